@@ -1,0 +1,96 @@
+//! Compiles every `glsl/**/*.comp` to SPIR-V and writes `shaders.rs`, the table that `src/gpu/shaders.rs` includes.
+//!
+//! With the feature `compile-shaders` the sources are compiled by shaderc; without it, `glsl/prebuilt/` is taken, so that
+//! whoever links the library needs neither cmake nor a shader compiler.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=glsl");
+    let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets OUT_DIR"));
+    let mut sources = Vec::new();
+    collect(Path::new("glsl"), &mut sources);
+    sources.sort();
+
+    let mut table = String::new();
+    let mut names = Vec::new();
+    for source in &sources {
+        let stem = source.strip_prefix("glsl").expect("found below glsl").with_extension("");
+        let name = stem.to_str().expect("shader names are ASCII").replace('\\', "/");
+        let constant = name.replace('/', "_").to_uppercase();
+        let spirv = spirv_of(source, &name, &out);
+        writeln!(
+            table,
+            "/// `glsl/{name}.comp`\npub static {constant}: Shader = Shader {{ name: {name:?}, spirv: include_bytes!({spirv:?}) }};"
+        )
+        .expect("writing to a string");
+        names.push(constant);
+    }
+    writeln!(
+        table,
+        "/// Every shader of the library, by name.\npub static ALL: &[&Shader] = &[&{}];",
+        names.join(", &")
+    )
+    .expect("writing to a string");
+    fs::write(out.join("shaders.rs"), table).expect("OUT_DIR can be written");
+}
+
+fn collect(folder: &Path, sources: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("glsl/ is part of the package") {
+        let path = entry.expect("glsl/ can be listed").path();
+        if path.is_dir() {
+            collect(&path, sources);
+        } else if path.extension().is_some_and(|e| e == "comp") {
+            sources.push(path);
+        }
+    }
+}
+
+/// The file of the prebuilt SPIR-V of a shader: one flat folder, `/` written as `.`.
+#[cfg_attr(feature = "compile-shaders", allow(dead_code, reason = "only the build without a compiler reads it"))]
+fn prebuilt(name: &str) -> PathBuf {
+    let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR").expect("cargo sets CARGO_MANIFEST_DIR"));
+    root.join("glsl/prebuilt").join(format!("{}.spv", name.replace('/', ".")))
+}
+
+#[cfg(not(feature = "compile-shaders"))]
+fn spirv_of(_source: &Path, name: &str, _out: &Path) -> PathBuf {
+    let path = prebuilt(name);
+    assert!(
+        path.exists(),
+        "{} is missing: build with the feature `compile-shaders`, or run `make prebuilt`",
+        path.display()
+    );
+    path
+}
+
+#[cfg(feature = "compile-shaders")]
+fn spirv_of(source: &Path, name: &str, out: &Path) -> PathBuf {
+    let text = fs::read_to_string(source).expect("the shader was just listed");
+    let compiler = shaderc::Compiler::new().expect("shaderc starts");
+    let mut options = shaderc::CompileOptions::new().expect("shaderc gives options");
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
+    options.set_optimization_level(shaderc::OptimizationLevel::Performance);
+    options.set_warnings_as_errors();
+    // Every include is named from glsl/, so that a line such as `#include "gpu/pass.glsl"` means the same everywhere.
+    options.set_include_callback(|requested, _kind, _from, _depth| {
+        let path = Path::new("glsl").join(requested);
+        let content = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
+    });
+    let file = source.display().to_string();
+    let binary = match compiler.compile_into_spirv(&text, shaderc::ShaderKind::Compute, &file, "main", Some(&options)) {
+        Ok(binary) => binary,
+        Err(error) => {
+            // shaderc already writes `glsl/room/pass.comp:LINE: error: …`, which editors follow as they follow rustc.
+            eprintln!("{error}");
+            panic!("a shader does not compile, see above");
+        }
+    };
+    let path = out.join(format!("{}.spv", name.replace('/', ".")));
+    fs::write(&path, binary.as_binary_u8()).expect("OUT_DIR can be written");
+    path
+}

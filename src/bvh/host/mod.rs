@@ -1,0 +1,1 @@
+//! Builders on the host: plain, and the specification of those on the device.

@@ -1,0 +1,198 @@
+//! The library on a device that somebody made: limits and pipelines, nothing else.
+
+use super::shaders::Shader;
+use crate::{Error, Result};
+use ash::vk;
+use std::collections::HashMap;
+use std::sync::Mutex;
+
+/// What [`Context::new`] takes.
+pub struct ContextDesc<'a> {
+    /// The instance that the device came from.
+    pub instance: &'a ash::Instance,
+    /// The device's physical device.
+    pub physical_device: vk::PhysicalDevice,
+    /// The device, created with everything that [`super::requirements`] asks for.
+    pub device: &'a ash::Device,
+    /// Where pipelines are cached; null for none. Stays the caller's.
+    pub pipeline_cache: vk::PipelineCache,
+    /// `VK_EXT_debug_utils` of the device, if each phase shall be labelled.
+    pub debug_utils: Option<&'a ash::ext::debug_utils::Device>,
+}
+
+/// What the builders must know of the device to choose sizes.
+#[derive(Debug, Clone)]
+pub struct Limits {
+    /// The device's name.
+    pub name: String,
+    /// CPU, integrated or discrete: a CPU wants few long invocations, a GPU many short ones.
+    pub kind: vk::PhysicalDeviceType,
+    /// The subgroup size the driver reports.
+    pub subgroup_size: u32,
+    /// Invocations a workgroup, at most.
+    pub workgroup_invocations: u32,
+    /// Bytes of shared memory a workgroup, at most.
+    pub shared_memory: u32,
+    /// Workgroups of a dispatch in x, at most.
+    pub workgroup_count: u32,
+    /// Nanoseconds a timestamp tick.
+    pub timestamp_period: f32,
+}
+
+impl Limits {
+    fn of(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Limits {
+        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup);
+        // SAFETY: the handles are the caller's and live.
+        unsafe { instance.get_physical_device_properties2(physical_device, &mut properties) };
+        let properties = properties.properties;
+        Limits {
+            name: properties.device_name_as_c_str().unwrap_or(c"?").to_string_lossy().into_owned(),
+            kind: properties.device_type,
+            subgroup_size: subgroup.subgroup_size,
+            workgroup_invocations: properties.limits.max_compute_work_group_invocations,
+            shared_memory: properties.limits.max_compute_shared_memory_size,
+            workgroup_count: properties.limits.max_compute_work_group_count[0],
+            timestamp_period: properties.limits.timestamp_period,
+        }
+    }
+
+    /// Whether the device is a CPU (lavapipe, SwiftShader).
+    pub fn is_cpu(&self) -> bool {
+        self.kind == vk::PhysicalDeviceType::CPU
+    }
+}
+
+/// A shader with its specialisation constants: what a pipeline is made of.
+///
+/// Constant 0 is the workgroup size in x by convention (`local_size_x_id = 0`); the others follow from 1 on.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Kernel {
+    shader: &'static str,
+    constants: Vec<u32>,
+}
+
+impl Kernel {
+    /// `shader` with a workgroup of `workgroup` invocations and the specialisation constants 1, 2, … as given.
+    pub fn new(shader: &'static Shader, workgroup: u32, constants: &[u32]) -> Kernel {
+        let mut all = vec![workgroup];
+        all.extend_from_slice(constants);
+        Kernel { shader: shader.name, constants: all }
+    }
+
+    /// The workgroup size in x.
+    pub fn workgroup(&self) -> u32 {
+        self.constants[0]
+    }
+}
+
+/// The library's state on one device: pipelines, made when first recorded.
+///
+/// Safe to share between threads that record; recording the first use of a kernel takes a lock.
+pub struct Context {
+    device: ash::Device,
+    debug_utils: Option<ash::ext::debug_utils::Device>,
+    /// What the device is and can.
+    pub limits: Limits,
+    layout: vk::PipelineLayout,
+    cache: vk::PipelineCache,
+    pipelines: Mutex<HashMap<Kernel, vk::Pipeline>>,
+}
+
+impl Context {
+    /// Wraps the caller's device.
+    ///
+    /// # Errors
+    /// A pipeline layout could not be made.
+    ///
+    /// # Safety
+    /// The device was created from `instance` and `physical_device` with the version, extensions and features that
+    /// [`super::requirements`] returned for it, and outlives the context.
+    pub unsafe fn new(desc: &ContextDesc<'_>) -> Result<Context> {
+        let range = vk::PushConstantRange::default()
+            .stage_flags(vk::ShaderStageFlags::COMPUTE)
+            .size(super::requirements::PUSH_CONSTANT_BYTES);
+        let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(std::slice::from_ref(&range));
+        // SAFETY: the device is live by the caller's promise.
+        let layout = unsafe { desc.device.create_pipeline_layout(&info, None) }
+            .map_err(Error::vulkan("vkCreatePipelineLayout"))?;
+        Ok(Context {
+            device: desc.device.clone(),
+            debug_utils: desc.debug_utils.cloned(),
+            limits: Limits::of(desc.instance, desc.physical_device),
+            layout,
+            cache: desc.pipeline_cache,
+            pipelines: Mutex::default(),
+        })
+    }
+
+    /// The device the context was made on.
+    pub fn ash_device(&self) -> &ash::Device {
+        &self.device
+    }
+
+    pub(super) fn layout(&self) -> vk::PipelineLayout {
+        self.layout
+    }
+
+    pub(super) fn debug_utils(&self) -> Option<&ash::ext::debug_utils::Device> {
+        self.debug_utils.as_ref()
+    }
+
+    /// Makes the pipelines of `kernels` now instead of when they are first recorded.
+    ///
+    /// # Errors
+    /// A pipeline could not be made.
+    pub fn warm(&self, kernels: &[Kernel]) -> Result<()> {
+        kernels.iter().try_for_each(|kernel| self.pipeline(kernel).map(drop))
+    }
+
+    pub(super) fn pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
+        let mut pipelines = self.pipelines.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if let Some(&pipeline) = pipelines.get(kernel) {
+            return Ok(pipeline);
+        }
+        let pipeline = self.create_pipeline(kernel)?;
+        pipelines.insert(kernel.clone(), pipeline);
+        Ok(pipeline)
+    }
+
+    fn create_pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
+        let shader =
+            super::shaders::ALL.iter().find(|s| s.name == kernel.shader).expect("kernels name shaders of the table");
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv)).expect("build.rs wrote whole words");
+        let module_info = vk::ShaderModuleCreateInfo::default().code(&words);
+        let entries: Vec<_> = (0..kernel.constants.len() as u32)
+            .map(|id| vk::SpecializationMapEntry { constant_id: id, offset: 4 * id, size: 4 })
+            .collect();
+        let specialisation =
+            vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&kernel.constants));
+        // SAFETY: the device is live; the module is destroyed after the pipeline that used it was made.
+        unsafe {
+            let module =
+                self.device.create_shader_module(&module_info, None).map_err(Error::vulkan("vkCreateShaderModule"))?;
+            let stage = vk::PipelineShaderStageCreateInfo::default()
+                .stage(vk::ShaderStageFlags::COMPUTE)
+                .module(module)
+                .name(c"main")
+                .specialization_info(&specialisation);
+            let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
+            let made = self.device.create_compute_pipelines(self.cache, &[info], None);
+            self.device.destroy_shader_module(module, None);
+            made.map(|pipelines| pipelines[0]).map_err(|(_, result)| Error::vulkan("vkCreateComputePipelines")(result))
+        }
+    }
+}
+
+impl Drop for Context {
+    fn drop(&mut self) {
+        let pipelines = self.pipelines.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
+        // SAFETY: made by this context; the caller has waited for the command buffers that use them.
+        unsafe {
+            for (_, pipeline) in pipelines.drain() {
+                self.device.destroy_pipeline(pipeline, None);
+            }
+            self.device.destroy_pipeline_layout(self.layout, None);
+        }
+    }
+}

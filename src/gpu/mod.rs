@@ -1,0 +1,17 @@
+//! The device: what we need of it, pipelines, recording, timing, and the primitives that every builder stands on.
+//!
+//! [`Context`] takes a device that the caller made and owns nothing but pipelines. `Device` is the binary's and the tests'
+//! own device, built on the same public calls.
+
+mod context;
+#[cfg(feature = "cli")]
+mod device;
+mod recorder;
+mod requirements;
+pub mod shaders;
+
+pub use context::{Context, ContextDesc, Kernel, Limits};
+#[cfg(feature = "cli")]
+pub use device::{Buffer, Device, DeviceOptions, Found, list};
+pub use recorder::{Phase, Recorder, Timestamps};
+pub use requirements::{Features, Requirements, requirements};

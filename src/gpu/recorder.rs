@@ -1,0 +1,233 @@
+//! Recording: phases, dispatches and barriers into the caller's command buffer, with labels and timestamps.
+
+use super::{Context, Kernel};
+use crate::{Error, Result};
+use ash::vk;
+use std::ffi::CString;
+
+/// One phase of a build and how long it took on the device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Phase {
+    /// What was done.
+    pub name: &'static str,
+    /// Milliseconds by the device's timestamps.
+    pub milliseconds: f64,
+}
+
+/// A query pool that a [`Recorder`] writes a timestamp into at each phase.
+pub struct Timestamps {
+    device: ash::Device,
+    pool: vk::QueryPool,
+    capacity: u32,
+    period: f32,
+    names: Vec<&'static str>,
+}
+
+impl Timestamps {
+    /// Room for `phases` phases.
+    ///
+    /// # Errors
+    /// The query pool could not be made.
+    pub fn new(context: &Context, phases: u32) -> Result<Timestamps> {
+        let capacity = phases + 1;
+        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(capacity);
+        let device = context.ash_device().clone();
+        // SAFETY: the context's device is live.
+        let pool = unsafe { device.create_query_pool(&info, None) }.map_err(Error::vulkan("vkCreateQueryPool"))?;
+        Ok(Timestamps { device, pool, capacity, period: context.limits.timestamp_period, names: Vec::new() })
+    }
+
+    /// The phases of the last recording, read back. Call after the command buffer has finished.
+    ///
+    /// # Errors
+    /// The timestamps could not be read.
+    pub fn phases(&self) -> Result<Vec<Phase>> {
+        if self.names.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut ticks = vec![0u64; self.names.len() + 1];
+        // SAFETY: the pool is ours, and holds one timestamp a phase and one at the end.
+        unsafe {
+            self.device.get_query_pool_results(
+                self.pool,
+                0,
+                &mut ticks,
+                vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT,
+            )
+        }
+        .map_err(Error::vulkan("vkGetQueryPoolResults"))?;
+        let phase = |(i, &name): (usize, &&'static str)| Phase {
+            name,
+            milliseconds: ticks[i + 1].wrapping_sub(ticks[i]) as f64 * f64::from(self.period) * 1e-6,
+        };
+        Ok(self.names.iter().enumerate().map(phase).collect())
+    }
+}
+
+impl Drop for Timestamps {
+    fn drop(&mut self) {
+        // SAFETY: ours; the caller has waited for the command buffers that write it.
+        unsafe { self.device.destroy_query_pool(self.pool, None) };
+    }
+}
+
+/// Records passes into a command buffer that is the caller's, and being recorded.
+///
+/// Clobbers the bound compute pipeline and the compute push constants, nothing else.
+/// Ends the last phase when dropped.
+pub struct Recorder<'a> {
+    context: &'a Context,
+    commands: vk::CommandBuffer,
+    timestamps: Option<&'a mut Timestamps>,
+    in_phase: bool,
+}
+
+impl<'a> Recorder<'a> {
+    /// Records into `commands`.
+    ///
+    /// # Safety
+    /// `commands` is in the recording state, outside a render pass, from a compute queue family of the context's device,
+    /// and is recorded by nobody else meanwhile. Device addresses given to the passes stay valid until it has run.
+    pub unsafe fn new(context: &'a Context, commands: vk::CommandBuffer) -> Recorder<'a> {
+        Recorder { context, commands, timestamps: None, in_phase: false }
+    }
+
+    /// Writes a timestamp at every phase into `timestamps`, which it resets.
+    pub fn timed(mut self, timestamps: &'a mut Timestamps) -> Recorder<'a> {
+        timestamps.names.clear();
+        // SAFETY: `new`'s promise; the pool is ours.
+        unsafe {
+            self.context.ash_device().cmd_reset_query_pool(self.commands, timestamps.pool, 0, timestamps.capacity);
+        }
+        self.timestamps = Some(timestamps);
+        self
+    }
+
+    /// The context whose kernels are recorded.
+    pub fn context(&self) -> &'a Context {
+        self.context
+    }
+
+    /// The command buffer being recorded.
+    pub fn commands(&self) -> vk::CommandBuffer {
+        self.commands
+    }
+
+    /// Ends the phase before and begins the phase `name`: a debug label and a timestamp.
+    pub fn phase(&mut self, name: &'static str) {
+        self.end_label();
+        if let Some(debug) = self.context.debug_utils() {
+            let label = CString::new(name).expect("phase names hold no zero byte");
+            // SAFETY: `new`'s promise.
+            unsafe {
+                debug.cmd_begin_debug_utils_label(self.commands, &vk::DebugUtilsLabelEXT::default().label_name(&label));
+            }
+        }
+        self.in_phase = true;
+        let at = self.timestamps.as_ref().map_or(0, |t| t.names.len() as u32);
+        self.stamp(at);
+        if let Some(timestamps) = &mut self.timestamps {
+            timestamps.names.push(name);
+        }
+    }
+
+    /// Dispatches `groups` workgroups of `kernel` with `arguments` as push constants (at most 128 bytes).
+    ///
+    /// # Errors
+    /// The kernel's pipeline could not be made.
+    pub fn dispatch<T: bytemuck::NoUninit>(&mut self, kernel: &Kernel, arguments: &T, groups: u32) -> Result<()> {
+        if groups == 0 {
+            return Ok(());
+        }
+        self.bind(kernel, arguments)?;
+        // SAFETY: `new`'s promise; the pipeline is live.
+        unsafe { self.context.ash_device().cmd_dispatch(self.commands, groups, 1, 1) };
+        Ok(())
+    }
+
+    /// Like [`Recorder::dispatch`], with as many workgroups as the three words at `offset` of `buffer` say when it runs.
+    ///
+    /// # Errors
+    /// The kernel's pipeline could not be made.
+    ///
+    /// # Safety
+    /// `buffer` is live, has `INDIRECT_BUFFER` usage and three words at `offset`.
+    pub unsafe fn dispatch_indirect<T: bytemuck::NoUninit>(
+        &mut self,
+        kernel: &Kernel,
+        arguments: &T,
+        buffer: vk::Buffer,
+        offset: u64,
+    ) -> Result<()> {
+        self.bind(kernel, arguments)?;
+        // SAFETY: the caller's promise.
+        unsafe { self.context.ash_device().cmd_dispatch_indirect(self.commands, buffer, offset) };
+        Ok(())
+    }
+
+    fn bind<T: bytemuck::NoUninit>(&mut self, kernel: &Kernel, arguments: &T) -> Result<()> {
+        let pipeline = self.context.pipeline(kernel)?;
+        let device = self.context.ash_device();
+        // SAFETY: `new`'s promise; the pipeline is live and the arguments fit the layout's 128 bytes.
+        unsafe {
+            device.cmd_bind_pipeline(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline);
+            let bytes = bytemuck::bytes_of(arguments);
+            device.cmd_push_constants(self.commands, self.context.layout(), vk::ShaderStageFlags::COMPUTE, 0, bytes);
+        }
+        Ok(())
+    }
+
+    /// Makes what dispatches before have written visible to dispatches after.
+    pub fn barrier(&mut self) {
+        let barrier = vk::MemoryBarrier::default()
+            .src_access_mask(vk::AccessFlags::SHADER_WRITE)
+            .dst_access_mask(vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE);
+        let stage = vk::PipelineStageFlags::COMPUTE_SHADER;
+        // SAFETY: `new`'s promise.
+        unsafe {
+            self.context.ash_device().cmd_pipeline_barrier(
+                self.commands,
+                stage,
+                stage,
+                vk::DependencyFlags::empty(),
+                &[barrier],
+                &[],
+                &[],
+            );
+        }
+    }
+
+    fn stamp(&mut self, at: u32) {
+        if let Some(timestamps) = &self.timestamps {
+            assert!(at < timestamps.capacity, "more phases than the Timestamps have room for");
+            // SAFETY: `new`'s promise; the query was reset by `timed` and is written once.
+            unsafe {
+                self.context.ash_device().cmd_write_timestamp(
+                    self.commands,
+                    vk::PipelineStageFlags::BOTTOM_OF_PIPE,
+                    timestamps.pool,
+                    at,
+                );
+            }
+        }
+    }
+
+    fn end_label(&mut self) {
+        if self.in_phase
+            && let Some(debug) = self.context.debug_utils()
+        {
+            // SAFETY: `new`'s promise; a label is open.
+            unsafe { debug.cmd_end_debug_utils_label(self.commands) };
+        }
+    }
+}
+
+impl Drop for Recorder<'_> {
+    fn drop(&mut self) {
+        self.end_label();
+        if self.in_phase {
+            let at = self.timestamps.as_ref().map_or(0, |t| t.names.len() as u32);
+            self.stamp(at);
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! Acceleration structures for ray tracing, built and traced with Vulkan compute shaders, and measured.
+//!
+//! The rooms, in the order in which a triangle walks through them:
+//!
+//! 1. [`scene`] reads triangles from files or generates them;
+//! 2. [`gpu`] records passes into a command buffer: reductions, scans, sorts, the task pool;
+//! 3. [`bvh`] turns triangles into codes, codes into an order, the order into a hierarchy, and that into a [`bvh::layout`];
+//! 4. [`trace`] finds the hits of rays in it;
+//! 5. [`measure`] turns builds and hits into figures;
+//! 6. [`report`] turns figures into tables and charts;
+//! 7. [`cli`] is the binary's commands.
+//!
+//! An engine needs [`gpu`], [`bvh`] and [`trace`] alone (`default-features = false`).
+#![warn(missing_docs)]
+
+pub mod bvh;
+#[cfg(feature = "cli")]
+pub mod cli;
+mod error;
+pub mod gpu;
+#[cfg(feature = "cli")]
+pub mod measure;
+#[cfg(feature = "cli")]
+pub mod report;
+#[cfg(feature = "cli")]
+pub mod scene;
+pub mod trace;
+
+pub use ash;
+pub use error::{Error, Result};

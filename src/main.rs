@@ -1,0 +1,3 @@
+//! The `hedgerow` binary: see `hedgerow --help`, and `cli` in the library.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! Figures: building and tracing under the clock, quality, and the records they end up in.
+
+pub mod record;
