@@ -47,8 +47,7 @@ pub struct Requirements {
 
 /// Bytes of push constants that the passes use at most; Vulkan guarantees 128.
 pub const PUSH_CONSTANT_BYTES: u32 = 128;
-/// Bytes of shared memory that the passes use at most; Vulkan guarantees 16 KiB.
-pub const SHARED_MEMORY_BYTES: u32 = 16 << 10;
+
 /// The subgroup operations that the passes use, in compute shaders.
 const SUBGROUP_OPERATIONS: [(vk::SubgroupFeatureFlags, &str); 5] = [
     (vk::SubgroupFeatureFlags::BASIC, "basic"),

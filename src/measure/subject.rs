@@ -1,0 +1,64 @@
+//! What is measured: a builder on a scene, behind one interface, ours and the peers' alike.
+
+use super::record;
+use crate::bvh::layout::Bvh2;
+use crate::trace::{Hit, Query, Ray, Work};
+use crate::{Result, gpu};
+
+/// One build under the clock.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BuildRun {
+    /// Milliseconds in all.
+    pub milliseconds: f64,
+    /// The phases, where the builder knows them; they sum to `milliseconds` or a little less.
+    pub phases: Vec<gpu::Phase>,
+}
+
+/// A builder on a scene. Whatever is uploaded once is uploaded when the subject is made, not under the clock.
+///
+/// Order of calls: `build` first, any number of times; then the others.
+pub trait Subject {
+    /// Builder with its options, as `-b` takes it.
+    fn builder(&self) -> &str;
+    /// `bvh2`, `driver` or `host`.
+    fn kind(&self) -> &'static str;
+    /// `device` where build times are timestamps, otherwise `wall`.
+    fn timer(&self) -> &'static str;
+    /// Builds once, from the triangles, into the same memory as before.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn build(&mut self) -> Result<BuildRun>;
+    /// Bytes of structure and scratch.
+    fn memory(&self) -> record::Memory;
+    /// Quality of the built tree with the costs of a step and of a test; figures that the builder cannot tell are `None`.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality>;
+    /// The tree on the host, where its layout is ours.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn tree(&mut self) -> Result<Option<Bvh2>>;
+    /// Brings rays to where they are traced; not under the clock.
+    ///
+    /// # Errors
+    /// Too little memory.
+    fn set_rays(&mut self, rays: &[Ray]) -> Result<()>;
+    /// Traces the rays once; milliseconds by the same kind of clock as `timer`.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn trace(&mut self, query: Query) -> Result<f64>;
+    /// The hits of the last `trace`, one a ray.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn hits(&mut self) -> Result<Vec<Hit>>;
+    /// Steps and tests of every ray, where the tracer counts them; not under the clock.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>>;
+}

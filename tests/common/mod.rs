@@ -1,0 +1,22 @@
+//! What the device tests share: one device a test binary, with the validation layers on where they are installed.
+#![allow(dead_code, reason = "each test binary uses its part")]
+
+use hedgerow::gpu::{Device, DeviceOptions};
+use std::sync::OnceLock;
+
+/// The device of this test binary. Any validation message fails the test that caused it.
+///
+/// Without the layers (`make test` installs them) the tests still run, and say so.
+pub fn device() -> &'static Device {
+    static DEVICE: OnceLock<Device> = OnceLock::new();
+    DEVICE.get_or_init(|| {
+        let wanted = std::env::var("HEDGEROW_DEVICE").ok();
+        let options = DeviceOptions { wanted, validation: true, ray_query: true };
+        Device::new(&options)
+            .or_else(|error| {
+                eprintln!("without validation layers: {error}");
+                Device::new(&DeviceOptions { validation: false, ..options })
+            })
+            .expect("a Vulkan device that has what hedgerow needs")
+    })
+}
