@@ -1,4 +1,8 @@
-//! Bounding volume hierarchies: node layouts, builders on the device, and their twins on the host.
+//! Bounding volume hierarchies: codes, node layouts, builders on the device, and their twins on the host.
 
+pub mod codes;
 pub mod host;
 pub mod layout;
+pub mod quality;
+pub mod sah;
+pub mod validate;

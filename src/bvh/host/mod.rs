@@ -1,1 +1,3 @@
 //! Builders on the host: plain, and the specification of those on the device.
+
+pub mod lbvh;

@@ -1,0 +1,138 @@
+//! Walks a structure on the host and says what is wrong and where.
+
+use super::layout::{Aabb, Bvh2, Child, MAX_DEPTH};
+use crate::{Error, Result};
+
+impl Bvh2 {
+    /// Checks every rule of the layout: indices in range, no cycle, every active triangle in exactly one leaf, boxes that are
+    /// exactly those around what they hold, and a depth that tracers can walk.
+    ///
+    /// # Errors
+    /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
+    pub fn validate(&self) -> Result<()> {
+        let header = &self.header;
+        if header.active > header.primitive_count {
+            return invalid(format!("{} active of {} primitives", header.active, header.primitive_count));
+        }
+        self.validate_primitives()?;
+        if header.active == 0 {
+            let empty = header.root.bounds() == Aabb::EMPTY && header.root.count == 0;
+            return if empty { Ok(()) } else { invalid("no active primitive, but the root is not empty".into()) };
+        }
+
+        let mut in_leaf = vec![false; header.active as usize];
+        let mut visited = vec![false; self.nodes.len()];
+        // What is left to see: a child, its depth, and the node that names it.
+        let mut stack = vec![(header.root, 0, None::<u32>)];
+        while let Some((child, depth, parent)) = stack.pop() {
+            let named_by = parent.map_or("the header".to_owned(), |slot| format!("node {slot}"));
+            if depth > MAX_DEPTH {
+                return invalid(format!("{named_by} is at depth {depth}, the most is {MAX_DEPTH}"));
+            }
+            if child.is_leaf() {
+                let range = child.index as usize..child.index as usize + child.count as usize;
+                if range.end > in_leaf.len() {
+                    return invalid(format!("{named_by}: a leaf of {range:?}, there are {} triangles", in_leaf.len()));
+                }
+                if let Some(twice) = range.clone().find(|&t| std::mem::replace(&mut in_leaf[t], true)) {
+                    return invalid(format!("{named_by}: triangle {twice} is in two leaves"));
+                }
+                let around =
+                    self.triangles[range].iter().fold(Aabb::EMPTY, |b, t| b.union(&Aabb::around(&[t.v0, t.v1, t.v2])));
+                same_box(&child, &around, &named_by)?;
+            } else {
+                let Some(node) = self.nodes.get(child.index as usize) else {
+                    return invalid(format!("{named_by}: node {}, there are {}", child.index, self.nodes.len()));
+                };
+                if std::mem::replace(&mut visited[child.index as usize], true) {
+                    return invalid(format!("{named_by}: node {} has two parents", child.index));
+                }
+                let [left, right] = node.children;
+                same_box(&child, &left.bounds().union(&right.bounds()), &named_by)?;
+                stack.extend(node.children.map(|c| (c, depth + 1, Some(child.index))));
+            }
+        }
+        match in_leaf.iter().position(|&there| !there) {
+            Some(lost) => invalid(format!("triangle {lost} is in no leaf")),
+            None => Ok(()),
+        }
+    }
+
+    /// The primitive order names every primitive once.
+    fn validate_primitives(&self) -> Result<()> {
+        let mut named = vec![false; self.triangles.len()];
+        for (position, triangle) in self.triangles.iter().enumerate() {
+            match named.get_mut(triangle.primitive as usize) {
+                None => return invalid(format!("triangle {position} names primitive {}", triangle.primitive)),
+                Some(true) => return invalid(format!("primitive {} is there twice", triangle.primitive)),
+                Some(there) => *there = true,
+            }
+        }
+        Ok(())
+    }
+}
+
+fn same_box(child: &Child, around: &Aabb, named_by: &str) -> Result<()> {
+    if child.bounds() == *around {
+        return Ok(());
+    }
+    let what = if child.is_leaf() { "leaf from" } else { "node" };
+    invalid(format!(
+        "{named_by}: {what} {} has box {:?}, around its content is {around:?}",
+        child.index,
+        child.bounds()
+    ))
+}
+
+fn invalid(what: String) -> Result<()> {
+    Err(Error::InvalidStructure(what))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::codes::Code;
+    use crate::bvh::host::lbvh;
+    use crate::bvh::sah::Collapse;
+
+    fn tree(collapse: Collapse) -> Bvh2 {
+        let positions: Vec<[f32; 3]> =
+            (0..60).map(|i| [(i * 7 % 13) as f32, (i * 5 % 11) as f32, (i % 3) as f32]).collect();
+        let triangles: Vec<[u32; 3]> = (0..20).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        lbvh::build(&positions, &triangles, Code::Mc30.full(), collapse)
+    }
+
+    #[test]
+    fn a_built_tree_is_valid_and_round_trips_through_bytes() {
+        for collapse in [Collapse::OFF, Collapse::SAH] {
+            let tree = tree(collapse);
+            tree.validate().expect("valid");
+            let again = Bvh2::from_bytes(&tree.to_bytes()).expect("its own bytes");
+            assert_eq!(again.to_bytes(), tree.to_bytes());
+        }
+    }
+
+    #[test]
+    fn every_broken_rule_is_found_and_named() {
+        let breaks: [(&str, fn(&mut Bvh2)); 6] = [
+            ("has box", |t| t.nodes[t.header.root.index as usize].children[0].hi[1] += 1.0),
+            ("two leaves", |t| first_leaf(t).index = 3),
+            ("there are 20 triangles", |t| first_leaf(t).count = 21),
+            ("there twice", |t| t.triangles[0].primitive = t.triangles[1].primitive),
+            ("names primitive 99", |t| t.triangles[4].primitive = 99),
+            ("active", |t| t.header.active = 21),
+        ];
+        for (says, break_it) in breaks {
+            let mut tree = tree(Collapse::OFF);
+            // Position 3 belongs to another leaf than the first one found, or the break would be none.
+            assert_ne!(first_leaf(&mut tree).index, 3);
+            break_it(&mut tree);
+            let error = tree.validate().expect_err(says).to_string();
+            assert!(error.contains(says), "{says}: {error}");
+        }
+        fn first_leaf(tree: &mut Bvh2) -> &mut Child {
+            let leaves = tree.nodes.iter_mut().flat_map(|n| &mut n.children);
+            leaves.into_iter().find(|c| c.count == 1 && c.index != 3).expect("a leaf")
+        }
+    }
+}
