@@ -6,6 +6,8 @@
 mod context;
 #[cfg(feature = "cli")]
 mod device;
+#[cfg(feature = "cli")]
+mod driver_structure;
 mod recorder;
 mod requirements;
 pub mod shaders;
@@ -13,5 +15,7 @@ pub mod shaders;
 pub use context::{Context, ContextDesc, Kernel, Limits};
 #[cfg(feature = "cli")]
 pub use device::{Buffer, Device, DeviceOptions, Found, list};
+#[cfg(feature = "cli")]
+pub use driver_structure::{DriverPreference, DriverSizes, DriverStructure};
 pub use recorder::{Phase, Recorder, Timestamps};
 pub use requirements::{Features, Requirements, requirements};

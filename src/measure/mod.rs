@@ -5,6 +5,7 @@
 
 pub mod growth;
 pub mod pareto;
+pub mod peers;
 pub mod provenance;
 pub mod record;
 pub mod statistics;

@@ -1,0 +1,3 @@
+//! Peers: what a user would take instead of our builders, behind the same interface and in the same table.
+
+pub mod driver;

@@ -1,0 +1,88 @@
+//! The driver's own acceleration structure as a peer: its hits are those of plain arithmetic, so that comparing with it
+//! means something.
+#![cfg(feature = "cli")]
+
+mod common;
+
+use hedgerow::gpu::DriverPreference;
+use hedgerow::measure::Subject;
+use hedgerow::measure::peers::driver::Driver;
+use hedgerow::scene::Mesh;
+use hedgerow::trace::{Hit, Query, Ray};
+
+const PREFERENCES: [DriverPreference; 2] = [DriverPreference::FastBuild, DriverPreference::FastTrace];
+
+fn traced(mesh: &Mesh, preference: DriverPreference, rays: &[Ray], query: Query) -> Option<Vec<Hit>> {
+    let device = common::device();
+    if !device.has_ray_query() {
+        eprintln!("skipped: {} has no VK_KHR_ray_query", device.found().name);
+        return None;
+    }
+    let mut driver = Driver::new(device, mesh, preference).expect("the mesh fits");
+    driver.build().expect("the driver builds");
+    driver.set_rays(rays).expect("the rays fit");
+    driver.trace(query).expect("the driver traces");
+    Some(driver.hits().expect("one hit a ray"))
+}
+
+/// Two squares of two triangles each, at z = 1 (primitives 0, 1) and z = 2 (primitives 2, 3), over 0..1 in x and y.
+fn two_squares() -> Mesh {
+    let square = |z: f32| [[0., 0., z], [1., 0., z], [1., 1., z], [0., 1., z]];
+    Mesh { positions: [square(1.0), square(2.0)].concat(), triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]] }
+}
+
+fn upwards(x: f32, y: f32, t_min: f32, t_max: f32) -> Ray {
+    Ray { origin: [x, y, 0.0], t_min, direction: [0.0, 0.0, 0.5], t_max }
+}
+
+#[test]
+fn the_driver_reports_primitive_distance_and_weights_as_we_do() {
+    // Below the diagonal lies the first triangle of a square: (0.75, 0.25) = v0 + 0.5 (v1 - v0) + 0.25 (v2 - v0).
+    let rays = [
+        upwards(0.75, 0.25, 0.0, f32::INFINITY),
+        upwards(0.25, 0.75, 0.0, f32::INFINITY),
+        upwards(0.75, 0.25, 2.5, f32::INFINITY),
+        upwards(0.75, 0.25, 2.5, 3.5),
+        upwards(1.5, 0.5, 0.0, f32::INFINITY),
+    ];
+    let expected = [
+        Hit { t: 2.0, primitive: 0, u: 0.5, v: 0.25 },
+        Hit { t: 2.0, primitive: 1, u: 0.25, v: 0.5 },
+        Hit { t: 4.0, primitive: 2, u: 0.5, v: 0.25 },
+        Hit::NONE,
+        Hit::NONE,
+    ];
+    for preference in PREFERENCES {
+        let Some(hits) = traced(&two_squares(), preference, &rays, Query::ClosestHit) else { return };
+        for (hit, expected) in hits.iter().zip(&expected) {
+            assert_eq!(hit.primitive, expected.primitive, "{preference:?}: {hits:?}");
+            let close = |a: f32, b: f32| a == b || (a - b).abs() <= 1e-5;
+            assert!(close(hit.t, expected.t) && close(hit.u, expected.u) && close(hit.v, expected.v), "{hit:?}");
+        }
+        let any = traced(&two_squares(), preference, &rays, Query::AnyHit).expect("the device has ray queries");
+        let met: Vec<_> = any.iter().map(|h| (h.t, h.is_some())).collect();
+        assert_eq!(met, expected.map(|h| if h.is_some() { (0.0, true) } else { (f32::INFINITY, false) }));
+    }
+}
+
+#[test]
+fn building_twice_into_the_same_memory_gives_the_same_hits() {
+    let device = common::device();
+    if !device.has_ray_query() {
+        return;
+    }
+    let mut driver = Driver::new(device, &two_squares(), DriverPreference::FastTrace).expect("the mesh fits");
+    driver.set_rays(&[upwards(0.75, 0.25, 0.0, 9.0)]).expect("the rays fit");
+    let hits: Vec<_> = (0..2)
+        .map(|_| {
+            let run = driver.build().expect("the driver builds");
+            let names: Vec<_> = run.phases.iter().map(|p| p.name).collect();
+            assert_eq!(names, ["build", "tlas"]);
+            assert_eq!(run.milliseconds, run.phases[0].milliseconds, "the bottom level alone is compared");
+            driver.trace(Query::ClosestHit).expect("the driver traces");
+            driver.hits().expect("one hit a ray")
+        })
+        .collect();
+    assert_eq!(hits[0], hits[1]);
+    assert_eq!(hits[0][0].primitive, 0);
+}
