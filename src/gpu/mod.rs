@@ -8,6 +8,7 @@ mod context;
 mod device;
 #[cfg(feature = "cli")]
 mod driver_structure;
+pub mod radix_sort;
 mod recorder;
 mod requirements;
 pub mod shaders;

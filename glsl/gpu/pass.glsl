@@ -1,0 +1,30 @@
+// What every pass has: the workgroup size as specialisation constant 0, buffers by address, and the Vulkan memory model.
+#ifndef HEDGEROW_GPU_PASS
+#define HEDGEROW_GPU_PASS
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference2 : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#extension GL_KHR_memory_scope_semantics : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#pragma use_vulkan_memory_model
+
+layout(local_size_x_id = 0) in;
+
+// `nonprivate`: what one workgroup writes another may read within the same dispatch, ordered by the barriers below.
+#define BUFFER layout(buffer_reference, scalar, buffer_reference_align = 4) nonprivate buffer
+BUFFER Words { uint word[]; };
+BUFFER Floats { float value[]; };
+
+// Makes what this invocation has written available to the device, before an atomic that tells others of it.
+void release_to_device() {
+    memoryBarrier(gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsRelease | gl_SemanticsMakeAvailable);
+}
+
+// Makes what others have released visible to this invocation, after the atomic that told of it.
+void acquire_from_device() {
+    memoryBarrier(gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsAcquire | gl_SemanticsMakeVisible);
+}
+#endif

@@ -1,0 +1,169 @@
+//! Stable radix sort of 32- or 64-bit keys with a 32-bit payload, doing only the passes that the keys' bits need.
+//!
+//! Reduce, then scan (Satish, Harris, Garland 2009): each pass counts digits, scans the counts, scatters. It asks for no
+//! progress between workgroups, so it runs on any device. `glsl/gpu/radix_sort.glsl` is the device's side.
+
+use super::{Kernel, Limits, Recorder, shaders};
+use crate::Result;
+
+/// How the sort is cut for a device: what the pipelines are specialised with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shape {
+    /// Invocations a workgroup.
+    pub workgroup: u32,
+    /// Bits a pass sorts by.
+    pub digit_bits: u32,
+    /// Each invocation counts a strip of its own (CPUs), instead of a workgroup a tile (GPUs).
+    pub private_counters: bool,
+    /// Keys of a tile, for shared counters.
+    tile_keys: u32,
+}
+
+/// Keys of a lane in a tile: `ROWS` in radix_sort.glsl.
+const ROWS: u32 = 16;
+/// Subgroups a workgroup: the shared counters have room for so many.
+const SUBGROUPS: u32 = 8;
+
+impl Shape {
+    /// What suits the device: strips on a CPU, tiles on a GPU.
+    pub fn of(limits: &Limits) -> Shape {
+        if limits.is_cpu() { Shape::strips(limits) } else { Shape::tiles(limits) }
+    }
+
+    /// A strip of keys for each invocation, which counts alone: for CPUs, where an invocation is a lane of a loop.
+    pub fn strips(limits: &Limits) -> Shape {
+        Shape { workgroup: limits.subgroup_size.min(SUBGROUPS), digit_bits: 8, private_counters: true, tile_keys: 0 }
+    }
+
+    /// A tile of keys for each workgroup, ranked by ballots: for GPUs.
+    pub fn tiles(limits: &Limits) -> Shape {
+        let workgroup = (SUBGROUPS * limits.subgroup_size).min(limits.workgroup_invocations);
+        Shape { workgroup, digit_bits: 8, private_counters: false, tile_keys: workgroup * ROWS }
+    }
+
+    /// Digits a pass tells apart.
+    fn digits(&self) -> u32 {
+        1 << self.digit_bits
+    }
+
+    /// Keys of a column of the table, for `count` keys in all.
+    ///
+    /// Long strips make the table small, short ones keep all cores busy: about 64 strips of a small input, 4,096 of a large.
+    pub(crate) fn column_keys(&self, count: u32) -> u32 {
+        if self.private_counters { (count / 256).next_power_of_two().clamp(256, 4096) } else { self.tile_keys }
+    }
+
+    pub(crate) fn columns(&self, count: u32) -> u32 {
+        count.div_ceil(self.column_keys(count))
+    }
+
+    /// Words of the table for `count` keys.
+    pub fn table_words(&self, count: u32) -> u64 {
+        u64::from(self.digits()) * (u64::from(self.columns(count)) + 1)
+    }
+
+    /// Tasks (workgroups) of the counting and scattering steps.
+    pub(crate) fn column_tasks(&self, count: u32) -> u32 {
+        if self.private_counters { self.columns(count).div_ceil(self.workgroup) } else { self.columns(count) }
+    }
+
+    /// Tasks of the scanning step.
+    pub(crate) fn scan_tasks(&self) -> u32 {
+        if self.private_counters { self.digits().div_ceil(self.workgroup) } else { self.digits() }
+    }
+
+    /// Passes that keys of `bits` bits need.
+    pub fn passes(&self, bits: u32) -> u32 {
+        bits.div_ceil(self.digit_bits)
+    }
+
+    /// Specialisation constants 1 to 4 of everything that includes radix_sort.glsl; 1 is free for the includer.
+    pub(crate) fn constants(&self, first: u32, key_words: u32) -> [u32; 4] {
+        [first, self.digit_bits, u32::from(self.private_counters), key_words]
+    }
+}
+
+/// The most keys that are sorted at once.
+pub const MAX_COUNT: u32 = 1 << 27;
+
+/// Device addresses of one sort. Keys are 4 bytes each, or 8 (low word first) where `bits > 32`; values are 4 bytes each.
+#[derive(Debug, Clone, Copy)]
+pub struct Buffers {
+    /// Keys and values to sort; overwritten.
+    pub keys: [u64; 2],
+    /// Room for keys and values, `count` each; [`record`] tells in which of the two the result is.
+    pub values: [u64; 2],
+    /// [`Shape::table_words`] words.
+    pub table: u64,
+}
+
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Arguments {
+    keys: u64,
+    values: u64,
+    keys_out: u64,
+    values_out: u64,
+    table: u64,
+    count: u32,
+    shift: u32,
+    columns: u32,
+    column_keys: u32,
+    identity: u32,
+    padding: u32,
+}
+
+/// Records the sort of `count` keys by their low `bits` bits. Returns the index (0 or 1) of the buffers that hold the result.
+///
+/// Three dispatches a pass with a barrier behind each; the caller places one before the first.
+///
+/// # Errors
+/// A pipeline could not be made.
+///
+/// # Panics
+/// `count` is over [`MAX_COUNT`], or `bits` over 64.
+pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, buffers: &Buffers, count: u32, bits: u32) -> Result<usize> {
+    assert!(count <= MAX_COUNT && bits <= 64, "{count} keys of {bits} bits");
+    if count < 2 {
+        return Ok(0);
+    }
+    let constants = shape.constants(0, if bits > 32 { 2 } else { 1 });
+    let kernel = |shader| Kernel::new(shader, shape.workgroup, &constants);
+    let (counting, scanning, scattering) = (
+        kernel(&shaders::GPU_RADIX_SORT_COUNT),
+        kernel(&shaders::GPU_RADIX_SORT_SCAN),
+        kernel(&shaders::GPU_RADIX_SORT_SCATTER),
+    );
+    let passes = shape.passes(bits);
+    for pass in 0..passes {
+        let (from, to) = (pass as usize % 2, (pass as usize + 1) % 2);
+        let arguments = Arguments {
+            keys: buffers.keys[from],
+            values: buffers.values[from],
+            keys_out: buffers.keys[to],
+            values_out: buffers.values[to],
+            table: buffers.table,
+            count,
+            shift: pass * shape.digit_bits,
+            columns: shape.columns(count),
+            column_keys: shape.column_keys(count),
+            identity: 0,
+            padding: 0,
+        };
+        recorder.dispatch(&counting, &arguments, shape.column_tasks(count))?;
+        recorder.barrier();
+        recorder.dispatch(&scanning, &arguments, shape.scan_tasks())?;
+        recorder.barrier();
+        recorder.dispatch(&scattering, &arguments, shape.column_tasks(count))?;
+        recorder.barrier();
+    }
+    Ok(passes as usize % 2)
+}
+
+/// What the sort computes, plainly: stable by the low `bits` bits of the keys.
+pub fn on_host(keys: &[u64], values: &[u32], bits: u32) -> (Vec<u64>, Vec<u32>) {
+    let mask = if bits == 64 { u64::MAX } else { (1 << bits) - 1 };
+    let mut pairs: Vec<_> = keys.iter().copied().zip(values.iter().copied()).collect();
+    pairs.sort_by_key(|&(key, _)| key & mask);
+    pairs.into_iter().unzip()
+}
