@@ -3,7 +3,7 @@
 mod common;
 
 use common::device;
-use hedgerow::gpu::radix_sort::{self, Buffers, Shape};
+use hedgerow::gpu::radix_sort::{self, Buffers, Shape, Sort};
 use proptest::prelude::*;
 
 fn sorted_on_device(shape: &Shape, keys: &[u64], values: &[u32], bits: u32) -> (Vec<u64>, Vec<u32>) {
@@ -23,7 +23,7 @@ fn sorted_on_device(shape: &Shape, keys: &[u64], values: &[u32], bits: u32) -> (
     let mut result = 0;
     device
         .run(None, |recorder| {
-            result = radix_sort::record(recorder, shape, &buffers, count, bits)?;
+            result = radix_sort::record(recorder, shape, &buffers, &Sort { count, bits, identity: false })?;
             Ok(())
         })
         .unwrap();

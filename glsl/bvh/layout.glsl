@@ -5,6 +5,8 @@
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference2 : require
 #extension GL_EXT_buffer_reference_uvec2 : require
+#extension GL_KHR_memory_scope_semantics : require
+#pragma use_vulkan_memory_model
 
 const uint MAGIC = 0x72676468u;
 const uint KIND_BVH2 = 0x00020001u;
@@ -42,30 +44,33 @@ struct Header {
     uint status;
     uint primitive_count;
     Child root;
-    uint active;
+    uint active_count;
     uint node_slots;
     uint code_bits;
     uint reserved[17];
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Structure {
+layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer Structure {
     Header header;
     Node nodes[];
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Triangles {
+layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer Triangles {
     Triangle triangle[];
 };
 
-// Where the triangles of a structure begin: behind its nodes. No 64-bit integers, which a device need not have.
+// Where the triangles of a structure with so many node slots begin: behind the nodes. No 64-bit integers, which a device need
+// not have.
+Triangles triangles_at(uvec2 structure, uint node_slots) {
+    uint high, low, carry, carry2;
+    umulExtended(node_slots, 64u, high, low);
+    structure.x = uaddCarry(structure.x, low, carry);
+    structure.x = uaddCarry(structure.x, 128u, carry2);
+    structure.y += high + carry + carry2;
+    return Triangles(structure);
+}
+
 Triangles triangles_of(Structure structure) {
-    uint high, low, slots = structure.header.node_slots;
-    umulExtended(slots, 64u, high, low);
-    uvec2 address = uvec2(structure);
-    uint carry, carry2;
-    address.x = uaddCarry(address.x, low, carry);
-    address.x = uaddCarry(address.x, 128u, carry2);
-    address.y += high + carry + carry2;
-    return Triangles(address);
+    return triangles_at(uvec2(structure), structure.header.node_slots);
 }
 #endif

@@ -85,6 +85,11 @@ impl Code {
         }
     }
 
+    /// The number by which shaders know the order: `ORDER_…` in codes.glsl.
+    pub(crate) fn order_number(self) -> u32 {
+        self.order() as u32
+    }
+
     fn name(self) -> &'static str {
         match self {
             Code::Mc30 => "mc30",

@@ -3,6 +3,7 @@
 pub mod codes;
 pub mod host;
 pub mod layout;
+pub mod lbvh;
 pub mod quality;
 pub mod sah;
 pub mod validate;

@@ -97,6 +97,17 @@ pub struct Buffers {
     pub table: u64,
 }
 
+/// What to sort.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sort {
+    /// Keys, at most [`MAX_COUNT`].
+    pub count: u32,
+    /// The low bits to sort by, at most 64; over 32, keys are 8 bytes each.
+    pub bits: u32,
+    /// The values are 0, 1, 2, …: they need not be there.
+    pub identity: bool,
+}
+
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct Arguments {
@@ -113,7 +124,7 @@ struct Arguments {
     padding: u32,
 }
 
-/// Records the sort of `count` keys by their low `bits` bits. Returns the index (0 or 1) of the buffers that hold the result.
+/// Records the sort. Returns the index (0 or 1) of the buffers that hold the result.
 ///
 /// Three dispatches a pass with a barrier behind each; the caller places one before the first.
 ///
@@ -121,8 +132,9 @@ struct Arguments {
 /// A pipeline could not be made.
 ///
 /// # Panics
-/// `count` is over [`MAX_COUNT`], or `bits` over 64.
-pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, buffers: &Buffers, count: u32, bits: u32) -> Result<usize> {
+/// The count is over [`MAX_COUNT`], or the bits over 64.
+pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, buffers: &Buffers, sort: &Sort) -> Result<usize> {
+    let Sort { count, bits, identity } = *sort;
     assert!(count <= MAX_COUNT && bits <= 64, "{count} keys of {bits} bits");
     if count < 2 {
         return Ok(0);
@@ -147,7 +159,7 @@ pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, buffers: &Buffers, cou
             shift: pass * shape.digit_bits,
             columns: shape.columns(count),
             column_keys: shape.column_keys(count),
-            identity: 0,
+            identity: u32::from(identity && pass == 0),
             padding: 0,
         };
         recorder.dispatch(&counting, &arguments, shape.column_tasks(count))?;

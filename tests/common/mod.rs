@@ -1,6 +1,8 @@
 //! What the device tests share: one device a test binary, with the validation layers on where they are installed.
 #![allow(dead_code, reason = "each test binary uses its part")]
 
+pub mod corpus;
+
 use hedgerow::gpu::{Device, DeviceOptions};
 use std::sync::OnceLock;
 

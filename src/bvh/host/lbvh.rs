@@ -64,7 +64,12 @@ fn corners(positions: &[[f32; 3]], triangle: &[u32; 3]) -> Result<[[f32; 3]; 3],
     for (corner, &vertex) in corners.iter_mut().zip(triangle) {
         *corner = *positions.get(vertex as usize).ok_or(status::INDEX_OUT_OF_RANGE)?;
     }
-    if corners.iter().flatten().all(|x| x.is_finite()) { Ok(corners) } else { Err(status::NON_FINITE) }
+    // Adding zero turns −0 into 0: the least of two zeros is then the same on every device.
+    if corners.iter().flatten().all(|x| x.is_finite()) {
+        Ok(corners.map(|c| c.map(|x| x + 0.0)))
+    } else {
+        Err(status::NON_FINITE)
+    }
 }
 
 struct Tree<'a> {

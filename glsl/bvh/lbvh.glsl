@@ -1,0 +1,292 @@
+// The phases of the LBVH build, each a function over a task (a workgroup's worth of items): dispatched one by one
+// (bvh/lbvh_*.comp) or all from the task pool (bvh/lbvh_persistent.comp). src/bvh/lbvh.rs records both.
+//
+//   bounds     reads the triangles                     writes state: bounds, active_count, status
+//   plan       reads state: bounds                     writes state: plan; the structure's header
+//   encode     reads the triangles, plan               writes keys[0], ends (none); values[0] where nothing is sorted
+//   (sort      reads keys[0]                           writes keys[result], values[result]: gpu/radix_sort.glsl)
+//   hierarchy  reads the triangles, keys and values    writes the structure: triangles, nodes, root
+//
+// needs one barrier between each two, and before the first; subgroups of any size; workgroups of whole subgroups
+#ifndef HEDGEROW_BVH_LBVH
+#define HEDGEROW_BVH_LBVH
+#include "gpu/pass.glsl"
+#include "gpu/task_pool.glsl"
+#include "gpu/radix_sort.glsl"
+#include "bvh/layout.glsl"
+#include "bvh/triangles.glsl"
+#include "bvh/codes.glsl"
+
+// Items of an invocation in a task.
+layout(constant_id = 1) const uint ITEMS = 1;
+
+const uint NONE = 0xFFFFFFFFu;
+
+// The order of the phases in the pool; the radix sort's three steps a pass and the hierarchy follow.
+const uint PHASE_BOUNDS = 0;
+const uint PHASE_PLAN = 1;
+const uint PHASE_ENCODE = 2;
+const uint PHASES_BEFORE_SORT = 3;
+const uint PHASES_OF_A_PASS = 3;
+
+BUFFER LbvhState {
+    uint pool[4 + POOL_PHASES_AT_MOST];   // a PoolState
+    uint boxes_lo[3];                     // `ordered` floats
+    uint boxes_hi[3];
+    uint centroids_lo[3];
+    uint centroids_hi[3];
+    uint active_count;
+    uint status;
+    CodePlan plan;
+};
+
+layout(push_constant, scalar) uniform Arguments {
+    uvec2 positions;
+    uvec2 indices;
+    uvec2 structure_address;
+    uvec2 state_address;
+    uvec2 keys[2];
+    uvec2 values[2];
+    uvec2 ends_address;
+    uvec2 table_address;
+    uint primitive_count;
+    uint vertex_count;
+    uint vertex_stride;
+    uint code_kind;     // order, bits << 8, size group << 16, concise << 24, collapse << 25
+    float c_t;
+    float c_i;
+    uint columns;       // of the radix sort's table
+    uint column_keys;
+    uint passes;        // of the radix sort
+};
+
+Input mesh() {
+    return Input(Floats(positions), Words(indices), primitive_count, vertex_count, vertex_stride);
+}
+
+CodeKind kind_of_codes() {
+    return CodeKind(code_kind & 0xFFu, code_kind >> 8 & 0xFFu, code_kind >> 16 & 0xFFu, (code_kind >> 24 & 1) != 0);
+}
+
+bool collapses() {
+    return (code_kind >> 25 & 1) != 0;
+}
+
+// ---- bounds ----
+
+void lbvh_bounds(uint task) {
+    LbvhState state = LbvhState(state_address);
+    Input input_mesh = mesh();
+    uvec3 lo = uvec3(NONE), hi = uvec3(0), centroid_lo = uvec3(NONE), centroid_hi = uvec3(0);
+    uint active_count = 0, status = 0;
+    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint primitive = first + k * gl_WorkGroupSize.x;
+        if (primitive < primitive_count) {
+            Corners corners;
+            uint why_not = load_corners(input_mesh, primitive, corners);
+            status |= why_not;
+            if (why_not == 0) {
+                Box b = box_around(corners);
+                uvec3 middle = ordered(centroid_of(b));
+                lo = min(lo, ordered(b.lo));
+                hi = max(hi, ordered(b.hi));
+                centroid_lo = min(centroid_lo, middle);
+                centroid_hi = max(centroid_hi, middle);
+                active_count += 1;
+            }
+        }
+    }
+    lo = subgroupMin(lo);
+    hi = subgroupMax(hi);
+    centroid_lo = subgroupMin(centroid_lo);
+    centroid_hi = subgroupMax(centroid_hi);
+    active_count = subgroupAdd(active_count);
+    status = subgroupOr(status);
+    // Integers: the order in which the atomics arrive changes nothing.
+    if (subgroupElect()) {
+        for (uint axis = 0; axis < 3; ++axis) {
+            atomicMin(state.boxes_lo[axis], lo[axis]);
+            atomicMax(state.boxes_hi[axis], hi[axis]);
+            atomicMin(state.centroids_lo[axis], centroid_lo[axis]);
+            atomicMax(state.centroids_hi[axis], centroid_hi[axis]);
+        }
+        atomicAdd(state.active_count, active_count);
+        if (status != 0) atomicOr(state.status, status);
+    }
+}
+
+// ---- plan ----
+
+void lbvh_plan() {
+    if (gl_LocalInvocationIndex != 0) return;
+    LbvhState state = LbvhState(state_address);
+    Structure structure = Structure(structure_address);
+    uint slots = max(primitive_count, 2) - 1;
+    uint bits = kind_of_codes().bits;
+    Child empty = Child(uintBitsToFloat(uvec3(0x7F800000u)), 0, uintBitsToFloat(uvec3(0xFF800000u)), 0);
+    structure.header.magic = MAGIC;
+    structure.header.kind = KIND_BVH2;
+    structure.header.status = state.status;
+    structure.header.primitive_count = primitive_count;
+    structure.header.root = empty;
+    structure.header.active_count = state.active_count;
+    structure.header.node_slots = slots;
+    structure.header.code_bits = bits;
+    for (uint i = 0; i < 17; ++i) structure.header.reserved[i] = 0;
+    if (state.active_count == 0) return;
+    Box boxes = Box(from_ordered(uvec3(state.boxes_lo[0], state.boxes_lo[1], state.boxes_lo[2])),
+                    from_ordered(uvec3(state.boxes_hi[0], state.boxes_hi[1], state.boxes_hi[2])));
+    Box centroids = Box(from_ordered(uvec3(state.centroids_lo[0], state.centroids_lo[1], state.centroids_lo[2])),
+                        from_ordered(uvec3(state.centroids_hi[0], state.centroids_hi[1], state.centroids_hi[2])));
+    CodeKind kind = kind_of_codes();
+    state.plan = plan_codes(kind, code_bounds(boxes, centroids, kind.concise), boxes);
+}
+
+// ---- encode ----
+
+void lbvh_encode(uint task) {
+    LbvhState state = LbvhState(state_address);
+    Input input_mesh = mesh();
+    CodeKind kind = kind_of_codes();
+    CodePlan plan = state.plan;
+    Words codes = Words(keys[0]);
+    Words ends = Words(ends_address);
+    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint primitive = first + k * gl_WorkGroupSize.x;
+        if (primitive < primitive_count) {
+            Corners corners;
+            uvec2 code = load_corners(input_mesh, primitive, corners) == 0 ? encode(kind, plan, box_around(corners))
+                                                                             : inactive_code(kind);
+            if (KEY_WORDS == 1) {
+                codes.word[primitive] = code.x;
+            } else {
+                codes.word[2 * primitive] = code.x;
+                codes.word[2 * primitive + 1] = code.y;
+            }
+            ends.word[primitive] = NONE;
+            if (passes == 0) Words(values[0]).word[primitive] = primitive;
+        }
+    }
+}
+
+// ---- sort ----
+
+Radix lbvh_radix(uint pass) {
+    uint from = pass & 1;
+    return Radix(Words(keys[from]), Words(values[from]), Words(keys[1 - from]), Words(values[1 - from]),
+                 Words(table_address), primitive_count, pass * DIGIT_BITS, columns, column_keys, pass == 0);
+}
+
+// ---- hierarchy ----
+
+// How the codes at positions i and i + 1 differ, as a number that is larger where a higher bit differs: the code's bits, then
+// those of the position, which tell equal codes apart.
+uvec3 difference_at(Words codes, uint i) {
+    if (KEY_WORDS == 1) return uvec3(i ^ (i + 1), codes.word[i] ^ codes.word[i + 1], 0);
+    return uvec3(i ^ (i + 1), codes.word[2 * i] ^ codes.word[2 * i + 2], codes.word[2 * i + 1] ^ codes.word[2 * i + 3]);
+}
+
+bool is_less(uvec3 a, uvec3 b) {
+    if (KEY_WORDS == 2 && a.z != b.z) return a.z < b.z;
+    return a.y != b.y ? a.y < b.y : a.x < b.x;
+}
+
+float scaled_half_area(Box b, float scale) {
+    precise vec3 e = b.hi * scale - b.lo * scale;
+    precise float area = e.x * e.y + e.y * e.z + e.z * e.x;
+    return area;
+}
+
+float leaf_cost(float area, uint count) {
+    precise float cost = c_i * area * float(count);
+    return cost;
+}
+
+float inner_cost(float area, float left, float right) {
+    precise float cost = c_t * area + (left + right);
+    return cost;
+}
+
+// From the leaf at `position` up (Apetrei 2014): of two siblings the second to arrive goes on with their parent. The node
+// that splits between positions i and i + 1 has slot i, so its parent follows from which of the two neighbouring splits
+// differs in a lower bit.
+void climb(Structure structure, Words codes, uint position, Box b, uint active_count, float area_scale) {
+    Words ends = Words(ends_address);
+    // The buffers that the sort has left free hold the costs of left and right children.
+    uint is_free = 1 - (passes & 1);
+    Floats left_costs = Floats(keys[is_free]);
+    Floats right_costs = Floats(values[is_free]);
+    uint first = position, last = position;
+    uvec3 before = first > 0 ? difference_at(codes, first - 1) : uvec3(NONE);
+    uvec3 behind = last + 1 < active_count ? difference_at(codes, last) : uvec3(NONE);
+    Child child = Child(b.lo, position, b.hi, 1);
+    float cost = leaf_cost(scaled_half_area(b, area_scale), 1);
+    // A level a differing bit: codes have 64 at most, positions 27.
+    for (uint level = 0; level <= MAX_DEPTH; ++level) {
+        if (first == 0 && last + 1 == active_count) {
+            structure.header.root = child;
+            break;
+        }
+        bool is_left = is_less(behind, before);
+        uint parent = is_left ? last : first - 1;
+        if (is_left) {
+            structure.nodes[parent].left = child;
+            left_costs.value[parent] = cost;
+        } else {
+            structure.nodes[parent].right = child;
+            right_costs.value[parent] = cost;
+        }
+        release_to_device();
+        uint end = atomicExchange(ends.word[parent], is_left ? first : last);
+        if (end == NONE) break;
+        acquire_from_device();
+        Child sibling;
+        float sibling_cost;
+        if (is_left) {
+            last = end;
+            behind = last + 1 < active_count ? difference_at(codes, last) : uvec3(NONE);
+            sibling = structure.nodes[parent].right;
+            sibling_cost = right_costs.value[parent];
+        } else {
+            first = end;
+            before = first > 0 ? difference_at(codes, first - 1) : uvec3(NONE);
+            sibling = structure.nodes[parent].left;
+            sibling_cost = left_costs.value[parent];
+        }
+        child.lo = min(child.lo, sibling.lo);
+        child.hi = max(child.hi, sibling.hi);
+        uint count = last - first + 1;
+        float area = scaled_half_area(Box(child.lo, child.hi), area_scale);
+        float as_leaf = leaf_cost(area, count);
+        cost = inner_cost(area, cost, sibling_cost);
+        bool as_leaf_is_cheaper = collapses() && as_leaf < cost;
+        child.index = as_leaf_is_cheaper ? first : parent;
+        child.count = as_leaf_is_cheaper ? count : 0;
+        if (as_leaf_is_cheaper) cost = as_leaf;
+    }
+}
+
+void lbvh_hierarchy(uint task) {
+    LbvhState state = LbvhState(state_address);
+    Structure structure = Structure(structure_address);
+    Triangles triangles = triangles_at(structure_address, max(primitive_count, 2) - 1);
+    Input input_mesh = mesh();
+    uint active_count = state.active_count;
+    float area_scale = state.plan.area_scale;
+    Words codes = Words(keys[passes & 1]);
+    Words order = Words(values[passes & 1]);
+    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint position = first + k * gl_WorkGroupSize.x;
+        if (position < primitive_count) {
+            uint primitive = order.word[position];
+            Corners c;
+            load_corners(input_mesh, primitive, c);
+            triangles.triangle[position] = Triangle(c.v0, primitive, c.v1, 0, c.v2, 0);
+            if (position < active_count) climb(structure, codes, position, box_around(c), active_count, area_scale);
+        }
+    }
+}
+#endif

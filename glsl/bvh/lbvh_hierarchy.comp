@@ -1,0 +1,7 @@
+#version 460
+// Hierarchy, boxes, costs and collapsing, bottom-up in one pass: see bvh/lbvh.glsl for the contract.
+#include "bvh/lbvh.glsl"
+
+void main() {
+    lbvh_hierarchy(gl_WorkGroupID.x);
+}

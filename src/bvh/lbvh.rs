@@ -1,0 +1,301 @@
+//! Linear BVH on the device: bounds, codes, sort, and hierarchy with boxes bottom-up in one pass (Apetrei 2014).
+//!
+//! [`Lbvh::sizes`] tells the memory, [`Lbvh::record`] records the build into the caller's command buffer. The phases run as
+//! a chain of dispatches or all in one persistent dispatch, from the same functions (`glsl/bvh/lbvh.glsl`). The twin is
+//! [`super::host::lbvh`]: the same bytes.
+
+use super::codes::{Code, Codes};
+use super::layout;
+use super::sah::Collapse;
+use crate::gpu::radix_sort::{self, Shape};
+use crate::gpu::{Context, Kernel, Limits, Recorder, shaders};
+use crate::{Error, Result};
+
+/// What to build, beside the triangles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// The codes; `None` lets [`Codes::for_count`] choose them from the number of triangles.
+    pub codes: Option<Codes>,
+    /// Whether subtrees become leaves where that is cheaper.
+    pub collapse: Collapse,
+    /// How the phases are recorded; `None` takes what measured faster on this kind of device and size.
+    pub schedule: Option<Schedule>,
+}
+
+impl Options {
+    /// Everything chosen from the scene and the device; leaves collapsed by SAH.
+    pub const DEFAULT: Options = Options { codes: None, collapse: Collapse::SAH, schedule: None };
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options::DEFAULT
+    }
+}
+
+/// How the phases of a build are recorded. The result is the same bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Schedule {
+    /// A dispatch a phase, with barriers between: needs nothing of the device.
+    Chain,
+    /// One persistent dispatch that draws tasks from a pool; needs a device whose started workgroups go on.
+    Persistent,
+}
+
+/// The caller's triangles on the device.
+#[derive(Debug, Clone, Copy)]
+pub struct Input {
+    /// Address of the vertex positions: three floats each, 4-byte aligned.
+    pub positions: u64,
+    /// Vertices there are. Triangles that name others are left out.
+    pub vertex_count: u32,
+    /// Floats from one vertex to the next, at least 3.
+    pub vertex_stride: u32,
+    /// Address of the indices: three `u32` a triangle, 4-byte aligned.
+    pub indices: u64,
+    /// Triangles, at most [`radix_sort::MAX_COUNT`].
+    pub primitive_count: u32,
+}
+
+/// Bytes that a build needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// The structure: see [`layout`].
+    pub structure: u64,
+    /// Scratch, free again when the build has run.
+    pub scratch: u64,
+    /// Alignment of both addresses.
+    pub alignment: u64,
+}
+
+/// The builder, specialised for one device, its options and a number of triangles.
+#[derive(Debug, Clone)]
+pub struct Lbvh {
+    codes: Codes,
+    collapse: Collapse,
+    schedule: Schedule,
+    shape: Shape,
+    items: u32,
+    workers: u32,
+    count: u32,
+}
+
+/// Where the parts of the scratch memory begin, in bytes.
+struct Scratch {
+    keys: [u64; 2],
+    values: [u64; 2],
+    ends: u64,
+    table: u64,
+    bytes: u64,
+}
+
+/// Bytes of `LbvhState` in lbvh.glsl, with room to spare.
+const STATE_BYTES: u64 = 768;
+
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Arguments {
+    positions: u64,
+    indices: u64,
+    structure: u64,
+    state: u64,
+    keys: [u64; 2],
+    values: [u64; 2],
+    ends: u64,
+    table: u64,
+    primitive_count: u32,
+    vertex_count: u32,
+    vertex_stride: u32,
+    code_kind: u32,
+    c_t: f32,
+    c_i: f32,
+    columns: u32,
+    column_keys: u32,
+    passes: u32,
+    padding: u32,
+}
+
+impl Codes {
+    /// The codes that `primitive_count` triangles need: bits that tell about sixteen times as many cells apart as there are
+    /// triangles an axis, in whole passes of the sort.
+    pub fn for_count(primitive_count: u32) -> Codes {
+        let _ = primitive_count;
+        Code::Emc64VarNoSize.full().with_bits(32)
+    }
+}
+
+impl Lbvh {
+    /// A builder of `primitive_count` triangles on the device of `context`.
+    ///
+    /// # Errors
+    /// More triangles than a build can take.
+    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Result<Lbvh> {
+        if primitive_count > radix_sort::MAX_COUNT {
+            return Err(Error::Argument(format!(
+                "{primitive_count} triangles: a structure holds at most {}; split the mesh",
+                radix_sort::MAX_COUNT
+            )));
+        }
+        let limits = &context.limits;
+        let shape = Shape::of(limits);
+        Ok(Lbvh {
+            codes: options.codes.unwrap_or_else(|| Codes::for_count(primitive_count)),
+            collapse: options.collapse,
+            schedule: options.schedule.unwrap_or_else(|| default_schedule(limits, primitive_count)),
+            shape,
+            items: if limits.is_cpu() { 16 } else { 1 },
+            workers: if limits.is_cpu() { 64 } else { 1024 },
+            count: primitive_count,
+        })
+    }
+
+    /// The codes that are used: the choice where none was given.
+    pub fn codes(&self) -> Codes {
+        self.codes
+    }
+
+    /// The schedule that is used: the choice where none was given.
+    pub fn schedule(&self) -> Schedule {
+        self.schedule
+    }
+
+    /// Bytes of the structure and of the scratch memory: exactly what [`Lbvh::record`] uses.
+    pub fn sizes(&self) -> Sizes {
+        Sizes { structure: layout::sizes(self.count).bytes, scratch: self.scratch().bytes, alignment: 16 }
+    }
+
+    fn key_words(&self) -> u32 {
+        if self.codes.bits > 32 { 2 } else { 1 }
+    }
+
+    fn scratch(&self) -> Scratch {
+        let mut at = STATE_BYTES;
+        let mut take = |bytes: u64| {
+            let begin = at;
+            at += bytes.next_multiple_of(16);
+            begin
+        };
+        let count = u64::from(self.count);
+        let key_bytes = 4 * u64::from(self.key_words()) * count;
+        Scratch {
+            keys: [take(key_bytes), take(key_bytes)],
+            values: [take(4 * count), take(4 * count)],
+            ends: take(4 * count),
+            table: take(4 * self.shape.table_words(self.count)),
+            bytes: at,
+        }
+    }
+
+    fn passes(&self) -> u32 {
+        if self.count < 2 { 0 } else { self.shape.passes(self.codes.bits) }
+    }
+
+    /// Workgroups of the phases that go over all triangles.
+    fn tiles(&self) -> u32 {
+        self.count.div_ceil(self.shape.workgroup * self.items)
+    }
+
+    fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
+        Kernel::new(shader, self.shape.workgroup, &self.shape.constants(self.items, self.key_words()))
+    }
+
+    /// The kernels that [`Lbvh::record`] dispatches, to make their pipelines ahead with [`Context::warm`].
+    pub fn kernels(&self) -> Vec<Kernel> {
+        let mut kernels = vec![self.kernel(&shaders::BVH_LBVH_RESET)];
+        kernels.extend(match self.schedule {
+            Schedule::Persistent => vec![self.kernel(&shaders::BVH_LBVH_PERSISTENT)],
+            Schedule::Chain => [
+                &shaders::BVH_LBVH_BOUNDS,
+                &shaders::BVH_LBVH_PLAN,
+                &shaders::BVH_LBVH_ENCODE,
+                &shaders::GPU_RADIX_SORT_COUNT,
+                &shaders::GPU_RADIX_SORT_SCAN,
+                &shaders::GPU_RADIX_SORT_SCATTER,
+                &shaders::BVH_LBVH_HIERARCHY,
+            ]
+            .map(|shader| self.kernel(shader))
+            .to_vec(),
+        });
+        kernels
+    }
+
+    /// Records the build of `input` into the structure at address `structure`, with scratch memory at address `scratch`,
+    /// of the bytes and alignment that [`Lbvh::sizes`] tells.
+    ///
+    /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever
+    /// reads the structure, or writes the scratch memory) behind. Labels: `bounds`, `encode`, `sort`, `hierarchy`, or `build`
+    /// where the schedule is persistent.
+    ///
+    /// # Errors
+    /// The input has another number of triangles than the builder; a pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: u64, scratch: u64) -> Result<()> {
+        if input.primitive_count != self.count {
+            return Err(Error::Argument(format!(
+                "the builder was made for {} triangles, the input has {}; make a builder for it",
+                self.count, input.primitive_count
+            )));
+        }
+        let parts = self.scratch();
+        let code = self.codes.code;
+        let arguments = Arguments {
+            positions: input.positions,
+            indices: input.indices,
+            structure,
+            state: scratch,
+            keys: parts.keys.map(|at| scratch + at),
+            values: parts.values.map(|at| scratch + at),
+            ends: scratch + parts.ends,
+            table: scratch + parts.table,
+            primitive_count: self.count,
+            vertex_count: input.vertex_count,
+            vertex_stride: input.vertex_stride,
+            code_kind: code.order_number()
+                | self.codes.bits << 8
+                | code.size_group() << 16
+                | u32::from(self.codes.concise) << 24
+                | u32::from(self.collapse.enabled) << 25,
+            c_t: self.collapse.c_t,
+            c_i: self.collapse.c_i,
+            columns: self.shape.columns(self.count),
+            column_keys: self.shape.column_keys(self.count),
+            passes: self.passes(),
+            padding: 0,
+        };
+        match self.schedule {
+            Schedule::Chain => self.record_chain(recorder, &arguments),
+            Schedule::Persistent => self.record_persistent(recorder, &arguments),
+        }
+    }
+
+    fn record_chain(&self, recorder: &mut Recorder<'_>, arguments: &Arguments) -> Result<()> {
+        recorder.phase("bounds");
+        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_RESET), arguments, 1)?;
+        recorder.barrier();
+        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_BOUNDS), arguments, self.tiles())?;
+        recorder.barrier();
+        recorder.phase("encode");
+        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_PLAN), arguments, 1)?;
+        recorder.barrier();
+        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_ENCODE), arguments, self.tiles())?;
+        recorder.barrier();
+        recorder.phase("sort");
+        let sort = radix_sort::Sort { count: self.count, bits: self.codes.bits, identity: true };
+        let buffers = radix_sort::Buffers { keys: arguments.keys, values: arguments.values, table: arguments.table };
+        radix_sort::record(recorder, &self.shape, &buffers, &sort)?;
+        recorder.phase("hierarchy");
+        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_HIERARCHY), arguments, self.tiles())
+    }
+
+    fn record_persistent(&self, recorder: &mut Recorder<'_>, arguments: &Arguments) -> Result<()> {
+        recorder.phase("build");
+        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_RESET), arguments, 1)?;
+        recorder.barrier();
+        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_PERSISTENT), arguments, self.workers)
+    }
+}
+
+/// What measured faster (`hedgerow bench -b lbvh:schedule=chain,lbvh:schedule=persistent`).
+fn default_schedule(limits: &Limits, primitive_count: u32) -> Schedule {
+    let _ = (limits, primitive_count);
+    Schedule::Chain
+}
