@@ -329,9 +329,9 @@ mod tests {
         let bounds = Aabb { lo: [0.0; 3], hi: [1.0; 3] };
         let plan = Plan::new(Code::Emc64Var.full().with_bits(14), &bounds);
         // The whole scene as one primitive: size 1 (all ones), centroid in the middle (first bits 1, then 0).
-        assert_eq!(plan.encode(&bounds), 0b111000_1_000000_1);
+        assert_eq!(plan.encode(&bounds), 0b11_1000_1000_0001);
         // The same centroid with no size.
-        assert_eq!(plan.encode(&box_at([0.5; 3])), 0b111000_0_000000_0);
+        assert_eq!(plan.encode(&box_at([0.5; 3])), 0b11_1000_0000_0000);
     }
 
     #[test]

@@ -114,7 +114,8 @@ mod tests {
 
     #[test]
     fn every_broken_rule_is_found_and_named() {
-        let breaks: [(&str, fn(&mut Bvh2)); 6] = [
+        type Break = fn(&mut Bvh2);
+        let breaks: [(&str, Break); 6] = [
             ("has box", |t| t.nodes[t.header.root.index as usize].children[0].hi[1] += 1.0),
             ("two leaves", |t| first_leaf(t).index = 3),
             ("there are 20 triangles", |t| first_leaf(t).count = 21),
