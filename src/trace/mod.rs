@@ -1,8 +1,33 @@
 //! Rays and hits: ray kinds, the tracer on the device, and the tracer and brute force on the host.
+//!
+//! A hit is a property of a ray and a triangle alone: [`triangle`] defines it, ties go to the lower primitive index, and
+//! [`slab`] proves that a box test never hides one. So every tree over the same triangles, traversed in any order, gives the
+//! same [`Hit`]s, bit for bit, and they are those of [`host::closest_hit_by_brute_force`].
+//!
+//! - [`ray`] prepares a ray: shear, reciprocals, error bounds;
+//! - [`determinant`], [`triangle`], [`slab`] are the arithmetic, each the twin of a file in `glsl/trace/`;
+//! - [`host`] traverses on the host;
+//! - `kinds` makes the rays that are measured; `files` reads and writes rays and hits.
+
+pub mod determinant;
+#[cfg(feature = "cli")]
+pub mod files;
+pub mod host;
+#[cfg(feature = "cli")]
+pub mod kinds;
+pub mod ray;
+pub mod slab;
+pub mod triangle;
 
 use bytemuck::{Pod, Zeroable};
 
+/// The most rays that one call traces.
+pub const MAX_RAYS: u32 = 1 << 27;
+
 /// A ray, 32 bytes, as ray files hold it (CONTRACT, "Ray files").
+///
+/// A ray hits nothing if a component of origin or direction is NaN or infinite, if the largest
+/// component of the direction has no magnitude between 2⁻¹⁰⁰ and 2¹⁰⁰, or if `t_min < t_max` does not hold.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Ray {

@@ -3,6 +3,8 @@
 
 pub mod corpus;
 
+pub mod shapes;
+
 use hedgerow::gpu::{Device, DeviceOptions};
 use std::sync::OnceLock;
 

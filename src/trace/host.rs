@@ -1,0 +1,114 @@
+//! The tracer on the host: the same traversal and arithmetic as `glsl/trace/`, and brute force.
+
+use super::ray::PreparedRay;
+use super::triangle::meet;
+use super::{Hit, Query, Ray, Work, slab};
+use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Triangle};
+
+/// The nearest hit; of equally near ones that with the lower primitive index.
+pub fn closest_hit(tree: &Bvh2, ray: &Ray) -> Hit {
+    trace(tree, ray, Query::ClosestHit).0
+}
+
+/// Any hit: `t` 0 and the primitive that was met first, or [`Hit::NONE`].
+pub fn any_hit(tree: &Bvh2, ray: &Ray) -> Hit {
+    trace(tree, ray, Query::AnyHit).0
+}
+
+/// The hit, and the steps and tests that it took.
+///
+/// A tree deeper than [`MAX_DEPTH`] (which builders report in its status) is traced all the same.
+pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
+    let mut work = Work::default();
+    let mut nearest = Nearest::new(ray.t_max);
+    let Some(ray) = PreparedRay::new(ray, &tree.header.root.bounds()).filter(|_| tree.header.active != 0) else {
+        return (Hit::NONE, work);
+    };
+    // Children that wait, each with the distance at which the ray enters it.
+    let mut waiting: Vec<(f32, Child)> = Vec::with_capacity(MAX_DEPTH as usize);
+    let mut next = Some(tree.header.root);
+    while let Some(child) = next {
+        next = None;
+        if child.is_leaf() {
+            let first = child.index as usize;
+            for triangle in &tree.triangles[first..first + child.count as usize] {
+                work.tests += 1;
+                nearest.consider(&ray, triangle);
+                if query == Query::AnyHit && nearest.hit.is_some() {
+                    return (nearest.hit_of(query), work);
+                }
+            }
+        } else {
+            work.steps += 1;
+            let [left, right] = tree.nodes[child.index as usize].children;
+            match (slab::enter(&ray, &left, nearest.t), slab::enter(&ray, &right, nearest.t)) {
+                (Some(l), Some(r)) => {
+                    let (near, far) = if r < l { (right, (l, left)) } else { (left, (r, right)) };
+                    waiting.push(far);
+                    next = Some(near);
+                }
+                (Some(_), None) => next = Some(left),
+                (None, Some(_)) => next = Some(right),
+                (None, None) => {}
+            }
+        }
+        while next.is_none()
+            && let Some((entered, child)) = waiting.pop()
+        {
+            // Equally far is not too far: an equally near hit with a lower index may be there.
+            next = (entered <= nearest.t).then_some(child);
+        }
+    }
+    (nearest.hit_of(query), work)
+}
+
+/// The nearest hit by testing every triangle: what every tracer must find.
+pub fn closest_hit_by_brute_force(tree: &Bvh2, ray: &Ray) -> Hit {
+    brute_force(tree, ray).hit
+}
+
+/// Whether any triangle is hit, by testing every triangle. `t` is 0, the primitive that of the nearest hit.
+pub fn any_hit_by_brute_force(tree: &Bvh2, ray: &Ray) -> Hit {
+    brute_force(tree, ray).hit_of(Query::AnyHit)
+}
+
+fn brute_force(tree: &Bvh2, ray: &Ray) -> Nearest {
+    let mut nearest = Nearest::new(ray.t_max);
+    if let Some(ray) = PreparedRay::new(ray, &tree.header.root.bounds()) {
+        // Triangles that builders leave out stand behind the others.
+        for triangle in &tree.triangles[..tree.header.active as usize] {
+            nearest.consider(&ray, triangle);
+        }
+    }
+    nearest
+}
+
+/// The best hit so far.
+struct Nearest {
+    t: f32,
+    hit: Hit,
+}
+
+impl Nearest {
+    fn new(t_max: f32) -> Nearest {
+        Nearest { t: t_max, hit: Hit::NONE }
+    }
+
+    fn consider(&mut self, ray: &PreparedRay, triangle: &Triangle) {
+        if let Some(met) = meet(ray, triangle)
+            && ray.t_min < met.t
+            && met.t < ray.t_max
+            && (met.t < self.t || met.t == self.t && triangle.primitive < self.hit.primitive)
+        {
+            self.t = met.t;
+            self.hit = Hit { t: met.t, primitive: triangle.primitive, u: met.u, v: met.v };
+        }
+    }
+
+    fn hit_of(&self, query: Query) -> Hit {
+        match query {
+            Query::AnyHit if self.hit.is_some() => Hit { t: 0.0, ..self.hit },
+            _ => self.hit,
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! The host tracer: its hits are those of brute force, bit for bit, and closed surfaces have no holes.
+
+mod common;
+
+use common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, soup, tree_of, tree_with};
+use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::trace::{Hit, Query, Ray, host};
+use proptest::prelude::*;
+
+fn assert_hits_of_brute_force(corners: &Corners, rays: &[Ray]) {
+    let trees = [tree_of(corners), tree_with(corners, Collapse::OFF)];
+    for ray in rays {
+        let expected = host::closest_hit_by_brute_force(&trees[0], ray);
+        for tree in &trees {
+            assert_eq!(host::closest_hit(tree, ray), expected, "{ray:?}");
+            let any = host::any_hit(tree, ray);
+            assert_eq!(
+                (any.is_some(), any.t),
+                (expected.is_some(), if expected.is_some() { 0.0 } else { f32::INFINITY })
+            );
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn hits_are_those_of_brute_force(
+        count in 1usize..60,
+        size in prop_oneof![Just(1.0f32), Just(0.2), Just(1e-3), Just(1e-6)],
+        scale in prop_oneof![Just(1.0f32), Just(1e-30), Just(1e-10), Just(1e10), Just(1e30)],
+        far in prop_oneof![Just(0.0f32), Just(3.0), Just(1e4), Just(1e6)],
+        seed in any::<u64>(),
+    ) {
+        let offset = [far * scale, -far * scale, 0.5 * far * scale];
+        let corners = placed(&soup(count, size, seed), scale, offset);
+        assert_hits_of_brute_force(&corners, &hard_rays(&corners, 64, scale, offset, seed));
+    }
+
+    #[test]
+    fn degenerate_triangles_change_nothing(count in 1usize..40, seed in any::<u64>()) {
+        let mut corners = soup(count, 0.3, seed);
+        let mut random = Random(seed);
+        for triangle in &mut corners {
+            let [a, b, _] = *triangle;
+            match random.bits() % 6 {
+                0 => *triangle = [a; 3],
+                1 => *triangle = [a, b, a],
+                2 => triangle[2] = std::array::from_fn(|i| 0.5 * a[i] + 0.5 * b[i]),
+                // Needles, so thin that their edge functions are nothing but rounding.
+                3 => triangle[2] = std::array::from_fn(|i| b[i] + 1e-6 * triangle[2][i]),
+                4 => triangle.iter_mut().for_each(|p| p[0] = 0.25),
+                _ => {}
+            }
+        }
+        let copies = corners.clone();
+        corners.extend(copies);
+        assert_hits_of_brute_force(&corners, &hard_rays(&corners, 64, 1.0, [0.0; 3], seed));
+    }
+}
+
+#[test]
+fn of_coincident_triangles_the_lower_index_is_hit() {
+    let corners = vec![[[-1.0, -1.0, 3.0], [3.0, -1.0, 3.0], [-1.0, 3.0, 3.0]]; 100];
+    for collapse in [Collapse::SAH, Collapse::OFF] {
+        let hit = host::closest_hit(&tree_with(&corners, collapse), &ray([0.0; 3], [0.1, 0.1, 1.0]));
+        assert_eq!((hit.t, hit.primitive), (3.0, 0));
+    }
+}
+
+/// From inside, every ray hits exactly the surface; through corners and edges above all.
+#[test]
+fn closed_surfaces_do_not_leak() {
+    let sphere = icosphere(4);
+    for (scale, offset) in [
+        (1.0, [0.0; 3]),
+        (1e-30, [0.0; 3]),
+        (1e-20, [0.0; 3]),
+        (1e20, [0.0; 3]),
+        (1e30, [0.0; 3]),
+        (1.0, [1e3, -1e4, 1e2]),
+        (1.0, [1e6, 1e6, 1e6]),
+        (1e-3, [1.0, 1.0, -1.0]),
+    ] {
+        let corners = placed(&sphere, scale, offset);
+        let tree = tree_of(&corners);
+        let mut random = Random(7);
+        for i in 0..30_000 {
+            let origin = if i % 2 == 0 { offset } else { common::shapes::add(offset, random.point(0.2 * scale)) };
+            let [a, b, c] = corners[random.bits() as usize % corners.len()];
+            let along = [0.0, 0.25, 0.5, 1.0, random.signed().abs()][i % 5];
+            let inside = if i % 7 == 0 { c } else { a };
+            let direction: [f32; 3] =
+                std::array::from_fn(|k| along * (b[k] - origin[k]) + (1.0 - along) * (inside[k] - origin[k]));
+            let ray = ray(origin, direction.map(|x| x / scale));
+            assert!(host::closest_hit(&tree, &ray).is_some(), "leaks at scale {scale:e}, offset {offset:?}: {ray:?}");
+        }
+    }
+}
+
+#[test]
+fn a_hit_counts_strictly_between_t_min_and_t_max() {
+    let tree = tree_of(&vec![[[-1.0, -1.0, 2.0], [3.0, -1.0, 2.0], [-1.0, 3.0, 2.0]]]);
+    let (below, above) = (2f32.next_down(), 2f32.next_up());
+    for (t_min, t_max, hits) in [
+        (0.0, f32::INFINITY, true),
+        (below, above, true),
+        (f32::NEG_INFINITY, above, true),
+        (2.0, 3.0, false),
+        (0.0, 2.0, false),
+        (2.0, 2.0, false),
+        (above, below, false),
+        (f32::NAN, 3.0, false),
+        (0.0, f32::NAN, false),
+    ] {
+        let ray = Ray { t_min, t_max, ..ray([0.0; 3], [0.0, 0.0, 1.0]) };
+        assert_eq!(host::closest_hit(&tree, &ray).is_some(), hits, "{t_min} < 2 < {t_max}");
+        assert_eq!(host::any_hit(&tree, &ray).is_some(), hits, "{t_min} < 2 < {t_max}");
+    }
+}
+
+#[test]
+fn t_is_in_units_of_the_direction() {
+    let tree = tree_of(&vec![[[-1.0, -1.0, 6.0], [3.0, -1.0, 6.0], [-1.0, 3.0, 6.0]]]);
+    for length in [1e-20f32, 0.5, 3.0, 1e20] {
+        let hit = host::closest_hit(&tree, &ray([0.0, 0.0, 0.0], [0.0, 0.0, length]));
+        assert!((hit.t * length - 6.0).abs() < 1e-5, "{hit:?}");
+        // Weights of the corners at (3, −1) and (−1, 3): the origin is a quarter of the way to each.
+        assert_eq!((hit.u, hit.v), (0.25, 0.25));
+    }
+}
+
+#[test]
+fn rays_that_are_no_rays_hit_nothing() {
+    let tree = tree_of(&icosphere(2));
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for axis in 0..3 {
+            let mut broken = ray([0.0; 3], [1.0, 0.5, 0.25]);
+            broken.origin[axis] = bad;
+            assert_eq!(host::closest_hit(&tree, &broken), Hit::NONE);
+            let mut broken = ray([0.0; 3], [1.0, 0.5, 0.25]);
+            broken.direction[axis] = bad;
+            assert_eq!(host::closest_hit(&tree, &broken), Hit::NONE);
+        }
+    }
+    for length in [0.0, -0.0, 1e-40, 1e38] {
+        assert_eq!(host::closest_hit(&tree, &ray([0.0; 3], [length; 3])), Hit::NONE);
+    }
+}
+
+#[test]
+fn an_empty_tree_has_no_hits_and_takes_no_work() {
+    let tree: Bvh2 = tree_of(&Corners::new());
+    let (hit, work) = host::trace(&tree, &ray([0.0; 3], [1.0; 3]), Query::ClosestHit);
+    assert_eq!((hit, work.steps, work.tests), (Hit::NONE, 0, 0));
+}
