@@ -1,3 +1,5 @@
 //! The `hedgerow` binary: see `hedgerow --help`, and `cli` in the library.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    hedgerow::cli::main()
+}

@@ -1,1 +1,76 @@
-//! The commands of the binary, one file each.
+//! The commands of the binary, one file each. What they print and when they fail is fixed in the README's contract:
+//! results to stdout, progress and diagnostics to stderr, exit status 0 done, 1 the work failed, 2 the arguments are wrong.
+
+mod devices;
+mod options;
+mod output;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+pub use options::{Common, Size};
+pub use output::{Bar, Json};
+
+/// Acceleration structures for ray tracing, built and traced with Vulkan compute shaders, and measured.
+#[derive(Debug, Parser)]
+#[command(name = "hedgerow", version, arg_required_else_help = true, after_help = AFTER_HELP)]
+struct Cli {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    Devices(devices::Arguments),
+}
+
+const AFTER_HELP: &str = "\
+A scene is a file (.obj, .ply, .gltf, .glb, .tri, .anim, .inst, each also with .zst behind), the bare name of one in
+scenes/ or in the folder of --scenes-dir, or a generator: gen:icosphere:N, gen:soup:N:SEED, gen:grid:N, gen:stadium:N,
+gen:needles:N:SEED.";
+
+/// Runs the command that the arguments name.
+pub fn main() -> ExitCode {
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
+    let cli = Cli::parse();
+    match run(&cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("hedgerow: {error:#}");
+            ExitCode::from(if is_usage(&error) { 2 } else { 1 })
+        }
+    }
+}
+
+fn run(cli: &Cli) -> anyhow::Result<()> {
+    let common = &cli.common;
+    common.start_threads()?;
+    match &cli.command {
+        Command::Devices(arguments) => devices::run(common, arguments),
+    }
+}
+
+/// Whether the arguments are at fault rather than the work.
+fn is_usage(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(crate::Error::Argument(_)))
+}
+
+/// Whether the reader of our output has seen enough (`hedgerow devices | head -1`).
+fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
+        .any(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_arguments_are_well_formed() {
+        use clap::CommandFactory;
+        super::Cli::command().debug_assert();
+    }
+}

@@ -1,6 +1,24 @@
 //! Scenes: triangles, a camera and lights, from files or generators. What measuring needs and nothing else.
+//!
+//! [`load`] takes what a user types: the path of a file, the bare name of one in a folder of scenes, or a generator.
+//! Every file may also lie there packed, with `.zst` behind its name. Triangles keep the order of the file, polygons are
+//! fan-triangulated from their first vertex; the position of a triangle in that order is its primitive index everywhere.
+
+mod cameras;
+mod check;
+mod generators;
+mod lookup;
+mod obj;
+mod random;
+mod source;
+mod tri;
 
 use crate::bvh::layout::Aabb;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+pub use lookup::{list, own_folders};
+pub use random::SplitMix64;
 
 /// A scene, ready to build.
 #[derive(Debug, Clone)]
@@ -57,4 +75,69 @@ impl Mesh {
     pub fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
         self.triangles[triangle].map(|v| self.positions[v as usize])
     }
+}
+
+/// How [`load`] finds files and tells how far it is.
+#[derive(Clone, Default)]
+pub struct LoadOptions<'a> {
+    /// Folders in which bare names are looked up, in this order; see [`own_folders`].
+    pub folders: Vec<PathBuf>,
+    /// Called now and then while a file is read.
+    pub progress: Option<&'a dyn Fn(Progress)>,
+}
+
+/// How far reading a file is, in bytes of the file as it lies on the disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Bytes read.
+    pub done: u64,
+    /// Bytes of the file.
+    pub total: u64,
+}
+
+/// What a file holds before the camera is chosen.
+#[derive(Debug, Default)]
+struct Content {
+    mesh: Mesh,
+    /// The camera of the file, if it has one.
+    camera: Option<Camera>,
+    lights: Vec<Light>,
+}
+
+/// Loads the scene that `spec` names: a path, the bare name of a file in one of the folders, or a generator
+/// (`gen:icosphere:6`).
+///
+/// # Errors
+/// [`Error::Scene`] if there is no such scene or it has no triangles, [`Error::Malformed`] with file, line or item and the
+/// remedy if the file is broken, [`Error::Argument`] if a generator's arguments are wrong.
+pub fn load(spec: &str, options: &LoadOptions<'_>) -> Result<Scene> {
+    let (name, content) = if let Some(generator) = spec.strip_prefix("gen:") {
+        (spec.to_owned(), Content { mesh: generators::generate(spec, generator)?, ..Content::default() })
+    } else {
+        let path = lookup::find(spec, &options.folders)?;
+        (lookup::name_of(&path), read(&path, options)?)
+    };
+    let Content { mesh, camera, lights } = content;
+    if mesh.triangles.is_empty() {
+        return Err(Error::Scene(format!("{spec}: no triangles; a scene needs at least one")));
+    }
+    let camera = camera.or_else(|| cameras::known(&name)).unwrap_or_else(|| cameras::around(&mesh.bounds()));
+    Ok(Scene { name, mesh, camera, lights })
+}
+
+/// Reads a file of any of the formats.
+fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Content> {
+    let mesh = match lookup::format_of(path).as_deref() {
+        Some("obj") => obj::read(path, options)?,
+        Some("tri") => tri::read_tri(path, options)?,
+        Some("anim") => tri::read_anim(path, options)?,
+        _ => {
+            return Err(Error::Scene(format!(
+                "{}: not a format we read; take one of {}, each also with .zst behind",
+                path.display(),
+                lookup::FORMATS.map(|f| format!(".{f}")).join(", ")
+            )));
+        }
+    };
+    Ok(Content { mesh, ..Content::default() })
 }

@@ -1,0 +1,169 @@
+//! Options that every command takes, and the values they are made of.
+
+use super::Bar;
+use crate::gpu::{Device, DeviceOptions};
+use crate::scene::{self, Scene};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Options that every command takes.
+#[derive(Debug, Clone, clap::Args)]
+#[command(next_help_heading = "Common options")]
+pub struct Common {
+    /// Vulkan device: its index, or a part of its name
+    #[arg(long, global = true, env = "HEDGEROW_DEVICE", value_name = "NAME_OR_INDEX")]
+    pub device: Option<String>,
+    /// Switch the Vulkan validation layers on; any message is an error
+    #[arg(long, global = true)]
+    pub validation: bool,
+    /// Seed of the rays that are drawn at random
+    #[arg(long, global = true, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Threads of builders and tracers on the host [default: one a core]
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Where the camera is, instead of the scene's own place
+    #[arg(long, global = true, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub eye: Option<Point>,
+    /// What the camera looks at
+    #[arg(long, global = true, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub look: Option<Point>,
+    /// The camera's vertical field of view
+    #[arg(long, global = true, value_name = "DEGREES")]
+    pub fov: Option<FieldOfView>,
+    /// A folder with more scenes
+    #[arg(long, global = true, env = "HEDGEROW_SCENES", value_name = "DIR")]
+    pub scenes_dir: Option<PathBuf>,
+    /// No progress on stderr
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+}
+
+impl Common {
+    /// Makes rayon's pool as large as `--threads` asks for. Once a process.
+    pub(super) fn start_threads(&self) -> anyhow::Result<()> {
+        if let Some(threads) = self.threads {
+            rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
+        }
+        Ok(())
+    }
+
+    /// Opens the device; with `ray_query`, the driver's own acceleration structures come with it where it has them.
+    ///
+    /// # Errors
+    /// There is no such device, or it lacks something.
+    pub fn open_device(&self, ray_query: bool) -> crate::Result<Device> {
+        Device::new(&DeviceOptions { wanted: self.device.clone(), validation: self.validation, ray_query })
+    }
+
+    /// The folders in which bare scene names are looked up.
+    pub fn scene_folders(&self) -> Vec<PathBuf> {
+        scene::own_folders().into_iter().chain(self.scenes_dir.clone()).collect()
+    }
+
+    /// Loads a scene under a progress bar, with the camera that `--eye`, `--look` and `--fov` ask for.
+    ///
+    /// # Errors
+    /// The scene cannot be found, read or used.
+    pub fn load(&self, spec: &str) -> crate::Result<Scene> {
+        let bar = Bar::bytes(self, &format!("loading {spec}"));
+        let progress = |p: scene::Progress| bar.set(p.done, p.total);
+        let folders = self.scene_folders();
+        let mut scene = scene::load(spec, &scene::LoadOptions { folders, progress: Some(&progress) })?;
+        if let Some(eye) = self.eye {
+            scene.camera.eye = eye.0;
+        }
+        if let Some(look) = self.look {
+            scene.camera.look = look.0;
+        }
+        if let Some(fov) = self.fov {
+            scene.camera.fov = fov.0;
+        }
+        Ok(scene)
+    }
+}
+
+/// A point, written `X,Y,Z`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point(pub [f32; 3]);
+
+impl FromStr for Point {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Point, String> {
+        let wrong = || format!("{text:?} is not a point; write three numbers with commas, as in 1,2.5,-3");
+        let numbers: Vec<f32> =
+            text.split(',').map(|n| n.trim().parse()).collect::<Result<_, _>>().map_err(|_| wrong())?;
+        let point: [f32; 3] = numbers.try_into().map_err(|_| wrong())?;
+        point.iter().all(|c| c.is_finite()).then_some(Point(point)).ok_or_else(wrong)
+    }
+}
+
+/// A vertical field of view in degrees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldOfView(pub f32);
+
+impl FromStr for FieldOfView {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<FieldOfView, String> {
+        let degrees = text.parse().ok().filter(|d: &f32| *d > 0.0 && *d < 180.0);
+        degrees.map(FieldOfView).ok_or_else(|| format!("{text:?} is not an angle between 0 and 180 degrees"))
+    }
+}
+
+/// Width and height in pixels, written `WxH`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Size, String> {
+        let side = |s: &str| s.parse().ok().filter(|n| (1..=16_384).contains(n));
+        text.split_once('x')
+            .and_then(|(w, h)| Some(Size { width: side(w)?, height: side(h)? }))
+            .ok_or_else(|| format!("{text:?} is not a size; write WxH, each from 1 to 16384, as in 640x480"))
+    }
+}
+
+impl std::fmt::Display for Size {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_is_three_finite_numbers() {
+        assert_eq!("1,-2.5, 3e2".parse(), Ok(Point([1.0, -2.5, 300.0])));
+        for wrong in ["", "1,2", "1,2,3,4", "1,2,x", "1,2,nan", "1,2,inf"] {
+            assert!(wrong.parse::<Point>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_size_is_two_positive_numbers() {
+        assert_eq!("640x480".parse(), Ok(Size { width: 640, height: 480 }));
+        for wrong in ["", "640", "640x", "0x480", "640x480x3", "-1x5", "99999x2"] {
+            assert!(wrong.parse::<Size>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_field_of_view_lies_between_0_and_180() {
+        assert_eq!("60".parse(), Ok(FieldOfView(60.0)));
+        for wrong in ["0", "180", "nan", "-5", "x"] {
+            assert!(wrong.parse::<FieldOfView>().is_err(), "{wrong}");
+        }
+    }
+}

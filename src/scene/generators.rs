@@ -1,0 +1,202 @@
+//! Scenes that need no file: `gen:NAME:ARGUMENTS`. Deterministic: the same name gives the same bytes everywhere.
+
+use super::{Mesh, SplitMix64};
+use crate::{Error, Result};
+use std::collections::HashMap;
+use std::f32::consts::TAU;
+
+/// The most triangles that the engine's primitives are made for.
+const MOST_TRIANGLES: u64 = 1 << 27;
+
+/// Makes the mesh of `gen:…`; `arguments` is what stands behind `gen:` in `spec`.
+pub(super) fn generate(spec: &str, arguments: &str) -> Result<Mesh> {
+    let mut parts = arguments.split(':');
+    let name = parts.next().unwrap_or_default();
+    let numbers: Vec<&str> = parts.collect();
+    let (usage, count): (&str, usize) = match name {
+        "icosphere" => ("gen:icosphere:N (20*4^N triangles)", 1),
+        "soup" => ("gen:soup:N:SEED (N triangles)", 2),
+        "grid" => ("gen:grid:N (2*N*N triangles)", 1),
+        "stadium" => ("gen:stadium:N (20*4^N triangles in a coarse arena)", 1),
+        "needles" => ("gen:needles:N:SEED (N triangles)", 2),
+        _ => {
+            return Err(Error::Argument(format!(
+                "{spec}: there is no such generator; there are gen:icosphere:N, gen:soup:N:SEED, gen:grid:N, gen:stadium:N \
+                 and gen:needles:N:SEED"
+            )));
+        }
+    };
+    let wrong = || Error::Argument(format!("{spec}: not the arguments of this generator; write {usage}"));
+    if numbers.len() != count {
+        return Err(wrong());
+    }
+    let n: u64 = numbers[0].parse().map_err(|_| wrong())?;
+    let seed: u64 = numbers.get(1).map_or(Ok(0), |seed| seed.parse()).map_err(|_| wrong())?;
+    let triangles = match name {
+        "icosphere" | "stadium" => {
+            u32::try_from(n).ok().and_then(|n| 4_u64.checked_pow(n)).and_then(|f| f.checked_mul(20))
+        }
+        "grid" => n.checked_mul(n).and_then(|cells| cells.checked_mul(2)),
+        _ => Some(n),
+    };
+    if triangles.is_none_or(|t| t > MOST_TRIANGLES) {
+        return Err(Error::Argument(format!(
+            "{spec}: more than {MOST_TRIANGLES} triangles; take a smaller N of {usage}"
+        )));
+    }
+    Ok(match name {
+        "icosphere" => icosphere(n as u32),
+        "soup" => soup(n as u32, seed),
+        "grid" => grid(n as u32),
+        "stadium" => stadium(n as u32),
+        _ => needles(n as u32, seed),
+    })
+}
+
+/// The unit sphere: an icosahedron whose triangles are cut in four `levels` times. Closed, 20·4^levels triangles.
+fn icosphere(levels: u32) -> Mesh {
+    let golden = (1.0 + 5_f32.sqrt()) / 2.0;
+    let mut positions = Vec::new();
+    // Three golden rectangles, one in each plane: (0, ±1, ±golden) and its rotations.
+    for axis in 0..3 {
+        for (a, b) in [(-1.0, -golden), (-1.0, golden), (1.0, -golden), (1.0, golden)] {
+            let mut corner = [0.0; 3];
+            corner[(axis + 1) % 3] = a;
+            corner[(axis + 2) % 3] = b;
+            positions.push(on_unit_sphere(corner));
+        }
+    }
+    let mut triangles = icosahedron_faces(&positions);
+    for _ in 0..levels {
+        let mut midpoints: HashMap<[u32; 2], u32> = HashMap::with_capacity(triangles.len() * 3 / 2);
+        let mut finer = Vec::with_capacity(triangles.len() * 4);
+        for [a, b, c] in triangles {
+            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|edge| {
+                *midpoints.entry([edge[0].min(edge[1]), edge[0].max(edge[1])]).or_insert_with(|| {
+                    let [p, q] = edge.map(|v| positions[v as usize]);
+                    positions.push(on_unit_sphere(std::array::from_fn(|i| p[i] + q[i])));
+                    positions.len() as u32 - 1
+                })
+            });
+            finer.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
+        }
+        triangles = finer;
+    }
+    Mesh { positions, triangles }
+}
+
+/// The triples of corners that lie an edge apart, each turned to face outwards.
+fn icosahedron_faces(corners: &[[f32; 3]]) -> Vec<[u32; 3]> {
+    // Neighbours on the unit icosahedron have a dot product of 1/√5, the others at most −1/√5.
+    let adjacent = |a: usize, b: usize| dot(corners[a], corners[b]) > 0.0;
+    let mut faces = Vec::with_capacity(20);
+    for a in 0..12 {
+        for b in a + 1..12 {
+            for c in b + 1..12 {
+                if adjacent(a, b) && adjacent(b, c) && adjacent(c, a) {
+                    let outwards = dot(cross(corners[a], corners[b]), corners[c]) > 0.0;
+                    faces.push(if outwards { [a, b, c] } else { [a, c, b] }.map(|v| v as u32));
+                }
+            }
+        }
+    }
+    faces
+}
+
+/// Small triangles anywhere: centres uniform in the unit cube, each corner within ±0.02 of its centre.
+fn soup(count: u32, seed: u64) -> Mesh {
+    let mut random = SplitMix64::new(seed);
+    separate(count, || {
+        let centre = random.point(0.0, 1.0);
+        std::array::from_fn(|_| add(centre, random.point(-0.02, 0.02)))
+    })
+}
+
+/// A flat square of `side` × `side` unit cells in the plane y = 0, two triangles each, row by row.
+fn grid(side: u32) -> Mesh {
+    let corners = side + 1;
+    let positions = (0..corners * corners).map(|v| [(v % corners) as f32, 0.0, (v / corners) as f32]).collect();
+    let triangles = (0..side * side).flat_map(|cell| {
+        let v = cell / side * corners + cell % side;
+        [[v, v + corners, v + 1], [v + 1, v + corners, v + corners + 1]]
+    });
+    Mesh { positions, triangles: triangles.collect() }
+}
+
+/// A fine object in a huge coarse one ("teapot in a stadium"): the unit [`icosphere`] on the floor of an arena of
+/// 800 triangles, 2,000 across, off its middle.
+fn stadium(levels: u32) -> Mesh {
+    const SECTORS: u32 = 80;
+    // Radius and height of each ring of the arena, from the floor's middle to the top of the stands.
+    const RINGS: [[f32; 2]; 6] =
+        [[0.0, 0.0], [500.0, 0.0], [500.0, 20.0], [800.0, 120.0], [800.0, 150.0], [1000.0, 260.0]];
+    let mut mesh = icosphere(levels);
+    for p in &mut mesh.positions {
+        *p = add(*p, [123.0, 1.0, -45.0]);
+    }
+    let first = mesh.positions.len() as u32;
+    for [radius, height] in RINGS {
+        mesh.positions.extend((0..SECTORS).map(|sector| {
+            let angle = TAU * sector as f32 / SECTORS as f32;
+            [radius * angle.cos(), height, radius * angle.sin()]
+        }));
+    }
+    for ring in 0..RINGS.len() as u32 - 1 {
+        for sector in 0..SECTORS {
+            let at = |ring, sector| first + ring * SECTORS + sector % SECTORS;
+            let quad = [at(ring, sector), at(ring, sector + 1), at(ring + 1, sector + 1), at(ring + 1, sector)];
+            mesh.triangles.extend([[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]);
+        }
+    }
+    mesh
+}
+
+/// Long thin triangles anywhere: middles uniform in the unit cube, directions uniform, 0.2 to 1 long, a thousandth wide.
+fn needles(count: u32, seed: u64) -> Mesh {
+    let mut random = SplitMix64::new(seed);
+    separate(count, || {
+        let middle = random.point(0.0, 1.0);
+        let length = random.within(0.2, 1.0);
+        let along = direction(&mut random);
+        let aside = direction(&mut random);
+        let end = |s: f32| std::array::from_fn(|i| middle[i] + s * 0.5 * length * along[i]);
+        let tail: [f32; 3] = end(-1.0);
+        [tail, add(tail, aside.map(|c| c * 0.001 * length)), end(1.0)]
+    })
+}
+
+/// `count` triangles that share no vertex.
+fn separate(count: u32, mut triangle: impl FnMut() -> [[f32; 3]; 3]) -> Mesh {
+    Mesh {
+        positions: (0..count).flat_map(|_| triangle()).collect(),
+        triangles: (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+    }
+}
+
+/// Uniform on the unit sphere: drawn from the ball by rejection, so that no sine or cosine of the platform is asked.
+fn direction(random: &mut SplitMix64) -> [f32; 3] {
+    loop {
+        let p = random.point(-1.0, 1.0);
+        let square = dot(p, p);
+        if (0.01..=1.0).contains(&square) {
+            return on_unit_sphere(p);
+        }
+    }
+}
+
+fn on_unit_sphere(p: [f32; 3]) -> [f32; 3] {
+    let length = dot(p, p).sqrt();
+    p.map(|c| c / length)
+}
+
+fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|i| a[i] + b[i])
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

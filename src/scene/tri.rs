@@ -1,0 +1,91 @@
+//! `.tri` and `.anim`: headerless little-endian arrays, indices from 0.
+//!
+//! - `.tri`: `u32` vertex count V, `u32` triangle count T, V × 3 `f32`, T × 3 `u32`.
+//! - `.anim`: `u32` V, `u32` T, `u32` frame count K, T × 3 `u32`, then K frames of V × 3 `f32`.
+
+use super::{LoadOptions, Mesh, check, source};
+use crate::{Error, Result};
+use std::io::{BufRead, ErrorKind, Read};
+use std::path::Path;
+
+/// Reads a `.tri` file.
+pub(super) fn read_tri(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> {
+    let mut words = Words { path, reader: source::open(path, options)? };
+    let [vertices, triangles] = words.head(["vertex count", "triangle count"])?;
+    let positions = words.triples(vertices, "vertices", f32::from_bits)?;
+    let triangles = words.triples(triangles, "triangles", |word| word)?;
+    words.end()?;
+    checked(path, Mesh { positions, triangles })
+}
+
+/// Reads the first frame of an `.anim` file.
+pub(super) fn read_anim(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> {
+    let mut words = Words { path, reader: source::open(path, options)? };
+    let [vertices, triangles, frames] = words.head(["vertex count", "triangle count", "frame count"])?;
+    if frames == 0 {
+        return Err(Error::Malformed(format!("{}: no frames; an animation needs at least one", path.display())));
+    }
+    let triangles = words.triples(triangles, "triangles", |word| word)?;
+    let positions = words.triples(vertices, "vertices of the first frame", f32::from_bits)?;
+    checked(path, Mesh { positions, triangles })
+}
+
+fn checked(path: &Path, mesh: Mesh) -> Result<Mesh> {
+    check::vertices_are_finite(path, &mesh.positions)?;
+    check::indices_are_in_range(path, &mesh.triangles, mesh.positions.len())?;
+    Ok(mesh)
+}
+
+/// The words of a file, in order.
+struct Words<'a> {
+    path: &'a Path,
+    reader: Box<dyn BufRead + 'a>,
+}
+
+impl Words<'_> {
+    fn head<const N: usize>(&mut self, names: [&str; N]) -> Result<[u32; N]> {
+        let mut words = [0; N];
+        for (word, name) in words.iter_mut().zip(names) {
+            let mut bytes = [0; 4];
+            self.reader.read_exact(&mut bytes).map_err(|e| self.error(e, || format!("the {name}")))?;
+            *word = u32::from_le_bytes(bytes);
+        }
+        Ok(words)
+    }
+
+    /// `count` triples of words. Memory grows with what is read, so that a wrong count in the head does not take it all.
+    fn triples<T>(&mut self, count: u32, what: &str, value: impl Fn(u32) -> T) -> Result<Vec<[T; 3]>> {
+        const AT_ONCE: usize = 1 << 16;
+        let count = count as usize;
+        let mut triples = Vec::with_capacity(count.min(AT_ONCE));
+        let mut buffer = vec![[0_u32; 3]; count.min(AT_ONCE)];
+        while triples.len() < count {
+            let words = &mut buffer[..(count - triples.len()).min(AT_ONCE)];
+            let read = self.reader.read_exact(bytemuck::cast_slice_mut(words));
+            read.map_err(|e| self.error(e, || format!("its {count} {what} (after {} or more)", triples.len())))?;
+            triples.extend(words.iter().map(|triple| triple.map(|word| value(u32::from_le(word)))));
+        }
+        triples.shrink_to_fit();
+        Ok(triples)
+    }
+
+    /// Nothing may follow.
+    fn end(&mut self) -> Result<()> {
+        match self.reader.read(&mut [0]) {
+            Ok(0) => Ok(()),
+            Ok(_) => Err(Error::Malformed(format!(
+                "{}: goes on behind its last triangle; its counts are wrong, write it again",
+                self.path.display()
+            ))),
+            Err(error) => Err(source::read_error(self.path, error)),
+        }
+    }
+
+    fn error(&self, error: std::io::Error, what: impl Fn() -> String) -> Error {
+        if error.kind() == ErrorKind::UnexpectedEof {
+            Error::Malformed(format!("{}: ends before {}; is it cut off?", self.path.display(), what()))
+        } else {
+            source::read_error(self.path, error)
+        }
+    }
+}
