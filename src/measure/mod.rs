@@ -1,9 +1,14 @@
 //! Figures: building and tracing under the clock, quality, and the records they end up in.
 //!
-//! [`Subject`] is a builder on a scene. The rest is how several of them are measured fairly and what follows from it:
+//! [`Subject`] is a builder on a scene; [`builders`] makes one by name; [`matrix`] measures several of them on a scene and
+//! gives a [`record`] for each. The rest is how that is fair and what follows from it: [`agreement`] (right hits),
 //! [`statistics`] (in turn, medians), [`growth`] (time over triangles), [`pareto`] and [`total_time`] (who is best for what).
 
+pub mod agreement;
+pub mod builders;
 pub mod growth;
+mod host;
+pub mod matrix;
 pub mod pareto;
 pub mod peers;
 pub mod provenance;

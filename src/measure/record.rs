@@ -106,6 +106,25 @@ pub struct Quality {
     pub prims_per_leaf: Option<f64>,
 }
 
+impl Quality {
+    /// The figures of a walk over a tree whose leaves hold triangles.
+    pub fn of(quality: &crate::bvh::quality::Quality, c_t: f64, c_i: f64) -> Quality {
+        Quality {
+            sah: Some(quality.sah),
+            c_t,
+            c_i,
+            inner: Some(quality.inner),
+            leaves: Some(quality.leaves),
+            empty_leaves: Some(0),
+            refs: Some(quality.refs),
+            depth_avg: Some(quality.depth_avg),
+            depth_max: Some(u64::from(quality.depth_max)),
+            prims_per_leaf: Some(quality.refs as f64 / quality.leaves.max(1) as f64),
+            ..Quality::default()
+        }
+    }
+}
+
 /// Tracing of one kind of ray.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trace {
@@ -125,4 +144,77 @@ pub struct Trace {
     pub runs: u32,
     /// Sum of t over the hits (of hits, for any-hit), as decimal.
     pub checksum: String,
+}
+
+impl Record {
+    /// Millions of triangles built a second, by the median.
+    pub fn mtris_s(&self) -> f64 {
+        self.triangles as f64 / (self.build.median_ms * 1e3)
+    }
+
+    /// Millions of rays traced a second over all kinds together: all rays over the time of all. `None` without tracing.
+    pub fn mrays_s(&self) -> Option<f64> {
+        let rays: f64 = self.trace.iter().map(|t| t.count as f64).sum();
+        let time: f64 = self.trace.iter().map(|t| t.count as f64 / t.mrays_s).sum();
+        (rays > 0.0 && time.is_finite()).then(|| rays / time)
+    }
+
+    /// Tracing of one kind of ray, where it was measured.
+    pub fn rays(&self, kind: &str) -> Option<&Trace> {
+        self.trace.iter().find(|t| t.rays == kind)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The example of the contract, word for word.
+    const EXAMPLE: &str = r#"{"schema":1,"scene":"sponza","triangles":262267,"builder":"lbvh:codes=emc64var","kind":"bvh2",
+ "device":"llvmpipe (LLVM 15.0.6, 256 bits)","driver":"Mesa 25.0.7","subgroup":8,"commit":"abc1234","when":"2026-11-21T10:00:00Z",
+ "build":{"runs":5,"median_ms":1.0,"min_ms":1.0,"max_ms":1.1,"timer":"device","phases":[{"name":"encode","median_ms":0.1}]},
+ "memory":{"structure_bytes":1,"scratch_bytes":1,"peak_bytes":1},
+ "quality":{"sah":1.0,"c_t":3.0,"c_i":2.0,"epo":null,"lcv":null,"inner":1,"leaves":1,"empty_leaves":0,"refs":1,"depth_avg":1.0,"depth_max":1,"prims_per_leaf":1.0},
+ "trace":[{"rays":"primary","count":1,"hits":1,"mrays_s":1.0,"steps":1.0,"tests":1.0,"runs":5,"checksum":"sum of t over hits, as decimal"}],
+ "valid":true}"#;
+
+    fn example() -> Record {
+        serde_json::from_str(EXAMPLE).expect("the contract's example is a record")
+    }
+
+    #[test]
+    fn a_record_has_the_names_of_the_contract_and_no_others() {
+        let contract: serde_json::Value = serde_json::from_str(EXAMPLE).expect("JSON");
+        assert_eq!(serde_json::to_value(example()).expect("a record is JSON"), contract);
+    }
+
+    #[test]
+    fn the_order_of_the_names_is_that_of_the_contract() {
+        let packed = EXAMPLE.replace("\n ", "");
+        assert_eq!(serde_json::to_string(&example()).expect("a record is JSON"), packed);
+    }
+
+    #[test]
+    fn a_figure_that_was_not_measured_is_null() {
+        let mut record = example();
+        record.quality = Quality { c_t: 3.0, c_i: 2.0, ..Quality::default() };
+        record.valid = None;
+        let value = serde_json::to_value(&record).expect("a record is JSON");
+        assert!(value["quality"]["sah"].is_null() && value["valid"].is_null(), "{value}");
+        assert_eq!(serde_json::from_value::<Record>(value).expect("round trip"), record);
+    }
+
+    #[test]
+    fn speeds_follow_from_times() {
+        let mut record = example();
+        record.triangles = 1_000_000;
+        record.build.median_ms = 250.0;
+        assert_eq!(record.mtris_s(), 4.0);
+        // 2 million rays at 1 Mray/s and 2 million at 4 Mrays/s: 4 million in 2.5 s.
+        let trace = |mrays_s| Trace { count: 2_000_000, mrays_s, ..record.trace[0].clone() };
+        record.trace = vec![trace(1.0), trace(4.0)];
+        assert_eq!(record.mrays_s(), Some(1.6));
+        record.trace.clear();
+        assert_eq!(record.mrays_s(), None);
+    }
 }

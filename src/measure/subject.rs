@@ -41,6 +41,14 @@ pub trait Subject {
     /// # Errors
     /// The device failed.
     fn tree(&mut self) -> Result<Option<Bvh2>>;
+    /// What the builder chose where it was left the choice, in a few words (`emc64var-nosize/32, chain`); `None` if nothing.
+    fn choice(&self) -> Option<String> {
+        None
+    }
+    /// Bytes that a phase must move: each of its inputs read once, each of its outputs written once; `None` if not known.
+    fn traffic(&self, _phase: &str) -> Option<u64> {
+        None
+    }
     /// Brings rays to where they are traced; not under the clock.
     ///
     /// # Errors

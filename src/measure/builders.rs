@@ -1,0 +1,266 @@
+//! Builders by name: what `-b` takes (CONTRACT, "Builder names"), and a [`Subject`] made from it.
+//!
+//! A builder with its options is a [`Spec`]: `lbvh:codes=emc64var:collapse=off`. [`BUILDERS`] is the list of all there are;
+//! whoever adds one adds a row there.
+
+use super::Subject;
+use super::host::HostLbvh;
+use super::peers::driver::Driver;
+use crate::bvh::codes::Codes;
+use crate::bvh::sah::Collapse;
+use crate::gpu::{Device, DriverPreference};
+use crate::scene::Mesh;
+use crate::{Error, Result};
+use std::fmt;
+use std::str::FromStr;
+
+/// A builder that can be asked for.
+pub struct Builder {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is, in half a sentence.
+    pub what: &'static str,
+    /// The options it takes.
+    pub options: &'static [BuilderOption],
+    /// What `-b all` takes of it: specs that differ in kind, not in degree.
+    pub variants: &'static [&'static str],
+    /// What it needs of the machine.
+    pub needs: Needs,
+    make: Make,
+    check: fn(&Spec) -> Result<()>,
+}
+
+/// Makes the subject of a spec on a device, if it needs one, and a mesh.
+type Make = for<'a> fn(&Spec, Option<&'a Device>, &'a Mesh) -> Result<Box<dyn Subject + 'a>>;
+
+/// An option of a builder, `key=value`.
+pub struct BuilderOption {
+    /// Its name.
+    pub key: &'static str,
+    /// The values it takes, for people.
+    pub values: &'static str,
+}
+
+/// What a builder needs of the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Needs {
+    /// Nothing: it works on the host.
+    Nothing,
+    /// A device.
+    Device,
+    /// A device whose driver has ray queries.
+    RayQuery,
+}
+
+const CODES: BuilderOption = BuilderOption {
+    key: "codes",
+    values: "mc30, mc63, emc64sort, emc64var or emc64var-nosize, with +concise or /BITS behind",
+};
+const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
+
+/// Every builder, in the order in which they are listed and measured.
+pub static BUILDERS: &[Builder] = &[
+    Builder {
+        name: "lbvh-host",
+        what: "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte",
+        options: &[CODES, COLLAPSE],
+        variants: &["lbvh-host"],
+        needs: Needs::Nothing,
+        make: |spec, _, mesh| Ok(Box::new(HostLbvh::new(&spec.to_string(), mesh, spec.codes()?, spec.collapse()?))),
+        check: |spec| spec.codes().and(spec.collapse()).map(drop),
+    },
+    Builder {
+        name: "driver-fast-build",
+        what: "the Vulkan driver's own, asked to build fast",
+        options: &[],
+        variants: &["driver-fast-build"],
+        needs: Needs::RayQuery,
+        make: |_, device, mesh| Ok(Box::new(Driver::new(given(device)?, mesh, DriverPreference::FastBuild)?)),
+        check: |_| Ok(()),
+    },
+    Builder {
+        name: "driver-fast-trace",
+        what: "the Vulkan driver's own, asked to trace fast",
+        options: &[],
+        variants: &["driver-fast-trace"],
+        needs: Needs::RayQuery,
+        make: |_, device, mesh| Ok(Box::new(Driver::new(given(device)?, mesh, DriverPreference::FastTrace)?)),
+        check: |_| Ok(()),
+    },
+];
+
+fn given(device: Option<&Device>) -> Result<&Device> {
+    device.ok_or_else(|| Error::NoVulkan("this builder works on a device, and none was opened".into()))
+}
+
+/// A builder with its options, as `-b` takes it. Known to exist and to have sound options once it is made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Spec {
+    name: String,
+    options: Vec<(String, String)>,
+}
+
+impl Spec {
+    /// The builder.
+    pub fn builder(&self) -> &'static Builder {
+        BUILDERS.iter().find(|b| b.name == self.name).expect("checked when the spec was parsed")
+    }
+
+    /// The value of an option, if it was given.
+    pub fn option(&self, key: &str) -> Option<&str> {
+        self.options.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str())
+    }
+
+    /// Option `codes`.
+    fn codes(&self) -> Result<Option<Codes>> {
+        self.option(CODES.key).map(str::parse).transpose()
+    }
+
+    /// Option `collapse`; `sah` where it was not given.
+    fn collapse(&self) -> Result<Collapse> {
+        match self.option(COLLAPSE.key) {
+            None | Some("sah") => Ok(Collapse::SAH),
+            Some("off") => Ok(Collapse::OFF),
+            Some(other) => Err(self.wrong_value(&COLLAPSE, other)),
+        }
+    }
+
+    fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {
+        Error::Argument(format!("builder {self}: {}={value} is not known; take {}", option.key, option.values))
+    }
+
+    /// Whether it can be measured with this device.
+    pub fn is_possible(&self, device: Option<&Device>) -> bool {
+        match self.builder().needs {
+            Needs::Nothing => true,
+            Needs::Device => device.is_some(),
+            Needs::RayQuery => device.is_some_and(Device::has_ray_query),
+        }
+    }
+
+    /// The subject: the builder on a scene, with everything uploaded that is uploaded once.
+    ///
+    /// # Errors
+    /// The device is missing or lacks something, or there is too little memory.
+    pub fn make<'a>(&self, device: Option<&'a Device>, mesh: &'a Mesh) -> Result<Box<dyn Subject + 'a>> {
+        (self.builder().make)(self, device, mesh)
+    }
+}
+
+impl FromStr for Spec {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Spec> {
+        let mut parts = text.split(':');
+        let name = parts.next().unwrap_or_default();
+        let builder = BUILDERS.iter().find(|b| b.name == name).ok_or_else(|| {
+            let names: Vec<_> = BUILDERS.iter().map(|b| b.name).collect();
+            Error::Argument(format!("no builder is called {name:?}; there are {}, or all", names.join(", ")))
+        })?;
+        let mut spec = Spec { name: name.to_owned(), options: Vec::new() };
+        for part in parts {
+            let (key, value) = part.split_once('=').ok_or_else(|| {
+                Error::Argument(format!("builder {text}: option {part:?} has no value; write {part}=VALUE"))
+            })?;
+            if !builder.options.iter().any(|option| option.key == key) {
+                let keys: Vec<_> = builder.options.iter().map(|option| option.key).collect();
+                let there_are =
+                    if keys.is_empty() { "it takes none".into() } else { format!("it takes {}", keys.join(", ")) };
+                return Err(Error::Argument(format!("builder {text}: {name} has no option {key:?}; {there_are}")));
+            }
+            if spec.option(key).is_some() {
+                return Err(Error::Argument(format!("builder {text}: {key} is given twice; give it once")));
+            }
+            spec.options.push((key.to_owned(), value.to_owned()));
+        }
+        (builder.check)(&spec)?;
+        Ok(spec)
+    }
+}
+
+impl fmt::Display for Spec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)?;
+        self.options.iter().try_for_each(|(key, value)| write!(f, ":{key}={value}"))
+    }
+}
+
+/// The builders that `-b` asks for: a comma-separated list, in which `all` stands for every variant of every builder.
+/// Each is there once.
+///
+/// # Errors
+/// [`Error::Argument`] says which builder or option is wrong, and what there is.
+pub fn parse_list(text: &str) -> Result<Vec<Spec>> {
+    let mut specs: Vec<Spec> = Vec::new();
+    let all = || BUILDERS.iter().flat_map(|b| b.variants.iter().copied());
+    for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+        let named: Vec<&str> = if part == "all" { all().collect() } else { vec![part] };
+        for name in named {
+            let spec = name.parse()?;
+            if !specs.contains(&spec) {
+                specs.push(spec);
+            }
+        }
+    }
+    if specs.is_empty() {
+        return Err(Error::Argument("no builder is named; take -b NAME,NAME… or -b all".into()));
+    }
+    Ok(specs)
+}
+
+/// Every builder with what it is and its options, for `--help`.
+pub fn help() -> String {
+    let mut text = String::from("Builders, each option behind a colon as in NAME:KEY=VALUE:\n");
+    for builder in BUILDERS {
+        text += &format!("  {:18} {}\n", builder.name, builder.what);
+        for option in builder.options {
+            text += &format!("  {:18}   :{}=  {}\n", "", option.key, option.values);
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error_of(text: &str) -> String {
+        parse_list(text).expect_err(text).to_string()
+    }
+
+    #[test]
+    fn every_variant_of_every_builder_parses_and_prints_as_it_was() {
+        for variant in BUILDERS.iter().flat_map(|b| b.variants) {
+            assert_eq!(variant.parse::<Spec>().expect(variant).to_string(), *variant);
+        }
+    }
+
+    #[test]
+    fn a_list_holds_each_builder_once() {
+        let specs = parse_list("driver-fast-trace, all,driver-fast-build").expect("known");
+        assert_eq!(specs[0].to_string(), "driver-fast-trace");
+        let variants: usize = BUILDERS.iter().map(|b| b.variants.len()).sum();
+        assert_eq!(specs.len(), variants);
+    }
+
+    #[test]
+    fn options_reach_the_builder() {
+        let spec: Spec = "lbvh-host:codes=mc63+concise:collapse=off".parse().expect("known");
+        assert_eq!(spec.codes().expect("checked").map(|c| c.to_string()).as_deref(), Some("mc63+concise"));
+        assert_eq!(spec.collapse().expect("checked"), Collapse::OFF);
+        assert_eq!("lbvh-host".parse::<Spec>().expect("known").collapse().expect("checked"), Collapse::SAH);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_what_there_is() {
+        assert!(error_of("lvbh").contains("no builder is called \"lvbh\"; there are"));
+        assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));
+        assert!(error_of("lbvh-host:collapse=maybe").contains("take sah or off"));
+        assert!(error_of("lbvh-host:codes").contains("write codes=VALUE"));
+        assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
+        assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse"));
+        assert!(error_of("driver-fast-build:codes=mc30").contains("it takes none"));
+        assert!(error_of("").contains("-b all"));
+        assert!(error_of(",").contains("-b all"));
+    }
+}

@@ -1,0 +1,115 @@
+//! Builders on the host as subjects: wall-clock time, the host's tracer on every core.
+
+use super::{BuildRun, Subject, record};
+use crate::Result;
+use crate::bvh::codes::Codes;
+use crate::bvh::layout::{self, Bvh2};
+use crate::bvh::sah::Collapse;
+use crate::bvh::{host, quality};
+use crate::scene::Mesh;
+use crate::trace::{self, Hit, Query, Ray, Work};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// `lbvh-host`: the plain LBVH that the device's is tested against.
+pub struct HostLbvh<'a> {
+    builder: String,
+    mesh: &'a Mesh,
+    codes: Codes,
+    chosen: bool,
+    collapse: Collapse,
+    tree: Option<Bvh2>,
+    rays: Vec<Ray>,
+    hits: Vec<Hit>,
+}
+
+impl<'a> HostLbvh<'a> {
+    /// On `mesh`; without `codes`, those that the device would take for so many triangles.
+    pub fn new(builder: &str, mesh: &'a Mesh, codes: Option<Codes>, collapse: Collapse) -> HostLbvh<'a> {
+        HostLbvh {
+            builder: builder.to_owned(),
+            mesh,
+            codes: codes.unwrap_or_else(|| Codes::for_count(mesh.triangles.len() as u32)),
+            chosen: codes.is_none(),
+            collapse,
+            tree: None,
+            rays: Vec::new(),
+            hits: Vec::new(),
+        }
+    }
+
+    fn built(&mut self) -> &Bvh2 {
+        let HostLbvh { mesh, codes, collapse, tree, .. } = self;
+        tree.get_or_insert_with(|| host::lbvh::build(&mesh.positions, &mesh.triangles, *codes, *collapse))
+    }
+}
+
+/// The time of `work` in milliseconds by the wall's clock, and what it gave.
+fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let start = Instant::now();
+    let result = work();
+    (start.elapsed().as_secs_f64() * 1e3, result)
+}
+
+impl Subject for HostLbvh<'_> {
+    fn builder(&self) -> &str {
+        &self.builder
+    }
+
+    fn kind(&self) -> &'static str {
+        "bvh2"
+    }
+
+    fn timer(&self) -> &'static str {
+        "wall"
+    }
+
+    fn build(&mut self) -> Result<BuildRun> {
+        self.tree = None;
+        let (milliseconds, _) = timed(|| self.built().header.active);
+        Ok(BuildRun { milliseconds, phases: Vec::new() })
+    }
+
+    fn memory(&self) -> record::Memory {
+        let structure = layout::sizes(self.mesh.triangles.len() as u32).bytes;
+        record::Memory { structure_bytes: Some(structure), ..Default::default() }
+    }
+
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+        Ok(record::Quality::of(&quality::on_host(self.built(), c_t, c_i), c_t, c_i))
+    }
+
+    fn tree(&mut self) -> Result<Option<Bvh2>> {
+        Ok(Some(self.built().clone()))
+    }
+
+    fn choice(&self) -> Option<String> {
+        self.chosen.then(|| format!("codes {}", self.codes))
+    }
+
+    fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
+        self.rays = rays.to_vec();
+        Ok(())
+    }
+
+    fn trace(&mut self, query: Query) -> Result<f64> {
+        let rays = std::mem::take(&mut self.rays);
+        let tree = self.built();
+        let (milliseconds, hits) =
+            timed(|| rays.par_iter().map(|ray| trace::host::trace(tree, ray, query).0).collect());
+        (self.rays, self.hits) = (rays, hits);
+        Ok(milliseconds)
+    }
+
+    fn hits(&mut self) -> Result<Vec<Hit>> {
+        Ok(self.hits.clone())
+    }
+
+    fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
+        let rays = std::mem::take(&mut self.rays);
+        let tree = self.built();
+        let work = rays.par_iter().map(|ray| trace::host::trace(tree, ray, query).1).collect();
+        self.rays = rays;
+        Ok(Some(work))
+    }
+}
