@@ -74,6 +74,14 @@ pub enum Error {
     /// The validation layers complained (with `--validation`, or in the tests).
     #[error("Vulkan validation: {0}")]
     Validation(String),
+    /// A chart of the report cannot be drawn.
+    #[error("the chart {chart} cannot be drawn: {reason}; the records in results.jsonl are complete without it")]
+    Chart {
+        /// Its name.
+        chart: String,
+        /// What the drawing library says.
+        reason: String,
+    },
     /// A structure breaks a rule of its layout; says which node and which rule.
     #[error("invalid structure: {0}")]
     InvalidStructure(String),

@@ -1,1 +1,8 @@
-//! Tables, charts and the HTML page: figures as a reader wants them.
+//! Tables, charts and the page.
+
+pub mod chart;
+pub mod charts;
+pub mod labels;
+pub mod names;
+pub mod numbers;
+pub mod theme;

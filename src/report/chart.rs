@@ -1,0 +1,282 @@
+//! A chart: drawn once by plotters, then labelled; as a file of its own, as a picture, and inside the page.
+
+use super::labels::{self, Rect};
+use super::theme::{self, BEST, GRID, INK, MUTED, PAPER, Tone};
+use crate::{Error, Result};
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use plotters::prelude::*;
+use std::fmt::Write as _;
+
+/// Width and height of every chart in pixels, before scaling.
+pub const SIZE: (u32, u32) = (760, 460);
+/// Pixels of a PNG per pixel of the chart.
+const PNG_SCALE: f32 = 2.0;
+/// Size of labels in pixels.
+pub const LABEL_SIZE: f64 = 13.0;
+
+/// A finished chart.
+#[derive(Debug, Clone)]
+pub struct Chart {
+    /// Stem of its files, and its identifier on the page.
+    pub name: String,
+    /// What it is.
+    pub title: String,
+    /// What it shows, in words, for whoever cannot see it.
+    pub alt: String,
+    /// What a reader shall take from it; one or two sentences.
+    pub reading: String,
+    svg: String,
+}
+
+/// What every chart needs to be named by.
+#[derive(Debug, Clone, Default)]
+pub struct Caption {
+    /// See [`Chart::name`].
+    pub name: String,
+    /// See [`Chart::title`].
+    pub title: String,
+    /// See [`Chart::alt`].
+    pub alt: String,
+    /// See [`Chart::reading`].
+    pub reading: String,
+}
+
+/// The area that plotters draws on.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// What drawing gives: plotters' errors are many, and none is expected when drawing into memory.
+pub type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
+
+impl Chart {
+    /// Draws a chart: `draw` gets the area below the title, and an overlay for labels and tooltips.
+    ///
+    /// # Errors
+    /// [`Error::Chart`] if plotters cannot draw it (a range that is empty or not finite).
+    pub fn draw(caption: Caption, draw: impl FnOnce(&Area<'_>, &mut Overlay) -> Drawn) -> Result<Chart> {
+        let mut body = String::new();
+        let mut overlay = Overlay::default();
+        let drawing = (|| {
+            let area = SVGBackend::with_string(&mut body, SIZE).into_drawing_area();
+            area.fill(&PAPER.light)?;
+            draw(&area.margin(44, 12, 12, 12), &mut overlay)?;
+            area.present()?;
+            Ok(())
+        })();
+        drawing.map_err(|e: Box<dyn std::error::Error>| Error::Chart {
+            chart: caption.name.clone(),
+            reason: e.to_string(),
+        })?;
+        let open = body.find(">\n").map_or(0, |at| at + 2);
+        let close = body.rfind("</svg>").unwrap_or(body.len());
+        let id = &caption.name;
+        let svg = format!(
+            "<svg width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" xmlns=\"http://www.w3.org/2000/svg\" \
+             font-family=\"sans-serif\" role=\"img\" aria-labelledby=\"{id}-title {id}-desc\">\n\
+             <title id=\"{id}-title\">{title}</title>\n<desc id=\"{id}-desc\">{alt}</desc>\n{marks}\
+             <text x=\"20\" y=\"30\" font-size=\"16\" font-weight=\"bold\" fill=\"{ink}\">{title}</text>\n{overlay}</svg>\n",
+            w = SIZE.0,
+            h = SIZE.1,
+            title = escape(&caption.title),
+            alt = escape(&caption.alt),
+            marks = &body[open..close],
+            ink = theme::hex(INK.light),
+            overlay = overlay.svg,
+        );
+        let Caption { name, title, alt, reading } = caption;
+        Ok(Chart { name, title, alt, reading, svg })
+    }
+
+    /// The chart as an SVG file.
+    pub fn svg(&self) -> &str {
+        &self.svg
+    }
+
+    /// The chart as a part of the page: every colour is a CSS variable, so that it follows the page's scheme.
+    pub fn inline(&self) -> String {
+        theme::all().fold(self.svg.clone(), |svg, tone| {
+            svg.replace(&format!("\"{}\"", theme::hex(tone.light)), &format!("\"var(--{})\"", tone.variable))
+        })
+    }
+
+    /// The chart as a PNG file, at twice its size. Text is set in Noto Sans, which the program carries: a machine without
+    /// any font gives the same picture.
+    ///
+    /// # Errors
+    /// [`Error::Chart`] if the SVG cannot be read back or the picture cannot be packed.
+    pub fn png(&self) -> Result<Vec<u8>> {
+        use resvg::{tiny_skia, usvg};
+        let wrong = |reason: String| Error::Chart { chart: self.name.clone(), reason };
+        let mut options = usvg::Options { font_family: "Noto Sans".into(), ..usvg::Options::default() };
+        let fonts = options.fontdb_mut();
+        fonts.load_font_data(notosans::REGULAR_TTF.to_vec());
+        fonts.load_font_data(notosans::BOLD_TTF.to_vec());
+        fonts.set_sans_serif_family("Noto Sans");
+        let tree = usvg::Tree::from_str(&self.svg, &options).map_err(|e| wrong(e.to_string()))?;
+        let size = (SIZE.0 as f32 * PNG_SCALE, SIZE.1 as f32 * PNG_SCALE);
+        let mut pixels =
+            tiny_skia::Pixmap::new(size.0 as u32, size.1 as u32).ok_or_else(|| wrong("too large".into()))?;
+        resvg::render(&tree, tiny_skia::Transform::from_scale(PNG_SCALE, PNG_SCALE), &mut pixels.as_mut());
+        pixels.encode_png().map_err(|e| wrong(e.to_string()))
+    }
+}
+
+/// Text that SVG takes as text.
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// Labels and tooltips over the marks: what plotters has no notion of.
+#[derive(Debug, Default)]
+pub struct Overlay {
+    svg: String,
+}
+
+/// A text of the overlay.
+#[derive(Debug, Clone, Copy)]
+pub struct Label<'a> {
+    /// Anchor on the base line.
+    pub at: (f64, f64),
+    /// What it says.
+    pub text: &'a str,
+    /// `start`, `middle` or `end`.
+    pub anchor: &'a str,
+    /// Its colour.
+    pub tone: Tone,
+    /// Size in pixels.
+    pub size: f64,
+}
+
+impl Overlay {
+    /// A text with a halo of paper, so that lines behind it do not disturb.
+    pub fn label(&mut self, label: Label<'_>) {
+        let Label { at: (x, y), text, anchor, tone, size } = label;
+        let (fill, paper, text) = (theme::hex(tone.light), theme::hex(PAPER.light), escape(text));
+        let _ = writeln!(
+            self.svg,
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{fill}\" \
+             stroke=\"{paper}\" stroke-width=\"3\" stroke-linejoin=\"round\" paint-order=\"stroke\">{text}</text>",
+        );
+    }
+
+    /// A thin line, from a label to what it names.
+    pub fn leader(&mut self, from: (f64, f64), to: (f64, f64), tone: Tone) {
+        let _ = writeln!(
+            self.svg,
+            "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{}\" stroke-width=\"1\" opacity=\"0.6\"/>",
+            from.0,
+            from.1,
+            to.0,
+            to.1,
+            theme::hex(tone.light),
+        );
+    }
+
+    /// An invisible rectangle that shows `text` when pointed at.
+    pub fn tip(&mut self, Rect { x, y, w, h }: Rect, text: &str) {
+        let _ = writeln!(
+            self.svg,
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" opacity=\"0\"><title>{}</title></rect>",
+            escape(text),
+        );
+    }
+
+    /// Labels the points of a chart, each beside its anchor, without covering each other; `frame` is the plotting area.
+    pub fn label_points(&mut self, points: &[(f64, f64)], texts: &[(String, Tone)], frame: Rect) {
+        const HEIGHT: f64 = 16.0;
+        let widths: Vec<f64> = texts.iter().map(|(t, _)| labels::text_width(t, LABEL_SIZE)).collect();
+        let places = labels::place(points, &widths, HEIGHT, &frame);
+        for ((&point, place), (text, tone)) in points.iter().zip(&places).zip(texts) {
+            let near = place.nearest(point);
+            if (near.0 - point.0).hypot(near.1 - point.1) > 14.0 {
+                self.leader(near, point, *tone);
+            }
+            // The text's estimated width is on the safe side: it stands at the end of its place that faces the point.
+            let (x, anchor) = match place.x + 0.5 * place.w - point.0 {
+                d if d > 1.0 => (place.x, "start"),
+                d if d < -1.0 => (place.x + place.w, "end"),
+                _ => (place.x + 0.5 * place.w, "middle"),
+            };
+            let at = (x, place.y + 0.78 * HEIGHT);
+            self.label(Label { at, text, anchor, tone: *tone, size: LABEL_SIZE });
+        }
+    }
+
+    /// Labels lines at their right ends, spread so that they do not cover each other.
+    pub fn label_ends(&mut self, ends: &[(f64, f64)], texts: &[(String, Tone)], frame: Rect) {
+        let heights: Vec<f64> = ends.iter().map(|e| e.1).collect();
+        let moved = labels::spread(&heights, 17.0, frame.y + 6.0, frame.y + frame.h - 6.0);
+        for ((&(x, y), moved), (text, tone)) in ends.iter().zip(moved).zip(texts) {
+            self.leader((x + 2.0, y), (x + 12.0, moved), *tone);
+            let at = (x + 15.0, moved + 4.5);
+            self.label(Label { at, text, anchor: "start", tone: *tone, size: LABEL_SIZE });
+        }
+    }
+}
+
+/// plotters' text size for a text of so many pixels: its SVG back end divides by 1.24.
+fn text(pixels: f64, tone: Tone) -> TextStyle<'static> {
+    ("sans-serif", pixels * 1.24).into_font().color(&tone.light)
+}
+
+/// What the axes are called and how their numbers are written.
+pub struct Axes<'a> {
+    /// Under the horizontal axis.
+    pub x: &'a str,
+    /// Beside the vertical axis; empty if the chart labels it itself.
+    pub y: &'a str,
+    /// Numbers of the horizontal axis.
+    pub x_number: &'a dyn Fn(&f64) -> String,
+    /// Numbers of the vertical axis.
+    pub y_number: &'a dyn Fn(&f64) -> String,
+}
+
+/// Grid, axes and their numbers.
+pub fn mesh<X, Y>(chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>, axes: &Axes<'_>) -> Drawn
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    let mut mesh = chart.configure_mesh();
+    mesh.light_line_style(TRANSPARENT)
+        .bold_line_style(GRID.light)
+        .axis_style(MUTED.light)
+        .label_style(text(12.0, MUTED))
+        .axis_desc_style(text(13.0, MUTED))
+        .x_desc(axes.x)
+        .x_label_formatter(axes.x_number)
+        .y_label_formatter(axes.y_number)
+        .x_labels(8)
+        .y_labels(8);
+    if axes.y.is_empty() {
+        mesh.disable_y_mesh().disable_y_axis();
+    } else {
+        mesh.y_desc(axes.y);
+    }
+    mesh.draw()?;
+    Ok(())
+}
+
+/// The plotting area in pixels of the chart.
+pub fn frame<X, Y>(chart: &ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>) -> Rect
+where
+    X: Ranged<ValueType = f64>,
+    Y: Ranged<ValueType = f64>,
+{
+    let (x, y) = chart.plotting_area().get_pixel_range();
+    Rect { x: f64::from(x.start), y: f64::from(y.start), w: f64::from(x.end - x.start), h: f64::from(y.end - y.start) }
+}
+
+/// Where a value lies, in pixels of the chart.
+pub fn pixel<X, Y>(chart: &ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>, at: (f64, f64)) -> (f64, f64)
+where
+    X: Ranged<ValueType = f64>,
+    Y: Ranged<ValueType = f64>,
+{
+    let (x, y) = chart.backend_coord(&at);
+    (f64::from(x), f64::from(y))
+}
+
+/// The style of frontiers and envelopes: wide, behind the marks.
+pub fn best_line() -> ShapeStyle {
+    BEST.light.stroke_width(7)
+}

@@ -1,0 +1,6 @@
+//! The charts of the report, one file a kind.
+
+pub mod growth;
+pub mod phases;
+pub mod scatter;
+pub mod total_time;

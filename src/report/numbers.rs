@@ -1,0 +1,92 @@
+//! Numbers as people read them: three digits that count, thousands told apart, units by size.
+
+/// Three significant digits, without an exponent: `0.0123`, `1.23`, `123`, `12345`.
+pub fn three_digits(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    // The exponent after rounding: 0.9999 has that of 1.00.
+    let rounded = format!("{value:.2e}");
+    let exponent: i32 = rounded.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0);
+    format!("{value:.*}", (2 - exponent).clamp(0, 9) as usize)
+}
+
+/// With a thin space between thousands: `262 267`.
+pub fn grouped(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push('\u{2009}');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A count in thousands, millions or billions: `66 k`, `1.4 M`.
+pub fn short_count(value: f64) -> String {
+    let (scaled, unit) = match value.abs() {
+        v if v >= 0.9995e9 => (value / 1e9, " G"),
+        v if v >= 0.9995e6 => (value / 1e6, " M"),
+        v if v >= 0.9995e3 => (value / 1e3, " k"),
+        _ => (value, ""),
+    };
+    let text = three_digits(scaled);
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    format!("{text}{unit}")
+}
+
+/// Milliseconds in the unit that fits: `12.3 µs`, `4.56 ms`, `7.89 s`.
+pub fn duration(milliseconds: f64) -> String {
+    match milliseconds {
+        ms if ms < 0.9995 => format!("{} µs", three_digits(ms * 1e3)),
+        ms if ms < 999.5 => format!("{} ms", three_digits(ms)),
+        ms => format!("{} s", three_digits(ms / 1e3)),
+    }
+}
+
+/// Bytes in binary units: `16.0 MiB`.
+pub fn bytes(value: u64) -> String {
+    let value = value as f64;
+    match value {
+        b if b >= 1023.5 * 1024.0 * 1024.0 => format!("{} GiB", three_digits(b / (1 << 30) as f64)),
+        b if b >= 1023.5 * 1024.0 => format!("{} MiB", three_digits(b / (1 << 20) as f64)),
+        b if b >= 1024.0 => format!("{} KiB", three_digits(b / 1024.0)),
+        b => format!("{b} B"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_digits_count_and_no_exponent_is_used() {
+        for (value, text) in
+            [(0.012345, "0.0123"), (1.0, "1.00"), (12.345, "12.3"), (123.45, "123"), (12345.6, "12346"), (0.0, "0")]
+        {
+            assert_eq!(three_digits(value), text);
+        }
+    }
+
+    #[test]
+    fn thousands_are_told_apart() {
+        assert_eq!(grouped(7), "7");
+        assert_eq!(grouped(262_267), "262\u{2009}267");
+        assert_eq!(grouped(1_000_000), "1\u{2009}000\u{2009}000");
+    }
+
+    #[test]
+    fn units_follow_the_size() {
+        assert_eq!(short_count(66_450.0), "66.5 k");
+        assert_eq!(short_count(1_000_000.0), "1 M");
+        assert_eq!(short_count(999_900.0), "1 M");
+        assert_eq!(short_count(20.0), "20");
+        assert_eq!(duration(0.0123), "12.3 µs");
+        assert_eq!(duration(4.56), "4.56 ms");
+        assert_eq!(duration(999.9), "1.00 s");
+        assert_eq!(bytes(512), "512 B");
+        assert_eq!(bytes(16 << 20), "16.0 MiB");
+    }
+}
