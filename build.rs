@@ -69,11 +69,24 @@ fn spirv_of(_source: &Path, name: &str, _out: &Path) -> PathBuf {
 
 #[cfg(feature = "compile-shaders")]
 fn spirv_of(source: &Path, name: &str, out: &Path) -> PathBuf {
+    let file = format!("{}.spv", name.replace('/', "."));
+    // Beside the optimised shader one with its names, for the test that compares layouts (src/layouts.rs).
+    let named = out.join("named");
+    fs::create_dir_all(&named).expect("OUT_DIR can be written");
+    println!("cargo:rustc-env=HEDGEROW_NAMED_SPIRV={}", named.display());
+    fs::write(named.join(&file), compile(source, shaderc::OptimizationLevel::Zero)).expect("OUT_DIR can be written");
+    let path = out.join(file);
+    fs::write(&path, compile(source, shaderc::OptimizationLevel::Performance)).expect("OUT_DIR can be written");
+    path
+}
+
+#[cfg(feature = "compile-shaders")]
+fn compile(source: &Path, level: shaderc::OptimizationLevel) -> Vec<u8> {
     let text = fs::read_to_string(source).expect("the shader was just listed");
     let compiler = shaderc::Compiler::new().expect("shaderc starts");
     let mut options = shaderc::CompileOptions::new().expect("shaderc gives options");
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
-    options.set_optimization_level(shaderc::OptimizationLevel::Performance);
+    options.set_optimization_level(level);
     options.set_warnings_as_errors();
     // Every include is named from glsl/, so that a line such as `#include "gpu/pass.glsl"` means the same everywhere.
     options.set_include_callback(|requested, _kind, _from, _depth| {
@@ -82,15 +95,12 @@ fn spirv_of(source: &Path, name: &str, out: &Path) -> PathBuf {
         Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
     });
     let file = source.display().to_string();
-    let binary = match compiler.compile_into_spirv(&text, shaderc::ShaderKind::Compute, &file, "main", Some(&options)) {
-        Ok(binary) => binary,
+    match compiler.compile_into_spirv(&text, shaderc::ShaderKind::Compute, &file, "main", Some(&options)) {
+        Ok(binary) => binary.as_binary_u8().to_vec(),
         Err(error) => {
             // shaderc already writes `glsl/room/pass.comp:LINE: error: …`, which editors follow as they follow rustc.
             eprintln!("{error}");
             panic!("a shader does not compile, see above");
         }
-    };
-    let path = out.join(format!("{}.spv", name.replace('/', ".")));
-    fs::write(&path, binary.as_binary_u8()).expect("OUT_DIR can be written");
-    path
+    }
 }

@@ -18,6 +18,8 @@ pub mod bvh;
 pub mod cli;
 mod error;
 pub mod gpu;
+#[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
+mod layouts;
 #[cfg(feature = "cli")]
 pub mod measure;
 #[cfg(feature = "cli")]

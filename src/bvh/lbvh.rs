@@ -115,6 +115,30 @@ struct Arguments {
     padding: u32,
 }
 
+#[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
+pub(crate) fn arguments_layout() -> crate::layouts::Layout {
+    crate::layouts::layout_of!(Arguments {
+        positions,
+        indices,
+        structure,
+        state,
+        keys,
+        values,
+        ends,
+        table,
+        primitive_count,
+        vertex_count,
+        vertex_stride,
+        code_kind,
+        c_t,
+        c_i,
+        columns,
+        column_keys,
+        passes,
+        padding
+    })
+}
+
 impl Codes {
     /// The codes that `primitive_count` triangles need: bits that tell about sixteen times as many cells apart as there are
     /// triangles an axis, in whole passes of the sort.

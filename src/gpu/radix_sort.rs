@@ -124,6 +124,23 @@ struct Arguments {
     padding: u32,
 }
 
+#[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
+pub(crate) fn arguments_layout() -> crate::layouts::Layout {
+    crate::layouts::layout_of!(Arguments {
+        keys,
+        values,
+        keys_out,
+        values_out,
+        table,
+        count,
+        shift,
+        columns,
+        column_keys,
+        identity,
+        padding
+    })
+}
+
 /// Records the sort. Returns the index (0 or 1) of the buffers that hold the result.
 ///
 /// Three dispatches a pass with a barrier behind each; the caller places one before the first.

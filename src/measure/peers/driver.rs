@@ -18,17 +18,17 @@ const WORKGROUP: u32 = 64;
 /// The push constants of `glsl/measure/ray_query.comp`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-pub struct Arguments {
-    /// Address of the top-level structure.
-    pub structure: u64,
-    /// Address of the rays.
-    pub rays: u64,
-    /// Address of the hits.
-    pub hits: u64,
-    /// The first ray of this dispatch.
-    pub first: u32,
-    /// Rays in all.
-    pub count: u32,
+struct Arguments {
+    structure: u64,
+    rays: u64,
+    hits: u64,
+    first: u32,
+    count: u32,
+}
+
+#[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
+pub(crate) fn arguments_layout() -> crate::layouts::Layout {
+    crate::layouts::layout_of!(Arguments { structure, rays, hits, first, count })
 }
 
 /// A scene in the driver's acceleration structure.

@@ -1,0 +1,184 @@
+//! The structs that host and device share are the same on both sides: offsets, sizes and names, from SPIR-V reflection.
+//!
+//! Each module that pushes constants says its layout in one line (`layout_of!`, in its tests); every shader of the table
+//! must be listed here, so that a new one cannot be forgotten. Names may differ by the ending `_address`.
+
+use crate::bvh::layout::{Child, Header, Node, Triangle};
+use crate::gpu::shaders;
+use crate::trace::{Hit, Ray};
+use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::spirv::{Decoration, Op, StorageClass};
+use std::collections::{BTreeMap, BTreeSet};
+use std::mem::offset_of;
+use std::path::Path;
+
+/// A struct: its bytes, and name, offset and bytes of each member.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Layout {
+    pub bytes: usize,
+    pub members: Vec<(String, usize, usize)>,
+}
+
+/// The [`Layout`] of a Rust struct: `layout_of!(Arguments { keys, values })`, with all its members.
+macro_rules! layout_of {
+    ($name:ty { $($member:ident),* $(,)? }) => {{
+        let member = |name: &str, at: usize, bytes: usize| (name.to_string(), at, bytes);
+        crate::layouts::Layout {
+            bytes: size_of::<$name>(),
+            members: vec![$(member(
+                stringify!($member),
+                std::mem::offset_of!($name, $member),
+                crate::layouts::bytes_of_member(|s: &$name| &s.$member),
+            )),*],
+        }
+    }};
+}
+pub(crate) use layout_of;
+
+pub(crate) fn bytes_of_member<S, M>(_: fn(&S) -> &M) -> usize {
+    size_of::<M>()
+}
+
+/// The push constants of each shader, as the host sees them.
+fn arguments_of(shader: &str) -> Option<Layout> {
+    match shader {
+        _ if shader.starts_with("bvh/lbvh_") => Some(crate::bvh::lbvh::arguments_layout()),
+        _ if shader.starts_with("gpu/radix_sort_") => Some(crate::gpu::radix_sort::arguments_layout()),
+        "measure/ray_query" => Some(crate::measure::peers::driver::arguments_layout()),
+        _ => None,
+    }
+}
+
+/// The structs in memory, by their name in GLSL, as the host sees them.
+fn structs() -> BTreeMap<&'static str, Layout> {
+    let mut node = layout_of!(Node { children });
+    let right = offset_of!(Node, children) + size_of::<Child>();
+    node.members = vec![("left".into(), 0, size_of::<Child>()), ("right".into(), right, size_of::<Child>())];
+    let mut header =
+        layout_of!(Header { magic, kind, status, primitive_count, root, active, node_slots, code_bits, reserved });
+    // `active` is a reserved word of GLSL.
+    header.members[5].0 = "active_count".into();
+    BTreeMap::from([
+        ("Child", layout_of!(Child { lo, index, hi, count })),
+        ("Node", node),
+        ("Triangle", layout_of!(Triangle { v0, primitive, v1, geometry, v2, flags })),
+        ("Header", header),
+        ("Ray", layout_of!(Ray { origin, t_min, direction, t_max })),
+        ("Hit", layout_of!(Hit { t, primitive, u, v })),
+    ])
+}
+
+/// The unoptimised SPIR-V of a shader, which still has the names.
+struct Reflection(Module);
+
+impl Reflection {
+    fn of(shader: &str) -> Reflection {
+        let path = Path::new(env!("HEDGEROW_NAMED_SPIRV")).join(format!("{}.spv", shader.replace('/', ".")));
+        let bytes = std::fs::read(&path).expect("build.rs wrote it");
+        Reflection(rspirv::dr::load_bytes(bytes).expect("SPIR-V of shaderc"))
+    }
+
+    /// The push constants, as the device sees them.
+    fn arguments(&self) -> Option<Layout> {
+        let is_pointer = |i: &&Instruction| {
+            i.class.opcode == Op::TypePointer && i.operands[0] == Operand::StorageClass(StorageClass::PushConstant)
+        };
+        let pointee = |i: &Instruction| self.ty(i.operands[1].unwrap_id_ref());
+        let pointees = self.0.types_global_values.iter().filter(is_pointer).map(pointee);
+        pointees.filter(|t| t.class.opcode == Op::TypeStruct).find_map(|t| self.layout(t))
+    }
+
+    /// All structs that lie in memory, by name, as the device sees them.
+    fn structs(&self) -> impl Iterator<Item = (&str, Layout)> {
+        let structs = self.0.types_global_values.iter().filter(|i| i.class.opcode == Op::TypeStruct);
+        structs.filter_map(|i| Some((self.name(i.result_id?, None)?, self.layout(i)?)))
+    }
+
+    fn ty(&self, id: u32) -> &Instruction {
+        self.0.types_global_values.iter().find(|i| i.result_id == Some(id)).expect("types are declared")
+    }
+
+    /// The name of a type, or of one of its members.
+    fn name(&self, id: u32, member: Option<u32>) -> Option<&str> {
+        let target: Vec<_> = [Operand::IdRef(id)].into_iter().chain(member.map(Operand::LiteralBit32)).collect();
+        let op = if member.is_some() { Op::MemberName } else { Op::Name };
+        let mut names = self.0.debug_names.iter().filter(|i| i.class.opcode == op);
+        names.find_map(|i| i.operands.strip_prefix(&target[..])?.first().map(Operand::unwrap_literal_string))
+    }
+
+    fn decoration(&self, id: u32, member: Option<u32>, decoration: Decoration) -> Option<usize> {
+        let mut target: Vec<_> = [Operand::IdRef(id)].into_iter().chain(member.map(Operand::LiteralBit32)).collect();
+        target.push(Operand::Decoration(decoration));
+        let mut values = self.0.annotations.iter().filter_map(|i| i.operands.strip_prefix(&target[..])?.first());
+        values.next().map(|value| value.unwrap_literal_bit32() as usize)
+    }
+
+    /// The layout of a struct; `None` for one that lies in no memory and so has no offsets.
+    fn layout(&self, block: &Instruction) -> Option<Layout> {
+        let id = block.result_id?;
+        let members = block.operands.iter().zip(0..).map(|(ty, member)| {
+            let name = self.name(id, Some(member))?.trim_end_matches("_address").to_string();
+            let offset = self.decoration(id, Some(member), Decoration::Offset)?;
+            Some((name, offset, self.bytes(ty.unwrap_id_ref())))
+        });
+        let members = members.collect::<Option<Vec<_>>>()?;
+        Some(Layout { bytes: members.last().map_or(0, |(_, offset, bytes)| offset + bytes), members })
+    }
+
+    /// Bytes of a type in memory; 0 for an array without end.
+    fn bytes(&self, id: u32) -> usize {
+        let ty = self.ty(id);
+        let operand = |i: usize| ty.operands[i].unwrap_id_ref();
+        match ty.class.opcode {
+            Op::TypeInt | Op::TypeFloat => ty.operands[0].unwrap_literal_bit32() as usize / 8,
+            Op::TypeVector => self.bytes(operand(0)) * ty.operands[1].unwrap_literal_bit32() as usize,
+            Op::TypeArray => {
+                let length = self.ty(operand(1)).operands[0].unwrap_literal_bit32() as usize;
+                length * self.stride(id, operand(0))
+            }
+            Op::TypeRuntimeArray => {
+                self.stride(id, operand(0));
+                0
+            }
+            Op::TypePointer => 8,
+            Op::TypeStruct => self.layout(ty).map_or(0, |l| l.bytes),
+            other => panic!("{other:?} lies in memory that the host shares"),
+        }
+    }
+
+    /// The stride of an array, which in scalar layout is the size of its element.
+    fn stride(&self, array: u32, element: u32) -> usize {
+        let stride = self.decoration(array, None, Decoration::ArrayStride).expect("arrays in memory have a stride");
+        assert_eq!(stride, self.bytes(element), "the stride of an array of {:?}", self.name(element, None));
+        stride
+    }
+}
+
+#[test]
+fn push_constants_are_the_same_on_host_and_device() {
+    for shader in shaders::ALL {
+        let device =
+            Reflection::of(shader.name).arguments().unwrap_or_else(|| panic!("{} has no push constants", shader.name));
+        let mut host = arguments_of(shader.name)
+            .unwrap_or_else(|| panic!("{} is new: say its arguments in src/layouts.rs", shader.name));
+        // The host's struct may end in padding, up to its alignment.
+        assert!(host.bytes <= 128 && (device.bytes..device.bytes + 8).contains(&host.bytes), "{}", shader.name);
+        host.members.retain(|(name, ..)| name != "padding");
+        assert_eq!(host.members, device.members, "{}: host left, device right", shader.name);
+    }
+}
+
+#[test]
+fn structs_in_memory_are_the_same_on_host_and_device() {
+    let host = structs();
+    let mut seen = BTreeSet::new();
+    for shader in shaders::ALL {
+        for (name, device) in Reflection::of(shader.name).structs() {
+            if let Some(host) = host.get(name) {
+                assert_eq!(host, &device, "{name} in {}: host left, device right", shader.name);
+                seen.insert(name.to_string());
+            }
+        }
+    }
+    assert!(seen.iter().eq(host.keys().copied()), "every struct is met in some shader: {seen:?}");
+}
