@@ -167,7 +167,7 @@ impl Lbvh {
             collapse: options.collapse,
             schedule: options.schedule.unwrap_or_else(|| default_schedule(limits, primitive_count)),
             shape,
-            items: if limits.is_cpu() { 16 } else { 1 },
+            items: if limits.is_cpu() { 32 } else { 1 },
             workers: if limits.is_cpu() { 64 } else { 1024 },
             count: primitive_count,
         })

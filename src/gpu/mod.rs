@@ -8,10 +8,15 @@ mod context;
 mod device;
 #[cfg(feature = "cli")]
 mod driver_structure;
+#[cfg(feature = "cli")]
+pub mod probe;
 pub mod radix_sort;
 mod recorder;
+pub mod reduce;
 mod requirements;
+pub mod scan;
 pub mod shaders;
+pub mod task_pool;
 
 pub use context::{Context, ContextDesc, Kernel, Limits};
 #[cfg(feature = "cli")]

@@ -1,0 +1,49 @@
+// Exclusive scan of words in three steps over tiles: sum each tile, scan the sums, scan each tile from its sum on.
+// src/gpu/scan.rs records them and holds the twin. Sums wrap around at 2^32.
+//
+//   sum    reads values          writes sums[tile]
+//   sums   reads sums            writes sums (exclusive), sums[tiles] = total; one workgroup
+//   apply  reads values, sums    writes results (may be the values' memory)
+//
+// needs  one barrier between each two; any subgroup size; at most 128 subgroups a workgroup
+#ifndef HEDGEROW_GPU_SCAN
+#define HEDGEROW_GPU_SCAN
+#include "gpu/pass.glsl"
+
+layout(push_constant, scalar) uniform Arguments {
+    Words values;
+    Words results;
+    Words sums;
+    uint count;
+    uint rounds;   // words of an invocation in a tile
+};
+
+shared uint scan_partial[128];
+
+// Exclusive scan over the workgroup; `total` is the sum of all.
+uint scan_workgroup(uint value, out uint total) {
+    uint before = subgroupExclusiveAdd(value);
+    uint subgroup_total = subgroupAdd(value);
+    if (subgroupElect()) scan_partial[gl_SubgroupID] = subgroup_total;
+    barrier();
+    total = 0;
+    for (uint s = 0; s < gl_NumSubgroups; ++s) {
+        if (s < gl_SubgroupID) before += scan_partial[s];
+        total += scan_partial[s];
+    }
+    barrier();
+    return before;
+}
+
+// Exclusive scan of words[first..end], starting from `sum`; returns the sum behind the last.
+uint scan_range(Words from, Words to, uint first, uint end, uint sum) {
+    for (uint base = first; base < end; base += gl_WorkGroupSize.x) {
+        uint i = base + gl_LocalInvocationIndex;
+        uint total;
+        uint before = scan_workgroup(i < end ? from.word[i] : 0, total);
+        if (i < end) to.word[i] = sum + before;
+        sum += total;
+    }
+    return sum;
+}
+#endif

@@ -1,0 +1,74 @@
+//! Reduction of bounds: the box around many boxes.
+
+use super::{Kernel, Limits, Recorder, shaders};
+use crate::Result;
+
+/// The least and the greatest corner, as the device has them: 24 bytes.
+pub type Bounds = [[f32; 3]; 2];
+
+/// The box that holds nothing.
+pub const EMPTY: Bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+
+/// How the reduction of so many boxes is cut for a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reduction {
+    count: u32,
+    workgroup: u32,
+    rounds: u32,
+}
+
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Arguments {
+    boxes: u64,
+    results: u64,
+    count: u32,
+    rounds: u32,
+}
+
+impl Reduction {
+    /// A reduction of `count` boxes.
+    pub fn new(limits: &Limits, count: u32) -> Reduction {
+        let workgroup = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
+        Reduction { count, workgroup, rounds: if limits.is_cpu() { 64 } else { 8 } }
+    }
+
+    fn tile(&self) -> u32 {
+        self.workgroup * self.rounds
+    }
+
+    /// Boxes of scratch (24 bytes each) that [`Reduction::record`] needs.
+    pub fn scratch_boxes(&self) -> u32 {
+        let first = self.count.div_ceil(self.tile());
+        if first <= 1 { 0 } else { first + first.div_ceil(self.tile()) }
+    }
+
+    /// Records the reduction of the boxes at `boxes` to the one at `result`, with scratch memory at `scratch` (4-byte
+    /// aligned). One dispatch a level with barriers between; the caller places one before and one behind.
+    ///
+    /// # Errors
+    /// A pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, boxes: u64, result: u64, scratch: u64) -> Result<()> {
+        let kernel = Kernel::new(&shaders::GPU_REDUCE_BOUNDS, self.workgroup, &[]);
+        let second = scratch + u64::from(self.count.div_ceil(self.tile())) * size_of::<Bounds>() as u64;
+        let (mut from, mut count, mut room) = (boxes, self.count, [scratch, second].into_iter().cycle());
+        loop {
+            let tiles = count.div_ceil(self.tile()).max(1);
+            let to = if tiles == 1 { result } else { room.next().expect("a cycle has no end") };
+            let arguments = Arguments { boxes: from, results: to, count, rounds: self.rounds };
+            recorder.dispatch(&kernel, &arguments, tiles)?;
+            if tiles == 1 {
+                return Ok(());
+            }
+            recorder.barrier();
+            (from, count) = (to, tiles);
+        }
+    }
+}
+
+/// What the reduction computes, plainly.
+pub fn on_host(boxes: &[Bounds]) -> Bounds {
+    boxes.iter().fold(EMPTY, |[lo, hi], b| {
+        [std::array::from_fn(|i| lo[i].min(b[0][i])), std::array::from_fn(|i| hi[i].max(b[1][i]))]
+    })
+}

@@ -1,0 +1,86 @@
+//! Exclusive scan (prefix sum) of 32-bit words.
+//!
+//! Reduce, then scan: three dispatches, no progress between workgroups asked for. `glsl/gpu/scan.glsl` is the device's side.
+
+use super::{Kernel, Limits, Recorder, shaders};
+use crate::Result;
+
+/// The most words that are scanned at once.
+pub const MAX_COUNT: u32 = 1 << 27;
+
+/// How the scan of so many words is cut for a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Scan {
+    count: u32,
+    workgroup: u32,
+    rounds: u32,
+}
+
+/// Device addresses of one scan, 4-byte aligned.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Buffers {
+    /// The words.
+    pub values: u64,
+    /// Where the scan goes: as many words; may be `values`.
+    pub results: u64,
+    /// [`Scan::sums_words`] words of scratch; the last of them is the total when the scan has run.
+    pub sums: u64,
+}
+
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Arguments {
+    buffers: Buffers,
+    count: u32,
+    rounds: u32,
+}
+
+impl Scan {
+    /// A scan of `count` words.
+    ///
+    /// # Panics
+    /// `count` is over [`MAX_COUNT`].
+    pub fn new(limits: &Limits, count: u32) -> Scan {
+        assert!(count <= MAX_COUNT, "{count} words, at most {MAX_COUNT} are scanned at once");
+        let workgroup = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
+        // At most 2^14 tiles, so that one workgroup scans their sums in little time.
+        let rounds = (count >> 14).div_ceil(workgroup).next_power_of_two().max(if limits.is_cpu() { 32 } else { 8 });
+        Scan { count, workgroup, rounds }
+    }
+
+    fn tiles(&self) -> u32 {
+        self.count.div_ceil(self.workgroup * self.rounds)
+    }
+
+    /// Words of scratch; the total is in the last one.
+    pub fn sums_words(&self) -> u32 {
+        self.tiles() + 1
+    }
+
+    /// Records the scan: three dispatches with barriers between; the caller places one before and one behind.
+    ///
+    /// # Errors
+    /// A pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, buffers: &Buffers) -> Result<()> {
+        let arguments = Arguments { buffers: *buffers, count: self.count, rounds: self.rounds };
+        let kernel = |shader| Kernel::new(shader, self.workgroup, &[]);
+        recorder.dispatch(&kernel(&shaders::GPU_SCAN_SUM), &arguments, self.tiles())?;
+        recorder.barrier();
+        recorder.dispatch(&kernel(&shaders::GPU_SCAN_SUMS), &arguments, 1)?;
+        recorder.barrier();
+        recorder.dispatch(&kernel(&shaders::GPU_SCAN_APPLY), &arguments, self.tiles())
+    }
+}
+
+/// What the scan computes, plainly: the sums of all words before, and the total.
+pub fn on_host(values: &[u32]) -> (Vec<u32>, u32) {
+    let mut sum = 0u32;
+    let before = |&value: &u32| {
+        let before = sum;
+        sum = sum.wrapping_add(value);
+        before
+    };
+    let scanned = values.iter().map(before).collect();
+    (scanned, sum)
+}
