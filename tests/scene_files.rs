@@ -7,6 +7,7 @@ mod files;
 
 use files::{Folder, load, pack};
 use hedgerow::scene::{self, LoadOptions, Progress};
+use proptest::prelude::*;
 use std::cell::Cell;
 
 /// A square of two triangles, as `.tri`.
@@ -109,7 +110,7 @@ fn binary_files_with_bad_indices_or_vertices_name_the_item() {
     tri[last..].copy_from_slice(&70_112_u32.to_le_bytes());
     assert_eq!(
         refused("square.tri", &tri),
-        ": triangle 1 names vertex 70112 (both from 0), the file has 4; is it cut off?"
+        ": triangle 1 names vertex 70112 (both from 0), there are 4; is it cut off?"
     );
     for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut tri = square_tri();
@@ -177,4 +178,32 @@ fn known_scenes_have_their_camera_and_others_see_all_of_it() {
     assert_eq!((known.camera.eye, known.camera.fov), ([-11.0, 4.0, 0.3], 65.0));
     let other = load(&folder.bytes("square.tri", &square_tri())).expect("square");
     assert_eq!(other.camera.look, [0.5, 0.5, 0.0]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// Whatever bytes are changed, lost or added, there is a scene or an error, never a panic.
+    #[test]
+    fn damaged_files_never_panic(
+        kind in 0_usize..5,
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..5),
+        length: prop::sample::Index,
+    ) {
+        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                   element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        let (name, mut bytes) = match kind {
+            0 => ("a.tri", square_tri()),
+            1 => ("a.anim", square_anim(2)),
+            2 => ("a.tri.zst", pack(&square_tri())),
+            3 => ("a.obj", b"v 0 0 0\nv 1 0 0 1\nv 1 1 0 0 0 1\nvn 0 0 1\no a\nf 1/2/3 -2//1 3\nl 1 2\n".to_vec()),
+            _ => ("a.ply", ply.into()),
+        };
+        for (at, byte) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        bytes.truncate(length.index(bytes.len()) + 1);
+        let _ = load(&Folder::new().bytes(name, &bytes));
+    }
 }

@@ -7,8 +7,11 @@
 mod cameras;
 mod check;
 mod generators;
+mod gltf;
+mod inst;
 mod lookup;
 mod obj;
+mod ply;
 mod random;
 mod source;
 mod tri;
@@ -129,6 +132,9 @@ pub fn load(spec: &str, options: &LoadOptions<'_>) -> Result<Scene> {
 fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Content> {
     let mesh = match lookup::format_of(path).as_deref() {
         Some("obj") => obj::read(path, options)?,
+        Some("ply") => ply::read(path, options)?,
+        Some("gltf" | "glb") => return gltf::read(path, options),
+        Some("inst") => inst::read(path, options)?,
         Some("tri") => tri::read_tri(path, options)?,
         Some("anim") => tri::read_anim(path, options)?,
         _ => {

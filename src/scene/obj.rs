@@ -17,6 +17,11 @@ pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> {
     Ok(objects.into_iter().next().map(|(_, mesh)| mesh).unwrap_or_default())
 }
 
+/// Reads an OBJ file object by object: the faces behind each `o` line, under its name.
+pub(super) fn read_objects(path: &Path, options: &LoadOptions<'_>) -> Result<Vec<(String, Mesh)>> {
+    parse(path, options, Objects::Named)
+}
+
 #[derive(Clone, Copy, PartialEq)]
 enum Objects {
     Merged,

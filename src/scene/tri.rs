@@ -31,8 +31,8 @@ pub(super) fn read_anim(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> 
 }
 
 fn checked(path: &Path, mesh: Mesh) -> Result<Mesh> {
-    check::vertices_are_finite(path, &mesh.positions)?;
-    check::indices_are_in_range(path, &mesh.triangles, mesh.positions.len())?;
+    check::vertices_are_finite(path.display(), &mesh.positions)?;
+    check::indices_are_in_range(path.display(), &mesh.triangles, mesh.positions.len())?;
     Ok(mesh)
 }
 
