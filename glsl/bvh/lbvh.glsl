@@ -118,6 +118,11 @@ void lbvh_bounds(uint task) {
 
 // ---- plan ----
 
+void mark_unused(Structure structure, uint slot) {
+    Child unused = Child(uintBitsToFloat(uvec3(0x7F800000u)), NONE, uintBitsToFloat(uvec3(0xFF800000u)), NONE);
+    structure.nodes[slot] = Node(unused, unused);
+}
+
 void lbvh_plan() {
     if (gl_LocalInvocationIndex != 0) return;
     LbvhState state = LbvhState(state_address);
@@ -134,6 +139,7 @@ void lbvh_plan() {
     structure.header.node_slots = slots;
     structure.header.code_bits = bits;
     for (uint i = 0; i < 17; ++i) structure.header.reserved[i] = 0;
+    if (primitive_count < 2) mark_unused(structure, 0);
     if (state.active_count == 0) return;
     Box boxes = Box(from_ordered(uvec3(state.boxes_lo[0], state.boxes_lo[1], state.boxes_lo[2])),
                     from_ordered(uvec3(state.boxes_hi[0], state.boxes_hi[1], state.boxes_hi[2])));
@@ -286,6 +292,8 @@ void lbvh_hierarchy(uint task) {
             load_corners(input_mesh, primitive, c);
             triangles.triangle[position] = Triangle(c.v0, primitive, c.v1, 0, c.v2, 0);
             if (position < active_count) climb(structure, codes, position, box_around(c), active_count, area_scale);
+            // Slots from active_count - 1 on have no node.
+            if (position >= max(active_count, 1)) mark_unused(structure, position - 1);
         }
     }
 }

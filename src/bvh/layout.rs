@@ -9,7 +9,9 @@
 //! | [`Triangle`] × `primitive_count` | 48 each | behind the nodes: [`Sizes::triangles_offset`] |
 //!
 //! A [`Child`] names either an inner node (`count` 0) or a leaf: `count` triangles from `index` on, in the *primitive order*,
-//! which is the order of the triangle records. Slots that no child names are unused and hold anything.
+//! which is the order of the triangle records. A slot that no child names is not part of the tree; what it holds may be the
+//! subtree of a collapsed leaf or [`Node::UNUSED`], but no slot is named twice, by used and unused slots together: so every
+//! node has one parent, and who climbs from any slot reaches the root or learns that the slot is not part of the tree.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -104,6 +106,9 @@ pub struct Child {
 }
 
 impl Child {
+    /// A child of an unused slot: a leaf of nothing.
+    pub const UNUSED: Child = Child { lo: Aabb::EMPTY.lo, index: u32::MAX, hi: Aabb::EMPTY.hi, count: u32::MAX };
+
     /// The child's box.
     pub fn bounds(&self) -> Aabb {
         Aabb { lo: self.lo, hi: self.hi }
@@ -121,6 +126,11 @@ impl Child {
 pub struct Node {
     /// Left and right child.
     pub children: [Child; 2],
+}
+
+impl Node {
+    /// A slot that names nothing.
+    pub const UNUSED: Node = Node { children: [Child::UNUSED; 2] };
 }
 
 /// A triangle in the primitive order. 48 bytes.

@@ -1,6 +1,11 @@
-//! Quality of a tree: SAH cost, depth and leaf statistics, on the host.
+//! Quality of a tree: SAH cost, depth and leaf statistics, on the device and, plainly, on the host.
+//!
+//! `glsl/bvh/quality.glsl` is the device's side; it takes any `Bvh2`, whoever built it.
 
-use super::layout::Bvh2;
+use super::layout::{Bvh2, node_slots};
+use crate::Result;
+use crate::gpu::{Kernel, Limits, Recorder, fill, shaders};
+use bytemuck::{Pod, Zeroable};
 
 /// What a walk over a tree finds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -19,6 +24,96 @@ pub struct Quality {
     pub depth_avg: f64,
     /// Depth of the deepest leaf.
     pub depth_max: u32,
+}
+
+/// What the device leaves behind, 36 bytes: `Figures` in quality.glsl. Areas are relative to that of the root.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Figures {
+    inner_area: f32,
+    leaf_area: f32,
+    inner: u32,
+    leaves: u32,
+    refs: u32,
+    leaf_max: u32,
+    depth_sum: [u32; 2],
+    depth_max: u32,
+}
+
+impl Figures {
+    /// The figures with these costs of a step and of a test.
+    pub fn quality(&self, c_t: f64, c_i: f64) -> Quality {
+        let depths = f64::from(self.depth_sum[0]) + f64::from(self.depth_sum[1]) * 4_294_967_296.0;
+        Quality {
+            sah: c_t * f64::from(self.inner_area) + c_i * f64::from(self.leaf_area),
+            inner: self.inner.into(),
+            leaves: self.leaves.into(),
+            refs: self.refs.into(),
+            leaf_max: self.leaf_max,
+            depth_avg: if self.leaves == 0 { 0.0 } else { depths / f64::from(self.leaves) },
+            depth_max: self.depth_max,
+        }
+    }
+}
+
+/// Measuring a `Bvh2` of so many triangles on the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OnDevice {
+    slots: u32,
+    workgroup: u32,
+    rounds: u32,
+}
+
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Arguments {
+    structure: u64,
+    parents: u64,
+    partials: u64,
+    result: u64,
+    rounds: u32,
+    tiles: u32,
+}
+
+impl OnDevice {
+    /// For a structure of `primitive_count` triangles.
+    pub fn new(limits: &Limits, primitive_count: u32) -> OnDevice {
+        let workgroup = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
+        OnDevice { slots: node_slots(primitive_count), workgroup, rounds: if limits.is_cpu() { 64 } else { 4 } }
+    }
+
+    fn tiles(&self) -> u32 {
+        self.slots.div_ceil(self.workgroup * self.rounds)
+    }
+
+    /// Bytes of scratch memory.
+    pub fn scratch_bytes(&self) -> u64 {
+        4 * u64::from(self.slots) + u64::from(self.tiles()) * size_of::<Figures>() as u64
+    }
+
+    /// Records the measuring of the structure at `structure` into the [`Figures`] at `result`, with scratch memory at
+    /// `scratch`; all addresses 16-byte aligned. The caller places a barrier before and one behind.
+    ///
+    /// # Errors
+    /// A pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, structure: u64, scratch: u64, result: u64) -> Result<()> {
+        let arguments = Arguments {
+            structure,
+            parents: scratch,
+            partials: scratch + 4 * u64::from(self.slots),
+            result,
+            rounds: self.rounds,
+            tiles: self.tiles(),
+        };
+        let kernel = |shader| Kernel::new(shader, self.workgroup, &[]);
+        fill::record(recorder, scratch, self.slots, u32::MAX)?;
+        recorder.barrier();
+        recorder.dispatch(&kernel(&shaders::BVH_QUALITY_PARENTS), &arguments, self.tiles())?;
+        recorder.barrier();
+        recorder.dispatch(&kernel(&shaders::BVH_QUALITY_MEASURE), &arguments, self.tiles())?;
+        recorder.barrier();
+        recorder.dispatch(&kernel(&shaders::BVH_QUALITY_SUM), &arguments, 1)
+    }
 }
 
 /// The quality of `tree` with these costs of a step and of a test. An empty tree has zeros.

@@ -52,10 +52,28 @@ impl Bvh2 {
                 stack.extend(node.children.map(|c| (c, depth + 1, Some(child.index))));
             }
         }
+        self.validate_unused(&mut visited)?;
         match in_leaf.iter().position(|&there| !there) {
             Some(lost) => invalid(format!("triangle {lost} is in no leaf")),
             None => Ok(()),
         }
+    }
+
+    /// No slot is named twice, by slots of the tree (`visited`) and unused ones together.
+    fn validate_unused(&self, visited: &mut [bool]) -> Result<()> {
+        let in_tree = visited.to_vec();
+        for (slot, node) in self.nodes.iter().enumerate().filter(|&(slot, _)| !in_tree[slot]) {
+            for child in node.children.iter().filter(|c| !c.is_leaf()) {
+                match visited.get_mut(child.index as usize) {
+                    Some(named) if !*named => *named = true,
+                    Some(_) => {
+                        return invalid(format!("unused node {slot} names node {}, as another does", child.index));
+                    }
+                    None => return invalid(format!("unused node {slot} names node {}", child.index)),
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The primitive order names every primitive once.

@@ -8,6 +8,7 @@ mod context;
 mod device;
 #[cfg(feature = "cli")]
 mod driver_structure;
+pub mod fill;
 #[cfg(feature = "cli")]
 pub mod probe;
 pub mod radix_sort;

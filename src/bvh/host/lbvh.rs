@@ -48,7 +48,7 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, colla
     let mut tree = Tree {
         codes: order.iter().map(|&(code, _)| code).collect(),
         triangles: &records,
-        nodes: vec![bytemuck::Zeroable::zeroed(); header.node_slots as usize],
+        nodes: vec![Node::UNUSED; header.node_slots as usize],
         collapse,
         area_scale: crate::bvh::sah::area_scale(&bounds),
     };

@@ -1,0 +1,26 @@
+//! Fills words with a value: `vkCmdFillBuffer` for memory that is known by its address.
+
+use super::{Kernel, Recorder, shaders};
+use crate::Result;
+
+/// Invocations a workgroup.
+const WORKGROUP: u32 = 64;
+/// Words of an invocation.
+const ROUNDS: u32 = 16;
+
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Arguments {
+    words: u64,
+    count: u32,
+    value: u32,
+}
+
+/// Records the fill of `count` words at address `words` with `value`. One dispatch; the caller places the barriers.
+///
+/// # Errors
+/// The pipeline could not be made.
+pub fn record(recorder: &mut Recorder<'_>, words: u64, count: u32, value: u32) -> Result<()> {
+    let kernel = Kernel::new(&shaders::GPU_FILL, WORKGROUP, &[ROUNDS]);
+    recorder.dispatch(&kernel, &Arguments { words, count, value }, count.div_ceil(WORKGROUP * ROUNDS))
+}
