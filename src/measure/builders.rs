@@ -6,6 +6,10 @@
 use super::Subject;
 use super::host::HostLbvh;
 use super::peers::driver::Driver;
+#[cfg(feature = "peer-embree")]
+use super::peers::embree;
+#[cfg(feature = "peer-obvhs")]
+use super::peers::obvhs;
 use crate::bvh::codes::Codes;
 use crate::bvh::sah::Collapse;
 use crate::gpu::{Device, DriverPreference};
@@ -85,6 +89,66 @@ pub static BUILDERS: &[Builder] = &[
         variants: &["driver-fast-trace"],
         needs: Needs::RayQuery,
         make: |_, device, mesh| Ok(Box::new(Driver::new(given(device)?, mesh, DriverPreference::FastTrace)?)),
+        check: |_| Ok(()),
+    },
+    #[cfg(feature = "peer-obvhs")]
+    Builder {
+        name: "obvhs-fastest",
+        what: "obvhs on the CPU: PLOC alone",
+        options: &[],
+        variants: &["obvhs-fastest"],
+        needs: Needs::Nothing,
+        make: |_, _, mesh| Ok(Box::new(obvhs::Obvhs::new(mesh, obvhs::Preset::Fastest)?)),
+        check: |_| Ok(()),
+    },
+    #[cfg(feature = "peer-obvhs")]
+    Builder {
+        name: "obvhs-fast",
+        what: "obvhs on the CPU: PLOC and a little reinsertion",
+        options: &[],
+        variants: &["obvhs-fast"],
+        needs: Needs::Nothing,
+        make: |_, _, mesh| Ok(Box::new(obvhs::Obvhs::new(mesh, obvhs::Preset::Fast)?)),
+        check: |_| Ok(()),
+    },
+    #[cfg(feature = "peer-obvhs")]
+    Builder {
+        name: "obvhs-medium",
+        what: "obvhs on the CPU: PLOC and more reinsertion",
+        options: &[],
+        variants: &["obvhs-medium"],
+        needs: Needs::Nothing,
+        make: |_, _, mesh| Ok(Box::new(obvhs::Obvhs::new(mesh, obvhs::Preset::Medium)?)),
+        check: |_| Ok(()),
+    },
+    #[cfg(feature = "peer-embree")]
+    Builder {
+        name: "embree-low",
+        what: "Embree on the CPU: Morton codes",
+        options: &[],
+        variants: &["embree-low"],
+        needs: Needs::Nothing,
+        make: |_, _, mesh| Ok(Box::new(embree::Embree::new(mesh, embree::Preset::Low)?)),
+        check: |_| Ok(()),
+    },
+    #[cfg(feature = "peer-embree")]
+    Builder {
+        name: "embree-medium",
+        what: "Embree on the CPU: binned SAH",
+        options: &[],
+        variants: &["embree-medium"],
+        needs: Needs::Nothing,
+        make: |_, _, mesh| Ok(Box::new(embree::Embree::new(mesh, embree::Preset::Medium)?)),
+        check: |_| Ok(()),
+    },
+    #[cfg(feature = "peer-embree")]
+    Builder {
+        name: "embree-high",
+        what: "Embree on the CPU: SAH with spatial splits",
+        options: &[],
+        variants: &["embree-high"],
+        needs: Needs::Nothing,
+        make: |_, _, mesh| Ok(Box::new(embree::Embree::new(mesh, embree::Preset::High)?)),
         check: |_| Ok(()),
     },
 ];

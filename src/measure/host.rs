@@ -45,7 +45,7 @@ impl<'a> HostLbvh<'a> {
 }
 
 /// The time of `work` in milliseconds by the wall's clock, and what it gave.
-fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
+pub(super) fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let start = Instant::now();
     let result = work();
     (start.elapsed().as_secs_f64() * 1e3, result)
