@@ -171,6 +171,15 @@ impl Overlay {
         );
     }
 
+    /// A coloured rectangle.
+    pub fn band(&mut self, Rect { x, y, w, h }: Rect, tone: Tone) {
+        let fill = theme::hex(tone.light);
+        let _ = writeln!(
+            self.svg,
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" rx=\"2\" fill=\"{fill}\"/>"
+        );
+    }
+
     /// An invisible rectangle that shows `text` when pointed at.
     pub fn tip(&mut self, Rect { x, y, w, h }: Rect, text: &str) {
         let _ = writeln!(
@@ -278,5 +287,5 @@ where
 
 /// The style of frontiers and envelopes: wide, behind the marks.
 pub fn best_line() -> ShapeStyle {
-    BEST.light.stroke_width(7)
+    BEST.light.mix(0.65).stroke_width(6)
 }

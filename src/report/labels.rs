@@ -49,7 +49,8 @@ pub fn place(anchors: &[(f64, f64)], widths: &[f64], height: f64, frame: &Rect) 
     for (&anchor, &w) in anchors.iter().zip(widths) {
         let cost = |place: &Rect| {
             let covered: f64 = placed.iter().chain(&marks).map(|other| place.overlap(other)).sum();
-            covered + 4.0 * place.outside(frame)
+            // Whole pixels: of places that cover nothing but rounding errors, the nearest is taken.
+            (covered + 4.0 * place.outside(frame)).floor()
         };
         let best = candidates(anchor, w, height, MARK).min_by(|a, b| cost(a).total_cmp(&cost(b)));
         placed.push(best.expect("there are always candidates"));

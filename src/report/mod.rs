@@ -1,8 +1,135 @@
 //! Tables, charts and the page.
+//!
+//! [`results`] is what programs read. For people, [`table`] goes to the terminal and [`Report::write`] makes a folder with
+//! charts as SVG and PNG and an `index.html` that opens from the disk with no network.
 
 pub mod chart;
 pub mod charts;
 pub mod labels;
 pub mod names;
 pub mod numbers;
+mod page;
+pub mod results;
+pub mod summary;
+pub mod table;
 pub mod theme;
+
+use crate::measure::matrix::{Failure, Outcome};
+use crate::measure::provenance::Machine;
+use crate::measure::record::Record;
+use crate::{Error, Result};
+use chart::Chart;
+use std::path::Path;
+use theme::Legend;
+
+/// A benchmark run: everything that the page says.
+#[derive(Debug, Clone)]
+pub struct Report {
+    /// The machine.
+    pub machine: Machine,
+    /// The device, if one was used.
+    pub device: Option<DeviceFacts>,
+    /// Commit of the program.
+    pub commit: String,
+    /// When it was measured, RFC 3339 UTC.
+    pub when: String,
+    /// The command line that measures it again.
+    pub command: String,
+    /// Options with their values, for people.
+    pub options: Vec<(String, String)>,
+    /// What was measured, scene by scene.
+    pub outcomes: Vec<Outcome>,
+    /// What could not be measured.
+    pub failures: Vec<Failure>,
+    /// What a reader must know to judge the figures, such as a peer that is none.
+    pub notes: Vec<String>,
+    /// Pictures of the scenes, in files below the folder.
+    pub pictures: Vec<Picture>,
+}
+
+/// The device that was measured.
+#[derive(Debug, Clone)]
+pub struct DeviceFacts {
+    /// Its name.
+    pub name: String,
+    /// Driver and version.
+    pub driver: String,
+    /// Discrete, integrated, CPU…
+    pub kind: String,
+    /// Vulkan version.
+    pub vulkan: String,
+    /// Subgroup size.
+    pub subgroup: u32,
+    /// Bytes of device memory.
+    pub memory: u64,
+    /// Bytes a second that a plain copy reads and writes, in GB/s (10⁹), both counted.
+    pub copy_gb_s: Option<f64>,
+}
+
+/// A picture of a scene.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    /// The scene's name.
+    pub scene: String,
+    /// File, relative to the report's folder, with `/`.
+    pub file: String,
+    /// What it is.
+    pub caption: String,
+    /// What it shows, for whoever cannot see it.
+    pub alt: String,
+}
+
+/// The charts of one scene.
+struct SceneCharts {
+    scene: String,
+    charts: Vec<Chart>,
+}
+
+impl Report {
+    /// The records, in the order in which they were measured.
+    pub fn records(&self) -> Vec<&Record> {
+        self.outcomes.iter().map(|outcome| &outcome.record).collect()
+    }
+
+    /// The scenes, in the order in which they were measured.
+    fn scenes(&self) -> Vec<&str> {
+        let mut scenes: Vec<&str> = self.outcomes.iter().map(|o| o.record.scene.as_str()).collect();
+        scenes.dedup();
+        scenes
+    }
+
+    /// Writes `results.csv`, `charts/` and `index.html` into `folder`; `results.jsonl` is there already.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        let records = self.records();
+        let legend = Legend::of(records.iter().copied());
+        results::write_csv(&folder.join("results.csv"), &records)?;
+
+        let mut scenes = Vec::new();
+        for scene in self.scenes() {
+            let of_scene: Vec<&Record> = records.iter().copied().filter(|r| r.scene == scene).collect();
+            let charts = [
+                charts::scatter::trace_speed(&of_scene, &legend)?,
+                charts::scatter::sah_cost(&of_scene, &legend)?,
+                charts::total_time::total_time(&of_scene, &legend)?,
+                charts::phases::phases(&of_scene, &legend)?,
+            ];
+            scenes.push(SceneCharts { scene: scene.to_owned(), charts: charts.into_iter().flatten().collect() });
+        }
+        let growth = charts::growth::growth(&records, &legend)?;
+
+        let chart_folder = folder.join("charts");
+        std::fs::create_dir_all(&chart_folder).map_err(Error::file(&chart_folder))?;
+        for chart in scenes.iter().flat_map(|s| &s.charts).chain(&growth) {
+            for (extension, content) in [("svg", chart.svg().as_bytes().to_vec()), ("png", chart.png()?)] {
+                let path = chart_folder.join(format!("{}.{extension}", chart.name));
+                std::fs::write(&path, content).map_err(Error::file(&path))?;
+            }
+        }
+        let page = page::page(self, &legend, &scenes, growth.as_ref());
+        let path = folder.join("index.html");
+        std::fs::write(&path, page).map_err(Error::file(&path))
+    }
+}

@@ -11,6 +11,12 @@ pub fn three_digits(value: f64) -> String {
     format!("{value:.*}", (2 - exponent).clamp(0, 9) as usize)
 }
 
+/// A number of an axis: no more digits than it needs, `0`, `0.5`, `120`.
+pub fn tick(value: f64) -> String {
+    let text = three_digits(value);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
 /// With a thin space between thousands: `262 267`.
 pub fn grouped(value: u64) -> String {
     let digits = value.to_string();
@@ -32,9 +38,14 @@ pub fn short_count(value: f64) -> String {
         v if v >= 0.9995e3 => (value / 1e3, " k"),
         _ => (value, ""),
     };
-    let text = three_digits(scaled);
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    format!("{text}{unit}")
+    format!("{}{unit}", tick(scaled))
+}
+
+/// [`duration`] with no more digits than it needs, for axes.
+pub fn duration_tick(milliseconds: f64) -> String {
+    let text = duration(milliseconds);
+    let (number, unit) = text.split_once(' ').unwrap_or((&text, ""));
+    format!("{} {unit}", tick(number.parse().unwrap_or(milliseconds)))
 }
 
 /// Milliseconds in the unit that fits: `12.3 µs`, `4.56 ms`, `7.89 s`.
@@ -86,6 +97,8 @@ mod tests {
         assert_eq!(duration(0.0123), "12.3 µs");
         assert_eq!(duration(4.56), "4.56 ms");
         assert_eq!(duration(999.9), "1.00 s");
+        assert_eq!((duration_tick(1000.0), duration_tick(0.25)), ("1 s".into(), "250 µs".into()));
+        assert_eq!((tick(2.0), tick(0.5), tick(0.0)), ("2".into(), "0.5".into(), "0".into()));
         assert_eq!(bytes(512), "512 B");
         assert_eq!(bytes(16 << 20), "16.0 MiB");
     }

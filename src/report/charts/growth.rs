@@ -6,7 +6,7 @@ use crate::measure::record::Record;
 use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, frame, mesh, pixel};
 use crate::report::labels::Rect;
 use crate::report::names::short;
-use crate::report::numbers::{duration, short_count};
+use crate::report::numbers::{duration, duration_tick, short_count};
 use crate::report::theme::Legend;
 use plotters::prelude::*;
 
@@ -58,7 +58,7 @@ pub fn growth(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
             .margin_right(230)
             .build_cartesian_2d(x.log_scale(), y.log_scale())?;
         let axes =
-            Axes { x: "triangles", y: "build time", x_number: &|v| short_count(*v), y_number: &|v| duration(*v) };
+            Axes { x: "triangles", y: "build time", x_number: &|v| short_count(*v), y_number: &|v| duration_tick(*v) };
         mesh(&mut chart, &axes)?;
         let mut ends = Vec::new();
         for s in &series {

@@ -5,7 +5,7 @@ use crate::measure::record::Record;
 use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, frame, mesh, pixel};
 use crate::report::labels::{Rect, text_width};
 use crate::report::names::{short, slug};
-use crate::report::numbers::{duration, three_digits};
+use crate::report::numbers::{duration, tick};
 use crate::report::theme::{INK, Legend, MUTED, PAPER};
 use plotters::prelude::*;
 
@@ -38,7 +38,7 @@ pub fn phases(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
             .margin_left((names + 10.0).min(240.0) as u32)
             .margin_bottom(26)
             .build_cartesian_2d(0.0..1.14 * longest, 0.0..bars.len() as f64)?;
-        let number = |v: &f64| if *v == 0.0 { "0".into() } else { three_digits(*v) };
+        let number = |v: &f64| tick(*v);
         mesh(&mut chart, &Axes { x: "milliseconds", y: "", x_number: &number, y_number: &|_| String::new() })?;
         let inner = frame(&chart);
         for (row, record) in bars.iter().enumerate() {

@@ -6,7 +6,7 @@ use crate::measure::record::Record;
 use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, best_line, frame, mesh, pixel};
 use crate::report::labels::Rect;
 use crate::report::names::{short, slug};
-use crate::report::numbers::three_digits;
+use crate::report::numbers::{three_digits, tick};
 use crate::report::theme::{Legend, Tone};
 use plotters::prelude::*;
 
@@ -38,7 +38,7 @@ pub fn trace_speed(records: &[&Record], legend: &Legend) -> Result<Option<Chart>
         title: format!("{scene}: build speed against trace speed"),
         alt: in_words(&points, "million rays a second"),
         reading: format!(
-            "Up and to the right is better. The gold line is the frontier: {} beaten at both by no other.",
+            "Up and to the right is better. The gold line bounds the builders that no other beats at both: {}.",
             list(&frontier, &points)
         ),
     };
@@ -58,8 +58,8 @@ pub fn sah_cost(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
         title: format!("{scene}: build speed against SAH cost"),
         alt: in_words(&points, "SAH cost"),
         reading: format!(
-            "Down and to the right is better: a lower cost promises faster tracing. Frontier: {}. A driver's tree is its \
-             own secret and has no cost here.",
+            "Down and to the right is better: a lower cost promises faster tracing. No other beats at both: {}. A driver does \
+             not show its trees, so it has no mark here.",
             list(&frontier, &points)
         ),
     };
@@ -129,7 +129,7 @@ fn scatter(caption: Caption, points: &[Point], frontier: &[usize], axis: Axis<'_
             .x_label_area_size(46)
             .y_label_area_size(64)
             .build_cartesian_2d(x_range.clone(), y_range.clone())?;
-        let number = |v: &f64| if *v == 0.0 { "0".into() } else { three_digits(*v) };
+        let number = |v: &f64| tick(*v);
         let x_name = "build speed, million triangles a second →";
         mesh(&mut chart, &Axes { x: x_name, y: y_name, x_number: &number, y_number: &number })?;
         let worst = if falls { y_range.end } else { 0.0 };

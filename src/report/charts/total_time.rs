@@ -8,8 +8,8 @@ use crate::report::chart::{
 };
 use crate::report::labels::Rect;
 use crate::report::names::{short, slug};
-use crate::report::numbers::{duration, short_count};
-use crate::report::theme::{Legend, MUTED};
+use crate::report::numbers::{duration_tick, short_count};
+use crate::report::theme::{Legend, MUTED, Tone};
 use plotters::prelude::*;
 
 /// Points a curve.
@@ -32,7 +32,7 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
         title: format!("{scene}: total time of a build and its rays"),
         alt: format!("The lower envelope: {}.", verdict(&envelope, &name)),
         reading: format!(
-            "The gold line is the lower envelope, who is best for so many rays a build: {}.",
+            "The gold line is the lower envelope, and the strip above says whose it is: {}. Both axes are logarithmic.",
             verdict(&envelope, &name)
         ),
     };
@@ -44,13 +44,14 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
         let mut chart = ChartBuilder::on(area)
             .x_label_area_size(46)
             .y_label_area_size(76)
+            .margin_top(34)
             .margin_right(190)
             .build_cartesian_2d((rays.0..rays.1).log_scale(), (0.8 * least..1.2 * greatest).log_scale())?;
         let axes = Axes {
             x: "rays traced a build",
             y: "build and rays",
             x_number: &|v| short_count(*v),
-            y_number: &|v| duration(*v),
+            y_number: &|v| duration_tick(*v),
         };
         mesh(&mut chart, &axes)?;
         let lowest = |&r: &f64| (r, lines.iter().map(|l| l.at(r)).fold(f64::INFINITY, f64::min));
@@ -63,16 +64,58 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
         let ends: Vec<_> = lines.iter().map(|l| pixel(&chart, (rays.1, l.at(rays.1)))).collect();
         let texts: Vec<_> = traced.iter().map(|(r, _)| (short(&r.builder), legend.builder(&r.builder))).collect();
         overlay.label_ends(&ends, &texts, frame(&chart));
-        for stretch in envelope.iter().skip(1) {
-            let (x, y) = pixel(&chart, (stretch.from, lines[stretch.line].at(stretch.from)));
-            let text = short_count(stretch.from);
-            overlay.label(Label { at: (x, y + 26.0), text: &text, anchor: "middle", tone: MUTED, size: LABEL_SIZE });
-            let tip = format!("from {text} rays a build on: {}", name(stretch));
-            overlay.tip(Rect { x: x - 12.0, y: y - 12.0, w: 24.0, h: 40.0 }, &tip);
-        }
+        let strip = frame(&chart);
+        winners(
+            overlay,
+            &envelope,
+            |rays_a_build| pixel(&chart, (rays_a_build, greatest)).0,
+            strip,
+            |stretch| (name(stretch), legend.builder(&traced[stretch.line].0.builder)),
+        );
         Ok(())
     };
     Chart::draw(caption, draw).map(Some)
+}
+
+/// A strip above the chart: who is best for so many rays, in the colours of the builders, and where they take over.
+fn winners(
+    overlay: &mut Overlay,
+    envelope: &[Stretch],
+    x_of: impl Fn(f64) -> f64,
+    inner: Rect,
+    who: impl Fn(&Stretch) -> (String, Tone),
+) {
+    const HEIGHT: f64 = 9.0;
+    let y = inner.y - 34.0;
+    let end = inner.x + inner.w;
+    overlay.label(Label {
+        at: (end + 15.0, y + HEIGHT),
+        text: "← best",
+        anchor: "start",
+        tone: MUTED,
+        size: LABEL_SIZE,
+    });
+    let mut last_label = f64::NEG_INFINITY;
+    for (i, stretch) in envelope.iter().enumerate() {
+        let left = if i == 0 { inner.x } else { x_of(stretch.from) };
+        let right = envelope.get(i + 1).map_or(end, |next| x_of(next.from));
+        let (name, tone) = who(stretch);
+        let band = Rect { x: left, y, w: right - left, h: HEIGHT };
+        overlay.band(band, tone);
+        overlay.tip(band, &name);
+        // Two that follow closely share a place: the first is written, the caption has them all.
+        if i > 0 && left - last_label > 55.0 {
+            let text = short_count(stretch.from);
+            overlay.label(Label {
+                at: (left, y + HEIGHT + 15.0),
+                text: &text,
+                anchor: "middle",
+                tone: MUTED,
+                size: 12.0,
+            });
+            last_label = left;
+        }
+    }
 }
 
 /// The envelope in words: `lbvh up to 2 M rays, then ploc`.
