@@ -34,6 +34,8 @@ pub mod status {
     pub const TOO_DEEP: u32 = 1 << 2;
     /// A bounded spin ran out: the structure is not usable.
     pub const SPIN_RAN_OUT: u32 = 1 << 3;
+    /// Bits of structures that cannot be traced: tracers take them as empty.
+    pub const UNUSABLE: u32 = TOO_DEEP | SPIN_RAN_OUT;
 }
 
 /// An axis-aligned box. Empty when `lo > hi`.

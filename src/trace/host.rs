@@ -3,7 +3,7 @@
 use super::ray::PreparedRay;
 use super::triangle::meet;
 use super::{Hit, Query, Ray, Work, slab};
-use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Triangle};
+use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Triangle, status};
 
 /// The nearest hit; of equally near ones that with the lower primitive index.
 pub fn closest_hit(tree: &Bvh2, ray: &Ray) -> Hit {
@@ -17,11 +17,12 @@ pub fn any_hit(tree: &Bvh2, ray: &Ray) -> Hit {
 
 /// The hit, and the steps and tests that it took.
 ///
-/// A tree deeper than [`MAX_DEPTH`] (which builders report in its status) is traced all the same.
+/// A tree whose status says that it cannot be used is traced as if it were empty, as the device must.
 pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
     let mut work = Work::default();
     let mut nearest = Nearest::new(ray.t_max);
-    let Some(ray) = PreparedRay::new(ray, &tree.header.root.bounds()).filter(|_| tree.header.active != 0) else {
+    let usable = tree.header.active != 0 && tree.header.status & status::UNUSABLE == 0;
+    let Some(ray) = PreparedRay::new(ray, &tree.header.root.bounds()).filter(|_| usable) else {
         return (Hit::NONE, work);
     };
     // Children that wait, each with the distance at which the ray enters it.

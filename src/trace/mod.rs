@@ -6,7 +6,7 @@
 //!
 //! - [`ray`] prepares a ray: shear, reciprocals, error bounds;
 //! - [`determinant`], [`triangle`], [`slab`] are the arithmetic, each the twin of a file in `glsl/trace/`;
-//! - [`host`] traverses on the host;
+//! - [`host`] traverses on the host, [`tracer`] on the device;
 //! - `kinds` makes the rays that are measured; `files` reads and writes rays and hits.
 
 pub mod determinant;
@@ -17,6 +17,7 @@ pub mod host;
 pub mod kinds;
 pub mod ray;
 pub mod slab;
+pub mod tracer;
 pub mod triangle;
 
 use bytemuck::{Pod, Zeroable};

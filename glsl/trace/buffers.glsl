@@ -1,0 +1,19 @@
+// What every ray kernel takes: rays, where hits and work go, and the structure.
+#ifndef HEDGEROW_TRACE_BUFFERS
+#define HEDGEROW_TRACE_BUFFERS
+#include "bvh/layout.glsl"
+#include "trace/ray.glsl"
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Rays { HedgerowRay ray[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Hits { HedgerowHit hit[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) writeonly buffer Works { uvec2 work[]; };
+
+layout(push_constant, scalar) uniform Arguments {
+    Structure structure;
+    Rays rays;
+    Hits hits;
+    Works works;
+    uint first;
+    uint count;
+};
+#endif

@@ -1,0 +1,120 @@
+//! The tracer on the device: rays in, hits out, recorded into the caller's command buffer.
+//!
+//! ```no_run
+//! # use hedgerow::{gpu::Recorder, trace::{Query, tracer::{self, Buffers, Shape}}};
+//! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: u64, hits: u64) -> hedgerow::Result<()> {
+//! let shape = Shape::of(&recorder.context().limits);
+//! tracer::record(recorder, &shape, Query::ClosestHit, &Buffers { structure, rays, hits, work: None, count: 1 << 20 })?;
+//! recorder.barrier();
+//! # Ok(())
+//! # }
+//! ```
+
+use super::{MAX_RAYS, Query};
+use crate::bvh::layout::MAX_DEPTH;
+use crate::gpu::{Kernel, Limits, Recorder, shaders};
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+
+/// How the work is cut for a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Shape {
+    /// Invocations a workgroup.
+    pub workgroup: u32,
+    /// How many entries of each ray's stack lie in shared memory; the others are private. At most
+    /// [`MAX_DEPTH`](crate::bvh::layout::MAX_DEPTH).
+    pub shared_levels: u32,
+}
+
+impl Shape {
+    /// What is fast on a device.
+    pub fn of(limits: &Limits) -> Shape {
+        if limits.is_cpu() { Shape::subgroups(limits) } else { Shape::groups(limits) }
+    }
+
+    /// For CPUs: workgroups of one subgroup, so that none waits for another, and the whole stack in shared memory, which is
+    /// memory like any other but laid out in columns.
+    pub fn subgroups(limits: &Limits) -> Shape {
+        Shape { workgroup: limits.subgroup_size, shared_levels: MAX_DEPTH }.within(limits)
+    }
+
+    /// For GPUs: larger workgroups, and the few levels in shared memory that most rays stay in.
+    pub fn groups(limits: &Limits) -> Shape {
+        Shape { workgroup: limits.subgroup_size.max(64), shared_levels: 8 }.within(limits)
+    }
+
+    fn within(self, limits: &Limits) -> Shape {
+        let workgroup = self.workgroup.min(limits.workgroup_invocations);
+        let level_bytes = LEVEL_BYTES * workgroup;
+        // One word more of each of the three arrays: they must not be empty.
+        let room = limits.shared_memory.saturating_sub(LEVEL_BYTES) / level_bytes;
+        Shape { workgroup, shared_levels: self.shared_levels.min(room) }
+    }
+}
+
+/// Shared memory an entry of a stack: node or first triangle, count, distance.
+const LEVEL_BYTES: u32 = 12;
+
+/// Device addresses of what is traced, all aligned to 16 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Buffers {
+    /// A `Bvh2`. One whose status says that it is too deep or unfinished is traced as if it were empty.
+    pub structure: u64,
+    /// [`Ray`](super::Ray) × `count`.
+    pub rays: u64,
+    /// [`Hit`](super::Hit) × `count`, written.
+    pub hits: u64,
+    /// [`Work`](super::Work) × `count`, written: counting takes time, so it has a kernel of its own.
+    pub work: Option<u64>,
+    /// How many rays; at most [`MAX_RAYS`].
+    pub count: u32,
+}
+
+/// Push constants of `glsl/trace/tracer_single.comp`.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct Arguments {
+    /// Address of a `Bvh2`.
+    pub structure: u64,
+    /// Address of the rays.
+    pub rays: u64,
+    /// Address of the hits, one a ray.
+    pub hits: u64,
+    /// Address of the work, one a ray, if it is counted.
+    pub works: u64,
+    /// The first ray of this dispatch.
+    pub first: u32,
+    /// Rays in all.
+    pub count: u32,
+}
+
+/// The kernel that [`record`] takes, for [`Context::warm`](crate::gpu::Context::warm).
+pub fn kernel(shape: &Shape, query: Query, count_work: bool) -> Kernel {
+    let any_hit = u32::from(query == Query::AnyHit);
+    Kernel::new(&shaders::TRACE_TRACER_SINGLE, shape.workgroup, &[any_hit, u32::from(count_work), shape.shared_levels])
+}
+
+/// Records the tracing of all rays: one dispatch for each as many workgroups as the device takes at once.
+///
+/// Rays, structure and hits must be visible to and not used by other shaders before: the caller places a barrier (shader
+/// write to shader read and write) before and after.
+///
+/// # Errors
+/// More than [`MAX_RAYS`] rays; the kernel's pipeline could not be made.
+pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, query: Query, buffers: &Buffers) -> Result<()> {
+    let &Buffers { structure, rays, hits, work, count } = buffers;
+    if count > MAX_RAYS {
+        return Err(Error::Argument(format!(
+            "{count} rays in one call, at most {MAX_RAYS}: trace them in several calls"
+        )));
+    }
+    let kernel = kernel(shape, query, work.is_some());
+    let at_once = recorder.context().limits.workgroup_count.saturating_mul(shape.workgroup);
+    let mut first = 0;
+    while first < count {
+        let arguments = Arguments { structure, rays, hits, works: work.unwrap_or(0), first, count };
+        recorder.dispatch(&kernel, &arguments, (count - first).min(at_once).div_ceil(shape.workgroup))?;
+        first += at_once.min(count - first);
+    }
+    Ok(())
+}

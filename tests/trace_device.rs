@@ -1,0 +1,171 @@
+//! The tracer on the device: its hits and its work are those of the host, bit for bit.
+
+mod common;
+
+use common::device;
+use common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, soup, tree_of, tree_with};
+use hedgerow::bvh::layout::{Bvh2, status};
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::{Hit, Query, Ray, Work, host};
+
+/// Every way to cut the work: the default, that for CPUs and that for GPUs, no shared memory at all, and a stack whose levels
+/// lie half here and half there.
+fn shapes() -> Vec<Shape> {
+    let limits = &device().limits;
+    vec![
+        Shape::of(limits),
+        Shape::subgroups(limits),
+        Shape::groups(limits),
+        Shape { workgroup: limits.subgroup_size, shared_levels: 0 },
+        Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3 },
+    ]
+}
+
+fn traced(tree: &Bvh2, rays: &[Ray], shape: &Shape, query: Query, count_work: bool) -> (Vec<Hit>, Vec<Work>) {
+    let device = device();
+    let structure = device.upload("structure", &tree.to_bytes()).expect("memory");
+    let ray_buffer = device.upload("rays", rays).expect("memory");
+    let hits = device.buffer("hits", size_of_val(rays) as u64 / 2).expect("memory");
+    let work = device.buffer("work", size_of_val(rays) as u64 / 4).expect("memory");
+    let unwritten = Hit { t: -1.0, primitive: 7, u: -1.0, v: -1.0 };
+    hits.write(&vec![unwritten; rays.len()]);
+    let buffers = Buffers {
+        structure: structure.address(),
+        rays: ray_buffer.address(),
+        hits: hits.address(),
+        work: count_work.then_some(work.address()),
+        count: rays.len() as u32,
+    };
+    device.run(None, |recorder| tracer::record(recorder, shape, query, &buffers)).expect("the device traces");
+    (hits.read(rays.len()), work.read(rays.len()))
+}
+
+#[track_caller]
+fn assert_as_on_the_host(tree: &Bvh2, rays: &[Ray]) {
+    for query in [Query::ClosestHit, Query::AnyHit] {
+        let expected: Vec<(Hit, Work)> = rays.iter().map(|ray| host::trace(tree, ray, query)).collect();
+        for shape in shapes() {
+            let (hits, work) = traced(tree, rays, &shape, query, true);
+            let (alone, _) = traced(tree, rays, &shape, query, false);
+            for (i, ray) in rays.iter().enumerate() {
+                assert_eq!((hits[i], work[i]), expected[i], "{shape:?} {query:?} {ray:?}");
+                match query {
+                    Query::ClosestHit => assert_eq!(alone[i], expected[i].0, "{shape:?} {ray:?}"),
+                    // Which hit is met first is nobody's business.
+                    Query::AnyHit => assert_eq!(alone[i].t, expected[i].0.t, "{shape:?} {ray:?}"),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn hits_and_work_are_those_of_the_host_at_any_scale() {
+    for (size, scale, far) in
+        [(0.3, 1.0, 0.0), (1.0, 1.0, 3.0), (1e-3, 1.0, 1e4), (0.2, 1e-10, 0.0), (0.2, 1e-25, 0.0), (0.2, 1e25, 1.0)]
+    {
+        let offset = [far * scale, -far * scale, 0.5 * far * scale];
+        let corners = placed(&soup(300, size, 5), scale, offset);
+        let rays = hard_rays(&corners, 1_000, scale, offset, 11);
+        for collapse in [Collapse::SAH, Collapse::OFF] {
+            assert_as_on_the_host(&tree_with(&corners, collapse), &rays);
+        }
+    }
+}
+
+#[test]
+fn any_number_of_rays_is_traced_and_nothing_behind_them_written() {
+    let corners = icosphere(2);
+    let tree = tree_of(&corners);
+    for count in [0, 1, 2, 7, 8, 9, 63, 64, 65, 1000] {
+        assert_as_on_the_host(&tree, &hard_rays(&corners, count, 1.0, [0.0; 3], count as u64));
+    }
+}
+
+#[test]
+fn closed_surfaces_do_not_leak() {
+    for (scale, offset) in
+        [(1.0, [0.0; 3]), (1e-20, [0.0; 3]), (1e20, [0.0; 3]), (1.0, [1e3, -1e4, 1e2]), (1.0, [1e6; 3])]
+    {
+        let corners = placed(&icosphere(4), scale, offset);
+        let mut random = Random(3);
+        let rays: Vec<Ray> = (0..20_000)
+            .map(|i| {
+                let [a, b, c] = corners[random.bits() as usize % corners.len()];
+                let along = [0.0, 0.25, 0.5, 1.0, random.signed().abs()][i % 5];
+                let from = if i % 7 == 0 { c } else { a };
+                let to = |k: usize| along * (b[k] - offset[k]) + (1.0 - along) * (from[k] - offset[k]);
+                ray(offset, std::array::from_fn(|k| to(k) / scale))
+            })
+            .collect();
+        let tree = tree_of(&corners);
+        let (hits, _) = traced(&tree, &rays, &shapes()[0], Query::ClosestHit, false);
+        for (ray, hit) in rays.iter().zip(&hits) {
+            assert!(hit.is_some(), "leaks at scale {scale:e}, offset {offset:?}: {ray:?}");
+            assert_eq!(*hit, host::closest_hit(&tree, ray), "{ray:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_ray_hits_nothing_and_ends() {
+    let tree = tree_of(&icosphere(3));
+    let mut rays = Vec::new();
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40, 0.0, -0.0, 1e38] {
+        for field in 0..8 {
+            let mut words = [0.1, 0.2, 0.3, 0.0, 0.5, 0.6, -0.7, 9.0];
+            words[field] = bad;
+            rays.push(bytemuck::cast(words));
+        }
+        rays.push(ray([0.0; 3], [bad; 3]));
+    }
+    assert_as_on_the_host(&tree, &rays);
+}
+
+#[test]
+fn limits_are_exclusive() {
+    let tree = tree_of(&vec![[[-1.0, -1.0, 2.0], [3.0, -1.0, 2.0], [-1.0, 3.0, 2.0]]]);
+    let (below, above) = (2f32.next_down(), 2f32.next_up());
+    let ends = [f32::NEG_INFINITY, 0.0, below, 2.0, above, 3.0, f32::INFINITY, f32::NAN];
+    let rays: Vec<Ray> = ends
+        .iter()
+        .flat_map(|&t_min| ends.map(|t_max| Ray { t_min, t_max, ..ray([0.0; 3], [0.0, 0.0, 1.0]) }))
+        .collect();
+    assert_as_on_the_host(&tree, &rays);
+    let (hits, _) = traced(&tree, &rays, &shapes()[0], Query::ClosestHit, false);
+    for (ray, hit) in rays.iter().zip(&hits) {
+        assert_eq!(hit.is_some(), ray.t_min < 2.0 && 2.0 < ray.t_max, "{ray:?}");
+    }
+}
+
+#[test]
+fn trees_that_are_empty_or_cannot_be_used_have_no_hits() {
+    let rays = hard_rays(&icosphere(0), 40, 1.0, [0.0; 3], 1);
+    assert_as_on_the_host(&tree_of(&Corners::new()), &rays);
+    for bit in [status::TOO_DEEP, status::SPIN_RAN_OUT] {
+        let mut tree = tree_of(&icosphere(1));
+        tree.header.status |= bit;
+        assert_as_on_the_host(&tree, &rays);
+        assert!(rays.iter().all(|ray| !host::closest_hit(&tree, ray).is_some()));
+    }
+}
+
+#[test]
+fn of_a_thousand_coincident_triangles_the_first_is_hit() {
+    let corners = vec![[[-1.0, -1.0, 3.0], [3.0, -1.0, 3.0], [-1.0, 3.0, 3.0]]; 1000];
+    let rays = hard_rays(&corners, 100, 1.0, [0.0; 3], 4);
+    for collapse in [Collapse::SAH, Collapse::OFF] {
+        let tree = tree_with(&corners, collapse);
+        assert_as_on_the_host(&tree, &rays);
+        let (hits, _) = traced(&tree, &rays, &shapes()[0], Query::ClosestHit, false);
+        assert!(hits.iter().filter(|hit| hit.is_some()).all(|hit| hit.primitive == 0));
+    }
+}
+
+#[test]
+fn too_many_rays_are_refused() {
+    let buffers = Buffers { structure: 16, rays: 16, hits: 16, work: None, count: (1 << 27) + 1 };
+    let refused = device().run(None, |recorder| tracer::record(recorder, &shapes()[0], Query::ClosestHit, &buffers));
+    assert!(refused.expect_err("more than 2^27").to_string().contains("134217728"));
+}
