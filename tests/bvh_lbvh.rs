@@ -3,7 +3,7 @@
 mod common;
 
 use common::{corpus, device};
-use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::lbvh::{Input, Lbvh, Options, Schedule};
@@ -65,11 +65,12 @@ fn quality_on_device(tree: &Bvh2) -> Figures {
 #[test]
 fn every_code_and_schedule_gives_the_bytes_of_the_host() {
     for (name, positions, triangles) in corpus::meshes() {
-        for code in Code::ALL {
+        for codes in
+            Code::ALL.into_iter().flat_map(|code| [code.full(), code.full().with_bits(32), code.full().with_bits(17)])
+        {
             for concise in [false, true] {
                 for collapse in [Collapse::OFF, Collapse::SAH] {
-                    let mut codes = code.full();
-                    codes.concise = concise;
+                    let codes = Codes { concise, ..codes };
                     let expected = host::lbvh::build(&positions, &triangles, codes, collapse);
                     expected.validate().unwrap_or_else(|e| panic!("{name} {codes}: {e}"));
                     for schedule in [Schedule::Chain, Schedule::Persistent] {

@@ -245,7 +245,43 @@ uvec2 inactive_code(CodeKind kind) {
     return bits_of(uvec2(0xFFFFFFFFu), 0, kind.bits);
 }
 
-uvec2 encode(CodeKind kind, CodePlan plan, Box b) {
+// ---- codes of at most 32 bits: the same with half the words (a third of the encoding time) ----
+
+// `count` bits of `v` from bit `from` below the top, at the bottom.
+uint bits_of(uint v, uint from, uint count) {
+    return count == 0 ? 0 : v << from >> (32 - count);
+}
+
+uint narrow_axis_bits(CodePlan plan, uint axis, float coordinate) {
+    uint q = fraction_of(coordinate).y;
+    uint alone = plan.bits[0][axis], paired = plan.bits[1][axis], tripled = plan.bits[2][axis];
+    uint code = spread_by_3(bits_of(q, alone + paired, tripled)) << plan.low[2][axis];
+    code |= spread_by_2(bits_of(q, alone, paired)) << plan.low[1][axis];
+    return code | bits_of(q, 0, alone) << plan.low[0][axis];
+}
+
+uint narrow_with_size(CodeKind kind, uint coordinates, uint size) {
+    uint left = coordinate_bits(kind);
+    uint group = kind.size_group;
+    uint code = 0;
+    for (uint k = 0; k < 8 && left > 0; ++k) {
+        uint take = min(group, left);
+        left -= take;
+        code = code << take | coordinates >> left & ((1u << take) - 1);
+        if (take == group && (k + 1) * (group + 1) <= kind.bits) code = code << 1 | size >> (15 - k) & 1;
+    }
+    return code;
+}
+
+uint narrow_encode(CodeKind kind, CodePlan plan, Box b) {
+    precise vec3 coordinate = (centroid_of(b) * plan.prescale - plan.offset) * plan.reciprocal;
+    uint code = narrow_axis_bits(plan, 0, coordinate.x) | narrow_axis_bits(plan, 1, coordinate.y)
+              | narrow_axis_bits(plan, 2, coordinate.z);
+    if (kind.size_group != 0) code = narrow_with_size(kind, code, size_of(plan, b));
+    return min(code, inactive_code(kind).x - 1);
+}
+
+uvec2 wide_encode(CodeKind kind, CodePlan plan, Box b) {
     precise vec3 coordinate = (centroid_of(b) * plan.prescale - plan.offset) * plan.reciprocal;
     uvec2 code = axis_bits(plan, 0, coordinate.x) | axis_bits(plan, 1, coordinate.y) | axis_bits(plan, 2, coordinate.z);
     if (kind.size_group != 0) code = with_size(kind, code, size_of(plan, b));

@@ -163,11 +163,12 @@ void lbvh_encode(uint task) {
         uint primitive = first + k * gl_WorkGroupSize.x;
         if (primitive < primitive_count) {
             Corners corners;
-            uvec2 code = load_corners(input_mesh, primitive, corners) == 0 ? encode(kind, plan, box_around(corners))
-                                                                             : inactive_code(kind);
+            bool is_active = load_corners(input_mesh, primitive, corners) == 0;
+            Box b = box_around(corners);
             if (KEY_WORDS == 1) {
-                codes.word[primitive] = code.x;
+                codes.word[primitive] = is_active ? narrow_encode(kind, plan, b) : inactive_code(kind).x;
             } else {
+                uvec2 code = is_active ? wide_encode(kind, plan, b) : inactive_code(kind);
                 codes.word[2 * primitive] = code.x;
                 codes.word[2 * primitive + 1] = code.y;
             }
