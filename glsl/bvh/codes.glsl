@@ -4,8 +4,9 @@
 // (Halving keeps the order of the extents, so whoever is next in turn stays next until a third is as long.) So a code is a
 // shift, two 2-way and three 3-way interleavings, whatever the bounds; `plan_codes` finds the stretches.
 //
-// Bit-exact on every device: only +, −, · of floats (correctly rounded by Vulkan's rules, `precise` against contraction), and
-// integers for everything else.
+// Bit-exact on every device: coordinates are integers from the start (a float's bits, shifted), so that nothing is lost in the
+// subtraction from a far corner and an object in the middle of the scene lies in the middle of the code; what is left of float
+// arithmetic is +, −, · (correctly rounded by Vulkan's rules, `precise` against contraction).
 #ifndef HEDGEROW_BVH_CODES
 #define HEDGEROW_BVH_CODES
 #include "gpu/pass.glsl"
@@ -23,12 +24,18 @@ struct CodeKind {
     bool concise;
 };
 
+// One axis of the bounds, for `fraction_of`.
+struct Axis {
+    uint exponent;    // biased, of the larger of |lo| and |hi|: the unit is 2^-62 of what it bounds
+    uint shift;       // brings the extent's leading bit to the top
+    uvec2 lo;         // the low corner
+    uvec2 inverse;    // (2^64 / extent − 1) · 2^63, rounded up, for the shifted extent; 0 for a flat axis
+};
+
 // The recipe for given bounds. Stretch 0 is one axis alone, 1 two in turn, 2 three in turn; per axis, how many bits it has
 // in a stretch, and at which bit of the code the lowest of them lies.
 struct CodePlan {
-    vec3 prescale;
-    vec3 offset;
-    vec3 reciprocal;
+    Axis axes[3];
     float size_prescale;
     float size_reciprocal;
     float area_scale;
@@ -100,13 +107,93 @@ uint integer_root(uint x) {
     return root;
 }
 
-// A coordinate of 0..1 as a 64-bit fraction.
-uvec2 fraction_of(float v) {
-    if (v >= 1.0) return uvec2(0xFFFFFFFFu);
-    precise float scaled = max(v, 0.0) * 4294967296.0;
-    uint high = uint(scaled);
-    precise float rest = (scaled - float(high)) * 4294967296.0;
-    return uvec2(uint(rest), high);
+// ---- coordinates as 64-bit fractions of the extent ----
+
+uvec2 add(uvec2 a, uvec2 b) {
+    uint carry;
+    uint low = uaddCarry(a.x, b.x, carry);
+    return uvec2(low, a.y + b.y + carry);
+}
+
+uvec2 subtract(uvec2 a, uvec2 b) {
+    uint borrow;
+    uint low = usubBorrow(a.x, b.x, borrow);
+    return uvec2(low, a.y - b.y - borrow);
+}
+
+bool is_below(uvec2 a, uvec2 b) {
+    return a.y != b.y ? a.y < b.y : a.x < b.x;
+}
+
+// A float in units of 2^-62 of the axis' magnitude, two's complement; what is smaller than a unit is cut off.
+uvec2 fixed_point(float v, uint exponent) {
+    uint bits = floatBitsToUint(v);
+    uint own = bits >> 23 & 0xFFu;
+    uint mantissa = own == 0 ? 0 : bits & 0x7FFFFFu | 0x800000u;
+    int shift = int(own) - int(exponent) + 38;   // at most 38
+    uint right = uint(clamp(-shift, 0, 31)), left = uint(clamp(shift, 0, 31)), over = uint(clamp(shift - 32, 0, 31));
+    uint low = shift >= 32 ? 0 : mantissa >> right << left;
+    // The bits that leave the low word; in two steps, as a shift by 32 is undefined.
+    uint high = shift >= 32 ? mantissa << over : shift <= 0 ? 0 : mantissa >> 1 >> (31 - left);
+    uvec2 magnitude = uvec2(low, high);
+    return (bits & 0x80000000u) != 0 ? subtract(uvec2(0), magnitude) : magnitude;
+}
+
+// (a · b) >> 63 for a · b < 2^127.
+uvec2 multiply_shift_63(uvec2 a, uvec2 b) {
+    uint high00, low00, high01, low01, high10, low10, high11, low11, carry;
+    umulExtended(a.x, b.x, high00, low00);
+    umulExtended(a.x, b.y, high01, low01);
+    umulExtended(a.y, b.x, high10, low10);
+    umulExtended(a.y, b.y, high11, low11);
+    // Words 1, 2, 3 of the product.
+    uint word1 = uaddCarry(high00, low01, carry);
+    uint carries = carry;
+    word1 = uaddCarry(word1, low10, carry);
+    carries += carry;
+    uvec2 words = add(add(uvec2(low11, high11), uvec2(high01, 0)), add(uvec2(high10, 0), uvec2(carries, 0)));
+    return uvec2(words.x << 1 | word1 >> 31, words.y << 1 | words.x >> 31);
+}
+
+Axis axis_of(float lo, float hi) {
+    Axis axis;
+    axis.exponent = max(floatBitsToUint(lo) >> 23 & 0xFFu, floatBitsToUint(hi) >> 23 & 0xFFu);
+    axis.lo = fixed_point(lo, axis.exponent);
+    axis.inverse = uvec2(0);
+    axis.shift = 0;
+    uvec2 extent = subtract(fixed_point(hi, axis.exponent), axis.lo);
+    if (extent == uvec2(0)) return axis;
+    axis.shift = uint(extent.y != 0 ? 31 - findMSB(extent.y) : 63 - findMSB(extent.x));
+    extent = shift_left(extent, axis.shift);
+    // Long division of (2^64 − extent) · 2^63 by the extent.
+    uvec2 remainder = subtract(uvec2(0), extent);
+    uvec2 quotient = uvec2(0);
+    if (!is_below(remainder, extent)) {
+        remainder = subtract(remainder, extent);
+        quotient.x = 1;
+    }
+    for (int i = 0; i < 63; ++i) {
+        bool overflows = (remainder.y & 0x80000000u) != 0;
+        remainder = shift_left(remainder, 1);
+        quotient = shift_left(quotient, 1);
+        if (overflows || !is_below(remainder, extent)) {
+            remainder = subtract(remainder, extent);
+            quotient.x |= 1;
+        }
+    }
+    if (remainder != uvec2(0)) quotient = add(quotient, uvec2(1, 0));
+    axis.inverse = quotient;
+    return axis;
+}
+
+// Where `v` lies between the corners, as a 64-bit fraction.
+uvec2 fraction_of(float v, Axis axis) {
+    uvec2 at = fixed_point(v, axis.exponent);
+    uvec2 distance = subtract(at, axis.lo);
+    if ((distance.y & 0x80000000u) != 0) distance = uvec2(0);   // rounded to below the corner
+    distance = shift_left(distance, axis.shift);
+    uvec2 fraction = add(distance, multiply_shift_63(distance, axis.inverse));
+    return is_below(fraction, distance) ? uvec2(0xFFFFFFFFu) : fraction;   // the high corner itself
 }
 
 // ---- the plan ----
@@ -140,12 +227,8 @@ uint coordinate_bits(CodeKind kind) {
 
 CodePlan plan_codes(CodeKind kind, Box bounds, Box scene) {
     CodePlan plan;
+    for (uint axis = 0; axis < 3; ++axis) plan.axes[axis] = axis_of(bounds.lo[axis], bounds.hi[axis]);
     vec3 magnitude = max(abs(bounds.lo), abs(bounds.hi));
-    plan.prescale = vec3(prescale_of(magnitude.x), prescale_of(magnitude.y), prescale_of(magnitude.z));
-    precise vec3 offset = bounds.lo * plan.prescale;
-    precise vec3 extent = bounds.hi * plan.prescale - offset;
-    plan.offset = offset;
-    plan.reciprocal = vec3(reciprocal_or_zero(extent.x), reciprocal_or_zero(extent.y), reciprocal_or_zero(extent.z));
     plan.size_prescale = prescale_of(max(magnitude.x, max(magnitude.y, magnitude.z)));
     precise vec3 e = bounds.hi * plan.size_prescale - bounds.lo * plan.size_prescale;
     precise float diagonal2 = e.x * e.x + e.y * e.y + e.z * e.z;
@@ -200,8 +283,8 @@ uint spread_by_3(uint x) {
 }
 
 // The code bits of one axis.
-uvec2 axis_bits(CodePlan plan, uint axis, float coordinate) {
-    uvec2 q = fraction_of(coordinate);
+uvec2 axis_bits(CodePlan plan, uint axis, float centroid_coordinate) {
+    uvec2 q = fraction_of(centroid_coordinate, plan.axes[axis]);
     uint alone = plan.bits[0][axis], paired = plan.bits[1][axis], tripled = plan.bits[2][axis];
     uint three = bits_of(q, alone + paired, tripled).x;
     uvec2 code = shift_left(uvec2(spread_by_3(three & 0x7FFu), spread_by_3(three >> 11) << 1), plan.low[2][axis]);
@@ -252,8 +335,8 @@ uint bits_of(uint v, uint from, uint count) {
     return count == 0 ? 0 : v << from >> (32 - count);
 }
 
-uint narrow_axis_bits(CodePlan plan, uint axis, float coordinate) {
-    uint q = fraction_of(coordinate).y;
+uint narrow_axis_bits(CodePlan plan, uint axis, float centroid_coordinate) {
+    uint q = fraction_of(centroid_coordinate, plan.axes[axis]).y;
     uint alone = plan.bits[0][axis], paired = plan.bits[1][axis], tripled = plan.bits[2][axis];
     uint code = spread_by_3(bits_of(q, alone + paired, tripled)) << plan.low[2][axis];
     code |= spread_by_2(bits_of(q, alone, paired)) << plan.low[1][axis];
@@ -274,16 +357,16 @@ uint narrow_with_size(CodeKind kind, uint coordinates, uint size) {
 }
 
 uint narrow_encode(CodeKind kind, CodePlan plan, Box b) {
-    precise vec3 coordinate = (centroid_of(b) * plan.prescale - plan.offset) * plan.reciprocal;
-    uint code = narrow_axis_bits(plan, 0, coordinate.x) | narrow_axis_bits(plan, 1, coordinate.y)
-              | narrow_axis_bits(plan, 2, coordinate.z);
+    vec3 at = centroid_of(b);
+    uint code = narrow_axis_bits(plan, 0, at.x) | narrow_axis_bits(plan, 1, at.y)
+              | narrow_axis_bits(plan, 2, at.z);
     if (kind.size_group != 0) code = narrow_with_size(kind, code, size_of(plan, b));
     return min(code, inactive_code(kind).x - 1);
 }
 
 uvec2 wide_encode(CodeKind kind, CodePlan plan, Box b) {
-    precise vec3 coordinate = (centroid_of(b) * plan.prescale - plan.offset) * plan.reciprocal;
-    uvec2 code = axis_bits(plan, 0, coordinate.x) | axis_bits(plan, 1, coordinate.y) | axis_bits(plan, 2, coordinate.z);
+    vec3 at = centroid_of(b);
+    uvec2 code = axis_bits(plan, 0, at.x) | axis_bits(plan, 1, at.y) | axis_bits(plan, 2, at.z);
     if (kind.size_group != 0) code = with_size(kind, code, size_of(plan, b));
     if (code == inactive_code(kind)) code.x -= 1;
     return code;

@@ -172,18 +172,62 @@ pub fn code_bounds(boxes: &Aabb, centroids: &Aabb, concise: bool) -> Aabb {
     }
 }
 
+/// One axis of the bounds, for [`Axis::fraction`]. All integers: nothing is lost in the subtraction from a far corner, and what
+/// lies in the middle of the scene lies in the middle of the code.
+#[derive(Debug, Clone)]
+struct Axis {
+    /// Biased exponent of the larger of |lo| and |hi|: the unit is 2⁻⁶² of what it bounds.
+    exponent: i32,
+    /// Brings the extent's leading bit to the top.
+    shift: u32,
+    /// The low corner.
+    lo: i64,
+    /// (2⁶⁴ / extent − 1) · 2⁶³, rounded up, for the shifted extent; 0 for a flat axis.
+    inverse: u64,
+}
+
+impl Axis {
+    fn new(lo: f32, hi: f32) -> Axis {
+        let exponent = biased_exponent(lo).max(biased_exponent(hi));
+        let low = fixed_point(lo, exponent);
+        let extent = (fixed_point(hi, exponent) - low) as u64;
+        if extent == 0 {
+            return Axis { exponent, shift: 0, lo: low, inverse: 0 };
+        }
+        let shift = extent.leading_zeros();
+        let extent = u128::from(extent << shift);
+        let inverse = (((1 << 64) - extent) << 63).div_ceil(extent) as u64;
+        Axis { exponent, shift, lo: low, inverse }
+    }
+
+    /// Where `v` lies between the corners, as a 64-bit fraction.
+    fn fraction(&self, v: f32) -> u64 {
+        let distance = ((fixed_point(v, self.exponent) - self.lo).max(0) as u64) << self.shift;
+        let more = (u128::from(distance) * u128::from(self.inverse)) >> 63;
+        distance.saturating_add(u64::try_from(more).unwrap_or(u64::MAX))
+    }
+}
+
+fn biased_exponent(v: f32) -> i32 {
+    (v.to_bits() >> 23) as i32 & 0xFF
+}
+
+/// A float in units of 2⁻⁶² of what the exponent bounds; what is smaller than a unit is cut off.
+fn fixed_point(v: f32, exponent: i32) -> i64 {
+    let own = biased_exponent(v);
+    let mantissa = if own == 0 { 0 } else { i64::from(v.to_bits() & 0x7F_FFFF | 0x80_0000) };
+    let shift = own - exponent + 38;
+    let magnitude = if shift >= 0 { mantissa << shift } else { mantissa >> (-shift).min(63) };
+    if v.is_sign_negative() { -magnitude } else { magnitude }
+}
+
 /// The recipe of a code for given bounds.
 #[derive(Debug, Clone)]
 pub struct Plan {
     codes: Codes,
     /// Axis of each coordinate bit, from the top.
     sequence: Vec<usize>,
-    /// Powers of two that bring each axis near 1 before anything is subtracted, so that nothing overflows.
-    prescale: [f32; 3],
-    /// The low corner, prescaled.
-    offset: [f32; 3],
-    /// 1 / extent, prescaled.
-    reciprocal: [f32; 3],
+    axes: [Axis; 3],
     /// The power of two for lengths along any axis.
     size_prescale: f32,
     /// 1 / diagonal².
@@ -222,25 +266,10 @@ fn sequence(extent: [f32; 3], order: Order, bits: u32) -> Vec<usize> {
         .collect()
 }
 
-/// A coordinate of 0..1 as a 64-bit fraction.
-fn fraction(v: f32) -> u64 {
-    if v >= 1.0 {
-        return u64::MAX;
-    }
-    // Exact: scaling by 2^32 moves the exponent only, and the floor leaves a remainder with fewer bits.
-    let scaled = v.max(0.0) * 4_294_967_296.0;
-    let high = scaled as u32;
-    let low = ((scaled - high as f32) * 4_294_967_296.0) as u32;
-    u64::from(high) << 32 | u64::from(low)
-}
-
 impl Plan {
     /// The recipe of `codes` for primitives whose [`code_bounds`] are `bounds`.
     pub fn new(codes: Codes, bounds: &Aabb) -> Plan {
         let magnitude: [f32; 3] = std::array::from_fn(|i| bounds.lo[i].abs().max(bounds.hi[i].abs()));
-        let prescale = magnitude.map(prescale_of);
-        let offset: [f32; 3] = std::array::from_fn(|i| bounds.lo[i] * prescale[i]);
-        let reciprocal = std::array::from_fn(|i| reciprocal_or_zero(bounds.hi[i] * prescale[i] - offset[i]));
         let size_prescale = prescale_of(magnitude.into_iter().fold(0.0, f32::max));
         let extent: [f32; 3] = std::array::from_fn(|i| bounds.hi[i] * size_prescale - bounds.lo[i] * size_prescale);
         let diagonal2 = extent[0] * extent[0] + extent[1] * extent[1] + extent[2] * extent[2];
@@ -249,9 +278,7 @@ impl Plan {
         Plan {
             codes,
             sequence: sequence(half_extent, codes.code.order(), codes.coordinate_bits()),
-            prescale,
-            offset,
-            reciprocal,
+            axes: std::array::from_fn(|i| Axis::new(bounds.lo[i], bounds.hi[i])),
             size_prescale,
             size_reciprocal: reciprocal_or_zero(diagonal2),
         }
@@ -260,8 +287,7 @@ impl Plan {
     /// The code of a primitive with this box, in the low [`Codes::bits`] bits. Never all ones: that is [`Plan::inactive`].
     pub fn encode(&self, primitive: &Aabb) -> u64 {
         let centroid = primitive.centroid();
-        let coordinate: [u64; 3] =
-            std::array::from_fn(|i| fraction((centroid[i] * self.prescale[i] - self.offset[i]) * self.reciprocal[i]));
+        let coordinate: [u64; 3] = std::array::from_fn(|i| self.axes[i].fraction(centroid[i]));
         let size = self.size(primitive);
         let group = self.codes.code.size_group();
         let (mut code, mut taken, mut size_taken) = (0u64, [0u32; 3], 0);
@@ -339,6 +365,30 @@ mod tests {
         let grown = Aabb { lo: [0.0; 3], hi: [2.0_f32.powi(42), 1.0, 1.0] };
         let plan = Plan::new(Code::Emc64VarNoSize.full(), &grown);
         // 42 bits go to x before y and z have any; 22 are left for three axes: 7 or 8 each.
+        let codes: Vec<_> = (0..64).map(|i| plan.encode(&box_at([(i as f32 + 0.5) / 64.0, 0.1, 0.1]))).collect();
+        assert!(codes.windows(2).all(|w| w[0] < w[1]), "64 cells along x are told apart");
+    }
+
+    #[test]
+    fn what_lies_in_the_middle_has_the_middle_code_wherever_the_scene_is() {
+        for (lo, hi) in [(-1.0, 1.0), (0.0, 3.0), (-17.402_76, 17.417_24), (1e6, 1e6 + 7.0), (-5e-20, 11e-20)] {
+            let bounds = Aabb { lo: [lo; 3], hi: [hi; 3] };
+            let middle = bounds.centroid()[0];
+            let below =
+                f32::from_bits(if middle > 0.0 { middle.to_bits() - 1 } else { (-f32::MIN_POSITIVE).to_bits() });
+            let plan = Plan::new(Code::Mc63.full(), &bounds);
+            // By exact arithmetic: twice the distance from the low corner against the extent.
+            let exact = |v: f32| 2.0 * (f64::from(v) - f64::from(lo)) >= f64::from(hi) - f64::from(lo);
+            for v in [middle, below] {
+                assert_eq!(plan.encode(&box_at([v; 3])) >> 62 == 1, exact(v), "{v} in {lo}..{hi}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_scene_far_on_the_negative_side_keeps_its_precision() {
+        let grown = Aabb { lo: [-2.0_f32.powi(40), 0.0, 0.0], hi: [1.0, 1.0, 1.0] };
+        let plan = Plan::new(Code::Emc64VarNoSize.full(), &grown);
         let codes: Vec<_> = (0..64).map(|i| plan.encode(&box_at([(i as f32 + 0.5) / 64.0, 0.1, 0.1]))).collect();
         assert!(codes.windows(2).all(|w| w[0] < w[1]), "64 cells along x are told apart");
     }
