@@ -42,6 +42,15 @@ pub enum Schedule {
     Persistent,
 }
 
+impl std::fmt::Display for Schedule {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Schedule::Chain => "chain",
+            Schedule::Persistent => "persistent",
+        })
+    }
+}
+
 /// The caller's triangles on the device.
 #[derive(Debug, Clone, Copy)]
 pub struct Input {
@@ -187,6 +196,28 @@ impl Lbvh {
     /// Bytes of the structure and of the scratch memory: exactly what [`Lbvh::record`] uses.
     pub fn sizes(&self) -> Sizes {
         Sizes { structure: layout::sizes(self.count).bytes, scratch: self.scratch().bytes, alignment: 16 }
+    }
+
+    /// Bytes that a phase must move if it reads each of its inputs once and writes each of its outputs once: what its time is
+    /// held against. `None` for a phase that there is not.
+    pub fn traffic(&self, phase: &str, input: &Input) -> Option<u64> {
+        let count = u64::from(self.count);
+        let triangles = 12 * count + 12 * u64::from(input.vertex_count);
+        let key = 4 * u64::from(self.key_words()) * count;
+        let value = 4 * count;
+        // Each pass reads the keys for counting, then keys and values, and writes both; the first knows the values.
+        let sort = u64::from(self.passes()) * (3 * key + 2 * value) - if self.passes() > 0 { value } else { 0 };
+        let bounds = triangles;
+        let encode = triangles + key + 4 * count;
+        let hierarchy = triangles + key + value + layout::sizes(self.count).bytes;
+        match phase {
+            "bounds" => Some(bounds),
+            "encode" => Some(encode),
+            "sort" => Some(sort),
+            "hierarchy" => Some(hierarchy),
+            "build" => Some(bounds + encode + sort + hierarchy),
+            _ => None,
+        }
     }
 
     fn key_words(&self) -> u32 {

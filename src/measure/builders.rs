@@ -4,6 +4,7 @@
 //! whoever adds one adds a row there.
 
 use super::Subject;
+use super::device_lbvh::DeviceLbvh;
 use super::host::HostLbvh;
 use super::peers::driver::Driver;
 #[cfg(feature = "peer-embree")]
@@ -11,6 +12,7 @@ use super::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use super::peers::obvhs;
 use crate::bvh::codes::Codes;
+use crate::bvh::lbvh::{self, Schedule};
 use crate::bvh::sah::Collapse;
 use crate::gpu::{Device, DriverPreference};
 use crate::scene::Mesh;
@@ -61,9 +63,27 @@ const CODES: BuilderOption = BuilderOption {
     values: "mc30, mc63, emc64sort, emc64var or emc64var-nosize, with +concise or /BITS behind",
 };
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
+const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain or persistent" };
 
 /// Every builder, in the order in which they are listed and measured.
 pub static BUILDERS: &[Builder] = &[
+    Builder {
+        name: "lbvh",
+        what: "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
+        options: &[CODES, COLLAPSE, SCHEDULE],
+        variants: &[
+            "lbvh",
+            "lbvh:codes=mc30",
+            "lbvh:codes=emc64var-nosize",
+            "lbvh:collapse=off",
+            "lbvh:schedule=persistent",
+        ],
+        needs: Needs::Device,
+        make: |spec, device, mesh| {
+            Ok(Box::new(DeviceLbvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
+        },
+        check: |spec| spec.lbvh_options().map(drop),
+    },
     Builder {
         name: "lbvh-host",
         what: "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte",
@@ -187,6 +207,17 @@ impl Spec {
             Some("off") => Ok(Collapse::OFF),
             Some(other) => Err(self.wrong_value(&COLLAPSE, other)),
         }
+    }
+
+    /// Options `codes`, `collapse` and `schedule`.
+    fn lbvh_options(&self) -> Result<lbvh::Options> {
+        let schedule = match self.option(SCHEDULE.key) {
+            None => None,
+            Some("chain") => Some(Schedule::Chain),
+            Some("persistent") => Some(Schedule::Persistent),
+            Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
+        };
+        Ok(lbvh::Options { codes: self.codes()?, collapse: self.collapse()?, schedule })
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {

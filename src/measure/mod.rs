@@ -6,6 +6,7 @@
 
 pub mod agreement;
 pub mod builders;
+mod device_lbvh;
 pub mod growth;
 mod host;
 pub mod matrix;

@@ -1,0 +1,172 @@
+//! `lbvh`: our LBVH on the device as a subject: timestamps around each phase, our tracer.
+
+use super::{BuildRun, Subject, record};
+use crate::bvh::layout::Bvh2;
+use crate::bvh::lbvh::{Input, Lbvh, Options, Sizes};
+use crate::bvh::quality::{self, Figures};
+use crate::gpu::{Buffer, Device, Timestamps};
+use crate::scene::Mesh;
+use crate::trace::tracer::{self, Buffers, Shape};
+use crate::trace::{Hit, Query, Ray, Work};
+use crate::{Error, Result};
+
+/// Phases of a build at most: reset and bounds, encode, sort, hierarchy.
+const PHASES: u32 = 8;
+
+/// A scene in our `Bvh2`, built and traced on the device.
+pub struct DeviceLbvh<'a> {
+    device: &'a Device,
+    builder: String,
+    choice: Option<String>,
+    lbvh: Lbvh,
+    sizes: Sizes,
+    input: Input,
+    _vertices: [Buffer<'a>; 2],
+    structure: Buffer<'a>,
+    scratch: Buffer<'a>,
+    timestamps: Timestamps,
+    rays: Option<Rays<'a>>,
+}
+
+struct Rays<'a> {
+    count: u32,
+    rays: Buffer<'a>,
+    hits: Buffer<'a>,
+}
+
+impl<'a> DeviceLbvh<'a> {
+    /// Uploads `mesh` and makes room for structure and scratch.
+    ///
+    /// # Errors
+    /// Too many triangles, or too little memory: the error says how much is needed.
+    pub fn new(device: &'a Device, builder: &str, mesh: &Mesh, options: &Options) -> Result<DeviceLbvh<'a>> {
+        let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
+        let lbvh = Lbvh::new(device, options, count)?;
+        device.warm(&lbvh.kernels())?;
+        let sizes = lbvh.sizes();
+        let (positions, indices) = (size_of_val(&mesh.positions[..]) as u64, size_of_val(&mesh.triangles[..]) as u64);
+        let (needed, available) = (positions + indices + sizes.structure + sizes.scratch, device.found().memory);
+        if needed > available {
+            return Err(Error::OutOfMemory { what: format!("{builder} of {count} triangles"), needed, available });
+        }
+        let vertices = [device.upload("positions", &mesh.positions)?, device.upload("indices", &mesh.triangles)?];
+        let input = Input {
+            positions: vertices[0].address(),
+            vertex_count: mesh.positions.len() as u32,
+            vertex_stride: 3,
+            indices: vertices[1].address(),
+            primitive_count: count,
+        };
+        Ok(DeviceLbvh {
+            device,
+            builder: builder.to_owned(),
+            choice: choice_of(options, &lbvh),
+            structure: device.buffer("structure", sizes.structure)?,
+            scratch: device.buffer("scratch", sizes.scratch)?,
+            timestamps: Timestamps::new(device, PHASES)?,
+            lbvh,
+            sizes,
+            input,
+            _vertices: vertices,
+            rays: None,
+        })
+    }
+
+    fn buffers(&self, rays: &Rays<'_>, work: Option<u64>) -> Buffers {
+        Buffers {
+            structure: self.structure.address(),
+            rays: rays.rays.address(),
+            hits: rays.hits.address(),
+            work,
+            count: rays.count,
+        }
+    }
+}
+
+/// What was left to the builder: codes and schedule.
+fn choice_of(options: &Options, lbvh: &Lbvh) -> Option<String> {
+    let codes = options.codes.is_none().then(|| format!("codes {}", lbvh.codes()));
+    let schedule = options.schedule.is_none().then(|| format!("schedule {}", lbvh.schedule()));
+    let chosen: Vec<String> = codes.into_iter().chain(schedule).collect();
+    (!chosen.is_empty()).then(|| chosen.join(", "))
+}
+
+impl Subject for DeviceLbvh<'_> {
+    fn builder(&self) -> &str {
+        &self.builder
+    }
+
+    fn kind(&self) -> &'static str {
+        "bvh2"
+    }
+
+    fn timer(&self) -> &'static str {
+        "device"
+    }
+
+    fn choice(&self) -> Option<String> {
+        self.choice.clone()
+    }
+
+    fn traffic(&self, phase: &str) -> Option<u64> {
+        self.lbvh.traffic(phase, &self.input)
+    }
+
+    fn build(&mut self) -> Result<BuildRun> {
+        let (structure, scratch) = (self.structure.address(), self.scratch.address());
+        self.device.run(Some(&mut self.timestamps), |r| self.lbvh.record(r, &self.input, structure, scratch))?;
+        let phases = self.timestamps.phases()?;
+        Ok(BuildRun { milliseconds: phases.iter().map(|p| p.milliseconds).sum(), phases })
+    }
+
+    fn memory(&self) -> record::Memory {
+        record::Memory {
+            structure_bytes: Some(self.sizes.structure),
+            scratch_bytes: Some(self.sizes.scratch),
+            peak_bytes: Some(self.sizes.structure + self.sizes.scratch),
+        }
+    }
+
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+        let measure = quality::OnDevice::new(&self.device.limits, self.input.primitive_count);
+        let scratch = self.device.buffer("quality: scratch", measure.scratch_bytes())?;
+        let result = self.device.buffer("quality: figures", size_of::<Figures>() as u64)?;
+        self.device.run(None, |r| measure.record(r, self.structure.address(), scratch.address(), result.address()))?;
+        Ok(record::Quality::of(&result.read::<Figures>(1)[0].quality(c_t, c_i), c_t, c_i))
+    }
+
+    fn tree(&mut self) -> Result<Option<Bvh2>> {
+        Bvh2::from_bytes(&self.structure.read::<u8>(self.sizes.structure as usize)).map(Some)
+    }
+
+    fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
+        let count = u32::try_from(rays.len())
+            .map_err(|_| Error::Argument(format!("{} rays; at most 4294967295 at once", rays.len())))?;
+        self.rays = None;
+        let hits = self.device.buffer("hits", size_of_val(rays) as u64 / 2)?;
+        self.rays = Some(Rays { count, rays: self.device.upload("rays", rays)?, hits });
+        Ok(())
+    }
+
+    fn trace(&mut self, query: Query) -> Result<f64> {
+        let Some(rays) = &self.rays else { return Ok(0.0) };
+        let (shape, buffers) = (Shape::of(&self.device.limits), self.buffers(rays, None));
+        self.device.run(Some(&mut self.timestamps), |recorder| {
+            recorder.phase("trace");
+            tracer::record(recorder, &shape, query, &buffers)
+        })?;
+        Ok(self.timestamps.phases()?.iter().map(|p| p.milliseconds).sum())
+    }
+
+    fn hits(&mut self) -> Result<Vec<Hit>> {
+        Ok(self.rays.as_ref().map_or_else(Vec::new, |r| r.hits.read(r.count as usize)))
+    }
+
+    fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
+        let Some(rays) = &self.rays else { return Ok(None) };
+        let work = self.device.buffer("work", u64::from(rays.count) * size_of::<Work>() as u64)?;
+        let (shape, buffers) = (Shape::of(&self.device.limits), self.buffers(rays, Some(work.address())));
+        self.device.run(None, |recorder| tracer::record(recorder, &shape, query, &buffers))?;
+        Ok(Some(work.read(rays.count as usize)))
+    }
+}
