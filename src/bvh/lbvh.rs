@@ -8,7 +8,7 @@ use super::codes::{Code, Codes};
 use super::layout;
 use super::sah::Collapse;
 use crate::gpu::radix_sort::{self, Shape};
-use crate::gpu::{Context, Kernel, Limits, Recorder, shaders};
+use crate::gpu::{Context, Kernel, Recorder, shaders};
 use crate::{Error, Result};
 
 /// What to build, beside the triangles.
