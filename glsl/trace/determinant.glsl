@@ -22,6 +22,9 @@ struct HedgerowProduct {
     bool negative;
 };
 
+// Below the exponent of every other product: a zero never outweighs one by what it is multiplied with.
+const int HEDGEROW_ZERO_EXPONENT = -1000;
+
 HedgerowProduct hedgerow_product(float a, float b) {
     uvec2 bits = uvec2(floatBitsToUint(a), floatBitsToUint(b));
     uvec2 exponents = bits >> 23u & 0xffu;
@@ -29,7 +32,7 @@ HedgerowProduct hedgerow_product(float a, float b) {
     uvec2 mantissas = mix(bits & 0x7fffffu | 0x800000u, uvec2(0), equal(exponents, uvec2(0)));
     HedgerowProduct product;
     umulExtended(mantissas.x, mantissas.y, product.magnitude.y, product.magnitude.x);
-    product.exponent = int(exponents.x + exponents.y) - 300;
+    product.exponent = product.magnitude == uvec2(0) ? HEDGEROW_ZERO_EXPONENT : int(exponents.x + exponents.y) - 300;
     product.negative = (bits.x ^ bits.y) >> 31u == 1u;
     return product;
 }
@@ -46,7 +49,7 @@ HedgerowScaled hedgerow_difference_of_products(float a, float b, float c, float 
     HedgerowProduct large = hedgerow_product(a, b);
     HedgerowProduct small = hedgerow_product(c, d);
     small.negative = !small.negative;
-    if (small.exponent > large.exponent || large.magnitude == uvec2(0)) {
+    if (small.exponent > large.exponent) {
         HedgerowProduct other = large;
         large = small;
         small = other;

@@ -32,7 +32,7 @@ const ROOM: u32 = 14;
 /// a·b − c·d of finite floats, subnormal ones taken as zero: its sign, and its value cut to 24 bits.
 pub fn difference_of_products([a, b]: [f32; 2], [c, d]: [f32; 2]) -> Scaled {
     let (p, q) = (Product::of(a, b), Product::of(c, d).negated());
-    let (large, small) = if q.exponent > p.exponent || p.magnitude == 0 { (q, p) } else { (p, q) };
+    let (large, small) = if q.exponent > p.exponent { (q, p) } else { (p, q) };
     // Both have their highest bit at 46 or 47 or are zero, so what the shift cuts off of the smaller one cannot be
     // missed in the first 24 bits: either less than 15 bits are shifted, and nothing is lost, or nothing cancels.
     let apart = (large.exponent - small.exponent).clamp(0, 63) as u32;
@@ -49,6 +49,9 @@ pub fn difference_of_products([a, b]: [f32; 2], [c, d]: [f32; 2]) -> Scaled {
     Scaled { mantissa: if negative { -mantissa } else { mantissa }, exponent: large.exponent - ROOM as i32 + cut }
 }
 
+/// Below the exponent of every other product: a zero never outweighs one by what it is multiplied with.
+const ZERO_EXPONENT: i32 = -1000;
+
 /// ±magnitude · 2^exponent, the exact product of two floats.
 #[derive(Clone, Copy)]
 struct Product {
@@ -61,9 +64,10 @@ impl Product {
     fn of(a: f32, b: f32) -> Product {
         let (ma, ea) = parts(a);
         let (mb, eb) = parts(b);
+        let magnitude = u64::from(ma) * u64::from(mb);
         Product {
-            magnitude: u64::from(ma) * u64::from(mb),
-            exponent: ea + eb,
+            magnitude,
+            exponent: if magnitude == 0 { ZERO_EXPONENT } else { ea + eb },
             negative: (a.to_bits() ^ b.to_bits()) >> 31 == 1,
         }
     }
@@ -115,5 +119,8 @@ mod tests {
         );
         assert_eq!(difference_of_products([1e-30, 1e-30], [1e-30, 1.5e-30]).mantissa.signum(), -1);
         assert_eq!(difference_of_products([1e30, 1e30], [1e30, 1e30]), Scaled::ZERO);
+        // A zero does not outweigh a small product.
+        assert_eq!(difference_of_products([1.0, 2e-32], [2e37, 0.0]).mantissa.signum(), 1);
+        assert_eq!(difference_of_products([2e37, 0.0], [1.0, 2e-32]).mantissa.signum(), -1);
     }
 }
