@@ -1,11 +1,12 @@
 //! The structs that host and device share are the same on both sides: offsets, sizes and names, from SPIR-V reflection.
 //!
-//! Each module that pushes constants says its layout in one line (`layout_of!`, in its tests); every shader of the table
-//! must be listed here, so that a new one cannot be forgotten. Names may differ by the ending `_address`.
+//! A module declares its push constants with `gpu::push_constants!`; every shader of the table must find its module in
+//! `arguments_of`, so that a new one cannot be forgotten. Names may differ by the ending `_address`.
 
 use crate::bvh::layout::{Child, Header, Node, Triangle};
 use crate::gpu::shaders;
 use crate::trace::{Hit, Ray};
+use crate::{bvh, gpu, measure, trace};
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{Decoration, Op, StorageClass};
 use std::collections::{BTreeMap, BTreeSet};
@@ -41,12 +42,20 @@ pub(crate) fn bytes_of_member<S, M>(_: fn(&S) -> &M) -> usize {
 
 /// The push constants of each shader, as the host sees them.
 fn arguments_of(shader: &str) -> Option<Layout> {
-    match shader {
-        _ if shader.starts_with("bvh/lbvh_") => Some(crate::bvh::lbvh::arguments_layout()),
-        _ if shader.starts_with("gpu/radix_sort_") => Some(crate::gpu::radix_sort::arguments_layout()),
-        "measure/ray_query" => Some(crate::measure::peers::driver::arguments_layout()),
-        _ => None,
-    }
+    let (room, name) = shader.split_once('/')?;
+    let is = |prefix: &str| name == prefix || name.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('_'));
+    Some(match room {
+        "bvh" if is("lbvh") => bvh::lbvh::push_constants(),
+        "bvh" if is("quality") => bvh::quality::push_constants(),
+        "gpu" if is("fill") => gpu::fill::push_constants(),
+        "gpu" if is("pool_tree") => gpu::probe::push_constants(),
+        "gpu" if is("radix_sort") => gpu::radix_sort::push_constants(),
+        "gpu" if is("reduce") => gpu::reduce::push_constants(),
+        "gpu" if is("scan") => gpu::scan::push_constants(),
+        "trace" if is("tracer") => trace::tracer::push_constants(),
+        "measure" if is("ray_query") => measure::peers::driver::push_constants(),
+        _ => return None,
+    })
 }
 
 /// The structs in memory, by their name in GLSL, as the host sees them.
@@ -174,6 +183,8 @@ fn structs_in_memory_are_the_same_on_host_and_device() {
     let mut seen = BTreeSet::new();
     for shader in shaders::ALL {
         for (name, device) in Reflection::of(shader.name).structs() {
+            // Headers that foreign shaders include put the library's name before theirs.
+            let name = name.strip_prefix("Hedgerow").unwrap_or(name);
             if let Some(host) = host.get(name) {
                 assert_eq!(host, &device, "{name} in {}: host left, device right", shader.name);
                 seen.insert(name.to_string());

@@ -7,6 +7,7 @@
 use super::codes::{Code, Codes};
 use super::layout;
 use super::sah::Collapse;
+use crate::gpu::push_constants::push_constants;
 use crate::gpu::radix_sort::{self, Shape};
 use crate::gpu::{Context, Kernel, Recorder, shaders};
 use crate::{Error, Result};
@@ -101,51 +102,27 @@ struct Scratch {
 /// Bytes of `LbvhState` in lbvh.glsl, with room to spare.
 const STATE_BYTES: u64 = 768;
 
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Arguments {
-    positions: u64,
-    indices: u64,
-    structure: u64,
-    state: u64,
-    keys: [u64; 2],
-    values: [u64; 2],
-    ends: u64,
-    table: u64,
-    primitive_count: u32,
-    vertex_count: u32,
-    vertex_stride: u32,
-    code_kind: u32,
-    c_t: f32,
-    c_i: f32,
-    columns: u32,
-    column_keys: u32,
-    passes: u32,
-    padding: u32,
-}
-
-#[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
-pub(crate) fn arguments_layout() -> crate::layouts::Layout {
-    crate::layouts::layout_of!(Arguments {
-        positions,
-        indices,
-        structure,
-        state,
-        keys,
-        values,
-        ends,
-        table,
-        primitive_count,
-        vertex_count,
-        vertex_stride,
-        code_kind,
-        c_t,
-        c_i,
-        columns,
-        column_keys,
-        passes,
-        padding
-    })
+push_constants! {
+    struct Arguments {
+        positions: u64,
+        indices: u64,
+        structure: u64,
+        state: u64,
+        keys: [u64; 2],
+        values: [u64; 2],
+        ends: u64,
+        table: u64,
+        primitive_count: u32,
+        vertex_count: u32,
+        vertex_stride: u32,
+        code_kind: u32,
+        c_t: f32,
+        c_i: f32,
+        columns: u32,
+        column_keys: u32,
+        passes: u32,
+        padding: u32,
+    }
 }
 
 impl Codes {

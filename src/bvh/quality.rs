@@ -4,6 +4,7 @@
 
 use super::layout::{Bvh2, node_slots};
 use crate::Result;
+use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Kernel, Limits, Recorder, fill, shaders};
 use bytemuck::{Pod, Zeroable};
 
@@ -64,15 +65,15 @@ pub struct OnDevice {
     rounds: u32,
 }
 
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Arguments {
-    structure: u64,
-    parents: u64,
-    partials: u64,
-    result: u64,
-    rounds: u32,
-    tiles: u32,
+push_constants! {
+    struct Arguments {
+        structure: u64,
+        parents: u64,
+        partials: u64,
+        result: u64,
+        rounds: u32,
+        tiles: u32,
+    }
 }
 
 impl OnDevice {

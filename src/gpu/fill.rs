@@ -1,5 +1,6 @@
 //! Fills words with a value: `vkCmdFillBuffer` for memory that is known by its address.
 
+use super::push_constants::push_constants;
 use super::{Kernel, Recorder, shaders};
 use crate::Result;
 
@@ -8,12 +9,12 @@ const WORKGROUP: u32 = 64;
 /// Words of an invocation.
 const ROUNDS: u32 = 16;
 
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Arguments {
-    words: u64,
-    count: u32,
-    value: u32,
+push_constants! {
+    struct Arguments {
+        words: u64,
+        count: u32,
+        value: u32,
+    }
 }
 
 /// Records the fill of `count` words at address `words` with `value`. One dispatch; the caller places the barriers.

@@ -11,6 +11,7 @@ mod driver_structure;
 pub mod fill;
 #[cfg(feature = "cli")]
 pub mod probe;
+pub(crate) mod push_constants;
 pub mod radix_sort;
 mod recorder;
 pub mod reduce;

@@ -1,6 +1,7 @@
 //! What a driver is asked at start-up because no property tells it: that started workgroups go on, and that long loops end
 //! where they should (Mesa 22.3's lavapipe ends them after 65,535 rounds and says nothing).
 
+use super::push_constants::push_constants;
 use super::task_pool::State;
 use super::{Device, Kernel, shaders};
 use crate::Result;
@@ -14,14 +15,14 @@ pub struct Findings {
     pub task_pool: bool,
 }
 
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Arguments {
-    pool: u64,
-    visits: u64,
-    loops: u64,
-    loop_length: u32,
-    padding: u32,
+push_constants! {
+    struct Arguments {
+        pool: u64,
+        visits: u64,
+        loops: u64,
+        loop_length: u32,
+        padding: u32,
+    }
 }
 
 /// Runs a pool of `phases` phases, 1, 2, 4, … tasks each, with `workgroups` workers. Returns the pool's state and what each

@@ -3,6 +3,7 @@
 //! Reduce, then scan (Satish, Harris, Garland 2009): each pass counts digits, scans the counts, scatters. It asks for no
 //! progress between workgroups, so it runs on any device. `glsl/gpu/radix_sort.glsl` is the device's side.
 
+use super::push_constants::push_constants;
 use super::{Kernel, Limits, Recorder, shaders};
 use crate::Result;
 
@@ -108,37 +109,20 @@ pub struct Sort {
     pub identity: bool,
 }
 
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Arguments {
-    keys: u64,
-    values: u64,
-    keys_out: u64,
-    values_out: u64,
-    table: u64,
-    count: u32,
-    shift: u32,
-    columns: u32,
-    column_keys: u32,
-    identity: u32,
-    padding: u32,
-}
-
-#[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
-pub(crate) fn arguments_layout() -> crate::layouts::Layout {
-    crate::layouts::layout_of!(Arguments {
-        keys,
-        values,
-        keys_out,
-        values_out,
-        table,
-        count,
-        shift,
-        columns,
-        column_keys,
-        identity,
-        padding
-    })
+push_constants! {
+    struct Arguments {
+        keys: u64,
+        values: u64,
+        keys_out: u64,
+        values_out: u64,
+        table: u64,
+        count: u32,
+        shift: u32,
+        columns: u32,
+        column_keys: u32,
+        identity: u32,
+        padding: u32,
+    }
 }
 
 /// Records the sort. Returns the index (0 or 1) of the buffers that hold the result.

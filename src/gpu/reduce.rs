@@ -1,5 +1,6 @@
 //! Reduction of bounds: the box around many boxes.
 
+use super::push_constants::push_constants;
 use super::{Kernel, Limits, Recorder, shaders};
 use crate::Result;
 
@@ -17,13 +18,13 @@ pub struct Reduction {
     rounds: u32,
 }
 
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Arguments {
-    boxes: u64,
-    results: u64,
-    count: u32,
-    rounds: u32,
+push_constants! {
+    struct Arguments {
+        boxes: u64,
+        results: u64,
+        count: u32,
+        rounds: u32,
+    }
 }
 
 impl Reduction {

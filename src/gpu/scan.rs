@@ -2,6 +2,7 @@
 //!
 //! Reduce, then scan: three dispatches, no progress between workgroups asked for. `glsl/gpu/scan.glsl` is the device's side.
 
+use super::push_constants::push_constants;
 use super::{Kernel, Limits, Recorder, shaders};
 use crate::Result;
 
@@ -28,12 +29,14 @@ pub struct Buffers {
     pub sums: u64,
 }
 
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Arguments {
-    buffers: Buffers,
-    count: u32,
-    rounds: u32,
+push_constants! {
+    struct Arguments {
+        values: u64,
+        results: u64,
+        sums: u64,
+        count: u32,
+        rounds: u32,
+    }
 }
 
 impl Scan {
@@ -63,7 +66,8 @@ impl Scan {
     /// # Errors
     /// A pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, buffers: &Buffers) -> Result<()> {
-        let arguments = Arguments { buffers: *buffers, count: self.count, rounds: self.rounds };
+        let Buffers { values, results, sums } = *buffers;
+        let arguments = Arguments { values, results, sums, count: self.count, rounds: self.rounds };
         let kernel = |shader| Kernel::new(shader, self.workgroup, &[]);
         recorder.dispatch(&kernel(&shaders::GPU_SCAN_SUM), &arguments, self.tiles())?;
         recorder.barrier();

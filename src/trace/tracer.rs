@@ -12,9 +12,9 @@
 
 use super::{MAX_RAYS, Query};
 use crate::bvh::layout::MAX_DEPTH;
+use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Kernel, Limits, Recorder, shaders};
 use crate::{Error, Result};
-use bytemuck::{Pod, Zeroable};
 
 /// How the work is cut for a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -70,22 +70,22 @@ pub struct Buffers {
     pub count: u32,
 }
 
-/// Push constants of `glsl/trace/tracer_single.comp`.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-pub struct Arguments {
-    /// Address of a `Bvh2`.
-    pub structure: u64,
-    /// Address of the rays.
-    pub rays: u64,
-    /// Address of the hits, one a ray.
-    pub hits: u64,
-    /// Address of the work, one a ray, if it is counted.
-    pub works: u64,
-    /// The first ray of this dispatch.
-    pub first: u32,
-    /// Rays in all.
-    pub count: u32,
+push_constants! {
+    /// Push constants of `glsl/trace/tracer_single.comp`.
+    pub struct Arguments {
+        /// Address of a `Bvh2`.
+        pub structure: u64,
+        /// Address of the rays.
+        pub rays: u64,
+        /// Address of the hits, one a ray.
+        pub hits: u64,
+        /// Address of the work, one a ray, if it is counted.
+        pub works: u64,
+        /// The first ray of this dispatch.
+        pub first: u32,
+        /// Rays in all.
+        pub count: u32,
+    }
 }
 
 /// The kernel that [`record`] takes, for [`Context::warm`](crate::gpu::Context::warm).

@@ -4,31 +4,26 @@
 //! instance, which a ray query cannot do without, is the phase `tlas` beside it. Structure bytes hold both.
 
 use crate::bvh::layout::Bvh2;
+use crate::gpu::push_constants::push_constants;
 use crate::gpu::{self, Buffer, Device, DriverPreference, DriverStructure, Found, Kernel, Timestamps, shaders};
 use crate::measure::{BuildRun, Subject, record};
 use crate::scene::Mesh;
 use crate::trace::{Hit, Query, Ray, Work};
 use crate::{Error, Result};
 use ash::vk;
-use bytemuck::{Pod, Zeroable};
 
 /// Invocations a workgroup of the tracing kernel.
 const WORKGROUP: u32 = 64;
 
-/// The push constants of `glsl/measure/ray_query.comp`.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Arguments {
-    structure: u64,
-    rays: u64,
-    hits: u64,
-    first: u32,
-    count: u32,
-}
-
-#[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
-pub(crate) fn arguments_layout() -> crate::layouts::Layout {
-    crate::layouts::layout_of!(Arguments { structure, rays, hits, first, count })
+push_constants! {
+    /// The push constants of `glsl/measure/ray_query.comp`.
+    struct Arguments {
+        structure: u64,
+        rays: u64,
+        hits: u64,
+        first: u32,
+        count: u32,
+    }
 }
 
 /// A scene in the driver's acceleration structure.
