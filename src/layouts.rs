@@ -53,6 +53,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "gpu" if is("reduce") => gpu::reduce::push_constants(),
         "gpu" if is("scan") => gpu::scan::push_constants(),
         "trace" if is("tracer") => trace::tracer::push_constants(),
+        "measure" if is("copy") => measure::copy::push_constants(),
         "measure" if is("ray_query") => measure::peers::driver::push_constants(),
         _ => return None,
     })

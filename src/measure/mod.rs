@@ -6,6 +6,8 @@
 
 pub mod agreement;
 pub mod builders;
+pub mod comparison;
+pub mod copy;
 mod device_lbvh;
 pub mod growth;
 mod host;

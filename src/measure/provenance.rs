@@ -1,12 +1,18 @@
 //! Where figures come from: commit, time, processor.
 
 use std::process::Command;
+use std::sync::OnceLock;
 
 /// Commit of the program, with `+` behind it if the tree was dirty; `unknown` outside a checkout.
 ///
 /// `HEDGEROW_COMMIT` at compile time decides where it is set (for packages); otherwise git is asked in the folder that the
 /// program was compiled in.
 pub fn commit() -> String {
+    static COMMIT: OnceLock<String> = OnceLock::new();
+    COMMIT.get_or_init(find_commit).clone()
+}
+
+fn find_commit() -> String {
     if let Some(commit) = option_env!("HEDGEROW_COMMIT") {
         return commit.to_owned();
     }
