@@ -1,9 +1,10 @@
 //! `hedgerow devices`: every Vulkan device, what it lacks, and which one we would pick.
 
-use super::{Common, Json};
+use super::{Common, Json, tables};
 use crate::gpu::{self, Found};
+use crate::report::numbers::bytes;
 use ash::vk;
-use comfy_table::{Table, presets::UTF8_HORIZONTAL_ONLY};
+use comfy_table::Table;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -34,7 +35,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let found = gpu::list(common.device.as_deref())?;
     let rows: Vec<_> = found.iter().map(row).collect();
     let json = Json { json: arguments.json.clone() };
-    json.write(&rows)?;
+    json.write_each([&rows])?;
     if !json.takes_stdout() {
         writeln!(std::io::stdout(), "{}", table(&rows))?;
     }
@@ -64,9 +65,8 @@ fn row(found: &Found) -> Row<'_> {
 }
 
 fn table(rows: &[Row<'_>]) -> Table {
-    let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY);
-    table.set_header(["", "#", "device", "driver", "kind", "Vulkan", "subgroup", "memory", "ray query", "lacks"]);
+    let header = ["", "#", "device", "driver", "kind", "Vulkan", "subgroup", "memory", "ray query", "lacks"];
+    let mut table = tables::table(&header, header.len());
     for row in rows {
         let lacks = if row.missing.is_empty() { "nothing".into() } else { row.missing.join(", ") };
         table.add_row([
@@ -77,7 +77,7 @@ fn table(rows: &[Row<'_>]) -> Table {
             row.kind.to_owned(),
             row.api_version.clone(),
             row.subgroup_size.to_string(),
-            indicatif::BinaryBytes(row.memory_bytes).to_string(),
+            bytes(row.memory_bytes),
             if row.ray_query { "yes" } else { "no" }.to_owned(),
             lacks,
         ]);

@@ -1,20 +1,27 @@
 //! The commands of the binary, one file each. What they print and when they fail is fixed in the README's contract:
 //! results to stdout, progress and diagnostics to stderr, exit status 0 done, 1 the work failed, 2 the arguments are wrong.
 
+mod build;
 mod compare;
 mod devices;
 mod options;
 mod output;
+mod rays;
+mod render;
+mod tables;
+mod trace;
+mod work;
 
+use crate::measure::builders;
 use clap::Parser;
 use std::process::ExitCode;
 
-pub use options::{Common, Size};
+pub use options::{Builders, Common, Costs, Kinds, Size};
 pub use output::{Bar, Json};
 
 /// Acceleration structures for ray tracing, built and traced with Vulkan compute shaders, and measured.
 #[derive(Debug, Parser)]
-#[command(name = "hedgerow", version, arg_required_else_help = true, after_help = AFTER_HELP)]
+#[command(name = "hedgerow", version, arg_required_else_help = true, after_help = after_help())]
 struct Cli {
     #[command(flatten)]
     common: Common,
@@ -26,9 +33,17 @@ struct Cli {
 enum Command {
     Compare(compare::Arguments),
     Devices(devices::Arguments),
+    Build(build::Arguments),
+    Trace(trace::Arguments),
+    Rays(rays::Arguments),
+    Render(render::Arguments),
 }
 
-const AFTER_HELP: &str = "\
+fn after_help() -> String {
+    builders::help() + SCENES
+}
+
+const SCENES: &str = "
 A scene is a file (.obj, .ply, .gltf, .glb, .tri, .anim, .inst, each also with .zst behind), the bare name of one in
 scenes/ or in the folder of --scenes-dir, or a generator: gen:icosphere:N, gen:soup:N:SEED, gen:grid:N, gen:stadium:N,
 gen:needles:N:SEED.";
@@ -53,6 +68,10 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     match &cli.command {
         Command::Compare(arguments) => compare::run(common, arguments),
         Command::Devices(arguments) => devices::run(common, arguments),
+        Command::Build(arguments) => build::run(common, arguments),
+        Command::Trace(arguments) => trace::run(common, arguments),
+        Command::Rays(arguments) => rays::run(common, arguments),
+        Command::Render(arguments) => render::run(common, arguments),
     }
 }
 

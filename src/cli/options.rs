@@ -2,7 +2,9 @@
 
 use super::Bar;
 use crate::gpu::{Device, DeviceOptions};
+use crate::measure::builders::{self, Spec};
 use crate::scene::{self, Scene};
+use crate::trace::kinds::{RayKind, RayOptions};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -133,9 +135,83 @@ impl FromStr for Size {
     }
 }
 
+impl Size {
+    /// As many rays as pixels.
+    pub fn rays(self, seed: u64) -> RayOptions {
+        RayOptions { size: [self.width, self.height], seed }
+    }
+}
+
 impl std::fmt::Display for Size {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+/// `-b`: builders, separated by commas.
+#[derive(Debug, Clone)]
+pub struct Builders(pub Vec<Spec>);
+
+impl FromStr for Builders {
+    type Err = crate::Error;
+
+    fn from_str(text: &str) -> crate::Result<Builders> {
+        builders::parse_list(text).map(Builders)
+    }
+}
+
+/// `--rays`: kinds of rays, separated by commas, or `all`.
+#[derive(Debug, Clone)]
+pub struct Kinds(pub Vec<RayKind>);
+
+impl FromStr for Kinds {
+    type Err = crate::Error;
+
+    fn from_str(text: &str) -> crate::Result<Kinds> {
+        if text == "all" {
+            return Ok(Kinds(RayKind::ALL.to_vec()));
+        }
+        let mut kinds = Vec::new();
+        for name in text.split(',') {
+            let kind = name.trim().parse()?;
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
+        }
+        Ok(Kinds(kinds))
+    }
+}
+
+/// `--costs`: what a traversal step and a triangle test cost in the SAH.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    /// c_T.
+    pub step: f64,
+    /// c_I.
+    pub test: f64,
+}
+
+impl FromStr for Costs {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Costs, String> {
+        let cost = |s: &str| s.trim().parse().ok().filter(|c: &f64| *c > 0.0 && c.is_finite());
+        text.split_once(',')
+            .and_then(|(step, test)| Some(Costs { step: cost(step)?, test: cost(test)? }))
+            .ok_or_else(|| format!("{text:?} are not two positive costs; write C_T,C_I, as in 3,2"))
+    }
+}
+
+/// A number above zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Positive(pub f32);
+
+impl FromStr for Positive {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Positive, String> {
+        let number = text.parse().ok().filter(|n: &f32| *n > 0.0 && n.is_finite());
+        number.map(Positive).ok_or_else(|| format!("{text:?} is not a number above zero"))
     }
 }
 
@@ -156,6 +232,17 @@ mod tests {
         assert_eq!("640x480".parse(), Ok(Size { width: 640, height: 480 }));
         for wrong in ["", "640", "640x", "0x480", "640x480x3", "-1x5", "99999x2"] {
             assert!(wrong.parse::<Size>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn kinds_are_listed_once_each_and_costs_are_positive() {
+        assert_eq!("all".parse::<Kinds>().expect("all").0, RayKind::ALL);
+        assert_eq!("ao, primary,ao".parse::<Kinds>().expect("two").0, [RayKind::Ao, RayKind::Primary]);
+        assert!("ao,light".parse::<Kinds>().is_err() && "".parse::<Kinds>().is_err());
+        assert_eq!("3,2".parse(), Ok(Costs { step: 3.0, test: 2.0 }));
+        for wrong in ["3", "3,0", "-1,2", "3,nan", "3,2,1"] {
+            assert!(wrong.parse::<Costs>().is_err(), "{wrong}");
         }
     }
 

@@ -20,17 +20,21 @@ impl Json {
         self.json.as_deref().is_some_and(|path| path.as_os_str() == "-")
     }
 
-    /// Writes `record` as one line, if `--json` was given.
+    /// Writes each record as one line, if `--json` was given.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&self, record: &impl serde::Serialize) -> anyhow::Result<()> {
+    pub fn write_each<R: serde::Serialize>(&self, records: impl IntoIterator<Item = R>) -> anyhow::Result<()> {
         let Some(path) = &self.json else { return Ok(()) };
-        let line = serde_json::to_string(record).context("the record cannot be written as JSON")? + "\n";
+        let mut lines = String::new();
+        for record in records {
+            lines += &serde_json::to_string(&record).context("the record cannot be written as JSON")?;
+            lines.push('\n');
+        }
         if self.takes_stdout() {
-            std::io::stdout().write_all(line.as_bytes())?;
+            std::io::stdout().write_all(lines.as_bytes())?;
         } else {
-            std::fs::write(path, line).map_err(crate::Error::file(path))?;
+            std::fs::write(path, lines).map_err(crate::Error::file(path))?;
         }
         Ok(())
     }

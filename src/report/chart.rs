@@ -1,6 +1,7 @@
 //! A chart: drawn once by plotters, then labelled; as a file of its own, as a picture, and inside the page.
 
 use super::labels::{self, Rect};
+use super::raster::rasterise;
 use super::theme::{self, BEST, GRID, INK, MUTED, PAPER, Tone};
 use crate::{Error, Result};
 use plotters::coord::Shift;
@@ -104,18 +105,9 @@ impl Chart {
     /// # Errors
     /// [`Error::Chart`] if the SVG cannot be read back or the picture cannot be packed.
     pub fn png(&self) -> Result<Vec<u8>> {
-        use resvg::{tiny_skia, usvg};
         let wrong = |reason: String| Error::Chart { chart: self.name.clone(), reason };
-        let mut options = usvg::Options { font_family: "Noto Sans".into(), ..usvg::Options::default() };
-        let fonts = options.fontdb_mut();
-        fonts.load_font_data(notosans::REGULAR_TTF.to_vec());
-        fonts.load_font_data(notosans::BOLD_TTF.to_vec());
-        fonts.set_sans_serif_family("Noto Sans");
-        let tree = usvg::Tree::from_str(&self.svg, &options).map_err(|e| wrong(e.to_string()))?;
         let size = (SIZE.0 as f32 * PNG_SCALE, SIZE.1 as f32 * PNG_SCALE);
-        let mut pixels =
-            tiny_skia::Pixmap::new(size.0 as u32, size.1 as u32).ok_or_else(|| wrong("too large".into()))?;
-        resvg::render(&tree, tiny_skia::Transform::from_scale(PNG_SCALE, PNG_SCALE), &mut pixels.as_mut());
+        let pixels = rasterise(&self.svg, (size.0 as u32, size.1 as u32), PNG_SCALE).map_err(wrong)?;
         pixels.encode_png().map_err(|e| wrong(e.to_string()))
     }
 }

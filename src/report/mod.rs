@@ -9,6 +9,8 @@ pub mod labels;
 pub mod names;
 pub mod numbers;
 mod page;
+pub mod picture;
+pub mod raster;
 pub mod results;
 pub mod summary;
 pub mod table;

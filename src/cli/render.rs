@@ -1,0 +1,57 @@
+//! `hedgerow render`: a picture of a scene, or of the work that its rays take.
+
+use super::{Bar, Common, Size, work};
+use crate::measure::builders::Spec;
+use crate::report::picture::{PictureOptions, View, picture};
+use anyhow::Context;
+use std::path::PathBuf;
+
+/// Write a picture: the scene shaded, its normals or depth, or heat maps of steps and tests a ray
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The scene: a file, a bare name, or a generator
+    scene: String,
+    /// The builder with its options
+    #[arg(short, long, value_name = "BUILDER")]
+    builder: Spec,
+    /// The PNG file
+    #[arg(short, long, value_name = "IMAGE.png")]
+    output: PathBuf,
+    /// What it shows: shaded, normals, steps, tests or depth
+    #[arg(long, value_name = "VIEW", default_value = "shaded")]
+    view: View,
+    /// Pixels, without the legend of heat maps
+    #[arg(long, value_name = "WxH", default_value = "960x720")]
+    size: Size,
+    /// Where the colours of a heat map end [default: what 99 of 100 pixels stay below]
+    #[arg(long, value_name = "VALUE")]
+    top: Option<super::options::Positive>,
+}
+
+pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+    if !arguments.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        let name = arguments.output.display();
+        return Err(
+            crate::Error::Argument(format!("{name}: pictures are PNG files; name one that ends in .png")).into()
+        );
+    }
+    let scene = common.load(&arguments.scene)?;
+    let builders = std::slice::from_ref(&arguments.builder);
+    let device = work::device_for(common, builders)?;
+    let bar = Bar::new(common, "building", 0);
+    let mut subject = arguments.builder.make(device.as_ref(), &scene.mesh)?;
+    subject.build()?;
+    bar.say("tracing");
+    let options = PictureOptions {
+        view: arguments.view,
+        size: [arguments.size.width, arguments.size.height],
+        seed: common.seed,
+        top: arguments.top.map(|top| top.0),
+    };
+    let image = picture(&scene, subject.as_mut(), &options)?;
+    drop(bar);
+    let path = &arguments.output;
+    image.save(path).with_context(|| format!("{} cannot be written; check the folder", path.display()))?;
+    drop(subject);
+    work::finish(device.as_ref(), true)
+}

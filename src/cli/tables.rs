@@ -1,0 +1,112 @@
+//! Records as tables for the terminal.
+
+use crate::measure::matrix::Outcome;
+use crate::measure::record::Record;
+use crate::report::numbers::{bytes, duration, grouped, three_digits};
+use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+
+/// A line below the header, and nothing else.
+const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
+
+/// An empty table in our style; columns from `numbers` on are aligned to the right.
+pub fn table(header: &[&str], numbers: usize) -> Table {
+    let mut table = Table::new();
+    table.load_style(STYLE);
+    table.set_header(header.iter().copied());
+    for column in table.column_iter_mut().skip(numbers) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+fn or_dash<T>(value: Option<T>, text: impl FnOnce(T) -> String) -> String {
+    value.map_or_else(|| "-".into(), text)
+}
+
+/// What was built, on what.
+fn heading(record: &Record) -> String {
+    let Record { scene, triangles, builder, device, .. } = record;
+    format!("{scene}, {} triangles: {builder} on {device}", grouped(*triangles))
+}
+
+/// Build time with its phases, quality and memory.
+pub fn build(outcome: &Outcome) -> String {
+    let record = &outcome.record;
+    let build = &record.build;
+    let mut text = heading(record);
+    if let Some(choice) = &outcome.choice {
+        text += &format!("\nchosen: {choice}");
+    }
+    let speed = record.triangles as f64 / (build.median_ms * 1e3);
+    text += &format!(
+        "\nbuilt in {} ({} to {}, {} runs, {} clock): {} million triangles a second\n",
+        duration(build.median_ms),
+        duration(build.min_ms),
+        duration(build.max_ms),
+        build.runs,
+        build.timer,
+        three_digits(speed)
+    );
+    if !build.phases.is_empty() {
+        let mut phases = table(&["phase", "time", "share", "GB/s of what it must move"], 1);
+        for (i, phase) in build.phases.iter().enumerate() {
+            let traffic = outcome.traffic.get(i).copied().flatten();
+            phases.add_row([
+                phase.name.clone(),
+                duration(phase.median_ms),
+                format!("{:.0}%", 100.0 * phase.median_ms / build.median_ms),
+                or_dash(traffic, |bytes| three_digits(bytes as f64 / (phase.median_ms * 1e6))),
+            ]);
+        }
+        text += &format!("{phases}\n");
+    }
+    let (q, m) = (&record.quality, &record.memory);
+    let mut figures = table(&["quality", "", "memory", ""], 4);
+    for column in [1, 3] {
+        figures.column_mut(column).into_iter().for_each(|c| c.set_cell_alignment(CellAlignment::Right));
+    }
+    let rows = [
+        (
+            format!("SAH cost (c_T {}, c_I {})", q.c_t, q.c_i),
+            or_dash(q.sah, three_decimals),
+            "structure",
+            m.structure_bytes,
+        ),
+        ("inner nodes".into(), or_dash(q.inner, grouped), "scratch", m.scratch_bytes),
+        ("leaves".into(), or_dash(q.leaves, grouped), "peak", m.peak_bytes),
+        ("triangles a leaf".into(), or_dash(q.prims_per_leaf, three_digits), "", None),
+        ("depth, mean".into(), or_dash(q.depth_avg, three_digits), "", None),
+        ("depth, most".into(), or_dash(q.depth_max, grouped), "", None),
+    ];
+    for (quality, value, memory, size) in rows {
+        let size = if memory.is_empty() { String::new() } else { or_dash(size, bytes) };
+        figures.add_row([quality, value, memory.into(), size]);
+    }
+    text += &format!("{figures}\n");
+    text += match record.valid {
+        Some(true) => "valid",
+        Some(false) => "NOT VALID",
+        None => "not validated",
+    };
+    text
+}
+
+fn three_decimals(value: f64) -> String {
+    format!("{value:.3}")
+}
+
+/// Speed, steps and tests of each kind of ray.
+pub fn trace(record: &Record) -> String {
+    let mut kinds = table(&["rays", "count", "hits", "Mrays/s", "steps a ray", "tests a ray"], 1);
+    for trace in &record.trace {
+        kinds.add_row([
+            trace.rays.clone(),
+            grouped(trace.count),
+            grouped(trace.hits),
+            three_digits(trace.mrays_s),
+            or_dash(trace.steps, three_digits),
+            or_dash(trace.tests, three_digits),
+        ]);
+    }
+    format!("{}\n{kinds}", heading(record))
+}

@@ -1,0 +1,60 @@
+//! What the commands that build have in common: the device that the builders need, and figures of several in turn.
+
+use super::{Bar, Common};
+use crate::gpu::Device;
+use crate::measure::builders::{Needs, Spec};
+use crate::measure::matrix::{self, Outcome, Plan};
+use crate::scene::Scene;
+use anyhow::bail;
+
+/// Opens the device if one of `builders` needs one.
+///
+/// # Errors
+/// The device does not exist, or lacks what a builder needs.
+pub fn device_for(common: &Common, builders: &[Spec]) -> anyhow::Result<Option<Device>> {
+    let need = |needs: Needs| builders.iter().find(|spec| spec.builder().needs == needs);
+    if need(Needs::Device).or(need(Needs::RayQuery)).is_none() {
+        return Ok(None);
+    }
+    let device = common.open_device(need(Needs::RayQuery).is_some())?;
+    if let Some(spec) = builders.iter().find(|spec| !spec.is_possible(Some(&device))) {
+        bail!(
+            "{spec} needs a device whose driver has VK_KHR_acceleration_structure and VK_KHR_ray_query, {} has not; choose \
+             another device or another builder",
+            device.found().name
+        );
+    }
+    Ok(Some(device))
+}
+
+/// Measures `plan` on `scene`: the outcomes, and whether all went well. Failures go to stderr.
+pub fn measured(common: &Common, scene: &Scene, device: Option<&Device>, plan: &Plan) -> (Vec<Outcome>, bool) {
+    let bar = Bar::new(common, &scene.name, 0);
+    let (outcomes, failures) = matrix::measure(scene, device, plan, &mut |what| bar.say(what));
+    drop(bar);
+    for failure in &failures {
+        let builder = failure.builder.as_deref().unwrap_or(&failure.scene);
+        eprintln!("hedgerow: {builder}: {}", failure.what);
+    }
+    for outcome in &outcomes {
+        for fault in &outcome.faults {
+            eprintln!("hedgerow: {} is wrong: {fault}", outcome.record.builder);
+        }
+    }
+    let all_right = failures.is_empty() && outcomes.iter().all(|o| o.faults.is_empty());
+    (outcomes, all_right)
+}
+
+/// Ends a command: messages of the validation layers and figures that are wrong are errors.
+///
+/// # Errors
+/// One of both.
+pub fn finish(device: Option<&Device>, all_right: bool) -> anyhow::Result<()> {
+    if let Some(device) = device {
+        device.validation_messages()?;
+    }
+    if !all_right {
+        bail!("not everything went well, see above");
+    }
+    Ok(())
+}
