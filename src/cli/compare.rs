@@ -6,7 +6,8 @@ use crate::report::names::short;
 use crate::report::numbers::{duration, three_digits};
 use crate::report::results;
 use crate::report::summary::geometric_mean;
-use comfy_table::{CellAlignment, Table, presets::UTF8_HORIZONTAL_ONLY};
+use crate::report::table::STYLE;
+use comfy_table::{CellAlignment, Table};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -61,7 +62,7 @@ fn table(pairs: &[Comparison]) -> Table {
         }
     }
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY);
+    table.load_style(STYLE);
     table.set_header(
         ["scene", "builder", "build old", "new", "time ×", "SAH ×"].into_iter().chain(kinds.iter().copied()),
     );

@@ -302,7 +302,8 @@ impl<'a> Rounds<'_, 'a> {
 fn checksum(query: Query, hits: &[Hit]) -> f64 {
     let hits = hits.iter().filter(|hit| hit.is_some());
     match query {
-        Query::ClosestHit => hits.map(|hit| f64::from(hit.t)).sum(),
+        // From +0: the sum of no floats is −0.
+        Query::ClosestHit => hits.fold(0.0, |sum, hit| sum + f64::from(hit.t)),
         Query::AnyHit => hits.count() as f64,
     }
 }

@@ -3,12 +3,18 @@
 use super::names::short;
 use super::numbers::{duration, grouped, three_digits};
 use crate::measure::record::Record;
-use comfy_table::{CellAlignment, Table, presets::UTF8_HORIZONTAL_ONLY};
+use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+
+/// Lines above, below and under the heading: a hundred rows stay readable.
+pub const STYLE: TableStyle = TableStyle::new()
+    .top_border(LineStyle::none().fill('─').junction('─'))
+    .header_separator(LineStyle::none().fill('─').junction('─'))
+    .bottom_border(LineStyle::none().fill('─').junction('─'));
 
 /// One row a record, in the order given.
 pub fn table(records: &[&Record]) -> Table {
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY);
+    table.load_style(STYLE);
     table.set_header([
         "scene",
         "triangles",
