@@ -18,8 +18,12 @@ CARGO := scripts/cargo.sh
 BIN := $(or $(CARGO_TARGET_DIR),target)/release/hedgerow
 CACHE := $(or $(HEDGEROW_CACHE),$(HOME)/.cache/hedgerow)
 MESA := $(CACHE)/mesa26
+comma := ,
+EMBREE_BUILDERS := ,embree-low,embree-medium,embree-high
 # Embree is linked where it is installed (scripts/setup.sh --peers).
-PEERS := peer-obvhs$(shell PATH="$$PATH:/sbin" ldconfig -p 2>/dev/null | grep -q 'libembree3\.so ' && echo ,peer-embree)
+EMBREE := $(shell PATH="$$PATH:/sbin" ldconfig -p 2>/dev/null | grep -q 'libembree3\.so ' && echo yes)
+PEERS := peer-obvhs$(if $(EMBREE),$(comma)peer-embree)
+PEER_BUILDERS ?= lbvh,lbvh:collapse=off,driver-fast-build,driver-fast-trace,obvhs-fastest,obvhs-medium$(if $(EMBREE),$(EMBREE_BUILDERS))
 # Seconds for the whole suite; compiling does not count.
 TEST_BOUND ?= 1200
 WITHIN := $(if $(shell command -v timeout),timeout --kill-after 10 $(TEST_BOUND))
@@ -34,13 +38,13 @@ bench: setup
 bench-all: setup
 	@test -d "$(SCENES)" || { echo "make bench-all: SCENES=DIR (or HEDGEROW_SCENES) names the folder of scenes" >&2; exit 2; }
 	$(CARGO) build --release
-	$(BIN) bench --scenes-dir "$(SCENES)" $$(scripts/scenes.sh "$(SCENES)") -o $(OUT) $(BENCH)
+	$(BIN) bench --all --scenes-dir "$(SCENES)" -o $(OUT) $(BENCH)
 
 bench-peers: setup
 	scripts/peer-lavapipe.sh $(MESA)
 	$(CARGO) build --release --features $(PEERS)
-	scripts/with-lavapipe.sh $(MESA) $(BIN) bench $(if $(SCENES),--scenes-dir "$(SCENES)" $$(scripts/scenes.sh "$(SCENES)")) \
-		-b all -o $(OUT) $(BENCH)
+	scripts/with-lavapipe.sh $(MESA) $(BIN) bench $(if $(SCENES),--all --scenes-dir "$(SCENES)") -b $(PEER_BUILDERS) \
+		-o $(OUT) $(BENCH)
 
 test: setup
 	$(CARGO) test --release --features peer-obvhs --no-run

@@ -30,3 +30,8 @@ pub mod trace;
 
 pub use ash;
 pub use error::{Error, Result};
+
+/// The README's code compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
