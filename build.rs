@@ -36,7 +36,23 @@ fn main() {
     )
     .expect("writing to a string");
     fs::write(out.join("shaders.rs"), table).expect("OUT_DIR can be written");
+    compile_example(&out);
 }
+
+/// The shader of the example engine, which takes the library's header as anybody's would. Examples need the compiler.
+#[cfg(feature = "compile-shaders")]
+fn compile_example(out: &Path) {
+    let source = Path::new("examples/engine.comp");
+    println!("cargo:rerun-if-changed={}", source.display());
+    // Not there in a package without its examples.
+    if source.exists() {
+        let spirv = compile(source, shaderc::OptimizationLevel::Performance);
+        fs::write(out.join("example_engine.spv"), spirv).expect("OUT_DIR can be written");
+    }
+}
+
+#[cfg(not(feature = "compile-shaders"))]
+fn compile_example(_out: &Path) {}
 
 fn collect(folder: &Path, sources: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("glsl/ is part of the package") {

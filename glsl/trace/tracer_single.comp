@@ -10,13 +10,15 @@
 #version 460
 // Before the includes: the stack's arrays have the workgroup's size.
 layout(local_size_x_id = 0) in;
+layout(constant_id = 1) const bool ANY_HIT = false;
+layout(constant_id = 2) const bool COUNT_WORK = false;
+layout(constant_id = 3) const uint SHARED_LEVELS = 0;
+#define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
+
 #include "trace/buffers.glsl"
 #include "trace/slab.glsl"
 #include "trace/stack.glsl"
 #include "trace/triangle.glsl"
-
-layout(constant_id = 1) const bool ANY_HIT = false;
-layout(constant_id = 2) const bool COUNT_WORK = false;
 
 // In place of a leaf's count: nothing at hand, take what waits.
 const uint NOTHING = 0xffffffffu;
@@ -46,7 +48,7 @@ void main() {
             float enter_b = hedgerow_enter(ray, b.lo, b.hi, best, enters_b);
             bool b_first = enters_b && (!enters_a || enter_b < enter_a);
             if (enters_a && enters_b) {
-                put(level, b_first ? Waiting(a.index, a.count, enter_a) : Waiting(b.index, b.count, enter_b));
+                hedgerow_put(level, b_first ? HedgerowWaiting(a.index, a.count, enter_a) : HedgerowWaiting(b.index, b.count, enter_b));
                 level++;
             }
             index = b_first ? b.index : a.index;
@@ -55,7 +57,7 @@ void main() {
                 left = NOTHING;
                 if (level > 0u) {
                     level--;
-                    Waiting waiting = taken(level);
+                    HedgerowWaiting waiting = hedgerow_taken(level);
                     index = waiting.index;
                     // Equally far is not too far: an equally near hit with a lower index may be there.
                     left = waiting.enter <= best ? waiting.count : NOTHING;
@@ -85,7 +87,7 @@ void main() {
             going = level > 0u;
             if (going) {
                 level--;
-                Waiting waiting = taken(level);
+                HedgerowWaiting waiting = hedgerow_taken(level);
                 index = waiting.index;
                 left = waiting.enter <= best ? waiting.count : NOTHING;
             }

@@ -1,0 +1,321 @@
+//! A small engine that links hedgerow: instance, device, allocator, memory, command buffer and shader are all its own.
+//!
+//! It asks the library what a device must have, makes a device with exactly that, records the build of a structure and the
+//! dispatch of its own shader (`engine.comp`, which includes `glsl/trace/query.glsl`) into one command buffer, submits that
+//! once, and writes what the shader drew.
+//!
+//! ```text
+//! cargo run --release --example engine --no-default-features --features compile-shaders -- picture.png
+//! ```
+
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
+use hedgerow::ash::{self, vk};
+use hedgerow::bvh::lbvh::{Input, Lbvh, Options};
+use hedgerow::gpu::{Context, ContextDesc, Recorder, Requirements, requirements};
+use std::error::Error;
+use std::path::Path;
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+pub const WIDTH: u32 = 320;
+pub const HEIGHT: u32 = 240;
+pub const EYE: [f32; 3] = [3.0, 3.5, 5.5];
+pub const LAMP: [f32; 3] = [-4.0, 7.0, 3.0];
+const WORKGROUP: u32 = 64;
+static SHADER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/example_engine.spv"));
+
+/// The push constants of `engine.comp`.
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Push {
+    scene: u64,
+    positions: u64,
+    triangles: u64,
+    picture: u64,
+    size: [u32; 2],
+    eye: [f32; 3],
+    lamp: [f32; 3],
+}
+
+#[allow(dead_code, reason = "the test that includes this file calls draw")]
+fn main() -> Result<()> {
+    let path = std::env::args().nth(1).unwrap_or_else(|| "engine.png".into());
+    draw(path.as_ref())?;
+    println!("{path}");
+    Ok(())
+}
+
+/// Draws a knot above a floor into a PNG of [`WIDTH`] × [`HEIGHT`] pixels.
+pub fn draw(path: &Path) -> Result<()> {
+    let mut engine = Engine::new()?;
+    let (positions, triangles) = knot_above_floor();
+    let pixels = engine.render(&positions, &triangles)?;
+    let image = image::RgbaImage::from_raw(WIDTH, HEIGHT, pixels).ok_or("the picture has another size")?;
+    Ok(image.save(path)?)
+}
+
+/// What every engine has anyway.
+struct Engine {
+    // Dropped first: it returns its memory to the device.
+    allocator: Option<Allocator>,
+    device: ash::Device,
+    physical: vk::PhysicalDevice,
+    instance: ash::Instance,
+    queue_family: u32,
+    _entry: ash::Entry,
+}
+
+impl Engine {
+    fn new() -> Result<Engine> {
+        // SAFETY: as every Vulkan program: the loader is loaded, and each handle is used while what it came from lives.
+        unsafe {
+            let entry = ash::Entry::load()?;
+            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_2);
+            let info = vk::InstanceCreateInfo::default().application_info(&application);
+            let instance = entry.create_instance(&info, None)?;
+            let (physical, needs) = pick(&instance)?;
+
+            // The device has what the library requires, and nothing more.
+            let Requirements { queue_family, extensions, mut features, .. } = needs;
+            let queue =
+                [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
+            let extensions: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
+            let info = vk::DeviceCreateInfo::default().queue_create_infos(&queue).enabled_extension_names(&extensions);
+            let device = instance.create_device(physical, &features.push_into(info), None)?;
+            let allocator = Allocator::new(&AllocatorCreateDesc {
+                instance: instance.clone(),
+                device: device.clone(),
+                physical_device: physical,
+                debug_settings: Default::default(),
+                buffer_device_address: true,
+                allocation_sizes: Default::default(),
+            })?;
+            Ok(Engine { allocator: Some(allocator), device, physical, instance, queue_family, _entry: entry })
+        }
+    }
+
+    fn render(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<Vec<u8>> {
+        let desc = ContextDesc {
+            instance: &self.instance,
+            physical_device: self.physical,
+            device: &self.device,
+            pipeline_cache: vk::PipelineCache::null(),
+            debug_utils: None,
+        };
+        // SAFETY: the device was made from these with what `requirements` returned, and outlives the context.
+        let context = unsafe { Context::new(&desc) }?;
+
+        // 1. How much memory does the build need? The engine brings it.
+        let builder = Lbvh::new(&context, &Options::DEFAULT, triangles.len() as u32)?;
+        let sizes = builder.sizes();
+        let mut position_buffer = self.buffer("positions", size_of_val(positions) as u64)?;
+        let mut triangle_buffer = self.buffer("triangles", size_of_val(triangles) as u64)?;
+        let structure = self.buffer("structure", sizes.structure)?;
+        let scratch = self.buffer("scratch", sizes.scratch)?;
+        let picture = self.buffer("picture", u64::from(4 * WIDTH * HEIGHT))?;
+        position_buffer.write(bytemuck::cast_slice(positions))?;
+        triangle_buffer.write(bytemuck::cast_slice(triangles))?;
+
+        let input = Input {
+            positions: position_buffer.address,
+            vertex_count: positions.len() as u32,
+            vertex_stride: 3,
+            indices: triangle_buffer.address,
+            primitive_count: triangles.len() as u32,
+        };
+        let push = Push {
+            scene: structure.address,
+            positions: position_buffer.address,
+            triangles: triangle_buffer.address,
+            picture: picture.address,
+            size: [WIDTH, HEIGHT],
+            eye: EYE,
+            lamp: LAMP,
+        };
+        let pipeline = self.pipeline(size_of::<Push>() as u32)?;
+        self.submit(|device, commands| {
+            // 2. The library records the build, the engine what it does with it.
+            // SAFETY: the command buffer records, on a queue of the family that `requirements` named.
+            let mut recorder = unsafe { Recorder::new(&context, commands) };
+            builder.record(&mut recorder, &input, structure.address, scratch.address)?;
+            recorder.barrier();
+            drop(recorder);
+            // SAFETY: pipeline, layout and buffers live until the queue has finished.
+            unsafe {
+                device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.pipeline);
+                let stage = vk::ShaderStageFlags::COMPUTE;
+                device.cmd_push_constants(commands, pipeline.layout, stage, 0, bytemuck::bytes_of(&push));
+                device.cmd_dispatch(commands, (WIDTH * HEIGHT).div_ceil(WORKGROUP), 1, 1);
+            }
+            Ok(())
+        })?;
+        let pixels = picture.bytes()?.to_vec();
+
+        // SAFETY: the queue has finished; nothing uses these any more.
+        unsafe {
+            self.device.destroy_pipeline(pipeline.pipeline, None);
+            self.device.destroy_pipeline_layout(pipeline.layout, None);
+        }
+        for buffer in [position_buffer, triangle_buffer, structure, scratch, picture] {
+            // SAFETY: as above.
+            unsafe { self.device.destroy_buffer(buffer.raw, None) };
+            self.allocator.as_mut().ok_or("the allocator is gone")?.free(buffer.allocation)?;
+        }
+        Ok(pixels)
+    }
+
+    /// Memory that the host maps and shaders reach by its address.
+    fn buffer(&mut self, name: &str, bytes: u64) -> Result<Buffer> {
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+        // SAFETY: the device lives; the buffer is bound before it is used.
+        unsafe {
+            let raw = self.device.create_buffer(&vk::BufferCreateInfo::default().size(bytes).usage(usage), None)?;
+            let allocation =
+                self.allocator.as_mut().ok_or("the allocator is gone")?.allocate(&AllocationCreateDesc {
+                    name,
+                    requirements: self.device.get_buffer_memory_requirements(raw),
+                    location: MemoryLocation::CpuToGpu,
+                    linear: true,
+                    allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+                })?;
+            self.device.bind_buffer_memory(raw, allocation.memory(), allocation.offset())?;
+            let address = self.device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(raw));
+            Ok(Buffer { raw, allocation, address })
+        }
+    }
+
+    fn pipeline(&self, push_bytes: u32) -> Result<Pipeline> {
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(SHADER))?;
+        let range = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(push_bytes)];
+        // SAFETY: the device lives; the module is needed until the pipeline is made.
+        unsafe {
+            let layout = self
+                .device
+                .create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&range), None)?;
+            let module = self.device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None)?;
+            let stage = vk::PipelineShaderStageCreateInfo::default()
+                .stage(vk::ShaderStageFlags::COMPUTE)
+                .module(module)
+                .name(c"main");
+            let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
+            let made = self.device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None);
+            self.device.destroy_shader_module(module, None);
+            let pipeline = made.map_err(|(_, error)| error)?[0];
+            Ok(Pipeline { pipeline, layout })
+        }
+    }
+
+    /// Records, submits and waits.
+    fn submit(&self, record: impl FnOnce(&ash::Device, vk::CommandBuffer) -> Result<()>) -> Result<()> {
+        let device = &self.device;
+        // SAFETY: pool and fence are made here and destroyed when the queue has finished.
+        unsafe {
+            let pool_info = vk::CommandPoolCreateInfo::default().queue_family_index(self.queue_family);
+            let pool = device.create_command_pool(&pool_info, None)?;
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+            let commands = device.allocate_command_buffers(&info)?;
+            device.begin_command_buffer(commands[0], &vk::CommandBufferBeginInfo::default())?;
+            record(device, commands[0])?;
+            let to_host = [vk::MemoryBarrier::default()
+                .src_access_mask(vk::AccessFlags::SHADER_WRITE)
+                .dst_access_mask(vk::AccessFlags::HOST_READ)];
+            let (shader, host) = (vk::PipelineStageFlags::COMPUTE_SHADER, vk::PipelineStageFlags::HOST);
+            device.cmd_pipeline_barrier(commands[0], shader, host, vk::DependencyFlags::empty(), &to_host, &[], &[]);
+            device.end_command_buffer(commands[0])?;
+            let fence = device.create_fence(&vk::FenceCreateInfo::default(), None)?;
+            let queue = device.get_device_queue(self.queue_family, 0);
+            device.queue_submit(queue, &[vk::SubmitInfo::default().command_buffers(&commands)], fence)?;
+            device.wait_for_fences(&[fence], true, 60_000_000_000)?;
+            device.destroy_fence(fence, None);
+            device.destroy_command_pool(pool, None);
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        drop(self.allocator.take());
+        // SAFETY: everything made from them is gone.
+        unsafe {
+            self.device.destroy_device(None);
+            self.instance.destroy_instance(None);
+        }
+    }
+}
+
+struct Pipeline {
+    pipeline: vk::Pipeline,
+    layout: vk::PipelineLayout,
+}
+
+struct Buffer {
+    raw: vk::Buffer,
+    allocation: Allocation,
+    address: u64,
+}
+
+impl Buffer {
+    fn write(&mut self, bytes: &[u8]) -> Result<()> {
+        let mapped = self.allocation.mapped_slice_mut().ok_or("the memory is not mapped")?;
+        mapped[..bytes.len()].copy_from_slice(bytes);
+        Ok(())
+    }
+
+    fn bytes(&self) -> Result<&[u8]> {
+        let mapped = self.allocation.mapped_slice().ok_or("the memory is not mapped")?;
+        Ok(&mapped[..(4 * WIDTH * HEIGHT) as usize])
+    }
+}
+
+/// The first device that has what the library requires.
+fn pick(instance: &ash::Instance) -> Result<(vk::PhysicalDevice, Requirements)> {
+    // SAFETY: the instance lives.
+    let devices = unsafe { instance.enumerate_physical_devices() }?;
+    let mut lacking = Vec::new();
+    for physical in devices {
+        match requirements(instance, physical) {
+            Ok(needs) => return Ok((physical, needs)),
+            Err(error) => lacking.push(error.to_string()),
+        }
+    }
+    Err(format!("no device can be used: {}", lacking.join("; ")).into())
+}
+
+/// A torus knot of about 9,000 triangles above a square.
+pub fn knot_above_floor() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    const AROUND: u32 = 320;
+    const ACROSS: u32 = 14;
+    const TURN: f32 = std::f32::consts::TAU;
+    let centre = |s: f32| {
+        let ring = 1.2 + 0.5 * (3.0 * s).cos();
+        [ring * (2.0 * s).cos(), 0.6 * (3.0 * s).sin(), ring * (2.0 * s).sin()]
+    };
+    let mut positions = vec![[-8.0, -1.2, -8.0], [8.0, -1.2, -8.0], [8.0, -1.2, 8.0], [-8.0, -1.2, 8.0]];
+    let mut triangles = vec![[0, 1, 2], [0, 2, 3]];
+    for i in 0..AROUND {
+        let s = i as f32 / AROUND as f32 * TURN;
+        let [from, to] = [centre(s), centre(s + 0.01)];
+        let along = unit(std::array::from_fn(|k| to[k] - from[k]));
+        let side = unit(cross(along, [0.0, 1.0, 0.0]));
+        let up = cross(side, along);
+        for j in 0..ACROSS {
+            let (sin, cos) = (j as f32 / ACROSS as f32 * TURN).sin_cos();
+            positions.push(std::array::from_fn(|k| from[k] + 0.22 * (cos * side[k] + sin * up[k])));
+            let corner = |i: u32, j: u32| 4 + i % AROUND * ACROSS + j % ACROSS;
+            let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    (positions, triangles)
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn unit(a: [f32; 3]) -> [f32; 3] {
+    let length = a.iter().map(|x| x * x).sum::<f32>().sqrt();
+    a.map(|x| x / length)
+}

@@ -1,0 +1,69 @@
+//! The example engine draws its picture: a device with exactly the requirements, the engine's own memory and command buffer,
+//! and rays by the header that it includes.
+#![cfg(all(feature = "compile-shaders", feature = "cli"))]
+
+#[path = "../examples/engine.rs"]
+mod engine;
+
+use engine::{EYE, HEIGHT, LAMP, WIDTH};
+use glam::Vec3;
+use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::host::lbvh;
+use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::trace::{Hit, Ray, host};
+
+/// How bright the light of the lamp makes a pixel, and whether there is anything: engine.comp, with the host's tracer.
+fn light(tree: &Bvh2, corners: &dyn Fn(u32) -> [Vec3; 3], pixel: u32) -> Option<f32> {
+    let [x, y] =
+        [(pixel % WIDTH, WIDTH), (pixel / WIDTH, HEIGHT)].map(|(at, of)| (at as f32 + 0.5) / of as f32 * 2.0 - 1.0);
+    let (eye, lamp) = (Vec3::from(EYE), Vec3::from(LAMP));
+    let forward = (-eye).normalize();
+    let right = forward.cross(Vec3::Y).normalize();
+    let up = right.cross(forward);
+    let direction = forward + 0.4 * (x * right * WIDTH as f32 / HEIGHT as f32 - y * up);
+    let trace = |origin: Vec3, direction: Vec3, t_max: f32| -> Hit {
+        host::closest_hit(tree, &Ray { origin: origin.into(), t_min: 0.0, direction: direction.into(), t_max })
+    };
+    let hit = trace(eye, direction, 1e30);
+    hit.is_some().then(|| {
+        let [a, b, c] = corners(hit.primitive);
+        let normal = (b - a).cross(c - a).normalize();
+        let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
+        let point = eye + hit.t * direction + 1e-3 * normal;
+        let shadowed = trace(point, lamp - point, 1.0).is_some();
+        0.2 + if shadowed { 0.0 } else { 0.8 * normal.dot((lamp - point).normalize()).max(0.0) }
+    })
+}
+
+#[test]
+fn a_foreign_engine_draws_what_the_host_traces() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("engine.png");
+    engine::draw(&path).expect("the engine draws");
+    let picture = image::open(&path).expect("a picture").into_rgb8();
+    assert_eq!(picture.dimensions(), (WIDTH, HEIGHT));
+
+    let (positions, triangles) = engine::knot_above_floor();
+    let tree = lbvh::build(&positions, &triangles, Code::Mc63.full(), Collapse::OFF);
+    let corners = |triangle: u32| triangles[triangle as usize].map(|vertex| Vec3::from(positions[vertex as usize]));
+    let expected: Vec<Option<f32>> = (0..WIDTH * HEIGHT).map(|pixel| light(&tree, &corners, pixel)).collect();
+    let (lit, dark) = expected.iter().flatten().partition::<Vec<f32>, _>(|&&light| light > 0.2);
+    assert!(
+        lit.len() > 10_000 && dark.len() > 3_000,
+        "the picture shows {} lit and {} dark pixels",
+        lit.len(),
+        dark.len()
+    );
+
+    // Rays through the middle of an edge or along a shadow's border may differ by the last bit of their direction.
+    let differs = |(pixel, light): (usize, &Option<f32>)| {
+        let [red, _, blue] = picture.get_pixel(pixel as u32 % WIDTH, pixel as u32 / WIDTH).0.map(f32::from);
+        match light {
+            None => red >= blue,
+            Some(light) => (red - 255.0 * (0.9 * light).sqrt()).abs() > 2.0,
+        }
+    };
+    let different = expected.iter().enumerate().filter(|&at| differs(at)).count();
+    assert!(different <= 40, "{different} of {} pixels differ", expected.len());
+}
