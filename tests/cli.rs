@@ -112,6 +112,30 @@ fn build_prints_quality_and_writes_the_tree() {
 }
 
 #[test]
+fn the_device_builds_the_tree_and_traces_the_picture_of_the_host() {
+    let folder = Folder::new();
+    let written = |builder: &str| {
+        let path = |name: &str| folder.path().join(format!("{builder}{name}")).display().to_string();
+        done(&["build", "gen:stadium:3", "-b", builder, "--runs", "1", "-o", &path(".tree")]);
+        done(&["render", "gen:stadium:3", "-b", builder, "--size", "32x24", "-o", &path(".png")]);
+        [".tree", ".png"].map(|name| std::fs::read(path(name)).expect("written"))
+    };
+    assert!(written("lbvh") == written("lbvh-host"), "the same bytes");
+}
+
+#[test]
+fn the_validation_layers_are_silent() {
+    let output =
+        hedgerow(&["trace", "gen:icosphere:3", "-b", "lbvh", "--size", "16x16", "--runs", "1", "--validation"]);
+    let (out, err) = texts(&output);
+    if err.contains("validation layers are not installed") {
+        eprintln!("skipped: {err}");
+        return;
+    }
+    assert_eq!((output.status.code(), err.as_str()), (Some(DONE), ""), "{out}");
+}
+
+#[test]
 fn trace_measures_the_kinds_that_are_asked_for() {
     let arguments = ["trace", "gen:icosphere:3", "-b", "lbvh-host", "--size", "32x24", "--runs", "1"];
     let text = done(&[&arguments[..], &["--rays", "random,primary"]].concat());

@@ -23,9 +23,18 @@ pub(super) fn open<'a>(path: &Path, options: &LoadOptions<'a>) -> Result<Box<dyn
 
 /// The whole file, unpacked.
 pub(super) fn bytes(path: &Path, options: &LoadOptions<'_>) -> Result<Vec<u8>> {
+    let mut reader = open(path, options)?;
     let mut bytes = Vec::new();
-    open(path, options)?.read_to_end(&mut bytes).map_err(|e| read_error(path, e))?;
-    Ok(bytes)
+    // Not `read_to_end`: that begins with reads of a few bytes, each of which would be progress.
+    loop {
+        let buffered = reader.fill_buf().map_err(|e| read_error(path, e))?;
+        if buffered.is_empty() {
+            return Ok(bytes);
+        }
+        bytes.extend_from_slice(buffered);
+        let taken = buffered.len();
+        reader.consume(taken);
+    }
 }
 
 /// What a failed read means for the file.
