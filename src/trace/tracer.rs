@@ -22,7 +22,7 @@ pub struct Shape {
     /// Invocations a workgroup.
     pub workgroup: u32,
     /// How many entries of each ray's stack lie in shared memory; the others are private. At most
-    /// [`MAX_DEPTH`](crate::bvh::layout::MAX_DEPTH).
+    /// [`MAX_DEPTH`].
     pub shared_levels: u32,
 }
 
