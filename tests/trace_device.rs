@@ -17,8 +17,8 @@ fn shapes() -> Vec<Shape> {
         Shape::of(limits),
         Shape::subgroups(limits),
         Shape::groups(limits),
-        Shape { workgroup: limits.subgroup_size, shared_levels: 0 },
-        Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3 },
+        Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1 },
+        Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5 },
     ]
 }
 

@@ -15,5 +15,6 @@ layout(push_constant, scalar) uniform Arguments {
     Works works;
     uint first;
     uint count;
+    uint rays_each;
 };
 #endif

@@ -24,6 +24,8 @@ pub struct Shape {
     /// How many entries of each ray's stack lie in shared memory; the others are private. At most
     /// [`MAX_DEPTH`].
     pub shared_levels: u32,
+    /// Rays that an invocation traces one after the other, at most.
+    pub rays_each: u32,
 }
 
 impl Shape {
@@ -33,14 +35,15 @@ impl Shape {
     }
 
     /// For CPUs: workgroups of one subgroup, so that none waits for another, and the whole stack in shared memory, which is
-    /// memory like any other but laid out in columns.
+    /// memory like any other but laid out in columns. An invocation takes ray after ray, so that it need not wait for the
+    /// longest of its subgroup.
     pub fn subgroups(limits: &Limits) -> Shape {
-        Shape { workgroup: limits.subgroup_size, shared_levels: MAX_DEPTH }.within(limits)
+        Shape { workgroup: limits.subgroup_size, shared_levels: MAX_DEPTH, rays_each: 128 }.within(limits)
     }
 
     /// For GPUs: larger workgroups, and the few levels in shared memory that most rays stay in.
     pub fn groups(limits: &Limits) -> Shape {
-        Shape { workgroup: limits.subgroup_size.max(64), shared_levels: 8 }.within(limits)
+        Shape { workgroup: limits.subgroup_size.max(64), shared_levels: 8, rays_each: 1 }.within(limits)
     }
 
     fn within(self, limits: &Limits) -> Shape {
@@ -48,10 +51,12 @@ impl Shape {
         let level_bytes = LEVEL_BYTES * workgroup;
         // One word more of each of the three arrays: they must not be empty.
         let room = limits.shared_memory.saturating_sub(LEVEL_BYTES) / level_bytes;
-        Shape { workgroup, shared_levels: self.shared_levels.min(room) }
+        Shape { workgroup, shared_levels: self.shared_levels.min(room), ..self }
     }
 }
 
+/// Workgroups that are worth more than rays that follow each other in one.
+const LEAST_WORKGROUPS: u32 = 64;
 /// Shared memory an entry of a stack: node or first triangle, count, distance.
 const LEVEL_BYTES: u32 = 12;
 
@@ -85,6 +90,10 @@ push_constants! {
         pub first: u32,
         /// Rays in all.
         pub count: u32,
+        /// Rays of an invocation, at most.
+        pub rays_each: u32,
+        /// Zero.
+        pub padding: u32,
     }
 }
 
@@ -109,11 +118,15 @@ pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, query: Query, buffers:
         )));
     }
     let kernel = kernel(shape, query, work.is_some());
-    let at_once = recorder.context().limits.workgroup_count.saturating_mul(shape.workgroup);
+    // Enough workgroups that all cores have some to the end.
+    let rays_each = (count / (shape.workgroup * LEAST_WORKGROUPS)).clamp(1, shape.rays_each);
+    let group_rays = shape.workgroup * rays_each;
+    let at_once = recorder.context().limits.workgroup_count.saturating_mul(group_rays);
     let mut first = 0;
     while first < count {
-        let arguments = Arguments { structure, rays, hits, works: work.unwrap_or(0), first, count };
-        recorder.dispatch(&kernel, &arguments, (count - first).min(at_once).div_ceil(shape.workgroup))?;
+        let arguments =
+            Arguments { structure, rays, hits, works: work.unwrap_or(0), first, count, rays_each, padding: 0 };
+        recorder.dispatch(&kernel, &arguments, (count - first).min(at_once).div_ceil(group_rays))?;
         first += at_once.min(count - first);
     }
     Ok(())
