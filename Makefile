@@ -4,6 +4,7 @@
 #   make bench-all     every scene of the folder SCENES (or HEDGEROW_SCENES)
 #   make bench-peers   the same on Mesa 26, whose ray queries are a peer, beside CPU crates
 #   make test          the test suite, under a bound in time: a shader that hangs would hang with it
+#   make test-lanes    the suite on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
 #   make check         formatting, lints and docs, warnings denied
 #   make prebuilt      compiles glsl/ into glsl/prebuilt/, for builds without the feature compile-shaders
 #
@@ -20,46 +21,51 @@ CACHE := $(or $(HEDGEROW_CACHE),$(HOME)/.cache/hedgerow)
 MESA := $(CACHE)/mesa26
 comma := ,
 EMBREE_BUILDERS := ,embree-low,embree-medium,embree-high
-# Embree is linked where it is installed (scripts/setup.sh --peers).
+# The CPU peers that can be built here: Embree where it is installed (scripts/setup.sh --peers). The same features
+# everywhere, so that nothing is compiled twice.
 EMBREE := $(shell PATH="$$PATH:/sbin" ldconfig -p 2>/dev/null | grep -q 'libembree3\.so ' && echo yes)
-PEERS := peer-obvhs$(if $(EMBREE),$(comma)peer-embree)
+FEATURES := peer-obvhs$(if $(EMBREE),$(comma)peer-embree)
 PEER_BUILDERS ?= lbvh,lbvh:collapse=off,driver-fast-build,driver-fast-trace,obvhs-fastest,obvhs-medium$(if $(EMBREE),$(EMBREE_BUILDERS))
 # Seconds for the whole suite; compiling does not count.
 TEST_BOUND ?= 1200
 WITHIN := $(if $(shell command -v timeout),timeout --kill-after 10 $(TEST_BOUND))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
+SUITE := $(WITHIN) $(CARGO) $(if $(NEXTEST),nextest run,test) --release --features $(FEATURES)
 
-.PHONY: bench bench-all bench-peers test check prebuilt setup
+.PHONY: bench bench-all bench-peers test test-lanes check prebuilt setup
 
 bench: setup
-	$(CARGO) build --release
+	$(CARGO) build --release --features $(FEATURES)
 	$(BIN) bench -o $(OUT) $(BENCH)
 
 bench-all: setup
 	@test -d "$(SCENES)" || { echo "make bench-all: SCENES=DIR (or HEDGEROW_SCENES) names the folder of scenes" >&2; exit 2; }
-	$(CARGO) build --release
+	$(CARGO) build --release --features $(FEATURES)
 	$(BIN) bench --all --scenes-dir "$(SCENES)" -o $(OUT) $(BENCH)
 
 bench-peers: setup
 	scripts/peer-lavapipe.sh $(MESA)
-	$(CARGO) build --release --features $(PEERS)
+	$(CARGO) build --release --features $(FEATURES)
 	scripts/with-lavapipe.sh $(MESA) $(BIN) bench $(if $(SCENES),--all --scenes-dir "$(SCENES)") -b $(PEER_BUILDERS) \
 		-o $(OUT) $(BENCH)
 
 test: setup
-	$(CARGO) test --release --features peer-obvhs --no-run
-ifeq ($(NEXTEST),yes)
-	$(WITHIN) $(CARGO) nextest run --release --features peer-obvhs
-	$(WITHIN) $(CARGO) test --release --features peer-obvhs --doc
-else
-	$(WITHIN) $(CARGO) test --release --features peer-obvhs
-endif
+	$(CARGO) test --release --features $(FEATURES) --no-run
+	$(SUITE)
+	$(if $(NEXTEST),$(WITHIN) $(CARGO) test --release --features $(FEATURES) --doc)
+
+# lavapipe alone reads these variables; subgroups of 8 and two workgroups at a time are what `make test` has on most machines.
+test-lanes: setup
+	$(CARGO) test --release --features $(FEATURES) --no-run
+	LP_NATIVE_VECTOR_WIDTH=128 $(SUITE)
+	LP_NATIVE_VECTOR_WIDTH=512 $(SUITE)
+	LP_NUM_THREADS=1 $(SUITE)
 
 check: setup
 	cargo fmt --check
-	$(CARGO) clippy --release --all-targets --features peer-obvhs -- -D warnings
+	$(CARGO) clippy --release --all-targets --features $(FEATURES) -- -D warnings
 	$(CARGO) clippy --release --no-default-features --lib -- -D warnings
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --features peer-obvhs
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --features $(FEATURES)
 
 prebuilt: setup
 	HEDGEROW_UPDATE_PREBUILT=1 $(CARGO) test --release --test prebuilt
