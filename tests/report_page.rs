@@ -129,6 +129,7 @@ fn report(folder: &Path) -> Report {
             builder: Some("driver-fast-trace".into()),
             what: "hair needs 3 GiB of device memory, 2 GiB are there".into(),
         }],
+        baseline: Some("driver-fast-build".into()),
         notes: Vec::new(),
         pictures,
     }

@@ -41,7 +41,7 @@ pub struct Arguments {
     #[arg(long, value_name = "KIND[,KIND…]", default_value = "all")]
     rays: Kinds,
     /// Pixels of the picture that the rays belong to
-    #[arg(long, value_name = "WxH", default_value = "320x240")]
+    #[arg(long, value_name = "WxH", default_value = "256x192")]
     size: Size,
     /// Counted runs of every build and trace, after one that warms up
     #[arg(long, value_name = "N", default_value = "5")]
@@ -63,8 +63,9 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     // Before any work: a folder that cannot be written would lose all of it.
     let results = Results::create(&arguments.output)?;
     let device = open(common, &asked)?;
+    let no_peer = device.as_ref().and_then(|device| driver::note(device.found()));
     let mut notes = Vec::new();
-    let builders = possible(asked, arguments, device.as_ref(), &mut notes)?;
+    let builders = possible(asked, arguments, device.as_ref(), no_peer.as_deref(), &mut notes)?;
     let plan = Plan {
         builders,
         runs: arguments.runs.get(),
@@ -76,6 +77,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let mut bench =
         Bench { common, arguments, device: device.as_ref(), plan, results, report: empty(device.as_ref(), notes)? };
     bench.report.options = options(common, arguments);
+    bench.report.baseline = no_peer.is_none().then(|| "driver-fast-build".into());
     for scene in &scenes {
         bench.scene(scene)?;
     }
@@ -140,15 +142,15 @@ fn possible(
     asked: Vec<Spec>,
     arguments: &Arguments,
     device: Option<&Device>,
+    no_peer: Option<&str>,
     notes: &mut Vec<String>,
 ) -> anyhow::Result<Vec<Spec>> {
     let by_default = arguments.builder == DEFAULT_BUILDERS;
     let was_named =
         |spec: &Spec| !by_default && arguments.builder.split(',').any(|part| part.trim() == spec.to_string());
     let is_driver = |spec: &Spec| spec.builder().needs == Needs::RayQuery;
-    let no_peer = device.and_then(|device| driver::note(device.found()));
     if asked.iter().any(is_driver) {
-        notes.extend(no_peer.clone());
+        notes.extend(no_peer.map(str::to_owned));
         if device.is_some_and(|device| !device.has_ray_query()) {
             notes.push(
                 "The driver has no acceleration structures of its own (VK_KHR_ray_query) to compare with.".into(),
@@ -197,6 +199,7 @@ fn empty(device: Option<&Device>, notes: Vec<String>) -> crate::Result<Report> {
         options: Vec::new(),
         outcomes: Vec::new(),
         failures: Vec::new(),
+        baseline: None,
         notes,
         pictures: Vec::new(),
     })

@@ -165,6 +165,7 @@ impl Overlay {
 
     /// A coloured rectangle.
     pub fn band(&mut self, Rect { x, y, w, h }: Rect, tone: Tone) {
+        let w = w.max(1.0);
         let fill = theme::hex(tone.light);
         let _ = writeln!(
             self.svg,
@@ -174,6 +175,8 @@ impl Overlay {
 
     /// An invisible rectangle that shows `text` when pointed at.
     pub fn tip(&mut self, Rect { x, y, w, h }: Rect, text: &str) {
+        // A phase of no time has no width, and SVG draws no such rectangle.
+        let w = w.max(1.0);
         let _ = writeln!(
             self.svg,
             "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" opacity=\"0\"><title>{}</title></rect>",

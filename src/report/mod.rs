@@ -43,6 +43,8 @@ pub struct Report {
     pub outcomes: Vec<Outcome>,
     /// What could not be measured.
     pub failures: Vec<Failure>,
+    /// The builder that the others are compared with; the first one without.
+    pub baseline: Option<String>,
     /// What a reader must know to judge the figures, such as a peer that is none.
     pub notes: Vec<String>,
     /// Pictures of the scenes, in files below the folder.

@@ -131,7 +131,7 @@ fn builder_name(builder: &str, record: Option<&Record>, legend: &Legend) -> Mark
 }
 
 fn summary_section(report: &Report, records: &[&Record], legend: &Legend) -> Markup {
-    let Some(baseline) = summary::baseline(legend) else {
+    let Some(baseline) = summary::baseline(legend, report.baseline.as_deref()) else {
         return html! { section #summary { h2 { "Summary" } p { "Nothing could be measured." } } };
     };
     let sah_baseline = summary::sah_baseline(records, baseline);
@@ -328,18 +328,29 @@ fn ray_cell(trace: Option<&Trace>) -> Markup {
     }
 }
 
-/// What the builders chose where they were left the choice.
+/// What the builders chose where they were left the choice; builders that chose the same stand together.
 fn choices(outcomes: &[&Outcome], legend: &Legend) -> Markup {
-    let chosen: Vec<_> = outcomes.iter().filter_map(|o| Some((&o.record, o.choice.as_ref()?))).collect();
+    let mut chosen: Vec<(&str, Vec<&Record>)> = Vec::new();
+    for outcome in outcomes {
+        let Some(choice) = outcome.choice.as_deref() else { continue };
+        match chosen.iter_mut().find(|(known, _)| *known == choice) {
+            Some((_, records)) => records.push(&outcome.record),
+            None => chosen.push((choice, vec![&outcome.record])),
+        }
+    }
     html! {
         @if !chosen.is_empty() {
-            p.choices {
-                "Chosen for this scene and device: "
-                @for (i, (record, choice)) in chosen.iter().enumerate() {
-                    @if i > 0 { "; " }
-                    (builder_name(&record.builder, Some(record), legend)) " " code { (choice) }
+            h3 { "Chosen for this scene and device" }
+            ul.choices {
+                @for (choice, records) in chosen {
+                    li {
+                        code { (choice) } " by "
+                        @for (i, record) in records.iter().enumerate() {
+                            @if i > 0 { ", " }
+                            (builder_name(&record.builder, Some(record), legend))
+                        }
+                    }
                 }
-                "."
             }
         }
     }

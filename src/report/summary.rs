@@ -18,10 +18,10 @@ pub struct Standing {
     pub sah: Option<f64>,
 }
 
-/// What every builder is compared with: the driver's fast build where it was measured, otherwise the first builder.
-pub fn baseline(legend: &Legend) -> Option<&str> {
+/// What every builder is compared with: the `wanted` one where it was measured, otherwise the first.
+pub fn baseline<'a>(legend: &'a Legend, wanted: Option<&str>) -> Option<&'a str> {
     let builders = legend.builders();
-    builders.iter().find(|b| *b == "driver-fast-build").or(builders.first()).map(String::as_str)
+    builders.iter().find(|b| Some(b.as_str()) == wanted).or(builders.first()).map(String::as_str)
 }
 
 /// What SAH costs are compared with: the baseline, or the first builder that tells its cost where the baseline does not.
