@@ -1,7 +1,7 @@
 //! What the commands that build have in common: the device that the builders need, and figures of several in turn.
 
 use super::{Bar, Common};
-use crate::gpu::Device;
+use crate::gpu::{Device, probe};
 use crate::measure::builders::{Needs, Spec};
 use crate::measure::matrix::{self, Outcome, Plan};
 use crate::scene::Scene;
@@ -24,7 +24,27 @@ pub fn device_for(common: &Common, builders: &[Spec]) -> anyhow::Result<Option<D
             device.found().name
         );
     }
+    check_driver(&device, builders)?;
     Ok(Some(device))
+}
+
+/// Asks the driver what no property tells: a driver that fails here would give wrong figures in silence.
+fn check_driver(device: &Device, builders: &[Spec]) -> anyhow::Result<()> {
+    let findings = probe::probe(device)?;
+    let found = device.found();
+    if !findings.long_loops {
+        bail!(
+            "{} ({}) ends long loops before their end and gives wrong results; install a newer driver (lavapipe of Mesa 25 \
+             or later: scripts/setup.sh) or choose another device",
+            found.name,
+            found.driver
+        );
+    }
+    let persistent = builders.iter().find(|spec| spec.option("schedule") == Some("persistent"));
+    if let (false, Some(spec)) = (findings.task_pool, persistent) {
+        bail!("{spec}: on {} workgroups that wait for each other do not finish; take schedule=chain", found.name);
+    }
+    Ok(())
 }
 
 /// Measures `plan` on `scene`: the outcomes, and whether all went well. Failures go to stderr.
