@@ -1,13 +1,16 @@
 //! A chart: drawn once by plotters, then labelled; as a file of its own, as a picture, and inside the page.
 
 use super::labels::{self, Rect};
+use super::numbers::log_ticks;
 use super::raster::rasterise;
 use super::theme::{self, BEST, GRID, INK, MUTED, PAPER, Tone};
 use crate::{Error, Result};
 use plotters::coord::Shift;
+use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::prelude::*;
 use std::fmt::Write as _;
+use std::ops::Range;
 
 /// Width and height of every chart in pixels, before scaling.
 pub const SIZE: (u32, u32) = (760, 460);
@@ -184,11 +187,12 @@ impl Overlay {
         );
     }
 
-    /// Labels the points of a chart, each beside its anchor, without covering each other; `frame` is the plotting area.
-    pub fn label_points(&mut self, points: &[(f64, f64)], texts: &[(String, Tone)], frame: Rect) {
+    /// Labels the points of a chart, each beside its anchor, without covering each other nor, where there is room, `lines`;
+    /// `frame` is the plotting area.
+    pub fn label_points(&mut self, points: &[(f64, f64)], texts: &[(String, Tone)], lines: &[Rect], frame: Rect) {
         const HEIGHT: f64 = 16.0;
         let widths: Vec<f64> = texts.iter().map(|(t, _)| labels::text_width(t, LABEL_SIZE)).collect();
-        let places = labels::place(points, &widths, HEIGHT, &frame);
+        let places = labels::place(points, &widths, HEIGHT, lines, &frame);
         for ((&point, place), (text, tone)) in points.iter().zip(&places).zip(texts) {
             let near = place.nearest(point);
             if (near.0 - point.0).hypot(near.1 - point.1) > 14.0 {
@@ -220,6 +224,12 @@ impl Overlay {
 /// plotters' text size for a text of so many pixels: its SVG back end divides by 1.24.
 fn text(pixels: f64, tone: Tone) -> TextStyle<'static> {
     ("sans-serif", pixels * 1.24).into_font().color(&tone.light)
+}
+
+/// A logarithmic axis, with numbers at [`log_ticks`].
+pub fn log_axis(range: Range<f64>) -> WithKeyPoints<LogCoord<f64>> {
+    let ticks = log_ticks(range.start, range.end);
+    range.log_scale().with_key_points(ticks)
 }
 
 /// What the axes are called and how their numbers are written.

@@ -14,6 +14,16 @@ pub struct Rect {
 }
 
 impl Rect {
+    /// The smallest around two points.
+    pub fn around(a: (f64, f64), b: (f64, f64)) -> Rect {
+        Rect { x: a.0.min(b.0), y: a.1.min(b.1), w: (a.0 - b.0).abs(), h: (a.1 - b.1).abs() }
+    }
+
+    /// Larger by `margin` on every side.
+    pub fn grown(&self, margin: f64) -> Rect {
+        Rect { x: self.x - margin, y: self.y - margin, w: self.w + 2.0 * margin, h: self.h + 2.0 * margin }
+    }
+
     /// Area that both cover.
     fn overlap(&self, other: &Rect) -> f64 {
         let w = (self.x + self.w).min(other.x + other.w) - self.x.max(other.x);
@@ -37,22 +47,25 @@ pub fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(|c| if "iljtfr.,:;|' ".contains(c) { 0.34 } else { 0.6 }).sum::<f64>() * size
 }
 
-/// A place for a label of each width beside each anchor, inside `frame`, in the order given.
+/// A place for a label of each width beside each anchor, inside `frame`, in the order given; off `lines` where there is room.
 ///
 /// Each takes, of a ring of places around its anchor and wider rings behind, the first that covers least. Good enough for
 /// the dozen points of a chart; an exact answer is NP-hard and would look no better.
-pub fn place(anchors: &[(f64, f64)], widths: &[f64], height: f64, frame: &Rect) -> Vec<Rect> {
+pub fn place(anchors: &[(f64, f64)], widths: &[f64], height: f64, lines: &[Rect], frame: &Rect) -> Vec<Rect> {
     const MARK: f64 = 7.0;
+    /// How bad it is to cover a line, against a mark or a label.
+    const LINE: f64 = 0.1;
     let marks: Vec<Rect> =
         anchors.iter().map(|&(x, y)| Rect { x: x - MARK, y: y - MARK, w: 2.0 * MARK, h: 2.0 * MARK }).collect();
     let mut placed: Vec<Rect> = Vec::new();
     for (&anchor, &w) in anchors.iter().zip(widths) {
         let cost = |place: &Rect| {
             let covered: f64 = placed.iter().chain(&marks).map(|other| place.overlap(other)).sum();
+            let on_lines: f64 = lines.iter().map(|line| place.overlap(line)).sum();
             // Whole pixels: of places that cover nothing but rounding errors, the nearest is taken.
-            (covered + 4.0 * place.outside(frame)).floor()
+            (covered + LINE * on_lines + 4.0 * place.outside(frame)).round() as i64
         };
-        let best = candidates(anchor, w, height, MARK).min_by(|a, b| cost(a).total_cmp(&cost(b)));
+        let best = candidates(anchor, w, height, MARK).min_by_key(cost);
         placed.push(best.expect("there are always candidates"));
     }
     placed
@@ -108,7 +121,7 @@ mod tests {
         // Twelve points within 60 pixels, labels of 90 pixels: beside the points alone there is no room.
         let anchors: Vec<_> =
             (0..12).map(|i| (300.0 + f64::from(i * 37 % 60), 200.0 + f64::from(i * 53 % 60))).collect();
-        let placed = place(&anchors, &[90.0; 12], 16.0, &FRAME);
+        let placed = place(&anchors, &[90.0; 12], 16.0, &[], &FRAME);
         for (i, a) in placed.iter().enumerate() {
             assert!(a.outside(&FRAME) < 1e-9, "{a:?} is outside");
             for b in &placed[i + 1..] {
@@ -118,9 +131,24 @@ mod tests {
     }
 
     #[test]
+    fn a_label_with_nothing_around_stands_close_to_the_right_of_its_mark() {
+        for anchor in [(160.0, 132.0), (333.3, 77.7), (0.1 + 0.2, 200.0)] {
+            let placed = place(&[anchor], &[107.64], 16.0, &[], &FRAME)[0];
+            assert_eq!((placed.x - anchor.0).round(), 9.0, "{anchor:?}: {placed:?}");
+        }
+    }
+
+    #[test]
+    fn a_line_is_left_free_where_there_is_room() {
+        let line = Rect { x: 0.0, y: 197.0, w: 640.0, h: 6.0 };
+        let placed = place(&[(300.0, 200.0)], &[80.0], 16.0, &[line], &FRAME);
+        assert_eq!(placed[0].overlap(&line), 0.0, "{placed:?}");
+    }
+
+    #[test]
     fn a_label_in_the_corner_stays_inside() {
         for corner in [(2.0, 2.0), (638.0, 2.0), (2.0, 398.0), (638.0, 398.0)] {
-            let placed = place(&[corner], &[120.0], 16.0, &FRAME);
+            let placed = place(&[corner], &[120.0], 16.0, &[], &FRAME);
             assert!(placed[0].outside(&FRAME) < 1e-9, "{corner:?}: {placed:?}");
         }
     }

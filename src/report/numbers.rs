@@ -17,6 +17,18 @@ pub fn tick(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
+/// Where a logarithmic axis has its numbers: 1, 2 and 5 times the powers of ten, the powers alone where those are many.
+pub fn log_ticks(lo: f64, hi: f64) -> Vec<f64> {
+    let steps: &[f64] = match (hi / lo).log10() {
+        decades if decades < 2.2 => &[1.0, 2.0, 5.0],
+        decades if decades < 4.2 => &[1.0, 3.0],
+        _ => &[1.0],
+    };
+    let decades = lo.log10().floor() as i32..=hi.log10().ceil() as i32;
+    let ticks = decades.flat_map(|decade| steps.iter().map(move |step| step * 10.0_f64.powi(decade)));
+    ticks.filter(|tick| (lo..=hi).contains(tick)).collect()
+}
+
 /// With a thin space between thousands: `262 267`.
 pub fn grouped(value: u64) -> String {
     let digits = value.to_string();
@@ -79,6 +91,13 @@ mod tests {
         {
             assert_eq!(three_digits(value), text);
         }
+    }
+
+    #[test]
+    fn a_logarithmic_axis_has_a_handful_of_numbers_whatever_its_range() {
+        assert_eq!(log_ticks(3.0, 150.0), [5.0, 10.0, 20.0, 50.0, 100.0]);
+        assert_eq!(log_ticks(1e4, 1e10), [1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10]);
+        assert_eq!(log_ticks(1.0, 1000.0).len(), 7, "1, 3, 10, 30, 100, 300, 1000");
     }
 
     #[test]

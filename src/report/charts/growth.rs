@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::measure::growth::PowerLaw;
 use crate::measure::record::Record;
-use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, frame, mesh, pixel};
+use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, frame, log_axis, mesh, pixel};
 use crate::report::labels::Rect;
 use crate::report::names::short;
 use crate::report::numbers::{duration, duration_tick, short_count};
@@ -56,7 +56,7 @@ pub fn growth(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
             .x_label_area_size(46)
             .y_label_area_size(76)
             .margin_right(230)
-            .build_cartesian_2d(x.log_scale(), y.log_scale())?;
+            .build_cartesian_2d(log_axis(x), log_axis(y))?;
         let axes =
             Axes { x: "triangles", y: "build time", x_number: &|v| short_count(*v), y_number: &|v| duration_tick(*v) };
         mesh(&mut chart, &axes)?;

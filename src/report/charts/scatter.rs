@@ -133,10 +133,8 @@ fn scatter(caption: Caption, points: &[Point], frontier: &[usize], axis: Axis<'_
         let x_name = "build speed, million triangles a second →";
         mesh(&mut chart, &Axes { x: x_name, y: y_name, x_number: &number, y_number: &number })?;
         let worst = if falls { y_range.end } else { 0.0 };
-        chart.draw_series(std::iter::once(PathElement::new(
-            staircase(&frontier.iter().map(|&i| points[i].at).collect::<Vec<_>>(), x_range.start, worst),
-            best_line(),
-        )))?;
+        let edge = staircase(&frontier.iter().map(|&i| points[i].at).collect::<Vec<_>>(), x_range.start, worst);
+        chart.draw_series([PathElement::new(edge.clone(), best_line())])?;
         for point in points {
             let style = point.tone.light.filled();
             match point.place {
@@ -149,7 +147,9 @@ fn scatter(caption: Caption, points: &[Point], frontier: &[usize], axis: Axis<'_
         }
         let at: Vec<_> = points.iter().map(|p| pixel(&chart, p.at)).collect();
         let texts: Vec<_> = points.iter().map(|p| (short(&p.name), p.tone)).collect();
-        overlay.label_points(&at, &texts, frame(&chart));
+        let edge: Vec<_> = edge.iter().map(|&corner| pixel(&chart, corner)).collect();
+        let lines: Vec<Rect> = edge.windows(2).map(|ends| Rect::around(ends[0], ends[1]).grown(4.0)).collect();
+        overlay.label_points(&at, &texts, &lines, frame(&chart));
         for (point, &(x, y)) in points.iter().zip(&at) {
             let tip = format!("{}\n{} Mtri/s, {}", point.name, three_digits(point.at.0), three_digits(point.at.1));
             overlay.tip(Rect { x: x - 9.0, y: y - 9.0, w: 18.0, h: 18.0 }, &tip);

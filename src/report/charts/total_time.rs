@@ -4,7 +4,7 @@ use crate::Result;
 use crate::measure::record::Record;
 use crate::measure::total_time::{Line, Stretch, lower_envelope};
 use crate::report::chart::{
-    Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, best_line, frame, mesh, pixel,
+    Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, best_line, frame, log_axis, mesh, pixel,
 };
 use crate::report::labels::Rect;
 use crate::report::names::{short, slug};
@@ -13,7 +13,7 @@ use crate::report::theme::{Legend, MUTED, Tone};
 use plotters::prelude::*;
 
 /// Points a curve.
-const STEPS: usize = 160;
+const STEPS: usize = 72;
 
 /// Total time over rays a build for one scene. `None` if nothing was traced.
 ///
@@ -46,7 +46,7 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
             .y_label_area_size(76)
             .margin_top(34)
             .margin_right(190)
-            .build_cartesian_2d((rays.0..rays.1).log_scale(), (0.8 * least..1.2 * greatest).log_scale())?;
+            .build_cartesian_2d(log_axis(rays.0..rays.1), log_axis(0.8 * least..1.2 * greatest))?;
         let axes = Axes {
             x: "rays traced a build",
             y: "build and rays",
