@@ -4,8 +4,14 @@
 
 mod common;
 
+use common::corpus;
+use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::host::lbvh;
+use hedgerow::bvh::sah::Collapse;
 use hedgerow::gpu::DriverPreference;
 use hedgerow::measure::Subject;
+use hedgerow::measure::agreement::wrong_where_different;
+use hedgerow::measure::builders::Spec;
 use hedgerow::measure::peers::driver::Driver;
 use hedgerow::scene::Mesh;
 use hedgerow::trace::{Hit, Query, Ray};
@@ -85,4 +91,57 @@ fn building_twice_into_the_same_memory_gives_the_same_hits() {
         .collect();
     assert_eq!(hits[0], hits[1]);
     assert_eq!(hits[0][0].primitive, 0);
+}
+
+/// Rays from a sphere around the mesh to points of its triangles, each of about unit length.
+fn rays_at(mesh: &Mesh) -> Vec<Ray> {
+    let is_finite = |t: &&[u32; 3]| t.iter().all(|&v| mesh.positions[v as usize].iter().all(|x| x.is_finite()));
+    let finite: Vec<[u32; 3]> = mesh.triangles.iter().filter(is_finite).copied().collect();
+    let bounds = Mesh { positions: mesh.positions.clone(), triangles: finite.clone() }.bounds();
+    let (lo, hi) = (bounds.lo.map(f64::from), bounds.hi.map(f64::from));
+    let radius = (0..3).map(|i| 0.5 * (hi[i] - lo[i])).fold(0.0, f64::max);
+    let mut unit = corpus::unit_floats(5);
+    let mut ray = |_| {
+        let (z, angle) = (f64::from(2.0 * unit() - 1.0), std::f64::consts::TAU * f64::from(unit()));
+        let across = (1.0 - z * z).sqrt();
+        let p = [across * angle.cos(), across * angle.sin(), z];
+        let origin: [f64; 3] = std::array::from_fn(|i| 0.5 * (lo[i] + hi[i]) + 2.0 * radius * p[i]);
+        let triangle = finite[(unit() * finite.len() as f32) as usize];
+        let [a, b, c] = triangle.map(|v| mesh.positions[v as usize].map(f64::from));
+        let (u, v) = (f64::from(0.5 * unit()), f64::from(0.5 * unit()));
+        let towards: [f64; 3] = std::array::from_fn(|i| a[i] + u * (b[i] - a[i]) + v * (c[i] - a[i]) - origin[i]);
+        let length = towards.iter().map(|x| x.abs()).fold(f64::MIN_POSITIVE, f64::max);
+        let direction = towards.map(|x| (x / length) as f32);
+        Ray { origin: origin.map(|x| x as f32), t_min: 0.0, direction, t_max: f32::INFINITY }
+    };
+    if finite.is_empty() { vec![upwards(0.25, 0.25, 0.0, f32::INFINITY)] } else { (0..1000).map(&mut ray).collect() }
+}
+
+#[test]
+fn the_driver_and_we_find_the_same_hits() {
+    let device = common::device();
+    let mut met = 0;
+    for (name, positions, mut triangles) in corpus::meshes() {
+        // Vulkan leaves to chance what an index out of range does.
+        triangles.retain(|t| t.iter().all(|&v| (v as usize) < positions.len()));
+        let mesh = Mesh { positions, triangles };
+        let rays = rays_at(&mesh);
+        let tree = lbvh::build(&mesh.positions, &mesh.triangles, Code::Mc30.full(), Collapse::OFF);
+        let mut ours = "lbvh".parse::<Spec>().expect("a builder").make(Some(device), &mesh).expect("the mesh fits");
+        ours.build().expect("it builds");
+        ours.set_rays(&rays).expect("the rays fit");
+        for query in [Query::ClosestHit, Query::AnyHit] {
+            ours.trace(query).expect("it traces");
+            let ours = ours.hits().expect("one hit a ray");
+            met += ours.iter().filter(|hit| hit.is_some()).count();
+            for preference in PREFERENCES {
+                let Some(theirs) = traced(&mesh, preference, &rays, query) else { return };
+                let wrong = |hits, reference| wrong_where_different(&tree, &rays, query, (hits, reference), rays.len());
+                assert_eq!(wrong(&ours, &theirs), 0, "ours: {name}, {query:?}, {preference:?}");
+                assert_eq!(wrong(&theirs, &ours), 0, "theirs: {name}, {query:?}, {preference:?}");
+            }
+        }
+    }
+    // Most meshes are hit by all of the rays aimed at them: points, lines and what is lost in rounding are not.
+    assert!(met > 30_000, "{met} hits are no test");
 }
