@@ -26,9 +26,13 @@ fn same_distance(a: f32, b: f32) -> bool {
 }
 
 /// Whether a hair's breadth more or less of the ray or the triangle would have been another hit.
+///
+/// A tracer may leave the weights of an any-hit away; a hit without any says nothing of where it lies, and excuses nothing.
 fn on_the_edge(ray: &Ray, hit: &Hit) -> bool {
     let weights = [hit.u, hit.v, 1.0 - hit.u - hit.v];
+    let tells_where = hit.t > 0.0 || (hit.u, hit.v) != (0.0, 0.0);
     hit.is_some()
+        && tells_where
         && (weights.iter().any(|w| w.abs() <= ON_EDGE)
             || same_distance(hit.t, ray.t_max)
             || (ray.t_min > 0.0 && same_distance(hit.t, ray.t_min)))
@@ -137,6 +141,18 @@ mod tests {
         };
         assert_eq!(count(&wrong, &right), 1);
         assert_eq!(count(&right, &wrong), 0, "brute force is with the first");
+    }
+
+    #[test]
+    fn an_any_hit_where_nothing_is_hit_is_wrong_though_it_says_not_where() {
+        let (tree, rays) = squares();
+        let sample = Sample::take(&tree, &rays, Query::AnyHit, 1000);
+        let something = Hit { t: 0.0, primitive: 0, u: 0.0, v: 0.0 };
+        assert_eq!(sample.first_wrong(&rays, &[something, something, Hit::NONE]), None);
+        // The third ray passes beside the squares.
+        assert_eq!(sample.first_wrong(&rays, &[something; 3]).map(|(i, _)| i), Some(2));
+        let truth = [something, something, Hit::NONE];
+        assert_eq!(wrong_where_different(&tree, &rays, Query::AnyHit, (&[something; 3], &truth), 10), 1);
     }
 
     #[test]
