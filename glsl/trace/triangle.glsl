@@ -24,6 +24,52 @@ bool hedgerow_exactly(vec3 a, vec3 b, vec3 c, out vec3 edges) {
     return true;
 }
 
+// x · y as the rounded product and, in `rest`, what it is off by; from the leading halves of the factors and their rests.
+vec3 hedgerow_product(vec3 x, vec3 x_leading, vec3 x_rest, vec3 y, vec3 y_leading, vec3 y_rest, out vec3 rest) {
+    precise vec3 rounded = x * y;
+    precise vec3 off = ((x_leading * y_leading - rounded) + x_leading * y_rest + x_rest * y_leading) + x_rest * y_rest;
+    rest = off;
+    return rounded;
+}
+
+// The edge functions off by less than 2^-44 of the greater product.
+vec3 hedgerow_differences(vec3 a, vec3 b, vec3 c) {
+    vec3 x = vec3(a.x, b.x, c.x), y = vec3(a.y, b.y, c.y);
+    precise vec3 x_scaled = 4097.0 * x;
+    precise vec3 y_scaled = 4097.0 * y;
+    precise vec3 xl = x_scaled - (x_scaled - x);
+    precise vec3 yl = y_scaled - (y_scaled - y);
+    precise vec3 xr = x - xl;
+    precise vec3 yr = y - yl;
+    vec3 first_rest, second_rest;
+    vec3 first = hedgerow_product(x.zxy, xl.zxy, xr.zxy, y.yzx, yl.yzx, yr.yzx, first_rest);
+    vec3 second = hedgerow_product(y.zxy, yl.zxy, yr.zxy, x.yzx, xl.yzx, xr.yzx, second_rest);
+    precise vec3 plain = first - second;
+    precise vec3 taken = plain - first;
+    precise vec3 lost = (first - (plain - taken)) - (second + taken);
+    precise vec3 differences = plain + (lost + (first_rest - second_rest));
+    return differences;
+}
+
+// The edge functions with right signs and accurate enough, where the plain ones are not.
+bool hedgerow_carefully(HedgerowPreparedRay ray, vec3 a, vec3 b, vec3 c, float m, float trusted, float largest_cube, out vec3 edges) {
+    const float CERTAIN = uintBitsToFloat((127u - 40u) << 23);
+    const float SMALLER = uintBitsToFloat((127u - 20u) << 23);
+    edges = hedgerow_differences(a, b, c);
+    float least = min(min(edges.x, edges.y), edges.z);
+    float greatest = max(max(edges.x, edges.y), edges.z);
+    float nearest = min(min(abs(edges.x), abs(edges.y)), abs(edges.z));
+    precise float cube = m * m * m;
+    precise float certainty = CERTAIN * (m * m);
+    bool certain = nearest > certainty && nearest > trusted;
+    if (certain && least < 0.0 && greatest > 0.0) return false;
+    precise float sum = edges.x + edges.y + edges.z;
+    precise float error = SMALLER * (4.0 * cube);
+    precise float allowed = ray.reach * abs(sum);
+    if (certain && cube < largest_cube && error <= allowed) return true;
+    return hedgerow_exactly(a, b, c, edges);
+}
+
 // Where the ray's line meets the triangle: t and the weights of the second and third vertex.
 bool hedgerow_meet(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, out vec3 meeting) {
     const float TRUSTED = uintBitsToFloat((127u - 76u) << 23);
@@ -43,9 +89,9 @@ bool hedgerow_meet(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, out vec3 
     bool trusted = least > TRUSTED || greatest < -TRUSTED;
     bool accurate = cube < LARGEST_CUBE && 4.0 * cube <= ray.reach * abs(sum);
     if (!(trusted && accurate)) {
-        vec3 exact;
-        if (!hedgerow_exactly(a, b, c, exact)) return false;
-        edges = exact;
+        vec3 careful;
+        if (!hedgerow_carefully(ray, a, b, c, largest, TRUSTED, LARGEST_CUBE, careful)) return false;
+        edges = careful;
     }
     precise float scale = 1.0 / (edges.x + edges.y + edges.z);
     precise vec3 weights = edges * scale;
