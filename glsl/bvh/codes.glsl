@@ -328,7 +328,7 @@ uvec2 inactive_code(CodeKind kind) {
     return bits_of(uvec2(0xFFFFFFFFu), 0, kind.bits);
 }
 
-// ---- codes of at most 32 bits: the same with half the words (a third of the encoding time) ----
+// ---- codes of at most 32 bits: the same with half the words ----
 
 // `count` bits of `v` from bit `from` below the top, at the bottom.
 uint bits_of(uint v, uint from, uint count) {

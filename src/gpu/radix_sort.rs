@@ -49,7 +49,7 @@ impl Shape {
 
     /// Keys of a column of the table, for `count` keys in all.
     ///
-    /// Long strips make the table small, short ones keep all cores busy: about 64 strips of a small input, 4,096 of a large.
+    /// Long strips make the table small, short ones keep all cores busy: 128 to 256 strips, until they would be over 4,096 keys.
     pub(crate) fn column_keys(&self, count: u32) -> u32 {
         if self.private_counters { (count / 256).next_power_of_two().clamp(256, 4096) } else { self.tile_keys }
     }
