@@ -66,6 +66,7 @@ check: setup
 	$(CARGO) clippy --release --all-targets --features $(FEATURES) -- -D warnings
 	$(CARGO) clippy --release --no-default-features --lib -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --features $(FEATURES)
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --no-default-features --lib
 
 prebuilt: setup
 	HEDGEROW_UPDATE_PREBUILT=1 $(CARGO) test --release --test prebuilt

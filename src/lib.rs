@@ -12,6 +12,8 @@
 //!
 //! An engine needs [`gpu`], [`bvh`] and [`trace`] alone (`default-features = false`).
 #![warn(missing_docs)]
+// Without the feature, the rooms of the binary are named above and not there.
+#![cfg_attr(not(feature = "cli"), allow(rustdoc::broken_intra_doc_links))]
 
 pub mod bvh;
 #[cfg(feature = "cli")]

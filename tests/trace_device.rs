@@ -6,20 +6,26 @@ use common::device;
 use common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, soup, tree_of, tree_with};
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
 use hedgerow::trace::{Hit, Query, Ray, Work, host};
 
-/// Every way to cut the work: the default, that for CPUs and that for GPUs, no shared memory at all, and a stack whose levels
+/// Every way to cut the work: the default, those for CPUs and that for GPUs, no shared memory at all, and a stack whose levels
 /// lie half here and half there.
 fn shapes() -> Vec<Shape> {
     let limits = &device().limits;
-    vec![
+    let loads = Loads::Gathered;
+    let mut shapes = vec![
         Shape::of(limits),
         Shape::subgroups(limits),
         Shape::groups(limits),
-        Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1 },
-        Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5 },
-    ]
+        Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
+        Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
+    ];
+    if limits.subgroup_size <= Loads::MAX_LANES {
+        shapes.push(Shape::lanes(limits));
+        shapes.push(Shape { shared_levels: 3, rays_each: 5, ..Shape::lanes(limits) });
+    }
+    shapes
 }
 
 fn traced(tree: &Bvh2, rays: &[Ray], shape: &Shape, query: Query, count_work: bool) -> (Vec<Hit>, Vec<Work>) {
@@ -83,6 +89,27 @@ fn any_number_of_rays_is_traced_and_nothing_behind_them_written() {
     }
 }
 
+/// A leaf that waits keeps its count beside its index, or in place of its distance.
+#[test]
+fn leaves_of_any_length_can_wait() {
+    let mut corners = Vec::new();
+    for (place, count) in [(0.0, 29), (1.0, 30), (2.0, 31), (3.0, 32), (4.0, 33), (5.0, 1000), (6.0, 1)] {
+        let triangle = [[place, 0.0, 0.0], [place, 1.0, 0.0], [place, 0.0, 1.0]];
+        corners.extend(std::iter::repeat_n(triangle, count));
+    }
+    let tree = tree_of(&corners);
+    let longest =
+        tree.nodes.iter().flat_map(|n| n.children).filter(|c| c.is_leaf() && c.count != u32::MAX).map(|c| c.count);
+    assert_eq!(longest.max(), Some(1000), "piles of the same triangle are leaves");
+    let rays: Vec<Ray> = (0..64)
+        .flat_map(|i| {
+            let from = 0.25 + 6.5 * i as f32 / 64.0;
+            [1.0, -1.0].map(|to| ray([from, 0.25, 0.25], [to, 0.01, 0.01]))
+        })
+        .collect();
+    assert_as_on_the_host(&tree, &rays);
+}
+
 #[test]
 fn closed_surfaces_do_not_leak() {
     for (scale, offset) in
@@ -111,16 +138,25 @@ fn closed_surfaces_do_not_leak() {
 #[test]
 fn what_is_no_ray_hits_nothing_and_ends() {
     let tree = tree_of(&icosphere(3));
-    let mut rays = Vec::new();
-    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40, 0.0, -0.0, 1e38] {
+    let with = |bad: f32| {
+        let mut rays = vec![ray([0.0; 3], [bad; 3])];
         for field in 0..8 {
             let mut words = [0.1, 0.2, 0.3, 0.0, 0.5, 0.6, -0.7, 9.0];
             words[field] = bad;
             rays.push(bytemuck::cast(words));
         }
-        rays.push(ray([0.0; 3], [bad; 3]));
+        rays
+    };
+    let no_rays = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1e38].map(with).concat();
+    assert_as_on_the_host(&tree, &no_rays);
+    // A device may take a subnormal number for zero, and find out sooner that there is nothing to hit.
+    let subnormal = with(1e-40);
+    for shape in shapes() {
+        let (hits, _) = traced(&tree, &subnormal, &shape, Query::ClosestHit, false);
+        for (ray, hit) in subnormal.iter().zip(hits) {
+            assert_eq!(hit, host::closest_hit(&tree, ray), "{shape:?} {ray:?}");
+        }
     }
-    assert_as_on_the_host(&tree, &rays);
 }
 
 #[test]

@@ -2,52 +2,69 @@
 //
 // A shader may define HEDGEROW_SHARED_LEVELS, a constant or specialisation constant, before it includes this file, and
 // declare its workgroup size before that: then so many of the lowest entries of each invocation lie in shared memory, in
-// columns, so that invocations side by side touch words side by side; 12 bytes each. The others, without it all, lie in
+// columns, so that invocations side by side touch words side by side; 8 bytes each. The others, without it all, lie in
 // private memory. Where shared memory is as good as any (CPUs), all may lie there, and no private array is left.
 #ifndef HEDGEROW_TRACE_STACK
 #define HEDGEROW_TRACE_STACK
 
-// A child that waits, and the distance at which the ray enters it.
+// A child that waits, and the distance at which the ray enters it: minus infinity for a leaf of so many triangles that
+// its count has no room in the entry beside the index; it is taken however far it is.
 struct HedgerowWaiting {
     uint index;
     uint count;
     float enter;
 };
 
+// Nodes and triangles of a structure are fewer than 2^27 (radix_sort::MAX_COUNT), which leaves these bits for the count.
+const uint HEDGEROW_INDEX_BITS = 27;
+const uint HEDGEROW_LONG_LEAF = 31;
+
+uvec2 hedgerow_packed(HedgerowWaiting waiting) {
+    bool long_leaf = waiting.count >= HEDGEROW_LONG_LEAF;
+    return uvec2(waiting.index | min(waiting.count, HEDGEROW_LONG_LEAF) << HEDGEROW_INDEX_BITS,
+                 long_leaf ? waiting.count : floatBitsToUint(waiting.enter));
+}
+
+HedgerowWaiting hedgerow_unpacked(uvec2 entry) {
+    uint count = entry.x >> HEDGEROW_INDEX_BITS;
+    uint index = entry.x & (1u << HEDGEROW_INDEX_BITS) - 1u;
+    if (count == HEDGEROW_LONG_LEAF) return HedgerowWaiting(index, entry.y, -HEDGEROW_INFINITY);
+    return HedgerowWaiting(index, count, uintBitsToFloat(entry.y));
+}
+
 #ifdef HEDGEROW_SHARED_LEVELS
 const uint HEDGEROW_PRIVATE_LEVELS = HEDGEROW_SHARED_LEVELS < MAX_DEPTH ? MAX_DEPTH - HEDGEROW_SHARED_LEVELS : 0;
 // One word more than needed: an array must not be empty.
-shared uint hedgerow_shared_index[HEDGEROW_SHARED_LEVELS * gl_WorkGroupSize.x + 1];
-shared uint hedgerow_shared_count[HEDGEROW_SHARED_LEVELS * gl_WorkGroupSize.x + 1];
-shared float hedgerow_shared_enter[HEDGEROW_SHARED_LEVELS * gl_WorkGroupSize.x + 1];
+shared uint hedgerow_shared_child[HEDGEROW_SHARED_LEVELS * gl_WorkGroupSize.x + 1];
+shared uint hedgerow_shared_enter[HEDGEROW_SHARED_LEVELS * gl_WorkGroupSize.x + 1];
 #else
 const uint HEDGEROW_PRIVATE_LEVELS = MAX_DEPTH;
 #endif
 
-HedgerowWaiting hedgerow_private[HEDGEROW_PRIVATE_LEVELS + 1];
+uvec2 hedgerow_private[HEDGEROW_PRIVATE_LEVELS + 1];
 
 void hedgerow_put(uint level, HedgerowWaiting waiting) {
+    uvec2 entry = hedgerow_packed(waiting);
 #ifdef HEDGEROW_SHARED_LEVELS
     if (HEDGEROW_PRIVATE_LEVELS == 0u || level < HEDGEROW_SHARED_LEVELS) {
         uint at = level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-        hedgerow_shared_index[at] = waiting.index;
-        hedgerow_shared_count[at] = waiting.count;
-        hedgerow_shared_enter[at] = waiting.enter;
+        hedgerow_shared_child[at] = entry.x;
+        hedgerow_shared_enter[at] = entry.y;
         return;
     }
     level -= HEDGEROW_SHARED_LEVELS;
 #endif
-    hedgerow_private[level] = waiting;
+    hedgerow_private[level] = entry;
 }
 
 HedgerowWaiting hedgerow_taken(uint level) {
 #ifdef HEDGEROW_SHARED_LEVELS
     if (HEDGEROW_PRIVATE_LEVELS == 0u || level < HEDGEROW_SHARED_LEVELS) {
         uint at = level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-        return HedgerowWaiting(hedgerow_shared_index[at], hedgerow_shared_count[at], hedgerow_shared_enter[at]);
+        return hedgerow_unpacked(uvec2(hedgerow_shared_child[at], hedgerow_shared_enter[at]));
     }
     level -= HEDGEROW_SHARED_LEVELS;
 #endif
-    return hedgerow_private[level];
+    return hedgerow_unpacked(hedgerow_private[level]);
 }
 #endif

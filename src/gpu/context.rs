@@ -27,6 +27,10 @@ pub struct Limits {
     pub name: String,
     /// CPU, integrated or discrete: a CPU wants few long invocations, a GPU many short ones.
     pub kind: vk::PhysicalDeviceType,
+    /// Who wrote the driver.
+    pub driver: vk::DriverId,
+    /// The driver's version, in its own encoding.
+    pub driver_version: u32,
     /// The subgroup size the driver reports.
     pub subgroup_size: u32,
     /// Invocations a workgroup, at most.
@@ -42,13 +46,16 @@ pub struct Limits {
 impl Limits {
     fn of(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Limits {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup);
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut driver);
         // SAFETY: the handles are the caller's and live.
         unsafe { instance.get_physical_device_properties2(physical_device, &mut properties) };
         let properties = properties.properties;
         Limits {
             name: properties.device_name_as_c_str().unwrap_or(c"?").to_string_lossy().into_owned(),
             kind: properties.device_type,
+            driver: driver.driver_id,
+            driver_version: properties.driver_version,
             subgroup_size: subgroup.subgroup_size,
             workgroup_invocations: properties.limits.max_compute_work_group_invocations,
             shared_memory: properties.limits.max_compute_shared_memory_size,
@@ -60,6 +67,12 @@ impl Limits {
     /// Whether the device is a CPU (lavapipe, SwiftShader).
     pub fn is_cpu(&self) -> bool {
         self.kind == vk::PhysicalDeviceType::CPU
+    }
+
+    /// Whether a load at an address that is the same for all lanes is one plain load: lavapipe of Mesa 26.1.6 does it, 25.0.7
+    /// does not, and those between were not asked.
+    pub fn loads_uniform_values_once(&self) -> bool {
+        self.driver == vk::DriverId::MESA_LLVMPIPE && vk::api_version_major(self.driver_version) >= 26
     }
 }
 

@@ -65,7 +65,7 @@ fn header(report: &Report, legend: &Legend, scenes: &[SceneCharts]) -> Markup {
             h1 { "Build speed against tree quality" }
             p.lead {
                 (legend.builders().len()) " builders of acceleration structures on " (scenes.len())
-                " scenes, built and traced in turn in one process, every tree validated and every kind of ray checked against brute force."
+                " scenes, built and traced in turn in one process; trees of ours validated on the host, a sample of every kind of ray checked against brute force."
             }
             dl.facts {
                 div { dt { "Processor" } dd { (machine.cpu) span { (machine.cores) " cores, " (machine.system) } } }

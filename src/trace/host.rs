@@ -5,6 +5,9 @@ use super::triangle::meet;
 use super::{Hit, Query, Ray, Work, slab};
 use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Triangle, status};
 
+/// From so many triangles on, the count of a leaf that waits takes the place of its distance (`glsl/trace/stack.glsl`).
+const LONG_LEAF: u32 = 31;
+
 /// The nearest hit; of equally near ones that with the lower primitive index.
 pub fn closest_hit(tree: &Bvh2, ray: &Ray) -> Hit {
     trace(tree, ray, Query::ClosestHit).0
@@ -25,7 +28,7 @@ pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
     let Some(ray) = PreparedRay::new(ray, &tree.header.root.bounds()).filter(|_| usable) else {
         return (Hit::NONE, work);
     };
-    // Children that wait, each with the distance at which the ray enters it.
+    // Children that wait, each with the distance at which the ray enters it. A long leaf is taken however far it is.
     let mut waiting: Vec<(f32, Child)> = Vec::with_capacity(MAX_DEPTH as usize);
     let mut next = Some(tree.header.root);
     while let Some(child) = next {
@@ -45,7 +48,8 @@ pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
             match (slab::enter(&ray, &left, nearest.t), slab::enter(&ray, &right, nearest.t)) {
                 (Some(l), Some(r)) => {
                     let (near, far) = if r < l { (right, (l, left)) } else { (left, (r, right)) };
-                    waiting.push(far);
+                    let entered = if far.1.count < LONG_LEAF { far.0 } else { f32::NEG_INFINITY };
+                    waiting.push((entered, far.1));
                     next = Some(near);
                 }
                 (Some(_), None) => next = Some(left),

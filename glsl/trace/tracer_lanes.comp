@@ -1,0 +1,68 @@
+// Traces rays, each by one invocation, on CPUs: the loop of tracer_single.comp, with loads lane by lane (trace/lanes.glsl).
+//
+// All lanes stay in the loop until all rays of the workgroup are done: every lane can be asked what it needs. Rays that go the
+// same way stay together: the next ones are taken when all lanes are done. Where more than half of the lanes' turns were spent waiting
+// for the longest ray, each lane takes its next ray as soon as it can instead.
+//
+// reads   structure, rays[first..count]
+// writes  hits[first..count]; with COUNT_WORK also works[first..count]
+// needs   a barrier (shader write -> shader read) before and after; a workgroup of one subgroup of at most 16 lanes
+#version 460
+// Before the includes: the stack's arrays have the workgroup's size.
+layout(local_size_x_id = 0) in;
+layout(constant_id = 1) const bool ANY_HIT = false;
+layout(constant_id = 2) const bool COUNT_WORK = false;
+layout(constant_id = 3) const uint SHARED_LEVELS = 0;
+#define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
+
+#include "trace/lanes.glsl"
+#include "trace/walk.glsl"
+
+void main() {
+    Triangles triangles = triangles_of(structure);
+    Child root = structure.header.root;
+    bool usable = can_be_traced(structure);
+    uint group_rays = gl_WorkGroupSize.x * rays_each;
+    uint next = first + gl_WorkGroupID.x * group_rays + gl_LocalInvocationIndex;
+    uint end = min(count, first + (gl_WorkGroupID.x + 1) * group_rays);
+
+    Walk walk;
+    walk.left = NOTHING;
+    bool going = false;
+    uint i;
+    bool together = true;
+    // Since all lanes took a ray: turns of the loop, and those in which this lane had a ray.
+    uint turns = 0, turns_going = 0;
+    while (true) {
+        bool none_goes = !any_lane(going);
+        if (none_goes) {
+            if (!any_lane(next < end)) break;
+            together = together && 2u * sum_of_lanes(turns_going) >= gl_WorkGroupSize.x * turns;
+            turns = 0;
+            turns_going = 0;
+        }
+        turns++;
+        if (!going && next < end && (none_goes || !together)) {
+            i = next;
+            next += gl_WorkGroupSize.x;
+            begin(rays.ray[i], root, usable, walk);
+            going = true;
+        }
+        if (going) turns_going++;
+        // A lane that needs no node loads that of any lane that does: the root is one, or no lane is at a node.
+        for (uint visits = 0; visits < 2; visits++) {
+            EachLane nodes = each_lane(at_node(walk) ? walk.index : root.index);
+            if (at_node(walk)) visit(node_of_each_lane(structure, nodes), walk);
+        }
+        // There is a first triangle, or no lane is at one.
+        EachLane tests = each_lane(at_triangle(walk) ? walk.index : 0u);
+        if (at_triangle(walk)) test(triangle_of_each_lane(triangles, tests), ANY_HIT, walk);
+        if (going && walk.left == NOTHING) {
+            going = go_on(walk);
+            if (!going) {
+                hits.hit[i] = walk.hit;
+                if (COUNT_WORK) works.work[i] = walk.work;
+            }
+        }
+    }
+}

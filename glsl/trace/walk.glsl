@@ -1,0 +1,95 @@
+// One ray on its way through a tree, step by step: the twin of src/trace/host.rs, visit for visit.
+//
+// The nearer child first; a child that waits is left out if it is farther than the best hit by then. The kernels decide in
+// which order lanes take their steps; each step is the same for all of them.
+#ifndef HEDGEROW_TRACE_WALK
+#define HEDGEROW_TRACE_WALK
+#include "trace/buffers.glsl"
+#include "trace/slab.glsl"
+#include "trace/stack.glsl"
+#include "trace/triangle.glsl"
+
+// In place of a leaf's count: nothing at hand, take what waits.
+const uint NOTHING = 0xffffffffu;
+
+struct Walk {
+    HedgerowPreparedRay ray;
+    // The node at hand (`left` is 0), or the next triangle and how many are left of its leaf, or NOTHING.
+    uint index;
+    uint left;
+    // How many children wait.
+    uint level;
+    float best;
+    HedgerowHit hit;
+    // Nodes visited, triangles tested.
+    uvec2 work;
+};
+
+bool at_node(Walk walk) {
+    return walk.left == 0u;
+}
+
+bool at_triangle(Walk walk) {
+    return walk.left != 0u && walk.left != NOTHING;
+}
+
+bool can_be_traced(Structure structure) {
+    const uint UNUSABLE = STATUS_TOO_DEEP | STATUS_SPIN_RAN_OUT;
+    return structure.header.active_count != 0u && (structure.header.status & UNUSABLE) == 0u;
+}
+
+// At the root; a ray that cannot hit anything has nothing at hand and nothing that waits.
+void begin(HedgerowRay ray, Child root, bool usable, out Walk walk) {
+    bool goes = hedgerow_prepare(ray, root.lo, root.hi, walk.ray) && usable;
+    walk.index = root.index;
+    walk.left = goes ? root.count : NOTHING;
+    walk.level = 0;
+    walk.best = walk.ray.t_max;
+    walk.hit = HedgerowHit(HEDGEROW_INFINITY, HEDGEROW_NONE, 0.0, 0.0);
+    walk.work = uvec2(0);
+}
+
+void visit(Node node, inout Walk walk) {
+    walk.work.x++;
+    Child a = node.left;
+    Child b = node.right;
+    bool enters_a, enters_b;
+    float enter_a = hedgerow_enter(walk.ray, a.lo, a.hi, walk.best, enters_a);
+    float enter_b = hedgerow_enter(walk.ray, b.lo, b.hi, walk.best, enters_b);
+    bool b_first = enters_b && (!enters_a || enter_b < enter_a);
+    if (enters_a && enters_b) {
+        hedgerow_put(walk.level, b_first ? HedgerowWaiting(a.index, a.count, enter_a) : HedgerowWaiting(b.index, b.count, enter_b));
+        walk.level++;
+    }
+    walk.index = b_first ? b.index : a.index;
+    walk.left = enters_a || enters_b ? b_first ? b.count : a.count : NOTHING;
+}
+
+void test(Triangle triangle, bool any_hit, inout Walk walk) {
+    walk.work.y++;
+    walk.index++;
+    walk.left = walk.left == 1u ? NOTHING : walk.left - 1u;
+    vec3 met;
+    if (hedgerow_meet(walk.ray, triangle.v0, triangle.v1, triangle.v2, met)) {
+        if (walk.ray.t_min < met.x && met.x < walk.ray.t_max &&
+            (met.x < walk.best || met.x == walk.best && triangle.primitive < walk.hit.primitive)) {
+            walk.best = met.x;
+            walk.hit = HedgerowHit(any_hit ? 0.0 : met.x, triangle.primitive, met.y, met.z);
+            if (any_hit) {
+                walk.left = NOTHING;
+                walk.level = 0;
+            }
+        }
+    }
+}
+
+// Takes what waits; whether there was any. Equally far is not too far: an equally near hit with a lower index may be there.
+bool go_on(inout Walk walk) {
+    if (walk.level == 0u) return false;
+    walk.level--;
+    HedgerowWaiting waiting = hedgerow_taken(walk.level);
+    walk.index = waiting.index;
+    walk.left = waiting.enter <= walk.best ? waiting.count : NOTHING;
+    return true;
+}
+#endif
