@@ -195,6 +195,15 @@ uvec3 difference_at(Words codes, uint i) {
     return uvec3(i ^ (i + 1), codes.word[2 * i] ^ codes.word[2 * i + 2], codes.word[2 * i + 1] ^ codes.word[2 * i + 3]);
 }
 
+// Of the neighbouring splits of a subtree; at the ends of all positions there is none.
+uvec3 difference_before(Words codes, uint first) {
+    return first > 0 ? difference_at(codes, first - 1) : uvec3(NONE);
+}
+
+uvec3 difference_behind(Words codes, uint last, uint active_count) {
+    return last + 1 < active_count ? difference_at(codes, last) : uvec3(NONE);
+}
+
 bool is_less(uvec3 a, uvec3 b) {
     if (KEY_WORDS == 2 && a.z != b.z) return a.z < b.z;
     return a.y != b.y ? a.y < b.y : a.x < b.x;
@@ -216,62 +225,87 @@ float inner_cost(float area, float left, float right) {
     return cost;
 }
 
-// From the leaf at `position` up (Apetrei 2014): of two siblings the second to arrive goes on with their parent. The node
-// that splits between positions i and i + 1 has slot i, so its parent follows from which of the two neighbouring splits
-// differs in a lower bit.
-void climb(Structure structure, Words codes, uint position, Box b, uint active_count, float area_scale) {
+// A finished subtree over the positions first..=last, and how the codes differ before and behind it.
+struct Subtree {
+    uint first;
+    uint last;
+    uvec3 before;
+    uvec3 behind;
+    Child child;
+    float cost;
+};
+
+// Left children that wait for a sibling out of the same run of positions: where each begins. They lie side by side and end
+// with the run so far, so that the last of them is the sibling of whichever right child comes next.
+shared uint run_firsts[ITEMS * gl_WorkGroupSize.x];
+
+uint run_slot(uint level) {
+    return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+}
+
+// From a subtree up (Apetrei 2014): of two siblings the second to arrive goes on with their parent. The node that splits
+// between positions i and i + 1 has slot i, so its parent follows from which of the two neighbouring splits differs in a lower
+// bit. An invocation that has a run of positions meets most siblings itself and asks the others only at the run's two ends:
+// atomics and their fences were a third of the time.
+void climb(Structure structure, Words codes, uint active_count, float area_scale, uint run, inout uint waiting, Subtree s) {
     Words ends = Words(ends_address);
     // The buffers that the sort has left free hold the costs of left and right children.
     uint is_free = 1 - (passes & 1);
     Floats left_costs = Floats(keys[is_free]);
     Floats right_costs = Floats(values[is_free]);
-    uint first = position, last = position;
-    uvec3 before = first > 0 ? difference_at(codes, first - 1) : uvec3(NONE);
-    uvec3 behind = last + 1 < active_count ? difference_at(codes, last) : uvec3(NONE);
-    Child child = Child(b.lo, position, b.hi, 1);
-    float cost = leaf_cost(scaled_half_area(b, area_scale), 1);
     // A level a differing bit: codes have 64 at most, positions 27.
     for (uint level = 0; level <= MAX_DEPTH; ++level) {
-        if (first == 0 && last + 1 == active_count) {
-            structure.header.root = child;
+        if (s.first == 0 && s.last + 1 == active_count) {
+            structure.header.root = s.child;
             break;
         }
-        bool is_left = is_less(behind, before);
-        uint parent = is_left ? last : first - 1;
+        bool is_left = is_less(s.behind, s.before);
+        uint parent = is_left ? s.last : s.first - 1;
         if (is_left) {
-            structure.nodes[parent].left = child;
-            left_costs.value[parent] = cost;
+            structure.nodes[parent].left = s.child;
+            left_costs.value[parent] = s.cost;
         } else {
-            structure.nodes[parent].right = child;
-            right_costs.value[parent] = cost;
+            structure.nodes[parent].right = s.child;
+            right_costs.value[parent] = s.cost;
         }
-        release_to_device();
-        uint end = atomicExchange(ends.word[parent], is_left ? first : last);
-        if (end == NONE) break;
-        acquire_from_device();
+        uint end;
+        if (is_left && s.first >= run) {
+            run_firsts[run_slot(waiting)] = s.first;
+            waiting++;
+            break;
+        }
+        if (!is_left && waiting > 0) {
+            waiting--;
+            end = run_firsts[run_slot(waiting)];
+        } else {
+            release_to_device();
+            end = atomicExchange(ends.word[parent], is_left ? s.first : s.last);
+            if (end == NONE) break;
+            acquire_from_device();
+        }
         Child sibling;
         float sibling_cost;
         if (is_left) {
-            last = end;
-            behind = last + 1 < active_count ? difference_at(codes, last) : uvec3(NONE);
+            s.last = end;
+            s.behind = difference_behind(codes, s.last, active_count);
             sibling = structure.nodes[parent].right;
             sibling_cost = right_costs.value[parent];
         } else {
-            first = end;
-            before = first > 0 ? difference_at(codes, first - 1) : uvec3(NONE);
+            s.first = end;
+            s.before = difference_before(codes, s.first);
             sibling = structure.nodes[parent].left;
             sibling_cost = left_costs.value[parent];
         }
-        child.lo = min(child.lo, sibling.lo);
-        child.hi = max(child.hi, sibling.hi);
-        uint count = last - first + 1;
-        float area = scaled_half_area(Box(child.lo, child.hi), area_scale);
+        s.child.lo = min(s.child.lo, sibling.lo);
+        s.child.hi = max(s.child.hi, sibling.hi);
+        uint count = s.last - s.first + 1;
+        float area = scaled_half_area(Box(s.child.lo, s.child.hi), area_scale);
         float as_leaf = leaf_cost(area, count);
-        cost = inner_cost(area, cost, sibling_cost);
-        bool as_leaf_is_cheaper = collapses() && as_leaf < cost;
-        child.index = as_leaf_is_cheaper ? first : parent;
-        child.count = as_leaf_is_cheaper ? count : 0;
-        if (as_leaf_is_cheaper) cost = as_leaf;
+        s.cost = inner_cost(area, s.cost, sibling_cost);
+        bool as_leaf_is_cheaper = collapses() && as_leaf < s.cost;
+        s.child.index = as_leaf_is_cheaper ? s.first : parent;
+        s.child.count = as_leaf_is_cheaper ? count : 0;
+        if (as_leaf_is_cheaper) s.cost = as_leaf;
     }
 }
 
@@ -282,19 +316,49 @@ void lbvh_hierarchy(uint task) {
     Input input_mesh = mesh();
     uint active_count = state.active_count;
     float area_scale = state.plan.area_scale;
+    uint is_free = 1 - (passes & 1);
     Words codes = Words(keys[passes & 1]);
     Words order = Words(values[passes & 1]);
-    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
-    for (uint k = 0; k < ITEMS; ++k) {
-        uint position = first + k * gl_WorkGroupSize.x;
-        if (position < primitive_count) {
+    uint run = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
+    uint end = min(run + ITEMS, primitive_count);
+    uint position = run;
+    uint waiting = 0;
+    // First the leaves of the run; then what waits, last first: its siblings begin behind the run.
+    bool leaves_done = false;
+    while (true) {
+        Subtree s;
+        uint own_run = run;
+        bool climbs = true;
+        if (position < end) {
             uint primitive = order.word[position];
             Corners c;
             load_corners(input_mesh, primitive, c);
             triangles.triangle[position] = Triangle(c.v0, primitive, c.v1, 0, c.v2, 0);
-            if (position < active_count) climb(structure, codes, position, box_around(c), active_count, area_scale);
+            climbs = position < active_count;
             // Slots from active_count - 1 on have no node.
             if (position >= max(active_count, 1)) mark_unused(structure, position - 1);
+            Box b = box_around(c);
+            s.first = position;
+            s.last = position;
+            s.child = Child(b.lo, position, b.hi, 1);
+            s.cost = leaf_cost(scaled_half_area(b, area_scale), 1);
+            position++;
+        } else if (waiting > 0) {
+            own_run = NONE;
+            // What was taken last began where this ends.
+            s.last = (leaves_done ? run_firsts[run_slot(waiting)] : min(end, active_count)) - 1;
+            leaves_done = true;
+            waiting--;
+            s.first = run_firsts[run_slot(waiting)];
+            s.child = structure.nodes[s.last].left;
+            s.cost = Floats(keys[is_free]).value[s.last];
+        } else {
+            break;
+        }
+        if (climbs) {
+            s.before = difference_before(codes, s.first);
+            s.behind = difference_behind(codes, s.last, active_count);
+            climb(structure, codes, active_count, area_scale, own_run, waiting, s);
         }
     }
 }
