@@ -327,7 +327,7 @@ impl Lbvh {
     }
 }
 
-/// What measured faster: on lavapipe the chain, by a factor of 1.5 (the loop around the phases costs the persistent kernel
+/// What measured faster: on lavapipe the chain, by a factor of 1.2 to 1.5 (the loop around the phases costs the persistent kernel
 /// its unmasked loads, and whoever waits takes a core from who works). No GPU has been measured: the chain also asks nothing
 /// of its progress.
 const DEFAULT_SCHEDULE: Schedule = Schedule::Chain;
