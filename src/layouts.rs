@@ -71,7 +71,7 @@ fn structs() -> BTreeMap<&'static str, Layout> {
     BTreeMap::from([
         ("Child", layout_of!(Child { lo, index, hi, count })),
         ("Node", node),
-        ("Triangle", layout_of!(Triangle { v0, primitive, v1, geometry, v2, flags })),
+        ("Triangle", layout_of!(Triangle { v0, v1, v2, primitive })),
         ("Header", header),
         ("Ray", layout_of!(Ray { origin, t_min, direction, t_max })),
         ("Hit", layout_of!(Hit { t, primitive, u, v })),

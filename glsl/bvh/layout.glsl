@@ -9,7 +9,7 @@
 #pragma use_vulkan_memory_model
 
 const uint MAGIC = 0x72676468u;
-const uint KIND_BVH2 = 0x00020001u;
+const uint KIND_BVH2 = 0x00020002u;
 const uint MAX_DEPTH = 96;
 
 const uint STATUS_NON_FINITE = 1u << 0;
@@ -31,11 +31,9 @@ struct Node {
 
 struct Triangle {
     vec3 v0;
-    uint primitive;
     vec3 v1;
-    uint geometry;
     vec3 v2;
-    uint flags;
+    uint primitive;
 };
 
 struct Header {
@@ -55,7 +53,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer 
     Node nodes[];
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer Triangles {
+layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Triangles {
     Triangle triangle[];
 };
 

@@ -333,7 +333,7 @@ void lbvh_hierarchy(uint task) {
             uint primitive = order.word[position];
             Corners c;
             load_corners(input_mesh, primitive, c);
-            triangles.triangle[position] = Triangle(c.v0, primitive, c.v1, 0, c.v2, 0);
+            triangles.triangle[position] = Triangle(c.v0, c.v1, c.v2, primitive);
             climbs = position < active_count;
             // Slots from active_count - 1 on have no node.
             if (position >= max(active_count, 1)) mark_unused(structure, position - 1);

@@ -55,17 +55,16 @@ Node node_of_each_lane(Structure structure, EachLane index) {
     return mine;
 }
 
-// Without what the tracer does not ask for.
 Triangle triangle_of_each_lane(Triangles triangles, EachLane index) {
-    Triangle mine = Triangle(vec3(0.0), 0u, vec3(0.0), 0u, vec3(0.0), 0u);
+    Triangle mine = Triangle(vec3(0.0), vec3(0.0), vec3(0.0), 0u);
 #define LOAD_TRIANGLE(lane)                                            \
     if (lane < gl_WorkGroupSize.x) {                                   \
         Triangle theirs = triangles.triangle[index.value[lane]];       \
         bool own = gl_SubgroupInvocationID == lane;                    \
         mine.v0 = own ? theirs.v0 : mine.v0;                           \
-        mine.primitive = own ? theirs.primitive : mine.primitive;      \
         mine.v1 = own ? theirs.v1 : mine.v1;                           \
         mine.v2 = own ? theirs.v2 : mine.v2;                           \
+        mine.primitive = own ? theirs.primitive : mine.primitive;      \
     }
     FOR_EACH_LANE(LOAD_TRIANGLE)
     return mine;

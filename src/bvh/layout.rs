@@ -6,7 +6,7 @@
 //! | --- | --- | --- |
 //! | [`Header`] | 128 | 0 |
 //! | [`Node`] × `node_slots` | 64 each | [`NODES_OFFSET`] |
-//! | [`Triangle`] × `primitive_count` | 48 each | behind the nodes: [`Sizes::triangles_offset`] |
+//! | [`Triangle`] × `primitive_count` | 40 each | behind the nodes: [`Sizes::triangles_offset`] |
 //!
 //! A [`Child`] names either an inner node (`count` 0) or a leaf: `count` triangles from `index` on, in the *primitive order*,
 //! which is the order of the triangle records. A slot that no child names is not part of the tree; what it holds may be the
@@ -18,7 +18,7 @@ use bytemuck::{Pod, Zeroable};
 /// The first word of a structure.
 pub const MAGIC: u32 = u32::from_le_bytes(*b"hdgr");
 /// The second word: layout `Bvh2`, version 1.
-pub const KIND_BVH2: u32 = 0x0002_0001;
+pub const KIND_BVH2: u32 = 0x0002_0002;
 /// Where the nodes begin.
 pub const NODES_OFFSET: u64 = size_of::<Header>() as u64;
 /// The deepest tree a tracer must be able to walk: every code bit and every index bit may cost a level.
@@ -135,22 +135,18 @@ impl Node {
     pub const UNUSED: Node = Node { children: [Child::UNUSED; 2] };
 }
 
-/// A triangle in the primitive order. 48 bytes.
+/// A triangle in the primitive order. 40 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Triangle {
     /// First vertex.
     pub v0: [f32; 3],
-    /// Primitive index: position in the input.
-    pub primitive: u32,
     /// Second vertex.
     pub v1: [f32; 3],
-    /// Zero; for geometry indices later.
-    pub geometry: u32,
     /// Third vertex.
     pub v2: [f32; 3],
-    /// Zero; for flags later.
-    pub flags: u32,
+    /// Primitive index: position in the input.
+    pub primitive: u32,
 }
 
 /// The head of a structure. 128 bytes.
@@ -197,7 +193,7 @@ pub const fn node_slots(primitive_count: u32) -> u32 {
     if primitive_count < 2 { 1 } else { primitive_count - 1 }
 }
 
-const _: () = assert!(size_of::<Header>() == 128 && size_of::<Node>() == 64 && size_of::<Triangle>() == 48);
+const _: () = assert!(size_of::<Header>() == 128 && size_of::<Node>() == 64 && size_of::<Triangle>() == 40);
 
 /// A `Bvh2` on the host, read back or built there.
 #[derive(Debug, Clone)]

@@ -42,7 +42,7 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, colla
         .iter()
         .map(|&(_, primitive)| {
             let [v0, v1, v2] = corners[primitive as usize].unwrap_or([[0.0; 3]; 3]);
-            Triangle { v0, primitive, v1, geometry: 0, v2, flags: 0 }
+            Triangle { v0, v1, v2, primitive }
         })
         .collect();
     let mut tree = Tree {
