@@ -43,13 +43,12 @@ impl<'a> Built<'a> {
     fn new(device: &'a Device, scene: &Scene, options: &Options) -> Result<Built<'a>> {
         let mesh = &scene.mesh;
         let vertices = [device.upload("positions", &mesh.positions)?, device.upload("indices", &mesh.triangles)?];
-        let input = Input {
-            positions: vertices[0].address(),
-            vertex_count: mesh.positions.len() as u32,
-            vertex_stride: 3,
-            indices: vertices[1].address(),
-            primitive_count: mesh.triangles.len() as u32,
-        };
+        let input = Input::mesh(
+            vertices[0].address(),
+            mesh.positions.len() as u32,
+            vertices[1].address(),
+            mesh.triangles.len() as u32,
+        );
         let lbvh = Lbvh::new(device, options, input.primitive_count)?;
         let sizes = lbvh.sizes();
         let structure = device.buffer("structure", sizes.structure)?;

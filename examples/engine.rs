@@ -117,13 +117,12 @@ impl Engine {
         position_buffer.write(bytemuck::cast_slice(positions))?;
         triangle_buffer.write(bytemuck::cast_slice(triangles))?;
 
-        let input = Input {
-            positions: position_buffer.address,
-            vertex_count: positions.len() as u32,
-            vertex_stride: 3,
-            indices: triangle_buffer.address,
-            primitive_count: triangles.len() as u32,
-        };
+        let input = Input::mesh(
+            position_buffer.address,
+            positions.len() as u32,
+            triangle_buffer.address,
+            triangles.len() as u32,
+        );
         let push = Push {
             scene: structure.address,
             positions: position_buffer.address,

@@ -3,6 +3,7 @@
 //! A module declares its push constants with `gpu::push_constants!`; every shader of the table must find its module in
 //! `arguments_of`, so that a new one cannot be forgotten. Names may differ by the ending `_address`.
 
+use crate::bvh::geometry::Geometry;
 use crate::bvh::layout::{Child, Header, Node, Triangle};
 use crate::gpu::shaders;
 use crate::trace::{Hit, Ray};
@@ -68,11 +69,16 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         layout_of!(Header { magic, kind, status, primitive_count, root, active, node_slots, code_bits, reserved });
     // `active` is a reserved word of GLSL.
     header.members[5].0 = "active_count".into();
+    // Both formats are one word there.
+    let mut geometry =
+        layout_of!(Geometry { vertices, indices, transform, vertex_stride, vertex_count, vertex_format, first });
+    geometry.members[5] = ("formats".into(), offset_of!(Geometry, vertex_format), 4);
     BTreeMap::from([
         ("Child", layout_of!(Child { lo, index, hi, count })),
         ("Node", node),
         ("Triangle", layout_of!(Triangle { v0, v1, v2, primitive })),
         ("Header", header),
+        ("Geometry", geometry),
         ("Ray", layout_of!(Ray { origin, t_min, direction, t_max })),
         ("Hit", layout_of!(Hit { t, primitive, u, v })),
     ])

@@ -23,13 +23,8 @@ fn twenty_builds_give_the_same_bytes_and_touch_nothing_else() {
             let sizes = lbvh.sizes();
             let vertices = device.upload("positions", &positions).unwrap();
             let indices = device.upload("indices", &triangles).unwrap();
-            let input = Input {
-                positions: vertices.address(),
-                vertex_count: positions.len() as u32,
-                vertex_stride: 3,
-                indices: indices.address(),
-                primitive_count: triangles.len() as u32,
-            };
+            let input =
+                Input::mesh(vertices.address(), positions.len() as u32, indices.address(), triangles.len() as u32);
             let guarded = |bytes: u64| [vec![0u8; bytes as usize], GUARD.to_vec()].concat();
             let structure = device.upload("structure", &guarded(sizes.structure)).unwrap();
             let scratch = device.upload("scratch", &guarded(sizes.scratch)).unwrap();

@@ -19,13 +19,7 @@ fn build_on_device(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &Opt
     let structure = device.buffer("structure", sizes.structure).unwrap();
     let scratch = device.buffer("scratch", sizes.scratch).unwrap();
     structure.write(&vec![0u8; sizes.structure as usize]);
-    let input = Input {
-        positions: vertices.address(),
-        vertex_count: positions.len() as u32,
-        vertex_stride: 3,
-        indices: indices.address(),
-        primitive_count: triangles.len() as u32,
-    };
+    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), triangles.len() as u32);
     device.run(None, |r| builder.record(r, &input, structure.address(), scratch.address())).unwrap();
     let bytes = structure.read::<u8>(sizes.structure as usize);
     (Bvh2::from_bytes(&bytes).unwrap(), bytes)

@@ -41,17 +41,19 @@ BUFFER LbvhState {
 };
 
 layout(push_constant, scalar) uniform Arguments {
-    uvec2 positions;
+    uvec2 vertices;     // these, with vertex_stride, vertex_count and formats, are a Geometry
     uvec2 indices;
+    uvec2 transform;
     uvec2 structure_address;
     uvec2 state_address;
     uvec2 keys[2];
     uvec2 values[2];
     uvec2 ends_address;
     uvec2 table_address;
-    uint primitive_count;
-    uint vertex_count;
     uint vertex_stride;
+    uint vertex_count;
+    uint formats;
+    uint primitive_count;
     uint code_kind;     // order, bits << 8, size group << 16, concise << 24, collapse << 25
     float c_t;
     float c_i;
@@ -60,8 +62,8 @@ layout(push_constant, scalar) uniform Arguments {
     uint passes;        // of the radix sort
 };
 
-Input mesh() {
-    return Input(Floats(positions), Words(indices), primitive_count, vertex_count, vertex_stride);
+Geometry geometries() {
+    return Geometry(vertices, indices, transform, vertex_stride, vertex_count, formats, 0);
 }
 
 CodeKind kind_of_codes() {
@@ -76,7 +78,7 @@ bool collapses() {
 
 void lbvh_bounds(uint task) {
     LbvhState state = LbvhState(state_address);
-    Input input_mesh = mesh();
+    Geometry input_geometries = geometries();
     uvec3 lo = uvec3(NONE), hi = uvec3(0), centroid_lo = uvec3(NONE), centroid_hi = uvec3(0);
     uint active_count = 0, status = 0;
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
@@ -84,7 +86,7 @@ void lbvh_bounds(uint task) {
         uint primitive = first + k * gl_WorkGroupSize.x;
         if (primitive < primitive_count) {
             Corners corners;
-            uint why_not = load_corners(input_mesh, primitive, corners);
+            uint why_not = load_corners(input_geometries, primitive, corners);
             status |= why_not;
             if (why_not == 0) {
                 Box b = box_around(corners);
@@ -153,7 +155,7 @@ void lbvh_plan() {
 
 void lbvh_encode(uint task) {
     LbvhState state = LbvhState(state_address);
-    Input input_mesh = mesh();
+    Geometry input_geometries = geometries();
     CodeKind kind = kind_of_codes();
     CodePlan plan = state.plan;
     Words codes = Words(keys[0]);
@@ -163,7 +165,7 @@ void lbvh_encode(uint task) {
         uint primitive = first + k * gl_WorkGroupSize.x;
         if (primitive < primitive_count) {
             Corners corners;
-            bool is_active = load_corners(input_mesh, primitive, corners) == 0;
+            bool is_active = load_corners(input_geometries, primitive, corners) == 0;
             Box b = box_around(corners);
             if (KEY_WORDS == 1) {
                 codes.word[primitive] = is_active ? narrow_encode(kind, plan, b) : inactive_code(kind).x;
@@ -313,7 +315,7 @@ void lbvh_hierarchy(uint task) {
     LbvhState state = LbvhState(state_address);
     Structure structure = Structure(structure_address);
     Triangles triangles = triangles_at(structure_address, max(primitive_count, 2) - 1);
-    Input input_mesh = mesh();
+    Geometry input_geometries = geometries();
     uint active_count = state.active_count;
     float area_scale = state.plan.area_scale;
     uint is_free = 1 - (passes & 1);
@@ -332,7 +334,7 @@ void lbvh_hierarchy(uint task) {
         if (position < end) {
             uint primitive = order.word[position];
             Corners c;
-            load_corners(input_mesh, primitive, c);
+            load_corners(input_geometries, primitive, c);
             triangles.triangle[position] = Triangle(c.v0, c.v1, c.v2, primitive);
             climbs = position < active_count;
             // Slots from active_count - 1 on have no node.

@@ -1,17 +1,31 @@
-// The caller's triangles: three vertex indices each, and positions with a stride. What is not finite or out of range is
-// left out, and never read outside the buffers.
+// The caller's triangles, in the formats of src/bvh/geometry.rs. What is not finite or out of range is left out, and never
+// read outside the buffers (but for the rest of an aligned word).
 #ifndef HEDGEROW_BVH_TRIANGLES
 #define HEDGEROW_BVH_TRIANGLES
 #include "gpu/pass.glsl"
 #include "bvh/layout.glsl"
 
-struct Input {
-    Floats positions;
-    Words indices;
-    uint primitive_count;
+// One geometry of three floats a vertex and 32-bit indices without a transform; one of any formats; several of any formats.
+const uint SOURCE_MESH = 0;
+const uint SOURCE_GEOMETRY = 1;
+const uint SOURCE_GEOMETRIES = 2;
+layout(constant_id = 5) const uint SOURCE = 0;
+
+const uint COMPONENT_FLOAT = 0;
+const uint COMPONENT_HALF = 1;
+const uint COMPONENT_SNORM = 2;
+
+struct Geometry {
+    uvec2 vertices;
+    uvec2 indices;
+    uvec2 transform;      // 0: none
+    uint vertex_stride;   // bytes
     uint vertex_count;
-    uint vertex_stride;   // floats from one vertex to the next
+    uint formats;         // kind of component, components << 8, bytes of an index << 16
+    uint first;
 };
+
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Geometries { Geometry geometry[]; };
 
 struct Corners {
     vec3 v0;
@@ -34,17 +48,91 @@ vec3 without_negative_zero(vec3 v) {
     return uintBitsToFloat(mix(floatBitsToUint(v), uvec3(0), equal(floatBitsToUint(v), uvec3(0x80000000u))));
 }
 
-vec3 vertex_at(Input mesh, uint index) {
-    uint at = index * mesh.vertex_stride;
-    return vec3(mesh.positions.value[at], mesh.positions.value[at + 1], mesh.positions.value[at + 2]);
+uvec2 address_of(uvec2 base, uint index, uint stride) {
+    uint high, low, carry;
+    umulExtended(index, stride, high, low);
+    base.x = uaddCarry(base.x, low, carry);
+    base.y += high + carry;
+    return base;
+}
+
+// The low bits of what lies at an address: the word around it, shifted.
+uint bits_at(uvec2 address) {
+    return Words(uvec2(address.x & ~3u, address.y)).word[0] >> 8u * (address.x & 3u);
+}
+
+float from_half(uint bits) {
+    uint exponent = bits >> 10 & 31u, mantissa = bits & 1023u;
+    // Exact, and normal however small.
+    precise float subnormal = float(mantissa) * uintBitsToFloat((127u - 24u) << 23);
+    uint magnitude = exponent == 0u ? floatBitsToUint(subnormal)
+                                    : exponent == 31u ? 0x7F800000u | mantissa << 13 : exponent + 112u << 23 | mantissa << 13;
+    return uintBitsToFloat((bits & 0x8000u) << 16 | magnitude);
+}
+
+float from_snorm(uint bits) {
+    precise float x = float(bitfieldExtract(int(bits), 0, 16)) * (1.0 / 32767.0);
+    return max(x, -1.0);
+}
+
+vec3 any_vertex_at(Geometry g, uint index) {
+    uint kind = g.formats & 0xFFu, components = g.formats >> 8 & 0xFFu;
+    uvec2 at = address_of(g.vertices, index, g.vertex_stride);
+    vec3 v = vec3(0);
+    for (uint k = 0; k < 3; ++k) {
+        if (k < components) {
+            uint bits = bits_at(address_of(at, k, kind == COMPONENT_FLOAT ? 4u : 2u)) ;
+            v[k] = kind == COMPONENT_FLOAT ? uintBitsToFloat(bits) : kind == COMPONENT_HALF ? from_half(bits & 0xFFFFu) : from_snorm(bits);
+        }
+    }
+    if (all(equal(g.transform, uvec2(0)))) return v;
+    Floats m = Floats(g.transform);
+    precise vec3 moved;
+    for (uint row = 0; row < 3; ++row) {
+        moved[row] = m.value[4 * row] * v.x + m.value[4 * row + 1] * v.y + m.value[4 * row + 2] * v.z + m.value[4 * row + 3];
+    }
+    return moved;
+}
+
+vec3 vertex_at(Geometry g, uint index) {
+    if (SOURCE != SOURCE_MESH) return any_vertex_at(g, index);
+    Floats positions = Floats(g.vertices);
+    uint at = index * (g.vertex_stride >> 2);
+    return vec3(positions.value[at], positions.value[at + 1], positions.value[at + 2]);
+}
+
+// The last geometry that begins at the primitive or before; `g` names the records and, in `vertex_count`, how many they are.
+Geometry geometry_of(Geometry g, uint primitive) {
+    Geometries records = Geometries(g.vertices);
+    uint at = 0, end = g.vertex_count;
+    for (uint halving = 0; halving < 32 && at + 1 < end; ++halving) {
+        uint middle = at + (end - at) / 2;
+        if (records.geometry[middle].first <= primitive) at = middle;
+        else end = middle;
+    }
+    return records.geometry[at];
+}
+
+uvec3 indices_of(Geometry g, uint triangle) {
+    if (SOURCE == SOURCE_MESH) {
+        Words indices = Words(g.indices);
+        return uvec3(indices.word[3 * triangle], indices.word[3 * triangle + 1], indices.word[3 * triangle + 2]);
+    }
+    uint bytes = g.formats >> 16 & 0xFFu;
+    uvec3 v = 3 * triangle + uvec3(0, 1, 2);
+    if (bytes == 0u) return v;
+    uint mask = bytes == 4u ? 0xFFFFFFFFu : (1u << 8u * bytes) - 1u;
+    for (uint k = 0; k < 3; ++k) v[k] = bits_at(address_of(g.indices, v[k], bytes)) & mask;
+    return v;
 }
 
 // The corners of a primitive; returns 0, or the status bit that tells why it is left out (then the corners are zero).
-uint load_corners(Input mesh, uint primitive, out Corners c) {
-    uvec3 v = uvec3(mesh.indices.word[3 * primitive], mesh.indices.word[3 * primitive + 1], mesh.indices.word[3 * primitive + 2]);
+uint load_corners(Geometry g, uint primitive, out Corners c) {
+    if (SOURCE == SOURCE_GEOMETRIES) g = geometry_of(g, primitive);
+    uvec3 v = indices_of(g, primitive - g.first);
     c = Corners(vec3(0), vec3(0), vec3(0));
-    if (max(v.x, max(v.y, v.z)) >= mesh.vertex_count) return STATUS_INDEX_OUT_OF_RANGE;
-    vec3 v0 = vertex_at(mesh, v.x), v1 = vertex_at(mesh, v.y), v2 = vertex_at(mesh, v.z);
+    if (max(v.x, max(v.y, v.z)) >= g.vertex_count) return STATUS_INDEX_OUT_OF_RANGE;
+    vec3 v0 = vertex_at(g, v.x), v1 = vertex_at(g, v.y), v2 = vertex_at(g, v.z);
     if (!is_finite(v0) || !is_finite(v1) || !is_finite(v2)) return STATUS_NON_FINITE;
     c = Corners(without_negative_zero(v0), without_negative_zero(v1), without_negative_zero(v2));
     return 0;

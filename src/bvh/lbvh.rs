@@ -5,6 +5,7 @@
 //! [`super::host::lbvh`]: the same bytes.
 
 use super::codes::{Code, Codes};
+pub use super::geometry::{Geometry, Input, Source};
 use super::layout;
 use super::sah::Collapse;
 use crate::gpu::push_constants::push_constants;
@@ -52,21 +53,6 @@ impl std::fmt::Display for Schedule {
     }
 }
 
-/// The caller's triangles on the device.
-#[derive(Debug, Clone, Copy)]
-pub struct Input {
-    /// Address of the vertex positions: three floats each, 4-byte aligned.
-    pub positions: u64,
-    /// Vertices there are. Triangles that name others are left out.
-    pub vertex_count: u32,
-    /// Floats from one vertex to the next, at least 3.
-    pub vertex_stride: u32,
-    /// Address of the indices: three `u32` a triangle, 4-byte aligned.
-    pub indices: u64,
-    /// Triangles, at most [`radix_sort::MAX_COUNT`].
-    pub primitive_count: u32,
-}
-
 /// Bytes that a build needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sizes {
@@ -99,29 +85,35 @@ struct Scratch {
     bytes: u64,
 }
 
+/// Specialisation constant 5 of the kernels that read triangles: `SOURCE` in triangles.glsl.
+const SOURCE_MESH: u32 = 0;
+const SOURCE_GEOMETRY: u32 = 1;
+const SOURCE_GEOMETRIES: u32 = 2;
+
 /// Bytes of `LbvhState` in lbvh.glsl, with room to spare.
 const STATE_BYTES: u64 = 768;
 
 push_constants! {
     struct Arguments {
-        positions: u64,
+        vertices: u64,
         indices: u64,
+        transform: u64,
         structure: u64,
         state: u64,
         keys: [u64; 2],
         values: [u64; 2],
         ends: u64,
         table: u64,
-        primitive_count: u32,
-        vertex_count: u32,
         vertex_stride: u32,
+        vertex_count: u32,
+        formats: u32,
+        primitive_count: u32,
         code_kind: u32,
         c_t: f32,
         c_i: f32,
         columns: u32,
         column_keys: u32,
         passes: u32,
-        padding: u32,
     }
 }
 
@@ -178,8 +170,11 @@ impl Lbvh {
     /// Bytes that a phase must move if it reads each of its inputs once and writes each of its outputs once: what its time is
     /// held against. `None` for a phase that there is not.
     pub fn traffic(&self, phase: &str, input: &Input) -> Option<u64> {
+        let Source::One(geometry) = input.source else { return None };
         let count = u64::from(self.count);
-        let triangles = 12 * count + 12 * u64::from(input.vertex_count);
+        let vertex = geometry.vertex_format.component_bytes() * geometry.vertex_format.components();
+        let triangles =
+            u64::from(3 * geometry.index_format.bytes()) * count + u64::from(vertex) * u64::from(geometry.vertex_count);
         let key = 4 * u64::from(self.key_words()) * count;
         let value = 4 * count;
         // Each pass reads the keys for counting, then keys and values, and writes both; the first knows the values.
@@ -232,23 +227,34 @@ impl Lbvh {
         Kernel::new(shader, self.shape.workgroup, &self.shape.constants(self.items, self.key_words()))
     }
 
-    /// The kernels that [`Lbvh::record`] dispatches, to make their pipelines ahead with [`Context::warm`].
-    pub fn kernels(&self) -> Vec<Kernel> {
+    /// A kernel that reads triangles.
+    fn reading_kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
+        let source = match input.source {
+            Source::One(geometry) if geometry.is_plain() => SOURCE_MESH,
+            Source::One(_) => SOURCE_GEOMETRY,
+            Source::Several { .. } => SOURCE_GEOMETRIES,
+        };
+        let constants = self.shape.constants(self.items, self.key_words());
+        Kernel::new(shader, self.shape.workgroup, &[&constants[..], &[source]].concat())
+    }
+
+    /// The kernels that [`Lbvh::record`] dispatches for `input`, to make their pipelines ahead with [`Context::warm`].
+    pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
         let mut kernels = vec![self.kernel(&shaders::BVH_LBVH_RESET)];
-        kernels.extend(match self.schedule {
-            Schedule::Persistent => vec![self.kernel(&shaders::BVH_LBVH_PERSISTENT)],
-            Schedule::Chain => [
-                &shaders::BVH_LBVH_BOUNDS,
-                &shaders::BVH_LBVH_PLAN,
-                &shaders::BVH_LBVH_ENCODE,
-                &shaders::GPU_RADIX_SORT_COUNT,
-                &shaders::GPU_RADIX_SORT_SCAN,
-                &shaders::GPU_RADIX_SORT_SCATTER,
-                &shaders::BVH_LBVH_HIERARCHY,
-            ]
-            .map(|shader| self.kernel(shader))
-            .to_vec(),
-        });
+        match self.schedule {
+            Schedule::Persistent => kernels.push(self.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input)),
+            Schedule::Chain => {
+                let reading = [&shaders::BVH_LBVH_BOUNDS, &shaders::BVH_LBVH_ENCODE, &shaders::BVH_LBVH_HIERARCHY];
+                let others = [
+                    &shaders::BVH_LBVH_PLAN,
+                    &shaders::GPU_RADIX_SORT_COUNT,
+                    &shaders::GPU_RADIX_SORT_SCAN,
+                    &shaders::GPU_RADIX_SORT_SCATTER,
+                ];
+                kernels.extend(reading.map(|shader| self.reading_kernel(shader, input)));
+                kernels.extend(others.map(|shader| self.kernel(shader)));
+            }
+        }
         kernels
     }
 
@@ -270,18 +276,25 @@ impl Lbvh {
         }
         let parts = self.scratch();
         let code = self.codes.code;
+        let geometry = match input.source {
+            Source::One(geometry) => geometry,
+            // The address of the records, and how many there are.
+            Source::Several { records, count } => Geometry { vertex_count: count, ..Geometry::mesh(records, 0, 0) },
+        };
         let arguments = Arguments {
-            positions: input.positions,
-            indices: input.indices,
+            vertices: geometry.vertices,
+            indices: geometry.indices,
+            transform: geometry.transform,
             structure,
             state: scratch,
             keys: parts.keys.map(|at| scratch + at),
             values: parts.values.map(|at| scratch + at),
             ends: scratch + parts.ends,
             table: scratch + parts.table,
+            vertex_stride: geometry.vertex_stride,
+            vertex_count: geometry.vertex_count,
+            formats: geometry.formats(),
             primitive_count: self.count,
-            vertex_count: input.vertex_count,
-            vertex_stride: input.vertex_stride,
             code_kind: code.order_number()
                 | self.codes.bits << 8
                 | code.size_group() << 16
@@ -292,38 +305,37 @@ impl Lbvh {
             columns: self.shape.columns(self.count),
             column_keys: self.shape.column_keys(self.count),
             passes: self.passes(),
-            padding: 0,
         };
         match self.schedule {
-            Schedule::Chain => self.record_chain(recorder, &arguments),
-            Schedule::Persistent => self.record_persistent(recorder, &arguments),
+            Schedule::Chain => self.record_chain(recorder, input, &arguments),
+            Schedule::Persistent => self.record_persistent(recorder, input, &arguments),
         }
     }
 
-    fn record_chain(&self, recorder: &mut Recorder<'_>, arguments: &Arguments) -> Result<()> {
+    fn record_chain(&self, recorder: &mut Recorder<'_>, input: &Input, arguments: &Arguments) -> Result<()> {
         recorder.phase("bounds");
         recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_RESET), arguments, 1)?;
         recorder.barrier();
-        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_BOUNDS), arguments, self.tiles())?;
+        recorder.dispatch(&self.reading_kernel(&shaders::BVH_LBVH_BOUNDS, input), arguments, self.tiles())?;
         recorder.barrier();
         recorder.phase("encode");
         recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_PLAN), arguments, 1)?;
         recorder.barrier();
-        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_ENCODE), arguments, self.tiles())?;
+        recorder.dispatch(&self.reading_kernel(&shaders::BVH_LBVH_ENCODE, input), arguments, self.tiles())?;
         recorder.barrier();
         recorder.phase("sort");
         let sort = radix_sort::Sort { count: self.count, bits: self.codes.bits, identity: true };
         let buffers = radix_sort::Buffers { keys: arguments.keys, values: arguments.values, table: arguments.table };
         radix_sort::record(recorder, &self.shape, &buffers, &sort)?;
         recorder.phase("hierarchy");
-        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_HIERARCHY), arguments, self.tiles())
+        recorder.dispatch(&self.reading_kernel(&shaders::BVH_LBVH_HIERARCHY, input), arguments, self.tiles())
     }
 
-    fn record_persistent(&self, recorder: &mut Recorder<'_>, arguments: &Arguments) -> Result<()> {
+    fn record_persistent(&self, recorder: &mut Recorder<'_>, input: &Input, arguments: &Arguments) -> Result<()> {
         recorder.phase("build");
         recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_RESET), arguments, 1)?;
         recorder.barrier();
-        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_PERSISTENT), arguments, self.workers)
+        recorder.dispatch(&self.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input), arguments, self.workers)
     }
 }
 

@@ -42,7 +42,6 @@ impl<'a> DeviceLbvh<'a> {
     pub fn new(device: &'a Device, builder: &str, mesh: &Mesh, options: &Options) -> Result<DeviceLbvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let lbvh = Lbvh::new(device, options, count)?;
-        device.warm(&lbvh.kernels())?;
         let sizes = lbvh.sizes();
         let (positions, indices) = (size_of_val(&mesh.positions[..]) as u64, size_of_val(&mesh.triangles[..]) as u64);
         let (needed, available) = (positions + indices + sizes.structure + sizes.scratch, device.found().memory);
@@ -50,13 +49,8 @@ impl<'a> DeviceLbvh<'a> {
             return Err(Error::OutOfMemory { what: format!("{builder} of {count} triangles"), needed, available });
         }
         let vertices = [device.upload("positions", &mesh.positions)?, device.upload("indices", &mesh.triangles)?];
-        let input = Input {
-            positions: vertices[0].address(),
-            vertex_count: mesh.positions.len() as u32,
-            vertex_stride: 3,
-            indices: vertices[1].address(),
-            primitive_count: count,
-        };
+        let input = Input::mesh(vertices[0].address(), mesh.positions.len() as u32, vertices[1].address(), count);
+        device.warm(&lbvh.kernels(&input))?;
         Ok(DeviceLbvh {
             device,
             builder: builder.to_owned(),

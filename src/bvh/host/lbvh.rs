@@ -3,6 +3,7 @@
 //! Lauterbach et al. 2009. Gives the same bytes as the device's (`bvh::lbvh`), which goes bottom-up (Apetrei 2014): the node
 //! that splits between positions i and i + 1 has slot i in both.
 
+use super::geometry::{self, Corners};
 use crate::bvh::codes::{Codes, Plan, code_bounds};
 use crate::bvh::layout::{Aabb, Bvh2, Child, Header, KIND_BVH2, MAGIC, Node, Triangle, node_slots, status};
 use crate::bvh::sah::Collapse;
@@ -10,23 +11,32 @@ use crate::bvh::sah::Collapse;
 /// Builds the LBVH of `triangles` over `positions`. Triangles that are not finite or name vertices that are not there are
 /// left out, and the status says so.
 pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, collapse: Collapse) -> Bvh2 {
-    let count = triangles.len() as u32;
+    let corners = triangles.iter().map(|triangle| {
+        let vertex = |v: u32| positions.get(v as usize).copied().ok_or(status::INDEX_OUT_OF_RANGE);
+        geometry::finite([vertex(triangle[0])?, vertex(triangle[1])?, vertex(triangle[2])?])
+    });
+    build_corners(corners, codes, collapse)
+}
+
+/// Builds the LBVH of triangles that [`HostGeometry::corners`](geometry::HostGeometry::corners) read.
+pub fn build_corners(corners: impl Iterator<Item = Corners>, codes: Codes, collapse: Collapse) -> Bvh2 {
+    let mut status = 0;
+    let corners: Vec<Option<[[f32; 3]; 3]>> = corners
+        .map(|corners| {
+            status |= corners.err().unwrap_or(0);
+            corners.ok()
+        })
+        .collect();
+    let count = corners.len() as u32;
     let mut header = Header {
         magic: MAGIC,
         kind: KIND_BVH2,
+        status,
         primitive_count: count,
         node_slots: node_slots(count),
         code_bits: codes.bits,
         ..bytemuck::Zeroable::zeroed()
     };
-    let corners: Vec<Option<[[f32; 3]; 3]>> = triangles
-        .iter()
-        .map(|triangle| {
-            let corners = corners(positions, triangle);
-            header.status |= corners.err().unwrap_or(0);
-            corners.ok()
-        })
-        .collect();
     let boxes: Vec<Option<Aabb>> = corners.iter().map(|c| c.map(|c| Aabb::around(&c))).collect();
     let (bounds, centroids) = boxes.iter().flatten().fold((Aabb::EMPTY, Aabb::EMPTY), |(bounds, centroids), b| {
         (bounds.union(b), centroids.union(&Aabb { lo: b.centroid(), hi: b.centroid() }))
@@ -57,19 +67,6 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, colla
         active => tree.subtree(0, active as usize - 1).0,
     };
     Bvh2 { header, nodes: tree.nodes, triangles: records }
-}
-
-fn corners(positions: &[[f32; 3]], triangle: &[u32; 3]) -> Result<[[f32; 3]; 3], u32> {
-    let mut corners = [[0.0; 3]; 3];
-    for (corner, &vertex) in corners.iter_mut().zip(triangle) {
-        *corner = *positions.get(vertex as usize).ok_or(status::INDEX_OUT_OF_RANGE)?;
-    }
-    // Adding zero turns −0 into 0: the least of two zeros is then the same on every device.
-    if corners.iter().flatten().all(|x| x.is_finite()) {
-        Ok(corners.map(|c| c.map(|x| x + 0.0)))
-    } else {
-        Err(status::NON_FINITE)
-    }
 }
 
 struct Tree<'a> {

@@ -1,0 +1,188 @@
+//! The caller's triangles: vertices and indices in the formats that Vulkan's acceleration structures take.
+//!
+//! `glsl/bvh/triangles.glsl` reads them on the device; [`host`](super::host::geometry) does the same on the host.
+
+use crate::{Error, Result};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+
+/// Triangles with vertices and indices of one format, at device addresses. 40 bytes, the same on the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Geometry {
+    /// Address of vertex 0, aligned to the size of a component.
+    pub vertices: u64,
+    /// Address of the first index, aligned to its size; without meaning for [`IndexFormat::NONE`].
+    pub indices: u64,
+    /// Address of a 3×4 matrix of `f32`, row by row, that every vertex is multiplied with; 4-byte aligned. 0: none.
+    pub transform: u64,
+    /// Bytes from one vertex to the next, a multiple of the size of a component.
+    pub vertex_stride: u32,
+    /// Vertices there are. Triangles that name others are left out.
+    pub vertex_count: u32,
+    /// The vertices' format.
+    pub vertex_format: VertexFormat,
+    /// The indices' format.
+    pub index_format: IndexFormat,
+    /// Its first triangle's primitive index: how many triangles the geometries before it have.
+    pub first: u32,
+}
+
+impl Geometry {
+    /// Three floats a vertex, one vertex after the other; three 32-bit indices a triangle.
+    pub fn mesh(positions: u64, vertex_count: u32, indices: u64) -> Geometry {
+        Geometry {
+            vertices: positions,
+            indices,
+            transform: 0,
+            vertex_stride: 12,
+            vertex_count,
+            vertex_format: VertexFormat::FLOAT3,
+            index_format: IndexFormat::U32,
+            first: 0,
+        }
+    }
+
+    /// The formats as the device has them, in one word.
+    pub(crate) fn formats(&self) -> u32 {
+        bytemuck::cast([self.vertex_format.kind, self.vertex_format.components, self.index_format.0 as u8, 0])
+    }
+
+    /// Whether it is of the formats of [`Geometry::mesh`], with any stride: these have kernels of their own.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.transform == 0 && self.vertex_format == VertexFormat::FLOAT3 && self.index_format == IndexFormat::U32
+    }
+}
+
+/// How a vertex lies in memory: the kind of its components, and how many of them are read (a third that is not read is 0).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Pod, Zeroable)]
+#[repr(C)]
+pub struct VertexFormat {
+    kind: u8,
+    components: u8,
+}
+
+impl VertexFormat {
+    /// `VK_FORMAT_R32G32B32_SFLOAT`.
+    pub const FLOAT3: VertexFormat = VertexFormat { kind: 0, components: 3 };
+    /// `VK_FORMAT_R32G32_SFLOAT`.
+    pub const FLOAT2: VertexFormat = VertexFormat { kind: 0, components: 2 };
+    /// `VK_FORMAT_R16G16B16A16_SFLOAT`, the fourth left out; also `VK_FORMAT_R16G16B16_SFLOAT`.
+    pub const HALF3: VertexFormat = VertexFormat { kind: 1, components: 3 };
+    /// `VK_FORMAT_R16G16_SFLOAT`.
+    pub const HALF2: VertexFormat = VertexFormat { kind: 1, components: 2 };
+    /// `VK_FORMAT_R16G16B16A16_SNORM`, the fourth left out; also `VK_FORMAT_R16G16B16_SNORM`. A component c stands for
+    /// c · fl(1/32767), at least −1.
+    pub const SNORM3: VertexFormat = VertexFormat { kind: 2, components: 3 };
+    /// `VK_FORMAT_R16G16_SNORM`.
+    pub const SNORM2: VertexFormat = VertexFormat { kind: 2, components: 2 };
+
+    /// Every format.
+    pub const ALL: [VertexFormat; 6] =
+        [Self::FLOAT3, Self::FLOAT2, Self::HALF3, Self::HALF2, Self::SNORM3, Self::SNORM2];
+
+    /// Bytes of a component.
+    pub fn component_bytes(self) -> u32 {
+        if self.kind == Self::FLOAT3.kind { 4 } else { 2 }
+    }
+
+    /// Components that are read: two or three.
+    pub fn components(self) -> u32 {
+        self.components.into()
+    }
+
+    pub(crate) fn is_half(self) -> bool {
+        self.kind == Self::HALF3.kind
+    }
+}
+
+impl TryFrom<vk::Format> for VertexFormat {
+    type Error = Error;
+
+    fn try_from(format: vk::Format) -> Result<VertexFormat> {
+        match format {
+            vk::Format::R32G32B32_SFLOAT | vk::Format::R32G32B32A32_SFLOAT => Ok(VertexFormat::FLOAT3),
+            vk::Format::R32G32_SFLOAT => Ok(VertexFormat::FLOAT2),
+            vk::Format::R16G16B16A16_SFLOAT | vk::Format::R16G16B16_SFLOAT => Ok(VertexFormat::HALF3),
+            vk::Format::R16G16_SFLOAT => Ok(VertexFormat::HALF2),
+            vk::Format::R16G16B16A16_SNORM | vk::Format::R16G16B16_SNORM => Ok(VertexFormat::SNORM3),
+            vk::Format::R16G16_SNORM => Ok(VertexFormat::SNORM2),
+            other => Err(Error::Argument(format!(
+                "vertexFormat {other:?} cannot be built from; take 32-bit or 16-bit floats or 16-bit snorm, two or three of them"
+            ))),
+        }
+    }
+}
+
+/// Bytes of an index; none where the vertices are taken in their order, three a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct IndexFormat(u16);
+
+impl IndexFormat {
+    /// `VK_INDEX_TYPE_NONE_KHR`.
+    pub const NONE: IndexFormat = IndexFormat(0);
+    /// `VK_INDEX_TYPE_UINT8_KHR`.
+    pub const U8: IndexFormat = IndexFormat(1);
+    /// `VK_INDEX_TYPE_UINT16`.
+    pub const U16: IndexFormat = IndexFormat(2);
+    /// `VK_INDEX_TYPE_UINT32`.
+    pub const U32: IndexFormat = IndexFormat(4);
+
+    /// Every format.
+    pub const ALL: [IndexFormat; 4] = [Self::NONE, Self::U8, Self::U16, Self::U32];
+
+    /// Bytes of an index.
+    pub fn bytes(self) -> u32 {
+        self.0.into()
+    }
+}
+
+impl TryFrom<vk::IndexType> for IndexFormat {
+    type Error = Error;
+
+    fn try_from(index_type: vk::IndexType) -> Result<IndexFormat> {
+        match index_type {
+            vk::IndexType::NONE_KHR => Ok(IndexFormat::NONE),
+            vk::IndexType::UINT8_EXT => Ok(IndexFormat::U8),
+            vk::IndexType::UINT16 => Ok(IndexFormat::U16),
+            vk::IndexType::UINT32 => Ok(IndexFormat::U32),
+            other => Err(Error::Argument(format!(
+                "indexType {other:?} cannot be built from; take indices of 8, 16 or 32 bits or none"
+            ))),
+        }
+    }
+}
+
+/// What a build reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Input {
+    /// The geometries.
+    pub source: Source,
+    /// Triangles of all geometries.
+    pub primitive_count: u32,
+}
+
+/// Where the geometries are named.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// In the recording itself.
+    One(Geometry),
+    /// In device memory: `count` [`Geometry`] records at an address aligned to 8 bytes, at least one, in the order of their
+    /// `first`, that of the first being 0.
+    Several {
+        /// Address of the records.
+        records: u64,
+        /// How many there are.
+        count: u32,
+    },
+}
+
+impl Input {
+    /// One geometry as [`Geometry::mesh`] has it.
+    pub fn mesh(positions: u64, vertex_count: u32, indices: u64, primitive_count: u32) -> Input {
+        Input { source: Source::One(Geometry::mesh(positions, vertex_count, indices)), primitive_count }
+    }
+}
+
+const _: () = assert!(size_of::<Geometry>() == 40);

@@ -1,0 +1,219 @@
+//! Triangles in every format: the device's tree is the host's, byte for byte, and that of the same triangles as plain floats.
+
+mod common;
+
+use common::device;
+use common::shapes::{Corners, Random, soup};
+use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Source, VertexFormat};
+use hedgerow::bvh::host;
+use hedgerow::bvh::host::geometry::HostGeometry;
+use hedgerow::bvh::layout::{Bvh2, status};
+use hedgerow::bvh::lbvh::{Lbvh, Options, Schedule};
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::gpu::Buffer;
+
+/// A geometry in the host's memory.
+#[derive(Clone)]
+struct Owned {
+    vertices: Vec<u8>,
+    vertex_stride: u32,
+    vertex_count: u32,
+    vertex_format: VertexFormat,
+    indices: Vec<u8>,
+    index_format: IndexFormat,
+    transform: Option<[[f32; 4]; 3]>,
+    primitive_count: u32,
+}
+
+impl Owned {
+    /// `count` triangles whose vertices are random bits of the format, `padding` bytes apart.
+    fn random(vertex_format: VertexFormat, index_format: IndexFormat, padding: u32, count: u32, seed: u64) -> Owned {
+        let mut random = Random(seed);
+        let bytes = vertex_format.component_bytes();
+        let vertex_stride = bytes * vertex_format.components() + padding;
+        let vertex_count = if index_format == IndexFormat::NONE { 3 * count } else { 200 };
+        let mut vertices = vec![0xa5; (vertex_stride * vertex_count) as usize];
+        for vertex in vertices.chunks_exact_mut(vertex_stride as usize) {
+            for component in vertex.chunks_exact_mut(bytes as usize).take(vertex_format.components() as usize) {
+                match component.len() {
+                    4 => component.copy_from_slice(&random.signed().to_le_bytes()),
+                    // Every pattern: halves that are subnormal, infinite or not numbers, too.
+                    _ => component.copy_from_slice(&(random.bits() as u16).to_le_bytes()),
+                }
+            }
+        }
+        let mut indices = Vec::new();
+        for _ in 0..3 * count {
+            // Some name vertices that are not there.
+            let index = random.bits() % 203;
+            indices.extend_from_slice(&index.to_le_bytes()[..index_format.bytes() as usize]);
+        }
+        let transform = None;
+        Owned {
+            vertices,
+            vertex_stride,
+            vertex_count,
+            vertex_format,
+            indices,
+            index_format,
+            transform,
+            primitive_count: count,
+        }
+    }
+
+    fn view(&self) -> HostGeometry<'_> {
+        HostGeometry {
+            vertices: &self.vertices,
+            vertex_stride: self.vertex_stride,
+            vertex_count: self.vertex_count,
+            vertex_format: self.vertex_format,
+            indices: &self.indices,
+            index_format: self.index_format,
+            transform: self.transform,
+            primitive_count: self.primitive_count,
+        }
+    }
+
+    /// Brings it to the device, its vertices and indices `shift` of their own sizes behind the buffers' beginnings.
+    fn upload(&self, first: u32, shift: usize) -> (Geometry, [Buffer<'static>; 3]) {
+        let shifted = |bytes: &[u8], by: u32| {
+            let by = shift * by as usize;
+            let all: Vec<u8> = std::iter::repeat_n(0x5a, by).chain(bytes.iter().copied()).chain([0; 4]).collect();
+            let buffer = device().upload("geometry", &all).expect("memory");
+            let address = buffer.address() + by as u64;
+            (buffer, address)
+        };
+        let (vertices, vertex_address) = shifted(&self.vertices, self.vertex_format.component_bytes());
+        let (indices, index_address) = shifted(&self.indices, self.index_format.bytes());
+        let matrix = device().upload("transform", &[self.transform.unwrap_or_default()]).expect("memory");
+        let geometry = Geometry {
+            vertices: vertex_address,
+            indices: index_address,
+            transform: if self.transform.is_some() { matrix.address() } else { 0 },
+            vertex_stride: self.vertex_stride,
+            vertex_count: self.vertex_count,
+            vertex_format: self.vertex_format,
+            index_format: self.index_format,
+            first,
+        };
+        (geometry, [vertices, indices, matrix])
+    }
+}
+
+fn built(input: &Input, schedule: Schedule) -> Vec<u8> {
+    let options = Options { codes: Some(Code::Emc64Var.full()), collapse: Collapse::SAH, schedule: Some(schedule) };
+    let builder = Lbvh::new(device(), &options, input.primitive_count).expect("few enough triangles");
+    let sizes = builder.sizes();
+    let structure = device().buffer("structure", sizes.structure).expect("memory");
+    let scratch = device().buffer("scratch", sizes.scratch).expect("memory");
+    structure.write(&vec![0u8; sizes.structure as usize]);
+    device().run(None, |r| builder.record(r, input, structure.address(), scratch.address())).expect("it builds");
+    structure.read(sizes.structure as usize)
+}
+
+#[track_caller]
+fn assert_as_on_the_host(geometries: &[Owned], shift: usize) -> Bvh2 {
+    let corners = geometries.iter().flat_map(|g| g.view().corners().collect::<Vec<_>>());
+    let expected = host::lbvh::build_corners(corners, Code::Emc64Var.full(), Collapse::SAH);
+    expected.validate().expect("a valid tree");
+    let mut first = 0;
+    let mut records = Vec::new();
+    let mut memory = Vec::new();
+    for geometry in geometries {
+        let (record, buffers) = geometry.upload(first, shift);
+        first += geometry.primitive_count;
+        records.push(record);
+        memory.push(buffers);
+    }
+    let buffer = device().upload("records", &records).expect("memory");
+    let several = Source::Several { records: buffer.address(), count: records.len() as u32 };
+    let mut sources = vec![several];
+    sources.extend((records.len() == 1).then(|| Source::One(records[0])));
+    for source in sources {
+        for schedule in [Schedule::Chain, Schedule::Persistent] {
+            let got = built(&Input { source, primitive_count: first }, schedule);
+            assert!(got == expected.to_bytes(), "{source:?} {schedule:?}");
+        }
+    }
+    expected
+}
+
+const MOVED: [[f32; 4]; 3] = [[0.5, -2.0, 0.25, 10.0], [1.0, 0.75, 0.0, -0.3], [0.0, 0.1, -3.0, 1e-3]];
+
+#[test]
+fn every_format_and_layout_gives_the_tree_of_the_host() {
+    for vertex_format in VertexFormat::ALL {
+        for index_format in IndexFormat::ALL {
+            for (padding, transform, shift) in [(0, None, 0), (4, Some(MOVED), 1), (12, None, 3)] {
+                let mut geometry = Owned::random(vertex_format, index_format, padding, 150, 7);
+                geometry.transform = transform;
+                let tree = assert_as_on_the_host(&[geometry], shift);
+                assert!(tree.header.active > 20, "{vertex_format:?} {index_format:?}: there is something to compare");
+                let left_out = index_format != IndexFormat::NONE || vertex_format.component_bytes() == 2;
+                if left_out && vertex_format != VertexFormat::SNORM2 && vertex_format != VertexFormat::SNORM3 {
+                    assert_ne!(tree.header.status & (status::NON_FINITE | status::INDEX_OUT_OF_RANGE), 0);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn several_geometries_are_one_after_the_other() {
+    let geometry = |i: usize, count| {
+        let (vertex_format, index_format) = (VertexFormat::ALL[i % 6], IndexFormat::ALL[i % 4]);
+        let transform = (i % 3 == 1).then_some(MOVED);
+        Owned { transform, ..Owned::random(vertex_format, index_format, 4, count, i as u64) }
+    };
+    assert_as_on_the_host(&[geometry(0, 1), geometry(1, 1)], 0);
+    // Empty ones, at the ends and between.
+    assert_as_on_the_host(
+        &[geometry(2, 0), geometry(3, 70), geometry(4, 0), geometry(5, 0), geometry(6, 9), geometry(7, 0)],
+        1,
+    );
+    let many: Vec<Owned> = (0..100).map(|i| geometry(i, (i as u32 * 7) % 13)).collect();
+    assert_as_on_the_host(&many, 0);
+}
+
+/// Numbers that 16 bits and two components hold exactly give the same hierarchy as the same numbers in 32 bits.
+#[test]
+fn the_same_triangles_in_other_formats_are_the_same_tree() {
+    let corners: Corners = soup(200, 0.3, 3);
+    let eighths = |x: f32| (8.0 * x).round();
+    let plain: Vec<[f32; 3]> = corners.iter().flatten().map(|v| v.map(|x| eighths(x) / 8.0)).collect();
+    // A half of a small multiple of 1/8, from the definition of binary16: exact.
+    let half = |x: f32| {
+        let bits = x.to_bits();
+        if x == 0.0 { 0 } else { ((bits >> 16 & 0x8000) | ((bits >> 23 & 255) - 112) << 10 | bits >> 13 & 1023) as u16 }
+    };
+    let as_floats = Owned {
+        vertices: bytemuck::cast_slice(&plain).to_vec(),
+        vertex_stride: 12,
+        vertex_count: plain.len() as u32,
+        vertex_format: VertexFormat::FLOAT3,
+        indices: Vec::new(),
+        index_format: IndexFormat::NONE,
+        transform: None,
+        primitive_count: 200,
+    };
+    let halves: Vec<[u16; 4]> = plain.iter().map(|v| [half(v[0]), half(v[1]), half(v[2]), 0x7e00]).collect();
+    let as_halves = Owned {
+        vertices: bytemuck::cast_slice(&halves).to_vec(),
+        vertex_stride: 8,
+        vertex_format: VertexFormat::HALF3,
+        ..as_floats.clone()
+    };
+    let count = plain.len() as u32;
+    let indexed = Owned {
+        indices: (0..count).flat_map(|i| (i as u16).to_le_bytes()).collect(),
+        index_format: IndexFormat::U16,
+        ..as_floats.clone()
+    };
+    let expected = assert_as_on_the_host(&[as_floats], 0);
+    assert_eq!(expected.header.active, 200);
+    for other in [as_halves, indexed] {
+        let tree = assert_as_on_the_host(&[other], 0);
+        assert!(tree.to_bytes() == expected.to_bytes());
+    }
+}
