@@ -7,7 +7,7 @@ use crate::bvh::geometry::Geometry;
 use crate::bvh::layout::{Child, Header, Node, Triangle};
 use crate::gpu::shaders;
 use crate::trace::{Hit, Ray};
-use crate::{bvh, gpu, measure, trace};
+use crate::{accel, bvh, gpu, measure, trace};
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{Decoration, Op, StorageClass};
 use std::collections::{BTreeMap, BTreeSet};
@@ -46,6 +46,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
     let (room, name) = shader.split_once('/')?;
     let is = |prefix: &str| name == prefix || name.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('_'));
     Some(match room {
+        "accel" if is("geometries") => accel::push_constants(),
         "bvh" if is("lbvh") => bvh::lbvh::push_constants(),
         "bvh" if is("quality") => bvh::quality::push_constants(),
         "gpu" if is("fill") => gpu::fill::push_constants(),

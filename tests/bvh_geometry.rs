@@ -3,103 +3,14 @@
 mod common;
 
 use common::device;
-use common::shapes::{Corners, Random, soup};
+use common::geometries::{MOVED, Owned, half};
+use common::shapes::{Corners, soup};
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Source, VertexFormat};
+use hedgerow::bvh::geometry::{IndexFormat, Input, Source, VertexFormat};
 use hedgerow::bvh::host;
-use hedgerow::bvh::host::geometry::HostGeometry;
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::lbvh::{Lbvh, Options, Schedule};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::gpu::Buffer;
-
-/// A geometry in the host's memory.
-#[derive(Clone)]
-struct Owned {
-    vertices: Vec<u8>,
-    vertex_stride: u32,
-    vertex_count: u32,
-    vertex_format: VertexFormat,
-    indices: Vec<u8>,
-    index_format: IndexFormat,
-    transform: Option<[[f32; 4]; 3]>,
-    primitive_count: u32,
-}
-
-impl Owned {
-    /// `count` triangles whose vertices are random bits of the format, `padding` bytes apart.
-    fn random(vertex_format: VertexFormat, index_format: IndexFormat, padding: u32, count: u32, seed: u64) -> Owned {
-        let mut random = Random(seed);
-        let bytes = vertex_format.component_bytes();
-        let vertex_stride = bytes * vertex_format.components() + padding;
-        let vertex_count = if index_format == IndexFormat::NONE { 3 * count } else { 200 };
-        let mut vertices = vec![0xa5; (vertex_stride * vertex_count) as usize];
-        for vertex in vertices.chunks_exact_mut(vertex_stride as usize) {
-            for component in vertex.chunks_exact_mut(bytes as usize).take(vertex_format.components() as usize) {
-                match component.len() {
-                    4 => component.copy_from_slice(&random.signed().to_le_bytes()),
-                    // Every pattern: halves that are subnormal, infinite or not numbers, too.
-                    _ => component.copy_from_slice(&(random.bits() as u16).to_le_bytes()),
-                }
-            }
-        }
-        let mut indices = Vec::new();
-        for _ in 0..3 * count {
-            // Some name vertices that are not there.
-            let index = random.bits() % 203;
-            indices.extend_from_slice(&index.to_le_bytes()[..index_format.bytes() as usize]);
-        }
-        let transform = None;
-        Owned {
-            vertices,
-            vertex_stride,
-            vertex_count,
-            vertex_format,
-            indices,
-            index_format,
-            transform,
-            primitive_count: count,
-        }
-    }
-
-    fn view(&self) -> HostGeometry<'_> {
-        HostGeometry {
-            vertices: &self.vertices,
-            vertex_stride: self.vertex_stride,
-            vertex_count: self.vertex_count,
-            vertex_format: self.vertex_format,
-            indices: &self.indices,
-            index_format: self.index_format,
-            transform: self.transform,
-            primitive_count: self.primitive_count,
-        }
-    }
-
-    /// Brings it to the device, its vertices and indices `shift` of their own sizes behind the buffers' beginnings.
-    fn upload(&self, first: u32, shift: usize) -> (Geometry, [Buffer<'static>; 3]) {
-        let shifted = |bytes: &[u8], by: u32| {
-            let by = shift * by as usize;
-            let all: Vec<u8> = std::iter::repeat_n(0x5a, by).chain(bytes.iter().copied()).chain([0; 4]).collect();
-            let buffer = device().upload("geometry", &all).expect("memory");
-            let address = buffer.address() + by as u64;
-            (buffer, address)
-        };
-        let (vertices, vertex_address) = shifted(&self.vertices, self.vertex_format.component_bytes());
-        let (indices, index_address) = shifted(&self.indices, self.index_format.bytes());
-        let matrix = device().upload("transform", &[self.transform.unwrap_or_default()]).expect("memory");
-        let geometry = Geometry {
-            vertices: vertex_address,
-            indices: index_address,
-            transform: if self.transform.is_some() { matrix.address() } else { 0 },
-            vertex_stride: self.vertex_stride,
-            vertex_count: self.vertex_count,
-            vertex_format: self.vertex_format,
-            index_format: self.index_format,
-            first,
-        };
-        (geometry, [vertices, indices, matrix])
-    }
-}
 
 fn built(input: &Input, schedule: Schedule) -> Vec<u8> {
     let options = Options { codes: Some(Code::Emc64Var.full()), collapse: Collapse::SAH, schedule: Some(schedule) };
@@ -138,8 +49,6 @@ fn assert_as_on_the_host(geometries: &[Owned], shift: usize) -> Bvh2 {
     }
     expected
 }
-
-const MOVED: [[f32; 4]; 3] = [[0.5, -2.0, 0.25, 10.0], [1.0, 0.75, 0.0, -0.3], [0.0, 0.1, -3.0, 1e-3]];
 
 #[test]
 fn every_format_and_layout_gives_the_tree_of_the_host() {
@@ -182,11 +91,6 @@ fn the_same_triangles_in_other_formats_are_the_same_tree() {
     let corners: Corners = soup(200, 0.3, 3);
     let eighths = |x: f32| (8.0 * x).round();
     let plain: Vec<[f32; 3]> = corners.iter().flatten().map(|v| v.map(|x| eighths(x) / 8.0)).collect();
-    // A half of a small multiple of 1/8, from the definition of binary16: exact.
-    let half = |x: f32| {
-        let bits = x.to_bits();
-        if x == 0.0 { 0 } else { ((bits >> 16 & 0x8000) | ((bits >> 23 & 255) - 112) << 10 | bits >> 13 & 1023) as u16 }
-    };
     let as_floats = Owned {
         vertices: bytemuck::cast_slice(&plain).to_vec(),
         vertex_stride: 12,

@@ -10,7 +10,7 @@ use super::layout;
 use super::sah::Collapse;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::radix_sort::{self, Shape};
-use crate::gpu::{Context, Kernel, Recorder, shaders};
+use crate::gpu::{Context, Kernel, Recorder, Step, shaders};
 use crate::{Error, Result};
 
 /// What to build, beside the triangles.
@@ -268,6 +268,14 @@ impl Lbvh {
     /// # Errors
     /// The input has another number of triangles than the builder; a pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: u64, scratch: u64) -> Result<()> {
+        recorder.chains(&[self.steps(input, structure, scratch)?])
+    }
+
+    /// What [`Lbvh::record`] records, to be recorded beside other builds by [`Recorder::chains`].
+    ///
+    /// # Errors
+    /// The input has another number of triangles than the builder.
+    pub fn steps(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
         if input.primitive_count != self.count {
             return Err(Error::Argument(format!(
                 "the builder was made for {} triangles, the input has {}; make a builder for it",
@@ -306,36 +314,34 @@ impl Lbvh {
             column_keys: self.shape.column_keys(self.count),
             passes: self.passes(),
         };
-        match self.schedule {
-            Schedule::Chain => self.record_chain(recorder, input, &arguments),
-            Schedule::Persistent => self.record_persistent(recorder, input, &arguments),
-        }
+        Ok(match self.schedule {
+            Schedule::Chain => self.chain(input, &arguments),
+            Schedule::Persistent => self.persistent(input, &arguments),
+        })
     }
 
-    fn record_chain(&self, recorder: &mut Recorder<'_>, input: &Input, arguments: &Arguments) -> Result<()> {
-        recorder.phase("bounds");
-        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_RESET), arguments, 1)?;
-        recorder.barrier();
-        recorder.dispatch(&self.reading_kernel(&shaders::BVH_LBVH_BOUNDS, input), arguments, self.tiles())?;
-        recorder.barrier();
-        recorder.phase("encode");
-        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_PLAN), arguments, 1)?;
-        recorder.barrier();
-        recorder.dispatch(&self.reading_kernel(&shaders::BVH_LBVH_ENCODE, input), arguments, self.tiles())?;
-        recorder.barrier();
-        recorder.phase("sort");
+    fn chain(&self, input: &Input, arguments: &Arguments) -> Vec<Step> {
+        let plain = |phase, shader, groups| Step::new(phase, self.kernel(shader), arguments, groups);
+        let reading = |phase, shader, groups| Step::new(phase, self.reading_kernel(shader, input), arguments, groups);
         let sort = radix_sort::Sort { count: self.count, bits: self.codes.bits, identity: true };
         let buffers = radix_sort::Buffers { keys: arguments.keys, values: arguments.values, table: arguments.table };
-        radix_sort::record(recorder, &self.shape, &buffers, &sort)?;
-        recorder.phase("hierarchy");
-        recorder.dispatch(&self.reading_kernel(&shaders::BVH_LBVH_HIERARCHY, input), arguments, self.tiles())
+        let mut steps = vec![
+            plain("bounds", &shaders::BVH_LBVH_RESET, 1),
+            reading("bounds", &shaders::BVH_LBVH_BOUNDS, self.tiles()),
+            plain("encode", &shaders::BVH_LBVH_PLAN, 1),
+            reading("encode", &shaders::BVH_LBVH_ENCODE, self.tiles()),
+        ];
+        steps.extend(radix_sort::steps(&self.shape, &buffers, &sort));
+        steps.push(reading("hierarchy", &shaders::BVH_LBVH_HIERARCHY, self.tiles()));
+        steps
     }
 
-    fn record_persistent(&self, recorder: &mut Recorder<'_>, input: &Input, arguments: &Arguments) -> Result<()> {
-        recorder.phase("build");
-        recorder.dispatch(&self.kernel(&shaders::BVH_LBVH_RESET), arguments, 1)?;
-        recorder.barrier();
-        recorder.dispatch(&self.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input), arguments, self.workers)
+    fn persistent(&self, input: &Input, arguments: &Arguments) -> Vec<Step> {
+        let persistent = self.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input);
+        vec![
+            Step::new("build", self.kernel(&shaders::BVH_LBVH_RESET), arguments, 1),
+            Step::new("build", persistent, arguments, self.workers),
+        ]
     }
 }
 

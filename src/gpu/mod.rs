@@ -25,5 +25,5 @@ pub use context::{Context, ContextDesc, Kernel, Limits};
 pub use device::{Buffer, Device, DeviceOptions, Found, list};
 #[cfg(feature = "cli")]
 pub use driver_structure::{DriverPreference, DriverSizes, DriverStructure};
-pub use recorder::{Phase, Recorder, Timestamps};
+pub use recorder::{Phase, Recorder, Step, Timestamps};
 pub use requirements::{Features, Requirements, requirements};

@@ -4,7 +4,7 @@
 //! progress between workgroups, so it runs on any device. `glsl/gpu/radix_sort.glsl` is the device's side.
 
 use super::push_constants::push_constants;
-use super::{Kernel, Limits, Recorder, shaders};
+use super::{Kernel, Limits, Recorder, Step, shaders};
 use crate::Result;
 
 /// How the sort is cut for a device: what the pipelines are specialised with.
@@ -135,20 +135,27 @@ push_constants! {
 /// # Panics
 /// The count is over [`MAX_COUNT`], or the bits over 64.
 pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, buffers: &Buffers, sort: &Sort) -> Result<usize> {
+    let steps = steps(shape, buffers, sort);
+    let passes = steps.len() / STEPS_OF_A_PASS;
+    recorder.chains(&[steps])?;
+    recorder.barrier();
+    Ok(passes % 2)
+}
+
+const STEPS_OF_A_PASS: usize = 3;
+
+/// The sort's dispatches, to be recorded with a barrier between each two.
+///
+/// # Panics
+/// The count is over [`MAX_COUNT`], or the bits over 64.
+pub(crate) fn steps(shape: &Shape, buffers: &Buffers, sort: &Sort) -> Vec<Step> {
     let Sort { count, bits, identity } = *sort;
     assert!(count <= MAX_COUNT && bits <= 64, "{count} keys of {bits} bits");
     if count < 2 {
-        return Ok(0);
+        return Vec::new();
     }
     let constants = shape.constants(0, if bits > 32 { 2 } else { 1 });
-    let kernel = |shader| Kernel::new(shader, shape.workgroup, &constants);
-    let (counting, scanning, scattering) = (
-        kernel(&shaders::GPU_RADIX_SORT_COUNT),
-        kernel(&shaders::GPU_RADIX_SORT_SCAN),
-        kernel(&shaders::GPU_RADIX_SORT_SCATTER),
-    );
-    let passes = shape.passes(bits);
-    for pass in 0..passes {
+    let pass = |pass: u32| -> [Step; STEPS_OF_A_PASS] {
         let (from, to) = (pass as usize % 2, (pass as usize + 1) % 2);
         let arguments = Arguments {
             keys: buffers.keys[from],
@@ -163,14 +170,14 @@ pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, buffers: &Buffers, sor
             identity: u32::from(identity && pass == 0),
             padding: 0,
         };
-        recorder.dispatch(&counting, &arguments, shape.column_tasks(count))?;
-        recorder.barrier();
-        recorder.dispatch(&scanning, &arguments, shape.scan_tasks())?;
-        recorder.barrier();
-        recorder.dispatch(&scattering, &arguments, shape.column_tasks(count))?;
-        recorder.barrier();
-    }
-    Ok(passes as usize % 2)
+        [
+            (&shaders::GPU_RADIX_SORT_COUNT, shape.column_tasks(count)),
+            (&shaders::GPU_RADIX_SORT_SCAN, shape.scan_tasks()),
+            (&shaders::GPU_RADIX_SORT_SCATTER, shape.column_tasks(count)),
+        ]
+        .map(|(shader, groups)| Step::new("sort", Kernel::new(shader, shape.workgroup, &constants), &arguments, groups))
+    };
+    (0..shape.passes(bits)).flat_map(pass).collect()
 }
 
 /// What the sort computes, plainly: stable by the low `bits` bits of the keys.

@@ -71,6 +71,22 @@ impl Drop for Timestamps {
     }
 }
 
+/// A dispatch that is ready to be recorded: what a build does between two barriers.
+#[derive(Debug, Clone)]
+pub struct Step {
+    phase: &'static str,
+    kernel: Kernel,
+    arguments: Vec<u8>,
+    groups: u32,
+}
+
+impl Step {
+    /// `groups` workgroups of `kernel` with `arguments` as push constants (at most 128 bytes), in the phase `phase`.
+    pub fn new<T: bytemuck::NoUninit>(phase: &'static str, kernel: Kernel, arguments: &T, groups: u32) -> Step {
+        Step { phase, kernel, arguments: bytemuck::bytes_of(arguments).to_vec(), groups }
+    }
+}
+
 /// Records passes into a command buffer that is the caller's, and being recorded.
 ///
 /// Clobbers the bound compute pipeline and the compute push constants, nothing else.
@@ -136,13 +152,7 @@ impl<'a> Recorder<'a> {
     /// # Errors
     /// The kernel's pipeline could not be made.
     pub fn dispatch<T: bytemuck::NoUninit>(&mut self, kernel: &Kernel, arguments: &T, groups: u32) -> Result<()> {
-        if groups == 0 {
-            return Ok(());
-        }
-        self.bind(kernel, arguments)?;
-        // SAFETY: `new`'s promise; the pipeline is live.
-        unsafe { self.context.ash_device().cmd_dispatch(self.commands, groups, 1, 1) };
-        Ok(())
+        self.dispatch_bytes(kernel, bytemuck::bytes_of(arguments), groups)
     }
 
     /// Like [`Recorder::dispatch`], with as many workgroups as the three words at `offset` of `buffer` say when it runs.
@@ -159,20 +169,52 @@ impl<'a> Recorder<'a> {
         buffer: vk::Buffer,
         offset: u64,
     ) -> Result<()> {
-        self.bind(kernel, arguments)?;
+        self.bind(kernel, bytemuck::bytes_of(arguments))?;
         // SAFETY: the caller's promise.
         unsafe { self.context.ash_device().cmd_dispatch_indirect(self.commands, buffer, offset) };
         Ok(())
     }
 
-    fn bind<T: bytemuck::NoUninit>(&mut self, kernel: &Kernel, arguments: &T) -> Result<()> {
+    /// Records chains of steps side by side: the first steps of all of them, a barrier, the second steps, … with no barrier
+    /// behind the last. Chains must not touch each other's memory.
+    ///
+    /// # Errors
+    /// A kernel's pipeline could not be made.
+    pub fn chains(&mut self, chains: &[Vec<Step>]) -> Result<()> {
+        let longest = chains.iter().max_by_key(|chain| chain.len()).map_or(&[][..], Vec::as_slice);
+        for (at, named) in longest.iter().enumerate() {
+            if at > 0 {
+                self.barrier();
+            }
+            // Shorter chains may be ahead: the longest names the phase.
+            if at == 0 || longest[at - 1].phase != named.phase {
+                self.phase(named.phase);
+            }
+            for step in chains.iter().filter_map(|chain| chain.get(at)) {
+                self.dispatch_bytes(&step.kernel, &step.arguments, step.groups)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn dispatch_bytes(&mut self, kernel: &Kernel, arguments: &[u8], groups: u32) -> Result<()> {
+        if groups == 0 {
+            return Ok(());
+        }
+        self.bind(kernel, arguments)?;
+        // SAFETY: `new`'s promise; the pipeline is live.
+        unsafe { self.context.ash_device().cmd_dispatch(self.commands, groups, 1, 1) };
+        Ok(())
+    }
+
+    fn bind(&mut self, kernel: &Kernel, arguments: &[u8]) -> Result<()> {
         let pipeline = self.context.pipeline(kernel)?;
         let device = self.context.ash_device();
         // SAFETY: `new`'s promise; the pipeline is live and the arguments fit the layout's 128 bytes.
         unsafe {
             device.cmd_bind_pipeline(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline);
-            let bytes = bytemuck::bytes_of(arguments);
-            device.cmd_push_constants(self.commands, self.context.layout(), vk::ShaderStageFlags::COMPUTE, 0, bytes);
+            let layout = self.context.layout();
+            device.cmd_push_constants(self.commands, layout, vk::ShaderStageFlags::COMPUTE, 0, arguments);
         }
         Ok(())
     }

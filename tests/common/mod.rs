@@ -1,8 +1,9 @@
 //! What the device tests share: one device a test binary, with the validation layers on where they are installed.
 #![allow(dead_code, reason = "each test binary uses its part")]
 
+pub mod backends;
 pub mod corpus;
-
+pub mod geometries;
 pub mod shapes;
 
 use hedgerow::gpu::{Device, DeviceOptions};

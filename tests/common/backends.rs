@@ -1,0 +1,270 @@
+//! The driver's acceleration structures and ours behind the same calls, so that one table of cases runs through both.
+
+use super::device;
+use super::geometries::Owned;
+use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
+use hedgerow::ash::{self, vk};
+use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
+use hedgerow::gpu::{Buffer, Kernel, Recorder, shaders};
+use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::{Hit, Query, Ray};
+
+type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
+type Ranges<'a> = &'a [vk::AccelerationStructureBuildRangeInfoKHR];
+
+/// What an engine calls.
+pub trait Backend {
+    fn name(&self) -> &'static str;
+    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static>;
+    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR;
+    fn destroy(&self, structure: vk::AccelerationStructureKHR);
+    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64;
+    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]);
+    fn scratch_alignment(&self) -> u64;
+    /// The hits of rays in a bottom-level structure.
+    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
+}
+
+/// Whether the driver is a lavapipe before Mesa 26. Mesa 26's agrees with us and brute force on every case; 25.0.7's breaks
+/// the specification in two, which are left out for it: a transform multiplies the fourth component of 16-bit formats, which
+/// should not be read; and `firstVertex` leads to other vertices.
+pub fn is_old_lavapipe() -> bool {
+    let version = device().found().driver.strip_prefix("Mesa ").and_then(|v| v.split('.').next()?.parse::<u32>().ok());
+    device().limits.is_cpu() && version.is_some_and(|major| major < 26)
+}
+
+/// Ours, and the driver's where the device has it.
+pub fn backends() -> Vec<Box<dyn Backend>> {
+    let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours(accel::Device::new(device())))];
+    if device().has_ray_query() {
+        let raw = ash::khr::acceleration_structure::Device::new(device().ash_instance(), device().ash_device());
+        all.push(Box::new(Drivers(raw)));
+    }
+    all
+}
+
+pub struct Ours(pub accel::Device<'static>);
+
+impl Backend for Ours {
+    fn name(&self) -> &'static str {
+        "hedgerow"
+    }
+
+    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
+        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
+        unsafe { self.0.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) }
+            .expect("it can be built");
+        sizes
+    }
+
+    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
+        unsafe { self.0.create_acceleration_structure(info) }.expect("the offset is right")
+    }
+
+    fn destroy(&self, structure: vk::AccelerationStructureKHR) {
+        self.0.destroy_acceleration_structure(structure);
+    }
+
+    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
+        let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
+        self.0.get_acceleration_structure_device_address(&info)
+    }
+
+    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]) {
+        unsafe { self.0.cmd_build_acceleration_structures(recorder.commands(), infos, ranges) }
+            .expect("it can be built");
+    }
+
+    fn scratch_alignment(&self) -> u64 {
+        SCRATCH_ALIGNMENT
+    }
+
+    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
+        let count = rays.len() as u32;
+        let ray_buffer = device().upload("rays", rays).expect("memory");
+        let hits = device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
+        let structure = self.address(structure);
+        let buffers = Buffers { structure, rays: ray_buffer.address(), hits: hits.address(), work: None, count };
+        let shape = Shape::of(&device().limits);
+        device().run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
+        hits.read(rays.len())
+    }
+}
+
+pub struct Drivers(pub ash::khr::acceleration_structure::Device);
+
+/// The push constants of `glsl/measure/ray_query.comp`.
+#[derive(Clone, Copy, bytemuck::NoUninit)]
+#[repr(C)]
+struct RayQuery {
+    structure: u64,
+    rays: u64,
+    hits: u64,
+    first: u32,
+    count: u32,
+}
+
+impl Backend for Drivers {
+    fn name(&self) -> &'static str {
+        "driver"
+    }
+
+    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
+        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
+        unsafe { self.0.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) };
+        sizes
+    }
+
+    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
+        unsafe { self.0.create_acceleration_structure(info, None) }.expect("the driver makes it")
+    }
+
+    fn destroy(&self, structure: vk::AccelerationStructureKHR) {
+        unsafe { self.0.destroy_acceleration_structure(structure, None) };
+    }
+
+    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
+        let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
+        unsafe { self.0.get_acceleration_structure_device_address(&info) }
+    }
+
+    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]) {
+        let access =
+            vk::AccessFlags::ACCELERATION_STRUCTURE_READ_KHR | vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR;
+        let barrier = vk::MemoryBarrier::default().src_access_mask(access).dst_access_mask(access);
+        let build = vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
+        let after = build | vk::PipelineStageFlags::COMPUTE_SHADER;
+        let none = vk::DependencyFlags::empty();
+        unsafe {
+            self.0.cmd_build_acceleration_structures(recorder.commands(), infos, ranges);
+            let raw = recorder.context().ash_device();
+            raw.cmd_pipeline_barrier(recorder.commands(), build, after, none, &[barrier], &[], &[]);
+        }
+    }
+
+    fn scratch_alignment(&self) -> u64 {
+        let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
+        unsafe { device().ash_instance().get_physical_device_properties2(device().physical_device(), &mut properties) };
+        u64::from(limits.min_acceleration_structure_scratch_offset_alignment).max(1)
+    }
+
+    /// Through a top level of one instance, which a ray query cannot do without.
+    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
+        let reference = self.address(structure);
+        let flags = vk::GeometryInstanceFlagsKHR::TRIANGLE_FACING_CULL_DISABLE.as_raw();
+        let rows = [[1f32, 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., 0.]];
+        let mut words = [0u32; 16];
+        words[..12].copy_from_slice(bytemuck::cast_slice(&rows));
+        words[12..].copy_from_slice(&[0xff00_0000, flags << 24, reference as u32, (reference >> 32) as u32]);
+        let instances = device().upload("instance", &words).expect("memory");
+        let data = vk::AccelerationStructureGeometryInstancesDataKHR::default()
+            .data(vk::DeviceOrHostAddressConstKHR { device_address: instances.address() });
+        let geometry = [vk::AccelerationStructureGeometryKHR::default()
+            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+            .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data })];
+        let info = BuildInfo::default().ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL).geometries(&geometry);
+        let range = vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(1);
+        let top = Built::new(self, &info, &[range], 0);
+        let count = rays.len() as u32;
+        let ray_buffer = device().upload("rays", rays).expect("memory");
+        let hits = device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
+        let structure = self.address(top.structure);
+        let arguments = RayQuery { structure, rays: ray_buffer.address(), hits: hits.address(), first: 0, count };
+        let kernel = Kernel::new(&shaders::MEASURE_RAY_QUERY, 64, &[0]);
+        device().run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(64))).expect("it traces");
+        let hits = hits.read(rays.len());
+        self.destroy(top.structure);
+        hits
+    }
+}
+
+/// A structure that was built alone, and its memory.
+pub struct Built {
+    pub structure: vk::AccelerationStructureKHR,
+    pub memory: Buffer<'static>,
+    pub bytes: u64,
+}
+
+impl Built {
+    /// Builds what `info` asks for, in a buffer of its own, `offset` bytes behind its beginning.
+    pub fn new(backend: &dyn Backend, info: &BuildInfo<'_>, ranges: Ranges<'_>, offset: u64) -> Built {
+        let counts: Vec<u32> = ranges.iter().map(|r| r.primitive_count).collect();
+        let mut built = Built::place(backend, info, &counts, offset);
+        let scratch = built.scratch(backend, info, &counts);
+        let info = info
+            .dst_acceleration_structure(built.structure)
+            .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.1 });
+        device()
+            .run(None, |recorder| {
+                backend.build(recorder, &[info], &[ranges]);
+                Ok(())
+            })
+            .expect("it builds");
+        built.bytes -= offset;
+        built
+    }
+
+    /// Memory and a handle; nothing is built.
+    pub fn place(backend: &dyn Backend, info: &BuildInfo<'_>, counts: &[u32], offset: u64) -> Built {
+        let bytes = backend.build_sizes(info, counts).acceleration_structure_size;
+        let memory = device().buffer("structure", offset + bytes).expect("memory");
+        let create = vk::AccelerationStructureCreateInfoKHR::default()
+            .buffer(memory.raw())
+            .offset(offset)
+            .size(bytes)
+            .ty(info.ty);
+        Built { structure: backend.create(&create), memory, bytes: offset + bytes }
+    }
+
+    /// Scratch memory for it, and its address.
+    pub fn scratch(&self, backend: &dyn Backend, info: &BuildInfo<'_>, counts: &[u32]) -> (Buffer<'static>, u64) {
+        let alignment = backend.scratch_alignment();
+        let bytes = backend.build_sizes(info, counts).build_scratch_size;
+        let buffer = device().buffer("scratch", bytes + 2 * alignment).expect("memory");
+        // As little aligned as is allowed.
+        let address = buffer.address().next_multiple_of(alignment) + alignment;
+        (buffer, address)
+    }
+}
+
+/// The Vulkan name of a format.
+pub fn vk_format(format: VertexFormat) -> vk::Format {
+    match format {
+        VertexFormat::FLOAT3 => vk::Format::R32G32B32_SFLOAT,
+        VertexFormat::FLOAT2 => vk::Format::R32G32_SFLOAT,
+        VertexFormat::HALF3 => vk::Format::R16G16B16A16_SFLOAT,
+        VertexFormat::HALF2 => vk::Format::R16G16_SFLOAT,
+        VertexFormat::SNORM3 => vk::Format::R16G16B16A16_SNORM,
+        _ => vk::Format::R16G16_SNORM,
+    }
+}
+
+/// The Vulkan name of an index format.
+pub fn vk_index_type(format: IndexFormat) -> vk::IndexType {
+    match format {
+        IndexFormat::U8 => vk::IndexType::UINT8_EXT,
+        IndexFormat::U16 => vk::IndexType::UINT16,
+        IndexFormat::U32 => vk::IndexType::UINT32,
+        _ => vk::IndexType::NONE_KHR,
+    }
+}
+
+/// Vulkan's struct for a geometry on the device.
+pub fn vk_geometry(geometry: &Geometry, owned: &Owned) -> vk::AccelerationStructureGeometryKHR<'static> {
+    let address = |device_address| vk::DeviceOrHostAddressConstKHR { device_address };
+    let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+        .vertex_format(vk_format(owned.vertex_format))
+        .vertex_data(address(geometry.vertices))
+        .vertex_stride(owned.vertex_stride.into())
+        .max_vertex(owned.vertex_count.saturating_sub(1))
+        .index_type(vk_index_type(owned.index_format))
+        .index_data(address(if owned.index_format == IndexFormat::NONE { 0 } else { geometry.indices }))
+        .transform_data(address(geometry.transform));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
+        .flags(vk::GeometryFlagsKHR::OPAQUE)
+}
