@@ -42,7 +42,7 @@ fn assert_as_on_the_host(geometries: &[Owned], shift: usize) -> Bvh2 {
     let mut sources = vec![several];
     sources.extend((records.len() == 1).then(|| Source::One(records[0])));
     for source in sources {
-        for schedule in [Schedule::Chain, Schedule::Persistent] {
+        for schedule in [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup] {
             let got = built(&Input { source, primitive_count: first }, schedule);
             assert!(got == expected.to_bytes(), "{source:?} {schedule:?}");
         }

@@ -40,6 +40,28 @@ BUFFER LbvhState {
     CodePlan plan;
 };
 
+// What a build is given: the push constants, or variables that the shader sets first.
+#ifdef HEDGEROW_LBVH_ARGUMENTS_ARE_SET
+uvec2 vertices;
+uvec2 indices;
+uvec2 transform;
+uvec2 structure_address;
+uvec2 state_address;
+uvec2 keys[2];
+uvec2 values[2];
+uvec2 ends_address;
+uvec2 table_address;
+uint vertex_stride;
+uint vertex_count;
+uint formats;
+uint primitive_count;
+uint code_kind;
+float c_t;
+float c_i;
+uint columns;
+uint column_keys;
+uint passes;
+#else
 layout(push_constant, scalar) uniform Arguments {
     uvec2 vertices;     // these, with vertex_stride, vertex_count and formats, are a Geometry
     uvec2 indices;
@@ -61,6 +83,7 @@ layout(push_constant, scalar) uniform Arguments {
     uint column_keys;
     uint passes;        // of the radix sort
 };
+#endif
 
 Geometry geometries() {
     return Geometry(vertices, indices, transform, vertex_stride, vertex_count, formats, 0);
@@ -72,6 +95,41 @@ CodeKind kind_of_codes() {
 
 bool collapses() {
     return (code_kind >> 25 & 1) != 0;
+}
+
+// ---- reset: writes the state that the others begin with ----
+
+void lbvh_reset() {
+    LbvhState state = LbvhState(state_address);
+    uint i = gl_LocalInvocationIndex;
+    uint tile = gl_WorkGroupSize.x * ITEMS;
+    uint tiles = (primitive_count + tile - 1) / tile;
+    uint columns_a_task = PRIVATE_COUNTERS ? gl_WorkGroupSize.x : 1;
+    uint column_tasks = (columns + columns_a_task - 1) / columns_a_task;
+    uint scan_tasks = (DIGITS + columns_a_task - 1) / columns_a_task;
+    uint phases = PHASES_BEFORE_SORT + PHASES_OF_A_PASS * passes + 1;
+    for (uint word = i; word < 4 + POOL_PHASES_AT_MOST; word += gl_WorkGroupSize.x) {
+        uint phase = word - 4;
+        uint value = 0;
+        if (word == 3) value = phases;
+        if (word >= 4 && phase < phases) {
+            uint step = (phase - PHASES_BEFORE_SORT) % PHASES_OF_A_PASS;
+            if (phase == PHASE_PLAN) value = 1;
+            else if (phase < PHASES_BEFORE_SORT || phase == phases - 1) value = tiles;
+            else value = step == 1 ? scan_tasks : column_tasks;
+        }
+        state.pool[word] = value;
+    }
+    for (uint axis = i; axis < 3; axis += gl_WorkGroupSize.x) {
+        state.boxes_lo[axis] = NONE;
+        state.boxes_hi[axis] = 0;
+        state.centroids_lo[axis] = NONE;
+        state.centroids_hi[axis] = 0;
+    }
+    if (i == 0) {
+        state.active_count = 0;
+        state.status = 0;
+    }
 }
 
 // ---- bounds ----

@@ -2,9 +2,9 @@
 
 use super::geometry;
 use crate::bvh::geometry::{Geometry, Input, Source};
-use crate::bvh::lbvh::{Lbvh, Options, Sizes};
+use crate::bvh::lbvh::{Job, Lbvh, Options, Sizes};
 use crate::gpu::push_constants::push_constants;
-use crate::gpu::{Context, Kernel, Recorder, Step, shaders};
+use crate::gpu::{Context, Kernel, Recorder, shaders};
 use crate::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -73,14 +73,15 @@ impl Build {
         (records * size_of::<Geometry>()).next_multiple_of(SCRATCH_ALIGNMENT as usize) as u64
     }
 
-    fn steps(&self, structure: u64, scratch: u64) -> Result<Vec<Step>> {
+    fn job(&self, structure: u64, scratch: u64) -> Job<'_> {
         let source = match self.geometries[..] {
             [] => Source::One(Geometry::mesh(0, 0, 0)),
             [geometry] => Source::One(geometry),
             _ => Source::Several { records: scratch, count: self.geometries.len() as u32 },
         };
         let input = Input { source, primitive_count: self.primitive_count };
-        self.lbvh.steps(&input, structure, scratch + Build::record_bytes(self.geometries.len()))
+        let scratch = scratch + Build::record_bytes(self.geometries.len());
+        Job { lbvh: &self.lbvh, input, structure, scratch }
     }
 
     /// The dispatches that write the records: they need no barrier between them.
@@ -201,21 +202,22 @@ impl<'a> Device<'a> {
             )));
         }
         let mut builds = Vec::with_capacity(infos.len());
-        let mut chains = Vec::with_capacity(infos.len());
         for (i, (info, ranges)) in infos.iter().zip(build_range_infos).enumerate() {
             // SAFETY: the caller's promise.
             let build = unsafe { self.build_of(info, ranges) }.map_err(|error| within(i, error))?;
             // SAFETY: device builds give device addresses.
             let scratch = unsafe { info.scratch_data.device_address };
-            chains.push(build.steps(info.dst_acceleration_structure.as_raw(), scratch)?);
-            builds.push((build, scratch));
+            builds.push((build, info.dst_acceleration_structure.as_raw(), scratch));
         }
+        let jobs: Vec<Job<'_>> =
+            builds.iter().map(|(build, structure, scratch)| build.job(*structure, *scratch)).collect();
+        let chains = Lbvh::chains(&jobs)?;
         // SAFETY: the caller's promise.
         let mut recorder = unsafe { Recorder::new(self.context, commands) };
-        for (build, scratch) in &builds {
+        for (build, _, scratch) in &builds {
             build.write_records(&mut recorder, *scratch)?;
         }
-        if builds.iter().any(|(build, _)| Build::has_records(build.geometries.len())) {
+        if builds.iter().any(|(build, ..)| Build::has_records(build.geometries.len())) {
             recorder.barrier();
         }
         recorder.chains(&chains)

@@ -12,6 +12,7 @@ use crate::gpu::push_constants::push_constants;
 use crate::gpu::radix_sort::{self, Shape};
 use crate::gpu::{Context, Kernel, Recorder, Step, shaders};
 use crate::{Error, Result};
+use std::collections::HashMap;
 
 /// What to build, beside the triangles.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +43,8 @@ pub enum Schedule {
     Chain,
     /// One persistent dispatch that draws tasks from a pool; needs a device whose started workgroups go on.
     Persistent,
+    /// One workgroup does everything, in one dispatch: for few triangles, at most [`Lbvh::WORKGROUP_MAX`].
+    Workgroup,
 }
 
 impl std::fmt::Display for Schedule {
@@ -49,6 +52,7 @@ impl std::fmt::Display for Schedule {
         f.write_str(match self {
             Schedule::Chain => "chain",
             Schedule::Persistent => "persistent",
+            Schedule::Workgroup => "workgroup",
         })
     }
 }
@@ -117,6 +121,53 @@ push_constants! {
     }
 }
 
+/// A build for one workgroup: `Small` in lbvh_workgroup.comp.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Small {
+    vertices: u64,
+    indices: u64,
+    transform: u64,
+    structure: u64,
+    scratch: u64,
+    vertex_stride: u32,
+    vertex_count: u32,
+    formats: u32,
+    primitive_count: u32,
+}
+
+/// Builds that fit into the push constants.
+const SMALL_AT_ONCE: usize = 2;
+
+pub(crate) mod workgroup {
+    use super::{SMALL_AT_ONCE, Small};
+    use crate::gpu::push_constants::push_constants;
+
+    push_constants! {
+        /// Push constants of `glsl/bvh/lbvh_workgroup.comp`.
+        pub(super) struct Arguments {
+            pub(super) builds: [Small; SMALL_AT_ONCE],
+            pub(super) step_cost: f32,
+            pub(super) test_cost: f32,
+            pub(super) codes: u32,
+            pub(super) state_bytes: u32,
+        }
+    }
+}
+
+/// A build with all that it is recorded with.
+#[derive(Debug, Clone, Copy)]
+pub struct Job<'a> {
+    /// The builder.
+    pub lbvh: &'a Lbvh,
+    /// Its input.
+    pub input: Input,
+    /// Address of the structure.
+    pub structure: u64,
+    /// Address of the scratch memory.
+    pub scratch: u64,
+}
+
 impl Codes {
     /// The codes that `primitive_count` triangles need: about a thousand times as many cells as triangles, in whole passes of
     /// the sort. On scenes of 66k to 1.4M triangles that is 32 bits, and the SAH cost is within 0.6% of that with
@@ -128,6 +179,9 @@ impl Codes {
 }
 
 impl Lbvh {
+    /// Triangles that [`Schedule::Workgroup`] takes at most.
+    pub const WORKGROUP_MAX: u32 = 1 << 16;
+
     /// A builder of `primitive_count` triangles on the device of `context`.
     ///
     /// # Errors
@@ -140,11 +194,21 @@ impl Lbvh {
             )));
         }
         let limits = &context.limits;
-        let shape = Shape::of(limits);
+        let schedule = options.schedule.unwrap_or_else(|| Schedule::for_count(primitive_count));
+        if schedule == Schedule::Workgroup && primitive_count > Lbvh::WORKGROUP_MAX {
+            return Err(Error::Argument(format!(
+                "{primitive_count} triangles by one workgroup: it takes at most {}; choose another schedule",
+                Lbvh::WORKGROUP_MAX
+            )));
+        }
+        let shape = match schedule {
+            Schedule::Workgroup => Shape::of(limits).with_digit_bits(SMALL_DIGIT_BITS),
+            _ => Shape::of(limits),
+        };
         Ok(Lbvh {
             codes: options.codes.unwrap_or_else(|| Codes::for_count(primitive_count)),
             collapse: options.collapse,
-            schedule: options.schedule.unwrap_or(DEFAULT_SCHEDULE),
+            schedule,
             shape,
             items: if limits.is_cpu() { 32 } else { 1 },
             workers: if limits.is_cpu() { 64 } else { 1024 },
@@ -209,8 +273,17 @@ impl Lbvh {
             keys: [take(key_bytes), take(key_bytes)],
             values: [take(4 * count), take(4 * count)],
             ends: take(4 * count),
-            table: take(4 * self.shape.table_words(self.count)),
+            table: take(4 * self.table_words()),
             bytes: at,
+        }
+    }
+
+    /// Words of the sort's table. One workgroup on a CPU gives each of its lanes a strip.
+    fn table_words(&self) -> u64 {
+        if self.schedule == Schedule::Workgroup && self.shape.private_counters {
+            (1 << self.shape.digit_bits) * u64::from(self.shape.workgroup + 1)
+        } else {
+            self.shape.table_words(self.count)
         }
     }
 
@@ -242,6 +315,7 @@ impl Lbvh {
     pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
         let mut kernels = vec![self.kernel(&shaders::BVH_LBVH_RESET)];
         match self.schedule {
+            Schedule::Workgroup => return vec![self.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, input)],
             Schedule::Persistent => kernels.push(self.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input)),
             Schedule::Chain => {
                 let reading = [&shaders::BVH_LBVH_BOUNDS, &shaders::BVH_LBVH_ENCODE, &shaders::BVH_LBVH_HIERARCHY];
@@ -276,19 +350,93 @@ impl Lbvh {
     /// # Errors
     /// The input has another number of triangles than the builder.
     pub fn steps(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
+        let mut chains = Lbvh::chains(&[Job { lbvh: self, input: *input, structure, scratch }])?;
+        Ok(chains.pop().unwrap_or_default())
+    }
+
+    /// The chains of many builds, for [`Recorder::chains`]: one each, but for builds by one workgroup, of which two share a
+    /// dispatch.
+    ///
+    /// # Errors
+    /// An input has another number of triangles than its builder.
+    pub fn chains(jobs: &[Job<'_>]) -> Result<Vec<Vec<Step>>> {
+        let (small, large): (Vec<&Job<'_>>, Vec<&Job<'_>>) =
+            jobs.iter().partition(|job| job.lbvh.schedule == Schedule::Workgroup);
+        let mut chains = large
+            .iter()
+            .map(|job| job.lbvh.chain_of(&job.input, job.structure, job.scratch))
+            .collect::<Result<Vec<_>>>()?;
+        // What fills the push constants together must be of one kind.
+        let mut kinds: HashMap<(Kernel, u32, [u32; 2]), Vec<Small>> = HashMap::new();
+        let mut order = Vec::new();
+        for job in small {
+            let Job { lbvh, input, structure, scratch } = *job;
+            let geometry = lbvh.checked(&input)?;
+            let kernel = lbvh.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, &input);
+            let costs = [lbvh.collapse.c_t.to_bits(), lbvh.collapse.c_i.to_bits()];
+            let kind = (kernel, lbvh.code_kind(), costs);
+            let builds = kinds.entry(kind.clone()).or_default();
+            if builds.is_empty() {
+                order.push(kind);
+            }
+            builds.push(Small {
+                vertices: geometry.vertices,
+                indices: geometry.indices,
+                transform: geometry.transform,
+                structure,
+                scratch,
+                vertex_stride: geometry.vertex_stride,
+                vertex_count: geometry.vertex_count,
+                formats: geometry.formats(),
+                primitive_count: lbvh.count,
+            });
+        }
+        for kind in order {
+            let (kernel, codes, costs) = &kind;
+            for pair in kinds[&kind].chunks(SMALL_AT_ONCE) {
+                let mut builds = [pair[0]; SMALL_AT_ONCE];
+                builds[..pair.len()].copy_from_slice(pair);
+                let arguments = workgroup::Arguments {
+                    builds,
+                    step_cost: f32::from_bits(costs[0]),
+                    test_cost: f32::from_bits(costs[1]),
+                    codes: *codes,
+                    state_bytes: STATE_BYTES as u32,
+                };
+                chains.push(vec![Step::new("build", kernel.clone(), &arguments, pair.len() as u32)]);
+            }
+        }
+        Ok(chains)
+    }
+
+    /// The input's geometry as the kernels are given it.
+    fn checked(&self, input: &Input) -> Result<Geometry> {
         if input.primitive_count != self.count {
             return Err(Error::Argument(format!(
                 "the builder was made for {} triangles, the input has {}; make a builder for it",
                 self.count, input.primitive_count
             )));
         }
-        let parts = self.scratch();
-        let code = self.codes.code;
-        let geometry = match input.source {
+        Ok(match input.source {
             Source::One(geometry) => geometry,
             // The address of the records, and how many there are.
             Source::Several { records, count } => Geometry { vertex_count: count, ..Geometry::mesh(records, 0, 0) },
-        };
+        })
+    }
+
+    /// `code_kind` in lbvh.glsl.
+    fn code_kind(&self) -> u32 {
+        let code = self.codes.code;
+        code.order_number()
+            | self.codes.bits << 8
+            | code.size_group() << 16
+            | u32::from(self.codes.concise) << 24
+            | u32::from(self.collapse.enabled) << 25
+    }
+
+    fn chain_of(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
+        let geometry = self.checked(input)?;
+        let parts = self.scratch();
         let arguments = Arguments {
             vertices: geometry.vertices,
             indices: geometry.indices,
@@ -303,11 +451,7 @@ impl Lbvh {
             vertex_count: geometry.vertex_count,
             formats: geometry.formats(),
             primitive_count: self.count,
-            code_kind: code.order_number()
-                | self.codes.bits << 8
-                | code.size_group() << 16
-                | u32::from(self.codes.concise) << 24
-                | u32::from(self.collapse.enabled) << 25,
+            code_kind: self.code_kind(),
             c_t: self.collapse.c_t,
             c_i: self.collapse.c_i,
             columns: self.shape.columns(self.count),
@@ -315,8 +459,8 @@ impl Lbvh {
             passes: self.passes(),
         };
         Ok(match self.schedule {
-            Schedule::Chain => self.chain(input, &arguments),
             Schedule::Persistent => self.persistent(input, &arguments),
+            Schedule::Chain | Schedule::Workgroup => self.chain(input, &arguments),
         })
     }
 
@@ -345,7 +489,16 @@ impl Lbvh {
     }
 }
 
-/// What measured faster: on lavapipe the chain, by a factor of 1.2 to 1.5 (the loop around the phases costs the persistent kernel
-/// its unmasked loads, and whoever waits takes a core from who works). No GPU has been measured: the chain also asks nothing
-/// of its progress.
-const DEFAULT_SCHEDULE: Schedule = Schedule::Chain;
+/// Triangles up to which one workgroup is faster than a chain of dispatches.
+const SMALL: u32 = 2048;
+/// Bits of a digit for them: with 8, a pass spends more on its table than on a few hundred keys.
+const SMALL_DIGIT_BITS: u32 = 4;
+
+impl Schedule {
+    /// What measured faster. Of few triangles, one workgroup. Of many, on lavapipe the chain, by a factor of 1.2 to 1.5 (the
+    /// loop around the phases costs the persistent kernel its unmasked loads, and whoever waits takes a core from who works).
+    /// No GPU has been measured: the chain also asks nothing of its progress.
+    pub fn for_count(primitive_count: u32) -> Schedule {
+        if primitive_count <= SMALL { Schedule::Workgroup } else { Schedule::Chain }
+    }
+}

@@ -42,6 +42,11 @@ impl Shape {
         Shape { workgroup, digit_bits: 8, private_counters: false, tile_keys: workgroup * ROWS }
     }
 
+    /// The same with digits of other bits: fewer for few keys, whose passes are short beside the table.
+    pub fn with_digit_bits(self, digit_bits: u32) -> Shape {
+        Shape { digit_bits, ..self }
+    }
+
     /// Digits a pass tells apart.
     fn digits(&self) -> u32 {
         1 << self.digit_bits

@@ -63,7 +63,7 @@ const CODES: BuilderOption = BuilderOption {
     values: "mc30, mc63, emc64sort, emc64var or emc64var-nosize, with +concise or /BITS behind",
 };
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
-const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain or persistent" };
+const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
 
 /// Every builder, in the order in which they are listed and measured.
 pub static BUILDERS: &[Builder] = &[
@@ -215,6 +215,7 @@ impl Spec {
             None => None,
             Some("chain") => Some(Schedule::Chain),
             Some("persistent") => Some(Schedule::Persistent),
+            Some("workgroup") => Some(Schedule::Workgroup),
             Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
         };
         Ok(lbvh::Options { codes: self.codes()?, collapse: self.collapse()?, schedule })

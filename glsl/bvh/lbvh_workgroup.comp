@@ -1,0 +1,94 @@
+// Builds of few triangles, each by one workgroup that does all phases: two builds a dispatch. See bvh/lbvh.glsl for the
+// phases' contracts.
+//
+// reads   the triangles
+// writes  the structures; scratch memory of each build
+// needs   nothing of other workgroups; subgroups of any size; workgroups of whole subgroups
+#version 460
+#define HEDGEROW_LBVH_ARGUMENTS_ARE_SET
+#include "bvh/lbvh.glsl"
+
+// The twin of `Small` in src/bvh/lbvh.rs.
+struct Small {
+    uvec2 vertices;
+    uvec2 indices;
+    uvec2 transform;
+    uvec2 structure;
+    uvec2 scratch;
+    uint vertex_stride;
+    uint vertex_count;
+    uint formats;
+    uint primitive_count;
+};
+
+layout(push_constant, scalar) uniform Arguments {
+    Small builds[2];
+    float step_cost;
+    float test_cost;
+    uint codes;
+    uint state_bytes;
+} given;
+
+// What one phase has written to memory, the next reads.
+void next_phase() {
+    controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
+                   gl_SemanticsAcquireRelease | gl_SemanticsMakeAvailable | gl_SemanticsMakeVisible);
+}
+
+// The next part of the scratch memory, as `Lbvh::scratch` lays it out.
+uvec2 take(inout uvec2 at, uint bytes) {
+    uvec2 begin = at;
+    at = address_of(at, (bytes + 15u) / 16u, 16u);
+    return begin;
+}
+
+void main() {
+    Small build = given.builds[gl_WorkGroupID.x];
+    vertices = build.vertices;
+    indices = build.indices;
+    transform = build.transform;
+    structure_address = build.structure;
+    vertex_stride = build.vertex_stride;
+    vertex_count = build.vertex_count;
+    formats = build.formats;
+    primitive_count = build.primitive_count;
+    code_kind = given.codes;
+    c_t = given.step_cost;
+    c_i = given.test_cost;
+    // A strip for each lane, or tiles.
+    column_keys = PRIVATE_COUNTERS ? max((primitive_count + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x, 1u)
+                                   : gl_WorkGroupSize.x * ROWS;
+    columns = (primitive_count + column_keys - 1u) / column_keys;
+    passes = primitive_count < 2u ? 0u : (kind_of_codes().bits + DIGIT_BITS - 1u) / DIGIT_BITS;
+    uvec2 at = build.scratch;
+    state_address = take(at, given.state_bytes);
+    uint key_bytes = 4u * KEY_WORDS * primitive_count;
+    keys[0] = take(at, key_bytes);
+    keys[1] = take(at, key_bytes);
+    values[0] = take(at, 4u * primitive_count);
+    values[1] = take(at, 4u * primitive_count);
+    ends_address = take(at, 4u * primitive_count);
+    table_address = at;
+
+    uint tile = gl_WorkGroupSize.x * ITEMS;
+    uint tiles = (primitive_count + tile - 1u) / tile;
+    uint lanes_a_task = PRIVATE_COUNTERS ? gl_WorkGroupSize.x : 1u;
+    lbvh_reset();
+    next_phase();
+    for (uint task = 0; task < tiles; ++task) lbvh_bounds(task);
+    next_phase();
+    lbvh_plan();
+    next_phase();
+    for (uint task = 0; task < tiles; ++task) lbvh_encode(task);
+    next_phase();
+    for (uint pass = 0; pass < passes; ++pass) {
+        Radix r = lbvh_radix(pass);
+        for (uint task = 0; task * lanes_a_task < columns; ++task) radix_count(r, task);
+        next_phase();
+        for (uint task = 0; task * lanes_a_task < DIGITS; ++task) radix_scan(r, task);
+        next_phase();
+        for (uint task = 0; task * lanes_a_task < columns; ++task) radix_scatter(r, task);
+        next_phase();
+    }
+    for (uint task = 0; task < tiles; ++task) lbvh_hierarchy(task);
+}
