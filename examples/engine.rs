@@ -1,8 +1,9 @@
 //! A small engine that links hedgerow: instance, device, allocator, memory, command buffer and shader are all its own.
 //!
-//! It asks the library what a device must have, makes a device with exactly that, records the build of a structure and the
-//! dispatch of its own shader (`engine.comp`, which includes `glsl/trace/query.glsl`) into one command buffer, submits that
-//! once, and writes what the shader drew.
+//! It asks the library what a device must have, makes a device with exactly that, records the build of a structure (by the
+//! calls and structs of `VK_KHR_acceleration_structure`, which the device need not have) and the dispatch of its own shader
+//! (`engine.comp`, which includes `glsl/trace/query.glsl`) into one command buffer, submits that once, and writes what the
+//! shader drew.
 //!
 //! ```text
 //! cargo run --release --example engine --no-default-features --features compile-shaders -- picture.png
@@ -10,9 +11,9 @@
 
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
+use hedgerow::accel;
 use hedgerow::ash::{self, vk};
-use hedgerow::bvh::lbvh::{Input, Lbvh, Options};
-use hedgerow::gpu::{Context, ContextDesc, Recorder, Requirements, requirements};
+use hedgerow::gpu::{Context, ContextDesc, Requirements, requirements};
 use std::error::Error;
 use std::path::Path;
 
@@ -53,6 +54,26 @@ pub fn draw(path: &Path) -> Result<()> {
     let pixels = engine.render(&positions, &triangles)?;
     let image = image::RgbaImage::from_raw(WIDTH, HEIGHT, pixels).ok_or("the picture has another size")?;
     Ok(image.save(path)?)
+}
+
+/// Three floats a vertex, three 32-bit indices a triangle.
+fn opaque_triangles(
+    positions: &Buffer,
+    vertices: u32,
+    triangles: &Buffer,
+) -> vk::AccelerationStructureGeometryKHR<'static> {
+    let address = |buffer: &Buffer| vk::DeviceOrHostAddressConstKHR { device_address: buffer.address };
+    let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+        .vertex_format(vk::Format::R32G32B32_SFLOAT)
+        .vertex_data(address(positions))
+        .vertex_stride(12)
+        .max_vertex(vertices - 1)
+        .index_type(vk::IndexType::UINT32)
+        .index_data(address(triangles));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
+        .flags(vk::GeometryFlagsKHR::OPAQUE)
 }
 
 /// What every engine has anyway.
@@ -106,25 +127,41 @@ impl Engine {
         // SAFETY: the device was made from these with what `requirements` returned, and outlives the context.
         let context = unsafe { Context::new(&desc) }?;
 
-        // 1. How much memory does the build need? The engine brings it.
-        let builder = Lbvh::new(&context, &Options::DEFAULT, triangles.len() as u32)?;
-        let sizes = builder.sizes();
+        // 1. How much memory does the build need? The engine brings it. The structs are Vulkan's own.
+        let structures = accel::Device::new(&context);
+        let count = triangles.len() as u32;
         let mut position_buffer = self.buffer("positions", size_of_val(positions) as u64)?;
         let mut triangle_buffer = self.buffer("triangles", size_of_val(triangles) as u64)?;
-        let structure = self.buffer("structure", sizes.structure)?;
-        let scratch = self.buffer("scratch", sizes.scratch)?;
-        let picture = self.buffer("picture", u64::from(4 * WIDTH * HEIGHT))?;
         position_buffer.write(bytemuck::cast_slice(positions))?;
         triangle_buffer.write(bytemuck::cast_slice(triangles))?;
+        let geometry = [opaque_triangles(&position_buffer, positions.len() as u32, &triangle_buffer)];
+        let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
+        let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+            .ty(ty)
+            .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)
+            .geometries(&geometry);
+        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
+        // SAFETY: the geometry lives.
+        unsafe { structures.get_acceleration_structure_build_sizes(place, &info, &[count], &mut sizes) }?;
+        let structure = self.buffer("structure", sizes.acceleration_structure_size)?;
+        let scratch = self.buffer("scratch", sizes.build_scratch_size)?;
+        let picture = self.buffer("picture", u64::from(4 * WIDTH * HEIGHT))?;
+        let create = vk::AccelerationStructureCreateInfoKHR::default()
+            .buffer(structure.raw)
+            .size(sizes.acceleration_structure_size)
+            .ty(ty);
+        // SAFETY: the buffer lives and has so many bytes.
+        let scene = unsafe { structures.create_acceleration_structure(&create) }?;
+        let address = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(scene);
+        let address = structures.get_acceleration_structure_device_address(&address);
+        let info = info
+            .dst_acceleration_structure(scene)
+            .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.address });
+        let range = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count)];
 
-        let input = Input::mesh(
-            position_buffer.address,
-            positions.len() as u32,
-            triangle_buffer.address,
-            triangles.len() as u32,
-        );
         let push = Push {
-            scene: structure.address,
+            scene: address,
             positions: position_buffer.address,
             triangles: triangle_buffer.address,
             picture: picture.address,
@@ -135,11 +172,16 @@ impl Engine {
         let pipeline = self.pipeline(size_of::<Push>() as u32)?;
         self.submit(|device, commands| {
             // 2. The library records the build, the engine what it does with it.
-            // SAFETY: the command buffer records, on a queue of the family that `requirements` named.
-            let mut recorder = unsafe { Recorder::new(&context, commands) };
-            builder.record(&mut recorder, &input, structure.address, scratch.address)?;
-            recorder.barrier();
-            drop(recorder);
+            // SAFETY: the command buffer records, on a queue of the family that `requirements` named; all memory lives until
+            // the queue has finished.
+            unsafe {
+                structures.cmd_build_acceleration_structures(commands, &[info], &[&range])?;
+                let built = [vk::MemoryBarrier::default()
+                    .src_access_mask(vk::AccessFlags::SHADER_WRITE)
+                    .dst_access_mask(vk::AccessFlags::SHADER_READ)];
+                let shader = vk::PipelineStageFlags::COMPUTE_SHADER;
+                device.cmd_pipeline_barrier(commands, shader, shader, vk::DependencyFlags::empty(), &built, &[], &[]);
+            }
             // SAFETY: pipeline, layout and buffers live until the queue has finished.
             unsafe {
                 device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.pipeline);
