@@ -47,7 +47,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
     let is = |prefix: &str| name == prefix || name.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('_'));
     Some(match room {
         "accel" if is("geometries") => accel::push_constants(),
-        "bvh" if is("lbvh_workgroup") => bvh::lbvh::workgroup::push_constants(),
+        "bvh" if is("lbvh_workgroup") => bvh::lbvh_workgroup::push_constants(),
         "bvh" if is("lbvh") => bvh::lbvh::push_constants(),
         "bvh" if is("quality") => bvh::quality::push_constants(),
         "gpu" if is("fill") => gpu::fill::push_constants(),

@@ -8,7 +8,7 @@
 #define HEDGEROW_LBVH_ARGUMENTS_ARE_SET
 #include "bvh/lbvh.glsl"
 
-// The twin of `Small` in src/bvh/lbvh.rs.
+// The twin of `Small` in src/bvh/lbvh_workgroup.rs.
 struct Small {
     uvec2 vertices;
     uvec2 indices;

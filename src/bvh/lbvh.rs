@@ -7,12 +7,12 @@
 use super::codes::{Code, Codes};
 pub use super::geometry::{Geometry, Input, Source};
 use super::layout;
+use super::lbvh_workgroup;
 use super::sah::Collapse;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::radix_sort::{self, Shape};
 use crate::gpu::{Context, Kernel, Recorder, Step, shaders};
 use crate::{Error, Result};
-use std::collections::HashMap;
 
 /// What to build, beside the triangles.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,12 +72,12 @@ pub struct Sizes {
 #[derive(Debug, Clone)]
 pub struct Lbvh {
     codes: Codes,
-    collapse: Collapse,
+    pub(super) collapse: Collapse,
     schedule: Schedule,
     shape: Shape,
     items: u32,
     workers: u32,
-    count: u32,
+    pub(super) count: u32,
 }
 
 /// Where the parts of the scratch memory begin, in bytes.
@@ -95,7 +95,7 @@ const SOURCE_GEOMETRY: u32 = 1;
 const SOURCE_GEOMETRIES: u32 = 2;
 
 /// Bytes of `LbvhState` in lbvh.glsl, with room to spare.
-const STATE_BYTES: u64 = 768;
+pub(super) const STATE_BYTES: u64 = 768;
 
 push_constants! {
     struct Arguments {
@@ -118,40 +118,6 @@ push_constants! {
         columns: u32,
         column_keys: u32,
         passes: u32,
-    }
-}
-
-/// A build for one workgroup: `Small` in lbvh_workgroup.comp.
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Small {
-    vertices: u64,
-    indices: u64,
-    transform: u64,
-    structure: u64,
-    scratch: u64,
-    vertex_stride: u32,
-    vertex_count: u32,
-    formats: u32,
-    primitive_count: u32,
-}
-
-/// Builds that fit into the push constants.
-const SMALL_AT_ONCE: usize = 2;
-
-pub(crate) mod workgroup {
-    use super::{SMALL_AT_ONCE, Small};
-    use crate::gpu::push_constants::push_constants;
-
-    push_constants! {
-        /// Push constants of `glsl/bvh/lbvh_workgroup.comp`.
-        pub(super) struct Arguments {
-            pub(super) builds: [Small; SMALL_AT_ONCE],
-            pub(super) step_cost: f32,
-            pub(super) test_cost: f32,
-            pub(super) codes: u32,
-            pub(super) state_bytes: u32,
-        }
     }
 }
 
@@ -301,7 +267,7 @@ impl Lbvh {
     }
 
     /// A kernel that reads triangles.
-    fn reading_kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
+    pub(super) fn reading_kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
         let source = match input.source {
             Source::One(geometry) if geometry.is_plain() => SOURCE_MESH,
             Source::One(_) => SOURCE_GEOMETRY,
@@ -362,55 +328,14 @@ impl Lbvh {
     pub fn chains(jobs: &[Job<'_>]) -> Result<Vec<Vec<Step>>> {
         let (small, large): (Vec<&Job<'_>>, Vec<&Job<'_>>) =
             jobs.iter().partition(|job| job.lbvh.schedule == Schedule::Workgroup);
-        let mut chains = large
-            .iter()
-            .map(|job| job.lbvh.chain_of(&job.input, job.structure, job.scratch))
-            .collect::<Result<Vec<_>>>()?;
-        // What fills the push constants together must be of one kind.
-        let mut kinds: HashMap<(Kernel, u32, [u32; 2]), Vec<Small>> = HashMap::new();
-        let mut order = Vec::new();
-        for job in small {
-            let Job { lbvh, input, structure, scratch } = *job;
-            let geometry = lbvh.checked(&input)?;
-            let kernel = lbvh.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, &input);
-            let costs = [lbvh.collapse.c_t.to_bits(), lbvh.collapse.c_i.to_bits()];
-            let kind = (kernel, lbvh.code_kind(), costs);
-            let builds = kinds.entry(kind.clone()).or_default();
-            if builds.is_empty() {
-                order.push(kind);
-            }
-            builds.push(Small {
-                vertices: geometry.vertices,
-                indices: geometry.indices,
-                transform: geometry.transform,
-                structure,
-                scratch,
-                vertex_stride: geometry.vertex_stride,
-                vertex_count: geometry.vertex_count,
-                formats: geometry.formats(),
-                primitive_count: lbvh.count,
-            });
-        }
-        for kind in order {
-            let (kernel, codes, costs) = &kind;
-            for pair in kinds[&kind].chunks(SMALL_AT_ONCE) {
-                let mut builds = [pair[0]; SMALL_AT_ONCE];
-                builds[..pair.len()].copy_from_slice(pair);
-                let arguments = workgroup::Arguments {
-                    builds,
-                    step_cost: f32::from_bits(costs[0]),
-                    test_cost: f32::from_bits(costs[1]),
-                    codes: *codes,
-                    state_bytes: STATE_BYTES as u32,
-                };
-                chains.push(vec![Step::new("build", kernel.clone(), &arguments, pair.len() as u32)]);
-            }
-        }
+        let chains = large.iter().map(|job| job.lbvh.chain_of(&job.input, job.structure, job.scratch));
+        let mut chains: Vec<Vec<Step>> = chains.collect::<Result<_>>()?;
+        chains.extend(lbvh_workgroup::steps(&small)?.into_iter().map(|step| vec![step]));
         Ok(chains)
     }
 
     /// The input's geometry as the kernels are given it.
-    fn checked(&self, input: &Input) -> Result<Geometry> {
+    pub(super) fn checked(&self, input: &Input) -> Result<Geometry> {
         if input.primitive_count != self.count {
             return Err(Error::Argument(format!(
                 "the builder was made for {} triangles, the input has {}; make a builder for it",
@@ -425,7 +350,7 @@ impl Lbvh {
     }
 
     /// `code_kind` in lbvh.glsl.
-    fn code_kind(&self) -> u32 {
+    pub(super) fn code_kind(&self) -> u32 {
         let code = self.codes.code;
         code.order_number()
             | self.codes.bits << 8

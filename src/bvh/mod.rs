@@ -5,6 +5,7 @@ pub mod geometry;
 pub mod host;
 pub mod layout;
 pub mod lbvh;
+pub(crate) mod lbvh_workgroup;
 pub mod quality;
 pub mod sah;
 pub mod validate;

@@ -1,0 +1,85 @@
+//! LBVHs of few triangles, each built by one workgroup that does all phases, two to a dispatch.
+//!
+//! A chain of dispatches costs a small build more than its work; many small builds in a batch need no barriers between them and
+//! no memory for their arguments this way: two fit into the push constants.
+
+use super::lbvh::{Job, STATE_BYTES};
+use crate::Result;
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::{Kernel, Step, shaders};
+use std::collections::HashMap;
+
+/// A build for one workgroup: `Small` in lbvh_workgroup.comp.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Small {
+    vertices: u64,
+    indices: u64,
+    transform: u64,
+    structure: u64,
+    scratch: u64,
+    vertex_stride: u32,
+    vertex_count: u32,
+    formats: u32,
+    primitive_count: u32,
+}
+
+/// Builds that fit into the push constants.
+const AT_ONCE: usize = 2;
+
+push_constants! {
+    /// Push constants of `glsl/bvh/lbvh_workgroup.comp`.
+    struct Arguments {
+        builds: [Small; AT_ONCE],
+        step_cost: f32,
+        test_cost: f32,
+        codes: u32,
+        state_bytes: u32,
+    }
+}
+
+/// The dispatches of the builds, which need no barrier between them.
+pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
+    // What fills the push constants together must be of one kind.
+    let mut kinds: HashMap<(Kernel, u32, [u32; 2]), Vec<Small>> = HashMap::new();
+    let mut order = Vec::new();
+    for job in jobs {
+        let Job { lbvh, input, structure, scratch } = **job;
+        let geometry = lbvh.checked(&input)?;
+        let kernel = lbvh.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, &input);
+        let costs = [lbvh.collapse.c_t.to_bits(), lbvh.collapse.c_i.to_bits()];
+        let kind = (kernel, lbvh.code_kind(), costs);
+        let builds = kinds.entry(kind.clone()).or_default();
+        if builds.is_empty() {
+            order.push(kind);
+        }
+        builds.push(Small {
+            vertices: geometry.vertices,
+            indices: geometry.indices,
+            transform: geometry.transform,
+            structure,
+            scratch,
+            vertex_stride: geometry.vertex_stride,
+            vertex_count: geometry.vertex_count,
+            formats: geometry.formats(),
+            primitive_count: lbvh.count,
+        });
+    }
+    let mut steps = Vec::new();
+    for kind in order {
+        let (kernel, codes, costs) = &kind;
+        for pair in kinds[&kind].chunks(AT_ONCE) {
+            let mut builds = [pair[0]; AT_ONCE];
+            builds[..pair.len()].copy_from_slice(pair);
+            let arguments = Arguments {
+                builds,
+                step_cost: f32::from_bits(costs[0]),
+                test_cost: f32::from_bits(costs[1]),
+                codes: *codes,
+                state_bytes: STATE_BYTES as u32,
+            };
+            steps.push(Step::new("build", kernel.clone(), &arguments, pair.len() as u32));
+        }
+    }
+    Ok(steps)
+}
