@@ -40,49 +40,19 @@ BUFFER LbvhState {
     CodePlan plan;
 };
 
-// What a build is given: the push constants, or variables that the shader sets first.
+// What a build is given: the push constants, or variables that the shader sets first. `vertices` to `transform` with
+// `vertex_stride` to `formats` are a Geometry; `code_kind` is order, bits << 8, size group << 16, concise << 24, collapse << 25;
+// `columns` to `passes` are of the radix sort.
+#define LBVH_ARGUMENTS                                                                                        \
+    uvec2 vertices; uvec2 indices; uvec2 transform; uvec2 structure_address; uvec2 state_address;             \
+    uvec2 keys[2]; uvec2 values[2]; uvec2 ends_address; uvec2 table_address;                                  \
+    uint vertex_stride; uint vertex_count; uint formats; uint primitive_count; uint code_kind;                \
+    float c_t; float c_i;                                                                                     \
+    uint columns; uint column_keys; uint passes;
 #ifdef HEDGEROW_LBVH_ARGUMENTS_ARE_SET
-uvec2 vertices;
-uvec2 indices;
-uvec2 transform;
-uvec2 structure_address;
-uvec2 state_address;
-uvec2 keys[2];
-uvec2 values[2];
-uvec2 ends_address;
-uvec2 table_address;
-uint vertex_stride;
-uint vertex_count;
-uint formats;
-uint primitive_count;
-uint code_kind;
-float c_t;
-float c_i;
-uint columns;
-uint column_keys;
-uint passes;
+LBVH_ARGUMENTS
 #else
-layout(push_constant, scalar) uniform Arguments {
-    uvec2 vertices;     // these, with vertex_stride, vertex_count and formats, are a Geometry
-    uvec2 indices;
-    uvec2 transform;
-    uvec2 structure_address;
-    uvec2 state_address;
-    uvec2 keys[2];
-    uvec2 values[2];
-    uvec2 ends_address;
-    uvec2 table_address;
-    uint vertex_stride;
-    uint vertex_count;
-    uint formats;
-    uint primitive_count;
-    uint code_kind;     // order, bits << 8, size group << 16, concise << 24, collapse << 25
-    float c_t;
-    float c_i;
-    uint columns;       // of the radix sort's table
-    uint column_keys;
-    uint passes;        // of the radix sort
-};
+layout(push_constant, scalar) uniform Arguments { LBVH_ARGUMENTS };
 #endif
 
 Geometry geometries() {
