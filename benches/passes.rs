@@ -213,7 +213,7 @@ fn batch(c: &mut Criterion) {
             sizes
         },
         // SAFETY: the buffer is live and large enough.
-        &|info| unsafe { ours.create_acceleration_structure(info) }.expect("a multiple of 256"),
+        &|info| unsafe { ours.create_acceleration_structure(info, None) }.expect("a multiple of 256"),
     );
     let build = |from: usize, to: usize| {
         device

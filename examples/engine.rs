@@ -152,7 +152,7 @@ impl Engine {
             .size(sizes.acceleration_structure_size)
             .ty(ty);
         // SAFETY: the buffer lives and has so many bytes.
-        let scene = unsafe { structures.create_acceleration_structure(&create) }?;
+        let scene = unsafe { structures.create_acceleration_structure(&create, None) }?;
         let address = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(scene);
         let address = structures.get_acceleration_structure_device_address(&address);
         let info = info

@@ -13,6 +13,7 @@ use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::lbvh::{Lbvh, Options};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::trace::host::closest_hit_by_brute_force;
 use hedgerow::trace::{Hit, Ray};
@@ -316,6 +317,32 @@ fn fewer_primitives_than_were_planned_for_fit() {
             .expect("it builds");
         let expected = on_the_host(&[Owned { primitive_count: count, ..owned.clone() }]).to_bytes();
         assert!(built.memory.read::<u8>(expected.len()) == expected, "{count} triangles");
+    }
+}
+
+/// More triangles have a smaller table to sort with at some counts: what is asked for must suffice for fewer, too.
+#[test]
+fn the_sizes_of_a_maximum_suffice_for_every_smaller_count() {
+    let ours = Ours(accel::Device::new(device()));
+    let owned = Owned::of(&soup(1, 0.5, 9), VertexFormat::FLOAT3, IndexFormat::U32, 0);
+    let (geometry, _memory) = owned.upload(0, 0);
+    let geometries = [vk_geometry(&geometry, &owned)];
+    let mut counts: Vec<u32> = (0..25)
+        .flat_map(|bit| [-300, -1, 0, 1, 255, 256, 257].map(|by| (1i64 << bit) + by))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .filter_map(|count| u32::try_from(count).ok())
+        .collect();
+    counts.sort_unstable();
+    let mut most = [0; 2];
+    for count in counts {
+        let sizes = ours.build_sizes(&bottom_level(&geometries), &[count]);
+        let builder = Lbvh::new(device(), &Options::DEFAULT, count).expect("few enough").sizes();
+        most = [most[0].max(builder.structure), most[1].max(builder.scratch)];
+        assert!(
+            sizes.acceleration_structure_size >= most[0] && sizes.build_scratch_size >= most[1],
+            "{count}: {sizes:?}, {most:?}"
+        );
     }
 }
 

@@ -200,6 +200,15 @@ fn of_a_thousand_coincident_triangles_the_first_is_hit() {
 }
 
 #[test]
+fn loads_lane_by_lane_need_a_workgroup_of_one_subgroup() {
+    let limits = &device().limits;
+    let buffers = Buffers { structure: 16, rays: 16, hits: 16, work: None, count: 0 };
+    let shape = Shape { workgroup: 2 * limits.subgroup_size, ..Shape::lanes(limits) };
+    let refused = device().run(None, |recorder| tracer::record(recorder, &shape, Query::ClosestHit, &buffers));
+    assert!(refused.expect_err("two subgroups").to_string().contains("lane by lane"));
+}
+
+#[test]
 fn too_many_rays_are_refused() {
     let buffers = Buffers { structure: 16, rays: 16, hits: 16, work: None, count: (1 << 27) + 1 };
     let refused = device().run(None, |recorder| tracer::record(recorder, &shapes()[0], Query::ClosestHit, &buffers));

@@ -137,7 +137,7 @@ impl<'a> Device<'a> {
             geometry::triangles(geometry, &vk::AccelerationStructureBuildRangeInfoKHR::default(), 0)?;
         }
         let count = max_primitive_counts.iter().copied().map(u64::from).sum();
-        let Sizes { structure, scratch, .. } = Build::new(self.context, info, Vec::new(), count)?.lbvh.sizes();
+        let Sizes { structure, scratch, .. } = Build::new(self.context, info, Vec::new(), count)?.lbvh.sizes_at_most();
         size_info.acceleration_structure_size = structure;
         size_info.build_scratch_size = scratch + Build::record_bytes(given.len());
         size_info.update_scratch_size = 0;
@@ -154,6 +154,7 @@ impl<'a> Device<'a> {
     pub unsafe fn create_acceleration_structure(
         &self,
         info: &vk::AccelerationStructureCreateInfoKHR<'_>,
+        _allocation_callbacks: Option<&vk::AllocationCallbacks<'_>>,
     ) -> Result<vk::AccelerationStructureKHR> {
         if !info.offset.is_multiple_of(STRUCTURE_ALIGNMENT) {
             return Err(Error::Argument(format!(
@@ -168,7 +169,12 @@ impl<'a> Device<'a> {
     }
 
     /// `vkDestroyAccelerationStructureKHR`. A handle owns nothing: the memory is the caller's before and after.
-    pub fn destroy_acceleration_structure(&self, _structure: vk::AccelerationStructureKHR) {}
+    pub fn destroy_acceleration_structure(
+        &self,
+        _structure: vk::AccelerationStructureKHR,
+        _allocation_callbacks: Option<&vk::AllocationCallbacks<'_>>,
+    ) {
+    }
 
     /// `vkGetAccelerationStructureDeviceAddressKHR`: what shaders trace through, and the tracer takes.
     pub fn get_acceleration_structure_device_address(

@@ -61,12 +61,12 @@ pub(super) fn triangles(
     };
     let offset = u64::from(range.primitive_offset);
     let indexed = index_format != IndexFormat::NONE;
+    let first_vertex = u64::from(range.first_vertex) * u64::from(vertex_stride);
+    // The size query is given addresses that mean nothing.
     Ok(Geometry {
-        vertices: vertices
-            + u64::from(range.first_vertex) * u64::from(vertex_stride)
-            + if indexed { 0 } else { offset },
-        indices: if indexed { indices + offset } else { 0 },
-        transform: if transform == 0 { 0 } else { transform + u64::from(range.transform_offset) },
+        vertices: vertices.wrapping_add(first_vertex).wrapping_add(if indexed { 0 } else { offset }),
+        indices: if indexed { indices.wrapping_add(offset) } else { 0 },
+        transform: if transform == 0 { 0 } else { transform.wrapping_add(range.transform_offset.into()) },
         vertex_stride,
         vertex_count: triangles.max_vertex.saturating_add(1).saturating_sub(range.first_vertex),
         vertex_format,

@@ -197,6 +197,13 @@ impl Lbvh {
         Sizes { structure: layout::sizes(self.count).bytes, scratch: self.scratch().bytes, alignment: 16 }
     }
 
+    /// Bytes that suffice for builds of this many triangles and of any fewer by builders of the same options.
+    pub fn sizes_at_most(&self) -> Sizes {
+        let more = self.shape.most_table_words(self.count).saturating_sub(self.table_words());
+        let sizes = self.sizes();
+        Sizes { scratch: sizes.scratch + (4 * more).next_multiple_of(16), ..sizes }
+    }
+
     /// Bytes that a phase must move if it reads each of its inputs once and writes each of its outputs once: what its time is
     /// held against. `None` for a phase that there is not.
     pub fn traffic(&self, phase: &str, input: &Input) -> Option<u64> {

@@ -68,6 +68,13 @@ impl Shape {
         u64::from(self.digits()) * (u64::from(self.columns(count)) + 1)
     }
 
+    /// Words that the table of no count up to `count` exceeds: longer strips make it smaller for more keys.
+    pub(crate) fn most_table_words(&self, count: u32) -> u64 {
+        // Strips hold at least 256 keys and, up to 4,096, at least a 256th of all, rounded down.
+        let columns = if self.private_counters { count.div_ceil(256).min(257) } else { 0 };
+        u64::from(self.digits()) * (u64::from(columns.max(self.columns(count))) + 1)
+    }
+
     /// Tasks (workgroups) of the counting and scattering steps.
     pub(crate) fn column_tasks(&self, count: u32) -> u32 {
         if self.private_counters { self.columns(count).div_ceil(self.workgroup) } else { self.columns(count) }

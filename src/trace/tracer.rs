@@ -35,7 +35,7 @@ pub struct Shape {
 pub enum Loads {
     /// Each for itself (`glsl/trace/tracer_single.comp`).
     Gathered,
-    /// One lane after the other (`glsl/trace/tracer_lanes.comp`): 1.3 to 1.6 times as fast where a CPU's driver makes plain
+    /// One lane after the other (`glsl/trace/tracer_lanes.comp`): 1.2 to 1.4 times as fast where a CPU's driver makes plain
     /// loads of it. The workgroup must be one subgroup, of at most [`Loads::MAX_LANES`].
     LaneByLane,
 }
@@ -143,12 +143,22 @@ pub fn kernel(shape: &Shape, query: Query, count_work: bool) -> Kernel {
 /// write to shader read and write) before and after.
 ///
 /// # Errors
-/// More than [`MAX_RAYS`] rays; the kernel's pipeline could not be made.
+/// More than [`MAX_RAYS`] rays; loads lane by lane in workgroups that are not one subgroup of at most
+/// [`Loads::MAX_LANES`]; the kernel's pipeline could not be made.
 pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, query: Query, buffers: &Buffers) -> Result<()> {
     let &Buffers { structure, rays, hits, work, count } = buffers;
     if count > MAX_RAYS {
         return Err(Error::Argument(format!(
             "{count} rays in one call, at most {MAX_RAYS}: trace them in several calls"
+        )));
+    }
+    let subgroup = recorder.context().limits.subgroup_size;
+    if shape.loads == Loads::LaneByLane && (shape.workgroup != subgroup || subgroup > Loads::MAX_LANES) {
+        return Err(Error::Argument(format!(
+            "loads lane by lane in workgroups of {}, subgroups have {subgroup} lanes; take workgroups of one subgroup of at \
+             most {} lanes, or Loads::Gathered",
+            shape.workgroup,
+            Loads::MAX_LANES
         )));
     }
     let kernel = kernel(shape, query, work.is_some());

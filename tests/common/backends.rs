@@ -59,11 +59,11 @@ impl Backend for Ours {
     }
 
     fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
-        unsafe { self.0.create_acceleration_structure(info) }.expect("the offset is right")
+        unsafe { self.0.create_acceleration_structure(info, None) }.expect("the offset is right")
     }
 
     fn destroy(&self, structure: vk::AccelerationStructureKHR) {
-        self.0.destroy_acceleration_structure(structure);
+        self.0.destroy_acceleration_structure(structure, None);
     }
 
     fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
