@@ -4,7 +4,7 @@
 //! `arguments_of`, so that a new one cannot be forgotten. Names may differ by the ending `_address`.
 
 use crate::bvh::geometry::Geometry;
-use crate::bvh::layout::{Child, Header, Node, Triangle};
+use crate::bvh::layout::{BoxRecord, Child, GeometryEntry, Header, Instance, Node, Triangle};
 use crate::gpu::shaders;
 use crate::trace::{Hit, Ray};
 use crate::{accel, bvh, gpu, measure, trace};
@@ -67,11 +67,28 @@ fn structs() -> BTreeMap<&'static str, Layout> {
     let mut node = layout_of!(Node { children });
     let right = offset_of!(Node, children) + size_of::<Child>();
     node.members = vec![("left".into(), 0, size_of::<Child>()), ("right".into(), right, size_of::<Child>())];
-    let mut header =
-        layout_of!(Header { magic, kind, status, primitive_count, root, active, node_slots, code_bits, reserved });
+    let mut header = layout_of!(Header {
+        magic,
+        kind,
+        status,
+        primitive_count,
+        root,
+        active,
+        node_slots,
+        code_bits,
+        inner_nodes,
+        geometry_count,
+        geometry_flags,
+        build_flags,
+        area_scale,
+        cost,
+        built_cost,
+        built_area,
+        reserved
+    });
     // `active` is a reserved word of GLSL.
     header.members[5].0 = "active_count".into();
-    // Both formats are one word there.
+    // Formats and flags are one word there.
     let mut geometry =
         layout_of!(Geometry { vertices, indices, transform, vertex_stride, vertex_count, vertex_format, first });
     geometry.members[5] = ("formats".into(), offset_of!(Geometry, vertex_format), 4);
@@ -79,6 +96,22 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         ("Child", layout_of!(Child { lo, index, hi, count })),
         ("Node", node),
         ("Triangle", layout_of!(Triangle { v0, v1, v2, primitive })),
+        ("BoxRecord", layout_of!(BoxRecord { lo, hi, primitive })),
+        ("GeometryEntry", layout_of!(GeometryEntry { first, flags })),
+        (
+            "Instance",
+            layout_of!(Instance {
+                to_object,
+                to_world,
+                structure,
+                index_and_mask,
+                offset_and_flags,
+                instance,
+                start,
+                start_count,
+                reserved
+            }),
+        ),
         ("Header", header),
         ("Geometry", geometry),
         ("Ray", layout_of!(Ray { origin, t_min, direction, t_max })),

@@ -10,7 +10,7 @@ use hedgerow::accel;
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::codes::Codes;
-use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
+use hedgerow::bvh::geometry::{GeometryFlags, IndexFormat, VertexFormat};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::lbvh::{Lbvh, Options};
@@ -33,7 +33,8 @@ fn range_of(owned: &Owned) -> Range {
 fn on_the_host(geometries: &[Owned]) -> Bvh2 {
     let corners: Vec<_> = geometries.iter().flat_map(|g| g.view().corners().collect::<Vec<_>>()).collect();
     let codes = Codes::for_count(corners.len() as u32);
-    host::lbvh::build_corners(corners.into_iter(), codes, Collapse::SAH)
+    let opaque: Vec<_> = geometries.iter().map(|g| (g.primitive_count, GeometryFlags::OPAQUE.bits())).collect();
+    host::lbvh::build_corners(corners.into_iter(), codes, Collapse::SAH).with_geometries(&opaque, 0)
 }
 
 /// Rays to random points of random triangles, from around them.
@@ -43,7 +44,7 @@ fn rays_to(tree: &Bvh2, count: usize) -> Vec<Ray> {
     let radius = bounds.diagonal();
     (0..count)
         .map(|_| {
-            let t = &tree.triangles[random.bits() as usize % tree.header.active as usize];
+            let t = &tree.records[random.bits() as usize % tree.header.active as usize];
             let (u, v) = (0.5 * random.signed().abs(), 0.5 * random.signed().abs());
             let target: [f32; 3] = std::array::from_fn(|k| t.v0[k] + u * (t.v1[k] - t.v0[k]) + v * (t.v2[k] - t.v0[k]));
             let out = random.point(radius);

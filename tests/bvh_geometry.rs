@@ -13,7 +13,16 @@ use hedgerow::bvh::lbvh::{Lbvh, Options, Schedule};
 use hedgerow::bvh::sah::Collapse;
 
 fn built(input: &Input, schedule: Schedule) -> Vec<u8> {
-    let options = Options { codes: Some(Code::Emc64Var.full()), collapse: Collapse::SAH, schedule: Some(schedule) };
+    let options = Options {
+        codes: Some(Code::Emc64Var.full()),
+        collapse: Collapse::SAH,
+        schedule: Some(schedule),
+        geometry_count: match input.source {
+            Source::Several { count, .. } => count,
+            _ => 1,
+        },
+        ..Options::DEFAULT
+    };
     let builder = Lbvh::new(device(), &options, input.primitive_count).expect("few enough triangles");
     let sizes = builder.sizes();
     let structure = device().buffer("structure", sizes.structure).expect("memory");
@@ -27,6 +36,8 @@ fn built(input: &Input, schedule: Schedule) -> Vec<u8> {
 fn assert_as_on_the_host(geometries: &[Owned], shift: usize) -> Bvh2 {
     let corners = geometries.iter().flat_map(|g| g.view().corners().collect::<Vec<_>>());
     let expected = host::lbvh::build_corners(corners, Code::Emc64Var.full(), Collapse::SAH);
+    let counts: Vec<_> = geometries.iter().map(|g| (g.primitive_count, 0)).collect();
+    let expected = expected.with_geometries(&counts, 0);
     expected.validate().expect("a valid tree");
     let mut first = 0;
     let mut records = Vec::new();

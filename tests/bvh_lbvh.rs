@@ -68,7 +68,8 @@ fn every_code_and_schedule_gives_the_bytes_of_the_host() {
                     let expected = host::lbvh::build(&positions, &triangles, codes, collapse);
                     expected.validate().unwrap_or_else(|e| panic!("{name} {codes}: {e}"));
                     for schedule in [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup] {
-                        let options = Options { codes: Some(codes), collapse, schedule: Some(schedule) };
+                        let options =
+                            Options { codes: Some(codes), collapse, schedule: Some(schedule), ..Options::DEFAULT };
                         let (got, bytes) = build_on_device(&positions, &triangles, &options);
                         assert_eq!(got.header, expected.header, "{name} {codes} {schedule:?}");
                         assert!(bytes == expected.to_bytes(), "{name} {codes} {collapse:?} {schedule:?}: other bytes");

@@ -1,10 +1,10 @@
-// Writes the records of a build's geometries from the push constants to where the build reads them (bvh/triangles.glsl).
+// Writes the records of a build's geometries from the push constants to where the build reads them (bvh/geometry.glsl).
 //
 // reads   nothing
 // writes  records[at..at + count]
 // needs   one workgroup; a barrier (shader write -> shader read) after
 #version 460
-#include "bvh/triangles.glsl"
+#include "bvh/geometry.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) writeonly buffer Records { Geometry geometry[]; };
 

@@ -10,7 +10,7 @@
 #ifndef HEDGEROW_BVH_CODES
 #define HEDGEROW_BVH_CODES
 #include "gpu/pass.glsl"
-#include "bvh/triangles.glsl"
+#include "bvh/geometry.glsl"
 
 const uint ORDER_REGULAR = 0;
 const uint ORDER_SORTED = 1;

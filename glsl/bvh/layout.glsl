@@ -9,19 +9,29 @@
 #pragma use_vulkan_memory_model
 
 const uint MAGIC = 0x72676468u;
-const uint KIND_BVH2 = 0x00020002u;
+// What the leaves hold.
+const uint KIND_TRIANGLES = 0x00020003u;
+const uint KIND_BOXES = 0x00120003u;
+const uint KIND_INSTANCES = 0x00220003u;
 const uint MAX_DEPTH = 96;
+// The count of a child that no tree has: its slot is unused.
+const uint UNUSED = 0xFFFFFFFFu;
 
 const uint STATUS_NON_FINITE = 1u << 0;
 const uint STATUS_INDEX_OUT_OF_RANGE = 1u << 1;
 const uint STATUS_TOO_DEEP = 1u << 2;
 const uint STATUS_SPIN_RAN_OUT = 1u << 3;
+const uint STATUS_BAD_INSTANCE = 1u << 4;
+const uint STATUS_WRONG_VERSION = 1u << 5;
+const uint STATUS_UNUSABLE = STATUS_TOO_DEEP | STATUS_SPIN_RAN_OUT | STATUS_WRONG_VERSION;
+
+const uint GEOMETRY_OPAQUE = 1u << 0;
 
 struct Child {
     vec3 lo;
-    uint index;   // node slot, or first triangle of the leaf
+    uint index;   // node slot, or first record of the leaf
     vec3 hi;
-    uint count;   // 0: inner node; otherwise triangles in the leaf
+    uint count;   // 0: inner node; otherwise records in the leaf
 };
 
 struct Node {
@@ -36,6 +46,29 @@ struct Triangle {
     uint primitive;
 };
 
+struct BoxRecord {
+    vec3 lo;
+    vec3 hi;
+    uint primitive;
+};
+
+struct Instance {
+    vec4 to_object[3];
+    vec4 to_world[3];
+    uvec2 structure;
+    uint index_and_mask;      // custom index, mask << 24
+    uint offset_and_flags;    // offset in the shader binding table, flags << 24
+    uint instance;
+    uint start;               // where to begin in the structure: a Child's index and count
+    uint start_count;
+    uint reserved;
+};
+
+struct GeometryEntry {
+    uint first;
+    uint flags;
+};
+
 struct Header {
     uint magic;
     uint kind;
@@ -45,7 +78,15 @@ struct Header {
     uint active_count;
     uint node_slots;
     uint code_bits;
-    uint reserved[17];
+    uint inner_nodes;
+    uint geometry_count;
+    uint geometry_flags;      // what all geometries have, what any has << 8
+    uint build_flags;
+    float area_scale;
+    float cost;
+    float built_cost;
+    float built_area;
+    uint reserved[9];
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer Structure {
@@ -53,22 +94,35 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer 
     Node nodes[];
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Triangles {
-    Triangle triangle[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Triangles { Triangle triangle[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) nonprivate buffer BoxRecords { BoxRecord box[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Instances { Instance instance[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) nonprivate buffer GeometryTable { GeometryEntry entry[]; };
 
-// Where the triangles of a structure with so many node slots begin: behind the nodes. No 64-bit integers, which a device need
-// not have.
-Triangles triangles_at(uvec2 structure, uint node_slots) {
-    uint high, low, carry, carry2;
-    umulExtended(node_slots, 64u, high, low);
-    structure.x = uaddCarry(structure.x, low, carry);
-    structure.x = uaddCarry(structure.x, 128u, carry2);
-    structure.y += high + carry + carry2;
-    return Triangles(structure);
+// base + index * stride: no 64-bit integers, which a device need not have.
+uvec2 address_of(uvec2 base, uint index, uint stride) {
+    uint high, low, carry;
+    umulExtended(index, stride, high, low);
+    base.x = uaddCarry(base.x, low, carry);
+    base.y += high + carry;
+    return base;
+}
+
+// Where the records of a structure with so many node slots begin: behind the nodes.
+uvec2 records_at(uvec2 structure, uint node_slots) {
+    return address_of(address_of(structure, 2u, 64u), node_slots, 64u);
+}
+
+uint record_bytes(uint kind) {
+    return kind == KIND_INSTANCES ? 128u : kind == KIND_BOXES ? 28u : 40u;
 }
 
 Triangles triangles_of(Structure structure) {
-    return triangles_at(uvec2(structure), structure.header.node_slots);
+    return Triangles(records_at(uvec2(structure), structure.header.node_slots));
+}
+
+// Behind the records, where there are several geometries.
+GeometryTable geometry_table_at(uvec2 structure, uint kind, uint node_slots, uint primitive_count) {
+    return GeometryTable(address_of(records_at(structure, node_slots), primitive_count, record_bytes(kind)));
 }
 #endif

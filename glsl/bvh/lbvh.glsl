@@ -1,11 +1,11 @@
 // The phases of the LBVH build, each a function over a task (a workgroup's worth of items): dispatched one by one
 // (bvh/lbvh_*.comp) or all from the task pool (bvh/lbvh_persistent.comp). src/bvh/lbvh.rs records both.
 //
-//   bounds     reads the triangles                     writes state: bounds, active_count, status
-//   plan       reads state: bounds                     writes state: plan; the structure's header
-//   encode     reads the triangles, plan               writes keys[0], ends (none); values[0] where nothing is sorted
+//   bounds     reads the primitives                    writes state: bounds, active_count, status
+//   plan       reads state: bounds                     writes state: plan; the structure's header and table of geometries
+//   encode     reads the primitives, plan              writes keys[0], ends (none); values[0] where nothing is sorted
 //   (sort      reads keys[0]                           writes keys[result], values[result]: gpu/radix_sort.glsl)
-//   hierarchy  reads the triangles, keys and values    writes the structure: triangles, nodes, root
+//   hierarchy  reads the primitives, keys and values   writes the structure: records, nodes, root, costs
 //
 // needs one barrier between each two, and before the first; subgroups of any size; workgroups of whole subgroups
 #ifndef HEDGEROW_BVH_LBVH
@@ -14,7 +14,7 @@
 #include "gpu/task_pool.glsl"
 #include "gpu/radix_sort.glsl"
 #include "bvh/layout.glsl"
-#include "bvh/triangles.glsl"
+#include "bvh/primitives.glsl"
 #include "bvh/codes.glsl"
 
 // Items of an invocation in a task.
@@ -41,7 +41,8 @@ BUFFER LbvhState {
 };
 
 // What a build is given: the push constants, or variables that the shader sets first. `vertices` to `transform` with
-// `vertex_stride` to `formats` are a Geometry; `code_kind` is order, bits << 8, size group << 16, concise << 24, collapse << 25;
+// `vertex_stride` to `formats` are a Geometry; `code_kind` is order, bits << 8, size group << 16, concise << 24, collapse << 25,
+// build flags << 26;
 // `columns` to `passes` are of the radix sort.
 #define LBVH_ARGUMENTS                                                                                        \
     uvec2 vertices; uvec2 indices; uvec2 transform; uvec2 structure_address; uvec2 state_address;             \
@@ -113,11 +114,10 @@ void lbvh_bounds(uint task) {
     for (uint k = 0; k < ITEMS; ++k) {
         uint primitive = first + k * gl_WorkGroupSize.x;
         if (primitive < primitive_count) {
-            Corners corners;
-            uint why_not = load_corners(input_geometries, primitive, corners);
+            Box b;
+            uint why_not = load_box(input_geometries, primitive, b);
             status |= why_not;
             if (why_not == 0) {
-                Box b = box_around(corners);
                 uvec3 middle = ordered(centroid_of(b));
                 lo = min(lo, ordered(b.lo));
                 hi = max(hi, ordered(b.hi));
@@ -142,15 +142,38 @@ void lbvh_bounds(uint task) {
             atomicMax(state.centroids_hi[axis], centroid_hi[axis]);
         }
         atomicAdd(state.active_count, active_count);
-        if (status != 0) atomicOr(state.status, status);
+        if ((status & ~INACTIVE) != 0) atomicOr(state.status, status & ~INACTIVE);
     }
 }
 
 // ---- plan ----
 
+float scaled_half_area(Box b, float scale) {
+    precise vec3 e = b.hi * scale - b.lo * scale;
+    precise float area = e.x * e.y + e.y * e.z + e.z * e.x;
+    return area;
+}
+
 void mark_unused(Structure structure, uint slot) {
     Child unused = Child(uintBitsToFloat(uvec3(0x7F800000u)), NONE, uintBitsToFloat(uvec3(0xFF800000u)), NONE);
     structure.nodes[slot] = Node(unused, unused);
+}
+
+// The flags of all geometries in one word; where there are several, the structure's table is written.
+uint write_geometries(Geometry g, uint node_slots) {
+    if (!has_geometry_table()) return SOURCE == SOURCE_ENTRIES ? 0 : flags_of(g) | flags_of(g) << 8;
+    Geometries given = Geometries(g.vertices);
+    GeometryTable table = geometry_table_at(structure_address, kind_of_records(), node_slots, primitive_count);
+    uint all = 0xFF, any = 0;
+    for (uint i = 0; i < g.vertex_count; ++i) {
+        uint flags = flags_of(given.geometry[i]);
+        if (g.vertex_count > 1) table.entry[i] = GeometryEntry(given.geometry[i].first, flags);
+        if ((flags & GEOMETRY_END) == 0u) {
+            all &= flags;
+            any |= flags;
+        }
+    }
+    return all | any << 8;
 }
 
 void lbvh_plan() {
@@ -161,14 +184,22 @@ void lbvh_plan() {
     uint bits = kind_of_codes().bits;
     Child empty = Child(uintBitsToFloat(uvec3(0x7F800000u)), 0, uintBitsToFloat(uvec3(0xFF800000u)), 0);
     structure.header.magic = MAGIC;
-    structure.header.kind = KIND_BVH2;
+    structure.header.kind = kind_of_records();
     structure.header.status = state.status;
     structure.header.primitive_count = primitive_count;
     structure.header.root = empty;
     structure.header.active_count = state.active_count;
     structure.header.node_slots = slots;
     structure.header.code_bits = bits;
-    for (uint i = 0; i < 17; ++i) structure.header.reserved[i] = 0;
+    structure.header.inner_nodes = max(state.active_count, 1) - 1;
+    structure.header.geometry_count = has_geometry_table() ? vertex_count : 1;
+    structure.header.geometry_flags = write_geometries(geometries(), slots);
+    structure.header.build_flags = code_kind >> 26;
+    structure.header.area_scale = 0.0;
+    structure.header.cost = 0.0;
+    structure.header.built_cost = 0.0;
+    structure.header.built_area = 0.0;
+    for (uint i = 0; i < 9; ++i) structure.header.reserved[i] = 0;
     if (primitive_count < 2) mark_unused(structure, 0);
     if (state.active_count == 0) return;
     Box boxes = Box(from_ordered(uvec3(state.boxes_lo[0], state.boxes_lo[1], state.boxes_lo[2])),
@@ -177,6 +208,8 @@ void lbvh_plan() {
                         from_ordered(uvec3(state.centroids_hi[0], state.centroids_hi[1], state.centroids_hi[2])));
     CodeKind kind = kind_of_codes();
     state.plan = plan_codes(kind, code_bounds(boxes, centroids, kind.concise), boxes);
+    structure.header.area_scale = state.plan.area_scale;
+    structure.header.built_area = scaled_half_area(boxes, state.plan.area_scale);
 }
 
 // ---- encode ----
@@ -192,9 +225,8 @@ void lbvh_encode(uint task) {
     for (uint k = 0; k < ITEMS; ++k) {
         uint primitive = first + k * gl_WorkGroupSize.x;
         if (primitive < primitive_count) {
-            Corners corners;
-            bool is_active = load_corners(input_geometries, primitive, corners) == 0;
-            Box b = box_around(corners);
+            Box b;
+            bool is_active = load_box(input_geometries, primitive, b) == 0;
             if (KEY_WORDS == 1) {
                 codes.word[primitive] = is_active ? narrow_encode(kind, plan, b) : inactive_code(kind).x;
             } else {
@@ -239,12 +271,6 @@ bool is_less(uvec3 a, uvec3 b) {
     return a.y != b.y ? a.y < b.y : a.x < b.x;
 }
 
-float scaled_half_area(Box b, float scale) {
-    precise vec3 e = b.hi * scale - b.lo * scale;
-    precise float area = e.x * e.y + e.y * e.z + e.z * e.x;
-    return area;
-}
-
 float leaf_cost(float area, uint count) {
     precise float cost = c_i * area * float(count);
     return cost;
@@ -273,11 +299,24 @@ uint run_slot(uint level) {
     return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
 }
 
+// Marks the slots below a leaf over the positions first..=last; how many had a node of the tree.
+uint free_slots(Structure structure, uint first, uint last) {
+    uint freed = 0;
+    for (uint slot = first; slot < last; ++slot) {
+        if (structure.nodes[slot].left.count != UNUSED) {
+            structure.nodes[slot].left.count = UNUSED;
+            freed += 1;
+        }
+    }
+    return freed;
+}
+
 // From a subtree up (Apetrei 2014): of two siblings the second to arrive goes on with their parent. The node that splits
 // between positions i and i + 1 has slot i, so its parent follows from which of the two neighbouring splits differs in a lower
 // bit. An invocation that has a run of positions meets most siblings itself and asks the others only at the run's two ends:
 // atomics and their fences were a third of the time.
-void climb(Structure structure, Words codes, uint active_count, float area_scale, uint run, inout uint waiting, Subtree s) {
+void climb(Structure structure, Words codes, uint active_count, float area_scale, uint run, inout uint waiting,
+           inout uint unused, Subtree s) {
     Words ends = Words(ends_address);
     // The buffers that the sort has left free hold the costs of left and right children.
     uint is_free = 1 - (passes & 1);
@@ -287,6 +326,8 @@ void climb(Structure structure, Words codes, uint active_count, float area_scale
     for (uint level = 0; level <= MAX_DEPTH; ++level) {
         if (s.first == 0 && s.last + 1 == active_count) {
             structure.header.root = s.child;
+            structure.header.cost = s.cost;
+            structure.header.built_cost = s.cost;
             break;
         }
         bool is_left = is_less(s.behind, s.before);
@@ -335,14 +376,17 @@ void climb(Structure structure, Words codes, uint active_count, float area_scale
         bool as_leaf_is_cheaper = collapses() && as_leaf < s.cost;
         s.child.index = as_leaf_is_cheaper ? s.first : parent;
         s.child.count = as_leaf_is_cheaper ? count : 0;
-        if (as_leaf_is_cheaper) s.cost = as_leaf;
+        if (as_leaf_is_cheaper) {
+            s.cost = as_leaf;
+            unused += free_slots(structure, s.first, s.last);
+        }
     }
 }
 
 void lbvh_hierarchy(uint task) {
     LbvhState state = LbvhState(state_address);
     Structure structure = Structure(structure_address);
-    Triangles triangles = triangles_at(structure_address, max(primitive_count, 2) - 1);
+    uvec2 records = records_at(structure_address, max(primitive_count, 2) - 1);
     Geometry input_geometries = geometries();
     uint active_count = state.active_count;
     float area_scale = state.plan.area_scale;
@@ -353,6 +397,7 @@ void lbvh_hierarchy(uint task) {
     uint end = min(run + ITEMS, primitive_count);
     uint position = run;
     uint waiting = 0;
+    uint unused = 0;
     // First the leaves of the run; then what waits, last first: its siblings begin behind the run.
     bool leaves_done = false;
     while (true) {
@@ -360,14 +405,10 @@ void lbvh_hierarchy(uint task) {
         uint own_run = run;
         bool climbs = true;
         if (position < end) {
-            uint primitive = order.word[position];
-            Corners c;
-            load_corners(input_geometries, primitive, c);
-            triangles.triangle[position] = Triangle(c.v0, c.v1, c.v2, primitive);
+            Box b = write_record(records, position, input_geometries, order.word[position]);
             climbs = position < active_count;
             // Slots from active_count - 1 on have no node.
             if (position >= max(active_count, 1)) mark_unused(structure, position - 1);
-            Box b = box_around(c);
             s.first = position;
             s.last = position;
             s.child = Child(b.lo, position, b.hi, 1);
@@ -388,8 +429,10 @@ void lbvh_hierarchy(uint task) {
         if (climbs) {
             s.before = difference_before(codes, s.first);
             s.behind = difference_behind(codes, s.last, active_count);
-            climb(structure, codes, active_count, area_scale, own_run, waiting, s);
+            climb(structure, codes, active_count, area_scale, own_run, waiting, unused, s);
         }
     }
+    unused = subgroupAdd(unused);
+    if (unused > 0 && subgroupElect()) atomicAdd(structure.header.inner_nodes, -unused);
 }
 #endif

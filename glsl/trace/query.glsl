@@ -1,29 +1,32 @@
-// The header that engines include: rays traced through a Bvh2 from any shader, as GLSL_EXT_ray_query does it, by our names.
+// The header that engines include: rays traced through our structures from any shader, as GLSL_EXT_ray_query does it, by our
+// names.
 //
 //     #include "trace/query.glsl"                              // with glsl/ of this package as the include folder
 //
 //     HedgerowRayQuery query;
 //     hedgerowRayQueryInitialize(query, hedgerowAccelerationStructure(address), hedgerowRayFlagsOpaque, 0xff,
 //                                origin, t_min, direction, t_max);
-//     while (hedgerowRayQueryProceed(query)) {}
+//     while (hedgerowRayQueryProceed(query)) { … }             // the candidates that are to be decided on
 //     if (hedgerowRayQueryGetIntersectionType(query, true) == hedgerowRayQueryCommittedIntersectionTriangle)
 //         t = hedgerowRayQueryGetIntersectionT(query, true);
 //
-// or, where only the hit is wanted,
-//
-//     HedgerowHit hit = hedgerow_closest_hit(structure, HedgerowRay(origin, t_min, direction, t_max));
-//     bool shadowed = hedgerow_any_hit(structure, HedgerowRay(origin, t_min, direction, t_max));
-//
 // A shader of GLSL_EXT_ray_query is moved over by renaming: `rayQuery…EXT` to `hedgerowRayQuery…`, `gl_Ray…EXT` to
-// `hedgerowRay…`, `accelerationStructureEXT` to `hedgerowAccelerationStructure`. Every triangle is opaque, so that proceeding
-// runs to the end and returns false; of a query that has not proceeded, nothing is committed.
+// `hedgerowRay…`, `accelerationStructureEXT` to `hedgerowAccelerationStructure`; or by trace/ray_query_names.glsl, which does
+// it for a shader that compiles for both. What a query is asked before it has proceeded, or of a hit that there is not, is as
+// undefined as in the extension, but bounded: nothing is read outside the structures.
 //
-// reads   the structure: the caller places a barrier behind its build (shader write -> shader read)
+// Beyond the extension: a bottom-level structure can be queried itself, as if it were the one instance, without a transform,
+// of a top level (instance id and custom index 0).
+//
+// reads   the structures: the caller places a barrier behind their builds (shader write -> shader read)
 // needs   the features of gpu::requirements(); no descriptors, no shared memory (but see trace/stack.glsl), any subgroup size
 //
-// A hit counts when t_min < t < t_max; of equally near ones that with the lower primitive index. The walk ends for every
-// input: rays that are no rays (NaN, infinite, no direction) hit nothing, and so does what is empty or cannot be used by its
-// status (src/bvh/layout.rs).
+// An invocation has one query at a time, unless the shader defines HEDGEROW_QUERIES, the number of those that live at the same
+// time, before it includes this file, and begins the others with `hedgerowRayQueryInitializeAt(query, n, …)`, n from 1 on.
+//
+// A triangle is hit when t_min < t < t_max; of equally near ones that of the lower instance, then of the lower primitive. A
+// walk ends for every input: rays that are no rays (NaN, infinite, no direction) hit nothing, and so does what is empty or
+// cannot be used by its status (src/bvh/layout.rs).
 #ifndef HEDGEROW_TRACE_QUERY
 #define HEDGEROW_TRACE_QUERY
 
@@ -31,146 +34,153 @@
 #define Child HedgerowChild
 #define Node HedgerowNode
 #define Triangle HedgerowTriangle
+#define BoxRecord HedgerowBoxRecord
+#define Instance HedgerowInstance
+#define GeometryEntry HedgerowGeometryEntry
 #define Header HedgerowHeader
 #define Structure HedgerowStructure
 #define Triangles HedgerowTriangles
+#define BoxRecords HedgerowBoxRecords
+#define Instances HedgerowInstances
+#define GeometryTable HedgerowGeometryTable
 #define triangles_of hedgerow_triangles_of
-#define triangles_at hedgerow_triangles_at
+#define address_of hedgerow_address_of
+#define records_at hedgerow_records_at
+#define record_bytes hedgerow_record_bytes
+#define geometry_table_at hedgerow_geometry_table_at
 #define MAGIC HEDGEROW_MAGIC
-#define KIND_BVH2 HEDGEROW_KIND_BVH2
+#define KIND_TRIANGLES HEDGEROW_KIND_TRIANGLES
+#define KIND_BOXES HEDGEROW_KIND_BOXES
+#define KIND_INSTANCES HEDGEROW_KIND_INSTANCES
 #define MAX_DEPTH HEDGEROW_MAX_DEPTH
+#define UNUSED HEDGEROW_UNUSED
 #define STATUS_NON_FINITE HEDGEROW_STATUS_NON_FINITE
 #define STATUS_INDEX_OUT_OF_RANGE HEDGEROW_STATUS_INDEX_OUT_OF_RANGE
 #define STATUS_TOO_DEEP HEDGEROW_STATUS_TOO_DEEP
 #define STATUS_SPIN_RAN_OUT HEDGEROW_STATUS_SPIN_RAN_OUT
-#include "bvh/layout.glsl"
-#include "trace/ray.glsl"
-#include "trace/slab.glsl"
-#include "trace/stack.glsl"
-#include "trace/triangle.glsl"
+#define STATUS_BAD_INSTANCE HEDGEROW_STATUS_BAD_INSTANCE
+#define STATUS_WRONG_VERSION HEDGEROW_STATUS_WRONG_VERSION
+#define STATUS_UNUSABLE HEDGEROW_STATUS_UNUSABLE
+#define GEOMETRY_OPAQUE HEDGEROW_GEOMETRY_OPAQUE
+#ifndef HEDGEROW_QUERIES
+#define HEDGEROW_QUERIES 1
+#endif
+#include "trace/query_walk.glsl"
 
 #define hedgerowAccelerationStructure HedgerowStructure
 
-const uint hedgerowRayFlagsNone = 0u;
-const uint hedgerowRayFlagsOpaque = 1u;
-const uint hedgerowRayFlagsTerminateOnFirstHit = 4u;
-const uint hedgerowRayQueryCommittedIntersectionNone = 0u;
-const uint hedgerowRayQueryCommittedIntersectionTriangle = 1u;
+const uint hedgerowRayQueryCandidateIntersectionTriangle = HEDGEROW_MET_TRIANGLE - 1u;
+const uint hedgerowRayQueryCandidateIntersectionAABB = HEDGEROW_MET_BOX - 1u;
+const uint hedgerowRayQueryCommittedIntersectionNone = HEDGEROW_MET_NOTHING;
+const uint hedgerowRayQueryCommittedIntersectionTriangle = HEDGEROW_MET_TRIANGLE;
+const uint hedgerowRayQueryCommittedIntersectionGenerated = HEDGEROW_MET_BOX;
 
-struct HedgerowRayQuery {
-    HedgerowStructure structure;
-    HedgerowRay ray;
-    uint flags;
-    uint cull_mask;
-    bool done;
-    HedgerowHit committed;
-};
-
-// Walks the tree; the nearest hit, or with `first` the first that is met.
-HedgerowHit hedgerow_walk(HedgerowStructure structure, HedgerowRay given, bool first) {
-    HedgerowHit hit = HedgerowHit(HEDGEROW_INFINITY, HEDGEROW_NONE, 0.0, 0.0);
-    const uint UNUSABLE = STATUS_TOO_DEEP | STATUS_SPIN_RAN_OUT;
-    HedgerowTriangles triangles = triangles_of(structure);
-    HedgerowPreparedRay ray;
-    bool going = hedgerow_prepare(given, structure.header.root.lo, structure.header.root.hi, ray) &&
-                 structure.header.active_count != 0u && (structure.header.status & UNUSABLE) == 0u;
-    float best = ray.t_max;
-    uint index = structure.header.root.index;
-    uint count = structure.header.root.count;
-    uint level = 0;
-    while (going) {
-        bool found = false;
-        if (count == 0u) {
-            HedgerowNode node = structure.nodes[index];
-            bool enters_left, enters_right;
-            float left = hedgerow_enter(ray, node.left.lo, node.left.hi, best, enters_left);
-            float right = hedgerow_enter(ray, node.right.lo, node.right.hi, best, enters_right);
-            bool right_first = enters_right && (!enters_left || right < left);
-            if (enters_left && enters_right) {
-                hedgerow_put(level, right_first ? HedgerowWaiting(node.left.index, node.left.count, left)
-                                                : HedgerowWaiting(node.right.index, node.right.count, right));
-                level++;
-            }
-            found = enters_left || enters_right;
-            index = right_first ? node.right.index : node.left.index;
-            count = right_first ? node.right.count : node.left.count;
-        } else {
-            for (uint i = index; i < index + count; i++) {
-                HedgerowTriangle triangle = triangles.triangle[i];
-                vec3 met;
-                if (hedgerow_meet(ray, triangle.v0, triangle.v1, triangle.v2, met) && ray.t_min < met.x &&
-                    met.x < ray.t_max && (met.x < best || met.x == best && triangle.primitive < hit.primitive)) {
-                    best = met.x;
-                    hit = HedgerowHit(met.x, triangle.primitive, met.y, met.z);
-                    if (first) break;
-                }
-            }
-            if (first && hit.primitive != HEDGEROW_NONE) break;
-        }
-        while (!found && level > 0u) {
-            level--;
-            HedgerowWaiting waiting = hedgerow_taken(level);
-            index = waiting.index;
-            count = waiting.count;
-            // Equally far is not too far: an equally near hit with a lower index may be there.
-            found = waiting.enter <= best;
-        }
-        going = found;
-    }
-    return hit;
-}
-
-// The nearest hit; without one, t is infinite and the primitive 0xffffffff.
-HedgerowHit hedgerow_closest_hit(HedgerowStructure structure, HedgerowRay ray) {
-    return hedgerow_walk(structure, ray, false);
-}
-
-// Whether there is a hit.
-bool hedgerow_any_hit(HedgerowStructure structure, HedgerowRay ray) {
-    return hedgerow_walk(structure, ray, true).primitive != HEDGEROW_NONE;
+void hedgerowRayQueryInitializeAt(out HedgerowRayQuery query, uint slot, HedgerowStructure structure, uint flags,
+                                  uint cull_mask, vec3 origin, float t_min, vec3 direction, float t_max) {
+    hedgerow_begin(query, slot, uvec2(structure), flags, cull_mask & 0xffu, HedgerowRay(origin, t_min, direction, t_max));
 }
 
 void hedgerowRayQueryInitialize(out HedgerowRayQuery query, HedgerowStructure structure, uint flags, uint cull_mask,
                                 vec3 origin, float t_min, vec3 direction, float t_max) {
-    query.structure = structure;
-    query.ray = HedgerowRay(origin, t_min, direction, t_max);
-    query.flags = flags;
-    query.cull_mask = cull_mask;
-    query.done = false;
-    query.committed = HedgerowHit(HEDGEROW_INFINITY, HEDGEROW_NONE, 0.0, 0.0);
+    hedgerowRayQueryInitializeAt(query, 0u, structure, flags, cull_mask, origin, t_min, direction, t_max);
 }
 
-// True while a candidate waits to be decided on: never, as every triangle is opaque.
+// True while a candidate waits to be decided on: a triangle that is not opaque, or a box.
 bool hedgerowRayQueryProceed(inout HedgerowRayQuery query) {
-    // As in Vulkan, a mask without bits lets the ray meet nothing.
-    if (!query.done && (query.cull_mask & 0xffu) != 0u) {
-        bool first = (query.flags & hedgerowRayFlagsTerminateOnFirstHit) != 0u;
-        query.committed = hedgerow_walk(query.structure, query.ray, first);
-    }
-    query.done = true;
-    return false;
+    return hedgerow_proceed(query);
 }
 
 void hedgerowRayQueryTerminate(inout HedgerowRayQuery query) {
-    query.done = true;
+    hedgerow_end(query);
 }
 
-// The getters take `committed` for the sake of the names; there are no candidates to ask for.
+// The candidate triangle is a hit.
+void hedgerowRayQueryConfirmIntersection(inout HedgerowRayQuery query) {
+    hedgerow_commit(query);
+}
+
+// The candidate box is hit at t.
+void hedgerowRayQueryGenerateIntersection(inout HedgerowRayQuery query, float t) {
+    query.candidate.t = t;
+    hedgerow_commit(query);
+}
+
 uint hedgerowRayQueryGetIntersectionType(HedgerowRayQuery query, bool committed) {
-    return committed && query.committed.primitive != HEDGEROW_NONE ? hedgerowRayQueryCommittedIntersectionTriangle
-                                                                  : hedgerowRayQueryCommittedIntersectionNone;
+    return committed ? query.committed.type : query.candidate.type - 1u;
 }
 
 float hedgerowRayQueryGetIntersectionT(HedgerowRayQuery query, bool committed) {
-    return query.committed.t;
+    return hedgerow_met(query, committed).t;
 }
 
+// The 24 bits of the instance.
+uint hedgerowRayQueryGetIntersectionInstanceCustomIndex(HedgerowRayQuery query, bool committed) {
+    return hedgerow_instance_of(query, hedgerow_met(query, committed)).index_and_mask & 0xffffffu;
+}
+
+// The instance's position in the input.
+uint hedgerowRayQueryGetIntersectionInstanceId(HedgerowRayQuery query, bool committed) {
+    return hedgerow_instance_of(query, hedgerow_met(query, committed)).instance;
+}
+
+uint hedgerowRayQueryGetIntersectionInstanceShaderBindingTableRecordOffset(HedgerowRayQuery query, bool committed) {
+    return hedgerow_instance_of(query, hedgerow_met(query, committed)).offset_and_flags & 0xffffffu;
+}
+
+uint hedgerowRayQueryGetIntersectionGeometryIndex(HedgerowRayQuery query, bool committed) {
+    HedgerowMeeting met = hedgerow_met(query, committed);
+    uvec2 structure = hedgerow_instance_of(query, met).structure;
+    return hedgerow_geometry_of(structure, hedgerow_primitive_of(structure, met)).index;
+}
+
+// The primitive's position in its geometry.
 uint hedgerowRayQueryGetIntersectionPrimitiveIndex(HedgerowRayQuery query, bool committed) {
-    return query.committed.primitive;
+    HedgerowMeeting met = hedgerow_met(query, committed);
+    uvec2 structure = hedgerow_instance_of(query, met).structure;
+    uint primitive = hedgerow_primitive_of(structure, met);
+    return primitive - hedgerow_geometry_of(structure, primitive).first;
 }
 
+// The weights of the second and the third vertex.
 vec2 hedgerowRayQueryGetIntersectionBarycentrics(HedgerowRayQuery query, bool committed) {
-    return vec2(query.committed.u, query.committed.v);
+    HedgerowMeeting met = hedgerow_met(query, committed);
+    return vec2(met.u, met.v);
+}
+
+bool hedgerowRayQueryGetIntersectionFrontFace(HedgerowRayQuery query, bool committed) {
+    return hedgerow_met(query, committed).is_front;
+}
+
+bool hedgerowRayQueryGetIntersectionCandidateAABBOpaque(HedgerowRayQuery query) {
+    return query.candidate.is_opaque;
+}
+
+vec3 hedgerowRayQueryGetIntersectionObjectRayDirection(HedgerowRayQuery query, bool committed) {
+    vec4 to_object[3] = hedgerow_instance_of(query, hedgerow_met(query, committed)).to_object;
+    return hedgerow_transformed(to_object, vec4(query.ray.direction, 0.0));
+}
+
+vec3 hedgerowRayQueryGetIntersectionObjectRayOrigin(HedgerowRayQuery query, bool committed) {
+    vec4 to_object[3] = hedgerow_instance_of(query, hedgerow_met(query, committed)).to_object;
+    return hedgerow_transformed(to_object, vec4(query.ray.origin, 1.0));
+}
+
+mat4x3 hedgerowRayQueryGetIntersectionObjectToWorld(HedgerowRayQuery query, bool committed) {
+    vec4 rows[3] = hedgerow_instance_of(query, hedgerow_met(query, committed)).to_world;
+    return transpose(mat3x4(rows[0], rows[1], rows[2]));
+}
+
+mat4x3 hedgerowRayQueryGetIntersectionWorldToObject(HedgerowRayQuery query, bool committed) {
+    vec4 rows[3] = hedgerow_instance_of(query, hedgerow_met(query, committed)).to_object;
+    return transpose(mat3x4(rows[0], rows[1], rows[2]));
+}
+
+// The corners of the triangle, in the object's space.
+void hedgerowRayQueryGetIntersectionTriangleVertexPositions(HedgerowRayQuery query, bool committed, out vec3 positions[3]) {
+    HedgerowMeeting met = hedgerow_met(query, committed);
+    HedgerowStructure structure = HedgerowStructure(hedgerow_instance_of(query, met).structure);
+    HedgerowTriangle triangle = triangles_of(structure).triangle[met.record];
+    positions = vec3[3](triangle.v0, triangle.v1, triangle.v2);
 }
 
 float hedgerowRayQueryGetRayTMin(HedgerowRayQuery query) {
@@ -192,16 +202,32 @@ vec3 hedgerowRayQueryGetWorldRayDirection(HedgerowRayQuery query) {
 #undef Child
 #undef Node
 #undef Triangle
+#undef BoxRecord
+#undef Instance
+#undef GeometryEntry
 #undef Header
 #undef Structure
 #undef Triangles
+#undef BoxRecords
+#undef Instances
+#undef GeometryTable
 #undef triangles_of
-#undef triangles_at
+#undef address_of
+#undef records_at
+#undef record_bytes
+#undef geometry_table_at
 #undef MAGIC
-#undef KIND_BVH2
+#undef KIND_TRIANGLES
+#undef KIND_BOXES
+#undef KIND_INSTANCES
 #undef MAX_DEPTH
+#undef UNUSED
 #undef STATUS_NON_FINITE
 #undef STATUS_INDEX_OUT_OF_RANGE
 #undef STATUS_TOO_DEEP
 #undef STATUS_SPIN_RAN_OUT
+#undef STATUS_BAD_INSTANCE
+#undef STATUS_WRONG_VERSION
+#undef STATUS_UNUSABLE
+#undef GEOMETRY_OPAQUE
 #endif

@@ -1,4 +1,5 @@
 // What a ray's traversal has put off: one entry a level of the tree, so MAX_DEPTH entries hold every tree that can be traced.
+// A shader that walks several trees at once defines HEDGEROW_LEVELS, the entries that it needs, before it includes this file.
 //
 // A shader may define HEDGEROW_SHARED_LEVELS, a constant or specialisation constant, before it includes this file, and
 // declare its workgroup size before that: then so many of the lowest entries of each invocation lie in shared memory, in
@@ -6,6 +7,9 @@
 // private memory. Where shared memory is as good as any (CPUs), all may lie there, and no private array is left.
 #ifndef HEDGEROW_TRACE_STACK
 #define HEDGEROW_TRACE_STACK
+#ifndef HEDGEROW_LEVELS
+#define HEDGEROW_LEVELS MAX_DEPTH
+#endif
 
 // A child that waits, and the distance at which the ray enters it: minus infinity for a leaf of so many triangles that
 // its count has no room in the entry beside the index; it is taken however far it is.
@@ -33,12 +37,12 @@ HedgerowWaiting hedgerow_unpacked(uvec2 entry) {
 }
 
 #ifdef HEDGEROW_SHARED_LEVELS
-const uint HEDGEROW_PRIVATE_LEVELS = HEDGEROW_SHARED_LEVELS < MAX_DEPTH ? MAX_DEPTH - HEDGEROW_SHARED_LEVELS : 0;
+const uint HEDGEROW_PRIVATE_LEVELS = HEDGEROW_SHARED_LEVELS < HEDGEROW_LEVELS ? HEDGEROW_LEVELS - HEDGEROW_SHARED_LEVELS : 0;
 // One word more than needed: an array must not be empty.
 shared uint hedgerow_shared_child[HEDGEROW_SHARED_LEVELS * gl_WorkGroupSize.x + 1];
 shared uint hedgerow_shared_enter[HEDGEROW_SHARED_LEVELS * gl_WorkGroupSize.x + 1];
 #else
-const uint HEDGEROW_PRIVATE_LEVELS = MAX_DEPTH;
+const uint HEDGEROW_PRIVATE_LEVELS = HEDGEROW_LEVELS;
 #endif
 
 uvec2 hedgerow_private[HEDGEROW_PRIVATE_LEVELS + 1];

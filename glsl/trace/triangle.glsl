@@ -70,8 +70,9 @@ bool hedgerow_carefully(HedgerowPreparedRay ray, vec3 a, vec3 b, vec3 c, float m
     return hedgerow_exactly(a, b, c, edges);
 }
 
-// Where the ray's line meets the triangle: t and the weights of the second and third vertex.
-bool hedgerow_meet(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, out vec3 meeting) {
+// Where the ray's line meets the triangle: t and the weights of the second and third vertex; and whether it meets the front,
+// from which the vertices go round clockwise.
+bool hedgerow_meet_facing(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, out vec3 meeting, out bool is_front) {
     const float TRUSTED = uintBitsToFloat((127u - 76u) << 23);
     const float LARGEST_CUBE = uintBitsToFloat((127u + 100u) << 23);
     vec3 a = hedgerow_sheared(ray, v0);
@@ -97,6 +98,13 @@ bool hedgerow_meet(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, out vec3 
     precise vec3 weights = edges * scale;
     precise float t = (weights.x * a.z + weights.y * b.z + weights.z * c.z) * ray.shear.z;
     meeting = vec3(t, weights.yz);
+    // The permutation keeps the sense of rotation, and the shear turns it where the ray goes down its major axis.
+    is_front = (scale < 0.0) != (ray.shear.z < 0.0);
     return true;
+}
+
+bool hedgerow_meet(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, out vec3 meeting) {
+    bool is_front;
+    return hedgerow_meet_facing(ray, v0, v1, v2, meeting, is_front);
 }
 #endif

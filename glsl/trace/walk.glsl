@@ -34,8 +34,7 @@ bool at_triangle(Walk walk) {
 }
 
 bool can_be_traced(Structure structure) {
-    const uint UNUSABLE = STATUS_TOO_DEEP | STATUS_SPIN_RAN_OUT;
-    return structure.header.active_count != 0u && (structure.header.status & UNUSABLE) == 0u;
+    return structure.header.active_count != 0u && (structure.header.status & STATUS_UNUSABLE) == 0u;
 }
 
 // At the root; a ray that cannot hit anything has nothing at hand and nothing that waits.

@@ -48,6 +48,7 @@ impl Build {
         context: &Context,
         info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
         geometries: Vec<Geometry>,
+        geometry_count: u32,
         primitive_count: u64,
     ) -> Result<Build> {
         if info.ty != vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL {
@@ -59,7 +60,8 @@ impl Build {
             return Err(Error::Argument(format!("flags are {:?}; take {preferences:?} or none", info.flags)));
         }
         let primitive_count = u32::try_from(primitive_count).unwrap_or(u32::MAX);
-        let lbvh = Lbvh::new(context, &Options::DEFAULT, primitive_count)?;
+        let options = Options { geometry_count: geometry_count.max(1), ..Options::DEFAULT };
+        let lbvh = Lbvh::new(context, &options, primitive_count)?;
         Ok(Build { lbvh, geometries, primitive_count })
     }
 
@@ -137,7 +139,8 @@ impl<'a> Device<'a> {
             geometry::triangles(geometry, &vk::AccelerationStructureBuildRangeInfoKHR::default(), 0)?;
         }
         let count = max_primitive_counts.iter().copied().map(u64::from).sum();
-        let Sizes { structure, scratch, .. } = Build::new(self.context, info, Vec::new(), count)?.lbvh.sizes_at_most();
+        let Sizes { structure, scratch, .. } =
+            Build::new(self.context, info, Vec::new(), given.len() as u32, count)?.lbvh.sizes_at_most();
         size_info.acceleration_structure_size = structure;
         size_info.build_scratch_size = scratch + Build::record_bytes(given.len());
         size_info.update_scratch_size = 0;
@@ -258,7 +261,7 @@ impl<'a> Device<'a> {
             geometries.push(geometry::triangles(geometry, range, count as u32)?);
             count += u64::from(range.primitive_count);
         }
-        Build::new(self.context, info, geometries, count)
+        Build::new(self.context, info, geometries, info.geometry_count, count)
     }
 }
 

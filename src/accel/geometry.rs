@@ -1,6 +1,6 @@
 //! The geometries of Vulkan's structs as those of our builders.
 
-use crate::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
+use crate::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, VertexFormat};
 use crate::{Error, Result};
 use ash::vk;
 
@@ -25,6 +25,17 @@ pub(super) unsafe fn given<'a>(
             Err(Error::Argument(format!("geometryCount is {count}; give exactly one of pGeometries and ppGeometries")))
         }
     }
+}
+
+fn flags_of(geometry: &vk::AccelerationStructureGeometryKHR<'_>) -> GeometryFlags {
+    let mut flags = GeometryFlags::NONE;
+    if geometry.flags.contains(vk::GeometryFlagsKHR::OPAQUE) {
+        flags = flags | GeometryFlags::OPAQUE;
+    }
+    if geometry.flags.contains(vk::GeometryFlagsKHR::NO_DUPLICATE_ANY_HIT_INVOCATION) {
+        flags = flags | GeometryFlags::NO_DUPLICATES;
+    }
+    flags
 }
 
 /// The triangles of a geometry that `range` takes; `first` triangles come before.
@@ -71,6 +82,7 @@ pub(super) fn triangles(
         vertex_count: triangles.max_vertex.saturating_add(1).saturating_sub(range.first_vertex),
         vertex_format,
         index_format,
+        flags: flags_of(geometry),
         first,
     })
 }

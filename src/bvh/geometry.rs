@@ -1,6 +1,6 @@
 //! The caller's triangles: vertices and indices in the formats that Vulkan's acceleration structures take.
 //!
-//! `glsl/bvh/triangles.glsl` reads them on the device; [`host`](super::host::geometry) does the same on the host.
+//! `glsl/bvh/geometry.glsl` reads them on the device; [`host`](super::host::geometry) does the same on the host.
 
 use crate::{Error, Result};
 use ash::vk;
@@ -24,7 +24,9 @@ pub struct Geometry {
     pub vertex_format: VertexFormat,
     /// The indices' format.
     pub index_format: IndexFormat,
-    /// Its first triangle's primitive index: how many triangles the geometries before it have.
+    /// What a ray meets of it.
+    pub flags: GeometryFlags,
+    /// Its first primitive index: how many primitives the geometries before it have.
     pub first: u32,
 }
 
@@ -39,13 +41,19 @@ impl Geometry {
             vertex_count,
             vertex_format: VertexFormat::FLOAT3,
             index_format: IndexFormat::U32,
+            flags: GeometryFlags::NONE,
             first: 0,
         }
     }
 
+    /// Boxes as `VkAabbPositionsKHR` has them, six floats each, `stride` bytes from one to the next.
+    pub fn boxes(address: u64, stride: u32) -> Geometry {
+        Geometry { vertex_stride: stride, ..Geometry::mesh(address, 0, 0) }
+    }
+
     /// The formats as the device has them, in one word.
     pub(crate) fn formats(&self) -> u32 {
-        bytemuck::cast([self.vertex_format.kind, self.vertex_format.components, self.index_format.0 as u8, 0])
+        bytemuck::cast([self.vertex_format.kind, self.vertex_format.components, self.index_format.0, self.flags.0])
     }
 
     /// Whether it is of the formats of [`Geometry::mesh`], with any stride: these have kernels of their own.
@@ -117,7 +125,7 @@ impl TryFrom<vk::Format> for VertexFormat {
 /// Bytes of an index; none where the vertices are taken in their order, three a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Pod, Zeroable)]
 #[repr(transparent)]
-pub struct IndexFormat(u16);
+pub struct IndexFormat(u8);
 
 impl IndexFormat {
     /// `VK_INDEX_TYPE_NONE_KHR`.
@@ -154,12 +162,63 @@ impl TryFrom<vk::IndexType> for IndexFormat {
     }
 }
 
+/// What a ray meets of a geometry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct GeometryFlags(u8);
+
+impl GeometryFlags {
+    /// Every meeting is asked of the shader.
+    pub const NONE: GeometryFlags = GeometryFlags(0);
+    /// Every meeting is a hit.
+    pub const OPAQUE: GeometryFlags = GeometryFlags(super::layout::GEOMETRY_OPAQUE as u8);
+    /// A primitive is met once by a ray. It always is: no tree of ours holds one twice.
+    pub const NO_DUPLICATES: GeometryFlags = GeometryFlags(1 << 1);
+    /// The record that ends the others: primitives from its `first` on are inactive.
+    pub(crate) const END: GeometryFlags = GeometryFlags(1 << 7);
+
+    /// The flags as the structure has them.
+    pub fn bits(self) -> u32 {
+        self.0.into()
+    }
+}
+
+impl std::ops::BitOr for GeometryFlags {
+    type Output = GeometryFlags;
+
+    fn bitor(self, other: GeometryFlags) -> GeometryFlags {
+        GeometryFlags(self.0 | other.0)
+    }
+}
+
+/// What the primitives of a structure are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Primitives {
+    /// Triangles; records are [`super::layout::Triangle`]s.
+    Triangles,
+    /// Boxes; records are [`super::layout::BoxRecord`]s.
+    Boxes,
+    /// Instances or parts of them; records are [`super::layout::Instance`]s.
+    Instances,
+}
+
+impl Primitives {
+    /// Bytes of a record.
+    pub const fn record_bytes(self) -> u64 {
+        match self {
+            Primitives::Triangles => size_of::<super::layout::Triangle>() as u64,
+            Primitives::Boxes => size_of::<super::layout::BoxRecord>() as u64,
+            Primitives::Instances => size_of::<super::layout::Instance>() as u64,
+        }
+    }
+}
+
 /// What a build reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Input {
     /// The geometries.
     pub source: Source,
-    /// Triangles of all geometries.
+    /// Primitives of all geometries.
     pub primitive_count: u32,
 }
 
@@ -175,6 +234,15 @@ pub enum Source {
         records: u64,
         /// How many there are.
         count: u32,
+    },
+    /// The entries of a top level, `glsl/bvh/instances.glsl`, in device memory, and the instances that they are of.
+    Entries {
+        /// Address of the entries, 40 bytes each, aligned to 8 bytes.
+        entries: u64,
+        /// Address of the instances, or of pointers to them.
+        instances: u64,
+        /// Whether they are pointers.
+        pointers: bool,
     },
 }
 

@@ -6,19 +6,19 @@
 //! | --- | --- | --- |
 //! | [`Header`] | 128 | 0 |
 //! | [`Node`] × `node_slots` | 64 each | [`NODES_OFFSET`] |
-//! | [`Triangle`] × `primitive_count` | 40 each | behind the nodes: [`Sizes::triangles_offset`] |
+//! | [`Record`] × `primitive_count` | 40, 28 or 128 each | behind the nodes: [`Sizes::records_offset`] |
+//! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | behind the records |
 //!
-//! A [`Child`] names either an inner node (`count` 0) or a leaf: `count` triangles from `index` on, in the *primitive order*,
-//! which is the order of the triangle records. A slot that no child names is not part of the tree; what it holds may be the
-//! subtree of a collapsed leaf or [`Node::UNUSED`], but no slot is named twice, by used and unused slots together: so every
-//! node has one parent, and who climbs from any slot reaches the root or learns that the slot is not part of the tree.
+//! A [`Child`] names either an inner node (`count` 0) or a leaf: `count` records from `index` on, in the *primitive order*,
+//! which is the order of the records: [`Triangle`]s, [`BoxRecord`]s or, of a top level, [`Instance`]s. A slot that no child
+//! names is unused: the `count` of its left child is [`UNUSED`], and nothing else of it means anything.
 
 use bytemuck::{Pod, Zeroable};
 
 /// The first word of a structure.
 pub const MAGIC: u32 = u32::from_le_bytes(*b"hdgr");
-/// The second word: layout `Bvh2`, version 1.
-pub const KIND_BVH2: u32 = 0x0002_0002;
+/// The left child's `count` of a slot that no child names.
+pub const UNUSED: u32 = u32::MAX;
 /// Where the nodes begin.
 pub const NODES_OFFSET: u64 = size_of::<Header>() as u64;
 /// The deepest tree a tracer must be able to walk: every code bit and every index bit may cost a level.
@@ -34,8 +34,12 @@ pub mod status {
     pub const TOO_DEEP: u32 = 1 << 2;
     /// A bounded spin ran out: the structure is not usable.
     pub const SPIN_RAN_OUT: u32 = 1 << 3;
+    /// An instance was left out: its matrix has no inverse, or it names what is no bottom-level structure.
+    pub const BAD_INSTANCE: u32 = 1 << 4;
+    /// Deserialised from what another version wrote: the structure is not usable.
+    pub const WRONG_VERSION: u32 = 1 << 5;
     /// Bits of structures that cannot be traced: tracers take them as empty.
-    pub const UNUSABLE: u32 = TOO_DEEP | SPIN_RAN_OUT;
+    pub const UNUSABLE: u32 = TOO_DEEP | SPIN_RAN_OUT | WRONG_VERSION;
 }
 
 /// An axis-aligned box. Empty when `lo > hi`.
@@ -99,17 +103,17 @@ impl Aabb {
 pub struct Child {
     /// Least corner of the child's box.
     pub lo: [f32; 3],
-    /// Node slot, or first triangle of the leaf.
+    /// Node slot, or first record of the leaf.
     pub index: u32,
     /// Greatest corner of the child's box.
     pub hi: [f32; 3],
-    /// 0: an inner node; otherwise the number of triangles in the leaf.
+    /// 0: an inner node; otherwise the number of records in the leaf.
     pub count: u32,
 }
 
 impl Child {
     /// A child of an unused slot: a leaf of nothing.
-    pub const UNUSED: Child = Child { lo: Aabb::EMPTY.lo, index: u32::MAX, hi: Aabb::EMPTY.hi, count: u32::MAX };
+    pub const UNUSED: Child = Child { lo: Aabb::EMPTY.lo, index: u32::MAX, hi: Aabb::EMPTY.hi, count: UNUSED };
 
     /// The child's box.
     pub fn bounds(&self) -> Aabb {
@@ -133,6 +137,23 @@ pub struct Node {
 impl Node {
     /// A slot that names nothing.
     pub const UNUSED: Node = Node { children: [Child::UNUSED; 2] };
+
+    /// Whether a child names the slot.
+    pub fn is_used(&self) -> bool {
+        self.children[0].count != UNUSED
+    }
+}
+
+/// What the leaves of a structure hold.
+pub trait Record: Pod + PartialEq + std::fmt::Debug {
+    /// The second word of the structure.
+    const KIND: u32;
+
+    /// Position in the input.
+    fn primitive(&self) -> u32;
+
+    /// The box around it, if it can be told without other structures.
+    fn bounds(&self) -> Option<Aabb>;
 }
 
 /// A triangle in the primitive order. 40 bytes.
@@ -149,89 +170,223 @@ pub struct Triangle {
     pub primitive: u32,
 }
 
+impl Record for Triangle {
+    const KIND: u32 = 0x0002_0003;
+
+    fn primitive(&self) -> u32 {
+        self.primitive
+    }
+
+    fn bounds(&self) -> Option<Aabb> {
+        Some(Aabb::around(&[self.v0, self.v1, self.v2]))
+    }
+}
+
+/// A box that stands for something that the caller's shaders know, in the primitive order. 28 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct BoxRecord {
+    /// Least corner.
+    pub lo: [f32; 3],
+    /// Greatest corner.
+    pub hi: [f32; 3],
+    /// Primitive index: position in the input.
+    pub primitive: u32,
+}
+
+impl Record for BoxRecord {
+    const KIND: u32 = 0x0012_0003;
+
+    fn primitive(&self) -> u32 {
+        self.primitive
+    }
+
+    fn bounds(&self) -> Option<Aabb> {
+        Some(Aabb { lo: self.lo, hi: self.hi })
+    }
+}
+
+/// An instance, or a part of one, in a top level. 128 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Instance {
+    /// World to object, row by row.
+    pub to_object: [[f32; 4]; 3],
+    /// Object to world, row by row: as the caller gave it.
+    pub to_world: [[f32; 4]; 3],
+    /// Address of the bottom-level structure.
+    pub structure: u64,
+    /// The caller's 24 bits, and the mask above them.
+    pub index_and_mask: u32,
+    /// The caller's 24 bits of offset in a shader binding table, and `vk::GeometryInstanceFlagsKHR` above them.
+    pub offset_and_flags: u32,
+    /// Position in the input.
+    pub instance: u32,
+    /// Where to begin in the bottom-level structure: a [`Child`]'s index. Not its root where the instance was opened.
+    pub start: u32,
+    /// And its count.
+    pub start_count: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+impl Record for Instance {
+    const KIND: u32 = 0x0022_0003;
+
+    fn primitive(&self) -> u32 {
+        self.instance
+    }
+
+    fn bounds(&self) -> Option<Aabb> {
+        None
+    }
+}
+
+/// Where the primitives of a geometry begin among those of all, and its flags. 8 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct GeometryEntry {
+    /// Its first primitive index.
+    pub first: u32,
+    /// [`GEOMETRY_OPAQUE`] and the other bits of [`crate::bvh::geometry::Geometry`].
+    pub flags: u32,
+}
+
+/// A geometry's flag: what a ray meets of it is a hit without asking the shader.
+pub const GEOMETRY_OPAQUE: u32 = 1 << 0;
+
 /// The head of a structure. 128 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Header {
     /// [`MAGIC`].
     pub magic: u32,
-    /// [`KIND_BVH2`].
+    /// [`Record::KIND`] of what the leaves hold.
     pub kind: u32,
     /// Bits of [`status`].
     pub status: u32,
-    /// Triangles of the input, and triangle records.
+    /// Primitives of the input, and records.
     pub primitive_count: u32,
     /// The root, with the box of the whole scene. Of an empty structure: an empty box, index 0, count 0 and `active` 0.
     pub root: Child,
-    /// Triangles in the tree: those of the input that are finite and whose indices are in range.
+    /// Primitives in the tree: those of the input that are finite and whose indices are in range.
     pub active: u32,
-    /// Node slots there is room for: `primitive_count` − 1, at least 1.
+    /// Node slots there are: `primitive_count` − 1, at least 1; of a compacted structure those that are used.
     pub node_slots: u32,
     /// Code bits that the builder sorted by.
     pub code_bits: u32,
+    /// Nodes of the tree.
+    pub inner_nodes: u32,
+    /// Geometries of the input.
+    pub geometry_count: u32,
+    /// The flags that all geometries have, and those that any has in the byte above.
+    pub geometry_flags: u32,
+    /// `vk::BuildAccelerationStructureFlagsKHR` that it was built with.
+    pub build_flags: u32,
+    /// What lengths were scaled by before areas were taken at the last build: [`crate::bvh::sah::area_scale`].
+    pub area_scale: f32,
+    /// SAH cost as a sum of scaled half areas, by the costs of collapsing: as of now, and as of the last build.
+    pub cost: f32,
+    /// See `cost`.
+    pub built_cost: f32,
+    /// Scaled half area of the root at the last build.
+    pub built_area: f32,
     /// Zero.
-    pub reserved: [u32; 17],
+    pub reserved: [u32; 9],
 }
 
-/// Where the parts of a structure of `primitive_count` triangles lie.
+impl Header {
+    /// SAH cost, divided by the root's area: as it is now (after updates). 0 for a root without area.
+    pub fn sah(&self) -> f32 {
+        ratio(self.cost, self.root.bounds().scaled_half_area(self.area_scale))
+    }
+
+    /// How many times the SAH cost is what it was at the last build: 1 until the first update.
+    pub fn sah_growth(&self) -> f32 {
+        ratio(self.sah(), ratio(self.built_cost, self.built_area))
+    }
+}
+
+fn ratio(a: f32, b: f32) -> f32 {
+    if b > 0.0 { a / b } else { 0.0 }
+}
+
+/// Where the parts of a structure lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sizes {
-    /// Byte offset of the triangle records.
-    pub triangles_offset: u64,
+    /// Byte offset of the records.
+    pub records_offset: u64,
+    /// Byte offset of the table of geometries.
+    pub geometries_offset: u64,
     /// Bytes in all.
     pub bytes: u64,
 }
 
-/// The sizes of a `Bvh2` of `primitive_count` triangles.
-pub const fn sizes(primitive_count: u32) -> Sizes {
-    let triangles_offset = NODES_OFFSET + node_slots(primitive_count) as u64 * size_of::<Node>() as u64;
-    Sizes { triangles_offset, bytes: triangles_offset + primitive_count as u64 * size_of::<Triangle>() as u64 }
+/// The sizes of a structure of so many records of `record_bytes` bytes with the most nodes that they can need.
+pub const fn sizes(record_bytes: u64, primitive_count: u32, geometry_count: u32) -> Sizes {
+    sizes_with(record_bytes, node_slots(primitive_count), primitive_count, geometry_count)
 }
 
-/// Node slots of a `Bvh2` of `primitive_count` triangles.
+/// The sizes of a structure of so many node slots, records of `record_bytes` bytes, and geometries.
+pub const fn sizes_with(record_bytes: u64, node_slots: u32, primitive_count: u32, geometry_count: u32) -> Sizes {
+    let records_offset = NODES_OFFSET + node_slots as u64 * size_of::<Node>() as u64;
+    let geometries_offset = records_offset + primitive_count as u64 * record_bytes;
+    let entries = if geometry_count > 1 { geometry_count as u64 } else { 0 };
+    let bytes = geometries_offset + entries * size_of::<GeometryEntry>() as u64;
+    Sizes { records_offset, geometries_offset, bytes }
+}
+
+/// Node slots that `primitive_count` records need at most.
 pub const fn node_slots(primitive_count: u32) -> u32 {
     if primitive_count < 2 { 1 } else { primitive_count - 1 }
 }
 
 const _: () = assert!(size_of::<Header>() == 128 && size_of::<Node>() == 64 && size_of::<Triangle>() == 40);
+const _: () = assert!(size_of::<BoxRecord>() == 28 && size_of::<Instance>() == 128);
 
-/// A `Bvh2` on the host, read back or built there.
+/// A structure on the host, read back or built there.
 #[derive(Debug, Clone)]
-pub struct Bvh2 {
+pub struct Bvh2<R: Record = Triangle> {
     /// The head.
     pub header: Header,
     /// All node slots, used or not.
     pub nodes: Vec<Node>,
-    /// The triangles in primitive order.
-    pub triangles: Vec<Triangle>,
+    /// What the leaves hold, in primitive order.
+    pub records: Vec<R>,
+    /// The table of geometries; empty where there is one.
+    pub geometries: Vec<GeometryEntry>,
 }
 
-impl Bvh2 {
+impl<R: Record> Bvh2<R> {
     /// Takes a structure's bytes apart.
     ///
     /// # Errors
-    /// [`crate::Error::InvalidStructure`] if the magic, kind or length is not that of a `Bvh2`.
-    pub fn from_bytes(bytes: &[u8]) -> crate::Result<Bvh2> {
+    /// [`crate::Error::InvalidStructure`] if the magic, kind or length is not that of a structure of such records.
+    pub fn from_bytes(bytes: &[u8]) -> crate::Result<Bvh2<R>> {
         let invalid = |what: String| crate::Error::InvalidStructure(what);
         if bytes.len() < size_of::<Header>() {
             return Err(invalid(format!("{} bytes, the header alone has {}", bytes.len(), size_of::<Header>())));
         }
         let header: Header = bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()]);
-        if header.magic != MAGIC || header.kind != KIND_BVH2 {
+        if header.magic != MAGIC || header.kind != R::KIND {
             return Err(invalid(format!(
-                "begins with {:#x} {:#x}, not a Bvh2 of this version",
-                header.magic, header.kind
+                "begins with {:#x} {:#x}, not with {MAGIC:#x} {:#x}: of another kind or version",
+                header.magic,
+                header.kind,
+                R::KIND
             )));
         }
-        let sizes = sizes(header.primitive_count);
+        let sizes = header.sizes(size_of::<R>() as u64);
         if (bytes.len() as u64) < sizes.bytes {
             let (has, needs) = (bytes.len(), sizes.bytes);
-            return Err(invalid(format!("{has} bytes, {} triangles need {needs}", header.primitive_count)));
+            return Err(invalid(format!("{has} bytes, {} primitives need {needs}", header.primitive_count)));
         }
+        let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
         Ok(Bvh2 {
             header,
-            nodes: bytemuck::pod_collect_to_vec(&bytes[NODES_OFFSET as usize..sizes.triangles_offset as usize]),
-            triangles: bytemuck::pod_collect_to_vec(&bytes[sizes.triangles_offset as usize..sizes.bytes as usize]),
+            nodes: bytemuck::pod_collect_to_vec(part(NODES_OFFSET, sizes.records_offset)),
+            records: bytemuck::pod_collect_to_vec(part(sizes.records_offset, sizes.geometries_offset)),
+            geometries: bytemuck::pod_collect_to_vec(part(sizes.geometries_offset, sizes.bytes)),
         })
     }
 
@@ -239,7 +394,15 @@ impl Bvh2 {
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = bytemuck::bytes_of(&self.header).to_vec();
         bytes.extend_from_slice(bytemuck::cast_slice(&self.nodes));
-        bytes.extend_from_slice(bytemuck::cast_slice(&self.triangles));
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.records));
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.geometries));
         bytes
+    }
+}
+
+impl Header {
+    /// Where the parts of the structure lie, if its records have `record_bytes` bytes.
+    pub const fn sizes(&self, record_bytes: u64) -> Sizes {
+        sizes_with(record_bytes, self.node_slots, self.primitive_count, self.geometry_count)
     }
 }

@@ -5,7 +5,7 @@
 //! [`super::host::lbvh`]: the same bytes.
 
 use super::codes::{Code, Codes};
-pub use super::geometry::{Geometry, Input, Source};
+pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::layout;
 use super::lbvh_workgroup;
 use super::sah::Collapse;
@@ -23,11 +23,24 @@ pub struct Options {
     pub collapse: Collapse,
     /// How the phases are recorded; `None` takes what measured faster on this kind of device and size.
     pub schedule: Option<Schedule>,
+    /// What it is built over.
+    pub primitives: Primitives,
+    /// How many geometries: what [`Source::Several`] has, otherwise 1.
+    pub geometry_count: u32,
+    /// `vk::BuildAccelerationStructureFlagsKHR` for the header, at most 6 bits.
+    pub build_flags: u32,
 }
 
 impl Options {
-    /// Everything chosen from the scene and the device; leaves collapsed by SAH.
-    pub const DEFAULT: Options = Options { codes: None, collapse: Collapse::SAH, schedule: None };
+    /// One geometry of triangles, everything chosen from the scene and the device; leaves collapsed by SAH.
+    pub const DEFAULT: Options = Options {
+        codes: None,
+        collapse: Collapse::SAH,
+        schedule: None,
+        primitives: Primitives::Triangles,
+        geometry_count: 1,
+        build_flags: 0,
+    };
 }
 
 impl Default for Options {
@@ -78,6 +91,9 @@ pub struct Lbvh {
     items: u32,
     workers: u32,
     pub(super) count: u32,
+    primitives: Primitives,
+    geometry_count: u32,
+    build_flags: u32,
 }
 
 /// Where the parts of the scratch memory begin, in bytes.
@@ -89,10 +105,16 @@ struct Scratch {
     bytes: u64,
 }
 
-/// Specialisation constant 5 of the kernels that read triangles: `SOURCE` in triangles.glsl.
+/// Specialisation constant 5 of the kernels that read primitives: `SOURCE` in geometry.glsl.
 const SOURCE_MESH: u32 = 0;
 const SOURCE_GEOMETRY: u32 = 1;
 const SOURCE_GEOMETRIES: u32 = 2;
+const SOURCE_BOXES: u32 = 3;
+const SOURCE_SEVERAL_BOXES: u32 = 4;
+const SOURCE_ENTRIES: u32 = 5;
+
+/// `GEOMETRY_POINTERS << 24`: in the formats of entries (instances.glsl).
+const INSTANCE_POINTERS: u32 = 1 << 25;
 
 /// Bytes of `LbvhState` in lbvh.glsl, with room to spare.
 pub(super) const STATE_BYTES: u64 = 768;
@@ -155,7 +177,7 @@ impl Lbvh {
     pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Result<Lbvh> {
         if primitive_count > radix_sort::MAX_COUNT {
             return Err(Error::Argument(format!(
-                "{primitive_count} triangles: a structure holds at most {}; split the mesh",
+                "{primitive_count} primitives: a structure holds at most {}; split the mesh",
                 radix_sort::MAX_COUNT
             )));
         }
@@ -163,7 +185,7 @@ impl Lbvh {
         let schedule = options.schedule.unwrap_or_else(|| Schedule::for_count(primitive_count));
         if schedule == Schedule::Workgroup && primitive_count > Lbvh::WORKGROUP_MAX {
             return Err(Error::Argument(format!(
-                "{primitive_count} triangles by one workgroup: it takes at most {}; choose another schedule",
+                "{primitive_count} primitives by one workgroup: it takes at most {}; choose another schedule",
                 Lbvh::WORKGROUP_MAX
             )));
         }
@@ -179,6 +201,9 @@ impl Lbvh {
             items: if limits.is_cpu() { 32 } else { 1 },
             workers: if limits.is_cpu() { 64 } else { 1024 },
             count: primitive_count,
+            primitives: options.primitives,
+            geometry_count: options.geometry_count,
+            build_flags: options.build_flags,
         })
     }
 
@@ -194,7 +219,12 @@ impl Lbvh {
 
     /// Bytes of the structure and of the scratch memory: exactly what [`Lbvh::record`] uses.
     pub fn sizes(&self) -> Sizes {
-        Sizes { structure: layout::sizes(self.count).bytes, scratch: self.scratch().bytes, alignment: 16 }
+        Sizes { structure: self.layout().bytes, scratch: self.scratch().bytes, alignment: 16 }
+    }
+
+    /// Where the parts of the structure lie.
+    pub fn layout(&self) -> layout::Sizes {
+        layout::sizes(self.primitives.record_bytes(), self.count, self.geometry_count)
     }
 
     /// Bytes that suffice for builds of this many triangles and of any fewer by builders of the same options.
@@ -218,7 +248,7 @@ impl Lbvh {
         let sort = u64::from(self.passes()) * (3 * key + 2 * value) - if self.passes() > 0 { value } else { 0 };
         let bounds = triangles;
         let encode = triangles + key + 4 * count;
-        let hierarchy = triangles + key + value + layout::sizes(self.count).bytes;
+        let hierarchy = triangles + key + value + self.layout().bytes;
         match phase {
             "bounds" => Some(bounds),
             "encode" => Some(encode),
@@ -273,12 +303,15 @@ impl Lbvh {
         Kernel::new(shader, self.shape.workgroup, &self.shape.constants(self.items, self.key_words()))
     }
 
-    /// A kernel that reads triangles.
+    /// A kernel that reads primitives.
     pub(super) fn reading_kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
-        let source = match input.source {
-            Source::One(geometry) if geometry.is_plain() => SOURCE_MESH,
-            Source::One(_) => SOURCE_GEOMETRY,
-            Source::Several { .. } => SOURCE_GEOMETRIES,
+        let source = match (self.primitives, input.source) {
+            (Primitives::Triangles, Source::One(geometry)) if geometry.is_plain() => SOURCE_MESH,
+            (Primitives::Triangles, Source::One(_)) => SOURCE_GEOMETRY,
+            (Primitives::Triangles, _) => SOURCE_GEOMETRIES,
+            (Primitives::Boxes, Source::One(_)) => SOURCE_BOXES,
+            (Primitives::Boxes, _) => SOURCE_SEVERAL_BOXES,
+            (Primitives::Instances, _) => SOURCE_ENTRIES,
         };
         let constants = self.shape.constants(self.items, self.key_words());
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &[source]].concat())
@@ -291,13 +324,14 @@ impl Lbvh {
             Schedule::Workgroup => return vec![self.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, input)],
             Schedule::Persistent => kernels.push(self.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input)),
             Schedule::Chain => {
-                let reading = [&shaders::BVH_LBVH_BOUNDS, &shaders::BVH_LBVH_ENCODE, &shaders::BVH_LBVH_HIERARCHY];
-                let others = [
+                let reading = [
+                    &shaders::BVH_LBVH_BOUNDS,
                     &shaders::BVH_LBVH_PLAN,
-                    &shaders::GPU_RADIX_SORT_COUNT,
-                    &shaders::GPU_RADIX_SORT_SCAN,
-                    &shaders::GPU_RADIX_SORT_SCATTER,
+                    &shaders::BVH_LBVH_ENCODE,
+                    &shaders::BVH_LBVH_HIERARCHY,
                 ];
+                let others =
+                    [&shaders::GPU_RADIX_SORT_COUNT, &shaders::GPU_RADIX_SORT_SCAN, &shaders::GPU_RADIX_SORT_SCATTER];
                 kernels.extend(reading.map(|shader| self.reading_kernel(shader, input)));
                 kernels.extend(others.map(|shader| self.kernel(shader)));
             }
@@ -341,18 +375,38 @@ impl Lbvh {
         Ok(chains)
     }
 
-    /// The input's geometry as the kernels are given it.
-    pub(super) fn checked(&self, input: &Input) -> Result<Geometry> {
+    /// The input's geometry as the kernels are given it, and its formats.
+    pub(super) fn checked(&self, input: &Input) -> Result<(Geometry, u32)> {
         if input.primitive_count != self.count {
             return Err(Error::Argument(format!(
-                "the builder was made for {} triangles, the input has {}; make a builder for it",
+                "the builder was made for {} primitives, the input has {}; make a builder for it",
                 self.count, input.primitive_count
             )));
         }
+        if let Source::Several { count, .. } = input.source
+            && count != self.geometry_count
+        {
+            return Err(Error::Argument(format!(
+                "the builder was made for {} geometries, the input has {count}; make a builder for it",
+                self.geometry_count
+            )));
+        }
+        let is_entries = matches!(input.source, Source::Entries { .. });
+        if is_entries != (self.primitives == Primitives::Instances) {
+            return Err(Error::Argument(format!(
+                "the builder was made for {:?}, the input is {:?}; make a builder for it",
+                self.primitives, input.source
+            )));
+        }
         Ok(match input.source {
-            Source::One(geometry) => geometry,
+            Source::One(geometry) => (geometry, geometry.formats()),
             // The address of the records, and how many there are.
-            Source::Several { records, count } => Geometry { vertex_count: count, ..Geometry::mesh(records, 0, 0) },
+            Source::Several { records, count } => {
+                (Geometry { vertex_count: count, ..Geometry::mesh(records, 0, 0) }, 0)
+            }
+            Source::Entries { entries, instances, pointers } => {
+                (Geometry::mesh(entries, 0, instances), if pointers { INSTANCE_POINTERS } else { 0 })
+            }
         })
     }
 
@@ -364,10 +418,11 @@ impl Lbvh {
             | code.size_group() << 16
             | u32::from(self.codes.concise) << 24
             | u32::from(self.collapse.enabled) << 25
+            | self.build_flags << 26
     }
 
     fn chain_of(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
-        let geometry = self.checked(input)?;
+        let (geometry, formats) = self.checked(input)?;
         let parts = self.scratch();
         let arguments = Arguments {
             vertices: geometry.vertices,
@@ -381,7 +436,7 @@ impl Lbvh {
             table: scratch + parts.table,
             vertex_stride: geometry.vertex_stride,
             vertex_count: geometry.vertex_count,
-            formats: geometry.formats(),
+            formats,
             primitive_count: self.count,
             code_kind: self.code_kind(),
             c_t: self.collapse.c_t,
@@ -404,7 +459,7 @@ impl Lbvh {
         let mut steps = vec![
             plain("bounds", &shaders::BVH_LBVH_RESET, 1),
             reading("bounds", &shaders::BVH_LBVH_BOUNDS, self.tiles()),
-            plain("encode", &shaders::BVH_LBVH_PLAN, 1),
+            reading("encode", &shaders::BVH_LBVH_PLAN, 1),
             reading("encode", &shaders::BVH_LBVH_ENCODE, self.tiles()),
         ];
         steps.extend(radix_sort::steps(&self.shape, &buffers, &sort));

@@ -45,7 +45,7 @@ pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
     let mut order = Vec::new();
     for job in jobs {
         let Job { lbvh, input, structure, scratch } = **job;
-        let geometry = lbvh.checked(&input)?;
+        let (geometry, formats) = lbvh.checked(&input)?;
         let kernel = lbvh.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, &input);
         let costs = [lbvh.collapse.c_t.to_bits(), lbvh.collapse.c_i.to_bits()];
         let kind = (kernel, lbvh.code_kind(), costs);
@@ -61,7 +61,7 @@ pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
             scratch,
             vertex_stride: geometry.vertex_stride,
             vertex_count: geometry.vertex_count,
-            formats: geometry.formats(),
+            formats,
             primitive_count: lbvh.count,
         });
     }

@@ -2,7 +2,7 @@
 //!
 //! `glsl/bvh/quality.glsl` is the device's side; it takes any `Bvh2`, whoever built it.
 
-use super::layout::{Bvh2, node_slots};
+use super::layout::{Bvh2, Record, node_slots};
 use crate::Result;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Kernel, Limits, Recorder, fill, shaders};
@@ -118,7 +118,7 @@ impl OnDevice {
 }
 
 /// The quality of `tree` with these costs of a step and of a test. An empty tree has zeros.
-pub fn on_host(tree: &Bvh2, c_t: f64, c_i: f64) -> Quality {
+pub fn on_host<R: Record>(tree: &Bvh2<R>, c_t: f64, c_i: f64) -> Quality {
     let mut quality = Quality::default();
     if tree.header.active == 0 {
         return quality;

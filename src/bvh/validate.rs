@@ -1,11 +1,12 @@
 //! Walks a structure on the host and says what is wrong and where.
 
-use super::layout::{Aabb, Bvh2, Child, MAX_DEPTH};
+use super::layout::{Aabb, Bvh2, Child, Instance, MAX_DEPTH, Record};
 use crate::{Error, Result};
 
-impl Bvh2 {
-    /// Checks every rule of the layout: indices in range, no cycle, every active triangle in exactly one leaf, boxes that are
-    /// exactly those around what they hold, and a depth that tracers can walk.
+impl<R: Record> Bvh2<R> {
+    /// Checks every rule of the layout: indices in range, no cycle, every active primitive in exactly one leaf, boxes that are
+    /// exactly those around what they hold (as far as records tell), unused slots that say so, and a depth that tracers can
+    /// walk.
     ///
     /// # Errors
     /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
@@ -16,7 +17,7 @@ impl Bvh2 {
         }
         self.validate_primitives()?;
         if header.active == 0 {
-            let empty = header.root.bounds() == Aabb::EMPTY && header.root.count == 0;
+            let empty = header.root.bounds() == Aabb::EMPTY && header.root.count == 0 && header.inner_nodes == 0;
             return if empty { Ok(()) } else { invalid("no active primitive, but the root is not empty".into()) };
         }
 
@@ -32,14 +33,15 @@ impl Bvh2 {
             if child.is_leaf() {
                 let range = child.index as usize..child.index as usize + child.count as usize;
                 if range.end > in_leaf.len() {
-                    return invalid(format!("{named_by}: a leaf of {range:?}, there are {} triangles", in_leaf.len()));
+                    return invalid(format!("{named_by}: a leaf of {range:?}, there are {} records", in_leaf.len()));
                 }
                 if let Some(twice) = range.clone().find(|&t| std::mem::replace(&mut in_leaf[t], true)) {
-                    return invalid(format!("{named_by}: triangle {twice} is in two leaves"));
+                    return invalid(format!("{named_by}: record {twice} is in two leaves"));
                 }
-                let around =
-                    self.triangles[range].iter().fold(Aabb::EMPTY, |b, t| b.union(&Aabb::around(&[t.v0, t.v1, t.v2])));
-                same_box(&child, &around, &named_by)?;
+                let boxes: Option<Vec<Aabb>> = self.records[range].iter().map(Record::bounds).collect();
+                if let Some(boxes) = boxes {
+                    same_box(&child, &boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b)), &named_by)?;
+                }
             } else {
                 let Some(node) = self.nodes.get(child.index as usize) else {
                     return invalid(format!("{named_by}: node {}, there are {}", child.index, self.nodes.len()));
@@ -52,41 +54,36 @@ impl Bvh2 {
                 stack.extend(node.children.map(|c| (c, depth + 1, Some(child.index))));
             }
         }
-        self.validate_unused(&mut visited)?;
+        self.validate_slots(&visited)?;
         match in_leaf.iter().position(|&there| !there) {
-            Some(lost) => invalid(format!("triangle {lost} is in no leaf")),
+            Some(lost) => invalid(format!("record {lost} is in no leaf")),
             None => Ok(()),
         }
     }
 
-    /// No slot is named twice, by slots of the tree (`visited`) and unused ones together.
-    fn validate_unused(&self, visited: &mut [bool]) -> Result<()> {
-        let in_tree = visited.to_vec();
-        for (slot, node) in self.nodes.iter().enumerate().filter(|&(slot, _)| !in_tree[slot]) {
-            for child in node.children.iter().filter(|c| !c.is_leaf()) {
-                match visited.get_mut(child.index as usize) {
-                    Some(named) if !*named => *named = true,
-                    Some(_) => {
-                        return invalid(format!("unused node {slot} names node {}, as another does", child.index));
-                    }
-                    None => return invalid(format!("unused node {slot} names node {}", child.index)),
-                }
-            }
+    /// The slots of the tree (`visited`) are as many as the header says, and the others say that they are unused.
+    fn validate_slots(&self, visited: &[bool]) -> Result<()> {
+        let used = visited.iter().filter(|&&visited| visited).count();
+        if used != self.header.inner_nodes as usize {
+            return invalid(format!("{used} nodes, the header says {}", self.header.inner_nodes));
         }
-        Ok(())
+        match self.nodes.iter().zip(visited).position(|(node, &visited)| node.is_used() != visited) {
+            Some(slot) if visited[slot] => invalid(format!("node {slot} is marked as unused")),
+            Some(slot) => invalid(format!("node {slot} is named by none and not marked as unused")),
+            None => Ok(()),
+        }
     }
 
-    /// The primitive order names every primitive once.
+    /// The primitive order names every primitive once; of a top level, an instance may have several entries.
     fn validate_primitives(&self) -> Result<()> {
-        let mut named = vec![false; self.triangles.len()];
-        for (position, triangle) in self.triangles.iter().enumerate() {
-            match named.get_mut(triangle.primitive as usize) {
-                None => return invalid(format!("triangle {position} names primitive {}", triangle.primitive)),
-                Some(true) => return invalid(format!("primitive {} is there twice", triangle.primitive)),
-                Some(there) => *there = true,
-            }
+        if self.header.kind == Instance::KIND {
+            return Ok(());
         }
-        Ok(())
+        let mut named = std::collections::HashSet::with_capacity(self.records.len());
+        match self.records.iter().position(|record| !named.insert(record.primitive())) {
+            Some(twice) => invalid(format!("primitive {} is there twice", self.records[twice].primitive())),
+            None => Ok(()),
+        }
     }
 }
 
@@ -111,6 +108,7 @@ mod tests {
     use super::*;
     use crate::bvh::codes::Code;
     use crate::bvh::host::lbvh;
+    use crate::bvh::layout::Triangle;
     use crate::bvh::sah::Collapse;
 
     fn tree(collapse: Collapse) -> Bvh2 {
@@ -125,7 +123,7 @@ mod tests {
         for collapse in [Collapse::OFF, Collapse::SAH] {
             let tree = tree(collapse);
             tree.validate().expect("valid");
-            let again = Bvh2::from_bytes(&tree.to_bytes()).expect("its own bytes");
+            let again = Bvh2::<Triangle>::from_bytes(&tree.to_bytes()).expect("its own bytes");
             assert_eq!(again.to_bytes(), tree.to_bytes());
         }
     }
@@ -136,10 +134,10 @@ mod tests {
         let breaks: [(&str, Break); 6] = [
             ("has box", |t| t.nodes[t.header.root.index as usize].children[0].hi[1] += 1.0),
             ("two leaves", |t| first_leaf(t).index = 3),
-            ("there are 20 triangles", |t| first_leaf(t).count = 21),
-            ("there twice", |t| t.triangles[0].primitive = t.triangles[1].primitive),
-            ("names primitive 99", |t| t.triangles[4].primitive = 99),
+            ("there are 20 records", |t| first_leaf(t).count = 21),
+            ("there twice", |t| t.records[0].primitive = t.records[1].primitive),
             ("active", |t| t.header.active = 21),
+            ("the header says 7", |t| t.header.inner_nodes = 7),
         ];
         for (says, break_it) in breaks {
             let mut tree = tree(Collapse::OFF);

@@ -50,7 +50,7 @@ pub struct Sample {
 impl Sample {
     /// As many of `rays` as `budget` triangle tests allow, at least one, by testing every triangle of `tree`.
     pub fn take(tree: &Bvh2, rays: &[Ray], query: Query, budget: usize) -> Sample {
-        let count = (budget / tree.triangles.len().max(1)).clamp(1, 256).min(rays.len());
+        let count = (budget / tree.records.len().max(1)).clamp(1, 256).min(rays.len());
         let indices: Vec<usize> = (0..count).map(|i| i * rays.len() / count).collect();
         let truth = indices.par_iter().map(|&i| closest_hit_by_brute_force(tree, &rays[i])).collect();
         Sample { query, indices, truth }

@@ -218,7 +218,7 @@ impl Spec {
             Some("workgroup") => Some(Schedule::Workgroup),
             Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
         };
-        Ok(lbvh::Options { codes: self.codes()?, collapse: self.collapse()?, schedule })
+        Ok(lbvh::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..lbvh::Options::DEFAULT })
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {

@@ -3,6 +3,7 @@
 use super::{BuildRun, Subject, record};
 use crate::Result;
 use crate::bvh::codes::Codes;
+use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::{self, Bvh2};
 use crate::bvh::sah::Collapse;
 use crate::bvh::{host, quality};
@@ -71,7 +72,7 @@ impl Subject for HostLbvh<'_> {
     }
 
     fn memory(&self) -> record::Memory {
-        let structure = layout::sizes(self.mesh.triangles.len() as u32).bytes;
+        let structure = layout::sizes(Primitives::Triangles.record_bytes(), self.mesh.triangles.len() as u32, 1).bytes;
         record::Memory { structure_bytes: Some(structure), ..Default::default() }
     }
 

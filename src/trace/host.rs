@@ -35,7 +35,7 @@ pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
         next = None;
         if child.is_leaf() {
             let first = child.index as usize;
-            for triangle in &tree.triangles[first..first + child.count as usize] {
+            for triangle in &tree.records[first..first + child.count as usize] {
                 work.tests += 1;
                 nearest.consider(&ray, triangle);
                 if query == Query::AnyHit && nearest.hit.is_some() {
@@ -81,7 +81,7 @@ fn brute_force(tree: &Bvh2, ray: &Ray) -> Nearest {
     let mut nearest = Nearest::new(ray.t_max);
     if let Some(ray) = PreparedRay::new(ray, &tree.header.root.bounds()) {
         // Triangles that builders leave out stand behind the others.
-        for triangle in &tree.triangles[..tree.header.active as usize] {
+        for triangle in &tree.records[..tree.header.active as usize] {
             nearest.consider(&ray, triangle);
         }
     }

@@ -2,7 +2,7 @@
 
 use super::device;
 use super::shapes::{Corners, Random};
-use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
+use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, VertexFormat};
 use hedgerow::bvh::host::geometry::HostGeometry;
 use hedgerow::gpu::Buffer;
 
@@ -97,6 +97,7 @@ impl Owned {
         let (indices, index_address) = shifted(&self.indices, self.index_format.bytes());
         let matrix = device().upload("transform", &[self.transform.unwrap_or_default()]).expect("memory");
         let geometry = Geometry {
+            flags: GeometryFlags::NONE,
             vertices: vertex_address,
             indices: index_address,
             transform: if self.transform.is_some() { matrix.address() } else { 0 },

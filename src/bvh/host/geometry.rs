@@ -1,7 +1,7 @@
-//! Reading the caller's triangles on the host, as `glsl/bvh/triangles.glsl` does on the device.
+//! Reading the caller's triangles on the host, as `glsl/bvh/geometry.glsl` does on the device.
 
 use crate::bvh::geometry::{IndexFormat, VertexFormat};
-use crate::bvh::layout::status;
+use crate::bvh::layout::{Aabb, status};
 
 /// [`Geometry`](crate::bvh::geometry::Geometry) in the host's memory.
 #[derive(Debug, Clone, Copy)]
@@ -74,6 +74,12 @@ pub(super) fn finite(corners: [[f32; 3]; 3]) -> Corners {
     } else {
         Err(status::NON_FINITE)
     }
+}
+
+/// Boxes that are not finite or hold nothing are left out.
+pub(super) fn finite_box(b: &Aabb) -> Result<Aabb, u32> {
+    let finite = b.lo.iter().chain(&b.hi).all(|x| x.is_finite()) && (0..3).all(|i| b.lo[i] <= b.hi[i]);
+    finite.then(|| Aabb { lo: b.lo.map(|x| x + 0.0), hi: b.hi.map(|x| x + 0.0) }).ok_or(status::NON_FINITE)
 }
 
 fn from_half(bits: u16) -> f32 {

@@ -5,7 +5,10 @@
 
 use super::geometry::{self, Corners};
 use crate::bvh::codes::{Codes, Plan, code_bounds};
-use crate::bvh::layout::{Aabb, Bvh2, Child, Header, KIND_BVH2, MAGIC, Node, Triangle, node_slots, status};
+use crate::bvh::layout::status;
+use crate::bvh::layout::{
+    Aabb, BoxRecord, Bvh2, Child, GeometryEntry, Header, MAGIC, Node, Record, Triangle, UNUSED, node_slots,
+};
 use crate::bvh::sah::Collapse;
 
 /// Builds the LBVH of `triangles` over `positions`. Triangles that are not finite or name vertices that are not there are
@@ -20,69 +23,108 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, colla
 
 /// Builds the LBVH of triangles that [`HostGeometry::corners`](geometry::HostGeometry::corners) read.
 pub fn build_corners(corners: impl Iterator<Item = Corners>, codes: Codes, collapse: Collapse) -> Bvh2 {
-    let mut status = 0;
-    let corners: Vec<Option<[[f32; 3]; 3]>> = corners
-        .map(|corners| {
-            status |= corners.err().unwrap_or(0);
-            corners.ok()
-        })
-        .collect();
-    let count = corners.len() as u32;
+    let corners: Vec<Corners> = corners.collect();
+    let boxes: Vec<_> = corners.iter().map(|c| c.map(|c| Aabb::around(&c))).collect();
+    let record = |primitive: u32| {
+        let [v0, v1, v2] = corners[primitive as usize].unwrap_or([[0.0; 3]; 3]);
+        Triangle { v0, v1, v2, primitive }
+    };
+    build_boxes(&boxes, record, codes, collapse)
+}
+
+/// Builds the LBVH of boxes; one that is not finite or is inside out is left out.
+pub fn build_aabbs(boxes: &[Aabb], codes: Codes, collapse: Collapse) -> Bvh2<BoxRecord> {
+    let boxes: Vec<_> = boxes.iter().map(geometry::finite_box).collect();
+    let record = |primitive: u32| {
+        let Aabb { lo, hi } = boxes[primitive as usize].unwrap_or(Aabb { lo: [0.0; 3], hi: [0.0; 3] });
+        BoxRecord { lo, hi, primitive }
+    };
+    build_boxes(&boxes, record, codes, collapse)
+}
+
+/// Builds the LBVH of primitives with these boxes, or the bits of [`status`] that say why they are left out (0: none says), and
+/// these records, of one geometry without flags.
+pub fn build_boxes<R: Record>(
+    boxes: &[Result<Aabb, u32>],
+    record: impl Fn(u32) -> R,
+    codes: Codes,
+    collapse: Collapse,
+) -> Bvh2<R> {
+    let count = boxes.len() as u32;
     let mut header = Header {
         magic: MAGIC,
-        kind: KIND_BVH2,
-        status,
+        kind: R::KIND,
+        status: boxes.iter().filter_map(|b| b.err()).fold(0, |a, b| a | b),
         primitive_count: count,
         node_slots: node_slots(count),
         code_bits: codes.bits,
+        geometry_count: 1,
         ..bytemuck::Zeroable::zeroed()
     };
-    let boxes: Vec<Option<Aabb>> = corners.iter().map(|c| c.map(|c| Aabb::around(&c))).collect();
-    let (bounds, centroids) = boxes.iter().flatten().fold((Aabb::EMPTY, Aabb::EMPTY), |(bounds, centroids), b| {
+    let active = || boxes.iter().flatten();
+    let (bounds, centroids) = active().fold((Aabb::EMPTY, Aabb::EMPTY), |(bounds, centroids), b| {
         (bounds.union(b), centroids.union(&Aabb { lo: b.centroid(), hi: b.centroid() }))
     });
-    header.active = boxes.iter().flatten().count() as u32;
+    header.active = active().count() as u32;
 
     let plan = Plan::new(codes, &code_bounds(&bounds, &centroids, codes.concise));
     let mut order: Vec<(u64, u32)> =
-        boxes.iter().enumerate().map(|(i, b)| (b.map_or(plan.inactive(), |b| plan.encode(&b)), i as u32)).collect();
+        (0..count).map(|i| (boxes[i as usize].map_or(plan.inactive(), |b| plan.encode(&b)), i)).collect();
     order.sort_unstable();
 
-    let records: Vec<Triangle> = order
-        .iter()
-        .map(|&(_, primitive)| {
-            let [v0, v1, v2] = corners[primitive as usize].unwrap_or([[0.0; 3]; 3]);
-            Triangle { v0, v1, v2, primitive }
-        })
-        .collect();
     let mut tree = Tree {
         codes: order.iter().map(|&(code, _)| code).collect(),
-        triangles: &records,
+        boxes: order.iter().map(|&(_, i)| boxes[i as usize].unwrap_or(Aabb::EMPTY)).collect(),
         nodes: vec![Node::UNUSED; header.node_slots as usize],
         collapse,
         area_scale: crate::bvh::sah::area_scale(&bounds),
     };
     header.root = match header.active {
         0 => Child { lo: Aabb::EMPTY.lo, index: 0, hi: Aabb::EMPTY.hi, count: 0 },
-        active => tree.subtree(0, active as usize - 1).0,
+        active => {
+            let (root, cost) = tree.subtree(0, active as usize - 1);
+            header.area_scale = tree.area_scale;
+            (header.cost, header.built_cost) = (cost, cost);
+            header.built_area = bounds.scaled_half_area(tree.area_scale);
+            root
+        }
     };
-    Bvh2 { header, nodes: tree.nodes, triangles: records }
+    header.inner_nodes = tree.nodes.iter().filter(|node| node.is_used()).count() as u32;
+    let records = order.iter().map(|&(_, primitive)| record(primitive)).collect();
+    Bvh2 { header, nodes: tree.nodes, records, geometries: Vec::new() }
 }
 
-struct Tree<'a> {
+impl<R: Record> Bvh2<R> {
+    /// The same with the geometries that its primitives are of: how many primitives each has, and its flags.
+    pub fn with_geometries(mut self, geometries: &[(u32, u32)], build_flags: u32) -> Bvh2<R> {
+        self.header.geometry_count = geometries.len().max(1) as u32;
+        self.header.build_flags = build_flags;
+        let flags = || geometries.iter().map(|&(_, flags)| flags);
+        let all = flags().reduce(|a, b| a & b).unwrap_or(0);
+        self.header.geometry_flags = all | flags().fold(0, |a, b| a | b) << 8;
+        let mut first = 0;
+        let entries = geometries.iter().map(|&(count, flags)| {
+            first += count;
+            GeometryEntry { first: first - count, flags }
+        });
+        self.geometries = if geometries.len() > 1 { entries.collect() } else { Vec::new() };
+        self
+    }
+}
+
+struct Tree {
     codes: Vec<u64>,
-    triangles: &'a [Triangle],
+    boxes: Vec<Aabb>,
     nodes: Vec<Node>,
     collapse: Collapse,
     area_scale: f32,
 }
 
-impl Tree<'_> {
+impl Tree {
     /// The subtree over positions `first..=last`, and its cost.
     fn subtree(&mut self, first: usize, last: usize) -> (Child, f32) {
         if first == last {
-            let t = &self.triangles[first];
-            let bounds = Aabb::around(&[t.v0, t.v1, t.v2]);
+            let bounds = self.boxes[first];
             let child = Child { lo: bounds.lo, index: first as u32, hi: bounds.hi, count: 1 };
             return (child, self.collapse.leaf_cost(bounds.scaled_half_area(self.area_scale), 1));
         }
@@ -96,6 +138,9 @@ impl Tree<'_> {
         let inner_cost = self.collapse.inner_cost(area, left_cost, right_cost);
         let leaf_cost = self.collapse.leaf_cost(area, count);
         if self.collapse.enabled && leaf_cost < inner_cost {
+            for node in &mut self.nodes[first..last] {
+                node.children[0].count = UNUSED;
+            }
             (Child { lo: bounds.lo, index: first as u32, hi: bounds.hi, count }, leaf_cost)
         } else {
             (Child { lo: bounds.lo, index: split as u32, hi: bounds.hi, count: 0 }, inner_cost)

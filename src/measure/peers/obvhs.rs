@@ -3,7 +3,7 @@
 //!
 //! The build time holds what a user waits for: the tree, and the triangles copied into its order.
 
-use crate::bvh::layout::{Bvh2, Child, Header, KIND_BVH2, MAGIC, Node, node_slots};
+use crate::bvh::layout::{Bvh2, Child, Header, MAGIC, Node, Record, Triangle as OurTriangle, node_slots};
 use crate::bvh::quality;
 use crate::gpu::Phase;
 use crate::measure::host::timed;
@@ -129,9 +129,9 @@ fn converted(tree: &Tree) -> Bvh2 {
         index: if node.is_leaf() { node.first_index } else { index },
         count: node.prim_count,
     };
-    let mut header = Header { magic: MAGIC, kind: KIND_BVH2, ..Header::zeroed() };
+    let mut header = Header { magic: MAGIC, kind: OurTriangle::KIND, ..Header::zeroed() };
     let Some(root) = tree.nodes.first() else {
-        return Bvh2 { header, nodes: Vec::new(), triangles: Vec::new() };
+        return Bvh2 { header, nodes: Vec::new(), records: Vec::new(), geometries: Vec::new() };
     };
     header.root = child(root, 0);
     header.active = tree.primitive_indices.len() as u32;
@@ -153,7 +153,8 @@ fn converted(tree: &Tree) -> Bvh2 {
         });
         nodes.push(Node { children });
     }
-    Bvh2 { header, nodes, triangles: Vec::new() }
+    header.inner_nodes = nodes.len() as u32;
+    Bvh2 { header, nodes, records: Vec::new(), geometries: Vec::new() }
 }
 
 impl Subject for Obvhs {

@@ -1,15 +1,22 @@
-// The caller's triangles, in the formats of src/bvh/geometry.rs. What is not finite or out of range is left out, and never
-// read outside the buffers (but for the rest of an aligned word).
-#ifndef HEDGEROW_BVH_TRIANGLES
-#define HEDGEROW_BVH_TRIANGLES
+// The caller's triangles and boxes, in the formats of src/bvh/geometry.rs. What is not finite or out of range is left out, and
+// never read outside the buffers (but for the rest of an aligned word).
+#ifndef HEDGEROW_BVH_GEOMETRY
+#define HEDGEROW_BVH_GEOMETRY
 #include "gpu/pass.glsl"
 #include "bvh/layout.glsl"
 
-// One geometry of three floats a vertex and 32-bit indices without a transform; one of any formats; several of any formats.
+// Triangles: one geometry of three floats a vertex and 32-bit indices without a transform; one of any formats; several of any
+// formats. Boxes: one geometry; several. The entries of a top level.
 const uint SOURCE_MESH = 0;
 const uint SOURCE_GEOMETRY = 1;
 const uint SOURCE_GEOMETRIES = 2;
+const uint SOURCE_BOXES = 3;
+const uint SOURCE_SEVERAL_BOXES = 4;
+const uint SOURCE_ENTRIES = 5;
 layout(constant_id = 5) const uint SOURCE = 0;
+
+// Why a primitive is left out where no status bit tells of it: the caller wants it so.
+const uint INACTIVE = 1u << 31;
 
 const uint COMPONENT_FLOAT = 0;
 const uint COMPONENT_HALF = 1;
@@ -21,11 +28,18 @@ struct Geometry {
     uvec2 transform;      // 0: none
     uint vertex_stride;   // bytes
     uint vertex_count;
-    uint formats;         // kind of component, components << 8, bytes of an index << 16
+    uint formats;         // kind of component, components << 8, bytes of an index << 16, flags << 24
     uint first;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Geometries { Geometry geometry[]; };
+
+// In the flags: the record that ends the others, where fewer primitives are there than were planned for.
+const uint GEOMETRY_END = 1u << 7;
+
+uint flags_of(Geometry g) {
+    return g.formats >> 24;
+}
 
 struct Corners {
     vec3 v0;
@@ -46,14 +60,6 @@ bool is_finite(vec3 v) {
 // Negative zeros become zeros, so that the least of two zeros is the same on every device.
 vec3 without_negative_zero(vec3 v) {
     return uintBitsToFloat(mix(floatBitsToUint(v), uvec3(0), equal(floatBitsToUint(v), uvec3(0x80000000u))));
-}
-
-uvec2 address_of(uvec2 base, uint index, uint stride) {
-    uint high, low, carry;
-    umulExtended(index, stride, high, low);
-    base.x = uaddCarry(base.x, low, carry);
-    base.y += high + carry;
-    return base;
 }
 
 // The low bits of what lies at an address: the word around it, shifted.
@@ -126,11 +132,12 @@ uvec3 indices_of(Geometry g, uint triangle) {
     return v;
 }
 
-// The corners of a primitive; returns 0, or the status bit that tells why it is left out (then the corners are zero).
+// The corners of a triangle; returns 0, or the status bit that tells why it is left out (then the corners are zero).
 uint load_corners(Geometry g, uint primitive, out Corners c) {
     if (SOURCE == SOURCE_GEOMETRIES) g = geometry_of(g, primitive);
-    uvec3 v = indices_of(g, primitive - g.first);
     c = Corners(vec3(0), vec3(0), vec3(0));
+    if (SOURCE == SOURCE_GEOMETRIES && (flags_of(g) & GEOMETRY_END) != 0u) return INACTIVE;
+    uvec3 v = indices_of(g, primitive - g.first);
     if (max(v.x, max(v.y, v.z)) >= g.vertex_count) return STATUS_INDEX_OUT_OF_RANGE;
     vec3 v0 = vertex_at(g, v.x), v1 = vertex_at(g, v.y), v2 = vertex_at(g, v.z);
     if (!is_finite(v0) || !is_finite(v1) || !is_finite(v2)) return STATUS_NON_FINITE;
@@ -140,6 +147,18 @@ uint load_corners(Geometry g, uint primitive, out Corners c) {
 
 Box box_around(Corners c) {
     return Box(min(c.v0, min(c.v1, c.v2)), max(c.v0, max(c.v1, c.v2)));
+}
+
+// A box of the caller's, as VkAabbPositionsKHR has it; returns as load_corners does. One that is inside out holds nothing.
+uint load_given_box(Geometry g, uint primitive, out Box b) {
+    if (SOURCE == SOURCE_SEVERAL_BOXES) g = geometry_of(g, primitive);
+    b = Box(vec3(0), vec3(0));
+    if (SOURCE == SOURCE_SEVERAL_BOXES && (flags_of(g) & GEOMETRY_END) != 0u) return INACTIVE;
+    Floats given = Floats(address_of(g.vertices, primitive - g.first, g.vertex_stride));
+    vec3 lo = vec3(given.value[0], given.value[1], given.value[2]), hi = vec3(given.value[3], given.value[4], given.value[5]);
+    if (!is_finite(lo) || !is_finite(hi) || any(greaterThan(lo, hi))) return STATUS_NON_FINITE;
+    b = Box(without_negative_zero(lo), without_negative_zero(hi));
+    return 0;
 }
 
 // Each half first: no overflow, and the same rounding everywhere.

@@ -1,0 +1,77 @@
+// What a top level is built of: the caller's instances, 64 bytes each as VkAccelerationStructureInstanceKHR has them, and the
+// entries that glsl/accel/ makes of them: boxes in the world, each over an instance or a part of it. src/accel/instances.rs is
+// the host's side.
+#ifndef HEDGEROW_BVH_INSTANCES
+#define HEDGEROW_BVH_INSTANCES
+#include "bvh/geometry.glsl"
+
+struct GivenInstance {
+    vec4 to_world[3];         // object to world, row by row
+    uint index_and_mask;
+    uint offset_and_flags;
+    uvec2 structure;          // 0: inactive
+};
+
+struct Entry {
+    vec3 lo;
+    uint instance;
+    vec3 hi;
+    uint start;               // a Child's index and count, in the instance's structure
+    uint start_count;
+    uint left_out;            // 0, or why it is
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer GivenInstances { GivenInstance instance[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Entries { Entry entry[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Pointers { uvec2 pointer[]; };
+
+// In the flags of a geometry of instances: `indices` is an array of pointers to them.
+const uint GEOMETRY_POINTERS = 1u << 1;
+
+GivenInstance instance_at(Geometry g, uint instance) {
+    if ((flags_of(g) & GEOMETRY_POINTERS) != 0u) return GivenInstances(Pointers(g.indices).pointer[instance]).instance[0];
+    return GivenInstances(g.indices).instance[instance];
+}
+
+// 2^-k, where 2^k is about the greatest of a matrix: what it is scaled by so that its determinant neither overflows nor vanishes.
+float scale_of_matrix(vec4 m[3]) {
+    vec3 greatest = max(max(abs(m[0].xyz), abs(m[1].xyz)), abs(m[2].xyz));
+    uint exponent = floatBitsToUint(max(max(greatest.x, greatest.y), greatest.z)) >> 23 & 0xFFu;
+    return uintBitsToFloat(clamp(254u - exponent, 1u, 254u) << 23);
+}
+
+// a × b.
+vec3 cross_product(vec3 a, vec3 b) {
+    precise vec3 c = a.yzx * b.zxy - a.zxy * b.yzx;
+    return c;
+}
+
+// The inverse of an affine matrix, by its adjugate; false where there is none in finite numbers.
+bool inverse_of(vec4 m[3], out vec4 inverse[3]) {
+    float scale = scale_of_matrix(m);
+    vec3 a = m[0].xyz * scale, b = m[1].xyz * scale, c = m[2].xyz * scale;
+    vec3 columns[3] = vec3[3](cross_product(b, c), cross_product(c, a), cross_product(a, b));
+    precise float determinant = a.x * columns[0].x + a.y * columns[0].y + a.z * columns[0].z;
+    precise float reciprocal = scale / determinant;
+    vec3 moved = vec3(m[0].w, m[1].w, m[2].w);
+    bool finite = is_finite(moved);
+    for (uint row = 0; row < 3; ++row) {
+        precise vec3 r = vec3(columns[0][row], columns[1][row], columns[2][row]) * reciprocal;
+        precise float w = -(r.x * moved.x + r.y * moved.y + r.z * moved.z);
+        inverse[row] = vec4(r, w);
+        finite = finite && is_finite(r) && is_finite(vec3(w));
+    }
+    return finite && abs(determinant) > 0.0;
+}
+
+// The record of an entry that is part of the tree; all zero for one that is not.
+Instance record_of(Geometry g, Entry entry) {
+    vec4 none[3] = vec4[3](vec4(0), vec4(0), vec4(0));
+    if (entry.left_out != 0u) return Instance(none, none, uvec2(0), 0, 0, entry.instance, 0, 0, 0);
+    GivenInstance given = instance_at(g, entry.instance);
+    vec4 to_object[3];
+    inverse_of(given.to_world, to_object);
+    return Instance(to_object, given.to_world, given.structure, given.index_and_mask, given.offset_and_flags, entry.instance,
+                    entry.start, entry.start_count, 0);
+}
+#endif

@@ -1,0 +1,51 @@
+// What a tree is built over, whatever SOURCE it comes from: the box of a primitive, and the record of it in the structure.
+#ifndef HEDGEROW_BVH_PRIMITIVES
+#define HEDGEROW_BVH_PRIMITIVES
+#include "bvh/geometry.glsl"
+#include "bvh/instances.glsl"
+
+uint kind_of_records() {
+    return SOURCE == SOURCE_ENTRIES ? KIND_INSTANCES
+                                    : SOURCE == SOURCE_BOXES || SOURCE == SOURCE_SEVERAL_BOXES ? KIND_BOXES : KIND_TRIANGLES;
+}
+
+bool has_geometry_table() {
+    return SOURCE == SOURCE_GEOMETRIES || SOURCE == SOURCE_SEVERAL_BOXES;
+}
+
+// The box of a primitive; returns 0, or why it is left out: a status bit or INACTIVE.
+uint load_box(Geometry g, uint primitive, out Box b) {
+    uint why_not;
+    if (SOURCE == SOURCE_ENTRIES) {
+        Entry entry = Entries(g.vertices).entry[primitive];
+        b = Box(entry.lo, entry.hi);
+        why_not = entry.left_out;
+    } else if (kind_of_records() == KIND_BOXES) {
+        why_not = load_given_box(g, primitive, b);
+    } else {
+        Corners corners;
+        why_not = load_corners(g, primitive, corners);
+        b = box_around(corners);
+    }
+    return why_not;
+}
+
+// Writes the record of a primitive to its place, and tells the box; one that is left out has a record of zeros.
+Box write_record(uvec2 records, uint position, Geometry g, uint primitive) {
+    if (SOURCE == SOURCE_ENTRIES) {
+        Entry entry = Entries(g.vertices).entry[primitive];
+        Instances(records).instance[position] = record_of(g, entry);
+        return Box(entry.lo, entry.hi);
+    }
+    if (kind_of_records() == KIND_BOXES) {
+        Box b;
+        load_given_box(g, primitive, b);
+        BoxRecords(records).box[position] = BoxRecord(b.lo, b.hi, primitive);
+        return b;
+    }
+    Corners c;
+    load_corners(g, primitive, c);
+    Triangles(records).triangle[position] = Triangle(c.v0, c.v1, c.v2, primitive);
+    return box_around(c);
+}
+#endif

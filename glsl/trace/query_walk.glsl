@@ -1,0 +1,351 @@
+// One query on its way through a top level and the structures below it: what trace/query.glsl is made of.
+//
+// The stack is one: the entries of the bottom-level structure at hand lie above those of the top level. Each round takes one
+// step (a node, a primitive, an instance, or what waits), so that invocations that do the same stay together.
+#ifndef HEDGEROW_TRACE_QUERY_WALK
+#define HEDGEROW_TRACE_QUERY_WALK
+#include "bvh/layout.glsl"
+#define HEDGEROW_LEVELS (2 * MAX_DEPTH * HEDGEROW_QUERIES)
+#include "trace/ray.glsl"
+#include "trace/slab.glsl"
+#include "trace/stack.glsl"
+#include "trace/triangle.glsl"
+
+const uint hedgerowRayFlagsNone = 0u;
+const uint hedgerowRayFlagsOpaque = 1u;
+const uint hedgerowRayFlagsNoOpaque = 2u;
+const uint hedgerowRayFlagsTerminateOnFirstHit = 4u;
+const uint hedgerowRayFlagsSkipClosestHitShader = 8u;
+const uint hedgerowRayFlagsCullBackFacingTriangles = 16u;
+const uint hedgerowRayFlagsCullFrontFacingTriangles = 32u;
+const uint hedgerowRayFlagsCullOpaque = 64u;
+const uint hedgerowRayFlagsCullNoOpaque = 128u;
+const uint hedgerowRayFlagsSkipTriangles = 256u;
+const uint hedgerowRayFlagsSkipAABB = 512u;
+
+// VkGeometryInstanceFlagsKHR.
+const uint HEDGEROW_INSTANCE_CULL_DISABLE = 1u;
+const uint HEDGEROW_INSTANCE_FLIP_FACING = 2u;
+const uint HEDGEROW_INSTANCE_FORCE_OPAQUE = 4u;
+const uint HEDGEROW_INSTANCE_FORCE_NO_OPAQUE = 8u;
+
+const uint HEDGEROW_MET_NOTHING = 0u;
+const uint HEDGEROW_MET_TRIANGLE = 1u;
+const uint HEDGEROW_MET_BOX = 2u;
+
+// In place of a leaf's count: nothing at hand, take what waits.
+const uint HEDGEROW_NOTHING = 0xffffffffu;
+// Rounds after which a walk is given up: more than any tree of 2^27 records needs. A structure that was overwritten may be a
+// circle.
+const uint HEDGEROW_MOST_ROUNDS = 1u << 28;
+
+struct HedgerowMeeting {
+    uint type;
+    float t;
+    float u;
+    float v;
+    uint record;              // in the bottom-level structure
+    uint instance;            // record in the top level; without meaning where a bottom-level structure is queried
+    bool is_front;
+    bool is_opaque;
+};
+
+struct HedgerowRayQuery {
+    HedgerowRay ray;
+    uint flags;
+    uint cull_mask;
+    uvec2 top;                // the structure that is queried
+    uint top_slots;
+    uint top_kind;
+    uint floor;               // where its entries of the stack begin
+    // The structure at hand, and the ray in its space.
+    uvec2 structure;
+    uint slots;
+    HedgerowPreparedRay prepared;
+    uint kind;
+    uint geometry_flags;
+    uint instance;            // record in the top level
+    uint instance_flags;
+    uint records;
+    // Where its entries of the stack begin, and whether it is below the one that is queried.
+    uint bottom;
+    bool is_below;
+    // The node at hand (`left` is 0), or the next record and how many are left of its leaf, or NOTHING.
+    uint index;
+    uint left;
+    uint level;
+    float best;
+    HedgerowMeeting candidate;
+    HedgerowMeeting committed;
+};
+
+vec3 hedgerow_transformed(vec4 rows[3], vec4 p) {
+    precise vec3 q = vec3(rows[0].x * p.x + rows[0].y * p.y + rows[0].z * p.z + rows[0].w * p.w,
+                          rows[1].x * p.x + rows[1].y * p.y + rows[1].z * p.z + rows[1].w * p.w,
+                          rows[2].x * p.x + rows[2].y * p.y + rows[2].z * p.z + rows[2].w * p.w);
+    return q;
+}
+
+bool hedgerow_can_be_traced(Header header) {
+    bool known = header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || header.kind == KIND_INSTANCES;
+    return header.magic == MAGIC && known && header.active_count != 0u && (header.status & STATUS_UNUSABLE) == 0u;
+}
+
+bool hedgerow_skips(uint flags, uint kind) {
+    return kind == KIND_TRIANGLES && (flags & hedgerowRayFlagsSkipTriangles) != 0u ||
+           kind == KIND_BOXES && (flags & hedgerowRayFlagsSkipAABB) != 0u;
+}
+
+// Nothing is at hand, and nothing waits.
+void hedgerow_end(inout HedgerowRayQuery query) {
+    query.left = HEDGEROW_NOTHING;
+    query.level = query.floor;
+    query.bottom = query.floor;
+    query.is_below = false;
+}
+
+void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint flags, uint cull_mask, HedgerowRay ray) {
+    const HedgerowMeeting nothing = HedgerowMeeting(HEDGEROW_MET_NOTHING, ray.t_max, 0.0, 0.0, 0u, 0u, false, false);
+    query.ray = ray;
+    query.flags = flags;
+    query.cull_mask = cull_mask;
+    query.top = structure;
+    query.floor = 2u * MAX_DEPTH * slot;
+    query.structure = structure;
+    query.instance = 0u;
+    query.instance_flags = 0u;
+    query.best = ray.t_max;
+    query.candidate = nothing;
+    query.committed = nothing;
+    hedgerow_end(query);
+    query.index = 0u;
+    query.top_slots = 0u;
+    query.top_kind = 0u;
+    query.slots = 0u;
+    query.records = 0u;
+    query.kind = 0u;
+    query.geometry_flags = 0u;
+    if (all(equal(structure, uvec2(0)))) return;
+    Header header = Structure(structure).header;
+    query.top_slots = header.node_slots;
+    query.top_kind = header.kind;
+    query.slots = header.node_slots;
+    query.records = header.primitive_count;
+    query.kind = header.kind;
+    query.geometry_flags = header.geometry_flags;
+    // As in Vulkan, a mask without bits lets the ray meet nothing.
+    if (hedgerow_prepare(ray, header.root.lo, header.root.hi, query.prepared) && cull_mask != 0u &&
+        hedgerow_can_be_traced(header) && !hedgerow_skips(flags, header.kind)) {
+        query.index = header.root.index;
+        query.left = header.root.count;
+    }
+}
+
+struct HedgerowGeometry {
+    uint index;
+    uint first;
+    uint flags;
+};
+
+// The geometry of a primitive.
+HedgerowGeometry hedgerow_geometry_of(uvec2 structure, uint primitive) {
+    Header header = Structure(structure).header;
+    if (header.geometry_count <= 1u) return HedgerowGeometry(0u, 0u, header.geometry_flags);
+    GeometryTable table = geometry_table_at(structure, header.kind, header.node_slots, header.primitive_count);
+    uint at = 0u, end = header.geometry_count;
+    for (uint halving = 0u; halving < 32u && at + 1u < end; ++halving) {
+        uint middle = at + (end - at) / 2u;
+        if (table.entry[middle].first <= primitive) at = middle;
+        else end = middle;
+    }
+    return HedgerowGeometry(at, table.entry[at].first, table.entry[at].flags);
+}
+
+HedgerowMeeting hedgerow_met(HedgerowRayQuery query, bool committed) {
+    HedgerowMeeting met = query.candidate;
+    if (committed) met = query.committed;
+    return met;
+}
+
+// The instance of a meeting: of a bottom-level structure that is queried itself, one without a transform.
+Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
+    if (query.top_kind == KIND_INSTANCES) return Instances(records_at(query.top, query.top_slots)).instance[met.instance];
+    const vec4 identity[3] = vec4[3](vec4(1, 0, 0, 0), vec4(0, 1, 0, 0), vec4(0, 0, 1, 0));
+    return Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, 0u, 0u);
+}
+
+uint hedgerow_primitive_of(uvec2 structure, HedgerowMeeting met) {
+    uvec2 records = records_at(structure, Structure(structure).header.node_slots);
+    return met.type == HEDGEROW_MET_BOX ? BoxRecords(records).box[met.record].primitive
+                                        : Triangles(records).triangle[met.record].primitive;
+}
+
+// Whether the candidate comes before the committed hit at the same t: by instance, then primitive.
+bool hedgerow_comes_before(HedgerowRayQuery query) {
+    if (query.committed.type == HEDGEROW_MET_NOTHING) return false;
+    Instance a = hedgerow_instance_of(query, query.candidate), b = hedgerow_instance_of(query, query.committed);
+    if (a.instance != b.instance) return a.instance < b.instance;
+    return hedgerow_primitive_of(a.structure, query.candidate) < hedgerow_primitive_of(b.structure, query.committed);
+}
+
+void hedgerow_commit(inout HedgerowRayQuery query) {
+    query.committed = query.candidate;
+    query.best = query.candidate.t;
+    if ((query.flags & hedgerowRayFlagsTerminateOnFirstHit) != 0u) hedgerow_end(query);
+}
+
+void hedgerow_visit(inout HedgerowRayQuery query) {
+    if (query.index >= query.slots) {
+        query.left = HEDGEROW_NOTHING;
+        return;
+    }
+    Node node = Structure(query.structure).nodes[query.index];
+    Child a = node.left, b = node.right;
+    bool enters_a, enters_b;
+    float enter_a = hedgerow_enter(query.prepared, a.lo, a.hi, query.best, enters_a);
+    float enter_b = hedgerow_enter(query.prepared, b.lo, b.hi, query.best, enters_b);
+    bool b_first = enters_b && (!enters_a || enter_b < enter_a);
+    bool has_room = query.level - query.bottom < MAX_DEPTH;
+    if (enters_a && enters_b && has_room) {
+        hedgerow_put(query.level, b_first ? HedgerowWaiting(a.index, a.count, enter_a) : HedgerowWaiting(b.index, b.count, enter_b));
+        query.level++;
+    }
+    query.index = b_first ? b.index : a.index;
+    query.left = enters_a || enters_b ? b_first ? b.count : a.count : HEDGEROW_NOTHING;
+}
+
+// From the top level into an instance.
+void hedgerow_enter_instance(inout HedgerowRayQuery query) {
+    uint at = query.index;
+    query.index++;
+    query.left = query.left == 1u ? HEDGEROW_NOTHING : query.left - 1u;
+    Instance instance = Instances(records_at(query.top, query.top_slots)).instance[at];
+    uint flags = instance.offset_and_flags >> 24;
+    if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
+    Header header = Structure(instance.structure).header;
+    HedgerowRay ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
+                                  hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
+    HedgerowPreparedRay prepared;
+    bool goes = hedgerow_prepare(ray, header.root.lo, header.root.hi, prepared);
+    if (!goes || !hedgerow_can_be_traced(header) || header.kind == KIND_INSTANCES || hedgerow_skips(query.flags, header.kind)) {
+        return;
+    }
+    // The rest of the leaf waits.
+    if (query.left != HEDGEROW_NOTHING) {
+        hedgerow_put(query.level, HedgerowWaiting(query.index, query.left, -HEDGEROW_INFINITY));
+        query.level++;
+    }
+    query.prepared = prepared;
+    query.structure = instance.structure;
+    query.slots = header.node_slots;
+    query.records = header.primitive_count;
+    query.is_below = true;
+    query.kind = header.kind;
+    query.geometry_flags = header.geometry_flags;
+    query.instance = at;
+    query.instance_flags = flags;
+    query.bottom = query.level;
+    query.index = instance.start;
+    query.left = instance.start_count;
+}
+
+// Back to the top level.
+void hedgerow_leave_instance(inout HedgerowRayQuery query) {
+    Header header = Structure(query.top).header;
+    hedgerow_prepare(query.ray, header.root.lo, header.root.hi, query.prepared);
+    query.structure = query.top;
+    query.slots = query.top_slots;
+    query.records = header.primitive_count;
+    query.kind = query.top_kind;
+    query.bottom = query.floor;
+    query.is_below = false;
+}
+
+// Whether a meeting with the geometry of the primitive is a hit without asking.
+bool hedgerow_is_opaque(HedgerowRayQuery query, uint primitive) {
+    uint all_have = query.geometry_flags, any_has = query.geometry_flags >> 8;
+    bool is_opaque = (all_have & GEOMETRY_OPAQUE) != 0u;
+    if (!is_opaque && (any_has & GEOMETRY_OPAQUE) != 0u) {
+        is_opaque = (hedgerow_geometry_of(query.structure, primitive).flags & GEOMETRY_OPAQUE) != 0u;
+    }
+    if ((query.instance_flags & HEDGEROW_INSTANCE_FORCE_OPAQUE) != 0u) is_opaque = true;
+    if ((query.instance_flags & HEDGEROW_INSTANCE_FORCE_NO_OPAQUE) != 0u) is_opaque = false;
+    if ((query.flags & hedgerowRayFlagsOpaque) != 0u) is_opaque = true;
+    if ((query.flags & hedgerowRayFlagsNoOpaque) != 0u) is_opaque = false;
+    return is_opaque;
+}
+
+bool hedgerow_is_culled(HedgerowRayQuery query, bool is_opaque) {
+    return (query.flags & (is_opaque ? hedgerowRayFlagsCullOpaque : hedgerowRayFlagsCullNoOpaque)) != 0u;
+}
+
+// The next triangle of the leaf; true if it is a candidate that is to be decided on.
+bool hedgerow_test_triangle(inout HedgerowRayQuery query, uint at) {
+    Triangle triangle = Triangles(records_at(query.structure, query.slots)).triangle[at];
+    vec3 met;
+    bool is_front;
+    if (!hedgerow_meet_facing(query.prepared, triangle.v0, triangle.v1, triangle.v2, met, is_front)) return false;
+    if (!(query.ray.t_min < met.x && met.x < query.ray.t_max && met.x <= query.best)) return false;
+    is_front = is_front != ((query.instance_flags & HEDGEROW_INSTANCE_FLIP_FACING) != 0u);
+    uint culled = is_front ? hedgerowRayFlagsCullFrontFacingTriangles : hedgerowRayFlagsCullBackFacingTriangles;
+    if ((query.flags & culled) != 0u && (query.instance_flags & HEDGEROW_INSTANCE_CULL_DISABLE) == 0u) return false;
+    bool is_opaque = hedgerow_is_opaque(query, triangle.primitive);
+    if (hedgerow_is_culled(query, is_opaque)) return false;
+    query.candidate =
+        HedgerowMeeting(HEDGEROW_MET_TRIANGLE, met.x, met.y, met.z, at, query.instance, is_front, is_opaque);
+    if (met.x == query.best && !hedgerow_comes_before(query)) return false;
+    if (is_opaque) hedgerow_commit(query);
+    return !is_opaque;
+}
+
+// The same for a box: always a candidate, as only the shader knows what is in it.
+bool hedgerow_test_box(inout HedgerowRayQuery query, uint at) {
+    BoxRecord box = BoxRecords(records_at(query.structure, query.slots)).box[at];
+    bool entered;
+    hedgerow_enter(query.prepared, box.lo, box.hi, query.best, entered);
+    if (!entered) return false;
+    bool is_opaque = hedgerow_is_opaque(query, box.primitive);
+    if (hedgerow_is_culled(query, is_opaque)) return false;
+    query.candidate = HedgerowMeeting(HEDGEROW_MET_BOX, query.best, 0.0, 0.0, at, query.instance, false, is_opaque);
+    return true;
+}
+
+bool hedgerow_test(inout HedgerowRayQuery query) {
+    uint at = query.index;
+    query.index++;
+    query.left = query.left == 1u ? HEDGEROW_NOTHING : query.left - 1u;
+    // A stale structure may name records that there are not.
+    if (at >= query.records) return false;
+    return query.kind == KIND_BOXES ? hedgerow_test_box(query, at) : hedgerow_test_triangle(query, at);
+}
+
+// Takes what waits; false at the end of the walk.
+bool hedgerow_go_on(inout HedgerowRayQuery query) {
+    if (query.level == query.bottom) {
+        if (!query.is_below) return false;
+        hedgerow_leave_instance(query);
+        return true;
+    }
+    query.level--;
+    HedgerowWaiting waiting = hedgerow_taken(query.level);
+    query.index = waiting.index;
+    // Equally far is not too far: an equally near hit that comes before may be there.
+    query.left = waiting.enter <= query.best ? waiting.count : HEDGEROW_NOTHING;
+    return true;
+}
+
+bool hedgerow_proceed(inout HedgerowRayQuery query) {
+    for (uint round = 0u; round < HEDGEROW_MOST_ROUNDS; ++round) {
+        if (query.left == HEDGEROW_NOTHING) {
+            if (!hedgerow_go_on(query)) return false;
+        } else if (query.left == 0u) {
+            hedgerow_visit(query);
+        } else if (query.kind == KIND_INSTANCES) {
+            hedgerow_enter_instance(query);
+        } else if (hedgerow_test(query)) {
+            return true;
+        }
+    }
+    return false;
+}
+#endif
