@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what `make bench` and `make test` need beside Rust, from the distribution's own packages.
 #
-#   scripts/setup.sh              compiler, cmake, git, python3, Vulkan loader, validation layers, lavapipe
+#   scripts/setup.sh              compiler, cmake, git, python3, Vulkan loader and headers, validation layers, lavapipe
 #   scripts/setup.sh --peers      also Embree 3 (for the builders embree-*)
 #   scripts/setup.sh --browser    also Chromium (for the test that opens the report in a browser)
 #
@@ -36,6 +36,11 @@ vulkan_json() {
     ls "$folder/vulkan/$1/"$2 2>/dev/null || true
   done
 }
+# What the tests of the C ABI compile against: asked of the compiler, as they do (capi/tests/c_program.rs).
+has_headers() {
+  echo '#include <vulkan/vulkan.h>' |
+    ${CC:-cc} ${VULKAN_SDK:+-I"$VULKAN_SDK/include"} -I/opt/homebrew/include -E -x c - >/dev/null 2>&1
+}
 mesa_version() { dpkg-query -W -f '${Version}' mesa-vulkan-drivers 2>/dev/null || true; }
 has_driver() {
   [ -n "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && return 0
@@ -56,6 +61,7 @@ else
   has_library libvulkan.so.1 || miss loader
 fi
 [ -n "${VK_LAYER_PATH:-}$(vulkan_json explicit_layer.d 'VkLayer_khronos_validation.json')" ] || miss layers
+has_headers || miss headers
 has_driver || miss driver
 [ $peers = no ] || has_library libembree3.so || miss embree
 [ $browser = no ] || has chromium || has chromium-browser || has google-chrome || miss browser
@@ -70,15 +76,16 @@ by_hand() {
   echo "setup: $1" >&2
   echo "setup: missing: ${missing[*]}. Install by hand:" >&2
   cat >&2 <<'TEXT'
-  Debian 12      apt install g++ cmake git python3 libvulkan1 vulkan-validationlayers
+  Debian 12      apt install g++ cmake git python3 libvulkan-dev vulkan-validationlayers
                  echo 'deb http://deb.debian.org/debian bookworm-backports main' > /etc/apt/sources.list.d/backports.list
                  apt update && apt install -t bookworm-backports mesa-vulkan-drivers
   Debian 13, Ubuntu 24.04 and later
-                 apt install g++ cmake git python3 libvulkan1 vulkan-validationlayers mesa-vulkan-drivers
-  Fedora         dnf install gcc-c++ cmake git python3 vulkan-loader vulkan-validation-layers mesa-vulkan-drivers
-  Arch           pacman -S gcc cmake git python vulkan-icd-loader vulkan-validation-layers vulkan-swrast
-  openSUSE       zypper install gcc-c++ cmake git python3 libvulkan1 vulkan-validationlayers libvulkan_lvp
-  macOS          xcode-select --install; brew install cmake python vulkan-loader vulkan-validationlayers molten-vk
+                 apt install g++ cmake git python3 libvulkan-dev vulkan-validationlayers mesa-vulkan-drivers
+  Fedora         dnf install gcc-c++ cmake git python3 vulkan-loader-devel vulkan-validation-layers mesa-vulkan-drivers
+  Arch           pacman -S gcc cmake git python vulkan-headers vulkan-icd-loader vulkan-validation-layers vulkan-swrast
+  openSUSE       zypper install gcc-c++ cmake git python3 vulkan-devel vulkan-validationlayers libvulkan_lvp
+  macOS          xcode-select --install
+                 brew install cmake python vulkan-headers vulkan-loader vulkan-validationlayers molten-vk
   Windows        Visual Studio Build Tools (C++), CMake, Ninja, git, Python; the GPU maker's driver; the Vulkan SDK
   A driver other than lavapipe does as well (set VK_DRIVER_FILES to its json). For the builders embree-*: libembree-dev
   or embree3; for the browser test: chromium. To go on without: make SETUP=true bench
@@ -103,6 +110,7 @@ for what in "${missing[@]}"; do
     compiler) packages+=(g++) ;;
     cmake | git | python3) packages+=("$what") ;;
     loader) packages+=(libvulkan1) ;;
+    headers) packages+=(libvulkan-dev) ;;
     layers) packages+=(vulkan-validationlayers) ;;
     driver) driver=yes ;;
     embree) packages+=(libembree-dev) ;;
