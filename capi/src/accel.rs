@@ -1,0 +1,142 @@
+//! The functions of `VK_KHR_acceleration_structure`, with a context in place of the device: [`hedgerow::accel`].
+
+use crate::context::{HedgerowContext, context_of};
+use crate::pointers::{handle, place, reference, reference_mut, slice};
+use crate::status::{status, value_or};
+use crate::vulkan::{
+    VkAccelerationStructureBuildGeometryInfoKHR, VkAccelerationStructureBuildRangeInfoKHR,
+    VkAccelerationStructureBuildSizesInfoKHR, VkAccelerationStructureBuildTypeKHR,
+    VkAccelerationStructureCreateInfoKHR, VkAccelerationStructureDeviceAddressInfoKHR, VkAccelerationStructureKHR,
+    VkAllocationCallbacks, VkCommandBuffer, VkDeviceAddress, VkResult,
+};
+use hedgerow::{Result, accel};
+
+/// What scratch addresses must be multiples of.
+pub const HEDGEROW_SCRATCH_ALIGNMENT: u32 = 16;
+/// What the offset of a structure in its buffer must be a multiple of.
+pub const HEDGEROW_STRUCTURE_ALIGNMENT: u32 = 256;
+const _: () = assert!(
+    HEDGEROW_SCRATCH_ALIGNMENT as u64 == accel::SCRATCH_ALIGNMENT
+        && HEDGEROW_STRUCTURE_ALIGNMENT as u64 == accel::STRUCTURE_ALIGNMENT
+);
+
+/// What an engine calls in place of the driver's functions.
+///
+/// # Safety
+/// As [`context_of`].
+unsafe fn structures<'a>(context: *const HedgerowContext) -> Result<accel::Device<'a>> {
+    // SAFETY: the caller's promise.
+    Ok(accel::Device::new(unsafe { context_of(context) }?))
+}
+
+/// `vkGetAccelerationStructureBuildSizesKHR`: bytes that a build of at most so many primitives a geometry needs.
+///
+/// # Safety
+/// As Vulkan's. Addresses in the geometries are not looked at.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hedgerow_get_acceleration_structure_build_sizes(
+    context: *const HedgerowContext,
+    build_type: VkAccelerationStructureBuildTypeKHR,
+    p_build_info: *const VkAccelerationStructureBuildGeometryInfoKHR<'_>,
+    p_max_primitive_counts: *const u32,
+    p_size_info: *mut VkAccelerationStructureBuildSizesInfoKHR<'_>,
+) -> VkResult {
+    status(|| {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let info = reference(p_build_info, "pBuildInfo")?;
+            let counts = slice(p_max_primitive_counts, info.geometry_count, "pMaxPrimitiveCounts")?;
+            let sizes = reference_mut(p_size_info, "pSizeInfo")?;
+            structures(context)?.get_acceleration_structure_build_sizes(build_type, info, counts, sizes)
+        }
+    })
+}
+
+/// `vkCreateAccelerationStructureKHR`: a handle for a place in a buffer. Nothing is allocated.
+///
+/// # Safety
+/// As Vulkan's. The buffer has the usages `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and
+/// `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hedgerow_create_acceleration_structure(
+    context: *const HedgerowContext,
+    p_create_info: *const VkAccelerationStructureCreateInfoKHR<'_>,
+    p_allocator: *const VkAllocationCallbacks<'_>,
+    p_acceleration_structure: *mut VkAccelerationStructureKHR,
+) -> VkResult {
+    status(|| {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let info = reference(p_create_info, "pCreateInfo")?;
+            handle(info.buffer, "pCreateInfo->buffer")?;
+            let place = place(p_acceleration_structure, "pAccelerationStructure")?;
+            place.write(structures(context)?.create_acceleration_structure(info, p_allocator.as_ref())?);
+        }
+        Ok(())
+    })
+}
+
+/// `vkDestroyAccelerationStructureKHR`. A handle owns nothing: the memory is the caller's before and after.
+///
+/// # Safety
+/// As Vulkan's.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hedgerow_destroy_acceleration_structure(
+    context: *const HedgerowContext,
+    acceleration_structure: VkAccelerationStructureKHR,
+    p_allocator: *const VkAllocationCallbacks<'_>,
+) {
+    value_or((), || {
+        // SAFETY: the caller's promises.
+        unsafe { structures(context)?.destroy_acceleration_structure(acceleration_structure, p_allocator.as_ref()) };
+        Ok(())
+    });
+}
+
+/// `vkGetAccelerationStructureDeviceAddressKHR`: what shaders and hedgerow_cmd_trace_rays trace through; 0 after an error.
+///
+/// # Safety
+/// As Vulkan's.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hedgerow_get_acceleration_structure_device_address(
+    context: *const HedgerowContext,
+    p_info: *const VkAccelerationStructureDeviceAddressInfoKHR<'_>,
+) -> VkDeviceAddress {
+    value_or(0, || {
+        // SAFETY: the caller's promises.
+        let (structures, info) = unsafe { (structures(context)?, reference(p_info, "pInfo")?) };
+        Ok(structures.get_acceleration_structure_device_address(info))
+    })
+}
+
+/// `vkCmdBuildAccelerationStructuresKHR`: records builds, side by side. After an error nothing is recorded.
+///
+/// Builds read and write in compute shaders: where the driver's want the stage
+/// `VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR` in a barrier, these want `VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT`
+/// with `VK_ACCESS_SHADER_READ_BIT` and `VK_ACCESS_SHADER_WRITE_BIT`. The bound compute pipeline and the push constants
+/// are others afterwards.
+///
+/// # Safety
+/// As Vulkan's.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hedgerow_cmd_build_acceleration_structures(
+    context: *const HedgerowContext,
+    command_buffer: VkCommandBuffer,
+    info_count: u32,
+    p_infos: *const VkAccelerationStructureBuildGeometryInfoKHR<'_>,
+    pp_build_range_infos: *const *const VkAccelerationStructureBuildRangeInfoKHR,
+) -> VkResult {
+    status(|| {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let infos = slice(p_infos, info_count, "pInfos")?;
+            let ranges = slice(pp_build_range_infos, info_count, "ppBuildRangeInfos")?;
+            let ranges_of = |(i, &p_ranges): (usize, &*const VkAccelerationStructureBuildRangeInfoKHR)| {
+                slice(p_ranges, infos[i].geometry_count, &format!("ppBuildRangeInfos[{i}]"))
+            };
+            let ranges = ranges.iter().enumerate().map(ranges_of).collect::<Result<Vec<_>>>()?;
+            let commands = handle(command_buffer, "commandBuffer")?;
+            structures(context)?.cmd_build_acceleration_structures(commands, infos, &ranges)
+        }
+    })
+}

@@ -1,0 +1,90 @@
+//! The library's state on the caller's device.
+
+use crate::loader;
+use crate::pointers::{handle, place, reference};
+use crate::status::{status, value_or};
+use crate::vulkan::{
+    PFN_vkGetInstanceProcAddr, VkBool32, VkDevice, VkInstance, VkPhysicalDevice, VkPipelineCache, VkResult,
+};
+use hedgerow::Result;
+use hedgerow::ash::vk;
+use hedgerow::gpu::{Context, ContextDesc};
+
+/// What hedgerow_create_context takes.
+#[repr(C)]
+pub struct HedgerowContextCreateInfo {
+    /// `vkGetInstanceProcAddr`: all of Vulkan's functions are found by it.
+    pub pfn_get_instance_proc_addr: PFN_vkGetInstanceProcAddr,
+    /// The instance that the device came from.
+    pub instance: VkInstance,
+    /// The device's physical device.
+    pub physical_device: VkPhysicalDevice,
+    /// The device, created with everything that hedgerow_create_requirements asks for.
+    pub device: VkDevice,
+    /// Where pipelines are cached; null for none. Stays the caller's.
+    pub pipeline_cache: VkPipelineCache,
+    /// Whether phases are labelled in command buffers: `VK_TRUE` wants `VK_EXT_debug_utils` enabled in the instance.
+    pub debug_labels: VkBool32,
+}
+
+/// The library's state on one device: pipelines, made when first recorded. Threads may share it.
+pub struct HedgerowContext {
+    context: Context,
+}
+
+/// The context behind a pointer.
+///
+/// # Safety
+/// `context` is null or was made by [`hedgerow_create_context`] and not destroyed.
+pub(crate) unsafe fn context_of<'a>(context: *const HedgerowContext) -> Result<&'a Context> {
+    // SAFETY: the caller's promise.
+    Ok(unsafe { &reference(context, "context")?.context })
+}
+
+/// Wraps a device.
+///
+/// # Safety
+/// The device was created from `instance` and `physicalDevice` with what hedgerow_create_requirements told, and outlives
+/// the context.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hedgerow_create_context(
+    p_create_info: *const HedgerowContextCreateInfo,
+    p_context: *mut *mut HedgerowContext,
+) -> VkResult {
+    status(|| {
+        // SAFETY: the caller's promises are those of each of these.
+        unsafe {
+            let info = reference(p_create_info, "pCreateInfo")?;
+            let place = place(p_context, "pContext")?;
+            let get = info.pfn_get_instance_proc_addr;
+            let instance = loader::instance(get, info.instance)?;
+            let device = loader::device(&instance, info.device)?;
+            let labels =
+                (info.debug_labels != vk::FALSE).then(|| loader::labels(get, &instance, &device)).transpose()?;
+            let context = Context::new(&ContextDesc {
+                instance: &instance,
+                physical_device: handle(info.physical_device, "physicalDevice")?,
+                device: &device,
+                pipeline_cache: info.pipeline_cache,
+                debug_utils: labels.as_ref(),
+            })?;
+            place.write(Box::into_raw(Box::new(HedgerowContext { context })));
+        }
+        Ok(())
+    })
+}
+
+/// Destroys a context and its pipelines; null is ignored.
+///
+/// # Safety
+/// All command buffers that it recorded into have finished. Its device still lives.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hedgerow_destroy_context(context: *mut HedgerowContext) {
+    if !context.is_null() {
+        value_or((), || {
+            // SAFETY: `hedgerow_create_context` gave it out, and nothing uses it any more.
+            drop(unsafe { Box::from_raw(context) });
+            Ok(())
+        });
+    }
+}

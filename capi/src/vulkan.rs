@@ -1,0 +1,19 @@
+//! Vulkan's types under their names in C: so the signatures here are those of the header, and the header needs no table of
+//! names.
+
+pub use hedgerow::ash::vk::{
+    AccelerationStructureBuildGeometryInfoKHR as VkAccelerationStructureBuildGeometryInfoKHR,
+    AccelerationStructureBuildRangeInfoKHR as VkAccelerationStructureBuildRangeInfoKHR,
+    AccelerationStructureBuildSizesInfoKHR as VkAccelerationStructureBuildSizesInfoKHR,
+    AccelerationStructureBuildTypeKHR as VkAccelerationStructureBuildTypeKHR,
+    AccelerationStructureCreateInfoKHR as VkAccelerationStructureCreateInfoKHR,
+    AccelerationStructureDeviceAddressInfoKHR as VkAccelerationStructureDeviceAddressInfoKHR,
+    AccelerationStructureKHR as VkAccelerationStructureKHR, AllocationCallbacks as VkAllocationCallbacks,
+    Bool32 as VkBool32, CommandBuffer as VkCommandBuffer, Device as VkDevice, DeviceAddress as VkDeviceAddress,
+    Instance as VkInstance, PhysicalDevice as VkPhysicalDevice, PipelineCache as VkPipelineCache,
+    QueueFlags as VkQueueFlags, Result as VkResult,
+};
+
+/// Null in C where it is `None` here.
+#[allow(non_camel_case_types, reason = "the name that it has in C")]
+pub type PFN_vkGetInstanceProcAddr = Option<hedgerow::ash::vk::PFN_vkGetInstanceProcAddr>;

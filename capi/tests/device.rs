@@ -1,0 +1,115 @@
+//! On a device made by what the library requires: what a context takes, and refusals that name the field.
+
+use hedgerow::ash::{self, ext, vk};
+use hedgerow_capi::*;
+use std::ffi::CStr;
+use std::ptr::{null, null_mut};
+
+/// A device that a C program would make, and a context's description of it.
+struct Engine {
+    info: HedgerowContextCreateInfo,
+    device: ash::Device,
+    instance: ash::Instance,
+    _entry: ash::Entry,
+}
+
+impl Engine {
+    fn new(instance_extensions: &[&CStr]) -> Engine {
+        let names: Vec<_> = instance_extensions.iter().map(|name| name.as_ptr()).collect();
+        let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_2);
+        let info = vk::InstanceCreateInfo::default().application_info(&application).enabled_extension_names(&names);
+        // SAFETY: each handle is used while what it came from lives; the requirements live until the device is made.
+        unsafe {
+            let entry = ash::Entry::load().expect("a Vulkan loader");
+            let instance = entry.create_instance(&info, None).expect("an instance");
+            let pfn_get_instance_proc_addr = Some(entry.static_fn().get_instance_proc_addr);
+            let mut needs = null_mut();
+            let usable = |&physical: &vk::PhysicalDevice| {
+                hedgerow_create_requirements(pfn_get_instance_proc_addr, instance.handle(), physical, &mut needs)
+                    == vk::Result::SUCCESS
+            };
+            let physical_devices = instance.enumerate_physical_devices().expect("physical devices");
+            let physical_device =
+                physical_devices.into_iter().find(usable).expect("a device that has what hedgerow needs");
+            let queue = [vk::DeviceQueueCreateInfo::default()
+                .queue_family_index((*needs).queue_family_index)
+                .queue_priorities(&[1.0])];
+            let mut device_info = vk::DeviceCreateInfo::default().queue_create_infos(&queue);
+            device_info.p_next = (*needs).features;
+            device_info.enabled_extension_count = (*needs).enabled_extension_count;
+            device_info.pp_enabled_extension_names = (*needs).enabled_extension_names;
+            let device = instance.create_device(physical_device, &device_info, None).expect("a device");
+            hedgerow_destroy_requirements(needs);
+            let info = HedgerowContextCreateInfo {
+                pfn_get_instance_proc_addr,
+                instance: instance.handle(),
+                physical_device,
+                device: device.handle(),
+                pipeline_cache: vk::PipelineCache::null(),
+                debug_labels: vk::FALSE,
+            };
+            Engine { info, device, instance, _entry: entry }
+        }
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        // SAFETY: its contexts are destroyed.
+        unsafe {
+            self.device.destroy_device(None);
+            self.instance.destroy_instance(None);
+        }
+    }
+}
+
+fn last_error() -> String {
+    // SAFETY: the text stays until the next error.
+    unsafe { CStr::from_ptr(hedgerow_last_error_message()) }.to_str().expect("UTF-8").into()
+}
+
+#[test]
+fn labels_want_their_extension() {
+    for (extensions, expected) in
+        [(&[][..], vk::Result::ERROR_VALIDATION_FAILED_EXT), (&[ext::debug_utils::NAME][..], vk::Result::SUCCESS)]
+    {
+        let mut engine = Engine::new(extensions);
+        engine.info.debug_labels = vk::TRUE;
+        let mut context = null_mut();
+        // SAFETY: the device has what the library requires and lives.
+        let result = unsafe { hedgerow_create_context(&engine.info, &mut context) };
+        assert_eq!(result, expected, "with {extensions:?}: {}", last_error());
+        // SAFETY: nothing was recorded.
+        unsafe { hedgerow_destroy_context(context) };
+    }
+    assert_eq!(
+        last_error(),
+        "debugLabels is VK_TRUE and the instance has no VK_EXT_debug_utils; enable it, or set VK_FALSE"
+    );
+}
+
+#[test]
+fn refusals_name_the_field() {
+    let engine = Engine::new(&[]);
+    let mut context = null_mut();
+    // SAFETY: the device has what the library requires and lives; what is refused is not looked at.
+    unsafe {
+        assert_eq!(hedgerow_create_context(&engine.info, &mut context), vk::Result::SUCCESS, "{}", last_error());
+        let host = vk::AccelerationStructureBuildTypeKHR::HOST_OR_DEVICE;
+        let build = vk::AccelerationStructureBuildGeometryInfoKHR::default();
+        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+        let result = hedgerow_get_acceleration_structure_build_sizes(context, host, &build, null(), &mut sizes);
+        assert_eq!(result, vk::Result::ERROR_VALIDATION_FAILED_EXT);
+        assert!(last_error().starts_with("buildType is HOST_OR_DEVICE; "), "{}", last_error());
+
+        let commands = vk::Handle::from_raw(1);
+        let mut trace = HedgerowTraceInfo { structure: 16, rays: 32, hits: 40, work: 0, ray_count: 1, query: 2 };
+        let result = hedgerow_cmd_trace_rays(context, commands, &trace);
+        assert_eq!(result, vk::Result::ERROR_VALIDATION_FAILED_EXT);
+        assert_eq!(last_error(), "query is 2; it must be one of HEDGEROW_QUERY_*");
+        trace.query = HEDGEROW_QUERY_ANY_HIT;
+        assert_eq!(hedgerow_cmd_trace_rays(context, commands, &trace), vk::Result::ERROR_VALIDATION_FAILED_EXT);
+        assert_eq!(last_error(), "hits is 0x28; it must be a multiple of 16 and not zero");
+        hedgerow_destroy_context(context);
+    }
+}
