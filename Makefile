@@ -7,6 +7,7 @@
 #   make test-lanes    the suite on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
 #   make check         formatting, lints and docs, warnings denied
 #   make prebuilt      compiles glsl/ into glsl/prebuilt/, for builds without the feature compile-shaders
+#   make install-c     hedgerow.h and the libraries for C into PREFIX (/usr/local); needs Rust alone
 #
 #   SETUP=true         go on without scripts/setup.sh       OUT=DIR        where reports go
 #   BENCH="…"          further arguments of `hedgerow bench`, such as -b lbvh,ploc or --runs 3
@@ -15,8 +16,10 @@ SETUP ?= scripts/setup.sh
 OUT ?= report
 SCENES ?= $(HEDGEROW_SCENES)
 BENCH ?=
+PREFIX ?= /usr/local
 CARGO := scripts/cargo.sh
-BIN := $(or $(CARGO_TARGET_DIR),target)/release/hedgerow
+RELEASE := $(or $(CARGO_TARGET_DIR),target)/release
+BIN := $(RELEASE)/hedgerow
 CACHE := $(or $(HEDGEROW_CACHE),$(HOME)/.cache/hedgerow)
 MESA := $(CACHE)/mesa26
 comma := ,
@@ -30,9 +33,13 @@ PEER_BUILDERS ?= lbvh,lbvh:collapse=off,driver-fast-build,driver-fast-trace,obvh
 TEST_BOUND ?= 1200
 WITHIN := $(if $(shell command -v timeout),timeout --kill-after 10 $(TEST_BOUND))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
-SUITE := $(WITHIN) $(CARGO) $(if $(NEXTEST),nextest run,test) --release --features $(FEATURES)
+RUN := $(WITHIN) $(CARGO) $(if $(NEXTEST),nextest run,test) --release
+SUITE := $(RUN) --features $(FEATURES)
+# The libraries for C, as their users build them: without the binary and the shader compiler.
+CAPI := -p hedgerow-capi
+SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
-.PHONY: bench bench-all bench-peers test test-lanes check prebuilt setup
+.PHONY: bench bench-all bench-peers test test-lanes check prebuilt install-c setup
 
 bench: setup
 	$(CARGO) build --release --features $(FEATURES)
@@ -53,6 +60,8 @@ test: setup
 	$(CARGO) test --release --features $(FEATURES) --no-run
 	$(SUITE)
 	$(if $(NEXTEST),$(WITHIN) $(CARGO) test --release --features $(FEATURES) --doc)
+	$(CARGO) test --release $(CAPI) --no-run
+	$(RUN) $(CAPI)
 
 # lavapipe alone reads these variables; subgroups of 8 and two workgroups at a time are what `make test` has on most machines.
 test-lanes: setup
@@ -62,14 +71,22 @@ test-lanes: setup
 	LP_NUM_THREADS=1 $(SUITE)
 
 check: setup
-	cargo fmt --check
+	cargo fmt --all --check
 	$(CARGO) clippy --release --all-targets --features $(FEATURES) -- -D warnings
 	$(CARGO) clippy --release --no-default-features --lib -- -D warnings
+	$(CARGO) clippy --release $(CAPI) --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --features $(FEATURES)
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --no-default-features --lib
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps $(CAPI)
 
 prebuilt: setup
 	HEDGEROW_UPDATE_PREBUILT=1 $(CARGO) test --release --test prebuilt
+
+install-c:
+	cargo build --release $(CAPI)
+	mkdir -p "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(PREFIX)/lib"
+	install -m 644 $(RELEASE)/include/hedgerow.h "$(DESTDIR)$(PREFIX)/include"
+	install -m 644 $(RELEASE)/libhedgerow_capi.a $(RELEASE)/libhedgerow_capi.$(SHARED) "$(DESTDIR)$(PREFIX)/lib"
 
 setup:
 	@$(SETUP)
