@@ -36,23 +36,29 @@ fn main() {
     )
     .expect("writing to a string");
     fs::write(out.join("shaders.rs"), table).expect("OUT_DIR can be written");
-    compile_example(&out);
+    compile_others(&out);
 }
 
-/// The shader of the example engine, which takes the library's header as anybody's would. Examples need the compiler.
+/// The shaders of the example engine and of the tests, which take the library's header as anybody's would. They need the
+/// compiler, and are not there in a package without its examples and tests.
 #[cfg(feature = "compile-shaders")]
-fn compile_example(out: &Path) {
-    let source = Path::new("examples/engine.comp");
-    println!("cargo:rerun-if-changed={}", source.display());
-    // Not there in a package without its examples.
-    if source.exists() {
-        let spirv = compile(source, shaderc::OptimizationLevel::Performance);
-        fs::write(out.join("example_engine.spv"), spirv).expect("OUT_DIR can be written");
+fn compile_others(out: &Path) {
+    for (source, define, name) in [
+        ("examples/engine.comp", None, "example_engine.spv"),
+        ("tests/shaders/probe.comp", None, "probe_of_the_driver.spv"),
+        ("tests/shaders/probe.comp", Some("WITH_HEDGEROW"), "probe.spv"),
+    ] {
+        println!("cargo:rerun-if-changed={source}");
+        let source = Path::new(source);
+        if source.exists() {
+            let spirv = compile(source, define, shaderc::OptimizationLevel::Performance);
+            fs::write(out.join(name), spirv).expect("OUT_DIR can be written");
+        }
     }
 }
 
 #[cfg(not(feature = "compile-shaders"))]
-fn compile_example(_out: &Path) {}
+fn compile_others(_out: &Path) {}
 
 fn collect(folder: &Path, sources: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("glsl/ is part of the package") {
@@ -90,20 +96,24 @@ fn spirv_of(source: &Path, name: &str, out: &Path) -> PathBuf {
     let named = out.join("named");
     fs::create_dir_all(&named).expect("OUT_DIR can be written");
     println!("cargo:rustc-env=HEDGEROW_NAMED_SPIRV={}", named.display());
-    fs::write(named.join(&file), compile(source, shaderc::OptimizationLevel::Zero)).expect("OUT_DIR can be written");
+    fs::write(named.join(&file), compile(source, None, shaderc::OptimizationLevel::Zero))
+        .expect("OUT_DIR can be written");
     let path = out.join(file);
-    fs::write(&path, compile(source, shaderc::OptimizationLevel::Performance)).expect("OUT_DIR can be written");
+    fs::write(&path, compile(source, None, shaderc::OptimizationLevel::Performance)).expect("OUT_DIR can be written");
     path
 }
 
 #[cfg(feature = "compile-shaders")]
-fn compile(source: &Path, level: shaderc::OptimizationLevel) -> Vec<u8> {
+fn compile(source: &Path, define: Option<&str>, level: shaderc::OptimizationLevel) -> Vec<u8> {
     let text = fs::read_to_string(source).expect("the shader was just listed");
     let compiler = shaderc::Compiler::new().expect("shaderc starts");
     let mut options = shaderc::CompileOptions::new().expect("shaderc gives options");
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
     options.set_optimization_level(level);
     options.set_warnings_as_errors();
+    if let Some(define) = define {
+        options.add_macro_definition(define, None);
+    }
     // Every include is named from glsl/, so that a line such as `#include "gpu/pass.glsl"` means the same everywhere.
     options.set_include_callback(|requested, _kind, _from, _depth| {
         let path = Path::new("glsl").join(requested);

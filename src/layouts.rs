@@ -46,7 +46,9 @@ fn arguments_of(shader: &str) -> Option<Layout> {
     let (room, name) = shader.split_once('/')?;
     let is = |prefix: &str| name == prefix || name.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('_'));
     Some(match room {
-        "accel" if is("geometries") => accel::push_constants(),
+        "accel" if is("entries") => accel::push_constants::entries(),
+        "accel" if is("geometries") => accel::push_constants::geometries(),
+        "accel" if is("ranges") => accel::push_constants::ranges(),
         "bvh" if is("lbvh_workgroup") => bvh::lbvh_workgroup::push_constants(),
         "bvh" if is("lbvh") => bvh::lbvh::push_constants(),
         "bvh" if is("quality") => bvh::quality::push_constants(),

@@ -104,7 +104,7 @@ fn build_prints_quality_and_writes_the_tree() {
         assert!(text.contains(word), "{word}: {text}");
     }
     let bytes = std::fs::read(&tree).expect("written");
-    let tree = hedgerow::bvh::layout::Bvh2::from_bytes(&bytes).expect("a tree");
+    let tree = hedgerow::bvh::layout::Bvh2::<hedgerow::bvh::layout::Triangle>::from_bytes(&bytes).expect("a tree");
     assert_eq!(tree.header.primitive_count, 320);
     assert!(tree.validate().is_ok());
     let message = fails(WRONG_ARGUMENTS, &["build", "gen:grid:2", "-b", "lbvh-host,lbvh-host:collapse=off", "-o", "x"]);

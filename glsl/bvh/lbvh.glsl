@@ -160,18 +160,16 @@ void mark_unused(Structure structure, uint slot) {
 }
 
 // The flags of all geometries in one word; where there are several, the structure's table is written.
-uint write_geometries(Geometry g, uint node_slots) {
-    if (!has_geometry_table()) return SOURCE == SOURCE_ENTRIES ? 0 : flags_of(g) | flags_of(g) << 8;
+uint write_geometries(Geometry g, uint count, uint node_slots) {
+    if (!has_records()) return SOURCE == SOURCE_ENTRIES ? 0 : flags_of(g) | flags_of(g) << 8;
     Geometries given = Geometries(g.vertices);
     GeometryTable table = geometry_table_at(structure_address, kind_of_records(), node_slots, primitive_count);
     uint all = 0xFF, any = 0;
-    for (uint i = 0; i < g.vertex_count; ++i) {
+    for (uint i = 0; i < count; ++i) {
         uint flags = flags_of(given.geometry[i]);
-        if (g.vertex_count > 1) table.entry[i] = GeometryEntry(given.geometry[i].first, flags);
-        if ((flags & GEOMETRY_END) == 0u) {
-            all &= flags;
-            any |= flags;
-        }
+        if (count > 1) table.entry[i] = GeometryEntry(given.geometry[i].first, flags);
+        all &= flags;
+        any |= flags;
     }
     return all | any << 8;
 }
@@ -192,8 +190,9 @@ void lbvh_plan() {
     structure.header.node_slots = slots;
     structure.header.code_bits = bits;
     structure.header.inner_nodes = max(state.active_count, 1) - 1;
-    structure.header.geometry_count = has_geometry_table() ? vertex_count : 1;
-    structure.header.geometry_flags = write_geometries(geometries(), slots);
+    uint geometry_count = count_geometries(geometries());
+    structure.header.geometry_count = geometry_count;
+    structure.header.geometry_flags = write_geometries(geometries(), geometry_count, slots);
     structure.header.build_flags = code_kind >> 26;
     structure.header.area_scale = 0.0;
     structure.header.cost = 0.0;

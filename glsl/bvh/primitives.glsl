@@ -9,8 +9,15 @@ uint kind_of_records() {
                                     : SOURCE == SOURCE_BOXES || SOURCE == SOURCE_SEVERAL_BOXES ? KIND_BOXES : KIND_TRIANGLES;
 }
 
-bool has_geometry_table() {
+bool has_records() {
     return SOURCE == SOURCE_GEOMETRIES || SOURCE == SOURCE_SEVERAL_BOXES;
+}
+
+// Geometries that are given, without the record that may end them.
+uint count_geometries(Geometry g) {
+    if (!has_records()) return 1;
+    bool has_end = g.vertex_count > 0 && (flags_of(Geometries(g.vertices).geometry[g.vertex_count - 1]) & GEOMETRY_END) != 0u;
+    return has_end ? g.vertex_count - 1 : g.vertex_count;
 }
 
 // The box of a primitive; returns 0, or why it is left out: a status bit or INACTIVE.

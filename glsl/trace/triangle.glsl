@@ -71,7 +71,7 @@ bool hedgerow_carefully(HedgerowPreparedRay ray, vec3 a, vec3 b, vec3 c, float m
 }
 
 // Where the ray's line meets the triangle: t and the weights of the second and third vertex; and whether it meets the front,
-// from which the vertices go round clockwise.
+// to which (v1 - v0) × (v2 - v0) points.
 bool hedgerow_meet_facing(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, out vec3 meeting, out bool is_front) {
     const float TRUSTED = uintBitsToFloat((127u - 76u) << 23);
     const float LARGEST_CUBE = uintBitsToFloat((127u + 100u) << 23);
@@ -99,7 +99,7 @@ bool hedgerow_meet_facing(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, ou
     precise float t = (weights.x * a.z + weights.y * b.z + weights.z * c.z) * ray.shear.z;
     meeting = vec3(t, weights.yz);
     // The permutation keeps the sense of rotation, and the shear turns it where the ray goes down its major axis.
-    is_front = (scale < 0.0) != (ray.shear.z < 0.0);
+    is_front = (scale > 0.0) != (ray.shear.z < 0.0);
     return true;
 }
 

@@ -1,6 +1,6 @@
 //! The geometries of Vulkan's structs as those of our builders.
 
-use crate::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, VertexFormat};
+use crate::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, Primitives, VertexFormat};
 use crate::{Error, Result};
 use ash::vk;
 
@@ -27,6 +27,129 @@ pub(super) unsafe fn given<'a>(
     }
 }
 
+/// What a build is over: geometries of one kind.
+#[derive(Debug, Clone)]
+pub(super) enum Given {
+    /// Triangles.
+    Triangles(Vec<Geometry>),
+    /// Boxes.
+    Boxes(Vec<Geometry>),
+    /// Instances at an address, or pointers to them.
+    Instances {
+        /// The address.
+        data: u64,
+        /// Whether pointers lie there.
+        pointers: bool,
+    },
+}
+
+impl Given {
+    /// The geometries of a structure of type `ty`, with their ranges and the `first` of each.
+    pub fn new(
+        ty: vk::AccelerationStructureTypeKHR,
+        geometries: &[&vk::AccelerationStructureGeometryKHR<'_>],
+        ranges: &[vk::AccelerationStructureBuildRangeInfoKHR],
+        firsts: &[u32],
+    ) -> Result<Given> {
+        match ty {
+            vk::AccelerationStructureTypeKHR::TOP_LEVEL => {
+                let [geometry] = geometries else {
+                    return Err(Error::Argument(format!(
+                        "geometryCount is {}; a TOP_LEVEL structure has one geometry, of INSTANCES",
+                        geometries.len()
+                    )));
+                };
+                instances(geometry, &ranges[0])
+            }
+            vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL => {
+                let kind = geometries.first().map_or(vk::GeometryTypeKHR::TRIANGLES, |g| g.geometry_type);
+                if let Some(other) = geometries.iter().position(|g| g.geometry_type != kind) {
+                    return Err(Error::Argument(format!(
+                        "pGeometries[{other}].geometryType is {:?} and that of the first {kind:?}; all must be the same",
+                        geometries[other].geometry_type
+                    )));
+                }
+                let all = geometries.iter().zip(ranges).zip(firsts);
+                match kind {
+                    vk::GeometryTypeKHR::TRIANGLES => {
+                        let given = all.map(|((geometry, range), &first)| triangles(geometry, range, first));
+                        given.collect::<Result<_>>().map(Given::Triangles)
+                    }
+                    vk::GeometryTypeKHR::AABBS => {
+                        let given = all.map(|((geometry, range), &first)| boxes(geometry, range, first));
+                        given.collect::<Result<_>>().map(Given::Boxes)
+                    }
+                    other => Err(Error::Argument(format!(
+                        "geometryType is {other:?}; bottom-level structures hold TRIANGLES or AABBS"
+                    ))),
+                }
+            }
+            other => {
+                Err(Error::Argument(format!("type is {other:?}; a build needs to know: BOTTOM_LEVEL or TOP_LEVEL")))
+            }
+        }
+    }
+
+    /// What the structure will hold.
+    pub fn primitives(&self) -> Primitives {
+        match self {
+            Given::Triangles(_) => Primitives::Triangles,
+            Given::Boxes(_) => Primitives::Boxes,
+            Given::Instances { .. } => Primitives::Instances,
+        }
+    }
+
+    /// Geometries, at least 1.
+    pub fn count(&self) -> u32 {
+        match self {
+            Given::Triangles(geometries) | Given::Boxes(geometries) => geometries.len().max(1) as u32,
+            Given::Instances { .. } => 1,
+        }
+    }
+}
+
+/// The instances of a top level.
+fn instances(
+    geometry: &vk::AccelerationStructureGeometryKHR<'_>,
+    range: &vk::AccelerationStructureBuildRangeInfoKHR,
+) -> Result<Given> {
+    if geometry.geometry_type != vk::GeometryTypeKHR::INSTANCES {
+        return Err(Error::Argument(format!(
+            "geometryType is {:?}; top-level structures hold INSTANCES",
+            geometry.geometry_type
+        )));
+    }
+    // SAFETY: the type says which of the union's members it is; device builds give device addresses.
+    let (instances, address) = unsafe {
+        let instances = geometry.geometry.instances;
+        (instances, instances.data.device_address)
+    };
+    let pointers = instances.array_of_pointers == vk::TRUE;
+    Ok(Given::Instances { data: address.wrapping_add(range.primitive_offset.into()), pointers })
+}
+
+/// The boxes of a geometry that `range` takes; `first` boxes come before.
+fn boxes(
+    geometry: &vk::AccelerationStructureGeometryKHR<'_>,
+    range: &vk::AccelerationStructureBuildRangeInfoKHR,
+    first: u32,
+) -> Result<Geometry> {
+    // SAFETY: the type says which of the union's members it is; device builds give device addresses.
+    let (boxes, address) = unsafe {
+        let boxes = geometry.geometry.aabbs;
+        (boxes, boxes.data.device_address)
+    };
+    let stride = u32::try_from(boxes.stride).ok().filter(|stride| stride.is_multiple_of(8));
+    let Some(stride) = stride else {
+        return Err(Error::Argument(format!(
+            "aabbs.stride is {}; it must be a multiple of 8 below 2^32",
+            boxes.stride
+        )));
+    };
+    let address = address.wrapping_add(range.primitive_offset.into());
+    Ok(Geometry { first, flags: flags_of(geometry), ..Geometry::boxes(address, stride) })
+}
+
 fn flags_of(geometry: &vk::AccelerationStructureGeometryKHR<'_>) -> GeometryFlags {
     let mut flags = GeometryFlags::NONE;
     if geometry.flags.contains(vk::GeometryFlagsKHR::OPAQUE) {
@@ -39,17 +162,11 @@ fn flags_of(geometry: &vk::AccelerationStructureGeometryKHR<'_>) -> GeometryFlag
 }
 
 /// The triangles of a geometry that `range` takes; `first` triangles come before.
-pub(super) fn triangles(
+fn triangles(
     geometry: &vk::AccelerationStructureGeometryKHR<'_>,
     range: &vk::AccelerationStructureBuildRangeInfoKHR,
     first: u32,
 ) -> Result<Geometry> {
-    if geometry.geometry_type != vk::GeometryTypeKHR::TRIANGLES {
-        return Err(Error::Argument(format!(
-            "geometryType is {:?}; bottom-level structures hold TRIANGLES",
-            geometry.geometry_type
-        )));
-    }
     // SAFETY: the type says which of the union's members it is; addresses are read as addresses.
     let triangles = unsafe { geometry.geometry.triangles };
     let vertex_format = VertexFormat::try_from(triangles.vertex_format)?;

@@ -1,8 +1,8 @@
 //! Acceleration structures by the calls and structs of `VK_KHR_acceleration_structure`, on any device with compute shaders.
 //!
 //! [`Device`] stands where an engine has `ash::khr::acceleration_structure::Device`: the same methods take the same structs
-//! of [`ash::vk`] and record compute dispatches. There are bottom-level structures of triangles, built on the device; what
-//! else the structs can ask for is refused with an error that names the field.
+//! of [`ash::vk`] and record compute dispatches. What the structs can ask for and is not there is refused with an error that
+//! names the field.
 //!
 //! A handle is the structure's device address, in the type that the structs want: it owns nothing, and lives as long as the
 //! buffer that it lies in. That buffer needs `STORAGE_BUFFER` and `SHADER_DEVICE_ADDRESS` usage, and so does scratch memory,
@@ -10,12 +10,59 @@
 //! want the stage `ACCELERATION_STRUCTURE_BUILD` in a barrier, these want `COMPUTE_SHADER` with `SHADER_READ` and
 //! `SHADER_WRITE`.
 //!
-//! Of the build flags, both preferences give an LBVH whose subtrees are leaves where that is cheaper; the others are refused.
+//! The build flags, and what each changes:
+//!
+//! | flag | |
+//! | --- | --- |
+//! | `PREFER_FAST_BUILD` | Morton codes of 8 bits less: a pass of the sort less |
+//! | `PREFER_FAST_TRACE` | codes of 8 bits more |
+//! | `LOW_MEMORY` | codes of at most 32 bits: 20 bytes of scratch a primitive instead of 28, from 4 million on |
+//! | `ALLOW_UPDATE` | updates are allowed; no re-braiding, as an opened instance cannot be refitted |
+//! | `ALLOW_COMPACTION` | nothing: every structure can be compacted |
+//! | [`REBRAID`] | a top level opens instances whose boxes are loose |
 
+mod build;
 mod device;
 mod geometry;
+mod instances;
 
-pub use device::{Device, SCRATCH_ALIGNMENT, STRUCTURE_ALIGNMENT};
+pub use build::SCRATCH_ALIGNMENT;
+pub use device::{Device, STRUCTURE_ALIGNMENT};
+pub use instances::Instance;
+
+use ash::vk;
+
+/// A build flag of ours: a top level may open instances (Benthin, Woop, Wald 2017), within [`Options::rebraid_budget`].
+pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAccelerationStructureFlagsKHR::from_raw(1 << 30);
+
+/// What a [`Device`] does beside what the structs say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Entries of a top level that is built with [`REBRAID`], as a multiple of its instances: at least 1.
+    pub rebraid_budget: f32,
+}
+
+impl Options {
+    /// Twice as many entries as instances.
+    pub const DEFAULT: Options = Options { rebraid_budget: 2.0 };
+
+    /// Entries that a top level of so many instances has room for.
+    fn entries(&self, flags: vk::BuildAccelerationStructureFlagsKHR, instance_count: u32) -> u32 {
+        let opens = flags.contains(REBRAID) && !flags.contains(vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE);
+        let budget = if opens { f64::from(self.rebraid_budget.max(1.0)) } else { 1.0 };
+        // What is too much is refused by the builder.
+        (f64::from(instance_count) * budget).ceil() as u32
+    }
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options::DEFAULT
+    }
+}
 
 #[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
-pub(crate) use device::push_constants;
+pub(crate) mod push_constants {
+    pub(crate) use super::build::{push_constants as geometries, ranges_push_constants as ranges};
+    pub(crate) use super::instances::push_constants as entries;
+}

@@ -175,7 +175,7 @@ impl GeometryFlags {
     /// A primitive is met once by a ray. It always is: no tree of ours holds one twice.
     pub const NO_DUPLICATES: GeometryFlags = GeometryFlags(1 << 1);
     /// The record that ends the others: primitives from its `first` on are inactive.
-    pub(crate) const END: GeometryFlags = GeometryFlags(1 << 7);
+    pub const END: GeometryFlags = GeometryFlags(1 << 7);
 
     /// The flags as the structure has them.
     pub fn bits(self) -> u32 {
@@ -232,7 +232,7 @@ pub enum Source {
     Several {
         /// Address of the records.
         records: u64,
-        /// How many there are.
+        /// How many there are; one more than the builder was made for where a last one ends the others.
         count: u32,
     },
     /// The entries of a top level, `glsl/bvh/instances.glsl`, in device memory, and the instances that they are of.

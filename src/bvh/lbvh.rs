@@ -114,7 +114,7 @@ const SOURCE_SEVERAL_BOXES: u32 = 4;
 const SOURCE_ENTRIES: u32 = 5;
 
 /// `GEOMETRY_POINTERS << 24`: in the formats of entries (instances.glsl).
-const INSTANCE_POINTERS: u32 = 1 << 25;
+pub(crate) const INSTANCE_POINTERS: u32 = 1 << 25;
 
 /// Bytes of `LbvhState` in lbvh.glsl, with room to spare.
 pub(super) const STATE_BYTES: u64 = 768;
@@ -210,6 +210,11 @@ impl Lbvh {
     /// The codes that are used: the choice where none was given.
     pub fn codes(&self) -> Codes {
         self.codes
+    }
+
+    /// Primitives that it is for.
+    pub fn count(&self) -> u32 {
+        self.count
     }
 
     /// The schedule that is used: the choice where none was given.
@@ -385,6 +390,7 @@ impl Lbvh {
         }
         if let Source::Several { count, .. } = input.source
             && count != self.geometry_count
+            && count != self.geometry_count + 1
         {
             return Err(Error::Argument(format!(
                 "the builder was made for {} geometries, the input has {count}; make a builder for it",

@@ -2,6 +2,7 @@
 
 use super::device;
 use super::geometries::Owned;
+use super::probe::{Probe, ProbeRay, Report};
 use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
 use hedgerow::ash::{self, vk};
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
@@ -21,6 +22,8 @@ pub trait Backend {
     fn address(&self, structure: vk::AccelerationStructureKHR) -> u64;
     fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]);
     fn scratch_alignment(&self) -> u64;
+    /// What queries through a top level report.
+    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<Report>;
     /// The hits of rays in a bottom-level structure.
     fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
 }
@@ -33,17 +36,29 @@ pub fn is_old_lavapipe() -> bool {
     device().limits.is_cpu() && version.is_some_and(|major| major < 26)
 }
 
+/// Whether the driver is a lavapipe of Mesa 26 or later: a top level with an inactive instance (reference 0, which the
+/// specification allows) crashes the process in a ray query of 26.1.6. 25.0.7 takes it.
+pub fn is_new_lavapipe() -> bool {
+    device().limits.loads_uniform_values_once()
+}
+
 /// Ours, and the driver's where the device has it.
 pub fn backends() -> Vec<Box<dyn Backend>> {
-    let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours(accel::Device::new(device())))];
+    let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours::new())];
     if device().has_ray_query() {
         let raw = ash::khr::acceleration_structure::Device::new(device().ash_instance(), device().ash_device());
-        all.push(Box::new(Drivers(raw)));
+        all.push(Box::new(Drivers(raw, Probe::of_the_driver())));
     }
     all
 }
 
-pub struct Ours(pub accel::Device<'static>);
+pub struct Ours(pub accel::Device<'static>, Probe);
+
+impl Ours {
+    pub fn new() -> Ours {
+        Ours(accel::Device::new(device()), Probe::ours())
+    }
+}
 
 impl Backend for Ours {
     fn name(&self) -> &'static str {
@@ -80,6 +95,10 @@ impl Backend for Ours {
         SCRATCH_ALIGNMENT
     }
 
+    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<Report> {
+        self.1.ask(self.address(structure), rays)
+    }
+
     fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
         let count = rays.len() as u32;
         let ray_buffer = device().upload("rays", rays).expect("memory");
@@ -92,7 +111,7 @@ impl Backend for Ours {
     }
 }
 
-pub struct Drivers(pub ash::khr::acceleration_structure::Device);
+pub struct Drivers(pub ash::khr::acceleration_structure::Device, Probe);
 
 /// The push constants of `glsl/measure/ray_query.comp`.
 #[derive(Clone, Copy, bytemuck::NoUninit)]
@@ -149,6 +168,10 @@ impl Backend for Drivers {
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
         unsafe { device().ash_instance().get_physical_device_properties2(device().physical_device(), &mut properties) };
         u64::from(limits.min_acceleration_structure_scratch_offset_alignment).max(1)
+    }
+
+    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<Report> {
+        self.1.ask(self.address(structure), rays)
     }
 
     /// Through a top level of one instance, which a ray query cannot do without.

@@ -4,7 +4,9 @@
 pub mod backends;
 pub mod corpus;
 pub mod geometries;
+pub mod probe;
 pub mod shapes;
+pub mod world;
 
 use hedgerow::gpu::{Device, DeviceOptions};
 use std::sync::OnceLock;

@@ -1,0 +1,272 @@
+//! A build that is asked for by Vulkan's structs: what it reads, the memory it needs, and what is recorded before the builder.
+
+use super::geometry::{self, Given};
+use super::instances::{ENTRY_BYTES, entries_step};
+use super::{Options, REBRAID};
+use crate::bvh::codes::Codes;
+use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
+use crate::bvh::lbvh::{self, Job, Lbvh, Sizes};
+use crate::bvh::sah::Collapse;
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::{Context, Kernel, Step, shaders};
+use crate::{Error, Result};
+use ash::vk;
+
+type Flags = vk::BuildAccelerationStructureFlagsKHR;
+
+/// What scratch addresses must be multiples of: `minAccelerationStructureScratchOffsetAlignment`.
+pub const SCRATCH_ALIGNMENT: u64 = 16;
+
+/// Flags that a build may have.
+const KNOWN_FLAGS: Flags = Flags::from_raw(
+    Flags::ALLOW_UPDATE.as_raw()
+        | Flags::ALLOW_COMPACTION.as_raw()
+        | Flags::PREFER_FAST_TRACE.as_raw()
+        | Flags::PREFER_FAST_BUILD.as_raw()
+        | Flags::LOW_MEMORY.as_raw()
+        | REBRAID.as_raw(),
+);
+
+/// Where the numbers of primitives are told.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Counts {
+    /// In the recording; the geometries are of their ranges.
+    Told,
+    /// In device memory, `VkAccelerationStructureBuildRangeInfoKHR` so many bytes apart; the geometries begin where the caller's
+    /// do, and their `first` is the most primitives that each may have.
+    OnDevice { address: u64, stride: u32 },
+}
+
+/// A build that is asked for.
+pub(super) struct Build {
+    lbvh: Lbvh,
+    given: Given,
+    counts: Counts,
+    /// Most primitives of all geometries.
+    primitive_count: u32,
+}
+
+/// Where the parts of the scratch memory begin.
+struct Scratch {
+    entries: u64,
+    builder: u64,
+}
+
+impl Build {
+    /// What `info` asks for over the primitives `given`, at most `primitive_count` in all.
+    pub fn new(
+        context: &Context,
+        options: &Options,
+        info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+        given: Given,
+        counts: Counts,
+        primitive_count: u64,
+    ) -> Result<Build> {
+        if !KNOWN_FLAGS.contains(info.flags) {
+            return Err(Error::Argument(format!("flags are {:?}; take some of {KNOWN_FLAGS:?}", info.flags)));
+        }
+        if info.flags.contains(Flags::PREFER_FAST_TRACE | Flags::PREFER_FAST_BUILD) {
+            return Err(Error::Argument("flags ask for a fast trace and for a fast build; take one".into()));
+        }
+        let primitive_count = u32::try_from(primitive_count).unwrap_or(u32::MAX);
+        let entries = match given {
+            Given::Instances { .. } => options.entries(info.flags, primitive_count),
+            _ => primitive_count,
+        };
+        let primitives = given.primitives();
+        let lbvh_options = lbvh::Options {
+            codes: Some(codes(info.flags, entries)),
+            // An instance costs more than a node whatever its box: one a leaf.
+            collapse: if primitives == Primitives::Instances { Collapse::OFF } else { Collapse::SAH },
+            primitives,
+            geometry_count: given.count(),
+            build_flags: info.flags.as_raw() & 0x1f,
+            ..lbvh::Options::DEFAULT
+        };
+        let lbvh = Lbvh::new(context, &lbvh_options, entries)?;
+        Ok(Build { lbvh, given, counts, primitive_count })
+    }
+
+    /// Bytes of structure and scratch memory that suffice for it and for the same with fewer primitives.
+    pub fn sizes_at_most(&self) -> Sizes {
+        let sizes = self.lbvh.sizes_at_most();
+        Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
+    }
+
+    /// The builder's part, with scratch memory at `scratch`.
+    pub fn job(&self, structure: u64, scratch: u64) -> Job<'_> {
+        let parts = self.scratch(scratch);
+        let source = match &self.given {
+            Given::Instances { data, pointers } => {
+                Source::Entries { entries: parts.entries, instances: *data, pointers: *pointers }
+            }
+            Given::Triangles(geometries) | Given::Boxes(geometries) => match (&geometries[..], self.counts) {
+                ([], _) => Source::One(Geometry::mesh(0, 0, 0)),
+                (&[geometry], Counts::Told) => Source::One(geometry),
+                (_, Counts::Told) => Source::Several { records: scratch, count: geometries.len() as u32 },
+                (_, Counts::OnDevice { .. }) => {
+                    Source::Several { records: scratch, count: geometries.len() as u32 + 1 }
+                }
+            },
+        };
+        let input = Input { source, primitive_count: self.lbvh.count() };
+        Job { lbvh: &self.lbvh, input, structure, scratch: parts.builder }
+    }
+
+    /// What must have run, with a barrier behind, before the builder's part: chains of steps for [`Recorder::chains`].
+    ///
+    /// [`Recorder::chains`]: crate::gpu::Recorder::chains
+    pub fn prologue(&self, context: &Context, scratch: u64) -> Vec<Vec<Step>> {
+        match &self.given {
+            Given::Instances { data, pointers } => {
+                let parts = self.scratch(scratch);
+                let ranges = match self.counts {
+                    Counts::Told => 0,
+                    Counts::OnDevice { address, .. } => address,
+                };
+                let (count, capacity) = (self.primitive_count, self.lbvh.count());
+                vec![vec![entries_step(context, *data, *pointers, parts.entries, ranges, count, capacity)]]
+            }
+            Given::Triangles(geometries) | Given::Boxes(geometries) => match self.counts {
+                Counts::Told if geometries.len() < 2 => Vec::new(),
+                Counts::Told => record_steps(geometries, scratch).into_iter().map(|step| vec![step]).collect(),
+                Counts::OnDevice { .. } if geometries.is_empty() => Vec::new(),
+                Counts::OnDevice { address, stride } => {
+                    let end = Geometry { flags: GeometryFlags::END, ..Geometry::mesh(0, 0, 0) };
+                    let all: Vec<Geometry> = geometries.iter().copied().chain([end]).collect();
+                    let arguments = Ranges {
+                        records: scratch,
+                        ranges: address,
+                        stride,
+                        count: geometries.len() as u32,
+                        boxes: u32::from(self.given.primitives() == Primitives::Boxes),
+                        padding: 0,
+                    };
+                    // The records of one chain touch no memory of each other's: the barriers between them are not needed, and
+                    // geometries whose ranges lie in device memory are few.
+                    let mut steps = record_steps(&all, scratch);
+                    let kernel = Kernel::new(&shaders::ACCEL_RANGES, 1, &[]);
+                    steps.push(Step::new("geometries", kernel, &arguments, 1));
+                    vec![steps]
+                }
+            },
+        }
+    }
+
+    /// The parts of scratch memory: records of the geometries with one more that may end them, or entries; then the builder's.
+    fn scratch(&self, begin: u64) -> Scratch {
+        let before = match &self.given {
+            Given::Instances { .. } => u64::from(self.lbvh.count()) * ENTRY_BYTES,
+            Given::Triangles(geometries) | Given::Boxes(geometries) => {
+                (geometries.len() as u64 + 1) * size_of::<Geometry>() as u64
+            }
+        };
+        Scratch { entries: begin, builder: begin + before.next_multiple_of(SCRATCH_ALIGNMENT) }
+    }
+}
+
+/// The codes that the flags ask for: a fast build sorts by 8 bits less, a fast trace by 8 more; low memory keeps them in one
+/// word, which saves 8 bytes of scratch a primitive.
+fn codes(flags: Flags, primitive_count: u32) -> Codes {
+    let codes = Codes::for_count(primitive_count);
+    let bits = match () {
+        () if flags.contains(Flags::PREFER_FAST_BUILD) => codes.bits.saturating_sub(8).max(8),
+        () if flags.contains(Flags::PREFER_FAST_TRACE) => (codes.bits + 8).min(64),
+        () => codes.bits,
+    };
+    codes.code.full().with_bits(if flags.contains(Flags::LOW_MEMORY) { bits.min(32) } else { bits })
+}
+
+push_constants! {
+    /// Push constants of `glsl/accel/geometries.comp`.
+    struct Records {
+        records: u64,
+        at: u32,
+        count: u32,
+        given: [Geometry; RECORDS_AT_ONCE],
+    }
+}
+
+/// Records that fit into the push constants.
+const RECORDS_AT_ONCE: usize = 2;
+
+/// The dispatches that write the records: they need no barrier between them.
+fn record_steps(geometries: &[Geometry], records: u64) -> Vec<Step> {
+    let kernel = Kernel::new(&shaders::ACCEL_GEOMETRIES, RECORDS_AT_ONCE as u32, &[]);
+    let step = |(i, chunk): (usize, &[Geometry])| {
+        let mut given = [Geometry::mesh(0, 0, 0); RECORDS_AT_ONCE];
+        given[..chunk.len()].copy_from_slice(chunk);
+        let (at, count) = ((RECORDS_AT_ONCE * i) as u32, chunk.len() as u32);
+        Step::new("geometries", kernel.clone(), &Records { records, at, count, given }, 1)
+    };
+    geometries.chunks(RECORDS_AT_ONCE).enumerate().map(step).collect()
+}
+
+/// Push constants of `glsl/accel/ranges.comp`.
+mod ranges {
+    use crate::gpu::push_constants::push_constants;
+
+    push_constants! {
+        pub struct Ranges {
+            pub records: u64,
+            pub ranges: u64,
+            pub stride: u32,
+            pub count: u32,
+            pub boxes: u32,
+            pub padding: u32,
+        }
+    }
+}
+use ranges::Ranges;
+#[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
+pub(crate) use ranges::push_constants as ranges_push_constants;
+
+/// The geometries that `info` gives with the counts of their ranges.
+///
+/// # Safety
+/// The pointers of `info` are valid.
+pub(super) unsafe fn told(
+    info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+    ranges: &[vk::AccelerationStructureBuildRangeInfoKHR],
+) -> Result<(Given, u64)> {
+    // SAFETY: the caller's promise.
+    let geometries = unsafe { geometry::given(info) }?;
+    if geometries.len() != ranges.len() {
+        return Err(Error::Argument(format!(
+            "geometryCount is {}, and there are {} ranges; give one for each geometry",
+            geometries.len(),
+            ranges.len()
+        )));
+    }
+    let mut count = 0u64;
+    let firsts: Vec<u32> = ranges
+        .iter()
+        .map(|range| {
+            count += u64::from(range.primitive_count);
+            // Too many are refused by the builder.
+            (count - u64::from(range.primitive_count)) as u32
+        })
+        .collect();
+    Ok((Given::new(info.ty, &geometries, ranges, &firsts)?, count))
+}
+
+/// The geometries that `info` gives, at most so many primitives each, whose ranges are not known.
+///
+/// # Safety
+/// The pointers of `info` are valid.
+pub(super) unsafe fn at_most(
+    info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+    counts: &[u32],
+) -> Result<(Given, u64)> {
+    // SAFETY: the caller's promise.
+    let geometries = unsafe { geometry::given(info) }?;
+    if geometries.len() != counts.len() {
+        return Err(Error::Argument(format!(
+            "geometryCount is {}, and there are {} maximal primitive counts; give one for each geometry",
+            geometries.len(),
+            counts.len()
+        )));
+    }
+    let ranges = vec![vk::AccelerationStructureBuildRangeInfoKHR::default(); counts.len()];
+    Ok((Given::new(info.ty, &geometries, &ranges, counts)?, counts.iter().copied().map(u64::from).sum()))
+}
