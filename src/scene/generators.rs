@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::f32::consts::TAU;
 
 /// The most triangles that the engine's primitives are made for.
-const MOST_TRIANGLES: u64 = 1 << 27;
+pub(super) const MOST_TRIANGLES: u64 = 1 << 27;
 
 /// Makes the mesh of `gen:…`; `arguments` is what stands behind `gen:` in `spec`.
 pub(super) fn generate(spec: &str, arguments: &str) -> Result<Mesh> {

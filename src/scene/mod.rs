@@ -9,6 +9,7 @@ mod check;
 mod generators;
 mod gltf;
 mod inst;
+mod instances;
 mod lookup;
 mod obj;
 mod ply;
@@ -20,6 +21,7 @@ use crate::bvh::layout::Aabb;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
+pub use instances::{Instance, Instances, load_instances};
 pub use lookup::{list, own_folders};
 pub use random::SplitMix64;
 
@@ -108,12 +110,16 @@ struct Content {
 }
 
 /// Loads the scene that `spec` names: a path, the bare name of a file in one of the folders, or a generator
-/// (`gen:icosphere:6`).
+/// (`gen:icosphere:6`). Instances are flattened; [`load_instances`] keeps them.
 ///
 /// # Errors
 /// [`Error::Scene`] if there is no such scene or it has no triangles, [`Error::Malformed`] with file, line or item and the
 /// remedy if the file is broken, [`Error::Argument`] if a generator's arguments are wrong.
 pub fn load(spec: &str, options: &LoadOptions<'_>) -> Result<Scene> {
+    if let Some(scene) = instances::placed(spec, options)? {
+        let mesh = scene.flatten()?;
+        return Ok(Scene { name: scene.name, mesh, camera: scene.camera, lights: scene.lights });
+    }
     let (name, content) = if let Some(generator) = spec.strip_prefix("gen:") {
         (spec.to_owned(), Content { mesh: generators::generate(spec, generator)?, ..Content::default() })
     } else {
@@ -122,19 +128,22 @@ pub fn load(spec: &str, options: &LoadOptions<'_>) -> Result<Scene> {
     };
     let Content { mesh, camera, lights } = content;
     if mesh.triangles.is_empty() {
-        return Err(Error::Scene(format!("{spec}: no triangles; a scene needs at least one")));
+        return Err(no_triangles(spec));
     }
     let camera = camera.or_else(|| cameras::known(&name)).unwrap_or_else(|| cameras::around(&mesh.bounds()));
     Ok(Scene { name, mesh, camera, lights })
 }
 
-/// Reads a file of any of the formats.
+fn no_triangles(spec: &str) -> Error {
+    Error::Scene(format!("{spec}: no triangles; a scene needs at least one"))
+}
+
+/// Reads a file of any of the formats that hold a mesh.
 fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Content> {
     let mesh = match lookup::format_of(path).as_deref() {
         Some("obj") => obj::read(path, options)?,
         Some("ply") => ply::read(path, options)?,
         Some("gltf" | "glb") => return gltf::read(path, options),
-        Some("inst") => inst::read(path, options)?,
         Some("tri") => tri::read_tri(path, options)?,
         Some("anim") => tri::read_anim(path, options)?,
         _ => {
