@@ -4,6 +4,7 @@
 //! Every file may also lie there packed, with `.zst` behind its name. Triangles keep the order of the file, polygons are
 //! fan-triangulated from their first vertex; the position of a triangle in that order is its primitive index everywhere.
 
+mod animation;
 mod cameras;
 mod check;
 mod generators;
@@ -21,6 +22,7 @@ use crate::bvh::layout::Aabb;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
+pub use animation::{Animation, load_animation};
 pub use instances::{Instance, Instances, load_instances};
 pub use lookup::{list, own_folders};
 pub use random::SplitMix64;
