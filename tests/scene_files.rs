@@ -161,9 +161,9 @@ fn animations_that_are_broken_in_any_frame_are_told_so() {
 fn what_is_no_animation_is_told_so() {
     let folder = Folder::new();
     let square = folder.bytes("square.tri", &square_tri());
-    for spec in [square.as_str()] {
+    for spec in [square.as_str(), "gen:icosphere:1", "gen:forest:3"] {
         let message = load_animation(spec).expect_err(spec).to_string();
-        let expected = ": not an animation; take an .anim file";
+        let expected = ": not an animation; take an .anim file or gen:twist:N:FRAMES";
         assert_eq!(message.strip_prefix(spec), Some(expected));
     }
     assert!(load_animation("none.anim").expect_err("missing").to_string().contains("there is no scene \"none.anim\""));

@@ -1,6 +1,6 @@
 //! Animations: one topology, the vertices of every frame. What updating a structure is measured with.
 
-use super::{Camera, LoadOptions, Mesh, cameras, lookup, no_triangles, tri};
+use super::{Camera, LoadOptions, Mesh, cameras, generators, lookup, no_triangles, tri};
 use crate::bvh::layout::Aabb;
 use crate::{Error, Result};
 
@@ -43,12 +43,15 @@ fn bounds(triangles: &[[u32; 3]], frames: &[Vec<[f32; 3]>]) -> Aabb {
     corners.fold(Aabb::EMPTY, |bounds, corner| bounds.union(&Aabb::around(&[corner])))
 }
 
-/// Loads all frames of the animation that `spec` names: an `.anim` file.
+/// Loads all frames of the animation that `spec` names: an `.anim` file or a generator of one (`gen:twist:20000:24`).
 ///
 /// # Errors
 /// As [`load`](super::load), and [`Error::Scene`] if the scene is no animation.
 pub fn load_animation(spec: &str, options: &LoadOptions<'_>) -> Result<Animation> {
-    let is_none = || Error::Scene(format!("{spec}: not an animation; take an .anim file"));
+    let is_none = || Error::Scene(format!("{spec}: not an animation; take an .anim file or gen:twist:N:FRAMES"));
+    if let Some(generated) = generators::Generated::find(spec)? {
+        return generated.animation().ok_or_else(is_none);
+    }
     let path = lookup::find(spec, &options.folders)?;
     if lookup::format_of(&path).as_deref() != Some("anim") {
         return Err(is_none());

@@ -1,7 +1,7 @@
 //! `.inst`: placed copies of the objects of an OBJ file, one a line: the object's `o` name and a row-major 3×4
 //! object-to-world matrix; `#` begins a comment. `NAME.inst` places the objects of `NAME_parts.obj` beside it.
 
-use super::{Instance, Instances, LoadOptions, Mesh, check, lookup, obj, source};
+use super::{Instance, Instances, LoadOptions, Mesh, cameras, check, lookup, obj, source};
 use crate::bvh::layout::Aabb;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Instances> 
             )));
         }
     }
-    Ok(Instances::new(lookup::name_of(path), parts, instances))
+    Ok(Instances::new(lookup::name_of(path), parts, instances, cameras::around))
 }
 
 fn parts_of(path: &Path) -> Result<PathBuf> {

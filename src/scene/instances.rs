@@ -1,6 +1,6 @@
 //! Scenes in two levels: a few parts, each placed many times. What a top-level structure over bottom-level ones is built of.
 
-use super::{Camera, Light, LoadOptions, Mesh, Scene, cameras, check, generators, inst, load, lookup};
+use super::{Camera, Light, LoadOptions, Mesh, Scene, cameras, check, generators, inst, load, lookup, no_triangles};
 use crate::bvh::layout::Aabb;
 use crate::{Error, Result};
 
@@ -57,9 +57,14 @@ impl Instances {
     /// The most triangles that are written out when instances are flattened.
     pub const MOST_FLATTENED: u64 = generators::MOST_TRIANGLES;
 
-    /// A scene without lights, and with the camera of its name or one that sees all of it.
-    pub(super) fn new(name: String, parts: Vec<Mesh>, instances: Vec<Instance>) -> Instances {
-        let camera = cameras::known(&name).unwrap_or_else(|| cameras::around(&bounds(&parts, &instances)));
+    /// A scene without lights, and with the camera of its name or else one for its box.
+    pub(super) fn new(
+        name: String,
+        parts: Vec<Mesh>,
+        instances: Vec<Instance>,
+        camera: impl Fn(&Aabb) -> Camera,
+    ) -> Instances {
+        let camera = cameras::known(&name).unwrap_or_else(|| camera(&bounds(&parts, &instances)));
         Instances { name, parts, instances, camera, lights: Vec::new() }
     }
 
@@ -101,16 +106,29 @@ impl Instances {
 }
 
 fn bounds(parts: &[Mesh], instances: &[Instance]) -> Aabb {
-    let boxes: Vec<Aabb> = parts.iter().map(Mesh::bounds).collect();
-    instances.iter().fold(Aabb::EMPTY, |bounds, instance| {
-        let part = &parts[instance.part as usize];
-        // Most instances cannot reach beyond those before them, and their vertices need not be asked.
-        if part.triangles.is_empty() || contains(&bounds, &instance.place_box(&boxes[instance.part as usize])) {
+    let corners: Vec<Vec<[f32; 3]>> = parts.iter().map(corners).collect();
+    let boxes: Vec<Aabb> = corners.iter().map(|corners| Aabb::around(corners)).collect();
+    let with = |bounds: Aabb, instance: &Instance, corners: &[[f32; 3]]| {
+        corners.iter().fold(bounds, |bounds, &corner| bounds.union(&Aabb::around(&[instance.place(corner)])))
+    };
+    // A corner of each instance, that most of them need not be asked for their others: those that cannot reach further out.
+    let core = instances.iter().fold(Aabb::EMPTY, |bounds, instance| {
+        with(bounds, instance, corners[instance.part as usize].get(..1).unwrap_or_default())
+    });
+    instances.iter().fold(core, |bounds, instance| {
+        let part = instance.part as usize;
+        if corners[part].is_empty() || contains(&bounds, &instance.place_box(&boxes[part])) {
             return bounds;
         }
-        let corners = part.triangles.iter().flatten().map(|&v| part.positions[v as usize]);
-        corners.fold(bounds, |bounds, corner| bounds.union(&Aabb::around(&[instance.place(corner)])))
+        with(bounds, instance, &corners[part])
     })
+}
+
+/// The vertices that triangles use, each once.
+fn corners(mesh: &Mesh) -> Vec<[f32; 3]> {
+    let mut is_used = vec![false; mesh.positions.len()];
+    mesh.triangles.iter().flatten().for_each(|&v| is_used[v as usize] = true);
+    mesh.positions.iter().zip(is_used).filter_map(|(&p, is_used)| is_used.then_some(p)).collect()
 }
 
 fn contains(outer: &Aabb, inner: &Aabb) -> bool {
@@ -133,16 +151,15 @@ pub fn load_instances(spec: &str, options: &LoadOptions<'_>) -> Result<Instances
 
 /// The scene, if it is one of instances.
 pub(super) fn placed(spec: &str, options: &LoadOptions<'_>) -> Result<Option<Instances>> {
-    if spec.starts_with("gen:") {
-        return Ok(None);
+    let instances = if let Some(generated) = generators::Generated::find(spec)? {
+        generated.instances()
+    } else {
+        let path = lookup::find(spec, &options.folders)?;
+        let is_inst = lookup::format_of(&path).as_deref() == Some("inst");
+        is_inst.then(|| inst::read(&path, options)).transpose()?
+    };
+    if instances.as_ref().is_some_and(|instances| instances.triangle_count() == 0) {
+        return Err(no_triangles(spec));
     }
-    let path = lookup::find(spec, &options.folders)?;
-    if lookup::format_of(&path).as_deref() != Some("inst") {
-        return Ok(None);
-    }
-    let instances = inst::read(&path, options)?;
-    if instances.triangle_count() == 0 {
-        return Err(super::no_triangles(spec));
-    }
-    Ok(Some(instances))
+    Ok(instances)
 }

@@ -1,8 +1,11 @@
-//! Scenes: triangles, a camera and lights, from files or generators. What measuring needs and nothing else.
+//! Scenes: triangles, placed parts or moving ones, a camera and lights, from files or generators. What measuring needs and
+//! nothing else.
 //!
 //! [`load`] takes what a user types: the path of a file, the bare name of one in a folder of scenes, or a generator.
 //! Every file may also lie there packed, with `.zst` behind its name. Triangles keep the order of the file, polygons are
 //! fan-triangulated from their first vertex; the position of a triangle in that order is its primitive index everywhere.
+//! Instances come flattened and animations stand still in their first frame, unless [`load_instances`] or
+//! [`load_animation`] ask for all of it.
 
 mod animation;
 mod cameras;
@@ -23,6 +26,7 @@ use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 pub use animation::{Animation, load_animation};
+pub use generators::generators;
 pub use instances::{Instance, Instances, load_instances};
 pub use lookup::{list, own_folders};
 pub use random::SplitMix64;
@@ -112,7 +116,7 @@ struct Content {
 }
 
 /// Loads the scene that `spec` names: a path, the bare name of a file in one of the folders, or a generator
-/// (`gen:icosphere:6`). Instances are flattened; [`load_instances`] keeps them.
+/// (`gen:icosphere:6`).
 ///
 /// # Errors
 /// [`Error::Scene`] if there is no such scene or it has no triangles, [`Error::Malformed`] with file, line or item and the
@@ -122,8 +126,8 @@ pub fn load(spec: &str, options: &LoadOptions<'_>) -> Result<Scene> {
         let mesh = scene.flatten()?;
         return Ok(Scene { name: scene.name, mesh, camera: scene.camera, lights: scene.lights });
     }
-    let (name, content) = if let Some(generator) = spec.strip_prefix("gen:") {
-        (spec.to_owned(), Content { mesh: generators::generate(spec, generator)?, ..Content::default() })
+    let (name, content) = if let Some(generated) = generators::Generated::find(spec)? {
+        (spec.to_owned(), Content { mesh: generated.mesh().unwrap_or_default(), ..Content::default() })
     } else {
         let path = lookup::find(spec, &options.folders)?;
         (lookup::name_of(&path), read(&path, options)?)
