@@ -6,7 +6,7 @@
 mod files;
 
 use files::{Folder, load, pack};
-use hedgerow::scene::{self, LoadOptions, Progress};
+use hedgerow::scene::{self, Animation, LoadOptions, Progress};
 use proptest::prelude::*;
 use std::cell::Cell;
 
@@ -40,10 +40,18 @@ fn square_anim(frames: u32) -> Vec<u8> {
 }
 
 fn refused(name: &str, bytes: &[u8]) -> String {
+    refused_by(load, name, bytes)
+}
+
+fn refused_by<T: std::fmt::Debug>(load: impl Fn(&str) -> hedgerow::Result<T>, name: &str, bytes: &[u8]) -> String {
     let folder = Folder::new();
     let path = folder.bytes(name, bytes);
     let message = load(&path).expect_err(name).to_string();
     message.strip_prefix(&path).unwrap_or_else(|| panic!("{message} does not begin with the file")).to_owned()
+}
+
+fn load_animation(spec: &str) -> hedgerow::Result<Animation> {
+    scene::load_animation(spec, &LoadOptions::default())
 }
 
 #[test]
@@ -101,6 +109,64 @@ fn binary_files_that_are_cut_off_say_what_is_missing() {
     assert!(refused("walk.anim", &square_anim(0)).contains("no frames"));
     // A head that promises 4 billion vertices must not take the memory for them.
     assert!(refused("huge.tri", &[0xff; 64]).contains("is it cut off?"));
+}
+
+#[test]
+fn every_frame_of_an_animation_is_read() {
+    let folder = Folder::new();
+    for path in [folder.bytes("walk.anim", &square_anim(3)), folder.bytes("walk.anim.zst", &pack(&square_anim(3)))] {
+        let walk = load_animation(&path).expect(&path);
+        assert_eq!((walk.name.as_str(), walk.frames.len()), ("walk", 3));
+        assert_eq!(walk.triangles, [[0, 1, 2], [0, 2, 3]]);
+        for frame in 0..3 {
+            // Each frame is the square, moved by its number along all axes.
+            let by = frame as f32;
+            let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| [x + by, y + by, by]);
+            assert_eq!(walk.mesh(frame).positions, corners);
+        }
+        assert_eq!((walk.bounds().lo, walk.bounds().hi), ([0.0; 3], [3.0, 3.0, 2.0]));
+        assert_eq!(walk.mesh(0).positions, load(&path).expect(&path).mesh.positions);
+    }
+    let known = load_animation(&folder.bytes("pigman_run.anim", &square_anim(1))).expect("one frame");
+    assert_eq!((known.camera.eye, known.camera.fov), ([2.0, 2.0, 3.0], 40.0));
+}
+
+#[test]
+fn animations_that_are_broken_in_any_frame_are_told_so() {
+    let refused = |bytes: &[u8]| refused_by(load_animation, "walk.anim", bytes);
+    let anim = square_anim(3);
+    for length in 0..anim.len() {
+        let message = refused(&anim[..length]);
+        assert!(message.starts_with(": ends before ") && message.ends_with("is it cut off?"), "{length}: {message}");
+    }
+    assert!(refused(&anim[..anim.len() - 1]).contains("frame 2 (from 0) of 3"));
+    assert!(refused(&[anim.clone(), vec![0]].concat()).starts_with(": goes on behind its last frame"));
+    assert!(refused(&square_anim(0)).starts_with(": no frames; an animation needs at least one"));
+    let mut wrong = anim.clone();
+    wrong[12..16].copy_from_slice(&4_u32.to_le_bytes());
+    assert_eq!(refused(&wrong), ": triangle 0 names vertex 4 (both from 0), there are 4; is it cut off?");
+    let mut wrong = anim.clone();
+    let second_vertex_of_the_last_frame = anim.len() - 3 * 12;
+    wrong[second_vertex_of_the_last_frame..][..4].copy_from_slice(&f32::INFINITY.to_le_bytes());
+    let message = refused(&wrong);
+    assert!(message.starts_with(": frame 2 (from 0) of 3: vertex 1 (from 0) is (inf, 2, 2)"), "{message}");
+    // The first frame alone is in order, and all that a still picture reads.
+    assert!(load(&Folder::new().bytes("walk.anim", &wrong)).is_ok());
+    // Four billion frames of no vertices are no reason to take memory for them.
+    let nothing: Vec<u8> = [0, 0, u32::MAX].iter().flat_map(|w: &u32| w.to_le_bytes()).collect();
+    assert_eq!(refused(&nothing), ": no triangles; a scene needs at least one");
+}
+
+#[test]
+fn what_is_no_animation_is_told_so() {
+    let folder = Folder::new();
+    let square = folder.bytes("square.tri", &square_tri());
+    for spec in [square.as_str(), "gen:icosphere:1", "gen:forest:3"] {
+        let message = load_animation(spec).expect_err(spec).to_string();
+        let expected = ": not an animation; take an .anim file or gen:twist:N:FRAMES";
+        assert_eq!(message.strip_prefix(spec), Some(expected));
+    }
+    assert!(load_animation("none.anim").expect_err("missing").to_string().contains("there is no scene \"none.anim\""));
 }
 
 #[test]
@@ -204,6 +270,9 @@ proptest! {
             bytes[at] = byte;
         }
         bytes.truncate(length.index(bytes.len()) + 1);
-        let _ = load(&Folder::new().bytes(name, &bytes));
+        let folder = Folder::new();
+        let path = folder.bytes(name, &bytes);
+        let _ = load(&path);
+        let _ = load_animation(&path);
     }
 }

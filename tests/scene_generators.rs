@@ -65,6 +65,42 @@ fn a_stadium_is_a_fine_object_in_a_huge_coarse_one() {
 }
 
 #[test]
+fn a_twisted_column_is_closed_and_has_about_as_many_triangles_as_asked() {
+    for asked in [12_usize, 13, 50, 100, 1_000, 20_000] {
+        let scene = generate(&format!("gen:twist:{asked}:2"));
+        let count = scene.mesh.triangles.len();
+        assert!(count.abs_diff(asked) as f64 <= (asked as f64).sqrt(), "{asked}: {count}");
+        let edges = edges(&scene);
+        assert!(edges.iter().all(|(&[a, b], &n)| n == 1 && edges.get(&[b, a]) == Some(&1)), "{asked}");
+        // A square of side 1, 4 high.
+        assert!((six_volumes(&scene) - 24.0).abs() < 1e-3, "{asked}: {}", six_volumes(&scene));
+        let bounds = scene.mesh.bounds();
+        assert_eq!((bounds.lo, bounds.hi), ([-0.5, 0.0, -0.5], [0.5, 4.0, 0.5]));
+    }
+}
+
+#[test]
+fn the_column_is_turned_by_height_and_frame_up_to_once_round() {
+    const FRAMES: usize = 9;
+    let options = LoadOptions::default();
+    let twist = scene::load_animation("gen:twist:2000:9", &options).expect("a generator");
+    assert_eq!((twist.name.as_str(), twist.frames.len()), ("gen:twist:2000:9", FRAMES));
+    let still = generate("gen:twist:2000:9").mesh;
+    assert_eq!((&twist.mesh(0).positions, &twist.triangles), (&still.positions, &still.triangles));
+    for (number, frame) in twist.frames.iter().enumerate() {
+        assert_eq!(frame.len(), still.positions.len());
+        for (&[x, y, z], &[tx, ty, tz]) in still.positions.iter().zip(frame) {
+            let angle = std::f32::consts::TAU * number as f32 / (FRAMES - 1) as f32 * y / 4.0;
+            let (s, c) = angle.sin_cos();
+            assert_eq!(y, ty);
+            assert!((tx - (c * x - s * z)).abs() < 1e-6 && (tz - (s * x + c * z)).abs() < 1e-6, "{number} {x} {y} {z}");
+        }
+    }
+    let alone = scene::load_animation("gen:twist:2000:1", &options).expect("one frame");
+    assert_eq!(alone.frames, [still.positions]);
+}
+
+#[test]
 fn too_many_triangles_and_wrong_arguments_are_refused_with_the_usage() {
     for spec in [
         "gen:",
@@ -81,17 +117,34 @@ fn too_many_triangles_and_wrong_arguments_are_refused_with_the_usage() {
         "gen:grid:99999999999999",
         "gen:stadium:4294967299",
         "gen:needles:5:x",
+        "gen:forest",
+        "gen:forest:-1",
+        "gen:cells:8:1",
+        "gen:city:16777216",
+        "gen:cables:99999999999",
+        "gen:twist:100",
+        "gen:twist:11:5",
+        "gen:twist:100:0",
+        "gen:twist:1000000:1000",
     ] {
-        let error = scene::load(spec, &LoadOptions::default()).expect_err(spec);
-        assert!(matches!(error, Error::Argument(_)), "{spec}: {error:?}");
-        let message = error.to_string();
-        assert!(message.starts_with(spec) && message.contains("gen:"), "{message}");
+        let options = LoadOptions::default();
+        for error in [
+            scene::load(spec, &options).expect_err(spec),
+            scene::load_instances(spec, &options).expect_err(spec),
+            scene::load_animation(spec, &options).expect_err(spec),
+        ] {
+            assert!(matches!(error, Error::Argument(_)), "{spec}: {error:?}");
+            let message = error.to_string();
+            assert!(message.starts_with(spec) && message[spec.len()..].contains("gen:"), "{message}");
+        }
     }
 }
 
 #[test]
 fn nothing_is_no_scene() {
-    for spec in ["gen:soup:0:1", "gen:grid:0", "gen:needles:0:1"] {
+    for spec in
+        ["gen:soup:0:1", "gen:grid:0", "gen:needles:0:1", "gen:forest:0", "gen:city:0", "gen:cables:0", "gen:cells:0"]
+    {
         let error = scene::load(spec, &LoadOptions::default()).expect_err(spec);
         assert!(error.to_string().contains("no triangles"), "{error}");
     }

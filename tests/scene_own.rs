@@ -29,6 +29,13 @@ fn every_scene_loads_with_the_triangles_that_its_readme_says() {
 }
 
 #[test]
+fn every_generator_that_the_readme_names_is_there() {
+    let named: Vec<&str> = README.split('`').filter(|words| words.starts_with("gen:") && words.len() > 4).collect();
+    let known: Vec<&str> = scene::generators().map(|(name, _)| name).collect();
+    assert!(named.len() >= 5 && named.iter().all(|name| known.contains(name)), "{named:?} {known:?}");
+}
+
+#[test]
 fn the_folder_stays_small() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let sizes: Vec<u64> = std::fs::read_dir(folder)

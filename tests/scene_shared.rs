@@ -37,11 +37,10 @@ fn every_shared_scene_loads_whole() {
     };
     let options = LoadOptions { folders: vec![folder.clone()], progress: None };
     let listed = scene::list(&folder).expect("HEDGEROW_SCENES can be read");
+    let is_there =
+        |file: &str| listed.iter().any(|path| path.file_name().is_some_and(|f| f.to_string_lossy().starts_with(file)));
     for (name, triangles) in TRIANGLES {
-        if !listed
-            .iter()
-            .any(|path| path.file_name().is_some_and(|f| f.to_string_lossy().starts_with(&format!("{name}."))))
-        {
+        if !is_there(&format!("{name}.")) {
             eprintln!("skipped: {name} is not in the folder");
             continue;
         }
@@ -50,5 +49,17 @@ fn every_shared_scene_loads_whole() {
         println!("{name}: {triangles} triangles in {:.2} s", start.elapsed().as_secs_f64());
         assert_eq!(scene.name, name);
         assert_eq!(scene.mesh.triangles.len(), triangles, "{name}");
+    }
+    // The one scene of instances, its parts as the table of files counts them, and the animations' frames.
+    if is_there("forest.inst") {
+        let forest = scene::load_instances("forest", &options).expect("forest");
+        let parts: usize = forest.parts.iter().map(|part| part.triangles.len()).sum();
+        assert_eq!((forest.parts.len(), parts, forest.instances.len()), (3, 282_724, 2_221));
+        assert_eq!(forest.triangle_count(), 6_568_212);
+    }
+    for (name, frames) in [("soldier_run", 20), ("clocktower_twist", 24), ("pigman_run", 24)] {
+        if is_there(name) {
+            assert_eq!(scene::load_animation(name, &options).expect(name).frames.len(), frames, "{name}");
+        }
     }
 }

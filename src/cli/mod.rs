@@ -14,6 +14,7 @@ mod trace;
 mod work;
 
 use crate::measure::builders;
+use crate::scene;
 use clap::Parser;
 use std::process::ExitCode;
 
@@ -42,13 +43,13 @@ enum Command {
 }
 
 fn after_help() -> String {
-    builders::help() + SCENES
+    let generators = scene::generators().map(|(name, what)| format!("\n  {name:18} {what}"));
+    builders::help() + SCENES + &generators.collect::<String>()
 }
 
 const SCENES: &str = "
 A scene is a file (.obj, .ply, .gltf, .glb, .tri, .anim, .inst, each also with .zst behind), the bare name of one in
-scenes/ or in the folder of --scenes-dir, or a generator: gen:icosphere:N, gen:soup:N:SEED, gen:grid:N, gen:stadium:N,
-gen:needles:N:SEED.";
+scenes/ or in the folder of --scenes-dir, or a generator:";
 
 /// Runs the command that the arguments name.
 pub fn main() -> ExitCode {

@@ -59,6 +59,14 @@ pub(super) fn around(bounds: &Aabb) -> Camera {
     Camera { eye, look, up: Y, fov: FOV }
 }
 
+/// A camera just outside a corner of the box, the one of the greatest coordinates, that looks through its middle: scenes of
+/// many things scattered fill the picture from here, some near and some far. y is up.
+pub(super) fn from_corner(bounds: &Aabb) -> Camera {
+    let (look, extent) = (bounds.centroid(), bounds.extent());
+    let eye = std::array::from_fn(|i| look[i] + 0.55 * extent[i]);
+    Camera { eye, look, up: Y, fov: 60.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

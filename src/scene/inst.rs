@@ -1,35 +1,37 @@
 //! `.inst`: placed copies of the objects of an OBJ file, one a line: the object's `o` name and a row-major 3×4
 //! object-to-world matrix; `#` begins a comment. `NAME.inst` places the objects of `NAME_parts.obj` beside it.
-//! Flattened in the order of the file.
 
-use super::{LoadOptions, Mesh, check, lookup, obj, source};
+use super::{Instance, Instances, LoadOptions, Mesh, cameras, check, lookup, obj, source};
+use crate::bvh::layout::Aabb;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// Reads the instances and writes every copy out.
-pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> {
+/// Reads the instances, in the order of the file; the objects become its parts, in theirs. A name that several objects bear
+/// places them all.
+pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Instances> {
     let text = source::bytes(path, options)?;
     let parts_path = parts_of(path)?;
-    let parts = obj::read_objects(&parts_path, options)?;
-    let mut mesh = Mesh::default();
+    let (names, parts): (Vec<String>, Vec<Mesh>) = obj::read_objects(&parts_path, options)?.into_iter().unzip();
+    let boxes: Vec<Aabb> = parts.iter().map(|part| Aabb::around(&part.positions)).collect();
+    let mut instances = Vec::new();
     for (line, text) in (1..).zip(String::from_utf8_lossy(&text).lines()) {
         let place = format!("{}:{line}", path.display());
         let text = text.split_once('#').map_or(text, |(before, _)| before);
-        let Some((name, matrix)) = instance(&place, text)? else { continue };
-        let mut known = false;
-        for (_, part) in parts.iter().filter(|(part, _)| part == name) {
-            known = true;
-            append(&place, part, &matrix, &mut mesh)?;
+        let Some((name, transform)) = instance(&place, text)? else { continue };
+        let before = instances.len();
+        for part in (0..names.len()).filter(|&part| names[part] == name) {
+            let instance = Instance { part: part as u32, transform };
+            placed_is_finite(&place, &parts[part], &boxes[part], &instance)?;
+            instances.push(instance);
         }
-        if !known {
-            let names = parts.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
-            let parts = parts_path.display();
+        if instances.len() == before {
+            let (parts, names) = (parts_path.display(), names.join(", "));
             return Err(Error::Malformed(format!(
                 "{place}: {parts} has no object {name:?}, it has {names}; correct the name"
             )));
         }
     }
-    Ok(mesh)
+    Ok(Instances::new(lookup::name_of(path), parts, instances, cameras::around))
 }
 
 fn parts_of(path: &Path) -> Result<PathBuf> {
@@ -63,15 +65,13 @@ fn instance<'a>(place: &str, line: &'a str) -> Result<Option<(&'a str, Matrix)>>
     }
 }
 
-fn append(place: &str, part: &Mesh, matrix: &Matrix, mesh: &mut Mesh) -> Result<()> {
-    let first = mesh.positions.len();
-    check::vertices_can_be_counted(place, first + part.positions.len())?;
-    let rows = matrix.map(|row| row.map(f64::from));
-    mesh.positions.extend(part.positions.iter().map(|p| {
-        let [x, y, z] = p.map(f64::from);
-        rows.map(|[a, b, c, d]| (a * x + b * y + c * z + d) as f32)
-    }));
-    check::vertices_are_finite(place, &mesh.positions[first..])?;
-    mesh.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first as u32)));
-    Ok(())
+/// Every vertex is finite where the instance puts it; `bounds` is around all of them.
+fn placed_is_finite(place: &str, part: &Mesh, bounds: &Aabb, instance: &Instance) -> Result<()> {
+    // The corners of the box go as far as any vertex, so that the vertices are asked only to name the one at fault.
+    let Aabb { lo, hi } = instance.place_box(bounds);
+    if part.positions.is_empty() || lo.into_iter().chain(hi).all(f32::is_finite) {
+        return Ok(());
+    }
+    let placed: Vec<[f32; 3]> = part.positions.iter().map(|&p| instance.place(p)).collect();
+    check::vertices_are_finite(place, &placed)
 }

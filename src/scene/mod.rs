@@ -1,14 +1,19 @@
-//! Scenes: triangles, a camera and lights, from files or generators. What measuring needs and nothing else.
+//! Scenes: triangles, placed parts or moving ones, a camera and lights, from files or generators. What measuring needs and
+//! nothing else.
 //!
 //! [`load`] takes what a user types: the path of a file, the bare name of one in a folder of scenes, or a generator.
 //! Every file may also lie there packed, with `.zst` behind its name. Triangles keep the order of the file, polygons are
 //! fan-triangulated from their first vertex; the position of a triangle in that order is its primitive index everywhere.
+//! Instances come flattened and animations stand still in their first frame, unless [`load_instances`] or
+//! [`load_animation`] ask for all of it.
 
+mod animation;
 mod cameras;
 mod check;
 mod generators;
 mod gltf;
 mod inst;
+mod instances;
 mod lookup;
 mod obj;
 mod ply;
@@ -20,6 +25,9 @@ use crate::bvh::layout::Aabb;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
+pub use animation::{Animation, load_animation};
+pub use generators::generators;
+pub use instances::{Instance, Instances, load_instances};
 pub use lookup::{list, own_folders};
 pub use random::SplitMix64;
 
@@ -114,27 +122,34 @@ struct Content {
 /// [`Error::Scene`] if there is no such scene or it has no triangles, [`Error::Malformed`] with file, line or item and the
 /// remedy if the file is broken, [`Error::Argument`] if a generator's arguments are wrong.
 pub fn load(spec: &str, options: &LoadOptions<'_>) -> Result<Scene> {
-    let (name, content) = if let Some(generator) = spec.strip_prefix("gen:") {
-        (spec.to_owned(), Content { mesh: generators::generate(spec, generator)?, ..Content::default() })
+    if let Some(scene) = instances::placed(spec, options)? {
+        let mesh = scene.flatten()?;
+        return Ok(Scene { name: scene.name, mesh, camera: scene.camera, lights: scene.lights });
+    }
+    let (name, content) = if let Some(generated) = generators::Generated::find(spec)? {
+        (spec.to_owned(), Content { mesh: generated.mesh().unwrap_or_default(), ..Content::default() })
     } else {
         let path = lookup::find(spec, &options.folders)?;
         (lookup::name_of(&path), read(&path, options)?)
     };
     let Content { mesh, camera, lights } = content;
     if mesh.triangles.is_empty() {
-        return Err(Error::Scene(format!("{spec}: no triangles; a scene needs at least one")));
+        return Err(no_triangles(spec));
     }
     let camera = camera.or_else(|| cameras::known(&name)).unwrap_or_else(|| cameras::around(&mesh.bounds()));
     Ok(Scene { name, mesh, camera, lights })
 }
 
-/// Reads a file of any of the formats.
+fn no_triangles(spec: &str) -> Error {
+    Error::Scene(format!("{spec}: no triangles; a scene needs at least one"))
+}
+
+/// Reads a file of any of the formats that hold a mesh.
 fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Content> {
     let mesh = match lookup::format_of(path).as_deref() {
         Some("obj") => obj::read(path, options)?,
         Some("ply") => ply::read(path, options)?,
         Some("gltf" | "glb") => return gltf::read(path, options),
-        Some("inst") => inst::read(path, options)?,
         Some("tri") => tri::read_tri(path, options)?,
         Some("anim") => tri::read_anim(path, options)?,
         _ => {

@@ -14,20 +14,36 @@ pub(super) fn read_tri(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> {
     let [vertices, triangles] = words.head(["vertex count", "triangle count"])?;
     let positions = words.triples(vertices, "vertices", f32::from_bits)?;
     let triangles = words.triples(triangles, "triangles", |word| word)?;
-    words.end()?;
+    words.end("triangle")?;
     checked(path, Mesh { positions, triangles })
 }
 
 /// Reads the first frame of an `.anim` file.
 pub(super) fn read_anim(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> {
     let mut words = Words { path, reader: source::open(path, options)? };
-    let [vertices, triangles, frames] = words.head(["vertex count", "triangle count", "frame count"])?;
-    if frames == 0 {
-        return Err(Error::Malformed(format!("{}: no frames; an animation needs at least one", path.display())));
-    }
-    let triangles = words.triples(triangles, "triangles", |word| word)?;
+    let ([vertices, _], triangles) = words.anim_topology()?;
     let positions = words.triples(vertices, "vertices of the first frame", f32::from_bits)?;
     checked(path, Mesh { positions, triangles })
+}
+
+/// The triangles and the positions in each frame.
+pub(super) type Frames = (Vec<[u32; 3]>, Vec<Vec<[f32; 3]>>);
+
+/// Reads all frames of an `.anim` file.
+pub(super) fn read_frames(path: &Path, options: &LoadOptions<'_>) -> Result<Frames> {
+    let mut words = Words { path, reader: source::open(path, options)? };
+    let ([vertices, count], triangles) = words.anim_topology()?;
+    check::indices_are_in_range(path.display(), &triangles, vertices as usize)?;
+    let mut frames = Vec::new();
+    // Frames without vertices take no bytes: a wrong count of them would not be seen at the end of the file.
+    for frame in 0..if vertices == 0 { 0 } else { count } {
+        let place = format!("frame {frame} (from 0) of {count}");
+        let positions = words.triples(vertices, &format!("vertices of {place}"), f32::from_bits)?;
+        check::vertices_are_finite(format_args!("{}: {place}", path.display()), &positions)?;
+        frames.push(positions);
+    }
+    words.end("frame")?;
+    Ok((triangles, frames))
 }
 
 fn checked(path: &Path, mesh: Mesh) -> Result<Mesh> {
@@ -53,6 +69,16 @@ impl Words<'_> {
         Ok(words)
     }
 
+    /// The head of an `.anim` file, as vertex count and frame count, and its triangles.
+    fn anim_topology(&mut self) -> Result<([u32; 2], Vec<[u32; 3]>)> {
+        let [vertices, triangles, frames] = self.head(["vertex count", "triangle count", "frame count"])?;
+        if frames == 0 {
+            let path = self.path.display();
+            return Err(Error::Malformed(format!("{path}: no frames; an animation needs at least one")));
+        }
+        Ok(([vertices, frames], self.triples(triangles, "triangles", |word| word)?))
+    }
+
     /// `count` triples of words. Memory grows with what is read, so that a wrong count in the head does not take it all.
     fn triples<T>(&mut self, count: u32, what: &str, value: impl Fn(u32) -> T) -> Result<Vec<[T; 3]>> {
         const AT_ONCE: usize = 1 << 16;
@@ -69,12 +95,12 @@ impl Words<'_> {
         Ok(triples)
     }
 
-    /// Nothing may follow.
-    fn end(&mut self) -> Result<()> {
+    /// Nothing may follow the `last` item.
+    fn end(&mut self, last: &str) -> Result<()> {
         match self.reader.read(&mut [0]) {
             Ok(0) => Ok(()),
             Ok(_) => Err(Error::Malformed(format!(
-                "{}: goes on behind its last triangle; its counts are wrong, write it again",
+                "{}: goes on behind its last {last}; its counts are wrong, write it again",
                 self.path.display()
             ))),
             Err(error) => Err(source::read_error(self.path, error)),

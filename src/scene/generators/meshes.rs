@@ -1,60 +1,22 @@
-//! Scenes that need no file: `gen:NAME:ARGUMENTS`. Deterministic: the same name gives the same bytes everywhere.
+//! Plain meshes: spheres, squares, an arena, and triangles anywhere.
 
-use super::{Mesh, SplitMix64};
-use crate::{Error, Result};
+use super::vector::{add, cross, dot, unit};
+use crate::scene::{Mesh, SplitMix64};
 use std::collections::HashMap;
 use std::f32::consts::TAU;
 
-/// The most triangles that the engine's primitives are made for.
-const MOST_TRIANGLES: u64 = 1 << 27;
+/// How many triangles an [`icosphere`] has.
+pub fn icosphere_triangles(levels: u64) -> Option<u64> {
+    u32::try_from(levels).ok().and_then(|levels| 4_u64.checked_pow(levels)).and_then(|faces| faces.checked_mul(20))
+}
 
-/// Makes the mesh of `gen:…`; `arguments` is what stands behind `gen:` in `spec`.
-pub(super) fn generate(spec: &str, arguments: &str) -> Result<Mesh> {
-    let mut parts = arguments.split(':');
-    let name = parts.next().unwrap_or_default();
-    let numbers: Vec<&str> = parts.collect();
-    let (usage, count): (&str, usize) = match name {
-        "icosphere" => ("gen:icosphere:N (20*4^N triangles)", 1),
-        "soup" => ("gen:soup:N:SEED (N triangles)", 2),
-        "grid" => ("gen:grid:N (2*N*N triangles)", 1),
-        "stadium" => ("gen:stadium:N (20*4^N triangles in a coarse arena)", 1),
-        "needles" => ("gen:needles:N:SEED (N triangles)", 2),
-        _ => {
-            return Err(Error::Argument(format!(
-                "{spec}: there is no such generator; there are gen:icosphere:N, gen:soup:N:SEED, gen:grid:N, gen:stadium:N \
-                 and gen:needles:N:SEED"
-            )));
-        }
-    };
-    let wrong = || Error::Argument(format!("{spec}: not the arguments of this generator; write {usage}"));
-    if numbers.len() != count {
-        return Err(wrong());
-    }
-    let n: u64 = numbers[0].parse().map_err(|_| wrong())?;
-    let seed: u64 = numbers.get(1).map_or(Ok(0), |seed| seed.parse()).map_err(|_| wrong())?;
-    let triangles = match name {
-        "icosphere" | "stadium" => {
-            u32::try_from(n).ok().and_then(|n| 4_u64.checked_pow(n)).and_then(|f| f.checked_mul(20))
-        }
-        "grid" => n.checked_mul(n).and_then(|cells| cells.checked_mul(2)),
-        _ => Some(n),
-    };
-    if triangles.is_none_or(|t| t > MOST_TRIANGLES) {
-        return Err(Error::Argument(format!(
-            "{spec}: more than {MOST_TRIANGLES} triangles; take a smaller N of {usage}"
-        )));
-    }
-    Ok(match name {
-        "icosphere" => icosphere(n as u32),
-        "soup" => soup(n as u32, seed),
-        "grid" => grid(n as u32),
-        "stadium" => stadium(n as u32),
-        _ => needles(n as u32, seed),
-    })
+/// How many triangles a [`grid`] has.
+pub fn grid_triangles(side: u64) -> Option<u64> {
+    side.checked_mul(side).and_then(|cells| cells.checked_mul(2))
 }
 
 /// The unit sphere: an icosahedron whose triangles are cut in four `levels` times. Closed, 20·4^levels triangles.
-fn icosphere(levels: u32) -> Mesh {
+pub fn icosphere(levels: u32) -> Mesh {
     let golden = (1.0 + 5_f32.sqrt()) / 2.0;
     let mut positions = Vec::new();
     // Three golden rectangles, one in each plane: (0, ±1, ±golden) and its rotations.
@@ -63,7 +25,7 @@ fn icosphere(levels: u32) -> Mesh {
             let mut corner = [0.0; 3];
             corner[(axis + 1) % 3] = a;
             corner[(axis + 2) % 3] = b;
-            positions.push(on_unit_sphere(corner));
+            positions.push(unit(corner));
         }
     }
     let mut triangles = icosahedron_faces(&positions);
@@ -74,7 +36,7 @@ fn icosphere(levels: u32) -> Mesh {
             let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|edge| {
                 *midpoints.entry([edge[0].min(edge[1]), edge[0].max(edge[1])]).or_insert_with(|| {
                     let [p, q] = edge.map(|v| positions[v as usize]);
-                    positions.push(on_unit_sphere(std::array::from_fn(|i| p[i] + q[i])));
+                    positions.push(unit(std::array::from_fn(|i| p[i] + q[i])));
                     positions.len() as u32 - 1
                 })
             });
@@ -104,7 +66,7 @@ fn icosahedron_faces(corners: &[[f32; 3]]) -> Vec<[u32; 3]> {
 }
 
 /// Small triangles anywhere: centres uniform in the unit cube, each corner within ±0.02 of its centre.
-fn soup(count: u32, seed: u64) -> Mesh {
+pub fn soup(count: u32, seed: u64) -> Mesh {
     let mut random = SplitMix64::new(seed);
     separate(count, || {
         let centre = random.point(0.0, 1.0);
@@ -113,7 +75,7 @@ fn soup(count: u32, seed: u64) -> Mesh {
 }
 
 /// A flat square of `side` × `side` unit cells in the plane y = 0, two triangles each, row by row.
-fn grid(side: u32) -> Mesh {
+pub fn grid(side: u32) -> Mesh {
     let corners = side + 1;
     let positions = (0..corners * corners).map(|v| [(v % corners) as f32, 0.0, (v / corners) as f32]).collect();
     let triangles = (0..side * side).flat_map(|cell| {
@@ -125,7 +87,7 @@ fn grid(side: u32) -> Mesh {
 
 /// A fine object in a huge coarse one ("teapot in a stadium"): the unit [`icosphere`] on the floor of an arena of
 /// 800 triangles, 2,000 across, off its middle.
-fn stadium(levels: u32) -> Mesh {
+pub fn stadium(levels: u32) -> Mesh {
     const SECTORS: u32 = 80;
     // Radius and height of each ring of the arena, from the floor's middle to the top of the stands.
     const RINGS: [[f32; 2]; 6] =
@@ -152,7 +114,7 @@ fn stadium(levels: u32) -> Mesh {
 }
 
 /// Long thin triangles anywhere: middles uniform in the unit cube, directions uniform, 0.2 to 1 long, a thousandth wide.
-fn needles(count: u32, seed: u64) -> Mesh {
+pub fn needles(count: u32, seed: u64) -> Mesh {
     let mut random = SplitMix64::new(seed);
     separate(count, || {
         let middle = random.point(0.0, 1.0);
@@ -179,24 +141,7 @@ fn direction(random: &mut SplitMix64) -> [f32; 3] {
         let p = random.point(-1.0, 1.0);
         let square = dot(p, p);
         if (0.01..=1.0).contains(&square) {
-            return on_unit_sphere(p);
+            return unit(p);
         }
     }
-}
-
-fn on_unit_sphere(p: [f32; 3]) -> [f32; 3] {
-    let length = dot(p, p).sqrt();
-    p.map(|c| c / length)
-}
-
-fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    std::array::from_fn(|i| a[i] + b[i])
-}
-
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

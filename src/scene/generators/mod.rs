@@ -1,0 +1,175 @@
+//! Scenes that need no file: `gen:NAME:ARGUMENTS`. The same name gives the same scene every time.
+
+mod cables;
+mod cells;
+mod city;
+mod forest;
+mod meshes;
+mod prism;
+mod series;
+mod tube;
+mod turns;
+mod twist;
+mod vector;
+
+use super::{Animation, Instance, Instances, Mesh, cameras};
+use crate::{Error, Result};
+
+/// The most triangles that the engine's primitives are made for.
+pub(super) const MOST_TRIANGLES: u64 = 1 << 27;
+/// The most instances: what every Vulkan driver with acceleration structures takes.
+const MOST_INSTANCES: u64 = (1 << 24) - 1;
+
+/// One generator.
+struct Generator {
+    /// The name with its arguments: N, and perhaps a second one.
+    pattern: &'static str,
+    /// What N means.
+    what: &'static str,
+    recipe: Recipe,
+}
+
+/// How a scene is made of N and of the second argument (0 where there is none).
+#[derive(Clone, Copy)]
+enum Recipe {
+    /// Triangles for an N (none: too many to be counted), and the mesh.
+    Mesh(fn(u64) -> Option<u64>, fn(u32, u64) -> Mesh),
+    /// Parts and where they stand, N of them.
+    Instances(fn(u32) -> Placed),
+    /// The mesh of about N triangles in its first frame, and where its vertices are in each of so many frames.
+    Animation(fn(u32) -> Mesh, fn(&Mesh, u32) -> Vec<Vec<[f32; 3]>>),
+}
+
+/// Parts and their instances.
+type Placed = (Vec<Mesh>, Vec<Instance>);
+
+const GENERATORS: [Generator; 10] = [
+    Generator {
+        pattern: "gen:icosphere:N",
+        what: "a sphere of 20*4^N triangles",
+        recipe: Recipe::Mesh(meshes::icosphere_triangles, |n, _| meshes::icosphere(n)),
+    },
+    Generator {
+        pattern: "gen:soup:N:SEED",
+        what: "N small triangles anywhere",
+        recipe: Recipe::Mesh(Some, meshes::soup),
+    },
+    Generator {
+        pattern: "gen:grid:N",
+        what: "a flat square of 2*N*N triangles",
+        recipe: Recipe::Mesh(meshes::grid_triangles, |n, _| meshes::grid(n)),
+    },
+    Generator {
+        pattern: "gen:stadium:N",
+        what: "a sphere of 20*4^N triangles in a huge coarse arena",
+        recipe: Recipe::Mesh(meshes::icosphere_triangles, |n, _| meshes::stadium(n)),
+    },
+    Generator {
+        pattern: "gen:needles:N:SEED",
+        what: "N long thin triangles anywhere",
+        recipe: Recipe::Mesh(Some, meshes::needles),
+    },
+    Generator {
+        pattern: "gen:forest:N",
+        what: "N instances of 3 trees whose crowns reach into each other",
+        recipe: Recipe::Instances(forest::place),
+    },
+    Generator {
+        pattern: "gen:city:N",
+        what: "N instances of L- and U-shaped blocks, each in the notch of another, none touching",
+        recipe: Recipe::Instances(city::place),
+    },
+    Generator {
+        pattern: "gen:cables:N",
+        what: "N instances of 4 long thin cables that hang across the scene",
+        recipe: Recipe::Instances(cables::place),
+    },
+    Generator {
+        pattern: "gen:cells:N",
+        what: "N instances of 3 spheres in a grid, each in a cell of its own",
+        recipe: Recipe::Instances(cells::place),
+    },
+    Generator {
+        pattern: "gen:twist:N:FRAMES",
+        what: "an animation: a column of about N (12 or more) triangles, twisted once round over the frames",
+        recipe: Recipe::Animation(twist::column, twist::frames),
+    },
+];
+
+/// The least side of a square (2 dimensions) or cube (3) of at least `count` cells.
+fn side_of(count: u32, dimensions: u32) -> u32 {
+    (0..).find(|side: &u32| side.pow(dimensions) >= count).unwrap_or_default()
+}
+
+/// The generators that [`load`](super::load) knows: the name with its arguments, and what it makes.
+pub fn generators() -> impl Iterator<Item = (&'static str, &'static str)> {
+    GENERATORS.iter().map(|generator| (generator.pattern, generator.what))
+}
+
+/// A generator with its arguments, of a size that can be made.
+pub(super) struct Generated {
+    name: String,
+    recipe: Recipe,
+    n: u32,
+    second: u64,
+}
+
+impl Generated {
+    /// What `spec` names; `None` if it is no generator's name at all (without `gen:`).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the usage.
+    pub fn find(spec: &str) -> Result<Option<Generated>> {
+        if !spec.starts_with("gen:") {
+            return Ok(None);
+        }
+        let words: Vec<&str> = spec.split(':').collect();
+        let Some(generator) = GENERATORS.iter().find(|g| g.pattern.split(':').nth(1) == Some(words[1])) else {
+            let patterns = GENERATORS.map(|g| g.pattern).join(", ");
+            return Err(Error::Argument(format!("{spec}: there is no such generator; there are {patterns}")));
+        };
+        let Generator { pattern, what, recipe } = *generator;
+        let usage = format!("{pattern} ({what})");
+        let wrong = || Error::Argument(format!("{spec}: not the arguments of this generator; write {usage}"));
+        if words.len() != pattern.split(':').count() {
+            return Err(wrong());
+        }
+        let n: u64 = words[2].parse().map_err(|_| wrong())?;
+        let second: u64 = words.get(3).map_or(Ok(0), |word| word.parse()).map_err(|_| wrong())?;
+        let (size, most, unit) = match recipe {
+            Recipe::Mesh(triangles, _) => (triangles(n), MOST_TRIANGLES, "triangles"),
+            Recipe::Instances(_) => (Some(n), MOST_INSTANCES, "instances"),
+            Recipe::Animation(..) if n < twist::LEAST_TRIANGLES || second == 0 => return Err(wrong()),
+            Recipe::Animation(..) => (n.checked_mul(second), MOST_TRIANGLES, "triangles in all frames together"),
+        };
+        if size.is_none_or(|size| size > most) {
+            return Err(Error::Argument(format!("{spec}: more than {most} {unit}; take a smaller N of {usage}")));
+        }
+        // What is counted is at least N, except for the exponents, which are smaller still.
+        Ok(Some(Generated { name: spec.to_owned(), recipe, n: n as u32, second }))
+    }
+
+    /// The mesh, if it is one; of an animation the first frame.
+    pub fn mesh(&self) -> Option<Mesh> {
+        match self.recipe {
+            Recipe::Mesh(_, make) => Some(make(self.n, self.second)),
+            Recipe::Animation(first, _) => Some(first(self.n)),
+            Recipe::Instances(_) => None,
+        }
+    }
+
+    /// The instances, if it is a scene of such.
+    pub fn instances(&self) -> Option<Instances> {
+        let Recipe::Instances(place) = self.recipe else { return None };
+        let (parts, instances) = place(self.n);
+        Some(Instances::new(self.name.clone(), parts, instances, cameras::from_corner))
+    }
+
+    /// The animation, if it is one.
+    pub fn animation(&self) -> Option<Animation> {
+        let Recipe::Animation(first, frames) = self.recipe else { return None };
+        let mesh = first(self.n);
+        let frames = frames(&mesh, self.second as u32);
+        Some(Animation::new(self.name.clone(), mesh.triangles, frames))
+    }
+}
