@@ -48,6 +48,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
     Some(match room {
         "accel" if is("entries") => accel::push_constants::entries(),
         "accel" if is("geometries") => accel::push_constants::geometries(),
+        "accel" if is("rebraid") => accel::push_constants::rebraid(),
         "accel" if is("ranges") => accel::push_constants::ranges(),
         "bvh" if is("lbvh_workgroup") => bvh::lbvh_workgroup::push_constants(),
         "bvh" if is("lbvh") => bvh::lbvh::push_constants(),
@@ -59,6 +60,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "gpu" if is("scan") => gpu::scan::push_constants(),
         "trace" if is("tracer") => trace::tracer::push_constants(),
         "measure" if is("copy") => measure::copy::push_constants(),
+        "measure" if is("query") => measure::peers::driver::push_constants(),
         "measure" if is("ray_query") => measure::peers::driver::push_constants(),
         _ => return None,
     })

@@ -6,7 +6,7 @@ use common::backends::{Backend, backends, is_new_lavapipe};
 use common::probe::{CONFIRM, CONFIRM_ODD, IGNORE, ProbeRay, Report, TERMINATE, flags};
 use common::shapes::{Random, soup};
 use common::world::{Part, World, inverse, transformed};
-use hedgerow::accel::Instance;
+use hedgerow::accel::{Instance, REBRAID};
 use hedgerow::ash::vk;
 use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
 
@@ -188,8 +188,15 @@ fn every_flag_and_decision_is_reported_as_by_brute_force() {
     ];
     for backend in backends() {
         let mut hits = 0;
-        for (by_pointers, seed) in [(false, 1), (true, 2)] {
+        for (by_pointers, seed, rebraids) in [(false, 1, false), (true, 2, false), (false, 1, true), (true, 2, true)] {
             let mut world = World { by_pointers, ..world(seed) };
+            if rebraids {
+                // The flag is ours alone.
+                if backend.name() == "driver" {
+                    continue;
+                }
+                world.flags = REBRAID;
+            }
             if backend.name() == "driver" && is_new_lavapipe() {
                 world.instances.retain(|instance| instance.structure != 0);
             }

@@ -1,7 +1,8 @@
 // One query on its way through a top level and the structures below it: what trace/query.glsl is made of.
 //
-// The stack is one: the entries of the bottom-level structure at hand lie above those of the top level. Each round takes one
-// step (a node, a primitive, an instance, or what waits), so that invocations that do the same stay together.
+// The stack is one: the entries of the bottom-level structure at hand lie above those of the top level. Each round takes a step
+// of each kind that there is to take (what waits, an instance, a node, a primitive): invocations that wait for each other's steps
+// are fewer than with a loop for each kind.
 #ifndef HEDGEROW_TRACE_QUERY_WALK
 #define HEDGEROW_TRACE_QUERY_WALK
 #include "bvh/layout.glsl"
@@ -38,6 +39,14 @@ const uint HEDGEROW_NOTHING = 0xffffffffu;
 // Rounds after which a walk is given up: more than any tree of 2^27 records needs. A structure that was overwritten may be a
 // circle.
 const uint HEDGEROW_MOST_ROUNDS = 1u << 28;
+
+// A shader that defines HEDGEROW_COUNTS_WORK finds in `work` how many nodes of the top level, instances, nodes below and primitives
+// a query has met so far.
+#ifdef HEDGEROW_COUNTS_WORK
+#define HEDGEROW_COUNT(member) query.work.member += 1u
+#else
+#define HEDGEROW_COUNT(member)
+#endif
 
 struct HedgerowMeeting {
     uint type;
@@ -77,6 +86,9 @@ struct HedgerowRayQuery {
     float best;
     HedgerowMeeting candidate;
     HedgerowMeeting committed;
+#ifdef HEDGEROW_COUNTS_WORK
+    uvec4 work;
+#endif
 };
 
 vec3 hedgerow_transformed(vec4 rows[3], vec4 p) {
@@ -117,6 +129,9 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.best = ray.t_max;
     query.candidate = nothing;
     query.committed = nothing;
+#ifdef HEDGEROW_COUNTS_WORK
+    query.work = uvec4(0u);
+#endif
     hedgerow_end(query);
     query.index = 0u;
     query.top_slots = 0u;
@@ -199,6 +214,10 @@ void hedgerow_visit(inout HedgerowRayQuery query) {
         query.left = HEDGEROW_NOTHING;
         return;
     }
+#ifdef HEDGEROW_COUNTS_WORK
+    if (query.kind == KIND_INSTANCES) query.work.x += 1u;
+    else query.work.z += 1u;
+#endif
     Node node = Structure(query.structure).nodes[query.index];
     Child a = node.left, b = node.right;
     bool enters_a, enters_b;
@@ -222,6 +241,7 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     Instance instance = Instances(records_at(query.top, query.top_slots)).instance[at];
     uint flags = instance.offset_and_flags >> 24;
     if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
+    HEDGEROW_COUNT(y);
     Header header = Structure(instance.structure).header;
     HedgerowRay ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
                                   hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
@@ -314,6 +334,7 @@ bool hedgerow_test(inout HedgerowRayQuery query) {
     uint at = query.index;
     query.index++;
     query.left = query.left == 1u ? HEDGEROW_NOTHING : query.left - 1u;
+    HEDGEROW_COUNT(w);
     // A stale structure may name records that there are not.
     if (at >= query.records) return false;
     return query.kind == KIND_BOXES ? hedgerow_test_box(query, at) : hedgerow_test_triangle(query, at);
@@ -334,17 +355,18 @@ bool hedgerow_go_on(inout HedgerowRayQuery query) {
     return true;
 }
 
+bool hedgerow_has_record(HedgerowRayQuery query) {
+    return query.left != 0u && query.left != HEDGEROW_NOTHING;
+}
+
 bool hedgerow_proceed(inout HedgerowRayQuery query) {
     for (uint round = 0u; round < HEDGEROW_MOST_ROUNDS; ++round) {
-        if (query.left == HEDGEROW_NOTHING) {
+        while (query.left == HEDGEROW_NOTHING) {
             if (!hedgerow_go_on(query)) return false;
-        } else if (query.left == 0u) {
-            hedgerow_visit(query);
-        } else if (query.kind == KIND_INSTANCES) {
-            hedgerow_enter_instance(query);
-        } else if (hedgerow_test(query)) {
-            return true;
         }
+        if (hedgerow_has_record(query) && query.kind == KIND_INSTANCES) hedgerow_enter_instance(query);
+        if (query.left == 0u) hedgerow_visit(query);
+        if (hedgerow_has_record(query) && query.kind != KIND_INSTANCES && hedgerow_test(query)) return true;
     }
     return false;
 }

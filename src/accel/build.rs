@@ -2,10 +2,11 @@
 
 use super::geometry::{self, Given};
 use super::instances::{ENTRY_BYTES, entries_step};
+use super::rebraid::Rebraid;
 use super::{Options, REBRAID};
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
-use crate::bvh::lbvh::{self, Job, Lbvh, Sizes};
+use crate::bvh::lbvh::{self, INSTANCE_POINTERS, Job, Lbvh, Sizes};
 use crate::bvh::sah::Collapse;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Context, Kernel, Step, shaders};
@@ -44,11 +45,13 @@ pub(super) struct Build {
     counts: Counts,
     /// Most primitives of all geometries.
     primitive_count: u32,
+    rebraid: Option<Rebraid>,
 }
 
 /// Where the parts of the scratch memory begin.
 struct Scratch {
     entries: u64,
+    rebraid: u64,
     builder: u64,
 }
 
@@ -69,10 +72,12 @@ impl Build {
             return Err(Error::Argument("flags ask for a fast trace and for a fast build; take one".into()));
         }
         let primitive_count = u32::try_from(primitive_count).unwrap_or(u32::MAX);
-        let entries = match given {
-            Given::Instances { .. } => options.entries(info.flags, primitive_count),
-            _ => primitive_count,
+        let opens = info.flags.contains(REBRAID) && !info.flags.contains(Flags::ALLOW_UPDATE);
+        let rebraid = match given {
+            Given::Instances { .. } if opens => Some(options.rebraid(primitive_count)),
+            _ => None,
         };
+        let entries = rebraid.map_or(primitive_count, |rebraid| rebraid.capacity);
         let primitives = given.primitives();
         let lbvh_options = lbvh::Options {
             codes: Some(codes(info.flags, entries)),
@@ -84,7 +89,7 @@ impl Build {
             ..lbvh::Options::DEFAULT
         };
         let lbvh = Lbvh::new(context, &lbvh_options, entries)?;
-        Ok(Build { lbvh, given, counts, primitive_count })
+        Ok(Build { lbvh, given, counts, primitive_count, rebraid })
     }
 
     /// Bytes of structure and scratch memory that suffice for it and for the same with fewer primitives.
@@ -125,7 +130,12 @@ impl Build {
                     Counts::OnDevice { address, .. } => address,
                 };
                 let (count, capacity) = (self.primitive_count, self.lbvh.count());
-                vec![vec![entries_step(context, *data, *pointers, parts.entries, ranges, count, capacity)]]
+                let mut steps = vec![entries_step(context, *data, *pointers, parts.entries, ranges, count, capacity)];
+                if let Some(rebraid) = &self.rebraid {
+                    let formats = if *pointers { INSTANCE_POINTERS } else { 0 };
+                    steps.extend(rebraid.steps(context, *data, formats, count, parts.entries, parts.rebraid));
+                }
+                vec![steps]
             }
             Given::Triangles(geometries) | Given::Boxes(geometries) => match self.counts {
                 Counts::Told if geometries.len() < 2 => Vec::new(),
@@ -155,13 +165,14 @@ impl Build {
 
     /// The parts of scratch memory: records of the geometries with one more that may end them, or entries; then the builder's.
     fn scratch(&self, begin: u64) -> Scratch {
-        let before = match &self.given {
+        let records = match &self.given {
             Given::Instances { .. } => u64::from(self.lbvh.count()) * ENTRY_BYTES,
             Given::Triangles(geometries) | Given::Boxes(geometries) => {
                 (geometries.len() as u64 + 1) * size_of::<Geometry>() as u64
             }
         };
-        Scratch { entries: begin, builder: begin + before.next_multiple_of(SCRATCH_ALIGNMENT) }
+        let rebraid = begin + records.next_multiple_of(SCRATCH_ALIGNMENT);
+        Scratch { entries: begin, rebraid, builder: rebraid + self.rebraid.map_or(0, |r| r.scratch_bytes()) }
     }
 }
 

@@ -25,12 +25,14 @@ mod build;
 mod device;
 mod geometry;
 mod instances;
+mod rebraid;
 
 pub use build::SCRATCH_ALIGNMENT;
 pub use device::{Device, STRUCTURE_ALIGNMENT};
 pub use instances::Instance;
 
 use ash::vk;
+use rebraid::Rebraid;
 
 /// A build flag of ours: a top level may open instances (Benthin, Woop, Wald 2017), within [`Options::rebraid_budget`].
 pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAccelerationStructureFlagsKHR::from_raw(1 << 30);
@@ -40,18 +42,20 @@ pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAcceleratio
 pub struct Options {
     /// Entries of a top level that is built with [`REBRAID`], as a multiple of its instances: at least 1.
     pub rebraid_budget: f32,
+    /// How much area the parts of an opened entry may have together, as a multiple of the entry's: at 1, only entries whose
+    /// boxes are loose are opened; above, those whose parts overlap, too.
+    pub rebraid_tolerance: f32,
 }
 
 impl Options {
     /// Twice as many entries as instances.
-    pub const DEFAULT: Options = Options { rebraid_budget: 2.0 };
+    pub const DEFAULT: Options = Options { rebraid_budget: 2.0, rebraid_tolerance: 1.0 };
 
-    /// Entries that a top level of so many instances has room for.
-    fn entries(&self, flags: vk::BuildAccelerationStructureFlagsKHR, instance_count: u32) -> u32 {
-        let opens = flags.contains(REBRAID) && !flags.contains(vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE);
-        let budget = if opens { f64::from(self.rebraid_budget.max(1.0)) } else { 1.0 };
+    /// The opening of a top level of so many instances.
+    fn rebraid(&self, instance_count: u32) -> Rebraid {
         // What is too much is refused by the builder.
-        (f64::from(instance_count) * budget).ceil() as u32
+        let capacity = (f64::from(instance_count) * f64::from(self.rebraid_budget.max(1.0))).ceil() as u32;
+        Rebraid { capacity, tolerance: self.rebraid_tolerance }
     }
 }
 
@@ -65,4 +69,5 @@ impl Default for Options {
 pub(crate) mod push_constants {
     pub(crate) use super::build::{push_constants as geometries, ranges_push_constants as ranges};
     pub(crate) use super::instances::push_constants as entries;
+    pub(crate) use super::rebraid::push_constants as rebraid;
 }

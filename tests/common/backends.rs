@@ -120,6 +120,7 @@ struct RayQuery {
     structure: u64,
     rays: u64,
     hits: u64,
+    works: u64,
     first: u32,
     count: u32,
 }
@@ -195,7 +196,8 @@ impl Backend for Drivers {
         let ray_buffer = device().upload("rays", rays).expect("memory");
         let hits = device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
         let structure = self.address(top.structure);
-        let arguments = RayQuery { structure, rays: ray_buffer.address(), hits: hits.address(), first: 0, count };
+        let arguments =
+            RayQuery { structure, rays: ray_buffer.address(), hits: hits.address(), works: 0, first: 0, count };
         let kernel = Kernel::new(&shaders::MEASURE_RAY_QUERY, 64, &[0]);
         device().run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(64))).expect("it traces");
         let hits = hits.read(rays.len());
