@@ -56,23 +56,23 @@ struct Scratch {
 }
 
 impl Build {
-    /// What `info` asks for over the primitives `given`, at most `primitive_count` in all.
+    /// A build with these flags over the primitives `given`, at most `primitive_count` in all.
     pub fn new(
         context: &Context,
         options: &Options,
-        info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+        flags: Flags,
         given: Given,
         counts: Counts,
         primitive_count: u64,
     ) -> Result<Build> {
-        if !KNOWN_FLAGS.contains(info.flags) {
-            return Err(Error::Argument(format!("flags are {:?}; take some of {KNOWN_FLAGS:?}", info.flags)));
+        if !KNOWN_FLAGS.contains(flags) {
+            return Err(Error::Argument(format!("flags are {flags:?}; take some of {KNOWN_FLAGS:?}")));
         }
-        if info.flags.contains(Flags::PREFER_FAST_TRACE | Flags::PREFER_FAST_BUILD) {
+        if flags.contains(Flags::PREFER_FAST_TRACE | Flags::PREFER_FAST_BUILD) {
             return Err(Error::Argument("flags ask for a fast trace and for a fast build; take one".into()));
         }
         let primitive_count = u32::try_from(primitive_count).unwrap_or(u32::MAX);
-        let opens = info.flags.contains(REBRAID) && !info.flags.contains(Flags::ALLOW_UPDATE);
+        let opens = flags.contains(REBRAID) && !flags.contains(Flags::ALLOW_UPDATE);
         let rebraid = match given {
             Given::Instances { .. } if opens => Some(options.rebraid(primitive_count)),
             _ => None,
@@ -80,16 +80,22 @@ impl Build {
         let entries = rebraid.map_or(primitive_count, |rebraid| rebraid.capacity);
         let primitives = given.primitives();
         let lbvh_options = lbvh::Options {
-            codes: Some(codes(info.flags, entries)),
+            codes: Some(codes(flags, entries)),
             // An instance costs more than a node whatever its box: one a leaf.
             collapse: if primitives == Primitives::Instances { Collapse::OFF } else { Collapse::SAH },
             primitives,
             geometry_count: given.count(),
-            build_flags: info.flags.as_raw() & 0x1f,
+            build_flags: flags.as_raw() & 0x1f,
             ..lbvh::Options::DEFAULT
         };
         let lbvh = Lbvh::new(context, &lbvh_options, entries)?;
         Ok(Build { lbvh, given, counts, primitive_count, rebraid })
+    }
+
+    /// Bytes of structure and scratch memory that it needs.
+    pub fn sizes(&self) -> Sizes {
+        let sizes = self.lbvh.sizes();
+        Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
     }
 
     /// Bytes of structure and scratch memory that suffice for it and for the same with fewer primitives.

@@ -2,7 +2,7 @@
 //!
 //! [`Device`] stands where an engine has `ash::khr::acceleration_structure::Device`: the same methods take the same structs
 //! of [`ash::vk`] and record compute dispatches. What the structs can ask for and is not there is refused with an error that
-//! names the field.
+//! names the field. Who does not come from those structs asks by a [`Request`].
 //!
 //! A handle is the structure's device address, in the type that the structs want: it owns nothing, and lives as long as the
 //! buffer that it lies in. That buffer needs `STORAGE_BUFFER` and `SHADER_DEVICE_ADDRESS` usage, and so does scratch memory,
@@ -22,14 +22,17 @@
 //! | [`REBRAID`] | a top level opens instances whose boxes are loose |
 
 mod build;
+mod checked;
 mod device;
 mod geometry;
 mod instances;
 mod rebraid;
+mod request;
 
 pub use build::SCRATCH_ALIGNMENT;
 pub use device::{Device, STRUCTURE_ALIGNMENT};
 pub use instances::Instance;
+pub use request::{Placement, Request, RequestSizes};
 
 use ash::vk;
 use rebraid::Rebraid;
@@ -45,11 +48,18 @@ pub struct Options {
     /// How much area the parts of an opened entry may have together, as a multiple of the entry's: at 1, only entries whose
     /// boxes are loose are opened; above, those whose parts overlap, too.
     pub rebraid_tolerance: f32,
+    /// Whether calls look at what takes memory of what was created and built, as Vulkan's validation would: memory that is too
+    /// small or overlaps, misaligned data, updates without the flag or of changed counts. They return an error before anything
+    /// is recorded. Structures must then be created, built and destroyed through this device and its clones. For debugging:
+    /// each call takes a lock.
+    pub checked: bool,
 }
 
 impl Options {
-    /// Twice as many entries as instances.
-    pub const DEFAULT: Options = Options { rebraid_budget: 2.0, rebraid_tolerance: 1.0 };
+    /// Twice as many entries as instances; no checks.
+    pub const DEFAULT: Options = Options { rebraid_budget: 2.0, rebraid_tolerance: 1.0, checked: false };
+    /// The same with checks.
+    pub const CHECKED: Options = Options { checked: true, ..Options::DEFAULT };
 
     /// The opening of a top level of so many instances.
     fn rebraid(&self, instance_count: u32) -> Rebraid {

@@ -16,14 +16,14 @@ type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
 type Sizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
 
 /// Who builds.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 enum Maker<'a> {
     Ours(accel::Device<'a>),
     Driver(&'a ash::khr::acceleration_structure::Device),
 }
 
 /// Structures of one maker.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Structures<'a> {
     device: &'a Device,
     maker: Maker<'a>,
@@ -118,7 +118,7 @@ impl<'a> Structures<'a> {
         let structure = self.create(&create)?;
         // The largest alignment that a driver may ask for.
         let scratch = self.device.buffer("scratch", sizes.build_scratch_size.max(sizes.update_scratch_size) + 256)?;
-        Ok(Placed { owner: *self, structure, sizes, scratch, _memory: memory })
+        Ok(Placed { owner: self.clone(), structure, sizes, scratch, _memory: memory })
     }
 }
 
@@ -264,7 +264,7 @@ impl<'a> Levels<'a> {
             info = info.src_acceleration_structure(self.top.structure);
         }
         let range = [Range::default().primitive_count(self.count)];
-        let structures = self.structures;
+        let structures = &self.structures;
         structures.device.run(Some(&mut self.timestamps), |recorder| {
             recorder.phase("build");
             structures.build(recorder, &[info], &[&range])
