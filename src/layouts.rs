@@ -50,6 +50,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "accel" if is("geometries") => accel::push_constants::geometries(),
         "accel" if is("rebraid") => accel::push_constants::rebraid(),
         "accel" if is("ranges") => accel::push_constants::ranges(),
+        "bvh" if is("compact") => bvh::compact::push_constants(),
         "bvh" if is("lbvh_workgroup") => bvh::lbvh_workgroup::push_constants(),
         "bvh" if is("lbvh") => bvh::lbvh::push_constants(),
         "bvh" if is("quality") => bvh::quality::push_constants(),
