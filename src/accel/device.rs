@@ -17,7 +17,7 @@ pub const STRUCTURE_ALIGNMENT: u64 = 256;
 /// what is wrong instead of leaving it to the validation layers.
 #[derive(Clone, Copy)]
 pub struct Device<'a> {
-    context: &'a Context,
+    pub(super) context: &'a Context,
     options: Options,
 }
 
