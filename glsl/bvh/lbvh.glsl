@@ -14,6 +14,7 @@
 #include "gpu/task_pool.glsl"
 #include "gpu/radix_sort.glsl"
 #include "bvh/layout.glsl"
+#include "bvh/empty.glsl"
 #include "bvh/primitives.glsl"
 #include "bvh/codes.glsl"
 
@@ -154,11 +155,6 @@ float scaled_half_area(Box b, float scale) {
     return area;
 }
 
-void mark_unused(Structure structure, uint slot) {
-    Child unused = Child(uintBitsToFloat(uvec3(0x7F800000u)), NONE, uintBitsToFloat(uvec3(0xFF800000u)), NONE);
-    structure.nodes[slot] = Node(unused, unused);
-}
-
 // The flags of all geometries in one word; where there are several, the structure's table is written.
 uint write_geometries(Geometry g, uint count, uint node_slots) {
     if (!has_records()) return SOURCE == SOURCE_ENTRIES ? 0 : flags_of(g) | flags_of(g) << 8;
@@ -180,12 +176,11 @@ void lbvh_plan() {
     Structure structure = Structure(structure_address);
     uint slots = max(primitive_count, 2) - 1;
     uint bits = kind_of_codes().bits;
-    Child empty = Child(uintBitsToFloat(uvec3(0x7F800000u)), 0, uintBitsToFloat(uvec3(0xFF800000u)), 0);
     structure.header.magic = MAGIC;
     structure.header.kind = kind_of_records();
     structure.header.status = state.status;
     structure.header.primitive_count = primitive_count;
-    structure.header.root = empty;
+    structure.header.root = empty_root();
     structure.header.active_count = state.active_count;
     structure.header.node_slots = slots;
     structure.header.code_bits = bits;

@@ -19,10 +19,10 @@ pub const STRUCTURE_ALIGNMENT: u64 = 256;
 /// what is wrong instead of leaving it to the validation layers.
 #[derive(Clone)]
 pub struct Device<'a> {
-    context: &'a Context,
+    pub(super) context: &'a Context,
     options: Options,
     /// Where [`Options::checked`] asks for it; shared with clones.
-    checks: Option<Arc<Checks>>,
+    pub(super) checks: Option<Arc<Checks>>,
 }
 
 impl<'a> Device<'a> {

@@ -10,6 +10,9 @@
 //! want the stage `ACCELERATION_STRUCTURE_BUILD` in a barrier, these want `COMPUTE_SHADER` with `SHADER_READ` and
 //! `SHADER_WRITE`.
 //!
+//! A structure is copied, compacted, kept in a file and brought back by the calls of the extension ([`serialize`]); what the
+//! device knows of it is a [`Property`], written to an address instead of a query pool.
+//!
 //! The build flags, and what each changes:
 //!
 //! | flag | |
@@ -23,15 +26,20 @@
 
 mod build;
 mod checked;
+mod copy;
 mod device;
 mod geometry;
+mod given;
 mod instances;
+mod properties;
 mod rebraid;
 mod request;
+pub mod serialize;
 
 pub use build::SCRATCH_ALIGNMENT;
 pub use device::{Device, STRUCTURE_ALIGNMENT};
 pub use instances::Instance;
+pub use properties::Property;
 pub use request::{Placement, Request, RequestSizes};
 
 use ash::vk;
@@ -78,6 +86,9 @@ impl Default for Options {
 #[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
 pub(crate) mod push_constants {
     pub(crate) use super::build::{push_constants as geometries, ranges_push_constants as ranges};
+    pub(crate) use super::copy::push_constants as copy;
     pub(crate) use super::instances::push_constants as entries;
+    pub(crate) use super::properties::push_constants as properties;
     pub(crate) use super::rebraid::push_constants as rebraid;
+    pub(crate) use super::serialize::push_constants as serialize;
 }

@@ -11,12 +11,15 @@
 //!
 //! A [`Child`] names either an inner node (`count` 0) or a leaf: `count` records from `index` on, in the *primitive order*,
 //! which is the order of the records: [`Triangle`]s, [`BoxRecord`]s or, of a top level, [`Instance`]s. A slot that no child
-//! names is unused: the `count` of its left child is [`UNUSED`], and nothing else of it means anything.
+//! names is unused: the `count` of its left child is [`UNUSED`], and nothing else of it means anything. The slots from
+//! `active` − 1 on are unused.
 
 use bytemuck::{Pod, Zeroable};
 
 /// The first word of a structure.
 pub const MAGIC: u32 = u32::from_le_bytes(*b"hdgr");
+/// The version of the layout: the low half of every [`Record::KIND`].
+pub const VERSION: u32 = Triangle::KIND & 0xFFFF;
 /// The left child's `count` of a slot that no child names.
 pub const UNUSED: u32 = u32::MAX;
 /// Where the nodes begin.
@@ -265,13 +268,13 @@ pub struct Header {
     pub kind: u32,
     /// Bits of [`status`].
     pub status: u32,
-    /// Primitives of the input, and records.
+    /// Records: one a primitive of the input; of a compacted structure those of the tree.
     pub primitive_count: u32,
     /// The root, with the box of the whole scene. Of an empty structure: an empty box, index 0, count 0 and `active` 0.
     pub root: Child,
     /// Primitives in the tree: those of the input that are finite and whose indices are in range.
     pub active: u32,
-    /// Node slots there are: `primitive_count` − 1, at least 1; of a compacted structure those that are used.
+    /// Node slots there are: `primitive_count` − 1, at least 1; of a compacted structure `inner_nodes`, at least 1.
     pub node_slots: u32,
     /// Code bits that the builder sorted by.
     pub code_bits: u32,
@@ -336,6 +339,16 @@ pub const fn sizes_with(record_bytes: u64, node_slots: u32, primitive_count: u32
     Sizes { records_offset, geometries_offset, bytes }
 }
 
+/// Bytes of a record of this [`Record::KIND`]; `None` where there is no such kind.
+pub const fn record_bytes(kind: u32) -> Option<u64> {
+    match kind {
+        Triangle::KIND => Some(size_of::<Triangle>() as u64),
+        BoxRecord::KIND => Some(size_of::<BoxRecord>() as u64),
+        Instance::KIND => Some(size_of::<Instance>() as u64),
+        _ => None,
+    }
+}
+
 /// Node slots that `primitive_count` records need at most.
 pub const fn node_slots(primitive_count: u32) -> u32 {
     if primitive_count < 2 { 1 } else { primitive_count - 1 }
@@ -343,6 +356,7 @@ pub const fn node_slots(primitive_count: u32) -> u32 {
 
 const _: () = assert!(size_of::<Header>() == 128 && size_of::<Node>() == 64 && size_of::<Triangle>() == 40);
 const _: () = assert!(size_of::<BoxRecord>() == 28 && size_of::<Instance>() == 128);
+const _: () = assert!(BoxRecord::KIND & 0xFFFF == VERSION && Instance::KIND & 0xFFFF == VERSION);
 
 /// A structure on the host, read back or built there.
 #[derive(Debug, Clone)]

@@ -1,6 +1,7 @@
 //! Bounding volume hierarchies: codes, node layouts, builders on the device, and their twins on the host.
 
 pub mod codes;
+pub mod compact;
 pub mod geometry;
 pub mod host;
 pub mod layout;
