@@ -41,6 +41,17 @@ pub fn soup(count: usize, size: f32, seed: u64) -> Corners {
         .collect()
 }
 
+/// `count` boxes with edges of up to `size` that begin in the cube −1..1, by their least and greatest corners.
+pub fn boxes(count: usize, size: f32, seed: u64) -> Vec<[[f32; 3]; 2]> {
+    let mut random = Random(seed);
+    (0..count)
+        .map(|_| {
+            let (at, size) = (random.point(1.0), random.point(size).map(f32::abs));
+            [at, add(at, size)]
+        })
+        .collect()
+}
+
 /// A closed mesh of 20·4^`levels` triangles with corners on the sphere around the origin.
 pub fn icosphere(levels: u32) -> Corners {
     let golden = (1.0 + 5f32.sqrt()) / 2.0;
