@@ -24,9 +24,10 @@
 // An invocation has one query at a time, unless the shader defines HEDGEROW_QUERIES, the number of those that live at the same
 // time, before it includes this file, and begins the others with `hedgerowRayQueryInitializeAt(query, n, …)`, n from 1 on.
 //
-// A triangle is hit when t_min < t < t_max; of equally near ones that of the lower instance, then of the lower primitive. A
-// walk ends for every input: rays that are no rays (NaN, infinite, no direction) hit nothing, and so does what is empty or
-// cannot be used by its status (src/bvh/layout.rs).
+// A triangle is hit when t_min < t < t_max; of equally near ones that of the lower instance, then of the lower primitive. A box
+// is a candidate where the ray is in it anywhere from t_min to t_max, both included. A walk ends for every input: rays that are
+// no rays (NaN, infinite, no direction) hit nothing, and so does what is empty or cannot be used by its status
+// (src/bvh/layout.rs).
 #ifndef HEDGEROW_TRACE_QUERY
 #define HEDGEROW_TRACE_QUERY
 
