@@ -35,9 +35,8 @@ const uint HEDGEROW_MET_BOX = 2u;
 
 // In place of a leaf's count: nothing at hand, take what waits.
 const uint HEDGEROW_NOTHING = 0xffffffffu;
-// Rounds after which a walk is given up: more than any tree of 2^27 records needs. A structure that was overwritten may be a
-// circle.
-const uint HEDGEROW_MOST_ROUNDS = 1u << 28;
+// As many nodes and records as a structure may have.
+const uint HEDGEROW_MOST = 1u << 27;
 
 struct HedgerowMeeting {
     uint type;
@@ -75,6 +74,9 @@ struct HedgerowRayQuery {
     uint left;
     uint level;
     float best;
+    // Rounds until the walk is given up, in the structure at hand and in the top level behind it.
+    uint rounds;
+    uint top_rounds;
     HedgerowMeeting candidate;
     HedgerowMeeting committed;
 };
@@ -89,6 +91,12 @@ vec3 hedgerow_transformed(vec4 rows[3], vec4 p) {
 bool hedgerow_can_be_traced(Header header) {
     bool known = header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || header.kind == KIND_INSTANCES;
     return header.magic == MAGIC && known && header.active_count != 0u && (header.status & STATUS_UNUSABLE) == 0u;
+}
+
+// More rounds than the walk of a structure takes: each node and each record is seen once and may wait once. One that was
+// overwritten may be a circle.
+uint hedgerow_rounds(Header header) {
+    return 2u * (min(header.node_slots, HEDGEROW_MOST) + min(header.primitive_count, HEDGEROW_MOST)) + 4u;
 }
 
 bool hedgerow_skips(uint flags, uint kind) {
@@ -125,6 +133,8 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.records = 0u;
     query.kind = 0u;
     query.geometry_flags = 0u;
+    query.rounds = 0u;
+    query.top_rounds = 0u;
     if (all(equal(structure, uvec2(0)))) return;
     Header header = Structure(structure).header;
     query.top_slots = header.node_slots;
@@ -133,6 +143,7 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.records = header.primitive_count;
     query.kind = header.kind;
     query.geometry_flags = header.geometry_flags;
+    query.rounds = hedgerow_rounds(header);
     // As in Vulkan, a mask without bits lets the ray meet nothing.
     if (hedgerow_prepare(ray, header.root.lo, header.root.hi, query.prepared) && cull_mask != 0u &&
         hedgerow_can_be_traced(header) && !hedgerow_skips(flags, header.kind)) {
@@ -214,11 +225,17 @@ void hedgerow_visit(inout HedgerowRayQuery query) {
     query.left = enters_a || enters_b ? b_first ? b.count : a.count : HEDGEROW_NOTHING;
 }
 
+// To the next record of the leaf, if it and they are there: a stale structure may name records that there are not.
+void hedgerow_step(inout HedgerowRayQuery query) {
+    query.index++;
+    query.left = query.left == 1u || query.index >= query.records ? HEDGEROW_NOTHING : query.left - 1u;
+}
+
 // From the top level into an instance.
 void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     uint at = query.index;
-    query.index++;
-    query.left = query.left == 1u ? HEDGEROW_NOTHING : query.left - 1u;
+    hedgerow_step(query);
+    if (at >= query.records) return;
     Instance instance = Instances(records_at(query.top, query.top_slots)).instance[at];
     uint flags = instance.offset_and_flags >> 24;
     if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
@@ -231,7 +248,7 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
         return;
     }
     // The rest of the leaf waits.
-    if (query.left != HEDGEROW_NOTHING) {
+    if (query.left != HEDGEROW_NOTHING && query.level - query.floor < MAX_DEPTH) {
         hedgerow_put(query.level, HedgerowWaiting(query.index, query.left, -HEDGEROW_INFINITY));
         query.level++;
     }
@@ -239,6 +256,8 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     query.structure = instance.structure;
     query.slots = header.node_slots;
     query.records = header.primitive_count;
+    query.top_rounds = query.rounds;
+    query.rounds = hedgerow_rounds(header);
     query.is_below = true;
     query.kind = header.kind;
     query.geometry_flags = header.geometry_flags;
@@ -258,6 +277,7 @@ void hedgerow_leave_instance(inout HedgerowRayQuery query) {
     query.records = header.primitive_count;
     query.kind = query.top_kind;
     query.bottom = query.floor;
+    query.rounds = query.top_rounds;
     query.is_below = false;
 }
 
@@ -312,9 +332,7 @@ bool hedgerow_test_box(inout HedgerowRayQuery query, uint at) {
 
 bool hedgerow_test(inout HedgerowRayQuery query) {
     uint at = query.index;
-    query.index++;
-    query.left = query.left == 1u ? HEDGEROW_NOTHING : query.left - 1u;
-    // A stale structure may name records that there are not.
+    hedgerow_step(query);
     if (at >= query.records) return false;
     return query.kind == KIND_BOXES ? hedgerow_test_box(query, at) : hedgerow_test_triangle(query, at);
 }
@@ -335,7 +353,7 @@ bool hedgerow_go_on(inout HedgerowRayQuery query) {
 }
 
 bool hedgerow_proceed(inout HedgerowRayQuery query) {
-    for (uint round = 0u; round < HEDGEROW_MOST_ROUNDS; ++round) {
+    for (; query.rounds != 0u; --query.rounds) {
         if (query.left == HEDGEROW_NOTHING) {
             if (!hedgerow_go_on(query)) return false;
         } else if (query.left == 0u) {
