@@ -84,7 +84,7 @@ pub fn icosphere(levels: u32) -> Corners {
     faces
 }
 
-fn onto_sphere(p: [f32; 3]) -> [f32; 3] {
+pub fn onto_sphere(p: [f32; 3]) -> [f32; 3] {
     let length = p.iter().map(|x| x * x).sum::<f32>().sqrt();
     p.map(|x| x / length)
 }

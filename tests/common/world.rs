@@ -44,6 +44,37 @@ fn address(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
     vk::DeviceOrHostAddressConstKHR { device_address }
 }
 
+/// Vulkan's struct for instances, or pointers to them.
+pub fn instances_at(at: u64, by_pointers: bool) -> Geometry {
+    let instances =
+        vk::AccelerationStructureGeometryInstancesDataKHR::default().array_of_pointers(by_pointers).data(address(at));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { instances })
+}
+
+/// Builds a top level of them alone.
+pub fn top_level(
+    backend: &dyn Backend,
+    instances: &Geometry,
+    range: Range,
+    flags: vk::BuildAccelerationStructureFlagsKHR,
+) -> Built {
+    let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
+        .flags(flags)
+        .geometries(std::slice::from_ref(instances));
+    Built::new(backend, &info, &[range], 0)
+}
+
+/// Builds a bottom level of them alone.
+pub fn bottom_level(backend: &dyn Backend, geometries: &[Geometry], ranges: &[Range]) -> Built {
+    let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
+        .geometries(geometries);
+    Built::new(backend, &info, ranges, 0)
+}
+
 impl Part {
     /// Vulkan's structs over uploaded data.
     pub fn geometries(&self) -> (Vec<Geometry>, Vec<Range>, Vec<Buffer<'static>>) {
@@ -86,10 +117,7 @@ impl Part {
     /// Builds it alone.
     pub fn build(&self, backend: &dyn Backend) -> (Built, Vec<Buffer<'static>>) {
         let (geometries, ranges, memory) = self.geometries();
-        let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
-            .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
-            .geometries(&geometries);
-        (Built::new(backend, &info, &ranges, 0), memory)
+        (bottom_level(backend, &geometries, &ranges), memory)
     }
 }
 
@@ -129,19 +157,9 @@ impl World {
                 (0..placed.len() as u64).map(|i| instances.address() + i * size_of::<Instance>() as u64).collect();
             memory.push(std::mem::replace(&mut instances, device().upload("pointers", &pointers).expect("memory")));
         }
-        let data = vk::AccelerationStructureGeometryInstancesDataKHR::default()
-            .array_of_pointers(self.by_pointers)
-            .data(address(instances.address()));
-        let geometry = vk::AccelerationStructureGeometryKHR::default()
-            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
-            .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data });
-        let geometries = [geometry];
-        let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
-            .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
-            .flags(self.flags)
-            .geometries(&geometries);
+        let geometry = instances_at(instances.address(), self.by_pointers);
         let range = Range::default().primitive_count(placed.len() as u32);
-        let top = Built::new(backend, &info, &[range], 0);
+        let top = top_level(backend, &geometry, range, self.flags);
         BuiltWorld { top, parts, instances, geometry, _memory: memory }
     }
 
@@ -271,8 +289,8 @@ struct Line {
 
 impl Line {
     fn in_object(transform: &[[f32; 4]; 3], ray: &ProbeRay) -> Line {
-        let to_object = inverse(transform);
         let (origin, direction) = (ray.origin.map(f64::from), ray.direction.map(f64::from));
+        let to_object = inverse(transform);
         Line {
             origin: transformed(&to_object, origin, 1.0),
             direction: transformed(&to_object, direction, 0.0),
@@ -289,19 +307,20 @@ impl Line {
 }
 
 /// A generous bound on what float32 may lose in a few operations, relative to their terms.
-const PRECISION: f64 = 2e-6;
+const PRECISION: f64 = 3e-6;
 
-/// How far off float32 may be in the transform of a point (or, with w = 0, of a direction) to the space of an instance.
+/// How far off float32 may be in the transform of a point (or, with w = 0, of a direction) to the space of an instance: each
+/// row of the inverse is a product of two columns divided by the determinant, and lost digits of these.
 pub fn transform_error(to_world: &[[f32; 4]; 3], p: [f64; 3], w: f64) -> f64 {
-    let to_object = inverse(to_world);
-    let most = |m: &Matrix| m.iter().flat_map(|row| &row[..3]).fold(0f64, |a, b| a.max(b.abs()));
-    // The inverse was rounded, too.
-    let condition = most(&to_object) * most(&to_world.map(|row| row.map(f64::from)));
-    let terms = |row: [f64; 4]| (0..3).map(|k| (row[k] * p[k]).abs()).sum::<f64>() + (row[3] * w).abs();
-    PRECISION * condition * to_object.map(terms).iter().sum::<f64>()
+    let column = |k: usize| to_world.map(|row| f64::from(row[k]));
+    let columns = [column(0), column(1), column(2)];
+    let determinant = dot(columns[0], cross(columns[1], columns[2])).abs();
+    let lengths = columns.map(length);
+    let rows = lengths.map(|own| lengths[0] * lengths[1] * lengths[2] / own / determinant);
+    PRECISION * length(rows) * (length(p) + w * length(column(3)))
 }
 
-type Matrix = [[f64; 4]; 3];
+pub type Matrix = [[f64; 4]; 3];
 
 pub fn transformed(m: &Matrix, p: [f64; 3], w: f64) -> [f64; 3] {
     m.map(|[a, b, c, d]| a * p[0] + b * p[1] + c * p[2] + d * w)
@@ -388,6 +407,9 @@ fn triangle_met(triangle: &[[f32; 3]; 3], line: &Line) -> Option<Met> {
 /// The same for a box, which implementations may enlarge a little.
 fn box_met(corners: &[[f32; 3]; 2], line: &Line) -> Option<Met> {
     let corners = corners.map(|corner| corner.map(f64::from));
+    if corners[0][0].is_nan() {
+        return None;
+    }
     let farthest = if length(corners[0]) > length(corners[1]) { corners[0] } else { corners[1] };
     let until = length(minus(farthest, line.origin)) / length(line.direction);
     let error = line.error_at(until, farthest);
