@@ -362,7 +362,7 @@ fn what_cannot_be_built_is_refused_by_name() {
         change(&mut geometry[0]);
         geometry
     };
-    let aabbs = changed(|g| g.geometry_type = vk::GeometryTypeKHR::AABBS);
+    let instances = changed(|g| g.geometry_type = vk::GeometryTypeKHR::INSTANCES);
     let format = changed(|g| g.geometry.triangles.vertex_format = vk::Format::R8G8B8A8_UNORM);
     let indices = changed(|g| g.geometry.triangles.index_type = vk::IndexType::from_raw(77));
     let stride = changed(|g| g.geometry.triangles.vertex_stride = 13);
@@ -370,15 +370,16 @@ fn what_cannot_be_built_is_refused_by_name() {
     let both = BuildInfo { pp_geometries: &raw const info.p_geometries, ..info };
     let update = vk::BuildAccelerationStructureModeKHR::UPDATE;
     let one = [range];
-    let cases: [(BuildInfo<'_>, &[Range], &str); 12] = [
-        (info.ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL), &one, "type"),
+    let cases: [(BuildInfo<'_>, &[Range], &str); 13] = [
+        (info.ty(vk::AccelerationStructureTypeKHR::GENERIC), &one, "type"),
+        (info.ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL), &one, "geometryType"),
         (info.mode(update), &one, "mode"),
-        (info.flags(vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE), &one, "flags"),
+        (info.flags(vk::BuildAccelerationStructureFlagsKHR::MOTION_NV), &one, "flags"),
         (info.dst_acceleration_structure(vk::AccelerationStructureKHR::null()), &one, "dstAccelerationStructure"),
         (info.scratch_data(scratch(24)), &one, "scratchData"),
         (info.scratch_data(scratch(0)), &one, "scratchData"),
         (info, &[], "ranges"),
-        (with(aabbs.as_ptr()), &one, "geometryType"),
+        (with(instances.as_ptr()), &one, "geometryType"),
         (with(format.as_ptr()), &one, "vertexFormat"),
         (with(indices.as_ptr()), &one, "indexType"),
         (with(stride.as_ptr()), &one, "vertexStride"),

@@ -24,9 +24,10 @@
 // An invocation has one query at a time, unless the shader defines HEDGEROW_QUERIES, the number of those that live at the same
 // time, before it includes this file, and begins the others with `hedgerowRayQueryInitializeAt(query, n, …)`, n from 1 on.
 //
-// A triangle is hit when t_min < t < t_max; of equally near ones that of the lower instance, then of the lower primitive. A
-// walk ends for every input: rays that are no rays (NaN, infinite, no direction) hit nothing, and so does what is empty or
-// cannot be used by its status (src/bvh/layout.rs).
+// A triangle is hit when t_min < t < t_max; of equally near ones that of the lower instance, then of the lower primitive. A box
+// is a candidate where the ray is in it anywhere from t_min to t_max, both included. A walk ends for every input: rays that are
+// no rays (NaN, infinite, no direction) hit nothing, and so does what is empty or cannot be used by its status
+// (src/bvh/layout.rs).
 #ifndef HEDGEROW_TRACE_QUERY
 #define HEDGEROW_TRACE_QUERY
 
@@ -54,6 +55,7 @@
 #define KIND_INSTANCES HEDGEROW_KIND_INSTANCES
 #define MAX_DEPTH HEDGEROW_MAX_DEPTH
 #define UNUSED HEDGEROW_UNUSED
+#define AT_ROOT HEDGEROW_AT_ROOT
 #define STATUS_NON_FINITE HEDGEROW_STATUS_NON_FINITE
 #define STATUS_INDEX_OUT_OF_RANGE HEDGEROW_STATUS_INDEX_OUT_OF_RANGE
 #define STATUS_TOO_DEEP HEDGEROW_STATUS_TOO_DEEP
@@ -222,6 +224,7 @@ vec3 hedgerowRayQueryGetWorldRayDirection(HedgerowRayQuery query) {
 #undef KIND_INSTANCES
 #undef MAX_DEPTH
 #undef UNUSED
+#undef AT_ROOT
 #undef STATUS_NON_FINITE
 #undef STATUS_INDEX_OUT_OF_RANGE
 #undef STATUS_TOO_DEEP

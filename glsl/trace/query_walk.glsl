@@ -36,9 +36,8 @@ const uint HEDGEROW_MET_BOX = 2u;
 
 // In place of a leaf's count: nothing at hand, take what waits.
 const uint HEDGEROW_NOTHING = 0xffffffffu;
-// Rounds after which a walk is given up: more than any tree of 2^27 records needs. A structure that was overwritten may be a
-// circle.
-const uint HEDGEROW_MOST_ROUNDS = 1u << 28;
+// As many nodes and records as a structure may have.
+const uint HEDGEROW_MOST = 1u << 27;
 
 // A shader that defines HEDGEROW_COUNTS_WORK finds in `work` how many nodes of the top level, instances, nodes below and primitives
 // a query has met so far.
@@ -84,6 +83,9 @@ struct HedgerowRayQuery {
     uint left;
     uint level;
     float best;
+    // Rounds until the walk is given up, in the structure at hand and in the top level behind it.
+    uint rounds;
+    uint top_rounds;
     HedgerowMeeting candidate;
     HedgerowMeeting committed;
 #ifdef HEDGEROW_COUNTS_WORK
@@ -101,6 +103,12 @@ vec3 hedgerow_transformed(vec4 rows[3], vec4 p) {
 bool hedgerow_can_be_traced(Header header) {
     bool known = header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || header.kind == KIND_INSTANCES;
     return header.magic == MAGIC && known && header.active_count != 0u && (header.status & STATUS_UNUSABLE) == 0u;
+}
+
+// More rounds than the walk of a structure takes: each node and each record is seen once and may wait once. One that was
+// overwritten may be a circle.
+uint hedgerow_rounds(Header header) {
+    return 2u * (min(header.node_slots, HEDGEROW_MOST) + min(header.primitive_count, HEDGEROW_MOST)) + 4u;
 }
 
 bool hedgerow_skips(uint flags, uint kind) {
@@ -140,6 +148,8 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.records = 0u;
     query.kind = 0u;
     query.geometry_flags = 0u;
+    query.rounds = 0u;
+    query.top_rounds = 0u;
     if (all(equal(structure, uvec2(0)))) return;
     Header header = Structure(structure).header;
     query.top_slots = header.node_slots;
@@ -148,6 +158,7 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.records = header.primitive_count;
     query.kind = header.kind;
     query.geometry_flags = header.geometry_flags;
+    query.rounds = hedgerow_rounds(header);
     // As in Vulkan, a mask without bits lets the ray meet nothing.
     if (hedgerow_prepare(ray, header.root.lo, header.root.hi, query.prepared) && cull_mask != 0u &&
         hedgerow_can_be_traced(header) && !hedgerow_skips(flags, header.kind)) {
@@ -233,11 +244,17 @@ void hedgerow_visit(inout HedgerowRayQuery query) {
     query.left = enters_a || enters_b ? b_first ? b.count : a.count : HEDGEROW_NOTHING;
 }
 
+// To the next record of the leaf, if it and they are there: a stale structure may name records that there are not.
+void hedgerow_step(inout HedgerowRayQuery query) {
+    query.index++;
+    query.left = query.left == 1u || query.index >= query.records ? HEDGEROW_NOTHING : query.left - 1u;
+}
+
 // From the top level into an instance.
 void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     uint at = query.index;
-    query.index++;
-    query.left = query.left == 1u ? HEDGEROW_NOTHING : query.left - 1u;
+    hedgerow_step(query);
+    if (at >= query.records) return;
     Instance instance = Instances(records_at(query.top, query.top_slots)).instance[at];
     uint flags = instance.offset_and_flags >> 24;
     if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
@@ -251,7 +268,7 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
         return;
     }
     // The rest of the leaf waits.
-    if (query.left != HEDGEROW_NOTHING) {
+    if (query.left != HEDGEROW_NOTHING && query.level - query.floor < MAX_DEPTH) {
         hedgerow_put(query.level, HedgerowWaiting(query.index, query.left, -HEDGEROW_INFINITY));
         query.level++;
     }
@@ -259,14 +276,17 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     query.structure = instance.structure;
     query.slots = header.node_slots;
     query.records = header.primitive_count;
+    query.top_rounds = query.rounds;
+    query.rounds = hedgerow_rounds(header);
     query.is_below = true;
     query.kind = header.kind;
     query.geometry_flags = header.geometry_flags;
     query.instance = at;
     query.instance_flags = flags;
     query.bottom = query.level;
-    query.index = instance.start;
-    query.left = instance.start_count;
+    bool is_whole = instance.start_count == AT_ROOT;
+    query.index = is_whole ? header.root.index : instance.start;
+    query.left = is_whole ? header.root.count : instance.start_count;
 }
 
 // Back to the top level.
@@ -278,6 +298,7 @@ void hedgerow_leave_instance(inout HedgerowRayQuery query) {
     query.records = header.primitive_count;
     query.kind = query.top_kind;
     query.bottom = query.floor;
+    query.rounds = query.top_rounds;
     query.is_below = false;
 }
 
@@ -332,10 +353,8 @@ bool hedgerow_test_box(inout HedgerowRayQuery query, uint at) {
 
 bool hedgerow_test(inout HedgerowRayQuery query) {
     uint at = query.index;
-    query.index++;
-    query.left = query.left == 1u ? HEDGEROW_NOTHING : query.left - 1u;
+    hedgerow_step(query);
     HEDGEROW_COUNT(w);
-    // A stale structure may name records that there are not.
     if (at >= query.records) return false;
     return query.kind == KIND_BOXES ? hedgerow_test_box(query, at) : hedgerow_test_triangle(query, at);
 }
@@ -360,7 +379,8 @@ bool hedgerow_has_record(HedgerowRayQuery query) {
 }
 
 bool hedgerow_proceed(inout HedgerowRayQuery query) {
-    for (uint round = 0u; round < HEDGEROW_MOST_ROUNDS; ++round) {
+    while (query.rounds != 0u) {
+        query.rounds--;
         while (query.left == HEDGEROW_NOTHING) {
             if (!hedgerow_go_on(query)) return false;
         }

@@ -69,6 +69,6 @@ bool hedgerow_prepare(HedgerowRay ray, vec3 lo, vec3 hi, out HedgerowPreparedRay
     prepared.origin_hi = origin_hi;
     return hedgerow_finite(ray.origin) && hedgerow_finite(ray.direction) &&
            greatest >= uintBitsToFloat((127u - 100u) << 23) && greatest <= uintBitsToFloat((127u + 100u) << 23) &&
-           ray.t_min < ray.t_max;
+           ray.t_min <= ray.t_max;
 }
 #endif

@@ -46,6 +46,7 @@ pub(super) struct Build {
     /// Most primitives of all geometries.
     primitive_count: u32,
     rebraid: Option<Rebraid>,
+    options: lbvh::Options,
 }
 
 /// Where the parts of the scratch memory begin.
@@ -82,14 +83,14 @@ impl Build {
         let lbvh_options = lbvh::Options {
             codes: Some(codes(flags, entries)),
             // An instance costs more than a node whatever its box: one a leaf.
-            collapse: if primitives == Primitives::Instances { Collapse::OFF } else { Collapse::SAH },
+            collapse: if primitives == Primitives::Instances { Collapse::OFF } else { collapse(flags) },
             primitives,
             geometry_count: given.count(),
             build_flags: flags.as_raw() & 0x1f,
             ..lbvh::Options::DEFAULT
         };
         let lbvh = Lbvh::new(context, &lbvh_options, entries)?;
-        Ok(Build { lbvh, given, counts, primitive_count, rebraid })
+        Ok(Build { lbvh, given, counts, primitive_count, rebraid, options: lbvh_options })
     }
 
     /// Bytes of structure and scratch memory that it needs.
@@ -102,6 +103,16 @@ impl Build {
     pub fn sizes_at_most(&self) -> Sizes {
         let sizes = self.lbvh.sizes_at_most();
         Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
+    }
+
+    /// What the host's builder takes: codes, collapsing, flags.
+    pub fn host_options(&self) -> (Codes, Collapse, u32) {
+        (self.lbvh.codes(), self.options.collapse, self.options.build_flags)
+    }
+
+    /// What it is over.
+    pub fn given(&self) -> &Given {
+        &self.given
     }
 
     /// The builder's part, with scratch memory at `scratch`.
@@ -192,6 +203,16 @@ fn codes(flags: Flags, primitive_count: u32) -> Codes {
         () => codes.bits,
     };
     codes.code.full().with_bits(if flags.contains(Flags::LOW_MEMORY) { bits.min(32) } else { bits })
+}
+
+/// How subtrees are collapsed: where memory counts, tests are taken to be cheaper than they are, so that leaves are larger and
+/// nodes fewer. Compacted structures then have 56 to 59 bytes a triangle instead of 64 to 70 on eleven scenes of twelve.
+fn collapse(flags: Flags) -> Collapse {
+    if flags.intersects(Flags::ALLOW_COMPACTION | Flags::LOW_MEMORY) {
+        Collapse { c_i: 1.25, ..Collapse::SAH }
+    } else {
+        Collapse::SAH
+    }
 }
 
 push_constants! {

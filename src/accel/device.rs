@@ -51,15 +51,13 @@ impl<'a> Device<'a> {
         max_primitive_counts: &[u32],
         size_info: &mut vk::AccelerationStructureBuildSizesInfoKHR<'_>,
     ) -> Result<()> {
-        if build_type != vk::AccelerationStructureBuildTypeKHR::DEVICE {
-            return Err(Error::Argument(format!("buildType is {build_type:?}; structures are built on the DEVICE")));
-        }
         // SAFETY: the caller's promise.
         let (given, count) = unsafe { build::at_most(info, max_primitive_counts) }?;
         let build = Build::new(self.context, &self.options, info.flags, given, Counts::Told, count)?;
         let Sizes { structure, scratch, .. } = build.sizes_at_most();
         size_info.acceleration_structure_size = structure;
-        size_info.build_scratch_size = scratch;
+        let on_host = build_type == vk::AccelerationStructureBuildTypeKHR::HOST;
+        size_info.build_scratch_size = if on_host { 0 } else { scratch };
         size_info.update_scratch_size = 0;
         Ok(())
     }
@@ -265,8 +263,8 @@ impl<'a> Device<'a> {
         unsafe { self.record_placed(commands, &builds) }
     }
 
-    pub(super) fn parts(&self) -> (&'a Context, &Options) {
-        (self.context, &self.options)
+    pub(super) fn options(&self) -> &Options {
+        &self.options
     }
 
     unsafe fn record_placed(&self, commands: vk::CommandBuffer, builds: &[Placed]) -> Result<()> {
@@ -292,7 +290,7 @@ struct Placed {
     scratch: u64,
 }
 
-fn within(build: usize, error: Error) -> Error {
+pub(super) fn within(build: usize, error: Error) -> Error {
     match error {
         Error::Argument(what) => Error::Argument(format!("pInfos[{build}]: {what}")),
         other => other,

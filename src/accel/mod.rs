@@ -19,9 +19,9 @@
 //! | --- | --- |
 //! | `PREFER_FAST_BUILD` | Morton codes of 8 bits less: a pass of the sort less |
 //! | `PREFER_FAST_TRACE` | codes of 8 bits more |
-//! | `LOW_MEMORY` | codes of at most 32 bits: 20 bytes of scratch a primitive instead of 28, from 4 million on |
+//! | `LOW_MEMORY` | larger leaves, so that compacted copies are smaller; codes of at most 32 bits: 20 bytes of scratch a primitive instead of 28, from 4 million on |
 //! | `ALLOW_UPDATE` | updates are allowed; no re-braiding, as an opened instance cannot be refitted |
-//! | `ALLOW_COMPACTION` | nothing: every structure can be compacted |
+//! | `ALLOW_COMPACTION` | larger leaves, as with `LOW_MEMORY`; every structure can be compacted |
 //! | [`REBRAID`] | a top level opens instances whose boxes are loose |
 
 mod build;
@@ -30,6 +30,7 @@ mod copy;
 mod device;
 mod geometry;
 mod given;
+mod host;
 mod instances;
 mod properties;
 mod rebraid;

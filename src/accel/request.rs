@@ -90,8 +90,7 @@ impl Request {
     }
 
     pub(super) fn build(&self, device: &Device<'_>) -> Result<Build> {
-        let (context, options) = device.parts();
-        Build::new(context, options, self.flags, self.given.clone(), Counts::Told, self.primitive_count)
+        Build::new(device.context, device.options(), self.flags, self.given.clone(), Counts::Told, self.primitive_count)
     }
 }
 

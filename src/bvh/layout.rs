@@ -225,12 +225,18 @@ pub struct Instance {
     pub offset_and_flags: u32,
     /// Position in the input.
     pub instance: u32,
-    /// Where to begin in the bottom-level structure: a [`Child`]'s index. Not its root where the instance was opened.
+    /// Where to begin in the bottom-level structure, if the instance was opened: a [`Child`]'s index.
     pub start: u32,
-    /// And its count.
+    /// And its count; [`Instance::AT_ROOT`] where it was not opened.
     pub start_count: u32,
     /// Zero.
     pub reserved: u32,
+}
+
+impl Instance {
+    /// The `start_count` of an instance that begins at its structure's root, wherever that is: the structure may be replaced by
+    /// a compacted copy.
+    pub const AT_ROOT: u32 = u32::MAX;
 }
 
 impl Record for Instance {

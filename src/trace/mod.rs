@@ -28,7 +28,7 @@ pub const MAX_RAYS: u32 = 1 << 27;
 /// A ray, 32 bytes, as ray files hold it (CONTRACT, "Ray files").
 ///
 /// A ray hits nothing if a component of origin or direction is NaN or infinite, if the largest
-/// component of the direction has no magnitude between 2⁻¹⁰⁰ and 2¹⁰⁰, or if `t_min < t_max` does not hold.
+/// component of the direction has no magnitude between 2⁻¹⁰⁰ and 2¹⁰⁰, or if `t_min ≤ t_max` does not hold.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Ray {

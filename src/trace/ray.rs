@@ -18,7 +18,7 @@ const ORIGIN_ERROR: f32 = f32::from_bits((127 - 22) << 23);
 pub struct PreparedRay {
     /// Where it starts.
     pub origin: [f32; 3],
-    /// A hit counts when `t_min < t < t_max`.
+    /// A hit counts when `t_min < t < t_max`; a box, when the ray is in it anywhere from `t_min` to `t_max`.
     pub t_min: f32,
     /// See `t_min`.
     pub t_max: f32,
@@ -43,7 +43,7 @@ impl PreparedRay {
         let major = longest(d);
         let finite = ray.origin.iter().chain(&d).all(|x| x.is_finite());
         // Not `>=`: a NaN must not pass.
-        if !(finite && DIRECTION.contains(&d[major].abs()) && ray.t_min < ray.t_max) {
+        if !(finite && DIRECTION.contains(&d[major].abs()) && ray.t_min <= ray.t_max) {
             return None;
         }
         let [x, y] = [(major + 1) % 3, (major + 2) % 3];

@@ -28,18 +28,23 @@ pub trait Backend {
     fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
 }
 
-/// Whether the driver is a lavapipe before Mesa 26. Mesa 26's agrees with us and brute force on every case; 25.0.7's breaks
-/// the specification in two, which are left out for it: a transform multiplies the fourth component of 16-bit formats, which
-/// should not be read; and `firstVertex` leads to other vertices.
+/// Whether the driver is a lavapipe before Mesa 26. 25.0.7's breaks the specification in a few cases, which are left out for it:
+/// a transform multiplies the fourth component of 16-bit formats, which should not be read; `firstVertex` leads to other
+/// vertices; many a ray passes by a box without a thickness, and one that ends where it enters a box.
 pub fn is_old_lavapipe() -> bool {
     let version = device().found().driver.strip_prefix("Mesa ").and_then(|v| v.split('.').next()?.parse::<u32>().ok());
     device().limits.is_cpu() && version.is_some_and(|major| major < 26)
 }
 
 /// Whether the driver is a lavapipe of Mesa 26 or later: a top level with an inactive instance (reference 0, which the
-/// specification allows) crashes the process in a ray query of 26.1.6. 25.0.7 takes it.
+/// specification allows) or one of mask 0 crashes the process in a ray query of 26.1.6. 25.0.7 takes them.
 pub fn is_new_lavapipe() -> bool {
     device().limits.loads_uniform_values_once()
+}
+
+/// Whether the driver is a lavapipe: those of Mesa 25.0.7 and 26.1.6 lose active boxes beside inactive ones.
+pub fn is_lavapipe() -> bool {
+    device().limits.driver == vk::DriverId::MESA_LLVMPIPE
 }
 
 /// Ours, and the driver's where the device has it.

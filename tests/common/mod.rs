@@ -1,9 +1,11 @@
 //! What the device tests share: one device a test binary, with the validation layers on where they are installed.
 #![allow(dead_code, reason = "each test binary uses its part")]
 
+pub mod agree;
 pub mod backends;
 pub mod corpus;
 pub mod geometries;
+pub mod matrices;
 pub mod probe;
 pub mod shapes;
 pub mod world;

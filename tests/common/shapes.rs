@@ -41,6 +41,17 @@ pub fn soup(count: usize, size: f32, seed: u64) -> Corners {
         .collect()
 }
 
+/// `count` boxes with edges of up to `size` that begin in the cube −1..1, by their least and greatest corners.
+pub fn boxes(count: usize, size: f32, seed: u64) -> Vec<[[f32; 3]; 2]> {
+    let mut random = Random(seed);
+    (0..count)
+        .map(|_| {
+            let (at, size) = (random.point(1.0), random.point(size).map(f32::abs));
+            [at, add(at, size)]
+        })
+        .collect()
+}
+
 /// A closed mesh of 20·4^`levels` triangles with corners on the sphere around the origin.
 pub fn icosphere(levels: u32) -> Corners {
     let golden = (1.0 + 5f32.sqrt()) / 2.0;
@@ -73,7 +84,7 @@ pub fn icosphere(levels: u32) -> Corners {
     faces
 }
 
-fn onto_sphere(p: [f32; 3]) -> [f32; 3] {
+pub fn onto_sphere(p: [f32; 3]) -> [f32; 3] {
     let length = p.iter().map(|x| x * x).sum::<f32>().sqrt();
     p.map(|x| x / length)
 }

@@ -44,6 +44,37 @@ fn address(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
     vk::DeviceOrHostAddressConstKHR { device_address }
 }
 
+/// Vulkan's struct for instances, or pointers to them.
+pub fn instances_at(at: u64, by_pointers: bool) -> Geometry {
+    let instances =
+        vk::AccelerationStructureGeometryInstancesDataKHR::default().array_of_pointers(by_pointers).data(address(at));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { instances })
+}
+
+/// Builds a top level of them alone.
+pub fn top_level(
+    backend: &dyn Backend,
+    instances: &Geometry,
+    range: Range,
+    flags: vk::BuildAccelerationStructureFlagsKHR,
+) -> Built {
+    let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
+        .flags(flags)
+        .geometries(std::slice::from_ref(instances));
+    Built::new(backend, &info, &[range], 0)
+}
+
+/// Builds a bottom level of them alone.
+pub fn bottom_level(backend: &dyn Backend, geometries: &[Geometry], ranges: &[Range]) -> Built {
+    let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
+        .geometries(geometries);
+    Built::new(backend, &info, ranges, 0)
+}
+
 impl Part {
     /// Vulkan's structs over uploaded data.
     pub fn geometries(&self) -> (Vec<Geometry>, Vec<Range>, Vec<Buffer<'static>>) {
@@ -86,10 +117,7 @@ impl Part {
     /// Builds it alone.
     pub fn build(&self, backend: &dyn Backend) -> (Built, Vec<Buffer<'static>>) {
         let (geometries, ranges, memory) = self.geometries();
-        let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
-            .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
-            .geometries(&geometries);
-        (Built::new(backend, &info, &ranges, 0), memory)
+        (bottom_level(backend, &geometries, &ranges), memory)
     }
 }
 
@@ -117,6 +145,11 @@ impl World {
             parts.push(built);
             memory.extend(data);
         }
+        self.build_over(backend, parts, memory)
+    }
+
+    /// Builds the top level over parts that are built, and keeps their memory.
+    pub fn build_over(&self, backend: &dyn Backend, parts: Vec<Built>, mut memory: Vec<Buffer<'static>>) -> BuiltWorld {
         let placed = self.placed(backend, &parts);
         let mut instances = device().upload("instances", &placed).expect("memory");
         if self.by_pointers {
@@ -124,33 +157,22 @@ impl World {
                 (0..placed.len() as u64).map(|i| instances.address() + i * size_of::<Instance>() as u64).collect();
             memory.push(std::mem::replace(&mut instances, device().upload("pointers", &pointers).expect("memory")));
         }
-        let data = vk::AccelerationStructureGeometryInstancesDataKHR::default()
-            .array_of_pointers(self.by_pointers)
-            .data(address(instances.address()));
-        let geometry = vk::AccelerationStructureGeometryKHR::default()
-            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
-            .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data });
-        let geometries = [geometry];
-        let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
-            .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
-            .flags(self.flags)
-            .geometries(&geometries);
+        let geometry = instances_at(instances.address(), self.by_pointers);
         let range = Range::default().primitive_count(placed.len() as u32);
-        let top = Built::new(backend, &info, &[range], 0);
+        let top = top_level(backend, &geometry, range, self.flags);
         BuiltWorld { top, parts, instances, geometry, _memory: memory }
     }
 
-    /// Everything that a ray meets between its limits and may not cull, by brute force, nearest first.
-    pub fn meetings(&self, ray: &ProbeRay) -> Vec<Met> {
+    /// Everything that a ray meets between its limits and may not cull, by brute force, nearest first; and what rounding might
+    /// make it meet.
+    fn possible_meetings(&self, ray: &ProbeRay) -> Vec<Met> {
         let mut all = Vec::new();
         for (i, instance) in self.instances.iter().enumerate() {
             if instance.structure == 0 || instance.index_and_mask >> 24 & ray.mask & 0xff == 0 {
                 continue;
             }
             let instance_flags = Flags::from_raw(instance.offset_and_flags >> 24);
-            let to_object = inverse(&instance.transform);
-            let origin = transformed(&to_object, ray.origin.map(f64::from), 1.0);
-            let direction = transformed(&to_object, ray.direction.map(f64::from), 0.0);
+            let line = Line::in_object(&instance.transform, ray);
             let is_opaque = |geometry: GeometryFlags| {
                 let mut is_opaque = geometry.contains(GeometryFlags::OPAQUE);
                 is_opaque |= instance_flags.contains(Flags::FORCE_OPAQUE);
@@ -159,7 +181,6 @@ impl World {
             };
             let is_culled =
                 |is_opaque: bool| ray.flags & (if is_opaque { flags::CULL_OPAQUE } else { flags::CULL_NO_OPAQUE }) != 0;
-            let limits = [f64::from(ray.t_min), f64::from(ray.t_max)];
             let mut add = |geometry: usize, primitive: usize, is_opaque: bool, met: Met| {
                 if !is_culled(is_opaque) {
                     let place = [i as u32, geometry as u32, primitive as u32];
@@ -172,7 +193,7 @@ impl World {
                 Part::Triangles(geometries) => {
                     for (g, (corners, geometry_flags)) in geometries.iter().enumerate() {
                         for (p, triangle) in corners.iter().enumerate() {
-                            let Some(mut met) = triangle_met(triangle, origin, direction, limits) else { continue };
+                            let Some(mut met) = triangle_met(triangle, &line) else { continue };
                             met.is_front ^= instance_flags.contains(Flags::TRIANGLE_FLIP_FACING);
                             let culled = if met.is_front { flags::CULL_FRONT } else { flags::CULL_BACK };
                             if ray.flags & culled == 0 || instance_flags.contains(Flags::TRIANGLE_FACING_CULL_DISABLE) {
@@ -184,7 +205,7 @@ impl World {
                 Part::Boxes(geometries) => {
                     for (g, (boxes, geometry_flags)) in geometries.iter().enumerate() {
                         for (p, corners) in boxes.iter().enumerate() {
-                            if let Some(met) = box_met(corners, origin, direction, limits) {
+                            if let Some(met) = box_met(corners, &line) {
                                 add(g, p, is_opaque(*geometry_flags), met);
                             }
                         }
@@ -196,32 +217,49 @@ impl World {
         all
     }
 
-    /// What a query commits to: the nearest of what is opaque, confirmed or generated.
-    pub fn committed(&self, ray: &ProbeRay) -> Option<Met> {
+    /// What a ray meets, and what its query commits to; nothing where rounding may decide: an edge or a limit is near, or two
+    /// meetings are, or a box that is farther than a hit is generated before it.
+    pub fn expected(&self, ray: &ProbeRay) -> Option<Expected> {
+        let mut meetings = self.possible_meetings(ray);
+        if meetings.iter().any(|met| met.is_unsure) {
+            return None;
+        }
+        meetings.retain(|met| met.is_met);
         let confirms = |met: &Met| match ray.decision {
             CONFIRM => true,
             CONFIRM_ODD => met.place[2] % 2 == 1,
             _ => false,
         };
-        let hits = self.meetings(ray).into_iter().filter_map(|met| match met.is_box {
-            true => confirms(&met).then(|| Met { t: f64::from(ray.generated_t), ..met }),
-            false => (met.is_opaque || confirms(&met)).then_some(met),
+        let hits = meetings.iter().filter_map(|met| match met.is_box {
+            true => confirms(met).then(|| Met { t: f64::from(ray.generated_t), t_error: 0.0, ..*met }),
+            false => (met.is_opaque || confirms(met)).then_some(*met),
         });
-        hits.min_by(|a, b| a.t.total_cmp(&b.t).then(a.place.cmp(&b.place)))
-    }
-
-    /// Whether rounding may change what the ray meets: an edge or a limit is near, or two meetings are.
-    pub fn is_close_call(&self, ray: &ProbeRay) -> bool {
-        let wide = ProbeRay { t_min: ray.t_min - 1e-3, t_max: ray.t_max + 1e-3, ..*ray };
-        let all = self.meetings(&wide);
-        let near_limit =
-            |met: &Met| [ray.t_min, ray.t_max].iter().any(|&limit| (met.t - f64::from(limit)).abs() < 2e-3);
-        let twins = all.windows(2).any(|pair| (pair[0].t - pair[1].t).abs() < 1e-4 * pair[0].t.abs().max(1e-3));
-        twins || all.iter().any(|met| met.margin < 1e-4 || !met.is_box && near_limit(met))
+        let mut hits: Vec<Met> = hits.collect();
+        hits.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.place.cmp(&b.place)));
+        let are_twins = |pair: &[Met]| {
+            !(pair[0].is_box && pair[1].is_box) && pair[1].t - pair[0].t <= pair[0].t_error + pair[1].t_error
+        };
+        // The box may be a candidate before the nearer triangle is a hit, or never.
+        let generated = hits.first().is_some_and(|hit| hit.is_box);
+        let nearest = hits.iter().find(|hit| !hit.is_box).map_or(f64::INFINITY, |hit| hit.t);
+        let is_late = |met: &Met| met.is_box && confirms(met) && met.t > nearest;
+        if hits.windows(2).any(are_twins) || generated && meetings.iter().any(is_late) {
+            return None;
+        }
+        Some(Expected { meetings, committed: hits.first().copied() })
     }
 }
 
-/// What a ray meets.
+/// What a query of a ray must say.
+#[derive(Debug, Clone)]
+pub struct Expected {
+    /// Nearest first.
+    pub meetings: Vec<Met>,
+    /// The nearest of what is opaque, confirmed or generated.
+    pub committed: Option<Met>,
+}
+
+/// What a ray meets, or may.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Met {
     pub t: f64,
@@ -231,11 +269,58 @@ pub struct Met {
     pub is_front: bool,
     pub is_opaque: bool,
     pub is_box: bool,
-    /// How far from an edge, as a weight.
-    pub margin: f64,
+    /// What float32 may be off by.
+    pub t_error: f64,
+    pub weight_error: f64,
+    pub is_met: bool,
+    /// Whether rounding may decide on it.
+    is_unsure: bool,
 }
 
-type Matrix = [[f64; 4]; 3];
+/// A ray in the space of an instance.
+struct Line {
+    origin: [f64; 3],
+    direction: [f64; 3],
+    limits: [f64; 2],
+    /// How far off float32 may place its origin, and a point at t = 1 in addition.
+    origin_error: f64,
+    direction_error: f64,
+}
+
+impl Line {
+    fn in_object(transform: &[[f32; 4]; 3], ray: &ProbeRay) -> Line {
+        let (origin, direction) = (ray.origin.map(f64::from), ray.direction.map(f64::from));
+        let to_object = inverse(transform);
+        Line {
+            origin: transformed(&to_object, origin, 1.0),
+            direction: transformed(&to_object, direction, 0.0),
+            limits: [ray.t_min.into(), ray.t_max.into()],
+            origin_error: transform_error(transform, origin, 1.0),
+            direction_error: transform_error(transform, direction, 0.0),
+        }
+    }
+
+    /// How far off a point at t may be beside something at `corner`.
+    fn error_at(&self, t: f64, corner: [f64; 3]) -> f64 {
+        self.origin_error + t.abs() * self.direction_error + PRECISION * length(corner)
+    }
+}
+
+/// A generous bound on what float32 may lose in a few operations, relative to their terms.
+const PRECISION: f64 = 3e-6;
+
+/// How far off float32 may be in the transform of a point (or, with w = 0, of a direction) to the space of an instance: each
+/// row of the inverse is a product of two columns divided by the determinant, and lost digits of these.
+pub fn transform_error(to_world: &[[f32; 4]; 3], p: [f64; 3], w: f64) -> f64 {
+    let column = |k: usize| to_world.map(|row| f64::from(row[k]));
+    let columns = [column(0), column(1), column(2)];
+    let determinant = dot(columns[0], cross(columns[1], columns[2])).abs();
+    let lengths = columns.map(length);
+    let rows = lengths.map(|own| lengths[0] * lengths[1] * lengths[2] / own / determinant);
+    PRECISION * length(rows) * (length(p) + w * length(column(3)))
+}
+
+pub type Matrix = [[f64; 4]; 3];
 
 pub fn transformed(m: &Matrix, p: [f64; 3], w: f64) -> [f64; 3] {
     m.map(|[a, b, c, d]| a * p[0] + b * p[1] + c * p[2] + d * w)
@@ -261,42 +346,103 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Möller and Trumbore 1997.
-fn triangle_met(triangle: &[[f32; 3]; 3], origin: [f64; 3], direction: [f64; 3], limits: [f64; 2]) -> Option<Met> {
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+fn length(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// Möller and Trumbore 1997. Nothing where even rounding does not lead to a meeting.
+fn triangle_met(triangle: &[[f32; 3]; 3], line: &Line) -> Option<Met> {
     let [v0, v1, v2] = triangle.map(|v| v.map(f64::from));
-    let minus = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| a[i] - b[i]) };
-    let (e1, e2, from_v0) = (minus(v1, v0), minus(v2, v0), minus(origin, v0));
-    let across = cross(direction, e2);
+    let (e1, e2, from_v0) = (minus(v1, v0), minus(v2, v0), minus(line.origin, v0));
+    let (normal, across) = (cross(e1, e2), cross(line.direction, e2));
     let determinant = dot(e1, across);
-    if determinant == 0.0 {
+    if length(normal) == 0.0 {
         return None;
     }
     let q = cross(from_v0, e1);
-    let (u, v, t) = (dot(from_v0, across) / determinant, dot(direction, q) / determinant, dot(e2, q) / determinant);
-    let margin = u.min(v).min(1.0 - u - v);
+    let [u, v, t] = [dot(from_v0, across), dot(line.direction, q), dot(e2, q)].map(|x| x / determinant);
     // The front is where the normal looks, by the right hand: clockwise in left-handed coordinates, as the field says it.
-    let is_front = dot(cross(e1, e2), direction) < 0.0;
-    let met = Met { t, weights: [u, v], place: [0; 3], is_front, is_opaque: false, is_box: false, margin };
-    (margin >= 0.0 && limits[0] < t && t < limits[1]).then_some(met)
+    let is_front = dot(normal, line.direction) < 0.0;
+    let mut met = Met {
+        t,
+        weights: [u, v],
+        place: [0; 3],
+        is_front,
+        is_opaque: false,
+        is_box: false,
+        t_error: f64::INFINITY,
+        weight_error: f64::INFINITY,
+        is_met: false,
+        is_unsure: true,
+    };
+    let farthest = if length(v0) > length(v1).max(length(v2)) {
+        v0
+    } else if length(v1) > length(v2) {
+        v1
+    } else {
+        v2
+    };
+    let cosine = dot(normal, line.direction).abs() / (length(normal) * length(line.direction));
+    if cosine < 1e-6 {
+        // In its plane: no meeting, unless rounding takes the ray out of it.
+        let off = dot(from_v0, normal).abs() / length(normal);
+        let near = (length(from_v0) + length(e1) + length(e2)) / length(line.direction);
+        return (off < line.error_at(near, farthest) && dot(normal, line.direction) != 0.0).then_some(met);
+    }
+    let error = line.error_at(t, farthest) / cosine;
+    let longest = length(e1).max(length(e2)).max(length(minus(v2, v1)));
+    met.t_error = error / length(line.direction);
+    met.weight_error = error * longest / length(normal);
+    let inside = u.min(v).min(1.0 - u - v);
+    let from_limits = (t - line.limits[0]).min(line.limits[1] - t);
+    met.is_met = inside >= 0.0 && from_limits > 0.0;
+    met.is_unsure = inside.abs() < met.weight_error || from_limits.abs() < met.t_error;
+    (inside > -met.weight_error && from_limits > -met.t_error).then_some(met)
 }
 
-fn box_met(corners: &[[f32; 3]; 2], origin: [f64; 3], direction: [f64; 3], limits: [f64; 2]) -> Option<Met> {
-    let (mut enter, mut leave) = (limits[0], limits[1]);
-    for k in 0..3 {
-        let at = |side: usize| (f64::from(corners[side][k]) - origin[k]) / direction[k];
-        if direction[k] == 0.0 {
-            let inside = f64::from(corners[0][k]) <= origin[k] && origin[k] <= f64::from(corners[1][k]);
-            if !inside {
-                return None;
-            }
-        } else {
-            enter = enter.max(at(0).min(at(1)));
-            leave = leave.min(at(0).max(at(1)));
-        }
+/// The same for a box, which implementations may enlarge a little.
+fn box_met(corners: &[[f32; 3]; 2], line: &Line) -> Option<Met> {
+    let corners = corners.map(|corner| corner.map(f64::from));
+    if corners[0][0].is_nan() {
+        return None;
     }
-    // Relative to how far the ray goes, so that close calls are told.
-    let margin = (leave - enter) / leave.abs().max(enter.abs()).max(1e-3);
-    let met =
-        Met { t: enter, weights: [0.0; 2], place: [0; 3], is_front: false, is_opaque: false, is_box: true, margin };
-    (enter <= leave).then_some(met)
+    let farthest = if length(corners[0]) > length(corners[1]) { corners[0] } else { corners[1] };
+    let until = length(minus(farthest, line.origin)) / length(line.direction);
+    let error = line.error_at(until, farthest);
+    let t_error = error / length(line.direction);
+    let enter_within = |by: f64, late: f64| -> Option<f64> {
+        let (mut enter, mut leave) = (line.limits[0] - late, line.limits[1] + late);
+        for k in 0..3 {
+            let (lo, hi) = (corners[0][k] - by, corners[1][k] + by);
+            if line.direction[k] == 0.0 {
+                if !(lo <= line.origin[k] && line.origin[k] <= hi) {
+                    return None;
+                }
+            } else {
+                let [a, b] = [lo, hi].map(|x| (x - line.origin[k]) / line.direction[k]);
+                enter = enter.max(a.min(b));
+                leave = leave.min(a.max(b));
+            }
+        }
+        (enter <= leave).then_some(enter)
+    };
+    let enter = enter_within(0.0, 0.0);
+    // Limits are inclusive for boxes, and an origin on one's face is no question of rounding.
+    let sure = enter_within(-error, 0.0).is_some();
+    enter_within(error, t_error).map(|possible| Met {
+        t: enter.unwrap_or(possible),
+        weights: [0.0; 2],
+        place: [0; 3],
+        is_front: false,
+        is_opaque: false,
+        is_box: true,
+        t_error,
+        weight_error: 0.0,
+        is_met: enter.is_some(),
+        is_unsure: !sure,
+    })
 }
