@@ -58,6 +58,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "bvh" if is("lbvh_workgroup") => bvh::lbvh_workgroup::push_constants(),
         "bvh" if is("lbvh") => bvh::lbvh::push_constants(),
         "bvh" if is("quality") => bvh::quality::push_constants(),
+        "bvh" if is("refit") => bvh::refit::push_constants(),
         "gpu" if is("fill") => gpu::fill::push_constants(),
         "gpu" if is("pool_tree") => gpu::probe::push_constants(),
         "gpu" if is("radix_sort") => gpu::radix_sort::push_constants(),

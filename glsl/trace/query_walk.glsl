@@ -342,6 +342,8 @@ bool hedgerow_test_triangle(inout HedgerowRayQuery query, uint at) {
 // The same for a box: always a candidate, as only the shader knows what is in it.
 bool hedgerow_test_box(inout HedgerowRayQuery query, uint at) {
     BoxRecord box = BoxRecords(records_at(query.structure, query.slots)).box[at];
+    // Inside out where an update has left it out.
+    if (box.lo.x > box.hi.x) return false;
     bool entered;
     hedgerow_enter(query.prepared, box.lo, box.hi, query.best, entered);
     if (!entered) return false;

@@ -157,6 +157,15 @@ pub trait Record: Pod + PartialEq + std::fmt::Debug {
 
     /// The box around it, if it can be told without other structures.
     fn bounds(&self) -> Option<Aabb>;
+
+    /// What an update makes of the record of a primitive that can no longer be met: no ray meets it, and no other primitive has
+    /// such a record.
+    fn left_out(primitive: u32) -> Self;
+
+    /// Whether it is such a record.
+    fn is_left_out(&self) -> bool {
+        bytemuck::bytes_of(self) == bytemuck::bytes_of(&Self::left_out(self.primitive()))
+    }
 }
 
 /// A triangle in the primitive order. 40 bytes.
@@ -183,6 +192,12 @@ impl Record for Triangle {
     fn bounds(&self) -> Option<Aabb> {
         Some(Aabb::around(&[self.v0, self.v1, self.v2]))
     }
+
+    /// Negative zeros: builders make zeros of all others.
+    fn left_out(primitive: u32) -> Triangle {
+        let zero = [-0.0; 3];
+        Triangle { v0: zero, v1: zero, v2: zero, primitive }
+    }
 }
 
 /// A box that stands for something that the caller's shaders know, in the primitive order. 28 bytes.
@@ -206,6 +221,12 @@ impl Record for BoxRecord {
 
     fn bounds(&self) -> Option<Aabb> {
         Some(Aabb { lo: self.lo, hi: self.hi })
+    }
+
+    /// Inside out: tracers skip it.
+    fn left_out(primitive: u32) -> BoxRecord {
+        let Aabb { lo, hi } = Aabb::EMPTY;
+        BoxRecord { lo, hi, primitive }
     }
 }
 
@@ -248,6 +269,11 @@ impl Record for Instance {
 
     fn bounds(&self) -> Option<Aabb> {
         None
+    }
+
+    /// Of no structure.
+    fn left_out(instance: u32) -> Instance {
+        Instance { instance, ..Zeroable::zeroed() }
     }
 }
 

@@ -8,5 +8,6 @@ pub mod layout;
 pub mod lbvh;
 pub(crate) mod lbvh_workgroup;
 pub mod quality;
+pub mod refit;
 pub mod sah;
 pub mod validate;

@@ -5,8 +5,8 @@ use crate::{Error, Result};
 
 impl<R: Record> Bvh2<R> {
     /// Checks every rule of the layout: indices in range, no cycle, every active primitive in exactly one leaf, boxes that are
-    /// exactly those around what they hold (as far as records tell), unused slots that say so, and a depth that tracers can
-    /// walk.
+    /// exactly those around what they hold (as far as records tell, and without what updates have left out), unused slots that
+    /// say so, and a depth that tracers can walk.
     ///
     /// # Errors
     /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
@@ -39,9 +39,11 @@ impl<R: Record> Bvh2<R> {
                 if let Some(twice) = range.clone().find(|&t| std::mem::replace(&mut in_leaf[t], true)) {
                     return invalid(format!("{named_by}: record {twice} is in two leaves"));
                 }
-                let boxes: Option<Vec<Aabb>> = self.records[range].iter().map(Record::bounds).collect();
-                if let Some(boxes) = boxes {
-                    same_box(&child, &boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b)), &named_by)?;
+                let met: Vec<_> = self.records[range].iter().filter(|record| !record.is_left_out()).collect();
+                let boxes: Option<Vec<Aabb>> = met.iter().map(|record| record.bounds()).collect();
+                // A leaf that updates have left nothing of has the box that it had.
+                if let Some(around) = boxes.and_then(|boxes| boxes.into_iter().reduce(|a, b| a.union(&b))) {
+                    same_box(&child, &around, &named_by)?;
                 }
             } else {
                 let Some(node) = self.nodes.get(child.index as usize) else {

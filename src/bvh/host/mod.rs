@@ -3,3 +3,4 @@
 mod compact;
 pub mod geometry;
 pub mod lbvh;
+pub mod refit;
