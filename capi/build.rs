@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 /// The files with functions and types for C, in the order of the header.
-const ROOMS: [&str; 5] = ["status", "requirements", "context", "accel", "trace"];
+const ROOMS: [&str; 6] = ["status", "requirements", "context", "accel", "copy", "trace"];
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

@@ -4,12 +4,13 @@ mod common;
 
 use common::corpus::unit_floats;
 use common::geometries::{MOVED, Owned};
+use common::probe::{self, Probe, ProbeRay};
 use common::shapes::{Corners, Random, hard_rays, soup};
 use common::{corpus, device};
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, VertexFormat};
 use hedgerow::bvh::host;
-use hedgerow::bvh::layout::{Aabb, BoxRecord, Bvh2, Instance, Node, Record, Triangle, status};
+use hedgerow::bvh::layout::{Aabb, BoxRecord, Bvh2, Child, Instance, Record, Triangle, status};
 use hedgerow::bvh::lbvh::{self, Lbvh};
 use hedgerow::bvh::quality;
 use hedgerow::bvh::refit::{Job, Options, Refit, Schedule};
@@ -148,13 +149,8 @@ fn assert_hits(structure: &Bvh2, rays: &[Ray], expected: &[Hit]) {
     let ray_buffer = device().upload("rays", rays).expect("memory");
     let hits = device().buffer("hits", size_of_val(expected) as u64).expect("memory");
     let count = rays.len() as u32;
-    let buffers = Buffers {
-        structure: structure.address(),
-        rays: ray_buffer.address(),
-        hits: hits.address(),
-        work: None,
-        count,
-    };
+    let buffers =
+        Buffers { structure: structure.address(), rays: ray_buffer.address(), hits: hits.address(), work: None, count };
     let shape = Shape::of(&device().limits);
     device().run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
     assert!(hits.read::<Hit>(rays.len()) == expected);
@@ -351,33 +347,25 @@ fn twenty_refits_back_to_the_start_give_the_first_bytes() {
     }
 }
 
-/// The tree with only the slots and records that it uses, and its slots in another order.
-fn squeezed<R: Record>(tree: &Bvh2<R>) -> Bvh2<R> {
-    let used: Vec<usize> = (0..tree.nodes.len()).rev().filter(|&slot| tree.nodes[slot].is_used()).collect();
-    let mut places = vec![u32::MAX; tree.nodes.len()];
-    used.iter().zip(0..).for_each(|(&slot, place)| places[slot] = place);
-    let mut tree = tree.clone();
-    let renamed = |child: &mut hedgerow::bvh::layout::Child| {
+/// The tree with its slots in the opposite order, as far as they may have nodes.
+fn turned_round<R: Record>(tree: &Bvh2<R>) -> Bvh2<R> {
+    let slots = tree.header.active.max(1) - 1;
+    let renamed = |child: &mut Child| {
         if !child.is_leaf() {
-            child.index = places[child.index as usize];
+            child.index = slots - 1 - child.index;
         }
     };
+    let mut tree = tree.clone();
+    tree.nodes[..slots as usize].reverse();
+    tree.nodes.iter_mut().flat_map(|node| &mut node.children).for_each(renamed);
     if tree.header.active > 0 {
         renamed(&mut tree.header.root);
     }
-    tree.nodes = used.iter().map(|&slot| tree.nodes[slot]).collect();
-    tree.nodes.iter_mut().flat_map(|node| &mut node.children).for_each(renamed);
-    if tree.nodes.is_empty() {
-        tree.nodes.push(Node::UNUSED);
-    }
-    tree.records.truncate(tree.header.active as usize);
-    tree.header.node_slots = tree.nodes.len() as u32;
-    tree.header.primitive_count = tree.header.active;
     tree
 }
 
 #[test]
-fn compacted_structures_in_any_order_are_refitted() {
+fn compacted_structures_and_those_in_any_order_are_refitted() {
     for count in SIZES {
         let mut mesh = Mesh::random(count);
         for primitive in (0..count).step_by(7) {
@@ -387,12 +375,46 @@ fn compacted_structures_in_any_order_are_refitted() {
         let moved = mesh.moved(bent(0.7));
         for collapse in [Collapse::SAH, Collapse::OFF] {
             let tree = mesh.built(collapse);
-            let small = squeezed(&tree);
-            small.validate().expect("a valid tree");
+            let small = tree.compacted();
             assert!(count < 2 || small.to_bytes().len() < tree.to_bytes().len());
-            let refitted = assert_as_on_the_host(&format!("squeezed {count}"), &small, &moved);
-            assert!(refitted.to_bytes() == squeezed(&moved.refitted(&tree)).to_bytes(), "{count}");
+            let refitted = assert_as_on_the_host(&format!("compacted {count}"), &small, &moved);
+            assert!(refitted.to_bytes() == moved.refitted(&tree).compacted().to_bytes(), "{count}");
+            let refitted = assert_as_on_the_host(&format!("turned round {count}"), &turned_round(&tree), &moved);
+            assert!(turned_round(&refitted).to_bytes() == moved.refitted(&tree).to_bytes(), "{count}");
         }
+    }
+}
+
+/// Leaves that one invocation refits, and those that a subgroup shares.
+#[test]
+fn leaves_of_any_length_are_refitted() {
+    let counts = [1, 31, 32, 33, 2, 64, 1000, 7, 100];
+    let mut corners = Corners::new();
+    for (place, count) in counts.into_iter().enumerate() {
+        let x = 10.0 * place as f32;
+        corners.extend(vec![[[x, 0.0, 0.0], [x, 1.0, 0.0], [x + 1.0, 0.0, 1.0]]; count]);
+    }
+    let indices = (0..corners.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let mesh = Mesh::new(corners.iter().flatten().copied().collect(), indices);
+    let tree = mesh.built(Collapse::SAH);
+    let mut lengths: Vec<u32> =
+        tree.nodes.iter().filter(|n| n.is_used()).flat_map(|n| n.children).map(|child| child.count).collect();
+    lengths.retain(|&count| count > 0);
+    lengths.sort_unstable();
+    assert_eq!(lengths, [1, 2, 7, 31, 32, 33, 64, 100, 1000], "piles of the same triangle are leaves");
+    assert_as_on_the_host("moved", &tree, &mesh.moved(scattered(2)));
+    // One of each pile is left, or none.
+    for left in [1, 0] {
+        let mut bad = mesh.positions.clone();
+        let mut first = 0;
+        for count in counts {
+            bad[3 * (first + left.min(count))..3 * (first + count)].fill([f32::NAN; 3]);
+            first += count;
+        }
+        let refitted = assert_as_on_the_host("broken", &tree, &Mesh::new(bad, mesh.triangles.clone()));
+        assert_eq!(refitted.header.root.bounds(), tree.header.root.bounds(), "{left}");
+        let left_out = refitted.records.iter().filter(|record| record.is_left_out()).count();
+        assert_eq!(left_out, corners.len() - left * counts.len());
     }
 }
 
@@ -407,7 +429,8 @@ fn every_format_and_several_geometries_are_refitted_as_on_the_host() {
         (0..24).map(|i| vec![[geometry(i, 150, i as u64), geometry(i, 150, 100 + i as u64)]]).collect();
     // Several, with empty ones among them; and many.
     let counts = [0, 70, 0, 0, 9, 200, 0];
-    let several = |i: usize| counts.iter().zip(i..).map(move |(&n, k)| [geometry(k, n, 3), geometry(k, n, 4)]).collect();
+    let several =
+        |i: usize| counts.iter().zip(i..).map(move |(&n, k)| [geometry(k, n, 3), geometry(k, n, 4)]).collect();
     cases.extend([several(0), several(5), several(13)]);
     cases.push((0..100).map(|i| [geometry(i, (i as u32 * 7) % 13, 5), geometry(i, (i as u32 * 7) % 13, 6)]).collect());
     for case in cases {
@@ -476,16 +499,12 @@ fn boxes_are_refitted_as_on_the_host() {
             assert!(expected.records.iter().all(|r| r.primitive < count as u32), "each keeps its primitive");
 
             // 32 bytes from one to the next; and the same boxes as three geometries.
-            let padded: Vec<[f32; 8]> = moved
-                .iter()
-                .map(|&Aabb { lo: [a, b, c], hi: [d, e, f] }| [a, b, c, d, e, f, f32::NAN, 1.0])
-                .collect();
+            let padded: Vec<[f32; 8]> =
+                moved.iter().map(|&Aabb { lo: [a, b, c], hi: [d, e, f] }| [a, b, c, d, e, f, f32::NAN, 1.0]).collect();
             let boxes = device().upload("boxes", &padded).expect("memory");
             let firsts = [0, count as u32 / 3, count as u32 / 2];
-            let records = firsts.map(|first| Geometry {
-                first,
-                ..Geometry::boxes(boxes.address() + 32 * u64::from(first), 32)
-            });
+            let records =
+                firsts.map(|first| Geometry { first, ..Geometry::boxes(boxes.address() + 32 * u64::from(first), 32) });
             let several = device().upload("records", &records).expect("memory");
             let flags = [(firsts[1], 0), (firsts[2] - firsts[1], 0), (count as u32 - firsts[2], 0)];
             for (source, counts) in [
@@ -494,8 +513,12 @@ fn boxes_are_refitted_as_on_the_host() {
             ] {
                 for schedule in SCHEDULES {
                     let geometry_count = counts.len().max(1) as u32;
-                    let options =
-                        Options { schedule: Some(schedule), primitives: Primitives::Boxes, geometry_count, costs: collapse };
+                    let options = Options {
+                        schedule: Some(schedule),
+                        primitives: Primitives::Boxes,
+                        geometry_count,
+                        costs: collapse,
+                    };
                     let tree = tree.clone().with_geometries(counts, 0);
                     let placed = Placed::new(&tree.to_bytes(), &options, count as u32);
                     placed.refit(&Input { source, primitive_count: count as u32 });
@@ -503,6 +526,31 @@ fn boxes_are_refitted_as_on_the_host() {
                     assert!(placed.read() == expected, "{count} {collapse:?} {source:?} {schedule:?}");
                 }
             }
+        }
+    }
+}
+
+/// A leaf with nothing left keeps its box, so rays come to its records.
+#[test]
+fn rays_do_not_meet_boxes_that_are_left_out() {
+    let given: Vec<Aabb> =
+        (0..5).map(|i| [4.0 * i as f32, 0.0, 0.0]).map(|lo| Aabb { lo, hi: lo.map(|x| x + 1.0) }).collect();
+    let mut broken = given.clone();
+    broken[1].lo[2] = f32::NAN;
+    (broken[3].lo, broken[3].hi) = (given[3].hi, given[3].lo);
+    let ray = ProbeRay { decision: probe::IGNORE, ..ProbeRay::new([-1.0, 0.5, 0.5], [1.0, 0.0, 0.0]) };
+    for collapse in [Collapse::SAH, Collapse::OFF] {
+        let tree = host::lbvh::build_aabbs(&given, Codes::for_count(5), collapse);
+        let options = Options { primitives: Primitives::Boxes, costs: collapse, ..Options::DEFAULT };
+        let placed = Placed::new(&tree.to_bytes(), &options, 5);
+        let met = || {
+            let report = Probe::ours().ask(placed.structure.address(), &[ray])[0];
+            report.sorted_candidates().iter().map(|&[_, _, _, primitive]| primitive).collect::<Vec<u32>>()
+        };
+        for (boxes, expected) in [(&given, &[0, 1, 2, 3, 4][..]), (&broken, &[0, 2, 4]), (&given, &[0, 1, 2, 3, 4])] {
+            let memory = device().upload("boxes", boxes).expect("memory");
+            placed.refit(&Input { source: Source::One(Geometry::boxes(memory.address(), 24)), primitive_count: 5 });
+            assert_eq!(met(), expected, "{collapse:?}");
         }
     }
 }
@@ -539,7 +587,10 @@ fn world(count: usize, seed: u64, left_out: impl Fn(usize) -> u32) -> (Vec<Entry
         let to_world = [[half[0], 0.3, 0.0, x], [0.0, half[1], 0.1, y], [-0.2, 0.0, half[2], z]];
         let number = (random.bits() % 1000) as u32;
         let entry = Entry { lo, instance: i as u32, hi, start: number, start_count: number % 3, left_out: left_out(i) };
-        (entry, Given { to_world, index_and_mask: number, offset_and_flags: !number, structure: 256 * u64::from(number) })
+        (
+            entry,
+            Given { to_world, index_and_mask: number, offset_and_flags: !number, structure: 256 * u64::from(number) },
+        )
     };
     (0..count).map(instance).unzip()
 }
@@ -589,8 +640,7 @@ fn top_levels_are_refitted_to_their_entries() {
         host::refit::refit_boxes(&mut expected, &boxes, |instance| fresh[instance as usize], Collapse::SAH);
         assert_eq!(expected.header.status, if count > 6 { status::BAD_INSTANCE } else { 0 });
         for schedule in SCHEDULES {
-            let options =
-                Options { schedule: Some(schedule), primitives: Primitives::Instances, ..Options::DEFAULT };
+            let options = Options { schedule: Some(schedule), primitives: Primitives::Instances, ..Options::DEFAULT };
             let placed = Placed::new(&tree.to_bytes(), &options, count as u32);
             placed.refit(&moved_input);
             assert!(placed.read() == expected.to_bytes(), "{count} {schedule:?}");
@@ -605,7 +655,7 @@ fn top_levels_are_refitted_to_their_entries() {
 #[test]
 fn refits_of_a_batch_are_those_of_the_host() {
     let meshes: Vec<Mesh> =
-        (0..60).map(|i| Mesh::random(if i % 9 == 0 { 3000 + i } else { i * i * 7919 % 300 })).collect();
+        (0..60).map(|i| Mesh::random(if i % 9 == 0 { 5000 + i } else { i * i * 7919 % 300 })).collect();
     let trees: Vec<Bvh2> = meshes.iter().map(|mesh| mesh.built(Collapse::SAH)).collect();
     let moved: Vec<Mesh> = meshes.iter().map(|mesh| mesh.moved(bent(0.4))).collect();
     let placed: Vec<Placed> = trees
@@ -615,8 +665,8 @@ fn refits_of_a_batch_are_those_of_the_host() {
         .collect();
     let jobs: Vec<Job<'_>> = placed.iter().zip(&moved).map(|(placed, mesh)| placed.job(&mesh.input())).collect();
     let chains = Refit::chains(&jobs).expect("every input is as planned");
-    let small = meshes.iter().filter(|mesh| (1..=2048).contains(&mesh.count())).count();
-    let large = meshes.iter().filter(|mesh| mesh.count() > 2048).count();
+    let small = meshes.iter().filter(|mesh| (1..=4096).contains(&mesh.count())).count();
+    let large = meshes.iter().filter(|mesh| mesh.count() > 4096).count();
     assert_eq!(chains.len(), large + small.div_ceil(2), "two small ones share a dispatch");
     device().run(None, |recorder| recorder.chains(&chains)).expect("they refit");
     for (i, ((placed, tree), mesh)) in placed.iter().zip(&trees).zip(&moved).enumerate() {

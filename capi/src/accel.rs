@@ -1,6 +1,6 @@
 //! The functions of `VK_KHR_acceleration_structure`, with a context in place of the device: [`hedgerow::accel`].
 
-use crate::context::{HedgerowContext, context_of};
+use crate::context::{HedgerowContext, structures_of};
 use crate::pointers::{handle, place, reference, reference_mut, slice};
 use crate::status::{status, value_or};
 use crate::vulkan::{
@@ -20,14 +20,9 @@ const _: () = assert!(
         && HEDGEROW_STRUCTURE_ALIGNMENT as u64 == accel::STRUCTURE_ALIGNMENT
 );
 
-/// What an engine calls in place of the driver's functions.
-///
-/// # Safety
-/// As [`context_of`].
-unsafe fn structures<'a>(context: *const HedgerowContext) -> Result<accel::Device<'a>> {
-    // SAFETY: the caller's promise.
-    Ok(accel::Device::new(unsafe { context_of(context) }?))
-}
+/// A build flag of ours: a top level may open instances whose boxes are loose (re-braiding).
+pub const HEDGEROW_BUILD_ACCELERATION_STRUCTURE_REBRAID_BIT: u32 = 1 << 30;
+const _: () = assert!(HEDGEROW_BUILD_ACCELERATION_STRUCTURE_REBRAID_BIT == accel::REBRAID.as_raw());
 
 /// `vkGetAccelerationStructureBuildSizesKHR`: bytes that a build of at most so many primitives a geometry needs.
 ///
@@ -47,7 +42,7 @@ pub unsafe extern "C" fn hedgerow_get_acceleration_structure_build_sizes(
             let info = reference(p_build_info, "pBuildInfo")?;
             let counts = slice(p_max_primitive_counts, info.geometry_count, "pMaxPrimitiveCounts")?;
             let sizes = reference_mut(p_size_info, "pSizeInfo")?;
-            structures(context)?.get_acceleration_structure_build_sizes(build_type, info, counts, sizes)
+            structures_of(context)?.get_acceleration_structure_build_sizes(build_type, info, counts, sizes)
         }
     })
 }
@@ -70,7 +65,7 @@ pub unsafe extern "C" fn hedgerow_create_acceleration_structure(
             let info = reference(p_create_info, "pCreateInfo")?;
             handle(info.buffer, "pCreateInfo->buffer")?;
             let place = place(p_acceleration_structure, "pAccelerationStructure")?;
-            place.write(structures(context)?.create_acceleration_structure(info, p_allocator.as_ref())?);
+            place.write(structures_of(context)?.create_acceleration_structure(info, p_allocator.as_ref())?);
         }
         Ok(())
     })
@@ -88,7 +83,7 @@ pub unsafe extern "C" fn hedgerow_destroy_acceleration_structure(
 ) {
     value_or((), || {
         // SAFETY: the caller's promises.
-        unsafe { structures(context)?.destroy_acceleration_structure(acceleration_structure, p_allocator.as_ref()) };
+        unsafe { structures_of(context)?.destroy_acceleration_structure(acceleration_structure, p_allocator.as_ref()) };
         Ok(())
     });
 }
@@ -104,7 +99,7 @@ pub unsafe extern "C" fn hedgerow_get_acceleration_structure_device_address(
 ) -> VkDeviceAddress {
     value_or(0, || {
         // SAFETY: the caller's promises.
-        let (structures, info) = unsafe { (structures(context)?, reference(p_info, "pInfo")?) };
+        let (structures, info) = unsafe { (structures_of(context)?, reference(p_info, "pInfo")?) };
         Ok(structures.get_acceleration_structure_device_address(info))
     })
 }
@@ -136,7 +131,40 @@ pub unsafe extern "C" fn hedgerow_cmd_build_acceleration_structures(
             };
             let ranges = ranges.iter().enumerate().map(ranges_of).collect::<Result<Vec<_>>>()?;
             let commands = handle(command_buffer, "commandBuffer")?;
-            structures(context)?.cmd_build_acceleration_structures(commands, infos, &ranges)
+            structures_of(context)?.cmd_build_acceleration_structures(commands, infos, &ranges)
+        }
+    })
+}
+
+/// `vkCmdBuildAccelerationStructuresIndirectKHR`: like hedgerow_cmd_build_acceleration_structures, with the ranges in device
+/// memory.
+///
+/// # Safety
+/// As Vulkan's.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hedgerow_cmd_build_acceleration_structures_indirect(
+    context: *const HedgerowContext,
+    command_buffer: VkCommandBuffer,
+    info_count: u32,
+    p_infos: *const VkAccelerationStructureBuildGeometryInfoKHR<'_>,
+    p_indirect_device_addresses: *const VkDeviceAddress,
+    p_indirect_strides: *const u32,
+    pp_max_primitive_counts: *const *const u32,
+) -> VkResult {
+    status(|| {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let infos = slice(p_infos, info_count, "pInfos")?;
+            let addresses = slice(p_indirect_device_addresses, info_count, "pIndirectDeviceAddresses")?;
+            let strides = slice(p_indirect_strides, info_count, "pIndirectStrides")?;
+            let counts = slice(pp_max_primitive_counts, info_count, "ppMaxPrimitiveCounts")?;
+            let counts_of = |(i, &p_counts): (usize, &*const u32)| {
+                slice(p_counts, infos[i].geometry_count, &format!("ppMaxPrimitiveCounts[{i}]"))
+            };
+            let counts = counts.iter().enumerate().map(counts_of).collect::<Result<Vec<_>>>()?;
+            let commands = handle(command_buffer, "commandBuffer")?;
+            structures_of(context)?
+                .cmd_build_acceleration_structures_indirect(commands, infos, addresses, strides, &counts)
         }
     })
 }

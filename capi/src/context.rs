@@ -6,9 +6,9 @@ use crate::status::{status, value_or};
 use crate::vulkan::{
     PFN_vkGetInstanceProcAddr, VkBool32, VkDevice, VkInstance, VkPhysicalDevice, VkPipelineCache, VkResult,
 };
-use hedgerow::Result;
 use hedgerow::ash::vk;
 use hedgerow::gpu::{Context, ContextDesc};
+use hedgerow::{Result, accel};
 
 /// What hedgerow_create_context takes.
 #[repr(C)]
@@ -25,11 +25,16 @@ pub struct HedgerowContextCreateInfo {
     pub pipeline_cache: VkPipelineCache,
     /// Whether phases are labelled in command buffers: `VK_TRUE` wants `VK_EXT_debug_utils` enabled in the instance.
     pub debug_labels: VkBool32,
+    /// Whether calls check what takes memory of what was created and built, as Vulkan's validation would: `VK_TRUE` for
+    /// debugging.
+    pub checked: VkBool32,
 }
 
 /// The library's state on one device: pipelines, made when first recorded. Threads may share it.
 pub struct HedgerowContext {
-    context: Context,
+    // Dropped first: it refers to the context, which stays where it is.
+    structures: accel::Device<'static>,
+    context: Box<Context>,
 }
 
 /// The context behind a pointer.
@@ -39,6 +44,15 @@ pub struct HedgerowContext {
 pub(crate) unsafe fn context_of<'a>(context: *const HedgerowContext) -> Result<&'a Context> {
     // SAFETY: the caller's promise.
     Ok(unsafe { &reference(context, "context")?.context })
+}
+
+/// What an engine calls in place of the driver's functions.
+///
+/// # Safety
+/// As [`context_of`].
+pub(crate) unsafe fn structures_of<'a>(context: *const HedgerowContext) -> Result<&'a accel::Device<'static>> {
+    // SAFETY: the caller's promise.
+    Ok(unsafe { &reference(context, "context")?.structures })
 }
 
 /// Wraps a device.
@@ -68,7 +82,12 @@ pub unsafe extern "C" fn hedgerow_create_context(
                 pipeline_cache: info.pipeline_cache,
                 debug_utils: labels.as_ref(),
             })?;
-            place.write(Box::into_raw(Box::new(HedgerowContext { context })));
+            let context = Box::new(context);
+            // The box is neither moved out of nor dropped before the structures that refer to what it holds.
+            let shared: &'static Context = &*std::ptr::from_ref(&*context);
+            let options = accel::Options { checked: info.checked != vk::FALSE, ..accel::Options::DEFAULT };
+            let structures = accel::Device::with_options(shared, options);
+            place.write(Box::into_raw(Box::new(HedgerowContext { structures, context })));
         }
         Ok(())
     })

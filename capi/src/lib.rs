@@ -5,6 +5,7 @@
 //!
 //! - [`requirements`](hedgerow_create_requirements) tells what a device needs, [`context`](hedgerow_create_context) wraps it;
 //! - [`accel`](hedgerow::accel) has the functions of `VK_KHR_acceleration_structure`;
+//! - `copy` has those that copy structures and tell their properties;
 //! - [`trace`](hedgerow_cmd_trace_rays) traces a buffer of rays;
 //! - [`status`](hedgerow_last_error_message) turns errors, null pointers and panics into what C can look at.
 //!
@@ -13,6 +14,7 @@
 
 mod accel;
 mod context;
+mod copy;
 mod loader;
 mod pointers;
 mod requirements;
@@ -22,6 +24,7 @@ mod vulkan;
 
 pub use accel::*;
 pub use context::*;
+pub use copy::*;
 pub use requirements::*;
 pub use status::hedgerow_last_error_message;
 pub use trace::*;

@@ -6,12 +6,17 @@ pub use hedgerow::ash::vk::{
     AccelerationStructureBuildRangeInfoKHR as VkAccelerationStructureBuildRangeInfoKHR,
     AccelerationStructureBuildSizesInfoKHR as VkAccelerationStructureBuildSizesInfoKHR,
     AccelerationStructureBuildTypeKHR as VkAccelerationStructureBuildTypeKHR,
+    AccelerationStructureCompatibilityKHR as VkAccelerationStructureCompatibilityKHR,
     AccelerationStructureCreateInfoKHR as VkAccelerationStructureCreateInfoKHR,
     AccelerationStructureDeviceAddressInfoKHR as VkAccelerationStructureDeviceAddressInfoKHR,
-    AccelerationStructureKHR as VkAccelerationStructureKHR, AllocationCallbacks as VkAllocationCallbacks,
-    Bool32 as VkBool32, CommandBuffer as VkCommandBuffer, Device as VkDevice, DeviceAddress as VkDeviceAddress,
-    Instance as VkInstance, PhysicalDevice as VkPhysicalDevice, PipelineCache as VkPipelineCache,
-    QueueFlags as VkQueueFlags, Result as VkResult,
+    AccelerationStructureKHR as VkAccelerationStructureKHR,
+    AccelerationStructureVersionInfoKHR as VkAccelerationStructureVersionInfoKHR,
+    AllocationCallbacks as VkAllocationCallbacks, Bool32 as VkBool32, CommandBuffer as VkCommandBuffer,
+    CopyAccelerationStructureInfoKHR as VkCopyAccelerationStructureInfoKHR,
+    CopyAccelerationStructureToMemoryInfoKHR as VkCopyAccelerationStructureToMemoryInfoKHR,
+    CopyMemoryToAccelerationStructureInfoKHR as VkCopyMemoryToAccelerationStructureInfoKHR, Device as VkDevice,
+    DeviceAddress as VkDeviceAddress, Instance as VkInstance, PhysicalDevice as VkPhysicalDevice,
+    PipelineCache as VkPipelineCache, QueueFlags as VkQueueFlags, Result as VkResult,
 };
 
 /// Null in C where it is `None` here.

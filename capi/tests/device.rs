@@ -47,6 +47,7 @@ impl Engine {
                 device: device.handle(),
                 pipeline_cache: vk::PipelineCache::null(),
                 debug_labels: vk::FALSE,
+                checked: vk::TRUE,
             };
             Engine { info, device, instance, _entry: entry }
         }

@@ -53,6 +53,7 @@ fn contexts_name_what_is_null() {
         device: vk::Device::null(),
         pipeline_cache: vk::PipelineCache::null(),
         debug_labels: vk::FALSE,
+        checked: vk::TRUE,
     };
     // SAFETY: null is refused before anything is called.
     unsafe {
@@ -111,5 +112,28 @@ fn tracing_names_what_is_null() {
     // SAFETY: null is refused before anything is called.
     unsafe {
         assert_refused(hedgerow_cmd_trace_rays(null(), vk::CommandBuffer::null(), null()), "context is null");
+    }
+}
+
+#[test]
+fn copies_and_properties_name_what_is_null() {
+    let commands = vk::CommandBuffer::from_raw(1);
+    let copy = vk::CopyAccelerationStructureInfoKHR::default();
+    // SAFETY: null is refused before anything is called.
+    unsafe {
+        assert_refused(hedgerow_cmd_copy_acceleration_structure(null(), commands, null()), "pInfo is null");
+        assert_refused(hedgerow_cmd_copy_acceleration_structure(null(), commands, &copy), "context is null");
+        assert_refused(hedgerow_cmd_copy_acceleration_structure_to_memory(null(), commands, null()), "pInfo is null");
+        assert_refused(hedgerow_cmd_copy_memory_to_acceleration_structure(null(), commands, null()), "pInfo is null");
+        let compatibility = hedgerow_get_device_acceleration_structure_compatibility(null(), null());
+        assert_eq!(compatibility, vk::AccelerationStructureCompatibilityKHR::INCOMPATIBLE);
+        let properties = |count, all, property| {
+            hedgerow_cmd_write_acceleration_structures_properties(null(), commands, count, all, property, 8)
+        };
+        assert_refused(
+            properties(1, null(), HEDGEROW_PROPERTY_SIZE),
+            "pAccelerationStructures is null; 1 elements were announced",
+        );
+        assert_refused(properties(0, null(), 99), "property is 99; take one of HEDGEROW_PROPERTY_…");
     }
 }

@@ -36,7 +36,7 @@ Entry entry_of(Geometry g, uint i) {
     // Too far away to be a number.
     entry.left_out = STATUS_BAD_INSTANCE;
     if (!is_finite(b.lo) || !is_finite(b.hi)) return entry;
-    return Entry(b.lo, i, b.hi, root.index, root.count, 0u);
+    return Entry(b.lo, i, b.hi, 0u, AT_ROOT, 0u);
 }
 
 void main() {

@@ -12,8 +12,9 @@ void open(uint i, uint behind) {
     Entry entry = entries.entry[i];
     GivenInstance given = instance_at(Geometry(uvec2(0), instances, uvec2(0), 0, 0, formats, 0), entry.instance);
     Structure structure = Structure(given.structure);
-    if (entry.start >= structure.header.node_slots) return;
-    Node node = structure.nodes[entry.start];
+    uint slot = begin_of(entry, structure).x;
+    if (slot >= structure.header.node_slots) return;
+    Node node = structure.nodes[slot];
     entries.entry[i] = entry_over(entry, given.to_world, structure, node.left);
     entries.entry[behind] = entry_over(entry, given.to_world, structure, node.right);
     gains.value[i] = UNKNOWN;

@@ -15,9 +15,11 @@ Box unite(Box a, Box b) {
 // The area that rays need not enter any more for each entry more, if the entry is opened once or twice: from the eight boxes
 // below it, transformed.
 float gain_of(Entry entry) {
-    if (entry.left_out != 0u || entry.start_count != 0u) return NO_GAIN;
+    if (entry.left_out != 0u) return NO_GAIN;
     GivenInstance given = instance_at(Geometry(uvec2(0), instances, uvec2(0), 0, 0, formats, 0), entry.instance);
     Structure structure = Structure(given.structure);
+    uvec2 begin = begin_of(entry, structure);
+    if (begin.y != 0u) return NO_GAIN;
     uint slots = structure.header.node_slots;
     Box nothing = Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
     float halves = 0.0, quarters = 0.0;
@@ -29,7 +31,7 @@ float gain_of(Entry entry) {
             Box piece = nothing;
             for (uint eighth = 0; eighth < 2; ++eighth) {
                 uint path = side | quarter << 1 | eighth << 2;
-                Child at = Child(vec3(0), entry.start, vec3(0), 0);
+                Child at = Child(vec3(0), begin.x, vec3(0), 0);
                 for (uint level = 0; level < FINE_LEVELS && at.count == 0u && at.index < slots; ++level) {
                     Node node = structure.nodes[at.index];
                     if ((path >> level & 1u) == 0u) at = node.left;

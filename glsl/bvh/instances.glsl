@@ -17,7 +17,7 @@ struct Entry {
     uint instance;
     vec3 hi;
     uint start;               // a Child's index and count, in the instance's structure
-    uint start_count;
+    uint start_count;         // or AT_ROOT: so that the structure may be replaced by a compacted copy
     uint left_out;            // 0, or why it is
 };
 
@@ -31,6 +31,12 @@ const uint GEOMETRY_POINTERS = 1u << 1;
 GivenInstance instance_at(Geometry g, uint instance) {
     if ((flags_of(g) & GEOMETRY_POINTERS) != 0u) return GivenInstances(Pointers(g.indices).pointer[instance]).instance[0];
     return GivenInstances(g.indices).instance[instance];
+}
+
+// Where an entry over a structure begins: a Child's index and count.
+uvec2 begin_of(Entry entry, Structure structure) {
+    if (entry.start_count != AT_ROOT) return uvec2(entry.start, entry.start_count);
+    return uvec2(structure.header.root.index, structure.header.root.count);
 }
 
 // 2^-k, where 2^k is about the greatest of a matrix: what it is scaled by so that its determinant neither overflows nor vanishes.
@@ -71,10 +77,7 @@ Instance record_of(Geometry g, Entry entry) {
     GivenInstance given = instance_at(g, entry.instance);
     vec4 to_object[3];
     inverse_of(given.to_world, to_object);
-    // So that the structure may be replaced by a compacted copy.
-    Child root = Structure(given.structure).header.root;
-    bool is_whole = root.index == entry.start && root.count == entry.start_count;
     return Instance(to_object, given.to_world, given.structure, given.index_and_mask, given.offset_and_flags, entry.instance,
-                    is_whole ? 0u : entry.start, is_whole ? AT_ROOT : entry.start_count, 0);
+                    entry.start, entry.start_count, 0);
 }
 #endif

@@ -7,6 +7,7 @@ use super::{Options, REBRAID};
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
 use crate::bvh::lbvh::{self, INSTANCE_POINTERS, Job, Lbvh, Sizes};
+use crate::bvh::refit::{self, Refit};
 use crate::bvh::sah::Collapse;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Context, Kernel, Step, shaders};
@@ -38,9 +39,10 @@ pub(super) enum Counts {
     OnDevice { address: u64, stride: u32 },
 }
 
-/// A build that is asked for.
+/// A build, or an update, that is asked for.
 pub(super) struct Build {
     lbvh: Lbvh,
+    refit: Refit,
     given: Given,
     counts: Counts,
     /// Most primitives of all geometries.
@@ -90,7 +92,8 @@ impl Build {
             ..lbvh::Options::DEFAULT
         };
         let lbvh = Lbvh::new(context, &lbvh_options, entries)?;
-        Ok(Build { lbvh, given, counts, primitive_count, rebraid, options: lbvh_options })
+        let refit = Refit::new(context, &refit::Options::from(&lbvh_options), entries)?;
+        Ok(Build { lbvh, refit, given, counts, primitive_count, rebraid, options: lbvh_options })
     }
 
     /// Bytes of structure and scratch memory that it needs.
@@ -115,8 +118,22 @@ impl Build {
         &self.given
     }
 
+    /// Bytes of scratch memory that an update of what it built needs.
+    pub fn update_scratch(&self) -> u64 {
+        self.scratch(0).builder + self.refit.sizes().scratch
+    }
+
     /// The builder's part, with scratch memory at `scratch`.
     pub fn job(&self, structure: u64, scratch: u64) -> Job<'_> {
+        Job { lbvh: &self.lbvh, input: self.input(scratch), structure, scratch: self.scratch(scratch).builder }
+    }
+
+    /// The part of an update in place, with scratch memory at `scratch`.
+    pub fn update(&self, structure: u64, scratch: u64) -> refit::Job<'_> {
+        refit::Job { refit: &self.refit, input: self.input(scratch), structure, scratch: self.scratch(scratch).builder }
+    }
+
+    fn input(&self, scratch: u64) -> Input {
         let parts = self.scratch(scratch);
         let source = match &self.given {
             Given::Instances { data, pointers } => {
@@ -131,8 +148,7 @@ impl Build {
                 }
             },
         };
-        let input = Input { source, primitive_count: self.lbvh.count() };
-        Job { lbvh: &self.lbvh, input, structure, scratch: parts.builder }
+        Input { source, primitive_count: self.lbvh.count() }
     }
 
     /// What must have run, with a barrier behind, before the builder's part: chains of steps for [`Recorder::chains`].

@@ -4,7 +4,7 @@ use super::Device;
 use super::given::not_null;
 use crate::bvh::compact;
 use crate::gpu::push_constants::push_constants;
-use crate::gpu::{Grid, Recorder, shaders};
+use crate::gpu::{Context, Grid, Recorder, Step, shaders};
 use crate::{Error, Result};
 use ash::vk;
 
@@ -14,6 +14,12 @@ push_constants! {
         source: u64,
         target: u64,
     }
+}
+
+/// The copying of a structure as it is.
+pub(super) fn clone_step(context: &Context, source: u64, target: u64) -> Step {
+    let grid = Grid::of(&context.limits);
+    Step::new("clone", grid.kernel(&shaders::ACCEL_COPY), &Arguments { source, target }, grid.groups)
 }
 
 impl Device<'_> {
@@ -46,10 +52,7 @@ impl Device<'_> {
         let mut recorder = unsafe { Recorder::new(self.context, commands) };
         match info.mode {
             vk::CopyAccelerationStructureModeKHR::CLONE => {
-                let grid = Grid::of(&self.context.limits);
-                recorder.phase("clone");
-                let kernel = grid.kernel(&shaders::ACCEL_COPY);
-                recorder.dispatch(&kernel, &Arguments { source, target }, grid.groups)
+                recorder.chains(&[vec![clone_step(self.context, source, target)]])
             }
             vk::CopyAccelerationStructureModeKHR::COMPACT => compact::record(&mut recorder, source, target),
             mode => Err(Error::Argument(format!(

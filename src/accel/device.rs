@@ -2,8 +2,11 @@
 
 use super::build::{self, Build, Counts, SCRATCH_ALIGNMENT};
 use super::checked::{Asked, Checks};
+use super::copy::clone_step;
+use super::given::not_null;
 use super::{Options, Placement, geometry};
 use crate::bvh::lbvh::{Job, Lbvh, Sizes};
+use crate::bvh::refit::Refit;
 use crate::gpu::{Context, Recorder, Step};
 use crate::{Error, Result};
 use ash::vk;
@@ -58,7 +61,7 @@ impl<'a> Device<'a> {
         size_info.acceleration_structure_size = structure;
         let on_host = build_type == vk::AccelerationStructureBuildTypeKHR::HOST;
         size_info.build_scratch_size = if on_host { 0 } else { scratch };
-        size_info.update_scratch_size = 0;
+        size_info.update_scratch_size = if on_host { 0 } else { build.update_scratch() };
         Ok(())
     }
 
@@ -215,7 +218,8 @@ impl<'a> Device<'a> {
             // SAFETY: the caller's promise.
             let geometries = unsafe { geometry::given(info) }?;
             let Sizes { structure, scratch, .. } = placed.build.sizes();
-            Ok(Asked { info, geometries, ranges, structure_bytes: structure, scratch_bytes: scratch })
+            let scratch_bytes = if placed.source.is_some() { placed.build.update_scratch() } else { scratch };
+            Ok(Asked { info, geometries, ranges, structure_bytes: structure, scratch_bytes })
         });
         checks.builds(&asked.collect::<Result<Vec<_>>>()?)
     }
@@ -231,9 +235,16 @@ impl<'a> Device<'a> {
         // SAFETY: device builds give device addresses.
         let scratch = unsafe { info.scratch_data.device_address };
         let refuse = |what: String| Err(Error::Argument(what));
-        if info.mode != vk::BuildAccelerationStructureModeKHR::BUILD {
-            return refuse(format!("mode is {:?}; it must be BUILD", info.mode));
-        }
+        let source = match info.mode {
+            vk::BuildAccelerationStructureModeKHR::BUILD => None,
+            vk::BuildAccelerationStructureModeKHR::UPDATE => {
+                if !info.flags.contains(vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE) {
+                    return refuse("mode is UPDATE and flags lack ALLOW_UPDATE; build it with that flag".into());
+                }
+                Some(not_null("srcAccelerationStructure", info.src_acceleration_structure)?)
+            }
+            other => return refuse(format!("mode is {other:?}; it must be BUILD or UPDATE")),
+        };
         if info.dst_acceleration_structure.is_null() {
             return refuse("dstAccelerationStructure is null; create it first".into());
         }
@@ -243,7 +254,7 @@ impl<'a> Device<'a> {
             ));
         }
         let build = Build::new(self.context, &self.options, info.flags, given, counts, primitive_count)?;
-        Ok(Placed { build, structure: info.dst_acceleration_structure.as_raw(), scratch })
+        Ok(Placed { build, source, structure: info.dst_acceleration_structure.as_raw(), scratch })
     }
 
     /// Records builds that are asked for without Vulkan's structs, side by side as
@@ -256,7 +267,7 @@ impl<'a> Device<'a> {
     /// As there.
     pub unsafe fn record(&self, commands: vk::CommandBuffer, placements: &[Placement<'_>]) -> Result<()> {
         let placed = placements.iter().map(|&Placement { request, structure, scratch }| {
-            Ok(Placed { build: request.build(self)?, structure, scratch })
+            Ok(Placed { build: request.build(self)?, source: None, structure, scratch })
         });
         let builds = placed.collect::<Result<Vec<_>>>()?;
         // SAFETY: the caller's promise.
@@ -268,11 +279,18 @@ impl<'a> Device<'a> {
     }
 
     unsafe fn record_placed(&self, commands: vk::CommandBuffer, builds: &[Placed]) -> Result<()> {
-        let jobs: Vec<Job<'_>> =
-            builds.iter().map(|placed| placed.build.job(placed.structure, placed.scratch)).collect();
-        let chains = Lbvh::chains(&jobs)?;
-        let prologues: Vec<Vec<Step>> =
-            builds.iter().flat_map(|placed| placed.build.prologue(self.context, placed.scratch)).collect();
+        let (updates, builds_anew): (Vec<&Placed>, Vec<&Placed>) = builds.iter().partition(|p| p.source.is_some());
+        let jobs: Vec<Job<'_>> = builds_anew.iter().map(|p| p.build.job(p.structure, p.scratch)).collect();
+        let updates_in_place: Vec<_> = updates.iter().map(|p| p.build.update(p.structure, p.scratch)).collect();
+        let mut chains = Lbvh::chains(&jobs)?;
+        chains.extend(Refit::chains(&updates_in_place)?);
+        let mut prologues: Vec<Vec<Step>> =
+            builds.iter().flat_map(|p| p.build.prologue(self.context, p.scratch)).collect();
+        // An update from another structure is one in place, of its copy.
+        let from_another =
+            |p: &&Placed| p.source.filter(|&source| source != p.structure).map(|source| (source, p.structure));
+        let copies = updates.iter().filter_map(from_another);
+        prologues.extend(copies.map(|(source, target)| vec![clone_step(self.context, source, target)]));
         // SAFETY: the caller's promise.
         let mut recorder = unsafe { Recorder::new(self.context, commands) };
         if !prologues.is_empty() {
@@ -286,6 +304,8 @@ impl<'a> Device<'a> {
 /// A build with its memory.
 struct Placed {
     build: Build,
+    /// The structure that is updated, where it is an update.
+    source: Option<u64>,
     structure: u64,
     scratch: u64,
 }

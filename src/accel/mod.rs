@@ -20,7 +20,7 @@
 //! | `PREFER_FAST_BUILD` | Morton codes of 8 bits less: a pass of the sort less |
 //! | `PREFER_FAST_TRACE` | codes of 8 bits more |
 //! | `LOW_MEMORY` | larger leaves, so that compacted copies are smaller; codes of at most 32 bits: 20 bytes of scratch a primitive instead of 28, from 4 million on |
-//! | `ALLOW_UPDATE` | updates are allowed; no re-braiding, as an opened instance cannot be refitted |
+//! | `ALLOW_UPDATE` | `UPDATE` may follow: boxes move with their primitives, the tree stays ([`crate::bvh::refit`]); no re-braiding, as an opened instance cannot be refitted |
 //! | `ALLOW_COMPACTION` | larger leaves, as with `LOW_MEMORY`; every structure can be compacted |
 //! | [`REBRAID`] | a top level opens instances whose boxes are loose |
 
