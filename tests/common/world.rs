@@ -307,7 +307,7 @@ impl Line {
 }
 
 /// A generous bound on what float32 may lose in a few operations, relative to their terms.
-const PRECISION: f64 = 3e-6;
+const PRECISION: f64 = 1e-6;
 
 /// How far off float32 may be in the transform of a point (or, with w = 0, of a direction) to the space of an instance: each
 /// row of the inverse is a product of two columns divided by the determinant, and lost digits of these.
