@@ -1,4 +1,5 @@
-//! What the defaults were chosen from, on this device: the schedules of the build, the ways to load nodes, builds in batches.
+//! What the defaults were chosen from, on this device: the schedules of the build, the ways to load nodes, what compaction is
+//! worth, builds in batches.
 //!
 //! ```text
 //! scripts/cargo.sh bench --features peer-obvhs --bench passes
@@ -11,6 +12,8 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use hedgerow::Result;
 use hedgerow::accel;
 use hedgerow::ash::{self, vk};
+use hedgerow::bvh::compact;
+use hedgerow::bvh::layout::{Header, Triangle};
 use hedgerow::bvh::lbvh::{Input, Lbvh, Options, Schedule};
 use hedgerow::gpu::{Buffer, Device, DeviceOptions};
 use hedgerow::scene::{self, LoadOptions, Scene};
@@ -65,12 +68,58 @@ impl<'a> Built<'a> {
         self.device.run(None, |recorder| self.lbvh.record(recorder, &self.input, structure, scratch))
     }
 
-    fn trace(&self, shape: &Shape, query: Query, rays: &Buffer<'_>, hits: &Buffer<'_>, count: u32) -> Result<()> {
-        let structure = self.structure.address();
-        let buffers = Buffers { structure, rays: rays.address(), hits: hits.address(), work: None, count };
+    /// Through its structure, or a copy of it.
+    fn trace(&self, structure: &Buffer<'_>, shape: &Shape, query: Query, rays: &Rays<'_>) -> Result<()> {
+        let buffers = Buffers {
+            structure: structure.address(),
+            rays: rays.rays.address(),
+            hits: rays.hits.address(),
+            work: None,
+            count: rays.count,
+        };
         self.device.run(None, |recorder| tracer::record(recorder, shape, query, &buffers))
     }
+
+    /// A compacted copy.
+    fn compacted(&self) -> Result<Buffer<'a>> {
+        let header: Header = self.structure.read(1)[0];
+        let bytes = header.compacted().sizes(size_of::<Triangle>() as u64).bytes;
+        let compacted = self.device.buffer("compacted", bytes)?;
+        self.compact(&compacted)?;
+        Ok(compacted)
+    }
+
+    fn compact(&self, target: &Buffer<'_>) -> Result<()> {
+        self.device.run(None, |recorder| compact::record(recorder, self.structure.address(), target.address()))
+    }
 }
+
+/// Rays on the device, and room for their hits.
+struct Rays<'a> {
+    rays: Buffer<'a>,
+    hits: Buffer<'a>,
+    count: u32,
+}
+
+impl<'a> Rays<'a> {
+    fn new(device: &'a Device, rays: &[Ray]) -> Result<Rays<'a>> {
+        let hits = device.buffer("hits", (rays.len() * size_of::<Hit>()) as u64)?;
+        Ok(Rays { rays: device.upload("rays", rays)?, hits, count: rays.len() as u32 })
+    }
+
+    /// The rays of a kind, through what was built.
+    fn of(kind: RayKind, built: &Built<'a>, scene: &Scene) -> Result<Rays<'a>> {
+        let shape = Shape::of(&built.device.limits);
+        let rays = kinds::generate(kind, scene, &RayOptions { size: SIZE, seed: 1 }, &mut |rays| {
+            let rays = Rays::new(built.device, rays)?;
+            built.trace(&built.structure, &shape, Query::ClosestHit, &rays)?;
+            Ok(rays.hits.read(rays.count as usize))
+        })?;
+        Rays::new(built.device, &rays)
+    }
+}
+
+const KINDS: [RayKind; 3] = [RayKind::Primary, RayKind::Diffuse1, RayKind::Random];
 
 fn build(c: &mut Criterion) {
     let (device, scene) = (device(), scene());
@@ -93,25 +142,37 @@ fn trace(c: &mut Criterion) {
     if device.limits.subgroup_size <= Loads::MAX_LANES {
         shapes.push(("lane by lane", Shape::lanes(&device.limits)));
     }
-    let shape = Shape::of(&device.limits);
-    for kind in [RayKind::Primary, RayKind::Diffuse1, RayKind::Random] {
-        let rays = kinds::generate(kind, &scene, &RayOptions { size: SIZE, seed: 1 }, &mut |rays| {
-            let hits = device.buffer("hits", size_of::<Hit>() as u64 * rays.len() as u64)?;
-            built.trace(&shape, Query::ClosestHit, &device.upload("rays", rays)?, &hits, rays.len() as u32)?;
-            Ok(hits.read(rays.len()))
-        });
-        let rays: Vec<Ray> = rays.expect("rays");
-        let count = rays.len() as u32;
-        let hits = device.buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
-        let rays = device.upload("rays", &rays).expect("memory");
+    for kind in KINDS {
+        let rays = Rays::of(kind, &built, &scene).expect("rays");
         let mut group = c.benchmark_group(kind.name());
-        group.sample_size(10).throughput(Throughput::Elements(count.into()));
+        group.sample_size(10).throughput(Throughput::Elements(rays.count.into()));
         for (name, shape) in &shapes {
             group.bench_function(*name, |b| {
-                b.iter(|| built.trace(shape, kind.query(), &rays, &hits, count).expect("it traces"));
+                b.iter(|| built.trace(&built.structure, shape, kind.query(), &rays).expect("it traces"));
             });
         }
     }
+}
+
+/// What a compacted copy costs, and the rays through it beside those through what was built.
+fn compaction(c: &mut Criterion) {
+    let (device, scene) = (device(), scene());
+    let built = Built::new(&device, &scene, &Options::DEFAULT).expect("it builds");
+    let compacted = built.compacted().expect("memory");
+    let mut group = c.benchmark_group("compact");
+    group.sample_size(10).throughput(Throughput::Elements(scene.mesh.triangles.len() as u64));
+    group.bench_function("compact", |b| b.iter(|| built.compact(&compacted).expect("it compacts")));
+    let shape = Shape::of(&device.limits);
+    for kind in KINDS {
+        let rays = Rays::of(kind, &built, &scene).expect("rays");
+        group.throughput(Throughput::Elements(rays.count.into()));
+        for (name, structure) in [("as built", &built.structure), ("compacted", &compacted)] {
+            group.bench_function(BenchmarkId::new(kind.name(), name), |b| {
+                b.iter(|| built.trace(structure, &shape, kind.query(), &rays).expect("it traces"));
+            });
+        }
+    }
+    group.finish();
 }
 
 /// Structures of 12 to 500 triangles out of one pair of buffers.
@@ -255,5 +316,5 @@ fn batch(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, build, trace, batch);
+criterion_group!(benches, build, trace, compaction, batch);
 criterion_main!(benches);

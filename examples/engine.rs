@@ -1,9 +1,9 @@
 //! A small engine that links hedgerow: instance, device, allocator, memory, command buffer and shader are all its own.
 //!
-//! It asks the library what a device must have, makes a device with exactly that, records the build of a structure (by the
-//! calls and structs of `VK_KHR_acceleration_structure`, which the device need not have) and the dispatch of its own shader
-//! (`engine.comp`, which includes `glsl/trace/query.glsl`) into one command buffer, submits that once, and writes what the
-//! shader drew.
+//! It asks the library what a device must have, makes a device with exactly that, records the builds of two bottom-level
+//! structures and of a top level over instances of them (by the calls and structs of `VK_KHR_acceleration_structure`, which the
+//! device need not have) and the dispatch of its own shader (`engine.comp`, written for `GLSL_EXT_ray_query`, which the device
+//! need not have either) into one command buffer, submits that once, and writes what the shader drew.
 //!
 //! ```text
 //! cargo run --release --example engine --no-default-features --features compile-shaders -- picture.png
@@ -11,7 +11,7 @@
 
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
-use hedgerow::accel;
+use hedgerow::accel::{self, Instance};
 use hedgerow::ash::{self, vk};
 use hedgerow::gpu::{Context, ContextDesc, Requirements, requirements};
 use std::error::Error;
@@ -47,14 +47,31 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Draws a knot above a floor into a PNG of [`WIDTH`] × [`HEIGHT`] pixels.
+/// Draws knots above a floor into a PNG of [`WIDTH`] × [`HEIGHT`] pixels.
 pub fn draw(path: &Path) -> Result<()> {
     let mut engine = Engine::new()?;
-    let (positions, triangles) = knot_above_floor();
-    let pixels = engine.render(&positions, &triangles)?;
+    let pixels = engine.render(&Model::knot_and_floor())?;
     let image = image::RgbaImage::from_raw(WIDTH, HEIGHT, pixels).ok_or("the picture has another size")?;
     Ok(image.save(path)?)
 }
+
+/// Triangles of two parts over common vertices.
+pub struct Model {
+    pub positions: Vec<[f32; 3]>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Of the floor, and of the knot.
+    pub parts: [std::ops::Range<u32>; 2],
+}
+
+/// Object to world, row by row.
+pub type Transform = [[f32; 4]; 3];
+
+/// Which part stands where: the floor, a knot, and a small one on its side.
+pub const PLACES: [(usize, Transform); 3] = [
+    (0, Instance::IDENTITY),
+    (1, Instance::IDENTITY),
+    (1, [[0.0, -0.35, 0.0, 2.2], [0.35, 0.0, 0.0, -0.3], [0.0, 0.0, 0.35, 1.6]]),
+];
 
 /// Three floats a vertex, three 32-bit indices a triangle.
 fn opaque_triangles(
@@ -74,6 +91,44 @@ fn opaque_triangles(
         .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
         .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
         .flags(vk::GeometryFlagsKHR::OPAQUE)
+}
+
+fn instances_at(address: u64) -> vk::AccelerationStructureGeometryKHR<'static> {
+    let data = vk::DeviceOrHostAddressConstKHR { device_address: address };
+    let instances = vk::AccelerationStructureGeometryInstancesDataKHR::default().data(data);
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { instances })
+}
+
+/// What is built of geometries, without its memory.
+fn build_info<'a>(
+    ty: vk::AccelerationStructureTypeKHR,
+    geometries: &'a [vk::AccelerationStructureGeometryKHR<'a>],
+) -> vk::AccelerationStructureBuildGeometryInfoKHR<'a> {
+    vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(ty)
+        .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)
+        .geometries(geometries)
+}
+
+/// A structure with its memory.
+struct Structure {
+    raw: vk::AccelerationStructureKHR,
+    address: u64,
+    memory: Buffer,
+    scratch: Buffer,
+}
+
+impl Structure {
+    /// `info` with the structure's memory, ready to be built.
+    fn placed<'a>(
+        &self,
+        info: vk::AccelerationStructureBuildGeometryInfoKHR<'a>,
+    ) -> vk::AccelerationStructureBuildGeometryInfoKHR<'a> {
+        info.dst_acceleration_structure(self.raw)
+            .scratch_data(vk::DeviceOrHostAddressKHR { device_address: self.scratch.address })
+    }
 }
 
 /// What every engine has anyway.
@@ -116,7 +171,7 @@ impl Engine {
         }
     }
 
-    fn render(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<Vec<u8>> {
+    fn render(&mut self, model: &Model) -> Result<Vec<u8>> {
         let desc = ContextDesc {
             instance: &self.instance,
             physical_device: self.physical,
@@ -127,43 +182,34 @@ impl Engine {
         // SAFETY: the device was made from these with what `requirements` returned, and outlives the context.
         let context = unsafe { Context::new(&desc) }?;
 
-        // 1. How much memory does the build need? The engine brings it. The structs are Vulkan's own.
+        // 1. The engine brings data and memory; the structs are Vulkan's own.
         let structures = accel::Device::new(&context);
-        let count = triangles.len() as u32;
-        let mut position_buffer = self.buffer("positions", size_of_val(positions) as u64)?;
-        let mut triangle_buffer = self.buffer("triangles", size_of_val(triangles) as u64)?;
-        position_buffer.write(bytemuck::cast_slice(positions))?;
-        triangle_buffer.write(bytemuck::cast_slice(triangles))?;
-        let geometry = [opaque_triangles(&position_buffer, positions.len() as u32, &triangle_buffer)];
-        let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
-        let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
-            .ty(ty)
-            .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)
-            .geometries(&geometry);
-        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
-        // SAFETY: the geometry lives.
-        unsafe { structures.get_acceleration_structure_build_sizes(place, &info, &[count], &mut sizes) }?;
-        let structure = self.buffer("structure", sizes.acceleration_structure_size)?;
-        let scratch = self.buffer("scratch", sizes.build_scratch_size)?;
+        let positions = self.filled("positions", bytemuck::cast_slice(&model.positions))?;
+        let triangles = self.filled("triangles", bytemuck::cast_slice(&model.triangles))?;
+        let geometry = [opaque_triangles(&positions, model.positions.len() as u32, &triangles)];
+        let bottom = build_info(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, &geometry);
+        let ranges = model.parts.each_ref().map(|part| {
+            [vk::AccelerationStructureBuildRangeInfoKHR::default()
+                .primitive_count(part.len() as u32)
+                .primitive_offset(12 * part.start)]
+        });
+        let floor = self.structure(&structures, &bottom, model.parts[0].len() as u32)?;
+        let knot = self.structure(&structures, &bottom, model.parts[1].len() as u32)?;
+        let places = PLACES.map(|(part, transform)| {
+            let structure = [&floor, &knot][part].address;
+            Instance::new(structure, transform).with_index_and_mask(model.parts[part].start, 0xff)
+        });
+        let instances = self.filled("instances", bytemuck::cast_slice(&places))?;
+        let instance_geometry = [instances_at(instances.address)];
+        let top = build_info(vk::AccelerationStructureTypeKHR::TOP_LEVEL, &instance_geometry);
+        let all = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(PLACES.len() as u32)];
+        let scene = self.structure(&structures, &top, PLACES.len() as u32)?;
         let picture = self.buffer("picture", u64::from(4 * WIDTH * HEIGHT))?;
-        let create = vk::AccelerationStructureCreateInfoKHR::default()
-            .buffer(structure.raw)
-            .size(sizes.acceleration_structure_size)
-            .ty(ty);
-        // SAFETY: the buffer lives and has so many bytes.
-        let scene = unsafe { structures.create_acceleration_structure(&create, None) }?;
-        let address = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(scene);
-        let address = structures.get_acceleration_structure_device_address(&address);
-        let info = info
-            .dst_acceleration_structure(scene)
-            .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.address });
-        let range = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count)];
 
         let push = Push {
-            scene: address,
-            positions: position_buffer.address,
-            triangles: triangle_buffer.address,
+            scene: scene.address,
+            positions: positions.address,
+            triangles: triangles.address,
             picture: picture.address,
             size: [WIDTH, HEIGHT],
             eye: EYE,
@@ -171,16 +217,15 @@ impl Engine {
         };
         let pipeline = self.pipeline(size_of::<Push>() as u32)?;
         self.submit(|device, commands| {
-            // 2. The library records the build, the engine what it does with it.
+            // 2. The library records the builds, the engine what it does with them.
             // SAFETY: the command buffer records, on a queue of the family that `requirements` named; all memory lives until
             // the queue has finished.
             unsafe {
-                structures.cmd_build_acceleration_structures(commands, &[info], &[&range])?;
-                let built = [vk::MemoryBarrier::default()
-                    .src_access_mask(vk::AccessFlags::SHADER_WRITE)
-                    .dst_access_mask(vk::AccessFlags::SHADER_READ)];
-                let shader = vk::PipelineStageFlags::COMPUTE_SHADER;
-                device.cmd_pipeline_barrier(commands, shader, shader, vk::DependencyFlags::empty(), &built, &[], &[]);
+                let parts = [floor.placed(bottom), knot.placed(bottom)];
+                structures.cmd_build_acceleration_structures(commands, &parts, &[&ranges[0], &ranges[1]])?;
+                built(device, commands);
+                structures.cmd_build_acceleration_structures(commands, &[scene.placed(top)], &[&all])?;
+                built(device, commands);
             }
             // SAFETY: pipeline, layout and buffers live until the queue has finished.
             unsafe {
@@ -198,12 +243,47 @@ impl Engine {
             self.device.destroy_pipeline(pipeline.pipeline, None);
             self.device.destroy_pipeline_layout(pipeline.layout, None);
         }
-        for buffer in [position_buffer, triangle_buffer, structure, scratch, picture] {
+        let memory = [floor, knot, scene].into_iter().flat_map(|structure| {
+            structures.destroy_acceleration_structure(structure.raw, None);
+            [structure.memory, structure.scratch]
+        });
+        for buffer in memory.collect::<Vec<_>>().into_iter().chain([positions, triangles, instances, picture]) {
             // SAFETY: as above.
             unsafe { self.device.destroy_buffer(buffer.raw, None) };
             self.allocator.as_mut().ok_or("the allocator is gone")?.free(buffer.allocation)?;
         }
         Ok(pixels)
+    }
+
+    /// Asks how much memory the build of `info` over `count` primitives needs, and brings it.
+    fn structure(
+        &mut self,
+        structures: &accel::Device<'_>,
+        info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+        count: u32,
+    ) -> Result<Structure> {
+        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
+        // SAFETY: the geometry lives.
+        unsafe { structures.get_acceleration_structure_build_sizes(place, info, &[count], &mut sizes) }?;
+        let memory = self.buffer("structure", sizes.acceleration_structure_size)?;
+        let scratch = self.buffer("scratch", sizes.build_scratch_size)?;
+        let create = vk::AccelerationStructureCreateInfoKHR::default()
+            .buffer(memory.raw)
+            .size(sizes.acceleration_structure_size)
+            .ty(info.ty);
+        // SAFETY: the buffer lives and has so many bytes.
+        let raw = unsafe { structures.create_acceleration_structure(&create, None) }?;
+        let address = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(raw);
+        let address = structures.get_acceleration_structure_device_address(&address);
+        Ok(Structure { raw, address, memory, scratch })
+    }
+
+    /// Memory that holds `bytes`.
+    fn filled(&mut self, name: &str, bytes: &[u8]) -> Result<Buffer> {
+        let mut buffer = self.buffer(name, bytes.len() as u64)?;
+        buffer.write(bytes)?;
+        Ok(buffer)
     }
 
     /// Memory that the host maps and shaders reach by its address.
@@ -286,6 +366,21 @@ impl Drop for Engine {
     }
 }
 
+/// What builds have written, later builds and shaders read.
+///
+/// # Safety
+/// `commands` is being recorded.
+unsafe fn built(device: &ash::Device, commands: vk::CommandBuffer) {
+    let written = [vk::MemoryBarrier::default()
+        .src_access_mask(vk::AccessFlags::SHADER_WRITE)
+        .dst_access_mask(vk::AccessFlags::SHADER_READ)];
+    let shader = vk::PipelineStageFlags::COMPUTE_SHADER;
+    // SAFETY: the caller's promise.
+    unsafe {
+        device.cmd_pipeline_barrier(commands, shader, shader, vk::DependencyFlags::empty(), &written, &[], &[]);
+    }
+}
+
 struct Pipeline {
     pipeline: vk::Pipeline,
     layout: vk::PipelineLayout,
@@ -324,32 +419,35 @@ fn pick(instance: &ash::Instance) -> Result<(vk::PhysicalDevice, Requirements)> 
     Err(format!("no device can be used: {}", lacking.join("; ")).into())
 }
 
-/// A torus knot of about 9,000 triangles above a square.
-pub fn knot_above_floor() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
-    const AROUND: u32 = 320;
-    const ACROSS: u32 = 14;
-    const TURN: f32 = std::f32::consts::TAU;
-    let centre = |s: f32| {
-        let ring = 1.2 + 0.5 * (3.0 * s).cos();
-        [ring * (2.0 * s).cos(), 0.6 * (3.0 * s).sin(), ring * (2.0 * s).sin()]
-    };
-    let mut positions = vec![[-8.0, -1.2, -8.0], [8.0, -1.2, -8.0], [8.0, -1.2, 8.0], [-8.0, -1.2, 8.0]];
-    let mut triangles = vec![[0, 1, 2], [0, 2, 3]];
-    for i in 0..AROUND {
-        let s = i as f32 / AROUND as f32 * TURN;
-        let [from, to] = [centre(s), centre(s + 0.01)];
-        let along = unit(std::array::from_fn(|k| to[k] - from[k]));
-        let side = unit(cross(along, [0.0, 1.0, 0.0]));
-        let up = cross(side, along);
-        for j in 0..ACROSS {
-            let (sin, cos) = (j as f32 / ACROSS as f32 * TURN).sin_cos();
-            positions.push(std::array::from_fn(|k| from[k] + 0.22 * (cos * side[k] + sin * up[k])));
-            let corner = |i: u32, j: u32| 4 + i % AROUND * ACROSS + j % ACROSS;
-            let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
-            triangles.extend([[a, b, c], [a, c, d]]);
+impl Model {
+    /// A square, and a torus knot of about 9,000 triangles.
+    pub fn knot_and_floor() -> Model {
+        const AROUND: u32 = 320;
+        const ACROSS: u32 = 14;
+        const TURN: f32 = std::f32::consts::TAU;
+        let centre = |s: f32| {
+            let ring = 1.2 + 0.5 * (3.0 * s).cos();
+            [ring * (2.0 * s).cos(), 0.6 * (3.0 * s).sin(), ring * (2.0 * s).sin()]
+        };
+        let mut positions = vec![[-8.0, -1.2, -8.0], [8.0, -1.2, -8.0], [8.0, -1.2, 8.0], [-8.0, -1.2, 8.0]];
+        let mut triangles = vec![[0, 1, 2], [0, 2, 3]];
+        for i in 0..AROUND {
+            let s = i as f32 / AROUND as f32 * TURN;
+            let [from, to] = [centre(s), centre(s + 0.01)];
+            let along = unit(std::array::from_fn(|k| to[k] - from[k]));
+            let side = unit(cross(along, [0.0, 1.0, 0.0]));
+            let up = cross(side, along);
+            for j in 0..ACROSS {
+                let (sin, cos) = (j as f32 / ACROSS as f32 * TURN).sin_cos();
+                positions.push(std::array::from_fn(|k| from[k] + 0.22 * (cos * side[k] + sin * up[k])));
+                let corner = |i: u32, j: u32| 4 + i % AROUND * ACROSS + j % ACROSS;
+                let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
         }
+        let parts = [0..2, 2..triangles.len() as u32];
+        Model { positions, triangles, parts }
     }
-    (positions, triangles)
 }
 
 fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {

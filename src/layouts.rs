@@ -3,6 +3,7 @@
 //! A module declares its push constants with `gpu::push_constants!`; every shader of the table must find its module in
 //! `arguments_of`, so that a new one cannot be forgotten. Names may differ by the ending `_address`.
 
+use crate::accel::serialize::Head;
 use crate::bvh::geometry::Geometry;
 use crate::bvh::layout::{BoxRecord, Child, GeometryEntry, Header, Instance, Node, Triangle};
 use crate::gpu::shaders;
@@ -46,12 +47,18 @@ fn arguments_of(shader: &str) -> Option<Layout> {
     let (room, name) = shader.split_once('/')?;
     let is = |prefix: &str| name == prefix || name.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('_'));
     Some(match room {
+        "accel" if is("copy") => accel::push_constants::copy(),
         "accel" if is("entries") => accel::push_constants::entries(),
         "accel" if is("geometries") => accel::push_constants::geometries(),
+        "accel" if is("properties") => accel::push_constants::properties(),
+        "accel" if is("rebraid") => accel::push_constants::rebraid(),
         "accel" if is("ranges") => accel::push_constants::ranges(),
+        "accel" if is("serialize") => accel::push_constants::serialize(),
+        "bvh" if is("compact") => bvh::compact::push_constants(),
         "bvh" if is("lbvh_workgroup") => bvh::lbvh_workgroup::push_constants(),
         "bvh" if is("lbvh") => bvh::lbvh::push_constants(),
         "bvh" if is("quality") => bvh::quality::push_constants(),
+        "bvh" if is("refit") => bvh::refit::push_constants(),
         "gpu" if is("fill") => gpu::fill::push_constants(),
         "gpu" if is("pool_tree") => gpu::probe::push_constants(),
         "gpu" if is("radix_sort") => gpu::radix_sort::push_constants(),
@@ -59,6 +66,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "gpu" if is("scan") => gpu::scan::push_constants(),
         "trace" if is("tracer") => trace::tracer::push_constants(),
         "measure" if is("copy") => measure::copy::push_constants(),
+        "measure" if is("query") => measure::peers::driver::push_constants(),
         "measure" if is("ray_query") => measure::peers::driver::push_constants(),
         _ => return None,
     })
@@ -116,6 +124,7 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         ),
         ("Header", header),
         ("Geometry", geometry),
+        ("SerializedHead", layout_of!(Head { version, serialized_bytes, structure_bytes, handle_count })),
         ("Ray", layout_of!(Ray { origin, t_min, direction, t_max })),
         ("Hit", layout_of!(Hit { t, primitive, u, v })),
     ])

@@ -7,7 +7,7 @@ use common::backends::{backends, is_new_lavapipe};
 use common::probe::{CONFIRM, CONFIRM_ODD, IGNORE, ProbeRay, TERMINATE, flags};
 use common::shapes::{Random, boxes, soup};
 use common::world::{Part, World, inverse};
-use hedgerow::accel::Instance;
+use hedgerow::accel::{Instance, REBRAID};
 use hedgerow::ash::vk;
 use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
 
@@ -89,8 +89,15 @@ fn every_flag_and_decision_is_reported_as_by_brute_force() {
     ];
     for backend in backends() {
         let mut hits = 0;
-        for (by_pointers, seed) in [(false, 1), (true, 2)] {
+        for (by_pointers, seed, rebraids) in [(false, 1, false), (true, 2, false), (false, 1, true), (true, 2, true)] {
             let mut world = World { by_pointers, ..world(seed) };
+            if rebraids {
+                // The flag is ours alone.
+                if backend.name() == "driver" {
+                    continue;
+                }
+                world.flags = REBRAID;
+            }
             if backend.name() == "driver" && is_new_lavapipe() {
                 world.instances.retain(|instance| instance.structure != 0);
             }

@@ -5,7 +5,7 @@
 #[path = "../examples/engine.rs"]
 mod engine;
 
-use engine::{EYE, HEIGHT, LAMP, WIDTH};
+use engine::{EYE, HEIGHT, LAMP, Model, PLACES, WIDTH};
 use glam::Vec3;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::host::lbvh;
@@ -44,7 +44,15 @@ fn a_foreign_engine_draws_what_the_host_traces() {
     let picture = image::open(&path).expect("a picture").into_rgb8();
     assert_eq!(picture.dimensions(), (WIDTH, HEIGHT));
 
-    let (positions, triangles) = engine::knot_above_floor();
+    // Every instance written out.
+    let model = Model::knot_and_floor();
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for (part, rows) in PLACES {
+        let first = positions.len() as u32;
+        positions.extend(model.positions.iter().map(|p| rows.map(|[a, b, c, d]| a * p[0] + b * p[1] + c * p[2] + d)));
+        let part = model.parts[part].start as usize..model.parts[part].end as usize;
+        triangles.extend(model.triangles[part].iter().map(|t| t.map(|v| v + first)));
+    }
     let tree = lbvh::build(&positions, &triangles, Code::Mc63.full(), Collapse::OFF);
     let corners = |triangle: u32| triangles[triangle as usize].map(|vertex| Vec3::from(positions[vertex as usize]));
     let expected: Vec<Option<f32>> = (0..WIDTH * HEIGHT).map(|pixel| light(&tree, &corners, pixel)).collect();

@@ -13,7 +13,6 @@ layout(push_constant, scalar) uniform Arguments {
     uint count;
     uint capacity;
     uint formats;      // flags << 24, as in a Geometry
-    uint padding;
 };
 
 bool is_finite_matrix(vec4 m[3]) {

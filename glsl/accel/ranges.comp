@@ -14,7 +14,6 @@ layout(push_constant, scalar) uniform Arguments {
     uint stride;
     uint count;
     uint boxes;
-    uint padding;
 };
 
 void main() {

@@ -71,7 +71,10 @@ Instance record_of(Geometry g, Entry entry) {
     GivenInstance given = instance_at(g, entry.instance);
     vec4 to_object[3];
     inverse_of(given.to_world, to_object);
+    // So that the structure may be replaced by a compacted copy.
+    Child root = Structure(given.structure).header.root;
+    bool is_whole = root.index == entry.start && root.count == entry.start_count;
     return Instance(to_object, given.to_world, given.structure, given.index_and_mask, given.offset_and_flags, entry.instance,
-                    entry.start, entry.start_count, 0);
+                    is_whole ? 0u : entry.start, is_whole ? AT_ROOT : entry.start_count, 0);
 }
 #endif

@@ -16,6 +16,8 @@ const uint KIND_INSTANCES = 0x00220003u;
 const uint MAX_DEPTH = 96;
 // The count of a child that no tree has: its slot is unused.
 const uint UNUSED = 0xFFFFFFFFu;
+// The count of where an instance begins that was not opened: wherever its structure's root is.
+const uint AT_ROOT = 0xFFFFFFFFu;
 
 const uint STATUS_NON_FINITE = 1u << 0;
 const uint STATUS_INDEX_OUT_OF_RANGE = 1u << 1;
@@ -60,7 +62,7 @@ struct Instance {
     uint offset_and_flags;    // offset in the shader binding table, flags << 24
     uint instance;
     uint start;               // where to begin in the structure: a Child's index and count
-    uint start_count;
+    uint start_count;         // or AT_ROOT
     uint reserved;
 };
 

@@ -14,8 +14,10 @@
 #include "gpu/task_pool.glsl"
 #include "gpu/radix_sort.glsl"
 #include "bvh/layout.glsl"
+#include "bvh/empty.glsl"
 #include "bvh/primitives.glsl"
 #include "bvh/codes.glsl"
+#include "bvh/sah.glsl"
 
 // Items of an invocation in a task.
 layout(constant_id = 1) const uint ITEMS = 1;
@@ -148,17 +150,6 @@ void lbvh_bounds(uint task) {
 
 // ---- plan ----
 
-float scaled_half_area(Box b, float scale) {
-    precise vec3 e = b.hi * scale - b.lo * scale;
-    precise float area = e.x * e.y + e.y * e.z + e.z * e.x;
-    return area;
-}
-
-void mark_unused(Structure structure, uint slot) {
-    Child unused = Child(uintBitsToFloat(uvec3(0x7F800000u)), NONE, uintBitsToFloat(uvec3(0xFF800000u)), NONE);
-    structure.nodes[slot] = Node(unused, unused);
-}
-
 // The flags of all geometries in one word; where there are several, the structure's table is written.
 uint write_geometries(Geometry g, uint count, uint node_slots) {
     if (!has_records()) return SOURCE == SOURCE_ENTRIES ? 0 : flags_of(g) | flags_of(g) << 8;
@@ -180,12 +171,11 @@ void lbvh_plan() {
     Structure structure = Structure(structure_address);
     uint slots = max(primitive_count, 2) - 1;
     uint bits = kind_of_codes().bits;
-    Child empty = Child(uintBitsToFloat(uvec3(0x7F800000u)), 0, uintBitsToFloat(uvec3(0xFF800000u)), 0);
     structure.header.magic = MAGIC;
     structure.header.kind = kind_of_records();
     structure.header.status = state.status;
     structure.header.primitive_count = primitive_count;
-    structure.header.root = empty;
+    structure.header.root = empty_root();
     structure.header.active_count = state.active_count;
     structure.header.node_slots = slots;
     structure.header.code_bits = bits;
@@ -268,16 +258,6 @@ uvec3 difference_behind(Words codes, uint last, uint active_count) {
 bool is_less(uvec3 a, uvec3 b) {
     if (KEY_WORDS == 2 && a.z != b.z) return a.z < b.z;
     return a.y != b.y ? a.y < b.y : a.x < b.x;
-}
-
-float leaf_cost(float area, uint count) {
-    precise float cost = c_i * area * float(count);
-    return cost;
-}
-
-float inner_cost(float area, float left, float right) {
-    precise float cost = c_t * area + (left + right);
-    return cost;
 }
 
 // A finished subtree over the positions first..=last, and how the codes differ before and behind it.
@@ -370,8 +350,8 @@ void climb(Structure structure, Words codes, uint active_count, float area_scale
         s.child.hi = max(s.child.hi, sibling.hi);
         uint count = s.last - s.first + 1;
         float area = scaled_half_area(Box(s.child.lo, s.child.hi), area_scale);
-        float as_leaf = leaf_cost(area, count);
-        s.cost = inner_cost(area, s.cost, sibling_cost);
+        float as_leaf = leaf_cost(c_i, area, count);
+        s.cost = inner_cost(c_t, area, s.cost, sibling_cost);
         bool as_leaf_is_cheaper = collapses() && as_leaf < s.cost;
         s.child.index = as_leaf_is_cheaper ? s.first : parent;
         s.child.count = as_leaf_is_cheaper ? count : 0;
@@ -404,14 +384,15 @@ void lbvh_hierarchy(uint task) {
         uint own_run = run;
         bool climbs = true;
         if (position < end) {
-            Box b = write_record(records, position, input_geometries, order.word[position]);
+            Box b;
+            write_record(records, position, input_geometries, order.word[position], b);
             climbs = position < active_count;
             // Slots from active_count - 1 on have no node.
             if (position >= max(active_count, 1)) mark_unused(structure, position - 1);
             s.first = position;
             s.last = position;
             s.child = Child(b.lo, position, b.hi, 1);
-            s.cost = leaf_cost(scaled_half_area(b, area_scale), 1);
+            s.cost = leaf_cost(c_i, scaled_half_area(b, area_scale), 1);
             position++;
         } else if (waiting > 0) {
             own_run = NONE;

@@ -37,22 +37,24 @@ uint load_box(Geometry g, uint primitive, out Box b) {
     return why_not;
 }
 
-// Writes the record of a primitive to its place, and tells the box; one that is left out has a record of zeros.
-Box write_record(uvec2 records, uint position, Geometry g, uint primitive) {
+// Writes the record of a primitive to its place, and tells the box; returns as load_box does. One that is left out has a
+// record of zeros.
+uint write_record(uvec2 records, uint position, Geometry g, uint primitive, out Box b) {
+    uint why_not;
     if (SOURCE == SOURCE_ENTRIES) {
         Entry entry = Entries(g.vertices).entry[primitive];
         Instances(records).instance[position] = record_of(g, entry);
-        return Box(entry.lo, entry.hi);
-    }
-    if (kind_of_records() == KIND_BOXES) {
-        Box b;
-        load_given_box(g, primitive, b);
+        b = Box(entry.lo, entry.hi);
+        why_not = entry.left_out;
+    } else if (kind_of_records() == KIND_BOXES) {
+        why_not = load_given_box(g, primitive, b);
         BoxRecords(records).box[position] = BoxRecord(b.lo, b.hi, primitive);
-        return b;
+    } else {
+        Corners c;
+        why_not = load_corners(g, primitive, c);
+        Triangles(records).triangle[position] = Triangle(c.v0, c.v1, c.v2, primitive);
+        b = box_around(c);
     }
-    Corners c;
-    load_corners(g, primitive, c);
-    Triangles(records).triangle[position] = Triangle(c.v0, c.v1, c.v2, primitive);
-    return box_around(c);
+    return why_not;
 }
 #endif

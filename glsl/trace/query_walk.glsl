@@ -1,7 +1,8 @@
 // One query on its way through a top level and the structures below it: what trace/query.glsl is made of.
 //
-// The stack is one: the entries of the bottom-level structure at hand lie above those of the top level. Each round takes one
-// step (a node, a primitive, an instance, or what waits), so that invocations that do the same stay together.
+// The stack is one: the entries of the bottom-level structure at hand lie above those of the top level. Each round takes a step
+// of each kind that there is to take (what waits, an instance, a node, a primitive): invocations that wait for each other's steps
+// are fewer than with a loop for each kind.
 #ifndef HEDGEROW_TRACE_QUERY_WALK
 #define HEDGEROW_TRACE_QUERY_WALK
 #include "bvh/layout.glsl"
@@ -37,6 +38,14 @@ const uint HEDGEROW_MET_BOX = 2u;
 const uint HEDGEROW_NOTHING = 0xffffffffu;
 // As many nodes and records as a structure may have.
 const uint HEDGEROW_MOST = 1u << 27;
+
+// A shader that defines HEDGEROW_COUNTS_WORK finds in `work` how many nodes of the top level, instances, nodes below and primitives
+// a query has met so far.
+#ifdef HEDGEROW_COUNTS_WORK
+#define HEDGEROW_COUNT(member) query.work.member += 1u
+#else
+#define HEDGEROW_COUNT(member)
+#endif
 
 struct HedgerowMeeting {
     uint type;
@@ -79,6 +88,9 @@ struct HedgerowRayQuery {
     uint top_rounds;
     HedgerowMeeting candidate;
     HedgerowMeeting committed;
+#ifdef HEDGEROW_COUNTS_WORK
+    uvec4 work;
+#endif
 };
 
 vec3 hedgerow_transformed(vec4 rows[3], vec4 p) {
@@ -125,6 +137,9 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.best = ray.t_max;
     query.candidate = nothing;
     query.committed = nothing;
+#ifdef HEDGEROW_COUNTS_WORK
+    query.work = uvec4(0u);
+#endif
     hedgerow_end(query);
     query.index = 0u;
     query.top_slots = 0u;
@@ -210,6 +225,10 @@ void hedgerow_visit(inout HedgerowRayQuery query) {
         query.left = HEDGEROW_NOTHING;
         return;
     }
+#ifdef HEDGEROW_COUNTS_WORK
+    if (query.kind == KIND_INSTANCES) query.work.x += 1u;
+    else query.work.z += 1u;
+#endif
     Node node = Structure(query.structure).nodes[query.index];
     Child a = node.left, b = node.right;
     bool enters_a, enters_b;
@@ -239,6 +258,7 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     Instance instance = Instances(records_at(query.top, query.top_slots)).instance[at];
     uint flags = instance.offset_and_flags >> 24;
     if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
+    HEDGEROW_COUNT(y);
     Header header = Structure(instance.structure).header;
     HedgerowRay ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
                                   hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
@@ -264,8 +284,9 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     query.instance = at;
     query.instance_flags = flags;
     query.bottom = query.level;
-    query.index = instance.start;
-    query.left = instance.start_count;
+    bool is_whole = instance.start_count == AT_ROOT;
+    query.index = is_whole ? header.root.index : instance.start;
+    query.left = is_whole ? header.root.count : instance.start_count;
 }
 
 // Back to the top level.
@@ -321,6 +342,8 @@ bool hedgerow_test_triangle(inout HedgerowRayQuery query, uint at) {
 // The same for a box: always a candidate, as only the shader knows what is in it.
 bool hedgerow_test_box(inout HedgerowRayQuery query, uint at) {
     BoxRecord box = BoxRecords(records_at(query.structure, query.slots)).box[at];
+    // Inside out where an update has left it out.
+    if (box.lo.x > box.hi.x) return false;
     bool entered;
     hedgerow_enter(query.prepared, box.lo, box.hi, query.best, entered);
     if (!entered) return false;
@@ -333,6 +356,7 @@ bool hedgerow_test_box(inout HedgerowRayQuery query, uint at) {
 bool hedgerow_test(inout HedgerowRayQuery query) {
     uint at = query.index;
     hedgerow_step(query);
+    HEDGEROW_COUNT(w);
     if (at >= query.records) return false;
     return query.kind == KIND_BOXES ? hedgerow_test_box(query, at) : hedgerow_test_triangle(query, at);
 }
@@ -352,17 +376,19 @@ bool hedgerow_go_on(inout HedgerowRayQuery query) {
     return true;
 }
 
+bool hedgerow_has_record(HedgerowRayQuery query) {
+    return query.left != 0u && query.left != HEDGEROW_NOTHING;
+}
+
 bool hedgerow_proceed(inout HedgerowRayQuery query) {
-    for (; query.rounds != 0u; --query.rounds) {
-        if (query.left == HEDGEROW_NOTHING) {
+    while (query.rounds != 0u) {
+        query.rounds--;
+        while (query.left == HEDGEROW_NOTHING) {
             if (!hedgerow_go_on(query)) return false;
-        } else if (query.left == 0u) {
-            hedgerow_visit(query);
-        } else if (query.kind == KIND_INSTANCES) {
-            hedgerow_enter_instance(query);
-        } else if (hedgerow_test(query)) {
-            return true;
         }
+        if (hedgerow_has_record(query) && query.kind == KIND_INSTANCES) hedgerow_enter_instance(query);
+        if (query.left == 0u) hedgerow_visit(query);
+        if (hedgerow_has_record(query) && query.kind != KIND_INSTANCES && hedgerow_test(query)) return true;
     }
     return false;
 }

@@ -2,10 +2,11 @@
 
 use super::geometry::{self, Given};
 use super::instances::{ENTRY_BYTES, entries_step};
+use super::rebraid::Rebraid;
 use super::{Options, REBRAID};
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
-use crate::bvh::lbvh::{self, Job, Lbvh, Sizes};
+use crate::bvh::lbvh::{self, INSTANCE_POINTERS, Job, Lbvh, Sizes};
 use crate::bvh::sah::Collapse;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Context, Kernel, Step, shaders};
@@ -44,53 +45,74 @@ pub(super) struct Build {
     counts: Counts,
     /// Most primitives of all geometries.
     primitive_count: u32,
+    rebraid: Option<Rebraid>,
+    options: lbvh::Options,
 }
 
 /// Where the parts of the scratch memory begin.
 struct Scratch {
     entries: u64,
+    rebraid: u64,
     builder: u64,
 }
 
 impl Build {
-    /// What `info` asks for over the primitives `given`, at most `primitive_count` in all.
+    /// A build with these flags over the primitives `given`, at most `primitive_count` in all.
     pub fn new(
         context: &Context,
         options: &Options,
-        info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+        flags: Flags,
         given: Given,
         counts: Counts,
         primitive_count: u64,
     ) -> Result<Build> {
-        if !KNOWN_FLAGS.contains(info.flags) {
-            return Err(Error::Argument(format!("flags are {:?}; take some of {KNOWN_FLAGS:?}", info.flags)));
+        if !KNOWN_FLAGS.contains(flags) {
+            return Err(Error::Argument(format!("flags are {flags:?}; take some of {KNOWN_FLAGS:?}")));
         }
-        if info.flags.contains(Flags::PREFER_FAST_TRACE | Flags::PREFER_FAST_BUILD) {
+        if flags.contains(Flags::PREFER_FAST_TRACE | Flags::PREFER_FAST_BUILD) {
             return Err(Error::Argument("flags ask for a fast trace and for a fast build; take one".into()));
         }
         let primitive_count = u32::try_from(primitive_count).unwrap_or(u32::MAX);
-        let entries = match given {
-            Given::Instances { .. } => options.entries(info.flags, primitive_count),
-            _ => primitive_count,
+        let opens = flags.contains(REBRAID) && !flags.contains(Flags::ALLOW_UPDATE);
+        let rebraid = match given {
+            Given::Instances { .. } if opens => Some(options.rebraid(primitive_count)),
+            _ => None,
         };
+        let entries = rebraid.map_or(primitive_count, |rebraid| rebraid.capacity);
         let primitives = given.primitives();
         let lbvh_options = lbvh::Options {
-            codes: Some(codes(info.flags, entries)),
+            codes: Some(codes(flags, entries)),
             // An instance costs more than a node whatever its box: one a leaf.
-            collapse: if primitives == Primitives::Instances { Collapse::OFF } else { Collapse::SAH },
+            collapse: if primitives == Primitives::Instances { Collapse::OFF } else { collapse(flags) },
             primitives,
             geometry_count: given.count(),
-            build_flags: info.flags.as_raw() & 0x1f,
+            build_flags: flags.as_raw() & 0x1f,
             ..lbvh::Options::DEFAULT
         };
         let lbvh = Lbvh::new(context, &lbvh_options, entries)?;
-        Ok(Build { lbvh, given, counts, primitive_count })
+        Ok(Build { lbvh, given, counts, primitive_count, rebraid, options: lbvh_options })
+    }
+
+    /// Bytes of structure and scratch memory that it needs.
+    pub fn sizes(&self) -> Sizes {
+        let sizes = self.lbvh.sizes();
+        Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
     }
 
     /// Bytes of structure and scratch memory that suffice for it and for the same with fewer primitives.
     pub fn sizes_at_most(&self) -> Sizes {
         let sizes = self.lbvh.sizes_at_most();
         Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
+    }
+
+    /// What the host's builder takes: codes, collapsing, flags.
+    pub fn host_options(&self) -> (Codes, Collapse, u32) {
+        (self.lbvh.codes(), self.options.collapse, self.options.build_flags)
+    }
+
+    /// What it is over.
+    pub fn given(&self) -> &Given {
+        &self.given
     }
 
     /// The builder's part, with scratch memory at `scratch`.
@@ -125,7 +147,12 @@ impl Build {
                     Counts::OnDevice { address, .. } => address,
                 };
                 let (count, capacity) = (self.primitive_count, self.lbvh.count());
-                vec![vec![entries_step(context, *data, *pointers, parts.entries, ranges, count, capacity)]]
+                let mut steps = vec![entries_step(context, *data, *pointers, parts.entries, ranges, count, capacity)];
+                if let Some(rebraid) = &self.rebraid {
+                    let formats = if *pointers { INSTANCE_POINTERS } else { 0 };
+                    steps.extend(rebraid.steps(context, *data, formats, count, parts.entries, parts.rebraid));
+                }
+                vec![steps]
             }
             Given::Triangles(geometries) | Given::Boxes(geometries) => match self.counts {
                 Counts::Told if geometries.len() < 2 => Vec::new(),
@@ -155,13 +182,14 @@ impl Build {
 
     /// The parts of scratch memory: records of the geometries with one more that may end them, or entries; then the builder's.
     fn scratch(&self, begin: u64) -> Scratch {
-        let before = match &self.given {
+        let records = match &self.given {
             Given::Instances { .. } => u64::from(self.lbvh.count()) * ENTRY_BYTES,
             Given::Triangles(geometries) | Given::Boxes(geometries) => {
                 (geometries.len() as u64 + 1) * size_of::<Geometry>() as u64
             }
         };
-        Scratch { entries: begin, builder: begin + before.next_multiple_of(SCRATCH_ALIGNMENT) }
+        let rebraid = begin + records.next_multiple_of(SCRATCH_ALIGNMENT);
+        Scratch { entries: begin, rebraid, builder: rebraid + self.rebraid.map_or(0, |r| r.scratch_bytes()) }
     }
 }
 
@@ -175,6 +203,16 @@ fn codes(flags: Flags, primitive_count: u32) -> Codes {
         () => codes.bits,
     };
     codes.code.full().with_bits(if flags.contains(Flags::LOW_MEMORY) { bits.min(32) } else { bits })
+}
+
+/// How subtrees are collapsed: where memory counts, tests are taken to be cheaper than they are, so that leaves are larger and
+/// nodes fewer. Compacted structures then have 56 to 59 bytes a triangle instead of 64 to 70 on eleven scenes of twelve.
+fn collapse(flags: Flags) -> Collapse {
+    if flags.intersects(Flags::ALLOW_COMPACTION | Flags::LOW_MEMORY) {
+        Collapse { c_i: 1.25, ..Collapse::SAH }
+    } else {
+        Collapse::SAH
+    }
 }
 
 push_constants! {

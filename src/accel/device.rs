@@ -1,12 +1,14 @@
 //! The object that stands for the driver's: sizes, handles, addresses, builds.
 
-use super::Options;
 use super::build::{self, Build, Counts, SCRATCH_ALIGNMENT};
+use super::checked::{Asked, Checks};
+use super::{Options, Placement, geometry};
 use crate::bvh::lbvh::{Job, Lbvh, Sizes};
 use crate::gpu::{Context, Recorder, Step};
 use crate::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
+use std::sync::Arc;
 
 /// What the offset of a structure in its buffer must be a multiple of, as Vulkan demands it.
 pub const STRUCTURE_ALIGNMENT: u64 = 256;
@@ -15,10 +17,12 @@ pub const STRUCTURE_ALIGNMENT: u64 = 256;
 ///
 /// As with ash, the methods are unsafe where they take handles, pointers and addresses on trust; unlike with ash, they return
 /// what is wrong instead of leaving it to the validation layers.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Device<'a> {
-    context: &'a Context,
+    pub(super) context: &'a Context,
     options: Options,
+    /// Where [`Options::checked`] asks for it; shared with clones.
+    pub(super) checks: Option<Arc<Checks>>,
 }
 
 impl<'a> Device<'a> {
@@ -29,7 +33,7 @@ impl<'a> Device<'a> {
 
     /// The same with options.
     pub fn with_options(context: &'a Context, options: Options) -> Device<'a> {
-        Device { context, options }
+        Device { context, options, checks: options.checked.then(Default::default) }
     }
 
     /// `vkGetAccelerationStructureBuildSizesKHR`: bytes that a build of at most `max_primitive_counts` primitives a geometry
@@ -47,15 +51,13 @@ impl<'a> Device<'a> {
         max_primitive_counts: &[u32],
         size_info: &mut vk::AccelerationStructureBuildSizesInfoKHR<'_>,
     ) -> Result<()> {
-        if build_type != vk::AccelerationStructureBuildTypeKHR::DEVICE {
-            return Err(Error::Argument(format!("buildType is {build_type:?}; structures are built on the DEVICE")));
-        }
         // SAFETY: the caller's promise.
         let (given, count) = unsafe { build::at_most(info, max_primitive_counts) }?;
-        let build = Build::new(self.context, &self.options, info, given, Counts::Told, count)?;
+        let build = Build::new(self.context, &self.options, info.flags, given, Counts::Told, count)?;
         let Sizes { structure, scratch, .. } = build.sizes_at_most();
         size_info.acceleration_structure_size = structure;
-        size_info.build_scratch_size = scratch;
+        let on_host = build_type == vk::AccelerationStructureBuildTypeKHR::HOST;
+        size_info.build_scratch_size = if on_host { 0 } else { scratch };
         size_info.update_scratch_size = 0;
         Ok(())
     }
@@ -80,16 +82,30 @@ impl<'a> Device<'a> {
         }
         let buffer = vk::BufferDeviceAddressInfo::default().buffer(info.buffer);
         // SAFETY: the caller's promise.
-        let address = unsafe { self.context.ash_device().get_buffer_device_address(&buffer) };
-        Ok(vk::AccelerationStructureKHR::from_raw(address + info.offset))
+        let address = unsafe { self.context.ash_device().get_buffer_device_address(&buffer) } + info.offset;
+        if let Some(checks) = &self.checks {
+            // SAFETY: the caller's promise.
+            let there = unsafe { self.context.ash_device().get_buffer_memory_requirements(info.buffer) }.size;
+            if info.offset.saturating_add(info.size) > there {
+                return Err(Error::Argument(format!(
+                    "offset {} and size {} reach behind the buffer's {there} bytes; create a larger buffer",
+                    info.offset, info.size
+                )));
+            }
+            checks.created(address, info.size, info.ty);
+        }
+        Ok(vk::AccelerationStructureKHR::from_raw(address))
     }
 
     /// `vkDestroyAccelerationStructureKHR`. A handle owns nothing: the memory is the caller's before and after.
     pub fn destroy_acceleration_structure(
         &self,
-        _structure: vk::AccelerationStructureKHR,
+        structure: vk::AccelerationStructureKHR,
         _allocation_callbacks: Option<&vk::AllocationCallbacks<'_>>,
     ) {
+        if let Some(checks) = &self.checks {
+            checks.destroyed(structure.as_raw());
+        }
     }
 
     /// `vkGetAccelerationStructureDeviceAddressKHR`: what shaders trace through, and the tracer takes.
@@ -132,8 +148,12 @@ impl<'a> Device<'a> {
             };
             builds.push(build().map_err(|error| within(i, error))?);
         }
+        let ranges = build_range_infos.iter().map(|ranges| ranges.to_vec());
         // SAFETY: the caller's promise.
-        unsafe { self.record(commands, &builds) }
+        unsafe {
+            self.check(infos, ranges, &builds)?;
+            self.record_placed(commands, &builds)
+        }
     }
 
     /// `vkCmdBuildAccelerationStructuresIndirectKHR`: like [`Device::cmd_build_acceleration_structures`], with the ranges of
@@ -174,15 +194,37 @@ impl<'a> Device<'a> {
             };
             builds.push(build().map_err(|error| within(i, error))?);
         }
+        let range = |&count: &u32| vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count);
+        let ranges = max_primitive_counts.iter().map(|counts| counts.iter().map(range).collect());
         // SAFETY: the caller's promise.
-        unsafe { self.record(commands, &builds) }
+        unsafe {
+            self.check(infos, ranges, &builds)?;
+            self.record_placed(commands, &builds)
+        }
+    }
+
+    /// Where checks are asked for: the rules that take memory of what was created and built.
+    unsafe fn check(
+        &self,
+        infos: &[vk::AccelerationStructureBuildGeometryInfoKHR<'_>],
+        ranges: impl Iterator<Item = Vec<vk::AccelerationStructureBuildRangeInfoKHR>>,
+        builds: &[Placed],
+    ) -> Result<()> {
+        let Some(checks) = &self.checks else { return Ok(()) };
+        let asked = infos.iter().zip(ranges).zip(builds).map(|((info, ranges), placed)| {
+            // SAFETY: the caller's promise.
+            let geometries = unsafe { geometry::given(info) }?;
+            let Sizes { structure, scratch, .. } = placed.build.sizes();
+            Ok(Asked { info, geometries, ranges, structure_bytes: structure, scratch_bytes: scratch })
+        });
+        checks.builds(&asked.collect::<Result<Vec<_>>>()?)
     }
 
     /// What `info` asks for, with its memory.
     fn placed(
         &self,
         info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
-        given: super::geometry::Given,
+        given: geometry::Given,
         counts: Counts,
         primitive_count: u64,
     ) -> Result<Placed> {
@@ -200,11 +242,32 @@ impl<'a> Device<'a> {
                 "scratchData.deviceAddress is {scratch:#x}; it must be a multiple of {SCRATCH_ALIGNMENT} and not zero"
             ));
         }
-        let build = Build::new(self.context, &self.options, info, given, counts, primitive_count)?;
+        let build = Build::new(self.context, &self.options, info.flags, given, counts, primitive_count)?;
         Ok(Placed { build, structure: info.dst_acceleration_structure.as_raw(), scratch })
     }
 
-    unsafe fn record(&self, commands: vk::CommandBuffer, builds: &[Placed]) -> Result<()> {
+    /// Records builds that are asked for without Vulkan's structs, side by side as
+    /// [`Device::cmd_build_acceleration_structures`] does. Nothing is checked against what was created.
+    ///
+    /// # Errors
+    /// A request that cannot be built; nothing is recorded then.
+    ///
+    /// # Safety
+    /// As there.
+    pub unsafe fn record(&self, commands: vk::CommandBuffer, placements: &[Placement<'_>]) -> Result<()> {
+        let placed = placements.iter().map(|&Placement { request, structure, scratch }| {
+            Ok(Placed { build: request.build(self)?, structure, scratch })
+        });
+        let builds = placed.collect::<Result<Vec<_>>>()?;
+        // SAFETY: the caller's promise.
+        unsafe { self.record_placed(commands, &builds) }
+    }
+
+    pub(super) fn options(&self) -> &Options {
+        &self.options
+    }
+
+    unsafe fn record_placed(&self, commands: vk::CommandBuffer, builds: &[Placed]) -> Result<()> {
         let jobs: Vec<Job<'_>> =
             builds.iter().map(|placed| placed.build.job(placed.structure, placed.scratch)).collect();
         let chains = Lbvh::chains(&jobs)?;
@@ -227,7 +290,7 @@ struct Placed {
     scratch: u64,
 }
 
-fn within(build: usize, error: Error) -> Error {
+pub(super) fn within(build: usize, error: Error) -> Error {
     match error {
         Error::Argument(what) => Error::Argument(format!("pInfos[{build}]: {what}")),
         other => other,

@@ -2,7 +2,7 @@
 //!
 //! [`Device`] stands where an engine has `ash::khr::acceleration_structure::Device`: the same methods take the same structs
 //! of [`ash::vk`] and record compute dispatches. What the structs can ask for and is not there is refused with an error that
-//! names the field.
+//! names the field. Who does not come from those structs asks by a [`Request`].
 //!
 //! A handle is the structure's device address, in the type that the structs want: it owns nothing, and lives as long as the
 //! buffer that it lies in. That buffer needs `STORAGE_BUFFER` and `SHADER_DEVICE_ADDRESS` usage, and so does scratch memory,
@@ -10,27 +10,41 @@
 //! want the stage `ACCELERATION_STRUCTURE_BUILD` in a barrier, these want `COMPUTE_SHADER` with `SHADER_READ` and
 //! `SHADER_WRITE`.
 //!
+//! A structure is copied, compacted, kept in a file and brought back by the calls of the extension ([`serialize`]); what the
+//! device knows of it is a [`Property`], written to an address instead of a query pool.
+//!
 //! The build flags, and what each changes:
 //!
 //! | flag | |
 //! | --- | --- |
 //! | `PREFER_FAST_BUILD` | Morton codes of 8 bits less: a pass of the sort less |
 //! | `PREFER_FAST_TRACE` | codes of 8 bits more |
-//! | `LOW_MEMORY` | codes of at most 32 bits: 20 bytes of scratch a primitive instead of 28, from 4 million on |
+//! | `LOW_MEMORY` | larger leaves, so that compacted copies are smaller; codes of at most 32 bits: 20 bytes of scratch a primitive instead of 28, from 4 million on |
 //! | `ALLOW_UPDATE` | updates are allowed; no re-braiding, as an opened instance cannot be refitted |
-//! | `ALLOW_COMPACTION` | nothing: every structure can be compacted |
+//! | `ALLOW_COMPACTION` | larger leaves, as with `LOW_MEMORY`; every structure can be compacted |
 //! | [`REBRAID`] | a top level opens instances whose boxes are loose |
 
 mod build;
+mod checked;
+mod copy;
 mod device;
 mod geometry;
+mod given;
+mod host;
 mod instances;
+mod properties;
+mod rebraid;
+mod request;
+pub mod serialize;
 
 pub use build::SCRATCH_ALIGNMENT;
 pub use device::{Device, STRUCTURE_ALIGNMENT};
 pub use instances::Instance;
+pub use properties::Property;
+pub use request::{Placement, Request, RequestSizes};
 
 use ash::vk;
+use rebraid::Rebraid;
 
 /// A build flag of ours: a top level may open instances (Benthin, Woop, Wald 2017), within [`Options::rebraid_budget`].
 pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAccelerationStructureFlagsKHR::from_raw(1 << 30);
@@ -40,18 +54,27 @@ pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAcceleratio
 pub struct Options {
     /// Entries of a top level that is built with [`REBRAID`], as a multiple of its instances: at least 1.
     pub rebraid_budget: f32,
+    /// How much area the parts of an opened entry may have together, as a multiple of the entry's: at 1, only entries whose
+    /// boxes are loose are opened; above, those whose parts overlap, too.
+    pub rebraid_tolerance: f32,
+    /// Whether calls look at what takes memory of what was created and built, as Vulkan's validation would: memory that is too
+    /// small or overlaps, misaligned data, updates without the flag or of changed counts. They return an error before anything
+    /// is recorded. Structures must then be created, built and destroyed through this device and its clones. For debugging:
+    /// each call takes a lock.
+    pub checked: bool,
 }
 
 impl Options {
-    /// Twice as many entries as instances.
-    pub const DEFAULT: Options = Options { rebraid_budget: 2.0 };
+    /// Twice as many entries as instances; no checks.
+    pub const DEFAULT: Options = Options { rebraid_budget: 2.0, rebraid_tolerance: 1.0, checked: false };
+    /// The same with checks.
+    pub const CHECKED: Options = Options { checked: true, ..Options::DEFAULT };
 
-    /// Entries that a top level of so many instances has room for.
-    fn entries(&self, flags: vk::BuildAccelerationStructureFlagsKHR, instance_count: u32) -> u32 {
-        let opens = flags.contains(REBRAID) && !flags.contains(vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE);
-        let budget = if opens { f64::from(self.rebraid_budget.max(1.0)) } else { 1.0 };
+    /// The opening of a top level of so many instances.
+    fn rebraid(&self, instance_count: u32) -> Rebraid {
         // What is too much is refused by the builder.
-        (f64::from(instance_count) * budget).ceil() as u32
+        let capacity = (f64::from(instance_count) * f64::from(self.rebraid_budget.max(1.0))).ceil() as u32;
+        Rebraid { capacity, tolerance: self.rebraid_tolerance }
     }
 }
 
@@ -64,5 +87,9 @@ impl Default for Options {
 #[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
 pub(crate) mod push_constants {
     pub(crate) use super::build::{push_constants as geometries, ranges_push_constants as ranges};
+    pub(crate) use super::copy::push_constants as copy;
     pub(crate) use super::instances::push_constants as entries;
+    pub(crate) use super::properties::push_constants as properties;
+    pub(crate) use super::rebraid::push_constants as rebraid;
+    pub(crate) use super::serialize::push_constants as serialize;
 }

@@ -232,7 +232,7 @@ pub enum Source {
     Several {
         /// Address of the records.
         records: u64,
-        /// How many there are; one more than the builder was made for where a last one ends the others.
+        /// How many there are; one more than was planned for where a last one ends the others.
         count: u32,
     },
     /// The entries of a top level, `glsl/bvh/instances.glsl`, in device memory, and the instances that they are of.
@@ -250,6 +250,74 @@ impl Input {
     /// One geometry as [`Geometry::mesh`] has it.
     pub fn mesh(positions: u64, vertex_count: u32, indices: u64, primitive_count: u32) -> Input {
         Input { source: Source::One(Geometry::mesh(positions, vertex_count, indices)), primitive_count }
+    }
+
+    /// Specialisation constant 5 of the kernels that read primitives: `SOURCE` in geometry.glsl.
+    pub(crate) fn source_constant(&self, primitives: Primitives) -> u32 {
+        match (primitives, self.source) {
+            (Primitives::Triangles, Source::One(geometry)) if geometry.is_plain() => SOURCE_MESH,
+            (Primitives::Triangles, Source::One(_)) => SOURCE_GEOMETRY,
+            (Primitives::Triangles, _) => SOURCE_GEOMETRIES,
+            (Primitives::Boxes, Source::One(_)) => SOURCE_BOXES,
+            (Primitives::Boxes, _) => SOURCE_SEVERAL_BOXES,
+            (Primitives::Instances, _) => SOURCE_ENTRIES,
+        }
+    }
+
+    /// The geometry as the kernels are given it, and its formats.
+    pub(crate) fn for_kernels(&self) -> (Geometry, u32) {
+        match self.source {
+            Source::One(geometry) => (geometry, geometry.formats()),
+            // The address of the records, and how many there are.
+            Source::Several { records, count } => {
+                (Geometry { vertex_count: count, ..Geometry::mesh(records, 0, 0) }, 0)
+            }
+            Source::Entries { entries, instances, pointers } => {
+                (Geometry::mesh(entries, 0, instances), if pointers { INSTANCE_POINTERS } else { 0 })
+            }
+        }
+    }
+}
+
+const SOURCE_MESH: u32 = 0;
+const SOURCE_GEOMETRY: u32 = 1;
+const SOURCE_GEOMETRIES: u32 = 2;
+const SOURCE_BOXES: u32 = 3;
+const SOURCE_SEVERAL_BOXES: u32 = 4;
+const SOURCE_ENTRIES: u32 = 5;
+
+/// `GEOMETRY_POINTERS << 24`: in the formats of entries (instances.glsl).
+pub(crate) const INSTANCE_POINTERS: u32 = 1 << 25;
+
+/// The inputs that kernels and memory were planned for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Planned {
+    pub primitives: Primitives,
+    pub primitive_count: u32,
+    pub geometry_count: u32,
+}
+
+impl Planned {
+    /// # Errors
+    /// `input` is another.
+    pub fn check(&self, input: &Input) -> Result<()> {
+        let refuse = |planned: String, has: String| {
+            Err(Error::Argument(format!("planned for {planned}, the input has {has}; plan for what it has")))
+        };
+        if input.primitive_count != self.primitive_count {
+            return refuse(format!("{} primitives", self.primitive_count), input.primitive_count.to_string());
+        }
+        if let Source::Several { count, .. } = input.source
+            && count != self.geometry_count
+            && count != self.geometry_count + 1
+        {
+            return refuse(format!("{} geometries", self.geometry_count), count.to_string());
+        }
+        let is_entries = matches!(input.source, Source::Entries { .. });
+        if is_entries != (self.primitives == Primitives::Instances) {
+            return refuse(format!("{:?}", self.primitives), format!("{:?}", input.source));
+        }
+        Ok(())
     }
 }
 

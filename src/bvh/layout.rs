@@ -11,12 +11,15 @@
 //!
 //! A [`Child`] names either an inner node (`count` 0) or a leaf: `count` records from `index` on, in the *primitive order*,
 //! which is the order of the records: [`Triangle`]s, [`BoxRecord`]s or, of a top level, [`Instance`]s. A slot that no child
-//! names is unused: the `count` of its left child is [`UNUSED`], and nothing else of it means anything.
+//! names is unused: the `count` of its left child is [`UNUSED`], and nothing else of it means anything. The slots from
+//! `active` − 1 on are unused.
 
 use bytemuck::{Pod, Zeroable};
 
 /// The first word of a structure.
 pub const MAGIC: u32 = u32::from_le_bytes(*b"hdgr");
+/// The version of the layout: the low half of every [`Record::KIND`].
+pub const VERSION: u32 = Triangle::KIND & 0xFFFF;
 /// The left child's `count` of a slot that no child names.
 pub const UNUSED: u32 = u32::MAX;
 /// Where the nodes begin.
@@ -154,6 +157,15 @@ pub trait Record: Pod + PartialEq + std::fmt::Debug {
 
     /// The box around it, if it can be told without other structures.
     fn bounds(&self) -> Option<Aabb>;
+
+    /// What an update makes of the record of a primitive that can no longer be met: no ray meets it, and no other primitive has
+    /// such a record.
+    fn left_out(primitive: u32) -> Self;
+
+    /// Whether it is such a record.
+    fn is_left_out(&self) -> bool {
+        bytemuck::bytes_of(self) == bytemuck::bytes_of(&Self::left_out(self.primitive()))
+    }
 }
 
 /// A triangle in the primitive order. 40 bytes.
@@ -180,6 +192,12 @@ impl Record for Triangle {
     fn bounds(&self) -> Option<Aabb> {
         Some(Aabb::around(&[self.v0, self.v1, self.v2]))
     }
+
+    /// Negative zeros: builders make zeros of all others.
+    fn left_out(primitive: u32) -> Triangle {
+        let zero = [-0.0; 3];
+        Triangle { v0: zero, v1: zero, v2: zero, primitive }
+    }
 }
 
 /// A box that stands for something that the caller's shaders know, in the primitive order. 28 bytes.
@@ -204,6 +222,12 @@ impl Record for BoxRecord {
     fn bounds(&self) -> Option<Aabb> {
         Some(Aabb { lo: self.lo, hi: self.hi })
     }
+
+    /// Inside out: tracers skip it.
+    fn left_out(primitive: u32) -> BoxRecord {
+        let Aabb { lo, hi } = Aabb::EMPTY;
+        BoxRecord { lo, hi, primitive }
+    }
 }
 
 /// An instance, or a part of one, in a top level. 128 bytes.
@@ -222,12 +246,18 @@ pub struct Instance {
     pub offset_and_flags: u32,
     /// Position in the input.
     pub instance: u32,
-    /// Where to begin in the bottom-level structure: a [`Child`]'s index. Not its root where the instance was opened.
+    /// Where to begin in the bottom-level structure, if the instance was opened: a [`Child`]'s index.
     pub start: u32,
-    /// And its count.
+    /// And its count; [`Instance::AT_ROOT`] where it was not opened.
     pub start_count: u32,
     /// Zero.
     pub reserved: u32,
+}
+
+impl Instance {
+    /// The `start_count` of an instance that begins at its structure's root, wherever that is: the structure may be replaced by
+    /// a compacted copy.
+    pub const AT_ROOT: u32 = u32::MAX;
 }
 
 impl Record for Instance {
@@ -239,6 +269,11 @@ impl Record for Instance {
 
     fn bounds(&self) -> Option<Aabb> {
         None
+    }
+
+    /// Of no structure.
+    fn left_out(instance: u32) -> Instance {
+        Instance { instance, ..Zeroable::zeroed() }
     }
 }
 
@@ -265,13 +300,13 @@ pub struct Header {
     pub kind: u32,
     /// Bits of [`status`].
     pub status: u32,
-    /// Primitives of the input, and records.
+    /// Records: one a primitive of the input; of a compacted structure those of the tree.
     pub primitive_count: u32,
     /// The root, with the box of the whole scene. Of an empty structure: an empty box, index 0, count 0 and `active` 0.
     pub root: Child,
     /// Primitives in the tree: those of the input that are finite and whose indices are in range.
     pub active: u32,
-    /// Node slots there are: `primitive_count` − 1, at least 1; of a compacted structure those that are used.
+    /// Node slots there are: `primitive_count` − 1, at least 1; of a compacted structure `inner_nodes`, at least 1.
     pub node_slots: u32,
     /// Code bits that the builder sorted by.
     pub code_bits: u32,
@@ -336,6 +371,16 @@ pub const fn sizes_with(record_bytes: u64, node_slots: u32, primitive_count: u32
     Sizes { records_offset, geometries_offset, bytes }
 }
 
+/// Bytes of a record of this [`Record::KIND`]; `None` where there is no such kind.
+pub const fn record_bytes(kind: u32) -> Option<u64> {
+    match kind {
+        Triangle::KIND => Some(size_of::<Triangle>() as u64),
+        BoxRecord::KIND => Some(size_of::<BoxRecord>() as u64),
+        Instance::KIND => Some(size_of::<Instance>() as u64),
+        _ => None,
+    }
+}
+
 /// Node slots that `primitive_count` records need at most.
 pub const fn node_slots(primitive_count: u32) -> u32 {
     if primitive_count < 2 { 1 } else { primitive_count - 1 }
@@ -343,6 +388,7 @@ pub const fn node_slots(primitive_count: u32) -> u32 {
 
 const _: () = assert!(size_of::<Header>() == 128 && size_of::<Node>() == 64 && size_of::<Triangle>() == 40);
 const _: () = assert!(size_of::<BoxRecord>() == 28 && size_of::<Instance>() == 128);
+const _: () = assert!(BoxRecord::KIND & 0xFFFF == VERSION && Instance::KIND & 0xFFFF == VERSION);
 
 /// A structure on the host, read back or built there.
 #[derive(Debug, Clone)]

@@ -5,6 +5,8 @@
 //! [`super::host::lbvh`]: the same bytes.
 
 use super::codes::{Code, Codes};
+use super::geometry::Planned;
+pub(crate) use super::geometry::INSTANCE_POINTERS;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::layout;
 use super::lbvh_workgroup;
@@ -104,17 +106,6 @@ struct Scratch {
     table: u64,
     bytes: u64,
 }
-
-/// Specialisation constant 5 of the kernels that read primitives: `SOURCE` in geometry.glsl.
-const SOURCE_MESH: u32 = 0;
-const SOURCE_GEOMETRY: u32 = 1;
-const SOURCE_GEOMETRIES: u32 = 2;
-const SOURCE_BOXES: u32 = 3;
-const SOURCE_SEVERAL_BOXES: u32 = 4;
-const SOURCE_ENTRIES: u32 = 5;
-
-/// `GEOMETRY_POINTERS << 24`: in the formats of entries (instances.glsl).
-pub(crate) const INSTANCE_POINTERS: u32 = 1 << 25;
 
 /// Bytes of `LbvhState` in lbvh.glsl, with room to spare.
 pub(super) const STATE_BYTES: u64 = 768;
@@ -311,16 +302,8 @@ impl Lbvh {
 
     /// A kernel that reads primitives.
     pub(super) fn reading_kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
-        let source = match (self.primitives, input.source) {
-            (Primitives::Triangles, Source::One(geometry)) if geometry.is_plain() => SOURCE_MESH,
-            (Primitives::Triangles, Source::One(_)) => SOURCE_GEOMETRY,
-            (Primitives::Triangles, _) => SOURCE_GEOMETRIES,
-            (Primitives::Boxes, Source::One(_)) => SOURCE_BOXES,
-            (Primitives::Boxes, _) => SOURCE_SEVERAL_BOXES,
-            (Primitives::Instances, _) => SOURCE_ENTRIES,
-        };
         let constants = self.shape.constants(self.items, self.key_words());
-        Kernel::new(shader, self.shape.workgroup, &[&constants[..], &[source]].concat())
+        Kernel::new(shader, self.shape.workgroup, &[&constants[..], &[input.source_constant(self.primitives)]].concat())
     }
 
     /// The kernels that [`Lbvh::record`] dispatches for `input`, to make their pipelines ahead with [`Context::warm`].
@@ -383,38 +366,13 @@ impl Lbvh {
 
     /// The input's geometry as the kernels are given it, and its formats.
     pub(super) fn checked(&self, input: &Input) -> Result<(Geometry, u32)> {
-        if input.primitive_count != self.count {
-            return Err(Error::Argument(format!(
-                "the builder was made for {} primitives, the input has {}; make a builder for it",
-                self.count, input.primitive_count
-            )));
-        }
-        if let Source::Several { count, .. } = input.source
-            && count != self.geometry_count
-            && count != self.geometry_count + 1
-        {
-            return Err(Error::Argument(format!(
-                "the builder was made for {} geometries, the input has {count}; make a builder for it",
-                self.geometry_count
-            )));
-        }
-        let is_entries = matches!(input.source, Source::Entries { .. });
-        if is_entries != (self.primitives == Primitives::Instances) {
-            return Err(Error::Argument(format!(
-                "the builder was made for {:?}, the input is {:?}; make a builder for it",
-                self.primitives, input.source
-            )));
-        }
-        Ok(match input.source {
-            Source::One(geometry) => (geometry, geometry.formats()),
-            // The address of the records, and how many there are.
-            Source::Several { records, count } => {
-                (Geometry { vertex_count: count, ..Geometry::mesh(records, 0, 0) }, 0)
-            }
-            Source::Entries { entries, instances, pointers } => {
-                (Geometry::mesh(entries, 0, instances), if pointers { INSTANCE_POINTERS } else { 0 })
-            }
-        })
+        let planned = Planned {
+            primitives: self.primitives,
+            primitive_count: self.count,
+            geometry_count: self.geometry_count,
+        };
+        planned.check(input)?;
+        Ok(input.for_kernels())
     }
 
     /// `code_kind` in lbvh.glsl.

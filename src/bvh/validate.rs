@@ -1,12 +1,12 @@
 //! Walks a structure on the host and says what is wrong and where.
 
-use super::layout::{Aabb, Bvh2, Child, Instance, MAX_DEPTH, Record};
+use super::layout::{Aabb, Bvh2, Child, Instance, MAX_DEPTH, Record, node_slots};
 use crate::{Error, Result};
 
 impl<R: Record> Bvh2<R> {
     /// Checks every rule of the layout: indices in range, no cycle, every active primitive in exactly one leaf, boxes that are
-    /// exactly those around what they hold (as far as records tell), unused slots that say so, and a depth that tracers can
-    /// walk.
+    /// exactly those around what they hold (as far as records tell, and without what updates have left out), unused slots that
+    /// say so, and a depth that tracers can walk.
     ///
     /// # Errors
     /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
@@ -16,6 +16,7 @@ impl<R: Record> Bvh2<R> {
             return invalid(format!("{} active of {} primitives", header.active, header.primitive_count));
         }
         self.validate_primitives()?;
+        self.validate_counts()?;
         if header.active == 0 {
             let empty = header.root.bounds() == Aabb::EMPTY && header.root.count == 0 && header.inner_nodes == 0;
             return if empty { Ok(()) } else { invalid("no active primitive, but the root is not empty".into()) };
@@ -38,9 +39,11 @@ impl<R: Record> Bvh2<R> {
                 if let Some(twice) = range.clone().find(|&t| std::mem::replace(&mut in_leaf[t], true)) {
                     return invalid(format!("{named_by}: record {twice} is in two leaves"));
                 }
-                let boxes: Option<Vec<Aabb>> = self.records[range].iter().map(Record::bounds).collect();
-                if let Some(boxes) = boxes {
-                    same_box(&child, &boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b)), &named_by)?;
+                let met: Vec<_> = self.records[range].iter().filter(|record| !record.is_left_out()).collect();
+                let boxes: Option<Vec<Aabb>> = met.iter().map(|record| record.bounds()).collect();
+                // A leaf that updates have left nothing of has the box that it had.
+                if let Some(around) = boxes.and_then(|boxes| boxes.into_iter().reduce(|a, b| a.union(&b))) {
+                    same_box(&child, &around, &named_by)?;
                 }
             } else {
                 let Some(node) = self.nodes.get(child.index as usize) else {
@@ -61,11 +64,40 @@ impl<R: Record> Bvh2<R> {
         }
     }
 
+    /// As many slots as the records need at most; of a compacted structure, as many as there are nodes, and no records but those
+    /// of the tree.
+    fn validate_counts(&self) -> Result<()> {
+        let header = &self.header;
+        let compacted = header.node_slots == header.inner_nodes.max(1) && header.primitive_count == header.active;
+        if header.node_slots != node_slots(header.primitive_count) && !compacted {
+            return invalid(format!(
+                "{} node slots for {} records, {} of them active, and {} nodes",
+                header.node_slots, header.primitive_count, header.active, header.inner_nodes
+            ));
+        }
+        let there = (self.nodes.len(), self.records.len());
+        if there != (header.node_slots as usize, header.primitive_count as usize) {
+            return invalid(format!(
+                "{} node slots and {} records are there, the header says {} and {}",
+                there.0, there.1, header.node_slots, header.primitive_count
+            ));
+        }
+        Ok(())
+    }
+
     /// The slots of the tree (`visited`) are as many as the header says, and the others say that they are unused.
     fn validate_slots(&self, visited: &[bool]) -> Result<()> {
         let used = visited.iter().filter(|&&visited| visited).count();
         if used != self.header.inner_nodes as usize {
             return invalid(format!("{used} nodes, the header says {}", self.header.inner_nodes));
+        }
+        if let Some(slot) =
+            visited.iter().rposition(|&visited| visited).filter(|&slot| slot + 1 >= self.header.active as usize)
+        {
+            return invalid(format!(
+                "node {slot} of {} primitives; slots from there on are unused",
+                self.header.active
+            ));
         }
         match self.nodes.iter().zip(visited).position(|(node, &visited)| node.is_used() != visited) {
             Some(slot) if visited[slot] => invalid(format!("node {slot} is marked as unused")),
@@ -108,7 +140,7 @@ mod tests {
     use super::*;
     use crate::bvh::codes::Code;
     use crate::bvh::host::lbvh;
-    use crate::bvh::layout::Triangle;
+    use crate::bvh::layout::{Node, Triangle};
     use crate::bvh::sah::Collapse;
 
     fn tree(collapse: Collapse) -> Bvh2 {
@@ -131,13 +163,23 @@ mod tests {
     #[test]
     fn every_broken_rule_is_found_and_named() {
         type Break = fn(&mut Bvh2);
-        let breaks: [(&str, Break); 6] = [
+        let breaks: [(&str, Break); 8] = [
             ("has box", |t| t.nodes[t.header.root.index as usize].children[0].hi[1] += 1.0),
             ("two leaves", |t| first_leaf(t).index = 3),
             ("there are 20 records", |t| first_leaf(t).count = 21),
             ("there twice", |t| t.records[0].primitive = t.records[1].primitive),
             ("active", |t| t.header.active = 21),
             ("the header says 7", |t| t.header.inner_nodes = 7),
+            ("18 node slots for 20 records", |t| t.header.node_slots = 18),
+            ("slots from there on are unused", |t| {
+                // The root moves behind the slots that its twenty triangles need.
+                t.records.push(Triangle { primitive: 20, ..t.records[0] });
+                t.header.primitive_count = 21;
+                t.header.node_slots = 20;
+                let root = std::mem::replace(&mut t.nodes[t.header.root.index as usize], Node::UNUSED);
+                t.nodes.push(root);
+                t.header.root.index = 19;
+            }),
         ];
         for (says, break_it) in breaks {
             let mut tree = tree(Collapse::OFF);

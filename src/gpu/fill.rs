@@ -1,7 +1,7 @@
 //! Fills words with a value: `vkCmdFillBuffer` for memory that is known by its address.
 
 use super::push_constants::push_constants;
-use super::{Kernel, Recorder, shaders};
+use super::{Kernel, Recorder, Step, shaders};
 use crate::Result;
 
 /// Invocations a workgroup.
@@ -24,4 +24,10 @@ push_constants! {
 pub fn record(recorder: &mut Recorder<'_>, words: u64, count: u32, value: u32) -> Result<()> {
     let kernel = Kernel::new(&shaders::GPU_FILL, WORKGROUP, &[ROUNDS]);
     recorder.dispatch(&kernel, &Arguments { words, count, value }, count.div_ceil(WORKGROUP * ROUNDS))
+}
+
+/// The same as a step of the phase `phase`.
+pub(crate) fn step(phase: &'static str, words: u64, count: u32, value: u32) -> Step {
+    let kernel = Kernel::new(&shaders::GPU_FILL, WORKGROUP, &[ROUNDS]);
+    Step::new(phase, kernel, &Arguments { words, count, value }, count.div_ceil(WORKGROUP * ROUNDS))
 }

@@ -9,6 +9,7 @@ mod device;
 #[cfg(feature = "cli")]
 mod driver_structure;
 pub mod fill;
+mod grid;
 #[cfg(feature = "cli")]
 pub mod probe;
 pub(crate) mod push_constants;
@@ -25,5 +26,6 @@ pub use context::{Context, ContextDesc, Kernel, Limits};
 pub use device::{Buffer, Device, DeviceOptions, Found, list};
 #[cfg(feature = "cli")]
 pub use driver_structure::{DriverPreference, DriverSizes, DriverStructure};
+pub use grid::Grid;
 pub use recorder::{Phase, Recorder, Step, Timestamps};
 pub use requirements::{Features, Requirements, requirements};

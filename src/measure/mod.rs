@@ -2,7 +2,7 @@
 //!
 //! [`Subject`] is a builder on a scene; [`builders`] makes one by name; [`matrix`] measures several of them on a scene and
 //! gives a [`record`] for each. The rest is how that is fair and what follows from it: [`agreement`] (right hits),
-//! [`statistics`] (in turn, medians), [`growth`] (time over triangles), [`pareto`] and [`total_time`] (who is best for what).
+//! [`statistics`] (in turn, medians), [`growth`] (time over triangles), [`levels`] (instances), [`pareto`] and [`total_time`] (who is best for what).
 
 pub mod agreement;
 pub mod builders;
@@ -11,6 +11,7 @@ pub mod copy;
 mod device_lbvh;
 pub mod growth;
 mod host;
+pub mod levels;
 pub mod matrix;
 pub mod pareto;
 pub mod peers;

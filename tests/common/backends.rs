@@ -51,8 +51,7 @@ pub fn is_lavapipe() -> bool {
 pub fn backends() -> Vec<Box<dyn Backend>> {
     let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours::new())];
     if device().has_ray_query() {
-        let raw = ash::khr::acceleration_structure::Device::new(device().ash_instance(), device().ash_device());
-        all.push(Box::new(Drivers(raw, Probe::of_the_driver())));
+        all.push(Box::new(Drivers::new()));
     }
     all
 }
@@ -118,6 +117,14 @@ impl Backend for Ours {
 
 pub struct Drivers(pub ash::khr::acceleration_structure::Device, Probe);
 
+impl Drivers {
+    /// For a device that has them.
+    pub fn new() -> Drivers {
+        let raw = ash::khr::acceleration_structure::Device::new(device().ash_instance(), device().ash_device());
+        Drivers(raw, Probe::of_the_driver())
+    }
+}
+
 /// The push constants of `glsl/measure/ray_query.comp`.
 #[derive(Clone, Copy, bytemuck::NoUninit)]
 #[repr(C)]
@@ -125,6 +132,7 @@ struct RayQuery {
     structure: u64,
     rays: u64,
     hits: u64,
+    works: u64,
     first: u32,
     count: u32,
 }
@@ -200,13 +208,118 @@ impl Backend for Drivers {
         let ray_buffer = device().upload("rays", rays).expect("memory");
         let hits = device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
         let structure = self.address(top.structure);
-        let arguments = RayQuery { structure, rays: ray_buffer.address(), hits: hits.address(), first: 0, count };
+        let arguments =
+            RayQuery { structure, rays: ray_buffer.address(), hits: hits.address(), works: 0, first: 0, count };
         let kernel = Kernel::new(&shaders::MEASURE_RAY_QUERY, 64, &[0]);
         device().run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(64))).expect("it traces");
         let hits = hits.read(rays.len());
         self.destroy(top.structure);
         hits
     }
+}
+
+/// What an engine calls to copy, each call in a submit of its own.
+pub trait Copies: Backend {
+    /// What a build must ask for so that its structure can be compacted.
+    fn flags_to_compact(&self) -> vk::BuildAccelerationStructureFlagsKHR;
+    fn property(&self, structure: vk::AccelerationStructureKHR, query: vk::QueryType) -> u64;
+    fn copy(&self, info: &vk::CopyAccelerationStructureInfoKHR<'_>);
+    fn serialize(&self, info: &vk::CopyAccelerationStructureToMemoryInfoKHR<'_>);
+    fn deserialize(&self, info: &vk::CopyMemoryToAccelerationStructureInfoKHR<'_>);
+    fn compatibility(
+        &self,
+        version: &vk::AccelerationStructureVersionInfoKHR<'_>,
+    ) -> vk::AccelerationStructureCompatibilityKHR;
+}
+
+impl Copies for Ours {
+    fn flags_to_compact(&self) -> vk::BuildAccelerationStructureFlagsKHR {
+        vk::BuildAccelerationStructureFlagsKHR::empty()
+    }
+
+    fn property(&self, structure: vk::AccelerationStructureKHR, query: vk::QueryType) -> u64 {
+        let property = query.try_into().expect("a property of structures");
+        let result = device().buffer("property", 16).expect("memory");
+        submit(|commands| unsafe {
+            self.0.cmd_write_acceleration_structures_properties(commands, &[structure], property, result.address())
+        });
+        result.read(1)[0]
+    }
+
+    fn copy(&self, info: &vk::CopyAccelerationStructureInfoKHR<'_>) {
+        submit(|commands| unsafe { self.0.cmd_copy_acceleration_structure(commands, info) });
+    }
+
+    fn serialize(&self, info: &vk::CopyAccelerationStructureToMemoryInfoKHR<'_>) {
+        submit(|commands| unsafe { self.0.cmd_copy_acceleration_structure_to_memory(commands, info) });
+    }
+
+    fn deserialize(&self, info: &vk::CopyMemoryToAccelerationStructureInfoKHR<'_>) {
+        submit(|commands| unsafe { self.0.cmd_copy_memory_to_acceleration_structure(commands, info) });
+    }
+
+    fn compatibility(
+        &self,
+        version: &vk::AccelerationStructureVersionInfoKHR<'_>,
+    ) -> vk::AccelerationStructureCompatibilityKHR {
+        self.0.get_device_acceleration_structure_compatibility(version)
+    }
+}
+
+impl Copies for Drivers {
+    fn flags_to_compact(&self) -> vk::BuildAccelerationStructureFlagsKHR {
+        vk::BuildAccelerationStructureFlagsKHR::ALLOW_COMPACTION
+    }
+
+    fn property(&self, structure: vk::AccelerationStructureKHR, query: vk::QueryType) -> u64 {
+        let info = vk::QueryPoolCreateInfo::default().query_type(query).query_count(1);
+        let raw = device().ash_device();
+        let mut results = [0u64];
+        unsafe {
+            let pool = raw.create_query_pool(&info, None).expect("a query pool");
+            submit(|commands| {
+                raw.cmd_reset_query_pool(commands, pool, 0, 1);
+                self.0.cmd_write_acceleration_structures_properties(commands, &[structure], query, pool, 0);
+                Ok(())
+            });
+            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+            raw.get_query_pool_results(pool, 0, &mut results, flags).expect("a result");
+            raw.destroy_query_pool(pool, None);
+        }
+        results[0]
+    }
+
+    fn copy(&self, info: &vk::CopyAccelerationStructureInfoKHR<'_>) {
+        submit(|commands| {
+            unsafe { self.0.cmd_copy_acceleration_structure(commands, info) };
+            Ok(())
+        });
+    }
+
+    fn serialize(&self, info: &vk::CopyAccelerationStructureToMemoryInfoKHR<'_>) {
+        submit(|commands| {
+            unsafe { self.0.cmd_copy_acceleration_structure_to_memory(commands, info) };
+            Ok(())
+        });
+    }
+
+    fn deserialize(&self, info: &vk::CopyMemoryToAccelerationStructureInfoKHR<'_>) {
+        submit(|commands| {
+            unsafe { self.0.cmd_copy_memory_to_acceleration_structure(commands, info) };
+            Ok(())
+        });
+    }
+
+    fn compatibility(
+        &self,
+        version: &vk::AccelerationStructureVersionInfoKHR<'_>,
+    ) -> vk::AccelerationStructureCompatibilityKHR {
+        unsafe { self.0.get_device_acceleration_structure_compatibility(version) }
+    }
+}
+
+fn submit(record: impl FnOnce(vk::CommandBuffer) -> hedgerow::Result<()>) {
+    device().run(None, |recorder| record(recorder.commands())).expect("it runs");
 }
 
 /// A structure that was built alone, and its memory.

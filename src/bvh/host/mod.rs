@@ -1,4 +1,6 @@
 //! Builders on the host: plain, and the specification of those on the device.
 
+mod compact;
 pub mod geometry;
 pub mod lbvh;
+pub mod refit;

@@ -16,13 +16,14 @@ use ash::vk;
 const WORKGROUP: u32 = 64;
 
 push_constants! {
-    /// The push constants of `glsl/measure/ray_query.comp`.
-    struct Arguments {
-        structure: u64,
-        rays: u64,
-        hits: u64,
-        first: u32,
-        count: u32,
+    /// The push constants of `glsl/measure/ray_query.comp` and `query.comp`.
+    pub(crate) struct Arguments {
+        pub(crate) structure: u64,
+        pub(crate) rays: u64,
+        pub(crate) hits: u64,
+        pub(crate) works: u64,
+        pub(crate) first: u32,
+        pub(crate) count: u32,
     }
 }
 
@@ -129,6 +130,7 @@ impl Subject for Driver<'_> {
                     structure: self.structure.address(),
                     rays: rays.address(),
                     hits: hits.address(),
+                    works: 0,
                     first,
                     count: *count,
                 };

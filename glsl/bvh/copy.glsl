@@ -1,0 +1,72 @@
+// Copies of structures, whose sizes only the device knows: how many bytes a header stands for, what it becomes, and bytes moved
+// by all workgroups of a dispatch together, however many they are.
+#ifndef HEDGEROW_BVH_COPY
+#define HEDGEROW_BVH_COPY
+#include "gpu/pass.glsl"
+#include "gpu/grid.glsl"
+#include "bvh/layout.glsl"
+#include "bvh/empty.glsl"
+
+// Eight bytes: what every part of a structure is aligned to, in whatever it is copied from or to.
+layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Pairs { uvec2 pair[]; };
+
+// Whether a header is one of this layout: what else may lie there says nothing of sizes.
+bool is_structure(Header header) {
+    return header.magic == MAGIC &&
+           (header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || header.kind == KIND_INSTANCES);
+}
+
+// Bytes of a structure, as two words: an address behind address 0.
+uvec2 structure_bytes(uint kind, uint node_slots, uint primitive_count, uint geometry_count) {
+    uvec2 table = uvec2(geometry_table_at(uvec2(0), kind, node_slots, primitive_count));
+    return address_of(table, geometry_count > 1 ? geometry_count : 0, 8);
+}
+
+uvec2 structure_bytes(Header header) {
+    return structure_bytes(header.kind, header.node_slots, header.primitive_count, header.geometry_count);
+}
+
+// Copies so many bytes (two words; a multiple of 4) between addresses that are multiples of 8. Pieces are found by address, as
+// indices into memory are signed and end at 2^31.
+void copy_bytes(uvec2 from, uvec2 to, uvec2 bytes) {
+    uint pairs = bytes.x >> 3 | bytes.y << 29;
+    for (uint first = gl_WorkGroupID.x * grid_piece(); first < pairs; first += gl_NumWorkGroups.x * grid_piece()) {
+        Pairs source = Pairs(address_of(from, first, 8));
+        Pairs target = Pairs(address_of(to, first, 8));
+        for (uint i = gl_LocalInvocationIndex; i < min(grid_piece(), pairs - first); i += gl_WorkGroupSize.x) {
+            target.pair[i] = source.pair[i];
+        }
+    }
+    if ((bytes.x & 4u) != 0u && gl_GlobalInvocationID.x == 0) {
+        Words(address_of(to, pairs, 8)).word[0] = Words(address_of(from, pairs, 8)).word[0];
+    }
+}
+
+// The header of a structure of nothing that stands for what this version cannot read.
+Header header_of_wrong_version() {
+    uint reserved[9];
+    for (uint i = 0; i < 9; ++i) reserved[i] = 0;
+    return Header(MAGIC, KIND_TRIANGLES, STATUS_WRONG_VERSION, 0, empty_root(), 0, 1, 0, 0, 1, 0, 0, 0.0, 0.0, 0.0, 0.0, reserved);
+}
+
+// One invocation of the dispatch writes it.
+void write_wrong_version(Structure structure) {
+    if (gl_GlobalInvocationID.x != 0) return;
+    structure.header = header_of_wrong_version();
+    mark_unused(structure, 0);
+}
+
+// The header of the compacted structure.
+Header compacted(Header header) {
+    if (header.active_count == 0 || (header.status & STATUS_UNUSABLE) != 0u) {
+        header.root = empty_root();
+        header.active_count = 0;
+        header.inner_nodes = 0;
+    }
+    header.primitive_count = header.active_count;
+    header.node_slots = max(header.inner_nodes, 1);
+    // A root that is a node is the first.
+    if (header.root.count == 0) header.root.index = 0;
+    return header;
+}
+#endif

@@ -1,0 +1,7 @@
+#version 460
+// The boxes above them made anew, bottom-up in one pass: see bvh/refit.glsl for the contract.
+#include "bvh/refit.glsl"
+
+void main() {
+    refit_climb(updates[0], gl_WorkGroupID.x);
+}

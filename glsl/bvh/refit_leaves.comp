@@ -1,0 +1,7 @@
+#version 460
+// The records made anew, and the boxes of leaves: see bvh/refit.glsl for the contract.
+#include "bvh/refit.glsl"
+
+void main() {
+    refit_leaves(updates[0], gl_WorkGroupID.x);
+}

@@ -1,0 +1,8 @@
+// Traces rays through our structures by queries, as an engine's shader does: top levels, which trace/ has no kernels of its
+// own for.
+#version 460
+layout(local_size_x_id = 0) in;
+layout(constant_id = 2) const uint SHARED_LEVELS = 0;
+#define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
+#include "trace/ray_query_names.glsl"
+#include "measure/ray_query.glsl"

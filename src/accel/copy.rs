@@ -1,0 +1,60 @@
+//! Copies of structures: as they are, or compacted.
+
+use super::Device;
+use super::given::not_null;
+use crate::bvh::compact;
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::{Grid, Recorder, shaders};
+use crate::{Error, Result};
+use ash::vk;
+
+push_constants! {
+    /// Push constants of `glsl/accel/copy.comp`.
+    struct Arguments {
+        source: u64,
+        target: u64,
+    }
+}
+
+impl Device<'_> {
+    /// `vkCmdCopyAccelerationStructureKHR`: `CLONE` copies the bytes; `COMPACT` leaves out the node slots and records that the
+    /// tree does not use, which takes [`Property::CompactedSize`](super::Property::CompactedSize) bytes.
+    ///
+    /// Nothing is to be asked for at the build: every structure can be compacted. A top level names what lies below it by
+    /// address: one over copies is to be built anew.
+    ///
+    /// # Errors
+    /// Another mode; a handle is null; the two are the same. Nothing is recorded then.
+    ///
+    /// # Safety
+    /// `commands` is being recorded, outside a render pass, on a queue with compute. Handles and the memory behind them stay
+    /// valid until it has run; the source is built, the destination has the bytes that the copy takes, and the two do not overlap.
+    pub unsafe fn cmd_copy_acceleration_structure(
+        &self,
+        commands: vk::CommandBuffer,
+        info: &vk::CopyAccelerationStructureInfoKHR<'_>,
+    ) -> Result<()> {
+        let source = not_null("src", info.src)?;
+        let target = not_null("dst", info.dst)?;
+        if source == target {
+            return Err(Error::Argument(format!("src and dst are both {source:#x}; give the copy memory of its own")));
+        }
+        if let Some(checks) = &self.checks {
+            checks.copies(info)?;
+        }
+        // SAFETY: the caller's promise.
+        let mut recorder = unsafe { Recorder::new(self.context, commands) };
+        match info.mode {
+            vk::CopyAccelerationStructureModeKHR::CLONE => {
+                let grid = Grid::of(&self.context.limits);
+                recorder.phase("clone");
+                let kernel = grid.kernel(&shaders::ACCEL_COPY);
+                recorder.dispatch(&kernel, &Arguments { source, target }, grid.groups)
+            }
+            vk::CopyAccelerationStructureModeKHR::COMPACT => compact::record(&mut recorder, source, target),
+            mode => Err(Error::Argument(format!(
+                "mode is {mode:?}; structures are copied by CLONE or COMPACT, and to and from memory by calls of their own"
+            ))),
+        }
+    }
+}

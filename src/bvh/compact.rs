@@ -1,0 +1,54 @@
+//! Compaction on the device: the same tree depth first, without unused slots and without the records that are in no leaf.
+//!
+//! What it saves is what collapsing has freed: subtrees that became leaves leave the slots of their nodes behind. Rays also meet
+//! the nodes of a path in the order in which they lie in memory. The source is left as it is; [`Bvh2::compacted`] is the twin,
+//! with the same bytes.
+//!
+//! [`Bvh2::compacted`]: super::layout::Bvh2::compacted
+
+use crate::Result;
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::{Grid, Kernel, Limits, Recorder, shaders};
+
+push_constants! {
+    struct Arguments {
+        source: u64,
+        target: u64,
+    }
+}
+
+const STEPS: [&shaders::Shader; 5] = [
+    &shaders::BVH_COMPACT_PARENTS,
+    &shaders::BVH_COMPACT_SIZES,
+    &shaders::BVH_COMPACT_INDICES,
+    &shaders::BVH_COMPACT_NODES,
+    &shaders::BVH_COMPACT_RECORDS,
+];
+
+/// The kernels that [`record`] dispatches, to make their pipelines ahead with [`crate::gpu::Context::warm`].
+pub fn kernels(limits: &Limits) -> Vec<Kernel> {
+    STEPS.iter().map(|shader| Grid::of(limits).kernel(shader)).collect()
+}
+
+/// Records the compaction of the structure at address `source` to address `target`, both aligned to 16 bytes: five dispatches
+/// with barriers between, and no scratch memory.
+///
+/// The target takes as many bytes as a header with the source's counts says ([`Header::compacted`]): on the device,
+/// `accel::Property::CompactedSize`. The caller places a barrier (shader write to shader read and write) before and behind.
+///
+/// [`Header::compacted`]: super::layout::Header::compacted
+///
+/// # Errors
+/// A pipeline could not be made.
+pub fn record(recorder: &mut Recorder<'_>, source: u64, target: u64) -> Result<()> {
+    let limits = &recorder.context().limits;
+    let groups = Grid::of(limits).groups;
+    recorder.phase("compact");
+    for (i, kernel) in kernels(limits).iter().enumerate() {
+        if i > 0 {
+            recorder.barrier();
+        }
+        recorder.dispatch(kernel, &Arguments { source, target }, groups)?;
+    }
+    Ok(())
+}

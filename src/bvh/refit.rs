@@ -1,0 +1,284 @@
+//! Refitting on the device: after its primitives have moved, a structure gets their new boxes, and keeps its tree.
+//!
+//! Bottom-up in one pass, of two siblings the second that is done goes on with their parent (Karras 2012). This is what Vulkan
+//! calls an update, with the rules of `VK_BUILD_ACCELERATION_STRUCTURE_MODE_UPDATE_KHR`: vertices, indices, transforms, boxes
+//! and instances may be others, but as many, of the same formats and flags, and in place. A primitive that was inactive at the
+//! build stays so, whatever it is now.
+//!
+//! Where those rules are broken, nothing is: a primitive that can no longer be met (NaN, an index out of range) sets its bit of
+//! the status, which stays, and is met by no ray until an update brings it back.
+//!
+//! [`Refit::sizes`] tells the memory, [`Refit::record`] records into the caller's command buffer. The structure may be compacted,
+//! and its slots lie in any order: each record names its primitive, and each node its children. Nearness in memory is worth
+//! time, however: an invocation refits a run of slots, and what lies in one needs no other.
+//! [`Header::sah_growth`](super::layout::Header::sah_growth) tells afterwards how much worse the tree has become, which is when to
+//! build anew. The twin is [`super::host::refit`]: the same bytes.
+
+use super::geometry::Planned;
+pub use super::geometry::{Geometry, Input, Primitives, Source};
+use super::layout::node_slots;
+use super::lbvh;
+use super::sah::Collapse;
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::{Context, Kernel, Recorder, Step, radix_sort, shaders};
+use crate::{Error, Result};
+use std::collections::HashMap;
+
+/// What was built, beside the number of its primitives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// The costs that it was built with; whether it was collapsed means nothing here.
+    pub costs: Collapse,
+    /// How the phases are recorded; `None` takes what measured faster for the size.
+    pub schedule: Option<Schedule>,
+    /// What it was built over.
+    pub primitives: Primitives,
+    /// How many geometries: what [`Source::Several`] has, otherwise 1.
+    pub geometry_count: u32,
+}
+
+impl Options {
+    /// One geometry of triangles, the costs of [`Collapse::SAH`].
+    pub const DEFAULT: Options =
+        Options { costs: Collapse::SAH, schedule: None, primitives: Primitives::Triangles, geometry_count: 1 };
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options::DEFAULT
+    }
+}
+
+impl From<&lbvh::Options> for Options {
+    /// For what was built with these.
+    fn from(built: &lbvh::Options) -> Options {
+        let &lbvh::Options { collapse, primitives, geometry_count, .. } = built;
+        Options { costs: collapse, schedule: None, primitives, geometry_count }
+    }
+}
+
+/// How the phases of a refit are recorded. The result is the same bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Schedule {
+    /// A dispatch a phase, with a barrier between.
+    Chain,
+    /// One workgroup does both, in one dispatch: for few primitives.
+    Workgroup,
+}
+
+/// Primitives up to which one workgroup is faster than two dispatches.
+const SMALL: u32 = 4096;
+/// Slots of a run: on a CPU as many as there are bits in a word, so that siblings meet in one; half of that for structures that
+/// are over before every lane has a run. Longer ones were faster from 4 up; no GPU has been measured.
+const RUN_ON_CPU: u32 = 32;
+const RUN_ON_GPU: u32 = 4;
+
+impl Schedule {
+    /// What measured faster.
+    pub fn for_count(primitive_count: u32) -> Schedule {
+        if primitive_count <= SMALL { Schedule::Workgroup } else { Schedule::Chain }
+    }
+}
+
+/// Bytes that a refit needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// Scratch, free again when the refit has run: 8 to 10 bytes a primitive.
+    pub scratch: u64,
+    /// Alignment of both addresses.
+    pub alignment: u64,
+}
+
+/// Refitting structures of so many primitives, specialised for one device.
+#[derive(Debug, Clone)]
+pub struct Refit {
+    planned: Planned,
+    costs: Collapse,
+    schedule: Schedule,
+    workgroup: u32,
+    run: u32,
+}
+
+/// A refit with all that it is recorded with.
+#[derive(Debug, Clone, Copy)]
+pub struct Job<'a> {
+    /// What for.
+    pub refit: &'a Refit,
+    /// The primitives as they are now.
+    pub input: Input,
+    /// Address of the structure.
+    pub structure: u64,
+    /// Address of the scratch memory.
+    pub scratch: u64,
+}
+
+/// `Update` in refit.glsl.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Update {
+    vertices: u64,
+    indices: u64,
+    transform: u64,
+    structure: u64,
+    scratch: u64,
+    vertex_stride: u32,
+    vertex_count: u32,
+    formats: u32,
+    primitive_count: u32,
+}
+
+/// Updates that fit into the push constants.
+const AT_ONCE: usize = 2;
+
+push_constants! {
+    /// Push constants of `glsl/bvh/refit_*.comp`.
+    struct Arguments {
+        updates: [Update; AT_ONCE],
+        c_t: f32,
+        c_i: f32,
+    }
+}
+
+impl Refit {
+    /// Refitting of structures that were built over `primitive_count` primitives, on the device of `context`.
+    ///
+    /// # Errors
+    /// More primitives than a structure can hold.
+    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Result<Refit> {
+        if primitive_count > radix_sort::MAX_COUNT {
+            return Err(Error::Argument(format!(
+                "{primitive_count} primitives: a structure holds at most {}",
+                radix_sort::MAX_COUNT
+            )));
+        }
+        let &Options { costs, schedule, primitives, geometry_count } = options;
+        let limits = &context.limits;
+        let workgroup = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
+        let schedule = schedule.unwrap_or_else(|| Schedule::for_count(primitive_count));
+        let run = match limits.is_cpu() {
+            true if primitive_count <= workgroup * RUN_ON_CPU => RUN_ON_CPU / 2,
+            true => RUN_ON_CPU,
+            false => RUN_ON_GPU,
+        };
+        let planned = Planned { primitives, primitive_count, geometry_count };
+        Ok(Refit { planned, costs, schedule, workgroup, run })
+    }
+
+    /// The schedule that is used: the choice where none was given.
+    pub fn schedule(&self) -> Schedule {
+        self.schedule
+    }
+
+    /// Bytes of the scratch memory: they suffice for refits of fewer primitives, too.
+    pub fn sizes(&self) -> Sizes {
+        let slots = node_slots(self.planned.primitive_count);
+        // The way up and a cost for each slot, two words for each run.
+        let words = 2 * u64::from(slots) + 2 * u64::from(slots.div_ceil(self.run));
+        Sizes { scratch: (4 * words).next_multiple_of(16), alignment: 16 }
+    }
+
+    /// The kernels that [`Refit::record`] dispatches for `input`, to make their pipelines ahead with [`Context::warm`].
+    pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
+        let shaders = match self.schedule {
+            Schedule::Chain => &[&shaders::BVH_REFIT_LEAVES, &shaders::BVH_REFIT_CLIMB][..],
+            Schedule::Workgroup => &[&shaders::BVH_REFIT_WORKGROUP],
+        };
+        shaders.iter().map(|shader| self.kernel(shader, input)).collect()
+    }
+
+    fn kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
+        let source = input.source_constant(self.planned.primitives);
+        Kernel::new(shader, self.workgroup, &[self.run, 0, 0, 0, source])
+    }
+
+    /// Records the refit of the structure at address `structure` to `input`, with scratch memory at address `scratch`, of the
+    /// bytes and alignment that [`Refit::sizes`] tells.
+    ///
+    /// The structure is one that was built over as many primitives with the same options, compacted or not; one that is not is
+    /// left as it is. The caller makes input and structure visible to compute shaders before, and places a barrier (compute
+    /// shader write to whatever reads the structure, or writes the scratch memory) behind. Labels: `leaves` and `climb`, or
+    /// `refit` where one workgroup does both.
+    ///
+    /// # Errors
+    /// The input has another number of primitives or geometries than was planned for; a pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: u64, scratch: u64) -> Result<()> {
+        recorder.chains(&[self.steps(input, structure, scratch)?])
+    }
+
+    /// What [`Refit::record`] records, to be recorded beside others by [`Recorder::chains`].
+    ///
+    /// # Errors
+    /// The input has another number of primitives or geometries than was planned for.
+    pub fn steps(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
+        let mut chains = Refit::chains(&[Job { refit: self, input: *input, structure, scratch }])?;
+        Ok(chains.pop().unwrap_or_default())
+    }
+
+    /// The chains of many refits, for [`Recorder::chains`]: one each, but for those by one workgroup, of which two share a
+    /// dispatch.
+    ///
+    /// # Errors
+    /// An input has another number of primitives or geometries than was planned for.
+    pub fn chains(jobs: &[Job<'_>]) -> Result<Vec<Vec<Step>>> {
+        let mut chains = Vec::new();
+        // What fills the push constants together must be of one kind.
+        let mut kinds: HashMap<(Kernel, [u32; 2]), usize> = HashMap::new();
+        let mut small: Vec<(Kernel, [f32; 2], Vec<Update>)> = Vec::new();
+        for job in jobs {
+            let update = job.update()?;
+            let Job { refit, input, .. } = job;
+            let costs = [refit.costs.c_t, refit.costs.c_i];
+            let kernels = refit.kernels(input);
+            match (refit.schedule, &kernels[..]) {
+                _ if update.primitive_count == 0 => {}
+                (Schedule::Chain, [leaves, climb]) => {
+                    let groups = update.primitive_count.div_ceil(refit.workgroup * refit.run);
+                    let arguments = arguments_of(&[update], costs);
+                    chains.push(vec![
+                        Step::new("leaves", leaves.clone(), &arguments, groups),
+                        Step::new("climb", climb.clone(), &arguments, groups),
+                    ]);
+                }
+                (_, kernels) => {
+                    let kernel = &kernels[0];
+                    let at = *kinds.entry((kernel.clone(), costs.map(f32::to_bits))).or_insert_with(|| {
+                        small.push((kernel.clone(), costs, Vec::new()));
+                        small.len() - 1
+                    });
+                    small[at].2.push(update);
+                }
+            }
+        }
+        for (kernel, costs, updates) in &small {
+            chains.extend(updates.chunks(AT_ONCE).map(|pair| {
+                vec![Step::new("refit", kernel.clone(), &arguments_of(pair, *costs), pair.len() as u32)]
+            }));
+        }
+        Ok(chains)
+    }
+}
+
+fn arguments_of(given: &[Update], [c_t, c_i]: [f32; 2]) -> Arguments {
+    let mut updates = [given[0]; AT_ONCE];
+    updates[..given.len()].copy_from_slice(given);
+    Arguments { updates, c_t, c_i }
+}
+
+impl Job<'_> {
+    fn update(&self) -> Result<Update> {
+        let Job { refit, input, structure, scratch } = *self;
+        refit.planned.check(&input)?;
+        let (geometry, formats) = input.for_kernels();
+        Ok(Update {
+            vertices: geometry.vertices,
+            indices: geometry.indices,
+            transform: geometry.transform,
+            structure,
+            scratch,
+            vertex_stride: geometry.vertex_stride,
+            vertex_count: geometry.vertex_count,
+            formats,
+            primitive_count: refit.planned.primitive_count,
+        })
+    }
+}

@@ -1,0 +1,34 @@
+//! Dispatches for work whose amount only the device knows.
+
+use super::shaders::Shader;
+use super::{Kernel, Limits};
+
+/// Workgroups that keep a device busy and share whatever there is to do: each takes a piece of it, then the piece that is as
+/// many pieces ahead as there are workgroups, until nothing is left (`glsl/gpu/grid.glsl`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Grid {
+    /// Invocations a workgroup.
+    pub workgroup: u32,
+    /// Workgroups of a dispatch.
+    pub groups: u32,
+    /// Items of an invocation in a piece.
+    pub rounds: u32,
+}
+
+impl Grid {
+    /// For a device. On a CPU few workgroups, as each costs its start even if there is nothing to do, and long pieces, as each is
+    /// done by one core; on a GPU enough for some hundred thousand invocations.
+    pub fn of(limits: &Limits) -> Grid {
+        if limits.is_cpu() {
+            Grid { workgroup: limits.subgroup_size, groups: 64, rounds: 64 }
+        } else {
+            let groups = limits.workgroup_count.min(512);
+            Grid { workgroup: limits.workgroup_invocations.min(256), groups, rounds: 4 }
+        }
+    }
+
+    /// The kernel of a shader that takes its items from the grid.
+    pub fn kernel(&self, shader: &'static Shader) -> Kernel {
+        Kernel::new(shader, self.workgroup, &[self.rounds])
+    }
+}
