@@ -16,7 +16,7 @@ Box unite(Box a, Box b) {
 // below it, transformed.
 float gain_of(Entry entry) {
     if (entry.left_out != 0u || entry.start_count != 0u) return NO_GAIN;
-    GivenInstance given = instance_at(Geometry(uvec2(0), instances, uvec2(0), 0, 0, formats, 0), entry.instance);
+    GivenInstance given = instance_of(entry);
     Structure structure = Structure(given.structure);
     uint slots = structure.header.node_slots;
     Box nothing = Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
