@@ -565,6 +565,7 @@ struct Entry {
     start: u32,
     start_count: u32,
     left_out: u32,
+    given: u64,
 }
 
 /// An instance as the caller gives it: `GivenInstance` there.
@@ -586,7 +587,15 @@ fn world(count: usize, seed: u64, left_out: impl Fn(usize) -> u32) -> (Vec<Entry
         let [x, y, z] = centre;
         let to_world = [[half[0], 0.3, 0.0, x], [0.0, half[1], 0.1, y], [-0.2, 0.0, half[2], z]];
         let number = (random.bits() % 1000) as u32;
-        let entry = Entry { lo, instance: i as u32, hi, start: number, start_count: number % 3, left_out: left_out(i) };
+        let entry = Entry {
+            lo,
+            instance: i as u32,
+            hi,
+            start: number,
+            start_count: number % 3,
+            left_out: left_out(i),
+            given: 0,
+        };
         (
             entry,
             Given { to_world, index_and_mask: number, offset_and_flags: !number, structure: 256 * u64::from(number) },
@@ -606,13 +615,12 @@ fn top_levels_are_refitted_to_their_entries() {
             _ => 0,
         });
         let on_device = |entries: &[Entry], given: &[Given]| {
-            let memory = (
-                device().upload("entries", entries).expect("memory"),
-                device().upload("instances", given).expect("memory"),
-            );
-            let (entries, instances) = (memory.0.address(), memory.1.address());
-            let source = Source::Entries { entries, instances, pointers: false };
-            (Input { source, primitive_count: count as u32 }, memory)
+            let instances = device().upload("instances", given).expect("memory");
+            let given = |i: u64| instances.address() + i * size_of::<Given>() as u64;
+            let entries: Vec<Entry> = entries.iter().zip(0..).map(|(e, i)| Entry { given: given(i), ..*e }).collect();
+            let entries = device().upload("entries", &entries).expect("memory");
+            let source = Source::Entries(entries.address());
+            (Input { source, primitive_count: count as u32 }, (entries, instances))
         };
         let built = |input: &Input| {
             let options = lbvh::Options { primitives: Primitives::Instances, ..lbvh::Options::DEFAULT };
@@ -696,7 +704,7 @@ fn what_was_not_planned_for_is_left_as_it_is() {
     assert!(refused(&Input { primitive_count: 99, ..mesh.input() }).contains("planned for 100 primitives"));
     let several = Source::Several { records: 256, count: 5 };
     assert!(refused(&Input { source: several, ..mesh.input() }).contains("planned for 1 geometries"));
-    let entries = Source::Entries { entries: 256, instances: 256, pointers: false };
+    let entries = Source::Entries(256);
     assert!(refused(&Input { source: entries, ..mesh.input() }).contains("planned for Triangles"));
     let error = Refit::new(device(), &Options::DEFAULT, (1 << 27) + 1).expect_err("too many").to_string();
     assert!(error.contains("at most 134217728"), "{error}");

@@ -12,16 +12,17 @@ layout(push_constant, scalar) uniform Arguments {
     uvec2 ranges;
     uint count;
     uint capacity;
-    uint formats;      // flags << 24, as in a Geometry
+    uint pointers;     // whether they are
 };
 
 bool is_finite_matrix(vec4 m[3]) {
     return is_finite(m[0].xyz) && is_finite(m[1].xyz) && is_finite(m[2].xyz) && is_finite(vec3(m[0].w, m[1].w, m[2].w));
 }
 
-Entry entry_of(Geometry g, uint i) {
-    Entry entry = Entry(vec3(0), i, vec3(0), 0, 0, INACTIVE);
-    GivenInstance given = instance_at(g, i);
+// Of the instance at an address.
+Entry entry_of(uvec2 given_at, uint i) {
+    Entry entry = Entry(vec3(0), i, vec3(0), 0, 0, INACTIVE, given_at);
+    GivenInstance given = instance_of(entry);
     if (all(equal(given.structure, uvec2(0)))) return entry;
     entry.left_out = STATUS_BAD_INSTANCE;
     vec4 inverse[3];
@@ -36,7 +37,7 @@ Entry entry_of(Geometry g, uint i) {
     // Too far away to be a number.
     entry.left_out = STATUS_BAD_INSTANCE;
     if (!is_finite(b.lo) || !is_finite(b.hi)) return entry;
-    return Entry(b.lo, i, b.hi, 0u, AT_ROOT, 0u);
+    return Entry(b.lo, i, b.hi, 0u, AT_ROOT, 0u, given_at);
 }
 
 void main() {
@@ -49,7 +50,7 @@ void main() {
         there = min(range.word[0], count);
         from = address_of(from, range.word[1], 1u);
     }
-    Geometry g = Geometry(uvec2(0), from, uvec2(0), 0, 0, formats, 0);
-    if (i < there) entries.entry[i] = entry_of(g, i);
-    else entries.entry[i] = Entry(vec3(0), 0xFFFFFFFFu, vec3(0), 0, 0, INACTIVE);
+    if (i >= there) entries.entry[i] = Entry(vec3(0), 0xFFFFFFFFu, vec3(0), 0, 0, INACTIVE, uvec2(0));
+    else if (pointers != 0u) entries.entry[i] = entry_of(Pointers(from).pointer[i], i);
+    else entries.entry[i] = entry_of(address_of(from, i, 64u), i);
 }

@@ -29,11 +29,9 @@ BUFFER RebraidState {
 };
 
 layout(push_constant, scalar) uniform Arguments {
-    uvec2 instances;
     Entries entries;
     Floats gains;
     RebraidState state;
-    uint formats;
     uint capacity;
     uint round;
     uint chunks;

@@ -5,12 +5,12 @@
 // The entry over one child of the node that another begins at.
 Entry entry_over(Entry parent, vec4 m[3], Structure structure, Child child) {
     Box b = world_box(m, structure, child);
-    return Entry(b.lo, parent.instance, b.hi, child.index, child.count, 0u);
+    return Entry(b.lo, parent.instance, b.hi, child.index, child.count, 0u, parent.given);
 }
 
 void open(uint i, uint behind) {
     Entry entry = entries.entry[i];
-    GivenInstance given = instance_at(Geometry(uvec2(0), instances, uvec2(0), 0, 0, formats, 0), entry.instance);
+    GivenInstance given = instance_of(entry);
     Structure structure = Structure(given.structure);
     uint slot = begin_of(entry, structure).x;
     if (slot >= structure.header.node_slots) return;

@@ -16,7 +16,7 @@ Box unite(Box a, Box b) {
 // below it, transformed.
 float gain_of(Entry entry) {
     if (entry.left_out != 0u) return NO_GAIN;
-    GivenInstance given = instance_at(Geometry(uvec2(0), instances, uvec2(0), 0, 0, formats, 0), entry.instance);
+    GivenInstance given = instance_of(entry);
     Structure structure = Structure(given.structure);
     uvec2 begin = begin_of(entry, structure);
     if (begin.y != 0u) return NO_GAIN;

@@ -19,18 +19,15 @@ struct Entry {
     uint start;               // a Child's index and count, in the instance's structure
     uint start_count;         // or AT_ROOT: so that the structure may be replaced by a compacted copy
     uint left_out;            // 0, or why it is
+    uvec2 given;              // address of the GivenInstance
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer GivenInstances { GivenInstance instance[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Entries { Entry entry[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Pointers { uvec2 pointer[]; };
 
-// In the flags of a geometry of instances: `indices` is an array of pointers to them.
-const uint GEOMETRY_POINTERS = 1u << 1;
-
-GivenInstance instance_at(Geometry g, uint instance) {
-    if ((flags_of(g) & GEOMETRY_POINTERS) != 0u) return GivenInstances(Pointers(g.indices).pointer[instance]).instance[0];
-    return GivenInstances(g.indices).instance[instance];
+GivenInstance instance_of(Entry entry) {
+    return GivenInstances(entry.given).instance[0];
 }
 
 // Where an entry over a structure begins: a Child's index and count.
@@ -71,10 +68,10 @@ bool inverse_of(vec4 m[3], out vec4 inverse[3]) {
 }
 
 // The record of an entry that is part of the tree; all zero for one that is not.
-Instance record_of(Geometry g, Entry entry) {
+Instance record_of(Entry entry) {
     vec4 none[3] = vec4[3](vec4(0), vec4(0), vec4(0));
     if (entry.left_out != 0u) return Instance(none, none, uvec2(0), 0, 0, entry.instance, 0, 0, 0);
-    GivenInstance given = instance_at(g, entry.instance);
+    GivenInstance given = instance_of(entry);
     vec4 to_object[3];
     inverse_of(given.to_world, to_object);
     return Instance(to_object, given.to_world, given.structure, given.index_and_mask, given.offset_and_flags, entry.instance,

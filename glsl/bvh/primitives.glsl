@@ -43,7 +43,7 @@ uint write_record(uvec2 records, uint position, Geometry g, uint primitive, out 
     uint why_not;
     if (SOURCE == SOURCE_ENTRIES) {
         Entry entry = Entries(g.vertices).entry[primitive];
-        Instances(records).instance[position] = record_of(g, entry);
+        Instances(records).instance[position] = record_of(entry);
         b = Box(entry.lo, entry.hi);
         why_not = entry.left_out;
     } else if (kind_of_records() == KIND_BOXES) {

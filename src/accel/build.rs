@@ -6,7 +6,7 @@ use super::rebraid::Rebraid;
 use super::{Options, REBRAID};
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
-use crate::bvh::lbvh::{self, INSTANCE_POINTERS, Job, Lbvh, Sizes};
+use crate::bvh::lbvh::{self, Job, Lbvh, Sizes};
 use crate::bvh::refit::{self, Refit};
 use crate::bvh::sah::Collapse;
 use crate::gpu::push_constants::push_constants;
@@ -136,9 +136,7 @@ impl Build {
     fn input(&self, scratch: u64) -> Input {
         let parts = self.scratch(scratch);
         let source = match &self.given {
-            Given::Instances { data, pointers } => {
-                Source::Entries { entries: parts.entries, instances: *data, pointers: *pointers }
-            }
+            Given::Instances { .. } => Source::Entries(parts.entries),
             Given::Triangles(geometries) | Given::Boxes(geometries) => match (&geometries[..], self.counts) {
                 ([], _) => Source::One(Geometry::mesh(0, 0, 0)),
                 (&[geometry], Counts::Told) => Source::One(geometry),
@@ -165,8 +163,7 @@ impl Build {
                 let (count, capacity) = (self.primitive_count, self.lbvh.count());
                 let mut steps = vec![entries_step(context, *data, *pointers, parts.entries, ranges, count, capacity)];
                 if let Some(rebraid) = &self.rebraid {
-                    let formats = if *pointers { INSTANCE_POINTERS } else { 0 };
-                    steps.extend(rebraid.steps(context, *data, formats, count, parts.entries, parts.rebraid));
+                    steps.extend(rebraid.steps(context, count, parts.entries, parts.rebraid));
                 }
                 vec![steps]
             }

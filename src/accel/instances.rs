@@ -42,7 +42,7 @@ impl Instance {
 }
 
 /// Bytes of an `Entry` of instances.glsl.
-pub(super) const ENTRY_BYTES: u64 = 40;
+pub(super) const ENTRY_BYTES: u64 = 48;
 
 push_constants! {
     /// Push constants of `glsl/accel/entries.comp`.
@@ -52,7 +52,7 @@ push_constants! {
         ranges: u64,
         count: u32,
         capacity: u32,
-        formats: u32,
+        pointers: u32,
         padding: u32,
     }
 }
@@ -70,7 +70,7 @@ pub(super) fn entries_step(
 ) -> Step {
     let workgroup = if context.limits.is_cpu() { context.limits.subgroup_size } else { 64 };
     let kernel = Kernel::new(&shaders::ACCEL_ENTRIES, workgroup, &[]);
-    let formats = if pointers { crate::bvh::lbvh::INSTANCE_POINTERS } else { 0 };
-    let arguments = Arguments { instances, entries, ranges, count, capacity, formats, padding: 0 };
+    let pointers = u32::from(pointers);
+    let arguments = Arguments { instances, entries, ranges, count, capacity, pointers, padding: 0 };
     Step::new("entries", kernel, &arguments, capacity.div_ceil(workgroup))
 }

@@ -19,16 +19,15 @@ const STATE_WORDS: u32 = ROUNDS + 1 + ROUNDS * 512 + 2 * CHUNKS;
 push_constants! {
     /// Push constants of `glsl/accel/rebraid_*.comp`.
     struct Arguments {
-        instances: u64,
         entries: u64,
         gains: u64,
         state: u64,
-        formats: u32,
         capacity: u32,
         round: u32,
         chunks: u32,
         tolerance: f32,
         instance_count: u32,
+        padding: u32,
     }
 }
 
@@ -47,16 +46,8 @@ impl Rebraid {
         (4 * (u64::from(self.capacity) + u64::from(STATE_WORDS))).next_multiple_of(16)
     }
 
-    /// The steps behind the one that writes the entries, of which `count` are of instances at `instances`.
-    pub fn steps(
-        &self,
-        context: &Context,
-        instances: u64,
-        formats: u32,
-        count: u32,
-        entries: u64,
-        scratch: u64,
-    ) -> Vec<Step> {
+    /// The steps behind the one that writes the entries, of which `count` are of instances.
+    pub fn steps(&self, context: &Context, count: u32, entries: u64, scratch: u64) -> Vec<Step> {
         let is_cpu = context.limits.is_cpu();
         let workgroup = if is_cpu { context.limits.subgroup_size } else { 64 };
         // Enough for all cores; a chunk has one invocation that opens.
@@ -66,16 +57,15 @@ impl Rebraid {
         let kernel = |shader| Kernel::new(shader, workgroup, &[]);
         for round in 0..ROUNDS {
             let arguments = Arguments {
-                instances,
                 entries,
                 gains: scratch,
                 state,
-                formats,
                 capacity: self.capacity,
                 round,
                 chunks,
                 tolerance: self.tolerance,
                 instance_count: count,
+                padding: 0,
             };
             for shader in [&shaders::ACCEL_REBRAID_WEIGH, &shaders::ACCEL_REBRAID_SELECT, &shaders::ACCEL_REBRAID_OPEN]
             {

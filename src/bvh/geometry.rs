@@ -235,15 +235,8 @@ pub enum Source {
         /// How many there are; one more than was planned for where a last one ends the others.
         count: u32,
     },
-    /// The entries of a top level, `glsl/bvh/instances.glsl`, in device memory, and the instances that they are of.
-    Entries {
-        /// Address of the entries, 40 bytes each, aligned to 8 bytes.
-        entries: u64,
-        /// Address of the instances, or of pointers to them.
-        instances: u64,
-        /// Whether they are pointers.
-        pointers: bool,
-    },
+    /// The entries of a top level, `glsl/bvh/instances.glsl`, in device memory: 48 bytes each at an address aligned to 8 bytes.
+    Entries(u64),
 }
 
 impl Input {
@@ -272,9 +265,7 @@ impl Input {
             Source::Several { records, count } => {
                 (Geometry { vertex_count: count, ..Geometry::mesh(records, 0, 0) }, 0)
             }
-            Source::Entries { entries, instances, pointers } => {
-                (Geometry::mesh(entries, 0, instances), if pointers { INSTANCE_POINTERS } else { 0 })
-            }
+            Source::Entries(entries) => (Geometry::mesh(entries, 0, 0), 0),
         }
     }
 }
@@ -285,9 +276,6 @@ const SOURCE_GEOMETRIES: u32 = 2;
 const SOURCE_BOXES: u32 = 3;
 const SOURCE_SEVERAL_BOXES: u32 = 4;
 const SOURCE_ENTRIES: u32 = 5;
-
-/// `GEOMETRY_POINTERS << 24`: in the formats of entries (instances.glsl).
-pub(crate) const INSTANCE_POINTERS: u32 = 1 << 25;
 
 /// The inputs that kernels and memory were planned for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -313,7 +301,7 @@ impl Planned {
         {
             return refuse(format!("{} geometries", self.geometry_count), count.to_string());
         }
-        let is_entries = matches!(input.source, Source::Entries { .. });
+        let is_entries = matches!(input.source, Source::Entries(_));
         if is_entries != (self.primitives == Primitives::Instances) {
             return refuse(format!("{:?}", self.primitives), format!("{:?}", input.source));
         }

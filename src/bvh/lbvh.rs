@@ -5,7 +5,6 @@
 //! [`super::host::lbvh`]: the same bytes.
 
 use super::codes::{Code, Codes};
-pub(crate) use super::geometry::INSTANCE_POINTERS;
 use super::geometry::Planned;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::layout;

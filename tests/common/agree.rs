@@ -102,7 +102,8 @@ fn assert_instance(what: &str, world: &World, ray: &ProbeRay, report: &Report) {
         assert_eq!(got.object_to_world[column], instance.transform.map(|row| row[column]), "{what}: column {column}");
         let unit = std::array::from_fn(|k| f64::from(u8::from(k == column)));
         let w = if column == 3 { 1.0 } else { 0.0 };
-        let error = transform_error(&instance.transform, unit, w);
+        // More than in what is made with it: lavapipe's inverse is that much worse.
+        let error = 3.0 * transform_error(&instance.transform, unit, w);
         assert_close(&got.world_to_object[column], &to_object.map(|row| row[column]), error, what);
     }
 }

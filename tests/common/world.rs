@@ -307,7 +307,7 @@ impl Line {
 }
 
 /// A generous bound on what float32 may lose in a few operations, relative to their terms.
-const PRECISION: f64 = 3e-6;
+const PRECISION: f64 = 1e-6;
 
 /// How far off float32 may be in the transform of a point (or, with w = 0, of a direction) to the space of an instance: each
 /// row of the inverse is a product of two columns divided by the determinant, and lost digits of these.
@@ -416,8 +416,8 @@ fn box_met(corners: &[[f32; 3]; 2], line: &Line) -> Option<Met> {
     let t_error = error / length(line.direction);
     let enter_within = |by: f64, late: f64| -> Option<f64> {
         let (mut enter, mut leave) = (line.limits[0] - late, line.limits[1] + late);
-        for k in 0..3 {
-            let (lo, hi) = (corners[0][k] - by, corners[1][k] + by);
+        for (k, (least, most)) in corners[0].iter().zip(&corners[1]).enumerate() {
+            let (lo, hi) = (least - by, most + by);
             if line.direction[k] == 0.0 {
                 if !(lo <= line.origin[k] && line.origin[k] <= hi) {
                     return None;
