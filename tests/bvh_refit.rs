@@ -148,13 +148,8 @@ fn assert_hits(structure: &Bvh2, rays: &[Ray], expected: &[Hit]) {
     let ray_buffer = device().upload("rays", rays).expect("memory");
     let hits = device().buffer("hits", size_of_val(expected) as u64).expect("memory");
     let count = rays.len() as u32;
-    let buffers = Buffers {
-        structure: structure.address(),
-        rays: ray_buffer.address(),
-        hits: hits.address(),
-        work: None,
-        count,
-    };
+    let buffers =
+        Buffers { structure: structure.address(), rays: ray_buffer.address(), hits: hits.address(), work: None, count };
     let shape = Shape::of(&device().limits);
     device().run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
     assert!(hits.read::<Hit>(rays.len()) == expected);
@@ -407,7 +402,8 @@ fn every_format_and_several_geometries_are_refitted_as_on_the_host() {
         (0..24).map(|i| vec![[geometry(i, 150, i as u64), geometry(i, 150, 100 + i as u64)]]).collect();
     // Several, with empty ones among them; and many.
     let counts = [0, 70, 0, 0, 9, 200, 0];
-    let several = |i: usize| counts.iter().zip(i..).map(move |(&n, k)| [geometry(k, n, 3), geometry(k, n, 4)]).collect();
+    let several =
+        |i: usize| counts.iter().zip(i..).map(move |(&n, k)| [geometry(k, n, 3), geometry(k, n, 4)]).collect();
     cases.extend([several(0), several(5), several(13)]);
     cases.push((0..100).map(|i| [geometry(i, (i as u32 * 7) % 13, 5), geometry(i, (i as u32 * 7) % 13, 6)]).collect());
     for case in cases {
@@ -476,16 +472,12 @@ fn boxes_are_refitted_as_on_the_host() {
             assert!(expected.records.iter().all(|r| r.primitive < count as u32), "each keeps its primitive");
 
             // 32 bytes from one to the next; and the same boxes as three geometries.
-            let padded: Vec<[f32; 8]> = moved
-                .iter()
-                .map(|&Aabb { lo: [a, b, c], hi: [d, e, f] }| [a, b, c, d, e, f, f32::NAN, 1.0])
-                .collect();
+            let padded: Vec<[f32; 8]> =
+                moved.iter().map(|&Aabb { lo: [a, b, c], hi: [d, e, f] }| [a, b, c, d, e, f, f32::NAN, 1.0]).collect();
             let boxes = device().upload("boxes", &padded).expect("memory");
             let firsts = [0, count as u32 / 3, count as u32 / 2];
-            let records = firsts.map(|first| Geometry {
-                first,
-                ..Geometry::boxes(boxes.address() + 32 * u64::from(first), 32)
-            });
+            let records =
+                firsts.map(|first| Geometry { first, ..Geometry::boxes(boxes.address() + 32 * u64::from(first), 32) });
             let several = device().upload("records", &records).expect("memory");
             let flags = [(firsts[1], 0), (firsts[2] - firsts[1], 0), (count as u32 - firsts[2], 0)];
             for (source, counts) in [
@@ -494,8 +486,12 @@ fn boxes_are_refitted_as_on_the_host() {
             ] {
                 for schedule in SCHEDULES {
                     let geometry_count = counts.len().max(1) as u32;
-                    let options =
-                        Options { schedule: Some(schedule), primitives: Primitives::Boxes, geometry_count, costs: collapse };
+                    let options = Options {
+                        schedule: Some(schedule),
+                        primitives: Primitives::Boxes,
+                        geometry_count,
+                        costs: collapse,
+                    };
                     let tree = tree.clone().with_geometries(counts, 0);
                     let placed = Placed::new(&tree.to_bytes(), &options, count as u32);
                     placed.refit(&Input { source, primitive_count: count as u32 });
@@ -539,7 +535,10 @@ fn world(count: usize, seed: u64, left_out: impl Fn(usize) -> u32) -> (Vec<Entry
         let to_world = [[half[0], 0.3, 0.0, x], [0.0, half[1], 0.1, y], [-0.2, 0.0, half[2], z]];
         let number = (random.bits() % 1000) as u32;
         let entry = Entry { lo, instance: i as u32, hi, start: number, start_count: number % 3, left_out: left_out(i) };
-        (entry, Given { to_world, index_and_mask: number, offset_and_flags: !number, structure: 256 * u64::from(number) })
+        (
+            entry,
+            Given { to_world, index_and_mask: number, offset_and_flags: !number, structure: 256 * u64::from(number) },
+        )
     };
     (0..count).map(instance).unzip()
 }
@@ -589,8 +588,7 @@ fn top_levels_are_refitted_to_their_entries() {
         host::refit::refit_boxes(&mut expected, &boxes, |instance| fresh[instance as usize], Collapse::SAH);
         assert_eq!(expected.header.status, if count > 6 { status::BAD_INSTANCE } else { 0 });
         for schedule in SCHEDULES {
-            let options =
-                Options { schedule: Some(schedule), primitives: Primitives::Instances, ..Options::DEFAULT };
+            let options = Options { schedule: Some(schedule), primitives: Primitives::Instances, ..Options::DEFAULT };
             let placed = Placed::new(&tree.to_bytes(), &options, count as u32);
             placed.refit(&moved_input);
             assert!(placed.read() == expected.to_bytes(), "{count} {schedule:?}");

@@ -5,8 +5,8 @@
 //! [`super::host::lbvh`]: the same bytes.
 
 use super::codes::{Code, Codes};
-use super::geometry::Planned;
 pub(crate) use super::geometry::INSTANCE_POINTERS;
+use super::geometry::Planned;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::layout;
 use super::lbvh_workgroup;
@@ -366,11 +366,8 @@ impl Lbvh {
 
     /// The input's geometry as the kernels are given it, and its formats.
     pub(super) fn checked(&self, input: &Input) -> Result<(Geometry, u32)> {
-        let planned = Planned {
-            primitives: self.primitives,
-            primitive_count: self.count,
-            geometry_count: self.geometry_count,
-        };
+        let planned =
+            Planned { primitives: self.primitives, primitive_count: self.count, geometry_count: self.geometry_count };
         planned.check(input)?;
         Ok(input.for_kernels())
     }

@@ -250,9 +250,11 @@ impl Refit {
             }
         }
         for (kernel, costs, updates) in &small {
-            chains.extend(updates.chunks(AT_ONCE).map(|pair| {
-                vec![Step::new("refit", kernel.clone(), &arguments_of(pair, *costs), pair.len() as u32)]
-            }));
+            chains.extend(
+                updates.chunks(AT_ONCE).map(|pair| {
+                    vec![Step::new("refit", kernel.clone(), &arguments_of(pair, *costs), pair.len() as u32)]
+                }),
+            );
         }
         Ok(chains)
     }
