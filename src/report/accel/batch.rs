@@ -82,9 +82,9 @@ pub(super) fn section(points: &[Batch]) -> Result<Option<Section>> {
         name: "accel-batch-growth".into(),
         title: "Time over the number of structures".into(),
         alt: all.iter().map(|curve| curve.name.clone()).collect::<Vec<_>>().join("; "),
-        reading: "Both axes are logarithmic. A call that builds all of them together grows slowly while the device has lanes \
-                  to spare; calls one by one grow with their number from the start."
-            .into(),
+        reading:
+            "Both axes are logarithmic. Where lines lie together, it makes no difference how the builds are asked for."
+                .into(),
     };
     let growth = curves::curves(
         caption,
