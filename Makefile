@@ -1,6 +1,7 @@
 # `make bench` and `make test` are all that a machine with Rust needs; scripts/setup.sh installs the rest.
 #
-#   make bench         scenes/ with the default builders: report/index.html, at most three minutes on two cores
+#   make bench         scenes/ with the default builders: report/index.html, and structures as engines use them:
+#                      report/accel.html; at most three minutes on two cores
 #   make bench-all     every scene of the folder SCENES (or HEDGEROW_SCENES)
 #   make bench-peers   the same on Mesa 26, whose ray queries are a peer, beside CPU crates
 #   make test          the test suite, under a bound in time: a shader that hangs would hang with it
@@ -11,11 +12,13 @@
 #
 #   SETUP=true         go on without scripts/setup.sh       OUT=DIR        where reports go
 #   BENCH="…"          further arguments of `hedgerow bench`, such as -b lbvh,ploc or --runs 3
+#   ACCEL="…"          the same of `hedgerow accel`, such as gen:city:1000 or --experiments batch,tlas
 
 SETUP ?= scripts/setup.sh
 OUT ?= report
 SCENES ?= $(HEDGEROW_SCENES)
 BENCH ?=
+ACCEL ?=
 PREFIX ?= /usr/local
 CARGO := scripts/cargo.sh
 RELEASE := $(or $(CARGO_TARGET_DIR),target)/release
@@ -29,6 +32,8 @@ EMBREE_BUILDERS := ,embree-low,embree-medium,embree-high
 EMBREE := $(shell PATH="$$PATH:/sbin" ldconfig -p 2>/dev/null | grep -q 'libembree3\.so ' && echo yes)
 FEATURES := peer-obvhs$(if $(EMBREE),$(comma)peer-embree)
 PEER_BUILDERS ?= lbvh,lbvh:collapse=off,driver-fast-build,driver-fast-trace,obvhs-fastest,obvhs-medium$(if $(EMBREE),$(EMBREE_BUILDERS))
+# What `make bench` has time for; the others measure all of it.
+QUICK := --runs 3 --structures 1024 --instances 10000 --size 80x60 --frames 7
 # Seconds for the whole suite; compiling does not count.
 TEST_BOUND ?= 1200
 WITHIN := $(if $(shell command -v timeout),timeout --kill-after 10 $(TEST_BOUND))
@@ -43,16 +48,19 @@ SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
 bench: setup
 	$(CARGO) build --release --features $(FEATURES)
+	$(BIN) accel $(QUICK) -o $(OUT) $(ACCEL)
 	$(BIN) bench -o $(OUT) $(BENCH)
 
 bench-all: setup
 	@test -d "$(SCENES)" || { echo "make bench-all: SCENES=DIR (or HEDGEROW_SCENES) names the folder of scenes" >&2; exit 2; }
 	$(CARGO) build --release --features $(FEATURES)
+	$(BIN) accel -o $(OUT) $(ACCEL)
 	$(BIN) bench --all --scenes-dir "$(SCENES)" -o $(OUT) $(BENCH)
 
 bench-peers: setup
 	scripts/peer-lavapipe.sh $(MESA)
 	$(CARGO) build --release --features $(FEATURES)
+	scripts/with-lavapipe.sh $(MESA) $(BIN) accel -o $(OUT) $(ACCEL)
 	scripts/with-lavapipe.sh $(MESA) $(BIN) bench $(if $(SCENES),--all --scenes-dir "$(SCENES)") -b $(PEER_BUILDERS) \
 		-o $(OUT) $(BENCH)
 

@@ -11,11 +11,14 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hedgerow::Result;
 use hedgerow::accel;
-use hedgerow::ash::{self, vk};
+use hedgerow::ash;
 use hedgerow::bvh::compact;
 use hedgerow::bvh::layout::{Header, Triangle};
 use hedgerow::bvh::lbvh::{Input, Lbvh, Options, Schedule};
 use hedgerow::gpu::{Buffer, Device, DeviceOptions};
+use hedgerow::measure::experiments::batch::{Batch, Workload};
+use hedgerow::measure::experiments::points::Way;
+use hedgerow::measure::structures::Structures;
 use hedgerow::scene::{self, LoadOptions, Scene};
 use hedgerow::trace::kinds::{self, RayKind, RayOptions};
 use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
@@ -175,144 +178,26 @@ fn compaction(c: &mut Criterion) {
     group.finish();
 }
 
-/// Structures of 12 to 500 triangles out of one pair of buffers.
-struct Batch<'a> {
-    geometries: Vec<vk::AccelerationStructureGeometryKHR<'static>>,
-    ranges: Vec<vk::AccelerationStructureBuildRangeInfoKHR>,
-    _buffers: [Buffer<'a>; 2],
-}
-
-impl<'a> Batch<'a> {
-    const COUNT: u32 = 4096;
-
-    fn new(device: &'a Device) -> Result<Batch<'a>> {
-        let soup = scene::load("gen:soup:1100000:1", &LoadOptions::default())?;
-        let positions = device.upload("positions", &soup.mesh.positions)?;
-        let indices = device.upload("indices", &soup.mesh.triangles)?;
-        let address = |device_address| vk::DeviceOrHostAddressConstKHR { device_address };
-        let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
-            .vertex_format(vk::Format::R32G32B32_SFLOAT)
-            .vertex_data(address(positions.address()))
-            .vertex_stride(12)
-            .max_vertex(soup.mesh.positions.len() as u32 - 1)
-            .index_type(vk::IndexType::UINT32)
-            .index_data(address(indices.address()));
-        let geometry = vk::AccelerationStructureGeometryKHR::default()
-            .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
-            .geometry(vk::AccelerationStructureGeometryDataKHR { triangles });
-        let mut first = 0;
-        let ranges = (0..Batch::COUNT).map(|i| {
-            let count = 12 + i * 7919 % 467;
-            let range = vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count);
-            let range = range.primitive_offset(12 * first);
-            first += count;
-            range
-        });
-        let ranges: Vec<_> = ranges.collect();
-        assert!(first as usize <= soup.mesh.triangles.len());
-        Ok(Batch { geometries: vec![geometry; Batch::COUNT as usize], ranges, _buffers: [positions, indices] })
-    }
-
-    fn info(&self, i: usize) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
-        vk::AccelerationStructureBuildGeometryInfoKHR::default()
-            .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
-            .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_BUILD)
-            .geometries(&self.geometries[i..=i])
-    }
-}
-
-/// Thousands of small structures: in one call, in a call each, and in one call of the driver's.
+/// Thousands of small structures: in one call, in a call each, and the same of the driver's.
 fn batch(c: &mut Criterion) {
+    const COUNT: u32 = 4096;
     let wanted = std::env::var("HEDGEROW_DEVICE").ok();
     let options = DeviceOptions { wanted, validation: false, ray_query: true };
     let device = Device::new(&options).expect("a device that fits");
-    let batch = Batch::new(&device).expect("memory");
-    let mut group = c.benchmark_group("batch");
-    group.sample_size(10).throughput(Throughput::Elements(Batch::COUNT.into()));
-    let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
-    type Info<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
-    // Places each structure and its scratch memory in two large buffers.
-    let placed =
-        |size: &dyn Fn(&Info<'_>, u32) -> vk::AccelerationStructureBuildSizesInfoKHR<'static>,
-         create: &dyn Fn(&vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR| {
-            let mut at = [0u64; 2];
-            let sizes: Vec<_> = (0..Batch::COUNT as usize)
-                .map(|i| {
-                    let sizes = size(&batch.info(i), batch.ranges[i].primitive_count);
-                    let begin = at;
-                    at[0] += sizes.acceleration_structure_size.next_multiple_of(256);
-                    at[1] += sizes.build_scratch_size.next_multiple_of(256);
-                    (begin, sizes.acceleration_structure_size)
-                })
-                .collect();
-            let structures = device.buffer("structures", at[0]).expect("memory");
-            let scratch = device.buffer("scratch", at[1] + 256).expect("memory");
-            let scratch_address = scratch.address().next_multiple_of(256);
-            let infos: Vec<Info<'_>> = sizes
-                .iter()
-                .enumerate()
-                .map(|(i, &(begin, bytes))| {
-                    let create_info = vk::AccelerationStructureCreateInfoKHR::default()
-                        .buffer(structures.raw())
-                        .offset(begin[0])
-                        .size(bytes)
-                        .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL);
-                    let scratch = vk::DeviceOrHostAddressKHR { device_address: scratch_address + begin[1] };
-                    batch.info(i).dst_acceleration_structure(create(&create_info)).scratch_data(scratch)
-                })
-                .collect();
-            (infos, structures, scratch)
-        };
-    let ranges: Vec<&[_]> = batch.ranges.iter().map(std::slice::from_ref).collect();
-
-    let ours = accel::Device::new(&device);
-    let (infos, _structures, _scratch) = placed(
-        &|info, count| {
-            let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-            // SAFETY: the pointers are those of live slices.
-            unsafe { ours.get_acceleration_structure_build_sizes(place, info, &[count], &mut sizes) }.expect("sizes");
-            sizes
-        },
-        // SAFETY: the buffer is live and large enough.
-        &|info| unsafe { ours.create_acceleration_structure(info, None) }.expect("a multiple of 256"),
-    );
-    let build = |from: usize, to: usize| {
-        device
-            // SAFETY: all memory is live and each build's own.
-            .run(None, |r| unsafe {
-                ours.cmd_build_acceleration_structures(r.commands(), &infos[from..to], &ranges[from..to])
-            })
-            .expect("it builds");
-    };
-    group.bench_function("one call", |b| b.iter(|| build(0, infos.len())));
-    group.bench_function("a call each", |b| b.iter(|| (0..infos.len()).for_each(|i| build(i, i + 1))));
-    if !device.has_ray_query() {
-        return;
-    }
     let driver = ash::khr::acceleration_structure::Device::new(device.ash_instance(), device.ash_device());
-    let (infos, _structures, _scratch) = placed(
-        &|info, count| {
-            let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-            // SAFETY: the pointers are those of live slices.
-            unsafe { driver.get_acceleration_structure_build_sizes(place, info, &[count], &mut sizes) };
-            sizes
-        },
-        // SAFETY: the buffer is live and large enough.
-        &|info| unsafe { driver.create_acceleration_structure(info, None) }.expect("a multiple of 256"),
-    );
-    group.bench_function("one call of the driver's", |b| {
-        b.iter(|| {
-            let built = device.run(None, |r| {
-                // SAFETY: all memory is live and each build's own.
-                unsafe { driver.cmd_build_acceleration_structures(r.commands(), &infos, &ranges) };
-                Ok(())
-            });
-            built.expect("it builds");
-        });
-    });
-    for info in &infos {
-        // SAFETY: made above; every submit has been waited for.
-        unsafe { driver.destroy_acceleration_structure(info.dst_acceleration_structure, None) };
+    let workload = Workload::new(&device, COUNT).expect("memory");
+    let mut makers = vec![("", Structures::ours(&device, accel::Options::DEFAULT))];
+    if device.has_ray_query() {
+        makers.push((", the driver's", Structures::drivers(&device, &driver)));
+    }
+    let mut group = c.benchmark_group("batch");
+    group.sample_size(10).throughput(Throughput::Elements(COUNT.into()));
+    for (whose, structures) in makers {
+        let batch = Batch::new(structures, &workload).expect("memory");
+        for way in [Way::OneCall, Way::OneSubmit, Way::SubmitEach] {
+            let name = format!("{}{whose}", way.name());
+            group.bench_function(name, |b| b.iter(|| batch.build(way, workload.count()).expect("it builds")));
+        }
     }
 }
 

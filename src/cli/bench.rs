@@ -4,7 +4,6 @@ use super::options::{Costs, Kinds, Size};
 use super::{Bar, Common};
 use crate::gpu::Device;
 use crate::measure::builders::{self, Needs, Spec};
-use crate::measure::copy;
 use crate::measure::matrix::{self, Failure, Outcome, Plan};
 use crate::measure::peers::driver;
 use crate::measure::provenance::{self, Machine};
@@ -14,7 +13,6 @@ use crate::report::results::Results;
 use crate::report::{DeviceFacts, Picture, Report, table};
 use crate::scene::{self, Scene};
 use anyhow::{Context, bail};
-use ash::vk;
 use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -169,33 +167,12 @@ fn possible(
 
 /// The report before anything was measured.
 fn empty(device: Option<&Device>, notes: Vec<String>) -> crate::Result<Report> {
-    let device = device.map(|device| -> crate::Result<DeviceFacts> {
-        let found = device.found();
-        let version = found.api_version;
-        Ok(DeviceFacts {
-            name: found.name.clone(),
-            driver: found.driver.clone(),
-            kind: match found.kind {
-                vk::PhysicalDeviceType::DISCRETE_GPU => "discrete GPU",
-                vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated GPU",
-                vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual GPU",
-                vk::PhysicalDeviceType::CPU => "CPU",
-                _ => "other",
-            }
-            .into(),
-            vulkan: format!("{}.{}", vk::api_version_major(version), vk::api_version_minor(version)),
-            subgroup: found.subgroup_size,
-            memory: found.memory,
-            copy_gb_s: Some(copy::rate_gb_s(device)?),
-        })
-    });
-    let command = std::env::args().skip(1).fold("hedgerow".to_owned(), |line, word| line + " " + &word);
     Ok(Report {
         machine: Machine::this(),
-        device: device.transpose()?,
+        device: device.map(DeviceFacts::of).transpose()?,
         commit: provenance::commit(),
         when: provenance::now(),
-        command,
+        command: provenance::command(),
         options: Vec::new(),
         outcomes: Vec::new(),
         failures: Vec::new(),

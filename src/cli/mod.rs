@@ -1,6 +1,7 @@
 //! The commands of the binary, one file each. What they print and when they fail is fixed in the README's contract:
 //! results to stdout, progress and diagnostics to stderr, exit status 0 done, 1 the work failed, 2 the arguments are wrong.
 
+mod accel;
 mod bench;
 mod build;
 mod compare;
@@ -34,6 +35,7 @@ struct Cli {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     Bench(bench::Arguments),
+    Accel(accel::Arguments),
     Compare(compare::Arguments),
     Devices(devices::Arguments),
     Build(build::Arguments),
@@ -70,6 +72,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     common.start_threads()?;
     match &cli.command {
         Command::Bench(arguments) => bench::run(common, arguments),
+        Command::Accel(arguments) => accel::run(common, arguments),
         Command::Compare(arguments) => compare::run(common, arguments),
         Command::Devices(arguments) => devices::run(common, arguments),
         Command::Build(arguments) => build::run(common, arguments),

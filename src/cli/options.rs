@@ -3,7 +3,7 @@
 use super::Bar;
 use crate::gpu::{Device, DeviceOptions};
 use crate::measure::builders::{self, Spec};
-use crate::scene::{self, Scene};
+use crate::scene::{self, Camera, Scene};
 use crate::trace::kinds::{RayKind, RayOptions};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -73,16 +73,21 @@ impl Common {
         let progress = |p: scene::Progress| bar.set(p.done, p.total);
         let folders = self.scene_folders();
         let mut scene = scene::load(spec, &scene::LoadOptions { folders, progress: Some(&progress) })?;
+        self.aim(&mut scene.camera);
+        Ok(scene)
+    }
+
+    /// Moves a camera to where `--eye`, `--look` and `--fov` ask for it.
+    pub fn aim(&self, camera: &mut Camera) {
         if let Some(eye) = self.eye {
-            scene.camera.eye = eye.0;
+            camera.eye = eye.0;
         }
         if let Some(look) = self.look {
-            scene.camera.look = look.0;
+            camera.look = look.0;
         }
         if let Some(fov) = self.fov {
-            scene.camera.fov = fov.0;
+            camera.fov = fov.0;
         }
-        Ok(scene)
     }
 }
 

@@ -1,14 +1,17 @@
 //! Figures: building and tracing under the clock, quality, and the records they end up in.
 //!
 //! [`Subject`] is a builder on a scene; [`builders`] makes one by name; [`matrix`] measures several of them on a scene and
-//! gives a [`record`] for each. The rest is how that is fair and what follows from it: [`agreement`] (right hits),
-//! [`statistics`] (in turn, medians), [`growth`] (time over triangles), [`levels`] (instances), [`pareto`] and [`total_time`] (who is best for what).
+//! gives a [`record`] for each. [`experiments`] measures what engines do through the calls of `VK_KHR_acceleration_structure`,
+//! over [`structures`] and [`levels`] of instances. The rest is how that is fair and what follows from it: [`agreement`] (right
+//! hits), [`statistics`] (in turn, medians), [`growth`] (time over triangles), [`pareto`] and [`total_time`] (who is best for
+//! what).
 
 pub mod agreement;
 pub mod builders;
 pub mod comparison;
 pub mod copy;
 mod device_lbvh;
+pub mod experiments;
 pub mod growth;
 mod host;
 pub mod levels;
@@ -18,6 +21,7 @@ pub mod peers;
 pub mod provenance;
 pub mod record;
 pub mod statistics;
+pub mod structures;
 mod subject;
 pub mod total_time;
 

@@ -1,5 +1,9 @@
-//! Where figures come from: commit, time, processor.
+//! Where figures come from: commit, time, processor, device, command.
 
+use super::copy;
+use crate::Result;
+use crate::gpu::Device;
+use ash::vk;
 use std::process::Command;
 use std::sync::OnceLock;
 
@@ -30,6 +34,11 @@ pub fn now() -> String {
     jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
 }
 
+/// The command line of this process.
+pub fn command() -> String {
+    std::env::args().skip(1).fold("hedgerow".to_owned(), |line, word| line + " " + &word)
+}
+
 /// The machine that figures belong to. Figures of different machines are never compared.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Machine {
@@ -58,6 +67,52 @@ impl Machine {
             memory: field("/proc/meminfo", "MemTotal").and_then(kilobytes).map(|k| k * 1024),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
         }
+    }
+}
+
+/// The device that was measured.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct DeviceFacts {
+    /// Its name.
+    pub name: String,
+    /// Driver and version.
+    pub driver: String,
+    /// Discrete, integrated, CPU…
+    pub kind: String,
+    /// Vulkan version.
+    pub vulkan: String,
+    /// Subgroup size.
+    pub subgroup: u32,
+    /// Bytes of device memory.
+    pub memory: u64,
+    /// Bytes a second that a plain copy reads and writes, in GB/s (10⁹), both counted.
+    pub copy_gb_s: Option<f64>,
+}
+
+impl DeviceFacts {
+    /// What `device` says of itself, and the rate of a plain copy on it.
+    ///
+    /// # Errors
+    /// Too little memory; the device failed.
+    pub fn of(device: &Device) -> Result<DeviceFacts> {
+        let found = device.found();
+        let version = found.api_version;
+        let kind = match found.kind {
+            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete GPU",
+            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated GPU",
+            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual GPU",
+            vk::PhysicalDeviceType::CPU => "CPU",
+            _ => "other",
+        };
+        Ok(DeviceFacts {
+            name: found.name.clone(),
+            driver: found.driver.clone(),
+            kind: kind.into(),
+            vulkan: format!("{}.{}", vk::api_version_major(version), vk::api_version_minor(version)),
+            subgroup: found.subgroup_size,
+            memory: found.memory,
+            copy_gb_s: Some(copy::rate_gb_s(device)?),
+        })
     }
 }
 

@@ -1,9 +1,9 @@
 //! Medians and spreads of repeated runs, and the order in which several subjects are run: in turn, A B A B.
 
-use crate::Result;
+use crate::{Error, Result};
 
 /// What repeated measurements of one thing say.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Spread {
     /// The middle value (mean of the two middle ones for an even number).
     pub median: f64,
@@ -26,10 +26,23 @@ impl Spread {
         Some(Spread { median, min, max, runs: sorted.len() as u32 })
     }
 
+    /// The spread of `samples`, of which there must be some.
+    ///
+    /// # Errors
+    /// There are none.
+    pub fn of_some(samples: &[f64]) -> Result<Spread> {
+        Spread::of(samples).ok_or_else(|| Error::Argument("nothing was run; take at least one run".into()))
+    }
+
     /// Whether the two could be the same thing measured twice: their ranges from `min` to `max` meet.
     pub fn overlaps(&self, other: &Spread) -> bool {
         self.min <= other.max && other.min <= self.max
     }
+}
+
+/// The ratios of two subjects that ran in turn, round by round: what slows down a round slows both.
+pub fn ratios(samples: &[f64], base: &[f64]) -> Vec<f64> {
+    samples.iter().zip(base).map(|(sample, base)| sample / base).collect()
 }
 
 /// Runs every subject once per round, one after the other, `warm_ups` rounds that do not count and `runs` that do.
@@ -59,7 +72,6 @@ pub fn in_turn<S, T>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Error;
 
     #[test]
     fn the_median_is_the_middle_of_the_sorted_values() {
@@ -68,6 +80,12 @@ mod tests {
         let even = Spread::of(&[4.0, 1.0, 2.0, 9.0]).expect("four samples");
         assert_eq!(even, Spread { median: 3.0, min: 1.0, max: 9.0, runs: 4 });
         assert_eq!(Spread::of(&[]), None);
+    }
+
+    #[test]
+    fn ratios_are_taken_round_by_round() {
+        assert_eq!(ratios(&[2.0, 9.0], &[1.0, 3.0]), [2.0, 3.0]);
+        assert!(Spread::of_some(&[]).is_err());
     }
 
     #[test]

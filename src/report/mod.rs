@@ -1,11 +1,14 @@
 //! Tables, charts and the page.
 //!
 //! [`results`] is what programs read. For people, [`table`] goes to the terminal and [`Report::write`] makes a folder with
-//! charts as SVG and PNG and an `index.html` that opens from the disk with no network.
+//! charts as SVG and PNG and an `index.html` that opens from the disk with no network; [`accel`] has a page of its own.
 
+pub mod accel;
 pub mod chart;
 pub mod charts;
+mod elements;
 pub mod labels;
+mod lines;
 pub mod names;
 pub mod numbers;
 mod page;
@@ -17,6 +20,7 @@ pub mod table;
 pub mod theme;
 
 use crate::measure::matrix::{Failure, Outcome};
+pub use crate::measure::provenance::DeviceFacts;
 use crate::measure::provenance::Machine;
 use crate::measure::record::Record;
 use crate::{Error, Result};
@@ -51,25 +55,6 @@ pub struct Report {
     pub pictures: Vec<Picture>,
 }
 
-/// The device that was measured.
-#[derive(Debug, Clone)]
-pub struct DeviceFacts {
-    /// Its name.
-    pub name: String,
-    /// Driver and version.
-    pub driver: String,
-    /// Discrete, integrated, CPU…
-    pub kind: String,
-    /// Vulkan version.
-    pub vulkan: String,
-    /// Subgroup size.
-    pub subgroup: u32,
-    /// Bytes of device memory.
-    pub memory: u64,
-    /// Bytes a second that a plain copy reads and writes, in GB/s (10⁹), both counted.
-    pub copy_gb_s: Option<f64>,
-}
-
 /// A picture of a scene.
 #[derive(Debug, Clone)]
 pub struct Picture {
@@ -102,7 +87,8 @@ impl Report {
         scenes
     }
 
-    /// Writes `results.csv`, `charts/` and `index.html` into `folder`; `results.jsonl` is there already.
+    /// Writes `results.csv`, `charts/` and `index.html` into `folder`; `results.jsonl` is there already. Where there is an
+    /// `accel.jsonl`, too, its page is written again, and the two name each other.
     ///
     /// # Errors
     /// A file cannot be written.
@@ -124,16 +110,27 @@ impl Report {
         }
         let growth = charts::growth::growth(&records, &legend)?;
 
-        let chart_folder = folder.join("charts");
-        std::fs::create_dir_all(&chart_folder).map_err(Error::file(&chart_folder))?;
-        for chart in scenes.iter().flat_map(|s| &s.charts).chain(&growth) {
-            for (extension, content) in [("svg", chart.svg().as_bytes().to_vec()), ("png", chart.png()?)] {
-                let path = chart_folder.join(format!("{}.{extension}", chart.name));
-                std::fs::write(&path, content).map_err(Error::file(&path))?;
-            }
-        }
-        let page = page::page(self, &legend, &scenes, growth.as_ref());
+        write_charts(folder, scenes.iter().flat_map(|s| &s.charts).chain(&growth))?;
+        let has_accel = folder.join(accel::FILE).is_file();
+        let page = page::page(self, &legend, &scenes, growth.as_ref(), has_accel);
         let path = folder.join("index.html");
-        std::fs::write(&path, page).map_err(Error::file(&path))
+        std::fs::write(&path, page).map_err(Error::file(&path))?;
+        if has_accel {
+            accel::write(folder)?;
+        }
+        Ok(())
     }
+}
+
+/// Writes charts as SVG and PNG into the folder `charts/` of `folder`.
+fn write_charts<'a>(folder: &Path, charts: impl Iterator<Item = &'a Chart>) -> Result<()> {
+    let folder = folder.join("charts");
+    std::fs::create_dir_all(&folder).map_err(Error::file(&folder))?;
+    for chart in charts {
+        for (extension, content) in [("svg", chart.svg().as_bytes().to_vec()), ("png", chart.png()?)] {
+            let path = folder.join(format!("{}.{extension}", chart.name));
+            std::fs::write(&path, content).map_err(Error::file(&path))?;
+        }
+    }
+    Ok(())
 }

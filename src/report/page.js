@@ -26,7 +26,7 @@ for (const table of document.querySelectorAll("table.sortable")) {
 }
 
 const filter = document.getElementById("filter");
-filter.addEventListener("input", () => {
+filter?.addEventListener("input", () => {
   const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
   for (const row of document.getElementById("results-table").tBodies[0].rows) {
     const text = [...row.cells].slice(0, 2).map((cell) => cell.textContent + " " + cell.dataset.value).join(" ").toLowerCase();

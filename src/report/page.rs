@@ -1,37 +1,36 @@
 //! `index.html`: one file that opens from the disk, with style, script and charts inside; pictures lie beside it.
 
 use super::chart::Chart;
+use super::elements::{bar, column, facts, figure, foot, head, measured_by, number};
 use super::names::{short, slug};
 use super::numbers::{bytes, duration, grouped, short_count, three_digits};
 use super::summary::{self, Standing};
 use super::table::verdict;
-use super::theme::{self, Legend, Tone};
+use super::theme::Legend;
 use super::{Picture, Report, SceneCharts};
 use crate::measure::matrix::Outcome;
 use crate::measure::record::{Record, Trace};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
-
-const STYLE: &str = include_str!("page.css");
-const SCRIPT: &str = include_str!("page.js");
+use maud::{DOCTYPE, Markup, html};
 
 /// The whole page.
-pub(super) fn page(report: &Report, legend: &Legend, scenes: &[SceneCharts], growth: Option<&Chart>) -> String {
+///
+/// `has_accel` where a page of `hedgerow accel` lies beside it.
+pub(super) fn page(
+    report: &Report,
+    legend: &Legend,
+    scenes: &[SceneCharts],
+    growth: Option<&Chart>,
+    has_accel: bool,
+) -> String {
     let records = report.records();
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { "hedgerow: " (scenes.len()) " scenes, " (legend.builders().len()) " builders" }
-                link rel="icon" href="data:,";
-                style { (PreEscaped(colours())) (PreEscaped(STYLE)) }
-            }
+            (head(&format!("hedgerow: {} scenes, {} builders", scenes.len(), legend.builders().len())))
             body {
                 a.skip href="#summary" { "Skip to the results" }
                 (header(report, legend, scenes))
-                (navigation(scenes, growth.is_some()))
+                (navigation(scenes, growth.is_some(), has_accel))
                 main {
                     @if !report.failures.is_empty() || records.iter().any(|r| r.valid == Some(false)) { (failures(report)) }
                     (summary_section(report, &records, legend))
@@ -40,25 +39,14 @@ pub(super) fn page(report: &Report, legend: &Legend, scenes: &[SceneCharts], gro
                     (results_section(&records, legend))
                     (method_section(report))
                 }
-                footer { p { "Made by hedgerow " (env!("CARGO_PKG_VERSION")) ", commit " code { (report.commit) } ", " (report.when) "." } }
-                script { (PreEscaped(SCRIPT)) }
+                (foot(&report.commit, &report.when))
             }
         }
     };
     markup.into_string()
 }
 
-/// The theme as CSS variables: light, and dark where the reader's system asks for it.
-fn colours() -> String {
-    let variables =
-        |of: fn(&Tone) -> String| theme::all().map(|t| format!("--{}:{};", t.variable, of(&t))).collect::<String>();
-    let light = variables(|t| theme::hex(t.light));
-    let dark = variables(|t| theme::hex(t.dark));
-    format!(":root{{{light}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n")
-}
-
 fn header(report: &Report, legend: &Legend, scenes: &[SceneCharts]) -> Markup {
-    let machine = &report.machine;
     html! {
         header.hero {
             p.kicker { "hedgerow benchmark" }
@@ -67,25 +55,13 @@ fn header(report: &Report, legend: &Legend, scenes: &[SceneCharts]) -> Markup {
                 (legend.builders().len()) " builders of acceleration structures on " (scenes.len())
                 " scenes, built and traced in turn in one process; trees of ours validated on the host, a sample of every kind of ray checked against brute force."
             }
-            dl.facts {
-                div { dt { "Processor" } dd { (machine.cpu) span { (machine.cores) " cores, " (machine.system) } } }
-                @if let Some(memory) = machine.memory { div { dt { "Memory" } dd { (bytes(memory)) } } }
-                @if let Some(device) = &report.device {
-                    div { dt { "Device" } dd { (device.name) span { (device.kind) ", subgroups of " (device.subgroup) ", " (bytes(device.memory)) } } }
-                    div { dt { "Driver" } dd { (device.driver) span { "Vulkan " (device.vulkan) } } }
-                    @if let Some(rate) = device.copy_gb_s {
-                        div { dt { "Plain copy" } dd { (three_digits(rate)) " GB/s" span { "read and written, measured" } } }
-                    }
-                }
-                div { dt { "Commit" } dd { code { (report.commit) } span { (report.when) } } }
-                @for (name, value) in &report.options { div { dt { (name) } dd { (value) } } }
-            }
-            p.command { span { "Measured by" } code { (report.command) } }
+            (facts(&report.machine, report.device.as_ref(), [&report.commit, &report.when], &report.options))
+            (measured_by(&report.command))
         }
     }
 }
 
-fn navigation(scenes: &[SceneCharts], growth: bool) -> Markup {
+fn navigation(scenes: &[SceneCharts], growth: bool, has_accel: bool) -> Markup {
     html! {
         nav aria-label="Sections" {
             a href="#summary" { "Summary" }
@@ -93,6 +69,7 @@ fn navigation(scenes: &[SceneCharts], growth: bool) -> Markup {
             @if growth { a href="#growth" { "Growth" } }
             a href="#results" { "All figures" }
             a href="#method" { "How it is measured" }
+            @if has_accel { a.page href="accel.html" { "Batches, top levels, updates" } }
         }
     }
 }
@@ -173,34 +150,6 @@ fn summary_section(report: &Report, records: &[&Record], legend: &Legend) -> Mar
     }
 }
 
-/// A heading that sorts its column when pressed.
-fn column(name: &str, unit: &str, is_number: bool) -> Markup {
-    html! {
-        th scope="col" .number[is_number] aria-sort="none" {
-            button type="button" { (name) @if !unit.is_empty() { " " small { (unit) } } }
-        }
-    }
-}
-
-/// A cell with a figure; a dash where it was not measured.
-fn number(value: Option<f64>, text: impl Fn(f64) -> String) -> Markup {
-    match value.filter(|v| v.is_finite()) {
-        Some(value) => html! { td.number data-value=(value) { (text(value)) } },
-        None => html! { td.number.none data-value="" { span aria-label="not measured" { "–" } } },
-    }
-}
-
-/// A cell with a figure and a bar as long as its share of the greatest.
-fn bar(value: Option<f64>, greatest: f64) -> Markup {
-    match value.filter(|v| v.is_finite() && greatest > 0.0) {
-        Some(value) => {
-            let share = format!("--share:{:.1}%", 100.0 * value / greatest);
-            html! { td.number.bar data-value=(value) style=(share) { (three_digits(value)) } }
-        }
-        None => number(None, three_digits),
-    }
-}
-
 fn scene_section(report: &Report, scene: &SceneCharts, legend: &Legend) -> Markup {
     let outcomes: Vec<&Outcome> = report.outcomes.iter().filter(|o| o.record.scene == scene.scene).collect();
     let triangles = outcomes.first().map_or(0, |o| o.record.triangles);
@@ -219,18 +168,6 @@ fn scene_section(report: &Report, scene: &SceneCharts, legend: &Legend) -> Marku
             (phase_table(report, &outcomes, legend))
             (ray_table(&outcomes, legend))
             (choices(&outcomes, legend))
-        }
-    }
-}
-
-fn figure(chart: &Chart) -> Markup {
-    html! {
-        figure.chart {
-            div.canvas { (PreEscaped(chart.inline())) }
-            figcaption {
-                (chart.reading) " "
-                span.files { a href={ "charts/" (chart.name) ".svg" } { "SVG" } " " a href={ "charts/" (chart.name) ".png" } { "PNG" } }
-            }
         }
     }
 }

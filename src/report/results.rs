@@ -1,17 +1,15 @@
 //! `results.jsonl` and `results.csv`: the records as programs read them.
 
-use crate::measure::record::{Record, SCHEMA};
+use super::lines::{self, Lines};
+use crate::measure::record::Record;
 use crate::{Error, Result};
-use std::fs::File;
-use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+const FILE: &str = "results.jsonl";
 
 /// `results.jsonl`, open for writing: each record is on the disk as soon as it is measured.
 #[derive(Debug)]
-pub struct Results {
-    path: PathBuf,
-    file: File,
-}
+pub struct Results(Lines);
 
 impl Results {
     /// Makes `folder` and an empty `results.jsonl` in it.
@@ -19,10 +17,7 @@ impl Results {
     /// # Errors
     /// The folder cannot be made or written to.
     pub fn create(folder: &Path) -> Result<Results> {
-        std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
-        let path = folder.join("results.jsonl");
-        let file = File::create(&path).map_err(Error::file(&path))?;
-        Ok(Results { path, file })
+        Lines::create(folder, FILE).map(Results)
     }
 
     /// Appends a record.
@@ -30,9 +25,7 @@ impl Results {
     /// # Errors
     /// The file cannot be written.
     pub fn append(&mut self, record: &Record) -> Result<()> {
-        let mut line = serde_json::to_vec(record).expect("a record has no keys but strings");
-        line.push(b'\n');
-        self.file.write_all(&line).and_then(|()| self.file.flush()).map_err(Error::file(&self.path))
+        self.0.append(record)
     }
 }
 
@@ -41,28 +34,7 @@ impl Results {
 /// # Errors
 /// The file cannot be read; a line is not a record of this schema.
 pub fn read(path: &Path) -> Result<Vec<Record>> {
-    let path = if path.is_dir() { path.join("results.jsonl") } else { path.to_owned() };
-    let file = File::open(&path).map_err(Error::file(&path))?;
-    let mut records = Vec::new();
-    for (number, line) in BufReader::new(file).lines().enumerate() {
-        let line = line.map_err(Error::file(&path))?;
-        if line.trim().is_empty() {
-            continue;
-        }
-        let wrong = |what: String| {
-            Error::Malformed(format!(
-                "{}:{}: {what}; is it a results.jsonl of `hedgerow bench`?",
-                path.display(),
-                number + 1
-            ))
-        };
-        let record: Record = serde_json::from_str(&line).map_err(|e| wrong(format!("not a record: {e}")))?;
-        if record.schema != SCHEMA {
-            return Err(wrong(format!("schema {}, this program reads {SCHEMA}", record.schema)));
-        }
-        records.push(record);
-    }
-    Ok(records)
+    lines::read(path, FILE, "hedgerow bench", |record: &Record| record.schema)
 }
 
 /// Writes the records as a table: one row each, three columns a kind of ray.

@@ -48,17 +48,25 @@ fn bounds(triangles: &[[u32; 3]], frames: &[Vec<[f32; 3]>]) -> Aabb {
 /// # Errors
 /// As [`load`](super::load), and [`Error::Scene`] if the scene is no animation.
 pub fn load_animation(spec: &str, options: &LoadOptions<'_>) -> Result<Animation> {
-    let is_none = || Error::Scene(format!("{spec}: not an animation; take an .anim file or gen:twist:N:FRAMES"));
+    load_moving(spec, options)?
+        .ok_or_else(|| Error::Scene(format!("{spec}: not an animation; take an .anim file or gen:twist:N:FRAMES")))
+}
+
+/// [`load_animation`] of a scene that is one; `None` if it is of another kind.
+///
+/// # Errors
+/// As [`load`](super::load).
+pub fn load_moving(spec: &str, options: &LoadOptions<'_>) -> Result<Option<Animation>> {
     if let Some(generated) = generators::Generated::find(spec)? {
-        return generated.animation().ok_or_else(is_none);
+        return Ok(generated.animation());
     }
     let path = lookup::find(spec, &options.folders)?;
     if lookup::format_of(&path).as_deref() != Some("anim") {
-        return Err(is_none());
+        return Ok(None);
     }
     let (triangles, frames) = tri::read_frames(&path, options)?;
     if triangles.is_empty() {
         return Err(no_triangles(spec));
     }
-    Ok(Animation::new(lookup::name_of(&path), triangles, frames))
+    Ok(Some(Animation::new(lookup::name_of(&path), triangles, frames)))
 }

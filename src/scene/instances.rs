@@ -141,7 +141,7 @@ fn contains(outer: &Aabb, inner: &Aabb) -> bool {
 /// # Errors
 /// As [`load`].
 pub fn load_instances(spec: &str, options: &LoadOptions<'_>) -> Result<Instances> {
-    if let Some(instances) = placed(spec, options)? {
+    if let Some(instances) = load_placed(spec, options)? {
         return Ok(instances);
     }
     let Scene { name, mesh, camera, lights } = load(spec, options)?;
@@ -149,8 +149,11 @@ pub fn load_instances(spec: &str, options: &LoadOptions<'_>) -> Result<Instances
     Ok(Instances { name, parts: vec![mesh], instances, camera, lights })
 }
 
-/// The scene, if it is one of instances.
-pub(super) fn placed(spec: &str, options: &LoadOptions<'_>) -> Result<Option<Instances>> {
+/// [`load_instances`] of a scene that is one of instances; `None` if it is of another kind.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_placed(spec: &str, options: &LoadOptions<'_>) -> Result<Option<Instances>> {
     let instances = if let Some(generated) = generators::Generated::find(spec)? {
         generated.instances()
     } else {

@@ -25,9 +25,9 @@ use crate::bvh::layout::Aabb;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
-pub use animation::{Animation, load_animation};
+pub use animation::{Animation, load_animation, load_moving};
 pub use generators::generators;
-pub use instances::{Instance, Instances, load_instances};
+pub use instances::{Instance, Instances, load_instances, load_placed};
 pub use lookup::{list, own_folders};
 pub use random::SplitMix64;
 
@@ -122,7 +122,7 @@ struct Content {
 /// [`Error::Scene`] if there is no such scene or it has no triangles, [`Error::Malformed`] with file, line or item and the
 /// remedy if the file is broken, [`Error::Argument`] if a generator's arguments are wrong.
 pub fn load(spec: &str, options: &LoadOptions<'_>) -> Result<Scene> {
-    if let Some(scene) = instances::placed(spec, options)? {
+    if let Some(scene) = load_placed(spec, options)? {
         let mesh = scene.flatten()?;
         return Ok(Scene { name: scene.name, mesh, camera: scene.camera, lights: scene.lights });
     }

@@ -1,0 +1,358 @@
+//! The lines of `accel.jsonl` (CONTRACT, "Records of experiments"). A figure that was not measured is `None`.
+
+use crate::measure::provenance::{DeviceFacts, Machine};
+use crate::measure::record::SCHEMA;
+use crate::measure::statistics::Spread;
+use serde::{Deserialize, Serialize};
+
+/// One line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// What it says.
+    #[serde(flatten)]
+    pub entry: Entry,
+}
+
+impl From<Entry> for Line {
+    fn from(entry: Entry) -> Line {
+        Line { schema: SCHEMA, entry }
+    }
+}
+
+/// What a line says, by its `experiment`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "experiment", rename_all = "lowercase")]
+pub enum Entry {
+    /// The first line: where and how the others were measured.
+    Setting(Setting),
+    /// Many small structures, built in one way.
+    Batch(Batch),
+    /// A top level over so many instances.
+    Tlas(TopLevel),
+    /// A scene of instances, re-braided and not.
+    Rebraid(Rebraid),
+    /// A frame of an animation.
+    Update(Update),
+    /// An experiment that could not be measured, or not to its end.
+    Failure(Failure),
+}
+
+/// Where and how it was measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// The machine.
+    pub machine: Machine,
+    /// The device.
+    pub device: DeviceFacts,
+    /// Commit of the program.
+    pub commit: String,
+    /// When, RFC 3339 UTC.
+    pub when: String,
+    /// The command line that measures it again.
+    pub command: String,
+    /// Options with their values, for people.
+    pub options: Vec<(String, String)>,
+    /// What a reader must know to judge the figures, such as a peer that is none.
+    pub notes: Vec<String>,
+}
+
+/// Whose structures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Maker {
+    /// Ours.
+    Ours,
+    /// The driver's.
+    Driver,
+}
+
+impl Maker {
+    /// As charts and tables have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Maker::Ours => "hedgerow",
+            Maker::Driver => "driver",
+        }
+    }
+}
+
+/// How many structures are built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Way {
+    /// All in one call.
+    OneCall,
+    /// A call each with a barrier behind it, all in one command buffer.
+    OneSubmit,
+    /// A call each, submitted and waited for by itself.
+    SubmitEach,
+    /// As many submits with nothing in them: what of [`Way::SubmitEach`] is no building.
+    EmptySubmits,
+}
+
+impl Way {
+    /// As charts and tables have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Way::OneCall => "one call",
+            Way::OneSubmit => "a call each, one submit",
+            Way::SubmitEach => "a call and submit each",
+            Way::EmptySubmits => "as many empty submits",
+        }
+    }
+}
+
+/// Structures of 12 to 500 triangles.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Batch {
+    /// How many.
+    pub structures: u32,
+    /// Triangles of all together.
+    pub triangles: u64,
+    /// Whose; nobody's are [`Way::EmptySubmits`].
+    pub maker: Option<Maker>,
+    /// How they are built.
+    pub way: Way,
+    /// By the wall's clock, from before the recording to behind the wait.
+    pub wall_ms: Spread,
+    /// Its time over that of ours in one call, run by run.
+    pub over_our_call: Spread,
+}
+
+/// A top level.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TopLevel {
+    /// Instances.
+    pub instances: u32,
+    /// Whose.
+    pub maker: Maker,
+    /// By the device's timestamps.
+    pub build_ms: Spread,
+    /// In place, with every instance moved.
+    pub update_ms: Option<Spread>,
+    /// The structure.
+    pub structure_bytes: u64,
+    /// What a build needs beside it.
+    pub scratch_bytes: u64,
+}
+
+/// A scene of instances under top levels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rebraid {
+    /// Scene name.
+    pub scene: String,
+    /// Instances.
+    pub instances: u32,
+    /// What they are instances of.
+    pub parts: u32,
+    /// Triangles, each as often as it is seen.
+    pub triangles: u64,
+    /// How many other instances' boxes each one's overlaps, in the mean (over some hundred, where there are many).
+    pub overlaps: f64,
+    /// Ours, plain.
+    pub off: Side,
+    /// Ours, with the flag `REBRAID`.
+    pub on: Side,
+    /// The driver's.
+    pub driver: Option<Side>,
+    /// One entry a kind of ray.
+    pub rays: Vec<BraidedRays>,
+}
+
+/// One of the top levels that are compared.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Side {
+    /// Building the top level, by the device's timestamps.
+    pub build_ms: Spread,
+    /// The top level.
+    pub structure_bytes: u64,
+    /// What its build needs beside it.
+    pub scratch_bytes: u64,
+    /// What its leaves hold: instances, those that were opened as their parts; `None` where the maker does not tell.
+    pub entries: Option<u32>,
+}
+
+/// Rays of a kind through both.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BraidedRays {
+    /// Ray kind.
+    pub rays: String,
+    /// How many.
+    pub count: u64,
+    /// How many hit.
+    pub hits: u64,
+    /// Of how many the two of ours say different hits; there should be none.
+    pub different: u64,
+    /// Through the plain top level, by the device's timestamps.
+    pub off_ms: Spread,
+    /// Through the re-braided one.
+    pub on_ms: Spread,
+    /// Through the driver's.
+    pub driver_ms: Option<Spread>,
+    /// Time through the plain one over that through the re-braided one, run by run: above 1, re-braiding is faster.
+    pub gain: Spread,
+    /// Work a ray through the plain one.
+    pub off_work: Work,
+    /// Work a ray through the re-braided one.
+    pub on_work: Work,
+}
+
+/// What a ray meets on its way, in the mean.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Work {
+    /// Nodes of the top level.
+    pub top_nodes: f64,
+    /// Instances that it enters.
+    pub instances: f64,
+    /// Nodes below.
+    pub nodes_below: f64,
+    /// Triangles tested.
+    pub tests: f64,
+}
+
+impl Work {
+    /// The mean over rays.
+    pub fn mean(works: &[[u32; 4]]) -> Work {
+        let sum = |k: usize| works.iter().map(|work| f64::from(work[k])).sum::<f64>();
+        let [top_nodes, instances, nodes_below, tests] =
+            std::array::from_fn(|k| if works.is_empty() { 0.0 } else { sum(k) / works.len() as f64 });
+        Work { top_nodes, instances, nodes_below, tests }
+    }
+}
+
+/// A frame of an animation, with the structure of the first frame updated, and built anew.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Update {
+    /// Scene name.
+    pub scene: String,
+    /// Triangles.
+    pub triangles: u64,
+    /// The frame; the first is 0.
+    pub frame: u32,
+    /// Whose.
+    pub maker: Maker,
+    /// Building anew, by the device's timestamps.
+    pub build_ms: Spread,
+    /// Updating in place.
+    pub update_ms: Option<Spread>,
+    /// How many times the SAH cost of the updated structure is what it was when built, as the structure itself tells.
+    pub growth: Option<f64>,
+    /// SAH cost of the updated structure.
+    pub updated_sah: Option<f64>,
+    /// SAH cost of that which was built anew.
+    pub built_sah: Option<f64>,
+    /// One entry a kind of ray.
+    pub rays: Vec<UpdatedRays>,
+}
+
+/// Rays of a kind through both.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UpdatedRays {
+    /// Ray kind.
+    pub rays: String,
+    /// How many.
+    pub count: u64,
+    /// Through the structure that was built anew, by the device's timestamps.
+    pub built_ms: Spread,
+    /// Through the updated one.
+    pub updated_ms: Option<Spread>,
+    /// Time through the updated one over that through the other, run by run: above 1, updating has cost speed.
+    pub slowdown: Option<Spread>,
+}
+
+impl Update {
+    /// Time of all rays through the updated structure over that through the one built anew.
+    pub fn slowdown(&self) -> Option<f64> {
+        let [updated, built] = self.tracing()?;
+        Some(updated / built)
+    }
+
+    /// From how many rays a frame on, in the mix that was traced, building anew takes less time than updating: what a build
+    /// takes longer, over what a ray does. `None` if never, or if it was not measured.
+    pub fn pays_from(&self) -> Option<f64> {
+        let rays: f64 = self.rays.iter().map(|rays| rays.count as f64).sum();
+        let [updated, built] = self.tracing()?;
+        let longer = (self.build_ms.median - self.update_ms?.median).max(0.0);
+        (updated > built).then(|| longer / ((updated - built) / rays))
+    }
+
+    /// Milliseconds of all rays: through the updated structure, and through the other.
+    fn tracing(&self) -> Option<[f64; 2]> {
+        let updated: Option<f64> = self.rays.iter().map(|rays| Some(rays.updated_ms?.median)).sum();
+        let built: f64 = self.rays.iter().map(|rays| rays.built_ms.median).sum();
+        Some([updated?, built]).filter(|_| built > 0.0)
+    }
+}
+
+/// What could not be measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Failure {
+    /// The experiment, and the scene where it has one.
+    pub of: String,
+    /// What went wrong.
+    pub what: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spread(median: f64) -> Spread {
+        Spread { median, min: 0.9 * median, max: 1.1 * median, runs: 3 }
+    }
+
+    fn frame(build: f64, update: f64, [built, updated]: [f64; 2]) -> Update {
+        let rays = UpdatedRays {
+            rays: "primary".into(),
+            count: 1000,
+            built_ms: spread(built),
+            updated_ms: Some(spread(updated)),
+            slowdown: Some(spread(updated / built)),
+        };
+        Update {
+            scene: "twist".into(),
+            triangles: 12,
+            frame: 1,
+            maker: Maker::Ours,
+            build_ms: spread(build),
+            update_ms: Some(spread(update)),
+            growth: Some(1.5),
+            updated_sah: None,
+            built_sah: None,
+            rays: vec![rays],
+        }
+    }
+
+    #[test]
+    fn a_line_names_its_schema_and_experiment_and_what_was_not_measured_is_null() {
+        let line = Line::from(Entry::Update(frame(4.0, 1.0, [2.0, 3.0])));
+        let value = serde_json::to_value(&line).expect("JSON");
+        assert_eq!((&value["schema"], &value["experiment"]), (&1.into(), &"update".into()));
+        assert_eq!((&value["maker"], &value["growth"]), (&"ours".into(), &1.5.into()));
+        assert!(value["built_sah"].is_null(), "{value}");
+        assert_eq!(serde_json::from_value::<Line>(value).expect("round trip"), line);
+        let text = serde_json::to_string(&line).expect("JSON");
+        assert_eq!(serde_json::from_str::<Line>(&text).expect("round trip"), line);
+    }
+
+    #[test]
+    fn building_anew_pays_when_the_rays_save_what_it_takes_longer() {
+        // 3 ms longer to build, 1 µs a ray saved.
+        assert_eq!(frame(4.0, 1.0, [2.0, 3.0]).pays_from().map(f64::round), Some(3000.0));
+        assert_eq!(frame(4.0, 1.0, [3.0, 3.0]).pays_from(), None, "no ray is faster");
+        assert_eq!(frame(1.0, 4.0, [2.0, 3.0]).pays_from(), Some(0.0), "nothing is longer");
+        let mut unmeasured = frame(4.0, 1.0, [2.0, 3.0]);
+        unmeasured.rays[0].updated_ms = None;
+        assert_eq!((unmeasured.pays_from(), unmeasured.slowdown()), (None, None));
+        assert_eq!(frame(4.0, 1.0, [2.0, 3.0]).slowdown(), Some(1.5));
+    }
+
+    #[test]
+    fn work_is_the_mean_over_rays() {
+        let mean = Work::mean(&[[1, 2, 3, 4], [3, 2, 1, 0]]);
+        assert_eq!(mean, Work { top_nodes: 2.0, instances: 2.0, nodes_below: 2.0, tests: 2.0 });
+        assert_eq!(Work::mean(&[]).tests, 0.0);
+    }
+}

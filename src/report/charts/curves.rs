@@ -1,0 +1,128 @@
+//! Figures over a quantity, one curve a subject, with the spread of each figure; where a curve has a power law, that is drawn.
+
+use crate::Result;
+use crate::measure::growth::PowerLaw;
+use crate::measure::statistics::Spread;
+use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, frame, log_axis, mesh, pixel};
+use crate::report::labels::{Rect, text_width};
+use crate::report::theme::{INK, Tone};
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use plotters::prelude::*;
+use std::ops::Range;
+
+/// One subject.
+#[derive(Debug, Clone)]
+pub struct Curve {
+    /// At its right end.
+    pub name: String,
+    /// Its colour.
+    pub tone: Tone,
+    /// From left to right.
+    pub points: Vec<(f64, Spread)>,
+    /// Drawn instead of lines from point to point.
+    pub law: Option<PowerLaw>,
+}
+
+impl Curve {
+    /// With the power law through its medians, whose exponent stands behind the name.
+    pub fn with_law(self) -> Curve {
+        let law = PowerLaw::fit(&self.points.iter().map(|(x, spread)| (*x, spread.median)).collect::<Vec<_>>());
+        match law {
+            Some(law) => Curve { name: format!("{}: n^{:.2}", self.name, law.exponent), law: Some(law), ..self },
+            None => self,
+        }
+    }
+}
+
+/// An axis.
+pub struct Axis<'a> {
+    /// What it is called.
+    pub name: &'a str,
+    /// Whether its numbers are logarithmic.
+    pub is_log: bool,
+    /// How they are written.
+    pub number: &'a dyn Fn(&f64) -> String,
+}
+
+/// Draws the curves. `None` if there are none, or all points have one place on the horizontal axis.
+///
+/// # Errors
+/// The chart cannot be drawn.
+pub fn curves(caption: Caption, curves: &[Curve], x: &Axis<'_>, y: &Axis<'_>) -> Result<Option<Chart>> {
+    let points = || curves.iter().flat_map(|curve| &curve.points);
+    let (left, right) = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), p| (l.min(p.0), r.max(p.0)));
+    let low = points().map(|p| p.1.min).fold(f64::INFINITY, f64::min);
+    let high = points().map(|p| p.1.max).fold(0.0, f64::max);
+    if left >= right || high <= 0.0 {
+        return Ok(None);
+    }
+    let x_range = if x.is_log { 0.8 * left..1.2 * right } else { left..right + 0.02 * (right - left) };
+    let y_range = if y.is_log { 0.7 * low..1.4 * high } else { 0.0..1.1 * high };
+    let names = curves.iter().map(|curve| text_width(&curve.name, 13.0)).fold(0.0, f64::max);
+    let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
+        let mut chart = ChartBuilder::on(area);
+        chart.x_label_area_size(46).y_label_area_size(76).margin_right(names as u32 + 24);
+        let axes = Axes { x: x.name, y: y.name, x_number: x.number, y_number: y.number };
+        let linear = |range: &Range<f64>| range.clone();
+        match (x.is_log, y.is_log) {
+            (true, true) => {
+                let chart = chart.build_cartesian_2d(log_axis(x_range.clone()), log_axis(y_range.clone()))?;
+                drawn(chart, overlay, curves, &axes, x_range.end)
+            }
+            (true, false) => {
+                let chart = chart.build_cartesian_2d(log_axis(x_range.clone()), linear(&y_range))?;
+                drawn(chart, overlay, curves, &axes, x_range.end)
+            }
+            (false, true) => {
+                let chart = chart.build_cartesian_2d(linear(&x_range), log_axis(y_range.clone()))?;
+                drawn(chart, overlay, curves, &axes, x_range.end)
+            }
+            (false, false) => {
+                let chart = chart.build_cartesian_2d(linear(&x_range), linear(&y_range))?;
+                drawn(chart, overlay, curves, &axes, x_range.end)
+            }
+        }
+    };
+    Chart::draw(caption, draw).map(Some)
+}
+
+fn drawn<X, Y>(
+    mut chart: ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>,
+    overlay: &mut Overlay,
+    curves: &[Curve],
+    axes: &Axes<'_>,
+    end: f64,
+) -> Drawn
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    mesh(&mut chart, axes)?;
+    let shown: Vec<&Curve> = curves.iter().filter(|curve| !curve.points.is_empty()).collect();
+    let mut ends = Vec::new();
+    for curve in &shown {
+        let Curve { points, tone, .. } = curve;
+        let (first, last) = (points[0].0, points[points.len() - 1].0);
+        let line: Vec<(f64, f64)> = match curve.law {
+            Some(law) => [first, last].map(|x| (x, law.at(x))).to_vec(),
+            None => points.iter().map(|(x, spread)| (*x, spread.median)).collect(),
+        };
+        let height = line[line.len() - 1].1;
+        chart.draw_series([PathElement::new(line, tone.light.stroke_width(2))])?;
+        for &(x, Spread { median, min, max, runs }) in points {
+            if min < max {
+                chart.draw_series([PathElement::new(vec![(x, min), (x, max)], INK.light.stroke_width(1))])?;
+            }
+            chart.draw_series([Circle::new((x, median), 4, tone.light.filled())])?;
+            let at = pixel(&chart, (x, median));
+            let [median, min, max] = [median, min, max].map(|v| (axes.y_number)(&v));
+            let x = (axes.x_number)(&x);
+            let tip = format!("{}\n{x}: {median}, from {min} to {max} in {runs} runs", curve.name);
+            overlay.tip(Rect { x: at.0 - 7.0, y: at.1 - 7.0, w: 14.0, h: 14.0 }, &tip);
+        }
+        ends.push((pixel(&chart, (end, height)).0, pixel(&chart, (end, height)).1));
+    }
+    let texts: Vec<_> = shown.iter().map(|curve| (curve.name.clone(), curve.tone)).collect();
+    overlay.label_ends(&ends, &texts, frame(&chart));
+    Ok(())
+}

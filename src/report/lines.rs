@@ -1,0 +1,64 @@
+//! Files of one JSON record a line: each is on the disk as soon as it is measured, and read back with the line that is wrong.
+
+use crate::measure::record::SCHEMA;
+use crate::{Error, Result};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+
+/// A file of records, open for writing.
+#[derive(Debug)]
+pub struct Lines {
+    path: PathBuf,
+    file: File,
+}
+
+impl Lines {
+    /// Makes `folder` and the empty file `name` in it.
+    ///
+    /// # Errors
+    /// The folder cannot be made or written to.
+    pub fn create(folder: &Path, name: &str) -> Result<Lines> {
+        std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
+        let path = folder.join(name);
+        let file = File::create(&path).map_err(Error::file(&path))?;
+        Ok(Lines { path, file })
+    }
+
+    /// Appends a record.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn append(&mut self, record: &impl Serialize) -> Result<()> {
+        let mut line = serde_json::to_vec(record).expect("a record has no keys but strings");
+        line.push(b'\n');
+        self.file.write_all(&line).and_then(|()| self.file.flush()).map_err(Error::file(&self.path))
+    }
+}
+
+/// The records of a file that `command` writes, or of the file `name` in a folder.
+///
+/// # Errors
+/// The file cannot be read; a line is not a record, or one of another schema.
+pub fn read<R: DeserializeOwned>(path: &Path, name: &str, command: &str, schema: fn(&R) -> u32) -> Result<Vec<R>> {
+    let path = if path.is_dir() { path.join(name) } else { path.to_owned() };
+    let file = File::open(&path).map_err(Error::file(&path))?;
+    let mut records = Vec::new();
+    for (number, line) in BufReader::new(file).lines().enumerate() {
+        let line = line.map_err(Error::file(&path))?;
+        if line.trim().is_empty() {
+            continue;
+        }
+        let wrong = |what: String| {
+            Error::Malformed(format!("{}:{}: {what}; is it a {name} of `{command}`?", path.display(), number + 1))
+        };
+        let record: R = serde_json::from_str(&line).map_err(|e| wrong(format!("not a record: {e}")))?;
+        if schema(&record) != SCHEMA {
+            return Err(wrong(format!("schema {}, this program reads {SCHEMA}", schema(&record))));
+        }
+        records.push(record);
+    }
+    Ok(records)
+}
