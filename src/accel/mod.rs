@@ -24,6 +24,7 @@
 mod build;
 mod device;
 mod geometry;
+pub mod host;
 mod instances;
 mod rebraid;
 
@@ -42,20 +43,17 @@ pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAcceleratio
 pub struct Options {
     /// Entries of a top level that is built with [`REBRAID`], as a multiple of its instances: at least 1.
     pub rebraid_budget: f32,
-    /// How much area the parts of an opened entry may have together, as a multiple of the entry's: at 1, only entries whose
-    /// boxes are loose are opened; above, those whose parts overlap, too.
-    pub rebraid_tolerance: f32,
 }
 
 impl Options {
-    /// Twice as many entries as instances.
-    pub const DEFAULT: Options = Options { rebraid_budget: 2.0, rebraid_tolerance: 1.0 };
+    /// Twice as many entries as instances: where scenes of all kinds whose boxes are loose gain, and memory is spared.
+    pub const DEFAULT: Options = Options { rebraid_budget: 2.0 };
 
     /// The opening of a top level of so many instances.
     fn rebraid(&self, instance_count: u32) -> Rebraid {
         // What is too much is refused by the builder.
         let capacity = (f64::from(instance_count) * f64::from(self.rebraid_budget.max(1.0))).ceil() as u32;
-        Rebraid { capacity, tolerance: self.rebraid_tolerance }
+        Rebraid { capacity }
     }
 }
 
