@@ -1,5 +1,6 @@
 // Re-braiding (Benthin, Woop, Wald 2017): before a top level is built, entries whose boxes are loose are opened, each replaced
-// by the two children of the node that it begins at, while the budget lasts. src/accel/rebraid.rs records the rounds.
+// by the two children of the node that it begins at, while the budget lasts. src/accel/rebraid.rs records the rounds, and
+// src/accel/host.rs is the twin.
 //
 //   weigh   reads entries, the structures below     writes gains of entries that have none yet; histogram[round]
 //   select  reads gains, histogram[round]           writes sums[chunk]: entries that the round opens
@@ -9,13 +10,13 @@
 // Entries are opened in the order of their gain, by 512 classes of it, within a class in that of their index: nothing depends
 // on who comes first.
 //
-// needs one barrier between each two; any subgroup size; `chunks` workgroups
+// needs  one barrier between each two; gains and the state zeroed before the first; any subgroup size; `chunks` workgroups
 #ifndef HEDGEROW_ACCEL_REBRAID
 #define HEDGEROW_ACCEL_REBRAID
 #include "accel/world_box.glsl"
 
 const uint CLASSES = 512;
-const uint ROUNDS = 8;
+const uint ROUNDS = 4;
 const uint CHUNKS_AT_MOST = 256;
 // Of a gain: not weighed yet; weighed, and nothing is gained. All begins as zeros.
 const float UNKNOWN = 0.0;
@@ -33,43 +34,64 @@ layout(push_constant, scalar) uniform Arguments {
     Floats gains;
     RebraidState state;
     uint capacity;
-    uint round;
+    uint first_round;   // of the dispatch
     uint chunks;
-    float tolerance;   // of the children's area, over that of their parent
     uint instance_count;
 };
 
-uint count_of_entries() {
+// A number of each invocation, or two.
+shared uint of_lane[2 * gl_WorkGroupSize.x];
+
+uint entries_before(uint round) {
     return round == 0u ? instance_count : state.count[round];
+}
+
+// Whether nothing is left to be opened, for lack of budget or of gain.
+bool is_over(uint round) {
+    uint count = entries_before(round);
+    return count >= capacity || round > 0u && count == entries_before(round - 1u);
 }
 
 uint class_of(float gain) {
     return floatBitsToUint(gain) >> 22 & (CLASSES - 1u);
 }
 
-// What a round opens: all of the classes above `partial`, and of that class the first `quota`.
+// A range cut into as many parts as there are invocations (or workgroups), in order.
+uvec2 part_of(uvec2 range, uint part, uint parts) {
+    uint size = (range.y - range.x + parts - 1u) / parts;
+    return uvec2(min(range.x + part * size, range.y), min(range.x + (part + 1u) * size, range.y));
+}
+
+uvec2 range_of_chunk(uint round, uint chunk) {
+    return part_of(uvec2(0u, entries_before(round)), chunk, chunks);
+}
+
+// What a round opens: all of the classes above `partial`, and of that class the first `quota`; everything, if the share suffices.
 struct Selection {
     uint partial;
     uint quota;
 };
 
-Selection selection_of_round() {
-    uint left = capacity - min(count_of_entries(), capacity);
+Selection selection_of(uint round) {
+    uint left = capacity - entries_before(round);
     uint share = (left + (ROUNDS - round) - 1u) / (ROUNDS - round);
-    for (uint i = 0; i < CLASSES; ++i) {
-        uint bucket = CLASSES - 1u - i;
-        uint there = state.histogram[round * CLASSES + bucket];
-        if (there > share) return Selection(bucket, share);
+    // From the highest class down: first by the sums of an invocation's classes, then class by class.
+    uint lanes = gl_WorkGroupSize.x;
+    uvec2 own = part_of(uvec2(0u, CLASSES), gl_LocalInvocationIndex, lanes);
+    uint sum = 0u;
+    for (uint i = own.x; i < own.y; ++i) sum += state.histogram[round * CLASSES + CLASSES - 1u - i];
+    of_lane[gl_LocalInvocationIndex] = sum;
+    barrier();
+    uint lane = 0u;
+    while (lane < lanes && of_lane[lane] <= share) share -= of_lane[lane++];
+    barrier();
+    uvec2 at = part_of(uvec2(0u, CLASSES), lane, lanes);
+    for (uint i = at.x; i < at.y; ++i) {
+        uint there = state.histogram[round * CLASSES + CLASSES - 1u - i];
+        if (there > share) return Selection(CLASSES - 1u - i, share);
         share -= there;
     }
-    return Selection(0u, 0u);
-}
-
-// The entries of a chunk.
-uvec2 range_of_chunk(uint chunk) {
-    uint count = count_of_entries();
-    uint size = (count + chunks - 1u) / chunks;
-    return uvec2(min(chunk * size, count), min((chunk + 1u) * size, count));
+    return Selection(0u, 0xFFFFFFFFu);
 }
 
 // x: opened for sure; y: in the class of which some are.
@@ -77,5 +99,126 @@ uvec2 kind_of(float gain, Selection s) {
     if (!(gain > 0.0)) return uvec2(0);
     uint bucket = class_of(gain);
     return uvec2(bucket > s.partial ? 1u : 0u, bucket == s.partial ? 1u : 0u);
+}
+
+uvec2 kinds_in(uvec2 range, Selection s) {
+    uvec2 sum = uvec2(0);
+    for (uint i = range.x; i < range.y; ++i) sum += kind_of(gains.value[i], s);
+    return sum;
+}
+
+float half_area(Box b) {
+    precise vec3 e = b.hi - b.lo;
+    precise float area = e.x * e.y + e.y * e.z + e.z * e.x;
+    return area;
+}
+
+// The area that rays need not enter any more for each entry more, if the entry is opened once, or its children too: from the
+// eight boxes below it, transformed.
+float gain_of(Entry entry) {
+    if (entry.left_out != 0u) return NO_GAIN;
+    GivenInstance given = instance_of(entry);
+    Structure structure = Structure(given.structure);
+    uint slots = structure.header.node_slots;
+    uvec2 begin = begin_of(entry, structure);
+    Child children[2];
+    if (!open_child(structure, slots, Child(entry.lo, begin.x, entry.hi, begin.y), children)) return NO_GAIN;
+    Box whole = empty_box();
+    precise float halves = 0.0, quarters = 0.0;
+    float added = 1.0;
+    for (uint side = 0; side < 2; ++side) {
+        Child grandchildren[2];
+        bool opens = open_child(structure, slots, children[side], grandchildren);
+        Box part = empty_box();
+        precise float pieces = 0.0;
+        for (uint quarter = 0; quarter < 2; ++quarter) {
+            Box piece = box_of_pair(given.to_world, structure, slots, grandchildren[quarter]);
+            pieces += half_area(piece);
+            part = united(part, piece);
+        }
+        float area = half_area(part);
+        halves += area;
+        quarters += opens ? pieces : area;
+        added += opens ? 1.0 : 0.0;
+        whole = united(whole, part);
+    }
+    float area = half_area(whole);
+    precise float once = area - halves;
+    precise float twice = (area - quarters) / added;
+    float gain = max(once, twice);
+    return gain > 0.0 && is_finite(vec3(area)) ? gain : NO_GAIN;
+}
+
+// The entry over one child of the node that another begins at.
+Entry entry_over(Entry parent, vec4 m[3], Structure structure, Child child) {
+    Box b = world_box(m, structure, child);
+    return Entry(b.lo, parent.instance, b.hi, child.index, child.count, 0u, parent.given);
+}
+
+void open(uint i, uint behind) {
+    Entry entry = entries.entry[i];
+    GivenInstance given = instance_of(entry);
+    Structure structure = Structure(given.structure);
+    // What has a gain begins at an inner node.
+    Node node = structure.nodes[begin_of(entry, structure).x];
+    entries.entry[i] = entry_over(entry, given.to_world, structure, node.left);
+    entries.entry[behind] = entry_over(entry, given.to_world, structure, node.right);
+    gains.value[i] = UNKNOWN;
+    gains.value[behind] = UNKNOWN;
+}
+
+void rebraid_weigh(uint round, uint chunk) {
+    if (is_over(round)) return;
+    uvec2 range = range_of_chunk(round, chunk);
+    for (uint i = range.x + gl_LocalInvocationIndex; i < range.y; i += gl_WorkGroupSize.x) {
+        float gain = gains.value[i];
+        if (gain == UNKNOWN) {
+            gain = gain_of(entries.entry[i]);
+            gains.value[i] = gain;
+        }
+        if (gain > 0.0) atomicAdd(state.histogram[round * CLASSES + class_of(gain)], 1u);
+    }
+}
+
+void rebraid_select(uint round, uint chunk) {
+    if (is_over(round)) return;
+    Selection s = selection_of(round);
+    uvec2 kinds = kinds_in(part_of(range_of_chunk(round, chunk), gl_LocalInvocationIndex, gl_WorkGroupSize.x), s);
+    of_lane[2u * gl_LocalInvocationIndex] = kinds.x;
+    of_lane[2u * gl_LocalInvocationIndex + 1u] = kinds.y;
+    barrier();
+    if (gl_LocalInvocationIndex < 2u) {
+        uint sum = 0u;
+        for (uint lane = 0; lane < gl_WorkGroupSize.x; ++lane) sum += of_lane[2u * lane + gl_LocalInvocationIndex];
+        state.sums[2u * chunk + gl_LocalInvocationIndex] = sum;
+    }
+}
+
+void rebraid_open(uint round, uint chunk) {
+    uint count = entries_before(round);
+    if (is_over(round)) {
+        if (chunk == 0u && gl_LocalInvocationIndex == 0u) state.count[round + 1u] = count;
+        return;
+    }
+    Selection s = selection_of(round);
+    // Each invocation opens a run of entries, and finds its place behind those that are opened before it.
+    uvec2 range = part_of(range_of_chunk(round, chunk), gl_LocalInvocationIndex, gl_WorkGroupSize.x);
+    uvec2 kinds = kinds_in(range, s);
+    of_lane[2u * gl_LocalInvocationIndex] = kinds.x;
+    of_lane[2u * gl_LocalInvocationIndex + 1u] = kinds.y;
+    uvec2 before = uvec2(0), all = uvec2(0);
+    for (uint other = 0; other < chunks; ++other) {
+        uvec2 sum = uvec2(state.sums[2u * other], state.sums[2u * other + 1u]);
+        all += sum;
+        if (other < chunk) before += sum;
+    }
+    barrier();
+    for (uint lane = 0; lane < gl_LocalInvocationIndex; ++lane) before += uvec2(of_lane[2u * lane], of_lane[2u * lane + 1u]);
+    for (uint i = range.x; i < range.y; ++i) {
+        uvec2 kind = kind_of(gains.value[i], s);
+        if (kind.x != 0u || kind.y != 0u && before.y < s.quota) open(i, count + before.x + min(before.y, s.quota));
+        before += kind;
+    }
+    if (chunk == 0u && gl_LocalInvocationIndex == 0u) state.count[round + 1u] = count + all.x + min(all.y, s.quota);
 }
 #endif

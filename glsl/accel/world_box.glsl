@@ -1,10 +1,15 @@
-// The box in the world of an instance, or of a part of one: the twin of src/accel/world_box.rs.
+// The box in the world of an instance, or of a part of one: the twin of src/accel/host.rs.
 #ifndef HEDGEROW_ACCEL_WORLD_BOX
 #define HEDGEROW_ACCEL_WORLD_BOX
 #include "bvh/instances.glsl"
 
-// Levels below a child whose boxes are transformed in its place, where its own would be loose: eight boxes.
-const uint FINE_LEVELS = 3;
+Box empty_box() {
+    return Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
+}
+
+Box united(Box a, Box b) {
+    return Box(min(a.lo, b.lo), max(a.hi, b.hi));
+}
 
 // The box around a transformed box, not smaller by any rounding.
 Box transformed_box(vec4 m[3], vec3 lo, vec3 hi) {
@@ -32,20 +37,40 @@ bool keeps_boxes(vec4 m[3]) {
     return keeps;
 }
 
-// The box in the world of what is below `child` of a structure.
+// The two children of an inner node; of a leaf twice itself, and false.
+bool open_child(Structure structure, uint slots, Child child, out Child children[2]) {
+    bool opens = child.count == 0u && child.index < slots;
+    children[0] = child;
+    children[1] = child;
+    if (opens) {
+        Node node = structure.nodes[child.index];
+        children[0] = node.left;
+        children[1] = node.right;
+    }
+    return opens;
+}
+
+// The box in the world around the boxes of a child's two children.
+Box box_of_pair(vec4 m[3], Structure structure, uint slots, Child child) {
+    Child pair[2];
+    open_child(structure, slots, child, pair);
+    return united(transformed_box(m, pair[0].lo, pair[0].hi), transformed_box(m, pair[1].lo, pair[1].hi));
+}
+
+// The box in the world of what is below `child` of a structure: where its own would be loose, around the boxes of the eight
+// that are three levels below.
 Box world_box(vec4 m[3], Structure structure, Child child) {
     if (keeps_boxes(m)) return transformed_box(m, child.lo, child.hi);
-    Box b = Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
+    Box b = empty_box();
     uint slots = structure.header.node_slots;
-    for (uint path = 0; path < 1u << FINE_LEVELS; ++path) {
-        Child at = child;
-        for (uint level = 0; level < FINE_LEVELS && at.count == 0u && at.index < slots; ++level) {
-            Node node = structure.nodes[at.index];
-            if ((path >> level & 1u) == 0u) at = node.left;
-            else at = node.right;
+    Child children[2];
+    open_child(structure, slots, child, children);
+    for (uint side = 0; side < 2; ++side) {
+        Child grandchildren[2];
+        open_child(structure, slots, children[side], grandchildren);
+        for (uint quarter = 0; quarter < 2; ++quarter) {
+            b = united(b, box_of_pair(m, structure, slots, grandchildren[quarter]));
         }
-        Box part = transformed_box(m, at.lo, at.hi);
-        b = Box(min(b.lo, part.lo), max(b.hi, part.hi));
     }
     return b;
 }

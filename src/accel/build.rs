@@ -208,7 +208,7 @@ impl Build {
 
 /// The codes that the flags ask for: a fast build sorts by 8 bits less, a fast trace by 8 more; low memory keeps them in one
 /// word, which saves 8 bytes of scratch a primitive.
-fn codes(flags: Flags, primitive_count: u32) -> Codes {
+pub(super) fn codes(flags: Flags, primitive_count: u32) -> Codes {
     let codes = Codes::for_count(primitive_count);
     let bits = match () {
         () if flags.contains(Flags::PREFER_FAST_BUILD) => codes.bits.saturating_sub(8).max(8),

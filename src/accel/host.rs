@@ -15,6 +15,7 @@ impl Device<'_> {
     /// `vkBuildAccelerationStructuresKHR`, but for where the structures go: the bytes of build i, those that a device's build of
     /// the same input writes, into `memory[i]`, to be copied to where the structure shall lie. Handles and scratch memory are
     /// not looked at. The host's builder is the plain one that the device's is tested with: one thread, no deferred operations.
+    /// Top levels are built by [`top_level`](super::top_level), which is told what lies below them.
     ///
     /// # Errors
     /// As [`Device::cmd_build_acceleration_structures`]; a build of instances, or an update; too little memory.
@@ -89,7 +90,7 @@ unsafe fn built(
             Ok(tree.with_geometries(&flags_of(geometries), build_flags).to_bytes())
         }
         Given::Instances { .. } => Err(Error::Argument(
-            "type is TOP_LEVEL; the host builds BOTTOM_LEVEL structures, as it does not have those that instances name"
+            "type is TOP_LEVEL; this call does not have the structures that instances name: take accel::top_level"
                 .into(),
         )),
     }

@@ -36,6 +36,7 @@ mod properties;
 mod rebraid;
 mod request;
 pub mod serialize;
+pub mod top_level;
 
 pub use build::SCRATCH_ALIGNMENT;
 pub use device::{Device, STRUCTURE_ALIGNMENT};
@@ -54,9 +55,6 @@ pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAcceleratio
 pub struct Options {
     /// Entries of a top level that is built with [`REBRAID`], as a multiple of its instances: at least 1.
     pub rebraid_budget: f32,
-    /// How much area the parts of an opened entry may have together, as a multiple of the entry's: at 1, only entries whose
-    /// boxes are loose are opened; above, those whose parts overlap, too.
-    pub rebraid_tolerance: f32,
     /// Whether calls look at what takes memory of what was created and built, as Vulkan's validation would: memory that is too
     /// small or overlaps, misaligned data, updates without the flag or of changed counts. They return an error before anything
     /// is recorded. Structures must then be created, built and destroyed through this device and its clones. For debugging:
@@ -65,8 +63,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// Twice as many entries as instances; no checks.
-    pub const DEFAULT: Options = Options { rebraid_budget: 2.0, rebraid_tolerance: 1.0, checked: false };
+    /// Twice as many entries as instances: where scenes of all kinds whose boxes are loose gain, and memory is spared. No checks.
+    pub const DEFAULT: Options = Options { rebraid_budget: 2.0, checked: false };
     /// The same with checks.
     pub const CHECKED: Options = Options { checked: true, ..Options::DEFAULT };
 
@@ -74,7 +72,7 @@ impl Options {
     fn rebraid(&self, instance_count: u32) -> Rebraid {
         // What is too much is refused by the builder.
         let capacity = (f64::from(instance_count) * f64::from(self.rebraid_budget.max(1.0))).ceil() as u32;
-        Rebraid { capacity, tolerance: self.rebraid_tolerance }
+        Rebraid { capacity }
     }
 }
 

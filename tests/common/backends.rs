@@ -60,7 +60,11 @@ pub struct Ours(pub accel::Device<'static>, Probe);
 
 impl Ours {
     pub fn new() -> Ours {
-        Ours(accel::Device::new(device()), Probe::ours())
+        Ours::with(accel::Options::DEFAULT)
+    }
+
+    pub fn with(options: accel::Options) -> Ours {
+        Ours(accel::Device::with_options(device(), options), Probe::ours())
     }
 }
 

@@ -1,45 +1,38 @@
-//! Blocks of an L or a U for a plan, interlocked: each stands in the notch of another's box. Boxes overlap a lot, walls
-//! nowhere, so that opening the boxes (re-braiding) is worth most here.
+//! L-shaped rows of houses, nested: each stands in the notch of the one before, a street's width behind its walls. Boxes lie over
+//! each other up to sixteen deep, walls touch nowhere, so that opening the boxes (re-braiding) is worth most here.
 //!
-//! All lengths are in sides of a block. A plot holds eight blocks, of one kind:
+//! All lengths are in sides of a block, some 200 metres. A plot holds twenty blocks of one kind in a staircase along its
+//! diagonal, a [`STEP`] from block to block. The first ones open forwards, and the corner of the next stands in their notch; the
+//! others open backwards, and the corner of the one before stands in theirs.
 //!
-//! - L: a staircase along the diagonal, a [`STEP`] from block to block. The first ones open forwards, and the corner of the
-//!   next stands in their notch; the others open backwards, and the corner of the one before stands in theirs.
-//! - U: two rows of four hooks that open up and down in turn, each with an arm of every neighbour in its notch.
-//!
-//! Nothing touches: in a plot, walls are at least 0.083 apart, of which two blocks' own yaw takes at most 0.043; plots are 2.75
-//! wide and [`PITCH`] apart, of which yaws take less than 0.1 on each side.
+//! Nothing touches: in a plot, walls are at least 0.031 apart, of which two blocks' own yaw takes at most 0.013; plots are 2.2
+//! wide and [`PITCH`] apart, of which yaws take less than 0.07 on each side.
 
 use super::turns::{self, QUARTERS, Turn, turned};
 use super::{Placed, prism, side_of};
 use crate::scene::SplitMix64;
 
-/// Cells along a side of a block, and how many of them an arm is thick: arms take 1/6.
-const CELLS: u32 = 12;
-const ARM: u32 = 2;
+/// Cells along a side of a block: arms are one of them thick, as streets are wide.
+const CELLS: u32 = 32;
+/// Cells along the shorter arm of the second kind.
+const SHORT: u32 = 27;
 /// Triangles of a wall from the ground to the roof: twice this many.
-const ROWS: u32 = 5;
+const ROWS: u32 = 3;
 
-const BLOCKS_A_PLOT: u32 = 8;
-/// From block to block on a staircase, in x and in z; an arm and a gap.
-const STEP: f32 = 0.25;
-/// From hook to hook in a row.
-const HOOK: f32 = 0.58;
-/// How far the hooks that open down stand behind those that open up; an arm and a gap.
-const HOOK_DEPTH: f32 = 0.25;
-/// From row to row.
-const ROW: f32 = 1.4;
+const BLOCKS_A_PLOT: u32 = 20;
+/// From block to block on a staircase, in x and in z; an arm and a street.
+const STEP: f32 = 0.0625;
 /// From plot to plot.
-const PITCH: f32 = 3.25;
+const PITCH: f32 = 2.4;
 
 /// Tangents of the largest small yaw of a block and of a plot.
-const BLOCK_YAW: f32 = 0.03;
+const BLOCK_YAW: f32 = 0.012;
 const PLOT_YAW: f32 = 0.05;
 
 /// `count` blocks, plot by plot on a square, of random heights.
 pub fn place(count: u32) -> Placed {
-    let ell = prism::closed(CELLS, ROWS, |x, z| x < ARM || z < ARM);
-    let hook = prism::closed(CELLS, ROWS, |x, z| x < ARM || z < ARM || x >= CELLS - ARM);
+    let even = prism::closed(CELLS, ROWS, |x, z| x == 0 || z == 0);
+    let uneven = prism::closed(CELLS, ROWS, |x, z| x == 0 && z < SHORT || z == 0);
     let mut random = SplitMix64::new(0);
     let plots = count.div_ceil(BLOCKS_A_PLOT);
     let side = side_of(plots, 2);
@@ -50,29 +43,19 @@ pub fn place(count: u32) -> Placed {
         let part = random.bits() as usize % 2;
         let forwards = random.bits() as u32 % (BLOCKS_A_PLOT + 1);
         for block in 0..BLOCKS_A_PLOT.min(count - plot * BLOCKS_A_PLOT) {
-            let (middle, facing) = if part == 0 { staircase(block, forwards) } else { hooks(block) };
+            let (middle, facing) = staircase(block, forwards);
             let turn_of_block = turned(turn, turned(facing, turns::small(&mut random, BLOCK_YAW)));
             let [dx, dz] = turned(turn, middle);
-            let height = random.within(0.3, 2.5);
+            let height = random.within(0.08, 0.2);
             let at = [corner[0] + dx, 0.0, corner[1] + dz];
             instances.push(turns::upright(part, [1.0, height, 1.0], turn_of_block, at));
         }
     }
-    (vec![ell, hook], instances)
+    (vec![even, uneven], instances)
 }
 
 /// The middle of an L's box, seen from the middle of its plot, and which way it faces.
 fn staircase(block: u32, forwards: u32) -> ([f32; 2], Turn) {
     let middle = (block as f32 - 0.5 * (BLOCKS_A_PLOT - 1) as f32) * STEP;
     ([middle; 2], if block < forwards { QUARTERS[0] } else { QUARTERS[2] })
-}
-
-/// The same of a U.
-fn hooks(block: u32) -> ([f32; 2], Turn) {
-    const A_ROW: u32 = BLOCKS_A_PLOT / 2;
-    let (row, column) = (block / A_ROW, block % A_ROW);
-    let up = column.is_multiple_of(2);
-    let x = (column as f32 - 0.5 * (A_ROW - 1) as f32) * HOOK;
-    let z = (row as f32 - 0.5) * ROW + if up { -0.5 } else { 0.5 } * HOOK_DEPTH;
-    ([x, z], if up { QUARTERS[0] } else { QUARTERS[2] })
 }

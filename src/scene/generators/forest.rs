@@ -1,14 +1,17 @@
-//! Trees whose crowns reach into each other: thin trunks in large boxes that are mostly empty and overlap on every side.
+//! A dense old stand after storms: tall bare trunks with a small crown, each leaning its own way, one over the other. A leaning
+//! trunk runs along the diagonal of its box, so that boxes are large, mostly empty, and many lie over each other.
 
 use super::tube::{self, Knot};
 use super::vector::{add, along, unit};
 use super::{Placed, side_of, turns};
 use crate::scene::{Mesh, SplitMix64};
 
-/// Metres from tree to tree: less than a crown is wide.
-const PITCH: f32 = 3.5;
+/// Metres from tree to tree.
+const PITCH: f32 = 2.2;
 /// Metres that a tree stands off its place at most, in x and in z.
-const JITTER: f32 = 1.0;
+const JITTER: f32 = 0.8;
+/// Tangents of the angles that trees lean by: 27 to 50 degrees.
+const LEAN: [f32; 2] = [0.5, 1.2];
 
 /// A kind of tree; lengths in metres.
 struct Tree {
@@ -20,14 +23,14 @@ struct Tree {
     leaves: u32,
 }
 
-/// Of 508, 1,060 and 1,972 triangles.
+/// Of 412, 628 and 964 triangles.
 const TREES: [Tree; 3] = [
-    Tree { height: 10.0, branches: 12, branch_length: 3.0, leaves: 10 },
-    Tree { height: 12.0, branches: 24, branch_length: 3.8, leaves: 16 },
-    Tree { height: 15.0, branches: 36, branch_length: 4.4, leaves: 28 },
+    Tree { height: 16.0, branches: 12, branch_length: 1.2, leaves: 2 },
+    Tree { height: 19.0, branches: 16, branch_length: 1.4, leaves: 9 },
+    Tree { height: 22.0, branches: 24, branch_length: 1.6, leaves: 12 },
 ];
 
-/// `count` trees on a square, row by row, each a little off its place, turned and scaled.
+/// `count` trees on a square, row by row, each a little off its place, leaning, turned and scaled.
 pub fn place(count: u32) -> Placed {
     let mut random = SplitMix64::new(0);
     let parts: Vec<Mesh> = TREES.iter().map(|tree| grow(tree, &mut random)).collect();
@@ -35,9 +38,10 @@ pub fn place(count: u32) -> Placed {
     let instances = (0..count).map(|i| {
         let part = random.bits() as usize % parts.len();
         let scale = random.within(0.8, 1.25);
-        let turn = turns::any(&mut random);
+        let [spin, heading] = [(); 2].map(|()| turns::any(&mut random));
+        let lean = turns::towards([1.0, random.within(LEAN[0], LEAN[1])]);
         let [x, z] = [i % side, i / side].map(|c| c as f32 * PITCH + random.within(-JITTER, JITTER));
-        turns::upright(part, [scale; 3], turn, [x, 0.0, z])
+        turns::leaning(part, scale, spin, lean, heading, [x, 0.0, z])
     });
     let instances = instances.collect();
     (parts, instances)
@@ -53,18 +57,18 @@ fn grow(tree: &Tree, random: &mut SplitMix64) -> Mesh {
         .map(|i| {
             let up = i as f32 / TRUNK_SEGMENTS as f32;
             foot = [foot[0] + random.within(-0.08, 0.08), up * tree.height, foot[2] + random.within(-0.08, 0.08)];
-            Knot { at: foot, radius: 0.02 * tree.height * (1.0 - 0.9 * up) }
+            Knot { at: foot, radius: 0.009 * tree.height * (1.0 - 0.8 * up) }
         })
         .collect();
     tube::append(&mut mesh, 5, &trunk);
     for branch in 0..tree.branches {
-        // The lowest third of the trunk is bare.
-        let up = 0.3 + 0.65 * (branch as f32 + random.unit()) / tree.branches as f32;
+        // Where neighbours stand close, only the top of the trunk has branches.
+        let up = 0.7 + 0.28 * (branch as f32 + random.unit()) / tree.branches as f32;
         let [c, s] = turns::any(random);
         let mut direction = unit([c, random.within(0.1, 0.5), s]);
-        let length = tree.branch_length * (1.25 - 0.8 * up) * random.within(0.8, 1.2);
+        let length = tree.branch_length * (1.8 - up) * random.within(0.8, 1.2);
         let mut at = on(&trunk, up);
-        let radius = 0.006 * tree.height * (1.2 - up);
+        let radius = 0.003 * tree.height * (1.4 - up);
         let knots: Vec<Knot> = (0..=BRANCH_SEGMENTS)
             .map(|i| {
                 if i > 0 {

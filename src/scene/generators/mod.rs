@@ -71,12 +71,12 @@ const GENERATORS: [Generator; 10] = [
     },
     Generator {
         pattern: "gen:forest:N",
-        what: "N instances of 3 trees whose crowns reach into each other",
+        what: "N instances of 3 thin trees that lean over each other",
         recipe: Recipe::Instances(forest::place),
     },
     Generator {
         pattern: "gen:city:N",
-        what: "N instances of L- and U-shaped blocks, each in the notch of another, none touching",
+        what: "N instances of 2 L-shaped blocks, each in the notch of the one before, none touching",
         recipe: Recipe::Instances(city::place),
     },
     Generator {

@@ -1,4 +1,4 @@
-//! Turns about the y axis, and where an upright instance stands.
+//! Turns about the y axis, and where an instance stands, upright or leaning.
 //!
 //! A turn is a pair [c, s] of unit length, the cosine and sine of its angle: the composition of two is a product of complex
 //! numbers, and a random one needs no platform's sine.
@@ -45,4 +45,17 @@ pub fn upright(part: usize, scale: [f32; 3], [c, s]: Turn, at: [f32; 3]) -> Inst
         [s * scale[0], 0.0, c * scale[2], at[2]],
     ];
     Instance { part: part as u32, transform }
+}
+
+/// An instance that leans: the part scaled, spun about its y axis, tilted by the turn `lean` from y towards x, and that way
+/// turned to `heading`; its origin at `at`.
+pub fn leaning(part: usize, scale: f32, spin: Turn, lean: Turn, heading: Turn, at: [f32; 3]) -> Instance {
+    let ([sc, ss], [lc, ls], [hc, hs]) = (spin, lean, heading);
+    // Where spin and lean take each axis; the heading turns all of them.
+    let columns = [[lc * sc, -ls * sc, ss], [ls, lc, 0.0], [-lc * ss, ls * ss, sc]].map(|[x, y, z]| {
+        let [x, z] = turned([hc, hs], [x, z]);
+        [x, y, z]
+    });
+    let row = |i: usize| [scale * columns[0][i], scale * columns[1][i], scale * columns[2][i], at[i]];
+    Instance { part: part as u32, transform: [row(0), row(1), row(2)] }
 }

@@ -1,0 +1,358 @@
+//! Re-braiding: top levels that open instances are those of the host, within the budget, and hold every primitive once.
+
+mod common;
+
+use common::backends::{Backend, Ours};
+use common::device;
+use common::probe::{IGNORE, ProbeRay, flags};
+use common::shapes::{Corners, Random, add, icosphere, placed, soup};
+use common::world::{BuiltWorld, Part, World};
+use hedgerow::accel::{self, Instance, Options, REBRAID, top_level};
+use hedgerow::ash::vk;
+use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Child, Record, Triangle, status};
+use std::collections::BTreeMap;
+use vk::BuildAccelerationStructureFlagsKHR as Flags;
+use vk::GeometryFlagsKHR as GeometryFlags;
+
+const NO_TRIANGLES: Corners = Corners::new();
+
+fn part(corners: Corners) -> Part {
+    Part::Triangles(vec![(corners, GeometryFlags::empty())])
+}
+
+/// A row of `count` small triangles along the diagonal of the cube −1..1: nearly nothing in a large box.
+fn diagonal(count: usize) -> Corners {
+    let small = soup(count, 0.2 / count as f32, 5);
+    let middle = |t: &[[f32; 3]; 3]| t[0];
+    let at = |i: usize| 2.0 * (i as f32 + 0.5) / count as f32 - 1.0;
+    small
+        .iter()
+        .enumerate()
+        .map(|(i, t)| t.map(|corner| std::array::from_fn(|k| corner[k] - middle(t)[k] + at(i))))
+        .collect()
+}
+
+/// Scaled, with no turn, and moved.
+fn scaled(scale: f32, [x, y, z]: [f32; 3]) -> [[f32; 4]; 3] {
+    [[scale, 0.0, 0.0, x], [0.0, scale, 0.0, y], [0.0, 0.0, scale, z]]
+}
+
+/// Instances of all kinds of parts, by all kinds of transforms: turned, sheared, mirrored, flat ones and none.
+fn mixture(count: usize, seed: u64) -> World {
+    let mut random = Random(seed);
+    let a_box = |random: &mut Random| {
+        let (at, size) = (random.point(1.0), random.point(0.1).map(f32::abs));
+        [at, add(at, size)]
+    };
+    let boxes: Vec<[[f32; 3]; 2]> = (0..40).map(|_| a_box(&mut random)).collect();
+    let parts = vec![
+        part(diagonal(200)),
+        part(soup(100, 0.3, seed)),
+        part(icosphere(2)),
+        Part::Boxes(vec![(boxes, GeometryFlags::empty())]),
+        part(soup(1, 0.5, seed)),
+        part(NO_TRIANGLES),
+        part(vec![[[f32::NAN; 3]; 3]; 4]),
+        part(soup(2, 0.5, seed)),
+    ];
+    let instances = (0..count)
+        .map(|i| {
+            // Most are of the first parts; some name none.
+            let number = if i % 3 == 0 { random.bits() % (parts.len() as u64 + 1) } else { 1 + random.bits() % 4 };
+            let mut m: [[f32; 4]; 3] =
+                [(); 3].map(|()| [random.signed(), random.signed(), random.signed(), 9.0 * random.signed()]);
+            match i % 11 {
+                0 => m = scaled(random.signed(), random.point(5.0)),
+                // Of no thickness, and of no size at all.
+                5 => m[1] = [0.0, 0.0, 0.0, 1.0],
+                6 if i % 5 == 0 => m = [[0.0; 4]; 3],
+                7 if i % 5 == 0 => m[2][3] = f32::INFINITY,
+                8 => m = m.map(|row| row.map(|x| 1e-3 * x)),
+                _ => {}
+            }
+            Instance::new(number, m).with_index_and_mask(i as u32, random.bits() as u8)
+        })
+        .collect();
+    World { flags: REBRAID, ..World::new(parts, instances) }
+}
+
+/// The structures of a world, read back, and the instances as they were given.
+struct ReadBack {
+    top: Bvh2<layout::Instance>,
+    instances: Vec<Instance>,
+    triangles: BTreeMap<u64, Bvh2<Triangle>>,
+    boxes: BTreeMap<u64, Bvh2<BoxRecord>>,
+}
+
+impl ReadBack {
+    fn new(backend: &Ours, world: &World) -> ReadBack {
+        let BuiltWorld { top, parts, .. } = &world.build(backend);
+        let bytes = |built: &common::backends::Built| built.memory.read::<u8>(built.bytes as usize);
+        let (mut triangles, mut boxes) = (BTreeMap::new(), BTreeMap::new());
+        for (part, built) in world.parts.iter().zip(parts) {
+            let (address, bytes) = (backend.address(built.structure), bytes(built));
+            match part {
+                Part::Triangles(_) => drop(triangles.insert(address, Bvh2::from_bytes(&bytes).expect("triangles"))),
+                Part::Boxes(_) => drop(boxes.insert(address, Bvh2::from_bytes(&bytes).expect("boxes"))),
+            }
+        }
+        let top = Bvh2::from_bytes(&bytes(top)).expect("a top level");
+        ReadBack { top, instances: world.placed(backend, parts), triangles, boxes }
+    }
+
+    fn below(&self, address: u64) -> Option<top_level::Below<'_>> {
+        let triangles = self.triangles.get(&address).map(top_level::Below::from);
+        triangles.or_else(|| self.boxes.get(&address).map(top_level::Below::from))
+    }
+
+    /// Where the entries of each instance begin.
+    fn entries(&self) -> BTreeMap<u32, Vec<[u32; 2]>> {
+        let mut all = BTreeMap::<u32, Vec<[u32; 2]>>::new();
+        for record in self.top.records.iter().filter(|record| record.structure != 0) {
+            all.entry(record.instance).or_default().push([record.start, record.start_count]);
+        }
+        all
+    }
+
+    /// How often the entries of an instance reach each record of its structure.
+    fn reached(&self, instance: u32, starts: &[[u32; 2]]) -> Vec<u32> {
+        let address = self.instances[instance as usize].structure;
+        match (self.triangles.get(&address), self.boxes.get(&address)) {
+            (Some(structure), _) => reached(structure, starts),
+            (_, Some(structure)) => reached(structure, starts),
+            _ => panic!("instance {instance} has entries and no structure"),
+        }
+    }
+}
+
+fn reached<R: Record>(structure: &Bvh2<R>, starts: &[[u32; 2]]) -> Vec<u32> {
+    let mut counts = vec![0; structure.header.active as usize];
+    let root = structure.header.root;
+    let begins =
+        |&start: &[u32; 2]| if start[1] == layout::Instance::AT_ROOT { [root.index, root.count] } else { start };
+    let mut waiting: Vec<[u32; 2]> = starts.iter().map(begins).collect();
+    while let Some([index, count]) = waiting.pop() {
+        match count {
+            0 => waiting
+                .extend(structure.nodes[index as usize].children.map(|Child { index, count, .. }| [index, count])),
+            _ => counts[index as usize..][..count as usize].iter_mut().for_each(|n| *n += 1),
+        }
+    }
+    counts
+}
+
+fn with_budget(rebraid_budget: f32) -> Ours {
+    Ours::with(Options { rebraid_budget, ..Options::DEFAULT })
+}
+
+#[test]
+fn a_top_level_has_the_bytes_of_the_hosts() {
+    // On both sides of the size up to which one workgroup does all rounds, and of that of the builder.
+    for (count, budget) in [
+        (0, 2.0),
+        (1, 7.5),
+        (2, 1.5),
+        (30, 4.0),
+        (300, 2.0),
+        (700, 5.0),
+        (1024, 2.0),
+        (1025, 2.0),
+        (2500, 3.3),
+        (2500, 1.0),
+    ] {
+        let backend = with_budget(budget);
+        for by_pointers in [false, true] {
+            let world = World { by_pointers, ..mixture(count, count as u64) };
+            let read = ReadBack::new(&backend, &world);
+            let options = Options { rebraid_budget: budget, ..Options::DEFAULT };
+            let expected = top_level::top_level(&read.instances, |a| read.below(a), world.flags, &options);
+            let what = format!("{count} instances, budget {budget}");
+            assert_eq!(read.top.header, expected.header, "{what}");
+            let differ = read.top.records.iter().zip(&expected.records).position(|(a, b)| a != b);
+            assert_eq!(differ.map(|i| (read.top.records[i], expected.records[i])), None, "{what}");
+            assert!(read.top.to_bytes() == expected.to_bytes(), "{what}: the nodes differ");
+        }
+    }
+}
+
+#[test]
+fn what_the_flags_ask_for_is_what_the_host_builds() {
+    let world = mixture(400, 3);
+    let backend = Ours::new();
+    let all = [
+        Flags::empty(),
+        REBRAID | Flags::PREFER_FAST_BUILD,
+        REBRAID | Flags::PREFER_FAST_TRACE,
+        REBRAID | Flags::LOW_MEMORY,
+        REBRAID | Flags::ALLOW_UPDATE,
+    ];
+    for flags in all {
+        let read = ReadBack::new(&backend, &World { flags, ..world.clone() });
+        let expected = top_level::top_level(&read.instances, |a| read.below(a), flags, &Options::DEFAULT);
+        assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}");
+        let opens = flags.contains(REBRAID) && !flags.contains(Flags::ALLOW_UPDATE);
+        assert_eq!(read.top.header.primitive_count > 400, opens, "{flags:?}");
+        assert_eq!(read.entries().values().any(|starts| starts.len() > 1), opens, "{flags:?}");
+    }
+}
+
+#[test]
+fn entries_keep_to_the_budget_and_reach_every_primitive_once() {
+    for (count, budget) in [(1, 2.0), (50, 1.3), (400, 2.0), (400, 16.0), (1500, 2.5)] {
+        let read = ReadBack::new(&with_budget(budget), &mixture(count, 77));
+        let most = (f64::from(budget) * count as f64).ceil() as u32;
+        assert_eq!(read.top.header.primitive_count, most);
+        assert!(read.top.header.active <= most, "{count} {budget}");
+        let entries = read.entries();
+        assert_eq!(entries.values().map(Vec::len).sum::<usize>(), read.top.header.active as usize);
+        for (&instance, starts) in &entries {
+            let counts = read.reached(instance, starts);
+            assert!(
+                !counts.is_empty() && counts.iter().all(|&n| n == 1),
+                "{instance} of {count}: {starts:?} {counts:?}"
+            );
+        }
+        // Not one that can be seen is lost: what is not there has no inverse, or nothing to show.
+        for (i, instance) in read.instances.iter().enumerate().filter(|(i, _)| !entries.contains_key(&(*i as u32))) {
+            let below = |b: &Bvh2<Triangle>| b.header.active == 0;
+            let shows_nothing = instance.structure == 0 || read.triangles.get(&instance.structure).is_some_and(below);
+            let m = instance.transform.map(|row| row.map(f64::from));
+            let minor = |r: usize, s: usize, c: usize, d: usize| m[r][c] * m[s][d] - m[r][d] * m[s][c];
+            let determinant = m[0][0] * minor(1, 2, 1, 2) - m[0][1] * minor(1, 2, 0, 2) + m[0][2] * minor(1, 2, 0, 1);
+            let is_bad = determinant == 0.0 || instance.transform.iter().flatten().any(|x| !x.is_finite());
+            assert!(shows_nothing || is_bad, "{i} {instance:?}");
+        }
+        assert_eq!(read.top.header.status & !status::BAD_INSTANCE, 0);
+    }
+}
+
+#[test]
+fn the_loose_are_opened_and_the_tight_are_not() {
+    // A full sphere, a single triangle and a flat grid fill their boxes; of the rows, the larger has more to save.
+    let grid: Corners = (0..128)
+        .map(|t| {
+            let (x, z) = ((t / 2 % 8) as f32, (t / 16) as f32);
+            match t % 2 {
+                0 => [[x, 0.0, z], [x, 0.0, z + 1.0], [x + 1.0, 0.0, z]],
+                _ => [[x + 1.0, 0.0, z], [x, 0.0, z + 1.0], [x + 1.0, 0.0, z + 1.0]],
+            }
+        })
+        .collect();
+    let parts = vec![part(icosphere(3)), part(soup(1, 0.5, 1)), part(grid), part(diagonal(300))];
+    let mut instances = Vec::new();
+    for i in 0..12 {
+        let at = [3.0 * i as f32, 0.0, 0.0];
+        instances.extend([Instance::new(1, scaled(1.0, at)), Instance::new(2, scaled(1.0, at))]);
+        instances.push(Instance::new(3, scaled(0.25, at)));
+    }
+    let (small, large) = (instances.len() as u32, instances.len() as u32 + 1);
+    instances.extend([Instance::new(4, scaled(0.5, [0.0; 3])), Instance::new(4, scaled(4.0, [1.0; 3]))]);
+    let world = World { flags: REBRAID, ..World::new(parts, instances) };
+    let counts_at = |budget: f32| -> Vec<usize> {
+        let entries = ReadBack::new(&with_budget(budget), &world).entries();
+        (0..world.instances.len() as u32).map(|i| entries[&i].len()).collect()
+    };
+    for budget in [1.2, 2.0, 4.0] {
+        let counts = counts_at(budget);
+        assert!(counts[..small as usize].iter().all(|&n| n == 1), "budget {budget}: {counts:?}");
+        assert!(counts[large as usize] >= 8, "budget {budget}: {counts:?}");
+        assert!(counts[large as usize] >= counts[small as usize], "budget {budget}: {counts:?}");
+    }
+    // Of eight entries more, the large one gets nearly all: even its quarters have more to save than the small one's halves.
+    assert!(counts_at(1.2)[small as usize] <= 2);
+}
+
+#[test]
+fn candidates_are_those_of_whole_instances() {
+    let mut random = Random(41);
+    let parts = vec![part(diagonal(60)), part(soup(50, 0.4, 3)), part(placed(&diagonal(90), 1.0, [0.2, 0.0, 0.0]))];
+    let instances: Vec<Instance> = (0..60)
+        .map(|i| {
+            let m = [(); 3].map(|()| [random.signed(), random.signed(), random.signed(), random.signed()]);
+            Instance::new(1 + i % 3, m)
+        })
+        .collect();
+    let whole = World::new(parts, instances);
+    let opened = World { flags: REBRAID, ..whole.clone() };
+    let rays: Vec<ProbeRay> = (0..2000)
+        .map(|i| {
+            let origin = random.point(2.0);
+            // Some begin within the boxes, some run along the rows.
+            let to = if i % 2 == 0 { random.point(1.0) } else { origin.map(|x| -x) };
+            let ray = ProbeRay::new(origin, std::array::from_fn(|k| to[k] - origin[k]));
+            ProbeRay { flags: flags::NO_OPAQUE, decision: IGNORE, ..ray }
+        })
+        .collect();
+    let backend = with_budget(6.0);
+    let read = ReadBack::new(&backend, &opened);
+    assert!(read.entries().values().any(|starts| starts.len() > 4), "nothing is opened: no test");
+    let [expected, got] = [&whole, &opened].map(|world| {
+        let built = world.build(&backend);
+        backend.probe(built.top.structure, &rays)
+    });
+    let mut met = 0;
+    for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
+        // An any-hit shader runs once for each: neither twice nor less for what is opened.
+        assert_eq!(got.candidate_count, expected.candidate_count, "ray {i}");
+        if got.candidate_count <= 8 {
+            assert_eq!(got.sorted_candidates(), expected.sorted_candidates(), "ray {i}");
+        }
+        met += got.candidate_count;
+    }
+    assert!(met > 1000, "{met} candidates are no test");
+}
+
+#[test]
+fn the_same_input_gives_the_same_bytes_every_time() {
+    for count in [600, 3000] {
+        let world = mixture(count, 9);
+        let backend = with_budget(3.0);
+        let built = world.build(&backend);
+        let bytes = built.top.memory.read::<u8>(built.top.bytes as usize);
+        for _ in 0..5 {
+            let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+                .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
+                .flags(REBRAID)
+                .geometries(std::slice::from_ref(&built.geometry));
+            let range = vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count as u32);
+            let again = common::backends::Built::new(&backend, &info, &[range], 0);
+            assert!(again.memory.read::<u8>(again.bytes as usize) == bytes, "{count}");
+        }
+    }
+}
+
+#[test]
+fn fewer_instances_than_were_planned_for_are_opened_too() {
+    // Their number lies in device memory: the entries behind it have no instance, and stay closed.
+    let world = mixture(200, 21);
+    let backend = with_budget(2.0);
+    let built = world.build(&backend);
+    let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
+        .flags(REBRAID)
+        .geometries(std::slice::from_ref(&built.geometry));
+    let top = common::backends::Built::place(&backend, &info, &[200], 0);
+    let (_memory, scratch) = top.scratch(&backend, &info, &[200]);
+    let range = device().upload("range", &[120u32, 0, 0, 0]).expect("memory");
+    let info = info
+        .dst_acceleration_structure(top.structure)
+        .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch });
+    device()
+        .run(None, |recorder| unsafe {
+            let indirect: accel::Device<'_> = backend.0;
+            indirect.cmd_build_acceleration_structures_indirect(
+                recorder.commands(),
+                &[info],
+                &[range.address()],
+                &[16],
+                &[&[200]],
+            )
+        })
+        .expect("it builds");
+    let tree: Bvh2<layout::Instance> =
+        Bvh2::from_bytes(&top.memory.read::<u8>(top.bytes as usize)).expect("a top level");
+    let mut counts = BTreeMap::<u32, u32>::new();
+    tree.records.iter().filter(|r| r.structure != 0).for_each(|r| *counts.entry(r.instance).or_default() += 1);
+    assert_eq!(counts.values().sum::<u32>(), tree.header.active);
+    assert!(counts.keys().all(|&i| i < 120) && counts.values().any(|&n| n > 1), "{counts:?}");
+}
