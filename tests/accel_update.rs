@@ -112,6 +112,55 @@ fn bottom_levels_follow_their_primitives() {
     }
 }
 
+/// Indices that name other vertices, and another transform.
+#[test]
+fn indices_and_transforms_may_be_others() {
+    const COUNT: u32 = 60;
+    let corners = soup(COUNT as usize, 0.4, 31);
+    let identity = Instance::IDENTITY;
+    let turned: [[f32; 4]; 3] = [[0.0, -1.0, 0.0, 0.5], [1.0, 0.0, 0.0, -0.25], [0.0, 0.0, 1.0, 0.125]];
+    let in_order: Vec<u32> = (0..3 * COUNT).collect();
+    // Triangle i has the corners of the i-th from the end.
+    let reversed: Vec<u32> = (0..COUNT).flat_map(|i| [0, 1, 2].map(|k| 3 * (COUNT - 1 - i) + k)).collect();
+    for backend in backends() {
+        let upload = |name, bytes: &[u8]| device().upload(name, bytes).expect("memory");
+        let vertices = upload("vertices", bytemuck::cast_slice(&corners));
+        let indices = upload("indices", bytemuck::cast_slice(&in_order));
+        let transform = upload("transform", bytemuck::bytes_of(&identity));
+        let at =
+            |buffer: &hedgerow::gpu::Buffer<'_>| vk::DeviceOrHostAddressConstKHR { device_address: buffer.address() };
+        let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+            .vertex_format(vk::Format::R32G32B32_SFLOAT)
+            .vertex_data(at(&vertices))
+            .vertex_stride(12)
+            .max_vertex(3 * COUNT - 1)
+            .index_type(vk::IndexType::UINT32)
+            .index_data(at(&indices))
+            .transform_data(at(&transform));
+        let geometries = [vk::AccelerationStructureGeometryKHR::default()
+            .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+            .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
+            .flags(GeometryFlags::OPAQUE)];
+        let asked = info(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, &geometries);
+        let ranges = [Range::default().primitive_count(COUNT)];
+        let built = Built::new(&*backend, &asked, &ranges, 0);
+        indices.write(&reversed);
+        transform.write(&turned);
+        update(&*backend, asked, &ranges, &built, &built);
+        let moved = |v: [f32; 3]| turned.map(|[a, b, c, d]| a * v[0] + b * v[1] + c * v[2] + d);
+        let expected = corners.iter().rev().map(|triangle| triangle.map(moved)).collect();
+        let part = Part::Triangles(vec![(expected, GeometryFlags::OPAQUE)]);
+        let world = World::new(vec![part], vec![Instance::new(1, identity)]);
+        let rays = rays(15);
+        let built = world.build_over(&*backend, vec![built], vec![vertices, indices, transform]);
+        let reports = backend.probe(built.top.structure, &rays);
+        let hits = assert_reports(backend.name(), &world, &rays, &reports);
+        assert!(hits > 10, "{}: {hits} hits are no test", backend.name());
+        backend.destroy(built.top.structure);
+        backend.destroy(built.parts[0].structure);
+    }
+}
+
 #[test]
 fn top_levels_follow_their_instances() {
     let mut random = Random(3);
