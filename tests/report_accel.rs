@@ -223,3 +223,11 @@ fn the_page_holds_together_in_a_browser() {
     assert_eq!(found["goals"], 5);
     assert_eq!(found["verdicts"], serde_json::json!(["met", "met", "missed", "met", "met"]));
 }
+
+/// Writes the page of the made-up records where `HEDGEROW_SAMPLE_REPORT` says, to look at.
+#[test]
+fn a_sample_to_look_at() {
+    if let Some(folder) = std::env::var_os("HEDGEROW_SAMPLE_REPORT") {
+        page_of(Path::new(&folder), &entries());
+    }
+}
