@@ -143,11 +143,12 @@ fn reading(frames: &[&Update]) -> String {
         },
     };
     format!(
-        "from frame {} to {} the SAH cost of the updated structure grows to {} times, and the time of its rays to {} times that \
-         of one built anew; an update takes {} of a build's time; {verdict}.",
+        "from frame {} to {} the SAH cost of the updated structure grows to {} times what it was: {} times that of one built anew, \
+         with {} times the time of its rays; an update takes {} of a build's time; {verdict}.",
         first.frame,
         last.frame,
         last.growth.map_or("–".into(), three_digits),
+        last.updated_sah.zip(last.built_sah).map_or("–".into(), |(updated, built)| three_digits(updated / built)),
         last.slowdown().map_or("–".into(), three_digits),
         three_digits(1.0 / faster),
     )

@@ -51,8 +51,10 @@ pub struct Axis<'a> {
 pub fn curves(caption: Caption, curves: &[Curve], x: &Axis<'_>, y: &Axis<'_>) -> Result<Option<Chart>> {
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let (left, right) = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), p| (l.min(p.0), r.max(p.0)));
-    let low = points().map(|p| p.1.min).fold(f64::INFINITY, f64::min);
-    let high = points().map(|p| p.1.max).fold(0.0, f64::max);
+    // A law may end below the least point or above the greatest.
+    let laws = || curves.iter().filter_map(|curve| curve.law).flat_map(|law| [law.at(left), law.at(right)]);
+    let low = points().map(|p| p.1.min).chain(laws()).fold(f64::INFINITY, f64::min);
+    let high = points().map(|p| p.1.max).chain(laws()).fold(0.0, f64::max);
     if left >= right || high <= 0.0 {
         return Ok(None);
     }
