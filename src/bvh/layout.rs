@@ -41,6 +41,8 @@ pub mod status {
     pub const BAD_INSTANCE: u32 = 1 << 4;
     /// Deserialised from what another version wrote: the structure is not usable.
     pub const WRONG_VERSION: u32 = 1 << 5;
+    /// Subtrees at [`super::MAX_DEPTH`] became leaves: rays that come there test more than they should.
+    pub const DEPTH_LIMITED: u32 = 1 << 6;
     /// Bits of structures that cannot be traced: tracers take them as empty.
     pub const UNUSABLE: u32 = TOO_DEEP | SPIN_RAN_OUT | WRONG_VERSION;
 }

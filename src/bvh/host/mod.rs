@@ -1,5 +1,6 @@
 //! Builders on the host: plain, and the specification of those on the device.
 
+mod collapse;
 mod compact;
 pub mod geometry;
 pub mod lbvh;
