@@ -1,11 +1,13 @@
 //! Bounding volume hierarchies: codes, node layouts, builders on the device, and their twins on the host.
 
+pub mod builder;
 pub mod codes;
 pub mod compact;
+pub(crate) mod encode;
 pub mod geometry;
 pub mod host;
 pub mod layout;
-pub mod lbvh;
+mod lbvh;
 pub(crate) mod lbvh_workgroup;
 pub mod quality;
 pub mod refit;

@@ -4,15 +4,15 @@
 //! whoever adds one adds a row there.
 
 use super::Subject;
-use super::device_lbvh::DeviceLbvh;
+use super::device_bvh::DeviceBvh;
 use super::host::HostLbvh;
 use super::peers::driver::Driver;
 #[cfg(feature = "peer-embree")]
 use super::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use super::peers::obvhs;
+use crate::bvh::builder::{self, Schedule};
 use crate::bvh::codes::Codes;
-use crate::bvh::lbvh::{self, Schedule};
 use crate::bvh::sah::Collapse;
 use crate::gpu::{Device, DriverPreference};
 use crate::scene::Mesh;
@@ -80,7 +80,7 @@ pub static BUILDERS: &[Builder] = &[
         ],
         needs: Needs::Device,
         make: |spec, device, mesh| {
-            Ok(Box::new(DeviceLbvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
+            Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
         },
         check: |spec| spec.lbvh_options().map(drop),
     },
@@ -210,7 +210,7 @@ impl Spec {
     }
 
     /// Options `codes`, `collapse` and `schedule`.
-    fn lbvh_options(&self) -> Result<lbvh::Options> {
+    fn lbvh_options(&self) -> Result<builder::Options> {
         let schedule = match self.option(SCHEDULE.key) {
             None => None,
             Some("chain") => Some(Schedule::Chain),
@@ -218,7 +218,7 @@ impl Spec {
             Some("workgroup") => Some(Schedule::Workgroup),
             Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
         };
-        Ok(lbvh::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..lbvh::Options::DEFAULT })
+        Ok(builder::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..builder::Options::DEFAULT })
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {
