@@ -7,7 +7,7 @@ use super::codes::{Code, Codes};
 use super::encode::Encode;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::sah::Collapse;
-use super::{layout, lbvh, lbvh_workgroup};
+use super::{hploc, layout, lbvh, lbvh_workgroup};
 use crate::gpu::radix_sort::{self, Shape};
 use crate::gpu::{Context, Kernel, Recorder, Step, shaders};
 use crate::{Error, Result};
@@ -55,13 +55,49 @@ impl Default for Options {
 pub enum Method {
     /// Linear BVH: split where the highest bit of the codes changes (Lauterbach et al. 2009). The fastest build.
     Lbvh,
+    /// Hierarchical PLOC (Benthin et al. 2024): neighbours in windows of the order are merged. Better trees for little more time.
+    Hploc(Window),
+}
+
+/// What [`Method::Hploc`] looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Window {
+    /// Clusters that are merged at a time: half of them from each side. Even, 4 to [`Window::MOST`].
+    pub size: u32,
+    /// Neighbours on either side that a cluster looks at, 1 or more.
+    pub radius: u32,
+}
+
+impl Window {
+    /// The most clusters of a window.
+    pub const MOST: u32 = 64;
+    /// What the paper has.
+    pub const DEFAULT: Window = Window { size: 32, radius: 8 };
 }
 
 impl Method {
+    /// # Errors
+    /// A parameter out of range.
+    pub fn check(self) -> Result<()> {
+        match self {
+            Method::Hploc(Window { size, radius })
+                if !(4..=Window::MOST).contains(&size) || !size.is_multiple_of(2) || radius == 0 =>
+            {
+                Err(Error::Argument(format!(
+                    "H-PLOC with a window of {size} and radius {radius}: a window has an even number of clusters from 4 to {}, \
+                     and the radius is at least 1",
+                    Window::MOST
+                )))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Whether there are kernels for the schedule.
     fn takes(self, schedule: Schedule) -> bool {
         match self {
-            Method::Lbvh => matches!(schedule, Schedule::Chain | Schedule::Persistent | Schedule::Workgroup),
+            Method::Lbvh => true,
+            Method::Hploc(_) => schedule != Schedule::Workgroup,
         }
     }
 }
@@ -147,6 +183,7 @@ impl Builder {
                 radix_sort::MAX_COUNT
             )));
         }
+        options.method.check()?;
         let limits = &context.limits;
         let schedule = options.schedule.unwrap_or_else(|| Schedule::for_count(options.method, primitive_count));
         if !options.method.takes(schedule) {
@@ -173,6 +210,11 @@ impl Builder {
             geometry_count: options.geometry_count,
             build_flags: options.build_flags,
             alone,
+            method_bytes: match options.method {
+                Method::Lbvh => 0,
+                Method::Hploc(_) => hploc::scratch_bytes(primitive_count),
+            },
+            shared_memory: limits.shared_memory,
         };
         let workers = if limits.is_cpu() { 64 } else { 1024 };
         Ok(Builder { method: options.method, schedule, workers, encode })
@@ -251,6 +293,8 @@ impl Builder {
             (Method::Lbvh, Schedule::Workgroup) => vec![encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, input)],
             (Method::Lbvh, Schedule::Persistent) => lbvh::persistent_kernels(encode, input),
             (Method::Lbvh, Schedule::Chain) => [encode.kernels(input), lbvh::kernels(encode, input)].concat(),
+            (Method::Hploc(window), Schedule::Persistent) => hploc::persistent_kernels(encode, window, input),
+            (Method::Hploc(window), _) => [encode.kernels(input), hploc::kernels(encode, window, input)].concat(),
         }
     }
 
@@ -297,6 +341,12 @@ impl Builder {
             (Method::Lbvh, Schedule::Persistent) => lbvh::persistent_steps(encode, &job.input, &arguments, *workers),
             (Method::Lbvh, Schedule::Chain | Schedule::Workgroup) => {
                 [encode.steps(&job.input, &arguments), lbvh::steps(encode, &job.input, &arguments)].concat()
+            }
+            (Method::Hploc(window), Schedule::Persistent) => {
+                hploc::persistent_steps(encode, window, &job.input, &arguments, *workers)
+            }
+            (Method::Hploc(window), _) => {
+                [encode.steps(&job.input, &arguments), hploc::steps(encode, window, &job.input, &arguments)].concat()
             }
         })
     }

@@ -24,6 +24,10 @@ pub(super) struct Encode {
     pub build_flags: u32,
     /// Whether one workgroup does everything.
     pub alone: bool,
+    /// Bytes of scratch memory behind the state that the method needs for itself.
+    pub method_bytes: u64,
+    /// Bytes of shared memory that a workgroup has.
+    pub shared_memory: u32,
 }
 
 /// Where the parts of the scratch memory begin, in bytes.
@@ -69,7 +73,7 @@ impl Encode {
     }
 
     pub fn scratch(&self) -> Scratch {
-        let mut at = STATE_BYTES;
+        let mut at = STATE_BYTES + self.method_bytes.next_multiple_of(16);
         let mut take = |bytes: u64| {
             let begin = at;
             at += bytes.next_multiple_of(16);
@@ -110,8 +114,14 @@ impl Encode {
 
     /// A kernel that reads primitives.
     pub fn reading_kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
+        self.reading_kernel_with(shader, input, &[])
+    }
+
+    /// The same with specialisation constants from 6 on.
+    pub fn reading_kernel_with(&self, shader: &'static shaders::Shader, input: &Input, more: &[u32]) -> Kernel {
         let constants = self.shape.constants(self.items, self.key_words());
-        Kernel::new(shader, self.shape.workgroup, &[&constants[..], &[input.source_constant(self.primitives)]].concat())
+        let source = [input.source_constant(self.primitives)];
+        Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source, more].concat())
     }
 
     /// The kernels of [`Encode::steps`].

@@ -24,9 +24,10 @@ pub(super) fn persistent_kernels(encode: &Encode, input: &Input) -> Vec<Kernel> 
 
 /// The whole build by `workers` workgroups of one dispatch. Label: `build`.
 pub(super) fn persistent_steps(encode: &Encode, input: &Input, arguments: &Arguments, workers: u32) -> Vec<Step> {
-    let [reset, build] = [(&shaders::BVH_LBVH_RESET, 1), (&shaders::BVH_LBVH_PERSISTENT, workers)];
-    vec![
-        Step::new("build", encode.kernel(reset.0), arguments, reset.1),
-        Step::new("build", encode.reading_kernel(build.0, input), arguments, build.1),
-    ]
+    let kernels = persistent_kernels(encode, input);
+    kernels
+        .into_iter()
+        .zip([1, workers])
+        .map(|(kernel, groups)| Step::new("build", kernel, arguments, groups))
+        .collect()
 }

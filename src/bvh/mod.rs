@@ -2,10 +2,12 @@
 
 pub mod builder;
 pub mod codes;
+mod collapse;
 pub mod compact;
 pub(crate) mod encode;
 pub mod geometry;
 pub mod host;
+mod hploc;
 pub mod layout;
 mod lbvh;
 pub(crate) mod lbvh_workgroup;
