@@ -5,13 +5,14 @@
 
 use super::Subject;
 use super::device_lbvh::DeviceLbvh;
-use super::host::HostLbvh;
+use super::host::{Hierarchy, Host};
 use super::peers::driver::Driver;
 #[cfg(feature = "peer-embree")]
 use super::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use super::peers::obvhs;
 use crate::bvh::codes::Codes;
+use crate::bvh::host::sweep::Leaves;
 use crate::bvh::lbvh::{self, Schedule};
 use crate::bvh::sah::Collapse;
 use crate::gpu::{Device, DriverPreference};
@@ -63,6 +64,10 @@ const CODES: BuilderOption = BuilderOption {
     values: "mc30, mc63, emc64sort, emc64var or emc64var-nosize, with +concise or /BITS behind",
 };
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
+const RADIUS: BuilderOption =
+    BuilderOption { key: "radius", values: "1 or more neighbours on either side; 25 if not given" };
+const TERMINATION: BuilderOption =
+    BuilderOption { key: "termination", values: "sah, or off: leaves of one triangle, then collapsed" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
 
 /// Every builder, in the order in which they are listed and measured.
@@ -90,8 +95,26 @@ pub static BUILDERS: &[Builder] = &[
         options: &[CODES, COLLAPSE],
         variants: &["lbvh-host"],
         needs: Needs::Nothing,
-        make: |spec, _, mesh| Ok(Box::new(HostLbvh::new(&spec.to_string(), mesh, spec.codes()?, spec.collapse()?))),
+        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Lbvh),
         check: |spec| spec.codes().and(spec.collapse()).map(drop),
+    },
+    Builder {
+        name: "ploc-host",
+        what: "locally-ordered clustering by one thread of the host: what `ploc` must equal, byte for byte",
+        options: &[RADIUS, CODES, COLLAPSE],
+        variants: &["ploc-host"],
+        needs: Needs::Nothing,
+        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Ploc(spec.radius()?)),
+        check: |spec| spec.codes().and(spec.collapse()).and(spec.radius()).map(drop),
+    },
+    Builder {
+        name: "sweep",
+        what: "full-sweep SAH on the host: what the quality of the others is told against",
+        options: &[COLLAPSE, TERMINATION],
+        variants: &["sweep"],
+        needs: Needs::Nothing,
+        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Sweep(spec.sweep_leaves()?)),
+        check: |spec| spec.collapse().and(spec.sweep_leaves()).map(drop),
     },
     Builder {
         name: "driver-fast-build",
@@ -207,6 +230,27 @@ impl Spec {
             Some("off") => Ok(Collapse::OFF),
             Some(other) => Err(self.wrong_value(&COLLAPSE, other)),
         }
+    }
+
+    /// Option `radius`; 25 where it was not given.
+    fn radius(&self) -> Result<usize> {
+        let Some(text) = self.option(RADIUS.key) else { return Ok(25) };
+        text.parse().ok().filter(|&radius: &usize| radius > 0).ok_or_else(|| self.wrong_value(&RADIUS, text))
+    }
+
+    /// Option `termination`; `sah` where it was not given, but of a tree that shall have one triangle a leaf.
+    fn sweep_leaves(&self) -> Result<Leaves> {
+        match self.option(TERMINATION.key) {
+            None | Some("sah") if !self.collapse()?.enabled => Ok(Leaves::Single),
+            None | Some("sah") => Ok(Leaves::Terminated),
+            Some("off") => Ok(Leaves::Single),
+            Some(other) => Err(self.wrong_value(&TERMINATION, other)),
+        }
+    }
+
+    /// The subject of a builder on the host.
+    fn on_host<'a>(&self, mesh: &'a Mesh, hierarchy: Hierarchy) -> Result<Box<dyn Subject + 'a>> {
+        Ok(Box::new(Host::new(&self.to_string(), mesh, hierarchy, self.codes()?, self.collapse()?)))
     }
 
     /// Options `codes`, `collapse` and `schedule`.

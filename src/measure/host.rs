@@ -4,18 +4,32 @@ use super::{BuildRun, Subject, record};
 use crate::Result;
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::Primitives;
+use crate::bvh::host::sweep::Leaves;
+use crate::bvh::host::{lbvh, ploc, sweep};
 use crate::bvh::layout::{self, Bvh2};
+use crate::bvh::quality;
 use crate::bvh::sah::Collapse;
-use crate::bvh::{host, quality};
 use crate::scene::Mesh;
 use crate::trace::{self, Hit, Query, Ray, Work};
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// `lbvh-host`: the plain LBVH that the device's is tested against.
-pub struct HostLbvh<'a> {
+/// How a host's builder makes the tree of what is sorted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hierarchy {
+    /// `lbvh-host`: the plain LBVH that the device's is tested against.
+    Lbvh,
+    /// `ploc-host`: the plain PLOC with this radius.
+    Ploc(usize),
+    /// `sweep`: full sweep, whatever the order.
+    Sweep(Leaves),
+}
+
+/// A builder on the host.
+pub struct Host<'a> {
     builder: String,
     mesh: &'a Mesh,
+    hierarchy: Hierarchy,
     codes: Codes,
     chosen: bool,
     collapse: Collapse,
@@ -24,14 +38,21 @@ pub struct HostLbvh<'a> {
     hits: Vec<Hit>,
 }
 
-impl<'a> HostLbvh<'a> {
+impl<'a> Host<'a> {
     /// On `mesh`; without `codes`, those that the device would take for so many triangles.
-    pub fn new(builder: &str, mesh: &'a Mesh, codes: Option<Codes>, collapse: Collapse) -> HostLbvh<'a> {
-        HostLbvh {
+    pub fn new(
+        builder: &str,
+        mesh: &'a Mesh,
+        hierarchy: Hierarchy,
+        codes: Option<Codes>,
+        collapse: Collapse,
+    ) -> Host<'a> {
+        Host {
             builder: builder.to_owned(),
             mesh,
+            hierarchy,
             codes: codes.unwrap_or_else(|| Codes::for_count(mesh.triangles.len() as u32)),
-            chosen: codes.is_none(),
+            chosen: codes.is_none() && !matches!(hierarchy, Hierarchy::Sweep(_)),
             collapse,
             tree: None,
             rays: Vec::new(),
@@ -40,8 +61,13 @@ impl<'a> HostLbvh<'a> {
     }
 
     fn built(&mut self) -> &Bvh2 {
-        let HostLbvh { mesh, codes, collapse, tree, .. } = self;
-        tree.get_or_insert_with(|| host::lbvh::build(&mesh.positions, &mesh.triangles, *codes, *collapse))
+        let Host { mesh, hierarchy, codes, collapse, tree, .. } = self;
+        let lbvh = |collapse| lbvh::build(&mesh.positions, &mesh.triangles, *codes, collapse);
+        tree.get_or_insert_with(|| match *hierarchy {
+            Hierarchy::Lbvh => lbvh(*collapse),
+            Hierarchy::Ploc(radius) => ploc::build(&lbvh(Collapse::OFF), radius).collapsed(collapse),
+            Hierarchy::Sweep(leaves) => sweep::build(&lbvh(Collapse::OFF), collapse, leaves).collapsed(collapse),
+        })
     }
 }
 
@@ -52,7 +78,7 @@ pub(super) fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (start.elapsed().as_secs_f64() * 1e3, result)
 }
 
-impl Subject for HostLbvh<'_> {
+impl Subject for Host<'_> {
     fn builder(&self) -> &str {
         &self.builder
     }

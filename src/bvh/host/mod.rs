@@ -4,4 +4,8 @@ mod collapse;
 mod compact;
 pub mod geometry;
 pub mod lbvh;
+mod over;
+pub mod ploc;
 pub mod refit;
+#[cfg(feature = "cli")]
+pub mod sweep;
