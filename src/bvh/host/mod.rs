@@ -7,5 +7,6 @@ pub mod lbvh;
 mod over;
 pub mod ploc;
 pub mod refit;
+mod reinsertion;
 #[cfg(feature = "cli")]
 pub mod sweep;
