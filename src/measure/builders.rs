@@ -4,16 +4,16 @@
 //! whoever adds one adds a row there.
 
 use super::Subject;
-use super::device_lbvh::DeviceLbvh;
+use super::device_bvh::DeviceBvh;
 use super::host::{Hierarchy, Host};
 use super::peers::driver::Driver;
 #[cfg(feature = "peer-embree")]
 use super::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use super::peers::obvhs;
+use crate::bvh::builder::{self, Method, Schedule, Window};
 use crate::bvh::codes::Codes;
 use crate::bvh::host::sweep::Leaves;
-use crate::bvh::lbvh::{self, Schedule};
 use crate::bvh::sah::Collapse;
 use crate::gpu::{Device, DriverPreference};
 use crate::scene::Mesh;
@@ -64,11 +64,12 @@ const CODES: BuilderOption = BuilderOption {
     values: "mc30, mc63, emc64sort, emc64var or emc64var-nosize, with +concise or /BITS behind",
 };
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
-const RADIUS: BuilderOption =
-    BuilderOption { key: "radius", values: "1 or more neighbours on either side; 25 if not given" };
 const TERMINATION: BuilderOption =
     BuilderOption { key: "termination", values: "sah, or off: leaves of one triangle, then collapsed" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
+
+const WINDOW: BuilderOption = BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
+const RADIUS: BuilderOption = BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
 
 /// Every builder, in the order in which they are listed and measured.
 pub static BUILDERS: &[Builder] = &[
@@ -85,9 +86,20 @@ pub static BUILDERS: &[Builder] = &[
         ],
         needs: Needs::Device,
         make: |spec, device, mesh| {
-            Ok(Box::new(DeviceLbvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
+            Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
         },
         check: |spec| spec.lbvh_options().map(drop),
+    },
+    Builder {
+        name: "hploc",
+        what: "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
+        options: &[CODES, COLLAPSE, SCHEDULE, WINDOW, RADIUS],
+        variants: &["hploc"],
+        needs: Needs::Device,
+        make: |spec, device, mesh| {
+            Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.hploc_options()?)?))
+        },
+        check: |spec| spec.hploc_options().map(drop),
     },
     Builder {
         name: "lbvh-host",
@@ -104,8 +116,8 @@ pub static BUILDERS: &[Builder] = &[
         options: &[RADIUS, CODES, COLLAPSE],
         variants: &["ploc-host"],
         needs: Needs::Nothing,
-        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Ploc(spec.radius()?)),
-        check: |spec| spec.codes().and(spec.collapse()).and(spec.radius()).map(drop),
+        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Ploc(spec.ploc_radius()?)),
+        check: |spec| spec.codes().and(spec.collapse()).and(spec.ploc_radius()).map(drop),
     },
     Builder {
         name: "sweep",
@@ -232,10 +244,25 @@ impl Spec {
         }
     }
 
-    /// Option `radius`; 25 where it was not given.
-    fn radius(&self) -> Result<usize> {
-        let Some(text) = self.option(RADIUS.key) else { return Ok(25) };
-        text.parse().ok().filter(|&radius: &usize| radius > 0).ok_or_else(|| self.wrong_value(&RADIUS, text))
+    /// The value of an option that is a number, or what it is where it was not given.
+    fn number(&self, option: &BuilderOption, default: u32) -> Result<u32> {
+        let Some(value) = self.option(option.key) else { return Ok(default) };
+        value.parse().map_err(|_| self.wrong_value(option, value))
+    }
+
+    /// Those of `lbvh`, and `window` and `radius`.
+    fn hploc_options(&self) -> Result<builder::Options> {
+        let size = self.number(&WINDOW, Window::DEFAULT.size)?;
+        let radius = self.number(&RADIUS, Window::DEFAULT.radius)?;
+        let method = Method::Hploc(Window { size, radius });
+        method.check()?;
+        Ok(builder::Options { method, ..self.lbvh_options()? })
+    }
+
+    /// Option `radius` of PLOC; 25 where it was not given.
+    fn ploc_radius(&self) -> Result<usize> {
+        let radius = self.number(&RADIUS, 25)?;
+        if radius > 0 { Ok(radius as usize) } else { Err(self.wrong_value(&RADIUS, "0")) }
     }
 
     /// Option `termination`; `sah` where it was not given, but of a tree that shall have one triangle a leaf.
@@ -254,7 +281,7 @@ impl Spec {
     }
 
     /// Options `codes`, `collapse` and `schedule`.
-    fn lbvh_options(&self) -> Result<lbvh::Options> {
+    fn lbvh_options(&self) -> Result<builder::Options> {
         let schedule = match self.option(SCHEDULE.key) {
             None => None,
             Some("chain") => Some(Schedule::Chain),
@@ -262,7 +289,7 @@ impl Spec {
             Some("workgroup") => Some(Schedule::Workgroup),
             Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
         };
-        Ok(lbvh::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..lbvh::Options::DEFAULT })
+        Ok(builder::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..builder::Options::DEFAULT })
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {

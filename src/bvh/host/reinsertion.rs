@@ -162,7 +162,10 @@ impl<R: Record> Work<R> {
     fn path(&self, m: &Move) -> impl Iterator<Item = u32> {
         let (pivot, top) = (m.pivot, self.top(m));
         let climb = |from: u32| std::iter::successors(Some(from), |&slot| Some(self.above(slot)));
-        climb(m.link / 2).take_while(move |&slot| slot != top).chain([top]).chain(climb(m.to / 2).take_while(move |&slot| slot != pivot))
+        climb(m.link / 2)
+            .take_while(move |&slot| slot != top)
+            .chain([top])
+            .chain(climb(m.to / 2).take_while(move |&slot| slot != pivot))
     }
 
     /// The highest node that a move changes.
