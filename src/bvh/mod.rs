@@ -13,5 +13,6 @@ mod lbvh;
 pub(crate) mod lbvh_workgroup;
 pub mod quality;
 pub mod refit;
+pub mod reinsertion;
 pub mod sah;
 pub mod validate;

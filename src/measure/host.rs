@@ -7,8 +7,8 @@ use crate::bvh::geometry::Primitives;
 use crate::bvh::host::sweep::Leaves;
 use crate::bvh::host::{lbvh, ploc, sweep};
 use crate::bvh::layout::{self, Bvh2};
-use crate::bvh::quality;
 use crate::bvh::sah::Collapse;
+use crate::bvh::{quality, reinsertion};
 use crate::scene::Mesh;
 use crate::trace::{self, Hit, Query, Ray, Work};
 use rayon::prelude::*;
@@ -25,35 +25,38 @@ pub enum Hierarchy {
     Sweep(Leaves),
 }
 
+/// What a builder on the host is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// How the tree is made.
+    pub hierarchy: Hierarchy,
+    /// The codes; `None` takes those that the device would take for so many triangles.
+    pub codes: Option<Codes>,
+    /// Reinsertion behind it.
+    pub reinsertion: Option<reinsertion::Options>,
+    /// Whether subtrees become leaves where that is cheaper.
+    pub collapse: Collapse,
+}
+
 /// A builder on the host.
 pub struct Host<'a> {
     builder: String,
     mesh: &'a Mesh,
-    hierarchy: Hierarchy,
+    options: Options,
     codes: Codes,
-    chosen: bool,
-    collapse: Collapse,
     tree: Option<Bvh2>,
     rays: Vec<Ray>,
     hits: Vec<Hit>,
 }
 
 impl<'a> Host<'a> {
-    /// On `mesh`; without `codes`, those that the device would take for so many triangles.
-    pub fn new(
-        builder: &str,
-        mesh: &'a Mesh,
-        hierarchy: Hierarchy,
-        codes: Option<Codes>,
-        collapse: Collapse,
-    ) -> Host<'a> {
+    /// On `mesh`.
+    pub fn new(builder: &str, mesh: &'a Mesh, options: Options) -> Host<'a> {
         Host {
             builder: builder.to_owned(),
             mesh,
-            hierarchy,
-            codes: codes.unwrap_or_else(|| Codes::for_count(mesh.triangles.len() as u32)),
-            chosen: codes.is_none() && !matches!(hierarchy, Hierarchy::Sweep(_)),
-            collapse,
+            options,
+            codes: options.codes.unwrap_or_else(|| Codes::for_count(mesh.triangles.len() as u32)),
             tree: None,
             rays: Vec::new(),
             hits: Vec::new(),
@@ -61,12 +64,20 @@ impl<'a> Host<'a> {
     }
 
     fn built(&mut self) -> &Bvh2 {
-        let Host { mesh, hierarchy, codes, collapse, tree, .. } = self;
-        let lbvh = |collapse| lbvh::build(&mesh.positions, &mesh.triangles, *codes, collapse);
-        tree.get_or_insert_with(|| match *hierarchy {
-            Hierarchy::Lbvh => lbvh(*collapse),
-            Hierarchy::Ploc(radius) => ploc::build(&lbvh(Collapse::OFF), radius).collapsed(collapse),
-            Hierarchy::Sweep(leaves) => sweep::build(&lbvh(Collapse::OFF), collapse, leaves).collapsed(collapse),
+        let Host { mesh, options, codes, tree, .. } = self;
+        tree.get_or_insert_with(|| {
+            let collapse = &options.collapse;
+            let lbvh = |collapse| lbvh::build(&mesh.positions, &mesh.triangles, *codes, collapse);
+            let tree = match (options.hierarchy, options.reinsertion) {
+                (Hierarchy::Lbvh, None) => return lbvh(*collapse),
+                (Hierarchy::Lbvh, _) => lbvh(Collapse::OFF),
+                (Hierarchy::Ploc(radius), _) => ploc::build(&lbvh(Collapse::OFF), radius),
+                (Hierarchy::Sweep(leaves), _) => sweep::build(&lbvh(Collapse::OFF), collapse, leaves),
+            };
+            match &options.reinsertion {
+                Some(reinsertion) => tree.reinserted(reinsertion).collapsed(collapse),
+                None => tree.collapsed(collapse),
+            }
         })
     }
 }
@@ -111,7 +122,8 @@ impl Subject for Host<'_> {
     }
 
     fn choice(&self) -> Option<String> {
-        self.chosen.then(|| format!("codes {}", self.codes))
+        let chosen = self.options.codes.is_none() && !matches!(self.options.hierarchy, Hierarchy::Sweep(_));
+        chosen.then(|| format!("codes {}", self.codes))
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {

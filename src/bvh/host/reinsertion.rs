@@ -1,7 +1,7 @@
 //! Parallel reinsertion, plainly: the twin of [`crate::bvh::reinsertion`], where the method is told.
 
 use crate::bvh::layout::{Aabb, Bvh2, Child, Record};
-use crate::bvh::reinsertion::{LEAST_GAIN, Options, PATH, STACK};
+use crate::bvh::reinsertion::{LEAST_GAIN, LEAST_SHARE, Options, PATH, STACK};
 
 const NONE: u32 = u32::MAX;
 
@@ -122,7 +122,7 @@ impl<R: Record> Work<R> {
     fn search_below(&self, at: u32, pivot: u32, saved: f32, pivot_area: f32, moving: &Aabb, best: &mut Move) {
         let moving_area = self.area(moving);
         let link = best.link;
-        let bar = |best: &Move| best.gain.max(LEAST_GAIN * pivot_area);
+        let bar = |best: &Move| best.gain.max((LEAST_SHARE * pivot_area).max(LEAST_GAIN));
         // What a move to `at` would gain; and of the node there, the slot and what would be saved if the move went below.
         let look = |at: u32, saved: f32, best: &mut Move| {
             let child = self.child(at);
