@@ -59,6 +59,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "bvh" if ["encode", "lbvh", "collapse", "hploc", "ploc"].into_iter().any(is) => bvh::encode::push_constants(),
         "bvh" if is("quality") => bvh::quality::push_constants(),
         "bvh" if is("refit") => bvh::refit::push_constants(),
+        "bvh" if is("reinsertion") => bvh::reinsertion::push_constants(),
         "gpu" if is("fill") => gpu::fill::push_constants(),
         "gpu" if is("pool_tree") => gpu::probe::push_constants(),
         "gpu" if is("radix_sort") => gpu::radix_sort::push_constants(),

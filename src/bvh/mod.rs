@@ -14,5 +14,6 @@ pub(crate) mod lbvh_workgroup;
 mod ploc;
 pub mod quality;
 pub mod refit;
+pub mod reinsertion;
 pub mod sah;
 pub mod validate;
