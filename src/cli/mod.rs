@@ -10,6 +10,7 @@ mod options;
 mod output;
 mod rays;
 mod render;
+mod stability;
 mod tables;
 mod trace;
 mod work;
@@ -36,6 +37,7 @@ struct Cli {
 enum Command {
     Bench(bench::Arguments),
     Accel(accel::Arguments),
+    Stability(stability::Arguments),
     Compare(compare::Arguments),
     Devices(devices::Arguments),
     Build(build::Arguments),
@@ -73,6 +75,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     match &cli.command {
         Command::Bench(arguments) => bench::run(common, arguments),
         Command::Accel(arguments) => accel::run(common, arguments),
+        Command::Stability(arguments) => stability::run(common, arguments),
         Command::Compare(arguments) => compare::run(common, arguments),
         Command::Devices(arguments) => devices::run(common, arguments),
         Command::Build(arguments) => build::run(common, arguments),

@@ -1,9 +1,11 @@
 //! Tables, charts and the page.
 //!
 //! [`results`] is what programs read. For people, [`table`] goes to the terminal and [`Report::write`] makes a folder with
-//! charts as SVG and PNG and an `index.html` that opens from the disk with no network; [`accel`] has a page of its own.
+//! charts as SVG and PNG and an `index.html` that opens from the disk with no network; [`accel`] has a page of its own, and so
+//! has each experiment of [`stability`].
 
 pub mod accel;
+pub mod beside;
 pub mod chart;
 pub mod charts;
 mod elements;
@@ -15,6 +17,7 @@ mod page;
 pub mod picture;
 pub mod raster;
 pub mod results;
+pub mod stability;
 pub mod summary;
 pub mod table;
 pub mod theme;
@@ -87,8 +90,8 @@ impl Report {
         scenes
     }
 
-    /// Writes `results.csv`, `charts/` and `index.html` into `folder`; `results.jsonl` is there already. Where there is an
-    /// `accel.jsonl`, too, its page is written again, and the two name each other.
+    /// Writes `results.csv`, `charts/` and `index.html` into `folder`; `results.jsonl` is there already. Where there are records
+    /// of other commands, too, their pages are written again, and all name each other.
     ///
     /// # Errors
     /// A file cannot be written.
@@ -111,14 +114,13 @@ impl Report {
         let growth = charts::growth::growth(&records, &legend)?;
 
         write_charts(folder, scenes.iter().flat_map(|s| &s.charts).chain(&growth))?;
-        let has_accel = folder.join(accel::FILE).is_file();
-        let page = page::page(self, &legend, &scenes, growth.as_ref(), has_accel);
+        let page = page::page(self, &legend, &scenes, growth.as_ref(), &beside::links(folder, beside::INDEX));
         let path = folder.join("index.html");
         std::fs::write(&path, page).map_err(Error::file(&path))?;
-        if has_accel {
+        if beside::ACCEL.is_in(folder) {
             accel::write(folder)?;
         }
-        Ok(())
+        stability::write_all(folder)
     }
 }
 
