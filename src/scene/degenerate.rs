@@ -106,7 +106,7 @@ impl List {
         let n = self.count;
         let near = || random(n, [0.0; 3], [1.0; 3]);
         self.add("far from the origin", "of size 1 at 1e6", random(n, [1e6; 3], [1.0; 3]));
-        self.add("very far from the origin", "of size 1e24 at 1e30: few floats apart", random(n, [1e30; 3], [1e24; 3]));
+        self.add("very far from the origin", "of size 1e26 at 1e30: few floats apart", random(n, [1e30; 3], [1e26; 3]));
         self.add("lost far from the origin", "of size 1 at 1e30: all at one float", random(n, [1e30; 3], [1.0; 3]));
         self.add("one far away", "one triangle at 1e12", {
             near().into_iter().chain([[[1e12, 0.0, 0.0], [1e12, 1.0, 0.0], [1e12, 0.0, 1.0]]]).collect()
