@@ -3,5 +3,7 @@
 mod collapse;
 mod compact;
 pub mod geometry;
+pub mod hploc;
 pub mod lbvh;
+mod over;
 pub mod refit;
