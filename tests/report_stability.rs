@@ -7,7 +7,7 @@ use browser::Browser;
 use hedgerow::measure::provenance::{DeviceFacts, Machine};
 use hedgerow::measure::stability::far::Side;
 use hedgerow::measure::stability::large::Placement;
-use hedgerow::measure::stability::points::{Degenerate, Failure, Growth, Head, Large, Point, Run};
+use hedgerow::measure::stability::points::{Degenerate, Failure, Growth, Head, Large, Run};
 use hedgerow::measure::statistics::Spread;
 use hedgerow::report::stability::{self, Paged, Points};
 use std::collections::BTreeMap;

@@ -57,7 +57,8 @@ scenes/ or in the folder of --scenes-dir, or a generator:";
 
 /// Runs the command that the arguments name.
 pub fn main() -> ExitCode {
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
+    // What obvhs says of deep trees, it says of every build.
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn,obvhs=error")).init();
     let cli = Cli::parse();
     match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,

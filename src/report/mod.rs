@@ -124,13 +124,17 @@ impl Report {
     }
 }
 
-/// Writes charts as SVG and PNG into the folder `charts/` of `folder`.
+/// Writes charts as SVG and PNG into the folder `charts/` of `folder`; those that are there already stay.
 fn write_charts<'a>(folder: &Path, charts: impl Iterator<Item = &'a Chart>) -> Result<()> {
     let folder = folder.join("charts");
     std::fs::create_dir_all(&folder).map_err(Error::file(&folder))?;
     for chart in charts {
-        for (extension, content) in [("svg", chart.svg().as_bytes().to_vec()), ("png", chart.png()?)] {
-            let path = folder.join(format!("{}.{extension}", chart.name));
+        let [svg, png] = ["svg", "png"].map(|extension| folder.join(format!("{}.{extension}", chart.name)));
+        if png.is_file() && std::fs::read(&svg).is_ok_and(|content| content == chart.svg().as_bytes()) {
+            continue;
+        }
+        // The SVG last: where it is, so is its picture.
+        for (path, content) in [(png, chart.png()?), (svg, chart.svg().as_bytes().to_vec())] {
             std::fs::write(&path, content).map_err(Error::file(&path))?;
         }
     }

@@ -19,6 +19,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Rays of the sample.
 const RAYS: usize = 256;
+/// Builds of a structure whose bytes are not ours to read, beside the first: for its time alone.
+const PEER_BUILDS: u32 = 3;
 /// Costs of a traversal step and of a triangle test.
 const COSTS: (f64, f64) = (3.0, 2.0);
 
@@ -111,7 +113,7 @@ fn fill(point: &mut Degenerate, stage: &Stage<'_>, spec: &Spec, mesh: &Mesh, tru
     let mut first: Option<Vec<u8>> = None;
     for build in 0..stage.builds {
         times.push(subject.build()?.milliseconds);
-        let Some(bytes) = subject.bytes()? else { continue };
+        let Some(bytes) = subject.bytes()? else { if build < PEER_BUILDS { continue } else { break } };
         let is_same = *first.get_or_insert_with(|| bytes.clone()) == bytes;
         if point.same_bytes != Some(false) {
             point.same_bytes = Some(is_same);
