@@ -105,7 +105,11 @@ impl List {
     fn far(&mut self) {
         let n = self.count;
         let near = || random(n, [0.0; 3], [1.0; 3]);
-        self.add("far from the origin", "of size 1 at 1e6", random(n, [1e6; 3], [1.0; 3]));
+        self.add(
+            "far from the origin",
+            "of size 100 at 1e6: a sixteenth from float to float",
+            random(n, [1e6; 3], [100.0; 3]),
+        );
         self.add("very far from the origin", "of size 1e26 at 1e30: few floats apart", random(n, [1e30; 3], [1e26; 3]));
         self.add("lost far from the origin", "of size 1 at 1e30: all at one float", random(n, [1e30; 3], [1.0; 3]));
         self.add("one far away", "one triangle at 1e12", {

@@ -13,10 +13,11 @@ pub mod large;
 pub mod points;
 pub mod relative;
 
-/// What `growth` measures where `-b` does not say: the codes, in trees with one triangle a leaf, so that nothing but the order
-/// of the triangles counts.
+/// What `growth` measures where `-b` does not say: the codes, and builders that sort by them, in trees with one triangle a leaf,
+/// so that nothing but the order of the triangles and what is made of it counts.
 pub const GROWTH_BUILDERS: &str = "lbvh:codes=mc63:collapse=off,lbvh:codes=emc64sort:collapse=off,\
-     lbvh:codes=emc64var:collapse=off,lbvh:codes=emc64var-nosize:collapse=off";
+     lbvh:codes=emc64var:collapse=off,lbvh:codes=emc64var-nosize:collapse=off,\
+     hploc:codes=emc64var-nosize:collapse=off,ploc:codes=emc64var-nosize:collapse=off";
 /// What `large` measures: codes normalised by the bounds of all boxes, and by the concise ones.
 pub const LARGE_BUILDERS: &str = "lbvh:codes=mc63:collapse=off,lbvh:codes=mc63+concise:collapse=off,\
      lbvh:codes=emc64var:collapse=off,lbvh:codes=emc64var+concise:collapse=off,\

@@ -52,7 +52,8 @@ pub struct Growth {
     pub e: u32,
     /// [`super::clipped::cost`] over that at e = 0.
     pub relative_cost: Option<f64>,
-    /// For each kind of ray, speed over that at e = 0: the median of ratios run by run.
+    /// For each kind of ray, speed over that at e = 0: the median of ratios run by run. A kind that has fallen below a twentieth
+    /// is missing at the e that follow.
     pub relative_mrays: BTreeMap<String, f64>,
 }
 
@@ -83,7 +84,8 @@ pub struct Large {
     pub cost: Option<f64>,
     /// The same over that at e = 0.
     pub relative_cost: Option<f64>,
-    /// For each kind of ray, speed over that at e = 0: the median of ratios run by run.
+    /// For each kind of ray, speed over that at e = 0: the median of ratios run by run. A kind that has fallen below a twentieth
+    /// is missing at the e that follow.
     pub relative_mrays: BTreeMap<String, f64>,
 }
 

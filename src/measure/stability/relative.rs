@@ -22,6 +22,8 @@ use std::collections::BTreeMap;
 const COSTS: (f64, f64) = (3.0, 2.0);
 /// Runs that do not count, before those that do.
 const WARM_UPS: u32 = 1;
+/// Of the speed at e = 0, what is no longer worth measuring on: the rays would soon take hours.
+const LOST: f64 = 0.05;
 /// Rays that differ between two trees of which brute force looks at, at most.
 const DIFFERENCES: usize = 16;
 
@@ -91,7 +93,7 @@ pub struct Figures {
     pub cost: Option<f64>,
     /// The same over that of the first point.
     pub relative_cost: Option<f64>,
-    /// Speeds over those of the first point, by kind of ray.
+    /// Speeds over those of the first point, by kind of ray; without those that had fallen below a twentieth before.
     pub relative_mrays: BTreeMap<String, f64>,
 }
 
@@ -148,6 +150,8 @@ struct Base<'a> {
     subject: Box<dyn Subject + 'a>,
     cost: Option<f64>,
     truth: &'a Bvh2,
+    /// Kinds of rays that are lost, and no longer measured.
+    lost: Vec<RayKind>,
 }
 
 impl<'a> Base<'a> {
@@ -155,7 +159,7 @@ impl<'a> Base<'a> {
         let mut subject = spec.make(stage.device, mesh)?;
         subject.build()?;
         let (cost, _) = cost_of(subject.as_mut(), part)?;
-        Ok(Base { part, subject, cost, truth })
+        Ok(Base { part, subject, cost, truth, lost: Vec::new() })
     }
 
     /// The figures of another mesh, and what is wrong with its tree or hits.
@@ -166,8 +170,14 @@ impl<'a> Base<'a> {
         let relative_cost = cost.zip(self.cost).map(|(cost, base)| cost / base).filter(|cost| cost.is_finite());
         let mut relative_mrays = BTreeMap::new();
         for (kind, rays) in &self.part.rays {
+            if self.lost.contains(kind) {
+                continue;
+            }
             let speed = self.speed(stage, subject.as_mut(), *kind, rays)?;
             relative_mrays.insert(kind.name().to_owned(), speed);
+            if speed < LOST {
+                self.lost.push(*kind);
+            }
             let wrong = self.wrong(subject.as_mut(), *kind, rays)?;
             if wrong > 0 {
                 faults.push(format!("{wrong} {kind} rays differ from e = 0 and are wrong by brute force"));

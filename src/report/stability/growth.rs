@@ -119,7 +119,8 @@ impl Paged for Growth {
             dt { "Relative speed" }
             dd {
                 "Rays of the scene without the far triangle, traced through both structures in turn, e = 0 and e, after a warm-up that does not "
-                "count; the median of the ratios run by run. Hits of the two are compared, and brute force decides where they differ."
+                "count; the median of the ratios run by run. Hits of the two are compared, and brute force decides where they differ. A kind of ray that has "
+                "fallen below a twentieth is not measured further on."
             }
             dt { "Rays" }
             dd {

@@ -115,7 +115,8 @@ impl Paged for Large {
             dt { "Relative speed" }
             dd {
                 "Rays of the scene without the huge triangles, through both structures in turn, e = 0 and e, after a warm-up that does not count; "
-                "the median of the ratios run by run."
+                "the median of the ratios run by run. A kind of ray that has "
+                "fallen below a twentieth is not measured further on."
             }
         }
     }
