@@ -42,8 +42,10 @@ fn growth_leaves_a_point_for_every_builder_manner_and_step() {
     assert_eq!(points.len(), 2 * 2 * 2 * 3);
     for point in &points {
         assert_eq!(point.scene, "gen:soup:300:1");
+        // Kinds that have lost nearly all of their speed are not measured further on.
         let kinds: Vec<&str> = point.relative_mrays.keys().map(String::as_str).collect();
-        assert_eq!(kinds, ["ao", "diffuse1", "primary", "shadow"]);
+        let all = ["ao", "diffuse1", "primary", "shadow"];
+        assert!(kinds.iter().all(|kind| all.contains(kind)) && (point.e > 0 || kinds == all), "{point:?}");
         assert!(point.relative_mrays.values().all(|speed| *speed > 0.0), "{point:?}");
         assert!(point.e > 0 || point.relative_cost == Some(1.0), "{point:?}");
     }
@@ -81,9 +83,12 @@ fn large_triangles_stand_where_they_are_asked_for() {
         points.iter().find(find).and_then(|point| point.relative_cost).expect("measured")
     };
     // One bit is left to each axis in which the walls are large; concise bounds keep all 21, but where nothing can be cut.
-    assert!(cost("mc63:", Placement::Walls) > 2.0 && cost("mc63:", Placement::Wall) > 1.5);
-    assert!((cost("mc63+concise", Placement::Walls) - 1.0).abs() < 0.1, "{points:?}");
-    assert!(cost("mc63+concise", Placement::Outward) > 2.0);
+    assert!(cost("mc63:", Placement::Walls) > 1.1 && cost("mc63:", Placement::Wall) > 1.1, "{points:?}");
+    assert!(
+        cost("mc63+concise", Placement::Walls) < 1.05 && cost("mc63+concise", Placement::Wall) < 1.05,
+        "{points:?}"
+    );
+    assert!(cost("mc63+concise", Placement::Outward) > 1.1, "{points:?}");
     assert!(points.iter().all(|point| point.relative_mrays.is_empty() && point.count == 2));
 }
 

@@ -86,6 +86,12 @@ pub fn curves_and_marks(
     }
     let x_range = if x.is_log { 0.8 * left..1.2 * right } else { left..right + 0.02 * (right - left) };
     let y_range = if y.is_log { 0.7 * low..1.4 * high } else { 0.0..1.1 * high };
+    // Room for the names of marks, a line each, above the curves.
+    let room = 0.06 * marks.len() as f64;
+    let y_range = match y.is_log {
+        true => y_range.start..y_range.end * (y_range.end / y_range.start).powf(room / (1.0 - room).max(0.2)),
+        false => y_range.start..y_range.end / (1.0 - room).max(0.2),
+    };
     let marks: Vec<&Mark> = marks.iter().filter(|mark| (left..=right).contains(&mark.x)).collect();
     let names = curves.iter().map(|curve| text_width(&curve.name, 13.0)).fold(0.0, f64::max);
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {

@@ -34,7 +34,7 @@ impl Paged for Degenerate {
             p {
                 "Of ours, " b { (right) " of " (all) } " pairs of a builder and one of " (scenes.len()) " scenes are right: a tree that keeps every rule of "
                 "its layout, the same bytes each time, every finite triangle in it, and every ray of a sample as by brute force. "
-                "A cell is the depth of the tree, or what is wrong."
+                "A cell is the depth of the tree and what its status says, or what is wrong."
                 @if !peers.is_empty() { " Of the peers, " (peers.len()) " are not: such cells are grey." }
             }
             (scroll("Who survives what", matrix(points, &scenes)))
@@ -103,7 +103,8 @@ fn cell(point: Option<&Degenerate>) -> Markup {
     let word = match point {
         _ if point.faults.is_empty() => {
             let depth = point.depth_max.map_or("right".into(), |depth| depth.to_string());
-            return html! { td { (depth) } };
+            let status = point.status.as_ref().map_or(String::new(), |names| names.join(", "));
+            return html! { td { (depth) @if !status.is_empty() { small { (status) } } } };
         }
         Degenerate { valid: Some(false), .. } => "invalid",
         Degenerate { same_bytes: Some(false), .. } => "other bytes",

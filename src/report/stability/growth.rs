@@ -142,7 +142,7 @@ fn marks(points: &[&Growth], builders: &[&str]) -> Vec<Mark> {
         {
             marks.push(Mark { name: format!("{} loses 10%", drop::BASE), tone: MUTED, x: f64::from(e) });
         }
-        marks.push(Mark { name: short_codes(builder), tone: tone(builders, builder), x });
+        marks.push(Mark { name: format!("{} expected", short_codes(builder)), tone: tone(builders, builder), x });
     }
     marks
 }

@@ -9,6 +9,7 @@ use crate::report::names::short;
 use crate::report::numbers::{three_digits, tick};
 use crate::report::summary::geometric_mean;
 use crate::report::theme::{SERIES, Tone};
+use crate::trace::kinds::RayKind;
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 
@@ -85,14 +86,9 @@ pub(super) fn different<'p, P, T: PartialEq>(points: &'p [P], of: impl Fn(&'p P)
 }
 
 /// The kinds of rays that any point has.
-pub(super) fn kinds<P: OverE>(points: &[P]) -> Vec<&str> {
-    let mut kinds: Vec<&str> = Vec::new();
-    for kind in points.iter().flat_map(|point| point.mrays().keys()) {
-        if !kinds.contains(&kind.as_str()) {
-            kinds.push(kind);
-        }
-    }
-    kinds
+pub(super) fn kinds<P: OverE>(points: &[P]) -> Vec<&'static str> {
+    let is_there = |kind: &&str| points.iter().any(|point| point.mrays().contains_key(*kind));
+    RayKind::ALL.map(RayKind::name).into_iter().filter(is_there).collect()
 }
 
 /// The colour of a builder: the same in all charts of the page.
