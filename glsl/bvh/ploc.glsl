@@ -234,7 +234,8 @@ void next_phase() {
 
 // `round` is the first that is not done yet.
 void ploc_finish(uint round) {
-    uint count = clusters_in(round);
+    // Where there is nothing, nobody has begun.
+    uint count = primitive_count == 0u ? 0u : clusters_in(round);
     // Every second round leaves at most fifteen of sixteen clusters.
     for (uint turn = 0; turn < 1024u && count > 1u; ++turn, ++round) {
         uint tiles = tiles_of(count);
