@@ -36,12 +36,12 @@ fn growth_leaves_a_point_for_every_builder_manner_and_step() {
     let builders = "lbvh:codes=mc63:collapse=off,lbvh-host:codes=emc64var-nosize:collapse=off";
     let size = ["--runs", "2", "--size", "12x8"];
     let arguments =
-        [&["stability", "growth", "gen:soup:300:1", "-b", builders, "--steps", "20,45"], &size[..]].concat();
+        [&["stability", "growth", "gen:soup:3000:1", "-b", builders, "--steps", "20,45"], &size[..]].concat();
     let page = done(&arguments, folder.path(), "growth.html");
     let points: Vec<Growth> = stability::read(folder.path()).expect("records");
     assert_eq!(points.len(), 2 * 2 * 2 * 3);
     for point in &points {
-        assert_eq!(point.scene, "gen:soup:300:1");
+        assert_eq!(point.scene, "gen:soup:3000:1");
         // Kinds that have lost nearly all of their speed are not measured further on.
         let kinds: Vec<&str> = point.relative_mrays.keys().map(String::as_str).collect();
         let all = ["ao", "diffuse1", "primary", "shadow"];
@@ -55,11 +55,11 @@ fn growth_leaves_a_point_for_every_builder_manner_and_step() {
     };
     for side in Side::ALL {
         assert!(cost("mc63", 1, side, 20) > 1.1, "all of x lies in the highest cell");
-        assert!(cost("nosize", 1, side, 45) < 1.1, "19 bits are left for 300 triangles");
+        assert!(cost("nosize", 1, side, 45) < 1.1, "19 bits are left for 3,000 triangles");
         assert!(cost("nosize", 3, side, 45) > 2.0, "no bit is left");
     }
-    assert!(page.contains("<section id=\"scene-gen-soup-300-1\">"));
-    for chart in ["growth-gen-soup-300-1-1-plus-cost", "growth-gen-soup-300-1-3-minus-speed-all"] {
+    assert!(page.contains("<section id=\"scene-gen-soup-3000-1\">"));
+    for chart in ["growth-gen-soup-3000-1-1-plus-cost", "growth-gen-soup-3000-1-3-minus-speed-all"] {
         for ending in ["svg", "png"] {
             assert!(folder.path().join(format!("charts/{chart}.{ending}")).is_file(), "{chart}.{ending}");
         }

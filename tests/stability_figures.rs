@@ -77,7 +77,7 @@ fn codes_lose_a_soup_where_their_bits_end_on_either_side() {
         assert!(cost(&one, side, 62) > 5.0 && cost(&three, side, 21) > 20.0, "{side:?}: {one:?} {three:?}");
         assert!(cost(&plain, side, 21) > 1.5, "{side:?}: {plain:?}");
     }
-    for (e, points) in [(30, &one), (62, &one), (10, &three), (21, &plain)] {
+    for (e, points) in [(30, &one), (10, &three), (21, &plain)] {
         let [plus, minus] = Side::ALL.map(|side| cost(points, side, e));
         assert!((plus / minus - 1.0).abs() < 0.05, "e = {e}, the sides lose the same: {plus} {minus}");
     }

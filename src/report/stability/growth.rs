@@ -64,7 +64,7 @@ impl Paged for Growth {
         let has_expected = points.iter().any(|point| drop::shift(&point.builder, 1).is_some());
         html! {
             p {
-                "The first e at which the scene costs a tenth more than at e = 0, or its rays have lost a tenth of their speed; later is better."
+                "The first e at which the scene costs a tenth more than at e = 0, or its rays have lost a tenth of their speed at two points in a row; later is better."
                 @if has_expected {
                     " Expected is where the thesis moves the drop of " code { (drop::BASE) } " by log2(cells) / axes (Riemersma 2024, equations 13 and 14)."
                 }

@@ -54,7 +54,7 @@ impl Paged for Large {
     fn summary(points: &[Large]) -> Markup {
         html! {
             p {
-                "The first e at which the scene costs a tenth more than at e = 0, or its rays have lost a tenth of their speed; later is better. "
+                "The first e at which the scene costs a tenth more than at e = 0, or its rays have lost a tenth of their speed at two points in a row; later is better. "
                 "Beside it the cost at the greatest e, and that over the same codes' with the bounds of all boxes: below 1, narrower bounds save."
             }
             (scroll("Where each loses a tenth", losses(points)))

@@ -47,11 +47,14 @@ impl Loss {
         Loss::of(&costs, |cost| cost >= drop::COST)
     }
 
-    /// Of the speed of a kind of ray.
+    /// Of the speed of a kind of ray: the first of two points in a row, as one alone may be noise; that at e = 0 is nothing else.
     pub fn of_speed<P: OverE>(points: &[&P], kind: &str) -> Loss {
-        let speeds: Vec<(u32, f64)> =
-            points.iter().filter_map(|point| Some((point.e(), *point.mrays().get(kind)?))).collect();
-        Loss::of(&speeds, |speed| speed <= drop::SPEED)
+        let measured = points.iter().filter_map(|point| Some((point.e(), *point.mrays().get(kind)?)));
+        let speeds: Vec<(u32, f64)> = measured.filter(|(e, _)| *e > 0).collect();
+        let next = |i: usize| speeds.get(i + 1).map_or(0.0, |(_, speed)| *speed);
+        let pairs: Vec<(u32, f64)> =
+            speeds.iter().enumerate().map(|(i, &(e, speed))| (e, speed.max(next(i)))).collect();
+        Loss::of(&pairs, |speed| speed <= drop::SPEED)
     }
 
     /// The e, if there is one.
@@ -189,6 +192,35 @@ pub(super) fn speed_chart<P: OverE>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    struct Traced(u32, BTreeMap<String, f64>);
+
+    impl OverE for Traced {
+        fn builder(&self) -> &str {
+            "lbvh"
+        }
+        fn e(&self) -> u32 {
+            self.0
+        }
+        fn cost(&self) -> Option<f64> {
+            None
+        }
+        fn mrays(&self) -> &BTreeMap<String, f64> {
+            &self.1
+        }
+    }
+
+    #[test]
+    fn one_slow_point_alone_is_noise() {
+        let loss = |speeds: &[f64]| {
+            let point = |(e, speed): (usize, &f64)| Traced(2 * e as u32, BTreeMap::from([("ao".to_owned(), *speed)]));
+            let points: Vec<Traced> = speeds.iter().enumerate().map(point).collect();
+            Loss::of_speed(&points.iter().collect::<Vec<_>>(), "ao")
+        };
+        assert_eq!(loss(&[0.8, 0.7, 1.0, 0.9, 0.5, 0.4]), Loss::From(6));
+        assert_eq!(loss(&[1.0, 1.0, 0.5]), Loss::From(4), "nothing behind it says otherwise");
+        assert_eq!(loss(&[0.5, 0.8, 1.0]), Loss::Never(4));
+    }
 
     #[test]
     fn never_is_told_apart_from_not_measured() {
