@@ -4,6 +4,7 @@
 #                      report/accel.html; at most three minutes on two cores
 #   make bench-all     every scene of the folder SCENES (or HEDGEROW_SCENES)
 #   make bench-peers   the same on Mesa 26, whose ray queries are a peer, beside CPU crates
+#   make stability     where methods give way: report/growth.html, report/large.html, report/degenerate.html
 #   make test          the test suite, under a bound in time: a shader that hangs would hang with it
 #   make test-lanes    the suite on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
 #   make check         formatting, lints and docs, warnings denied
@@ -13,12 +14,14 @@
 #   SETUP=true         go on without scripts/setup.sh       OUT=DIR        where reports go
 #   BENCH="…"          further arguments of `hedgerow bench`, such as -b lbvh,ploc or --runs 3
 #   ACCEL="…"          the same of `hedgerow accel`, such as gen:city:1000 or --experiments batch,tlas
+#   STABILITY="…"      the same of `hedgerow stability growth` and `large`, such as sponza or --no-rays
 
 SETUP ?= scripts/setup.sh
 OUT ?= report
 SCENES ?= $(HEDGEROW_SCENES)
 BENCH ?=
 ACCEL ?=
+STABILITY ?=
 PREFIX ?= /usr/local
 CARGO := scripts/cargo.sh
 RELEASE := $(or $(CARGO_TARGET_DIR),target)/release
@@ -44,7 +47,7 @@ SUITE := $(RUN) --features $(FEATURES)
 CAPI := -p hedgerow-capi
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
-.PHONY: bench bench-all bench-peers test test-lanes check prebuilt install-c setup
+.PHONY: bench bench-all bench-peers stability test test-lanes check prebuilt install-c setup
 
 bench: setup
 	$(CARGO) build --release --features $(FEATURES)
@@ -63,6 +66,12 @@ bench-peers: setup
 	scripts/with-lavapipe.sh $(MESA) $(BIN) accel -o $(OUT) $(ACCEL)
 	scripts/with-lavapipe.sh $(MESA) $(BIN) bench $(if $(SCENES),--all --scenes-dir "$(SCENES)") -b $(PEER_BUILDERS) \
 		-o $(OUT) $(BENCH)
+
+stability: setup
+	$(CARGO) build --release --features $(FEATURES)
+	$(BIN) stability growth -o $(OUT) $(STABILITY)
+	$(BIN) stability large -o $(OUT) $(STABILITY)
+	$(BIN) stability degenerate -o $(OUT)
 
 test: setup
 	$(CARGO) test --release --features $(FEATURES) --no-run

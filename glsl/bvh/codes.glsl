@@ -211,8 +211,10 @@ Box code_bounds(Box boxes, Box centroids, bool concise) {
 float area_scale_of(Box scene) {
     precise vec3 half_extent = 0.5 * scene.hi - 0.5 * scene.lo;
     float magnitude = max(max(half_extent.x, max(half_extent.y, half_extent.z)), 0.0);
-    int exponent = int(floatBitsToUint(magnitude) >> 23 & 0xFFu);
-    return uintBitsToFloat(uint(clamp(127 + 127 - exponent, 1, 254)) << 23);
+    vec3 corner = max(abs(scene.lo), abs(scene.hi));
+    float farthest = max(corner.x, max(corner.y, corner.z));
+    ivec2 exponent = ivec2(floatBitsToUint(vec2(magnitude, farthest)) >> 23 & 0xFFu);
+    return uintBitsToFloat(uint(min(clamp(127 + 127 - exponent.x, 1, 254), 3 * 127 - 1 - exponent.y)) << 23);
 }
 
 // x before y before z where equal.

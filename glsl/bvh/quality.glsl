@@ -64,8 +64,10 @@ float relative_area(vec3 lo, vec3 hi, float scale) {
 float scale_of(Child root) {
     vec3 half_extent = 0.5 * root.hi - 0.5 * root.lo;
     float longest = max(half_extent.x, max(half_extent.y, half_extent.z));
-    int exponent = int(floatBitsToUint(longest) >> 23 & 0xFFu);
-    return uintBitsToFloat(uint(clamp(127 + 127 - exponent, 1, 254)) << 23);
+    vec3 corner = max(abs(root.lo), abs(root.hi));
+    float farthest = max(corner.x, max(corner.y, corner.z));
+    ivec2 exponent = ivec2(floatBitsToUint(vec2(longest, farthest)) >> 23 & 0xFFu);
+    return uintBitsToFloat(uint(min(clamp(127 + 127 - exponent.x, 1, 254), 3 * 127 - 1 - exponent.y)) << 23);
 }
 
 void count_leaf(inout Figures f, Child child, uint depth, float scale) {

@@ -45,6 +45,22 @@ pub mod status {
     pub const DEPTH_LIMITED: u32 = 1 << 6;
     /// Bits of structures that cannot be traced: tracers take them as empty.
     pub const UNUSABLE: u32 = TOO_DEEP | SPIN_RAN_OUT | WRONG_VERSION;
+
+    /// The names of the bits that are set, for people.
+    pub fn names(status: u32) -> Vec<String> {
+        const NAMES: [(u32, &str); 7] = [
+            (NON_FINITE, "not finite"),
+            (INDEX_OUT_OF_RANGE, "index out of range"),
+            (TOO_DEEP, "too deep"),
+            (SPIN_RAN_OUT, "spin ran out"),
+            (BAD_INSTANCE, "bad instance"),
+            (WRONG_VERSION, "wrong version"),
+            (DEPTH_LIMITED, "depth limited"),
+        ];
+        let name = |bit: u32| NAMES.iter().find(|(b, _)| *b == 1 << bit).map(|(_, name)| (*name).to_owned());
+        let is_set = |bit: &u32| status >> bit & 1 == 1;
+        (0..u32::BITS).filter(is_set).map(|bit| name(bit).unwrap_or_else(|| format!("bit {bit}"))).collect()
+    }
 }
 
 /// An axis-aligned box. Empty when `lo > hi`.

@@ -33,9 +33,12 @@ impl Collapse {
 /// The power of two by which lengths are scaled before areas are taken, so that scenes of 1e30 have finite areas and those of
 /// 1e-30 have areas at all. Costs are compared only with each other: a common power of two changes nothing else.
 pub fn area_scale(scene: &Aabb) -> f32 {
+    let exponent = |x: f32| (x.to_bits() >> 23) as i32 & 0xFF;
     let magnitude = (0..3).map(|i| 0.5 * scene.hi[i] - 0.5 * scene.lo[i]).fold(0.0, f32::max);
-    let exponent = (magnitude.to_bits() >> 23) as i32 & 0xFF;
-    f32::from_bits(((127 + 127 - exponent).clamp(1, 254) as u32) << 23)
+    let farthest = scene.lo.iter().chain(&scene.hi).fold(0.0, |m: f32, x| m.max(x.abs()));
+    // A scene of no extent that is far from the origin stays among the floats: its areas are 0, not NaN.
+    let scale = (127 + 127 - exponent(magnitude)).clamp(1, 254).min(3 * 127 - 1 - exponent(farthest));
+    f32::from_bits((scale as u32) << 23)
 }
 
 impl Aabb {
@@ -43,5 +46,24 @@ impl Aabb {
     pub fn scaled_half_area(&self, scale: f32) -> f32 {
         let [x, y, z]: [f32; 3] = std::array::from_fn(|i| self.hi[i] * scale - self.lo[i] * scale);
         x * y + y * z + z * x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn areas_are_finite_wherever_the_scene_is_and_however_small() {
+        let point = |at| Aabb { lo: [at; 3], hi: [at; 3] };
+        for at in [0.0, 1e-30, -1.0, 1e30, -3e38] {
+            let scene = point(at);
+            assert_eq!(scene.scaled_half_area(area_scale(&scene)), 0.0, "{at}");
+        }
+        for (lo, hi) in [(1.0, 1.0 + f32::EPSILON), (1e30, 1.000_000_1e30), (-3e38, 3e38), (1e-37, 2e-37)] {
+            let scene = Aabb { lo: [lo; 3], hi: [hi; 3] };
+            let area = scene.scaled_half_area(area_scale(&scene));
+            assert!((12.0..=192.0).contains(&area), "{lo} {hi}: {area}");
+        }
     }
 }

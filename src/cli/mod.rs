@@ -10,6 +10,7 @@ mod options;
 mod output;
 mod rays;
 mod render;
+mod stability;
 mod tables;
 mod trace;
 mod work;
@@ -36,6 +37,7 @@ struct Cli {
 enum Command {
     Bench(bench::Arguments),
     Accel(accel::Arguments),
+    Stability(stability::Arguments),
     Compare(compare::Arguments),
     Devices(devices::Arguments),
     Build(build::Arguments),
@@ -55,7 +57,8 @@ scenes/ or in the folder of --scenes-dir, or a generator:";
 
 /// Runs the command that the arguments name.
 pub fn main() -> ExitCode {
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
+    // What obvhs says of deep trees, it says of every build.
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn,obvhs=error")).init();
     let cli = Cli::parse();
     match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
@@ -73,6 +76,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     match &cli.command {
         Command::Bench(arguments) => bench::run(common, arguments),
         Command::Accel(arguments) => accel::run(common, arguments),
+        Command::Stability(arguments) => stability::run(common, arguments),
         Command::Compare(arguments) => compare::run(common, arguments),
         Command::Devices(arguments) => devices::run(common, arguments),
         Command::Build(arguments) => build::run(common, arguments),

@@ -207,6 +207,31 @@ impl FromStr for Costs {
     }
 }
 
+/// `--steps`: the exponents e at which something is measured, ascending; 0 is always among them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Steps(pub Vec<u32>);
+
+impl FromStr for Steps {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Steps, String> {
+        /// Beyond it lie the floats' ends, wherever one begins.
+        const MOST: u32 = 254;
+        let number = |s: &str| s.trim().parse().ok().filter(|e: &u32| *e <= MOST);
+        let steps: Option<Vec<u32>> = match text.split_once('/') {
+            Some((last, step)) => number(last)
+                .zip(number(step).filter(|step| *step > 0))
+                .map(|(last, step)| (0..=last).step_by(step as usize).collect()),
+            None => text.split(',').map(number).collect(),
+        };
+        let steps = steps.ok_or_else(|| {
+            format!("{text:?} are no steps; write numbers from 0 to {MOST}, as in 14,42, or LAST/STEP, as in 60/2")
+        })?;
+        let all: std::collections::BTreeSet<u32> = steps.into_iter().chain([0]).collect();
+        Ok(Steps(all.into_iter().collect()))
+    }
+}
+
 /// A number above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Positive(pub f32);
@@ -248,6 +273,15 @@ mod tests {
         assert_eq!("3,2".parse(), Ok(Costs { step: 3.0, test: 2.0 }));
         for wrong in ["3", "3,0", "-1,2", "3,nan", "3,2,1"] {
             assert!(wrong.parse::<Costs>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn steps_ascend_from_zero() {
+        assert_eq!("42, 14,42".parse(), Ok(Steps(vec![0, 14, 42])));
+        assert_eq!("9/4".parse(), Ok(Steps(vec![0, 4, 8])));
+        for wrong in ["", "x", "1,", "-1", "300", "60/0", "60/x", "/2"] {
+            assert!(wrong.parse::<Steps>().is_err(), "{wrong}");
         }
     }
 

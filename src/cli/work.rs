@@ -12,12 +12,26 @@ use anyhow::bail;
 /// # Errors
 /// The device does not exist, or lacks what a builder needs.
 pub fn device_for(common: &Common, builders: &[Spec]) -> anyhow::Result<Option<Device>> {
+    device_for_those(common, builders, |_| true).map(|(device, _)| device)
+}
+
+/// Opens the device if one of `builders` needs one, and gives those that can work on it: a builder that `must` work and
+/// cannot is an error, the others are left out.
+///
+/// # Errors
+/// The device does not exist, or lacks what a builder needs that must work.
+pub fn device_for_those<'b>(
+    common: &Common,
+    builders: &'b [Spec],
+    must: impl Fn(&Spec) -> bool,
+) -> anyhow::Result<(Option<Device>, Vec<&'b Spec>)> {
     let need = |needs: Needs| builders.iter().find(|spec| spec.builder().needs == needs);
     if need(Needs::Device).or(need(Needs::RayQuery)).is_none() {
-        return Ok(None);
+        return Ok((None, builders.iter().collect()));
     }
     let device = common.open_device(need(Needs::RayQuery).is_some())?;
-    if let Some(spec) = builders.iter().find(|spec| !spec.is_possible(Some(&device))) {
+    let (possible, not): (Vec<&Spec>, Vec<&Spec>) = builders.iter().partition(|spec| spec.is_possible(Some(&device)));
+    if let Some(spec) = not.into_iter().find(|spec| must(spec)) {
         bail!(
             "{spec} needs a device whose driver has VK_KHR_acceleration_structure and VK_KHR_ray_query, {} has not; choose \
              another device or another builder",
@@ -25,7 +39,7 @@ pub fn device_for(common: &Common, builders: &[Spec]) -> anyhow::Result<Option<D
         );
     }
     check_driver(&device, builders)?;
-    Ok(Some(device))
+    Ok((Some(device), possible))
 }
 
 /// Asks the driver what no property tells: a driver that fails here would give wrong figures in silence.

@@ -2,9 +2,9 @@
 //!
 //! [`Subject`] is a builder on a scene; [`builders`] makes one by name; [`matrix`] measures several of them on a scene and
 //! gives a [`record`] for each. [`experiments`] measures what engines do through the calls of `VK_KHR_acceleration_structure`,
-//! over [`structures`] and [`levels`] of instances. The rest is how that is fair and what follows from it: [`agreement`] (right
-//! hits), [`statistics`] (in turn, medians), [`growth`] (time over triangles), [`pareto`] and [`total_time`] (who is best for
-//! what).
+//! over [`structures`] and [`levels`] of instances; [`stability`] where methods give way. The rest is how that is fair and what
+//! follows from it: [`agreement`] (right hits), [`statistics`] (in turn, medians), [`growth`] (time over triangles), [`pareto`]
+//! and [`total_time`] (who is best for what).
 
 pub mod agreement;
 pub mod builders;
@@ -20,6 +20,7 @@ pub mod pareto;
 pub mod peers;
 pub mod provenance;
 pub mod record;
+pub mod stability;
 pub mod statistics;
 pub mod structures;
 mod subject;

@@ -41,6 +41,13 @@ pub trait Subject {
     /// # Errors
     /// The device failed.
     fn tree(&mut self) -> Result<Option<Bvh2>>;
+    /// The bytes of what was built, where they are ours to read: the same input gives the same.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
+        Ok(self.tree()?.map(|tree| tree.to_bytes()))
+    }
     /// What the builder chose where it was left the choice, in a few words (`emc64var-nosize/32, chain`); `None` if nothing.
     fn choice(&self) -> Option<String> {
         None

@@ -166,6 +166,20 @@ impl Overlay {
         );
     }
 
+    /// A dashed line, for what is expected and not measured.
+    pub fn dashes(&mut self, from: (f64, f64), to: (f64, f64), tone: Tone) {
+        let _ = writeln!(
+            self.svg,
+            "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{}\" stroke-width=\"1.5\" \
+             stroke-dasharray=\"5 4\"/>",
+            from.0,
+            from.1,
+            to.0,
+            to.1,
+            theme::hex(tone.light),
+        );
+    }
+
     /// A coloured rectangle.
     pub fn band(&mut self, Rect { x, y, w, h }: Rect, tone: Tone) {
         let w = w.max(1.0);

@@ -1,9 +1,11 @@
 //! Tables, charts and the page.
 //!
 //! [`results`] is what programs read. For people, [`table`] goes to the terminal and [`Report::write`] makes a folder with
-//! charts as SVG and PNG and an `index.html` that opens from the disk with no network; [`accel`] has a page of its own.
+//! charts as SVG and PNG and an `index.html` that opens from the disk with no network; [`accel`] has a page of its own, and so
+//! has each experiment of [`stability`].
 
 pub mod accel;
+pub mod beside;
 pub mod chart;
 pub mod charts;
 mod elements;
@@ -15,6 +17,7 @@ mod page;
 pub mod picture;
 pub mod raster;
 pub mod results;
+pub mod stability;
 pub mod summary;
 pub mod table;
 pub mod theme;
@@ -87,8 +90,8 @@ impl Report {
         scenes
     }
 
-    /// Writes `results.csv`, `charts/` and `index.html` into `folder`; `results.jsonl` is there already. Where there is an
-    /// `accel.jsonl`, too, its page is written again, and the two name each other.
+    /// Writes `results.csv`, `charts/` and `index.html` into `folder`; `results.jsonl` is there already. Where there are records
+    /// of other commands, too, their pages are written again, and all name each other.
     ///
     /// # Errors
     /// A file cannot be written.
@@ -111,24 +114,27 @@ impl Report {
         let growth = charts::growth::growth(&records, &legend)?;
 
         write_charts(folder, scenes.iter().flat_map(|s| &s.charts).chain(&growth))?;
-        let has_accel = folder.join(accel::FILE).is_file();
-        let page = page::page(self, &legend, &scenes, growth.as_ref(), has_accel);
+        let page = page::page(self, &legend, &scenes, growth.as_ref(), &beside::links(folder, beside::INDEX));
         let path = folder.join("index.html");
         std::fs::write(&path, page).map_err(Error::file(&path))?;
-        if has_accel {
+        if beside::ACCEL.is_in(folder) {
             accel::write(folder)?;
         }
-        Ok(())
+        stability::write_all(folder)
     }
 }
 
-/// Writes charts as SVG and PNG into the folder `charts/` of `folder`.
+/// Writes charts as SVG and PNG into the folder `charts/` of `folder`; those that are there already stay.
 fn write_charts<'a>(folder: &Path, charts: impl Iterator<Item = &'a Chart>) -> Result<()> {
     let folder = folder.join("charts");
     std::fs::create_dir_all(&folder).map_err(Error::file(&folder))?;
     for chart in charts {
-        for (extension, content) in [("svg", chart.svg().as_bytes().to_vec()), ("png", chart.png()?)] {
-            let path = folder.join(format!("{}.{extension}", chart.name));
+        let [svg, png] = ["svg", "png"].map(|extension| folder.join(format!("{}.{extension}", chart.name)));
+        if png.is_file() && std::fs::read(&svg).is_ok_and(|content| content == chart.svg().as_bytes()) {
+            continue;
+        }
+        // The SVG last: where it is, so is its picture.
+        for (path, content) in [(png, chart.png()?), (svg, chart.svg().as_bytes().to_vec())] {
             std::fs::write(&path, content).map_err(Error::file(&path))?;
         }
     }

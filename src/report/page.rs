@@ -14,13 +14,13 @@ use maud::{DOCTYPE, Markup, html};
 
 /// The whole page.
 ///
-/// `has_accel` where a page of `hedgerow accel` lies beside it.
+/// `links` name the pages that lie beside it.
 pub(super) fn page(
     report: &Report,
     legend: &Legend,
     scenes: &[SceneCharts],
     growth: Option<&Chart>,
-    has_accel: bool,
+    links: &Markup,
 ) -> String {
     let records = report.records();
     let markup = html! {
@@ -30,7 +30,7 @@ pub(super) fn page(
             body {
                 a.skip href="#summary" { "Skip to the results" }
                 (header(report, legend, scenes))
-                (navigation(scenes, growth.is_some(), has_accel))
+                (navigation(scenes, growth.is_some(), links))
                 main {
                     @if !report.failures.is_empty() || records.iter().any(|r| r.valid == Some(false)) { (failures(report)) }
                     (summary_section(report, &records, legend))
@@ -61,7 +61,7 @@ fn header(report: &Report, legend: &Legend, scenes: &[SceneCharts]) -> Markup {
     }
 }
 
-fn navigation(scenes: &[SceneCharts], growth: bool, has_accel: bool) -> Markup {
+fn navigation(scenes: &[SceneCharts], growth: bool, links: &Markup) -> Markup {
     html! {
         nav aria-label="Sections" {
             a href="#summary" { "Summary" }
@@ -69,7 +69,7 @@ fn navigation(scenes: &[SceneCharts], growth: bool, has_accel: bool) -> Markup {
             @if growth { a href="#growth" { "Growth" } }
             a href="#results" { "All figures" }
             a href="#method" { "How it is measured" }
-            @if has_accel { a.page href="accel.html" { "Batches, top levels, updates" } }
+            (links)
         }
     }
 }

@@ -10,6 +10,7 @@
 mod animation;
 mod cameras;
 mod check;
+mod degenerate;
 mod generators;
 mod gltf;
 mod inst;
@@ -26,6 +27,7 @@ use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 pub use animation::{Animation, load_animation, load_moving};
+pub use degenerate::{Degenerate, degenerate};
 pub use generators::generators;
 pub use instances::{Instance, Instances, load_instances, load_placed};
 pub use lookup::{list, own_folders};

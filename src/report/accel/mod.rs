@@ -10,6 +10,7 @@ mod rebraid;
 mod top_level;
 mod update;
 
+use super::beside;
 use super::chart::Chart;
 use super::lines::{self, Lines};
 use super::write_charts;
@@ -19,7 +20,7 @@ use maud::Markup;
 use std::path::{Path, PathBuf};
 
 /// The name of the file of records.
-pub const FILE: &str = "accel.jsonl";
+pub const FILE: &str = beside::ACCEL.records;
 
 /// `accel.jsonl`, open for writing: each point is on the disk as soon as it is measured.
 #[derive(Debug)]
@@ -90,8 +91,8 @@ struct Section {
     below: Markup,
 }
 
-/// Writes `accel.html` and its charts into `folder`, from the `accel.jsonl` there; gives the page's path. Where there is an
-/// `index.html`, too, the page names it.
+/// Writes `accel.html` and its charts into `folder`, from the `accel.jsonl` there; gives the page's path. The page names the
+/// others that lie there.
 ///
 /// # Errors
 /// The records cannot be read; a file cannot be written.
@@ -107,8 +108,7 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     .flatten()
     .collect();
     write_charts(folder, sections.iter().flat_map(|section| &section.charts))?;
-    let has_index = folder.join("index.html").is_file();
-    let page = page::page(&measured, &goals::goals(&measured), &sections, has_index);
+    let page = page::page(&measured, &goals::goals(&measured), &sections, &beside::links(folder, beside::ACCEL));
     let path = folder.join("accel.html");
     std::fs::write(&path, page).map_err(Error::file(&path))?;
     Ok(path)

@@ -7,8 +7,8 @@ use crate::report::elements::{column, facts, figure, foot, head, measured_by, nu
 use crate::report::numbers::three_digits;
 use maud::{DOCTYPE, Markup, html};
 
-/// The whole page; `has_index` where a page of `hedgerow bench` lies beside it.
-pub(super) fn page(measured: &Measured, goals: &[Goal], sections: &[Section], has_index: bool) -> String {
+/// The whole page; `links` name the pages that lie beside it.
+pub(super) fn page(measured: &Measured, goals: &[Goal], sections: &[Section], links: &Markup) -> String {
     let (setting, failures) = (measured.setting.as_ref(), &measured.failures);
     let markup = html! {
         (DOCTYPE)
@@ -32,7 +32,7 @@ pub(super) fn page(measured: &Measured, goals: &[Goal], sections: &[Section], ha
                     a href="#summary" { "Summary" }
                     @for section in sections { a href={ "#" (section.id) } { (section.title) } }
                     a href="#method" { "How it is measured" }
-                    @if has_index { a.page href="index.html" { "Build speed and tree quality" } }
+                    (links)
                 }
                 main {
                     @if !failures.is_empty() { (warning(failures)) }

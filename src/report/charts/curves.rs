@@ -1,4 +1,5 @@
-//! Figures over a quantity, one curve a subject, with the spread of each figure; where a curve has a power law, that is drawn.
+//! Figures over a quantity, one curve a subject, with the spread of each figure; where a curve has a power law, that is drawn,
+//! and where something is expected at a place, so is that.
 
 use crate::Result;
 use crate::measure::growth::PowerLaw;
@@ -34,6 +35,17 @@ impl Curve {
     }
 }
 
+/// A place on the horizontal axis where something is expected.
+#[derive(Debug, Clone)]
+pub struct Mark {
+    /// At its upper end.
+    pub name: String,
+    /// Its colour.
+    pub tone: Tone,
+    /// Where.
+    pub x: f64,
+}
+
 /// An axis.
 pub struct Axis<'a> {
     /// What it is called.
@@ -49,6 +61,20 @@ pub struct Axis<'a> {
 /// # Errors
 /// The chart cannot be drawn.
 pub fn curves(caption: Caption, curves: &[Curve], x: &Axis<'_>, y: &Axis<'_>) -> Result<Option<Chart>> {
+    curves_and_marks(caption, curves, &[], x, y)
+}
+
+/// The same with dashed lines at `marks`, as far as the curves reach.
+///
+/// # Errors
+/// The chart cannot be drawn.
+pub fn curves_and_marks(
+    caption: Caption,
+    curves: &[Curve],
+    marks: &[Mark],
+    x: &Axis<'_>,
+    y: &Axis<'_>,
+) -> Result<Option<Chart>> {
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let (left, right) = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), p| (l.min(p.0), r.max(p.0)));
     // A law may end below the least point or above the greatest.
@@ -60,6 +86,13 @@ pub fn curves(caption: Caption, curves: &[Curve], x: &Axis<'_>, y: &Axis<'_>) ->
     }
     let x_range = if x.is_log { 0.8 * left..1.2 * right } else { left..right + 0.02 * (right - left) };
     let y_range = if y.is_log { 0.7 * low..1.4 * high } else { 0.0..1.1 * high };
+    // Room for the names of marks, a line each, above the curves.
+    let room = 0.06 * marks.len() as f64;
+    let y_range = match y.is_log {
+        true => y_range.start..y_range.end * (y_range.end / y_range.start).powf(room / (1.0 - room).max(0.2)),
+        false => y_range.start..y_range.end / (1.0 - room).max(0.2),
+    };
+    let marks: Vec<&Mark> = marks.iter().filter(|mark| (left..=right).contains(&mark.x)).collect();
     let names = curves.iter().map(|curve| text_width(&curve.name, 13.0)).fold(0.0, f64::max);
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
         let mut chart = ChartBuilder::on(area);
@@ -69,19 +102,19 @@ pub fn curves(caption: Caption, curves: &[Curve], x: &Axis<'_>, y: &Axis<'_>) ->
         match (x.is_log, y.is_log) {
             (true, true) => {
                 let chart = chart.build_cartesian_2d(log_axis(x_range.clone()), log_axis(y_range.clone()))?;
-                drawn(chart, overlay, curves, &axes, x_range.end)
+                drawn(chart, overlay, (curves, &marks), &axes, x_range.end)
             }
             (true, false) => {
                 let chart = chart.build_cartesian_2d(log_axis(x_range.clone()), linear(&y_range))?;
-                drawn(chart, overlay, curves, &axes, x_range.end)
+                drawn(chart, overlay, (curves, &marks), &axes, x_range.end)
             }
             (false, true) => {
                 let chart = chart.build_cartesian_2d(linear(&x_range), log_axis(y_range.clone()))?;
-                drawn(chart, overlay, curves, &axes, x_range.end)
+                drawn(chart, overlay, (curves, &marks), &axes, x_range.end)
             }
             (false, false) => {
                 let chart = chart.build_cartesian_2d(linear(&x_range), linear(&y_range))?;
-                drawn(chart, overlay, curves, &axes, x_range.end)
+                drawn(chart, overlay, (curves, &marks), &axes, x_range.end)
             }
         }
     };
@@ -91,7 +124,7 @@ pub fn curves(caption: Caption, curves: &[Curve], x: &Axis<'_>, y: &Axis<'_>) ->
 fn drawn<X, Y>(
     mut chart: ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>,
     overlay: &mut Overlay,
-    curves: &[Curve],
+    (curves, marks): (&[Curve], &[&Mark]),
     axes: &Axes<'_>,
     end: f64,
 ) -> Drawn
@@ -100,6 +133,14 @@ where
     Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
     mesh(&mut chart, axes)?;
+    let area = frame(&chart);
+    let places: Vec<f64> = marks.iter().map(|mark| pixel(&chart, (mark.x, 1.0)).0).collect();
+    for (mark, &x) in marks.iter().zip(&places) {
+        overlay.dashes((x, area.y), (x, area.y + area.h), mark.tone);
+    }
+    let tops: Vec<(f64, f64)> = places.iter().map(|&x| (x, area.y + 8.0)).collect();
+    let names: Vec<_> = marks.iter().map(|mark| (mark.name.clone(), mark.tone)).collect();
+    overlay.label_points(&tops, &names, &[], area);
     let shown: Vec<&Curve> = curves.iter().filter(|curve| !curve.points.is_empty()).collect();
     let mut ends = Vec::new();
     for curve in &shown {
@@ -119,12 +160,13 @@ where
             let at = pixel(&chart, (x, median));
             let [median, min, max] = [median, min, max].map(|v| (axes.y_number)(&v));
             let x = (axes.x_number)(&x);
-            let tip = format!("{}\n{x}: {median}, from {min} to {max} in {runs} runs", curve.name);
+            let spread = if runs > 1 { format!(", from {min} to {max} in {runs} runs") } else { String::new() };
+            let tip = format!("{}\n{x}: {median}{spread}", curve.name);
             overlay.tip(Rect { x: at.0 - 7.0, y: at.1 - 7.0, w: 14.0, h: 14.0 }, &tip);
         }
         ends.push((pixel(&chart, (end, height)).0, pixel(&chart, (end, height)).1));
     }
     let texts: Vec<_> = shown.iter().map(|curve| (curve.name.clone(), curve.tone)).collect();
-    overlay.label_ends(&ends, &texts, frame(&chart));
+    overlay.label_ends(&ends, &texts, area);
     Ok(())
 }

@@ -14,6 +14,7 @@ mod vector;
 
 use super::{Animation, Instance, Instances, Mesh, cameras};
 use crate::{Error, Result};
+pub(super) use meshes::needles;
 
 /// The most triangles that the engine's primitives are made for.
 pub(super) const MOST_TRIANGLES: u64 = 1 << 27;
