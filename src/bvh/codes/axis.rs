@@ -20,7 +20,9 @@ impl Axis {
     pub fn new(lo: f32, hi: f32) -> Axis {
         let exponent = biased_exponent(lo).max(biased_exponent(hi));
         let low = fixed_point(lo, exponent);
-        let extent = (fixed_point(hi, exponent) - low) as u64;
+        // Rounded up: what the units cut off must not put the far corner behind the extent.
+        let wide = wide_fixed_point(hi, exponent) - wide_fixed_point(lo, exponent);
+        let extent = ((wide + 0xFFFF_FFFF) >> 32) as u64;
         if extent == 0 {
             return Axis { exponent, shift: 0, lo: low, corner: lo, inverse: 0 };
         }

@@ -15,6 +15,7 @@
 mod axis;
 mod binning;
 mod bounds;
+mod for_device;
 mod mipping;
 mod name;
 mod plan;
@@ -116,11 +117,6 @@ impl Code {
         }
     }
 
-    /// The number by which shaders know the order: `ORDER_…` in codes.glsl.
-    pub(crate) fn order_number(self) -> u32 {
-        self.order() as u32
-    }
-
     /// Bits of the occupancy grid of mipping; 0 for other codes.
     pub(crate) const fn grid_bits(self) -> u32 {
         match self {
@@ -141,8 +137,7 @@ impl Codes {
     /// The same normalised by other bounds; `None` where the code has no such bounds: those with a grid cannot have
     /// [`CodeBounds::Robust`].
     pub fn with_bounds(self, bounds: CodeBounds) -> Option<Codes> {
-        let has_grid = self.code.grid_bits() > 0 || matches!(self.code, Code::Bin(_));
-        (bounds != CodeBounds::Robust || !has_grid).then(|| Codes { bounds, ..self }.with_bits(self.bits))
+        (bounds != CodeBounds::Robust || !self.has_grid()).then(|| Codes { bounds, ..self }.with_bits(self.bits))
     }
 
     /// The bits of the longest prefix, at least 1.
@@ -152,6 +147,11 @@ impl Codes {
             (_, CodeBounds::Robust) => sections::PREFIX_BITS,
             (code, _) => code.grid_bits().max(1),
         }
+    }
+
+    /// Whether there is a grid of cells that must be counted first.
+    pub(crate) fn has_grid(&self) -> bool {
+        self.code.grid_bits() > 0 || matches!(self.code, Code::Bin(_))
     }
 
     /// Of the used bits, those that hold coordinates.
