@@ -9,9 +9,22 @@ use hedgerow::bvh::host;
 use hedgerow::bvh::sah::Collapse;
 
 const CODES: [&str; 16] = [
-    "emc64var+robust", "emc64var+robust/24", "emc64var+robust/5", "emc64sort+robust/32", "mc63+robust", "mc30+robust/9",
-    "mip6/6", "mip9+concise", "mip12", "mip12+centroid/32",
-    "bin2a0", "bin4a4+concise", "bin4a3~1/20", "bin6a9~256", "bin6a1~2/6", "bin6a5+centroid",
+    "emc64var+robust",
+    "emc64var+robust/24",
+    "emc64var+robust/5",
+    "emc64sort+robust/32",
+    "mc63+robust",
+    "mc30+robust/9",
+    "mip6/6",
+    "mip9+concise",
+    "mip12",
+    "mip12+centroid/32",
+    "bin2a0",
+    "bin4a4+concise",
+    "bin4a3~1/20",
+    "bin6a9~256",
+    "bin6a1~2/6",
+    "bin6a5+centroid",
 ];
 
 type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
@@ -26,7 +39,8 @@ fn scene(cells: impl Iterator<Item = [f32; 3]>, larger: &[[[f32; 3]; 3]]) -> Mes
 
 /// A bent plate of 3,000 cells: of an octant little is occupied.
 fn plate() -> impl Iterator<Item = [f32; 3]> {
-    (0..3000).map(|i| [(i % 60) as f32 * 0.05, (i / 60) as f32 * 0.05, if i % 60 < 50 { 0.0 } else { (i % 7) as f32 * 0.3 }])
+    (0..3000)
+        .map(|i| [(i % 60) as f32 * 0.05, (i / 60) as f32 * 0.05, if i % 60 < 50 { 0.0 } else { (i % 7) as f32 * 0.3 }])
 }
 
 fn triangle_at(d: f32) -> [[f32; 3]; 3] {
@@ -57,7 +71,8 @@ fn meshes() -> Vec<(String, Mesh)> {
 #[test]
 fn every_prefix_gives_the_bytes_of_the_host() {
     let device = device();
-    let corpus = corpus::meshes().into_iter().map(|(name, positions, triangles)| (name.to_string(), (positions, triangles)));
+    let corpus =
+        corpus::meshes().into_iter().map(|(name, positions, triangles)| (name.to_string(), (positions, triangles)));
     for (name, (positions, triangles)) in meshes().into_iter().chain(corpus) {
         let vertices = device.upload("positions", &positions).unwrap();
         let indices = device.upload("indices", &triangles).unwrap();

@@ -158,10 +158,10 @@ uint coordinate_bits(CodeKind kind) {
     return kind.size_group == 0 ? kind.bits : kind.bits - kind.bits / (kind.size_group + 1);
 }
 
-// Extents as integers: halving is taking one from the exponent.
+// Extents as integers: halving is taking one from the exponent; of what is flat there is room for a code's bits below the others.
 ivec3 extents_of(Box bounds) {
     precise vec3 half_extent = 0.5 * bounds.hi - 0.5 * bounds.lo;
-    return mix(ivec3(-0x7F000000), floatBitsToInt(half_extent), greaterThan(half_extent, vec3(0)));
+    return mix(ivec3(-0x40000000), floatBitsToInt(half_extent), greaterThan(half_extent, vec3(0)));
 }
 
 // The axes, longest first; x before y before z where equal.

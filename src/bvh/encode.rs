@@ -134,8 +134,7 @@ impl Encode {
 
     /// The kernels of [`Encode::steps`].
     pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
-        let sort =
-            [&shaders::GPU_RADIX_SORT_COUNT, &shaders::GPU_RADIX_SORT_SCAN, &shaders::GPU_RADIX_SORT_SCATTER];
+        let sort = [&shaders::GPU_RADIX_SORT_COUNT, &shaders::GPU_RADIX_SORT_SCAN, &shaders::GPU_RADIX_SORT_SCATTER];
         let mut reading = vec![&shaders::BVH_ENCODE_BOUNDS, &shaders::BVH_ENCODE_PLAN, &shaders::BVH_ENCODE_CODES];
         if self.codes.has_grid() {
             reading.extend([&shaders::BVH_ENCODE_CELLS, &shaders::BVH_ENCODE_PREFIXES]);

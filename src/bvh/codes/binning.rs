@@ -38,7 +38,11 @@ impl Binning {
     /// `None` for anything else.
     pub const fn new(depth: u32, count_bits: u32, stretch: u32) -> Option<Binning> {
         let is_known = matches!(depth, 2 | 4 | 6) && count_bits <= 9 && stretch.is_power_of_two() && stretch <= 256;
-        if is_known { Some(Binning { depth: depth as u8, count_bits: count_bits as u8, stretch: stretch as u16 }) } else { None }
+        if is_known {
+            Some(Binning { depth: depth as u8, count_bits: count_bits as u8, stretch: stretch as u16 })
+        } else {
+            None
+        }
     }
 
     /// How often parts are split, at most.
@@ -211,7 +215,8 @@ impl Splits {
                 Part { cells, path, length, recipe: within.recipe(Order::Variable, bits) }
             })
             .collect();
-        let holds = |part: &Part, cell: [u32; 3]| (0..3).all(|i| (part.cells[0][i]..=part.cells[1][i]).contains(&cell[i]));
+        let holds =
+            |part: &Part, cell: [u32; 3]| (0..3).all(|i| (part.cells[0][i]..=part.cells[1][i]).contains(&cell[i]));
         let part_of = (0..1 << GRID_BITS)
             .map(|number| parts.iter().position(|part| holds(part, grid.cell(number))).unwrap_or(0))
             .collect();
@@ -277,9 +282,10 @@ mod tests {
             let splits = Splits::new(binning, Extents::new([1.0, 1.5, 1.2]), 64, cells.iter().copied());
             for &coordinates in &cells {
                 let cell = splits.grid.cell_of(coordinates);
-                let holding = splits.parts.iter().filter(|part| {
-                    (0..3).all(|i| (part.cells[0][i]..=part.cells[1][i]).contains(&cell[i]))
-                });
+                let holding = splits
+                    .parts
+                    .iter()
+                    .filter(|part| (0..3).all(|i| (part.cells[0][i]..=part.cells[1][i]).contains(&cell[i])));
                 assert_eq!(holding.count(), 1);
             }
         }

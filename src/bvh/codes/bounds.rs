@@ -38,8 +38,9 @@ impl CodeBounds {
             CodeBounds::Full | CodeBounds::Robust => *boxes,
             CodeBounds::Centroid => *centroids,
             CodeBounds::Concise => {
-                let difference: [f32; 3] =
-                    std::array::from_fn(|i| (centroids.lo[i] - boxes.lo[i]).min(boxes.hi[i] - centroids.hi[i]).max(0.0));
+                let difference: [f32; 3] = std::array::from_fn(|i| {
+                    (centroids.lo[i] - boxes.lo[i]).min(boxes.hi[i] - centroids.hi[i]).max(0.0)
+                });
                 Aabb {
                     lo: std::array::from_fn(|i| boxes.lo[i] + difference[i]),
                     hi: std::array::from_fn(|i| boxes.hi[i] - difference[i]),

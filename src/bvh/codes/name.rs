@@ -77,16 +77,19 @@ impl FromStr for Codes {
         let mut codes = code.full();
         if let Some(bounds) = bounds {
             let known = CodeBounds::ALL.iter().find(|b| b.name() == bounds && **b != CodeBounds::Full);
-            let known = known.ok_or_else(|| wrong(format!("+{bounds} is not known; there are {}", CodeBounds::NAMES)))?;
+            let known =
+                known.ok_or_else(|| wrong(format!("+{bounds} is not known; there are {}", CodeBounds::NAMES)))?;
             codes = codes
                 .with_bounds(*known)
                 .ok_or_else(|| wrong(format!("{name} has a grid of its own; it takes +concise or +centroid")))?;
         }
         if let Some(bits) = bits {
             let range = codes.least_bits()..=code.bits();
-            codes.bits = bits.parse().ok().filter(|b| range.contains(b)).ok_or_else(|| {
-                wrong(format!("the bits after / are {} to {}", range.start(), range.end()))
-            })?;
+            codes.bits = bits
+                .parse()
+                .ok()
+                .filter(|b| range.contains(b))
+                .ok_or_else(|| wrong(format!("the bits after / are {} to {}", range.start(), range.end())))?;
         }
         Ok(codes)
     }
@@ -99,8 +102,22 @@ mod tests {
     #[test]
     fn names_round_trip() {
         for text in [
-            "mc30", "mc63", "emc64sort", "emc64var", "emc64var-nosize", "mip6", "mip9/40", "mip12+concise", "bin2a0", "bin4a4",
-            "bin6a9~256", "bin4a3~1+centroid/32", "mc63+concise", "emc64var+robust", "mc30+robust/12", "emc64var+concise/32",
+            "mc30",
+            "mc63",
+            "emc64sort",
+            "emc64var",
+            "emc64var-nosize",
+            "mip6",
+            "mip9/40",
+            "mip12+concise",
+            "bin2a0",
+            "bin4a4",
+            "bin6a9~256",
+            "bin4a3~1+centroid/32",
+            "mc63+concise",
+            "emc64var+robust",
+            "mc30+robust/12",
+            "emc64var+concise/32",
         ] {
             assert_eq!(text.parse::<Codes>().expect(text).to_string(), text);
         }

@@ -59,7 +59,8 @@ impl Size {
 
     /// Diagonal of the box over that of the scene, as a 16-bit fraction.
     fn of(&self, primitive: &Aabb) -> u32 {
-        let extent: [f32; 3] = std::array::from_fn(|i| primitive.hi[i] * self.prescale - primitive.lo[i] * self.prescale);
+        let extent: [f32; 3] =
+            std::array::from_fn(|i| primitive.hi[i] * self.prescale - primitive.lo[i] * self.prescale);
         let squared = (extent[0] * extent[0] + extent[1] * extent[1] + extent[2] * extent[2]) * self.reciprocal;
         // The square root is taken of the fraction as an integer: the same on every device.
         let fixed = if squared >= 1.0 { u32::MAX } else { (squared * 4_294_967_296.0) as u32 };
@@ -89,7 +90,9 @@ impl Plan {
         let centroids = || boxes.iter().flatten().map(|b| plan.wide_fractions(b.centroid()));
         let prefix = match codes.code {
             Code::Bin(binning) => Prefix::Splits(Splits::new(binning, extents, codes.bits, centroids())),
-            code if code.grid_bits() > 0 => Prefix::Cells(Occupancy::new(code.grid_bits(), extents, codes.bits, centroids())),
+            code if code.grid_bits() > 0 => {
+                Prefix::Cells(Occupancy::new(code.grid_bits(), extents, codes.bits, centroids()))
+            }
             _ => Prefix::None,
         };
         Plan { prefix, ..plan }

@@ -36,7 +36,8 @@ pub(super) struct Extents(pub [i32; 3]);
 
 impl Extents {
     pub fn new(extent: [f32; 3]) -> Extents {
-        Extents(extent.map(|e| if e > 0.0 { e.to_bits() as i32 } else { -0x7F00_0000 }))
+        // What is flat stays below what was halved as often as a code has bits, and has as many halvings left itself.
+        Extents(extent.map(|e| if e > 0.0 { e.to_bits() as i32 } else { -0x4000_0000 }))
     }
 
     pub fn of(bounds: &Aabb) -> Extents {
