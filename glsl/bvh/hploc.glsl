@@ -12,8 +12,6 @@
 // needs one barrier before, behind bvh/encode.glsl's phases; subgroups of any size; workgroups of whole subgroups or less than one
 #ifndef HEDGEROW_BVH_HPLOC
 #define HEDGEROW_BVH_HPLOC
-#extension GL_KHR_shader_subgroup_vote : require
-#extension GL_KHR_shader_subgroup_shuffle : require
 #include "bvh/clusters.glsl"
 #include "bvh/radix_tree.glsl"
 
@@ -25,26 +23,31 @@ const uint LEVELS = 64 + 27;
 // Subgroups of a workgroup: radix_sort::Shape.
 const uint SUBGROUPS = PRIVATE_COUNTERS ? 1u : SUBGROUPS_AT_MOST;
 
-// The window of each subgroup.
+// The window of each subgroup: the boxes of its clusters and where their records lie, at fixed places; the places of those that
+// are left, in order; for each of these, which is the nearest; and the pairs that merge.
 shared vec3 window_lo[SUBGROUPS * WINDOW];
 shared vec3 window_hi[SUBGROUPS * WINDOW];
-shared uint window_reference[SUBGROUPS * WINDOW];
-shared uint window_count[SUBGROUPS * WINDOW];
-shared float window_cost[SUBGROUPS * WINDOW];
 shared uint window_first[SUBGROUPS * WINDOW];
+shared uint window_left[SUBGROUPS * WINDOW];
 shared uint window_nearest[SUBGROUPS * WINDOW];
+shared uint window_pairs[SUBGROUPS * WINDOW];
+
+// What each invocation asks its subgroup to merge: see `Request`.
+shared uvec3 requests[gl_WorkGroupSize.x];
+// How many clusters that left.
+shared uint replies[gl_WorkGroupSize.x];
 
 // Left children that wait for a sibling out of the same run of positions (bvh/lbvh.glsl), and their clusters.
 shared uint run_firsts[ITEMS * gl_WorkGroupSize.x];
 shared uint run_clusters[ITEMS * gl_WorkGroupSize.x];
 
+uint run_slot(uint level) {
+    return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+}
+
 // Lanes of a subgroup; of a workgroup that is less than one, those that there are.
 uint lane_count() {
     return min(gl_SubgroupSize, gl_WorkGroupSize.x);
-}
-
-uint run_slot(uint level) {
-    return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
 }
 
 // What lanes have written, to memory or to the window, the subgroup sees; and whoever is told of it afterwards.
@@ -67,32 +70,29 @@ struct Range {
     uvec3 behind;
 };
 
-// Two lists of clusters side by side in the window: from `left` on, then from `right` on.
-struct Lists {
+// The clusters of two siblings: their records are named by the list from `left` and from `right` on.
+struct Request {
     uint left;
     uint left_count;
     uint right;
     uint right_count;
+    bool is_whole;    // they are all that there are
 };
 
-Cluster in_window(uint at) {
-    return Cluster(window_lo[at], window_reference[at], window_hi[at], window_count[at], window_cost[at], window_first[at]);
+const Request NO_REQUEST = Request(0u, 0u, 0u, 0u, false);
+const uint IS_WHOLE = 1u << 16;
+const uint IS_WORKING = 1u << 17;
+
+// Where the records of a subtree's clusters lie, from its first position on. The sort has left the memory free.
+Words cluster_list() {
+    return Words(keys[1u - (passes & 1u)]);
 }
 
-void to_window(uint at, Cluster c) {
-    window_lo[at] = c.lo;
-    window_reference[at] = c.reference;
-    window_hi[at] = c.hi;
-    window_count[at] = c.count;
-    window_cost[at] = c.cost;
-    window_first[at] = c.first;
-}
-
-// The cluster nearest to each of the window's; ties to the one before.
+// The cluster nearest to each that is left; ties to the one before.
 void find_nearest(uint begin, uint count, float area_scale) {
     for (uint base = 0; base < count; base += lane_count()) {
         uint own = base + gl_SubgroupInvocationID;
-        uint at = begin + min(own, count - 1u);
+        uint at = begin + window_left[begin + min(own, count - 1u)];
         vec3 lo = window_lo[at], hi = window_hi[at];
         float best = uintBitsToFloat(0x7F800000u);
         uint nearest = own;
@@ -103,61 +103,89 @@ void find_nearest(uint begin, uint count, float area_scale) {
             uint other = PRIVATE_COUNTERS ? from + turn : own + turn - RADIUS;
             // Before the first wraps around to far behind the last.
             bool looks = other < count && other != own && other + RADIUS >= own && other <= own + RADIUS;
-            uint there = begin + min(other, count - 1u);
+            uint there = begin + window_left[begin + (PRIVATE_COUNTERS ? other : min(other, count - 1u))];
             float distance = scaled_half_area(Box(min(lo, window_lo[there]), max(hi, window_hi[there])), area_scale);
             if (looks && distance < best) {
                 best = distance;
                 nearest = other;
             }
         }
-        if (own < count) window_nearest[at] = nearest;
+        if (own < count) window_nearest[begin + own] = nearest;
     }
     subgroup_step();
 }
 
-// A round of PLOC; how many clusters are left.
-uint merge_round(Structure structure, Weights w, uint begin, uint count, float area_scale) {
-    find_nearest(begin, count, area_scale);
-    uint left = 0;
-    for (uint base = 0; base < count; base += lane_count()) {
-        uint own = base + gl_SubgroupInvocationID;
-        bool stays = own < count;
-        Cluster c;
-        if (stays) {
-            c = in_window(begin + own);
-            uint other = window_nearest[begin + own];
-            bool mutual = window_nearest[begin + other] == own;
-            if (mutual && own < other) c = merge_clusters(structure, w, c, in_window(begin + other), area_scale);
-            stays = !mutual || own < other;
+// Finds the pairs that are each other's nearest and leaves the first of each; how many are left, and how many pairs there are.
+uvec2 find_pairs(uint begin, uint count) {
+    uvec2 found = uvec2(0);
+    if (PRIVATE_COUNTERS) {
+        // One after the other: ballots are loops on a CPU.
+        for (uint i = 0; i < count; ++i) {
+            uint j = window_nearest[begin + i], own = window_left[begin + i];
+            bool mutual = window_nearest[begin + j] == i;
+            if (gl_SubgroupInvocationID == 0u) {
+                if (mutual && i < j) window_pairs[begin + found.y] = own | window_left[begin + j] << 16;
+                if (!mutual || i < j) window_left[begin + found.x] = own;
+            }
+            found += uvec2(!mutual || i < j ? 1u : 0u, mutual && i < j ? 1u : 0u);
         }
-        uvec4 staying = subgroupBallot(stays);
-        subgroup_step();
-        // To the places of clusters that all lanes have read.
-        if (stays) to_window(begin + left + subgroupBallotExclusiveBitCount(staying), c);
-        left += subgroupBallotBitCount(staying);
-        subgroup_step();
+    } else {
+        for (uint base = 0; base < count; base += lane_count()) {
+            uint i = base + gl_SubgroupInvocationID;
+            uint j = i < count ? window_nearest[begin + i] : 0u, own = i < count ? window_left[begin + i] : 0u;
+            bool mutual = i < count && window_nearest[begin + j] == i;
+            uint other = window_left[begin + j];
+            bool merges = mutual && i < j, stays = i < count && (!mutual || i < j);
+            uvec4 merging = subgroupBallot(merges), staying = subgroupBallot(stays);
+            subgroup_step();
+            // To places that all lanes have read.
+            if (merges) window_pairs[begin + found.y + subgroupBallotExclusiveBitCount(merging)] = own | other << 16;
+            if (stays) window_left[begin + found.x + subgroupBallotExclusiveBitCount(staying)] = own;
+            found += uvec2(subgroupBallotBitCount(staying), subgroupBallotBitCount(merging));
+            subgroup_step();
+        }
     }
-    return left;
+    subgroup_step();
+    return found;
 }
 
-// Merges two lists until at most `most` clusters are left, and writes them from the left list's place on; how many they are.
-uint merge_lists(Structure structure, Weights w, Clusters clusters, Lists lists, uint most, float area_scale) {
+// Merges what is asked for until at most half a window is left, or one of all; how many are left.
+uint merge(Structure structure, Weights w, Clusters clusters, Request request, float area_scale) {
     uint begin = gl_SubgroupID * WINDOW;
-    uint count = lists.left_count + lists.right_count;
+    uint count = request.left_count + request.right_count;
+    uint most = request.is_whole ? 1u : HALF_WINDOW;
+    Words list = cluster_list();
     subgroup_step();
     for (uint i = gl_SubgroupInvocationID; i < count; i += lane_count()) {
-        uint place = i < lists.left_count ? lists.left + i : lists.right + (i - lists.left_count);
-        to_window(begin + i, clusters.cluster[place]);
+        uint first = list.word[i < request.left_count ? request.left + i : request.right + (i - request.left_count)];
+        window_first[begin + i] = first;
+        window_left[begin + i] = i;
+        window_lo[begin + i] = clusters.cluster[first].lo;
+        window_hi[begin + i] = clusters.cluster[first].hi;
     }
     subgroup_step();
     // Each round merges two at least: the nearest of all.
     for (uint round = 0; round < WINDOW && count > most; ++round) {
-        count = merge_round(structure, w, begin, count, area_scale);
+        find_nearest(begin, count, area_scale);
+        uvec2 found = find_pairs(begin, count);
+        count = found.x;
+        for (uint i = gl_SubgroupInvocationID; i < found.y; i += lane_count()) {
+            uint pair = window_pairs[begin + i];
+            uint left = begin + (pair & 0xFFFFu), right = begin + (pair >> 16);
+            Cluster c = merge_clusters(structure, w, clusters.cluster[window_first[left]],
+                                       clusters.cluster[window_first[right]], area_scale);
+            clusters.cluster[c.first] = c;
+            window_lo[left] = c.lo;
+            window_hi[left] = c.hi;
+        }
+        subgroup_step();
     }
     for (uint i = gl_SubgroupInvocationID; i < count; i += lane_count()) {
-        clusters.cluster[lists.left + i] = in_window(begin + i);
+        list.word[request.left + i] = window_first[begin + window_left[begin + i]];
     }
-    if (most == 1u && gl_SubgroupInvocationID == 0u) write_root(structure, w, in_window(begin));
+    if (request.is_whole && gl_SubgroupInvocationID == 0u) {
+        write_root(structure, w, clusters.cluster[window_first[begin + window_left[begin]]]);
+    }
     subgroup_step();
     return count;
 }
@@ -167,8 +195,8 @@ bool is_whole(Range s, uint active_count) {
 }
 
 // One step up from a subtree: whether its sibling is there. If so, `s` becomes their parent, and the clusters of both are told.
-bool step_up(Words codes, uint active_count, uint run, inout uint waiting, inout Range s, out Lists lists) {
-    lists = Lists(s.first, s.clusters, s.first, 0u);
+bool step_up(Words codes, uint active_count, uint run, inout uint waiting, inout Range s, out Request request) {
+    request = NO_REQUEST;
     Words ends = Words(ends_address);
     bool is_left = is_less(s.behind, s.before);
     uint parent = is_left ? s.last : s.first - 1u;
@@ -192,15 +220,16 @@ bool step_up(Words codes, uint active_count, uint run, inout uint waiting, inout
         clusters = (word >> 27) + 1u;
     }
     if (is_left) {
-        lists = Lists(s.first, s.clusters, s.last + 1u, clusters);
+        request = Request(s.first, s.clusters, s.last + 1u, clusters, false);
         s.last = end;
         s.behind = difference_behind(codes, s.last, active_count);
     } else {
-        lists = Lists(end, clusters, s.first, s.clusters);
+        request = Request(end, clusters, s.first, s.clusters, false);
         s.first = end;
         s.before = difference_before(codes, s.first);
     }
     s.clusters += clusters;
+    request.is_whole = is_whole(s, active_count);
     return true;
 }
 
@@ -209,59 +238,67 @@ void hploc_hierarchy(uint task) {
     Structure structure = Structure(structure_address);
     Weights w = weights();
     Clusters clusters = Clusters(scratch_behind_weights());
+    Words list = cluster_list();
     Geometry input_geometries = geometries();
     Words codes = Words(keys[passes & 1u]);
     uint active_count = state.active_count;
     float area_scale = state.plan.area_scale;
     uint run = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
     uint end = min(run + ITEMS, active_count);
+    for (uint position = run; position < end; ++position) {
+        clusters.cluster[position] = cluster_of_primitive(input_geometries, position, area_scale);
+        list.word[position] = position;
+    }
     uint position = run;
     uint waiting = 0;
-    bool leaves_done = false, climbs = false, done = false;
+    bool leaves_done = false, climbs = false;
     uint own_run = run;
     Range s;
-    // Each turn, each lane goes up a level, or takes what is next of its run.
+    // Each invocation goes as far as it can alone; then the subgroup merges for all.
     for (uint turn = 0; turn < (ITEMS + 1u) * (LEVELS + 1u); ++turn) {
-        bool merges = false;
-        Lists lists = Lists(0u, 0u, 0u, 0u);
-        if (climbs) {
-            climbs = step_up(codes, active_count, own_run, waiting, s, lists);
-            // Where they lie side by side and are few, nothing needs to be done.
-            merges = climbs && (s.clusters > HALF_WINDOW || lists.left + lists.left_count != lists.right || is_whole(s, active_count));
-        } else if (position < end) {
-            clusters.cluster[position] = cluster_of_primitive(input_geometries, position, area_scale);
-            s = Range(position, position, 1u, difference_before(codes, position), difference_behind(codes, position, active_count));
-            lists = Lists(position, 1u, position, 0u);
-            climbs = true;
-            merges = is_whole(s, active_count);
-            position++;
-        } else if (waiting > 0u) {
-            own_run = NONE;
-            uint last = (leaves_done ? run_firsts[run_slot(waiting)] : end) - 1u;
-            leaves_done = true;
-            waiting--;
-            uint first = run_firsts[run_slot(waiting)];
-            s = Range(first, last, run_clusters[run_slot(waiting)], difference_before(codes, first),
-                      difference_behind(codes, last, active_count));
-            climbs = true;
-        } else {
-            done = true;
-        }
-        uvec4 merging = subgroupBallot(merges);
-        uint lanes = subgroupBallotBitCount(merging);
-        for (uint k = 0; k < lanes; ++k) {
-            uint lane = subgroupBallotFindLSB(merging);
-            merging[lane >> 5] &= merging[lane >> 5] - 1u;
-            Lists of_lane = Lists(subgroupShuffle(lists.left, lane), subgroupShuffle(lists.left_count, lane),
-                                  subgroupShuffle(lists.right, lane), subgroupShuffle(lists.right_count, lane));
-            bool whole = subgroupShuffle(is_whole(s, active_count) ? 1u : 0u, lane) != 0u;
-            uint left = merge_lists(structure, w, clusters, of_lane, whole ? 1u : HALF_WINDOW, area_scale);
-            if (gl_SubgroupInvocationID == lane) {
-                s.clusters = left;
-                if (whole) climbs = false;
+        Request request = NO_REQUEST;
+        bool merges = false, done = false;
+        for (uint steps = 0; steps < (ITEMS + 1u) * (LEVELS + 1u) && !merges && !done; ++steps) {
+            if (climbs) {
+                climbs = step_up(codes, active_count, own_run, waiting, s, request);
+                // Where they lie side by side and are few, nothing needs to be done.
+                merges = climbs && (s.clusters > HALF_WINDOW || request.left + request.left_count != request.right || request.is_whole);
+            } else if (position < end) {
+                s = Range(position, position, 1u, difference_before(codes, position), difference_behind(codes, position, active_count));
+                request = Request(position, 1u, position, 0u, is_whole(s, active_count));
+                climbs = true;
+                merges = request.is_whole;
+                position++;
+            } else if (waiting > 0u) {
+                own_run = NONE;
+                uint last = (leaves_done ? run_firsts[run_slot(waiting)] : end) - 1u;
+                leaves_done = true;
+                waiting--;
+                uint first = run_firsts[run_slot(waiting)];
+                s = Range(first, last, run_clusters[run_slot(waiting)], difference_before(codes, first),
+                          difference_behind(codes, last, active_count));
+                climbs = true;
+            } else {
+                done = true;
             }
         }
-        if (!subgroupAny(!done)) break;
+        uint counts = merges ? request.left_count | request.right_count << 8 | (request.is_whole ? IS_WHOLE : 0u) : 0u;
+        uint lanes = gl_SubgroupID * lane_count();
+        requests[lanes + gl_SubgroupInvocationID] = uvec3(request.left, request.right, counts | (done ? 0u : IS_WORKING));
+        subgroup_step();
+        bool any_works = false;
+        for (uint lane = 0; lane < lane_count(); ++lane) {
+            uvec3 asked = requests[lanes + lane];
+            any_works = any_works || (asked.z & IS_WORKING) != 0u;
+            if ((asked.z & 0xFFFFu) != 0u) {
+                Request of_lane = Request(asked.x, asked.z & 0xFFu, asked.y, asked.z >> 8 & 0xFFu, (asked.z & IS_WHOLE) != 0u);
+                uint left = merge(structure, w, clusters, of_lane, area_scale);
+                if (gl_SubgroupInvocationID == lane) replies[lanes + lane] = left;
+            }
+        }
+        if (!any_works) break;
+        if (merges) s.clusters = replies[lanes + gl_SubgroupInvocationID];
+        if (merges && request.is_whole) climbs = false;
     }
 }
 #endif
