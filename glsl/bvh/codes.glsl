@@ -1,8 +1,8 @@
-// Morton codes and extended Morton codes (Vinkler, Bittner, Havran 2017): src/bvh/codes.rs explains them and is the twin.
+// Morton codes and extended Morton codes (Vinkler, Bittner, Havran 2017): src/bvh/codes explains them and is the twin.
 //
 // A code's sequence of axes has at most three stretches: bits of the longest axis alone, then two axes in turn, then three.
 // (Halving keeps the order of the extents, so whoever is next in turn stays next until a third is as long.) So a code is a
-// shift, two 2-way and three 3-way interleavings, whatever the bounds; `plan_codes` finds the stretches.
+// shift, two 2-way and three 3-way interleavings, whatever the bounds; `find_stretches` finds the stretches.
 //
 // Bit-exact on every device: coordinates are integers from the start (a float's bits, shifted), so that nothing is lost in the
 // subtraction from a far corner and an object in the middle of the scene lies in the middle of the code; what is left of float
@@ -11,54 +11,75 @@
 #define HEDGEROW_BVH_CODES
 #include "gpu/pass.glsl"
 #include "bvh/geometry.glsl"
+#include "bvh/code_axes.glsl"
+
+// What comes before the bits of the recipe: `Prefix` in src/bvh/codes/plan.rs. Kernels without have none of its code.
+layout(constant_id = 6) const uint CODE_PREFIX = 0;
+const uint PREFIX_NONE = 0;
+const uint PREFIX_SECTIONS = 1;
+const uint PREFIX_CELLS = 2;
+const uint PREFIX_SPLITS = 3;
+const bool HAS_GRID = CODE_PREFIX >= PREFIX_CELLS;
 
 const uint ORDER_REGULAR = 0;
 const uint ORDER_SORTED = 1;
 const uint ORDER_VARIABLE = 2;
 
-// What to encode: Codes in src/bvh/codes.rs, as the shaders take it.
+// Bits of the grid of binning.
+const uint BINNING_BITS = 7;
+
+// What codes are normalised by: CodeBounds in src/bvh/codes/bounds.rs.
+const uint BOUNDS_FULL = 0;
+const uint BOUNDS_CONCISE = 1;
+const uint BOUNDS_CENTROID = 2;
+const uint BOUNDS_ROBUST = 3;
+
+// What to encode: Codes in src/bvh/codes, as the shaders take it.
 struct CodeKind {
     uint order;
     uint bits;         // of the code
     uint size_group;   // coordinate bits before each bit of the size; 0: no size
-    bool concise;
+    uint bounds;
+    uint depth;        // mipping: layers of 8:1; binning: half the depth of the splits
+    uint count_bits;   // binning: bits of a count
+    uint stretch;      // binning: 1 / the weight of the stretch factor
 };
 
-// One axis of the bounds, for `fraction_of`.
-struct Axis {
-    uint exponent;    // biased, of the larger of |lo| and |hi|: the unit is 2^-62 of what it bounds
-    uint shift;       // brings the extent's leading bit to the top
-    uvec2 lo;         // the low corner
-    uvec2 inverse;    // (2^64 / extent − 1) · 2^63, rounded up, for the shifted extent; 0 for a flat axis
+// Stretch 0 is one axis alone, 1 two in turn, 2 three in turn; per axis, how many bits it has in a stretch, and at which bit of
+// the code the lowest of them lies.
+struct Stretches {
+    uvec3 bits[3];
+    uvec3 low[3];
 };
 
-// The recipe for given bounds. Stretch 0 is one axis alone, 1 two in turn, 2 three in turn; per axis, how many bits it has
-// in a stretch, and at which bit of the code the lowest of them lies.
+// Along each axis, what is beyond the core: Sections in src/bvh/codes/sections.rs.
+struct CodeSections {
+    Box fences;
+    Box core;
+    uint head;         // coordinate bits before the one of what is far; 0: the scene has one section
+    uint beyond;       // the axes along which there is something, a bit each
+    uvec3 reference;
+    uvec3 shift;
+};
+
+// The cells of a grid.
+struct CodeGrid {
+    uint axes;         // mipping: axis of each bit of the cell from the top, two bits each from the bottom
+    uvec3 bits;        // of each axis
+    uvec3 shift;       // binning: bit of the cell number at which each axis begins
+    ivec3 extents;     // of a cell, as the integers that compare and halve exactly
+};
+
+// The recipe for given bounds.
 struct CodePlan {
     Axis axes[3];
     float size_prescale;
     float size_reciprocal;
     float area_scale;
-    uvec3 bits[3];
-    uvec3 low[3];
+    Stretches stretches;
+    CodeSections sections;
+    CodeGrid grid;
 };
-
-// ---- 64-bit integers as (low, high) ----
-
-uvec2 shift_left(uvec2 v, uint s) {
-    if (s == 0) return v;
-    return s >= 32 ? uvec2(0, s >= 64 ? 0 : v.x << (s - 32)) : uvec2(v.x << s, v.y << s | v.x >> (32 - s));
-}
-
-uvec2 shift_right(uvec2 v, uint s) {
-    if (s == 0) return v;
-    return s >= 32 ? uvec2(s >= 64 ? 0 : v.y >> (s - 32), 0) : uvec2(v.x >> s | v.y << (32 - s), v.y >> s);
-}
-
-// `count` bits of `v` from bit `from` below the top, at the bottom.
-uvec2 bits_of(uvec2 v, uint from, uint count) {
-    return shift_right(shift_left(v, from), 64 - count);
-}
 
 // ---- exact arithmetic ----
 
@@ -107,99 +128,11 @@ uint integer_root(uint x) {
     return root;
 }
 
-// ---- coordinates as 64-bit fractions of the extent ----
-
-uvec2 add(uvec2 a, uvec2 b) {
-    uint carry;
-    uint low = uaddCarry(a.x, b.x, carry);
-    return uvec2(low, a.y + b.y + carry);
-}
-
-uvec2 subtract(uvec2 a, uvec2 b) {
-    uint borrow;
-    uint low = usubBorrow(a.x, b.x, borrow);
-    return uvec2(low, a.y - b.y - borrow);
-}
-
-bool is_below(uvec2 a, uvec2 b) {
-    return a.y != b.y ? a.y < b.y : a.x < b.x;
-}
-
-// A float in units of 2^-62 of the axis' magnitude, two's complement; what is smaller than a unit is cut off.
-uvec2 fixed_point(float v, uint exponent) {
-    uint bits = floatBitsToUint(v);
-    uint own = bits >> 23 & 0xFFu;
-    uint mantissa = own == 0 ? 0 : bits & 0x7FFFFFu | 0x800000u;
-    int shift = int(own) - int(exponent) + 38;   // at most 38
-    uint right = uint(clamp(-shift, 0, 31)), left = uint(clamp(shift, 0, 31)), over = uint(clamp(shift - 32, 0, 31));
-    uint low = shift >= 32 ? 0 : mantissa >> right << left;
-    // The bits that leave the low word; in two steps, as a shift by 32 is undefined.
-    uint high = shift >= 32 ? mantissa << over : shift <= 0 ? 0 : mantissa >> 1 >> (31 - left);
-    uvec2 magnitude = uvec2(low, high);
-    return (bits & 0x80000000u) != 0 ? subtract(uvec2(0), magnitude) : magnitude;
-}
-
-// (a · b) >> 63 for a · b < 2^127.
-uvec2 multiply_shift_63(uvec2 a, uvec2 b) {
-    uint high00, low00, high01, low01, high10, low10, high11, low11, carry;
-    umulExtended(a.x, b.x, high00, low00);
-    umulExtended(a.x, b.y, high01, low01);
-    umulExtended(a.y, b.x, high10, low10);
-    umulExtended(a.y, b.y, high11, low11);
-    // Words 1, 2, 3 of the product.
-    uint word1 = uaddCarry(high00, low01, carry);
-    uint carries = carry;
-    word1 = uaddCarry(word1, low10, carry);
-    carries += carry;
-    uvec2 words = add(add(uvec2(low11, high11), uvec2(high01, 0)), add(uvec2(high10, 0), uvec2(carries, 0)));
-    return uvec2(words.x << 1 | word1 >> 31, words.y << 1 | words.x >> 31);
-}
-
-Axis axis_of(float lo, float hi) {
-    Axis axis;
-    axis.exponent = max(floatBitsToUint(lo) >> 23 & 0xFFu, floatBitsToUint(hi) >> 23 & 0xFFu);
-    axis.lo = fixed_point(lo, axis.exponent);
-    axis.inverse = uvec2(0);
-    axis.shift = 0;
-    uvec2 extent = subtract(fixed_point(hi, axis.exponent), axis.lo);
-    if (extent == uvec2(0)) return axis;
-    axis.shift = uint(extent.y != 0 ? 31 - findMSB(extent.y) : 63 - findMSB(extent.x));
-    extent = shift_left(extent, axis.shift);
-    // Long division of (2^64 − extent) · 2^63 by the extent.
-    uvec2 remainder = subtract(uvec2(0), extent);
-    uvec2 quotient = uvec2(0);
-    if (!is_below(remainder, extent)) {
-        remainder = subtract(remainder, extent);
-        quotient.x = 1;
-    }
-    for (int i = 0; i < 63; ++i) {
-        bool overflows = (remainder.y & 0x80000000u) != 0;
-        remainder = shift_left(remainder, 1);
-        quotient = shift_left(quotient, 1);
-        if (overflows || !is_below(remainder, extent)) {
-            remainder = subtract(remainder, extent);
-            quotient.x |= 1;
-        }
-    }
-    if (remainder != uvec2(0)) quotient = add(quotient, uvec2(1, 0));
-    axis.inverse = quotient;
-    return axis;
-}
-
-// Where `v` lies between the corners, as a 64-bit fraction.
-uvec2 fraction_of(float v, Axis axis) {
-    uvec2 at = fixed_point(v, axis.exponent);
-    uvec2 distance = subtract(at, axis.lo);
-    if ((distance.y & 0x80000000u) != 0) distance = uvec2(0);   // rounded to below the corner
-    distance = shift_left(distance, axis.shift);
-    uvec2 fraction = add(distance, multiply_shift_63(distance, axis.inverse));
-    return is_below(fraction, distance) ? uvec2(0xFFFFFFFFu) : fraction;   // the high corner itself
-}
-
 // ---- the plan ----
 
-Box code_bounds(Box boxes, Box centroids, bool concise) {
-    if (!concise) return boxes;
+Box code_bounds(Box boxes, Box centroids, uint bounds) {
+    if (bounds == BOUNDS_CENTROID) return centroids;
+    if (bounds != BOUNDS_CONCISE) return boxes;
     // Riemersma 2024, equation 15.
     precise vec3 difference = max(min(centroids.lo - boxes.lo, boxes.hi - centroids.hi), vec3(0));
     precise vec3 lo = boxes.lo + difference;
@@ -227,6 +160,40 @@ uint coordinate_bits(CodeKind kind) {
     return kind.size_group == 0 ? kind.bits : kind.bits - kind.bits / (kind.size_group + 1);
 }
 
+// Extents as integers: halving is taking one from the exponent; of what is flat there is room for a code's bits below the others.
+ivec3 extents_of(Box bounds) {
+    precise vec3 half_extent = 0.5 * bounds.hi - 0.5 * bounds.lo;
+    return mix(ivec3(-0x40000000), floatBitsToInt(half_extent), greaterThan(half_extent, vec3(0)));
+}
+
+// The axes, longest first; x before y before z where equal.
+uvec3 sorted_axes(ivec3 extents) {
+    uint first = longest_axis(extents);
+    extents[first] = -0x7FFFFFFF;
+    uint second = longest_axis(extents);
+    return uvec3(first, second, 3 - first - second);
+}
+
+// The stretches of `total` coordinate bits.
+Stretches find_stretches(uint order, ivec3 extents, uint total) {
+    Stretches found;
+    for (uint stretch = 0; stretch < 3; ++stretch) {
+        found.bits[stretch] = uvec3(0);
+        found.low[stretch] = uvec3(0);
+    }
+    uvec3 sorted = order == ORDER_SORTED ? sorted_axes(extents) : uvec3(0, 1, 2);
+    uint seen = 0;   // axes so far, a bit each
+    for (uint taken = 0; taken < total; ++taken) {
+        uint axis = order == ORDER_VARIABLE ? longest_axis(extents) : sorted[taken % 3];
+        extents[axis] -= 1 << 23;
+        seen |= 1 << axis;
+        uint stretch = order == ORDER_VARIABLE ? bitCount(seen) - 1 : 2;
+        found.bits[stretch][axis] += 1;
+        found.low[stretch][axis] = total - 1 - taken;
+    }
+    return found;
+}
+
 CodePlan plan_codes(CodeKind kind, Box bounds, Box scene) {
     CodePlan plan;
     for (uint axis = 0; axis < 3; ++axis) plan.axes[axis] = axis_of(bounds.lo[axis], bounds.hi[axis]);
@@ -236,33 +203,24 @@ CodePlan plan_codes(CodeKind kind, Box bounds, Box scene) {
     precise float diagonal2 = e.x * e.x + e.y * e.y + e.z * e.z;
     plan.size_reciprocal = reciprocal_or_zero(diagonal2);
     plan.area_scale = area_scale_of(scene);
-
-    // Extents as integers: halving is taking one from the exponent.
-    precise vec3 half_extent = 0.5 * bounds.hi - 0.5 * bounds.lo;
-    ivec3 keys = mix(ivec3(-0x7F000000), floatBitsToInt(half_extent), greaterThan(half_extent, vec3(0)));
-    for (uint stretch = 0; stretch < 3; ++stretch) {
-        plan.bits[stretch] = uvec3(0);
-        plan.low[stretch] = uvec3(0);
+    ivec3 extents = extents_of(bounds);
+    if (HAS_GRID) {
+        plan.grid.bits = uvec3(0);
+        plan.grid.axes = 0;
+        uvec3 sorted = sorted_axes(extents);
+        uint grid_bits = CODE_PREFIX == PREFIX_CELLS ? 3 * kind.depth : BINNING_BITS;
+        for (uint bit = 0; bit < grid_bits; ++bit) {
+            uint axis = longest_axis(extents);
+            extents[axis] -= 1 << 23;
+            plan.grid.bits[axis] += 1;
+            plan.grid.axes |= axis << 2 * bit;
+        }
+        plan.grid.shift[sorted.x] = 0;
+        plan.grid.shift[sorted.y] = plan.grid.bits[sorted.x];
+        plan.grid.shift[sorted.z] = plan.grid.bits[sorted.x] + plan.grid.bits[sorted.y];
+        plan.grid.extents = extents;
     }
-    uint sorted[3] = uint[3](0, 1, 2);
-    if (kind.order == ORDER_SORTED) {
-        // Longest first, x before y before z where equal.
-        uint first = longest_axis(keys);
-        ivec3 others = keys;
-        others[first] = -0x7FFFFFFF;
-        uint second = longest_axis(others);
-        sorted = uint[3](first, second, 3 - first - second);
-    }
-    uint total = coordinate_bits(kind);
-    uint seen = 0;   // axes so far, a bit each
-    for (uint taken = 0; taken < total; ++taken) {
-        uint axis = kind.order == ORDER_VARIABLE ? longest_axis(keys) : sorted[taken % 3];
-        keys[axis] -= 1 << 23;
-        seen |= 1 << axis;
-        uint stretch = kind.order == ORDER_VARIABLE ? bitCount(seen) - 1 : 2;
-        plan.bits[stretch][axis] += 1;
-        plan.low[stretch][axis] = total - 1 - taken;
-    }
+    plan.stretches = find_stretches(kind.order, extents, coordinate_bits(kind));
     return plan;
 }
 
@@ -284,16 +242,15 @@ uint spread_by_3(uint x) {
     return (x | x << 2) & 0x49249249u;
 }
 
-// The code bits of one axis.
-uvec2 axis_bits(CodePlan plan, uint axis, float centroid_coordinate) {
-    uvec2 q = fraction_of(centroid_coordinate, plan.axes[axis]);
-    uint alone = plan.bits[0][axis], paired = plan.bits[1][axis], tripled = plan.bits[2][axis];
+// The code bits of one axis with coordinate q.
+uvec2 axis_bits(Stretches s, uint axis, uvec2 q) {
+    uint alone = s.bits[0][axis], paired = s.bits[1][axis], tripled = s.bits[2][axis];
     uint three = bits_of(q, alone + paired, tripled).x;
-    uvec2 code = shift_left(uvec2(spread_by_3(three & 0x7FFu), spread_by_3(three >> 11) << 1), plan.low[2][axis]);
+    uvec2 code = shift_left(uvec2(spread_by_3(three & 0x7FFu), spread_by_3(three >> 11) << 1), s.low[2][axis]);
     if (alone + paired > 0) {
         uint two = bits_of(q, alone, paired).x;
-        code |= shift_left(uvec2(spread_by_2(two & 0xFFFFu), spread_by_2(two >> 16)), plan.low[1][axis]);
-        code |= shift_left(bits_of(q, 0, alone), plan.low[0][axis]);
+        code |= shift_left(uvec2(spread_by_2(two & 0xFFFFu), spread_by_2(two >> 16)), s.low[1][axis]);
+        code |= shift_left(bits_of(q, 0, alone), s.low[0][axis]);
     }
     return code;
 }
@@ -337,12 +294,11 @@ uint bits_of(uint v, uint from, uint count) {
     return count == 0 ? 0 : v << from >> (32 - count);
 }
 
-uint narrow_axis_bits(CodePlan plan, uint axis, float centroid_coordinate) {
-    uint q = fraction_of(centroid_coordinate, plan.axes[axis]).y;
-    uint alone = plan.bits[0][axis], paired = plan.bits[1][axis], tripled = plan.bits[2][axis];
-    uint code = spread_by_3(bits_of(q, alone + paired, tripled)) << plan.low[2][axis];
-    code |= spread_by_2(bits_of(q, alone, paired)) << plan.low[1][axis];
-    return code | bits_of(q, 0, alone) << plan.low[0][axis];
+uint narrow_axis_bits(Stretches s, uint axis, uint q) {
+    uint alone = s.bits[0][axis], paired = s.bits[1][axis], tripled = s.bits[2][axis];
+    uint code = spread_by_3(bits_of(q, alone + paired, tripled)) << s.low[2][axis];
+    code |= spread_by_2(bits_of(q, alone, paired)) << s.low[1][axis];
+    return code | bits_of(q, 0, alone) << s.low[0][axis];
 }
 
 uint narrow_with_size(CodeKind kind, uint coordinates, uint size) {
@@ -358,19 +314,40 @@ uint narrow_with_size(CodeKind kind, uint coordinates, uint size) {
     return code;
 }
 
-uint narrow_encode(CodeKind kind, CodePlan plan, Box b) {
+// ---- a primitive's code ----
+
+// What a code is made of.
+struct CodeParts {
+    uvec2 coordinates[3];
+    Stretches stretches;
+    uint size;
+    uint prefix;
+    uint prefix_bits;
+    uint section;
+};
+
+// The parts of a code without a prefix.
+CodeParts plain_parts(CodeKind kind, CodePlan plan, Box b) {
     vec3 at = centroid_of(b);
-    uint code = narrow_axis_bits(plan, 0, at.x) | narrow_axis_bits(plan, 1, at.y)
-              | narrow_axis_bits(plan, 2, at.z);
-    if (kind.size_group != 0) code = narrow_with_size(kind, code, size_of(plan, b));
-    return min(code, inactive_code(kind).x - 1);
+    CodeParts parts;
+    for (uint axis = 0; axis < 3; ++axis) parts.coordinates[axis] = fraction_of(at[axis], plan.axes[axis]);
+    parts.stretches = plan.stretches;
+    parts.size = kind.size_group != 0 ? size_of(plan, b) : 0;
+    parts.prefix = 0;
+    parts.prefix_bits = 0;
+    parts.section = 0;
+    return parts;
 }
 
-uvec2 wide_encode(CodeKind kind, CodePlan plan, Box b) {
-    vec3 at = centroid_of(b);
-    uvec2 code = axis_bits(plan, 0, at.x) | axis_bits(plan, 1, at.y) | axis_bits(plan, 2, at.z);
-    if (kind.size_group != 0) code = with_size(kind, code, size_of(plan, b));
-    if (code == inactive_code(kind)) code.x -= 1;
-    return code;
+uint narrow_body(CodeKind kind, CodeParts parts) {
+    uint code = 0;
+    for (uint axis = 0; axis < 3; ++axis) code |= narrow_axis_bits(parts.stretches, axis, parts.coordinates[axis].y);
+    return kind.size_group != 0 ? narrow_with_size(kind, code, parts.size) : code;
+}
+
+uvec2 wide_body(CodeKind kind, CodeParts parts) {
+    uvec2 code = uvec2(0);
+    for (uint axis = 0; axis < 3; ++axis) code |= axis_bits(parts.stretches, axis, parts.coordinates[axis]);
+    return kind.size_group != 0 ? with_size(kind, code, parts.size) : code;
 }
 #endif

@@ -17,7 +17,7 @@
 #define HEDGEROW_BVH_COLLAPSE
 #include "bvh/weights.glsl"
 
-layout(constant_id = 8) const uint TREELET = 16;
+layout(constant_id = 9) const uint TREELET = 16;
 
 uint node_count() {
     return max(BuildState(state_address).active_count, 1u) - 1u;

@@ -5,73 +5,29 @@
 //   reset      writes state: empty bounds, the pool
 //   bounds     reads the primitives                    writes state: bounds, active_count, status
 //   plan       reads state: bounds                     writes state: plan; the structure's header and table of geometries
-//   encode     reads the primitives, plan              writes keys[0], ends (none); values[0] where nothing is sorted
+//   (cells     reads the primitives, plan              writes table: the cells of a grid, in codes that have one
+//   prefixes   reads table                             writes table: what the cells say)
+//   encode     reads the primitives, plan, table             writes keys[0], ends (none); values[0] where nothing is sorted
 //   (sort      reads keys[0]                           writes keys[result], values[result]: gpu/radix_sort.glsl)
 //
 // needs one barrier between each two, and before the first; subgroups of any size; workgroups of whole subgroups
 #ifndef HEDGEROW_BVH_ENCODE
 #define HEDGEROW_BVH_ENCODE
-#include "gpu/pass.glsl"
-#include "gpu/task_pool.glsl"
-#include "gpu/radix_sort.glsl"
-#include "bvh/layout.glsl"
+#include "bvh/build_state.glsl"
 #include "bvh/empty.glsl"
-#include "bvh/primitives.glsl"
-#include "bvh/codes.glsl"
 #include "bvh/sah.glsl"
-
-// Items of an invocation in a task.
-layout(constant_id = 1) const uint ITEMS = 1;
-
-const uint NONE = 0xFFFFFFFFu;
+#include "bvh/code_sections.glsl"
+#include "bvh/code_mipping.glsl"
+#include "bvh/code_binning.glsl"
 
 // The order of the phases in the pool; the radix sort's three steps a pass and those of the hierarchy follow.
 const uint PHASE_BOUNDS = 0;
 const uint PHASE_PLAN = 1;
-const uint PHASE_ENCODE = 2;
-const uint PHASES_BEFORE_SORT = 3;
+const uint PHASE_CELLS = HAS_GRID ? 2 : NONE;
+const uint PHASE_SPLITS = HAS_GRID ? 3 : NONE;
+const uint PHASE_ENCODE = HAS_GRID ? 4 : 2;
+const uint PHASES_BEFORE_SORT = HAS_GRID ? 5 : 3;
 const uint PHASES_OF_A_PASS = 3;
-
-BUFFER BuildState {
-    uint pool[4 + POOL_PHASES_AT_MOST];   // a PoolState
-    uint boxes_lo[3];                     // `ordered` floats
-    uint boxes_hi[3];
-    uint centroids_lo[3];
-    uint centroids_hi[3];
-    uint active_count;
-    uint status;
-    CodePlan plan;
-    uint cluster_counts[2];               // of PLOC: of even and odd rounds
-    uint is_forced[2];
-};
-
-// What a build is given: the push constants, or variables that the shader sets first. `vertices` to `transform` with
-// `vertex_stride` to `formats` are a Geometry; `code_kind` is order, bits << 8, size group << 16, concise << 24, collapse << 25,
-// build flags << 26;
-// `columns` to `passes` are of the radix sort.
-#define BUILD_ARGUMENTS                                                                                        \
-    uvec2 vertices; uvec2 indices; uvec2 transform; uvec2 structure_address; uvec2 state_address;             \
-    uvec2 keys[2]; uvec2 values[2]; uvec2 ends_address; uvec2 table_address;                                  \
-    uint vertex_stride; uint vertex_count; uint formats; uint primitive_count; uint code_kind;                \
-    float c_t; float c_i;                                                                                     \
-    uint columns; uint column_keys; uint passes;
-#ifdef HEDGEROW_BUILD_ARGUMENTS_ARE_SET
-BUILD_ARGUMENTS
-#else
-layout(push_constant, scalar) uniform Arguments { BUILD_ARGUMENTS };
-#endif
-
-Geometry geometries() {
-    return Geometry(vertices, indices, transform, vertex_stride, vertex_count, formats, 0);
-}
-
-CodeKind kind_of_codes() {
-    return CodeKind(code_kind & 0xFFu, code_kind >> 8 & 0xFFu, code_kind >> 16 & 0xFFu, (code_kind >> 24 & 1) != 0);
-}
-
-bool collapses() {
-    return (code_kind >> 25 & 1) != 0;
-}
 
 // Phases of the pool before the first of the hierarchy.
 uint phases_before_hierarchy() {
@@ -97,7 +53,7 @@ void reset_build(uint phases_behind) {
         if (word == 3) value = phases;
         if (word >= 4 && phase < phases) {
             uint step = (phase - PHASES_BEFORE_SORT) % PHASES_OF_A_PASS;
-            if (phase == PHASE_PLAN) value = 1;
+            if (phase == PHASE_PLAN || phase == PHASE_SPLITS) value = 1;
             else if (phase < PHASES_BEFORE_SORT || phase >= sorted) value = tiles;
             else value = step == 1 ? scan_tasks : column_tasks;
         }
@@ -108,6 +64,10 @@ void reset_build(uint phases_behind) {
         state.boxes_hi[axis] = 0;
         state.centroids_lo[axis] = NONE;
         state.centroids_hi[axis] = 0;
+    }
+    if (HAS_GRID) {
+        Words cells = Words(table_address);
+        for (uint word = i; word < CELL_WORDS; word += gl_WorkGroupSize.x) cells.word[word] = 0;
     }
     if (i == 0) {
         state.active_count = 0;
@@ -176,6 +136,7 @@ uint write_geometries(Geometry g, uint count, uint node_slots) {
 }
 
 void make_plan() {
+    if (HAS_SECTIONS) find_sections();
     if (gl_LocalInvocationIndex != 0) return;
     BuildState state = BuildState(state_address);
     Structure structure = Structure(structure_address);
@@ -201,17 +162,49 @@ void make_plan() {
     for (uint i = 0; i < 9; ++i) structure.header.reserved[i] = 0;
     if (primitive_count < 2) mark_unused(structure, 0);
     if (state.active_count == 0) return;
-    Box boxes = Box(from_ordered(uvec3(state.boxes_lo[0], state.boxes_lo[1], state.boxes_lo[2])),
-                    from_ordered(uvec3(state.boxes_hi[0], state.boxes_hi[1], state.boxes_hi[2])));
+    Box boxes = bounds_of_boxes(state);
     Box centroids = Box(from_ordered(uvec3(state.centroids_lo[0], state.centroids_lo[1], state.centroids_lo[2])),
                         from_ordered(uvec3(state.centroids_hi[0], state.centroids_hi[1], state.centroids_hi[2])));
     CodeKind kind = kind_of_codes();
-    state.plan = plan_codes(kind, code_bounds(boxes, centroids, kind.concise), boxes);
+    Box bounds = code_bounds(boxes, centroids, kind.bounds);
+    if (HAS_SECTIONS && state.plan.sections.head != 0) bounds = state.plan.sections.core;
+    CodePlan plan = plan_codes(kind, bounds, boxes);
+    if (HAS_SECTIONS) {
+        plan.sections = state.plan.sections;
+        if (plan.sections.head != 0) plan.sections.head = head_of(plan.stretches);
+    }
+    state.plan = plan;
     structure.header.area_scale = state.plan.area_scale;
     structure.header.built_area = scaled_half_area(boxes, state.plan.area_scale);
 }
 
+// ---- what the cells of a grid say; one workgroup ----
+
+void find_prefixes() {
+    if (CODE_PREFIX == PREFIX_CELLS) find_layers();
+    else find_splits();
+}
+
 // ---- encode ----
+
+CodeParts parts_of(CodeKind kind, CodePlan plan, Box b) {
+    if (CODE_PREFIX == PREFIX_SECTIONS) return section_parts(kind, plan, b);
+    if (CODE_PREFIX == PREFIX_CELLS) return mip_parts(kind, plan, b);
+    if (CODE_PREFIX == PREFIX_SPLITS) return bin_parts(kind, plan, b);
+    return plain_parts(kind, plan, b);
+}
+
+// The code of a primitive: not that of those that are left out.
+uvec2 code_of(CodeKind kind, CodePlan plan, Box b) {
+    CodeParts parts = parts_of(kind, plan, b);
+    uvec2 code = KEY_WORDS == 1 ? uvec2(narrow_body(kind, parts), 0) : wide_body(kind, parts);
+    if (HAS_SECTIONS) code = with_section(kind, plan, parts, code);
+    if (HAS_GRID && parts.prefix_bits != 0) {
+        code = shift_right(code, parts.prefix_bits) | shift_left(uvec2(parts.prefix, 0), kind.bits - parts.prefix_bits);
+    }
+    if (code == inactive_code(kind)) code.x -= 1;
+    return code;
+}
 
 void encode(uint task) {
     BuildState state = BuildState(state_address);
@@ -226,10 +219,10 @@ void encode(uint task) {
         if (primitive < primitive_count) {
             Box b;
             bool is_active = load_box(input_geometries, primitive, b) == 0;
+            uvec2 code = is_active ? code_of(kind, plan, b) : inactive_code(kind);
             if (KEY_WORDS == 1) {
-                codes.word[primitive] = is_active ? narrow_encode(kind, plan, b) : inactive_code(kind).x;
+                codes.word[primitive] = code.x;
             } else {
-                uvec2 code = is_active ? wide_encode(kind, plan, b) : inactive_code(kind);
                 codes.word[2 * primitive] = code.x;
                 codes.word[2 * primitive + 1] = code.y;
             }
@@ -255,6 +248,10 @@ void encode_from_pool(uint phase, uint task) {
         find_bounds(task);
     } else if (phase == PHASE_PLAN) {
         make_plan();
+    } else if (HAS_GRID && phase == PHASE_CELLS) {
+        count_cells(task);
+    } else if (HAS_GRID && phase == PHASE_SPLITS) {
+        find_prefixes();
     } else if (phase == PHASE_ENCODE) {
         encode(task);
     } else {

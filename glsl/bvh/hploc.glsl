@@ -15,8 +15,8 @@
 #include "bvh/clusters.glsl"
 #include "bvh/radix_tree.glsl"
 
-layout(constant_id = 6) const uint WINDOW = 32;
-layout(constant_id = 7) const uint RADIUS = 8;
+layout(constant_id = 7) const uint WINDOW = 32;
+layout(constant_id = 8) const uint RADIUS = 8;
 const uint HALF_WINDOW = WINDOW / 2;
 // Levels of a radix tree: a code bit or a position bit each.
 const uint LEVELS = 64 + 27;

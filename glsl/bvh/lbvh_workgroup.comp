@@ -29,12 +29,6 @@ layout(push_constant, scalar) uniform Arguments {
     uint state_bytes;
 } given;
 
-// What one phase has written to memory, the next reads.
-void next_phase() {
-    controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
-                   gl_SemanticsAcquireRelease | gl_SemanticsMakeAvailable | gl_SemanticsMakeVisible);
-}
-
 // The next part of the scratch memory, as `Lbvh::scratch` lays it out.
 uvec2 take(inout uvec2 at, uint bytes) {
     uvec2 begin = at;
@@ -79,6 +73,15 @@ void main() {
     next_phase();
     make_plan();
     next_phase();
+    if (HAS_GRID) {
+        for (uint task = 0; task < tiles; ++task) {
+            count_cells(task);
+            barrier();   // the task's use of shared memory is over
+        }
+        next_phase();
+        find_prefixes();
+        next_phase();
+    }
     for (uint task = 0; task < tiles; ++task) encode(task);
     next_phase();
     for (uint pass = 0; pass < passes; ++pass) {

@@ -17,7 +17,7 @@
 #define HEDGEROW_BVH_PLOC
 #include "bvh/clusters.glsl"
 
-layout(constant_id = 6) const uint RADIUS = 16;
+layout(constant_id = 7) const uint RADIUS = 16;
 // Of a round's clusters, one in so many falls away, or the next round is forced.
 const uint SLOW = 16;
 const uint CACHED = PRIVATE_COUNTERS ? 1u : gl_WorkGroupSize.x + 2u * RADIUS;
@@ -225,12 +225,6 @@ void ploc_merge(uint task, uint round) {
 }
 
 // ---- finish ----
-
-// What one phase has written to memory, the next reads.
-void next_phase() {
-    controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
-                   gl_SemanticsAcquireRelease | gl_SemanticsMakeAvailable | gl_SemanticsMakeVisible);
-}
 
 // `round` is the first that is not done yet.
 void ploc_finish(uint round) {

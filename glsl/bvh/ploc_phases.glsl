@@ -4,7 +4,7 @@
 #include "bvh/encode.glsl"
 
 // Rounds that are recorded: src/bvh/ploc.rs.
-layout(constant_id = 7) const uint ROUNDS = 0;
+layout(constant_id = 8) const uint ROUNDS = 0;
 const uint PHASES_OF_A_ROUND = 4;
 const uint PHASES_BEHIND_SORT = 1 + PHASES_OF_A_ROUND * ROUNDS + 3;
 

@@ -3,7 +3,7 @@
 #include "bvh/ploc.glsl"
 
 // The round's, even or odd.
-layout(constant_id = 7) const uint ROUND = 0;
+layout(constant_id = 8) const uint ROUND = 0;
 
 void main() {
     ploc_scan(ROUND);

@@ -90,13 +90,15 @@ impl Encode {
         }
     }
 
-    /// Words of the sort's table. One workgroup on a CPU gives each of its lanes a strip.
+    /// Words of the sort's table, in which the codes' prefixes lie before the sort. One workgroup on a CPU gives each of its
+    /// lanes a strip.
     pub fn table_words(&self) -> u64 {
-        if self.alone && self.shape.private_counters {
+        let sort = if self.alone && self.shape.private_counters {
             (1 << self.shape.digit_bits) * u64::from(self.shape.workgroup + 1)
         } else {
             self.shape.table_words(self.count)
-        }
+        };
+        sort.max(self.codes.prefix_words())
     }
 
     pub fn passes(&self) -> u32 {
@@ -117,24 +119,30 @@ impl Encode {
         self.reading_kernel_with(shader, input, &[])
     }
 
-    /// The same with specialisation constants from 6 on.
+    /// The same with specialisation constants from 7 on.
     pub fn reading_kernel_with(&self, shader: &'static shaders::Shader, input: &Input, more: &[u32]) -> Kernel {
         let constants = self.shape.constants(self.items, self.key_words());
-        let source = [input.source_constant(self.primitives)];
+        let source = [input.source_constant(self.primitives), self.codes.prefix_number()];
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source, more].concat())
+    }
+
+    /// The kernel of a `reset` shader.
+    pub fn reset_kernel(&self, shader: &'static shaders::Shader) -> Kernel {
+        let constants = self.shape.constants(self.items, self.key_words());
+        Kernel::new(shader, self.shape.workgroup, &[&constants[..], &[0, self.codes.prefix_number()]].concat())
     }
 
     /// The kernels of [`Encode::steps`].
     pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
-        let plain = [
-            &shaders::BVH_ENCODE_RESET,
-            &shaders::GPU_RADIX_SORT_COUNT,
-            &shaders::GPU_RADIX_SORT_SCAN,
-            &shaders::GPU_RADIX_SORT_SCATTER,
-        ];
-        let reading = [&shaders::BVH_ENCODE_BOUNDS, &shaders::BVH_ENCODE_PLAN, &shaders::BVH_ENCODE_CODES];
-        let plain = plain.map(|shader| self.kernel(shader));
-        plain.into_iter().chain(reading.map(|shader| self.reading_kernel(shader, input))).collect()
+        let sort = [&shaders::GPU_RADIX_SORT_COUNT, &shaders::GPU_RADIX_SORT_SCAN, &shaders::GPU_RADIX_SORT_SCATTER];
+        let mut reading = vec![&shaders::BVH_ENCODE_BOUNDS, &shaders::BVH_ENCODE_PLAN, &shaders::BVH_ENCODE_CODES];
+        if self.codes.has_grid() {
+            reading.extend([&shaders::BVH_ENCODE_CELLS, &shaders::BVH_ENCODE_PREFIXES]);
+        }
+        let mut kernels = vec![self.reset_kernel(&shaders::BVH_ENCODE_RESET)];
+        kernels.extend(sort.map(|shader| self.kernel(shader)));
+        kernels.extend(reading.into_iter().map(|shader| self.reading_kernel(shader, input)));
+        kernels
     }
 
     /// The input's geometry as the kernels are given it, and its formats.
@@ -147,13 +155,7 @@ impl Encode {
 
     /// `code_kind` in encode.glsl.
     pub fn code_kind(&self) -> u32 {
-        let code = self.codes.code;
-        code.order_number()
-            | self.codes.bits << 8
-            | code.size_group() << 16
-            | u32::from(self.codes.concise) << 24
-            | u32::from(self.collapse.enabled) << 25
-            | self.build_flags << 26
+        self.codes.kind_word() | u32::from(self.collapse.enabled) << 25 | self.build_flags << 26
     }
 
     /// What the kernels are given, with scratch memory at address `scratch`.
@@ -183,18 +185,22 @@ impl Encode {
         })
     }
 
-    /// The dispatches up to the sort; what follows needs a barrier before. Labels: `bounds`, `encode`, `sort`.
+    /// The dispatches up to the sort; what follows needs a barrier before. Labels: `bounds`, `encode`, `sort`, and for
+    /// codes with a grid `cells`.
     pub fn steps(&self, input: &Input, arguments: &Arguments) -> Vec<Step> {
-        let plain = |phase, shader, groups| Step::new(phase, self.kernel(shader), arguments, groups);
         let reading = |phase, shader, groups| Step::new(phase, self.reading_kernel(shader, input), arguments, groups);
         let sort = radix_sort::Sort { count: self.count, bits: self.codes.bits, identity: true };
         let buffers = radix_sort::Buffers { keys: arguments.keys, values: arguments.values, table: arguments.table };
         let mut steps = vec![
-            plain("bounds", &shaders::BVH_ENCODE_RESET, 1),
+            Step::new("bounds", self.reset_kernel(&shaders::BVH_ENCODE_RESET), arguments, 1),
             reading("bounds", &shaders::BVH_ENCODE_BOUNDS, self.tiles()),
             reading("encode", &shaders::BVH_ENCODE_PLAN, 1),
-            reading("encode", &shaders::BVH_ENCODE_CODES, self.tiles()),
         ];
+        if self.codes.has_grid() {
+            steps.push(reading("cells", &shaders::BVH_ENCODE_CELLS, self.tiles()));
+            steps.push(reading("cells", &shaders::BVH_ENCODE_PREFIXES, 1));
+        }
+        steps.push(reading("encode", &shaders::BVH_ENCODE_CODES, self.tiles()));
         steps.extend(radix_sort::steps(&self.shape, &buffers, &sort));
         steps
     }

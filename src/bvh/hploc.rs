@@ -29,7 +29,7 @@ pub(super) fn steps(encode: &Encode, window: &Window, input: &Input, arguments: 
 
 /// The kernels of [`persistent_steps`].
 pub(super) fn persistent_kernels(encode: &Encode, window: &Window, input: &Input) -> Vec<Kernel> {
-    vec![encode.kernel(&shaders::BVH_HPLOC_RESET), kernel(encode, window, &shaders::BVH_HPLOC_PERSISTENT, input)]
+    vec![encode.reset_kernel(&shaders::BVH_HPLOC_RESET), kernel(encode, window, &shaders::BVH_HPLOC_PERSISTENT, input)]
 }
 
 /// The whole build by `workers` workgroups of one dispatch. Label: `build`.

@@ -19,7 +19,7 @@ pub(super) fn steps(encode: &Encode, input: &Input, arguments: &Arguments) -> Ve
 
 /// The kernels of [`persistent_steps`].
 pub(super) fn persistent_kernels(encode: &Encode, input: &Input) -> Vec<Kernel> {
-    vec![encode.kernel(&shaders::BVH_LBVH_RESET), encode.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input)]
+    vec![encode.reset_kernel(&shaders::BVH_LBVH_RESET), encode.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input)]
 }
 
 /// The whole build by `workers` workgroups of one dispatch. Label: `build`.

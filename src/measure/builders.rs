@@ -62,7 +62,8 @@ pub enum Needs {
 
 const CODES: BuilderOption = BuilderOption {
     key: "codes",
-    values: "mc30, mc63, emc64sort, emc64var or emc64var-nosize, with +concise or /BITS behind",
+    values: "mc30, mc63, emc64sort, emc64var, emc64var-nosize, mip6, mip9, mip12 or binQaA (Q 2, 4 or 6, A 0 to 9; ~N behind: the \
+             stretch factor weighs 1/N), with +concise, +centroid, +robust or /BITS behind",
 };
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
 const TERMINATION: BuilderOption =

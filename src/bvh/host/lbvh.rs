@@ -4,7 +4,7 @@
 //! that splits between positions i and i + 1 has slot i in both.
 
 use super::geometry::{self, Corners};
-use crate::bvh::codes::{Codes, Plan, code_bounds};
+use crate::bvh::codes::{Codes, Plan};
 use crate::bvh::layout::status;
 use crate::bvh::layout::{
     Aabb, BoxRecord, Bvh2, Child, GeometryEntry, Header, MAGIC, Node, Record, Triangle, UNUSED, node_slots,
@@ -62,12 +62,10 @@ pub fn build_boxes<R: Record>(
         ..bytemuck::Zeroable::zeroed()
     };
     let active = || boxes.iter().flatten();
-    let (bounds, centroids) = active().fold((Aabb::EMPTY, Aabb::EMPTY), |(bounds, centroids), b| {
-        (bounds.union(b), centroids.union(&Aabb { lo: b.centroid(), hi: b.centroid() }))
-    });
+    let bounds = active().fold(Aabb::EMPTY, |bounds, b| bounds.union(b));
     header.active = active().count() as u32;
 
-    let plan = Plan::new(codes, &code_bounds(&bounds, &centroids, codes.concise));
+    let plan = Plan::new(codes, boxes);
     let mut order: Vec<(u64, u32)> =
         (0..count).map(|i| (boxes[i as usize].map_or(plan.inactive(), |b| plan.encode(&b)), i)).collect();
     order.sort_unstable();

@@ -1,0 +1,67 @@
+// What the phases of a build share: the state, the arguments, and the barrier between phases of one workgroup.
+#ifndef HEDGEROW_BVH_BUILD_STATE
+#define HEDGEROW_BVH_BUILD_STATE
+#include "gpu/pass.glsl"
+#include "gpu/task_pool.glsl"
+#include "gpu/radix_sort.glsl"
+#include "bvh/layout.glsl"
+#include "bvh/primitives.glsl"
+#include "bvh/codes.glsl"
+
+// Items of an invocation in a task.
+layout(constant_id = 1) const uint ITEMS = 1;
+
+const uint NONE = 0xFFFFFFFFu;
+
+BUFFER BuildState {
+    uint pool[4 + POOL_PHASES_AT_MOST];   // a PoolState
+    uint boxes_lo[3];                     // `ordered` floats
+    uint boxes_hi[3];
+    uint centroids_lo[3];
+    uint centroids_hi[3];
+    uint active_count;
+    uint status;
+    CodePlan plan;
+    uint cluster_counts[2];               // of PLOC: of even and odd rounds
+    uint is_forced[2];
+};
+
+// What a build is given: the push constants, or variables that the shader sets first. `vertices` to `transform` with
+// `vertex_stride` to `formats` are a Geometry; `code_kind` is what `kind_of_codes` takes out, collapse << 25, build flags << 26;
+// `columns` to `passes` are of the radix sort.
+#define BUILD_ARGUMENTS                                                                                        \
+    uvec2 vertices; uvec2 indices; uvec2 transform; uvec2 structure_address; uvec2 state_address;             \
+    uvec2 keys[2]; uvec2 values[2]; uvec2 ends_address; uvec2 table_address;                                  \
+    uint vertex_stride; uint vertex_count; uint formats; uint primitive_count; uint code_kind;                \
+    float c_t; float c_i;                                                                                     \
+    uint columns; uint column_keys; uint passes;
+#ifdef HEDGEROW_BUILD_ARGUMENTS_ARE_SET
+BUILD_ARGUMENTS
+#else
+layout(push_constant, scalar) uniform Arguments { BUILD_ARGUMENTS };
+#endif
+
+Geometry geometries() {
+    return Geometry(vertices, indices, transform, vertex_stride, vertex_count, formats, 0);
+}
+
+CodeKind kind_of_codes() {
+    return CodeKind(code_kind & 3u, code_kind >> 8 & 0x7Fu, 3u * (code_kind >> 6 & 3u), code_kind >> 2 & 3u,
+                    (code_kind >> 4 & 3u) + (CODE_PREFIX == PREFIX_CELLS ? 1u : 0u), code_kind >> 15 & 0xFu, 1u << (code_kind >> 19 & 0xFu));
+}
+
+bool collapses() {
+    return (code_kind >> 25 & 1) != 0;
+}
+
+Box bounds_of_boxes(BuildState state) {
+    return Box(from_ordered(uvec3(state.boxes_lo[0], state.boxes_lo[1], state.boxes_lo[2])),
+               from_ordered(uvec3(state.boxes_hi[0], state.boxes_hi[1], state.boxes_hi[2])));
+}
+
+// What one phase of a workgroup has written to memory, the next reads.
+void next_phase() {
+    controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
+                   gl_SemanticsAcquireRelease | gl_SemanticsMakeAvailable | gl_SemanticsMakeVisible);
+}
+#endif

@@ -1,0 +1,7 @@
+#version 460
+// How many primitives lie in each cell of the codes' grid: see bvh/encode.glsl for the contract.
+#include "bvh/encode.glsl"
+
+void main() {
+    count_cells(gl_WorkGroupID.x);
+}

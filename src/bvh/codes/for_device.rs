@@ -1,0 +1,49 @@
+//! Codes as the shaders are told of them: `CodeKind` and `CODE_PREFIX` in codes.glsl.
+
+use super::{Code, CodeBounds, Codes};
+
+/// Words of a grid: 2¹² bits or 2⁷ counts.
+const CELL_WORDS: u64 = 128;
+/// Words of `CodePart` in code_binning.glsl, of which there are at most 64.
+const PART_WORDS: u64 = 26;
+/// Words of `Sampled` in code_sections.glsl, of which there are 256.
+const SAMPLED_WORDS: u64 = 9;
+
+impl Codes {
+    /// `PREFIX_…` in codes.glsl: kernels are specialised by it, so that codes without a prefix do not pay for the others.
+    pub(crate) fn prefix_number(&self) -> u32 {
+        match (self.code, self.bounds) {
+            (Code::Bin(_), _) => 3,
+            (code, _) if code.grid_bits() > 0 => 2,
+            (_, CodeBounds::Robust) => 1,
+            _ => 0,
+        }
+    }
+
+    /// Words of memory between the bounds and the sort.
+    pub(crate) fn prefix_words(&self) -> u64 {
+        match self.prefix_number() {
+            0 => 0,
+            1 => 256 * SAMPLED_WORDS,
+            // The layers above the cells have a seventh of them.
+            2 => CELL_WORDS + CELL_WORDS / 4,
+            _ => CELL_WORDS + 64 * PART_WORDS,
+        }
+    }
+
+    /// What `kind_of_codes` in build_state.glsl takes apart.
+    pub(crate) fn kind_word(&self) -> u32 {
+        let (depth, count_bits, stretch) = match self.code {
+            Code::Bin(binning) => (binning.depth() / 2, binning.count_bits(), binning.stretch()),
+            // Two bits: layers but one.
+            code => ((code.grid_bits() / 3).saturating_sub(1), 0, 1),
+        };
+        self.code.order() as u32
+            | (self.bounds as u32) << 2
+            | depth << 4
+            | self.code.size_group() / 3 << 6
+            | self.bits << 8
+            | count_bits << 15
+            | stretch.ilog2() << 19
+    }
+}

@@ -1,0 +1,225 @@
+//! The recipe of a code for a given scene, and encoding by it.
+
+use super::axis::Axis;
+use super::binning::Splits;
+use super::mipping::Occupancy;
+use super::recipe::{Extents, Recipe};
+use super::sections::Sections;
+use super::{Code, CodeBounds, Codes};
+use crate::bvh::layout::Aabb;
+
+/// The recipe of a code for a given scene.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    codes: Codes,
+    axes: [Axis; 3],
+    recipe: Recipe,
+    size: Size,
+    prefix: Prefix,
+}
+
+/// What comes before the bits of the recipe.
+#[derive(Debug, Clone)]
+enum Prefix {
+    None,
+    Sections(Sections),
+    Cells(Occupancy),
+    Splits(Splits),
+}
+
+/// How sizes become fractions.
+#[derive(Debug, Clone, Copy)]
+struct Size {
+    /// The power of two for lengths along any axis.
+    prescale: f32,
+    /// 1 / diagonal².
+    reciprocal: f32,
+}
+
+/// The power of two that brings `magnitude` into [1/4, 1/2): exact to multiply by, and a difference of two such stays below 1.
+fn prescale_of(magnitude: f32) -> f32 {
+    let exponent = (magnitude.to_bits() >> 23) as i32 & 0xFF;
+    // Denormals and zero take the largest scale; 2^(127 − e − 2) as a float, kept normal.
+    f32::from_bits(((127 + 127 - 2 - exponent).clamp(1, 254) as u32) << 23)
+}
+
+/// 1 / x for x > 0; 0 for anything else, so that a flat axis gives coordinate 0.
+fn reciprocal_or_zero(x: f32) -> f32 {
+    if x >= f32::MIN_POSITIVE { 1.0 / x } else { 0.0 }
+}
+
+impl Size {
+    fn new(bounds: &Aabb) -> Size {
+        let magnitude: [f32; 3] = std::array::from_fn(|i| bounds.lo[i].abs().max(bounds.hi[i].abs()));
+        let prescale = prescale_of(magnitude.into_iter().fold(0.0, f32::max));
+        let extent: [f32; 3] = std::array::from_fn(|i| bounds.hi[i] * prescale - bounds.lo[i] * prescale);
+        let diagonal2 = extent[0] * extent[0] + extent[1] * extent[1] + extent[2] * extent[2];
+        Size { prescale, reciprocal: reciprocal_or_zero(diagonal2) }
+    }
+
+    /// Diagonal of the box over that of the scene, as a 16-bit fraction.
+    fn of(&self, primitive: &Aabb) -> u32 {
+        let extent: [f32; 3] =
+            std::array::from_fn(|i| primitive.hi[i] * self.prescale - primitive.lo[i] * self.prescale);
+        let squared = (extent[0] * extent[0] + extent[1] * extent[1] + extent[2] * extent[2]) * self.reciprocal;
+        // The square root is taken of the fraction as an integer: the same on every device.
+        let fixed = if squared >= 1.0 { u32::MAX } else { (squared * 4_294_967_296.0) as u32 };
+        fixed.isqrt()
+    }
+}
+
+impl Plan {
+    /// The recipe of `codes` for primitives with these boxes; those that are left out have an error instead.
+    pub fn new<E>(codes: Codes, boxes: &[Result<Aabb, E>]) -> Plan {
+        let (bounds, centroids) = boxes.iter().flatten().fold((Aabb::EMPTY, Aabb::EMPTY), |(bounds, centroids), b| {
+            (bounds.union(b), centroids.union(&Aabb { lo: b.centroid(), hi: b.centroid() }))
+        });
+        if boxes.iter().flatten().next().is_none() {
+            return Plan::within(codes, &Aabb { lo: [0.0; 3], hi: [0.0; 3] });
+        }
+        if codes.bounds == CodeBounds::Robust
+            && let Some(sections) = Sections::of(boxes, &bounds)
+        {
+            let plan = Plan::within(codes, &sections.core);
+            let sections = sections.with_head(&plan.recipe.sequence);
+            return Plan { prefix: Prefix::Sections(sections), ..plan };
+        }
+        let bounds = codes.bounds.of(&bounds, &centroids);
+        let plan = Plan::within(codes, &bounds);
+        let extents = Extents::of(&bounds);
+        let centroids = || boxes.iter().flatten().map(|b| plan.wide_fractions(b.centroid()));
+        let prefix = match codes.code {
+            Code::Bin(binning) => Prefix::Splits(Splits::new(binning, extents, codes.bits, centroids())),
+            code if code.grid_bits() > 0 => {
+                Prefix::Cells(Occupancy::new(code.grid_bits(), extents, codes.bits, centroids()))
+            }
+            _ => Prefix::None,
+        };
+        Plan { prefix, ..plan }
+    }
+
+    /// The recipe within these bounds, without a prefix.
+    fn within(codes: Codes, bounds: &Aabb) -> Plan {
+        Plan {
+            codes,
+            axes: std::array::from_fn(|i| Axis::new(bounds.lo[i], bounds.hi[i])),
+            recipe: Extents::of(bounds).recipe(codes.code.order(), codes.coordinate_bits()),
+            size: Size::new(bounds),
+            prefix: Prefix::None,
+        }
+    }
+
+    fn fractions(&self, at: [f32; 3]) -> [u64; 3] {
+        std::array::from_fn(|i| self.axes[i].fraction(at[i]))
+    }
+
+    fn wide_fractions(&self, at: [f32; 3]) -> [u128; 3] {
+        std::array::from_fn(|i| self.axes[i].wide_fraction(at[i]))
+    }
+
+    /// The code of a primitive with this box, in the low [`Codes::bits`] bits. Never all ones: that is [`Plan::inactive`].
+    pub fn encode(&self, primitive: &Aabb) -> u64 {
+        let (bits, group) = (self.codes.bits, self.codes.code.size_group());
+        let coordinates = self.fractions(primitive.centroid());
+        let code = match &self.prefix {
+            Prefix::None => self.recipe.encode(coordinates, self.size.of(primitive), group, bits),
+            Prefix::Sections(sections) => {
+                let section = sections.section_of(primitive);
+                let (coordinates, size) = if section.is_core() {
+                    (coordinates, self.size.of(primitive))
+                } else {
+                    (sections.coordinates(primitive.centroid(), coordinates), 0xFFFF)
+                };
+                sections.insert(section, self.recipe.encode(coordinates, size, group, bits), bits)
+            }
+            Prefix::Cells(cells) => cells.encode(self.wide_fractions(primitive.centroid()), bits),
+            Prefix::Splits(splits) => splits.encode(self.wide_fractions(primitive.centroid()), bits),
+        };
+        code.min(self.inactive() - 1)
+    }
+
+    /// The code of primitives that are left out: it sorts behind all others.
+    pub fn inactive(&self) -> u64 {
+        u64::MAX >> (64 - self.codes.bits)
+    }
+}
+
+/// A prefix of `length` bits before the top of a code of `bits` bits.
+pub(super) fn prefixed(prefix: u32, length: u32, code: u64, bits: u32) -> u64 {
+    if length == 0 { code } else { u64::from(prefix) << (bits - length) | code >> length }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn box_at(p: [f32; 3]) -> Aabb {
+        Aabb { lo: p, hi: p }
+    }
+
+    #[test]
+    fn a_plain_code_interleaves_x_y_z_from_the_top() {
+        let bounds = Aabb { lo: [0.0; 3], hi: [8.0; 3] };
+        let plan = Plan::within(Code::Mc30.full().with_bits(9), &bounds);
+        // x = 5 = 101, y = 3 = 011, z = 6 = 110 of 8 cells.
+        assert_eq!(plan.encode(&box_at([5.0, 3.0, 6.0])), 0b101_011_110);
+    }
+
+    #[test]
+    fn every_seventh_bit_is_of_the_size() {
+        let bounds = Aabb { lo: [0.0; 3], hi: [1.0; 3] };
+        let plan = Plan::within(Code::Emc64Var.full().with_bits(14), &bounds);
+        // The whole scene as one primitive: size 1 (all ones), centroid in the middle (first bits 1, then 0).
+        assert_eq!(plan.encode(&bounds), 0b11_1000_1000_0001);
+        // The same centroid with no size.
+        assert_eq!(plan.encode(&box_at([0.5; 3])), 0b11_1000_0000_0000);
+    }
+
+    #[test]
+    fn a_far_primitive_costs_the_long_axis_no_precision_below_42_doublings() {
+        let grown = Aabb { lo: [0.0; 3], hi: [2.0_f32.powi(42), 1.0, 1.0] };
+        let plan = Plan::within(Code::Emc64VarNoSize.full(), &grown);
+        // 42 bits go to x before y and z have any; 22 are left for three axes: 7 or 8 each.
+        let codes: Vec<_> = (0..64).map(|i| plan.encode(&box_at([(i as f32 + 0.5) / 64.0, 0.1, 0.1]))).collect();
+        assert!(codes.windows(2).all(|w| w[0] < w[1]), "64 cells along x are told apart");
+    }
+
+    #[test]
+    fn what_lies_in_the_middle_has_the_middle_code_wherever_the_scene_is() {
+        for (lo, hi) in [(-1.0, 1.0), (0.0, 3.0), (-17.402_76, 17.417_24), (1e6, 1e6 + 7.0), (-5e-20, 11e-20)] {
+            let bounds = Aabb { lo: [lo; 3], hi: [hi; 3] };
+            let middle = bounds.centroid()[0];
+            let below =
+                f32::from_bits(if middle > 0.0 { middle.to_bits() - 1 } else { (-f32::MIN_POSITIVE).to_bits() });
+            let plan = Plan::within(Code::Mc63.full(), &bounds);
+            // By exact arithmetic: twice the distance from the low corner against the extent.
+            let exact = |v: f32| 2.0 * (f64::from(v) - f64::from(lo)) >= f64::from(hi) - f64::from(lo);
+            for v in [middle, below] {
+                assert_eq!(plan.encode(&box_at([v; 3])) >> 62 == 1, exact(v), "{v} in {lo}..{hi}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_scene_far_on_the_negative_side_keeps_its_precision() {
+        let grown = Aabb { lo: [-2.0_f32.powi(40), 0.0, 0.0], hi: [1.0, 1.0, 1.0] };
+        let plan = Plan::within(Code::Emc64VarNoSize.full(), &grown);
+        let codes: Vec<_> = (0..64).map(|i| plan.encode(&box_at([(i as f32 + 0.5) / 64.0, 0.1, 0.1]))).collect();
+        assert!(codes.windows(2).all(|w| w[0] < w[1]), "64 cells along x are told apart");
+    }
+
+    #[test]
+    fn huge_and_tiny_and_flat_bounds_encode_in_order() {
+        for (lo, hi) in [(-3.0e38, 3.0e38), (1.0e-30, 3.0e-30), (-1.0e30, 1.0e30), (1.0e6, 1.000_01e6)] {
+            let corners = [box_at([lo, 0.0, lo]), box_at([hi, 0.0, hi])];
+            for code in Code::ALL {
+                for bounds in CodeBounds::ALL {
+                    let Some(codes) = code.full().with_bounds(bounds) else { continue };
+                    let plan = Plan::new(codes, &corners.map(Ok::<_, u32>));
+                    let [low, high] = corners.map(|b| plan.encode(&b));
+                    assert!(low < high && high < plan.inactive(), "{codes} in {lo:e}..{hi:e}: {low:x} {high:x}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! Robust bounds: codes for which far and huge primitives cost (almost) nothing. The scheme is our own; it follows what Riemersma
+//! 2024, section 5, leaves to the future: a heuristic that filters primitives into sections while they are encoded, with the split
+//! between the sections at the start of the code.
+//!
+//! *Tukey's fences* of a sample of the centroids tell what is far: what lies beyond the quantiles by more than one and a half times
+//! the distance between them (here the 1/16 quantiles). Where nothing does, codes are those of the full bounds. Otherwise there are
+//! three sections: the *core*, all boxes inside the fences, encoded within its own bounds; what is *far*; and what is not inside
+//! the fences but touches the core, *huge*.
+//!
+//! A code begins with a bit for what is huge, which otherwise would lie over every node above it. The bit that sets apart what is far
+//! stands behind the first bit of each axis: only one octant of the core has the far primitives of one side in its node,
+//! and those of different sides meet in no node of their own. Coordinates of what is far or huge are linear in the core and the
+//! logarithm of the distance beyond it, so that a hundred far primitives at different distances are told apart, however far they
+//! are.
+
+use super::axis::{from_ordered, octaves, ordered};
+use crate::bvh::layout::Aabb;
+
+/// Bits for what is huge, what is far, and one of each axis between them.
+pub(super) const PREFIX_BITS: u32 = 5;
+/// Primitives that are looked at.
+const SAMPLE: u64 = 256;
+/// One of so many sampled centroids lies below the low quantile, and as many above the high one.
+const QUANTILE: usize = 16;
+
+/// The sections of a scene that has something far or huge.
+#[derive(Debug, Clone)]
+pub(super) struct Sections {
+    /// What is inside is of the core.
+    fences: Aabb,
+    /// The bounds of the core, from the sample.
+    pub core: Aabb,
+    /// Coordinate bits before the one of what is far.
+    head: u32,
+    tails: [Option<Tail>; 3],
+}
+
+/// Along one axis, what is beyond the core.
+#[derive(Debug, Clone, Copy)]
+struct Tail {
+    /// [`octaves`] of the core's extent.
+    reference: u32,
+    /// Brings the leading bit of the farthest distance to the second bit from the top: tails are a quarter of the coordinate.
+    shift: u32,
+}
+
+/// Where a primitive belongs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Section {
+    Core,
+    Far,
+    Huge,
+}
+
+impl Section {
+    pub fn is_core(self) -> bool {
+        self == Section::Core
+    }
+}
+
+/// Float comparison by [`ordered`] bits, as the device does: denormals are what they are.
+fn below(a: f32, b: f32) -> bool {
+    ordered(a) < ordered(b)
+}
+
+/// The box whose corners are given in [`ordered`] bits.
+fn from_ordered_box(lo: [u32; 3], hi: [u32; 3]) -> Aabb {
+    Aabb { lo: lo.map(from_ordered), hi: hi.map(from_ordered) }
+}
+
+fn is_inside(b: &Aabb, fences: &Aabb) -> bool {
+    (0..3).all(|i| !below(b.lo[i], fences.lo[i]) && !below(fences.hi[i], b.hi[i]))
+}
+
+/// `base` moved by `by` both ways, but not beyond `limits`; both are given as eighths, so that nothing overflows.
+fn widened(base: [f32; 2], by: f32, limits: [f32; 2]) -> [f32; 2] {
+    let [lo, hi] = [base[0] - by, base[1] + by];
+    [
+        if lo > limits[0] * 0.125 { lo * 8.0 } else { limits[0] },
+        if hi < limits[1] * 0.125 { hi * 8.0 } else { limits[1] },
+    ]
+}
+
+impl Sections {
+    /// The sections of primitives with these boxes, whose bounds are `bounds`; `None` where nothing is beyond the fences.
+    pub fn of<E>(boxes: &[Result<Aabb, E>], bounds: &Aabb) -> Option<Sections> {
+        let count = boxes.len() as u64;
+        let taken = count.min(SAMPLE);
+        let sample: Vec<&Aabb> = (0..taken).filter_map(|i| boxes[(i * count / taken) as usize].as_ref().ok()).collect();
+        if sample.is_empty() {
+            return None;
+        }
+        let quantiles: [[f32; 2]; 3] = std::array::from_fn(|axis| {
+            let mut keys: Vec<u32> = sample.iter().map(|b| ordered(b.centroid()[axis])).collect();
+            keys.sort_unstable();
+            let rank = keys.len() / QUANTILE;
+            [keys[rank], keys[keys.len() - 1 - rank]].map(|key| from_ordered(key) * 0.125)
+        });
+        let widths = quantiles.map(|[low, high]| high - low);
+        // What is thin is not therefore outlying: no axis is taken to be thinner than a quarter of the widest.
+        let least = 0.25 * widths.into_iter().fold(0.0, f32::max);
+        let mut fences = *bounds;
+        for axis in 0..3 {
+            let by = 1.5 * widths[axis].max(least);
+            [fences.lo[axis], fences.hi[axis]] = widened(quantiles[axis], by, [bounds.lo[axis], bounds.hi[axis]]);
+        }
+        if is_inside(bounds, &fences) {
+            return None;
+        }
+
+        let mut core = [[u32::MAX; 3], [0; 3]];
+        for b in sample.iter().filter(|b| is_inside(b, &fences)) {
+            for axis in 0..3 {
+                core[0][axis] = core[0][axis].min(ordered(b.lo[axis]));
+                core[1][axis] = core[1][axis].max(ordered(b.hi[axis]));
+            }
+        }
+        let sampled = if core[0][0] > core[1][0] { fences } else { from_ordered_box(core[0], core[1]) };
+        let mut core = sampled;
+        for axis in 0..3 {
+            // The sample misses the outermost: an eighth more to each side.
+            let eighths = [sampled.lo[axis] * 0.125, sampled.hi[axis] * 0.125];
+            let by = (eighths[1] - eighths[0]) * 0.125;
+            [core.lo[axis], core.hi[axis]] = widened(eighths, by, [fences.lo[axis], fences.hi[axis]]);
+        }
+        let tails = std::array::from_fn(|axis| {
+            let (lo, hi) = (core.lo[axis], core.hi[axis]);
+            let is_beyond = below(bounds.lo[axis], lo) || below(hi, bounds.hi[axis]);
+            let reference = octaves(hi, lo);
+            let farthest = octaves(bounds.hi[axis], lo).max(octaves(bounds.lo[axis], hi)).saturating_sub(reference);
+            is_beyond.then(|| Tail { reference, shift: 30 + farthest.max(1).leading_zeros() })
+        });
+        Some(Sections { fences, core, head: 0, tails })
+    }
+
+    /// The same with its far bit behind the first bit of each axis in this sequence.
+    pub fn with_head(self, sequence: &[usize]) -> Sections {
+        let again = (1..3).find(|&bit| sequence[..bit].contains(&sequence[bit])).unwrap_or(3);
+        Sections { head: again as u32, ..self }
+    }
+
+    pub fn section_of(&self, primitive: &Aabb) -> Section {
+        let touches = |i: usize| !below(self.core.hi[i], primitive.lo[i]) && !below(primitive.hi[i], self.core.lo[i]);
+        match is_inside(primitive, &self.fences) {
+            true => Section::Core,
+            false if (0..3).all(touches) => Section::Huge,
+            false => Section::Far,
+        }
+    }
+
+    /// The coordinates of what is not of the core, from those within the core: the lower and the upper quarter are for what is beyond.
+    pub fn coordinates(&self, at: [f32; 3], within: [u64; 3]) -> [u64; 3] {
+        std::array::from_fn(|axis| {
+            let Some(tail) = self.tails[axis] else { return within[axis] };
+            let (lo, hi) = (self.core.lo[axis], self.core.hi[axis]);
+            let beyond = |corner| u64::from(octaves(at[axis], corner).saturating_sub(tail.reference)) << tail.shift;
+            if below(at[axis], lo) {
+                (1 << 62) - 1 - beyond(hi)
+            } else if below(hi, at[axis]) {
+                (3 << 62) + beyond(lo)
+            } else {
+                (1 << 62) + (within[axis] >> 1)
+            }
+        })
+    }
+
+    /// The bits of the section put into a code of `bits` bits.
+    pub fn insert(&self, section: Section, code: u64, bits: u32) -> u64 {
+        let behind = bits - self.head;
+        let (head, rest) = (code >> behind, (code & ((1 << behind) - 1)) >> 2);
+        let huge = u64::from(section == Section::Huge);
+        let beyond = u64::from(section != Section::Core);
+        huge << (bits - 1) | head << (behind - 1) | beyond << (behind - 2) | rest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Code, CodeBounds, Codes, Plan};
+    use super::*;
+
+    fn robust() -> Codes {
+        Code::Emc64Var.full().with_bounds(CodeBounds::Robust).expect("it has no grid")
+    }
+
+    fn grid() -> Vec<Aabb> {
+        let at = |i: u32| i as f32 / 10.0;
+        let cells = (0..1000).map(|i| [at(i % 10), at(i / 10 % 10), at(i / 100)]);
+        cells.map(|lo| Aabb { lo, hi: lo.map(|v| v + 0.05) }).collect()
+    }
+
+    fn plan(boxes: &[Aabb]) -> Plan {
+        Plan::new(robust(), &boxes.iter().map(|&b| Ok::<_, u32>(b)).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_scene_without_anything_far_has_the_codes_of_its_full_bounds() {
+        let boxes = grid();
+        let full = Plan::new(Code::Emc64Var.full(), &boxes.iter().map(|&b| Ok::<_, u32>(b)).collect::<Vec<_>>());
+        let robust = plan(&boxes);
+        assert!(boxes.iter().all(|b| full.encode(b) == robust.encode(b)));
+    }
+
+    #[test]
+    fn codes_of_the_core_do_not_depend_on_how_far_the_others_are() {
+        let codes = |distance: f32| {
+            let mut boxes = grid();
+            boxes.push(Aabb { lo: [-distance; 3], hi: [-0.999 * distance; 3] });
+            boxes.push(Aabb { lo: [0.5; 3], hi: [0.5, 0.5, distance] });
+            let plan = plan(&boxes);
+            let [far, huge] = [plan.encode(&boxes[1000]), plan.encode(&boxes[1001])];
+            assert_eq!(huge >> 63, 1, "what is huge comes last");
+            assert!(boxes[..1000].iter().all(|b| plan.encode(b) != far));
+            boxes[..1000].iter().map(|b| plan.encode(b)).collect::<Vec<_>>()
+        };
+        let near = codes(100.0);
+        assert!(near.iter().collect::<std::collections::HashSet<_>>().len() == 1000, "every cell has its own code");
+        for distance in [1.0e6, 1.0e18, 1.0e37, 3.0e38] {
+            assert_eq!(codes(distance), near, "{distance:e}");
+        }
+    }
+
+    #[test]
+    fn a_hundred_far_primitives_are_told_apart() {
+        let mut boxes = grid();
+        let distances = (1..=100).map(|i| 10.0_f32.powf(1.0 + 0.37 * i as f32));
+        boxes.extend(distances.map(|d| Aabb { lo: [d, 0.5, 0.5], hi: [d * 1.001, 0.5, 0.5] }));
+        let plan = plan(&boxes);
+        let codes: Vec<u64> = boxes[1000..].iter().map(|b| plan.encode(b)).collect();
+        assert!(codes.windows(2).all(|w| w[0] < w[1]), "{codes:x?}");
+    }
+}
