@@ -2,6 +2,7 @@
 
 pub mod codes;
 pub mod compact;
+pub mod epo;
 pub mod geometry;
 pub mod host;
 pub mod layout;

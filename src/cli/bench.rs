@@ -5,6 +5,7 @@ use super::{Bar, Common};
 use crate::gpu::Device;
 use crate::measure::builders::{self, Needs, Spec};
 use crate::measure::matrix::{self, Failure, Outcome, Plan};
+use crate::measure::overlap::Epo;
 use crate::measure::peers::driver;
 use crate::measure::provenance::{self, Machine};
 use crate::report::names::slug;
@@ -47,6 +48,9 @@ pub struct Arguments {
     /// Costs of a traversal step and of a triangle test in the SAH
     #[arg(long, value_name = "C_T,C_I", default_value = "3,2")]
     costs: Costs,
+    /// Measure the end-point overlap: on, off, or cheap (given up after 5 s a tree)
+    #[arg(long, value_name = "on|off|cheap", default_value = "cheap")]
+    epo: Epo,
     /// No pictures of the scenes
     #[arg(long)]
     no_pictures: bool,
@@ -71,6 +75,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         rays: arguments.size.rays(common.seed),
         c_t: arguments.costs.step,
         c_i: arguments.costs.test,
+        epo: arguments.epo,
     };
     let mut bench =
         Bench { common, arguments, device: device.as_ref(), plan, results, report: empty(device.as_ref(), notes)? };

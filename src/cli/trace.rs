@@ -4,6 +4,7 @@ use super::options::{Builders, Kinds};
 use super::{Common, Json, Size, tables, work};
 use crate::measure::builders::Spec;
 use crate::measure::matrix::Plan;
+use crate::measure::overlap::Epo;
 use crate::report::numbers::{grouped, three_digits};
 use crate::scene::Scene;
 use crate::trace::{Query, files};
@@ -69,6 +70,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         rays: arguments.size.rays(common.seed),
         c_t: 3.0,
         c_i: 2.0,
+        epo: Epo::Off,
     };
     let (outcomes, all_right) = work::measured(common, &scene, device.as_ref(), &plan);
     arguments.json.write_each(outcomes.iter().map(|outcome| &outcome.record))?;
