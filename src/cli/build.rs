@@ -38,7 +38,7 @@ pub struct Arguments {
 }
 
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
-    let builders = &arguments.builder.0;
+    let builders = &common.builders(&arguments.builder.0);
     if arguments.output.is_some() && builders.len() > 1 {
         return Err(crate::Error::Argument("-o takes the structure of one builder; name one with -b".into()).into());
     }

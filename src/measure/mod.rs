@@ -5,10 +5,11 @@
 //! over [`structures`] and [`levels`] of instances. The rest is how that is fair and what follows from it: [`agreement`] (right
 //! hits), [`overlap`] (a quality that
 //! takes time), [`statistics`] (in turn, medians), [`growth`] (time over triangles), [`pareto`] and [`total_time`] (who is best for
-//! what).
+//! what). [`choose`] says who will be, before anything is built.
 
 pub mod agreement;
 pub mod builders;
+pub mod choose;
 pub mod comparison;
 pub mod copy;
 mod device_lbvh;

@@ -1,6 +1,7 @@
 //! `index.html`: one file that opens from the disk, with style, script and charts inside; pictures lie beside it.
 
 use super::chart::Chart;
+use super::choosing;
 use super::elements::{bar, column, facts, figure, foot, head, measured_by, number};
 use super::names::{short, slug};
 use super::numbers::{bytes, duration, grouped, short_count, three_digits};
@@ -30,11 +31,12 @@ pub(super) fn page(
             body {
                 a.skip href="#summary" { "Skip to the results" }
                 (header(report, legend, scenes))
-                (navigation(scenes, growth.is_some(), has_accel))
+                (navigation(scenes, [!report.choices.is_empty(), growth.is_some(), has_accel]))
                 main {
                     @if !report.failures.is_empty() || records.iter().any(|r| r.valid == Some(false)) { (failures(report)) }
                     (summary_section(report, &records, legend))
                     @for scene in scenes { (scene_section(report, scene, legend)) }
+                    (choosing::section(&report.choices, &records))
                     @if let Some(chart) = growth { (growth_section(chart)) }
                     (results_section(&records, legend))
                     (method_section(report))
@@ -61,11 +63,12 @@ fn header(report: &Report, legend: &Legend, scenes: &[SceneCharts]) -> Markup {
     }
 }
 
-fn navigation(scenes: &[SceneCharts], growth: bool, has_accel: bool) -> Markup {
+fn navigation(scenes: &[SceneCharts], [choosing, growth, has_accel]: [bool; 3]) -> Markup {
     html! {
         nav aria-label="Sections" {
             a href="#summary" { "Summary" }
             @for scene in scenes { a href={ "#scene-" (slug(&scene.scene)) } { (scene.scene) } }
+            @if choosing { a href="#choosing" { "Choosing" } }
             @if growth { a href="#growth" { "Growth" } }
             a href="#results" { "All figures" }
             a href="#method" { "How it is measured" }

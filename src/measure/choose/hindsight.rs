@@ -2,7 +2,6 @@
 
 use super::model::Model;
 use super::{Features, candidates};
-use crate::gpu::Device;
 use crate::measure::record::Record;
 use crate::measure::total_time::Line;
 use crate::scene::Scene;
@@ -86,9 +85,4 @@ pub fn good_parts_of_each(pairs: &[Pair], records: &[&Record]) -> Vec<(String, f
         Some(((*builder).to_owned(), good_part(&self::pairs(&always, records))?))
     };
     candidates::CANDIDATES.iter().filter_map(part).collect()
-}
-
-/// The names of the candidates that `device` can build, for whoever measures them all.
-pub fn candidates_of(device: &Device) -> Vec<crate::measure::builders::Spec> {
-    candidates::possible(device)
 }

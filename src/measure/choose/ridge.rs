@@ -31,7 +31,8 @@ impl Ridge {
                 .sum()
         };
         let errors = STRENGTHS.map(|strength| (error_left_out(strength), strength));
-        let best = errors.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map_or(f64::INFINITY, |(_, strength)| strength);
+        let best =
+            errors.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map_or(f64::INFINITY, |(_, strength)| strength);
         Ridge::with(samples, best)
     }
 
@@ -47,7 +48,8 @@ impl Ridge {
         let (least, most) = (extreme(f64::INFINITY, f64::min), extreme(f64::NEG_INFINITY, f64::max));
         let mut weights = [0.0; COUNT];
         if strength.is_finite() && samples.len() > 1 {
-            let unit = |s: &Sample, k: usize| if deviation[k] > 0.0 { (s.0[k] - x_mean[k]) / deviation[k] } else { 0.0 };
+            let unit =
+                |s: &Sample, k: usize| if deviation[k] > 0.0 { (s.0[k] - x_mean[k]) / deviation[k] } else { 0.0 };
             let mut matrix = [[0.0; COUNT + 1]; COUNT];
             for (j, row) in matrix.iter_mut().enumerate() {
                 for k in 0..COUNT {
