@@ -1,12 +1,19 @@
 //! Bounding volume hierarchies: codes, node layouts, builders on the device, and their twins on the host.
 
+pub mod builder;
 pub mod codes;
+mod collapse;
 pub mod compact;
+<<<<<<< HEAD
 pub mod epo;
+=======
+pub(crate) mod encode;
+>>>>>>> main
 pub mod geometry;
 pub mod host;
+mod hploc;
 pub mod layout;
-pub mod lbvh;
+mod lbvh;
 pub(crate) mod lbvh_workgroup;
 pub mod quality;
 pub mod refit;

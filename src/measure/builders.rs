@@ -5,15 +5,15 @@
 
 use super::Subject;
 use super::choose::{self, Auto};
-use super::device_lbvh::DeviceLbvh;
+use super::device_bvh::DeviceBvh;
 use super::host::HostLbvh;
 use super::peers::driver::Driver;
 #[cfg(feature = "peer-embree")]
 use super::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use super::peers::obvhs;
+use crate::bvh::builder::{self, Method, Schedule, Window};
 use crate::bvh::codes::Codes;
-use crate::bvh::lbvh::{self, Schedule};
 use crate::bvh::sah::Collapse;
 use crate::gpu::{Device, DriverPreference};
 use crate::scene::Mesh;
@@ -68,6 +68,9 @@ const RAYS: BuilderOption =
     BuilderOption { key: "rays", values: "rays that are traced between two builds, 1e7 unless given" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
 
+const WINDOW: BuilderOption = BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
+const RADIUS: BuilderOption = BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
+
 /// Every builder, in the order in which they are listed and measured.
 pub static BUILDERS: &[Builder] = &[
     Builder {
@@ -83,9 +86,20 @@ pub static BUILDERS: &[Builder] = &[
         ],
         needs: Needs::Device,
         make: |spec, device, mesh| {
-            Ok(Box::new(DeviceLbvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
+            Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
         },
         check: |spec| spec.lbvh_options().map(drop),
+    },
+    Builder {
+        name: "hploc",
+        what: "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
+        options: &[CODES, COLLAPSE, SCHEDULE, WINDOW, RADIUS],
+        variants: &["hploc"],
+        needs: Needs::Device,
+        make: |spec, device, mesh| {
+            Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.hploc_options()?)?))
+        },
+        check: |spec| spec.hploc_options().map(drop),
     },
     Builder {
         name: "auto",
@@ -232,8 +246,23 @@ impl Spec {
         }
     }
 
+    /// The value of an option that is a number, or what it is where it was not given.
+    fn number(&self, option: &BuilderOption, default: u32) -> Result<u32> {
+        let Some(value) = self.option(option.key) else { return Ok(default) };
+        value.parse().map_err(|_| self.wrong_value(option, value))
+    }
+
+    /// Those of `lbvh`, and `window` and `radius`.
+    fn hploc_options(&self) -> Result<builder::Options> {
+        let size = self.number(&WINDOW, Window::DEFAULT.size)?;
+        let radius = self.number(&RADIUS, Window::DEFAULT.radius)?;
+        let method = Method::Hploc(Window { size, radius });
+        method.check()?;
+        Ok(builder::Options { method, ..self.lbvh_options()? })
+    }
+
     /// Options `codes`, `collapse` and `schedule`.
-    fn lbvh_options(&self) -> Result<lbvh::Options> {
+    fn lbvh_options(&self) -> Result<builder::Options> {
         let schedule = match self.option(SCHEDULE.key) {
             None => None,
             Some("chain") => Some(Schedule::Chain),
@@ -241,7 +270,7 @@ impl Spec {
             Some("workgroup") => Some(Schedule::Workgroup),
             Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
         };
-        Ok(lbvh::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..lbvh::Options::DEFAULT })
+        Ok(builder::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..builder::Options::DEFAULT })
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {

@@ -12,7 +12,7 @@ pub mod builders;
 pub mod choose;
 pub mod comparison;
 pub mod copy;
-mod device_lbvh;
+mod device_bvh;
 pub mod experiments;
 pub mod growth;
 mod host;

@@ -4,5 +4,7 @@ mod collapse;
 mod compact;
 pub mod epo;
 pub mod geometry;
+pub mod hploc;
 pub mod lbvh;
+mod over;
 pub mod refit;

@@ -1,9 +1,9 @@
-//! `lbvh`: our LBVH on the device as a subject: timestamps around each phase, our tracer.
+//! Our trees built on the device as subjects: timestamps around each phase, our tracer.
 
 use super::overlap::{self, Epo};
 use super::{BuildRun, Subject, record};
+use crate::bvh::builder::{Builder, Input, Options, Sizes};
 use crate::bvh::layout::Bvh2;
-use crate::bvh::lbvh::{Input, Lbvh, Options, Sizes};
 use crate::bvh::quality::{self, Figures};
 use crate::gpu::{Buffer, Device, Timestamps};
 use crate::scene::Mesh;
@@ -15,11 +15,11 @@ use crate::{Error, Result};
 const PHASES: u32 = 8;
 
 /// A scene in our `Bvh2`, built and traced on the device.
-pub struct DeviceLbvh<'a> {
+pub struct DeviceBvh<'a> {
     device: &'a Device,
     builder: String,
     choice: Option<String>,
-    lbvh: Lbvh,
+    bvh: Builder,
     sizes: Sizes,
     input: Input,
     _vertices: [Buffer<'a>; 2],
@@ -35,15 +35,15 @@ struct Rays<'a> {
     hits: Buffer<'a>,
 }
 
-impl<'a> DeviceLbvh<'a> {
+impl<'a> DeviceBvh<'a> {
     /// Uploads `mesh` and makes room for structure and scratch.
     ///
     /// # Errors
     /// Too many triangles, or too little memory: the error says how much is needed.
-    pub fn new(device: &'a Device, builder: &str, mesh: &Mesh, options: &Options) -> Result<DeviceLbvh<'a>> {
+    pub fn new(device: &'a Device, builder: &str, mesh: &Mesh, options: &Options) -> Result<DeviceBvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
-        let lbvh = Lbvh::new(device, options, count)?;
-        let sizes = lbvh.sizes();
+        let bvh = Builder::new(device, options, count)?;
+        let sizes = bvh.sizes();
         let (positions, indices) = (size_of_val(&mesh.positions[..]) as u64, size_of_val(&mesh.triangles[..]) as u64);
         let (needed, available) = (positions + indices + sizes.structure + sizes.scratch, device.found().memory);
         if needed > available {
@@ -51,15 +51,15 @@ impl<'a> DeviceLbvh<'a> {
         }
         let vertices = [device.upload("positions", &mesh.positions)?, device.upload("indices", &mesh.triangles)?];
         let input = Input::mesh(vertices[0].address(), mesh.positions.len() as u32, vertices[1].address(), count);
-        device.warm(&lbvh.kernels(&input))?;
-        Ok(DeviceLbvh {
+        device.warm(&bvh.kernels(&input))?;
+        Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
-            choice: choice_of(options, &lbvh),
+            choice: choice_of(options, &bvh),
             structure: device.buffer("structure", sizes.structure)?,
             scratch: device.buffer("scratch", sizes.scratch)?,
             timestamps: Timestamps::new(device, PHASES)?,
-            lbvh,
+            bvh,
             sizes,
             input,
             _vertices: vertices,
@@ -79,14 +79,14 @@ impl<'a> DeviceLbvh<'a> {
 }
 
 /// What was left to the builder: codes and schedule.
-fn choice_of(options: &Options, lbvh: &Lbvh) -> Option<String> {
-    let codes = options.codes.is_none().then(|| format!("codes {}", lbvh.codes()));
-    let schedule = options.schedule.is_none().then(|| format!("schedule {}", lbvh.schedule()));
+fn choice_of(options: &Options, bvh: &Builder) -> Option<String> {
+    let codes = options.codes.is_none().then(|| format!("codes {}", bvh.codes()));
+    let schedule = options.schedule.is_none().then(|| format!("schedule {}", bvh.schedule()));
     let chosen: Vec<String> = codes.into_iter().chain(schedule).collect();
     (!chosen.is_empty()).then(|| chosen.join(", "))
 }
 
-impl Subject for DeviceLbvh<'_> {
+impl Subject for DeviceBvh<'_> {
     fn builder(&self) -> &str {
         &self.builder
     }
@@ -104,12 +104,12 @@ impl Subject for DeviceLbvh<'_> {
     }
 
     fn traffic(&self, phase: &str) -> Option<u64> {
-        self.lbvh.traffic(phase, &self.input)
+        self.bvh.traffic(phase, &self.input)
     }
 
     fn build(&mut self) -> Result<BuildRun> {
         let (structure, scratch) = (self.structure.address(), self.scratch.address());
-        self.device.run(Some(&mut self.timestamps), |r| self.lbvh.record(r, &self.input, structure, scratch))?;
+        self.device.run(Some(&mut self.timestamps), |r| self.bvh.record(r, &self.input, structure, scratch))?;
         let phases = self.timestamps.phases()?;
         Ok(BuildRun { milliseconds: phases.iter().map(|p| p.milliseconds).sum(), phases })
     }
