@@ -4,11 +4,8 @@ pub mod builder;
 pub mod codes;
 mod collapse;
 pub mod compact;
-<<<<<<< HEAD
-pub mod epo;
-=======
 pub(crate) mod encode;
->>>>>>> main
+pub mod epo;
 pub mod geometry;
 pub mod host;
 mod hploc;

@@ -8,8 +8,17 @@ use crate::measure::builders::Spec;
 ///
 /// Those that are worse than another at both ends of the scale (few rays a build, and many) cost time at calibration and nothing
 /// else.
-pub const CANDIDATES: &[&str] =
-    &["lbvh:codes=mc30", "lbvh:codes=mc30:collapse=off", "lbvh", "lbvh:codes=emc64var", "lbvh:codes=emc64var-nosize"];
+pub const CANDIDATES: &[&str] = &[
+    // The shortest codes: the fewest passes of the sort.
+    "lbvh:codes=mc30",
+    // Codes by the number of triangles.
+    "lbvh",
+    // Long codes that look at sizes.
+    "lbvh:codes=emc64var",
+    "hploc:codes=mc30",
+    "hploc",
+    "hploc:codes=emc64var",
+];
 
 /// The candidates that this device can build.
 pub fn possible(device: &Device) -> Vec<Spec> {
