@@ -3,15 +3,13 @@
 use super::options::{RaysPerBuild, Size};
 use super::{Bar, Common, tables, work};
 use crate::gpu::Device;
-use crate::measure::choose::hindsight::{self, Choice, Pair};
+use crate::measure::choose::calibration::{self, Effort};
+use crate::measure::choose::hindsight::{self, Choice, Pair, Taken};
+use crate::measure::choose::model::Measured;
 use crate::measure::choose::{DEFAULT_RAYS, Estimate, Features, Model, cache, candidates};
-use crate::measure::matrix::Plan;
-use crate::measure::overlap::Epo;
-use crate::measure::record::Record;
 use crate::report::names::short;
 use crate::report::numbers::{duration, grouped, short_count, three_digits};
 use crate::scene::Scene;
-use crate::trace::kinds::RayKind;
 use std::io::Write;
 use std::num::NonZeroU32;
 
@@ -42,40 +40,30 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         cache::model_of(&device, arguments.recalibrate, &mut |what| bar.say(what))?
     };
     let rays = common.rays_per_build.map_or(DEFAULT_RAYS, |RaysPerBuild(rays)| rays);
-    let (mut choices, mut records, mut all_right) = (Vec::new(), Vec::new(), true);
+    let (mut choices, mut taken) = (Vec::new(), Vec::new());
     for name in &arguments.scenes {
         let scene = common.load(name)?;
         if arguments.hindsight {
             choices.extend(hindsight::choices(&model, &scene));
-            let (measured, right) = measured(common, arguments, &device, &scene);
+            let measured = measured(common, arguments, &device, &scene)?;
             let text = beside_estimates(&model, &scene, &measured);
             writeln!(std::io::stdout(), "{text}\n")?;
-            records.extend(measured);
-            all_right &= right;
+            taken.extend(measured.iter().map(Taken::from));
         } else {
             writeln!(std::io::stdout(), "{}\n", estimates(&model, &scene, rays))?;
         }
     }
     if arguments.hindsight {
-        let records: Vec<&Record> = records.iter().collect();
-        writeln!(std::io::stdout(), "{}", in_hindsight(&choices, &records))?;
+        writeln!(std::io::stdout(), "{}", in_hindsight(&choices, &taken))?;
     }
-    work::finish(Some(&device), all_right)
+    work::finish(Some(&device), true)
 }
 
 /// Every candidate measured on a scene, with all kinds of rays.
-fn measured(common: &Common, arguments: &Arguments, device: &Device, scene: &Scene) -> (Vec<Record>, bool) {
-    let plan = Plan {
-        builders: candidates::possible(device),
-        runs: arguments.runs.get(),
-        kinds: RayKind::ALL.to_vec(),
-        rays: arguments.size.rays(common.seed),
-        c_t: 3.0,
-        c_i: 2.0,
-        epo: Epo::Off,
-    };
-    let (outcomes, right) = work::measured(common, scene, Some(device), &plan);
-    (outcomes.into_iter().map(|outcome| outcome.record).collect(), right)
+fn measured(common: &Common, arguments: &Arguments, device: &Device, scene: &Scene) -> crate::Result<Vec<Measured>> {
+    let _bar = Bar::new(common, &format!("measuring {}", scene.name), 0);
+    let effort = Effort { rays: arguments.size.rays(common.seed), runs: arguments.runs.get() };
+    calibration::on_scene(device, scene, &candidates::possible(device), &effort)
 }
 
 /// What every candidate is expected to take, the choice marked.
@@ -97,17 +85,16 @@ fn estimates(model: &Model, scene: &Scene, rays: f64) -> String {
 }
 
 /// What every candidate took beside what it was expected to take.
-fn beside_estimates(model: &Model, scene: &Scene, records: &[Record]) -> String {
+fn beside_estimates(model: &Model, scene: &Scene, measured: &[Measured]) -> String {
     let features = Features::of(&scene.mesh);
     let mut table = tables::table(&["builder", "build", "expected", "a ray", "expected"], 1);
     for Estimate { builder, build_ms, ray_ns } in model.estimates(&features) {
-        let Some(record) = records.iter().find(|record| record.builder == builder) else { continue };
-        let measured_ns = record.mrays_s().map_or("–".into(), |speed| format!("{} ns", three_digits(1e3 / speed)));
+        let Some(took) = measured.iter().find(|took| took.builder == builder) else { continue };
         table.add_row([
             builder,
-            duration(record.build.median_ms),
+            duration(took.build_ms),
             duration(build_ms),
-            measured_ns,
+            format!("{} ns", three_digits(took.ray_ns)),
             format!("{} ns", three_digits(ray_ns)),
         ]);
     }
@@ -115,8 +102,8 @@ fn beside_estimates(model: &Model, scene: &Scene, records: &[Record]) -> String 
 }
 
 /// Each choice beside the best, and the part that is good.
-fn in_hindsight(choices: &[Choice], records: &[&Record]) -> String {
-    let pairs = hindsight::pairs(choices, records);
+fn in_hindsight(choices: &[Choice], taken: &[Taken]) -> String {
+    let pairs = hindsight::pairs(choices, taken);
     let mut table = tables::table(&["scene", "rays a build", "chosen", "best", "chosen / best"], 4);
     for pair in &pairs {
         let Pair { choice, best, .. } = pair;
@@ -131,7 +118,7 @@ fn in_hindsight(choices: &[Choice], records: &[&Record]) -> String {
     let percent = |part: f64| format!("{:.1}%", 100.0 * part);
     let part = hindsight::good_part(&pairs).map_or("–".into(), percent);
     let mut text = format!("{table}\nwithin 10% of the best: {part} of {} choices\n", pairs.len());
-    for (builder, part) in hindsight::good_parts_of_each(&pairs, records) {
+    for (builder, part) in hindsight::good_parts_of_each(&pairs, taken) {
         text += &format!("  {} always: {}\n", builder, percent(part));
     }
     text

@@ -3,13 +3,14 @@
 use super::elements::column;
 use super::names::short;
 use super::numbers::short_count;
-use crate::measure::choose::hindsight::{self, Choice, GOOD, Pair, RAYS};
+use crate::measure::choose::hindsight::{self, Choice, GOOD, Pair, RAYS, Taken};
 use crate::measure::record::Record;
 use maud::{Markup, html};
 
 /// Empty where nothing was chosen, or nothing that was chosen was measured.
 pub(super) fn section(choices: &[Choice], records: &[&Record]) -> Markup {
-    let pairs = hindsight::pairs(choices, records);
+    let taken: Vec<Taken> = records.iter().filter_map(|record| Taken::of(record)).collect();
+    let pairs = hindsight::pairs(choices, &taken);
     let Some(part) = hindsight::good_part(&pairs) else { return html! {} };
     let mut scenes: Vec<&str> = Vec::new();
     for pair in &pairs {
@@ -46,7 +47,7 @@ pub(super) fn section(choices: &[Choice], records: &[&Record]) -> Markup {
             }
             p { "Had one candidate been taken always, so many would be within the same:" }
             ul {
-                @for (builder, part) in hindsight::good_parts_of_each(&pairs, records) {
+                @for (builder, part) in hindsight::good_parts_of_each(&pairs, &taken) {
                     li { code { (short(&builder)) } ": " (format!("{:.0}%", 100.0 * part)) }
                 }
             }
@@ -111,12 +112,13 @@ mod tests {
         let choice = |rays, builder: &str| Choice { scene: "a".into(), rays, builder: builder.into() };
         // 1 ms + 1 µs a ray against 2 ms + 0.5 µs: they meet at 2,000 rays.
         let choices = [choice(1e4, "lbvh"), choice(1e5, "lbvh:codes=mc30"), choice(1e6, "lbvh:codes=emc64var")];
-        let pairs = hindsight::pairs(&choices, &records);
+        let taken: Vec<Taken> = records.iter().filter_map(|record| Taken::of(record)).collect();
+        let pairs = hindsight::pairs(&choices, &taken);
         assert_eq!(pairs.len(), 2, "what was not measured has no time");
         assert_eq!((pairs[0].ratio(), pairs[0].best.as_str()), (1.0, "lbvh"));
         assert!((pairs[1].ratio() - 101.0 / 52.0).abs() < 1e-12 && pairs[1].best == "lbvh", "{:?}", pairs[1]);
         assert_eq!(hindsight::good_part(&pairs), Some(0.5));
-        let each = hindsight::good_parts_of_each(&pairs, &records);
+        let each = hindsight::good_parts_of_each(&pairs, &taken);
         assert_eq!(each, [("lbvh:codes=mc30".to_owned(), 0.0), ("lbvh".to_owned(), 1.0)]);
         let page = section(&choices, &records).into_string();
         assert!(page.contains("1.94×") && page.contains("best: lbvh") && page.contains("50%"), "{page}");

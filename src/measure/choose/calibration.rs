@@ -22,18 +22,18 @@ pub const SCENES: [&str; 12] = [
     "gen:icosphere:3",
     "gen:icosphere:6",
     "gen:soup:3000:1",
-    "gen:soup:60000:2",
+    "gen:soup:30000:2",
     "gen:grid:60",
-    "gen:grid:200",
+    "gen:grid:120",
     "gen:stadium:5",
-    "gen:needles:4000:1",
+    "gen:needles:1500:1",
     "gen:twist:20000:1",
-    "gen:city:400",
+    "gen:city:60",
     "gen:forest:20",
     "gen:cells:40",
 ];
 /// Pixels of the picture that the rays belong to.
-const RAYS: RayOptions = RayOptions { size: [64, 48], seed: 1 };
+const RAYS: RayOptions = RayOptions { size: [48, 36], seed: 1 };
 /// Runs that count, after one that does not.
 const RUNS: u32 = 3;
 
@@ -51,27 +51,40 @@ pub fn measure(device: &Device, say: &mut dyn FnMut(&str)) -> Result<Vec<Measure
     for name in SCENES {
         say(&format!("calibrating on {name}"));
         let scene = scene::load(name, &LoadOptions::default())?;
-        measured.extend(on_scene(device, &scene, &specs)?);
+        measured.extend(on_scene(device, &scene, &specs, &Effort { rays: RAYS, runs: RUNS })?);
     }
     Ok(measured)
 }
 
-/// A candidate on a scene, and its times as they are measured.
+/// How much is measured.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// The picture that the rays belong to.
+    pub rays: RayOptions,
+    /// Runs that count, after one that does not.
+    pub runs: u32,
+}
+
+/// A candidate on a scene.
 struct Entry<'a> {
     spec: &'a Spec,
     subject: Box<dyn Subject + 'a>,
 }
 
-fn on_scene(device: &Device, scene: &Scene, specs: &[Spec]) -> Result<Vec<Measured>> {
+/// The least times of builders on a scene, over several runs in turn: what disturbs a run only adds to it. One that fails has none.
+///
+/// # Errors
+/// The scene has no triangles, or the image of the rays too many pixels.
+pub fn on_scene(device: &Device, scene: &Scene, specs: &[Spec], effort: &Effort) -> Result<Vec<Measured>> {
     let features = Features::of(&scene.mesh);
-    let rays = rays(scene)?;
+    let rays = rays(scene, &effort.rays)?;
     let count: usize = rays.iter().map(|(_, rays)| rays.len()).sum();
     let mut entries: Vec<Entry<'_>> = specs
         .iter()
         .filter_map(|spec| Some(Entry { spec, subject: spec.make(Some(device), &scene.mesh).ok()? }))
         .collect();
     // A run is a build and all rays; candidates take turns, as everything that is compared does.
-    let runs = in_turn(&mut entries, 1, RUNS, |entry| {
+    let runs = in_turn(&mut entries, 1, effort.runs, |entry| {
         let build_ms = entry.subject.build()?.milliseconds;
         let mut trace_ms = 0.0;
         for (query, rays) in rays.iter().filter(|(_, rays)| !rays.is_empty()) {
@@ -82,26 +95,26 @@ fn on_scene(device: &Device, scene: &Scene, specs: &[Spec]) -> Result<Vec<Measur
     });
     let measured = entries.iter().zip(runs).filter_map(|(entry, runs)| {
         let runs = runs.ok()?;
-        let median = |of: fn(&(f64, f64)) -> f64| Some(Spread::of(&runs.iter().map(of).collect::<Vec<_>>())?.median);
+        let least = |of: fn(&(f64, f64)) -> f64| Some(Spread::of(&runs.iter().map(of).collect::<Vec<_>>())?.min);
         Some(Measured {
             scene: scene.name.clone(),
             features,
             builder: entry.spec.to_string(),
-            build_ms: median(|run| run.0)?,
-            ray_ns: median(|run| run.1)? * 1e6 / count as f64,
+            build_ms: least(|run| run.0)?,
+            ray_ns: least(|run| run.1)? * 1e6 / count as f64,
         })
     });
     Ok(measured.collect())
 }
 
 /// All kinds of rays together, by what they ask for.
-fn rays(scene: &Scene) -> Result<[(Query, Vec<Ray>); 2]> {
+fn rays(scene: &Scene, options: &RayOptions) -> Result<[(Query, Vec<Ray>); 2]> {
     let mesh = &scene.mesh;
     let tree = lbvh::build(&mesh.positions, &mesh.triangles, Code::Mc63.full(), Collapse::SAH);
     let mut hits = |rays: &[Ray]| Ok(rays.par_iter().map(|ray| host::closest_hit(&tree, ray)).collect());
     let mut all = [(Query::ClosestHit, Vec::new()), (Query::AnyHit, Vec::new())];
     for kind in RayKind::ALL {
-        let rays = kinds::generate(kind, scene, &RAYS, &mut hits)?;
+        let rays = kinds::generate(kind, scene, options, &mut hits)?;
         all[usize::from(kind.query() == Query::AnyHit)].1.extend(rays);
     }
     Ok(all)

@@ -1,5 +1,6 @@
 //! Choices against what was measured: was the chosen builder the best, and if not, how much slower is it?
 
+use super::model::Measured;
 use super::model::Model;
 use super::{Features, candidates};
 use crate::measure::record::Record;
@@ -42,6 +43,32 @@ impl Pair {
     }
 }
 
+/// What a builder took on a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Taken {
+    /// The scene.
+    pub scene: String,
+    /// The builder, as `-b` takes it.
+    pub builder: String,
+    /// Milliseconds of a build and of a ray.
+    pub line: Line,
+}
+
+impl Taken {
+    /// By the medians of a record; `None` where nothing was traced.
+    pub fn of(record: &Record) -> Option<Taken> {
+        let line = Line::new(record.build.median_ms, record.mrays_s()?);
+        Some(Taken { scene: record.scene.clone(), builder: record.builder.clone(), line })
+    }
+}
+
+impl From<&Measured> for Taken {
+    fn from(measured: &Measured) -> Taken {
+        let line = Line { build: measured.build_ms, ray: measured.ray_ns * 1e-6 };
+        Taken { scene: measured.scene.clone(), builder: measured.builder.clone(), line }
+    }
+}
+
 /// The choices for a scene, for all of [`RAYS`].
 pub fn choices(model: &Model, scene: &Scene) -> Vec<Choice> {
     let features = Features::of(&scene.mesh);
@@ -54,17 +81,13 @@ pub fn choices(model: &Model, scene: &Scene) -> Vec<Choice> {
 
 /// Each choice beside the best of the candidates that were measured on its scene. A choice that was not measured itself is left
 /// out.
-pub fn pairs(choices: &[Choice], records: &[&Record]) -> Vec<Pair> {
-    let candidates = candidates::CANDIDATES;
+pub fn pairs(choices: &[Choice], taken: &[Taken]) -> Vec<Pair> {
+    let is_candidate = |t: &&Taken| candidates::CANDIDATES.contains(&t.builder.as_str());
     let pair = |choice: &Choice| {
-        let total = |record: &&Record| {
-            let line = Line::new(record.build.median_ms, record.mrays_s()?);
-            Some((line.at(choice.rays), record.builder.clone()))
-        };
-        let here = |r: &&&Record| r.scene == choice.scene && candidates.contains(&r.builder.as_str());
-        let totals: Vec<(f64, String)> = records.iter().filter(here).filter_map(total).collect();
-        let chosen_ms = totals.iter().find(|(_, builder)| *builder == choice.builder)?.0;
-        let (best_ms, best) = totals.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let here = || taken.iter().filter(is_candidate).filter(|t| t.scene == choice.scene);
+        let chosen_ms = here().find(|t| t.builder == choice.builder)?.line.at(choice.rays);
+        let best = here().min_by(|a, b| a.line.at(choice.rays).total_cmp(&b.line.at(choice.rays)))?;
+        let (best_ms, best) = (best.line.at(choice.rays), best.builder.clone());
         Some(Pair { choice: choice.clone(), chosen_ms, best, best_ms })
     };
     choices.iter().filter_map(pair).collect()
@@ -78,11 +101,11 @@ pub fn good_part(pairs: &[Pair]) -> Option<f64> {
 
 /// For each candidate, the part of all (scene, rays) for which it would have been good had it been taken always: what a choice has
 /// to be better than.
-pub fn good_parts_of_each(pairs: &[Pair], records: &[&Record]) -> Vec<(String, f64)> {
+pub fn good_parts_of_each(pairs: &[Pair], taken: &[Taken]) -> Vec<(String, f64)> {
     let part = |builder: &&str| {
         let always: Vec<Choice> =
             pairs.iter().map(|pair| Choice { builder: (*builder).to_owned(), ..pair.choice.clone() }).collect();
-        Some(((*builder).to_owned(), good_part(&self::pairs(&always, records))?))
+        Some(((*builder).to_owned(), good_part(&self::pairs(&always, taken))?))
     };
     candidates::CANDIDATES.iter().filter_map(part).collect()
 }
