@@ -1,7 +1,7 @@
 //! `hedgerow choose`: what `auto` would build, and why; and how good its choices are in hindsight.
 
 use super::options::{RaysPerBuild, Size};
-use super::{Bar, Common, tables, work};
+use super::{Bar, Common, Json, tables, work};
 use crate::gpu::Device;
 use crate::measure::choose::calibration::{self, Effort};
 use crate::measure::choose::hindsight::{self, Choice, Pair, Taken};
@@ -31,6 +31,8 @@ pub struct Arguments {
     /// Counted runs of every build and trace of --hindsight
     #[arg(long, value_name = "N", default_value = "3")]
     runs: NonZeroU32,
+    #[command(flatten)]
+    json: Json,
 }
 
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
@@ -40,7 +42,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         cache::model_of(&device, arguments.recalibrate, &mut |what| bar.say(what))?
     };
     let rays = common.rays_per_build.map_or(DEFAULT_RAYS, |RaysPerBuild(rays)| rays);
-    let (mut choices, mut taken) = (Vec::new(), Vec::new());
+    let (mut choices, mut taken, mut all) = (Vec::new(), Vec::new(), Vec::new());
     for name in &arguments.scenes {
         let scene = common.load(name)?;
         if arguments.hindsight {
@@ -49,11 +51,13 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
             let text = beside_estimates(&model, &scene, &measured);
             writeln!(std::io::stdout(), "{text}\n")?;
             taken.extend(measured.iter().map(Taken::from));
+            all.extend(measured);
         } else {
             writeln!(std::io::stdout(), "{}\n", estimates(&model, &scene, rays))?;
         }
     }
     if arguments.hindsight {
+        arguments.json.write_each(&all)?;
         writeln!(std::io::stdout(), "{}", in_hindsight(&choices, &taken))?;
     }
     work::finish(Some(&device), true)

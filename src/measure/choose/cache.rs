@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Version of the figures' meaning: of the features, the scenes and the rays.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// What a file holds: the figures, and what they belong to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -114,7 +114,7 @@ mod tests {
             driver: "Mesa 25.0.7".into(),
             candidates: vec!["lbvh".into()],
         };
-        let features = Features { triangles: 12, values: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6] };
+        let features = Features { triangles: 12, values: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7] };
         let measured =
             Measured { scene: "a".into(), features, builder: "lbvh".into(), build_ms: 1.0 / 3.0, ray_ns: 1e3 };
         Calibration { key, measured: vec![measured] }

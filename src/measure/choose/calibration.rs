@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 /// The scenes: of different sizes, and lying differently in their bounds (closed objects, sheets, soups, long thin triangles, a few
 /// large ones around many small ones, towns, plants), so that every figure of [`Features`] varies by itself.
-pub const SCENES: [&str; 12] = [
+pub const SCENES: [&str; 18] = [
     "gen:icosphere:3",
     "gen:icosphere:6",
     "gen:soup:3000:1",
@@ -26,11 +26,17 @@ pub const SCENES: [&str; 12] = [
     "gen:grid:60",
     "gen:grid:120",
     "gen:stadium:5",
+    "gen:stadium:6",
     "gen:needles:1500:1",
     "gen:twist:20000:1",
     "gen:city:60",
     "gen:forest:20",
     "gen:cells:40",
+    "gen:clutter:24:1",
+    "gen:clutter:60:2",
+    "gen:clutter:100:3",
+    "gen:clutter:150:4",
+    "gen:clutter:240:5",
 ];
 /// Pixels of the picture that the rays belong to.
 const RAYS: RayOptions = RayOptions { size: [48, 36], seed: 1 };

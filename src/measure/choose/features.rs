@@ -6,7 +6,10 @@ use crate::scene::Mesh;
 use serde::{Deserialize, Serialize};
 
 /// How many figures describe a scene.
-pub const COUNT: usize = 6;
+pub const COUNT: usize = 7;
+
+/// As many octaves below the scene's diagonal a triangle may be: the bits of a float.
+const FINEST: f64 = 24.0;
 
 /// The figures of a scene. All are logarithms to base 2: models of ratios are sums.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -21,10 +24,12 @@ pub struct Features {
 pub const NAMES: [&str; COUNT] = [
     // Triangles.
     "count",
-    // Diagonal of the scene over the mean diagonal of a triangle's box.
+    // Diagonal of the scene over that of a triangle's box: the mean of the logarithms over all triangles.
     "fineness",
-    // Root of the mean square of these diagonals over their mean: 0 where all are alike.
+    // The standard deviation of these logarithms: 0 where all triangles are of a size.
     "mixture",
+    // How much they are over 10, the bits of an axis in a 30-bit code, in the mean: what such a code cannot tell apart.
+    "blur",
     // Area of the full bounds over that of the concise ones (Riemersma 2024, equation 15).
     "fringe",
     // Area of the boxes of all triangles over that of the triangles on both sides: how empty boxes are.
@@ -38,37 +43,45 @@ impl Features {
     pub fn of(mesh: &Mesh) -> Features {
         let count = mesh.triangles.len();
         let (mut bounds, mut centroids) = (Aabb::EMPTY, Aabb::EMPTY);
-        let (mut diagonals, mut squares, mut boxes, mut surface) = (0.0, 0.0, 0.0, 0.0);
+        let (mut boxes, mut surface) = (0.0, 0.0);
+        let mut sizes: Vec<f64> = Vec::with_capacity(count);
         for i in 0..count {
             let corners = mesh.corners(i);
             let around = Aabb::around(&corners);
             let centroid = around.centroid();
             bounds = bounds.union(&around);
             centroids = centroids.union(&Aabb { lo: centroid, hi: centroid });
-            let square: f64 = extent(&around).iter().map(|e| e * e).sum();
-            diagonals += square.sqrt();
-            squares += square;
+            sizes.push(diagonal(&around).log2());
             boxes += half_area(&around);
             surface += area(&corners);
         }
-        let of_count = count as f64;
-        let diagonal = extent(&bounds).iter().map(|e| e * e).sum::<f64>().sqrt();
+        // In octaves; triangles without extent are as fine as floats tell apart.
+        let scene = diagonal(&bounds).log2();
+        let octaves = || sizes.iter().map(|size| (scene - size).min(FINEST));
+        let mean = octaves().sum::<f64>() / count as f64;
+        let variance = octaves().map(|o| (o - mean).powi(2)).sum::<f64>() / count as f64;
+        let blur = octaves().map(|o| (o - 10.0).max(0.0)).sum::<f64>() / count as f64;
         let concise = half_area(&code_bounds(&bounds, &centroids, true));
-        let ratios = [
-            of_count,
-            diagonal * of_count / diagonals,
-            (squares * of_count).sqrt() / diagonals,
-            half_area(&bounds) / concise,
-            boxes / surface,
-            boxes / half_area(&bounds),
+        let values = [
+            (count as f64).log2(),
+            mean,
+            variance.sqrt(),
+            blur,
+            (half_area(&bounds) / concise).log2(),
+            (boxes / surface).log2(),
+            (boxes / half_area(&bounds)).log2(),
         ];
-        let log = |ratio: f64| if ratio > 0.0 && ratio.is_finite() { ratio.log2() } else { 0.0 };
-        Features { triangles: count as u64, values: ratios.map(log) }
+        let number = |value: f64| if value.is_finite() { value } else { 0.0 };
+        Features { triangles: count as u64, values: values.map(number) }
     }
 }
 
 fn extent(b: &Aabb) -> [f64; 3] {
     std::array::from_fn(|i| f64::from(b.hi[i]) - f64::from(b.lo[i]))
+}
+
+fn diagonal(b: &Aabb) -> f64 {
+    extent(b).iter().map(|e| e * e).sum::<f64>().sqrt()
 }
 
 fn half_area(b: &Aabb) -> f64 {
@@ -99,11 +112,19 @@ mod tests {
         let Features { triangles, values } = Features::of(&mesh(&[a, b]));
         // The scene is 9 × 8; centroids lie from (1.5, 2) to (6, 4): concise bounds cut 1.5 and 2 from either side.
         let concise: f64 = (9.0 - 3.0) * (8.0 - 4.0);
-        let expected: [f64; COUNT] =
-            [2.0, 145f64.sqrt() / 7.5, 62.5f64.sqrt() / 7.5, 72.0 / concise, 60.0 / 30.0, 60.0 / 72.0];
+        // An octave apart: each half of it from the mean.
+        let expected: [f64; COUNT] = [
+            1.0,
+            (145f64 / 50.0).log2() / 2.0,
+            0.5,
+            0.0,
+            (72.0 / concise).log2(),
+            (60.0f64 / 30.0).log2(),
+            (60.0f64 / 72.0).log2(),
+        ];
         assert_eq!(triangles, 2);
         for ((name, value), expected) in NAMES.iter().zip(values).zip(expected) {
-            assert!((value - expected.log2()).abs() < 1e-12, "{name}: {value}, {}", expected.log2());
+            assert!((value - expected).abs() < 1e-12, "{name}: {value}, {expected}");
         }
     }
 

@@ -162,7 +162,7 @@ mod tests {
     use super::*;
 
     fn features(triangles: u64, crossing: f64) -> Features {
-        Features { triangles, values: [(triangles as f64).log2(), 0.0, 0.0, 0.0, 0.0, crossing] }
+        Features { triangles, values: [(triangles as f64).log2(), 0.0, 0.0, 0.0, 0.0, 0.0, crossing] }
     }
 
     /// One that builds fast and traces slowly, all the more where rays cross many boxes, and one that does the opposite.
