@@ -188,9 +188,9 @@ impl Polygon {
         let mut sum = [0.0; 3];
         for i in 1..self.count.saturating_sub(1) {
             let (a, b) = (offset(i), offset(i + 1));
-            for k in 0..3 {
+            for (k, sum) in sum.iter_mut().enumerate() {
                 let (x, y) = ((k + 1) % 3, (k + 2) % 3);
-                sum[k] += a[x] * b[y] - a[y] * b[x];
+                *sum += a[x] * b[y] - a[y] * b[x];
             }
         }
         0.5 * sum.iter().map(|x| x * x).sum::<f64>().sqrt()

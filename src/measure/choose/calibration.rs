@@ -141,11 +141,11 @@ mod tests {
         let mean = |k: usize| column(k).sum::<f64>() / scenes.len() as f64;
         let product =
             |j: usize, k: usize| -> f64 { column(j).zip(column(k)).map(|(a, b)| (a - mean(j)) * (b - mean(k))).sum() };
-        for j in 0..NAMES.len() {
-            assert!(product(j, j) > 0.1, "{} is nearly the same everywhere", NAMES[j]);
-            for k in 0..j {
+        for (j, one) in NAMES.iter().enumerate() {
+            assert!(product(j, j) > 0.1, "{one} is nearly the same everywhere");
+            for (k, other) in NAMES.iter().enumerate().take(j) {
                 let correlation = product(j, k) / (product(j, j) * product(k, k)).sqrt();
-                assert!(correlation.abs() < 0.97, "{} and {}: {correlation}", NAMES[j], NAMES[k]);
+                assert!(correlation.abs() < 0.97, "{one} and {other}: {correlation}");
             }
         }
         let most = scenes.iter().map(|f| f.triangles).max().expect("there are scenes");

@@ -52,10 +52,10 @@ impl Ridge {
                 |s: &Sample, k: usize| if deviation[k] > 0.0 { (s.0[k] - x_mean[k]) / deviation[k] } else { 0.0 };
             let mut matrix = [[0.0; COUNT + 1]; COUNT];
             for (j, row) in matrix.iter_mut().enumerate() {
-                for k in 0..COUNT {
-                    row[k] = mean(&|s| unit(s, j) * unit(s, k)) + if j == k { strength } else { 0.0 };
-                }
-                row[COUNT] = mean(&|s| unit(s, j) * (s.1 - y_mean));
+                *row = std::array::from_fn(|k| match k {
+                    COUNT => mean(&|s| unit(s, j) * (s.1 - y_mean)),
+                    _ => mean(&|s| unit(s, j) * unit(s, k)) + if j == k { strength } else { 0.0 },
+                });
             }
             let solved = solve(matrix);
             weights = std::array::from_fn(|k| if deviation[k] > 0.0 { solved[k] / deviation[k] } else { 0.0 });
@@ -76,9 +76,8 @@ fn solve(mut rows: [[f64; COUNT + 1]; COUNT]) -> [f64; COUNT] {
     for pivot in 0..COUNT {
         for row in pivot + 1..COUNT {
             let factor = rows[row][pivot] / rows[pivot][pivot];
-            for k in pivot..=COUNT {
-                rows[row][k] -= factor * rows[pivot][k];
-            }
+            let subtrahend = rows[pivot];
+            rows[row].iter_mut().zip(subtrahend).for_each(|(value, s)| *value -= factor * s);
         }
     }
     let mut solution = [0.0; COUNT];
