@@ -6,7 +6,7 @@
 use super::Subject;
 use super::choose::{self, Auto};
 use super::device_bvh::DeviceBvh;
-use super::host::HostLbvh;
+use super::host::{self, Hierarchy, Host};
 use super::peers::driver::Driver;
 #[cfg(feature = "peer-embree")]
 use super::peers::embree;
@@ -14,6 +14,8 @@ use super::peers::embree;
 use super::peers::obvhs;
 use crate::bvh::builder::{self, Method, Schedule, Window};
 use crate::bvh::codes::Codes;
+use crate::bvh::host::sweep::Leaves;
+use crate::bvh::reinsertion;
 use crate::bvh::sah::Collapse;
 use crate::gpu::{Device, DriverPreference};
 use crate::scene::Mesh;
@@ -66,10 +68,17 @@ const CODES: BuilderOption = BuilderOption {
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
 const RAYS: BuilderOption =
     BuilderOption { key: "rays", values: "rays that are traced between two builds, 1e7 unless given" };
+const TERMINATION: BuilderOption =
+    BuilderOption { key: "termination", values: "sah, or off: leaves of one triangle, then collapsed" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
 
+const OPTIMISE: BuilderOption =
+    BuilderOption { key: "optimise", values: "off, fast, medium, high, or a number of rounds of reinsertion" };
 const WINDOW: BuilderOption = BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
 const RADIUS: BuilderOption = BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
+
+/// Of `ploc` where it is not told: what drivers take.
+const PLOC_RADIUS: u32 = 16;
 
 /// Every builder, in the order in which they are listed and measured.
 pub static BUILDERS: &[Builder] = &[
@@ -89,6 +98,17 @@ pub static BUILDERS: &[Builder] = &[
             Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
         },
         check: |spec| spec.lbvh_options().map(drop),
+    },
+    Builder {
+        name: "ploc",
+        what: "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
+        options: &[CODES, COLLAPSE, SCHEDULE, RADIUS],
+        variants: &["ploc", "ploc:radius=25"],
+        needs: Needs::Device,
+        make: |spec, device, mesh| {
+            Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.ploc_options()?)?))
+        },
+        check: |spec| spec.ploc_options().map(drop),
     },
     Builder {
         name: "hploc",
@@ -115,11 +135,29 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "lbvh-host",
         what: "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte",
-        options: &[CODES, COLLAPSE],
+        options: &[CODES, COLLAPSE, OPTIMISE],
         variants: &["lbvh-host"],
         needs: Needs::Nothing,
-        make: |spec, _, mesh| Ok(Box::new(HostLbvh::new(&spec.to_string(), mesh, spec.codes()?, spec.collapse()?))),
-        check: |spec| spec.codes().and(spec.collapse()).map(drop),
+        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Lbvh),
+        check: |spec| spec.host_options(Hierarchy::Lbvh).map(drop),
+    },
+    Builder {
+        name: "ploc-host",
+        what: "locally-ordered clustering by one thread of the host: what `ploc` must equal, byte for byte",
+        options: &[RADIUS, CODES, COLLAPSE, OPTIMISE],
+        variants: &["ploc-host"],
+        needs: Needs::Nothing,
+        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Ploc(spec.ploc_radius()?)),
+        check: |spec| spec.host_options(Hierarchy::Ploc(spec.ploc_radius()?)).map(drop),
+    },
+    Builder {
+        name: "sweep",
+        what: "full-sweep SAH on the host: what the quality of the others is told against",
+        options: &[COLLAPSE, OPTIMISE, TERMINATION],
+        variants: &["sweep"],
+        needs: Needs::Nothing,
+        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Sweep(spec.sweep_leaves()?)),
+        check: |spec| spec.host_options(Hierarchy::Sweep(spec.sweep_leaves()?)).map(drop),
     },
     Builder {
         name: "driver-fast-build",
@@ -252,6 +290,13 @@ impl Spec {
         value.parse().map_err(|_| self.wrong_value(option, value))
     }
 
+    /// Those of `lbvh`, and `radius`.
+    fn ploc_options(&self) -> Result<builder::Options> {
+        let method = Method::Ploc { radius: self.number(&RADIUS, PLOC_RADIUS)? };
+        method.check()?;
+        Ok(builder::Options { method, ..self.lbvh_options()? })
+    }
+
     /// Those of `lbvh`, and `window` and `radius`.
     fn hploc_options(&self) -> Result<builder::Options> {
         let size = self.number(&WINDOW, Window::DEFAULT.size)?;
@@ -259,6 +304,45 @@ impl Spec {
         let method = Method::Hploc(Window { size, radius });
         method.check()?;
         Ok(builder::Options { method, ..self.lbvh_options()? })
+    }
+
+    /// Option `radius` of PLOC; 25 where it was not given.
+    fn ploc_radius(&self) -> Result<usize> {
+        let radius = self.number(&RADIUS, 25)?;
+        if radius > 0 { Ok(radius as usize) } else { Err(self.wrong_value(&RADIUS, "0")) }
+    }
+
+    /// Option `termination`, if `optimise` and `collapse` leave it a choice: both need leaves of one triangle.
+    fn sweep_leaves(&self) -> Result<Leaves> {
+        let single = !self.collapse()?.enabled || self.reinsertion()?.is_some();
+        match self.option(TERMINATION.key) {
+            Some("off") => Ok(Leaves::Single),
+            None | Some("sah") if single => Ok(Leaves::Single),
+            None | Some("sah") => Ok(Leaves::Terminated),
+            Some(other) => Err(self.wrong_value(&TERMINATION, other)),
+        }
+    }
+
+    /// Option `optimise`; off where it was not given.
+    fn reinsertion(&self) -> Result<Option<reinsertion::Options>> {
+        use reinsertion::Options;
+        Ok(match self.option(OPTIMISE.key) {
+            None | Some("off") => None,
+            Some("fast") => Some(Options::FAST),
+            Some("medium") => Some(Options::MEDIUM),
+            Some("high") => Some(Options::HIGH),
+            Some(_) => Some(Options::of_rounds(self.number(&OPTIMISE, 0)?)),
+        })
+    }
+
+    fn host_options(&self, hierarchy: Hierarchy) -> Result<host::Options> {
+        let (codes, collapse) = (self.codes()?, self.collapse()?);
+        Ok(host::Options { hierarchy, codes, reinsertion: self.reinsertion()?, collapse })
+    }
+
+    /// The subject of a builder on the host.
+    fn on_host<'a>(&self, mesh: &'a Mesh, hierarchy: Hierarchy) -> Result<Box<dyn Subject + 'a>> {
+        Ok(Box::new(Host::new(&self.to_string(), mesh, self.host_options(hierarchy)?)))
     }
 
     /// Options `codes`, `collapse` and `schedule`.
@@ -414,7 +498,7 @@ mod tests {
         assert!(error_of("lbvh-host:collapse=maybe").contains("take sah or off"));
         assert!(error_of("lbvh-host:codes").contains("write codes=VALUE"));
         assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
-        assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse"));
+        assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse, optimise"));
         assert!(error_of("driver-fast-build:codes=mc30").contains("it takes none"));
         assert!(error_of("auto:rays=many").contains("no number of rays"));
         assert!(error_of("").contains("-b all"));

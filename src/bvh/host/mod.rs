@@ -7,4 +7,8 @@ pub mod geometry;
 pub mod hploc;
 pub mod lbvh;
 mod over;
+pub mod ploc;
 pub mod refit;
+mod reinsertion;
+#[cfg(feature = "cli")]
+pub mod sweep;
