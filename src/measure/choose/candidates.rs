@@ -15,9 +15,10 @@ pub const CANDIDATES: &[&str] = &[
     "lbvh",
     // Long codes that look at sizes.
     "lbvh:codes=emc64var",
-    "hploc:codes=mc30",
     "hploc",
     "hploc:codes=emc64var",
+    "ploc",
+    "ploc:radius=25",
 ];
 
 /// The candidates that this device can build.
