@@ -55,6 +55,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "accel" if is("ranges") => accel::push_constants::ranges(),
         "accel" if is("serialize") => accel::push_constants::serialize(),
         "bvh" if is("compact") => bvh::compact::push_constants(),
+        "bvh" if is("epo") => bvh::epo::push_constants(),
         "bvh" if is("lbvh_workgroup") => bvh::lbvh_workgroup::push_constants(),
         "bvh" if ["encode", "lbvh", "collapse", "hploc", "ploc"].into_iter().any(is) => bvh::encode::push_constants(),
         "bvh" if is("quality") => bvh::quality::push_constants(),

@@ -4,6 +4,7 @@
 mod browser;
 
 use browser::Browser;
+use hedgerow::measure::choose::hindsight::Choice;
 use hedgerow::measure::matrix::{Failure, Outcome};
 use hedgerow::measure::provenance::Machine;
 use hedgerow::measure::record::{Build, Memory, Phase, Quality, Record, SCHEMA, Trace};
@@ -134,6 +135,10 @@ fn report(folder: &Path) -> Report {
         baseline: Some("driver-fast-build".into()),
         notes: Vec::new(),
         pictures,
+        choices: SCENES
+            .iter()
+            .map(|(scene, _)| Choice { scene: (*scene).into(), rays: 1e6, builder: "lbvh".into() })
+            .collect(),
     }
 }
 

@@ -156,3 +156,19 @@ fn an_empty_tree_has_no_hits_and_takes_no_work() {
     let (hit, work) = host::trace(&tree, &ray([0.0; 3], [1.0; 3]), Query::ClosestHit);
     assert_eq!((hit, work.steps, work.tests), (Hit::NONE, 0, 0));
 }
+
+#[test]
+fn a_leaf_is_visited_once_and_its_triangles_tested() {
+    let corners = soup(300, 0.3, 6);
+    let (flat, collapsed) = (tree_with(&corners, Collapse::OFF), tree_of(&corners));
+    let mut more_than_one = false;
+    for ray in hard_rays(&corners, 200, 1.0, [0.0; 3], 8) {
+        // One triangle a leaf.
+        let work = host::trace(&flat, &ray, Query::ClosestHit).1;
+        assert_eq!(work.leaves, work.tests, "{ray:?}");
+        let work = host::trace(&collapsed, &ray, Query::ClosestHit).1;
+        assert!(work.leaves <= work.tests, "{ray:?}");
+        more_than_one |= work.leaves < work.tests;
+    }
+    assert!(more_than_one, "a collapsed tree has leaves of several triangles");
+}

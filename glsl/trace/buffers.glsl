@@ -6,7 +6,7 @@
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Rays { HedgerowRay ray[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Hits { HedgerowHit hit[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 8) writeonly buffer Works { uvec2 work[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Works { uvec3 work[]; };
 
 layout(push_constant, scalar) uniform Arguments {
     Structure structure;

@@ -21,8 +21,8 @@ struct Walk {
     uint level;
     float best;
     HedgerowHit hit;
-    // Nodes visited, triangles tested.
-    uvec2 work;
+    // Nodes visited, triangles tested, leaves visited.
+    uvec3 work;
 };
 
 bool at_node(Walk walk) {
@@ -37,6 +37,11 @@ bool can_be_traced(Structure structure) {
     return structure.header.active_count != 0u && (structure.header.status & STATUS_UNUSABLE) == 0u;
 }
 
+// What is at hand has just been taken: a leaf counts.
+void count_leaf(inout Walk walk) {
+    if (at_triangle(walk)) walk.work.z++;
+}
+
 // At the root; a ray that cannot hit anything has nothing at hand and nothing that waits.
 void begin(HedgerowRay ray, Child root, bool usable, out Walk walk) {
     bool goes = hedgerow_prepare(ray, root.lo, root.hi, walk.ray) && usable;
@@ -45,7 +50,8 @@ void begin(HedgerowRay ray, Child root, bool usable, out Walk walk) {
     walk.level = 0;
     walk.best = walk.ray.t_max;
     walk.hit = HedgerowHit(HEDGEROW_INFINITY, HEDGEROW_NONE, 0.0, 0.0);
-    walk.work = uvec2(0);
+    walk.work = uvec3(0);
+    count_leaf(walk);
 }
 
 void visit(Node node, inout Walk walk) {
@@ -62,6 +68,7 @@ void visit(Node node, inout Walk walk) {
     }
     walk.index = b_first ? b.index : a.index;
     walk.left = enters_a || enters_b ? b_first ? b.count : a.count : NOTHING;
+    count_leaf(walk);
 }
 
 void test(Triangle triangle, bool any_hit, inout Walk walk) {
@@ -89,6 +96,7 @@ bool go_on(inout Walk walk) {
     HedgerowWaiting waiting = hedgerow_taken(walk.level);
     walk.index = waiting.index;
     walk.left = waiting.enter <= walk.best ? waiting.count : NOTHING;
+    count_leaf(walk);
     return true;
 }
 #endif

@@ -5,6 +5,7 @@ pub mod codes;
 mod collapse;
 pub mod compact;
 pub(crate) mod encode;
+pub mod epo;
 pub mod geometry;
 pub mod host;
 mod hploc;

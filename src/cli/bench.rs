@@ -4,7 +4,9 @@ use super::options::{Costs, Kinds, Size};
 use super::{Bar, Common};
 use crate::gpu::Device;
 use crate::measure::builders::{self, Needs, Spec};
+use crate::measure::choose::{Model, cache, candidates, hindsight};
 use crate::measure::matrix::{self, Failure, Outcome, Plan};
+use crate::measure::overlap::Epo;
 use crate::measure::peers::driver;
 use crate::measure::provenance::{self, Machine};
 use crate::report::names::slug;
@@ -47,6 +49,9 @@ pub struct Arguments {
     /// Costs of a traversal step and of a triangle test in the SAH
     #[arg(long, value_name = "C_T,C_I", default_value = "3,2")]
     costs: Costs,
+    /// Measure the end-point overlap: on, off, or cheap (given up after 5 s a tree)
+    #[arg(long, value_name = "on|off|cheap", default_value = "cheap")]
+    epo: Epo,
     /// No pictures of the scenes
     #[arg(long)]
     no_pictures: bool,
@@ -56,14 +61,24 @@ pub struct Arguments {
 }
 
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
-    let asked = builders::parse_list(&arguments.builder)?;
+    let asked = common.builders(&builders::parse_list(&arguments.builder)?);
     let scenes = scenes(common, arguments)?;
     // Before any work: a folder that cannot be written would lose all of it.
     let results = Results::create(&arguments.output)?;
     let device = open(common, &asked)?;
     let no_peer = device.as_ref().and_then(|device| driver::note(device.found()));
     let mut notes = Vec::new();
-    let builders = possible(asked, arguments, device.as_ref(), no_peer.as_deref(), &mut notes)?;
+    let mut builders = possible(asked, arguments, device.as_ref(), no_peer.as_deref(), &mut notes)?;
+    let model = builders.iter().any(|spec| spec.builder().name == "auto").then(|| calibrated(common, device.as_ref()));
+    let model = model.transpose()?.flatten();
+    if let (Some(_), Some(device)) = (&model, &device) {
+        // A choice can be held against the best only where all that could have been chosen are measured.
+        for spec in candidates::possible(device) {
+            if !builders.contains(&spec) {
+                builders.push(spec);
+            }
+        }
+    }
     let plan = Plan {
         builders,
         runs: arguments.runs.get(),
@@ -71,9 +86,17 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         rays: arguments.size.rays(common.seed),
         c_t: arguments.costs.step,
         c_i: arguments.costs.test,
+        epo: arguments.epo,
     };
-    let mut bench =
-        Bench { common, arguments, device: device.as_ref(), plan, results, report: empty(device.as_ref(), notes)? };
+    let mut bench = Bench {
+        common,
+        arguments,
+        device: device.as_ref(),
+        plan,
+        model,
+        results,
+        report: empty(device.as_ref(), notes)?,
+    };
     bench.report.options = options(common, arguments);
     bench.report.baseline = no_peer.is_none().then(|| "driver-fast-build".into());
     for scene in &scenes {
@@ -165,6 +188,12 @@ fn possible(
     Ok(kept)
 }
 
+/// The cost model of the device, measured under a progress bar where it is not known.
+fn calibrated(common: &Common, device: Option<&Device>) -> crate::Result<Option<Model>> {
+    let bar = Bar::new(common, "calibrating", 0);
+    device.map(|device| cache::model_of(device, false, &mut |what| bar.say(what))).transpose()
+}
+
 /// The report before anything was measured.
 fn empty(device: Option<&Device>, notes: Vec<String>) -> crate::Result<Report> {
     Ok(Report {
@@ -179,6 +208,7 @@ fn empty(device: Option<&Device>, notes: Vec<String>) -> crate::Result<Report> {
         baseline: None,
         notes,
         pictures: Vec::new(),
+        choices: Vec::new(),
     })
 }
 
@@ -200,6 +230,8 @@ struct Bench<'a> {
     arguments: &'a Arguments,
     device: Option<&'a Device>,
     plan: Plan,
+    /// Where `auto` is measured.
+    model: Option<Model>,
     results: Results,
     report: Report,
 }
@@ -214,6 +246,9 @@ impl Bench<'_> {
                 return Ok(());
             }
         };
+        if let Some(model) = &self.model {
+            self.report.choices.extend(hindsight::choices(model, &scene));
+        }
         let bar = Bar::new(self.common, &scene.name, 0);
         let say = |what: &str| bar.say(&format!("{}: {what}", scene.name));
         let (outcomes, failures) = matrix::measure(&scene, self.device, &self.plan, &mut |what| say(what));

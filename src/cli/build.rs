@@ -3,11 +3,15 @@
 use super::options::{Builders, Costs};
 use super::{Common, Json, tables, work};
 use crate::measure::matrix::Plan;
+use crate::measure::overlap::Epo;
 use crate::trace::kinds::RayOptions;
 use anyhow::{Context, bail};
 use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
+
+/// Pixels of the picture whose rays count leaves.
+const LEAF_COUNT_RAYS: [u32; 2] = [128, 96];
 
 /// Build a scene, validate the structure on the host, and print phases, quality and memory
 #[derive(Debug, clap::Args)]
@@ -23,6 +27,9 @@ pub struct Arguments {
     /// Costs of a traversal step and of a triangle test in the SAH
     #[arg(long, value_name = "C_T,C_I", default_value = "3,2")]
     costs: Costs,
+    /// Measure the end-point overlap: on, off, or cheap (given up after 5 s a tree)
+    #[arg(long, value_name = "on|off|cheap", default_value = "cheap")]
+    epo: Epo,
     /// Write the structure's bytes to a file (with one builder)
     #[arg(short, long, value_name = "TREE")]
     output: Option<PathBuf>,
@@ -31,7 +38,7 @@ pub struct Arguments {
 }
 
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
-    let builders = &arguments.builder.0;
+    let builders = &common.builders(&arguments.builder.0);
     if arguments.output.is_some() && builders.len() > 1 {
         return Err(crate::Error::Argument("-o takes the structure of one builder; name one with -b".into()).into());
     }
@@ -41,9 +48,10 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         builders: builders.clone(),
         runs: arguments.runs.get(),
         kinds: Vec::new(),
-        rays: RayOptions { size: [1, 1], seed: common.seed },
+        rays: RayOptions { size: LEAF_COUNT_RAYS, seed: common.seed },
         c_t: arguments.costs.step,
         c_i: arguments.costs.test,
+        epo: arguments.epo,
     };
     let (outcomes, all_right) = work::measured(common, &scene, device.as_ref(), &plan);
     if let Some(path) = &arguments.output {

@@ -4,6 +4,7 @@
 mod accel;
 mod bench;
 mod build;
+mod choose;
 mod compare;
 mod devices;
 mod options;
@@ -38,6 +39,7 @@ enum Command {
     Bench(bench::Arguments),
     Accel(accel::Arguments),
     Stability(stability::Arguments),
+    Choose(choose::Arguments),
     Compare(compare::Arguments),
     Devices(devices::Arguments),
     Build(build::Arguments),
@@ -77,6 +79,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Bench(arguments) => bench::run(common, arguments),
         Command::Accel(arguments) => accel::run(common, arguments),
         Command::Stability(arguments) => stability::run(common, arguments),
+        Command::Choose(arguments) => choose::run(common, arguments),
         Command::Compare(arguments) => compare::run(common, arguments),
         Command::Devices(arguments) => devices::run(common, arguments),
         Command::Build(arguments) => build::run(common, arguments),

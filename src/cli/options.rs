@@ -34,6 +34,9 @@ pub struct Common {
     /// The camera's vertical field of view
     #[arg(long, global = true, value_name = "DEGREES")]
     pub fov: Option<FieldOfView>,
+    /// Rays that are traced between two builds: what the builder auto chooses for [default: 1e7]
+    #[arg(long, global = true, value_name = "N")]
+    pub rays_per_build: Option<RaysPerBuild>,
     /// A folder with more scenes
     #[arg(long, global = true, env = "HEDGEROW_SCENES", value_name = "DIR")]
     pub scenes_dir: Option<PathBuf>,
@@ -49,6 +52,15 @@ impl Common {
             rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
         }
         Ok(())
+    }
+
+    /// The builders of `-b`, with the rays of `--rays-per-build` where one chooses by them.
+    pub fn builders(&self, asked: &[Spec]) -> Vec<Spec> {
+        let with_rays = |spec: &Spec| match self.rays_per_build {
+            Some(RaysPerBuild(rays)) => spec.clone().for_rays(rays),
+            None => spec.clone(),
+        };
+        asked.iter().map(with_rays).collect()
     }
 
     /// Opens the device; with `ray_query`, the driver's own acceleration structures come with it where it has them.
@@ -88,6 +100,19 @@ impl Common {
         if let Some(fov) = self.fov {
             camera.fov = fov.0;
         }
+    }
+}
+
+/// A number of rays, from 0 on; may be written `1e6`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RaysPerBuild(pub f64);
+
+impl FromStr for RaysPerBuild {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<RaysPerBuild, String> {
+        let rays = text.parse().ok().filter(|n: &f64| *n >= 0.0 && n.is_finite());
+        rays.map(RaysPerBuild).ok_or_else(|| format!("{text:?} is not a number of rays; write one as in 1e6"))
     }
 }
 
@@ -282,6 +307,14 @@ mod tests {
         assert_eq!("9/4".parse(), Ok(Steps(vec![0, 4, 8])));
         for wrong in ["", "x", "1,", "-1", "300", "60/0", "60/x", "/2"] {
             assert!(wrong.parse::<Steps>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn rays_per_build_are_counted_from_zero() {
+        assert_eq!("1e6".parse(), Ok(RaysPerBuild(1e6)));
+        for wrong in ["", "-1", "inf", "x"] {
+            assert!(wrong.parse::<RaysPerBuild>().is_err(), "{wrong}");
         }
     }
 

@@ -72,6 +72,8 @@ pub fn build(outcome: &Outcome) -> String {
             "structure",
             m.structure_bytes,
         ),
+        ("end-point overlap".into(), or_dash(q.epo, three_decimals), "", None),
+        ("leaf count variability".into(), or_dash(q.lcv, three_decimals), "", None),
         ("inner nodes".into(), or_dash(q.inner, grouped), "scratch", m.scratch_bytes),
         ("leaves".into(), or_dash(q.leaves, grouped), "peak", m.peak_bytes),
         ("triangles a leaf".into(), or_dash(q.prims_per_leaf, three_digits), "", None),

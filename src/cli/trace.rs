@@ -4,6 +4,7 @@ use super::options::{Builders, Kinds};
 use super::{Common, Json, Size, tables, work};
 use crate::measure::builders::Spec;
 use crate::measure::matrix::Plan;
+use crate::measure::overlap::Epo;
 use crate::report::numbers::{grouped, three_digits};
 use crate::scene::Scene;
 use crate::trace::{Query, files};
@@ -42,7 +43,7 @@ pub struct Arguments {
 }
 
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
-    let builders = &arguments.builder.0;
+    let builders = &common.builders(&arguments.builder.0);
     let files = arguments.rays_file.as_deref().zip(arguments.hits_file.as_deref());
     if files.is_some() && (builders.len() > 1 || arguments.json.json.is_some()) {
         let message =
@@ -69,6 +70,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         rays: arguments.size.rays(common.seed),
         c_t: 3.0,
         c_i: 2.0,
+        epo: Epo::Off,
     };
     let (outcomes, all_right) = work::measured(common, &scene, device.as_ref(), &plan);
     arguments.json.write_each(outcomes.iter().map(|outcome| &outcome.record))?;

@@ -4,6 +4,7 @@
 //! whoever adds one adds a row there.
 
 use super::Subject;
+use super::choose::{self, Auto};
 use super::device_bvh::DeviceBvh;
 use super::host::{self, Hierarchy, Host};
 use super::peers::driver::Driver;
@@ -66,6 +67,8 @@ const CODES: BuilderOption = BuilderOption {
              stretch factor weighs 1/N), with +concise, +centroid, +robust or /BITS behind",
 };
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
+const RAYS: BuilderOption =
+    BuilderOption { key: "rays", values: "rays that are traced between two builds, 1e7 unless given" };
 const TERMINATION: BuilderOption =
     BuilderOption { key: "termination", values: "sah, or off: leaves of one triangle, then collapsed" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
@@ -118,6 +121,17 @@ pub static BUILDERS: &[Builder] = &[
             Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.hploc_options()?)?))
         },
         check: |spec| spec.hploc_options().map(drop),
+    },
+    Builder {
+        name: "auto",
+        what: "the device's builder that takes least for a build and its rays, by its measured costs",
+        options: &[RAYS],
+        variants: &["auto"],
+        needs: Needs::Device,
+        make: |spec, device, mesh| {
+            Ok(Box::new(Auto::new(given(device)?, &spec.to_string(), mesh, choose::rays_of(spec.option(RAYS.key))?)?))
+        },
+        check: |spec| choose::rays_of(spec.option(RAYS.key)).map(drop),
     },
     Builder {
         name: "lbvh-host",
@@ -246,6 +260,15 @@ impl Spec {
     /// The value of an option, if it was given.
     pub fn option(&self, key: &str) -> Option<&str> {
         self.options.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str())
+    }
+
+    /// The same for so many rays a build, where it is one that chooses by them and has no number of its own.
+    pub fn for_rays(mut self, rays: f64) -> Spec {
+        let chooses = self.builder().options.iter().any(|option| option.key == RAYS.key);
+        if chooses && self.option(RAYS.key).is_none() {
+            self.options.push((RAYS.key.to_owned(), rays.to_string()));
+        }
+        self
     }
 
     /// Option `codes`.
@@ -462,6 +485,14 @@ mod tests {
     }
 
     #[test]
+    fn rays_a_build_reach_the_builder_that_chooses_by_them() {
+        let for_rays = |text: &str| text.parse::<Spec>().expect("known").for_rays(2e6).to_string();
+        assert_eq!(for_rays("auto"), "auto:rays=2000000");
+        assert_eq!(for_rays("auto:rays=5"), "auto:rays=5");
+        assert_eq!(for_rays("lbvh"), "lbvh");
+    }
+
+    #[test]
     fn what_is_wrong_is_named_with_what_there_is() {
         assert!(error_of("lvbh").contains("no builder is called \"lvbh\"; there are"));
         assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));
@@ -470,6 +501,7 @@ mod tests {
         assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
         assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse, optimise"));
         assert!(error_of("driver-fast-build:codes=mc30").contains("it takes none"));
+        assert!(error_of("auto:rays=many").contains("no number of rays"));
         assert!(error_of("").contains("-b all"));
         assert!(error_of(",").contains("-b all"));
     }

@@ -1,5 +1,6 @@
 //! Our trees built on the device as subjects: timestamps around each phase, our tracer.
 
+use super::overlap::{self, Epo};
 use super::{BuildRun, Subject, record};
 use crate::bvh::builder::{Builder, Input, Options, Sizes};
 use crate::bvh::layout::Bvh2;
@@ -127,6 +128,10 @@ impl Subject for DeviceBvh<'_> {
         let result = self.device.buffer("quality: figures", size_of::<Figures>() as u64)?;
         self.device.run(None, |r| measure.record(r, self.structure.address(), scratch.address(), result.address()))?;
         Ok(record::Quality::of(&result.read::<Figures>(1)[0].quality(c_t, c_i), c_t, c_i))
+    }
+
+    fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
+        overlap::on_device(self.device, self.structure.address(), self.input.primitive_count, (c_t, c_i), epo)
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {

@@ -1,5 +1,6 @@
 //! Builders on the host as subjects: wall-clock time, the host's tracer on every core.
 
+use super::overlap::{self, Epo};
 use super::{BuildRun, Subject, record};
 use crate::Result;
 use crate::bvh::codes::Codes;
@@ -115,6 +116,10 @@ impl Subject for Host<'_> {
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
         Ok(record::Quality::of(&quality::on_host(self.built(), c_t, c_i), c_t, c_i))
+    }
+
+    fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
+        Ok(overlap::on_host(self.built(), c_t, c_i, epo))
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {

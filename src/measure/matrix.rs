@@ -5,6 +5,7 @@
 
 use super::agreement::{Sample, wrong_where_different};
 use super::builders::Spec;
+use super::overlap::Epo;
 use super::provenance::{self, Machine};
 use super::record::{Build, Phase, Record, SCHEMA, Trace};
 use super::statistics::{Spread, in_turn};
@@ -16,7 +17,7 @@ use crate::bvh::sah::Collapse;
 use crate::gpu::Device;
 use crate::scene::Scene;
 use crate::trace::kinds::{self, RayKind, RayOptions};
-use crate::trace::{Hit, Query, Ray, host};
+use crate::trace::{Hit, Query, Ray, Work, host};
 use crate::{Error, Result};
 use rayon::prelude::*;
 
@@ -24,6 +25,8 @@ use rayon::prelude::*;
 const WARM_UPS: u32 = 1;
 /// Triangle tests that brute force may take for each kind of ray.
 const BRUTE_FORCE_TESTS: usize = 20_000_000;
+/// The rays of the leaf count variability: incoherent ones from the surfaces, one from each primary hit.
+const LCV_RAYS: RayKind = RayKind::Diffuse1;
 /// Rays that differ between two builders of which brute force looks at, at most.
 const DIFFERENCES: usize = 16;
 
@@ -42,6 +45,8 @@ pub struct Plan {
     pub c_t: f64,
     /// Cost of a triangle test in the SAH.
     pub c_i: f64,
+    /// Whether the end-point overlap is measured.
+    pub epo: Epo,
 }
 
 /// What one builder gave on one scene.
@@ -110,6 +115,7 @@ pub fn measure(
     rounds.once(|entry| {
         entry.record.memory = entry.subject.memory();
         entry.record.quality = entry.subject.quality(plan.c_t, plan.c_i)?;
+        entry.record.quality.epo = entry.subject.epo(plan.c_t, plan.c_i, plan.epo)?;
         if let Some(tree) = entry.subject.tree()?
             && let Err(error) = tree.validate()
         {
@@ -122,12 +128,13 @@ pub fn measure(
     let mesh = &scene.mesh;
     let reference = lbvh::build(&mesh.positions, &mesh.triangles, Code::Mc63.full(), Collapse::SAH);
     let mut closest_hits = Remembered { tree: &reference, last: Vec::new() };
-    for &kind in &plan.kinds {
+    for kind in traced_kinds(plan) {
         say(&format!("tracing {kind} rays"));
         let rays = kinds::generate(kind, scene, &plan.rays, &mut |rays| Ok(closest_hits.of(rays)));
         match rays {
             // Where nothing is hit there is nothing to follow: the kind is left out of the records.
             Ok(rays) if rays.is_empty() => {}
+            Ok(rays) if !plan.kinds.contains(&kind) => rounds.variability(kind, &rays),
             Ok(rays) => rounds.trace(kind, &rays, plan.runs, &reference),
             Err(error) => failures.push(Failure {
                 scene: scene.name.clone(),
@@ -250,6 +257,15 @@ impl<'a> Rounds<'_, 'a> {
         }
     }
 
+    /// Traces `rays` with every builder for the leaves that they visit, and nothing else.
+    fn variability(&mut self, kind: RayKind, rays: &[Ray]) {
+        self.once(|entry| {
+            entry.subject.set_rays(rays)?;
+            entry.record.quality.lcv = entry.subject.work(kind.query())?.as_deref().and_then(leaf_count_variability);
+            Ok(())
+        });
+    }
+
     /// Traces `rays` with every builder and compares what they hit.
     fn trace(&mut self, kind: RayKind, rays: &[Ray], runs: u32, truth: &Bvh2) {
         let query = kind.query();
@@ -279,6 +295,9 @@ impl<'a> Rounds<'_, 'a> {
                 }
             }
             let work = entry.subject.work(query)?;
+            if kind == LCV_RAYS {
+                entry.record.quality.lcv = work.as_deref().and_then(leaf_count_variability);
+            }
             let mean = |of: fn(&crate::trace::Work) -> u32| {
                 let work = work.as_ref().filter(|work| !work.is_empty())?;
                 Some(work.iter().map(|w| f64::from(of(w))).sum::<f64>() / work.len() as f64)
@@ -296,6 +315,18 @@ impl<'a> Rounds<'_, 'a> {
             Ok(())
         });
     }
+}
+
+/// The kinds that are asked for; where none is, that of the leaf count variability.
+fn traced_kinds(plan: &Plan) -> Vec<RayKind> {
+    if plan.kinds.is_empty() { vec![LCV_RAYS] } else { plan.kinds.clone() }
+}
+
+/// Standard deviation of the number of leaves that a ray visits (Aila, Karras, Laine 2013, section 3.3); `None` without rays.
+fn leaf_count_variability(work: &[Work]) -> Option<f64> {
+    let mean = |of: &dyn Fn(f64) -> f64| work.iter().map(|w| of(f64::from(w.leaves))).sum::<f64>() / work.len() as f64;
+    let leaves = mean(&|leaves| leaves);
+    (!work.is_empty()).then(|| mean(&|l| (l - leaves).powi(2)).sqrt())
 }
 
 /// Sum of t over the hits; of an any-hit query, the number of hits.
@@ -322,6 +353,7 @@ mod tests {
             rays: RayOptions { size: [16, 12], seed: 1 },
             c_t: 3.0,
             c_i: 2.0,
+            epo: Epo::On,
         }
     }
 
@@ -338,6 +370,8 @@ mod tests {
             assert_eq!((record.build.runs, record.trace.len()), (2, RayKind::ALL.len()));
             assert!(record.build.min_ms <= record.build.median_ms && record.build.median_ms <= record.build.max_ms);
             assert_eq!(record.quality.refs, Some(record.triangles));
+            assert!(record.quality.epo.is_some_and(|epo| epo > 0.0), "{:?}", record.quality);
+            assert!(record.quality.lcv.is_some_and(|lcv| lcv > 0.0), "{:?}", record.quality);
             let primary = record.rays("primary").expect("traced");
             assert_eq!(primary.count, 16 * 12);
             assert!(primary.steps.is_some_and(|steps| steps > 0.0), "{primary:?}");
@@ -355,6 +389,24 @@ mod tests {
         let (outcomes, failures) = measure(&scene, None, &plan("driver-fast-build,lbvh-host"), &mut |_| {});
         assert_eq!(outcomes.len(), 1);
         assert_eq!(failures[0].builder.as_deref(), Some("driver-fast-build"));
+    }
+
+    #[test]
+    fn leaves_are_counted_even_where_no_kind_is_traced() {
+        let scene = scene::load("gen:stadium:3", &LoadOptions::default()).expect("a generator");
+        let plan = Plan { kinds: Vec::new(), epo: Epo::Off, ..plan("lbvh-host") };
+        let (outcomes, _) = measure(&scene, None, &plan, &mut |_| {});
+        let record = &outcomes[0].record;
+        assert!(record.trace.is_empty() && record.quality.lcv.is_some() && record.quality.epo.is_none(), "{record:?}");
+    }
+
+    #[test]
+    fn variability_is_the_standard_deviation_of_the_leaves() {
+        let work = |leaves| Work { leaves, ..Work::default() };
+        // Mean 5, variance (9 + 1 + 1 + 9) / 4.
+        let lcv = leaf_count_variability(&[work(2), work(4), work(6), work(8)]).expect("four rays");
+        assert!((lcv - 5.0f64.sqrt()).abs() < 1e-12, "{lcv}");
+        assert_eq!(leaf_count_variability(&[]), None);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What is measured: a builder on a scene, behind one interface, ours and the peers' alike.
 
+use super::overlap::Epo;
 use super::record;
 use crate::bvh::layout::Bvh2;
 use crate::trace::{Hit, Query, Ray, Work};
@@ -36,6 +37,14 @@ pub trait Subject {
     /// # Errors
     /// The device failed.
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality>;
+    /// End-point overlap of the built tree with the costs of a step and of a test, if `epo` asks for it; `None` where it was not
+    /// measured.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn epo(&mut self, _c_t: f64, _c_i: f64, _epo: Epo) -> Result<Option<f64>> {
+        Ok(None)
+    }
     /// The tree on the host, where its layout is ours.
     ///
     /// # Errors

@@ -8,6 +8,7 @@ pub mod accel;
 pub mod beside;
 pub mod chart;
 pub mod charts;
+mod choosing;
 mod elements;
 pub mod labels;
 mod lines;
@@ -22,6 +23,7 @@ pub mod summary;
 pub mod table;
 pub mod theme;
 
+use crate::measure::choose::hindsight::Choice;
 use crate::measure::matrix::{Failure, Outcome};
 pub use crate::measure::provenance::DeviceFacts;
 use crate::measure::provenance::Machine;
@@ -56,6 +58,8 @@ pub struct Report {
     pub notes: Vec<String>,
     /// Pictures of the scenes, in files below the folder.
     pub pictures: Vec<Picture>,
+    /// What `auto` chose for every scene, before it was measured.
+    pub choices: Vec<Choice>,
 }
 
 /// A picture of a scene.

@@ -1,6 +1,7 @@
 //! `index.html`: one file that opens from the disk, with style, script and charts inside; pictures lie beside it.
 
 use super::chart::Chart;
+use super::choosing;
 use super::elements::{bar, column, facts, figure, foot, head, measured_by, number};
 use super::names::{short, slug};
 use super::numbers::{bytes, duration, grouped, short_count, three_digits};
@@ -30,11 +31,12 @@ pub(super) fn page(
             body {
                 a.skip href="#summary" { "Skip to the results" }
                 (header(report, legend, scenes))
-                (navigation(scenes, growth.is_some(), links))
+                (navigation(scenes, [!report.choices.is_empty(), growth.is_some()], links))
                 main {
                     @if !report.failures.is_empty() || records.iter().any(|r| r.valid == Some(false)) { (failures(report)) }
                     (summary_section(report, &records, legend))
                     @for scene in scenes { (scene_section(report, scene, legend)) }
+                    (choosing::section(&report.choices, &records))
                     @if let Some(chart) = growth { (growth_section(chart)) }
                     (results_section(&records, legend))
                     (method_section(report))
@@ -61,11 +63,12 @@ fn header(report: &Report, legend: &Legend, scenes: &[SceneCharts]) -> Markup {
     }
 }
 
-fn navigation(scenes: &[SceneCharts], growth: bool, links: &Markup) -> Markup {
+fn navigation(scenes: &[SceneCharts], [choosing, growth]: [bool; 2], links: &Markup) -> Markup {
     html! {
         nav aria-label="Sections" {
             a href="#summary" { "Summary" }
             @for scene in scenes { a href={ "#scene-" (slug(&scene.scene)) } { (scene.scene) } }
+            @if choosing { a href="#choosing" { "Choosing" } }
             @if growth { a href="#growth" { "Growth" } }
             a href="#results" { "All figures" }
             a href="#method" { "How it is measured" }
@@ -320,7 +323,7 @@ fn results_section(records: &[&Record], legend: &Legend) -> Markup {
                     thead { tr {
                         (column("scene", "", false)) (column("builder", "", false)) (column("triangles", "", true))
                         (column("build", "ms", true)) (column("min – max", "ms", true)) (column("build speed", "Mtri/s", true))
-                        (column("trace speed", "Mrays/s", true)) (column("SAH cost", "", true)) (column("depth", "", true))
+                        (column("trace speed", "Mrays/s", true)) (column("SAH cost", "", true)) (column("EPO", "", true)) (column("LCV", "", true)) (column("depth", "", true))
                         (column("leaf", "triangles", true)) (column("structure", "B/tri", true)) (column("scratch", "B/tri", true))
                         (column("right", "", false))
                     } }
@@ -337,6 +340,8 @@ fn results_section(records: &[&Record], legend: &Legend) -> Markup {
                                 (bar(Some(record.mtris_s()), build_most))
                                 (bar(record.mrays_s(), trace_most))
                                 (number(record.quality.sah, three_digits))
+                                (number(record.quality.epo, three_digits))
+                                (number(record.quality.lcv, three_digits))
                                 (number(record.quality.depth_max.map(|d| d as f64), |v| format!("{v:.0}")))
                                 (number(record.quality.prims_per_leaf, |v| format!("{v:.2}")))
                                 (number(a_triangle(record, record.memory.structure_bytes), |v| format!("{v:.1}")))
@@ -375,6 +380,16 @@ fn method_section(report: &Report) -> Markup {
                 dd {
                     "Expected work of a random ray: (3 · Σ area of inner nodes + 2 · Σ area × triangles of leaves) / area of the root. "
                     "Lower is better, and only trees of the same scene compare."
+                }
+                dt { "EPO" }
+                dd {
+                    "End-point overlap (Aila, Karras, Laine 2013): of all surface, what lies in a node's box and belongs to triangles of other "
+                    "subtrees, times what the node costs, summed over the nodes. Rays that end there visit the node in vain."
+                }
+                dt { "LCV" }
+                dd {
+                    "Leaf count variability (the same): the standard deviation of the number of leaves that a " b { "diffuse1" }
+                    " ray visits. Rays that are traced side by side wait for the one that visits most."
                 }
                 dt { "Right" }
                 dd {

@@ -23,6 +23,8 @@ pub fn table(records: &[&Record]) -> Table {
         "min – max",
         "Mtri/s",
         "SAH",
+        "EPO",
+        "LCV",
         "depth",
         "Mrays/s",
         "right",
@@ -37,12 +39,14 @@ pub fn table(records: &[&Record]) -> Table {
             format!("{} – {}", three_digits(record.build.min_ms), three_digits(record.build.max_ms)),
             three_digits(record.mtris_s()),
             figure(record.quality.sah),
+            figure(record.quality.epo),
+            figure(record.quality.lcv),
             record.quality.depth_max.map_or("–".into(), |depth| depth.to_string()),
             figure(record.mrays_s()),
             verdict(record.valid).to_owned(),
         ]);
     }
-    for column in [1, 3, 4, 5, 6, 7, 8] {
+    for column in [1, 3, 4, 5, 6, 7, 8, 9, 10] {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }

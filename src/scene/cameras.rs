@@ -41,6 +41,10 @@ pub(super) fn known(name: &str) -> Option<Camera> {
         // The object on the floor, the stands behind it.
         return Some(Camera { eye: [127.0, 3.0, -39.0], look: [123.0, 1.0, -45.0], up: Y, fov: 50.0 });
     }
+    if name.starts_with("gen:clutter:") {
+        // In the open corner of the room.
+        return Some(Camera { eye: [0.9, 0.6, 0.9], look: [-0.3, 0.25, -0.3], up: Y, fov: 60.0 });
+    }
     if name.starts_with("gen:city:") {
         // In a street of the first plot, in the boxes of eleven blocks.
         return Some(Camera { eye: [0.359, 0.06, -0.1], look: [0.359, 0.1, -0.35], up: Y, fov: 60.0 });

@@ -34,6 +34,7 @@ pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
     while let Some(child) = next {
         next = None;
         if child.is_leaf() {
+            work.leaves += 1;
             let first = child.index as usize;
             for triangle in &tree.records[first..first + child.count as usize] {
                 work.tests += 1;

@@ -2,6 +2,7 @@
 
 mod collapse;
 mod compact;
+pub mod epo;
 pub mod geometry;
 pub mod hploc;
 pub mod lbvh;

@@ -7,6 +7,7 @@ use crate::bvh::layout::{Bvh2, Child, Header, MAGIC, Node, Record, Triangle as O
 use crate::bvh::quality;
 use crate::gpu::Phase;
 use crate::measure::host::timed;
+use crate::measure::overlap::{self, Epo};
 use crate::measure::{BuildRun, Subject, record};
 use crate::scene::Mesh;
 use crate::trace::{Hit, Query, Ray, Work};
@@ -121,8 +122,8 @@ impl Obvhs {
     }
 }
 
-/// obvhs's tree in our layout, without triangles: its children lie side by side behind their parent's index.
-fn converted(tree: &Tree) -> Bvh2 {
+/// obvhs's tree in our layout: its children lie side by side behind their parent's index.
+fn converted(tree: &Tree, triangles: &[Triangle]) -> Bvh2 {
     let child = |node: &Bvh2Node, index| Child {
         lo: node.aabb().min.to_array(),
         hi: node.aabb().max.to_array(),
@@ -154,7 +155,13 @@ fn converted(tree: &Tree) -> Bvh2 {
         nodes.push(Node { children });
     }
     header.inner_nodes = nodes.len() as u32;
-    Bvh2 { header, nodes, records: Vec::new(), geometries: Vec::new() }
+    let record = |&primitive: &u32| {
+        let Triangle { v0, v1, v2 } = &triangles[primitive as usize];
+        let [v0, v1, v2] = [v0, v1, v2].map(|v| v.to_array());
+        OurTriangle { v0, v1, v2, primitive }
+    };
+    let records = tree.primitive_indices.iter().map(record).collect();
+    Bvh2 { header, nodes, records, geometries: Vec::new() }
 }
 
 impl Subject for Obvhs {
@@ -191,7 +198,11 @@ impl Subject for Obvhs {
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
-        Ok(record::Quality::of(&quality::on_host(&converted(&self.tree), c_t, c_i), c_t, c_i))
+        Ok(record::Quality::of(&quality::on_host(&converted(&self.tree, &self.triangles), c_t, c_i), c_t, c_i))
+    }
+
+    fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
+        Ok(overlap::on_host(&converted(&self.tree, &self.triangles), c_t, c_i, epo))
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {

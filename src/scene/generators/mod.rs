@@ -3,6 +3,7 @@
 mod cables;
 mod cells;
 mod city;
+mod clutter;
 mod forest;
 mod meshes;
 mod prism;
@@ -44,7 +45,7 @@ enum Recipe {
 /// Parts and their instances.
 type Placed = (Vec<Mesh>, Vec<Instance>);
 
-const GENERATORS: [Generator; 10] = [
+const GENERATORS: [Generator; 11] = [
     Generator {
         pattern: "gen:icosphere:N",
         what: "a sphere of 20*4^N triangles",
@@ -69,6 +70,11 @@ const GENERATORS: [Generator; 10] = [
         pattern: "gen:needles:N:SEED",
         what: "N long thin triangles anywhere",
         recipe: Recipe::Mesh(Some, meshes::needles),
+    },
+    Generator {
+        pattern: "gen:clutter:N:SEED",
+        what: "N things of all sizes in a room",
+        recipe: Recipe::Mesh(clutter::triangles, clutter::clutter),
     },
     Generator {
         pattern: "gen:forest:N",

@@ -1,0 +1,128 @@
+//! The page's section on `auto`: its choices for every scene and so many rays a build, beside the best in hindsight.
+
+use super::elements::column;
+use super::names::short;
+use super::numbers::short_count;
+use crate::measure::choose::hindsight::{self, Choice, GOOD, Pair, RAYS, Taken};
+use crate::measure::record::Record;
+use maud::{Markup, html};
+
+/// Empty where nothing was chosen, or nothing that was chosen was measured.
+pub(super) fn section(choices: &[Choice], records: &[&Record]) -> Markup {
+    let taken: Vec<Taken> = records.iter().filter_map(|record| Taken::of(record)).collect();
+    let pairs = hindsight::pairs(choices, &taken);
+    let Some(part) = hindsight::good_part(&pairs) else { return html! {} };
+    let mut scenes: Vec<&str> = Vec::new();
+    for pair in &pairs {
+        if !scenes.contains(&pair.choice.scene.as_str()) {
+            scenes.push(&pair.choice.scene);
+        }
+    }
+    let of = |scene: &str, rays: f64| pairs.iter().find(|p| p.choice.scene == scene && p.choice.rays == rays);
+    html! {
+        section #choosing {
+            h2 { "What auto chooses" }
+            p {
+                "For each scene and number of rays a build: the builder that " code { "auto" } " takes, by a cost model of this device that has "
+                "seen none of these scenes, and how many times the best candidate's total time that takes. "
+                b { (format!("{:.0}%", 100.0 * part)) } " of the " (pairs.len()) " choices are within "
+                (format!("{:.0}%", 100.0 * GOOD)) " of the best."
+            }
+            div.scroll tabindex="0" role="region" aria-label="Choices beside the best" {
+                table.sortable #choices-table {
+                    caption.hidden { "Choices of auto beside the best in hindsight" }
+                    thead { tr {
+                        (column("scene", "", false))
+                        @for rays in RAYS { (column(&short_count(rays), "rays a build", true)) }
+                    } }
+                    tbody {
+                        @for scene in scenes {
+                            tr {
+                                th scope="row" data-value=(scene) { (scene) }
+                                @for rays in RAYS { (cell(of(scene, rays))) }
+                            }
+                        }
+                    }
+                }
+            }
+            p { "Had one candidate been taken always, so many would be within the same:" }
+            ul {
+                @for (builder, part) in hindsight::good_parts_of_each(&pairs, &taken) {
+                    li { code { (short(&builder)) } ": " (format!("{:.0}%", 100.0 * part)) }
+                }
+            }
+        }
+    }
+}
+
+fn cell(pair: Option<&Pair>) -> Markup {
+    let Some(pair) = pair else { return html! { td.number data-value="" { "–" } } };
+    let is_best = pair.best == pair.choice.builder;
+    html! {
+        td.number .wrong[pair.ratio() > 1.0 + GOOD] data-value=(pair.ratio()) {
+            (format!("{:.2}×", pair.ratio()))
+            small { (short(&pair.choice.builder)) @if !is_best { br; "best: " (short(&pair.best)) } }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::record::{Build, Quality, SCHEMA, Trace};
+
+    fn record(builder: &str, median_ms: f64, mrays_s: f64) -> Record {
+        let build =
+            Build { runs: 1, median_ms, min_ms: median_ms, max_ms: median_ms, timer: "device".into(), phases: vec![] };
+        let trace = Trace {
+            rays: "primary".into(),
+            count: 100,
+            hits: 50,
+            mrays_s,
+            steps: None,
+            tests: None,
+            runs: 1,
+            checksum: "1".into(),
+        };
+        Record {
+            schema: SCHEMA,
+            scene: "a".into(),
+            triangles: 10,
+            builder: builder.into(),
+            kind: "bvh2".into(),
+            device: "d".into(),
+            driver: "d".into(),
+            subgroup: 8,
+            commit: "c".into(),
+            when: "w".into(),
+            build,
+            memory: Default::default(),
+            quality: Quality::default(),
+            trace: vec![trace],
+            valid: Some(true),
+        }
+    }
+
+    #[test]
+    fn choices_stand_beside_the_best_that_was_measured() {
+        // Two candidates, and one that is none and is better than both.
+        let records =
+            [record("lbvh:codes=mc30", 1.0, 1.0), record("lbvh", 2.0, 2.0), record("driver-fast-build", 0.1, 9.0)];
+        let records: Vec<&Record> = records.iter().collect();
+        let choice = |rays, builder: &str| Choice { scene: "a".into(), rays, builder: builder.into() };
+        // 1 ms + 1 µs a ray against 2 ms + 0.5 µs: they meet at 2,000 rays.
+        let choices = [choice(1e4, "lbvh"), choice(1e5, "lbvh:codes=mc30"), choice(1e6, "lbvh:codes=emc64var")];
+        let taken: Vec<Taken> = records.iter().filter_map(|record| Taken::of(record)).collect();
+        let pairs = hindsight::pairs(&choices, &taken);
+        assert_eq!(pairs.len(), 2, "what was not measured has no time");
+        assert_eq!((pairs[0].ratio(), pairs[0].best.as_str()), (1.0, "lbvh"));
+        assert!((pairs[1].ratio() - 101.0 / 52.0).abs() < 1e-12 && pairs[1].best == "lbvh", "{:?}", pairs[1]);
+        assert_eq!(hindsight::good_part(&pairs), Some(0.5));
+        let each = hindsight::good_parts_of_each(&pairs, &taken);
+        assert_eq!(each, [("lbvh:codes=mc30".to_owned(), 0.0), ("lbvh".to_owned(), 1.0)]);
+        let page = section(&choices, &records).into_string();
+        assert!(page.contains("1.94×") && page.contains("best: lbvh") && page.contains("50%"), "{page}");
+        assert_eq!(section(&choices[2..], &records).into_string(), "");
+        assert_eq!(hindsight::good_part(&[]), None);
+    }
+}
