@@ -33,7 +33,7 @@ impl CodeBounds {
     }
 
     /// These bounds of primitives with such bounds of boxes and centroids; [`CodeBounds::Robust`] begins with the boxes'.
-    pub(super) fn of(self, boxes: &Aabb, centroids: &Aabb) -> Aabb {
+    pub fn of(self, boxes: &Aabb, centroids: &Aabb) -> Aabb {
         match self {
             CodeBounds::Full | CodeBounds::Robust => *boxes,
             CodeBounds::Centroid => *centroids,

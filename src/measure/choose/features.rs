@@ -1,6 +1,6 @@
 //! What is known of a scene before anything is built: one pass over the boxes of its triangles.
 
-use crate::bvh::codes::code_bounds;
+use crate::bvh::codes::CodeBounds;
 use crate::bvh::layout::Aabb;
 use crate::scene::Mesh;
 use serde::{Deserialize, Serialize};
@@ -61,7 +61,7 @@ impl Features {
         let mean = octaves().sum::<f64>() / count as f64;
         let variance = octaves().map(|o| (o - mean).powi(2)).sum::<f64>() / count as f64;
         let blur = octaves().map(|o| (o - 10.0).max(0.0)).sum::<f64>() / count as f64;
-        let concise = half_area(&code_bounds(&bounds, &centroids, true));
+        let concise = half_area(&CodeBounds::Concise.of(&bounds, &centroids));
         let values = [
             (count as f64).log2(),
             mean,
