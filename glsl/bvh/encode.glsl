@@ -41,6 +41,8 @@ BUFFER BuildState {
     uint active_count;
     uint status;
     CodePlan plan;
+    uint cluster_counts[2];               // of PLOC: of even and odd rounds
+    uint is_forced[2];
 };
 
 // What a build is given: the push constants, or variables that the shader sets first. `vertices` to `transform` with

@@ -8,7 +8,7 @@
 #include "bvh/encode.glsl"
 
 // Bytes of BuildState with its room to spare: STATE_BYTES in src/bvh/encode.rs.
-const uint STATE_BYTES = 768;
+const uint STATE_BYTES = 1536;
 const uint IS_PRIMITIVE = 1u << 31;
 // In the count of a node: it is cheaper as a leaf.
 const uint IS_LEAF = 1u << 31;

@@ -7,7 +7,7 @@ use super::codes::{Code, Codes};
 use super::encode::Encode;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::sah::Collapse;
-use super::{hploc, layout, lbvh, lbvh_workgroup};
+use super::{collapse, hploc, layout, lbvh, lbvh_workgroup, ploc};
 use crate::gpu::radix_sort::{self, Shape};
 use crate::gpu::{Context, Kernel, Recorder, Step, shaders};
 use crate::{Error, Result};
@@ -55,6 +55,12 @@ impl Default for Options {
 pub enum Method {
     /// Linear BVH: split where the highest bit of the codes changes (Lauterbach et al. 2009). The fastest build.
     Lbvh,
+    /// Parallel locally-ordered clustering (Meister and Bittner 2018): neighbours in the order, so many places away at most, are
+    /// merged in rounds.
+    Ploc {
+        /// Neighbours on either side that a cluster looks at, 1 to [`Method::MOST_RADIUS`].
+        radius: u32,
+    },
     /// Hierarchical PLOC (Benthin et al. 2024): neighbours in windows of the order are merged. Better trees for little more time.
     Hploc(Window),
 }
@@ -76,6 +82,9 @@ impl Window {
 }
 
 impl Method {
+    /// The most neighbours that PLOC looks at.
+    pub const MOST_RADIUS: u32 = 256;
+
     /// # Errors
     /// A parameter out of range.
     pub fn check(self) -> Result<()> {
@@ -89,6 +98,9 @@ impl Method {
                     Window::MOST
                 )))
             }
+            Method::Ploc { radius } if !(1..=Method::MOST_RADIUS).contains(&radius) => {
+                Err(Error::Argument(format!("PLOC with radius {radius}: it is 1 to {}", Method::MOST_RADIUS)))
+            }
             _ => Ok(()),
         }
     }
@@ -97,7 +109,7 @@ impl Method {
     fn takes(self, schedule: Schedule) -> bool {
         match self {
             Method::Lbvh => true,
-            Method::Hploc(_) => schedule != Schedule::Workgroup,
+            Method::Ploc { .. } | Method::Hploc(_) => schedule != Schedule::Workgroup,
         }
     }
 }
@@ -212,7 +224,7 @@ impl Builder {
             alone,
             method_bytes: match options.method {
                 Method::Lbvh => 0,
-                Method::Hploc(_) => hploc::scratch_bytes(primitive_count),
+                Method::Ploc { .. } | Method::Hploc(_) => clusters_bytes(primitive_count),
             },
             shared_memory: limits.shared_memory,
         };
@@ -293,6 +305,8 @@ impl Builder {
             (Method::Lbvh, Schedule::Workgroup) => vec![encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, input)],
             (Method::Lbvh, Schedule::Persistent) => lbvh::persistent_kernels(encode, input),
             (Method::Lbvh, Schedule::Chain) => [encode.kernels(input), lbvh::kernels(encode, input)].concat(),
+            (&Method::Ploc { radius }, Schedule::Persistent) => ploc::persistent_kernels(encode, radius, input),
+            (&Method::Ploc { radius }, _) => [encode.kernels(input), ploc::kernels(encode, radius, input)].concat(),
             (Method::Hploc(window), Schedule::Persistent) => hploc::persistent_kernels(encode, window, input),
             (Method::Hploc(window), _) => [encode.kernels(input), hploc::kernels(encode, window, input)].concat(),
         }
@@ -342,6 +356,12 @@ impl Builder {
             (Method::Lbvh, Schedule::Chain | Schedule::Workgroup) => {
                 [encode.steps(&job.input, &arguments), lbvh::steps(encode, &job.input, &arguments)].concat()
             }
+            (&Method::Ploc { radius }, Schedule::Persistent) => {
+                ploc::persistent_steps(encode, radius, &job.input, &arguments, *workers)
+            }
+            (&Method::Ploc { radius }, _) => {
+                [encode.steps(&job.input, &arguments), ploc::steps(encode, radius, &job.input, &arguments)].concat()
+            }
             (Method::Hploc(window), Schedule::Persistent) => {
                 hploc::persistent_steps(encode, window, &job.input, &arguments, *workers)
             }
@@ -350,6 +370,12 @@ impl Builder {
             }
         })
     }
+}
+
+/// Bytes of scratch memory behind the state: weights, and a `Cluster` of clusters.glsl a primitive.
+fn clusters_bytes(count: u32) -> u64 {
+    const CLUSTER_BYTES: u64 = 40;
+    collapse::weights_bytes(count.into()) + CLUSTER_BYTES * u64::from(count)
 }
 
 /// Primitives up to which one workgroup is faster than a chain of dispatches.

@@ -40,7 +40,7 @@ pub(super) struct Scratch {
 }
 
 /// Bytes of `BuildState` in encode.glsl, with room to spare.
-pub(super) const STATE_BYTES: u64 = 768;
+pub(super) const STATE_BYTES: u64 = 1536;
 
 push_constants! {
     /// Push constants of `glsl/bvh/encode_*.comp` and `glsl/bvh/lbvh_*.comp`.

@@ -9,15 +9,6 @@ use super::encode::{Arguments, Encode};
 use super::geometry::Input;
 use crate::gpu::{Kernel, Step, shaders};
 
-/// Bytes of a `Cluster` in clusters.glsl.
-const CLUSTER_BYTES: u64 = 40;
-
-/// Bytes of scratch memory behind the state: weights and clusters.
-pub(super) fn scratch_bytes(count: u32) -> u64 {
-    let count = u64::from(count);
-    collapse::weights_bytes(count) + CLUSTER_BYTES * count
-}
-
 fn kernel(encode: &Encode, window: &Window, shader: &'static shaders::Shader, input: &Input) -> Kernel {
     encode.reading_kernel_with(shader, input, &[window.size, window.radius, collapse::treelet(encode)])
 }

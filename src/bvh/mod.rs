@@ -11,6 +11,7 @@ mod hploc;
 pub mod layout;
 mod lbvh;
 pub(crate) mod lbvh_workgroup;
+mod ploc;
 pub mod quality;
 pub mod refit;
 pub mod reinsertion;

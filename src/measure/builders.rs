@@ -74,6 +74,9 @@ const OPTIMISE: BuilderOption =
 const WINDOW: BuilderOption = BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
 const RADIUS: BuilderOption = BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
 
+/// Of `ploc` where it is not told: what drivers take.
+const PLOC_RADIUS: u32 = 16;
+
 /// Every builder, in the order in which they are listed and measured.
 pub static BUILDERS: &[Builder] = &[
     Builder {
@@ -92,6 +95,17 @@ pub static BUILDERS: &[Builder] = &[
             Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
         },
         check: |spec| spec.lbvh_options().map(drop),
+    },
+    Builder {
+        name: "ploc",
+        what: "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
+        options: &[CODES, COLLAPSE, SCHEDULE, RADIUS],
+        variants: &["ploc", "ploc:radius=25"],
+        needs: Needs::Device,
+        make: |spec, device, mesh| {
+            Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.ploc_options()?)?))
+        },
+        check: |spec| spec.ploc_options().map(drop),
     },
     Builder {
         name: "hploc",
@@ -251,6 +265,13 @@ impl Spec {
     fn number(&self, option: &BuilderOption, default: u32) -> Result<u32> {
         let Some(value) = self.option(option.key) else { return Ok(default) };
         value.parse().map_err(|_| self.wrong_value(option, value))
+    }
+
+    /// Those of `lbvh`, and `radius`.
+    fn ploc_options(&self) -> Result<builder::Options> {
+        let method = Method::Ploc { radius: self.number(&RADIUS, PLOC_RADIUS)? };
+        method.check()?;
+        Ok(builder::Options { method, ..self.lbvh_options()? })
     }
 
     /// Those of `lbvh`, and `window` and `radius`.

@@ -1,4 +1,4 @@
-//! The device's H-PLOC equals the host's, byte for byte, for every window, code and schedule, over inputs that hurt.
+//! The device's trees equal the host's, byte for byte, for every method, code and schedule, over inputs that hurt.
 
 mod common;
 
@@ -9,12 +9,15 @@ use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
 
-const WINDOWS: [Window; 3] = [Window::DEFAULT, Window { size: 64, radius: 16 }, Window { size: 4, radius: 1 }];
-
-fn on_host(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, window: Window, collapse: &Collapse) -> Bvh2 {
+fn on_host(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, method: Method) -> Bvh2 {
     let radix = host::lbvh::build(positions, triangles, codes, Collapse::OFF);
-    let window = host::hploc::Window { size: window.size as usize, radius: window.radius as usize };
-    host::hploc::build(&radix, window).collapsed(collapse)
+    match method {
+        Method::Lbvh => radix,
+        Method::Ploc { radius } => host::ploc::build(&radix, radius as usize),
+        Method::Hploc(Window { size, radius }) => {
+            host::hploc::build(&radix, host::hploc::Window { size: size as usize, radius: radius as usize })
+        }
+    }
 }
 
 fn on_device(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &Options) -> Bvh2 {
@@ -33,25 +36,37 @@ fn on_device(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &Options) 
     Bvh2::from_bytes(&structure.read::<u8>(sizes.structure as usize)).unwrap()
 }
 
-#[test]
-fn every_window_code_and_schedule_gives_the_bytes_of_the_host() {
-    for (name, positions, triangles) in corpus::meshes() {
-        for (window, codes) in
-            WINDOWS.into_iter().zip([Code::Emc64Var.full(), Code::Mc30.full(), Code::Mc63.full().with_bits(17)])
-        {
+/// The trees of `methods`, one for each of some codes, by the chain and by the pool.
+fn equals_the_host(methods: [Method; 3]) {
+    let codes = [Code::Emc64Var.full(), Code::Mc30.full(), Code::Mc63.full().with_bits(17)];
+    // The largest takes rounds that many workgroups share.
+    let meshes = corpus::meshes().into_iter().chain([corpus::random("random 9000", 9000, [-0.5; 3], [1.0; 3])]);
+    for (name, positions, triangles) in meshes {
+        for (method, codes) in methods.into_iter().zip(codes) {
+            let tree = on_host(&positions, &triangles, codes, method);
             for collapse in [Collapse::OFF, Collapse::SAH] {
-                let expected = on_host(&positions, &triangles, codes, window, &collapse);
-                expected.validate().unwrap_or_else(|e| panic!("{name} {codes} {window:?}: {e}"));
+                let expected = tree.collapsed(&collapse);
+                expected.validate().unwrap_or_else(|e| panic!("{name} {codes} {method:?}: {e}"));
                 for schedule in [Schedule::Chain, Schedule::Persistent] {
-                    let method = Method::Hploc(window);
                     let options =
                         Options { method, codes: Some(codes), collapse, schedule: Some(schedule), ..Options::DEFAULT };
                     let got = on_device(&positions, &triangles, &options);
-                    assert_eq!(got.header, expected.header, "{name} {codes} {window:?} {schedule:?}");
+                    assert_eq!(got.header, expected.header, "{name} {codes} {method:?} {schedule:?}");
                     let same = got.to_bytes() == expected.to_bytes();
-                    assert!(same, "{name} {codes} {window:?} {collapse:?} {schedule:?}: other bytes");
+                    assert!(same, "{name} {codes} {method:?} {collapse:?} {schedule:?}: other bytes");
                 }
             }
         }
     }
+}
+
+#[test]
+fn ploc_gives_the_bytes_of_the_host() {
+    equals_the_host([25, 100, 1].map(|radius| Method::Ploc { radius }));
+}
+
+#[test]
+fn hploc_gives_the_bytes_of_the_host() {
+    let windows = [Window::DEFAULT, Window { size: 64, radius: 16 }, Window { size: 4, radius: 1 }];
+    equals_the_host(windows.map(Method::Hploc));
 }
