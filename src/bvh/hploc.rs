@@ -15,7 +15,8 @@ fn kernel(encode: &Encode, window: &Window, shader: &'static shaders::Shader, in
 
 /// The kernels of [`steps`].
 pub(super) fn kernels(encode: &Encode, window: &Window, input: &Input) -> Vec<Kernel> {
-    vec![kernel(encode, window, &shaders::BVH_HPLOC_HIERARCHY, input), collapse::place_kernel(encode, input)]
+    [vec![kernel(encode, window, &shaders::BVH_HPLOC_HIERARCHY, input)], collapse::place_kernels(encode, input)]
+        .concat()
 }
 
 /// The dispatches behind [`Encode::steps`]. Labels: `hierarchy`, `collapse`.

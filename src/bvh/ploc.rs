@@ -70,7 +70,7 @@ impl Kernels<'_> {
 /// The kernels of [`steps`].
 pub(super) fn kernels(encode: &Encode, radius: u32, input: &Input) -> Vec<Kernel> {
     let chain = Kernels { encode, input, radius }.chain();
-    chain.into_iter().map(|(kernel, _)| kernel).chain([collapse::place_kernel(encode, input)]).collect()
+    chain.into_iter().map(|(kernel, _)| kernel).chain(collapse::place_kernels(encode, input)).collect()
 }
 
 /// The dispatches behind [`Encode::steps`]. Labels: `hierarchy`, `collapse`.
