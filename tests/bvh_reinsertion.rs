@@ -20,9 +20,8 @@ fn trees() -> impl Iterator<Item = (String, Bvh2)> {
     })
 }
 
-/// Few links a round, every link, and more rounds than a tree has moves for.
-const OPTIONS: [Options; 3] =
-    [Options::of_rounds(20), Options { rounds: 3, stride: 1 }, Options { rounds: 30, stride: 3 }];
+/// Few links a round, every link, and a stride that all of them take.
+const OPTIONS: [Options; 3] = [Options::FAST, Options { passes: 4, stride: 1 }, Options { passes: 3, stride: 5 }];
 
 /// Cost of the steps: what reinsertion lessens.
 fn area(tree: &Bvh2) -> f64 {
@@ -48,15 +47,15 @@ fn optimised_trees_are_valid_with_the_same_records_and_never_worse() {
     }
 }
 
-/// A tree that is as bad as can be, for a scene of which the best is known: pairs of boxes, two by two the same.
+/// Sixty-four cells of sixteen triangles in any order, against a tree that knows where each lies.
 #[test]
-fn a_chain_of_pairs_becomes_a_tree_that_parts_them() {
-    let mesh = corpus::random("random 1023", 1023, [0.0; 3], [1.0; 3]);
-    let tree = lbvh::build(&mesh.1, &mesh.2, Code::Mc30.full().with_bits(1), Collapse::OFF);
-    let good = ploc::build(&lbvh::build(&mesh.1, &mesh.2, Code::Mc63.full(), Collapse::OFF), 25);
-    let optimised = tree.reinserted(&Options { rounds: 400, stride: 16 });
-    assert!(area(&tree) > 2.0 * area(&good), "{} is not bad against {}", area(&tree), area(&good));
-    assert!(area(&optimised) < 1.05 * area(&good), "{} against {}", area(&optimised), area(&good));
+fn a_tree_that_is_bad_below_becomes_better_than_a_good_one() {
+    let (_, positions, triangles) = corpus::random("random 1023", 1023, [0.0; 3], [1.0; 3]);
+    let lbvh = |bits| lbvh::build(&positions, &triangles, Code::Mc30.full().with_bits(bits), Collapse::OFF);
+    let (bad, good) = (lbvh(6), ploc::build(&lbvh(30), 25));
+    let optimised = bad.reinserted(&Options::HIGH);
+    assert!(area(&bad) > 1.3 * area(&good), "{} is not bad against {}", area(&bad), area(&good));
+    assert!(area(&optimised) < area(&good), "{} against {}", area(&optimised), area(&good));
 }
 
 #[test]

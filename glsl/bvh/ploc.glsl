@@ -20,6 +20,8 @@
 layout(constant_id = 7) const uint RADIUS = 16;
 // Of a round's clusters, one in so many falls away, or the next round is forced.
 const uint SLOW = 16;
+// Among so many clusters, or fewer, no round is forced.
+const uint FEW = 256;
 const uint CACHED = PRIVATE_COUNTERS ? 1u : gl_WorkGroupSize.x + 2u * RADIUS;
 
 // On a GPU, the boxes of a tile and of what is near it.
@@ -198,7 +200,7 @@ void ploc_scan(uint round) {
     if (gl_LocalInvocationIndex == 0u) {
         uint next = (round + 1u) & 1u;
         state.cluster_counts[next] = total;
-        state.is_forced[next] = count > 1u && SLOW * (count - total) < count ? 1u : 0u;
+        state.is_forced[next] = total > FEW && SLOW * (count - total) < count ? 1u : 0u;
     }
 }
 
@@ -230,7 +232,7 @@ void ploc_merge(uint task, uint round) {
 void ploc_finish(uint round) {
     // Where there is nothing, nobody has begun.
     uint count = primitive_count == 0u ? 0u : clusters_in(round);
-    // Every second round leaves at most fifteen of sixteen clusters.
+    // Every second round leaves at most fifteen of sixteen clusters, until there are few.
     for (uint turn = 0; turn < 1024u && count > 1u; ++turn, ++round) {
         uint tiles = tiles_of(count);
         for (uint task = 0; task < tiles; ++task) ploc_search(task, round);

@@ -28,26 +28,38 @@ use crate::gpu::{Grid, Kernel, Limits, Recorder, Step, fill, shaders};
 /// How much is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Options {
-    /// Rounds. Every link is tried once in [`Options::stride`] rounds.
-    pub rounds: u32,
-    /// Of so many links, one is tried in a round, another in each; at least 1.
+    /// How often every link is tried. Time grows with it.
+    pub passes: u32,
+    /// Of so many links, one is tried in a round, another in each; fewer where there are few. So many rounds are a pass.
     pub stride: u32,
 }
 
 impl Options {
-    /// Every link once.
-    pub const FAST: Options = Options::of_rounds(16);
+    /// Every link once: most of what is to be had from a good tree.
+    pub const FAST: Options = Options::of_passes(1);
     /// Every link twice.
-    pub const MEDIUM: Options = Options::of_rounds(32);
+    pub const MEDIUM: Options = Options::of_passes(2);
     /// Every link six times: little more is to be had from there on.
-    pub const HIGH: Options = Options::of_rounds(96);
+    pub const HIGH: Options = Options::of_passes(6);
 
-    /// So many rounds, of every sixteenth link each.
-    pub const fn of_rounds(rounds: u32) -> Options {
-        Options { rounds, stride: 16 }
+    /// So many passes, of 64 rounds each where there are enough links.
+    pub const fn of_passes(passes: u32) -> Options {
+        Options { passes, stride: 64 }
+    }
+
+    /// Of so many links, one is tried in a round of a structure with these node slots: in a round at least [`LEAST_LINKS`].
+    pub(super) fn stride_for(&self, node_slots: u32) -> u32 {
+        self.stride.min(2 * node_slots / LEAST_LINKS).max(1)
+    }
+
+    /// Rounds for a structure with these node slots.
+    pub(super) fn rounds_for(&self, node_slots: u32) -> u32 {
+        self.passes * self.stride_for(node_slots)
     }
 }
 
+/// Links that are not worth a round of less.
+const LEAST_LINKS: u32 = 128;
 /// Subtrees that a search may put off; what does not find room is not looked at.
 pub(super) const STACK: usize = 32;
 /// Nodes that a path may have on either side.
@@ -77,8 +89,9 @@ const MOVE_BYTES: u64 = 12;
 /// Rounds of reinsertion, for one device and a number of primitives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reinsertion {
-    options: Options,
     slots: u32,
+    stride: u32,
+    rounds: u32,
     grid: Grid,
 }
 
@@ -88,8 +101,8 @@ impl Reinsertion {
         let grid = Grid::of(limits);
         // A search is long: on a GPU it is an invocation's only one, as far as there are invocations.
         let grid = if limits.is_cpu() { grid } else { Grid { rounds: 1, ..grid } };
-        let options = Options { stride: options.stride.max(1), ..*options };
-        Reinsertion { options, slots: node_slots(primitive_count), grid }
+        let slots = node_slots(primitive_count);
+        Reinsertion { slots, stride: options.stride_for(slots), rounds: options.rounds_for(slots), grid }
     }
 
     fn link_count(&self) -> u32 {
@@ -98,7 +111,7 @@ impl Reinsertion {
 
     /// Bytes of scratch memory.
     pub fn scratch_bytes(&self) -> u64 {
-        let moves = u64::from(self.link_count().div_ceil(self.options.stride));
+        let moves = u64::from(self.link_count().div_ceil(self.stride));
         12 * u64::from(self.slots) + MOVE_BYTES * moves
     }
 
@@ -109,7 +122,7 @@ impl Reinsertion {
         shaders.map(|shader| self.grid.kernel(shader)).collect()
     }
 
-    /// Records the rounds on the structure at address `structure`, in place, with scratch memory at address `scratch`; both aligned
+    /// Records all rounds on the structure at address `structure`, in place, with scratch memory at address `scratch`; both aligned
     /// to 16 bytes. Five dispatches a round with barriers between; the caller places one before and one behind. Label: `optimise`.
     ///
     /// # Errors
@@ -128,19 +141,16 @@ impl Reinsertion {
             firsts: scratch + 2 * words,
             moves: scratch + 3 * words,
             offset,
-            stride: self.options.stride,
+            stride: self.stride,
             link_count: self.link_count(),
             padding: 0,
         };
         let step = |shader, offset| Step::new(PHASE, self.grid.kernel(shader), &arguments(offset), self.grid.groups);
         let round = |round: u32| {
             let unlock = fill::step(PHASE, scratch + words, 2 * self.slots, 0);
-            [unlock].into_iter().chain(STEPS.map(|shader| step(shader, round % self.options.stride)))
+            [unlock].into_iter().chain(STEPS.map(|shader| step(shader, round % self.stride)))
         };
-        [step(&shaders::BVH_REINSERTION_PARENTS, 0)]
-            .into_iter()
-            .chain((0..self.options.rounds).flat_map(round))
-            .collect()
+        [step(&shaders::BVH_REINSERTION_PARENTS, 0)].into_iter().chain((0..self.rounds).flat_map(round)).collect()
     }
 }
 

@@ -74,7 +74,7 @@ const TERMINATION: BuilderOption =
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
 
 const OPTIMISE: BuilderOption =
-    BuilderOption { key: "optimise", values: "off, fast, medium, high, or a number of rounds of reinsertion" };
+    BuilderOption { key: "optimise", values: "off, fast, medium, high, or a number of passes of reinsertion" };
 const WINDOW: BuilderOption = BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
 const RADIUS: BuilderOption = BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
 
@@ -332,7 +332,7 @@ impl Spec {
             Some("fast") => Some(Options::FAST),
             Some("medium") => Some(Options::MEDIUM),
             Some("high") => Some(Options::HIGH),
-            Some(_) => Some(Options::of_rounds(self.number(&OPTIMISE, 0)?)),
+            Some(_) => Some(Options::of_passes(self.number(&OPTIMISE, 0)?)),
         })
     }
 

@@ -9,7 +9,8 @@
 //!   before the position of the right child's first primitive, which no other node can have.
 //! - Where all distances are equal, only the first two merge. So a round of n clusters in which fewer than n/16 fell away is
 //!   followed by a *forced* one: beside the pairs of before, 2k and 2k + 1 merge wherever neither is in a pair. That leaves at
-//!   most three quarters of them.
+//!   most three quarters of them. Of at most 256 clusters none is forced: there it would save little time, and a single one at 19
+//!   clusters has cost 2.4% of a tree's quality.
 //!
 //! [`Aabb::scaled_half_area`]: crate::bvh::layout::Aabb::scaled_half_area
 
@@ -17,6 +18,8 @@ use crate::bvh::layout::{Bvh2, Child, Node, Record};
 
 /// Of a round's clusters, one in so many falls away, or the next round is forced.
 const SLOW: usize = 16;
+/// Among so many clusters, or fewer, no round is forced.
+const FEW: usize = 256;
 
 #[derive(Clone, Copy)]
 struct Cluster {
@@ -51,7 +54,7 @@ pub fn build<R: Record>(sorted: &Bvh2<R>, radius: usize) -> Bvh2<R> {
                 Some(_) => {}
             }
         }
-        is_forced = SLOW * (count - next.len()) < count;
+        is_forced = SLOW * (count - next.len()) < count && next.len() > FEW;
         clusters = next;
     }
     if let Some(root) = clusters.first() {

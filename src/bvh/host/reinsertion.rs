@@ -15,12 +15,13 @@ struct Move {
 }
 
 impl<R: Record> Bvh2<R> {
-    /// The tree, in which every leaf has one record, after the rounds that `options` tells: the bytes of
+    /// The tree, in which every leaf has one record, after the passes that `options` tells: the bytes of
     /// [`crate::bvh::reinsertion`].
     pub fn reinserted(&self, options: &Options) -> Bvh2<R> {
         let mut work = Work { parents: parents_of(self), tree: self.clone() };
-        for round in 0..options.rounds {
-            work.round(round, options.stride);
+        let slots = self.nodes.len() as u32;
+        for round in 0..options.rounds_for(slots) {
+            work.round(round, options.stride_for(slots));
         }
         work.tree
     }
