@@ -157,7 +157,7 @@ pub fn measure(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bvh::codes::code_bounds;
+    use crate::bvh::codes::CodeBounds;
 
     const BOUNDS: Aabb = Aabb { lo: [0.0; 3], hi: [2.0, 4.0, 8.0] };
 
@@ -170,7 +170,7 @@ mod tests {
         let own = [BOUNDS.lo, BOUNDS.hi].map(point);
         let all = boxes.iter().chain(&own).fold(Aabb::EMPTY, |a, b| a.union(b));
         let centroids = boxes.iter().chain(&own).fold(Aabb::EMPTY, |a, b| a.union(&point(b.centroid())));
-        [false, true].map(|concise| code_bounds(&all, &centroids, concise))
+        [CodeBounds::Full, CodeBounds::Concise].map(|bounds| bounds.of(&all, &centroids))
     }
 
     #[test]
