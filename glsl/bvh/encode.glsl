@@ -7,7 +7,7 @@
 //   plan       reads state: bounds                     writes state: plan; the structure's header and table of geometries
 //   (cells     reads the primitives, plan              writes table: the cells of a grid, in codes that have one
 //   prefixes   reads table                             writes table: what the cells say)
-//   encode     reads the primitives, plan, table             writes keys[0], ends (none); values[0] where nothing is sorted
+//   encode     reads the primitives, plan, table       writes keys[0], ends (none); values[0] where nothing is sorted
 //   (sort      reads keys[0]                           writes keys[result], values[result]: gpu/radix_sort.glsl)
 //
 // needs one barrier between each two, and before the first; subgroups of any size; workgroups of whole subgroups
