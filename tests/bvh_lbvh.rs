@@ -64,7 +64,9 @@ fn every_code_and_schedule_gives_the_bytes_of_the_host() {
         {
             for codes in CodeBounds::ALL.into_iter().filter_map(|bounds| codes.with_bounds(bounds)) {
                 for collapse in [Collapse::OFF, Collapse::SAH] {
-                    if collapse == Collapse::OFF && codes.bounds != CodeBounds::Full {
+                    // Fewer bits and no collapsing are tried where bounds are as they come.
+                    let is_whole = codes.bits == codes.code.bits() && collapse == Collapse::SAH;
+                    if !is_whole && matches!(codes.bounds, CodeBounds::Concise | CodeBounds::Centroid) {
                         continue;
                     }
                     let expected = host::lbvh::build(&positions, &triangles, codes, collapse);
