@@ -11,3 +11,4 @@ pub mod quality;
 pub mod refit;
 pub mod sah;
 pub mod validate;
+pub mod wide;

@@ -14,6 +14,7 @@ use super::peers::obvhs;
 use crate::bvh::codes::Codes;
 use crate::bvh::lbvh::{self, Schedule};
 use crate::bvh::sah::Collapse;
+use crate::bvh::wide::Form;
 use crate::gpu::{Device, DriverPreference};
 use crate::scene::Mesh;
 use crate::{Error, Result};
@@ -63,6 +64,7 @@ const CODES: BuilderOption = BuilderOption {
     values: "mc30, mc63, emc64sort, emc64var or emc64var-nosize, with +concise or /BITS behind",
 };
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
+const WIDTH: BuilderOption = BuilderOption { key: "width", values: "2, 4, 8 or 8q (quantised)" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
 
 /// Every builder, in the order in which they are listed and measured.
@@ -70,19 +72,22 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "lbvh",
         what: "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
-        options: &[CODES, COLLAPSE, SCHEDULE],
+        options: &[CODES, COLLAPSE, SCHEDULE, WIDTH],
         variants: &[
             "lbvh",
             "lbvh:codes=mc30",
             "lbvh:codes=emc64var-nosize",
             "lbvh:collapse=off",
             "lbvh:schedule=persistent",
+            "lbvh:width=4",
+            "lbvh:width=8q",
         ],
         needs: Needs::Device,
         make: |spec, device, mesh| {
-            Ok(Box::new(DeviceLbvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
+            let (options, form) = (spec.lbvh_options()?, spec.form()?);
+            Ok(Box::new(DeviceLbvh::new(given(device)?, &spec.to_string(), mesh, &options, form)?))
         },
-        check: |spec| spec.lbvh_options().map(drop),
+        check: |spec| spec.lbvh_options().map(drop).and(spec.form().map(drop)),
     },
     Builder {
         name: "lbvh-host",
@@ -221,6 +226,17 @@ impl Spec {
         Ok(lbvh::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..lbvh::Options::DEFAULT })
     }
 
+    /// Option `width`: the form of a wide tree, or `None` for a `Bvh2`, also where it was not given.
+    fn form(&self) -> Result<Option<Form>> {
+        match self.option(WIDTH.key) {
+            None | Some("2") => Ok(None),
+            Some("4") => Ok(Some(Form::Four)),
+            Some("8") => Ok(Some(Form::Eight)),
+            Some("8q") => Ok(Some(Form::EightQuantised)),
+            Some(other) => Err(self.wrong_value(&WIDTH, other)),
+        }
+    }
+
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {
         Error::Argument(format!("builder {self}: {}={value} is not known; take {}", option.key, option.values))
     }
@@ -352,6 +368,7 @@ mod tests {
         assert!(error_of("lvbh").contains("no builder is called \"lvbh\"; there are"));
         assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));
         assert!(error_of("lbvh-host:collapse=maybe").contains("take sah or off"));
+        assert!(error_of("lbvh:width=3").contains("width=3 is not known; take 2, 4, 8 or 8q"));
         assert!(error_of("lbvh-host:codes").contains("write codes=VALUE"));
         assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
         assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse"));

@@ -1,16 +1,18 @@
 //! `lbvh`: our LBVH on the device as a subject: timestamps around each phase, our tracer.
 
+use super::wide::WideTree;
 use super::{BuildRun, Subject, record};
 use crate::bvh::layout::Bvh2;
 use crate::bvh::lbvh::{Input, Lbvh, Options, Sizes};
 use crate::bvh::quality::{self, Figures};
-use crate::gpu::{Buffer, Device, Timestamps};
+use crate::bvh::wide::Form;
+use crate::gpu::{Buffer, Device, Recorder, Timestamps};
 use crate::scene::Mesh;
 use crate::trace::tracer::{self, Buffers, Shape};
-use crate::trace::{Hit, Query, Ray, Work};
+use crate::trace::{Hit, Query, Ray, Work, wide};
 use crate::{Error, Result};
 
-/// Phases of a build at most: reset and bounds, encode, sort, hierarchy.
+/// Phases of a build at most: reset and bounds, encode, sort, hierarchy, wide.
 const PHASES: u32 = 8;
 
 /// A scene in our `Bvh2`, built and traced on the device.
@@ -24,6 +26,7 @@ pub struct DeviceLbvh<'a> {
     _vertices: [Buffer<'a>; 2],
     structure: Buffer<'a>,
     scratch: Buffer<'a>,
+    wide: Option<WideTree<'a>>,
     timestamps: Timestamps,
     rays: Option<Rays<'a>>,
 }
@@ -35,11 +38,17 @@ struct Rays<'a> {
 }
 
 impl<'a> DeviceLbvh<'a> {
-    /// Uploads `mesh` and makes room for structure and scratch.
+    /// Uploads `mesh` and makes room for structure and scratch, and for the wide tree if there shall be one.
     ///
     /// # Errors
     /// Too many triangles, or too little memory: the error says how much is needed.
-    pub fn new(device: &'a Device, builder: &str, mesh: &Mesh, options: &Options) -> Result<DeviceLbvh<'a>> {
+    pub fn new(
+        device: &'a Device,
+        builder: &str,
+        mesh: &Mesh,
+        options: &Options,
+        form: Option<Form>,
+    ) -> Result<DeviceLbvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let lbvh = Lbvh::new(device, options, count)?;
         let sizes = lbvh.sizes();
@@ -57,6 +66,7 @@ impl<'a> DeviceLbvh<'a> {
             choice: choice_of(options, &lbvh),
             structure: device.buffer("structure", sizes.structure)?,
             scratch: device.buffer("scratch", sizes.scratch)?,
+            wide: form.map(|form| WideTree::new(device, form, count)).transpose()?,
             timestamps: Timestamps::new(device, PHASES)?,
             lbvh,
             sizes,
@@ -68,12 +78,26 @@ impl<'a> DeviceLbvh<'a> {
 
     fn buffers(&self, rays: &Rays<'_>, work: Option<u64>) -> Buffers {
         Buffers {
-            structure: self.structure.address(),
+            structure: self.wide.as_ref().map_or(self.structure.address(), WideTree::address),
             rays: rays.rays.address(),
             hits: rays.hits.address(),
             work,
             count: rays.count,
         }
+    }
+}
+
+/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`.
+fn record_trace(
+    recorder: &mut Recorder<'_>,
+    wide_tree: Option<&WideTree<'_>>,
+    query: Query,
+    buffers: &Buffers,
+) -> Result<()> {
+    let limits = &recorder.context().limits;
+    match wide_tree.map(|tree| tree.form) {
+        None => tracer::record(recorder, &Shape::of(limits), query, buffers),
+        Some(form) => wide::record(recorder, form, &wide::shape_of(limits, form), query, buffers),
     }
 }
 
@@ -91,7 +115,7 @@ impl Subject for DeviceLbvh<'_> {
     }
 
     fn kind(&self) -> &'static str {
-        "bvh2"
+        self.wide.as_ref().map_or("bvh2", |tree| tree.form.name())
     }
 
     fn timer(&self) -> &'static str {
@@ -108,20 +132,27 @@ impl Subject for DeviceLbvh<'_> {
 
     fn build(&mut self) -> Result<BuildRun> {
         let (structure, scratch) = (self.structure.address(), self.scratch.address());
-        self.device.run(Some(&mut self.timestamps), |r| self.lbvh.record(r, &self.input, structure, scratch))?;
+        self.device.run(Some(&mut self.timestamps), |recorder| {
+            self.lbvh.record(recorder, &self.input, structure, scratch)?;
+            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, structure))
+        })?;
         let phases = self.timestamps.phases()?;
         Ok(BuildRun { milliseconds: phases.iter().map(|p| p.milliseconds).sum(), phases })
     }
 
     fn memory(&self) -> record::Memory {
-        record::Memory {
+        let binary = record::Memory {
             structure_bytes: Some(self.sizes.structure),
             scratch_bytes: Some(self.sizes.scratch),
             peak_bytes: Some(self.sizes.structure + self.sizes.scratch),
-        }
+        };
+        self.wide.as_ref().map_or(binary.clone(), |tree| tree.memory(&binary))
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+        if let Some(tree) = &self.wide {
+            return tree.quality(c_t, c_i);
+        }
         let measure = quality::OnDevice::new(&self.device.limits, self.input.primitive_count);
         let scratch = self.device.buffer("quality: scratch", measure.scratch_bytes())?;
         let result = self.device.buffer("quality: figures", size_of::<Figures>() as u64)?;
@@ -131,6 +162,18 @@ impl Subject for DeviceLbvh<'_> {
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {
         Bvh2::from_bytes(&self.structure.read::<u8>(self.sizes.structure as usize)).map(Some)
+    }
+
+    fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
+        match &self.wide {
+            Some(tree) => Ok(Some(tree.bytes())),
+            None => Ok(Some(self.structure.read(self.sizes.structure as usize))),
+        }
+    }
+
+    fn validate(&mut self) -> Result<()> {
+        self.tree()?.map_or(Ok(()), |tree| tree.validate())?;
+        self.wide.as_ref().map_or(Ok(()), WideTree::validate)
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
@@ -144,10 +187,10 @@ impl Subject for DeviceLbvh<'_> {
 
     fn trace(&mut self, query: Query) -> Result<f64> {
         let Some(rays) = &self.rays else { return Ok(0.0) };
-        let (shape, buffers) = (Shape::of(&self.device.limits), self.buffers(rays, None));
+        let buffers = self.buffers(rays, None);
         self.device.run(Some(&mut self.timestamps), |recorder| {
             recorder.phase("trace");
-            tracer::record(recorder, &shape, query, &buffers)
+            record_trace(recorder, self.wide.as_ref(), query, &buffers)
         })?;
         Ok(self.timestamps.phases()?.iter().map(|p| p.milliseconds).sum())
     }
@@ -159,8 +202,8 @@ impl Subject for DeviceLbvh<'_> {
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
         let Some(rays) = &self.rays else { return Ok(None) };
         let work = self.device.buffer("work", u64::from(rays.count) * size_of::<Work>() as u64)?;
-        let (shape, buffers) = (Shape::of(&self.device.limits), self.buffers(rays, Some(work.address())));
-        self.device.run(None, |recorder| tracer::record(recorder, &shape, query, &buffers))?;
+        let buffers = self.buffers(rays, Some(work.address()));
+        self.device.run(None, |recorder| record_trace(recorder, self.wide.as_ref(), query, &buffers))?;
         Ok(Some(work.read(rays.count as usize)))
     }
 }

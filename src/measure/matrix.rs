@@ -110,10 +110,9 @@ pub fn measure(
     rounds.once(|entry| {
         entry.record.memory = entry.subject.memory();
         entry.record.quality = entry.subject.quality(plan.c_t, plan.c_i)?;
-        if let Some(tree) = entry.subject.tree()?
-            && let Err(error) = tree.validate()
-        {
-            entry.faults.push(error.to_string());
+        match entry.subject.validate() {
+            Err(error @ Error::InvalidStructure(_)) => entry.faults.push(error.to_string()),
+            other => other?,
         }
         Ok(())
     });

@@ -1,0 +1,168 @@
+// One ray on its way through a tree of quantised nodes, step by step: the twin of src/trace/wide_host.rs, visit for visit.
+//
+// As Ylitie, Karras and Laine (2017, section 4) do: the children of a node that are nodes and that the ray enters are a group,
+// met from near to far by counting slots in the order of the ray's octant; what is left of a group waits as one entry. The
+// leaves that the ray enters come first.
+#ifndef HEDGEROW_TRACE_WALK_QUANTISED
+#define HEDGEROW_TRACE_WALK_QUANTISED
+#include "trace/buffers.glsl"
+#include "trace/nearest.glsl"
+#include "trace/slab.glsl"
+#include "trace/stack.glsl"
+#include "bvh/wide.glsl"
+
+struct QuantisedWalk {
+    HedgerowPreparedRay ray;
+    // Bits of the axes in which the ray goes down.
+    uint octant;
+    // The group at hand: its first node, which slots are nodes, and which places, in the order of the octant, are to be visited.
+    uint first_child;
+    uint nodes;
+    uint visits;
+    // The leaves at hand, likewise.
+    uint first_record;
+    uvec2 counts;
+    uint leaves;
+    // The next triangle, and how many are left of its leaf.
+    uint record;
+    uint left;
+    // How many groups wait.
+    uint level;
+    float best;
+    HedgerowHit hit;
+    // Nodes visited, triangles tested.
+    uvec2 work;
+};
+
+// A mask of slots as one of places, or back: the bit of slot s goes to place s ^ octant.
+uint in_octant(uint mask, uint octant) {
+    if ((octant & 1u) != 0u) mask = mask >> 1 & 0x55u | mask << 1 & 0xAAu;
+    if ((octant & 2u) != 0u) mask = mask >> 2 & 0x33u | mask << 2 & 0xCCu;
+    if ((octant & 4u) != 0u) mask = mask >> 4 & 0x0Fu | mask << 4 & 0xF0u;
+    return mask;
+}
+
+// At the root; a ray that cannot hit anything has nothing at hand and nothing that waits.
+void begin(HedgerowRay ray, Child root, bool usable, out QuantisedWalk walk) {
+    bool goes = hedgerow_prepare(ray, root.lo, root.hi, walk.ray) && usable;
+    uvec3 down = floatBitsToUint(walk.ray.inverse) >> 31;
+    walk.octant = down.x | down.y << 1 | down.z << 2;
+    // The root is the only node of a group.
+    walk.first_child = 0;
+    walk.nodes = 1;
+    walk.visits = goes ? in_octant(1, walk.octant) : 0;
+    walk.first_record = 0;
+    walk.counts = uvec2(0);
+    walk.leaves = 0;
+    walk.record = 0;
+    walk.left = 0;
+    walk.level = 0;
+    walk.best = walk.ray.t_max;
+    walk.hit = HedgerowHit(HEDGEROW_INFINITY, HEDGEROW_NONE, 0.0, 0.0);
+    walk.work = uvec2(0);
+}
+
+bool at_node(QuantisedWalk walk) {
+    return walk.left == 0u && walk.leaves == 0u && walk.visits != 0u;
+}
+
+bool at_triangle(QuantisedWalk walk) {
+    return walk.left != 0u;
+}
+
+// The next node of the group; what is left of it waits.
+uint next_node(inout QuantisedWalk walk) {
+    uint slot = uint(findLSB(walk.visits)) ^ walk.octant;
+    walk.visits &= walk.visits - 1u;
+    if (walk.visits != 0u) {
+        hedgerow_put_entry(walk.level, uvec2(walk.first_child, walk.nodes << 8 | walk.visits));
+        walk.level++;
+    }
+    return walk.first_child + uint(bitCount(walk.nodes & (1u << slot) - 1u));
+}
+
+vec3 corner_of(vec3 origin, vec3 cell, uvec2 x, uvec2 y, uvec2 z, uint slot) {
+    uint shift = (slot & 3u) * 8;
+    uvec3 word = slot < 4 ? uvec3(x.x, y.x, z.x) : uvec3(x.y, y.y, z.y);
+    precise vec3 corner = origin + vec3(word >> shift & 0xFFu) * cell;
+    return corner;
+}
+
+void visit(QuantisedNode node, inout QuantisedWalk walk) {
+    walk.work.x++;
+    walk.visits = 0;
+    if (node.exponents_and_nodes == LONG_LEAF) {
+        walk.record = node.first_record;
+        walk.left = node.first_child;
+        return;
+    }
+    uint e = node.exponents_and_nodes;
+    vec3 origin = uintBitsToFloat(node.origin);
+    vec3 cell = uintBitsToFloat((uvec3(e, e >> 8, e >> 16) & 0xFFu) << 23);
+    // Which corners are met first is the same for all children: hedgerow_enter sorts each pair of distances.
+    bvec3 down = lessThan(walk.ray.inverse, vec3(0.0));
+    uvec2 near_x = down.x ? node.hi[0] : node.lo[0], far_x = down.x ? node.lo[0] : node.hi[0];
+    uvec2 near_y = down.y ? node.hi[1] : node.lo[1], far_y = down.y ? node.lo[1] : node.hi[1];
+    uvec2 near_z = down.z ? node.hi[2] : node.lo[2], far_z = down.z ? node.lo[2] : node.hi[2];
+    vec3 origin_near = mix(walk.ray.origin_lo, walk.ray.origin_hi, down);
+    vec3 origin_far = mix(walk.ray.origin_hi, walk.ray.origin_lo, down);
+    uint entered = 0;
+    for (uint slot = 0; slot < 8; ++slot) {
+        vec3 near = (corner_of(origin, cell, near_x, near_y, near_z, slot) - origin_near) * walk.ray.inverse;
+        vec3 far = (corner_of(origin, cell, far_x, far_y, far_z, slot) - origin_far) * walk.ray.inverse;
+        float enter = max(max(near.x, near.y), max(near.z, walk.ray.t_min));
+        float leave = min(min(far.x, far.y), min(far.z, walk.best));
+        // A slot without a child has a box inside out; where that is flat, it is a leaf of nothing.
+        if (enter <= leave) entered |= 1u << slot;
+    }
+    walk.first_child = node.first_child;
+    walk.nodes = e >> 24;
+    walk.visits = in_octant(entered & walk.nodes, walk.octant);
+    walk.first_record = node.first_record;
+    walk.counts = node.counts;
+    walk.leaves = in_octant(entered & ~walk.nodes, walk.octant);
+}
+
+// The sum of the bytes of both words that are below that of a slot.
+uint sum_below(uvec2 bytes, uint slot) {
+    uint shift = (slot & 3u) * 8;
+    uint below = (1u << shift) - 1u;
+    uvec2 words = slot < 4 ? uvec2(bytes.x & below, 0u) : uvec2(bytes.x, bytes.y & below);
+    uvec2 halves = (words & 0x00FF00FFu) + (words >> 8 & 0x00FF00FFu);
+    uint sum = halves.x + halves.y;
+    return (sum & 0xFFFFu) + (sum >> 16);
+}
+
+// The next leaf, if the last one is done.
+void next_leaf(inout QuantisedWalk walk) {
+    if (walk.left != 0u || walk.leaves == 0u) return;
+    uint slot = uint(findLSB(walk.leaves)) ^ walk.octant;
+    walk.leaves &= walk.leaves - 1u;
+    walk.record = walk.first_record + sum_below(walk.counts, slot);
+    walk.left = (slot < 4 ? walk.counts.x : walk.counts.y) >> ((slot & 3u) * 8) & 0xFFu;
+}
+
+void test(Triangle triangle, bool any_hit, inout QuantisedWalk walk) {
+    walk.work.y++;
+    walk.record++;
+    walk.left--;
+    if (hit_nearer(walk.ray, triangle, any_hit, walk.best, walk.hit) && any_hit) {
+        walk.left = 0;
+        walk.leaves = 0;
+        walk.visits = 0;
+        walk.level = 0;
+    }
+}
+
+// Takes a group that waits, if there is nothing at hand; whether there is anything.
+bool go_on(inout QuantisedWalk walk) {
+    if (walk.left != 0u || walk.leaves != 0u || walk.visits != 0u) return true;
+    if (walk.level == 0u) return false;
+    walk.level--;
+    uvec2 entry = hedgerow_entry(walk.level);
+    walk.first_child = entry.x;
+    walk.nodes = entry.y >> 8;
+    walk.visits = entry.y & 0xFFu;
+    return true;
+}
+#endif
