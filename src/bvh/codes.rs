@@ -259,7 +259,7 @@ fn sequence(extent: [f32; 3], order: Order, bits: u32) -> Vec<usize> {
             Order::Sorted => sorted[bit % 3],
             Order::Variable => {
                 let axis = longest(&keys);
-                keys[axis] -= 1 << 23;
+                keys[axis] = keys[axis].wrapping_sub(1 << 23);
                 axis
             }
         })
