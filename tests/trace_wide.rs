@@ -17,12 +17,17 @@ use hedgerow::trace::{Hit, Query, Ray, Work, host, wide, wide_host};
 fn shapes(form: Form) -> Vec<Shape> {
     let limits = &device().limits;
     let loads = Loads::Gathered;
-    vec![
+    let mut shapes = vec![
         wide::shape_of(limits, form),
         Shape::groups(limits),
         Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
         Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
-    ]
+    ];
+    if form.is_quantised() && limits.subgroup_size <= Loads::MAX_LANES {
+        shapes.push(Shape { shared_levels: wide::stack_levels(form), ..Shape::lanes(limits) });
+        shapes.push(Shape { shared_levels: 3, rays_each: 5, ..Shape::lanes(limits) });
+    }
+    shapes
 }
 
 fn traced<N: WideNode>(
@@ -209,7 +214,7 @@ fn of_a_thousand_coincident_triangles_the_first_is_hit() {
 }
 
 #[test]
-fn loads_lane_by_lane_are_refused() {
+fn loads_lane_by_lane_are_for_quantised_nodes() {
     let buffers = Buffers { structure: 16, rays: 16, hits: 16, work: None, count: 0 };
     let shape = Shape { loads: Loads::LaneByLane, ..shapes(Form::Four)[0] };
     let refused =

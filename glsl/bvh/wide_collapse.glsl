@@ -22,6 +22,7 @@
 #include "bvh/copy.glsl"
 #include "bvh/sah.glsl"
 #include "bvh/wide.glsl"
+#extension GL_EXT_control_flow_attributes : require
 
 layout(constant_id = 2) const uint WIDTH = 4;
 layout(constant_id = 3) const bool QUANTISED = false;
@@ -29,7 +30,8 @@ layout(constant_id = 3) const bool QUANTISED = false;
 // src/bvh/wide/mod.rs
 const uint LEVELS_BY_AREA = 24;
 const uint LEVELS_AT_MOST = 64;
-// In place of what names a child: twice its node's slot, and one for the right one.
+// In place of what names a child, which is where it lies among all children of the source: twice its node's slot, and one for
+// the right one.
 const uint NO_CHILD = 0xFFFFFFFFu;
 const uint WHOLE_TREE = 0xFFFFFFFEu;
 
@@ -72,9 +74,7 @@ bool is_wide_node(Child child) {
 
 Child child_named(uint name) {
     if (name == WHOLE_TREE) return source.header.root;
-    Child left = source.nodes[name >> 1].left;
-    Child right = source.nodes[name >> 1].right;
-    return (name & 1u) != 0u ? right : left;
+    return Children(address_of(wide_nodes_at(uvec2(source)), name, 32)).child[0];
 }
 
 // How many of opened lie before those of a level.

@@ -46,22 +46,18 @@ void write_node(uint at, uint index, uint next_node) {
 void write_quantised_node(uint at, uint index, uint next_node, uint next_record) {
     vec3 lo = uintBitsToFloat(uvec3(0x7F800000u)), hi = uintBitsToFloat(uvec3(0xFF800000u));
     bool has_node = false, has_leaf = false;
-    for (uint s = 0; s < 8; ++s) {
-        uint name = slots.word[at * WIDTH + s];
-        if (name == NO_CHILD) continue;
-        Child child = child_named(name);
-        lo = min(lo, child.lo);
-        hi = max(hi, child.hi);
-        if (is_wide_node(child)) has_node = true;
-        else has_leaf = true;
-    }
     // The records of short leaves lie side by side; those of long ones, which are nodes of their own, before them.
     uint first_of_long = next_record;
     for (uint s = 0; s < 8; ++s) {
         uint name = slots.word[at * WIDTH + s];
         if (name == NO_CHILD) continue;
         Child child = child_named(name);
-        if (!is_inner(child) && child.count > LEAF_MAX) next_record += child.count;
+        lo = min(lo, child.lo);
+        hi = max(hi, child.hi);
+        bool is_node = is_wide_node(child);
+        has_node = has_node || is_node;
+        has_leaf = has_leaf || !is_node;
+        if (is_node) next_record += child.count;
     }
     QuantisedNode node = quantised_node_around(lo, hi, has_node ? next_node : 0, has_leaf ? next_record : 0);
     for (uint s = 0; s < 8; ++s) {

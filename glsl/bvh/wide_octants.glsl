@@ -3,32 +3,23 @@
 #define HEDGEROW_BVH_WIDE_OCTANTS
 #include "bvh/wide_collapse.glsl"
 
-// What names the children that are being put into slots.
-uint open_name[8];
+// A quarter of the sum of the corners of each child.
+vec3 open_middle[8];
 
 vec3 quarter_middle(vec3 lo, vec3 hi) {
     precise vec3 middle = 0.25 * lo + 0.25 * hi;
     return middle;
 }
 
-// The slots of the `count` children that open_name names: `in_slot` tells which is in each, 8 for none.
-void octant_slots(uint count, out uint in_slot[8]) {
-    vec3 offset[8];
-    vec3 lo = uintBitsToFloat(uvec3(0x7F800000u)), hi = uintBitsToFloat(uvec3(0xFF800000u));
-    for (uint i = 0; i < count; ++i) {
-        Child child = child_named(open_name[i]);
-        lo = min(lo, child.lo);
-        hi = max(hi, child.hi);
-        offset[i] = quarter_middle(child.lo, child.hi);
-    }
-    vec3 centre = quarter_middle(lo, hi);
+// The slots of the `count` children of open_middle, `centre` being that of their node: `in_slot` tells which is in each, 8 for none.
+void octant_slots(uint count, vec3 centre, out uint in_slot[8]) {
     uint left = (1u << count) - 1u;
-    for (uint s = 0; s < 8; ++s) in_slot[s] = 8;
+    [[unroll]] for (uint s = 0; s < 8; ++s) in_slot[s] = 8;
     for (uint round = 0; round < count; ++round) {
         uint farthest = 8;
         float distance = -1.0;
         for (uint i = 0; i < count; ++i) {
-            precise vec3 from = abs(offset[i] - centre);
+            precise vec3 from = abs(open_middle[i] - centre);
             precise float far = from.x + from.y + from.z;
             if ((left >> i & 1u) != 0u && far > distance) {
                 distance = far;
@@ -36,10 +27,10 @@ void octant_slots(uint count, out uint in_slot[8]) {
             }
         }
         left &= ~(1u << farthest);
-        precise vec3 from = offset[farthest] - centre;
+        precise vec3 from = open_middle[farthest] - centre;
         uint best = 8;
         float most = 0.0;
-        for (uint s = 0; s < 8; ++s) {
+        [[unroll]] for (uint s = 0; s < 8; ++s) {
             vec3 towards = vec3((s & 1u) != 0u ? from.x : -from.x, (s & 2u) != 0u ? from.y : -from.y, (s & 4u) != 0u ? from.z : -from.z);
             precise float gain = towards.x + towards.y + towards.z;
             if (in_slot[s] == 8 && (best == 8 || gain > most)) {

@@ -4,7 +4,8 @@
 #include "bvh/wide_octants.glsl"
 #include "bvh/wide_octants.glsl"
 
-// What is known of the children so far, beside open_name.
+// What is known of the children so far, beside open_middle.
+uint open_name[8];
 uint open_index[8];
 uint open_count[8];
 uint open_depth[8];
@@ -20,6 +21,7 @@ void put_child(uint at, uint name, uint depth, uint level, float scale) {
     open_depth[at] = depth;
     float weight = level < LEVELS_BY_AREA ? scaled_half_area(Box(child.lo, child.hi), scale) : float(64 - depth);
     open_weight[at] = is_inner(child) ? weight : -1.0;
+    if (QUANTISED) open_middle[at] = quarter_middle(child.lo, child.hi);
 }
 
 // The children of the wide node that begins with the binary node `slot`: how many.
@@ -50,6 +52,14 @@ uint open_children(uint slot, uint level, Child root) {
     return count;
 }
 
+// Of the binary node that a wide one begins with, whose box is that of the wide one.
+vec3 middle_of_node(uint slot) {
+    Child root = source.header.root;
+    if (!is_inner(root)) return quarter_middle(root.lo, root.hi);
+    Child left = child_named(2 * slot), right = child_named(2 * slot + 1);
+    return quarter_middle(min(left.lo, right.lo), max(left.hi, right.hi));
+}
+
 // Lists the nodes of all lanes that are here together, in one piece.
 uint place_in_next_level(uint level, uint nodes) {
     uint before = subgroupExclusiveAdd(nodes);
@@ -66,7 +76,7 @@ void open(uint at, uint level, uint next_level) {
 
     uint in_slot[8];
     for (uint s = 0; s < 8; ++s) in_slot[s] = s < count ? s : 8;
-    if (QUANTISED) octant_slots(count, in_slot);
+    if (QUANTISED) octant_slots(count, middle_of_node(slot), in_slot);
 
     uint nodes = 0, inner = 0, records = 0;
     for (uint s = 0; s < WIDTH; ++s) {

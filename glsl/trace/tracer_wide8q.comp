@@ -14,10 +14,6 @@ layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 
 #include "trace/walk_quantised.glsl"
 
-bool can_be_traced(Structure structure) {
-    return structure.header.active_count != 0u && (structure.header.status & STATUS_UNUSABLE) == 0u;
-}
-
 void main() {
     Triangles triangles = Triangles(wide_records_at(uvec2(structure), structure.header.node_slots, QUANTISED_NODE_BYTES));
     QuantisedNodes nodes = QuantisedNodes(wide_nodes_at(uvec2(structure)));

@@ -33,10 +33,6 @@ bool at_triangle(Walk walk) {
     return walk.left != 0u && walk.left != NOTHING;
 }
 
-bool can_be_traced(Structure structure) {
-    return structure.header.active_count != 0u && (structure.header.status & STATUS_UNUSABLE) == 0u;
-}
-
 // At the root; a ray that cannot hit anything has nothing at hand and nothing that waits.
 void begin(HedgerowRay ray, Child root, bool usable, out Walk walk) {
     bool goes = hedgerow_prepare(ray, root.lo, root.hi, walk.ray) && usable;

@@ -2,7 +2,8 @@
 //
 // As Ylitie, Karras and Laine (2017, section 4) do: the children of a node that are nodes and that the ray enters are a group,
 // met from near to far by counting slots in the order of the ray's octant; what is left of a group waits as one entry. The
-// leaves that the ray enters come first.
+// leaves that the ray enters come first. Other than there, an entry tells where the ray enters the nearest of the nodes that
+// wait, in the leading half of a float; a group that is farther than the best hit by then is left out.
 #ifndef HEDGEROW_TRACE_WALK_QUANTISED
 #define HEDGEROW_TRACE_WALK_QUANTISED
 #include "trace/buffers.glsl"
@@ -10,6 +11,7 @@
 #include "trace/slab.glsl"
 #include "trace/stack.glsl"
 #include "bvh/wide.glsl"
+#extension GL_EXT_control_flow_attributes : require
 
 struct QuantisedWalk {
     HedgerowPreparedRay ray;
@@ -19,6 +21,8 @@ struct QuantisedWalk {
     uint first_child;
     uint nodes;
     uint visits;
+    // Where the ray enters the nearest of the group but the first: the leading half of a float, not above it.
+    uint enter;
     // The leaves at hand, likewise.
     uint first_record;
     uvec2 counts;
@@ -51,6 +55,7 @@ void begin(HedgerowRay ray, Child root, bool usable, out QuantisedWalk walk) {
     walk.first_child = 0;
     walk.nodes = 1;
     walk.visits = goes ? in_octant(1, walk.octant) : 0;
+    walk.enter = 0;
     walk.first_record = 0;
     walk.counts = uvec2(0);
     walk.leaves = 0;
@@ -75,16 +80,22 @@ uint next_node(inout QuantisedWalk walk) {
     uint slot = uint(findLSB(walk.visits)) ^ walk.octant;
     walk.visits &= walk.visits - 1u;
     if (walk.visits != 0u) {
-        hedgerow_put_entry(walk.level, uvec2(walk.first_child, walk.nodes << 8 | walk.visits));
+        hedgerow_put_entry(walk.level, uvec2(walk.first_child, walk.enter | walk.nodes << 8 | walk.visits));
         walk.level++;
     }
     return walk.first_child + uint(bitCount(walk.nodes & (1u << slot) - 1u));
 }
 
+// The leading half of a float that is not above `enter`.
+uint leading_half(float enter) {
+    return enter >= 0.0 ? floatBitsToUint(enter) & 0xFFFF0000u : 0xFF800000u;
+}
+
 vec3 corner_of(vec3 origin, vec3 cell, uvec2 x, uvec2 y, uvec2 z, uint slot) {
     uint shift = (slot & 3u) * 8;
     uvec3 word = slot < 4 ? uvec3(x.x, y.x, z.x) : uvec3(x.y, y.y, z.y);
-    precise vec3 corner = origin + vec3(word >> shift & 0xFFu) * cell;
+    // As signed numbers: CPUs turn those into floats by one instruction.
+    precise vec3 corner = origin + vec3(ivec3(word >> shift & 0xFFu)) * cell;
     return corner;
 }
 
@@ -107,17 +118,25 @@ void visit(QuantisedNode node, inout QuantisedWalk walk) {
     vec3 origin_near = mix(walk.ray.origin_lo, walk.ray.origin_hi, down);
     vec3 origin_far = mix(walk.ray.origin_hi, walk.ray.origin_lo, down);
     uint entered = 0;
-    for (uint slot = 0; slot < 8; ++slot) {
+    float enters[8];
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
         vec3 near = (corner_of(origin, cell, near_x, near_y, near_z, slot) - origin_near) * walk.ray.inverse;
         vec3 far = (corner_of(origin, cell, far_x, far_y, far_z, slot) - origin_far) * walk.ray.inverse;
         float enter = max(max(near.x, near.y), max(near.z, walk.ray.t_min));
         float leave = min(min(far.x, far.y), min(far.z, walk.best));
         // A slot without a child has a box inside out; where that is flat, it is a leaf of nothing.
         if (enter <= leave) entered |= 1u << slot;
+        enters[slot] = enter;
     }
     walk.first_child = node.first_child;
     walk.nodes = e >> 24;
     walk.visits = in_octant(entered & walk.nodes, walk.octant);
+    uint others = in_octant(walk.visits & walk.visits - 1u, walk.octant);
+    float nearest = HEDGEROW_INFINITY;
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+        if ((others >> slot & 1u) != 0u) nearest = min(nearest, enters[slot]);
+    }
+    walk.enter = leading_half(nearest);
     walk.first_record = node.first_record;
     walk.counts = node.counts;
     walk.leaves = in_octant(entered & ~walk.nodes, walk.octant);
@@ -154,15 +173,17 @@ void test(Triangle triangle, bool any_hit, inout QuantisedWalk walk) {
     }
 }
 
-// Takes a group that waits, if there is nothing at hand; whether there is anything.
+// Takes a group that waits, if there is nothing at hand; whether there was any. Equally far is not too far: an equally near hit
+// with a lower index may be there.
 bool go_on(inout QuantisedWalk walk) {
     if (walk.left != 0u || walk.leaves != 0u || walk.visits != 0u) return true;
     if (walk.level == 0u) return false;
     walk.level--;
     uvec2 entry = hedgerow_entry(walk.level);
     walk.first_child = entry.x;
-    walk.nodes = entry.y >> 8;
-    walk.visits = entry.y & 0xFFu;
+    walk.enter = entry.y & 0xFFFF0000u;
+    walk.nodes = entry.y >> 8 & 0xFFu;
+    walk.visits = uintBitsToFloat(walk.enter) <= walk.best ? entry.y & 0xFFu : 0;
     return true;
 }
 #endif

@@ -6,6 +6,7 @@
 #define HEDGEROW_TRACE_WALK_WIDE
 #include "trace/walk.glsl"
 #include "bvh/wide.glsl"
+#extension GL_EXT_control_flow_attributes : require
 
 struct WideNode {
     Child child[WIDTH];
@@ -32,7 +33,7 @@ void in_order(uint a, uint b) {
 
 void visit_wide(WideNode node, inout Walk walk) {
     walk.work.x++;
-    for (uint i = 0; i < WIDTH; ++i) {
+    [[unroll]] for (uint i = 0; i < WIDTH; ++i) {
         Child child = node.child[i];
         bool enters;
         float enter = hedgerow_enter(walk.ray, child.lo, child.hi, walk.best, enters);
@@ -54,7 +55,7 @@ void visit_wide(WideNode node, inout Walk walk) {
     in_order(0, 2); in_order(1, 3);
     in_order(1, 2);
 #endif
-    for (uint i = WIDTH - 1; i > 0; --i) {
+    [[unroll]] for (uint i = WIDTH - 1; i > 0; --i) {
         if (wide_enter[i] < HEDGEROW_INFINITY) {
             hedgerow_put(walk.level, HedgerowWaiting(wide_index[i], wide_count[i], wide_enter[i]));
             walk.level++;

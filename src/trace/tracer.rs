@@ -152,15 +152,6 @@ pub(super) fn kernel_of(shader: &'static shaders::Shader, shape: &Shape, query: 
 /// More than [`MAX_RAYS`] rays; loads lane by lane in workgroups that are not one subgroup of at most
 /// [`Loads::MAX_LANES`]; the kernel's pipeline could not be made.
 pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, query: Query, buffers: &Buffers) -> Result<()> {
-    let subgroup = recorder.context().limits.subgroup_size;
-    if shape.loads == Loads::LaneByLane && (shape.workgroup != subgroup || subgroup > Loads::MAX_LANES) {
-        return Err(Error::Argument(format!(
-            "loads lane by lane in workgroups of {}, subgroups have {subgroup} lanes; take workgroups of one subgroup of at \
-             most {} lanes, or Loads::Gathered",
-            shape.workgroup,
-            Loads::MAX_LANES
-        )));
-    }
     record_kernel(recorder, &kernel(shape, query, buffers.work.is_some()), shape, buffers)
 }
 
@@ -171,6 +162,15 @@ pub(super) fn record_kernel(
     shape: &Shape,
     buffers: &Buffers,
 ) -> Result<()> {
+    let subgroup = recorder.context().limits.subgroup_size;
+    if shape.loads == Loads::LaneByLane && (shape.workgroup != subgroup || subgroup > Loads::MAX_LANES) {
+        return Err(Error::Argument(format!(
+            "loads lane by lane in workgroups of {}, subgroups have {subgroup} lanes; take workgroups of one subgroup of at \
+             most {} lanes, or Loads::Gathered",
+            shape.workgroup,
+            Loads::MAX_LANES
+        )));
+    }
     let &Buffers { structure, rays, hits, work, count } = buffers;
     if count > MAX_RAYS {
         return Err(Error::Argument(format!(

@@ -19,21 +19,22 @@ pub const fn stack_levels(form: Form) -> u32 {
 const _: () = assert!(stack_levels(Form::Four) == 180 && stack_levels(Form::Eight) == 336);
 const _: () = assert!(stack_levels(Form::EightQuantised) == 49);
 
-/// What is fast on a device: as [`Shape::of`], with the whole stack in shared memory on CPUs. Loads are gathered.
+/// What is fast on a device: as [`Shape::of`], with the whole stack in shared memory on CPUs. Nodes of floats are gathered.
 pub fn shape_of(limits: &Limits, form: Form) -> Shape {
-    if limits.is_cpu() {
-        Shape { shared_levels: stack_levels(form), ..Shape::subgroups(limits) }.within(limits)
-    } else {
-        Shape::groups(limits)
+    let mut shape = Shape::of(limits);
+    if !form.is_quantised() {
+        shape.loads = Loads::Gathered;
     }
+    if limits.is_cpu() { Shape { shared_levels: stack_levels(form), ..shape }.within(limits) } else { shape }
 }
 
 /// The kernel that [`record`] takes, for [`Context::warm`](crate::gpu::Context::warm).
 pub fn kernel(form: Form, shape: &Shape, query: Query, count_work: bool) -> Kernel {
-    let shader = match form {
-        Form::Four => &shaders::TRACE_TRACER_WIDE4,
-        Form::Eight => &shaders::TRACE_TRACER_WIDE8,
-        Form::EightQuantised => &shaders::TRACE_TRACER_WIDE8Q,
+    let shader = match (form, shape.loads) {
+        (Form::Four, _) => &shaders::TRACE_TRACER_WIDE4,
+        (Form::Eight, _) => &shaders::TRACE_TRACER_WIDE8,
+        (Form::EightQuantised, Loads::Gathered) => &shaders::TRACE_TRACER_WIDE8Q,
+        (Form::EightQuantised, Loads::LaneByLane) => &shaders::TRACE_TRACER_WIDE8Q_LANES,
     };
     tracer::kernel_of(shader, shape, query, count_work)
 }
@@ -42,10 +43,10 @@ pub fn kernel(form: Form, shape: &Shape, query: Query, count_work: bool) -> Kern
 /// [`tracer::record`] does for a `Bvh2`, with the same hits.
 ///
 /// # Errors
-/// As of [`tracer::record`]; loads lane by lane, which there is no kernel for.
+/// As of [`tracer::record`]; loads lane by lane of nodes of floats, which there is no kernel for.
 pub fn record(recorder: &mut Recorder<'_>, form: Form, shape: &Shape, query: Query, buffers: &Buffers) -> Result<()> {
-    if shape.loads == Loads::LaneByLane {
-        let message = "wide trees are not traced with loads lane by lane; take Loads::Gathered";
+    if shape.loads == Loads::LaneByLane && !form.is_quantised() {
+        let message = "nodes of floats are not loaded lane by lane in wide trees; take Loads::Gathered";
         return Err(crate::Error::Argument(message.into()));
     }
     let kernel = kernel(form, shape, query, buffers.work.is_some());

@@ -102,9 +102,17 @@ impl<N: WideNode> Walk<'_, N> {
     /// The leaves of a node first, then its nodes from near to far by the octant that the ray goes to.
     fn by_octant(&mut self, ray: &PreparedRay) {
         let octant = (0..3).fold(0, |octant, i| octant | usize::from(ray.inverse[i].is_sign_negative()) << i);
-        // Node indices that wait.
-        let mut waiting = vec![0];
-        while let Some(index) = waiting.pop() {
+        // Groups of nodes that wait, each with where the ray enters the nearest of them but the first that there was.
+        let mut waiting = vec![(f32::NEG_INFINITY, vec![0])];
+        while let Some((entered, mut group)) = waiting.pop() {
+            // Equally far is not too far: an equally near hit with a lower index may be there.
+            if entered > self.nearest.t {
+                continue;
+            }
+            let index = group.pop().expect("groups that wait are not empty");
+            if !group.is_empty() {
+                waiting.push((entered, group));
+            }
             self.work.steps += 1;
             let node = &self.tree.nodes[index as usize];
             if let Some((first, count)) = node.long_leaf() {
@@ -115,14 +123,27 @@ impl<N: WideNode> Walk<'_, N> {
             }
             let children: Slots = node.children();
             let best = self.nearest.t;
-            let entered = (0..8).filter_map(|place| children[place ^ octant]);
-            let entered: Vec<Child> = entered.filter(|child| slab::enter(ray, child, best).is_some()).collect();
-            for leaf in entered.iter().filter(|child| child.is_leaf()) {
+            let in_order = (0..8).filter_map(|place| children[place ^ octant]);
+            let entered: Vec<(f32, Child)> =
+                in_order.filter_map(|child| Some((slab::enter(ray, &child, best)?, child))).collect();
+            for (_, leaf) in entered.iter().filter(|(_, child)| child.is_leaf()) {
                 if self.leaf(ray, leaf.index, leaf.count) {
                     return;
                 }
             }
-            waiting.extend(entered.iter().rev().filter(|child| !child.is_leaf()).map(|child| child.index));
+            let nodes: Vec<_> = entered.iter().filter(|(_, child)| !child.is_leaf()).collect();
+            if let Some((first, others)) = nodes.split_first() {
+                if !others.is_empty() {
+                    let nearest = others.iter().fold(f32::INFINITY, |nearest, (enter, _)| nearest.min(*enter));
+                    waiting.push((leading_half(nearest), others.iter().rev().map(|(_, child)| child.index).collect()));
+                }
+                waiting.push((f32::NEG_INFINITY, vec![first.1.index]));
+            }
         }
     }
+}
+
+/// The leading half of a float that is not above `enter`: what an entry has room for.
+fn leading_half(enter: f32) -> f32 {
+    if enter >= 0.0 { f32::from_bits(enter.to_bits() & 0xFFFF_0000) } else { f32::NEG_INFINITY }
 }
