@@ -11,29 +11,36 @@ use hedgerow::bvh::wide::Form;
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::trace::tracer::{Buffers, Loads, Shape};
-use hedgerow::trace::{Hit, Query, Ray, Work, host, wide, wide_host};
+use hedgerow::trace::wide::{Order, Tracer};
+use hedgerow::trace::{Hit, Query, Ray, Work, host, wide_host};
 
-/// Every way to cut the work: the default, that for GPUs, no shared memory at all, and a stack half here and half there.
-fn shapes(form: Form) -> Vec<Shape> {
+/// Every order, and every way to cut the work: the default, that for GPUs, no shared memory at all, and a stack half here and
+/// half there.
+fn tracers(form: Form) -> Vec<Tracer> {
     let limits = &device().limits;
     let loads = Loads::Gathered;
-    let mut shapes = vec![
-        wide::shape_of(limits, form),
-        Shape::groups(limits),
-        Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
-        Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
-    ];
-    if form.is_quantised() && limits.subgroup_size <= Loads::MAX_LANES {
-        shapes.push(Shape { shared_levels: wide::stack_levels(form), ..Shape::lanes(limits) });
-        shapes.push(Shape { shared_levels: 3, rays_each: 5, ..Shape::lanes(limits) });
+    let mut tracers = vec![Tracer::of(limits, form)];
+    let orders = if form.is_quantised() { &[Order::Distance, Order::Octant][..] } else { &[Order::Distance] };
+    for &order in orders {
+        let shapes = [
+            Shape::subgroups(limits),
+            Shape::groups(limits),
+            Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
+            Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
+        ];
+        tracers.extend(shapes.map(|shape| Tracer::with(limits, form, order, shape)));
     }
-    shapes
+    if form.is_quantised() && limits.subgroup_size <= Loads::MAX_LANES {
+        let few = Shape { shared_levels: 3, rays_each: 5, ..Shape::lanes(limits) };
+        tracers.extend([Shape::lanes(limits), few].map(|shape| Tracer::with(limits, form, Order::Octant, shape)));
+    }
+    tracers
 }
 
 fn traced<N: WideNode>(
     tree: &Wide<N>,
     rays: &[Ray],
-    shape: &Shape,
+    tracer: &Tracer,
     query: Query,
     count: bool,
 ) -> (Vec<Hit>, Vec<Work>) {
@@ -51,7 +58,7 @@ fn traced<N: WideNode>(
         work: count.then_some(work.address()),
         count: rays.len() as u32,
     };
-    device.run(None, |recorder| wide::record(recorder, N::FORM, shape, query, &buffers)).expect("the device traces");
+    device.run(None, |recorder| tracer.record(recorder, query, &buffers)).expect("the device traces");
     (hits.read(rays.len()), work.read(rays.len()))
 }
 
@@ -62,8 +69,11 @@ fn assert_form<N: WideNode>(tree: &Bvh2, rays: &[Ray]) {
     wide.validate().expect("a valid tree");
     let usable = tree.header.status & status::UNUSABLE == 0;
     for query in [Query::ClosestHit, Query::AnyHit] {
-        let expected: Vec<(Hit, Work)> = rays.iter().map(|ray| wide_host::trace(&wide, ray, query)).collect();
-        for (ray, (hit, _)) in rays.iter().zip(&expected).filter(|_| usable) {
+        let on_host = |order: Order| -> Vec<(Hit, Work)> {
+            rays.iter().map(|ray| wide_host::trace(&wide, ray, query, order)).collect()
+        };
+        let expected = [Order::Distance, Order::Octant].map(on_host);
+        for (ray, (hit, _)) in expected.iter().flat_map(|expected| rays.iter().zip(expected)).filter(|_| usable) {
             match query {
                 Query::ClosestHit => {
                     assert_eq!(*hit, host::closest_hit_by_brute_force(tree, ray), "{} {ray:?}", N::FORM)
@@ -71,12 +81,13 @@ fn assert_form<N: WideNode>(tree: &Bvh2, rays: &[Ray]) {
                 Query::AnyHit => assert_eq!(hit.t, host::any_hit_by_brute_force(tree, ray).t, "{} {ray:?}", N::FORM),
             }
         }
-        for shape in shapes(N::FORM) {
-            let (hits, work) = traced(&wide, rays, &shape, query, true);
-            let (alone, _) = traced(&wide, rays, &shape, query, false);
+        for tracer in tracers(N::FORM) {
+            let expected = &expected[tracer.order as usize];
+            let (hits, work) = traced(&wide, rays, &tracer, query, true);
+            let (alone, _) = traced(&wide, rays, &tracer, query, false);
             for (i, ray) in rays.iter().enumerate() {
-                assert_eq!((hits[i], work[i]), expected[i], "{} {shape:?} {query:?} {ray:?}", N::FORM);
-                assert_eq!(alone[i].t, expected[i].0.t, "{} {shape:?} {query:?} {ray:?}", N::FORM);
+                assert_eq!((hits[i], work[i]), expected[i], "{tracer:?} {query:?} {ray:?}");
+                assert_eq!(alone[i].t, expected[i].0.t, "{tracer:?} {query:?} {ray:?}");
             }
         }
     }
@@ -155,11 +166,13 @@ fn closed_surfaces_do_not_leak() {
     }
 
     fn assert_tight<N: WideNode>(tree: &Bvh2, rays: &[Ray]) {
-        let shape = &shapes(N::FORM)[0];
-        let (hits, _) = traced(&Wide::<N>::of(tree), rays, shape, Query::ClosestHit, false);
-        for (ray, hit) in rays.iter().zip(&hits) {
-            assert!(hit.is_some(), "{} leaks: {ray:?}", N::FORM);
-            assert_eq!(*hit, host::closest_hit(tree, ray), "{} {ray:?}", N::FORM);
+        let wide = Wide::<N>::of(tree);
+        for tracer in tracers(N::FORM).iter().take(3) {
+            let (hits, _) = traced(&wide, rays, tracer, Query::ClosestHit, false);
+            for (ray, hit) in rays.iter().zip(&hits) {
+                assert!(hit.is_some(), "{tracer:?} leaks: {ray:?}");
+                assert_eq!(*hit, host::closest_hit(tree, ray), "{tracer:?} {ray:?}");
+            }
         }
     }
 }
@@ -200,7 +213,7 @@ fn trees_that_are_empty_or_cannot_be_used_have_no_hits() {
         tree.header.status |= bit;
         assert_all_forms(&tree, &rays);
         let wide = Wide::<QuantisedNode>::of(&tree);
-        assert!(rays.iter().all(|ray| !wide_host::trace(&wide, ray, Query::ClosestHit).0.is_some()));
+        assert!(rays.iter().all(|ray| !wide_host::trace(&wide, ray, Query::ClosestHit, Order::Octant).0.is_some()));
     }
 }
 
@@ -214,10 +227,16 @@ fn of_a_thousand_coincident_triangles_the_first_is_hit() {
 }
 
 #[test]
-fn loads_lane_by_lane_are_for_quantised_nodes() {
+fn what_there_is_no_kernel_for_is_refused() {
+    let limits = &device().limits;
     let buffers = Buffers { structure: 16, rays: 16, hits: 16, work: None, count: 0 };
-    let shape = Shape { loads: Loads::LaneByLane, ..shapes(Form::Four)[0] };
-    let refused =
-        device().run(None, |recorder| wide::record(recorder, Form::Four, &shape, Query::ClosestHit, &buffers));
-    assert!(refused.expect_err("no kernel").to_string().contains("Loads::Gathered"));
+    for (form, order, shape) in [
+        (Form::Four, Order::Octant, Shape::subgroups(limits)),
+        (Form::Eight, Order::Distance, Shape::lanes(limits)),
+        (Form::EightQuantised, Order::Distance, Shape::lanes(limits)),
+    ] {
+        let tracer = Tracer { form, order, shape };
+        let refused = device().run(None, |recorder| tracer.record(recorder, Query::ClosestHit, &buffers));
+        assert!(refused.expect_err("no kernel").to_string().contains("no kernel traces"), "{tracer:?}");
+    }
 }

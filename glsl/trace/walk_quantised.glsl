@@ -8,10 +8,8 @@
 #define HEDGEROW_TRACE_WALK_QUANTISED
 #include "trace/buffers.glsl"
 #include "trace/nearest.glsl"
-#include "trace/slab.glsl"
+#include "trace/quantised_boxes.glsl"
 #include "trace/stack.glsl"
-#include "bvh/wide.glsl"
-#extension GL_EXT_control_flow_attributes : require
 
 struct QuantisedWalk {
     HedgerowPreparedRay ray;
@@ -91,14 +89,6 @@ uint leading_half(float enter) {
     return enter >= 0.0 ? floatBitsToUint(enter) & 0xFFFF0000u : 0xFF800000u;
 }
 
-vec3 corner_of(vec3 origin, vec3 cell, uvec2 x, uvec2 y, uvec2 z, uint slot) {
-    uint shift = (slot & 3u) * 8;
-    uvec3 word = slot < 4 ? uvec3(x.x, y.x, z.x) : uvec3(x.y, y.y, z.y);
-    // As signed numbers: CPUs turn those into floats by one instruction.
-    precise vec3 corner = origin + vec3(ivec3(word >> shift & 0xFFu)) * cell;
-    return corner;
-}
-
 void visit(QuantisedNode node, inout QuantisedWalk walk) {
     walk.work.x++;
     walk.visits = 0;
@@ -107,29 +97,14 @@ void visit(QuantisedNode node, inout QuantisedWalk walk) {
         walk.left = node.first_child;
         return;
     }
-    uint e = node.exponents_and_nodes;
-    vec3 origin = uintBitsToFloat(node.origin);
-    vec3 cell = uintBitsToFloat((uvec3(e, e >> 8, e >> 16) & 0xFFu) << 23);
-    // Which corners are met first is the same for all children: hedgerow_enter sorts each pair of distances.
-    bvec3 down = lessThan(walk.ray.inverse, vec3(0.0));
-    uvec2 near_x = down.x ? node.hi[0] : node.lo[0], far_x = down.x ? node.lo[0] : node.hi[0];
-    uvec2 near_y = down.y ? node.hi[1] : node.lo[1], far_y = down.y ? node.lo[1] : node.hi[1];
-    uvec2 near_z = down.z ? node.hi[2] : node.lo[2], far_z = down.z ? node.lo[2] : node.hi[2];
-    vec3 origin_near = mix(walk.ray.origin_lo, walk.ray.origin_hi, down);
-    vec3 origin_far = mix(walk.ray.origin_hi, walk.ray.origin_lo, down);
-    uint entered = 0;
     float enters[8];
+    enter_quantised(walk.ray, node, walk.best, enters);
+    uint entered = 0;
     [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
-        vec3 near = (corner_of(origin, cell, near_x, near_y, near_z, slot) - origin_near) * walk.ray.inverse;
-        vec3 far = (corner_of(origin, cell, far_x, far_y, far_z, slot) - origin_far) * walk.ray.inverse;
-        float enter = max(max(near.x, near.y), max(near.z, walk.ray.t_min));
-        float leave = min(min(far.x, far.y), min(far.z, walk.best));
-        // A slot without a child has a box inside out; where that is flat, it is a leaf of nothing.
-        if (enter <= leave) entered |= 1u << slot;
-        enters[slot] = enter;
+        if (enters[slot] < HEDGEROW_INFINITY) entered |= 1u << slot;
     }
     walk.first_child = node.first_child;
-    walk.nodes = e >> 24;
+    walk.nodes = node.exponents_and_nodes >> 24;
     walk.visits = in_octant(entered & walk.nodes, walk.octant);
     uint others = in_octant(walk.visits & walk.visits - 1u, walk.octant);
     float nearest = HEDGEROW_INFINITY;
@@ -139,6 +114,7 @@ void visit(QuantisedNode node, inout QuantisedWalk walk) {
     walk.enter = leading_half(nearest);
     walk.first_record = node.first_record;
     walk.counts = node.counts;
+    // A slot without a child may be among them: a leaf of nothing.
     walk.leaves = in_octant(entered & ~walk.nodes, walk.octant);
 }
 

@@ -1,7 +1,7 @@
 // A step of trace/walk.glsl at a node of WIDTH children as floats: the twin of src/trace/wide_host.rs, visit for visit.
 //
 // The children that the ray enters are sorted by where it does; the nearest is at hand then, the others wait, the farthest
-// below. So many may wait at once that a shader defines HEDGEROW_LEVELS (src/trace/wide.rs, `stack_levels`).
+// below. So many may wait at once that a shader defines HEDGEROW_LEVELS (src/trace/wide.rs, `Tracer::stack_levels`).
 #ifndef HEDGEROW_TRACE_WALK_WIDE
 #define HEDGEROW_TRACE_WALK_WIDE
 #include "trace/walk.glsl"
@@ -12,7 +12,7 @@ struct WideNode {
     Child child[WIDTH];
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer WideNodes { WideNode node[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer WideNodes { WideNode node[]; };
 
 // Where the ray enters each child: infinity for those that it does not.
 float wide_enter[WIDTH];
@@ -31,16 +31,9 @@ void in_order(uint a, uint b) {
     wide_count[b] = swap ? count : wide_count[b];
 }
 
-void visit_wide(WideNode node, inout Walk walk) {
+// The nearest child is at hand, the others wait.
+void go_to_nearest(inout Walk walk) {
     walk.work.x++;
-    [[unroll]] for (uint i = 0; i < WIDTH; ++i) {
-        Child child = node.child[i];
-        bool enters;
-        float enter = hedgerow_enter(walk.ray, child.lo, child.hi, walk.best, enters);
-        wide_enter[i] = enters && child.count != UNUSED ? enter : HEDGEROW_INFINITY;
-        wide_index[i] = child.index;
-        wide_count[i] = child.count;
-    }
     // Sorting networks.
 #if WIDTH == 8
     in_order(0, 1); in_order(2, 3); in_order(4, 5); in_order(6, 7);
@@ -63,5 +56,17 @@ void visit_wide(WideNode node, inout Walk walk) {
     }
     walk.index = wide_index[0];
     walk.left = wide_enter[0] < HEDGEROW_INFINITY ? wide_count[0] : NOTHING;
+}
+
+void visit_wide(WideNode node, inout Walk walk) {
+    [[unroll]] for (uint i = 0; i < WIDTH; ++i) {
+        Child child = node.child[i];
+        bool enters;
+        float enter = hedgerow_enter(walk.ray, child.lo, child.hi, walk.best, enters);
+        wide_enter[i] = enters && child.count != UNUSED ? enter : HEDGEROW_INFINITY;
+        wide_index[i] = child.index;
+        wide_count[i] = child.count;
+    }
+    go_to_nearest(walk);
 }
 #endif

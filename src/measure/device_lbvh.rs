@@ -97,7 +97,7 @@ fn record_trace(
     let limits = &recorder.context().limits;
     match wide_tree.map(|tree| tree.form) {
         None => tracer::record(recorder, &Shape::of(limits), query, buffers),
-        Some(form) => wide::record(recorder, form, &wide::shape_of(limits, form), query, buffers),
+        Some(form) => wide::Tracer::of(limits, form).record(recorder, query, buffers),
     }
 }
 

@@ -1,20 +1,24 @@
-//! The tracer of wide trees on the host: the same traversal and arithmetic as `glsl/trace/walk_wide.glsl` and
+//! The tracer of wide trees on the host: the same traversals and arithmetic as `glsl/trace/walk_wide.glsl` and
 //! `glsl/trace/walk_quantised.glsl`.
 
 use super::host::{LONG_LEAF, Nearest};
 use super::ray::PreparedRay;
+use super::wide::Order;
 use super::{Hit, Query, Ray, Work, slab};
 use crate::bvh::layout::{Child, status};
 use crate::bvh::wide::layout::{Slots, Wide, WideNode};
 
-/// The hit, and the steps (nodes visited, long leaves among them) and tests that it took.
+/// The hit, and the steps (nodes visited, long leaves among them) and tests that it took in this order.
 ///
 /// A tree whose status says that it cannot be used is traced as if it were empty, as the device must.
-pub fn trace<N: WideNode>(tree: &Wide<N>, ray: &Ray, query: Query) -> (Hit, Work) {
+pub fn trace<N: WideNode>(tree: &Wide<N>, ray: &Ray, query: Query, order: Order) -> (Hit, Work) {
     let mut walk = Walk { tree, query, nearest: Nearest::new(ray.t_max), work: Work::default() };
     let usable = tree.header.active != 0 && tree.header.status & status::UNUSABLE == 0;
     if let Some(ray) = PreparedRay::new(ray, &tree.header.root.bounds()).filter(|_| usable) {
-        if N::FORM.is_quantised() { walk.by_octant(&ray) } else { walk.by_distance(&ray) }
+        match order {
+            Order::Distance => walk.by_distance(&ray),
+            Order::Octant => walk.by_octant(&ray),
+        }
     }
     (walk.nearest.hit_of(query), walk.work)
 }
@@ -81,6 +85,12 @@ impl<N: WideNode> Walk<'_, N> {
                 continue;
             }
             self.work.steps += 1;
+            if let Some((first, count)) = self.tree.nodes[child.index as usize].long_leaf() {
+                if self.leaf(ray, first, count) {
+                    return;
+                }
+                continue;
+            }
             let enter = |child: &Child| slab::enter(ray, child, self.nearest.t).unwrap_or(f32::INFINITY);
             let children = self.tree.nodes[child.index as usize].children();
             let mut entered = children.map(|child| (child.as_ref().map_or(f32::INFINITY, enter), child));
@@ -124,8 +134,10 @@ impl<N: WideNode> Walk<'_, N> {
             let children: Slots = node.children();
             let best = self.nearest.t;
             let in_order = (0..8).filter_map(|place| children[place ^ octant]);
-            let entered: Vec<(f32, Child)> =
-                in_order.filter_map(|child| Some((slab::enter(ray, &child, best)?, child))).collect();
+            let entered: Vec<(f32, Child)> = in_order
+                .filter_map(|child| Some((slab::enter(ray, &child, best)?, child)))
+                .filter(|&(enter, _)| enter < f32::INFINITY)
+                .collect();
             for (_, leaf) in entered.iter().filter(|(_, child)| child.is_leaf()) {
                 if self.leaf(ray, leaf.index, leaf.count) {
                     return;

@@ -1,5 +1,5 @@
 // Traces rays through a tree of quantised nodes, each by one invocation, on CPUs: the loop of trace/tracer_lanes.comp, with loads
-// lane by lane (trace/lanes.glsl), and the steps of trace/tracer_wide8q.comp.
+// lane by lane (trace/lanes.glsl), and the steps of trace/tracer_wide8q_octant.comp.
 //
 // reads   structure, rays[first..count]
 // writes  hits[first..count]; with COUNT_WORK also works[first..count]
