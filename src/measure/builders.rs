@@ -15,8 +15,9 @@ use crate::bvh::codes::Codes;
 use crate::bvh::lbvh::{self, Schedule};
 use crate::bvh::sah::Collapse;
 use crate::bvh::wide::Form;
-use crate::gpu::{Device, DriverPreference};
+use crate::gpu::{Device, DriverPreference, Limits};
 use crate::scene::Mesh;
+use crate::trace::wide::{Order, Tracer};
 use crate::{Error, Result};
 use std::fmt;
 use std::str::FromStr;
@@ -65,6 +66,7 @@ const CODES: BuilderOption = BuilderOption {
 };
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
 const WIDTH: BuilderOption = BuilderOption { key: "width", values: "2, 4, 8 or 8q (quantised)" };
+const ORDER: BuilderOption = BuilderOption { key: "order", values: "distance or octant (of width=8q)" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
 
 /// Every builder, in the order in which they are listed and measured.
@@ -72,7 +74,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "lbvh",
         what: "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
-        options: &[CODES, COLLAPSE, SCHEDULE, WIDTH],
+        options: &[CODES, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &[
             "lbvh",
             "lbvh:codes=mc30",
@@ -84,10 +86,11 @@ pub static BUILDERS: &[Builder] = &[
         ],
         needs: Needs::Device,
         make: |spec, device, mesh| {
-            let (options, form) = (spec.lbvh_options()?, spec.form()?);
-            Ok(Box::new(DeviceLbvh::new(given(device)?, &spec.to_string(), mesh, &options, form)?))
+            let (device, options) = (given(device)?, spec.lbvh_options()?);
+            let wide = spec.wide(&device.limits)?;
+            Ok(Box::new(DeviceLbvh::new(device, &spec.to_string(), mesh, &options, wide)?))
         },
-        check: |spec| spec.lbvh_options().map(drop).and(spec.form().map(drop)),
+        check: |spec| spec.lbvh_options().map(drop).and(spec.form_and_order().map(drop)),
     },
     Builder {
         name: "lbvh-host",
@@ -226,15 +229,31 @@ impl Spec {
         Ok(lbvh::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..lbvh::Options::DEFAULT })
     }
 
-    /// Option `width`: the form of a wide tree, or `None` for a `Bvh2`, also where it was not given.
-    fn form(&self) -> Result<Option<Form>> {
-        match self.option(WIDTH.key) {
-            None | Some("2") => Ok(None),
-            Some("4") => Ok(Some(Form::Four)),
-            Some("8") => Ok(Some(Form::Eight)),
-            Some("8q") => Ok(Some(Form::EightQuantised)),
-            Some(other) => Err(self.wrong_value(&WIDTH, other)),
-        }
+    /// Options `width`, of a wide tree, and `order`; no width where it is 2 or was not given.
+    fn form_and_order(&self) -> Result<(Option<Form>, Option<Order>)> {
+        let form = match self.option(WIDTH.key) {
+            None | Some("2") => None,
+            Some("4") => Some(Form::Four),
+            Some("8") => Some(Form::Eight),
+            Some("8q") => Some(Form::EightQuantised),
+            Some(other) => return Err(self.wrong_value(&WIDTH, other)),
+        };
+        let order = match self.option(ORDER.key) {
+            None => None,
+            Some("distance") if form.is_some() => Some(Order::Distance),
+            Some("octant") if form == Some(Form::EightQuantised) => Some(Order::Octant),
+            Some(other) => return Err(self.wrong_value(&ORDER, other)),
+        };
+        Ok((form, order))
+    }
+
+    /// The same as the tracer of such a tree.
+    fn wide(&self, limits: &Limits) -> Result<Option<Tracer>> {
+        let (form, order) = self.form_and_order()?;
+        Ok(form.map(|form| match order {
+            None => Tracer::of(limits, form),
+            Some(order) => Tracer::in_order(limits, form, order),
+        }))
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {
@@ -369,6 +388,9 @@ mod tests {
         assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));
         assert!(error_of("lbvh-host:collapse=maybe").contains("take sah or off"));
         assert!(error_of("lbvh:width=3").contains("width=3 is not known; take 2, 4, 8 or 8q"));
+        assert!(
+            error_of("lbvh:width=4:order=octant").contains("order=octant is not known; take distance or octant (of")
+        );
         assert!(error_of("lbvh-host:codes").contains("write codes=VALUE"));
         assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
         assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse"));

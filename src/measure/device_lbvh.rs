@@ -5,11 +5,11 @@ use super::{BuildRun, Subject, record};
 use crate::bvh::layout::Bvh2;
 use crate::bvh::lbvh::{Input, Lbvh, Options, Sizes};
 use crate::bvh::quality::{self, Figures};
-use crate::bvh::wide::Form;
 use crate::gpu::{Buffer, Device, Recorder, Timestamps};
 use crate::scene::Mesh;
 use crate::trace::tracer::{self, Buffers, Shape};
-use crate::trace::{Hit, Query, Ray, Work, wide};
+use crate::trace::wide::Tracer;
+use crate::trace::{Hit, Query, Ray, Work};
 use crate::{Error, Result};
 
 /// Phases of a build at most: reset and bounds, encode, sort, hierarchy, wide.
@@ -47,7 +47,7 @@ impl<'a> DeviceLbvh<'a> {
         builder: &str,
         mesh: &Mesh,
         options: &Options,
-        form: Option<Form>,
+        wide: Option<Tracer>,
     ) -> Result<DeviceLbvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let lbvh = Lbvh::new(device, options, count)?;
@@ -66,7 +66,7 @@ impl<'a> DeviceLbvh<'a> {
             choice: choice_of(options, &lbvh),
             structure: device.buffer("structure", sizes.structure)?,
             scratch: device.buffer("scratch", sizes.scratch)?,
-            wide: form.map(|form| WideTree::new(device, form, count)).transpose()?,
+            wide: wide.map(|tracer| WideTree::new(device, tracer, count)).transpose()?,
             timestamps: Timestamps::new(device, PHASES)?,
             lbvh,
             sizes,
@@ -94,10 +94,9 @@ fn record_trace(
     query: Query,
     buffers: &Buffers,
 ) -> Result<()> {
-    let limits = &recorder.context().limits;
-    match wide_tree.map(|tree| tree.form) {
-        None => tracer::record(recorder, &Shape::of(limits), query, buffers),
-        Some(form) => wide::Tracer::of(limits, form).record(recorder, query, buffers),
+    match wide_tree {
+        None => tracer::record(recorder, &Shape::of(&recorder.context().limits), query, buffers),
+        Some(tree) => tree.tracer.record(recorder, query, buffers),
     }
 }
 
@@ -115,7 +114,7 @@ impl Subject for DeviceLbvh<'_> {
     }
 
     fn kind(&self) -> &'static str {
-        self.wide.as_ref().map_or("bvh2", |tree| tree.form.name())
+        self.wide.as_ref().map_or("bvh2", |tree| tree.tracer.form.name())
     }
 
     fn timer(&self) -> &'static str {

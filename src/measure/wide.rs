@@ -10,11 +10,12 @@ use crate::bvh::wide::layout::{Wide, WideNode};
 use crate::bvh::wide::quantised::QuantisedNode;
 use crate::bvh::wide::{Form, quality};
 use crate::gpu::{Buffer, Device, Recorder};
+use crate::trace::wide::Tracer;
 
-/// Memory for a wide tree of triangles, and its collapsing.
+/// Memory for a wide tree of triangles, its collapsing, and what traces it.
 pub struct WideTree<'a> {
-    /// Its nodes.
-    pub form: Form,
+    /// What traces it.
+    pub tracer: Tracer,
     collapse: OnDevice,
     sizes: Sizes,
     structure: Buffer<'a>,
@@ -26,14 +27,14 @@ impl<'a> WideTree<'a> {
     ///
     /// # Errors
     /// Too little memory; a pipeline could not be made.
-    pub fn new(device: &'a Device, form: Form, count: u32) -> Result<WideTree<'a>> {
-        let options = Options { form, primitives: Primitives::Triangles, geometry_count: 1 };
+    pub fn new(device: &'a Device, tracer: Tracer, count: u32) -> Result<WideTree<'a>> {
+        let options = Options { form: tracer.form, primitives: Primitives::Triangles, geometry_count: 1 };
         let collapse = OnDevice::new(&device.limits, &options, count);
         collapse.warm(device)?;
         let sizes = collapse.sizes();
         let structure = device.buffer("wide structure", sizes.structure)?;
         let scratch = device.buffer("wide scratch", sizes.scratch)?;
-        Ok(WideTree { form, collapse, sizes, structure, scratch })
+        Ok(WideTree { tracer, collapse, sizes, structure, scratch })
     }
 
     /// Records the phase `wide`, behind the build of the `Bvh2` at `source`.
@@ -57,7 +58,7 @@ impl<'a> WideTree<'a> {
 
     fn bytes_in_use(&self) -> u64 {
         let header: Header = self.structure.read(1)[0];
-        self.form.bytes_in_use(&header, size_of::<Triangle>() as u64)
+        self.tracer.form.bytes_in_use(&header, size_of::<Triangle>() as u64)
     }
 
     /// What the build takes beside `binary`, the memory of the `Bvh2` and of its build. The structure's bytes are those in use,
@@ -82,7 +83,7 @@ impl<'a> WideTree<'a> {
             let tree = Wide::<N, Triangle>::from_bytes(bytes)?;
             Ok(record::Quality::of(&quality::on_host(&tree, c_t, c_i), c_t, c_i))
         }
-        match self.form {
+        match self.tracer.form {
             Form::Four => of::<[Child; 4]>(&self.bytes(), c_t, c_i),
             Form::Eight => of::<[Child; 8]>(&self.bytes(), c_t, c_i),
             Form::EightQuantised => of::<QuantisedNode>(&self.bytes(), c_t, c_i),
@@ -94,7 +95,7 @@ impl<'a> WideTree<'a> {
     /// # Errors
     /// [`Wide::validate`] names the rule that is broken.
     pub fn validate(&self) -> Result<()> {
-        match self.form {
+        match self.tracer.form {
             Form::Four => Wide::<[Child; 4], Triangle>::from_bytes(&self.bytes())?.validate(),
             Form::Eight => Wide::<[Child; 8], Triangle>::from_bytes(&self.bytes())?.validate(),
             Form::EightQuantised => Wide::<QuantisedNode, Triangle>::from_bytes(&self.bytes())?.validate(),

@@ -46,15 +46,20 @@ impl Order {
 }
 
 impl Tracer {
-    /// What is fast on a device: the shape as of [`Shape::of`], but the whole stack in shared memory on CPUs. Quantised nodes by
-    /// distance there, unless loads are lane by lane; on GPUs, of which none was measured, as their paper has it.
+    /// What is fast on a device: quantised nodes by distance on CPUs, unless loads are lane by lane there; on GPUs, of which none
+    /// was measured, as their paper has it.
     pub fn of(limits: &Limits, form: Form) -> Tracer {
-        let shape = Shape::of(limits);
-        let lanes = shape.loads == Loads::LaneByLane;
-        if form.is_quantised() && (lanes || !limits.is_cpu()) {
-            return Tracer::with(limits, form, Order::Octant, shape);
+        let by_octant = form.is_quantised() && (!limits.is_cpu() || Shape::of(limits).loads == Loads::LaneByLane);
+        Tracer::in_order(limits, form, if by_octant { Order::Octant } else { Order::Distance })
+    }
+
+    /// In this order: the shape as of [`Shape::of`], but the whole stack in shared memory on CPUs.
+    pub fn in_order(limits: &Limits, form: Form, order: Order) -> Tracer {
+        let mut shape = Shape::of(limits);
+        if order == Order::Distance {
+            shape.loads = Loads::Gathered;
         }
-        Tracer::with(limits, form, Order::Distance, Shape { loads: Loads::Gathered, ..shape })
+        Tracer::with(limits, form, order, shape)
     }
 
     /// With as many levels in shared memory as `shape` has for binary trees: some, or all.
