@@ -12,9 +12,9 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use hedgerow::Result;
 use hedgerow::accel;
 use hedgerow::ash;
+use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
 use hedgerow::bvh::compact;
 use hedgerow::bvh::layout::{Header, Triangle};
-use hedgerow::bvh::lbvh::{Input, Lbvh, Options, Schedule};
 use hedgerow::gpu::{Buffer, Device, DeviceOptions};
 use hedgerow::measure::experiments::batch::{Batch, Workload};
 use hedgerow::measure::experiments::points::Way;
@@ -40,7 +40,7 @@ fn scene() -> Scene {
 /// A scene on the device, and room for its structure.
 struct Built<'a> {
     device: &'a Device,
-    lbvh: Lbvh,
+    bvh: Builder,
     input: Input,
     structure: Buffer<'a>,
     scratch: Buffer<'a>,
@@ -57,18 +57,18 @@ impl<'a> Built<'a> {
             vertices[1].address(),
             mesh.triangles.len() as u32,
         );
-        let lbvh = Lbvh::new(device, options, input.primitive_count)?;
-        let sizes = lbvh.sizes();
+        let bvh = Builder::new(device, options, input.primitive_count)?;
+        let sizes = bvh.sizes();
         let structure = device.buffer("structure", sizes.structure)?;
         let scratch = device.buffer("scratch", sizes.scratch)?;
-        let built = Built { device, lbvh, input, structure, scratch, _vertices: vertices };
+        let built = Built { device, bvh, input, structure, scratch, _vertices: vertices };
         built.build()?;
         Ok(built)
     }
 
     fn build(&self) -> Result<()> {
         let (structure, scratch) = (self.structure.address(), self.scratch.address());
-        self.device.run(None, |recorder| self.lbvh.record(recorder, &self.input, structure, scratch))
+        self.device.run(None, |recorder| self.bvh.record(recorder, &self.input, structure, scratch))
     }
 
     /// Through its structure, or a copy of it.

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{corpus, device};
-use hedgerow::bvh::lbvh::{Input, Lbvh, Options, Schedule};
+use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
 use std::process::Command;
 
 /// Twenty builds into the same memory, with a guard behind structure and scratch.
@@ -19,7 +19,7 @@ fn twenty_builds_give_the_same_bytes_and_touch_nothing_else() {
     ] {
         for schedule in [Schedule::Chain, Schedule::Persistent] {
             let options = Options { schedule: Some(schedule), ..Options::DEFAULT };
-            let lbvh = Lbvh::new(device, &options, triangles.len() as u32).unwrap();
+            let lbvh = Builder::new(device, &options, triangles.len() as u32).unwrap();
             let sizes = lbvh.sizes();
             let vertices = device.upload("positions", &positions).unwrap();
             let indices = device.upload("indices", &triangles).unwrap();
@@ -66,7 +66,7 @@ fn subgroups_of_4_8_and_16_give_the_same_bytes() {
         eprintln!("skipped: {driver} is not Mesa 25, whose lavapipe takes other subgroup sizes");
         return;
     }
-    for builder in ["lbvh", "lbvh:codes=emc64var:schedule=persistent"] {
+    for builder in ["lbvh", "lbvh:width=4", "lbvh:width=8q", "lbvh:codes=emc64var:schedule=persistent"] {
         let mut trees = Vec::new();
         for (width, subgroup) in [("128", 4), ("256", 8), ("512", 16)] {
             assert_eq!(sizes_of(&run(width, &["devices", "--json"])).0, subgroup);

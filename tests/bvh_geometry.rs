@@ -5,11 +5,11 @@ mod common;
 use common::device;
 use common::geometries::{MOVED, Owned, half};
 use common::shapes::{Corners, soup};
+use hedgerow::bvh::builder::{Builder, Options, Schedule};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{IndexFormat, Input, Source, VertexFormat};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::{Bvh2, status};
-use hedgerow::bvh::lbvh::{Lbvh, Options, Schedule};
 use hedgerow::bvh::sah::Collapse;
 
 fn built(input: &Input, schedule: Schedule) -> Vec<u8> {
@@ -23,7 +23,7 @@ fn built(input: &Input, schedule: Schedule) -> Vec<u8> {
         },
         ..Options::DEFAULT
     };
-    let builder = Lbvh::new(device(), &options, input.primitive_count).expect("few enough triangles");
+    let builder = Builder::new(device(), &options, input.primitive_count).expect("few enough triangles");
     let sizes = builder.sizes();
     let structure = device().buffer("structure", sizes.structure).expect("memory");
     let scratch = device().buffer("scratch", sizes.scratch).expect("memory");

@@ -3,16 +3,16 @@
 mod common;
 
 use common::{corpus, device};
+use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow::bvh::lbvh::{Input, Lbvh, Options, Schedule};
 use hedgerow::bvh::quality::{self, Figures, Quality};
 use hedgerow::bvh::sah::Collapse;
 
 fn build_on_device(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &Options) -> (Bvh2, Vec<u8>) {
     let device = device();
-    let builder = Lbvh::new(device, options, triangles.len() as u32).unwrap();
+    let builder = Builder::new(device, options, triangles.len() as u32).unwrap();
     let sizes = builder.sizes();
     let vertices = device.upload("positions", positions).unwrap();
     let indices = device.upload("indices", triangles).unwrap();

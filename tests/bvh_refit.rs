@@ -7,11 +7,11 @@ use common::geometries::{MOVED, Owned};
 use common::probe::{self, Probe, ProbeRay};
 use common::shapes::{Corners, Random, hard_rays, soup};
 use common::{corpus, device};
+use hedgerow::bvh::builder::{self, Builder};
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, VertexFormat};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::{Aabb, BoxRecord, Bvh2, Child, Instance, Record, Triangle, status};
-use hedgerow::bvh::lbvh::{self, Lbvh};
 use hedgerow::bvh::quality;
 use hedgerow::bvh::refit::{Job, Options, Refit, Schedule};
 use hedgerow::bvh::sah::Collapse;
@@ -623,8 +623,8 @@ fn top_levels_are_refitted_to_their_entries() {
             (Input { source, primitive_count: count as u32 }, (entries, instances))
         };
         let built = |input: &Input| {
-            let options = lbvh::Options { primitives: Primitives::Instances, ..lbvh::Options::DEFAULT };
-            let builder = Lbvh::new(device(), &options, count as u32).expect("few enough");
+            let options = builder::Options { primitives: Primitives::Instances, ..builder::Options::DEFAULT };
+            let builder = Builder::new(device(), &options, count as u32).expect("few enough");
             let sizes = builder.sizes();
             let structure = device().buffer("structure", sizes.structure).expect("memory");
             let scratch = device().buffer("scratch", sizes.scratch).expect("memory");

@@ -3,8 +3,8 @@
 //
 // writes  state
 // needs   one barrier after
-#include "bvh/lbvh.glsl"
+#include "bvh/encode.glsl"
 
 void main() {
-    lbvh_reset();
+    reset_build(1);
 }

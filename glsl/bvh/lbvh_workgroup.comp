@@ -5,7 +5,7 @@
 // writes  the structures; scratch memory of each build
 // needs   nothing of other workgroups; subgroups of any size; workgroups of whole subgroups
 #version 460
-#define HEDGEROW_LBVH_ARGUMENTS_ARE_SET
+#define HEDGEROW_BUILD_ARGUMENTS_ARE_SET
 #include "bvh/lbvh.glsl"
 
 // The twin of `Small` in src/bvh/lbvh_workgroup.rs.
@@ -73,16 +73,16 @@ void main() {
     uint tile = gl_WorkGroupSize.x * ITEMS;
     uint tiles = (primitive_count + tile - 1u) / tile;
     uint lanes_a_task = PRIVATE_COUNTERS ? gl_WorkGroupSize.x : 1u;
-    lbvh_reset();
+    reset_build(0);
     next_phase();
-    for (uint task = 0; task < tiles; ++task) lbvh_bounds(task);
+    for (uint task = 0; task < tiles; ++task) find_bounds(task);
     next_phase();
-    lbvh_plan();
+    make_plan();
     next_phase();
-    for (uint task = 0; task < tiles; ++task) lbvh_encode(task);
+    for (uint task = 0; task < tiles; ++task) encode(task);
     next_phase();
     for (uint pass = 0; pass < passes; ++pass) {
-        Radix r = lbvh_radix(pass);
+        Radix r = radix_of_pass(pass);
         for (uint task = 0; task * lanes_a_task < columns; ++task) radix_count(r, task);
         next_phase();
         for (uint task = 0; task * lanes_a_task < DIGITS; ++task) radix_scan(r, task);

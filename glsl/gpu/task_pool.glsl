@@ -14,7 +14,7 @@
 #define HEDGEROW_GPU_TASK_POOL
 #include "gpu/pass.glsl"
 
-const uint POOL_PHASES_AT_MOST = 60;
+const uint POOL_PHASES_AT_MOST = 188;
 const uint POOL_STATUS_SPIN_RAN_OUT = 1;
 // Polls before a worker gives up and says so. A poll takes at least some tens of nanoseconds: seconds in all.
 const uint POOL_SPINS = 1u << 28;

@@ -4,9 +4,9 @@ use super::geometry::{self, Given};
 use super::instances::{ENTRY_BYTES, entries_step};
 use super::rebraid::Rebraid;
 use super::{Options, REBRAID};
+use crate::bvh::builder::{self, Builder, Job, Sizes};
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
-use crate::bvh::lbvh::{self, Job, Lbvh, Sizes};
 use crate::bvh::refit::{self, Refit};
 use crate::bvh::sah::Collapse;
 use crate::gpu::push_constants::push_constants;
@@ -41,14 +41,14 @@ pub(super) enum Counts {
 
 /// A build, or an update, that is asked for.
 pub(super) struct Build {
-    lbvh: Lbvh,
+    builder: Builder,
     refit: Refit,
     given: Given,
     counts: Counts,
     /// Most primitives of all geometries.
     primitive_count: u32,
     rebraid: Option<Rebraid>,
-    options: lbvh::Options,
+    options: builder::Options,
 }
 
 /// Where the parts of the scratch memory begin.
@@ -82,35 +82,35 @@ impl Build {
         };
         let entries = rebraid.map_or(primitive_count, |rebraid| rebraid.capacity);
         let primitives = given.primitives();
-        let lbvh_options = lbvh::Options {
+        let builder_options = builder::Options {
             codes: Some(codes(flags, entries)),
             // An instance costs more than a node whatever its box: one a leaf.
             collapse: if primitives == Primitives::Instances { Collapse::OFF } else { collapse(flags) },
             primitives,
             geometry_count: given.count(),
             build_flags: flags.as_raw() & 0x1f,
-            ..lbvh::Options::DEFAULT
+            ..builder::Options::DEFAULT
         };
-        let lbvh = Lbvh::new(context, &lbvh_options, entries)?;
-        let refit = Refit::new(context, &refit::Options::from(&lbvh_options), entries)?;
-        Ok(Build { lbvh, refit, given, counts, primitive_count, rebraid, options: lbvh_options })
+        let builder = Builder::new(context, &builder_options, entries)?;
+        let refit = Refit::new(context, &refit::Options::from(&builder_options), entries)?;
+        Ok(Build { builder, refit, given, counts, primitive_count, rebraid, options: builder_options })
     }
 
     /// Bytes of structure and scratch memory that it needs.
     pub fn sizes(&self) -> Sizes {
-        let sizes = self.lbvh.sizes();
+        let sizes = self.builder.sizes();
         Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
     }
 
     /// Bytes of structure and scratch memory that suffice for it and for the same with fewer primitives.
     pub fn sizes_at_most(&self) -> Sizes {
-        let sizes = self.lbvh.sizes_at_most();
+        let sizes = self.builder.sizes_at_most();
         Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
     }
 
     /// What the host's builder takes: codes, collapsing, flags.
     pub fn host_options(&self) -> (Codes, Collapse, u32) {
-        (self.lbvh.codes(), self.options.collapse, self.options.build_flags)
+        (self.builder.codes(), self.options.collapse, self.options.build_flags)
     }
 
     /// What it is over.
@@ -125,7 +125,7 @@ impl Build {
 
     /// The builder's part, with scratch memory at `scratch`.
     pub fn job(&self, structure: u64, scratch: u64) -> Job<'_> {
-        Job { lbvh: &self.lbvh, input: self.input(scratch), structure, scratch: self.scratch(scratch).builder }
+        Job { builder: &self.builder, input: self.input(scratch), structure, scratch: self.scratch(scratch).builder }
     }
 
     /// The part of an update in place, with scratch memory at `scratch`.
@@ -146,7 +146,7 @@ impl Build {
                 }
             },
         };
-        Input { source, primitive_count: self.lbvh.count() }
+        Input { source, primitive_count: self.builder.count() }
     }
 
     /// What must have run, with a barrier behind, before the builder's part: chains of steps for [`Recorder::chains`].
@@ -160,7 +160,7 @@ impl Build {
                     Counts::Told => 0,
                     Counts::OnDevice { address, .. } => address,
                 };
-                let (count, capacity) = (self.primitive_count, self.lbvh.count());
+                let (count, capacity) = (self.primitive_count, self.builder.count());
                 let mut steps = vec![entries_step(context, *data, *pointers, parts.entries, ranges, count, capacity)];
                 if let Some(rebraid) = &self.rebraid {
                     steps.extend(rebraid.steps(context, count, parts.entries, parts.rebraid));
@@ -196,7 +196,7 @@ impl Build {
     /// The parts of scratch memory: records of the geometries with one more that may end them, or entries; then the builder's.
     fn scratch(&self, begin: u64) -> Scratch {
         let records = match &self.given {
-            Given::Instances { .. } => u64::from(self.lbvh.count()) * ENTRY_BYTES,
+            Given::Instances { .. } => u64::from(self.builder.count()) * ENTRY_BYTES,
             Given::Triangles(geometries) | Given::Boxes(geometries) => {
                 (geometries.len() as u64 + 1) * size_of::<Geometry>() as u64
             }

@@ -5,7 +5,7 @@ use super::checked::{Asked, Checks};
 use super::copy::clone_step;
 use super::given::not_null;
 use super::{Options, Placement, geometry};
-use crate::bvh::lbvh::{Job, Lbvh, Sizes};
+use crate::bvh::builder::{Builder, Job, Sizes};
 use crate::bvh::refit::Refit;
 use crate::gpu::{Context, Recorder, Step};
 use crate::{Error, Result};
@@ -282,7 +282,7 @@ impl<'a> Device<'a> {
         let (updates, builds_anew): (Vec<&Placed>, Vec<&Placed>) = builds.iter().partition(|p| p.source.is_some());
         let jobs: Vec<Job<'_>> = builds_anew.iter().map(|p| p.build.job(p.structure, p.scratch)).collect();
         let updates_in_place: Vec<_> = updates.iter().map(|p| p.build.update(p.structure, p.scratch)).collect();
-        let mut chains = Lbvh::chains(&jobs)?;
+        let mut chains = Builder::chains(&jobs)?;
         chains.extend(Refit::chains(&updates_in_place)?);
         let mut prologues: Vec<Vec<Step>> =
             builds.iter().flat_map(|p| p.build.prologue(self.context, p.scratch)).collect();

@@ -3,7 +3,8 @@
 //! A chain of dispatches costs a small build more than its work; many small builds in a batch need no barriers between them and
 //! no memory for their arguments this way: two fit into the push constants.
 
-use super::lbvh::{Job, STATE_BYTES};
+use super::builder::Job;
+use super::encode::STATE_BYTES;
 use crate::Result;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Kernel, Step, shaders};
@@ -44,11 +45,12 @@ pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
     let mut kinds: HashMap<(Kernel, u32, [u32; 2]), Vec<Small>> = HashMap::new();
     let mut order = Vec::new();
     for job in jobs {
-        let Job { lbvh, input, structure, scratch } = **job;
-        let (geometry, formats) = lbvh.checked(&input)?;
-        let kernel = lbvh.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, &input);
-        let costs = [lbvh.collapse.c_t.to_bits(), lbvh.collapse.c_i.to_bits()];
-        let kind = (kernel, lbvh.code_kind(), costs);
+        let Job { builder, input, structure, scratch } = **job;
+        let encode = &builder.encode;
+        let (geometry, formats) = encode.checked(&input)?;
+        let kernel = encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, &input);
+        let costs = [encode.collapse.c_t.to_bits(), encode.collapse.c_i.to_bits()];
+        let kind = (kernel, encode.code_kind(), costs);
         let builds = kinds.entry(kind.clone()).or_default();
         if builds.is_empty() {
             order.push(kind);
@@ -62,7 +64,7 @@ pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
             vertex_stride: geometry.vertex_stride,
             vertex_count: geometry.vertex_count,
             formats,
-            primitive_count: lbvh.count,
+            primitive_count: encode.count,
         });
     }
     let mut steps = Vec::new();

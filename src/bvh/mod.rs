@@ -1,14 +1,20 @@
 //! Bounding volume hierarchies: codes, node layouts, builders on the device, and their twins on the host.
 
+pub mod builder;
 pub mod codes;
+mod collapse;
 pub mod compact;
+pub(crate) mod encode;
 pub mod geometry;
 pub mod host;
+mod hploc;
 pub mod layout;
-pub mod lbvh;
+mod lbvh;
 pub(crate) mod lbvh_workgroup;
+mod ploc;
 pub mod quality;
 pub mod refit;
+pub mod reinsertion;
 pub mod sah;
 pub mod validate;
 pub mod wide;

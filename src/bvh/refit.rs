@@ -14,10 +14,10 @@
 //! [`Header::sah_growth`](super::layout::Header::sah_growth) tells afterwards how much worse the tree has become, which is when to
 //! build anew. The twin is [`super::host::refit`]: the same bytes.
 
+use super::builder;
 use super::geometry::Planned;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::layout::node_slots;
-use super::lbvh;
 use super::sah::Collapse;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Context, Kernel, Recorder, Step, radix_sort, shaders};
@@ -49,10 +49,10 @@ impl Default for Options {
     }
 }
 
-impl From<&lbvh::Options> for Options {
+impl From<&builder::Options> for Options {
     /// For what was built with these.
-    fn from(built: &lbvh::Options) -> Options {
-        let &lbvh::Options { collapse, primitives, geometry_count, .. } = built;
+    fn from(built: &builder::Options) -> Options {
+        let &builder::Options { collapse, primitives, geometry_count, .. } = built;
         Options { costs: collapse, schedule: None, primitives, geometry_count }
     }
 }

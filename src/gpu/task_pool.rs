@@ -6,9 +6,9 @@
 use bytemuck::{Pod, Zeroable};
 
 /// Phases a pool has at most: `POOL_PHASES_AT_MOST` in task_pool.glsl.
-pub const PHASES_AT_MOST: usize = 60;
+pub const PHASES_AT_MOST: usize = 188;
 
-/// The pool's state in device memory, 256 bytes: `PoolState` in task_pool.glsl.
+/// The pool's state in device memory, 768 bytes: `PoolState` in task_pool.glsl.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct State {

@@ -4,18 +4,20 @@
 //! whoever adds one adds a row there.
 
 use super::Subject;
-use super::device_lbvh::DeviceLbvh;
-use super::host::HostLbvh;
+use super::device_bvh::DeviceBvh;
+use super::host::{self, Hierarchy, Host};
 use super::peers::driver::Driver;
 #[cfg(feature = "peer-embree")]
 use super::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use super::peers::obvhs;
+use crate::bvh::builder::{self, Method, Schedule, Window};
 use crate::bvh::codes::Codes;
-use crate::bvh::lbvh::{self, Schedule};
+use crate::bvh::host::sweep::Leaves;
+use crate::bvh::reinsertion;
 use crate::bvh::sah::Collapse;
 use crate::bvh::wide::Form;
-use crate::gpu::{Device, DriverPreference, Limits};
+use crate::gpu::{Device, DriverPreference};
 use crate::scene::Mesh;
 use crate::trace::wide::{Order, Tracer};
 use crate::{Error, Result};
@@ -67,7 +69,17 @@ const CODES: BuilderOption = BuilderOption {
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
 const WIDTH: BuilderOption = BuilderOption { key: "width", values: "2, 4, 8 or 8q (quantised)" };
 const ORDER: BuilderOption = BuilderOption { key: "order", values: "distance or octant (of width=8q)" };
+const TERMINATION: BuilderOption =
+    BuilderOption { key: "termination", values: "sah, or off: leaves of one triangle, then collapsed" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
+
+const OPTIMISE: BuilderOption =
+    BuilderOption { key: "optimise", values: "off, fast, medium, high, or a number of rounds of reinsertion" };
+const WINDOW: BuilderOption = BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
+const RADIUS: BuilderOption = BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
+
+/// Of `ploc` where it is not told: what drivers take.
+const PLOC_RADIUS: u32 = 16;
 
 /// Every builder, in the order in which they are listed and measured.
 pub static BUILDERS: &[Builder] = &[
@@ -85,21 +97,53 @@ pub static BUILDERS: &[Builder] = &[
             "lbvh:width=8q",
         ],
         needs: Needs::Device,
-        make: |spec, device, mesh| {
-            let (device, options) = (given(device)?, spec.lbvh_options()?);
-            let wide = spec.wide(&device.limits)?;
-            Ok(Box::new(DeviceLbvh::new(device, &spec.to_string(), mesh, &options, wide)?))
-        },
-        check: |spec| spec.lbvh_options().map(drop).and(spec.form_and_order().map(drop)),
+        make: |spec, device, mesh| spec.on_device(device, mesh, &spec.lbvh_options()?),
+        check: |spec| spec.lbvh_options().and(spec.form_and_order()).map(drop),
+    },
+    Builder {
+        name: "ploc",
+        what: "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
+        options: &[CODES, COLLAPSE, SCHEDULE, RADIUS, WIDTH, ORDER],
+        variants: &["ploc", "ploc:radius=25"],
+        needs: Needs::Device,
+        make: |spec, device, mesh| spec.on_device(device, mesh, &spec.ploc_options()?),
+        check: |spec| spec.ploc_options().and(spec.form_and_order()).map(drop),
+    },
+    Builder {
+        name: "hploc",
+        what: "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
+        options: &[CODES, COLLAPSE, SCHEDULE, WINDOW, RADIUS, WIDTH, ORDER],
+        variants: &["hploc"],
+        needs: Needs::Device,
+        make: |spec, device, mesh| spec.on_device(device, mesh, &spec.hploc_options()?),
+        check: |spec| spec.hploc_options().and(spec.form_and_order()).map(drop),
     },
     Builder {
         name: "lbvh-host",
         what: "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte",
-        options: &[CODES, COLLAPSE],
+        options: &[CODES, COLLAPSE, OPTIMISE],
         variants: &["lbvh-host"],
         needs: Needs::Nothing,
-        make: |spec, _, mesh| Ok(Box::new(HostLbvh::new(&spec.to_string(), mesh, spec.codes()?, spec.collapse()?))),
-        check: |spec| spec.codes().and(spec.collapse()).map(drop),
+        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Lbvh),
+        check: |spec| spec.host_options(Hierarchy::Lbvh).map(drop),
+    },
+    Builder {
+        name: "ploc-host",
+        what: "locally-ordered clustering by one thread of the host: what `ploc` must equal, byte for byte",
+        options: &[RADIUS, CODES, COLLAPSE, OPTIMISE],
+        variants: &["ploc-host"],
+        needs: Needs::Nothing,
+        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Ploc(spec.ploc_radius()?)),
+        check: |spec| spec.host_options(Hierarchy::Ploc(spec.ploc_radius()?)).map(drop),
+    },
+    Builder {
+        name: "sweep",
+        what: "full-sweep SAH on the host: what the quality of the others is told against",
+        options: &[COLLAPSE, OPTIMISE, TERMINATION],
+        variants: &["sweep"],
+        needs: Needs::Nothing,
+        make: |spec, _, mesh| spec.on_host(mesh, Hierarchy::Sweep(spec.sweep_leaves()?)),
+        check: |spec| spec.host_options(Hierarchy::Sweep(spec.sweep_leaves()?)).map(drop),
     },
     Builder {
         name: "driver-fast-build",
@@ -217,8 +261,69 @@ impl Spec {
         }
     }
 
+    /// The value of an option that is a number, or what it is where it was not given.
+    fn number(&self, option: &BuilderOption, default: u32) -> Result<u32> {
+        let Some(value) = self.option(option.key) else { return Ok(default) };
+        value.parse().map_err(|_| self.wrong_value(option, value))
+    }
+
+    /// Those of `lbvh`, and `radius`.
+    fn ploc_options(&self) -> Result<builder::Options> {
+        let method = Method::Ploc { radius: self.number(&RADIUS, PLOC_RADIUS)? };
+        method.check()?;
+        Ok(builder::Options { method, ..self.lbvh_options()? })
+    }
+
+    /// Those of `lbvh`, and `window` and `radius`.
+    fn hploc_options(&self) -> Result<builder::Options> {
+        let size = self.number(&WINDOW, Window::DEFAULT.size)?;
+        let radius = self.number(&RADIUS, Window::DEFAULT.radius)?;
+        let method = Method::Hploc(Window { size, radius });
+        method.check()?;
+        Ok(builder::Options { method, ..self.lbvh_options()? })
+    }
+
+    /// Option `radius` of PLOC; 25 where it was not given.
+    fn ploc_radius(&self) -> Result<usize> {
+        let radius = self.number(&RADIUS, 25)?;
+        if radius > 0 { Ok(radius as usize) } else { Err(self.wrong_value(&RADIUS, "0")) }
+    }
+
+    /// Option `termination`, if `optimise` and `collapse` leave it a choice: both need leaves of one triangle.
+    fn sweep_leaves(&self) -> Result<Leaves> {
+        let single = !self.collapse()?.enabled || self.reinsertion()?.is_some();
+        match self.option(TERMINATION.key) {
+            Some("off") => Ok(Leaves::Single),
+            None | Some("sah") if single => Ok(Leaves::Single),
+            None | Some("sah") => Ok(Leaves::Terminated),
+            Some(other) => Err(self.wrong_value(&TERMINATION, other)),
+        }
+    }
+
+    /// Option `optimise`; off where it was not given.
+    fn reinsertion(&self) -> Result<Option<reinsertion::Options>> {
+        use reinsertion::Options;
+        Ok(match self.option(OPTIMISE.key) {
+            None | Some("off") => None,
+            Some("fast") => Some(Options::FAST),
+            Some("medium") => Some(Options::MEDIUM),
+            Some("high") => Some(Options::HIGH),
+            Some(_) => Some(Options::of_rounds(self.number(&OPTIMISE, 0)?)),
+        })
+    }
+
+    fn host_options(&self, hierarchy: Hierarchy) -> Result<host::Options> {
+        let (codes, collapse) = (self.codes()?, self.collapse()?);
+        Ok(host::Options { hierarchy, codes, reinsertion: self.reinsertion()?, collapse })
+    }
+
+    /// The subject of a builder on the host.
+    fn on_host<'a>(&self, mesh: &'a Mesh, hierarchy: Hierarchy) -> Result<Box<dyn Subject + 'a>> {
+        Ok(Box::new(Host::new(&self.to_string(), mesh, self.host_options(hierarchy)?)))
+    }
+
     /// Options `codes`, `collapse` and `schedule`.
-    fn lbvh_options(&self) -> Result<lbvh::Options> {
+    fn lbvh_options(&self) -> Result<builder::Options> {
         let schedule = match self.option(SCHEDULE.key) {
             None => None,
             Some("chain") => Some(Schedule::Chain),
@@ -226,7 +331,7 @@ impl Spec {
             Some("workgroup") => Some(Schedule::Workgroup),
             Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
         };
-        Ok(lbvh::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..lbvh::Options::DEFAULT })
+        Ok(builder::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..builder::Options::DEFAULT })
     }
 
     /// Options `width`, of a wide tree, and `order`; no width where it is 2 or was not given.
@@ -247,13 +352,21 @@ impl Spec {
         Ok((form, order))
     }
 
-    /// The same as the tracer of such a tree.
-    fn wide(&self, limits: &Limits) -> Result<Option<Tracer>> {
+    /// A builder of ours on the device, with these options and those of [`Spec::form_and_order`].
+    fn on_device<'a>(
+        &self,
+        device: Option<&'a Device>,
+        mesh: &'a Mesh,
+        options: &builder::Options,
+    ) -> Result<Box<dyn Subject + 'a>> {
+        let device = given(device)?;
+        let limits = &device.limits;
         let (form, order) = self.form_and_order()?;
-        Ok(form.map(|form| match order {
+        let wide = form.map(|form| match order {
             None => Tracer::of(limits, form),
             Some(order) => Tracer::in_order(limits, form, order),
-        }))
+        });
+        Ok(Box::new(DeviceBvh::new(device, &self.to_string(), mesh, options, wide)?))
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {
@@ -393,7 +506,7 @@ mod tests {
         );
         assert!(error_of("lbvh-host:codes").contains("write codes=VALUE"));
         assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
-        assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse"));
+        assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse, optimise"));
         assert!(error_of("driver-fast-build:codes=mc30").contains("it takes none"));
         assert!(error_of("").contains("-b all"));
         assert!(error_of(",").contains("-b all"));

@@ -4,35 +4,59 @@ use super::{BuildRun, Subject, record};
 use crate::Result;
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::Primitives;
+use crate::bvh::host::sweep::Leaves;
+use crate::bvh::host::{lbvh, ploc, sweep};
 use crate::bvh::layout::{self, Bvh2};
 use crate::bvh::sah::Collapse;
-use crate::bvh::{host, quality};
+use crate::bvh::{quality, reinsertion};
 use crate::scene::Mesh;
 use crate::trace::{self, Hit, Query, Ray, Work};
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// `lbvh-host`: the plain LBVH that the device's is tested against.
-pub struct HostLbvh<'a> {
+/// How a host's builder makes the tree of what is sorted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hierarchy {
+    /// `lbvh-host`: the plain LBVH that the device's is tested against.
+    Lbvh,
+    /// `ploc-host`: the plain PLOC with this radius.
+    Ploc(usize),
+    /// `sweep`: full sweep, whatever the order.
+    Sweep(Leaves),
+}
+
+/// What a builder on the host is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// How the tree is made.
+    pub hierarchy: Hierarchy,
+    /// The codes; `None` takes those that the device would take for so many triangles.
+    pub codes: Option<Codes>,
+    /// Reinsertion behind it.
+    pub reinsertion: Option<reinsertion::Options>,
+    /// Whether subtrees become leaves where that is cheaper.
+    pub collapse: Collapse,
+}
+
+/// A builder on the host.
+pub struct Host<'a> {
     builder: String,
     mesh: &'a Mesh,
+    options: Options,
     codes: Codes,
-    chosen: bool,
-    collapse: Collapse,
     tree: Option<Bvh2>,
     rays: Vec<Ray>,
     hits: Vec<Hit>,
 }
 
-impl<'a> HostLbvh<'a> {
-    /// On `mesh`; without `codes`, those that the device would take for so many triangles.
-    pub fn new(builder: &str, mesh: &'a Mesh, codes: Option<Codes>, collapse: Collapse) -> HostLbvh<'a> {
-        HostLbvh {
+impl<'a> Host<'a> {
+    /// On `mesh`.
+    pub fn new(builder: &str, mesh: &'a Mesh, options: Options) -> Host<'a> {
+        Host {
             builder: builder.to_owned(),
             mesh,
-            codes: codes.unwrap_or_else(|| Codes::for_count(mesh.triangles.len() as u32)),
-            chosen: codes.is_none(),
-            collapse,
+            options,
+            codes: options.codes.unwrap_or_else(|| Codes::for_count(mesh.triangles.len() as u32)),
             tree: None,
             rays: Vec::new(),
             hits: Vec::new(),
@@ -40,8 +64,21 @@ impl<'a> HostLbvh<'a> {
     }
 
     fn built(&mut self) -> &Bvh2 {
-        let HostLbvh { mesh, codes, collapse, tree, .. } = self;
-        tree.get_or_insert_with(|| host::lbvh::build(&mesh.positions, &mesh.triangles, *codes, *collapse))
+        let Host { mesh, options, codes, tree, .. } = self;
+        tree.get_or_insert_with(|| {
+            let collapse = &options.collapse;
+            let lbvh = |collapse| lbvh::build(&mesh.positions, &mesh.triangles, *codes, collapse);
+            let tree = match (options.hierarchy, options.reinsertion) {
+                (Hierarchy::Lbvh, None) => return lbvh(*collapse),
+                (Hierarchy::Lbvh, _) => lbvh(Collapse::OFF),
+                (Hierarchy::Ploc(radius), _) => ploc::build(&lbvh(Collapse::OFF), radius),
+                (Hierarchy::Sweep(leaves), _) => sweep::build(&lbvh(Collapse::OFF), collapse, leaves),
+            };
+            match &options.reinsertion {
+                Some(reinsertion) => tree.reinserted(reinsertion).collapsed(collapse),
+                None => tree.collapsed(collapse),
+            }
+        })
     }
 }
 
@@ -52,7 +89,7 @@ pub(super) fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (start.elapsed().as_secs_f64() * 1e3, result)
 }
 
-impl Subject for HostLbvh<'_> {
+impl Subject for Host<'_> {
     fn builder(&self) -> &str {
         &self.builder
     }
@@ -85,7 +122,8 @@ impl Subject for HostLbvh<'_> {
     }
 
     fn choice(&self) -> Option<String> {
-        self.chosen.then(|| format!("codes {}", self.codes))
+        let chosen = self.options.codes.is_none() && !matches!(self.options.hierarchy, Hierarchy::Sweep(_));
+        chosen.then(|| format!("codes {}", self.codes))
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {

@@ -10,7 +10,7 @@ pub mod agreement;
 pub mod builders;
 pub mod comparison;
 pub mod copy;
-mod device_lbvh;
+mod device_bvh;
 pub mod experiments;
 pub mod growth;
 mod host;

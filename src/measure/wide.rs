@@ -2,9 +2,9 @@
 
 use super::record;
 use crate::Result;
+use crate::bvh::builder::Sizes;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::{Child, Header, Triangle};
-use crate::bvh::lbvh::Sizes;
 use crate::bvh::wide::device::{OnDevice, Options};
 use crate::bvh::wide::layout::{Wide, WideNode};
 use crate::bvh::wide::quantised::QuantisedNode;

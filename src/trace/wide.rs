@@ -12,8 +12,8 @@ pub enum Order {
     /// By where the ray enters them, each that waits with its distance: the fewest steps and tests.
     Distance,
     /// Of quantised nodes: the leaves first, then the nodes by slots, in an order that follows from the signs of the direction,
-    /// those of a node waiting as one entry (Ylitie, Karras, Laine 2017): less to sort and to keep. On sponza it takes 1.0 to 1.3
-    /// times the steps and 1.4 to 1.9 times the tests.
+    /// those of a node waiting as one entry (Ylitie, Karras, Laine 2017): less to sort and to keep. Over seven scenes it takes
+    /// 1.0 to 1.2 times the steps and 1.0 to 1.3 times the tests, the most of primary and random rays; lavapipe is as fast.
     Octant,
 }
 

@@ -3,5 +3,11 @@
 mod collapse;
 mod compact;
 pub mod geometry;
+pub mod hploc;
 pub mod lbvh;
+mod over;
+pub mod ploc;
 pub mod refit;
+mod reinsertion;
+#[cfg(feature = "cli")]
+pub mod sweep;

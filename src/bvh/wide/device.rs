@@ -2,9 +2,9 @@
 
 use super::Form;
 use crate::Result;
+use crate::bvh::builder::Sizes;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::node_slots;
-use crate::bvh::lbvh::Sizes;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Context, Grid, Kernel, Limits, Recorder, fill, scan, shaders};
 

@@ -124,8 +124,8 @@ impl WideNode for QuantisedNode {
         let first = |leaf: bool| children.iter().flatten().find(|c| c.is_leaf() == leaf).map_or(0, |c| c.index);
         (node.first_child, node.first_record) = (first(false), first(true));
         for (slot, child) in children.iter().enumerate() {
-            for axis in 0..3 {
-                let (origin, exponent) = (bounds.lo[axis], exponents[axis]);
+            for (axis, &exponent) in exponents.iter().enumerate() {
+                let origin = bounds.lo[axis];
                 let (lo, hi) = child.map_or((255, 0), |child| {
                     (byte_below(child.lo[axis], origin, exponent), byte_above(child.hi[axis], origin, exponent))
                 });

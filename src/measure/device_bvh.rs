@@ -1,9 +1,9 @@
-//! `lbvh`: our LBVH on the device as a subject: timestamps around each phase, our tracer.
+//! Our trees built on the device as subjects: timestamps around each phase, our tracer.
 
 use super::wide::WideTree;
 use super::{BuildRun, Subject, record};
+use crate::bvh::builder::{Builder, Input, Options, Sizes};
 use crate::bvh::layout::Bvh2;
-use crate::bvh::lbvh::{Input, Lbvh, Options, Sizes};
 use crate::bvh::quality::{self, Figures};
 use crate::gpu::{Buffer, Device, Recorder, Timestamps};
 use crate::scene::Mesh;
@@ -12,15 +12,15 @@ use crate::trace::wide::Tracer;
 use crate::trace::{Hit, Query, Ray, Work};
 use crate::{Error, Result};
 
-/// Phases of a build at most: reset and bounds, encode, sort, hierarchy, wide.
-const PHASES: u32 = 8;
+/// Phases of a build at most: reset and bounds, encode, sort, hierarchy, those of collapsing, wide.
+const PHASES: u32 = 10;
 
-/// A scene in our `Bvh2`, built and traced on the device.
-pub struct DeviceLbvh<'a> {
+/// A scene in our `Bvh2`, or in a wide tree made of it, built and traced on the device.
+pub struct DeviceBvh<'a> {
     device: &'a Device,
     builder: String,
     choice: Option<String>,
-    lbvh: Lbvh,
+    bvh: Builder,
     sizes: Sizes,
     input: Input,
     _vertices: [Buffer<'a>; 2],
@@ -37,7 +37,7 @@ struct Rays<'a> {
     hits: Buffer<'a>,
 }
 
-impl<'a> DeviceLbvh<'a> {
+impl<'a> DeviceBvh<'a> {
     /// Uploads `mesh` and makes room for structure and scratch, and for the wide tree if there shall be one.
     ///
     /// # Errors
@@ -48,10 +48,10 @@ impl<'a> DeviceLbvh<'a> {
         mesh: &Mesh,
         options: &Options,
         wide: Option<Tracer>,
-    ) -> Result<DeviceLbvh<'a>> {
+    ) -> Result<DeviceBvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
-        let lbvh = Lbvh::new(device, options, count)?;
-        let sizes = lbvh.sizes();
+        let bvh = Builder::new(device, options, count)?;
+        let sizes = bvh.sizes();
         let (positions, indices) = (size_of_val(&mesh.positions[..]) as u64, size_of_val(&mesh.triangles[..]) as u64);
         let (needed, available) = (positions + indices + sizes.structure + sizes.scratch, device.found().memory);
         if needed > available {
@@ -59,16 +59,16 @@ impl<'a> DeviceLbvh<'a> {
         }
         let vertices = [device.upload("positions", &mesh.positions)?, device.upload("indices", &mesh.triangles)?];
         let input = Input::mesh(vertices[0].address(), mesh.positions.len() as u32, vertices[1].address(), count);
-        device.warm(&lbvh.kernels(&input))?;
-        Ok(DeviceLbvh {
+        device.warm(&bvh.kernels(&input))?;
+        Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
-            choice: choice_of(options, &lbvh),
+            choice: choice_of(options, &bvh),
             structure: device.buffer("structure", sizes.structure)?,
             scratch: device.buffer("scratch", sizes.scratch)?,
             wide: wide.map(|tracer| WideTree::new(device, tracer, count)).transpose()?,
             timestamps: Timestamps::new(device, PHASES)?,
-            lbvh,
+            bvh,
             sizes,
             input,
             _vertices: vertices,
@@ -101,14 +101,14 @@ fn record_trace(
 }
 
 /// What was left to the builder: codes and schedule.
-fn choice_of(options: &Options, lbvh: &Lbvh) -> Option<String> {
-    let codes = options.codes.is_none().then(|| format!("codes {}", lbvh.codes()));
-    let schedule = options.schedule.is_none().then(|| format!("schedule {}", lbvh.schedule()));
+fn choice_of(options: &Options, bvh: &Builder) -> Option<String> {
+    let codes = options.codes.is_none().then(|| format!("codes {}", bvh.codes()));
+    let schedule = options.schedule.is_none().then(|| format!("schedule {}", bvh.schedule()));
     let chosen: Vec<String> = codes.into_iter().chain(schedule).collect();
     (!chosen.is_empty()).then(|| chosen.join(", "))
 }
 
-impl Subject for DeviceLbvh<'_> {
+impl Subject for DeviceBvh<'_> {
     fn builder(&self) -> &str {
         &self.builder
     }
@@ -126,13 +126,13 @@ impl Subject for DeviceLbvh<'_> {
     }
 
     fn traffic(&self, phase: &str) -> Option<u64> {
-        self.lbvh.traffic(phase, &self.input)
+        self.bvh.traffic(phase, &self.input)
     }
 
     fn build(&mut self) -> Result<BuildRun> {
         let (structure, scratch) = (self.structure.address(), self.scratch.address());
         self.device.run(Some(&mut self.timestamps), |recorder| {
-            self.lbvh.record(recorder, &self.input, structure, scratch)?;
+            self.bvh.record(recorder, &self.input, structure, scratch)?;
             self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, structure))
         })?;
         let phases = self.timestamps.phases()?;

@@ -1,0 +1,50 @@
+// Clusters of PLOC and H-PLOC: subtrees that wait to be merged, in the order of their first primitives. They lie behind the
+// weights, one place a primitive. Of two that merge, the one before is the left child; the node's slot is the place before the
+// right child's first primitive, which no other node can have: so slots do not depend on who merges first.
+#ifndef HEDGEROW_BVH_CLUSTERS
+#define HEDGEROW_BVH_CLUSTERS
+#include "bvh/weights.glsl"
+
+struct Cluster {
+    vec3 lo;
+    uint reference;
+    vec3 hi;
+    uint count;
+    float cost;
+    uint first;      // sorted position of its first primitive
+};
+
+BUFFER Clusters { Cluster cluster[]; };
+
+// The cluster of the primitive at a sorted position.
+Cluster cluster_of_primitive(Geometry input_geometries, uint position, float area_scale) {
+    Box b;
+    load_box(input_geometries, Words(values[passes & 1u]).word[position], b);
+    return Cluster(b.lo, position | IS_PRIMITIVE, b.hi, 1u, leaf_cost(c_i, scaled_half_area(b, area_scale), 1u), position);
+}
+
+Child child_of(Cluster c) {
+    bool is_primitive = (c.reference & IS_PRIMITIVE) != 0u;
+    return Child(c.lo, c.reference & ~IS_PRIMITIVE, c.hi, is_primitive ? 1u : 0u);
+}
+
+// Makes the node over two clusters.
+Cluster merge_clusters(Structure structure, Weights w, Cluster left, Cluster right, float area_scale) {
+    uint slot = right.first - 1u;
+    structure.nodes[slot] = Node(child_of(left), child_of(right));
+    w.parents.word[parent_at(left.reference)] = 2u * slot;
+    w.parents.word[parent_at(right.reference)] = 2u * slot + 1u;
+    vec3 lo = min(left.lo, right.lo), hi = max(left.hi, right.hi);
+    float area = scaled_half_area(Box(lo, hi), area_scale);
+    float cost = weigh_node(w, slot, uvec2(left.count, right.count), vec2(left.cost, right.cost), area);
+    return Cluster(lo, slot, hi, left.count + right.count, cost, left.first);
+}
+
+// The last cluster is the tree.
+void write_root(Structure structure, Weights w, Cluster c) {
+    structure.header.root = child_of(c);
+    structure.header.cost = c.cost;
+    structure.header.built_cost = c.cost;
+    w.parents.word[parent_at(c.reference)] = NO_PARENT;
+}
+#endif

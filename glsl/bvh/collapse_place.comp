@@ -1,0 +1,7 @@
+#version 460
+// Leaves, and records in the order of a walk: see bvh/collapse.glsl for the contract.
+#include "bvh/collapse.glsl"
+
+void main() {
+    collapse_place(gl_WorkGroupID.x);
+}

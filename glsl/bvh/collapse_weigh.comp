@@ -1,0 +1,7 @@
+#version 460
+// Counts and costs of all nodes, bottom-up: see bvh/collapse.glsl for the contract.
+#include "bvh/collapse.glsl"
+
+void main() {
+    collapse_weigh(gl_WorkGroupID.x);
+}

@@ -1,0 +1,7 @@
+#version 460
+// The nodes of the tree and their weights, bottom-up in one pass: see bvh/hploc.glsl for the contract.
+#include "bvh/hploc.glsl"
+
+void main() {
+    hploc_hierarchy(gl_WorkGroupID.x);
+}

@@ -1,0 +1,256 @@
+// PLOC (Meister and Bittner 2018): in rounds, clusters that are each other's nearest within RADIUS places become one.
+// src/bvh/ploc.rs records it; src/bvh/host/ploc.rs is the twin and says what the paper leaves open.
+//
+//   begin    reads the primitives, keys, values      writes clusters, list[0], the first round's count
+//   search   reads list[round], clusters             writes nearest
+//   count    reads nearest                           writes sums: clusters that are left of each tile
+//   scan     reads sums                              writes sums (exclusive), the next round's count; one workgroup
+//   merge    reads list[round], nearest, sums        writes clusters, nodes, weights, list[round + 1]
+//   finish   rounds until one cluster is left        the root; one workgroup
+//   (collapse: bvh/collapse.glsl)
+//
+// A round of fewer clusters than there are tiles for does nothing in the others: how many rounds are recorded follows from the
+// number of primitives, and what they leave, however many they are, is for `finish`.
+//
+// needs one barrier between each two, and before the first; subgroups of any size; workgroups of whole subgroups or less than one
+#ifndef HEDGEROW_BVH_PLOC
+#define HEDGEROW_BVH_PLOC
+#include "bvh/clusters.glsl"
+
+layout(constant_id = 6) const uint RADIUS = 16;
+// Of a round's clusters, one in so many falls away, or the next round is forced.
+const uint SLOW = 16;
+const uint CACHED = PRIVATE_COUNTERS ? 1u : gl_WorkGroupSize.x + 2u * RADIUS;
+
+// On a GPU, the boxes of a tile and of what is near it.
+shared vec3 cached_lo[CACHED];
+shared vec3 cached_hi[CACHED];
+shared uint partial[SUBGROUPS_AT_MOST];
+
+// Where the records of the clusters of a round lie, in order. The sort has left the memory free.
+Words cluster_list(uint round) {
+    uint is_free = 1u - (passes & 1u);
+    return Words((round & 1u) == 0u ? keys[is_free] : values[is_free]);
+}
+
+Words nearest_of() {
+    return Words(ends_address);
+}
+
+Words sums_of_tiles() {
+    return Words(table_address);
+}
+
+Clusters all_clusters() {
+    return Clusters(scratch_behind_weights());
+}
+
+uint clusters_in(uint round) {
+    return BuildState(state_address).cluster_counts[round & 1u];
+}
+
+uint tile_size() {
+    return gl_WorkGroupSize.x * ITEMS;
+}
+
+uint tiles_of(uint count) {
+    return (count + tile_size() - 1u) / tile_size();
+}
+
+// ---- begin ----
+
+void ploc_begin(uint task) {
+    BuildState state = BuildState(state_address);
+    Clusters clusters = all_clusters();
+    Geometry input_geometries = geometries();
+    if (task == 0u && gl_LocalInvocationIndex == 0u) {
+        state.cluster_counts[0] = state.active_count;
+        state.is_forced[0] = 0;
+    }
+    uint first = task * tile_size() + gl_LocalInvocationIndex;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint position = first + k * gl_WorkGroupSize.x;
+        if (position < state.active_count) {
+            clusters.cluster[position] = cluster_of_primitive(input_geometries, position, state.plan.area_scale);
+            cluster_list(0).word[position] = position;
+        }
+    }
+}
+
+// ---- search ----
+
+Box box_of_cluster(Words list, Clusters clusters, uint i) {
+    uint first = list.word[i];
+    return Box(clusters.cluster[first].lo, clusters.cluster[first].hi);
+}
+
+void ploc_search(uint task, uint round) {
+    uint count = clusters_in(round);
+    Words list = cluster_list(round), nearest = nearest_of();
+    Clusters clusters = all_clusters();
+    float area_scale = BuildState(state_address).plan.area_scale;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint begin = task * tile_size() + k * gl_WorkGroupSize.x;
+        if (begin >= count) break;
+        uint own = begin + gl_LocalInvocationIndex;
+        if (!PRIVATE_COUNTERS) {
+            barrier();
+            for (uint i = gl_LocalInvocationIndex; i < CACHED; i += gl_WorkGroupSize.x) {
+                uint other = begin + i - RADIUS;
+                if (other < count) {
+                    Box b = box_of_cluster(list, clusters, other);
+                    cached_lo[i] = b.lo;
+                    cached_hi[i] = b.hi;
+                }
+            }
+            barrier();
+        }
+        Box mine = box_of_cluster(list, clusters, min(own, count - 1u));
+        float best = uintBitsToFloat(0x7F800000u);
+        uint best_other = own;
+        // On a CPU all lanes look at the same cluster: one load instead of one a lane.
+        uint from = PRIVATE_COUNTERS ? uint(max(int(begin) - int(RADIUS), 0)) : 0u;
+        uint turns = PRIVATE_COUNTERS ? min(begin + gl_WorkGroupSize.x + RADIUS, count) - from : 2u * RADIUS + 1u;
+        for (uint turn = 0; turn < turns; ++turn) {
+            uint other = PRIVATE_COUNTERS ? from + turn : own + turn - RADIUS;
+            // Before the first wraps around to far behind the last.
+            bool looks = other < count && other != own && other + RADIUS >= own && other <= own + RADIUS;
+            Box theirs;
+            if (PRIVATE_COUNTERS) {
+                theirs = box_of_cluster(list, clusters, other);
+            } else {
+                uint cached = gl_LocalInvocationIndex + turn;
+                theirs = Box(cached_lo[cached], cached_hi[cached]);
+            }
+            float distance = scaled_half_area(Box(min(mine.lo, theirs.lo), max(mine.hi, theirs.hi)), area_scale);
+            if (looks && distance < best) {
+                best = distance;
+                best_other = other;
+            }
+        }
+        if (own < count) nearest.word[own] = best_other;
+    }
+}
+
+// ---- count, scan, merge ----
+
+// The cluster that merges with the one at `i`, or `i`.
+uint partner_of(Words nearest, uint i, uint count, bool is_forced) {
+    uint j = nearest.word[i];
+    if (nearest.word[j] == i) return j;
+    uint other = i ^ 1u;
+    if (!is_forced || other >= count) return i;
+    return nearest.word[nearest.word[other]] == other ? i : other;
+}
+
+// How many of this invocation's strip of the tile are left.
+uint left_of_strip(uint task, uint round) {
+    uint count = clusters_in(round);
+    bool is_forced = BuildState(state_address).is_forced[round & 1u] != 0u;
+    Words nearest = nearest_of();
+    uint begin = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
+    uint left = 0;
+    for (uint i = begin; i < min(begin + ITEMS, count); ++i) left += partner_of(nearest, i, count, is_forced) >= i ? 1u : 0u;
+    return left;
+}
+
+void ploc_count(uint task, uint round) {
+    uint left = subgroupAdd(left_of_strip(task, round));
+    if (subgroupElect()) partial[gl_SubgroupID] = left;
+    barrier();
+    if (gl_LocalInvocationIndex == 0u) {
+        uint sum = 0;
+        for (uint s = 0; s < gl_NumSubgroups; ++s) sum += partial[s];
+        sums_of_tiles().word[task] = sum;
+    }
+    barrier();
+}
+
+// The sum of what lanes before have, and of all.
+uint sum_before(uint value, out uint total) {
+    uint before = subgroupExclusiveAdd(value), own_total = subgroupAdd(value);
+    barrier();
+    if (subgroupElect()) partial[gl_SubgroupID] = own_total;
+    barrier();
+    total = 0;
+    for (uint s = 0; s < gl_NumSubgroups; ++s) {
+        if (s < gl_SubgroupID) before += partial[s];
+        total += partial[s];
+    }
+    return before;
+}
+
+void ploc_scan(uint round) {
+    BuildState state = BuildState(state_address);
+    uint count = clusters_in(round), tiles = tiles_of(count);
+    Words sums = sums_of_tiles();
+    uint strip = (tiles + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x;
+    uint begin = gl_LocalInvocationIndex * strip, end = min(begin + strip, tiles);
+    uint own = 0;
+    for (uint i = begin; i < end; ++i) own += sums.word[i];
+    uint total;
+    uint sum = sum_before(own, total);
+    for (uint i = begin; i < end; ++i) {
+        uint value = sums.word[i];
+        sums.word[i] = sum;
+        sum += value;
+    }
+    if (gl_LocalInvocationIndex == 0u) {
+        uint next = (round + 1u) & 1u;
+        state.cluster_counts[next] = total;
+        state.is_forced[next] = count > 1u && SLOW * (count - total) < count ? 1u : 0u;
+    }
+}
+
+void ploc_merge(uint task, uint round) {
+    BuildState state = BuildState(state_address);
+    Structure structure = Structure(structure_address);
+    Weights w = weights();
+    Clusters clusters = all_clusters();
+    uint count = clusters_in(round);
+    bool is_forced = state.is_forced[round & 1u] != 0u;
+    Words list = cluster_list(round), next = cluster_list(round + 1u), nearest = nearest_of();
+    uint total;
+    uint place = sums_of_tiles().word[task] + sum_before(left_of_strip(task, round), total);
+    uint begin = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
+    for (uint i = begin; i < min(begin + ITEMS, count); ++i) {
+        uint partner = partner_of(nearest, i, count, is_forced);
+        uint first = list.word[i];
+        if (partner > i) {
+            uint other = list.word[partner];
+            clusters.cluster[first] = merge_clusters(structure, w, clusters.cluster[first], clusters.cluster[other], state.plan.area_scale);
+        }
+        if (partner >= i) next.word[place++] = first;
+    }
+}
+
+// ---- finish ----
+
+// What one phase has written to memory, the next reads.
+void next_phase() {
+    controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
+                   gl_SemanticsAcquireRelease | gl_SemanticsMakeAvailable | gl_SemanticsMakeVisible);
+}
+
+// `round` is the first that is not done yet.
+void ploc_finish(uint round) {
+    // Where there is nothing, nobody has begun.
+    uint count = primitive_count == 0u ? 0u : clusters_in(round);
+    // Every second round leaves at most fifteen of sixteen clusters.
+    for (uint turn = 0; turn < 1024u && count > 1u; ++turn, ++round) {
+        uint tiles = tiles_of(count);
+        for (uint task = 0; task < tiles; ++task) ploc_search(task, round);
+        next_phase();
+        for (uint task = 0; task < tiles; ++task) ploc_count(task, round);
+        next_phase();
+        ploc_scan(round);
+        next_phase();
+        for (uint task = 0; task < tiles; ++task) ploc_merge(task, round);
+        next_phase();
+        count = clusters_in(round + 1u);
+    }
+    if (gl_LocalInvocationIndex == 0u && count == 1u) {
+        write_root(Structure(structure_address), weights(), all_clusters().cluster[cluster_list(round).word[0]]);
+    }
+}
+#endif

@@ -1,0 +1,10 @@
+#version 460
+// The rounds that are left, until one cluster is; one workgroup: see bvh/ploc.glsl for the contract.
+#include "bvh/ploc.glsl"
+
+// The first that is not done, even or odd.
+layout(constant_id = 7) const uint ROUND = 0;
+
+void main() {
+    ploc_finish(ROUND);
+}

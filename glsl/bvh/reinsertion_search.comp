@@ -1,0 +1,130 @@
+#version 460
+// The best move of each subtree, and its gain on all nodes of its path: see bvh/reinsertion.glsl for the contract.
+#include "bvh/reinsertion.glsl"
+
+// Subtrees that are put off; what does not find room is not looked at.
+const uint STACK = 32;
+// A gain counts if it is more than this share of the pivot's area (less may be rounding) and more than this (less may be made of
+// numbers that devices take for zero).
+const float LEAST_SHARE = 1.0 / 1048576.0;
+const float LEAST_GAIN = 1.0 / 1152921504606846976.0;
+
+struct Search {
+    Box moving;
+    float moving_area;
+    float scale;
+    uint pivot;
+    float least;     // what a gain must exceed at this pivot
+    uint best_to;
+    uint best_pivot;
+    float best_gain;
+};
+
+// A node that may be looked into, and what would be saved if the move went below it.
+struct Below {
+    uint slot;
+    float saved;
+};
+
+float bar(Search s) {
+    return max(s.best_gain, s.least);
+}
+
+// The new node has at least the area of what moves.
+bool may_gain(Search s, Below b) {
+    precise float most = b.saved - s.moving_area;
+    return b.slot != NONE && most > bar(s);
+}
+
+// What a move to link `at`, where `child` hangs, would gain.
+Below look(inout Search s, uint at, Child child, float saved) {
+    float merged = scaled_half_area(around(box_of(child), s.moving), s.scale);
+    precise float gain = saved - merged;
+    if (gain > bar(s)) {
+        s.best_to = at;
+        s.best_pivot = s.pivot;
+        s.best_gain = gain;
+    }
+    precise float below = saved - (merged - scaled_half_area(box_of(child), s.scale));
+    return Below(child.count == 0u ? child.index : NONE, below);
+}
+
+// Into the subtree on the other side of the pivot.
+void search_below(inout Search s, Below next) {
+    Below stack[STACK];
+    uint height = 0;
+    for (uint visits = 0; visits < link_count; ++visits) {
+        if (may_gain(s, next)) {
+            Node node = structure.nodes[next.slot];
+            Below left = look(s, 2u * next.slot, node.left, next.saved);
+            Below right = look(s, 2u * next.slot + 1u, node.right, next.saved);
+            bool swap = right.saved > left.saved;
+            Below far = left, near = right;
+            if (!swap) {
+                far = right;
+                near = left;
+            }
+            if (may_gain(s, far) && height < STACK) stack[height++] = far;
+            if (may_gain(s, near) && height < STACK) stack[height++] = near;
+        }
+        if (height == 0u) break;
+        next = stack[--height];
+    }
+}
+
+// Whether the new place is no more than PATH nodes below the pivot.
+bool is_path_walkable(uint to, uint pivot) {
+    uint slot = to >> 1;
+    for (uint level = 0; level < PATH; ++level) {
+        if (slot == pivot) return true;
+        slot = above(slot);
+    }
+    return false;
+}
+
+Move search(uint link) {
+    uint parent = link >> 1, root = structure.header.root.index;
+    Move none = Move(NONE, NONE, 0u);
+    if (structure.nodes[parent].left.count == UNUSED || parent == root) return none;
+    Search s;
+    s.moving = box_of(child_at(link));
+    s.scale = structure.header.area_scale;
+    s.moving_area = scaled_half_area(s.moving, s.scale);
+    s.best_to = NONE;
+    s.best_pivot = NONE;
+    s.best_gain = 0.0;
+    // What all nodes shorten by, less the area of a new one; so far, the parent's area.
+    precise float saved = 0.0;
+    // What is left below the pivot on the side that the subtree leaves.
+    Box left_behind;
+    uint at = link;
+    for (uint level = 0; level < PATH; ++level) {
+        s.pivot = at >> 1;
+        Node node = structure.nodes[s.pivot];
+        Child other = (at & 1u) == 0u ? node.right : node.left;
+        float pivot_area = scaled_half_area(around(box_of(node.left), box_of(node.right)), s.scale);
+        if (level == 0u) saved = pivot_area;
+        s.least = max(LEAST_SHARE * pivot_area, LEAST_GAIN);
+        Below next = look(s, at ^ 1u, other, saved);
+        search_below(s, next);
+        if (s.pivot == root) break;
+        if (level == 0u) {
+            left_behind = box_of(other);
+        } else {
+            left_behind = around(left_behind, box_of(other));
+            saved = saved + (pivot_area - scaled_half_area(left_behind, s.scale));
+        }
+        at = parents.word[s.pivot];
+    }
+    if (s.best_to == NONE || !is_path_walkable(s.best_to, s.best_pivot)) return none;
+    return Move(s.best_to, s.best_pivot, floatBitsToUint(s.best_gain));
+}
+
+void main() {
+    for (uint k = 0, i = grid_item(0); i < tried(); i = grid_item(++k)) {
+        Move m = search(link_of(i));
+        moves.move[i] = m;
+        if (m.to == NONE) continue;
+        for (Path path = path_of(link_of(i), m); path.slot != NONE; advance(path)) atomicMax(gains.word[path.slot], m.gain);
+    }
+}

@@ -1,0 +1,397 @@
+//! Trees over triangles, boxes or instances, built on the device in the caller's command buffer and memory.
+//!
+//! [`Builder::sizes`] tells the memory, [`Builder::record`] records the build. What all methods begin with is in `encode.rs`;
+//! each [`Method`] has a file of its own, and a twin in [`super::host`] with the same bytes.
+
+use super::codes::{Code, Codes};
+use super::encode::Encode;
+pub use super::geometry::{Geometry, Input, Primitives, Source};
+use super::sah::Collapse;
+use super::{collapse, hploc, layout, lbvh, lbvh_workgroup, ploc};
+use crate::gpu::radix_sort::{self, Shape};
+use crate::gpu::{Context, Kernel, Recorder, Step, shaders};
+use crate::{Error, Result};
+
+/// What to build, beside the primitives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// How the tree is made.
+    pub method: Method,
+    /// The codes; `None` lets [`Codes::for_count`] choose them from the number of primitives.
+    pub codes: Option<Codes>,
+    /// Whether subtrees become leaves where that is cheaper.
+    pub collapse: Collapse,
+    /// How the phases are recorded; `None` takes what measured faster on this kind of device and size.
+    pub schedule: Option<Schedule>,
+    /// What it is built over.
+    pub primitives: Primitives,
+    /// How many geometries: what [`Source::Several`] has, otherwise 1.
+    pub geometry_count: u32,
+    /// `vk::BuildAccelerationStructureFlagsKHR` for the header, at most 6 bits.
+    pub build_flags: u32,
+}
+
+impl Options {
+    /// The LBVH of one geometry of triangles, everything chosen from the scene and the device; leaves collapsed by SAH.
+    pub const DEFAULT: Options = Options {
+        method: Method::Lbvh,
+        codes: None,
+        collapse: Collapse::SAH,
+        schedule: None,
+        primitives: Primitives::Triangles,
+        geometry_count: 1,
+        build_flags: 0,
+    };
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options::DEFAULT
+    }
+}
+
+/// How a tree is made of the order of codes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// Linear BVH: split where the highest bit of the codes changes (Lauterbach et al. 2009). The fastest build.
+    Lbvh,
+    /// Parallel locally-ordered clustering (Meister and Bittner 2018): neighbours in the order, so many places away at most, are
+    /// merged in rounds.
+    Ploc {
+        /// Neighbours on either side that a cluster looks at, 1 to [`Method::MOST_RADIUS`].
+        radius: u32,
+    },
+    /// Hierarchical PLOC (Benthin et al. 2024): neighbours in windows of the order are merged. Better trees for little more time.
+    Hploc(Window),
+}
+
+/// What [`Method::Hploc`] looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Window {
+    /// Clusters that are merged at a time: half of them from each side. Even, 4 to [`Window::MOST`].
+    pub size: u32,
+    /// Neighbours on either side that a cluster looks at, 1 or more.
+    pub radius: u32,
+}
+
+impl Window {
+    /// The most clusters of a window.
+    pub const MOST: u32 = 64;
+    /// What the paper has.
+    pub const DEFAULT: Window = Window { size: 32, radius: 8 };
+}
+
+impl Method {
+    /// The most neighbours that PLOC looks at.
+    pub const MOST_RADIUS: u32 = 256;
+
+    /// # Errors
+    /// A parameter out of range.
+    pub fn check(self) -> Result<()> {
+        match self {
+            Method::Hploc(Window { size, radius })
+                if !(4..=Window::MOST).contains(&size) || !size.is_multiple_of(2) || radius == 0 =>
+            {
+                Err(Error::Argument(format!(
+                    "H-PLOC with a window of {size} and radius {radius}: a window has an even number of clusters from 4 to {}, \
+                     and the radius is at least 1",
+                    Window::MOST
+                )))
+            }
+            Method::Ploc { radius } if !(1..=Method::MOST_RADIUS).contains(&radius) => {
+                Err(Error::Argument(format!("PLOC with radius {radius}: it is 1 to {}", Method::MOST_RADIUS)))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether there are kernels for the schedule.
+    fn takes(self, schedule: Schedule) -> bool {
+        match self {
+            Method::Lbvh => true,
+            Method::Ploc { .. } | Method::Hploc(_) => schedule != Schedule::Workgroup,
+        }
+    }
+}
+
+/// How the phases of a build are recorded. The result is the same bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Schedule {
+    /// A dispatch a phase, with barriers between: needs nothing of the device.
+    Chain,
+    /// One persistent dispatch that draws tasks from a pool; needs a device whose started workgroups go on.
+    Persistent,
+    /// One workgroup does everything, in one dispatch: for few primitives, at most [`Builder::WORKGROUP_MAX`]. Of
+    /// [`Method::Lbvh`] alone.
+    Workgroup,
+}
+
+impl std::fmt::Display for Schedule {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Schedule::Chain => "chain",
+            Schedule::Persistent => "persistent",
+            Schedule::Workgroup => "workgroup",
+        })
+    }
+}
+
+/// Bytes that a build needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// The structure: see [`layout`].
+    pub structure: u64,
+    /// Scratch, free again when the build has run.
+    pub scratch: u64,
+    /// Alignment of both addresses.
+    pub alignment: u64,
+}
+
+/// The builder, specialised for one device, its options and a number of primitives.
+#[derive(Debug, Clone)]
+pub struct Builder {
+    method: Method,
+    schedule: Schedule,
+    workers: u32,
+    pub(super) encode: Encode,
+}
+
+/// A build with all that it is recorded with.
+#[derive(Debug, Clone, Copy)]
+pub struct Job<'a> {
+    /// The builder.
+    pub builder: &'a Builder,
+    /// Its input.
+    pub input: Input,
+    /// Address of the structure.
+    pub structure: u64,
+    /// Address of the scratch memory.
+    pub scratch: u64,
+}
+
+impl Codes {
+    /// The codes that `primitive_count` triangles need: about a thousand times as many cells as triangles, in whole passes of
+    /// the sort. On scenes of 66k to 1.4M triangles that is 32 bits, and the SAH cost is within 0.6% of that with
+    /// all 64; 24 bits would cost 1.3% at 111k triangles and 7.8% at 871k.
+    pub fn for_count(primitive_count: u32) -> Codes {
+        // Bits of an index, whatever the count: what is too much is refused, not computed with.
+        let bits = 32 - (primitive_count.max(2) - 1).leading_zeros() + 10;
+        Code::Emc64Var.full().with_bits(bits.next_multiple_of(8))
+    }
+}
+
+impl Builder {
+    /// Primitives that [`Schedule::Workgroup`] takes at most.
+    pub const WORKGROUP_MAX: u32 = 1 << 16;
+
+    /// A builder of `primitive_count` primitives on the device of `context`.
+    ///
+    /// # Errors
+    /// More primitives than a build can take; a schedule that the method has not.
+    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Result<Builder> {
+        if primitive_count > radix_sort::MAX_COUNT {
+            return Err(Error::Argument(format!(
+                "{primitive_count} primitives: a structure holds at most {}; split the mesh",
+                radix_sort::MAX_COUNT
+            )));
+        }
+        options.method.check()?;
+        let limits = &context.limits;
+        let schedule = options.schedule.unwrap_or_else(|| Schedule::for_count(options.method, primitive_count));
+        if !options.method.takes(schedule) {
+            return Err(Error::Argument(format!(
+                "{:?} is not built by the schedule {schedule}; choose another, or none",
+                options.method
+            )));
+        }
+        let alone = schedule == Schedule::Workgroup;
+        if alone && primitive_count > Builder::WORKGROUP_MAX {
+            return Err(Error::Argument(format!(
+                "{primitive_count} primitives by one workgroup: it takes at most {}; choose another schedule",
+                Builder::WORKGROUP_MAX
+            )));
+        }
+        let shape = Shape::of(limits);
+        let encode = Encode {
+            codes: options.codes.unwrap_or_else(|| Codes::for_count(primitive_count)),
+            collapse: options.collapse,
+            shape: if alone { shape.with_digit_bits(SMALL_DIGIT_BITS) } else { shape },
+            items: if limits.is_cpu() { 32 } else { 1 },
+            count: primitive_count,
+            primitives: options.primitives,
+            geometry_count: options.geometry_count,
+            build_flags: options.build_flags,
+            alone,
+            method_bytes: match options.method {
+                Method::Lbvh => 0,
+                Method::Ploc { .. } | Method::Hploc(_) => clusters_bytes(primitive_count),
+            },
+            shared_memory: limits.shared_memory,
+        };
+        let workers = if limits.is_cpu() { 64 } else { 1024 };
+        Ok(Builder { method: options.method, schedule, workers, encode })
+    }
+
+    /// The method.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The codes that are used: the choice where none was given.
+    pub fn codes(&self) -> Codes {
+        self.encode.codes
+    }
+
+    /// Primitives that it is for.
+    pub fn count(&self) -> u32 {
+        self.encode.count
+    }
+
+    /// The schedule that is used: the choice where none was given.
+    pub fn schedule(&self) -> Schedule {
+        self.schedule
+    }
+
+    /// Bytes of the structure and of the scratch memory: exactly what [`Builder::record`] uses.
+    pub fn sizes(&self) -> Sizes {
+        let scratch = self.encode.scratch().bytes;
+        Sizes { structure: self.layout().bytes, scratch, alignment: 16 }
+    }
+
+    /// Where the parts of the structure lie.
+    pub fn layout(&self) -> layout::Sizes {
+        let Encode { primitives, count, geometry_count, .. } = self.encode;
+        layout::sizes(primitives.record_bytes(), count, geometry_count)
+    }
+
+    /// Bytes that suffice for builds of this many primitives and of any fewer by builders of the same options.
+    pub fn sizes_at_most(&self) -> Sizes {
+        let Encode { shape, count, .. } = self.encode;
+        let more = shape.most_table_words(count).saturating_sub(self.encode.table_words());
+        let sizes = self.sizes();
+        Sizes { scratch: sizes.scratch + (4 * more).next_multiple_of(16), ..sizes }
+    }
+
+    /// Bytes that a phase must move if it reads each of its inputs once and writes each of its outputs once: what its time is
+    /// held against. `None` for a phase that there is not.
+    pub fn traffic(&self, phase: &str, input: &Input) -> Option<u64> {
+        let Source::One(geometry) = input.source else { return None };
+        let count = u64::from(self.count());
+        let vertex = geometry.vertex_format.component_bytes() * geometry.vertex_format.components();
+        let triangles =
+            u64::from(3 * geometry.index_format.bytes()) * count + u64::from(vertex) * u64::from(geometry.vertex_count);
+        let key = 4 * u64::from(self.encode.key_words()) * count;
+        let value = 4 * count;
+        // Each pass reads the keys for counting, then keys and values, and writes both; the first knows the values.
+        let passes = self.encode.passes();
+        let sort = u64::from(passes) * (3 * key + 2 * value) - if passes > 0 { value } else { 0 };
+        let bounds = triangles;
+        let encode = triangles + key + 4 * count;
+        let hierarchy = triangles + key + value + self.layout().bytes;
+        match phase {
+            "bounds" => Some(bounds),
+            "encode" => Some(encode),
+            "sort" => Some(sort),
+            "hierarchy" => Some(hierarchy),
+            "build" => Some(bounds + encode + sort + hierarchy),
+            _ => None,
+        }
+    }
+
+    /// The kernels that [`Builder::record`] dispatches for `input`, to make their pipelines ahead with [`Context::warm`].
+    pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
+        let Builder { method, schedule, encode, .. } = self;
+        match (method, schedule) {
+            (Method::Lbvh, Schedule::Workgroup) => vec![encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, input)],
+            (Method::Lbvh, Schedule::Persistent) => lbvh::persistent_kernels(encode, input),
+            (Method::Lbvh, Schedule::Chain) => [encode.kernels(input), lbvh::kernels(encode, input)].concat(),
+            (&Method::Ploc { radius }, Schedule::Persistent) => ploc::persistent_kernels(encode, radius, input),
+            (&Method::Ploc { radius }, _) => [encode.kernels(input), ploc::kernels(encode, radius, input)].concat(),
+            (Method::Hploc(window), Schedule::Persistent) => hploc::persistent_kernels(encode, window, input),
+            (Method::Hploc(window), _) => [encode.kernels(input), hploc::kernels(encode, window, input)].concat(),
+        }
+    }
+
+    /// Records the build of `input` into the structure at address `structure`, with scratch memory at address `scratch`,
+    /// of the bytes and alignment that [`Builder::sizes`] tells.
+    ///
+    /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever
+    /// reads the structure, or writes the scratch memory) behind. Labels: `bounds`, `encode`, `sort`, `hierarchy`, or `build`
+    /// where the schedule is persistent.
+    ///
+    /// # Errors
+    /// The input has another number of primitives than the builder; a pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: u64, scratch: u64) -> Result<()> {
+        recorder.chains(&[self.steps(input, structure, scratch)?])
+    }
+
+    /// What [`Builder::record`] records, to be recorded beside other builds by [`Recorder::chains`].
+    ///
+    /// # Errors
+    /// The input has another number of primitives than the builder.
+    pub fn steps(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
+        let mut chains = Builder::chains(&[Job { builder: self, input: *input, structure, scratch }])?;
+        Ok(chains.pop().unwrap_or_default())
+    }
+
+    /// The chains of many builds, for [`Recorder::chains`]: one each, but for builds by one workgroup, of which two share a
+    /// dispatch.
+    ///
+    /// # Errors
+    /// An input has another number of primitives than its builder.
+    pub fn chains(jobs: &[Job<'_>]) -> Result<Vec<Vec<Step>>> {
+        let (small, large): (Vec<&Job<'_>>, Vec<&Job<'_>>) =
+            jobs.iter().partition(|job| job.builder.schedule == Schedule::Workgroup);
+        let chains = large.iter().map(|job| job.builder.chain_of(job));
+        let mut chains: Vec<Vec<Step>> = chains.collect::<Result<_>>()?;
+        chains.extend(lbvh_workgroup::steps(&small)?.into_iter().map(|step| vec![step]));
+        Ok(chains)
+    }
+
+    fn chain_of(&self, job: &Job<'_>) -> Result<Vec<Step>> {
+        let Builder { method, schedule, encode, workers } = self;
+        let arguments = encode.arguments(&job.input, job.structure, job.scratch)?;
+        Ok(match (method, schedule) {
+            (Method::Lbvh, Schedule::Persistent) => lbvh::persistent_steps(encode, &job.input, &arguments, *workers),
+            (Method::Lbvh, Schedule::Chain | Schedule::Workgroup) => {
+                [encode.steps(&job.input, &arguments), lbvh::steps(encode, &job.input, &arguments)].concat()
+            }
+            (&Method::Ploc { radius }, Schedule::Persistent) => {
+                ploc::persistent_steps(encode, radius, &job.input, &arguments, *workers)
+            }
+            (&Method::Ploc { radius }, _) => {
+                [encode.steps(&job.input, &arguments), ploc::steps(encode, radius, &job.input, &arguments)].concat()
+            }
+            (Method::Hploc(window), Schedule::Persistent) => {
+                hploc::persistent_steps(encode, window, &job.input, &arguments, *workers)
+            }
+            (Method::Hploc(window), _) => {
+                [encode.steps(&job.input, &arguments), hploc::steps(encode, window, &job.input, &arguments)].concat()
+            }
+        })
+    }
+}
+
+/// Bytes of scratch memory behind the state: weights, and a `Cluster` of clusters.glsl a primitive.
+fn clusters_bytes(count: u32) -> u64 {
+    const CLUSTER_BYTES: u64 = 40;
+    collapse::weights_bytes(count.into()) + CLUSTER_BYTES * u64::from(count)
+}
+
+/// Primitives up to which one workgroup is faster than a chain of dispatches.
+const SMALL: u32 = 2048;
+/// Bits of a digit for them: with 8, a pass spends more on its table than on a few hundred keys.
+const SMALL_DIGIT_BITS: u32 = 4;
+
+impl Schedule {
+    /// What measured faster. Of few primitives, one workgroup. Of many, on lavapipe the chain, by a factor of 1.2 to 1.5 (the
+    /// loop around the phases costs the persistent kernel its unmasked loads, and whoever waits takes a core from who works).
+    /// No GPU has been measured: the chain also asks nothing of its progress.
+    pub fn for_count(method: Method, primitive_count: u32) -> Schedule {
+        if primitive_count <= SMALL && method.takes(Schedule::Workgroup) {
+            Schedule::Workgroup
+        } else {
+            Schedule::Chain
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! From primitives to an order: bounds, codes and sort, which every builder begins with.
+//!
+//! `glsl/bvh/encode.glsl` is the device's side.
+
+use super::codes::Codes;
+use super::geometry::{Geometry, Input, Planned, Primitives};
+use super::sah::Collapse;
+use crate::Result;
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::radix_sort::{self, Shape};
+use crate::gpu::{Kernel, Step, shaders};
+
+/// The phases up to the sort, for one device, codes and number of primitives.
+#[derive(Debug, Clone)]
+pub(super) struct Encode {
+    pub codes: Codes,
+    pub collapse: Collapse,
+    pub shape: Shape,
+    /// Items of an invocation in a task.
+    pub items: u32,
+    pub count: u32,
+    pub primitives: Primitives,
+    pub geometry_count: u32,
+    pub build_flags: u32,
+    /// Whether one workgroup does everything.
+    pub alone: bool,
+    /// Bytes of scratch memory behind the state that the method needs for itself.
+    pub method_bytes: u64,
+    /// Bytes of shared memory that a workgroup has.
+    pub shared_memory: u32,
+}
+
+/// Where the parts of the scratch memory begin, in bytes.
+pub(super) struct Scratch {
+    keys: [u64; 2],
+    values: [u64; 2],
+    ends: u64,
+    table: u64,
+    pub bytes: u64,
+}
+
+/// Bytes of `BuildState` in encode.glsl, with room to spare.
+pub(super) const STATE_BYTES: u64 = 1536;
+
+push_constants! {
+    /// Push constants of `glsl/bvh/encode_*.comp` and `glsl/bvh/lbvh_*.comp`.
+    pub(super) struct Arguments {
+        pub vertices: u64,
+        pub indices: u64,
+        pub transform: u64,
+        pub structure: u64,
+        pub state: u64,
+        pub keys: [u64; 2],
+        pub values: [u64; 2],
+        pub ends: u64,
+        pub table: u64,
+        pub vertex_stride: u32,
+        pub vertex_count: u32,
+        pub formats: u32,
+        pub primitive_count: u32,
+        pub code_kind: u32,
+        pub c_t: f32,
+        pub c_i: f32,
+        pub columns: u32,
+        pub column_keys: u32,
+        pub passes: u32,
+    }
+}
+
+impl Encode {
+    pub fn key_words(&self) -> u32 {
+        if self.codes.bits > 32 { 2 } else { 1 }
+    }
+
+    pub fn scratch(&self) -> Scratch {
+        let mut at = STATE_BYTES + self.method_bytes.next_multiple_of(16);
+        let mut take = |bytes: u64| {
+            let begin = at;
+            at += bytes.next_multiple_of(16);
+            begin
+        };
+        let count = u64::from(self.count);
+        let key_bytes = 4 * u64::from(self.key_words()) * count;
+        Scratch {
+            keys: [take(key_bytes), take(key_bytes)],
+            values: [take(4 * count), take(4 * count)],
+            ends: take(4 * count),
+            table: take(4 * self.table_words()),
+            bytes: at,
+        }
+    }
+
+    /// Words of the sort's table. One workgroup on a CPU gives each of its lanes a strip.
+    pub fn table_words(&self) -> u64 {
+        if self.alone && self.shape.private_counters {
+            (1 << self.shape.digit_bits) * u64::from(self.shape.workgroup + 1)
+        } else {
+            self.shape.table_words(self.count)
+        }
+    }
+
+    pub fn passes(&self) -> u32 {
+        if self.count < 2 { 0 } else { self.shape.passes(self.codes.bits) }
+    }
+
+    /// Workgroups of the phases that go over all primitives.
+    pub fn tiles(&self) -> u32 {
+        self.count.div_ceil(self.shape.workgroup * self.items)
+    }
+
+    pub fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
+        Kernel::new(shader, self.shape.workgroup, &self.shape.constants(self.items, self.key_words()))
+    }
+
+    /// A kernel that reads primitives.
+    pub fn reading_kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
+        self.reading_kernel_with(shader, input, &[])
+    }
+
+    /// The same with specialisation constants from 6 on.
+    pub fn reading_kernel_with(&self, shader: &'static shaders::Shader, input: &Input, more: &[u32]) -> Kernel {
+        let constants = self.shape.constants(self.items, self.key_words());
+        let source = [input.source_constant(self.primitives)];
+        Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source, more].concat())
+    }
+
+    /// The kernels of [`Encode::steps`].
+    pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
+        let plain = [
+            &shaders::BVH_ENCODE_RESET,
+            &shaders::GPU_RADIX_SORT_COUNT,
+            &shaders::GPU_RADIX_SORT_SCAN,
+            &shaders::GPU_RADIX_SORT_SCATTER,
+        ];
+        let reading = [&shaders::BVH_ENCODE_BOUNDS, &shaders::BVH_ENCODE_PLAN, &shaders::BVH_ENCODE_CODES];
+        let plain = plain.map(|shader| self.kernel(shader));
+        plain.into_iter().chain(reading.map(|shader| self.reading_kernel(shader, input))).collect()
+    }
+
+    /// The input's geometry as the kernels are given it, and its formats.
+    pub fn checked(&self, input: &Input) -> Result<(Geometry, u32)> {
+        let planned =
+            Planned { primitives: self.primitives, primitive_count: self.count, geometry_count: self.geometry_count };
+        planned.check(input)?;
+        Ok(input.for_kernels())
+    }
+
+    /// `code_kind` in encode.glsl.
+    pub fn code_kind(&self) -> u32 {
+        let code = self.codes.code;
+        code.order_number()
+            | self.codes.bits << 8
+            | code.size_group() << 16
+            | u32::from(self.codes.concise) << 24
+            | u32::from(self.collapse.enabled) << 25
+            | self.build_flags << 26
+    }
+
+    /// What the kernels are given, with scratch memory at address `scratch`.
+    pub fn arguments(&self, input: &Input, structure: u64, scratch: u64) -> Result<Arguments> {
+        let (geometry, formats) = self.checked(input)?;
+        let parts = self.scratch();
+        Ok(Arguments {
+            vertices: geometry.vertices,
+            indices: geometry.indices,
+            transform: geometry.transform,
+            structure,
+            state: scratch,
+            keys: parts.keys.map(|at| scratch + at),
+            values: parts.values.map(|at| scratch + at),
+            ends: scratch + parts.ends,
+            table: scratch + parts.table,
+            vertex_stride: geometry.vertex_stride,
+            vertex_count: geometry.vertex_count,
+            formats,
+            primitive_count: self.count,
+            code_kind: self.code_kind(),
+            c_t: self.collapse.c_t,
+            c_i: self.collapse.c_i,
+            columns: self.shape.columns(self.count),
+            column_keys: self.shape.column_keys(self.count),
+            passes: self.passes(),
+        })
+    }
+
+    /// The dispatches up to the sort; what follows needs a barrier before. Labels: `bounds`, `encode`, `sort`.
+    pub fn steps(&self, input: &Input, arguments: &Arguments) -> Vec<Step> {
+        let plain = |phase, shader, groups| Step::new(phase, self.kernel(shader), arguments, groups);
+        let reading = |phase, shader, groups| Step::new(phase, self.reading_kernel(shader, input), arguments, groups);
+        let sort = radix_sort::Sort { count: self.count, bits: self.codes.bits, identity: true };
+        let buffers = radix_sort::Buffers { keys: arguments.keys, values: arguments.values, table: arguments.table };
+        let mut steps = vec![
+            plain("bounds", &shaders::BVH_ENCODE_RESET, 1),
+            reading("bounds", &shaders::BVH_ENCODE_BOUNDS, self.tiles()),
+            reading("encode", &shaders::BVH_ENCODE_PLAN, 1),
+            reading("encode", &shaders::BVH_ENCODE_CODES, self.tiles()),
+        ];
+        steps.extend(radix_sort::steps(&self.shape, &buffers, &sort));
+        steps
+    }
+}

@@ -1,0 +1,48 @@
+//! H-PLOC on the device: PLOC within each node of the radix tree, bottom-up in one pass (Benthin et al. 2024).
+//!
+//! `glsl/bvh/hploc.glsl` is the device's side; the twin is [`super::host::hploc`] with
+//! [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
+
+use super::builder::Window;
+use super::collapse;
+use super::encode::{Arguments, Encode};
+use super::geometry::Input;
+use crate::gpu::{Kernel, Step, shaders};
+
+fn kernel(encode: &Encode, window: &Window, shader: &'static shaders::Shader, input: &Input) -> Kernel {
+    encode.reading_kernel_with(shader, input, &[window.size, window.radius, collapse::treelet(encode)])
+}
+
+/// The kernels of [`steps`].
+pub(super) fn kernels(encode: &Encode, window: &Window, input: &Input) -> Vec<Kernel> {
+    vec![kernel(encode, window, &shaders::BVH_HPLOC_HIERARCHY, input), collapse::place_kernel(encode, input)]
+}
+
+/// The dispatches behind [`Encode::steps`]. Labels: `hierarchy`, `collapse`.
+pub(super) fn steps(encode: &Encode, window: &Window, input: &Input, arguments: &Arguments) -> Vec<Step> {
+    let hierarchy = kernel(encode, window, &shaders::BVH_HPLOC_HIERARCHY, input);
+    let mut steps = vec![Step::new("hierarchy", hierarchy, arguments, encode.tiles())];
+    steps.extend(collapse::place_steps(encode, input, arguments));
+    steps
+}
+
+/// The kernels of [`persistent_steps`].
+pub(super) fn persistent_kernels(encode: &Encode, window: &Window, input: &Input) -> Vec<Kernel> {
+    vec![encode.kernel(&shaders::BVH_HPLOC_RESET), kernel(encode, window, &shaders::BVH_HPLOC_PERSISTENT, input)]
+}
+
+/// The whole build by `workers` workgroups of one dispatch. Label: `build`.
+pub(super) fn persistent_steps(
+    encode: &Encode,
+    window: &Window,
+    input: &Input,
+    arguments: &Arguments,
+    workers: u32,
+) -> Vec<Step> {
+    let kernels = persistent_kernels(encode, window, input);
+    kernels
+        .into_iter()
+        .zip([1, workers])
+        .map(|(kernel, groups)| Step::new("build", kernel, arguments, groups))
+        .collect()
+}

@@ -1,0 +1,103 @@
+//! PLOC on the device: in rounds, clusters that are each other's nearest become one (Meister and Bittner 2018).
+//!
+//! `glsl/bvh/ploc.glsl` is the device's side; the twin is [`super::host::ploc`] with
+//! [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
+
+use super::collapse;
+use super::encode::{Arguments, Encode};
+use super::geometry::Input;
+use crate::gpu::{Kernel, Step, shaders};
+
+/// Clusters that one workgroup finishes in less time than rounds of all take.
+const FINISH: u32 = 2048;
+/// The most rounds that the pool has phases for.
+const MOST_ROUNDS: u32 = 38;
+
+/// Rounds until one workgroup goes on: seven tenths of the clusters are left of a round, or a little less. Where more are, that
+/// workgroup has more to do.
+fn rounds(count: u32) -> u32 {
+    let mut rounds = 0;
+    let mut left = f64::from(count);
+    while left > f64::from(FINISH) && rounds < MOST_ROUNDS {
+        left *= 0.7;
+        rounds += 1;
+    }
+    rounds
+}
+
+/// The workgroups of a round, which share its tiles.
+fn groups(encode: &Encode) -> u32 {
+    encode.tiles().min(if encode.shape.private_counters { 64 } else { 1024 })
+}
+
+/// The kernels of a build with this radius.
+struct Kernels<'a> {
+    encode: &'a Encode,
+    input: &'a Input,
+    radius: u32,
+}
+
+impl Kernels<'_> {
+    /// Specialised for even and odd rounds.
+    fn of_round(&self, shader: &'static shaders::Shader, round: u32) -> Kernel {
+        self.encode.reading_kernel_with(shader, self.input, &[self.radius, round % 2])
+    }
+
+    fn of_pool(&self, shader: &'static shaders::Shader) -> Kernel {
+        let rounds = rounds(self.encode.count);
+        self.encode.reading_kernel_with(shader, self.input, &[self.radius, rounds, collapse::treelet(self.encode)])
+    }
+
+    /// Kernels and workgroups, a barrier between each two.
+    fn chain(&self) -> Vec<(Kernel, u32)> {
+        let Kernels { encode, .. } = self;
+        let round = |round| {
+            [
+                (&shaders::BVH_PLOC_SEARCH, groups(encode)),
+                (&shaders::BVH_PLOC_COUNT, groups(encode)),
+                (&shaders::BVH_PLOC_SCAN, 1),
+                (&shaders::BVH_PLOC_MERGE, groups(encode)),
+            ]
+            .map(|(shader, groups)| (self.of_round(shader, round), groups))
+        };
+        let rounds = rounds(encode.count);
+        let begin = (self.of_round(&shaders::BVH_PLOC_BEGIN, 0), encode.tiles());
+        let finish = (self.of_round(&shaders::BVH_PLOC_FINISH, rounds), 1);
+        [begin].into_iter().chain((0..rounds).flat_map(round)).chain([finish]).collect()
+    }
+}
+
+/// The kernels of [`steps`].
+pub(super) fn kernels(encode: &Encode, radius: u32, input: &Input) -> Vec<Kernel> {
+    let chain = Kernels { encode, input, radius }.chain();
+    chain.into_iter().map(|(kernel, _)| kernel).chain([collapse::place_kernel(encode, input)]).collect()
+}
+
+/// The dispatches behind [`Encode::steps`]. Labels: `hierarchy`, `collapse`.
+pub(super) fn steps(encode: &Encode, radius: u32, input: &Input, arguments: &Arguments) -> Vec<Step> {
+    let chain = Kernels { encode, input, radius }.chain();
+    let steps = chain.into_iter().map(|(kernel, groups)| Step::new("hierarchy", kernel, arguments, groups));
+    steps.chain(collapse::place_steps(encode, input, arguments)).collect()
+}
+
+/// The kernels of [`persistent_steps`].
+pub(super) fn persistent_kernels(encode: &Encode, radius: u32, input: &Input) -> Vec<Kernel> {
+    let kernels = Kernels { encode, input, radius };
+    vec![kernels.of_pool(&shaders::BVH_PLOC_RESET), kernels.of_pool(&shaders::BVH_PLOC_PERSISTENT)]
+}
+
+/// The whole build by `workers` workgroups of one dispatch. Label: `build`.
+pub(super) fn persistent_steps(
+    encode: &Encode,
+    radius: u32,
+    input: &Input,
+    arguments: &Arguments,
+    workers: u32,
+) -> Vec<Step> {
+    let kernels = persistent_kernels(encode, radius, input);
+    kernels
+        .into_iter()
+        .zip([1, workers])
+        .map(|(kernel, groups)| Step::new("build", kernel, arguments, groups))
+        .collect()
+}

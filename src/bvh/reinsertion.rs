@@ -1,0 +1,153 @@
+//! Parallel reinsertion on the device: subtrees of a finished tree move to where they cost less.
+//!
+//! Meister and Bittner 2018, "Parallel Reinsertion for Bounding Volume Hierarchy Optimization". A *link* names a subtree by where
+//! it hangs: 2 · slot + side. To move the subtree at a link, its parent is taken out (the sibling takes its place) and put in
+//! again at another link, with the subtree still below it: nothing moves in memory but boxes and indices. The *pivot* is the
+//! lowest node above both places; above it no box changes. Children of the root stay, so the root does.
+//!
+//! A round has three steps, each done for all links at once that the round tries:
+//!
+//! 1. *search*: of the subtree at each link, the move that shortens the sum of the nodes' areas most: up through all pivots, and
+//!    down on their other side as long as there may be more to gain than was found;
+//! 2. *match*: a move is made if no other across a node of its path (from the parent up to the pivot, and from there down to the new
+//!    place) gains more, or as much with a smaller link;
+//! 3. *move*: of each such path, the links, boxes and parents.
+//!
+//! Paths of moves that are made have no node in common. That is the paper's conservative locking: gains add up, no cycle can come
+//! to be, and the area never grows. It lets fewer moves through than locking only the nodes whose links change. That is made up for
+//! by trying few links a round and more rounds ([`Options::stride`]): what was tried, with figures, is in docs/optimisation.md.
+//!
+//! The leaves of the tree have one record each; collapsing comes behind it and makes leaves of whatever is deeper than tracers can
+//! walk. The twin is [`Bvh2::reinserted`](super::layout::Bvh2::reinserted): the same bytes.
+
+use super::layout::node_slots;
+use crate::Result;
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::{Grid, Kernel, Limits, Recorder, Step, fill, shaders};
+
+/// How much is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Options {
+    /// Rounds. Every link is tried once in [`Options::stride`] rounds.
+    pub rounds: u32,
+    /// Of so many links, one is tried in a round, another in each; at least 1.
+    pub stride: u32,
+}
+
+impl Options {
+    /// Every link once.
+    pub const FAST: Options = Options::of_rounds(16);
+    /// Every link twice.
+    pub const MEDIUM: Options = Options::of_rounds(32);
+    /// Every link six times: little more is to be had from there on.
+    pub const HIGH: Options = Options::of_rounds(96);
+
+    /// So many rounds, of every sixteenth link each.
+    pub const fn of_rounds(rounds: u32) -> Options {
+        Options { rounds, stride: 16 }
+    }
+}
+
+/// Subtrees that a search may put off; what does not find room is not looked at.
+pub(super) const STACK: usize = 32;
+/// Nodes that a path may have on either side.
+pub(super) const PATH: usize = 256;
+/// A gain counts if it is more than this share of the pivot's area: less may be rounding.
+pub(super) const LEAST_SHARE: f32 = 1.0 / 1_048_576.0;
+/// And more than this, the scene's longest edge being about 1: less may be made of numbers that devices take for zero.
+pub(super) const LEAST_GAIN: f32 = 1.0 / 1_152_921_504_606_846_976.0;
+
+push_constants! {
+    struct Arguments {
+        structure: u64,
+        parents: u64,
+        moves: u64,
+        gains: u64,
+        firsts: u64,
+        offset: u32,
+        stride: u32,
+        link_count: u32,
+        padding: u32,
+    }
+}
+
+/// Bytes of `Move` in reinsertion.glsl.
+const MOVE_BYTES: u64 = 12;
+
+/// Rounds of reinsertion, for one device and a number of primitives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reinsertion {
+    options: Options,
+    slots: u32,
+    grid: Grid,
+}
+
+impl Reinsertion {
+    /// For structures of `primitive_count` primitives.
+    pub fn new(limits: &Limits, options: &Options, primitive_count: u32) -> Reinsertion {
+        let grid = Grid::of(limits);
+        // A search is long: on a GPU it is an invocation's only one, as far as there are invocations.
+        let grid = if limits.is_cpu() { grid } else { Grid { rounds: 1, ..grid } };
+        let options = Options { stride: options.stride.max(1), ..*options };
+        Reinsertion { options, slots: node_slots(primitive_count), grid }
+    }
+
+    fn link_count(&self) -> u32 {
+        2 * self.slots
+    }
+
+    /// Bytes of scratch memory.
+    pub fn scratch_bytes(&self) -> u64 {
+        let moves = u64::from(self.link_count().div_ceil(self.options.stride));
+        12 * u64::from(self.slots) + MOVE_BYTES * moves
+    }
+
+    /// The kernels that [`Reinsertion::record`] dispatches beside that of [`fill`], to make their pipelines ahead with
+    /// [`crate::gpu::Context::warm`].
+    pub fn kernels(&self) -> Vec<Kernel> {
+        let shaders = [&shaders::BVH_REINSERTION_PARENTS].into_iter().chain(STEPS);
+        shaders.map(|shader| self.grid.kernel(shader)).collect()
+    }
+
+    /// Records the rounds on the structure at address `structure`, in place, with scratch memory at address `scratch`; both aligned
+    /// to 16 bytes. Five dispatches a round with barriers between; the caller places one before and one behind. Label: `optimise`.
+    ///
+    /// # Errors
+    /// A pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, structure: u64, scratch: u64) -> Result<()> {
+        recorder.chains(&[self.steps(structure, scratch)])
+    }
+
+    /// What [`Reinsertion::record`] records, to be recorded behind or beside other steps by [`Recorder::chains`].
+    pub fn steps(&self, structure: u64, scratch: u64) -> Vec<Step> {
+        let words = 4 * u64::from(self.slots);
+        let arguments = |offset: u32| Arguments {
+            structure,
+            parents: scratch,
+            gains: scratch + words,
+            firsts: scratch + 2 * words,
+            moves: scratch + 3 * words,
+            offset,
+            stride: self.options.stride,
+            link_count: self.link_count(),
+            padding: 0,
+        };
+        let step = |shader, offset| Step::new(PHASE, self.grid.kernel(shader), &arguments(offset), self.grid.groups);
+        let round = |round: u32| {
+            let unlock = fill::step(PHASE, scratch + words, 2 * self.slots, 0);
+            [unlock].into_iter().chain(STEPS.map(|shader| step(shader, round % self.options.stride)))
+        };
+        [step(&shaders::BVH_REINSERTION_PARENTS, 0)]
+            .into_iter()
+            .chain((0..self.options.rounds).flat_map(round))
+            .collect()
+    }
+}
+
+const PHASE: &str = "optimise";
+const STEPS: [&shaders::Shader; 4] = [
+    &shaders::BVH_REINSERTION_SEARCH,
+    &shaders::BVH_REINSERTION_MATCH,
+    &shaders::BVH_REINSERTION_SETTLE,
+    &shaders::BVH_REINSERTION_MOVE,
+];
