@@ -6,6 +6,7 @@
 use crate::accel::serialize::Head;
 use crate::bvh::geometry::Geometry;
 use crate::bvh::layout::{BoxRecord, Child, GeometryEntry, Header, Instance, Node, Triangle};
+use crate::bvh::wide::quantised::QuantisedNode;
 use crate::gpu::shaders;
 use crate::trace::{Hit, Ray};
 use crate::{accel, bvh, gpu, measure, trace};
@@ -60,6 +61,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "bvh" if ["encode", "lbvh", "collapse", "hploc", "ploc"].into_iter().any(is) => bvh::encode::push_constants(),
         "bvh" if is("quality") => bvh::quality::push_constants(),
         "bvh" if is("refit") => bvh::refit::push_constants(),
+        "bvh" if is("wide") => bvh::wide::device::push_constants(),
         "bvh" if is("reinsertion") => bvh::reinsertion::push_constants(),
         "gpu" if is("fill") => gpu::fill::push_constants(),
         "gpu" if is("pool_tree") => gpu::probe::push_constants(),
@@ -123,6 +125,10 @@ fn structs() -> BTreeMap<&'static str, Layout> {
                 start_count,
                 reserved
             }),
+        ),
+        (
+            "QuantisedNode",
+            layout_of!(QuantisedNode { origin, exponents_and_nodes, first_child, first_record, counts, lo, hi }),
         ),
         ("Header", header),
         ("Geometry", geometry),

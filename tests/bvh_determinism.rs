@@ -66,7 +66,7 @@ fn subgroups_of_4_8_and_16_give_the_same_bytes() {
         eprintln!("skipped: {driver} is not Mesa 25, whose lavapipe takes other subgroup sizes");
         return;
     }
-    for builder in ["lbvh", "lbvh:codes=emc64var:schedule=persistent"] {
+    for builder in ["lbvh", "lbvh:width=4", "lbvh:width=8q", "lbvh:codes=emc64var:schedule=persistent"] {
         let mut trees = Vec::new();
         for (width, subgroup) in [("128", 4), ("256", 8), ("512", 16)] {
             assert_eq!(sizes_of(&run(width, &["devices", "--json"])).0, subgroup);

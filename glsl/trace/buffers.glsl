@@ -17,4 +17,8 @@ layout(push_constant, scalar) uniform Arguments {
     uint count;
     uint rays_each;
 };
+
+bool can_be_traced(Structure structure) {
+    return structure.header.active_count != 0u && (structure.header.status & STATUS_UNUSABLE) == 0u;
+}
 #endif

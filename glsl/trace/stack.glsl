@@ -47,8 +47,7 @@ const uint HEDGEROW_PRIVATE_LEVELS = HEDGEROW_LEVELS;
 
 uvec2 hedgerow_private[HEDGEROW_PRIVATE_LEVELS + 1];
 
-void hedgerow_put(uint level, HedgerowWaiting waiting) {
-    uvec2 entry = hedgerow_packed(waiting);
+void hedgerow_put_entry(uint level, uvec2 entry) {
 #ifdef HEDGEROW_SHARED_LEVELS
     if (HEDGEROW_PRIVATE_LEVELS == 0u || level < HEDGEROW_SHARED_LEVELS) {
         uint at = level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
@@ -61,14 +60,22 @@ void hedgerow_put(uint level, HedgerowWaiting waiting) {
     hedgerow_private[level] = entry;
 }
 
-HedgerowWaiting hedgerow_taken(uint level) {
+uvec2 hedgerow_entry(uint level) {
 #ifdef HEDGEROW_SHARED_LEVELS
     if (HEDGEROW_PRIVATE_LEVELS == 0u || level < HEDGEROW_SHARED_LEVELS) {
         uint at = level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-        return hedgerow_unpacked(uvec2(hedgerow_shared_child[at], hedgerow_shared_enter[at]));
+        return uvec2(hedgerow_shared_child[at], hedgerow_shared_enter[at]);
     }
     level -= HEDGEROW_SHARED_LEVELS;
 #endif
-    return hedgerow_unpacked(hedgerow_private[level]);
+    return hedgerow_private[level];
+}
+
+void hedgerow_put(uint level, HedgerowWaiting waiting) {
+    hedgerow_put_entry(level, hedgerow_packed(waiting));
+}
+
+HedgerowWaiting hedgerow_taken(uint level) {
+    return hedgerow_unpacked(hedgerow_entry(level));
 }
 #endif

@@ -5,9 +5,9 @@
 #ifndef HEDGEROW_TRACE_WALK
 #define HEDGEROW_TRACE_WALK
 #include "trace/buffers.glsl"
+#include "trace/nearest.glsl"
 #include "trace/slab.glsl"
 #include "trace/stack.glsl"
-#include "trace/triangle.glsl"
 
 // In place of a leaf's count: nothing at hand, take what waits.
 const uint NOTHING = 0xffffffffu;
@@ -31,10 +31,6 @@ bool at_node(Walk walk) {
 
 bool at_triangle(Walk walk) {
     return walk.left != 0u && walk.left != NOTHING;
-}
-
-bool can_be_traced(Structure structure) {
-    return structure.header.active_count != 0u && (structure.header.status & STATUS_UNUSABLE) == 0u;
 }
 
 // What is at hand has just been taken: a leaf counts.
@@ -75,17 +71,9 @@ void test(Triangle triangle, bool any_hit, inout Walk walk) {
     walk.work.y++;
     walk.index++;
     walk.left = walk.left == 1u ? NOTHING : walk.left - 1u;
-    vec3 met;
-    if (hedgerow_meet(walk.ray, triangle.v0, triangle.v1, triangle.v2, met)) {
-        if (walk.ray.t_min < met.x && met.x < walk.ray.t_max &&
-            (met.x < walk.best || met.x == walk.best && triangle.primitive < walk.hit.primitive)) {
-            walk.best = met.x;
-            walk.hit = HedgerowHit(any_hit ? 0.0 : met.x, triangle.primitive, met.y, met.z);
-            if (any_hit) {
-                walk.left = NOTHING;
-                walk.level = 0;
-            }
-        }
+    if (hit_nearer(walk.ray, triangle, any_hit, walk.best, walk.hit) && any_hit) {
+        walk.left = NOTHING;
+        walk.level = 0;
     }
 }
 

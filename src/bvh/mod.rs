@@ -18,3 +18,4 @@ pub mod refit;
 pub mod reinsertion;
 pub mod sah;
 pub mod validate;
+pub mod wide;

@@ -57,10 +57,10 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     if let Some(path) = &arguments.output {
         let mut subject = builders[0].make(device.as_ref(), &scene.mesh)?;
         subject.build()?;
-        let Some(tree) = subject.tree()? else {
+        let Some(bytes) = subject.bytes()? else {
             bail!("the structure of {} is the driver's own and cannot be written; choose another builder", builders[0]);
         };
-        write(path, &tree.to_bytes()).with_context(|| format!("the tree of {}", builders[0]))?;
+        write(path, &bytes).with_context(|| format!("the tree of {}", builders[0]))?;
     }
     arguments.json.write_each(outcomes.iter().map(|outcome| &outcome.record))?;
     if !arguments.json.takes_stdout() {

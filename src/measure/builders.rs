@@ -17,8 +17,10 @@ use crate::bvh::codes::Codes;
 use crate::bvh::host::sweep::Leaves;
 use crate::bvh::reinsertion;
 use crate::bvh::sah::Collapse;
+use crate::bvh::wide::Form;
 use crate::gpu::{Device, DriverPreference};
 use crate::scene::Mesh;
+use crate::trace::wide::{Order, Tracer};
 use crate::{Error, Result};
 use std::fmt;
 use std::str::FromStr;
@@ -69,6 +71,8 @@ const CODES: BuilderOption = BuilderOption {
 const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
 const RAYS: BuilderOption =
     BuilderOption { key: "rays", values: "rays that are traced between two builds, 1e7 unless given" };
+const WIDTH: BuilderOption = BuilderOption { key: "width", values: "2, 4, 8 or 8q (quantised)" };
+const ORDER: BuilderOption = BuilderOption { key: "order", values: "distance or octant (of width=8q)" };
 const TERMINATION: BuilderOption =
     BuilderOption { key: "termination", values: "sah, or off: leaves of one triangle, then collapsed" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
@@ -86,41 +90,37 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "lbvh",
         what: "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
-        options: &[CODES, OPTIMISE, COLLAPSE, SCHEDULE],
+        options: &[CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &[
             "lbvh",
             "lbvh:codes=mc30",
             "lbvh:codes=emc64var-nosize",
             "lbvh:collapse=off",
             "lbvh:schedule=persistent",
+            "lbvh:width=4",
+            "lbvh:width=8q",
         ],
         needs: Needs::Device,
-        make: |spec, device, mesh| {
-            Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.lbvh_options()?)?))
-        },
-        check: |spec| spec.lbvh_options().map(drop),
+        make: |spec, device, mesh| spec.on_device(device, mesh, &spec.lbvh_options()?),
+        check: |spec| spec.lbvh_options().and(spec.form_and_order()).map(drop),
     },
     Builder {
         name: "ploc",
         what: "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
-        options: &[RADIUS, CODES, OPTIMISE, COLLAPSE, SCHEDULE],
+        options: &[RADIUS, CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &["ploc", "ploc:radius=25"],
         needs: Needs::Device,
-        make: |spec, device, mesh| {
-            Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.ploc_options()?)?))
-        },
-        check: |spec| spec.ploc_options().map(drop),
+        make: |spec, device, mesh| spec.on_device(device, mesh, &spec.ploc_options()?),
+        check: |spec| spec.ploc_options().and(spec.form_and_order()).map(drop),
     },
     Builder {
         name: "hploc",
         what: "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
-        options: &[WINDOW, RADIUS, CODES, OPTIMISE, COLLAPSE, SCHEDULE],
+        options: &[WINDOW, RADIUS, CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &["hploc"],
         needs: Needs::Device,
-        make: |spec, device, mesh| {
-            Ok(Box::new(DeviceBvh::new(given(device)?, &spec.to_string(), mesh, &spec.hploc_options()?)?))
-        },
-        check: |spec| spec.hploc_options().map(drop),
+        make: |spec, device, mesh| spec.on_device(device, mesh, &spec.hploc_options()?),
+        check: |spec| spec.hploc_options().and(spec.form_and_order()).map(drop),
     },
     Builder {
         name: "auto",
@@ -359,6 +359,41 @@ impl Spec {
         Ok(builder::Options { codes, optimise, collapse, schedule, ..builder::Options::DEFAULT })
     }
 
+    /// Options `width`, of a wide tree, and `order`; no width where it is 2 or was not given.
+    fn form_and_order(&self) -> Result<(Option<Form>, Option<Order>)> {
+        let form = match self.option(WIDTH.key) {
+            None | Some("2") => None,
+            Some("4") => Some(Form::Four),
+            Some("8") => Some(Form::Eight),
+            Some("8q") => Some(Form::EightQuantised),
+            Some(other) => return Err(self.wrong_value(&WIDTH, other)),
+        };
+        let order = match self.option(ORDER.key) {
+            None => None,
+            Some("distance") if form.is_some() => Some(Order::Distance),
+            Some("octant") if form == Some(Form::EightQuantised) => Some(Order::Octant),
+            Some(other) => return Err(self.wrong_value(&ORDER, other)),
+        };
+        Ok((form, order))
+    }
+
+    /// A builder of ours on the device, with these options and those of [`Spec::form_and_order`].
+    fn on_device<'a>(
+        &self,
+        device: Option<&'a Device>,
+        mesh: &'a Mesh,
+        options: &builder::Options,
+    ) -> Result<Box<dyn Subject + 'a>> {
+        let device = given(device)?;
+        let limits = &device.limits;
+        let (form, order) = self.form_and_order()?;
+        let wide = form.map(|form| match order {
+            None => Tracer::of(limits, form),
+            Some(order) => Tracer::in_order(limits, form, order),
+        });
+        Ok(Box::new(DeviceBvh::new(device, &self.to_string(), mesh, options, wide)?))
+    }
+
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {
         Error::Argument(format!("builder {self}: {}={value} is not known; take {}", option.key, option.values))
     }
@@ -498,6 +533,10 @@ mod tests {
         assert!(error_of("lvbh").contains("no builder is called \"lvbh\"; there are"));
         assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));
         assert!(error_of("lbvh-host:collapse=maybe").contains("take sah or off"));
+        assert!(error_of("lbvh:width=3").contains("width=3 is not known; take 2, 4, 8 or 8q"));
+        assert!(
+            error_of("lbvh:width=4:order=octant").contains("order=octant is not known; take distance or octant (of")
+        );
         assert!(error_of("lbvh-host:codes").contains("write codes=VALUE"));
         assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
         assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse, optimise"));

@@ -1,20 +1,22 @@
 //! Our trees built on the device as subjects: timestamps around each phase, our tracer.
 
 use super::overlap::{self, Epo};
+use super::wide::WideTree;
 use super::{BuildRun, Subject, record};
 use crate::bvh::builder::{Builder, Input, Options, Sizes};
 use crate::bvh::layout::Bvh2;
 use crate::bvh::quality::{self, Figures};
-use crate::gpu::{Buffer, Device, Timestamps};
+use crate::gpu::{Buffer, Device, Recorder, Timestamps};
 use crate::scene::Mesh;
 use crate::trace::tracer::{self, Buffers, Shape};
+use crate::trace::wide::Tracer;
 use crate::trace::{Hit, Query, Ray, Work};
 use crate::{Error, Result};
 
-/// Phases of a build at most: reset and bounds, encode, sort, hierarchy.
-const PHASES: u32 = 8;
+/// Phases of a build at most: reset and bounds, encode, sort, hierarchy, those of collapsing, wide.
+const PHASES: u32 = 10;
 
-/// A scene in our `Bvh2`, built and traced on the device.
+/// A scene in our `Bvh2`, or in a wide tree made of it, built and traced on the device.
 pub struct DeviceBvh<'a> {
     device: &'a Device,
     builder: String,
@@ -25,6 +27,7 @@ pub struct DeviceBvh<'a> {
     _vertices: [Buffer<'a>; 2],
     structure: Buffer<'a>,
     scratch: Buffer<'a>,
+    wide: Option<WideTree<'a>>,
     timestamps: Timestamps,
     rays: Option<Rays<'a>>,
 }
@@ -36,11 +39,17 @@ struct Rays<'a> {
 }
 
 impl<'a> DeviceBvh<'a> {
-    /// Uploads `mesh` and makes room for structure and scratch.
+    /// Uploads `mesh` and makes room for structure and scratch, and for the wide tree if there shall be one.
     ///
     /// # Errors
     /// Too many triangles, or too little memory: the error says how much is needed.
-    pub fn new(device: &'a Device, builder: &str, mesh: &Mesh, options: &Options) -> Result<DeviceBvh<'a>> {
+    pub fn new(
+        device: &'a Device,
+        builder: &str,
+        mesh: &Mesh,
+        options: &Options,
+        wide: Option<Tracer>,
+    ) -> Result<DeviceBvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let bvh = Builder::new(device, options, count)?;
         let sizes = bvh.sizes();
@@ -58,6 +67,7 @@ impl<'a> DeviceBvh<'a> {
             choice: choice_of(options, &bvh),
             structure: device.buffer("structure", sizes.structure)?,
             scratch: device.buffer("scratch", sizes.scratch)?,
+            wide: wide.map(|tracer| WideTree::new(device, tracer, count)).transpose()?,
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,
             sizes,
@@ -69,12 +79,25 @@ impl<'a> DeviceBvh<'a> {
 
     fn buffers(&self, rays: &Rays<'_>, work: Option<u64>) -> Buffers {
         Buffers {
-            structure: self.structure.address(),
+            structure: self.wide.as_ref().map_or(self.structure.address(), WideTree::address),
             rays: rays.rays.address(),
             hits: rays.hits.address(),
             work,
             count: rays.count,
         }
+    }
+}
+
+/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`.
+fn record_trace(
+    recorder: &mut Recorder<'_>,
+    wide_tree: Option<&WideTree<'_>>,
+    query: Query,
+    buffers: &Buffers,
+) -> Result<()> {
+    match wide_tree {
+        None => tracer::record(recorder, &Shape::of(&recorder.context().limits), query, buffers),
+        Some(tree) => tree.tracer.record(recorder, query, buffers),
     }
 }
 
@@ -92,7 +115,7 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn kind(&self) -> &'static str {
-        "bvh2"
+        self.wide.as_ref().map_or("bvh2", |tree| tree.tracer.form.name())
     }
 
     fn timer(&self) -> &'static str {
@@ -109,20 +132,27 @@ impl Subject for DeviceBvh<'_> {
 
     fn build(&mut self) -> Result<BuildRun> {
         let (structure, scratch) = (self.structure.address(), self.scratch.address());
-        self.device.run(Some(&mut self.timestamps), |r| self.bvh.record(r, &self.input, structure, scratch))?;
+        self.device.run(Some(&mut self.timestamps), |recorder| {
+            self.bvh.record(recorder, &self.input, structure, scratch)?;
+            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, structure))
+        })?;
         let phases = self.timestamps.phases()?;
         Ok(BuildRun { milliseconds: phases.iter().map(|p| p.milliseconds).sum(), phases })
     }
 
     fn memory(&self) -> record::Memory {
-        record::Memory {
+        let binary = record::Memory {
             structure_bytes: Some(self.sizes.structure),
             scratch_bytes: Some(self.sizes.scratch),
             peak_bytes: Some(self.sizes.structure + self.sizes.scratch),
-        }
+        };
+        self.wide.as_ref().map_or(binary.clone(), |tree| tree.memory(&binary))
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+        if let Some(tree) = &self.wide {
+            return tree.quality(c_t, c_i);
+        }
         let measure = quality::OnDevice::new(&self.device.limits, self.input.primitive_count);
         let scratch = self.device.buffer("quality: scratch", measure.scratch_bytes())?;
         let result = self.device.buffer("quality: figures", size_of::<Figures>() as u64)?;
@@ -138,6 +168,18 @@ impl Subject for DeviceBvh<'_> {
         Bvh2::from_bytes(&self.structure.read::<u8>(self.sizes.structure as usize)).map(Some)
     }
 
+    fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
+        match &self.wide {
+            Some(tree) => Ok(Some(tree.bytes())),
+            None => Ok(Some(self.structure.read(self.sizes.structure as usize))),
+        }
+    }
+
+    fn validate(&mut self) -> Result<()> {
+        self.tree()?.map_or(Ok(()), |tree| tree.validate())?;
+        self.wide.as_ref().map_or(Ok(()), WideTree::validate)
+    }
+
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
         let count = u32::try_from(rays.len())
             .map_err(|_| Error::Argument(format!("{} rays; at most 4294967295 at once", rays.len())))?;
@@ -149,10 +191,10 @@ impl Subject for DeviceBvh<'_> {
 
     fn trace(&mut self, query: Query) -> Result<f64> {
         let Some(rays) = &self.rays else { return Ok(0.0) };
-        let (shape, buffers) = (Shape::of(&self.device.limits), self.buffers(rays, None));
+        let buffers = self.buffers(rays, None);
         self.device.run(Some(&mut self.timestamps), |recorder| {
             recorder.phase("trace");
-            tracer::record(recorder, &shape, query, &buffers)
+            record_trace(recorder, self.wide.as_ref(), query, &buffers)
         })?;
         Ok(self.timestamps.phases()?.iter().map(|p| p.milliseconds).sum())
     }
@@ -164,8 +206,8 @@ impl Subject for DeviceBvh<'_> {
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
         let Some(rays) = &self.rays else { return Ok(None) };
         let work = self.device.buffer("work", u64::from(rays.count) * size_of::<Work>() as u64)?;
-        let (shape, buffers) = (Shape::of(&self.device.limits), self.buffers(rays, Some(work.address())));
-        self.device.run(None, |recorder| tracer::record(recorder, &shape, query, &buffers))?;
+        let buffers = self.buffers(rays, Some(work.address()));
+        self.device.run(None, |recorder| record_trace(recorder, self.wide.as_ref(), query, &buffers))?;
         Ok(Some(work.read(rays.count as usize)))
     }
 }

@@ -116,10 +116,9 @@ pub fn measure(
         entry.record.memory = entry.subject.memory();
         entry.record.quality = entry.subject.quality(plan.c_t, plan.c_i)?;
         entry.record.quality.epo = entry.subject.epo(plan.c_t, plan.c_i, plan.epo)?;
-        if let Some(tree) = entry.subject.tree()?
-            && let Err(error) = tree.validate()
-        {
-            entry.faults.push(error.to_string());
+        match entry.subject.validate() {
+            Err(error @ Error::InvalidStructure(_)) => entry.faults.push(error.to_string()),
+            other => other?,
         }
         Ok(())
     });

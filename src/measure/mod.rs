@@ -28,5 +28,6 @@ pub mod statistics;
 pub mod structures;
 mod subject;
 pub mod total_time;
+mod wide;
 
 pub use subject::{BuildRun, Subject};

@@ -16,7 +16,7 @@ pub struct Record {
     pub triangles: u64,
     /// Builder with its options, as `-b` takes it.
     pub builder: String,
-    /// Layout: `bvh2`, `driver`, `host`.
+    /// Layout: `bvh2`, `wide4`, `wide8`, `wide8q`, `driver`, `host`.
     pub kind: String,
     /// Device name.
     pub device: String,
@@ -82,7 +82,7 @@ pub struct Memory {
 pub struct Quality {
     /// SAH cost: (c_t · Σ SA(inner) + c_i · Σ SA(leaf)·n_leaf) / SA(root).
     pub sah: Option<f64>,
-    /// Cost of a traversal step.
+    /// Cost of a traversal step: of visiting a node, whatever its width.
     pub c_t: f64,
     /// Cost of a triangle test.
     pub c_i: f64,

@@ -21,7 +21,7 @@ pub struct BuildRun {
 pub trait Subject {
     /// Builder with its options, as `-b` takes it.
     fn builder(&self) -> &str;
-    /// `bvh2`, `driver` or `host`.
+    /// `bvh2`, `wide4`, `wide8`, `wide8q`, `driver` or `host`.
     fn kind(&self) -> &'static str;
     /// `device` where build times are timestamps, otherwise `wall`.
     fn timer(&self) -> &'static str;
@@ -50,12 +50,19 @@ pub trait Subject {
     /// # Errors
     /// The device failed.
     fn tree(&mut self) -> Result<Option<Bvh2>>;
-    /// The bytes of what was built, where they are ours to read: the same input gives the same.
+    /// The bytes of what is traced, where they are ours to read: the same input gives the same.
     ///
     /// # Errors
     /// The device failed.
     fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
         Ok(self.tree()?.map(|tree| tree.to_bytes()))
+    }
+    /// Walks whatever of the build has a layout of ours.
+    ///
+    /// # Errors
+    /// [`crate::Error::InvalidStructure`] says what is wrong; the device failed.
+    fn validate(&mut self) -> Result<()> {
+        self.tree()?.map_or(Ok(()), |tree| tree.validate())
     }
     /// What the builder chose where it was left the choice, in a few words (`emc64var-nosize/32, chain`); `None` if nothing.
     fn choice(&self) -> Option<String> {

@@ -6,7 +6,7 @@ use super::{Hit, Query, Ray, Work, slab};
 use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Triangle, status};
 
 /// From so many triangles on, the count of a leaf that waits takes the place of its distance (`glsl/trace/stack.glsl`).
-const LONG_LEAF: u32 = 31;
+pub(super) const LONG_LEAF: u32 = 31;
 
 /// The nearest hit; of equally near ones that with the lower primitive index.
 pub fn closest_hit(tree: &Bvh2, ray: &Ray) -> Hit {
@@ -90,17 +90,17 @@ fn brute_force(tree: &Bvh2, ray: &Ray) -> Nearest {
 }
 
 /// The best hit so far.
-struct Nearest {
-    t: f32,
-    hit: Hit,
+pub(super) struct Nearest {
+    pub(super) t: f32,
+    pub(super) hit: Hit,
 }
 
 impl Nearest {
-    fn new(t_max: f32) -> Nearest {
+    pub(super) fn new(t_max: f32) -> Nearest {
         Nearest { t: t_max, hit: Hit::NONE }
     }
 
-    fn consider(&mut self, ray: &PreparedRay, triangle: &Triangle) {
+    pub(super) fn consider(&mut self, ray: &PreparedRay, triangle: &Triangle) {
         if let Some(met) = meet(ray, triangle)
             && ray.t_min < met.t
             && met.t < ray.t_max
@@ -111,7 +111,7 @@ impl Nearest {
         }
     }
 
-    fn hit_of(&self, query: Query) -> Hit {
+    pub(super) fn hit_of(&self, query: Query) -> Hit {
         match query {
             Query::AnyHit if self.hit.is_some() => Hit { t: 0.0, ..self.hit },
             _ => self.hit,

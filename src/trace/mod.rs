@@ -6,7 +6,7 @@
 //!
 //! - [`ray`] prepares a ray: shear, reciprocals, error bounds;
 //! - [`determinant`], [`triangle`], [`slab`] are the arithmetic, each the twin of a file in `glsl/trace/`;
-//! - [`host`] traverses on the host, [`tracer`] on the device;
+//! - [`host`] traverses on the host, [`tracer`] on the device; [`wide_host`] and [`wide`] do it in wide trees;
 //! - `kinds` makes the rays that are measured; `files` reads and writes rays and hits.
 
 pub mod determinant;
@@ -19,6 +19,8 @@ pub mod ray;
 pub mod slab;
 pub mod tracer;
 pub mod triangle;
+pub mod wide;
+pub mod wide_host;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -70,7 +72,7 @@ impl Hit {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Work {
-    /// Inner nodes visited (each tests the boxes of its two children).
+    /// Inner nodes visited (each tests the boxes of its children: two, four or eight).
     pub steps: u32,
     /// Triangles tested.
     pub tests: u32,

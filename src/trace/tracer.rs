@@ -76,7 +76,8 @@ impl Shape {
         Shape { workgroup, shared_levels: 8, rays_each: 1, loads: Loads::Gathered }.within(limits)
     }
 
-    fn within(self, limits: &Limits) -> Shape {
+    /// With no more levels in shared memory than there is room for.
+    pub(super) fn within(self, limits: &Limits) -> Shape {
         let workgroup = self.workgroup.min(limits.workgroup_invocations);
         let level_bytes = LEVEL_BYTES * workgroup;
         // One word more of each of the two arrays: they must not be empty.
@@ -133,6 +134,11 @@ pub fn kernel(shape: &Shape, query: Query, count_work: bool) -> Kernel {
         Loads::Gathered => &shaders::TRACE_TRACER_SINGLE,
         Loads::LaneByLane => &shaders::TRACE_TRACER_LANES,
     };
+    kernel_of(shader, shape, query, count_work)
+}
+
+/// The kernel of a shader that takes the constants of the tracers.
+pub(super) fn kernel_of(shader: &'static shaders::Shader, shape: &Shape, query: Query, count_work: bool) -> Kernel {
     let any_hit = u32::from(query == Query::AnyHit);
     Kernel::new(shader, shape.workgroup, &[any_hit, u32::from(count_work), shape.shared_levels])
 }
@@ -146,12 +152,16 @@ pub fn kernel(shape: &Shape, query: Query, count_work: bool) -> Kernel {
 /// More than [`MAX_RAYS`] rays; loads lane by lane in workgroups that are not one subgroup of at most
 /// [`Loads::MAX_LANES`]; the kernel's pipeline could not be made.
 pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, query: Query, buffers: &Buffers) -> Result<()> {
-    let &Buffers { structure, rays, hits, work, count } = buffers;
-    if count > MAX_RAYS {
-        return Err(Error::Argument(format!(
-            "{count} rays in one call, at most {MAX_RAYS}: trace them in several calls"
-        )));
-    }
+    record_kernel(recorder, &kernel(shape, query, buffers.work.is_some()), shape, buffers)
+}
+
+/// Records the tracing of all rays by a kernel that takes [`Arguments`].
+pub(super) fn record_kernel(
+    recorder: &mut Recorder<'_>,
+    kernel: &Kernel,
+    shape: &Shape,
+    buffers: &Buffers,
+) -> Result<()> {
     let subgroup = recorder.context().limits.subgroup_size;
     if shape.loads == Loads::LaneByLane && (shape.workgroup != subgroup || subgroup > Loads::MAX_LANES) {
         return Err(Error::Argument(format!(
@@ -161,7 +171,12 @@ pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, query: Query, buffers:
             Loads::MAX_LANES
         )));
     }
-    let kernel = kernel(shape, query, work.is_some());
+    let &Buffers { structure, rays, hits, work, count } = buffers;
+    if count > MAX_RAYS {
+        return Err(Error::Argument(format!(
+            "{count} rays in one call, at most {MAX_RAYS}: trace them in several calls"
+        )));
+    }
     // Enough workgroups that all cores have some to the end.
     let rays_each = (count / (shape.workgroup * LEAST_WORKGROUPS)).clamp(1, shape.rays_each);
     let group_rays = shape.workgroup * rays_each;
@@ -170,7 +185,7 @@ pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, query: Query, buffers:
     while first < count {
         let arguments =
             Arguments { structure, rays, hits, works: work.unwrap_or(0), first, count, rays_each, padding: 0 };
-        recorder.dispatch(&kernel, &arguments, (count - first).min(at_once).div_ceil(group_rays))?;
+        recorder.dispatch(kernel, &arguments, (count - first).min(at_once).div_ceil(group_rays))?;
         first += at_once.min(count - first);
     }
     Ok(())

@@ -1,0 +1,38 @@
+// Where a ray enters the boxes of a quantised node. The proof of src/trace/slab.rs is for any box around the triangle: those that
+// come out of the bytes are (src/bvh/wide/quantised.rs), and the test of each is that of trace/slab.glsl, bit for bit.
+#ifndef HEDGEROW_TRACE_QUANTISED_BOXES
+#define HEDGEROW_TRACE_QUANTISED_BOXES
+#include "bvh/wide.glsl"
+#include "trace/slab.glsl"
+#extension GL_EXT_control_flow_attributes : require
+
+vec3 corner_of(vec3 origin, vec3 cell, uvec2 x, uvec2 y, uvec2 z, uint slot) {
+    uint shift = (slot & 3u) * 8;
+    uvec3 word = slot < 4 ? uvec3(x.x, y.x, z.x) : uvec3(x.y, y.y, z.y);
+    // As signed numbers: CPUs turn those into floats by one instruction.
+    precise vec3 corner = origin + vec3(ivec3(word >> shift & 0xFFu)) * cell;
+    return corner;
+}
+
+// For each slot where the ray enters its box, infinity if it does not between t_min and t_best. A slot without a child has a box
+// inside out, which is not entered but where it is flat.
+void enter_quantised(HedgerowPreparedRay ray, QuantisedNode node, float t_best, out float enters[8]) {
+    uint e = node.exponents_and_nodes;
+    vec3 origin = uintBitsToFloat(node.origin);
+    vec3 cell = uintBitsToFloat((uvec3(e, e >> 8, e >> 16) & 0xFFu) << 23);
+    // Which corners are met first is the same for all children: hedgerow_enter sorts each pair of distances.
+    bvec3 down = lessThan(ray.inverse, vec3(0.0));
+    uvec2 near_x = down.x ? node.hi[0] : node.lo[0], far_x = down.x ? node.lo[0] : node.hi[0];
+    uvec2 near_y = down.y ? node.hi[1] : node.lo[1], far_y = down.y ? node.lo[1] : node.hi[1];
+    uvec2 near_z = down.z ? node.hi[2] : node.lo[2], far_z = down.z ? node.lo[2] : node.hi[2];
+    vec3 origin_near = mix(ray.origin_lo, ray.origin_hi, down);
+    vec3 origin_far = mix(ray.origin_hi, ray.origin_lo, down);
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+        vec3 near = (corner_of(origin, cell, near_x, near_y, near_z, slot) - origin_near) * ray.inverse;
+        vec3 far = (corner_of(origin, cell, far_x, far_y, far_z, slot) - origin_far) * ray.inverse;
+        float enter = max(max(near.x, near.y), max(near.z, ray.t_min));
+        float leave = min(min(far.x, far.y), min(far.z, t_best));
+        enters[slot] = enter <= leave ? enter : HEDGEROW_INFINITY;
+    }
+}
+#endif

@@ -1,0 +1,165 @@
+// One ray on its way through a tree of quantised nodes, step by step: the twin of src/trace/wide_host.rs, visit for visit.
+//
+// As Ylitie, Karras and Laine (2017, section 4) do: the children of a node that are nodes and that the ray enters are a group,
+// met from near to far by counting slots in the order of the ray's octant; what is left of a group waits as one entry. The
+// leaves that the ray enters come first. Other than there, an entry tells where the ray enters the nearest of the nodes that
+// wait, in the leading half of a float; a group that is farther than the best hit by then is left out.
+#ifndef HEDGEROW_TRACE_WALK_QUANTISED
+#define HEDGEROW_TRACE_WALK_QUANTISED
+#include "trace/buffers.glsl"
+#include "trace/nearest.glsl"
+#include "trace/quantised_boxes.glsl"
+#include "trace/stack.glsl"
+
+struct QuantisedWalk {
+    HedgerowPreparedRay ray;
+    // Bits of the axes in which the ray goes down.
+    uint octant;
+    // The group at hand: its first node, which slots are nodes, and which places, in the order of the octant, are to be visited.
+    uint first_child;
+    uint nodes;
+    uint visits;
+    // Where the ray enters the nearest of the group but the first: the leading half of a float, not above it.
+    uint enter;
+    // The leaves at hand, likewise.
+    uint first_record;
+    uvec2 counts;
+    uint leaves;
+    // The next triangle, and how many are left of its leaf.
+    uint record;
+    uint left;
+    // How many groups wait.
+    uint level;
+    float best;
+    HedgerowHit hit;
+    // Nodes visited, triangles tested.
+    uvec2 work;
+};
+
+// A mask of slots as one of places, or back: the bit of slot s goes to place s ^ octant.
+uint in_octant(uint mask, uint octant) {
+    if ((octant & 1u) != 0u) mask = mask >> 1 & 0x55u | mask << 1 & 0xAAu;
+    if ((octant & 2u) != 0u) mask = mask >> 2 & 0x33u | mask << 2 & 0xCCu;
+    if ((octant & 4u) != 0u) mask = mask >> 4 & 0x0Fu | mask << 4 & 0xF0u;
+    return mask;
+}
+
+// At the root; a ray that cannot hit anything has nothing at hand and nothing that waits.
+void begin(HedgerowRay ray, Child root, bool usable, out QuantisedWalk walk) {
+    bool goes = hedgerow_prepare(ray, root.lo, root.hi, walk.ray) && usable;
+    uvec3 down = floatBitsToUint(walk.ray.inverse) >> 31;
+    walk.octant = down.x | down.y << 1 | down.z << 2;
+    // The root is the only node of a group.
+    walk.first_child = 0;
+    walk.nodes = 1;
+    walk.visits = goes ? in_octant(1, walk.octant) : 0;
+    walk.enter = 0;
+    walk.first_record = 0;
+    walk.counts = uvec2(0);
+    walk.leaves = 0;
+    walk.record = 0;
+    walk.left = 0;
+    walk.level = 0;
+    walk.best = walk.ray.t_max;
+    walk.hit = HedgerowHit(HEDGEROW_INFINITY, HEDGEROW_NONE, 0.0, 0.0);
+    walk.work = uvec2(0);
+}
+
+bool at_node(QuantisedWalk walk) {
+    return walk.left == 0u && walk.leaves == 0u && walk.visits != 0u;
+}
+
+bool at_triangle(QuantisedWalk walk) {
+    return walk.left != 0u;
+}
+
+// The next node of the group; what is left of it waits.
+uint next_node(inout QuantisedWalk walk) {
+    uint slot = uint(findLSB(walk.visits)) ^ walk.octant;
+    walk.visits &= walk.visits - 1u;
+    if (walk.visits != 0u) {
+        hedgerow_put_entry(walk.level, uvec2(walk.first_child, walk.enter | walk.nodes << 8 | walk.visits));
+        walk.level++;
+    }
+    return walk.first_child + uint(bitCount(walk.nodes & (1u << slot) - 1u));
+}
+
+// The leading half of a float that is not above `enter`.
+uint leading_half(float enter) {
+    return enter >= 0.0 ? floatBitsToUint(enter) & 0xFFFF0000u : 0xFF800000u;
+}
+
+void visit(QuantisedNode node, inout QuantisedWalk walk) {
+    walk.work.x++;
+    walk.visits = 0;
+    if (node.exponents_and_nodes == LONG_LEAF) {
+        walk.record = node.first_record;
+        walk.left = node.first_child;
+        return;
+    }
+    float enters[8];
+    enter_quantised(walk.ray, node, walk.best, enters);
+    uint entered = 0;
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+        if (enters[slot] < HEDGEROW_INFINITY) entered |= 1u << slot;
+    }
+    walk.first_child = node.first_child;
+    walk.nodes = node.exponents_and_nodes >> 24;
+    walk.visits = in_octant(entered & walk.nodes, walk.octant);
+    uint others = in_octant(walk.visits & walk.visits - 1u, walk.octant);
+    float nearest = HEDGEROW_INFINITY;
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+        if ((others >> slot & 1u) != 0u) nearest = min(nearest, enters[slot]);
+    }
+    walk.enter = leading_half(nearest);
+    walk.first_record = node.first_record;
+    walk.counts = node.counts;
+    // A slot without a child may be among them: a leaf of nothing.
+    walk.leaves = in_octant(entered & ~walk.nodes, walk.octant);
+}
+
+// The sum of the bytes of both words that are below that of a slot.
+uint sum_below(uvec2 bytes, uint slot) {
+    uint shift = (slot & 3u) * 8;
+    uint below = (1u << shift) - 1u;
+    uvec2 words = slot < 4 ? uvec2(bytes.x & below, 0u) : uvec2(bytes.x, bytes.y & below);
+    uvec2 halves = (words & 0x00FF00FFu) + (words >> 8 & 0x00FF00FFu);
+    uint sum = halves.x + halves.y;
+    return (sum & 0xFFFFu) + (sum >> 16);
+}
+
+// The next leaf, if the last one is done.
+void next_leaf(inout QuantisedWalk walk) {
+    if (walk.left != 0u || walk.leaves == 0u) return;
+    uint slot = uint(findLSB(walk.leaves)) ^ walk.octant;
+    walk.leaves &= walk.leaves - 1u;
+    walk.record = walk.first_record + sum_below(walk.counts, slot);
+    walk.left = (slot < 4 ? walk.counts.x : walk.counts.y) >> ((slot & 3u) * 8) & 0xFFu;
+}
+
+void test(Triangle triangle, bool any_hit, inout QuantisedWalk walk) {
+    walk.work.y++;
+    walk.record++;
+    walk.left--;
+    if (hit_nearer(walk.ray, triangle, any_hit, walk.best, walk.hit) && any_hit) {
+        walk.left = 0;
+        walk.leaves = 0;
+        walk.visits = 0;
+        walk.level = 0;
+    }
+}
+
+// Takes a group that waits, if there is nothing at hand; whether there was any. Equally far is not too far: an equally near hit
+// with a lower index may be there.
+bool go_on(inout QuantisedWalk walk) {
+    if (walk.left != 0u || walk.leaves != 0u || walk.visits != 0u) return true;
+    if (walk.level == 0u) return false;
+    walk.level--;
+    uvec2 entry = hedgerow_entry(walk.level);
+    walk.first_child = entry.x;
+    walk.enter = entry.y & 0xFFFF0000u;
+    walk.nodes = entry.y >> 8 & 0xFFu;
+    walk.visits = uintBitsToFloat(walk.enter) <= walk.best ? entry.y & 0xFFu : 0;
+    return true;
+}
+#endif

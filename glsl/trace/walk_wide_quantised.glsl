@@ -1,0 +1,30 @@
+// A step of trace/walk.glsl at a quantised node, its children met by distance as in trace/walk_wide.glsl: the twin of
+// src/trace/wide_host.rs, visit for visit.
+#ifndef HEDGEROW_TRACE_WALK_WIDE_QUANTISED
+#define HEDGEROW_TRACE_WALK_WIDE_QUANTISED
+#include "trace/quantised_boxes.glsl"
+#include "trace/walk_wide.glsl"
+
+void visit_wide(QuantisedNode node, inout Walk walk) {
+    if (node.exponents_and_nodes == LONG_LEAF) {
+        walk.work.x++;
+        walk.index = node.first_record;
+        walk.left = node.first_child;
+        return;
+    }
+    float enters[8];
+    enter_quantised(walk.ray, node, walk.best, enters);
+    uint nodes = node.exponents_and_nodes >> 24;
+    uint next_node = node.first_child, next_record = node.first_record;
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+        bool is_node = (nodes >> slot & 1u) != 0u;
+        uint count = (slot < 4 ? node.counts.x : node.counts.y) >> ((slot & 3u) * 8) & 0xFFu;
+        wide_enter[slot] = is_node || count != 0u ? enters[slot] : HEDGEROW_INFINITY;
+        wide_index[slot] = is_node ? next_node : next_record;
+        wide_count[slot] = count;
+        next_node += is_node ? 1u : 0u;
+        next_record += count;
+    }
+    go_to_nearest(walk);
+}
+#endif

@@ -1,0 +1,190 @@
+//! Collapsing a `Bvh2` into a wide tree on the device (glsl/bvh/wide_collapse.glsl); [`super::host`] is the twin.
+
+use super::Form;
+use crate::Result;
+use crate::bvh::builder::Sizes;
+use crate::bvh::geometry::Primitives;
+use crate::bvh::layout::node_slots;
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::{Context, Grid, Kernel, Limits, Recorder, fill, scan, shaders};
+
+/// What is collapsed into what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// The nodes of the wide tree.
+    pub form: Form,
+    /// What the leaves hold.
+    pub primitives: Primitives,
+    /// How many geometries.
+    pub geometry_count: u32,
+}
+
+/// Collapsing of a `Bvh2` of at most so many primitives, by whatever builder.
+#[derive(Debug, Clone, Copy)]
+pub struct OnDevice {
+    options: Options,
+    count: u32,
+    grid: Grid,
+    few: u32,
+    scan: scan::Scan,
+}
+
+/// Levels from the root on that one workgroup opens: not more than a few hundred nodes. And how many are opened by many
+/// workgroups, a dispatch each; whatever is below is done by one workgroup again. Trees of scenes have ended by then.
+const FIRST_LEVELS: u32 = 3;
+const LEVELS: u32 = 16;
+
+/// Words of `Levels` in wide_collapse.glsl.
+const LEVEL_WORDS: u64 = 64;
+
+push_constants! {
+    struct Arguments {
+        source: u64,
+        target: u64,
+        levels: u64,
+        opened: u64,
+        slots: u64,
+        first_children: u64,
+        first_records: u64,
+        order: u64,
+        source_slots: u32,
+        capacity: u32,
+        level: u32,
+        level_end: u32,
+    }
+}
+
+/// Where the parts of the scratch memory begin, in bytes.
+struct Scratch {
+    levels: u64,
+    opened: u64,
+    slots: u64,
+    first_children: u64,
+    first_records: u64,
+    order: u64,
+    sums: u64,
+    bytes: u64,
+}
+
+impl OnDevice {
+    /// For a source built of `primitive_count` primitives, or of fewer.
+    pub fn new(limits: &Limits, options: &Options, primitive_count: u32) -> OnDevice {
+        let few = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
+        let scan = scan::Scan::new(limits, node_slots(primitive_count) + 1);
+        OnDevice { options: *options, count: primitive_count, grid: Grid::of(limits), few, scan }
+    }
+
+    /// Bytes of the wide structure, at most (its header tells how many are in use: [`Form::bytes_in_use`]), and of the scratch
+    /// memory.
+    pub fn sizes(&self) -> Sizes {
+        let Options { form, primitives, geometry_count } = self.options;
+        let nodes = form.nodes_at_most(self.count);
+        let structure = form.bytes(primitives.record_bytes(), nodes, self.count, geometry_count);
+        Sizes { structure, scratch: self.scratch().bytes, alignment: 16 }
+    }
+
+    fn scratch(&self) -> Scratch {
+        let mut at = 0;
+        let mut take = |words: u64| {
+            let begin = at;
+            at += (4 * words).next_multiple_of(16);
+            begin
+        };
+        let form = self.options.form;
+        let (nodes, width) = (u64::from(form.nodes_at_most(self.count)), u64::from(form.width()));
+        let slots = u64::from(node_slots(self.count)) + 1;
+        let of_quantised = |words: u64| if form.is_quantised() { words } else { 0 };
+        Scratch {
+            levels: take(LEVEL_WORDS),
+            opened: take(2 * nodes),
+            slots: take(width * nodes),
+            first_children: take(slots),
+            first_records: take(of_quantised(slots)),
+            order: take(of_quantised(self.count.into())),
+            sums: take(self.scan.sums_words().into()),
+            bytes: at,
+        }
+    }
+
+    fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
+        let workgroup = if one_workgroup(shader) { self.few } else { self.grid.workgroup };
+        let Options { form, .. } = self.options;
+        Kernel::new(shader, workgroup, &[self.grid.rounds, form.width(), u32::from(form.is_quantised())])
+    }
+
+    /// The kernels of its own that [`OnDevice::record`] dispatches, to make their pipelines ahead with [`Context::warm`].
+    pub fn kernels(&self) -> Vec<Kernel> {
+        let all = [
+            &shaders::BVH_WIDE_RESET,
+            &shaders::BVH_WIDE_OPEN_FEW,
+            &shaders::BVH_WIDE_OPEN,
+            &shaders::BVH_WIDE_NODES,
+            &shaders::BVH_WIDE_RECORDS,
+        ];
+        all.map(|shader| self.kernel(shader)).to_vec()
+    }
+
+    /// Records the collapsing of the `Bvh2` at address `source` into the wide tree at `target`, with scratch memory at
+    /// `scratch`, of the bytes and alignment that [`OnDevice::sizes`] tells. The phase is `wide`.
+    ///
+    /// The source is left as it is; the target stands alone. The caller places a barrier (shader write to shader read and
+    /// write) before and behind.
+    ///
+    /// # Errors
+    /// A pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, source: u64, target: u64, scratch: u64) -> Result<()> {
+        let form = self.options.form;
+        let parts = self.scratch();
+        let arguments = Arguments {
+            source,
+            target,
+            levels: scratch + parts.levels,
+            opened: scratch + parts.opened,
+            slots: scratch + parts.slots,
+            first_children: scratch + parts.first_children,
+            first_records: scratch + parts.first_records,
+            order: scratch + parts.order,
+            source_slots: node_slots(self.count),
+            capacity: form.nodes_at_most(self.count),
+            level: 0,
+            level_end: 0,
+        };
+        recorder.phase("wide");
+        // The sums of children and of records lie side by side.
+        let sums_words = (parts.order - parts.first_children) / 4;
+        fill::record(recorder, arguments.first_children, sums_words as u32, 0)?;
+        recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RESET), &arguments, 1)?;
+        let few = |level, level_end| (&shaders::BVH_WIDE_OPEN_FEW, Arguments { level, level_end, ..arguments }, 1);
+        let many = |level| (&shaders::BVH_WIDE_OPEN, Arguments { level, ..arguments }, self.grid.groups);
+        let levels = (FIRST_LEVELS..LEVELS).map(many);
+        for (shader, arguments, groups) in
+            [few(0, FIRST_LEVELS)].into_iter().chain(levels).chain([few(LEVELS, form.levels())])
+        {
+            recorder.barrier();
+            recorder.dispatch(&self.kernel(shader), &arguments, groups)?;
+        }
+        let sums = scratch + parts.sums;
+        let scanned = [arguments.first_children, arguments.first_records];
+        for words in scanned.into_iter().take(if form.is_quantised() { 2 } else { 1 }) {
+            recorder.barrier();
+            self.scan.record(recorder, &scan::Buffers { values: words, results: words, sums })?;
+        }
+        recorder.barrier();
+        recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_NODES), &arguments, self.grid.groups)?;
+        recorder.barrier();
+        recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RECORDS), &arguments, self.grid.groups)
+    }
+
+    /// Makes the pipelines of [`OnDevice::kernels`] now.
+    ///
+    /// # Errors
+    /// A pipeline could not be made.
+    pub fn warm(&self, context: &Context) -> Result<()> {
+        context.warm(&self.kernels())
+    }
+}
+
+/// Whether a step is dispatched as one workgroup.
+fn one_workgroup(shader: &'static shaders::Shader) -> bool {
+    [&shaders::BVH_WIDE_RESET, &shaders::BVH_WIDE_OPEN_FEW].iter().any(|few| few.name == shader.name)
+}
