@@ -32,8 +32,8 @@ struct QuantisedWalk {
     uint level;
     float best;
     HedgerowHit hit;
-    // Nodes visited, triangles tested.
-    uvec2 work;
+    // Nodes visited, triangles tested, leaves visited.
+    uvec3 work;
 };
 
 // A mask of slots as one of places, or back: the bit of slot s goes to place s ^ octant.
@@ -62,7 +62,7 @@ void begin(HedgerowRay ray, Child root, bool usable, out QuantisedWalk walk) {
     walk.level = 0;
     walk.best = walk.ray.t_max;
     walk.hit = HedgerowHit(HEDGEROW_INFINITY, HEDGEROW_NONE, 0.0, 0.0);
-    walk.work = uvec2(0);
+    walk.work = uvec3(0);
 }
 
 bool at_node(QuantisedWalk walk) {
@@ -95,6 +95,7 @@ void visit(QuantisedNode node, inout QuantisedWalk walk) {
     if (node.exponents_and_nodes == LONG_LEAF) {
         walk.record = node.first_record;
         walk.left = node.first_child;
+        walk.work.z++;
         return;
     }
     float enters[8];
@@ -135,6 +136,7 @@ void next_leaf(inout QuantisedWalk walk) {
     walk.leaves &= walk.leaves - 1u;
     walk.record = walk.first_record + sum_below(walk.counts, slot);
     walk.left = (slot < 4 ? walk.counts.x : walk.counts.y) >> ((slot & 3u) * 8) & 0xFFu;
+    if (walk.left != 0u) walk.work.z++;
 }
 
 void test(Triangle triangle, bool any_hit, inout QuantisedWalk walk) {

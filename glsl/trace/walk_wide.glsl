@@ -56,6 +56,7 @@ void go_to_nearest(inout Walk walk) {
     }
     walk.index = wide_index[0];
     walk.left = wide_enter[0] < HEDGEROW_INFINITY ? wide_count[0] : NOTHING;
+    count_leaf(walk);
 }
 
 void visit_wide(WideNode node, inout Walk walk) {

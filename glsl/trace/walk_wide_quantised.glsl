@@ -10,6 +10,7 @@ void visit_wide(QuantisedNode node, inout Walk walk) {
         walk.work.x++;
         walk.index = node.first_record;
         walk.left = node.first_child;
+        count_leaf(walk);
         return;
     }
     float enters[8];

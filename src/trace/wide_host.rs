@@ -58,6 +58,7 @@ const NETWORK_OF_8: &[[usize; 2]] = &[
 impl<N: WideNode> Walk<'_, N> {
     /// Tests the records of a leaf; whether the search is over.
     fn leaf(&mut self, ray: &PreparedRay, first: u32, count: u32) -> bool {
+        self.work.leaves += 1;
         for triangle in &self.tree.records[first as usize..(first + count) as usize] {
             self.work.tests += 1;
             self.nearest.consider(ray, triangle);

@@ -60,7 +60,8 @@ impl Extents {
     /// Halves the longest axis.
     pub fn halve(&mut self) -> usize {
         let axis = self.longest();
-        self.0[axis] -= 1 << 23;
+        // Where every axis is flat it goes round, as on the device: all coordinates are 0 there.
+        self.0[axis] = self.0[axis].wrapping_sub(1 << 23);
         axis
     }
 
