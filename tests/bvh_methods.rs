@@ -66,7 +66,7 @@ fn optimised_trees_are_those_of_the_host() {
     for (name, positions, triangles) in corpus::meshes() {
         for method in [Method::Lbvh, Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)] {
             let (codes, collapse) = (Code::Emc64Var.full(), Collapse::SAH);
-            let optimise = reinsertion::Options { rounds: 3, stride: 2 };
+            let optimise = reinsertion::Options { passes: 3, stride: 2 };
             let tree = on_host(&positions, &triangles, codes, method).reinserted(&optimise);
             let expected = tree.collapsed(&collapse);
             expected.validate().unwrap_or_else(|e| panic!("{name} {method:?}: {e}"));
