@@ -86,7 +86,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "lbvh",
         what: "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
-        options: &[CODES, COLLAPSE, SCHEDULE, WIDTH, ORDER],
+        options: &[CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &[
             "lbvh",
             "lbvh:codes=mc30",
@@ -103,7 +103,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "ploc",
         what: "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
-        options: &[CODES, COLLAPSE, SCHEDULE, RADIUS, WIDTH, ORDER],
+        options: &[RADIUS, CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &["ploc", "ploc:radius=25"],
         needs: Needs::Device,
         make: |spec, device, mesh| spec.on_device(device, mesh, &spec.ploc_options()?),
@@ -112,7 +112,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "hploc",
         what: "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
-        options: &[CODES, COLLAPSE, SCHEDULE, WINDOW, RADIUS, WIDTH, ORDER],
+        options: &[WINDOW, RADIUS, CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &["hploc"],
         needs: Needs::Device,
         make: |spec, device, mesh| spec.on_device(device, mesh, &spec.hploc_options()?),
@@ -331,7 +331,8 @@ impl Spec {
             Some("workgroup") => Some(Schedule::Workgroup),
             Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
         };
-        Ok(builder::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..builder::Options::DEFAULT })
+        let (codes, optimise, collapse) = (self.codes()?, self.reinsertion()?, self.collapse()?);
+        Ok(builder::Options { codes, optimise, collapse, schedule, ..builder::Options::DEFAULT })
     }
 
     /// Options `width`, of a wide tree, and `order`; no width where it is 2 or was not given.
