@@ -6,7 +6,7 @@ use common::{corpus, device};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::host::lbvh;
-use hedgerow::bvh::layout::{Bvh2, Child, Header, Node, Triangle, status};
+use hedgerow::bvh::layout::{Aabb, Bvh2, Child, Header, Node, Record, Triangle, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::wide::device::{OnDevice, Options};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
@@ -109,14 +109,15 @@ fn leaves_of_any_length_stay_leaves() {
 /// A tree of 96 levels whose nodes all have a leaf beside a node, or beside a small tree: as deep as trees may be.
 fn deep(beside: usize) -> Bvh2 {
     let mut tree = piles(&vec![1; 1 + 96 * beside]);
-    let record = |i: usize| Aabb1::of(&tree.records[i]);
     let mut nodes: Vec<Node> = Vec::new();
-    let leaf = |i: usize| Child { lo: record(i).0, index: i as u32, hi: record(i).1, count: 1 };
+    let leaf = |i: usize| {
+        let Aabb { lo, hi } = tree.records[i].bounds().expect("a triangle");
+        Child { lo, index: i as u32, hi, count: 1 }
+    };
     let join = |nodes: &mut Vec<Node>, a: Child, b: Child| {
-        let (b2, a2) = (b.bounds(), a.bounds().union(&b.bounds()));
-        let _ = b2;
         nodes.push(Node { children: [a, b] });
-        Child { lo: a2.lo, index: nodes.len() as u32 - 1, hi: a2.hi, count: 0 }
+        let Aabb { lo, hi } = a.bounds().union(&b.bounds());
+        Child { lo, index: nodes.len() as u32 - 1, hi, count: 0 }
     };
     let mut root = leaf(0);
     let levels = if beside == 1 { 96 } else { 95 };
@@ -144,15 +145,6 @@ fn deep(beside: usize) -> Bvh2 {
     }
     tree.validate().expect("a deep tree");
     tree
-}
-
-struct Aabb1;
-
-impl Aabb1 {
-    fn of(triangle: &Triangle) -> ([f32; 3], [f32; 3]) {
-        let b = hedgerow::bvh::layout::Aabb::around(&[triangle.v0, triangle.v1, triangle.v2]);
-        (b.lo, b.hi)
-    }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 // A step of trace/walk.glsl at a node of WIDTH children as floats: the twin of src/trace/wide_host.rs, visit for visit.
 //
 // The children that the ray enters are sorted by where it does; the nearest is at hand then, the others wait, the farthest
-// below. So many may wait at once that a shader defines HEDGEROW_LEVELS (src/trace/wide.rs, `Tracer::stack_levels`).
+// below. So many may wait at once that a shader defines HEDGEROW_LEVELS (src/trace/wide.rs, `Order::stack_levels`).
 #ifndef HEDGEROW_TRACE_WALK_WIDE
 #define HEDGEROW_TRACE_WALK_WIDE
 #include "trace/walk.glsl"
