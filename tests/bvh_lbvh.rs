@@ -4,7 +4,7 @@ mod common;
 
 use common::{corpus, device};
 use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
-use hedgerow::bvh::codes::{Code, CodeBounds, Codes};
+use hedgerow::bvh::codes::{Code, CodeBounds};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::quality::{self, Figures, Quality};

@@ -23,7 +23,7 @@ BUFFER Sample { Sampled primitive[]; };
 
 const bool HAS_SECTIONS = CODE_PREFIX == PREFIX_SECTIONS;
 shared uint sampled_count;
-shared uint sampled_ranks[HAS_SECTIONS ? 6 : 1];    // the low quantiles, the high ones
+shared uint sampled_below[HAS_SECTIONS ? 18 : 1];   // of three rounds in turn: keys below three low candidates, three high ones
 shared uint sampled_core[HAS_SECTIONS ? 6 : 1];     // low corner, high corner
 
 bool is_inside(uvec3 lo, uvec3 hi, Box fences) {
@@ -38,9 +38,9 @@ Box widened(Box eighth, vec3 by, Box limits) {
                mix(limits.hi, hi * 8.0, lessThan(hi, limits.hi * 0.125)));
 }
 
-Box fences_of(Box bounds) {
-    precise vec3 low = from_ordered(uvec3(sampled_ranks[0], sampled_ranks[1], sampled_ranks[2])) * 0.125;
-    precise vec3 high = from_ordered(uvec3(sampled_ranks[3], sampled_ranks[4], sampled_ranks[5])) * 0.125;
+Box fences_of(Box bounds, uvec3 low_quantile, uvec3 high_quantile) {
+    precise vec3 low = from_ordered(low_quantile) * 0.125;
+    precise vec3 high = from_ordered(high_quantile) * 0.125;
     precise vec3 widths = high - low;
     precise float least = 0.25 * max(max(widths.x, widths.y), max(widths.z, 0.0));
     precise vec3 by = 1.5 * max(widths, vec3(least));
@@ -54,10 +54,8 @@ void find_sections() {
     uint taken = min(primitive_count, SECTION_SAMPLE);
     if (gl_LocalInvocationIndex == 0) {
         sampled_count = 0;
-        for (uint i = 0; i < 6; ++i) {
-            sampled_ranks[i] = 0;
-            sampled_core[i] = i < 3 ? NONE : 0;
-        }
+        for (uint i = 0; i < 6; ++i) sampled_core[i] = i < 3 ? NONE : 0;
+        for (uint i = 0; i < 18; ++i) sampled_below[i] = 0;
     }
     next_phase();
     for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
@@ -75,27 +73,40 @@ void find_sections() {
     if (gl_LocalInvocationIndex == 0) state.plan.sections.head = 0;
     if (count == 0) return;
 
-    // Ranks by counting: 2^16 comparisons at most, and nothing to wait for.
+    // The keys of both ranks along each axis, bit by bit: the largest that no more keys than the rank are below.
     uint rank = count / SECTION_QUANTILE;
-    for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
-        uvec3 own = table.primitive[i].middle;
-        uvec3 before = uvec3(0);
-        for (uint j = 0; j < taken; ++j) {
-            uvec3 other = table.primitive[j].middle;
-            before += uvec3(lessThan(other, own)) + uvec3(equal(other, own)) * (j < i ? 1u : 0u);
+    uvec3 low = uvec3(0), high = uvec3(0);
+    for (uint round = 0; round < 32; ++round) {
+        uint at = round % 3 * 6, next = (round + 1) % 3 * 6;
+        uvec3 try_low = low | 0x80000000u >> round, try_high = high | 0x80000000u >> round;
+        uvec3 below_low = uvec3(0), below_high = uvec3(0);
+        for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
+            uvec3 key = table.primitive[i].middle;
+            below_low += uvec3(lessThan(key, try_low));
+            below_high += uvec3(lessThan(key, try_high));
         }
-        if (own.x != NONE) {
+        below_low = subgroupAdd(below_low);
+        below_high = subgroupAdd(below_high);
+        if (subgroupElect()) {
             for (uint axis = 0; axis < 3; ++axis) {
-                if (before[axis] == rank) sampled_ranks[axis] = own[axis];
-                if (before[axis] == count - 1 - rank) sampled_ranks[3 + axis] = own[axis];
+                atomicAdd(sampled_below[at + axis], below_low[axis]);
+                atomicAdd(sampled_below[at + 3 + axis], below_high[axis]);
             }
         }
+        // What was read in the round before the last is free.
+        if (gl_LocalInvocationIndex == 0) {
+            for (uint i = 0; i < 6; ++i) sampled_below[next + i] = 0;
+        }
+        barrier();
+        for (uint axis = 0; axis < 3; ++axis) {
+            if (sampled_below[at + axis] <= rank) low[axis] = try_low[axis];
+            if (sampled_below[at + 3 + axis] <= count - 1 - rank) high[axis] = try_high[axis];
+        }
     }
-    next_phase();
     Box bounds = bounds_of_boxes(state);
-    Box fences = fences_of(bounds);
+    Box fences = fences_of(bounds, low, high);
     if (is_inside(ordered(bounds.lo), ordered(bounds.hi), fences)) return;
-    uvec3 lo = uvec3(NONE), hi = uvec3(0);
+    uvec3 lo = uvec3(NONE), hi = uvec3(0);   // of the core
     for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
         Sampled sampled = table.primitive[i];
         if (sampled.middle.x != NONE && is_inside(sampled.lo, sampled.hi, fences)) {
@@ -114,10 +125,10 @@ void find_sections() {
     Box sampled = fences;
     if (lo.x <= hi.x) sampled = Box(from_ordered(lo), from_ordered(hi));
     // The sample misses the outermost: an eighth more to each side.
-    precise vec3 low = sampled.lo * 0.125;
-    precise vec3 high = sampled.hi * 0.125;
-    precise vec3 by = (high - low) * 0.125;
-    Box core = widened(Box(low, high), by, fences);
+    precise vec3 low_eighth = sampled.lo * 0.125;
+    precise vec3 high_eighth = sampled.hi * 0.125;
+    precise vec3 by = (high_eighth - low_eighth) * 0.125;
+    Box core = widened(Box(low_eighth, high_eighth), by, fences);
     CodeSections sections;
     sections.fences = fences;
     sections.core = core;
@@ -165,25 +176,30 @@ uvec2 beyond_core(CodeSections s, uint axis, float at, uvec2 within) {
 
 CodeParts section_parts(CodeKind kind, CodePlan plan, Box b) {
     CodeParts parts = plain_parts(kind, plan, b);
-    if (plan.sections.head == 0) return parts;
-    parts.section = section_of(plan.sections, b);
-    if (parts.section == SECTION_CORE) return parts;
-    vec3 at = centroid_of(b);
-    for (uint axis = 0; axis < 3; ++axis) {
-        parts.coordinates[axis] = beyond_core(plan.sections, axis, at[axis], parts.coordinates[axis]);
+    parts.section = SECTION_CORE;
+    // Most scenes have one section, and most primitives are of the core. Loops of at most one round, for a driver on a CPU leaves a
+    // loop that no lane is in, and goes through every branch.
+    for (uint round = plan.sections.head == 0 ? 1 : 0; round < 1; ++round) parts.section = section_of(plan.sections, b);
+    for (uint round = parts.section == SECTION_CORE ? 1 : 0; round < 1; ++round) {
+        vec3 at = centroid_of(b);
+        for (uint axis = 0; axis < 3; ++axis) {
+            parts.coordinates[axis] = beyond_core(plan.sections, axis, at[axis], parts.coordinates[axis]);
+        }
+        parts.size = 0xFFFFu;
     }
-    parts.size = 0xFFFFu;
     return parts;
 }
 
 // The bits of the section put into a code.
 uvec2 with_section(CodeKind kind, CodePlan plan, CodeParts parts, uvec2 code) {
-    if (plan.sections.head == 0) return code;
-    uint behind = kind.bits - plan.sections.head;
-    uvec2 head = shift_right(code, behind);
-    uvec2 rest = shift_right(bits_of(code, 64 - behind, behind), 2);
-    uvec2 huge = uvec2(parts.section == SECTION_HUGE ? 1 : 0, 0);
-    uvec2 beyond = uvec2(parts.section == SECTION_CORE ? 0 : 1, 0);
-    return shift_left(huge, kind.bits - 1) | shift_left(head, behind - 1) | shift_left(beyond, behind - 2) | rest;
+    for (uint round = plan.sections.head == 0 ? 1 : 0; round < 1; ++round) {
+        uint behind = kind.bits - plan.sections.head;
+        uvec2 head = shift_right(code, behind);
+        uvec2 rest = shift_right(bits_of(code, 64 - behind, behind), 2);
+        uvec2 huge = uvec2(parts.section == SECTION_HUGE ? 1 : 0, 0);
+        uvec2 beyond = uvec2(parts.section == SECTION_CORE ? 0 : 1, 0);
+        code = shift_left(huge, kind.bits - 1) | shift_left(head, behind - 1) | shift_left(beyond, behind - 2) | rest;
+    }
+    return code;
 }
 #endif

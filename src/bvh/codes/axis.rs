@@ -53,7 +53,7 @@ impl Axis {
         let distance = distance << self.shift;
         // The product's lowest word is left out: it cannot carry.
         let inverse = u128::from(self.inverse);
-        let more = (distance >> 32) * inverse + ((distance & 0xFFFF_FFFF) * inverse >> 32);
+        let more = (distance >> 32) * inverse + (((distance & 0xFFFF_FFFF) * inverse) >> 32);
         (distance + (more >> 31)).min(WIDE_MAX)
     }
 }

@@ -150,7 +150,7 @@ impl Grid {
             sah += u64::from(weight) * u64::from(self.half_area(child));
             factors += u64::from(self.stretch_factor(child));
         }
-        u64::from(stretch - 1) * sah + (factors * (u64::from(weight) * u64::from(self.half_area(parent))) >> 8)
+        u64::from(stretch - 1) * sah + ((factors * u64::from(weight) * u64::from(self.half_area(parent))) >> 8)
     }
 
     /// The boxes below the plane with the least score, of x before y before z and from the low side where scores are equal; `None` for

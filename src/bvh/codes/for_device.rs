@@ -41,7 +41,7 @@ impl Codes {
         self.code.order() as u32
             | (self.bounds as u32) << 2
             | depth << 4
-            | self.code.size_group() / 3 << 6
+            | (self.code.size_group() / 3) << 6
             | self.bits << 8
             | count_bits << 15
             | stretch.ilog2() << 19

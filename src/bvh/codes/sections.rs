@@ -108,13 +108,13 @@ impl Sections {
             return None;
         }
 
-        let mut core = [[u32::MAX; 3], [0; 3]];
-        for b in sample.iter().filter(|b| is_inside(b, &fences)) {
-            for axis in 0..3 {
-                core[0][axis] = core[0][axis].min(ordered(b.lo[axis]));
-                core[1][axis] = core[1][axis].max(ordered(b.hi[axis]));
-            }
-        }
+        let inside = sample.iter().filter(|b| is_inside(b, &fences));
+        let core = inside.fold([[u32::MAX; 3], [0; 3]], |[lo, hi], b| {
+            [
+                std::array::from_fn(|axis| lo[axis].min(ordered(b.lo[axis]))),
+                std::array::from_fn(|axis| hi[axis].max(ordered(b.hi[axis]))),
+            ]
+        });
         let sampled = if core[0][0] > core[1][0] { fences } else { from_ordered_box(core[0], core[1]) };
         let mut core = sampled;
         for axis in 0..3 {
