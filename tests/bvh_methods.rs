@@ -7,6 +7,7 @@ use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Window};
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::reinsertion;
 use hedgerow::bvh::sah::Collapse;
 
 fn on_host(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, method: Method) -> Bvh2 {
@@ -56,6 +57,24 @@ fn equals_the_host(methods: [Method; 3]) {
                     assert!(same, "{name} {codes} {method:?} {collapse:?} {schedule:?}: other bytes");
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn optimised_trees_are_those_of_the_host() {
+    for (name, positions, triangles) in corpus::meshes() {
+        for method in [Method::Lbvh, Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)] {
+            let (codes, collapse) = (Code::Emc64Var.full(), Collapse::SAH);
+            let optimise = reinsertion::Options { rounds: 3, stride: 2 };
+            let tree = on_host(&positions, &triangles, codes, method).reinserted(&optimise);
+            let expected = tree.collapsed(&collapse);
+            expected.validate().unwrap_or_else(|e| panic!("{name} {method:?}: {e}"));
+            let options =
+                Options { method, codes: Some(codes), optimise: Some(optimise), collapse, ..Options::DEFAULT };
+            let got = on_device(&positions, &triangles, &options);
+            assert_eq!(got.header, expected.header, "{name} {method:?}");
+            assert!(got.to_bytes() == expected.to_bytes(), "{name} {method:?}: other bytes");
         }
     }
 }

@@ -4,9 +4,10 @@
 //
 //   parents  reads nodes                      writes weights: parents; arrivals (zero)
 //   weigh    reads nodes, parents             writes weights: counts, left_counts; costs; the header's costs
-//   place    reads nodes, weights, the order  writes records, the nodes' children, slots that fall out, the root
+//   place    reads nodes, weights             writes the walk's order, the nodes' children, slots that fall out, the root
+//   records  reads the walk's order           writes records
 //
-// A builder that writes the weights itself needs the last alone.
+// A builder that writes the weights itself needs the last two alone.
 //
 // Where a record goes is the sum of the counts of all left siblings on the way up. That way is long, and few take it: the roots
 // of the largest subtrees of at most TREELET primitives (and what lies above them). One invocation then walks each of them.
@@ -113,18 +114,18 @@ bool is_large(Weights w, uint slot) {
     return (w.counts.word[slot] & ~IS_LEAF) > TREELET;
 }
 
+// The sorted positions in the order of the walk. The sort has left the memory free, and PLOC has done with it.
+Words walk_order() {
+    return Words(values[1u - (passes & 1u)]);
+}
+
 // Tells the parent, or the header, of what has become a leaf.
-void name_leaf(Structure structure, uint link, uint first, uint count) {
-    if (link == NO_PARENT) {
-        structure.header.root.index = first;
-        structure.header.root.count = count;
-    } else if ((link & 1u) == 0u) {
-        structure.nodes[link >> 1].left.index = first;
-        structure.nodes[link >> 1].left.count = count;
-    } else {
-        structure.nodes[link >> 1].right.index = first;
-        structure.nodes[link >> 1].right.count = count;
-    }
+void name_leaf(uint link, uint first, uint count) {
+    // In words: the root begins at 4, nodes at 32; a child has 8, its index is the fourth and its count the last.
+    uint child = link == NO_PARENT ? 4u : 32u + 8u * link;
+    Words words = Words(structure_address);
+    words.word[child + 3u] = first;
+    words.word[child + 7u] = count;
 }
 
 struct Place {
@@ -148,12 +149,10 @@ Place place_of(Weights w, uint reference) {
     return place;
 }
 
-// Walks a treelet, or what is no larger: writes its records, and makes leaves. Adds what falls out to `unused`; whether a leaf
+// Walks a treelet, or what is no larger: tells where its records go, and makes leaves. Adds what falls out to `unused`; whether a leaf
 // was made for the depth alone.
 bool place_treelet(Structure structure, Weights w, uint reference, Place place, inout uint unused) {
-    Words order = Words(values[passes & 1u]);
-    uvec2 records = records_at(structure_address, max(primitive_count, 2u) - 1u);
-    Geometry input_geometries = geometries();
+    Words order = walk_order();
     uint position = place.first;
     uint depth = place.depth;
     // Up to here everything is inside of a leaf.
@@ -164,9 +163,8 @@ bool place_treelet(Structure structure, Weights w, uint reference, Place place, 
         bool inside = position < leaf_end;
         if ((reference & IS_PRIMITIVE) != 0u) {
             uint sorted = reference & ~IS_PRIMITIVE;
-            Box b;
-            write_record(records, position, input_geometries, order.word[sorted], b);
-            if (!inside) name_leaf(structure, w.parents.word[parent_at(reference)], position, 1u);
+            order.word[position] = sorted;
+            if (!inside) name_leaf(w.parents.word[parent_at(reference)], position, 1u);
             position++;
             if (level == 0u) break;
             level--;
@@ -180,7 +178,7 @@ bool place_treelet(Structure structure, Weights w, uint reference, Place place, 
             if (!inside && (is_leaf || depth == MAX_DEPTH)) {
                 limited = limited || !is_leaf;
                 count &= ~IS_LEAF;
-                name_leaf(structure, w.parents.word[reference], position, count);
+                name_leaf(w.parents.word[reference], position, count);
                 leaf_end = position + count;
                 inside = true;
             }
@@ -203,7 +201,7 @@ bool place_large(Structure structure, Weights w, uint slot, Place place, inout u
     uint count = w.counts.word[slot];
     bool is_leaf = (count & IS_LEAF) != 0u;
     bool limited = !place.inside && !is_leaf && place.depth == MAX_DEPTH;
-    if (!place.inside && (is_leaf || limited)) name_leaf(structure, w.parents.word[slot], place.first, count & ~IS_LEAF);
+    if (!place.inside && (is_leaf || limited)) name_leaf(w.parents.word[slot], place.first, count & ~IS_LEAF);
     if (place.inside || is_leaf || limited) {
         mark_unused(structure, slot);
         unused++;
@@ -224,17 +222,13 @@ void collapse_place(uint task) {
         if (i < nodes) {
             uint link = w.parents.word[i];
             if (is_large(w, i) || link == NO_PARENT || is_large(w, link >> 1)) found[atomicAdd(found_count, 1u)] = i;
-        } else if (i < max(primitive_count, 2u) - 1u) {
-            mark_unused(structure, i);
         }
         if (i < active_count) {
             uint link = w.parents.word[parent_at(i | IS_PRIMITIVE)];
             if (link == NO_PARENT || is_large(w, link >> 1)) found[atomicAdd(found_count, 1u)] = i | IS_PRIMITIVE;
         } else if (i < primitive_count) {
             // Those that are left out stay behind the others.
-            Box b;
-            uvec2 records = records_at(structure_address, max(primitive_count, 2u) - 1u);
-            write_record(records, i, geometries(), Words(values[passes & 1u]).word[i], b);
+            walk_order().word[i] = i;
         }
     }
     barrier();
@@ -256,5 +250,21 @@ void collapse_place(uint task) {
     }
     // The next task begins with the list empty.
     barrier();
+}
+
+// ---- records ----
+
+void collapse_records(uint task) {
+    Words walk = walk_order(), sorted = Words(values[passes & 1u]);
+    uvec2 records = records_at(structure_address, max(primitive_count, 2u) - 1u);
+    Geometry input_geometries = geometries();
+    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint position = first + k * gl_WorkGroupSize.x;
+        Box b;
+        if (position < primitive_count) {
+            write_record(records, position, input_geometries, sorted.word[walk.word[position]], b);
+        }
+    }
 }
 #endif

@@ -1,5 +1,5 @@
 #version 460
-// Leaves, and records in the order of a walk: see bvh/collapse.glsl for the contract.
+// Leaves, and the order of a walk: see bvh/collapse.glsl for the contract.
 #include "bvh/collapse.glsl"
 
 void main() {

@@ -6,6 +6,6 @@
 #include "bvh/encode.glsl"
 
 void main() {
-    // Hierarchy and collapse.
-    reset_build(2);
+    // Hierarchy, and two of the collapse.
+    reset_build(3);
 }

@@ -34,8 +34,10 @@ void ploc_from_pool(PoolState pool, uint phase, uint task) {
         ploc_merge(task, round_of(behind));
     } else if (step == STEP_FINISH) {
         ploc_finish(ROUNDS);
-    } else {
+    } else if (step == STEP_PLACE) {
         collapse_place(task);
+    } else {
+        collapse_records(task);
     }
 }
 

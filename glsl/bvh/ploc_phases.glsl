@@ -1,4 +1,4 @@
-// The phases of the PLOC build behind the sort, in the pool: begin, four a round, finish, collapse.
+// The phases of the PLOC build behind the sort, in the pool: begin, four a round, finish, two of the collapse.
 #ifndef HEDGEROW_BVH_PLOC_PHASES
 #define HEDGEROW_BVH_PLOC_PHASES
 #include "bvh/encode.glsl"
@@ -6,7 +6,7 @@
 // Rounds that are recorded: src/bvh/ploc.rs.
 layout(constant_id = 7) const uint ROUNDS = 0;
 const uint PHASES_OF_A_ROUND = 4;
-const uint PHASES_BEHIND_SORT = 1 + PHASES_OF_A_ROUND * ROUNDS + 2;
+const uint PHASES_BEHIND_SORT = 1 + PHASES_OF_A_ROUND * ROUNDS + 3;
 
 const uint STEP_SEARCH = 0;
 const uint STEP_COUNT = 1;
@@ -14,14 +14,15 @@ const uint STEP_SCAN = 2;
 const uint STEP_MERGE = 3;
 const uint STEP_BEGIN = 4;
 const uint STEP_FINISH = 5;
-const uint STEP_COLLAPSE = 6;
+const uint STEP_PLACE = 6;
+const uint STEP_RECORDS = 7;
 
 // `phase` counts from the sort on.
 uint step_of(uint phase) {
     if (phase == 0u) return STEP_BEGIN;
     uint of_rounds = phase - 1u;
     if (of_rounds < PHASES_OF_A_ROUND * ROUNDS) return of_rounds % PHASES_OF_A_ROUND;
-    return of_rounds == PHASES_OF_A_ROUND * ROUNDS ? STEP_FINISH : STEP_COLLAPSE;
+    return STEP_FINISH + of_rounds - PHASES_OF_A_ROUND * ROUNDS;
 }
 
 uint round_of(uint phase) {

@@ -23,14 +23,16 @@ pub(super) const fn weigh_bytes(count: u64) -> u64 {
     8 * count
 }
 
-/// The kernel of [`place_steps`].
-pub(super) fn place_kernel(encode: &Encode, input: &Input) -> Kernel {
-    encode.reading_kernel_with(&shaders::BVH_COLLAPSE_PLACE, input, &[0, 0, treelet(encode)])
+/// The kernels of [`place_steps`].
+pub(super) fn place_kernels(encode: &Encode, input: &Input) -> Vec<Kernel> {
+    let of = |shader| encode.reading_kernel_with(shader, input, &[0, 0, treelet(encode)]);
+    [&shaders::BVH_COLLAPSE_PLACE, &shaders::BVH_COLLAPSE_RECORDS].map(of).into()
 }
 
-/// The dispatch that finishes a tree whose weights are known. Label: `collapse`.
+/// The dispatches that finish a tree whose weights are known. Label: `collapse`.
 pub(super) fn place_steps(encode: &Encode, input: &Input, arguments: &Arguments) -> Vec<Step> {
-    vec![Step::new("collapse", place_kernel(encode, input), arguments, encode.tiles())]
+    let kernels = place_kernels(encode, input).into_iter();
+    kernels.map(|kernel| Step::new("collapse", kernel, arguments, encode.tiles())).collect()
 }
 
 const WEIGH: [&shaders::Shader; 2] = [&shaders::BVH_COLLAPSE_PARENTS, &shaders::BVH_COLLAPSE_WEIGH];
