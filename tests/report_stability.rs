@@ -181,13 +181,11 @@ fn records_are_read_back_as_they_were_written() {
 fn the_pages_say_where_a_tenth_is_lost_and_what_was_wrong() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let page = page_of(folder.path(), &growth());
-    for row in [
-        // Cost from 57 on, of which 58 is measured; expected at 48 + 9.
-        ">mip9</td><td class=\"number\" data-value=\"1\">1</td><td data-value=\"+\">+</td><td class=\"number\" \
-         data-value=\"58\">58</td><td class=\"number\" data-value=\"57\">57</td><td class=\"number\" data-value=\"1\">+1.0</td>",
-    ] {
-        assert!(page.replace("lbvh ", "").contains(row), "{row}: {page}");
-    }
+    // Cost from 57 on, of which 58 is measured; expected at 48 + 9.
+    let row = ">mip9</td><td class=\"number\" data-value=\"1\">1</td><td data-value=\"+\">+</td><td class=\"number\" \
+               data-value=\"58\">58</td><td class=\"number\" data-value=\"57\">57</td><td class=\"number\" \
+               data-value=\"1\">+1.0</td>";
+    assert!(page.replace("lbvh ", "").contains(row), "{page}");
     for words in ["bunny, lbvh : 3 GiB of &lt;memory&gt;", "a note &amp; more", "in three axes to the negative side"] {
         assert!(text(&page).contains(words), "{words}: {}", text(&page));
     }

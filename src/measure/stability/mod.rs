@@ -2,7 +2,7 @@
 //!
 //! [`growth`]: the bounds grow by a far triangle; [`large`]: huge triangles at the scene's edge; [`degenerate`]: scenes that
 //! hurt. The first two compare a builder with itself ([`relative`]) by the cost of what stays ([`clipped`]) and the speed of its
-//! rays; [`drop`] says where a tenth is lost. Each gives [`points`] as it goes.
+//! rays; [`mod@drop`] says where a tenth is lost. Each gives [`points`] as it goes.
 
 pub mod clipped;
 pub mod degenerate;

@@ -19,10 +19,10 @@ impl OverE for Large {
     fn e(&self) -> u32 {
         self.e
     }
-    fn cost(&self) -> Option<f64> {
+    fn relative_cost(&self) -> Option<f64> {
         self.relative_cost
     }
-    fn mrays(&self) -> &BTreeMap<String, f64> {
+    fn relative_mrays(&self) -> &BTreeMap<String, f64> {
         &self.relative_mrays
     }
 }

@@ -17,8 +17,8 @@ use std::collections::BTreeMap;
 pub(super) trait OverE {
     fn builder(&self) -> &str;
     fn e(&self) -> u32;
-    fn cost(&self) -> Option<f64>;
-    fn mrays(&self) -> &BTreeMap<String, f64>;
+    fn relative_cost(&self) -> Option<f64>;
+    fn relative_mrays(&self) -> &BTreeMap<String, f64>;
 }
 
 /// Where a tenth is lost.
@@ -43,13 +43,14 @@ impl Loss {
 
     /// Of the cost.
     pub fn of_cost<P: OverE>(points: &[&P]) -> Loss {
-        let costs: Vec<(u32, f64)> = points.iter().filter_map(|point| Some((point.e(), point.cost()?))).collect();
+        let costs: Vec<(u32, f64)> =
+            points.iter().filter_map(|point| Some((point.e(), point.relative_cost()?))).collect();
         Loss::of(&costs, |cost| cost >= drop::COST)
     }
 
     /// Of the speed of a kind of ray: the first of two points in a row, as one alone may be noise; that at e = 0 is nothing else.
     pub fn of_speed<P: OverE>(points: &[&P], kind: &str) -> Loss {
-        let measured = points.iter().filter_map(|point| Some((point.e(), *point.mrays().get(kind)?)));
+        let measured = points.iter().filter_map(|point| Some((point.e(), *point.relative_mrays().get(kind)?)));
         let speeds: Vec<(u32, f64)> = measured.filter(|(e, _)| *e > 0).collect();
         let next = |i: usize| speeds.get(i + 1).map_or(0.0, |(_, speed)| *speed);
         let pairs: Vec<(u32, f64)> =
@@ -90,7 +91,7 @@ pub(super) fn different<'p, P, T: PartialEq>(points: &'p [P], of: impl Fn(&'p P)
 
 /// The kinds of rays that any point has.
 pub(super) fn kinds<P: OverE>(points: &[P]) -> Vec<&'static str> {
-    let is_there = |kind: &&str| points.iter().any(|point| point.mrays().contains_key(*kind));
+    let is_there = |kind: &&str| points.iter().any(|point| point.relative_mrays().contains_key(*kind));
     RayKind::ALL.map(RayKind::name).into_iter().filter(is_there).collect()
 }
 
@@ -141,7 +142,7 @@ pub(super) fn cost_chart<P: OverE>(
     marks: &[Mark],
     titled: &Titled<'_>,
 ) -> Result<Option<Chart>> {
-    let all = curves_of(points, builders, P::cost);
+    let all = curves_of(points, builders, P::relative_cost);
     let expected = if marks.is_empty() { "" } else { " Dashed: where the thesis expects the tenth to be lost." };
     let caption = Caption {
         name: format!("{}-cost", titled.name),
@@ -170,8 +171,8 @@ pub(super) fn speed_chart<P: OverE>(
     titled: &Titled<'_>,
 ) -> Result<Option<Chart>> {
     let of = |point: &P| match kind {
-        Some(kind) => point.mrays().get(kind).copied(),
-        None => geometric_mean(point.mrays().values().copied()),
+        Some(kind) => point.relative_mrays().get(kind).copied(),
+        None => geometric_mean(point.relative_mrays().values().copied()),
     };
     let all = curves_of(points, builders, of);
     let rays = kind.map_or("all kinds of rays".to_owned(), |kind| format!("{kind} rays"));
@@ -202,10 +203,10 @@ mod tests {
         fn e(&self) -> u32 {
             self.0
         }
-        fn cost(&self) -> Option<f64> {
+        fn relative_cost(&self) -> Option<f64> {
             None
         }
-        fn mrays(&self) -> &BTreeMap<String, f64> {
+        fn relative_mrays(&self) -> &BTreeMap<String, f64> {
             &self.1
         }
     }
