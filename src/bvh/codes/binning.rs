@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn parts_are_disjoint_and_hold_all_cells() {
-        let cells: Vec<[u128; 3]> = (0..60).map(|i| [7919, 104_729, 31].map(|step| i * step % 64 << 90)).collect();
+        let cells: Vec<[u128; 3]> = (0..60).map(|i| [7919, 104_729, 31].map(|step| (i * step % 64) << 90)).collect();
         for depth in [2, 4, 6] {
             let binning = Binning::new(depth, 3, 8).expect("known");
             let splits = Splits::new(binning, Extents::new([1.0, 1.5, 1.2]), 64, cells.iter().copied());
