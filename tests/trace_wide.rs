@@ -48,7 +48,7 @@ fn traced<N: WideNode>(
     let structure = device.upload("structure", &tree.to_bytes()).expect("memory");
     let ray_buffer = device.upload("rays", rays).expect("memory");
     let hits = device.buffer("hits", size_of_val(rays) as u64 / 2).expect("memory");
-    let work = device.buffer("work", size_of_val(rays) as u64 / 4).expect("memory");
+    let work = device.buffer("work", (rays.len() * size_of::<Work>()) as u64).expect("memory");
     let unwritten = Hit { t: -1.0, primitive: 7, u: -1.0, v: -1.0 };
     hits.write(&vec![unwritten; rays.len()]);
     let buffers = Buffers {
