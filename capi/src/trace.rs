@@ -41,7 +41,7 @@ pub struct HedgerowHit {
     pub v: f32,
 }
 
-/// Work that tracing one ray took, 8 bytes.
+/// Work that tracing one ray took, 12 bytes.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct HedgerowWork {
@@ -49,6 +49,8 @@ pub struct HedgerowWork {
     pub steps: u32,
     /// Triangles tested.
     pub tests: u32,
+    /// Leaves visited.
+    pub leaves: u32,
 }
 
 /// The primitive of a ray that met nothing.
@@ -70,6 +72,7 @@ const _: () = {
     assert!(size_of::<HedgerowWork>() == size_of::<Work>());
     assert!(offset_of!(HedgerowWork, steps) == offset_of!(Work, steps));
     assert!(offset_of!(HedgerowWork, tests) == offset_of!(Work, tests));
+    assert!(offset_of!(HedgerowWork, leaves) == offset_of!(Work, leaves));
     assert!(HEDGEROW_NO_HIT == Hit::NONE.primitive && HEDGEROW_MAX_RAYS == MAX_RAYS);
 };
 

@@ -14,8 +14,8 @@ struct Weight {
 impl<R: Record> Bvh2<R> {
     /// A finished tree made of one whose leaves have any records in any order: subtrees become leaves where `collapse` says that
     /// they are cheaper, or where they are as deep as tracers can walk ([`MAX_DEPTH`]; the status says so, the costs do not),
-    /// and records lie in the order of a walk, left child first. Node slots stay; those that fall out are marked. The bytes of
-    /// [`crate::bvh::collapse`].
+    /// and records lie in the order of a walk, left child first. Node slots stay; those that fall out are marked. The bytes
+    /// of the device's (`src/bvh/collapse.rs`).
     pub fn collapsed(&self, collapse: &Collapse) -> Bvh2<R> {
         let mut tree = Bvh2 { nodes: vec![Node::UNUSED; self.nodes.len()], ..self.clone() };
         tree.header.inner_nodes = 0;
