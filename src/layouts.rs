@@ -56,7 +56,9 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "accel" if is("serialize") => accel::push_constants::serialize(),
         "bvh" if is("compact") => bvh::compact::push_constants(),
         "bvh" if is("lbvh_workgroup") => bvh::lbvh_workgroup::push_constants(),
-        "bvh" if ["encode", "lbvh", "collapse", "hploc", "ploc"].into_iter().any(is) => bvh::encode::push_constants(),
+        "bvh" if ["encode", "lbvh", "collapse", "hlbvh", "hploc", "ploc"].into_iter().any(is) => {
+            bvh::encode::push_constants()
+        }
         "bvh" if is("quality") => bvh::quality::push_constants(),
         "bvh" if is("refit") => bvh::refit::push_constants(),
         "bvh" if is("reinsertion") => bvh::reinsertion::push_constants(),

@@ -6,6 +6,7 @@ mod collapse;
 pub mod compact;
 pub(crate) mod encode;
 pub mod geometry;
+mod hlbvh;
 pub mod host;
 mod hploc;
 pub mod layout;

@@ -3,6 +3,7 @@
 mod collapse;
 mod compact;
 pub mod geometry;
+pub mod hlbvh;
 pub mod hploc;
 pub mod lbvh;
 mod over;
