@@ -7,6 +7,7 @@ use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Treelets
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::reinsertion;
 use hedgerow::bvh::sah::Collapse;
 
 fn on_host(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, method: Method) -> Bvh2 {
@@ -70,6 +71,26 @@ fn hlbvh_gives_the_bytes_of_the_host() {
     let treelets =
         [Treelets::DEFAULT, Treelets { bits: None, primitives: 1 }, Treelets { bits: Some(5), primitives: 5000 }];
     equals_the_host(treelets.map(Method::Hlbvh));
+}
+
+#[test]
+fn optimised_trees_are_those_of_the_host() {
+    for (name, positions, triangles) in corpus::meshes() {
+        for method in
+            [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)]
+        {
+            let (codes, collapse) = (Code::Emc64Var.full(), Collapse::SAH);
+            let optimise = reinsertion::Options { rounds: 3, stride: 2 };
+            let tree = on_host(&positions, &triangles, codes, method).reinserted(&optimise);
+            let expected = tree.collapsed(&collapse);
+            expected.validate().unwrap_or_else(|e| panic!("{name} {method:?}: {e}"));
+            let options =
+                Options { method, codes: Some(codes), optimise: Some(optimise), collapse, ..Options::DEFAULT };
+            let got = on_device(&positions, &triangles, &options);
+            assert_eq!(got.header, expected.header, "{name} {method:?}");
+            assert!(got.to_bytes() == expected.to_bytes(), "{name} {method:?}: other bytes");
+        }
+    }
 }
 
 #[test]

@@ -222,8 +222,6 @@ void collapse_place(uint task) {
         if (i < nodes) {
             uint link = w.parents.word[i];
             if (is_large(w, i) || link == NO_PARENT || is_large(w, link >> 1)) found[atomicAdd(found_count, 1u)] = i;
-        } else if (i < max(primitive_count, 2u) - 1u) {
-            mark_unused(structure, i);
         }
         if (i < active_count) {
             uint link = w.parents.word[parent_at(i | IS_PRIMITIVE)];

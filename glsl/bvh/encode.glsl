@@ -5,7 +5,8 @@
 //   reset      writes state: empty bounds, the pool
 //   bounds     reads the primitives                    writes state: bounds, active_count, status
 //   plan       reads state: bounds                     writes state: plan; the structure's header and table of geometries
-//   encode     reads the primitives, plan              writes keys[0], ends (none); values[0] where nothing is sorted
+//   encode     reads the primitives, plan              writes keys[0], ends (none), the slots that no node will have;
+//                                                      values[0] where nothing is sorted
 //   (sort      reads keys[0]                           writes keys[result], values[result]: gpu/radix_sort.glsl)
 //
 // needs one barrier between each two, and before the first; subgroups of any size; workgroups of whole subgroups
@@ -234,6 +235,8 @@ void encode(uint task) {
                 codes.word[2 * primitive + 1] = code.y;
             }
             ends.word[primitive] = NONE;
+            // Slots from active_count - 1 on have no node.
+            if (primitive >= max(state.active_count, 1)) mark_unused(Structure(structure_address), primitive - 1);
             if (passes == 0) Words(values[0]).word[primitive] = primitive;
         }
     }

@@ -137,8 +137,6 @@ void lbvh_hierarchy(uint task) {
             Box b;
             write_record(records, position, input_geometries, order.word[position], b);
             climbs = position < active_count;
-            // Slots from active_count - 1 on have no node.
-            if (position >= max(active_count, 1)) mark_unused(structure, position - 1);
             s.first = position;
             s.last = position;
             s.child = Child(b.lo, position, b.hi, 1);

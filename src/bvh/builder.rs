@@ -4,8 +4,9 @@
 //! each [`Method`] has a file of its own, and a twin in [`super::host`] with the same bytes.
 
 use super::codes::{Code, Codes};
-use super::encode::Encode;
+use super::encode::{Arguments, Encode};
 pub use super::geometry::{Geometry, Input, Primitives, Source};
+use super::reinsertion::{self, Reinsertion};
 use super::sah::Collapse;
 use super::{collapse, hlbvh, hploc, layout, lbvh, lbvh_workgroup, ploc};
 use crate::gpu::radix_sort::{self, Shape};
@@ -19,6 +20,8 @@ pub struct Options {
     pub method: Method,
     /// The codes; `None` lets [`Codes::for_count`] choose them from the number of primitives.
     pub codes: Option<Codes>,
+    /// Rounds of reinsertion behind it, which take time and give a better tree.
+    pub optimise: Option<reinsertion::Options>,
     /// Whether subtrees become leaves where that is cheaper.
     pub collapse: Collapse,
     /// How the phases are recorded; `None` takes what measured faster on this kind of device and size.
@@ -36,6 +39,7 @@ impl Options {
     pub const DEFAULT: Options = Options {
         method: Method::Lbvh,
         codes: None,
+        optimise: None,
         collapse: Collapse::SAH,
         schedule: None,
         primitives: Primitives::Triangles,
@@ -130,12 +134,15 @@ impl Method {
             _ => Ok(()),
         }
     }
+}
 
+impl Options {
     /// Whether there are kernels for the schedule.
-    fn takes(self, schedule: Schedule) -> bool {
-        match self {
-            Method::Lbvh => true,
-            Method::Hlbvh(_) | Method::Ploc { .. } | Method::Hploc(_) => schedule != Schedule::Workgroup,
+    fn takes(&self, schedule: Schedule) -> bool {
+        match schedule {
+            Schedule::Chain => true,
+            Schedule::Persistent => self.optimise.is_none(),
+            Schedule::Workgroup => self.optimise.is_none() && self.method == Method::Lbvh,
         }
     }
 }
@@ -178,6 +185,7 @@ pub struct Sizes {
 pub struct Builder {
     method: Method,
     schedule: Schedule,
+    optimise: Option<Reinsertion>,
     workers: u32,
     pub(super) encode: Encode,
 }
@@ -223,10 +231,11 @@ impl Builder {
         }
         options.method.check()?;
         let limits = &context.limits;
-        let schedule = options.schedule.unwrap_or_else(|| Schedule::for_count(options.method, primitive_count));
-        if !options.method.takes(schedule) {
+        let schedule = options.schedule.unwrap_or_else(|| Schedule::for_count(options, primitive_count));
+        if !options.takes(schedule) {
+            let optimised = if options.optimise.is_some() { " and optimised" } else { "" };
             return Err(Error::Argument(format!(
-                "{:?} is not built by the schedule {schedule}; choose another, or none",
+                "{:?} is not built{optimised} by the schedule {schedule}; choose chain, or none",
                 options.method
             )));
         }
@@ -238,6 +247,7 @@ impl Builder {
             )));
         }
         let shape = Shape::of(limits);
+        let optimise = options.optimise.map(|options| Reinsertion::new(limits, &options, primitive_count));
         let encode = Encode {
             codes: options.codes.unwrap_or_else(|| Codes::for_count(primitive_count)),
             collapse: options.collapse,
@@ -248,18 +258,11 @@ impl Builder {
             geometry_count: options.geometry_count,
             build_flags: options.build_flags,
             alone,
-            method_bytes: match options.method {
-                Method::Lbvh => 0,
-                Method::Hlbvh(_) => {
-                    let count = primitive_count.into();
-                    collapse::weights_bytes(count) + hlbvh::scratch_bytes(count)
-                }
-                Method::Ploc { .. } | Method::Hploc(_) => clusters_bytes(primitive_count),
-            },
+            method_bytes: method_bytes(options.method, optimise.as_ref(), primitive_count.into()),
             shared_memory: limits.shared_memory,
         };
         let workers = if limits.is_cpu() { 64 } else { 1024 };
-        Ok(Builder { method: options.method, schedule, workers, encode })
+        Ok(Builder { method: options.method, schedule, optimise, workers, encode })
     }
 
     /// The method.
@@ -332,27 +335,52 @@ impl Builder {
     pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
         let Builder { method, schedule, encode, .. } = self;
         match (method, schedule) {
+            (_, Schedule::Chain) => self.chain_kernels(input),
             (Method::Lbvh, Schedule::Workgroup) => vec![encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, input)],
-            (Method::Lbvh, Schedule::Persistent) => lbvh::persistent_kernels(encode, input),
-            (Method::Lbvh, Schedule::Chain) => [encode.kernels(input), lbvh::kernels(encode, input)].concat(),
-            (Method::Hlbvh(treelets), Schedule::Persistent) => hlbvh::persistent_kernels(encode, treelets, input),
-            (Method::Hlbvh(treelets), _) => {
-                let hierarchy = hlbvh::kernels(encode, treelets, input);
-                [encode.kernels(input), hierarchy, collapse::place_kernels(encode, input)].concat()
-            }
-            (&Method::Ploc { radius }, Schedule::Persistent) => ploc::persistent_kernels(encode, radius, input),
-            (&Method::Ploc { radius }, _) => [encode.kernels(input), ploc::kernels(encode, radius, input)].concat(),
-            (Method::Hploc(window), Schedule::Persistent) => hploc::persistent_kernels(encode, window, input),
-            (Method::Hploc(window), _) => [encode.kernels(input), hploc::kernels(encode, window, input)].concat(),
+            (Method::Lbvh, _) => lbvh::persistent_kernels(encode, input),
+            (Method::Hlbvh(treelets), _) => hlbvh::persistent_kernels(encode, treelets, input),
+            (&Method::Ploc { radius }, _) => ploc::persistent_kernels(encode, radius, input),
+            (Method::Hploc(window), _) => hploc::persistent_kernels(encode, window, input),
         }
+    }
+
+    fn chain_kernels(&self, input: &Input) -> Vec<Kernel> {
+        let Builder { method, encode, optimise, .. } = self;
+        let hierarchy = match method {
+            Method::Lbvh => lbvh::kernels(encode, input),
+            Method::Hlbvh(treelets) => hlbvh::kernels(encode, treelets, input),
+            &Method::Ploc { radius } => ploc::kernels(encode, radius, input),
+            Method::Hploc(window) => hploc::kernels(encode, window, input),
+        };
+        let mut kernels = [encode.kernels(input), hierarchy].concat();
+        if let Some(reinsertion) = optimise {
+            kernels.extend(reinsertion.kernels());
+        }
+        if self.weighs() {
+            kernels.extend(collapse::weigh_kernels(encode));
+        }
+        if self.places() {
+            kernels.extend(collapse::place_kernels(encode, input));
+        }
+        kernels
+    }
+
+    /// Whether the weights of the tree must be found when it is there.
+    fn weighs(&self) -> bool {
+        self.optimise.is_some()
+    }
+
+    /// Whether leaves and records are made when the tree is there.
+    fn places(&self) -> bool {
+        self.weighs() || self.method != Method::Lbvh
     }
 
     /// Records the build of `input` into the structure at address `structure`, with scratch memory at address `scratch`,
     /// of the bytes and alignment that [`Builder::sizes`] tells.
     ///
     /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever
-    /// reads the structure, or writes the scratch memory) behind. Labels: `bounds`, `encode`, `sort`, `hierarchy`, or `build`
-    /// where the schedule is persistent.
+    /// reads the structure, or writes the scratch memory) behind. Labels: `bounds`, `encode`, `sort`, `hierarchy`, `optimise`
+    /// and `collapse` where there are such phases; or `build` where the schedule is persistent.
     ///
     /// # Errors
     /// The input has another number of primitives than the builder; a pipeline could not be made.
@@ -384,41 +412,57 @@ impl Builder {
     }
 
     fn chain_of(&self, job: &Job<'_>) -> Result<Vec<Step>> {
-        let Builder { method, schedule, encode, workers } = self;
-        let arguments = encode.arguments(&job.input, job.structure, job.scratch)?;
+        let Builder { method, schedule, encode, workers, .. } = self;
+        let (input, workers) = (&job.input, *workers);
+        let arguments = &encode.arguments(input, job.structure, job.scratch)?;
         Ok(match (method, schedule) {
-            (Method::Lbvh, Schedule::Persistent) => lbvh::persistent_steps(encode, &job.input, &arguments, *workers),
-            (Method::Lbvh, Schedule::Chain | Schedule::Workgroup) => {
-                [encode.steps(&job.input, &arguments), lbvh::steps(encode, &job.input, &arguments)].concat()
-            }
-            (Method::Hlbvh(treelets), Schedule::Persistent) => {
-                hlbvh::persistent_steps(encode, treelets, &job.input, &arguments, *workers)
-            }
-            (Method::Hlbvh(treelets), _) => {
-                let hierarchy = hlbvh::steps(encode, treelets, &job.input, &arguments);
-                let place = collapse::place_steps(encode, &job.input, &arguments);
-                [encode.steps(&job.input, &arguments), hierarchy, place].concat()
-            }
-            (&Method::Ploc { radius }, Schedule::Persistent) => {
-                ploc::persistent_steps(encode, radius, &job.input, &arguments, *workers)
-            }
-            (&Method::Ploc { radius }, _) => {
-                [encode.steps(&job.input, &arguments), ploc::steps(encode, radius, &job.input, &arguments)].concat()
-            }
-            (Method::Hploc(window), Schedule::Persistent) => {
-                hploc::persistent_steps(encode, window, &job.input, &arguments, *workers)
-            }
-            (Method::Hploc(window), _) => {
-                [encode.steps(&job.input, &arguments), hploc::steps(encode, window, &job.input, &arguments)].concat()
-            }
+            (_, Schedule::Chain) => self.chain(input, arguments),
+            (Method::Lbvh, _) => lbvh::persistent_steps(encode, input, arguments, workers),
+            (Method::Hlbvh(treelets), _) => hlbvh::persistent_steps(encode, treelets, input, arguments, workers),
+            (&Method::Ploc { radius }, _) => ploc::persistent_steps(encode, radius, input, arguments, workers),
+            (Method::Hploc(window), _) => hploc::persistent_steps(encode, window, input, arguments, workers),
         })
+    }
+
+    fn chain(&self, input: &Input, arguments: &Arguments) -> Vec<Step> {
+        let Builder { method, encode, optimise, .. } = self;
+        // What is weighed later has leaves of one primitive until then.
+        let single = if self.weighs() { arguments.without_collapse() } else { *arguments };
+        let hierarchy = match method {
+            Method::Lbvh => lbvh::steps(encode, input, &single),
+            Method::Hlbvh(treelets) => hlbvh::steps(encode, treelets, input, &single),
+            &Method::Ploc { radius } => ploc::steps(encode, radius, input, &single),
+            Method::Hploc(window) => hploc::steps(encode, window, input, &single),
+        };
+        let mut steps = [encode.steps(input, arguments), hierarchy].concat();
+        if let Some(reinsertion) = optimise {
+            steps.extend(reinsertion.steps(arguments.structure, encode.behind_weights(arguments)));
+        }
+        if self.weighs() {
+            steps.extend(collapse::weigh_steps(encode, arguments));
+        }
+        if self.places() {
+            steps.extend(collapse::place_steps(encode, input, arguments));
+        }
+        steps
     }
 }
 
-/// Bytes of scratch memory behind the state: weights, and a `Cluster` of clusters.glsl a primitive.
-fn clusters_bytes(count: u32) -> u64 {
+/// Bytes of scratch memory behind the state: the weights, and behind them what is needed one after the other.
+fn method_bytes(method: Method, optimise: Option<&Reinsertion>, count: u64) -> u64 {
+    /// Of a `Cluster` in clusters.glsl.
     const CLUSTER_BYTES: u64 = 40;
-    collapse::weights_bytes(count.into()) + CLUSTER_BYTES * u64::from(count)
+    let clusters = match method {
+        Method::Lbvh => 0,
+        Method::Hlbvh(_) => CLUSTER_BYTES * count + hlbvh::tasks_bytes(count),
+        Method::Ploc { .. } | Method::Hploc(_) => CLUSTER_BYTES * count,
+    };
+    let optimising = optimise.map_or(0, |reinsertion| reinsertion.scratch_bytes().max(collapse::weigh_bytes(count)));
+    if method == Method::Lbvh && optimise.is_none() {
+        0
+    } else {
+        collapse::weights_bytes(count) + clusters.max(optimising)
+    }
 }
 
 /// Primitives up to which one workgroup is faster than a chain of dispatches.
@@ -430,8 +474,8 @@ impl Schedule {
     /// What measured faster. Of few primitives, one workgroup. Of many, on lavapipe the chain, by a factor of 1.2 to 1.5 (the
     /// loop around the phases costs the persistent kernel its unmasked loads, and whoever waits takes a core from who works).
     /// No GPU has been measured: the chain also asks nothing of its progress.
-    pub fn for_count(method: Method, primitive_count: u32) -> Schedule {
-        if primitive_count <= SMALL && method.takes(Schedule::Workgroup) {
+    pub fn for_count(options: &Options, primitive_count: u32) -> Schedule {
+        if primitive_count <= SMALL && options.takes(Schedule::Workgroup) {
             Schedule::Workgroup
         } else {
             Schedule::Chain

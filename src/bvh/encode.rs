@@ -3,6 +3,7 @@
 //! `glsl/bvh/encode.glsl` is the device's side.
 
 use super::codes::Codes;
+use super::collapse;
 use super::geometry::{Geometry, Input, Planned, Primitives};
 use super::sah::Collapse;
 use crate::Result;
@@ -67,7 +68,22 @@ push_constants! {
     }
 }
 
+impl Arguments {
+    /// The same for a tree that is not collapsed.
+    pub fn without_collapse(&self) -> Arguments {
+        Arguments { code_kind: self.code_kind & !COLLAPSES, ..*self }
+    }
+}
+
+/// In `code_kind`: subtrees become leaves.
+const COLLAPSES: u32 = 1 << 25;
+
 impl Encode {
+    /// Address of the scratch memory behind the weights.
+    pub fn behind_weights(&self, arguments: &Arguments) -> u64 {
+        arguments.state + STATE_BYTES + collapse::weights_bytes(self.count.into())
+    }
+
     pub fn key_words(&self) -> u32 {
         if self.codes.bits > 32 { 2 } else { 1 }
     }
@@ -152,7 +168,7 @@ impl Encode {
             | self.codes.bits << 8
             | code.size_group() << 16
             | u32::from(self.codes.concise) << 24
-            | u32::from(self.collapse.enabled) << 25
+            | if self.collapse.enabled { COLLAPSES } else { 0 }
             | self.build_flags << 26
     }
 

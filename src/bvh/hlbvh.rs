@@ -20,9 +20,9 @@ fn groups(encode: &Encode) -> u32 {
     encode.tiles().min(if encode.shape.private_counters { 64 } else { 1024 })
 }
 
-/// Bytes of scratch memory behind the weights: a `Cluster` of clusters.glsl for each treelet, and what names each task of a level.
-pub(super) const fn scratch_bytes(count: u64) -> u64 {
-    (40 + 4) * count
+/// Bytes behind the clusters: what names each task of two levels. A task has two treelets at least.
+pub(super) const fn tasks_bytes(count: u64) -> u64 {
+    4 * count
 }
 
 fn kernel(encode: &Encode, treelets: &Treelets, shader: &'static shaders::Shader, input: &Input) -> Kernel {

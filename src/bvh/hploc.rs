@@ -13,18 +13,15 @@ fn kernel(encode: &Encode, window: &Window, shader: &'static shaders::Shader, in
     encode.reading_kernel_with(shader, input, &[window.size, window.radius, collapse::treelet(encode)])
 }
 
-/// The kernels of [`steps`].
+/// The kernel of [`steps`].
 pub(super) fn kernels(encode: &Encode, window: &Window, input: &Input) -> Vec<Kernel> {
-    [vec![kernel(encode, window, &shaders::BVH_HPLOC_HIERARCHY, input)], collapse::place_kernels(encode, input)]
-        .concat()
+    vec![kernel(encode, window, &shaders::BVH_HPLOC_HIERARCHY, input)]
 }
 
-/// The dispatches behind [`Encode::steps`]. Labels: `hierarchy`, `collapse`.
+/// The dispatch behind [`Encode::steps`]. Label: `hierarchy`.
 pub(super) fn steps(encode: &Encode, window: &Window, input: &Input, arguments: &Arguments) -> Vec<Step> {
-    let hierarchy = kernel(encode, window, &shaders::BVH_HPLOC_HIERARCHY, input);
-    let mut steps = vec![Step::new("hierarchy", hierarchy, arguments, encode.tiles())];
-    steps.extend(collapse::place_steps(encode, input, arguments));
-    steps
+    let kernel = kernel(encode, window, &shaders::BVH_HPLOC_HIERARCHY, input);
+    vec![Step::new("hierarchy", kernel, arguments, encode.tiles())]
 }
 
 /// The kernels of [`persistent_steps`].

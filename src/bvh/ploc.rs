@@ -70,14 +70,13 @@ impl Kernels<'_> {
 /// The kernels of [`steps`].
 pub(super) fn kernels(encode: &Encode, radius: u32, input: &Input) -> Vec<Kernel> {
     let chain = Kernels { encode, input, radius }.chain();
-    chain.into_iter().map(|(kernel, _)| kernel).chain(collapse::place_kernels(encode, input)).collect()
+    chain.into_iter().map(|(kernel, _)| kernel).collect()
 }
 
-/// The dispatches behind [`Encode::steps`]. Labels: `hierarchy`, `collapse`.
+/// The dispatches behind [`Encode::steps`]. Label: `hierarchy`.
 pub(super) fn steps(encode: &Encode, radius: u32, input: &Input, arguments: &Arguments) -> Vec<Step> {
     let chain = Kernels { encode, input, radius }.chain();
-    let steps = chain.into_iter().map(|(kernel, groups)| Step::new("hierarchy", kernel, arguments, groups));
-    steps.chain(collapse::place_steps(encode, input, arguments)).collect()
+    chain.into_iter().map(|(kernel, groups)| Step::new("hierarchy", kernel, arguments, groups)).collect()
 }
 
 /// The kernels of [`persistent_steps`].

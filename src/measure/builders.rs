@@ -84,7 +84,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "lbvh",
         what: "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
-        options: &[CODES, COLLAPSE, SCHEDULE],
+        options: &[CODES, OPTIMISE, COLLAPSE, SCHEDULE],
         variants: &[
             "lbvh",
             "lbvh:codes=mc30",
@@ -101,7 +101,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "hlbvh",
         what: "hierarchical LBVH on the device: small subtrees of the LBVH under a top split by the surface area heuristic",
-        options: &[BITS, TREELET, CODES, COLLAPSE, SCHEDULE],
+        options: &[BITS, TREELET, CODES, OPTIMISE, COLLAPSE, SCHEDULE],
         variants: &["hlbvh"],
         needs: Needs::Device,
         make: |spec, device, mesh| {
@@ -112,7 +112,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "ploc",
         what: "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
-        options: &[CODES, COLLAPSE, SCHEDULE, RADIUS],
+        options: &[RADIUS, CODES, OPTIMISE, COLLAPSE, SCHEDULE],
         variants: &["ploc", "ploc:radius=25"],
         needs: Needs::Device,
         make: |spec, device, mesh| {
@@ -123,7 +123,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "hploc",
         what: "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
-        options: &[CODES, COLLAPSE, SCHEDULE, WINDOW, RADIUS],
+        options: &[WINDOW, RADIUS, CODES, OPTIMISE, COLLAPSE, SCHEDULE],
         variants: &["hploc"],
         needs: Needs::Device,
         make: |spec, device, mesh| {
@@ -352,7 +352,8 @@ impl Spec {
             Some("workgroup") => Some(Schedule::Workgroup),
             Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
         };
-        Ok(builder::Options { codes: self.codes()?, collapse: self.collapse()?, schedule, ..builder::Options::DEFAULT })
+        let (codes, optimise, collapse) = (self.codes()?, self.reinsertion()?, self.collapse()?);
+        Ok(builder::Options { codes, optimise, collapse, schedule, ..builder::Options::DEFAULT })
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {
