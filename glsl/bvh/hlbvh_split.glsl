@@ -1,63 +1,18 @@
 // The top of an HLBVH, from the root down: see bvh/hlbvh.glsl for the contract.
 //
-// A task is a range of the order that a workgroup splits in two. Of few clusters every centroid is a plane that is tried; of more,
-// the planes between BINS slabs of the box around the centroids. A plane costs, on either side, the area of the box around the
-// clusters times the primitives in them; the least wins, of equal ones the first. Each side keeps its order. Where no plane has
-// clusters on both sides, or levels were many, the range is split in the middle.
+// A task is a range of the order that a workgroup splits in two by the cheapest plane, of equal ones the first. Each side keeps its
+// order. Where no plane has clusters on both sides, or levels were many, the range is split in the middle.
 //
 // The node has the slot before the first position of the first treelet right of the split, in the order that the codes gave: as the
 // splits of all tasks lie at different places, slots differ, and none is inside of a treelet.
 #ifndef HEDGEROW_BVH_HLBVH_SPLIT
 #define HEDGEROW_BVH_HLBVH_SPLIT
-#include "bvh/hlbvh.glsl"
+#include "bvh/hlbvh_planes.glsl"
 
-// As src/bvh/host/hlbvh.rs has them.
-const uint BINS = 16;
-const uint SWEPT = 16;
-const uint SAH_LEVELS = 40;
-const float LEAST_EXTENT = 7.888609052210118e-31;   // 2^-100
-// Planes of all three axes have numbers; of bins, those between them, and one that is none.
-const uint NO_PLANE = 0xFFFFFFFFu;
-const uint INFINITE = 0x7F800000u;
+const uint SAH_LEVELS = 40;   // as src/bvh/host/hlbvh.rs has it
 // Tasks that one has put off: it goes on with the smaller half.
 const uint STACK = 32;
 
-struct Task {
-    uint begin;
-    uint end;
-    uint link;
-};
-
-// One side of a plane.
-struct Side {
-    vec3 lo;
-    vec3 hi;
-    uint primitives;
-    uint clusters;
-};
-
-// A plane with what is on either side.
-struct Plane {
-    uint cost;       // the bits of a float that is not negative
-    uint number;
-    uint axis;
-    float at;        // of a sweep: the greatest centroid on the left
-    uint bin;        // of bins: the last on the left
-    Side left;
-    Side right;
-};
-
-// Of a sweep.
-shared vec3 swept_lo[SWEPT];
-shared vec3 swept_hi[SWEPT];
-shared uint swept_primitives[SWEPT];
-// Of bins: `ordered` floats.
-shared uint bin_lo[3u * BINS * 3u];
-shared uint bin_hi[3u * BINS * 3u];
-shared uint bin_primitives[3u * BINS];
-shared uint bin_clusters[3u * BINS];
-shared uint centroids_lo[3];
-shared uint centroids_hi[3];
 // The best plane of all lanes.
 shared uint best_cost;
 shared uint best_number;
@@ -72,157 +27,6 @@ shared uint stack_begins[STACK];
 shared uint stack_ends[STACK];
 shared uint stack_links[STACK];
 shared uint stack_levels[STACK];
-
-Side empty_side() {
-    return Side(vec3(uintBitsToFloat(0x7F800000u)), vec3(uintBitsToFloat(0xFF800000u)), 0u, 0u);
-}
-
-Side with_box(Side s, vec3 lo, vec3 hi, uint primitives, uint clusters) {
-    return Side(min(s.lo, lo), max(s.hi, hi), s.primitives + primitives, s.clusters + clusters);
-}
-
-// Cost of a plane; NO_PLANE's where a side is empty.
-uint plane_cost(Side left, Side right, float area_scale) {
-    if (left.clusters == 0u || right.clusters == 0u) return INFINITE;
-    precise float cost = scaled_half_area(Box(left.lo, left.hi), area_scale) * float(left.primitives)
-                       + scaled_half_area(Box(right.lo, right.hi), area_scale) * float(right.primitives);
-    return floatBitsToUint(cost);
-}
-
-// ---- few clusters: all planes ----
-
-Plane sweep(Words order, Clusters clusters, Task t, float area_scale) {
-    uint count = t.end - t.begin;
-    for (uint i = gl_LocalInvocationIndex; i < count; i += gl_WorkGroupSize.x) {
-        uint c = order.word[t.begin + i];
-        swept_lo[i] = clusters.cluster[c].lo;
-        swept_hi[i] = clusters.cluster[c].hi;
-        swept_primitives[i] = clusters.cluster[c].count;
-    }
-    barrier();
-    Plane best;
-    best.cost = INFINITE;
-    best.number = NO_PLANE;
-    for (uint number = gl_LocalInvocationIndex; number < 3u * count; number += gl_WorkGroupSize.x) {
-        uint axis = number / count, own = number % count;
-        float at = centroid_of(Box(swept_lo[own], swept_hi[own]))[axis];
-        Side left = empty_side(), right = empty_side();
-        for (uint i = 0; i < count; ++i) {
-            vec3 lo = swept_lo[i], hi = swept_hi[i];
-            bool is_left = centroid_of(Box(lo, hi))[axis] <= at;
-            if (is_left) left = with_box(left, lo, hi, swept_primitives[i], 1u);
-            else right = with_box(right, lo, hi, swept_primitives[i], 1u);
-        }
-        uint cost = plane_cost(left, right, area_scale);
-        if (cost < best.cost) best = Plane(cost, number, axis, at, 0u, left, right);
-    }
-    return best;
-}
-
-// ---- many clusters: bins ----
-
-struct Slabs {
-    vec3 lo;        // of the centroids, scaled
-    vec3 factor;    // one over their extent; 0 of a flat one
-};
-
-Slabs slabs_of(float area_scale) {
-    precise vec3 lo = from_ordered(uvec3(centroids_lo[0], centroids_lo[1], centroids_lo[2])) * area_scale;
-    precise vec3 hi = from_ordered(uvec3(centroids_hi[0], centroids_hi[1], centroids_hi[2])) * area_scale;
-    precise vec3 extent = hi - lo;
-    vec3 factor;
-    for (uint axis = 0; axis < 3u; ++axis) factor[axis] = extent[axis] < LEAST_EXTENT ? 0.0 : reciprocal_or_zero(extent[axis]);
-    return Slabs(lo, factor);
-}
-
-uvec3 bins_of(Slabs slabs, vec3 point, float area_scale) {
-    precise vec3 at = (point * area_scale - slabs.lo) * slabs.factor * float(BINS);
-    return min(uvec3(at), uvec3(BINS - 1u));
-}
-
-void find_centroids(Words order, Clusters clusters, Task t) {
-    for (uint axis = gl_LocalInvocationIndex; axis < 3u; axis += gl_WorkGroupSize.x) {
-        centroids_lo[axis] = NONE;
-        centroids_hi[axis] = 0u;
-    }
-    barrier();
-    uvec3 lo = uvec3(NONE), hi = uvec3(0);
-    for (uint i = t.begin + gl_LocalInvocationIndex; i < t.end; i += gl_WorkGroupSize.x) {
-        uint c = order.word[i];
-        uvec3 point = ordered(centroid_of(Box(clusters.cluster[c].lo, clusters.cluster[c].hi)));
-        lo = min(lo, point);
-        hi = max(hi, point);
-    }
-    lo = subgroupMin(lo);
-    hi = subgroupMax(hi);
-    if (subgroupElect()) {
-        for (uint axis = 0; axis < 3u; ++axis) {
-            atomicMin(centroids_lo[axis], lo[axis]);
-            atomicMax(centroids_hi[axis], hi[axis]);
-        }
-    }
-    barrier();
-}
-
-void fill_bins(Words order, Clusters clusters, Task t, Slabs slabs, float area_scale) {
-    for (uint i = gl_LocalInvocationIndex; i < 3u * BINS; i += gl_WorkGroupSize.x) {
-        bin_primitives[i] = 0u;
-        bin_clusters[i] = 0u;
-        for (uint axis = 0; axis < 3u; ++axis) {
-            bin_lo[3u * i + axis] = NONE;
-            bin_hi[3u * i + axis] = 0u;
-        }
-    }
-    barrier();
-    for (uint i = t.begin + gl_LocalInvocationIndex; i < t.end; i += gl_WorkGroupSize.x) {
-        uint c = order.word[i];
-        Box b = Box(clusters.cluster[c].lo, clusters.cluster[c].hi);
-        uint primitives = clusters.cluster[c].count;
-        uvec3 bins = bins_of(slabs, centroid_of(b), area_scale);
-        uvec3 lo = ordered(b.lo), hi = ordered(b.hi);
-        // Integers: the order in which the atomics arrive changes nothing.
-        for (uint axis = 0; axis < 3u; ++axis) {
-            uint bin = axis * BINS + bins[axis];
-            atomicAdd(bin_primitives[bin], primitives);
-            atomicAdd(bin_clusters[bin], 1u);
-            for (uint side = 0; side < 3u; ++side) {
-                atomicMin(bin_lo[3u * bin + side], lo[side]);
-                atomicMax(bin_hi[3u * bin + side], hi[side]);
-            }
-        }
-    }
-    barrier();
-}
-
-Side with_bin(Side s, uint bin) {
-    if (bin_clusters[bin] == 0u) return s;
-    vec3 lo = from_ordered(uvec3(bin_lo[3u * bin], bin_lo[3u * bin + 1u], bin_lo[3u * bin + 2u]));
-    vec3 hi = from_ordered(uvec3(bin_hi[3u * bin], bin_hi[3u * bin + 1u], bin_hi[3u * bin + 2u]));
-    return with_box(s, lo, hi, bin_primitives[bin], bin_clusters[bin]);
-}
-
-Plane best_of_bins(float area_scale) {
-    Plane best;
-    best.cost = INFINITE;
-    best.number = NO_PLANE;
-    // On a CPU all lanes look at the same bin: one load instead of one a lane.
-    uint turns = PRIVATE_COUNTERS ? 3u : 1u, lanes = PRIVATE_COUNTERS ? BINS : 3u * BINS;
-    for (uint turn = 0; turn < turns; ++turn) {
-        for (uint lane = gl_LocalInvocationIndex; lane < lanes; lane += gl_WorkGroupSize.x) {
-            uint axis = PRIVATE_COUNTERS ? turn : lane / BINS, plane = lane % BINS;
-            Side left = empty_side(), right = empty_side();
-            for (uint bin = 0; bin < BINS; ++bin) {
-                if (bin <= plane) left = with_bin(left, axis * BINS + bin);
-                else right = with_bin(right, axis * BINS + bin);
-            }
-            uint cost = plane_cost(left, right, area_scale);
-            if (cost < best.cost) best = Plane(cost, axis * BINS + plane, axis, 0.0, plane, left, right);
-        }
-    }
-    return best;
-}
-
-// ---- a task ----
 
 // Of the best planes of all lanes the best: whether there is one. It is in `chosen_…` then.
 bool choose(Plane own, Task t) {
@@ -329,7 +133,8 @@ uint split(Task t, uint level, out uint middle) {
         } else {
             find_centroids(from, clusters, t);
             slabs = slabs_of(area_scale);
-            fill_bins(from, clusters, t, slabs, area_scale);
+            if (PRIVATE_COUNTERS) fill_own_bins(from, clusters, t, slabs, area_scale);
+            else fill_bins(from, clusters, t, slabs, area_scale);
             own = best_of_bins(area_scale);
         }
         is_found = choose(own, t);

@@ -259,7 +259,8 @@ fn sequence(extent: [f32; 3], order: Order, bits: u32) -> Vec<usize> {
             Order::Sorted => sorted[bit % 3],
             Order::Variable => {
                 let axis = longest(&keys);
-                keys[axis] -= 1 << 23;
+                // Those of flat axes wrap around, as on the device.
+                keys[axis] = keys[axis].wrapping_sub(1 << 23);
                 axis
             }
         })

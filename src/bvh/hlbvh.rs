@@ -27,7 +27,8 @@ pub(super) const fn tasks_bytes(count: u64) -> u64 {
 
 fn kernel(encode: &Encode, treelets: &Treelets, shader: &'static shaders::Shader, input: &Input) -> Kernel {
     let bits = treelets.bits(encode.codes, encode.count);
-    let constants = [treelets.primitives, levels(encode.count), collapse::treelet(encode), bits];
+    let primitives = treelets.primitives.min(encode.count.max(1));
+    let constants = [primitives, levels(encode.count), collapse::treelet(encode), bits];
     encode.reading_kernel_with(shader, input, &constants)
 }
 
