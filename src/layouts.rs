@@ -58,7 +58,9 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "bvh" if is("compact") => bvh::compact::push_constants(),
         "bvh" if is("epo") => bvh::epo::push_constants(),
         "bvh" if is("lbvh_workgroup") => bvh::lbvh_workgroup::push_constants(),
-        "bvh" if ["encode", "lbvh", "collapse", "hploc", "ploc"].into_iter().any(is) => bvh::encode::push_constants(),
+        "bvh" if ["encode", "lbvh", "collapse", "hlbvh", "hploc", "ploc"].into_iter().any(is) => {
+            bvh::encode::push_constants()
+        }
         "bvh" if is("quality") => bvh::quality::push_constants(),
         "bvh" if is("refit") => bvh::refit::push_constants(),
         "bvh" if is("wide") => bvh::wide::device::push_constants(),

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{corpus, device};
-use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Window};
+use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Treelets, Window};
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
@@ -14,6 +14,10 @@ fn on_host(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, method:
     let radix = host::lbvh::build(positions, triangles, codes, Collapse::OFF);
     match method {
         Method::Lbvh => radix,
+        Method::Hlbvh(treelets) => {
+            let bits = treelets.bits(codes, triangles.len() as u32);
+            host::hlbvh::build(&radix, codes, host::hlbvh::Treelets { bits, primitives: treelets.primitives })
+        }
         Method::Ploc { radius } => host::ploc::build(&radix, radius as usize),
         Method::Hploc(Window { size, radius }) => {
             host::hploc::build(&radix, host::hploc::Window { size: size as usize, radius: radius as usize })
@@ -62,9 +66,19 @@ fn equals_the_host(methods: [Method; 3]) {
 }
 
 #[test]
+fn hlbvh_gives_the_bytes_of_the_host() {
+    // Treelets of one primitive each, and those that the first bits alone tell apart.
+    let treelets =
+        [Treelets::DEFAULT, Treelets { bits: None, primitives: 1 }, Treelets { bits: Some(5), primitives: 5000 }];
+    equals_the_host(treelets.map(Method::Hlbvh));
+}
+
+#[test]
 fn optimised_trees_are_those_of_the_host() {
     for (name, positions, triangles) in corpus::meshes() {
-        for method in [Method::Lbvh, Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)] {
+        for method in
+            [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)]
+        {
             let (codes, collapse) = (Code::Emc64Var.full(), Collapse::SAH);
             let optimise = reinsertion::Options { passes: 3, stride: 2 };
             let tree = on_host(&positions, &triangles, codes, method).reinserted(&optimise);

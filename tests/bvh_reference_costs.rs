@@ -103,6 +103,17 @@ fn ploc_and_sweep_costs_of_large_scenes_are_those_of_an_independent_program_with
 }
 
 #[test]
+fn hlbvh_costs_at_most_1_15_of_full_sweep_in_the_mean() {
+    compare_hlbvhs(|triangles| triangles < SMALL);
+}
+
+#[test]
+#[ignore = "scenes of up to 1.4M triangles"]
+fn hlbvh_costs_of_large_scenes_are_at_most_1_15_of_full_sweep_in_the_mean() {
+    compare_hlbvhs(|_| true);
+}
+
+#[test]
 #[ignore = "871,414 triangles, one builder with a window of 200"]
 fn large_scene_dragon_has_the_costs_of_frantal_2019() {
     let Some(scene) = load("dragon.tri") else { return };
@@ -133,6 +144,23 @@ fn compare_host_builders(is_meant: fn(usize) -> bool) {
             compare(&scene, builder, expected, ties.map_or(TOLERANCE, |ties| ties.1));
         }
     }
+}
+
+/// The geometric mean of what the device's HLBVH costs over what full sweep does.
+fn compare_hlbvhs(is_meant: fn(usize) -> bool) {
+    let triangles = |name| COSTS.iter().find(|row| row.0 == name).map(|row| row.1).unwrap();
+    let mut ratios = Vec::new();
+    for (name, costs) in HOST_COSTS.into_iter().filter(|&(name, _)| is_meant(triangles(name))) {
+        let Some(scene) = load(name) else { return };
+        let spec: Spec = "hlbvh".parse().unwrap();
+        let mut subject = spec.make(Some(device()), &scene.mesh).unwrap();
+        subject.build().unwrap();
+        let ratio = subject.quality(3.0, 2.0).unwrap().sah.unwrap() / costs[HOST_BUILDERS.len() - 1];
+        println!("{name} {spec}: {ratio:.4} of full sweep");
+        ratios.push(ratio);
+    }
+    let mean = (ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64).exp();
+    assert!(mean <= 1.15, "{mean:.4} of full sweep over {} scenes", ratios.len());
 }
 
 /// A scene of HEDGEROW_SCENES; `None`, and a line that says so, where that is not set.

@@ -16,6 +16,7 @@
 #ifndef HEDGEROW_BVH_PLOC
 #define HEDGEROW_BVH_PLOC
 #include "bvh/clusters.glsl"
+#include "bvh/tiles.glsl"
 
 layout(constant_id = 7) const uint RADIUS = 16;
 // Of a round's clusters, one in so many falls away, or the next round is forced.
@@ -27,7 +28,6 @@ const uint CACHED = PRIVATE_COUNTERS ? 1u : gl_WorkGroupSize.x + 2u * RADIUS;
 // On a GPU, the boxes of a tile and of what is near it.
 shared vec3 cached_lo[CACHED];
 shared vec3 cached_hi[CACHED];
-shared uint partial[SUBGROUPS_AT_MOST];
 
 // Where the records of the clusters of a round lie, in order. The sort has left the memory free.
 Words cluster_list(uint round) {
@@ -39,24 +39,12 @@ Words nearest_of() {
     return Words(ends_address);
 }
 
-Words sums_of_tiles() {
-    return Words(table_address);
-}
-
 Clusters all_clusters() {
     return Clusters(scratch_behind_weights());
 }
 
 uint clusters_in(uint round) {
     return BuildState(state_address).cluster_counts[round & 1u];
-}
-
-uint tile_size() {
-    return gl_WorkGroupSize.x * ITEMS;
-}
-
-uint tiles_of(uint count) {
-    return (count + tile_size() - 1u) / tile_size();
 }
 
 // ---- begin ----
@@ -157,46 +145,13 @@ uint left_of_strip(uint task, uint round) {
 }
 
 void ploc_count(uint task, uint round) {
-    uint left = subgroupAdd(left_of_strip(task, round));
-    if (subgroupElect()) partial[gl_SubgroupID] = left;
-    barrier();
-    if (gl_LocalInvocationIndex == 0u) {
-        uint sum = 0;
-        for (uint s = 0; s < gl_NumSubgroups; ++s) sum += partial[s];
-        sums_of_tiles().word[task] = sum;
-    }
-    barrier();
-}
-
-// The sum of what lanes before have, and of all.
-uint sum_before(uint value, out uint total) {
-    uint before = subgroupExclusiveAdd(value), own_total = subgroupAdd(value);
-    barrier();
-    if (subgroupElect()) partial[gl_SubgroupID] = own_total;
-    barrier();
-    total = 0;
-    for (uint s = 0; s < gl_NumSubgroups; ++s) {
-        if (s < gl_SubgroupID) before += partial[s];
-        total += partial[s];
-    }
-    return before;
+    write_tile_sum(task, left_of_strip(task, round));
 }
 
 void ploc_scan(uint round) {
     BuildState state = BuildState(state_address);
-    uint count = clusters_in(round), tiles = tiles_of(count);
-    Words sums = sums_of_tiles();
-    uint strip = (tiles + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x;
-    uint begin = gl_LocalInvocationIndex * strip, end = min(begin + strip, tiles);
-    uint own = 0;
-    for (uint i = begin; i < end; ++i) own += sums.word[i];
-    uint total;
-    uint sum = sum_before(own, total);
-    for (uint i = begin; i < end; ++i) {
-        uint value = sums.word[i];
-        sums.word[i] = sum;
-        sum += value;
-    }
+    uint count = clusters_in(round);
+    uint total = scan_tiles(tiles_of(count));
     if (gl_LocalInvocationIndex == 0u) {
         uint next = (round + 1u) & 1u;
         state.cluster_counts[next] = total;

@@ -4,11 +4,21 @@
 #define HEDGEROW_BVH_RADIX_TREE
 #include "gpu/radix_sort.glsl"
 
-// How the codes at positions i and i + 1 differ, as a number that is larger where a higher bit differs: the code's bits, then
-// those of the position, which tell equal codes apart.
+// How the codes at two positions differ, as a number that is larger where a higher bit differs: the code's bits, then those of the
+// position, which tell equal codes apart.
+uvec3 difference_of(Words codes, uint i, uint j) {
+    if (KEY_WORDS == 1) return uvec3(i ^ j, codes.word[i] ^ codes.word[j], 0);
+    return uvec3(i ^ j, codes.word[2 * i] ^ codes.word[2 * j], codes.word[2 * i + 1] ^ codes.word[2 * j + 1]);
+}
+
 uvec3 difference_at(Words codes, uint i) {
-    if (KEY_WORDS == 1) return uvec3(i ^ (i + 1), codes.word[i] ^ codes.word[i + 1], 0);
-    return uvec3(i ^ (i + 1), codes.word[2 * i] ^ codes.word[2 * i + 2], codes.word[2 * i + 1] ^ codes.word[2 * i + 3]);
+    return difference_of(codes, i, i + 1);
+}
+
+// The highest bit of a difference, counted from the lowest of the position.
+int highest_bit(uvec3 difference) {
+    if (KEY_WORDS == 2 && difference.z != 0u) return 64 + findMSB(difference.z);
+    return difference.y != 0u ? 32 + findMSB(difference.y) : findMSB(difference.x);
 }
 
 // Of the neighbouring splits of a subtree; at the ends of all positions there is none.

@@ -7,6 +7,7 @@ pub mod compact;
 pub(crate) mod encode;
 pub mod epo;
 pub mod geometry;
+mod hlbvh;
 pub mod host;
 mod hploc;
 pub mod layout;

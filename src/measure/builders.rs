@@ -12,7 +12,7 @@ use super::peers::driver::Driver;
 use super::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use super::peers::obvhs;
-use crate::bvh::builder::{self, Method, Schedule, Window};
+use crate::bvh::builder::{self, Method, Schedule, Treelets, Window};
 use crate::bvh::codes::Codes;
 use crate::bvh::host::sweep::Leaves;
 use crate::bvh::reinsertion;
@@ -79,6 +79,8 @@ const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain,
 
 const OPTIMISE: BuilderOption =
     BuilderOption { key: "optimise", values: "off, fast, medium, high, or a number of passes of reinsertion" };
+const BITS: BuilderOption = BuilderOption { key: "bits", values: "a number of bits that the codes of a treelet share" };
+const TREELET: BuilderOption = BuilderOption { key: "treelet", values: "a number of primitives at most, from 1" };
 const WINDOW: BuilderOption = BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
 const RADIUS: BuilderOption = BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
 
@@ -103,6 +105,15 @@ pub static BUILDERS: &[Builder] = &[
         needs: Needs::Device,
         make: |spec, device, mesh| spec.on_device(device, mesh, &spec.lbvh_options()?),
         check: |spec| spec.lbvh_options().and(spec.form_and_order()).map(drop),
+    },
+    Builder {
+        name: "hlbvh",
+        what: "hierarchical LBVH on the device: small subtrees of the LBVH under a top split by the surface area heuristic",
+        options: &[BITS, TREELET, CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
+        variants: &["hlbvh"],
+        needs: Needs::Device,
+        make: |spec, device, mesh| spec.on_device(device, mesh, &spec.hlbvh_options()?),
+        check: |spec| spec.hlbvh_options().and(spec.form_and_order()).map(drop),
     },
     Builder {
         name: "ploc",
@@ -289,6 +300,14 @@ impl Spec {
     fn number(&self, option: &BuilderOption, default: u32) -> Result<u32> {
         let Some(value) = self.option(option.key) else { return Ok(default) };
         value.parse().map_err(|_| self.wrong_value(option, value))
+    }
+
+    /// Those of `lbvh`, and `bits` and `treelet`.
+    fn hlbvh_options(&self) -> Result<builder::Options> {
+        let bits = self.option(BITS.key).map(|_| self.number(&BITS, 0)).transpose()?;
+        let method = Method::Hlbvh(Treelets { bits, primitives: self.number(&TREELET, Treelets::DEFAULT.primitives)? });
+        method.check()?;
+        Ok(builder::Options { method, ..self.lbvh_options()? })
     }
 
     /// Those of `lbvh`, and `radius`.

@@ -4,6 +4,7 @@ mod collapse;
 mod compact;
 pub mod epo;
 pub mod geometry;
+pub mod hlbvh;
 pub mod hploc;
 pub mod lbvh;
 mod over;

@@ -1,0 +1,202 @@
+// The treelets of an HLBVH: see bvh/hlbvh.glsl for the contract.
+//
+// A treelet is a subtree of the radix tree that has at most TREELET_PRIMITIVES, which share TREELET_BITS of the code, and whose
+// parent is none. The climb is that of bvh/lbvh.glsl; it ends where a treelet is complete. Of the split behind a treelet's last position nobody asks for the parent:
+// its weights hold the treelet's root and cost until the clusters are gathered, and its word in `ends` stays as it was.
+#ifndef HEDGEROW_BVH_HLBVH_TREELETS
+#define HEDGEROW_BVH_HLBVH_TREELETS
+#include "bvh/hlbvh.glsl"
+#include "bvh/radix_tree.glsl"
+
+// A finished subtree over the positions first..=last, and how the codes differ before and behind it.
+struct Subtree {
+    uint first;
+    uint last;
+    uvec3 before;
+    uvec3 behind;
+    Child child;
+    float cost;
+};
+
+// Left children that wait for a sibling out of the same run of positions, as in bvh/lbvh.glsl.
+shared uint run_firsts[ITEMS * gl_WorkGroupSize.x];
+
+uint run_slot(uint level) {
+    return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+}
+
+// Whether a subtree has no parent, or one that is no treelet: one that splits at a bit that treelets share, or has too many
+// primitives. Its positions begin (or end) where the subtree's do, and share all bits of the code above the one that it splits at.
+bool is_treelet(Words codes, uint active_count, bool is_left, Subtree s) {
+    if (s.first == 0u && s.last + 1u == active_count) return true;
+    int split = highest_bit(is_left ? s.behind : s.before);
+    // Behind the bits of the position.
+    if (split >= 32 + int(kind_of_codes().bits - TREELET_BITS)) return true;
+    uint from = is_left ? s.first : max(s.last, TREELET_PRIMITIVES) - TREELET_PRIMITIVES;
+    uint to = from + TREELET_PRIMITIVES;
+    if (to >= active_count || (!is_left && to != s.last)) return false;
+    return highest_bit(difference_of(codes, from, to)) <= split;
+}
+
+void climb(Structure structure, Weights w, Words codes, uint active_count, float area_scale, uint run, inout uint waiting,
+           Subtree s) {
+    Words ends = Words(ends_address);
+    // The buffers that the sort has left free hold the costs of left and right children.
+    uint is_free = 1u - (passes & 1u);
+    Floats left_costs = Floats(keys[is_free]);
+    Floats right_costs = Floats(values[is_free]);
+    // As many levels as there are primitives in a treelet, at most.
+    for (uint level = 0; level <= TREELET_PRIMITIVES; ++level) {
+        bool is_left = is_less(s.behind, s.before);
+        if (is_treelet(codes, active_count, is_left, s)) {
+            w.counts.word[s.last] = reference_of(s.child);
+            w.left_counts.word[s.last] = floatBitsToUint(s.cost);
+            break;
+        }
+        uint parent = is_left ? s.last : s.first - 1u;
+        w.parents.word[parent_at(reference_of(s.child))] = 2u * parent + (is_left ? 0u : 1u);
+        if (is_left) {
+            structure.nodes[parent].left = s.child;
+            left_costs.value[parent] = s.cost;
+        } else {
+            structure.nodes[parent].right = s.child;
+            right_costs.value[parent] = s.cost;
+        }
+        uint end;
+        if (is_left && s.first >= run) {
+            run_firsts[run_slot(waiting)] = s.first;
+            waiting++;
+            break;
+        }
+        if (!is_left && waiting > 0u) {
+            waiting--;
+            end = run_firsts[run_slot(waiting)];
+            ends.word[parent] = end;
+        } else {
+            release_to_device();
+            end = atomicExchange(ends.word[parent], is_left ? s.first : s.last);
+            if (end == NONE) break;
+            acquire_from_device();
+        }
+        Child sibling;
+        float sibling_cost;
+        if (is_left) {
+            s.last = end;
+            s.behind = difference_behind(codes, s.last, active_count);
+            sibling = structure.nodes[parent].right;
+            sibling_cost = right_costs.value[parent];
+        } else {
+            s.first = end;
+            s.before = difference_before(codes, s.first);
+            sibling = structure.nodes[parent].left;
+            sibling_cost = left_costs.value[parent];
+        }
+        s.child = Child(min(s.child.lo, sibling.lo), parent, max(s.child.hi, sibling.hi), 0u);
+        float area = scaled_half_area(Box(s.child.lo, s.child.hi), area_scale);
+        vec2 costs = is_left ? vec2(s.cost, sibling_cost) : vec2(sibling_cost, s.cost);
+        s.cost = weigh_node(w, parent, uvec2(parent + 1u - s.first, s.last - parent), costs, area);
+    }
+}
+
+void hlbvh_treelets(uint task) {
+    BuildState state = BuildState(state_address);
+    Structure structure = Structure(structure_address);
+    Weights w = weights();
+    Geometry input_geometries = geometries();
+    uint active_count = state.active_count;
+    float area_scale = state.plan.area_scale;
+    Words codes = Words(keys[passes & 1u]);
+    uint run = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
+    uint end = min(run + ITEMS, active_count);
+    uint position = run;
+    uint waiting = 0;
+    // First the leaves of the run; then what waits, last first: its siblings begin behind the run.
+    bool leaves_done = false;
+    for (uint turn = 0; turn < 2u * ITEMS; ++turn) {
+        Subtree s;
+        uint own_run = run;
+        if (position < end) {
+            Cluster c = cluster_of_primitive(input_geometries, position, area_scale);
+            s.first = position;
+            s.last = position;
+            s.child = child_of(c);
+            s.cost = c.cost;
+            position++;
+        } else if (waiting > 0u) {
+            own_run = NONE;
+            // What was taken last began where this ends.
+            s.last = (leaves_done ? run_firsts[run_slot(waiting)] : end) - 1u;
+            leaves_done = true;
+            waiting--;
+            s.first = run_firsts[run_slot(waiting)];
+            s.child = structure.nodes[s.last].left;
+            s.cost = Floats(keys[1u - (passes & 1u)]).value[s.last];
+        } else {
+            break;
+        }
+        s.before = difference_before(codes, s.first);
+        s.behind = difference_behind(codes, s.last, active_count);
+        climb(structure, w, codes, active_count, area_scale, own_run, waiting, s);
+    }
+}
+
+// ---- count, scan, gather ----
+
+// Whether a treelet ends at a position.
+bool ends_treelet(uint position, uint active_count) {
+    return position + 1u == active_count || Words(ends_address).word[position] == NONE;
+}
+
+uint treelets_of_strip(uint task) {
+    uint active_count = BuildState(state_address).active_count;
+    uint begin = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
+    uint count = 0;
+    for (uint i = begin; i < min(begin + ITEMS, active_count); ++i) count += ends_treelet(i, active_count) ? 1u : 0u;
+    return count;
+}
+
+void hlbvh_count(uint task) {
+    write_tile_sum(task, treelets_of_strip(task));
+}
+
+void hlbvh_scan() {
+    uint count = scan_tiles(tiles_of(primitive_count));
+    if (gl_LocalInvocationIndex == 0u) {
+        PoolState pool = PoolState(state_address);
+        BuildState(state_address).cluster_counts[0] = count;
+        pool.tasks[pool_phase(PHASE_SPLIT)] = count > 1u ? 1u : 0u;
+        pool.tasks[pool_phase(PHASE_WEIGH)] = tiles_of(count);
+    }
+}
+
+// The cluster of the treelet that ends at a position.
+Cluster cluster_of_treelet(Structure structure, Weights w, Geometry input_geometries, uint last, float area_scale) {
+    uint reference = w.counts.word[last];
+    if ((reference & IS_PRIMITIVE) != 0u) return cluster_of_primitive(input_geometries, last, area_scale);
+    Child left = structure.nodes[reference].left, right = structure.nodes[reference].right;
+    uint count = w.counts.word[reference] & ~IS_LEAF;
+    float cost = uintBitsToFloat(w.left_counts.word[last]);
+    return Cluster(min(left.lo, right.lo), reference, max(left.hi, right.hi), count, cost, last + 1u - count);
+}
+
+void hlbvh_gather(uint task) {
+    BuildState state = BuildState(state_address);
+    Structure structure = Structure(structure_address);
+    Weights w = weights();
+    Clusters clusters = all_clusters();
+    Geometry input_geometries = geometries();
+    uint active_count = state.active_count;
+    uint total;
+    uint place = sums_of_tiles().word[task] + sum_before(treelets_of_strip(task), total);
+    uint begin = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
+    for (uint i = begin; i < min(begin + ITEMS, active_count); ++i) {
+        if (ends_treelet(i, active_count)) {
+            Cluster c = cluster_of_treelet(structure, w, input_geometries, i, state.plan.area_scale);
+            clusters.cluster[place] = c;
+            order_of(0).word[place] = place;
+            place++;
+            if (treelet_count() == 1u) write_root(structure, w, c);
+        }
+    }
+}
+#endif

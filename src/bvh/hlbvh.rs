@@ -1,0 +1,95 @@
+//! HLBVH on the device: treelets of the radix tree under a top that the surface area heuristic splits, level by level.
+//!
+//! Pantaleoni and Luebke 2010; Garanzha, Pantaleoni, McAllister 2011. `glsl/bvh/hlbvh.glsl` is the device's side; the twin is
+//! [`super::host::hlbvh`] with [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
+
+use super::builder::Treelets;
+use super::collapse;
+use super::encode::{Arguments, Encode};
+use super::geometry::Input;
+use crate::gpu::{Kernel, Step, shaders};
+
+/// Levels of the top that are recorded. Behind so many, the queues of the scenes that were measured are empty; what is left of
+/// others, whose workgroups go on alone, is little.
+fn levels(count: u32) -> u32 {
+    (u32::BITS - count.leading_zeros()) + 6
+}
+
+/// Workgroups that share what only the device knows the number of.
+fn groups(encode: &Encode) -> u32 {
+    encode.tiles().min(if encode.shape.private_counters { 64 } else { 1024 })
+}
+
+/// Bytes behind the clusters: what names each task of two levels. A task has two treelets at least.
+pub(super) const fn tasks_bytes(count: u64) -> u64 {
+    4 * count
+}
+
+fn kernel(encode: &Encode, treelets: &Treelets, shader: &'static shaders::Shader, input: &Input) -> Kernel {
+    let bits = treelets.bits(encode.codes, encode.count);
+    let primitives = treelets.primitives.min(encode.count.max(1));
+    let constants = [primitives, levels(encode.count), collapse::treelet(encode), bits];
+    encode.reading_kernel_with(shader, input, &constants)
+}
+
+/// Shaders and workgroups up to the top, and behind it.
+fn before_top(encode: &Encode) -> [(&'static shaders::Shader, u32); 4] {
+    [
+        (&shaders::BVH_HLBVH_TREELETS, encode.tiles()),
+        (&shaders::BVH_HLBVH_COUNT, encode.tiles()),
+        (&shaders::BVH_HLBVH_SCAN, 1),
+        (&shaders::BVH_HLBVH_GATHER, encode.tiles()),
+    ]
+}
+
+fn behind_levels(encode: &Encode) -> [(&'static shaders::Shader, u32); 2] {
+    [(&shaders::BVH_HLBVH_FINISH, groups(encode)), (&shaders::BVH_HLBVH_WEIGH, groups(encode))]
+}
+
+/// The kernels of [`steps`].
+pub(super) fn kernels(encode: &Encode, treelets: &Treelets, input: &Input) -> Vec<Kernel> {
+    let shaders = before_top(encode).into_iter().chain(behind_levels(encode)).map(|(shader, _)| shader);
+    shaders.chain([&shaders::BVH_HLBVH_SPLIT]).map(|shader| kernel(encode, treelets, shader, input)).collect()
+}
+
+/// The dispatches behind [`Encode::steps`]. Label: `hierarchy`.
+pub(super) fn steps(encode: &Encode, treelets: &Treelets, input: &Input, arguments: &Arguments) -> Vec<Step> {
+    let step = |shader, arguments: &Arguments, groups| {
+        Step::new("hierarchy", kernel(encode, treelets, shader, input), arguments, groups)
+    };
+    let plain = |(shader, groups)| step(shader, arguments, groups);
+    let level = |level| {
+        // A word of the sort, which has run.
+        step(&shaders::BVH_HLBVH_SPLIT, &Arguments { columns: level, ..*arguments }, groups(encode))
+    };
+    let levels = (0..levels(encode.count)).map(level);
+    before_top(encode)
+        .into_iter()
+        .map(plain)
+        .chain(levels)
+        .chain(behind_levels(encode).into_iter().map(plain))
+        .collect()
+}
+
+/// The kernels of [`persistent_steps`].
+pub(super) fn persistent_kernels(encode: &Encode, treelets: &Treelets, input: &Input) -> Vec<Kernel> {
+    [&shaders::BVH_HLBVH_RESET, &shaders::BVH_HLBVH_PERSISTENT]
+        .map(|shader| kernel(encode, treelets, shader, input))
+        .into()
+}
+
+/// The whole build by `workers` workgroups of one dispatch. Label: `build`.
+pub(super) fn persistent_steps(
+    encode: &Encode,
+    treelets: &Treelets,
+    input: &Input,
+    arguments: &Arguments,
+    workers: u32,
+) -> Vec<Step> {
+    let kernels = persistent_kernels(encode, treelets, input);
+    kernels
+        .into_iter()
+        .zip([1, workers])
+        .map(|(kernel, groups)| Step::new("build", kernel, arguments, groups))
+        .collect()
+}
