@@ -28,7 +28,8 @@ BUFFER BuildState {
 
 // What a build is given: the push constants, or variables that the shader sets first. `vertices` to `transform` with
 // `vertex_stride` to `formats` are a Geometry; `code_kind` is what `kind_of_codes` takes out, collapse << 25, build flags << 26;
-// `columns` to `passes` are of the radix sort; where it has run, `columns` is the level of bvh/hlbvh_split.comp.
+// `columns` to `passes` are of the radix sort; where it has run, `columns` is the level of bvh/hlbvh_split.comp and
+// hlbvh_finish.comp.
 #define BUILD_ARGUMENTS                                                                                        \
     uvec2 vertices; uvec2 indices; uvec2 transform; uvec2 structure_address; uvec2 state_address;             \
     uvec2 keys[2]; uvec2 values[2]; uvec2 ends_address; uvec2 table_address;                                  \

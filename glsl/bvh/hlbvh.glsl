@@ -21,10 +21,16 @@
 
 // Primitives of a treelet at most.
 layout(constant_id = 7) const uint TREELET_PRIMITIVES = 16;
-// Levels that are recorded: src/bvh/hlbvh.rs.
-layout(constant_id = 8) const uint LEVELS = 0;
-// Bits of the code that a treelet's primitives share.
-layout(constant_id = 10) const uint TREELET_BITS = 15;
+// Bits of the code that a treelet's primitives share; BY_COUNT takes as many as number all primitives.
+layout(constant_id = 8) const uint TREELET_BITS = 0xFFFFFFFFu;
+const uint BY_COUNT = 0xFFFFFFFFu;
+// Levels of the top that have phases, at most.
+const uint LEVELS = 32;
+
+uint treelet_bits() {
+    uint numbering = uint(findMSB(max(primitive_count, 2u) - 1u)) + 1u;
+    return min(TREELET_BITS == BY_COUNT ? numbering : TREELET_BITS, kind_of_codes().bits);
+}
 
 // Phases behind the sort.
 const uint PHASE_TREELETS = 0;

@@ -3,6 +3,7 @@
 #include "bvh/hlbvh_split.glsl"
 
 void main() {
-    uint tasks = task_count(LEVELS);
-    for (uint i = gl_WorkGroupID.x; i < tasks; i += gl_NumWorkGroups.x) hlbvh_finish(i, LEVELS);
+    // The sort, which has run, has left the word free.
+    uint level = columns, tasks = task_count(level);
+    for (uint i = gl_WorkGroupID.x; i < tasks; i += gl_NumWorkGroups.x) hlbvh_finish(i, level);
 }

@@ -31,9 +31,10 @@ bool is_treelet(Words codes, uint active_count, bool is_left, Subtree s) {
     if (s.first == 0u && s.last + 1u == active_count) return true;
     int split = highest_bit(is_left ? s.behind : s.before);
     // Behind the bits of the position.
-    if (split >= 32 + int(kind_of_codes().bits - TREELET_BITS)) return true;
-    uint from = is_left ? s.first : max(s.last, TREELET_PRIMITIVES) - TREELET_PRIMITIVES;
-    uint to = from + TREELET_PRIMITIVES;
+    if (split >= 32 + int(kind_of_codes().bits - treelet_bits())) return true;
+    uint most = min(TREELET_PRIMITIVES, active_count);
+    uint from = is_left ? s.first : max(s.last, most) - most;
+    uint to = from + most;
     if (to >= active_count || (!is_left && to != s.last)) return false;
     return highest_bit(difference_of(codes, from, to)) <= split;
 }
@@ -45,8 +46,8 @@ void climb(Structure structure, Weights w, Words codes, uint active_count, float
     uint is_free = 1u - (passes & 1u);
     Floats left_costs = Floats(keys[is_free]);
     Floats right_costs = Floats(values[is_free]);
-    // As many levels as there are primitives in a treelet, at most.
-    for (uint level = 0; level <= TREELET_PRIMITIVES; ++level) {
+    // As many levels as there are primitives, at most.
+    for (uint level = 0; level < active_count; ++level) {
         bool is_left = is_less(s.behind, s.before);
         if (is_treelet(codes, active_count, is_left, s)) {
             w.counts.word[s.last] = reference_of(s.child);

@@ -12,7 +12,9 @@ use crate::gpu::{Kernel, Step, shaders};
 /// Levels of the top that are recorded. Behind so many, the queues of the scenes that were measured are empty; what is left of
 /// others, whose workgroups go on alone, is little.
 fn levels(count: u32) -> u32 {
-    (u32::BITS - count.leading_zeros()) + 6
+    /// `LEVELS` in hlbvh.glsl.
+    const MOST: u32 = 32;
+    (u32::BITS - count.leading_zeros() + 6).min(MOST)
 }
 
 /// Workgroups that share what only the device knows the number of.
@@ -26,9 +28,9 @@ pub(super) const fn tasks_bytes(count: u64) -> u64 {
 }
 
 fn kernel(encode: &Encode, treelets: &Treelets, shader: &'static shaders::Shader, input: &Input) -> Kernel {
-    let bits = treelets.bits(encode.codes, encode.count);
-    let primitives = treelets.primitives.min(encode.count.max(1));
-    let constants = [primitives, levels(encode.count), collapse::treelet(encode), bits];
+    /// `BY_COUNT` in hlbvh.glsl: pipelines do not depend on the number of primitives.
+    const BY_COUNT: u32 = u32::MAX;
+    let constants = [treelets.primitives, treelets.bits.unwrap_or(BY_COUNT), collapse::treelet(encode)];
     encode.reading_kernel_with(shader, input, &constants)
 }
 
@@ -57,18 +59,15 @@ pub(super) fn steps(encode: &Encode, treelets: &Treelets, input: &Input, argumen
     let step = |shader, arguments: &Arguments, groups| {
         Step::new("hierarchy", kernel(encode, treelets, shader, input), arguments, groups)
     };
-    let plain = |(shader, groups)| step(shader, arguments, groups);
-    let level = |level| {
+    let of_level = |shader, level, groups| {
         // A word of the sort, which has run.
-        step(&shaders::BVH_HLBVH_SPLIT, &Arguments { columns: level, ..*arguments }, groups(encode))
+        step(shader, &Arguments { columns: level, ..*arguments }, groups)
     };
-    let levels = (0..levels(encode.count)).map(level);
-    before_top(encode)
-        .into_iter()
-        .map(plain)
-        .chain(levels)
-        .chain(behind_levels(encode).into_iter().map(plain))
-        .collect()
+    let levels = levels(encode.count);
+    let before = before_top(encode).into_iter().map(|(shader, groups)| step(shader, arguments, groups));
+    let top = (0..levels).map(|level| of_level(&shaders::BVH_HLBVH_SPLIT, level, groups(encode)));
+    let behind = behind_levels(encode).into_iter().map(|(shader, groups)| of_level(shader, levels, groups));
+    before.chain(top).chain(behind).collect()
 }
 
 /// The kernels of [`persistent_steps`].

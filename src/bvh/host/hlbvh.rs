@@ -12,7 +12,7 @@
 //! - Each side keeps its order. The node that splits the last order before its place p has the slot before the first position of
 //!   the p-th treelet in the order of codes, which no other node can have.
 
-use crate::bvh::codes::{Codes, Plan, code_bounds};
+use crate::bvh::codes::{Codes, Plan};
 use crate::bvh::layout::{Aabb, Bvh2, Child, Node, Record};
 
 /// What is a treelet.
@@ -82,13 +82,15 @@ pub fn build<R: Record>(radix: &Bvh2<R>, codes: Codes, limits: Treelets) -> Bvh2
     tree
 }
 
-/// The codes in the order of the records.
+/// The codes in the order of the records. Bounds may be those of a sample, which is taken in the order of the input.
 fn codes_of<R: Record>(radix: &Bvh2<R>, codes: Codes) -> Vec<u64> {
-    let boxes: Vec<Aabb> = radix.leaf_children().iter().map(Child::bounds).collect();
-    let centroids: Vec<[f32; 3]> = boxes.iter().map(Aabb::centroid).collect();
-    let bounds = code_bounds(&radix.header.root.bounds(), &Aabb::around(&centroids), codes.concise);
-    let plan = Plan::new(codes, &bounds);
-    boxes.iter().map(|b| plan.encode(b)).collect()
+    let leaves = radix.leaf_children();
+    let mut boxes = vec![Err(()); radix.records.len()];
+    for leaf in &leaves {
+        boxes[radix.records[leaf.index as usize].primitive() as usize] = Ok(leaf.bounds());
+    }
+    let plan = Plan::new(codes, &boxes);
+    leaves.iter().map(|leaf| plan.encode(&leaf.bounds())).collect()
 }
 
 /// Primitives below a child; of the nodes, in `counts`.
