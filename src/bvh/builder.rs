@@ -82,7 +82,8 @@ pub struct Treelets {
 }
 
 impl Treelets {
-    /// What measured well: a bit more gains 1% of cost for half as many treelets again, a bit less loses 2%.
+    /// What measured well in cost: on sponza 1.04 of full sweep's, where 15 bits and 128 primitives have 1.09 in two thirds of the
+    /// time.
     pub const DEFAULT: Treelets = Treelets { bits: None, primitives: 64 };
 
     /// The bits that are taken of codes of so many, for so many primitives.
