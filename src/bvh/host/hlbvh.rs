@@ -5,10 +5,10 @@
 //! code; here, where that would have too many primitives, it is the largest subtree that has not, so that a small object in a
 //! large scene is not one treelet. What else the papers leave open:
 //!
-//! - Of at most [`SWEPT`] treelets every centroid is a plane that is tried; of more, the planes between [`BINS`] slabs of the box
+//! - Of at most `SWEPT` treelets every centroid is a plane that is tried; of more, the planes between `BINS` slabs of the box
 //!   around the centroids, on every axis. The cost of a plane is the area of the box around the treelets on either side times
 //!   the primitives in them, in `f32`; of planes of equal cost the first wins, x before y before z.
-//! - Where no plane has treelets on both sides, of two treelets, and from level [`SAH_LEVELS`] on, half of them go to either side.
+//! - Where no plane has treelets on both sides, of two treelets, and from level `SAH_LEVELS` on, half of them go to either side.
 //! - Each side keeps its order. The node that splits the last order before its place p has the slot before the first position of
 //!   the p-th treelet in the order of codes, which no other node can have.
 
@@ -31,7 +31,7 @@ const SWEPT: usize = 16;
 /// Levels that are split by area.
 const SAH_LEVELS: usize = 40;
 /// 2^-100: of a scene whose boxes are scaled to about 1, what is less is nothing.
-const LEAST_EXTENT: f32 = 7.888_609_052_210_118e-31;
+const LEAST_EXTENT: f32 = f32::from_bits((127 - 100) << 23);
 
 #[derive(Clone, Copy)]
 struct Treelet {
