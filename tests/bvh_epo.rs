@@ -51,8 +51,10 @@ fn assert_as_on_the_host(name: &str, tree: &Bvh2) {
 
 #[test]
 fn hard_meshes_have_the_overlap_of_the_host() {
-    // Triangles whose corners lie on a line have the area that rounding leaves them: there is no figure to agree on.
-    for (name, positions, triangles) in corpus::meshes().into_iter().filter(|mesh| mesh.0 != "zero area") {
+    // Where no figure can agree: triangles whose corners lie on a line have the area that rounding leaves them, and the surface of
+    // a scene 10^33 times as large as what is in it is 0 in 32 bits, of which the device says that there is no figure.
+    let without = ["zero area", "a hundred far away"];
+    for (name, positions, triangles) in corpus::meshes().into_iter().filter(|mesh| !without.contains(&&*mesh.0)) {
         for collapse in [Collapse::OFF, Collapse::SAH] {
             assert_as_on_the_host(&name, &host::lbvh::build(&positions, &triangles, Code::Mc63.full(), collapse));
         }
