@@ -26,7 +26,8 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// The end-point overlap with these costs of a step and of a test; `None` where there is no surface, or none in 32 bits beside the scene.
+    /// The end-point overlap with these costs of a step and of a test; `None` where there is no surface, or
+    /// none in 32 bits beside the scene.
     pub fn epo(&self, c_t: f64, c_i: f64) -> Option<f64> {
         let surface = f64::from(self.surface);
         (surface > 0.0).then(|| (c_t * f64::from(self.inner) + c_i * f64::from(self.leaves)) / surface)
