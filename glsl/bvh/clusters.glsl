@@ -28,6 +28,17 @@ Child child_of(Cluster c) {
     return Child(c.lo, c.reference & ~IS_PRIMITIVE, c.hi, is_primitive ? 1u : 0u);
 }
 
+// A place in a list of clusters, or in the memory of all of them, that there is. Mesa 26's lavapipe loads what is at the same
+// address for all lanes even where no lane is active: then too the address must be one.
+uint safe_place(uint place) {
+    return min(place, max(primitive_count, 1u) - 1u);
+}
+
+// The cluster that a list names, for lanes that all look at the same.
+uint listed(Words list, uint i) {
+    return safe_place(list.word[safe_place(i)]);
+}
+
 // Makes the node over two clusters.
 Cluster merge_clusters(Structure structure, Weights w, Cluster left, Cluster right, float area_scale) {
     uint slot = right.first - 1u;

@@ -148,7 +148,7 @@ void fill_own_bins(Words order, Clusters clusters, Task t, Slabs slabs, float ar
         uint axis = own / BINS, bin = own % BINS;
         Side s = empty_side();
         for (uint i = t.begin; i < t.end; ++i) {
-            uint c = order.word[i];
+            uint c = listed(order, i);
             vec3 lo = clusters.cluster[c].lo, hi = clusters.cluster[c].hi;
             bool is_in = bins_of(slabs, centroid_of(Box(lo, hi)), area_scale)[axis] == bin;
             if (is_in) s = with_box(s, lo, hi, clusters.cluster[c].count, 1u);

@@ -147,7 +147,7 @@ uint split(Task t, uint level, out uint middle) {
     }
     next_phase();
     middle = chosen_middle;
-    uint slot = clusters.cluster[middle].first - 1u;
+    uint slot = clusters.cluster[safe_place(middle)].first - 1u;
     if (gl_LocalInvocationIndex == 0u) {
         w.counts.word[slot] = 0u;
         w.parents.word[slot] = t.link;
@@ -156,7 +156,7 @@ uint split(Task t, uint level, out uint middle) {
             uint begin = side == 0u ? t.begin : middle, end = side == 0u ? middle : t.end;
             children[side] = Child(chosen_lo[side], 0u, chosen_hi[side], 0u);
             if (end - begin == 1u) {
-                Cluster c = clusters.cluster[to.word[begin]];
+                Cluster c = clusters.cluster[listed(to, begin)];
                 children[side] = child_of(c);
                 w.parents.word[parent_at(c.reference)] = 2u * slot + side;
             }
@@ -177,7 +177,7 @@ uint split(Task t, uint level, out uint middle) {
 Task task_at(uint level, uint i) {
     if (level == 0u) return Task(0u, treelet_count(), NO_PARENT);
     Tasks tasks = tasks_of(level);
-    uint at = tasks.first + i;
+    uint at = safe_place(tasks.first + i);
     return Task(tasks.begins.word[at], tasks.ends.word[at], tasks.links.word[at]);
 }
 

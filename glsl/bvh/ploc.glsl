@@ -69,11 +69,8 @@ void ploc_begin(uint task) {
 
 // ---- search ----
 
-// Mesa 26's lavapipe loads what is at the same address for all lanes even where no lane is active: whatever `i` and the list are
-// then, the address is that of a cluster.
 Box box_of_cluster(Words list, Clusters clusters, uint i) {
-    uint last = max(primitive_count, 1u) - 1u;
-    uint first = min(list.word[min(i, last)], last);
+    uint first = listed(list, i);
     return Box(clusters.cluster[first].lo, clusters.cluster[first].hi);
 }
 

@@ -10,7 +10,7 @@ use super::reinsertion::{self, Reinsertion};
 use super::sah::Collapse;
 use super::{collapse, hlbvh, hploc, layout, lbvh, lbvh_workgroup, ploc};
 use crate::gpu::radix_sort::{self, Shape};
-use crate::gpu::{Context, Kernel, Limits, Recorder, Step, shaders};
+use crate::gpu::{Context, Kernel, Recorder, Step, shaders};
 use crate::{Error, Result};
 
 /// What to build, beside the primitives.
@@ -110,14 +110,6 @@ impl Window {
 }
 
 impl Method {
-    /// HLBVH with what measured well.
-    pub const HLBVH: Method = Method::Hlbvh(Treelets::DEFAULT);
-
-    /// Whether the device is not known to crash: Mesa 26.1.6's lavapipe does in HLBVH, 25.0.7's does not.
-    pub fn runs_on(self, limits: &Limits) -> bool {
-        !matches!(self, Method::Hlbvh(_)) || !limits.loads_uniform_values_once()
-    }
-
     /// The most neighbours that PLOC looks at.
     pub const MOST_RADIUS: u32 = 256;
 
@@ -240,12 +232,6 @@ impl Builder {
         }
         options.method.check()?;
         let limits = &context.limits;
-        if !options.method.runs_on(limits) {
-            return Err(Error::Argument(
-                "HLBVH crashes Mesa 26.1.6's lavapipe, which loads from addresses that no lane asks for; take Mesa 25's, or another method"
-                    .into(),
-            ));
-        }
         let schedule = options.schedule.unwrap_or_else(|| Schedule::for_count(options, primitive_count));
         if !options.takes(schedule) {
             let optimised = if options.optimise.is_some() { " and optimised" } else { "" };

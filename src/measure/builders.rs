@@ -421,7 +421,7 @@ impl Spec {
     pub fn is_possible(&self, device: Option<&Device>) -> bool {
         match self.builder().needs {
             Needs::Nothing => true,
-            Needs::Device => device.is_some_and(|device| self.name != "hlbvh" || Method::HLBVH.runs_on(&device.limits)),
+            Needs::Device => device.is_some(),
             Needs::RayQuery => device.is_some_and(Device::has_ray_query),
         }
     }
