@@ -256,3 +256,31 @@ fn structs_in_memory_are_the_same_on_host_and_device() {
     }
     assert!(seen.iter().eq(host.keys().copied()), "every struct is met in some shader: {seen:?}");
 }
+
+/// Whether every operation of a kind that rounds is one that must not be contracted with others.
+fn are_all_precise(module: &Module, op: Op) -> bool {
+    let target = |i: &Instruction| match &i.operands[..] {
+        [Operand::IdRef(id), Operand::Decoration(Decoration::NoContraction)] => Some(*id),
+        _ => None,
+    };
+    let precise: BTreeSet<u32> = module.annotations.iter().filter_map(target).collect();
+    let blocks = module.functions.iter().flat_map(|f| &f.blocks);
+    let mut operations = blocks.flat_map(|b| &b.instructions).filter(|i| i.class.opcode == op);
+    operations.all(|i| i.result_id.is_some_and(|id| precise.contains(&id)))
+}
+
+/// Where shaderc unrolls a loop, its copies are not `precise` any more: then the bits depend on the driver.
+#[test]
+fn what_is_precise_in_a_source_is_so_in_its_shader() {
+    let mut precise_shaders = 0;
+    for shader in shaders::ALL {
+        let optimised = rspirv::dr::load_bytes(shader.spirv).expect("SPIR-V of shaderc");
+        let source = Reflection::of(shader.name).0;
+        for op in [Op::FAdd, Op::FSub, Op::FMul, Op::FDiv] {
+            let is_precise = are_all_precise(&source, op);
+            assert!(!is_precise || are_all_precise(&optimised, op), "{}: {op:?}", shader.name);
+            precise_shaders += u32::from(is_precise);
+        }
+    }
+    assert!(precise_shaders > 0, "some shaders are precise throughout");
+}

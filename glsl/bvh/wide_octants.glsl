@@ -30,7 +30,8 @@ void octant_slots(uint count, vec3 centre, out uint in_slot[8]) {
         precise vec3 from = open_middle[farthest] - centre;
         uint best = 8;
         float most = 0.0;
-        [[unroll]] for (uint s = 0; s < 8; ++s) {
+        // Not unrolled here: where shaderc does it, the copies of what is `precise` are not.
+        for (uint s = 0; s < 8; ++s) {
             vec3 towards = vec3((s & 1u) != 0u ? from.x : -from.x, (s & 2u) != 0u ? from.y : -from.y, (s & 4u) != 0u ? from.z : -from.z);
             precise float gain = towards.x + towards.y + towards.z;
             if (in_slot[s] == 8 && (best == 8 || gain > most)) {

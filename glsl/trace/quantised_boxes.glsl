@@ -4,7 +4,6 @@
 #define HEDGEROW_TRACE_QUANTISED_BOXES
 #include "bvh/wide.glsl"
 #include "trace/slab.glsl"
-#extension GL_EXT_control_flow_attributes : require
 
 vec3 corner_of(vec3 origin, vec3 cell, uvec2 x, uvec2 y, uvec2 z, uint slot) {
     uint shift = (slot & 3u) * 8;
@@ -12,6 +11,13 @@ vec3 corner_of(vec3 origin, vec3 cell, uvec2 x, uvec2 y, uvec2 z, uint slot) {
     // As signed numbers: CPUs turn those into floats by one instruction.
     precise vec3 corner = origin + vec3(ivec3(word >> shift & 0xFFu)) * cell;
     return corner;
+}
+
+// Where a ray enters a box whose planes it meets at these distances, those that it meets first being `near`.
+float enter_box(vec3 near, vec3 far, float t_min, float t_best) {
+    float enter = max(max(near.x, near.y), max(near.z, t_min));
+    float leave = min(min(far.x, far.y), min(far.z, t_best));
+    return enter <= leave ? enter : HEDGEROW_INFINITY;
 }
 
 // For each slot where the ray enters its box, infinity if it does not between t_min and t_best. A slot without a child has a box
@@ -27,12 +33,12 @@ void enter_quantised(HedgerowPreparedRay ray, QuantisedNode node, float t_best, 
     uvec2 near_z = down.z ? node.hi[2] : node.lo[2], far_z = down.z ? node.lo[2] : node.hi[2];
     vec3 origin_near = mix(ray.origin_lo, ray.origin_hi, down);
     vec3 origin_far = mix(ray.origin_hi, ray.origin_lo, down);
-    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
-        vec3 near = (corner_of(origin, cell, near_x, near_y, near_z, slot) - origin_near) * ray.inverse;
-        vec3 far = (corner_of(origin, cell, far_x, far_y, far_z, slot) - origin_far) * ray.inverse;
-        float enter = max(max(near.x, near.y), max(near.z, ray.t_min));
-        float leave = min(min(far.x, far.y), min(far.z, t_best));
-        enters[slot] = enter <= leave ? enter : HEDGEROW_INFINITY;
-    }
+    // No loop: where shaderc unrolls one, the copies of what is `precise` are not.
+#define ENTER_SLOT(slot)                                                                                                       \
+    enters[slot] = enter_box((corner_of(origin, cell, near_x, near_y, near_z, slot) - origin_near) * ray.inverse,              \
+                             (corner_of(origin, cell, far_x, far_y, far_z, slot) - origin_far) * ray.inverse, ray.t_min, t_best)
+    ENTER_SLOT(0); ENTER_SLOT(1); ENTER_SLOT(2); ENTER_SLOT(3);
+    ENTER_SLOT(4); ENTER_SLOT(5); ENTER_SLOT(6); ENTER_SLOT(7);
+#undef ENTER_SLOT
 }
 #endif

@@ -6,6 +6,7 @@
 // wait, in the leading half of a float; a group that is farther than the best hit by then is left out.
 #ifndef HEDGEROW_TRACE_WALK_QUANTISED
 #define HEDGEROW_TRACE_WALK_QUANTISED
+#extension GL_EXT_control_flow_attributes : require
 #include "trace/buffers.glsl"
 #include "trace/nearest.glsl"
 #include "trace/quantised_boxes.glsl"
