@@ -43,12 +43,12 @@ fn on_device(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &Options) 
 
 /// The trees of `methods`, one for each of some codes, by the chain; of the first also by the pool, whose kernels take long to
 /// compile.
-fn equals_the_host(methods: [Method; 3]) {
+fn equals_the_host<const N: usize>(methods: [Method; N]) {
     let codes = [Code::Emc64Var.full(), Code::Mc30.full(), Code::Mc63.full().with_bits(17)];
     // The largest takes rounds that many workgroups share.
     let meshes = corpus::meshes().into_iter().chain([corpus::random("random 9000", 9000, [-0.5; 3], [1.0; 3])]);
     for (name, positions, triangles) in meshes {
-        for (i, (method, codes)) in methods.into_iter().zip(codes).enumerate() {
+        for (i, (method, codes)) in methods.into_iter().zip(codes.into_iter().cycle()).enumerate() {
             let schedules = if i == 0 { &[Schedule::Chain, Schedule::Persistent][..] } else { &[Schedule::Chain] };
             let tree = on_host(&positions, &triangles, codes, method);
             for collapse in [Collapse::OFF, Collapse::SAH] {
@@ -102,6 +102,8 @@ fn ploc_gives_the_bytes_of_the_host() {
 
 #[test]
 fn hploc_gives_the_bytes_of_the_host() {
-    let windows = [Window::DEFAULT, Window { size: 64, radius: 16 }, Window { size: 4, radius: 1 }];
+    // Those of an invocation, and of a subgroup.
+    let alone = [Window::DEFAULT, Window { size: 6, radius: 5 }];
+    let windows = [alone[0], alone[1], Window { size: 64, radius: 16 }, Window { size: 4, radius: 1 }];
     equals_the_host(windows.map(Method::Hploc));
 }

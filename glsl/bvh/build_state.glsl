@@ -24,6 +24,7 @@ BUFFER BuildState {
     CodePlan plan;
     uint cluster_counts[2];               // of PLOC: of even and odd rounds; of HLBVH the first: treelets
     uint is_forced[2];
+    uint looks;                           // clusters that rounds have looked at
 };
 
 // What a build is given: the push constants, or variables that the shader sets first. `vertices` to `transform` with

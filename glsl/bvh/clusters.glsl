@@ -39,6 +39,22 @@ uint listed(Words list, uint i) {
     return safe_place(list.word[safe_place(i)]);
 }
 
+// Edges of boxes count at least so much, the scene's longest being 1 to 4: of their products devices would take some for zero.
+const float SHORTEST = 8.673617379884035e-19;   // 2^-60
+
+// The distance of two clusters: half the area of the box around both.
+float distance_of(Box a, Box b, float area_scale) {
+    precise vec3 e = max(max(a.hi, b.hi) * area_scale - min(a.lo, b.lo) * area_scale, vec3(SHORTEST));
+    precise float area = e.x * e.y + e.y * e.z + e.z * e.x;
+    return area;
+}
+
+// Whether the cluster at place `i` is nearer to that at `own` than the one at `j` is. Of the same distance that of the least XOR:
+// so of many that are all equally far from each other, those at 2k and 2k + 1 find each other.
+bool is_nearer(float distance_i, uint i, float distance_j, uint j, uint own) {
+    return distance_i < distance_j || (distance_i == distance_j && (i ^ own) < (j ^ own));
+}
+
 // Makes the node over two clusters.
 Cluster merge_clusters(Structure structure, Weights w, Cluster left, Cluster right, float area_scale) {
     uint slot = right.first - 1u;

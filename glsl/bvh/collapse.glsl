@@ -4,20 +4,22 @@
 //
 //   parents  reads nodes                      writes weights: parents; arrivals (zero)
 //   weigh    reads nodes, parents             writes weights: counts, left_counts; costs; the header's costs
-//   place    reads nodes, weights             writes the walk's order, the nodes' children, slots that fall out, the root
+//   above    reads weights                    writes the places of large nodes
+//   place    reads weights, places            writes the walk's order, the nodes' children, slots that fall out, the root
 //   records  reads the walk's order           writes records
 //
-// A builder that writes the weights itself needs the last two alone.
+// A builder that writes the weights itself needs the last three alone.
 //
-// Where a record goes is the sum of the counts of all left siblings on the way up. That way is long, and few take it: the roots
-// of the largest subtrees of at most TREELET primitives (and what lies above them). One invocation then walks each of them.
+// Where a record goes is the sum of the counts of all left siblings on the way up. That way is long, and the larger part of it is
+// that of many others too: so nodes above more than LARGE primitives go it first.
 //
 // needs  one barrier between each two, and before the first; subgroups of any size
 #ifndef HEDGEROW_BVH_COLLAPSE
 #define HEDGEROW_BVH_COLLAPSE
 #include "bvh/weights.glsl"
 
-layout(constant_id = 9) const uint TREELET = 16;
+// Primitives below a node that goes its way for others: 16 and 64 were slower.
+const uint LARGE = 32;
 
 uint node_count() {
     return max(BuildState(state_address).active_count, 1u) - 1u;
@@ -97,26 +99,69 @@ void collapse_weigh(uint task) {
     }
 }
 
-// ---- place ----
+// ---- above, place ----
 
-// What a workgroup found in its tile: nodes above all treelets, the roots of treelets, primitives that are in none.
-shared uint found[2u * ITEMS * gl_WorkGroupSize.x];
-shared uint found_count;
-// What an invocation has put off on its walk through a treelet: a reference and its depth, a level after the other.
-shared uint walk_references[TREELET * gl_WorkGroupSize.x];
-shared uint walk_depths[TREELET * gl_WorkGroupSize.x];
+// Where a subtree begins: the position of its first record and its depth; whether it is inside of a leaf.
+struct Place {
+    uint first;
+    uint depth;
+    bool inside;
+};
 
-uint walk_slot(uint level) {
-    return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+// The places of large nodes. The sort has left the memory free, and methods have done with it.
+Words large_firsts() {
+    return Words(ends_address);
 }
 
-bool is_large(Weights w, uint slot) {
-    return (w.counts.word[slot] & ~IS_LEAF) > TREELET;
+// depth * 2, + 1 inside of a leaf.
+Words large_depths() {
+    return Words(keys[1u - (passes & 1u)]);
 }
 
-// The sorted positions in the order of the walk. The sort has left the memory free, and PLOC has done with it.
+// The sorted positions in the order of the walk. The sort has left the memory free, and methods have done with it.
 Words walk_order() {
     return Words(values[1u - (passes & 1u)]);
+}
+
+bool is_large(uint count) {
+    return (count & ~IS_LEAF) > LARGE;
+}
+
+// Up the tree from a reference; where `large_are_known`, only to the next large node.
+Place place_of(Weights w, uint reference, bool large_are_known) {
+    Place place = Place(0u, 0u, false);
+    uint link = w.parents.word[parent_at(reference)];
+    for (uint level = 0; level < node_count() && link != NO_PARENT; ++level) {
+        uint slot = link >> 1;
+        uint count = w.counts.word[slot];
+        if ((link & 1u) != 0u) place.first += w.left_counts.word[slot];
+        if ((count & IS_LEAF) != 0u) place.inside = true;
+        place.depth++;
+        if (large_are_known && is_large(count)) {
+            uint depth = large_depths().word[slot];
+            place.first += large_firsts().word[slot];
+            place.depth += depth >> 1;
+            place.inside = place.inside || (depth & 1u) != 0u;
+            break;
+        }
+        link = w.parents.word[slot];
+    }
+    // What is deeper than tracers can walk is inside of the leaf that its ancestor becomes.
+    place.inside = place.inside || place.depth > MAX_DEPTH;
+    return place;
+}
+
+void collapse_above(uint task) {
+    Weights w = weights();
+    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint slot = first + k * gl_WorkGroupSize.x;
+        if (slot < node_count() && is_large(w.counts.word[slot])) {
+            Place place = place_of(w, slot, false);
+            large_firsts().word[slot] = place.first;
+            large_depths().word[slot] = place.depth << 1 | (place.inside ? 1u : 0u);
+        }
+    }
 }
 
 // Tells the parent, or the header, of what has become a leaf.
@@ -128,119 +173,39 @@ void name_leaf(uint link, uint first, uint count) {
     words.word[child + 7u] = count;
 }
 
-struct Place {
-    uint first;     // position of the first record
-    uint depth;
-    bool inside;    // of a leaf
-};
-
-Place place_of(Weights w, uint reference) {
-    Place place = Place(0, 0, false);
-    uint link = w.parents.word[parent_at(reference)];
-    for (uint level = 0; level < node_count() && link != NO_PARENT; ++level) {
-        uint slot = link >> 1;
-        if ((link & 1u) != 0u) place.first += w.left_counts.word[slot];
-        if ((w.counts.word[slot] & IS_LEAF) != 0u) place.inside = true;
-        place.depth++;
-        link = w.parents.word[slot];
-    }
-    // What is deeper than tracers can walk is inside of the leaf that its ancestor becomes.
-    place.inside = place.inside || place.depth > MAX_DEPTH;
-    return place;
-}
-
-// Walks a treelet, or what is no larger: tells where its records go, and makes leaves. Adds what falls out to `unused`; whether a leaf
-// was made for the depth alone.
-bool place_treelet(Structure structure, Weights w, uint reference, Place place, inout uint unused) {
-    Words order = walk_order();
-    uint position = place.first;
-    uint depth = place.depth;
-    // Up to here everything is inside of a leaf.
-    uint leaf_end = place.inside ? 0xFFFFFFFFu : 0u;
-    uint level = 0;
-    bool limited = false;
-    for (uint visits = 0; visits < 2u * TREELET; ++visits) {
-        bool inside = position < leaf_end;
-        if ((reference & IS_PRIMITIVE) != 0u) {
-            uint sorted = reference & ~IS_PRIMITIVE;
-            order.word[position] = sorted;
-            if (!inside) name_leaf(w.parents.word[parent_at(reference)], position, 1u);
-            position++;
-            if (level == 0u) break;
-            level--;
-            reference = walk_references[walk_slot(level)];
-            depth = walk_depths[walk_slot(level)];
-        } else {
-            uint left = reference_of(structure.nodes[reference].left);
-            uint right = reference_of(structure.nodes[reference].right);
-            uint count = w.counts.word[reference];
-            bool is_leaf = (count & IS_LEAF) != 0u;
-            if (!inside && (is_leaf || depth == MAX_DEPTH)) {
-                limited = limited || !is_leaf;
-                count &= ~IS_LEAF;
-                name_leaf(w.parents.word[reference], position, count);
-                leaf_end = position + count;
-                inside = true;
-            }
-            if (inside) {
-                mark_unused(structure, reference);
-                unused++;
-            }
-            depth++;
-            walk_references[walk_slot(level)] = right;
-            walk_depths[walk_slot(level)] = depth;
-            level++;
-            reference = left;
-        }
-    }
-    return limited;
-}
-
-// A node above all treelets: its leaf has records that others write.
-bool place_large(Structure structure, Weights w, uint slot, Place place, inout uint unused) {
+// What becomes of a node: whether it falls out, and whether a leaf was made of it for the depth alone.
+void place_node(Structure structure, Weights w, uint slot, inout uint unused, inout bool limited) {
     uint count = w.counts.word[slot];
     bool is_leaf = (count & IS_LEAF) != 0u;
-    bool limited = !place.inside && !is_leaf && place.depth == MAX_DEPTH;
-    if (!place.inside && (is_leaf || limited)) name_leaf(w.parents.word[slot], place.first, count & ~IS_LEAF);
-    if (place.inside || is_leaf || limited) {
+    Place place = place_of(w, slot, true);
+    if (!place.inside && (is_leaf || place.depth == MAX_DEPTH)) {
+        limited = limited || !is_leaf;
+        name_leaf(w.parents.word[slot], place.first, count & ~IS_LEAF);
+    }
+    if (place.inside || is_leaf || place.depth == MAX_DEPTH) {
         mark_unused(structure, slot);
         unused++;
     }
-    return limited;
 }
 
 void collapse_place(uint task) {
     Structure structure = Structure(structure_address);
     uint active_count = BuildState(state_address).active_count;
     Weights w = weights();
-    uint nodes = node_count();
-    if (gl_LocalInvocationIndex == 0u) found_count = 0;
-    barrier();
+    uint unused = 0;
+    bool limited = false;
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
         uint i = first + k * gl_WorkGroupSize.x;
-        if (i < nodes) {
-            uint link = w.parents.word[i];
-            if (is_large(w, i) || link == NO_PARENT || is_large(w, link >> 1)) found[atomicAdd(found_count, 1u)] = i;
-        }
+        if (i < node_count()) place_node(structure, w, i, unused, limited);
         if (i < active_count) {
-            uint link = w.parents.word[parent_at(i | IS_PRIMITIVE)];
-            if (link == NO_PARENT || is_large(w, link >> 1)) found[atomicAdd(found_count, 1u)] = i | IS_PRIMITIVE;
+            Place place = place_of(w, i | IS_PRIMITIVE, true);
+            walk_order().word[place.first] = i;
+            if (!place.inside) name_leaf(w.parents.word[parent_at(i | IS_PRIMITIVE)], place.first, 1u);
         } else if (i < primitive_count) {
             // Those that are left out stay behind the others.
             walk_order().word[i] = i;
         }
-    }
-    barrier();
-    uint unused = 0;
-    bool limited = false;
-    for (uint i = gl_LocalInvocationIndex; i < found_count; i += gl_WorkGroupSize.x) {
-        uint reference = found[i];
-        Place place = place_of(w, reference);
-        bool large = (reference & IS_PRIMITIVE) == 0u && is_large(w, reference);
-        bool is_limited = large ? place_large(structure, w, reference, place, unused)
-                                : place_treelet(structure, w, reference, place, unused);
-        limited = limited || is_limited;
     }
     unused = subgroupAdd(unused);
     bool any_limited = subgroupOr(limited ? 1u : 0u) != 0u;
@@ -248,8 +213,6 @@ void collapse_place(uint task) {
         if (unused > 0u) atomicAdd(structure.header.inner_nodes, -unused);
         if (any_limited) atomicOr(structure.header.status, STATUS_DEPTH_LIMITED);
     }
-    // The next task begins with the list empty.
-    barrier();
 }
 
 // ---- records ----

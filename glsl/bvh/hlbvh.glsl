@@ -40,8 +40,9 @@ const uint PHASE_GATHER = 3;
 const uint PHASE_SPLIT = 4;
 const uint PHASE_FINISH = PHASE_SPLIT + LEVELS;
 const uint PHASE_WEIGH = PHASE_FINISH + 1;
-const uint PHASE_PLACE = PHASE_FINISH + 2;
-const uint PHASES_BEHIND_SORT = PHASE_FINISH + 4;
+const uint PHASE_ABOVE = PHASE_FINISH + 2;
+const uint PHASE_PLACE = PHASE_FINISH + 3;
+const uint PHASES_BEHIND_SORT = PHASE_FINISH + 5;
 
 Clusters all_clusters() {
     return Clusters(scratch_behind_weights());

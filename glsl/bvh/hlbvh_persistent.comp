@@ -14,6 +14,7 @@ void hlbvh_from_pool(uint phase, uint task) {
     else if (phase < PHASE_FINISH) hlbvh_split(task, phase - PHASE_SPLIT);
     else if (phase == PHASE_FINISH) hlbvh_finish(task, LEVELS);
     else if (phase == PHASE_WEIGH) hlbvh_weigh(task);
+    else if (phase == PHASE_ABOVE) collapse_above(task);
     else if (phase == PHASE_PLACE) collapse_place(task);
     else collapse_records(task);
 }

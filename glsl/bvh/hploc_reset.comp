@@ -6,6 +6,6 @@
 #include "bvh/encode.glsl"
 
 void main() {
-    // Hierarchy, and two of the collapse.
-    reset_build(3);
+    // Hierarchy, and three of the collapse.
+    reset_build(4);
 }

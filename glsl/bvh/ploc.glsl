@@ -19,10 +19,11 @@
 #include "bvh/tiles.glsl"
 
 layout(constant_id = 7) const uint RADIUS = 16;
-// Of a round's clusters, one in so many falls away, or the next round is forced.
+// Clusters that rounds look at before any is forced: so many a primitive, and so many anyway.
+const uint LOOKS = 16;
+const uint LOOKS_ANYWAY = 1u << 17;
+// Of a round's clusters, one in so many falls away, or it is slow.
 const uint SLOW = 16;
-// Among so many clusters, or fewer, no round is forced.
-const uint FEW = 256;
 const uint CACHED = PRIVATE_COUNTERS ? 1u : gl_WorkGroupSize.x + 2u * RADIUS;
 
 // On a GPU, the boxes of a tile and of what is near it.
@@ -56,6 +57,7 @@ void ploc_begin(uint task) {
     if (task == 0u && gl_LocalInvocationIndex == 0u) {
         state.cluster_counts[0] = state.active_count;
         state.is_forced[0] = 0;
+        state.looks = 0;
     }
     uint first = task * tile_size() + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
@@ -112,8 +114,8 @@ void ploc_search(uint task, uint round) {
                 uint cached = gl_LocalInvocationIndex + turn;
                 theirs = Box(cached_lo[cached], cached_hi[cached]);
             }
-            float distance = scaled_half_area(Box(min(mine.lo, theirs.lo), max(mine.hi, theirs.hi)), area_scale);
-            if (looks && distance < best) {
+            float distance = distance_of(mine, theirs, area_scale);
+            if (looks && is_nearer(distance, other, best, best_other, own)) {
                 best = distance;
                 best_other = other;
             }
@@ -154,8 +156,12 @@ void ploc_scan(uint round) {
     uint total = scan_tiles(tiles_of(count));
     if (gl_LocalInvocationIndex == 0u) {
         uint next = (round + 1u) & 1u;
+        // There are at most 2^27 primitives; behind the most looks every second round leaves at most three quarters.
+        uint looks = state.looks + count;
+        bool is_late = looks > LOOKS * state.active_count + LOOKS_ANYWAY;
+        state.looks = looks;
         state.cluster_counts[next] = total;
-        state.is_forced[next] = total > FEW && SLOW * (count - total) < count ? 1u : 0u;
+        state.is_forced[next] = is_late && SLOW * (count - total) < count ? 1u : 0u;
     }
 }
 
@@ -187,7 +193,7 @@ void ploc_merge(uint task, uint round) {
 void ploc_finish(uint round) {
     // Where there is nothing, nobody has begun.
     uint count = primitive_count == 0u ? 0u : clusters_in(round);
-    // Every second round leaves at most fifteen of sixteen clusters, until there are few.
+    // Until rounds are forced there can be 512 of at least 256 clusters, and later every second leaves fifteen of sixteen.
     for (uint turn = 0; turn < 1024u && count > 1u; ++turn, ++round) {
         uint tiles = tiles_of(count);
         for (uint task = 0; task < tiles; ++task) ploc_search(task, round);

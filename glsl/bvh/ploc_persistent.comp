@@ -34,6 +34,8 @@ void ploc_from_pool(PoolState pool, uint phase, uint task) {
         ploc_merge(task, round_of(behind));
     } else if (step == STEP_FINISH) {
         ploc_finish(ROUNDS);
+    } else if (step == STEP_ABOVE) {
+        collapse_above(task);
     } else if (step == STEP_PLACE) {
         collapse_place(task);
     } else {

@@ -1,4 +1,4 @@
-// The phases of the PLOC build behind the sort, in the pool: begin, four a round, finish, two of the collapse.
+// The phases of the PLOC build behind the sort, in the pool: begin, four a round, finish, three of the collapse.
 #ifndef HEDGEROW_BVH_PLOC_PHASES
 #define HEDGEROW_BVH_PLOC_PHASES
 #include "bvh/encode.glsl"
@@ -6,7 +6,7 @@
 // Rounds that are recorded: src/bvh/ploc.rs.
 layout(constant_id = 8) const uint ROUNDS = 0;
 const uint PHASES_OF_A_ROUND = 4;
-const uint PHASES_BEHIND_SORT = 1 + PHASES_OF_A_ROUND * ROUNDS + 3;
+const uint PHASES_BEHIND_SORT = 1 + PHASES_OF_A_ROUND * ROUNDS + 4;
 
 const uint STEP_SEARCH = 0;
 const uint STEP_COUNT = 1;
@@ -14,8 +14,9 @@ const uint STEP_SCAN = 2;
 const uint STEP_MERGE = 3;
 const uint STEP_BEGIN = 4;
 const uint STEP_FINISH = 5;
-const uint STEP_PLACE = 6;
-const uint STEP_RECORDS = 7;
+const uint STEP_ABOVE = 6;
+const uint STEP_PLACE = 7;
+const uint STEP_RECORDS = 8;
 
 // `phase` counts from the sort on.
 uint step_of(uint phase) {

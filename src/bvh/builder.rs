@@ -105,8 +105,11 @@ pub struct Window {
 impl Window {
     /// The most clusters of a window.
     pub const MOST: u32 = 64;
-    /// What the paper has.
-    pub const DEFAULT: Window = Window { size: 32, radius: 8 };
+    /// Each cluster looks at all others: what an invocation merges by itself. Over eleven scenes trees cost 1.047 times a full
+    /// sweep's, with [`Window::PAPER`] 1.013, in more than twice the time on lavapipe.
+    pub const DEFAULT: Window = Window { size: 8, radius: 8 };
+    /// What Benthin et al. have: a subgroup of a GPU.
+    pub const PAPER: Window = Window { size: 32, radius: 8 };
 }
 
 impl Method {
@@ -260,7 +263,6 @@ impl Builder {
             build_flags: options.build_flags,
             alone,
             method_bytes: method_bytes(options.method, optimise.as_ref(), primitive_count.into()),
-            shared_memory: limits.shared_memory,
         };
         let workers = if limits.is_cpu() { 64 } else { 1024 };
         Ok(Builder { method: options.method, schedule, optimise, workers, encode })

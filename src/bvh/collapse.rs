@@ -7,12 +7,6 @@ use super::encode::{Arguments, Encode};
 use super::geometry::Input;
 use crate::gpu::{Kernel, Step, shaders};
 
-/// Primitives of a treelet, which one invocation walks with a stack in shared memory: as many as a quarter of that has room for.
-pub(super) fn treelet(encode: &Encode) -> u32 {
-    const STACK_ENTRY_BYTES: u32 = 8;
-    (encode.shared_memory / 4 / (STACK_ENTRY_BYTES * encode.shape.workgroup)).clamp(2, 32)
-}
-
 /// Bytes of the weights of so many primitives: `Weights` in weights.glsl.
 pub(super) const fn weights_bytes(count: u64) -> u64 {
     16 * count
@@ -25,8 +19,8 @@ pub(super) const fn weigh_bytes(count: u64) -> u64 {
 
 /// The kernels of [`place_steps`].
 pub(super) fn place_kernels(encode: &Encode, input: &Input) -> Vec<Kernel> {
-    let of = |shader| encode.reading_kernel_with(shader, input, &[0, 0, treelet(encode)]);
-    [&shaders::BVH_COLLAPSE_PLACE, &shaders::BVH_COLLAPSE_RECORDS].map(of).into()
+    let tree = [&shaders::BVH_COLLAPSE_ABOVE, &shaders::BVH_COLLAPSE_PLACE].map(|shader| encode.kernel(shader));
+    tree.into_iter().chain([encode.reading_kernel(&shaders::BVH_COLLAPSE_RECORDS, input)]).collect()
 }
 
 /// The dispatches that finish a tree whose weights are known. Label: `collapse`.

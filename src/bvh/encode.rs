@@ -27,8 +27,6 @@ pub(super) struct Encode {
     pub alone: bool,
     /// Bytes of scratch memory behind the state that the method needs for itself.
     pub method_bytes: u64,
-    /// Bytes of shared memory that a workgroup has.
-    pub shared_memory: u32,
 }
 
 /// Where the parts of the scratch memory begin, in bytes.

@@ -4,7 +4,6 @@
 //! [`super::host::hlbvh`] with [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
 use super::builder::Treelets;
-use super::collapse;
 use super::encode::{Arguments, Encode};
 use super::geometry::Input;
 use crate::gpu::{Kernel, Step, shaders};
@@ -30,7 +29,7 @@ pub(super) const fn tasks_bytes(count: u64) -> u64 {
 fn kernel(encode: &Encode, treelets: &Treelets, shader: &'static shaders::Shader, input: &Input) -> Kernel {
     /// `BY_COUNT` in hlbvh.glsl: pipelines do not depend on the number of primitives.
     const BY_COUNT: u32 = u32::MAX;
-    let constants = [treelets.primitives, treelets.bits.unwrap_or(BY_COUNT), collapse::treelet(encode)];
+    let constants = [treelets.primitives, treelets.bits.unwrap_or(BY_COUNT)];
     encode.reading_kernel_with(shader, input, &constants)
 }
 

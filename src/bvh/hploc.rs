@@ -4,13 +4,12 @@
 //! [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
 use super::builder::Window;
-use super::collapse;
 use super::encode::{Arguments, Encode};
 use super::geometry::Input;
 use crate::gpu::{Kernel, Step, shaders};
 
 fn kernel(encode: &Encode, window: &Window, shader: &'static shaders::Shader, input: &Input) -> Kernel {
-    encode.reading_kernel_with(shader, input, &[window.size, window.radius, collapse::treelet(encode)])
+    encode.reading_kernel_with(shader, input, &[window.size, window.radius])
 }
 
 /// The kernel of [`steps`].

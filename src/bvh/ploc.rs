@@ -3,7 +3,6 @@
 //! `glsl/bvh/ploc.glsl` is the device's side; the twin is [`super::host::ploc`] with
 //! [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
-use super::collapse;
 use super::encode::{Arguments, Encode};
 use super::geometry::Input;
 use crate::gpu::{Kernel, Step, shaders};
@@ -45,7 +44,7 @@ impl Kernels<'_> {
 
     fn of_pool(&self, shader: &'static shaders::Shader) -> Kernel {
         let rounds = rounds(self.encode.count);
-        self.encode.reading_kernel_with(shader, self.input, &[self.radius, rounds, collapse::treelet(self.encode)])
+        self.encode.reading_kernel_with(shader, self.input, &[self.radius, rounds])
     }
 
     /// Kernels and workgroups, a barrier between each two.

@@ -1,0 +1,7 @@
+#version 460
+// Where large nodes begin: see bvh/collapse.glsl for the contract.
+#include "bvh/collapse.glsl"
+
+void main() {
+    collapse_above(gl_WorkGroupID.x);
+}
