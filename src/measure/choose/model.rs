@@ -1,6 +1,7 @@
 //! The cost model: build time and time of a ray of every candidate, from the figures of a scene.
 
 use super::features::{COUNT, Features};
+use super::prices::{Prices, RayWork};
 use super::ridge::{Ridge, Sample};
 use crate::measure::total_time::Line;
 use serde::{Deserialize, Serialize};
@@ -14,10 +15,14 @@ pub struct Measured {
     pub features: Features,
     /// The candidate, as `-b` takes it.
     pub builder: String,
+    /// The layout of its tree: `bvh2`, `wide8q`…
+    pub layout: String,
     /// Milliseconds of a build.
     pub build_ms: f64,
     /// Nanoseconds of a ray, over all kinds together.
     pub ray_ns: f64,
+    /// What rays did, over all kinds together.
+    pub work: RayWork,
 }
 
 /// What a candidate is expected to take.
@@ -44,6 +49,10 @@ impl Estimate {
 /// together, times what they make of a candidate's part. "What they make of" is the exponential of a linear function.
 #[derive(Debug, Clone)]
 pub struct Model {
+    /// What rays' work costs.
+    pub prices: Prices,
+    /// Standard deviation of the logarithm of times of rays over what the prices make of them.
+    pub deviation: f64,
     ray: Ridge,
     candidates: Vec<Candidate>,
 }
@@ -58,7 +67,8 @@ struct Candidate {
 }
 
 impl Model {
-    /// A model of what was measured. Scenes that not all candidates were measured on are left out.
+    /// A model of what was measured, with the prices of what rays did in place of their times. Scenes that not all candidates were
+    /// measured on are left out.
     pub fn of(measured: &[Measured]) -> Model {
         let mut builders: Vec<&str> = Vec::new();
         let mut scenes: Vec<&Measured> = Vec::new();
@@ -72,6 +82,12 @@ impl Model {
         }
         let of = |scene: &str, builder: &str| measured.iter().find(|m| m.scene == scene && m.builder == builder);
         scenes.retain(|scene| builders.iter().all(|builder| of(&scene.scene, builder).is_some_and(is_positive)));
+        let complete: Vec<Measured> =
+            measured.iter().filter(|m| scenes.iter().any(|scene| scene.scene == m.scene)).cloned().collect();
+        let prices = Prices::of(&complete);
+        let deviation = prices.deviation(&complete);
+        let measured = prices.applied(&complete);
+        let of = |scene: &str, builder: &str| measured.iter().find(|m| m.scene == scene && m.builder == builder);
         // Mean of the logarithms over the candidates.
         let all: Vec<Sample> = scenes
             .iter()
@@ -94,13 +110,14 @@ impl Model {
                 ray_factor: Ridge::fit(&ray_factors),
             }
         };
-        Model { ray: Ridge::fit(&all), candidates: builders.iter().map(candidate).collect() }
+        let candidates = builders.iter().map(candidate).collect();
+        Model { prices, deviation, ray: Ridge::fit(&all), candidates }
     }
 
     /// What every candidate is expected to take on a scene.
     pub fn estimates(&self, features: &Features) -> Vec<Estimate> {
         let x = &features.values;
-        let all = self.ray.at(x);
+        let all = self.ray.at_any_size(x);
         let estimate = |candidate: &Candidate| Estimate {
             builder: candidate.builder.clone(),
             build_ms: at(candidate.build, features.triangles) * candidate.build_factor.at(&shape(x)).exp(),
@@ -162,7 +179,7 @@ mod tests {
     use super::*;
 
     fn features(triangles: u64, crossing: f64) -> Features {
-        Features { triangles, values: [(triangles as f64).log2(), 0.0, 0.0, 0.0, 0.0, 0.0, crossing] }
+        Features { triangles, values: [(triangles as f64).log2(), 0.0, 0.0, 0.0, crossing, 0.0, 0.0, 0.0] }
     }
 
     /// One that builds fast and traces slowly, all the more where rays cross many boxes, and one that does the opposite.
@@ -174,8 +191,11 @@ mod tests {
                 scene: scene.clone(),
                 features: features(n, crossing),
                 builder: builder.into(),
+                layout: "bvh2".into(),
                 build_ms,
                 ray_ns,
+                // At 20 ns a step.
+                work: RayWork { steps: 0.05 * ray_ns, tests: 0.0 },
             };
             let n = n as f64;
             [m("fast", 0.5 + 1e-4 * n, ray * (0.1 * crossing).exp2()), m("good", 2.0 + 3e-4 * n, 0.8 * ray)]
