@@ -151,11 +151,11 @@ mod tests {
             line: Line { build, ray },
         };
         let expected = [of("b", "lbvh", 9.0, 9.0), of("a", "lbvh", 1.0, 2.0), of("a", "lbvh:width=8q", 4.0, 1.0)];
-        let taken = [of("a", "lbvh", 2.0, 1.0), of("a", "lbvh:width=8q", 2.0, 1.0)];
+        let taken = [of("a", "lbvh", 2.0, 0.5), of("a", "lbvh:width=8q", 2.0, 1.0)];
         let choice = Choice { scene: "a".into(), rays: 10.0, builder: "lbvh:width=8q".into() };
         let [pair] = &pairs(&[choice], &taken)[..] else { panic!("one choice") };
         let [chosen, best] = misses(pair, &expected, &taken).expect("both are there");
-        assert_eq!((chosen, best), (Miss { build: 0.5, ray: 1.0 }, Miss { build: 0.5, ray: 1.0 }));
+        assert_eq!((chosen, best), (Miss { build: 0.5, ray: 1.0 }, Miss { build: 2.0, ray: 0.25 }));
         assert_eq!(misses(pair, &expected[..1], &taken), None);
     }
 }
