@@ -1,13 +1,13 @@
-//! What is known of a scene before anything is built: one pass over the boxes of its triangles, and what methods make of a sample of
-//! them.
+//! What is known of a scene before anything is built: one pass over the boxes of its triangles, and what reinsertion gains on a
+//! sample of them.
 
-use super::sample::Gains;
+use super::sample;
 use crate::bvh::layout::Aabb;
 use crate::scene::Mesh;
 use serde::{Deserialize, Serialize};
 
 /// How many figures describe a scene.
-pub const COUNT: usize = 8;
+pub const COUNT: usize = 5;
 
 /// As many octaves below the scene's diagonal a triangle may be: the bits of a float.
 const FINEST: f64 = 24.0;
@@ -25,18 +25,15 @@ pub struct Features {
 pub const NAMES: [&str; COUNT] = [
     // Triangles.
     "count",
-    // Octaves of a triangle's size: the standard deviation of the logarithm of its box's diagonal, 0 where all are of a size.
-    "mixture",
-    // Levels of the tree that codes by the number of triangles leave open, in the mean over a sample: triangles with the same code.
+    // How much the scene's diagonal over that of a triangle's box is beyond 10 octaves, the bits of an axis in a 30-bit code, in the
+    // mean: what such a code cannot tell apart.
     "blur",
     // Area of the boxes of all triangles over that of the triangles on both sides: how empty boxes are.
     "hollowness",
     // Area of the boxes of all triangles over that of the scene's: how many of them a random ray meets.
     "crossing",
-    // Costs of trees over that of the LBVH, on a sample of the boxes: of PLOC, after reinsertion, by robust codes.
-    "clustering",
+    // Cost of the LBVH after reinsertion over that before, on a sample of the boxes: how much a better tree gains.
     "reinsertion",
-    "robust",
 ];
 
 impl Features {
@@ -57,19 +54,14 @@ impl Features {
         }
         // In octaves; triangles without extent are as fine as floats tell apart.
         let scene = diagonal(&bounds).log2();
-        let octaves = || sizes.iter().map(|size| (scene - size).min(FINEST));
-        let mean = octaves().sum::<f64>() / count as f64;
-        let variance = octaves().map(|o| (o - mean).powi(2)).sum::<f64>() / count as f64;
-        let gains = Gains::of(&boxes);
+        let octaves = sizes.iter().map(|size| (scene - size).min(FINEST));
+        let blur = octaves.map(|o| (o - 10.0).max(0.0)).sum::<f64>() / count as f64;
         let values = [
             (count as f64).log2(),
-            variance.sqrt(),
-            gains.open_levels,
+            blur,
             (crossed / surface).log2(),
             (crossed / half_area(&bounds)).log2(),
-            gains.clustering,
-            gains.reinsertion,
-            gains.robust,
+            sample::gain(&boxes),
         ];
         let number = |value: f64| if value.is_finite() { value } else { 0.0 };
         Features { triangles: count as u64, values: values.map(number) }
@@ -110,8 +102,8 @@ mod tests {
         let a = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
         let b = [[3.0, 0.0, 0.0], [9.0, 0.0, 0.0], [3.0, 8.0, 0.0]];
         let Features { triangles, values } = Features::of(&mesh(&[a, b]));
-        // The scene is 9 × 8. An octave apart: each half of it from the mean. Of two boxes there is one tree.
-        let expected: [f64; COUNT] = [1.0, 0.5, 0.0, (60.0f64 / 30.0).log2(), (60.0f64 / 72.0).log2(), 0.0, 0.0, 0.0];
+        // The scene is 9 × 8. Of two boxes there is one tree.
+        let expected: [f64; COUNT] = [1.0, 0.0, (60.0f64 / 30.0).log2(), (60.0f64 / 72.0).log2(), 0.0];
         assert_eq!(triangles, 2);
         for ((name, value), expected) in NAMES.iter().zip(values).zip(expected) {
             assert!((value - expected).abs() < 1e-12, "{name}: {value}, {expected}");

@@ -45,8 +45,8 @@ impl Estimate {
 
 /// A model of measured candidates.
 ///
-/// A build takes a + b · triangles, times what the other figures make of it; a ray what the figures make of it for all candidates
-/// together, times what they make of a candidate's part. "What they make of" is the exponential of a linear function.
+/// A build takes a + b · triangles, times what the other figures make of it; a ray what the figures make of it for the best
+/// candidate, times what they make of how much worse another is. "What they make of" is the exponential of a linear function.
 #[derive(Debug, Clone)]
 pub struct Model {
     /// What rays' work costs.
@@ -56,6 +56,10 @@ pub struct Model {
     ray: Ridge,
     candidates: Vec<Candidate>,
 }
+
+/// The logarithm of how many times the best candidate's ray another's takes, at most: by how much more it is worse would only draw the
+/// weights away from where candidates are near each other.
+const MOST: f64 = 1.5;
 
 #[derive(Debug, Clone)]
 struct Candidate {
@@ -88,12 +92,11 @@ impl Model {
         let deviation = prices.deviation(&complete);
         let measured = prices.applied(&complete);
         let of = |scene: &str, builder: &str| measured.iter().find(|m| m.scene == scene && m.builder == builder);
-        // Mean of the logarithms over the candidates.
         let all: Vec<Sample> = scenes
             .iter()
             .map(|scene| {
                 let logs = builders.iter().filter_map(|builder| Some(of(&scene.scene, builder)?.ray_ns.ln()));
-                (scene.features.values, logs.sum::<f64>() / builders.len() as f64)
+                (scene.features.values, logs.fold(f64::INFINITY, f64::min))
             })
             .collect();
         let candidate = |builder: &&str| {
@@ -102,7 +105,7 @@ impl Model {
             let build_factors: Vec<Sample> =
                 own.iter().map(|m| (m.features.values, (m.build_ms / at(build, m.features.triangles)).ln())).collect();
             let ray_factors: Vec<Sample> =
-                own.iter().zip(&all).map(|(m, (x, mean))| (*x, m.ray_ns.ln() - mean)).collect();
+                own.iter().zip(&all).map(|(m, (x, least))| (*x, (m.ray_ns.ln() - least).min(MOST))).collect();
             Candidate {
                 builder: (*builder).to_owned(),
                 build,
@@ -179,7 +182,7 @@ mod tests {
     use super::*;
 
     fn features(triangles: u64, crossing: f64) -> Features {
-        Features { triangles, values: [(triangles as f64).log2(), 0.0, 0.0, 0.0, crossing, 0.0, 0.0, 0.0] }
+        Features { triangles, values: [(triangles as f64).log2(), 0.0, 0.0, crossing, 0.0] }
     }
 
     /// One that builds fast and traces slowly, all the more where rays cross many boxes, and one that does the opposite.
