@@ -2,8 +2,8 @@
 //!
 //! The device is measured once ([`calibration`]): every candidate ([`candidates`]) builds and traces a few generated scenes. What
 //! rays do there is counted and has its [`prices`]. A [`model`] of these figures tells build time and time of a ray on a scene by
-//! its [`features`]: triangles, how their boxes lie, and what reinsertion gains on a sample of them. The choice is the least of build +
-//! rays · ray. The figures are kept in a file ([`cache`]), and [`hindsight`] holds choices against what was measured afterwards.
+//! its [`features`]: triangles, how their boxes lie, and what reinsertion gains on a sample of them. The choice is the least of
+//! build + rays · ray. The figures are kept in a file ([`cache`]), and [`hindsight`] holds choices against what was measured afterwards.
 
 mod auto;
 pub mod cache;

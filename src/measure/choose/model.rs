@@ -57,8 +57,8 @@ pub struct Model {
     candidates: Vec<Candidate>,
 }
 
-/// The logarithm of how many times the best candidate's ray another's takes, at most: by how much more it is worse would only draw the
-/// weights away from where candidates are near each other.
+/// The logarithm of how many times the best candidate's ray another's takes, at most: by how much more it is worse would only draw
+/// the weights away from where candidates are near each other.
 const MOST: f64 = 1.5;
 
 #[derive(Debug, Clone)]

@@ -47,8 +47,8 @@ const SWEEPS: usize = 100;
 const NEAR: f64 = 0.03;
 
 impl Prices {
-    /// The prices with which candidates on the same scene took what they took. Scenes as a whole may be dearer or cheaper (rays side by
-    /// side go different ways, memory is far): by a factor that is 1 in the geometric mean.
+    /// The prices with which candidates on the same scene took what they took. Scenes as a whole may be dearer or cheaper (rays side
+    /// by side go different ways, memory is far): by a factor that is 1 in the geometric mean.
     pub fn of(measured: &[Measured]) -> Prices {
         let mut layouts: Vec<String> = Vec::new();
         for m in measured {

@@ -15,8 +15,8 @@ use crate::scene::SplitMix64;
 /// Boxes of a sample, at most.
 const SIZE: usize = 4096;
 
-/// Cost of the LBVH of a sample of `boxes` after a pass of reinsertion over that before, as a logarithm to base 2: a gain is negative.
-/// The same every time. Not a number where boxes have no area.
+/// Cost of the LBVH of a sample of `boxes` after a pass of reinsertion over that before, as a logarithm to base 2: a gain is
+/// negative. The same every time. Not a number where boxes have no area.
 pub(super) fn gain(boxes: &[Aabb]) -> f64 {
     let lbvh = lbvh::build_aabbs(&sample(boxes), Codes::for_count(boxes.len() as u32), Collapse::OFF);
     (cost(&lbvh.reinserted(&reinsertion::Options::FAST)) / cost(&lbvh)).log2()
