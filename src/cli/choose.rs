@@ -4,7 +4,7 @@ use super::options::{RaysPerBuild, Size};
 use super::{Bar, Common, Json, tables, work};
 use crate::gpu::Device;
 use crate::measure::choose::calibration::{self, Effort};
-use crate::measure::choose::hindsight::{self, Choice, Pair, Taken};
+use crate::measure::choose::hindsight::{self, Choice, Miss, Pair, Taken};
 use crate::measure::choose::model::Measured;
 use crate::measure::choose::{DEFAULT_RAYS, Estimate, Features, Model, cache, candidates};
 use crate::report::names::short;
@@ -12,6 +12,10 @@ use crate::report::numbers::{duration, grouped, short_count, three_digits};
 use crate::scene::Scene;
 use std::io::Write;
 use std::num::NonZeroU32;
+use std::time::Instant;
+
+/// Milliseconds that a builder builds on a scene of `--hindsight`, and then no more.
+const ENOUGH_MS: f64 = 500.0;
 
 /// Say which builder auto takes for a scene and --rays-per-build, by the measured costs of this device
 #[derive(Debug, clap::Args)]
@@ -42,7 +46,10 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         cache::model_of(&device, arguments.recalibrate, &mut |what| bar.say(what))?
     };
     let rays = common.rays_per_build.map_or(DEFAULT_RAYS, |RaysPerBuild(rays)| rays);
-    let (mut choices, mut taken, mut all) = (Vec::new(), Vec::new(), Vec::new());
+    if arguments.scenes.is_empty() || arguments.recalibrate {
+        writeln!(std::io::stdout(), "{}\n", prices(&model))?;
+    }
+    let (mut choices, mut expected, mut all) = (Vec::new(), Vec::new(), Vec::new());
     for name in &arguments.scenes {
         let scene = common.load(name)?;
         if arguments.hindsight {
@@ -50,7 +57,8 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
             let measured = measured(common, arguments, &device, &scene)?;
             let text = beside_estimates(&model, &scene, &measured);
             writeln!(std::io::stdout(), "{text}\n")?;
-            taken.extend(measured.iter().map(Taken::from));
+            let estimates = model.estimates(&Features::of(&scene.mesh));
+            expected.extend(estimates.iter().map(|estimate| Taken::expected(&scene.name, estimate)));
             all.extend(measured);
         } else {
             writeln!(std::io::stdout(), "{}\n", estimates(&model, &scene, rays))?;
@@ -58,7 +66,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     }
     if arguments.hindsight {
         arguments.json.write_each(&all)?;
-        writeln!(std::io::stdout(), "{}", in_hindsight(&choices, &taken))?;
+        writeln!(std::io::stdout(), "{}", in_hindsight(&choices, &expected, &all))?;
     }
     work::finish(Some(&device), true)
 }
@@ -66,13 +74,22 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
 /// Every candidate measured on a scene, with all kinds of rays.
 fn measured(common: &Common, arguments: &Arguments, device: &Device, scene: &Scene) -> crate::Result<Vec<Measured>> {
     let _bar = Bar::new(common, &format!("measuring {}", scene.name), 0);
-    let effort = Effort { rays: arguments.size.rays(common.seed), runs: arguments.runs.get() };
+    let effort = Effort { rays: arguments.size.rays(common.seed), runs: arguments.runs.get(), enough_ms: ENOUGH_MS };
     calibration::on_scene(device, scene, &candidates::possible(device), &effort)
+}
+
+/// What the device asks for what rays do.
+fn prices(model: &Model) -> String {
+    let mut text = model.prices.lines().join("\n");
+    text += &format!("\ntimes of rays by these prices are right within {:.1}%", 100.0 * model.deviation.exp_m1());
+    text
 }
 
 /// What every candidate is expected to take, the choice marked.
 fn estimates(model: &Model, scene: &Scene, rays: f64) -> String {
+    let start = Instant::now();
     let features = Features::of(&scene.mesh);
+    let took = duration(start.elapsed().as_secs_f64() * 1e3);
     let chosen = model.choose(&features, rays).map(|estimate| estimate.builder);
     let mut table = tables::table(&["", "builder", "build", "a ray", "in all"], 2);
     for estimate in model.estimates(&features) {
@@ -85,7 +102,8 @@ fn estimates(model: &Model, scene: &Scene, rays: f64) -> String {
             duration(estimate.total_ms(rays)),
         ]);
     }
-    format!("{}, {} triangles, {} rays a build\n{table}", scene.name, grouped(features.triangles), short_count(rays))
+    let (name, triangles, rays) = (&scene.name, grouped(features.triangles), short_count(rays));
+    format!("{name}, {triangles} triangles, {rays} rays a build (its figures took {took})\n{table}")
 }
 
 /// What every candidate took beside what it was expected to take.
@@ -105,9 +123,13 @@ fn beside_estimates(model: &Model, scene: &Scene, measured: &[Measured]) -> Stri
     format!("{}, {} triangles\n{table}", scene.name, grouped(features.triangles))
 }
 
-/// Each choice beside the best, and the part that is good.
-fn in_hindsight(choices: &[Choice], taken: &[Taken]) -> String {
-    let pairs = hindsight::pairs(choices, taken);
+/// Of choices that are not good, so many are shown.
+const WORST: usize = 12;
+
+/// Each choice beside the best, the part that is good, and why the others are not.
+fn in_hindsight(choices: &[Choice], expected: &[Taken], measured: &[Measured]) -> String {
+    let taken: Vec<Taken> = measured.iter().map(Taken::from).collect();
+    let pairs = hindsight::pairs(choices, &taken);
     let mut table = tables::table(&["scene", "rays a build", "chosen", "best", "chosen / best"], 4);
     for pair in &pairs {
         let Pair { choice, best, .. } = pair;
@@ -121,9 +143,30 @@ fn in_hindsight(choices: &[Choice], taken: &[Taken]) -> String {
     }
     let percent = |part: f64| format!("{:.1}%", 100.0 * part);
     let part = hindsight::good_part(&pairs).map_or("–".into(), percent);
-    let mut text = format!("{table}\nwithin 10% of the best: {part} of {} choices\n", pairs.len());
-    for (builder, part) in hindsight::good_parts_of_each(&pairs, taken) {
+    let mut text = format!(
+        "{table}\n{}\nwithin 10% of the best: {part} of {} choices\n",
+        worst(&pairs, expected, &taken),
+        pairs.len()
+    );
+    for (builder, part) in hindsight::good_parts_of_each(&pairs, &taken) {
         text += &format!("  {} always: {}\n", builder, percent(part));
     }
     text
+}
+
+/// The worst choices with what was expected wrongly: how many times what was expected a build and a ray took.
+fn worst(pairs: &[Pair], expected: &[Taken], taken: &[Taken]) -> String {
+    let mut bad: Vec<&Pair> = pairs.iter().filter(|pair| pair.ratio() > 1.0 + hindsight::GOOD).collect();
+    bad.sort_by(|a, b| b.ratio().total_cmp(&a.ratio()));
+    let mut table =
+        tables::table(&["worst", "rays a build", "chosen / best", "chosen: build, ray", "best: build, ray"], 1);
+    for pair in bad.into_iter().take(WORST) {
+        let misses = hindsight::misses(pair, expected, taken);
+        let [chosen, best] = misses.map_or_else(Default::default, |misses| {
+            misses.map(|Miss { build, ray }| format!("× {build:.2}, × {ray:.2} of what was expected"))
+        });
+        let Choice { scene, rays, .. } = &pair.choice;
+        table.add_row([scene.clone(), short_count(*rays), format!("{:.3}", pair.ratio()), chosen, best]);
+    }
+    table.to_string()
 }

@@ -107,21 +107,21 @@ mod tests {
     fn choices_stand_beside_the_best_that_was_measured() {
         // Two candidates, and one that is none and is better than both.
         let records =
-            [record("lbvh:codes=mc30", 1.0, 1.0), record("lbvh", 2.0, 2.0), record("driver-fast-build", 0.1, 9.0)];
+            [record("lbvh", 1.0, 1.0), record("lbvh:width=8q", 2.0, 2.0), record("driver-fast-build", 0.1, 9.0)];
         let records: Vec<&Record> = records.iter().collect();
         let choice = |rays, builder: &str| Choice { scene: "a".into(), rays, builder: builder.into() };
         // 1 ms + 1 µs a ray against 2 ms + 0.5 µs: they meet at 2,000 rays.
-        let choices = [choice(1e4, "lbvh"), choice(1e5, "lbvh:codes=mc30"), choice(1e6, "lbvh:codes=emc64var")];
+        let choices = [choice(1e4, "lbvh:width=8q"), choice(1e5, "lbvh"), choice(1e6, "hploc:width=8q")];
         let taken: Vec<Taken> = records.iter().filter_map(|record| Taken::of(record)).collect();
         let pairs = hindsight::pairs(&choices, &taken);
         assert_eq!(pairs.len(), 2, "what was not measured has no time");
-        assert_eq!((pairs[0].ratio(), pairs[0].best.as_str()), (1.0, "lbvh"));
-        assert!((pairs[1].ratio() - 101.0 / 52.0).abs() < 1e-12 && pairs[1].best == "lbvh", "{:?}", pairs[1]);
+        assert_eq!((pairs[0].ratio(), pairs[0].best.as_str()), (1.0, "lbvh:width=8q"));
+        assert!((pairs[1].ratio() - 101.0 / 52.0).abs() < 1e-12 && pairs[1].best == "lbvh:width=8q", "{:?}", pairs[1]);
         assert_eq!(hindsight::good_part(&pairs), Some(0.5));
         let each = hindsight::good_parts_of_each(&pairs, &taken);
-        assert_eq!(each, [("lbvh:codes=mc30".to_owned(), 0.0), ("lbvh".to_owned(), 1.0)]);
+        assert_eq!(each, [("lbvh".to_owned(), 0.0), ("lbvh:width=8q".to_owned(), 1.0)]);
         let page = section(&choices, &records).into_string();
-        assert!(page.contains("1.94×") && page.contains("best: lbvh") && page.contains("50%"), "{page}");
+        assert!(page.contains("1.94×") && page.contains("best: lbvh width 8q") && page.contains("50%"), "{page}");
         assert_eq!(section(&choices[2..], &records).into_string(), "");
         assert_eq!(hindsight::good_part(&[]), None);
     }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Version of the figures' meaning: of the features, the scenes and the rays.
-const VERSION: u32 = 3;
+const VERSION: u32 = 6;
 
 /// What a file holds: the figures, and what they belong to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -105,6 +105,7 @@ fn write(path: &Path, calibration: &Calibration) -> Result<()> {
 mod tests {
     use super::*;
     use crate::measure::choose::Features;
+    use crate::measure::choose::prices::RayWork;
 
     fn calibration() -> Calibration {
         let key = Key {
@@ -114,9 +115,15 @@ mod tests {
             driver: "Mesa 25.0.7".into(),
             candidates: vec!["lbvh".into()],
         };
-        let features = Features { triangles: 12, values: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7] };
-        let measured =
-            Measured { scene: "a".into(), features, builder: "lbvh".into(), build_ms: 1.0 / 3.0, ray_ns: 1e3 };
+        let measured = Measured {
+            scene: "a".into(),
+            features: Features { triangles: 12, values: [0.1, 0.2, 0.3, 0.4, -0.5] },
+            builder: "lbvh".into(),
+            layout: "bvh2".into(),
+            build_ms: 1.0 / 3.0,
+            ray_ns: 1e3,
+            work: RayWork { steps: 7.25, tests: 2.0 / 3.0 },
+        };
         Calibration { key, measured: vec![measured] }
     }
 

@@ -3,6 +3,7 @@
 use super::candidates;
 use super::features::Features;
 use super::model::Measured;
+use super::prices::RayWork;
 use crate::bvh::codes::Code;
 use crate::bvh::host::lbvh;
 use crate::bvh::sah::Collapse;
@@ -42,6 +43,8 @@ pub const SCENES: [&str; 18] = [
 const RAYS: RayOptions = RayOptions { size: [48, 36], seed: 1 };
 /// Runs that count, after one that does not.
 const RUNS: u32 = 3;
+/// Milliseconds after which a builder has built enough on a scene.
+const ENOUGH_MS: f64 = 50.0;
 
 /// Measures every candidate that `device` can build on every scene of [`SCENES`]. `say` is told what is being done. A candidate that
 /// fails on a scene has no figures there.
@@ -57,7 +60,7 @@ pub fn measure(device: &Device, say: &mut dyn FnMut(&str)) -> Result<Vec<Measure
     for name in SCENES {
         say(&format!("calibrating on {name}"));
         let scene = load(name)?;
-        measured.extend(on_scene(device, &scene, &specs, &Effort { rays: RAYS, runs: RUNS })?);
+        measured.extend(on_scene(device, &scene, &specs, &Effort { rays: RAYS, runs: RUNS, enough_ms: ENOUGH_MS })?);
     }
     Ok(measured)
 }
@@ -81,12 +84,17 @@ pub struct Effort {
     pub rays: RayOptions,
     /// Runs that count, after one that does not.
     pub runs: u32,
+    /// A builder that has built twice, and for so many milliseconds, builds no more: what disturbs so long a time is small beside it.
+    pub enough_ms: f64,
 }
 
 /// A candidate on a scene.
 struct Entry<'a> {
     spec: &'a Spec,
     subject: Box<dyn Subject + 'a>,
+    builds_ms: Vec<f64>,
+    /// Steps and tests a ray.
+    work: RayWork,
 }
 
 /// The least times of builders on a scene, over several runs in turn: what disturbs a run only adds to it. One that fails has none.
@@ -97,29 +105,41 @@ pub fn on_scene(device: &Device, scene: &Scene, specs: &[Spec], effort: &Effort)
     let features = Features::of(&scene.mesh);
     let rays = rays(scene, &effort.rays)?;
     let count: usize = rays.iter().map(|(_, rays)| rays.len()).sum();
-    let mut entries: Vec<Entry<'_>> = specs
-        .iter()
-        .filter_map(|spec| Some(Entry { spec, subject: spec.make(Some(device), &scene.mesh).ok()? }))
-        .collect();
+    let entry = |spec| {
+        let subject = Spec::make(spec, Some(device), &scene.mesh).ok()?;
+        Some(Entry { spec, subject, builds_ms: Vec::new(), work: RayWork::default() })
+    };
+    let mut entries: Vec<Entry<'_>> = specs.iter().filter_map(entry).collect();
     // A run is a build and all rays; candidates take turns, as everything that is compared does.
     let runs = in_turn(&mut entries, 1, effort.runs, |entry| {
-        let build_ms = entry.subject.build()?.milliseconds;
+        let is_first = entry.builds_ms.is_empty();
+        // The first build may have waited for its kernels' code.
+        if entry.builds_ms.len() < 2 || entry.builds_ms.iter().sum::<f64>() < effort.enough_ms {
+            entry.builds_ms.push(entry.subject.build()?.milliseconds);
+        }
         let mut trace_ms = 0.0;
+        let mut work = Vec::new();
         for (query, rays) in rays.iter().filter(|(_, rays)| !rays.is_empty()) {
             entry.subject.set_rays(rays)?;
             trace_ms += entry.subject.trace(*query)?;
+            if is_first {
+                work.extend(entry.subject.work(*query)?.unwrap_or_default());
+            }
         }
-        Ok((build_ms, trace_ms))
+        if is_first {
+            entry.work = RayWork::mean(&work);
+        }
+        Ok(trace_ms)
     });
     let measured = entries.iter().zip(runs).filter_map(|(entry, runs)| {
-        let runs = runs.ok()?;
-        let least = |of: fn(&(f64, f64)) -> f64| Some(Spread::of(&runs.iter().map(of).collect::<Vec<_>>())?.min);
         Some(Measured {
             scene: scene.name.clone(),
             features,
             builder: entry.spec.to_string(),
-            build_ms: least(|run| run.0)?,
-            ray_ns: least(|run| run.1)? * 1e6 / count as f64,
+            layout: entry.subject.kind().into(),
+            build_ms: Spread::of(&entry.builds_ms)?.min,
+            ray_ns: Spread::of(&runs.ok()?)?.min * 1e6 / count as f64,
+            work: entry.work,
         })
     });
     Ok(measured.collect())

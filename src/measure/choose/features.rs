@@ -1,12 +1,13 @@
-//! What is known of a scene before anything is built: one pass over the boxes of its triangles.
+//! What is known of a scene before anything is built: one pass over the boxes of its triangles, and what reinsertion gains on a
+//! sample of them.
 
-use crate::bvh::codes::CodeBounds;
+use super::sample;
 use crate::bvh::layout::Aabb;
 use crate::scene::Mesh;
 use serde::{Deserialize, Serialize};
 
 /// How many figures describe a scene.
-pub const COUNT: usize = 7;
+pub const COUNT: usize = 5;
 
 /// As many octaves below the scene's diagonal a triangle may be: the bits of a float.
 const FINEST: f64 = 24.0;
@@ -24,52 +25,43 @@ pub struct Features {
 pub const NAMES: [&str; COUNT] = [
     // Triangles.
     "count",
-    // Diagonal of the scene over that of a triangle's box: the mean of the logarithms over all triangles.
-    "fineness",
-    // The standard deviation of these logarithms: 0 where all triangles are of a size.
-    "mixture",
-    // How much they are over 10, the bits of an axis in a 30-bit code, in the mean: what such a code cannot tell apart.
+    // How much the scene's diagonal over that of a triangle's box is beyond 10 octaves, the bits of an axis in a 30-bit code, in the
+    // mean: what such a code cannot tell apart.
     "blur",
-    // Area of the full bounds over that of the concise ones (Riemersma 2024, equation 15).
-    "fringe",
     // Area of the boxes of all triangles over that of the triangles on both sides: how empty boxes are.
     "hollowness",
     // Area of the boxes of all triangles over that of the scene's: how many of them a random ray meets.
     "crossing",
+    // Cost of the LBVH after reinsertion over that before, on a sample of the boxes: how much a better tree gains.
+    "reinsertion",
 ];
 
 impl Features {
     /// The figures of `mesh`. Of one without extent, those that are not numbers are 0.
     pub fn of(mesh: &Mesh) -> Features {
         let count = mesh.triangles.len();
-        let (mut bounds, mut centroids) = (Aabb::EMPTY, Aabb::EMPTY);
-        let (mut boxes, mut surface) = (0.0, 0.0);
-        let mut sizes: Vec<f64> = Vec::with_capacity(count);
+        let mut bounds = Aabb::EMPTY;
+        let (mut crossed, mut surface) = (0.0, 0.0);
+        let (mut boxes, mut sizes): (Vec<Aabb>, Vec<f64>) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for i in 0..count {
             let corners = mesh.corners(i);
             let around = Aabb::around(&corners);
-            let centroid = around.centroid();
             bounds = bounds.union(&around);
-            centroids = centroids.union(&Aabb { lo: centroid, hi: centroid });
+            boxes.push(around);
             sizes.push(diagonal(&around).log2());
-            boxes += half_area(&around);
+            crossed += half_area(&around);
             surface += area(&corners);
         }
         // In octaves; triangles without extent are as fine as floats tell apart.
         let scene = diagonal(&bounds).log2();
-        let octaves = || sizes.iter().map(|size| (scene - size).min(FINEST));
-        let mean = octaves().sum::<f64>() / count as f64;
-        let variance = octaves().map(|o| (o - mean).powi(2)).sum::<f64>() / count as f64;
-        let blur = octaves().map(|o| (o - 10.0).max(0.0)).sum::<f64>() / count as f64;
-        let concise = half_area(&CodeBounds::Concise.of(&bounds, &centroids));
+        let octaves = sizes.iter().map(|size| (scene - size).min(FINEST));
+        let blur = octaves.map(|o| (o - 10.0).max(0.0)).sum::<f64>() / count as f64;
         let values = [
             (count as f64).log2(),
-            mean,
-            variance.sqrt(),
             blur,
-            (half_area(&bounds) / concise).log2(),
-            (boxes / surface).log2(),
-            (boxes / half_area(&bounds)).log2(),
+            (crossed / surface).log2(),
+            (crossed / half_area(&bounds)).log2(),
+            sample::gain(&boxes),
         ];
         let number = |value: f64| if value.is_finite() { value } else { 0.0 };
         Features { triangles: count as u64, values: values.map(number) }
@@ -110,18 +102,8 @@ mod tests {
         let a = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
         let b = [[3.0, 0.0, 0.0], [9.0, 0.0, 0.0], [3.0, 8.0, 0.0]];
         let Features { triangles, values } = Features::of(&mesh(&[a, b]));
-        // The scene is 9 × 8; centroids lie from (1.5, 2) to (6, 4): concise bounds cut 1.5 and 2 from either side.
-        let concise: f64 = (9.0 - 3.0) * (8.0 - 4.0);
-        // An octave apart: each half of it from the mean.
-        let expected: [f64; COUNT] = [
-            1.0,
-            (145f64 / 50.0).log2() / 2.0,
-            0.5,
-            0.0,
-            (72.0 / concise).log2(),
-            (60.0f64 / 30.0).log2(),
-            (60.0f64 / 72.0).log2(),
-        ];
+        // The scene is 9 × 8. Of two boxes there is one tree.
+        let expected: [f64; COUNT] = [1.0, 0.0, (60.0f64 / 30.0).log2(), (60.0f64 / 72.0).log2(), 0.0];
         assert_eq!(triangles, 2);
         for ((name, value), expected) in NAMES.iter().zip(values).zip(expected) {
             assert!((value - expected).abs() < 1e-12, "{name}: {value}, {expected}");

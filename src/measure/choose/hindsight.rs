@@ -1,7 +1,6 @@
 //! Choices against what was measured: was the chosen builder the best, and if not, how much slower is it?
 
-use super::model::Measured;
-use super::model::Model;
+use super::model::{Estimate, Measured, Model};
 use super::{Features, candidates};
 use crate::measure::record::Record;
 use crate::measure::total_time::Line;
@@ -69,6 +68,36 @@ impl From<&Measured> for Taken {
     }
 }
 
+impl Taken {
+    /// What a candidate is expected to take on a scene.
+    pub fn expected(scene: &str, estimate: &Estimate) -> Taken {
+        let line = Line { build: estimate.build_ms, ray: estimate.ray_ns * 1e-6 };
+        Taken { scene: scene.to_owned(), builder: estimate.builder.clone(), line }
+    }
+}
+
+/// How many times what was expected of it a candidate took.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Miss {
+    /// For a build.
+    pub build: f64,
+    /// For a ray.
+    pub ray: f64,
+}
+
+/// Why a choice is not the best: what was expected wrongly of it and of the best; `None` where either was not expected or measured.
+pub fn misses(pair: &Pair, expected: &[Taken], taken: &[Taken]) -> Option<[Miss; 2]> {
+    let miss = |builder: &str| {
+        let line = |all: &[Taken]| {
+            let mut of_scene = all.iter().filter(|t| t.scene == pair.choice.scene);
+            Some(of_scene.find(|t| t.builder == builder)?.line)
+        };
+        let (expected, took) = (line(expected)?, line(taken)?);
+        Some(Miss { build: took.build / expected.build, ray: took.ray / expected.ray })
+    };
+    Some([miss(&pair.choice.builder)?, miss(&pair.best)?])
+}
+
 /// The choices for a scene, for all of [`RAYS`].
 pub fn choices(model: &Model, scene: &Scene) -> Vec<Choice> {
     let features = Features::of(&scene.mesh);
@@ -108,4 +137,25 @@ pub fn good_parts_of_each(pairs: &[Pair], taken: &[Taken]) -> Vec<(String, f64)>
         Some(((*builder).to_owned(), good_part(&self::pairs(&always, taken))?))
     };
     candidates::CANDIDATES.iter().filter_map(part).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_miss_is_what_was_taken_over_what_was_expected() {
+        let of = |scene: &str, builder: &str, build, ray| Taken {
+            scene: scene.into(),
+            builder: builder.into(),
+            line: Line { build, ray },
+        };
+        let expected = [of("b", "lbvh", 9.0, 9.0), of("a", "lbvh", 1.0, 2.0), of("a", "lbvh:width=8q", 4.0, 1.0)];
+        let taken = [of("a", "lbvh", 2.0, 0.5), of("a", "lbvh:width=8q", 2.0, 1.0)];
+        let choice = Choice { scene: "a".into(), rays: 10.0, builder: "lbvh:width=8q".into() };
+        let [pair] = &pairs(&[choice], &taken)[..] else { panic!("one choice") };
+        let [chosen, best] = misses(pair, &expected, &taken).expect("both are there");
+        assert_eq!((chosen, best), (Miss { build: 0.5, ray: 1.0 }, Miss { build: 2.0, ray: 0.25 }));
+        assert_eq!(misses(pair, &expected[..1], &taken), None);
+    }
 }

@@ -1,6 +1,7 @@
 //! The cost model: build time and time of a ray of every candidate, from the figures of a scene.
 
 use super::features::{COUNT, Features};
+use super::prices::{Prices, RayWork};
 use super::ridge::{Ridge, Sample};
 use crate::measure::total_time::Line;
 use serde::{Deserialize, Serialize};
@@ -14,10 +15,14 @@ pub struct Measured {
     pub features: Features,
     /// The candidate, as `-b` takes it.
     pub builder: String,
+    /// The layout of its tree: `bvh2`, `wide8q`…
+    pub layout: String,
     /// Milliseconds of a build.
     pub build_ms: f64,
     /// Nanoseconds of a ray, over all kinds together.
     pub ray_ns: f64,
+    /// What rays did, over all kinds together.
+    pub work: RayWork,
 }
 
 /// What a candidate is expected to take.
@@ -40,13 +45,21 @@ impl Estimate {
 
 /// A model of measured candidates.
 ///
-/// A build takes a + b · triangles, times what the other figures make of it; a ray what the figures make of it for all candidates
-/// together, times what they make of a candidate's part. "What they make of" is the exponential of a linear function.
+/// A build takes a + b · triangles, times what the other figures make of it; a ray what the figures make of it for the best
+/// candidate, times what they make of how much worse another is. "What they make of" is the exponential of a linear function.
 #[derive(Debug, Clone)]
 pub struct Model {
+    /// What rays' work costs.
+    pub prices: Prices,
+    /// Standard deviation of the logarithm of times of rays over what the prices make of them.
+    pub deviation: f64,
     ray: Ridge,
     candidates: Vec<Candidate>,
 }
+
+/// The logarithm of how many times the best candidate's ray another's takes, at most: by how much more it is worse would only draw
+/// the weights away from where candidates are near each other.
+const MOST: f64 = 1.5;
 
 #[derive(Debug, Clone)]
 struct Candidate {
@@ -58,7 +71,8 @@ struct Candidate {
 }
 
 impl Model {
-    /// A model of what was measured. Scenes that not all candidates were measured on are left out.
+    /// A model of what was measured, with the prices of what rays did in place of their times. Scenes that not all candidates were
+    /// measured on are left out.
     pub fn of(measured: &[Measured]) -> Model {
         let mut builders: Vec<&str> = Vec::new();
         let mut scenes: Vec<&Measured> = Vec::new();
@@ -72,12 +86,17 @@ impl Model {
         }
         let of = |scene: &str, builder: &str| measured.iter().find(|m| m.scene == scene && m.builder == builder);
         scenes.retain(|scene| builders.iter().all(|builder| of(&scene.scene, builder).is_some_and(is_positive)));
-        // Mean of the logarithms over the candidates.
+        let complete: Vec<Measured> =
+            measured.iter().filter(|m| scenes.iter().any(|scene| scene.scene == m.scene)).cloned().collect();
+        let prices = Prices::of(&complete);
+        let deviation = prices.deviation(&complete);
+        let measured = prices.applied(&complete);
+        let of = |scene: &str, builder: &str| measured.iter().find(|m| m.scene == scene && m.builder == builder);
         let all: Vec<Sample> = scenes
             .iter()
             .map(|scene| {
                 let logs = builders.iter().filter_map(|builder| Some(of(&scene.scene, builder)?.ray_ns.ln()));
-                (scene.features.values, logs.sum::<f64>() / builders.len() as f64)
+                (scene.features.values, logs.fold(f64::INFINITY, f64::min))
             })
             .collect();
         let candidate = |builder: &&str| {
@@ -86,7 +105,7 @@ impl Model {
             let build_factors: Vec<Sample> =
                 own.iter().map(|m| (m.features.values, (m.build_ms / at(build, m.features.triangles)).ln())).collect();
             let ray_factors: Vec<Sample> =
-                own.iter().zip(&all).map(|(m, (x, mean))| (*x, m.ray_ns.ln() - mean)).collect();
+                own.iter().zip(&all).map(|(m, (x, least))| (*x, (m.ray_ns.ln() - least).min(MOST))).collect();
             Candidate {
                 builder: (*builder).to_owned(),
                 build,
@@ -94,13 +113,14 @@ impl Model {
                 ray_factor: Ridge::fit(&ray_factors),
             }
         };
-        Model { ray: Ridge::fit(&all), candidates: builders.iter().map(candidate).collect() }
+        let candidates = builders.iter().map(candidate).collect();
+        Model { prices, deviation, ray: Ridge::fit(&all), candidates }
     }
 
     /// What every candidate is expected to take on a scene.
     pub fn estimates(&self, features: &Features) -> Vec<Estimate> {
         let x = &features.values;
-        let all = self.ray.at(x);
+        let all = self.ray.at_any_size(x);
         let estimate = |candidate: &Candidate| Estimate {
             builder: candidate.builder.clone(),
             build_ms: at(candidate.build, features.triangles) * candidate.build_factor.at(&shape(x)).exp(),
@@ -162,7 +182,7 @@ mod tests {
     use super::*;
 
     fn features(triangles: u64, crossing: f64) -> Features {
-        Features { triangles, values: [(triangles as f64).log2(), 0.0, 0.0, 0.0, 0.0, 0.0, crossing] }
+        Features { triangles, values: [(triangles as f64).log2(), 0.0, 0.0, crossing, 0.0] }
     }
 
     /// One that builds fast and traces slowly, all the more where rays cross many boxes, and one that does the opposite.
@@ -174,8 +194,11 @@ mod tests {
                 scene: scene.clone(),
                 features: features(n, crossing),
                 builder: builder.into(),
+                layout: "bvh2".into(),
                 build_ms,
                 ray_ns,
+                // At 20 ns a step.
+                work: RayWork { steps: 0.05 * ray_ns, tests: 0.0 },
             };
             let n = n as f64;
             [m("fast", 0.5 + 1e-4 * n, ray * (0.1 * crossing).exp2()), m("good", 2.0 + 3e-4 * n, 0.8 * ray)]

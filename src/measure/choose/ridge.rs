@@ -63,11 +63,18 @@ impl Ridge {
         Ridge { x_mean, weights, y_mean, least, most }
     }
 
-    /// The prediction. Figures outside of those of the samples count as the nearest that was seen; the first of them, the size of
-    /// the scene, may go on.
+    /// The prediction. Figures outside of those of the samples count as the nearest that was seen.
     pub fn at(&self, x: &[f64; COUNT]) -> f64 {
-        let seen = |k: usize| if k == 0 { x[0] } else { x[k].max(self.least[k]).min(self.most[k]) };
-        (0..COUNT).fold(self.y_mean, |y, k| y + self.weights[k] * (seen(k) - self.x_mean[k]))
+        self.at_seen(std::array::from_fn(|k| x[k].max(self.least[k]).min(self.most[k])))
+    }
+
+    /// The same, but that the first figure, the size of the scene, may go on.
+    pub fn at_any_size(&self, x: &[f64; COUNT]) -> f64 {
+        self.at_seen(std::array::from_fn(|k| if k == 0 { x[0] } else { x[k].max(self.least[k]).min(self.most[k]) }))
+    }
+
+    fn at_seen(&self, x: [f64; COUNT]) -> f64 {
+        (0..COUNT).fold(self.y_mean, |y, k| y + self.weights[k] * (x[k] - self.x_mean[k]))
     }
 }
 
