@@ -15,7 +15,9 @@ use hedgerow::bvh::{refit, reinsertion};
 use hedgerow::trace::wide::Order;
 use hedgerow::trace::{Query, Ray, host as tracer, wide_host};
 
-const FRACTIONS: [f32; 2] = [0.3, 1.0];
+/// The usual, and as much as there may be.
+const SPLITS: [split::Options; 2] = [split::Options::DEFAULT, ALL];
+const ALL: split::Options = split::Options { fraction: 1.0, most: split::Options::MOST_SPLITS };
 
 fn soup(name: &str, triangles: Vec<[[f32; 3]; 3]>) -> corpus::Mesh {
     let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
@@ -41,7 +43,8 @@ fn grazing() -> corpus::Mesh {
         }
     };
     let random = (0..200).map(|_| std::array::from_fn(|_| std::array::from_fn(|_| near_plane())));
-    let floor = [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1.0]], [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 0.0]]];
+    let floor =
+        [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1.0]], [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 0.0]]];
     soup("grazing", random.chain(floor).collect())
 }
 
@@ -108,7 +111,7 @@ fn every_method_gives_the_bytes_of_the_host() {
     let (codes, collapse) = (Code::Emc64Var.full(), Collapse::SAH);
     for mesh in meshes() {
         for (i, method) in methods.into_iter().enumerate() {
-            let split = split::Options { fraction: FRACTIONS[i % 2] };
+            let split = SPLITS[i % 2];
             let expected = match method {
                 // Its own collapsing leaves other bytes in slots that fall out.
                 Method::Lbvh => host::split::build(&mesh.1, &mesh.2, &split, codes, collapse),
@@ -140,8 +143,7 @@ fn codes_with_a_grid_or_sections_and_optimised_trees_are_those_of_the_host() {
         let optimise = reinsertion::Options { passes: 3, stride: 2 };
         let tree = on_host(&mesh, &split, codes, Method::Lbvh).reinserted(&optimise).collapsed(&Collapse::SAH);
         tree.validate().expect("valid");
-        let options =
-            Options { codes: Some(codes), split: Some(split), optimise: Some(optimise), ..Options::DEFAULT };
+        let options = Options { codes: Some(codes), split: Some(split), optimise: Some(optimise), ..Options::DEFAULT };
         assert_same(&on_device(&mesh, &options), &tree, &format!("{} optimised", mesh.0));
     }
 }
@@ -150,8 +152,7 @@ fn codes_with_a_grid_or_sections_and_optimised_trees_are_those_of_the_host() {
 fn splits_are_within_the_budget_and_lower_the_cost_where_few_triangles_are_large() {
     for mesh in meshes() {
         let count = mesh.2.len() as u32;
-        for fraction in FRACTIONS {
-            let split = split::Options { fraction };
+        for split in SPLITS {
             let tree = on_host(&mesh, &split, Code::Emc64Var.full(), Method::Lbvh);
             let whole = host::lbvh::build(&mesh.1, &mesh.2, Code::Emc64Var.full(), Collapse::OFF);
             assert_eq!(tree.header.primitive_count, count + split.budget(count), "{}", mesh.0);
@@ -160,8 +161,8 @@ fn splits_are_within_the_budget_and_lower_the_cost_where_few_triangles_are_large
             assert_eq!(tree.header.root.bounds(), whole.header.root.bounds(), "{}", mesh.0);
             if mesh.0 == "mixed" {
                 assert!(tree.header.active > whole.header.active, "{}: nothing was split", mesh.0);
-                let (split, whole) = [&tree, &whole].map(|t| t.collapsed(&Collapse::SAH).header.sah()).into();
-                assert!(split < whole, "{}: {split} with {fraction}, {whole} without", mesh.0);
+                let (with, whole) = [&tree, &whole].map(|t| t.collapsed(&Collapse::SAH).header.sah()).into();
+                assert!(with < whole, "{}: {with} with {split:?}, {whole} without", mesh.0);
             }
         }
     }
@@ -170,7 +171,7 @@ fn splits_are_within_the_budget_and_lower_the_cost_where_few_triangles_are_large
 #[test]
 fn a_fraction_too_small_for_one_split_gives_the_tree_without() {
     let mesh = large(130);
-    let split = split::Options { fraction: 0.005 };
+    let split = split::Options { fraction: 0.005, ..ALL };
     let options = Options { split: Some(split), codes: Some(Code::Mc63.full()), ..Options::DEFAULT };
     let tree = on_device(&mesh, &options);
     assert_same(&tree, &host::lbvh::build(&mesh.1, &mesh.2, Code::Mc63.full(), Collapse::SAH), "as without");
@@ -181,7 +182,8 @@ fn rays_at((_, positions, triangles): &corpus::Mesh, tree: &Bvh2) -> Vec<Ray> {
     let mut next = corpus::unit_floats(77);
     let bounds = tree.header.root.bounds();
     let extent: [f32; 3] = bounds.extent().map(|e| if e > 0.0 && e.is_finite() { e } else { 1.0 });
-    let leaves: Vec<Aabb> = tree.nodes.iter().filter(|n| n.is_used()).flat_map(|n| n.children).map(|c| c.bounds()).collect();
+    let leaves: Vec<Aabb> =
+        tree.nodes.iter().filter(|n| n.is_used()).flat_map(|n| n.children).map(|c| c.bounds()).collect();
     let mut rays = Vec::new();
     for i in 0..1500 {
         let Some(triangle) = triangles.get(next_index(&mut next, triangles.len())) else { break };
@@ -222,7 +224,7 @@ fn no_ray_loses_a_hit() {
         let codes = Code::Emc64Var.full();
         let whole = host::lbvh::build(&mesh.1, &mesh.2, codes, Collapse::SAH);
         for collapse in [Collapse::OFF, Collapse::SAH] {
-            let tree = on_host(&mesh, &split::Options { fraction: 1.0 }, codes, Method::Hploc(Window::DEFAULT));
+            let tree = on_host(&mesh, &ALL, codes, Method::Hploc(Window::DEFAULT));
             let tree = tree.collapsed(&collapse);
             tree.validate().unwrap_or_else(|e| panic!("{}: {e}", mesh.0));
             let (wide4, wide8, quantised) = (Wide4::of(&tree), Wide8::of(&tree), Wide8q::of(&tree));
@@ -263,7 +265,7 @@ fn a_compacted_split_tree_is_valid_and_has_the_same_hits() {
 #[test]
 fn validation_sees_a_part_that_is_lost() {
     let mesh = large(130);
-    let tree = on_host(&mesh, &split::Options { fraction: 1.0 }, Code::Emc64Var.full(), Method::Lbvh);
+    let tree = on_host(&mesh, &ALL, Code::Emc64Var.full(), Method::Lbvh);
     tree.validate().expect("valid");
     // A leaf that gives up an inner tenth of its box loses some of its triangle, and the boxes above stay what they are.
     let mut seen = 0;
@@ -284,8 +286,12 @@ fn what_cannot_be_split_says_so() {
     let options = Options { split: Some(split::Options::DEFAULT), ..Options::DEFAULT };
     let error = |options: &Options| Builder::new(device, options, 1000).map(drop).expect_err("refused").to_string();
     for fraction in [-0.1, 1.1, f32::NAN] {
-        let options = Options { split: Some(split::Options { fraction }), ..options };
+        let options = Options { split: Some(split::Options { fraction, ..ALL }), ..options };
         assert!(error(&options).contains("the fraction of splits is 0 to 1"), "{fraction}");
+    }
+    for most in [0, 1024] {
+        let options = Options { split: Some(split::Options { most, ..ALL }), ..options };
+        assert!(error(&options).contains("that is 1 to 1023"), "{most}");
     }
     assert!(error(&Options { primitives: Primitives::Boxes, ..options }).contains("only triangles"));
     assert!(error(&Options { schedule: Some(Schedule::Workgroup), ..options }).contains("choose chain, or none"));
@@ -302,7 +308,7 @@ fn what_cannot_be_split_says_so() {
 #[test]
 fn memory_grows_by_the_budget() {
     let sizes = |split| Builder::new(device(), &Options { split, ..Options::DEFAULT }, 10_000).unwrap().sizes();
-    let (without, with) = (sizes(None), sizes(Some(split::Options { fraction: 0.5 })));
+    let (without, with) = (sizes(None), sizes(Some(split::Options { fraction: 0.5, ..ALL })));
     // A node and a record for each reference.
     assert_eq!(with.structure - without.structure, 5000 * (64 + 40));
     assert!(with.scratch > without.scratch + 15_000 * 32, "room for the references");

@@ -32,6 +32,7 @@ layout(push_constant, scalar) uniform Arguments {
     uint formats;
     uint primitive_count;
     uint reference_count;       // at most
+    uint most_splits;           // of a triangle
 };
 
 // Of a triangle that is not split.
@@ -118,7 +119,7 @@ uint weight_of(SplitGrid grid, Corners c) {
     return weight < 0 ? NO_WEIGHT : min(uint(weight), SPLIT_WEIGHTS - 1);
 }
 
-// The splits of a triangle: the cube root of weight times factor, rounded down.
+// The splits of a triangle: the cube root of weight times factor, rounded down, or as many as it may have.
 uint splits_of(uint weight, uint factor) {
     if (weight == NO_WEIGHT) return 0;
     // Sixteenths of mantissas, and exponents.
@@ -131,7 +132,7 @@ uint splits_of(uint weight, uint factor) {
         uint larger = root | 1 << bit;
         if (larger * larger * larger <= cube) root = larger;
     }
-    return root;
+    return min(root, most_splits);
 }
 
 void weigh_triangles(uint task) {

@@ -234,10 +234,19 @@ impl Builder {
                 radix_sort::MAX_COUNT
             )));
         }
-        options.split.map_or(Ok(()), |split| split.check(options.primitives))?;
+        if let Some(split) = options.split {
+            split.check()?;
+            if options.primitives != Primitives::Triangles {
+                return Err(Error::Argument(format!(
+                    "{:?} cannot be split, only triangles; build without split",
+                    options.primitives
+                )));
+            }
+        }
         let budget = options.split.map_or(0, |split| split.budget(primitive_count));
         let budget = budget.min(radix_sort::MAX_COUNT - primitive_count);
-        let split = (budget > 0).then(|| Split::new(&context.limits, primitive_count));
+        let split = options.split.filter(|_| budget > 0);
+        let split = split.map(|split| Split::new(&context.limits, &split, primitive_count));
         // From here on, what the tree is over.
         let count = primitive_count + budget;
         options.method.check()?;

@@ -186,8 +186,7 @@ impl Encode {
     /// The input's geometry as the kernels are given it, and its formats.
     pub fn checked(&self, input: &Input) -> Result<(Geometry, u32)> {
         let primitive_count = self.split.map_or(self.count, |split| split.primitives);
-        let planned =
-            Planned { primitives: self.primitives, primitive_count, geometry_count: self.geometry_count };
+        let planned = Planned { primitives: self.primitives, primitive_count, geometry_count: self.geometry_count };
         planned.check(input)?;
         self.split.map_or(Ok(()), |split| split.check(input))?;
         Ok(input.for_kernels())

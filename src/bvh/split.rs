@@ -3,8 +3,8 @@
 //!
 //! A triangle's *weight* is X · (A_box − A_ideal): the half area of its box, less that of as many boxes as one likes (half the
 //! sum of the components of its edges' cross product), times X = 2⁻ⁱ for the most important plane that its box crosses, i being
-//! how many halvings of the scene's longest extent the plane's spacing is. It has s = ⌊∛(F · weight)⌋ splits, F the greatest that
-//! keeps the sum of all within the budget. The planes are those that halve the scene's box along each axis, over and over; a part
+//! how many halvings of the scene's longest extent the plane's spacing is. It has s = ⌊∛(F · weight)⌋ splits, or as many as one
+//! triangle may have, F the greatest that keeps the sum of all within the budget. The planes are those that halve the scene's box along each axis, over and over; a part
 //! is split at the one of the greatest spacing that lies inside of its box, and the other splits are given to the two halves by
 //! their longest sides.
 //!
@@ -18,7 +18,7 @@
 //! `glsl/bvh/split.glsl` is the device's side.
 
 use super::encode::Encode;
-use super::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
+use super::geometry::{Geometry, GeometryFlags, Input, Source};
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::scan::{self, Scan};
 use crate::gpu::{Kernel, Limits, Step, shaders};
@@ -28,15 +28,20 @@ use bytemuck::{Pod, Zeroable};
 /// How much may be split.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Splits, at most, as a part of the primitives: 0 to [`Options::MOST`]. Structure and scratch memory grow by as much.
+    /// Splits, at most, as a part of the primitives: 0 to [`Options::MOST_FRACTION`]. Structure and scratch memory grow by as much.
     pub fraction: f32,
+    /// Splits of one triangle, at most: 1 to [`Options::MOST_SPLITS`].
+    pub most: u32,
 }
 
 impl Options {
-    /// The paper's: 30% more references than triangles, at most.
-    pub const DEFAULT: Options = Options { fraction: 0.3 };
+    /// The paper's 30% more references than triangles, at most; and at most 7 splits of each, which measured well
+    /// (docs/splitting.md).
+    pub const DEFAULT: Options = Options { fraction: 0.3, most: 7 };
     /// As many splits as triangles.
-    pub const MOST: f32 = 1.0;
+    pub const MOST_FRACTION: f32 = 1.0;
+    /// What the budget alone bounds, as the paper has it, but for this.
+    pub const MOST_SPLITS: u32 = 1023;
 
     /// Splits of so many primitives, at most.
     pub fn budget(&self, primitive_count: u32) -> u32 {
@@ -44,17 +49,21 @@ impl Options {
     }
 
     /// # Errors
-    /// A fraction out of range; primitives that are no triangles.
-    pub(super) fn check(&self, primitives: Primitives) -> Result<()> {
-        if !(0.0..=Options::MOST).contains(&self.fraction) {
+    /// A fraction or a number of splits out of range.
+    pub fn check(&self) -> Result<()> {
+        if !(0.0..=Options::MOST_FRACTION).contains(&self.fraction) {
             return Err(Error::Argument(format!(
                 "split by {}: the fraction of splits is 0 to {}",
                 self.fraction,
-                Options::MOST
+                Options::MOST_FRACTION
             )));
         }
-        if primitives != Primitives::Triangles {
-            return Err(Error::Argument(format!("{primitives:?} cannot be split, only triangles; build without split")));
+        if !(1..=Options::MOST_SPLITS).contains(&self.most) {
+            return Err(Error::Argument(format!(
+                "at most {} splits of a triangle: that is 1 to {}",
+                self.most,
+                Options::MOST_SPLITS
+            )));
         }
         Ok(())
     }
@@ -85,6 +94,7 @@ pub struct Reference {
 pub(super) struct Split {
     /// Triangles of the input.
     pub primitives: u32,
+    most: u32,
     scan: Scan,
 }
 
@@ -105,13 +115,13 @@ push_constants! {
         formats: u32,
         primitive_count: u32,
         reference_count: u32,
-        padding: u32,
+        most_splits: u32,
     }
 }
 
 impl Split {
-    pub fn new(limits: &Limits, primitives: u32) -> Split {
-        Split { primitives, scan: Scan::new(limits, primitives) }
+    pub fn new(limits: &Limits, options: &Options, primitives: u32) -> Split {
+        Split { primitives, most: options.most, scan: Scan::new(limits, primitives) }
     }
 
     /// Bytes of scratch memory before the build's state.
@@ -159,7 +169,7 @@ impl Split {
             formats,
             primitive_count: self.primitives,
             reference_count: build.primitive_count,
-            padding: 0,
+            most_splits: self.most,
         };
         let step = |shader, groups| Step::new("split", encode.unsplit_kernel(shader, input), &arguments, groups);
         let tiles = encode.tiles_of(self.primitives);

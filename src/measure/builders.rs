@@ -16,8 +16,8 @@ use crate::bvh::builder::{self, Method, Schedule, Treelets, Window};
 use crate::bvh::codes::Codes;
 use crate::bvh::host::sweep::Leaves;
 use crate::bvh::reinsertion;
-use crate::bvh::split;
 use crate::bvh::sah::Collapse;
+use crate::bvh::split;
 use crate::bvh::wide::Form;
 use crate::gpu::{Device, DriverPreference};
 use crate::scene::Mesh;
@@ -78,8 +78,10 @@ const TERMINATION: BuilderOption =
     BuilderOption { key: "termination", values: "sah, or off: leaves of one triangle, then collapsed" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
 
-const SPLIT: BuilderOption =
-    BuilderOption { key: "split", values: "a number from 0 to 1: splits of large triangles at most, as a part of all" };
+const SPLIT: BuilderOption = BuilderOption {
+    key: "split",
+    values: "a number from 0 to 1: splits of large triangles at most, as a part of all; with /N behind: of each at most N",
+};
 
 const OPTIMISE: BuilderOption =
     BuilderOption { key: "optimise", values: "off, fast, medium, high, or a number of passes of reinsertion" };
@@ -372,12 +374,12 @@ impl Spec {
     /// Option `split`; `None` where it was not given or is 0.
     fn split(&self) -> Result<Option<split::Options>> {
         let Some(value) = self.option(SPLIT.key) else { return Ok(None) };
-        match value.parse() {
-            Ok(fraction) if (0.0..=split::Options::MOST).contains(&fraction) => {
-                Ok((fraction > 0.0).then_some(split::Options { fraction }))
-            }
-            _ => Err(self.wrong_value(&SPLIT, value)),
-        }
+        let (fraction, most) = value.split_once('/').unwrap_or((value, ""));
+        let most = if most.is_empty() { Ok(split::Options::DEFAULT.most) } else { most.parse() };
+        let (Ok(fraction), Ok(most)) = (fraction.parse(), most) else { return Err(self.wrong_value(&SPLIT, value)) };
+        let options = split::Options { fraction, most };
+        options.check().map_err(|_| self.wrong_value(&SPLIT, value))?;
+        Ok((fraction > 0.0).then_some(options))
     }
 
     /// Options `codes`, `split`, `optimise`, `collapse` and `schedule`.
@@ -572,7 +574,7 @@ mod tests {
         assert!(
             error_of("lbvh:width=4:order=octant").contains("order=octant is not known; take distance or octant (of")
         );
-        for wrong in ["lots", "-0.1", "1.5", "nan"] {
+        for wrong in ["lots", "-0.1", "1.5", "nan", "0.3/0", "0.3/x"] {
             let says = format!("split={wrong} is not known; take a number from 0 to 1");
             assert!(error_of(&format!("hploc:split={wrong}")).contains(&says), "{wrong}");
         }

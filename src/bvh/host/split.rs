@@ -77,7 +77,7 @@ pub fn references(corners: &[Corners], options: &Options) -> Vec<Reference> {
     let bounds = corners.iter().flatten().fold(Aabb::EMPTY, |b, c| b.union(&Aabb::around(c)));
     let grid = Grid::over(&bounds);
     let weights: Vec<Option<u32>> = corners.iter().map(|c| grid.weight_of(c.as_ref().ok()?)).collect();
-    let splits_of_weight = splits_within(budget, &weights);
+    let splits_of_weight = splits_within(budget, options.most, &weights);
     let none = Reference { lo: [0.0; 3], primitive: u32::MAX, hi: [0.0; 3], left_out: INACTIVE };
     let mut others = Vec::new();
     let mut references: Vec<Reference> = Vec::with_capacity((count + budget) as usize);
@@ -97,11 +97,12 @@ pub fn references(corners: &[Corners], options: &Options) -> Vec<Reference> {
 }
 
 /// How many splits each weight has, by the greatest factor with which the sum of all is within the budget.
-fn splits_within(budget: u32, weights: &[Option<u32>]) -> Vec<u32> {
+fn splits_within(budget: u32, most: u32, weights: &[Option<u32>]) -> Vec<u32> {
     let mut histogram = [0u64; WEIGHTS as usize];
     for weight in weights.iter().flatten() {
         histogram[*weight as usize] += 1;
     }
+    let splits_of = |weight, factor| splits_of(weight, factor).min(most);
     let sum = |factor| -> u64 {
         let there = histogram.iter().zip(0..).filter(|&(&count, _)| count > 0);
         there.map(|(count, weight)| count * u64::from(splits_of(weight, factor))).sum()
@@ -159,8 +160,7 @@ struct Plane {
 
 impl Grid {
     fn over(scene: &Aabb) -> Grid {
-        let mut grid =
-            Grid { lo: scene.lo, cell: [0.0; 3], cells_per_length: [0.0; 3], level: [0; 3], scale: 0.0 };
+        let mut grid = Grid { lo: scene.lo, cell: [0.0; 3], cells_per_length: [0.0; 3], level: [0; 3], scale: 0.0 };
         let extent = scene.extent();
         let longest = biased_exponent(extent.into_iter().fold(f32::NEG_INFINITY, f32::max));
         if scene.lo[0] > scene.hi[0] || !EXPONENTS.contains(&longest) {
@@ -218,9 +218,8 @@ impl Grid {
         let plane = self.plane_in(&b)?;
         let [v0, v1, v2] = *corners;
         let kept = |x: f32| if x.abs() < power_of_two(-40) { 0.0 } else { x };
-        let scaled = |a: [f32; 3], b: [f32; 3]| -> [f32; 3] {
-            std::array::from_fn(|i| kept((b[i] - a[i]) * self.scale))
-        };
+        let scaled =
+            |a: [f32; 3], b: [f32; 3]| -> [f32; 3] { std::array::from_fn(|i| kept((b[i] - a[i]) * self.scale)) };
         let (e, p, q) = (scaled(b.lo, b.hi), scaled(v0, v1), scaled(v0, v2));
         let normal: [f32; 3] = std::array::from_fn(|i| {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
