@@ -5,7 +5,7 @@ mod common;
 use common::{corpus, device};
 use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Source, Treelets, Window};
 use hedgerow::bvh::codes::{Code, Codes};
-use hedgerow::bvh::geometry::{Geometry, GeometryFlags, Primitives};
+use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, Primitives};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::{Aabb, Bvh2};
 use hedgerow::bvh::sah::Collapse;
@@ -312,4 +312,65 @@ fn memory_grows_by_the_budget() {
     // A node and a record for each reference.
     assert_eq!(with.structure - without.structure, 5000 * (64 + 40));
     assert!(with.scratch > without.scratch + 15_000 * 32, "room for the references");
+}
+
+/// The tree by the chain over `input`, of as many geometries as it has.
+fn built(options: &Options, input: &Input) -> (Bvh2, Vec<u8>) {
+    let device = device();
+    let builder = Builder::new(device, options, input.primitive_count).unwrap();
+    let sizes = builder.sizes();
+    let structure = device.buffer("structure", sizes.structure).unwrap();
+    let scratch = device.buffer("scratch", sizes.scratch).unwrap();
+    device.run(None, |r| builder.record(r, input, structure.address(), scratch.address())).unwrap();
+    let bytes = structure.read::<u8>(sizes.structure as usize);
+    (Bvh2::from_bytes(&bytes).unwrap(), bytes)
+}
+
+#[test]
+fn triangles_of_other_formats_and_of_several_geometries_are_split_alike() {
+    let (device, mesh) = (device(), mixed());
+    let (codes, split) = (Code::Emc64Var.full(), split::Options::DEFAULT);
+    let expected = host::split::build(&mesh.1, &mesh.2, &split, codes, Collapse::SAH);
+    let options = Options { codes: Some(codes), split: Some(split), ..Options::DEFAULT };
+    let count = mesh.2.len() as u32;
+    // Each triangle has vertices of its own, in order: they need no indices.
+    let vertices = device.upload("positions", &mesh.1).unwrap();
+    let whole = Geometry { index_format: IndexFormat::NONE, ..Geometry::mesh(vertices.address(), 3 * count, 0) };
+    let (tree, _) = built(&options, &Input { source: Source::One(whole), primitive_count: count });
+    assert_same(&tree, &expected, "without indices");
+
+    const FIRST: u32 = 300;
+    let second = Geometry {
+        vertices: vertices.address() + 36 * u64::from(FIRST),
+        vertex_count: 3 * (count - FIRST),
+        first: FIRST,
+        ..whole
+    };
+    let records = device.upload("geometries", &[Geometry { vertex_count: 3 * FIRST, ..whole }, second]).unwrap();
+    let source = Source::Several { records: records.address(), count: 2 };
+    let options = Options { geometry_count: 2, ..options };
+    let (tree, bytes) = built(&options, &Input { source, primitive_count: count });
+    let expected = expected.with_geometries(&[(FIRST, 0), (count - FIRST, 0)], 0);
+    assert_eq!(tree.header, expected.header);
+    assert!(bytes == expected.to_bytes(), "two geometries: other bytes");
+}
+
+#[test]
+fn a_refit_leaves_a_split_structure_as_it_is() {
+    let (device, mesh) = (device(), mixed());
+    let (count, codes) = (mesh.2.len() as u32, Code::Emc64Var.full());
+    let tree = on_host(&mesh, &split::Options::DEFAULT, codes, Method::Lbvh).collapsed(&Collapse::SAH);
+    // As large as one without splits, so that nothing but the header tells.
+    let before = tree.compacted().to_bytes();
+    let planned = tree.header.active;
+    let refit = refit::Refit::new(device, &refit::Options::DEFAULT, planned).unwrap();
+    let positions: Vec<[f32; 3]> = mesh.1.iter().map(|p| p.map(|x| x + 1.0)).collect();
+    let vertices = device.upload("positions", &positions).unwrap();
+    let indices = device.upload("indices", &mesh.2).unwrap();
+    let structure = device.upload("structure", &before).unwrap();
+    let scratch = device.buffer("scratch", refit.sizes().scratch).unwrap();
+    // Room for more triangles than there are: none is read.
+    let input = Input::mesh(vertices.address(), 3 * count, indices.address(), planned);
+    device.run(None, |r| refit.record(r, &input, structure.address(), scratch.address())).unwrap();
+    assert!(structure.read::<u8>(before.len()) == before, "other bytes");
 }
