@@ -6,6 +6,7 @@
 use crate::accel::serialize::Head;
 use crate::bvh::geometry::Geometry;
 use crate::bvh::layout::{BoxRecord, Child, GeometryEntry, Header, Instance, Node, Triangle};
+use crate::bvh::split::Reference;
 use crate::bvh::wide::quantised::QuantisedNode;
 use crate::gpu::shaders;
 use crate::trace::{Hit, Ray};
@@ -64,6 +65,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "bvh" if is("quality") => bvh::quality::push_constants(),
         "bvh" if is("refit") => bvh::refit::push_constants(),
         "bvh" if is("wide") => bvh::wide::device::push_constants(),
+        "bvh" if is("split") => bvh::split::push_constants(),
         "bvh" if is("reinsertion") => bvh::reinsertion::push_constants(),
         "gpu" if is("fill") => gpu::fill::push_constants(),
         "gpu" if is("pool_tree") => gpu::probe::push_constants(),
@@ -100,6 +102,7 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         cost,
         built_cost,
         built_area,
+        split_from,
         reserved
     });
     // `active` is a reserved word of GLSL.
@@ -112,6 +115,7 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         ("Child", layout_of!(Child { lo, index, hi, count })),
         ("Node", node),
         ("Triangle", layout_of!(Triangle { v0, v1, v2, primitive })),
+        ("Reference", layout_of!(Reference { lo, primitive, hi, left_out })),
         ("BoxRecord", layout_of!(BoxRecord { lo, hi, primitive })),
         ("GeometryEntry", layout_of!(GeometryEntry { first, flags })),
         (

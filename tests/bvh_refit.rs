@@ -516,6 +516,7 @@ fn boxes_are_refitted_as_on_the_host() {
                     let options = Options {
                         schedule: Some(schedule),
                         primitives: Primitives::Boxes,
+                        is_split: false,
                         geometry_count,
                         costs: collapse,
                     };

@@ -6,6 +6,7 @@
 #include "gpu/radix_sort.glsl"
 #include "bvh/layout.glsl"
 #include "bvh/primitives.glsl"
+#include "bvh/references.glsl"
 #include "bvh/codes.glsl"
 
 // Items of an invocation in a task.
@@ -45,6 +46,25 @@ layout(push_constant, scalar) uniform Arguments { BUILD_ARGUMENTS };
 
 Geometry geometries() {
     return Geometry(vertices, indices, transform, vertex_stride, vertex_count, formats, 0);
+}
+
+// The box of what a leaf holds; returns 0, or why it is left out: a status bit or INACTIVE.
+uint load_reference(Geometry g, uint reference, out Box b) {
+    if (!HAS_REFERENCES) return load_box(g, reference, b);
+    Reference r = references_before(state_address, primitive_count).reference[reference];
+    b = Box(r.lo, r.hi);
+    return r.left_out;
+}
+
+// Writes the record of what a leaf holds to its place, and tells its box; returns as load_reference does.
+uint write_reference(uvec2 records, uint position, Geometry g, uint reference, out Box b) {
+    if (!HAS_REFERENCES) return write_record(records, position, g, reference, b);
+    Reference r = references_before(state_address, primitive_count).reference[reference];
+    Box whole;
+    if (r.primitive == NO_PRIMITIVE) Triangles(records).triangle[position] = Triangle(vec3(0), vec3(0), vec3(0), NO_PRIMITIVE);
+    else write_record(records, position, g, r.primitive, whole);
+    b = Box(r.lo, r.hi);
+    return r.left_out;
 }
 
 CodeKind kind_of_codes() {

@@ -19,7 +19,7 @@ BUFFER Clusters { Cluster cluster[]; };
 // The cluster of the primitive at a sorted position.
 Cluster cluster_of_primitive(Geometry input_geometries, uint position, float area_scale) {
     Box b;
-    load_box(input_geometries, Words(values[passes & 1u]).word[position], b);
+    load_reference(input_geometries, Words(values[passes & 1u]).word[position], b);
     return Cluster(b.lo, position | IS_PRIMITIVE, b.hi, 1u, leaf_cost(c_i, scaled_half_area(b, area_scale), 1u), position);
 }
 

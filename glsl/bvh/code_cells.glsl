@@ -59,7 +59,7 @@ void count_cells(uint task) {
         uint primitive = first + k * gl_WorkGroupSize.x;
         if (primitive < primitive_count) {
             Box b;
-            if (load_box(input_geometries, primitive, b) == 0) {
+            if (load_reference(input_geometries, primitive, b) == 0) {
                 WideCoordinates wide = wide_coordinates(plan, b);
                 if (CODE_PREFIX == PREFIX_CELLS) {
                     uint cell = cell_by_code(kind, plan.grid, wide);

@@ -62,7 +62,7 @@ void find_sections() {
         // i · primitive_count / taken, which may have more than 32 bits on the way.
         uint primitive = i * (primitive_count / taken) + i * (primitive_count % taken) / taken;
         Box b;
-        bool is_active = load_box(input_geometries, primitive, b) == 0;
+        bool is_active = load_reference(input_geometries, primitive, b) == 0;
         table.primitive[i].middle = is_active ? ordered(centroid_of(b)) : uvec3(NONE);
         table.primitive[i].lo = ordered(b.lo);
         table.primitive[i].hi = ordered(b.hi);

@@ -226,7 +226,7 @@ void collapse_records(uint task) {
         uint position = first + k * gl_WorkGroupSize.x;
         Box b;
         if (position < primitive_count) {
-            write_record(records, position, input_geometries, sorted.word[walk.word[position]], b);
+            write_reference(records, position, input_geometries, sorted.word[walk.word[position]], b);
         }
     }
 }

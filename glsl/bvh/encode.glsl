@@ -88,7 +88,7 @@ void find_bounds(uint task) {
         uint primitive = first + k * gl_WorkGroupSize.x;
         if (primitive < primitive_count) {
             Box b;
-            uint why_not = load_box(input_geometries, primitive, b);
+            uint why_not = load_reference(input_geometries, primitive, b);
             status |= why_not;
             if (why_not == 0) {
                 uvec3 middle = ordered(centroid_of(b));
@@ -160,7 +160,8 @@ void make_plan() {
     structure.header.cost = 0.0;
     structure.header.built_cost = 0.0;
     structure.header.built_area = 0.0;
-    for (uint i = 0; i < 9; ++i) structure.header.reserved[i] = 0;
+    structure.header.split_from = HAS_REFERENCES ? split_state_before(state_address).primitive_count : 0;
+    for (uint i = 0; i < 8; ++i) structure.header.reserved[i] = 0;
     if (primitive_count < 2) mark_unused(structure, 0);
     if (state.active_count == 0) return;
     Box boxes = bounds_of_boxes(state);
@@ -219,7 +220,7 @@ void encode(uint task) {
         uint primitive = first + k * gl_WorkGroupSize.x;
         if (primitive < primitive_count) {
             Box b;
-            bool is_active = load_box(input_geometries, primitive, b) == 0;
+            bool is_active = load_reference(input_geometries, primitive, b) == 0;
             uvec2 code = is_active ? code_of(kind, plan, b) : inactive_code(kind);
             if (KEY_WORDS == 1) {
                 codes.word[primitive] = code.x;

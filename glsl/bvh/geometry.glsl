@@ -13,7 +13,10 @@ const uint SOURCE_GEOMETRIES = 2;
 const uint SOURCE_BOXES = 3;
 const uint SOURCE_SEVERAL_BOXES = 4;
 const uint SOURCE_ENTRIES = 5;
-layout(constant_id = 5) const uint SOURCE = 0;
+layout(constant_id = 5) const uint SOURCE_WORD = 0;
+const uint SOURCE = SOURCE_WORD & 7u;
+// Whether leaves hold references (bvh/references.glsl) to the primitives.
+const bool HAS_REFERENCES = (SOURCE_WORD & 8u) != 0u;
 
 // Why a primitive is left out where no status bit tells of it: the caller wants it so.
 const uint INACTIVE = 1u << 31;

@@ -89,7 +89,8 @@ struct Header {
     float cost;
     float built_cost;
     float built_area;
-    uint reserved[9];
+    uint split_from;
+    uint reserved[8];
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer Structure {

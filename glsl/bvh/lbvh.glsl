@@ -135,7 +135,7 @@ void lbvh_hierarchy(uint task) {
         bool climbs = true;
         if (position < end) {
             Box b;
-            write_record(records, position, input_geometries, order.word[position], b);
+            write_reference(records, position, input_geometries, order.word[position], b);
             climbs = position < active_count;
             s.first = position;
             s.last = position;

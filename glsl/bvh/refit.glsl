@@ -5,8 +5,8 @@
 //                                                   one run; scratch: all
 //   climb    reads nodes, scratch                   writes the structure: the other boxes, root, cost; scratch: ways, costs
 //
-// Which node has which children and records, and in which order they lie, stays. A structure of another kind or larger than was
-// planned for is left as it is.
+// Which node has which children and records, and in which order they lie, stays. A structure of another kind, larger than was
+// planned for or with split triangles is left as it is.
 //
 // needs one barrier between the two, and before the first; subgroups of any size; workgroups of whole subgroups
 #ifndef HEDGEROW_BVH_REFIT
@@ -84,7 +84,7 @@ bool begin(Update u, out Work w) {
     w.starts = Words(address_of(u.scratch, slots_at_most, 8u));
     w.waiting = Words(address_of(uvec2(w.starts), (slots_at_most + RUN - 1u) / RUN, 4u));
     return structure.header.magic == MAGIC && structure.header.kind == kind_of_records() && w.slots <= slots_at_most &&
-           structure.header.primitive_count <= u.primitive_count;
+           structure.header.primitive_count <= u.primitive_count && structure.header.split_from == 0u;
 }
 
 Box empty_box() {

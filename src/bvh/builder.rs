@@ -8,6 +8,7 @@ use super::encode::{Arguments, Encode};
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::reinsertion::{self, Reinsertion};
 use super::sah::Collapse;
+use super::split::{self, Split};
 use super::{collapse, hlbvh, hploc, layout, lbvh, lbvh_workgroup, ploc};
 use crate::gpu::radix_sort::{self, Shape};
 use crate::gpu::{Context, Kernel, Recorder, Step, shaders};
@@ -20,6 +21,8 @@ pub struct Options {
     pub method: Method,
     /// The codes; `None` lets [`Codes::for_count`] choose them from the number of primitives.
     pub codes: Option<Codes>,
+    /// Whether large triangles are split into several references before all else, and how much.
+    pub split: Option<split::Options>,
     /// Rounds of reinsertion behind it, which take time and give a better tree.
     pub optimise: Option<reinsertion::Options>,
     /// Whether subtrees become leaves where that is cheaper.
@@ -39,6 +42,7 @@ impl Options {
     pub const DEFAULT: Options = Options {
         method: Method::Lbvh,
         codes: None,
+        split: None,
         optimise: None,
         collapse: Collapse::SAH,
         schedule: None,
@@ -146,7 +150,7 @@ impl Options {
         match schedule {
             Schedule::Chain => true,
             Schedule::Persistent => self.optimise.is_none(),
-            Schedule::Workgroup => self.optimise.is_none() && self.method == Method::Lbvh,
+            Schedule::Workgroup => self.optimise.is_none() && self.split.is_none() && self.method == Method::Lbvh,
         }
     }
 }
@@ -225,7 +229,7 @@ impl Builder {
     /// A builder of `primitive_count` primitives on the device of `context`.
     ///
     /// # Errors
-    /// More primitives than a build can take; a schedule that the method has not.
+    /// More primitives than a build can take; a schedule that the method has not; splitting of what is no triangle.
     pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Result<Builder> {
         if primitive_count > radix_sort::MAX_COUNT {
             return Err(Error::Argument(format!(
@@ -233,13 +237,29 @@ impl Builder {
                 radix_sort::MAX_COUNT
             )));
         }
+        if let Some(split) = options.split {
+            split.check()?;
+            if options.primitives != Primitives::Triangles {
+                return Err(Error::Argument(format!(
+                    "{:?} cannot be split, only triangles; build without split",
+                    options.primitives
+                )));
+            }
+        }
+        let budget = options.split.map_or(0, |split| split.budget(primitive_count));
+        let budget = budget.min(radix_sort::MAX_COUNT - primitive_count);
+        let split = options.split.filter(|_| budget > 0);
+        let split = split.map(|split| Split::new(&context.limits, &split, primitive_count));
+        // From here on, what the tree is over.
+        let count = primitive_count + budget;
         options.method.check()?;
         let limits = &context.limits;
         let schedule = options.schedule.unwrap_or_else(|| Schedule::for_count(options, primitive_count));
         if !options.takes(schedule) {
             let optimised = if options.optimise.is_some() { " and optimised" } else { "" };
+            let split = if options.split.is_some() { " of split triangles" } else { "" };
             return Err(Error::Argument(format!(
-                "{:?} is not built{optimised} by the schedule {schedule}; choose chain, or none",
+                "{:?} is not built{split}{optimised} by the schedule {schedule}; choose chain, or none",
                 options.method
             )));
         }
@@ -251,18 +271,19 @@ impl Builder {
             )));
         }
         let shape = Shape::of(limits);
-        let optimise = options.optimise.map(|options| Reinsertion::new(limits, &options, primitive_count));
+        let optimise = options.optimise.map(|options| Reinsertion::new(limits, &options, count));
         let encode = Encode {
-            codes: options.codes.unwrap_or_else(|| Codes::for_count(primitive_count)),
+            codes: options.codes.unwrap_or_else(|| Codes::for_count(count)),
             collapse: options.collapse,
             shape: if alone { shape.with_digit_bits(SMALL_DIGIT_BITS) } else { shape },
             items: if limits.is_cpu() { 32 } else { 1 },
-            count: primitive_count,
+            count,
+            split,
             primitives: options.primitives,
             geometry_count: options.geometry_count,
             build_flags: options.build_flags,
             alone,
-            method_bytes: method_bytes(options.method, optimise.as_ref(), primitive_count.into()),
+            method_bytes: method_bytes(options.method, optimise.as_ref(), count.into()),
         };
         let workers = if limits.is_cpu() { 64 } else { 1024 };
         Ok(Builder { method: options.method, schedule, optimise, workers, encode })
@@ -280,6 +301,11 @@ impl Builder {
 
     /// Primitives that it is for.
     pub fn count(&self) -> u32 {
+        self.encode.split.map_or(self.encode.count, |split| split.primitives)
+    }
+
+    /// Records that the structure has room for: as many as primitives, or with splits as the references that these may become.
+    pub fn record_count(&self) -> u32 {
         self.encode.count
     }
 
@@ -309,9 +335,12 @@ impl Builder {
     }
 
     /// Bytes that a phase must move if it reads each of its inputs once and writes each of its outputs once: what its time is
-    /// held against. `None` for a phase that there is not.
+    /// held against. `None` for a phase that there is not, and for all of a build of split triangles.
     pub fn traffic(&self, phase: &str, input: &Input) -> Option<u64> {
         let Source::One(geometry) = input.source else { return None };
+        if self.encode.split.is_some() {
+            return None;
+        }
         let count = u64::from(self.count());
         let vertex = geometry.vertex_format.component_bytes() * geometry.vertex_format.components();
         let triangles =
@@ -337,14 +366,16 @@ impl Builder {
     /// The kernels that [`Builder::record`] dispatches for `input`, to make their pipelines ahead with [`Context::warm`].
     pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
         let Builder { method, schedule, encode, .. } = self;
-        match (method, schedule) {
+        let mut kernels = encode.split.map_or(Vec::new(), |split| split.kernels(encode, input));
+        kernels.extend(match (method, schedule) {
             (_, Schedule::Chain) => self.chain_kernels(input),
             (Method::Lbvh, Schedule::Workgroup) => vec![encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, input)],
             (Method::Lbvh, _) => lbvh::persistent_kernels(encode, input),
             (Method::Hlbvh(treelets), _) => hlbvh::persistent_kernels(encode, treelets, input),
             (&Method::Ploc { radius }, _) => ploc::persistent_kernels(encode, radius, input),
             (Method::Hploc(window), _) => hploc::persistent_kernels(encode, window, input),
-        }
+        });
+        kernels
     }
 
     fn chain_kernels(&self, input: &Input) -> Vec<Kernel> {
@@ -382,11 +413,12 @@ impl Builder {
     /// of the bytes and alignment that [`Builder::sizes`] tells.
     ///
     /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever
-    /// reads the structure, or writes the scratch memory) behind. Labels: `bounds`, `encode`, `sort`, `hierarchy`, `optimise`
+    /// reads the structure, or writes the scratch memory) behind. Labels: `split`, `bounds`, `encode`, `sort`, `hierarchy`, `optimise`
     /// and `collapse` where there are such phases; or `build` where the schedule is persistent.
     ///
     /// # Errors
-    /// The input has another number of primitives than the builder; a pipeline could not be made.
+    /// The input has another number of primitives than the builder; triangles are to be split of which each must be met once
+    /// ([`GeometryFlags::NO_DUPLICATES`](super::geometry::GeometryFlags)); a pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: u64, scratch: u64) -> Result<()> {
         recorder.chains(&[self.steps(input, structure, scratch)?])
     }
@@ -418,13 +450,15 @@ impl Builder {
         let Builder { method, schedule, encode, workers, .. } = self;
         let (input, workers) = (&job.input, *workers);
         let arguments = &encode.arguments(input, job.structure, job.scratch)?;
-        Ok(match (method, schedule) {
+        let mut steps = encode.split.map_or(Vec::new(), |split| split.steps(encode, input, arguments));
+        steps.extend(match (method, schedule) {
             (_, Schedule::Chain) => self.chain(input, arguments),
             (Method::Lbvh, _) => lbvh::persistent_steps(encode, input, arguments, workers),
             (Method::Hlbvh(treelets), _) => hlbvh::persistent_steps(encode, treelets, input, arguments, workers),
             (&Method::Ploc { radius }, _) => ploc::persistent_steps(encode, radius, input, arguments, workers),
             (Method::Hploc(window), _) => hploc::persistent_steps(encode, window, input, arguments, workers),
-        })
+        });
+        Ok(steps)
     }
 
     fn chain(&self, input: &Input, arguments: &Arguments) -> Vec<Step> {

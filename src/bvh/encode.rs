@@ -6,6 +6,7 @@ use super::codes::Codes;
 use super::collapse;
 use super::geometry::{Geometry, Input, Planned, Primitives};
 use super::sah::Collapse;
+use super::split::Split;
 use crate::Result;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::radix_sort::{self, Shape};
@@ -19,7 +20,10 @@ pub(super) struct Encode {
     pub shape: Shape,
     /// Items of an invocation in a task.
     pub items: u32,
+    /// What the tree is over: primitives, or references to split ones.
     pub count: u32,
+    /// What makes those references.
+    pub split: Option<Split>,
     pub primitives: Primitives,
     pub geometry_count: u32,
     pub build_flags: u32,
@@ -31,6 +35,7 @@ pub(super) struct Encode {
 
 /// Where the parts of the scratch memory begin, in bytes.
 pub(super) struct Scratch {
+    state: u64,
     keys: [u64; 2],
     values: [u64; 2],
     ends: u64,
@@ -73,6 +78,8 @@ impl Arguments {
     }
 }
 
+/// In `SOURCE_WORD` of geometry.glsl: leaves hold references.
+const HAS_REFERENCES: u32 = 8;
 /// In `code_kind`: subtrees become leaves.
 const COLLAPSES: u32 = 1 << 25;
 
@@ -87,7 +94,8 @@ impl Encode {
     }
 
     pub fn scratch(&self) -> Scratch {
-        let mut at = STATE_BYTES + self.method_bytes.next_multiple_of(16);
+        let state = self.split.map_or(0, |split| split.bytes(self.count));
+        let mut at = state + STATE_BYTES + self.method_bytes.next_multiple_of(16);
         let mut take = |bytes: u64| {
             let begin = at;
             at += bytes.next_multiple_of(16);
@@ -96,6 +104,7 @@ impl Encode {
         let count = u64::from(self.count);
         let key_bytes = 4 * u64::from(self.key_words()) * count;
         Scratch {
+            state,
             keys: [take(key_bytes), take(key_bytes)],
             values: [take(4 * count), take(4 * count)],
             ends: take(4 * count),
@@ -112,7 +121,7 @@ impl Encode {
         } else {
             self.shape.table_words(self.count)
         };
-        sort.max(self.codes.prefix_words())
+        sort.max(self.codes.prefix_words()).max(self.split.map_or(0, |split| split.table_words()))
     }
 
     pub fn passes(&self) -> u32 {
@@ -121,7 +130,12 @@ impl Encode {
 
     /// Workgroups of the phases that go over all primitives.
     pub fn tiles(&self) -> u32 {
-        self.count.div_ceil(self.shape.workgroup * self.items)
+        self.tiles_of(self.count)
+    }
+
+    /// Workgroups of a phase that goes over so many.
+    pub fn tiles_of(&self, count: u32) -> u32 {
+        count.div_ceil(self.shape.workgroup * self.items)
     }
 
     pub fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
@@ -136,8 +150,16 @@ impl Encode {
     /// The same with specialisation constants from 7 on.
     pub fn reading_kernel_with(&self, shader: &'static shaders::Shader, input: &Input, more: &[u32]) -> Kernel {
         let constants = self.shape.constants(self.items, self.key_words());
-        let source = [input.source_constant(self.primitives), self.codes.prefix_number()];
+        let references = if self.split.is_some() { HAS_REFERENCES } else { 0 };
+        let source = [input.source_constant(self.primitives) | references, self.codes.prefix_number()];
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source, more].concat())
+    }
+
+    /// A kernel that reads primitives before they are split.
+    pub fn unsplit_kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
+        let constants = self.shape.constants(self.items, self.key_words());
+        let source = [input.source_constant(self.primitives)];
+        Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source].concat())
     }
 
     /// The kernel of a `reset` shader.
@@ -161,9 +183,10 @@ impl Encode {
 
     /// The input's geometry as the kernels are given it, and its formats.
     pub fn checked(&self, input: &Input) -> Result<(Geometry, u32)> {
-        let planned =
-            Planned { primitives: self.primitives, primitive_count: self.count, geometry_count: self.geometry_count };
+        let primitive_count = self.split.map_or(self.count, |split| split.primitives);
+        let planned = Planned { primitives: self.primitives, primitive_count, geometry_count: self.geometry_count };
         planned.check(input)?;
+        self.split.map_or(Ok(()), |split| split.check(input))?;
         Ok(input.for_kernels())
     }
 
@@ -182,7 +205,7 @@ impl Encode {
             indices: geometry.indices,
             transform: geometry.transform,
             structure,
-            state: scratch,
+            state: scratch + parts.state,
             keys: parts.keys.map(|at| scratch + at),
             values: parts.values.map(|at| scratch + at),
             ends: scratch + parts.ends,

@@ -172,7 +172,8 @@ impl GeometryFlags {
     pub const NONE: GeometryFlags = GeometryFlags(0);
     /// Every meeting is a hit.
     pub const OPAQUE: GeometryFlags = GeometryFlags(super::layout::GEOMETRY_OPAQUE as u8);
-    /// A primitive is met once by a ray. It always is: no tree of ours holds one twice.
+    /// A primitive is met once by a ray. It is, but for triangles that are split ([`super::split`]): a build refuses to split a
+    /// geometry with this flag that it is told of; of several, it is the caller's to know.
     pub const NO_DUPLICATES: GeometryFlags = GeometryFlags(1 << 1);
     /// The record that ends the others: primitives from its `first` on are inactive.
     pub const END: GeometryFlags = GeometryFlags(1 << 7);

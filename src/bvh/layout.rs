@@ -112,6 +112,14 @@ impl Aabb {
         (x * x + y * y + z * z).sqrt()
     }
 
+    /// What both have in common; empty where that is nothing.
+    pub fn intersection(&self, other: &Aabb) -> Aabb {
+        Aabb {
+            lo: std::array::from_fn(|i| self.lo[i].max(other.lo[i])),
+            hi: std::array::from_fn(|i| self.hi[i].min(other.hi[i])),
+        }
+    }
+
     /// Whether `other` lies inside, touching allowed.
     pub fn contains(&self, other: &Aabb) -> bool {
         (0..3).all(|i| self.lo[i] <= other.lo[i] && other.hi[i] <= self.hi[i])
@@ -176,6 +184,11 @@ pub trait Record: Pod + PartialEq + std::fmt::Debug {
     /// The box around it, if it can be told without other structures.
     fn bounds(&self) -> Option<Aabb>;
 
+    /// The corners of a triangle; of what is none, nothing.
+    fn corners(&self) -> Option<[[f32; 3]; 3]> {
+        None
+    }
+
     /// What an update makes of the record of a primitive that can no longer be met: no ray meets it, and no other primitive has
     /// such a record.
     fn left_out(primitive: u32) -> Self;
@@ -209,6 +222,10 @@ impl Record for Triangle {
 
     fn bounds(&self) -> Option<Aabb> {
         Some(Aabb::around(&[self.v0, self.v1, self.v2]))
+    }
+
+    fn corners(&self) -> Option<[[f32; 3]; 3]> {
+        Some([self.v0, self.v1, self.v2])
     }
 
     /// Negative zeros: builders make zeros of all others.
@@ -318,11 +335,12 @@ pub struct Header {
     pub kind: u32,
     /// Bits of [`status`].
     pub status: u32,
-    /// Records: one a primitive of the input; of a compacted structure those of the tree.
+    /// Records: one a primitive of the input, or where triangles were split room for all their parts; of a compacted structure
+    /// those of the tree.
     pub primitive_count: u32,
     /// The root, with the box of the whole scene. Of an empty structure: an empty box, index 0, count 0 and `active` 0.
     pub root: Child,
-    /// Primitives in the tree: those of the input that are finite and whose indices are in range.
+    /// Records in the tree: of the input's primitives those that are finite and whose indices are in range, or their parts.
     pub active: u32,
     /// Node slots there are: `primitive_count` − 1, at least 1; of a compacted structure `inner_nodes`, at least 1.
     pub node_slots: u32,
@@ -344,8 +362,10 @@ pub struct Header {
     pub built_cost: f32,
     /// Scaled half area of the root at the last build.
     pub built_area: f32,
+    /// Where triangles were split, and several records may be of one: primitives of the input. Otherwise 0.
+    pub split_from: u32,
     /// Zero.
-    pub reserved: [u32; 9],
+    pub reserved: [u32; 8],
 }
 
 impl Header {

@@ -35,12 +35,19 @@ pub struct Options {
     pub primitives: Primitives,
     /// How many geometries: what [`Source::Several`] has, otherwise 1.
     pub geometry_count: u32,
+    /// Whether triangles were split: such a structure cannot be refitted, for a part that has moved is another.
+    pub is_split: bool,
 }
 
 impl Options {
     /// One geometry of triangles, the costs of [`Collapse::SAH`].
-    pub const DEFAULT: Options =
-        Options { costs: Collapse::SAH, schedule: None, primitives: Primitives::Triangles, geometry_count: 1 };
+    pub const DEFAULT: Options = Options {
+        costs: Collapse::SAH,
+        schedule: None,
+        primitives: Primitives::Triangles,
+        geometry_count: 1,
+        is_split: false,
+    };
 }
 
 impl Default for Options {
@@ -52,8 +59,8 @@ impl Default for Options {
 impl From<&builder::Options> for Options {
     /// For what was built with these.
     fn from(built: &builder::Options) -> Options {
-        let &builder::Options { collapse, primitives, geometry_count, .. } = built;
-        Options { costs: collapse, schedule: None, primitives, geometry_count }
+        let &builder::Options { collapse, primitives, geometry_count, split, .. } = built;
+        Options { costs: collapse, schedule: None, primitives, geometry_count, is_split: split.is_some() }
     }
 }
 
@@ -143,7 +150,7 @@ impl Refit {
     /// Refitting of structures that were built over `primitive_count` primitives, on the device of `context`.
     ///
     /// # Errors
-    /// More primitives than a structure can hold.
+    /// More primitives than a structure can hold; split triangles.
     pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Result<Refit> {
         if primitive_count > radix_sort::MAX_COUNT {
             return Err(Error::Argument(format!(
@@ -151,7 +158,12 @@ impl Refit {
                 radix_sort::MAX_COUNT
             )));
         }
-        let &Options { costs, schedule, primitives, geometry_count } = options;
+        let &Options { costs, schedule, primitives, geometry_count, is_split } = options;
+        if is_split {
+            return Err(Error::Argument(
+                "a structure with split triangles cannot be updated: build it anew, or build it without split".into(),
+            ));
+        }
         let limits = &context.limits;
         let workgroup = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
         let schedule = schedule.unwrap_or_else(|| Schedule::for_count(primitive_count));

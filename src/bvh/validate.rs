@@ -1,12 +1,16 @@
 //! Walks a structure on the host and says what is wrong and where.
 
-use super::layout::{Aabb, Bvh2, Child, Instance, MAX_DEPTH, Record, node_slots};
+use super::cover::Parts;
+use super::layout::{Aabb, Bvh2, Child, Header, Instance, MAX_DEPTH, Record, node_slots};
 use crate::{Error, Result};
 
 impl<R: Record> Bvh2<R> {
     /// Checks every rule of the layout: indices in range, no cycle, every active primitive in exactly one leaf, boxes that are
     /// exactly those around what they hold (as far as records tell, and without what updates have left out), unused slots that
     /// say so, and a depth that tracers can walk.
+    ///
+    /// Where triangles were split: every record in exactly one leaf, leaves whose boxes lie within those around their triangles,
+    /// and no triangle with a point that is in no box of its leaves.
     ///
     /// # Errors
     /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
@@ -24,6 +28,7 @@ impl<R: Record> Bvh2<R> {
 
         let mut in_leaf = vec![false; header.active as usize];
         let mut visited = vec![false; self.nodes.len()];
+        let mut parts = Parts::default();
         // What is left to see: a child, its depth, and the node that names it.
         let mut stack = vec![(header.root, 0, None::<u32>)];
         while let Some((child, depth, parent)) = stack.pop() {
@@ -39,11 +44,17 @@ impl<R: Record> Bvh2<R> {
                 if let Some(twice) = range.clone().find(|&t| std::mem::replace(&mut in_leaf[t], true)) {
                     return invalid(format!("{named_by}: record {twice} is in two leaves"));
                 }
+                if header.split_from != 0 {
+                    range.clone().for_each(|record| parts.add(record, child.bounds()));
+                }
                 let met: Vec<_> = self.records[range].iter().filter(|record| !record.is_left_out()).collect();
                 let boxes: Option<Vec<Aabb>> = met.iter().map(|record| record.bounds()).collect();
                 // A leaf that updates have left nothing of has the box that it had.
                 if let Some(around) = boxes.and_then(|boxes| boxes.into_iter().reduce(|a, b| a.union(&b))) {
-                    same_box(&child, &around, &named_by)?;
+                    let within = header.split_from != 0 && around.contains(&child.bounds());
+                    if !within {
+                        same_box(&child, &around, &named_by)?;
+                    }
                 }
             } else {
                 let Some(node) = self.nodes.get(child.index as usize) else {
@@ -60,7 +71,7 @@ impl<R: Record> Bvh2<R> {
         self.validate_slots(&visited)?;
         match in_leaf.iter().position(|&there| !there) {
             Some(lost) => invalid(format!("record {lost} is in no leaf")),
-            None => Ok(()),
+            None => parts.check(&self.records),
         }
     }
 
@@ -106,16 +117,38 @@ impl<R: Record> Bvh2<R> {
         }
     }
 
-    /// The primitive order names every primitive once; of a top level, an instance may have several entries.
+    /// The primitive order names every primitive once; of a top level, an instance may have several entries. Where triangles were
+    /// split, every primitive at least once, as long as all records are there.
     fn validate_primitives(&self) -> Result<()> {
-        if self.header.kind == Instance::KIND {
+        let Header { kind, split_from, active, .. } = self.header;
+        if kind == Instance::KIND {
             return Ok(());
+        }
+        if split_from != 0 {
+            return validate_split_primitives(&self.records, split_from, active as usize);
         }
         let mut named = std::collections::HashSet::with_capacity(self.records.len());
         match self.records.iter().position(|record| !named.insert(record.primitive())) {
             Some(twice) => invalid(format!("primitive {} is there twice", self.records[twice].primitive())),
             None => Ok(()),
         }
+    }
+}
+
+/// Primitives of records of which the first `active` are in leaves.
+pub(super) fn validate_split_primitives<R: Record>(records: &[R], split_from: u32, active: usize) -> Result<()> {
+    let mut named = vec![false; split_from as usize];
+    for (i, primitive) in records.iter().map(Record::primitive).enumerate() {
+        match named.get_mut(primitive as usize) {
+            Some(named) => *named = true,
+            None if i < active => return invalid(format!("record {i} is of primitive {primitive} of {split_from}")),
+            // Room that no part has needed.
+            None => {}
+        }
+    }
+    match named.iter().position(|&named| !named) {
+        Some(lost) if records.len() > active => invalid(format!("primitive {lost} is not there")),
+        _ => Ok(()),
     }
 }
 

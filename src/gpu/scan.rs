@@ -3,7 +3,7 @@
 //! Reduce, then scan: three dispatches, no progress between workgroups asked for. `glsl/gpu/scan.glsl` is the device's side.
 
 use super::push_constants::push_constants;
-use super::{Kernel, Limits, Recorder, shaders};
+use super::{Kernel, Limits, Recorder, Step, shaders};
 use crate::Result;
 
 /// The most words that are scanned at once.
@@ -66,14 +66,38 @@ impl Scan {
     /// # Errors
     /// A pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, buffers: &Buffers) -> Result<()> {
-        let Buffers { values, results, sums } = *buffers;
-        let arguments = Arguments { values, results, sums, count: self.count, rounds: self.rounds };
+        let arguments = self.arguments(buffers);
+        for (i, (kernel, groups)) in self.dispatches().into_iter().enumerate() {
+            if i > 0 {
+                recorder.barrier();
+            }
+            recorder.dispatch(&kernel, &arguments, groups)?;
+        }
+        Ok(())
+    }
+
+    /// The kernels of the scan.
+    pub(crate) fn kernels(&self) -> Vec<Kernel> {
+        self.dispatches().map(|(kernel, _)| kernel).into()
+    }
+
+    /// The three dispatches in the phase `phase`.
+    pub(crate) fn steps(&self, phase: &'static str, buffers: &Buffers) -> Vec<Step> {
+        let arguments = self.arguments(buffers);
+        self.dispatches().map(|(kernel, groups)| Step::new(phase, kernel, &arguments, groups)).into()
+    }
+
+    fn arguments(&self, &Buffers { values, results, sums }: &Buffers) -> Arguments {
+        Arguments { values, results, sums, count: self.count, rounds: self.rounds }
+    }
+
+    fn dispatches(&self) -> [(Kernel, u32); 3] {
         let kernel = |shader| Kernel::new(shader, self.workgroup, &[]);
-        recorder.dispatch(&kernel(&shaders::GPU_SCAN_SUM), &arguments, self.tiles())?;
-        recorder.barrier();
-        recorder.dispatch(&kernel(&shaders::GPU_SCAN_SUMS), &arguments, 1)?;
-        recorder.barrier();
-        recorder.dispatch(&kernel(&shaders::GPU_SCAN_APPLY), &arguments, self.tiles())
+        [
+            (kernel(&shaders::GPU_SCAN_SUM), self.tiles()),
+            (kernel(&shaders::GPU_SCAN_SUMS), 1),
+            (kernel(&shaders::GPU_SCAN_APPLY), self.tiles()),
+        ]
     }
 }
 

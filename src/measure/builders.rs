@@ -17,6 +17,7 @@ use crate::bvh::codes::Codes;
 use crate::bvh::host::sweep::Leaves;
 use crate::bvh::reinsertion;
 use crate::bvh::sah::Collapse;
+use crate::bvh::split;
 use crate::bvh::wide::Form;
 use crate::gpu::{Device, DriverPreference};
 use crate::scene::Mesh;
@@ -77,6 +78,11 @@ const TERMINATION: BuilderOption =
     BuilderOption { key: "termination", values: "sah, or off: leaves of one triangle, then collapsed" };
 const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
 
+const SPLIT: BuilderOption = BuilderOption {
+    key: "split",
+    values: "a number from 0 to 1: splits of large triangles at most, as a part of all; with /N behind: of each at most N",
+};
+
 const OPTIMISE: BuilderOption =
     BuilderOption { key: "optimise", values: "off, fast, medium, high, or a number of passes of reinsertion" };
 const BITS: BuilderOption = BuilderOption { key: "bits", values: "a number of bits that the codes of a treelet share" };
@@ -92,7 +98,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "lbvh",
         what: "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
-        options: &[CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
+        options: &[CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &[
             "lbvh",
             "lbvh:codes=mc30",
@@ -109,7 +115,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "hlbvh",
         what: "hierarchical LBVH on the device: small subtrees of the LBVH under a top split by the surface area heuristic",
-        options: &[BITS, TREELET, CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
+        options: &[BITS, TREELET, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &["hlbvh"],
         needs: Needs::Device,
         make: |spec, device, mesh| spec.on_device(device, mesh, &spec.hlbvh_options()?),
@@ -118,7 +124,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "ploc",
         what: "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
-        options: &[RADIUS, CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
+        options: &[RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &["ploc", "ploc:radius=25"],
         needs: Needs::Device,
         make: |spec, device, mesh| spec.on_device(device, mesh, &spec.ploc_options()?),
@@ -127,7 +133,7 @@ pub static BUILDERS: &[Builder] = &[
     Builder {
         name: "hploc",
         what: "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
-        options: &[WINDOW, RADIUS, CODES, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
+        options: &[WINDOW, RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER],
         variants: &["hploc"],
         needs: Needs::Device,
         make: |spec, device, mesh| spec.on_device(device, mesh, &spec.hploc_options()?),
@@ -365,7 +371,18 @@ impl Spec {
         Ok(Box::new(Host::new(&self.to_string(), mesh, self.host_options(hierarchy)?)))
     }
 
-    /// Options `codes`, `collapse` and `schedule`.
+    /// Option `split`; `None` where it was not given or is 0.
+    fn split(&self) -> Result<Option<split::Options>> {
+        let Some(value) = self.option(SPLIT.key) else { return Ok(None) };
+        let (fraction, most) = value.split_once('/').unwrap_or((value, ""));
+        let most = if most.is_empty() { Ok(split::Options::DEFAULT.most) } else { most.parse() };
+        let (Ok(fraction), Ok(most)) = (fraction.parse(), most) else { return Err(self.wrong_value(&SPLIT, value)) };
+        let options = split::Options { fraction, most };
+        options.check().map_err(|_| self.wrong_value(&SPLIT, value))?;
+        Ok((fraction > 0.0).then_some(options))
+    }
+
+    /// Options `codes`, `split`, `optimise`, `collapse` and `schedule`.
     fn lbvh_options(&self) -> Result<builder::Options> {
         let schedule = match self.option(SCHEDULE.key) {
             None => None,
@@ -374,8 +391,9 @@ impl Spec {
             Some("workgroup") => Some(Schedule::Workgroup),
             Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
         };
-        let (codes, optimise, collapse) = (self.codes()?, self.reinsertion()?, self.collapse()?);
-        Ok(builder::Options { codes, optimise, collapse, schedule, ..builder::Options::DEFAULT })
+        let (codes, split) = (self.codes()?, self.split()?);
+        let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
+        Ok(builder::Options { codes, split, optimise, collapse, schedule, ..builder::Options::DEFAULT })
     }
 
     /// Options `width`, of a wide tree, and `order`; no width where it is 2 or was not given.
@@ -556,6 +574,10 @@ mod tests {
         assert!(
             error_of("lbvh:width=4:order=octant").contains("order=octant is not known; take distance or octant (of")
         );
+        for wrong in ["lots", "-0.1", "1.5", "nan", "0.3/0", "0.3/x"] {
+            let says = format!("split={wrong} is not known; take a number from 0 to 1");
+            assert!(error_of(&format!("hploc:split={wrong}")).contains(&says), "{wrong}");
+        }
         assert!(error_of("lbvh-host:codes").contains("write codes=VALUE"));
         assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
         assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse, optimise"));

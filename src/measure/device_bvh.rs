@@ -13,8 +13,8 @@ use crate::trace::wide::Tracer;
 use crate::trace::{Hit, Query, Ray, Work};
 use crate::{Error, Result};
 
-/// Phases of a build at most: reset and bounds, encode, sort, hierarchy, those of collapsing, wide.
-const PHASES: u32 = 10;
+/// Phases of a build at most: split, reset and bounds, encode, sort, hierarchy, those of collapsing, wide.
+const PHASES: u32 = 12;
 
 /// A scene in our `Bvh2`, or in a wide tree made of it, built and traced on the device.
 pub struct DeviceBvh<'a> {
@@ -67,7 +67,7 @@ impl<'a> DeviceBvh<'a> {
             choice: choice_of(options, &bvh),
             structure: device.buffer("structure", sizes.structure)?,
             scratch: device.buffer("scratch", sizes.scratch)?,
-            wide: wide.map(|tracer| WideTree::new(device, tracer, count)).transpose()?,
+            wide: wide.map(|tracer| WideTree::new(device, tracer, bvh.record_count())).transpose()?,
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,
             sizes,
@@ -153,7 +153,7 @@ impl Subject for DeviceBvh<'_> {
         if let Some(tree) = &self.wide {
             return tree.quality(c_t, c_i);
         }
-        let measure = quality::OnDevice::new(&self.device.limits, self.input.primitive_count);
+        let measure = quality::OnDevice::new(&self.device.limits, self.bvh.record_count());
         let scratch = self.device.buffer("quality: scratch", measure.scratch_bytes())?;
         let result = self.device.buffer("quality: figures", size_of::<Figures>() as u64)?;
         self.device.run(None, |r| measure.record(r, self.structure.address(), scratch.address(), result.address()))?;
@@ -161,6 +161,10 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
+        if self.bvh.record_count() != self.bvh.count() {
+            // The device takes each record for a triangle of its own.
+            return Ok(self.tree()?.and_then(|tree| overlap::on_host(&tree, c_t, c_i, epo)));
+        }
         overlap::on_device(self.device, self.structure.address(), self.input.primitive_count, (c_t, c_i), epo)
     }
 

@@ -13,7 +13,8 @@
 //!
 //! The slab distance itself adds 7ε·extent. All of it is less than 32ε·(extent + reach), [`super::ray`]'s bound. So for every
 //! box around the triangle the interval that is computed here holds the computed t; it may be cut at the best t so far, and a
-//! box that is farther than the best hit holds neither a nearer hit nor an equally near one.
+//! box that is farther than the best hit holds neither a nearer hit nor an equally near one. Where a triangle was split, that is
+//! true of the box of whichever part has the point on the triangle; every point is in one (`crate::bvh::host::split`).
 
 use super::ray::PreparedRay;
 use crate::bvh::layout::Child;

@@ -82,12 +82,15 @@ pub fn build<R: Record>(radix: &Bvh2<R>, codes: Codes, limits: Treelets) -> Bvh2
     tree
 }
 
-/// The codes in the order of the records. Bounds may be those of a sample, which is taken in the order of the input.
+/// The codes in the order of the records. Bounds may be those of a sample, which is taken in the order of the input; of split
+/// triangles that order is not known any more, and codes of such bounds may be others than the device's.
 fn codes_of<R: Record>(radix: &Bvh2<R>, codes: Codes) -> Vec<u64> {
     let leaves = radix.leaf_children();
     let mut boxes = vec![Err(()); radix.records.len()];
     for leaf in &leaves {
-        boxes[radix.records[leaf.index as usize].primitive() as usize] = Ok(leaf.bounds());
+        let is_split = radix.header.split_from != 0;
+        let place = if is_split { leaf.index } else { radix.records[leaf.index as usize].primitive() };
+        boxes[place as usize] = Ok(leaf.bounds());
     }
     let plan = Plan::new(codes, &boxes);
     leaves.iter().map(|leaf| plan.encode(&leaf.bounds())).collect()

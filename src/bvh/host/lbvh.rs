@@ -14,11 +14,15 @@ use crate::bvh::sah::Collapse;
 /// Builds the LBVH of `triangles` over `positions`. Triangles that are not finite or name vertices that are not there are
 /// left out, and the status says so.
 pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, collapse: Collapse) -> Bvh2 {
-    let corners = triangles.iter().map(|triangle| {
+    build_corners(corners(positions, triangles), codes, collapse)
+}
+
+/// The corners of triangles, or why they are left out.
+pub(super) fn corners(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> impl Iterator<Item = Corners> {
+    triangles.iter().map(|triangle| {
         let vertex = |v: u32| positions.get(v as usize).copied().ok_or(status::INDEX_OUT_OF_RANGE);
         geometry::finite([vertex(triangle[0])?, vertex(triangle[1])?, vertex(triangle[2])?])
-    });
-    build_corners(corners, codes, collapse)
+    })
 }
 
 /// Builds the LBVH of triangles that [`HostGeometry::corners`](geometry::HostGeometry::corners) read.

@@ -12,5 +12,6 @@ mod over;
 pub mod ploc;
 pub mod refit;
 mod reinsertion;
+pub mod split;
 #[cfg(feature = "cli")]
 pub mod sweep;

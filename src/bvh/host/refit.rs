@@ -36,7 +36,7 @@ pub fn refit_boxes<R: Record>(
     costs: Collapse,
 ) {
     let box_of = |record: &R| *boxes.get(record.primitive() as usize).unwrap_or(&Err(status::INDEX_OUT_OF_RANGE));
-    if tree.header.active == 0 {
+    if tree.header.active == 0 || tree.header.split_from != 0 {
         return;
     }
     for old in &mut tree.records[..tree.header.active as usize] {

@@ -1,7 +1,9 @@
 //! Walks a wide tree on the host and says what is wrong and where.
 
 use super::layout::{Wide, WideNode};
+use crate::bvh::cover::Parts;
 use crate::bvh::layout::{Aabb, Instance, Record};
+use crate::bvh::validate::validate_split_primitives;
 use crate::{Error, Result};
 
 impl<N: WideNode, R: Record> Wide<N, R> {
@@ -9,7 +11,8 @@ impl<N: WideNode, R: Record> Wide<N, R> {
     /// exactly one other, nodes that one names side by side, records within the boxes that lead to them (as far as records tell,
     /// and without what updates have left out), and as many levels as tracers can walk.
     ///
-    /// Boxes of floats are exactly those around what they hold; quantised ones hold it.
+    /// Boxes of floats are exactly those around what they hold; quantised ones hold it. Where triangles were split, leaves cover
+    /// them as in [`Bvh2::validate`](crate::bvh::layout::Bvh2::validate).
     ///
     /// # Errors
     /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
@@ -23,7 +26,9 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         let mut in_leaf = vec![false; self.records.len()];
         let mut visited = vec![false; self.nodes.len()];
         visited[0] = true;
-        let around = self.validate_node(0, &self.header.root.bounds(), 0, (&mut in_leaf, &mut visited))?;
+        let mut parts = Parts::default();
+        let seen = (&mut in_leaf[..], &mut visited[..], &mut parts);
+        let around = self.validate_node(0, &self.header.root.bounds(), 0, seen)?;
         if around.is_some_and(|around| around != self.header.root.bounds()) {
             return invalid(format!("the root has box {:?}, its content {around:?}", self.header.root.bounds()));
         }
@@ -32,7 +37,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         }
         match in_leaf.iter().position(|&named| !named) {
             Some(record) => invalid(format!("record {record} is in no leaf")),
-            None => Ok(()),
+            None => parts.check(&self.records),
         }
     }
 
@@ -72,6 +77,9 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         if R::KIND == Instance::KIND {
             return Ok(());
         }
+        if self.header.split_from != 0 {
+            return validate_split_primitives(&self.records, self.header.split_from, self.records.len());
+        }
         let mut named = std::collections::HashSet::with_capacity(self.records.len());
         match self.records.iter().position(|record| !named.insert(record.primitive())) {
             Some(twice) => invalid(format!("primitive {} is there twice", self.records[twice].primitive())),
@@ -85,9 +93,9 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         index: u32,
         bounds: &Aabb,
         level: u32,
-        seen: (&mut [bool], &mut [bool]),
+        seen: (&mut [bool], &mut [bool], &mut Parts),
     ) -> Result<Option<Aabb>> {
-        let (in_leaf, visited) = seen;
+        let (in_leaf, visited, parts) = seen;
         if level >= N::FORM.levels() {
             return invalid(format!("node {index} is on level {level}, the last is {}", N::FORM.levels() - 1));
         }
@@ -96,7 +104,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
             if count <= N::LEAF_MAX {
                 return invalid(format!("node {index} is a long leaf of {count} records"));
             }
-            return self.validate_leaf(index, (first, count), bounds, in_leaf);
+            return self.validate_leaf(index, (first, count), bounds, (in_leaf, parts));
         }
         let children = node.children();
         if children.iter().all(Option::is_none) {
@@ -106,9 +114,11 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         let mut nodes = first_child..self.nodes.len() as u32;
         let mut around: Option<Aabb> = None;
         for child in children.iter().flatten() {
-            let box_of_child = child.bounds();
+            // A part lies in all boxes that lead to it.
+            let is_split = self.header.split_from != 0;
+            let box_of_child = if is_split { child.bounds().intersection(bounds) } else { child.bounds() };
             let content = if child.is_leaf() {
-                self.validate_leaf(index, (child.index, child.count), &box_of_child, in_leaf)?
+                self.validate_leaf(index, (child.index, child.count), &box_of_child, (in_leaf, parts))?
             } else {
                 if nodes.next() != Some(child.index) {
                     return invalid(format!("node {index}: its child {} does not lie beside the others", child.index));
@@ -116,7 +126,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
                 if std::mem::replace(&mut visited[child.index as usize], true) {
                     return invalid(format!("node {index}: node {} has two parents", child.index));
                 }
-                self.validate_node(child.index, &box_of_child, level + 1, (in_leaf, visited))?
+                self.validate_node(child.index, &box_of_child, level + 1, (in_leaf, visited, parts))?
             };
             // A leaf that updates have left nothing of has the box that it had.
             let content = content.unwrap_or(box_of_child);
@@ -139,7 +149,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         named_by: u32,
         (first, count): (u32, u32),
         bounds: &Aabb,
-        in_leaf: &mut [bool],
+        (in_leaf, parts): (&mut [bool], &mut Parts),
     ) -> Result<Option<Aabb>> {
         let range = first as usize..first as usize + count as usize;
         if range.end > in_leaf.len() {
@@ -148,10 +158,14 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         if let Some(twice) = range.clone().find(|&record| std::mem::replace(&mut in_leaf[record], true)) {
             return invalid(format!("node {named_by}: record {twice} is in two leaves"));
         }
+        if self.header.split_from != 0 {
+            range.clone().for_each(|record| parts.add(record, *bounds));
+        }
         let met = self.records[range].iter().filter(|record| !record.is_left_out());
         let boxes: Option<Vec<Aabb>> = met.map(|record| record.bounds()).collect();
         let around = boxes.and_then(|boxes| boxes.into_iter().reduce(|a, b| a.union(&b)));
         match around {
+            Some(around) if self.header.split_from != 0 => Ok(Some(around.intersection(bounds))),
             Some(around) if !bounds.contains(&around) => invalid(format!(
                 "node {named_by}: leaf from {first} has box {bounds:?}, around its content is {around:?}"
             )),

@@ -1,0 +1,192 @@
+//! Splitting of large triangles before a build: each becomes several references with tighter boxes (Karras and Aila 2013, "Fast
+//! Parallel Construction of High-Quality Bounding Volume Hierarchies", section 5).
+//!
+//! A triangle's *weight* is X · (A_box − A_ideal): the half area of its box, less that of as many boxes as one likes (half the
+//! sum of the components of its edges' cross product), times X = 2⁻ⁱ for the most important plane that its box crosses, i being
+//! how many halvings of the scene's longest extent the plane's spacing is. It has s = ⌊∛(F · weight)⌋ splits, or as many as one
+//! triangle may have, F the greatest that keeps the sum of all within the budget. The planes are those that halve the scene's box along each axis, over and over; a part
+//! is split at the one of the greatest spacing that lies inside of its box, and the other splits are given to the two halves by
+//! their longest sides.
+//!
+//! What the paper leaves to floats is in integers here, so that every device finds the same references: weights count eighths of
+//! octaves, a histogram of them gives F by bisection, and the cube root is the integer one. No invocation splits a triangle to
+//! the end: each finds one reference, going down the triangle's splits from its box, so that a triangle of a thousand splits
+//! keeps no other waiting. Nothing is read back; references that there are not are left out as triangles that are not finite are.
+//!
+//! A record is in the tree once for each part, with the same bytes. So rays may be shown a triangle several times, which changes
+//! no closest hit; and a leaf's box holds the part alone. [`super::host::split`] is the twin, and says why no ray loses a hit.
+//! `glsl/bvh/split.glsl` is the device's side.
+
+use super::encode::Encode;
+use super::geometry::{Geometry, GeometryFlags, Input, Source};
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::scan::{self, Scan};
+use crate::gpu::{Kernel, Limits, Step, shaders};
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+
+/// How much may be split.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Splits, at most, as a part of the primitives: 0 to [`Options::MOST_FRACTION`]. Structure and scratch memory grow by as much.
+    pub fraction: f32,
+    /// Splits of one triangle, at most: 1 to [`Options::MOST_SPLITS`].
+    pub most: u32,
+}
+
+impl Options {
+    /// The paper's 30% more references than triangles, at most; and at most 7 splits of each, which measured well
+    /// (docs/splitting.md).
+    pub const DEFAULT: Options = Options { fraction: 0.3, most: 7 };
+    /// As many splits as triangles.
+    pub const MOST_FRACTION: f32 = 1.0;
+    /// What the budget alone bounds, as the paper has it, but for this.
+    pub const MOST_SPLITS: u32 = 1023;
+
+    /// Splits of so many primitives, at most.
+    pub fn budget(&self, primitive_count: u32) -> u32 {
+        (f64::from(self.fraction) * f64::from(primitive_count)) as u32
+    }
+
+    /// # Errors
+    /// A fraction or a number of splits out of range.
+    pub fn check(&self) -> Result<()> {
+        if !(0.0..=Options::MOST_FRACTION).contains(&self.fraction) {
+            return Err(Error::Argument(format!(
+                "split by {}: the fraction of splits is 0 to {}",
+                self.fraction,
+                Options::MOST_FRACTION
+            )));
+        }
+        if !(1..=Options::MOST_SPLITS).contains(&self.most) {
+            return Err(Error::Argument(format!(
+                "at most {} splits of a triangle: that is 1 to {}",
+                self.most,
+                Options::MOST_SPLITS
+            )));
+        }
+        Ok(())
+    }
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options::DEFAULT
+    }
+}
+
+/// A part of a triangle: what a leaf of a split tree holds. 32 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Reference {
+    /// Least corner of a box that the part is in.
+    pub lo: [f32; 3],
+    /// The triangle; `u32::MAX` where there is no such part.
+    pub primitive: u32,
+    /// Greatest corner.
+    pub hi: [f32; 3],
+    /// 0; or why it is in no leaf: a bit of [`super::layout::status`], or `1 << 31`.
+    pub left_out: u32,
+}
+
+/// The splitting before a build, for one device and a number of triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Split {
+    /// Triangles of the input.
+    pub primitives: u32,
+    most: u32,
+    scan: Scan,
+}
+
+/// Bytes of `SplitState` in references.glsl, with room to spare.
+const STATE_BYTES: u64 = 3328;
+
+push_constants! {
+    /// Push constants of `glsl/bvh/split_*.comp`.
+    struct Arguments {
+        vertices: u64,
+        indices: u64,
+        transform: u64,
+        state: u64,
+        counts: u64,
+        total: u64,
+        vertex_stride: u32,
+        vertex_count: u32,
+        formats: u32,
+        primitive_count: u32,
+        reference_count: u32,
+        most_splits: u32,
+    }
+}
+
+impl Split {
+    pub fn new(limits: &Limits, options: &Options, primitives: u32) -> Split {
+        Split { primitives, most: options.most, scan: Scan::new(limits, primitives) }
+    }
+
+    /// Bytes of scratch memory before the build's state.
+    pub fn bytes(&self, reference_count: u32) -> u64 {
+        STATE_BYTES + size_of::<Reference>() as u64 * u64::from(reference_count)
+    }
+
+    /// Words of the sort's table that splitting needs before.
+    pub fn table_words(&self) -> u64 {
+        self.scan.sums_words().into()
+    }
+
+    /// # Errors
+    /// The geometry wants its primitives to be met once.
+    pub fn check(&self, input: &Input) -> Result<()> {
+        match input.source {
+            Source::One(geometry) if geometry.flags.bits() & GeometryFlags::NO_DUPLICATES.bits() != 0 => {
+                Err(Error::Argument(
+                    "a geometry that must show rays each primitive once is not split; build without split, or drop its flag"
+                        .into(),
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    pub fn kernels(&self, encode: &Encode, input: &Input) -> Vec<Kernel> {
+        let of = |shader| encode.unsplit_kernel(shader, input);
+        BEFORE_SCAN.iter().map(|(shader, _)| of(shader)).chain(self.scan.kernels()).chain([of(REFERENCES)]).collect()
+    }
+
+    /// The dispatches before those of [`Encode`]; what follows needs a barrier before. Its words and table are free until then.
+    /// Label: `split`.
+    pub fn steps(&self, encode: &Encode, input: &Input, build: &super::encode::Arguments) -> Vec<Step> {
+        let (Geometry { vertices, indices, transform, vertex_stride, vertex_count, .. }, formats) = input.for_kernels();
+        let arguments = Arguments {
+            vertices,
+            indices,
+            transform,
+            state: build.state,
+            counts: build.ends,
+            total: build.table + 4 * (self.table_words() - 1),
+            vertex_stride,
+            vertex_count,
+            formats,
+            primitive_count: self.primitives,
+            reference_count: build.primitive_count,
+            most_splits: self.most,
+        };
+        let step = |shader, groups| Step::new("split", encode.unsplit_kernel(shader, input), &arguments, groups);
+        let tiles = encode.tiles_of(self.primitives);
+        let scanned = scan::Buffers { values: build.ends, results: build.ends, sums: build.table };
+        let before = BEFORE_SCAN.iter().map(|&(shader, over_all)| step(shader, if over_all { tiles } else { 1 }));
+        let references = step(REFERENCES, encode.tiles_of(build.primitive_count));
+        before.chain(self.scan.steps("split", &scanned)).chain([references]).collect()
+    }
+}
+
+/// What runs before the scan, and whether it goes over all triangles.
+const BEFORE_SCAN: [(&shaders::Shader, bool); 6] = [
+    (&shaders::BVH_SPLIT_RESET, false),
+    (&shaders::BVH_SPLIT_BOUNDS, true),
+    (&shaders::BVH_SPLIT_GRID, false),
+    (&shaders::BVH_SPLIT_WEIGH, true),
+    (&shaders::BVH_SPLIT_FACTOR, false),
+    (&shaders::BVH_SPLIT_COUNT, true),
+];
+const REFERENCES: &shaders::Shader = &shaders::BVH_SPLIT_REFERENCES;
