@@ -7,7 +7,7 @@
 //! 3. [`bvh`] turns triangles into codes, codes into an order, the order into a hierarchy, and that into a [`bvh::layout`];
 //! 4. [`accel`] does that by the calls and structs of `VK_KHR_acceleration_structure`;
 //! 5. [`trace`] finds the hits of rays in it;
-//! 6. [`measure`] turns builds and hits into figures;
+//! 6. [`measure`] turns builds and hits into figures, finds where methods give way (`stability`) and which to take (`choose`);
 //! 7. [`report`] turns figures into tables and charts;
 //! 8. [`cli`] is the binary's commands.
 //!

@@ -82,7 +82,7 @@ fn optimised_trees_are_those_of_the_host() {
             [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)]
         {
             let (codes, collapse) = (Code::Emc64Var.full(), Collapse::SAH);
-            let optimise = reinsertion::Options { passes: 3, stride: 2 };
+            let optimise = reinsertion::Options { rounds: 6, stride: 2 };
             let tree = on_host(&positions, &triangles, codes, method).reinserted(&optimise);
             let expected = tree.collapsed(&collapse);
             expected.validate().unwrap_or_else(|e| panic!("{name} {method:?}: {e}"));

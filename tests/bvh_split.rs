@@ -140,7 +140,7 @@ fn codes_with_a_grid_or_sections_and_optimised_trees_are_those_of_the_host() {
             assert_same(&on_device(&mesh, &options), &expected, &format!("{} {codes}", mesh.0));
         }
         let codes = Code::Emc64Var.full();
-        let optimise = reinsertion::Options { passes: 3, stride: 2 };
+        let optimise = reinsertion::Options { rounds: 6, stride: 2 };
         let tree = on_host(&mesh, &split, codes, Method::Lbvh).reinserted(&optimise).collapsed(&Collapse::SAH);
         tree.validate().expect("valid");
         let options = Options { codes: Some(codes), split: Some(split), optimise: Some(optimise), ..Options::DEFAULT };

@@ -283,7 +283,7 @@ impl Builder {
             geometry_count: options.geometry_count,
             build_flags: options.build_flags,
             alone,
-            method_bytes: method_bytes(options.method, optimise.as_ref(), count.into()),
+            method_bytes: method_bytes(options.method, optimise.as_ref(), count.max(1).into()),
         };
         let workers = if limits.is_cpu() { 64 } else { 1024 };
         Ok(Builder { method: options.method, schedule, optimise, workers, encode })

@@ -1,4 +1,15 @@
 //! Bounding volume hierarchies: codes, node layouts, builders on the device, and their twins on the host.
+//!
+//! The way of a triangle, each step a file here and shaders of the same name in `glsl/bvh`:
+//!
+//! 1. [`geometry`] is what a caller gives; [`split`] makes several references of a large triangle, if asked;
+//! 2. `encode` finds bounds, computes [`codes`] and sorts by them;
+//! 3. `lbvh`, `hlbvh`, `ploc` or `hploc` makes the tree; [`builder`] is where a caller chooses;
+//! 4. [`reinsertion`] makes it better, if asked;
+//! 5. `collapse` makes leaves where they are cheaper ([`sah`]) and orders the records: a [`layout::Bvh2`];
+//! 6. [`wide`] makes nodes of four or eight children of it, [`refit`] follows moved vertices, [`compact`] gives back room.
+//!
+//! What came of it: [`quality`] and [`epo`] measure, [`validate`] checks. [`host`] has a twin of every step, with the same bytes.
 
 pub mod builder;
 pub mod codes;

@@ -24,13 +24,15 @@ use super::layout::node_slots;
 use crate::Result;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Grid, Kernel, Limits, Recorder, Step, fill, shaders};
+use std::time::Duration;
 
 /// How much is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Options {
-    /// How often every link is tried. Time grows with it.
-    pub passes: u32,
-    /// Of so many links, one is tried in a round, another in each; fewer where there are few. So many rounds are a pass.
+    /// How many rounds there are. Time grows with them.
+    pub rounds: u32,
+    /// Of so many links, one is tried in a round, another in each: so many rounds are a *pass*. Where there are few links both
+    /// numbers are smaller by the same factor.
     pub stride: u32,
 }
 
@@ -44,7 +46,15 @@ impl Options {
 
     /// So many passes, of 64 rounds each where there are enough links.
     pub const fn of_passes(passes: u32) -> Options {
-        Options { passes, stride: 64 }
+        Options { rounds: passes.saturating_mul(STRIDE), stride: STRIDE }
+    }
+
+    /// As many rounds as there is time for in `budget`, if a pass over the same structure takes `pass`: what [`Options::FAST`] took.
+    /// Rounds of [`Options::HIGH`] at most, and possibly none.
+    pub fn within(budget: Duration, pass: Duration) -> Options {
+        // A ratio of floats; one that is not a number is none.
+        let rounds = f64::from(STRIDE) * budget.as_secs_f64() / pass.as_secs_f64();
+        Options { rounds: (rounds as u32).min(Options::HIGH.rounds), stride: STRIDE }
     }
 
     /// Of so many links, one is tried in a round of a structure with these node slots: in a round at least [`LEAST_LINKS`].
@@ -54,10 +64,13 @@ impl Options {
 
     /// Rounds for a structure with these node slots.
     pub(super) fn rounds_for(&self, node_slots: u32) -> u32 {
-        self.passes * self.stride_for(node_slots)
+        let rounds = u64::from(self.rounds) * u64::from(self.stride_for(node_slots));
+        u32::try_from(rounds.div_ceil(u64::from(self.stride.max(1)))).unwrap_or(u32::MAX)
     }
 }
 
+/// Of [`Options::of_passes`].
+const STRIDE: u32 = 64;
 /// Links that are not worth a round of less.
 const LEAST_LINKS: u32 = 128;
 /// Subtrees that a search may put off; what does not find room is not looked at.
@@ -161,3 +174,26 @@ const STEPS: [&shaders::Shader; 4] = [
     &shaders::BVH_REINSERTION_SETTLE,
     &shaders::BVH_REINSERTION_MOVE,
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_budget_has_the_rounds_that_there_is_time_for() {
+        let within = |budget, pass| Options::within(Duration::from_millis(budget), Duration::from_millis(pass)).rounds;
+        assert_eq!((within(50, 100), within(101, 100), within(1, 100)), (32, 64, 0));
+        assert_eq!(within(10_000, 100), Options::HIGH.rounds);
+        // Where a pass is shorter than the clock's tick.
+        assert_eq!((within(0, 0), within(1, 0)), (0, Options::HIGH.rounds));
+    }
+
+    #[test]
+    fn a_pass_of_few_links_has_fewer_rounds() {
+        let slots = 640;
+        assert_eq!((Options::FAST.stride_for(slots), Options::FAST.rounds_for(slots)), (10, 10));
+        assert_eq!(Options { rounds: 32, stride: 64 }.rounds_for(slots), 5);
+        assert_eq!(Options { rounds: 33, stride: 64 }.rounds_for(slots), 6);
+        assert_eq!(Options::of_passes(u32::MAX).rounds_for(2), u32::MAX / 64 + 1);
+    }
+}

@@ -25,6 +25,7 @@ use crate::trace::wide::{Order, Tracer};
 use crate::{Error, Result};
 use std::fmt;
 use std::str::FromStr;
+use std::time::Duration;
 
 /// A builder that can be asked for.
 pub struct Builder {
@@ -83,8 +84,10 @@ const SPLIT: BuilderOption = BuilderOption {
     values: "a number from 0 to 1: splits of large triangles at most, as a part of all; with /N behind: of each at most N",
 };
 
-const OPTIMISE: BuilderOption =
-    BuilderOption { key: "optimise", values: "off, fast, medium, high, or a number of passes of reinsertion" };
+const OPTIMISE: BuilderOption = BuilderOption {
+    key: "optimise",
+    values: "off, fast, medium, high, a number of passes of reinsertion, or on the device a time for it as in 20ms",
+};
 const BITS: BuilderOption = BuilderOption { key: "bits", values: "a number of bits that the codes of a treelet share" };
 const TREELET: BuilderOption = BuilderOption { key: "treelet", values: "a number of primitives at most, from 1" };
 const WINDOW: BuilderOption = BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
@@ -261,6 +264,15 @@ fn given(device: Option<&Device>) -> Result<&Device> {
     device.ok_or_else(|| Error::NoVulkan("this builder works on a device, and none was opened".into()))
 }
 
+/// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
+fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &builder::Options) -> Result<Duration> {
+    let mut subject = DeviceBvh::new(device, "", mesh, options, None)?;
+    subject.build()?;
+    let run = subject.build()?;
+    let milliseconds: f64 = run.phases.iter().filter(|p| p.name == OPTIMISE.key).map(|p| p.milliseconds).sum();
+    Ok(Duration::from_secs_f64(1e-3 * milliseconds))
+}
+
 /// A builder with its options, as `-b` takes it. Known to exist and to have sound options once it is made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Spec {
@@ -349,9 +361,20 @@ impl Spec {
         }
     }
 
-    /// Option `optimise`; off where it was not given.
+    /// Option `optimise` where it is a time.
+    fn time_to_optimise(&self) -> Option<Result<Duration>> {
+        let value = self.option(OPTIMISE.key)?;
+        let milliseconds = value.strip_suffix("ms")?.parse().ok();
+        let time = milliseconds.and_then(|ms: f64| Duration::try_from_secs_f64(1e-3 * ms).ok());
+        Some(time.ok_or_else(|| self.wrong_value(&OPTIMISE, value)))
+    }
+
+    /// Option `optimise`; off where it was not given. For a time, the pass that tells how many there is time for.
     fn reinsertion(&self) -> Result<Option<reinsertion::Options>> {
         use reinsertion::Options;
+        if let Some(time) = self.time_to_optimise() {
+            return time.map(|_| Some(Options::FAST));
+        }
         Ok(match self.option(OPTIMISE.key) {
             None | Some("off") => None,
             Some("fast") => Some(Options::FAST),
@@ -362,6 +385,10 @@ impl Spec {
     }
 
     fn host_options(&self, hierarchy: Hierarchy) -> Result<host::Options> {
+        if self.time_to_optimise().is_some() {
+            let what = "on the host rounds are not timed; take fast, medium, high or a number of passes";
+            return Err(Error::Argument(format!("builder {self}: {}: {what}", OPTIMISE.key)));
+        }
         let (codes, collapse) = (self.codes()?, self.collapse()?);
         Ok(host::Options { hierarchy, codes, reinsertion: self.reinsertion()?, collapse })
     }
@@ -428,7 +455,12 @@ impl Spec {
             None => Tracer::of(limits, form),
             Some(order) => Tracer::in_order(limits, form, order),
         });
-        Ok(Box::new(DeviceBvh::new(device, &self.to_string(), mesh, options, wide)?))
+        let mut options = *options;
+        if let Some(budget) = self.time_to_optimise() {
+            let pass = pass_of_reinsertion(device, mesh, &options)?;
+            options.optimise = Some(reinsertion::Options::within(budget?, pass));
+        }
+        Ok(Box::new(DeviceBvh::new(device, &self.to_string(), mesh, &options, wide)?))
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {
@@ -578,6 +610,10 @@ mod tests {
             let says = format!("split={wrong} is not known; take a number from 0 to 1");
             assert!(error_of(&format!("hploc:split={wrong}")).contains(&says), "{wrong}");
         }
+        for wrong in ["ms", "-1ms", "infms", "20s"] {
+            assert!(error_of(&format!("lbvh:optimise={wrong}")).contains("a time for it as in 20ms"), "{wrong}");
+        }
+        assert!(error_of("lbvh-host:optimise=20ms").contains("on the host rounds are not timed"));
         assert!(error_of("lbvh-host:codes").contains("write codes=VALUE"));
         assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
         assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse, optimise"));

@@ -40,7 +40,7 @@ pub const SCENES: [&str; 18] = [
     "gen:clutter:240:5",
 ];
 /// Pixels of the picture that the rays belong to.
-const RAYS: RayOptions = RayOptions { size: [48, 36], seed: 1 };
+const RAYS: RayOptions = RayOptions { size: [128, 96], seed: 1 };
 /// Runs that count, after one that does not.
 const RUNS: u32 = 3;
 /// Milliseconds after which a builder has built enough on a scene.

@@ -288,10 +288,10 @@ impl Update {
     }
 }
 
-/// What could not be measured.
+/// What could not be measured, or was wrong.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
-    /// The experiment, and the scene where it has one.
+    /// The experiment, or the scene, with the builder and the point where it has them.
     pub of: String,
     /// What went wrong.
     pub what: String,

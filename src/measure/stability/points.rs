@@ -3,6 +3,7 @@
 
 use super::far::Side;
 use super::large::Placement;
+pub use crate::measure::experiments::points::Failure;
 use crate::measure::provenance::{DeviceFacts, Machine};
 use crate::measure::record::SCHEMA;
 use crate::measure::statistics::Spread;
@@ -169,15 +170,6 @@ pub struct Run {
     pub notes: Vec<String>,
     /// What could not be measured, or was wrong.
     pub failures: Vec<Failure>,
-}
-
-/// What could not be measured, or was wrong.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Failure {
-    /// Scene, builder, point.
-    pub of: String,
-    /// What went wrong.
-    pub what: String,
 }
 
 #[cfg(test)]
