@@ -49,12 +49,6 @@ float distance_of(Box a, Box b, float area_scale) {
     return area;
 }
 
-// Whether the cluster at place `i` is nearer to that at `own` than the one at `j` is. Of the same distance that of the least XOR:
-// so of many that are all equally far from each other, those at 2k and 2k + 1 find each other.
-bool is_nearer(float distance_i, uint i, float distance_j, uint j, uint own) {
-    return distance_i < distance_j || (distance_i == distance_j && (i ^ own) < (j ^ own));
-}
-
 // Makes the node over two clusters.
 Cluster merge_clusters(Structure structure, Weights w, Cluster left, Cluster right, float area_scale) {
     uint slot = right.first - 1u;

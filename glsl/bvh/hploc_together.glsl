@@ -34,6 +34,12 @@ void subgroup_step() {
                    gl_SemanticsAcquireRelease | gl_SemanticsMakeAvailable | gl_SemanticsMakeVisible);
 }
 
+// Whether the cluster at place `i` is nearer to that at `own` than the one at `j` is. Of the same distance that of the least XOR:
+// so of many that are all equally far from each other, those at 2k and 2k + 1 find each other.
+bool is_nearer(float distance_i, uint i, float distance_j, uint j, uint own) {
+    return distance_i < distance_j || (distance_i == distance_j && (i ^ own) < (j ^ own));
+}
+
 // The cluster nearest to each that is left.
 void find_nearest(uint begin, uint count, float area_scale) {
     for (uint base = 0; base < count; base += lane_count()) {

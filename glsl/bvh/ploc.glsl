@@ -115,7 +115,7 @@ void ploc_search(uint task, uint round) {
                 theirs = Box(cached_lo[cached], cached_hi[cached]);
             }
             float distance = distance_of(mine, theirs, area_scale);
-            if (looks && is_nearer(distance, other, best, best_other, own)) {
+            if (looks && distance < best) {
                 best = distance;
                 best_other = other;
             }

@@ -5,10 +5,10 @@
 //! - The distance of two clusters is the half area of the box around both, in `f32`, scaled as [`Aabb::scaled_half_area`] is.
 //!   Edges of less than 2^-60 count as that, the scene's longest being 1 to 4: some devices take the smallest of their products
 //!   for zero, others do not, and neither must decide.
-//! - Of clusters at the same distance from the one at place i, the nearest is that at the place j with the least i XOR j: of many
-//!   that are all equally far from each other, those at 2k and 2k + 1 find each other, and a round merges half of them. With the
-//!   one before the others for the nearest, a round would merge the first two only. Places are those of the round in PLOC, and in
-//!   a window of H-PLOC those of its first round.
+//! - Of clusters at the same distance, PLOC takes the one before the others for the nearest, which gives the costs that others
+//!   have published. H-PLOC takes, for the cluster at place i of its window in the first round, that at the place j with the least
+//!   i XOR j: of many that are all equally far from each other, those at 2k and 2k + 1 find each other, and a round merges half of
+//!   them. In PLOC that would change costs by 2.8% less to 2.1% more, in the mean by nothing.
 //! - Of two that merge, the one before is the left child, and its place is that of the new cluster. The node is in the slot
 //!   before the position of the right child's first primitive, which no other node can have.
 //!
@@ -21,7 +21,7 @@ pub(super) struct Cluster {
     pub child: Child,
     /// The position of its first primitive.
     representative: u32,
-    /// What ties are broken by.
+    /// What ties are broken by; all 0 in PLOC.
     place: usize,
 }
 

@@ -3,15 +3,15 @@
 //! Meister and Bittner 2018, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction". What it leaves
 //! open is settled so that the tree does not depend on who runs it:
 //!
-//! - Where boxes grow from each cluster to the next, everyone's nearest is the one before, and only the first two merge. So once
-//!   rounds have looked at 16 clusters a primitive and 131 072 more, a round of n in which fewer than n/16 fall
-//!   away is followed by a *forced* one: beside the pairs of before, 2k and 2k + 1 merge wherever neither is in a pair. That
-//!   leaves at most three quarters of them. Real scenes need none: most look at 4 to 7 a primitive, and a bathroom (salle_de_bain)
-//!   whose last 2000 clusters take 170 rounds has cost 37% more with forced ones.
+//! - Where all distances are equal, or boxes grow from each cluster to the next, everyone's nearest is the one before, and only the
+//!   first two merge. So once rounds have looked at 16 clusters a primitive and 131 072 more, a round of n in which fewer than
+//!   n/16 fall away is followed by a *forced* one: beside the pairs of before, 2k and 2k + 1 merge wherever neither is in a pair.
+//!   That leaves at most three quarters of them. Rounds forced wherever one is slow have cost a bathroom (salle_de_bain), whose last
+//!   2000 clusters take 170 rounds, 37%.
 //!
 //! Distances, ties and slots: [`super::clusters`].
 
-use super::clusters::{Cluster, merged, nearest, number};
+use super::clusters::{Cluster, merged, nearest};
 use crate::bvh::layout::{Bvh2, Record};
 
 /// Clusters that rounds look at before any is forced: so many a primitive, and so many anyway.
@@ -30,7 +30,6 @@ pub fn build<R: Record>(sorted: &Bvh2<R>, radius: usize) -> Bvh2<R> {
     let (mut looks, mut is_forced) = (0, false);
     while clusters.len() > 1 {
         let count = clusters.len();
-        number(&mut clusters);
         let nearest = nearest(&clusters, radius, scale);
         let in_pair = |i: usize| nearest[nearest[i]] == i;
         let partner = |i: usize| match i ^ 1 {
