@@ -2,7 +2,7 @@
 //!
 //! Benthin, Meister, Barczak, Mehalwal, Tsakok, Kensler 2024, "H-PLOC: Hierarchical Parallel Locally-Ordered Clustering for
 //! Bounding Volume Hierarchy Construction". There the window is as wide as a subgroup; here it is what it is given as, so that
-//! the tree is the same on every device. Distances, ties and slots: [`super::clusters`].
+//! the tree is the same on every device. Distances, ties and slots: `clusters.rs`.
 
 use super::clusters::{Cluster, merged, nearest, number};
 use crate::bvh::layout::{Bvh2, Child, Node, Record};

@@ -9,7 +9,7 @@
 //!   That leaves at most three quarters of them. Rounds forced wherever one is slow have cost a bathroom (salle_de_bain), whose last
 //!   2000 clusters take 170 rounds, 37%.
 //!
-//! Distances, ties and slots: [`super::clusters`].
+//! Distances, ties and slots: `clusters.rs`.
 
 use super::clusters::{Cluster, merged, nearest};
 use crate::bvh::layout::{Bvh2, Record};
