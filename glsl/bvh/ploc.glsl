@@ -207,7 +207,7 @@ void ploc_finish(uint round) {
         count = clusters_in(round + 1u);
     }
     if (gl_LocalInvocationIndex == 0u && count == 1u) {
-        write_root(Structure(structure_address), weights(), all_clusters().cluster[cluster_list(round).word[0]]);
+        write_root(Structure(structure_address), weights(), all_clusters().cluster[listed(cluster_list(round), 0u)]);
     }
 }
 #endif

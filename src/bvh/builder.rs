@@ -280,6 +280,8 @@ impl Builder {
                 Builder::WORKGROUP_MAX
             )));
         }
+        // One primitive has one tree, which the LBVH's kernels make; those of PLOC crash Mesa 26's lavapipe where there are none.
+        let method = if count < 2 { Method::Lbvh } else { options.method };
         let shape = Shape::of(limits);
         let optimise = options.optimise.map(|options| Reinsertion::new(limits, &options, count));
         let encode = Encode {
@@ -293,13 +295,13 @@ impl Builder {
             geometry_count: options.geometry_count,
             build_flags: options.build_flags,
             alone,
-            method_bytes: method_bytes(options.method, optimise.as_ref(), count.max(1).into()),
+            method_bytes: method_bytes(method, optimise.as_ref(), count.max(1).into()),
         };
         let workers = if limits.is_cpu() { 64 } else { 1024 };
-        Ok(Builder { method: options.method, schedule, optimise, workers, encode })
+        Ok(Builder { method, schedule, optimise, workers, encode })
     }
 
-    /// The method.
+    /// The method: of fewer than two primitives [`Method::Lbvh`], whatever was asked for.
     pub fn method(&self) -> Method {
         self.method
     }
