@@ -194,8 +194,10 @@ void ploc_finish(uint round) {
     // Where there is nothing, nobody has begun.
     uint count = primitive_count == 0u ? 0u : clusters_in(round);
     // Until rounds are forced there can be 512 of at least 256 clusters, and later every second leaves fifteen of sixteen.
-    for (uint turn = 0; turn < 1024u && count > 1u; ++turn, ++round) {
-        uint tiles = tiles_of(count);
+    // Once at least, which changes nothing where there is one cluster or none: Mesa 26's lavapipe goes through a loop that no lane
+    // enters, and loads from null.
+    for (uint turn = 0; turn < 1024u && (turn == 0u || count > 1u); ++turn, ++round) {
+        uint tiles = max(tiles_of(count), 1u);
         for (uint task = 0; task < tiles; ++task) ploc_search(task, round);
         next_phase();
         for (uint task = 0; task < tiles; ++task) ploc_count(task, round);
