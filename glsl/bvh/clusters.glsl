@@ -39,10 +39,8 @@ uint listed(Words list, uint i) {
     return safe_place(list.word[safe_place(i)]);
 }
 
-// Edges of boxes count at least so much, the scene's longest being 1 to 4: of their products devices would take some for zero.
-const float SHORTEST = 8.673617379884035e-19;   // 2^-60
-
-// The distance of two clusters: half the area of the box around both.
+// The distance of two clusters: half the area of the box around both, whose edges are SHORTEST at least, so that the nearer of two
+// on a line is the nearer.
 float distance_of(Box a, Box b, float area_scale) {
     precise vec3 e = max(max(a.hi, b.hi) * area_scale - min(a.lo, b.lo) * area_scale, vec3(SHORTEST));
     precise float area = e.x * e.y + e.y * e.z + e.z * e.x;

@@ -3,8 +3,13 @@
 #define HEDGEROW_BVH_SAH
 #include "bvh/geometry.glsl"
 
+// Shorter edges count as none, the scene's longest being 1 to 4: of what is computed from them some devices would take a part for
+// zero, and costs would be compared otherwise.
+const float SHORTEST = 8.881784197001252e-16;   // 2^-50
+
 float scaled_half_area(Box b, float scale) {
     precise vec3 e = b.hi * scale - b.lo * scale;
+    e = mix(vec3(0.0), e, greaterThanEqual(abs(e), vec3(SHORTEST)));
     precise float area = e.x * e.y + e.y * e.z + e.z * e.x;
     return area;
 }

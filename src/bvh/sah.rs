@@ -41,10 +41,18 @@ pub fn area_scale(scene: &Aabb) -> f32 {
     f32::from_bits((scale as u32) << 23)
 }
 
+/// Edges shorter than this count as none, the scene's longest being 1 to 4. Areas are 2^-100 at least then, and differences of areas
+/// 2^-123: among the subnormals, which some devices take for zero, costs would be compared otherwise than here.
+pub(crate) const SHORTEST: f32 = 1.0 / (1u64 << 50) as f32;
+
 impl Aabb {
-    /// [`Aabb::half_area`] of the box scaled by `scale`, in the order of operations that the device uses.
+    /// [`Aabb::half_area`] of the box scaled by `scale`, in the order of operations that the device uses. Edges of less than 2^-50
+    /// count as none.
     pub fn scaled_half_area(&self, scale: f32) -> f32 {
-        let [x, y, z]: [f32; 3] = std::array::from_fn(|i| self.hi[i] * scale - self.lo[i] * scale);
+        let [x, y, z]: [f32; 3] = std::array::from_fn(|i| {
+            let edge = self.hi[i] * scale - self.lo[i] * scale;
+            if edge.abs() >= SHORTEST { edge } else { 0.0 }
+        });
         x * y + y * z + z * x
     }
 }
@@ -52,6 +60,17 @@ impl Aabb {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn neither_areas_nor_their_differences_are_subnormal() {
+        let edges = [0.0, 1e-30, 0.5 * SHORTEST, SHORTEST, SHORTEST * (1.0 + f32::EPSILON), 1e-7, 1.0];
+        let boxes = edges.iter().flat_map(|&x| edges.map(|y| Aabb { lo: [0.0; 3], hi: [x, y, 1.5 * SHORTEST] }));
+        let areas: Vec<f32> = boxes.map(|b| b.scaled_half_area(1.0)).collect();
+        for a in &areas {
+            assert!(areas.iter().all(|b| !(a - b).is_subnormal()), "{a}");
+        }
+        assert!(areas.contains(&0.0) && areas.iter().any(|&a| a > 0.0 && a < 1e-29));
+    }
 
     #[test]
     fn areas_are_finite_wherever_the_scene_is_and_however_small() {

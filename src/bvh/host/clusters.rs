@@ -3,18 +3,19 @@
 //! What the papers leave open is settled so that the tree does not depend on who runs it:
 //!
 //! - The distance of two clusters is the half area of the box around both, in `f32`, scaled as [`Aabb::scaled_half_area`] is.
-//!   Edges of less than 2^-60 count as that, the scene's longest being 1 to 4: some devices take the smallest of their products
+//!   Edges of less than 2^-50 count as that, the scene's longest being 1 to 4: some devices take the smallest of their products
 //!   for zero, others do not, and neither must decide.
 //! - Of clusters at the same distance, PLOC takes the one before the others for the nearest, which gives the costs that others
 //!   have published. H-PLOC takes, for the cluster at place i of its window in the first round, that at the place j with the least
 //!   i XOR j: of many that are all equally far from each other, those at 2k and 2k + 1 find each other, and a round merges half of
-//!   them. In PLOC that would change costs by 2.8% less to 2.1% more, in the mean by nothing.
+//!   them. PLOC's trees of eleven scenes would cost 0.7% less in the mean by that, from 2.8% less to 2.1% more.
 //! - Of two that merge, the one before is the left child, and its place is that of the new cluster. The node is in the slot
 //!   before the position of the right child's first primitive, which no other node can have.
 //!
 //! [`Aabb::scaled_half_area`]: crate::bvh::layout::Aabb::scaled_half_area
 
 use crate::bvh::layout::{Aabb, Child, Node};
+use crate::bvh::sah::SHORTEST;
 
 #[derive(Clone, Copy)]
 pub(super) struct Cluster {
@@ -38,8 +39,6 @@ pub(super) fn number(clusters: &mut [Cluster]) {
         cluster.place = place;
     }
 }
-
-const SHORTEST: f32 = 1.0 / (1u64 << 60) as f32;
 
 fn distance(a: &Aabb, b: &Aabb, scale: f32) -> f32 {
     let both = a.union(b);
