@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Version of the figures' meaning: of the features, the scenes and the rays.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 /// What a file holds: the figures, and what they belong to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

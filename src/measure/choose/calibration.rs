@@ -39,6 +39,18 @@ pub const SCENES: [&str; 18] = [
     "gen:clutter:150:4",
     "gen:clutter:240:5",
 ];
+/// Scenes larger than caches. Only the fastest builds of each layout are measured there: they tell how many times its price a ray
+/// takes, and what a ray does is told by the others.
+pub const LARGE_SCENES: [&str; 8] = [
+    "gen:icosphere:7",
+    "gen:icosphere:8",
+    "gen:grid:400",
+    "gen:soup:300000:2",
+    "gen:city:300",
+    "gen:forest:500",
+    "gen:cells:700",
+    "gen:clutter:800:6",
+];
 /// Pixels of the picture that the rays belong to.
 const RAYS: RayOptions = RayOptions { size: [128, 96], seed: 1 };
 /// Runs that count, after one that does not.
@@ -46,7 +58,7 @@ const RUNS: u32 = 3;
 /// Milliseconds after which a builder has built enough on a scene.
 const ENOUGH_MS: f64 = 50.0;
 
-/// Measures every candidate that `device` can build on every scene of [`SCENES`]. `say` is told what is being done. A candidate that
+/// Measures every candidate that `device` can build on every scene of [`SCENES`], and some on [`LARGE_SCENES`]. `say` is told what is being done. A candidate that
 /// fails on a scene has no figures there.
 ///
 /// # Errors
@@ -56,11 +68,15 @@ pub fn measure(device: &Device, say: &mut dyn FnMut(&str)) -> Result<Vec<Measure
     if specs.is_empty() {
         return Err(Error::NoVulkan(format!("{} can build none of the candidates of auto", device.found().name)));
     }
+    let fastest: Vec<Spec> =
+        candidates::FASTEST.iter().filter_map(|name| specs.iter().find(|s| s.to_string() == *name)).cloned().collect();
     let mut measured = Vec::new();
-    for name in SCENES {
+    let all = SCENES.map(|name| (name, &specs));
+    let large = LARGE_SCENES.map(|name| (name, &fastest));
+    for (name, specs) in all.into_iter().chain(large) {
         say(&format!("calibrating on {name}"));
         let scene = load(name)?;
-        measured.extend(on_scene(device, &scene, &specs, &Effort { rays: RAYS, runs: RUNS, enough_ms: ENOUGH_MS })?);
+        measured.extend(on_scene(device, &scene, specs, &Effort { rays: RAYS, runs: RUNS, enough_ms: ENOUGH_MS })?);
     }
     Ok(measured)
 }

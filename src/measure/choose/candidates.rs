@@ -31,6 +31,9 @@ pub const CANDIDATES: &[&str] = &[
     "ploc:codes=emc64var+robust:optimise=high:width=8q",
 ];
 
+/// Of each layout the one that is built fastest.
+pub const FASTEST: [&str; 2] = ["lbvh", "lbvh:width=8q"];
+
 /// The candidates that this device can build.
 pub fn possible(device: &Device) -> Vec<Spec> {
     let specs = CANDIDATES.iter().map(|name| name.parse::<Spec>().expect("a unit test parses every candidate"));
@@ -49,5 +52,6 @@ mod tests {
             assert!(!CANDIDATES[..i].contains(name), "{name} is there twice");
             assert_ne!(spec.builder().name, "auto", "a choice is none of its own candidates");
         }
+        assert!(FASTEST.iter().all(|name| CANDIDATES.contains(name)));
     }
 }

@@ -2,15 +2,18 @@
 //! sample of them.
 
 use super::sample;
+use crate::bvh::codes::{Codes, Plan};
+use crate::bvh::host::geometry::finite_box;
 use crate::bvh::layout::Aabb;
 use crate::scene::Mesh;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How many figures describe a scene.
 pub const COUNT: usize = 5;
 
-/// As many octaves below the scene's diagonal a triangle may be: the bits of a float.
-const FINEST: f64 = 24.0;
+/// A crowd of so many triangles costs nothing that is seen: its order in the file is one in space, too.
+const SMALL_CROWD: f64 = 128.0;
 
 /// The figures of a scene. All are logarithms to base 2: models of ratios are sums.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -25,9 +28,9 @@ pub struct Features {
 pub const NAMES: [&str; COUNT] = [
     // Triangles.
     "count",
-    // How much the scene's diagonal over that of a triangle's box is beyond 10 octaves, the bits of an axis in a 30-bit code, in the
-    // mean: what such a code cannot tell apart.
-    "blur",
+    // How many triangles have the code that one has, in the mean, over SMALL_CROWD: what an LBVH's codes cannot tell apart. The mean of
+    // logarithms would tell less: a fifth of the triangles in one crowd costs more than all in crowds of thirty.
+    "crowding",
     // Area of the boxes of all triangles over that of the triangles on both sides: how empty boxes are.
     "hollowness",
     // Area of the boxes of all triangles over that of the scene's: how many of them a random ray meets.
@@ -42,23 +45,18 @@ impl Features {
         let count = mesh.triangles.len();
         let mut bounds = Aabb::EMPTY;
         let (mut crossed, mut surface) = (0.0, 0.0);
-        let (mut boxes, mut sizes): (Vec<Aabb>, Vec<f64>) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let mut boxes: Vec<Aabb> = Vec::with_capacity(count);
         for i in 0..count {
             let corners = mesh.corners(i);
             let around = Aabb::around(&corners);
             bounds = bounds.union(&around);
             boxes.push(around);
-            sizes.push(diagonal(&around).log2());
             crossed += half_area(&around);
             surface += area(&corners);
         }
-        // In octaves; triangles without extent are as fine as floats tell apart.
-        let scene = diagonal(&bounds).log2();
-        let octaves = sizes.iter().map(|size| (scene - size).min(FINEST));
-        let blur = octaves.map(|o| (o - 10.0).max(0.0)).sum::<f64>() / count as f64;
         let values = [
             (count as f64).log2(),
-            blur,
+            crowding(&boxes),
             (crossed / surface).log2(),
             (crossed / half_area(&bounds)).log2(),
             sample::gain(&boxes),
@@ -72,8 +70,15 @@ fn extent(b: &Aabb) -> [f64; 3] {
     std::array::from_fn(|i| f64::from(b.hi[i]) - f64::from(b.lo[i]))
 }
 
-fn diagonal(b: &Aabb) -> f64 {
-    extent(b).iter().map(|e| e * e).sum::<f64>().sqrt()
+/// log2 of the mean of how many boxes have the code of one, over a small crowd; 0 where it is less.
+fn crowding(boxes: &[Aabb]) -> f64 {
+    let finite: Vec<Result<Aabb, u32>> = boxes.iter().map(finite_box).collect();
+    let plan = Plan::new(Codes::for_count(boxes.len() as u32), &finite);
+    let mut codes: Vec<u64> = finite.par_iter().flatten().map(|b| plan.encode(b)).collect();
+    codes.par_sort_unstable();
+    let crowds = codes.chunk_by(|a, b| a == b).map(|crowd| crowd.len() as f64);
+    let mean = crowds.map(|size| size * size).sum::<f64>() / codes.len() as f64;
+    (mean / SMALL_CROWD).max(1.0).log2()
 }
 
 fn half_area(b: &Aabb) -> f64 {
@@ -102,12 +107,25 @@ mod tests {
         let a = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
         let b = [[3.0, 0.0, 0.0], [9.0, 0.0, 0.0], [3.0, 8.0, 0.0]];
         let Features { triangles, values } = Features::of(&mesh(&[a, b]));
-        // The scene is 9 × 8. Of two boxes there is one tree.
+        // The scene is 9 × 8. Codes tell the two apart, and of two boxes there is one tree.
         let expected: [f64; COUNT] = [1.0, 0.0, (60.0f64 / 30.0).log2(), (60.0f64 / 72.0).log2(), 0.0];
         assert_eq!(triangles, 2);
         for ((name, value), expected) in NAMES.iter().zip(values).zip(expected) {
             assert!((value - expected).abs() < 1e-12, "{name}: {value}, {expected}");
         }
+    }
+
+    #[test]
+    fn what_has_the_same_code_is_a_crowd() {
+        // Some at one place, two at another, one far away.
+        let at = |x: f32| [[x, 0.0, 0.0], [x + 1e-6, 0.0, 0.0], [x, 1e-6, 0.0]];
+        let crowding = |some: usize| {
+            let crowds = [vec![at(0.0); some], vec![at(0.5); 2], vec![at(1.0)]].concat();
+            Features::of(&mesh(&crowds)).values[1]
+        };
+        assert_eq!(crowding(100), 0.0);
+        let expected = ((600.0 * 600.0 + 2.0 * 2.0 + 1.0) / 603.0 / 128.0f64).log2();
+        assert!((crowding(600) - expected).abs() < 1e-12, "{} {expected}", crowding(600));
     }
 
     #[test]

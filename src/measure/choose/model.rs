@@ -45,86 +45,116 @@ impl Estimate {
 
 /// A model of measured candidates.
 ///
-/// A build takes a + b · triangles, times what the other figures make of it; a ray what the figures make of it for the best
-/// candidate, times what they make of how much worse another is. "What they make of" is the exponential of a linear function.
+/// A build takes a + b · triangles, times what the other figures make of it. A ray takes the price of what the best candidate's does,
+/// times how much more another's does, times how many times its price a ray of that layout takes: rays side by side go different
+/// ways, and trees are larger than caches. Each of these three is what the figures make of it, the exponential of a linear function.
 #[derive(Debug, Clone)]
 pub struct Model {
     /// What rays' work costs.
     pub prices: Prices,
-    /// Standard deviation of the logarithm of times of rays over what the prices make of them.
+    /// Standard deviation of the logarithm of times of rays over what the prices make of them, scene and layout aside.
     pub deviation: f64,
-    ray: Ridge,
+    least_work: Ridge,
+    /// How many times its price a ray takes, and of each of the prices' layouts how much more.
+    pace: Ridge,
+    layout_paces: Vec<Ridge>,
     candidates: Vec<Candidate>,
 }
 
-/// The logarithm of how many times the best candidate's ray another's takes, at most: by how much more it is worse would only draw
-/// the weights away from where candidates are near each other.
+/// The logarithm of how many times what the best candidate's ray does another's does, at most: by how much more it is worse would
+/// only draw the weights away from where candidates are near each other.
 const MOST: f64 = 1.5;
 
 #[derive(Debug, Clone)]
 struct Candidate {
     builder: String,
+    /// Its place among the prices' layouts.
+    layout: usize,
     /// Milliseconds of any build, and of each triangle more.
     build: [f64; 2],
     build_factor: Ridge,
-    ray_factor: Ridge,
+    work_factor: Ridge,
 }
 
 impl Model {
-    /// A model of what was measured, with the prices of what rays did in place of their times. Scenes that not all candidates were
-    /// measured on are left out.
+    /// A model of what was measured. Scenes that not all candidates were measured on tell of the pace alone.
     pub fn of(measured: &[Measured]) -> Model {
-        let mut builders: Vec<&str> = Vec::new();
+        let mut builders: Vec<&Measured> = Vec::new();
         let mut scenes: Vec<&Measured> = Vec::new();
         for m in measured {
-            if !builders.contains(&m.builder.as_str()) {
-                builders.push(&m.builder);
+            if !builders.iter().any(|known| known.builder == m.builder) {
+                builders.push(m);
             }
             if !scenes.iter().any(|known| known.scene == m.scene) {
                 scenes.push(m);
             }
         }
         let of = |scene: &str, builder: &str| measured.iter().find(|m| m.scene == scene && m.builder == builder);
-        scenes.retain(|scene| builders.iter().all(|builder| of(&scene.scene, builder).is_some_and(is_positive)));
-        let complete: Vec<Measured> =
-            measured.iter().filter(|m| scenes.iter().any(|scene| scene.scene == m.scene)).cloned().collect();
-        let prices = Prices::of(&complete);
-        let deviation = prices.deviation(&complete);
-        let measured = prices.applied(&complete);
-        let of = |scene: &str, builder: &str| measured.iter().find(|m| m.scene == scene && m.builder == builder);
-        let all: Vec<Sample> = scenes
+        let is_complete = |scene: &str| {
+            builders.iter().all(|m| of(scene, &m.builder).is_some_and(|m| is_positive(m) && m.work.steps > 0.0))
+        };
+        let (complete, _): (Vec<&Measured>, Vec<&Measured>) = scenes.iter().partition(|m| is_complete(&m.scene));
+        let on_complete: Vec<Measured> =
+            measured.iter().filter(|m| complete.iter().any(|scene| scene.scene == m.scene)).cloned().collect();
+        let prices = Prices::of(&on_complete);
+        let price = |m: &Measured| prices.ray_ns(m).unwrap_or(m.ray_ns).ln();
+        let least: Vec<Sample> = complete
             .iter()
             .map(|scene| {
-                let logs = builders.iter().filter_map(|builder| Some(of(&scene.scene, builder)?.ray_ns.ln()));
-                (scene.features.values, logs.fold(f64::INFINITY, f64::min))
+                let of_scene = on_complete.iter().filter(|m| m.scene == scene.scene);
+                (scene.features.values, of_scene.map(price).fold(f64::INFINITY, f64::min))
             })
             .collect();
-        let candidate = |builder: &&str| {
-            let own: Vec<&Measured> = scenes.iter().filter_map(|scene| of(&scene.scene, builder)).collect();
+        let candidate = |first: &&Measured| {
+            let own: Vec<&Measured> = complete.iter().filter_map(|scene| of(&scene.scene, &first.builder)).collect();
             let build = affine(own.iter().map(|m| (m.features.triangles as f64, m.build_ms)));
             let build_factors: Vec<Sample> =
                 own.iter().map(|m| (m.features.values, (m.build_ms / at(build, m.features.triangles)).ln())).collect();
-            let ray_factors: Vec<Sample> =
-                own.iter().zip(&all).map(|(m, (x, least))| (*x, (m.ray_ns.ln() - least).min(MOST))).collect();
-            Candidate {
-                builder: (*builder).to_owned(),
+            let work_factors: Vec<Sample> =
+                own.iter().zip(&least).map(|(m, (x, least))| (*x, (price(m) - least).min(MOST))).collect();
+            Some(Candidate {
+                builder: first.builder.clone(),
+                layout: prices.layouts().iter().position(|layout| *layout == first.layout)?,
                 build,
                 build_factor: Ridge::fit(&without_count(&build_factors)),
-                ray_factor: Ridge::fit(&ray_factors),
-            }
+                work_factor: Ridge::fit(&work_factors),
+            })
         };
-        let candidates = builders.iter().map(candidate).collect();
-        Model { prices, deviation, ray: Ridge::fit(&all), candidates }
+        let candidates = builders.iter().filter_map(candidate).collect();
+        // The pace of a scene, of one layout or of all.
+        let pace = |scene: &Measured, layout: Option<&String>| {
+            let alike =
+                measured.iter().filter(|m| m.scene == scene.scene && layout.is_none_or(|layout| m.layout == *layout));
+            Some(prices.factor(alike)?.ln())
+        };
+        let paces: Vec<Sample> =
+            scenes.iter().filter_map(|scene| Some((scene.features.values, pace(scene, None)?))).collect();
+        let of_layout = |layout: &String| {
+            let sample =
+                |scene: &&Measured| Some((scene.features.values, pace(scene, Some(layout))? - pace(scene, None)?));
+            Ridge::fit(&scenes.iter().filter_map(sample).collect::<Vec<Sample>>())
+        };
+        Model {
+            deviation: prices.deviation(&on_complete),
+            least_work: Ridge::fit(&least),
+            pace: Ridge::fit(&paces),
+            layout_paces: prices.layouts().iter().map(of_layout).collect(),
+            candidates,
+            prices,
+        }
     }
 
     /// What every candidate is expected to take on a scene.
     pub fn estimates(&self, features: &Features) -> Vec<Estimate> {
         let x = &features.values;
-        let all = self.ray.at_any_size(x);
-        let estimate = |candidate: &Candidate| Estimate {
-            builder: candidate.builder.clone(),
-            build_ms: at(candidate.build, features.triangles) * candidate.build_factor.at(&shape(x)).exp(),
-            ray_ns: (all + candidate.ray_factor.at(x)).exp(),
+        let common = self.least_work.at_any_size(x) + self.pace.at_any_size(x);
+        let estimate = |candidate: &Candidate| {
+            let own = candidate.work_factor.at(x) + self.layout_paces[candidate.layout].at(x);
+            Estimate {
+                builder: candidate.builder.clone(),
+                build_ms: at(candidate.build, features.triangles) * candidate.build_factor.at(&shape(x)).exp(),
+                ray_ns: (common + own).exp(),
+            }
         };
         self.candidates.iter().map(estimate).collect()
     }
@@ -244,13 +274,36 @@ mod tests {
     }
 
     #[test]
-    fn scenes_that_a_candidate_failed_on_are_left_out() {
+    fn scenes_that_not_all_were_measured_on_tell_of_the_pace_alone() {
         let mut some = measured(&SCENES);
         some.push(Measured { scene: "alone".into(), build_ms: 1e9, ..some[0].clone() });
         let (all, without) = (Model::of(&some), Model::of(&measured(&SCENES)));
         let x = features(7_000, 1.0);
-        assert_eq!(all.estimates(&x), without.estimates(&x));
+        for (all, without) in all.estimates(&x).iter().zip(without.estimates(&x)) {
+            assert_eq!(all.build_ms, without.build_ms);
+            assert!((all.ray_ns / without.ray_ns - 1.0).abs() < 0.01, "{all:?} {without:?}");
+        }
         assert_eq!(Model::of(&[]).choose(&x, 1e6), None);
+    }
+
+    #[test]
+    fn where_large_scenes_are_slower_than_their_work_all_candidates_are() {
+        // Of scenes from 300,000 triangles on, one candidate alone: as many steps as ever, at twice their price.
+        let mut all = measured(&SCENES);
+        for n in [300_000, 500_000, 1_000_000] {
+            for crossing in [0.0, 1.0, 2.0, 3.0] {
+                let [fast, _] = &measured(&[(n, crossing)])[..] else { panic!("two") };
+                all.push(Measured { ray_ns: 2.0 * fast.ray_ns, ..fast.clone() });
+            }
+        }
+        let (slower, before) = (Model::of(&all), Model::of(&measured(&SCENES)));
+        let of =
+            |model: &Model, n| model.estimates(&features(n, 1.5)).into_iter().map(|e| e.ray_ns).collect::<Vec<_>>();
+        for (n, least, most) in [(700_000, 1.6, 2.4), (5_000, 0.7, 1.2)] {
+            for (slower, before) in of(&slower, n).iter().zip(of(&before, n)) {
+                assert!((least..most).contains(&(slower / before)), "{n}: {slower} {before}");
+            }
+        }
     }
 
     #[test]

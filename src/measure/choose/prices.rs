@@ -85,19 +85,26 @@ impl Prices {
         Some(amounts.iter().zip(&self.nanoseconds).map(|(amount, price)| amount * price).sum())
     }
 
-    /// What was measured with times of rays by these prices and their scenes' factors.
-    pub fn applied(&self, measured: &[Measured]) -> Vec<Measured> {
-        let factors = self.factors(measured);
-        let priced = |m: &Measured| {
-            let factor = factors.iter().find(|(scene, _)| *scene == m.scene)?.1;
-            Some(Measured { ray_ns: factor * self.ray_ns(m)?, ..m.clone() })
-        };
-        measured.iter().map(|m| priced(m).filter(|p| p.ray_ns > 0.0).unwrap_or_else(|| m.clone())).collect()
+    /// The layouts that have prices.
+    pub fn layouts(&self) -> &[String] {
+        &self.layouts
     }
 
-    /// The standard deviation of the logarithm of what was measured over what these prices make of it.
+    /// How many times its price a ray takes: the median over what was measured; `None` where nothing has a price.
+    pub fn factor<'a>(&self, measured: impl Iterator<Item = &'a Measured>) -> Option<f64> {
+        let factors = measured.filter_map(|m| Some(m.ray_ns / self.ray_ns(m)?));
+        let factors: Vec<f64> = factors.filter(|f| f.is_finite() && *f > 0.0).collect();
+        Some(Spread::of(&factors)?.median)
+    }
+
+    /// The standard deviation of the logarithm of what was measured over what these prices and the factor of the scene and layout
+    /// make of it.
     pub fn deviation(&self, measured: &[Measured]) -> f64 {
-        let logs = measured.iter().zip(self.applied(measured)).map(|(m, priced)| (m.ray_ns / priced.ray_ns).ln());
+        let log = |m: &Measured| {
+            let alike = measured.iter().filter(|other| other.scene == m.scene && other.layout == m.layout);
+            Some((m.ray_ns / (self.factor(alike)? * self.ray_ns(m)?)).ln())
+        };
+        let logs = measured.iter().filter_map(log);
         let (count, sum) = logs.fold((0u32, 0.0), |(count, sum), log| (count + 1, sum + log * log));
         (sum / f64::from(count.max(1))).sqrt()
     }
@@ -124,19 +131,12 @@ impl Prices {
         Some(amounts)
     }
 
-    /// How many times its price a ray takes on each scene: the median over the candidates; 1 where there are no prices yet.
+    /// How many times its price a ray takes on each scene; 1 where there are no prices yet.
     fn factors<'a>(&self, measured: &'a [Measured]) -> Vec<(&'a str, f64)> {
         let mut scenes: Vec<&str> = measured.iter().map(|m| m.scene.as_str()).collect();
         scenes.dedup();
-        let factor = |scene: &str| {
-            let of_scene = measured.iter().filter(|m| m.scene == scene);
-            let factors: Vec<f64> = of_scene
-                .filter_map(|m| Some(m.ray_ns / self.ray_ns(m)?))
-                .filter(|f| f.is_finite() && *f > 0.0)
-                .collect();
-            Spread::of(&factors).map_or(1.0, |spread| spread.median)
-        };
-        scenes.into_iter().map(|scene| (scene, factor(scene))).collect()
+        let of = |scene: &str| self.factor(measured.iter().filter(|m| m.scene == scene)).unwrap_or(1.0);
+        scenes.into_iter().map(|scene| (scene, of(scene))).collect()
     }
 }
 
@@ -191,8 +191,10 @@ mod tests {
         let all = all();
         let prices = Prices::of(&all);
         assert!(prices.deviation(&all) < 0.02, "{:?} {}", prices, prices.deviation(&all));
-        for (m, priced) in all.iter().zip(prices.applied(&all)) {
-            assert!((priced.ray_ns / m.ray_ns - 1.0).abs() < 0.05, "{m:?} {priced:?}");
+        for m in &all {
+            let factor = prices.factor(all.iter().filter(|other| other.scene == m.scene)).expect("prices");
+            let priced = factor * prices.ray_ns(m).expect("a price");
+            assert!((priced / m.ray_ns - 1.0).abs() < 0.05, "{m:?} {priced}");
         }
         assert_eq!(prices.lines().len(), 2);
     }
@@ -201,8 +203,10 @@ mod tests {
     fn a_disturbed_time_hardly_moves_its_price() {
         let (calm, mut disturbed) = (all(), all());
         disturbed[4].ray_ns *= 1.3;
-        let priced = Prices::of(&disturbed).applied(&disturbed);
-        assert!((priced[4].ray_ns / calm[4].ray_ns - 1.0).abs() < 0.1, "{:?} {:?}", priced[4], calm[4]);
+        let prices = Prices::of(&disturbed);
+        let factor = prices.factor(disturbed.iter().filter(|m| m.scene == calm[4].scene)).expect("prices");
+        let priced = factor * prices.ray_ns(&disturbed[4]).expect("a price");
+        assert!((priced / calm[4].ray_ns - 1.0).abs() < 0.1, "{priced} {:?}", calm[4]);
     }
 
     #[test]
@@ -213,7 +217,7 @@ mod tests {
         assert!(prices.nanoseconds.iter().all(|price| *price >= 0.0), "{prices:?}");
         odd[0].layout = "wide4".into();
         assert_eq!(prices.ray_ns(&odd[0]), None);
-        assert_eq!(prices.applied(&odd)[0], odd[0]);
+        assert_eq!(prices.factor(odd[..1].iter()), None);
         assert_eq!(Prices::of(&[]).lines().len(), 0);
     }
 
