@@ -19,7 +19,7 @@ use crate::{Error, Result};
 pub struct Options {
     /// How the tree is made.
     pub method: Method,
-    /// The codes; `None` lets [`Codes::for_method`] choose them from the number of primitives.
+    /// The codes; `None` lets [`Codes::for_count`] choose them from the number of primitives.
     pub codes: Option<Codes>,
     /// Whether large triangles are split into several references before all else, and how much.
     pub split: Option<split::Options>,
@@ -212,23 +212,15 @@ pub struct Job<'a> {
 }
 
 impl Codes {
-    /// The codes that an LBVH of `primitive_count` triangles needs: about a thousand times as many cells as triangles, in whole passes of
+    /// The codes that a tree of `primitive_count` triangles needs: about a thousand times as many cells as triangles, in whole passes of
     /// the sort. On scenes of 66k to 1.4M triangles that is 32 bits, and the SAH cost is within 0.6% of that with
-    /// all 64; 24 bits would cost 1.3% at 111k triangles and 7.8% at 871k.
+    /// all 64; 24 bits would cost 1.3% at 111k triangles and 7.8% at 871k. Methods that look at boxes themselves need no bits for the
+    /// size; without them, over thirteen scenes, the trees of PLOC and H-PLOC cost the same within 0.1%, and those of HLBVH 1.3% less
+    /// for 1.4 times the build.
     pub fn for_count(primitive_count: u32) -> Codes {
         // Bits of an index, whatever the count: what is too much is refused, not computed with.
         let bits = 32 - (primitive_count.max(2) - 1).leading_zeros() + 10;
         Code::Emc64Var.full().with_bits(bits.next_multiple_of(8))
-    }
-
-    /// The same for a method. What looks at boxes itself needs no bits for the size: without them trees over eleven scenes cost
-    /// 1.2% less by HLBVH, 0.3% by PLOC with radius 25, and the same by H-PLOC; by LBVH 2.2% more.
-    pub fn for_method(method: Method, primitive_count: u32) -> Codes {
-        let codes = Codes::for_count(primitive_count);
-        match method {
-            Method::Lbvh => codes,
-            _ => Code::Emc64VarNoSize.full().with_bits(codes.bits),
-        }
     }
 }
 
@@ -284,11 +276,16 @@ impl Builder {
         let method = if count < 2 { Method::Lbvh } else { options.method };
         let shape = Shape::of(limits);
         let optimise = options.optimise.map(|options| Reinsertion::new(limits, &options, count));
+        let items = match limits.is_cpu() {
+            true if alone => SHORT_RUN,
+            true => run_of(count, shape.workgroup),
+            false => 1,
+        };
         let encode = Encode {
-            codes: options.codes.unwrap_or_else(|| Codes::for_method(options.method, count)),
+            codes: options.codes.unwrap_or_else(|| Codes::for_count(count)),
             collapse: options.collapse,
             shape: if alone { shape.with_digit_bits(SMALL_DIGIT_BITS) } else { shape },
-            items: if limits.is_cpu() { 32 } else { 1 },
+            items,
             count,
             split,
             primitives: options.primitives,
@@ -518,6 +515,18 @@ fn method_bytes(method: Method, optimise: Option<&Reinsertion>, count: u64) -> u
 const SMALL: u32 = 2048;
 /// Bits of a digit for them: with 8, a pass spends more on its table than on a few hundred keys.
 const SMALL_DIGIT_BITS: u32 = 4;
+/// Primitives that an invocation of a CPU takes one after the other: siblings among them meet without atomics.
+const SHORT_RUN: u32 = 32;
+/// The same where there are many. The bunny's hierarchy takes 0.85 times as long with 128 as with 32 by LBVH and by H-PLOC, and no
+/// less with 256.
+const LONG_RUN: u32 = 128;
+/// Workgroups that are enough for the threads of a CPU to end at the same time, nearly.
+const ENOUGH_WORKGROUPS: u32 = 64;
+
+/// How many primitives an invocation of a CPU takes. Of two numbers, as each has its own kernels.
+fn run_of(count: u32, workgroup: u32) -> u32 {
+    if count >= LONG_RUN * workgroup * ENOUGH_WORKGROUPS { LONG_RUN } else { SHORT_RUN }
+}
 
 impl Schedule {
     /// What measured faster. Of few primitives, one workgroup. Of many, on lavapipe the chain, by a factor of 1.2 to 1.5 (the

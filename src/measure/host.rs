@@ -3,7 +3,6 @@
 use super::overlap::{self, Epo};
 use super::{BuildRun, Subject, record};
 use crate::Result;
-use crate::bvh::builder::Method;
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::host::sweep::Leaves;
@@ -54,15 +53,11 @@ pub struct Host<'a> {
 impl<'a> Host<'a> {
     /// On `mesh`.
     pub fn new(builder: &str, mesh: &'a Mesh, options: Options) -> Host<'a> {
-        let method = match options.hierarchy {
-            Hierarchy::Ploc(radius) => Method::Ploc { radius: radius as u32 },
-            _ => Method::Lbvh,
-        };
         Host {
             builder: builder.to_owned(),
             mesh,
             options,
-            codes: options.codes.unwrap_or_else(|| Codes::for_method(method, mesh.triangles.len() as u32)),
+            codes: options.codes.unwrap_or_else(|| Codes::for_count(mesh.triangles.len() as u32)),
             tree: None,
             rays: Vec::new(),
             hits: Vec::new(),

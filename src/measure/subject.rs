@@ -64,7 +64,7 @@ pub trait Subject {
     fn validate(&mut self) -> Result<()> {
         self.tree()?.map_or(Ok(()), |tree| tree.validate())
     }
-    /// What the builder chose where it was left the choice, in a few words (`emc64var-nosize/32, chain`); `None` if nothing.
+    /// What the builder chose where it was left the choice, in a few words (`emc64var/32, chain`); `None` if nothing.
     fn choice(&self) -> Option<String> {
         None
     }
