@@ -2,11 +2,10 @@
 
 mod common;
 
-use common::{corpus, device};
-use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
+use common::corpus;
+use common::twins::{assert_same, on_device, on_host};
+use hedgerow::bvh::builder::{Options, Schedule};
 use hedgerow::bvh::codes::Codes;
-use hedgerow::bvh::host;
-use hedgerow::bvh::sah::Collapse;
 
 const CODES: [&str; 16] = [
     "emc64var+robust",
@@ -27,14 +26,10 @@ const CODES: [&str; 16] = [
     "bin6a5+centroid",
 ];
 
-type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
-
 /// Small triangles in a lattice of these cells, which may be far apart, and larger ones with these corners.
-fn scene(cells: impl Iterator<Item = [f32; 3]>, larger: &[[[f32; 3]; 3]]) -> Mesh {
-    let small = cells.flat_map(|[x, y, z]| [[x, y, z], [x + 0.03, y, z + 0.01], [x, y + 0.02, z]]);
-    let positions: Vec<[f32; 3]> = small.chain(larger.iter().flatten().copied()).collect();
-    let triangles = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    (positions, triangles)
+fn scene(name: &str, cells: impl Iterator<Item = [f32; 3]>, larger: &[[[f32; 3]; 3]]) -> corpus::Mesh {
+    let small = cells.map(|[x, y, z]| [[x, y, z], [x + 0.03, y, z + 0.01], [x, y + 0.02, z]]);
+    corpus::soup(name, small.chain(larger.iter().copied()).collect())
 }
 
 /// A bent plate of 3,000 cells: of an octant little is occupied.
@@ -47,51 +42,36 @@ fn triangle_at(d: f32) -> [[f32; 3]; 3] {
     [[d, 0.5, 0.5], [d * 1.001, 0.5, 0.5], [d, 0.6, 0.5]]
 }
 
-fn meshes() -> Vec<(String, Mesh)> {
+fn meshes() -> Vec<corpus::Mesh> {
     let far = |e: i32| triangle_at(2.0_f32.powi(e));
     let mut meshes = vec![
-        ("plate".into(), scene(plate(), &[])),
-        ("flat".into(), scene((0..500).map(|i| [(i % 25) as f32, (i / 25) as f32, 0.0]), &[far(30)])),
-        ("line".into(), scene((0..300).map(|i| [i as f32, 0.0, 0.0]), &[[[0.0; 3], [0.0, 9.0e9, 0.0], [0.0; 3]]])),
-        ("point".into(), scene((0..100).map(|_| [1.0; 3]), &[far(3), far(60)])),
-        ("two towns".into(), scene((0..400).map(|i| [if i % 2 == 0 { 0.0 } else { 1.0e12 }, i as f32, 0.5]), &[])),
+        scene("plate", plate(), &[]),
+        scene("flat", (0..500).map(|i| [(i % 25) as f32, (i / 25) as f32, 0.0]), &[far(30)]),
+        scene("line", (0..300).map(|i| [i as f32, 0.0, 0.0]), &[[[0.0; 3], [0.0, 9.0e9, 0.0], [0.0; 3]]]),
+        scene("point", (0..100).map(|_| [1.0; 3]), &[far(3), far(60)]),
+        scene("two towns", (0..400).map(|i| [if i % 2 == 0 { 0.0 } else { 1.0e12 }, i as f32, 0.5]), &[]),
     ];
     for e in [4, 9, 50, 127] {
         let scale = 2.0_f32.powi(e);
-        meshes.push((format!("far by 2^{e}"), scene(plate(), &[triangle_at(scale)])));
-        meshes.push((format!("far by -2^{e}"), scene(plate(), &[triangle_at(-scale)])));
+        meshes.push(scene(&format!("far by 2^{e}"), plate(), &[triangle_at(scale)]));
+        meshes.push(scene(&format!("far by -2^{e}"), plate(), &[triangle_at(-scale)]));
         let huge = [[-scale, -0.2 * scale, 1.0], [scale, 0.3 * scale, 0.0], [0.0, scale, 2.0]];
-        meshes.push((format!("huge by 2^{e}"), scene(plate(), &[huge])));
+        meshes.push(scene(&format!("huge by 2^{e}"), plate(), &[huge]));
     }
     let hundred: Vec<_> = (1..=100).map(|i| far(1 + i)).collect();
-    meshes.push(("a hundred far".into(), scene(plate(), &hundred)));
+    meshes.push(scene("a hundred far", plate(), &hundred));
     meshes
 }
 
 #[test]
 fn every_prefix_gives_the_bytes_of_the_host() {
-    let device = device();
-    let corpus =
-        corpus::meshes().into_iter().map(|(name, positions, triangles)| (name.to_string(), (positions, triangles)));
-    for (name, (positions, triangles)) in meshes().into_iter().chain(corpus) {
-        let vertices = device.upload("positions", &positions).unwrap();
-        let indices = device.upload("indices", &triangles).unwrap();
+    for mesh in meshes().into_iter().chain(corpus::meshes()) {
         for codes in CODES {
             let codes: Codes = codes.parse().unwrap();
-            let expected = host::lbvh::build(&positions, &triangles, codes, Collapse::SAH);
-            expected.validate().unwrap_or_else(|e| panic!("{name} {codes}: {e}"));
             let options = Options { codes: Some(codes), schedule: Some(Schedule::Chain), ..Options::DEFAULT };
-            let builder = Builder::new(device, &options, triangles.len() as u32).unwrap();
-            let sizes = builder.sizes();
-            let structure = device.buffer("structure", sizes.structure).unwrap();
-            let scratch = device.buffer("scratch", sizes.scratch).unwrap();
-            structure.write(&vec![0u8; sizes.structure as usize]);
-            scratch.write(&vec![0xA5u8; sizes.scratch as usize]);
-            let (count, corners) = (triangles.len() as u32, positions.len() as u32);
-            let input = Input::mesh(vertices.address(), corners, indices.address(), count);
-            device.run(None, |r| builder.record(r, &input, structure.address(), scratch.address())).unwrap();
-            let bytes = structure.read::<u8>(sizes.structure as usize);
-            assert!(bytes == expected.to_bytes(), "{name} {codes}: other bytes than the host's");
+            let expected = on_host(&mesh, &options);
+            expected.validate().unwrap_or_else(|e| panic!("{} {codes}: {e}", mesh.0));
+            assert_same(&on_device(&mesh, &options), &expected, &format!("{} {codes}", mesh.0));
         }
     }
 }

@@ -5,32 +5,13 @@ mod common;
 use common::device;
 use common::geometries::{MOVED, Owned, half};
 use common::shapes::{Corners, soup};
-use hedgerow::bvh::builder::{Builder, Options, Schedule};
+use common::twins::{assert_same, built};
+use hedgerow::bvh::builder::{Options, Schedule};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{IndexFormat, Input, Source, VertexFormat};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
-
-fn built(input: &Input, schedule: Schedule) -> Vec<u8> {
-    let options = Options {
-        codes: Some(Code::Emc64Var.full()),
-        collapse: Collapse::SAH,
-        schedule: Some(schedule),
-        geometry_count: match input.source {
-            Source::Several { count, .. } => count,
-            _ => 1,
-        },
-        ..Options::DEFAULT
-    };
-    let builder = Builder::new(device(), &options, input.primitive_count).expect("few enough triangles");
-    let sizes = builder.sizes();
-    let structure = device().buffer("structure", sizes.structure).expect("memory");
-    let scratch = device().buffer("scratch", sizes.scratch).expect("memory");
-    structure.write(&vec![0u8; sizes.structure as usize]);
-    device().run(None, |r| builder.record(r, input, structure.address(), scratch.address())).expect("it builds");
-    structure.read(sizes.structure as usize)
-}
 
 #[track_caller]
 fn assert_as_on_the_host(geometries: &[Owned], shift: usize) -> Bvh2 {
@@ -53,9 +34,15 @@ fn assert_as_on_the_host(geometries: &[Owned], shift: usize) -> Bvh2 {
     let mut sources = vec![several];
     sources.extend((records.len() == 1).then(|| Source::One(records[0])));
     for source in sources {
+        let geometry_count = match source {
+            Source::Several { count, .. } => count,
+            _ => 1,
+        };
         for schedule in [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup] {
-            let got = built(&Input { source, primitive_count: first }, schedule);
-            assert!(got == expected.to_bytes(), "{source:?} {schedule:?}");
+            let (codes, schedule) = (Some(Code::Emc64Var.full()), Some(schedule));
+            let options = Options { codes, schedule, geometry_count, ..Options::DEFAULT };
+            let got = built(&options, &Input { source, primitive_count: first });
+            assert_same(&got, &expected, &format!("{source:?} {schedule:?}"));
         }
     }
     expected

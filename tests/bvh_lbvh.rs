@@ -2,28 +2,14 @@
 
 mod common;
 
+use common::twins::{assert_same, on_device, on_host};
 use common::{corpus, device};
-use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
+use hedgerow::bvh::builder::{Options, Schedule};
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::quality::{self, Figures, Quality};
 use hedgerow::bvh::sah::Collapse;
-
-fn build_on_device(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &Options) -> (Bvh2, Vec<u8>) {
-    let device = device();
-    let builder = Builder::new(device, options, triangles.len() as u32).unwrap();
-    let sizes = builder.sizes();
-    let vertices = device.upload("positions", positions).unwrap();
-    let indices = device.upload("indices", triangles).unwrap();
-    let structure = device.buffer("structure", sizes.structure).unwrap();
-    let scratch = device.buffer("scratch", sizes.scratch).unwrap();
-    structure.write(&vec![0u8; sizes.structure as usize]);
-    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), triangles.len() as u32);
-    device.run(None, |r| builder.record(r, &input, structure.address(), scratch.address())).unwrap();
-    let bytes = structure.read::<u8>(sizes.structure as usize);
-    (Bvh2::from_bytes(&bytes).unwrap(), bytes)
-}
 
 #[test]
 fn quality_on_the_device_equals_the_walk_on_the_host() {
@@ -74,16 +60,16 @@ const KINDS: [(&str, Collapse); 12] = [
 
 #[test]
 fn every_code_and_schedule_gives_the_bytes_of_the_host() {
-    for (name, positions, triangles) in corpus::meshes() {
+    for mesh in corpus::meshes() {
         for (codes, collapse) in KINDS {
             let codes: Codes = codes.parse().unwrap();
-            let expected = host::lbvh::build(&positions, &triangles, codes, collapse);
-            expected.validate().unwrap_or_else(|e| panic!("{name} {codes}: {e}"));
+            let options = Options { codes: Some(codes), collapse, ..Options::DEFAULT };
+            let expected = on_host(&mesh, &options);
+            let what = format!("{} {codes} {collapse:?}", mesh.0);
+            expected.validate().unwrap_or_else(|e| panic!("{what}: {e}"));
             for schedule in [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup] {
-                let options = Options { codes: Some(codes), collapse, schedule: Some(schedule), ..Options::DEFAULT };
-                let (got, bytes) = build_on_device(&positions, &triangles, &options);
-                assert_eq!(got.header, expected.header, "{name} {codes} {schedule:?}");
-                assert!(bytes == expected.to_bytes(), "{name} {codes} {collapse:?} {schedule:?}: other bytes");
+                let got = on_device(&mesh, &Options { schedule: Some(schedule), ..options });
+                assert_same(&got, &expected, &format!("{what} {schedule:?}"));
             }
         }
     }

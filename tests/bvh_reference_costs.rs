@@ -176,7 +176,7 @@ fn load(name: &str) -> Option<Scene> {
 /// The cost of what `builder` makes of `scene` is the expected one but for this share of it.
 fn compare(scene: &Scene, builder: &str, expected: f64, tolerance: f64) {
     let spec: Spec = builder.parse().unwrap();
-    let on = matches!(spec.builder().needs, Needs::Device).then(device);
+    let on = matches!(spec.builder().needs(), Needs::Device).then(device);
     let mut subject = spec.make(on, &scene.mesh).unwrap();
     subject.build().unwrap();
     let got = subject.quality(3.0, 2.0).unwrap().sah.unwrap();

@@ -2,11 +2,12 @@
 
 mod common;
 
-use common::{corpus, device};
+use common::corpus::{self, soup};
+use common::device;
+use common::twins::{assert_same, built, on_device, on_host};
 use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Source, Treelets, Window};
-use hedgerow::bvh::codes::{Code, Codes};
+use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, Primitives};
-use hedgerow::bvh::host;
 use hedgerow::bvh::layout::{Aabb, Bvh2};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::split;
@@ -19,10 +20,8 @@ use hedgerow::trace::{Query, Ray, host as tracer, wide_host};
 const SPLITS: [split::Options; 2] = [split::Options::DEFAULT, ALL];
 const ALL: split::Options = split::Options { fraction: 1.0, most: split::Options::MOST_SPLITS };
 
-fn soup(name: &str, triangles: Vec<[[f32; 3]; 3]>) -> corpus::Mesh {
-    let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    (name.into(), triangles.into_iter().flatten().collect(), indices)
-}
+/// Without splits, collapsed by SAH.
+const WHOLE: Options = Options { codes: Some(Code::Emc64Var.full()), ..Options::DEFAULT };
 
 /// Triangles that reach across the scene in all directions.
 fn large(count: usize) -> corpus::Mesh {
@@ -60,70 +59,25 @@ fn meshes() -> Vec<corpus::Mesh> {
     corpus::meshes().into_iter().chain([large(130), grazing(), mixed()]).collect()
 }
 
-fn on_host(mesh: &corpus::Mesh, split: &split::Options, codes: Codes, method: Method) -> Bvh2 {
-    let (_, positions, triangles) = mesh;
-    let radix = host::split::build(positions, triangles, split, codes, Collapse::OFF);
-    match method {
-        Method::Lbvh => radix,
-        Method::Hlbvh(treelets) => {
-            let bits = treelets.bits(codes, radix.header.primitive_count);
-            host::hlbvh::build(&radix, codes, host::hlbvh::Treelets { bits, primitives: treelets.primitives })
-        }
-        Method::Ploc { radius } => host::ploc::build(&radix, radius as usize),
-        Method::Hploc(Window { size, radius }) => {
-            host::hploc::build(&radix, host::hploc::Window { size: size as usize, radius: radius as usize })
-        }
-    }
-}
-
-fn on_device((_, positions, triangles): &corpus::Mesh, options: &Options) -> Bvh2 {
-    let device = device();
-    let builder = Builder::new(device, options, triangles.len() as u32).unwrap();
-    let sizes = builder.sizes();
-    let vertices = device.upload("positions", positions).unwrap();
-    let indices = device.upload("indices", triangles).unwrap();
-    let structure = device.buffer("structure", sizes.structure).unwrap();
-    let scratch = device.buffer("scratch", sizes.scratch).unwrap();
-    // Whatever was there before changes nothing.
-    structure.write(&vec![0x5Au8; sizes.structure as usize]);
-    scratch.write(&vec![0xA5u8; sizes.scratch as usize]);
-    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), triangles.len() as u32);
-    device.warm(&builder.kernels(&input)).unwrap();
-    device.run(None, |r| builder.record(r, &input, structure.address(), scratch.address())).unwrap();
-    Bvh2::from_bytes(&structure.read::<u8>(sizes.structure as usize)).unwrap()
-}
-
-fn assert_same(got: &Bvh2, expected: &Bvh2, what: &str) {
-    assert_eq!(got.header, expected.header, "{what}");
-    for (i, (got, expected)) in got.records.iter().zip(&expected.records).enumerate() {
-        assert_eq!(got, expected, "{what}: record {i}");
-    }
-    for (i, (got, expected)) in got.nodes.iter().zip(&expected.nodes).enumerate() {
-        assert_eq!(got, expected, "{what}: node {i}");
-    }
-    assert!(got.to_bytes() == expected.to_bytes(), "{what}: other bytes");
+/// The LBVH's tree with splits, not collapsed.
+fn lbvh(mesh: &corpus::Mesh, split: split::Options) -> Bvh2 {
+    on_host(mesh, &Options { split: Some(split), collapse: Collapse::OFF, ..WHOLE })
 }
 
 #[test]
 fn every_method_gives_the_bytes_of_the_host() {
     let methods =
         [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)];
-    let (codes, collapse) = (Code::Emc64Var.full(), Collapse::SAH);
     for mesh in meshes() {
         for (i, method) in methods.into_iter().enumerate() {
-            let split = SPLITS[i % 2];
-            let expected = match method {
-                // Its own collapsing leaves other bytes in slots that fall out.
-                Method::Lbvh => host::split::build(&mesh.1, &mesh.2, &split, codes, collapse),
-                _ => on_host(&mesh, &split, codes, method).collapsed(&collapse),
-            };
+            let options = Options { method, split: Some(SPLITS[i % 2]), ..WHOLE };
+            let expected = on_host(&mesh, &options);
             expected.validate().unwrap_or_else(|e| panic!("{} {method:?}: {e}", mesh.0));
             // The kernels of pools take long to compile: two methods stand for all.
             let pool = matches!(method, Method::Lbvh | Method::Hploc(_));
             for schedule in [Schedule::Chain, Schedule::Persistent].into_iter().take(1 + usize::from(pool)) {
-                let (split, codes, schedule) = (Some(split), Some(codes), Some(schedule));
-                let options = Options { method, codes, split, collapse, schedule, ..Options::DEFAULT };
-                assert_same(&on_device(&mesh, &options), &expected, &format!("{} {method:?} {schedule:?}", mesh.0));
+                let got = on_device(&mesh, &Options { schedule: Some(schedule), ..options });
+                assert_same(&got, &expected, &format!("{} {method:?} {schedule:?}", mesh.0));
             }
         }
     }
@@ -131,20 +85,16 @@ fn every_method_gives_the_bytes_of_the_host() {
 
 #[test]
 fn codes_with_a_grid_or_sections_and_optimised_trees_are_those_of_the_host() {
-    let split = split::Options::DEFAULT;
+    let options = Options { split: Some(split::Options::DEFAULT), ..WHOLE };
     for mesh in [large(130), mixed()] {
         for codes in ["mip6", "bin2a4", "emc64var+robust"] {
-            let codes: Codes = codes.parse().expect("known");
-            let expected = host::split::build(&mesh.1, &mesh.2, &split, codes, Collapse::SAH);
-            let options = Options { codes: Some(codes), split: Some(split), ..Options::DEFAULT };
-            assert_same(&on_device(&mesh, &options), &expected, &format!("{} {codes}", mesh.0));
+            let options = Options { codes: Some(codes.parse().expect("known")), ..options };
+            assert_same(&on_device(&mesh, &options), &on_host(&mesh, &options), &format!("{} {codes}", mesh.0));
         }
-        let codes = Code::Emc64Var.full();
-        let optimise = reinsertion::Options { rounds: 6, stride: 2 };
-        let tree = on_host(&mesh, &split, codes, Method::Lbvh).reinserted(&optimise).collapsed(&Collapse::SAH);
-        tree.validate().expect("valid");
-        let options = Options { codes: Some(codes), split: Some(split), optimise: Some(optimise), ..Options::DEFAULT };
-        assert_same(&on_device(&mesh, &options), &tree, &format!("{} optimised", mesh.0));
+        let options = Options { optimise: Some(reinsertion::Options { rounds: 6, stride: 2 }), ..options };
+        let expected = on_host(&mesh, &options);
+        expected.validate().expect("valid");
+        assert_same(&on_device(&mesh, &options), &expected, &format!("{} optimised", mesh.0));
     }
 }
 
@@ -153,8 +103,8 @@ fn splits_are_within_the_budget_and_lower_the_cost_where_few_triangles_are_large
     for mesh in meshes() {
         let count = mesh.2.len() as u32;
         for split in SPLITS {
-            let tree = on_host(&mesh, &split, Code::Emc64Var.full(), Method::Lbvh);
-            let whole = host::lbvh::build(&mesh.1, &mesh.2, Code::Emc64Var.full(), Collapse::OFF);
+            let tree = lbvh(&mesh, split);
+            let whole = on_host(&mesh, &Options { collapse: Collapse::OFF, ..WHOLE });
             assert_eq!(tree.header.primitive_count, count + split.budget(count), "{}", mesh.0);
             assert!(tree.header.active >= whole.header.active, "{}: a triangle is lost", mesh.0);
             assert_eq!(tree.header.status, whole.header.status, "{}", mesh.0);
@@ -172,9 +122,9 @@ fn splits_are_within_the_budget_and_lower_the_cost_where_few_triangles_are_large
 fn a_fraction_too_small_for_one_split_gives_the_tree_without() {
     let mesh = large(130);
     let split = split::Options { fraction: 0.005, ..ALL };
-    let options = Options { split: Some(split), codes: Some(Code::Mc63.full()), ..Options::DEFAULT };
-    let tree = on_device(&mesh, &options);
-    assert_same(&tree, &host::lbvh::build(&mesh.1, &mesh.2, Code::Mc63.full(), Collapse::SAH), "as without");
+    let without = Options { codes: Some(Code::Mc63.full()), ..Options::DEFAULT };
+    let tree = on_device(&mesh, &Options { split: Some(split), ..without });
+    assert_same(&tree, &on_host(&mesh, &without), "as without");
 }
 
 /// Rays from everywhere to points of triangles, many of them where planes cut these; and along the axes.
@@ -221,11 +171,10 @@ fn next_index(next: &mut impl FnMut() -> f32, count: usize) -> usize {
 fn no_ray_loses_a_hit() {
     let mut hits = 0;
     for mesh in meshes() {
-        let codes = Code::Emc64Var.full();
-        let whole = host::lbvh::build(&mesh.1, &mesh.2, codes, Collapse::SAH);
+        let whole = on_host(&mesh, &WHOLE);
         for collapse in [Collapse::OFF, Collapse::SAH] {
-            let tree = on_host(&mesh, &ALL, codes, Method::Hploc(Window::DEFAULT));
-            let tree = tree.collapsed(&collapse);
+            let method = Method::Hploc(Window::DEFAULT);
+            let tree = on_host(&mesh, &Options { method, split: Some(ALL), collapse, ..WHOLE });
             tree.validate().unwrap_or_else(|e| panic!("{}: {e}", mesh.0));
             let (wide4, wide8, quantised) = (Wide4::of(&tree), Wide8::of(&tree), Wide8q::of(&tree));
             wide4.validate().unwrap_or_else(|e| panic!("{} wide4: {e}", mesh.0));
@@ -253,7 +202,7 @@ fn no_ray_loses_a_hit() {
 #[test]
 fn a_compacted_split_tree_is_valid_and_has_the_same_hits() {
     let mesh = mixed();
-    let tree = on_host(&mesh, &split::Options::DEFAULT, Code::Emc64Var.full(), Method::Lbvh).collapsed(&Collapse::SAH);
+    let tree = lbvh(&mesh, split::Options::DEFAULT).collapsed(&Collapse::SAH);
     let compacted = tree.compacted();
     compacted.validate().expect("valid");
     assert_eq!(compacted.header.split_from, tree.header.split_from);
@@ -265,7 +214,7 @@ fn a_compacted_split_tree_is_valid_and_has_the_same_hits() {
 #[test]
 fn validation_sees_a_part_that_is_lost() {
     let mesh = large(130);
-    let tree = on_host(&mesh, &ALL, Code::Emc64Var.full(), Method::Lbvh);
+    let tree = lbvh(&mesh, ALL);
     tree.validate().expect("valid");
     // A leaf that gives up an inner tenth of its box loses some of its triangle, and the boxes above stay what they are.
     let mut seen = 0;
@@ -314,29 +263,16 @@ fn memory_grows_by_the_budget() {
     assert!(with.scratch > without.scratch + 15_000 * 32, "room for the references");
 }
 
-/// The tree by the chain over `input`, of as many geometries as it has.
-fn built(options: &Options, input: &Input) -> (Bvh2, Vec<u8>) {
-    let device = device();
-    let builder = Builder::new(device, options, input.primitive_count).unwrap();
-    let sizes = builder.sizes();
-    let structure = device.buffer("structure", sizes.structure).unwrap();
-    let scratch = device.buffer("scratch", sizes.scratch).unwrap();
-    device.run(None, |r| builder.record(r, input, structure.address(), scratch.address())).unwrap();
-    let bytes = structure.read::<u8>(sizes.structure as usize);
-    (Bvh2::from_bytes(&bytes).unwrap(), bytes)
-}
-
 #[test]
 fn triangles_of_other_formats_and_of_several_geometries_are_split_alike() {
     let (device, mesh) = (device(), mixed());
-    let (codes, split) = (Code::Emc64Var.full(), split::Options::DEFAULT);
-    let expected = host::split::build(&mesh.1, &mesh.2, &split, codes, Collapse::SAH);
-    let options = Options { codes: Some(codes), split: Some(split), ..Options::DEFAULT };
+    let options = Options { split: Some(split::Options::DEFAULT), ..WHOLE };
+    let expected = on_host(&mesh, &options);
     let count = mesh.2.len() as u32;
     // Each triangle has vertices of its own, in order: they need no indices.
     let vertices = device.upload("positions", &mesh.1).unwrap();
     let whole = Geometry { index_format: IndexFormat::NONE, ..Geometry::mesh(vertices.address(), 3 * count, 0) };
-    let (tree, _) = built(&options, &Input { source: Source::One(whole), primitive_count: count });
+    let tree = built(&options, &Input { source: Source::One(whole), primitive_count: count });
     assert_same(&tree, &expected, "without indices");
 
     const FIRST: u32 = 300;
@@ -349,17 +285,16 @@ fn triangles_of_other_formats_and_of_several_geometries_are_split_alike() {
     let records = device.upload("geometries", &[Geometry { vertex_count: 3 * FIRST, ..whole }, second]).unwrap();
     let source = Source::Several { records: records.address(), count: 2 };
     let options = Options { geometry_count: 2, ..options };
-    let (tree, bytes) = built(&options, &Input { source, primitive_count: count });
+    let tree = built(&options, &Input { source, primitive_count: count });
     let expected = expected.with_geometries(&[(FIRST, 0), (count - FIRST, 0)], 0);
-    assert_eq!(tree.header, expected.header);
-    assert!(bytes == expected.to_bytes(), "two geometries: other bytes");
+    assert_same(&tree, &expected, "two geometries");
 }
 
 #[test]
 fn a_refit_leaves_a_split_structure_as_it_is() {
     let (device, mesh) = (device(), mixed());
-    let (count, codes) = (mesh.2.len() as u32, Code::Emc64Var.full());
-    let tree = on_host(&mesh, &split::Options::DEFAULT, codes, Method::Lbvh).collapsed(&Collapse::SAH);
+    let count = mesh.2.len() as u32;
+    let tree = lbvh(&mesh, split::Options::DEFAULT).collapsed(&Collapse::SAH);
     // As large as one without splits, so that nothing but the header tells.
     let before = tree.compacted().to_bytes();
     let planned = tree.header.active;

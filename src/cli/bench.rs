@@ -151,7 +151,7 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<Vec<String>>
 
 /// The device, with ray queries where it has them: host builders alone need none.
 fn open(common: &Common, builders: &[Spec]) -> crate::Result<Option<Device>> {
-    if builders.iter().all(|spec| spec.builder().needs == Needs::Nothing) {
+    if builders.iter().all(|spec| spec.builder().needs() == Needs::Nothing) {
         return Ok(None);
     }
     common.open_device(true).map(Some)
@@ -169,7 +169,7 @@ fn possible(
     let by_default = arguments.builder == DEFAULT_BUILDERS;
     let was_named =
         |spec: &Spec| !by_default && arguments.builder.split(',').any(|part| part.trim() == spec.to_string());
-    let is_driver = |spec: &Spec| spec.builder().needs == Needs::RayQuery;
+    let is_driver = |spec: &Spec| spec.builder().needs() == Needs::RayQuery;
     if asked.iter().any(is_driver) {
         notes.extend(no_peer.map(str::to_owned));
         if device.is_some_and(|device| !device.has_ray_query()) {

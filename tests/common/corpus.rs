@@ -6,7 +6,7 @@ use hedgerow::scene::degenerate;
 pub type Mesh = (String, Vec<[f32; 3]>, Vec<[u32; 3]>);
 
 /// Three positions of its own for each triangle.
-fn soup(name: &str, triangles: Vec<[[f32; 3]; 3]>) -> Mesh {
+pub fn soup(name: &str, triangles: Vec<[[f32; 3]; 3]>) -> Mesh {
     let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     (name.into(), triangles.into_iter().flatten().collect(), indices)
 }

@@ -8,6 +8,7 @@ pub mod geometries;
 pub mod matrices;
 pub mod probe;
 pub mod shapes;
+pub mod twins;
 pub mod world;
 
 use hedgerow::gpu::{Device, DeviceOptions};

@@ -1,0 +1,213 @@
+//! What options there are, and what a [`Spec`] says with them.
+
+use super::Spec;
+use super::table::{BuilderOption, Kind};
+use crate::bvh::builder::{self, Method, Schedule, Treelets, Window};
+use crate::bvh::codes::Codes;
+use crate::bvh::host::sweep::Leaves;
+use crate::bvh::reinsertion;
+use crate::bvh::sah::Collapse;
+use crate::bvh::split;
+use crate::bvh::wide::Form;
+use crate::measure::choose;
+use crate::measure::host::{self, Hierarchy};
+use crate::trace::wide::Order;
+use crate::{Error, Result};
+use std::time::Duration;
+
+pub(super) const CODES: BuilderOption = BuilderOption {
+    key: "codes",
+    values: "mc30, mc63, emc64sort, emc64var, emc64var-nosize, mip6, mip9, mip12 or binQaA (Q 2, 4 or 6, A 0 to 9; ~N behind: the \
+             stretch factor weighs 1/N), with +concise, +centroid, +robust or /BITS behind",
+};
+pub(super) const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
+pub(super) const RAYS: BuilderOption =
+    BuilderOption { key: "rays", values: "rays that are traced between two builds, 1e7 unless given" };
+pub(super) const WIDTH: BuilderOption = BuilderOption { key: "width", values: "2, 4, 8 or 8q (quantised)" };
+pub(super) const ORDER: BuilderOption = BuilderOption { key: "order", values: "distance or octant (of width=8q)" };
+pub(super) const TERMINATION: BuilderOption =
+    BuilderOption { key: "termination", values: "sah, or off: leaves of one triangle, then collapsed" };
+pub(super) const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
+pub(super) const SPLIT: BuilderOption = BuilderOption {
+    key: "split",
+    values: "a number from 0 to 1: splits of large triangles at most, as a part of all; with /N behind: of each at most N",
+};
+pub(super) const OPTIMISE: BuilderOption = BuilderOption {
+    key: "optimise",
+    values: "off, fast, medium, high, a number of passes of reinsertion, or on the device a time for it as in 20ms",
+};
+pub(super) const BITS: BuilderOption =
+    BuilderOption { key: "bits", values: "a number of bits that the codes of a treelet share" };
+pub(super) const TREELET: BuilderOption =
+    BuilderOption { key: "treelet", values: "a number of primitives at most, from 1" };
+pub(super) const WINDOW: BuilderOption =
+    BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
+pub(super) const RADIUS: BuilderOption =
+    BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
+
+/// Of `ploc` where it is not told: what drivers take.
+const PLOC_RADIUS: u32 = 16;
+
+impl Spec {
+    /// Whether every option has a value that the builder takes.
+    pub(super) fn check(&self) -> Result<()> {
+        match self.builder().kind {
+            Kind::Device(options) => options(self).and(self.form_and_order()).map(drop),
+            Kind::Host(hierarchy) => self.host_options(hierarchy(self)?).map(drop),
+            Kind::Auto => self.rays().map(drop),
+            // They take none.
+            Kind::Driver(_) => Ok(()),
+            #[cfg(feature = "peer-obvhs")]
+            Kind::Obvhs(_) => Ok(()),
+            #[cfg(feature = "peer-embree")]
+            Kind::Embree(_) => Ok(()),
+        }
+    }
+
+    /// Options `codes`, `split`, `optimise`, `collapse` and `schedule`.
+    pub(super) fn lbvh_options(&self) -> Result<builder::Options> {
+        let schedule = match self.option(SCHEDULE.key) {
+            None => None,
+            Some("chain") => Some(Schedule::Chain),
+            Some("persistent") => Some(Schedule::Persistent),
+            Some("workgroup") => Some(Schedule::Workgroup),
+            Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
+        };
+        let (codes, split) = (self.codes()?, self.split()?);
+        let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
+        Ok(builder::Options { codes, split, optimise, collapse, schedule, ..builder::Options::DEFAULT })
+    }
+
+    /// Those of `lbvh`, with another method.
+    fn options_with(&self, method: Method) -> Result<builder::Options> {
+        method.check()?;
+        Ok(builder::Options { method, ..self.lbvh_options()? })
+    }
+
+    /// Those of `lbvh`, and `bits` and `treelet`.
+    pub(super) fn hlbvh_options(&self) -> Result<builder::Options> {
+        let bits = self.option(BITS.key).map(|_| self.number(&BITS, 0)).transpose()?;
+        let primitives = self.number(&TREELET, Treelets::DEFAULT.primitives)?;
+        self.options_with(Method::Hlbvh(Treelets { bits, primitives }))
+    }
+
+    /// Those of `lbvh`, and `radius`.
+    pub(super) fn ploc_options(&self) -> Result<builder::Options> {
+        self.options_with(Method::Ploc { radius: self.number(&RADIUS, PLOC_RADIUS)? })
+    }
+
+    /// Those of `lbvh`, and `window` and `radius`.
+    pub(super) fn hploc_options(&self) -> Result<builder::Options> {
+        let size = self.number(&WINDOW, Window::DEFAULT.size)?;
+        let radius = self.number(&RADIUS, Window::DEFAULT.radius)?;
+        self.options_with(Method::Hploc(Window { size, radius }))
+    }
+
+    /// Options `width`, of a wide tree, and `order`; no width where it is 2 or was not given.
+    pub(super) fn form_and_order(&self) -> Result<(Option<Form>, Option<Order>)> {
+        let form = match self.option(WIDTH.key) {
+            None | Some("2") => None,
+            Some("4") => Some(Form::Four),
+            Some("8") => Some(Form::Eight),
+            Some("8q") => Some(Form::EightQuantised),
+            Some(other) => return Err(self.wrong_value(&WIDTH, other)),
+        };
+        let order = match self.option(ORDER.key) {
+            None => None,
+            Some("distance") if form.is_some() => Some(Order::Distance),
+            Some("octant") if form == Some(Form::EightQuantised) => Some(Order::Octant),
+            Some(other) => return Err(self.wrong_value(&ORDER, other)),
+        };
+        Ok((form, order))
+    }
+
+    /// Option `rays`.
+    pub(super) fn rays(&self) -> Result<f64> {
+        choose::rays_of(self.option(RAYS.key))
+    }
+
+    /// Options `codes`, `collapse` and `optimise` of a builder on the host.
+    pub(super) fn host_options(&self, hierarchy: Hierarchy) -> Result<host::Options> {
+        if self.time_to_optimise().is_some() {
+            let what = "on the host rounds are not timed; take fast, medium, high or a number of passes";
+            return Err(Error::Argument(format!("builder {self}: {}: {what}", OPTIMISE.key)));
+        }
+        let (codes, collapse) = (self.codes()?, self.collapse()?);
+        Ok(host::Options { hierarchy, codes, reinsertion: self.reinsertion()?, collapse })
+    }
+
+    /// Option `radius` of PLOC; 25 where it was not given.
+    pub(super) fn ploc_radius(&self) -> Result<usize> {
+        let radius = self.number(&RADIUS, 25)?;
+        if radius > 0 { Ok(radius as usize) } else { Err(self.wrong_value(&RADIUS, "0")) }
+    }
+
+    /// Option `termination`, if `optimise` and `collapse` leave it a choice: both need leaves of one triangle.
+    pub(super) fn sweep_leaves(&self) -> Result<Leaves> {
+        let single = !self.collapse()?.enabled || self.reinsertion()?.is_some();
+        match self.option(TERMINATION.key) {
+            Some("off") => Ok(Leaves::Single),
+            None | Some("sah") if single => Ok(Leaves::Single),
+            None | Some("sah") => Ok(Leaves::Terminated),
+            Some(other) => Err(self.wrong_value(&TERMINATION, other)),
+        }
+    }
+
+    /// Option `codes`.
+    pub(super) fn codes(&self) -> Result<Option<Codes>> {
+        self.option(CODES.key).map(str::parse).transpose()
+    }
+
+    /// Option `collapse`; `sah` where it was not given.
+    pub(super) fn collapse(&self) -> Result<Collapse> {
+        match self.option(COLLAPSE.key) {
+            None | Some("sah") => Ok(Collapse::SAH),
+            Some("off") => Ok(Collapse::OFF),
+            Some(other) => Err(self.wrong_value(&COLLAPSE, other)),
+        }
+    }
+
+    /// Option `split`; `None` where it was not given or is 0.
+    fn split(&self) -> Result<Option<split::Options>> {
+        let Some(value) = self.option(SPLIT.key) else { return Ok(None) };
+        let (fraction, most) = value.split_once('/').unwrap_or((value, ""));
+        let most = if most.is_empty() { Ok(split::Options::DEFAULT.most) } else { most.parse() };
+        let (Ok(fraction), Ok(most)) = (fraction.parse(), most) else { return Err(self.wrong_value(&SPLIT, value)) };
+        let options = split::Options { fraction, most };
+        options.check().map_err(|_| self.wrong_value(&SPLIT, value))?;
+        Ok((fraction > 0.0).then_some(options))
+    }
+
+    /// Option `optimise` where it is a time.
+    pub(super) fn time_to_optimise(&self) -> Option<Result<Duration>> {
+        let value = self.option(OPTIMISE.key)?;
+        let milliseconds = value.strip_suffix("ms")?.parse().ok();
+        let time = milliseconds.and_then(|ms: f64| Duration::try_from_secs_f64(1e-3 * ms).ok());
+        Some(time.ok_or_else(|| self.wrong_value(&OPTIMISE, value)))
+    }
+
+    /// Option `optimise`; off where it was not given. For a time, the pass that tells how many there is time for.
+    fn reinsertion(&self) -> Result<Option<reinsertion::Options>> {
+        use reinsertion::Options;
+        if let Some(time) = self.time_to_optimise() {
+            return time.map(|_| Some(Options::FAST));
+        }
+        Ok(match self.option(OPTIMISE.key) {
+            None | Some("off") => None,
+            Some("fast") => Some(Options::FAST),
+            Some("medium") => Some(Options::MEDIUM),
+            Some("high") => Some(Options::HIGH),
+            Some(_) => Some(Options::of_passes(self.number(&OPTIMISE, 0)?)),
+        })
+    }
+
+    /// The value of an option that is a number, or what it is where it was not given.
+    fn number(&self, option: &BuilderOption, default: u32) -> Result<u32> {
+        let Some(value) = self.option(option.key) else { return Ok(default) };
+        value.parse().map_err(|_| self.wrong_value(option, value))
+    }
+
+    fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {
+        Error::Argument(format!("builder {self}: {}={value} is not known; take {}", option.key, option.values))
+    }
+}
