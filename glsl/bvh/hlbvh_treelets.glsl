@@ -6,93 +6,40 @@
 #ifndef HEDGEROW_BVH_HLBVH_TREELETS
 #define HEDGEROW_BVH_HLBVH_TREELETS
 #include "bvh/hlbvh.glsl"
-#include "bvh/radix_tree.glsl"
-
-// A finished subtree over the positions first..=last, and how the codes differ before and behind it.
-struct Subtree {
-    uint first;
-    uint last;
-    uvec3 before;
-    uvec3 behind;
-    Child child;
-    float cost;
-};
-
-// Left children that wait for a sibling out of the same run of positions, as in bvh/lbvh.glsl.
-shared uint run_firsts[ITEMS * gl_WorkGroupSize.x];
-
-uint run_slot(uint level) {
-    return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-}
+#include "bvh/run.glsl"
 
 // Whether a subtree has no parent, or one that is no treelet: one that splits at a bit that treelets share, or has too many
 // primitives. Its positions begin (or end) where the subtree's do, and share all bits of the code above the one that it splits at.
-bool is_treelet(Words codes, uint active_count, bool is_left, Subtree s) {
-    if (s.first == 0u && s.last + 1u == active_count) return true;
+bool is_treelet(Run run, bool is_left, Subtree s) {
+    if (s.first == 0u && s.last + 1u == run.active_count) return true;
     int split = highest_bit(is_left ? s.behind : s.before);
     // Behind the bits of the position.
     if (split >= 32 + int(kind_of_codes().bits - treelet_bits())) return true;
-    uint most = min(TREELET_PRIMITIVES, active_count);
+    uint most = min(TREELET_PRIMITIVES, run.active_count);
     uint from = is_left ? s.first : max(s.last, most) - most;
     uint to = from + most;
-    if (to >= active_count || (!is_left && to != s.last)) return false;
-    return highest_bit(difference_of(codes, from, to)) <= split;
+    if (to >= run.active_count || (!is_left && to != s.last)) return false;
+    return highest_bit(difference_of(run.codes, from, to)) <= split;
 }
 
-void climb(Structure structure, Weights w, Words codes, uint active_count, float area_scale, uint run, inout uint waiting,
-           Subtree s) {
-    Words ends = Words(ends_address);
-    // The buffers that the sort has left free hold the costs of left and right children.
-    uint is_free = 1u - (passes & 1u);
-    Floats left_costs = Floats(keys[is_free]);
-    Floats right_costs = Floats(values[is_free]);
+void climb(inout Run run, Weights w, float area_scale, Subtree s) {
+    find_neighbours(run, s);
     // As many levels as there are primitives, at most.
-    for (uint level = 0; level < active_count; ++level) {
-        bool is_left = is_less(s.behind, s.before);
-        if (is_treelet(codes, active_count, is_left, s)) {
+    for (uint level = 0; level < run.active_count; ++level) {
+        bool is_left = is_left_child(s);
+        if (is_treelet(run, is_left, s)) {
             w.counts.word[s.last] = reference_of(s.child);
             w.left_counts.word[s.last] = floatBitsToUint(s.cost);
             break;
         }
-        uint parent = is_left ? s.last : s.first - 1u;
+        uint parent = parent_of(s, is_left);
         w.parents.word[parent_at(reference_of(s.child))] = 2u * parent + (is_left ? 0u : 1u);
-        if (is_left) {
-            structure.nodes[parent].left = s.child;
-            left_costs.value[parent] = s.cost;
-        } else {
-            structure.nodes[parent].right = s.child;
-            right_costs.value[parent] = s.cost;
-        }
-        uint end;
-        if (is_left && s.first >= run) {
-            run_firsts[run_slot(waiting)] = s.first;
-            waiting++;
-            break;
-        }
-        if (!is_left && waiting > 0u) {
-            waiting--;
-            end = run_firsts[run_slot(waiting)];
-            ends.word[parent] = end;
-        } else {
-            release_to_device();
-            end = atomicExchange(ends.word[parent], is_left ? s.first : s.last);
-            if (end == NONE) break;
-            acquire_from_device();
-        }
-        Child sibling;
         float sibling_cost;
-        if (is_left) {
-            s.last = end;
-            s.behind = difference_behind(codes, s.last, active_count);
-            sibling = structure.nodes[parent].right;
-            sibling_cost = right_costs.value[parent];
-        } else {
-            s.first = end;
-            s.before = difference_before(codes, s.first);
-            sibling = structure.nodes[parent].left;
-            sibling_cost = left_costs.value[parent];
-        }
-        s.child = Child(min(s.child.lo, sibling.lo), parent, max(s.child.hi, sibling.hi), 0u);
+        if (!step_up(run, is_left, parent, s, sibling_cost)) break;
+        // Siblings that met within the run left the word as it was.
+        run.ends.word[parent] = s.first;
+        s.child.index = parent;
+        s.child.count = 0u;
         float area = scaled_half_area(Box(s.child.lo, s.child.hi), area_scale);
         vec2 costs = is_left ? vec2(s.cost, sibling_cost) : vec2(sibling_cost, s.cost);
         s.cost = weigh_node(w, parent, uvec2(parent + 1u - s.first, s.last - parent), costs, area);
@@ -100,22 +47,15 @@ void climb(Structure structure, Weights w, Words codes, uint active_count, float
 }
 
 void hlbvh_treelets(uint task) {
-    BuildState state = BuildState(state_address);
-    Structure structure = Structure(structure_address);
     Weights w = weights();
     Geometry input_geometries = geometries();
-    uint active_count = state.active_count;
-    float area_scale = state.plan.area_scale;
-    Words codes = Words(keys[passes & 1u]);
-    uint run = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
-    uint end = min(run + ITEMS, active_count);
-    uint position = run;
-    uint waiting = 0;
-    // First the leaves of the run; then what waits, last first: its siblings begin behind the run.
-    bool leaves_done = false;
+    float area_scale = BuildState(state_address).plan.area_scale;
+    Run run = run_of(task);
+    uint position = run.first;
+    uint end = min(position + ITEMS, run.active_count);
+    // First the leaves of the run; then what waits, last first.
     for (uint turn = 0; turn < 2u * ITEMS; ++turn) {
         Subtree s;
-        uint own_run = run;
         if (position < end) {
             Cluster c = cluster_of_primitive(input_geometries, position, area_scale);
             s.first = position;
@@ -123,21 +63,12 @@ void hlbvh_treelets(uint task) {
             s.child = child_of(c);
             s.cost = c.cost;
             position++;
-        } else if (waiting > 0u) {
-            own_run = NONE;
-            // What was taken last began where this ends.
-            s.last = (leaves_done ? run_firsts[run_slot(waiting)] : end) - 1u;
-            leaves_done = true;
-            waiting--;
-            s.first = run_firsts[run_slot(waiting)];
-            s.child = structure.nodes[s.last].left;
-            s.cost = Floats(keys[1u - (passes & 1u)]).value[s.last];
+        } else if (run.waiting > 0u) {
+            s = take_waiting(run, end);
         } else {
             break;
         }
-        s.before = difference_before(codes, s.first);
-        s.behind = difference_behind(codes, s.last, active_count);
-        climb(structure, w, codes, active_count, area_scale, own_run, waiting, s);
+        climb(run, w, area_scale, s);
     }
 }
 
