@@ -69,3 +69,17 @@ fn hploc_gives_the_bytes_of_the_host() {
     let windows = [alone[0], alone[1], Window { size: 64, radius: 16 }, Window { size: 4, radius: 1 }];
     equals_the_host(windows.map(Method::Hploc));
 }
+
+/// From a count on, invocations of a CPU take longer runs of primitives: 131,072 for subgroups of 16 lanes.
+#[test]
+fn large_inputs_give_the_bytes_of_the_host() {
+    let mesh = corpus::random("random 140,000", 140_000, [-0.5; 3], [1.0; 3]);
+    for method in
+        [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 3 }, Method::Hploc(Window::DEFAULT)]
+    {
+        let options = Options { method, codes: Some(Code::Mc30.full()), ..Options::DEFAULT };
+        let expected = on_host(&mesh, &options);
+        expected.validate().unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        assert_same(&on_device(&mesh, &options), &expected, &format!("{method:?}"));
+    }
+}

@@ -4,7 +4,7 @@
 //
 //   parents  reads nodes                      writes weights: parents; arrivals (zero)
 //   weigh    reads nodes, parents             writes weights: counts, left_counts; costs; the header's costs
-//   above    reads weights                    writes the places of large nodes
+//   above    reads weights                    writes the places of large nodes; of these what place writes of the others
 //   place    reads weights, places            writes the walk's order, the nodes' children, slots that fall out, the root
 //   records  reads the walk's order           writes records
 //
@@ -127,41 +127,10 @@ bool is_large(uint count) {
     return (count & ~IS_LEAF) > LARGE;
 }
 
-// Up the tree from a reference; where `large_are_known`, only to the next large node.
-Place place_of(Weights w, uint reference, bool large_are_known) {
-    Place place = Place(0u, 0u, false);
-    uint link = w.parents.word[parent_at(reference)];
-    for (uint level = 0; level < node_count() && link != NO_PARENT; ++level) {
-        uint slot = link >> 1;
-        uint count = w.counts.word[slot];
-        if ((link & 1u) != 0u) place.first += w.left_counts.word[slot];
-        if ((count & IS_LEAF) != 0u) place.inside = true;
-        place.depth++;
-        if (large_are_known && is_large(count)) {
-            uint depth = large_depths().word[slot];
-            place.first += large_firsts().word[slot];
-            place.depth += depth >> 1;
-            place.inside = place.inside || (depth & 1u) != 0u;
-            break;
-        }
-        link = w.parents.word[slot];
-    }
-    // What is deeper than tracers can walk is inside of the leaf that its ancestor becomes.
+// What is deeper than tracers can walk is inside of the leaf that its ancestor becomes.
+Place limited_by_depth(Place place) {
     place.inside = place.inside || place.depth > MAX_DEPTH;
     return place;
-}
-
-void collapse_above(uint task) {
-    Weights w = weights();
-    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
-    for (uint k = 0; k < ITEMS; ++k) {
-        uint slot = first + k * gl_WorkGroupSize.x;
-        if (slot < node_count() && is_large(w.counts.word[slot])) {
-            Place place = place_of(w, slot, false);
-            large_firsts().word[slot] = place.first;
-            large_depths().word[slot] = place.depth << 1 | (place.inside ? 1u : 0u);
-        }
-    }
 }
 
 // Tells the parent, or the header, of what has become a leaf.
@@ -173,46 +142,116 @@ void name_leaf(uint link, uint first, uint count) {
     words.word[child + 7u] = count;
 }
 
-// What becomes of a node: whether it falls out, and whether a leaf was made of it for the depth alone.
-void place_node(Structure structure, Weights w, uint slot, inout uint unused, inout bool limited) {
-    uint count = w.counts.word[slot];
+// Of the nodes that an invocation has placed: how many fell out, and whether a leaf was made for the depth alone.
+struct Placed {
+    uint unused;
+    bool limited;
+};
+
+// What becomes of a node with this count and its link to the parent.
+void place_node(Structure structure, uint slot, uint count, uint link, Place place, inout Placed placed) {
     bool is_leaf = (count & IS_LEAF) != 0u;
-    Place place = place_of(w, slot, true);
     if (!place.inside && (is_leaf || place.depth == MAX_DEPTH)) {
-        limited = limited || !is_leaf;
-        name_leaf(w.parents.word[slot], place.first, count & ~IS_LEAF);
+        placed.limited = placed.limited || !is_leaf;
+        name_leaf(link, place.first, count & ~IS_LEAF);
     }
     if (place.inside || is_leaf || place.depth == MAX_DEPTH) {
         mark_unused(structure, slot);
-        unused++;
+        placed.unused++;
     }
+}
+
+void write_placed(Structure structure, Placed placed) {
+    uint unused = subgroupAdd(placed.unused);
+    bool any_limited = subgroupOr(placed.limited ? 1u : 0u) != 0u;
+    if (subgroupElect()) {
+        if (unused > 0u) atomicAdd(structure.header.inner_nodes, -unused);
+        if (any_limited) atomicOr(structure.header.status, STATUS_DEPTH_LIMITED);
+    }
+}
+
+// Large nodes go up to the root.
+void collapse_above(uint task) {
+    Structure structure = Structure(structure_address);
+    Weights w = weights();
+    Placed placed = Placed(0u, false);
+    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint slot = first + k * gl_WorkGroupSize.x;
+        if (slot >= node_count() || !is_large(w.counts.word[slot])) continue;
+        Place place = Place(0u, 0u, false);
+        uint link = w.parents.word[slot];
+        for (uint level = 0; level < node_count() && link != NO_PARENT; ++level) {
+            uint above = link >> 1;
+            if ((link & 1u) != 0u) place.first += w.left_counts.word[above];
+            if ((w.counts.word[above] & IS_LEAF) != 0u) place.inside = true;
+            place.depth++;
+            link = w.parents.word[above];
+        }
+        place = limited_by_depth(place);
+        large_firsts().word[slot] = place.first;
+        large_depths().word[slot] = place.depth << 1 | (place.inside ? 1u : 0u);
+        place_node(structure, slot, w.counts.word[slot], w.parents.word[slot], place, placed);
+    }
+    write_placed(structure, placed);
+}
+
+// A primitive goes up to the next large node. Unless it is the first of all it is the first below the right child of one node, and
+// of no other: that is the node it meets where it first comes from the right. It places that node, too, if it is not large.
+void place_primitive(Structure structure, Weights w, uint position, inout Placed placed) {
+    Place place = Place(0u, 0u, false), own_place = place;
+    uint own = NONE, own_count = 0u, own_link = NO_PARENT, own_left = 0u;
+    uint own_steps = 0u;
+    uint first_link = w.parents.word[parent_at(position | IS_PRIMITIVE)];
+    uint link = first_link;
+    for (uint level = 0; level < node_count() && link != NO_PARENT; ++level) {
+        uint slot = link >> 1;
+        uint count = w.counts.word[slot];
+        bool is_right = (link & 1u) != 0u, is_leaf = (count & IS_LEAF) != 0u;
+        uint left = is_right ? w.left_counts.word[slot] : 0u;
+        place.first += left;
+        place.depth++;
+        place.inside = place.inside || is_leaf;
+        if (own != NONE) own_place.inside = own_place.inside || is_leaf;
+        if (is_large(count)) {
+            uint depth = large_depths().word[slot];
+            bool inside = (depth & 1u) != 0u;
+            place.first += large_firsts().word[slot];
+            place.depth += depth >> 1;
+            place.inside = place.inside || inside;
+            own_place.inside = own_place.inside || inside;
+            break;
+        }
+        link = w.parents.word[slot];
+        if (own == NONE && is_right) {
+            own = slot;
+            own_count = count;
+            own_link = link;
+            own_left = left;
+            own_steps = place.depth;
+        }
+    }
+    own_place.first = place.first - own_left;
+    own_place.depth = place.depth - own_steps;
+    place = limited_by_depth(place);
+    walk_order().word[place.first] = position;
+    if (!place.inside) name_leaf(first_link, place.first, 1u);
+    if (own != NONE) place_node(structure, own, own_count, own_link, limited_by_depth(own_place), placed);
 }
 
 void collapse_place(uint task) {
     Structure structure = Structure(structure_address);
     uint active_count = BuildState(state_address).active_count;
     Weights w = weights();
-    uint unused = 0;
-    bool limited = false;
+    Placed placed = Placed(0u, false);
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
         uint i = first + k * gl_WorkGroupSize.x;
-        if (i < node_count()) place_node(structure, w, i, unused, limited);
-        if (i < active_count) {
-            Place place = place_of(w, i | IS_PRIMITIVE, true);
-            walk_order().word[place.first] = i;
-            if (!place.inside) name_leaf(w.parents.word[parent_at(i | IS_PRIMITIVE)], place.first, 1u);
-        } else if (i < primitive_count) {
-            // Those that are left out stay behind the others.
-            walk_order().word[i] = i;
-        }
+        if (i < active_count) place_primitive(structure, w, i, placed);
+        // Those that are left out stay behind the others.
+        else if (i < primitive_count) walk_order().word[i] = i;
     }
-    unused = subgroupAdd(unused);
-    bool any_limited = subgroupOr(limited ? 1u : 0u) != 0u;
-    if (subgroupElect()) {
-        if (unused > 0u) atomicAdd(structure.header.inner_nodes, -unused);
-        if (any_limited) atomicOr(structure.header.status, STATUS_DEPTH_LIMITED);
-    }
+    write_placed(structure, placed);
 }
 
 // ---- records ----
