@@ -278,7 +278,7 @@ impl Builder {
         let optimise = options.optimise.map(|options| Reinsertion::new(limits, &options, count));
         let items = match limits.is_cpu() {
             true if alone => SHORT_RUN,
-            true => run_of(count, shape.workgroup),
+            true => run_of(method, count, shape.workgroup),
             false => 1,
         };
         let encode = Encode {
@@ -523,9 +523,11 @@ const LONG_RUN: u32 = 128;
 /// Workgroups that are enough for the threads of a CPU to end at the same time, nearly.
 const ENOUGH_WORKGROUPS: u32 = 64;
 
-/// How many primitives an invocation of a CPU takes. Of two numbers, as each has its own kernels.
-fn run_of(count: u32, workgroup: u32) -> u32 {
-    if count >= LONG_RUN * workgroup * ENOUGH_WORKGROUPS { LONG_RUN } else { SHORT_RUN }
+/// How many primitives an invocation of a CPU takes. Of two numbers, as each has its own kernels. What climbs the radix tree to the
+/// root gains by long runs; PLOC's rounds take 1.2 times as long by them, and HLBVH, which climbs to its treelets, as long.
+fn run_of(method: Method, count: u32, workgroup: u32) -> u32 {
+    let climbs = matches!(method, Method::Lbvh | Method::Hploc(_));
+    if climbs && count >= LONG_RUN * workgroup * ENOUGH_WORKGROUPS { LONG_RUN } else { SHORT_RUN }
 }
 
 impl Schedule {
