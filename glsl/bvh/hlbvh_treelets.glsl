@@ -1,8 +1,8 @@
 // The treelets of an HLBVH: see bvh/hlbvh.glsl for the contract.
 //
 // A treelet is a subtree of the radix tree that has at most TREELET_PRIMITIVES, which share TREELET_BITS of the code, and whose
-// parent is none. The climb is that of bvh/lbvh.glsl; it ends where a treelet is complete. Of the split behind a treelet's last position nobody asks for the parent:
-// its weights hold the treelet's root and cost until the clusters are gathered, and its word in `ends` stays as it was.
+// parent is none. The climb ends where a treelet is complete. Of the split behind a treelet's last position nobody asks for the
+// parent: its weights hold the treelet's root and cost until the clusters are gathered, and its word in `ends` stays as it was.
 #ifndef HEDGEROW_BVH_HLBVH_TREELETS
 #define HEDGEROW_BVH_HLBVH_TREELETS
 #include "bvh/hlbvh.glsl"
@@ -36,7 +36,7 @@ void climb(inout Run run, Weights w, float area_scale, Subtree s) {
         w.parents.word[parent_at(reference_of(s.child))] = 2u * parent + (is_left ? 0u : 1u);
         float sibling_cost;
         if (!step_up(run, is_left, parent, s, sibling_cost)) break;
-        // Siblings that met within the run left the word as it was.
+        // No treelet ends there, which siblings that met within the run have not said yet.
         run.ends.word[parent] = s.first;
         s.child.index = parent;
         s.child.count = 0u;

@@ -19,7 +19,7 @@
 // Levels of a radix tree: a code bit or a position bit each.
 const uint LEVELS = 64 + 27;
 
-// Left children that wait for a sibling out of the same run of positions (bvh/lbvh.glsl), and their clusters.
+// Left children that wait for a sibling out of the same run of positions (bvh/run.glsl), and their clusters.
 shared uint run_firsts[ITEMS * gl_WorkGroupSize.x];
 shared uint run_clusters[ITEMS * gl_WorkGroupSize.x];
 

@@ -3,6 +3,7 @@
 // their fences were a third of the time.
 #ifndef HEDGEROW_BVH_RUN
 #define HEDGEROW_BVH_RUN
+#include "bvh/build_state.glsl"
 #include "bvh/radix_tree.glsl"
 
 // A finished subtree over the positions first..=last, and how the codes differ before and behind it.
