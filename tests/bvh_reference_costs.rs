@@ -97,7 +97,7 @@ fn ploc_and_sweep_costs_are_those_of_an_independent_program_within_a_percent() {
 }
 
 #[test]
-#[ignore = "scenes of up to 1.4M triangles"]
+#[ignore = "scenes of up to 1.4M triangles; fails: san_francisco and bunny_in_city by PLOC 25 with mc30 are 1.1% off"]
 fn ploc_and_sweep_costs_of_large_scenes_are_those_of_an_independent_program_within_a_percent() {
     compare_host_builders(|triangles| triangles >= SMALL);
 }

@@ -18,7 +18,7 @@
 #define HEDGEROW_BVH_COLLAPSE
 #include "bvh/weights.glsl"
 
-// Primitives below a node that goes its way for others: 8, 16 and 64 took as long.
+// Primitives below a node that goes its way for others: with 16 above and place took 1.1 times as long, with 64 as long.
 const uint LARGE = 32;
 
 uint node_count() {

@@ -93,7 +93,7 @@ impl Model {
         let is_complete = |scene: &str| {
             builders.iter().all(|m| of(scene, &m.builder).is_some_and(|m| is_positive(m) && m.work.steps > 0.0))
         };
-        let (complete, _): (Vec<&Measured>, Vec<&Measured>) = scenes.iter().partition(|m| is_complete(&m.scene));
+        let complete: Vec<&Measured> = scenes.iter().copied().filter(|m| is_complete(&m.scene)).collect();
         let on_complete: Vec<Measured> =
             measured.iter().filter(|m| complete.iter().any(|scene| scene.scene == m.scene)).cloned().collect();
         let prices = Prices::of(&on_complete);
