@@ -3,6 +3,8 @@
 mod common;
 
 use common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, soup, tree_of, tree_with};
+use hedgerow::bvh::codes::Codes;
+use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::trace::{Hit, Query, Ray, host};
@@ -171,4 +173,31 @@ fn a_leaf_is_visited_once_and_its_triangles_tested() {
         more_than_one |= work.leaves < work.tests;
     }
     assert!(more_than_one, "a collapsed tree has leaves of several triangles");
+}
+
+/// Boxes are widened by a part of their own distance, not of the scene's extent.
+#[test]
+fn a_far_triangle_does_not_slow_rays() {
+    let robust: Codes = "emc64var+robust".parse().expect("codes");
+    let built = |corners: &Corners| lbvh::build_corners(corners.iter().copied().map(Ok), robust, Collapse::OFF);
+    let near = icosphere(4);
+    let rays = hard_rays(&near, 400, 1.0, [0.0; 3], 5);
+    let steps = |tree: &Bvh2| -> f64 {
+        rays.iter().map(|ray| f64::from(host::trace(tree, ray, Query::ClosestHit).1.steps)).sum::<f64>()
+    };
+    let without = steps(&built(&near));
+    for e in [10, 20, 40, 60, 100] {
+        let far = placed(&vec![near[0]], 1.0, [2f32.powi(e), 0.0, 0.0]);
+        let corners: Corners = near.iter().chain(&far).copied().collect();
+        let tree = built(&corners);
+        let with = steps(&tree);
+        // Every ray visits the nodes that it is below.
+        let above = tree.nodes.iter().filter(|n| n.is_used() && n.children.iter().any(|c| c.hi[0] > 100.0)).count();
+        assert!(above < 8, "2^{e} away: {above} nodes above it");
+        let most = 1.01 * without + (above * rays.len()) as f64;
+        assert!(with < most, "2^{e} away: {with} steps, {without} without, {above} nodes above it");
+        for ray in rays.iter().step_by(10) {
+            assert_eq!(host::closest_hit(&tree, ray), host::closest_hit_by_brute_force(&tree, ray), "2^{e}: {ray:?}");
+        }
+    }
 }

@@ -8,11 +8,12 @@ use common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, soup, t
 use hedgerow::bvh::layout::{Bvh2, Child, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::wide::Form;
-use hedgerow::bvh::wide::layout::{Wide, WideNode};
+use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::trace::tracer::{Buffers, Loads, Shape};
 use hedgerow::trace::wide::{Order, Tracer};
-use hedgerow::trace::{Hit, Query, Ray, Work, host, wide_host};
+use hedgerow::trace::wide_host::{self, TracedNode};
+use hedgerow::trace::{Hit, Query, Ray, Work, host};
 
 /// Every order, and every way to cut the work: the default, that for GPUs, no shared memory at all, and a stack half here and
 /// half there.
@@ -37,7 +38,7 @@ fn tracers(form: Form) -> Vec<Tracer> {
     tracers
 }
 
-fn traced<N: WideNode>(
+fn traced<N: TracedNode>(
     tree: &Wide<N>,
     rays: &[Ray],
     tracer: &Tracer,
@@ -64,7 +65,7 @@ fn traced<N: WideNode>(
 
 /// On the host as by brute force; on the device as on the host.
 #[track_caller]
-fn assert_form<N: WideNode>(tree: &Bvh2, rays: &[Ray]) {
+fn assert_form<N: TracedNode>(tree: &Bvh2, rays: &[Ray]) {
     let wide = Wide::<N>::of(tree);
     wide.validate().expect("a valid tree");
     let usable = tree.header.status & status::UNUSABLE == 0;
@@ -165,7 +166,7 @@ fn closed_surfaces_do_not_leak() {
         assert_tight::<QuantisedNode>(&tree, &rays);
     }
 
-    fn assert_tight<N: WideNode>(tree: &Bvh2, rays: &[Ray]) {
+    fn assert_tight<N: TracedNode>(tree: &Bvh2, rays: &[Ray]) {
         let wide = Wide::<N>::of(tree);
         for tracer in tracers(N::FORM).iter().take(3) {
             let (hits, _) = traced(&wide, rays, tracer, Query::ClosestHit, false);

@@ -157,9 +157,17 @@ uint splits_of_first(uint splits, Box first, Box second) {
     return (2 * splits * parts.x + sum) / (2 * sum);
 }
 
+// The box of a part, larger by the slack that its triangle's vertices need.
+Box padded(Box b, Box whole) {
+    precise vec3 lo = b.lo - (power_of_two(-18) * longest_side(whole) + power_of_two(-22) * abs(b.lo));
+    precise vec3 hi = b.hi + (power_of_two(-18) * longest_side(whole) + power_of_two(-22) * abs(b.hi));
+    return Box(lo, hi);
+}
+
 // The part of a triangle with this number, of as many as its splits and one; false where there are not so many.
 bool find_part(SplitGrid grid, Corners c, uint splits, uint number, out Box b) {
-    b = box_around(c);
+    Box whole = box_around(c);
+    b = whole;
     // No box has more planes inside: each level has one along each axis.
     for (uint depth = 0; depth < 3 * SPLIT_LEVELS && splits > 0; ++depth) {
         SplitPlane plane;
@@ -181,6 +189,7 @@ bool find_part(SplitGrid grid, Corners c, uint splits, uint number, out Box b) {
             splits -= first;
         }
     }
+    if (b != whole) b = padded(b, whole);
     return number == 0;
 }
 #endif

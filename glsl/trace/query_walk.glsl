@@ -116,6 +116,16 @@ bool hedgerow_skips(uint flags, uint kind) {
            kind == KIND_BOXES && (flags & hedgerowRayFlagsSkipAABB) != 0u;
 }
 
+// In a top level, boxes must hold what a ray hits in the space of an instance: a place that is off there by 64 units of rounding
+// of the largest component of its distance (src/trace/slab.rs), which a rotation may make 3 times as many of it in the world; and
+// as the ray went through the inverse of the transform, by a few units of its coordinates. Eight times the slack holds both. (A
+// transform that stretches one axis against another makes as much more of it; what it does to boxes is in accel/world_box.glsl.)
+void hedgerow_widen_for(uint kind, inout HedgerowPreparedRay prepared) {
+    if (kind != KIND_INSTANCES) return;
+    prepared.slack *= 8.0;
+    prepared.margin *= 8.0;
+}
+
 // Nothing is at hand, and nothing waits.
 void hedgerow_end(inout HedgerowRayQuery query) {
     query.left = HEDGEROW_NOTHING;
@@ -160,7 +170,9 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.geometry_flags = header.geometry_flags;
     query.rounds = hedgerow_rounds(header);
     // As in Vulkan, a mask without bits lets the ray meet nothing.
-    if (hedgerow_prepare(ray, header.root.lo, header.root.hi, query.prepared) && cull_mask != 0u &&
+    bool goes = hedgerow_prepare(ray, query.prepared);
+    hedgerow_widen_for(header.kind, query.prepared);
+    if (goes && cull_mask != 0u &&
         hedgerow_can_be_traced(header) && !hedgerow_skips(flags, header.kind)) {
         query.index = header.root.index;
         query.left = header.root.count;
@@ -263,7 +275,7 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     HedgerowRay ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
                                   hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
     HedgerowPreparedRay prepared;
-    bool goes = hedgerow_prepare(ray, header.root.lo, header.root.hi, prepared);
+    bool goes = hedgerow_prepare(ray, prepared);
     if (!goes || !hedgerow_can_be_traced(header) || header.kind == KIND_INSTANCES || hedgerow_skips(query.flags, header.kind)) {
         return;
     }
@@ -292,7 +304,8 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
 // Back to the top level.
 void hedgerow_leave_instance(inout HedgerowRayQuery query) {
     Header header = Structure(query.top).header;
-    hedgerow_prepare(query.ray, header.root.lo, header.root.hi, query.prepared);
+    hedgerow_prepare(query.ray, query.prepared);
+    hedgerow_widen_for(query.top_kind, query.prepared);
     query.structure = query.top;
     query.slots = query.top_slots;
     query.records = header.primitive_count;

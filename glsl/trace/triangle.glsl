@@ -51,8 +51,13 @@ vec3 hedgerow_differences(vec3 a, vec3 b, vec3 c) {
     return differences;
 }
 
+// 2^-76 and 2^100.
+const float HEDGEROW_TRUSTED = 1.0 / 75557863725914323419136.0;
+const float HEDGEROW_LARGEST_CUBE = 1267650600228229401496703205376.0;
+const float HEDGEROW_PART_OF_CUBE = 0.5625;
+
 // The edge functions with right signs and accurate enough, where the plain ones are not.
-bool hedgerow_carefully(HedgerowPreparedRay ray, vec3 a, vec3 b, vec3 c, float m, float trusted, float largest_cube, out vec3 edges) {
+bool hedgerow_carefully(vec3 a, vec3 b, vec3 c, float m, float reach, out vec3 edges) {
     const float CERTAIN = uintBitsToFloat((127u - 40u) << 23);
     const float SMALLER = uintBitsToFloat((127u - 20u) << 23);
     edges = hedgerow_differences(a, b, c);
@@ -61,37 +66,39 @@ bool hedgerow_carefully(HedgerowPreparedRay ray, vec3 a, vec3 b, vec3 c, float m
     float nearest = min(min(abs(edges.x), abs(edges.y)), abs(edges.z));
     precise float cube = m * m * m;
     precise float certainty = CERTAIN * (m * m);
-    bool certain = nearest > certainty && nearest > trusted;
+    bool certain = nearest > certainty && nearest > HEDGEROW_TRUSTED;
     if (certain && least < 0.0 && greatest > 0.0) return false;
     precise float sum = edges.x + edges.y + edges.z;
-    precise float error = SMALLER * (4.0 * cube);
-    precise float allowed = ray.reach * abs(sum);
-    if (certain && cube < largest_cube && error <= allowed) return true;
+    precise float error = SMALLER * (HEDGEROW_PART_OF_CUBE * cube);
+    precise float allowed = reach * abs(sum);
+    if (certain && cube < HEDGEROW_LARGEST_CUBE && error <= allowed) return true;
     return hedgerow_exactly(a, b, c, edges);
 }
 
 // Where the ray's line meets the triangle: t and the weights of the second and third vertex; and whether it meets the front,
 // to which (v1 - v0) × (v2 - v0) points.
 bool hedgerow_meet_facing(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, out vec3 meeting, out bool is_front) {
-    const float TRUSTED = uintBitsToFloat((127u - 76u) << 23);
-    const float LARGEST_CUBE = uintBitsToFloat((127u + 100u) << 23);
     vec3 a = hedgerow_sheared(ray, v0);
     vec3 b = hedgerow_sheared(ray, v1);
     vec3 c = hedgerow_sheared(ray, v2);
     precise vec3 edges = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
     float least = min(min(edges.x, edges.y), edges.z);
     float greatest = max(max(edges.x, edges.y), edges.z);
-    if (least < -TRUSTED && greatest > TRUSTED) return false;
+    if (least < -HEDGEROW_TRUSTED && greatest > HEDGEROW_TRUSTED) return false;
 
     vec2 m = max(max(abs(a.xy), abs(b.xy)), abs(c.xy));
     float largest = max(m.x, m.y);
     precise float cube = largest * largest * largest;
     precise float sum = edges.x + edges.y + edges.z;
-    bool trusted = least > TRUSTED || greatest < -TRUSTED;
-    bool accurate = cube < LARGEST_CUBE && 4.0 * cube <= ray.reach * abs(sum);
+    // No vertex is nearer to the origin along all axes.
+    precise float reach = max(max(abs(a.z), abs(b.z)), max(abs(c.z), 0.5 * largest));
+    precise float error = HEDGEROW_PART_OF_CUBE * cube;
+    precise float allowed = reach * abs(sum);
+    bool trusted = least > HEDGEROW_TRUSTED || greatest < -HEDGEROW_TRUSTED;
+    bool accurate = cube < HEDGEROW_LARGEST_CUBE && error <= allowed;
     if (!(trusted && accurate)) {
         vec3 careful;
-        if (!hedgerow_carefully(ray, a, b, c, largest, TRUSTED, LARGEST_CUBE, careful)) return false;
+        if (!hedgerow_carefully(a, b, c, largest, reach, careful)) return false;
         edges = careful;
     }
     precise float scale = 1.0 / (edges.x + edges.y + edges.z);

@@ -40,7 +40,7 @@ void count_leaf(inout Walk walk) {
 
 // At the root; a ray that cannot hit anything has nothing at hand and nothing that waits.
 void begin(HedgerowRay ray, Child root, bool usable, out Walk walk) {
-    bool goes = hedgerow_prepare(ray, root.lo, root.hi, walk.ray) && usable;
+    bool goes = hedgerow_prepare(ray, walk.ray) && usable;
     walk.index = root.index;
     walk.left = goes ? root.count : NOTHING;
     walk.level = 0;

@@ -47,7 +47,7 @@ uint in_octant(uint mask, uint octant) {
 
 // At the root; a ray that cannot hit anything has nothing at hand and nothing that waits.
 void begin(HedgerowRay ray, Child root, bool usable, out QuantisedWalk walk) {
-    bool goes = hedgerow_prepare(ray, root.lo, root.hi, walk.ray) && usable;
+    bool goes = hedgerow_prepare(ray, walk.ray) && usable;
     uvec3 down = floatBitsToUint(walk.ray.inverse) >> 31;
     walk.octant = down.x | down.y << 1 | down.z << 2;
     // The root is the only node of a group.

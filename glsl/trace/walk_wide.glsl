@@ -59,15 +59,22 @@ void go_to_nearest(inout Walk walk) {
     count_leaf(walk);
 }
 
+void enter_child(uint i, Child child, Walk walk) {
+    bool enters;
+    float enter = hedgerow_enter(walk.ray, child.lo, child.hi, walk.best, enters);
+    wide_enter[i] = enters && child.count != UNUSED ? enter : HEDGEROW_INFINITY;
+    wide_index[i] = child.index;
+    wide_count[i] = child.count;
+}
+
 void visit_wide(WideNode node, inout Walk walk) {
-    [[unroll]] for (uint i = 0; i < WIDTH; ++i) {
-        Child child = node.child[i];
-        bool enters;
-        float enter = hedgerow_enter(walk.ray, child.lo, child.hi, walk.best, enters);
-        wide_enter[i] = enters && child.count != UNUSED ? enter : HEDGEROW_INFINITY;
-        wide_index[i] = child.index;
-        wide_count[i] = child.count;
-    }
+    // No loop: where shaderc unrolls one, the copies of what is `precise` are not.
+#define ENTER_CHILD(i) enter_child(i, node.child[i], walk)
+    ENTER_CHILD(0); ENTER_CHILD(1); ENTER_CHILD(2); ENTER_CHILD(3);
+#if WIDTH == 8
+    ENTER_CHILD(4); ENTER_CHILD(5); ENTER_CHILD(6); ENTER_CHILD(7);
+#endif
+#undef ENTER_CHILD
     go_to_nearest(walk);
 }
 #endif

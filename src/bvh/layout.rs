@@ -26,6 +26,9 @@ pub const UNUSED: u32 = u32::MAX;
 pub const NODES_OFFSET: u64 = size_of::<Header>() as u64;
 /// The deepest tree a tracer must be able to walk: every code bit and every index bit may cost a level.
 pub const MAX_DEPTH: u32 = 96;
+/// By what part of its distance from a ray's origin, along whichever axis that is most, tracers see a box widened:
+/// 64 units of rounding, ε = 2⁻²⁴ each ([`crate::trace::slab`]).
+pub const SLACK: f32 = f32::from_bits((127 - 18) << 23);
 
 /// Bits of [`Header::status`]. Zero is a structure without a blemish.
 pub mod status {

@@ -1,6 +1,7 @@
 //! Walks a structure on the host and says what is wrong and where.
 
 use super::cover::Parts;
+use super::host::split::around_parts;
 use super::layout::{Aabb, Bvh2, Child, Header, Instance, MAX_DEPTH, Record, node_slots};
 use crate::{Error, Result};
 
@@ -9,8 +10,8 @@ impl<R: Record> Bvh2<R> {
     /// exactly those around what they hold (as far as records tell, and without what updates have left out), unused slots that
     /// say so, and a depth that tracers can walk.
     ///
-    /// Where triangles were split: every record in exactly one leaf, leaves whose boxes lie within those around their triangles,
-    /// and no triangle with a point that is in no box of its leaves.
+    /// Where triangles were split: every record in exactly one leaf, leaves whose boxes lie within those around their triangles
+    /// (larger by the slack of parts), and no triangle with a point that is in no box of its leaves.
     ///
     /// # Errors
     /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
@@ -44,14 +45,16 @@ impl<R: Record> Bvh2<R> {
                 if let Some(twice) = range.clone().find(|&t| std::mem::replace(&mut in_leaf[t], true)) {
                     return invalid(format!("{named_by}: record {twice} is in two leaves"));
                 }
-                if header.split_from != 0 {
+                let is_split = header.split_from != 0;
+                if is_split {
                     range.clone().for_each(|record| parts.add(record, child.bounds()));
                 }
                 let met: Vec<_> = self.records[range].iter().filter(|record| !record.is_left_out()).collect();
-                let boxes: Option<Vec<Aabb>> = met.iter().map(|record| record.bounds()).collect();
+                let loose = |b: Aabb| if is_split { around_parts(&b) } else { b };
+                let boxes: Option<Vec<Aabb>> = met.iter().map(|record| record.bounds().map(loose)).collect();
                 // A leaf that updates have left nothing of has the box that it had.
                 if let Some(around) = boxes.and_then(|boxes| boxes.into_iter().reduce(|a, b| a.union(&b))) {
-                    let within = header.split_from != 0 && around.contains(&child.bounds());
+                    let within = is_split && around.contains(&child.bounds());
                     if !within {
                         same_box(&child, &around, &named_by)?;
                     }

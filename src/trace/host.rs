@@ -25,7 +25,7 @@ pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
     let mut work = Work::default();
     let mut nearest = Nearest::new(ray.t_max);
     let usable = tree.header.active != 0 && tree.header.status & status::UNUSABLE == 0;
-    let Some(ray) = PreparedRay::new(ray, &tree.header.root.bounds()).filter(|_| usable) else {
+    let Some(ray) = PreparedRay::new(ray).filter(|_| usable) else {
         return (Hit::NONE, work);
     };
     // Children that wait, each with the distance at which the ray enters it. A long leaf is taken however far it is.
@@ -46,7 +46,8 @@ pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
         } else {
             work.steps += 1;
             let [left, right] = tree.nodes[child.index as usize].children;
-            match (slab::enter(&ray, &left, nearest.t), slab::enter(&ray, &right, nearest.t)) {
+            let boxes = [left.bounds(), right.bounds()];
+            match boxes.map(|b| slab::enter(&ray, &b, nearest.t)).into() {
                 (Some(l), Some(r)) => {
                     let (near, far) = if r < l { (right, (l, left)) } else { (left, (r, right)) };
                     let entered = if far.1.count < LONG_LEAF { far.0 } else { f32::NEG_INFINITY };
@@ -80,7 +81,7 @@ pub fn any_hit_by_brute_force(tree: &Bvh2, ray: &Ray) -> Hit {
 
 fn brute_force(tree: &Bvh2, ray: &Ray) -> Nearest {
     let mut nearest = Nearest::new(ray.t_max);
-    if let Some(ray) = PreparedRay::new(ray, &tree.header.root.bounds()) {
+    if let Some(ray) = PreparedRay::new(ray) {
         // Triangles that builders leave out stand behind the others.
         for triangle in &tree.records[..tree.header.active as usize] {
             nearest.consider(&ray, triangle);

@@ -1,17 +1,16 @@
-//! A ray made ready for the tests: shear, reciprocals and error bounds, computed once (glsl/trace/ray.glsl).
+//! A ray made ready for the tests: shear, reciprocals and an error bound, computed once (glsl/trace/ray.glsl).
 
 use super::Ray;
-use crate::bvh::layout::Aabb;
 
 /// Directions whose largest component lies outside these bounds hit nothing: their reciprocals would leave the floats.
 const DIRECTION: std::ops::RangeInclusive<f32> = f32::from_bits((127 - 100) << 23)..=f32::from_bits((127 + 100) << 23);
 /// A component of the direction less than this part of the largest is moved away from zero, so that no reciprocal is
-/// infinite and no slab distance NaN. The ray moves by less than the slab's error bound, which covers it.
+/// infinite and no slab distance NaN. The ray moves by ε/4 of its way, which is in the slab's error bound.
 const FLATTEST: f32 = f32::from_bits((127 - 26) << 23);
-/// 32 units of rounding, 2⁻²⁴ each: see [`super::slab`].
-const SLAB_ERROR: f32 = f32::from_bits((127 - 19) << 23);
-/// Covers the rounding of an origin moved by an error bound.
-const ORIGIN_ERROR: f32 = f32::from_bits((127 - 22) << 23);
+/// By what part of the origin's coordinates every box is widened: 4ε.
+const MARGIN: f32 = f32::from_bits((127 - 22) << 23);
+/// By how much every box is widened at least: more than what a device flushes to zero, a few times 2⁻¹²⁶.
+const LEAST_MARGIN: f32 = f32::from_bits((127 - 120) << 23);
 
 /// A ray with what both tests need of it.
 #[derive(Debug, Clone, Copy)]
@@ -26,19 +25,15 @@ pub struct PreparedRay {
     pub major: usize,
     /// Shear in x, shear in y, scale in z (Woop, Benthin, Wald 2013, section 3.1).
     pub shear: [f32; 3],
-    /// The farthest that anything in the scene is from the origin along `major`.
-    pub reach: f32,
     /// Reciprocal of the direction, finite.
     pub inverse: [f32; 3],
-    /// The origin moved towards greater coordinates by the error bound: for distances to the least corner of a box.
-    pub origin_lo: [f32; 3],
-    /// The origin moved towards lesser coordinates: for distances to the greatest corner.
-    pub origin_hi: [f32; 3],
+    /// By how much boxes are widened however near they are.
+    pub margin: f32,
 }
 
 impl PreparedRay {
-    /// Prepares `ray` for a scene inside `bounds`; `None` if it can hit nothing (see [`Ray`]).
-    pub fn new(ray: &Ray, bounds: &Aabb) -> Option<PreparedRay> {
+    /// `None` if the ray can hit nothing (see [`Ray`]).
+    pub fn new(ray: &Ray) -> Option<PreparedRay> {
         let d = ray.direction;
         let major = longest(d);
         let finite = ray.origin.iter().chain(&d).all(|x| x.is_finite());
@@ -49,21 +44,15 @@ impl PreparedRay {
         let [x, y] = [(major + 1) % 3, (major + 2) % 3];
         let scale = 1.0 / d[major];
         let flattest = FLATTEST * d[major].abs();
-        let extent: [f32; 3] =
-            std::array::from_fn(|i| (bounds.lo[i] - ray.origin[i]).abs().max((bounds.hi[i] - ray.origin[i]).abs()));
-        let reach = extent[major];
-        let slack: [f32; 3] =
-            std::array::from_fn(|i| SLAB_ERROR * (extent[i] + reach) + ORIGIN_ERROR * ray.origin[i].abs());
+        let coordinate = ray.origin.iter().fold(0f32, |most, x| most.max(x.abs()));
         Some(PreparedRay {
             origin: ray.origin,
             t_min: ray.t_min,
             t_max: ray.t_max,
             major,
             shear: [d[x] * scale, d[y] * scale, scale],
-            reach,
             inverse: d.map(|d| 1.0 / if d.abs() < flattest { flattest.copysign(d) } else { d }),
-            origin_lo: std::array::from_fn(|i| ray.origin[i] + slack[i]),
-            origin_hi: std::array::from_fn(|i| ray.origin[i] - slack[i]),
+            margin: MARGIN * coordinate + LEAST_MARGIN,
         })
     }
 }

@@ -7,8 +7,11 @@
 //! from integers, so that a device without doubles is as tight as the host, whatever the scale of the scene.
 //!
 //! The same path is taken where a hit is certain but the determinants cancel so much that the hit would be placed outside of
-//! its own box: the error of a weight is 8ε·M²/|det| (M the largest sheared coordinate), that of the place the sum of three,
-//! 24ε·M³/|det|, and [`super::slab`] allows 6ε·reach.
+//! its own box. With M the largest sheared coordinate, an edge function is off by 4ε·M² (two products, their difference), the
+//! weight made of it by 4ε·M²/|det| and its own rounding, and the place, the sum of three, by 12ε·M³/|det| + ε·M. [`super::slab`]
+//! allows 24ε times the farthest that a vertex is from the origin along an axis. That is at least the greatest |z|, and at least
+//! M/2, as a sheared coordinate is the sum of two; so hits are taken for accurate where 9/16·M³ ≤ max(|z|, M/2)·|det|, which
+//! makes of the above 22ε·max(|z|, M/2) and 2ε·M/2.
 //!
 //! Between the two lies a step that settles all but what is on an edge or corner: the products as sums of two floats (Dekker
 //! 1971; no fused operation, which devices round as they like), so that the errors above shrink by 2²⁰. Large thin triangles
@@ -37,6 +40,9 @@ pub struct Meeting {
     pub v: f32,
 }
 
+/// The part of the largest sheared coordinate's cube that is compared with reach times determinant.
+const PART_OF_CUBE: f32 = 0.5625;
+
 /// Where the ray's line meets the triangle, at any t; edges and corners belong to it, triangles seen edge-on do not count.
 pub fn meet(ray: &PreparedRay, triangle: &Triangle) -> Option<Meeting> {
     let [a, b, c] = [triangle.v0, triangle.v1, triangle.v2].map(|vertex| sheared(ray, vertex));
@@ -51,9 +57,11 @@ pub fn meet(ray: &PreparedRay, triangle: &Triangle) -> Option<Meeting> {
     }
     let m = [a.x, a.y, b.x, b.y, c.x, c.y].iter().fold(0f32, |m, x| m.max(x.abs()));
     let cube = m * m * m;
+    // No vertex is nearer to the origin along all axes.
+    let reach = [a.z, b.z, c.z].iter().fold(0.5 * m, |reach, z| reach.max(z.abs()));
     let trusted = least > TRUSTED || greatest < -TRUSTED;
-    let accurate = cube < LARGEST_CUBE && 4.0 * cube <= ray.reach * (u + v + w).abs();
-    let [u, v, w] = if trusted && accurate { [u, v, w] } else { carefully(ray, a, b, c, m)? };
+    let accurate = cube < LARGEST_CUBE && PART_OF_CUBE * cube <= reach * (u + v + w).abs();
+    let [u, v, w] = if trusted && accurate { [u, v, w] } else { carefully(a, b, c, m, reach)? };
     let scale = 1.0 / (u + v + w);
     let (u, v, w) = (u * scale, v * scale, w * scale);
     Some(Meeting { t: (u * a.z + v * b.z + w * c.z) * ray.shear[2], u: v, v: w })
@@ -78,7 +86,7 @@ const CERTAIN: f32 = f32::from_bits((127 - 40) << 23);
 const SMALLER: f32 = f32::from_bits((127 - 20) << 23);
 
 /// The edge functions with right signs and accurate enough; `None` if the line misses. `m` is the largest sheared coordinate.
-fn carefully(ray: &PreparedRay, a: Sheared, b: Sheared, c: Sheared, m: f32) -> Option<[f32; 3]> {
+fn carefully(a: Sheared, b: Sheared, c: Sheared, m: f32, reach: f32) -> Option<[f32; 3]> {
     let edges @ [u, v, w] = [difference(c, b), difference(a, c), difference(b, a)];
     let (least, greatest) = (u.min(v).min(w), u.max(v).max(w));
     let nearest = u.abs().min(v.abs()).min(w.abs());
@@ -87,7 +95,7 @@ fn carefully(ray: &PreparedRay, a: Sheared, b: Sheared, c: Sheared, m: f32) -> O
     if certain && least < 0.0 && greatest > 0.0 {
         return None;
     }
-    let accurate = cube < LARGEST_CUBE && SMALLER * (4.0 * cube) <= ray.reach * (u + v + w).abs();
+    let accurate = cube < LARGEST_CUBE && SMALLER * (PART_OF_CUBE * cube) <= reach * (u + v + w).abs();
     if certain && accurate { Some(edges) } else { exactly(a, b, c) }
 }
 

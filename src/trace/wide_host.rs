@@ -7,14 +7,49 @@ use super::wide::Order;
 use super::{Hit, Query, Ray, Work, slab};
 use crate::bvh::layout::{Child, status};
 use crate::bvh::wide::layout::{Slots, Wide, WideNode};
+use crate::bvh::wide::quantised::QuantisedNode;
+
+/// A node whose children rays enter.
+pub trait TracedNode: WideNode {
+    /// Where the ray enters the boxes of the children, by their slots; nothing where it does not between `t_min` and `t_best`, and
+    /// whatever comes to it where there is no child.
+    fn enters(&self, ray: &PreparedRay, t_best: f32) -> [Option<f32>; 8];
+}
+
+impl<const W: usize> TracedNode for [Child; W]
+where
+    [Child; W]: WideNode,
+{
+    fn enters(&self, ray: &PreparedRay, t_best: f32) -> [Option<f32>; 8] {
+        std::array::from_fn(|slot| slab::enter(ray, &self.get(slot)?.bounds(), t_best))
+    }
+}
+
+impl TracedNode for QuantisedNode {
+    /// The slack is that of the node's whole grid, and goes to where bytes are counted from.
+    fn enters(&self, ray: &PreparedRay, t_best: f32) -> [Option<f32>; 8] {
+        let (origin, cell) = self.grid();
+        let least: [f32; 3] = std::array::from_fn(|i| origin[i] - ray.origin[i]);
+        let farthest = (0..3).map(|i| (least[i] + 255.0 * cell[i]).max(-least[i]));
+        let slack = slab::slack_of(ray, farthest.fold(f32::NEG_INFINITY, f32::max));
+        std::array::from_fn(|slot| {
+            let [lo, hi] = self.bytes(slot);
+            let lo = |i: usize| ((least[i] - slack) + lo[i] * cell[i]) * ray.inverse[i];
+            let hi = |i: usize| ((least[i] + slack) + hi[i] * cell[i]) * ray.inverse[i];
+            let near = (0..3).fold(ray.t_min, |t, i| t.max(lo(i).min(hi(i))));
+            let far = (0..3).fold(t_best, |t, i| t.min(lo(i).max(hi(i))));
+            (near <= far).then_some(near)
+        })
+    }
+}
 
 /// The hit, and the steps (nodes visited, long leaves among them) and tests that it took in this order.
 ///
 /// A tree whose status says that it cannot be used is traced as if it were empty, as the device must.
-pub fn trace<N: WideNode>(tree: &Wide<N>, ray: &Ray, query: Query, order: Order) -> (Hit, Work) {
+pub fn trace<N: TracedNode>(tree: &Wide<N>, ray: &Ray, query: Query, order: Order) -> (Hit, Work) {
     let mut walk = Walk { tree, query, nearest: Nearest::new(ray.t_max), work: Work::default() };
     let usable = tree.header.active != 0 && tree.header.status & status::UNUSABLE == 0;
-    if let Some(ray) = PreparedRay::new(ray, &tree.header.root.bounds()).filter(|_| usable) {
+    if let Some(ray) = PreparedRay::new(ray).filter(|_| usable) {
         match order {
             Order::Distance => walk.by_distance(&ray),
             Order::Octant => walk.by_octant(&ray),
@@ -23,7 +58,7 @@ pub fn trace<N: WideNode>(tree: &Wide<N>, ray: &Ray, query: Query, order: Order)
     (walk.nearest.hit_of(query), walk.work)
 }
 
-struct Walk<'a, N: WideNode> {
+struct Walk<'a, N: TracedNode> {
     tree: &'a Wide<N>,
     query: Query,
     nearest: Nearest,
@@ -55,7 +90,7 @@ const NETWORK_OF_8: &[[usize; 2]] = &[
     [3, 4],
 ];
 
-impl<N: WideNode> Walk<'_, N> {
+impl<N: TracedNode> Walk<'_, N> {
     /// Tests the records of a leaf; whether the search is over.
     fn leaf(&mut self, ray: &PreparedRay, first: u32, count: u32) -> bool {
         self.work.leaves += 1;
@@ -92,9 +127,12 @@ impl<N: WideNode> Walk<'_, N> {
                 }
                 continue;
             }
-            let enter = |child: &Child| slab::enter(ray, child, self.nearest.t).unwrap_or(f32::INFINITY);
-            let children = self.tree.nodes[child.index as usize].children();
-            let mut entered = children.map(|child| (child.as_ref().map_or(f32::INFINITY, enter), child));
+            let node = &self.tree.nodes[child.index as usize];
+            let (enters, children) = (node.enters(ray, self.nearest.t), node.children());
+            let mut entered: [_; 8] = std::array::from_fn(|slot| {
+                let there = enters[slot].filter(|_| children[slot].is_some());
+                (there.unwrap_or(f32::INFINITY), children[slot])
+            });
             for &[a, b] in network {
                 if entered[b].0 < entered[a].0 {
                     entered.swap(a, b);
@@ -132,11 +170,10 @@ impl<N: WideNode> Walk<'_, N> {
                 }
                 continue;
             }
-            let children: Slots = node.children();
-            let best = self.nearest.t;
-            let in_order = (0..8).filter_map(|place| children[place ^ octant]);
+            let (enters, children): (_, Slots) = (node.enters(ray, self.nearest.t), node.children());
+            let in_order = (0..8).map(|place| place ^ octant);
             let entered: Vec<(f32, Child)> = in_order
-                .filter_map(|child| Some((slab::enter(ray, &child, best)?, child)))
+                .filter_map(|slot| Some((enters[slot]?, children[slot]?)))
                 .filter(|&(enter, _)| enter < f32::INFINITY)
                 .collect();
             for (_, leaf) in entered.iter().filter(|(_, child)| child.is_leaf()) {

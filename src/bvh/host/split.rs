@@ -6,14 +6,16 @@
 //! part t of the edge is off by less than 4ε (three differences and a reciprocal, each correctly rounded, and their product), and
 //! a + t·d in another axis by 6ε·|d| + ε·max(|a|, |b|): the margin is 32ε·|d| + 4ε·max(|a|, |b|). What the device may flush to
 //! zero is left out of the computation, which the margin covers too: 2⁻¹⁰⁰ beside a |d| of at least 2⁻⁶⁰; an edge that is shorter
-//! along an axis counts there with all of its extent. So every point of a triangle is in the box of one of its parts, and
-//! [`crate::trace::slab`]'s proof, which needs no more of a box than that the hit's point on the triangle is in it, holds for
-//! that part's leaf and all above.
+//! along an axis counts there with all of its extent. So every point of a triangle is in the box of one of its parts.
+//!
+//! [`crate::trace::slab`]'s proof takes the triangle's vertices for no farther from the ray's origin along any axis than the
+//! box's corners. Those of a triangle that was split may be farther, by its longest side e: its parts' boxes are made larger by
+//! what slack that is worth, 2⁻¹⁸e, and 2⁻²² of their coordinates for the rounding.
 
 use super::geometry::Corners;
 use crate::bvh::codes::Codes;
 use crate::bvh::host::lbvh;
-use crate::bvh::layout::{Aabb, Bvh2, Triangle};
+use crate::bvh::layout::{Aabb, Bvh2, SLACK, Triangle};
 use crate::bvh::sah::Collapse;
 use crate::bvh::split::{Options, Reference};
 
@@ -238,7 +240,8 @@ impl Grid {
 
     /// The box of the part of a triangle with this number, of as many as its splits and one, if there are so many.
     fn part(&self, corners: &[[f32; 3]; 3], mut splits: u32, mut number: u32) -> Option<Aabb> {
-        let mut b = Aabb::around(corners);
+        let whole = Aabb::around(corners);
+        let mut b = whole;
         // No box has more planes inside: each level has one along each axis.
         for _ in 0..3 * LEVELS {
             if splits == 0 {
@@ -258,8 +261,21 @@ impl Grid {
                 (b, number, splits) = (above, number - first - 1, splits - first);
             }
         }
-        (number == 0).then_some(b)
+        (number == 0).then(|| if b == whole { whole } else { padded(&b, &whole) })
     }
+}
+
+/// The box that holds those of all parts of a triangle whose own is `whole`.
+pub fn around_parts(whole: &Aabb) -> Aabb {
+    if is_empty(whole) { *whole } else { padded(whole, whole) }
+}
+
+/// The box of a part, larger by the slack that the vertices of its triangle, whose box is `whole`, need.
+fn padded(b: &Aabb, whole: &Aabb) -> Aabb {
+    let slack = SLACK * whole.extent().into_iter().fold(0.0, f32::max);
+    let lo = std::array::from_fn(|i| b.lo[i] - (slack + power_of_two(-22) * b.lo[i].abs()));
+    let hi = std::array::from_fn(|i| b.hi[i] + (slack + power_of_two(-22) * b.hi[i].abs()));
+    Aabb { lo, hi }
 }
 
 fn is_empty(b: &Aabb) -> bool {

@@ -2,7 +2,8 @@
 //!
 //! The corners of the children's boxes are bytes in a grid of the node's own: a corner is `origin + byte · 2^exponent`, rounded
 //! as floats are, with an exponent for each axis. Bytes are chosen by that same arithmetic so that the box that comes out of
-//! them holds the child's; so [`crate::trace::slab`], whose proof is for any box around the triangle, holds for it.
+//! them holds the child's; so [`crate::trace::slab`], whose proof is for any box around the triangle, holds for it. (Tracers,
+//! which see it from the ray's origin, do not round as this does: that is in the proof's margin.)
 //!
 //! A child's slot tells the octant that it lies in, as seen from the middle of the node (section 3.1): a tracer meets the
 //! children from near to far by counting slots in an order that follows from the signs of the ray's direction.
@@ -70,15 +71,22 @@ impl QuantisedNode {
         }
     }
 
-    /// The box in a slot, as tracers see it.
+    /// The least corner, and the extent of a cell of the grid.
+    pub fn grid(&self) -> ([f32; 3], [f32; 3]) {
+        let cell = |i: usize| f32::from_bits((self.exponents_and_nodes >> (8 * i) & 0xFF) << 23);
+        (self.origin.map(f32::from_bits), std::array::from_fn(cell))
+    }
+
+    /// The least and the greatest corner of a slot's box, in cells.
+    pub fn bytes(&self, slot: usize) -> [[f32; 3]; 2] {
+        [self.lo, self.hi].map(|corner| corner.map(|words| QuantisedNode::byte(words, slot) as f32))
+    }
+
+    /// The box in a slot.
     pub fn bounds(&self, slot: usize) -> Aabb {
-        let corner = |bytes: &[[u32; 2]; 3]| -> [f32; 3] {
-            std::array::from_fn(|i| {
-                let cell = f32::from_bits((self.exponents_and_nodes >> (8 * i) & 0xFF) << 23);
-                f32::from_bits(self.origin[i]) + QuantisedNode::byte(bytes[i], slot) as f32 * cell
-            })
-        };
-        Aabb { lo: corner(&self.lo), hi: corner(&self.hi) }
+        let (origin, cell) = self.grid();
+        let [lo, hi] = self.bytes(slot).map(|bytes| std::array::from_fn(|i| origin[i] + bytes[i] * cell[i]));
+        Aabb { lo, hi }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::layout::{Wide, WideNode};
 use crate::bvh::cover::Parts;
+use crate::bvh::host::split::around_parts;
 use crate::bvh::layout::{Aabb, Instance, Record};
 use crate::bvh::validate::validate_split_primitives;
 use crate::{Error, Result};
@@ -162,10 +163,12 @@ impl<N: WideNode, R: Record> Wide<N, R> {
             range.clone().for_each(|record| parts.add(record, *bounds));
         }
         let met = self.records[range].iter().filter(|record| !record.is_left_out());
-        let boxes: Option<Vec<Aabb>> = met.map(|record| record.bounds()).collect();
+        let is_split = self.header.split_from != 0;
+        let loose = |b: Aabb| if is_split { around_parts(&b) } else { b };
+        let boxes: Option<Vec<Aabb>> = met.map(|record| record.bounds().map(loose)).collect();
         let around = boxes.and_then(|boxes| boxes.into_iter().reduce(|a, b| a.union(&b)));
         match around {
-            Some(around) if self.header.split_from != 0 => Ok(Some(around.intersection(bounds))),
+            Some(around) if is_split => Ok(Some(around.intersection(bounds))),
             Some(around) if !bounds.contains(&around) => invalid(format!(
                 "node {named_by}: leaf from {first} has box {bounds:?}, around its content is {around:?}"
             )),
