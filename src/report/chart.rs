@@ -144,12 +144,22 @@ pub struct Label<'a> {
 impl Overlay {
     /// A text with a halo of paper, so that lines behind it do not disturb.
     pub fn label(&mut self, label: Label<'_>) {
-        let Label { at: (x, y), text, anchor, tone, size } = label;
-        let (fill, paper, text) = (theme::hex(tone.light), theme::hex(PAPER.light), escape(text));
+        self.text(label, &escape(label.text));
+    }
+
+    /// The same of a name that may be too long: then it is cut ([`labels::fitted`]), and shown whole when pointed at.
+    pub fn name(&mut self, label: Label<'_>) {
+        let shown = labels::fitted(label.text, label.size);
+        let whole = if shown == label.text { String::new() } else { format!("<title>{}</title>", escape(label.text)) };
+        self.text(label, &format!("{whole}{}", escape(&shown)));
+    }
+
+    fn text(&mut self, Label { at: (x, y), anchor, tone, size, .. }: Label<'_>, content: &str) {
+        let (fill, paper) = (theme::hex(tone.light), theme::hex(PAPER.light));
         let _ = writeln!(
             self.svg,
             "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{fill}\" \
-             stroke=\"{paper}\" stroke-width=\"3\" stroke-linejoin=\"round\" paint-order=\"stroke\">{text}</text>",
+             stroke=\"{paper}\" stroke-width=\"3\" stroke-linejoin=\"round\" paint-order=\"stroke\">{content}</text>",
         );
     }
 
@@ -205,7 +215,7 @@ impl Overlay {
     /// `frame` is the plotting area.
     pub fn label_points(&mut self, points: &[(f64, f64)], texts: &[(String, Tone)], lines: &[Rect], frame: Rect) {
         const HEIGHT: f64 = 16.0;
-        let widths: Vec<f64> = texts.iter().map(|(t, _)| labels::text_width(t, LABEL_SIZE)).collect();
+        let widths: Vec<f64> = texts.iter().map(|(t, _)| labels::name_room([t], LABEL_SIZE)).collect();
         let places = labels::place(points, &widths, HEIGHT, lines, &frame);
         for ((&point, place), (text, tone)) in points.iter().zip(&places).zip(texts) {
             let near = place.nearest(point);
@@ -219,20 +229,25 @@ impl Overlay {
                 _ => (place.x + 0.5 * place.w, "middle"),
             };
             let at = (x, place.y + 0.78 * HEIGHT);
-            self.label(Label { at, text, anchor, tone: *tone, size: LABEL_SIZE });
+            self.name(Label { at, text, anchor, tone: *tone, size: LABEL_SIZE });
         }
     }
 
-    /// Labels lines at their right ends, spread so that they do not cover each other.
+    /// Labels lines at their right ends, spread so that they do not cover each other; [`room_at_ends`] is the margin for it.
     pub fn label_ends(&mut self, ends: &[(f64, f64)], texts: &[(String, Tone)], frame: Rect) {
         let heights: Vec<f64> = ends.iter().map(|e| e.1).collect();
         let moved = labels::spread(&heights, 17.0, frame.y + 6.0, frame.y + frame.h - 6.0);
         for ((&(x, y), moved), (text, tone)) in ends.iter().zip(moved).zip(texts) {
             self.leader((x + 2.0, y), (x + 12.0, moved), *tone);
             let at = (x + 15.0, moved + 4.5);
-            self.label(Label { at, text, anchor: "start", tone: *tone, size: LABEL_SIZE });
+            self.name(Label { at, text, anchor: "start", tone: *tone, size: LABEL_SIZE });
         }
     }
+}
+
+/// The margin to the right of a chart whose lines have labels at their ends.
+pub fn room_at_ends<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> u32 {
+    labels::name_room(names, LABEL_SIZE) as u32 + 24
 }
 
 /// plotters' text size for a text of so many pixels: its SVG back end divides by 1.24.

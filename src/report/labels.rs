@@ -1,5 +1,7 @@
 //! Where labels go so that they cover neither each other nor a mark.
 
+use std::borrow::Cow;
+
 /// A rectangle in pixels: left, top, width, height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rect {
@@ -45,6 +47,28 @@ impl Rect {
 /// Estimated width of `text` in Noto Sans of `size` pixels; on the safe side.
 pub fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(|c| if "iljtfr.,:;|' ".contains(c) { 0.34 } else { 0.6 }).sum::<f64>() * size
+}
+
+/// The most pixels that a name has room for: a chart's other half is for what it shows.
+pub const NAME_ROOM: f64 = 300.0;
+
+/// The room that the longest of some names takes, in pixels, each cut by [`fitted`].
+pub fn name_room<S: AsRef<str>>(names: impl IntoIterator<Item = S>, size: f64) -> f64 {
+    names.into_iter().map(|name| text_width(name.as_ref(), size)).fold(0.0, f64::max).min(NAME_ROOM)
+}
+
+/// A name that is no wider than [`NAME_ROOM`]: of a longer one its begin and its end, which tell it from others.
+pub fn fitted(name: &str, size: f64) -> Cow<'_, str> {
+    if text_width(name, size) <= NAME_ROOM {
+        return name.into();
+    }
+    let chars: Vec<char> = name.chars().collect();
+    let cut = |kept: usize| -> String {
+        let (begin, end) = (&chars[..kept.div_ceil(2)], &chars[chars.len() - kept / 2..]);
+        begin.iter().chain(&['…']).chain(end).collect()
+    };
+    let longest = (0..chars.len()).rev().map(cut).find(|short| text_width(short, size) <= NAME_ROOM);
+    longest.unwrap_or_default().into()
 }
 
 /// A place for a label of each width beside each anchor, inside `frame`, in the order given; off `lines` where there is room.
@@ -151,6 +175,18 @@ mod tests {
             let placed = place(&[corner], &[120.0], 16.0, &[], &FRAME);
             assert!(placed[0].outside(&FRAME) < 1e-9, "{corner:?}: {placed:?}");
         }
+    }
+
+    #[test]
+    fn long_names_keep_their_begin_and_end_and_fit() {
+        assert_eq!(fitted("lbvh emc64var", 13.0), "lbvh emc64var");
+        let name = "lbvh emc64var+robust+concise, width 8q, optimise high, split 0.3/7, collapsed";
+        let short = fitted(name, 13.0);
+        let (begin, end) = short.split_once('…').expect("a cut name");
+        assert!(name.starts_with(begin) && name.ends_with(end), "{short}");
+        let width = text_width(&short, 13.0);
+        assert!(width <= NAME_ROOM && width > NAME_ROOM - 20.0, "{short}: {width} pixels");
+        assert_eq!(name_room([name, "lbvh"], 13.0), NAME_ROOM);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::measure::statistics::Spread;
 use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, frame, mesh, pixel};
-use crate::report::labels::{Rect, text_width};
+use crate::report::labels::{Rect, name_room, text_width};
 use crate::report::theme::{INK, MUTED, Tone};
 use plotters::prelude::*;
 
@@ -46,13 +46,13 @@ pub fn bars(caption: Caption, what: &Bars<'_>) -> Result<Option<Chart>> {
     if bars.is_empty() || longest <= 0.0 {
         return Ok(None);
     }
-    let width = |text: fn(&Bar) -> &String| bars.iter().map(|b| text_width(text(b), LABEL_SIZE)).fold(0.0, f64::max);
+    let figures = bars.iter().map(|b| text_width(&b.figure, LABEL_SIZE)).fold(0.0, f64::max);
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
         let mut chart = ChartBuilder::on(area)
             .x_label_area_size(46)
             .margin_top(if marks.is_empty() { 0 } else { 22 })
-            .margin_left((width(|b| &b.label) + 10.0).min(240.0) as u32)
-            .margin_right((width(|b| &b.figure) + 12.0) as u32)
+            .margin_left(name_room(bars.iter().map(|b| &b.label), LABEL_SIZE) as u32 + 10)
+            .margin_right(figures as u32 + 12)
             .build_cartesian_2d(0.0..1.02 * longest, 0.0..bars.len() as f64)?;
         mesh(&mut chart, &Axes { x: axis, y: "", x_number: number, y_number: &|_| String::new() })?;
         let inner = frame(&chart);
@@ -75,7 +75,7 @@ pub fn bars(caption: Caption, what: &Bars<'_>) -> Result<Option<Chart>> {
             let at = (end + 8.0, y + 4.5);
             overlay.label(Label { at, text: &bar.figure, anchor: "start", tone: MUTED, size: LABEL_SIZE });
             let at = (inner.x - 8.0, y + 4.5);
-            overlay.label(Label { at, text: &bar.label, anchor: "end", tone: bar.tone, size: LABEL_SIZE });
+            overlay.name(Label { at, text: &bar.label, anchor: "end", tone: bar.tone, size: LABEL_SIZE });
             let tip = format!(
                 "{}: {}, from {} to {} in {} runs",
                 bar.label,

@@ -4,8 +4,8 @@
 use crate::Result;
 use crate::measure::growth::PowerLaw;
 use crate::measure::statistics::Spread;
-use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, frame, log_axis, mesh, pixel};
-use crate::report::labels::{Rect, text_width};
+use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, frame, log_axis, mesh, pixel, room_at_ends};
+use crate::report::labels::Rect;
 use crate::report::theme::{INK, Tone};
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::prelude::*;
@@ -93,10 +93,10 @@ pub fn curves_and_marks(
         false => y_range.start..y_range.end / (1.0 - room).max(0.2),
     };
     let marks: Vec<&Mark> = marks.iter().filter(|mark| (left..=right).contains(&mark.x)).collect();
-    let names = curves.iter().map(|curve| text_width(&curve.name, 13.0)).fold(0.0, f64::max);
+    let names = room_at_ends(curves.iter().map(|curve| &curve.name));
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
         let mut chart = ChartBuilder::on(area);
-        chart.x_label_area_size(46).y_label_area_size(76).margin_right(names as u32 + 24);
+        chart.x_label_area_size(46).y_label_area_size(76).margin_right(names);
         let axes = Axes { x: x.name, y: y.name, x_number: x.number, y_number: y.number };
         let linear = |range: &Range<f64>| range.clone();
         match (x.is_log, y.is_log) {

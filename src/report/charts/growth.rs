@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::measure::growth::PowerLaw;
 use crate::measure::record::Record;
-use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, frame, log_axis, mesh, pixel};
+use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, frame, log_axis, mesh, pixel, room_at_ends};
 use crate::report::labels::Rect;
 use crate::report::names::short;
 use crate::report::numbers::{duration, duration_tick, short_count};
@@ -50,12 +50,13 @@ pub fn growth(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
                   squares. An exponent of 1 is proportional; above 1, twice the triangles cost more than twice the time."
             .into(),
     };
+    let texts: Vec<_> = series.iter().map(|s| (s.label(), legend.builder(s.builder))).collect();
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
         let (x, y) = (0.8 * triangles.0..1.2 * triangles.1, 0.7 * times.0..1.4 * times.1);
         let mut chart = ChartBuilder::on(area)
             .x_label_area_size(46)
             .y_label_area_size(76)
-            .margin_right(230)
+            .margin_right(room_at_ends(texts.iter().map(|t| &t.0)))
             .build_cartesian_2d(log_axis(x), log_axis(y))?;
         let axes =
             Axes { x: "triangles", y: "build time", x_number: &|v| short_count(*v), y_number: &|v| duration_tick(*v) };
@@ -79,7 +80,6 @@ pub fn growth(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
             let right = pixel(&chart, (1.2 * triangles.1, height));
             ends.push((right.0, right.1));
         }
-        let texts: Vec<_> = series.iter().map(|s| (s.label(), legend.builder(s.builder))).collect();
         overlay.label_ends(&ends, &texts, frame(&chart));
         Ok(())
     };

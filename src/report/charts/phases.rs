@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::measure::record::Record;
 use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, frame, mesh, pixel};
-use crate::report::labels::{Rect, text_width};
+use crate::report::labels::{Rect, name_room, text_width};
 use crate::report::names::{short, slug};
 use crate::report::numbers::{duration, tick};
 use crate::report::theme::{INK, Legend, MUTED, PAPER};
@@ -32,10 +32,10 @@ pub fn phases(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
                 .into(),
     };
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
-        let names = bars.iter().map(|r| text_width(&short(&r.builder), LABEL_SIZE)).fold(0.0, f64::max);
+        let names = name_room(bars.iter().map(|r| short(&r.builder)), LABEL_SIZE);
         let mut chart = ChartBuilder::on(area)
             .x_label_area_size(46)
-            .margin_left((names + 10.0).min(240.0) as u32)
+            .margin_left(names as u32 + 10)
             .margin_bottom(26)
             .build_cartesian_2d(0.0..1.14 * longest, 0.0..bars.len() as f64)?;
         let number = |v: &f64| tick(*v);
@@ -69,7 +69,7 @@ pub fn phases(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
             let at = (inner.x - 8.0, y + 4.5);
             let name = short(&record.builder);
             let tone = legend.builder(&record.builder);
-            overlay.label(Label { at, text: &name, anchor: "end", tone, size: LABEL_SIZE });
+            overlay.name(Label { at, text: &name, anchor: "end", tone, size: LABEL_SIZE });
         }
         let shown = |name: &&String| bars.iter().any(|r| r.build.phases.iter().any(|p| p.name == **name));
         key(area, overlay, &legend.phases().iter().filter(shown).collect::<Vec<_>>(), legend)

@@ -5,6 +5,7 @@ use crate::measure::record::Record;
 use crate::measure::total_time::{Line, Stretch, lower_envelope};
 use crate::report::chart::{
     Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, best_line, frame, log_axis, mesh, pixel,
+    room_at_ends,
 };
 use crate::report::labels::Rect;
 use crate::report::names::{short, slug};
@@ -40,12 +41,13 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
     let samples: Vec<f64> = (0..=STEPS).map(|i| rays.0 * (rays.1 / rays.0).powf(i as f64 / STEPS as f64)).collect();
     let least = lines.iter().map(|l| l.at(rays.0)).fold(f64::INFINITY, f64::min);
     let greatest = lines.iter().map(|l| l.at(rays.1)).fold(0.0, f64::max);
+    let texts: Vec<_> = traced.iter().map(|(r, _)| (short(&r.builder), legend.builder(&r.builder))).collect();
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
         let mut chart = ChartBuilder::on(area)
             .x_label_area_size(46)
             .y_label_area_size(76)
             .margin_top(34)
-            .margin_right(190)
+            .margin_right(room_at_ends(texts.iter().map(|t| &t.0)))
             .build_cartesian_2d(log_axis(rays.0..rays.1), log_axis(0.8 * least..1.2 * greatest))?;
         let axes = Axes {
             x: "rays traced a build",
@@ -62,7 +64,6 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
             chart.draw_series([PathElement::new(curve, tone.light.stroke_width(2))])?;
         }
         let ends: Vec<_> = lines.iter().map(|l| pixel(&chart, (rays.1, l.at(rays.1)))).collect();
-        let texts: Vec<_> = traced.iter().map(|(r, _)| (short(&r.builder), legend.builder(&r.builder))).collect();
         overlay.label_ends(&ends, &texts, frame(&chart));
         let strip = frame(&chart);
         winners(
