@@ -3,7 +3,7 @@
 use super::Bar;
 use crate::gpu::{Device, DeviceOptions};
 use crate::measure::builders::{self, Spec};
-use crate::scene::{self, Camera, Scene};
+use crate::scene::{self, Camera, DynamicScene, Scene};
 use crate::trace::kinds::{RayKind, RayOptions};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -81,12 +81,27 @@ impl Common {
     /// # Errors
     /// The scene cannot be found, read or used.
     pub fn load(&self, spec: &str) -> crate::Result<Scene> {
-        let bar = Bar::bytes(self, &format!("loading {spec}"));
-        let progress = |p: scene::Progress| bar.set(p.done, p.total);
-        let folders = self.scene_folders();
-        let mut scene = scene::load(spec, &scene::LoadOptions { folders, progress: Some(&progress) })?;
+        let mut scene = self.loaded(spec, scene::load)?;
         self.aim(&mut scene.camera);
         Ok(scene)
+    }
+
+    /// Loads a dynamic scene under a progress bar; its camera is to be aimed at each time.
+    ///
+    /// # Errors
+    /// The scene cannot be found, read or used, or nothing in it moves.
+    pub fn load_dynamic(&self, spec: &str) -> crate::Result<DynamicScene> {
+        self.loaded(spec, scene::load_dynamic)
+    }
+
+    fn loaded<T>(
+        &self,
+        spec: &str,
+        load: impl Fn(&str, &scene::LoadOptions<'_>) -> crate::Result<T>,
+    ) -> crate::Result<T> {
+        let bar = Bar::bytes(self, &format!("loading {spec}"));
+        let progress = |p: scene::Progress| bar.set(p.done, p.total);
+        load(spec, &scene::LoadOptions { folders: self.scene_folders(), progress: Some(&progress) })
     }
 
     /// Moves a camera to where `--eye`, `--look` and `--fov` ask for it.
@@ -267,6 +282,19 @@ impl FromStr for Positive {
     fn from_str(text: &str) -> Result<Positive, String> {
         let number = text.parse().ok().filter(|n: &f32| *n > 0.0 && n.is_finite());
         number.map(Positive).ok_or_else(|| format!("{text:?} is not a number above zero"))
+    }
+}
+
+/// A time in seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Time(pub f32);
+
+impl FromStr for Time {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Time, String> {
+        let seconds = text.parse().ok().filter(|t: &f32| t.is_finite());
+        seconds.map(Time).ok_or_else(|| format!("{text:?} is not a time; write seconds, as in 1.5"))
     }
 }
 

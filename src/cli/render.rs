@@ -3,6 +3,7 @@
 use super::{Bar, Common, Size, work};
 use crate::measure::builders::Spec;
 use crate::report::picture::{PictureOptions, View, picture};
+use crate::scene::Scene;
 use anyhow::Context;
 use std::path::PathBuf;
 
@@ -26,6 +27,12 @@ pub struct Arguments {
     /// Where the colours of a heat map end [default: what 99 of 100 pixels stay below]
     #[arg(long, value_name = "VALUE")]
     top: Option<super::options::Positive>,
+    /// When a dynamic scene is seen, in seconds [default: 0]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, conflicts_with = "frame")]
+    time: Option<super::options::Time>,
+    /// Which of its frames is seen, from 0
+    #[arg(long, value_name = "K")]
+    frame: Option<u32>,
 }
 
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
@@ -35,7 +42,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
             crate::Error::Argument(format!("{name}: pictures are PNG files; name one that ends in .png")).into()
         );
     }
-    let scene = common.load(&arguments.scene)?;
+    let scene = scene(common, arguments)?;
     let builders = std::slice::from_ref(&arguments.builder);
     let device = work::device_for(common, builders)?;
     let bar = Bar::new(common, "building", 0);
@@ -54,4 +61,21 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     image.save(path).with_context(|| format!("{} cannot be written; check the folder", path.display()))?;
     drop(subject);
     work::finish(device.as_ref(), true)
+}
+
+/// The scene, at the time or in the frame that is asked for.
+fn scene(common: &Common, arguments: &Arguments) -> crate::Result<Scene> {
+    if arguments.time.is_none() && arguments.frame.is_none() {
+        return common.load(&arguments.scene);
+    }
+    let dynamic = common.load_dynamic(&arguments.scene)?;
+    let frame = arguments.frame.unwrap_or_default();
+    if frame >= dynamic.frames {
+        let (name, frames) = (&dynamic.name, dynamic.frames);
+        let what = format!("--frame {frame}: {name} has {frames}, counted from 0; take an earlier one");
+        return Err(crate::Error::Argument(what));
+    }
+    let mut scene = dynamic.at(arguments.time.map_or_else(|| dynamic.time_of(frame), |time| time.0))?;
+    common.aim(&mut scene.camera);
+    Ok(scene)
 }

@@ -38,7 +38,8 @@ impl Animation {
     }
 }
 
-fn bounds(triangles: &[[u32; 3]], frames: &[Vec<[f32; 3]>]) -> Aabb {
+/// The box around all triangles in all frames.
+pub(super) fn bounds(triangles: &[[u32; 3]], frames: &[Vec<[f32; 3]>]) -> Aabb {
     let corners = frames.iter().flat_map(|frame| triangles.iter().flatten().map(|&v| frame[v as usize]));
     corners.fold(Aabb::EMPTY, |bounds, corner| bounds.union(&Aabb::around(&[corner])))
 }

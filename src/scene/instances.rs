@@ -1,6 +1,6 @@
 //! Scenes in two levels: a few parts, each placed many times. What a top-level structure over bottom-level ones is built of.
 
-use super::{Camera, Light, LoadOptions, Mesh, Scene, cameras, check, generators, inst, load, lookup, no_triangles};
+use super::{Camera, Light, LoadOptions, Mesh, Scene, cameras, check, dynamic, generators, inst, load, lookup, no_triangles};
 use crate::bvh::layout::Aabb;
 use crate::{Error, Result};
 
@@ -136,7 +136,7 @@ fn contains(outer: &Aabb, inner: &Aabb) -> bool {
 }
 
 /// Loads the scene that `spec` names as [`load`] does, but without flattening it: an `.inst` file and the generators of
-/// instances keep their parts, every other scene is one part that stands where it is.
+/// instances keep their parts, a `.dyn` file its objects at time 0; every other scene is one part that stands where it is.
 ///
 /// # Errors
 /// As [`load`].
@@ -158,8 +158,11 @@ pub fn load_placed(spec: &str, options: &LoadOptions<'_>) -> Result<Option<Insta
         generated.instances()
     } else {
         let path = lookup::find(spec, &options.folders)?;
-        let is_inst = lookup::format_of(&path).as_deref() == Some("inst");
-        is_inst.then(|| inst::read(&path, options)).transpose()?
+        match lookup::format_of(&path).as_deref() {
+            Some("inst") => Some(inst::read(&path, options)?),
+            Some("dyn") => Some(dynamic::read(&path, options)?.instances(0.0)),
+            _ => None,
+        }
     };
     if instances.as_ref().is_some_and(|instances| instances.triangle_count() == 0) {
         return Err(no_triangles(spec));

@@ -4,14 +4,15 @@ use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// The formats, by extension, in the order in which a bare name without one is looked up.
-pub(super) const FORMATS: [&str; 7] = ["obj", "ply", "glb", "gltf", "tri", "anim", "inst"];
+pub(super) const FORMATS: [&str; 8] = ["obj", "ply", "glb", "gltf", "tri", "anim", "inst", "dyn"];
 
 /// The folders that need no option: `scenes/` of the working directory and of the package.
 pub fn own_folders() -> Vec<PathBuf> {
     vec!["scenes".into(), concat!(env!("CARGO_MANIFEST_DIR"), "/scenes").into()]
 }
 
-/// The scene files of a folder, by name, without the parts that an `.inst` file beside them places.
+/// The scene files of a folder, by name, without the parts that an `.inst` file beside them places, and without dynamic scenes:
+/// standing still, they are other scenes put together.
 ///
 /// # Errors
 /// The folder cannot be read.
@@ -19,7 +20,7 @@ pub fn list(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(Error::file(folder))? {
         let path = entry.map_err(Error::file(folder))?.path();
-        if path.is_file() && format_of(&path).is_some_and(|f| FORMATS.contains(&f.as_str())) {
+        if path.is_file() && format_of(&path).is_some_and(|f| f != "dyn" && FORMATS.contains(&f.as_str())) {
             files.push(path);
         }
     }

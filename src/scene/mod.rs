@@ -4,13 +4,14 @@
 //! [`load`] takes what a user types: the path of a file, the bare name of one in a folder of scenes, or a generator.
 //! Every file may also lie there packed, with `.zst` behind its name. Triangles keep the order of the file, polygons are
 //! fan-triangulated from their first vertex; the position of a triangle in that order is its primitive index everywhere.
-//! Instances come flattened and animations stand still in their first frame, unless [`load_instances`] or
-//! [`load_animation`] ask for all of it.
+//! Instances come flattened, and what moves stands still in its first frame, unless [`load_instances`], [`load_animation`] or
+//! [`load_dynamic`] ask for all of it.
 
 mod animation;
 mod cameras;
 mod check;
 mod degenerate;
+mod dynamic;
 mod generators;
 mod gltf;
 mod inst;
@@ -28,6 +29,7 @@ use std::path::{Path, PathBuf};
 
 pub use animation::{Animation, load_animation, load_moving};
 pub use degenerate::{Degenerate, degenerate};
+pub use dynamic::{DynamicObject, DynamicScene, load_dynamic};
 pub use generators::generators;
 pub use instances::{Instance, Instances, load_instances, load_placed};
 pub use lookup::{list, own_folders};
@@ -151,7 +153,7 @@ fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Content> {
     let mesh = match lookup::format_of(path).as_deref() {
         Some("obj") => obj::read(path, options)?,
         Some("ply") => ply::read(path, options)?,
-        Some("gltf" | "glb") => return gltf::read(path, options),
+        Some("gltf" | "glb") => return gltf::read_at_rest(path, options),
         Some("tri") => tri::read_tri(path, options)?,
         Some("anim") => tri::read_anim(path, options)?,
         _ => {

@@ -16,6 +16,7 @@ mod vector;
 use super::{Animation, Instance, Instances, Mesh, cameras};
 use crate::{Error, Result};
 pub(super) use meshes::needles;
+pub(super) use series::turn;
 
 /// The most triangles that the engine's primitives are made for.
 pub(super) const MOST_TRIANGLES: u64 = 1 << 27;

@@ -1,0 +1,43 @@
+//! Where to look from at any time.
+
+use super::looped;
+use super::motion::Motion;
+use super::track::Track;
+use crate::scene::Camera;
+use glam::Vec3;
+
+/// A camera that may move.
+#[derive(Debug, Clone)]
+pub(in crate::scene) enum CameraPath {
+    /// It stands.
+    Still(Camera),
+    /// Each part of it by its own keys, from the beginning again every so many seconds.
+    Keys { eye: Track<[f32; 3]>, look: Track<[f32; 3]>, up: Track<[f32; 3]>, fov: Track<f32>, seconds: f32 },
+    /// As a node of a scene carries it, which it looks along backwards.
+    Carried { motion: Motion, fov: f32 },
+}
+
+impl CameraPath {
+    pub fn at(&self, time: f32) -> Camera {
+        match self {
+            CameraPath::Still(camera) => *camera,
+            CameraPath::Keys { eye, look, up, fov, seconds } => {
+                let time = looped(time, *seconds);
+                Camera { eye: eye.at(time), look: look.at(time), up: up.at(time), fov: fov.at(time) }
+            }
+            CameraPath::Carried { motion, fov } => carried(&motion.at(time), *fov),
+        }
+    }
+
+    /// Whether it is ever elsewhere.
+    pub fn moves(&self) -> bool {
+        !matches!(self, CameraPath::Still(_))
+    }
+}
+
+/// The camera of a node: it looks down the node's −z, and up is its y.
+pub(in crate::scene) fn carried(to_world: &[[f32; 4]; 3], fov: f32) -> Camera {
+    let column = |j: usize| Vec3::from(to_world.map(|row| row[j]));
+    let (eye, backwards) = (column(3), column(2).normalize_or_zero());
+    Camera { eye: eye.into(), look: (eye - backwards).into(), up: column(1).normalize_or(Vec3::Y).into(), fov }
+}

@@ -1,0 +1,79 @@
+//! The triangles of a mesh, and where its morph targets move them.
+
+use super::{CUT_OFF, File, has_type};
+use crate::scene::{Mesh, check};
+use crate::{Error, Result};
+use gltf::accessor::{DataType, Dimensions, Iter};
+use gltf::mesh::Mode;
+use gltf::{Primitive, Semantic};
+
+/// The triangles of a primitive.
+pub(super) struct Part {
+    /// The file, the mesh and the primitive.
+    pub place: String,
+    pub mesh: Mesh,
+    /// How far each morph target moves the vertices.
+    pub targets: Vec<Vec<[f32; 3]>>,
+}
+
+/// The primitives of a mesh that have triangles.
+pub(super) fn parts(file: File<'_>, mesh: &gltf::Mesh<'_>) -> Result<Vec<Part>> {
+    mesh.primitives().filter_map(|primitive| part(file, mesh, &primitive).transpose()).collect()
+}
+
+fn part(file: File<'_>, mesh: &gltf::Mesh<'_>, primitive: &Primitive<'_>) -> Result<Option<Part>> {
+    let place = format!("{}: mesh {}, primitive {}", file.path.display(), mesh.index(), primitive.index());
+    let wrong = |what: &str| Err(Error::Malformed(format!("{place}: {what}")));
+    let fans: fn(usize, &[u32]) -> [u32; 3] = match primitive.mode() {
+        Mode::Triangles => |t, v| [v[3 * t], v[3 * t + 1], v[3 * t + 2]],
+        // Every second triangle of a strip is turned round.
+        Mode::TriangleStrip => |t, v| [v[t], v[t + 1 + t % 2], v[t + 2 - t % 2]],
+        Mode::TriangleFan => |t, v| [v[0], v[t + 1], v[t + 2]],
+        _ => return Ok(None),
+    };
+    let Some(accessor) = primitive.get(&Semantic::Positions).filter(|a| a.count() > 0) else { return Ok(None) };
+    if !has_type(&accessor, Dimensions::Vec3, &[DataType::F32]) {
+        return wrong("positions are not three 32-bit floats; export it without quantisation");
+    }
+    let reader = primitive.reader(|buffer| file.bytes(buffer));
+    let Some(positions) = reader.read_positions() else { return wrong(CUT_OFF) };
+    let positions: Vec<[f32; 3]> = positions.collect();
+    check::vertices_are_finite(&place, &positions)?;
+    let indices: Vec<u32> = match primitive.indices() {
+        None => (0..positions.len() as u32).collect(),
+        Some(accessor) if accessor.count() == 0 => Vec::new(),
+        Some(accessor) => {
+            if !has_type(&accessor, Dimensions::Scalar, &[DataType::U8, DataType::U16, DataType::U32]) {
+                return wrong("indices are not unsigned integers; export it again");
+            }
+            let Some(indices) = reader.read_indices() else { return wrong(CUT_OFF) };
+            indices.into_u32().collect()
+        }
+    };
+    let count = match primitive.mode() {
+        Mode::Triangles if !indices.len().is_multiple_of(3) => {
+            return wrong(&format!("{} indices make no whole triangles; is it cut off?", indices.len()));
+        }
+        Mode::Triangles => indices.len() / 3,
+        _ => indices.len().saturating_sub(2),
+    };
+    let triangles: Vec<[u32; 3]> = (0..count).map(|t| fans(t, &indices)).collect();
+    check::indices_are_in_range(&place, &triangles, positions.len())?;
+    let mut targets = Vec::new();
+    for (target, accessor) in primitive.morph_targets().map(|target| target.positions()).enumerate() {
+        let place = format!("{place}, target {target}");
+        let Some(accessor) = accessor else {
+            targets.push(vec![[0.0; 3]; positions.len()]);
+            continue;
+        };
+        let wrong = |what: &str| Err(Error::Malformed(format!("{place}: {what}")));
+        if !has_type(&accessor, Dimensions::Vec3, &[DataType::F32]) || accessor.count() != positions.len() {
+            return wrong("not three 32-bit floats for each vertex; export it again");
+        }
+        let Some(moves) = Iter::new(accessor, |buffer| file.bytes(buffer)) else { return wrong(CUT_OFF) };
+        let moves: Vec<[f32; 3]> = moves.collect();
+        check::vertices_are_finite(&place, &moves)?;
+        targets.push(moves);
+    }
+    Ok(Some(Part { place, mesh: Mesh { positions, triangles }, targets }))
+}

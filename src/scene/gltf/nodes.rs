@@ -1,0 +1,197 @@
+//! The tree of nodes: what each places, and whether it stands or moves.
+
+use super::channels::Channels;
+use super::meshes::{self, Part};
+use super::{File, malformed};
+use crate::scene::dynamic::{self, CameraPath, DynamicContent, DynamicObject, Motion, Shape, Step, carried, morphed};
+use crate::scene::{Light, check};
+use crate::Result;
+use glam::{Mat4, Vec3};
+use gltf::Node;
+use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
+use gltf::json::validation::Checked;
+use std::collections::HashSet;
+
+/// Adds what the nodes place to `content`: those of the default scene, else the first; a file without scenes is a library of
+/// which we take every root.
+pub(super) fn walk(file: File<'_>, channels: &Channels, content: DynamicContent) -> Result<DynamicContent> {
+    let document = file.document;
+    let roots: Vec<Node<'_>> = match document.default_scene().or_else(|| document.scenes().next()) {
+        Some(scene) => scene.nodes().collect(),
+        None => {
+            let children: HashSet<usize> = document.nodes().flat_map(|n| n.children().map(|c| c.index())).collect();
+            document.nodes().filter(|n| !children.contains(&n.index())).collect()
+        }
+    };
+    let mut scene = Walk { file, channels, content, directional: Vec::new() };
+    let mut seen = vec![false; document.nodes().len()];
+    let root = Placement::Still(Mat4::IDENTITY);
+    // A stack of our own: the depth of the tree is the file's choice.
+    let mut stack: Vec<_> = roots.into_iter().rev().map(|node| (node, root.clone())).collect();
+    while let Some((node, parent)) = stack.pop() {
+        if std::mem::replace(&mut seen[node.index()], true) {
+            let what = format!("node {} has two parents, or is its own; export it again", node.index());
+            return Err(malformed(file.path, what));
+        }
+        let placement = parent.inner(&node, channels);
+        scene.node(&node, &placement)?;
+        let children: Vec<_> = node.children().collect();
+        stack.extend(children.into_iter().rev().map(|child| (child, placement.clone())));
+    }
+    Ok(scene.lit())
+}
+
+/// Where a node is.
+#[derive(Clone)]
+enum Placement {
+    /// Always there.
+    Still(Mat4),
+    /// Moved by itself or by a node above it: the steps from the root down.
+    Moving(Vec<Step>),
+}
+
+impl Placement {
+    /// That of a node below this one.
+    fn inner(&self, node: &Node<'_>, channels: &Channels) -> Placement {
+        let local = Mat4::from_cols_array_2d(&node.transform().matrix());
+        let (mut steps, step) = match (self, channels.pose(node)) {
+            (Placement::Still(outer), None) => return Placement::Still(outer * local),
+            (Placement::Still(outer), Some(pose)) => (vec![fixed(outer)], Step::Moving(pose)),
+            (Placement::Moving(steps), None) => (steps.clone(), fixed(&local)),
+            (Placement::Moving(steps), Some(pose)) => (steps.clone(), Step::Moving(pose)),
+        };
+        steps.push(step);
+        Placement::Moving(steps)
+    }
+
+    fn motion(&self, seconds: f32) -> Motion {
+        match self {
+            Placement::Still(to_world) => Motion::new(vec![fixed(to_world)], seconds),
+            Placement::Moving(steps) => Motion::new(steps.clone(), seconds),
+        }
+    }
+}
+
+fn fixed(to_parent: &Mat4) -> Step {
+    Step::Fixed(rows(to_parent).map(|row| row.map(f64::from)))
+}
+
+fn rows(matrix: &Mat4) -> [[f32; 4]; 3] {
+    let columns = matrix.to_cols_array_2d();
+    std::array::from_fn(|i| columns.map(|column| column[i]))
+}
+
+/// The scene while its nodes are walked.
+struct Walk<'a> {
+    file: File<'a>,
+    channels: &'a Channels,
+    content: DynamicContent,
+    /// Where directional lights shine to; they get a place when the box of the scene is known.
+    directional: Vec<Vec3>,
+}
+
+impl Walk<'_> {
+    fn node(&mut self, node: &Node<'_>, placement: &Placement) -> Result<()> {
+        let motion = placement.motion(self.content.seconds);
+        if let Some(mesh) = node.mesh() {
+            self.content.skinned = self.content.skinned.or(node.skin().map(|_| node.index()));
+            let parts = meshes::parts(self.file, &mesh)?;
+            let weights = node.weights().or(mesh.weights()).unwrap_or_default();
+            match (placement, self.channels.weights(node)) {
+                (Placement::Still(to_world), None) => {
+                    parts.iter().try_for_each(|part| self.append(part, weights, to_world))?;
+                }
+                _ => self.object(node, &parts, weights, motion.clone())?,
+            }
+        }
+        let to_world = match placement {
+            Placement::Still(to_world) => rows(to_world),
+            Placement::Moving(_) => motion.at(0.0),
+        };
+        let column = |j: usize| Vec3::from(to_world.map(|row| row[j]));
+        let (eye, backwards) = (column(3), column(2).normalize_or_zero());
+        if self.content.camera.is_none()
+            && let Some(camera) = node.camera()
+            && let gltf::camera::Projection::Perspective(lens) = camera.projection()
+            && backwards != Vec3::ZERO
+            && eye.is_finite()
+        {
+            let fov = lens.yfov().to_degrees();
+            self.content.camera = Some(match placement {
+                Placement::Still(_) => CameraPath::Still(carried(&to_world, fov)),
+                Placement::Moving(_) => CameraPath::Carried { motion, fov },
+            });
+        }
+        match node.light().map(|light| self.light_type(light.index())) {
+            Some(LightType::Directional) => self.directional.push(-backwards),
+            Some(LightType::Point | LightType::Spot) => self.content.lights.push(point_light(eye)),
+            None => {}
+        }
+        Ok(())
+    }
+
+    /// The crate's own `kind()` panics on a spot light without its angles.
+    fn light_type(&self, light: usize) -> LightType {
+        let lights = self.file.document.as_json().extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+        match lights.and_then(|l| l.lights.get(light)).map(|l| &l.type_) {
+            Some(Checked::Valid(kind)) => *kind,
+            _ => LightType::Point,
+        }
+    }
+
+    /// Adds a part that stands.
+    fn append(&mut self, part: &Part, weights: &[f32], to_world: &Mat4) -> Result<()> {
+        let mesh = &mut self.content.static_mesh;
+        let first = mesh.positions.len();
+        check::vertices_can_be_counted(&part.place, first + part.mesh.positions.len())?;
+        let positions = morphed(&part.mesh.positions, &part.targets, weights);
+        mesh.positions.extend(positions.into_iter().map(|p| to_world.transform_point3(p.into()).to_array()));
+        check::vertices_are_finite(format!("{}, placed by its node", part.place), &mesh.positions[first..])?;
+        mesh.triangles.extend(part.mesh.triangles.iter().map(|t| t.map(|v| v + first as u32)));
+        Ok(())
+    }
+
+    /// Adds an object of all the parts of a node that moves or morphs.
+    fn object(&mut self, node: &Node<'_>, parts: &[Part], weights: &[f32], motion: Motion) -> Result<()> {
+        let (mut base, mut triangles) = (Vec::new(), Vec::new());
+        let count = parts.iter().map(|part| part.targets.len()).max().unwrap_or_default();
+        let mut targets = vec![Vec::new(); count];
+        for Part { place, mesh, targets: its } in parts {
+            let first = base.len();
+            check::vertices_can_be_counted(place, first + mesh.positions.len())?;
+            base.extend_from_slice(&mesh.positions);
+            triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first as u32)));
+            for (target, its) in targets.iter_mut().zip(its) {
+                target.resize(first, [0.0; 3]);
+                target.extend_from_slice(its);
+            }
+        }
+        if triangles.is_empty() {
+            return Ok(());
+        }
+        let seconds = self.content.seconds;
+        let shape = match self.channels.weights(node) {
+            Some(weights) => Shape::Targets { base, targets, weights, seconds },
+            None => Shape::Rigid(morphed(&base, &targets, weights)),
+        };
+        let name = node.name().map_or_else(|| format!("node {}", node.index()), str::to_owned);
+        self.content.objects.push(DynamicObject { name, triangles, shape, motion });
+        Ok(())
+    }
+
+    /// The scene with its directional lights, far away.
+    fn lit(self) -> DynamicContent {
+        let Walk { mut content, directional, .. } = self;
+        let bounds = content.static_mesh.bounds().union(&dynamic::bounds(&content.objects, [0.0]));
+        content.lights.extend(directional.into_iter().map(|towards| {
+            let far = Vec3::from(bounds.centroid()) - towards * (10.0 * bounds.diagonal());
+            point_light(far)
+        }));
+        content.lights.retain(|light| light.corner.iter().all(|c| c.is_finite()));
+        content
+    }
+}
+
+fn point_light(corner: Vec3) -> Light {
+    Light { corner: corner.into(), edges: [[0.0; 3]; 2] }
+}
