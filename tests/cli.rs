@@ -216,6 +216,32 @@ fn render_writes_a_png_of_every_view() {
 }
 
 #[test]
+fn render_shows_a_dynamic_scene_at_a_time_or_in_a_frame() {
+    let folder = Folder::new();
+    let moving = "frames 4\nseconds 2\nobject ball gen:icosphere:2\nat 0 move 0 0 0\nat 2 move 4 0 0\n\
+                  camera\nat 0 eye 2 0 9 look 2 0 0\n";
+    let scene = folder.file("ball.dyn", moving);
+    let picture = |options: &[&str]| {
+        let path = folder.path().join("ball.png").display().to_string();
+        done(&[&["render", &scene, "-b", "lbvh-host", "-o", &path, "--size", "40x30"], options].concat());
+        std::fs::read(path).expect("written")
+    };
+    let first = picture(&[]);
+    assert_eq!(first, picture(&["--time", "0"]));
+    assert_eq!(first, picture(&["--time", "-4"]));
+    assert_eq!(picture(&["--frame", "2"]), picture(&["--time", "1"]));
+    assert_ne!(first, picture(&["--frame", "2"]));
+    let refused = |status, options: &[&str]| {
+        fails(status, &[&["render", &scene, "-b", "lbvh-host", "-o", "a.png"], options].concat())
+    };
+    assert!(refused(WRONG_ARGUMENTS, &["--frame", "4"]).contains("--frame 4: ball has 4, counted from 0"));
+    assert!(refused(WRONG_ARGUMENTS, &["--time", "inf"]).contains("is not a time"));
+    refused(WRONG_ARGUMENTS, &["--time", "1", "--frame", "1"]);
+    let still = fails(FAILED, &["render", "gen:grid:2", "-b", "lbvh-host", "-o", "a.png", "--frame", "0"]);
+    assert!(still.contains("gen:grid:2: nothing in it moves"), "{still}");
+}
+
+#[test]
 fn wrong_arguments_end_with_2_and_say_what_is_right() {
     for (arguments, says) in [
         (&["build", "gen:grid:2"][..], "--builder"),

@@ -5,6 +5,7 @@
 mod files;
 
 use files::{Folder, load, pack};
+use hedgerow::scene::{self, DynamicScene, LoadOptions};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -171,6 +172,212 @@ fn broken_documents_are_told_what_is_broken() {
     }
 }
 
+/// Key times 0, 1 and 2, then values, in accessors 2 and 3 behind the square; a target of the square in accessor 4.
+fn animated(nodes: Value, channels: Value, samplers: Value, values: &[f32], kind: &str) -> (Value, Vec<u8>) {
+    let mut bytes = buffer();
+    let width = if kind == "VEC4" {
+        4
+    } else if kind == "VEC3" {
+        3
+    } else {
+        1
+    };
+    let target = [0.0_f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 8.0];
+    let numbers = [0.0, 1.0, 2.0].iter().chain(values).chain(&target);
+    bytes.extend(numbers.flat_map(|n: &f32| n.to_le_bytes()));
+    let mut document = document(nodes);
+    document["buffers"][0]["byteLength"] = bytes.len().into();
+    let views = document["bufferViews"].as_array_mut().expect("a list");
+    views.push(json!({ "buffer": 0, "byteOffset": 60, "byteLength": 12 }));
+    views.push(json!({ "buffer": 0, "byteOffset": 72, "byteLength": 4 * values.len() }));
+    views.push(json!({ "buffer": 0, "byteOffset": 72 + 4 * values.len(), "byteLength": 48 }));
+    let accessors = document["accessors"].as_array_mut().expect("a list");
+    accessors
+        .push(json!({ "bufferView": 2, "componentType": 5126, "count": 3, "type": "SCALAR", "min": [0], "max": [2] }));
+    accessors.push(json!({ "bufferView": 3, "componentType": 5126, "count": values.len() / width, "type": kind }));
+    accessors.push(json!({ "bufferView": 4, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [0, 0, 8] }));
+    document["animations"] = json!([{ "channels": channels, "samplers": samplers }]);
+    (document, bytes)
+}
+
+fn load_dynamic((document, bytes): &(Value, Vec<u8>)) -> hedgerow::Result<DynamicScene> {
+    let folder = Folder::new();
+    scene::load_dynamic(&folder.bytes("mesh.glb", &glb(document, bytes)), &LoadOptions::default())
+}
+
+fn channel(node: u32, path: &str) -> Value {
+    json!([{ "sampler": 0, "target": { "node": node, "path": path } }])
+}
+
+fn sampler(interpolation: &str) -> Value {
+    json!([{ "input": 2, "output": 3, "interpolation": interpolation }])
+}
+
+/// A static square, one that an animation moves, and one below that.
+fn three_squares() -> Value {
+    json!([
+        { "mesh": 0, "children": [1], "translation": [10, 0, 0] },
+        { "name": "mover", "mesh": 0, "children": [2], "scale": [2, 2, 2] },
+        { "mesh": 0, "translation": [0, 0, 1] }
+    ])
+}
+
+#[test]
+fn nodes_that_an_animation_moves_are_objects_and_the_rest_is_static() {
+    let values = [0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 4.0, 6.0, 0.0];
+    let file = animated(three_squares(), channel(1, "translation"), sampler("LINEAR"), &values, "VEC3");
+    let scene = load_dynamic(&file).expect("animated");
+    assert_eq!(scene.static_mesh.positions[1], [11.0, 0.0, 0.0]);
+    assert_eq!(scene.objects.iter().map(|o| o.name.as_str()).collect::<Vec<_>>(), ["mover", "node 2"]);
+    assert_eq!((scene.seconds, scene.frames), (2.0, 48));
+    // The second corner is (1, 0, 0): doubled, moved by the animation and by the parent; the child's stands 1 up, doubled too.
+    for (time, x, y) in [(0.0, 0.0, 0.0), (0.5, 2.0, 0.0), (1.0, 4.0, 0.0), (1.25, 4.0, 1.5), (2.5, 2.0, 0.0)] {
+        assert_eq!(scene.objects[0].placed(time)[1], [12.0 + x, y, 0.0], "{time}");
+        assert_eq!(scene.objects[1].placed(time)[1], [12.0 + x, y, 2.0], "{time}");
+    }
+    // At rest it is the scene at time 0, what stands before what moves.
+    let folder = Folder::new();
+    let still = load(&folder.bytes("mesh.glb", &glb(&file.0, &file.1))).expect("at rest").mesh;
+    assert_eq!(still.positions, scene.at(0.0).expect("finite").mesh.positions);
+}
+
+#[test]
+fn steps_splines_and_rotations_are_as_gltf_has_them() {
+    let placed = |path: &str, interpolation: &str, values: &[f32], kind: &str, time: f32| {
+        let file = animated(json!([{ "mesh": 0 }]), channel(0, path), sampler(interpolation), values, kind);
+        load_dynamic(&file).expect(path).objects[0].placed(time)[1]
+    };
+    let values = [0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 4.0, 6.0, 0.0];
+    assert_eq!(placed("translation", "STEP", &values, "VEC3", 0.9), [1.0, 0.0, 0.0]);
+    assert_eq!(placed("translation", "STEP", &values, "VEC3", 1.0), [5.0, 0.0, 0.0]);
+    assert_eq!(placed("scale", "LINEAR", &values, "VEC3", 0.5), [2.0, 0.0, 0.0]);
+    // Into each key, the value, out of it: from 0 with slope 8 to 0 with slope 0, at the half (⅛)·8 = 1.
+    let mut spline = [0.0; 27];
+    spline[6] = 8.0;
+    assert_eq!(placed("translation", "CUBICSPLINE", &spline, "VEC3", 0.5), [2.0, 0.0, 0.0]);
+    // No rotation, then half a turn about z in two steps: an eighth of a turn at the half of the first.
+    let (c, s) = (std::f32::consts::FRAC_1_SQRT_2, std::f32::consts::FRAC_1_SQRT_2);
+    let rotations = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, s, c, 0.0, 0.0, 1.0, 0.0];
+    let at = placed("rotation", "LINEAR", &rotations, "VEC4", 0.5);
+    assert!((at[0] - c).abs() < 1e-6 && (at[1] - s).abs() < 1e-6, "{at:?}");
+    let at = placed("rotation", "LINEAR", &rotations, "VEC4", 1.0);
+    assert!(at[0].abs() < 1e-6 && (at[1] - 1.0).abs() < 1e-6, "{at:?}");
+}
+
+/// A square whose fourth corner a target lifts by 8.
+fn with_target(mut file: (Value, Vec<u8>)) -> (Value, Vec<u8>) {
+    file.0["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": 4 }]);
+    file
+}
+
+#[test]
+fn weights_morph_a_mesh_and_those_of_the_file_hold_where_none_are_animated() {
+    let file = with_target(animated(
+        json!([{ "mesh": 0 }]),
+        channel(0, "weights"),
+        sampler("LINEAR"),
+        &[0.0, 1.0, 0.5],
+        "SCALAR",
+    ));
+    let scene = load_dynamic(&file).expect("morphing");
+    assert!(scene.objects[0].morphs());
+    for (time, z) in [(0.0, 0.0), (0.25, 2.0), (1.0, 8.0), (1.5, 6.0)] {
+        assert_eq!(scene.objects[0].mesh_at(time)[3], [1.0, 1.0, z], "{time}");
+    }
+    let values = [0.0; 9];
+    let mut file =
+        with_target(animated(three_squares(), channel(1, "translation"), sampler("LINEAR"), &values, "VEC3"));
+    file.0["meshes"][0]["weights"] = json!([0.25]);
+    let scene = load_dynamic(&file).expect("moving");
+    assert_eq!((scene.static_mesh.positions[3][2], scene.objects[0].mesh_at(1.0)[3][2]), (2.0, 2.0));
+    assert!(!scene.objects[0].morphs());
+}
+
+#[test]
+fn a_camera_that_a_node_carries_goes_with_it() {
+    let nodes = json!([{ "mesh": 0, "children": [1] }, { "children": [2] }, { "camera": 0, "translation": [0, 0, 5] }]);
+    let values = [0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 4.0, 6.0, 0.0];
+    let mut file = animated(nodes, channel(1, "translation"), sampler("LINEAR"), &values, "VEC3");
+    file.0["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 1.0, "znear": 0.1 } }]);
+    let scene = load_dynamic(&file).expect("a moving camera");
+    assert_eq!((scene.objects.len(), scene.static_mesh.triangles.len()), (0, 2));
+    let camera = scene.camera(0.5);
+    assert_eq!((camera.eye, camera.look, camera.up), ([2.0, 0.0, 5.0], [2.0, 0.0, 4.0], [0.0, 1.0, 0.0]));
+}
+
+#[test]
+fn of_two_animations_of_one_property_the_first_counts() {
+    let values = [0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 4.0, 6.0, 0.0];
+    let mut file = animated(json!([{ "mesh": 0 }]), channel(0, "translation"), sampler("LINEAR"), &values, "VEC3");
+    let mut second = file.0["animations"][0].clone();
+    second["channels"] = json!([{ "sampler": 0, "target": { "node": 0, "path": "translation" } }, { "sampler": 0, "target": { "node": 0, "path": "scale" } }]);
+    second["samplers"][0]["interpolation"] = "STEP".into();
+    file.0["animations"].as_array_mut().expect("a list").push(second);
+    let scene = load_dynamic(&file).expect("animated twice");
+    // Translation by the first, evenly; scale by the second, in steps: (4, 0, 0) from time 1 on.
+    assert_eq!(scene.objects[0].placed(1.5)[1], [8.0, 3.0, 0.0]);
+}
+
+#[test]
+fn broken_animations_are_told_what_is_broken() {
+    let values = [0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 4.0, 6.0, 0.0];
+    let good = || animated(json!([{ "mesh": 0 }]), channel(0, "translation"), sampler("LINEAR"), &values, "VEC3");
+    let with = |change: &dyn Fn(&mut Value, &mut Vec<u8>)| {
+        let (mut document, mut bytes) = good();
+        change(&mut document, &mut bytes);
+        load_dynamic(&(document, bytes)).expect_err("a broken file").to_string()
+    };
+    let place = "mesh.glb: animation 0, channel 0: ";
+    for (change, says) in [
+        (
+            &(|d: &mut Value, _: &mut Vec<u8>| d["animations"][0]["channels"][0]["target"]["node"] = 7.into())
+                as &dyn Fn(&mut Value, &mut Vec<u8>),
+            "moves node 7, the file has 1; is it cut off?",
+        ),
+        (
+            &|d, _| d["animations"][0]["channels"][0]["target"]["path"] = "colour".into(),
+            "moves neither translation, rotation, scale nor weights",
+        ),
+        (
+            &|d, _| d["animations"][0]["channels"][0]["target"]["path"] = "weights".into(),
+            "moves weights of node 0, which has no morph targets",
+        ),
+        (
+            &|d, _| d["animations"][0]["channels"][0]["target"]["path"] = "rotation".into(),
+            "key values are not of the type",
+        ),
+        (
+            &|d, _| d["animations"][0]["samplers"][0]["interpolation"] = "CUBICSPLINE".into(),
+            "has 9 numbers for 3 keys, 9 values of 3 are needed",
+        ),
+        (&|d, _| d["accessors"][2]["componentType"] = 5125.into(), "key times are not 32-bit floats"),
+        (&|d, _| d["accessors"][3]["count"] = 300.into(), "reaches beyond the end of its buffer"),
+        (&|_, b| b[64..68].copy_from_slice(&2_f32.to_le_bytes()), "key times do not ascend"),
+        (&|_, b| b[72..76].copy_from_slice(&f32::NAN.to_le_bytes()), "a key value is not finite"),
+    ] {
+        let message = with(change);
+        assert!(message.contains(&format!("{place}{says}")), "{says}: {message}");
+    }
+    let message = with(&|_, b| b[68..72].copy_from_slice(&1e9_f32.to_le_bytes()));
+    assert!(message.contains("its animations last 1000000000 s, there may be"), "{message}");
+    let rotation = animated(json!([{ "mesh": 0 }]), channel(0, "rotation"), sampler("LINEAR"), &[0.0; 12], "VEC4");
+    let message = load_dynamic(&rotation).expect_err("no rotation").to_string();
+    assert!(message.ends_with("has a rotation of no length; export it again"), "{message}");
+    let (mut document, bytes) = good();
+    document["animations"] = json!([]);
+    let message = load_dynamic(&(document, bytes)).expect_err("nothing moves").to_string();
+    assert!(message.contains("nothing in it moves"), "{message}");
+    let mut file = with_target(good());
+    file.0["accessors"][4]["count"] = 3.into();
+    let message = load_dynamic(&file).expect_err("a short target").to_string();
+    assert!(message.contains("mesh 0, primitive 0, target 0: not three 32-bit floats for each vertex"), "{message}");
+    let mut file = good();
+    file.0["nodes"][0]["skin"] = 0.into();
+    file.0["skins"] = json!([{ "joints": [0] }]);
+    let message = load_dynamic(&file).expect_err("a skin").to_string();
+    assert!(message.contains("node 0 has a skin, which stands still here; bake it to morph targets"), "{message}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
@@ -199,5 +406,20 @@ proptest! {
         let folder = Folder::new();
         folder.bytes("buffer.bin", &buffer());
         let _ = load(&folder.file("mesh.gltf", &changed.replace("\"byteLength\":60", "\"byteLength\":60,\"uri\":\"buffer.bin\"")));
+    }
+
+    /// The same of files with animations and morph targets.
+    #[test]
+    fn damaged_animations_never_panic(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4)) {
+        let (document, binary) = with_target(animated(json!([{ "mesh": 0 }]), channel(0, "weights"), sampler("LINEAR"), &[0.0, 1.0, 0.5], "SCALAR"));
+        let mut bytes = glb(&document, &binary);
+        for (at, byte) in changes {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        let folder = Folder::new();
+        let path = folder.bytes("mesh.glb", &bytes);
+        let _ = load(&path);
+        let _ = scene::load_dynamic(&path, &LoadOptions::default());
     }
 }

@@ -54,7 +54,7 @@ fn after_help() -> String {
 }
 
 const SCENES: &str = "
-A scene is a file (.obj, .ply, .gltf, .glb, .tri, .anim, .inst, each also with .zst behind), the bare name of one in
+A scene is a file (.obj, .ply, .gltf, .glb, .tri, .anim, .inst, .dyn, each also with .zst behind), the bare name of one in
 scenes/ or in the folder of --scenes-dir, or a generator:";
 
 /// Runs the command that the arguments name.

@@ -1,6 +1,8 @@
 //! Scenes in two levels: a few parts, each placed many times. What a top-level structure over bottom-level ones is built of.
 
-use super::{Camera, Light, LoadOptions, Mesh, Scene, cameras, check, dynamic, generators, inst, load, lookup, no_triangles};
+use super::{
+    Camera, Light, LoadOptions, Mesh, Scene, cameras, check, dynamic, generators, inst, load, lookup, no_triangles,
+};
 use crate::bvh::layout::Aabb;
 use crate::{Error, Result};
 

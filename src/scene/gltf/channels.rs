@@ -80,17 +80,20 @@ impl Channels {
         let Checked::Valid(property) = target.path else {
             return Err("moves neither translation, rotation, scale nor weights; export it without".into());
         };
-        let targets = channel.target().node().mesh().and_then(|mesh| Some(mesh.primitives().next()?.morph_targets().len()));
+        let targets =
+            channel.target().node().mesh().and_then(|mesh| Some(mesh.primitives().next()?.morph_targets().len()));
         let moved = self.nodes.entry(node).or_default();
         let samples = Samples { file, channel };
         let last = match property {
             Property::Translation => samples.set(&mut moved.translation, 3, |n| [n[0], n[1], n[2]]),
             Property::Scale => samples.set(&mut moved.scale, 3, |n| [n[0], n[1], n[2]]),
-            Property::Rotation => samples.set(&mut moved.rotation, 4, |n| {
-                Rotation([n[0], n[1], n[2], n[3]].map(f64::from))
-            }),
+            Property::Rotation => {
+                samples.set(&mut moved.rotation, 4, |n| Rotation([n[0], n[1], n[2], n[3]].map(f64::from)))
+            }
             Property::MorphTargetWeights => match targets {
-                None | Some(0) => Err(format!("moves weights of node {node}, which has no morph targets; export it again")),
+                None | Some(0) => {
+                    Err(format!("moves weights of node {node}, which has no morph targets; export it again"))
+                }
                 Some(targets) => samples.set(&mut moved.weights, targets, <[f32]>::to_vec),
             },
         }?;
@@ -107,7 +110,12 @@ struct Samples<'a> {
 
 impl Samples<'_> {
     /// Makes a track of the keys, each value of `width` numbers, unless one is there already; gives the time of the last key.
-    fn set<V: Value>(&self, track: &mut Option<Track<V>>, width: usize, value: impl Fn(&[f32]) -> V) -> Result<f32, String> {
+    fn set<V: Value>(
+        &self,
+        track: &mut Option<Track<V>>,
+        width: usize,
+        value: impl Fn(&[f32]) -> V,
+    ) -> Result<f32, String> {
         if track.is_some() {
             return Ok(0.0);
         }
@@ -159,11 +167,16 @@ impl Samples<'_> {
         if !has_type(&accessor, dimensions, types) || accessor.count() == 0 {
             return Err("key values are not of the type that glTF gives their property; export it again".into());
         }
-        let numbers: Vec<f32> = match self.channel.reader(|buffer| self.file.bytes(buffer)).read_outputs().ok_or(CUT_OFF)? {
-            ReadOutputs::Translations(values) | ReadOutputs::Scales(values) => values.flatten().collect(),
-            ReadOutputs::Rotations(values) => values.into_f32().flatten().collect(),
-            ReadOutputs::MorphTargetWeights(values) => values.into_f32().collect(),
-        };
-        if numbers.iter().all(|n| n.is_finite()) { Ok(numbers) } else { Err("a key value is not finite; export it again".into()) }
+        let numbers: Vec<f32> =
+            match self.channel.reader(|buffer| self.file.bytes(buffer)).read_outputs().ok_or(CUT_OFF)? {
+                ReadOutputs::Translations(values) | ReadOutputs::Scales(values) => values.flatten().collect(),
+                ReadOutputs::Rotations(values) => values.into_f32().flatten().collect(),
+                ReadOutputs::MorphTargetWeights(values) => values.into_f32().collect(),
+            };
+        if numbers.iter().all(|n| n.is_finite()) {
+            Ok(numbers)
+        } else {
+            Err("a key value is not finite; export it again".into())
+        }
     }
 }

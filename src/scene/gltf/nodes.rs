@@ -3,9 +3,9 @@
 use super::channels::Channels;
 use super::meshes::{self, Part};
 use super::{File, malformed};
+use crate::Result;
 use crate::scene::dynamic::{self, CameraPath, DynamicContent, DynamicObject, Motion, Shape, Step, carried, morphed};
 use crate::scene::{Light, check};
-use crate::Result;
 use glam::{Mat4, Vec3};
 use gltf::Node;
 use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;

@@ -131,7 +131,10 @@ impl Reading {
                     return Err("an object is a name and a scene; write it as in object ball gen:icosphere:3".into());
                 }
                 if let Some(before) = self.objects.iter().find(|object| object.name == name) {
-                    return Err(format!("the object of line {} is called {name:?}, too; rename one", before.scene.line));
+                    return Err(format!(
+                        "the object of line {} is called {name:?}, too; rename one",
+                        before.scene.line
+                    ));
                 }
                 *above = Above::Object;
                 let scene = Named { line, spec: spec.into() };

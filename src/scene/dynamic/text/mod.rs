@@ -4,7 +4,9 @@
 
 mod lines;
 
-use super::{CameraPath, DynamicContent, DynamicObject, DynamicScene, Keys, Motion, Pose, Rotation, Shape, Step, Track, Value};
+use super::{
+    CameraPath, DynamicContent, DynamicObject, DynamicScene, Keys, Motion, Pose, Rotation, Shape, Step, Track, Value,
+};
 use crate::scene::{self, Animation, LoadOptions, Mesh, Scene, lookup, source};
 use crate::{Error, Result};
 use lines::{Key, Lines, Named};
