@@ -213,12 +213,13 @@ fn sampler(interpolation: &str) -> Value {
     json!([{ "input": 2, "output": 3, "interpolation": interpolation }])
 }
 
-/// A static square, one that an animation moves, and one below that.
+/// A static square, one that an animation moves, and one below that, 2 − ½·2 up.
 fn three_squares() -> Value {
     json!([
         { "mesh": 0, "children": [1], "translation": [10, 0, 0] },
         { "name": "mover", "mesh": 0, "children": [2], "scale": [2, 2, 2] },
-        { "mesh": 0, "translation": [0, 0, 1] }
+        { "translation": [0, 0, 2], "scale": [1, 1, 0.5], "children": [3] },
+        { "mesh": 0, "translation": [0, 0, -2] }
     ])
 }
 
@@ -228,7 +229,7 @@ fn nodes_that_an_animation_moves_are_objects_and_the_rest_is_static() {
     let file = animated(three_squares(), channel(1, "translation"), sampler("LINEAR"), &values, "VEC3");
     let scene = load_dynamic(&file).expect("animated");
     assert_eq!(scene.static_mesh.positions[1], [11.0, 0.0, 0.0]);
-    assert_eq!(scene.objects.iter().map(|o| o.name.as_str()).collect::<Vec<_>>(), ["mover", "node 2"]);
+    assert_eq!(scene.objects.iter().map(|o| o.name.as_str()).collect::<Vec<_>>(), ["mover", "node 3"]);
     assert_eq!((scene.seconds, scene.frames), (2.0, 48));
     // The second corner is (1, 0, 0): doubled, moved by the animation and by the parent; the child's stands 1 up, doubled too.
     for (time, x, y) in [(0.0, 0.0, 0.0), (0.5, 2.0, 0.0), (1.0, 4.0, 0.0), (1.25, 4.0, 1.5), (2.5, 2.0, 0.0)] {

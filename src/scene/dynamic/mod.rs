@@ -26,7 +26,7 @@ use std::ops::Range;
 
 pub(super) use camera::{CameraPath, carried};
 pub(super) use content::DynamicContent;
-pub(super) use motion::{Motion, Pose, Step};
+pub(super) use motion::{Motion, Pose, Step, product};
 pub(super) use rotation::Rotation;
 pub(super) use shape::{Shape, morphed};
 pub(super) use text::read;

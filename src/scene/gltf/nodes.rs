@@ -4,7 +4,9 @@ use super::channels::Channels;
 use super::meshes::{self, Part};
 use super::{File, malformed};
 use crate::Result;
-use crate::scene::dynamic::{self, CameraPath, DynamicContent, DynamicObject, Motion, Shape, Step, carried, morphed};
+use crate::scene::dynamic::{
+    self, CameraPath, DynamicContent, DynamicObject, Motion, Shape, Step, carried, morphed, product,
+};
 use crate::scene::{Light, check};
 use glam::{Mat4, Vec3};
 use gltf::Node;
@@ -60,7 +62,11 @@ impl Placement {
             (Placement::Moving(steps), None) => (steps.clone(), fixed(&local)),
             (Placement::Moving(steps), Some(pose)) => (steps.clone(), Step::Moving(pose)),
         };
-        steps.push(step);
+        match (steps.last_mut(), step) {
+            // Long chains below what moves stay short.
+            (Some(Step::Fixed(outer)), Step::Fixed(inner)) => *outer = product(outer, &inner),
+            (_, step) => steps.push(step),
+        }
         Placement::Moving(steps)
     }
 
