@@ -17,10 +17,11 @@ pub(in crate::scene) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<D
     let text = source::bytes(path, options)?;
     let lines = Lines::read(path, &String::from_utf8_lossy(&text))?;
     let Lines { frames, seconds, .. } = lines;
-    let beside = path.parent().unwrap_or(Path::new("")).to_owned();
-    let folders = [beside].into_iter().chain(options.folders.clone()).collect();
+    let mut folders = options.folders.clone();
+    if let Some(beside) = path.parent().filter(|beside| !folders.iter().any(|folder| folder == beside)) {
+        folders.insert(0, beside.to_owned());
+    }
     let file = File { path, seconds, options: LoadOptions { folders, progress: options.progress } };
-    let objects = lines.objects.iter().map(|object| file.object(object)).collect::<Result<_>>()?;
     let (static_mesh, its_camera, lights) = match &lines.static_scene {
         Some(named) => {
             let Scene { mesh, camera, lights, .. } = file.named(named, scene::load)?;
@@ -28,6 +29,7 @@ pub(in crate::scene) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<D
         }
         None => (Mesh::default(), None, Vec::new()),
     };
+    let objects = lines.objects.iter().map(|object| file.object(object)).collect::<Result<_>>()?;
     let camera = lines.camera.map(|keys| file.camera(&keys)).transpose()?.or(its_camera);
     DynamicContent { static_mesh, objects, camera, lights, frames, seconds, skinned: None }.into_scene(path)
 }
@@ -37,7 +39,7 @@ struct File<'a> {
     path: &'a Path,
     /// Until it begins again.
     seconds: f32,
-    /// The folder of the file first.
+    /// The folder of the file first, unless it is one of the others.
     options: LoadOptions<'a>,
 }
 
