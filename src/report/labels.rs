@@ -44,9 +44,14 @@ impl Rect {
     }
 }
 
-/// Estimated width of `text` in Noto Sans of `size` pixels; on the safe side.
+/// Estimated width of `text` of `size` pixels in whatever sans-serif font a browser has; on the safe side.
 pub fn text_width(text: &str, size: f64) -> f64 {
-    text.chars().map(|c| if "iljtfr.,:;|' ".contains(c) { 0.34 } else { 0.6 }).sum::<f64>() * size
+    let width = |c: char| match c {
+        'i' | 'l' | 'j' | 't' | 'f' | 'r' | '.' | ',' | ':' | ';' | '|' | '\'' | ' ' => 0.37,
+        'm' | 'w' | 'M' | 'W' | '+' | '=' | '%' | '…' => 0.92,
+        _ => 0.62,
+    };
+    text.chars().map(width).sum::<f64>() * size
 }
 
 /// The most pixels that a name has room for: a chart's other half is for what it shows.
