@@ -39,7 +39,8 @@ impl Parts {
     }
 }
 
-type Polygon = Vec<[f64; 3]>;
+/// Its corners.
+pub(crate) type Polygon = Vec<[f64; 3]>;
 
 /// Whether every point of a triangle is in one of the boxes: what is left of it when they are cut out is nothing. In double
 /// precision, with room for its rounding.
@@ -78,7 +79,7 @@ fn cut_out(mut polygon: Polygon, b: &Aabb, slack: f64, left: &mut Vec<Polygon>) 
 }
 
 /// The part of a convex polygon where `height` is not negative.
-fn clipped(polygon: &Polygon, height: impl Fn(&[f64; 3]) -> f64) -> Polygon {
+pub(crate) fn clipped(polygon: &Polygon, height: impl Fn(&[f64; 3]) -> f64) -> Polygon {
     let mut kept = Polygon::new();
     for (i, p) in polygon.iter().enumerate() {
         let q = &polygon[(i + 1) % polygon.len()];

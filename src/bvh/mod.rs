@@ -15,7 +15,7 @@ pub mod builder;
 pub mod codes;
 mod collapse;
 pub mod compact;
-mod cover;
+pub(crate) mod cover;
 pub(crate) mod encode;
 pub mod epo;
 pub mod geometry;

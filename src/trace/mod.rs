@@ -7,12 +7,14 @@
 //! - [`ray`] prepares a ray: shear, reciprocals, error bounds;
 //! - [`determinant`], [`triangle`], [`slab`] are the arithmetic, each the twin of a file in `glsl/trace/`;
 //! - [`host`] traverses on the host, [`tracer`] on the device; [`wide_host`] and [`wide`] do it in wide trees;
+//! - [`kd_host`] traverses kd-trees on the host;
 //! - `kinds` makes the rays that are measured; `files` reads and writes rays and hits.
 
 pub mod determinant;
 #[cfg(feature = "cli")]
 pub mod files;
 pub mod host;
+pub mod kd_host;
 #[cfg(feature = "cli")]
 pub mod kinds;
 pub mod ray;

@@ -1,0 +1,297 @@
+//! `KdTree`: the bytes that builders write and tracers read.
+//!
+//! A structure is one range of memory, position-independent, little-endian:
+//!
+//! | part | bytes | at |
+//! | --- | --- | --- |
+//! | [`Header`] | 128 | 0 |
+//! | [`Node`] × `node_count` | 8 each | [`NODES_OFFSET`] |
+//! | references × `reference_count` | 4 each: index of a record | [`Sizes::references_offset`] |
+//! | [`Triangle`] × `active` | 40 each | [`Sizes::records_offset`] |
+//! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | [`Sizes::geometries_offset`] |
+//!
+//! The first node is the root. An empty leaf has no node: its parent says that it is empty, and a ray that would go there needs no
+//! load to know it. Builders write the nodes level by level, in each the children in the order of their parents, left before right,
+//! and the references in the order of the leaves: what a device that builds level by level gets from prefix sums.
+//! The records are the triangles that are not left out, in the order of the input.
+//!
+//! A cell is what is left of the box in the header where the planes of the nodes above have cut it.
+
+use crate::bvh::layout::{self as bvh, Aabb, GeometryEntry, MAGIC, Triangle};
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
+
+/// The second word of a structure; the version in the low half is that of all our layouts.
+pub const KIND: u32 = 0x0032_0000 | bvh::VERSION;
+/// Where the nodes begin.
+pub const NODES_OFFSET: u64 = size_of::<Header>() as u64;
+/// The deepest tree that a tracer must be able to walk: [`super::termination::depth_limit`] of 2³² primitives is 41.
+pub const MAX_DEPTH: u32 = 41;
+/// The most nodes there can be: 28 bits name a child.
+pub const MAX_NODES: u64 = 1 << 28;
+/// The most references there can be: 30 bits name a leaf's first.
+pub const MAX_REFERENCES: u64 = 1 << 30;
+
+/// The head of a structure. 128 bytes; the first four words are those of [`bvh::Header`].
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Header {
+    /// [`MAGIC`].
+    pub magic: u32,
+    /// [`KIND`].
+    pub kind: u32,
+    /// Bits of [`bvh::status`].
+    pub status: u32,
+    /// Primitives of the input.
+    pub primitive_count: u32,
+    /// Least corner of the root's cell, which holds all triangles and what rounding may move a hit by; of an empty structure,
+    /// [`Aabb::EMPTY`]'s.
+    pub lo: [f32; 3],
+    /// Nodes there are.
+    pub node_count: u32,
+    /// Greatest corner of the root's cell.
+    pub hi: [f32; 3],
+    /// References of all leaves together.
+    pub reference_count: u32,
+    /// Records: primitives of the input that are finite and whose indices are in range.
+    pub active: u32,
+    /// Nodes that are split.
+    pub inner_nodes: u32,
+    /// Leaves that hold something: the other nodes.
+    pub leaves: u32,
+    /// Leaves that hold nothing, and have no node.
+    pub empty_leaves: u32,
+    /// Geometries of the input.
+    pub geometry_count: u32,
+    /// The flags that all geometries have, and those that any has in the byte above.
+    pub geometry_flags: u32,
+    /// `vk::BuildAccelerationStructureFlagsKHR` that it was built with.
+    pub build_flags: u32,
+    /// Depth of the deepest node; the root has depth 0.
+    pub depth: u32,
+    /// What lengths were scaled by before areas were taken: [`crate::bvh::sah::area_scale`] of the root's cell.
+    pub area_scale: f32,
+    /// Zero.
+    pub reserved: [u32; 11],
+}
+
+/// An inner node or a leaf. 8 bytes.
+///
+/// | | word 0 | word 1, bits 0–1 | bit 2 | bit 3 | the others |
+/// | --- | --- | --- | --- | --- | --- |
+/// | inner | the plane, an `f32` | its axis, 0–2 | left child is empty | right child is empty | 28 bits: first child that is not |
+/// | leaf | number of references, at least 1 | 3 | 30 bits from here on: first reference | | |
+///
+/// Where neither child is empty, the right one is beside the left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Node {
+    /// See the table.
+    pub first: u32,
+    /// See the table.
+    pub second: u32,
+}
+
+/// What a [`Node`] says.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Content {
+    /// A cell that is split.
+    Inner(Inner),
+    /// A cell that is not: its part of the references.
+    Leaf(Range<usize>),
+}
+
+/// An inner node taken apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inner {
+    /// The axis that the plane is across.
+    pub axis: usize,
+    /// Where the plane is.
+    pub plane: f32,
+    /// The nodes of the left child (lesser coordinates) and of the right; `None` where one is empty.
+    pub children: [Option<u32>; 2],
+}
+
+const LEAF: u32 = 3;
+
+impl Node {
+    /// A node that is split. `first_child` is the node of the first child that is not `empty`, less than [`MAX_NODES`].
+    pub fn inner(axis: usize, plane: f32, first_child: u32, empty: [bool; 2]) -> Node {
+        let [left, right] = empty.map(u32::from);
+        Node { first: plane.to_bits(), second: axis as u32 | left << 2 | right << 3 | first_child << 4 }
+    }
+
+    /// A leaf of `count` references from `first` on, which is less than [`MAX_REFERENCES`].
+    pub fn leaf(first: u32, count: u32) -> Node {
+        Node { first: count, second: LEAF | first << 2 }
+    }
+
+    /// The node taken apart.
+    pub fn content(&self) -> Content {
+        let Node { first, second } = *self;
+        if second & 3 == LEAF {
+            let from = (second >> 2) as usize;
+            return Content::Leaf(from..from + first as usize);
+        }
+        let (is_left, is_right) = (second & 4 == 0, second & 8 == 0);
+        let child = second >> 4;
+        let children = [is_left.then_some(child), is_right.then(|| child + u32::from(is_left))];
+        Content::Inner(Inner { axis: (second & 3) as usize, plane: f32::from_bits(first), children })
+    }
+}
+
+impl Inner {
+    /// What the plane makes of a cell: left and right.
+    pub fn halves(&self, cell: &Aabb) -> [Aabb; 2] {
+        halves(cell, self.axis, self.plane)
+    }
+}
+
+/// The two parts of a cell on the sides of a plane.
+pub(super) fn halves(cell: &Aabb, axis: usize, plane: f32) -> [Aabb; 2] {
+    let [mut left, mut right] = [*cell; 2];
+    left.hi[axis] = plane;
+    right.lo[axis] = plane;
+    [left, right]
+}
+
+/// Where the parts of a structure lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// Byte offset of the references.
+    pub references_offset: u64,
+    /// Byte offset of the records.
+    pub records_offset: u64,
+    /// Byte offset of the table of geometries.
+    pub geometries_offset: u64,
+    /// Bytes in all.
+    pub bytes: u64,
+}
+
+impl Header {
+    /// The root's cell.
+    pub fn cell(&self) -> Aabb {
+        Aabb { lo: self.lo, hi: self.hi }
+    }
+
+    /// Where the parts of the structure lie.
+    pub const fn sizes(&self) -> Sizes {
+        let references_offset = NODES_OFFSET + self.node_count as u64 * size_of::<Node>() as u64;
+        let records_offset = references_offset + self.reference_count as u64 * size_of::<u32>() as u64;
+        let geometries_offset = records_offset + self.active as u64 * size_of::<Triangle>() as u64;
+        let entries = if self.geometry_count > 1 { self.geometry_count as u64 } else { 0 };
+        let bytes = geometries_offset + entries * size_of::<GeometryEntry>() as u64;
+        Sizes { references_offset, records_offset, geometries_offset, bytes }
+    }
+}
+
+const _: () = assert!(size_of::<Header>() == 128 && size_of::<Node>() == 8);
+const _: () =
+    assert!(std::mem::offset_of!(Header, primitive_count) == std::mem::offset_of!(bvh::Header, primitive_count));
+
+/// A structure on the host, read back or built there.
+#[derive(Debug, Clone)]
+pub struct KdTree {
+    /// The head.
+    pub header: Header,
+    /// The nodes, the root first.
+    pub nodes: Vec<Node>,
+    /// Indices of records, those of each leaf together and ascending.
+    pub references: Vec<u32>,
+    /// The triangles, in the order of the input.
+    pub records: Vec<Triangle>,
+    /// The table of geometries; empty where there is one.
+    pub geometries: Vec<GeometryEntry>,
+}
+
+impl KdTree {
+    /// Takes a structure's bytes apart.
+    ///
+    /// # Errors
+    /// [`Error::InvalidStructure`] if the magic, kind or length is not that of a kd-tree.
+    pub fn from_bytes(bytes: &[u8]) -> Result<KdTree> {
+        let head = size_of::<Header>();
+        if bytes.len() < head {
+            return Err(Error::InvalidStructure(format!("{} bytes, the header alone has {head}", bytes.len())));
+        }
+        let header: Header = bytemuck::pod_read_unaligned(&bytes[..head]);
+        if header.magic != MAGIC || header.kind != KIND {
+            return Err(Error::InvalidStructure(format!(
+                "begins with {:#x} {:#x}, not with {MAGIC:#x} {KIND:#x}: of another kind or version",
+                header.magic, header.kind
+            )));
+        }
+        let sizes = header.sizes();
+        if bytes.len() as u64 != sizes.bytes {
+            return Err(Error::InvalidStructure(format!(
+                "{} bytes, {} nodes, {} references and {} records need {}; is it cut off?",
+                bytes.len(),
+                header.node_count,
+                header.reference_count,
+                header.active,
+                sizes.bytes
+            )));
+        }
+        let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
+        Ok(KdTree {
+            header,
+            nodes: bytemuck::pod_collect_to_vec(part(NODES_OFFSET, sizes.references_offset)),
+            references: bytemuck::pod_collect_to_vec(part(sizes.references_offset, sizes.records_offset)),
+            records: bytemuck::pod_collect_to_vec(part(sizes.records_offset, sizes.geometries_offset)),
+            geometries: bytemuck::pod_collect_to_vec(part(sizes.geometries_offset, sizes.bytes)),
+        })
+    }
+
+    /// The structure's bytes, as the device has them.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = bytemuck::bytes_of(&self.header).to_vec();
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.nodes));
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.references));
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.records));
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.geometries));
+        bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_node_says_what_it_was_made_of() {
+        let child = MAX_NODES as u32 - 2;
+        for (empty, children) in [
+            ([false, false], [Some(child), Some(child + 1)]),
+            ([true, false], [None, Some(child)]),
+            ([false, true], [Some(child), None]),
+        ] {
+            for axis in 0..3 {
+                let node = Node::inner(axis, -0.1, child, empty);
+                assert_eq!(node.content(), Content::Inner(Inner { axis, plane: -0.1, children }));
+            }
+        }
+        let last = MAX_REFERENCES as u32 - 1;
+        assert_eq!(Node::leaf(last, 1).content(), Content::Leaf(last as usize..last as usize + 1));
+    }
+
+    #[test]
+    fn bytes_that_are_no_kd_tree_are_refused_by_name() {
+        let header = Header { magic: MAGIC, kind: KIND, node_count: 1, reference_count: 1, ..Header::zeroed() };
+        let tree = KdTree {
+            header,
+            nodes: vec![Node::leaf(0, 1)],
+            references: vec![0],
+            records: Vec::new(),
+            geometries: Vec::new(),
+        };
+        let bytes = tree.to_bytes();
+        assert_eq!(KdTree::from_bytes(&bytes).expect("its own bytes").to_bytes(), bytes);
+        let error_of = |bytes: &[u8]| KdTree::from_bytes(bytes).expect_err("broken").to_string();
+        assert!(error_of(&bytes[..100]).contains("100 bytes, the header alone has 128"));
+        assert!(error_of(&bytes[..139]).contains("139 bytes, 1 nodes, 1 references and 0 records need 140"));
+        let mut other = bytes.clone();
+        other[4] ^= 1;
+        assert!(error_of(&other).contains("of another kind or version"));
+    }
+}

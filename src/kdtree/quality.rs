@@ -1,0 +1,113 @@
+//! Quality of a kd-tree: SAH cost, depth and leaf statistics, by a walk on the host.
+
+use super::layout::{Content, KdTree};
+use crate::bvh::layout::Aabb;
+
+/// What a walk over a tree finds.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Quality {
+    /// SAH cost (CONTRACT): (c_T · Σ SA(inner) + c_I · Σ SA(leaf)·n_leaf) / SA(root), of the cells, the root's included.
+    pub sah: f64,
+    /// Nodes that are split.
+    pub inner: u64,
+    /// Leaves, the empty ones among them: one more than `inner`.
+    pub leaves: u64,
+    /// Leaves without a primitive.
+    pub empty_leaves: u64,
+    /// References in all leaves.
+    pub refs: u64,
+    /// Most references in a leaf.
+    pub leaf_max: u64,
+    /// Mean depth of a leaf, the empty ones among them; the root has depth 0.
+    pub depth_avg: f64,
+    /// Depth of the deepest leaf.
+    pub depth_max: u32,
+}
+
+impl Quality {
+    /// References in a leaf that is not empty, on average.
+    pub fn prims_per_leaf(&self) -> f64 {
+        self.refs as f64 / (self.leaves - self.empty_leaves).max(1) as f64
+    }
+}
+
+/// The quality of `tree` with these costs of a step and of a test. An empty tree has one empty leaf and costs nothing.
+pub fn on_host(tree: &KdTree, c_t: f64, c_i: f64) -> Quality {
+    let mut quality = Quality::default();
+    let mut depths = 0u64;
+    let mut leaf = |quality: &mut Quality, depth: u32, count: usize| {
+        quality.leaves += 1;
+        quality.empty_leaves += u64::from(count == 0);
+        quality.refs += count as u64;
+        quality.leaf_max = quality.leaf_max.max(count as u64);
+        quality.depth_max = quality.depth_max.max(depth);
+        depths += u64::from(depth);
+    };
+    let mut cost = 0.0;
+    let root = tree.header.cell();
+    let mut stack = vec![((!tree.nodes.is_empty()).then_some(0), root, 0)];
+    while let Some((node, cell, depth)) = stack.pop() {
+        let Some(node) = node else {
+            leaf(&mut quality, depth, 0);
+            continue;
+        };
+        match tree.nodes[node as usize].content() {
+            Content::Leaf(range) => {
+                cost += c_i * half_area(&cell) * range.len() as f64;
+                leaf(&mut quality, depth, range.len());
+            }
+            Content::Inner(inner) => {
+                cost += c_t * half_area(&cell);
+                quality.inner += 1;
+                let [left, right] = inner.halves(&cell);
+                stack.push((inner.children[1], right, depth + 1));
+                stack.push((inner.children[0], left, depth + 1));
+            }
+        }
+    }
+    let whole = half_area(&root);
+    quality.sah = if whole > 0.0 { cost / whole } else { 0.0 };
+    quality.depth_avg = depths as f64 / quality.leaves as f64;
+    quality
+}
+
+fn half_area(cell: &Aabb) -> f64 {
+    let [x, y, z]: [f64; 3] = std::array::from_fn(|i| f64::from(cell.hi[i]) - f64::from(cell.lo[i]));
+    if x < 0.0 { 0.0 } else { x * y + y * z + z * x }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kdtree::layout::{Header, Node};
+    use bytemuck::Zeroable;
+
+    #[test]
+    fn the_cost_of_a_tree_of_three_leaves_is_that_of_its_areas() {
+        // A cube of edge 2, cut in the middle along x; its right half is cut again along y, where the lower part is empty.
+        let header = Header { lo: [0.0; 3], hi: [2.0; 3], ..Header::zeroed() };
+        let nodes = vec![
+            Node::inner(0, 1.0, 1, [false, false]),
+            Node::leaf(0, 3),
+            Node::inner(1, 0.5, 3, [true, false]),
+            Node::leaf(3, 1),
+        ];
+        let tree = KdTree { header, nodes, references: vec![0, 1, 2, 0], records: Vec::new(), geometries: Vec::new() };
+        let quality = on_host(&tree, 3.0, 2.0);
+        // Half areas: 12 the root, 8 a half, 1·1.5 + 1.5·2 + 2·1 = 6.5 the upper part.
+        let sah = (3.0 * (12.0 + 8.0) + 2.0 * (3.0 * 8.0 + 6.5)) / 12.0;
+        assert!((quality.sah - sah).abs() < 1e-12, "{}", quality.sah);
+        let expected = Quality {
+            sah: quality.sah,
+            inner: 2,
+            leaves: 3,
+            empty_leaves: 1,
+            refs: 4,
+            leaf_max: 3,
+            depth_avg: 5.0 / 3.0,
+            depth_max: 2,
+        };
+        assert_eq!(quality, expected);
+        assert_eq!(quality.prims_per_leaf(), 2.0);
+    }
+}

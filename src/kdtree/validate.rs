@@ -1,0 +1,335 @@
+//! Walks a kd-tree on the host and says what is wrong and where.
+
+use super::layout::{Content, Inner, KdTree, MAX_DEPTH};
+use crate::bvh::cover::{Polygon, clipped};
+use crate::bvh::layout::{Aabb, Triangle};
+use crate::{Error, Result};
+
+impl KdTree {
+    /// Checks every rule of the layout: indices in range, no cycle and no node that none names, planes strictly inside of their
+    /// cells, a depth that tracers can walk, every reference in one leaf and none twice in it, and every triangle referenced by every
+    /// leaf whose closed cell it touches, in double precision and without what builders add to it. What the header counts is there.
+    ///
+    /// # Errors
+    /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
+    pub fn validate(&self) -> Result<()> {
+        self.validate_records()?;
+        let mut walk = Walk {
+            tree: self,
+            visited: vec![false; self.nodes.len()],
+            in_leaf: vec![false; self.references.len()],
+            found: Counts::default(),
+        };
+        let cell = self.header.cell();
+        if self.nodes.is_empty() {
+            if self.header.active > 0 {
+                return invalid(format!("{} records and no node", self.header.active));
+            }
+            walk.found.empty_leaves = 1;
+        } else {
+            walk.run(cell)?;
+        }
+        if let Some(node) = walk.visited.iter().position(|&visited| !visited) {
+            return invalid(format!("node {node} is named by none"));
+        }
+        if let Some(lost) = walk.in_leaf.iter().position(|&there| !there) {
+            return invalid(format!("reference {lost} is in no leaf"));
+        }
+        let header = &self.header;
+        let said = Counts {
+            inner_nodes: header.inner_nodes,
+            leaves: header.leaves,
+            empty_leaves: header.empty_leaves,
+            depth: header.depth,
+        };
+        if walk.found != said {
+            return invalid(format!("{:?}, the header says {said:?}", walk.found));
+        }
+        Ok(())
+    }
+
+    /// As many parts as the header says; primitives in the order of the input; all triangles in the root's cell.
+    fn validate_records(&self) -> Result<()> {
+        let header = &self.header;
+        let there = [self.nodes.len(), self.references.len(), self.records.len()];
+        let said = [header.node_count, header.reference_count, header.active].map(|count| count as usize);
+        if there != said {
+            return invalid(format!("{there:?} nodes, references and records are there, the header says {said:?}"));
+        }
+        if let Some(i) = self.records.windows(2).position(|pair| pair[0].primitive >= pair[1].primitive) {
+            return invalid(format!("record {} is not of a later primitive than record {i}", i + 1));
+        }
+        if let Some(last) = self.records.last().filter(|last| last.primitive >= header.primitive_count) {
+            return invalid(format!("a record is of primitive {} of {}", last.primitive, header.primitive_count));
+        }
+        let cell = header.cell();
+        match self.records.iter().position(|record| !cell.contains(&Aabb::around(&[record.v0, record.v1, record.v2]))) {
+            Some(record) => invalid(format!("record {record} is not inside of the root's cell")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What a walk counts and the header says.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Counts {
+    inner_nodes: u32,
+    leaves: u32,
+    empty_leaves: u32,
+    depth: u32,
+}
+
+/// A triangle in a cell: its record, and the box of its part there.
+#[derive(Clone, Copy)]
+struct Part {
+    record: u32,
+    lo: [f64; 3],
+    hi: [f64; 3],
+}
+
+/// A node that is left to see.
+struct Place {
+    node: u32,
+    /// The node that names it.
+    parent: Option<u32>,
+    depth: u32,
+    cell: Aabb,
+    /// The triangles that touch the cell.
+    parts: Vec<Part>,
+}
+
+struct Walk<'a> {
+    tree: &'a KdTree,
+    visited: Vec<bool>,
+    in_leaf: Vec<bool>,
+    found: Counts,
+}
+
+impl Walk<'_> {
+    fn run(&mut self, cell: Aabb) -> Result<()> {
+        let parts = (0..self.tree.records.len() as u32).filter_map(|record| self.part(record, &cell)).collect();
+        let mut stack = vec![Place { node: 0, parent: None, depth: 0, cell, parts }];
+        while let Some(Place { node, parent, depth, cell, parts }) = stack.pop() {
+            let named_by = parent.map_or("the header".to_owned(), |parent| format!("node {parent}"));
+            if depth > MAX_DEPTH {
+                return invalid(format!("node {node} is at depth {depth}, the most is {MAX_DEPTH}"));
+            }
+            let Some(content) = self.tree.nodes.get(node as usize).map(|node| node.content()) else {
+                return invalid(format!("{named_by}: child {node}, there are {} nodes", self.tree.nodes.len()));
+            };
+            if std::mem::replace(&mut self.visited[node as usize], true) {
+                return invalid(format!("{named_by}: node {node} has two parents"));
+            }
+            self.found.depth = self.found.depth.max(depth);
+            match content {
+                Content::Leaf(range) => self.leaf(node, range, &parts)?,
+                Content::Inner(inner) => {
+                    let [left, right] = self.inner(node, &inner, &cell, parts)?;
+                    let halves = inner.halves(&cell);
+                    for ((child, cell), parts) in inner.children.into_iter().zip(halves).zip([left, right]).rev() {
+                        match child {
+                            Some(child) => {
+                                stack.push(Place { node: child, parent: Some(node), depth: depth + 1, cell, parts });
+                            }
+                            None => self.empty_leaf(node, &parts)?,
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The parts in the two halves of a cell.
+    fn inner(&mut self, node: u32, inner: &Inner, cell: &Aabb, parts: Vec<Part>) -> Result<[Vec<Part>; 2]> {
+        let Inner { axis, plane, children } = *inner;
+        self.found.inner_nodes += 1;
+        // Not the other way round: a NaN must not pass.
+        if !(cell.lo[axis] < plane && plane < cell.hi[axis]) {
+            let (from, to) = (cell.lo[axis], cell.hi[axis]);
+            return invalid(format!("node {node}: plane {plane} is not strictly inside of {from} to {to}"));
+        }
+        if children == [None; 2] {
+            return invalid(format!("node {node} has two empty children"));
+        }
+        let halves = inner.halves(cell);
+        let plane = f64::from(plane);
+        let mut sides = [Vec::new(), Vec::new()];
+        for part in parts {
+            let touches = [part.lo[axis] <= plane, part.hi[axis] >= plane];
+            for side in (0..2).filter(|&side| touches[side]) {
+                let one_sided = !touches[1 - side];
+                sides[side].extend(if one_sided { Some(part) } else { self.part(part.record, &halves[side]) });
+            }
+        }
+        Ok(sides)
+    }
+
+    fn leaf(&mut self, node: u32, range: std::ops::Range<usize>, parts: &[Part]) -> Result<()> {
+        self.found.leaves += 1;
+        if range.is_empty() {
+            return invalid(format!("node {node} is a leaf of nothing"));
+        }
+        let Some(references) = self.tree.references.get(range.clone()) else {
+            let there = self.tree.references.len();
+            return invalid(format!("node {node}: a leaf of references {range:?}, there are {there}"));
+        };
+        if let Some(twice) = range.clone().find(|&at| std::mem::replace(&mut self.in_leaf[at], true)) {
+            return invalid(format!("node {node}: reference {twice} is in two leaves"));
+        }
+        if let Some(wrong) = references.iter().find(|&&record| record as usize >= self.tree.records.len()) {
+            return invalid(format!("node {node}: record {wrong}, there are {}", self.tree.records.len()));
+        }
+        if let Some(pair) = references.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return invalid(format!("node {node}: record {} after {}, they must ascend", pair[1], pair[0]));
+        }
+        match parts.iter().find(|part| references.binary_search(&part.record).is_err()) {
+            Some(part) => {
+                let primitive = self.tree.records[part.record as usize].primitive;
+                invalid(format!("node {node}: primitive {primitive} touches the cell and is not referenced"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn empty_leaf(&mut self, parent: u32, parts: &[Part]) -> Result<()> {
+        self.found.empty_leaves += 1;
+        match parts.first() {
+            Some(part) => {
+                let primitive = self.tree.records[part.record as usize].primitive;
+                invalid(format!("node {parent}: primitive {primitive} touches the child that is said to be empty"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The part of a triangle in a closed cell, if they touch.
+    fn part(&self, record: u32, cell: &Aabb) -> Option<Part> {
+        let Triangle { v0, v1, v2, .. } = self.tree.records[record as usize];
+        let mut polygon: Polygon = [v0, v1, v2].iter().map(|corner| corner.map(f64::from)).collect();
+        for axis in 0..3 {
+            let (lo, hi) = (f64::from(cell.lo[axis]), f64::from(cell.hi[axis]));
+            for (sign, bound) in [(1.0, hi), (-1.0, -lo)] {
+                if polygon.iter().any(|p| sign * p[axis] > bound) {
+                    polygon = clipped(&polygon, |p| bound - sign * p[axis]);
+                }
+            }
+        }
+        let first = *polygon.first()?;
+        let bounds = |pick: fn(f64, f64) -> f64| {
+            polygon.iter().fold(first, |b, p| std::array::from_fn(|axis| pick(b[axis], p[axis])))
+        };
+        Some(Part { record, lo: bounds(f64::min), hi: bounds(f64::max) })
+    }
+}
+
+fn invalid<T>(what: String) -> Result<T> {
+    Err(Error::InvalidStructure(what))
+}
+
+#[cfg(all(test, feature = "cli"))]
+mod tests {
+    use super::*;
+    use crate::kdtree::host::{Options, build};
+    use crate::kdtree::layout::Node;
+
+    /// Small triangles along a diagonal, and one all along it.
+    fn tree() -> KdTree {
+        let mut positions: Vec<[f32; 3]> =
+            (0..60).map(|i| [(i / 3) as f32, (i / 3 + i % 3) as f32, (i * 5 % 11) as f32]).collect();
+        positions.extend([[0.0; 3], [20.0, 20.0, 10.0], [20.0, 19.0, 10.0]]);
+        let triangles: Vec<[u32; 3]> = (0..21).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        build(&positions, &triangles, &Options::EXACT).expect("a small tree")
+    }
+
+    #[test]
+    fn a_built_tree_is_valid_and_round_trips_through_bytes() {
+        let tree = tree();
+        tree.validate().expect("valid");
+        assert!(tree.header.inner_nodes > 3 && tree.header.empty_leaves > 0, "{:?}", tree.header);
+        let bytes = tree.to_bytes();
+        assert_eq!(KdTree::from_bytes(&bytes).expect("its own bytes").to_bytes(), bytes);
+    }
+
+    fn inner_of(tree: &KdTree, node: usize) -> Inner {
+        match tree.nodes[node].content() {
+            Content::Inner(inner) => inner,
+            Content::Leaf(_) => panic!("node {node} is a leaf"),
+        }
+    }
+
+    /// A leaf of at least so many references.
+    fn leaf_of(tree: &KdTree, count: usize) -> (usize, std::ops::Range<usize>) {
+        let leaf = |node: &Node| match node.content() {
+            Content::Leaf(range) if range.len() >= count => Some(range),
+            _ => None,
+        };
+        tree.nodes.iter().enumerate().find_map(|(i, node)| leaf(node).map(|range| (i, range))).expect("a leaf")
+    }
+
+    #[test]
+    fn every_broken_rule_is_found_and_named() {
+        type Break = fn(&mut KdTree);
+        let breaks: [(&str, Break); 16] = [
+            ("is not strictly inside of", |t| {
+                let axis = inner_of(t, 0).axis;
+                t.nodes[0].first = t.header.hi[axis].to_bits();
+            }),
+            ("is not strictly inside of", |t| t.nodes[0].first = f32::NAN.to_bits()),
+            ("has two empty children", |t| t.nodes[0].second |= 0b1100),
+            ("there are", |t| t.nodes[0].second |= 0xFFFF_FFF0),
+            ("has two parents", |t| {
+                let Inner { axis, plane, .. } = inner_of(t, 0);
+                t.nodes[0] = Node::inner(axis, plane, 0, [false, false]);
+            }),
+            ("touches the child that is said to be empty", |t| {
+                let Inner { axis, plane, children } = inner_of(t, 0);
+                t.nodes[0] = Node::inner(axis, plane, children[0].expect("both") + 1, [true, false]);
+            }),
+            ("touches the cell and is not referenced", |t| {
+                let (leaf, range) = leaf_of(t, 2);
+                t.nodes[leaf] = Node::leaf(range.start as u32 + 1, range.len() as u32 - 1);
+            }),
+            ("a leaf of nothing", |t| {
+                let (leaf, _) = leaf_of(t, 1);
+                t.nodes[leaf].first = 0;
+            }),
+            ("is in two leaves", |t| {
+                let (first, range) = leaf_of(t, 1);
+                // The rightmost leaf is seen last.
+                let mut last = 0;
+                while let Content::Inner(inner) = t.nodes[last].content() {
+                    last = inner.children[1].or(inner.children[0]).expect("one is not empty") as usize;
+                }
+                assert_ne!(first, last);
+                t.nodes[last] = Node::leaf(range.start as u32, range.len() as u32);
+            }),
+            ("they must ascend", |t| {
+                let (_, range) = leaf_of(t, 2);
+                t.references[range.start + 1] = t.references[range.start];
+            }),
+            ("record 21, there are 21", |t| {
+                let (_, range) = leaf_of(t, 1);
+                t.references[range.end - 1] = 21;
+            }),
+            ("is in no leaf", |t| {
+                t.references.push(0);
+                t.header.reference_count += 1;
+            }),
+            ("is named by none", |t| {
+                t.nodes.push(t.nodes[0]);
+                t.header.node_count += 1;
+            }),
+            ("the header says", |t| t.header.empty_leaves += 1),
+            ("nodes, references and records are there", |t| t.header.active -= 1),
+            ("is not inside of the root's cell", |t| t.header.hi[0] -= 2.0),
+        ];
+        for (says, break_it) in breaks {
+            let mut tree = tree();
+            assert_eq!(inner_of(&tree, 0).children, [Some(1), Some(2)]);
+            break_it(&mut tree);
+            let error = tree.validate().expect_err(says).to_string();
+            assert!(error.contains(says), "{says}: {error}");
+        }
+    }
+}
