@@ -16,6 +16,7 @@ mod device_bvh;
 pub mod experiments;
 pub mod growth;
 mod host;
+mod kd_host;
 pub mod levels;
 pub mod matrix;
 pub mod overlap;

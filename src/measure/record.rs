@@ -16,7 +16,7 @@ pub struct Record {
     pub triangles: u64,
     /// Builder with its options, as `-b` takes it.
     pub builder: String,
-    /// Layout: `bvh2`, `wide4`, `wide8`, `wide8q`, `driver`, `host`.
+    /// Layout: `bvh2`, `wide4`, `wide8`, `wide8q`, `kdtree`, `driver`, `host`.
     pub kind: String,
     /// Device name.
     pub device: String,
@@ -92,7 +92,7 @@ pub struct Quality {
     pub lcv: Option<f64>,
     /// Inner nodes.
     pub inner: Option<u64>,
-    /// Leaves.
+    /// Leaves, with those without a primitive.
     pub leaves: Option<u64>,
     /// Leaves without a primitive.
     pub empty_leaves: Option<u64>,
@@ -102,7 +102,7 @@ pub struct Quality {
     pub depth_avg: Option<f64>,
     /// Depth of the deepest leaf.
     pub depth_max: Option<u64>,
-    /// Mean primitives a leaf.
+    /// Mean primitives a leaf that has any.
     pub prims_per_leaf: Option<f64>,
 }
 
@@ -120,6 +120,23 @@ impl Quality {
             depth_avg: Some(quality.depth_avg),
             depth_max: Some(u64::from(quality.depth_max)),
             prims_per_leaf: Some(quality.refs as f64 / quality.leaves.max(1) as f64),
+            ..Quality::default()
+        }
+    }
+
+    /// The figures of a walk over a kd-tree.
+    pub fn of_kd_tree(quality: &crate::kdtree::quality::Quality, c_t: f64, c_i: f64) -> Quality {
+        Quality {
+            sah: Some(quality.sah),
+            c_t,
+            c_i,
+            inner: Some(quality.inner),
+            leaves: Some(quality.leaves),
+            empty_leaves: Some(quality.empty_leaves),
+            refs: Some(quality.refs),
+            depth_avg: Some(quality.depth_avg),
+            depth_max: Some(u64::from(quality.depth_max)),
+            prims_per_leaf: Some(quality.prims_per_leaf()),
             ..Quality::default()
         }
     }

@@ -21,7 +21,7 @@ pub struct BuildRun {
 pub trait Subject {
     /// Builder with its options, as `-b` takes it.
     fn builder(&self) -> &str;
-    /// `bvh2`, `wide4`, `wide8`, `wide8q`, `driver` or `host`.
+    /// `bvh2`, `wide4`, `wide8`, `wide8q`, `kdtree`, `driver` or `host`.
     fn kind(&self) -> &'static str;
     /// `device` where build times are timestamps, otherwise `wall`.
     fn timer(&self) -> &'static str;
@@ -45,7 +45,7 @@ pub trait Subject {
     fn epo(&mut self, _c_t: f64, _c_i: f64, _epo: Epo) -> Result<Option<f64>> {
         Ok(None)
     }
-    /// The tree on the host, where its layout is ours.
+    /// The BVH on the host, where it is one and its layout is ours.
     ///
     /// # Errors
     /// The device failed.

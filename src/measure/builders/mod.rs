@@ -10,6 +10,7 @@ use super::Subject;
 use super::choose::Auto;
 use super::device_bvh::DeviceBvh;
 use super::host::Host;
+use super::kd_host::KdHost;
 use super::peers::driver::Driver;
 #[cfg(feature = "peer-embree")]
 use super::peers::embree::Embree;
@@ -74,6 +75,7 @@ impl Spec {
         Ok(match self.builder().kind {
             Kind::Device(options) => Box::new(self.on_device(given()?, mesh, options(self)?)?),
             Kind::Host(hierarchy) => Box::new(Host::new(&name, mesh, self.host_options(hierarchy(self)?)?)),
+            Kind::KdHost(options) => Box::new(KdHost::new(&name, mesh, options(self)?)),
             Kind::Auto => Box::new(Auto::new(given()?, &name, mesh, self.rays()?)?),
             Kind::Driver(preference) => Box::new(Driver::new(given()?, mesh, preference)?),
             #[cfg(feature = "peer-obvhs")]
@@ -242,6 +244,15 @@ mod tests {
         assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
         assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse, optimise"));
         assert!(error_of("driver-fast-build:codes=mc30").contains("it takes none"));
+        for wrong in ["many", "1", "1025"] {
+            let says = format!("bins={wrong} is not known; take a number of bins along each axis, from 2 to 1024");
+            assert!(error_of(&format!("kd-binned:bins={wrong}")).contains(&says), "{wrong}");
+        }
+        for wrong in ["much", "0", "-1", "nan", "1e9"] {
+            let says = format!("kt={wrong} is not known; take a cost of a traversal step, from 0.001 to 1000");
+            assert!(error_of(&format!("kd-exact:kt={wrong}")).contains(&says), "{wrong}");
+        }
+        assert!(error_of("kd-exact:bins=8").contains("no option \"bins\"; it takes kt, ki"));
         assert!(error_of("auto:rays=many").contains("no number of rays"));
         assert!(error_of("").contains("-b all"));
         assert!(error_of(",").contains("-b all"));

@@ -9,6 +9,9 @@ use crate::bvh::reinsertion;
 use crate::bvh::sah::Collapse;
 use crate::bvh::split;
 use crate::bvh::wide::Form;
+use crate::kdtree;
+use crate::kdtree::host::Planes;
+use crate::kdtree::termination::Costs;
 use crate::measure::choose;
 use crate::measure::host::{self, Hierarchy};
 use crate::trace::wide::Order;
@@ -44,6 +47,12 @@ pub(super) const WINDOW: BuilderOption =
     BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
 pub(super) const RADIUS: BuilderOption =
     BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
+pub(super) const BINS: BuilderOption =
+    BuilderOption { key: "bins", values: "a number of bins along each axis, from 2 to 1024" };
+pub(super) const KT: BuilderOption =
+    BuilderOption { key: "kt", values: "a cost of a traversal step, from 0.001 to 1000; 3 unless given" };
+pub(super) const KI: BuilderOption =
+    BuilderOption { key: "ki", values: "a cost of a triangle test, from 0.001 to 1000; 2 unless given" };
 
 /// Of `ploc` where it is not told: what drivers take.
 const PLOC_RADIUS: u32 = 16;
@@ -54,6 +63,7 @@ impl Spec {
         match self.builder().kind {
             Kind::Device(options) => options(self).and(self.form_and_order()).map(drop),
             Kind::Host(hierarchy) => self.host_options(hierarchy(self)?).map(drop),
+            Kind::KdHost(options) => options(self).map(drop),
             Kind::Auto => self.rays().map(drop),
             // They take none.
             Kind::Driver(_) => Ok(()),
@@ -140,6 +150,30 @@ impl Spec {
     pub(super) fn ploc_radius(&self) -> Result<usize> {
         let radius = self.number(&RADIUS, 25)?;
         if radius > 0 { Ok(radius as usize) } else { Err(self.wrong_value(&RADIUS, "0")) }
+    }
+
+    /// Options `kt` and `ki`.
+    pub(super) fn kd_exact_options(&self) -> Result<kdtree::host::Options> {
+        self.kd_options(Planes::Exact)
+    }
+
+    /// Options `bins`, `kt` and `ki`.
+    pub(super) fn kd_binned_options(&self) -> Result<kdtree::host::Options> {
+        self.kd_options(Planes::Binned(self.number(&BINS, Planes::BINS)?))
+    }
+
+    fn kd_options(&self, planes: Planes) -> Result<kdtree::host::Options> {
+        let cost = |option: &BuilderOption, default: f32| {
+            let Some(value) = self.option(option.key) else { return Ok(default) };
+            value.parse().map_err(|_| self.wrong_value(option, value))
+        };
+        let costs = Costs { c_t: cost(&KT, Costs::DEFAULT.c_t)?, c_i: cost(&KI, Costs::DEFAULT.c_i)? };
+        let options = kdtree::host::Options { planes, costs };
+        let wrong = [(BINS, options.check_planes()), (KT, Costs::check(costs.c_t)), (KI, Costs::check(costs.c_i))];
+        match wrong.iter().find(|(_, is_right)| !is_right) {
+            Some((option, _)) => Err(self.wrong_value(option, self.option(option.key).unwrap_or_default())),
+            None => Ok(options),
+        }
     }
 
     /// Option `termination`, if `optimise` and `collapse` leave it a choice: both need leaves of one triangle.

@@ -2,11 +2,13 @@
 
 use super::Spec;
 use super::options::{
-    BITS, CODES, COLLAPSE, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT, TERMINATION, TREELET, WIDTH, WINDOW,
+    BINS, BITS, CODES, COLLAPSE, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT, TERMINATION, TREELET, WIDTH,
+    WINDOW,
 };
 use crate::Result;
 use crate::bvh::builder;
 use crate::gpu::DriverPreference;
+use crate::kdtree;
 use crate::measure::host::Hierarchy;
 #[cfg(feature = "peer-embree")]
 use crate::measure::peers::embree;
@@ -41,6 +43,8 @@ pub(super) enum Kind {
     Device(fn(&Spec) -> Result<builder::Options>),
     /// One of ours on the host, with this hierarchy.
     Host(fn(&Spec) -> Result<Hierarchy>),
+    /// A kd-tree by one of ours on the host.
+    KdHost(fn(&Spec) -> Result<kdtree::host::Options>),
     /// The one of ours on the device that the cost model chooses.
     Auto,
     /// The Vulkan driver's own.
@@ -81,7 +85,7 @@ impl Builder {
         match self.kind {
             Kind::Device(_) | Kind::Auto => Needs::Device,
             Kind::Driver(_) => Needs::RayQuery,
-            Kind::Host(_) => Needs::Nothing,
+            Kind::Host(_) | Kind::KdHost(_) => Needs::Nothing,
             #[cfg(feature = "peer-obvhs")]
             Kind::Obvhs(_) => Needs::Nothing,
             #[cfg(feature = "peer-embree")]
@@ -150,6 +154,14 @@ pub static BUILDERS: &[Builder] = &[
         Kind::Host(|spec| spec.sweep_leaves().map(Hierarchy::Sweep)),
     )
     .taking(&[COLLAPSE, OPTIMISE, TERMINATION]),
+    Builder::new(&"kd-exact", "kd-tree on the host: perfect splits by SAH", Kind::KdHost(Spec::kd_exact_options))
+        .taking(&[KT, KI]),
+    Builder::new(
+        &"kd-binned",
+        "kd-tree on the host: the best by SAH of equally spaced planes",
+        Kind::KdHost(Spec::kd_binned_options),
+    )
+    .taking(&[BINS, KT, KI]),
     Builder::new(
         &"driver-fast-build",
         "the Vulkan driver's own, asked to build fast",
