@@ -124,12 +124,15 @@ fn fill(point: &mut Degenerate, stage: &Stage<'_>, spec: &Spec, mesh: &Mesh, tru
     }
     // The first build compiles the shaders; it counts where it is the only one.
     point.build_ms = Spread::of(times.get(1..).filter(|times| !times.is_empty()).unwrap_or(&times));
+    // Whatever has bytes of ours can be validated, be it a BVH or not.
+    if first.is_some() {
+        let error = subject.validate().err();
+        point.valid = Some(error.is_none());
+        point.faults.extend(error.map(|error| error.to_string()));
+    }
     if let Some(tree) = subject.tree()? {
         point.active = Some(tree.header.active.into());
         point.status = Some(status::names(tree.header.status));
-        let error = tree.validate().err();
-        point.valid = Some(error.is_none());
-        point.faults.extend(error.map(|error| error.to_string()));
         let lost = truth.tree.header.active.abs_diff(tree.header.active);
         if lost > 0 {
             point.faults.push(format!(
