@@ -72,8 +72,11 @@ pub struct Header {
     pub depth: u32,
     /// What lengths were scaled by before areas were taken: [`crate::bvh::sah::area_scale`] of the root's cell.
     pub area_scale: f32,
+    /// The longest side of a triangle that is referenced only where it is: rays look as far beside themselves as hits of such a one
+    /// may be ([`crate::trace::kd_host`]).
+    pub reach: f32,
     /// Zero.
-    pub reserved: [u32; 11],
+    pub reserved: [u32; 10],
 }
 
 /// An inner node or a leaf. 8 bytes.

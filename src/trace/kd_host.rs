@@ -9,13 +9,13 @@
 //! hit may lie beside the ray, in another cell. With t the hit's computed distance, m the farthest that a vertex of the triangle is
 //! from the origin along an axis, s the triangle's longest side: the triangle's point with the computed weights is less than
 //! [`SLACK`]·m from the ray's point at t along each axis ([`super::slab`]). That point is within |t|·|d| of the origin, d the
-//! direction's longest component, and so m ≤ (|t|·|d| + s)·(1 + 2⁻¹⁶). What the s is good for is in the cells: a triangle is referenced by
-//! all that it comes that near to ([`crate::kdtree`], split clipping). So there is a point in a cell that references the triangle
-//! and less than SLACK·|t|·|d| from the ray's point at t; and where it is left of a plane, or in it, the ray's point at t is no
-//! farther right than that. Both children are visited by the part of the ray that is so near, at the end of its interval that is
-//! farther from the origin: twice that, and twice the ray's margin, which is for the rounding of where the planes are crossed (5ε
-//! of |t| and ε of the origin) and for a direction that is moved away from zero (ε/4 of |t|). Where the ray runs in a plane, all of
-//! it visits both.
+//! direction's longest component, and so m ≤ (|t|·|d| + s)·(1 + 2⁻¹⁶). Every point of a triangle is in a cell that references it; and of
+//! those few triangles that are longer than the header's `reach`, all that is within 2·SLACK·s of it ([`crate::kdtree`], split
+//! clipping). So there is a point in a cell that references the triangle and is less than SLACK·(|t|·|d| + reach)·(1 + 2⁻¹⁶) from the
+//! ray's point at t; and where it is left of a plane, or in it, the ray's point at t is no farther right than that. Both children are
+//! visited by the part of the ray that is so near, at the end of its interval that is farther from the origin: twice that, and twice
+//! the ray's margin, which is for the rounding of where the planes are crossed (7ε of |t| and ε of the origin) and for a direction
+//! that is moved away from zero (ε/4 of |t|). Where the ray runs in a plane, all of it visits both.
 //!
 //! **No cell is visited twice and none forgotten.** Intervals of cells overlap by this, so that t alone cannot tell, as in kd-restart,
 //! where to go on. A bit a level does (Laine 2010, "Restart Trail for Stackless BVH Traversal"): 0 while a far child waits, 1 where none
@@ -78,7 +78,11 @@ pub fn trace(tree: &KdTree, ray: &Ray, query: Query, traversal: Traversal) -> (H
     let mut nearest = Nearest::new(ray.t_max);
     let usable = !tree.nodes.is_empty() && tree.header.status & status::UNUSABLE == 0;
     let Some(prepared) = PreparedRay::new(ray).filter(|_| usable) else { return (Hit::NONE, work) };
-    let line = Line { slack: 2.0 * SLACK * ray.direction[prepared.major].abs(), ray: prepared };
+    let line = Line {
+        slack: 2.0 * SLACK * ray.direction[prepared.major].abs(),
+        margin: 2.0 * (SLACK * tree.header.reach + prepared.margin),
+        ray: prepared,
+    };
     let Some((t_in, t_out)) = line.through(&tree.header.cell()) else { return (Hit::NONE, work) };
 
     let root = Place { node: 0, level: 0, t_in, t_out, others: f32::INFINITY };
@@ -188,10 +192,11 @@ impl Trail {
     }
 }
 
-/// A ray, and by what part of t it may miss its triangle.
+/// A ray, and by what part of t, and by how much besides, it may miss its triangle.
 struct Line {
     ray: PreparedRay,
     slack: f32,
+    margin: f32,
 }
 
 impl Line {
@@ -214,7 +219,7 @@ impl Line {
         let (axis, ray) = (inner.axis, &self.ray);
         let inverse = ray.inverse[axis];
         let farther = place.t_in.abs().max(place.t_out.abs());
-        let slack = (self.slack * farther + 2.0 * ray.margin).min(f32::MAX).copysign(inverse);
+        let slack = (self.slack * farther + self.margin).min(f32::MAX).copysign(inverse);
         let plane = inner.plane - ray.origin[axis];
         let [left, right] = inner.children;
         let (near, far) = if inverse > 0.0 { (left, right) } else { (right, left) };

@@ -11,7 +11,7 @@ use bytemuck::Zeroable;
 pub(super) fn assemble(
     root: Subtree,
     heuristic: &Heuristic,
-    cell: Aabb,
+    (cell, reach): (Aabb, f32),
     records: Vec<Triangle>,
     (primitive_count, status): (u32, u32),
 ) -> Result<KdTree> {
@@ -27,6 +27,7 @@ pub(super) fn assemble(
         active: records.len() as u32,
         geometry_count: 1,
         area_scale: heuristic.area_scale,
+        reach,
         ..Header::zeroed()
     };
     let mut level = vec![root];
@@ -46,10 +47,10 @@ pub(super) fn assemble(
                     references.extend(records);
                     header.leaves += 1;
                 }
-                Subtree::Inner { axis, plane, children } => {
+                Subtree::Inner { plane, children } => {
                     let empty = children.each_ref().map(|child| matches!(child, Subtree::Empty));
                     within("nodes", first_child + next.len() + 2, MAX_NODES)?;
-                    nodes.push(Node::inner(axis, plane, (first_child + next.len()) as u32, empty));
+                    nodes.push(Node::inner(plane.axis, plane.at, (first_child + next.len()) as u32, empty));
                     next.extend(children.into_iter().filter(|child| !matches!(child, Subtree::Empty)));
                     header.inner_nodes += 1;
                     header.empty_leaves += empty.map(u32::from).iter().sum::<u32>();

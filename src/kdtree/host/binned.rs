@@ -14,7 +14,7 @@ use crate::kdtree::layout::halves;
 /// The tree over `references` in `cell`, by so many bins along each axis.
 pub(super) fn build(
     heuristic: &Heuristic,
-    records: &[Triangle],
+    records: (&[Triangle], f32),
     bins: u32,
     cell: Aabb,
     references: Vec<Reference>,
@@ -24,7 +24,8 @@ pub(super) fn build(
 
 struct Binned<'a> {
     heuristic: &'a Heuristic,
-    records: &'a [Triangle],
+    /// The records, and what of them has no room.
+    records: (&'a [Triangle], f32),
     bins: usize,
 }
 
@@ -35,19 +36,19 @@ impl Binned<'_> {
             return Subtree::leaf(&references);
         }
         let best = self.best_split(&cell, &references);
-        let Some(Split { axis, plane, .. }) = self.heuristic.paying(best, &cell, count) else {
+        let Some(Split { plane, .. }) = self.heuristic.paying(best, &cell, count) else {
             return Subtree::leaf(&references);
         };
-        let halves = halves(&cell, axis, plane);
+        let halves = halves(&cell, plane.axis, plane.at);
         let mut parts = [Vec::new(), Vec::new()];
         for reference in &references {
-            let divided = divided(reference, self.records, (axis, plane), &halves);
+            let divided = divided(reference, self.records, &plane, &halves);
             parts.iter_mut().zip(divided).for_each(|(part, reference)| part.extend(reference));
         }
         drop(references);
         let ([left_cell, right_cell], [left, right]) = (halves, parts);
         Subtree::inner(
-            (axis, plane),
+            plane,
             count,
             || self.subtree(left_cell, left, depth + 1),
             || self.subtree(right_cell, right, depth + 1),
@@ -70,15 +71,18 @@ impl Binned<'_> {
         let planes = Planes::of(cell, axis, self.bins);
         let (mut begin, mut end) = (vec![0u32; self.bins], vec![0u32; self.bins]);
         for reference in references {
-            begin[planes.not_beyond(reference.bounds.lo[axis])] += 1;
-            end[planes.before(reference.bounds.hi[axis])] += 1;
+            let (lo, hi) = (reference.bounds.lo[axis], reference.bounds.hi[axis]);
+            // What lies in a plane is on its left.
+            begin[if lo == hi { planes.before(lo) } else { planes.not_beyond(lo) }] += 1;
+            end[planes.before(hi)] += 1;
         }
         let (mut left, mut right) = (0, references.len() as u32);
         let mut best = None;
         for bin in 1..self.bins {
             left += begin[bin - 1];
             right -= end[bin - 1];
-            best = Split::better(best, self.heuristic.split(cell, (axis, planes.at(bin)), [left, right]));
+            let split = self.heuristic.split(cell, (axis, planes.at(bin)), [left, 0, right]);
+            best = Split::better(best, split.map(|split| split.with_planar_left()));
         }
         best
     }

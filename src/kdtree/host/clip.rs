@@ -3,31 +3,28 @@
 //! The thesis gathers where edges and faces of triangle and box cross. Here the triangle is cut at the six faces of the cell, one
 //! after the other (Sutherland and Hodgman 1974): the same points, and no division by how steep the triangle stands to an edge.
 //!
-//! **No cell that a triangle touches is without it.** A ray's hit may lie beside its triangle by a part of how far and how long the
-//! triangle is; [`crate::trace::kd_host`] takes care of how far, the builder of how long: a triangle touches all that is nearer to
-//! it than [`padding`] along each axis. What is within p of the triangle and in a cell is within p of the triangle's part in the
-//! cell that is larger by p on all sides: so the triangle is clipped to that, and the box around the part is larger by p again.
+//! **Every point of a triangle is in a cell that references it.** A plane puts a triangle whose part ends at it on that side alone;
+//! one that lies in it on either, as the builder likes; all others on both, each clipped anew. The box of a part holds the part: with
+//! ε = 2⁻²⁴, *s* the triangle's longest side and *c* its greatest coordinate along the axis, six cuts put what is left of a triangle
+//! off by at most 64ε·s + 6ε·c. (Of a corner that a cut makes, a + t·(b − a), t is off by 8ε: two differences, a reciprocal that a
+//! device has to 5ε, a product; t·(b − a) by two more; the sum is rounded once.) So the faces that it is cut at are moved out by
+//! 64ε·s + 8ε·c, [`rounding`], and what was right before the cut and is off by less than that is kept; and the box around the part is
+//! larger by as much, but not larger than the triangle's own: walls and tiles whose corners lie in common planes are parted by them.
 //!
-//! Of p, with ε = 2⁻²⁴, *s* the triangle's longest side and *c* its greatest coordinate along the axis,
-//!
-//! - 128ε·s + 4ε·c = 2⁻¹⁷s + 2⁻²²c is for the tracer;
-//! - six cuts put what is left of the triangle off by at most 64ε·s + 6ε·c. Of a corner that a cut makes, a + t·(b − a), t is off by
-//!   8ε (two differences, a reciprocal that a device has to 5ε, a product; a and b are what they are), t·(b − a) by two more; the
-//!   sum is rounded once. As the planes are moved out by p, what was right before the cut and is off by less than that is kept;
-//! - the rest, 64ε·s + 6ε·c, is for the rounding of the box, and more than that: a box that only touches a plane with its face is of
-//!   a triangle that does not touch it. So each plane puts such a triangle on one side alone, and leaves hold none for nothing.
-//!
-//! No box is flat: what is parallel to an axis is as thick as that, as the thesis (section 9.2) expands its boxes, and so no
-//! primitive lies in a plane.
+//! A ray's hit may lie beside its triangle, by a part of how far and how long it is. The tracer looks beside the ray by as much
+//! ([`crate::trace::kd_host`]), as long as no triangle is longer than it knows from the header: [`reach_of`]. For those few that are,
+//! a triangle is all that is near enough to it, [`room`].
 
-use crate::bvh::layout::{Aabb, Triangle};
+use crate::bvh::layout::{Aabb, SLACK, Triangle};
 
-/// 256ε = 2⁻¹⁶: by what part of the longest side of its box a triangle is larger.
-const OF_SIDE: f32 = f32::from_bits((127 - 16) << 23);
-/// 16ε = 2⁻²⁰: by what part of its greatest coordinate along the axis.
-const OF_COORDINATE: f32 = f32::from_bits((127 - 20) << 23);
+/// 64ε: by what part of the longest side of its box a part may be off.
+const OF_SIDE: f32 = f32::from_bits((127 - 18) << 23);
+/// 8ε: by what part of its greatest coordinate along the axis.
+const OF_COORDINATE: f32 = f32::from_bits((127 - 21) << 23);
 /// By how much at least: more than what a device may flush to zero.
 const LEAST: f32 = f32::from_bits((127 - 120) << 23);
+/// Triangles are long whose longest side is so many octaves over the mean.
+const LONG: u64 = 12;
 /// Edges that are shorter along an axis are not cut there: both ends count. Their reciprocals are finite.
 const SHORTEST: f32 = f32::from_bits((127 - 100) << 23);
 /// Corners of a triangle that six planes have cut.
@@ -36,49 +33,94 @@ const CORNERS: usize = 9;
 /// A primitive in a cell: the box of its part there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Reference {
-    /// Within the cell, and not flat.
+    /// Within the cell; flat where the triangle is.
     pub bounds: Aabb,
     /// Index of the record.
     pub record: u32,
 }
 
-/// How near along each axis is near enough to touch.
-pub fn padding(corners: &[[f32; 3]; 3]) -> [f32; 3] {
-    let b = Aabb::around(corners);
-    let longest = b.extent().into_iter().fold(0.0, f32::max).min(f32::MAX);
+/// The longest side of the box around a triangle; finite.
+fn longest_side(corners: &[[f32; 3]; 3]) -> f32 {
+    Aabb::around(corners).extent().into_iter().fold(0.0, f32::max).min(f32::MAX)
+}
+
+/// How long a triangle may be to be referenced only where it is: as the longest, or 2¹² times the mean of their octaves. More would
+/// have rays look far beside themselves, where most triangles are small, for the sake of a few.
+pub(super) fn reach_of(records: &[Triangle]) -> f32 {
+    let sides = || records.iter().map(|t| longest_side(&[t.v0, t.v1, t.v2])).filter(|side| side.is_normal());
+    let (sum, count) = sides().fold((0, 0), |(sum, count), side| (sum + u64::from(side.to_bits() >> 23), count + 1));
+    let octave = (sum / count.max(1) + LONG).min(254);
+    sides().fold(0.0, f32::max).min(f32::from_bits((octave as u32) << 23))
+}
+
+/// How near along each axis is near enough to be met for a triangle: nothing for those within `reach`.
+fn room(corners: &[[f32; 3]; 3], reach: f32) -> [f32; 3] {
+    let longest = longest_side(corners);
+    let rounding = rounding(corners);
+    rounding.map(|rounding| if longest > reach { 2.0 * SLACK * longest + rounding } else { 0.0 })
+}
+
+/// By how much along each axis the box of a part is off at most.
+fn rounding(corners: &[[f32; 3]; 3]) -> [f32; 3] {
+    let (b, longest) = (Aabb::around(corners), longest_side(corners));
     std::array::from_fn(|i| OF_SIDE * longest + OF_COORDINATE * b.lo[i].abs().max(b.hi[i].abs()) + LEAST)
 }
 
-/// The box of a triangle, as large as what it touches; finite.
-pub(super) fn padded(corners: &[[f32; 3]; 3]) -> Aabb {
-    widened(&Aabb::around(corners), padding(corners)).intersection(&Aabb { lo: [-f32::MAX; 3], hi: [f32::MAX; 3] })
+/// The box of a triangle with its room; finite.
+pub(super) fn bounds_of(corners: &[[f32; 3]; 3], reach: f32) -> Aabb {
+    widened(&Aabb::around(corners), room(corners, reach)).intersection(&FINITE)
 }
 
-/// The box of what of a triangle touches a cell; `None` where nothing does.
-pub(super) fn clipped(corners: &[[f32; 3]; 3], cell: &Aabb) -> Option<Aabb> {
-    let padding = padding(corners);
-    let larger = widened(cell, padding);
+/// What a triangle adds to the root's cell: its box, not flat; finite.
+pub(super) fn cell_around(corners: &[[f32; 3]; 3], reach: f32) -> Aabb {
+    widened(&bounds_of(corners, reach), rounding(corners)).intersection(&FINITE)
+}
+
+const FINITE: Aabb = Aabb { lo: [-f32::MAX; 3], hi: [f32::MAX; 3] };
+
+/// The box of a triangle's part in a cell; `None` where there is none.
+pub(super) fn clipped(corners: &[[f32; 3]; 3], reach: f32, cell: &Aabb) -> Option<Aabb> {
+    let (room, rounding) = (room(corners, reach), rounding(corners));
+    let margin = std::array::from_fn(|i| room[i] + rounding[i]);
+    let larger = widened(cell, margin);
     let mut polygon = Polygon::of(corners);
     let is_cut = (0..3).all(|axis| polygon.cut(axis, larger.hi[axis], 1.0) && polygon.cut(axis, larger.lo[axis], -1.0));
     let bounds = if is_cut { polygon.bounds() } else { Aabb::around(corners) };
-    let part = widened(&bounds, padding).intersection(cell);
+    let part = widened(&bounds, margin).intersection(&bounds_of(corners, reach)).intersection(cell);
     // A polygon of no corners has a box from +∞ to −∞.
-    (0..3).all(|i| part.lo[i] < part.hi[i]).then_some(part)
+    (0..3).all(|i| part.lo[i] <= part.hi[i]).then_some(part)
 }
 
-/// What a plane across `axis` makes of a reference: its parts in the two halves of its cell.
+/// A plane across an axis, and on which side of it is what lies in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Plane {
+    pub axis: usize,
+    pub at: f32,
+    pub planar_left: bool,
+}
+
+impl Plane {
+    /// Whether a box is on the left and on the right.
+    pub fn sides_of(&self, b: &Aabb) -> [bool; 2] {
+        let (lo, hi) = (b.lo[self.axis], b.hi[self.axis]);
+        let is_planar = lo == self.at && hi == self.at;
+        [lo < self.at || is_planar && self.planar_left, hi > self.at || is_planar && !self.planar_left]
+    }
+}
+
+/// What a plane makes of a reference: its parts in the two halves of its cell.
 pub(super) fn divided(
     reference: &Reference,
-    records: &[Triangle],
-    (axis, plane): (usize, f32),
+    (records, reach): (&[Triangle], f32),
+    plane: &Plane,
     halves: &[Aabb; 2],
 ) -> [Option<Reference>; 2] {
-    let (is_left, is_right) = (reference.bounds.lo[axis] < plane, reference.bounds.hi[axis] > plane);
-    if is_left != is_right {
-        return [is_left.then_some(*reference), is_right.then_some(*reference)];
+    let sides = plane.sides_of(&reference.bounds);
+    if sides != [true; 2] {
+        return sides.map(|is_there| is_there.then_some(*reference));
     }
     let Triangle { v0, v1, v2, .. } = records[reference.record as usize];
-    let part = |cell| clipped(&[v0, v1, v2], cell).map(|bounds| Reference { bounds, ..*reference });
+    let part = |cell| clipped(&[v0, v1, v2], reach, cell).map(|bounds| Reference { bounds, ..*reference });
     halves.each_ref().map(part)
 }
 
@@ -172,33 +214,68 @@ mod tests {
     #[test]
     fn a_part_is_as_small_as_the_cell_makes_it() {
         let whole = cell([-9.0; 3], [9.0; 3]);
-        assert_near(clipped(&CORNERS, &whole), [0.0; 3], [4.0, 4.0, 2.0]);
+        assert_near(clipped(&CORNERS, 9.0, &whole), [0.0; 3], [4.0, 4.0, 2.0]);
         // x ≥ 2 leaves y ≤ 2 of the hypotenuse, and z of the plane z = x/4 + y/2.
-        assert_near(clipped(&CORNERS, &cell([2.0, -9.0, -9.0], [9.0; 3])), [2.0, 0.0, 0.5], [4.0, 2.0, 1.5]);
-        assert_near(clipped(&CORNERS, &cell([1.0, 1.0, -9.0], [2.0, 1.5, 9.0])), [1.0, 1.0, 0.75], [2.0, 1.5, 1.25]);
+        assert_near(clipped(&CORNERS, 9.0, &cell([2.0, -9.0, -9.0], [9.0; 3])), [2.0, 0.0, 0.5], [4.0, 2.0, 1.5]);
+        assert_near(
+            clipped(&CORNERS, 9.0, &cell([1.0, 1.0, -9.0], [2.0, 1.5, 9.0])),
+            [1.0, 1.0, 0.75],
+            [2.0, 1.5, 1.25],
+        );
     }
 
     #[test]
     fn a_cell_that_the_box_reaches_and_the_triangle_does_not_is_not_touched() {
-        assert_eq!(clipped(&CORNERS, &cell([3.0, 3.0, 0.0], [4.0, 4.0, 2.0])), None);
-        assert_eq!(clipped(&CORNERS, &cell([0.0, 0.0, 1.0], [1.0, 1.0, 2.0])), None);
-        assert_eq!(clipped(&CORNERS, &cell([5.0, 0.0, 0.0], [6.0, 1.0, 1.0])), None);
-        assert!(clipped(&CORNERS, &cell([4.0, 0.0, 0.0], [6.0, 1.0, 2.0])).is_some(), "it touches with a corner");
+        assert_eq!(clipped(&CORNERS, 9.0, &cell([3.0, 3.0, 0.0], [4.0, 4.0, 2.0])), None);
+        assert_eq!(clipped(&CORNERS, 9.0, &cell([0.0, 0.0, 1.0], [1.0, 1.0, 2.0])), None);
+        assert_eq!(clipped(&CORNERS, 9.0, &cell([5.0, 0.0, 0.0], [6.0, 1.0, 1.0])), None);
+        assert!(clipped(&CORNERS, 9.0, &cell([4.0, 0.0, 0.0], [6.0, 1.0, 2.0])).is_some(), "it touches with a corner");
     }
 
     #[test]
-    fn what_is_flat_or_a_point_is_no_box_without_room() {
+    fn the_cell_around_what_is_flat_or_a_point_is_not() {
         for corners in [[[0.0f32; 3]; 3], [[1.0, 2.0, -3.0]; 3], [[1e30; 3]; 3], [[-1e-30; 3]; 3], [[f32::MAX; 3]; 3]] {
-            let b = padded(&corners);
+            let b = cell_around(&corners, 1.0);
             assert!(
                 (0..3).all(|i| b.lo[i] < b.hi[i] && b.lo[i].is_finite() && b.hi[i].is_finite()),
                 "{corners:?} {b:?}"
             );
-            assert_eq!(clipped(&corners, &b), Some(b), "{corners:?}");
+            assert_eq!(clipped(&corners, 1.0, &b), Some(Aabb::around(&corners)), "{corners:?}");
         }
-        let wall = [[0.0, 5.0, 0.0], [1.0, 5.0, 0.0], [0.0, 5.0, 1.0]];
-        let b = padded(&wall);
-        assert!(b.lo[1] < 5.0 && 5.0 < b.hi[1] && b.hi[1] - b.lo[1] < 1e-4, "{b:?}");
+    }
+
+    #[test]
+    fn planes_part_what_ends_at_them_and_clip_what_crosses_them() {
+        let left = Triangle { v0: [0.0; 3], v1: [1.0, 0.0, 0.0], v2: [1.0, 1.0, 0.0], primitive: 0 };
+        let planar = Triangle { v0: [1.0, 0.0, 0.0], v1: [1.0, 1.0, 0.0], v2: [1.0, 0.0, 1.0], primitive: 1 };
+        let both = Triangle { v0: [0.0; 3], v1: [3.0, 0.0, 0.0], v2: [0.0, 3.0, 0.0], primitive: 2 };
+        let records = [left, planar, both];
+        let cell = cell([-1.0; 3], [4.0; 3]);
+        for planar_left in [false, true] {
+            let plane = Plane { axis: 0, at: 1.0, planar_left };
+            let halves = crate::kdtree::layout::halves(&cell, 0, 1.0);
+            let sides = [0, 1, 2].map(|record: u32| {
+                let t = records[record as usize];
+                let bounds = bounds_of(&[t.v0, t.v1, t.v2], 9.0);
+                divided(&Reference { bounds, record }, (&records, 9.0), &plane, &halves).map(|part| part.is_some())
+            });
+            assert_eq!(sides, [[true, false], [planar_left, !planar_left], [true; 2]]);
+        }
+    }
+
+    #[test]
+    fn few_long_triangles_have_room_and_others_none() {
+        let small = |i: usize| Triangle { v0: [i as f32; 3], v1: [i as f32 + 1.5; 3], v2: [i as f32; 3], primitive: 0 };
+        let mut records: Vec<Triangle> = (0..100).map(small).collect();
+        assert_eq!(reach_of(&records), 1.5);
+        records.push(Triangle { v0: [0.0; 3], v1: [1e6; 3], v2: [0.0; 3], primitive: 0 });
+        let reach = reach_of(&records);
+        assert_eq!(reach, 4096.0);
+        let room_of = |t: &Triangle| room(&[t.v0, t.v1, t.v2], reach)[0];
+        assert_eq!(room_of(&records[5]), 0.0);
+        assert!(room_of(&records[100]) >= 2.0 * SLACK * 1e6);
+        assert_eq!(reach_of(&[]), 0.0);
+        assert_eq!(reach_of(&[Triangle { v0: [1.0; 3], v1: [1.0; 3], v2: [1.0; 3], primitive: 0 }]), 0.0);
     }
 
     /// In double precision, at every point of a grid over the triangle.
@@ -221,7 +298,7 @@ mod tests {
                 std::array::from_fn(|i| centre[i] - random().abs() * 0.5 * scale),
                 std::array::from_fn(|i| centre[i] + random().abs() * 0.5 * scale),
             );
-            let part = clipped(&corners, &cell);
+            let part = clipped(&corners, f32::MAX, &cell);
             for i in 0..=40 {
                 for j in 0..=40 - i {
                     let (u, v) = (f64::from(i) / 40.0, f64::from(j) / 40.0);
@@ -229,10 +306,16 @@ mod tests {
                         let [a, b, c] = corners.map(|corner| f64::from(corner[k]));
                         (1.0 - u - v) * a + u * b + v * c
                     });
-                    let is_in =
-                        |b: &Aabb| (0..3).all(|k| f64::from(b.lo[k]) <= point[k] && point[k] <= f64::from(b.hi[k]));
-                    if is_in(&cell) {
-                        assert!(part.is_some_and(|part| is_in(&part)), "{corners:?} {cell:?} {point:?}: {part:?}");
+                    // The point itself is rounded.
+                    let is_in = |b: &Aabb, off: f64| {
+                        (0..3).all(|k| {
+                            let off = off * point[k].abs();
+                            f64::from(b.lo[k]) <= point[k] + off && point[k] - off <= f64::from(b.hi[k])
+                        })
+                    };
+                    if is_in(&cell, 0.0) {
+                        let is_there = part.is_some_and(|part| is_in(&part, 1e-14));
+                        assert!(is_there, "{corners:?} {cell:?} {point:?}: {part:?}");
                     }
                 }
             }

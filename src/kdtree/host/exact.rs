@@ -7,10 +7,10 @@
 //! sorted by themselves and merged.
 //!
 //! At a common position boxes end before others begin, so that all that ends there is on the left alone, and all that begins there
-//! on the right. Wald and Havran have a third kind of event between the two, for boxes flat across the axis; here none is
-//! ([`super::clip`]).
+//! on the right. Between the two are the events of boxes that are flat across the axis, one each: they go to the side where they cost
+//! less.
 
-use super::clip::{Reference, divided};
+use super::clip::{Plane, Reference, divided};
 use super::heuristic::{Heuristic, Split};
 use super::{ALONE, Subtree};
 use crate::bvh::layout::{Aabb, Triangle};
@@ -19,24 +19,37 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 
 /// The tree over `references` in `cell`.
-pub(super) fn build(heuristic: &Heuristic, records: &[Triangle], cell: Aabb, references: Vec<Reference>) -> Subtree {
+pub(super) fn build(
+    heuristic: &Heuristic,
+    records: (&[Triangle], f32),
+    cell: Aabb,
+    references: Vec<Reference>,
+) -> Subtree {
     let content = Content::sorted(references);
     Exact { heuristic, records }.subtree(cell, content, 0)
 }
 
-/// A face of a box.
+/// What of a box is in a plane, in the order in which a sweep must meet it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    Ends,
+    IsFlat,
+    Begins,
+}
+
+/// A face of a box, or a flat box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Event {
     at: f32,
     /// Position among the references of the cell.
     reference: u32,
-    begins: bool,
+    kind: Kind,
 }
 
 impl Event {
     fn order(&self, other: &Event) -> Ordering {
         let by_position = self.at.partial_cmp(&other.at).expect("boxes are finite");
-        by_position.then(self.begins.cmp(&other.begins)).then(self.reference.cmp(&other.reference))
+        by_position.then(self.kind.cmp(&other.kind)).then(self.reference.cmp(&other.reference))
     }
 }
 
@@ -59,13 +72,17 @@ impl Content {
     }
 }
 
-fn faces(b: &Aabb, axis: usize, reference: u32) -> [Event; 2] {
-    [(b.lo[axis], true), (b.hi[axis], false)].map(|(at, begins)| Event { at, reference, begins })
+fn faces(b: &Aabb, axis: usize, reference: u32) -> impl Iterator<Item = Event> + use<> {
+    let (lo, hi) = (b.lo[axis], b.hi[axis]);
+    let [first, last] = if lo == hi { [Some(Kind::IsFlat), None] } else { [Some(Kind::Begins), Some(Kind::Ends)] };
+    let event = move |(at, kind): (f32, Option<Kind>)| Some(Event { at, reference, kind: kind? });
+    [(lo, first), (hi, last)].into_iter().filter_map(event)
 }
 
 struct Exact<'a> {
     heuristic: &'a Heuristic,
-    records: &'a [Triangle],
+    /// The records, and what of them has no room.
+    records: (&'a [Triangle], f32),
 }
 
 impl Exact<'_> {
@@ -75,14 +92,14 @@ impl Exact<'_> {
             return Subtree::leaf(&content.references);
         }
         let best = self.best_split(&cell, &content);
-        let Some(Split { axis, plane, .. }) = self.heuristic.paying(best, &cell, count) else {
+        let Some(Split { plane, .. }) = self.heuristic.paying(best, &cell, count) else {
             return Subtree::leaf(&content.references);
         };
-        let halves = halves(&cell, axis, plane);
-        let [left, right] = self.parts(content, (axis, plane), &halves);
+        let halves = halves(&cell, plane.axis, plane.at);
+        let [left, right] = self.parts(content, &plane, &halves);
         let [left_cell, right_cell] = halves;
         Subtree::inner(
-            (axis, plane),
+            plane,
             count,
             || self.subtree(left_cell, left, depth + 1),
             || self.subtree(right_cell, right, depth + 1),
@@ -106,23 +123,24 @@ impl Exact<'_> {
         let (mut left, mut right) = (0, count);
         let mut best = None;
         for here in events.chunk_by(|a, b| a.at == b.at) {
-            let ends = here.partition_point(|event| !event.begins);
-            right -= ends as u32;
-            best = Split::better(best, self.heuristic.split(cell, (axis, here[0].at), [left, right]));
-            left += (here.len() - ends) as u32;
+            let of = |kind: Kind| here.iter().filter(|event| event.kind == kind).count() as u32;
+            let (ends, flat) = (of(Kind::Ends), of(Kind::IsFlat));
+            right -= ends + flat;
+            best = Split::better(best, self.heuristic.split(cell, (axis, here[0].at), [left, flat, right]));
+            left += here.len() as u32 - ends;
         }
         best
     }
 
     /// What is in the two halves of a cell.
-    fn parts(&self, content: Content, plane: (usize, f32), halves: &[Aabb; 2]) -> [Content; 2] {
+    fn parts(&self, content: Content, plane: &Plane, halves: &[Aabb; 2]) -> [Content; 2] {
         let mut parts = [Content::default(), Content::default()];
         // Of each reference, where it went on each side; of what straddles the plane, nothing, as its events are new.
         let mut went = vec![[NOWHERE; 2]; content.references.len()];
         let mut straddling: [Vec<u32>; 2] = Default::default();
         for (i, reference) in content.references.iter().enumerate() {
             let divided = divided(reference, self.records, plane, halves);
-            let straddles = reference.bounds.lo[plane.0] < plane.1 && plane.1 < reference.bounds.hi[plane.0];
+            let straddles = plane.sides_of(&reference.bounds) == [true; 2];
             for side in 0..2 {
                 let Some(reference) = divided[side] else { continue };
                 let at = parts[side].references.len() as u32;
@@ -173,7 +191,7 @@ fn merged(kept: impl Iterator<Item = Event>, new: Vec<Event>, count: usize) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kdtree::host::clip::padded;
+    use crate::kdtree::host::clip::{bounds_of, cell_around};
     use crate::kdtree::termination::Costs;
 
     /// Triangles in the cube, some of them along its axes and with common coordinates.
@@ -197,9 +215,9 @@ mod tests {
 
     fn content_of(records: &[Triangle]) -> (Aabb, Content) {
         let reference =
-            |(i, t): (usize, &Triangle)| Reference { bounds: padded(&[t.v0, t.v1, t.v2]), record: i as u32 };
+            |(i, t): (usize, &Triangle)| Reference { bounds: bounds_of(&[t.v0, t.v1, t.v2], 9.0), record: i as u32 };
         let references: Vec<Reference> = records.iter().enumerate().map(reference).collect();
-        let cell = references.iter().fold(Aabb::EMPTY, |b, r| b.union(&r.bounds));
+        let cell = records.iter().fold(Aabb::EMPTY, |b, t| b.union(&cell_around(&[t.v0, t.v1, t.v2], 9.0)));
         (cell, Content::sorted(references))
     }
 
@@ -210,9 +228,11 @@ mod tests {
             for plane in references.iter().flat_map(|r| [r.bounds.lo[axis], r.bounds.hi[axis]]) {
                 let left = references.iter().filter(|r| r.bounds.lo[axis] < plane).count() as u32;
                 let right = references.iter().filter(|r| r.bounds.hi[axis] > plane).count() as u32;
-                let Some(split) = heuristic.split(cell, (axis, plane), [left, right]) else { continue };
+                let is_flat = |r: &&Reference| r.bounds.lo[axis] == plane && r.bounds.hi[axis] == plane;
+                let planar = references.iter().filter(is_flat).count() as u32;
+                let Some(split) = heuristic.split(cell, (axis, plane), [left, planar, right]) else { continue };
                 let is_better = best.is_none_or(|b| {
-                    let key = |s: &Split| (s.cost, s.axis as f32, s.plane);
+                    let key = |s: &Split| (s.cost, s.plane.axis as f32, s.plane.at);
                     key(&split) < key(&b)
                 });
                 if is_better {
@@ -230,16 +250,16 @@ mod tests {
             let records = triangles(count, seed);
             let (cell, content) = content_of(&records);
             let heuristic = Heuristic::new(Costs::DEFAULT, &cell, count as u32);
-            let exact = Exact { heuristic: &heuristic, records: &records };
+            let exact = Exact { heuristic: &heuristic, records: (&records, 9.0) };
             let mut cells = vec![(cell, content)];
             let mut splits = 0;
             while let Some((cell, content)) = cells.pop().filter(|_| splits < 40) {
                 let split = exact.best_split(&cell, &content);
                 assert_eq!(split, best_by_brute_force(&heuristic, &cell, &content.references), "{count} {cell:?}");
-                let Some(Split { axis, plane, .. }) = split.filter(|_| content.references.len() > 1) else { continue };
+                let Some(Split { plane, .. }) = split.filter(|_| content.references.len() > 1) else { continue };
                 splits += 1;
-                let halves = halves(&cell, axis, plane);
-                for (half, part) in halves.into_iter().zip(exact.parts(content, (axis, plane), &halves)) {
+                let halves = halves(&cell, plane.axis, plane.at);
+                for (half, part) in halves.into_iter().zip(exact.parts(content, &plane, &halves)) {
                     assert_eq!(part.events, Content::sorted(part.references.clone()).events, "merged as sorted");
                     assert!(part.references.iter().all(|r| half.contains(&r.bounds)), "boxes in their cell");
                     cells.push((half, part));

@@ -1,5 +1,6 @@
 //! What a plane costs, and whether a cell is split at all (Papay 2025, sections 2.2 and 9.2).
 
+use super::clip::Plane;
 use crate::bvh::layout::Aabb;
 use crate::bvh::sah::area_scale;
 use crate::kdtree::layout::halves;
@@ -8,13 +9,17 @@ use crate::kdtree::termination::{Costs, depth_limit, leaf_size};
 /// A plane and what it costs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Split {
-    pub axis: usize,
-    pub plane: f32,
+    pub plane: Plane,
     /// Scaled by the cell's area.
     pub cost: f32,
 }
 
 impl Split {
+    /// With what lies in the plane on its left.
+    pub fn with_planar_left(self) -> Split {
+        Split { plane: Plane { planar_left: true, ..self.plane }, ..self }
+    }
+
     /// The cheaper one; of equal ones the first.
     pub fn better(first: Option<Split>, second: Option<Split>) -> Option<Split> {
         match (first, second) {
@@ -50,16 +55,18 @@ impl Heuristic {
         references < self.leaf_size as usize || depth >= self.depth_limit
     }
 
-    /// The split of a cell at a plane with so many references on its sides; `None` at and beyond the faces, where it would leave no
-    /// volume (section 9.2).
-    pub fn split(&self, cell: &Aabb, (axis, plane): (usize, f32), [left, right]: [u32; 2]) -> Option<Split> {
-        if plane <= cell.lo[axis] || plane >= cell.hi[axis] {
+    /// The split of a cell at a plane with so many references on the left, in it, and on the right; what lies in it goes where it
+    /// costs less. `None` at and beyond the faces, where it would leave no volume (section 9.2).
+    pub fn split(&self, cell: &Aabb, (axis, at): (usize, f32), [left, planar, right]: [u32; 3]) -> Option<Split> {
+        if at <= cell.lo[axis] || at >= cell.hi[axis] {
             return None;
         }
-        let areas = halves(cell, axis, plane).map(|half| half.scaled_half_area(self.area_scale));
-        let tests = areas[0] * left as f32 + areas[1] * right as f32;
+        let areas = halves(cell, axis, at).map(|half| half.scaled_half_area(self.area_scale));
+        let planar_left = areas[0] <= areas[1];
+        let counts = if planar_left { [left + planar, right] } else { [left, planar + right] };
+        let tests = areas[0] * counts[0] as f32 + areas[1] * counts[1] as f32;
         let steps = self.costs.c_t * cell.scaled_half_area(self.area_scale);
-        Some(Split { axis, plane, cost: steps + self.costs.c_i * tests })
+        Some(Split { plane: Plane { axis, at, planar_left }, cost: steps + self.costs.c_i * tests })
     }
 
     /// The split, if a leaf of so many references costs more.

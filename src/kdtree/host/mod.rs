@@ -15,8 +15,7 @@ use crate::bvh::host::geometry::Corners;
 use crate::bvh::host::lbvh;
 use crate::bvh::layout::{Aabb, Triangle};
 use crate::{Error, Result};
-use clip::Reference;
-pub use clip::padding;
+use clip::{Plane, Reference};
 use heuristic::Heuristic;
 use rayon::prelude::*;
 
@@ -98,18 +97,20 @@ pub fn build_corners(corners: impl Iterator<Item = Corners>, options: &Options) 
         }
         primitive_count += 1;
     }
+    let reach = clip::reach_of(&records);
     let reference = |(record, t): (usize, &Triangle)| Reference {
-        bounds: clip::padded(&[t.v0, t.v1, t.v2]),
+        bounds: clip::bounds_of(&[t.v0, t.v1, t.v2], reach),
         record: record as u32,
     };
     let references: Vec<Reference> = records.par_iter().enumerate().map(reference).collect();
-    let cell = references.iter().fold(Aabb::EMPTY, |b, reference| b.union(&reference.bounds));
+    let around = |t: &Triangle| clip::cell_around(&[t.v0, t.v1, t.v2], reach);
+    let cell = records.iter().fold(Aabb::EMPTY, |b, t| b.union(&around(t)));
     let heuristic = Heuristic::new(options.costs, &cell, records.len() as u32);
     let root = match options.planes {
-        Planes::Exact => exact::build(&heuristic, &records, cell, references),
-        Planes::Binned(bins) => binned::build(&heuristic, &records, bins, cell, references),
+        Planes::Exact => exact::build(&heuristic, (&records, reach), cell, references),
+        Planes::Binned(bins) => binned::build(&heuristic, (&records, reach), bins, cell, references),
     };
-    assemble::assemble(root, &heuristic, cell, records, (primitive_count, status))
+    assemble::assemble(root, &heuristic, (cell, reach), records, (primitive_count, status))
 }
 
 /// Fewer references than this are not worth another thread.
@@ -121,8 +122,7 @@ enum Subtree {
     /// The records, ascending.
     Leaf(Vec<u32>),
     Inner {
-        axis: usize,
-        plane: f32,
+        plane: Plane,
         children: Box<[Subtree; 2]>,
     },
 }
@@ -137,7 +137,7 @@ impl Subtree {
 
     /// Both sides of a plane, each made by a thread of its own if there is work enough.
     fn inner(
-        (axis, plane): (usize, f32),
+        plane: Plane,
         count: usize,
         left: impl FnOnce() -> Subtree + Send,
         right: impl FnOnce() -> Subtree + Send,
@@ -146,7 +146,7 @@ impl Subtree {
         match children {
             // Clipping has shown that nothing touches the cell.
             (Subtree::Empty, Subtree::Empty) => Subtree::Empty,
-            (left, right) => Subtree::Inner { axis, plane, children: Box::new([left, right]) },
+            (left, right) => Subtree::Inner { plane, children: Box::new([left, right]) },
         }
     }
 }
