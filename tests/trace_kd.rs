@@ -240,6 +240,22 @@ fn hits_at_negative_distances_are_found() {
 }
 
 #[test]
+fn traversals_have_the_names_that_options_take() {
+    for (name, traversal) in [
+        ("stack", Traversal::STACK),
+        ("restart", Traversal::RESTART),
+        ("push-down", Traversal::PUSH_DOWN),
+        ("short-4", Traversal::short_stack(4)),
+        ("short-1-push-down", Traversal::short_stack_with_push_down(1)),
+    ] {
+        assert_eq!(name.parse(), Ok(traversal));
+    }
+    for wrong in ["", "Stack", "short", "short-", "short-0", "short-x", "short-2-", "short-99999999999999999999"] {
+        assert_eq!(wrong.parse::<Traversal>(), Err(()), "{wrong}");
+    }
+}
+
+#[test]
 fn an_empty_tree_has_no_hits_and_takes_no_work() {
     for tree in both(&Corners::new()) {
         let (hit, work) = kd_host::trace(&tree, &ray([0.0; 3], [1.0; 3]), Query::ClosestHit, Traversal::STACK);

@@ -1,7 +1,7 @@
 //! Builders of kd-trees on the host as subjects: wall-clock time, the host's tracer on every core.
 
 use super::host::timed;
-use super::{BuildRun, Subject, record};
+use super::{BuildRun, Outcome, Subject, record};
 use crate::Result;
 use crate::bvh::layout::Bvh2;
 use crate::kdtree::host::{Options, build};
@@ -17,15 +17,16 @@ pub struct KdHost<'a> {
     builder: String,
     mesh: &'a Mesh,
     options: Options,
+    traversal: Traversal,
     tree: Option<KdTree>,
     rays: Vec<Ray>,
     hits: Vec<Hit>,
 }
 
 impl<'a> KdHost<'a> {
-    /// On `mesh`.
-    pub fn new(builder: &str, mesh: &'a Mesh, options: Options) -> KdHost<'a> {
-        KdHost { builder: builder.to_owned(), mesh, options, tree: None, rays: Vec::new(), hits: Vec::new() }
+    /// On `mesh`, to be traced in this way.
+    pub fn new(builder: &str, mesh: &'a Mesh, options: Options, traversal: Traversal) -> KdHost<'a> {
+        KdHost { builder: builder.to_owned(), mesh, options, traversal, tree: None, rays: Vec::new(), hits: Vec::new() }
     }
 
     fn built(&mut self) -> Result<&KdTree> {
@@ -37,9 +38,9 @@ impl<'a> KdHost<'a> {
     }
 
     fn traced(&mut self, query: Query) -> Result<(f64, Vec<(Hit, Work)>)> {
-        let rays = std::mem::take(&mut self.rays);
+        let (rays, traversal) = (std::mem::take(&mut self.rays), self.traversal);
         let tree = self.built()?;
-        let traced = timed(|| rays.par_iter().map(|ray| trace(tree, ray, query, Traversal::STACK)).collect());
+        let traced = timed(|| rays.par_iter().map(|ray| trace(tree, ray, query, traversal)).collect());
         self.rays = rays;
         Ok(traced)
     }
@@ -76,6 +77,11 @@ impl Subject for KdHost<'_> {
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {
         Ok(None)
+    }
+
+    fn outcome(&mut self) -> Result<Option<Outcome>> {
+        let header = &self.built()?.header;
+        Ok(Some(Outcome { active: header.active, status: header.status }))
     }
 
     fn bytes(&mut self) -> Result<Option<Vec<u8>>> {

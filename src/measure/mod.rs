@@ -31,4 +31,4 @@ mod subject;
 pub mod total_time;
 mod wide;
 
-pub use subject::{BuildRun, Subject};
+pub use subject::{BuildRun, Outcome, Subject};

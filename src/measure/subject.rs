@@ -15,6 +15,15 @@ pub struct BuildRun {
     pub phases: Vec<gpu::Phase>,
 }
 
+/// What a structure of ours says of how it was built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Outcome {
+    /// Primitives that are in it.
+    pub active: u32,
+    /// Bits of [`crate::bvh::layout::status`].
+    pub status: u32,
+}
+
 /// A builder on a scene. Whatever is uploaded once is uploaded when the subject is made, not under the clock.
 ///
 /// Order of calls: `build` first, any number of times; then the others.
@@ -50,6 +59,13 @@ pub trait Subject {
     /// # Errors
     /// The device failed.
     fn tree(&mut self) -> Result<Option<Bvh2>>;
+    /// What the built structure's header says, where its layout is ours.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn outcome(&mut self) -> Result<Option<Outcome>> {
+        Ok(self.tree()?.map(|tree| Outcome { active: tree.header.active, status: tree.header.status }))
+    }
     /// The bytes of what is traced, where they are ours to read: the same input gives the same.
     ///
     /// # Errors

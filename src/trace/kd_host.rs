@@ -60,6 +60,25 @@ impl Traversal {
     }
 }
 
+impl std::str::FromStr for Traversal {
+    type Err = ();
+
+    /// `stack`, `restart`, `push-down`, `short-N` or `short-N-push-down`, N being a capacity from 1 to [`MAX_DEPTH`].
+    fn from_str(name: &str) -> std::result::Result<Traversal, ()> {
+        let (capacity, push_down) = match name {
+            "stack" => return Ok(Traversal::STACK),
+            "restart" => return Ok(Traversal::RESTART),
+            "push-down" => return Ok(Traversal::PUSH_DOWN),
+            _ => {
+                let short = name.strip_prefix("short-").ok_or(())?;
+                short.strip_suffix("-push-down").map_or((short, false), |capacity| (capacity, true))
+            }
+        };
+        let capacity = capacity.parse().ok().filter(|capacity| (1..=MAX_DEPTH as usize).contains(capacity)).ok_or(())?;
+        Ok(Traversal { capacity, push_down })
+    }
+}
+
 /// The nearest hit; of equally near ones that with the lower primitive index.
 pub fn closest_hit(tree: &KdTree, ray: &Ray, traversal: Traversal) -> Hit {
     trace(tree, ray, Query::ClosestHit, traversal).0

@@ -75,7 +75,7 @@ impl Spec {
         Ok(match self.builder().kind {
             Kind::Device(options) => Box::new(self.on_device(given()?, mesh, options(self)?)?),
             Kind::Host(hierarchy) => Box::new(Host::new(&name, mesh, self.host_options(hierarchy(self)?)?)),
-            Kind::KdHost(options) => Box::new(KdHost::new(&name, mesh, options(self)?)),
+            Kind::KdHost(options) => Box::new(KdHost::new(&name, mesh, options(self)?, self.traversal()?)),
             Kind::Auto => Box::new(Auto::new(given()?, &name, mesh, self.rays()?)?),
             Kind::Driver(preference) => Box::new(Driver::new(given()?, mesh, preference)?),
             #[cfg(feature = "peer-obvhs")]
@@ -252,7 +252,11 @@ mod tests {
             let says = format!("kt={wrong} is not known; take a cost of a traversal step, from 0.001 to 1000");
             assert!(error_of(&format!("kd-exact:kt={wrong}")).contains(&says), "{wrong}");
         }
-        assert!(error_of("kd-exact:bins=8").contains("no option \"bins\"; it takes kt, ki"));
+        for wrong in ["queue", "short", "short-0", "short-42", "short-2-up", "stack-push-down"] {
+            let says = format!("traversal={wrong} is not known; take stack, restart, push-down, short-N");
+            assert!(error_of(&format!("kd-exact:traversal={wrong}")).contains(&says), "{wrong}");
+        }
+        assert!(error_of("kd-exact:bins=8").contains("no option \"bins\"; it takes kt, ki, traversal"));
         assert!(error_of("auto:rays=many").contains("no number of rays"));
         assert!(error_of("").contains("-b all"));
         assert!(error_of(",").contains("-b all"));

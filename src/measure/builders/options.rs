@@ -14,6 +14,7 @@ use crate::kdtree::host::Planes;
 use crate::kdtree::termination::Costs;
 use crate::measure::choose;
 use crate::measure::host::{self, Hierarchy};
+use crate::trace::kd_host::Traversal;
 use crate::trace::wide::Order;
 use crate::{Error, Result};
 use std::time::Duration;
@@ -54,6 +55,11 @@ pub(super) const KT: BuilderOption =
 pub(super) const KI: BuilderOption =
     BuilderOption { key: "ki", values: "a cost of a triangle test, from 0.001 to 1000; 2 unless given" };
 
+pub(super) const TRAVERSAL: BuilderOption = BuilderOption {
+    key: "traversal",
+    values: "stack, restart, push-down, short-N or short-N-push-down, N being how much a short stack holds; stack unless given",
+};
+
 /// Of `ploc` where it is not told: what drivers take.
 const PLOC_RADIUS: u32 = 16;
 
@@ -63,7 +69,7 @@ impl Spec {
         match self.builder().kind {
             Kind::Device(options) => options(self).and(self.form_and_order()).map(drop),
             Kind::Host(hierarchy) => self.host_options(hierarchy(self)?).map(drop),
-            Kind::KdHost(options) => options(self).map(drop),
+            Kind::KdHost(options) => options(self).and(self.traversal()).map(drop),
             Kind::Auto => self.rays().map(drop),
             // They take none.
             Kind::Driver(_) => Ok(()),
@@ -150,6 +156,12 @@ impl Spec {
     pub(super) fn ploc_radius(&self) -> Result<usize> {
         let radius = self.number(&RADIUS, 25)?;
         if radius > 0 { Ok(radius as usize) } else { Err(self.wrong_value(&RADIUS, "0")) }
+    }
+
+    /// Option `traversal`.
+    pub(super) fn traversal(&self) -> Result<Traversal> {
+        let Some(value) = self.option(TRAVERSAL.key) else { return Ok(Traversal::STACK) };
+        value.parse().map_err(|()| self.wrong_value(&TRAVERSAL, value))
     }
 
     /// Options `kt` and `ki`.

@@ -2,8 +2,8 @@
 
 use super::Spec;
 use super::options::{
-    BINS, BITS, CODES, COLLAPSE, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT, TERMINATION, TREELET, WIDTH,
-    WINDOW,
+    BINS, BITS, CODES, COLLAPSE, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT, TERMINATION, TRAVERSAL,
+    TREELET, WIDTH, WINDOW,
 };
 use crate::Result;
 use crate::bvh::builder;
@@ -155,13 +155,13 @@ pub static BUILDERS: &[Builder] = &[
     )
     .taking(&[COLLAPSE, OPTIMISE, TERMINATION]),
     Builder::new(&"kd-exact", "kd-tree on the host: perfect splits by SAH", Kind::KdHost(Spec::kd_exact_options))
-        .taking(&[KT, KI]),
+        .taking(&[KT, KI, TRAVERSAL]),
     Builder::new(
         &"kd-binned",
         "kd-tree on the host: the best by SAH of equally spaced planes",
         Kind::KdHost(Spec::kd_binned_options),
     )
-    .taking(&[BINS, KT, KI]),
+    .taking(&[BINS, KT, KI, TRAVERSAL]),
     Builder::new(
         &"driver-fast-build",
         "the Vulkan driver's own, asked to build fast",

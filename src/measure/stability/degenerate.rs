@@ -130,17 +130,14 @@ fn fill(point: &mut Degenerate, stage: &Stage<'_>, spec: &Spec, mesh: &Mesh, tru
         point.valid = Some(error.is_none());
         point.faults.extend(error.map(|error| error.to_string()));
     }
-    if let Some(tree) = subject.tree()? {
-        point.active = Some(tree.header.active.into());
-        point.status = Some(status::names(tree.header.status));
-        let lost = truth.tree.header.active.abs_diff(tree.header.active);
-        if lost > 0 {
-            point.faults.push(format!(
-                "{} active triangles, {} are finite and in range",
-                tree.header.active, truth.tree.header.active
-            ));
+    if let Some(outcome) = subject.outcome()? {
+        point.active = Some(outcome.active.into());
+        point.status = Some(status::names(outcome.status));
+        let sound = truth.tree.header.active;
+        if outcome.active != sound {
+            point.faults.push(format!("{} active triangles, {sound} are finite and in range", outcome.active));
         }
-        if tree.header.status & status::UNUSABLE != 0 {
+        if outcome.status & status::UNUSABLE != 0 {
             point.faults.push("the status says that the tree cannot be used".into());
         }
     }
