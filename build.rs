@@ -47,6 +47,7 @@ fn compile_others(out: &Path) {
         ("examples/engine.comp", None, "example_engine.spv"),
         ("tests/shaders/probe.comp", None, "probe_of_the_driver.spv"),
         ("tests/shaders/probe.comp", Some("WITH_HEDGEROW"), "probe.spv"),
+        ("tests/shaders/kd_probe.comp", None, "kd_probe.spv"),
     ] {
         println!("cargo:rerun-if-changed={source}");
         let source = Path::new(source);

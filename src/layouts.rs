@@ -9,6 +9,8 @@ use crate::bvh::layout::{BoxRecord, Child, GeometryEntry, Header, Instance, Node
 use crate::bvh::split::Reference;
 use crate::bvh::wide::quantised::QuantisedNode;
 use crate::gpu::shaders;
+use crate::kdtree::layout as kdtree;
+use crate::trace::kd::TreeEntry;
 use crate::trace::{Hit, Ray};
 use crate::{accel, bvh, gpu, measure, trace};
 use rspirv::dr::{Instruction, Module, Operand};
@@ -56,6 +58,8 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "accel" if is("rebraid") => accel::push_constants::rebraid(),
         "accel" if is("ranges") => accel::push_constants::ranges(),
         "accel" if is("serialize") => accel::push_constants::serialize(),
+        "kdtree" if is("merge_setup") || is("merge_restore") => crate::kdtree::merge::push_constants(),
+        "kdtree" if is("build") || is("merge") => crate::kdtree::builder::push_constants(),
         "bvh" if is("compact") => bvh::compact::push_constants(),
         "bvh" if is("epo") => bvh::epo::push_constants(),
         "bvh" if is("lbvh_workgroup") => bvh::lbvh_workgroup::push_constants(),
@@ -111,6 +115,33 @@ fn structs() -> BTreeMap<&'static str, Layout> {
     let mut geometry =
         layout_of!(Geometry { vertices, indices, transform, vertex_stride, vertex_count, vertex_format, first });
     geometry.members[5] = ("formats".into(), offset_of!(Geometry, vertex_format), 4);
+    let mut kd_header = layout_of!(kdtree::Header {
+        magic,
+        kind,
+        status,
+        primitive_count,
+        lo,
+        node_count,
+        hi,
+        reference_count,
+        active,
+        inner_nodes,
+        leaves,
+        empty_leaves,
+        geometry_count,
+        geometry_flags,
+        build_flags,
+        depth,
+        area_scale,
+        reach,
+        node_room,
+        reference_room,
+        record_room,
+        replaced_nodes,
+        replaced_references,
+        reserved
+    });
+    kd_header.members[8].0 = "active_count".into();
     BTreeMap::from([
         ("Child", layout_of!(Child { lo, index, hi, count })),
         ("Node", node),
@@ -137,10 +168,13 @@ fn structs() -> BTreeMap<&'static str, Layout> {
             layout_of!(QuantisedNode { origin, exponents_and_nodes, first_child, first_record, counts, lo, hi }),
         ),
         ("Header", header),
+        ("KdHeader", kd_header),
+        ("KdNode", layout_of!(kdtree::Node { first, second })),
         ("Geometry", geometry),
         ("SerializedHead", layout_of!(Head { version, serialized_bytes, structure_bytes, handle_count })),
         ("Ray", layout_of!(Ray { origin, t_min, direction, t_max })),
         ("Hit", layout_of!(Hit { t, primitive, u, v })),
+        ("TreeEntry", layout_of!(TreeEntry { structure, first, reserved })),
     ])
 }
 

@@ -6,7 +6,7 @@
 //! 2. [`gpu`] records passes into a command buffer: reductions, scans, sorts, the task pool;
 //! 3. [`bvh`] turns triangles into codes, codes into an order, the order into a hierarchy, and that into a [`bvh::layout`];
 //! 4. [`kdtree`] turns them into a kd-tree instead;
-//! 5. [`accel`] does that by the calls and structs of `VK_KHR_acceleration_structure`;
+//! 5. [`accel`] does what [`bvh`] does by the calls and structs of `VK_KHR_acceleration_structure`;
 //! 6. [`trace`] finds the hits of rays in it;
 //! 7. [`measure`] turns builds and hits into figures, finds where methods give way (`stability`) and which to take (`choose`);
 //! 8. [`report`] turns figures into tables and charts;

@@ -86,7 +86,7 @@ fn lbvh_costs_are_those_of_an_independent_program_within_half_a_percent() {
 }
 
 #[test]
-#[ignore = "scenes of up to 1.4M triangles"]
+#[ignore = "scenes of up to 1.4M triangles take minutes"]
 fn lbvh_costs_of_large_scenes_are_those_of_an_independent_program_within_half_a_percent() {
     compare_lbvhs(|triangles| triangles >= SMALL);
 }
@@ -108,13 +108,13 @@ fn hlbvh_costs_at_most_1_15_of_full_sweep_in_the_mean() {
 }
 
 #[test]
-#[ignore = "scenes of up to 1.4M triangles"]
+#[ignore = "scenes of up to 1.4M triangles take minutes"]
 fn hlbvh_costs_of_large_scenes_are_at_most_1_15_of_full_sweep_in_the_mean() {
     compare_hlbvhs(|_| true);
 }
 
 #[test]
-#[ignore = "871,414 triangles, one builder with a window of 200"]
+#[ignore = "871,414 triangles, one builder with a window of 200: minutes"]
 fn large_scene_dragon_has_the_costs_of_frantal_2019() {
     let Some(scene) = load("dragon.tri") else { return };
     assert_eq!(scene.mesh.triangles.len(), 871_414);
@@ -176,7 +176,7 @@ fn load(name: &str) -> Option<Scene> {
 /// The cost of what `builder` makes of `scene` is the expected one but for this share of it.
 fn compare(scene: &Scene, builder: &str, expected: f64, tolerance: f64) {
     let spec: Spec = builder.parse().unwrap();
-    let on = matches!(spec.builder().needs(), Needs::Device).then(device);
+    let on = matches!(spec.needs(), Needs::Device).then(device);
     let mut subject = spec.make(on, &scene.mesh).unwrap();
     subject.build().unwrap();
     let got = subject.quality(3.0, 2.0).unwrap().sah.unwrap();

@@ -5,9 +5,10 @@ mod common;
 use common::corpus::{self, Mesh};
 use common::shapes::{Corners, icosphere, placed, soup};
 use hedgerow::bvh::layout::status;
+use hedgerow::bvh::quality::Quality;
 use hedgerow::kdtree::host::{Options, Planes, build};
 use hedgerow::kdtree::layout::KdTree;
-use hedgerow::kdtree::quality::{self, Quality};
+use hedgerow::kdtree::quality;
 use hedgerow::kdtree::termination::{Costs, depth_limit};
 
 const BOTH: [Options; 2] = [Options::EXACT, Options::BINNED];

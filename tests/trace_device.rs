@@ -3,7 +3,9 @@
 mod common;
 
 use common::device;
-use common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, soup, tree_of, tree_with};
+use common::shapes::{
+    Corners, hard_rays, icosphere, no_rays, placed, ray, rays_from_the_middle, rays_with, soup, tree_of, tree_with,
+};
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
@@ -116,16 +118,7 @@ fn closed_surfaces_do_not_leak() {
         [(1.0, [0.0; 3]), (1e-20, [0.0; 3]), (1e20, [0.0; 3]), (1.0, [1e3, -1e4, 1e2]), (1.0, [1e6; 3])]
     {
         let corners = placed(&icosphere(4), scale, offset);
-        let mut random = Random(3);
-        let rays: Vec<Ray> = (0..20_000)
-            .map(|i| {
-                let [a, b, c] = corners[random.bits() as usize % corners.len()];
-                let along = [0.0, 0.25, 0.5, 1.0, random.signed().abs()][i % 5];
-                let from = if i % 7 == 0 { c } else { a };
-                let to = |k: usize| along * (b[k] - offset[k]) + (1.0 - along) * (from[k] - offset[k]);
-                ray(offset, std::array::from_fn(|k| to(k) / scale))
-            })
-            .collect();
+        let rays = rays_from_the_middle(&corners, 20_000, scale, offset);
         let tree = tree_of(&corners);
         let (hits, _) = traced(&tree, &rays, &shapes()[0], Query::ClosestHit, false);
         for (ray, hit) in rays.iter().zip(&hits) {
@@ -138,19 +131,9 @@ fn closed_surfaces_do_not_leak() {
 #[test]
 fn what_is_no_ray_hits_nothing_and_ends() {
     let tree = tree_of(&icosphere(3));
-    let with = |bad: f32| {
-        let mut rays = vec![ray([0.0; 3], [bad; 3])];
-        for field in 0..8 {
-            let mut words = [0.1, 0.2, 0.3, 0.0, 0.5, 0.6, -0.7, 9.0];
-            words[field] = bad;
-            rays.push(bytemuck::cast(words));
-        }
-        rays
-    };
-    let no_rays = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1e38].map(with).concat();
-    assert_as_on_the_host(&tree, &no_rays);
+    assert_as_on_the_host(&tree, &no_rays());
     // A device may take a subnormal number for zero, and find out sooner that there is nothing to hit.
-    let subnormal = with(1e-40);
+    let subnormal = rays_with(1e-40);
     for shape in shapes() {
         let (hits, _) = traced(&tree, &subnormal, &shape, Query::ClosestHit, false);
         for (ray, hit) in subnormal.iter().zip(hits) {

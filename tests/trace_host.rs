@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, soup, tree_of, tree_with};
+use common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, rays_from_inside, soup, tree_of, tree_with};
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::Bvh2;
@@ -88,15 +88,7 @@ fn closed_surfaces_do_not_leak() {
     ] {
         let corners = placed(&sphere, scale, offset);
         let tree = tree_of(&corners);
-        let mut random = Random(7);
-        for i in 0..30_000 {
-            let origin = if i % 2 == 0 { offset } else { common::shapes::add(offset, random.point(0.2 * scale)) };
-            let [a, b, c] = corners[random.bits() as usize % corners.len()];
-            let along = [0.0, 0.25, 0.5, 1.0, random.signed().abs()][i % 5];
-            let inside = if i % 7 == 0 { c } else { a };
-            let direction: [f32; 3] =
-                std::array::from_fn(|k| along * (b[k] - origin[k]) + (1.0 - along) * (inside[k] - origin[k]));
-            let ray = ray(origin, direction.map(|x| x / scale));
+        for ray in rays_from_inside(&corners, 30_000, scale, offset) {
             assert!(host::closest_hit(&tree, &ray).is_some(), "leaks at scale {scale:e}, offset {offset:?}: {ray:?}");
         }
     }

@@ -3,7 +3,7 @@
 mod common;
 
 use common::corpus;
-use common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, soup, tree_of};
+use common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, rays_from_inside, soup, tree_of};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::kdtree::host::{Options, build};
 use hedgerow::kdtree::layout::{Content, KdTree};
@@ -151,15 +151,7 @@ fn closed_surfaces_do_not_leak() {
     ] {
         let corners = placed(&sphere, scale, offset);
         let trees = both(&corners);
-        let mut random = Random(7);
-        for i in 0..10_000 {
-            let origin = if i % 2 == 0 { offset } else { common::shapes::add(offset, random.point(0.2 * scale)) };
-            let [a, b, c] = corners[random.bits() as usize % corners.len()];
-            let along = [0.0, 0.25, 0.5, 1.0, random.signed().abs()][i % 5];
-            let inside = if i % 7 == 0 { c } else { a };
-            let direction: [f32; 3] =
-                std::array::from_fn(|k| along * (b[k] - origin[k]) + (1.0 - along) * (inside[k] - origin[k]));
-            let ray = ray(origin, direction.map(|x| x / scale));
+        for (i, ray) in rays_from_inside(&corners, 10_000, scale, offset).into_iter().enumerate() {
             let hits = trees.each_ref().map(|tree| kd_host::closest_hit(tree, &ray, TRAVERSALS[i % TRAVERSALS.len()]));
             assert!(hits[0].is_some() && hits[0] == hits[1], "leaks at scale {scale:e}, offset {offset:?}: {ray:?}");
         }

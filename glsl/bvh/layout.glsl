@@ -26,6 +26,7 @@ const uint STATUS_SPIN_RAN_OUT = 1u << 3;
 const uint STATUS_BAD_INSTANCE = 1u << 4;
 const uint STATUS_WRONG_VERSION = 1u << 5;
 const uint STATUS_DEPTH_LIMITED = 1u << 6;
+const uint STATUS_OUT_OF_ROOM = 1u << 7;
 const uint STATUS_UNUSABLE = STATUS_TOO_DEEP | STATUS_SPIN_RAN_OUT | STATUS_WRONG_VERSION;
 
 const uint GEOMETRY_OPAQUE = 1u << 0;

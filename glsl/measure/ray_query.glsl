@@ -40,7 +40,9 @@ void main() {
     if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionTriangleEXT) {
         vec2 uv = rayQueryGetIntersectionBarycentricsEXT(query, true);
         hit.t = ANY_HIT ? 0.0 : rayQueryGetIntersectionTEXT(query, true);
-        hit.primitive = rayQueryGetIntersectionPrimitiveIndexEXT(query, true);
+        // Instances are numbered by their first primitives, where those of several are to be told apart.
+        hit.primitive = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true)) +
+                        uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true));
         hit.u = uv.x;
         hit.v = uv.y;
     }

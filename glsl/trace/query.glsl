@@ -31,40 +31,8 @@
 #ifndef HEDGEROW_TRACE_QUERY
 #define HEDGEROW_TRACE_QUERY
 
-// The library's own shaders say Node and Triangle; in somebody else's these names are theirs, so they end with this file.
-#define Child HedgerowChild
-#define Node HedgerowNode
-#define Triangle HedgerowTriangle
-#define BoxRecord HedgerowBoxRecord
-#define Instance HedgerowInstance
-#define GeometryEntry HedgerowGeometryEntry
-#define Header HedgerowHeader
-#define Structure HedgerowStructure
-#define Triangles HedgerowTriangles
-#define BoxRecords HedgerowBoxRecords
-#define Instances HedgerowInstances
-#define GeometryTable HedgerowGeometryTable
-#define triangles_of hedgerow_triangles_of
-#define address_of hedgerow_address_of
-#define records_at hedgerow_records_at
-#define record_bytes hedgerow_record_bytes
-#define geometry_table_at hedgerow_geometry_table_at
-#define MAGIC HEDGEROW_MAGIC
-#define KIND_TRIANGLES HEDGEROW_KIND_TRIANGLES
-#define KIND_BOXES HEDGEROW_KIND_BOXES
-#define KIND_INSTANCES HEDGEROW_KIND_INSTANCES
-#define MAX_DEPTH HEDGEROW_MAX_DEPTH
-#define UNUSED HEDGEROW_UNUSED
-#define AT_ROOT HEDGEROW_AT_ROOT
-#define STATUS_NON_FINITE HEDGEROW_STATUS_NON_FINITE
-#define STATUS_INDEX_OUT_OF_RANGE HEDGEROW_STATUS_INDEX_OUT_OF_RANGE
-#define STATUS_TOO_DEEP HEDGEROW_STATUS_TOO_DEEP
-#define STATUS_SPIN_RAN_OUT HEDGEROW_STATUS_SPIN_RAN_OUT
-#define STATUS_BAD_INSTANCE HEDGEROW_STATUS_BAD_INSTANCE
-#define STATUS_WRONG_VERSION HEDGEROW_STATUS_WRONG_VERSION
-#define STATUS_DEPTH_LIMITED HEDGEROW_STATUS_DEPTH_LIMITED
-#define STATUS_UNUSABLE HEDGEROW_STATUS_UNUSABLE
-#define GEOMETRY_OPAQUE HEDGEROW_GEOMETRY_OPAQUE
+// Names that are the includer's: until the end of this file.
+#include "bvh/names.glsl"
 #ifndef HEDGEROW_QUERIES
 #define HEDGEROW_QUERIES 1
 #endif
@@ -202,37 +170,5 @@ vec3 hedgerowRayQueryGetWorldRayDirection(HedgerowRayQuery query) {
     return query.ray.direction;
 }
 
-#undef Child
-#undef Node
-#undef Triangle
-#undef BoxRecord
-#undef Instance
-#undef GeometryEntry
-#undef Header
-#undef Structure
-#undef Triangles
-#undef BoxRecords
-#undef Instances
-#undef GeometryTable
-#undef triangles_of
-#undef address_of
-#undef records_at
-#undef record_bytes
-#undef geometry_table_at
-#undef MAGIC
-#undef KIND_TRIANGLES
-#undef KIND_BOXES
-#undef KIND_INSTANCES
-#undef MAX_DEPTH
-#undef UNUSED
-#undef AT_ROOT
-#undef STATUS_NON_FINITE
-#undef STATUS_INDEX_OUT_OF_RANGE
-#undef STATUS_TOO_DEEP
-#undef STATUS_SPIN_RAN_OUT
-#undef STATUS_BAD_INSTANCE
-#undef STATUS_WRONG_VERSION
-#undef STATUS_DEPTH_LIMITED
-#undef STATUS_UNUSABLE
-#undef GEOMETRY_OPAQUE
+#include "bvh/names_end.glsl"
 #endif

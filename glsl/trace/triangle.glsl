@@ -90,7 +90,7 @@ bool hedgerow_meet_facing(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, ou
     float largest = max(m.x, m.y);
     precise float cube = largest * largest * largest;
     precise float sum = edges.x + edges.y + edges.z;
-    // No vertex is nearer to the origin along all axes.
+    // Along some axis, the farthest vertex is at least this far from the origin.
     precise float reach = max(max(abs(a.z), abs(b.z)), max(abs(c.z), 0.5 * largest));
     precise float error = HEDGEROW_PART_OF_CUBE * cube;
     precise float allowed = reach * abs(sum);

@@ -14,6 +14,7 @@
 //! names is unused: the `count` of its left child is [`UNUSED`], and nothing else of it means anything. The slots from
 //! `active` − 1 on are unused.
 
+use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 
 /// The first word of a structure.
@@ -46,12 +47,14 @@ pub mod status {
     pub const WRONG_VERSION: u32 = 1 << 5;
     /// Subtrees at [`super::MAX_DEPTH`] became leaves: rays that come there test more than they should.
     pub const DEPTH_LIMITED: u32 = 1 << 6;
+    /// Nodes of a kd-tree became leaves, as there was no room for what is below them: rays that come there test more than they should.
+    pub const OUT_OF_ROOM: u32 = 1 << 7;
     /// Bits of structures that cannot be traced: tracers take them as empty.
     pub const UNUSABLE: u32 = TOO_DEEP | SPIN_RAN_OUT | WRONG_VERSION;
 
     /// The names of the bits that are set, for people.
     pub fn names(status: u32) -> Vec<String> {
-        const NAMES: [(u32, &str); 7] = [
+        const NAMES: [(u32, &str); 8] = [
             (NON_FINITE, "not finite"),
             (INDEX_OUT_OF_RANGE, "index out of range"),
             (TOO_DEEP, "too deep"),
@@ -59,6 +62,7 @@ pub mod status {
             (BAD_INSTANCE, "bad instance"),
             (WRONG_VERSION, "wrong version"),
             (DEPTH_LIMITED, "depth limited"),
+            (OUT_OF_ROOM, "out of room"),
         ];
         let name = |bit: u32| NAMES.iter().find(|(b, _)| *b == 1 << bit).map(|(_, name)| (*name).to_owned());
         let is_set = |bit: &u32| status >> bit & 1 == 1;
@@ -431,6 +435,21 @@ const _: () = assert!(size_of::<Header>() == 128 && size_of::<Node>() == 64 && s
 const _: () = assert!(size_of::<BoxRecord>() == 28 && size_of::<Instance>() == 128);
 const _: () = assert!(BoxRecord::KIND & 0xFFFF == VERSION && Instance::KIND & 0xFFFF == VERSION);
 
+/// The header that a structure's bytes begin with; the first two words of every one are [`MAGIC`] and the structure's kind.
+pub(crate) fn header_of<H: Pod>(bytes: &[u8], kind: u32) -> Result<H> {
+    let head = size_of::<H>();
+    if bytes.len() < head {
+        return Err(Error::InvalidStructure(format!("{} bytes, the header alone has {head}", bytes.len())));
+    }
+    let [magic, its_kind]: [u32; 2] = bytemuck::pod_read_unaligned(&bytes[..8]);
+    if (magic, its_kind) != (MAGIC, kind) {
+        return Err(Error::InvalidStructure(format!(
+            "begins with {magic:#x} {its_kind:#x}, not with {MAGIC:#x} {kind:#x}: of another kind or version"
+        )));
+    }
+    Ok(bytemuck::pod_read_unaligned(&bytes[..head]))
+}
+
 /// A structure on the host, read back or built there.
 #[derive(Debug, Clone)]
 pub struct Bvh2<R: Record = Triangle> {
@@ -445,28 +464,17 @@ pub struct Bvh2<R: Record = Triangle> {
 }
 
 impl<R: Record> Bvh2<R> {
-    /// Takes a structure's bytes apart.
+    /// Takes a structure's bytes apart; what lies behind them is of no interest.
     ///
     /// # Errors
-    /// [`crate::Error::InvalidStructure`] if the magic, kind or length is not that of a structure of such records.
-    pub fn from_bytes(bytes: &[u8]) -> crate::Result<Bvh2<R>> {
-        let invalid = |what: String| crate::Error::InvalidStructure(what);
-        if bytes.len() < size_of::<Header>() {
-            return Err(invalid(format!("{} bytes, the header alone has {}", bytes.len(), size_of::<Header>())));
-        }
-        let header: Header = bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()]);
-        if header.magic != MAGIC || header.kind != R::KIND {
-            return Err(invalid(format!(
-                "begins with {:#x} {:#x}, not with {MAGIC:#x} {:#x}: of another kind or version",
-                header.magic,
-                header.kind,
-                R::KIND
-            )));
-        }
+    /// [`Error::InvalidStructure`] if the magic, kind or length is not that of a structure of such records.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Bvh2<R>> {
+        let header: Header = header_of(bytes, R::KIND)?;
         let sizes = header.sizes(size_of::<R>() as u64);
         if (bytes.len() as u64) < sizes.bytes {
             let (has, needs) = (bytes.len(), sizes.bytes);
-            return Err(invalid(format!("{has} bytes, {} primitives need {needs}", header.primitive_count)));
+            let what = format!("{has} bytes, {} primitives need {needs}", header.primitive_count);
+            return Err(Error::InvalidStructure(what));
         }
         let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
         Ok(Bvh2 {

@@ -8,15 +8,17 @@ use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Kernel, Limits, Recorder, fill, shaders};
 use bytemuck::{Pod, Zeroable};
 
-/// What a walk over a tree finds.
+/// What a walk over a tree finds, of whatever kind it is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Quality {
     /// SAH cost (CONTRACT): (c_T · Σ SA(inner) + c_I · Σ SA(leaf)·n_leaf) / SA(root), the root included.
     pub sah: f64,
     /// Inner nodes.
     pub inner: u64,
-    /// Leaves.
+    /// Leaves, those that hold nothing among them.
     pub leaves: u64,
+    /// Leaves that hold nothing: of kd-trees alone.
+    pub empty_leaves: u64,
     /// Triangles in all leaves.
     pub refs: u64,
     /// Most triangles in a leaf.
@@ -25,6 +27,13 @@ pub struct Quality {
     pub depth_avg: f64,
     /// Depth of the deepest leaf.
     pub depth_max: u32,
+}
+
+impl Quality {
+    /// Mean triangles in a leaf that has any; 0 where none has.
+    pub fn prims_per_leaf(&self) -> f64 {
+        self.refs as f64 / (self.leaves - self.empty_leaves).max(1) as f64
+    }
 }
 
 /// What the device leaves behind, 36 bytes: `Figures` in quality.glsl. Areas are relative to that of the root.
@@ -49,6 +58,7 @@ impl Figures {
             sah: c_t * f64::from(self.inner_area) + c_i * f64::from(self.leaf_area),
             inner: self.inner.into(),
             leaves: self.leaves.into(),
+            empty_leaves: 0,
             refs: self.refs.into(),
             leaf_max: self.leaf_max,
             depth_avg: if self.leaves == 0 { 0.0 } else { depths / f64::from(self.leaves) },

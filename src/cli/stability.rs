@@ -261,7 +261,7 @@ fn opened(common: &Common, text: &str) -> anyhow::Result<(Option<Device>, Vec<Sp
 
 /// Where and how it is measured; nothing has failed yet.
 fn started(device: Option<&Device>, specs: &[Spec], options: &[(&str, Option<String>)]) -> crate::Result<Run> {
-    let has_driver = specs.iter().any(|spec| spec.builder().needs() == builders::Needs::RayQuery);
+    let has_driver = specs.iter().any(|spec| spec.needs() == builders::Needs::RayQuery);
     Ok(Run {
         schema: SCHEMA,
         machine: Machine::this(),

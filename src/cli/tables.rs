@@ -76,7 +76,9 @@ pub fn build(outcome: &Outcome) -> String {
         ("leaf count variability".into(), or_dash(q.lcv, three_decimals), "", None),
         ("inner nodes".into(), or_dash(q.inner, grouped), "scratch", m.scratch_bytes),
         ("leaves".into(), or_dash(q.leaves, grouped), "peak", m.peak_bytes),
-        ("triangles a leaf".into(), or_dash(q.prims_per_leaf, three_digits), "", None),
+        ("leaves without a triangle".into(), or_dash(q.empty_leaves, grouped), "", None),
+        ("triangles a leaf, mean".into(), or_dash(q.prims_per_leaf, three_digits), "", None),
+        ("triangles a leaf, most".into(), or_dash(q.prims_per_leaf_max, grouped), "", None),
         ("depth, mean".into(), or_dash(q.depth_avg, three_digits), "", None),
         ("depth, most".into(), or_dash(q.depth_max, grouped), "", None),
     ];

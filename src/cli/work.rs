@@ -25,7 +25,7 @@ pub fn device_for_those<'b>(
     builders: &'b [Spec],
     must: impl Fn(&Spec) -> bool,
 ) -> anyhow::Result<(Option<Device>, Vec<&'b Spec>)> {
-    let need = |needs: Needs| builders.iter().find(|spec| spec.builder().needs() == needs);
+    let need = |needs: Needs| builders.iter().find(|spec| spec.needs() == needs);
     if need(Needs::Device).or(need(Needs::RayQuery)).is_none() {
         return Ok((None, builders.iter().collect()));
     }

@@ -545,6 +545,11 @@ impl Buffer<'_> {
         self.bytes
     }
 
+    /// All of it, for what is recorded.
+    pub fn region(&self) -> super::Region {
+        super::Region { address: self.address, bytes: self.bytes }
+    }
+
     /// Copies `data` to the start of the buffer. Nothing on the device may use it meanwhile: every [`Device::run`] waits.
     ///
     /// # Panics

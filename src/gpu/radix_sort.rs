@@ -154,7 +154,7 @@ pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, buffers: &Buffers, sor
     Ok(passes % 2)
 }
 
-const STEPS_OF_A_PASS: usize = 3;
+pub(crate) const STEPS_OF_A_PASS: usize = 3;
 
 /// The sort's dispatches, to be recorded with a barrier between each two.
 ///

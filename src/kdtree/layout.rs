@@ -5,19 +5,21 @@
 //! | part | bytes | at |
 //! | --- | --- | --- |
 //! | [`Header`] | 128 | 0 |
-//! | [`Node`] × `node_count` | 8 each | [`NODES_OFFSET`] |
-//! | references × `reference_count` | 4 each: index of a record | [`Sizes::references_offset`] |
-//! | [`Triangle`] × `active` | 40 each | [`Sizes::records_offset`] |
+//! | [`Node`] × `node_room` | 8 each | [`NODES_OFFSET`] |
+//! | references × `reference_room` | 4 each: index of a record | [`Sizes::references_offset`] |
+//! | [`Triangle`] × `record_room` | 40 each | [`Sizes::records_offset`] |
 //! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | [`Sizes::geometries_offset`] |
 //!
 //! The first node is the root. An empty leaf has no node: its parent says that it is empty, and a ray that would go there needs no
 //! load to know it. Builders write the nodes level by level, in each the children in the order of their parents, left before right,
 //! and the references in the order of the leaves: what a device that builds level by level gets from prefix sums.
-//! The records are the triangles that are not left out, in the order of the input.
+//! The records are the triangles that are not left out, in the order of the input. Of each part as much is used as the counts say
+//! (`node_count`, `reference_count`, `active`); there is room for more where other trees are to be merged into this one. What a
+//! merge adds stands behind what there was, in any order; what it puts nothing in place of stays where it is.
 //!
 //! A cell is what is left of the box in the header where the planes of the nodes above have cut it.
 
-use crate::bvh::layout::{self as bvh, Aabb, GeometryEntry, MAGIC, Triangle};
+use crate::bvh::layout::{self as bvh, Aabb, GeometryEntry, Triangle};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -37,7 +39,7 @@ pub const MAX_REFERENCES: u64 = 1 << 30;
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Header {
-    /// [`MAGIC`].
+    /// [`bvh::MAGIC`].
     pub magic: u32,
     /// [`KIND`].
     pub kind: u32,
@@ -75,8 +77,18 @@ pub struct Header {
     /// The longest side of a triangle that is referenced only where it is: rays look as far beside themselves as hits of such a one
     /// may be ([`crate::trace::kd_host`]).
     pub reach: f32,
+    /// Nodes that there is room for, where a merge may add some; as many as there are unless told.
+    pub node_room: u32,
+    /// References that there is room for.
+    pub reference_room: u32,
+    /// Records that there is room for.
+    pub record_room: u32,
+    /// Nodes that a merge has put others in place of, and that none names any more; 0 in a tree that nothing is merged into.
+    pub replaced_nodes: u32,
+    /// References that were those of leaves that a merge has put others in place of, and that are in no leaf any more.
+    pub replaced_references: u32,
     /// Zero.
-    pub reserved: [u32; 10],
+    pub reserved: [u32; 5],
 }
 
 /// An inner node or a leaf. 8 bytes.
@@ -180,9 +192,9 @@ impl Header {
 
     /// Where the parts of the structure lie.
     pub const fn sizes(&self) -> Sizes {
-        let references_offset = NODES_OFFSET + self.node_count as u64 * size_of::<Node>() as u64;
-        let records_offset = references_offset + self.reference_count as u64 * size_of::<u32>() as u64;
-        let geometries_offset = records_offset + self.active as u64 * size_of::<Triangle>() as u64;
+        let references_offset = NODES_OFFSET + self.node_room as u64 * size_of::<Node>() as u64;
+        let records_offset = references_offset + self.reference_room as u64 * size_of::<u32>() as u64;
+        let geometries_offset = records_offset + self.record_room as u64 * size_of::<Triangle>() as u64;
         let entries = if self.geometry_count > 1 { self.geometry_count as u64 } else { 0 };
         let bytes = geometries_offset + entries * size_of::<GeometryEntry>() as u64;
         Sizes { references_offset, records_offset, geometries_offset, bytes }
@@ -192,6 +204,17 @@ impl Header {
 const _: () = assert!(size_of::<Header>() == 128 && size_of::<Node>() == 8);
 const _: () =
     assert!(std::mem::offset_of!(Header, primitive_count) == std::mem::offset_of!(bvh::Header, primitive_count));
+
+/// How much more a structure has room for than it has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Room {
+    /// Nodes.
+    pub nodes: u32,
+    /// References.
+    pub references: u32,
+    /// Records.
+    pub records: u32,
+}
 
 /// A structure on the host, read back or built there.
 #[derive(Debug, Clone)]
@@ -209,52 +232,87 @@ pub struct KdTree {
 }
 
 impl KdTree {
-    /// Takes a structure's bytes apart.
+    /// Takes a structure's bytes apart; what lies behind them is of no interest.
     ///
     /// # Errors
     /// [`Error::InvalidStructure`] if the magic, kind or length is not that of a kd-tree.
     pub fn from_bytes(bytes: &[u8]) -> Result<KdTree> {
-        let head = size_of::<Header>();
-        if bytes.len() < head {
-            return Err(Error::InvalidStructure(format!("{} bytes, the header alone has {head}", bytes.len())));
-        }
-        let header: Header = bytemuck::pod_read_unaligned(&bytes[..head]);
-        if header.magic != MAGIC || header.kind != KIND {
-            return Err(Error::InvalidStructure(format!(
-                "begins with {:#x} {:#x}, not with {MAGIC:#x} {KIND:#x}: of another kind or version",
-                header.magic, header.kind
-            )));
-        }
+        let header: Header = bvh::header_of(bytes, KIND)?;
         let sizes = header.sizes();
-        if bytes.len() as u64 != sizes.bytes {
+        if (bytes.len() as u64) < sizes.bytes {
             return Err(Error::InvalidStructure(format!(
                 "{} bytes, {} nodes, {} references and {} records need {}; is it cut off?",
                 bytes.len(),
-                header.node_count,
-                header.reference_count,
-                header.active,
+                header.node_room,
+                header.reference_room,
+                header.record_room,
                 sizes.bytes
             )));
         }
-        let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
+        if header.node_count > header.node_room
+            || header.reference_count > header.reference_room
+            || header.active > header.record_room
+        {
+            return Err(Error::InvalidStructure(format!(
+                "{} nodes, {} references and {} records where there is room for {}, {} and {}",
+                header.node_count,
+                header.reference_count,
+                header.active,
+                header.node_room,
+                header.reference_room,
+                header.record_room
+            )));
+        }
         Ok(KdTree {
             header,
-            nodes: bytemuck::pod_collect_to_vec(part(NODES_OFFSET, sizes.references_offset)),
-            references: bytemuck::pod_collect_to_vec(part(sizes.references_offset, sizes.records_offset)),
-            records: bytemuck::pod_collect_to_vec(part(sizes.records_offset, sizes.geometries_offset)),
-            geometries: bytemuck::pod_collect_to_vec(part(sizes.geometries_offset, sizes.bytes)),
+            nodes: part(bytes, NODES_OFFSET, header.node_count),
+            references: part(bytes, sizes.references_offset, header.reference_count),
+            records: part(bytes, sizes.records_offset, header.active),
+            geometries: if header.geometry_count > 1 {
+                part(bytes, sizes.geometries_offset, header.geometry_count)
+            } else {
+                Vec::new()
+            },
         })
+    }
+
+    /// The same tree with so much room behind what it has.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there would be room for more than the layout can name.
+    pub fn with_room(mut self, more: Room) -> Result<KdTree> {
+        let Header { node_count, reference_count, active, .. } = self.header;
+        let room = |what: &str, count: u32, more: u32, most: u64| {
+            let room = u64::from(count) + u64::from(more);
+            u32::try_from(room).ok().filter(|_| room <= most).ok_or_else(|| {
+                Error::Argument(format!("room for {room} {what}, the most is {most}; take less or a smaller scene"))
+            })
+        };
+        self.header.node_room = room("nodes", node_count, more.nodes, MAX_NODES)?;
+        self.header.reference_room = room("references", reference_count, more.references, MAX_REFERENCES)?;
+        self.header.record_room = room("records", active, more.records, u32::MAX.into())?;
+        Ok(self)
     }
 
     /// The structure's bytes, as the device has them.
     pub fn to_bytes(&self) -> Vec<u8> {
+        let Sizes { references_offset, records_offset, geometries_offset, .. } = self.header.sizes();
         let mut bytes = bytemuck::bytes_of(&self.header).to_vec();
         bytes.extend_from_slice(bytemuck::cast_slice(&self.nodes));
+        bytes.resize(references_offset as usize, 0);
         bytes.extend_from_slice(bytemuck::cast_slice(&self.references));
+        bytes.resize(records_offset as usize, 0);
         bytes.extend_from_slice(bytemuck::cast_slice(&self.records));
+        bytes.resize(geometries_offset as usize, 0);
         bytes.extend_from_slice(bytemuck::cast_slice(&self.geometries));
         bytes
     }
+}
+
+/// So many of what lies at an offset of the bytes; within them.
+fn part<T: Pod>(bytes: &[u8], offset: u64, count: u32) -> Vec<T> {
+    let end = offset as usize + size_of::<T>() * count as usize;
+    bytemuck::pod_collect_to_vec(&bytes[offset as usize..end])
 }
 
 #[cfg(test)]
@@ -280,7 +338,15 @@ mod tests {
 
     #[test]
     fn bytes_that_are_no_kd_tree_are_refused_by_name() {
-        let header = Header { magic: MAGIC, kind: KIND, node_count: 1, reference_count: 1, ..Header::zeroed() };
+        let header = Header {
+            magic: bvh::MAGIC,
+            kind: KIND,
+            node_count: 1,
+            reference_count: 1,
+            node_room: 1,
+            reference_room: 1,
+            ..Header::zeroed()
+        };
         let tree = KdTree {
             header,
             nodes: vec![Node::leaf(0, 1)],
@@ -290,11 +356,22 @@ mod tests {
         };
         let bytes = tree.to_bytes();
         assert_eq!(KdTree::from_bytes(&bytes).expect("its own bytes").to_bytes(), bytes);
+        let longer = KdTree::from_bytes(&[&bytes[..], &[1, 2, 3]].concat()).expect("bytes that something lies behind");
+        assert_eq!(longer.to_bytes(), bytes);
         let error_of = |bytes: &[u8]| KdTree::from_bytes(bytes).expect_err("broken").to_string();
         assert!(error_of(&bytes[..100]).contains("100 bytes, the header alone has 128"));
         assert!(error_of(&bytes[..139]).contains("139 bytes, 1 nodes, 1 references and 0 records need 140"));
         let mut other = bytes.clone();
         other[4] ^= 1;
         assert!(error_of(&other).contains("of another kind or version"));
+        let roomy = KdTree { header: Header { node_room: 3, reference_room: 2, ..header }, ..tree };
+        let more = roomy.to_bytes();
+        assert_eq!(more.len(), bytes.len() + 2 * 8 + 4);
+        assert_eq!(KdTree::from_bytes(&more).expect("room for more").references, [0]);
+        let full = KdTree { header: Header { node_count: 4, ..roomy.header }, ..roomy };
+        assert!(
+            error_of(&full.to_bytes()[..more.len()])
+                .contains("4 nodes, 1 references and 0 records where there is room for 3")
+        );
     }
 }

@@ -2,44 +2,18 @@
 
 use super::layout::{Content, KdTree};
 use crate::bvh::layout::Aabb;
+use crate::bvh::quality::Quality;
 
-/// What a walk over a tree finds.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Quality {
-    /// SAH cost (CONTRACT): (c_T · Σ SA(inner) + c_I · Σ SA(leaf)·n_leaf) / SA(root), of the cells, the root's included.
-    pub sah: f64,
-    /// Nodes that are split.
-    pub inner: u64,
-    /// Leaves, the empty ones among them: one more than `inner`.
-    pub leaves: u64,
-    /// Leaves without a primitive.
-    pub empty_leaves: u64,
-    /// References in all leaves.
-    pub refs: u64,
-    /// Most references in a leaf.
-    pub leaf_max: u64,
-    /// Mean depth of a leaf, the empty ones among them; the root has depth 0.
-    pub depth_avg: f64,
-    /// Depth of the deepest leaf.
-    pub depth_max: u32,
-}
-
-impl Quality {
-    /// References in a leaf that is not empty, on average.
-    pub fn prims_per_leaf(&self) -> f64 {
-        self.refs as f64 / (self.leaves - self.empty_leaves).max(1) as f64
-    }
-}
-
-/// The quality of `tree` with these costs of a step and of a test. An empty tree has one empty leaf and costs nothing.
+/// The quality of `tree` with these costs of a step and of a test. Areas are those of the cells; empty leaves count in the mean
+/// depth. An empty tree has one empty leaf and costs nothing.
 pub fn on_host(tree: &KdTree, c_t: f64, c_i: f64) -> Quality {
     let mut quality = Quality::default();
     let mut depths = 0u64;
-    let mut leaf = |quality: &mut Quality, depth: u32, count: usize| {
+    let mut leaf = |quality: &mut Quality, depth: u32, count: u32| {
         quality.leaves += 1;
         quality.empty_leaves += u64::from(count == 0);
-        quality.refs += count as u64;
-        quality.leaf_max = quality.leaf_max.max(count as u64);
+        quality.refs += u64::from(count);
+        quality.leaf_max = quality.leaf_max.max(count);
         quality.depth_max = quality.depth_max.max(depth);
         depths += u64::from(depth);
     };
@@ -54,7 +28,7 @@ pub fn on_host(tree: &KdTree, c_t: f64, c_i: f64) -> Quality {
         match tree.nodes[node as usize].content() {
             Content::Leaf(range) => {
                 cost += c_i * half_area(&cell) * range.len() as f64;
-                leaf(&mut quality, depth, range.len());
+                leaf(&mut quality, depth, range.len() as u32);
             }
             Content::Inner(inner) => {
                 cost += c_t * half_area(&cell);

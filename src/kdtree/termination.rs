@@ -26,8 +26,8 @@ pub struct Costs {
 }
 
 impl Costs {
-    /// 3 and 2, as the other theses have them and as Vinkler, Havran and Bittner do, whose values this one says to take; its own
-    /// are not in the text that is left of it.
+    /// 3 and 2, those of records unless asked otherwise (CONTRACT) and of Frantál 2019. The thesis' own are not in the text that is
+    /// left of it.
     pub const DEFAULT: Costs = Costs { c_t: 3.0, c_i: 2.0 };
 
     /// Whether it can be a cost: 0.001 to 1000.

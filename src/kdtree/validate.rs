@@ -8,7 +8,8 @@ use crate::{Error, Result};
 impl KdTree {
     /// Checks every rule of the layout: indices in range, no cycle and no node that none names, planes strictly inside of their
     /// cells, a depth that tracers can walk, every reference in one leaf and none twice in it, and every point of every triangle in a
-    /// closed cell that references it, in double precision. What the header counts is there.
+    /// closed cell that references it, in double precision. What the header counts is there. Of a tree that something is merged
+    /// into, as many nodes and references are left over as the header says that others are in place of.
     ///
     /// # Errors
     /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
@@ -30,13 +31,9 @@ impl KdTree {
             walk.run(cell)?;
             (0..self.records.len() as u32).try_for_each(|record| self.validate_cover(record))?;
         }
-        if let Some(node) = walk.visited.iter().position(|&visited| !visited) {
-            return invalid(format!("node {node} is named by none"));
-        }
-        if let Some(lost) = walk.in_leaf.iter().position(|&there| !there) {
-            return invalid(format!("reference {lost} is in no leaf"));
-        }
         let header = &self.header;
+        left_over(&walk.visited, header.replaced_nodes, |node| format!("node {node} is named by none"))?;
+        left_over(&walk.in_leaf, header.replaced_references, |lost| format!("reference {lost} is in no leaf"))?;
         let said = Counts {
             inner_nodes: header.inner_nodes,
             leaves: header.leaves,
@@ -56,7 +53,7 @@ impl KdTree {
         let polygon: Polygon = [v0, v1, v2].iter().map(|corner| corner.map(f64::from)).collect();
         let magnitude = polygon.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let cover = Cover { tree: self, record, slack: magnitude * 2f64.powi(-44) };
-        match cover.lacking(0, polygon) {
+        match cover.lacking(0, polygon).first().map(|(place, _)| place) {
             Some(Lacking::Leaf(node)) => {
                 invalid(format!("node {node}: primitive {primitive} is in the cell and is not referenced"))
             }
@@ -114,28 +111,32 @@ struct Cover<'a> {
 }
 
 impl Cover<'_> {
-    /// The first place below a node where a part of the triangle is not referenced.
-    fn lacking(&self, node: u32, polygon: Polygon) -> Option<Lacking> {
+    /// The parts of the triangle that are not referenced below a node, and where they should be.
+    fn lacking(&self, node: u32, polygon: Polygon) -> Vec<(Lacking, Polygon)> {
         let inner = match self.tree.nodes[node as usize].content() {
             Content::Leaf(range) => {
                 let is_there = self.tree.references[range].binary_search(&self.record).is_ok();
-                return (!is_there).then_some(Lacking::Leaf(node));
+                return if is_there { Vec::new() } else { vec![(Lacking::Leaf(node), polygon)] };
             }
             Content::Inner(inner) => inner,
         };
         let below = |side: usize, polygon: Polygon| match inner.children[side] {
             Some(child) => self.lacking(child, polygon),
-            None => Some(Lacking::EmptyChild(node)),
+            None => vec![(Lacking::EmptyChild(node), polygon)],
         };
         let (axis, plane) = (inner.axis, f64::from(inner.plane));
         let is_left = polygon.iter().any(|p| p[axis] < plane - self.slack);
         let is_right = polygon.iter().any(|p| p[axis] > plane + self.slack);
         match (is_left, is_right) {
-            (true, true) => below(0, clipped(&polygon, |p| plane - p[axis]))
-                .or_else(|| below(1, clipped(&polygon, |p| p[axis] - plane))),
+            (true, true) => {
+                let mut lacking = below(0, clipped(&polygon, |p| plane - p[axis]));
+                lacking.extend(below(1, clipped(&polygon, |p| p[axis] - plane)));
+                lacking
+            }
             (true, false) => below(0, polygon),
             (false, true) => below(1, polygon),
-            (false, false) => below(0, polygon.clone()).and_then(|_| below(1, polygon)),
+            // What is not on the left must be on the right.
+            (false, false) => below(0, polygon).into_iter().flat_map(|(_, left)| below(1, left)).collect(),
         }
     }
 }
@@ -225,6 +226,16 @@ impl Walk<'_> {
     }
 }
 
+/// As many are not found as others are in place of.
+fn left_over(found: &[bool], replaced: u32, what: impl Fn(usize) -> String) -> Result<()> {
+    let left = found.iter().filter(|&&found| !found).count();
+    match found.iter().position(|&found| !found) {
+        _ if left == replaced as usize => Ok(()),
+        Some(first) => invalid(format!("{}; {left} such, the header says that {replaced} are replaced", what(first))),
+        None => invalid(format!("nothing is left over, the header says that {replaced} are replaced")),
+    }
+}
+
 fn invalid<T>(what: String) -> Result<T> {
     Err(Error::InvalidStructure(what))
 }
@@ -272,7 +283,7 @@ mod tests {
     #[test]
     fn every_broken_rule_is_found_and_named() {
         type Break = fn(&mut KdTree);
-        let breaks: [(&str, Break); 16] = [
+        let breaks: [(&str, Break); 18] = [
             ("is not strictly inside of", |t| {
                 let axis = inner_of(t, 0).axis;
                 t.nodes[0].first = t.header.hi[axis].to_bits();
@@ -324,6 +335,12 @@ mod tests {
             ("is named by none", |t| {
                 t.nodes.push(t.nodes[0]);
                 t.header.node_count += 1;
+            }),
+            ("nothing is left over", |t| t.header.replaced_nodes = 1),
+            ("1 such, the header says that 2 are replaced", |t| {
+                t.references.push(0);
+                t.header.reference_count += 1;
+                t.header.replaced_references = 2;
             }),
             ("the header says", |t| t.header.empty_leaves += 1),
             ("nodes, references and records are there", |t| t.header.active -= 1),

@@ -38,6 +38,11 @@ fn on_the_edge(ray: &Ray, hit: &Hit) -> bool {
             || (ray.t_min > 0.0 && same_distance(hit.t, ray.t_min)))
 }
 
+/// Whether two hits of a ray may both be right, by arithmetic that is not the same: they agree, or one of them is on an edge.
+pub fn may_both_be_right(query: Query, ray: &Ray, a: &Hit, b: &Hit) -> bool {
+    agree(query, a, b) || on_the_edge(ray, a) || on_the_edge(ray, b)
+}
+
 /// The true hits of a sample of rays, spread over all of them.
 pub struct Sample {
     query: Query,

@@ -1,5 +1,6 @@
 //! Our trees built on the device as subjects: timestamps around each phase, our tracer.
 
+use super::device_rays::DeviceRays;
 use super::overlap::{self, Epo};
 use super::wide::WideTree;
 use super::{BuildRun, Subject, record};
@@ -29,13 +30,7 @@ pub struct DeviceBvh<'a> {
     scratch: Buffer<'a>,
     wide: Option<WideTree<'a>>,
     timestamps: Timestamps,
-    rays: Option<Rays<'a>>,
-}
-
-struct Rays<'a> {
-    count: u32,
-    rays: Buffer<'a>,
-    hits: Buffer<'a>,
+    rays: DeviceRays<'a>,
 }
 
 impl<'a> DeviceBvh<'a> {
@@ -73,18 +68,13 @@ impl<'a> DeviceBvh<'a> {
             sizes,
             input,
             _vertices: vertices,
-            rays: None,
+            rays: DeviceRays::new(device)?,
         })
     }
 
-    fn buffers(&self, rays: &Rays<'_>, work: Option<u64>) -> Buffers {
-        Buffers {
-            structure: self.wide.as_ref().map_or(self.structure.address(), WideTree::address),
-            rays: rays.rays.address(),
-            hits: rays.hits.address(),
-            work,
-            count: rays.count,
-        }
+    /// Address of what is traced.
+    fn traced(&self) -> u64 {
+        self.wide.as_ref().map_or(self.structure.address(), WideTree::address)
     }
 }
 
@@ -185,33 +175,19 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        let count = u32::try_from(rays.len())
-            .map_err(|_| Error::Argument(format!("{} rays; at most 4294967295 at once", rays.len())))?;
-        self.rays = None;
-        let hits = self.device.buffer("hits", size_of_val(rays) as u64 / 2)?;
-        self.rays = Some(Rays { count, rays: self.device.upload("rays", rays)?, hits });
-        Ok(())
+        self.rays.set(rays)
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let Some(rays) = &self.rays else { return Ok(0.0) };
-        let buffers = self.buffers(rays, None);
-        self.device.run(Some(&mut self.timestamps), |recorder| {
-            recorder.phase("trace");
-            record_trace(recorder, self.wide.as_ref(), query, &buffers)
-        })?;
-        Ok(self.timestamps.phases()?.iter().map(|p| p.milliseconds).sum())
+        let structure = self.traced();
+        self.rays.trace(structure, |recorder, buffers| record_trace(recorder, self.wide.as_ref(), query, buffers))
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(self.rays.as_ref().map_or_else(Vec::new, |r| r.hits.read(r.count as usize)))
+        Ok(self.rays.hits())
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        let Some(rays) = &self.rays else { return Ok(None) };
-        let work = self.device.buffer("work", u64::from(rays.count) * size_of::<Work>() as u64)?;
-        let buffers = self.buffers(rays, Some(work.address()));
-        self.device.run(None, |recorder| record_trace(recorder, self.wide.as_ref(), query, &buffers))?;
-        Ok(Some(work.read(rays.count as usize)))
+        self.rays.work(self.traced(), |recorder, buffers| record_trace(recorder, self.wide.as_ref(), query, buffers))
     }
 }

@@ -1,9 +1,11 @@
-//! Builders of kd-trees on the host as subjects: wall-clock time, the host's tracer on every core.
+//! Builders of kd-trees on the host as subjects: wall-clock time, and the host's tracer on every core or the device's.
 
 use super::host::timed;
-use super::{BuildRun, Outcome, Subject, record};
+use super::kd_device::KdDevice;
+use super::{BuildRun, KD_TREE, Outcome, Subject, record};
 use crate::Result;
 use crate::bvh::layout::Bvh2;
+use crate::gpu::Buffer;
 use crate::kdtree::host::{Options, build};
 use crate::kdtree::layout::KdTree;
 use crate::kdtree::quality;
@@ -17,33 +19,44 @@ pub struct KdHost<'a> {
     builder: String,
     mesh: &'a Mesh,
     options: Options,
-    traversal: Traversal,
     tree: Option<KdTree>,
-    rays: Vec<Ray>,
-    hits: Vec<Hit>,
+    tracing: Tracing<'a>,
+}
+
+/// Where rays are traced, and what for.
+enum Tracing<'a> {
+    Host { traversal: Traversal, rays: Vec<Ray>, hits: Vec<Hit> },
+    Device { tracer: Box<KdDevice<'a>>, structure: Option<Buffer<'a>> },
 }
 
 impl<'a> KdHost<'a> {
-    /// On `mesh`, to be traced in this way.
+    /// On `mesh`, to be traced in this way on the host.
     pub fn new(builder: &str, mesh: &'a Mesh, options: Options, traversal: Traversal) -> KdHost<'a> {
-        KdHost { builder: builder.to_owned(), mesh, options, traversal, tree: None, rays: Vec::new(), hits: Vec::new() }
+        let tracing = Tracing::Host { traversal, rays: Vec::new(), hits: Vec::new() };
+        KdHost { builder: builder.to_owned(), mesh, options, tree: None, tracing }
+    }
+
+    /// The same, to be traced on the device.
+    pub fn traced_by(self, tracer: KdDevice<'a>) -> KdHost<'a> {
+        KdHost { tracing: Tracing::Device { tracer: Box::new(tracer), structure: None }, ..self }
     }
 
     fn built(&mut self) -> Result<&KdTree> {
-        let tree = match self.tree.take() {
-            Some(tree) => tree,
-            None => build(&self.mesh.positions, &self.mesh.triangles, &self.options)?,
-        };
-        Ok(self.tree.insert(tree))
+        built(&mut self.tree, self.mesh, &self.options)
     }
+}
 
-    fn traced(&mut self, query: Query) -> Result<(f64, Vec<(Hit, Work)>)> {
-        let (rays, traversal) = (std::mem::take(&mut self.rays), self.traversal);
-        let tree = self.built()?;
-        let traced = timed(|| rays.par_iter().map(|ray| trace(tree, ray, query, traversal)).collect());
-        self.rays = rays;
-        Ok(traced)
-    }
+/// The tree, built where there is none yet.
+fn built<'t>(tree: &'t mut Option<KdTree>, mesh: &Mesh, options: &Options) -> Result<&'t KdTree> {
+    let there = match tree.take() {
+        Some(there) => there,
+        None => build(&mesh.positions, &mesh.triangles, options)?,
+    };
+    Ok(tree.insert(there))
+}
+
+fn traced(tree: &KdTree, rays: &[Ray], query: Query, traversal: Traversal) -> Vec<(Hit, Work)> {
+    rays.par_iter().map(|ray| trace(tree, ray, query, traversal)).collect()
 }
 
 impl Subject for KdHost<'_> {
@@ -52,15 +65,22 @@ impl Subject for KdHost<'_> {
     }
 
     fn kind(&self) -> &'static str {
-        "kdtree"
+        KD_TREE
     }
 
     fn timer(&self) -> &'static str {
         "wall"
     }
 
+    fn traces_on_device(&self) -> bool {
+        matches!(self.tracing, Tracing::Device { .. })
+    }
+
     fn build(&mut self) -> Result<BuildRun> {
         self.tree = None;
+        if let Tracing::Device { structure, .. } = &mut self.tracing {
+            *structure = None;
+        }
         let (milliseconds, built) = timed(|| self.built().map(drop));
         built?;
         Ok(BuildRun { milliseconds, phases: Vec::new() })
@@ -72,11 +92,15 @@ impl Subject for KdHost<'_> {
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
-        Ok(record::Quality::of_kd_tree(&quality::on_host(self.built()?, c_t, c_i), c_t, c_i))
+        Ok(record::Quality::of(&quality::on_host(self.built()?, c_t, c_i), c_t, c_i))
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {
         Ok(None)
+    }
+
+    fn kd_tree(&mut self) -> Result<Option<KdTree>> {
+        self.built().cloned().map(Some)
     }
 
     fn outcome(&mut self) -> Result<Option<Outcome>> {
@@ -92,22 +116,49 @@ impl Subject for KdHost<'_> {
         self.built()?.validate()
     }
 
-    fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        self.rays = rays.to_vec();
+    fn set_rays(&mut self, new: &[Ray]) -> Result<()> {
+        match &mut self.tracing {
+            Tracing::Host { rays, .. } => *rays = new.to_vec(),
+            Tracing::Device { tracer, structure } => {
+                if structure.is_none() {
+                    *structure = Some(tracer.upload(built(&mut self.tree, self.mesh, &self.options)?)?);
+                }
+                tracer.set_rays(new)?;
+            }
+        }
         Ok(())
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let (milliseconds, traced) = self.traced(query)?;
-        self.hits = traced.into_iter().map(|(hit, _)| hit).collect();
-        Ok(milliseconds)
+        match &mut self.tracing {
+            Tracing::Host { traversal, rays, hits } => {
+                let tree = built(&mut self.tree, self.mesh, &self.options)?;
+                let (milliseconds, all) = timed(|| traced(tree, rays, query, *traversal));
+                *hits = all.into_iter().map(|(hit, _)| hit).collect();
+                Ok(milliseconds)
+            }
+            Tracing::Device { tracer, structure: Some(structure) } => tracer.trace(structure.address(), query),
+            // There are no rays yet.
+            Tracing::Device { structure: None, .. } => Ok(0.0),
+        }
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(self.hits.clone())
+        Ok(match &self.tracing {
+            Tracing::Host { hits, .. } => hits.clone(),
+            Tracing::Device { tracer, .. } => tracer.hits(),
+        })
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        Ok(Some(self.traced(query)?.1.into_iter().map(|(_, work)| work).collect()))
+        match &self.tracing {
+            Tracing::Host { traversal, rays, .. } => {
+                let tree = built(&mut self.tree, self.mesh, &self.options)?;
+                let all = traced(tree, rays, query, *traversal);
+                Ok(Some(all.into_iter().map(|(_, work)| work).collect()))
+            }
+            Tracing::Device { tracer, structure: Some(structure) } => tracer.work(structure.address(), query),
+            Tracing::Device { structure: None, .. } => Ok(None),
+        }
     }
 }

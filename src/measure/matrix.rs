@@ -160,7 +160,7 @@ pub fn measure(
 /// The record before anything was measured.
 fn blank(scene: &Scene, device: Option<&Device>, subject: &dyn Subject) -> Record {
     let on_host = || (Machine::this().cpu, format!("hedgerow {}", env!("CARGO_PKG_VERSION")), 0);
-    let (device, driver, subgroup) = match device.filter(|_| subject.timer() == "device") {
+    let (device, driver, subgroup) = match device.filter(|_| subject.traces_on_device()) {
         Some(device) => {
             let found = device.found();
             (found.name.clone(), found.driver.clone(), found.subgroup_size)

@@ -13,9 +13,12 @@ pub mod choose;
 pub mod comparison;
 pub mod copy;
 mod device_bvh;
+mod device_rays;
 pub mod experiments;
 pub mod growth;
 mod host;
+mod kd_device;
+mod kd_gpu;
 mod kd_host;
 pub mod levels;
 pub mod matrix;
@@ -31,4 +34,4 @@ mod subject;
 pub mod total_time;
 mod wide;
 
-pub use subject::{BuildRun, Outcome, Subject};
+pub use subject::{BuildRun, KD_TREE, Outcome, Subject};

@@ -104,28 +104,14 @@ pub struct Quality {
     pub depth_max: Option<u64>,
     /// Mean primitives a leaf that has any.
     pub prims_per_leaf: Option<f64>,
+    /// Most primitives in a leaf. Not in the contract: where it was not measured, the record has no such name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prims_per_leaf_max: Option<u64>,
 }
 
 impl Quality {
-    /// The figures of a walk over a tree whose leaves hold triangles.
+    /// The figures of a walk over a tree.
     pub fn of(quality: &crate::bvh::quality::Quality, c_t: f64, c_i: f64) -> Quality {
-        Quality {
-            sah: Some(quality.sah),
-            c_t,
-            c_i,
-            inner: Some(quality.inner),
-            leaves: Some(quality.leaves),
-            empty_leaves: Some(0),
-            refs: Some(quality.refs),
-            depth_avg: Some(quality.depth_avg),
-            depth_max: Some(u64::from(quality.depth_max)),
-            prims_per_leaf: Some(quality.refs as f64 / quality.leaves.max(1) as f64),
-            ..Quality::default()
-        }
-    }
-
-    /// The figures of a walk over a kd-tree.
-    pub fn of_kd_tree(quality: &crate::kdtree::quality::Quality, c_t: f64, c_i: f64) -> Quality {
         Quality {
             sah: Some(quality.sah),
             c_t,
@@ -137,6 +123,7 @@ impl Quality {
             depth_avg: Some(quality.depth_avg),
             depth_max: Some(u64::from(quality.depth_max)),
             prims_per_leaf: Some(quality.prims_per_leaf()),
+            prims_per_leaf_max: Some(quality.leaf_max.into()),
             ..Quality::default()
         }
     }

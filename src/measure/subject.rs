@@ -3,8 +3,12 @@
 use super::overlap::Epo;
 use super::record;
 use crate::bvh::layout::Bvh2;
+use crate::kdtree::layout::KdTree;
 use crate::trace::{Hit, Query, Ray, Work};
 use crate::{Result, gpu};
+
+/// [`Subject::kind`] of kd-trees.
+pub const KD_TREE: &str = "kdtree";
 
 /// One build under the clock.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +38,10 @@ pub trait Subject {
     fn kind(&self) -> &'static str;
     /// `device` where build times are timestamps, otherwise `wall`.
     fn timer(&self) -> &'static str;
+    /// Whether rays are traced on the device.
+    fn traces_on_device(&self) -> bool {
+        self.timer() == "device"
+    }
     /// Builds once, from the triangles, into the same memory as before.
     ///
     /// # Errors
@@ -59,6 +67,16 @@ pub trait Subject {
     /// # Errors
     /// The device failed.
     fn tree(&mut self) -> Result<Option<Bvh2>>;
+    /// The kd-tree on the host, where it is one.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn kd_tree(&mut self) -> Result<Option<KdTree>> {
+        match self.kind() {
+            KD_TREE => self.bytes()?.map(|bytes| KdTree::from_bytes(&bytes)).transpose(),
+            _ => Ok(None),
+        }
+    }
     /// What the built structure's header says, where its layout is ours.
     ///
     /// # Errors
@@ -93,7 +111,7 @@ pub trait Subject {
     /// # Errors
     /// Too little memory.
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()>;
-    /// Traces the rays once; milliseconds by the same kind of clock as `timer`.
+    /// Traces the rays once; milliseconds by timestamps where that is on the device, otherwise of wall-clock time.
     ///
     /// # Errors
     /// The device failed.

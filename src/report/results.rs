@@ -65,7 +65,7 @@ pub fn write_csv(path: &Path, records: &[&Record]) -> Result<()> {
 /// A column: its name, and its value in a record.
 type Column = (&'static str, fn(&Record) -> String);
 
-const COLUMNS: [Column; 30] = [
+const COLUMNS: [Column; 31] = [
     ("scene", |r| r.scene.clone()),
     ("triangles", |r| r.triangles.to_string()),
     ("builder", |r| r.builder.clone()),
@@ -94,6 +94,7 @@ const COLUMNS: [Column; 30] = [
     ("depth_avg", |r| text(r.quality.depth_avg)),
     ("depth_max", |r| text(r.quality.depth_max)),
     ("prims_per_leaf", |r| text(r.quality.prims_per_leaf)),
+    ("prims_per_leaf_max", |r| text(r.quality.prims_per_leaf_max)),
     ("mrays_s", |r| text(r.mrays_s())),
     ("valid", |r| text(r.valid)),
 ];

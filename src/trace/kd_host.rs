@@ -33,7 +33,7 @@ use crate::kdtree::layout::{Content, Inner, KdTree, MAX_DEPTH};
 use std::collections::VecDeque;
 
 /// How a tree is walked. All find the same hits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Traversal {
     /// Cells that may wait on the stack.
     pub capacity: usize,

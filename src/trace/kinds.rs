@@ -151,14 +151,37 @@ pub fn generate(
     })
 }
 
+/// Where the pixels of a picture lie in space.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Frame {
+    /// Where the camera is.
+    pub eye: DVec3,
+    /// Three directions at right angles, of unit length.
+    pub forward: DVec3,
+    /// See `forward`.
+    pub right: DVec3,
+    /// See `forward`.
+    pub up: DVec3,
+    /// Half the width and half the height of the picture, at a distance of 1.
+    pub half: [f64; 2],
+}
+
+impl Frame {
+    /// Of a picture with so many pixels in x and y.
+    pub fn of(camera: &Camera, [width, height]: [u32; 2]) -> Frame {
+        let eye = dvec3(camera.eye);
+        let forward = (dvec3(camera.look) - eye).normalize_or(DVec3::NEG_Z);
+        // A camera that looks straight up has no right; any direction across will do.
+        let right = forward.cross(dvec3(camera.up)).try_normalize().unwrap_or(forward.any_orthonormal_vector());
+        let up = right.cross(forward);
+        let half_height = (f64::from(camera.fov).to_radians() / 2.0).tan();
+        let half_width = half_height * f64::from(width) / f64::from(height);
+        Frame { eye, forward, right, up, half: [half_width, half_height] }
+    }
+}
+
 fn primary(camera: &Camera, [width, height]: [u32; 2]) -> Vec<Ray> {
-    let eye = dvec3(camera.eye);
-    let forward = (dvec3(camera.look) - eye).normalize_or(DVec3::NEG_Z);
-    // A camera that looks straight up has no right; any direction across will do.
-    let right = forward.cross(dvec3(camera.up)).try_normalize().unwrap_or(forward.any_orthonormal_vector());
-    let up = right.cross(forward);
-    let half_height = (f64::from(camera.fov).to_radians() / 2.0).tan();
-    let half_width = half_height * f64::from(width) / f64::from(height);
+    let Frame { forward, right, up, half: [half_width, half_height], .. } = Frame::of(camera, [width, height]);
     (0..width as usize * height as usize)
         .into_par_iter()
         .map(|pixel| {

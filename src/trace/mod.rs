@@ -7,13 +7,14 @@
 //! - [`ray`] prepares a ray: shear, reciprocals, error bounds;
 //! - [`determinant`], [`triangle`], [`slab`] are the arithmetic, each the twin of a file in `glsl/trace/`;
 //! - [`host`] traverses on the host, [`tracer`] on the device; [`wide_host`] and [`wide`] do it in wide trees;
-//! - [`kd_host`] traverses kd-trees on the host;
+//! - [`kd_host`] traverses kd-trees on the host, [`kd`] on the device, in the same ways;
 //! - `kinds` makes the rays that are measured; `files` reads and writes rays and hits.
 
 pub mod determinant;
 #[cfg(feature = "cli")]
 pub mod files;
 pub mod host;
+pub mod kd;
 pub mod kd_host;
 #[cfg(feature = "cli")]
 pub mod kinds;
@@ -74,7 +75,7 @@ impl Hit {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Work {
-    /// Inner nodes visited (each tests the boxes of its children: two, four or eight).
+    /// Inner nodes visited (each tests the boxes of its children: two, four or eight; of a kd-tree, its plane).
     pub steps: u32,
     /// Triangles tested.
     pub tests: u32,

@@ -94,7 +94,7 @@ const LEVEL_BYTES: u32 = 8;
 /// Device addresses of what is traced, all aligned to 16 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Buffers {
-    /// A `Bvh2`. One whose status says that it is too deep or unfinished is traced as if it were empty.
+    /// A `Bvh2`, or what else a tracer says that it takes. One whose status says that it is too deep or unfinished is traced as if it were empty.
     pub structure: u64,
     /// [`Ray`](super::Ray) × `count`.
     pub rays: u64,
@@ -109,7 +109,7 @@ pub struct Buffers {
 push_constants! {
     /// Push constants of `glsl/trace/tracer_*.comp`.
     pub struct Arguments {
-        /// Address of a `Bvh2`.
+        /// Address of the structure.
         pub structure: u64,
         /// Address of the rays.
         pub rays: u64,

@@ -57,7 +57,7 @@ pub fn meet(ray: &PreparedRay, triangle: &Triangle) -> Option<Meeting> {
     }
     let m = [a.x, a.y, b.x, b.y, c.x, c.y].iter().fold(0f32, |m, x| m.max(x.abs()));
     let cube = m * m * m;
-    // No vertex is nearer to the origin along all axes.
+    // Along some axis, the farthest vertex is at least this far from the origin.
     let reach = [a.z, b.z, c.z].iter().fold(0.5 * m, |reach, z| reach.max(z.abs()));
     let trusted = least > TRUSTED || greatest < -TRUSTED;
     let accurate = cube < LARGEST_CUBE && PART_OF_CUBE * cube <= reach * (u + v + w).abs();

@@ -1,8 +1,10 @@
-//! What a ray query reports: `tests/shaders/probe.comp` in a pipeline of its own, as an engine would have it.
+//! What a ray query reports: `tests/shaders/probe.comp` in a pipeline of its own, as an engine would have it; and what the header
+//! for kd-trees does, `kd_probe.comp`.
 
 use super::device;
 use hedgerow::ash::{self, vk};
 use hedgerow::gpu::Recorder;
+use hedgerow::trace::{Hit, Ray};
 
 /// A ray with its flags, and how its candidates are decided on.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -96,6 +98,26 @@ impl Report {
     }
 }
 
+/// What a ray meets by the header for kd-trees, and by a query of a BVH in the same shader.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct KdReport {
+    pub of_kd_tree: Hit,
+    pub of_query: Hit,
+    pub is_hit: u32,
+}
+
+#[derive(Clone, Copy, bytemuck::NoUninit)]
+#[repr(C)]
+struct KdPush {
+    kd_tree: u64,
+    bvh: u64,
+    rays: u64,
+    reports: u64,
+    count: u32,
+    padding: u32,
+}
+
 #[derive(Clone, Copy, bytemuck::NoUninit)]
 #[repr(C)]
 struct Push {
@@ -123,12 +145,17 @@ impl Probe {
         Probe::of(include_bytes!(concat!(env!("OUT_DIR"), "/probe_of_the_driver.spv")))
     }
 
+    /// For kd-trees.
+    pub fn of_kd_trees() -> Probe {
+        Probe::of(include_bytes!(concat!(env!("OUT_DIR"), "/kd_probe.spv")))
+    }
+
     fn of(spirv: &[u8]) -> Probe {
         let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).expect("SPIR-V");
         let raw = device().ash_device();
         let range = [vk::PushConstantRange::default()
             .stage_flags(vk::ShaderStageFlags::COMPUTE)
-            .size(size_of::<Push>() as u32)];
+            .size(size_of::<KdPush>().max(size_of::<Push>()) as u32)];
         unsafe {
             let layout = raw
                 .create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&range), None)
@@ -159,18 +186,37 @@ impl Probe {
             count: rays.len() as u32,
             padding: 0,
         };
+        self.dispatch(bytemuck::bytes_of(&push), push.count);
+        reports.read(rays.len())
+    }
+
+    /// Traces every ray through both.
+    pub fn ask_kd_tree(&self, kd_tree: u64, bvh: u64, rays: &[Ray]) -> Vec<KdReport> {
+        let ray_buffer = device().upload("rays", rays).expect("memory");
+        let reports = device().buffer("reports", size_of::<KdReport>() as u64 * rays.len() as u64).expect("memory");
+        let push = KdPush {
+            kd_tree,
+            bvh,
+            rays: ray_buffer.address(),
+            reports: reports.address(),
+            count: rays.len() as u32,
+            padding: 0,
+        };
+        self.dispatch(bytemuck::bytes_of(&push), push.count);
+        reports.read(rays.len())
+    }
+
+    fn dispatch(&self, push: &[u8], count: u32) {
         let record = |recorder: &mut Recorder<'_>| {
             let (raw, commands) = (device().ash_device(), recorder.commands());
             unsafe {
                 raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, self.pipeline);
-                let stage = vk::ShaderStageFlags::COMPUTE;
-                raw.cmd_push_constants(commands, self.layout, stage, 0, bytemuck::bytes_of(&push));
-                raw.cmd_dispatch(commands, push.count.div_ceil(64), 1, 1);
+                raw.cmd_push_constants(commands, self.layout, vk::ShaderStageFlags::COMPUTE, 0, push);
+                raw.cmd_dispatch(commands, count.div_ceil(64), 1, 1);
             }
             Ok(())
         };
         device().run(None, record).expect("it traces");
-        reports.read(rays.len())
     }
 }
 

@@ -115,6 +115,51 @@ pub fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
     Ray { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
 }
 
+/// Rays from `offset`, the middle of a closed surface of radius `scale`, and from around it, through corners and edges: each must
+/// hit.
+pub fn rays_from_inside(corners: &Corners, count: usize, scale: f32, offset: [f32; 3]) -> Vec<Ray> {
+    let mut random = Random(7);
+    (0..count)
+        .map(|i| {
+            let origin = if i % 2 == 0 { offset } else { add(offset, random.point(0.2 * scale)) };
+            let [a, b, c] = corners[random.bits() as usize % corners.len()];
+            let along = [0.0, 0.25, 0.5, 1.0, random.signed().abs()][i % 5];
+            let inside = if i % 7 == 0 { c } else { a };
+            let to = |k: usize| along * (b[k] - origin[k]) + (1.0 - along) * (inside[k] - origin[k]);
+            ray(origin, std::array::from_fn(|k| to(k) / scale))
+        })
+        .collect()
+}
+
+/// From the middle of a closed surface to it: through corners and edges, and at any place between them.
+pub fn rays_from_the_middle(corners: &Corners, count: usize, scale: f32, offset: [f32; 3]) -> Vec<Ray> {
+    let mut random = Random(3);
+    (0..count)
+        .map(|i| {
+            let [a, b, c] = corners[random.bits() as usize % corners.len()];
+            let along = [0.0, 0.25, 0.5, 1.0, random.signed().abs()][i % 5];
+            let from = if i % 7 == 0 { c } else { a };
+            let to = |k: usize| along * (b[k] - offset[k]) + (1.0 - along) * (from[k] - offset[k]);
+            ray(offset, std::array::from_fn(|k| to(k) / scale))
+        })
+        .collect()
+}
+
+/// Rays with this number as their direction, and in place of each of their words.
+pub fn rays_with(bad: f32) -> Vec<Ray> {
+    let of_word = |word: usize| {
+        let mut words = [0.1, 0.2, 0.3, 0.0, 0.5, 0.6, -0.7, 9.0];
+        words[word] = bad;
+        bytemuck::cast(words)
+    };
+    [ray([0.0; 3], [bad; 3])].into_iter().chain((0..8).map(of_word)).collect()
+}
+
+/// What is no ray, or nearly none.
+pub fn no_rays() -> Vec<Ray> {
+    [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1e38].map(rays_with).concat()
+}
+
 /// Rays that are hard for a scene in `−scale..scale` around `offset`: random ones, along the axes and in their planes, with
 /// zeroes of both signs, through corners, edges and centres of triangles, along edges, and short ones.
 pub fn hard_rays(corners: &Corners, count: usize, scale: f32, offset: [f32; 3], seed: u64) -> Vec<Ray> {

@@ -17,7 +17,7 @@
 //! the order of the binary tree. Of quantised ones [`super::quantised`] tells.
 
 use super::Form;
-use crate::bvh::layout::{self, Child, GeometryEntry, Header, MAGIC, NODES_OFFSET, Record, Triangle};
+use crate::bvh::layout::{self, Child, GeometryEntry, Header, NODES_OFFSET, Record, Triangle, header_of};
 use crate::{Error, Result};
 use bytemuck::Pod;
 
@@ -117,24 +117,13 @@ impl<N: WideNode, R: Record> Wide<N, R> {
     /// # Errors
     /// [`Error::InvalidStructure`] if the magic, kind or length is not that of such a structure.
     pub fn from_bytes(bytes: &[u8]) -> Result<Wide<N, R>> {
-        let head = size_of::<Header>();
-        if bytes.len() < head {
-            return Err(Error::InvalidStructure(format!("{} bytes, the header alone has {head}", bytes.len())));
-        }
-        let header: Header = bytemuck::pod_read_unaligned(&bytes[..head]);
-        if (header.magic, header.kind) != (MAGIC, Self::KIND) {
-            return Err(Error::InvalidStructure(format!(
-                "begins with {:#x} {:#x}, not with {MAGIC:#x} {:#x}: of another kind or version",
-                header.magic,
-                header.kind,
-                Self::KIND
-            )));
-        }
+        let header: Header = header_of(bytes, Self::KIND)?;
         let needs = N::FORM.bytes_in_use(&header, size_of::<R>() as u64);
         if (bytes.len() as u64) < needs {
             let (has, nodes) = (bytes.len(), header.node_slots);
             return Err(Error::InvalidStructure(format!("{has} bytes, {nodes} nodes with their records need {needs}")));
         }
+        let head = NODES_OFFSET as usize;
         let records = head + header.node_slots as usize * size_of::<N>();
         let geometries = records + header.primitive_count as usize * size_of::<R>();
         Ok(Wide {

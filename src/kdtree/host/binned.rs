@@ -7,19 +7,20 @@
 
 use super::clip::{Reference, divided};
 use super::heuristic::{Heuristic, Split};
+use super::small::Small;
 use super::{ALONE, Subtree};
 use crate::bvh::layout::{Aabb, Triangle};
 use crate::kdtree::layout::halves;
 
-/// The tree over `references` in `cell`, by so many bins along each axis.
+/// The tree over `references` in `cell`, by so many bins along each axis; cells of no more than `exact` references are split exactly.
 pub(super) fn build(
     heuristic: &Heuristic,
     records: (&[Triangle], f32),
-    bins: u32,
+    (bins, exact): (u32, u32),
     cell: Aabb,
     references: Vec<Reference>,
 ) -> Subtree {
-    Binned { heuristic, records, bins: bins as usize }.subtree(cell, references, 0)
+    Binned { heuristic, records, bins: bins as usize, exact: exact as usize }.subtree(cell, references, 0)
 }
 
 struct Binned<'a> {
@@ -27,6 +28,8 @@ struct Binned<'a> {
     /// The records, and what of them has no room.
     records: (&'a [Triangle], f32),
     bins: usize,
+    /// References of a cell from which on bins are taken, less one.
+    exact: usize,
 }
 
 impl Binned<'_> {
@@ -34,6 +37,9 @@ impl Binned<'_> {
         let count = references.len();
         if self.heuristic.is_leaf(count, depth) {
             return Subtree::leaf(&references);
+        }
+        if count <= self.exact {
+            return Small::new(self.heuristic, self.records).tree(cell, references, depth);
         }
         let best = self.best_split(&cell, &references);
         let Some(Split { plane, .. }) = self.heuristic.paying(best, &cell, count) else {

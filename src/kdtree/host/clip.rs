@@ -121,7 +121,12 @@ pub(super) fn divided(
     }
     let Triangle { v0, v1, v2, .. } = records[reference.record as usize];
     let part = |cell| clipped(&[v0, v1, v2], reach, cell).map(|bounds| Reference { bounds, ..*reference });
-    halves.each_ref().map(part)
+    let parts = halves.each_ref().map(part);
+    if parts != [None; 2] {
+        return parts;
+    }
+    // Rounding has it that the triangle is in neither: it was in the cell, and no node may lose its last reference.
+    halves.each_ref().map(|half| Some(Reference { bounds: reference.bounds.intersection(half), ..*reference }))
 }
 
 fn widened(b: &Aabb, by: [f32; 3]) -> Aabb {

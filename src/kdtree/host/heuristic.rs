@@ -3,7 +3,7 @@
 use super::clip::Plane;
 use crate::bvh::layout::Aabb;
 use crate::bvh::sah::area_scale;
-use crate::kdtree::layout::halves;
+use crate::kdtree::layout::{MAX_DEPTH, halves};
 use crate::kdtree::termination::{Costs, depth_limit, leaf_size};
 
 /// A plane and what it costs.
@@ -40,14 +40,24 @@ pub(super) struct Heuristic {
 }
 
 impl Heuristic {
-    /// For so many triangles in the root's `cell`.
+    /// For so many primitives, those among them that are left out too, in the root's `cell`, which is empty where all are.
     pub fn new(costs: Costs, cell: &Aabb, primitives: u32) -> Heuristic {
         Heuristic {
             costs,
-            area_scale: if primitives == 0 { 1.0 } else { area_scale(cell) },
+            area_scale: if cell.lo[0] > cell.hi[0] { 1.0 } else { area_scale(cell) },
             depth_limit: depth_limit(primitives),
             leaf_size: leaf_size(primitives),
         }
+    }
+
+    /// For what is merged in a leaf of a tree of so many triangles, in the leaf's `cell`: as deep as a tracer can walk.
+    pub fn of_leaf(costs: Costs, cell: &Aabb, primitives: u32) -> Heuristic {
+        Heuristic { costs, area_scale: area_scale(cell), depth_limit: MAX_DEPTH, leaf_size: leaf_size(primitives) }
+    }
+
+    /// For a builder that begins at a depth and counts from there.
+    pub fn below(&self, depth: u32) -> Heuristic {
+        Heuristic { depth_limit: self.depth_limit.saturating_sub(depth), ..*self }
     }
 
     /// Whether a cell is a leaf whatever a split would cost.
@@ -64,9 +74,27 @@ impl Heuristic {
         let areas = halves(cell, axis, at).map(|half| half.scaled_half_area(self.area_scale));
         let planar_left = areas[0] <= areas[1];
         let counts = if planar_left { [left + planar, right] } else { [left, planar + right] };
-        let tests = areas[0] * counts[0] as f32 + areas[1] * counts[1] as f32;
+        let cost = self.cost(cell, areas, counts.map(|count| count as f32));
+        // Of the two zeros the positive one, whichever the box had.
+        Some(Split { plane: Plane { axis, at: at + 0.0, planar_left }, cost })
+    }
+
+    /// A step in the cell, and so many tests in each of its parts.
+    fn cost(&self, cell: &Aabb, areas: [f32; 2], [left, right]: [f32; 2]) -> f32 {
         let steps = self.costs.c_t * cell.scaled_half_area(self.area_scale);
-        Some(Split { plane: Plane { axis, at, planar_left }, cost: steps + self.costs.c_i * tests })
+        steps + self.costs.c_i * (areas[0] * left + areas[1] * right)
+    }
+
+    /// The cost of a plane between trees that are worth so many tests, and whether that is less than without it.
+    pub fn between(&self, cell: &Aabb, (axis, at): (usize, f32), tests: [f32; 2]) -> (f32, bool) {
+        let areas = halves(cell, axis, at).map(|half| half.scaled_half_area(self.area_scale));
+        let cost = self.cost(cell, areas, tests);
+        (cost, cost < self.costs.c_i * (cell.scaled_half_area(self.area_scale) * (tests[0] + tests[1])))
+    }
+
+    /// How many tests a step is worth.
+    pub fn step(costs: Costs) -> f32 {
+        costs.c_t / costs.c_i
     }
 
     /// The split, if a leaf of so many references costs more.

@@ -8,6 +8,9 @@ mod binned;
 mod clip;
 mod exact;
 mod heuristic;
+pub mod marked;
+pub mod merge;
+mod small;
 
 use super::layout::KdTree;
 use super::termination::Costs;
@@ -26,6 +29,13 @@ pub enum Planes {
     Exact,
     /// Between so many bins along each axis (Shevtsov, Soupikov and Kapustin 2007).
     Binned(u32),
+    /// The same in cells of more than `exact` references, and every face of every box in the others: what the device builds.
+    Mixed {
+        /// Bins along each axis.
+        bins: u32,
+        /// References of a cell below which no bins are taken.
+        exact: u32,
+    },
 }
 
 impl Planes {
@@ -33,6 +43,8 @@ impl Planes {
     pub const BINS: u32 = 32;
     /// The most bins there may be.
     pub const MAX_BINS: u32 = 1024;
+    /// The most there may be: looking at every plane takes time by the square.
+    pub const MAX_EXACT: u32 = 64;
 }
 
 /// What a build is asked for.
@@ -55,9 +67,10 @@ impl Options {
     pub fn check(&self) -> Result<()> {
         if !self.check_planes() {
             return Err(Error::Argument(format!(
-                "{:?} cannot be used; take 2 to {} bins",
+                "{:?} cannot be used; take 2 to {} bins, and exact splits of at most {} references",
                 self.planes,
-                Planes::MAX_BINS
+                Planes::MAX_BINS,
+                Planes::MAX_EXACT
             )));
         }
         match [self.costs.c_t, self.costs.c_i].into_iter().find(|&cost| !Costs::check(cost)) {
@@ -68,7 +81,11 @@ impl Options {
 
     /// Whether there can be so many bins.
     pub fn check_planes(&self) -> bool {
-        !matches!(self.planes, Planes::Binned(bins) if !(2..=Planes::MAX_BINS).contains(&bins))
+        match self.planes {
+            Planes::Exact => true,
+            Planes::Binned(bins) => (2..=Planes::MAX_BINS).contains(&bins),
+            Planes::Mixed { bins, exact } => (2..=Planes::MAX_BINS).contains(&bins) && exact <= Planes::MAX_EXACT,
+        }
     }
 }
 
@@ -105,10 +122,11 @@ pub fn build_corners(corners: impl Iterator<Item = Corners>, options: &Options) 
     let references: Vec<Reference> = records.par_iter().enumerate().map(reference).collect();
     let around = |t: &Triangle| clip::cell_around(&[t.v0, t.v1, t.v2], reach);
     let cell = records.iter().fold(Aabb::EMPTY, |b, t| b.union(&around(t)));
-    let heuristic = Heuristic::new(options.costs, &cell, records.len() as u32);
+    let heuristic = Heuristic::new(options.costs, &cell, primitive_count);
     let root = match options.planes {
         Planes::Exact => exact::build(&heuristic, (&records, reach), cell, references),
-        Planes::Binned(bins) => binned::build(&heuristic, (&records, reach), bins, cell, references),
+        Planes::Binned(bins) => binned::build(&heuristic, (&records, reach), (bins, 0), cell, references),
+        Planes::Mixed { bins, exact } => binned::build(&heuristic, (&records, reach), (bins, exact), cell, references),
     };
     assemble::assemble(root, &heuristic, (cell, reach), records, (primitive_count, status))
 }
@@ -125,6 +143,8 @@ enum Subtree {
         plane: Plane,
         children: Box<[Subtree; 2]>,
     },
+    /// One whose nodes lie together, depth first.
+    Together(Box<Subtree>),
 }
 
 impl Subtree {
@@ -143,10 +163,6 @@ impl Subtree {
         right: impl FnOnce() -> Subtree + Send,
     ) -> Subtree {
         let children = if count < ALONE { (left(), right()) } else { rayon::join(left, right) };
-        match children {
-            // Clipping has shown that nothing touches the cell.
-            (Subtree::Empty, Subtree::Empty) => Subtree::Empty,
-            (left, right) => Subtree::Inner { plane, children: Box::new([left, right]) },
-        }
+        Subtree::Inner { plane, children: Box::new([children.0, children.1]) }
     }
 }

@@ -10,6 +10,8 @@ use super::Subject;
 use super::choose::Auto;
 use super::device_bvh::DeviceBvh;
 use super::host::Host;
+use super::kd_device::KdDevice;
+use super::kd_gpu::KdGpu;
 use super::kd_host::KdHost;
 use super::peers::driver::Driver;
 #[cfg(feature = "peer-embree")]
@@ -18,10 +20,12 @@ use super::peers::embree::Embree;
 use super::peers::obvhs::Obvhs;
 use crate::bvh::{builder, reinsertion};
 use crate::gpu::Device;
+use crate::kdtree;
 use crate::scene::Mesh;
+use crate::trace::kd_host::Traversal;
 use crate::trace::wide::Tracer;
 use crate::{Error, Result};
-use options::{OPTIMISE, RAYS};
+use options::{OPTIMISE, RAYS, TRACE};
 use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
@@ -55,9 +59,17 @@ impl Spec {
         self
     }
 
+    /// What it needs of the machine: what its builder does, and a device if rays are to be traced there.
+    pub fn needs(&self) -> Needs {
+        match self.builder().needs() {
+            Needs::Nothing if self.option(TRACE.key) == Some("device") => Needs::Device,
+            needs => needs,
+        }
+    }
+
     /// Whether it can be measured with this device.
     pub fn is_possible(&self, device: Option<&Device>) -> bool {
-        match self.builder().needs() {
+        match self.needs() {
             Needs::Nothing => true,
             Needs::Device => device.is_some(),
             Needs::RayQuery => device.is_some_and(Device::has_ray_query),
@@ -75,13 +87,42 @@ impl Spec {
         Ok(match self.builder().kind {
             Kind::Device(options) => Box::new(self.on_device(given()?, mesh, options(self)?)?),
             Kind::Host(hierarchy) => Box::new(Host::new(&name, mesh, self.host_options(hierarchy(self)?)?)),
-            Kind::KdHost(options) => Box::new(KdHost::new(&name, mesh, options(self)?, self.traversal()?)),
+            Kind::KdHost(options) => {
+                let (options, traversal) = (options(self)?, self.traversal()?);
+                let subject = KdHost::new(&name, mesh, options, traversal);
+                match self.traces_on_device()? {
+                    false => Box::new(subject),
+                    true => Box::new(subject.traced_by(KdDevice::new(given()?, traversal)?)),
+                }
+            }
+            Kind::KdGpu => Box::new(KdGpu::new(given()?, &name, mesh, &self.kd_gpu_options()?, self.traversal()?)?),
             Kind::Auto => Box::new(Auto::new(given()?, &name, mesh, self.rays()?)?),
             Kind::Driver(preference) => Box::new(Driver::new(given()?, mesh, preference)?),
             #[cfg(feature = "peer-obvhs")]
             Kind::Obvhs(preset) => Box::new(Obvhs::new(mesh, preset)?),
             #[cfg(feature = "peer-embree")]
             Kind::Embree(preset) => Box::new(Embree::new(mesh, preset)?),
+        })
+    }
+
+    /// How it builds and traces kd-trees, if it does.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if it is no builder of kd-trees.
+    pub fn kd(&self) -> Result<KdBuilder> {
+        let traversal = || self.traversal();
+        Ok(match self.builder().kind {
+            Kind::KdHost(options) => KdBuilder::Host {
+                options: options(self)?,
+                traversal: traversal()?,
+                traces_on_device: self.traces_on_device()?,
+            },
+            Kind::KdGpu => KdBuilder::Device { options: self.kd_gpu_options()?, traversal: traversal()? },
+            _ => {
+                let of_kd = |b: &&Builder| matches!(b.kind, Kind::KdHost(_) | Kind::KdGpu);
+                let names: Vec<&str> = BUILDERS.iter().filter(of_kd).map(|b| b.name).collect();
+                return Err(Error::Argument(format!("{self} builds no kd-trees; take {}", names.join(", "))));
+            }
         })
     }
 
@@ -99,6 +140,27 @@ impl Spec {
         }
         DeviceBvh::new(device, &self.to_string(), mesh, &options, wide)
     }
+}
+
+/// A builder of kd-trees, for those that build more than one of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum KdBuilder {
+    /// On the host.
+    Host {
+        /// What it builds.
+        options: kdtree::host::Options,
+        /// How its trees are traced.
+        traversal: Traversal,
+        /// Whether that is on the device.
+        traces_on_device: bool,
+    },
+    /// On the device, which traces them, too.
+    Device {
+        /// What it builds.
+        options: kdtree::builder::Options,
+        /// How its trees are traced.
+        traversal: Traversal,
+    },
 }
 
 /// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
@@ -224,6 +286,14 @@ mod tests {
     }
 
     #[test]
+    fn a_device_is_needed_where_rays_are_traced_on_it() {
+        let needs = |text: &str| text.parse::<Spec>().expect("known").needs();
+        assert_eq!(needs("kd-binned:trace=device"), Needs::Device);
+        assert_eq!([needs("kd-binned"), needs("kd-exact:trace=host")], [Needs::Nothing; 2]);
+        assert_eq!([needs("lbvh"), needs("driver-fast-build")], [Needs::Device, Needs::RayQuery]);
+    }
+
+    #[test]
     fn what_is_wrong_is_named_with_what_there_is() {
         assert!(error_of("lvbh").contains("no builder is called \"lvbh\"; there are"));
         assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));
@@ -256,7 +326,8 @@ mod tests {
             let says = format!("traversal={wrong} is not known; take stack, restart, push-down, short-N");
             assert!(error_of(&format!("kd-exact:traversal={wrong}")).contains(&says), "{wrong}");
         }
-        assert!(error_of("kd-exact:bins=8").contains("no option \"bins\"; it takes kt, ki, traversal"));
+        assert!(error_of("kd-exact:trace=there").contains("trace=there is not known; take host or device"));
+        assert!(error_of("kd-exact:bins=8").contains("no option \"bins\"; it takes kt, ki, traversal, trace"));
         assert!(error_of("auto:rays=many").contains("no number of rays"));
         assert!(error_of("").contains("-b all"));
         assert!(error_of(",").contains("-b all"));

@@ -50,6 +50,12 @@ pub(super) const RADIUS: BuilderOption =
     BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
 pub(super) const BINS: BuilderOption =
     BuilderOption { key: "bins", values: "a number of bins along each axis, from 2 to 1024" };
+pub(super) const EXACT: BuilderOption = BuilderOption {
+    key: "exact",
+    values: "references of a cell that is split exactly, at most 64 of them, 0 for none; 32 unless given",
+};
+pub(super) const WORKGROUPS: BuilderOption =
+    BuilderOption { key: "workgroups", values: "a number of workgroups of the persistent schedule, from 1" };
 pub(super) const KT: BuilderOption =
     BuilderOption { key: "kt", values: "a cost of a traversal step, from 0.001 to 1000; 3 unless given" };
 pub(super) const KI: BuilderOption =
@@ -60,6 +66,9 @@ pub(super) const TRAVERSAL: BuilderOption = BuilderOption {
     values: "stack, restart, push-down, short-N or short-N-push-down, N being how much a short stack holds; stack unless given",
 };
 
+pub(super) const TRACE: BuilderOption =
+    BuilderOption { key: "trace", values: "host or device: where rays are traced; host unless given" };
+
 /// Of `ploc` where it is not told: what drivers take.
 const PLOC_RADIUS: u32 = 16;
 
@@ -69,7 +78,8 @@ impl Spec {
         match self.builder().kind {
             Kind::Device(options) => options(self).and(self.form_and_order()).map(drop),
             Kind::Host(hierarchy) => self.host_options(hierarchy(self)?).map(drop),
-            Kind::KdHost(options) => options(self).and(self.traversal()).map(drop),
+            Kind::KdHost(options) => options(self).and(self.traversal()).and(self.traces_on_device()).map(drop),
+            Kind::KdGpu => self.kd_gpu_options().map(drop).and(self.traversal().map(drop)),
             Kind::Auto => self.rays().map(drop),
             // They take none.
             Kind::Driver(_) => Ok(()),
@@ -80,15 +90,20 @@ impl Spec {
         }
     }
 
-    /// Options `codes`, `split`, `optimise`, `collapse` and `schedule`.
-    pub(super) fn lbvh_options(&self) -> Result<builder::Options> {
-        let schedule = match self.option(SCHEDULE.key) {
+    /// Option `schedule`.
+    fn schedule(&self) -> Result<Option<Schedule>> {
+        Ok(match self.option(SCHEDULE.key) {
             None => None,
             Some("chain") => Some(Schedule::Chain),
             Some("persistent") => Some(Schedule::Persistent),
             Some("workgroup") => Some(Schedule::Workgroup),
             Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
-        };
+        })
+    }
+
+    /// Options `codes`, `split`, `optimise`, `collapse` and `schedule`.
+    pub(super) fn lbvh_options(&self) -> Result<builder::Options> {
+        let schedule = self.schedule()?;
         let (codes, split) = (self.codes()?, self.split()?);
         let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
         Ok(builder::Options { codes, split, optimise, collapse, schedule, ..builder::Options::DEFAULT })
@@ -164,6 +179,15 @@ impl Spec {
         value.parse().map_err(|()| self.wrong_value(&TRAVERSAL, value))
     }
 
+    /// Option `trace`.
+    pub(super) fn traces_on_device(&self) -> Result<bool> {
+        match self.option(TRACE.key) {
+            None | Some("host") => Ok(false),
+            Some("device") => Ok(true),
+            Some(other) => Err(self.wrong_value(&TRACE, other)),
+        }
+    }
+
     /// Options `kt` and `ki`.
     pub(super) fn kd_exact_options(&self) -> Result<kdtree::host::Options> {
         self.kd_options(Planes::Exact)
@@ -172,6 +196,35 @@ impl Spec {
     /// Options `bins`, `kt` and `ki`.
     pub(super) fn kd_binned_options(&self) -> Result<kdtree::host::Options> {
         self.kd_options(Planes::Binned(self.number(&BINS, Planes::BINS)?))
+    }
+
+    /// Options `bins`, `exact`, `kt` and `ki`.
+    pub(super) fn kd_mixed_options(&self) -> Result<kdtree::host::Options> {
+        let default = kdtree::builder::Options::DEFAULT;
+        let (bins, exact) = (self.number(&BINS, default.bins)?, self.number(&EXACT, default.exact)?);
+        if exact > Planes::MAX_EXACT {
+            return Err(self.wrong_value(&EXACT, self.option(EXACT.key).unwrap_or_default()));
+        }
+        self.kd_options(Planes::Mixed { bins, exact })
+    }
+
+    /// Options `bins`, `exact`, `kt`, `ki`, `schedule` and `workgroups`.
+    pub(super) fn kd_gpu_options(&self) -> Result<kdtree::builder::Options> {
+        let default = kdtree::builder::Options::DEFAULT;
+        let costs = self.kd_options(Planes::Exact)?.costs;
+        let workgroups = match self.option(WORKGROUPS.key) {
+            None => None,
+            Some(_) => Some(self.number(&WORKGROUPS, 1)?),
+        };
+        let options = kdtree::builder::Options {
+            bins: self.number(&BINS, default.bins)?,
+            exact: self.number(&EXACT, default.exact)?,
+            costs,
+            schedule: self.schedule()?,
+            workgroups,
+            ..default
+        };
+        options.check().map(|()| options)
     }
 
     fn kd_options(&self, planes: Planes) -> Result<kdtree::host::Options> {

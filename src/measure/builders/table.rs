@@ -2,8 +2,8 @@
 
 use super::Spec;
 use super::options::{
-    BINS, BITS, CODES, COLLAPSE, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT, TERMINATION, TRAVERSAL,
-    TREELET, WIDTH, WINDOW,
+    BINS, BITS, CODES, COLLAPSE, EXACT, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT, TERMINATION, TRACE,
+    TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
 };
 use crate::Result;
 use crate::bvh::builder;
@@ -45,6 +45,8 @@ pub(super) enum Kind {
     Host(fn(&Spec) -> Result<Hierarchy>),
     /// A kd-tree by one of ours on the host.
     KdHost(fn(&Spec) -> Result<kdtree::host::Options>),
+    /// A kd-tree by ours on the device.
+    KdGpu,
     /// The one of ours on the device that the cost model chooses.
     Auto,
     /// The Vulkan driver's own.
@@ -83,7 +85,7 @@ impl Builder {
     /// What it needs of the machine.
     pub fn needs(&self) -> Needs {
         match self.kind {
-            Kind::Device(_) | Kind::Auto => Needs::Device,
+            Kind::Device(_) | Kind::KdGpu | Kind::Auto => Needs::Device,
             Kind::Driver(_) => Needs::RayQuery,
             Kind::Host(_) | Kind::KdHost(_) => Needs::Nothing,
             #[cfg(feature = "peer-obvhs")]
@@ -155,13 +157,25 @@ pub static BUILDERS: &[Builder] = &[
     )
     .taking(&[COLLAPSE, OPTIMISE, TERMINATION]),
     Builder::new(&"kd-exact", "kd-tree on the host: perfect splits by SAH", Kind::KdHost(Spec::kd_exact_options))
-        .taking(&[KT, KI, TRAVERSAL]),
+        .taking(&[KT, KI, TRAVERSAL, TRACE]),
     Builder::new(
         &"kd-binned",
         "kd-tree on the host: the best by SAH of equally spaced planes",
         Kind::KdHost(Spec::kd_binned_options),
     )
-    .taking(&[BINS, KT, KI, TRAVERSAL]),
+    .taking(&[BINS, KT, KI, TRAVERSAL, TRACE]),
+    Builder::new(
+        &"kd-gpu",
+        "kd-tree on the device: bins above, level by level; perfect splits of few references below",
+        Kind::KdGpu,
+    )
+    .taking(&[BINS, EXACT, KT, KI, SCHEDULE, WORKGROUPS, TRAVERSAL]),
+    Builder::new(
+        &"kd-gpu-host",
+        "kd-tree of bins above and perfect splits below, on the host: what `kd-gpu` must equal, byte for byte",
+        Kind::KdHost(Spec::kd_mixed_options),
+    )
+    .taking(&[BINS, EXACT, KT, KI, TRAVERSAL, TRACE]),
     Builder::new(
         &"driver-fast-build",
         "the Vulkan driver's own, asked to build fast",

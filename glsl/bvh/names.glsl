@@ -1,0 +1,35 @@
+// The library's own shaders say Node and Triangle; in somebody else's these names are theirs. A header for others begins with this
+// file, which puts the library's name before them, and ends with bvh/names_end.glsl, which gives them back.
+#define Child HedgerowChild
+#define Node HedgerowNode
+#define Triangle HedgerowTriangle
+#define BoxRecord HedgerowBoxRecord
+#define Instance HedgerowInstance
+#define GeometryEntry HedgerowGeometryEntry
+#define Header HedgerowHeader
+#define Structure HedgerowStructure
+#define Triangles HedgerowTriangles
+#define BoxRecords HedgerowBoxRecords
+#define Instances HedgerowInstances
+#define GeometryTable HedgerowGeometryTable
+#define triangles_of hedgerow_triangles_of
+#define address_of hedgerow_address_of
+#define records_at hedgerow_records_at
+#define record_bytes hedgerow_record_bytes
+#define geometry_table_at hedgerow_geometry_table_at
+#define MAGIC HEDGEROW_MAGIC
+#define KIND_TRIANGLES HEDGEROW_KIND_TRIANGLES
+#define KIND_BOXES HEDGEROW_KIND_BOXES
+#define KIND_INSTANCES HEDGEROW_KIND_INSTANCES
+#define MAX_DEPTH HEDGEROW_MAX_DEPTH
+#define UNUSED HEDGEROW_UNUSED
+#define AT_ROOT HEDGEROW_AT_ROOT
+#define STATUS_NON_FINITE HEDGEROW_STATUS_NON_FINITE
+#define STATUS_INDEX_OUT_OF_RANGE HEDGEROW_STATUS_INDEX_OUT_OF_RANGE
+#define STATUS_TOO_DEEP HEDGEROW_STATUS_TOO_DEEP
+#define STATUS_SPIN_RAN_OUT HEDGEROW_STATUS_SPIN_RAN_OUT
+#define STATUS_BAD_INSTANCE HEDGEROW_STATUS_BAD_INSTANCE
+#define STATUS_WRONG_VERSION HEDGEROW_STATUS_WRONG_VERSION
+#define STATUS_DEPTH_LIMITED HEDGEROW_STATUS_DEPTH_LIMITED
+#define STATUS_UNUSABLE HEDGEROW_STATUS_UNUSABLE
+#define GEOMETRY_OPAQUE HEDGEROW_GEOMETRY_OPAQUE

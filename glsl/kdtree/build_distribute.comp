@@ -1,0 +1,8 @@
+#version 460
+// References to the next level and to leaves; workgroups share them. See kdtree/build.glsl.
+#include "kdtree/phases.glsl"
+
+void main() {
+    uint items = PoolState(state_address).tasks[bin_phase(level) + 2u];
+    for (uint i = gl_WorkGroupID.x; i < items; i += gl_NumWorkGroups.x) kd_distribute(i, level);
+}

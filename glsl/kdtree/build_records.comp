@@ -1,0 +1,7 @@
+#version 460
+// The records and the references of the root; workgroups share the tiles. See kdtree/build.glsl.
+#include "kdtree/encode.glsl"
+
+void main() {
+    for (uint i = gl_WorkGroupID.x; i < tile_count(); i += gl_NumWorkGroups.x) kd_records(i);
+}

@@ -1,0 +1,144 @@
+// Split clipping: the box of what of a triangle lies in a cell. src/kdtree/host/clip.rs is the twin, bit for bit, and says why no
+// point of a triangle is lost.
+#ifndef HEDGEROW_KDTREE_CLIP
+#define HEDGEROW_KDTREE_CLIP
+#include "kdtree/build.glsl"
+#include "bvh/codes.glsl"
+
+const float OF_SIDE = 3.814697265625e-6;                  // 2^-18
+const float OF_COORDINATE = 4.76837158203125e-7;          // 2^-21
+const float TWICE_SLACK = 7.62939453125e-6;               // 2^-17
+const float FARTHEST = 3.4028234663852886e38;
+const uint POLYGON_CORNERS = 9;
+
+float least_rounding() {
+    return uintBitsToFloat((127u - 120u) << 23);
+}
+
+float shortest_edge() {
+    return uintBitsToFloat((127u - 100u) << 23);
+}
+
+float longest_side(Box b) {
+    precise vec3 extent = b.hi - b.lo;
+    return min(max(max(0.0, extent.x), max(extent.y, extent.z)), FARTHEST);
+}
+
+// By how much along each axis the box of a part is off at most.
+vec3 rounding_of(Box whole, float longest) {
+    precise vec3 rounding = OF_SIDE * longest + OF_COORDINATE * max(abs(whole.lo), abs(whole.hi)) + least_rounding();
+    return rounding;
+}
+
+// How near along each axis is near enough to be met for a triangle: nothing for those within `reach`.
+vec3 room_of(float longest, vec3 rounding, float reach) {
+    precise vec3 room = TWICE_SLACK * longest + rounding;
+    return longest > reach ? room : vec3(0.0);
+}
+
+Box widened(Box b, vec3 by) {
+    precise vec3 lo = b.lo - by;
+    precise vec3 hi = b.hi + by;
+    return Box(lo, hi);
+}
+
+Box common_part(Box a, Box b) {
+    return Box(max(a.lo, b.lo), min(a.hi, b.hi));
+}
+
+Box finite_part(Box b) {
+    return Box(max(b.lo, vec3(-FARTHEST)), min(b.hi, vec3(FARTHEST)));
+}
+
+// The box of a triangle with its room.
+Box bounds_of(Corners c, float reach) {
+    Box whole = box_around(c);
+    float longest = longest_side(whole);
+    return finite_part(widened(whole, room_of(longest, rounding_of(whole, longest), reach)));
+}
+
+// What a triangle adds to the root's cell.
+Box cell_around(Corners c, float reach) {
+    Box whole = box_around(c);
+    return finite_part(widened(bounds_of(c, reach), rounding_of(whole, longest_side(whole))));
+}
+
+// Where the edge from a to b, which goes up along the axis, crosses the plane; `outer` where it is too short or too long to tell.
+vec3 crossing_of(vec3 a, vec3 b, uint axis, float plane, vec3 outer) {
+    precise vec3 d = b - a;
+    if (d[axis] < shortest_edge() || !is_finite(d)) return outer;
+    precise float t = (plane - a[axis]) * (1.0 / d[axis]);
+    precise vec3 point = a + t * d;
+    point[axis] = plane;
+    return point;
+}
+
+// The box of a triangle's part in a cell; false where there is none.
+bool clip_triangle(Corners c, float reach, Box cell, out Box part) {
+    Box whole = box_around(c);
+    float longest = longest_side(whole);
+    vec3 rounding = rounding_of(whole, longest), room = room_of(longest, rounding, reach);
+    precise vec3 margin = room + rounding;
+    Box larger = widened(cell, margin);
+    vec3 polygon[POLYGON_CORNERS], cut[POLYGON_CORNERS];
+    polygon[0] = c.v0;
+    polygon[1] = c.v1;
+    polygon[2] = c.v2;
+    uint count = 3;
+    bool is_cut = true;
+    for (uint face = 0; face < 6 && is_cut; ++face) {
+        uint axis = face >> 1;
+        bool is_upper = (face & 1u) == 0u;
+        float plane = is_upper ? larger.hi[axis] : larger.lo[axis];
+        bool all_kept = true;
+        for (uint i = 0; i < count; ++i) {
+            float x = polygon[i][axis];
+            all_kept = all_kept && (is_upper ? x <= plane : x >= plane);
+        }
+        if (all_kept) continue;
+        uint kept = 0;
+        vec3 p = polygon[0];
+        for (uint i = 0; i < count && is_cut; ++i) {
+            vec3 q = polygon[i + 1 < count ? i + 1 : 0];
+            bool keeps_p = is_upper ? p[axis] <= plane : p[axis] >= plane;
+            bool keeps_q = is_upper ? q[axis] <= plane : q[axis] >= plane;
+            uint more = (keeps_p ? 1u : 0u) + (keeps_p != keeps_q ? 1u : 0u);
+            if (kept + more > POLYGON_CORNERS) {
+                is_cut = false;
+            } else {
+                if (keeps_p) cut[kept++] = p;
+                if (keeps_p != keeps_q) {
+                    bool goes_up = p[axis] < q[axis];
+                    cut[kept++] = crossing_of(goes_up ? p : q, goes_up ? q : p, axis, plane, keeps_p ? q : p);
+                }
+            }
+            p = q;
+        }
+        count = kept;
+        for (uint i = 0; i < count; ++i) polygon[i] = cut[i];
+    }
+    // A polygon of no corners has a box from +∞ to −∞.
+    Box bounds = Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
+    if (is_cut) {
+        for (uint i = 0; i < count; ++i) bounds = Box(min(bounds.lo, polygon[i]), max(bounds.hi, polygon[i]));
+    } else {
+        bounds = whole;
+    }
+    Box own = finite_part(widened(whole, room));
+    part = common_part(common_part(widened(bounds, margin), own), cell);
+    return all(lessThanEqual(part.lo, part.hi));
+}
+
+// Whether a box is on the left of a plane, and on its right.
+bvec2 sides_of(Box b, uint axis, float plane, bool planar_left) {
+    float lo = b.lo[axis], hi = b.hi[axis];
+    bool is_planar = lo == plane && hi == plane;
+    return bvec2(lo < plane || is_planar && planar_left, hi > plane || is_planar && !planar_left);
+}
+
+Corners corners_of_record(uint record) {
+    Triangles triangles = Triangles(kd_records_at(structure_address, node_room, reference_room));
+    Triangle t = triangles.triangle[record];
+    return Corners(t.v0, t.v1, t.v2);
+}
+#endif

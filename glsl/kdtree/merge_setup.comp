@@ -1,0 +1,25 @@
+#version 460
+// Where things of a merge lie, and the static tree's header to where it is kept; one workgroup. See kdtree/merge.glsl.
+#include "kdtree/merge_setup.glsl"
+
+void main() {
+    if (gl_LocalInvocationIndex != 0u) return;
+    KdMerge merge = KdMerge(address_of(state_address, 1u, MERGE_AT));
+    merge.undo = undo;
+    merge.pairs = pairs;
+    merge.keys = keys;
+    merge.values = values;
+    merge.sorted_keys = sorted_keys;
+    merge.sorted_values = sorted_values;
+    merge.marked = marked;
+    merge.pair_capacity = pair_capacity;
+    merge.marked_capacity = marked_capacity;
+    merge.record_bits = record_bits;
+    merge.key_words = key_words;
+    merge.tiles = tiles;
+    merge.primitive_end = primitive_end;
+    merge.status = 0u;
+    merge.wanted_pairs = 0u;
+    KdUndo(undo).header = KdStructure(structure_address).header;
+    KdUndo(undo).count = 0u;
+}

@@ -1,0 +1,23 @@
+// The arguments of what comes before a merge, and of what undoes it.
+#ifndef HEDGEROW_KDTREE_MERGE_SETUP
+#define HEDGEROW_KDTREE_MERGE_SETUP
+#include "kdtree/merge_state.glsl"
+
+layout(push_constant, scalar) uniform Setup {
+    uvec2 structure_address;
+    uvec2 state_address;
+    uvec2 undo;
+    uvec2 pairs;
+    uvec2 keys;
+    uvec2 values;
+    uvec2 sorted_keys;
+    uvec2 sorted_values;
+    uvec2 marked;
+    uint pair_capacity;
+    uint marked_capacity;
+    uint record_bits;
+    uint key_words;
+    uint tiles;
+    uint primitive_end;
+};
+#endif

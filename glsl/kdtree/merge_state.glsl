@@ -1,0 +1,85 @@
+// What a merge has beside a build's state: src/kdtree/merge.rs.
+#ifndef HEDGEROW_KDTREE_MERGE_STATE
+#define HEDGEROW_KDTREE_MERGE_STATE
+#include "gpu/pass.glsl"
+#include "kdtree/layout.glsl"
+
+// A triangle of an object in a leaf of the static tree: the leaf.
+struct KdPair {
+    vec3 lo;
+    uint node;                      // NONE of an empty leaf
+    vec3 hi;
+    uint depth;
+};
+
+// A leaf of the static tree that triangles of objects are in.
+struct KdMarked {
+    uint id;
+    uint node;
+    uint first;                     // of its pairs
+    uint count;                     // references, those of the static leaf first
+    uint own;                       // so many are of the static leaf
+    uint from;                      // where they are
+    uint begin;                     // where all are in the first level
+    uint home;                      // of the leaf, or of the parent of one that is empty: where its word is to go
+    uint pair;                      // of an empty leaf and its sibling: two new nodes
+    uint copies;                    // whether the sibling moves as it is
+};
+
+// What a merge has overwritten.
+struct KdUndone {
+    uint slot;
+    KdNode node;
+};
+
+BUFFER KdPairs { KdPair pair[]; };
+BUFFER KdMarkedLeaves { KdMarked leaf[]; };
+BUFFER KdUndo {
+    KdHeader header;
+    uint count;
+    KdUndone undone[];
+};
+
+BUFFER KdMerge {
+    // `Report` in src/kdtree/merge.rs.
+    uint status;
+    uint wanted_pairs;
+    uint wanted_marked;
+    uint wanted_references;         // of the first level
+    uint level_references;          // these as a build has them
+    uint level_nodes;
+    uint subtree_nodes;
+    uint cut_references;
+    uint subtree_references;
+    uint subtrees;
+    uint ended;
+    uvec2 undo;
+    uvec2 pairs;
+    uvec2 keys;
+    uvec2 values;
+    uvec2 sorted_keys;
+    uvec2 sorted_values;
+    uvec2 marked;
+    uint pair_capacity;
+    uint marked_capacity;
+    uint record_bits;               // of a key, below those of the leaf
+    uint key_words;
+    uint tiles;                     // of all objects
+    uint primitive_end;
+    uint marked_count;
+    uint marked_empty;              // of them, those that get a pair
+    uint marked_root;               // 1 if the tree holds nothing
+    uint replaced_references;
+    uint first_root;                // node
+};
+
+// In the state, behind what a build has.
+const uint MERGE_AT = 2560;
+
+// Leaves are numbered by parent and side, as those that are empty have no node; the root is 0.
+const uint ROOT_ID = 0;
+
+uint id_of(uint parent, uint side) {
+    return 2u * parent + side + 1u;
+}
+#endif

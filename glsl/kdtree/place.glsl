@@ -1,0 +1,90 @@
+// Subtrees in their order behind the levels, and the header.
+#ifndef HEDGEROW_KDTREE_PLACE
+#define HEDGEROW_KDTREE_PLACE
+#include "kdtree/build.glsl"
+
+// Where the nodes and the references of each subtree go; by one workgroup. Nodes and references of the structure.
+uvec2 order_subtrees() {
+    KdState state = build_state();
+    KdSubtrees subtrees = all_subtrees();
+    uint count = state.subtree_count;
+    uint node = state.node_count, reference = state.leaf_count;
+    for (uint base = 0; base < count; base += gl_WorkGroupSize.x) {
+        uint i = base + gl_LocalInvocationIndex;
+        uint nodes = i < count ? subtrees.subtree[i].nodes : 0u, references = i < count ? subtrees.subtree[i].references : 0u;
+        uvec2 total;
+        uint node_at = node + sum_before(nodes, total.x), reference_at = reference + sum_before(references, total.y);
+        if (i < count) {
+            subtrees.subtree[i].first_node = node_at;
+            subtrees.subtree[i].first_reference = reference_at;
+        }
+        node += total.x;
+        reference += total.y;
+    }
+    if (gl_LocalInvocationIndex == 0u) PoolState(state_address).tasks[PHASE_PLACE] = (count + ITEMS - 1u) / ITEMS;
+    return uvec2(node, reference);
+}
+
+void kd_order_subtrees() {
+    KdState state = build_state();
+    KdStructure structure = KdStructure(structure_address);
+    uvec2 used = order_subtrees();
+    if (gl_LocalInvocationIndex != 0u) return;
+    KdHeader header;
+    header.magic = MAGIC;
+    header.kind = KIND_KD_TREE;
+    header.status = state.status;
+    header.primitive_count = primitive_count;
+    header.lo = state.cell_lo;
+    header.hi = state.cell_hi;
+    header.node_count = used.x;
+    header.reference_count = used.y;
+    header.active_count = state.active_count;
+    header.inner_nodes = state.inner_nodes + state.subtree_inner;
+    header.leaves = state.leaves + state.subtree_leaves;
+    header.empty_leaves = state.empty_leaves + state.subtree_empty;
+    header.geometry_count = 1u;
+    header.geometry_flags = flags_of(given_geometry()) | flags_of(given_geometry()) << 8;
+    header.build_flags = build_flags;
+    header.depth = state.depth;
+    header.area_scale = state.area_scale;
+    header.reach = state.reach;
+    header.node_room = node_room;
+    header.reference_room = reference_room;
+    header.record_room = record_room;
+    header.replaced_nodes = 0u;
+    header.replaced_references = 0u;
+    for (uint k = 0; k < 5; ++k) header.reserved[k] = 0u;
+    structure.header = header;
+    state.report = KdReport(state.status, state.most_references, state.most_nodes, state.subtree_nodes, state.most_cut,
+                            state.subtree_references, state.most_subtrees, state.ended);
+}
+
+// Where a node of a subtree goes, what it names goes too: a subtree's nodes count from 1, its references from 0.
+KdNode moved(KdNode node, uint first_node, uint first_reference) {
+    if (kd_is_leaf(node)) node.second += first_reference << 2;
+    else node.second += first_node - 1u << 4;
+    return node;
+}
+
+void kd_place_subtree(uint s) {
+    KdState state = build_state();
+    KdStructure structure = KdStructure(structure_address);
+    KdSubtree t = all_subtrees().subtree[s];
+    KdNodes nodes = KdNodes(state.nodes);
+    Words from = Words(state.leaf_references), to = Words(kd_references_at(structure_address, node_room));
+    if (gl_LocalInvocationIndex == 0u) structure.nodes[t.node] = moved(t.root, t.first_node, t.first_reference);
+    for (uint i = gl_LocalInvocationIndex; i < t.nodes; i += gl_WorkGroupSize.x) {
+        structure.nodes[t.first_node + i] = moved(nodes.node[t.nodes_at + i], t.first_node, t.first_reference);
+    }
+    for (uint i = gl_LocalInvocationIndex; i < t.references; i += gl_WorkGroupSize.x) {
+        to.word[t.first_reference + i] = from.word[t.references_at + i];
+    }
+}
+
+// So many subtrees, one after the other.
+void kd_place(uint tile) {
+    uint count = build_state().subtree_count;
+    for (uint s = tile * ITEMS; s < min(tile * ITEMS + ITEMS, count); ++s) kd_place_subtree(s);
+}
+#endif

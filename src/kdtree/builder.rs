@@ -1,0 +1,517 @@
+//! kd-trees built on the device in the caller's command buffer and memory: `kd-gpu`.
+//!
+//! [`Builder::sizes`] tells the memory, [`Builder::record`] records the build. How many references and nodes a tree has shows only
+//! when it is built, so the sizes go by an [`Estimate`]; where that was too little, nodes are leaves, the status says so
+//! ([`OUT_OF_ROOM`](crate::bvh::layout::status::OUT_OF_ROOM)), and the [`Report`] says what would have been enough.
+//!
+//! Min-max binning above, level by level (Papay 2025, sections 9.4 to 9.6); cells of few references are split exactly, by one
+//! workgroup to their leaves. [`super::host`] is the twin, with
+//! [`Planes::Mixed`](super::host::Planes::Mixed). `glsl/kdtree/build.glsl` is the device's side.
+
+use super::layout::{self, Header, Node};
+use super::termination::{Costs, depth_limit, leaf_size};
+use crate::bvh::builder::Schedule;
+use crate::bvh::geometry::{Input, Planned, Primitives};
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::shaders::{self, Shader};
+use crate::gpu::{Context, Kernel, Recorder, Region, Step};
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
+
+/// What to build, beside the triangles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Bins along each axis, 2 to [`Options::MOST_BINS`].
+    pub bins: u32,
+    /// References up to which a cell is split exactly, [`Options::LEAST_EXACT`] to [`Options::MOST_EXACT`].
+    pub exact: u32,
+    /// The costs by which the best plane is chosen.
+    pub costs: Costs,
+    /// How the phases are recorded: a chain of dispatches or one persistent dispatch; `None` takes what measured faster.
+    pub schedule: Option<Schedule>,
+    /// Workgroups of the persistent dispatch, 1 or more; `None` takes what keeps the device busy.
+    pub workgroups: Option<u32>,
+    /// What the memory goes by; `None` takes [`Estimate::for_exact`].
+    pub estimate: Option<Estimate>,
+    /// Room in the structure beside what the build may need, for objects that are to be merged into it: [`super::merge`].
+    pub more: layout::Room,
+    /// `vk::BuildAccelerationStructureFlagsKHR` for the header.
+    pub build_flags: u32,
+}
+
+impl Options {
+    /// Bins and exact splits that measured well (docs/kdtree.md), everything else chosen.
+    pub const DEFAULT: Options = Options {
+        bins: 128,
+        exact: 32,
+        costs: Costs::DEFAULT,
+        schedule: None,
+        workgroups: None,
+        estimate: None,
+        more: layout::Room { nodes: 0, references: 0, records: 0 },
+        build_flags: 0,
+    };
+    /// The most bins: their counters lie in a workgroup's shared memory.
+    pub const MOST_BINS: u32 = 256;
+    /// The least number of references of exact splits: the tasks of a level are told by it.
+    pub const LEAST_EXACT: u32 = 4;
+    /// The most: looking at every plane takes time by the square.
+    pub const MOST_EXACT: u32 = 64;
+
+    /// # Errors
+    /// [`Error::Argument`] names the option that cannot be used, and what can.
+    pub fn check(&self) -> Result<()> {
+        if !(2..=Options::MOST_BINS).contains(&self.bins) {
+            return Err(Error::Argument(format!(
+                "{} bins; a kd-tree is built by 2 to {}",
+                self.bins,
+                Options::MOST_BINS
+            )));
+        }
+        if !(Options::LEAST_EXACT..=Options::MOST_EXACT).contains(&self.exact) {
+            return Err(Error::Argument(format!(
+                "exact splits of {} references; it is {} to {}",
+                self.exact,
+                Options::LEAST_EXACT,
+                Options::MOST_EXACT
+            )));
+        }
+        if self.schedule == Some(Schedule::Workgroup) {
+            return Err(Error::Argument(
+                "kd-trees are built by a chain or by persistent workgroups, not by one alone".into(),
+            ));
+        }
+        if self.workgroups == Some(0) {
+            return Err(Error::Argument("no workgroups; a build has 1 or more".into()));
+        }
+        match [self.costs.c_t, self.costs.c_i].into_iter().find(|&cost| !Costs::check(cost)) {
+            Some(cost) => Err(Error::Argument(format!("a cost of {cost} cannot be used; take 0.001 to 1000"))),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options::DEFAULT
+    }
+}
+
+/// How much a tree has, of each primitive. [`Report::estimate`] makes one that suffices for the scene that was built.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// References of a level.
+    pub level_references: f32,
+    /// Nodes of all levels above the subtrees of few references, their roots among them.
+    pub level_nodes: f32,
+    /// Nodes of those subtrees below their roots.
+    pub subtree_nodes: f32,
+    /// References that leaves would have if no cell was split any more, at the level where that is most.
+    pub cut_references: f32,
+    /// References of the subtrees.
+    pub subtree_references: f32,
+    /// Subtrees.
+    pub subtrees: f32,
+}
+
+impl Estimate {
+    /// For a scene of which nothing is known. The fewer references are split exactly, the more subtrees there are.
+    pub fn for_exact(exact: u32) -> Estimate {
+        Estimate {
+            level_references: 2.0,
+            level_nodes: 16.0 / exact as f32,
+            subtree_nodes: 3.0,
+            cut_references: 3.0,
+            subtree_references: 6.0,
+            subtrees: 8.0 / exact as f32,
+        }
+    }
+}
+
+/// What a build needed, in the scratch memory at [`Builder::report_range`] when it has run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Report {
+    /// Bits of [`crate::bvh::layout::status`].
+    pub status: u32,
+    /// References of the largest level, with what straddles a plane twice.
+    pub level_references: u32,
+    /// Nodes of all levels.
+    pub level_nodes: u32,
+    /// Nodes of subtrees below their roots.
+    pub subtree_nodes: u32,
+    /// References of all leaves if nothing was split any more, at the level where that is most.
+    pub cut_references: u32,
+    /// References of subtrees.
+    pub subtree_references: u32,
+    /// Subtrees.
+    pub subtrees: u32,
+    /// One more than the level that was split no further for want of room, or 0. What the levels below it would have needed is not
+    /// known: a build by [`Report::estimate`] comes farther, and tells.
+    pub ended: u32,
+}
+
+impl Report {
+    /// What suffices for the scene of so many primitives, exactly; where levels were cut off, twice what was asked for.
+    pub fn estimate(&self, primitive_count: u32) -> Estimate {
+        let more = if self.ended > 0 { 2.0 } else { 1.0 };
+        let each =
+            |count: u32| (f64::from(count) * more / f64::from(primitive_count.max(1))) as f32 * (1.0 + f32::EPSILON);
+        Estimate {
+            level_references: each(self.level_references),
+            level_nodes: each(self.level_nodes),
+            subtree_nodes: each(self.subtree_nodes),
+            cut_references: each(self.cut_references),
+            subtree_references: each(self.subtree_references),
+            subtrees: each(self.subtrees),
+        }
+    }
+}
+
+/// Bytes that a build needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// The structure: see [`super::layout`].
+    pub structure: u64,
+    /// Scratch, free again when the build has run and its report has been read.
+    pub scratch: u64,
+    /// Alignment of both addresses.
+    pub alignment: u64,
+}
+
+/// The builder, for one device, its options and a number of triangles.
+#[derive(Debug, Clone)]
+pub struct Builder {
+    options: Options,
+    schedule: Schedule,
+    count: u32,
+    shape: Shape,
+    room: Room,
+}
+
+/// How work is cut for a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Shape {
+    pub workgroup: u32,
+    items: u32,
+    pub groups: u32,
+}
+
+/// How much there is room for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Room {
+    pub level_references: u32,
+    pub tasks: u32,
+    pub chunks: u32,
+    pub subtrees: u32,
+    /// Nodes of levels, and those that there are before.
+    pub level_nodes: u32,
+    /// Of the structure.
+    pub nodes: u32,
+    /// References of all leaves if nothing was split any more, and those that there are before.
+    pub cut_references: u32,
+    /// Of the structure.
+    pub references: u32,
+    /// Of the structure.
+    pub records: u32,
+}
+
+push_constants! {
+    /// Push constants of `glsl/kdtree/build_*.comp`.
+    pub(super) struct Arguments {
+        vertices: u64,
+        indices: u64,
+        transform: u64,
+        structure: u64,
+        state: u64,
+        vertex_stride: u32,
+        vertex_count: u32,
+        formats: u32,
+        pub primitive_count: u32,
+        c_t: f32,
+        c_i: f32,
+        bin_part: f32,
+        pub depth_limit: u32,
+        pub leaf_size: u32,
+        pub level: u32,
+        reference_capacity: u32,
+        task_capacity: u32,
+        chunk_capacity: u32,
+        subtree_capacity: u32,
+        node_room: u32,
+        level_node_room: u32,
+        reference_room: u32,
+        cut_room: u32,
+        build_flags: u32,
+        record_room: u32,
+        pub first_tile: u32,
+        pub first_primitive: u32,
+    }
+}
+
+/// As `glsl/kdtree/` has them.
+const STATE_BYTES: u64 = 3072;
+const REPORT_AT: u64 = 768;
+const REFERENCE_BYTES: u64 = 28;
+const TASK_BYTES: u64 = 64;
+const SUBTREE_BYTES: u64 = 40;
+const MAX_DEPTH: u64 = layout::MAX_DEPTH as u64;
+const MOST_NODES: u64 = 254;
+/// The most triangles: references of a level are numbered twice over in 30 bits.
+pub const MAX_COUNT: u32 = 1 << 27;
+
+impl Room {
+    pub fn of(options: &Options, count: u32, chunk: u32) -> Room {
+        let Estimate { level_references, level_nodes, subtree_nodes, cut_references, subtree_references, subtrees } =
+            options.estimate.unwrap_or(Estimate::for_exact(options.exact));
+        // A little more where a scene is small, and what the layout can name at most.
+        let each = |of_each: f32, at_least: u32, most: u64| {
+            let wanted = (f64::from(of_each.max(0.0)) * f64::from(count)).ceil() as u64 + u64::from(at_least);
+            wanted.min(most) as u32
+        };
+        let level = each(level_references.max(1.0), 64, 1 << 29);
+        let large = level / (options.exact + 1) + 1;
+        let more = |of: u32, more: u32, most: u64| (u64::from(of) + u64::from(more)).min(most) as u32;
+        let level_nodes = more(each(level_nodes, 16, layout::MAX_NODES / 4), options.more.nodes, layout::MAX_NODES / 4);
+        let cut_references = each(cut_references.max(1.0), 64, layout::MAX_REFERENCES / 2);
+        let cut_references = more(cut_references, options.more.references, layout::MAX_REFERENCES / 2);
+        Room {
+            level_references: level,
+            tasks: 2 * large,
+            chunks: (level / chunk + large + 1).max(count.div_ceil(chunk) + 1),
+            subtrees: each(subtrees, 16, 1 << 28),
+            level_nodes,
+            nodes: level_nodes + each(subtree_nodes, 256, layout::MAX_NODES / 4 * 3),
+            cut_references,
+            references: cut_references + each(subtree_references, 512, layout::MAX_REFERENCES / 2),
+            records: more(count, options.more.records, u32::MAX.into()),
+        }
+    }
+}
+
+impl Shape {
+    pub fn of(context: &Context, options: &Options, count: u32, schedule: Schedule) -> Shape {
+        let limits = &context.limits;
+        // Two invocations look at the two parts of a reference.
+        let workgroup = limits.subgroup_size.max(2);
+        let is_cpu = limits.is_cpu();
+        let groups = (count / options.exact).clamp(1, if is_cpu { 64 } else { 1024 });
+        Shape {
+            workgroup,
+            items: (if is_cpu { 256 } else { 512 } / workgroup).max(1),
+            groups: options.workgroups.filter(|_| schedule == Schedule::Persistent).unwrap_or(groups),
+        }
+    }
+
+    pub fn chunk(&self) -> u32 {
+        self.workgroup * self.items
+    }
+
+    pub fn kernel(&self, shader: &'static Shader, options: &Options, input: &Input) -> Kernel {
+        // The fourth is of kernels that sort.
+        let source = input.source_constant(Primitives::Triangles);
+        let constants = [self.items, options.bins, options.exact, 0, source];
+        Kernel::new(shader, self.workgroup, &constants)
+    }
+
+    /// Scratch memory of a build with so much room.
+    pub fn scratch(&self, options: &Options, room: &Room) -> u64 {
+        let Room { level_references, tasks, chunks, subtrees, level_nodes, nodes, references, .. } = *room;
+        let of = |count: u32, bytes: u64| u64::from(count) * bytes;
+        let exact = u64::from(options.exact);
+        let counters = of(level_references / self.chunk() + 1, 4 * (6 * u64::from(options.bins) + 1));
+        let stack = 36 * MAX_DEPTH
+            + REFERENCE_BYTES * exact * MAX_DEPTH
+            + size_of::<Node>() as u64 * (MOST_NODES + 2)
+            + 4 * (MOST_NODES / 2 + 2) * exact;
+        let scratch = STATE_BYTES
+            + of(level_references, 2 * REFERENCE_BYTES + 4)
+            + of(tasks, 2 * TASK_BYTES)
+            + of(subtrees, SUBTREE_BYTES)
+            + of(chunks + 1, 8)
+            + counters
+            + of(nodes - level_nodes, size_of::<Node>() as u64)
+            + of(references, 4)
+            + of(self.groups, stack);
+        scratch.next_multiple_of(16)
+    }
+}
+
+impl Arguments {
+    /// Of a build with so much room; `depth_limit` and `leaf_size` go by what `input` has.
+    pub fn new(options: &Options, room: &Room, input: &Input, structure: u64, scratch: u64) -> Arguments {
+        let (geometry, formats) = input.for_kernels();
+        let count = input.primitive_count;
+        Arguments {
+            vertices: geometry.vertices,
+            indices: geometry.indices,
+            transform: geometry.transform,
+            structure,
+            state: scratch,
+            vertex_stride: geometry.vertex_stride,
+            vertex_count: geometry.vertex_count,
+            formats,
+            primitive_count: count,
+            c_t: options.costs.c_t,
+            c_i: options.costs.c_i,
+            bin_part: 2.0 / options.bins as f32,
+            depth_limit: depth_limit(count),
+            leaf_size: leaf_size(count),
+            level: 0,
+            reference_capacity: room.level_references,
+            task_capacity: room.tasks,
+            chunk_capacity: room.chunks,
+            subtree_capacity: room.subtrees,
+            node_room: room.nodes,
+            level_node_room: room.level_nodes,
+            reference_room: room.references,
+            cut_room: room.cut_references,
+            build_flags: options.build_flags,
+            record_room: room.records,
+            first_tile: 0,
+            first_primitive: 0,
+        }
+    }
+}
+
+/// The steps of all levels. `step` makes one of a phase, a shader, a level and a number of workgroups.
+pub(super) fn levels(
+    depth_limit: u32,
+    groups: u32,
+    step: impl Fn(&'static str, &'static Shader, u32, u32) -> Step,
+) -> Vec<Step> {
+    let of_level: [(&'static str, &'static Shader); 4] = [
+        ("subtrees", &shaders::KDTREE_BUILD_SUBTREES),
+        ("bin", &shaders::KDTREE_BUILD_BIN),
+        ("classify", &shaders::KDTREE_BUILD_CLASSIFY),
+        ("distribute", &shaders::KDTREE_BUILD_DISTRIBUTE),
+    ];
+    let level = |level| of_level.map(|(phase, shader)| step(phase, shader, level, groups));
+    (0..=depth_limit).flat_map(level).collect()
+}
+
+impl Builder {
+    /// A builder of `primitive_count` triangles on the device of `context`.
+    ///
+    /// # Errors
+    /// An option out of range; more triangles than [`MAX_COUNT`].
+    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Result<Builder> {
+        options.check()?;
+        if primitive_count > MAX_COUNT {
+            return Err(Error::Argument(format!(
+                "{primitive_count} triangles: a kd-tree holds at most {MAX_COUNT}; split the mesh"
+            )));
+        }
+        let schedule = options.schedule.unwrap_or(Schedule::Chain);
+        let shape = Shape::of(context, options, primitive_count, schedule);
+        let room = Room::of(options, primitive_count, shape.chunk());
+        Ok(Builder { options: *options, schedule, count: primitive_count, shape, room })
+    }
+
+    /// The schedule that is used: the choice where none was given.
+    pub fn schedule(&self) -> Schedule {
+        self.schedule
+    }
+
+    /// Triangles that it is for.
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Bytes of the structure and of the scratch memory: exactly what [`Builder::record`] uses.
+    pub fn sizes(&self) -> Sizes {
+        let scratch = self.shape.scratch(&self.options, &self.room);
+        Sizes { structure: self.header().sizes().bytes, scratch, alignment: 16 }
+    }
+
+    /// What there is room for in the structure, as its header says, and nothing else.
+    pub fn header(&self) -> Header {
+        Header {
+            node_room: self.room.nodes,
+            reference_room: self.room.references,
+            record_room: self.room.records,
+            geometry_count: 1,
+            ..Header::zeroed()
+        }
+    }
+
+    /// Where in the scratch memory the [`Report`] is, in bytes.
+    pub fn report_range(&self) -> Range<u64> {
+        REPORT_AT..REPORT_AT + size_of::<Report>() as u64
+    }
+
+    fn kernel(&self, shader: &'static Shader, input: &Input) -> Kernel {
+        self.shape.kernel(shader, &self.options, input)
+    }
+
+    /// The kernels that [`Builder::record`] dispatches for `input`, to make their pipelines ahead with [`Context::warm`].
+    pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
+        let of = |shaders: &[&'static Shader]| shaders.iter().map(|shader| self.kernel(shader, input)).collect();
+        match self.schedule {
+            Schedule::Persistent => of(&[&shaders::KDTREE_BUILD_RESET, &shaders::KDTREE_BUILD_PERSISTENT]),
+            _ => of(&[
+                &shaders::KDTREE_BUILD_RESET,
+                &shaders::KDTREE_BUILD_COUNT,
+                &shaders::KDTREE_BUILD_PLAN,
+                &shaders::KDTREE_BUILD_RECORDS,
+                &shaders::KDTREE_BUILD_ROOT,
+                &shaders::KDTREE_BUILD_SUBTREES,
+                &shaders::KDTREE_BUILD_BIN,
+                &shaders::KDTREE_BUILD_CLASSIFY,
+                &shaders::KDTREE_BUILD_DISTRIBUTE,
+                &shaders::KDTREE_BUILD_ORDER,
+                &shaders::KDTREE_BUILD_PLACE,
+            ]),
+        }
+    }
+
+    /// Records the build of `input` into `structure`, with scratch memory, of the bytes and alignment that [`Builder::sizes`] tells.
+    ///
+    /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever reads
+    /// the structure or the report, or writes the scratch memory) behind. Labels: `encode`; `subtrees`, `bin`,
+    /// `classify` and `distribute` of each level; `place`. Or `build` where the schedule is persistent.
+    ///
+    /// # Errors
+    /// The memory is too small; the input has another number of triangles than the builder, or several geometries; a pipeline could
+    /// not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: Region, scratch: Region) -> Result<()> {
+        let sizes = self.sizes();
+        let structure = structure.checked("memory for a kd-tree", sizes.structure, sizes.alignment)?;
+        let scratch = scratch.checked("scratch memory for a kd-tree", sizes.scratch, sizes.alignment)?;
+        recorder.chains(&[self.steps(input, structure, scratch)?])
+    }
+
+    fn arguments(&self, input: &Input, structure: u64, scratch: u64) -> Result<Arguments> {
+        let planned = Planned { primitives: Primitives::Triangles, primitive_count: self.count, geometry_count: 1 };
+        planned.check(input)?;
+        Ok(Arguments::new(&self.options, &self.room, input, structure, scratch))
+    }
+
+    fn steps(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
+        let arguments = self.arguments(input, structure, scratch)?;
+        let groups = self.shape.groups;
+        let step = |phase, shader: &'static Shader, level, groups| {
+            Step::new(phase, self.kernel(shader, input), &Arguments { level, ..arguments }, groups)
+        };
+        if self.schedule == Schedule::Persistent {
+            return Ok(vec![
+                step("build", &shaders::KDTREE_BUILD_RESET, 0, 1),
+                step("build", &shaders::KDTREE_BUILD_PERSISTENT, 0, groups),
+            ]);
+        }
+        let encode = [
+            (&shaders::KDTREE_BUILD_RESET, 1),
+            (&shaders::KDTREE_BUILD_COUNT, groups),
+            (&shaders::KDTREE_BUILD_PLAN, 1),
+            (&shaders::KDTREE_BUILD_RECORDS, groups),
+            (&shaders::KDTREE_BUILD_ROOT, 1),
+        ];
+        let place = [(&shaders::KDTREE_BUILD_ORDER, 1), (&shaders::KDTREE_BUILD_PLACE, groups)];
+        let mut steps = Vec::new();
+        steps.extend(encode.map(|(shader, groups)| step("encode", shader, 0, groups)));
+        steps.extend(levels(arguments.depth_limit, groups, step));
+        steps.extend(place.map(|(shader, groups)| step("place", shader, 0, groups)));
+        Ok(steps)
+    }
+}

@@ -1,0 +1,96 @@
+//! What a merge goes by, and what it needed.
+
+use crate::bvh::layout::status;
+use crate::kdtree::builder;
+use bytemuck::{Pod, Zeroable};
+
+/// How to merge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Bins, exact splits and costs of what is built in leaves; the rest is not looked at.
+    pub build: builder::Options,
+    /// What the memory goes by.
+    pub estimate: Estimate,
+}
+
+impl Options {
+    /// The builder's, and memory for objects about as dense as what they are put into.
+    pub const DEFAULT: Options = Options { build: builder::Options::DEFAULT, estimate: Estimate::DEFAULT };
+}
+
+/// How much a merge has, of each triangle of objects, and of 64 more. [`Report::estimate`] makes one that suffices.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Leaves of the static tree that it is in.
+    pub pairs: f32,
+    /// Leaves of the static tree that any is in.
+    pub marked: f32,
+    /// As a build has them, with what was in those leaves before.
+    pub build: builder::Estimate,
+}
+
+impl Estimate {
+    /// For objects of which nothing is known.
+    pub const DEFAULT: Estimate = Estimate {
+        pairs: 8.0,
+        marked: 4.0,
+        build: builder::Estimate {
+            level_references: 24.0,
+            level_nodes: 4.0,
+            subtree_nodes: 12.0,
+            cut_references: 32.0,
+            subtree_references: 48.0,
+            subtrees: 4.0,
+        },
+    };
+}
+
+/// What a merge needed, in the scratch memory at [`Merger::report_range`](super::Merger::report_range) when it has run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Report {
+    /// Bits of [`crate::bvh::layout::status`].
+    pub status: u32,
+    /// Pairs of a static leaf and a triangle.
+    pub pairs: u32,
+    /// Static leaves.
+    pub marked: u32,
+    /// References of these leaves and of the triangles in them, as far as pairs and leaves had room.
+    pub first_references: u32,
+    /// As [`builder::Report`] has it.
+    pub level_references: u32,
+    /// Nodes of all levels, and what is hooked.
+    pub level_nodes: u32,
+    /// As [`builder::Report`] has it.
+    pub subtree_nodes: u32,
+    /// As [`builder::Report`] has it.
+    pub cut_references: u32,
+    /// As [`builder::Report`] has it.
+    pub subtree_references: u32,
+    /// As [`builder::Report`] has it.
+    pub subtrees: u32,
+    /// As [`builder::Report`] has it.
+    pub ended: u32,
+}
+
+impl Report {
+    /// What suffices for so many triangles of objects; where it was not found out, twice what was asked for.
+    pub fn estimate(&self, triangles: u32) -> Estimate {
+        let is_known = self.status & status::OUT_OF_ROOM == 0;
+        let of = |count: u32, more: f64| (f64::from(count) * more / f64::from(triangles.saturating_add(64))) as f32;
+        let exactly = |count: u32| of(count, 1.0) * (1.0 + f32::EPSILON);
+        let each = |count: u32| if is_known { exactly(count) } else { of(count.max(self.pairs), 2.0) };
+        Estimate {
+            pairs: exactly(self.pairs),
+            marked: each(self.marked),
+            build: builder::Estimate {
+                level_references: each(self.level_references),
+                level_nodes: each(self.level_nodes),
+                subtree_nodes: each(self.subtree_nodes),
+                cut_references: each(self.cut_references),
+                subtree_references: each(self.subtree_references),
+                subtrees: each(self.subtrees),
+            },
+        }
+    }
+}

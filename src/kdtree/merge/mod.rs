@@ -1,0 +1,374 @@
+//! Objects that move are merged into a kd-tree on the device, and taken out again, in the caller's command buffer and memory
+//! (Papay 2025, section 10.3).
+//!
+//! [`Merger::record`] puts triangles into a tree of what stands still: those leaves that they are in are built anew, as tasks of the
+//! builder ([`super::builder`]), and put where the leaves were; all else stays where it is. [`Merger::restore`] writes back what was
+//! overwritten. So objects come and go by a restore and a merge of those that are then to be there; [`Objects`] keeps the list.
+//!
+//! The structure needs room: [`Merger::room`] tells how much, [`KdTree::with_room`](super::layout::KdTree::with_room) or
+//! [`builder::Options::more`](super::builder::Options::more) make it. [`super::host::marked`] is the twin, `glsl/kdtree/merge.glsl`
+//! the device's side.
+
+mod estimate;
+mod objects;
+
+pub use estimate::{Estimate, Options, Report};
+pub use objects::{Object, Objects};
+
+use super::builder::{self, Arguments, Shape};
+use super::layout::{Header, MAX_DEPTH, Room};
+use super::termination::leaf_size;
+use crate::bvh::builder::Schedule;
+use crate::bvh::geometry::{Input, Source};
+use crate::gpu::push_constants::push_constants;
+use crate::gpu::radix_sort::{self, Buffers, Sort};
+use crate::gpu::shaders::{self, Shader};
+use crate::gpu::{Context, Kernel, Recorder, Region, Step, fill};
+use crate::{Error, Result};
+use bytemuck::Zeroable;
+use std::ops::Range;
+
+/// What is merged at once at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Most {
+    /// Objects.
+    pub objects: u32,
+    /// Triangles of all of them.
+    pub triangles: u32,
+}
+
+/// Bytes that a merge needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sizes {
+    /// Scratch, free again when the merge has run and its report has been read.
+    pub scratch: u64,
+    /// What was overwritten: kept until the static tree is restored.
+    pub undo: u64,
+    /// Alignment of all addresses.
+    pub alignment: u64,
+}
+
+/// Where a merge works.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Memory {
+    /// The static tree with its room, and then the merged one.
+    pub structure: Region,
+    /// Of the bytes that [`Merger::sizes`] tells.
+    pub scratch: Region,
+    /// The same.
+    pub undo: Region,
+}
+
+/// Merges into one static tree.
+#[derive(Debug, Clone)]
+pub struct Merger {
+    options: Options,
+    most: Most,
+    primitive_count: u32,
+    structure_bytes: u64,
+    shape: Shape,
+    sort: radix_sort::Shape,
+    room: builder::Room,
+    plan: Plan,
+}
+
+/// How much a merge has, but for what is in the structure already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Plan {
+    pairs: u32,
+    marked: u32,
+    level_nodes: u32,
+    subtree_nodes: u32,
+    cut_references: u32,
+    subtree_references: u32,
+}
+
+push_constants! {
+    /// Push constants of `glsl/kdtree/merge_setup.comp` and `merge_restore.comp`.
+    struct Setup {
+        structure: u64,
+        state: u64,
+        undo: u64,
+        pairs: u64,
+        keys: u64,
+        values: u64,
+        sorted_keys: u64,
+        sorted_values: u64,
+        marked: u64,
+        pair_capacity: u32,
+        marked_capacity: u32,
+        record_bits: u32,
+        key_words: u32,
+        tiles: u32,
+        primitive_end: u32,
+    }
+}
+
+/// As `glsl/kdtree/merge_state.glsl` has them.
+const MERGE_AT: u64 = 2560;
+const PAIR_BYTES: u64 = 32;
+const MARKED_BYTES: u64 = 40;
+const UNDONE_BYTES: u64 = 12;
+
+/// So many of each triangle and of 64 more; at most a quarter of what 32 bits count.
+fn each(of_each: f32, triangles: u32) -> u32 {
+    (f64::from(of_each.max(0.0)) * (f64::from(triangles) + 64.0)).ceil().min(f64::from(1 << 30)) as u32
+}
+
+impl Plan {
+    fn of(estimate: &Estimate, triangles: u32) -> Plan {
+        let of = |of_each: f32| each(of_each, triangles).max(1);
+        let marked = of(estimate.marked);
+        Plan {
+            pairs: of(estimate.pairs),
+            marked,
+            // Roots, and pairs of empty leaves and their siblings.
+            level_nodes: of(estimate.build.level_nodes).saturating_add(marked.saturating_mul(3)),
+            subtree_nodes: of(estimate.build.subtree_nodes),
+            cut_references: of(estimate.build.cut_references),
+            subtree_references: of(estimate.build.subtree_references),
+        }
+    }
+}
+
+impl Merger {
+    /// The room that a structure must have beside the static tree.
+    pub fn room(options: &Options, most: Most) -> Room {
+        let plan = Plan::of(&options.estimate, most.triangles);
+        Room {
+            nodes: plan.level_nodes + plan.subtree_nodes,
+            references: plan.cut_references + plan.subtree_references,
+            records: most.triangles,
+        }
+    }
+
+    /// Merges into the structure with the primitives and the room that `still` tells of; nothing else of it is looked at.
+    ///
+    /// # Errors
+    /// An option out of range; the structure has less room than [`Merger::room`].
+    pub fn new(context: &Context, options: &Options, still: &Header, most: Most) -> Result<Merger> {
+        options.build.check()?;
+        let Room { nodes, references, records } = Merger::room(options, most);
+        for (what, has, needs) in [
+            ("nodes", still.node_room, nodes),
+            ("references", still.reference_room, references),
+            ("records", still.record_room, records),
+        ] {
+            if has < needs {
+                return Err(Error::Argument(format!(
+                    "the structure has room for {has} {what}, {} triangles of objects alone need {needs}; build it with more room",
+                    most.triangles
+                )));
+            }
+        }
+        let shape = Shape::of(context, &options.build, most.triangles.saturating_mul(4), Schedule::Chain);
+        let plan = Plan::of(&options.estimate, most.triangles);
+        let chunk = shape.chunk();
+        let level_references =
+            each(options.estimate.build.level_references, most.triangles).max(most.triangles).max(64);
+        let large = level_references / (options.build.exact + 1) + 1;
+        let tiles = most.triangles.div_ceil(chunk) + most.objects;
+        let room = builder::Room {
+            level_references,
+            tasks: (2 * large).max(plan.marked),
+            chunks: (level_references / chunk + large + 1).max(tiles + 1),
+            subtrees: each(options.estimate.build.subtrees, most.triangles).max(plan.marked),
+            level_nodes: still.node_room - plan.subtree_nodes,
+            nodes: still.node_room,
+            cut_references: still.reference_room - plan.subtree_references,
+            references: still.reference_room,
+            records: still.record_room,
+        };
+        let sort = radix_sort::Shape::of(&context.limits);
+        Ok(Merger {
+            options: *options,
+            most,
+            primitive_count: still.primitive_count,
+            structure_bytes: still.sizes().bytes,
+            shape,
+            sort,
+            room,
+            plan,
+        })
+    }
+
+    /// Bytes of scratch and undo memory: what [`Merger::record`] uses at most.
+    pub fn sizes(&self) -> Sizes {
+        let marked = self.plan.marked;
+        let undo = size_of::<Header>() as u64 + 4 + UNDONE_BYTES * u64::from(marked);
+        Sizes { scratch: self.places(0).bytes, undo: undo.next_multiple_of(16), alignment: 16 }
+    }
+
+    /// Where in the scratch memory the [`Report`] is, in bytes.
+    pub fn report_range(&self) -> Range<u64> {
+        MERGE_AT..MERGE_AT + size_of::<Report>() as u64
+    }
+
+    fn places(&self, scratch: u64) -> Places {
+        let Plan { pairs, marked, .. } = self.plan;
+        let mut at = scratch + self.shape.scratch(&self.options.build, &self.room);
+        let mut take = |bytes: u64| {
+            let begin = at;
+            at += bytes.next_multiple_of(16);
+            begin
+        };
+        let keys = 8 * u64::from(pairs);
+        Places {
+            pairs: take(PAIR_BYTES * u64::from(pairs)),
+            marked: take(MARKED_BYTES * u64::from(marked)),
+            keys: [take(keys), take(keys)],
+            values: [take(keys / 2), take(keys / 2)],
+            table: take(4 * self.sort.most_table_words(pairs)),
+            bytes: at - scratch,
+        }
+    }
+
+    /// Records the merge of `objects`, in any order, into the static tree at `memory.structure`, which nothing is merged into.
+    ///
+    /// The caller makes the inputs and the structure visible to compute shaders before, and places a barrier (compute shader write to
+    /// whatever reads the structure or the report, writes the scratch memory or restores) behind. Where there is no room for the
+    /// pairs, the leaves or their references, nothing is merged; where there is none for the levels below, nodes are leaves; the
+    /// status says so in both cases. Labels: `encode`, `find`, `sort`, `mark`; those of the builder's levels; `place`, `hook`.
+    ///
+    /// # Errors
+    /// The memory is too small; more objects or triangles than the merger is for; several geometries in one; primitives that are numbered twice; a pipeline
+    /// could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, memory: Memory, objects: &[Object]) -> Result<()> {
+        let mut objects = objects.to_vec();
+        objects.sort_by_key(|object| object.first_primitive);
+        self.check(&objects)?;
+        let sizes = self.sizes();
+        let scratch = memory.scratch.checked("scratch memory for a merge", sizes.scratch, sizes.alignment)?;
+        let (structure, undo) = (self.structure_of(&memory)?, self.undo_of(&memory)?);
+        recorder.chains(&[self.steps([structure, scratch, undo], &objects)])
+    }
+
+    fn structure_of(&self, memory: &Memory) -> Result<u64> {
+        memory.structure.checked("memory of a kd-tree that is merged into", self.structure_bytes, 16)
+    }
+
+    fn undo_of(&self, memory: &Memory) -> Result<u64> {
+        let sizes = self.sizes();
+        memory.undo.checked("memory for what a merge overwrites", sizes.undo, sizes.alignment)
+    }
+
+    /// Records the way back: the structure has the bytes of the static tree again, and behind its counts what a merge left there.
+    ///
+    /// The caller places a barrier before, behind the merge and what reads the merged tree, and one behind.
+    ///
+    /// # Errors
+    /// The memory is too small; a pipeline could not be made.
+    pub fn restore(&self, recorder: &mut Recorder<'_>, memory: Memory) -> Result<()> {
+        let (structure, undo) = (self.structure_of(&memory)?, self.undo_of(&memory)?);
+        let setup = Setup { structure, undo, ..Setup::zeroed() };
+        let groups = self.plan.marked.div_ceil(16 * self.shape.workgroup).clamp(1, self.shape.groups);
+        let kernel = Kernel::new(&shaders::KDTREE_MERGE_RESTORE, self.shape.workgroup, &[]);
+        recorder.chains(&[vec![Step::new("restore", kernel, &setup, groups)]])
+    }
+
+    /// Objects in the order of their primitives.
+    fn check(&self, objects: &[Object]) -> Result<()> {
+        let triangles: u64 = objects.iter().map(|object| u64::from(object.input.primitive_count)).sum();
+        if objects.len() > self.most.objects as usize || triangles > u64::from(self.most.triangles) {
+            return Err(Error::Argument(format!(
+                "{} objects of {triangles} triangles; the merger is for {} of {}; make one for more",
+                objects.len(),
+                self.most.objects,
+                self.most.triangles
+            )));
+        }
+        let mut end = u64::from(self.primitive_count);
+        for object in objects {
+            if !matches!(object.input.source, Source::One(_)) {
+                return Err(Error::Argument("an object is one geometry; make several objects of several".into()));
+            }
+            let first = u64::from(object.first_primitive);
+            let next = first + u64::from(object.input.primitive_count);
+            if first < end || next > u64::from(u32::MAX) {
+                return Err(Error::Argument(format!(
+                    "an object has primitives {first}..{next}, those before end at {end}; number them apart"
+                )));
+            }
+            end = next;
+        }
+        Ok(())
+    }
+
+    fn steps(&self, [structure, scratch, undo]: [u64; 3], objects: &[Object]) -> Vec<Step> {
+        let Places { pairs, marked, keys, values, table, .. } = self.places(scratch);
+        let triangles: u32 = objects.iter().map(|object| object.input.primitive_count).sum();
+        let bits_of = |most: u32| 32 - most.leading_zeros();
+        // Leaves are numbered by parent and side from 1 on, and no key is that of a place without a pair.
+        let record_bits = bits_of(triangles.saturating_sub(1));
+        let bits = record_bits + bits_of(2 * self.room.nodes + 2);
+        let pair_capacity = each(self.options.estimate.pairs, triangles).clamp(1, self.plan.pairs);
+        let sort = Sort { count: pair_capacity, bits, identity: false };
+        let sorting = radix_sort::steps(&self.sort, &Buffers { keys, values, table }, &sort);
+        let sorted = sorting.len() / radix_sort::STEPS_OF_A_PASS % 2;
+        let key_words = if bits > 32 { 2 } else { 1 };
+        let tiles = |object: &Object| object.input.primitive_count.div_ceil(self.shape.chunk());
+        let primitive_end = objects.last().map_or(0, |last| last.first_primitive + last.input.primitive_count);
+        let setup = Setup {
+            structure,
+            state: scratch,
+            undo,
+            pairs,
+            keys: keys[0],
+            values: values[0],
+            sorted_keys: keys[sorted],
+            sorted_values: values[sorted],
+            marked,
+            pair_capacity,
+            marked_capacity: self.plan.marked,
+            record_bits,
+            key_words,
+            tiles: objects.iter().map(tiles).sum(),
+            primitive_end,
+        };
+        let groups = self.shape.groups;
+        let none = Object { input: Input::mesh(0, 0, 0, 0), first_primitive: 0 };
+        let step_of = |object: &Object, first_tile, phase, shader: &'static Shader, level, groups| {
+            let kernel = self.shape.kernel(shader, &self.options.build, &object.input);
+            let mut arguments = Arguments::new(&self.options.build, &self.room, &object.input, structure, scratch);
+            arguments.level = level;
+            arguments.first_tile = first_tile;
+            arguments.first_primitive = object.first_primitive;
+            arguments.depth_limit = MAX_DEPTH;
+            arguments.leaf_size = leaf_size(self.primitive_count);
+            Step::new(phase, kernel, &arguments, groups)
+        };
+        let step = |phase, shader: &'static Shader, level, groups| step_of(&none, 0, phase, shader, level, groups);
+        let of_objects = |shader: &'static Shader| {
+            let first_tile = |i: usize| objects[..i].iter().map(tiles).sum();
+            let of = |(i, object)| step_of(object, first_tile(i), "encode", shader, 0, tiles(object).min(groups));
+            objects.iter().enumerate().map(of).collect::<Vec<Step>>()
+        };
+        let mut steps = vec![
+            Step::new("encode", Kernel::new(&shaders::KDTREE_MERGE_SETUP, self.shape.workgroup, &[]), &setup, 1),
+            step("encode", &shaders::KDTREE_MERGE_RESET, 0, 1),
+        ];
+        steps.extend(of_objects(&shaders::KDTREE_BUILD_COUNT));
+        steps.push(step("encode", &shaders::KDTREE_MERGE_PLAN, 0, 1));
+        steps.extend(of_objects(&shaders::KDTREE_BUILD_RECORDS));
+        steps.push(fill::step("find", keys[0], pair_capacity * key_words, u32::MAX));
+        steps.push(step("find", &shaders::KDTREE_MERGE_FIND, 0, groups));
+        steps.extend(sorting);
+        steps.push(step("mark", &shaders::KDTREE_MERGE_MARK, 0, 1));
+        steps.push(step("mark", &shaders::KDTREE_MERGE_GATHER, 0, groups));
+        steps.extend(builder::levels(MAX_DEPTH, groups, step));
+        steps.push(step("place", &shaders::KDTREE_MERGE_ORDER, 0, 1));
+        steps.push(step("place", &shaders::KDTREE_BUILD_PLACE, 0, groups));
+        steps.push(step("hook", &shaders::KDTREE_MERGE_HOOK, 0, groups));
+        steps
+    }
+}
+
+/// What lies in the scratch memory behind that of a build.
+struct Places {
+    pairs: u64,
+    marked: u64,
+    keys: [u64; 2],
+    values: [u64; 2],
+    table: u64,
+    bytes: u64,
+}

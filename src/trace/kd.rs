@@ -1,0 +1,98 @@
+//! The tracer of kd-trees on the device, recorded as [`super::tracer`] is: each [`Traversal`] is a variant of one shader, with the
+//! hits and the work that [`super::kd_host`] has.
+//!
+//! ```no_run
+//! # use hedgerow::gpu::Recorder;
+//! # use hedgerow::trace::{Query, kd::Tracer, kd_host::Traversal, tracer::Buffers};
+//! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: u64, hits: u64) -> hedgerow::Result<()> {
+//! let tracer = Tracer::new(&recorder.context().limits, Traversal::short_stack_with_push_down(4));
+//! tracer.record(recorder, Query::ClosestHit, &Buffers { structure, rays, hits, work: None, count: 1 << 20 })?;
+//! recorder.barrier();
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Shaders of others trace by `glsl/trace/kd_tree.glsl`.
+
+use super::Query;
+use super::kd_host::Traversal;
+use super::tracer::{self, Buffers, Loads, Shape};
+use crate::Result;
+use crate::gpu::shaders::Shader;
+use crate::gpu::{Kernel, Limits, Recorder, shaders};
+use crate::kdtree::layout::MAX_DEPTH;
+use bytemuck::{Pod, Zeroable};
+
+/// A tree of several that are traced together ([`Tracer::record_several`]). Also the head of their table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct TreeEntry {
+    /// Its address; 0 in the head.
+    pub structure: u64,
+    /// What its first primitive is numbered; in the head, how many trees follow.
+    pub first: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+impl TreeEntry {
+    /// The table of these trees, each an address and the number of its first primitive.
+    pub fn table(trees: &[(u64, u32)]) -> Vec<TreeEntry> {
+        let entry = |&(structure, first): &(u64, u32)| TreeEntry { structure, first, reserved: 0 };
+        [entry(&(0, trees.len() as u32))].into_iter().chain(trees.iter().map(entry)).collect()
+    }
+}
+
+/// How the rays of a device go through kd-trees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Tracer {
+    traversal: Traversal,
+    shape: Shape,
+}
+
+impl Tracer {
+    /// By this traversal, cut as [`Shape::of`] does, but with loads gathered. Stacks of up to 8 cells, which lie in registers, are the
+    /// fastest where that was measured: `docs/kdtree.md`.
+    pub fn new(limits: &Limits, traversal: Traversal) -> Tracer {
+        Tracer::with(traversal, if limits.is_cpu() { Shape::subgroups(limits) } else { Shape::groups(limits) })
+    }
+
+    /// Cut as `shape` has it. Nothing lies in shared memory and loads are gathered, whatever it says.
+    pub fn with(traversal: Traversal, shape: Shape) -> Tracer {
+        let capacity = traversal.capacity.min(MAX_DEPTH as usize);
+        let shape = Shape { shared_levels: 0, loads: Loads::Gathered, ..shape };
+        Tracer { traversal: Traversal { capacity, ..traversal }, shape }
+    }
+
+    /// The kernel that [`Tracer::record`] takes, for [`Context::warm`](crate::gpu::Context::warm).
+    pub fn kernel(&self, query: Query, count_work: bool) -> Kernel {
+        self.kernel_of(&shaders::TRACE_TRACER_KD, query, count_work)
+    }
+
+    fn kernel_of(&self, shader: &'static Shader, query: Query, count_work: bool) -> Kernel {
+        let any_hit = u32::from(query == Query::AnyHit);
+        let Traversal { capacity, push_down } = self.traversal;
+        let constants = [any_hit, u32::from(count_work), capacity as u32, u32::from(push_down)];
+        Kernel::new(shader, self.shape.workgroup, &constants)
+    }
+
+    /// Records the tracing of all rays through the kd-tree at `buffers.structure`: as [`tracer::record`] does for a `Bvh2`, with the
+    /// same hits. What is no kd-tree there is traced as if it were an empty one.
+    ///
+    /// # Errors
+    /// More than [`MAX_RAYS`](super::MAX_RAYS) rays; the kernel's pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &Buffers) -> Result<()> {
+        let kernel = self.kernel(query, buffers.work.is_some());
+        tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
+    }
+
+    /// The same through several trees, one after the other: at `buffers.structure` is their [`TreeEntry::table`], of at least one. A ray
+    /// ends in each where the trees before it have its nearest hit; of equally near ones that in the earlier tree counts.
+    ///
+    /// # Errors
+    /// As [`Tracer::record`].
+    pub fn record_several(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &Buffers) -> Result<()> {
+        let kernel = self.kernel_of(&shaders::TRACE_TRACER_KD_SEVERAL, query, buffers.work.is_some());
+        tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
+    }
+}

@@ -1,0 +1,117 @@
+//! What merging costs on the device beside building anew: prints the figures of docs/kdtree.md. Needs the scenes of
+//! HEDGEROW_SCENES and minutes:
+//!
+//! `cargo test --release --test kdtree_merge_device_cost -- --ignored --nocapture`
+
+mod common;
+
+use common::corpus::{self, Mesh};
+use common::device;
+use common::shapes::Corners;
+use hedgerow::bvh::builder::Input;
+use hedgerow::bvh::layout::status;
+use hedgerow::gpu::{Buffer, Phase, Timestamps};
+use hedgerow::kdtree::builder::{self, Builder, Report as BuildReport};
+use hedgerow::kdtree::merge::{Memory, Merger, Most, Object, Options, Report};
+use hedgerow::scene::{LoadOptions, load};
+use std::collections::BTreeMap;
+
+const ROUNDS: usize = 9;
+
+fn input_of((_, positions, triangles): &Mesh) -> (Input, [Buffer<'static>; 2]) {
+    let vertices = device().upload("positions", positions).expect("memory");
+    let indices = device().upload("indices", triangles).expect("memory");
+    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), triangles.len() as u32);
+    (input, [vertices, indices])
+}
+
+/// Milliseconds by phase.
+fn timed(record: impl FnOnce(&mut hedgerow::gpu::Recorder<'_>) -> hedgerow::Result<()>) -> Vec<Phase> {
+    let mut timestamps = Timestamps::new(device(), 400).expect("timestamps");
+    device().run(Some(&mut timestamps), record).expect("a run");
+    timestamps.phases().expect("timestamps")
+}
+
+fn total(phases: &[Phase]) -> f64 {
+    phases.iter().map(|phase| phase.milliseconds).sum()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// A twentieth of the scene's triangles: those around one of them, a little beside where they are.
+fn patch(all: &Corners) -> Corners {
+    let centre = |t: &[[f32; 3]; 3]| -> [f32; 3] { std::array::from_fn(|k| (t[0][k] + t[1][k] + t[2][k]) / 3.0) };
+    let middle = centre(&all[all.len() / 3]);
+    let distance = |t: &[[f32; 3]; 3]| (0..3).map(|k| (centre(t)[k] - middle[k]).powi(2)).sum::<f32>();
+    let mut near = all.clone();
+    near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    near.truncate(all.len() / 20);
+    let by = near.last().map_or(0.0, distance).sqrt() * 0.3;
+    near.iter().map(|t| t.map(|p| [p[0] + by, p[1] + 0.7 * by, p[2] - 0.4 * by])).collect()
+}
+
+#[test]
+#[ignore = "prints what merging costs, in minutes, over scenes that are not in the repository"]
+fn merging_beside_building_on_the_device() {
+    let folders = std::env::var_os("HEDGEROW_SCENES").into_iter().map(Into::into).collect();
+    let loading = LoadOptions { folders, progress: None };
+    for name in ["bunny", "sponza", "armadillo"] {
+        let mesh = load(name, &loading).expect(name).mesh;
+        let corners: Corners = mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect();
+        let still = corpus::soup(name, corners.clone());
+        let moves = corpus::soup("object", patch(&corners));
+        let both = corpus::soup("both", corners.iter().copied().chain(patch(&corners)).collect());
+        let options = Options::DEFAULT;
+        let (count, triangles) = (still.2.len() as u32, moves.2.len() as u32);
+        let most = Most { objects: 1, triangles };
+        let build = builder::Options { more: Merger::room(&options, most), ..options.build };
+        let (still_builder, builder) = (
+            Builder::new(device(), &build, count).expect("a builder"),
+            Builder::new(device(), &options.build, count + triangles).expect("a builder"),
+        );
+        let header = hedgerow::kdtree::layout::Header { primitive_count: count, ..still_builder.header() };
+        let merger = Merger::new(device(), &options, &header, most).expect("a merger");
+        let buffer = |bytes: u64| device().buffer("memory", bytes).expect("memory");
+        let (structure, other) = (buffer(still_builder.sizes().structure), buffer(builder.sizes().structure));
+        let building = buffer(still_builder.sizes().scratch.max(builder.sizes().scratch));
+        let (scratch, undo) = (buffer(merger.sizes().scratch), buffer(merger.sizes().undo));
+        let memory = Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+        let ((still_input, _a), (input, _b), (both_input, _c)) = (input_of(&still), input_of(&moves), input_of(&both));
+        timed(|recorder| still_builder.record(recorder, &still_input, structure.region(), building.region()));
+        let object = Object { input, first_primitive: count };
+        let (mut builds, mut merges, mut restores) = (Vec::new(), Vec::new(), Vec::new());
+        let mut by_phase = BTreeMap::<&str, f64>::new();
+        for round in 0..=ROUNDS {
+            let built = timed(|r| builder.record(r, &both_input, other.region(), building.region()));
+            let report: BuildReport = building.read_at(builder.report_range().start, 1)[0];
+            assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
+            let merged = timed(|r| merger.record(r, memory, &[object]));
+            let report: Report = scratch.read_at(merger.report_range().start, 1)[0];
+            assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
+            let restored = timed(|r| merger.restore(r, memory));
+            // The first compiles.
+            if round > 0 {
+                builds.push(total(&built));
+                merges.push(total(&merged));
+                restores.push(total(&restored));
+                merged.iter().for_each(|p| *by_phase.entry(p.name).or_default() += p.milliseconds / ROUNDS as f64);
+            } else {
+                println!("{name}: {count} triangles, {triangles} merged; {:?}", report.estimate(triangles));
+                println!("  {report:?}");
+            }
+        }
+        let ratio = |a: &[f64], b: &[f64]| median(a.iter().zip(b).map(|(a, b)| a / b).collect());
+        println!(
+            "  merge / build {:.3}, restore / merge {:.4}; medians, ms: build {:.1}, merge {:.1}, restore {:.2}",
+            ratio(&merges, &builds),
+            ratio(&restores, &merges),
+            median(builds),
+            median(merges),
+            median(restores)
+        );
+        println!("  merge by phase, ms: {by_phase:.2?}");
+    }
+}
