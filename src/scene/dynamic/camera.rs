@@ -37,7 +37,16 @@ impl CameraPath {
 
 /// The camera of a node: it looks down the node's −z, and up is its y.
 pub(in crate::scene) fn carried(to_world: &[[f32; 4]; 3], fov: f32) -> Camera {
-    let column = |j: usize| Vec3::from(to_world.map(|row| row[j]));
-    let (eye, backwards) = (column(3), column(2).normalize_or_zero());
-    Camera { eye: eye.into(), look: (eye - backwards).into(), up: column(1).normalize_or(Vec3::Y).into(), fov }
+    let (eye, backwards) = eye_and_backwards(to_world);
+    let up = column(to_world, 1).normalize_or(Vec3::Y);
+    Camera { eye: eye.into(), look: (eye - backwards).into(), up: up.into(), fov }
+}
+
+/// Where a node is and the direction of its z, zero where that has no length: what it carries looks and shines the other way.
+pub(in crate::scene) fn eye_and_backwards(to_world: &[[f32; 4]; 3]) -> (Vec3, Vec3) {
+    (column(to_world, 3), column(to_world, 2).normalize_or_zero())
+}
+
+fn column(to_world: &[[f32; 4]; 3], j: usize) -> Vec3 {
+    to_world.map(|row| row[j]).into()
 }

@@ -24,7 +24,7 @@ use crate::{Error, Result};
 use std::borrow::Cow;
 use std::ops::Range;
 
-pub(super) use camera::{CameraPath, carried};
+pub(super) use camera::{CameraPath, carried, eye_and_backwards};
 pub(super) use content::DynamicContent;
 pub(super) use motion::{Motion, Pose, Step, product};
 pub(super) use rotation::Rotation;

@@ -5,7 +5,7 @@ use super::meshes::{self, Part};
 use super::{File, malformed};
 use crate::Result;
 use crate::scene::dynamic::{
-    self, CameraPath, DynamicContent, DynamicObject, Motion, Shape, Step, carried, morphed, product,
+    self, CameraPath, DynamicContent, DynamicObject, Motion, Shape, Step, carried, eye_and_backwards, morphed, product,
 };
 use crate::scene::{Light, check};
 use glam::{Mat4, Vec3};
@@ -114,8 +114,7 @@ impl Walk<'_> {
             Placement::Still(to_world) => rows(to_world),
             Placement::Moving(_) => motion.at(0.0),
         };
-        let column = |j: usize| Vec3::from(to_world.map(|row| row[j]));
-        let (eye, backwards) = (column(3), column(2).normalize_or_zero());
+        let (eye, backwards) = eye_and_backwards(&to_world);
         if self.content.camera.is_none()
             && let Some(camera) = node.camera()
             && let gltf::camera::Projection::Perspective(lens) = camera.projection()

@@ -1,0 +1,148 @@
+//! The lines of `animate.jsonl`. A figure that was not measured is `None`.
+
+use super::Way;
+use crate::measure::provenance::{DeviceFacts, Machine};
+use crate::measure::record::{Memory, SCHEMA};
+use crate::measure::statistics::Spread;
+use serde::{Deserialize, Serialize};
+
+/// One line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// What it says.
+    #[serde(flatten)]
+    pub entry: Entry,
+}
+
+impl From<Entry> for Line {
+    fn from(entry: Entry) -> Line {
+        Line { schema: SCHEMA, entry }
+    }
+}
+
+/// What a line says, by its `experiment`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "experiment", rename_all = "lowercase")]
+pub enum Entry {
+    /// The first line: where and how the others were measured.
+    Setting(Setting),
+    /// A frame in one of the ways.
+    Animate(Animated),
+    /// A way that could not be measured, or not to its end, or found something else than the first.
+    Failure(Failure),
+}
+
+/// Where, how and of what it was measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// The machine.
+    pub machine: Machine,
+    /// The device, if one was used.
+    pub device: Option<DeviceFacts>,
+    /// Commit of the program.
+    pub commit: String,
+    /// When, RFC 3339 UTC.
+    pub when: String,
+    /// The command line that measures it again.
+    pub command: String,
+    /// Options with their values, for people.
+    pub options: Vec<(String, String)>,
+    /// What a reader must know to judge the figures.
+    pub notes: Vec<String>,
+    /// The scene's name.
+    pub scene: String,
+    /// Triangles that stand still.
+    pub static_triangles: u64,
+    /// What moves.
+    pub objects: Vec<Object>,
+    /// Who built the tree of what stands still, once.
+    pub static_builder: String,
+    /// Pictures of frames, in files beside the records: the frame and the file.
+    pub pictures: Vec<(u32, String)>,
+}
+
+/// Something that moves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Object {
+    /// What the scene calls it.
+    pub name: String,
+    /// Its triangles.
+    pub triangles: u64,
+    /// Whether it changes its shape.
+    pub morphs: bool,
+}
+
+/// A frame in one of the ways.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Animated {
+    /// The scene.
+    pub scene: String,
+    /// Which frame, from 0.
+    pub frame: u32,
+    /// When it is, in seconds.
+    pub time: f32,
+    /// The way.
+    pub way: Way,
+    /// Who built what is built a frame; `accel` of two levels.
+    pub builder: String,
+    /// What the builds were timed by: `device` (timestamps) or `wall`.
+    pub timer: String,
+    /// Triangles that stand still.
+    pub static_triangles: u64,
+    /// Triangles that move.
+    pub dynamic_triangles: u64,
+    /// All that is done a frame to have something that can be traced.
+    pub build_ms: Spread,
+    /// The rays, by kind.
+    pub trace: Vec<Rays>,
+    /// Memory of all structures together.
+    pub memory: Memory,
+    /// SAH cost, where rays go through one tree.
+    pub sah: Option<f64>,
+}
+
+/// Rays of one kind.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rays {
+    /// The kind.
+    pub rays: String,
+    /// How many.
+    pub count: u64,
+    /// How many hit something.
+    pub hits: u64,
+    /// Tracing all of them once.
+    pub trace_ms: Spread,
+    /// Inner nodes visited a ray, in all trees.
+    pub steps: Option<f64>,
+    /// Triangles tested a ray.
+    pub tests: Option<f64>,
+    /// The sum of t over the hits, as decimal.
+    pub checksum: String,
+    /// Rays whose hits are not those of the first way: bit for bit between kd-trees, otherwise but for what rounding decides.
+    pub different: u64,
+}
+
+/// What could not be measured, or was wrong.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Failure {
+    /// The way.
+    pub way: Way,
+    /// In which frame; `None` before the first.
+    pub frame: Option<u32>,
+    /// What happened.
+    pub what: String,
+}
+
+impl Animated {
+    /// Tracing all rays of the frame, in the median of the runs: milliseconds.
+    pub fn trace_ms(&self) -> f64 {
+        self.trace.iter().map(|rays| rays.trace_ms.median).sum()
+    }
+
+    /// Building and tracing: milliseconds.
+    pub fn frame_ms(&self) -> f64 {
+        self.build_ms.median + self.trace_ms()
+    }
+}
