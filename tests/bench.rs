@@ -60,6 +60,53 @@ fn a_run_leaves_records_a_table_charts_pictures_and_a_page() {
 }
 
 #[test]
+fn kd_trees_are_told_in_the_tables_of_the_thesis_beside_its_own_figures() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let output = folder.path().to_str().expect("text");
+    let arguments = [
+        "bench",
+        "gen:soup:2000:1",
+        "-b",
+        "kd-exact,lbvh-host",
+        "--size",
+        "24x16",
+        "--runs",
+        "1",
+        "--no-pictures",
+        "-o",
+        output,
+    ];
+    let done = hedgerow(&arguments);
+    assert_eq!(status(&done), Some(0), "{}", err(&done));
+    let record = &records(folder.path())[0];
+    let quality = &record.quality;
+    let most = quality.prims_per_leaf_max.expect("a kd-tree tells it");
+    assert!(most as f64 >= quality.prims_per_leaf.expect("told"), "{quality:?}");
+    let page = || std::fs::read_to_string(folder.path().join("index.html")).expect("written");
+    let section = |page: &str| page.split_once("<section id=\"kd-trees\">").map(|(_, rest)| rest.to_owned());
+    let text = section(&page()).expect("there is a kd-tree");
+    // Thirty rows of the thesis, in each of both tables.
+    for (says, times) in [("CPU approx", 20), ("Its scenes are not ours", 1), ("170.45<", 1)] {
+        assert_eq!(text.matches(says).count(), times, "{says}");
+    }
+    let table = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(table.contains("full / empty") && table.contains("(Sibenik)"), "{table}");
+
+    let file = folder.path().join("others.csv");
+    std::fs::write(&file, "table,kind,scene,config,metric,value\nx,static,attic,theirs,nodes,77\n").expect("written");
+    let others = [&arguments[..], &["--published", file.to_str().expect("text")]].concat();
+    assert_eq!(status(&hedgerow(&others)), Some(0));
+    let text = section(&page()).expect("there is a kd-tree");
+    assert!(text.contains("attic") && !text.contains("Sibenik"));
+    let missing = hedgerow(&[&arguments[..], &["--published", "/no/such.csv"]].concat());
+    assert!(status(&missing) == Some(1) && err(&missing).contains("/no/such.csv"), "{}", err(&missing));
+
+    let done = bench(folder.path(), &["gen:icosphere:1", "--no-pictures"]);
+    assert_eq!(status(&done), Some(0), "{}", err(&done));
+    assert_eq!(section(&page()), None, "no kd-tree, no table");
+}
+
+#[test]
 fn what_fails_is_reported_and_the_rest_is_measured() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let done = bench(folder.path(), &["no-such-scene", "gen:icosphere:1", "--no-pictures"]);

@@ -204,9 +204,9 @@ fn the_same_seed_gives_the_same_rays_and_another_seed_others() {
 #[test]
 fn render_writes_a_png_of_every_view() {
     let folder = Folder::new();
-    for view in ["shaded", "normals", "steps", "tests", "depth"] {
+    for view in ["shaded", "normals", "steps", "tests", "depth", "leaf-size", "planes"] {
         let path = folder.path().join(format!("{view}.png")).display().to_string();
-        done(&["render", "gen:stadium:2", "-b", "lbvh-host", "-o", &path, "--view", view, "--size", "40x30"]);
+        done(&["render", "gen:stadium:2", "-b", "kd-exact", "-o", &path, "--view", view, "--size", "40x30"]);
         let image = image::open(&path).expect("a picture").to_rgb8();
         assert_eq!(image.width(), 40);
         assert!(image.pixels().any(|p| p != image.get_pixel(0, 0)), "{view} shows something");
@@ -260,6 +260,10 @@ fn wrong_arguments_end_with_2_and_say_what_is_right() {
         (&["rays", "gen:grid:2", "--kind", "primary"], "--output"),
         (&["render", "gen:grid:2", "-b", "lbvh-host", "-o", "a.jpg"], "a.jpg: pictures are PNG files"),
         (&["render", "gen:grid:2", "-b", "lbvh-host", "-o", "a.png", "--view", "colour"], "there are shaded, normals"),
+        (
+            &["render", "gen:grid:2", "-b", "lbvh-host", "-o", "a.png", "--view", "planes"],
+            "lbvh-host builds no kd-tree, so there are no planes to see; choose kd-exact or kd-binned",
+        ),
         (&["render", "gen:grid:2", "-b", "lbvh-host", "-o", "a.png", "--eye", "1,2"], "write three numbers"),
         (&["render", "gen:grid:2", "-b", "lbvh-host", "-o", "a.png", "--fov", "180"], "between 0 and 180"),
         (&["devices", "--threads", "0"], "--threads"),

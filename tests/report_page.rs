@@ -8,11 +8,11 @@ use hedgerow::measure::choose::hindsight::Choice;
 use hedgerow::measure::matrix::{Failure, Outcome};
 use hedgerow::measure::provenance::Machine;
 use hedgerow::measure::record::{Build, Memory, Phase, Quality, Record, SCHEMA, Trace};
-use hedgerow::report::{DeviceFacts, Picture, Report, results};
+use hedgerow::report::{DeviceFacts, Picture, Report, kd_trees, results};
 use std::path::{Path, PathBuf};
 
 /// Builders with how fast they build and trace, in Mtri/s and Mrays/s, and their SAH cost on a scene where it is 100.
-const BUILDERS: [(&str, &str, f64, f64, Option<f64>); 7] = [
+const BUILDERS: [(&str, &str, f64, f64, Option<f64>); 8] = [
     ("lbvh", "bvh2", 7.0, 2.6, Some(104.0)),
     ("lbvh:codes=mc30", "bvh2", 8.3, 2.4, Some(109.0)),
     ("lbvh:codes=emc64var", "bvh2", 5.2, 2.7, Some(103.0)),
@@ -20,6 +20,7 @@ const BUILDERS: [(&str, &str, f64, f64, Option<f64>); 7] = [
     ("driver-fast-build", "driver", 3.1, 1.7, None),
     ("driver-fast-trace", "driver", 1.1, 2.2, None),
     ("lbvh-host", "bvh2", 2.9, 1.2, Some(104.0)),
+    ("kd-binned", "kdtree", 0.3, 1.5, Some(217.8)),
 ];
 const SCENES: [(&str, u64); 3] = [("sponza", 66_450), ("san_francisco", 268_041), ("dragon", 871_414)];
 const KINDS: [&str; 7] = ["primary", "shadow", "ao", "diffuse1", "diffuse2", "reflection", "random"];
@@ -34,7 +35,7 @@ fn outcome(scene: &str, triangles: u64, builder: &(&str, &str, f64, f64, Option<
     let &(name, kind, mtris_s, mrays_s, sah) = builder;
     let wobble = 1.0 + 0.12 * jitter(scene, name);
     let median_ms = (triangles as f64).powf(1.04) / 66_450_f64.powf(0.04) / (mtris_s * wobble * 1e3);
-    let host = name.ends_with("host");
+    let host = name.ends_with("host") || kind == "kdtree";
     let shares: &[(&str, f64)] = match (kind, host) {
         ("bvh2", false) => &[("bounds", 0.07), ("encode", 0.16), ("sort", 0.43), ("hierarchy", 0.34)],
         ("driver", _) => &[("blas", 1.0), ("tlas", 0.02)],
@@ -79,6 +80,10 @@ fn outcome(scene: &str, triangles: u64, builder: &(&str, &str, f64, f64, Option<
             sah: sah.map(|sah| sah * (1.0 + 0.05 * jitter(name, scene))),
             c_t: 3.0,
             c_i: 2.0,
+            inner: sah.map(|_| triangles),
+            leaves: sah.map(|_| triangles + 1),
+            empty_leaves: sah.map(|_| if kind == "kdtree" { triangles / 3 } else { 0 }),
+            prims_per_leaf_max: sah.map(|_| 31),
             depth_max: sah.map(|_| 31),
             prims_per_leaf: sah.map(|_| 2.4),
             ..Quality::default()
@@ -139,6 +144,7 @@ fn report(folder: &Path) -> Report {
             .iter()
             .map(|(scene, _)| Choice { scene: (*scene).into(), rays: 1e6, builder: "lbvh".into() })
             .collect(),
+        published: kd_trees::published::papay(),
     }
 }
 
@@ -179,7 +185,8 @@ fn the_page_holds_together_in_a_browser() {
     assert_eq!(found["broken"], 0, "{found}");
     assert_eq!(found["nameless"], 0, "{found}");
     let scenes = ["scene-sponza", "scene-san-francisco", "scene-dragon"];
-    let sections = [&["failures", "summary"][..], &scenes, &["choosing", "growth", "results", "method"]].concat();
+    let sections =
+        [&["failures", "summary"][..], &scenes, &["kd-trees", "choosing", "growth", "results", "method"]].concat();
     assert_eq!(found["sections"], serde_json::json!(sections));
     assert_eq!(found["rows"], report.outcomes.len());
     assert_eq!(found["charts"], 4 * SCENES.len() + 1);

@@ -9,6 +9,7 @@ use crate::measure::matrix::{self, Failure, Outcome, Plan};
 use crate::measure::overlap::Epo;
 use crate::measure::peers::driver;
 use crate::measure::provenance::{self, Machine};
+use crate::report::kd_trees::{self, published};
 use crate::report::names::slug;
 use crate::report::picture::{PictureOptions, View, picture};
 use crate::report::results::Results;
@@ -52,6 +53,9 @@ pub struct Arguments {
     /// Measure the end-point overlap: on, off, or cheap (given up after 5 s a tree)
     #[arg(long, value_name = "on|off|cheap", default_value = "cheap")]
     epo: Epo,
+    /// Published figures of kd-trees to print beside measured ones [default: those of Papay 2025]
+    #[arg(long, env = "HEDGEROW_PUBLISHED", value_name = "CSV")]
+    published: Option<PathBuf>,
     /// No pictures of the scenes
     #[arg(long)]
     no_pictures: bool,
@@ -63,6 +67,7 @@ pub struct Arguments {
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let asked = common.builders(&builders::parse_list(&arguments.builder)?);
     let scenes = scenes(common, arguments)?;
+    let published = arguments.published.as_deref().map_or_else(|| Ok(published::papay()), published::read)?;
     // Before any work: a folder that cannot be written would lose all of it.
     let results = Results::create(&arguments.output)?;
     let device = open(common, &asked)?;
@@ -95,7 +100,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         plan,
         model,
         results,
-        report: empty(device.as_ref(), notes)?,
+        report: empty(device.as_ref(), notes, published)?,
     };
     bench.report.options = options(common, arguments);
     bench.report.baseline = no_peer.is_none().then(|| "driver-fast-build".into());
@@ -105,7 +110,11 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let report = &bench.report;
     report.write(&arguments.output)?;
     let mut out = std::io::stdout().lock();
-    writeln!(out, "{}\n{}", table::table(&report.records()), arguments.output.join("index.html").display())?;
+    writeln!(out, "{}", table::table(&report.records()))?;
+    if let Some(tables) = kd_trees::text(&report.records(), &report.published) {
+        writeln!(out, "{tables}")?;
+    }
+    writeln!(out, "{}", arguments.output.join("index.html").display())?;
     if let Some(device) = &device {
         device.validation_messages()?;
     }
@@ -151,7 +160,7 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<Vec<String>>
 
 /// The device, with ray queries where it has them: host builders alone need none.
 fn open(common: &Common, builders: &[Spec]) -> crate::Result<Option<Device>> {
-    if builders.iter().all(|spec| spec.builder().needs() == Needs::Nothing) {
+    if builders.iter().all(|spec| spec.needs() == Needs::Nothing) {
         return Ok(None);
     }
     common.open_device(true).map(Some)
@@ -169,7 +178,7 @@ fn possible(
     let by_default = arguments.builder == DEFAULT_BUILDERS;
     let was_named =
         |spec: &Spec| !by_default && arguments.builder.split(',').any(|part| part.trim() == spec.to_string());
-    let is_driver = |spec: &Spec| spec.builder().needs() == Needs::RayQuery;
+    let is_driver = |spec: &Spec| spec.needs() == Needs::RayQuery;
     if asked.iter().any(is_driver) {
         notes.extend(no_peer.map(str::to_owned));
         if device.is_some_and(|device| !device.has_ray_query()) {
@@ -195,7 +204,7 @@ fn calibrated(common: &Common, device: Option<&Device>) -> crate::Result<Option<
 }
 
 /// The report before anything was measured.
-fn empty(device: Option<&Device>, notes: Vec<String>) -> crate::Result<Report> {
+fn empty(device: Option<&Device>, notes: Vec<String>, published: published::Published) -> crate::Result<Report> {
     Ok(Report {
         machine: Machine::this(),
         device: device.map(DeviceFacts::of).transpose()?,
@@ -209,6 +218,7 @@ fn empty(device: Option<&Device>, notes: Vec<String>) -> crate::Result<Report> {
         notes,
         pictures: Vec::new(),
         choices: Vec::new(),
+        published,
     })
 }
 

@@ -2,11 +2,13 @@
 //! results to stdout, progress and diagnostics to stderr, exit status 0 done, 1 the work failed, 2 the arguments are wrong.
 
 mod accel;
+mod animate;
 mod bench;
 mod build;
 mod choose;
 mod compare;
 mod devices;
+mod navigate;
 mod options;
 mod output;
 mod rays;
@@ -38,6 +40,7 @@ struct Cli {
 enum Command {
     Bench(bench::Arguments),
     Accel(accel::Arguments),
+    Animate(animate::Arguments),
     Stability(stability::Arguments),
     Choose(choose::Arguments),
     Compare(compare::Arguments),
@@ -46,6 +49,7 @@ enum Command {
     Trace(trace::Arguments),
     Rays(rays::Arguments),
     Render(render::Arguments),
+    Navigate(navigate::Arguments),
 }
 
 fn after_help() -> String {
@@ -78,6 +82,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     match &cli.command {
         Command::Bench(arguments) => bench::run(common, arguments),
         Command::Accel(arguments) => accel::run(common, arguments),
+        Command::Animate(arguments) => animate::run(common, arguments),
         Command::Stability(arguments) => stability::run(common, arguments),
         Command::Choose(arguments) => choose::run(common, arguments),
         Command::Compare(arguments) => compare::run(common, arguments),
@@ -86,6 +91,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Trace(arguments) => trace::run(common, arguments),
         Command::Rays(arguments) => rays::run(common, arguments),
         Command::Render(arguments) => render::run(common, arguments),
+        Command::Navigate(arguments) => navigate::run(common, arguments),
     }
 }
 

@@ -7,7 +7,8 @@ use crate::scene::Scene;
 use anyhow::Context;
 use std::path::PathBuf;
 
-/// Write a picture: the scene shaded, its normals or depth, or heat maps of steps and tests a ray
+/// Write a picture: the scene shaded, its normals or depth, heat maps of steps and tests a ray or of the size of leaves, or where
+/// the planes of a kd-tree cut the surfaces
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// The scene: a file, a bare name, or a generator
@@ -18,13 +19,14 @@ pub struct Arguments {
     /// The PNG file
     #[arg(short, long, value_name = "IMAGE.png")]
     output: PathBuf,
-    /// What it shows: shaded, normals, steps, tests or depth
+    /// What it shows: shaded, normals, steps, tests, depth, leaf-size (of the leaf where a ray ends), or planes (of a kd-tree)
     #[arg(long, value_name = "VIEW", default_value = "shaded")]
     view: View,
     /// Pixels, without the legend of heat maps
     #[arg(long, value_name = "WxH", default_value = "960x720")]
     size: Size,
-    /// Where the colours of a heat map end [default: what 99 of 100 pixels stay below]
+    /// Where the colours of a heat map end [default: what 99 of 100 pixels stay below]; of planes, the deepest level that is drawn
+    /// [default: as deep as lines cover a fifth of the surface]
     #[arg(long, value_name = "VALUE")]
     top: Option<super::options::Positive>,
     /// When a dynamic scene is seen, in seconds [default: 0]
@@ -47,6 +49,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let device = work::device_for(common, builders)?;
     let bar = Bar::new(common, "building", 0);
     let mut subject = arguments.builder.make(device.as_ref(), &scene.mesh)?;
+    arguments.view.check(subject.as_ref())?;
     subject.build()?;
     bar.say("tracing");
     let options = PictureOptions {

@@ -24,9 +24,11 @@ pub const GROWTH: Page = Page { records: "growth.jsonl", file: "growth.html", na
 pub const LARGE: Page = Page { records: "large.jsonl", file: "large.html", name: "Large triangles" };
 /// `hedgerow stability degenerate`.
 pub const DEGENERATE: Page = Page { records: "degenerate.jsonl", file: "degenerate.html", name: "Degenerate scenes" };
+/// `hedgerow animate`.
+pub const ANIMATE: Page = Page { records: "animate.jsonl", file: "animate.html", name: "Moving scenes" };
 
 /// All of them.
-pub const ALL: [Page; 5] = [INDEX, ACCEL, GROWTH, LARGE, DEGENERATE];
+pub const ALL: [Page; 6] = [INDEX, ACCEL, ANIMATE, GROWTH, LARGE, DEGENERATE];
 
 impl Page {
     /// Whether it lies, or is about to, in `folder`.
@@ -35,11 +37,30 @@ impl Page {
     }
 }
 
-/// Links to the others in `folder`, for the navigation of `own`.
-pub fn links(folder: &Path, own: Page) -> Markup {
+/// The page of `hedgerow navigate` for a scene of this name as [`super::names::slug`] has it.
+pub fn navigator_of(scene: &str) -> String {
+    format!("{NAVIGATOR}{scene}.html")
+}
+
+const NAVIGATOR: &str = "navigate-";
+
+/// The scenes that have such a page in `folder`.
+fn navigated(folder: &Path) -> Vec<String> {
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let scene = |file: &str| Some(file.strip_prefix(NAVIGATOR)?.strip_suffix(".html")?.to_owned());
+    let mut scenes: Vec<String> = files.filter_map(|entry| scene(entry.file_name().to_str()?)).collect();
+    scenes.sort();
+    scenes
+}
+
+/// Links to the others in `folder`, for the navigation of the page in the file `own`.
+pub fn links(folder: &Path, own: &str) -> Markup {
     html! {
-        @for page in ALL.into_iter().filter(|page| *page != own && page.is_in(folder)) {
+        @for page in ALL.into_iter().filter(|page| page.file != own && page.is_in(folder)) {
             a.page href=(page.file) { (page.name) }
+        }
+        @for scene in navigated(folder).iter().filter(|scene| navigator_of(scene) != own) {
+            a.page href=(navigator_of(scene)) { "Trees of " (scene) }
         }
     }
 }

@@ -1,18 +1,21 @@
 //! Tables, charts and the page.
 //!
 //! [`results`] is what programs read. For people, [`table`] goes to the terminal and [`Report::write`] makes a folder with
-//! charts as SVG and PNG and an `index.html` that opens from the disk with no network; [`accel`] has a page of its own, and so
-//! has each experiment of [`stability`].
+//! charts as SVG and PNG and an `index.html` that opens from the disk with no network; [`accel`] and
+//! [`animate`] have pages of their own, and so has each experiment of [`stability`]; [`navigate`] makes one a scene, of its trees.
 
 pub mod accel;
+pub mod animate;
 pub mod beside;
 pub mod chart;
 pub mod charts;
 mod choosing;
 mod elements;
+pub mod kd_trees;
 pub mod labels;
 mod lines;
 pub mod names;
+pub mod navigate;
 pub mod numbers;
 mod page;
 pub mod picture;
@@ -60,6 +63,8 @@ pub struct Report {
     pub pictures: Vec<Picture>,
     /// What `auto` chose for every scene, before it was measured.
     pub choices: Vec<Choice>,
+    /// Published figures of kd-trees, to stand beside those that are measured.
+    pub published: kd_trees::published::Published,
 }
 
 /// A picture of a scene.
@@ -118,11 +123,14 @@ impl Report {
         let growth = charts::growth::growth(&records, &legend)?;
 
         write_charts(folder, scenes.iter().flat_map(|s| &s.charts).chain(&growth))?;
-        let page = page::page(self, &legend, &scenes, growth.as_ref(), &beside::links(folder, beside::INDEX));
+        let page = page::page(self, &legend, &scenes, growth.as_ref(), &beside::links(folder, beside::INDEX.file));
         let path = folder.join("index.html");
         std::fs::write(&path, page).map_err(Error::file(&path))?;
         if beside::ACCEL.is_in(folder) {
             accel::write(folder)?;
+        }
+        if beside::ANIMATE.is_in(folder) {
+            animate::write(folder)?;
         }
         stability::write_all(folder)
     }

@@ -3,6 +3,7 @@
 use super::chart::Chart;
 use super::choosing;
 use super::elements::{bar, column, facts, figure, foot, head, measured_by, number};
+use super::kd_trees;
 use super::names::{short, slug};
 use super::numbers::{bytes, duration, grouped, short_count, three_digits};
 use super::summary::{self, Standing};
@@ -31,11 +32,12 @@ pub(super) fn page(
             body {
                 a.skip href="#summary" { "Skip to the results" }
                 (header(report, legend, scenes))
-                (navigation(scenes, [!report.choices.is_empty(), growth.is_some()], links))
+                (navigation(scenes, [!kd_trees::of(&records).is_empty(), !report.choices.is_empty(), growth.is_some()], links))
                 main {
                     @if !report.failures.is_empty() || records.iter().any(|r| r.valid == Some(false)) { (failures(report)) }
                     (summary_section(report, &records, legend))
                     @for scene in scenes { (scene_section(report, scene, legend)) }
+                    (kd_trees::section(&records, &report.published))
                     (choosing::section(&report.choices, &records))
                     @if let Some(chart) = growth { (growth_section(chart)) }
                     (results_section(&records, legend))
@@ -63,11 +65,12 @@ fn header(report: &Report, legend: &Legend, scenes: &[SceneCharts]) -> Markup {
     }
 }
 
-fn navigation(scenes: &[SceneCharts], [choosing, growth]: [bool; 2], links: &Markup) -> Markup {
+fn navigation(scenes: &[SceneCharts], [kd_trees, choosing, growth]: [bool; 3], links: &Markup) -> Markup {
     html! {
         nav aria-label="Sections" {
             a href="#summary" { "Summary" }
             @for scene in scenes { a href={ "#scene-" (slug(&scene.scene)) } { (scene.scene) } }
+            @if kd_trees { a href="#kd-trees" { "kd-trees" } }
             @if choosing { a href="#choosing" { "Choosing" } }
             @if growth { a href="#growth" { "Growth" } }
             a href="#results" { "All figures" }

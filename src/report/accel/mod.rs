@@ -108,7 +108,7 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     .flatten()
     .collect();
     write_charts(folder, sections.iter().flat_map(|section| &section.charts))?;
-    let page = page::page(&measured, &goals::goals(&measured), &sections, &beside::links(folder, beside::ACCEL));
+    let page = page::page(&measured, &goals::goals(&measured), &sections, &beside::links(folder, beside::ACCEL.file));
     let path = folder.join("accel.html");
     std::fs::write(&path, page).map_err(Error::file(&path))?;
     Ok(path)

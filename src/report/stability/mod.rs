@@ -153,7 +153,7 @@ fn write<P: Paged>(folder: &Path) -> Result<()> {
     let run = read_run::<P>(folder)?;
     let sections = P::sections(&points)?;
     write_charts(folder, sections.iter().flat_map(|section| section.charts.iter().chain(&section.more)))?;
-    let page = page::page(&points, run.as_ref(), &sections, &beside::links(folder, P::PAGE));
+    let page = page::page(&points, run.as_ref(), &sections, &beside::links(folder, P::PAGE.file));
     let path = folder.join(P::PAGE.file);
     std::fs::write(&path, page).map_err(Error::file(&path))
 }

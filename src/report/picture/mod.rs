@@ -1,16 +1,20 @@
-//! Pictures of a scene as a tracer sees it: shaded, and heat maps of the work that each ray took.
+//! Pictures of a scene as a tracer sees it: shaded, heat maps of the work that each ray took, and of the tree that it went through.
+
+mod legend;
+mod planes;
 
 use super::numbers::three_digits;
-use super::raster::rasterise;
-use super::theme::{self, INK, PAPER};
-use crate::measure::Subject;
+use crate::measure::outline::{Content, Outline};
+use crate::measure::{KD_TREE, Subject};
 use crate::scene::Scene;
 use crate::trace::kinds::{self, RayKind, RayOptions};
 use crate::trace::{Hit, Query, Ray, Work};
 use crate::{Error, Result};
 use glam::Vec3;
 use image::{Rgb, RgbImage};
+use legend::Scale;
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
+use rayon::prelude::*;
 use std::fmt;
 use std::str::FromStr;
 
@@ -27,11 +31,17 @@ pub enum View {
     Tests,
     /// The distance to the surface.
     Depth,
+    /// Triangles in the leaf in which the primary ray of each pixel ends: where a tree is coarse, on the surface that it is coarse
+    /// for. (What leaves on the way cost is in `Tests`.)
+    LeafSize,
+    /// Lines where the planes of a kd-tree cut the surfaces.
+    Planes,
 }
 
 impl View {
     /// All views.
-    pub const ALL: [View; 5] = [View::Shaded, View::Normals, View::Steps, View::Tests, View::Depth];
+    pub const ALL: [View; 7] =
+        [View::Shaded, View::Normals, View::Steps, View::Tests, View::Depth, View::LeafSize, View::Planes];
 
     /// Its name, as `--view` takes it.
     pub fn name(self) -> &'static str {
@@ -41,6 +51,19 @@ impl View {
             View::Steps => "steps",
             View::Tests => "tests",
             View::Depth => "depth",
+            View::LeafSize => "leaf-size",
+            View::Planes => "planes",
+        }
+    }
+
+    /// Whether a subject can be seen so, before it is built.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] says what it lacks, and what to choose.
+    pub fn check(self, subject: &dyn Subject) -> Result<()> {
+        match self {
+            View::Planes if subject.kind() != KD_TREE => Err(planes::needs_kd_tree(subject.builder())),
+            _ => Ok(()),
         }
     }
 }
@@ -72,14 +95,14 @@ pub struct PictureOptions {
     /// Of the rays to the sky.
     pub seed: u64,
     /// Where the colours of a heat map end; without it, at what 99 of 100 pixels stay below. Pictures that are compared
-    /// need the same.
+    /// need the same. Of planes, the deepest level that is drawn; without it, as deep as they cover a fifth of the surface.
     pub top: Option<f32>,
 }
 
-/// Makes a picture with a subject that has been built. Heat maps have their legend below.
+/// Makes a picture with a subject that has been built. Heat maps and planes have their legend below.
 ///
 /// # Errors
-/// The device failed, or the tracer does not count what `view` shows.
+/// The device failed, or the tracer does not count what `view` shows, or there is no tree of ours that it shows.
 pub fn picture(scene: &Scene, subject: &mut dyn Subject, options: &PictureOptions) -> Result<RgbImage> {
     match options.view {
         View::Shaded => shaded(scene, subject, options),
@@ -87,7 +110,15 @@ pub fn picture(scene: &Scene, subject: &mut dyn Subject, options: &PictureOption
         View::Depth => depth(scene, subject, options),
         View::Steps => work(scene, subject, options, "inner nodes visited by the ray of each pixel", |w| w.steps),
         View::Tests => work(scene, subject, options, "triangles tested by the ray of each pixel", |w| w.tests),
+        View::LeafSize => leaf_size(scene, subject, options),
+        View::Planes => planes::planes(scene, subject, options),
     }
+}
+
+fn traced(subject: &mut dyn Subject, rays: &[Ray], query: Query) -> Result<Vec<Hit>> {
+    subject.set_rays(rays)?;
+    subject.trace(query)?;
+    subject.hits()
 }
 
 /// The primary rays of a picture and what they meet.
@@ -98,11 +129,19 @@ struct Seen {
 
 impl Seen {
     fn trace(scene: &Scene, subject: &mut dyn Subject, rays: &RayOptions) -> Result<Seen> {
+        Seen::by(scene, rays, &mut |rays, query| traced(subject, rays, query))
+    }
+
+    fn by(scene: &Scene, rays: &RayOptions, trace: &mut Tracing<'_>) -> Result<Seen> {
         let rays = kinds::generate(RayKind::Primary, scene, rays, &mut |_| Ok(Vec::new()))?;
-        subject.set_rays(&rays)?;
-        subject.trace(Query::ClosestHit)?;
-        let hits = subject.hits()?;
+        let hits = trace(&rays, Query::ClosestHit)?;
         Ok(Seen { rays, hits })
+    }
+
+    /// Where a ray ends.
+    fn point(&self, i: usize) -> Option<Vec3> {
+        let (ray, hit) = (&self.rays[i], &self.hits[i]);
+        hit.is_some().then(|| Vec3::from(ray.origin) + hit.t * Vec3::from(ray.direction))
     }
 
     /// The geometric normal of each hit, on the side of the eye.
@@ -121,17 +160,26 @@ impl Seen {
 /// Rays a pixel in x and in y where edges shall be smooth.
 const SMOOTH: u32 = 2;
 
-fn smooth(options: &PictureOptions) -> RayOptions {
-    RayOptions { size: options.size.map(|side| side * SMOOTH), seed: options.seed }
+fn smooth(size: [u32; 2], seed: u64) -> RayOptions {
+    RayOptions { size: size.map(|side| side * SMOOTH), seed }
 }
 
 fn shaded(scene: &Scene, subject: &mut dyn Subject, options: &PictureOptions) -> Result<RgbImage> {
-    let rays = smooth(options);
-    let seen = Seen::trace(scene, subject, &rays)?;
+    shaded_by(scene, options.size, options.seed, &mut |rays, query| traced(subject, rays, query))
+}
+
+/// Whatever traces rays: a hit a ray.
+pub type Tracing<'t> = dyn FnMut(&[Ray], Query) -> Result<Vec<Hit>> + 't;
+
+/// [`View::Shaded`] of whatever traces rays.
+///
+/// # Errors
+/// Those of `trace`.
+pub fn shaded_by(scene: &Scene, size: [u32; 2], seed: u64, trace: &mut Tracing<'_>) -> Result<RgbImage> {
+    let rays = smooth(size, seed);
+    let seen = Seen::by(scene, &rays, trace)?;
     let sky_rays = kinds::generate(RayKind::Ao, scene, &rays, &mut |_| Ok(seen.hits.clone()))?;
-    subject.set_rays(&sky_rays)?;
-    subject.trace(Query::AnyHit)?;
-    let hidden = subject.hits()?;
+    let hidden = trace(&sky_rays, Query::AnyHit)?;
     let surfaces = seen.hits.iter().filter(|hit| hit.is_some()).count();
     let mut skies = hidden.chunks(hidden.len().checked_div(surfaces).unwrap_or(1).max(1));
 
@@ -149,11 +197,11 @@ fn shaded(scene: &Scene, subject: &mut dyn Subject, options: &PictureOptions) ->
             (ambient + light * normal.dot(lamp).max(0.0)) * (0.3 + 0.7 * open)
         }
     });
-    Ok(averaged(&colours.collect::<Vec<_>>(), options.size))
+    Ok(averaged(&colours.collect::<Vec<_>>(), size))
 }
 
 fn normals(scene: &Scene, subject: &mut dyn Subject, options: &PictureOptions) -> Result<RgbImage> {
-    let seen = Seen::trace(scene, subject, &smooth(options))?;
+    let seen = Seen::trace(scene, subject, &smooth(options.size, options.seed))?;
     let colours = seen.normals(scene).map(|n| n.map_or(Vec3::ZERO, |normal| decoded(0.5 + 0.5 * normal)));
     Ok(averaged(&colours.collect::<Vec<_>>(), options.size))
 }
@@ -183,8 +231,8 @@ fn depth(scene: &Scene, subject: &mut dyn Subject, options: &PictureOptions) -> 
     let colour = |t: f32| 1.0 - (t - nearest) / (farthest - nearest).max(f32::MIN_POSITIVE);
     let image = heat_map(&values, options.size, colour);
     let [near, far] = [nearest, farthest].map(|t| if t.is_finite() { three_digits(f64::from(t)) } else { "-".into() });
-    let legend = Legend { ends: [format!("{far}+"), near], middle: "distance from the eye".into() };
-    legend.below(image)
+    let scale = Scale { ends: [format!("{far}+"), near], middle: "distance from the eye".into() };
+    legend::below(image, |width| scale.svg(width))
 }
 
 fn work(
@@ -200,17 +248,36 @@ fn work(
         let remedy = "choose another builder or the view shaded, normals or depth";
         return Err(Error::Argument(format!("{builder} does not count {view}; {remedy}")));
     };
-    let values: Vec<f32> = work.iter().map(|w| count(w) as f32).collect();
-    let top = options.top.unwrap_or_else(|| nice(below(values.iter().copied(), 0.99)));
-    let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len().max(1) as f64;
-    let most = values.iter().copied().fold(0.0, f32::max);
-    let values: Vec<_> = values.into_iter().map(Some).collect();
-    let image = heat_map(&values, options.size, |v| v / top);
-    let legend = Legend {
+    let values: Vec<_> = work.iter().map(|w| Some(count(w) as f32)).collect();
+    counts(&values, options, what)
+}
+
+fn leaf_size(scene: &Scene, subject: &mut dyn Subject, options: &PictureOptions) -> Result<RgbImage> {
+    let seen = Seen::trace(scene, subject, &RayOptions { size: options.size, seed: options.seed })?;
+    let outline = Outline::of(subject)?;
+    let size = |(ray, hit): (&Ray, &Hit)| {
+        let leaf = hit.is_some().then(|| outline.leaf_of(ray, hit)).flatten()?;
+        match &outline.nodes[leaf as usize].content {
+            Content::Leaf(range) => Some(range.len() as f32),
+            Content::Inner(_) => None,
+        }
+    };
+    let values: Vec<_> = seen.rays.par_iter().zip(&seen.hits).map(size).collect();
+    counts(&values, options, "triangles in the leaf where the ray of each pixel ends")
+}
+
+/// A heat map of counts, from 0 on.
+fn counts(values: &[Option<f32>], options: &PictureOptions, what: &str) -> Result<RgbImage> {
+    let there = || values.iter().flatten().copied();
+    let top = options.top.unwrap_or_else(|| nice(below(there(), 0.99)));
+    let mean = there().map(f64::from).sum::<f64>() / there().count().max(1) as f64;
+    let most = there().fold(0.0, f32::max);
+    let image = heat_map(values, options.size, |v| v / top);
+    let scale = Scale {
         ends: ["0".into(), format!("{top}+")],
         middle: format!("{what}: mean {}, most {most}", three_digits(mean)),
     };
-    legend.below(image)
+    legend::below(image, |width| scale.svg(width))
 }
 
 /// What the share `share` of the values stays below.
@@ -243,62 +310,6 @@ fn colour(place: f32) -> Rgb<u8> {
     Rgb([r, g, b])
 }
 
-/// What the colours of a heat map mean.
-struct Legend {
-    /// At the dark and at the bright end.
-    ends: [String; 2],
-    /// Between them.
-    middle: String,
-}
-
-impl Legend {
-    const HEIGHT: u32 = 44;
-
-    /// `image` with the legend below it.
-    fn below(&self, image: RgbImage) -> Result<RgbImage> {
-        let (width, height) = image.dimensions();
-        let scale = (width as f32 / 560.0).clamp(0.25, 3.0);
-        let strip_height = (Self::HEIGHT as f32 * scale).round() as u32;
-        let svg = self.svg(width as f32 / scale);
-        let strip = rasterise(&svg, (width, strip_height), scale)
-            .map_err(|reason| Error::Chart { chart: "the legend".into(), reason })?;
-        let mut whole = RgbImage::new(width, height + strip_height);
-        image::imageops::replace(&mut whole, &image, 0, 0);
-        for (i, pixel) in strip.pixels().iter().enumerate() {
-            let (x, y) = (i as u32 % width, i as u32 / width);
-            whole.put_pixel(x, height + y, Rgb([pixel.red(), pixel.green(), pixel.blue()]));
-        }
-        Ok(whole)
-    }
-
-    fn svg(&self, width: f32) -> String {
-        const STOPS: u32 = 16;
-        let stops: String = (0..=STOPS)
-            .map(|i| {
-                let place = i as f32 / STOPS as f32;
-                let Rgb([r, g, b]) = colour(place);
-                format!("<stop offset=\"{place}\" stop-color=\"rgb({r},{g},{b})\"/>")
-            })
-            .collect();
-        let (ink, paper) = (theme::hex(INK.light), theme::hex(PAPER.light));
-        let text = |x: f32, anchor: &str, words: &str| {
-            format!("<text x=\"{x}\" y=\"36\" text-anchor=\"{anchor}\" font-size=\"12\" fill=\"{ink}\">{words}</text>")
-        };
-        let [low, high] = &self.ends;
-        format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{h}\" font-family=\"sans-serif\">\
-             <defs><linearGradient id=\"heat\">{stops}</linearGradient></defs>\
-             <rect width=\"{width}\" height=\"{h}\" fill=\"{paper}\"/>\
-             <rect x=\"10\" y=\"8\" width=\"{bar}\" height=\"12\" fill=\"url(#heat)\"/>{}{}{}</svg>",
-            text(10.0, "start", low),
-            text(width / 2.0, "middle", &self.middle),
-            text(width - 10.0, "end", high),
-            h = Self::HEIGHT,
-            bar = width - 20.0,
-        )
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -306,8 +317,12 @@ mod tests {
     use crate::scene::{self, LoadOptions};
 
     fn of(view: View, top: Option<f32>) -> RgbImage {
+        by("kd-binned", view, top)
+    }
+
+    fn by(builder: &str, view: View, top: Option<f32>) -> RgbImage {
         let scene = scene::load("gen:icosphere:3", &LoadOptions::default()).expect("a generator");
-        let spec: Spec = "lbvh-host".parse().expect("a builder");
+        let spec: Spec = builder.parse().expect("a builder");
         let mut subject = spec.make(None, &scene.mesh).expect("a subject");
         subject.build().expect("a tree");
         let options = PictureOptions { view, size: [64, 48], seed: 1, top };
@@ -327,6 +342,28 @@ mod tests {
             assert_ne!(image.get_pixel(32, 24), image.get_pixel(0, 0), "{view}");
             assert_eq!(image.get_pixel(0, 0), image.get_pixel(63, 0), "{view}: both corners are background");
         }
+    }
+
+    #[test]
+    fn every_view_but_planes_is_of_a_bvh_too() {
+        for view in View::ALL.into_iter().filter(|view| *view != View::Planes) {
+            assert_ne!(
+                by("lbvh-host", view, None).get_pixel(32, 24),
+                by("lbvh-host", view, None).get_pixel(0, 0),
+                "{view}"
+            );
+        }
+        let shaded = [by("lbvh-host", View::Shaded, None), by("kd-binned", View::Shaded, None)];
+        assert_eq!(shaded[0], shaded[1], "the same hits");
+        assert_eq!(by("lbvh-host", View::LeafSize, Some(8.0)).dimensions(), of(View::LeafSize, Some(8.0)).dimensions());
+    }
+
+    #[test]
+    fn deeper_planes_draw_more_lines() {
+        let is_coloured = |p: &&Rgb<u8>| p.0.iter().max() > p.0.iter().min().map(|least| least + 24).as_ref();
+        let lines = |top| of(View::Planes, Some(top)).rows().take(48).flatten().filter(is_coloured).count();
+        let counts = [0.5, 2.0, 5.0].map(lines);
+        assert!(0 < counts[0] && counts[0] < counts[1] && counts[1] < counts[2], "{counts:?}");
     }
 
     #[test]

@@ -1,0 +1,85 @@
+//! `animate.jsonl` and `animate.html`: a scene that moves, frame by frame in each of the ways, as programs read it and as people do.
+//!
+//! The page follows from the records alone: whoever has them can write it again.
+
+mod charts;
+mod page;
+pub mod standings;
+
+use super::beside;
+use super::lines::{self, Lines};
+use super::write_charts;
+use crate::measure::animate::points::{Animated, Entry, Failure, Line, Setting};
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// The name of the file of records.
+pub const FILE: &str = beside::ANIMATE.records;
+
+/// `animate.jsonl`, open for writing: each point is on the disk as soon as it is measured.
+#[derive(Debug)]
+pub struct Points(Lines);
+
+impl Points {
+    /// Makes `folder` and an empty `animate.jsonl` in it.
+    ///
+    /// # Errors
+    /// The folder cannot be made or written to.
+    pub fn create(folder: &Path) -> Result<Points> {
+        Lines::create(folder, FILE).map(Points)
+    }
+
+    /// Appends a line.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn append(&mut self, entry: Entry) -> Result<()> {
+        self.0.append(&Line::from(entry))
+    }
+}
+
+/// The lines of an `animate.jsonl`, or of the one in a folder.
+///
+/// # Errors
+/// The file cannot be read; a line is not a record of this schema.
+pub fn read(path: &Path) -> Result<Vec<Entry>> {
+    let lines = lines::read(path, FILE, "hedgerow animate", |line: &Line| line.schema)?;
+    Ok(lines.into_iter().map(|line| line.entry).collect())
+}
+
+/// The records, by what they are of.
+#[derive(Debug, Default)]
+struct Measured {
+    setting: Option<Setting>,
+    frames: Vec<Animated>,
+    failures: Vec<Failure>,
+}
+
+impl From<Vec<Entry>> for Measured {
+    fn from(entries: Vec<Entry>) -> Measured {
+        let mut measured = Measured::default();
+        for entry in entries {
+            match entry {
+                Entry::Setting(setting) => measured.setting = Some(setting),
+                Entry::Animate(frame) => measured.frames.push(frame),
+                Entry::Failure(failure) => measured.failures.push(failure),
+            }
+        }
+        measured
+    }
+}
+
+/// Writes `animate.html` and its charts into `folder`, from the `animate.jsonl` there; gives the page's path. The page names the
+/// others that lie there.
+///
+/// # Errors
+/// The records cannot be read; a file cannot be written.
+pub fn write(folder: &Path) -> Result<PathBuf> {
+    let measured = Measured::from(read(folder)?);
+    let charts = charts::all(&measured)?;
+    write_charts(folder, charts.iter())?;
+    let page = page::page(&measured, &charts, &beside::links(folder, beside::ANIMATE.file));
+    let path = folder.join(beside::ANIMATE.file);
+    std::fs::write(&path, page).map_err(Error::file(&path))?;
+    Ok(path)
+}
