@@ -3,12 +3,17 @@
 //! With the feature `compile-shaders` the sources are compiled by shaderc; without it, `glsl/prebuilt/` is taken, so that
 //! whoever links the library needs neither cmake nor a shader compiler.
 
+#[cfg(feature = "compile-shaders")]
+#[path = "build/shared_memory.rs"]
+mod shared_memory;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=build");
     println!("cargo:rerun-if-changed=glsl");
     let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets OUT_DIR"));
     let mut sources = Vec::new();
@@ -123,7 +128,7 @@ fn compile(source: &Path, define: Option<&str>, level: shaderc::OptimizationLeve
     });
     let file = source.display().to_string();
     match compiler.compile_into_spirv(&text, shaderc::ShaderKind::Compute, &file, "main", Some(&options)) {
-        Ok(binary) => binary.as_binary_u8().to_vec(),
+        Ok(binary) => shared_memory::handed_over_at_barriers(binary.as_binary_u8()),
         Err(error) => {
             // shaderc already writes `glsl/room/pass.comp:LINE: error: …`, which editors follow as they follow rustc.
             eprintln!("{error}");

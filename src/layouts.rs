@@ -14,7 +14,7 @@ use crate::trace::kd::TreeEntry;
 use crate::trace::{Hit, Ray};
 use crate::{accel, bvh, gpu, measure, trace};
 use rspirv::dr::{Instruction, Module, Operand};
-use rspirv::spirv::{Decoration, Op, StorageClass};
+use rspirv::spirv::{Decoration, MemorySemantics, Op, StorageClass};
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 use std::path::Path;
@@ -321,4 +321,43 @@ fn what_is_precise_in_a_source_is_so_in_its_shader() {
         }
     }
     assert!(precise_shaders > 0, "some shaders are precise throughout");
+}
+
+/// What `build/shared_memory.rs` has made of them.
+#[test]
+fn shared_memory_is_handed_over_at_barriers_alone() {
+    let (mut accesses, mut barriers) = (0, 0);
+    for shader in shaders::ALL {
+        let module = rspirv::dr::load_bytes(shader.spirv).expect("SPIR-V of shaderc");
+        let is_shared = |i: &&Instruction| i.operands.contains(&Operand::StorageClass(StorageClass::Workgroup));
+        let types: BTreeSet<_> = module.types_global_values.iter().filter(is_shared).map(|i| i.result_id).collect();
+        let pointers: BTreeSet<_> =
+            module.all_inst_iter().filter(|i| types.contains(&i.result_type)).filter_map(|i| i.result_id).collect();
+        let semantics = |id: u32| {
+            let constant = module.types_global_values.iter().find(|i| i.result_id == Some(id)).expect("a constant");
+            MemorySemantics::from_bits_retain(constant.operands[0].unwrap_literal_bit32())
+        };
+        for i in module.all_inst_iter() {
+            match (i.class.opcode, &i.operands[..]) {
+                (Op::Load | Op::Store, [Operand::IdRef(pointer), rest @ ..]) if pointers.contains(pointer) => {
+                    accesses += 1;
+                    assert!(
+                        !rest.iter().any(|operand| matches!(operand, Operand::IdScope(_))),
+                        "{}: {i:?}",
+                        shader.name
+                    );
+                }
+                (Op::ControlBarrier | Op::MemoryBarrier, [.., Operand::IdMemorySemantics(id)]) => {
+                    let has = |of: MemorySemantics| semantics(*id).contains(of);
+                    if has(MemorySemantics::WORKGROUP_MEMORY) {
+                        barriers += 1;
+                        let both = MemorySemantics::MAKE_AVAILABLE | MemorySemantics::MAKE_VISIBLE;
+                        assert!(has(MemorySemantics::ACQUIRE_RELEASE | both), "{}: {i:?}", shader.name);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+    assert!(accesses > 0 && barriers > 0, "{accesses} accesses, {barriers} barriers");
 }
