@@ -73,6 +73,14 @@ vec3 crossing_of(vec3 a, vec3 b, uint axis, float plane, vec3 outer) {
     return point;
 }
 
+// The faces of a cell beyond which a box reaches: two bits an axis, the upper face first.
+uint faces_beyond(Box b, Box cell) {
+    bvec3 above = greaterThan(b.hi, cell.hi), below = lessThan(b.lo, cell.lo);
+    uint faces = 0;
+    for (uint axis = 0; axis < 3; ++axis) faces |= (above[axis] ? 1u : 0u) << 2u * axis | (below[axis] ? 2u : 0u) << 2u * axis;
+    return faces;
+}
+
 // The box of a triangle's part in a cell; false where there is none.
 bool clip_triangle(Corners c, float reach, Box cell, out Box part) {
     Box whole = box_around(c);
@@ -80,50 +88,45 @@ bool clip_triangle(Corners c, float reach, Box cell, out Box part) {
     vec3 rounding = rounding_of(whole, longest), room = room_of(longest, rounding, reach);
     precise vec3 margin = room + rounding;
     Box larger = widened(cell, margin);
-    vec3 polygon[POLYGON_CORNERS], cut[POLYGON_CORNERS];
+    // The polygon and what becomes of it at a face, in turn.
+    vec3 polygon[2 * POLYGON_CORNERS];
     polygon[0] = c.v0;
     polygon[1] = c.v1;
     polygon[2] = c.v2;
-    uint count = 3;
+    uint from = 0, count = 3;
     bool is_cut = true;
-    for (uint face = 0; face < 6 && is_cut; ++face) {
-        uint axis = face >> 1;
+    uint faces = faces_beyond(whole, larger);
+    if (faces != 0u) do {
+        uint face = findLSB(faces), axis = face >> 1, to = POLYGON_CORNERS - from, kept = 0;
         bool is_upper = (face & 1u) == 0u;
         float plane = is_upper ? larger.hi[axis] : larger.lo[axis];
-        bool all_kept = true;
-        for (uint i = 0; i < count; ++i) {
-            float x = polygon[i][axis];
-            all_kept = all_kept && (is_upper ? x <= plane : x >= plane);
-        }
-        if (all_kept) continue;
-        uint kept = 0;
-        vec3 p = polygon[0];
-        for (uint i = 0; i < count && is_cut; ++i) {
-            vec3 q = polygon[i + 1 < count ? i + 1 : 0];
-            bool keeps_p = is_upper ? p[axis] <= plane : p[axis] >= plane;
+        vec3 p = polygon[from];
+        bool keeps_p = is_upper ? p[axis] <= plane : p[axis] >= plane;
+        uint i = 0;
+        do {
+            vec3 q = polygon[from + (i + 1 < count ? i + 1 : 0)];
             bool keeps_q = is_upper ? q[axis] <= plane : q[axis] >= plane;
-            uint more = (keeps_p ? 1u : 0u) + (keeps_p != keeps_q ? 1u : 0u);
-            if (kept + more > POLYGON_CORNERS) {
-                is_cut = false;
-            } else {
-                if (keeps_p) cut[kept++] = p;
-                if (keeps_p != keeps_q) {
-                    bool goes_up = p[axis] < q[axis];
-                    cut[kept++] = crossing_of(goes_up ? p : q, goes_up ? q : p, axis, plane, keeps_p ? q : p);
-                }
+            is_cut = kept + (keeps_p ? 1u : 0u) + (keeps_p != keeps_q ? 1u : 0u) <= POLYGON_CORNERS;
+            if (is_cut && keeps_p) polygon[to + kept++] = p;
+            if (is_cut && keeps_p != keeps_q) {
+                bool goes_up = p[axis] < q[axis];
+                polygon[to + kept++] = crossing_of(goes_up ? p : q, goes_up ? q : p, axis, plane, keeps_p ? q : p);
             }
             p = q;
-        }
+            keeps_p = keeps_q;
+        } while (++i < count && is_cut);
+        from = to;
         count = kept;
-        for (uint i = 0; i < count; ++i) polygon[i] = cut[i];
-    }
+        faces &= faces - 1u;
+    } while (faces != 0u && is_cut && count != 0u);
     // A polygon of no corners has a box from +∞ to −∞.
     Box bounds = Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
-    if (is_cut) {
-        for (uint i = 0; i < count; ++i) bounds = Box(min(bounds.lo, polygon[i]), max(bounds.hi, polygon[i]));
-    } else {
-        bounds = whole;
-    }
+    uint i = 0;
+    if (count != 0u) do {
+        vec3 p = polygon[from + i];
+        bounds = Box(min(bounds.lo, p), max(bounds.hi, p));
+    } while (++i < count);
+    if (!is_cut) bounds = whole;
     Box own = finite_part(widened(whole, room));
     part = common_part(common_part(widened(bounds, margin), own), cell);
     return all(lessThanEqual(part.lo, part.hi));

@@ -3,6 +3,8 @@
 //
 // The left child is done first, what is on the right waits on a stack in memory. Nodes and references are written to the workgroup's
 // own memory, and when all are there to a place that an atomic gives: placing them in order is kdtree/place.glsl's.
+//
+// Loops test at their ends: lavapipe goes through one that tests at its beginning once more, with no lane active.
 #ifndef HEDGEROW_KDTREE_SMALL
 #define HEDGEROW_KDTREE_SMALL
 #include "kdtree/heuristic.glsl"
@@ -93,20 +95,22 @@ void consider(inout KdPlane best, Box cell, float area_scale, uint axis, float a
 // The planes at the two faces of each lane's own box across an axis.
 void consider_faces(inout KdPlane best, uint set, uint count, uint axis, float lo, float hi, Box cell, float area_scale) {
     Counts at_lo = Counts(0u, 0u, 0u), at_hi = Counts(0u, 0u, 0u);
-    for (uint tile = 0; tile < count; tile += gl_SubgroupSize) {
+    uint tile = 0;
+    do {
         float others_lo = lo, others_hi = hi;
         if (count > gl_SubgroupSize || gl_NumSubgroups > 1u) {
             uint i = (3u * set + axis) * EXACT + min(tile + gl_SubgroupInvocationID, count - 1u);
             others_lo = small_lo[i];
             others_hi = small_hi[i];
         }
-        uint turns = min(gl_SubgroupSize, count - tile);
-        for (uint turn = 0; turn < turns; ++turn) {
+        uint turns = min(gl_SubgroupSize, count - tile), turn = 0;
+        do {
             float l = subgroupBroadcast(others_lo, turn), h = subgroupBroadcast(others_hi, turn);
             count_box(at_lo, l, h, lo);
             count_box(at_hi, l, h, hi);
-        }
-    }
+        } while (++turn < turns);
+        tile += gl_SubgroupSize;
+    } while (tile < count);
     consider(best, cell, area_scale, axis, lo, at_lo);
     consider(best, cell, area_scale, axis, hi, at_hi);
 }
@@ -115,20 +119,22 @@ void consider_faces(inout KdPlane best, uint set, uint count, uint axis, float l
 // registers, which is cheaper than shared memory, much so on lavapipe.
 KdPlane best_of_faces(uint set, uint count, Box cell, float area_scale) {
     KdPlane best = no_plane();
-    for (uint base = 0; base < count; base += gl_WorkGroupSize.x) {
+    uint base = 0;
+    do {
         // Who has none looks at the last one's again.
         Box own = box_of(set, min(base + gl_LocalInvocationIndex, count - 1u));
         consider_faces(best, set, count, 0u, own.lo.x, own.hi.x, cell, area_scale);
         consider_faces(best, set, count, 1u, own.lo.y, own.hi.y, cell, area_scale);
         consider_faces(best, set, count, 2u, own.lo.z, own.hi.z, cell, area_scale);
-    }
+        base += gl_WorkGroupSize.x;
+    } while (base < count);
     return best_of_all(best);
 }
 
 // Tells the sides of all references, and the boxes of the parts of those on both: item 2k is the part on the left of the k-th.
 void divide(uint set, uint count, Box cell, uint axis, float plane, bool planar_left) {
-    uint straddlers = 0;
-    for (uint base = 0; base < count; base += gl_WorkGroupSize.x) {
+    uint straddlers = 0, base = 0;
+    do {
         uint i = base + gl_LocalInvocationIndex;
         bvec2 is_there = bvec2(false);
         if (i < count) is_there = sides_of(box_of(set, i), axis, plane, planar_left);
@@ -137,13 +143,15 @@ void divide(uint set, uint count, Box cell, uint axis, float plane, bool planar_
         if (all(is_there)) small_straddling[at] = i;
         if (i < count) small_side[i] = (is_there.x ? 1u : 0u) | (is_there.y ? 2u : 0u) | (all(is_there) ? at + 1u << 2 : 0u);
         straddlers += total;
-    }
+        base += gl_WorkGroupSize.x;
+    } while (base < count);
     barrier();
     if (straddlers == 0u) return;
     float reach = build_state().reach;
     Box halves[2];
     half_cells(cell, axis, plane, halves[0], halves[1]);
-    for (uint item = gl_LocalInvocationIndex; item < 2u * straddlers; item += gl_WorkGroupSize.x) {
+    uint item = gl_LocalInvocationIndex;
+    if (item < 2u * straddlers) do {
         uint i = small_straddling[item >> 1];
         Box half_cell = halves[0], part;
         if ((item & 1u) == 1u) half_cell = halves[1];
@@ -155,12 +163,15 @@ void divide(uint set, uint count, Box cell, uint axis, float plane, bool planar_
             part_lo[k * 2u * EXACT + item] = part.lo[k];
             part_hi[k * 2u * EXACT + item] = part.hi[k];
         }
-    }
+        item += gl_WorkGroupSize.x;
+    } while (item < 2u * straddlers);
     barrier();
-    for (uint k = gl_LocalInvocationIndex; k < straddlers; k += gl_WorkGroupSize.x) {
+    uint k = gl_LocalInvocationIndex;
+    if (k < straddlers) do {
         uint left = small_part_is_there[2u * k], right = small_part_is_there[2u * k + 1u];
         if (left + right == 1u) small_side[small_straddling[k]] = (left == 1u ? 1u : 2u) | k + 1u << 2;
-    }
+        k += gl_WorkGroupSize.x;
+    } while (k < straddlers);
     barrier();
 }
 
@@ -176,7 +187,8 @@ Box part_of(uint item) {
 // What is on the left goes to the other set, what is on the right to where it waits; returns how many.
 uvec2 part(uint set, uint count, KdReferences right, uint right_at) {
     uvec2 counts = uvec2(0);
-    for (uint base = 0; base < count; base += gl_WorkGroupSize.x) {
+    uint base = 0;
+    do {
         uint i = base + gl_LocalInvocationIndex;
         uint side = i < count ? small_side[i] : 0u;
         uvec2 total;
@@ -192,16 +204,19 @@ uvec2 part(uint set, uint count, KdReferences right, uint right_at) {
             if ((side & 2u) != 0u) right.reference[right_at + at.y] = KdReference(own_right.lo, record, own_right.hi);
         }
         counts += total;
-    }
+        base += gl_WorkGroupSize.x;
+    } while (base < count);
     next_step();
     return counts;
 }
 
 void load_references(uint set, KdReferences from, uint begin, uint count) {
-    for (uint i = gl_LocalInvocationIndex; i < count; i += gl_WorkGroupSize.x) {
+    uint i = gl_LocalInvocationIndex;
+    if (i < count) do {
         KdReference r = from.reference[begin + i];
         set_reference(set, i, Box(r.lo, r.hi), r.record);
-    }
+        i += gl_WorkGroupSize.x;
+    } while (i < count);
     barrier();
 }
 
@@ -298,9 +313,11 @@ void kd_small(uint s, uint of_level) {
             }
         } else {
             if (gl_LocalInvocationIndex == 0u) stack.nodes.node[slot] = kd_leaf(references, count);
-            for (uint i = gl_LocalInvocationIndex; i < count; i += gl_WorkGroupSize.x) {
+            uint i = gl_LocalInvocationIndex;
+            if (i < count) do {
                 stack.leaves.word[references + i] = small_record[set * EXACT + i];
-            }
+                i += gl_WorkGroupSize.x;
+            } while (i < count);
             references += count;
             tallies.y += 1u;
             if (waiting == 0u) break;

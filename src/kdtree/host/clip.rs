@@ -83,9 +83,13 @@ pub(super) fn clipped(corners: &[[f32; 3]; 3], reach: f32, cell: &Aabb) -> Optio
     let (room, rounding) = (room(corners, reach), rounding(corners));
     let margin = std::array::from_fn(|i| room[i] + rounding[i]);
     let larger = widened(cell, margin);
+    let whole = Aabb::around(corners);
     let mut polygon = Polygon::of(corners);
-    let is_cut = (0..3).all(|axis| polygon.cut(axis, larger.hi[axis], 1.0) && polygon.cut(axis, larger.lo[axis], -1.0));
-    let bounds = if is_cut { polygon.bounds() } else { Aabb::around(corners) };
+    let is_cut = (0..3).all(|axis| {
+        (whole.hi[axis] <= larger.hi[axis] || polygon.cut(axis, larger.hi[axis], 1.0))
+            && (whole.lo[axis] >= larger.lo[axis] || polygon.cut(axis, larger.lo[axis], -1.0))
+    });
+    let bounds = if is_cut { polygon.bounds() } else { whole };
     let part = widened(&bounds, margin).intersection(&bounds_of(corners, reach)).intersection(cell);
     // A polygon of no corners has a box from +∞ to −∞.
     (0..3).all(|i| part.lo[i] <= part.hi[i]).then_some(part)
