@@ -2,12 +2,13 @@
 
 #[path = "common/browser.rs"]
 mod browser;
+#[path = "common/pages.rs"]
+mod pages;
 
 use browser::Browser;
 use hedgerow::measure::experiments::points::{
     Batch, BraidedRays, Entry, Failure, Maker, Rebraid, Setting, Side, TopLevel, Update, UpdatedRays, Way, Work,
 };
-use hedgerow::measure::provenance::{DeviceFacts, Machine};
 use hedgerow::measure::statistics::Spread;
 use hedgerow::report::accel::{self, Points};
 use std::path::Path;
@@ -18,21 +19,8 @@ fn spread(median: f64) -> Spread {
 
 fn setting() -> Entry {
     Entry::Setting(Setting {
-        machine: Machine {
-            cpu: "AMD EPYC 9R14".into(),
-            cores: 2,
-            memory: Some(8 << 30),
-            system: "linux x86_64".into(),
-        },
-        device: DeviceFacts {
-            name: "llvmpipe (LLVM 19.1.7, 256 bits)".into(),
-            driver: "Mesa 26.1.6".into(),
-            kind: "CPU".into(),
-            vulkan: "1.4".into(),
-            subgroup: 8,
-            memory: 8 << 30,
-            copy_gb_s: Some(18.3),
-        },
+        machine: pages::machine(),
+        device: pages::device_facts(),
         commit: "abc1234".into(),
         when: "2026-11-21T10:00:00Z".into(),
         command: "hedgerow accel -o <folder>".into(),
@@ -148,13 +136,6 @@ fn page_of(folder: &Path, entries: &[Entry]) -> String {
     std::fs::read_to_string(accel::write(folder).expect("the page is written")).expect("just written")
 }
 
-/// What a reader sees of a page: its text without its markup.
-fn text(page: &str) -> String {
-    let body = &page[page.find("<body>").expect("a body")..];
-    let parts = body.split('<').map(|part| part.split_once('>').map_or(part, |(_, text)| text));
-    parts.collect::<String>().replace('\u{2009}', "")
-}
-
 #[test]
 fn records_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -175,7 +156,7 @@ fn records_are_read_back_as_they_were_written() {
 #[test]
 fn the_page_says_plainly_what_is_reached_and_what_is_not() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let text = text(&page_of(folder.path(), &entries()));
+    let text = pages::text(&page_of(folder.path(), &entries()), "");
     for words in [
         "Goals met: 4 of 5",
         "Ours is slower than the driver's batch: 1.25 times its time",
@@ -192,7 +173,7 @@ fn the_page_says_plainly_what_is_reached_and_what_is_not() {
 fn updates_that_were_not_measured_are_told_as_such() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let entries: Vec<Entry> = [setting()].into_iter().chain(updates(None)).collect();
-    let text = text(&page_of(folder.path(), &entries));
+    let text = pages::text(&page_of(folder.path(), &entries), "");
     assert!(text.contains("updates of ours were not measured") && !text.contains("NaN"), "{text}");
     assert!(folder.path().join("charts/accel-update-gen-twist-20000-8.svg").is_file());
 }
@@ -200,10 +181,10 @@ fn updates_that_were_not_measured_are_told_as_such() {
 #[test]
 fn few_points_and_none_make_a_page_all_the_same() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    assert!(text(&page_of(folder.path(), &[])).contains("Nothing that has a goal was measured"));
+    assert!(pages::text(&page_of(folder.path(), &[]), "").contains("Nothing that has a goal was measured"));
     for entry in entries() {
         let page = page_of(folder.path(), std::slice::from_ref(&entry));
-        assert!(!text(&page).contains("NaN"), "{entry:?}");
+        assert!(!pages::text(&page, "").contains("NaN"), "{entry:?}");
     }
 }
 

@@ -2,11 +2,12 @@
 
 #[path = "common/browser.rs"]
 mod browser;
+#[path = "common/pages.rs"]
+mod pages;
 
 use browser::Browser;
 use hedgerow::measure::animate::Way;
 use hedgerow::measure::animate::points::{Animated, Entry, Failure, Object, Rays, Setting};
-use hedgerow::measure::provenance::{DeviceFacts, Machine};
 use hedgerow::measure::record::Memory;
 use hedgerow::measure::statistics::Spread;
 use hedgerow::report::animate::{self, Points};
@@ -18,21 +19,8 @@ fn spread(median: f64) -> Spread {
 
 fn setting() -> Entry {
     Entry::Setting(Setting {
-        machine: Machine {
-            cpu: "AMD EPYC 9R14".into(),
-            cores: 2,
-            memory: Some(8 << 30),
-            system: "linux x86_64".into(),
-        },
-        device: Some(DeviceFacts {
-            name: "llvmpipe (LLVM 19.1.7, 256 bits)".into(),
-            driver: "Mesa 26.1.6".into(),
-            kind: "CPU".into(),
-            vulkan: "1.4".into(),
-            subgroup: 8,
-            memory: 8 << 30,
-            copy_gb_s: Some(18.3),
-        }),
+        machine: pages::machine(),
+        device: Some(pages::device_facts()),
         commit: "abc1234".into(),
         when: "2026-11-21T10:00:00Z".into(),
         command: "hedgerow animate atrium_run -o <folder>".into(),
@@ -105,13 +93,6 @@ fn page_of(folder: &Path, entries: &[Entry]) -> String {
     std::fs::read_to_string(animate::write(folder).expect("the page is written")).expect("just written")
 }
 
-/// What a reader sees of a page: its text without its markup.
-fn text(page: &str) -> String {
-    let body = &page[page.find("<body>").expect("a body")..];
-    let parts = body.split('<').map(|part| part.split_once('>').map_or(part, |(_, text)| text));
-    parts.collect::<String>().replace('\u{2009}', "")
-}
-
 #[test]
 fn records_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -137,7 +118,7 @@ fn records_are_read_back_as_they_were_written() {
 #[test]
 fn the_page_says_plainly_which_way_takes_least() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let text = text(&page_of(folder.path(), &entries()));
+    let text = pages::text(&page_of(folder.path(), &entries()), "");
     for words in [
         "66450 triangles stand still; 11876 move, in 2 objects, 1 of them changing shape.",
         "A frame takes least by merge: 83.0 ms in the mean",
@@ -153,10 +134,10 @@ fn the_page_says_plainly_which_way_takes_least() {
 #[test]
 fn few_records_and_none_make_a_page_all_the_same() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    assert!(text(&page_of(folder.path(), &[])).contains("Nothing was measured to its end"));
+    assert!(pages::text(&page_of(folder.path(), &[]), "").contains("Nothing was measured to its end"));
     for entry in entries().into_iter().take(4) {
         let page = page_of(folder.path(), std::slice::from_ref(&entry));
-        assert!(!text(&page).contains("NaN"), "{entry:?}");
+        assert!(!pages::text(&page, "").contains("NaN"), "{entry:?}");
     }
 }
 

@@ -2,13 +2,14 @@
 
 #[path = "common/browser.rs"]
 mod browser;
+#[path = "common/pages.rs"]
+mod pages;
 
 use browser::Browser;
 use hedgerow::measure::choose::hindsight::Choice;
 use hedgerow::measure::matrix::{Failure, Outcome};
-use hedgerow::measure::provenance::Machine;
 use hedgerow::measure::record::{Build, Memory, Phase, Quality, Record, SCHEMA, Trace};
-use hedgerow::report::{DeviceFacts, Picture, Report, kd_trees, results};
+use hedgerow::report::{Picture, Report, kd_trees, results};
 use std::path::{Path, PathBuf};
 
 /// Builders with how fast they build and trace, in Mtri/s and Mrays/s, and their SAH cost on a scene where it is 100.
@@ -112,21 +113,8 @@ fn report(folder: &Path) -> Report {
         }
     }
     Report {
-        machine: Machine {
-            cpu: "AMD EPYC 9R14".into(),
-            cores: 2,
-            memory: Some(8 << 30),
-            system: "linux x86_64".into(),
-        },
-        device: Some(DeviceFacts {
-            name: "llvmpipe (LLVM 19.1.7, 256 bits)".into(),
-            driver: "Mesa 26.1.6".into(),
-            kind: "CPU".into(),
-            vulkan: "1.4".into(),
-            subgroup: 8,
-            memory: 8 << 30,
-            copy_gb_s: Some(18.3),
-        }),
+        machine: pages::machine(),
+        device: Some(pages::device_facts()),
         commit: "abc1234".into(),
         when: "2026-11-21T10:00:00Z".into(),
         command: "hedgerow bench -b all".into(),

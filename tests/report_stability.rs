@@ -2,9 +2,10 @@
 
 #[path = "common/browser.rs"]
 mod browser;
+#[path = "common/pages.rs"]
+mod pages;
 
 use browser::Browser;
-use hedgerow::measure::provenance::{DeviceFacts, Machine};
 use hedgerow::measure::stability::far::Side;
 use hedgerow::measure::stability::large::Placement;
 use hedgerow::measure::stability::points::{Degenerate, Failure, Growth, Head, Large, Run};
@@ -18,21 +19,8 @@ const KINDS: [&str; 4] = ["primary", "diffuse1", "ao", "shadow"];
 fn run(command: &str) -> Run {
     Run {
         schema: 1,
-        machine: Machine {
-            cpu: "AMD EPYC 9R14".into(),
-            cores: 2,
-            memory: Some(8 << 30),
-            system: "linux x86_64".into(),
-        },
-        device: Some(DeviceFacts {
-            name: "llvmpipe (LLVM 19.1.7, 256 bits)".into(),
-            driver: "Mesa 26.1.6".into(),
-            kind: "CPU".into(),
-            vulkan: "1.4".into(),
-            subgroup: 8,
-            memory: 8 << 30,
-            copy_gb_s: Some(18.3),
-        }),
+        machine: pages::machine(),
+        device: Some(pages::device_facts()),
         commit: "abc1234".into(),
         when: "2026-11-21T10:00:00Z".into(),
         command: format!("hedgerow stability {command} -o <folder>"),
@@ -151,13 +139,6 @@ fn page_of<P: Paged>(folder: &Path, points: &[P]) -> String {
     std::fs::read_to_string(file.finish(&run(P::EXPERIMENT)).expect("the page is written")).expect("just written")
 }
 
-/// What a reader sees of a page: its text without its markup.
-fn text(page: &str) -> String {
-    let body = &page[page.find("<body>").expect("a body")..];
-    let parts = body.split('<').map(|part| part.split_once('>').map_or(part, |(_, text)| text));
-    parts.collect::<Vec<_>>().join(" ").replace('\u{2009}', "")
-}
-
 #[test]
 fn records_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -187,9 +168,9 @@ fn the_pages_say_where_a_tenth_is_lost_and_what_was_wrong() {
                data-value=\"1\">+1.0</td>";
     assert!(page.replace("lbvh ", "").contains(row), "{page}");
     for words in ["bunny, lbvh : 3 GiB of &lt;memory&gt;", "a note &amp; more", "in three axes to the negative side"] {
-        assert!(text(&page).contains(words), "{words}: {}", text(&page));
+        assert!(pages::text(&page, " ").contains(words), "{words}: {}", pages::text(&page, " "));
     }
-    let degenerate = text(&page_of(folder.path(), &degenerate()));
+    let degenerate = pages::text(&page_of(folder.path(), &degenerate()), " ");
     for words in ["4 of 6", "needles, lbvh:codes=mc30: the header: node 3 has two parents", "other bytes", "wrong hits"]
     {
         assert!(degenerate.contains(words), "{words}: {degenerate}");
@@ -200,18 +181,22 @@ fn the_pages_say_where_a_tenth_is_lost_and_what_was_wrong() {
 #[test]
 fn few_points_and_none_make_a_page_all_the_same() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    assert!(text(&page_of::<Growth>(folder.path(), &[])).contains("Nothing was measured"));
-    assert!(text(&page_of::<Large>(folder.path(), &[])).contains("Nothing was measured"));
-    assert!(text(&page_of::<Degenerate>(folder.path(), &[])).contains("Nothing was measured"));
+    assert!(pages::text(&page_of::<Growth>(folder.path(), &[]), " ").contains("Nothing was measured"));
+    assert!(pages::text(&page_of::<Large>(folder.path(), &[]), " ").contains("Nothing was measured"));
+    assert!(pages::text(&page_of::<Degenerate>(folder.path(), &[]), " ").contains("Nothing was measured"));
     let bare = Growth { relative_cost: None, relative_mrays: BTreeMap::new(), ..growth()[0].clone() };
     for page in [page_of(folder.path(), &[bare]), page_of(folder.path(), &large()[..1])] {
-        assert!(!text(&page).contains("NaN") && !text(&page).contains("inf"), "{}", text(&page));
+        assert!(
+            !pages::text(&page, " ").contains("NaN") && !pages::text(&page, " ").contains("inf"),
+            "{}",
+            pages::text(&page, " ")
+        );
     }
     // A run that was ended before its end.
     std::fs::remove_file(folder.path().join("large.run.json")).expect("just written");
     stability::write_all(folder.path()).expect("written");
     let page = std::fs::read_to_string(folder.path().join("large.html")).expect("written");
-    assert!(text(&page).contains("ended before its end"));
+    assert!(pages::text(&page, " ").contains("ended before its end"));
 }
 
 #[test]
