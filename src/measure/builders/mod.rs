@@ -294,6 +294,13 @@ mod tests {
     }
 
     #[test]
+    fn kd_trees_are_traced_with_a_short_stack_on_the_device() {
+        let traversal = |text: &str| text.parse::<Spec>().expect("known").traversal().expect("one");
+        assert_eq!(["kd-gpu", "kd-binned:trace=device"].map(traversal), [Traversal::short_stack(4); 2]);
+        assert_eq!(["kd-binned", "kd-gpu:traversal=stack"].map(traversal), [Traversal::STACK; 2]);
+    }
+
+    #[test]
     fn what_is_wrong_is_named_with_what_there_is() {
         assert!(error_of("lvbh").contains("no builder is called \"lvbh\"; there are"));
         assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));

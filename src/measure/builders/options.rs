@@ -63,7 +63,7 @@ pub(super) const KI: BuilderOption =
 
 pub(super) const TRAVERSAL: BuilderOption = BuilderOption {
     key: "traversal",
-    values: "stack, restart, push-down, short-N or short-N-push-down, N being how much a short stack holds; stack unless given",
+    values: "stack, restart, push-down, short-N or short-N-push-down, N being how much a short stack holds; unless given stack on the host and short-4 on the device",
 };
 
 pub(super) const TRACE: BuilderOption =
@@ -173,10 +173,15 @@ impl Spec {
         if radius > 0 { Ok(radius as usize) } else { Err(self.wrong_value(&RADIUS, "0")) }
     }
 
-    /// Option `traversal`.
+    /// Option `traversal`; where it was not given, what is fastest where rays are traced (docs/kdtree.md).
     pub(super) fn traversal(&self) -> Result<Traversal> {
-        let Some(value) = self.option(TRAVERSAL.key) else { return Ok(Traversal::STACK) };
-        value.parse().map_err(|()| self.wrong_value(&TRAVERSAL, value))
+        match self.option(TRAVERSAL.key) {
+            Some(value) => value.parse().map_err(|()| self.wrong_value(&TRAVERSAL, value)),
+            None if matches!(self.builder().kind, Kind::KdGpu) || self.traces_on_device()? => {
+                Ok(Traversal::short_stack(4))
+            }
+            None => Ok(Traversal::STACK),
+        }
     }
 
     /// Option `trace`.
