@@ -65,7 +65,8 @@ pub fn bars(caption: Caption, what: &Bars<'_>) -> Result<Option<Chart>> {
             chart.draw_series([Rectangle::new(corners, bar.tone.light.filled())])?;
             let whisker = |value: f64, half: f64| vec![(value, centre - half), (value, centre + half)];
             let ink = INK.light.stroke_width(1);
-            if min < max {
+            // Less than a pixel has no length that could be drawn.
+            if chart.backend_coord(&(min, centre)) != chart.backend_coord(&(max, centre)) {
                 chart.draw_series([PathElement::new(vec![(min, centre), (max, centre)], ink)])?;
             }
             for end in [min, max] {

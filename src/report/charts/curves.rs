@@ -153,7 +153,8 @@ where
         let height = line[line.len() - 1].1;
         chart.draw_series([PathElement::new(line, tone.light.stroke_width(2))])?;
         for &(x, Spread { median, min, max, runs }) in points {
-            if min < max {
+            // Less than a pixel has no length that could be drawn.
+            if chart.backend_coord(&(x, min)) != chart.backend_coord(&(x, max)) {
                 chart.draw_series([PathElement::new(vec![(x, min), (x, max)], INK.light.stroke_width(1))])?;
             }
             chart.draw_series([Circle::new((x, median), 4, tone.light.filled())])?;
