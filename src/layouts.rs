@@ -58,6 +58,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "accel" if is("rebraid") => accel::push_constants::rebraid(),
         "accel" if is("ranges") => accel::push_constants::ranges(),
         "accel" if is("serialize") => accel::push_constants::serialize(),
+        "kdtree" if is("merge_seed") => crate::kdtree::merge::push::push_constants(),
         "kdtree" if is("merge_setup") || is("merge_restore") => crate::kdtree::merge::push_constants(),
         "kdtree" if is("build") || is("merge") => crate::kdtree::builder::push_constants(),
         "bvh" if is("compact") => bvh::compact::push_constants(),

@@ -19,6 +19,7 @@ const PLENTY: Options = Options {
     build: builder::Options::DEFAULT,
     estimate: Estimate {
         pairs: 60.0,
+        items: 20.0,
         marked: 40.0,
         build: builder::Estimate {
             level_references: 200.0,
@@ -113,7 +114,7 @@ impl Scene {
             let indices = upload("indices", bytemuck::cast_slice(&mesh.2));
             let count = mesh.2.len() as u32;
             let input = Input::mesh(vertices.address(), mesh.1.len() as u32, indices.address(), count);
-            meshes.push((first_primitive, mesh, Object { input, first_primitive }));
+            meshes.push((first_primitive, mesh, Object { input, first_primitive, tree: None }));
             first_primitive += count;
             buffers.extend([vertices, indices]);
         }
@@ -141,6 +142,29 @@ impl Scene {
 
     fn objects(&self, which: impl Fn(usize) -> bool) -> Vec<Object> {
         (0..self.meshes.len()).filter(|&i| which(i)).map(|i| self.meshes[i].2).collect()
+    }
+
+    /// Kd-trees of the objects, built on the device.
+    fn trees(&self) -> Vec<Buffer<'static>> {
+        let tree = |(_, _, object): &(u32, Mesh, Object)| {
+            let builder =
+                Builder::new(device(), &builder::Options::DEFAULT, object.input.primitive_count).expect("a builder");
+            let sizes = builder.sizes();
+            let [structure, scratch] =
+                [sizes.structure, sizes.scratch].map(|bytes| device().buffer("tree", bytes).expect("memory"));
+            device()
+                .run(None, |recorder| builder.record(recorder, &object.input, structure.region(), scratch.region()))
+                .expect("a build");
+            structure
+        };
+        self.meshes.iter().map(tree).collect()
+    }
+
+    /// All objects, of which those of these numbers are pushed as trees.
+    fn pushed(&self, trees: &[Buffer<'_>], which: impl Fn(usize) -> bool) -> Vec<Object> {
+        let pushed =
+            |(i, tree): (usize, &Buffer<'_>)| Object { tree: which(i).then(|| tree.address()), ..self.meshes[i].2 };
+        trees.iter().enumerate().map(pushed).collect()
     }
 
     fn on_host(&self, which: impl Fn(usize) -> bool) -> KdTree {
@@ -190,6 +214,67 @@ fn a_merge_gives_the_bytes_of_the_host_and_a_restore_those_of_the_static_tree() 
         let counted = 128 + 8 * header.node_count as usize;
         assert!(raw[..counted] == scene.still.to_bytes()[..counted], "{}: raw bytes", world.name);
     }
+}
+
+#[test]
+fn objects_that_are_pushed_as_trees_give_the_same_bytes_as_those_that_find_their_leaves() {
+    // Squares in planes that static ones lie in too, and edges whose ends no difference tells.
+    let squares = |at: f32, count: i32| {
+        let square = |i: i32| {
+            let [x, y] = [i % count, i / count].map(|k| at + 0.25 * k as f32);
+            [[[x, y, at], [x + 0.25, y, at], [x, y + 0.25, at]], [[at, x, y], [at, x, y + 0.25], [at, x + 0.25, y]]]
+        };
+        (0..count * count).flat_map(square).collect::<Corners>()
+    };
+    let more = [
+        World {
+            name: "in planes",
+            still: squares(0.0, 8),
+            objects: vec![squares(0.0, 3), squares(0.5, 4), squares(0.375, 4)],
+        },
+        World {
+            name: "too long",
+            still: soup(50, 0.2, 10),
+            objects: vec![
+                placed(&soup(20, 1.0, 11), 1.5e38, [0.0; 3]),
+                soup(50, 0.2, 12),
+                placed(&soup(20, 1.0, 13), 1e30, [0.0; 3]),
+            ],
+        },
+    ];
+    for world in worlds().into_iter().chain(more) {
+        let scene = Scene::new(&world, &PLENTY);
+        let before = scene.tree().to_bytes();
+        let expected = scene.on_host(|_| true);
+        let trees = scene.trees();
+        for which in [0b000u32, 0b111, 0b010, 0b101] {
+            let what = format!("{}, pushed {which:03b}", world.name);
+            let report = scene.merge(&scene.pushed(&trees, |i| which >> i & 1 == 1));
+            assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{what}: {report:?}");
+            assert_same(&scene.tree(), &expected, &what);
+            scene.restore();
+            assert!(scene.tree().to_bytes() == before, "{what}: the static tree is another");
+        }
+    }
+}
+
+/// The object's tree in the same command buffer, ahead of the merge.
+#[test]
+fn a_tree_can_be_built_and_pushed_at_once() {
+    let world = &worlds()[0];
+    let scene = Scene::new(world, &PLENTY);
+    let object = scene.meshes[0].2;
+    let builder = Builder::new(device(), &builder::Options::DEFAULT, object.input.primitive_count).expect("a builder");
+    let sizes = builder.sizes();
+    let [tree, scratch] = [sizes.structure, sizes.scratch].map(|bytes| device().buffer("tree", bytes).expect("memory"));
+    device()
+        .run(None, |recorder| {
+            builder.record(recorder, &object.input, tree.region(), scratch.region())?;
+            recorder.barrier();
+            scene.merger.record(recorder, scene.memory(), &[Object { tree: Some(tree.address()), ..object }])
+        })
+        .expect("a build and a merge");
+    assert_same(&scene.tree(), &scene.on_host(|_| true), "built and pushed");
 }
 
 #[test]
@@ -295,12 +380,15 @@ fn what_the_device_builds_can_be_merged_into() {
 fn what_is_out_of_room_is_told() {
     let world = &worlds()[0];
     let enough = Scene::new(world, &PLENTY);
-    let report = enough.merge(&enough.objects(|_| true));
+    let trees = enough.trees();
+    // Trees are of the triangles, wherever these lie.
+    let report = enough.merge(&enough.pushed(&trees, |_| true));
     let expected = enough.on_host(|_| true);
     let triangles = world.objects[0].len() as u32;
     let exact = report.estimate(triangles);
-    let fields: [fn(&mut Estimate) -> &mut f32; 8] = [
+    let fields: [fn(&mut Estimate) -> &mut f32; 9] = [
         |e| &mut e.pairs,
+        |e| &mut e.items,
         |e| &mut e.marked,
         |e| &mut e.build.level_references,
         |e| &mut e.build.level_nodes,
@@ -317,7 +405,7 @@ fn what_is_out_of_room_is_told() {
                 let what = format!("field {number} × {factor}, attempt {attempt}");
                 let scene = Scene::new(world, &options);
                 let before = scene.tree().to_bytes();
-                let report = scene.merge(&scene.objects(|_| true));
+                let report = scene.merge(&scene.pushed(&trees, |_| true));
                 let tree = scene.tree();
                 tree.validate().unwrap_or_else(|error| panic!("{what}: {error}"));
                 assert_eq!(tree.header.status, report.status, "{what}");
@@ -347,6 +435,7 @@ fn what_cannot_be_merged_is_refused_by_name() {
     let [a, b, _] = scene.objects(|_| true)[..] else { panic!("three objects") };
     assert!(error_of(&[a, b, a, b]).contains("4 objects of"));
     assert!(error_of(&[a, a]).contains("number them apart"));
+    assert!(error_of(&[Object { tree: Some(8), ..a }]).contains("a multiple of 16"));
     assert!(error_of(&[Object { first_primitive: 3, ..a }]).contains("those before end at 500"));
     let small = Header { node_room: 5, ..scene.still.header };
     let error = Merger::new(device(), &PLENTY, &small, Most { objects: 1, triangles: 100 }).expect_err("too small");

@@ -53,14 +53,20 @@ fn patch(all: &Corners) -> Corners {
     near.iter().map(|t| t.map(|p| [p[0] + by, p[1] + 0.7 * by, p[2] - 0.4 * by])).collect()
 }
 
+/// The scenes that merging is measured in.
+fn scenes(names: &[&'static str]) -> impl Iterator<Item = (&'static str, Corners)> {
+    let folders = std::env::var_os("HEDGEROW_SCENES").into_iter().map(Into::into).collect();
+    let loading = LoadOptions { folders, progress: None };
+    names.iter().map(move |name| {
+        let mesh = load(name, &loading).expect(name).mesh;
+        (*name, mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect())
+    })
+}
+
 #[test]
 #[ignore = "prints what merging costs, in minutes, over scenes that are not in the repository"]
 fn merging_beside_building_on_the_device() {
-    let folders = std::env::var_os("HEDGEROW_SCENES").into_iter().map(Into::into).collect();
-    let loading = LoadOptions { folders, progress: None };
-    for name in ["bunny", "sponza", "armadillo"] {
-        let mesh = load(name, &loading).expect(name).mesh;
-        let corners: Corners = mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect();
+    for (name, corners) in scenes(&["bunny", "sponza", "armadillo"]) {
         let still = corpus::soup(name, corners.clone());
         let moves = corpus::soup("object", patch(&corners));
         let both = corpus::soup("both", corners.iter().copied().chain(patch(&corners)).collect());
@@ -81,7 +87,7 @@ fn merging_beside_building_on_the_device() {
         let memory = Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
         let ((still_input, _a), (input, _b), (both_input, _c)) = (input_of(&still), input_of(&moves), input_of(&both));
         timed(|recorder| still_builder.record(recorder, &still_input, structure.region(), building.region()));
-        let object = Object { input, first_primitive: count };
+        let object = Object { input, first_primitive: count, tree: None };
         let (mut builds, mut merges, mut restores) = (Vec::new(), Vec::new(), Vec::new());
         let mut by_phase = BTreeMap::<&str, f64>::new();
         for round in 0..=ROUNDS {
@@ -113,5 +119,69 @@ fn merging_beside_building_on_the_device() {
             median(restores)
         );
         println!("  merge by phase, ms: {by_phase:.2?}");
+    }
+}
+
+/// Merges by both ways with as much room as each needs, in turn.
+#[test]
+#[ignore = "prints what pushing trees costs beside finding leaves, over scenes that are not in the repository"]
+fn pushing_beside_finding() {
+    for (name, corners) in scenes(&["bunny", "sponza"]) {
+        let still = corpus::soup(name, corners.clone());
+        let moves = corpus::soup("object", patch(&corners));
+        let (count, triangles) = (still.2.len() as u32, moves.2.len() as u32);
+        let most = Most { objects: 1, triangles };
+        let buffer = |bytes: u64| device().buffer("memory", bytes).expect("memory");
+        let ((still_input, _a), (input, _b)) = (input_of(&still), input_of(&moves));
+        let builder = Builder::new(device(), &builder::Options::DEFAULT, triangles).expect("a builder");
+        let (tree, building) = (buffer(builder.sizes().structure), buffer(builder.sizes().scratch));
+        let record_tree = || timed(|r| builder.record(r, &input, tree.region(), building.region()));
+        record_tree();
+        let place = |object: &Object, options: &Options| {
+            let build = builder::Options { more: Merger::room(options, most), ..options.build };
+            let still_builder = Builder::new(device(), &build, count).expect("a builder");
+            let header = hedgerow::kdtree::layout::Header { primitive_count: count, ..still_builder.header() };
+            let merger = Merger::new(device(), options, &header, most).expect("a merger");
+            let structure = buffer(still_builder.sizes().structure);
+            let (scratch, undo) = (buffer(merger.sizes().scratch), buffer(merger.sizes().undo));
+            let building = buffer(still_builder.sizes().scratch);
+            timed(|recorder| still_builder.record(recorder, &still_input, structure.region(), building.region()));
+            (*object, merger, structure, scratch, undo)
+        };
+        let ways = [None, Some(tree.address())].map(|tree| {
+            let object = Object { input, first_primitive: count, tree };
+            let mut options = Options::DEFAULT;
+            loop {
+                let place = place(&object, &options);
+                let (object, merger, structure, scratch, undo) = &place;
+                let memory = Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+                timed(|r| merger.record(r, memory, &[*object]));
+                let report: Report = scratch.read_at(merger.report_range().start, 1)[0];
+                timed(|r| merger.restore(r, memory));
+                options.estimate = report.estimate(triangles);
+                if report.status & status::OUT_OF_ROOM == 0 {
+                    println!("{name}: {report:?}");
+                    break place;
+                }
+            }
+        });
+        let mut merges = [Vec::new(), Vec::new()];
+        let mut by_phase = [BTreeMap::<&str, f64>::new(), BTreeMap::new()];
+        let mut builds = Vec::new();
+        for _ in 0..ROUNDS {
+            builds.push(total(&record_tree()));
+            for (i, (object, merger, structure, scratch, undo)) in ways.iter().enumerate() {
+                let memory = Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+                let merged = timed(|r| merger.record(r, memory, &[*object]));
+                timed(|r| merger.restore(r, memory));
+                merges[i].push(total(&merged));
+                merged.iter().for_each(|p| *by_phase[i].entry(p.name).or_default() += p.milliseconds / ROUNDS as f64);
+            }
+        }
+        let [find, push] = merges;
+        let ratio = |a: &[f64], b: &[f64]| median(a.iter().zip(b).map(|(a, b)| a / b).collect());
+        println!("  push / find {:.3}, the object's tree / find {:.3}", ratio(&push, &find), ratio(&builds, &find));
+        println!("  medians, ms: find {:.2}, push {:.2}, tree {:.2}", median(find), median(push), median(builds));
+        println!("  by phase, ms: {by_phase:.2?}");
     }
 }

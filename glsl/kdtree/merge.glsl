@@ -1,10 +1,14 @@
 // Merging on the device (Papay 2025, section 10.3): triangles of objects find the leaves of the static tree that they are in, and
-// each such *marked* leaf is built anew, as a task of the first level of a build. src/kdtree/merge.rs records the phases,
-// src/kdtree/host/marked.rs is the twin, bit for bit.
+// each such *marked* leaf is built anew, as a task of the first level of a build. An object that has a tree of its own is pushed down
+// the static one as a tree, many triangles at once. src/kdtree/merge/mod.rs records the phases, src/kdtree/host/marked.rs is the
+// twin, bit for bit, of both ways.
 //
 //     setup    keeps the static tree's header                                            merge_setup.comp, merge_reset.comp
 //     encode   records of all objects behind those that there are: kdtree/encode.glsl     and merge_plan.comp between
-//     find     pairs of leaf and triangle, in any order; sorted by leaf, then triangle    merge_find.comp, gpu/radix_sort
+//     push     leaves of objects' trees in leaves of the static one, and pairs of         merge_seed.comp, merge_push.comp,
+//              leaf and triangle there, in any order                                      merge_meet.comp
+//     find     pairs of objects without trees; all are sorted by leaf, then triangle      merge_find.comp, gpu/radix_sort
+//     unique   pushed pairs are left once                                                 merge_unique.comp
 //     mark     a task for each leaf                                                       merge_mark.comp
 //     gather   its references                                                             merge_gather.comp
 //     ...      the levels and subtrees, as in a build, behind what there is
@@ -35,6 +39,88 @@ Box merged_cell() {
     return Box(min(header.lo, lo), max(header.hi, hi));
 }
 
+// A node of the static tree, or an empty leaf, on the way down.
+struct Place {
+    Box cell;
+    uint id;
+    uint node;                      // NONE of an empty leaf
+    uint depth;
+};
+
+// A node of an object's tree and how far down the static one it is.
+struct KdItem {
+    Place place;
+    uvec2 tree;
+    uint first_record;              // of the object, among those of objects
+    uint node;
+    Box cell;                       // of that node
+};
+
+const uint ITEM_BYTES = 76;
+
+BUFFER KdItems { KdItem item[]; };
+
+KdItems items_of(uint step) {
+    KdMerge merge = merge_state();
+    return KdItems(address_of(merge.items, (step & 1u) * merge.item_capacity, ITEM_BYTES));
+}
+
+// Leaves of objects' trees in leaves of the static one.
+KdItems met_items() {
+    KdMerge merge = merge_state();
+    return KdItems(address_of(merge.items, 2u * merge.item_capacity, ITEM_BYTES));
+}
+
+// Of so many items those that there was room for; one invocation keeps what was wanted.
+uint take_items(uint wanted) {
+    KdMerge merge = merge_state();
+    if (gl_GlobalInvocationID.x == 0u) {
+        merge.wanted_items = max(merge.wanted_items, wanted);
+        if (wanted > merge.item_capacity) {
+            if (merge.items_ended == 0u) merge.items_ended = level;
+            merge.status = STATUS_OUT_OF_ROOM;
+        }
+    }
+    return min(wanted, merge.item_capacity);
+}
+
+Place root_place() {
+    uint nodes = KdStructure(structure_address).header.node_count;
+    return Place(merged_cell(), ROOT_ID, nodes > 0u ? 0u : NONE, 0u);
+}
+
+KdNode node_of(Place place) {
+    KdNode node = KdNode(0u, KD_LEAF);
+    if (place.node != NONE) node = KdStructure(structure_address).nodes[place.node];
+    return node;
+}
+
+// The nodes of both children of an inner node; NONE of one that is empty.
+uvec2 children_of(KdNode node) {
+    bool left_is_empty = (node.second & 4u) != 0u, right_is_empty = (node.second & 8u) != 0u;
+    uint child = node.second >> 4;
+    return uvec2(left_is_empty ? NONE : child, right_is_empty ? NONE : child + (left_is_empty ? 0u : 1u));
+}
+
+// The places below one that is split.
+void places_below(Place place, KdNode node, out Place left, out Place right) {
+    left = place;
+    right = place;
+    half_cells(place.cell, node.second & 3u, uintBitsToFloat(node.first), left.cell, right.cell);
+    uvec2 children = children_of(node);
+    left.id = id_of(place.node, 0u);
+    right.id = id_of(place.node, 1u);
+    left.node = children.x;
+    right.node = children.y;
+    left.depth = place.depth + 1u;
+    right.depth = place.depth + 1u;
+}
+
+// Of a tile, among the records of objects; none has any where there is no room for all.
+uint first_record_of(uint tile) {
+    return min(chunk_sides().side[tile].x, build_state().active_count);
+}
+
 // Keys of pairs: the leaf, and below it the record among those of objects.
 void write_key(uint i, uint id, uint record) {
     KdMerge merge = merge_state();
@@ -46,6 +132,22 @@ void write_key(uint i, uint id, uint record) {
         keys.word[2u * i] = low;
         keys.word[2u * i + 1u] = merge.record_bits == 0u ? 0u : id >> 32u - merge.record_bits;
     }
+}
+
+// Leaf and record `j` of objects.
+void add_pair(Place leaf, uint j) {
+    KdMerge merge = merge_state();
+    uint at = atomicAdd(merge.wanted_pairs, 1u);
+    if (at >= merge.pair_capacity) return;
+    KdPairs(merge.pairs).pair[at] = KdPair(leaf.cell.lo, leaf.node, leaf.cell.hi, leaf.depth);
+    write_key(at, leaf.id, j);
+    Words(merge.values).word[at] = at;
+}
+
+// Pairs that count.
+uint pair_count() {
+    KdMerge merge = merge_state();
+    return min(merge.wanted_pairs, merge.pair_capacity) - merge.equal_pairs;
 }
 
 uint id_of_key(uint i) {

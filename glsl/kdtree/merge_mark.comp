@@ -94,7 +94,7 @@ void main() {
     KdState state = build_state();
     KdMerge merge = merge_state();
     KdStructure structure = KdStructure(structure_address);
-    uint pairs = min(merge.wanted_pairs, merge.pair_capacity);
+    uint pairs = pair_count();
     uint wanted_marked = mark(pairs), marked = min(wanted_marked, merge.marked_capacity);
     next_step();
     Wanted wanted = describe(marked, pairs);

@@ -12,14 +12,23 @@ void main() {
     merge.sorted_keys = sorted_keys;
     merge.sorted_values = sorted_values;
     merge.marked = marked;
+    merge.seeds = seeds;
+    merge.items = items;
     merge.pair_capacity = pair_capacity;
     merge.marked_capacity = marked_capacity;
     merge.record_bits = record_bits;
     merge.key_words = key_words;
     merge.tiles = tiles;
     merge.primitive_end = primitive_end;
+    merge.seed_count = seed_count;
+    merge.item_capacity = item_capacity;
     merge.status = 0u;
     merge.wanted_pairs = 0u;
+    merge.equal_pairs = 0u;
+    merge.met_count = 0u;
+    merge.wanted_items = 0u;
+    merge.items_ended = 0u;
+    for (uint i = 0; i < 3u; ++i) merge.item_count[i] = 0u;
     KdUndo(undo).header = KdStructure(structure_address).header;
     KdUndo(undo).count = 0u;
 }

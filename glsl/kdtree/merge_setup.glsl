@@ -13,11 +13,15 @@ layout(push_constant, scalar) uniform Setup {
     uvec2 sorted_keys;
     uvec2 sorted_values;
     uvec2 marked;
+    uvec2 seeds;
+    uvec2 items;
     uint pair_capacity;
     uint marked_capacity;
     uint record_bits;
     uint key_words;
     uint tiles;
     uint primitive_end;
+    uint seed_count;
+    uint item_capacity;
 };
 #endif

@@ -12,6 +12,12 @@ struct KdPair {
     uint depth;
 };
 
+// Where an object's own tree begins its way down the static one.
+struct KdSeed {
+    uvec2 tree;
+    uint first_tile;                // of the object
+};
+
 // A leaf of the static tree that triangles of objects are in.
 struct KdMarked {
     uint id;
@@ -32,6 +38,7 @@ struct KdUndone {
     KdNode node;
 };
 
+BUFFER KdSeeds { KdSeed seed[]; };
 BUFFER KdPairs { KdPair pair[]; };
 BUFFER KdMarkedLeaves { KdMarked leaf[]; };
 BUFFER KdUndo {
@@ -53,6 +60,8 @@ BUFFER KdMerge {
     uint subtree_references;
     uint subtrees;
     uint ended;
+    uint wanted_items;              // of the step that has most, or leaves in leaves
+    uint items_ended;               // the step that found no room for all, and 1 more; otherwise 0
     uvec2 undo;
     uvec2 pairs;
     uvec2 keys;
@@ -60,12 +69,19 @@ BUFFER KdMerge {
     uvec2 sorted_keys;
     uvec2 sorted_values;
     uvec2 marked;
+    uvec2 seeds;
+    uvec2 items;
     uint pair_capacity;
     uint marked_capacity;
     uint record_bits;               // of a key, below those of the leaf
     uint key_words;
     uint tiles;                     // of all objects
     uint primitive_end;
+    uint seed_count;
+    uint item_capacity;             // of a step
+    uint item_count[3];             // of a step, of the next, and of the one after, in turn
+    uint met_count;                 // leaves of objects' trees in leaves of the static one
+    uint equal_pairs;               // of those that there is room for: what is left out, as it is there once
     uint marked_count;
     uint marked_empty;              // of them, those that get a pair
     uint marked_root;               // 1 if the tree holds nothing

@@ -21,8 +21,11 @@ impl Options {
 /// How much a merge has, of each triangle of objects, and of 64 more. [`Report::estimate`] makes one that suffices.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Leaves of the static tree that it is in.
+    /// Leaves of the static tree that it is in; where its object has a tree, once for each leaf of that one there.
     pub pairs: f32,
+    /// Nodes of objects' trees on their way down the static one, in the step that has most, or leaves of them in its leaves; 0 where
+    /// no object has a tree.
+    pub items: f32,
     /// Leaves of the static tree that any is in.
     pub marked: f32,
     /// As a build has them, with what was in those leaves before.
@@ -33,6 +36,7 @@ impl Estimate {
     /// For objects of which nothing is known.
     pub const DEFAULT: Estimate = Estimate {
         pairs: 8.0,
+        items: 4.0,
         marked: 4.0,
         build: builder::Estimate {
             level_references: 24.0,
@@ -51,7 +55,7 @@ impl Estimate {
 pub struct Report {
     /// Bits of [`crate::bvh::layout::status`].
     pub status: u32,
-    /// Pairs of a static leaf and a triangle.
+    /// Pairs of a static leaf and a triangle; of objects with trees, before those are left out that are there twice.
     pub pairs: u32,
     /// Static leaves.
     pub marked: u32,
@@ -71,6 +75,10 @@ pub struct Report {
     pub subtrees: u32,
     /// As [`builder::Report`] has it.
     pub ended: u32,
+    /// Nodes of objects' trees on their way, in the step that has most, or leaves of them in static leaves.
+    pub items: u32,
+    /// The step that found no room for all of them, and 1 more, or 0. What there would have been below is not known.
+    pub items_ended: u32,
 }
 
 impl Report {
@@ -80,8 +88,10 @@ impl Report {
         let of = |count: u32, more: f64| (f64::from(count) * more / f64::from(triangles.saturating_add(64))) as f32;
         let exactly = |count: u32| of(count, 1.0) * (1.0 + f32::EPSILON);
         let each = |count: u32| if is_known { exactly(count) } else { of(count.max(self.pairs), 2.0) };
+        let pushed = |count: u32| if self.items_ended == 0 { exactly(count) } else { of(count.max(triangles), 2.0) };
         Estimate {
-            pairs: exactly(self.pairs),
+            pairs: pushed(self.pairs),
+            items: pushed(self.items),
             marked: each(self.marked),
             build: builder::Estimate {
                 level_references: each(self.level_references),

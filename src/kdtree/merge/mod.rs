@@ -5,12 +5,16 @@
 //! builder ([`super::builder`]), and put where the leaves were; all else stays where it is. [`Merger::restore`] writes back what was
 //! overwritten. So objects come and go by a restore and a merge of those that are then to be there; [`Objects`] keeps the list.
 //!
+//! There are two ways to those leaves, and the merged tree is the same by both. Triangles find them each by itself; or an object has a
+//! kd-tree of its own ([`Object::tree`]), and that is pushed down the static one, many triangles at once.
+//!
 //! The structure needs room: [`Merger::room`] tells how much, [`KdTree::with_room`](super::layout::KdTree::with_room) or
 //! [`builder::Options::more`](super::builder::Options::more) make it. [`super::host::marked`] is the twin, `glsl/kdtree/merge.glsl`
 //! the device's side.
 
 mod estimate;
 mod objects;
+pub(crate) mod push;
 
 pub use estimate::{Estimate, Options, Report};
 pub use objects::{Object, Objects};
@@ -76,6 +80,7 @@ pub struct Merger {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Plan {
     pairs: u32,
+    items: u32,
     marked: u32,
     level_nodes: u32,
     subtree_nodes: u32,
@@ -95,12 +100,16 @@ push_constants! {
         sorted_keys: u64,
         sorted_values: u64,
         marked: u64,
+        seeds: u64,
+        items: u64,
         pair_capacity: u32,
         marked_capacity: u32,
         record_bits: u32,
         key_words: u32,
         tiles: u32,
         primitive_end: u32,
+        seed_count: u32,
+        item_capacity: u32,
     }
 }
 
@@ -121,6 +130,7 @@ impl Plan {
         let marked = of(estimate.marked);
         Plan {
             pairs: of(estimate.pairs),
+            items: of(estimate.items),
             marked,
             // Roots, and pairs of empty leaves and their siblings.
             level_nodes: of(estimate.build.level_nodes).saturating_add(marked.saturating_mul(3)),
@@ -205,7 +215,7 @@ impl Merger {
     }
 
     fn places(&self, scratch: u64) -> Places {
-        let Plan { pairs, marked, .. } = self.plan;
+        let Plan { pairs, items, marked, .. } = self.plan;
         let mut at = scratch + self.shape.scratch(&self.options.build, &self.room);
         let mut take = |bytes: u64| {
             let begin = at;
@@ -216,6 +226,8 @@ impl Merger {
         Places {
             pairs: take(PAIR_BYTES * u64::from(pairs)),
             marked: take(MARKED_BYTES * u64::from(marked)),
+            seeds: take(push::SEED_BYTES * u64::from(self.most.objects)),
+            items: take(push::ITEM_BYTES * u64::from(items)),
             keys: [take(keys), take(keys)],
             values: [take(keys / 2), take(keys / 2)],
             table: take(4 * self.sort.most_table_words(pairs)),
@@ -227,8 +239,9 @@ impl Merger {
     ///
     /// The caller makes the inputs and the structure visible to compute shaders before, and places a barrier (compute shader write to
     /// whatever reads the structure or the report, writes the scratch memory or restores) behind. Where there is no room for the
-    /// pairs, the leaves or their references, nothing is merged; where there is none for the levels below, nodes are leaves; the
-    /// status says so in both cases. Labels: `encode`, `find`, `sort`, `mark`; those of the builder's levels; `place`, `hook`.
+    /// items, the pairs, the leaves or their references, nothing is merged; where there is none for the levels below, nodes are leaves;
+    /// the status says so in both cases. Labels: `encode`; `push` where an object has a tree, `find` where one has none; `sort`;
+    /// `unique` where one has a tree; `mark`; those of the builder's levels; `place`, `hook`.
     ///
     /// # Errors
     /// The memory is too small; more objects or triangles than the merger is for; several geometries in one; primitives that are numbered twice; a pipeline
@@ -282,6 +295,11 @@ impl Merger {
             if !matches!(object.input.source, Source::One(_)) {
                 return Err(Error::Argument("an object is one geometry; make several objects of several".into()));
             }
+            if let Some(tree) = object.tree.filter(|tree| *tree == 0 || tree % 16 != 0) {
+                return Err(Error::Argument(format!(
+                    "an object's tree is at address {tree:#x}; it must be a multiple of 16 and not 0"
+                )));
+            }
             let first = u64::from(object.first_primitive);
             let next = first + u64::from(object.input.primitive_count);
             if first < end || next > u64::from(u32::MAX) {
@@ -295,7 +313,7 @@ impl Merger {
     }
 
     fn steps(&self, [structure, scratch, undo]: [u64; 3], objects: &[Object]) -> Vec<Step> {
-        let Places { pairs, marked, keys, values, table, .. } = self.places(scratch);
+        let Places { pairs, marked, seeds, items, keys, values, table, .. } = self.places(scratch);
         let triangles: u32 = objects.iter().map(|object| object.input.primitive_count).sum();
         let bits_of = |most: u32| 32 - most.leading_zeros();
         // Leaves are numbered by parent and side from 1 on, and no key is that of a place without a pair.
@@ -306,6 +324,7 @@ impl Merger {
         let sorting = radix_sort::steps(&self.sort, &Buffers { keys, values, table }, &sort);
         let sorted = sorting.len() / radix_sort::STEPS_OF_A_PASS % 2;
         let key_words = if bits > 32 { 2 } else { 1 };
+        let has_tree = |object: &Object| object.tree.is_some();
         let tiles = |object: &Object| object.input.primitive_count.div_ceil(self.shape.chunk());
         let primitive_end = objects.last().map_or(0, |last| last.first_primitive + last.input.primitive_count);
         let setup = Setup {
@@ -318,15 +337,20 @@ impl Merger {
             sorted_keys: keys[sorted],
             sorted_values: values[sorted],
             marked,
+            seeds,
+            items,
             pair_capacity,
             marked_capacity: self.plan.marked,
             record_bits,
             key_words,
             tiles: objects.iter().map(tiles).sum(),
             primitive_end,
+            seed_count: objects.iter().filter(|object| has_tree(object)).count() as u32,
+            item_capacity: self.plan.items,
         };
         let groups = self.shape.groups;
-        let none = Object { input: Input::mesh(0, 0, 0, 0), first_primitive: 0 };
+        let counted = |primitives| Object { input: Input::mesh(0, 0, 0, primitives), first_primitive: 0, tree: None };
+        let none = counted(0);
         let step_of = |object: &Object, first_tile, phase, shader: &'static Shader, level, groups| {
             let kernel = self.shape.kernel(shader, &self.options.build, &object.input);
             let mut arguments = Arguments::new(&self.options.build, &self.room, &object.input, structure, scratch);
@@ -338,8 +362,8 @@ impl Merger {
             Step::new(phase, kernel, &arguments, groups)
         };
         let step = |phase, shader: &'static Shader, level, groups| step_of(&none, 0, phase, shader, level, groups);
+        let first_tile = |i: usize| objects[..i].iter().map(tiles).sum::<u32>();
         let of_objects = |shader: &'static Shader| {
-            let first_tile = |i: usize| objects[..i].iter().map(tiles).sum();
             let of = |(i, object)| step_of(object, first_tile(i), "encode", shader, 0, tiles(object).min(groups));
             objects.iter().enumerate().map(of).collect::<Vec<Step>>()
         };
@@ -350,9 +374,23 @@ impl Merger {
         steps.extend(of_objects(&shaders::KDTREE_BUILD_COUNT));
         steps.push(step("encode", &shaders::KDTREE_MERGE_PLAN, 0, 1));
         steps.extend(of_objects(&shaders::KDTREE_BUILD_RECORDS));
-        steps.push(fill::step("find", keys[0], pair_capacity * key_words, u32::MAX));
-        steps.push(step("find", &shaders::KDTREE_MERGE_FIND, 0, groups));
+        steps.push(fill::step("encode", keys[0], pair_capacity * key_words, u32::MAX));
+        let each_first_tile = objects.iter().enumerate().map(|(i, object)| (*object, first_tile(i)));
+        steps.extend(push::steps(seeds, (self.shape.workgroup, groups), each_first_tile, step));
+        // Neighbours without trees at once: so many primitives have as many tiles.
+        let mut at = 0;
+        for neighbours in objects.chunk_by(|a, b| has_tree(a) == has_tree(b)) {
+            let first = at;
+            at += neighbours.iter().map(tiles).sum::<u32>();
+            if !has_tree(&neighbours[0]) {
+                let all = counted((at - first) * self.shape.chunk());
+                steps.push(step_of(&all, first, "find", &shaders::KDTREE_MERGE_FIND, 0, groups));
+            }
+        }
         steps.extend(sorting);
+        if setup.seed_count > 0 {
+            steps.push(step("unique", &shaders::KDTREE_MERGE_UNIQUE, 0, 1));
+        }
         steps.push(step("mark", &shaders::KDTREE_MERGE_MARK, 0, 1));
         steps.push(step("mark", &shaders::KDTREE_MERGE_GATHER, 0, groups));
         steps.extend(builder::levels(MAX_DEPTH, groups, step));
@@ -367,6 +405,8 @@ impl Merger {
 struct Places {
     pairs: u64,
     marked: u64,
+    seeds: u64,
+    items: u64,
     keys: [u64; 2],
     values: [u64; 2],
     table: u64,

@@ -10,6 +10,10 @@ pub struct Object {
     pub input: Input,
     /// What hits of its first triangle say; behind those of the static tree, and apart from those of other objects.
     pub first_primitive: u32,
+    /// The address of a kd-tree of the same triangles as they now are, its primitives numbered from 0 on, in memory of the caller, who
+    /// makes it visible to compute shaders as the input is: [`crate::kdtree::builder`] builds one. It is pushed down the static tree
+    /// ("merging on the GPU", Papay 2025, section 10.3). Without one the triangles find their leaves each by itself.
+    pub tree: Option<u64>,
 }
 
 /// Which objects are to be in the tree, by name.

@@ -92,7 +92,7 @@ impl<'a> MergeOnDevice<'a> {
             let indices = device.upload("indices", &mesh.triangles)?;
             let (vertices, triangles) = (mesh.positions.len() as u32, mesh.triangles.len() as u32);
             let input = Input::mesh(positions.address(), vertices, indices.address(), triangles);
-            let object = Object { input, first_primitive: first.first(group) };
+            let object = Object { input, first_primitive: first.first(group), tree: None };
             Ok(Moving { group, object, positions, _indices: indices })
         };
         let objects: Vec<Moving<'_>> = Group::objects(first).into_iter().map(moving).collect::<Result<_>>()?;
