@@ -12,7 +12,7 @@ use hedgerow::bvh::builder::Input;
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::{Buffer, Phase, Timestamps};
 use hedgerow::kdtree::builder::{self, Builder, Report as BuildReport};
-use hedgerow::kdtree::merge::{Memory, Merger, Most, Object, Options, Report};
+use hedgerow::kdtree::merge::{Estimate, Memory, Merger, Most, Object, Options, Report};
 use hedgerow::scene::{LoadOptions, load};
 use std::collections::BTreeMap;
 
@@ -150,7 +150,7 @@ fn pushing_beside_finding() {
         };
         let ways = [None, Some(tree.address())].map(|tree| {
             let object = Object { input, first_primitive: count, tree };
-            let mut options = Options::DEFAULT;
+            let mut options = Options { estimate: Estimate::WITH_TREES, ..Options::DEFAULT };
             loop {
                 let place = place(&object, &options);
                 let (object, merger, structure, scratch, undo) = &place;

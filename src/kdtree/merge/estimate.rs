@@ -33,10 +33,10 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// For objects of which nothing is known.
+    /// For objects of which nothing is known, but that none has a tree.
     pub const DEFAULT: Estimate = Estimate {
         pairs: 8.0,
-        items: 4.0,
+        items: 0.0,
         marked: 4.0,
         build: builder::Estimate {
             level_references: 24.0,
@@ -47,6 +47,8 @@ impl Estimate {
             subtrees: 4.0,
         },
     };
+    /// The same for objects with trees.
+    pub const WITH_TREES: Estimate = Estimate { pairs: 20.0, items: 4.0, ..Estimate::DEFAULT };
 }
 
 /// What a merge needed, in the scratch memory at [`Merger::report_range`](super::Merger::report_range) when it has run.
