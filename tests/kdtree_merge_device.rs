@@ -226,7 +226,13 @@ fn objects_that_are_pushed_as_trees_give_the_same_bytes_as_those_that_find_their
         };
         (0..count * count).flat_map(square).collect::<Corners>()
     };
+    // A long triangle is in leaves that begin beside it, farther off than the cell of its own tree reaches.
+    let beside = |p: [f32; 3]| [p[0], p[1], 1.2e-4 + (p[2].abs() - 0.3).max(0.0)];
+    let mut above: Corners = soup(20, 0.1, 14).iter().map(|t| t.map(beside)).collect();
+    above.push([[-1.0, -1.0, -1.0], [-0.9, -1.0, -1.0], [-1.0, -0.9, -1.0]]);
+    let long = vec![[[-8.0, -8.0, 0.0], [8.0, -8.0, 0.0], [-8.0, 8.0, 0.0]]];
     let more = [
+        World { name: "beside", still: above, objects: vec![long, soup(20, 0.1, 15)] },
         World {
             name: "in planes",
             still: squares(0.0, 8),
