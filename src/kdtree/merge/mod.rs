@@ -393,7 +393,11 @@ impl Merger {
         }
         steps.push(step("mark", &shaders::KDTREE_MERGE_MARK, 0, 1));
         steps.push(step("mark", &shaders::KDTREE_MERGE_GATHER, 0, groups));
-        steps.extend(builder::levels(MAX_DEPTH, groups, step));
+        // Leaves have few references: below the first level little is left, and at most of them nothing.
+        let few = groups.div_ceil(4);
+        steps.extend(builder::levels(MAX_DEPTH, groups, |phase, shader, level, groups| {
+            step(phase, shader, level, if level == 0 { groups } else { few })
+        }));
         steps.push(step("place", &shaders::KDTREE_MERGE_ORDER, 0, 1));
         steps.push(step("place", &shaders::KDTREE_BUILD_PLACE, 0, groups));
         steps.push(step("hook", &shaders::KDTREE_MERGE_HOOK, 0, groups));
