@@ -1,4 +1,4 @@
-// What a merge has beside a build's state: src/kdtree/merge.rs.
+// What a merge has beside a build's state: src/kdtree/merge/mod.rs.
 #ifndef HEDGEROW_KDTREE_MERGE_STATE
 #define HEDGEROW_KDTREE_MERGE_STATE
 #include "gpu/pass.glsl"
@@ -48,7 +48,7 @@ BUFFER KdUndo {
 };
 
 BUFFER KdMerge {
-    // `Report` in src/kdtree/merge.rs.
+    // `Report` in src/kdtree/merge/estimate.rs.
     uint status;
     uint wanted_pairs;
     uint wanted_marked;
