@@ -2,10 +2,11 @@
 
 use crate::measure::record::SCHEMA;
 use crate::{Error, Result};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 /// A file of records, open for writing.
@@ -61,4 +62,51 @@ pub fn read<R: DeserializeOwned>(path: &Path, name: &str, command: &str, schema:
         records.push(record);
     }
     Ok(records)
+}
+
+/// What the lines of a file say, of several kinds, each told by its `experiment`.
+pub trait Entry: Serialize + DeserializeOwned {
+    /// The name of the file.
+    const FILE: &'static str;
+    /// The command that writes it.
+    const COMMAND: &'static str;
+}
+
+/// An entry as it is written.
+#[derive(Serialize, Deserialize)]
+struct Line<E> {
+    schema: u32,
+    #[serde(flatten)]
+    entry: E,
+}
+
+/// A file of entries, open for writing: each is on the disk as soon as it is measured.
+#[derive(Debug)]
+pub struct Points<E>(Lines, PhantomData<E>);
+
+impl<E: Entry> Points<E> {
+    /// Makes `folder` and the empty file in it.
+    ///
+    /// # Errors
+    /// The folder cannot be made or written to.
+    pub fn create(folder: &Path) -> Result<Points<E>> {
+        Ok(Points(Lines::create(folder, E::FILE)?, PhantomData))
+    }
+
+    /// Appends a line.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn append(&mut self, entry: E) -> Result<()> {
+        self.0.append(&Line { schema: SCHEMA, entry })
+    }
+}
+
+/// The entries of a file, or of the one in a folder.
+///
+/// # Errors
+/// The file cannot be read; a line is not an entry of this schema.
+pub fn entries<E: Entry>(path: &Path) -> Result<Vec<E>> {
+    let lines = read(path, E::FILE, E::COMMAND, |line: &Line<E>| line.schema)?;
+    Ok(lines.into_iter().map(|line| line.entry).collect())
 }

@@ -2,25 +2,9 @@
 
 use super::Way;
 use crate::measure::provenance::{DeviceFacts, Machine};
-use crate::measure::record::{Memory, SCHEMA};
+use crate::measure::record::Memory;
 use crate::measure::statistics::Spread;
 use serde::{Deserialize, Serialize};
-
-/// One line.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Line {
-    /// [`SCHEMA`].
-    pub schema: u32,
-    /// What it says.
-    #[serde(flatten)]
-    pub entry: Entry,
-}
-
-impl From<Entry> for Line {
-    fn from(entry: Entry) -> Line {
-        Line { schema: SCHEMA, entry }
-    }
-}
 
 /// What a line says, by its `experiment`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

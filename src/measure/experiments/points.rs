@@ -1,25 +1,8 @@
 //! The lines of `accel.jsonl` (CONTRACT, "Records of experiments"). A figure that was not measured is `None`.
 
 use crate::measure::provenance::{DeviceFacts, Machine};
-use crate::measure::record::SCHEMA;
 use crate::measure::statistics::Spread;
 use serde::{Deserialize, Serialize};
-
-/// One line.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Line {
-    /// [`SCHEMA`].
-    pub schema: u32,
-    /// What it says.
-    #[serde(flatten)]
-    pub entry: Entry,
-}
-
-impl From<Entry> for Line {
-    fn from(entry: Entry) -> Line {
-        Line { schema: SCHEMA, entry }
-    }
-}
 
 /// What a line says, by its `experiment`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -328,15 +311,15 @@ mod tests {
     }
 
     #[test]
-    fn a_line_names_its_schema_and_experiment_and_what_was_not_measured_is_null() {
-        let line = Line::from(Entry::Update(frame(4.0, 1.0, [2.0, 3.0])));
+    fn an_entry_names_its_experiment_and_what_was_not_measured_is_null() {
+        let line = Entry::Update(frame(4.0, 1.0, [2.0, 3.0]));
         let value = serde_json::to_value(&line).expect("JSON");
-        assert_eq!((&value["schema"], &value["experiment"]), (&1.into(), &"update".into()));
+        assert_eq!(value["experiment"], "update");
         assert_eq!((&value["maker"], &value["growth"]), (&"ours".into(), &1.5.into()));
         assert!(value["built_sah"].is_null(), "{value}");
-        assert_eq!(serde_json::from_value::<Line>(value).expect("round trip"), line);
+        assert_eq!(serde_json::from_value::<Entry>(value).expect("round trip"), line);
         let text = serde_json::to_string(&line).expect("JSON");
-        assert_eq!(serde_json::from_str::<Line>(&text).expect("round trip"), line);
+        assert_eq!(serde_json::from_str::<Entry>(&text).expect("round trip"), line);
     }
 
     #[test]

@@ -12,45 +12,27 @@ mod update;
 
 use super::beside;
 use super::chart::Chart;
-use super::lines::{self, Lines};
+use super::lines;
 use super::write_charts;
-use crate::measure::experiments::points::{Batch, Entry, Failure, Line, Rebraid, Setting, TopLevel, Update};
+use crate::measure::experiments::points::{Batch, Entry, Failure, Rebraid, Setting, TopLevel, Update};
 use crate::{Error, Result};
 use maud::Markup;
 use std::path::{Path, PathBuf};
 
-/// The name of the file of records.
-pub const FILE: &str = beside::ACCEL.records;
-
-/// `accel.jsonl`, open for writing: each point is on the disk as soon as it is measured.
-#[derive(Debug)]
-pub struct Points(Lines);
-
-impl Points {
-    /// Makes `folder` and an empty `accel.jsonl` in it.
-    ///
-    /// # Errors
-    /// The folder cannot be made or written to.
-    pub fn create(folder: &Path) -> Result<Points> {
-        Lines::create(folder, FILE).map(Points)
-    }
-
-    /// Appends a line.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn append(&mut self, entry: Entry) -> Result<()> {
-        self.0.append(&Line::from(entry))
-    }
+impl lines::Entry for Entry {
+    const FILE: &'static str = beside::ACCEL.records;
+    const COMMAND: &'static str = "hedgerow accel";
 }
+
+/// `accel.jsonl`, open for writing.
+pub type Points = lines::Points<Entry>;
 
 /// The lines of an `accel.jsonl`, or of the one in a folder.
 ///
 /// # Errors
 /// The file cannot be read; a line is not a record of this schema.
 pub fn read(path: &Path) -> Result<Vec<Entry>> {
-    let lines = lines::read(path, FILE, "hedgerow accel", |line: &Line| line.schema)?;
-    Ok(lines.into_iter().map(|line| line.entry).collect())
+    lines::entries(path)
 }
 
 /// The records, by what they are of.

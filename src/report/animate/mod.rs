@@ -7,44 +7,26 @@ mod page;
 pub mod standings;
 
 use super::beside;
-use super::lines::{self, Lines};
+use super::lines;
 use super::write_charts;
-use crate::measure::animate::points::{Animated, Entry, Failure, Line, Setting};
+use crate::measure::animate::points::{Animated, Entry, Failure, Setting};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// The name of the file of records.
-pub const FILE: &str = beside::ANIMATE.records;
-
-/// `animate.jsonl`, open for writing: each point is on the disk as soon as it is measured.
-#[derive(Debug)]
-pub struct Points(Lines);
-
-impl Points {
-    /// Makes `folder` and an empty `animate.jsonl` in it.
-    ///
-    /// # Errors
-    /// The folder cannot be made or written to.
-    pub fn create(folder: &Path) -> Result<Points> {
-        Lines::create(folder, FILE).map(Points)
-    }
-
-    /// Appends a line.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn append(&mut self, entry: Entry) -> Result<()> {
-        self.0.append(&Line::from(entry))
-    }
+impl lines::Entry for Entry {
+    const FILE: &'static str = beside::ANIMATE.records;
+    const COMMAND: &'static str = "hedgerow animate";
 }
+
+/// `animate.jsonl`, open for writing.
+pub type Points = lines::Points<Entry>;
 
 /// The lines of an `animate.jsonl`, or of the one in a folder.
 ///
 /// # Errors
 /// The file cannot be read; a line is not a record of this schema.
 pub fn read(path: &Path) -> Result<Vec<Entry>> {
-    let lines = lines::read(path, FILE, "hedgerow animate", |line: &Line| line.schema)?;
-    Ok(lines.into_iter().map(|line| line.entry).collect())
+    lines::entries(path)
 }
 
 /// The records, by what they are of.
