@@ -2,11 +2,11 @@
 //!
 //! Everything here stands on the same public calls that an engine uses with its own device.
 
-use super::{Context, ContextDesc, Recorder, Timestamps, requirements};
+use super::{Buffer, Context, ContextDesc, Recorder, Timestamps, requirements};
 use crate::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
+use gpu_allocator::vulkan::{AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 use std::ffi::{CStr, c_void};
 use std::mem::ManuallyDrop;
 use std::ops::Deref;
@@ -243,7 +243,7 @@ pub struct Device {
     // Dropped in `drop`, in this order: context, allocator, device; the instance follows as the last field.
     context: ManuallyDrop<Context>,
     allocator: ManuallyDrop<Mutex<Allocator>>,
-    raw: ash::Device,
+    pub(super) raw: ash::Device,
     queue: Mutex<vk::Queue>,
     queue_family: u32,
     pipeline_cache: vk::PipelineCache,
@@ -501,7 +501,7 @@ impl Device {
         if messages.is_empty() { Ok(()) } else { Err(Error::Validation(messages.join("\n"))) }
     }
 
-    fn lock_allocator(&self) -> std::sync::MutexGuard<'_, Allocator> {
+    pub(super) fn lock_allocator(&self) -> std::sync::MutexGuard<'_, Allocator> {
         self.allocator.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }
@@ -516,87 +516,6 @@ impl Drop for Device {
             ManuallyDrop::drop(&mut self.allocator);
             self.raw.destroy_pipeline_cache(self.pipeline_cache, None);
             self.raw.destroy_device(None);
-        }
-    }
-}
-
-/// A buffer with its memory, mapped.
-pub struct Buffer<'a> {
-    device: &'a Device,
-    raw: vk::Buffer,
-    allocation: Option<Allocation>,
-    address: u64,
-    bytes: u64,
-}
-
-impl Buffer<'_> {
-    /// The address that shaders use.
-    pub fn address(&self) -> u64 {
-        self.address
-    }
-
-    /// The Vulkan handle.
-    pub fn raw(&self) -> vk::Buffer {
-        self.raw
-    }
-
-    /// Size in bytes.
-    pub fn bytes(&self) -> u64 {
-        self.bytes
-    }
-
-    /// All of it, for what is recorded.
-    pub fn region(&self) -> super::Region {
-        super::Region { address: self.address, bytes: self.bytes }
-    }
-
-    /// Copies `data` to the start of the buffer. Nothing on the device may use it meanwhile: every [`Device::run`] waits.
-    ///
-    /// # Panics
-    /// `data` is larger than the buffer.
-    pub fn write<T: bytemuck::NoUninit>(&self, data: &[T]) {
-        let bytes: &[u8] = bytemuck::cast_slice(data);
-        assert!(bytes.len() as u64 <= self.bytes, "{} bytes into a buffer of {}", bytes.len(), self.bytes);
-        // SAFETY: mapped for the buffer's lifetime, large enough, and no other reference to the mapping exists.
-        unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), self.mapped(), bytes.len()) };
-    }
-
-    /// The first `count` elements of the buffer.
-    ///
-    /// # Panics
-    /// The buffer is smaller than that.
-    pub fn read<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(&self, count: usize) -> Vec<T> {
-        self.read_at(0, count)
-    }
-
-    /// `count` elements from byte `offset` on.
-    ///
-    /// # Panics
-    /// The buffer is smaller than that.
-    pub fn read_at<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(&self, offset: u64, count: usize) -> Vec<T> {
-        let bytes = count * size_of::<T>();
-        assert!(offset + bytes as u64 <= self.bytes, "{bytes} bytes at {offset} of a buffer of {}", self.bytes);
-        let mut data = vec![T::zeroed(); count];
-        let target: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
-        // SAFETY: mapped, large enough, and every submit that writes it has been waited for.
-        unsafe {
-            std::ptr::copy_nonoverlapping(self.mapped().add(offset as usize).cast_const(), target.as_mut_ptr(), bytes);
-        }
-        data
-    }
-
-    fn mapped(&self) -> *mut u8 {
-        let allocation = self.allocation.as_ref().expect("held until the drop");
-        allocation.mapped_ptr().expect("host-visible memory is mapped").as_ptr().cast()
-    }
-}
-
-impl Drop for Buffer<'_> {
-    fn drop(&mut self) {
-        // SAFETY: ours, and no submit that uses it is running.
-        unsafe { self.device.raw.destroy_buffer(self.raw, None) };
-        if let Some(allocation) = self.allocation.take() {
-            let _ = self.device.lock_allocator().free(allocation);
         }
     }
 }

@@ -3,6 +3,8 @@
 //! [`Context`] takes a device that the caller made and owns nothing but pipelines. `Device` is the binary's and the tests'
 //! own device, built on the same public calls.
 
+#[cfg(feature = "cli")]
+mod buffer;
 mod context;
 #[cfg(feature = "cli")]
 mod device;
@@ -22,9 +24,11 @@ pub mod scan;
 pub mod shaders;
 pub mod task_pool;
 
+#[cfg(feature = "cli")]
+pub use buffer::Buffer;
 pub use context::{Context, ContextDesc, Kernel, Limits};
 #[cfg(feature = "cli")]
-pub use device::{Buffer, Device, DeviceOptions, Found, list};
+pub use device::{Device, DeviceOptions, Found, list};
 #[cfg(feature = "cli")]
 pub use driver_structure::{DriverPreference, DriverSizes, DriverStructure};
 pub use grid::Grid;
