@@ -63,12 +63,14 @@ Box cell_around(Corners c, float reach) {
     return finite_part(widened(bounds_of(c, reach), rounding_of(whole, longest_side(whole))));
 }
 
-// Where the edge from a to b, which goes up along the axis, crosses the plane; `outer` where it is too short or too long to tell.
+// Where the edge from a to b, which goes up along the axis, crosses the plane, within the box around it; `outer` where it is too
+// short or too long to tell.
 vec3 crossing_of(vec3 a, vec3 b, uint axis, float plane, vec3 outer) {
     precise vec3 d = b - a;
     if (d[axis] < shortest_edge() || !is_finite(d)) return outer;
     precise float t = (plane - a[axis]) * (1.0 / d[axis]);
     precise vec3 point = a + t * d;
+    point = min(max(point, min(a, b)), max(a, b));
     point[axis] = plane;
     return point;
 }
@@ -94,7 +96,6 @@ bool clip_triangle(Corners c, float reach, Box cell, out Box part) {
     polygon[1] = c.v1;
     polygon[2] = c.v2;
     uint from = 0, count = 3;
-    bool is_cut = true;
     uint faces = faces_beyond(whole, larger);
     if (faces != 0u) do {
         uint face = findLSB(faces), axis = face >> 1, to = POLYGON_CORNERS - from, kept = 0;
@@ -106,19 +107,18 @@ bool clip_triangle(Corners c, float reach, Box cell, out Box part) {
         do {
             vec3 q = polygon[from + (i + 1 < count ? i + 1 : 0)];
             bool keeps_q = is_upper ? q[axis] <= plane : q[axis] >= plane;
-            is_cut = kept + (keeps_p ? 1u : 0u) + (keeps_p != keeps_q ? 1u : 0u) <= POLYGON_CORNERS;
-            if (is_cut && keeps_p) polygon[to + kept++] = p;
-            if (is_cut && keeps_p != keeps_q) {
+            if (keeps_p) polygon[to + kept++] = p;
+            if (keeps_p != keeps_q) {
                 bool goes_up = p[axis] < q[axis];
                 polygon[to + kept++] = crossing_of(goes_up ? p : q, goes_up ? q : p, axis, plane, keeps_p ? q : p);
             }
             p = q;
             keeps_p = keeps_q;
-        } while (++i < count && is_cut);
+        } while (++i < count);
         from = to;
         count = kept;
         faces &= faces - 1u;
-    } while (faces != 0u && is_cut && count != 0u);
+    } while (faces != 0u && count != 0u);
     // A polygon of no corners has a box from +∞ to −∞.
     Box bounds = Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
     uint i = 0;
@@ -126,7 +126,6 @@ bool clip_triangle(Corners c, float reach, Box cell, out Box part) {
         vec3 p = polygon[from + i];
         bounds = Box(min(bounds.lo, p), max(bounds.hi, p));
     } while (++i < count);
-    if (!is_cut) bounds = whole;
     Box own = finite_part(widened(whole, room));
     part = common_part(common_part(widened(bounds, margin), own), cell);
     return all(lessThanEqual(part.lo, part.hi));
