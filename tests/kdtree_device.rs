@@ -4,8 +4,10 @@ mod common;
 
 use common::corpus::{self, Mesh};
 use common::device;
+use common::geometries::{MOVED, Owned};
 use common::shapes::{icosphere, placed};
-use hedgerow::bvh::builder::{Input, Schedule};
+use hedgerow::bvh::builder::{Input, Schedule, Source};
+use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::Region;
 use hedgerow::kdtree::builder::{Builder, Estimate, Options, Report};
@@ -20,9 +22,17 @@ fn on_host((name, positions, triangles): &Mesh, options: &Options) -> KdTree {
 
 /// The structure and the report of a build.
 fn built((_, positions, triangles): &Mesh, options: &Options) -> (KdTree, Report) {
+    let vertices = device().upload("positions", positions).expect("memory");
+    let indices = device().upload("indices", triangles).expect("memory");
+    built_of(
+        &Input::mesh(vertices.address(), positions.len() as u32, indices.address(), triangles.len() as u32),
+        options,
+    )
+}
+
+fn built_of(input: &Input, options: &Options) -> (KdTree, Report) {
     let device = device();
-    let count = triangles.len() as u32;
-    let builder = Builder::new(device, options, count).expect("options that can be used");
+    let builder = Builder::new(device, options, input.primitive_count).expect("options that can be used");
     let sizes = builder.sizes();
     // Whatever was there before changes nothing.
     let garbage = |bytes: u64| vec![0xA5u8; bytes as usize];
@@ -30,11 +40,8 @@ fn built((_, positions, triangles): &Mesh, options: &Options) -> (KdTree, Report
     let (structure, scratch) = (buffer("structure", sizes.structure), buffer("scratch", sizes.scratch));
     structure.write(&garbage(sizes.structure));
     scratch.write(&garbage(sizes.scratch));
-    let vertices = device.upload("positions", positions).expect("memory");
-    let indices = device.upload("indices", triangles).expect("memory");
-    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), count);
     device
-        .run(None, |recorder| builder.record(recorder, &input, structure.region(), scratch.region()))
+        .run(None, |recorder| builder.record(recorder, input, structure.region(), scratch.region()))
         .expect("a build");
     let range = builder.report_range();
     let scratch: Vec<u8> = scratch.read(range.end as usize);
@@ -64,6 +71,7 @@ fn assert_same(got: &KdTree, expected: &KdTree, what: &str) {
     assert_eq!(differs, None, "{what}: {:?}", differs.map(|i| (got.nodes[i].content(), expected.nodes[i].content())));
     assert_eq!(got.references, expected.references, "{what}: references");
     assert_eq!(got.records, expected.records, "{what}: records");
+    assert_eq!(got.geometries, expected.geometries, "{what}: geometries");
 }
 
 fn meshes() -> Vec<Mesh> {
@@ -86,6 +94,67 @@ fn the_chain_gives_the_bytes_of_the_host() {
             assert_same(&got, &expected, &what);
         }
     }
+}
+
+/// As one geometry and as several, by both schedules.
+#[track_caller]
+fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
+    // Each triangle is as large as all of them.
+    let estimate = Estimate {
+        level_references: 200.0,
+        level_nodes: 200.0,
+        subtree_nodes: 200.0,
+        cut_references: 200.0,
+        subtree_references: 400.0,
+        subtrees: 200.0,
+    };
+    let with = Options { estimate: Some(estimate), ..Options::DEFAULT };
+    let planes = Planes::Mixed { bins: with.bins, exact: with.exact };
+    let corners = geometries.iter().flat_map(|g| g.view().corners().collect::<Vec<_>>());
+    let expected = host::build_corners(corners, &host::Options { planes, costs: with.costs }).expect("a tree");
+    let flags = |i: usize| if i % 3 == 1 { GeometryFlags::OPAQUE } else { GeometryFlags::NONE };
+    let counts = geometries.iter().enumerate().map(|(i, g)| (g.primitive_count, flags(i).bits()));
+    let expected = expected.with_geometries(&counts.collect::<Vec<_>>());
+    expected.validate().expect("a valid tree");
+    let mut first = 0;
+    let (mut records, mut memory) = (Vec::new(), Vec::new());
+    for (i, geometry) in geometries.iter().enumerate() {
+        let (record, buffers) = geometry.upload(first, 1);
+        first += geometry.primitive_count;
+        records.push(Geometry { flags: flags(i), ..record });
+        memory.push(buffers);
+    }
+    let buffer = device().upload("records", &records).expect("memory");
+    let geometry_count = records.len() as u32;
+    let several = Source::Several { records: buffer.address(), count: geometry_count };
+    for source in [several].into_iter().chain((records.len() == 1).then(|| Source::One(records[0]))) {
+        for schedule in [Schedule::Chain, Schedule::Persistent] {
+            let options = Options { schedule: Some(schedule), geometry_count, ..with };
+            let (got, report) = built_of(&Input { source, primitive_count: first }, &options);
+            assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
+            assert_same(&got, &expected, &format!("{source:?} {schedule}"));
+        }
+    }
+}
+
+#[test]
+fn every_format_and_several_geometries_give_the_bytes_of_the_host() {
+    for vertex_format in VertexFormat::ALL {
+        for index_format in [IndexFormat::NONE, IndexFormat::U8, IndexFormat::U32] {
+            for (padding, transform) in [(0, None), (4, Some(MOVED))] {
+                let geometry = Owned::random(vertex_format, index_format, padding, 60, 7);
+                assert_geometries_as_on_the_host(&[Owned { transform, ..geometry }]);
+            }
+        }
+    }
+    let geometry = |i: usize, count| {
+        let (vertices, indices) = (VertexFormat::ALL[i % 6], IndexFormat::ALL[i % 4]);
+        Owned::random(vertices, indices, 0, count, i as u64)
+    };
+    assert_geometries_as_on_the_host(&[geometry(0, 1), geometry(1, 1)]);
+    assert_geometries_as_on_the_host(&[geometry(2, 0), geometry(3, 0)]);
+    assert_geometries_as_on_the_host(&[2, 3, 4, 5, 6, 7].map(|i| geometry(i, [0, 70, 0, 0, 9, 0][i - 2])));
+    assert_geometries_as_on_the_host(&(0..50).map(|i| geometry(i, (i as u32 * 7) % 13)).collect::<Vec<_>>());
 }
 
 #[test]

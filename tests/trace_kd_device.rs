@@ -187,17 +187,11 @@ fn rays_in_planes_are_traced_as_on_the_host() {
 
 #[test]
 fn every_scene_that_hurts_has_the_hits_of_brute_force() {
-    for (name, positions, triangles) in corpus::meshes() {
-        let corners: Corners = triangles
-            .iter()
-            .filter_map(|t| {
-                let corner = |v: u32| positions.get(v as usize).copied().filter(|p| p.iter().all(|x| x.is_finite()));
-                Some([corner(t[0])?, corner(t[1])?, corner(t[2])?])
-            })
-            .collect();
+    for mesh in corpus::meshes() {
+        let (name, corners) = (&mesh.0, corpus::corners_of(&mesh));
         let b = corners.iter().flatten().flatten().fold(0f32, |m, x| m.max(x.abs()));
         let rays = hard_rays(&corners, 64, if b > 0.0 { b.min(1e37) } else { 1.0 }, [0.0; 3], 5);
-        assert_hits_of_brute_force(&name, &corners, &kd_tree_of(&corners, &Options::BINNED), &rays);
+        assert_hits_of_brute_force(name, &corners, &kd_tree_of(&corners, &Options::BINNED), &rays);
     }
 }
 
@@ -329,6 +323,7 @@ fn parts_are_found_where_there_is_room_for_more() {
 fn shaders_of_others_trace_kd_trees_by_the_header() {
     let corners = soup(500, 0.2, 81);
     let (kd_tree, bvh) = (kd_tree_of(&corners, &Options::BINNED), tree_of(&corners));
+    let kd_tree = kd_tree.with_geometries(&[(120, 1), (0, 2), (380, 0)]);
     let rays = hard_rays(&corners, 500, 1.0, [0.0; 3], 82);
     let upload = |bytes: &[u8]| device().upload("structure", bytes).expect("memory");
     let (kd_buffer, bvh_buffer) = (upload(&kd_tree.to_bytes()), upload(&bvh.to_bytes()));
@@ -337,5 +332,7 @@ fn shaders_of_others_trace_kd_trees_by_the_header() {
         let hit = kd_host::closest_hit(&kd_tree, ray, Traversal::STACK);
         assert_eq!((report.of_kd_tree, report.of_query), (hit, hit), "{ray:?}");
         assert_eq!(report.is_hit == 1, hit.is_some(), "{ray:?}");
+        let geometry = [[0, 0, 1], [2, 120, 0]][usize::from(hit.primitive >= 120)];
+        assert!(!hit.is_some() || report.geometry == geometry, "{ray:?}: {:?}", report.geometry);
     }
 }

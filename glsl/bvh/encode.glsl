@@ -121,21 +121,6 @@ void find_bounds(uint task) {
 
 // ---- plan ----
 
-// The flags of all geometries in one word; where there are several, the structure's table is written.
-uint write_geometries(Geometry g, uint count, uint node_slots) {
-    if (!has_records()) return SOURCE == SOURCE_ENTRIES ? 0 : flags_of(g) | flags_of(g) << 8;
-    Geometries given = Geometries(g.vertices);
-    GeometryTable table = geometry_table_at(structure_address, kind_of_records(), node_slots, primitive_count);
-    uint all = 0xFF, any = 0;
-    for (uint i = 0; i < count; ++i) {
-        uint flags = flags_of(given.geometry[i]);
-        if (count > 1) table.entry[i] = GeometryEntry(given.geometry[i].first, flags);
-        all &= flags;
-        any |= flags;
-    }
-    return all | any << 8;
-}
-
 void make_plan() {
     if (HAS_SECTIONS) find_sections();
     if (gl_LocalInvocationIndex != 0) return;
@@ -154,7 +139,8 @@ void make_plan() {
     structure.header.inner_nodes = max(state.active_count, 1) - 1;
     uint geometry_count = count_geometries(geometries());
     structure.header.geometry_count = geometry_count;
-    structure.header.geometry_flags = write_geometries(geometries(), geometry_count, slots);
+    GeometryTable table = geometry_table_at(structure_address, kind_of_records(), slots, primitive_count);
+    structure.header.geometry_flags = write_geometries(geometries(), geometry_count, table);
     structure.header.build_flags = code_kind >> 26;
     structure.header.area_scale = 0.0;
     structure.header.cost = 0.0;

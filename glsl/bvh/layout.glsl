@@ -126,6 +126,17 @@ Triangles triangles_of(Structure structure) {
     return Triangles(records_at(uvec2(structure), structure.header.node_slots));
 }
 
+// Which of several geometries a primitive is of.
+uint geometry_index_of(GeometryTable table, uint count, uint primitive) {
+    uint at = 0, end = count;
+    for (uint halving = 0; halving < 32 && at + 1 < end; ++halving) {
+        uint middle = at + (end - at) / 2;
+        if (table.entry[middle].first <= primitive) at = middle;
+        else end = middle;
+    }
+    return at;
+}
+
 // Behind the records, where there are several geometries.
 GeometryTable geometry_table_at(uvec2 structure, uint kind, uint node_slots, uint primitive_count) {
     return GeometryTable(address_of(records_at(structure, node_slots), primitive_count, record_bytes(kind)));

@@ -20,6 +20,20 @@ uint count_geometries(Geometry g) {
     return has_end ? g.vertex_count - 1 : g.vertex_count;
 }
 
+// The flags of all geometries in one word; where there are several, the structure's table is written.
+uint write_geometries(Geometry g, uint count, GeometryTable table) {
+    if (!has_records()) return SOURCE == SOURCE_ENTRIES ? 0 : flags_of(g) | flags_of(g) << 8;
+    Geometries given = Geometries(g.vertices);
+    uint all = 0xFF, any = 0;
+    for (uint i = 0; i < count; ++i) {
+        uint flags = flags_of(given.geometry[i]);
+        if (count > 1) table.entry[i] = GeometryEntry(given.geometry[i].first, flags);
+        all &= flags;
+        any |= flags;
+    }
+    return all | any << 8;
+}
+
 // The box of a primitive; returns 0, or why it is left out: a status bit or INACTIVE.
 uint load_box(Geometry g, uint primitive, out Box b) {
     uint why_not;

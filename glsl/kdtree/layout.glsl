@@ -67,6 +67,11 @@ uvec2 kd_references_at(uvec2 structure, uint node_room) {
 }
 
 uvec2 kd_records_at(uvec2 structure, uint node_room, uint reference_room) {
-    return address_of(kd_references_at(structure, node_room), reference_room, 4u);
+    return address_of(kd_references_at(structure, node_room), reference_room + 1u >> 1, 8u);
+}
+
+// Behind the records, where there are several geometries.
+GeometryTable kd_geometries_at(uvec2 structure, uint node_room, uint reference_room, uint record_room) {
+    return GeometryTable(address_of(kd_records_at(structure, node_room, reference_room), record_room, 40u));
 }
 #endif

@@ -43,8 +43,9 @@ void kd_order_subtrees() {
     header.inner_nodes = state.inner_nodes + state.subtree_inner;
     header.leaves = state.leaves + state.subtree_leaves;
     header.empty_leaves = state.empty_leaves + state.subtree_empty;
-    header.geometry_count = 1u;
-    header.geometry_flags = flags_of(given_geometry()) | flags_of(given_geometry()) << 8;
+    header.geometry_count = count_geometries(given_geometry());
+    GeometryTable table = kd_geometries_at(structure_address, node_room, reference_room, record_room);
+    header.geometry_flags = write_geometries(given_geometry(), header.geometry_count, table);
     header.build_flags = build_flags;
     header.depth = state.depth;
     header.area_scale = state.area_scale;

@@ -6,8 +6,8 @@
 //     if (hit.primitive != HEDGEROW_NONE) shade(hit.t, hit.primitive, hit.u, hit.v);
 //
 // A shader that defines HEDGEROW_KD_CAPACITY and HEDGEROW_KD_PUSH_DOWN before has another traversal than a full stack
-// (trace/walk_kd.glsl): a short stack of up to 8 cells lies in registers and is faster. One that traces several rays of a tree makes a HedgerowKdTree once, by
-// hedgerow_kd_tree(address).
+// (trace/walk_kd.glsl): a short stack of up to 8 cells lies in registers and is faster. One that traces several rays of a tree makes a
+// HedgerowKdTree once, by hedgerow_kd_tree(address). Primitives count through all geometries: hedgerowKdTreeGeometry tells which.
 //
 // reads   the structure: the caller places a barrier behind its build (shader write -> shader read)
 // needs   the features of gpu::requirements(); no descriptors, no shared memory, any subgroup size
@@ -32,7 +32,9 @@
 #define kd_inner hedgerow_kd_inner
 #define kd_references_at hedgerow_kd_references_at
 #define kd_records_at hedgerow_kd_records_at
+#define kd_geometries_at hedgerow_kd_geometries_at
 #define hit_nearer hedgerow_hit_nearer
+#include "trace/geometry.glsl"
 #include "trace/walk_kd.glsl"
 
 // Either hit, through a tree that was made ready.
@@ -54,6 +56,14 @@ bool hedgerowKdTreeAnyHit(uvec2 structure, vec3 origin, float t_min, vec3 direct
     return hedgerow_kd_trace(hedgerow_kd_tree(structure), ray, true).primitive != HEDGEROW_NONE;
 }
 
+// The geometry that a primitive is of: its index, its first primitive, its flags.
+HedgerowGeometry hedgerowKdTreeGeometry(uvec2 structure, uint primitive) {
+    KdHeader header = KdStructure(structure).header;
+    if (header.geometry_count <= 1u) return HedgerowGeometry(0u, 0u, header.geometry_flags & 0xffu);
+    GeometryTable table = kd_geometries_at(structure, header.node_room, header.reference_room, header.record_room);
+    return hedgerow_geometry_in(table, header.geometry_count, primitive);
+}
+
 #include "bvh/names_end.glsl"
 #undef KdHeader
 #undef KdNode
@@ -68,5 +78,6 @@ bool hedgerowKdTreeAnyHit(uvec2 structure, vec3 origin, float t_min, vec3 direct
 #undef kd_inner
 #undef kd_references_at
 #undef kd_records_at
+#undef kd_geometries_at
 #undef hit_nearer
 #endif

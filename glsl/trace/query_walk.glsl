@@ -7,6 +7,7 @@
 #define HEDGEROW_TRACE_QUERY_WALK
 #include "bvh/layout.glsl"
 #define HEDGEROW_LEVELS (2 * MAX_DEPTH * HEDGEROW_QUERIES)
+#include "trace/geometry.glsl"
 #include "trace/ray.glsl"
 #include "trace/slab.glsl"
 #include "trace/stack.glsl"
@@ -179,24 +180,12 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     }
 }
 
-struct HedgerowGeometry {
-    uint index;
-    uint first;
-    uint flags;
-};
-
 // The geometry of a primitive.
 HedgerowGeometry hedgerow_geometry_of(uvec2 structure, uint primitive) {
     Header header = Structure(structure).header;
     if (header.geometry_count <= 1u) return HedgerowGeometry(0u, 0u, header.geometry_flags);
     GeometryTable table = geometry_table_at(structure, header.kind, header.node_slots, header.primitive_count);
-    uint at = 0u, end = header.geometry_count;
-    for (uint halving = 0u; halving < 32u && at + 1u < end; ++halving) {
-        uint middle = at + (end - at) / 2u;
-        if (table.entry[middle].first <= primitive) at = middle;
-        else end = middle;
-    }
-    return HedgerowGeometry(at, table.entry[at].first, table.entry[at].flags);
+    return hedgerow_geometry_in(table, header.geometry_count, primitive);
 }
 
 HedgerowMeeting hedgerow_met(HedgerowRayQuery query, bool committed) {

@@ -7,7 +7,7 @@
 //! | [`Header`] | 128 | 0 |
 //! | [`Node`] × `node_room` | 8 each | [`NODES_OFFSET`] |
 //! | references × `reference_room` | 4 each: index of a record | [`Sizes::references_offset`] |
-//! | [`Triangle`] × `record_room` | 40 each | [`Sizes::records_offset`] |
+//! | [`Triangle`] × `record_room` | 40 each | [`Sizes::records_offset`], a multiple of 8 |
 //! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | [`Sizes::geometries_offset`] |
 //!
 //! The first node is the root. An empty leaf has no node: its parent says that it is empty, and a ray that would go there needs no
@@ -193,7 +193,8 @@ impl Header {
     /// Where the parts of the structure lie.
     pub const fn sizes(&self) -> Sizes {
         let references_offset = NODES_OFFSET + self.node_room as u64 * size_of::<Node>() as u64;
-        let records_offset = references_offset + self.reference_room as u64 * size_of::<u32>() as u64;
+        let records_offset =
+            references_offset + (self.reference_room as u64 * size_of::<u32>() as u64).next_multiple_of(8);
         let geometries_offset = records_offset + self.record_room as u64 * size_of::<Triangle>() as u64;
         let entries = if self.geometry_count > 1 { self.geometry_count as u64 } else { 0 };
         let bytes = geometries_offset + entries * size_of::<GeometryEntry>() as u64;
@@ -360,13 +361,13 @@ mod tests {
         assert_eq!(longer.to_bytes(), bytes);
         let error_of = |bytes: &[u8]| KdTree::from_bytes(bytes).expect_err("broken").to_string();
         assert!(error_of(&bytes[..100]).contains("100 bytes, the header alone has 128"));
-        assert!(error_of(&bytes[..139]).contains("139 bytes, 1 nodes, 1 references and 0 records need 140"));
+        assert!(error_of(&bytes[..139]).contains("139 bytes, 1 nodes, 1 references and 0 records need 144"));
         let mut other = bytes.clone();
         other[4] ^= 1;
         assert!(error_of(&other).contains("of another kind or version"));
         let roomy = KdTree { header: Header { node_room: 3, reference_room: 2, ..header }, ..tree };
         let more = roomy.to_bytes();
-        assert_eq!(more.len(), bytes.len() + 2 * 8 + 4);
+        assert_eq!(more.len(), 128 + 3 * 8 + 2 * 4);
         assert_eq!(KdTree::from_bytes(&more).expect("room for more").references, [0]);
         let full = KdTree { header: Header { node_count: 4, ..roomy.header }, ..roomy };
         assert!(

@@ -105,6 +105,8 @@ pub struct KdReport {
     pub of_kd_tree: Hit,
     pub of_query: Hit,
     pub is_hit: u32,
+    /// Index, first primitive and flags of the geometry that is hit.
+    pub geometry: [u32; 3],
 }
 
 #[derive(Clone, Copy, bytemuck::NoUninit)]

@@ -29,6 +29,7 @@ struct KdNode {
     Triangle of_kd_tree;
     Triangle of_query;
     uint is_hit;
+    HedgerowGeometry geometry;
 };
 
 layout(buffer_reference, scalar) readonly buffer Structure { Node ray[]; };
@@ -56,5 +57,7 @@ void main() {
     report.of_kd_tree = Triangle(hit.t, hit.primitive, vec2(hit.u, hit.v));
     report.of_query = hit_nearer(ray);
     report.is_hit = uint(hedgerowKdTreeAnyHit(kd_tree, ray.origin, ray.t_min, ray.direction, ray.t_max));
+    report.geometry = HedgerowGeometry(0u, 0u, 0u);
+    if (hit.primitive != HEDGEROW_NONE) report.geometry = hedgerowKdTreeGeometry(kd_tree, hit.primitive);
     reports.report[i] = report;
 }

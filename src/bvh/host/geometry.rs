@@ -1,7 +1,7 @@
 //! Reading the caller's triangles on the host, as `glsl/bvh/geometry.glsl` does on the device.
 
 use crate::bvh::geometry::{IndexFormat, VertexFormat};
-use crate::bvh::layout::{Aabb, status};
+use crate::bvh::layout::{Aabb, GeometryEntry, status};
 
 /// [`Geometry`](crate::bvh::geometry::Geometry) in the host's memory.
 #[derive(Debug, Clone, Copy)]
@@ -26,6 +26,20 @@ pub struct HostGeometry<'a> {
 
 /// The corners of a triangle, or the bit of [`status`] that says why it is left out.
 pub type Corners = Result<[[f32; 3]; 3], u32>;
+
+/// The flags of a structure's header and its table, of so many primitives in each geometry, and the flags of each. There is a table
+/// where there are several.
+pub(crate) fn table_of(geometries: &[(u32, u32)]) -> (u32, Vec<GeometryEntry>) {
+    let flags = || geometries.iter().map(|&(_, flags)| flags);
+    let all = flags().reduce(|a, b| a & b).unwrap_or(0);
+    let mut first = 0;
+    let entries = geometries.iter().map(|&(count, flags)| {
+        first += count;
+        GeometryEntry { first: first - count, flags }
+    });
+    let table = if geometries.len() > 1 { entries.collect() } else { Vec::new() };
+    (all | flags().fold(0, |a, b| a | b) << 8, table)
+}
 
 impl HostGeometry<'_> {
     /// All triangles in their order.

@@ -6,9 +6,7 @@
 use super::geometry::{self, Corners};
 use crate::bvh::codes::{Codes, Plan};
 use crate::bvh::layout::status;
-use crate::bvh::layout::{
-    Aabb, BoxRecord, Bvh2, Child, GeometryEntry, Header, MAGIC, Node, Record, Triangle, UNUSED, node_slots,
-};
+use crate::bvh::layout::{Aabb, BoxRecord, Bvh2, Child, Header, MAGIC, Node, Record, Triangle, UNUSED, node_slots};
 use crate::bvh::sah::Collapse;
 
 /// Builds the LBVH of `triangles` over `positions`. Triangles that are not finite or name vertices that are not there are
@@ -101,15 +99,7 @@ impl<R: Record> Bvh2<R> {
     pub fn with_geometries(mut self, geometries: &[(u32, u32)], build_flags: u32) -> Bvh2<R> {
         self.header.geometry_count = geometries.len().max(1) as u32;
         self.header.build_flags = build_flags;
-        let flags = || geometries.iter().map(|&(_, flags)| flags);
-        let all = flags().reduce(|a, b| a & b).unwrap_or(0);
-        self.header.geometry_flags = all | flags().fold(0, |a, b| a | b) << 8;
-        let mut first = 0;
-        let entries = geometries.iter().map(|&(count, flags)| {
-            first += count;
-            GeometryEntry { first: first - count, flags }
-        });
-        self.geometries = if geometries.len() > 1 { entries.collect() } else { Vec::new() };
+        (self.header.geometry_flags, self.geometries) = geometry::table_of(geometries);
         self
     }
 }

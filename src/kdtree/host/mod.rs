@@ -14,7 +14,7 @@ mod small;
 
 use super::layout::KdTree;
 use super::termination::Costs;
-use crate::bvh::host::geometry::Corners;
+use crate::bvh::host::geometry::{self, Corners};
 use crate::bvh::host::lbvh;
 use crate::bvh::layout::{Aabb, Triangle};
 use crate::{Error, Result};
@@ -129,6 +129,15 @@ pub fn build_corners(corners: impl Iterator<Item = Corners>, options: &Options) 
         Planes::Mixed { bins, exact } => binned::build(&heuristic, (&records, reach), (bins, exact), cell, references),
     };
     assemble::assemble(root, &heuristic, (cell, reach), records, (primitive_count, status))
+}
+
+impl KdTree {
+    /// The same with the geometries that its primitives are of: how many primitives each has, and its flags.
+    pub fn with_geometries(mut self, geometries: &[(u32, u32)]) -> KdTree {
+        self.header.geometry_count = geometries.len().max(1) as u32;
+        (self.header.geometry_flags, self.geometries) = geometry::table_of(geometries);
+        self
+    }
 }
 
 /// Fewer references than this are not worth another thread.
