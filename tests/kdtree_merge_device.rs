@@ -5,7 +5,7 @@ mod common;
 use common::corpus::{self, Mesh};
 use common::device;
 use common::shapes::{Corners, Random, hard_rays, icosphere, placed, soup, tree_of};
-use hedgerow::bvh::builder::Input;
+use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::Buffer;
 use hedgerow::kdtree::builder::{self, Builder};
@@ -32,6 +32,17 @@ const PLENTY: Options = Options {
     },
 };
 
+/// As a chain, and by persistent workgroups.
+fn schedules() -> impl Iterator<Item = Options> {
+    let persistent = [1, 2, 7, 64, 1024].map(|workgroups| builder::Options {
+        schedule: Some(Schedule::Persistent),
+        workgroups: Some(workgroups),
+        ..PLENTY.build
+    });
+    let chain = builder::Options { schedule: Some(Schedule::Chain), ..PLENTY.build };
+    [chain].into_iter().chain(persistent).map(|build| Options { build, ..PLENTY })
+}
+
 fn mixed() -> host::Options {
     let builder::Options { bins, exact, costs, .. } = builder::Options::DEFAULT;
     host::Options { planes: Planes::Mixed { bins, exact }, costs }
@@ -42,6 +53,15 @@ struct World {
     name: &'static str,
     still: Corners,
     objects: Vec<Corners>,
+}
+
+impl World {
+    fn most(&self) -> Most {
+        Most {
+            objects: self.objects.len() as u32,
+            triangles: self.objects.iter().map(|object| object.len() as u32).sum(),
+        }
+    }
 }
 
 fn worlds() -> Vec<World> {
@@ -86,10 +106,7 @@ impl Scene {
     }
 
     fn with(still: KdTree, world: &World, options: &Options) -> Scene {
-        let most = Most {
-            objects: world.objects.len() as u32,
-            triangles: world.objects.iter().map(|object| object.len() as u32).sum(),
-        };
+        let most = world.most();
         let still = still.with_room(Merger::room(options, most)).expect("room");
         let merger = Merger::new(device(), options, &still.header, most).expect("a merger");
         let sizes = merger.sizes();
@@ -264,6 +281,27 @@ fn objects_that_are_pushed_as_trees_give_the_same_bytes_as_those_that_find_their
     }
 }
 
+#[test]
+fn chains_and_any_number_of_persistent_workgroups_give_the_same_bytes() {
+    for world in worlds() {
+        let expected = Scene::new(&world, &PLENTY).on_host(|_| true);
+        for options in schedules() {
+            let scene = Scene::new(&world, &options);
+            let before = scene.tree().to_bytes();
+            let trees = scene.trees();
+            for which in [0b000u32, 0b101] {
+                let builder::Options { schedule, workgroups, .. } = options.build;
+                let what = format!("{}, {schedule:?}, {workgroups:?} workgroups, pushed {which:03b}", world.name);
+                let report = scene.merge(&scene.pushed(&trees, |i| which >> i & 1 == 1));
+                assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{what}: {report:?}");
+                assert_same(&scene.tree(), &expected, &what);
+                scene.restore();
+                assert!(scene.tree().to_bytes() == before, "{what}: the static tree is another");
+            }
+        }
+    }
+}
+
 /// The object's tree in the same command buffer, ahead of the merge.
 #[test]
 fn a_tree_can_be_built_and_pushed_at_once() {
@@ -301,14 +339,18 @@ fn hits_of_a_merged_tree_are_those_of_brute_force() {
     }
 }
 
-/// Objects come and go at random; now and then the tree is looked at.
+/// Objects come and go at random, merged by the schedules in turn; now and then the tree is looked at.
 fn rounds(count: u32, look: u32) {
     let sphere = placed(&icosphere(1), 0.2, [0.0; 3]);
     let mut random = Random(11);
     let objects = (0..6).map(|_| placed(&sphere, 1.0, random.point(0.6))).collect();
     let world = World { name: "rounds", still: soup(300, 0.2, 12), objects };
-    let scene = Scene::new(&world, &PLENTY);
+    let mut scene = Scene::new(&world, &PLENTY);
     let before = scene.tree().to_bytes();
+    let merger = |options| Merger::new(device(), &options, &scene.still.header, world.most()).expect("a merger");
+    let mergers: Vec<Merger> = schedules().map(merger).collect();
+    let scratch = mergers.iter().map(|merger| merger.sizes().scratch).max().expect("schedules");
+    scene.scratch = device().buffer("scratch", scratch).expect("memory");
     let mut there = Objects::default();
     let mut is_there = [false; 6];
     for round in 0..count {
@@ -320,6 +362,7 @@ fn rounds(count: u32, look: u32) {
             there.insert(&name, scene.meshes[object].2).expect("it is not there");
         }
         is_there[object] ^= true;
+        scene.merger = mergers[round as usize % mergers.len()].clone();
         scene.merge(&there.list());
         if round % look == 0 {
             let tree = scene.tree();

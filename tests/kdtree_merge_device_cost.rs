@@ -8,7 +8,7 @@ mod common;
 use common::corpus::{self, Mesh};
 use common::device;
 use common::shapes::Corners;
-use hedgerow::bvh::builder::Input;
+use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::{Buffer, Phase, Timestamps};
 use hedgerow::kdtree::builder::{self, Builder, Report as BuildReport};
@@ -17,6 +17,7 @@ use hedgerow::scene::{LoadOptions, load};
 use std::collections::BTreeMap;
 
 const ROUNDS: usize = 9;
+const SCHEDULES: [Schedule; 2] = [Schedule::Chain, Schedule::Persistent];
 
 fn input_of((_, positions, triangles): &Mesh) -> (Input, [Buffer<'static>; 2]) {
     let vertices = device().upload("positions", positions).expect("memory");
@@ -79,46 +80,53 @@ fn merging_beside_building_on_the_device() {
             Builder::new(device(), &options.build, count + triangles).expect("a builder"),
         );
         let header = hedgerow::kdtree::layout::Header { primitive_count: count, ..still_builder.header() };
-        let merger = Merger::new(device(), &options, &header, most).expect("a merger");
+        let mergers = SCHEDULES.map(|schedule| {
+            let build = builder::Options { schedule: Some(schedule), ..options.build };
+            Merger::new(device(), &Options { build, ..options }, &header, most).expect("a merger")
+        });
         let buffer = |bytes: u64| device().buffer("memory", bytes).expect("memory");
         let (structure, other) = (buffer(still_builder.sizes().structure), buffer(builder.sizes().structure));
         let building = buffer(still_builder.sizes().scratch.max(builder.sizes().scratch));
-        let (scratch, undo) = (buffer(merger.sizes().scratch), buffer(merger.sizes().undo));
+        let sizes = mergers.each_ref().map(Merger::sizes);
+        let scratch = buffer(sizes.iter().map(|sizes| sizes.scratch).max().expect("schedules"));
+        let undo = buffer(sizes[0].undo);
         let memory = Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
         let ((still_input, _a), (input, _b), (both_input, _c)) = (input_of(&still), input_of(&moves), input_of(&both));
         timed(|recorder| still_builder.record(recorder, &still_input, structure.region(), building.region()));
         let object = Object { input, first_primitive: count, tree: None };
-        let (mut builds, mut merges, mut restores) = (Vec::new(), Vec::new(), Vec::new());
-        let mut by_phase = BTreeMap::<&str, f64>::new();
+        let (mut builds, mut merges, mut restores) = (Vec::new(), SCHEDULES.map(|_| Vec::new()), Vec::new());
+        let mut by_phase = SCHEDULES.map(|_| BTreeMap::<&str, f64>::new());
         for round in 0..=ROUNDS {
             let built = timed(|r| builder.record(r, &both_input, other.region(), building.region()));
             let report: BuildReport = building.read_at(builder.report_range().start, 1)[0];
             assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
-            let merged = timed(|r| merger.record(r, memory, &[object]));
-            let report: Report = scratch.read_at(merger.report_range().start, 1)[0];
-            assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
-            let restored = timed(|r| merger.restore(r, memory));
             // The first compiles.
             if round > 0 {
                 builds.push(total(&built));
-                merges.push(total(&merged));
-                restores.push(total(&restored));
-                merged.iter().for_each(|p| *by_phase.entry(p.name).or_default() += p.milliseconds / ROUNDS as f64);
-            } else {
-                println!("{name}: {count} triangles, {triangles} merged; {:?}", report.estimate(triangles));
-                println!("  {report:?}");
+            }
+            for (i, merger) in mergers.iter().enumerate() {
+                let merged = timed(|r| merger.record(r, memory, &[object]));
+                let report: Report = scratch.read_at(merger.report_range().start, 1)[0];
+                assert_eq!(report.status, 0, "{report:?}");
+                let restored = timed(|r| merger.restore(r, memory));
+                if round > 0 {
+                    merges[i].push(total(&merged));
+                    restores.push(total(&restored) / total(&merged));
+                    merged
+                        .iter()
+                        .for_each(|p| *by_phase[i].entry(p.name).or_default() += p.milliseconds / ROUNDS as f64);
+                } else if i == 0 {
+                    println!("{name}: {count} triangles, {triangles} merged; {:?}", report.estimate(triangles));
+                    println!("  {report:?}");
+                }
             }
         }
         let ratio = |a: &[f64], b: &[f64]| median(a.iter().zip(b).map(|(a, b)| a / b).collect());
-        println!(
-            "  merge / build {:.3}, restore / merge {:.4}; medians, ms: build {:.1}, merge {:.1}, restore {:.2}",
-            ratio(&merges, &builds),
-            ratio(&restores, &merges),
-            median(builds),
-            median(merges),
-            median(restores)
-        );
-        println!("  merge by phase, ms: {by_phase:.2?}");
+        println!("  restore / merge {:.4}; median of builds, ms: {:.1}", median(restores), median(builds.clone()));
+        for ((schedule, merges), by_phase) in SCHEDULES.into_iter().zip(merges).zip(by_phase) {
+            println!("  {schedule}: merge / build {:.3}, median, ms: {:.2}", ratio(&merges, &builds), median(merges));
+            println!("    by phase, ms: {by_phase:.2?}");
+        }
     }
 }
 
@@ -138,7 +146,7 @@ fn pushing_beside_finding() {
         let record_tree = || timed(|r| builder.record(r, &input, tree.region(), building.region()));
         record_tree();
         let place = |object: &Object, options: &Options| {
-            let build = builder::Options { more: Merger::room(options, most), ..options.build };
+            let build = builder::Options { more: Merger::room(options, most), ..builder::Options::DEFAULT };
             let still_builder = Builder::new(device(), &build, count).expect("a builder");
             let header = hedgerow::kdtree::layout::Header { primitive_count: count, ..still_builder.header() };
             let merger = Merger::new(device(), options, &header, most).expect("a merger");
@@ -148,40 +156,47 @@ fn pushing_beside_finding() {
             timed(|recorder| still_builder.record(recorder, &still_input, structure.region(), building.region()));
             (*object, merger, structure, scratch, undo)
         };
-        let ways = [None, Some(tree.address())].map(|tree| {
-            let object = Object { input, first_primitive: count, tree };
-            let mut options = Options { estimate: Estimate::WITH_TREES, ..Options::DEFAULT };
-            loop {
-                let place = place(&object, &options);
-                let (object, merger, structure, scratch, undo) = &place;
-                let memory = Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
-                timed(|r| merger.record(r, memory, &[*object]));
-                let report: Report = scratch.read_at(merger.report_range().start, 1)[0];
-                timed(|r| merger.restore(r, memory));
-                options.estimate = report.estimate(triangles);
-                if report.status & status::OUT_OF_ROOM == 0 {
-                    println!("{name}: {report:?}");
-                    break place;
+        for schedule in SCHEDULES {
+            let ways = [None, Some(tree.address())].map(|tree| {
+                let object = Object { input, first_primitive: count, tree };
+                let build = builder::Options { schedule: Some(schedule), ..builder::Options::DEFAULT };
+                let mut options = Options { build, estimate: Estimate::WITH_TREES };
+                loop {
+                    let place = place(&object, &options);
+                    let (object, merger, structure, scratch, undo) = &place;
+                    let memory =
+                        Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+                    timed(|r| merger.record(r, memory, &[*object]));
+                    let report: Report = scratch.read_at(merger.report_range().start, 1)[0];
+                    timed(|r| merger.restore(r, memory));
+                    options.estimate = report.estimate(triangles);
+                    if report.status & status::OUT_OF_ROOM == 0 {
+                        println!("{name}, {schedule}: {report:?}");
+                        break place;
+                    }
+                }
+            });
+            let mut merges = [Vec::new(), Vec::new()];
+            let mut by_phase = [BTreeMap::<&str, f64>::new(), BTreeMap::new()];
+            let mut builds = Vec::new();
+            for _ in 0..ROUNDS {
+                builds.push(total(&record_tree()));
+                for (i, (object, merger, structure, scratch, undo)) in ways.iter().enumerate() {
+                    let memory =
+                        Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+                    let merged = timed(|r| merger.record(r, memory, &[*object]));
+                    timed(|r| merger.restore(r, memory));
+                    merges[i].push(total(&merged));
+                    merged
+                        .iter()
+                        .for_each(|p| *by_phase[i].entry(p.name).or_default() += p.milliseconds / ROUNDS as f64);
                 }
             }
-        });
-        let mut merges = [Vec::new(), Vec::new()];
-        let mut by_phase = [BTreeMap::<&str, f64>::new(), BTreeMap::new()];
-        let mut builds = Vec::new();
-        for _ in 0..ROUNDS {
-            builds.push(total(&record_tree()));
-            for (i, (object, merger, structure, scratch, undo)) in ways.iter().enumerate() {
-                let memory = Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
-                let merged = timed(|r| merger.record(r, memory, &[*object]));
-                timed(|r| merger.restore(r, memory));
-                merges[i].push(total(&merged));
-                merged.iter().for_each(|p| *by_phase[i].entry(p.name).or_default() += p.milliseconds / ROUNDS as f64);
-            }
+            let [find, push] = merges;
+            let ratio = |a: &[f64], b: &[f64]| median(a.iter().zip(b).map(|(a, b)| a / b).collect());
+            println!("  push / find {:.3}, the object's tree / find {:.3}", ratio(&push, &find), ratio(&builds, &find));
+            println!("  medians, ms: find {:.2}, push {:.2}, tree {:.2}", median(find), median(push), median(builds));
+            println!("  by phase, ms: {by_phase:.2?}");
         }
-        let [find, push] = merges;
-        let ratio = |a: &[f64], b: &[f64]| median(a.iter().zip(b).map(|(a, b)| a / b).collect());
-        println!("  push / find {:.3}, the object's tree / find {:.3}", ratio(&push, &find), ratio(&builds, &find));
-        println!("  medians, ms: find {:.2}, push {:.2}, tree {:.2}", median(find), median(push), median(builds));
-        println!("  by phase, ms: {by_phase:.2?}");
     }
 }

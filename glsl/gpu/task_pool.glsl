@@ -51,6 +51,15 @@ bool pool_wait(PoolState pool, uint target) {
     return false;
 }
 
+// A pool that has not begun, of so many phases without tasks; by one invocation.
+void pool_reset(PoolState pool, uint phases) {
+    pool.next = 0u;
+    pool.done = 0u;
+    pool.status = 0u;
+    pool.phases = phases;
+    for (uint i = 0; i < phases; ++i) pool.tasks[i] = 0u;
+}
+
 PoolCursor pool_start() {
     return PoolCursor(0, 0, 0, true);
 }

@@ -12,16 +12,13 @@ void main() {
         pool_take(pool, cursor);
         if (!cursor.working) break;
         uint phase = cursor.phase, item = cursor.task;
-        uint of_level = (phase - PHASE_LEVELS) / 3u, of_three = (phase - PHASE_LEVELS) % 3u;
         if (phase == PHASE_COUNT) kd_count(item);
         else if (phase == PHASE_PLAN) kd_plan();
         else if (phase == PHASE_RECORDS) kd_records(item);
         else if (phase == PHASE_ROOT) kd_root();
         else if (phase == PHASE_ORDER) kd_order_subtrees();
         else if (phase == PHASE_PLACE) kd_place(item);
-        else if (of_three == 0u) kd_bin(item, of_level);
-        else if (of_three == 1u) kd_classify(item, of_level);
-        else kd_distribute(item, of_level);
+        else kd_level(phase, item);
         pool_finish(pool);
     }
     if (gl_LocalInvocationIndex == 0 && pool.status != 0) {

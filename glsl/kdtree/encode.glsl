@@ -25,11 +25,7 @@ void kd_reset() {
     if (gl_LocalInvocationIndex != 0u) return;
     KdState state = build_state();
     PoolState pool = PoolState(state_address);
-    pool.next = 0u;
-    pool.done = 0u;
-    pool.status = 0u;
-    pool.phases = PHASES;
-    for (uint i = 0; i < PHASES; ++i) pool.tasks[i] = 0u;
+    pool_reset(pool, PHASES);
     pool.tasks[PHASE_COUNT] = tile_count();
     pool.tasks[PHASE_PLAN] = 1u;
     pool.tasks[PHASE_RECORDS] = tile_count();

@@ -5,14 +5,17 @@
 //
 //     setup    keeps the static tree's header                                            merge_setup.comp, merge_reset.comp
 //     encode   records of all objects behind those that there are: kdtree/encode.glsl     and merge_plan.comp between
-//     push     leaves of objects' trees in leaves of the static one, and pairs of         merge_seed.comp, merge_push.comp,
-//              leaf and triangle there, in any order                                      merge_meet.comp
+//     push     leaves of objects' trees in leaves of the static one, and pairs of         merge_seed.comp, merge_push.glsl
+//              leaf and triangle there, in any order
 //     find     pairs of objects without trees; all are sorted by leaf, then triangle      merge_find.comp, gpu/radix_sort
 //     unique   pushed pairs are left once                                                 merge_unique.comp
 //     mark     a task for each leaf                                                       merge_mark.comp
-//     gather   its references                                                             merge_gather.comp
+//     gather   its references                                                             merge_build.glsl
 //     ...      the levels and subtrees, as in a build, behind what there is
-//     hook     the roots to the places of the leaves; what was there is kept              merge_order.comp, merge_hook.comp
+//     hook     the roots to the places of the leaves; what was there is kept              merge_build.glsl
+//
+// What is pushed and what is built goes by steps of which only the device knows how much they have. Each is a chain of dispatches, or
+// one persistent dispatch of a task pool: merge_push_persistent.comp, merge_build_persistent.comp.
 //
 //   needs  one barrier between phases
 #ifndef HEDGEROW_KDTREE_MERGE
@@ -20,6 +23,14 @@
 #include "kdtree/merge_state.glsl"
 #include "kdtree/scan.glsl"
 #include "kdtree/clip.glsl"
+
+// Phases as the pools count them. Of a push its steps, each of which goes down in one of two trees, and what is met behind them;
+// of what is built, the phases of a build from the levels on, with one before and one behind.
+const uint PUSH_STEPS = 2 * KD_MAX_DEPTH + 1;
+const uint PUSH_PHASES = PUSH_STEPS + 1;
+const uint PHASE_GATHER = PHASE_ROOT;
+const uint PHASE_HOOK = PHASE_PLACE + 1;
+const uint MERGE_PHASES = PHASE_HOOK + 1;
 
 KdMerge merge_state() {
     return KdMerge(address_of(state_address, 1u, MERGE_AT));
@@ -69,19 +80,6 @@ KdItems items_of(uint step) {
 KdItems met_items() {
     KdMerge merge = merge_state();
     return KdItems(address_of(merge.items, 2u * merge.item_capacity, ITEM_BYTES));
-}
-
-// Of so many items those that there was room for; one invocation keeps what was wanted.
-uint take_items(uint wanted) {
-    KdMerge merge = merge_state();
-    if (gl_GlobalInvocationID.x == 0u) {
-        merge.wanted_items = max(merge.wanted_items, wanted);
-        if (wanted > merge.item_capacity) {
-            if (merge.items_ended == 0u) merge.items_ended = level;
-            merge.status = STATUS_OUT_OF_ROOM;
-        }
-    }
-    return min(wanted, merge.item_capacity);
 }
 
 Place root_place() {

@@ -109,7 +109,7 @@ void main() {
     next_step();
     if (gl_LocalInvocationIndex == 0u) {
         if (!fits) {
-            merge.status = STATUS_OUT_OF_ROOM;
+            merge.status |= STATUS_OUT_OF_ROOM;
             state.status |= STATUS_OUT_OF_ROOM;
             state.active_count = 0u;
         }
@@ -130,6 +130,11 @@ void main() {
         merge.replaced_references = fits ? wanted.own : 0u;
         merge.first_root = base_node;
         KdUndo(merge.undo).count = marked;
+        PoolState pool = PoolState(state_address);
+        pool_reset(pool, MERGE_PHASES);
+        pool.tasks[PHASE_GATHER] = marked;
+        pool.tasks[PHASE_ORDER] = 1u;
+        pool.tasks[PHASE_HOOK] = (marked + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x;
     }
     next_step();
     KdMarkedLeaves leaves = marked_leaves();

@@ -31,4 +31,12 @@ void kd_distribute(uint item, uint of_level) {
     if (item < chunks) kd_distribute_chunk(item, of_level);
     else kd_distribute_leaves(item - chunks, of_level);
 }
+
+// A task of the pool, of a phase of the levels.
+void kd_level(uint phase, uint item) {
+    uint of_level = (phase - PHASE_LEVELS) / 3u, of_three = (phase - PHASE_LEVELS) % 3u;
+    if (of_three == 0u) kd_bin(item, of_level);
+    else if (of_three == 1u) kd_classify(item, of_level);
+    else kd_distribute(item, of_level);
+}
 #endif

@@ -28,7 +28,8 @@ pub struct Options {
     pub exact: u32,
     /// The costs by which the best plane is chosen.
     pub costs: Costs,
-    /// How the phases are recorded: a chain of dispatches or one persistent dispatch; `None` takes what measured faster.
+    /// How the phases are recorded: a chain of dispatches or one persistent dispatch; `None` takes what measured faster
+    /// ([`Options::schedule_on`]).
     pub schedule: Option<Schedule>,
     /// Workgroups of the persistent dispatch, 1 or more; `None` takes what keeps the device busy.
     pub workgroups: Option<u32>,
@@ -36,6 +37,8 @@ pub struct Options {
     pub estimate: Option<Estimate>,
     /// Room in the structure beside what the build may need, for objects that are to be merged into it: [`super::merge`].
     pub more: layout::Room,
+    /// Geometries: what [`Source::Several`](crate::bvh::geometry::Source::Several) has, otherwise 1.
+    pub geometry_count: u32,
     /// `vk::BuildAccelerationStructureFlagsKHR` for the header.
     pub build_flags: u32,
 }
@@ -50,6 +53,7 @@ impl Options {
         workgroups: None,
         estimate: None,
         more: layout::Room { nodes: 0, references: 0, records: 0 },
+        geometry_count: 1,
         build_flags: 0,
     };
     /// The most bins: their counters lie in a workgroup's shared memory.
@@ -58,6 +62,14 @@ impl Options {
     pub const LEAST_EXACT: u32 = 4;
     /// The most: looking at every plane takes time by the square.
     pub const MOST_EXACT: u32 = 64;
+
+    /// The schedule on the device of `context`; of a merge, too. The pool on a CPU: workgroups take what is left as they come, where
+    /// those of a dispatch have their shares, whichever core is slower (docs/kdtree.md). No GPU was measured, and a chain asks nothing
+    /// of one's progress.
+    pub fn schedule_on(&self, context: &Context) -> Schedule {
+        let measured = if context.limits.is_cpu() { Schedule::Persistent } else { Schedule::Chain };
+        self.schedule.unwrap_or(measured)
+    }
 
     /// # Errors
     /// [`Error::Argument`] names the option that cannot be used, and what can.
@@ -403,7 +415,7 @@ impl Builder {
                 "{primitive_count} triangles: a kd-tree holds at most {MAX_COUNT}; split the mesh"
             )));
         }
-        let schedule = options.schedule.unwrap_or(Schedule::Chain);
+        let schedule = options.schedule_on(context);
         let shape = Shape::of(context, options, primitive_count, schedule);
         let room = Room::of(options, primitive_count, shape.chunk());
         Ok(Builder { options: *options, schedule, count: primitive_count, shape, room })
@@ -431,7 +443,7 @@ impl Builder {
             node_room: self.room.nodes,
             reference_room: self.room.references,
             record_room: self.room.records,
-            geometry_count: 1,
+            geometry_count: self.options.geometry_count,
             ..Header::zeroed()
         }
     }
@@ -473,8 +485,7 @@ impl Builder {
     /// `classify` and `distribute` of each level; `place`. Or `build` where the schedule is persistent.
     ///
     /// # Errors
-    /// The memory is too small; the input has another number of triangles than the builder, or several geometries; a pipeline could
-    /// not be made.
+    /// The memory is too small; the input has another number of triangles or geometries than the builder; a pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: Region, scratch: Region) -> Result<()> {
         let sizes = self.sizes();
         let structure = structure.checked("memory for a kd-tree", sizes.structure, sizes.alignment)?;
@@ -483,7 +494,8 @@ impl Builder {
     }
 
     fn arguments(&self, input: &Input, structure: u64, scratch: u64) -> Result<Arguments> {
-        let planned = Planned { primitives: Primitives::Triangles, primitive_count: self.count, geometry_count: 1 };
+        let geometry_count = self.options.geometry_count;
+        let planned = Planned { primitives: Primitives::Triangles, primitive_count: self.count, geometry_count };
         planned.check(input)?;
         Ok(Arguments::new(&self.options, &self.room, input, structure, scratch))
     }

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 /// How to merge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Bins, exact splits and costs of what is built in leaves; the rest is not looked at.
+    /// Bins, exact splits and costs of what is built in leaves, the schedule and its workgroups; the rest is not looked at.
     pub build: builder::Options,
     /// What the memory goes by.
     pub estimate: Estimate,

@@ -70,6 +70,7 @@ pub struct Merger {
     most: Most,
     primitive_count: u32,
     structure_bytes: u64,
+    schedule: Schedule,
     shape: Shape,
     sort: radix_sort::Shape,
     room: builder::Room,
@@ -171,7 +172,8 @@ impl Merger {
                 )));
             }
         }
-        let shape = Shape::of(context, &options.build, most.triangles.saturating_mul(4), Schedule::Chain);
+        let schedule = options.build.schedule_on(context);
+        let shape = Shape::of(context, &options.build, most.triangles.saturating_mul(4), schedule);
         let plan = Plan::of(&options.estimate, most.triangles);
         let chunk = shape.chunk();
         let level_references =
@@ -195,6 +197,7 @@ impl Merger {
             most,
             primitive_count: still.primitive_count,
             structure_bytes: still.sizes().bytes,
+            schedule,
             shape,
             sort,
             room,
@@ -241,7 +244,8 @@ impl Merger {
     /// whatever reads the structure or the report, writes the scratch memory or restores) behind. Where there is no room for the
     /// items, the pairs, the leaves or their references, nothing is merged; where there is none for the levels below, nodes are leaves;
     /// the status says so in both cases. Labels: `encode`; `push` where an object has a tree, `find` where one has none; `sort`;
-    /// `unique` where one has a tree; `mark`; those of the builder's levels; `place`, `hook`.
+    /// `unique` where one has a tree; `mark`; those of the builder's levels, `place` and `hook`, or `build` where the schedule is
+    /// persistent.
     ///
     /// # Errors
     /// The memory is too small; more objects or triangles than the merger is for; several geometries in one; primitives that are numbered twice; a pipeline
@@ -376,7 +380,7 @@ impl Merger {
         steps.extend(of_objects(&shaders::KDTREE_BUILD_RECORDS));
         steps.push(fill::step("encode", keys[0], pair_capacity * key_words, u32::MAX));
         let each_first_tile = objects.iter().enumerate().map(|(i, object)| (*object, first_tile(i)));
-        steps.extend(push::steps(seeds, (self.shape.workgroup, groups), each_first_tile, step));
+        steps.extend(push::steps(seeds, self.schedule, (self.shape.workgroup, groups), each_first_tile, step));
         // Neighbours without trees at once: so many primitives have as many tiles.
         let mut at = 0;
         for neighbours in objects.chunk_by(|a, b| has_tree(a) == has_tree(b)) {
@@ -392,6 +396,10 @@ impl Merger {
             steps.push(step("unique", &shaders::KDTREE_MERGE_UNIQUE, 0, 1));
         }
         steps.push(step("mark", &shaders::KDTREE_MERGE_MARK, 0, 1));
+        if self.schedule == Schedule::Persistent {
+            steps.push(step("build", &shaders::KDTREE_MERGE_BUILD_PERSISTENT, 0, groups));
+            return steps;
+        }
         steps.push(step("mark", &shaders::KDTREE_MERGE_GATHER, 0, groups));
         // Leaves have few references: below the first level little is left, and at most of them nothing.
         let few = groups.div_ceil(4);

@@ -1,6 +1,7 @@
 //! Objects' own trees on their way down the static one.
 
 use super::Object;
+use crate::bvh::builder::Schedule;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::shaders::{self, Shader};
 use crate::gpu::{Kernel, Step};
@@ -27,6 +28,7 @@ const STEPS: u32 = 2 * MAX_DEPTH + 1;
 /// of a phase, a shader, a level and a number of workgroups.
 pub(super) fn steps(
     seeds: u64,
+    schedule: Schedule,
     (workgroup, groups): (u32, u32),
     objects: impl Iterator<Item = (Object, u32)>,
     step: impl Fn(&'static str, &'static Shader, u32, u32) -> Step,
@@ -37,11 +39,16 @@ pub(super) fn steps(
         Step::new("push", Kernel::new(&shaders::KDTREE_MERGE_SEED, workgroup, &[]), &seed, 1)
     };
     let mut steps: Vec<Step> = trees.enumerate().map(seed).collect();
-    if !steps.is_empty() {
+    if steps.is_empty() {
+        return steps;
+    }
+    if schedule == Schedule::Persistent {
+        steps.push(step("push", &shaders::KDTREE_MERGE_PUSH_PERSISTENT, 0, groups));
+    } else {
         // Most steps have few items or none.
         let few = groups.div_ceil(4);
         steps.extend((0..STEPS).map(|level| step("push", &shaders::KDTREE_MERGE_PUSH, level, few)));
-        steps.push(step("push", &shaders::KDTREE_MERGE_MEET, STEPS, groups));
+        steps.push(step("push", &shaders::KDTREE_MERGE_MEET, 0, groups));
     }
     steps
 }
