@@ -301,6 +301,17 @@ fn scenes_are_found_by_name_in_the_folder_that_is_given() {
 }
 
 #[test]
+fn a_variable_that_is_empty_is_as_one_that_is_not_set() {
+    let output = Command::new(env!("CARGO_BIN_EXE_hedgerow"))
+        .args(["build", "there_is_none", "-b", "lbvh-host"])
+        .envs(["HEDGEROW_SCENES", "HEDGEROW_DEVICE", "HEDGEROW_PUBLISHED"].map(|name| (name, "")))
+        .output()
+        .expect("the binary starts");
+    let (_, err) = texts(&output);
+    assert_eq!(err, fails(FAILED, &["build", "there_is_none", "-b", "lbvh-host"]));
+}
+
+#[test]
 fn a_reader_that_goes_away_is_no_error() {
     use std::process::Stdio;
     let mut child = Command::new(env!("CARGO_BIN_EXE_hedgerow"))

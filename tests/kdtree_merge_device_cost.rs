@@ -79,10 +79,9 @@ fn merging_beside_building_on_the_device() {
             Builder::new(device(), &build, count).expect("a builder"),
             Builder::new(device(), &options.build, count + triangles).expect("a builder"),
         );
-        let header = hedgerow::kdtree::layout::Header { primitive_count: count, ..still_builder.header() };
         let mergers = SCHEDULES.map(|schedule| {
             let build = builder::Options { schedule: Some(schedule), ..options.build };
-            Merger::new(device(), &Options { build, ..options }, &header, most).expect("a merger")
+            Merger::new(device(), &Options { build, ..options }, &still_builder.header(), most).expect("a merger")
         });
         let buffer = |bytes: u64| device().buffer("memory", bytes).expect("memory");
         let (structure, other) = (buffer(still_builder.sizes().structure), buffer(builder.sizes().structure));
@@ -148,8 +147,7 @@ fn pushing_beside_finding() {
         let place = |object: &Object, options: &Options| {
             let build = builder::Options { more: Merger::room(options, most), ..builder::Options::DEFAULT };
             let still_builder = Builder::new(device(), &build, count).expect("a builder");
-            let header = hedgerow::kdtree::layout::Header { primitive_count: count, ..still_builder.header() };
-            let merger = Merger::new(device(), options, &header, most).expect("a merger");
+            let merger = Merger::new(device(), options, &still_builder.header(), most).expect("a merger");
             let structure = buffer(still_builder.sizes().structure);
             let (scratch, undo) = (buffer(merger.sizes().scratch), buffer(merger.sizes().undo));
             let building = buffer(still_builder.sizes().scratch);

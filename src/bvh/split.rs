@@ -4,9 +4,9 @@
 //! A triangle's *weight* is X · (A_box − A_ideal): the half area of its box, less that of as many boxes as one likes (half the
 //! sum of the components of its edges' cross product), times X = 2⁻ⁱ for the most important plane that its box crosses, i being
 //! how many halvings of the scene's longest extent the plane's spacing is. It has s = ⌊∛(F · weight)⌋ splits, or as many as one
-//! triangle may have, F the greatest that keeps the sum of all within the budget. The planes are those that halve the scene's box along each axis, over and over; a part
-//! is split at the one of the greatest spacing that lies inside of its box, and the other splits are given to the two halves by
-//! their longest sides.
+//! triangle may have, F the greatest that keeps the sum of all within the budget. The planes are those that halve the scene's
+//! box along each axis, over and over; a part is split at the one of the greatest spacing that lies inside of its box, and the
+//! other splits are given to the two halves by their longest sides.
 //!
 //! What the paper leaves to floats is in integers here, so that every device finds the same references: weights count eighths of
 //! octaves, a histogram of them gives F by bisection, and the cube root is the integer one. No invocation splits a triangle to

@@ -1,6 +1,6 @@
 //! `hedgerow bench`: the whole matrix of scenes, builders and rays; records as they are measured, and the report.
 
-use super::options::{Costs, Kinds, Size};
+use super::options::{Costs, Kinds, Size, perhaps_empty};
 use super::{Bar, Common};
 use crate::gpu::Device;
 use crate::measure::builders::{self, Needs, Spec};
@@ -54,7 +54,7 @@ pub struct Arguments {
     #[arg(long, value_name = "on|off|cheap", default_value = "cheap")]
     epo: Epo,
     /// Published figures of kd-trees to print beside measured ones [default: those of Papay 2025]
-    #[arg(long, env = "HEDGEROW_PUBLISHED", value_name = "CSV")]
+    #[arg(long, env = "HEDGEROW_PUBLISHED", value_name = "CSV", value_parser = perhaps_empty())]
     published: Option<PathBuf>,
     /// No pictures of the scenes
     #[arg(long)]
@@ -67,7 +67,8 @@ pub struct Arguments {
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let asked = common.builders(&builders::parse_list(&arguments.builder)?);
     let scenes = scenes(common, arguments)?;
-    let published = arguments.published.as_deref().map_or_else(|| Ok(published::papay()), published::read)?;
+    let published = arguments.published.as_deref().filter(|file| !file.as_os_str().is_empty());
+    let published = published.map_or_else(|| Ok(published::papay()), published::read)?;
     // Before any work: a folder that cannot be written would lose all of it.
     let results = Results::create(&arguments.output)?;
     let device = open(common, &asked)?;
@@ -143,7 +144,7 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<Vec<String>>
         if folder.is_dir() { scenes.extend(in_folder(folder)?) } else { scenes.push(name.clone()) }
     }
     if arguments.all {
-        let folder = common.scenes_dir.as_deref().ok_or_else(|| {
+        let folder = common.scenes_dir().ok_or_else(|| {
             crate::Error::Argument(
                 "--all takes the scenes of a folder; name it with --scenes-dir or HEDGEROW_SCENES".into(),
             )

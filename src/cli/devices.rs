@@ -32,7 +32,7 @@ struct Row<'a> {
 }
 
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
-    let found = gpu::list(common.device.as_deref())?;
+    let found = gpu::list(common.device())?;
     let rows: Vec<_> = found.iter().map(row).collect();
     let json = Json { json: arguments.json.clone() };
     json.write_each([&rows])?;

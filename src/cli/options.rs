@@ -5,8 +5,9 @@ use crate::gpu::{Device, DeviceOptions};
 use crate::measure::builders::{self, Spec};
 use crate::scene::{self, Camera, DynamicScene, Scene};
 use crate::trace::kinds::{RayKind, RayOptions};
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// Options that every command takes.
@@ -15,7 +16,7 @@ use std::str::FromStr;
 pub struct Common {
     /// Vulkan device: its index, or a part of its name
     #[arg(long, global = true, env = "HEDGEROW_DEVICE", value_name = "NAME_OR_INDEX")]
-    pub device: Option<String>,
+    device: Option<String>,
     /// Switch the Vulkan validation layers on; any message is an error
     #[arg(long, global = true)]
     pub validation: bool,
@@ -38,14 +39,29 @@ pub struct Common {
     #[arg(long, global = true, value_name = "N")]
     pub rays_per_build: Option<RaysPerBuild>,
     /// A folder with more scenes
-    #[arg(long, global = true, env = "HEDGEROW_SCENES", value_name = "DIR")]
-    pub scenes_dir: Option<PathBuf>,
+    #[arg(long, global = true, env = "HEDGEROW_SCENES", value_name = "DIR", value_parser = perhaps_empty())]
+    scenes_dir: Option<PathBuf>,
     /// No progress on stderr
     #[arg(long, short, global = true)]
     pub quiet: bool,
 }
 
+/// A path, or nothing: a variable of the environment that is empty is as one that is not set.
+pub fn perhaps_empty() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().map(PathBuf::from)
+}
+
 impl Common {
+    /// The device that is asked for.
+    pub fn device(&self) -> Option<&str> {
+        self.device.as_deref().filter(|device| !device.is_empty())
+    }
+
+    /// The folder with more scenes.
+    pub fn scenes_dir(&self) -> Option<&Path> {
+        self.scenes_dir.as_deref().filter(|folder| !folder.as_os_str().is_empty())
+    }
+
     /// Makes rayon's pool as large as `--threads` asks for. Once a process.
     pub(super) fn start_threads(&self) -> anyhow::Result<()> {
         if let Some(threads) = self.threads {
@@ -68,12 +84,12 @@ impl Common {
     /// # Errors
     /// There is no such device, or it lacks something.
     pub fn open_device(&self, ray_query: bool) -> crate::Result<Device> {
-        Device::new(&DeviceOptions { wanted: self.device.clone(), validation: self.validation, ray_query })
+        Device::new(&DeviceOptions { wanted: self.device().map(str::to_owned), validation: self.validation, ray_query })
     }
 
     /// The folders in which bare scene names are looked up.
     pub fn scene_folders(&self) -> Vec<PathBuf> {
-        scene::own_folders().into_iter().chain(self.scenes_dir.clone()).collect()
+        scene::own_folders().into_iter().chain(self.scenes_dir().map(Path::to_owned)).collect()
     }
 
     /// Loads a scene under a progress bar, with the camera that `--eye`, `--look` and `--fov` ask for.

@@ -437,9 +437,10 @@ impl Builder {
         Sizes { structure: self.header().sizes().bytes, scratch, alignment: 16 }
     }
 
-    /// What there is room for in the structure, as its header says, and nothing else.
+    /// What the structure's header will say of its primitives, its geometries and its room, and nothing else.
     pub fn header(&self) -> Header {
         Header {
+            primitive_count: self.count,
             node_room: self.room.nodes,
             reference_room: self.room.references,
             record_room: self.room.records,

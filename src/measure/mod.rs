@@ -2,10 +2,10 @@
 //!
 //! [`Subject`] is a builder on a scene; [`builders`] makes one by name; [`matrix`] measures several of them on a scene and
 //! gives a [`record`] for each. [`experiments`] measures what engines do through the calls of `VK_KHR_acceleration_structure`,
-//! over [`structures`] and [`levels`] of instances; [`animate`] scenes that move; [`stability`] where methods give way. The rest is how that is fair and what
-//! follows from it: [`agreement`] (right hits), [`overlap`] (a quality that takes time), [`statistics`] (in turn, medians), [`outline`] (boxes level by level, to be drawn),
-//! [`growth`] (time over triangles), [`pareto`] and [`total_time`] (who is best for what). [`choose`] says who will be, before
-//! anything is built.
+//! over [`structures`] and [`levels`] of instances; [`animate`] scenes that move; [`stability`] where methods give way. The rest
+//! is how that is fair and what follows from it: [`agreement`] (right hits), [`overlap`] (a quality that takes time),
+//! [`statistics`] (in turn, medians), [`outline`] (boxes level by level, to be drawn), [`growth`] (time over triangles), [`pareto`]
+//! and [`total_time`] (who is best for what). [`choose`] says who will be, before anything is built.
 
 pub mod agreement;
 pub mod animate;

@@ -53,6 +53,8 @@ pub(super) fn find(spec: &str, folders: &[PathBuf]) -> Result<PathBuf> {
         format!(
             "{spec} is a folder; name a scene file in it, or the folder with --scenes-dir and the scene by its name"
         )
+    } else if is_bare && folders.is_empty() {
+        format!("there is no scene {spec:?}: no file of this name, and no folder to look in; name either of them")
     } else if is_bare {
         format!(
             "there is no scene {spec:?}, neither as a file nor in {looked}; name a file, or a folder with --scenes-dir"

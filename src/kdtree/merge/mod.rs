@@ -248,8 +248,8 @@ impl Merger {
     /// persistent.
     ///
     /// # Errors
-    /// The memory is too small; more objects or triangles than the merger is for; several geometries in one; primitives that are numbered twice; a pipeline
-    /// could not be made.
+    /// The memory is too small; more objects or triangles than the merger is for; several geometries in one; primitives that are
+    /// numbered twice; a pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, memory: Memory, objects: &[Object]) -> Result<()> {
         let mut objects = objects.to_vec();
         objects.sort_by_key(|object| object.first_primitive);
