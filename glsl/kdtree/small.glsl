@@ -270,7 +270,8 @@ void write_subtree(uint s, KdTask t, KdReferences level_references, KdStack stac
 
 void kd_small(uint s, uint of_level) {
     KdState state = build_state();
-    KdTask t = tasks_of(of_level).task[all_subtrees().subtree[s].task];
+    // Behind the last one of a loop, no lane active, lavapipe of Mesa 26 still loads what is the same for all lanes.
+    KdTask t = tasks_of(of_level).task[min(all_subtrees().subtree[s].task, task_capacity - 1u)];
     KdStack stack = stack_of(gl_WorkGroupID.x);
     float area_scale = state.area_scale;
     uint set = 0, count = t.count, depth = t.depth, slot = 0, waiting = 0, nodes = 0, references = 0, deepest = t.depth;
