@@ -19,6 +19,14 @@ float shortest_edge() {
     return uintBitsToFloat((127u - 100u) << 23);
 }
 
+float longest_edge() {
+    return uintBitsToFloat((127u + 125u) << 23);
+}
+
+float least_normal() {
+    return uintBitsToFloat(1u << 23);
+}
+
 float longest_side(Box b) {
     precise vec3 extent = b.hi - b.lo;
     return min(max(max(0.0, extent.x), max(extent.y, extent.z)), FARTHEST);
@@ -67,8 +75,9 @@ Box cell_around(Corners c, float reach) {
 // short or too long to tell.
 vec3 crossing_of(vec3 a, vec3 b, uint axis, float plane, vec3 outer) {
     precise vec3 d = b - a;
-    if (d[axis] < shortest_edge() || !is_finite(d)) return outer;
+    if (d[axis] < shortest_edge() || d[axis] > longest_edge() || !is_finite(d)) return outer;
     precise float t = (plane - a[axis]) * (1.0 / d[axis]);
+    if (t < least_normal()) t = 0.0;
     precise vec3 point = a + t * d;
     point = min(max(point, min(a, b)), max(a, b));
     point[axis] = plane;

@@ -28,6 +28,8 @@ const LEAST: f32 = f32::from_bits((127 - 120) << 23);
 const LONG: u64 = 12;
 /// Edges that are shorter along an axis are not cut there: both ends count. Their reciprocals are finite.
 const SHORTEST: f32 = f32::from_bits((127 - 100) << 23);
+/// Those that are longer are not, either: their reciprocals are subnormal, which a device may flush to zero.
+const LONGEST: f32 = f32::from_bits((127 + 125) << 23);
 /// Corners of a triangle that six planes have cut.
 const CORNERS: usize = 9;
 
@@ -195,10 +197,11 @@ impl Polygon {
 /// short or too long to tell.
 fn crossing(a: &[f32; 3], b: &[f32; 3], axis: usize, plane: f32) -> Option<[f32; 3]> {
     let d: [f32; 3] = std::array::from_fn(|k| b[k] - a[k]);
-    if d[axis] < SHORTEST || !d.iter().all(|d| d.is_finite()) {
+    if !(SHORTEST..=LONGEST).contains(&d[axis]) || !d.iter().all(|d| d.is_finite()) {
         return None;
     }
     let t = (plane - a[axis]) * (1.0 / d[axis]);
+    let t = if t.is_normal() { t } else { 0.0 };
     let mut point: [f32; 3] = std::array::from_fn(|k| (a[k] + t * d[k]).max(a[k].min(b[k])).min(a[k].max(b[k])));
     point[axis] = plane;
     Some(point)
