@@ -300,16 +300,19 @@ mod tests {
         assert_eq!(reach_of(&[Triangle { v0: [1.0; 3], v1: [1.0; 3], v2: [1.0; 3], primitive: 0 }]), 0.0);
     }
 
-    /// So a plane crosses it twice at most. Triangles a few roundings wide, and planes through them.
+    /// So a plane crosses it twice at most. Coordinates of all magnitudes, and planes next to corners, where an edge's parameter is
+    /// rounded to more than 1 and what is cut off would end beyond the edge.
     #[test]
     fn coordinates_of_a_cut_triangle_go_up_once_and_down_once() {
         let mut random = numbers();
-        let mut near = || f32::from_bits(1f32.to_bits() + random() % 12);
-        for _ in 0..20_000 {
-            let mut polygon = Polygon::of(&[(); 3].map(|()| [(); 3].map(|()| near())));
+        for _ in 0..50_000 {
+            let coordinate =
+                |bits: u32| (bits >> 5) as f32 * 2f32.powi(-(bits as i32 % 32)) * [1.0, -1.0][bits as usize % 2];
+            let mut polygon = Polygon::of(&[(); 3].map(|()| [(); 3].map(|()| coordinate(random()))));
             for axis in 0..3 {
                 for sign in [1.0, -1.0] {
-                    polygon.cut(axis, near() + sign * 4.0 * f32::EPSILON, sign);
+                    let at = polygon.corners[random() as usize % polygon.count.max(1)][axis];
+                    polygon.cut(axis, f32::from_bits((at.to_bits() + random() % 5).saturating_sub(2)), sign);
                     let corners = &polygon.corners[..polygon.count];
                     for k in 0..3 {
                         let steps = (0..corners.len()).map(|i| corners[(i + 1) % corners.len()][k] - corners[i][k]);
