@@ -157,6 +157,17 @@ impl Scene {
         KdTree::from_bytes(&self.structure.read::<u8>(bytes as usize)).expect("a kd-tree")
     }
 
+    /// Merged, it is the tree expected; restored, the one that was there.
+    #[track_caller]
+    fn assert_in_and_out(&self, objects: &[Object], expected: &KdTree, what: &str) {
+        let before = self.tree().to_bytes();
+        let report = self.merge(objects);
+        assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{what}: {report:?}");
+        assert_same(&self.tree(), expected, what);
+        self.restore();
+        assert!(self.tree().to_bytes() == before, "{what}: the static tree is another");
+    }
+
     fn objects(&self, which: impl Fn(usize) -> bool) -> Vec<Object> {
         (0..self.meshes.len()).filter(|&i| which(i)).map(|i| self.meshes[i].2).collect()
     }
@@ -212,7 +223,6 @@ fn assert_same(got: &KdTree, expected: &KdTree, what: &str) {
 fn a_merge_gives_the_bytes_of_the_host_and_a_restore_those_of_the_static_tree() {
     for world in worlds() {
         let scene = Scene::new(&world, &PLENTY);
-        let before = scene.tree().to_bytes();
         for which in [0b1u32, 0b11, 0b101, 0b111] {
             let which = |i: usize| which >> i & 1 == 1;
             let expected = scene.on_host(which);
@@ -220,11 +230,7 @@ fn a_merge_gives_the_bytes_of_the_host_and_a_restore_those_of_the_static_tree() 
             // In any order.
             let mut objects = scene.objects(which);
             objects.reverse();
-            let report = scene.merge(&objects);
-            assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{}: {report:?}", world.name);
-            assert_same(&scene.tree(), &expected, world.name);
-            scene.restore();
-            assert!(scene.tree().to_bytes() == before, "{}: the static tree is another", world.name);
+            scene.assert_in_and_out(&objects, &expected, world.name);
         }
         let header = scene.still.header;
         let raw = scene.structure.read::<u8>(header.sizes().bytes as usize);
@@ -267,16 +273,11 @@ fn objects_that_are_pushed_as_trees_give_the_same_bytes_as_those_that_find_their
     ];
     for world in worlds().into_iter().chain(more) {
         let scene = Scene::new(&world, &PLENTY);
-        let before = scene.tree().to_bytes();
         let expected = scene.on_host(|_| true);
         let trees = scene.trees();
         for which in [0b000u32, 0b111, 0b010, 0b101] {
             let what = format!("{}, pushed {which:03b}", world.name);
-            let report = scene.merge(&scene.pushed(&trees, |i| which >> i & 1 == 1));
-            assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{what}: {report:?}");
-            assert_same(&scene.tree(), &expected, &what);
-            scene.restore();
-            assert!(scene.tree().to_bytes() == before, "{what}: the static tree is another");
+            scene.assert_in_and_out(&scene.pushed(&trees, |i| which >> i & 1 == 1), &expected, &what);
         }
     }
 }
@@ -287,16 +288,11 @@ fn chains_and_any_number_of_persistent_workgroups_give_the_same_bytes() {
         let expected = Scene::new(&world, &PLENTY).on_host(|_| true);
         for options in schedules() {
             let scene = Scene::new(&world, &options);
-            let before = scene.tree().to_bytes();
             let trees = scene.trees();
             for which in [0b000u32, 0b101] {
                 let builder::Options { schedule, workgroups, .. } = options.build;
                 let what = format!("{}, {schedule:?}, {workgroups:?} workgroups, pushed {which:03b}", world.name);
-                let report = scene.merge(&scene.pushed(&trees, |i| which >> i & 1 == 1));
-                assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{what}: {report:?}");
-                assert_same(&scene.tree(), &expected, &what);
-                scene.restore();
-                assert!(scene.tree().to_bytes() == before, "{what}: the static tree is another");
+                scene.assert_in_and_out(&scene.pushed(&trees, |i| which >> i & 1 == 1), &expected, &what);
             }
         }
     }
