@@ -270,7 +270,7 @@ fn builds_in_a_row_give_the_same_bytes() {
 }
 
 #[test]
-#[ignore = "ten thousand builds take most of a minute; the same with 300 is not ignored"]
+#[ignore = "ten thousand builds take more than a minute; the same with 300 is not ignored"]
 fn ten_thousand_builds_in_a_row_give_the_same_bytes() {
     many_builds(10_000);
 }

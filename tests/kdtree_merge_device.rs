@@ -379,7 +379,7 @@ fn objects_come_and_go() {
 }
 
 #[test]
-#[ignore = "ten thousand merges on the device take six minutes; the same with 200 rounds is not ignored"]
+#[ignore = "ten thousand merges on the device take two minutes; the same with 200 rounds is not ignored"]
 fn objects_come_and_go_ten_thousand_times() {
     rounds(10_000, 50);
 }
