@@ -102,11 +102,38 @@ fn spirv_of(source: &Path, name: &str, out: &Path) -> PathBuf {
     let named = out.join("named");
     fs::create_dir_all(&named).expect("OUT_DIR can be written");
     println!("cargo:rustc-env=HEDGEROW_NAMED_SPIRV={}", named.display());
+    let path = out.join(&file);
+    // What both were made of lies beside them: a shader none of whose text has changed is not compiled again.
+    let stamp = out.join(format!("{file}.source"));
+    let made_of = made_of(source);
+    if path.exists() && named.join(&file).exists() && fs::read_to_string(&stamp).is_ok_and(|was| was == made_of) {
+        return path;
+    }
     fs::write(named.join(&file), compile(source, None, shaderc::OptimizationLevel::Zero))
         .expect("OUT_DIR can be written");
-    let path = out.join(file);
     fs::write(&path, compile(source, None, shaderc::OptimizationLevel::Performance)).expect("OUT_DIR can be written");
+    fs::write(stamp, made_of).expect("OUT_DIR can be written");
     path
+}
+
+/// All text that a shader's SPIR-V follows from: its own, that of every file it includes, and this program's.
+#[cfg(feature = "compile-shaders")]
+fn made_of(source: &Path) -> String {
+    let mut files = vec![source.to_path_buf()];
+    let mut text = concat!(include_str!("build.rs"), include_str!("build/shared_memory.rs")).to_owned();
+    let mut next = 0;
+    while next < files.len() {
+        let content = fs::read_to_string(&files[next]).unwrap_or_default();
+        let included = content.lines().filter_map(|line| line.trim().strip_prefix("#include \"")?.strip_suffix('"'));
+        for path in included.map(|name| Path::new("glsl").join(name)) {
+            if !files.contains(&path) {
+                files.push(path);
+            }
+        }
+        text.push_str(&content);
+        next += 1;
+    }
+    text
 }
 
 #[cfg(feature = "compile-shaders")]
