@@ -28,7 +28,8 @@ const SIZE: [u32; 2] = [256, 192];
 
 fn device() -> Device {
     let wanted = std::env::var("HEDGEROW_DEVICE").ok();
-    Device::new(&DeviceOptions { wanted, validation: false, ray_query: false }).expect("a device that fits")
+    Device::new(&DeviceOptions { wanted, validation: false, ray_query: false, ..DeviceOptions::default() })
+        .expect("a device that fits")
 }
 
 fn scene() -> Scene {
@@ -112,7 +113,7 @@ impl<'a> Rays<'a> {
 
     /// The rays of a kind, through what was built.
     fn of(kind: RayKind, built: &Built<'a>, scene: &Scene) -> Result<Rays<'a>> {
-        let shape = Shape::of(&built.device.limits);
+        let shape = Shape::of(built.device);
         let rays = kinds::generate(kind, scene, &RayOptions { size: SIZE, seed: 1 }, &mut |rays| {
             let rays = Rays::new(built.device, rays)?;
             built.trace(&built.structure, &shape, Query::ClosestHit, &rays)?;
@@ -165,7 +166,7 @@ fn compaction(c: &mut Criterion) {
     let mut group = c.benchmark_group("compact");
     group.sample_size(10).throughput(Throughput::Elements(scene.mesh.triangles.len() as u64));
     group.bench_function("compact", |b| b.iter(|| built.compact(&compacted).expect("it compacts")));
-    let shape = Shape::of(&device.limits);
+    let shape = Shape::of(device);
     for kind in KINDS {
         let rays = Rays::of(kind, &built, &scene).expect("rays");
         group.throughput(Throughput::Elements(rays.count.into()));
@@ -182,7 +183,7 @@ fn compaction(c: &mut Criterion) {
 fn batch(c: &mut Criterion) {
     const COUNT: u32 = 4096;
     let wanted = std::env::var("HEDGEROW_DEVICE").ok();
-    let options = DeviceOptions { wanted, validation: false, ray_query: true };
+    let options = DeviceOptions { wanted, validation: false, ray_query: true, ..DeviceOptions::default() };
     let device = Device::new(&options).expect("a device that fits");
     let driver = ash::khr::acceleration_structure::Device::new(device.ash_instance(), device.ash_device());
     let workload = Workload::new(&device, COUNT).expect("memory");

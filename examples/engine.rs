@@ -13,7 +13,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 use hedgerow::accel::{self, Instance};
 use hedgerow::ash::{self, vk};
-use hedgerow::gpu::{Context, ContextDesc, Requirements, requirements};
+use hedgerow::gpu::{Context, ContextDesc, Requirements, TuningChoice, requirements};
 use std::error::Error;
 use std::path::Path;
 
@@ -178,6 +178,7 @@ impl Engine {
             device: &self.device,
             pipeline_cache: vk::PipelineCache::null(),
             debug_utils: None,
+            tuning: TuningChoice::Auto,
         };
         // SAFETY: the device was made from these with what `requirements` returned, and outlives the context.
         let context = unsafe { Context::new(&desc) }?;

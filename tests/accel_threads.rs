@@ -29,6 +29,7 @@ fn builds_that_many_threads_record_are_those_of_one() {
         device: raw,
         pipeline_cache: vk::PipelineCache::null(),
         debug_utils: None,
+        tuning: common::tuning(),
     };
     let context = unsafe { Context::new(&desc) }.expect("a context");
     let builder = accel::Device::new(&context);

@@ -14,7 +14,7 @@ use hedgerow::bvh::sah::Collapse;
 fn on_device(tree: &Bvh2, piece: u32) -> Figures {
     let device = device();
     let records = tree.header.primitive_count;
-    let measure = OnDevice::new(&device.limits, records);
+    let measure = OnDevice::new(device, records);
     let structure = device.upload("structure", &tree.to_bytes()).expect("memory");
     let scratch = device.buffer("scratch", measure.scratch_bytes()).expect("memory");
     let result = device.buffer("result", size_of::<Figures>() as u64).expect("memory");

@@ -34,7 +34,7 @@ fn quality_on_the_device_equals_the_walk_on_the_host() {
 
 fn quality_on_device(tree: &Bvh2) -> Figures {
     let device = device();
-    let measure = quality::OnDevice::new(&device.limits, tree.header.primitive_count);
+    let measure = quality::OnDevice::new(device, tree.header.primitive_count);
     let structure = device.upload("structure", &tree.to_bytes()).unwrap();
     let scratch = device.buffer("scratch", measure.scratch_bytes()).unwrap();
     let result = device.buffer("result", size_of::<Figures>() as u64).unwrap();

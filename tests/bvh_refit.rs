@@ -151,7 +151,7 @@ fn assert_hits(structure: &Bvh2, rays: &[Ray], expected: &[Hit]) {
     let count = rays.len() as u32;
     let buffers =
         Buffers { structure: structure.address(), rays: ray_buffer.address(), hits: hits.address(), work: None, count };
-    let shape = Shape::of(&device().limits);
+    let shape = Shape::of(device());
     device().run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
     assert!(hits.read::<Hit>(rays.len()) == expected);
 }

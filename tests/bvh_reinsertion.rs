@@ -64,7 +64,7 @@ fn the_device_gives_the_bytes_of_the_host_and_touches_nothing_else() {
     let device = device();
     for (name, tree) in trees() {
         for options in OPTIONS {
-            let reinsertion = Reinsertion::new(&device.limits, &options, tree.header.primitive_count);
+            let reinsertion = Reinsertion::new(device, &options, tree.header.primitive_count);
             let bytes = tree.to_bytes();
             let structure = device.upload("structure", &[&bytes[..], &GUARD].concat()).unwrap();
             let scratch_bytes = reinsertion.scratch_bytes();

@@ -20,7 +20,7 @@ fn collapsed<N: WideNode>(tree: &Bvh2) -> Vec<u8> {
     let count = tree.header.primitive_count;
     let geometry_count = tree.header.geometry_count;
     let options = Options { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
-    let wide = OnDevice::new(&device.limits, &options, count);
+    let wide = OnDevice::new(device, &options, count);
     let sizes = wide.sizes();
     let source = device.upload("source", &tree.to_bytes()).unwrap();
     // Whatever was there before is of no interest.

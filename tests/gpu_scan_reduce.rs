@@ -12,7 +12,7 @@ const SIZES: [usize; 20] =
 
 fn scan_equals_its_twin(values: &[u32]) {
     let device = device();
-    let scan = Scan::new(&device.limits, values.len() as u32);
+    let scan = Scan::new(device, values.len() as u32);
     let from = device.upload("values", values).unwrap();
     let to = device.buffer("results", 4 * values.len() as u64).unwrap();
     let sums = device.buffer("sums", 4 * u64::from(scan.sums_words())).unwrap();
@@ -27,7 +27,7 @@ fn scan_equals_its_twin(values: &[u32]) {
 
 fn reduction_equals_its_twin(boxes: &[Bounds]) {
     let device = device();
-    let reduction = Reduction::new(&device.limits, boxes.len() as u32);
+    let reduction = Reduction::new(device, boxes.len() as u32);
     let from = device.upload("boxes", boxes).unwrap();
     let to = device.buffer("result", 24).unwrap();
     let scratch = device.buffer("scratch", 24 * u64::from(reduction.scratch_boxes())).unwrap();

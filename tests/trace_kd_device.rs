@@ -208,7 +208,7 @@ fn closed_surfaces_do_not_leak() {
         let bytes = tree.to_bytes();
         let mut first = None;
         for traversal in TRAVERSALS {
-            let tracer = Tracer::new(&device().limits, traversal);
+            let tracer = Tracer::new(device(), traversal);
             let (hits, _) = traced(&bytes, &rays, &tracer, Query::ClosestHit, false);
             for (ray, hit) in rays.iter().zip(&hits) {
                 assert!(hit.is_some(), "{traversal:?} leaks at scale {scale:e}, offset {offset:?}: {ray:?}");
@@ -302,7 +302,7 @@ fn walks_of_overwritten_trees_end() {
             *reference = random.bits() as u32;
         }
         for traversal in TRAVERSALS {
-            traced(&broken.to_bytes(), &rays, &Tracer::new(&device().limits, traversal), Query::ClosestHit, true);
+            traced(&broken.to_bytes(), &rays, &Tracer::new(device(), traversal), Query::ClosestHit, true);
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::vulkan::{
     PFN_vkGetInstanceProcAddr, VkBool32, VkDevice, VkInstance, VkPhysicalDevice, VkPipelineCache, VkResult,
 };
 use hedgerow::ash::vk;
-use hedgerow::gpu::{Context, ContextDesc};
+use hedgerow::gpu::{Context, ContextDesc, TuningChoice};
 use hedgerow::{Result, accel};
 
 /// What hedgerow_create_context takes.
@@ -81,6 +81,7 @@ pub unsafe extern "C" fn hedgerow_create_context(
                 device: &device,
                 pipeline_cache: info.pipeline_cache,
                 debug_utils: labels.as_ref(),
+                tuning: TuningChoice::Auto,
             })?;
             let context = Box::new(context);
             // The box is neither moved out of nor dropped before the structures that refer to what it holds.

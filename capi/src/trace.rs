@@ -140,6 +140,6 @@ pub unsafe extern "C" fn hedgerow_cmd_trace_rays(
         let buffers = Buffers { structure, rays, hits, work: (work != 0).then_some(work), count };
         // SAFETY: the caller's promises.
         let mut recorder = unsafe { Recorder::new(context, commands) };
-        tracer::record(&mut recorder, &Shape::of(&context.limits), query, &buffers)
+        tracer::record(&mut recorder, &Shape::of(context), query, &buffers)
     })
 }

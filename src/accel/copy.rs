@@ -18,7 +18,7 @@ push_constants! {
 
 /// The copying of a structure as it is.
 pub(super) fn clone_step(context: &Context, source: u64, target: u64) -> Step {
-    let grid = Grid::of(&context.limits);
+    let grid = Grid::of(context);
     Step::new("clone", grid.kernel(&shaders::ACCEL_COPY), &Arguments { source, target }, grid.groups)
 }
 

@@ -68,7 +68,7 @@ pub(super) fn entries_step(
     count: u32,
     capacity: u32,
 ) -> Step {
-    let workgroup = if context.limits.is_cpu() { context.limits.subgroup_size } else { 64 };
+    let workgroup = context.tuning.small_group;
     let kernel = Kernel::new(&shaders::ACCEL_ENTRIES, workgroup, &[]);
     let pointers = u32::from(pointers);
     let arguments = Arguments { instances, entries, ranges, count, capacity, pointers, padding: 0 };

@@ -71,7 +71,6 @@ impl Rebraid {
 
     /// The steps behind the one that writes the entries, of which `count` are of instances.
     pub fn steps(&self, context: &Context, count: u32, entries: u64, scratch: u64) -> Vec<Step> {
-        let is_cpu = context.limits.is_cpu();
         // Enough for all cores; a chunk is a workgroup's.
         let chunks = count.div_ceil(256).clamp(1, CHUNKS);
         let arguments = |first_round, chunks| Arguments {
@@ -83,17 +82,16 @@ impl Rebraid {
             chunks,
             instance_count: count,
         };
-        let kernel =
-            |shader, on_gpu| Kernel::new(shader, if is_cpu { context.limits.subgroup_size } else { on_gpu }, &[]);
         if count <= SMALL {
-            let all = kernel(&shaders::ACCEL_REBRAID_WORKGROUP, 128);
+            let all = Kernel::new(&shaders::ACCEL_REBRAID_WORKGROUP, context.tuning.build.rebraid_group, &[]);
             return vec![Step::new("re-braid", all, &arguments(0, 1), 1)];
         }
         let mut steps = vec![fill::step("re-braid", scratch, self.capacity + STATE_WORDS, 0)];
         for round in 0..ROUNDS {
             for shader in [&shaders::ACCEL_REBRAID_WEIGH, &shaders::ACCEL_REBRAID_SELECT, &shaders::ACCEL_REBRAID_OPEN]
             {
-                steps.push(Step::new("re-braid", kernel(shader, 64), &arguments(round, chunks), chunks));
+                let kernel = Kernel::new(shader, context.tuning.small_group, &[]);
+                steps.push(Step::new("re-braid", kernel, &arguments(round, chunks), chunks));
             }
         }
         steps

@@ -117,7 +117,7 @@ impl Device<'_> {
         }
         // SAFETY: the caller's promise.
         let mut recorder = unsafe { Recorder::new(self.context, commands) };
-        let grid = Grid::of(&self.context.limits);
+        let grid = Grid::of(self.context);
         recorder.phase("serialize");
         let kernel = grid.kernel(&shaders::ACCEL_SERIALIZE_WRITE);
         recorder.dispatch(&kernel, &arguments, grid.groups)
@@ -152,7 +152,7 @@ impl Device<'_> {
         }
         // SAFETY: the caller's promise.
         let mut recorder = unsafe { Recorder::new(self.context, commands) };
-        let grid = Grid::of(&self.context.limits);
+        let grid = Grid::of(self.context);
         recorder.phase("deserialize");
         recorder.dispatch(&grid.kernel(&shaders::ACCEL_SERIALIZE_READ), &arguments, grid.groups)?;
         recorder.barrier();

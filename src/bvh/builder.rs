@@ -11,7 +11,7 @@ use super::sah::Collapse;
 use super::split::{self, Split};
 use super::{collapse, hlbvh, hploc, layout, lbvh, lbvh_workgroup, ploc};
 use crate::gpu::radix_sort::{self, Shape};
-use crate::gpu::{Context, Kernel, Recorder, Step, shaders};
+use crate::gpu::{BuildTuning, Context, Kernel, Recorder, Step, shaders};
 use crate::{Error, Result};
 
 /// What to build, beside the primitives.
@@ -251,12 +251,14 @@ impl Builder {
         let budget = options.split.map_or(0, |split| split.budget(primitive_count));
         let budget = budget.min(radix_sort::MAX_COUNT - primitive_count);
         let split = options.split.filter(|_| budget > 0);
-        let split = split.map(|split| Split::new(&context.limits, &split, primitive_count));
+        let split = split.map(|split| Split::new(context, &split, primitive_count));
         // From here on, what the tree is over.
         let count = primitive_count + budget;
         options.method.check()?;
-        let limits = &context.limits;
-        let schedule = options.schedule.unwrap_or_else(|| Schedule::for_count(options, primitive_count));
+        let tuning = &context.tuning.build;
+        let by_one = primitive_count <= tuning.small && options.takes(Schedule::Workgroup);
+        let of_count = if by_one { Schedule::Workgroup } else { Schedule::Chain };
+        let schedule = options.schedule.unwrap_or(of_count);
         if !options.takes(schedule) {
             let optimised = if options.optimise.is_some() { " and optimised" } else { "" };
             let split = if options.split.is_some() { " of split triangles" } else { "" };
@@ -274,17 +276,13 @@ impl Builder {
         }
         // One primitive has one tree, which the LBVH's kernels make; those of PLOC crash Mesa 26's lavapipe where there are none.
         let method = if count < 2 { Method::Lbvh } else { options.method };
-        let shape = Shape::of(limits);
-        let optimise = options.optimise.map(|options| Reinsertion::new(limits, &options, count));
-        let items = match limits.is_cpu() {
-            true if alone => SHORT_RUN,
-            true => run_of(method, count, shape.workgroup),
-            false => 1,
-        };
+        let shape = Shape::of(context);
+        let optimise = options.optimise.map(|options| Reinsertion::new(context, &options, count));
+        let items = if alone { tuning.alone_run } else { run_of(tuning, method, count, shape.workgroup) };
         let encode = Encode {
             codes: options.codes.unwrap_or_else(|| Codes::for_count(count)),
             collapse: options.collapse,
-            shape: if alone { shape.with_digit_bits(SMALL_DIGIT_BITS) } else { shape },
+            shape: if alone { shape.with_digit_bits(tuning.small_digit_bits) } else { shape },
             items,
             count,
             split,
@@ -294,8 +292,7 @@ impl Builder {
             alone,
             method_bytes: method_bytes(method, optimise.as_ref(), count.max(1).into()),
         };
-        let workers = if limits.is_cpu() { 64 } else { 1024 };
-        Ok(Builder { method, schedule, optimise, workers, encode })
+        Ok(Builder { method, schedule, optimise, workers: tuning.workers, encode })
     }
 
     /// The method: of fewer than two primitives [`Method::Lbvh`], whatever was asked for.
@@ -511,34 +508,10 @@ fn method_bytes(method: Method, optimise: Option<&Reinsertion>, count: u64) -> u
     }
 }
 
-/// Primitives up to which one workgroup is faster than a chain of dispatches.
-const SMALL: u32 = 2048;
-/// Bits of a digit for them: with 8, a pass spends more on its table than on a few hundred keys.
-const SMALL_DIGIT_BITS: u32 = 4;
-/// Primitives that an invocation of a CPU takes one after the other: siblings among them meet without atomics.
-const SHORT_RUN: u32 = 32;
-/// The same where there are many. The bunny's hierarchy takes 0.85 times as long with 128 as with 32 by LBVH and by H-PLOC, and no
-/// less with 256.
-const LONG_RUN: u32 = 128;
-/// Workgroups that are enough for the threads of a CPU to end at the same time, nearly.
-const ENOUGH_WORKGROUPS: u32 = 64;
-
-/// How many primitives an invocation of a CPU takes. Of two numbers, as each has its own kernels. What climbs the radix tree to the
-/// root gains by long runs; PLOC's rounds take 1.2 times as long by them, and HLBVH, which climbs to its treelets, as long.
-fn run_of(method: Method, count: u32, workgroup: u32) -> u32 {
+/// How many primitives an invocation takes. Of two numbers, as each has its own kernels: what climbs the radix tree to the root
+/// gains by long runs.
+fn run_of(tuning: &BuildTuning, method: Method, count: u32, workgroup: u32) -> u32 {
     let climbs = matches!(method, Method::Lbvh | Method::Hploc(_));
-    if climbs && count >= LONG_RUN * workgroup * ENOUGH_WORKGROUPS { LONG_RUN } else { SHORT_RUN }
-}
-
-impl Schedule {
-    /// What measured faster. Of few primitives, one workgroup. Of many, on lavapipe the chain, by a factor of 1.2 to 1.5 (the
-    /// loop around the phases costs the persistent kernel its unmasked loads, and whoever waits takes a core from who works).
-    /// No GPU has been measured: the chain also asks nothing of its progress.
-    pub fn for_count(options: &Options, primitive_count: u32) -> Schedule {
-        if primitive_count <= SMALL && options.takes(Schedule::Workgroup) {
-            Schedule::Workgroup
-        } else {
-            Schedule::Chain
-        }
-    }
+    let is_long = climbs && count >= tuning.long_run.saturating_mul(workgroup * tuning.enough_groups);
+    if is_long { tuning.long_run } else { tuning.run }
 }

@@ -8,7 +8,7 @@
 
 use crate::Result;
 use crate::gpu::push_constants::push_constants;
-use crate::gpu::{Grid, Kernel, Limits, Recorder, shaders};
+use crate::gpu::{Context, Grid, Kernel, Recorder, shaders};
 
 push_constants! {
     struct Arguments {
@@ -26,8 +26,8 @@ const STEPS: [&shaders::Shader; 5] = [
 ];
 
 /// The kernels that [`record`] dispatches, to make their pipelines ahead with [`crate::gpu::Context::warm`].
-pub fn kernels(limits: &Limits) -> Vec<Kernel> {
-    STEPS.iter().map(|shader| Grid::of(limits).kernel(shader)).collect()
+pub fn kernels(context: &Context) -> Vec<Kernel> {
+    STEPS.iter().map(|shader| Grid::of(context).kernel(shader)).collect()
 }
 
 /// Records the compaction of the structure at address `source` to address `target`, both aligned to 16 bytes: five dispatches
@@ -41,10 +41,10 @@ pub fn kernels(limits: &Limits) -> Vec<Kernel> {
 /// # Errors
 /// A pipeline could not be made.
 pub fn record(recorder: &mut Recorder<'_>, source: u64, target: u64) -> Result<()> {
-    let limits = &recorder.context().limits;
-    let groups = Grid::of(limits).groups;
+    let context = recorder.context();
+    let groups = Grid::of(context).groups;
     recorder.phase("compact");
-    for (i, kernel) in kernels(limits).iter().enumerate() {
+    for (i, kernel) in kernels(context).iter().enumerate() {
         if i > 0 {
             recorder.barrier();
         }

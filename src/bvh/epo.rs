@@ -12,7 +12,7 @@
 use super::layout::node_slots;
 use crate::Result;
 use crate::gpu::push_constants::push_constants;
-use crate::gpu::{Kernel, Limits, Recorder, fill, shaders};
+use crate::gpu::{Context, Kernel, Recorder, fill, shaders};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
@@ -72,9 +72,8 @@ push_constants! {
 
 impl OnDevice {
     /// For a structure with `primitive_count` records.
-    pub fn new(limits: &Limits, primitive_count: u32) -> OnDevice {
-        let workgroup = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(64) };
-        let rounds = if limits.is_cpu() { 64 } else { 4 };
+    pub fn new(context: &Context, primitive_count: u32) -> OnDevice {
+        let (workgroup, rounds) = (context.tuning.small_group, context.tuning.measure_rounds);
         OnDevice { slots: node_slots(primitive_count), records: primitive_count, workgroup, rounds }
     }
 

@@ -5,7 +5,7 @@
 use super::layout::{Bvh2, Record, node_slots};
 use crate::Result;
 use crate::gpu::push_constants::push_constants;
-use crate::gpu::{Kernel, Limits, Recorder, fill, shaders};
+use crate::gpu::{Context, Kernel, Recorder, fill, shaders};
 use bytemuck::{Pod, Zeroable};
 
 /// What a walk over a tree finds, of whatever kind it is.
@@ -88,9 +88,9 @@ push_constants! {
 
 impl OnDevice {
     /// For a structure of `primitive_count` triangles.
-    pub fn new(limits: &Limits, primitive_count: u32) -> OnDevice {
-        let workgroup = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
-        OnDevice { slots: node_slots(primitive_count), workgroup, rounds: if limits.is_cpu() { 64 } else { 4 } }
+    pub fn new(context: &Context, primitive_count: u32) -> OnDevice {
+        let (workgroup, rounds) = (context.tuning.group, context.tuning.measure_rounds);
+        OnDevice { slots: node_slots(primitive_count), workgroup, rounds }
     }
 
     fn tiles(&self) -> u32 {

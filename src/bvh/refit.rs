@@ -73,20 +73,6 @@ pub enum Schedule {
     Workgroup,
 }
 
-/// Primitives up to which one workgroup is faster than two dispatches.
-const SMALL: u32 = 4096;
-/// Slots of a run: on a CPU as many as there are bits in a word, so that siblings meet in one; half of that for structures that
-/// are over before every lane has a run. Longer ones were faster from 4 up; no GPU has been measured.
-const RUN_ON_CPU: u32 = 32;
-const RUN_ON_GPU: u32 = 4;
-
-impl Schedule {
-    /// What measured faster.
-    pub fn for_count(primitive_count: u32) -> Schedule {
-        if primitive_count <= SMALL { Schedule::Workgroup } else { Schedule::Chain }
-    }
-}
-
 /// Bytes that a refit needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sizes {
@@ -164,14 +150,10 @@ impl Refit {
                 "a structure with split triangles cannot be updated: build it anew, or build it without split".into(),
             ));
         }
-        let limits = &context.limits;
-        let workgroup = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
-        let schedule = schedule.unwrap_or_else(|| Schedule::for_count(primitive_count));
-        let run = match limits.is_cpu() {
-            true if primitive_count <= workgroup * RUN_ON_CPU => RUN_ON_CPU / 2,
-            true => RUN_ON_CPU,
-            false => RUN_ON_GPU,
-        };
+        let (tuning, workgroup) = (&context.tuning.refit, context.tuning.group);
+        let of_count = if primitive_count <= tuning.small { Schedule::Workgroup } else { Schedule::Chain };
+        let schedule = schedule.unwrap_or(of_count);
+        let run = if primitive_count <= workgroup * tuning.run { tuning.short_run } else { tuning.run };
         let planned = Planned { primitives, primitive_count, geometry_count };
         Ok(Refit { planned, costs, schedule, workgroup, run })
     }

@@ -23,7 +23,7 @@
 use super::layout::node_slots;
 use crate::Result;
 use crate::gpu::push_constants::push_constants;
-use crate::gpu::{Grid, Kernel, Limits, Recorder, Step, fill, shaders};
+use crate::gpu::{Context, Grid, Kernel, Recorder, Step, fill, shaders};
 use std::time::Duration;
 
 /// How much is done.
@@ -110,10 +110,8 @@ pub struct Reinsertion {
 
 impl Reinsertion {
     /// For structures of `primitive_count` primitives.
-    pub fn new(limits: &Limits, options: &Options, primitive_count: u32) -> Reinsertion {
-        let grid = Grid::of(limits);
-        // A search is long: on a GPU it is an invocation's only one, as far as there are invocations.
-        let grid = if limits.is_cpu() { grid } else { Grid { rounds: 1, ..grid } };
+    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Reinsertion {
+        let grid = Grid { rounds: context.tuning.build.reinsertion_rounds, ..Grid::of(context) };
         let slots = node_slots(primitive_count);
         Reinsertion { slots, stride: options.stride_for(slots), rounds: options.rounds_for(slots), grid }
     }

@@ -21,7 +21,7 @@ use super::encode::Encode;
 use super::geometry::{Geometry, GeometryFlags, Input, Source};
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::scan::{self, Scan};
-use crate::gpu::{Kernel, Limits, Step, shaders};
+use crate::gpu::{Context, Kernel, Step, shaders};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 
@@ -120,8 +120,8 @@ push_constants! {
 }
 
 impl Split {
-    pub fn new(limits: &Limits, options: &Options, primitives: u32) -> Split {
-        Split { primitives, most: options.most, scan: Scan::new(limits, primitives) }
+    pub fn new(context: &Context, options: &Options, primitives: u32) -> Split {
+        Split { primitives, most: options.most, scan: Scan::new(context, primitives) }
     }
 
     /// Bytes of scratch memory before the build's state.

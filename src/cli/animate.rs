@@ -11,6 +11,7 @@ use crate::report::animate::{self, Points, standings};
 use crate::report::picture::shaded_by;
 use crate::scene::{DynamicScene, Scene};
 use anyhow::bail;
+use ash::vk;
 use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -224,7 +225,7 @@ fn setting(
     device: Option<&Device>,
 ) -> crate::Result<Setting> {
     let mut notes = Vec::new();
-    if device.is_some_and(|device| device.limits.is_cpu()) {
+    if device.is_some_and(|device| device.limits.kind == vk::PhysicalDeviceType::CPU) {
         notes.push(
             "The device is a CPU: figures of it say how much work the ways are, not how they stand on a GPU."
                 .to_owned(),

@@ -1,7 +1,7 @@
 //! Options that every command takes, and the values they are made of.
 
 use super::Bar;
-use crate::gpu::{Device, DeviceOptions};
+use crate::gpu::{Device, DeviceOptions, TuningChoice};
 use crate::measure::builders::{self, Spec};
 use crate::scene::{self, Camera, DynamicScene, Scene};
 use crate::trace::kinds::{RayKind, RayOptions};
@@ -17,6 +17,9 @@ pub struct Common {
     /// Vulkan device: its index, or a part of its name
     #[arg(long, global = true, env = "HEDGEROW_DEVICE", value_name = "NAME_OR_INDEX")]
     device: Option<String>,
+    /// How work is cut: for what the device is, or as for a CPU or a GPU, to the same bytes
+    #[arg(long, global = true, env = "HEDGEROW_TUNING", value_name = "auto|cpu|gpu", default_value = "auto")]
+    pub tuning: TuningChoice,
     /// Switch the Vulkan validation layers on; any message is an error
     #[arg(long, global = true)]
     pub validation: bool,
@@ -84,7 +87,12 @@ impl Common {
     /// # Errors
     /// There is no such device, or it lacks something.
     pub fn open_device(&self, ray_query: bool) -> crate::Result<Device> {
-        Device::new(&DeviceOptions { wanted: self.device().map(str::to_owned), validation: self.validation, ray_query })
+        Device::new(&DeviceOptions {
+            wanted: self.device().map(str::to_owned),
+            validation: self.validation,
+            ray_query,
+            tuning: self.tuning,
+        })
     }
 
     /// The folders in which bare scene names are looked up.

@@ -1,6 +1,7 @@
 //! The library on a device that somebody made: limits and pipelines, nothing else.
 
 use super::shaders::Shader;
+use super::{Tuning, TuningChoice};
 use crate::{Error, Result};
 use ash::vk;
 use std::collections::HashMap;
@@ -18,6 +19,8 @@ pub struct ContextDesc<'a> {
     pub pipeline_cache: vk::PipelineCache,
     /// `VK_EXT_debug_utils` of the device, if each phase shall be labelled.
     pub debug_utils: Option<&'a ash::ext::debug_utils::Device>,
+    /// How work is cut: for what the device is, unless told.
+    pub tuning: TuningChoice,
 }
 
 /// What the builders must know of the device to choose sizes.
@@ -25,7 +28,7 @@ pub struct ContextDesc<'a> {
 pub struct Limits {
     /// The device's name.
     pub name: String,
-    /// CPU, integrated or discrete: a CPU wants few long invocations, a GPU many short ones.
+    /// CPU, integrated or discrete.
     pub kind: vk::PhysicalDeviceType,
     /// Who wrote the driver.
     pub driver: vk::DriverId,
@@ -62,11 +65,6 @@ impl Limits {
             workgroup_count: properties.limits.max_compute_work_group_count[0],
             timestamp_period: properties.limits.timestamp_period,
         }
-    }
-
-    /// Whether the device is a CPU (lavapipe, SwiftShader).
-    pub fn is_cpu(&self) -> bool {
-        self.kind == vk::PhysicalDeviceType::CPU
     }
 
     /// Whether a load at an address that is the same for all lanes is one plain load: lavapipe of Mesa 26.1.6 does it, 25.0.7
@@ -107,6 +105,8 @@ pub struct Context {
     debug_utils: Option<ash::ext::debug_utils::Device>,
     /// What the device is and can.
     pub limits: Limits,
+    /// How work is cut for it.
+    pub tuning: Tuning,
     layout: vk::PipelineLayout,
     cache: vk::PipelineCache,
     pipelines: Mutex<HashMap<Kernel, vk::Pipeline>>,
@@ -129,10 +129,12 @@ impl Context {
         // SAFETY: the device is live by the caller's promise.
         let layout = unsafe { desc.device.create_pipeline_layout(&info, None) }
             .map_err(Error::vulkan("vkCreatePipelineLayout"))?;
+        let limits = Limits::of(desc.instance, desc.physical_device);
         Ok(Context {
             device: desc.device.clone(),
             debug_utils: desc.debug_utils.cloned(),
-            limits: Limits::of(desc.instance, desc.physical_device),
+            tuning: Tuning::of(desc.tuning, &limits),
+            limits,
             layout,
             cache: desc.pipeline_cache,
             pipelines: Mutex::default(),

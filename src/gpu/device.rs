@@ -2,7 +2,7 @@
 //!
 //! Everything here stands on the same public calls that an engine uses with its own device.
 
-use super::{Buffer, Context, ContextDesc, Recorder, Timestamps, requirements};
+use super::{Buffer, Context, ContextDesc, Recorder, Timestamps, TuningChoice, requirements};
 use crate::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -22,6 +22,8 @@ pub struct DeviceOptions {
     pub validation: bool,
     /// Enable `VK_KHR_acceleration_structure` and `VK_KHR_ray_query` where the device has them (for the driver's builders).
     pub ray_query: bool,
+    /// How work is cut: for what the device is, unless told.
+    pub tuning: TuningChoice,
 }
 
 /// One Vulkan device of this machine.
@@ -314,6 +316,7 @@ impl Device {
             device: &raw,
             pipeline_cache,
             debug_utils: debug_utils.as_ref(),
+            tuning: options.tuning,
         };
         // SAFETY: created above with what `requirements` asks for; dropped after the context.
         let context = unsafe { Context::new(&desc) }?;

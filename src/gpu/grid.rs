@@ -1,7 +1,7 @@
 //! Dispatches for work whose amount only the device knows.
 
 use super::shaders::Shader;
-use super::{Kernel, Limits};
+use super::{Context, Kernel};
 
 /// Workgroups that keep a device busy and share whatever there is to do: each takes a piece of it, then the piece that is as
 /// many pieces ahead as there are workgroups, until nothing is left (`glsl/gpu/grid.glsl`).
@@ -18,13 +18,8 @@ pub struct Grid {
 impl Grid {
     /// For a device. On a CPU few workgroups, as each costs its start even if there is nothing to do, and long pieces, as each is
     /// done by one core; on a GPU enough for some hundred thousand invocations.
-    pub fn of(limits: &Limits) -> Grid {
-        if limits.is_cpu() {
-            Grid { workgroup: limits.subgroup_size, groups: 64, rounds: 64 }
-        } else {
-            let groups = limits.workgroup_count.min(512);
-            Grid { workgroup: limits.workgroup_invocations.min(256), groups, rounds: 4 }
-        }
+    pub fn of(context: &Context) -> Grid {
+        context.tuning.grid
     }
 
     /// The kernel of a shader that takes its items from the grid.

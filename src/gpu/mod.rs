@@ -23,6 +23,7 @@ mod requirements;
 pub mod scan;
 pub mod shaders;
 pub mod task_pool;
+mod tuning;
 
 #[cfg(feature = "cli")]
 pub use buffer::Buffer;
@@ -35,3 +36,5 @@ pub use grid::Grid;
 pub use recorder::{Phase, Recorder, Step, Timestamps};
 pub use region::Region;
 pub use requirements::{Features, Requirements, requirements};
+pub(crate) use tuning::MOST_LANES;
+pub use tuning::{BuildTuning, KdTuning, RefitTuning, TraceTuning, Tuning, TuningChoice};

@@ -4,7 +4,7 @@
 //! progress between workgroups, so it runs on any device. `glsl/gpu/radix_sort.glsl` is the device's side.
 
 use super::push_constants::push_constants;
-use super::{Kernel, Limits, Recorder, Step, shaders};
+use super::{Context, Kernel, Limits, Recorder, Step, shaders};
 use crate::Result;
 
 /// How the sort is cut for a device: what the pipelines are specialised with.
@@ -27,8 +27,8 @@ const SUBGROUPS: u32 = 8;
 
 impl Shape {
     /// What suits the device: strips on a CPU, tiles on a GPU.
-    pub fn of(limits: &Limits) -> Shape {
-        if limits.is_cpu() { Shape::strips(limits) } else { Shape::tiles(limits) }
+    pub fn of(context: &Context) -> Shape {
+        context.tuning.sort
     }
 
     /// A strip of keys for each invocation, which counts alone: for CPUs, where an invocation is a lane of a loop.

@@ -1,7 +1,7 @@
 //! Reduction of bounds: the box around many boxes.
 
 use super::push_constants::push_constants;
-use super::{Kernel, Limits, Recorder, shaders};
+use super::{Context, Kernel, Recorder, shaders};
 use crate::Result;
 
 /// The least and the greatest corner, as the device has them: 24 bytes.
@@ -29,9 +29,8 @@ push_constants! {
 
 impl Reduction {
     /// A reduction of `count` boxes.
-    pub fn new(limits: &Limits, count: u32) -> Reduction {
-        let workgroup = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
-        Reduction { count, workgroup, rounds: if limits.is_cpu() { 64 } else { 8 } }
+    pub fn new(context: &Context, count: u32) -> Reduction {
+        Reduction { count, workgroup: context.tuning.group, rounds: context.tuning.reduce_rounds }
     }
 
     fn tile(&self) -> u32 {

@@ -3,7 +3,7 @@
 //! Reduce, then scan: three dispatches, no progress between workgroups asked for. `glsl/gpu/scan.glsl` is the device's side.
 
 use super::push_constants::push_constants;
-use super::{Kernel, Limits, Recorder, Step, shaders};
+use super::{Context, Kernel, Recorder, Step, shaders};
 use crate::Result;
 
 /// The most words that are scanned at once.
@@ -44,11 +44,11 @@ impl Scan {
     ///
     /// # Panics
     /// `count` is over [`MAX_COUNT`].
-    pub fn new(limits: &Limits, count: u32) -> Scan {
+    pub fn new(context: &Context, count: u32) -> Scan {
         assert!(count <= MAX_COUNT, "{count} words, at most {MAX_COUNT} are scanned at once");
-        let workgroup = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
+        let workgroup = context.tuning.group;
         // At most 2^14 tiles, so that one workgroup scans their sums in little time.
-        let rounds = (count >> 14).div_ceil(workgroup).next_power_of_two().max(if limits.is_cpu() { 32 } else { 8 });
+        let rounds = (count >> 14).div_ceil(workgroup).next_power_of_two().max(context.tuning.scan_rounds);
         Scan { count, workgroup, rounds }
     }
 

@@ -67,7 +67,7 @@ impl Options {
     /// those of a dispatch have their shares, whichever core is slower (docs/kdtree.md). No GPU was measured, and a chain asks nothing
     /// of one's progress.
     pub fn schedule_on(&self, context: &Context) -> Schedule {
-        let measured = if context.limits.is_cpu() { Schedule::Persistent } else { Schedule::Chain };
+        let measured = if context.tuning.kd.persistent { Schedule::Persistent } else { Schedule::Chain };
         self.schedule.unwrap_or(measured)
     }
 
@@ -307,11 +307,11 @@ impl Shape {
         let limits = &context.limits;
         // Two invocations look at the two parts of a reference.
         let workgroup = limits.subgroup_size.max(2);
-        let is_cpu = limits.is_cpu();
-        let groups = (count / options.exact).clamp(1, if is_cpu { 64 } else { 1024 });
+        let tuning = &context.tuning.kd;
+        let groups = (count / options.exact).clamp(1, tuning.groups);
         Shape {
             workgroup,
-            items: (if is_cpu { 256 } else { 512 } / workgroup).max(1),
+            items: (tuning.chunk / workgroup).max(1),
             groups: options.workgroups.filter(|_| schedule == Schedule::Persistent).unwrap_or(groups),
         }
     }

@@ -86,7 +86,7 @@ fn record_trace(
     buffers: &Buffers,
 ) -> Result<()> {
     match wide_tree {
-        None => tracer::record(recorder, &Shape::of(&recorder.context().limits), query, buffers),
+        None => tracer::record(recorder, &Shape::of(recorder.context()), query, buffers),
         Some(tree) => tree.tracer.record(recorder, query, buffers),
     }
 }
@@ -143,7 +143,7 @@ impl Subject for DeviceBvh<'_> {
         if let Some(tree) = &self.wide {
             return tree.quality(c_t, c_i);
         }
-        let measure = quality::OnDevice::new(&self.device.limits, self.bvh.record_count());
+        let measure = quality::OnDevice::new(self.device, self.bvh.record_count());
         let scratch = self.device.buffer("quality: scratch", measure.scratch_bytes())?;
         let result = self.device.buffer("quality: figures", size_of::<Figures>() as u64)?;
         self.device.run(None, |r| measure.record(r, self.structure.address(), scratch.address(), result.address()))?;

@@ -21,7 +21,7 @@ impl<'a> KdDevice<'a> {
     /// # Errors
     /// The device failed.
     pub fn new(device: &'a Device, traversal: Traversal) -> Result<KdDevice<'a>> {
-        Ok(KdDevice { device, tracer: Tracer::new(&device.limits, traversal), rays: DeviceRays::new(device)? })
+        Ok(KdDevice { device, tracer: Tracer::new(device, traversal), rays: DeviceRays::new(device)? })
     }
 
     /// Brings a tree of the host to the device.

@@ -90,7 +90,7 @@ pub fn on_device(
     if over(deadline) {
         return Ok(None);
     }
-    let measure = OnDevice::new(&device.limits, records);
+    let measure = OnDevice::new(device, records);
     let scratch = device.buffer("overlap: scratch", measure.scratch_bytes())?;
     let result = device.buffer("overlap: figures", size_of::<Figures>() as u64)?;
     let buffers = Buffers { structure, scratch: scratch.address(), result: result.address() };

@@ -144,13 +144,13 @@ impl<'a> Structures<'a> {
         query: trace::Query,
     ) -> Result<f64> {
         let any_hit = u32::from(query == trace::Query::AnyHit);
-        let limits = &self.device.limits;
         let kernel = match self.maker {
-            // As trace::tracer has it: on a CPU a subgroup a workgroup, and all of the stack in shared memory.
-            Maker::Ours(_) if limits.is_cpu() => {
-                Kernel::new(&shaders::MEASURE_QUERY, limits.subgroup_size, &[any_hit, 2 * MAX_DEPTH])
+            // As trace::tracer has it, or no level of the stack in shared memory.
+            Maker::Ours(_) => {
+                let tuning = &self.device.tuning.trace;
+                let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
+                Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[any_hit, levels])
             }
-            Maker::Ours(_) => Kernel::new(&shaders::MEASURE_QUERY, 64, &[any_hit, 0]),
             Maker::Driver(_) => Kernel::new(&shaders::MEASURE_RAY_QUERY, 64, &[any_hit]),
         };
         debug_assert!(rays.bytes() >= u64::from(count) * size_of::<Ray>() as u64);

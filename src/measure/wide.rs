@@ -29,7 +29,7 @@ impl<'a> WideTree<'a> {
     /// Too little memory; a pipeline could not be made.
     pub fn new(device: &'a Device, tracer: Tracer, count: u32) -> Result<WideTree<'a>> {
         let options = Options { form: tracer.form, primitives: Primitives::Triangles, geometry_count: 1 };
-        let collapse = OnDevice::new(&device.limits, &options, count);
+        let collapse = OnDevice::new(device, &options, count);
         collapse.warm(device)?;
         let sizes = collapse.sizes();
         let structure = device.buffer("wide structure", sizes.structure)?;

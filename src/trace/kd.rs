@@ -5,7 +5,7 @@
 //! # use hedgerow::gpu::Recorder;
 //! # use hedgerow::trace::{Query, kd::Tracer, kd_host::Traversal, tracer::Buffers};
 //! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: u64, hits: u64) -> hedgerow::Result<()> {
-//! let tracer = Tracer::new(&recorder.context().limits, Traversal::short_stack_with_push_down(4));
+//! let tracer = Tracer::new(recorder.context(), Traversal::short_stack_with_push_down(4));
 //! tracer.record(recorder, Query::ClosestHit, &Buffers { structure, rays, hits, work: None, count: 1 << 20 })?;
 //! recorder.barrier();
 //! # Ok(())
@@ -19,7 +19,7 @@ use super::kd_host::Traversal;
 use super::tracer::{self, Buffers, Loads, Shape};
 use crate::Result;
 use crate::gpu::shaders::Shader;
-use crate::gpu::{Kernel, Limits, Recorder, shaders};
+use crate::gpu::{Context, Kernel, Recorder, shaders};
 use crate::kdtree::layout::MAX_DEPTH;
 use bytemuck::{Pod, Zeroable};
 
@@ -53,8 +53,8 @@ pub struct Tracer {
 impl Tracer {
     /// By this traversal, cut as [`Shape::of`] does, but with loads gathered. Stacks of up to 8 cells, which lie in registers, are the
     /// fastest where that was measured: `docs/kdtree.md`.
-    pub fn new(limits: &Limits, traversal: Traversal) -> Tracer {
-        Tracer::with(traversal, if limits.is_cpu() { Shape::subgroups(limits) } else { Shape::groups(limits) })
+    pub fn new(context: &Context, traversal: Traversal) -> Tracer {
+        Tracer::with(traversal, Shape::of(context))
     }
 
     /// Cut as `shape` has it. Nothing lies in shared memory and loads are gathered, whatever it says.

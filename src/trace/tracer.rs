@@ -3,7 +3,7 @@
 //! ```no_run
 //! # use hedgerow::{gpu::Recorder, trace::{Query, tracer::{self, Buffers, Shape}}};
 //! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: u64, hits: u64) -> hedgerow::Result<()> {
-//! let shape = Shape::of(&recorder.context().limits);
+//! let shape = Shape::of(recorder.context());
 //! tracer::record(recorder, &shape, Query::ClosestHit, &Buffers { structure, rays, hits, work: None, count: 1 << 20 })?;
 //! recorder.barrier();
 //! # Ok(())
@@ -13,7 +13,7 @@
 use super::{MAX_RAYS, Query};
 use crate::bvh::layout::MAX_DEPTH;
 use crate::gpu::push_constants::push_constants;
-use crate::gpu::{Kernel, Limits, Recorder, shaders};
+use crate::gpu::{Context, Kernel, Limits, MOST_LANES, Recorder, shaders};
 use crate::{Error, Result};
 
 /// How the work is cut for a device.
@@ -42,19 +42,20 @@ pub enum Loads {
 
 impl Loads {
     /// Lanes that can load one after the other.
-    pub const MAX_LANES: u32 = 16;
+    pub const MAX_LANES: u32 = MOST_LANES;
 }
 
 impl Shape {
     /// What is fast on a device.
-    pub fn of(limits: &Limits) -> Shape {
-        if !limits.is_cpu() {
-            Shape::groups(limits)
-        } else if limits.loads_uniform_values_once() && limits.subgroup_size <= Loads::MAX_LANES {
-            Shape::lanes(limits)
-        } else {
-            Shape::subgroups(limits)
-        }
+    pub fn of(context: &Context) -> Shape {
+        let tuning = &context.tuning.trace;
+        let shape = Shape {
+            workgroup: tuning.group,
+            shared_levels: tuning.shared_levels.min(MAX_DEPTH),
+            rays_each: tuning.rays_each,
+            loads: if tuning.lane_by_lane { Loads::LaneByLane } else { Loads::Gathered },
+        };
+        shape.within(&context.limits)
     }
 
     /// For CPUs: workgroups of one subgroup, so that none waits for another, and the whole stack in shared memory, which is

@@ -3,7 +3,7 @@
 use super::Query;
 use super::tracer::{self, Buffers, Loads, Shape};
 use crate::bvh::wide::Form;
-use crate::gpu::{Kernel, Limits, Recorder, shaders};
+use crate::gpu::{Context, Kernel, Limits, Recorder, shaders};
 use crate::{Error, Result};
 
 /// In which order a ray meets the children of a node.
@@ -48,18 +48,18 @@ impl Order {
 impl Tracer {
     /// What is fast on a device: quantised nodes by distance on CPUs, unless loads are lane by lane there; on GPUs, of which none
     /// was measured, as their paper has it.
-    pub fn of(limits: &Limits, form: Form) -> Tracer {
-        let by_octant = form.is_quantised() && (!limits.is_cpu() || Shape::of(limits).loads == Loads::LaneByLane);
-        Tracer::in_order(limits, form, if by_octant { Order::Octant } else { Order::Distance })
+    pub fn of(context: &Context, form: Form) -> Tracer {
+        let by_octant = form.is_quantised() && context.tuning.trace.by_octant;
+        Tracer::in_order(context, form, if by_octant { Order::Octant } else { Order::Distance })
     }
 
     /// In this order: the shape as of [`Shape::of`], but the whole stack in shared memory on CPUs.
-    pub fn in_order(limits: &Limits, form: Form, order: Order) -> Tracer {
-        let mut shape = Shape::of(limits);
+    pub fn in_order(context: &Context, form: Form, order: Order) -> Tracer {
+        let mut shape = Shape::of(context);
         if order == Order::Distance {
             shape.loads = Loads::Gathered;
         }
-        Tracer::with(limits, form, order, shape)
+        Tracer::with(&context.limits, form, order, shape)
     }
 
     /// With as many levels in shared memory as `shape` has for binary trees: some, or all.

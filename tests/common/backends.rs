@@ -33,7 +33,7 @@ pub trait Backend {
 /// vertices; many a ray passes by a box without a thickness, and one that ends where it enters a box.
 pub fn is_old_lavapipe() -> bool {
     let version = device().found().driver.strip_prefix("Mesa ").and_then(|v| v.split('.').next()?.parse::<u32>().ok());
-    device().limits.is_cpu() && version.is_some_and(|major| major < 26)
+    is_lavapipe() && version.is_some_and(|major| major < 26)
 }
 
 /// Whether the driver is a lavapipe of Mesa 26 or later: a top level with an inactive instance (reference 0, which the
@@ -113,7 +113,7 @@ impl Backend for Ours {
         let hits = device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
         let structure = self.address(structure);
         let buffers = Buffers { structure, rays: ray_buffer.address(), hits: hits.address(), work: None, count };
-        let shape = Shape::of(&device().limits);
+        let shape = Shape::of(device());
         device().run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
         hits.read(rays.len())
     }

@@ -11,8 +11,13 @@ pub mod shapes;
 pub mod twins;
 pub mod world;
 
-use hedgerow::gpu::{Device, DeviceOptions};
+use hedgerow::gpu::{Device, DeviceOptions, TuningChoice};
 use std::sync::OnceLock;
+
+/// The tuning that `HEDGEROW_TUNING` asks for, as for the binary.
+pub fn tuning() -> TuningChoice {
+    std::env::var("HEDGEROW_TUNING").unwrap_or_default().parse().expect("HEDGEROW_TUNING is auto, cpu or gpu")
+}
 
 /// The device of this test binary. Any validation message fails the test that caused it.
 ///
@@ -21,7 +26,7 @@ pub fn device() -> &'static Device {
     static DEVICE: OnceLock<Device> = OnceLock::new();
     DEVICE.get_or_init(|| {
         let wanted = std::env::var("HEDGEROW_DEVICE").ok();
-        let options = DeviceOptions { wanted, validation: true, ray_query: true };
+        let options = DeviceOptions { wanted, validation: true, ray_query: true, tuning: tuning() };
         Device::new(&options)
             .or_else(|error| {
                 eprintln!("without validation layers: {error}");

@@ -6,7 +6,7 @@ use crate::bvh::builder::Sizes;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::node_slots;
 use crate::gpu::push_constants::push_constants;
-use crate::gpu::{Context, Grid, Kernel, Limits, Recorder, fill, scan, shaders};
+use crate::gpu::{Context, Grid, Kernel, Recorder, fill, scan, shaders};
 
 /// What is collapsed into what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,10 +68,10 @@ struct Scratch {
 
 impl OnDevice {
     /// For a source built of `primitive_count` primitives, or of fewer.
-    pub fn new(limits: &Limits, options: &Options, primitive_count: u32) -> OnDevice {
-        let few = if limits.is_cpu() { limits.subgroup_size } else { limits.workgroup_invocations.min(256) };
-        let scan = scan::Scan::new(limits, node_slots(primitive_count) + 1);
-        OnDevice { options: *options, count: primitive_count, grid: Grid::of(limits), few, scan }
+    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> OnDevice {
+        let few = context.tuning.group;
+        let scan = scan::Scan::new(context, node_slots(primitive_count) + 1);
+        OnDevice { options: *options, count: primitive_count, grid: Grid::of(context), few, scan }
     }
 
     /// Bytes of the wide structure, at most (its header tells how many are in use: [`Form::bytes_in_use`]), and of the scratch

@@ -191,7 +191,7 @@ impl Merger {
             references: still.reference_room,
             records: still.record_room,
         };
-        let sort = radix_sort::Shape::of(&context.limits);
+        let sort = radix_sort::Shape::of(context);
         Ok(Merger {
             options: *options,
             most,

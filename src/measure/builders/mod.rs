@@ -128,11 +128,10 @@ impl Spec {
 
     /// A builder of ours on the device, with these options and those that depend on the device.
     fn on_device<'a>(&self, device: &'a Device, mesh: &Mesh, mut options: builder::Options) -> Result<DeviceBvh<'a>> {
-        let limits = &device.limits;
         let (form, order) = self.form_and_order()?;
         let wide = form.map(|form| match order {
-            None => Tracer::of(limits, form),
-            Some(order) => Tracer::in_order(limits, form, order),
+            None => Tracer::of(device, form),
+            Some(order) => Tracer::in_order(device, form, order),
         });
         if let Some(budget) = self.time_to_optimise() {
             let pass = pass_of_reinsertion(device, mesh, &options)?;

@@ -1,0 +1,230 @@
+//! What differs between devices and changes no byte of a result: how work is cut, and which schedule runs it.
+//!
+//! A pass reads a field of [`Tuning`]; no pass asks what the device is. What would change bytes (the window of H-PLOC, code bits, the
+//! width of nodes) is an option of its builder, with one default everywhere.
+
+use super::radix_sort::Shape;
+use super::{Grid, Limits};
+use ash::vk;
+use std::fmt;
+use std::str::FromStr;
+
+/// Which [`Tuning`] a context takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum TuningChoice {
+    /// That of the device's kind.
+    #[default]
+    Auto,
+    /// [`Tuning::cpu`], whatever the device is.
+    Cpu,
+    /// [`Tuning::gpu`], whatever the device is: so that its branches run in tests on a CPU.
+    Gpu,
+}
+
+impl FromStr for TuningChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<TuningChoice, String> {
+        match text {
+            "auto" | "" => Ok(TuningChoice::Auto),
+            "cpu" => Ok(TuningChoice::Cpu),
+            "gpu" => Ok(TuningChoice::Gpu),
+            _ => Err(format!("there is no tuning {text:?}; take auto, cpu or gpu")),
+        }
+    }
+}
+
+impl fmt::Display for TuningChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            TuningChoice::Auto => "auto",
+            TuningChoice::Cpu => "cpu",
+            TuningChoice::Gpu => "gpu",
+        })
+    }
+}
+
+/// How work is cut for a device. Made once, with the context.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tuning {
+    /// Invocations of a workgroup that streams over many items.
+    pub group: u32,
+    /// Invocations of a workgroup whose invocations each keep much in registers.
+    pub small_group: u32,
+    /// Workgroups for work whose amount only the device knows.
+    pub grid: Grid,
+    /// Items that an invocation of `reduce` takes.
+    pub reduce_rounds: u32,
+    /// Items that an invocation of `scan` takes, at least.
+    pub scan_rounds: u32,
+    /// Items that an invocation takes which measures a tree (`quality`, `epo`).
+    pub measure_rounds: u32,
+    /// The radix sort's cut.
+    pub sort: Shape,
+    /// Builds.
+    pub build: BuildTuning,
+    /// Refits.
+    pub refit: RefitTuning,
+    /// Builds of kd-trees, and merging.
+    pub kd: KdTuning,
+    /// Tracers.
+    pub trace: TraceTuning,
+}
+
+/// How builds of BVHs are cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BuildTuning {
+    /// Items that an invocation takes one after the other.
+    pub run: u32,
+    /// The same of methods that climb the radix tree to the root, over many items.
+    pub long_run: u32,
+    /// Workgroups at least that a dispatch must keep for `long_run` to be taken.
+    pub enough_groups: u32,
+    /// Items that an invocation takes where one workgroup builds everything.
+    pub alone_run: u32,
+    /// Workgroups of a persistent dispatch.
+    pub workers: u32,
+    /// Primitives up to which one workgroup builds everything. Of more, the chain: on lavapipe it is 1.2 to 1.5 times as fast as the
+    /// task pool (the loop around the phases costs the persistent kernel its unmasked loads, and whoever waits takes a core from
+    /// who works), and it asks nothing of the device's progress.
+    pub small: u32,
+    /// Bits of a digit of its sort: with 8, a pass spends more on its table than on a few hundred keys.
+    pub small_digit_bits: u32,
+    /// Items that an invocation of reinsertion's passes takes.
+    pub reinsertion_rounds: u32,
+    /// Invocations of a workgroup that re-braids by itself.
+    pub rebraid_group: u32,
+}
+
+/// How refits are cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RefitTuning {
+    /// Slots that an invocation takes one after the other.
+    pub run: u32,
+    /// The same where one run of every invocation of a workgroup would hold all.
+    pub short_run: u32,
+    /// Primitives up to which one workgroup refits everything.
+    pub small: u32,
+}
+
+/// How builds of kd-trees are cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct KdTuning {
+    /// Workgroups of a dispatch, at most.
+    pub groups: u32,
+    /// References of a chunk, which is what a workgroup takes at a time.
+    pub chunk: u32,
+    /// Whether the task pool is the default, or a chain of dispatches.
+    pub persistent: bool,
+}
+
+/// How tracers are cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TraceTuning {
+    /// Invocations of a workgroup.
+    pub group: u32,
+    /// Entries of a ray's stack in shared memory, as far as there is room; the others are private.
+    pub shared_levels: u32,
+    /// Rays that an invocation traces one after the other, at most.
+    pub rays_each: u32,
+    /// Whether lanes load nodes and triangles one after the other.
+    pub lane_by_lane: bool,
+    /// Whether rays meet the children of quantised nodes by octants, or by distance.
+    pub by_octant: bool,
+}
+
+/// Every level of a stack.
+const ALL_LEVELS: u32 = u32::MAX;
+
+impl Tuning {
+    /// What `choice` says for a device.
+    pub fn of(choice: TuningChoice, limits: &Limits) -> Tuning {
+        match choice {
+            TuningChoice::Cpu => Tuning::cpu(limits),
+            TuningChoice::Gpu => Tuning::gpu(limits),
+            TuningChoice::Auto if limits.kind == vk::PhysicalDeviceType::CPU => Tuning::cpu(limits),
+            TuningChoice::Auto => Tuning::gpu(limits),
+        }
+    }
+
+    /// Few long invocations: a workgroup is one subgroup, so that none waits for another at a barrier, and each of its lanes takes
+    /// many items, for a workgroup costs its start. Figures are of lavapipe.
+    pub fn cpu(limits: &Limits) -> Tuning {
+        let group = limits.subgroup_size;
+        // Mesa 26 makes one plain load of what is at the same address for all lanes.
+        let lane_by_lane = limits.loads_uniform_values_once() && group <= MOST_LANES;
+        Tuning {
+            group,
+            small_group: group,
+            grid: Grid { workgroup: group, groups: 64, rounds: 64 },
+            reduce_rounds: 64,
+            scan_rounds: 32,
+            measure_rounds: 64,
+            sort: Shape::strips(limits),
+            build: BuildTuning {
+                run: 32,
+                // The bunny's hierarchy takes 0.85 times as long with 128 as with 32 by LBVH and by H-PLOC, and no less with 256.
+                // PLOC's rounds take 1.2 times as long by them, and HLBVH, which climbs to its treelets, as long.
+                long_run: 128,
+                enough_groups: 64,
+                alone_run: 32,
+                workers: 64,
+                small: 2048,
+                small_digit_bits: 4,
+                reinsertion_rounds: 64,
+                rebraid_group: group,
+            },
+            // As many slots as there are bits in a word, so that siblings meet in one; half of that for structures that are over
+            // before every lane has a run.
+            refit: RefitTuning { run: 32, short_run: 16, small: 4096 },
+            kd: KdTuning { groups: 64, chunk: 256, persistent: true },
+            trace: TraceTuning {
+                group,
+                shared_levels: ALL_LEVELS,
+                rays_each: 128,
+                lane_by_lane,
+                by_octant: lane_by_lane,
+            },
+        }
+    }
+
+    /// Many short invocations in workgroups of several subgroups. No GPU has been measured: values are from the literature.
+    pub fn gpu(limits: &Limits) -> Tuning {
+        let at_most = |invocations: u32| limits.workgroup_invocations.min(invocations);
+        let group = at_most(256);
+        let small_group = at_most(64);
+        Tuning {
+            group,
+            small_group,
+            grid: Grid { workgroup: group, groups: limits.workgroup_count.min(512), rounds: 4 },
+            reduce_rounds: 8,
+            scan_rounds: 8,
+            measure_rounds: 4,
+            sort: Shape::tiles(limits),
+            build: BuildTuning {
+                run: 1,
+                long_run: 1,
+                enough_groups: 64,
+                alone_run: 1,
+                workers: 1024,
+                small: 2048,
+                small_digit_bits: 4,
+                // A search is long: it is an invocation's only one, as far as there are invocations.
+                reinsertion_rounds: 1,
+                rebraid_group: at_most(128),
+            },
+            refit: RefitTuning { run: 4, short_run: 4, small: 4096 },
+            kd: KdTuning { groups: 1024, chunk: 512, persistent: false },
+            trace: TraceTuning {
+                group: at_most(limits.subgroup_size.max(64)),
+                shared_levels: 8,
+                rays_each: 1,
+                lane_by_lane: false,
+                by_octant: true,
+            },
+        }
+    }
+}
+
+/// Lanes that can load one after the other: `LANES` in `glsl/trace/lanes.glsl`.
+pub(crate) const MOST_LANES: u32 = 16;
