@@ -33,6 +33,6 @@ manifest=$(found vk_swiftshader_icd.json)
 [ -n "$library" ] && [ -n "$manifest" ] || say "chromium-common holds no libvk_swiftshader.so, or no ICD file of it"
 mv "$library" "$dir/libvk_swiftshader.so"
 # Written last: it says that the folder is complete.
-sed "s#\"library_path\": *\".*\"#\"library_path\": \"$dir/libvk_swiftshader.so\"#" "$manifest" >"$dir/.swiftshader.json"
+sed "s#\"library_path\": *\"[^\"]*\"#\"library_path\": \"$dir/libvk_swiftshader.so\"#" "$manifest" >"$dir/.swiftshader.json"
 rm -rf "$work"
 mv "$dir/.swiftshader.json" "$dir/swiftshader.json"
