@@ -38,7 +38,7 @@ fn tracers() -> Vec<Tracer> {
         Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 0, rays_each: 5, loads },
     ];
     let pairs = TRAVERSALS.iter().zip(others.iter().cycle());
-    pairs.flat_map(|(&t, &shape)| [Tracer::new(limits, t), Tracer::with(t, shape)]).collect()
+    pairs.flat_map(|(&t, &shape)| [Tracer::new(device(), t), Tracer::with(t, shape)]).collect()
 }
 
 fn traversal_of(i: usize) -> Traversal {
