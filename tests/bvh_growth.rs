@@ -4,11 +4,22 @@
 //! of the tree of the scene alone. The far triangle is that of CONTRACT.md. The bunny's figures are of an independent program; its
 //! scene is not in the repository: HEDGEROW_SCENES names the folder.
 
+#[path = "common/conditional.rs"]
+mod conditional;
+
+use conditional::needs;
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::host;
 use hedgerow::bvh::layout::{Aabb, Bvh2};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::scene::{self, LoadOptions, Mesh};
+
+conditional::tests! {
+    a_far_triangle_costs_robust_codes_almost_nothing_at_any_distance: needs::nothing(),
+    a_hundred_far_triangles_at_different_distances_cost_robust_codes_almost_nothing: needs::nothing(),
+    grids_move_the_drop_by_what_their_prefix_spares: needs::nothing(),
+    the_bunny_costs_what_an_independent_program_says: needs::scene("bunny"),
+}
 
 /// How a scene grows.
 #[derive(Debug, Clone, Copy)]
@@ -102,7 +113,6 @@ fn sphere(levels: u32) -> Mesh {
     Mesh { triangles, ..mesh }
 }
 
-#[test]
 fn a_far_triangle_costs_robust_codes_almost_nothing_at_any_distance() {
     let mesh = sphere(4);
     for growth in GROWTHS {
@@ -116,7 +126,6 @@ fn a_far_triangle_costs_robust_codes_almost_nothing_at_any_distance() {
     }
 }
 
-#[test]
 fn a_hundred_far_triangles_at_different_distances_cost_robust_codes_almost_nothing() {
     let mesh = sphere(5);
     for growth in GROWTHS {
@@ -128,7 +137,6 @@ fn a_hundred_far_triangles_at_different_distances_cost_robust_codes_almost_nothi
     }
 }
 
-#[test]
 fn grids_move_the_drop_by_what_their_prefix_spares() {
     let mesh = sphere(4);
     for growth in GROWTHS {
@@ -143,12 +151,8 @@ fn grids_move_the_drop_by_what_their_prefix_spares() {
     }
 }
 
-#[test]
 fn the_bunny_costs_what_an_independent_program_says() {
-    let Some(mesh) = load("bunny.obj") else {
-        eprintln!("skipped: HEDGEROW_SCENES names no folder with the bunny");
-        return;
-    };
+    let mesh = load("bunny.obj");
     let nosize = "emc64var-nosize";
     for positive in [true, false] {
         let figures = [

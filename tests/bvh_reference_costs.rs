@@ -5,11 +5,24 @@
 //! HEDGEROW_SCENES names their folder.
 
 mod common;
+#[path = "common/conditional.rs"]
+mod conditional;
 
 use common::device;
+use conditional::needs;
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::measure::builders::{Needs, Spec};
 use hedgerow::scene::{self, LoadOptions, Scene};
+
+conditional::tests! {
+    lbvh_costs_are_those_of_an_independent_program_within_half_a_percent: needs::scenes(),
+    lbvh_costs_of_large_scenes_are_those_of_an_independent_program_within_half_a_percent: needs::time("scenes of up to 1.4M triangles take minutes"),
+    ploc_and_sweep_costs_are_those_of_an_independent_program_within_a_percent: needs::scenes(),
+    ploc_and_sweep_costs_of_large_scenes_are_those_of_an_independent_program_within_a_percent: needs::time("scenes of up to 1.4M triangles; fails: san_francisco and bunny_in_city by PLOC 25 with mc30 are 1.1% off"),
+    hlbvh_costs_at_most_1_15_of_full_sweep_in_the_mean: needs::scenes(),
+    hlbvh_costs_of_large_scenes_are_at_most_1_15_of_full_sweep_in_the_mean: needs::time("scenes of up to 1.4M triangles take minutes"),
+    large_scene_dragon_has_the_costs_of_frantal_2019: needs::time("871,414 triangles, one builder with a window of 200: minutes"),
+}
 
 /// Codes in the order of [`COSTS`].
 const CODES: [Codes; 4] = [Code::Mc30.full(), Code::Mc63.full(), Code::Emc64VarNoSize.full(), Code::Emc64Var.full()];
@@ -80,43 +93,32 @@ const TIES: [(&str, f64); 2] = [("sponza", 0.02), ("terrain_jacksboro", 0.02)];
 /// Scenes of fewer triangles are in the suite.
 const SMALL: usize = 130_000;
 
-#[test]
 fn lbvh_costs_are_those_of_an_independent_program_within_half_a_percent() {
     compare_lbvhs(|triangles| triangles < SMALL);
 }
 
-#[test]
-#[ignore = "scenes of up to 1.4M triangles take minutes"]
 fn lbvh_costs_of_large_scenes_are_those_of_an_independent_program_within_half_a_percent() {
     compare_lbvhs(|triangles| triangles >= SMALL);
 }
 
-#[test]
 fn ploc_and_sweep_costs_are_those_of_an_independent_program_within_a_percent() {
     compare_host_builders(|triangles| triangles < SMALL);
 }
 
-#[test]
-#[ignore = "scenes of up to 1.4M triangles; fails: san_francisco and bunny_in_city by PLOC 25 with mc30 are 1.1% off"]
 fn ploc_and_sweep_costs_of_large_scenes_are_those_of_an_independent_program_within_a_percent() {
     compare_host_builders(|triangles| triangles >= SMALL);
 }
 
-#[test]
 fn hlbvh_costs_at_most_1_15_of_full_sweep_in_the_mean() {
     compare_hlbvhs(|triangles| triangles < SMALL);
 }
 
-#[test]
-#[ignore = "scenes of up to 1.4M triangles take minutes"]
 fn hlbvh_costs_of_large_scenes_are_at_most_1_15_of_full_sweep_in_the_mean() {
     compare_hlbvhs(|_| true);
 }
 
-#[test]
-#[ignore = "871,414 triangles, one builder with a window of 200: minutes"]
 fn large_scene_dragon_has_the_costs_of_frantal_2019() {
-    let Some(scene) = load("dragon.tri") else { return };
+    let scene = load("dragon.tri");
     assert_eq!(scene.mesh.triangles.len(), 871_414);
     for (builder, expected, tolerance) in DRAGON {
         compare(&scene, builder, expected, tolerance);
@@ -125,7 +127,7 @@ fn large_scene_dragon_has_the_costs_of_frantal_2019() {
 
 fn compare_lbvhs(is_meant: fn(usize) -> bool) {
     for (name, triangles, costs) in COSTS.into_iter().filter(|&(_, triangles, _)| is_meant(triangles)) {
-        let Some(scene) = load(name) else { return };
+        let scene = load(name);
         assert_eq!(scene.mesh.triangles.len(), triangles, "{name}");
         for (codes, costs) in CODES.into_iter().zip(costs) {
             for (collapse, expected) in ["off", "sah"].into_iter().zip(costs) {
@@ -138,7 +140,7 @@ fn compare_lbvhs(is_meant: fn(usize) -> bool) {
 fn compare_host_builders(is_meant: fn(usize) -> bool) {
     let triangles = |name| COSTS.iter().find(|row| row.0 == name).map(|row| row.1).unwrap();
     for (name, costs) in HOST_COSTS.into_iter().filter(|&(name, _)| is_meant(triangles(name))) {
-        let Some(scene) = load(name) else { return };
+        let scene = load(name);
         for (builder, expected) in HOST_BUILDERS.into_iter().zip(costs) {
             let ties = TIES.iter().find(|(tied, _)| *tied == scene.name && builder.starts_with("ploc"));
             compare(&scene, builder, expected, ties.map_or(TOLERANCE, |ties| ties.1));
@@ -151,7 +153,7 @@ fn compare_hlbvhs(is_meant: fn(usize) -> bool) {
     let triangles = |name| COSTS.iter().find(|row| row.0 == name).map(|row| row.1).unwrap();
     let mut ratios = Vec::new();
     for (name, costs) in HOST_COSTS.into_iter().filter(|&(name, _)| is_meant(triangles(name))) {
-        let Some(scene) = load(name) else { return };
+        let scene = load(name);
         let spec: Spec = "hlbvh".parse().unwrap();
         let mut subject = spec.make(Some(device()), &scene.mesh).unwrap();
         subject.build().unwrap();
@@ -163,14 +165,10 @@ fn compare_hlbvhs(is_meant: fn(usize) -> bool) {
     assert!(mean <= 1.15, "{mean:.4} of full sweep over {} scenes", ratios.len());
 }
 
-/// A scene of HEDGEROW_SCENES; `None`, and a line that says so, where that is not set.
-fn load(name: &str) -> Option<Scene> {
-    let Some(folder) = std::env::var_os("HEDGEROW_SCENES") else {
-        eprintln!("skipped: HEDGEROW_SCENES names no folder of scenes");
-        return None;
-    };
-    let options = LoadOptions { folders: vec![folder.into()], progress: None };
-    Some(scene::load(name, &options).unwrap())
+/// A scene of HEDGEROW_SCENES.
+fn load(name: &str) -> Scene {
+    let options = LoadOptions { folders: vec![conditional::scenes_folder()], progress: None };
+    scene::load(name, &options).unwrap()
 }
 
 /// The cost of what `builder` makes of `scene` is the expected one but for this share of it.

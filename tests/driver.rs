@@ -3,8 +3,11 @@
 #![cfg(feature = "cli")]
 
 mod common;
+#[path = "common/conditional.rs"]
+mod conditional;
 
 use common::corpus;
+use conditional::Needs;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::sah::Collapse;
@@ -16,19 +19,27 @@ use hedgerow::measure::peers::driver::Driver;
 use hedgerow::scene::Mesh;
 use hedgerow::trace::{Hit, Query, Ray};
 
+conditional::tests! {
+    the_driver_reports_primitive_distance_and_weights_as_we_do: needs_driver(),
+    building_twice_into_the_same_memory_gives_the_same_hits: needs_driver(),
+    the_driver_and_we_find_the_same_hits: needs_driver(),
+}
+
 const PREFERENCES: [DriverPreference; 2] = [DriverPreference::FastBuild, DriverPreference::FastTrace];
 
-fn traced(mesh: &Mesh, preference: DriverPreference, rays: &[Ray], query: Query) -> Option<Vec<Hit>> {
+/// A driver that builds and traces acceleration structures itself.
+fn needs_driver() -> Needs {
     let device = common::device();
-    if !device.has_ray_query() {
-        eprintln!("skipped: {} has no VK_KHR_ray_query", device.found().name);
-        return None;
-    }
+    (!device.has_ray_query()).then(|| format!("{} has no VK_KHR_ray_query", device.found().name))
+}
+
+fn traced(mesh: &Mesh, preference: DriverPreference, rays: &[Ray], query: Query) -> Vec<Hit> {
+    let device = common::device();
     let mut driver = Driver::new(device, mesh, preference).expect("the mesh fits");
     driver.build().expect("the driver builds");
     driver.set_rays(rays).expect("the rays fit");
     driver.trace(query).expect("the driver traces");
-    Some(driver.hits().expect("one hit a ray"))
+    driver.hits().expect("one hit a ray")
 }
 
 /// Two squares of two triangles each, at z = 1 (primitives 0, 1) and z = 2 (primitives 2, 3), over 0..1 in x and y.
@@ -41,7 +52,6 @@ fn upwards(x: f32, y: f32, t_min: f32, t_max: f32) -> Ray {
     Ray { origin: [x, y, 0.0], t_min, direction: [0.0, 0.0, 0.5], t_max }
 }
 
-#[test]
 fn the_driver_reports_primitive_distance_and_weights_as_we_do() {
     // Below the diagonal lies the first triangle of a square: (0.75, 0.25) = v0 + 0.5 (v1 - v0) + 0.25 (v2 - v0).
     let rays = [
@@ -59,24 +69,20 @@ fn the_driver_reports_primitive_distance_and_weights_as_we_do() {
         Hit::NONE,
     ];
     for preference in PREFERENCES {
-        let Some(hits) = traced(&two_squares(), preference, &rays, Query::ClosestHit) else { return };
+        let hits = traced(&two_squares(), preference, &rays, Query::ClosestHit);
         for (hit, expected) in hits.iter().zip(&expected) {
             assert_eq!(hit.primitive, expected.primitive, "{preference:?}: {hits:?}");
             let close = |a: f32, b: f32| a == b || (a - b).abs() <= 1e-5;
             assert!(close(hit.t, expected.t) && close(hit.u, expected.u) && close(hit.v, expected.v), "{hit:?}");
         }
-        let any = traced(&two_squares(), preference, &rays, Query::AnyHit).expect("the device has ray queries");
+        let any = traced(&two_squares(), preference, &rays, Query::AnyHit);
         let met: Vec<_> = any.iter().map(|h| (h.t, h.is_some())).collect();
         assert_eq!(met, expected.map(|h| if h.is_some() { (0.0, true) } else { (f32::INFINITY, false) }));
     }
 }
 
-#[test]
 fn building_twice_into_the_same_memory_gives_the_same_hits() {
     let device = common::device();
-    if !device.has_ray_query() {
-        return;
-    }
     let mut driver = Driver::new(device, &two_squares(), DriverPreference::FastTrace).expect("the mesh fits");
     driver.set_rays(&[upwards(0.75, 0.25, 0.0, 9.0)]).expect("the rays fit");
     let hits: Vec<_> = (0..2)
@@ -117,7 +123,6 @@ fn rays_at(mesh: &Mesh) -> Vec<Ray> {
     if finite.is_empty() { vec![upwards(0.25, 0.25, 0.0, f32::INFINITY)] } else { (0..1000).map(&mut ray).collect() }
 }
 
-#[test]
 fn the_driver_and_we_find_the_same_hits() {
     let device = common::device();
     let mut met = 0;
@@ -135,7 +140,7 @@ fn the_driver_and_we_find_the_same_hits() {
             let ours = ours.hits().expect("one hit a ray");
             met += ours.iter().filter(|hit| hit.is_some()).count();
             for preference in PREFERENCES {
-                let Some(theirs) = traced(&mesh, preference, &rays, query) else { return };
+                let theirs = traced(&mesh, preference, &rays, query);
                 let wrong = |hits, reference| wrong_where_different(&tree, &rays, query, (hits, reference), rays.len());
                 assert_eq!(wrong(&ours, &theirs), 0, "ours: {name}, {query:?}, {preference:?}");
                 assert_eq!(wrong(&theirs, &ours), 0, "theirs: {name}, {query:?}, {preference:?}");

@@ -3,10 +3,20 @@
 
 #[path = "common/browser.rs"]
 mod browser;
+#[path = "common/conditional.rs"]
+mod conditional;
 
 use browser::Browser;
+use conditional::needs;
 use std::path::Path;
 use std::process::{Command, Output};
+
+conditional::tests! {
+    a_reader_steps_through_both_trees: needs::browser(),
+    of_too_many_boxes_those_are_drawn_that_are_seen: needs::nothing(),
+    pages_of_two_scenes_name_each_other: needs::nothing(),
+    what_cannot_be_drawn_is_refused: needs::nothing(),
+}
 
 fn navigate(scene: &str, builders: &str, folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_hedgerow"))
@@ -44,7 +54,6 @@ const LOOK: &str = r#"
   });
   return { trees };"#;
 
-#[test]
 fn a_reader_steps_through_both_trees() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let done = navigate("gen:icosphere:3", "kd-binned,lbvh-host", folder.path());
@@ -55,7 +64,7 @@ fn a_reader_steps_through_both_trees() {
     for says in ["gen:icosphere:3, level by level", "Level 0: 1 node, all drawn", "empty leaf", "of the cost"] {
         assert!(page.contains(says), "{says}");
     }
-    let Some(browser) = Browser::find() else { return };
+    let browser = Browser::find();
     let found = browser.look(&path, LOOK);
     assert_eq!(found["sections"], serde_json::json!(["tree-kd-binned", "tree-lbvh-host", "method"]));
     for tree in found["trees"].as_array().expect("two trees") {
@@ -72,7 +81,6 @@ fn a_reader_steps_through_both_trees() {
     }
 }
 
-#[test]
 fn of_too_many_boxes_those_are_drawn_that_are_seen() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     assert!(navigate("gen:soup:2000:1", "kd-binned", folder.path()).status.success());
@@ -82,7 +90,6 @@ fn of_too_many_boxes_those_are_drawn_that_are_seen() {
     assert!(full > 3, "{full} levels have more than 50 boxes in the picture");
 }
 
-#[test]
 fn pages_of_two_scenes_name_each_other() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for scene in ["gen:icosphere:1", "gen:icosphere:2"] {
@@ -93,7 +100,6 @@ fn pages_of_two_scenes_name_each_other() {
     assert!(!page.contains("href=\"navigate-gen-icosphere-2.html\""), "not itself");
 }
 
-#[test]
 fn what_cannot_be_drawn_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (builders, says) in [("lvbh", "no builder is called \"lvbh\""), ("kd-binned:bins=1", "bins=1 is not known")] {

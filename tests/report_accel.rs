@@ -2,16 +2,28 @@
 
 #[path = "common/browser.rs"]
 mod browser;
+#[path = "common/conditional.rs"]
+mod conditional;
 #[path = "common/pages.rs"]
 mod pages;
 
 use browser::Browser;
+use conditional::needs;
 use hedgerow::measure::experiments::points::{
     Batch, BraidedRays, Entry, Failure, Maker, Rebraid, Setting, Side, TopLevel, Update, UpdatedRays, Way, Work,
 };
 use hedgerow::measure::statistics::Spread;
 use hedgerow::report::accel::{self, Points};
 use std::path::Path;
+
+conditional::tests! {
+    records_are_read_back_as_they_were_written: needs::nothing(),
+    the_page_says_plainly_what_is_reached_and_what_is_not: needs::nothing(),
+    updates_that_were_not_measured_are_told_as_such: needs::nothing(),
+    few_points_and_none_make_a_page_all_the_same: needs::nothing(),
+    the_page_holds_together_in_a_browser: needs::browser(),
+    a_sample_to_look_at: needs::variable("HEDGEROW_SAMPLE_REPORT"),
+}
 
 fn spread(median: f64) -> Spread {
     Spread { median, min: 0.94 * median, max: 1.09 * median, runs: 5 }
@@ -136,7 +148,6 @@ fn page_of(folder: &Path, entries: &[Entry]) -> String {
     std::fs::read_to_string(accel::write(folder).expect("the page is written")).expect("just written")
 }
 
-#[test]
 fn records_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let entries = entries();
@@ -153,7 +164,6 @@ fn records_are_read_back_as_they_were_written() {
     assert!(error.contains("accel.jsonl:1: schema 2, this program reads 1"), "{error}");
 }
 
-#[test]
 fn the_page_says_plainly_what_is_reached_and_what_is_not() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let text = pages::text(&page_of(folder.path(), &entries()), "");
@@ -169,7 +179,6 @@ fn the_page_says_plainly_what_is_reached_and_what_is_not() {
     }
 }
 
-#[test]
 fn updates_that_were_not_measured_are_told_as_such() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let entries: Vec<Entry> = [setting()].into_iter().chain(updates(None)).collect();
@@ -178,7 +187,6 @@ fn updates_that_were_not_measured_are_told_as_such() {
     assert!(folder.path().join("charts/accel-update-gen-twist-20000-8.svg").is_file());
 }
 
-#[test]
 fn few_points_and_none_make_a_page_all_the_same() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     assert!(pages::text(&page_of(folder.path(), &[]), "").contains("Nothing that has a goal was measured"));
@@ -188,11 +196,10 @@ fn few_points_and_none_make_a_page_all_the_same() {
     }
 }
 
-#[test]
 fn the_page_holds_together_in_a_browser() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     page_of(folder.path(), &entries());
-    let Some(browser) = Browser::find() else { return };
+    let browser = Browser::find();
     let look = r##"return {
       goals: document.getElementById("goals").tBodies[0].rows.length,
       verdicts: all("#goals tbody td:last-child").map((cell) => cell.textContent),
@@ -206,9 +213,7 @@ fn the_page_holds_together_in_a_browser() {
 }
 
 /// Writes the page of the made-up records where `HEDGEROW_SAMPLE_REPORT` says, to look at.
-#[test]
 fn a_sample_to_look_at() {
-    if let Some(folder) = std::env::var_os("HEDGEROW_SAMPLE_REPORT") {
-        page_of(Path::new(&folder), &entries());
-    }
+    let folder = std::env::var_os("HEDGEROW_SAMPLE_REPORT").expect("it names a folder");
+    page_of(Path::new(&folder), &entries());
 }

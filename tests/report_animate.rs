@@ -2,16 +2,26 @@
 
 #[path = "common/browser.rs"]
 mod browser;
+#[path = "common/conditional.rs"]
+mod conditional;
 #[path = "common/pages.rs"]
 mod pages;
 
 use browser::Browser;
+use conditional::needs;
 use hedgerow::measure::animate::Way;
 use hedgerow::measure::animate::points::{Animated, Entry, Failure, Object, Rays, Setting};
 use hedgerow::measure::record::Memory;
 use hedgerow::measure::statistics::Spread;
 use hedgerow::report::animate::{self, Points};
 use std::path::Path;
+
+conditional::tests! {
+    records_are_read_back_as_they_were_written: needs::nothing(),
+    the_page_says_plainly_which_way_takes_least: needs::nothing(),
+    few_records_and_none_make_a_page_all_the_same: needs::nothing(),
+    the_page_holds_together_in_a_browser: needs::browser(),
+}
 
 fn spread(median: f64) -> Spread {
     Spread { median, min: 0.94 * median, max: 1.09 * median, runs: 3 }
@@ -93,7 +103,6 @@ fn page_of(folder: &Path, entries: &[Entry]) -> String {
     std::fs::read_to_string(animate::write(folder).expect("the page is written")).expect("just written")
 }
 
-#[test]
 fn records_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let entries = entries();
@@ -115,7 +124,6 @@ fn records_are_read_back_as_they_were_written() {
     );
 }
 
-#[test]
 fn the_page_says_plainly_which_way_takes_least() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let text = pages::text(&page_of(folder.path(), &entries()), "");
@@ -131,7 +139,6 @@ fn the_page_says_plainly_which_way_takes_least() {
     }
 }
 
-#[test]
 fn few_records_and_none_make_a_page_all_the_same() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     assert!(pages::text(&page_of(folder.path(), &[]), "").contains("Nothing was measured to its end"));
@@ -141,11 +148,10 @@ fn few_records_and_none_make_a_page_all_the_same() {
     }
 }
 
-#[test]
 fn the_page_holds_together_in_a_browser() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     page_of(folder.path(), &entries());
-    let Some(browser) = Browser::find() else { return };
+    let browser = Browser::find();
     let look = r##"return { ways: all("#ways tbody th").map((cell) => cell.textContent) };"##;
     let found = browser.look(&folder.path().join("animate.html"), look);
     let sections = ["failures", "summary", "pictures", "frames", "published", "method"];

@@ -2,15 +2,27 @@
 
 #[path = "common/browser.rs"]
 mod browser;
+#[path = "common/conditional.rs"]
+mod conditional;
 #[path = "common/pages.rs"]
 mod pages;
 
 use browser::Browser;
+use conditional::needs;
 use hedgerow::measure::choose::hindsight::Choice;
 use hedgerow::measure::matrix::{Failure, Outcome};
 use hedgerow::measure::record::{Build, Memory, Phase, Quality, Record, SCHEMA, Trace};
 use hedgerow::report::{Picture, Report, kd_trees, results};
 use std::path::{Path, PathBuf};
+
+conditional::tests! {
+    the_page_holds_together_in_a_browser: needs::browser(),
+    every_chart_is_an_svg_and_a_png_of_twice_its_size: needs::nothing(),
+    the_csv_has_a_row_a_record_and_columns_for_every_kind_of_ray: needs::nothing(),
+    records_are_read_back_as_they_were_written: needs::nothing(),
+    a_line_that_is_no_record_is_named: needs::nothing(),
+    a_sample_to_look_at: needs::variable("HEDGEROW_SAMPLE_REPORT"),
+}
 
 /// Builders with how fast they build and trace, in Mtri/s and Mrays/s, and their SAH cost on a scene where it is 100.
 const BUILDERS: [(&str, &str, f64, f64, Option<f64>); 8] = [
@@ -161,12 +173,11 @@ const LOOK: &str = r#"
     shown,
   };"#;
 
-#[test]
 fn the_page_holds_together_in_a_browser() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let report = report(folder.path());
     report.write(folder.path()).expect("the report is written");
-    let Some(browser) = Browser::find() else { return };
+    let browser = Browser::find();
     let found = browser.look(&folder.path().join("index.html"), LOOK);
 
     assert_eq!(found["images"], 2 * SCENES.len());
@@ -183,7 +194,6 @@ fn the_page_holds_together_in_a_browser() {
     assert_eq!(found["shown"], lbvhs, "the filter shows the builders of that name on that scene");
 }
 
-#[test]
 fn every_chart_is_an_svg_and_a_png_of_twice_its_size() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     report(folder.path()).write(folder.path()).expect("the report is written");
@@ -209,7 +219,6 @@ fn every_chart_is_an_svg_and_a_png_of_twice_its_size() {
     }
 }
 
-#[test]
 fn the_csv_has_a_row_a_record_and_columns_for_every_kind_of_ray() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let report = report(folder.path());
@@ -231,7 +240,6 @@ fn the_csv_has_a_row_a_record_and_columns_for_every_kind_of_ray() {
     }
 }
 
-#[test]
 fn records_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let report = report(folder.path());
@@ -245,7 +253,6 @@ fn records_are_read_back_as_they_were_written() {
     assert_eq!(read.iter().collect::<Vec<_>>(), report.records());
 }
 
-#[test]
 fn a_line_that_is_no_record_is_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("results.jsonl");
@@ -259,11 +266,9 @@ fn a_line_that_is_no_record_is_named() {
 }
 
 /// Writes the page of the made-up records where `HEDGEROW_SAMPLE_REPORT` says, to look at.
-#[test]
 fn a_sample_to_look_at() {
-    if let Some(folder) = std::env::var_os("HEDGEROW_SAMPLE_REPORT") {
-        let folder = PathBuf::from(folder);
-        std::fs::create_dir_all(&folder).expect("the folder can be made");
-        report(&folder).write(&folder).expect("the report is written");
-    }
+    let folder = std::env::var_os("HEDGEROW_SAMPLE_REPORT").expect("it names a folder");
+    let folder = PathBuf::from(folder);
+    std::fs::create_dir_all(&folder).expect("the folder can be made");
+    report(&folder).write(&folder).expect("the report is written");
 }

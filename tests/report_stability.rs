@@ -2,10 +2,13 @@
 
 #[path = "common/browser.rs"]
 mod browser;
+#[path = "common/conditional.rs"]
+mod conditional;
 #[path = "common/pages.rs"]
 mod pages;
 
 use browser::Browser;
+use conditional::needs;
 use hedgerow::measure::stability::far::Side;
 use hedgerow::measure::stability::large::Placement;
 use hedgerow::measure::stability::points::{Degenerate, Failure, Growth, Head, Large, Run};
@@ -13,6 +16,14 @@ use hedgerow::measure::statistics::Spread;
 use hedgerow::report::stability::{self, Paged, Points};
 use std::collections::BTreeMap;
 use std::path::Path;
+
+conditional::tests! {
+    records_are_read_back_as_they_were_written: needs::nothing(),
+    the_pages_say_where_a_tenth_is_lost_and_what_was_wrong: needs::nothing(),
+    few_points_and_none_make_a_page_all_the_same: needs::nothing(),
+    the_pages_hold_together_in_a_browser: needs::browser(),
+    a_sample_to_look_at: needs::variable("HEDGEROW_SAMPLE_REPORT"),
+}
 
 const KINDS: [&str; 4] = ["primary", "diffuse1", "ao", "shadow"];
 
@@ -139,7 +150,6 @@ fn page_of<P: Paged>(folder: &Path, points: &[P]) -> String {
     std::fs::read_to_string(file.finish(&run(P::EXPERIMENT)).expect("the page is written")).expect("just written")
 }
 
-#[test]
 fn records_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     page_of(folder.path(), &growth());
@@ -158,7 +168,6 @@ fn records_are_read_back_as_they_were_written() {
     assert!(error.contains("growth.jsonl:1: schema 2, this program reads 1"), "{error}");
 }
 
-#[test]
 fn the_pages_say_where_a_tenth_is_lost_and_what_was_wrong() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let page = page_of(folder.path(), &growth());
@@ -178,7 +187,6 @@ fn the_pages_say_where_a_tenth_is_lost_and_what_was_wrong() {
     assert!(!degenerate.contains("identical, driver-fast-build"), "a peer's fault is no failure");
 }
 
-#[test]
 fn few_points_and_none_make_a_page_all_the_same() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     assert!(pages::text(&page_of::<Growth>(folder.path(), &[]), " ").contains("Nothing was measured"));
@@ -199,13 +207,12 @@ fn few_points_and_none_make_a_page_all_the_same() {
     assert!(pages::text(&page, " ").contains("ended before its end"));
 }
 
-#[test]
 fn the_pages_hold_together_in_a_browser() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     page_of(folder.path(), &growth());
     page_of(folder.path(), &large());
     page_of(folder.path(), &degenerate());
-    let Some(browser) = Browser::find() else { return };
+    let browser = Browser::find();
     let look = r##"all("details").forEach((details) => { details.open = true; });
     return {
       rows: (document.getElementById("losses") ?? document.getElementById("matrix")).tBodies[0].rows.length,
@@ -227,12 +234,10 @@ fn the_pages_hold_together_in_a_browser() {
 }
 
 /// Writes the pages of the made-up records where `HEDGEROW_SAMPLE_REPORT` says, to look at.
-#[test]
 fn a_sample_to_look_at() {
-    if let Some(folder) = std::env::var_os("HEDGEROW_SAMPLE_REPORT") {
-        let folder = Path::new(&folder).join("stability");
-        page_of(&folder, &growth());
-        page_of(&folder, &large());
-        page_of(&folder, &degenerate());
-    }
+    let folder = std::env::var_os("HEDGEROW_SAMPLE_REPORT").expect("it names a folder");
+    let folder = Path::new(&folder).join("stability");
+    page_of(&folder, &growth());
+    page_of(&folder, &large());
+    page_of(&folder, &degenerate());
 }

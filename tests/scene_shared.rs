@@ -1,10 +1,17 @@
-//! The scenes of the folder that `HEDGEROW_SCENES` names, where it is set: each loads, with the triangles that its table
+//! The scenes of the folder that `HEDGEROW_SCENES` names: each loads, with the triangles that its table
 //! says, and the camera is outside of nothing and looks somewhere.
 #![cfg(feature = "cli")]
 
+#[path = "common/conditional.rs"]
+mod conditional;
+
+use conditional::needs;
 use hedgerow::scene::{self, LoadOptions};
-use std::path::PathBuf;
 use std::time::Instant;
+
+conditional::tests! {
+    every_shared_scene_loads_whole: needs::scenes(),
+}
 
 /// Triangles by scene, as the folder's own README counts them.
 const TRIANGLES: [(&str, usize); 19] = [
@@ -29,12 +36,8 @@ const TRIANGLES: [(&str, usize); 19] = [
     ("forest", 6_568_212),
 ];
 
-#[test]
 fn every_shared_scene_loads_whole() {
-    let Some(folder) = std::env::var_os("HEDGEROW_SCENES").map(PathBuf::from) else {
-        eprintln!("skipped: HEDGEROW_SCENES names no folder of scenes");
-        return;
-    };
+    let folder = conditional::scenes_folder();
     let options = LoadOptions { folders: vec![folder.clone()], progress: None };
     let listed = scene::list(&folder).expect("HEDGEROW_SCENES can be read");
     let is_there =

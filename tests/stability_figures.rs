@@ -5,6 +5,10 @@
 //! HEDGEROW_SCENES names its folder.
 #![cfg(feature = "cli")]
 
+#[path = "common/conditional.rs"]
+mod conditional;
+
+use conditional::needs;
 use hedgerow::measure::builders;
 use hedgerow::measure::stability::far::{Axes, Side};
 use hedgerow::measure::stability::growth::{self, Plan};
@@ -12,6 +16,11 @@ use hedgerow::measure::stability::points::Growth;
 use hedgerow::measure::stability::relative::Stage;
 use hedgerow::scene::{self, LoadOptions, Scene};
 use hedgerow::trace::kinds::RayOptions;
+
+conditional::tests! {
+    costs_are_those_of_an_independent_program_on_either_side: needs::scene("bunny"),
+    codes_lose_a_soup_where_their_bits_end_on_either_side: needs::nothing(),
+}
 
 /// Costs of these codes on the host, by axes, side and e.
 fn costs(scene: &Scene, codes: &str, axes: Axes, steps: &[u32]) -> Vec<Growth> {
@@ -36,13 +45,8 @@ const TOLERANCE: f64 = 0.02;
 /// e, and the relative cost that the independent program has there.
 type Known = &'static [(u32, f64)];
 
-#[test]
 fn costs_are_those_of_an_independent_program_on_either_side() {
-    let Some(folder) = std::env::var_os("HEDGEROW_SCENES") else {
-        eprintln!("skipped: HEDGEROW_SCENES names no folder of scenes");
-        return;
-    };
-    let options = LoadOptions { folders: vec![folder.into()], progress: None };
+    let options = LoadOptions { folders: vec![conditional::scenes_folder()], progress: None };
     let bunny = scene::load("bunny", &options).expect("the bunny");
     let known: [(&str, Axes, Known); 3] = [
         ("emc64var-nosize", Axes::One, &[(10, 1.03), (42, 1.03), (46, 1.08), (50, 1.38), (56, 5.6)]),
@@ -60,7 +64,6 @@ fn costs_are_those_of_an_independent_program_on_either_side() {
     }
 }
 
-#[test]
 fn codes_lose_a_soup_where_their_bits_end_on_either_side() {
     let soup = scene::load("gen:soup:5000:1", &LoadOptions::default()).expect("a generator");
     let cost = |points: &[Growth], side, e| {

@@ -46,17 +46,9 @@ const BEHIND: &str = r#"
 });</script></body>"#;
 
 impl Browser {
-    /// The one that is there; says so if there is none.
-    pub fn find() -> Option<Browser> {
-        let named = std::env::var_os("HEDGEROW_CHROMIUM").map(PathBuf::from);
-        let path = std::env::var_os("PATH").unwrap_or_default();
-        let names = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-        let found = || std::env::split_paths(&path).flat_map(|d| names.map(|n| d.join(n))).find(|p| p.is_file());
-        let browser = named.or_else(found).map(Browser);
-        if browser.is_none() {
-            eprintln!("skipped: no Chromium here; install chromium or name one with HEDGEROW_CHROMIUM");
-        }
-        browser
+    /// The one that is there: tests that take it need `needs::browser()`.
+    pub fn find() -> Browser {
+        Browser(crate::conditional::browser().expect("a test that needs a browser says so"))
     }
 
     /// Opens a page, and gives what is found there: sections, charts and links, and what `look`, the body of a function of
