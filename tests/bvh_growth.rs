@@ -35,9 +35,9 @@ const GROWTHS: [Growth; 4] = [
     Growth { axes: 3, positive: false },
 ];
 
-fn load(name: &str) -> Option<Mesh> {
-    let folders = std::env::var_os("HEDGEROW_SCENES").map(Into::into).into_iter().collect();
-    scene::load(name, &LoadOptions { folders, progress: None }).ok().map(|scene| scene.mesh)
+fn load(name: &str) -> Mesh {
+    let folders = vec![conditional::scenes_folder()];
+    scene::load(name, &LoadOptions { folders, progress: None }).expect(name).mesh
 }
 
 fn bounds(mesh: &Mesh) -> Aabb {
@@ -106,7 +106,7 @@ fn drop(mesh: &Mesh, codes: &str, growth: Growth, from: u32, to: u32) -> u32 {
 
 /// A sphere whose triangles are in an order that says nothing of where they are.
 fn sphere(levels: u32) -> Mesh {
-    let mesh = load(&format!("gen:icosphere:{levels}")).unwrap();
+    let mesh = scene::load(&format!("gen:icosphere:{levels}"), &LoadOptions::default()).expect("a generator").mesh;
     let count = mesh.triangles.len();
     // Prime, and no divisor of 20 · 4^levels.
     let triangles = (0..count).map(|i| mesh.triangles[i * 1237 % count]).collect();
