@@ -92,6 +92,7 @@ impl Common {
             validation: self.validation,
             ray_query,
             tuning: self.tuning,
+            ..DeviceOptions::default()
         })
     }
 

@@ -2,7 +2,7 @@
 //!
 //! Everything here stands on the same public calls that an engine uses with its own device.
 
-use super::{Buffer, Context, ContextDesc, Recorder, Timestamps, TuningChoice, requirements};
+use super::{Buffer, Context, ContextDesc, Optional, Recorder, Restrict, Timestamps, TuningChoice, requirements};
 use crate::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -24,6 +24,8 @@ pub struct DeviceOptions {
     pub ray_query: bool,
     /// How work is cut: for what the device is, unless told.
     pub tuning: TuningChoice,
+    /// What of the device is not used: for tests.
+    pub restrict: Restrict,
 }
 
 /// One Vulkan device of this machine.
@@ -53,6 +55,8 @@ pub struct Found {
 
 const RAY_QUERY_EXTENSIONS: [&CStr; 3] =
     [ash::khr::acceleration_structure::NAME, ash::khr::ray_query::NAME, ash::khr::deferred_host_operations::NAME];
+/// The first header of Vulkan with `VK_KHR_shader_maximal_reconvergence`.
+const MAXIMAL_RECONVERGENCE_SINCE: u32 = vk::make_api_version(0, 1, 3, 276);
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 /// A dispatch that takes longer than this is taken to hang.
 const SUBMIT_BOUND: Duration = Duration::from_secs(300);
@@ -100,6 +104,8 @@ struct Instance {
     raw: ash::Instance,
     debug: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     has_debug_utils: bool,
+    /// The version of Vulkan that the validation layers were written for, where they are on.
+    layers: Option<u32>,
     messages: Arc<Mutex<Vec<String>>>,
 }
 
@@ -114,7 +120,8 @@ impl Instance {
                 entry.enumerate_instance_extension_properties(None).unwrap_or_default(),
             )
         };
-        if validation && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+        let layer = layers.iter().find(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
+        if validation && layer.is_none() {
             return Err(Error::Argument(
                 "the Vulkan validation layers are not installed; on Debian: apt install vulkan-validationlayers".into(),
             ));
@@ -163,7 +170,15 @@ impl Instance {
                 .map_err(Error::vulkan("vkCreateDebugUtilsMessengerEXT"))?;
             debug = Some((utils, messenger));
         }
-        Ok(Instance { entry: ManuallyDrop::new(entry), raw, debug, has_debug_utils, messages })
+        let layers = layer.filter(|_| validation).map(|layer| layer.spec_version);
+        Ok(Instance { entry: ManuallyDrop::new(entry), raw, debug, has_debug_utils, layers, messages })
+    }
+
+    /// Validation layers complain of extensions that are younger than they are.
+    fn without_what_layers_do_not_know(&self, optional: Optional) -> Optional {
+        let knows = |version: u32| self.layers.is_none_or(|layers| layers >= version);
+        let known = Optional { maximal_reconvergence: knows(MAXIMAL_RECONVERGENCE_SINCE), ..optional };
+        optional.and(known)
     }
 
     fn physical_devices(&self) -> Result<Vec<vk::PhysicalDevice>> {
@@ -274,7 +289,9 @@ impl Device {
         let found: Vec<_> = physical_devices.iter().enumerate().map(|(i, &p)| instance.describe(i, p)).collect();
         let found = found[pick(&found, options.wanted.as_deref())?].clone();
         let physical = physical_devices[found.index];
-        let mut needs = requirements(&instance.raw, physical)?;
+        let needs = requirements(&instance.raw, physical)?;
+        let optional = instance.without_what_layers_do_not_know(options.restrict.optional(needs.optional));
+        let mut needs = needs.only(optional);
 
         let priority = [1.0];
         let queue =
@@ -316,10 +333,11 @@ impl Device {
             device: &raw,
             pipeline_cache,
             debug_utils: debug_utils.as_ref(),
+            optional: needs.optional,
             tuning: options.tuning,
         };
         // SAFETY: created above with what `requirements` asks for; dropped after the context.
-        let context = unsafe { Context::new(&desc) }?;
+        let context = unsafe { Context::limited(&desc, |limits| options.restrict.limit(limits)) }?;
         Ok(Device {
             context: ManuallyDrop::new(context),
             allocator: ManuallyDrop::new(Mutex::new(allocator)),

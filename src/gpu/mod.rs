@@ -16,10 +16,13 @@ mod grid;
 pub mod probe;
 pub(crate) mod push_constants;
 pub mod radix_sort;
+mod reconvergence;
 mod recorder;
 pub mod reduce;
 mod region;
 mod requirements;
+#[cfg(feature = "cli")]
+mod restrict;
 pub mod scan;
 pub mod shaders;
 pub mod task_pool;
@@ -35,6 +38,8 @@ pub use driver_structure::{DriverPreference, DriverSizes, DriverStructure};
 pub use grid::Grid;
 pub use recorder::{Phase, Recorder, Step, Timestamps};
 pub use region::Region;
-pub use requirements::{Features, Requirements, requirements};
+pub use requirements::{Features, Optional, Requirements, requirements};
+#[cfg(feature = "cli")]
+pub use restrict::Restrict;
 pub(crate) use tuning::MOST_LANES;
 pub use tuning::{BuildTuning, KdTuning, RefitTuning, TraceTuning, Tuning, TuningChoice};
