@@ -18,7 +18,7 @@ use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, 
 use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::{Aabb, BoxRecord, Bvh2, Child, Header, Instance, Record, status};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::gpu::{Buffer, Recorder};
+use hedgerow::gpu::{Buffer, DriverTracing, Recorder};
 use hedgerow::trace::host::closest_hit;
 use hedgerow::trace::{Hit, Ray};
 
@@ -730,7 +730,7 @@ fn the_same_calls_of_the_driver_give_the_same_hits() {
     assert!(ours[0].iter().filter(|hit| hit.is_some()).count() > 1000, "rays that hit nothing are no test");
     assert_eq!(ours[1], ours[0]);
     assert_eq!(ours[2], ours[0]);
-    if device().has_ray_query() {
+    if device().driver_tracing() == Some(DriverTracing::Query) {
         for (i, theirs) in hits_of_copies(&Drivers::new(), &corners, &rays).iter().enumerate() {
             // Arithmetic of its own: rays within rounding of an edge.
             let differ = theirs.iter().zip(&ours[0]).filter(|(a, b)| a.primitive != b.primitive).count();

@@ -182,9 +182,10 @@ fn possible(
     let is_driver = |spec: &Spec| spec.needs() == Needs::RayQuery;
     if asked.iter().any(is_driver) {
         notes.extend(no_peer.map(str::to_owned));
-        if device.is_some_and(|device| !device.has_ray_query()) {
+        if device.is_some_and(|device| device.driver_tracing().is_none()) {
             notes.push(
-                "The driver has no acceleration structures of its own (VK_KHR_ray_query) to compare with.".into(),
+                "The driver has no acceleration structures of its own (VK_KHR_acceleration_structure) to compare with."
+                    .into(),
             );
         }
     }

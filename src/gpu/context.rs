@@ -2,7 +2,7 @@
 
 use super::requirements::{self, Optional, SubgroupSizes};
 use super::shaders::Shader;
-use super::{Tuning, TuningChoice, reconvergence};
+use super::{Tuning, TuningChoice, Workarounds, reconvergence};
 use crate::{Error, Result};
 use ash::vk;
 use std::collections::HashMap;
@@ -129,6 +129,8 @@ pub struct Context {
     pub limits: Limits,
     /// How work is cut for it.
     pub tuning: Tuning,
+    /// What its driver's faults need.
+    pub workarounds: Workarounds,
     optional: Optional,
     /// Subgroups of a workgroup, at most, where the size is required.
     subgroups_of_a_workgroup: u32,
@@ -169,6 +171,7 @@ impl Context {
             device: desc.device.clone(),
             debug_utils: desc.debug_utils.cloned(),
             tuning: Tuning::of(desc.tuning, &limits),
+            workarounds: Workarounds::of(&limits),
             optional: desc.optional,
             subgroups_of_a_workgroup: SubgroupSizes::of(desc.instance, desc.physical_device).of_a_workgroup,
             limits,
@@ -244,9 +247,8 @@ impl Context {
                 .name(c"main")
                 .specialization_info(&specialisation);
             if self.can_require_subgroups(kernel.workgroup()) {
-                stage = stage
-                    .flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS)
-                    .push_next(&mut subgroups);
+                stage =
+                    stage.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS).push_next(&mut subgroups);
             }
             let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
             let made = self.device.create_compute_pipelines(self.cache, &[info], None);

@@ -83,9 +83,7 @@ impl Timestamps {
         .map_err(Error::vulkan("vkGetQueryPoolResults"))?;
         let phase = |(i, &name): (usize, &&'static str)| Phase {
             name,
-            milliseconds: ticks_between(ticks[i], ticks[i + 1], self.valid_bits) as f64
-                * f64::from(self.period)
-                * 1e-6,
+            milliseconds: ticks_between(ticks[i], ticks[i + 1], self.valid_bits) as f64 * f64::from(self.period) * 1e-6,
         };
         Ok(self.names.iter().enumerate().map(phase).collect())
     }

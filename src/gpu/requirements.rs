@@ -27,6 +27,13 @@ impl Optional {
         }
     }
 
+    /// What is there, as `hedgerow devices` says it.
+    pub fn names(self) -> Vec<&'static str> {
+        let subgroups = self.subgroup_size_control.then_some("subgroup size control");
+        let reconvergence = self.maximal_reconvergence.then_some("maximal reconvergence");
+        subgroups.into_iter().chain(reconvergence).collect()
+    }
+
     fn extensions(self) -> Vec<&'static CStr> {
         let subgroups = self.subgroup_size_control.then_some(ash::ext::subgroup_size_control::NAME);
         let reconvergence = self.maximal_reconvergence.then_some(ash::khr::shader_maximal_reconvergence::NAME);
@@ -55,8 +62,7 @@ impl Optional {
             subgroup_size_control: offers_subgroups
                 && full
                 && SubgroupSizes::of(instance, physical_device).can_be_required,
-            maximal_reconvergence: offers_reconvergence
-                && reconvergence.shader_maximal_reconvergence != vk::FALSE,
+            maximal_reconvergence: offers_reconvergence && reconvergence.shader_maximal_reconvergence != vk::FALSE,
         }
     }
 }

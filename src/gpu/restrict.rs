@@ -95,7 +95,8 @@ mod tests {
     #[test]
     fn restrictions_are_read_from_a_list() {
         assert_eq!("".parse(), Ok(Restrict::default()));
-        let some = Restrict { subgroup_size: Some(32), inexact: true, shared_memory: Some(16384), ..Default::default() };
+        let some =
+            Restrict { subgroup_size: Some(32), inexact: true, shared_memory: Some(16384), ..Default::default() };
         assert_eq!("subgroup=32, inexact,shared=16384".parse(), Ok(some));
         for wrong in ["subgroup", "shared=x", "inexact=1", "nothing"] {
             assert!(wrong.parse::<Restrict>().is_err(), "{wrong}");

@@ -6,7 +6,7 @@ use super::probe::{Probe, ProbeRay, Report};
 use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
 use hedgerow::ash::{self, vk};
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
-use hedgerow::gpu::{Buffer, Kernel, Recorder, shaders};
+use hedgerow::gpu::{Buffer, DriverRays, DriverTracing, Recorder};
 use hedgerow::trace::tracer::{self, Buffers, Shape};
 use hedgerow::trace::{Hit, Query, Ray};
 
@@ -28,29 +28,10 @@ pub trait Backend {
     fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
 }
 
-/// Whether the driver is a lavapipe before Mesa 26. 25.0.7's breaks the specification in a few cases, which are left out for it:
-/// a transform multiplies the fourth component of 16-bit formats, which should not be read; `firstVertex` leads to other
-/// vertices; many a ray passes by a box without a thickness, and one that ends where it enters a box.
-pub fn is_old_lavapipe() -> bool {
-    let version = device().found().driver.strip_prefix("Mesa ").and_then(|v| v.split('.').next()?.parse::<u32>().ok());
-    is_lavapipe() && version.is_some_and(|major| major < 26)
-}
-
-/// Whether the driver is a lavapipe of Mesa 26 or later: a top level with an inactive instance (reference 0, which the
-/// specification allows) or one of mask 0 crashes the process in a ray query of 26.1.6. 25.0.7 takes them.
-pub fn is_new_lavapipe() -> bool {
-    device().limits.loads_uniform_values_once()
-}
-
-/// Whether the driver is a lavapipe: those of Mesa 25.0.7 and 26.1.6 lose active boxes beside inactive ones.
-pub fn is_lavapipe() -> bool {
-    device().limits.driver == vk::DriverId::MESA_LLVMPIPE
-}
-
-/// Ours, and the driver's where the device has it.
+/// Ours, and the driver's where the device has it with ray queries, which shaders of engines ask.
 pub fn backends() -> Vec<Box<dyn Backend>> {
     let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours::new())];
-    if device().has_ray_query() {
+    if device().driver_tracing() == Some(DriverTracing::Query) {
         all.push(Box::new(Drivers::new()));
     }
     all
@@ -129,18 +110,6 @@ impl Drivers {
     }
 }
 
-/// The push constants of `glsl/measure/ray_query.comp`.
-#[derive(Clone, Copy, bytemuck::NoUninit)]
-#[repr(C)]
-struct RayQuery {
-    structure: u64,
-    rays: u64,
-    hits: u64,
-    works: u64,
-    first: u32,
-    count: u32,
-}
-
 impl Backend for Drivers {
     fn name(&self) -> &'static str {
         "driver"
@@ -212,10 +181,8 @@ impl Backend for Drivers {
         let ray_buffer = device().upload("rays", rays).expect("memory");
         let hits = device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
         let structure = self.address(top.structure);
-        let arguments =
-            RayQuery { structure, rays: ray_buffer.address(), hits: hits.address(), works: 0, first: 0, count };
-        let kernel = Kernel::new(&shaders::MEASURE_RAY_QUERY, 64, &[0]);
-        device().run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(64))).expect("it traces");
+        let of_rays = DriverRays { structure, rays: ray_buffer.address(), hits: hits.address(), count, any_hit: false };
+        device().run(None, |r| device().trace_by_driver(r, &of_rays)).expect("it traces");
         let hits = hits.read(rays.len());
         self.destroy(top.structure);
         hits

@@ -11,7 +11,7 @@ pub mod shapes;
 pub mod twins;
 pub mod world;
 
-use hedgerow::gpu::{Device, DeviceOptions, Restrict, TuningChoice};
+use hedgerow::gpu::{Device, DeviceOptions, DriverTracing, Restrict, TuningChoice};
 use std::sync::OnceLock;
 
 /// The tuning that `HEDGEROW_TUNING` asks for, as for the binary.
@@ -40,7 +40,7 @@ pub fn device() -> &'static Device {
 pub const OPTIONS: DeviceOptions = DeviceOptions {
     wanted: None,
     validation: true,
-    ray_query: true,
+    driver_tracing: Some(DriverTracing::Query),
     tuning: TuningChoice::Auto,
     restrict: Restrict::NONE,
 };
