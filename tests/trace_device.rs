@@ -17,7 +17,7 @@ fn shapes() -> Vec<Shape> {
     let limits = &device().limits;
     let loads = Loads::Gathered;
     let mut shapes = vec![
-        Shape::of(limits),
+        Shape::of(device()),
         Shape::subgroups(limits),
         Shape::groups(limits),
         Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },

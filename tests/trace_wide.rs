@@ -22,7 +22,7 @@ use hedgerow::trace::{Hit, Query, Ray, Work, host};
 fn tracers(form: Form) -> Vec<Tracer> {
     let limits = &device().limits;
     let loads = Loads::Gathered;
-    let mut tracers = vec![Tracer::of(limits, form)];
+    let mut tracers = vec![Tracer::of(device(), form)];
     let orders = if form.is_quantised() { &[Order::Distance, Order::Octant][..] } else { &[Order::Distance] };
     for &order in orders {
         let shapes = [

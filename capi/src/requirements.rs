@@ -5,8 +5,8 @@ use crate::pointers::{handle, place};
 use crate::status::status;
 use crate::vulkan::{PFN_vkGetInstanceProcAddr, VkInstance, VkPhysicalDevice, VkQueueFlags, VkResult};
 use hedgerow::ash::vk;
-use hedgerow::{Error, Result};
 use hedgerow::gpu::{Features, Optional, requirements};
+use hedgerow::{Error, Result};
 use std::ffi::{c_char, c_void};
 
 /// What is optional: bits HEDGEROW_OPTIONAL_*. Results are the same without, only slower.
