@@ -183,6 +183,11 @@ fn the_driver_and_we_find_the_same_hits() {
     assert!(met > 30_000, "{met} hits are no test");
 }
 
+/// NaN is among the weights of triangles that are lost in rounding.
+fn bits(hits: &[Hit]) -> &[u32] {
+    bytemuck::cast_slice(hits)
+}
+
 fn a_pipeline_finds_the_hits_of_queries() {
     let device = by_pipeline();
     assert_eq!(device.driver_tracing(), Some(DriverTracing::Pipeline));
@@ -196,7 +201,7 @@ fn a_pipeline_finds_the_hits_of_queries() {
             let of_pipeline = traced_on(device, &mesh, DriverPreference::FastTrace, &rays, query);
             met += of_queries.iter().filter(|hit| hit.is_some()).count();
             match query {
-                Query::ClosestHit => assert_eq!(of_pipeline, of_queries, "{name}"),
+                Query::ClosestHit => assert!(bits(&of_pipeline) == bits(&of_queries), "{name}"),
                 // Which of several it is, is the driver's choice.
                 Query::AnyHit => {
                     let there = |hits: &[Hit]| hits.iter().map(|hit| (hit.t, hit.is_some())).collect::<Vec<_>>();
@@ -212,16 +217,15 @@ fn a_pipeline_finds_the_hits_of_queries() {
 fn two_levels_are_traced_by_a_pipeline_as_by_queries() {
     let options = scene::LoadOptions { folders: Vec::new(), progress: None };
     let city = scene::load_instances("gen:city:100", &options).expect("a generator");
-    let (lo, hi) = ([-1e3f32; 3], [1e3f32; 3]);
     let mut unit = corpus::unit_floats(9);
-    let mut point = || std::array::from_fn::<f32, 3, _>(|i| lo[i] + (hi[i] - lo[i]) * unit());
-    let ray = |(origin, towards): ([f32; 3], [f32; 3])| Ray {
-        origin,
-        t_min: 0.0,
-        direction: std::array::from_fn(|i| towards[i] - origin[i]),
-        t_max: f32::INFINITY,
+    // Down on each instance, aslant.
+    let ray = |i: usize| {
+        let target = city.instances[i % city.instances.len()].transform.map(|row| row[3]);
+        let away = [unit() - 0.5, unit() - 0.5, unit() - 0.5].map(|x| 40.0 * x);
+        let origin = std::array::from_fn(|k| target[k] + away[k]);
+        Ray { origin, t_min: 0.0, direction: away.map(|x| -x), t_max: f32::INFINITY }
     };
-    let rays: Vec<Ray> = (0..2000).map(|_| ray((point(), std::array::from_fn(|i| 0.02 * point()[i])))).collect();
+    let rays: Vec<Ray> = (0..2000).map(ray).collect();
     let hits = [common::device(), by_pipeline()].map(|device| {
         let functions = ash::khr::acceleration_structure::Device::new(device.ash_instance(), device.ash_device());
         let structures = Structures::drivers(device, &functions);
@@ -235,5 +239,5 @@ fn two_levels_are_traced_by_a_pipeline_as_by_queries() {
     });
     let met = hits[0].iter().filter(|hit| hit.is_some()).count();
     assert!(met > 100, "{met} hits are no test");
-    assert_eq!(hits[0], hits[1]);
+    assert_eq!(bits(&hits[0]), bits(&hits[1]));
 }
