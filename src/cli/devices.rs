@@ -26,9 +26,7 @@ struct Row<'a> {
     api_version: String,
     subgroup_size: u32,
     memory_bytes: u64,
-    /// Ways to trace rays through the driver's own acceleration structures: `query`, `pipeline`.
-    driver_tracing: Vec<&'static str>,
-    optional: Vec<&'static str>,
+    ray_query: bool,
     missing: &'a [String],
     picked: bool,
 }
@@ -60,16 +58,14 @@ fn row(found: &Found) -> Row<'_> {
         api_version: format!("{}.{}", vk::api_version_major(version), vk::api_version_minor(version)),
         subgroup_size: found.subgroup_size,
         memory_bytes: found.memory,
-        driver_tracing: found.driver_tracing.iter().map(|way| way.name()).collect(),
-        optional: found.optional.names(),
+        ray_query: found.ray_query,
         missing: &found.missing,
         picked: found.picked,
     }
 }
 
 fn table(rows: &[Row<'_>]) -> Table {
-    let header =
-        ["", "#", "device", "driver", "kind", "Vulkan", "subgroup", "memory", "driver's rays", "optional", "lacks"];
+    let header = ["", "#", "device", "driver", "kind", "Vulkan", "subgroup", "memory", "ray query", "lacks"];
     let mut table = tables::table(&header, header.len());
     for row in rows {
         let lacks = if row.missing.is_empty() { "nothing".into() } else { row.missing.join(", ") };
@@ -82,14 +78,9 @@ fn table(rows: &[Row<'_>]) -> Table {
             row.api_version.clone(),
             row.subgroup_size.to_string(),
             bytes(row.memory_bytes),
-            or_none(&row.driver_tracing),
-            or_none(&row.optional),
+            if row.ray_query { "yes" } else { "no" }.to_owned(),
             lacks,
         ]);
     }
     table
-}
-
-fn or_none(names: &[&str]) -> String {
-    if names.is_empty() { "none".into() } else { names.join(", ") }
 }

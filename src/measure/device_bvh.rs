@@ -109,11 +109,7 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn timer(&self) -> &'static str {
-        self.device.timer()
-    }
-
-    fn traces_on_device(&self) -> bool {
-        true
+        "device"
     }
 
     fn choice(&self) -> Option<String> {
