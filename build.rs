@@ -1,4 +1,4 @@
-//! Compiles every `glsl/**/*.comp` to SPIR-V and writes `shaders.rs`, the table that `src/gpu/shaders.rs` includes.
+//! Compiles every shader below `glsl/` to SPIR-V and writes `shaders.rs`, the table that `src/gpu/shaders.rs` includes.
 //!
 //! With the feature `compile-shaders` the sources are compiled by shaderc; without it, `glsl/prebuilt/` is taken, so that
 //! whoever links the library needs neither cmake nor a shader compiler.
@@ -21,7 +21,7 @@ fn main() {
     sources.sort();
 
     let mut table = String::new();
-    let mut names = Vec::new();
+    let (mut names, mut of_rays) = (Vec::new(), Vec::new());
     for source in &sources {
         let stem = source.strip_prefix("glsl").expect("found below glsl").with_extension("");
         let name = stem.to_str().expect("shader names are ASCII").replace('\\', "/");
@@ -29,15 +29,19 @@ fn main() {
         let spirv = spirv_of(source, &name, &out);
         writeln!(
             table,
-            "/// `glsl/{name}.comp`\npub static {constant}: Shader = Shader {{ name: {name:?}, spirv: include_bytes!({spirv:?}) }};"
+            "/// `{}`\npub static {constant}: Shader = Shader {{ name: {name:?}, spirv: include_bytes!({spirv:?}) }};",
+            source.display()
         )
         .expect("writing to a string");
-        names.push(constant);
+        let is_compute = source.extension().is_some_and(|e| e == "comp");
+        if is_compute { &mut names } else { &mut of_rays }.push(constant);
     }
     writeln!(
         table,
-        "/// Every shader of the library, by name.\npub static ALL: &[&Shader] = &[&{}];",
-        names.join(", &")
+        "/// Every compute shader, by name.\npub static ALL: &[&Shader] = &[&{}];\n\
+         /// The shaders of ray-tracing pipelines, by name.\npub static OF_RAYS: &[&Shader] = &[&{}];",
+        names.join(", &"),
+        of_rays.join(", &")
     )
     .expect("writing to a string");
     fs::write(out.join("shaders.rs"), table).expect("OUT_DIR can be written");
@@ -51,6 +55,7 @@ fn compile_others(out: &Path) {
     for (source, define, name) in [
         ("examples/engine.comp", None, "example_engine.spv"),
         ("tests/shaders/probe.comp", None, "probe_of_the_driver.spv"),
+        ("tests/shaders/probe.comp", Some("WITH_HEDGEROW"), "probe.spv"),
         ("tests/shaders/kd_probe.comp", None, "kd_probe.spv"),
     ] {
         println!("cargo:rerun-if-changed={source}");
@@ -65,12 +70,15 @@ fn compile_others(out: &Path) {
 #[cfg(not(feature = "compile-shaders"))]
 fn compile_others(_out: &Path) {}
 
+/// How the names of shaders end, by their stage.
+const STAGES: [&str; 4] = ["comp", "rgen", "rchit", "rmiss"];
+
 fn collect(folder: &Path, sources: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("glsl/ is part of the package") {
         let path = entry.expect("glsl/ can be listed").path();
         if path.is_dir() {
             collect(&path, sources);
-        } else if path.extension().is_some_and(|e| e == "comp") {
+        } else if path.extension().is_some_and(|e| STAGES.iter().any(|stage| e == *stage)) {
             sources.push(path);
         }
     }
@@ -105,7 +113,10 @@ fn spirv_of(source: &Path, name: &str, out: &Path) -> PathBuf {
     // What both were made of lies beside them: a shader none of whose text has changed is not compiled again.
     let stamp = out.join(format!("{file}.source"));
     let made_of = made_of(source);
-    if path.exists() && named.join(&file).exists() && fs::read_to_string(&stamp).is_ok_and(|was| was == made_of) {
+    if path.exists()
+        && named.join(&file).exists()
+        && fs::read_to_string(&stamp).is_ok_and(|was| was.ends_with(&made_of))
+    {
         return path;
     }
     fs::write(named.join(&file), compile(source, None, shaderc::OptimizationLevel::Zero))
@@ -115,11 +126,12 @@ fn spirv_of(source: &Path, name: &str, out: &Path) -> PathBuf {
     path
 }
 
-/// All text that a shader's SPIR-V follows from: its own, that of every file it includes, and this program's.
+/// All text that a shader's SPIR-V follows from: its own, that of every file it includes, and that of what changes it afterwards.
+/// Whoever changes the options of `compile` removes the stamps.
 #[cfg(feature = "compile-shaders")]
 fn made_of(source: &Path) -> String {
     let mut files = vec![source.to_path_buf()];
-    let mut text = concat!(include_str!("build.rs"), include_str!("build/shared_memory.rs")).to_owned();
+    let mut text = include_str!("build/shared_memory.rs").to_owned();
     let mut next = 0;
     while next < files.len() {
         let content = fs::read_to_string(&files[next]).unwrap_or_default();
@@ -153,7 +165,13 @@ fn compile(source: &Path, define: Option<&str>, level: shaderc::OptimizationLeve
         Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
     });
     let file = source.display().to_string();
-    match compiler.compile_into_spirv(&text, shaderc::ShaderKind::Compute, &file, "main", Some(&options)) {
+    let kind = match source.extension().and_then(|e| e.to_str()) {
+        Some("rgen") => shaderc::ShaderKind::RayGeneration,
+        Some("rchit") => shaderc::ShaderKind::ClosestHit,
+        Some("rmiss") => shaderc::ShaderKind::Miss,
+        _ => shaderc::ShaderKind::Compute,
+    };
+    match compiler.compile_into_spirv(&text, kind, &file, "main", Some(&options)) {
         Ok(binary) => shared_memory::handed_over_at_barriers(binary.as_binary_u8()),
         Err(error) => {
             // shaderc already writes `glsl/room/pass.comp:LINE: error: …`, which editors follow as they follow rustc.

@@ -15,7 +15,7 @@ use hedgerow::ash;
 use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
 use hedgerow::bvh::compact;
 use hedgerow::bvh::layout::{Header, Triangle};
-use hedgerow::gpu::{Buffer, Device, DeviceOptions};
+use hedgerow::gpu::{Buffer, Device, DeviceOptions, DriverTracing};
 use hedgerow::measure::experiments::batch::{Batch, Workload};
 use hedgerow::measure::experiments::points::Way;
 use hedgerow::measure::structures::Structures;
@@ -28,8 +28,7 @@ const SIZE: [u32; 2] = [256, 192];
 
 fn device() -> Device {
     let wanted = std::env::var("HEDGEROW_DEVICE").ok();
-    Device::new(&DeviceOptions { wanted, validation: false, ray_query: false, ..DeviceOptions::default() })
-        .expect("a device that fits")
+    Device::new(&DeviceOptions { wanted, validation: false, ..DeviceOptions::default() }).expect("a device that fits")
 }
 
 fn scene() -> Scene {
@@ -183,12 +182,17 @@ fn compaction(c: &mut Criterion) {
 fn batch(c: &mut Criterion) {
     const COUNT: u32 = 4096;
     let wanted = std::env::var("HEDGEROW_DEVICE").ok();
-    let options = DeviceOptions { wanted, validation: false, ray_query: true, ..DeviceOptions::default() };
+    let options = DeviceOptions {
+        wanted,
+        validation: false,
+        driver_tracing: Some(DriverTracing::Query),
+        ..DeviceOptions::default()
+    };
     let device = Device::new(&options).expect("a device that fits");
     let driver = ash::khr::acceleration_structure::Device::new(device.ash_instance(), device.ash_device());
     let workload = Workload::new(&device, COUNT).expect("memory");
     let mut makers = vec![("", Structures::ours(&device, accel::Options::DEFAULT))];
-    if device.has_ray_query() {
+    if device.driver_tracing().is_some() {
         makers.push((", the driver's", Structures::drivers(&device, &driver)));
     }
     let mut group = c.benchmark_group("batch");

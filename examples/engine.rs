@@ -13,7 +13,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 use hedgerow::accel::{self, Instance};
 use hedgerow::ash::{self, vk};
-use hedgerow::gpu::{Context, ContextDesc, Requirements, TuningChoice, requirements};
+use hedgerow::gpu::{Context, ContextDesc, Optional, Requirements, TuningChoice, requirements};
 use std::error::Error;
 use std::path::Path;
 
@@ -136,6 +136,8 @@ struct Engine {
     // Dropped first: it returns its memory to the device.
     allocator: Option<Allocator>,
     device: ash::Device,
+    /// What the device was made with of what is optional.
+    optional: Optional,
     physical: vk::PhysicalDevice,
     instance: ash::Instance,
     queue_family: u32,
@@ -152,8 +154,8 @@ impl Engine {
             let instance = entry.create_instance(&info, None)?;
             let (physical, needs) = pick(&instance)?;
 
-            // The device has what the library requires, and nothing more.
-            let Requirements { queue_family, extensions, mut features, .. } = needs;
+            // The device has what the library requires, and what makes it faster where there is that.
+            let Requirements { queue_family, extensions, mut features, optional, .. } = needs;
             let queue =
                 [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
             let extensions: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
@@ -167,7 +169,7 @@ impl Engine {
                 buffer_device_address: true,
                 allocation_sizes: Default::default(),
             })?;
-            Ok(Engine { allocator: Some(allocator), device, physical, instance, queue_family, _entry: entry })
+            Ok(Engine { allocator: Some(allocator), device, optional, physical, instance, queue_family, _entry: entry })
         }
     }
 
@@ -178,6 +180,7 @@ impl Engine {
             device: &self.device,
             pipeline_cache: vk::PipelineCache::null(),
             debug_utils: None,
+            optional: self.optional,
             tuning: TuningChoice::Auto,
         };
         // SAFETY: the device was made from these with what `requirements` returned, and outlives the context.

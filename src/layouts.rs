@@ -79,9 +79,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "gpu" if is("scan") => gpu::scan::push_constants(),
         "trace" if is("tracer") => trace::tracer::push_constants(),
         "measure" if is("copy") => measure::copy::push_constants(),
-        "measure" if is("probe") => measure::check::probe::push_constants(),
-        "measure" if is("query") => measure::peers::driver::push_constants(),
-        "measure" if is("ray_query") => measure::peers::driver::push_constants(),
+        "measure" if ["query", "ray_query", "driver_rays"].into_iter().any(is) => gpu::driver_rays::push_constants(),
         _ => return None,
     })
 }
@@ -268,7 +266,7 @@ impl Reflection {
 
 #[test]
 fn push_constants_are_the_same_on_host_and_device() {
-    for shader in shaders::ALL {
+    for shader in shaders::ALL.iter().copied().chain([&shaders::MEASURE_DRIVER_RAYS]) {
         let device =
             Reflection::of(shader.name).arguments().unwrap_or_else(|| panic!("{} has no push constants", shader.name));
         let mut host = arguments_of(shader.name)

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::backends::{Backend, Built, Ours, backends, is_old_lavapipe, vk_format, vk_geometry};
+use common::backends::{Backend, Built, Ours, backends, vk_format, vk_geometry};
 use common::device;
 use common::geometries::{MOVED, Owned};
 use common::shapes::{Corners, Random, ray, soup};
@@ -120,7 +120,9 @@ fn every_format_and_layout_is_hit_where_it_is() {
                     continue;
                 }
                 let transform = Some(MOVED).filter(|_| {
-                    backend.name() == "hedgerow" || vertex_format.component_bytes() == 4 || !is_old_lavapipe()
+                    backend.name() == "hedgerow"
+                        || vertex_format.component_bytes() == 4
+                        || !device().workarounds.driver_misreads_geometry
                 });
                 for (padding, transform, offset) in [(0, None, 0), (8, transform, 256)] {
                     let what = format!("{} {vertex_format:?} {index_format:?} {padding}", backend.name());
@@ -148,7 +150,7 @@ fn offsets_of_a_range_begin_in_the_middle_of_the_buffers() {
     let corners = soup(90, 0.9, 5);
     for backend in backends() {
         for index_format in [IndexFormat::NONE, IndexFormat::U16, IndexFormat::U32] {
-            let no_first_vertex = backend.name() == "driver" && is_old_lavapipe();
+            let no_first_vertex = backend.name() == "driver" && device().workarounds.driver_misreads_geometry;
             let owned = Owned::of(&corners, VertexFormat::FLOAT3, index_format, 4);
             let transforms = device().upload("transforms", &[[[0f32; 4]; 3], MOVED]).expect("memory");
             let (geometry, _memory) = owned.upload(0, 0);
@@ -207,7 +209,7 @@ fn several() -> Vec<Owned> {
 fn several_geometries_are_one_structure() {
     for backend in backends() {
         let mut parts: Vec<Owned> = several().into_iter().filter(|p| takes(&*backend, p.vertex_format)).collect();
-        if backend.name() == "driver" && is_old_lavapipe() {
+        if backend.name() == "driver" && device().workarounds.driver_misreads_geometry {
             parts.retain(|part| part.transform.is_none());
         }
         let tree = on_the_host(&parts);
@@ -240,7 +242,7 @@ fn several_geometries_are_one_structure() {
 /// Our bytes are those of the host, whether built alone or beside others, and nothing else is written.
 #[test]
 fn builds_of_a_batch_are_those_of_the_host() {
-    let ours = Ours::on(device());
+    let ours = Ours::new();
     let cases: Vec<Vec<Owned>> = (0..40)
         .map(|i| match i % 5 {
             0 => several(),
@@ -298,7 +300,7 @@ fn builds_of_a_batch_are_those_of_the_host() {
 
 #[test]
 fn fewer_primitives_than_were_planned_for_fit() {
-    let ours = Ours::on(device());
+    let ours = Ours::new();
     let owned = Owned::of(&soup(300, 0.5, 9), VertexFormat::FLOAT3, IndexFormat::U32, 0);
     let (geometry, _memory) = owned.upload(0, 0);
     let geometries = [vk_geometry(&geometry, &owned)];
@@ -324,7 +326,7 @@ fn fewer_primitives_than_were_planned_for_fit() {
 /// More triangles have a smaller table to sort with at some counts: what is asked for must suffice for fewer, too.
 #[test]
 fn the_sizes_of_a_maximum_suffice_for_every_smaller_count() {
-    let ours = Ours::on(device());
+    let ours = Ours::new();
     let owned = Owned::of(&soup(1, 0.5, 9), VertexFormat::FLOAT3, IndexFormat::U32, 0);
     let (geometry, _memory) = owned.upload(0, 0);
     let geometries = [vk_geometry(&geometry, &owned)];

@@ -9,7 +9,7 @@ use common::shapes::soup;
 use hedgerow::accel;
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
-use hedgerow::gpu::{Context, ContextDesc, requirements};
+use hedgerow::gpu::{Context, ContextDesc, Optional, requirements};
 use vk::BuildAccelerationStructureFlagsKHR as BuildFlags;
 
 type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
@@ -29,11 +29,12 @@ fn builds_that_many_threads_record_are_those_of_one() {
         device: raw,
         pipeline_cache: vk::PipelineCache::null(),
         debug_utils: None,
+        optional: Optional::NONE,
         tuning: common::tuning(),
     };
     let context = unsafe { Context::new(&desc) }.expect("a context");
     let builder = accel::Device::new(&context);
-    let ours = Ours::on(device());
+    let ours = Ours::new();
     let flags =
         [BuildFlags::empty(), BuildFlags::PREFER_FAST_BUILD, BuildFlags::PREFER_FAST_TRACE, BuildFlags::LOW_MEMORY];
     let meshes: Vec<Owned> = (0..THREADS * BUILDS_EACH)

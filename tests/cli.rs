@@ -26,6 +26,7 @@ conditional::tests! {
     wrong_arguments_end_with_2_and_say_what_is_right: needs::nothing(),
     work_that_fails_ends_with_1_and_one_line: needs::nothing(),
     scenes_are_found_by_name_in_the_folder_that_is_given: needs::nothing(),
+    a_device_a_driver_file_and_a_tuning_that_do_not_exist_are_named: needs::nothing(),
     a_variable_that_is_empty_is_as_one_that_is_not_set: needs::nothing(),
     a_reader_that_goes_away_is_no_error: needs::nothing(),
 }
@@ -308,6 +309,23 @@ fn scenes_are_found_by_name_in_the_folder_that_is_given() {
     let text = done(&["build", "corner", "-b", "lbvh-host", "--runs", "1", "--json", "-", "--scenes-dir", &here]);
     let record: Value = serde_json::from_str(&text).expect("a record");
     assert_eq!((&record["scene"], &record["triangles"]), (&"corner".into(), &1.into()));
+}
+
+fn a_device_a_driver_file_and_a_tuning_that_do_not_exist_are_named() {
+    for (variable, value, message) in [
+        ("HEDGEROW_DEVICE", "nonsense", "no device is called \"nonsense\"; there are: 0: "),
+        ("HEDGEROW_TUNING", "nonsense", "there is no tuning \"nonsense\"; take auto, cpu or gpu"),
+        ("VK_DRIVER_FILES", "/nonexistent/icd.json", "VK_DRIVER_FILES names /nonexistent/icd.json, which is not there"),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_hedgerow"))
+            .args(["devices"])
+            .env_remove("VK_ICD_FILENAMES")
+            .env(variable, value)
+            .output()
+            .expect("the binary starts");
+        let (_, err) = texts(&output);
+        assert!(!output.status.success() && err.contains(message), "{variable}={value}: {err}");
+    }
 }
 
 fn a_variable_that_is_empty_is_as_one_that_is_not_set() {

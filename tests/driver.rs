@@ -8,21 +8,27 @@ mod conditional;
 
 use common::corpus;
 use conditional::Needs;
+use hedgerow::ash::{self, vk};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::gpu::DriverPreference;
+use hedgerow::gpu::{Device, DeviceOptions, DriverPreference, DriverTracing, Restrict};
 use hedgerow::measure::Subject;
 use hedgerow::measure::agreement::wrong_where_different;
 use hedgerow::measure::builders::Spec;
+use hedgerow::measure::levels::Levels;
 use hedgerow::measure::peers::driver::Driver;
-use hedgerow::scene::Mesh;
+use hedgerow::measure::structures::Structures;
+use hedgerow::scene::{self, Mesh};
 use hedgerow::trace::{Hit, Query, Ray};
+use std::sync::OnceLock;
 
 conditional::tests! {
     the_driver_reports_primitive_distance_and_weights_as_we_do: needs_driver(),
     building_twice_into_the_same_memory_gives_the_same_hits: needs_driver(),
     the_driver_and_we_find_the_same_hits: needs_driver(),
+    a_pipeline_finds_the_hits_of_queries: needs_both(),
+    two_levels_are_traced_by_a_pipeline_as_by_queries: needs_both(),
 }
 
 const PREFERENCES: [DriverPreference; 2] = [DriverPreference::FastBuild, DriverPreference::FastTrace];
@@ -30,11 +36,37 @@ const PREFERENCES: [DriverPreference; 2] = [DriverPreference::FastBuild, DriverP
 /// A driver that builds and traces acceleration structures itself.
 fn needs_driver() -> Needs {
     let device = common::device();
-    (!device.has_ray_query()).then(|| format!("{} has no VK_KHR_ray_query", device.found().name))
+    device.driver_tracing().is_none().then(|| format!("{} has no VK_KHR_acceleration_structure", device.found().name))
+}
+
+/// Queries and pipelines.
+fn needs_both() -> Needs {
+    let found = common::device().found();
+    let both = [DriverTracing::Query, DriverTracing::Pipeline];
+    (found.driver_tracing != both).then(|| format!("{} has no VK_KHR_ray_tracing_pipeline beside queries", found.name))
+}
+
+/// The device with the driver's structures traced by a pipeline.
+fn by_pipeline() -> &'static Device {
+    static DEVICE: OnceLock<Device> = OnceLock::new();
+    DEVICE.get_or_init(|| {
+        let wanted = std::env::var("HEDGEROW_DEVICE").ok();
+        // Staged too, as it is on the GPUs that have no queries.
+        let restrict = Restrict { staged: true, ..common::restrict() };
+        common::open(DeviceOptions {
+            wanted,
+            driver_tracing: Some(DriverTracing::Pipeline),
+            restrict,
+            ..common::OPTIONS
+        })
+    })
 }
 
 fn traced(mesh: &Mesh, preference: DriverPreference, rays: &[Ray], query: Query) -> Vec<Hit> {
-    let device = common::device();
+    traced_on(common::device(), mesh, preference, rays, query)
+}
+
+fn traced_on(device: &Device, mesh: &Mesh, preference: DriverPreference, rays: &[Ray], query: Query) -> Vec<Hit> {
     let mut driver = Driver::new(device, mesh, preference).expect("the mesh fits");
     driver.build().expect("the driver builds");
     driver.set_rays(rays).expect("the rays fit");
@@ -149,4 +181,63 @@ fn the_driver_and_we_find_the_same_hits() {
     }
     // Most meshes are hit by all of the rays aimed at them: points, lines and what is lost in rounding are not.
     assert!(met > 30_000, "{met} hits are no test");
+}
+
+/// NaN is among the weights of triangles that are lost in rounding.
+fn bits(hits: &[Hit]) -> &[u32] {
+    bytemuck::cast_slice(hits)
+}
+
+fn a_pipeline_finds_the_hits_of_queries() {
+    let device = by_pipeline();
+    assert_eq!(device.driver_tracing(), Some(DriverTracing::Pipeline));
+    let mut met = 0;
+    for (name, positions, mut triangles) in corpus::meshes() {
+        triangles.retain(|t| t.iter().all(|&v| (v as usize) < positions.len()));
+        let mesh = Mesh { positions, triangles };
+        let rays = rays_at(&mesh);
+        for query in [Query::ClosestHit, Query::AnyHit] {
+            let of_queries = traced(&mesh, DriverPreference::FastTrace, &rays, query);
+            let of_pipeline = traced_on(device, &mesh, DriverPreference::FastTrace, &rays, query);
+            met += of_queries.iter().filter(|hit| hit.is_some()).count();
+            match query {
+                Query::ClosestHit => assert!(bits(&of_pipeline) == bits(&of_queries), "{name}"),
+                // Which of several it is, is the driver's choice.
+                Query::AnyHit => {
+                    let there = |hits: &[Hit]| hits.iter().map(|hit| (hit.t, hit.is_some())).collect::<Vec<_>>();
+                    assert_eq!(there(&of_pipeline), there(&of_queries), "{name}");
+                }
+            }
+        }
+    }
+    assert!(met > 30_000, "{met} hits are no test");
+}
+
+/// As `hedgerow accel` measures them.
+fn two_levels_are_traced_by_a_pipeline_as_by_queries() {
+    let options = scene::LoadOptions { folders: Vec::new(), progress: None };
+    let city = scene::load_instances("gen:city:100", &options).expect("a generator");
+    let mut unit = corpus::unit_floats(9);
+    // Down on each instance, aslant.
+    let ray = |i: usize| {
+        let target = city.instances[i % city.instances.len()].transform.map(|row| row[3]);
+        let away = [unit() - 0.5, unit() - 0.5, unit() - 0.5].map(|x| 40.0 * x);
+        let origin = std::array::from_fn(|k| target[k] + away[k]);
+        Ray { origin, t_min: 0.0, direction: away.map(|x| -x), t_max: f32::INFINITY }
+    };
+    let rays: Vec<Ray> = (0..2000).map(ray).collect();
+    let hits = [common::device(), by_pipeline()].map(|device| {
+        let functions = ash::khr::acceleration_structure::Device::new(device.ash_instance(), device.ash_device());
+        let structures = Structures::drivers(device, &functions);
+        let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE;
+        let mut levels = Levels::new(structures, &city, flags).expect("memory");
+        levels.build().expect("it builds");
+        let rays_on_device = device.upload("rays", &rays).expect("memory");
+        let hits = device.buffer("hits", (rays.len() * size_of::<Hit>()) as u64).expect("memory");
+        levels.trace(&rays_on_device, &hits, rays.len() as u32, Query::ClosestHit).expect("it traces");
+        hits.read::<Hit>(rays.len())
+    });
+    let met = hits[0].iter().filter(|hit| hit.is_some()).count();
+    assert!(met > 100, "{met} hits are no test");
+    assert_eq!(bits(&hits[0]), bits(&hits[1]));
 }

@@ -10,7 +10,11 @@ use std::path::Path;
 
 /// File name to SPIR-V, of what this build compiled.
 fn compiled() -> BTreeMap<String, Vec<u8>> {
-    shaders::ALL.iter().map(|s| (format!("{}.spv", s.name.replace('/', ".")), s.spirv.to_vec())).collect()
+    shaders::ALL
+        .iter()
+        .chain(shaders::OF_RAYS)
+        .map(|s| (format!("{}.spv", s.name.replace('/', ".")), s.spirv.to_vec()))
+        .collect()
 }
 
 /// File name to SPIR-V, of what is committed.

@@ -52,6 +52,7 @@ typedef struct Engine {
     VkInstance instance;
     VkPhysicalDevice physical_device;
     VkDevice device;
+    HedgerowOptional optional;
     uint32_t queue_family;
     VkQueue queue;
 } Engine;
@@ -108,6 +109,7 @@ static Engine create_engine(void) {
         .ppEnabledExtensionNames = needs->enabledExtensionNames,
     };
     CHECK(vkCreateDevice(engine.physical_device, &device_info, NULL, &engine.device));
+    engine.optional = needs->optional;
     hedgerow_destroy_requirements(needs);
     vkGetDeviceQueue(engine.device, engine.queue_family, 0, &engine.queue);
     return engine;
@@ -281,6 +283,7 @@ int main(void) {
         .instance = engine.instance,
         .physicalDevice = engine.physical_device,
         .device = engine.device,
+        .optional = engine.optional,
     };
     HedgerowContext *context;
     CHECK(hedgerow_create_context(&context_info, &context));

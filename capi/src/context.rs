@@ -2,6 +2,7 @@
 
 use crate::loader;
 use crate::pointers::{handle, place, reference};
+use crate::requirements::{HedgerowOptional, optional_of};
 use crate::status::{status, value_or};
 use crate::vulkan::{
     PFN_vkGetInstanceProcAddr, VkBool32, VkDevice, VkInstance, VkPhysicalDevice, VkPipelineCache, VkResult,
@@ -28,6 +29,8 @@ pub struct HedgerowContextCreateInfo {
     /// Whether calls check what takes memory of what was created and built, as Vulkan's validation would: `VK_TRUE` for
     /// debugging.
     pub checked: VkBool32,
+    /// What the device was created with of `HedgerowRequirements::optional`; 0 is always right.
+    pub optional: HedgerowOptional,
 }
 
 /// The library's state on one device: pipelines, made when first recorded. Threads may share it.
@@ -81,6 +84,7 @@ pub unsafe extern "C" fn hedgerow_create_context(
                 device: &device,
                 pipeline_cache: info.pipeline_cache,
                 debug_utils: labels.as_ref(),
+                optional: optional_of(info.optional)?,
                 tuning: TuningChoice::Auto,
             })?;
             let context = Box::new(context);

@@ -5,15 +5,40 @@ use crate::pointers::{handle, place};
 use crate::status::status;
 use crate::vulkan::{PFN_vkGetInstanceProcAddr, VkInstance, VkPhysicalDevice, VkQueueFlags, VkResult};
 use hedgerow::ash::vk;
-use hedgerow::gpu::{Features, requirements};
+use hedgerow::gpu::{Features, Optional, requirements};
+use hedgerow::{Error, Result};
 use std::ffi::{c_char, c_void};
+
+/// What is optional: bits HEDGEROW_OPTIONAL_*. Results are the same without, only slower.
+pub type HedgerowOptional = u32;
+/// `VK_EXT_subgroup_size_control` with its features `subgroupSizeControl` and `computeFullSubgroups`.
+pub const HEDGEROW_OPTIONAL_SUBGROUP_SIZE_CONTROL: HedgerowOptional = 1;
+/// `VK_KHR_shader_maximal_reconvergence` with its feature `shaderMaximalReconvergence`.
+pub const HEDGEROW_OPTIONAL_MAXIMAL_RECONVERGENCE: HedgerowOptional = 2;
+
+fn bits_of(optional: Optional) -> HedgerowOptional {
+    let bit = |has: bool, bit| if has { bit } else { 0 };
+    bit(optional.subgroup_size_control, HEDGEROW_OPTIONAL_SUBGROUP_SIZE_CONTROL)
+        | bit(optional.maximal_reconvergence, HEDGEROW_OPTIONAL_MAXIMAL_RECONVERGENCE)
+}
+
+pub(crate) fn optional_of(bits: HedgerowOptional) -> Result<Optional> {
+    let optional = Optional {
+        subgroup_size_control: bits & HEDGEROW_OPTIONAL_SUBGROUP_SIZE_CONTROL != 0,
+        maximal_reconvergence: bits & HEDGEROW_OPTIONAL_MAXIMAL_RECONVERGENCE != 0,
+    };
+    if bits_of(optional) != bits {
+        return Err(Error::Argument(format!("optional is {bits:#x}; it must be of the bits HEDGEROW_OPTIONAL_*")));
+    }
+    Ok(optional)
+}
 
 /// What to create a `VkDevice` with. It is the library's memory, until hedgerow_destroy_requirements.
 #[repr(C)]
 pub struct HedgerowRequirements {
     /// The version for `VkApplicationInfo::apiVersion`, at least.
     pub api_version: u32,
-    /// The first queue family that has `queueFlags`, of those without graphics where there is one with timestamps.
+    /// The queue family to take: with `queueFlags` and timestamps, without graphics where there is such a one.
     pub queue_family_index: u32,
     /// What the queue family must have, if the caller takes another.
     pub queue_flags: VkQueueFlags,
@@ -25,6 +50,9 @@ pub struct HedgerowRequirements {
     /// `VkPhysicalDeviceVulkan12Features` already, set `bufferDeviceAddress`, `vulkanMemoryModel`,
     /// `vulkanMemoryModelDeviceScope` and `scalarBlockLayout` there instead.
     pub features: *mut c_void,
+    /// What the extensions and the features hold that is optional, for `HedgerowContextCreateInfo::optional`. Whoever enables
+    /// less gives less there.
+    pub optional: HedgerowOptional,
 }
 
 /// What the caller's pointer points to, and what that points to.
@@ -63,6 +91,7 @@ pub unsafe extern "C" fn hedgerow_create_requirements(
                 enabled_extension_count: names.len() as u32,
                 enabled_extension_names: names.as_ptr(),
                 features: std::ptr::null_mut(),
+                optional: bits_of(needs.optional),
             },
             _names: names,
             features: needs.features,

@@ -39,6 +39,7 @@ impl Engine {
             device_info.enabled_extension_count = (*needs).enabled_extension_count;
             device_info.pp_enabled_extension_names = (*needs).enabled_extension_names;
             let device = instance.create_device(physical_device, &device_info, None).expect("a device");
+            let optional = (*needs).optional;
             hedgerow_destroy_requirements(needs);
             let info = HedgerowContextCreateInfo {
                 pfn_get_instance_proc_addr,
@@ -48,6 +49,7 @@ impl Engine {
                 pipeline_cache: vk::PipelineCache::null(),
                 debug_labels: vk::FALSE,
                 checked: vk::TRUE,
+                optional,
             };
             Engine { info, device, instance, _entry: entry }
         }
@@ -112,5 +114,9 @@ fn refusals_name_the_field() {
         assert_eq!(hedgerow_cmd_trace_rays(context, commands, &trace), vk::Result::ERROR_VALIDATION_FAILED_EXT);
         assert_eq!(last_error(), "hits is 0x28; it must be a multiple of 16 and not zero");
         hedgerow_destroy_context(context);
+
+        let more = HedgerowContextCreateInfo { optional: 0x80, ..engine.info };
+        assert_eq!(hedgerow_create_context(&more, &mut context), vk::Result::ERROR_VALIDATION_FAILED_EXT);
+        assert_eq!(last_error(), "optional is 0x80; it must be of the bits HEDGEROW_OPTIONAL_*");
     }
 }

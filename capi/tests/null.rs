@@ -54,6 +54,7 @@ fn contexts_name_what_is_null() {
         pipeline_cache: vk::PipelineCache::null(),
         debug_labels: vk::FALSE,
         checked: vk::TRUE,
+        optional: 0,
     };
     // SAFETY: null is refused before anything is called.
     unsafe {

@@ -3,26 +3,7 @@
 // reads   rays[first..count], the structure
 // writes  hits[first..count]; works[first..count] where work is counted
 // needs   a barrier (build -> read) before and one after; any subgroup size
-layout(constant_id = 1) const bool ANY_HIT = false;
-
-struct GivenRay {
-    vec3 origin;
-    float t_min;
-    vec3 direction;
-    float t_max;
-};
-
-struct Hit {
-    float t;
-    uint primitive;
-    float u;
-    float v;
-};
-
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Rays { GivenRay ray[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer Hits { Hit hit[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer Works { uvec4 work[]; };
-layout(push_constant, scalar) uniform Arguments { uvec2 structure; Rays rays; Hits hits; Works works; uint first; uint count; };
+#include "measure/rays.glsl"
 
 void main() {
     uint i = first + gl_GlobalInvocationID.x;
@@ -36,7 +17,7 @@ void main() {
     // Every triangle is opaque, so that nothing is left to decide between candidates.
     while (rayQueryProceedEXT(query)) {}
 
-    Hit hit = Hit(uintBitsToFloat(0x7F800000u), 0xFFFFFFFFu, 0.0, 0.0);
+    Hit hit = no_hit();
     if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionTriangleEXT) {
         vec2 uv = rayQueryGetIntersectionBarycentricsEXT(query, true);
         hit.t = ANY_HIT ? 0.0 : rayQueryGetIntersectionTEXT(query, true);

@@ -60,7 +60,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     // Before any work: a folder that cannot be written would lose all of it.
     let points = Points::create(&arguments.output)?;
     let device = common.open_device(true)?;
-    let driver = device.has_ray_query().then(|| functions::Device::new(device.ash_instance(), device.ash_device()));
+    let driver = device.driver_tracing().map(|_| functions::Device::new(device.ash_instance(), device.ash_device()));
     let bar = Bar::new(common, "opening the device", 0);
     let say = |what: &str| bar.say(what);
     let stage = Stage {
@@ -135,8 +135,11 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<(Vec<Instanc
 /// Where and how it is measured.
 fn setting(common: &Common, arguments: &Arguments, device: &Device) -> crate::Result<Setting> {
     let mut notes: Vec<String> = driver::note(device.found()).into_iter().collect();
-    if !device.has_ray_query() {
-        notes.push("The driver has no acceleration structures of its own (VK_KHR_ray_query) to compare with.".into());
+    if device.driver_tracing().is_none() {
+        notes.push(
+            "The driver has no acceleration structures of its own (VK_KHR_acceleration_structure) to compare with."
+                .into(),
+        );
     }
     let options = [
         ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),

@@ -26,7 +26,9 @@ struct Row<'a> {
     api_version: String,
     subgroup_size: u32,
     memory_bytes: u64,
-    ray_query: bool,
+    /// Ways to trace rays through the driver's own acceleration structures: `query`, `pipeline`.
+    driver_tracing: Vec<&'static str>,
+    optional: Vec<&'static str>,
     missing: &'a [String],
     picked: bool,
 }
@@ -58,14 +60,16 @@ fn row(found: &Found) -> Row<'_> {
         api_version: format!("{}.{}", vk::api_version_major(version), vk::api_version_minor(version)),
         subgroup_size: found.subgroup_size,
         memory_bytes: found.memory,
-        ray_query: found.ray_query,
+        driver_tracing: found.driver_tracing.iter().map(|way| way.name()).collect(),
+        optional: found.optional.names(),
         missing: &found.missing,
         picked: found.picked,
     }
 }
 
 fn table(rows: &[Row<'_>]) -> Table {
-    let header = ["", "#", "device", "driver", "kind", "Vulkan", "subgroup", "memory", "ray query", "lacks"];
+    let header =
+        ["", "#", "device", "driver", "kind", "Vulkan", "subgroup", "memory", "driver's rays", "optional", "lacks"];
     let mut table = tables::table(&header, header.len());
     for row in rows {
         let lacks = if row.missing.is_empty() { "nothing".into() } else { row.missing.join(", ") };
@@ -78,9 +82,14 @@ fn table(rows: &[Row<'_>]) -> Table {
             row.api_version.clone(),
             row.subgroup_size.to_string(),
             bytes(row.memory_bytes),
-            if row.ray_query { "yes" } else { "no" }.to_owned(),
+            or_none(&row.driver_tracing),
+            or_none(&row.optional),
             lacks,
         ]);
     }
     table
+}
+
+fn or_none(names: &[&str]) -> String {
+    if names.is_empty() { "none".into() } else { names.join(", ") }
 }

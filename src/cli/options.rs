@@ -1,7 +1,7 @@
 //! Options that every command takes, and the values they are made of.
 
 use super::Bar;
-use crate::gpu::{Device, DeviceOptions, TuningChoice};
+use crate::gpu::{Device, DeviceOptions, DriverTracing, TuningChoice};
 use crate::measure::builders::{self, Spec};
 use crate::scene::{self, Camera, DynamicScene, Scene};
 use crate::trace::kinds::{RayKind, RayOptions};
@@ -82,16 +82,17 @@ impl Common {
         asked.iter().map(with_rays).collect()
     }
 
-    /// Opens the device; with `ray_query`, the driver's own acceleration structures come with it where it has them.
+    /// Opens the device; with `driver`, the driver's own acceleration structures come with it where it has them.
     ///
     /// # Errors
     /// There is no such device, or it lacks something.
-    pub fn open_device(&self, ray_query: bool) -> crate::Result<Device> {
+    pub fn open_device(&self, driver: bool) -> crate::Result<Device> {
         Device::new(&DeviceOptions {
             wanted: self.device().map(str::to_owned),
             validation: self.validation,
-            ray_query,
+            driver_tracing: driver.then_some(DriverTracing::Query),
             tuning: self.tuning,
+            ..DeviceOptions::default()
         })
     }
 

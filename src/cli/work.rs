@@ -33,8 +33,8 @@ pub fn device_for_those<'b>(
     let (possible, not): (Vec<&Spec>, Vec<&Spec>) = builders.iter().partition(|spec| spec.is_possible(Some(&device)));
     if let Some(spec) = not.into_iter().find(|spec| must(spec)) {
         bail!(
-            "{spec} needs a device whose driver has VK_KHR_acceleration_structure and VK_KHR_ray_query, {} has not; choose \
-             another device or another builder",
+            "{spec} needs a device whose driver has VK_KHR_acceleration_structure, and VK_KHR_ray_query or \
+             VK_KHR_ray_tracing_pipeline, {} has not; choose another device or another builder",
             device.found().name
         );
     }

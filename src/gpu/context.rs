@@ -1,7 +1,8 @@
 //! The library on a device that somebody made: limits and pipelines, nothing else.
 
+use super::requirements::{self, Optional, SubgroupSizes};
 use super::shaders::Shader;
-use super::{Tuning, TuningChoice};
+use super::{Tuning, TuningChoice, Workarounds, reconvergence};
 use crate::{Error, Result};
 use ash::vk;
 use std::collections::HashMap;
@@ -19,6 +20,8 @@ pub struct ContextDesc<'a> {
     pub pipeline_cache: vk::PipelineCache,
     /// `VK_EXT_debug_utils` of the device, if each phase shall be labelled.
     pub debug_utils: Option<&'a ash::ext::debug_utils::Device>,
+    /// What the device was created with of [`super::Requirements::optional`]; [`Optional::NONE`] is always right.
+    pub optional: Optional,
     /// How work is cut: for what the device is, unless told.
     pub tuning: TuningChoice,
 }
@@ -36,6 +39,13 @@ pub struct Limits {
     pub driver_version: u32,
     /// The subgroup size the driver reports.
     pub subgroup_size: u32,
+    /// The smallest size that a subgroup may have, as far as is known.
+    pub subgroup_min: u32,
+    /// The largest size that a subgroup may have.
+    pub subgroup_max: u32,
+    /// Whether workgroups of whole subgroups have full subgroups of exactly `subgroup_size`: it is required when a pipeline is made,
+    /// or the device has one size alone. Otherwise a subgroup may be smaller, down to one invocation.
+    pub subgroup_is_exact: bool,
     /// Invocations a workgroup, at most.
     pub workgroup_invocations: u32,
     /// Bytes of shared memory a workgroup, at most.
@@ -44,26 +54,38 @@ pub struct Limits {
     pub workgroup_count: u32,
     /// Nanoseconds a timestamp tick.
     pub timestamp_period: f32,
+    /// Valid bits of a timestamp in the queue family that [`super::requirements`] chooses; 0 if it has none.
+    pub timestamp_bits: u32,
 }
 
 impl Limits {
-    fn of(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Limits {
+    fn of(instance: &ash::Instance, physical_device: vk::PhysicalDevice, optional: Optional) -> Limits {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut driver);
         // SAFETY: the handles are the caller's and live.
-        unsafe { instance.get_physical_device_properties2(physical_device, &mut properties) };
+        let families = unsafe {
+            instance.get_physical_device_properties2(physical_device, &mut properties);
+            instance.get_physical_device_queue_family_properties(physical_device)
+        };
         let properties = properties.properties;
+        let sizes = SubgroupSizes::of(instance, physical_device);
+        let subgroup_size = subgroup.subgroup_size;
+        let family = requirements::queue_family(&families);
         Limits {
             name: properties.device_name_as_c_str().unwrap_or(c"?").to_string_lossy().into_owned(),
             kind: properties.device_type,
             driver: driver.driver_id,
             driver_version: properties.driver_version,
-            subgroup_size: subgroup.subgroup_size,
+            subgroup_size,
+            subgroup_min: sizes.least,
+            subgroup_max: sizes.most.min(128).max(subgroup_size),
+            subgroup_is_exact: optional.subgroup_size_control || sizes.least == sizes.most,
             workgroup_invocations: properties.limits.max_compute_work_group_invocations,
             shared_memory: properties.limits.max_compute_shared_memory_size,
             workgroup_count: properties.limits.max_compute_work_group_count[0],
             timestamp_period: properties.limits.timestamp_period,
+            timestamp_bits: family.map_or(0, |family| families[family as usize].timestamp_valid_bits),
         }
     }
 
@@ -107,6 +129,11 @@ pub struct Context {
     pub limits: Limits,
     /// How work is cut for it.
     pub tuning: Tuning,
+    /// What its driver's faults need.
+    pub workarounds: Workarounds,
+    optional: Optional,
+    /// Subgroups of a workgroup, at most, where the size is required.
+    subgroups_of_a_workgroup: u32,
     layout: vk::PipelineLayout,
     cache: vk::PipelineCache,
     pipelines: Mutex<HashMap<Kernel, vk::Pipeline>>,
@@ -122,6 +149,15 @@ impl Context {
     /// The device was created from `instance` and `physical_device` with the version, extensions and features that
     /// [`super::requirements`] returned for it, and outlives the context.
     pub unsafe fn new(desc: &ContextDesc<'_>) -> Result<Context> {
+        // SAFETY: the caller's promise.
+        unsafe { Context::limited(desc, |_| ()) }
+    }
+
+    /// The same on a device whose limits are lower than it says.
+    ///
+    /// # Safety
+    /// As [`Context::new`].
+    pub(super) unsafe fn limited(desc: &ContextDesc<'_>, limit: impl FnOnce(&mut Limits)) -> Result<Context> {
         let range = vk::PushConstantRange::default()
             .stage_flags(vk::ShaderStageFlags::COMPUTE)
             .size(super::requirements::PUSH_CONSTANT_BYTES);
@@ -129,11 +165,15 @@ impl Context {
         // SAFETY: the device is live by the caller's promise.
         let layout = unsafe { desc.device.create_pipeline_layout(&info, None) }
             .map_err(Error::vulkan("vkCreatePipelineLayout"))?;
-        let limits = Limits::of(desc.instance, desc.physical_device);
+        let mut limits = Limits::of(desc.instance, desc.physical_device, desc.optional);
+        limit(&mut limits);
         Ok(Context {
             device: desc.device.clone(),
             debug_utils: desc.debug_utils.cloned(),
             tuning: Tuning::of(desc.tuning, &limits),
+            workarounds: Workarounds::of(&limits),
+            optional: desc.optional,
+            subgroups_of_a_workgroup: SubgroupSizes::of(desc.instance, desc.physical_device).of_a_workgroup,
             limits,
             layout,
             cache: desc.pipeline_cache,
@@ -172,25 +212,44 @@ impl Context {
         Ok(pipeline)
     }
 
+    /// Whether a workgroup of so many invocations can be made of full subgroups of the size that is known.
+    fn can_require_subgroups(&self, workgroup: u32) -> bool {
+        let size = self.limits.subgroup_size;
+        self.optional.subgroup_size_control
+            && self.limits.subgroup_is_exact
+            && workgroup.is_multiple_of(size)
+            && workgroup / size <= self.subgroups_of_a_workgroup
+    }
+
     fn create_pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
         let shader =
             super::shaders::ALL.iter().find(|s| s.name == kernel.shader).expect("kernels name shaders of the table");
-        let words = ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv)).expect("build.rs wrote whole words");
+        let mut words =
+            ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv)).expect("build.rs wrote whole words");
+        if self.optional.maximal_reconvergence {
+            words = reconvergence::maximal(&words);
+        }
         let module_info = vk::ShaderModuleCreateInfo::default().code(&words);
         let entries: Vec<_> = (0..kernel.constants.len() as u32)
             .map(|id| vk::SpecializationMapEntry { constant_id: id, offset: 4 * id, size: 4 })
             .collect();
         let specialisation =
             vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&kernel.constants));
+        let mut subgroups = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
+            .required_subgroup_size(self.limits.subgroup_size);
         // SAFETY: the device is live; the module is destroyed after the pipeline that used it was made.
         unsafe {
             let module =
                 self.device.create_shader_module(&module_info, None).map_err(Error::vulkan("vkCreateShaderModule"))?;
-            let stage = vk::PipelineShaderStageCreateInfo::default()
+            let mut stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)
                 .module(module)
                 .name(c"main")
                 .specialization_info(&specialisation);
+            if self.can_require_subgroups(kernel.workgroup()) {
+                stage =
+                    stage.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS).push_next(&mut subgroups);
+            }
             let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
             let made = self.device.create_compute_pipelines(self.cache, &[info], None);
             self.device.destroy_shader_module(module, None);

@@ -1,7 +1,7 @@
 //! The driver's own acceleration structure (`VK_KHR_acceleration_structure`): what an engine uses where the device has it,
 //! and so what ours is measured against.
 
-use super::{Buffer, Device, Recorder};
+use super::{Buffer, Device, DriverTracing, Recorder};
 use crate::{Error, Result};
 use ash::vk;
 
@@ -41,6 +41,7 @@ pub struct DriverStructure<'a> {
     top: Handle,
     geometry: [vk::AccelerationStructureGeometryKHR<'static>; 2],
     preference: DriverPreference,
+    tracing: DriverTracing,
     triangles: u32,
     scratch_address: u64,
     sizes: DriverSizes,
@@ -68,7 +69,7 @@ impl Handle {
         bytes: u64,
     ) -> Result<Handle> {
         let info = vk::AccelerationStructureCreateInfoKHR::default().buffer(storage.raw()).size(bytes).ty(kind);
-        // SAFETY: the buffer is live, large enough and has the usage that `Device::buffer` gives with ray queries.
+        // SAFETY: the buffer is live, large enough and has the usage that `Device::buffer` gives with them.
         let raw = unsafe { functions.create_acceleration_structure(&info, None) }
             .map_err(Error::vulkan("vkCreateAccelerationStructureKHR"))?;
         Ok(Handle { functions: functions.clone(), raw })
@@ -85,17 +86,16 @@ impl<'a> DriverStructure<'a> {
     /// Memory and handles for `triangles` over `positions`, uploaded; nothing is built yet.
     ///
     /// # Errors
-    /// The device was opened without ray queries or has none; too many triangles for it; too little memory.
+    /// The device was opened without the driver's structures or has none; too many triangles for it; too little memory.
     pub fn new(
         device: &'a Device,
         positions: &[[f32; 3]],
         triangles: &[[u32; 3]],
         preference: DriverPreference,
     ) -> Result<DriverStructure<'a>> {
-        if !device.has_ray_query() {
-            let missing = vec!["VK_KHR_acceleration_structure and VK_KHR_ray_query (or was opened without)".into()];
-            return Err(Error::Unsupported { device: device.found().name.clone(), missing });
-        }
+        let Some(tracing) = device.driver_tracing() else {
+            return Err(not_there(device));
+        };
         let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
         // SAFETY: the handles are live; the structures outlive the call.
@@ -158,6 +158,7 @@ impl<'a> DriverStructure<'a> {
             top,
             geometry: [bottom_geometry, top_geometry],
             preference,
+            tracing,
             triangles: count,
             scratch_address: scratch_buffer.address().next_multiple_of(alignment),
             sizes: DriverSizes {
@@ -171,7 +172,7 @@ impl<'a> DriverStructure<'a> {
 
     /// Records the build: the phase `build` is the bottom level, the phase `tlas` the one instance above it.
     ///
-    /// What is recorded behind it in compute shaders may query the structure.
+    /// What is recorded behind it may trace rays through the structure.
     pub fn record(&self, recorder: &mut Recorder<'_>) {
         recorder.phase("build");
         self.record_level(recorder, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL);
@@ -200,7 +201,7 @@ impl<'a> DriverStructure<'a> {
             recorder.context().ash_device().cmd_pipeline_barrier(
                 commands,
                 vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR,
-                vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR | vk::PipelineStageFlags::COMPUTE_SHADER,
+                vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR | self.tracing.stage(),
                 vk::DependencyFlags::empty(),
                 &[barrier],
                 &[],
@@ -209,7 +210,7 @@ impl<'a> DriverStructure<'a> {
         }
     }
 
-    /// The top level's address, for `accelerationStructureEXT(uvec2)` in a shader.
+    /// The top level's address, for [`super::DriverRays`] and for `accelerationStructureEXT(uvec2)` in a shader.
     pub fn address(&self) -> u64 {
         self.top.address()
     }
@@ -218,6 +219,13 @@ impl<'a> DriverStructure<'a> {
     pub fn sizes(&self) -> DriverSizes {
         self.sizes
     }
+}
+
+/// The driver has no structures, or the device was opened without.
+pub(super) fn not_there(device: &Device) -> Error {
+    let missing =
+        "VK_KHR_acceleration_structure with VK_KHR_ray_query or VK_KHR_ray_tracing_pipeline (or was opened without)";
+    Error::Unsupported { device: device.found().name.clone(), missing: vec![missing.into()] }
 }
 
 fn build_info<'g>(

@@ -15,35 +15,60 @@ pub struct Phase {
 }
 
 /// A query pool that a [`Recorder`] writes a timestamp into at each phase.
+///
+/// Where the queue family has no timestamps ([`super::Limits::timestamp_bits`] is 0), none are written and there are no phases.
 pub struct Timestamps {
     device: ash::Device,
     pool: vk::QueryPool,
     capacity: u32,
     period: f32,
+    valid_bits: u32,
     names: Vec<&'static str>,
+    /// What the whole took by the host's clock, for whoever submits and waits.
+    #[cfg(feature = "cli")]
+    pub(super) waited: Option<std::time::Duration>,
 }
 
 impl Timestamps {
-    /// Room for `phases` phases.
+    /// Room for `phases` phases, in command buffers of the queue family that [`super::requirements`] chooses.
     ///
     /// # Errors
     /// The query pool could not be made.
     pub fn new(context: &Context, phases: u32) -> Result<Timestamps> {
+        Timestamps::with_valid_bits(context, phases, context.limits.timestamp_bits)
+    }
+
+    /// The same in command buffers of another queue family, whose `VkQueueFamilyProperties::timestampValidBits` these are.
+    ///
+    /// # Errors
+    /// The query pool could not be made.
+    pub fn with_valid_bits(context: &Context, phases: u32, valid_bits: u32) -> Result<Timestamps> {
         let capacity = phases + 1;
         let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(capacity);
         let device = context.ash_device().clone();
         // SAFETY: the context's device is live.
         let pool = unsafe { device.create_query_pool(&info, None) }.map_err(Error::vulkan("vkCreateQueryPool"))?;
-        Ok(Timestamps { device, pool, capacity, period: context.limits.timestamp_period, names: Vec::new() })
+        Ok(Timestamps {
+            device,
+            pool,
+            capacity,
+            period: context.limits.timestamp_period,
+            valid_bits,
+            names: Vec::new(),
+            #[cfg(feature = "cli")]
+            waited: None,
+        })
     }
 
-    /// The phases of the last recording, read back. Call after the command buffer has finished.
+    /// The phases of the last recording, read back; none without timestamps. Call after the command buffer has finished.
+    ///
+    /// What [`super::Device`] ran has one phase without timestamps, `submit`: all of it, by the host's clock.
     ///
     /// # Errors
     /// The timestamps could not be read.
     pub fn phases(&self) -> Result<Vec<Phase>> {
-        if self.names.is_empty() {
-            return Ok(Vec::new());
+        if self.names.is_empty() || self.valid_bits == 0 {
+            return Ok(self.submit().into_iter().collect());
         }
         let mut ticks = vec![0u64; self.names.len() + 1];
         // SAFETY: the pool is ours, and holds one timestamp a phase and one at the end.
@@ -58,10 +83,26 @@ impl Timestamps {
         .map_err(Error::vulkan("vkGetQueryPoolResults"))?;
         let phase = |(i, &name): (usize, &&'static str)| Phase {
             name,
-            milliseconds: ticks[i + 1].wrapping_sub(ticks[i]) as f64 * f64::from(self.period) * 1e-6,
+            milliseconds: ticks_between(ticks[i], ticks[i + 1], self.valid_bits) as f64 * f64::from(self.period) * 1e-6,
         };
         Ok(self.names.iter().enumerate().map(phase).collect())
     }
+
+    /// All of what was recorded as one phase, where it was waited for.
+    fn submit(&self) -> Option<Phase> {
+        #[cfg(feature = "cli")]
+        if !self.names.is_empty() {
+            let milliseconds = |waited: std::time::Duration| waited.as_secs_f64() * 1e3;
+            return self.waited.map(|waited| Phase { name: "submit", milliseconds: milliseconds(waited) });
+        }
+        None
+    }
+}
+
+/// Ticks from one timestamp to a later one, of a counter that has so many bits and begins again behind its last value. What the bits
+/// above it hold is undefined.
+fn ticks_between(from: u64, to: u64, valid_bits: u32) -> u64 {
+    to.wrapping_sub(from) & (u64::MAX >> (64 - valid_bits.clamp(1, 64)))
 }
 
 impl Drop for Timestamps {
@@ -111,9 +152,11 @@ impl<'a> Recorder<'a> {
     /// Writes a timestamp at every phase into `timestamps`, which it resets.
     pub fn timed(mut self, timestamps: &'a mut Timestamps) -> Recorder<'a> {
         timestamps.names.clear();
-        // SAFETY: `new`'s promise; the pool is ours.
-        unsafe {
-            self.context.ash_device().cmd_reset_query_pool(self.commands, timestamps.pool, 0, timestamps.capacity);
+        if timestamps.valid_bits > 0 {
+            // SAFETY: `new`'s promise; the pool is ours.
+            unsafe {
+                self.context.ash_device().cmd_reset_query_pool(self.commands, timestamps.pool, 0, timestamps.capacity);
+            }
         }
         self.timestamps = Some(timestamps);
         self
@@ -240,7 +283,7 @@ impl<'a> Recorder<'a> {
     }
 
     fn stamp(&mut self, at: u32) {
-        if let Some(timestamps) = &self.timestamps {
+        if let Some(timestamps) = self.timestamps.as_ref().filter(|timestamps| timestamps.valid_bits > 0) {
             assert!(at < timestamps.capacity, "more phases than the Timestamps have room for");
             // SAFETY: `new`'s promise; the query was reset by `timed` and is written once.
             unsafe {
@@ -271,5 +314,18 @@ impl Drop for Recorder<'_> {
             let at = self.timestamps.as_ref().map_or(0, |t| t.names.len() as u32);
             self.stamp(at);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_counted_over_the_counters_end_and_without_what_lies_above_it() {
+        assert_eq!(ticks_between(5, 9, 64), 4);
+        assert_eq!(ticks_between(u64::MAX, 3, 64), 4);
+        assert_eq!(ticks_between((1 << 36) - 2, 5, 36), 7, "the counter began again");
+        assert_eq!(ticks_between(0xabc0_0000_0000_0010, 0x1230_0000_0000_0017, 36), 7, "garbage above 36 bits");
     }
 }

@@ -4,29 +4,155 @@ use crate::{Error, Result};
 use ash::vk;
 use std::ffi::CStr;
 
+/// What makes results no different, only faster, where a device has it and it is enabled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Optional {
+    /// `VK_EXT_subgroup_size_control` with its features `subgroupSizeControl` and `computeFullSubgroups`: pipelines ask for full
+    /// subgroups of a known size. Without it kernels expect any size up to the reported one.
+    pub subgroup_size_control: bool,
+    /// `VK_KHR_shader_maximal_reconvergence` with its feature `shaderMaximalReconvergence`: lanes meet again where the source
+    /// says. No kernel relies on it.
+    pub maximal_reconvergence: bool,
+}
+
+impl Optional {
+    /// Nothing is enabled that [`requirements`] did not require: always right.
+    pub const NONE: Optional = Optional { subgroup_size_control: false, maximal_reconvergence: false };
+
+    /// What both have.
+    pub fn and(self, other: Optional) -> Optional {
+        Optional {
+            subgroup_size_control: self.subgroup_size_control && other.subgroup_size_control,
+            maximal_reconvergence: self.maximal_reconvergence && other.maximal_reconvergence,
+        }
+    }
+
+    /// What is there, as `hedgerow devices` says it.
+    pub fn names(self) -> Vec<&'static str> {
+        let subgroups = self.subgroup_size_control.then_some("subgroup size control");
+        let reconvergence = self.maximal_reconvergence.then_some("maximal reconvergence");
+        subgroups.into_iter().chain(reconvergence).collect()
+    }
+
+    fn extensions(self) -> Vec<&'static CStr> {
+        let subgroups = self.subgroup_size_control.then_some(ash::ext::subgroup_size_control::NAME);
+        let reconvergence = self.maximal_reconvergence.then_some(ash::khr::shader_maximal_reconvergence::NAME);
+        subgroups.into_iter().chain(reconvergence).collect()
+    }
+
+    /// What a device has of it. Extensions are asked for even where a version of Vulkan has taken them up: the version that the
+    /// instance was made for is not known here.
+    fn of(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Optional {
+        let offered = Offered::by(instance, physical_device);
+        let mut subgroups = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
+        let mut reconvergence = vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default();
+        let offers_subgroups = offered.has(ash::ext::subgroup_size_control::NAME);
+        let offers_reconvergence = offered.has(ash::khr::shader_maximal_reconvergence::NAME);
+        if offers_subgroups {
+            features = features.push_next(&mut subgroups);
+        }
+        if offers_reconvergence {
+            features = features.push_next(&mut reconvergence);
+        }
+        // SAFETY: the handles are the caller's and live; the structures are chained and outlive the call.
+        unsafe { instance.get_physical_device_features2(physical_device, &mut features) };
+        let full = subgroups.subgroup_size_control & subgroups.compute_full_subgroups != vk::FALSE;
+        Optional {
+            subgroup_size_control: offers_subgroups
+                && full
+                && SubgroupSizes::of(instance, physical_device).can_be_required,
+            maximal_reconvergence: offers_reconvergence && reconvergence.shader_maximal_reconvergence != vk::FALSE,
+        }
+    }
+}
+
+/// Extensions that a device offers.
+pub(super) struct Offered(Vec<vk::ExtensionProperties>);
+
+impl Offered {
+    pub(super) fn by(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Offered {
+        // SAFETY: the handles are the caller's and live. A device that cannot list them is taken to offer none.
+        Offered(unsafe { instance.enumerate_device_extension_properties(physical_device) }.unwrap_or_default())
+    }
+
+    pub(super) fn has(&self, name: &CStr) -> bool {
+        self.0.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name))
+    }
+}
+
+/// The sizes that subgroups of compute shaders may have.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SubgroupSizes {
+    pub least: u32,
+    pub most: u32,
+    /// Subgroups of a workgroup, at most, where the size is required.
+    pub of_a_workgroup: u32,
+    /// Whether a compute pipeline can ask for a size between them.
+    pub can_be_required: bool,
+}
+
+impl SubgroupSizes {
+    /// Of a device that does not offer `VK_EXT_subgroup_size_control`: any up to the reported size.
+    const UNKNOWN: SubgroupSizes =
+        SubgroupSizes { least: 1, most: u32::MAX, of_a_workgroup: 0, can_be_required: false };
+
+    pub(super) fn of(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> SubgroupSizes {
+        if !Offered::by(instance, physical_device).has(ash::ext::subgroup_size_control::NAME) {
+            return SubgroupSizes::UNKNOWN;
+        }
+        let mut sizes = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut sizes);
+        // SAFETY: as in `Optional::of`.
+        unsafe { instance.get_physical_device_properties2(physical_device, &mut properties) };
+        SubgroupSizes {
+            least: sizes.min_subgroup_size,
+            most: sizes.max_subgroup_size,
+            of_a_workgroup: sizes.max_compute_workgroup_subgroups,
+            can_be_required: sizes.required_subgroup_size_stages.contains(vk::ShaderStageFlags::COMPUTE),
+        }
+    }
+}
+
 /// The features to enable when the device is created; `push_into` chains them behind a `vk::DeviceCreateInfo`.
 ///
-/// All are core in Vulkan 1.2. Nothing else is required: no extension, no 64-bit integers, no float atomics.
+/// The required ones are core in Vulkan 1.2: no extension, no 64-bit integers, no float atomics.
 #[derive(Debug, Clone, Copy)]
 pub struct Features {
     vulkan_1_2: vk::PhysicalDeviceVulkan12Features<'static>,
+    subgroups: vk::PhysicalDeviceSubgroupSizeControlFeatures<'static>,
+    reconvergence: vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR<'static>,
 }
 
 impl Features {
-    fn required() -> Features {
-        let vulkan_1_2 = vk::PhysicalDeviceVulkan12Features::default()
-            .buffer_device_address(true)
-            .vulkan_memory_model(true)
-            .vulkan_memory_model_device_scope(true)
-            .scalar_block_layout(true);
-        Features { vulkan_1_2 }
+    fn with(optional: Optional) -> Features {
+        Features {
+            vulkan_1_2: vk::PhysicalDeviceVulkan12Features::default()
+                .buffer_device_address(true)
+                .vulkan_memory_model(true)
+                .vulkan_memory_model_device_scope(true)
+                .scalar_block_layout(true),
+            subgroups: vk::PhysicalDeviceSubgroupSizeControlFeatures::default()
+                .subgroup_size_control(optional.subgroup_size_control)
+                .compute_full_subgroups(optional.subgroup_size_control),
+            reconvergence: vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR::default()
+                .shader_maximal_reconvergence(optional.maximal_reconvergence),
+        }
     }
 
-    /// Chains the features behind `info`. If the chain already holds a `VkPhysicalDeviceVulkan12Features`, set the four
-    /// members there instead: `bufferDeviceAddress`, `vulkanMemoryModel`, `vulkanMemoryModelDeviceScope`,
-    /// `scalarBlockLayout`.
+    /// Chains the features behind `info`. Vulkan allows each structure once in a chain: if yours holds a
+    /// `VkPhysicalDeviceVulkan12Features`, set `bufferDeviceAddress`, `vulkanMemoryModel`, `vulkanMemoryModelDeviceScope` and
+    /// `scalarBlockLayout` there instead; if it holds a `VkPhysicalDeviceVulkan13Features`, `subgroupSizeControl` and
+    /// `computeFullSubgroups`, or take [`Requirements::only`] what you want.
     pub fn push_into<'a>(&'a mut self, info: vk::DeviceCreateInfo<'a>) -> vk::DeviceCreateInfo<'a> {
-        info.push_next(&mut self.vulkan_1_2)
+        let mut info = info.push_next(&mut self.vulkan_1_2);
+        if self.subgroups.subgroup_size_control != vk::FALSE {
+            info = info.push_next(&mut self.subgroups);
+        }
+        if self.reconvergence.shader_maximal_reconvergence != vk::FALSE {
+            info = info.push_next(&mut self.reconvergence);
+        }
+        info
     }
 }
 
@@ -35,14 +161,26 @@ impl Features {
 pub struct Requirements {
     /// The Vulkan version to ask for in `VkApplicationInfo` and to have on the device, at least.
     pub api_version: u32,
-    /// Device extensions to enable (none today).
-    pub extensions: &'static [&'static CStr],
+    /// Device extensions to enable: those of `optional`, as nothing else is an extension.
+    pub extensions: Vec<&'static CStr>,
     /// Features to enable.
     pub features: Features,
+    /// What the extensions and features hold that is optional: for [`super::ContextDesc::optional`].
+    pub optional: Optional,
     /// What a queue family must have.
     pub queue_flags: vk::QueueFlags,
-    /// The first queue family that has it, of those without graphics where there is one with timestamps.
+    /// The queue family to take: with compute and timestamps, without graphics where there is such a one.
     pub queue_family: u32,
+}
+
+impl Requirements {
+    /// The same with no more of what is optional than `wanted`.
+    pub fn only(mut self, wanted: Optional) -> Requirements {
+        self.optional = self.optional.and(wanted);
+        self.extensions = self.optional.extensions();
+        self.features = Features::with(self.optional);
+        self
+    }
 }
 
 /// Bytes of push constants that the passes use at most; Vulkan guarantees 128.
@@ -104,21 +242,53 @@ pub fn requirements(instance: &ash::Instance, physical_device: vk::PhysicalDevic
         missing.push(format!("subgroups of 4 to 128 (it has {})", subgroup.subgroup_size));
     }
 
-    let candidates = || families.iter().enumerate().filter(|(_, f)| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
-    let dedicated = candidates()
-        .find(|(_, f)| !f.queue_flags.contains(vk::QueueFlags::GRAPHICS) && f.timestamp_valid_bits > 0)
-        .or_else(|| candidates().next());
-    if dedicated.is_none() {
+    let family = queue_family(&families);
+    if family.is_none() {
         missing.push("a compute queue".into());
     }
-    match dedicated {
-        Some((family, _)) if missing.is_empty() => Ok(Requirements {
-            api_version: vk::API_VERSION_1_2,
-            extensions: &[],
-            features: Features::required(),
-            queue_flags: vk::QueueFlags::COMPUTE,
-            queue_family: family as u32,
-        }),
+    match family {
+        Some(queue_family) if missing.is_empty() => {
+            let optional = Optional::of(instance, physical_device);
+            Ok(Requirements {
+                api_version: vk::API_VERSION_1_2,
+                extensions: optional.extensions(),
+                features: Features::with(optional),
+                optional,
+                queue_flags: vk::QueueFlags::COMPUTE,
+                queue_family,
+            })
+        }
         _ => Err(Error::Unsupported { device: name, missing }),
+    }
+}
+
+/// The compute family to take: one with timestamps rather than without, then one without graphics rather than with, then the first.
+pub(super) fn queue_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
+    let rank = |family: &vk::QueueFamilyProperties| {
+        (family.timestamp_valid_bits == 0, family.queue_flags.contains(vk::QueueFlags::GRAPHICS))
+    };
+    let computes = |family: &&vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::COMPUTE);
+    let best = families.iter().filter(computes).map(rank).min()?;
+    families.iter().position(|family| computes(&family) && rank(family) == best).map(|family| family as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_queue_family_is_chosen_by_compute_then_timestamps_then_no_graphics() {
+        let family = |flags, bits| {
+            vk::QueueFamilyProperties::default().queue_flags(flags).queue_count(1).timestamp_valid_bits(bits)
+        };
+        let (compute, transfer) = (vk::QueueFlags::COMPUTE, vk::QueueFlags::TRANSFER);
+        let graphics = compute | vk::QueueFlags::GRAPHICS;
+        assert_eq!(queue_family(&[]), None);
+        assert_eq!(queue_family(&[family(transfer, 64)]), None);
+        assert_eq!(queue_family(&[family(transfer, 64), family(graphics, 64)]), Some(1));
+        assert_eq!(queue_family(&[family(graphics, 64), family(transfer, 64), family(compute, 64)]), Some(2));
+        assert_eq!(queue_family(&[family(compute, 0), family(graphics, 36)]), Some(1), "timestamps come first");
+        assert_eq!(queue_family(&[family(graphics, 0), family(compute, 0)]), Some(1));
+        assert_eq!(queue_family(&[family(compute, 36), family(compute, 64)]), Some(0), "the first of equals");
     }
 }

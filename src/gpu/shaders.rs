@@ -1,6 +1,6 @@
-//! The table of shaders that `build.rs` writes: one static for each `glsl/**/*.comp`, named after its path.
+//! The table of shaders that `build.rs` writes: one static for each shader below `glsl/`, named after its path.
 
-/// One compute shader.
+/// One shader: all of [`ALL`] are compute shaders.
 #[derive(Debug)]
 pub struct Shader {
     /// Path below `glsl/`, without extension.

@@ -109,7 +109,11 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn timer(&self) -> &'static str {
-        "device"
+        self.device.timer()
+    }
+
+    fn traces_on_device(&self) -> bool {
+        true
     }
 
     fn choice(&self) -> Option<String> {

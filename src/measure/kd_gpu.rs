@@ -131,7 +131,11 @@ impl Subject for KdGpu<'_> {
     }
 
     fn timer(&self) -> &'static str {
-        "device"
+        self.device.timer()
+    }
+
+    fn traces_on_device(&self) -> bool {
+        true
     }
 
     fn choice(&self) -> Option<String> {

@@ -2,9 +2,8 @@
 
 use crate::accel;
 use crate::bvh::layout::{Header, MAX_DEPTH};
-use crate::gpu::{Buffer, Device, Kernel, Recorder, Timestamps, shaders};
+use crate::gpu::{Buffer, Device, DriverRays, DriverTracing, Kernel, RayArguments, Recorder, Timestamps, shaders};
 use crate::measure::experiments::points;
-use crate::measure::peers::driver::Arguments as Query;
 use crate::scene::Mesh;
 use crate::trace::{self, Hit, Ray};
 use crate::{Error, Result};
@@ -98,7 +97,7 @@ impl<'a> Structures<'a> {
         }
     }
 
-    /// Records builds; compute shaders and builds behind it may use them.
+    /// Records builds; rays and builds behind it may use them.
     pub(super) fn build(
         &self,
         recorder: &mut Recorder<'_>,
@@ -116,7 +115,9 @@ impl<'a> Structures<'a> {
                     | vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR;
                 let barrier = [vk::MemoryBarrier::default().src_access_mask(access).dst_access_mask(access)];
                 let build = vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
-                let after = build | vk::PipelineStageFlags::COMPUTE_SHADER;
+                let traces =
+                    self.device.driver_tracing().map_or(vk::PipelineStageFlags::COMPUTE_SHADER, DriverTracing::stage);
+                let after = build | traces;
                 // SAFETY: as above.
                 unsafe {
                     driver.cmd_build_acceleration_structures(recorder.commands(), infos, ranges);
@@ -143,23 +144,25 @@ impl<'a> Structures<'a> {
         (rays, hits, count): (&Buffer<'_>, &Buffer<'_>, u32),
         query: trace::Query,
     ) -> Result<f64> {
-        let any_hit = u32::from(query == trace::Query::AnyHit);
-        let kernel = match self.maker {
-            // As trace::tracer has it, or no level of the stack in shared memory.
-            Maker::Ours(_) => {
-                let tuning = &self.device.tuning.trace;
-                let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
-                Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[any_hit, levels])
-            }
-            Maker::Driver(_) => Kernel::new(&shaders::MEASURE_RAY_QUERY, 64, &[any_hit]),
-        };
         debug_assert!(rays.bytes() >= u64::from(count) * size_of::<Ray>() as u64);
         debug_assert!(hits.bytes() >= u64::from(count) * size_of::<Hit>() as u64);
-        let structure = self.address(top);
-        let arguments = Query { structure, rays: rays.address(), hits: hits.address(), works: 0, first: 0, count };
+        let (structure, any_hit) = (self.address(top), query == trace::Query::AnyHit);
+        let (rays, hits) = (rays.address(), hits.address());
         self.device.run(Some(timestamps), |recorder| {
             recorder.phase("trace");
-            recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
+            match self.maker {
+                Maker::Ours(_) => {
+                    // As trace::tracer has it, or no level of the stack in shared memory.
+                    let tuning = &self.device.tuning.trace;
+                    let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
+                    let kernel = Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[u32::from(any_hit), levels]);
+                    let arguments = RayArguments { structure, rays, hits, works: 0, first: 0, count };
+                    recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
+                }
+                Maker::Driver(_) => {
+                    self.device.trace_by_driver(recorder, &DriverRays { structure, rays, hits, count, any_hit })
+                }
+            }
         })?;
         Ok(timestamps.phases()?.iter().map(|p| p.milliseconds).sum())
     }
@@ -180,7 +183,7 @@ impl<'a> Structures<'a> {
         let works = device.buffer("work", 16 * u64::from(count))?;
         let (structure, works_at) = (self.address(top), works.address());
         let arguments =
-            Query { structure, rays: rays.address(), hits: hits.address(), works: works_at, first: 0, count };
+            RayArguments { structure, rays: rays.address(), hits: hits.address(), works: works_at, first: 0, count };
         device.run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup())))?;
         Ok(works.read(count as usize))
     }

@@ -2,39 +2,102 @@
 
 use super::device;
 use super::geometries::Owned;
-use super::probe::{self, Probe, ProbeRay, Report};
+use super::probe::{Probe, ProbeRay, Report};
+use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
 use hedgerow::ash::{self, vk};
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
-use hedgerow::gpu::{Device, Kernel, Recorder, shaders};
-pub use hedgerow::measure::check::backend::{Backend, BuildInfo, Built, Ours, Ranges};
-use hedgerow::trace::{Hit, Ray};
+use hedgerow::gpu::{Buffer, DriverRays, DriverTracing, Recorder};
+use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::{Hit, Query, Ray};
 
-/// Whether the driver is a lavapipe before Mesa 26. 25.0.7's breaks the specification in a few cases, which are left out for it:
-/// a transform multiplies the fourth component of 16-bit formats, which should not be read; `firstVertex` leads to other
-/// vertices; many a ray passes by a box without a thickness, and one that ends where it enters a box.
-pub fn is_old_lavapipe() -> bool {
-    let version = device().found().driver.strip_prefix("Mesa ").and_then(|v| v.split('.').next()?.parse::<u32>().ok());
-    is_lavapipe() && version.is_some_and(|major| major < 26)
+type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
+type Ranges<'a> = &'a [vk::AccelerationStructureBuildRangeInfoKHR];
+
+/// What an engine calls.
+pub trait Backend {
+    fn name(&self) -> &'static str;
+    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static>;
+    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR;
+    fn destroy(&self, structure: vk::AccelerationStructureKHR);
+    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64;
+    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]);
+    fn scratch_alignment(&self) -> u64;
+    /// What queries through a top level report.
+    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<Report>;
+    /// The hits of rays in a bottom-level structure.
+    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
 }
 
-/// Whether the driver is a lavapipe of Mesa 26 or later: a top level with an inactive instance (reference 0, which the
-/// specification allows) or one of mask 0 crashes the process in a ray query of 26.1.6. 25.0.7 takes them.
-pub fn is_new_lavapipe() -> bool {
-    device().limits.loads_uniform_values_once()
-}
-
-/// Whether the driver is a lavapipe: those of Mesa 25.0.7 and 26.1.6 lose active boxes beside inactive ones.
-pub fn is_lavapipe() -> bool {
-    device().limits.driver == vk::DriverId::MESA_LLVMPIPE
-}
-
-/// Ours, and the driver's where the device has it.
+/// Ours, and the driver's where the device has it with ray queries, which shaders of engines ask.
 pub fn backends() -> Vec<Box<dyn Backend>> {
-    let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours::on(device()))];
-    if device().has_ray_query() {
+    let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours::new())];
+    if device().driver_tracing() == Some(DriverTracing::Query) {
         all.push(Box::new(Drivers::new()));
     }
     all
+}
+
+pub struct Ours(pub accel::Device<'static>, Probe);
+
+impl Ours {
+    pub fn new() -> Ours {
+        Ours::with(accel::Options::DEFAULT)
+    }
+
+    pub fn with(options: accel::Options) -> Ours {
+        Ours(accel::Device::with_options(device(), options), Probe::ours())
+    }
+}
+
+impl Backend for Ours {
+    fn name(&self) -> &'static str {
+        "hedgerow"
+    }
+
+    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
+        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
+        unsafe { self.0.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) }
+            .expect("it can be built");
+        sizes
+    }
+
+    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
+        unsafe { self.0.create_acceleration_structure(info, None) }.expect("the offset is right")
+    }
+
+    fn destroy(&self, structure: vk::AccelerationStructureKHR) {
+        self.0.destroy_acceleration_structure(structure, None);
+    }
+
+    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
+        let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
+        self.0.get_acceleration_structure_device_address(&info)
+    }
+
+    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]) {
+        unsafe { self.0.cmd_build_acceleration_structures(recorder.commands(), infos, ranges) }
+            .expect("it can be built");
+    }
+
+    fn scratch_alignment(&self) -> u64 {
+        SCRATCH_ALIGNMENT
+    }
+
+    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<Report> {
+        self.1.ask(self.address(structure), rays)
+    }
+
+    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
+        let count = rays.len() as u32;
+        let ray_buffer = device().upload("rays", rays).expect("memory");
+        let hits = device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
+        let structure = self.address(structure);
+        let buffers = Buffers { structure, rays: ray_buffer.address(), hits: hits.address(), work: None, count };
+        let shape = Shape::of(device());
+        device().run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
+        hits.read(rays.len())
+    }
 }
 
 pub struct Drivers(pub ash::khr::acceleration_structure::Device, Probe);
@@ -43,29 +106,13 @@ impl Drivers {
     /// For a device that has them.
     pub fn new() -> Drivers {
         let raw = ash::khr::acceleration_structure::Device::new(device().ash_instance(), device().ash_device());
-        Drivers(raw, probe::of_the_driver())
+        Drivers(raw, Probe::of_the_driver())
     }
-}
-
-/// The push constants of `glsl/measure/ray_query.comp`.
-#[derive(Clone, Copy, bytemuck::NoUninit)]
-#[repr(C)]
-struct RayQuery {
-    structure: u64,
-    rays: u64,
-    hits: u64,
-    works: u64,
-    first: u32,
-    count: u32,
 }
 
 impl Backend for Drivers {
     fn name(&self) -> &'static str {
         "driver"
-    }
-
-    fn device(&self) -> &'static Device {
-        device()
     }
 
     fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
@@ -134,10 +181,8 @@ impl Backend for Drivers {
         let ray_buffer = device().upload("rays", rays).expect("memory");
         let hits = device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
         let structure = self.address(top.structure);
-        let arguments =
-            RayQuery { structure, rays: ray_buffer.address(), hits: hits.address(), works: 0, first: 0, count };
-        let kernel = Kernel::new(&shaders::MEASURE_RAY_QUERY, 64, &[0]);
-        device().run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(64))).expect("it traces");
+        let of_rays = DriverRays { structure, rays: ray_buffer.address(), hits: hits.address(), count, any_hit: false };
+        device().run(None, |r| device().trace_by_driver(r, &of_rays)).expect("it traces");
         let hits = hits.read(rays.len());
         self.destroy(top.structure);
         hits
@@ -246,6 +291,55 @@ impl Copies for Drivers {
 
 fn submit(record: impl FnOnce(vk::CommandBuffer) -> hedgerow::Result<()>) {
     device().run(None, |recorder| record(recorder.commands())).expect("it runs");
+}
+
+/// A structure that was built alone, and its memory.
+pub struct Built {
+    pub structure: vk::AccelerationStructureKHR,
+    pub memory: Buffer<'static>,
+    pub bytes: u64,
+}
+
+impl Built {
+    /// Builds what `info` asks for, in a buffer of its own, `offset` bytes behind its beginning.
+    pub fn new(backend: &dyn Backend, info: &BuildInfo<'_>, ranges: Ranges<'_>, offset: u64) -> Built {
+        let counts: Vec<u32> = ranges.iter().map(|r| r.primitive_count).collect();
+        let mut built = Built::place(backend, info, &counts, offset);
+        let scratch = built.scratch(backend, info, &counts);
+        let info = info
+            .dst_acceleration_structure(built.structure)
+            .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.1 });
+        device()
+            .run(None, |recorder| {
+                backend.build(recorder, &[info], &[ranges]);
+                Ok(())
+            })
+            .expect("it builds");
+        built.bytes -= offset;
+        built
+    }
+
+    /// Memory and a handle; nothing is built.
+    pub fn place(backend: &dyn Backend, info: &BuildInfo<'_>, counts: &[u32], offset: u64) -> Built {
+        let bytes = backend.build_sizes(info, counts).acceleration_structure_size;
+        let memory = device().buffer("structure", offset + bytes).expect("memory");
+        let create = vk::AccelerationStructureCreateInfoKHR::default()
+            .buffer(memory.raw())
+            .offset(offset)
+            .size(bytes)
+            .ty(info.ty);
+        Built { structure: backend.create(&create), memory, bytes: offset + bytes }
+    }
+
+    /// Scratch memory for it, and its address.
+    pub fn scratch(&self, backend: &dyn Backend, info: &BuildInfo<'_>, counts: &[u32]) -> (Buffer<'static>, u64) {
+        let alignment = backend.scratch_alignment();
+        let bytes = backend.build_sizes(info, counts).build_scratch_size;
+        let buffer = device().buffer("scratch", bytes + 2 * alignment).expect("memory");
+        // As little aligned as is allowed.
+        let address = buffer.address().next_multiple_of(alignment) + alignment;
+        (buffer, address)
+    }
 }
 
 /// The Vulkan name of a format.

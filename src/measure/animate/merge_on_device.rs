@@ -123,7 +123,7 @@ impl Contender for MergeOnDevice<'_> {
     }
 
     fn timer(&self) -> &'static str {
-        "device"
+        self.device.timer()
     }
 
     fn place(&mut self, frame: &Frame<'_>) -> Result<()> {

@@ -85,7 +85,7 @@ impl Contender for OnDevice<'_> {
     }
 
     fn timer(&self) -> &'static str {
-        "device"
+        self.parts.first().map_or("device", |part| part.subject.timer())
     }
 
     fn place(&mut self, frame: &Frame<'_>) -> Result<()> {

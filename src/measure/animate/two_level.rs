@@ -134,7 +134,7 @@ impl Contender for TwoLevel<'_> {
     }
 
     fn timer(&self) -> &'static str {
-        "device"
+        self.structures.device.timer()
     }
 
     fn place(&mut self, frame: &Frame<'_>) -> Result<()> {

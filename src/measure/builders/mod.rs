@@ -72,7 +72,7 @@ impl Spec {
         match self.needs() {
             Needs::Nothing => true,
             Needs::Device => device.is_some(),
-            Needs::RayQuery => device.is_some_and(Device::has_ray_query),
+            Needs::RayQuery => device.is_some_and(|device| device.driver_tracing().is_some()),
         }
     }
 

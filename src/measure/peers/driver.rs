@@ -1,31 +1,15 @@
-//! `driver-fast-build` and `driver-fast-trace`: the Vulkan driver's own acceleration structure, traced by ray queries.
+//! `driver-fast-build` and `driver-fast-trace`: the Vulkan driver's own acceleration structure, traced by ray queries, or by a
+//! ray-tracing pipeline where there are none.
 //!
 //! The build time is that of the bottom level alone, which is what compares with our builders; the top level of one
-//! instance, which a ray query cannot do without, is the phase `tlas` beside it. Structure bytes hold both.
+//! instance, which rays cannot do without, is the phase `tlas` beside it. Structure bytes hold both.
 
 use crate::bvh::layout::Bvh2;
-use crate::gpu::push_constants::push_constants;
-use crate::gpu::{self, Buffer, Device, DriverPreference, DriverStructure, Found, Kernel, Timestamps, shaders};
+use crate::gpu::{self, Buffer, Device, DriverPreference, DriverRays, DriverStructure, Found, Timestamps};
 use crate::measure::{BuildRun, Subject, record};
 use crate::scene::Mesh;
 use crate::trace::{Hit, Query, Ray, Work};
 use crate::{Error, Result};
-use ash::vk;
-
-/// Invocations a workgroup of the tracing kernel.
-const WORKGROUP: u32 = 64;
-
-push_constants! {
-    /// The push constants of `glsl/measure/ray_query.comp` and `query.comp`.
-    pub(crate) struct Arguments {
-        pub(crate) structure: u64,
-        pub(crate) rays: u64,
-        pub(crate) hits: u64,
-        pub(crate) works: u64,
-        pub(crate) first: u32,
-        pub(crate) count: u32,
-    }
-}
 
 /// A scene in the driver's acceleration structure.
 pub struct Driver<'a> {
@@ -37,13 +21,8 @@ pub struct Driver<'a> {
 }
 
 /// What a reader of the figures must know of this driver's builder, if anything.
-///
-/// lavapipe before Mesa 26 halves the triangles in the order of the input: it builds in no time a tree that is slow to trace.
 pub fn note(found: &Found) -> Option<String> {
-    let mesa = found.driver.strip_prefix("Mesa ")?;
-    let major: u32 = mesa.split('.').next()?.parse().ok()?;
-    let halves_in_order = found.kind == vk::PhysicalDeviceType::CPU && major < 26;
-    halves_in_order.then(|| {
+    found.workarounds.driver_halves_in_order.then(|| {
         format!(
             "{} ({}) does not sort the triangles of its acceleration structures but halves them in the order of the \
              input: no peer. Mesa 26 does sort them: `make bench-peers` measures under it.",
@@ -56,7 +35,7 @@ impl<'a> Driver<'a> {
     /// Uploads `mesh` and makes room for the structure.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] where the device has no ray queries (or was opened without); too little memory.
+    /// [`Error::Unsupported`] where the driver has no structures (or the device was opened without); too little memory.
     pub fn new(device: &'a Device, mesh: &Mesh, preference: DriverPreference) -> Result<Driver<'a>> {
         let structure = DriverStructure::new(device, &mesh.positions, &mesh.triangles, preference)?;
         Ok(Driver { device, preference, structure, timestamps: Timestamps::new(device, 2)?, rays: None })
@@ -76,7 +55,11 @@ impl Subject for Driver<'_> {
     }
 
     fn timer(&self) -> &'static str {
-        "device"
+        self.device.timer()
+    }
+
+    fn traces_on_device(&self) -> bool {
+        true
     }
 
     fn build(&mut self) -> Result<BuildRun> {
@@ -121,22 +104,17 @@ impl Subject for Driver<'_> {
         let Some((count, rays, hits)) = &self.rays else {
             return Ok(0.0);
         };
-        let kernel = Kernel::new(&shaders::MEASURE_RAY_QUERY, WORKGROUP, &[u32::from(query == Query::AnyHit)]);
-        let most = self.device.limits.workgroup_count.saturating_mul(WORKGROUP);
-        self.device.run(Some(&mut self.timestamps), |recorder| {
+        let rays = DriverRays {
+            structure: self.structure.address(),
+            rays: rays.address(),
+            hits: hits.address(),
+            count: *count,
+            any_hit: query == Query::AnyHit,
+        };
+        let device = self.device;
+        device.run(Some(&mut self.timestamps), |recorder| {
             recorder.phase("trace");
-            for first in (0..*count).step_by(most as usize) {
-                let arguments = Arguments {
-                    structure: self.structure.address(),
-                    rays: rays.address(),
-                    hits: hits.address(),
-                    works: 0,
-                    first,
-                    count: *count,
-                };
-                recorder.dispatch(&kernel, &arguments, (*count - first).min(most).div_ceil(WORKGROUP))?;
-            }
-            Ok(())
+            device.trace_by_driver(recorder, &rays)
         })?;
         Ok(self.timestamps.phases()?.iter().map(|p: &gpu::Phase| p.milliseconds).sum())
     }

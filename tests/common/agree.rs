@@ -1,7 +1,6 @@
 //! What queries report, held against brute force.
-#![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
-use super::backend::Backend;
+use super::backends::Backend;
 use super::probe::{IGNORE, ProbeRay, Report, TERMINATE, flags};
 use super::world::{Met, World, inverse, transform_error, transformed};
 

@@ -1,0 +1,25 @@
+// Rays and hits of the shaders that are measured: the same for the driver's structures and ours.
+layout(constant_id = 1) const bool ANY_HIT = false;
+
+struct GivenRay {
+    vec3 origin;
+    float t_min;
+    vec3 direction;
+    float t_max;
+};
+
+struct Hit {
+    float t;
+    uint primitive;
+    float u;
+    float v;
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Rays { GivenRay ray[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer Hits { Hit hit[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer Works { uvec4 work[]; };
+layout(push_constant, scalar) uniform Arguments { uvec2 structure; Rays rays; Hits hits; Works works; uint first; uint count; };
+
+Hit no_hit() {
+    return Hit(uintBitsToFloat(0x7F800000u), 0xFFFFFFFFu, 0.0, 0.0);
+}

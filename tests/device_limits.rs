@@ -1,0 +1,114 @@
+//! A device that has less than it could: without what is optional, with inexact subgroups, with small limits, without timestamps.
+#![cfg(feature = "cli")]
+
+mod common;
+
+use common::{OPTIONS, open};
+use hedgerow::gpu::scan::{self, Buffers, Scan};
+use hedgerow::gpu::{Device, DeviceOptions, Restrict, Timestamps, TuningChoice};
+
+fn restricted(text: &str) -> Device {
+    open(DeviceOptions { restrict: text.parse().expect("a list of restrictions"), ..OPTIONS })
+}
+
+/// A device without the validation layers, which refuse extensions that are younger than they are.
+fn unvalidated(restrict: Restrict) -> Device {
+    Device::new(&DeviceOptions { validation: false, restrict, ..OPTIONS }).expect("a device")
+}
+
+const COUNT: u32 = 100_000;
+
+fn numbers() -> Vec<u32> {
+    (0..COUNT).map(|i| i % 7).collect()
+}
+
+/// Sums of the numbers before each, by the device.
+fn sums(device: &Device, timestamps: Option<&mut Timestamps>) -> Vec<u32> {
+    let scan = Scan::new(device, COUNT);
+    let values = device.upload("values", &numbers()).expect("memory");
+    let sums = device.buffer("sums", 4 * u64::from(scan.sums_words())).expect("memory");
+    let buffers = Buffers { values: values.address(), results: values.address(), sums: sums.address() };
+    device
+        .run(timestamps, |recorder| {
+            recorder.phase("scan");
+            scan.record(recorder, &buffers)
+        })
+        .expect("it scans");
+    values.read(COUNT as usize)
+}
+
+#[test]
+fn limits_can_only_be_lowered() {
+    let all = &common::open(OPTIONS).limits;
+    let less = restricted("shared=16384,invocations=128,groups=64,timestamps=0").limits.clone();
+    assert_eq!((less.shared_memory, less.workgroup_invocations, less.workgroup_count), (16384, 128, 64));
+    assert_eq!((less.timestamp_bits, less.subgroup_size), (0, all.subgroup_size));
+    assert_eq!(less.subgroup_is_exact, all.subgroup_is_exact);
+    assert_eq!(restricted("shared=1000000000").limits.shared_memory, all.shared_memory);
+    let larger = restricted(&format!("subgroup={}", 4 * all.subgroup_size)).limits.clone();
+    assert_eq!((larger.subgroup_size, larger.subgroup_is_exact), (4 * all.subgroup_size, false));
+    assert!(!restricted("inexact").limits.subgroup_is_exact);
+}
+
+#[test]
+fn results_are_the_same_with_and_without_what_is_optional() {
+    let (expected, _) = scan::on_host(&numbers());
+    let all = unvalidated(Restrict::NONE);
+    assert!(sums(&all, None) == expected, "with what is optional");
+    for tuning in [TuningChoice::Cpu, TuningChoice::Gpu] {
+        for restrict in ["", "inexact", "shared=16384,invocations=128,groups=64"] {
+            let restrict = restrict.parse().expect("restrictions");
+            let device = open(DeviceOptions { restrict, tuning, ..OPTIONS });
+            assert!(sums(&device, None) == expected, "{tuning}, {restrict:?}");
+        }
+    }
+}
+
+#[test]
+fn without_timestamps_a_submit_is_one_phase_by_the_hosts_clock() {
+    let device = restricted("timestamps=0");
+    let mut timestamps = Timestamps::new(&device, 2).expect("a query pool");
+    assert!(timestamps.phases().expect("nothing ran").is_empty());
+    sums(&device, Some(&mut timestamps));
+    let phases = timestamps.phases().expect("phases");
+    assert_eq!(phases.iter().map(|phase| phase.name).collect::<Vec<_>>(), ["submit"]);
+    assert!(phases[0].milliseconds > 0.0);
+    assert_eq!(device.timer(), "wall");
+}
+
+/// As on a GPU with memory of its own.
+#[test]
+fn staged_buffers_hold_what_was_written() {
+    let device = restricted("staged");
+    assert!(!device.maps_memory());
+    // More than is staged at once, and no multiple of it.
+    let numbers: Vec<u32> = (0..5_000_003u32).map(|i| i.wrapping_mul(2_654_435_769)).collect();
+    let buffer = device.upload("numbers", &numbers).expect("memory");
+    assert!(buffer.read::<u32>(numbers.len()) == numbers);
+    assert_eq!(buffer.read_at::<u32>(4 * 4_999_999, 4), numbers[4_999_999..]);
+    assert_eq!(buffer.read_at::<u8>(5, 3), bytemuck::cast_slice::<u32, u8>(&numbers[1..2])[1..]);
+    assert!(buffer.read::<u32>(0).is_empty());
+    buffer.write(&[7u32]);
+    assert_eq!(buffer.read::<u32>(2), [7, numbers[1]]);
+    assert!(sums(&device, None) == scan::on_host(&self::numbers()).0);
+    // What is uploaded while a command buffer is recorded is there when it runs.
+    let scan = Scan::new(&device, COUNT);
+    let sums = device.buffer("sums", 4 * u64::from(scan.sums_words())).expect("memory");
+    let mut values = None;
+    device
+        .run(None, |recorder| {
+            let buffer = values.insert(device.upload("values", &self::numbers())?);
+            let buffers = Buffers { values: buffer.address(), results: buffer.address(), sums: sums.address() };
+            scan.record(recorder, &buffers)
+        })
+        .expect("it scans");
+    assert!(values.expect("uploaded").read::<u32>(COUNT as usize) == scan::on_host(&self::numbers()).0);
+}
+
+#[test]
+fn too_little_memory_is_an_error_that_says_how_much_there_is() {
+    let device = common::device();
+    let Err(error) = device.buffer("a mountain", 1 << 50) else { panic!("there is no such memory") };
+    let text = error.to_string();
+    assert!(text.starts_with("a mountain needs 1125899906842624 bytes of device memory"), "{text}");
+}
