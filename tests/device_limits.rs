@@ -5,15 +5,16 @@ mod common;
 
 use common::{OPTIONS, open};
 use hedgerow::gpu::scan::{self, Buffers, Scan};
-use hedgerow::gpu::{Device, DeviceOptions, Restrict, Timestamps, TuningChoice};
+use hedgerow::gpu::{Device, DeviceOptions, Timestamps, TuningChoice};
 
 fn restricted(text: &str) -> Device {
     open(DeviceOptions { restrict: text.parse().expect("a list of restrictions"), ..OPTIONS })
 }
 
-/// A device without the validation layers, which refuse extensions that are younger than they are.
-fn unvalidated(restrict: Restrict) -> Device {
-    Device::new(&DeviceOptions { validation: false, restrict, ..OPTIONS }).expect("a device")
+/// A device with all that is optional, without the validation layers, which refuse extensions that are younger than they are.
+fn with_everything() -> Device {
+    let options = DeviceOptions { validation: false, maximal_reconvergence: true, ..OPTIONS };
+    Device::new(&options).expect("a device")
 }
 
 const COUNT: u32 = 100_000;
@@ -53,7 +54,7 @@ fn limits_can_only_be_lowered() {
 #[test]
 fn results_are_the_same_with_and_without_what_is_optional() {
     let (expected, _) = scan::on_host(&numbers());
-    let all = unvalidated(Restrict::NONE);
+    let all = with_everything();
     assert!(sums(&all, None) == expected, "with what is optional");
     for tuning in [TuningChoice::Cpu, TuningChoice::Gpu] {
         for restrict in ["", "inexact", "shared=16384,invocations=128,groups=64"] {

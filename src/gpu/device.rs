@@ -7,7 +7,8 @@ use super::driver_tracing::DriverFeatures;
 use super::instance::{Instance, pick};
 use super::memory::{self, Staging};
 use super::{
-    Buffer, Context, ContextDesc, DriverTracing, Found, Recorder, Restrict, Timestamps, TuningChoice, requirements,
+    Buffer, Context, ContextDesc, DriverTracing, Found, Optional, Recorder, Restrict, Timestamps, TuningChoice,
+    requirements,
 };
 use crate::{Error, Result};
 use ash::vk;
@@ -30,6 +31,8 @@ pub struct DeviceOptions {
     pub driver_tracing: Option<DriverTracing>,
     /// How work is cut: for what the device is, unless told.
     pub tuning: TuningChoice,
+    /// Enable maximal reconvergence where the device has it.
+    pub maximal_reconvergence: bool,
     /// What of the device is not used: for tests.
     pub restrict: Restrict,
 }
@@ -78,7 +81,8 @@ impl Device {
         let picked = pick(&found, options.wanted.as_deref())?;
         let (physical, found) = (handles[picked], found[picked].clone());
         let needs = requirements(&instance.raw, physical)?;
-        let optional = instance.without_what_layers_do_not_know(options.restrict.optional(needs.optional));
+        let wanted = Optional { maximal_reconvergence: options.maximal_reconvergence, ..Optional::DEFAULT };
+        let optional = instance.without_what_layers_do_not_know(options.restrict.optional(wanted));
         let mut needs = needs.only(optional);
 
         let priority = [1.0];

@@ -214,7 +214,7 @@ impl Instance {
         let properties = properties.properties;
         let text = |c: Result<&CStr, _>| c.unwrap_or(c"?").to_string_lossy().into_owned();
         let (optional, missing) = match requirements(&self.raw, physical) {
-            Ok(needs) => (needs.optional, Vec::new()),
+            Ok(needs) => (needs.available, Vec::new()),
             Err(Error::Unsupported { missing, .. }) => (Optional::NONE, missing),
             Err(other) => (Optional::NONE, vec![other.to_string()]),
         };

@@ -11,13 +11,16 @@ pub struct Optional {
     /// subgroups of a known size. Without it kernels expect any size up to the reported one.
     pub subgroup_size_control: bool,
     /// `VK_KHR_shader_maximal_reconvergence` with its feature `shaderMaximalReconvergence`: lanes meet again where the source
-    /// says. No kernel relies on it.
+    /// says. No kernel relies on it, so it is enabled only where [`Requirements::only`] asks for it.
     pub maximal_reconvergence: bool,
 }
 
 impl Optional {
     /// Nothing is enabled that [`requirements`] did not require: always right.
     pub const NONE: Optional = Optional { subgroup_size_control: false, maximal_reconvergence: false };
+
+    /// What [`requirements`] enables where a device has it: what kernels make use of.
+    pub const DEFAULT: Optional = Optional { subgroup_size_control: true, maximal_reconvergence: false };
 
     /// What both have.
     pub fn and(self, other: Optional) -> Optional {
@@ -167,6 +170,8 @@ pub struct Requirements {
     pub features: Features,
     /// What the extensions and features hold that is optional: for [`super::ContextDesc::optional`].
     pub optional: Optional,
+    /// What the device has of it.
+    pub available: Optional,
     /// What a queue family must have.
     pub queue_flags: vk::QueueFlags,
     /// The queue family to take: with compute and timestamps, without graphics where there is such a one.
@@ -174,9 +179,9 @@ pub struct Requirements {
 }
 
 impl Requirements {
-    /// The same with no more of what is optional than `wanted`.
+    /// The same with what is `wanted` of what is optional, as far as the device has it.
     pub fn only(mut self, wanted: Optional) -> Requirements {
-        self.optional = self.optional.and(wanted);
+        self.optional = self.available.and(wanted);
         self.extensions = self.optional.extensions();
         self.features = Features::with(self.optional);
         self
@@ -248,12 +253,14 @@ pub fn requirements(instance: &ash::Instance, physical_device: vk::PhysicalDevic
     }
     match family {
         Some(queue_family) if missing.is_empty() => {
-            let optional = Optional::of(instance, physical_device);
+            let available = Optional::of(instance, physical_device);
+            let optional = available.and(Optional::DEFAULT);
             Ok(Requirements {
                 api_version: vk::API_VERSION_1_2,
                 extensions: optional.extensions(),
                 features: Features::with(optional),
                 optional,
+                available,
                 queue_flags: vk::QueueFlags::COMPUTE,
                 queue_family,
             })

@@ -42,6 +42,7 @@ pub const OPTIONS: DeviceOptions = DeviceOptions {
     validation: true,
     driver_tracing: Some(DriverTracing::Query),
     tuning: TuningChoice::Auto,
+    maximal_reconvergence: false,
     restrict: Restrict::NONE,
 };
 
