@@ -55,7 +55,6 @@ fn compile_others(out: &Path) {
     for (source, define, name) in [
         ("examples/engine.comp", None, "example_engine.spv"),
         ("tests/shaders/probe.comp", None, "probe_of_the_driver.spv"),
-        ("tests/shaders/probe.comp", Some("WITH_HEDGEROW"), "probe.spv"),
         ("tests/shaders/kd_probe.comp", None, "kd_probe.spv"),
     ] {
         println!("cargo:rerun-if-changed={source}");

@@ -79,6 +79,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "gpu" if is("scan") => gpu::scan::push_constants(),
         "trace" if is("tracer") => trace::tracer::push_constants(),
         "measure" if is("copy") => measure::copy::push_constants(),
+        "measure" if is("probe") => measure::check::probe::push_constants(),
         "measure" if ["query", "ray_query", "driver_rays"].into_iter().any(is) => gpu::driver_rays::push_constants(),
         _ => return None,
     })

@@ -43,7 +43,7 @@ fn seen(ours: &Ours, part: Part, built: Built) -> (World, BuiltWorld) {
 
 #[test]
 fn triangles_with_bad_vertices_or_indices_are_left_out_and_told_of() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let corners = soup(80, 0.5, 3);
     let rounded: Corners = corners.iter().map(|t| t.map(|v| v.map(|x| (8.0 * x).round() / 8.0))).collect();
     let rays = rays(400);
@@ -91,7 +91,7 @@ fn triangles_with_bad_vertices_or_indices_are_left_out_and_told_of() {
 /// them for zero in a box and keep them in a record.
 #[test]
 fn random_bits_as_vertices_make_valid_trees() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let mut random = Random(6);
     let rays = rays(64);
     for round in 0..60 {
@@ -126,7 +126,7 @@ fn assert_finite(what: &str, rays: &[ProbeRay], reports: &[Report]) {
 
 #[test]
 fn instances_that_cannot_be_are_left_out_and_told_of() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let parts = vec![
         Part::Triangles(vec![(soup(60, 0.5, 1), GeometryFlags::OPAQUE)]),
         Part::Boxes(vec![(boxes(20, 0.3, 2), GeometryFlags::empty())]),
@@ -230,7 +230,7 @@ const NOTHING_LEFT: usize = 5;
 /// Below a good top level: its instance is empty, or finite somehow; and the other instance is hit as before.
 #[test]
 fn queries_of_overwritten_bottom_levels_end() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let mut random = Random(11);
     let rays = rays(128);
     for part in [
@@ -270,7 +270,7 @@ fn queries_of_overwritten_bottom_levels_end() {
 /// The records, which hold addresses, stay: nothing can be said of a structure that sends a query to any place.
 #[test]
 fn queries_of_overwritten_top_levels_end() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let mut random = Random(12);
     let part = Part::Triangles(vec![(soup(50, 0.4, 3), GeometryFlags::OPAQUE)]);
     let instances = (0..60).map(|i| Instance::new(1, moved(rotation(i), random.point(1.0)))).collect();

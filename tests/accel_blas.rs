@@ -242,7 +242,7 @@ fn several_geometries_are_one_structure() {
 /// Our bytes are those of the host, whether built alone or beside others, and nothing else is written.
 #[test]
 fn builds_of_a_batch_are_those_of_the_host() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let cases: Vec<Vec<Owned>> = (0..40)
         .map(|i| match i % 5 {
             0 => several(),
@@ -300,7 +300,7 @@ fn builds_of_a_batch_are_those_of_the_host() {
 
 #[test]
 fn fewer_primitives_than_were_planned_for_fit() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let owned = Owned::of(&soup(300, 0.5, 9), VertexFormat::FLOAT3, IndexFormat::U32, 0);
     let (geometry, _memory) = owned.upload(0, 0);
     let geometries = [vk_geometry(&geometry, &owned)];
@@ -326,7 +326,7 @@ fn fewer_primitives_than_were_planned_for_fit() {
 /// More triangles have a smaller table to sort with at some counts: what is asked for must suffice for fewer, too.
 #[test]
 fn the_sizes_of_a_maximum_suffice_for_every_smaller_count() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let owned = Owned::of(&soup(1, 0.5, 9), VertexFormat::FLOAT3, IndexFormat::U32, 0);
     let (geometry, _memory) = owned.upload(0, 0);
     let geometries = [vk_geometry(&geometry, &owned)];

@@ -237,7 +237,7 @@ fn boxes_whose_least_x_is_not_a_number_are_inactive() {
 /// Ours alone: Vulkan forbids them.
 #[test]
 fn boxes_that_are_inside_out_or_endless_are_left_out_and_told_of() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     for bad in [
         [[-1.0, -1.0, 8.0], [1.0, 1.0, 4.0]],
         [[-1.0, f32::NAN, 4.0], [1.0, 1.0, 8.0]],

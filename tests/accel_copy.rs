@@ -279,7 +279,7 @@ fn the_host_compacts_depth_first() {
 /// Built, compacted and cloned in one command buffer: hits are the same bits, and those of the host.
 #[test]
 fn what_is_copied_is_hit_as_before() {
-    let backend = Ours::new();
+    let backend = Ours::on(device());
     for (count, parts) in [(1, 1), (2, 2), (700, 3), (6000, 1)] {
         let corners: Vec<Corners> = (0..parts).map(|part| soup(count, 0.1, 40 + part)).collect();
         let owned: Vec<Owned> =
@@ -429,7 +429,7 @@ fn probe_rays() -> Vec<ProbeRay> {
 /// All of two levels is kept as bytes and brought back elsewhere; nothing of what was built is left.
 #[test]
 fn a_world_that_was_read_back_answers_queries_as_before() {
-    let backend = Ours::new();
+    let backend = Ours::on(device());
     let rays = probe_rays();
     for flags in [vk::BuildAccelerationStructureFlagsKHR::empty(), accel::REBRAID] {
         let built = World { flags, ..world() }.build(&backend);
@@ -490,7 +490,7 @@ fn what_another_version_wrote_is_an_empty_structure_that_says_so() {
     let good = serialize::write_on_host(&bytes).expect("a structure");
     // A bit of each byte of the version, then sizes that are not those of the structure, then what is no structure.
     let structure = size_of::<Head>();
-    let (backend, rays) = (Ours::new(), rays());
+    let (backend, rays) = (Ours::on(device()), rays());
     let changes = (0..32).chain([32, 40, 44, 48, structure, structure + 4, structure + 12, structure + 52]);
     for at in changes {
         let mut memory = good.clone();
@@ -726,7 +726,7 @@ fn the_same_calls_of_the_driver_give_the_same_hits() {
             ray(origin, std::array::from_fn(|k| target[k] - origin[k]))
         })
         .collect();
-    let ours = hits_of_copies(&Ours::new(), &corners, &rays);
+    let ours = hits_of_copies(&Ours::on(device()), &corners, &rays);
     assert!(ours[0].iter().filter(|hit| hit.is_some()).count() > 1000, "rays that hit nothing are no test");
     assert_eq!(ours[1], ours[0]);
     assert_eq!(ours[2], ours[0]);

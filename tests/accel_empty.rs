@@ -4,6 +4,7 @@ mod common;
 
 use common::agree::assert_reports;
 use common::backends::{Backend, Built, Ours, backends, vk_geometry};
+use common::device;
 use common::geometries::Owned;
 use common::matrices::{moved, rotation};
 use common::probe::{CONFIRM, IGNORE, ProbeRay};
@@ -141,7 +142,7 @@ fn a_top_level_without_an_active_instance_is_empty() {
 /// Ours alone: queried itself, and by its bytes.
 #[test]
 fn a_structure_of_nothing_says_so() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     for nothing in ALL {
         let (empty, _memory) = built(&ours, nothing);
         let reports = ours.probe(empty.structure, &rays());

@@ -39,7 +39,7 @@ fn on_the_device(ours: &Ours, geometries: &[Geometry], ranges: &[Range], flags: 
 
 #[test]
 fn triangles_of_every_kind_have_the_devices_bytes() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     for flags in [Flags::empty(), Flags::PREFER_FAST_BUILD, Flags::PREFER_FAST_TRACE, Flags::ALLOW_COMPACTION] {
         let parts = [
             Owned::of(&soup(40, 0.9, 1), VertexFormat::FLOAT3, IndexFormat::U32, 4),
@@ -77,10 +77,10 @@ fn at_host_addresses(owned: &Owned) -> Geometry {
 
 #[test]
 fn boxes_have_the_devices_bytes_and_small_memory_is_refused() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let all = boxes(70, 0.2, 5);
     let part = Part::Boxes(vec![(all.clone(), vk::GeometryFlagsKHR::OPAQUE)]);
-    let (geometries, ranges, _memory) = part.geometries();
+    let (geometries, ranges, _memory) = part.geometries(device());
     let expected = on_the_device(&ours, &geometries, &ranges, Flags::empty());
     let mut host = geometries.clone();
     host[0].geometry.aabbs.data = vk::DeviceOrHostAddressConstKHR { host_address: all.as_ptr().cast() };

@@ -110,7 +110,7 @@ fn assert_as_told(what: &str, ours: &Ours, builds: &[Indirect<'_>], rays: &[Prob
 
 #[test]
 fn counts_and_offsets_of_triangles_are_read_when_the_build_runs() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let corners = soup(400, 0.3, 3);
     let transforms = device().upload("transforms", &[[[0f32; 4]; 3], Instance::IDENTITY, MOVED]).expect("memory");
     for index_format in [IndexFormat::NONE, IndexFormat::U16, IndexFormat::U32] {
@@ -155,7 +155,7 @@ fn counts_and_offsets_of_triangles_are_read_when_the_build_runs() {
 
 #[test]
 fn several_geometries_keep_their_indices_when_some_have_fewer_primitives_than_planned() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let list = [(100, 1), (1, 2), (50, 3), (200, 4)];
     let parts = list.map(|(count, seed)| Owned::of(&soup(count, 0.3, seed), VertexFormat::FLOAT3, IndexFormat::U32, 0));
     let uploaded = parts.each_ref().map(|part| part.upload(0, 0));
@@ -179,7 +179,7 @@ fn several_geometries_keep_their_indices_when_some_have_fewer_primitives_than_pl
 
 #[test]
 fn instances_boxes_and_triangles_are_built_by_one_call() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let parts = vec![
         Part::Triangles(vec![(soup(90, 0.3, 5), GeometryFlags::OPAQUE), (soup(60, 0.3, 6), GeometryFlags::empty())]),
         Part::Boxes(vec![(boxes(40, 0.2, 7), GeometryFlags::empty()), (boxes(9, 0.3, 8), GeometryFlags::OPAQUE)]),
@@ -192,7 +192,7 @@ fn instances_boxes_and_triangles_are_built_by_one_call() {
     let instances = device().upload("instances", &placed).expect("memory");
     let pointers: Vec<u64> = (0..50).map(|i| instances.address() + 64 * i).collect();
     let pointers = device().upload("pointers", &pointers).expect("memory");
-    let given: Vec<_> = world.parts.iter().map(Part::geometries).collect();
+    let given: Vec<_> = world.parts.iter().map(|part| part.geometries(device())).collect();
     let tops = [[instances_at(instances.address(), false)], [instances_at(pointers.address(), true)]];
     for (count, skipped) in [(0, 0), (1, 0), (1, 49), (17, 20), (50, 0), (60, 0), (40, 10)] {
         let mut builds: Vec<Indirect<'_>> = given

@@ -209,7 +209,7 @@ fn of_instances_at_the_same_place_the_first_is_hit() {
 /// Ours alone: a bottom-level structure that is queried itself is as one instance without a transform.
 #[test]
 fn a_bottom_level_is_queried_as_under_the_identity() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     for part in [triangles(soup(60, 0.5, 10)), Part::Boxes(vec![(boxes(30, 0.3, 11), GeometryFlags::OPAQUE)])] {
         let world = World::new(vec![part], vec![Instance::new(1, Instance::IDENTITY).with_index_and_mask(0, 0xff)]);
         let built = world.build(&ours);
@@ -236,7 +236,7 @@ fn the_box_of_an_instance_holds_all_of_it_and_little_more() {
         })
         .collect();
     let world = World::new(meshes.iter().cloned().map(triangles).collect(), instances);
-    let built = world.build(&Ours::new());
+    let built = world.build(&Ours::on(device()));
     let tree = Bvh2::<Placed>::from_bytes(&built.top.memory.read::<u8>(built.top.bytes as usize)).expect("a structure");
     tree.validate().expect("a valid tree");
     assert_eq!((tree.header.status, tree.header.active), (0, 2000));

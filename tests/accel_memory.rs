@@ -52,7 +52,7 @@ fn one_scratch_memory_serves_all_builds_of_a_command_buffer() {
     let world = World::new(parts, instances);
     let rays = rays(300, 8);
     for backend in backends() {
-        let given: Vec<_> = world.parts.iter().map(Part::geometries).collect();
+        let given: Vec<_> = world.parts.iter().map(|part| part.geometries(device())).collect();
         let counts: Vec<Vec<u32>> = given.iter().map(|g| g.1.iter().map(|r| r.primitive_count).collect()).collect();
         let placed: Vec<Built> =
             given.iter().zip(&counts).map(|(g, n)| Built::place(&*backend, &bottom_level(&g.0), n, 0)).collect();
@@ -92,7 +92,7 @@ fn one_scratch_memory_serves_all_builds_of_a_command_buffer() {
 /// The same bytes wherever the scratch memory begins, and whatever lies in it.
 #[test]
 fn scratch_memory_may_begin_at_every_multiple_of_its_alignment() {
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     for count in [5, 900, 70_000] {
         let owned = Owned::of(&soup(count, 0.1, 9), VertexFormat::FLOAT3, IndexFormat::U32, 0);
         let (geometry, _memory) = owned.upload(0, 0);

@@ -4,6 +4,7 @@ mod common;
 
 use common::agree::{assert_agrees, probed};
 use common::backends::{Ours, backends};
+use common::device;
 use common::matrices::{rotation, scaled};
 use common::probe::{CONFIRM, IGNORE, ProbeRay, flags};
 use common::shapes::{Random, boxes, soup};
@@ -134,7 +135,7 @@ fn a_negative_limit_lets_in_what_lies_behind() {
     let behind = ProbeRay { t_min: -8.0, ..ProbeRay::new([1.0, 1.0, 8.0], [0.0, 0.0, 1.0]) };
     let on = ProbeRay { t_min: -1e-30, ..ProbeRay::new([1.0, 1.0, 4.0], [0.0, 0.0, 1.0]) };
     let cases = [(behind, Some(-4.0)), (ProbeRay { t_max: -4.0, ..behind }, None), (on, Some(0.0))];
-    let reports = probed(&Ours::new(), &exact(), &cases.map(|(ray, _)| ray));
+    let reports = probed(&Ours::on(device()), &exact(), &cases.map(|(ray, _)| ray));
     for ((ray, expected), report) in cases.iter().zip(&reports) {
         let hit = &report.committed;
         assert_eq!((hit.kind != 0).then_some(hit.t), *expected, "{ray:?}");
@@ -173,7 +174,7 @@ fn what_is_no_ray_meets_nothing() {
     let boxes = Part::Boxes(vec![(vec![[[0.0, 0.0, -1.0], [4.0, 4.0, 6.0]]], GeometryFlags::empty())]);
     let boxes = World::new(vec![boxes], vec![Instance::new(1, rotation(1)), Instance::new(1, Instance::IDENTITY)]);
     for world in [exact(), boxes] {
-        let reports = probed(&Ours::new(), &world, &all);
+        let reports = probed(&Ours::on(device()), &world, &all);
         for (ray, report) in all.iter().zip(&reports) {
             let is_good = *ray == good;
             assert_eq!(report.committed.kind != 0, is_good, "{ray:?}: {:?}", report.committed);

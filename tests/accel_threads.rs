@@ -34,7 +34,7 @@ fn builds_that_many_threads_record_are_those_of_one() {
     };
     let context = unsafe { Context::new(&desc) }.expect("a context");
     let builder = accel::Device::new(&context);
-    let ours = Ours::new();
+    let ours = Ours::on(device());
     let flags =
         [BuildFlags::empty(), BuildFlags::PREFER_FAST_BUILD, BuildFlags::PREFER_FAST_TRACE, BuildFlags::LOW_MEMORY];
     let meshes: Vec<Owned> = (0..THREADS * BUILDS_EACH)

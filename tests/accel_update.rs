@@ -87,7 +87,7 @@ fn bottom_levels_follow_their_primitives() {
     for backend in backends() {
         for (name, before, after) in parts() {
             for in_place in [true, false] {
-                let (geometries, ranges, memory) = before.geometries();
+                let (geometries, ranges, memory) = before.geometries(device());
                 let asked = info(ty, &geometries);
                 let counts: Vec<u32> = ranges.iter().map(|r| r.primitive_count).collect();
                 let first = Built::new(&*backend, &asked, &ranges, 0);

@@ -545,7 +545,7 @@ fn rays_do_not_meet_boxes_that_are_left_out() {
         let options = Options { primitives: Primitives::Boxes, costs: collapse, ..Options::DEFAULT };
         let placed = Placed::new(&tree.to_bytes(), &options, 5);
         let met = || {
-            let report = Probe::ours().ask(placed.structure.address(), &[ray])[0];
+            let report = Probe::ours(device()).ask(placed.structure.address(), &[ray])[0];
             report.sorted_candidates().iter().map(|&[_, _, _, primitive]| primitive).collect::<Vec<u32>>()
         };
         for (boxes, expected) in [(&given, &[0, 1, 2, 3, 4][..]), (&broken, &[0, 2, 4]), (&given, &[0, 1, 2, 3, 4])] {

@@ -3,7 +3,7 @@
 mod common;
 
 use common::device;
-use common::probe::Probe;
+use common::probe::ask_kd_tree;
 use common::shapes::{
     Corners, Random, hard_rays, icosphere, no_rays, placed, ray, rays_from_the_middle, rays_with, soup, tree_of,
 };
@@ -327,7 +327,7 @@ fn shaders_of_others_trace_kd_trees_by_the_header() {
     let rays = hard_rays(&corners, 500, 1.0, [0.0; 3], 82);
     let upload = |bytes: &[u8]| device().upload("structure", bytes).expect("memory");
     let (kd_buffer, bvh_buffer) = (upload(&kd_tree.to_bytes()), upload(&bvh.to_bytes()));
-    let reports = Probe::of_kd_trees().ask_kd_tree(kd_buffer.address(), bvh_buffer.address(), &rays);
+    let reports = ask_kd_tree(kd_buffer.address(), bvh_buffer.address(), &rays);
     for (ray, report) in rays.iter().zip(reports) {
         let hit = kd_host::closest_hit(&kd_tree, ray, Traversal::STACK);
         assert_eq!((report.of_kd_tree, report.of_query), (hit, hit), "{ray:?}");

@@ -9,10 +9,13 @@ use crate::measure::matrix::{self, Failure, Outcome, Plan};
 use crate::measure::overlap::Epo;
 use crate::measure::peers::driver;
 use crate::measure::provenance::{self, Machine};
+use crate::measure::record::SCHEMA;
+use crate::measure::shard::Shard;
 use crate::report::kd_trees::{self, published};
 use crate::report::names::slug;
 use crate::report::picture::{PictureOptions, View, picture};
 use crate::report::results::Results;
+use crate::report::setting::Setting;
 use crate::report::{DeviceFacts, Picture, Report, table};
 use crate::scene::{self, Scene};
 use anyhow::{Context, bail};
@@ -59,6 +62,9 @@ pub struct Arguments {
     /// No pictures of the scenes
     #[arg(long)]
     no_pictures: bool,
+    /// Take the I-th of N shares of the scenes, I from 1, each scene with all its builders
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
     /// The folder for results.jsonl, results.csv, charts and index.html
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -66,7 +72,7 @@ pub struct Arguments {
 
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let asked = common.builders(&builders::parse_list(&arguments.builder)?);
-    let scenes = scenes(common, arguments)?;
+    let scenes = shared(common, arguments, scenes(common, arguments)?);
     let published = arguments.published.as_deref().filter(|file| !file.as_os_str().is_empty());
     let published = published.map_or_else(|| Ok(published::papay()), published::read)?;
     // Before any work: a folder that cannot be written would lose all of it.
@@ -105,6 +111,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     };
     bench.report.options = options(common, arguments);
     bench.report.baseline = no_peer.is_none().then(|| "driver-fast-build".into());
+    setting(&bench.report).write(&arguments.output)?;
     for scene in &scenes {
         bench.scene(scene)?;
     }
@@ -157,6 +164,30 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<Vec<String>>
         scenes = in_folder(&folder)?;
     }
     Ok(scenes)
+}
+
+/// The scenes of the share that is asked for.
+fn shared(common: &Common, arguments: &Arguments, scenes: Vec<String>) -> Vec<String> {
+    let Some(shard) = arguments.shard else { return scenes };
+    let folders = common.scene_folders();
+    let costs: Vec<u64> = scenes.iter().map(|scene| scene::weight(scene, &folders)).collect();
+    let own = shard.of(&costs);
+    if own.is_empty() && !common.quiet {
+        eprintln!("hedgerow: share {} of {} has none of the {} scenes", shard.index, shard.count, scenes.len());
+    }
+    own.into_iter().map(|i| scenes[i].clone()).collect()
+}
+
+/// What the records need beside them, to be joined with those of other runs.
+fn setting(report: &Report) -> Setting {
+    Setting {
+        schema: SCHEMA,
+        machine: report.machine.clone(),
+        device: report.device.clone(),
+        command: report.command.clone(),
+        options: report.options.clone(),
+        notes: report.notes.clone(),
+    }
 }
 
 /// The device, with ray queries where it has them: host builders alone need none.

@@ -2,6 +2,7 @@
 
 use super::options::{Builders, Costs};
 use super::{Common, Json, tables, work};
+use crate::measure::copy;
 use crate::measure::matrix::Plan;
 use crate::measure::overlap::Epo;
 use crate::trace::kinds::RayOptions;
@@ -64,9 +65,10 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     }
     arguments.json.write_each(outcomes.iter().map(|outcome| &outcome.record))?;
     if !arguments.json.takes_stdout() {
+        let copy_gb_s = device.as_ref().map(copy::rate_gb_s).transpose()?;
         let mut out = std::io::stdout().lock();
         for outcome in &outcomes {
-            writeln!(out, "{}", tables::build(outcome))?;
+            writeln!(out, "{}", tables::build(outcome, copy_gb_s))?;
         }
     }
     work::finish(device.as_ref(), all_right)

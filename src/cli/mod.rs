@@ -5,6 +5,7 @@ mod accel;
 mod animate;
 mod bench;
 mod build;
+mod check;
 mod choose;
 mod compare;
 mod devices;
@@ -13,6 +14,7 @@ mod options;
 mod output;
 mod rays;
 mod render;
+mod report;
 mod stability;
 mod tables;
 mod trace;
@@ -38,12 +40,14 @@ struct Cli {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
+    Check(check::Arguments),
     Bench(bench::Arguments),
     Accel(accel::Arguments),
     Animate(animate::Arguments),
     Stability(stability::Arguments),
     Choose(choose::Arguments),
     Compare(compare::Arguments),
+    Report(report::Arguments),
     Devices(devices::Arguments),
     Build(build::Arguments),
     Trace(trace::Arguments),
@@ -80,12 +84,14 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     let common = &cli.common;
     common.start_threads()?;
     match &cli.command {
+        Command::Check(arguments) => check::run(common, arguments),
         Command::Bench(arguments) => bench::run(common, arguments),
         Command::Accel(arguments) => accel::run(common, arguments),
         Command::Animate(arguments) => animate::run(common, arguments),
         Command::Stability(arguments) => stability::run(common, arguments),
         Command::Choose(arguments) => choose::run(common, arguments),
         Command::Compare(arguments) => compare::run(common, arguments),
+        Command::Report(arguments) => report::run(common, arguments),
         Command::Devices(arguments) => devices::run(common, arguments),
         Command::Build(arguments) => build::run(common, arguments),
         Command::Trace(arguments) => trace::run(common, arguments),

@@ -30,7 +30,8 @@ fn heading(record: &Record) -> String {
 }
 
 /// Build time with its phases, quality and memory.
-pub fn build(outcome: &Outcome) -> String {
+/// Phases stand beside a plain copy of the bytes that they must move, given its rate in GB/s.
+pub fn build(outcome: &Outcome, copy_gb_s: Option<f64>) -> String {
     let record = &outcome.record;
     let build = &record.build;
     let mut text = heading(record);
@@ -48,16 +49,26 @@ pub fn build(outcome: &Outcome) -> String {
         three_digits(speed)
     );
     if !build.phases.is_empty() {
-        let mut phases = table(&["phase", "time", "share", "GB/s of what it must move"], 1);
-        for (i, phase) in build.phases.iter().enumerate() {
-            let traffic = outcome.traffic.get(i).copied().flatten();
+        let header = ["phase", "time", "share", "must move", "GB/s", "a copy of it", "of the copy's speed"];
+        let mut phases = table(&header, 1);
+        let mut add = |name: &str, milliseconds: f64, traffic: Option<u64>| {
+            let copy = traffic.zip(copy_gb_s).map(|(bytes, rate)| bytes as f64 / (rate * 1e6));
             phases.add_row([
-                phase.name.clone(),
-                duration(phase.median_ms),
-                format!("{:.0}%", 100.0 * phase.median_ms / build.median_ms),
-                or_dash(traffic, |bytes| three_digits(bytes as f64 / (phase.median_ms * 1e6))),
+                name.to_owned(),
+                duration(milliseconds),
+                format!("{:.0}%", 100.0 * milliseconds / build.median_ms),
+                or_dash(traffic, bytes),
+                or_dash(traffic, |bytes| three_digits(bytes as f64 / (milliseconds * 1e6))),
+                or_dash(copy, duration),
+                or_dash(copy, |copy| format!("{:.0}%", 100.0 * copy / milliseconds)),
             ]);
+        };
+        for (phase, traffic) in build.phases.iter().zip(outcome.traffic.iter().copied().chain(std::iter::repeat(None)))
+        {
+            add(&phase.name, phase.median_ms, traffic);
         }
+        // Of all, if it is known of each.
+        add("all", build.median_ms, outcome.traffic.iter().copied().sum());
         text += &format!("{phases}\n");
     }
     let (q, m) = (&record.quality, &record.memory);

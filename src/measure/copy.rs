@@ -14,12 +14,17 @@ const WORKGROUP: u32 = 256;
 
 push_constants! {
     /// The push constants of `glsl/measure/copy.comp`.
-    struct Arguments {
+    pub(super) struct Arguments {
         source: u64,
         target: u64,
         count: u32,
         padding: u32,
     }
+}
+
+/// What the shader takes to copy `count` times 16 bytes.
+pub(super) fn arguments(source: u64, target: u64, count: u32) -> Arguments {
+    Arguments { source, target, count, padding: 0 }
 }
 
 /// Bytes a second in GB/s (10⁹) that a plain copy moves, reading and writing both counted.
@@ -31,7 +36,7 @@ pub fn rate_gb_s(device: &Device) -> Result<f64> {
     let target = device.buffer("copy: target", BYTES)?;
     let count = (BYTES / 16) as u32;
     let kernel = Kernel::new(&shaders::MEASURE_COPY, WORKGROUP, &[]);
-    let arguments = Arguments { source: source.address(), target: target.address(), count, padding: 0 };
+    let arguments = arguments(source.address(), target.address(), count);
     let mut timestamps = Timestamps::new(device, 1)?;
     let mut times = Vec::new();
     for run in 0..=RUNS {

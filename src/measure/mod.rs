@@ -2,7 +2,8 @@
 //!
 //! [`Subject`] is a builder on a scene; [`builders`] makes one by name; [`matrix`] measures several of them on a scene and
 //! gives a [`record`] for each. [`experiments`] measures what engines do through the calls of `VK_KHR_acceleration_structure`,
-//! over [`structures`] and [`levels`] of instances; [`animate`] scenes that move; [`stability`] where methods give way. The rest
+//! over [`structures`] and [`levels`] of instances; [`animate`] scenes that move; [`stability`] where methods give way;
+//! [`check`] asks whether a device does all of it rightly. The rest
 //! is how that is fair and what follows from it: [`agreement`] (right hits), [`overlap`] (a quality that takes time),
 //! [`statistics`] (in turn, medians), [`outline`] (boxes level by level, to be drawn), [`growth`] (time over triangles), [`pareto`]
 //! and [`total_time`] (who is best for what). [`choose`] says who will be, before anything is built.
@@ -10,6 +11,7 @@
 pub mod agreement;
 pub mod animate;
 pub mod builders;
+pub mod check;
 pub mod choose;
 pub mod comparison;
 pub mod copy;
@@ -29,6 +31,7 @@ pub mod pareto;
 pub mod peers;
 pub mod provenance;
 pub mod record;
+pub mod shard;
 pub mod stability;
 pub mod statistics;
 pub mod structures;

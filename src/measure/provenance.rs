@@ -9,8 +9,8 @@ use std::sync::OnceLock;
 
 /// Commit of the program, with `+` behind it if the tree was dirty; `unknown` outside a checkout.
 ///
-/// `HEDGEROW_COMMIT` at compile time decides where it is set (for packages); otherwise git is asked in the folder that the
-/// program was compiled in.
+/// `HEDGEROW_COMMIT` at compile time decides where it is set (for packages), then the file `COMMIT` beside the program (in a
+/// portable folder); otherwise git is asked in the folder that the program was compiled in.
 pub fn commit() -> String {
     static COMMIT: OnceLock<String> = OnceLock::new();
     COMMIT.get_or_init(find_commit).clone()
@@ -19,6 +19,10 @@ pub fn commit() -> String {
 fn find_commit() -> String {
     if let Some(commit) = option_env!("HEDGEROW_COMMIT") {
         return commit.to_owned();
+    }
+    let beside = std::env::current_exe().ok().map(|program| program.with_file_name("COMMIT"));
+    if let Some(commit) = beside.and_then(|file| std::fs::read_to_string(file).ok()) {
+        return commit.trim().to_owned();
     }
     let git = |arguments: &[&str]| {
         let output = Command::new("git").args(["-C", env!("CARGO_MANIFEST_DIR")]).args(arguments).output().ok()?;

@@ -102,6 +102,15 @@ impl<E: Entry> Points<E> {
     }
 }
 
+/// Writes all entries of a file into `folder`.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write<E: Entry>(folder: &Path, entries: Vec<E>) -> Result<()> {
+    let mut points = Points::create(folder)?;
+    entries.into_iter().try_for_each(|entry| points.append(entry))
+}
+
 /// The entries of a file, or of the one in a folder.
 ///
 /// # Errors

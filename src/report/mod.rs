@@ -3,6 +3,7 @@
 //! [`results`] is what programs read. For people, [`table`] goes to the terminal and [`Report::write`] makes a folder with
 //! charts as SVG and PNG and an `index.html` that opens from the disk with no network; [`accel`] and
 //! [`animate`] have pages of their own, and so has each experiment of [`stability`]; [`navigate`] makes one a scene, of its trees.
+//! [`joined`] makes one page of the records of many folders.
 
 pub mod accel;
 pub mod animate;
@@ -11,6 +12,7 @@ pub mod chart;
 pub mod charts;
 mod choosing;
 mod elements;
+pub mod joined;
 pub mod kd_trees;
 pub mod labels;
 mod lines;
@@ -21,6 +23,7 @@ mod page;
 pub mod picture;
 pub mod raster;
 pub mod results;
+pub mod setting;
 pub mod stability;
 pub mod summary;
 pub mod table;

@@ -34,6 +34,18 @@ pub fn list(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// About how many bytes a scene takes, for sharing scenes out; 0 where that cannot be told without loading it.
+pub fn weight(spec: &str, folders: &[PathBuf]) -> u64 {
+    /// Of a triangle in a text file.
+    const BYTES: u64 = 64;
+    if let Ok(Some(generated)) = super::generators::Generated::find(spec) {
+        return BYTES * generated.size();
+    }
+    find(spec, folders)
+        .and_then(|path| std::fs::metadata(&path).map_err(Error::file(path)))
+        .map_or(0, |file| file.len())
+}
+
 /// The file that `spec` names.
 pub(super) fn find(spec: &str, folders: &[PathBuf]) -> Result<PathBuf> {
     let path = Path::new(spec);

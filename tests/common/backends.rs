@@ -2,102 +2,20 @@
 
 use super::device;
 use super::geometries::Owned;
-use super::probe::{Probe, ProbeRay, Report};
-use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
+use super::probe::{self, Probe, ProbeRay, Report};
 use hedgerow::ash::{self, vk};
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
-use hedgerow::gpu::{Buffer, DriverRays, DriverTracing, Recorder};
-use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::gpu::{Device, DriverRays, DriverTracing, Recorder};
+pub use hedgerow::measure::check::backend::{Backend, BuildInfo, Built, Ours, Ranges};
 use hedgerow::trace::{Hit, Query, Ray};
-
-type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
-type Ranges<'a> = &'a [vk::AccelerationStructureBuildRangeInfoKHR];
-
-/// What an engine calls.
-pub trait Backend {
-    fn name(&self) -> &'static str;
-    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static>;
-    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR;
-    fn destroy(&self, structure: vk::AccelerationStructureKHR);
-    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64;
-    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]);
-    fn scratch_alignment(&self) -> u64;
-    /// What queries through a top level report.
-    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<Report>;
-    /// The hits of rays in a bottom-level structure.
-    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
-}
 
 /// Ours, and the driver's where the device has it with ray queries, which shaders of engines ask.
 pub fn backends() -> Vec<Box<dyn Backend>> {
-    let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours::new())];
+    let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours::on(device()))];
     if device().driver_tracing() == Some(DriverTracing::Query) {
         all.push(Box::new(Drivers::new()));
     }
     all
-}
-
-pub struct Ours(pub accel::Device<'static>, Probe);
-
-impl Ours {
-    pub fn new() -> Ours {
-        Ours::with(accel::Options::DEFAULT)
-    }
-
-    pub fn with(options: accel::Options) -> Ours {
-        Ours(accel::Device::with_options(device(), options), Probe::ours())
-    }
-}
-
-impl Backend for Ours {
-    fn name(&self) -> &'static str {
-        "hedgerow"
-    }
-
-    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
-        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
-        unsafe { self.0.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) }
-            .expect("it can be built");
-        sizes
-    }
-
-    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
-        unsafe { self.0.create_acceleration_structure(info, None) }.expect("the offset is right")
-    }
-
-    fn destroy(&self, structure: vk::AccelerationStructureKHR) {
-        self.0.destroy_acceleration_structure(structure, None);
-    }
-
-    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
-        let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
-        self.0.get_acceleration_structure_device_address(&info)
-    }
-
-    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]) {
-        unsafe { self.0.cmd_build_acceleration_structures(recorder.commands(), infos, ranges) }
-            .expect("it can be built");
-    }
-
-    fn scratch_alignment(&self) -> u64 {
-        SCRATCH_ALIGNMENT
-    }
-
-    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<Report> {
-        self.1.ask(self.address(structure), rays)
-    }
-
-    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
-        let count = rays.len() as u32;
-        let ray_buffer = device().upload("rays", rays).expect("memory");
-        let hits = device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
-        let structure = self.address(structure);
-        let buffers = Buffers { structure, rays: ray_buffer.address(), hits: hits.address(), work: None, count };
-        let shape = Shape::of(device());
-        device().run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
-        hits.read(rays.len())
-    }
 }
 
 pub struct Drivers(pub ash::khr::acceleration_structure::Device, Probe);
@@ -106,13 +24,17 @@ impl Drivers {
     /// For a device that has them.
     pub fn new() -> Drivers {
         let raw = ash::khr::acceleration_structure::Device::new(device().ash_instance(), device().ash_device());
-        Drivers(raw, Probe::of_the_driver())
+        Drivers(raw, probe::of_the_driver())
     }
 }
 
 impl Backend for Drivers {
     fn name(&self) -> &'static str {
         "driver"
+    }
+
+    fn device(&self) -> &'static Device {
+        device()
     }
 
     fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
@@ -291,55 +213,6 @@ impl Copies for Drivers {
 
 fn submit(record: impl FnOnce(vk::CommandBuffer) -> hedgerow::Result<()>) {
     device().run(None, |recorder| record(recorder.commands())).expect("it runs");
-}
-
-/// A structure that was built alone, and its memory.
-pub struct Built {
-    pub structure: vk::AccelerationStructureKHR,
-    pub memory: Buffer<'static>,
-    pub bytes: u64,
-}
-
-impl Built {
-    /// Builds what `info` asks for, in a buffer of its own, `offset` bytes behind its beginning.
-    pub fn new(backend: &dyn Backend, info: &BuildInfo<'_>, ranges: Ranges<'_>, offset: u64) -> Built {
-        let counts: Vec<u32> = ranges.iter().map(|r| r.primitive_count).collect();
-        let mut built = Built::place(backend, info, &counts, offset);
-        let scratch = built.scratch(backend, info, &counts);
-        let info = info
-            .dst_acceleration_structure(built.structure)
-            .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.1 });
-        device()
-            .run(None, |recorder| {
-                backend.build(recorder, &[info], &[ranges]);
-                Ok(())
-            })
-            .expect("it builds");
-        built.bytes -= offset;
-        built
-    }
-
-    /// Memory and a handle; nothing is built.
-    pub fn place(backend: &dyn Backend, info: &BuildInfo<'_>, counts: &[u32], offset: u64) -> Built {
-        let bytes = backend.build_sizes(info, counts).acceleration_structure_size;
-        let memory = device().buffer("structure", offset + bytes).expect("memory");
-        let create = vk::AccelerationStructureCreateInfoKHR::default()
-            .buffer(memory.raw())
-            .offset(offset)
-            .size(bytes)
-            .ty(info.ty);
-        Built { structure: backend.create(&create), memory, bytes: offset + bytes }
-    }
-
-    /// Scratch memory for it, and its address.
-    pub fn scratch(&self, backend: &dyn Backend, info: &BuildInfo<'_>, counts: &[u32]) -> (Buffer<'static>, u64) {
-        let alignment = backend.scratch_alignment();
-        let bytes = backend.build_sizes(info, counts).build_scratch_size;
-        let buffer = device().buffer("scratch", bytes + 2 * alignment).expect("memory");
-        // As little aligned as is allowed.
-        let address = buffer.address().next_multiple_of(alignment) + alignment;
-        (buffer, address)
-    }
 }
 
 /// The Vulkan name of a format.

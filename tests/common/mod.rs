@@ -1,15 +1,12 @@
 //! What the device tests share: one device a test binary, with the validation layers on where they are installed.
-#![allow(dead_code, reason = "each test binary uses its part")]
+#![allow(dead_code, unused_imports, reason = "each test binary uses its part")]
 
-pub mod agree;
 pub mod backends;
-pub mod corpus;
 pub mod geometries;
-pub mod matrices;
 pub mod probe;
-pub mod shapes;
 pub mod twins;
-pub mod world;
+
+pub use hedgerow::measure::check::{agree, corpus, matrices, mixture, shapes, world};
 
 use hedgerow::gpu::{Device, DeviceOptions, DriverTracing, Restrict, TuningChoice};
 use std::sync::OnceLock;

@@ -157,6 +157,15 @@ impl Generated {
         Ok(Some(Generated { name: spec.to_owned(), recipe, n: n as u32, second }))
     }
 
+    /// Its triangles, or its instances; of an animation the triangles of a frame.
+    pub fn size(&self) -> u64 {
+        let n = u64::from(self.n);
+        match self.recipe {
+            Recipe::Mesh(triangles, _) => triangles(n).unwrap_or(n),
+            _ => n,
+        }
+    }
+
     /// The mesh, if it is one; of an animation the first frame.
     pub fn mesh(&self) -> Option<Mesh> {
         match self.recipe {

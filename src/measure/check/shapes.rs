@@ -1,10 +1,11 @@
 //! Meshes and rays for the tracing tests, made of nothing but numbers.
+#![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
-use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::host::lbvh;
-use hedgerow::bvh::layout::Bvh2;
-use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::Ray;
+use crate::bvh::codes::Code;
+use crate::bvh::host::lbvh;
+use crate::bvh::layout::Bvh2;
+use crate::bvh::sah::Collapse;
+use crate::trace::Ray;
 
 /// Triangles by their corners.
 pub type Corners = Vec<[[f32; 3]; 3]>;

@@ -1,6 +1,7 @@
 //! Meshes that hurt builders: sizes around powers of two, and every degenerate scene.
+#![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
-use hedgerow::scene::degenerate;
+use crate::scene::degenerate;
 
 /// Name, positions, triangles.
 pub type Mesh = (String, Vec<[f32; 3]>, Vec<[u32; 3]>);

@@ -1,6 +1,7 @@
 //! What queries report, held against brute force.
+#![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
-use super::backends::Backend;
+use super::backend::Backend;
 use super::probe::{IGNORE, ProbeRay, Report, TERMINATE, flags};
 use super::world::{Met, World, inverse, transform_error, transformed};
 

@@ -1,12 +1,12 @@
 //! A small world of instances, built through a back end, and what a ray meets in it by brute force in double precision.
+#![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
-use super::backends::{Backend, Built};
-use super::device;
+use super::backend::{Backend, Built};
 use super::probe::{CONFIRM, CONFIRM_ODD, ProbeRay, flags};
 use super::shapes::Corners;
-use hedgerow::accel::Instance;
-use hedgerow::ash::vk;
-use hedgerow::gpu::Buffer;
+use crate::accel::Instance;
+use crate::gpu::{Buffer, Device};
+use ash::vk;
 
 type Flags = vk::GeometryInstanceFlagsKHR;
 type GeometryFlags = vk::GeometryFlagsKHR;
@@ -77,7 +77,7 @@ pub fn bottom_level(backend: &dyn Backend, geometries: &[Geometry], ranges: &[Ra
 
 impl Part {
     /// Vulkan's structs over uploaded data.
-    pub fn geometries(&self) -> (Vec<Geometry>, Vec<Range>, Vec<Buffer<'static>>) {
+    pub fn geometries(&self, device: &'static Device) -> (Vec<Geometry>, Vec<Range>, Vec<Buffer<'static>>) {
         let mut all = (Vec::new(), Vec::new(), Vec::new());
         let mut add = |kind, data, flags, count: usize, memory| {
             let geometry =
@@ -89,7 +89,7 @@ impl Part {
         match self {
             Part::Triangles(geometries) => {
                 for (corners, flags) in geometries {
-                    let memory = device().upload("corners", corners).expect("memory");
+                    let memory = device.upload("corners", corners).expect("memory");
                     let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
                         .vertex_format(vk::Format::R32G32B32_SFLOAT)
                         .vertex_data(address(memory.address()))
@@ -102,7 +102,7 @@ impl Part {
             }
             Part::Boxes(geometries) => {
                 for (boxes, flags) in geometries {
-                    let memory = device().upload("boxes", boxes).expect("memory");
+                    let memory = device.upload("boxes", boxes).expect("memory");
                     let aabbs = vk::AccelerationStructureGeometryAabbsDataKHR::default()
                         .data(address(memory.address()))
                         .stride(24);
@@ -116,7 +116,7 @@ impl Part {
 
     /// Builds it alone.
     pub fn build(&self, backend: &dyn Backend) -> (Built, Vec<Buffer<'static>>) {
-        let (geometries, ranges, memory) = self.geometries();
+        let (geometries, ranges, memory) = self.geometries(backend.device());
         (bottom_level(backend, &geometries, &ranges), memory)
     }
 }
@@ -151,11 +151,14 @@ impl World {
     /// Builds the top level over parts that are built, and keeps their memory.
     pub fn build_over(&self, backend: &dyn Backend, parts: Vec<Built>, mut memory: Vec<Buffer<'static>>) -> BuiltWorld {
         let placed = self.placed(backend, &parts);
-        let mut instances = device().upload("instances", &placed).expect("memory");
+        let mut instances = backend.device().upload("instances", &placed).expect("memory");
         if self.by_pointers {
             let pointers: Vec<u64> =
                 (0..placed.len() as u64).map(|i| instances.address() + i * size_of::<Instance>() as u64).collect();
-            memory.push(std::mem::replace(&mut instances, device().upload("pointers", &pointers).expect("memory")));
+            memory.push(std::mem::replace(
+                &mut instances,
+                backend.device().upload("pointers", &pointers).expect("memory"),
+            ));
         }
         let geometry = instances_at(instances.address(), self.by_pointers);
         let range = Range::default().primitive_count(placed.len() as u32);

@@ -1,4 +1,5 @@
 //! Matrices of instances.
+#![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
 use super::shapes::Random;
 
