@@ -9,6 +9,7 @@
 #   make test-lanes    the suite on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
 #   make check         formatting, lints and docs, warnings denied
 #   make prebuilt      compiles glsl/ into glsl/prebuilt/, for builds without the feature compile-shaders
+#   make portable      a folder OUT that runs on any machine with a Vulkan driver: scripts/portable.sh
 #   make install-c     hedgerow.h and the libraries for C into PREFIX (/usr/local); needs Rust alone
 #
 #   SETUP=true         go on without scripts/setup.sh       OUT=DIR        where reports go
@@ -47,7 +48,7 @@ SUITE := $(RUN) --features $(FEATURES)
 CAPI := -p hedgerow-capi
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
-.PHONY: bench bench-all bench-peers stability test test-lanes check prebuilt install-c setup
+.PHONY: bench bench-all bench-peers stability test test-lanes check prebuilt portable install-c setup
 
 bench: setup
 	$(CARGO) build --release --features $(FEATURES)
@@ -98,6 +99,10 @@ check: setup
 
 prebuilt: setup
 	HEDGEROW_UPDATE_PREBUILT=1 $(CARGO) test --release --test prebuilt
+
+portable: setup
+	@test "$(OUT)" != report || { echo "make portable: OUT=DIR names the folder to make" >&2; exit 2; }
+	scripts/portable.sh "$(OUT)"
 
 install-c:
 	cargo build --release $(CAPI)
