@@ -18,7 +18,7 @@ bool is_structure(Header header) {
 
 // Bytes of a structure, as two words: an address behind address 0.
 uvec2 structure_bytes(uint kind, uint node_slots, uint primitive_count, uint geometry_count) {
-    uvec2 table = uvec2(geometry_table_at(uvec2(0), kind, node_slots, primitive_count));
+    uvec2 table = geometry_table_address(uvec2(0), kind, node_slots, primitive_count);
     return address_of(table, geometry_count > 1 ? geometry_count : 0, 8);
 }
 

@@ -137,8 +137,13 @@ uint geometry_index_of(GeometryTable table, uint count, uint primitive) {
     return at;
 }
 
-// Behind the records, where there are several geometries.
+// Where the table of geometries lies, if there are several: behind the records. An address, for a reference made of another
+// reference makes SwiftShader crash.
+uvec2 geometry_table_address(uvec2 structure, uint kind, uint node_slots, uint primitive_count) {
+    return address_of(records_at(structure, node_slots), primitive_count, record_bytes(kind));
+}
+
 GeometryTable geometry_table_at(uvec2 structure, uint kind, uint node_slots, uint primitive_count) {
-    return GeometryTable(address_of(records_at(structure, node_slots), primitive_count, record_bytes(kind)));
+    return GeometryTable(geometry_table_address(structure, kind, node_slots, primitive_count));
 }
 #endif

@@ -17,6 +17,7 @@
 #define records_at hedgerow_records_at
 #define record_bytes hedgerow_record_bytes
 #define geometry_table_at hedgerow_geometry_table_at
+#define geometry_table_address hedgerow_geometry_table_address
 #define geometry_index_of hedgerow_geometry_index_of
 #define MAGIC HEDGEROW_MAGIC
 #define KIND_TRIANGLES HEDGEROW_KIND_TRIANGLES

@@ -16,6 +16,7 @@
 #undef records_at
 #undef record_bytes
 #undef geometry_table_at
+#undef geometry_table_address
 #undef geometry_index_of
 #undef MAGIC
 #undef KIND_TRIANGLES

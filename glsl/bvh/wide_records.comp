@@ -18,7 +18,7 @@ void main() {
     } else {
         copy_bytes(records, target_records, address_of(uvec2(0), to.primitive_count, bytes_each));
     }
-    Words given = Words(geometry_table_at(uvec2(source), from.kind, from.node_slots, from.primitive_count));
+    Words given = Words(geometry_table_address(uvec2(source), from.kind, from.node_slots, from.primitive_count));
     Words table = Words(address_of(target_records, to.primitive_count, bytes_each));
     uint words = to.geometry_count > 1 ? 2 * to.geometry_count : 0;
     for (uint k = 0, i = grid_item(0); i < words; i = grid_item(++k)) table.word[i] = given.word[i];
