@@ -16,8 +16,12 @@ const GUARD: [u8; 256] = [0xA5; 256];
 
 /// The bytes in use of the wide tree that the device makes of `tree`; nothing else is written.
 fn collapsed<N: WideNode>(tree: &Bvh2) -> Vec<u8> {
+    collapsed_as::<N>(tree, tree.header.primitive_count)
+}
+
+/// The same, planned for trees of up to `count` primitives.
+fn collapsed_as<N: WideNode>(tree: &Bvh2, count: u32) -> Vec<u8> {
     let device = device();
-    let count = tree.header.primitive_count;
     let geometry_count = tree.header.geometry_count;
     let options = Options { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
     let wide = OnDevice::new(device, &options, count);
@@ -151,6 +155,19 @@ fn deep(beside: usize) -> Bvh2 {
 fn trees_as_deep_as_they_may_be_have_as_many_levels_as_tracers_can_walk() {
     for beside in [1, 2] {
         assert_all_forms(&format!("deep, {beside} beside"), &deep(beside));
+    }
+}
+
+/// Levels are opened by one workgroup, or the first ones and the last ones by one and those between by many: what was planned for
+/// says which.
+#[test]
+fn small_and_deep_trees_planned_as_large_ones_have_the_same_bytes() {
+    for tree in [piles(&[1]), piles(&[1; 9]), deep(1), deep(2)] {
+        for planned in [2_000, 20_000, 100_000] {
+            let planned = planned + tree.header.primitive_count;
+            assert!(collapsed_as::<[Child; 4]>(&tree, planned) == collapsed::<[Child; 4]>(&tree), "{planned}");
+            assert!(collapsed_as::<QuantisedNode>(&tree, planned) == collapsed::<QuantisedNode>(&tree), "{planned}");
+        }
     }
 }
 

@@ -26,6 +26,8 @@
 
 layout(constant_id = 2) const uint WIDTH = 4;
 layout(constant_id = 3) const bool QUANTISED = false;
+// Whether what is known of a node's children is chosen by comparisons, so that it stays in registers, or by index.
+layout(constant_id = 4) const bool IN_REGISTERS = false;
 
 // src/bvh/wide/mod.rs
 const uint LEVELS_BY_AREA = 24;
@@ -41,7 +43,11 @@ struct Opened {
     uint place;
 };
 
-BUFFER Levels { uint count[LEVELS_AT_MOST]; };
+BUFFER Levels {
+    uint count[LEVELS_AT_MOST];
+    uint first[LEVELS_AT_MOST + 1];   // of opened: where a level begins
+    uint end;                         // of all levels that have a node
+};
 BUFFER OpenedNodes { Opened node[]; };
 
 layout(push_constant, scalar) uniform Arguments {
@@ -77,14 +83,15 @@ Child child_named(uint name) {
     return Children(address_of(wide_nodes_at(uvec2(source)), name, 32)).child[0];
 }
 
-// How many of opened lie before those of a level.
-uint opened_before(uint level) {
-    uint before = 0;
-    for (uint l = 0; l < min(level, LEVELS_AT_MOST); ++l) before += levels.count[l];
-    return min(before, capacity);
+// Which of opened are of a level: the first, and how many.
+uvec2 opened_of(uint level) {
+    uint first = min(levels.first[level], capacity);
+    return uvec2(first, min(levels.count[level], capacity - first));
 }
 
-uint opened_of(uint level) {
-    return min(levels.count[level], capacity - opened_before(level));
+// The next level begins where this one ends: one invocation of those that open it notes it.
+void note_end(uint level, uint end) {
+    levels.first[level + 1] = end;
+    levels.end = end;
 }
 #endif

@@ -85,7 +85,7 @@ void write_quantised_node(uint at, uint index, uint next_node, uint next_record)
 void main() {
     bool there_is = can_be_collapsed(source.header);
     if (gl_GlobalInvocationID.x == 0) write_header(there_is);
-    uint count = opened_before(LEVELS_AT_MOST);
+    uint count = levels.end;
     for (uint k = 0, at = grid_item(0); at < count; at = grid_item(++k)) {
         Opened o = opened.node[at];
         uint index = at == 0 ? 0 : 1 + first_children.word[o.place >> 3] + (o.place & 7u);

@@ -3,7 +3,9 @@
 #include "bvh/wide_open.glsl"
 
 void main() {
-    uint first = opened_before(level);
-    uint count = opened_of(level);
-    for (uint k = 0, i = grid_item(0); i < count; i = grid_item(++k)) open(first + i, level, first + count);
+    uvec2 of = opened_of(level);
+    if (of.y == 0) return;
+    if (gl_GlobalInvocationID.x == 0) note_end(level, of.x + of.y);
+    // All invocations of a workgroup go round together.
+    for (uint k = 0, i = grid_item(0); i - gl_LocalInvocationIndex < of.y; i = grid_item(++k)) open(i, of, level);
 }

@@ -8,6 +8,10 @@ void main() {
     for (uint l = gl_LocalInvocationIndex; l < LEVELS_AT_MOST; l += gl_WorkGroupSize.x) {
         levels.count[l] = l == 0 && there_is ? 1 : 0;
     }
+    if (gl_LocalInvocationIndex == 0) {
+        levels.first[0] = 0;
+        levels.end = 0;
+    }
     // A tree that is a leaf has no slot: the first one then stands for it.
     if (gl_LocalInvocationIndex == 0) opened.node[0] = Opened(is_inner(header.root) ? header.root.index : 0, 0);
 }

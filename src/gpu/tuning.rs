@@ -59,6 +59,11 @@ pub struct Tuning {
     pub scan_rounds: u32,
     /// Items that an invocation takes which measures a tree (`quality`, `epo`).
     pub measure_rounds: u32,
+    /// Whether an invocation's few values that are asked for by a number are chosen among by comparisons, which keeps them in
+    /// registers: a GPU has arrays with an index in memory.
+    pub in_registers: bool,
+    /// Wide nodes up to which one workgroup opens all levels of a tree: a dispatch a level costs more.
+    pub wide_alone: u32,
     /// The radix sort's cut.
     pub sort: Shape,
     /// Builds.
@@ -92,6 +97,8 @@ pub struct BuildTuning {
     pub small_digit_bits: u32,
     /// Items that an invocation of reinsertion's passes takes.
     pub reinsertion_rounds: u32,
+    /// Entries of a reinsertion's stack in shared memory; the others are private.
+    pub reinsertion_shared: u32,
     /// Invocations of a workgroup that re-braids by itself.
     pub rebraid_group: u32,
 }
@@ -160,6 +167,8 @@ impl Tuning {
             reduce_rounds: 64,
             scan_rounds: 32,
             measure_rounds: 64,
+            in_registers: false,
+            wide_alone: 256,
             sort: Shape::strips(limits),
             build: BuildTuning {
                 run: 32,
@@ -172,6 +181,7 @@ impl Tuning {
                 small: 2048,
                 small_digit_bits: 4,
                 reinsertion_rounds: 64,
+                reinsertion_shared: 0,
                 rebraid_group: group,
             },
             // As many slots as there are bits in a word, so that siblings meet in one; half of that for structures that are over
@@ -200,6 +210,8 @@ impl Tuning {
             reduce_rounds: 8,
             scan_rounds: 8,
             measure_rounds: 4,
+            in_registers: true,
+            wide_alone: 1024,
             sort: Shape::tiles(limits),
             build: BuildTuning {
                 run: 1,
@@ -211,6 +223,8 @@ impl Tuning {
                 small_digit_bits: 4,
                 // A search is long: it is an invocation's only one, as far as there are invocations.
                 reinsertion_rounds: 1,
+                // 8 KiB a workgroup: few searches put off more.
+                reinsertion_shared: 16,
                 rebraid_group: at_most(128),
             },
             refit: RefitTuning { run: 4, short_run: 4, small: 4096 },

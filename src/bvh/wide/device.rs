@@ -7,6 +7,7 @@ use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::node_slots;
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::{Context, Grid, Kernel, Recorder, fill, scan, shaders};
+use std::ops::Range;
 
 /// What is collapsed into what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,16 +27,18 @@ pub struct OnDevice {
     count: u32,
     grid: Grid,
     few: u32,
+    alone: u32,
+    in_registers: bool,
     scan: scan::Scan,
 }
 
-/// Levels from the root on that one workgroup opens: not more than a few hundred nodes. And how many are opened by many
-/// workgroups, a dispatch each; whatever is below is done by one workgroup again. Trees of scenes have ended by then.
+/// Levels from the root on that one workgroup opens: not more than a few hundred nodes.
 const FIRST_LEVELS: u32 = 3;
+/// Levels, at most, that are above those that one workgroup opens at the end.
 const LEVELS: u32 = 16;
 
 /// Words of `Levels` in wide_collapse.glsl.
-const LEVEL_WORDS: u64 = 64;
+const LEVEL_WORDS: u64 = 64 + 65 + 1;
 
 push_constants! {
     struct Arguments {
@@ -69,9 +72,17 @@ struct Scratch {
 impl OnDevice {
     /// For a source built of `primitive_count` primitives, or of fewer.
     pub fn new(context: &Context, options: &Options, primitive_count: u32) -> OnDevice {
-        let few = context.tuning.group;
+        let tuning = &context.tuning;
         let scan = scan::Scan::new(context, node_slots(primitive_count) + 1);
-        OnDevice { options: *options, count: primitive_count, grid: Grid::of(context), few, scan }
+        OnDevice {
+            options: *options,
+            count: primitive_count,
+            grid: Grid::of(context),
+            few: tuning.group,
+            alone: tuning.wide_alone,
+            in_registers: tuning.in_registers,
+            scan,
+        }
     }
 
     /// Bytes of the wide structure, at most (its header tells how many are in use: [`Form::bytes_in_use`]), and of the scratch
@@ -109,7 +120,20 @@ impl OnDevice {
     fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
         let workgroup = if one_workgroup(shader) { self.few } else { self.grid.workgroup };
         let Options { form, .. } = self.options;
-        Kernel::new(shader, workgroup, &[self.grid.rounds, form.width(), u32::from(form.is_quantised())])
+        let [quantised, in_registers] = [form.is_quantised(), self.in_registers].map(u32::from);
+        Kernel::new(shader, workgroup, &[self.grid.rounds, form.width(), quantised, in_registers])
+    }
+
+    /// The levels that are opened by many workgroups, a dispatch each. Those before and behind are done by one workgroup, which
+    /// ends where the tree does; trees of scenes have ended by then. No dispatches for a tree that is small at all.
+    fn levels_by_many(&self) -> Range<u32> {
+        let nodes = self.options.form.nodes_at_most(self.count);
+        if nodes <= self.alone {
+            return 0..0;
+        }
+        // A full tree has as many levels as the logarithm; trees of scenes have less than twice that.
+        let full = nodes.ilog2() / self.options.form.width().ilog2() + 1;
+        FIRST_LEVELS..(2 * full).clamp(FIRST_LEVELS, LEVELS)
     }
 
     /// The kernels of its own that [`OnDevice::record`] dispatches, to make their pipelines ahead with [`Context::warm`].
@@ -156,10 +180,10 @@ impl OnDevice {
         recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RESET), &arguments, 1)?;
         let few = |level, level_end| (&shaders::BVH_WIDE_OPEN_FEW, Arguments { level, level_end, ..arguments }, 1);
         let many = |level| (&shaders::BVH_WIDE_OPEN, Arguments { level, ..arguments }, self.grid.groups);
-        let levels = (FIRST_LEVELS..LEVELS).map(many);
-        for (shader, arguments, groups) in
-            [few(0, FIRST_LEVELS)].into_iter().chain(levels).chain([few(LEVELS, form.levels())])
-        {
+        let by_many = self.levels_by_many();
+        let first = Some(few(0, by_many.start)).filter(|_| by_many.start > 0);
+        let last = few(by_many.end, form.levels());
+        for (shader, arguments, groups) in first.into_iter().chain(by_many.map(many)).chain([last]) {
             recorder.barrier();
             recorder.dispatch(&self.kernel(shader), &arguments, groups)?;
         }
