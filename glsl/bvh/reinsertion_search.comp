@@ -4,6 +4,8 @@
 
 // Subtrees that are put off; what does not find room is not looked at.
 const uint STACK = 32;
+// Of those, the first that lie in shared memory: a GPU has an invocation's own arrays far away.
+layout(constant_id = 2) const uint SHARED_ENTRIES = 0;
 // A gain counts if it is more than this share of the pivot's area (less may be rounding) and more than this (less may be made of
 // numbers that devices take for zero).
 const float LEAST_SHARE = 1.0 / 1048576.0;
@@ -25,6 +27,20 @@ struct Below {
     uint slot;
     float saved;
 };
+
+const uint SHARED_SIZE = SHARED_ENTRIES == 0 ? 1 : SHARED_ENTRIES * gl_WorkGroupSize.x;
+shared Below put_off_first[SHARED_SIZE];
+Below put_off[STACK];
+
+void put(uint at, Below b) {
+    if (at < SHARED_ENTRIES) put_off_first[at * gl_WorkGroupSize.x + gl_LocalInvocationIndex] = b;
+    else put_off[at] = b;
+}
+
+Below take(uint at) {
+    if (at < SHARED_ENTRIES) return put_off_first[at * gl_WorkGroupSize.x + gl_LocalInvocationIndex];
+    return put_off[at];
+}
 
 float bar(Search s) {
     return max(s.best_gain, s.least);
@@ -51,7 +67,6 @@ Below look(inout Search s, uint at, Child child, float saved) {
 
 // Into the subtree on the other side of the pivot.
 void search_below(inout Search s, Below next) {
-    Below stack[STACK];
     uint height = 0;
     for (uint visits = 0; visits < link_count; ++visits) {
         if (may_gain(s, next)) {
@@ -64,11 +79,11 @@ void search_below(inout Search s, Below next) {
                 far = right;
                 near = left;
             }
-            if (may_gain(s, far) && height < STACK) stack[height++] = far;
-            if (may_gain(s, near) && height < STACK) stack[height++] = near;
+            if (may_gain(s, far) && height < STACK) put(height++, far);
+            if (may_gain(s, near) && height < STACK) put(height++, near);
         }
         if (height == 0u) break;
-        next = stack[--height];
+        next = take(--height);
     }
 }
 

@@ -98,6 +98,8 @@ push_constants! {
 
 /// Bytes of `Move` in reinsertion.glsl.
 const MOVE_BYTES: u64 = 12;
+/// Bytes of an entry of a search's stack, `Below` in reinsertion_search.comp.
+const ENTRY_BYTES: u32 = 8;
 
 /// Rounds of reinsertion, for one device and a number of primitives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,14 +108,20 @@ pub struct Reinsertion {
     stride: u32,
     rounds: u32,
     grid: Grid,
+    shared: u32,
 }
 
 impl Reinsertion {
     /// For structures of `primitive_count` primitives.
     pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Reinsertion {
-        let grid = Grid { rounds: context.tuning.build.reinsertion_rounds, ..Grid::of(context) };
+        let tuning = &context.tuning;
+        // As many invocations as the grid has, in workgroups small enough for their stacks.
+        let groups = tuning.grid.groups * (tuning.grid.workgroup / tuning.small_group);
+        let grid = Grid { workgroup: tuning.small_group, groups, rounds: tuning.build.reinsertion_rounds };
+        let bytes = ENTRY_BYTES * tuning.small_group;
+        let shared = tuning.build.reinsertion_shared.min(context.limits.shared_memory / bytes).min(STACK as u32);
         let slots = node_slots(primitive_count);
-        Reinsertion { slots, stride: options.stride_for(slots), rounds: options.rounds_for(slots), grid }
+        Reinsertion { slots, stride: options.stride_for(slots), rounds: options.rounds_for(slots), grid, shared }
     }
 
     fn link_count(&self) -> u32 {
@@ -130,7 +138,11 @@ impl Reinsertion {
     /// [`crate::gpu::Context::warm`].
     pub fn kernels(&self) -> Vec<Kernel> {
         let shaders = [&shaders::BVH_REINSERTION_PARENTS].into_iter().chain(STEPS);
-        shaders.map(|shader| self.grid.kernel(shader)).collect()
+        shaders.map(|shader| self.kernel(shader)).collect()
+    }
+
+    fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
+        Kernel::new(shader, self.grid.workgroup, &[self.grid.rounds, self.shared])
     }
 
     /// Records all rounds on the structure at address `structure`, in place, with scratch memory at address `scratch`; both aligned
@@ -156,7 +168,7 @@ impl Reinsertion {
             link_count: self.link_count(),
             padding: 0,
         };
-        let step = |shader, offset| Step::new(PHASE, self.grid.kernel(shader), &arguments(offset), self.grid.groups);
+        let step = |shader, offset| Step::new(PHASE, self.kernel(shader), &arguments(offset), self.grid.groups);
         let round = |round: u32| {
             let unlock = fill::step(PHASE, scratch + words, 2 * self.slots, 0);
             [unlock].into_iter().chain(STEPS.map(|shader| step(shader, round % self.stride)))
