@@ -7,7 +7,7 @@
 // A slot is part of the tree if climbing from it reaches the root; the climb is its depth. Sums are taken in a fixed order:
 // the figures are the same on every run.
 //
-// needs  one barrier between each two; any subgroup size; at most 128 subgroups a workgroup
+// needs  one barrier between each two; any subgroup size; 36 bytes of shared memory an invocation
 #ifndef HEDGEROW_BVH_QUALITY
 #define HEDGEROW_BVH_QUALITY
 #include "gpu/pass.glsl"

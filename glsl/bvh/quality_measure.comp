@@ -2,7 +2,8 @@
 // The figures of a tile of node slots: see bvh/quality.glsl for the contract.
 #include "bvh/quality.glsl"
 
-shared Figures partial[128];
+// As many subgroups as there may be: they may be smaller than the device reports.
+shared Figures partial[gl_WorkGroupSize.x];
 
 // The figures of the node at `slot` and of the leaves below it; none if it is not part of the tree.
 Figures figures_of(uint slot, Child root, float scale) {

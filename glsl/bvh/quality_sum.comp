@@ -2,7 +2,7 @@
 // The sum of the tiles' figures, over the root's area: see bvh/quality.glsl for the contract.
 #include "bvh/quality.glsl"
 
-shared Figures partial[256];
+shared Figures partial[gl_WorkGroupSize.x];
 
 void main() {
     Figures sum = no_figures();

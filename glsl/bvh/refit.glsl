@@ -144,9 +144,12 @@ uint end_of(Work w, uint first, uint count) {
 
 // The box of the records first..end, made anew by all lanes of the subgroup together.
 Box refit_together(Work w, uint first, uint end, inout uint status) {
+    // Whatever lanes there are: the real subgroup may be smaller than the device reports.
+    uvec4 lanes = subgroupBallot(true);
+    uint rank = subgroupBallotExclusiveBitCount(lanes), count = subgroupBallotBitCount(lanes);
     Box b = empty_box();
-    for (uint position = first + gl_SubgroupInvocationID; position < end; position += gl_SubgroupSize) {
-        b = box_around(b, refit_record(w, position, status));
+    for (uint round = first; round < end; round += count) {
+        if (round + rank < end) b = box_around(b, refit_record(w, round + rank, status));
     }
     return Box(subgroupMin(b.lo), subgroupMax(b.hi));
 }

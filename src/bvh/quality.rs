@@ -89,7 +89,9 @@ push_constants! {
 impl OnDevice {
     /// For a structure of `primitive_count` triangles.
     pub fn new(context: &Context, primitive_count: u32) -> OnDevice {
-        let (workgroup, rounds) = (context.tuning.group, context.tuning.measure_rounds);
+        // Figures of every invocation lie in shared memory.
+        let most = context.limits.shared_memory / size_of::<Figures>() as u32;
+        let (workgroup, rounds) = (context.tuning.group.min(most), context.tuning.measure_rounds);
         OnDevice { slots: node_slots(primitive_count), workgroup, rounds }
     }
 
