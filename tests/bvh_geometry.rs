@@ -83,6 +83,28 @@ fn several_geometries_are_one_after_the_other() {
     assert_as_on_the_host(&many, 0);
 }
 
+/// Vertices are found by address: numbers of bytes and of floats before them need more than 32 bits.
+#[test]
+fn vertices_behind_four_billion_bytes_are_found() {
+    let corners: Corners = soup(200, 0.3, 9);
+    let positions: Vec<[f32; 3]> = corners.into_iter().flatten().collect();
+    let count = positions.len() as u32;
+    let vertices = device().upload("positions", &positions).expect("memory");
+    let tree = |first: u32| {
+        let triangles: Vec<u32> = (0..count).map(|v| first + v).collect();
+        let indices = device().upload("indices", &triangles).expect("memory");
+        // Where vertex 0 would lie; nobody reads it.
+        let begin = vertices.address().wrapping_sub(12 * u64::from(first));
+        let options = Options { codes: Some(Code::Emc64Var.full()), ..Options::DEFAULT };
+        built(&options, &Input::mesh(begin, first + count, indices.address(), count / 3))
+    };
+    let expected = tree(0);
+    assert_eq!(expected.header.active, 200);
+    for first in [u32::MAX / 12, u32::MAX / 3, u32::MAX - count] {
+        assert_same(&tree(first), &expected, &format!("from vertex {first} on"));
+    }
+}
+
 /// Numbers that 16 bits and two components hold exactly give the same hierarchy as the same numbers in 32 bits.
 #[test]
 fn the_same_triangles_in_other_formats_are_the_same_tree() {

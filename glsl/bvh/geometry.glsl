@@ -90,7 +90,7 @@ vec3 any_vertex_at(Geometry g, uint index) {
     vec3 v = vec3(0);
     for (uint k = 0; k < 3; ++k) {
         if (k < components) {
-            uint bits = bits_at(address_of(at, k, kind == COMPONENT_FLOAT ? 4u : 2u)) ;
+            uint bits = bits_at(address_of(at, k, kind == COMPONENT_FLOAT ? 4u : 2u));
             v[k] = kind == COMPONENT_FLOAT ? uintBitsToFloat(bits) : kind == COMPONENT_HALF ? from_half(bits & 0xFFFFu) : from_snorm(bits);
         }
     }
@@ -105,9 +105,9 @@ vec3 any_vertex_at(Geometry g, uint index) {
 
 vec3 vertex_at(Geometry g, uint index) {
     if (SOURCE != SOURCE_MESH) return any_vertex_at(g, index);
-    Floats positions = Floats(g.vertices);
-    uint at = index * (g.vertex_stride >> 2);
-    return vec3(positions.value[at], positions.value[at + 1], positions.value[at + 2]);
+    // By address: vertices of more than 8 GiB have numbers of floats that no index has.
+    Floats position = Floats(address_of(g.vertices, index, g.vertex_stride));
+    return vec3(position.value[0], position.value[1], position.value[2]);
 }
 
 // The last geometry that begins at the primitive or before; `g` names the records and, in `vertex_count`, how many they are.
