@@ -64,6 +64,9 @@ void reset_split() {
     state.primitive_count = primitive_count;
 }
 
+// Of a workgroup of several subgroups: the least corner, and the greatest.
+shared uint group_bounds[6];
+
 void find_split_bounds(uint task) {
     SplitState state = state_of_split();
     Geometry given = triangles_given();
@@ -80,11 +83,28 @@ void find_split_bounds(uint task) {
     }
     lo = subgroupMin(lo);
     hi = subgroupMax(hi);
+    if (gl_NumSubgroups == 1u) {
+        if (subgroupElect()) {
+            for (uint axis = 0; axis < 3; ++axis) {
+                atomicMin(state.lo[axis], lo[axis]);
+                atomicMax(state.hi[axis], hi[axis]);
+            }
+        }
+        return;
+    }
+    // Six atomics a workgroup: all of the device's meet at the same line of memory.
+    for (uint i = gl_LocalInvocationIndex; i < 6; i += gl_WorkGroupSize.x) group_bounds[i] = i < 3 ? 0xFFFFFFFFu : 0;
+    barrier();
     if (subgroupElect()) {
         for (uint axis = 0; axis < 3; ++axis) {
-            atomicMin(state.lo[axis], lo[axis]);
-            atomicMax(state.hi[axis], hi[axis]);
+            atomicMin(group_bounds[axis], lo[axis]);
+            atomicMax(group_bounds[3 + axis], hi[axis]);
         }
+    }
+    barrier();
+    for (uint i = gl_LocalInvocationIndex; i < 6; i += gl_WorkGroupSize.x) {
+        if (i < 3) atomicMin(state.lo[i], group_bounds[i]);
+        else atomicMax(state.hi[i - 3], group_bounds[i]);
     }
 }
 
