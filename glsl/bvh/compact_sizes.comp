@@ -17,7 +17,8 @@ void sum(Places places, uint root, uint slot) {
             places.place[parent].left = (up & IS_RIGHT) != 0u ? other : size;
         }
         size += 1 + other;
-        places.place[parent].size = size;
+        // The sibling may have come by: atomic, as its exchange was.
+        atomicStore(places.place[parent].size, size, gl_ScopeDevice, 0, 0);
         slot = parent;
     }
 }
