@@ -185,7 +185,7 @@ impl Build {
                     // The records of one chain touch no memory of each other's: the barriers between them are not needed, and
                     // geometries whose ranges lie in device memory are few.
                     let mut steps = record_steps(&all, scratch);
-                    let kernel = Kernel::new(&shaders::ACCEL_RANGES, 1, &[]);
+                    let kernel = Kernel::new(&shaders::ACCEL_RANGES, context.tuning.small_group, &[]);
                     steps.push(Step::new("geometries", kernel, &arguments, 1));
                     vec![steps]
                 }
