@@ -145,7 +145,9 @@ impl OnDevice {
             &shaders::BVH_WIDE_NODES,
             &shaders::BVH_WIDE_RECORDS,
         ];
-        all.map(|shader| self.kernel(shader)).to_vec()
+        let is_used =
+            |shader: &&shaders::Shader| shader.name != shaders::BVH_WIDE_OPEN.name || !self.levels_by_many().is_empty();
+        all.into_iter().filter(is_used).map(|shader| self.kernel(shader)).collect()
     }
 
     /// Records the collapsing of the `Bvh2` at address `source` into the wide tree at `target`, with scratch memory at
