@@ -116,7 +116,8 @@ impl Reinsertion {
     pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Reinsertion {
         let tuning = &context.tuning;
         // As many invocations as the grid has, in workgroups small enough for their stacks.
-        let groups = tuning.grid.groups * (tuning.grid.workgroup / tuning.small_group);
+        let groups = tuning.grid.groups * (tuning.grid.workgroup / tuning.small_group).max(1);
+        let groups = groups.min(context.limits.workgroup_count);
         let grid = Grid { workgroup: tuning.small_group, groups, rounds: tuning.build.reinsertion_rounds };
         let bytes = ENTRY_BYTES * tuning.small_group;
         let shared = tuning.build.reinsertion_shared.min(context.limits.shared_memory / bytes).min(STACK as u32);
