@@ -6,7 +6,8 @@
 #   make bench-peers   the same on Mesa 26, whose ray queries are a peer, beside CPU crates
 #   make stability     where methods give way: report/growth.html, report/large.html, report/degenerate.html
 #   make test          the test suite, under a bound in time: a shader that hangs would hang with it
-#   make test-lanes    the suite on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
+#   make test-gpu      the suite with work cut as for a GPU, and a part of it with subgroups of 4 and 16
+#   make test-lanes    the suite by either tuning on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
 #   make check         formatting, lints and docs, warnings denied
 #   make prebuilt      compiles glsl/ into glsl/prebuilt/, for builds without the feature compile-shaders
 #   make portable      a folder OUT that runs on any machine with a Vulkan driver: scripts/portable.sh
@@ -44,11 +45,13 @@ WITHIN := $(if $(shell command -v timeout),timeout --kill-after 10 $(TEST_BOUND)
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 RUN := $(WITHIN) $(CARGO) $(if $(NEXTEST),nextest run,test) --release
 SUITE := $(RUN) --features $(FEATURES)
+# Tests of what depends on how many lanes a subgroup has.
+WIDTH_TESTS := gpu_radix_sort gpu_scan_reduce bvh_codes bvh_lbvh bvh_methods bvh_wide bvh_refit accel_rebraid kdtree_device
 # The libraries for C, as their users build them: without the binary and the shader compiler.
 CAPI := -p hedgerow-capi
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
-.PHONY: bench bench-all bench-peers stability test test-lanes check prebuilt portable install-c setup
+.PHONY: bench bench-all bench-peers stability test test-gpu test-lanes check prebuilt portable install-c setup
 
 bench: setup
 	$(CARGO) build --release --features $(FEATURES)
@@ -81,12 +84,18 @@ test: setup
 	$(CARGO) test --release $(CAPI) --no-run
 	$(RUN) $(CAPI)
 
+# What `make test` has on a CPU is the tuning of CPUs; every branch for GPUs runs here. lavapipe alone reads the width.
+test-gpu: setup
+	$(CARGO) test --release --features $(FEATURES) --no-run
+	HEDGEROW_TUNING=gpu $(SUITE)
+	HEDGEROW_TUNING=gpu LP_NATIVE_VECTOR_WIDTH=128 $(SUITE) $(addprefix --test ,$(WIDTH_TESTS))
+	HEDGEROW_TUNING=gpu LP_NATIVE_VECTOR_WIDTH=512 $(SUITE) $(addprefix --test ,$(WIDTH_TESTS))
+
 # lavapipe alone reads these variables; subgroups of 8 and two workgroups at a time are what `make test` has on most machines.
 test-lanes: setup
 	$(CARGO) test --release --features $(FEATURES) --no-run
-	LP_NATIVE_VECTOR_WIDTH=128 $(SUITE)
-	LP_NATIVE_VECTOR_WIDTH=512 $(SUITE)
-	LP_NUM_THREADS=1 $(SUITE)
+	for tuning in cpu gpu; do for lanes in LP_NATIVE_VECTOR_WIDTH=128 LP_NATIVE_VECTOR_WIDTH=512 LP_NUM_THREADS=1; do \
+		env HEDGEROW_TUNING=$$tuning $$lanes $(SUITE) || exit 1; done; done
 
 check: setup
 	cargo fmt --all --check
