@@ -3,6 +3,7 @@
 mod common;
 
 use common::{corpus::unit_floats, device};
+use hedgerow::gpu::fill;
 use hedgerow::gpu::reduce::{self, Bounds, Reduction};
 use hedgerow::gpu::scan::{self, Buffers, Scan};
 use proptest::prelude::*;
@@ -54,4 +55,27 @@ proptest! {
     fn any_words_scan(values in prop::collection::vec(any::<u32>(), 0..3000)) {
         scan_equals_its_twin(&values);
     }
+}
+
+/// Of a device that takes few workgroups along x, rows of them and what is left behind.
+#[test]
+fn a_dispatch_may_have_more_workgroups_than_the_device_takes_along_x() {
+    let device = device();
+    let row = device.limits.workgroup_count;
+    if row > 1 << 16 {
+        return eprintln!("{} takes {row} workgroups along x: no dispatch of ours has more", device.limits.name);
+    }
+    // Two rows and three workgroups of 1,024 words, the last not full.
+    let count = 1024 * (2 * row + 3) - 5;
+    let words = device.buffer("words", 4 * u64::from(count + 1)).unwrap();
+    words.write(&[0u32; 1]);
+    device
+        .run(None, |recorder| {
+            fill::record(recorder, words.address() + 4 * u64::from(count), 1, 3)?;
+            fill::record(recorder, words.address(), count, 7)
+        })
+        .unwrap();
+    let got = words.read::<u32>(count as usize + 1);
+    assert_eq!(got.iter().position(|&word| word != 7), Some(count as usize), "the fill ends where it shall");
+    assert_eq!(got[count as usize], 3, "nothing behind it is written");
 }

@@ -41,7 +41,7 @@ Entry entry_of(uvec2 given_at, uint i) {
 }
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_number();
     if (i >= capacity) return;
     uint there = count;
     uvec2 from = instances;

@@ -52,7 +52,7 @@ uvec2 property_of(Header header) {
 }
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_number();
     if (i >= count) return;
     Header header = Structure(structures[i]).header;
     // Of what is no structure: those of the structure that a copy of it is.

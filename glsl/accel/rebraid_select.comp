@@ -3,5 +3,5 @@
 #include "accel/rebraid.glsl"
 
 void main() {
-    rebraid_select(first_round, gl_WorkGroupID.x);
+    rebraid_select(first_round, group_number());
 }

@@ -7,7 +7,7 @@ void main() {
     bool is_sound = is_structure(header);
     if (!is_sound) header = header_of_wrong_version();
     uint handles = handle_count(header);
-    if (gl_GlobalInvocationID.x == 0) {
+    if (invocation_number() == 0) {
         for (uint i = 0; i < 8; ++i) memory.head.version[i] = is_sound ? version[i] : 0;
         memory.head.serialized_bytes = serialized_bytes(header);
         memory.head.structure_bytes = structure_bytes(header);

@@ -3,5 +3,5 @@
 #include "bvh/collapse.glsl"
 
 void main() {
-    collapse_above(gl_WorkGroupID.x);
+    collapse_above(group_number());
 }

@@ -3,5 +3,5 @@
 #include "bvh/collapse.glsl"
 
 void main() {
-    collapse_parents(gl_WorkGroupID.x);
+    collapse_parents(group_number());
 }

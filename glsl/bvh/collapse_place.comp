@@ -3,5 +3,5 @@
 #include "bvh/collapse.glsl"
 
 void main() {
-    collapse_place(gl_WorkGroupID.x);
+    collapse_place(group_number());
 }

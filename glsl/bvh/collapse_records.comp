@@ -3,5 +3,5 @@
 #include "bvh/collapse.glsl"
 
 void main() {
-    collapse_records(gl_WorkGroupID.x);
+    collapse_records(group_number());
 }

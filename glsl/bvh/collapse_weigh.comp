@@ -3,5 +3,5 @@
 #include "bvh/collapse.glsl"
 
 void main() {
-    collapse_weigh(gl_WorkGroupID.x);
+    collapse_weigh(group_number());
 }

@@ -8,7 +8,7 @@ void main() {
         write_wrong_version(target);
         return;
     }
-    if (gl_GlobalInvocationID.x == 0) {
+    if (invocation_number() == 0) {
         target.header = compacted(header);
         if (compacted(header).inner_nodes == 0) mark_unused(target, 0);
     }

@@ -30,14 +30,14 @@ uvec2 structure_bytes(Header header) {
 // indices into memory are signed and end at 2^31.
 void copy_bytes(uvec2 from, uvec2 to, uvec2 bytes) {
     uint pairs = bytes.x >> 3 | bytes.y << 29;
-    for (uint first = gl_WorkGroupID.x * grid_piece(); first < pairs; first += gl_NumWorkGroups.x * grid_piece()) {
+    for (uint first = group_number() * grid_piece(); first < pairs; first += gl_NumWorkGroups.x * grid_piece()) {
         Pairs source = Pairs(address_of(from, first, 8));
         Pairs target = Pairs(address_of(to, first, 8));
         for (uint i = gl_LocalInvocationIndex; i < min(grid_piece(), pairs - first); i += gl_WorkGroupSize.x) {
             target.pair[i] = source.pair[i];
         }
     }
-    if ((bytes.x & 4u) != 0u && gl_GlobalInvocationID.x == 0) {
+    if ((bytes.x & 4u) != 0u && invocation_number() == 0) {
         Words(address_of(to, pairs, 8)).word[0] = Words(address_of(from, pairs, 8)).word[0];
     }
 }
@@ -51,7 +51,7 @@ Header header_of_wrong_version() {
 
 // One invocation of the dispatch writes it.
 void write_wrong_version(Structure structure) {
-    if (gl_GlobalInvocationID.x != 0) return;
+    if (invocation_number() != 0) return;
     structure.header = header_of_wrong_version();
     mark_unused(structure, 0);
 }

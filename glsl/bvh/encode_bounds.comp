@@ -3,5 +3,5 @@
 #include "bvh/encode.glsl"
 
 void main() {
-    find_bounds(gl_WorkGroupID.x);
+    find_bounds(group_number());
 }

@@ -3,5 +3,5 @@
 #include "bvh/encode.glsl"
 
 void main() {
-    count_cells(gl_WorkGroupID.x);
+    count_cells(group_number());
 }

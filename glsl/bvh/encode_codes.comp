@@ -3,5 +3,5 @@
 #include "bvh/encode.glsl"
 
 void main() {
-    encode(gl_WorkGroupID.x);
+    encode(group_number());
 }

@@ -27,8 +27,8 @@ void main() {
     Triangles triangles = triangles_of(structure);
 
     uint tile = gl_WorkGroupSize.x * rounds;
-    uint next = gl_WorkGroupID.x * tile + gl_LocalInvocationIndex;
-    uint end = min(count, (gl_WorkGroupID.x + 1) * tile);
+    uint next = group_number() * tile + gl_LocalInvocationIndex;
+    uint end = min(count, (group_number() + 1) * tile);
     uint stack[STACK];
     uint waiting = 0;         // entries of the stack
     uint path = NONE;         // what names the node or leaf that the climb has come to

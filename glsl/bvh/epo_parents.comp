@@ -13,7 +13,7 @@ void tell(Child child, uint slots, uint records, uint name) {
 
 void main() {
     uint slots = structure.header.node_slots, records = structure.header.primitive_count;
-    uint begin = first + gl_WorkGroupID.x * gl_WorkGroupSize.x * rounds + gl_LocalInvocationIndex;
+    uint begin = first + group_number() * gl_WorkGroupSize.x * rounds + gl_LocalInvocationIndex;
     for (uint round = 0; round < rounds; ++round) {
         uint slot = begin + round * gl_WorkGroupSize.x;
         if (slot < slots && structure.nodes[slot].left.count != UNUSED) {

@@ -4,7 +4,7 @@
 
 void main() {
     uint kept = max((count + 63) / 64, 1);
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_number();
     if (i >= kept) return;
     vec3 sum = vec3(0.0);
     for (uint k = i; k < count; k += kept) sum += sums.of[k];

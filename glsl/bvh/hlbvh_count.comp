@@ -3,5 +3,5 @@
 #include "bvh/hlbvh_treelets.glsl"
 
 void main() {
-    hlbvh_count(gl_WorkGroupID.x);
+    hlbvh_count(group_number());
 }

@@ -5,5 +5,5 @@
 void main() {
     // The sort, which has run, has left the word free.
     uint level = columns, tasks = task_count(level);
-    for (uint i = gl_WorkGroupID.x; i < tasks; i += gl_NumWorkGroups.x) hlbvh_finish(i, level);
+    for (uint i = group_number(); i < tasks; i += gl_NumWorkGroups.x) hlbvh_finish(i, level);
 }

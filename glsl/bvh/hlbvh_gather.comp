@@ -3,5 +3,5 @@
 #include "bvh/hlbvh_treelets.glsl"
 
 void main() {
-    hlbvh_gather(gl_WorkGroupID.x);
+    hlbvh_gather(group_number());
 }

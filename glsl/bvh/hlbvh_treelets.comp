@@ -3,5 +3,5 @@
 #include "bvh/hlbvh_treelets.glsl"
 
 void main() {
-    hlbvh_treelets(gl_WorkGroupID.x);
+    hlbvh_treelets(group_number());
 }

@@ -4,5 +4,5 @@
 
 void main() {
     uint tiles = tiles_of(treelet_count());
-    for (uint task = gl_WorkGroupID.x; task < tiles; task += gl_NumWorkGroups.x) hlbvh_weigh(task);
+    for (uint task = group_number(); task < tiles; task += gl_NumWorkGroups.x) hlbvh_weigh(task);
 }

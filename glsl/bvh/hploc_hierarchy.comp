@@ -3,5 +3,5 @@
 #include "bvh/hploc.glsl"
 
 void main() {
-    hploc_hierarchy(gl_WorkGroupID.x);
+    hploc_hierarchy(group_number());
 }

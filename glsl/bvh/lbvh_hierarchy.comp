@@ -3,5 +3,5 @@
 #include "bvh/lbvh.glsl"
 
 void main() {
-    lbvh_hierarchy(gl_WorkGroupID.x);
+    lbvh_hierarchy(group_number());
 }

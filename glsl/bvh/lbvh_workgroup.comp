@@ -37,7 +37,7 @@ uvec2 take(inout uvec2 at, uint bytes) {
 }
 
 void main() {
-    Small build = given.builds[gl_WorkGroupID.x];
+    Small build = given.builds[group_number()];
     vertices = build.vertices;
     indices = build.indices;
     transform = build.transform;

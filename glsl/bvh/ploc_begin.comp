@@ -3,5 +3,5 @@
 #include "bvh/ploc.glsl"
 
 void main() {
-    ploc_begin(gl_WorkGroupID.x);
+    ploc_begin(group_number());
 }

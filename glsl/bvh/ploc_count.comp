@@ -7,5 +7,5 @@ layout(constant_id = 8) const uint ROUND = 0;
 
 void main() {
     uint tiles = tiles_of(clusters_in(ROUND));
-    for (uint task = gl_WorkGroupID.x; task < tiles; task += gl_NumWorkGroups.x) ploc_count(task, ROUND);
+    for (uint task = group_number(); task < tiles; task += gl_NumWorkGroups.x) ploc_count(task, ROUND);
 }

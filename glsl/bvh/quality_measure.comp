@@ -28,7 +28,7 @@ void main() {
     Child root = structure.header.root;
     uint slots = structure.header.active_count == 0 || root.count != 0 ? 0 : structure.header.node_slots;
     float scale = scale_of(root);
-    uint first = gl_WorkGroupID.x * gl_WorkGroupSize.x * rounds + gl_LocalInvocationIndex;
+    uint first = group_number() * gl_WorkGroupSize.x * rounds + gl_LocalInvocationIndex;
     Figures sum = no_figures();
     for (uint round = 0; round < rounds; ++round) {
         uint slot = first + round * gl_WorkGroupSize.x;
@@ -47,6 +47,6 @@ void main() {
     barrier();
     if (gl_LocalInvocationIndex == 0) {
         for (uint s = 1; s < gl_NumSubgroups; ++s) add(sum, partial[s]);
-        partials.tile[gl_WorkGroupID.x] = sum;
+        partials.tile[group_number()] = sum;
     }
 }

@@ -3,7 +3,7 @@
 #include "bvh/quality.glsl"
 
 void main() {
-    uint first = gl_WorkGroupID.x * gl_WorkGroupSize.x * rounds + gl_LocalInvocationIndex;
+    uint first = group_number() * gl_WorkGroupSize.x * rounds + gl_LocalInvocationIndex;
     uint slots = structure.header.node_slots;
     for (uint round = 0; round < rounds; ++round) {
         uint slot = first + round * gl_WorkGroupSize.x;

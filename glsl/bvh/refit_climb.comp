@@ -3,5 +3,5 @@
 #include "bvh/refit.glsl"
 
 void main() {
-    refit_climb(updates[0], gl_WorkGroupID.x);
+    refit_climb(updates[0], group_number());
 }

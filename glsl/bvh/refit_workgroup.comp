@@ -6,7 +6,7 @@
 #include "bvh/refit.glsl"
 
 void main() {
-    Update update = updates[gl_WorkGroupID.x];
+    Update update = updates[group_number()];
     uint tile = gl_WorkGroupSize.x * RUN;
     uint tiles = (update.primitive_count + tile - 1u) / tile;
     for (uint task = 0; task < tiles; ++task) refit_leaves(update, task);

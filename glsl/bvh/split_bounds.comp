@@ -3,5 +3,5 @@
 #include "bvh/split.glsl"
 
 void main() {
-    find_split_bounds(gl_WorkGroupID.x);
+    find_split_bounds(group_number());
 }

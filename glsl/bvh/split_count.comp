@@ -3,5 +3,5 @@
 #include "bvh/split.glsl"
 
 void main() {
-    count_splits(gl_WorkGroupID.x);
+    count_splits(group_number());
 }

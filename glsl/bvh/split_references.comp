@@ -3,5 +3,5 @@
 #include "bvh/split.glsl"
 
 void main() {
-    write_references(gl_WorkGroupID.x);
+    write_references(group_number());
 }

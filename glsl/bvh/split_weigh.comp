@@ -3,5 +3,5 @@
 #include "bvh/split.glsl"
 
 void main() {
-    weigh_triangles(gl_WorkGroupID.x);
+    weigh_triangles(group_number());
 }

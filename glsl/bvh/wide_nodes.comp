@@ -84,7 +84,7 @@ void write_quantised_node(uint at, uint index, uint next_node, uint next_record)
 
 void main() {
     bool there_is = can_be_collapsed(source.header);
-    if (gl_GlobalInvocationID.x == 0) write_header(there_is);
+    if (invocation_number() == 0) write_header(there_is);
     uint count = levels.end;
     for (uint k = 0, at = grid_item(0); at < count; at = grid_item(++k)) {
         Opened o = opened.node[at];

@@ -14,7 +14,7 @@ layout(push_constant, scalar) uniform Arguments {
 };
 
 void main() {
-    uint first = gl_WorkGroupID.x * gl_WorkGroupSize.x * ROUNDS + gl_LocalInvocationIndex;
+    uint first = group_number() * gl_WorkGroupSize.x * ROUNDS + gl_LocalInvocationIndex;
     for (uint round = 0; round < ROUNDS; ++round) {
         uint i = first + round * gl_WorkGroupSize.x;
         if (i < count) words.word[i] = value;

@@ -13,6 +13,17 @@
 
 layout(local_size_x_id = 0) in;
 
+// A dispatch of more workgroups than a device takes along x has rows of as many as it takes: src/gpu/recorder.rs.
+layout(constant_id = 30) const uint GROUPS_OF_A_ROW = 65535;
+
+uint group_number() {
+    return gl_WorkGroupID.y * GROUPS_OF_A_ROW + gl_WorkGroupID.x;
+}
+
+uint invocation_number() {
+    return group_number() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+}
+
 // `nonprivate`: what one workgroup writes another may read within the same dispatch, ordered by the barriers below.
 #define BUFFER layout(buffer_reference, scalar, buffer_reference_align = 4) nonprivate buffer
 BUFFER Words { uint word[]; };

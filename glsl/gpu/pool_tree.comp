@@ -31,7 +31,7 @@ void main() {
         pool_finish(pool);
     }
     // Some drivers end long loops early, without a word.
-    if (gl_GlobalInvocationID.x == 0) {
+    if (invocation_number() == 0) {
         uint counted = 0;
         for (uint i = 0; i < loop_length; ++i) counted += visits.word[0] == 0 ? 0 : 1;
         loops.word[0] = counted;

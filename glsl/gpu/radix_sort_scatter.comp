@@ -17,5 +17,5 @@ layout(push_constant, scalar) uniform Arguments {
 
 void main() {
     Radix r = Radix(keys, values, keys_out, values_out, table, count, shift, columns, column_keys, identity != 0);
-    radix_scatter(r, gl_WorkGroupID.x);
+    radix_scatter(r, group_number());
 }

@@ -24,7 +24,7 @@ shared Bounds partial[128];
 
 void main() {
     Bounds around = Bounds(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
-    uint first = gl_WorkGroupID.x * gl_WorkGroupSize.x * rounds + gl_LocalInvocationIndex;
+    uint first = group_number() * gl_WorkGroupSize.x * rounds + gl_LocalInvocationIndex;
     for (uint round = 0; round < rounds; ++round) {
         uint i = first + round * gl_WorkGroupSize.x;
         if (i < count) {
@@ -39,6 +39,6 @@ void main() {
         for (uint s = 1; s < gl_NumSubgroups; ++s) {
             around = Bounds(min(around.lo, partial[s].lo), max(around.hi, partial[s].hi));
         }
-        results.bounds[gl_WorkGroupID.x] = around;
+        results.bounds[group_number()] = around;
     }
 }

@@ -3,7 +3,7 @@
 #include "gpu/scan.glsl"
 
 void main() {
-    uint tile = gl_WorkGroupID.x;
+    uint tile = group_number();
     uint tile_words = gl_WorkGroupSize.x * rounds;
     uint first = tile * tile_words;
     scan_range(values, results, first, min(count, first + tile_words), sums.word[tile]);

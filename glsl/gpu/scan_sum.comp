@@ -3,7 +3,7 @@
 #include "gpu/scan.glsl"
 
 void main() {
-    uint tile = gl_WorkGroupID.x;
+    uint tile = group_number();
     uint tile_words = gl_WorkGroupSize.x * rounds;
     uint sum = 0;
     for (uint round = 0; round < rounds; ++round) {

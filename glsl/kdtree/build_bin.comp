@@ -4,5 +4,5 @@
 
 void main() {
     uint chunks = build_state().binned_chunks[level];
-    for (uint i = gl_WorkGroupID.x; i < chunks; i += gl_NumWorkGroups.x) kd_bin_chunk(i, level);
+    for (uint i = group_number(); i < chunks; i += gl_NumWorkGroups.x) kd_bin_chunk(i, level);
 }

@@ -4,5 +4,5 @@
 
 void main() {
     uint items = PoolState(state_address).tasks[bin_phase(level) + 2u];
-    for (uint i = gl_WorkGroupID.x; i < items; i += gl_NumWorkGroups.x) kd_distribute(i, level);
+    for (uint i = group_number(); i < items; i += gl_NumWorkGroups.x) kd_distribute(i, level);
 }

@@ -3,5 +3,5 @@
 #include "kdtree/encode.glsl"
 
 void main() {
-    for (uint i = gl_WorkGroupID.x; i < tile_count(); i += gl_NumWorkGroups.x) kd_records(i);
+    for (uint i = group_number(); i < tile_count(); i += gl_NumWorkGroups.x) kd_records(i);
 }

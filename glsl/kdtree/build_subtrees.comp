@@ -5,5 +5,5 @@
 void main() {
     KdState state = build_state();
     uint count = PoolState(state_address).tasks[bin_phase(level)] - state.binned_chunks[level];
-    for (uint i = gl_WorkGroupID.x; i < count; i += gl_NumWorkGroups.x) kd_small(state.first_subtree[level] + i, level);
+    for (uint i = group_number(); i < count; i += gl_NumWorkGroups.x) kd_small(state.first_subtree[level] + i, level);
 }

@@ -39,5 +39,5 @@ void main() {
     // Of neighbouring objects: as many tiles as these primitives have.
     uint begin = first_record_of(first_tile), end = first_record_of(first_tile + chunks_of(primitive_count));
     Place root = root_place();
-    for (uint j = begin + gl_GlobalInvocationID.x; j < end; j += stride) kd_find(j, root);
+    for (uint j = begin + invocation_number(); j < end; j += stride) kd_find(j, root);
 }

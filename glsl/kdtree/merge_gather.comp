@@ -4,5 +4,5 @@
 
 void main() {
     uint marked = merge_state().marked_count;
-    for (uint m = gl_WorkGroupID.x; m < marked; m += gl_NumWorkGroups.x) kd_gather(m);
+    for (uint m = group_number(); m < marked; m += gl_NumWorkGroups.x) kd_gather(m);
 }

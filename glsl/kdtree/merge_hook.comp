@@ -4,5 +4,5 @@
 
 void main() {
     uint tiles = PoolState(state_address).tasks[PHASE_HOOK];
-    for (uint i = gl_WorkGroupID.x; i < tiles; i += gl_NumWorkGroups.x) kd_hook(i);
+    for (uint i = group_number(); i < tiles; i += gl_NumWorkGroups.x) kd_hook(i);
 }

@@ -4,5 +4,5 @@
 
 void main() {
     uint tiles = PoolState(state_address).tasks[PUSH_STEPS];
-    for (uint i = gl_WorkGroupID.x; i < tiles; i += gl_NumWorkGroups.x) kd_meet(i);
+    for (uint i = group_number(); i < tiles; i += gl_NumWorkGroups.x) kd_meet(i);
 }

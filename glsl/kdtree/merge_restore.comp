@@ -6,9 +6,9 @@ void main() {
     KdUndo kept = KdUndo(undo);
     KdStructure structure = KdStructure(structure_address);
     uint stride = gl_NumWorkGroups.x * gl_WorkGroupSize.x;
-    for (uint i = gl_GlobalInvocationID.x; i < kept.count; i += stride) {
+    for (uint i = invocation_number(); i < kept.count; i += stride) {
         uint slot = kept.undone[i].slot;
         if (slot != 0xFFFFFFFFu) structure.nodes[slot] = kept.undone[i].node;
     }
-    if (gl_GlobalInvocationID.x == 0u) structure.header = kept.header;
+    if (invocation_number() == 0u) structure.header = kept.header;
 }

@@ -272,7 +272,7 @@ void kd_small(uint s, uint of_level) {
     KdState state = build_state();
     // Behind the last one of a loop, no lane active, lavapipe of Mesa 26 still loads what is the same for all lanes.
     KdTask t = tasks_of(of_level).task[min(all_subtrees().subtree[s].task, task_capacity - 1u)];
-    KdStack stack = stack_of(gl_WorkGroupID.x);
+    KdStack stack = stack_of(group_number());
     float area_scale = state.area_scale;
     uint set = 0, count = t.count, depth = t.depth, slot = 0, waiting = 0, nodes = 0, references = 0, deepest = t.depth;
     // Inner nodes, leaves, empty leaves.

@@ -103,14 +103,37 @@ impl Limits {
 pub struct Kernel {
     shader: &'static str,
     constants: Vec<u32>,
+    /// For what is left of a dispatch behind its full rows.
+    behind_rows: bool,
 }
+
+/// The specialisation constant that every pass has: workgroups of a row, in glsl/gpu/pass.glsl.
+const GROUPS_OF_A_ROW: u32 = 30;
 
 impl Kernel {
     /// `shader` with a workgroup of `workgroup` invocations and the specialisation constants 1, 2, … as given.
     pub fn new(shader: &'static Shader, workgroup: u32, constants: &[u32]) -> Kernel {
         let mut all = vec![workgroup];
         all.extend_from_slice(constants);
-        Kernel { shader: shader.name, constants: all }
+        Kernel { shader: shader.name, constants: all, behind_rows: false }
+    }
+
+    /// The same for a dispatch whose workgroups begin behind rows of others.
+    pub(super) fn behind_rows(&self) -> Kernel {
+        Kernel { behind_rows: true, ..self.clone() }
+    }
+
+    /// Whether the shader numbers the workgroups of several rows through.
+    pub(super) fn takes_rows(&self) -> bool {
+        /// `OpDecorate` of four words with the decoration `SpecId`.
+        const DECORATE: u32 = 4 << 16 | 71;
+        const SPEC_ID: u32 = 1;
+        let words = bytemuck::pod_collect_to_vec::<u8, u32>(self.shader().spirv);
+        words.windows(4).any(|w| w[0] == DECORATE && w[2] == SPEC_ID && w[3] == GROUPS_OF_A_ROW)
+    }
+
+    fn shader(&self) -> &'static Shader {
+        super::shaders::ALL.iter().find(|s| s.name == self.shader).expect("kernels name shaders of the table")
     }
 
     /// The workgroup size in x.
@@ -222,19 +245,20 @@ impl Context {
     }
 
     fn create_pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
-        let shader =
-            super::shaders::ALL.iter().find(|s| s.name == kernel.shader).expect("kernels name shaders of the table");
         let mut words =
-            ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv)).expect("build.rs wrote whole words");
+            ash::util::read_spv(&mut std::io::Cursor::new(kernel.shader().spirv)).expect("build.rs wrote whole words");
         if self.optional.maximal_reconvergence {
             words = reconvergence::maximal(&words);
         }
         let module_info = vk::ShaderModuleCreateInfo::default().code(&words);
-        let entries: Vec<_> = (0..kernel.constants.len() as u32)
-            .map(|id| vk::SpecializationMapEntry { constant_id: id, offset: 4 * id, size: 4 })
+        let constants = [&kernel.constants[..], &[self.limits.workgroup_count]].concat();
+        let ids = (0..kernel.constants.len() as u32).chain([GROUPS_OF_A_ROW]);
+        let entries: Vec<_> = (0..)
+            .zip(ids)
+            .map(|(i, id)| vk::SpecializationMapEntry { constant_id: id, offset: 4 * i, size: 4 })
             .collect();
         let specialisation =
-            vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&kernel.constants));
+            vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&constants));
         let mut subgroups = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
             .required_subgroup_size(self.limits.subgroup_size);
         // SAFETY: the device is live; the module is destroyed after the pipeline that used it was made.
@@ -250,7 +274,12 @@ impl Context {
                 stage =
                     stage.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS).push_next(&mut subgroups);
             }
-            let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
+            let base = if kernel.behind_rows {
+                vk::PipelineCreateFlags::DISPATCH_BASE
+            } else {
+                vk::PipelineCreateFlags::empty()
+            };
+            let info = vk::ComputePipelineCreateInfo::default().flags(base).stage(stage).layout(self.layout);
             let made = self.device.create_compute_pipelines(self.cache, &[info], None);
             self.device.destroy_shader_module(module, None);
             made.map(|pipelines| pipelines[0]).map_err(|(_, result)| Error::vulkan("vkCreateComputePipelines")(result))

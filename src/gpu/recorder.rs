@@ -240,13 +240,27 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
+    /// More workgroups than the device takes along x are rows of as many as it takes, and behind them what is left:
+    /// `group_number()` in glsl/gpu/pass.glsl numbers them through.
     fn dispatch_bytes(&mut self, kernel: &Kernel, arguments: &[u8], groups: u32) -> Result<()> {
-        if groups == 0 {
-            return Ok(());
+        let row = self.context.limits.workgroup_count;
+        let (rows, rest) = (groups / row, groups % row);
+        if groups > row && !kernel.takes_rows() {
+            return Err(Error::Argument(format!(
+                "{groups} workgroups of {kernel:?}, which takes one row of at most {row} on this device; give less at a time"
+            )));
         }
-        self.bind(kernel, arguments)?;
-        // SAFETY: `new`'s promise; the pipeline is live.
-        unsafe { self.context.ash_device().cmd_dispatch(self.commands, groups, 1, 1) };
+        let device = self.context.ash_device();
+        if rows > 0 {
+            self.bind(kernel, arguments)?;
+            // SAFETY: `new`'s promise; the pipeline is live.
+            unsafe { device.cmd_dispatch(self.commands, row, rows, 1) };
+        }
+        if rest > 0 {
+            self.bind(&if rows > 0 { kernel.behind_rows() } else { kernel.clone() }, arguments)?;
+            // SAFETY: the same; where rows are before, the pipeline was made for it.
+            unsafe { device.cmd_dispatch_base(self.commands, 0, rows, 0, rest, 1, 1) };
+        }
         Ok(())
     }
 
