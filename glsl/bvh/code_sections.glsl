@@ -24,6 +24,7 @@ BUFFER Sample { Sampled primitive[]; };
 const bool HAS_SECTIONS = CODE_PREFIX == PREFIX_SECTIONS;
 shared uint sampled_count;
 shared uint sampled_below[HAS_SECTIONS ? 18 : 1];   // of three rounds in turn: keys below three low candidates, three high ones
+shared uint section_octaves[HAS_SECTIONS ? 9 : 1];  // of each axis: of the core's extent, from the core to the high and to the low bound
 shared uint sampled_core[HAS_SECTIONS ? 6 : 1];     // low corner, high corner
 
 bool is_inside(uvec3 lo, uvec3 hi, Box fences) {
@@ -45,6 +46,44 @@ Box fences_of(Box bounds, uvec3 low_quantile, uvec3 high_quantile) {
     precise float least = 0.25 * max(max(widths.x, widths.y), max(widths.z, 0.0));
     precise vec3 by = 1.5 * max(widths, vec3(least));
     return widened(Box(low, high), by, bounds);
+}
+
+// What the sample found inside of the fences, and an eighth more to each side, for the sample misses the outermost.
+Box core_of(Box fences) {
+    uvec3 lo = uvec3(sampled_core[0], sampled_core[1], sampled_core[2]);
+    uvec3 hi = uvec3(sampled_core[3], sampled_core[4], sampled_core[5]);
+    Box sampled = fences;
+    if (lo.x <= hi.x) sampled = Box(from_ordered(lo), from_ordered(hi));
+    precise vec3 low_eighth = sampled.lo * 0.125;
+    precise vec3 high_eighth = sampled.hi * 0.125;
+    precise vec3 by = (high_eighth - low_eighth) * 0.125;
+    return widened(Box(low_eighth, high_eighth), by, fences);
+}
+
+// A lane a distance, so that there is one copy of what computes it: drivers that go through every branch take long over three.
+void write_sections(BuildState state, Box bounds, Box fences, Box core) {
+    for (uint i = gl_LocalInvocationIndex; i < 9; i += gl_WorkGroupSize.x) {
+        uint axis = i % 3, which = i / 3;
+        vec3 from = which == 0 ? core.hi : which == 1 ? bounds.hi : bounds.lo;
+        vec3 corner = which == 2 ? core.hi : core.lo;
+        section_octaves[i] = octaves(from[axis], corner[axis]);
+    }
+    barrier();
+    for (uint axis = gl_LocalInvocationIndex; axis < 3; axis += gl_WorkGroupSize.x) {
+        uint reference = section_octaves[axis];
+        uint farthest = max(section_octaves[3 + axis], section_octaves[6 + axis]);
+        farthest = max(farthest - min(farthest, reference), 1);
+        state.plan.sections.reference[axis] = reference;
+        state.plan.sections.shift[axis] = 30 + uint(31 - findMSB(farthest));
+    }
+    if (gl_LocalInvocationIndex == 0) {
+        bvec3 is_below = lessThan(ordered(bounds.lo), ordered(core.lo)), is_above = lessThan(ordered(core.hi), ordered(bounds.hi));
+        uvec3 beyond = uvec3(is_below) | uvec3(is_above);
+        state.plan.sections.fences = fences;
+        state.plan.sections.core = core;
+        state.plan.sections.head = 1;   // more is known with the recipe
+        state.plan.sections.beyond = beyond.x | beyond.y << 1 | beyond.z << 2;
+    }
 }
 
 void find_sections() {
@@ -119,31 +158,7 @@ void find_sections() {
         atomicMax(sampled_core[3 + axis], hi[axis]);
     }
     next_phase();
-    if (gl_LocalInvocationIndex != 0) return;
-    lo = uvec3(sampled_core[0], sampled_core[1], sampled_core[2]);
-    hi = uvec3(sampled_core[3], sampled_core[4], sampled_core[5]);
-    Box sampled = fences;
-    if (lo.x <= hi.x) sampled = Box(from_ordered(lo), from_ordered(hi));
-    // The sample misses the outermost: an eighth more to each side.
-    precise vec3 low_eighth = sampled.lo * 0.125;
-    precise vec3 high_eighth = sampled.hi * 0.125;
-    precise vec3 by = (high_eighth - low_eighth) * 0.125;
-    Box core = widened(Box(low_eighth, high_eighth), by, fences);
-    CodeSections sections;
-    sections.fences = fences;
-    sections.core = core;
-    sections.head = 1;   // more is known with the recipe
-    sections.beyond = 0;
-    for (uint axis = 0; axis < 3; ++axis) {
-        bool is_beyond = ordered(bounds.lo)[axis] < ordered(core.lo)[axis] || ordered(core.hi)[axis] < ordered(bounds.hi)[axis];
-        uint reference = octaves(core.hi[axis], core.lo[axis]);
-        uint farthest = max(octaves(bounds.hi[axis], core.lo[axis]), octaves(bounds.lo[axis], core.hi[axis]));
-        farthest = max(farthest - min(farthest, reference), 1);
-        sections.beyond |= is_beyond ? 1 << axis : 0;
-        sections.reference[axis] = reference;
-        sections.shift[axis] = 30 + uint(31 - findMSB(farthest));
-    }
-    state.plan.sections = sections;
+    write_sections(state, bounds, fences, core_of(fences));
 }
 
 // How many coordinate bits come before the one of what is far: the first of each axis.
