@@ -3,6 +3,7 @@
 mod common;
 
 use common::device;
+use hedgerow::gpu::Limits;
 use hedgerow::gpu::radix_sort::{self, Buffers, Shape, Sort};
 use proptest::prelude::*;
 
@@ -36,8 +37,16 @@ fn sorted_on_device(shape: &Shape, keys: &[u64], values: &[u32], bits: u32) -> (
     (keys, values[result].read(count as usize))
 }
 
-fn shapes() -> [Shape; 2] {
-    [Shape::strips(&device().limits), Shape::tiles(&device().limits)]
+/// All cuts: strips of CPUs, tiles of GPUs, those of a small GPU, and strips where nobody knows how large subgroups are.
+fn shapes() -> Vec<Shape> {
+    let limits = &device().limits;
+    let strips = [Shape::strips(limits), Shape::many_strips(limits)];
+    if !limits.subgroup_is_exact {
+        return strips.into();
+    }
+    let small = Limits { shared_memory: 16 << 10, workgroup_invocations: 128, ..limits.clone() };
+    let tiles = Shape::tiles(limits);
+    [&strips[..], &[tiles, tiles.with_digit_bits(5), Shape::tiles(&small)]].concat()
 }
 
 fn equals_its_twin(keys: &[u64], bits: u32) {

@@ -51,7 +51,7 @@ void main() {
     c_i = given.test_cost;
     // A strip for each lane, or tiles.
     column_keys = PRIVATE_COUNTERS ? max((primitive_count + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x, 1u)
-                                   : gl_WorkGroupSize.x * ROWS;
+                                   : TILE_KEYS;
     columns = (primitive_count + column_keys - 1u) / column_keys;
     passes = primitive_count < 2u ? 0u : (kind_of_codes().bits + DIGIT_BITS - 1u) / DIGIT_BITS;
     uvec2 at = build.scratch;
@@ -66,7 +66,6 @@ void main() {
 
     uint tile = gl_WorkGroupSize.x * ITEMS;
     uint tiles = (primitive_count + tile - 1u) / tile;
-    uint lanes_a_task = PRIVATE_COUNTERS ? gl_WorkGroupSize.x : 1u;
     reset_build(0);
     next_phase();
     for (uint task = 0; task < tiles; ++task) find_bounds(task);
@@ -86,11 +85,11 @@ void main() {
     next_phase();
     for (uint pass = 0; pass < passes; ++pass) {
         Radix r = radix_of_pass(pass);
-        for (uint task = 0; task * lanes_a_task < columns; ++task) radix_count(r, task);
+        for (uint task = 0; task * COLUMNS_A_TASK < columns; ++task) radix_count(r, task);
         next_phase();
-        for (uint task = 0; task * lanes_a_task < DIGITS; ++task) radix_scan(r, task);
+        for (uint task = 0; task * DIGITS_A_TASK < DIGITS; ++task) radix_scan(r, task);
         next_phase();
-        for (uint task = 0; task * lanes_a_task < columns; ++task) radix_scatter(r, task);
+        for (uint task = 0; task * COLUMNS_A_TASK < columns; ++task) radix_scatter(r, task);
         next_phase();
     }
     for (uint task = 0; task < tiles; ++task) lbvh_hierarchy(task);

@@ -7,7 +7,8 @@
 #define HEDGEROW_BVH_TILES
 #include "bvh/encode.glsl"
 
-shared uint partial[SUBGROUPS_AT_MOST];
+// A workgroup may have as many subgroups as invocations.
+shared uint partial[gl_WorkGroupSize.x];
 
 Words sums_of_tiles() {
     return Words(table_address);
@@ -47,9 +48,33 @@ uint sum_before(uint value, out uint total) {
     return before;
 }
 
+// Sums of a lane that a GPU loads at once.
+const uint SUMS_AT_ONCE = 8;
+
+// The same as scan_tiles, of neighbours by neighbours: lanes that each had a strip would load from as many places.
+uint scan_side_by_side(Words sums, uint tiles) {
+    uint before = 0;
+    for (uint first = 0; first < tiles; first += SUMS_AT_ONCE * gl_WorkGroupSize.x) {
+        uint begin = first + SUMS_AT_ONCE * gl_LocalInvocationIndex, own = 0, total;
+        uint values[SUMS_AT_ONCE];
+        [[unroll]] for (uint k = 0; k < SUMS_AT_ONCE; ++k) {
+            values[k] = begin + k < tiles ? sums.word[begin + k] : 0;
+            own += values[k];
+        }
+        uint sum = before + sum_before(own, total);
+        [[unroll]] for (uint k = 0; k < SUMS_AT_ONCE; ++k) {
+            if (begin + k < tiles) sums.word[begin + k] = sum;
+            sum += values[k];
+        }
+        before += total;
+    }
+    return before;
+}
+
 // Makes of each tile's sum that of the tiles before; returns the sum of all.
 uint scan_tiles(uint tiles) {
     Words sums = sums_of_tiles();
+    if (!PRIVATE_COUNTERS) return scan_side_by_side(sums, tiles);
     uint strip = (tiles + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x;
     uint begin = gl_LocalInvocationIndex * strip, end = min(begin + strip, tiles);
     uint own = 0;

@@ -3,7 +3,7 @@
 //
 // reads   boxes[count]
 // writes  results[tiles]; of no boxes, one empty box
-// needs   one barrier before and after; any subgroup size; at most 128 subgroups a workgroup
+// needs   one barrier before and after; any subgroup size
 #include "gpu/pass.glsl"
 
 struct Bounds {
@@ -20,7 +20,8 @@ layout(push_constant, scalar) uniform Arguments {
     uint rounds;   // boxes of an invocation in a tile
 };
 
-shared Bounds partial[128];
+// A workgroup may have as many subgroups as invocations.
+shared Bounds partial[gl_WorkGroupSize.x];
 
 void main() {
     Bounds around = Bounds(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));

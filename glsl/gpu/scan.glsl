@@ -5,7 +5,7 @@
 //   sums   reads sums            writes sums (exclusive), sums[tiles] = total; one workgroup
 //   apply  reads values, sums    writes results (may be the values' memory)
 //
-// needs  one barrier between each two; any subgroup size; at most 128 subgroups a workgroup
+// needs  one barrier between each two; any subgroup size
 #ifndef HEDGEROW_GPU_SCAN
 #define HEDGEROW_GPU_SCAN
 #include "gpu/pass.glsl"
@@ -18,7 +18,8 @@ layout(push_constant, scalar) uniform Arguments {
     uint rounds;   // words of an invocation in a tile
 };
 
-shared uint scan_partial[128];
+// A workgroup may have as many subgroups as invocations.
+shared uint scan_partial[gl_WorkGroupSize.x];
 
 // Exclusive scan over the workgroup; `total` is the sum of all.
 uint scan_workgroup(uint value, out uint total) {

@@ -16,14 +16,14 @@ pub struct Shape {
     pub digit_bits: u32,
     /// Each invocation counts a strip of its own (CPUs), instead of a workgroup a tile (GPUs).
     pub private_counters: bool,
-    /// Keys of a tile, for shared counters.
-    tile_keys: u32,
+    /// Subgroups of a workgroup that has tiles.
+    subgroups: u32,
+    /// Keys of a lane in a tile.
+    rows: u32,
 }
 
-/// Keys of a lane in a tile: `ROWS` in radix_sort.glsl.
-const ROWS: u32 = 16;
-/// Subgroups a workgroup: the shared counters have room for so many.
-const SUBGROUPS: u32 = 8;
+/// Digits whose counts of a tile are scanned together: `SCANNED_TOGETHER` in radix_sort.glsl.
+const SCANNED_TOGETHER: u32 = 8;
 
 impl Shape {
     /// What suits the device: strips on a CPU, tiles on a GPU.
@@ -33,18 +33,51 @@ impl Shape {
 
     /// A strip of keys for each invocation, which counts alone: for CPUs, where an invocation is a lane of a loop.
     pub fn strips(limits: &Limits) -> Shape {
-        Shape { workgroup: limits.subgroup_size.min(SUBGROUPS), digit_bits: 8, private_counters: true, tile_keys: 0 }
+        /// A lane's counters take 1 KiB of shared memory.
+        const MOST: u32 = 8;
+        Shape {
+            workgroup: limits.subgroup_size.min(MOST),
+            digit_bits: 8,
+            private_counters: true,
+            subgroups: 0,
+            rows: 0,
+        }
     }
 
-    /// A tile of keys for each workgroup, ranked by ballots: for GPUs.
+    /// The same for GPUs whose subgroups may be smaller than they report: small digits, so that a workgroup has many strips.
+    pub fn many_strips(limits: &Limits) -> Shape {
+        let workgroup = limits.workgroup_invocations.min(64);
+        Shape { workgroup, digit_bits: 4, private_counters: true, subgroups: 0, rows: 0 }
+    }
+
+    /// A tile of keys for each workgroup, ranked by ballots: for GPUs whose subgroups have the size that they report.
+    ///
+    /// A subgroup's counters take 1 KiB of shared memory; the keys of a tile, a word of each, lie there afterwards. Of what a
+    /// small device has, half is left to others.
     pub fn tiles(limits: &Limits) -> Shape {
-        let workgroup = (SUBGROUPS * limits.subgroup_size).min(limits.workgroup_invocations);
-        Shape { workgroup, digit_bits: 8, private_counters: false, tile_keys: workgroup * ROWS }
+        const SMALL: u32 = 32 << 10;
+        let (most_subgroups, rows) = if limits.shared_memory < SMALL { (4, 8) } else { (8, 16) };
+        let most_lanes = limits.workgroup_invocations.min(256);
+        let subgroups = (most_lanes / limits.subgroup_size).clamp(1, most_subgroups);
+        Shape { workgroup: subgroups * limits.subgroup_size, digit_bits: 8, private_counters: false, subgroups, rows }
     }
 
     /// The same with digits of other bits: fewer for few keys, whose passes are short beside the table.
     pub fn with_digit_bits(self, digit_bits: u32) -> Shape {
         Shape { digit_bits, ..self }
+    }
+
+    /// The same with short tiles: for kernels that hold all phases, which compilers are slow with.
+    pub(crate) fn with_short_tiles(self) -> Shape {
+        Shape { rows: self.rows.min(4), ..self }
+    }
+
+    /// Bytes of shared memory that it takes of a workgroup.
+    pub(crate) fn shared_bytes(&self) -> u32 {
+        let counters = self.digits() * if self.private_counters { self.workgroup } else { self.subgroups };
+        let tile = self.workgroup * self.rows;
+        let offsets = if self.private_counters { 0 } else { self.digits() + 2 * self.subgroups };
+        4 * (counters.max(tile) + offsets)
     }
 
     /// Digits a pass tells apart.
@@ -56,7 +89,11 @@ impl Shape {
     ///
     /// Long strips make the table small, short ones keep all cores busy: 128 to 256 strips, until they would be over 4,096 keys.
     pub(crate) fn column_keys(&self, count: u32) -> u32 {
-        if self.private_counters { (count / 256).next_power_of_two().clamp(256, 4096) } else { self.tile_keys }
+        if self.private_counters {
+            (count / 256).next_power_of_two().clamp(256, 4096)
+        } else {
+            self.workgroup * self.rows
+        }
     }
 
     pub(crate) fn columns(&self, count: u32) -> u32 {
@@ -82,7 +119,7 @@ impl Shape {
 
     /// Tasks of the scanning step.
     pub(crate) fn scan_tasks(&self) -> u32 {
-        if self.private_counters { self.digits().div_ceil(self.workgroup) } else { self.digits() }
+        self.digits().div_ceil(if self.private_counters { self.workgroup } else { SCANNED_TOGETHER })
     }
 
     /// Passes that keys of `bits` bits need.
@@ -92,7 +129,7 @@ impl Shape {
 
     /// Specialisation constants 1 to 4 of everything that includes radix_sort.glsl; 1 is free for the includer.
     pub(crate) fn constants(&self, first: u32, key_words: u32) -> [u32; 4] {
-        [first, self.digit_bits, u32::from(self.private_counters), key_words]
+        [first, self.digit_bits, self.rows << 16 | self.subgroups, key_words]
     }
 }
 
