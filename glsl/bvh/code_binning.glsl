@@ -21,14 +21,19 @@ BUFFER CodeSplits {
     CodePart part[PARTS_AT_MOST];
 };
 
-// The parts so far, their corners packed in bytes, and the candidates for their splits: at most one fewer than cells.
+// The parts before and behind a level of splits in turn, their corners packed in bytes, and the candidates for their splits: at
+// most one fewer than cells.
 shared uint part_count;
-shared uint part_first[HAS_SPLITS ? PARTS_AT_MOST : 1];
-shared uint part_last[HAS_SPLITS ? PARTS_AT_MOST : 1];
-shared uint part_path[HAS_SPLITS ? PARTS_AT_MOST : 1];
-shared uint part_path_bits[HAS_SPLITS ? PARTS_AT_MOST : 1];
+shared uint part_first[HAS_SPLITS ? 2 * PARTS_AT_MOST : 1];
+shared uint part_last[HAS_SPLITS ? 2 * PARTS_AT_MOST : 1];
+shared uint part_path[HAS_SPLITS ? 2 * PARTS_AT_MOST : 1];
+shared uint part_path_bits[HAS_SPLITS ? 2 * PARTS_AT_MOST : 1];
 shared uint first_candidate[HAS_SPLITS ? PARTS_AT_MOST + 1 : 1];
 shared uvec2 scores[HAS_SPLITS ? CELLS : 1];
+
+uint parts_at(uint level) {
+    return (level & 1) * PARTS_AT_MOST;
+}
 
 uvec3 unpack_cell(uint packed) {
     return uvec3(packed, packed >> 8, packed >> 16) & 0xFFu;
@@ -49,13 +54,14 @@ uvec2 plane_of(uvec3 first, uvec3 last, uint candidate) {
 }
 
 // One level of splits: candidates are numbered through all parts, so that whoever is free takes the next.
-void split_parts(CodeKind kind, CodeGrid grid) {
+void split_parts(CodeKind kind, CodeGrid grid, uint level) {
     uint parts = part_count;
+    uint from = parts_at(level), to = parts_at(level + 1);
     if (gl_LocalInvocationIndex == 0) {
         uint candidates = 0;
         for (uint part = 0; part < parts; ++part) {
             first_candidate[part] = candidates;
-            uvec3 planes = unpack_cell(part_last[part]) - unpack_cell(part_first[part]);
+            uvec3 planes = unpack_cell(part_last[from + part]) - unpack_cell(part_first[from + part]);
             candidates += planes.x + planes.y + planes.z;
         }
         first_candidate[parts] = candidates;
@@ -64,44 +70,37 @@ void split_parts(CodeKind kind, CodeGrid grid) {
     for (uint candidate = gl_LocalInvocationIndex; candidate < first_candidate[parts]; candidate += gl_WorkGroupSize.x) {
         uint part = 0;
         while (part + 1 < parts && first_candidate[part + 1] <= candidate) part++;
-        uvec3 first = unpack_cell(part_first[part]), last = unpack_cell(part_last[part]);
+        uvec3 first = unpack_cell(part_first[from + part]), last = unpack_cell(part_last[from + part]);
         uvec2 plane = plane_of(first, last, candidate - first_candidate[part]);
         scores[candidate] = score_of(kind, grid, first, last, plane.x, plane.y);
     }
     barrier();
-    if (gl_LocalInvocationIndex == 0) {
-        // From the last part down, as the new ones move up: each part that is split makes place for one more.
-        uint splits = 0;
-        for (uint part = 0; part < parts; ++part) splits += first_candidate[part + 1] > first_candidate[part] ? 1 : 0;
-        uint to = parts + splits;
-        part_count = to;
-        for (uint part = parts; part-- > 0;) {
-            uvec3 first = unpack_cell(part_first[part]), last = unpack_cell(part_last[part]);
-            uint path = part_path[part], bits = part_path_bits[part];
-            uint best = first_candidate[part], end = first_candidate[part + 1];
-            if (best == end) {
-                --to;
-                part_first[to] = pack_cell(first);
-                part_last[to] = pack_cell(last);
-                part_path[to] = path;
-                part_path_bits[to] = bits;
-                continue;
+    // A side of a part is a lane's. Each part that is split before it moves it up by one; the parts so far are read from elsewhere.
+    for (uint item = gl_LocalInvocationIndex; item < 2 * parts; item += gl_WorkGroupSize.x) {
+        uint part = item / 2, side = item % 2;
+        uint best = first_candidate[part], end = first_candidate[part + 1];
+        bool is_split = best < end;
+        uint place = part;
+        for (uint before = 0; before < part; ++before) place += first_candidate[before + 1] > first_candidate[before] ? 1 : 0;
+        if (is_split || side == 0) {
+            uvec3 first = unpack_cell(part_first[from + part]), last = unpack_cell(part_last[from + part]);
+            uint path = part_path[from + part];
+            if (is_split) {
+                for (uint other = best + 1; other < end; ++other) {
+                    if (is_below(scores[other], scores[best])) best = other;
+                }
+                uvec2 plane = plane_of(first, last, best - first_candidate[part]);
+                if (side == 0) last[plane.x] = plane.y - 1;
+                else first[plane.x] = plane.y;
+                tighten(grid, 0, first, last);
+                path = path << 1 | side;
+                place += side;
             }
-            for (uint other = best + 1; other < end; ++other) {
-                if (is_below(scores[other], scores[best])) best = other;
-            }
-            uvec2 plane = plane_of(first, last, best - first_candidate[part]);
-            for (uint side = 2; side-- > 0;) {
-                uvec3 low = first, high = last;
-                if (side == 0) high[plane.x] = plane.y - 1;
-                else low[plane.x] = plane.y;
-                tighten(grid, 0, low, high);
-                --to;
-                part_first[to] = pack_cell(low);
-                part_last[to] = pack_cell(high);
-                part_path[to] = path << 1 | side;
-                part_path_bits[to] = bits + 1;
-            }
+            part_first[to + place] = pack_cell(first);
+            part_last[to + place] = pack_cell(last);
+            part_path[to + place] = path;
+            part_path_bits[to + place] = part_path_bits[from + part] + (is_split ? 1 : 0);
+            if (part + 1 == parts) atomicMax(part_count, place + 1);
         }
     }
     barrier();
@@ -134,7 +133,7 @@ void find_splits() {
         part_path_bits[0] = 0;
     }
     barrier();
-    for (uint level = 0; level < 2 * kind.depth; ++level) split_parts(kind, grid);
+    for (uint level = 0; level < 2 * kind.depth; ++level) split_parts(kind, grid, level);
 
     CodeSplits splits = CodeSplits(table_address);
     for (uint part = gl_LocalInvocationIndex; part < part_count; part += gl_WorkGroupSize.x) {
