@@ -135,11 +135,9 @@ Place limited_by_depth(Place place) {
 
 // Tells the parent, or the header, of what has become a leaf.
 void name_leaf(uint link, uint first, uint count) {
-    // In words: the root begins at 4, nodes at 32; a child has 8, its index is the fourth and its count the last.
-    uint child = link == NO_PARENT ? 4u : 32u + 8u * link;
-    Words words = Words(structure_address);
-    words.word[child + 3u] = first;
-    words.word[child + 7u] = count;
+    Words child = child_words(link);
+    child.word[INDEX_WORD] = first;
+    child.word[COUNT_WORD] = count;
 }
 
 // Of the nodes that an invocation has placed: how many fell out, and whether a leaf was made for the depth alone.

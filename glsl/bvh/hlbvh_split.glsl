@@ -111,9 +111,7 @@ void move_to_sides(Words from, Words to, Clusters clusters, Task t, bool is_swep
 
 // What a link names is the node in a slot.
 void name_node(uint link, uint slot) {
-    // In words: the root begins at 4, nodes at 32; a child has 8, its index is the fourth.
-    uint child = link == NO_PARENT ? 4u : 32u + 8u * link;
-    Words(structure_address).word[child + 3u] = slot;
+    child_words(link).word[INDEX_WORD] = slot;
 }
 
 // Splits a task of a level by the whole workgroup; tells the node's slot, and where the right side begins.

@@ -38,6 +38,16 @@ uint reference_of(Child child) {
     return child.count != 0u ? child.index | IS_PRIMITIVE : child.index;
 }
 
+// The words of the child that a link names, or of the header's root: at 64-bit addresses, for a tree may have over 2^31 bytes.
+Words child_words(uint link) {
+    uvec2 root = address_of(structure_address, 1u, 16u);
+    return Words(link == NO_PARENT ? root : address_of(structure_address, link + 4u, 32u));
+}
+
+// In a child.
+const uint INDEX_WORD = 3;
+const uint COUNT_WORD = 7;
+
 // Writes what is known of a node over two subtrees of these counts and costs, with the area around both; returns its cost.
 float weigh_node(Weights w, uint slot, uvec2 children_counts, vec2 children_costs, float area) {
     uint count = children_counts.x + children_counts.y;

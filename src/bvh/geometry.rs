@@ -56,9 +56,13 @@ impl Geometry {
         bytemuck::cast([self.vertex_format.kind, self.vertex_format.components, self.index_format.0, self.flags.0])
     }
 
-    /// Whether it is of the formats of [`Geometry::mesh`], with any stride: these have kernels of their own.
+    /// Whether it is of the formats of [`Geometry::mesh`], with any stride: these have kernels of their own, in which a vertex's
+    /// words have numbers below 2^31.
     pub(crate) fn is_plain(&self) -> bool {
-        self.transform == 0 && self.vertex_format == VertexFormat::FLOAT3 && self.index_format == IndexFormat::U32
+        let bytes = u64::from(self.vertex_count) * u64::from(self.vertex_stride);
+        let is_near = bytes <= 4 << 31;
+        let formats = self.vertex_format == VertexFormat::FLOAT3 && self.index_format == IndexFormat::U32;
+        self.transform == 0 && formats && is_near
     }
 }
 
@@ -311,3 +315,18 @@ impl Planned {
 }
 
 const _: () = assert!(size_of::<Geometry>() == 40);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vertices_beyond_31_bits_of_words_are_read_by_64_bit_addresses() {
+        let source = |vertex_count, vertex_stride| {
+            let geometry = Geometry { vertex_count, vertex_stride, ..Geometry::mesh(16, 3, 16) };
+            Input { source: Source::One(geometry), primitive_count: 1 }.source_constant(Primitives::Triangles)
+        };
+        assert_eq!(source(1 << 29, 16), SOURCE_MESH);
+        assert_eq!(source((1 << 29) + 1, 16), SOURCE_GEOMETRY);
+    }
+}
