@@ -9,8 +9,9 @@
 #include "bvh/references.glsl"
 #include "bvh/codes.glsl"
 
-// Items of an invocation in a task.
-layout(constant_id = 1) const uint ITEMS = 1;
+// Items of an invocation in a task; whether climbs meet in the workgroup (bvh/run.glsl) << 16.
+layout(constant_id = 1) const uint ITEMS_WORD = 1;
+const uint ITEMS = ITEMS_WORD & 0xFFFFu;
 
 const uint NONE = 0xFFFFFFFFu;
 

@@ -194,9 +194,9 @@ Stretches find_stretches(uint order, ivec3 extents, uint total) {
     return found;
 }
 
+// All but the axes and the sections.
 CodePlan plan_codes(CodeKind kind, Box bounds, Box scene) {
     CodePlan plan;
-    for (uint axis = 0; axis < 3; ++axis) plan.axes[axis] = axis_of(bounds.lo[axis], bounds.hi[axis]);
     vec3 magnitude = max(abs(bounds.lo), abs(bounds.hi));
     plan.size_prescale = prescale_of(max(magnitude.x, max(magnitude.y, magnitude.z)));
     precise vec3 e = bounds.hi * plan.size_prescale - bounds.lo * plan.size_prescale;

@@ -43,9 +43,8 @@ void reset_build(uint phases_behind) {
     uint i = gl_LocalInvocationIndex;
     uint tile = gl_WorkGroupSize.x * ITEMS;
     uint tiles = (primitive_count + tile - 1) / tile;
-    uint columns_a_task = PRIVATE_COUNTERS ? gl_WorkGroupSize.x : 1;
-    uint column_tasks = (columns + columns_a_task - 1) / columns_a_task;
-    uint scan_tasks = (DIGITS + columns_a_task - 1) / columns_a_task;
+    uint column_tasks = (columns + COLUMNS_A_TASK - 1) / COLUMNS_A_TASK;
+    uint scan_tasks = (DIGITS + DIGITS_A_TASK - 1) / DIGITS_A_TASK;
     uint sorted = phases_before_hierarchy();
     uint phases = sorted + phases_behind;
     for (uint word = i; word < 4 + POOL_PHASES_AT_MOST; word += gl_WorkGroupSize.x) {
@@ -78,8 +77,36 @@ void reset_build(uint phases_behind) {
 
 // ---- bounds ----
 
+// The words of BuildState from boxes_lo to status, of a workgroup: on a GPU hundreds of thousands of subgroups would wait for each
+// other at one line of memory.
+const uint BOUNDS_WORDS = 14;
+shared uint group_bounds[PRIVATE_COUNTERS ? 1u : BOUNDS_WORDS];
+
+bool is_low_corner(uint word) {
+    return word < 12 && word % 6 < 3;
+}
+
+void begin_group_bounds() {
+    for (uint i = gl_LocalInvocationIndex; i < BOUNDS_WORDS; i += gl_WorkGroupSize.x) {
+        group_bounds[i] = is_low_corner(i) ? NONE : 0;
+    }
+    barrier();
+}
+
+// A lane a word.
+void end_group_bounds(Words to) {
+    barrier();
+    for (uint i = gl_LocalInvocationIndex; i < BOUNDS_WORDS; i += gl_WorkGroupSize.x) {
+        uint found = group_bounds[i];
+        if (is_low_corner(i)) atomicMin(to.word[i], found);
+        else if (i < 12) atomicMax(to.word[i], found);
+        else if (i == 12) atomicAdd(to.word[i], found);
+        else if (found != 0) atomicOr(to.word[i], found);
+    }
+    barrier();   // the words may be used again by the next task
+}
+
 void find_bounds(uint task) {
-    BuildState state = BuildState(state_address);
     Geometry input_geometries = geometries();
     uvec3 lo = uvec3(NONE), hi = uvec3(0), centroid_lo = uvec3(NONE), centroid_hi = uvec3(0);
     uint active_count = 0, status = 0;
@@ -105,42 +132,51 @@ void find_bounds(uint task) {
     centroid_lo = subgroupMin(centroid_lo);
     centroid_hi = subgroupMax(centroid_hi);
     active_count = subgroupAdd(active_count);
-    status = subgroupOr(status);
+    status = subgroupOr(status & ~INACTIVE);
     // Integers: the order in which the atomics arrive changes nothing.
+    Words to = Words(address_of(state_address, 4 + POOL_PHASES_AT_MOST, 4));
+    if (!PRIVATE_COUNTERS) begin_group_bounds();
     if (subgroupElect()) {
         for (uint axis = 0; axis < 3; ++axis) {
-            atomicMin(state.boxes_lo[axis], lo[axis]);
-            atomicMax(state.boxes_hi[axis], hi[axis]);
-            atomicMin(state.centroids_lo[axis], centroid_lo[axis]);
-            atomicMax(state.centroids_hi[axis], centroid_hi[axis]);
+            if (PRIVATE_COUNTERS) {
+                atomicMin(to.word[axis], lo[axis]);
+                atomicMax(to.word[3 + axis], hi[axis]);
+                atomicMin(to.word[6 + axis], centroid_lo[axis]);
+                atomicMax(to.word[9 + axis], centroid_hi[axis]);
+            } else {
+                atomicMin(group_bounds[axis], lo[axis]);
+                atomicMax(group_bounds[3 + axis], hi[axis]);
+                atomicMin(group_bounds[6 + axis], centroid_lo[axis]);
+                atomicMax(group_bounds[9 + axis], centroid_hi[axis]);
+            }
         }
-        atomicAdd(state.active_count, active_count);
-        if ((status & ~INACTIVE) != 0) atomicOr(state.status, status & ~INACTIVE);
+        if (PRIVATE_COUNTERS) {
+            atomicAdd(to.word[12], active_count);
+            if (status != 0) atomicOr(to.word[13], status);
+        } else {
+            atomicAdd(group_bounds[12], active_count);
+            atomicOr(group_bounds[13], status);
+        }
     }
+    if (!PRIVATE_COUNTERS) end_group_bounds(to);
 }
 
 // ---- plan ----
 
-void make_plan() {
-    if (HAS_SECTIONS) find_sections();
-    if (gl_LocalInvocationIndex != 0) return;
-    BuildState state = BuildState(state_address);
+// By one invocation, but for what the recipe says.
+void write_header(BuildState state, uint geometry_count, uint geometry_flags) {
     Structure structure = Structure(structure_address);
-    uint slots = max(primitive_count, 2) - 1;
-    uint bits = kind_of_codes().bits;
     structure.header.magic = MAGIC;
     structure.header.kind = kind_of_records();
     structure.header.status = state.status;
     structure.header.primitive_count = primitive_count;
     structure.header.root = empty_root();
     structure.header.active_count = state.active_count;
-    structure.header.node_slots = slots;
-    structure.header.code_bits = bits;
+    structure.header.node_slots = max(primitive_count, 2) - 1;
+    structure.header.code_bits = kind_of_codes().bits;
     structure.header.inner_nodes = max(state.active_count, 1) - 1;
-    uint geometry_count = count_geometries(geometries());
     structure.header.geometry_count = geometry_count;
-    GeometryTable table = geometry_table_at(structure_address, kind_of_records(), slots, primitive_count);
-    structure.header.geometry_flags = write_geometries(geometries(), geometry_count, table);
+    structure.header.geometry_flags = geometry_flags;
     structure.header.build_flags = code_kind >> 26;
     structure.header.area_scale = 0.0;
     structure.header.cost = 0.0;
@@ -149,21 +185,45 @@ void make_plan() {
     structure.header.split_from = HAS_REFERENCES ? split_state_before(state_address).primitive_count : 0;
     for (uint i = 0; i < 8; ++i) structure.header.reserved[i] = 0;
     if (primitive_count < 2) mark_unused(structure, 0);
+}
+
+// Of bounds that hold something: an axis a lane, the others by one.
+void write_recipe(BuildState state, Box boxes, Box bounds) {
+    for (uint axis = gl_LocalInvocationIndex; axis < 3; axis += gl_WorkGroupSize.x) {
+        state.plan.axes[axis] = axis_of(bounds.lo[axis], bounds.hi[axis]);
+    }
+    if (gl_LocalInvocationIndex != 0) return;
+    CodePlan plan = plan_codes(kind_of_codes(), bounds, boxes);
+    state.plan.size_prescale = plan.size_prescale;
+    state.plan.size_reciprocal = plan.size_reciprocal;
+    state.plan.area_scale = plan.area_scale;
+    state.plan.stretches = plan.stretches;
+    if (HAS_GRID) state.plan.grid = plan.grid;
+    if (HAS_SECTIONS && state.plan.sections.head != 0) state.plan.sections.head = head_of(plan.stretches);
+    Structure structure = Structure(structure_address);
+    structure.header.area_scale = plan.area_scale;
+    structure.header.built_area = scaled_half_area(boxes, plan.area_scale);
+}
+
+// By the workgroup together.
+void make_plan() {
+    BuildState state = BuildState(state_address);
+    uint geometry_count = count_geometries(geometries()), slots = max(primitive_count, 2) - 1;
+    GeometryTable table = geometry_table_at(structure_address, kind_of_records(), slots, primitive_count);
+    uint geometry_flags = write_geometries_together(geometries(), geometry_count, table);
+    if (gl_LocalInvocationIndex == 0) write_header(state, geometry_count, geometry_flags);
+    if (HAS_SECTIONS) {
+        find_sections();
+        next_phase();
+    }
     if (state.active_count == 0) return;
     Box boxes = bounds_of_boxes(state);
     Box centroids = Box(from_ordered(uvec3(state.centroids_lo[0], state.centroids_lo[1], state.centroids_lo[2])),
                         from_ordered(uvec3(state.centroids_hi[0], state.centroids_hi[1], state.centroids_hi[2])));
-    CodeKind kind = kind_of_codes();
-    Box bounds = code_bounds(boxes, centroids, kind.bounds);
+    Box bounds = code_bounds(boxes, centroids, kind_of_codes().bounds);
     if (HAS_SECTIONS && state.plan.sections.head != 0) bounds = state.plan.sections.core;
-    CodePlan plan = plan_codes(kind, bounds, boxes);
-    if (HAS_SECTIONS) {
-        plan.sections = state.plan.sections;
-        if (plan.sections.head != 0) plan.sections.head = head_of(plan.stretches);
-    }
-    state.plan = plan;
-    structure.header.area_scale = state.plan.area_scale;
-    structure.header.built_area = scaled_half_area(boxes, state.plan.area_scale);
+    if (HAS_SECTIONS) barrier();   // the head is about to change
+    write_recipe(state, boxes, bounds);
 }
 
 // ---- what the cells of a grid say; one workgroup ----

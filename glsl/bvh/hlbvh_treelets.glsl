@@ -53,22 +53,27 @@ void hlbvh_treelets(uint task) {
     Run run = run_of(task);
     uint position = run.first;
     uint end = min(position + ITEMS, run.active_count);
-    // First the leaves of the run; then what waits, last first.
-    for (uint turn = 0; turn < 2u * ITEMS; ++turn) {
-        Subtree s;
-        if (position < end) {
-            Cluster c = cluster_of_primitive(input_geometries, position, area_scale);
-            s.first = position;
-            s.last = position;
-            s.child = child_of(c);
-            s.cost = c.cost;
-            position++;
-        } else if (run.waiting > 0u) {
-            s = take_waiting(run, end);
-        } else {
-            break;
+    for (uint turn = 0; turn < TURNS; ++turn) {
+        begin_turn(run, turn);
+        uint split = gl_LocalInvocationIndex;
+        // First the leaves of the run; then what waits, last first; in the second turn what is left over.
+        for (uint taken = 0; taken < 2u * ITEMS; ++taken) {
+            Subtree s;
+            if (position < end) {
+                Cluster c = cluster_of_primitive(input_geometries, position, area_scale);
+                s.first = position;
+                s.last = position;
+                s.child = child_of(c);
+                s.cost = c.cost;
+                position++;
+            } else if (run.waiting > 0u) {
+                s = take_waiting(run, end);
+            } else if (!MEETS_IN_GROUP || turn == 0u || !take_left_over(run, split, s)) {
+                break;
+            }
+            climb(run, w, area_scale, s);
         }
-        climb(run, w, area_scale, s);
+        end_turn();
     }
 }
 

@@ -61,25 +61,30 @@ void lbvh_hierarchy(uint task) {
     uint position = run.first;
     uint end = min(position + ITEMS, primitive_count);
     uint unused = 0;
-    // First the leaves of the run; then what waits, last first.
-    while (true) {
-        Subtree s;
-        bool climbs = true;
-        if (position < end) {
-            Box b;
-            write_reference(records, position, input_geometries, order.word[position], b);
-            climbs = position < run.active_count;
-            s.first = position;
-            s.last = position;
-            s.child = Child(b.lo, position, b.hi, 1);
-            s.cost = leaf_cost(c_i, scaled_half_area(b, area_scale), 1);
-            position++;
-        } else if (run.waiting > 0) {
-            s = take_waiting(run, min(end, run.active_count));
-        } else {
-            break;
+    for (uint turn = 0; turn < TURNS; ++turn) {
+        begin_turn(run, turn);
+        uint split = gl_LocalInvocationIndex;
+        // First the leaves of the run; then what waits, last first; in the second turn what is left over.
+        while (true) {
+            Subtree s;
+            bool climbs = true;
+            if (position < end) {
+                Box b;
+                write_reference(records, position, input_geometries, order.word[position], b);
+                climbs = position < run.active_count;
+                s.first = position;
+                s.last = position;
+                s.child = Child(b.lo, position, b.hi, 1);
+                s.cost = leaf_cost(c_i, scaled_half_area(b, area_scale), 1);
+                position++;
+            } else if (run.waiting > 0) {
+                s = take_waiting(run, min(end, run.active_count));
+            } else if (!MEETS_IN_GROUP || turn == 0 || !take_left_over(run, split, s)) {
+                break;
+            }
+            if (climbs) climb(run, area_scale, s, unused);
         }
-        if (climbs) climb(run, area_scale, s, unused);
+        end_turn();
     }
     unused = subgroupAdd(unused);
     if (unused > 0 && subgroupElect()) atomicAdd(run.structure.header.inner_nodes, -unused);

@@ -18,13 +18,16 @@
 #include "bvh/clusters.glsl"
 #include "bvh/tiles.glsl"
 
-layout(constant_id = 7) const uint RADIUS = 16;
+// Neighbours on either side that a cluster looks at; whether boxes are cached in shared memory << 16.
+layout(constant_id = 7) const uint RADIUS_WORD = 16;
+const uint RADIUS = RADIUS_WORD & 0xFFFFu;
+const bool CACHES = RADIUS_WORD >> 16 != 0u;
 // Clusters that rounds look at before any is forced: so many a primitive, and so many anyway.
 const uint LOOKS = 16;
 const uint LOOKS_ANYWAY = 1u << 17;
 // Of a round's clusters, one in so many falls away, or it is slow.
 const uint SLOW = 16;
-const uint CACHED = PRIVATE_COUNTERS ? 1u : gl_WorkGroupSize.x + 2u * RADIUS;
+const uint CACHED = CACHES ? gl_WorkGroupSize.x + 2u * RADIUS : 1u;
 
 // On a GPU, the boxes of a tile and of what is near it.
 shared vec3 cached_lo[CACHED];
@@ -85,7 +88,7 @@ void ploc_search(uint task, uint round) {
         uint begin = task * tile_size() + k * gl_WorkGroupSize.x;
         if (begin >= count) break;
         uint own = begin + gl_LocalInvocationIndex;
-        if (!PRIVATE_COUNTERS) {
+        if (CACHES) {
             barrier();
             for (uint i = gl_LocalInvocationIndex; i < CACHED; i += gl_WorkGroupSize.x) {
                 uint other = begin + i - RADIUS;
@@ -100,19 +103,19 @@ void ploc_search(uint task, uint round) {
         Box mine = box_of_cluster(list, clusters, min(own, count - 1u));
         float best = uintBitsToFloat(0x7F800000u);
         uint best_other = own;
-        // On a CPU all lanes look at the same cluster: one load instead of one a lane.
-        uint from = PRIVATE_COUNTERS ? uint(max(int(begin) - int(RADIUS), 0)) : 0u;
-        uint turns = PRIVATE_COUNTERS ? min(begin + gl_WorkGroupSize.x + RADIUS, count) - from : 2u * RADIUS + 1u;
+        // Without a cache all lanes look at the same cluster: one load instead of one a lane.
+        uint from = CACHES ? 0u : uint(max(int(begin) - int(RADIUS), 0));
+        uint turns = CACHES ? 2u * RADIUS + 1u : min(begin + gl_WorkGroupSize.x + RADIUS, count) - from;
         for (uint turn = 0; turn < turns; ++turn) {
-            uint other = PRIVATE_COUNTERS ? from + turn : own + turn - RADIUS;
+            uint other = CACHES ? own + turn - RADIUS : from + turn;
             // Before the first wraps around to far behind the last.
             bool looks = other < count && other != own && other + RADIUS >= own && other <= own + RADIUS;
             Box theirs;
-            if (PRIVATE_COUNTERS) {
-                theirs = box_of_cluster(list, clusters, other);
-            } else {
+            if (CACHES) {
                 uint cached = gl_LocalInvocationIndex + turn;
                 theirs = Box(cached_lo[cached], cached_hi[cached]);
+            } else {
+                theirs = box_of_cluster(list, clusters, other);
             }
             float distance = distance_of(mine, theirs, area_scale);
             if (looks && distance < best) {

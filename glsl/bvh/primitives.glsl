@@ -34,6 +34,28 @@ uint write_geometries(Geometry g, uint count, GeometryTable table) {
     return all | any << 8;
 }
 
+shared uint flags_of_all;
+shared uint flags_of_any;
+
+// The same by the workgroup together, which all get what it returns.
+uint write_geometries_together(Geometry g, uint count, GeometryTable table) {
+    if (!has_records()) return write_geometries(g, count, table);
+    if (gl_LocalInvocationIndex == 0) {
+        flags_of_all = 0xFFu;
+        flags_of_any = 0u;
+    }
+    barrier();
+    Geometries given = Geometries(g.vertices);
+    for (uint i = gl_LocalInvocationIndex; i < count; i += gl_WorkGroupSize.x) {
+        uint flags = flags_of(given.geometry[i]);
+        if (count > 1) table.entry[i] = GeometryEntry(given.geometry[i].first, flags);
+        atomicAnd(flags_of_all, flags);
+        atomicOr(flags_of_any, flags);
+    }
+    barrier();
+    return flags_of_all | flags_of_any << 8;
+}
+
 // The box of a primitive; returns 0, or why it is left out: a status bit or INACTIVE.
 uint load_box(Geometry g, uint primitive, out Box b) {
     uint why_not;

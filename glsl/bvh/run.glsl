@@ -1,6 +1,10 @@
 // Climbing the radix tree from a run of positions (Apetrei 2014): of two siblings the second to arrive goes on with their parent.
 // An invocation that has a run of positions meets most siblings itself and asks the others only at the run's two ends: atomics and
 // their fences were a third of the time.
+//
+// On a GPU runs are short, and a fence for the device costs hundreds of cycles. There a task has two turns. In the first,
+// invocations meet in shared memory, as far as the workgroup's positions go, with fences for the workgroup alone. In the second
+// those subtrees go on whose siblings reach beyond it, a few for each level: they meet those of other workgroups.
 #ifndef HEDGEROW_BVH_RUN
 #define HEDGEROW_BVH_RUN
 #include "bvh/build_state.glsl"
@@ -16,6 +20,9 @@ struct Subtree {
     float cost;
 };
 
+const bool MEETS_IN_GROUP = ITEMS_WORD >> 16 != 0u;
+const uint TURNS = MEETS_IN_GROUP ? 2u : 1u;
+
 // A run from a position on, or NONE once its leaves are done; how many left children wait in it.
 struct Run {
     Structure structure;
@@ -27,11 +34,20 @@ struct Run {
     uint active_count;
     uint first;
     uint waiting;
+    uint group_first;   // the task's first position
+    bool in_group;      // meets those of the workgroup
 };
 
 // Left children that wait for a sibling out of the same run of positions: where each begins. They lie side by side and end
 // with the run so far, so that the last of them is the sibling of whichever right child comes next.
 shared uint run_firsts[ITEMS * gl_WorkGroupSize.x];
+
+// For each split from the one before the task's positions to the one behind them, the far end of the child that came first, with
+// its side; or that both came.
+const uint GROUP_SPLITS = MEETS_IN_GROUP ? ITEMS * gl_WorkGroupSize.x + 1u : 1u;
+const uint LEFT_SIDE = 1u << 31;
+const uint BOTH_CAME = 0x7FFFFFFFu;
+shared uint group_ends[GROUP_SPLITS];
 
 uint run_slot(uint level) {
     return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
@@ -49,7 +65,44 @@ Run run_of(uint task) {
     run.active_count = BuildState(state_address).active_count;
     run.first = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
     run.waiting = 0u;
+    run.group_first = task * gl_WorkGroupSize.x * ITEMS;
+    run.in_group = false;
     return run;
+}
+
+// By the workgroup together. In the second turn nobody has a run any more.
+void begin_turn(inout Run run, uint turn) {
+    if (!MEETS_IN_GROUP) return;
+    run.in_group = turn == 0u;
+    if (turn == 0u) {
+        for (uint i = gl_LocalInvocationIndex; i < GROUP_SPLITS; i += gl_WorkGroupSize.x) group_ends[i] = NONE;
+        barrier();
+    } else {
+        run.first = NONE;
+    }
+}
+
+// By the workgroup together: what was written in the turn, the next reads.
+void end_turn() {
+    if (MEETS_IN_GROUP) next_phase();
+}
+
+// The next subtree, from this split on, whose sibling has not come in the workgroup.
+bool take_left_over(Run run, inout uint split, out Subtree s) {
+    for (; split < GROUP_SPLITS; split += gl_WorkGroupSize.x) {
+        uint end = group_ends[split];
+        if (end == NONE || end == BOTH_CAME) continue;
+        uint parent = run.group_first + split - 1u;
+        bool is_left = (end & LEFT_SIDE) != 0u;
+        s.first = is_left ? end & ~LEFT_SIDE : parent + 1u;
+        s.last = is_left ? parent : end;
+        if (is_left) s.child = run.structure.nodes[parent].left;
+        else s.child = run.structure.nodes[parent].right;
+        s.cost = is_left ? run.left_costs.value[parent] : run.right_costs.value[parent];
+        split += gl_WorkGroupSize.x;
+        return true;
+    }
+    return false;
 }
 
 // The last of those that wait, once the leaves up to `end` are done: its sibling begins behind the run.
@@ -80,6 +133,24 @@ uint parent_of(Subtree s, bool is_left) {
     return is_left ? s.last : s.first - 1u;
 }
 
+// Tells where a child ends; returns where its sibling does, or NONE if that has not come yet.
+uint meet_in_group(Run run, uint parent, bool is_left, uint end) {
+    uint split = parent + 1u - run.group_first;
+    memoryBarrier(gl_ScopeWorkgroup, gl_StorageSemanticsBuffer, gl_SemanticsRelease | gl_SemanticsMakeAvailable);
+    uint other = atomicExchange(group_ends[split], is_left ? end | LEFT_SIDE : end);
+    if (other == NONE) return NONE;
+    memoryBarrier(gl_ScopeWorkgroup, gl_StorageSemanticsBuffer, gl_SemanticsAcquire | gl_SemanticsMakeVisible);
+    atomicExchange(group_ends[split], BOTH_CAME);
+    return other & ~LEFT_SIDE;
+}
+
+uint meet_in_device(Run run, uint parent, uint end) {
+    release_to_device();
+    uint other = atomicExchange(run.ends.word[parent], end);
+    if (other != NONE) acquire_from_device();
+    return other;
+}
+
 // Whether the sibling is there; then `s` has the positions and the box of both.
 bool step_up(inout Run run, bool is_left, uint parent, inout Subtree s, out float sibling_cost) {
     if (is_left) {
@@ -97,9 +168,9 @@ bool step_up(inout Run run, bool is_left, uint parent, inout Subtree s, out floa
         run.waiting--;
         end = run_firsts[run_slot(run.waiting)];
     } else {
-        release_to_device();
-        end = atomicExchange(run.ends.word[parent], is_left ? s.first : s.last);
-        if (end != NONE) acquire_from_device();
+        uint own_end = is_left ? s.first : s.last;
+        if (MEETS_IN_GROUP && run.in_group) end = meet_in_group(run, parent, is_left, own_end);
+        else end = meet_in_device(run, parent, own_end);
     }
     if (end != NONE) {
         Child sibling;

@@ -224,6 +224,10 @@ impl Codes {
     }
 }
 
+/// Bytes of shared memory that the kernels of builds take beside the sort's and a method's own, at most: ends of climbs, partial
+/// sums, the pool.
+const SHARED_BY_ALL: u32 = 4096;
+
 impl Builder {
     /// Primitives that [`Schedule::Workgroup`] takes at most.
     pub const WORKGROUP_MAX: u32 = 1 << 16;
@@ -276,7 +280,8 @@ impl Builder {
         }
         // One primitive has one tree, which the LBVH's kernels make; those of PLOC crash Mesa 26's lavapipe where there are none.
         let method = if count < 2 { Method::Lbvh } else { options.method };
-        let shape = Shape::of(context);
+        let shape =
+            if schedule == Schedule::Chain { Shape::of(context) } else { Shape::of(context).with_short_tiles() };
         let optimise = options.optimise.map(|options| Reinsertion::new(context, &options, count));
         let items = if alone { tuning.alone_run } else { run_of(tuning, method, count, shape.workgroup) };
         let encode = Encode {
@@ -284,6 +289,11 @@ impl Builder {
             collapse: options.collapse,
             shape: if alone { shape.with_digit_bits(tuning.small_digit_bits) } else { shape },
             items,
+            bounds_items: tuning.bounds_run.max(items),
+            // Persistent kernels are large as they are: lavapipe's compiler takes a third longer for it.
+            meets_in_group: tuning.meets_in_group && schedule != Schedule::Persistent,
+            sharers: tuning.workers,
+            shared_left: context.limits.shared_memory.saturating_sub(shape.shared_bytes() + SHARED_BY_ALL),
             count,
             split,
             primitives: options.primitives,

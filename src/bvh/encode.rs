@@ -20,6 +20,14 @@ pub(super) struct Encode {
     pub shape: Shape,
     /// Items of an invocation in a task.
     pub items: u32,
+    /// The same where a dispatch of its own finds the bounds.
+    pub bounds_items: u32,
+    /// Whether climbs meet in the workgroup first.
+    pub meets_in_group: bool,
+    /// Workgroups that share what only the device knows the number of.
+    pub sharers: u32,
+    /// Bytes of shared memory of a workgroup that a method may take beside the sort.
+    pub shared_left: u32,
     /// What the tree is over: primitives, or references to split ones.
     pub count: u32,
     /// What makes those references.
@@ -139,8 +147,13 @@ impl Encode {
         count.div_ceil(self.shape.workgroup * self.items)
     }
 
+    /// Specialisation constants 1 to 4 of every kernel.
+    fn constants(&self) -> [u32; 4] {
+        self.shape.constants(self.items | u32::from(self.meets_in_group) << 16, self.key_words())
+    }
+
     pub fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
-        Kernel::new(shader, self.shape.workgroup, &self.shape.constants(self.items, self.key_words()))
+        Kernel::new(shader, self.shape.workgroup, &self.constants())
     }
 
     /// A kernel that reads primitives.
@@ -150,7 +163,7 @@ impl Encode {
 
     /// The same with specialisation constants from 7 on.
     pub fn reading_kernel_with(&self, shader: &'static shaders::Shader, input: &Input, more: &[u32]) -> Kernel {
-        let constants = self.shape.constants(self.items, self.key_words());
+        let constants = self.constants();
         let references = if self.split.is_some() { HAS_REFERENCES } else { 0 };
         let source = [input.source_constant(self.primitives) | references, self.codes.prefix_number()];
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source, more].concat())
@@ -158,27 +171,33 @@ impl Encode {
 
     /// A kernel that reads primitives before they are split.
     pub fn unsplit_kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
-        let constants = self.shape.constants(self.items, self.key_words());
+        let constants = self.constants();
         let source = [input.source_constant(self.primitives)];
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source].concat())
     }
 
     /// The kernel of a `reset` shader.
     pub fn reset_kernel(&self, shader: &'static shaders::Shader) -> Kernel {
-        let constants = self.shape.constants(self.items, self.key_words());
+        let constants = self.constants();
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &[0, self.codes.prefix_number()]].concat())
+    }
+
+    /// The same with the items that the bounds are found by.
+    fn for_bounds(&self) -> Encode {
+        Encode { items: self.bounds_items, ..self.clone() }
     }
 
     /// The kernels of [`Encode::steps`].
     pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
         let sort = [&shaders::GPU_RADIX_SORT_COUNT, &shaders::GPU_RADIX_SORT_SCAN, &shaders::GPU_RADIX_SORT_SCATTER];
-        let mut reading = vec![&shaders::BVH_ENCODE_BOUNDS, &shaders::BVH_ENCODE_PLAN, &shaders::BVH_ENCODE_CODES];
+        let mut reading = vec![&shaders::BVH_ENCODE_PLAN, &shaders::BVH_ENCODE_CODES];
         if self.codes.has_grid() {
             reading.extend([&shaders::BVH_ENCODE_CELLS, &shaders::BVH_ENCODE_PREFIXES]);
         }
         let mut kernels = vec![self.reset_kernel(&shaders::BVH_ENCODE_RESET)];
         kernels.extend(sort.map(|shader| self.kernel(shader)));
         kernels.extend(reading.into_iter().map(|shader| self.reading_kernel(shader, input)));
+        kernels.push(self.for_bounds().reading_kernel(&shaders::BVH_ENCODE_BOUNDS, input));
         kernels
     }
 
@@ -230,9 +249,10 @@ impl Encode {
         let reading = |phase, shader, groups| Step::new(phase, self.reading_kernel(shader, input), arguments, groups);
         let sort = radix_sort::Sort { count: self.count, bits: self.codes.bits, identity: true };
         let buffers = radix_sort::Buffers { keys: arguments.keys, values: arguments.values, table: arguments.table };
+        let bounds = self.for_bounds();
         let mut steps = vec![
             Step::new("bounds", self.reset_kernel(&shaders::BVH_ENCODE_RESET), arguments, 1),
-            reading("bounds", &shaders::BVH_ENCODE_BOUNDS, self.tiles()),
+            Step::new("bounds", bounds.reading_kernel(&shaders::BVH_ENCODE_BOUNDS, input), arguments, bounds.tiles()),
             reading("encode", &shaders::BVH_ENCODE_PLAN, 1),
         ];
         if self.codes.has_grid() {

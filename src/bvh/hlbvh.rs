@@ -18,7 +18,7 @@ fn levels(count: u32) -> u32 {
 
 /// Workgroups that share what only the device knows the number of.
 fn groups(encode: &Encode) -> u32 {
-    encode.tiles().min(if encode.shape.private_counters { 64 } else { 1024 })
+    encode.tiles().min(encode.sharers)
 }
 
 /// Bytes behind the clusters: what names each task of two levels. A task has two treelets at least.

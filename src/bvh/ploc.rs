@@ -26,7 +26,7 @@ fn rounds(count: u32) -> u32 {
 
 /// The workgroups of a round, which share its tiles.
 fn groups(encode: &Encode) -> u32 {
-    encode.tiles().min(if encode.shape.private_counters { 64 } else { 1024 })
+    encode.tiles().min(encode.sharers)
 }
 
 /// The kernels of a build with this radius.
@@ -37,14 +37,24 @@ struct Kernels<'a> {
 }
 
 impl Kernels<'_> {
+    /// `RADIUS_WORD` in ploc.glsl: with the boxes of a tile and its neighbours in shared memory, where workgroups have several
+    /// subgroups and the room is there.
+    fn radius_word(&self) -> u32 {
+        /// Of a box.
+        const BYTES: u32 = 24;
+        let Kernels { encode, radius, .. } = self;
+        let fits = BYTES * (encode.shape.workgroup + 2 * radius) <= encode.shared_left;
+        radius | u32::from(!encode.shape.private_counters && fits) << 16
+    }
+
     /// Specialised for even and odd rounds.
     fn of_round(&self, shader: &'static shaders::Shader, round: u32) -> Kernel {
-        self.encode.reading_kernel_with(shader, self.input, &[self.radius, round % 2])
+        self.encode.reading_kernel_with(shader, self.input, &[self.radius_word(), round % 2])
     }
 
     fn of_pool(&self, shader: &'static shaders::Shader) -> Kernel {
         let rounds = rounds(self.encode.count);
-        self.encode.reading_kernel_with(shader, self.input, &[self.radius, rounds])
+        self.encode.reading_kernel_with(shader, self.input, &[self.radius_word(), rounds])
     }
 
     /// Kernels and workgroups, a barrier between each two.

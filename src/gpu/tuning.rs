@@ -87,7 +87,11 @@ pub struct BuildTuning {
     pub enough_groups: u32,
     /// Items that an invocation takes where one workgroup builds everything.
     pub alone_run: u32,
-    /// Workgroups of a persistent dispatch.
+    /// Items that an invocation takes of the scene's bounds, whose workgroups all tell theirs at one place.
+    pub bounds_run: u32,
+    /// Whether invocations that climb the radix tree meet in their workgroup first, or all in the device.
+    pub meets_in_group: bool,
+    /// Workgroups of a persistent dispatch, and of others that share what only the device knows the number of.
     pub workers: u32,
     /// Primitives up to which one workgroup builds everything. Of more, the chain: on lavapipe it is 1.2 to 1.5 times as fast as the
     /// task pool (the loop around the phases costs the persistent kernel its unmasked loads, and whoever waits takes a core from
@@ -163,7 +167,7 @@ impl Tuning {
         Tuning {
             group,
             small_group: group,
-            grid: Grid { workgroup: group, groups: 64, rounds: 64 },
+            grid: Grid { workgroup: group, groups: limits.workgroup_count.min(64), rounds: 64 },
             reduce_rounds: 64,
             scan_rounds: 32,
             measure_rounds: 64,
@@ -177,7 +181,10 @@ impl Tuning {
                 long_run: 128,
                 enough_groups: 64,
                 alone_run: 32,
-                workers: 64,
+                bounds_run: 32,
+                // A workgroup is one subgroup, whose lanes have long runs: what is left is little.
+                meets_in_group: false,
+                workers: limits.workgroup_count.min(64),
                 small: 2048,
                 small_digit_bits: 4,
                 reinsertion_rounds: 64,
@@ -187,7 +194,7 @@ impl Tuning {
             // As many slots as there are bits in a word, so that siblings meet in one; half of that for structures that are over
             // before every lane has a run.
             refit: RefitTuning { run: 32, short_run: 16, small: 4096 },
-            kd: KdTuning { groups: 64, chunk: 256, persistent: true },
+            kd: KdTuning { groups: limits.workgroup_count.min(64), chunk: 256, persistent: true },
             trace: TraceTuning {
                 group,
                 shared_levels: ALL_LEVELS,
@@ -206,19 +213,24 @@ impl Tuning {
         Tuning {
             group,
             small_group,
-            grid: Grid { workgroup: group, groups: limits.workgroup_count.min(512), rounds: 4 },
+            // Half a million invocations: a large GPU holds a quarter of a million at a time.
+            grid: Grid { workgroup: group, groups: limits.workgroup_count.min(2048), rounds: 4 },
             reduce_rounds: 8,
             scan_rounds: 8,
             measure_rounds: 4,
             in_registers: true,
             wide_alone: 1024,
-            sort: Shape::tiles(limits),
+            // Tiles count on the subgroups that they were cut for.
+            sort: if limits.subgroup_is_exact { Shape::tiles(limits) } else { Shape::many_strips(limits) },
             build: BuildTuning {
                 run: 1,
                 long_run: 1,
                 enough_groups: 64,
                 alone_run: 1,
-                workers: 1024,
+                // 10 million primitives are 5,000 workgroups of 256, each of which adds 14 words.
+                bounds_run: 8,
+                meets_in_group: true,
+                workers: limits.workgroup_count.min(1024),
                 small: 2048,
                 small_digit_bits: 4,
                 // A search is long: it is an invocation's only one, as far as there are invocations.
@@ -228,7 +240,7 @@ impl Tuning {
                 rebraid_group: at_most(128),
             },
             refit: RefitTuning { run: 4, short_run: 4, small: 4096 },
-            kd: KdTuning { groups: 1024, chunk: 512, persistent: false },
+            kd: KdTuning { groups: limits.workgroup_count.min(1024), chunk: 512, persistent: false },
             trace: TraceTuning {
                 group: at_most(limits.subgroup_size.max(64)),
                 shared_levels: 8,
