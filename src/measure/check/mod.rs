@@ -78,7 +78,7 @@ impl Ground {
         let is_as_cpu = device.tuning == Tuning::cpu(limits);
         Ground {
             device: found.name.clone(),
-            driver: found.driver.clone(),
+            driver: driver_of(found, limits.driver_version),
             vulkan: format!(
                 "{}.{}.{}",
                 ash::vk::api_version_major(version),
@@ -95,6 +95,14 @@ impl Ground {
             tuning: choice.to_string(),
             tuned_as: if is_as_cpu { "cpu" } else { "gpu" }.to_owned(),
         }
+    }
+}
+
+/// Driver and version as it says them; of one that says nothing the number of its version.
+fn driver_of(found: &crate::gpu::Found, version: u32) -> String {
+    match found.driver.trim() {
+        "" => format!("version {version:#x}"),
+        driver => driver.to_owned(),
     }
 }
 
