@@ -114,7 +114,7 @@ fn spirv_of(source: &Path, name: &str, out: &Path) -> PathBuf {
     let made_of = made_of(source);
     if path.exists()
         && named.join(&file).exists()
-        && fs::read_to_string(&stamp).is_ok_and(|was| was.ends_with(&made_of))
+        && fs::read_to_string(&stamp).is_ok_and(|was| was == made_of)
     {
         return path;
     }
@@ -125,12 +125,11 @@ fn spirv_of(source: &Path, name: &str, out: &Path) -> PathBuf {
     path
 }
 
-/// All text that a shader's SPIR-V follows from: its own, that of every file it includes, and that of what changes it afterwards.
-/// Whoever changes the options of `compile` removes the stamps.
+/// All text that a shader's SPIR-V follows from: its own, that of every file it includes, and this program's.
 #[cfg(feature = "compile-shaders")]
 fn made_of(source: &Path) -> String {
     let mut files = vec![source.to_path_buf()];
-    let mut text = include_str!("build/shared_memory.rs").to_owned();
+    let mut text = concat!(include_str!("build.rs"), include_str!("build/shared_memory.rs")).to_owned();
     let mut next = 0;
     while next < files.len() {
         let content = fs::read_to_string(&files[next]).unwrap_or_default();

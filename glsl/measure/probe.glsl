@@ -18,7 +18,7 @@ const uint CONFIRM_ODD = 2;
 const uint TERMINATE = 3;
 const uint CANDIDATES = 8;
 
-struct Ray {
+struct ProbeRay {
     vec3 origin;
     float t_min;
     vec3 direction;
@@ -57,14 +57,14 @@ struct Report {
     uint opaque_boxes;
 };
 
-layout(buffer_reference, scalar) readonly buffer Rays { Ray ray[]; };
+layout(buffer_reference, scalar) readonly buffer Rays { ProbeRay ray[]; };
 layout(buffer_reference, scalar) writeonly buffer Reports { Report report[]; };
 layout(push_constant, scalar) uniform Probe { uvec2 structure; Rays rays; Reports reports; uint count; };
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
-    Ray ray = rays.ray[i];
+    ProbeRay ray = rays.ray[i];
     Report r;
     for (uint k = 0; k < CANDIDATES; ++k) r.candidates[k] = uvec4(0);
     r.candidate_count = 0;

@@ -12,7 +12,7 @@
 //!
 //! A structure's bytes are the same on every device, with one exception: an instance's record holds the inverse of its matrix,
 //! which takes one division. Vulkan lets a device's quotient be 2.5 units in the last place away from the correctly rounded one.
-//! lavapipe, SwiftShader and most GPUs' drivers of compute shaders round correctly, and there the bytes are those of
+//! lavapipe and SwiftShader round correctly, and there the bytes are those of
 //! [`top_level`]; elsewhere its numbers are within [`top_level::INVERSE_BOUND`] of them, and everything else is the same.
 //!
 //! A structure is copied, compacted, kept in a file and brought back by the calls of the extension ([`serialize`]); what the
