@@ -112,10 +112,7 @@ fn spirv_of(source: &Path, name: &str, out: &Path) -> PathBuf {
     // What both were made of lies beside them: a shader none of whose text has changed is not compiled again.
     let stamp = out.join(format!("{file}.source"));
     let made_of = made_of(source);
-    if path.exists()
-        && named.join(&file).exists()
-        && fs::read_to_string(&stamp).is_ok_and(|was| was == made_of)
-    {
+    if path.exists() && named.join(&file).exists() && fs::read_to_string(&stamp).is_ok_and(|was| was == made_of) {
         return path;
     }
     fs::write(named.join(&file), compile(source, None, shaderc::OptimizationLevel::Zero))
