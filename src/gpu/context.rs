@@ -2,11 +2,12 @@
 
 use super::requirements::{self, Optional, SubgroupSizes};
 use super::shaders::Shader;
-use super::{Tuning, TuningChoice, Workarounds, reconvergence};
+use super::{Tuning, TuningChoice, Workarounds, reconvergence, specialise};
 use crate::{Error, Result};
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 /// What [`Context::new`] takes.
 pub struct ContextDesc<'a> {
@@ -136,6 +137,17 @@ impl Kernel {
         super::shaders::ALL.iter().find(|s| s.name == self.shader).expect("kernels name shaders of the table")
     }
 
+    /// The same in workgroups of `workgroup` invocations.
+    pub(crate) fn in_workgroups_of(mut self, workgroup: u32) -> Kernel {
+        self.constants[0] = workgroup;
+        self
+    }
+
+    /// Path of its shader below `glsl/`.
+    pub fn name(&self) -> &'static str {
+        self.shader
+    }
+
     /// The workgroup size in x.
     pub fn workgroup(&self) -> u32 {
         self.constants[0]
@@ -159,7 +171,8 @@ pub struct Context {
     subgroups_of_a_workgroup: u32,
     layout: vk::PipelineLayout,
     cache: vk::PipelineCache,
-    pipelines: Mutex<HashMap<Kernel, vk::Pipeline>>,
+    /// Each with the time that its making took.
+    pipelines: Mutex<HashMap<Kernel, (vk::Pipeline, Duration)>>,
 }
 
 impl Context {
@@ -225,13 +238,20 @@ impl Context {
         kernels.iter().try_for_each(|kernel| self.pipeline(kernel).map(drop))
     }
 
+    /// The pipelines that there are, and how long each took to be made. Most drivers compile then; lavapipe, at the first dispatch.
+    pub fn pipelines(&self) -> Vec<(Kernel, Duration)> {
+        let pipelines = self.pipelines.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        pipelines.iter().map(|(kernel, &(_, time))| (kernel.clone(), time)).collect()
+    }
+
     pub(super) fn pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
         let mut pipelines = self.pipelines.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        if let Some(&pipeline) = pipelines.get(kernel) {
+        if let Some(&(pipeline, _)) = pipelines.get(kernel) {
             return Ok(pipeline);
         }
+        let begin = Instant::now();
         let pipeline = self.create_pipeline(kernel)?;
-        pipelines.insert(kernel.clone(), pipeline);
+        pipelines.insert(kernel.clone(), (pipeline, begin.elapsed()));
         Ok(pipeline)
     }
 
@@ -247,12 +267,15 @@ impl Context {
     fn create_pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
         let mut words =
             ash::util::read_spv(&mut std::io::Cursor::new(kernel.shader().spirv)).expect("build.rs wrote whole words");
+        let constants = [&kernel.constants[..], &[self.limits.workgroup_count]].concat();
+        let ids = (0..kernel.constants.len() as u32).chain([GROUPS_OF_A_ROW]);
+        if self.workarounds.folded_constants {
+            words = specialise::folded(&words, &ids.clone().zip(constants.iter().copied()).collect());
+        }
         if self.optional.maximal_reconvergence {
             words = reconvergence::maximal(&words);
         }
         let module_info = vk::ShaderModuleCreateInfo::default().code(&words);
-        let constants = [&kernel.constants[..], &[self.limits.workgroup_count]].concat();
-        let ids = (0..kernel.constants.len() as u32).chain([GROUPS_OF_A_ROW]);
         let entries: Vec<_> = (0..)
             .zip(ids)
             .map(|(i, id)| vk::SpecializationMapEntry { constant_id: id, offset: 4 * i, size: 4 })
@@ -292,7 +315,7 @@ impl Drop for Context {
         let pipelines = self.pipelines.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
         // SAFETY: made by this context; the caller has waited for the command buffers that use them.
         unsafe {
-            for (_, pipeline) in pipelines.drain() {
+            for (_, (pipeline, _)) in pipelines.drain() {
                 self.device.destroy_pipeline(pipeline, None);
             }
             self.device.destroy_pipeline_layout(self.layout, None);

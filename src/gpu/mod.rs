@@ -33,6 +33,7 @@ mod requirements;
 mod restrict;
 pub mod scan;
 pub mod shaders;
+mod specialise;
 pub mod task_pool;
 mod tuning;
 mod workarounds;

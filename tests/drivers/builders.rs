@@ -1,0 +1,48 @@
+//! BVHs of every method and schedule, against their twins.
+
+use super::common::twins::{assert_same, on_device, on_host};
+use super::meshes;
+use hedgerow::bvh::builder::{Method, Options, Schedule, Treelets, Window};
+use hedgerow::bvh::codes::{Code, Codes};
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::{reinsertion, split};
+
+fn methods() -> [(Method, Codes); 5] {
+    [
+        (Method::Lbvh, Code::Emc64Var.full()),
+        (Method::Hlbvh(Treelets::DEFAULT), Code::Mc30.full()),
+        (Method::Ploc { radius: 8 }, Code::Mc63.full().with_bits(17)),
+        (Method::Hploc(Window::DEFAULT), Code::Emc64Var.full()),
+        (Method::Hploc(Window::PAPER), Code::Mc30.full()),
+    ]
+}
+
+fn assert_as_on_the_host(options: &Options, schedules: &[Schedule]) {
+    for mesh in meshes() {
+        let expected = on_host(&mesh, options);
+        let what = format!("{} {:?}", mesh.0, options.method);
+        expected.validate().unwrap_or_else(|e| panic!("{what}: {e}"));
+        for &schedule in schedules {
+            let got = on_device(&mesh, &Options { schedule: Some(schedule), ..*options });
+            assert_same(&got, &expected, &format!("{what} {schedule:?}"));
+        }
+    }
+}
+
+pub fn all_give_the_bytes_of_the_host() {
+    for (method, codes) in methods() {
+        for collapse in [Collapse::OFF, Collapse::SAH] {
+            let options = Options { method, codes: Some(codes), collapse, ..Options::DEFAULT };
+            let alone: &[Schedule] = if method == Method::Lbvh { &[Schedule::Workgroup] } else { &[] };
+            assert_as_on_the_host(&options, &[&[Schedule::Chain, Schedule::Persistent], alone].concat());
+        }
+    }
+}
+
+pub fn splits_and_optimised_trees_too() {
+    let optimise = Some(reinsertion::Options { rounds: 3, stride: 2 });
+    let split = Some(split::Options::DEFAULT);
+    let codes = Some(Code::Emc64Var.full());
+    assert_as_on_the_host(&Options { codes, optimise, ..Options::DEFAULT }, &[Schedule::Chain]);
+    assert_as_on_the_host(&Options { codes, split, ..Options::DEFAULT }, &[Schedule::Chain, Schedule::Persistent]);
+}

@@ -1,0 +1,74 @@
+//! Everything that runs on a device, once by each tuning, on whichever driver the loader finds: `make test-drivers` runs it on
+//! SwiftShader, a driver with another compiler than lavapipe's.
+//!
+//! One process and one test: SwiftShader compiles every pipeline anew in each process, when it is made. So the time that
+//! [`Context::pipelines`](hedgerow::gpu::Context::pipelines) tells of is the compiler's, and it is bounded here: by the wall clock,
+//! on a machine that does little else.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod builders;
+mod kd_trees;
+mod structures;
+mod tracers;
+
+use common::corpus::{self, Mesh};
+use common::{device, with_tuning};
+use hedgerow::gpu::{Kernel, TuningChoice};
+use std::time::{Duration, Instant};
+
+/// What a pipeline may take, and one whose kernel does everything.
+const BOUNDS: [Duration; 2] = [Duration::from_secs(3), Duration::from_secs(8)];
+
+#[test]
+#[ignore = "takes minutes where pipelines are compiled anew: make test-drivers runs it on SwiftShader"]
+fn every_pass_gives_the_bytes_of_the_host_by_each_tuning() {
+    // A thread each: most of the time is the compiler's.
+    std::thread::scope(|scope| {
+        for tuning in [TuningChoice::Cpu, TuningChoice::Gpu] {
+            scope.spawn(move || with_tuning(tuning, || run(tuning)));
+        }
+    });
+}
+
+fn run(tuning: TuningChoice) {
+    let parts: [(&str, fn()); 7] = [
+        ("builders", builders::all_give_the_bytes_of_the_host),
+        ("splits and optimised trees", builders::splits_and_optimised_trees_too),
+        ("tracers", tracers::hits_and_work_are_those_of_the_host),
+        ("wide trees", tracers::wide_trees_are_those_of_the_host),
+        ("accel", structures::all),
+        ("kd-trees", kd_trees::builds_and_hits_are_those_of_the_host),
+        ("merging", kd_trees::merges_and_restores_are_those_of_the_host),
+    ];
+    for (name, part) in parts {
+        let begin = Instant::now();
+        part();
+        println!("{} {tuning}: {name} in {:.1} s", device().found().name, begin.elapsed().as_secs_f32());
+    }
+    let mut pipelines = device().pipelines();
+    pipelines.sort_by_key(|(_, time)| std::cmp::Reverse(*time));
+    println!("{tuning}: {} pipelines, the slowest ten:", pipelines.len());
+    for (kernel, time) in pipelines.iter().take(10) {
+        println!("{tuning}: {:6.2} s  {}", time.as_secs_f32(), kernel.name());
+    }
+    for (kernel, time) in &pipelines {
+        let bound = BOUNDS[usize::from(does_everything(kernel))];
+        assert!(*time <= bound, "{} takes {time:?}, more than {bound:?}", kernel.name());
+    }
+}
+
+fn does_everything(kernel: &Kernel) -> bool {
+    ["_persistent", "_workgroup"].iter().any(|end| kernel.name().ends_with(end))
+}
+
+/// Meshes that hurt and are quickly built, none with coordinates whose areas are subnormal: a device may take those for zero.
+fn meshes() -> Vec<Mesh> {
+    let is_usual = |x: &f32| !x.is_finite() || *x == 0.0 || (1e-8..1e8).contains(&x.abs());
+    let hard = hedgerow::scene::degenerate(100).into_iter();
+    let hard = hard.map(|hard| (hard.name.to_owned(), hard.mesh.positions, hard.mesh.triangles));
+    let usual = hard.filter(|(_, positions, _)| positions.iter().flatten().all(is_usual));
+    let random = [3, 9, 129, 1025].map(|count| corpus::random(&format!("random {count}"), count, [-0.5; 3], [1.0; 3]));
+    random.into_iter().chain(usual).collect()
+}

@@ -1,0 +1,105 @@
+//! Tracers of BVHs and of wide trees, cut in every way, against the host's; and wide trees as the device collapses them.
+
+use super::common::device;
+use super::common::shapes::{hard_rays, icosphere, placed, soup, tree_of};
+use hedgerow::bvh::geometry::Primitives;
+use hedgerow::bvh::layout::{Bvh2, Child};
+use hedgerow::bvh::wide::device::{OnDevice, Options};
+use hedgerow::bvh::wide::layout::Wide;
+use hedgerow::bvh::wide::quantised::QuantisedNode;
+use hedgerow::gpu::Recorder;
+use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
+use hedgerow::trace::wide::{Order, Tracer};
+use hedgerow::trace::wide_host::{self, TracedNode};
+use hedgerow::trace::{Hit, Query, Ray, Work, host};
+
+/// Trees and the rays that are traced through them.
+fn cases() -> Vec<(Bvh2, Vec<Ray>)> {
+    let soups = [placed(&soup(300, 0.3, 5), 1.0, [3.0, -3.0, 1.5]), icosphere(3)];
+    soups.iter().map(|corners| (tree_of(corners), hard_rays(corners, 400, 1.0, [0.0; 3], 11))).collect()
+}
+
+/// Cut for CPUs, for GPUs, and without shared memory; lane by lane where there is a kernel for it.
+fn shapes(lanes: bool) -> Vec<Shape> {
+    let limits = &device().limits;
+    let private = Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 5, loads: Loads::Gathered };
+    let by_lanes = lanes && limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES;
+    [Shape::subgroups(limits), Shape::groups(limits), private]
+        .into_iter()
+        .chain(by_lanes.then(|| Shape::lanes(limits)))
+        .collect()
+}
+
+/// What a tracer finds, which `record` records; rays count their work.
+pub fn traced(
+    structure: &[u8],
+    rays: &[Ray],
+    record: impl FnOnce(&mut Recorder<'_>, &Buffers) -> hedgerow::Result<()>,
+) -> Vec<(Hit, Work)> {
+    let structure = device().upload("structure", structure).expect("memory");
+    let ray_buffer = device().upload("rays", rays).expect("memory");
+    let hits = device().buffer("hits", size_of::<Hit>() as u64 * rays.len() as u64).expect("memory");
+    let work = device().buffer("work", size_of::<Work>() as u64 * rays.len() as u64).expect("memory");
+    let buffers = Buffers {
+        structure: structure.address(),
+        rays: ray_buffer.address(),
+        hits: hits.address(),
+        work: Some(work.address()),
+        count: rays.len() as u32,
+    };
+    device().run(None, |recorder| record(recorder, &buffers)).expect("the device traces");
+    hits.read(rays.len()).into_iter().zip(work.read(rays.len())).collect()
+}
+
+pub fn hits_and_work_are_those_of_the_host() {
+    for (tree, rays) in cases() {
+        for query in [Query::ClosestHit, Query::AnyHit] {
+            let expected: Vec<_> = rays.iter().map(|ray| host::trace(&tree, ray, query)).collect();
+            for shape in shapes(true) {
+                let got = traced(&tree.to_bytes(), &rays, |r, buffers| tracer::record(r, &shape, query, buffers));
+                assert_eq!(got, expected, "{shape:?} {query:?}");
+            }
+        }
+    }
+}
+
+pub fn wide_trees_are_those_of_the_host() {
+    for (tree, rays) in cases() {
+        assert_form::<[Child; 4]>(&tree, &rays);
+        assert_form::<[Child; 8]>(&tree, &rays);
+        assert_form::<QuantisedNode>(&tree, &rays);
+    }
+}
+
+fn assert_form<N: TracedNode>(tree: &Bvh2, rays: &[Ray]) {
+    let wide = Wide::<N>::of(tree);
+    assert!(collapsed::<N>(tree) == wide.to_bytes(), "{}: other bytes", N::FORM);
+    let quantised = N::FORM.is_quantised();
+    let orders = if quantised { &[Order::Distance, Order::Octant][..] } else { &[Order::Distance] };
+    for &order in orders {
+        for shape in shapes(order == Order::Octant) {
+            let tracer = Tracer::with(&device().limits, N::FORM, order, shape);
+            for query in [Query::ClosestHit, Query::AnyHit] {
+                let expected: Vec<_> = rays.iter().map(|ray| wide_host::trace(&wide, ray, query, order)).collect();
+                let got = traced(&wide.to_bytes(), rays, |r, buffers| tracer.record(r, query, buffers));
+                assert_eq!(got, expected, "{tracer:?} {query:?}");
+            }
+        }
+    }
+}
+
+/// The bytes in use of the wide tree that the device makes.
+fn collapsed<N: TracedNode>(tree: &Bvh2) -> Vec<u8> {
+    let header = &tree.header;
+    let options = Options { form: N::FORM, primitives: Primitives::Triangles, geometry_count: header.geometry_count };
+    let wide = OnDevice::new(device(), &options, header.primitive_count);
+    let sizes = wide.sizes();
+    let source = device().upload("source", &tree.to_bytes()).expect("memory");
+    let target = device().buffer("target", sizes.structure).expect("memory");
+    let scratch = device().buffer("scratch", sizes.scratch).expect("memory");
+    device()
+        .run(None, |r| wide.record(r, source.address(), target.address(), scratch.address()))
+        .expect("the device collapses");
+    let record_bytes = size_of::<hedgerow::bvh::layout::Triangle>() as u64;
+    target.read(N::FORM.bytes_in_use(&target.read(1)[0], record_bytes) as usize)
+}
