@@ -142,7 +142,7 @@ fn trace(c: &mut Criterion) {
         ("gathered", Shape { rays_each: 1, ..Shape::subgroups(&device.limits) }),
         ("gathered, ray after ray", Shape::subgroups(&device.limits)),
     ];
-    if device.limits.subgroup_size <= Loads::MAX_LANES {
+    if device.limits.subgroup_is_exact && device.limits.subgroup_size <= Loads::MAX_LANES {
         shapes.push(("lane by lane", Shape::lanes(&device.limits)));
     }
     for kind in KINDS {

@@ -23,7 +23,7 @@ fn shapes() -> Vec<Shape> {
         Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
         Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
     ];
-    if limits.subgroup_size <= Loads::MAX_LANES {
+    if limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES {
         shapes.push(Shape::lanes(limits));
         shapes.push(Shape { shared_levels: 3, rays_each: 5, ..Shape::lanes(limits) });
     }

@@ -33,7 +33,7 @@ fn tracers(form: Form) -> Vec<Tracer> {
         ];
         tracers.extend(shapes.map(|shape| Tracer::with(limits, form, order, shape)));
     }
-    if form.is_quantised() && limits.subgroup_size <= Loads::MAX_LANES {
+    if form.is_quantised() && limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES {
         let few = Shape { shared_levels: 3, rays_each: 5, ..Shape::lanes(limits) };
         tracers.extend([Shape::lanes(limits), few].map(|shape| Tracer::with(limits, form, Order::Octant, shape)));
     }

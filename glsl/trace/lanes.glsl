@@ -12,6 +12,11 @@
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 
+// Lanes of the workgroup, at most 16: gl_WorkGroupSize.x by a constant of its own. Compared as a variable, not in a constant expression:
+// SwiftShader folds what is done to constants, but not constant expressions, and follows each of 2^16 paths through what is left.
+layout(constant_id = 4) const uint LANES = 16;
+uint lane_count = LANES;
+
 // Lanes are named by constants: what is broadcast from a constant lane needs no feature and costs an instruction.
 #define FOR_EACH_LANE(DO) DO(0) DO(1) DO(2) DO(3) DO(4) DO(5) DO(6) DO(7) DO(8) DO(9) DO(10) DO(11) DO(12) DO(13) DO(14) DO(15)
 
@@ -22,7 +27,7 @@ struct EachLane {
 
 EachLane each_lane(uint value) {
     EachLane each;
-#define BROADCAST(lane) each.value[lane] = lane < gl_WorkGroupSize.x ? subgroupBroadcast(value, lane) : 0u;
+#define BROADCAST(lane) each.value[lane] = lane < lane_count ? subgroupBroadcast(value, lane) : 0u;
     FOR_EACH_LANE(BROADCAST)
     return each;
 }
@@ -46,7 +51,7 @@ Child own_child(bool own, Child theirs, Child mine) {
 Node node_of_each_lane(Structure structure, EachLane index) {
     Node mine = Node(Child(vec3(0.0), 0u, vec3(0.0), 0u), Child(vec3(0.0), 0u, vec3(0.0), 0u));
 #define LOAD_NODE(lane)                                        \
-    if (lane < gl_WorkGroupSize.x) {                           \
+    if (lane < lane_count) {                                        \
         Node theirs = structure.nodes[index.value[lane]];      \
         bool own = gl_SubgroupInvocationID == lane;            \
         mine.left = own_child(own, theirs.left, mine.left);    \
@@ -59,7 +64,7 @@ Node node_of_each_lane(Structure structure, EachLane index) {
 Triangle triangle_of_each_lane(Triangles triangles, EachLane index) {
     Triangle mine = Triangle(vec3(0.0), vec3(0.0), vec3(0.0), 0u);
 #define LOAD_TRIANGLE(lane)                                            \
-    if (lane < gl_WorkGroupSize.x) {                                   \
+    if (lane < lane_count) {                                                \
         Triangle theirs = triangles.triangle[index.value[lane]];       \
         bool own = gl_SubgroupInvocationID == lane;                    \
         mine.v0 = own ? theirs.v0 : mine.v0;                           \

@@ -17,6 +17,7 @@ layout(constant_id = 2) const bool COUNT_WORK = false;
 layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
 
+#include "trace/vector_loads.glsl"
 #include "trace/walk.glsl"
 
 void main() {
@@ -38,9 +39,9 @@ void main() {
             begin(rays.ray[i], root, usable, walk);
             going = true;
         }
-        if (at_node(walk)) visit(structure.nodes[walk.index], walk);
-        if (at_node(walk)) visit(structure.nodes[walk.index], walk);
-        if (at_triangle(walk)) test(triangles.triangle[walk.index], ANY_HIT, walk);
+        if (at_node(walk)) visit(node_at(structure, walk.index), walk);
+        if (at_node(walk)) visit(node_at(structure, walk.index), walk);
+        if (at_triangle(walk)) test(triangle_at(triangles, walk.index), ANY_HIT, walk);
         if (walk.left == NOTHING) {
             going = go_on(walk);
             if (!going) {

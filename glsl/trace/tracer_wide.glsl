@@ -13,9 +13,11 @@ layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 #if QUANTISED
 #include "trace/walk_wide_quantised.glsl"
 #define NODES QuantisedNodes
+#define NODE_AT quantised_node_at
 #else
 #include "trace/walk_wide.glsl"
 #define NODES WideNodes
+#define NODE_AT wide_node_at
 #endif
 
 void main() {
@@ -38,8 +40,8 @@ void main() {
             begin(rays.ray[i], root, usable, walk);
             going = true;
         }
-        if (at_node(walk)) visit_wide(nodes.node[walk.index], walk);
-        if (at_triangle(walk)) test(triangles.triangle[walk.index], ANY_HIT, walk);
+        if (at_node(walk)) visit_wide(NODE_AT(nodes, walk.index), walk);
+        if (at_triangle(walk)) test(triangle_at(triangles, walk.index), ANY_HIT, walk);
         if (walk.left == NOTHING) {
             going = go_on(walk);
             if (!going) {

@@ -12,6 +12,7 @@ layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
 #define HEDGEROW_LEVELS 49
 
+#include "trace/quantised_loads.glsl"
 #include "trace/walk_quantised.glsl"
 
 void main() {
@@ -34,9 +35,9 @@ void main() {
             begin(rays.ray[i], root, usable, walk);
             going = true;
         }
-        if (at_node(walk)) visit(nodes.node[next_node(walk)], walk);
+        if (at_node(walk)) visit(quantised_node_at(nodes, next_node(walk)), walk);
         next_leaf(walk);
-        if (at_triangle(walk)) test(triangles.triangle[walk.record], ANY_HIT, walk);
+        if (at_triangle(walk)) test(triangle_at(triangles, walk.record), ANY_HIT, walk);
         going = go_on(walk);
         if (!going) {
             hits.hit[i] = walk.hit;

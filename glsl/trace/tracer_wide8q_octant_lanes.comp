@@ -18,7 +18,7 @@ layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 QuantisedNode quantised_node_of_each_lane(QuantisedNodes nodes, EachLane index) {
     QuantisedNode mine;
 #define LOAD_QUANTISED(lane)                                 \
-    if (lane < gl_WorkGroupSize.x) {                         \
+    if (lane < lane_count) {                                 \
         QuantisedNode theirs = nodes.node[index.value[lane]]; \
         if (gl_SubgroupInvocationID == lane) mine = theirs;  \
     }

@@ -4,6 +4,7 @@
 // below. So many may wait at once that a shader defines HEDGEROW_LEVELS (src/trace/wide.rs, `Order::stack_levels`).
 #ifndef HEDGEROW_TRACE_WALK_WIDE
 #define HEDGEROW_TRACE_WALK_WIDE
+#include "trace/vector_loads.glsl"
 #include "trace/walk.glsl"
 #include "bvh/wide.glsl"
 #extension GL_EXT_control_flow_attributes : require
@@ -13,6 +14,17 @@ struct WideNode {
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer WideNodes { WideNode node[]; };
+
+WideNode wide_node_at(WideNodes nodes, uint index) {
+    if (!IN_VECTORS) return nodes.node[index];
+    Quads quads = Quads(uvec2(nodes));
+    WideNode node;
+    [[unroll]] for (uint i = 0; i < WIDTH; ++i) {
+        uint at = 2u * (WIDTH * index + i);
+        node.child[i] = child_of_quads(quads.quad[at], quads.quad[at + 1u]);
+    }
+    return node;
+}
 
 // Where the ray enters each child: infinity for those that it does not.
 float wide_enter[WIDTH];

@@ -3,6 +3,7 @@
 #ifndef HEDGEROW_TRACE_WALK_WIDE_QUANTISED
 #define HEDGEROW_TRACE_WALK_WIDE_QUANTISED
 #include "trace/quantised_boxes.glsl"
+#include "trace/quantised_loads.glsl"
 #include "trace/walk_wide.glsl"
 
 void visit_wide(QuantisedNode node, inout Walk walk) {

@@ -99,6 +99,8 @@ pub struct BuildTuning {
     pub small: u32,
     /// Bits of a digit of its sort: with 8, a pass spends more on its table than on a few hundred keys.
     pub small_digit_bits: u32,
+    /// Whether an invocation of H-PLOC merges small windows by itself, in registers, or a team of invocations does.
+    pub merges_alone: bool,
     /// Items that an invocation of reinsertion's passes takes.
     pub reinsertion_rounds: u32,
     /// Entries of a reinsertion's stack in shared memory; the others are private.
@@ -140,6 +142,8 @@ pub struct TraceTuning {
     pub rays_each: u32,
     /// Whether lanes load nodes and triangles one after the other.
     pub lane_by_lane: bool,
+    /// Whether each lane loads them in vectors, or member by member.
+    pub in_vectors: bool,
     /// Whether rays meet the children of quantised nodes by octants, or by distance.
     pub by_octant: bool,
 }
@@ -163,7 +167,7 @@ impl Tuning {
     pub fn cpu(limits: &Limits) -> Tuning {
         let group = limits.subgroup_size;
         // Mesa 26 makes one plain load of what is at the same address for all lanes.
-        let lane_by_lane = limits.loads_uniform_values_once() && group <= MOST_LANES;
+        let lane_by_lane = limits.loads_uniform_values_once() && group <= MOST_LANES && limits.subgroup_is_exact;
         Tuning {
             group,
             small_group: group,
@@ -187,6 +191,7 @@ impl Tuning {
                 workers: limits.workgroup_count.min(64),
                 small: 2048,
                 small_digit_bits: 4,
+                merges_alone: true,
                 reinsertion_rounds: 64,
                 reinsertion_shared: 0,
                 rebraid_group: group,
@@ -200,6 +205,7 @@ impl Tuning {
                 shared_levels: ALL_LEVELS,
                 rays_each: 128,
                 lane_by_lane,
+                in_vectors: false,
                 by_octant: lane_by_lane,
             },
         }
@@ -233,6 +239,9 @@ impl Tuning {
                 workers: limits.workgroup_count.min(1024),
                 small: 2048,
                 small_digit_bits: 4,
+                // As in the paper: of the invocations that climb, ever fewer have a window, and merging one alone takes 28
+                // distances a round and some hundred registers.
+                merges_alone: false,
                 // A search is long: it is an invocation's only one, as far as there are invocations.
                 reinsertion_rounds: 1,
                 // 8 KiB a workgroup: few searches put off more.
@@ -246,6 +255,7 @@ impl Tuning {
                 shared_levels: 8,
                 rays_each: 1,
                 lane_by_lane: false,
+                in_vectors: true,
                 by_octant: true,
             },
         }

@@ -57,7 +57,7 @@ impl Tracer {
     pub fn in_order(context: &Context, form: Form, order: Order) -> Tracer {
         let mut shape = Shape::of(context);
         if order == Order::Distance {
-            shape.loads = Loads::Gathered;
+            shape.loads = if context.tuning.trace.in_vectors { Loads::InVectors } else { Loads::Gathered };
         }
         Tracer::with(&context.limits, form, order, shape)
     }
@@ -75,10 +75,14 @@ impl Tracer {
     /// There is no kernel for that order of such nodes, or for such loads.
     pub fn kernel(&self, query: Query, count_work: bool) -> Result<Kernel> {
         let shader = match (self.form, self.order, self.shape.loads) {
-            (Form::Four, Order::Distance, Loads::Gathered) => &shaders::TRACE_TRACER_WIDE4,
-            (Form::Eight, Order::Distance, Loads::Gathered) => &shaders::TRACE_TRACER_WIDE8,
-            (Form::EightQuantised, Order::Distance, Loads::Gathered) => &shaders::TRACE_TRACER_WIDE8Q,
-            (Form::EightQuantised, Order::Octant, Loads::Gathered) => &shaders::TRACE_TRACER_WIDE8Q_OCTANT,
+            (Form::Four, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_TRACER_WIDE4,
+            (Form::Eight, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_TRACER_WIDE8,
+            (Form::EightQuantised, Order::Distance, Loads::Gathered | Loads::InVectors) => {
+                &shaders::TRACE_TRACER_WIDE8Q
+            }
+            (Form::EightQuantised, Order::Octant, Loads::Gathered | Loads::InVectors) => {
+                &shaders::TRACE_TRACER_WIDE8Q_OCTANT
+            }
             (Form::EightQuantised, Order::Octant, Loads::LaneByLane) => &shaders::TRACE_TRACER_WIDE8Q_OCTANT_LANES,
             (form, order, loads) => {
                 return Err(Error::Argument(format!(
