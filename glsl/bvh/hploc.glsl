@@ -6,14 +6,14 @@
 //
 // Each invocation climbs the radix tree from a run of positions; of two siblings the second to arrive goes on. What it meets
 // there has up to half a window of clusters on either side, which lie side by side from the first position of their subtree on.
-// Where they are more than half a window together, they are merged: small windows by the invocation, others by the whole subgroup.
-// The window has the same width whatever the subgroup's, and so the tree is the same.
+// Where they are more than half a window together, they are merged: by the invocation itself, or by teams of the workgroup's
+// invocations. The window has the same width whatever the device's subgroups, and so the tree is the same.
 //
-// needs one barrier before, behind bvh/encode.glsl's phases; subgroups of any size; workgroups of whole subgroups or less than one
+// needs one barrier before, behind bvh/encode.glsl's phases; subgroups of any size
 #ifndef HEDGEROW_BVH_HPLOC
 #define HEDGEROW_BVH_HPLOC
 #include "bvh/hploc_alone.glsl"
-#include "bvh/hploc_together.glsl"
+#include "bvh/hploc_teams.glsl"
 #include "bvh/radix_tree.glsl"
 
 // Levels of a radix tree: a code bit or a position bit each.
@@ -100,6 +100,7 @@ void hploc_hierarchy(uint task) {
         clusters.cluster[position] = cluster_of_primitive(input_geometries, position, area_scale);
         list.word[position] = position;
     }
+    if (!ALONE) reset_teams();
     uint position = run;
     uint waiting = 0;
     bool leaves_done = false, climbs = false;
@@ -135,7 +136,7 @@ void hploc_hierarchy(uint task) {
         }
         uint left = 0u;
         bool any_works = !done;
-        if (!ALONE) any_works = merge_together(structure, w, clusters, request, merges, done, area_scale, left);
+        if (!ALONE) any_works = merge_in_teams(structure, w, clusters, request, merges, done, area_scale, left);
         else if (merges) left = merge_alone(structure, w, clusters, request, area_scale);
         if (!any_works) break;
         if (merges) s.clusters = left;

@@ -13,16 +13,21 @@ bool slot_is_there[SLOTS];
 float slot_distance[SLOTS];
 uint slot_apart[SLOTS];
 
+// Both, without a branch: 28 copies of what `&&` and `?:` make branches of are paths that a driver may follow one by one (SwiftShader).
+bool both(bool a, bool b) {
+    return all(bvec2(a, b));
+}
+
 // Lets two slots look at each other.
 void look(uint i, uint j, float area_scale) {
     Cluster a = slot_cluster[i], b = slot_cluster[j];
     float distance = distance_of(Box(a.lo, a.hi), Box(b.lo, b.hi), area_scale);
-    bool looks = slot_is_there[i] && slot_is_there[j];
-    bool is_nearer_i = looks && distance < slot_distance[i], is_nearer_j = looks && distance < slot_distance[j];
-    slot_distance[i] = is_nearer_i ? distance : slot_distance[i];
-    slot_apart[i] = is_nearer_i ? i ^ j : slot_apart[i];
-    slot_distance[j] = is_nearer_j ? distance : slot_distance[j];
-    slot_apart[j] = is_nearer_j ? i ^ j : slot_apart[j];
+    bool looks = both(slot_is_there[i], slot_is_there[j]);
+    bool is_nearer_i = both(looks, distance < slot_distance[i]), is_nearer_j = both(looks, distance < slot_distance[j]);
+    slot_distance[i] = mix(slot_distance[i], distance, is_nearer_i);
+    slot_apart[i] = mix(slot_apart[i], i ^ j, is_nearer_i);
+    slot_distance[j] = mix(slot_distance[j], distance, is_nearer_j);
+    slot_apart[j] = mix(slot_apart[j], i ^ j, is_nearer_j);
 }
 
 // Finds the nearest of each slot. They look at each other in the order in which ties are broken. No loop: where shaderc unrolls one,
@@ -46,7 +51,7 @@ uint first_slots_of_pairs() {
     uint pairs = 0u;
     [[unroll]] for (uint i = 0; i < SLOTS; ++i) {
         [[unroll]] for (uint j = i + 1u; j < SLOTS; ++j) {
-            pairs |= slot_apart[i] == (i ^ j) && slot_apart[j] == (i ^ j) ? 1u << i : 0u;
+            pairs |= uint(both(slot_apart[i] == (i ^ j), slot_apart[j] == (i ^ j))) << i;
         }
     }
     return pairs;

@@ -195,6 +195,8 @@ pub struct Builder {
     schedule: Schedule,
     optimise: Option<Reinsertion>,
     workers: u32,
+    /// Of [`Method::Hploc`].
+    merging: hploc::Merging,
     pub(super) encode: Encode,
 }
 
@@ -302,7 +304,9 @@ impl Builder {
             alone,
             method_bytes: method_bytes(method, optimise.as_ref(), count.max(1).into()),
         };
-        Ok(Builder { method, schedule, optimise, workers: tuning.workers, encode })
+        let window = if let Method::Hploc(window) = method { window } else { Window::DEFAULT };
+        let merging = hploc::Merging::of(context, window);
+        Ok(Builder { method, schedule, optimise, workers: tuning.workers, merging, encode })
     }
 
     /// The method: of fewer than two primitives [`Method::Lbvh`], whatever was asked for.
@@ -389,7 +393,7 @@ impl Builder {
             (Method::Lbvh, _) => lbvh::persistent_kernels(encode, input),
             (Method::Hlbvh(treelets), _) => hlbvh::persistent_kernels(encode, treelets, input),
             (&Method::Ploc { radius }, _) => ploc::persistent_kernels(encode, radius, input),
-            (Method::Hploc(window), _) => hploc::persistent_kernels(encode, window, input),
+            (Method::Hploc(_), _) => hploc::persistent_kernels(encode, &self.merging, input),
         });
         kernels
     }
@@ -400,7 +404,7 @@ impl Builder {
             Method::Lbvh => lbvh::kernels(encode, input),
             Method::Hlbvh(treelets) => hlbvh::kernels(encode, treelets, input),
             &Method::Ploc { radius } => ploc::kernels(encode, radius, input),
-            Method::Hploc(window) => hploc::kernels(encode, window, input),
+            Method::Hploc(_) => hploc::kernels(encode, &self.merging, input),
         };
         let mut kernels = [encode.kernels(input), hierarchy].concat();
         if let Some(reinsertion) = optimise {
@@ -472,7 +476,7 @@ impl Builder {
             (Method::Lbvh, _) => lbvh::persistent_steps(encode, input, arguments, workers),
             (Method::Hlbvh(treelets), _) => hlbvh::persistent_steps(encode, treelets, input, arguments, workers),
             (&Method::Ploc { radius }, _) => ploc::persistent_steps(encode, radius, input, arguments, workers),
-            (Method::Hploc(window), _) => hploc::persistent_steps(encode, window, input, arguments, workers),
+            (Method::Hploc(_), _) => hploc::persistent_steps(encode, &self.merging, input, arguments, workers),
         });
         Ok(steps)
     }
@@ -485,7 +489,7 @@ impl Builder {
             Method::Lbvh => lbvh::steps(encode, input, &single),
             Method::Hlbvh(treelets) => hlbvh::steps(encode, treelets, input, &single),
             &Method::Ploc { radius } => ploc::steps(encode, radius, input, &single),
-            Method::Hploc(window) => hploc::steps(encode, window, input, &single),
+            Method::Hploc(_) => hploc::steps(encode, &self.merging, input, &single),
         };
         let mut steps = [encode.steps(input, arguments), hierarchy].concat();
         if let Some(reinsertion) = optimise {

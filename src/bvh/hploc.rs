@@ -6,37 +6,86 @@
 use super::builder::Window;
 use super::encode::{Arguments, Encode};
 use super::geometry::Input;
-use crate::gpu::{Kernel, Step, shaders};
+use crate::gpu::{Context, Kernel, Step, shaders};
 
-fn kernel(encode: &Encode, window: &Window, shader: &'static shaders::Shader, input: &Input) -> Kernel {
-    encode.reading_kernel_with(shader, input, &[window.size, window.radius])
+/// Who merges a window. The tree is the same bytes whoever does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Merging {
+    window: Window,
+    /// Each invocation merges its own windows (`hploc_alone.glsl`), or teams of them do (`hploc_teams.glsl`).
+    alone: bool,
+    /// Invocations of a workgroup of the hierarchy's dispatch, at most: on GPUs few, for the workgroup's barriers divide the steps.
+    group: u32,
+    /// Bytes of shared memory for the windows of teams.
+    shared_memory: u32,
+}
+
+/// Places of the window that an invocation merges by itself: `SLOTS` in hploc_alone.glsl.
+const SLOTS: u32 = 8;
+/// Shared memory for each place of a team's window.
+const PLACE_BYTES: u32 = 44;
+
+impl Merging {
+    pub fn of(context: &Context, window: Window) -> Merging {
+        let tuning = &context.tuning;
+        let sees_all = window.size <= SLOTS && window.radius + 1 >= window.size;
+        Merging {
+            window,
+            alone: tuning.build.merges_alone && sees_all,
+            group: tuning.small_group,
+            // The sort's counters take most of the rest, where one kernel does everything.
+            shared_memory: context.limits.shared_memory / 4,
+        }
+    }
+
+    /// Invocations of a team, in workgroups of so many: one for each place, where there is room for as many teams as that makes.
+    fn team(&self, workgroup: u32) -> u32 {
+        let fits = |team: u32| workgroup / team * self.window.size * PLACE_BYTES <= self.shared_memory;
+        let mut team = self.window.size.next_power_of_two();
+        while team < workgroup && !fits(team) {
+            team *= 2;
+        }
+        if workgroup.is_multiple_of(team) { team } else { workgroup }
+    }
+
+    fn kernel(&self, encode: &Encode, shader: &'static shaders::Shader, input: &Input, workgroup: u32) -> Kernel {
+        let Merging { window, alone, .. } = *self;
+        let constants = [window.size, window.radius, u32::from(alone), self.team(workgroup)];
+        encode.reading_kernel_with(shader, input, &constants).in_workgroups_of(workgroup)
+    }
+
+    fn hierarchy_kernel(&self, encode: &Encode, input: &Input) -> Kernel {
+        self.kernel(encode, &shaders::BVH_HPLOC_HIERARCHY, input, encode.shape.workgroup.min(self.group))
+    }
 }
 
 /// The kernel of [`steps`].
-pub(super) fn kernels(encode: &Encode, window: &Window, input: &Input) -> Vec<Kernel> {
-    vec![kernel(encode, window, &shaders::BVH_HPLOC_HIERARCHY, input)]
+pub(super) fn kernels(encode: &Encode, merging: &Merging, input: &Input) -> Vec<Kernel> {
+    vec![merging.hierarchy_kernel(encode, input)]
 }
 
 /// The dispatch behind [`Encode::steps`]. Label: `hierarchy`.
-pub(super) fn steps(encode: &Encode, window: &Window, input: &Input, arguments: &Arguments) -> Vec<Step> {
-    let kernel = kernel(encode, window, &shaders::BVH_HPLOC_HIERARCHY, input);
-    vec![Step::new("hierarchy", kernel, arguments, encode.tiles())]
+pub(super) fn steps(encode: &Encode, merging: &Merging, input: &Input, arguments: &Arguments) -> Vec<Step> {
+    let kernel = merging.hierarchy_kernel(encode, input);
+    let groups = encode.count.div_ceil(kernel.workgroup() * encode.items);
+    vec![Step::new("hierarchy", kernel, arguments, groups)]
 }
 
 /// The kernels of [`persistent_steps`].
-pub(super) fn persistent_kernels(encode: &Encode, window: &Window, input: &Input) -> Vec<Kernel> {
-    vec![encode.reset_kernel(&shaders::BVH_HPLOC_RESET), kernel(encode, window, &shaders::BVH_HPLOC_PERSISTENT, input)]
+pub(super) fn persistent_kernels(encode: &Encode, merging: &Merging, input: &Input) -> Vec<Kernel> {
+    let all = merging.kernel(encode, &shaders::BVH_HPLOC_PERSISTENT, input, encode.shape.workgroup);
+    vec![encode.reset_kernel(&shaders::BVH_HPLOC_RESET), all]
 }
 
 /// The whole build by `workers` workgroups of one dispatch. Label: `build`.
 pub(super) fn persistent_steps(
     encode: &Encode,
-    window: &Window,
+    merging: &Merging,
     input: &Input,
     arguments: &Arguments,
     workers: u32,
 ) -> Vec<Step> {
-    let kernels = persistent_kernels(encode, window, input);
+    let kernels = persistent_kernels(encode, merging, input);
     kernels
         .into_iter()
         .zip([1, workers])
