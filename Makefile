@@ -9,6 +9,7 @@
 #   make test-gpu      the suite with work cut as for a GPU, and a part of it with subgroups of 4 and 16
 #   make test-passes   passes that are cut otherwise for a GPU, by that tuning, with subgroups of 4, 8 and 16
 #   make test-lanes    the suite by either tuning on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
+#   make test-drivers  every pass on a second driver, SwiftShader, by the tunings of CPUs and of GPUs
 #   make check         formatting, lints and docs, warnings denied
 #   make prebuilt      compiles glsl/ into glsl/prebuilt/, for builds without the feature compile-shaders
 #   make portable      a folder OUT that runs on any machine with a Vulkan driver: scripts/portable.sh
@@ -31,6 +32,9 @@ RELEASE := $(or $(CARGO_TARGET_DIR),target)/release
 BIN := $(RELEASE)/hedgerow
 CACHE := $(or $(HEDGEROW_CACHE),$(HOME)/.cache/hedgerow)
 MESA := $(CACHE)/mesa26
+SWIFTSHADER := $(CACHE)/swiftshader
+# The ICD file of the second driver; another one may be named.
+SECOND_DRIVER := $(or $(HEDGEROW_SECOND_DRIVER),$(SWIFTSHADER)/swiftshader.json)
 comma := ,
 EMBREE_BUILDERS := ,embree-low,embree-medium,embree-high
 # The CPU peers that can be built here: Embree where it is installed (scripts/setup.sh --peers). The same features
@@ -53,7 +57,7 @@ PASS_TESTS := gpu_radix_sort gpu_scan_reduce bvh_wide bvh_refit
 CAPI := -p hedgerow-capi
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
-.PHONY: bench bench-all bench-peers stability test test-gpu test-passes test-lanes check prebuilt portable install-c setup
+.PHONY: bench bench-all bench-peers stability test test-gpu test-passes test-lanes check prebuilt portable install-c setup test-drivers
 
 bench: setup
 	$(CARGO) build --release --features $(FEATURES)
@@ -104,6 +108,13 @@ test-lanes: setup
 	$(CARGO) test --release --features $(FEATURES) --no-run
 	for tuning in cpu gpu; do for lanes in LP_NATIVE_VECTOR_WIDTH=128 LP_NATIVE_VECTOR_WIDTH=512 LP_NUM_THREADS=1; do \
 		env HEDGEROW_TUNING=$$tuning $$lanes $(SUITE) || exit 1; done; done
+
+# One process: SwiftShader compiles every pipeline anew in each.
+test-drivers: setup
+	$(if $(HEDGEROW_SECOND_DRIVER),,scripts/second-driver.sh $(SWIFTSHADER))
+	$(CARGO) test --release --features $(FEATURES) --test drivers --no-run
+	VK_DRIVER_FILES=$(SECOND_DRIVER) VK_ICD_FILENAMES=$(SECOND_DRIVER) $(WITHIN) \
+		$(CARGO) test --release --features $(FEATURES) --test drivers -- --ignored --nocapture
 
 check: setup
 	cargo fmt --all --check

@@ -9,6 +9,7 @@ pub mod twins;
 pub use hedgerow::measure::check::{agree, corpus, matrices, mixture, shapes, world};
 
 use hedgerow::gpu::{Device, DeviceOptions, DriverTracing, Restrict, TuningChoice};
+use std::cell::Cell;
 use std::sync::OnceLock;
 
 /// The tuning that `HEDGEROW_TUNING` asks for, as for the binary.
@@ -22,14 +23,27 @@ pub fn restrict() -> Restrict {
     std::env::var("HEDGEROW_PRETEND").unwrap_or_default().parse().expect("HEDGEROW_PRETEND is a list of restrictions")
 }
 
-/// The device of this test binary. Any validation message fails the test that caused it.
+/// Runs `body`, for which [`device`] is one of this tuning.
+pub fn with_tuning<T>(tuning: TuningChoice, body: impl FnOnce() -> T) -> T {
+    TUNING.set(Some(tuning));
+    let result = body();
+    TUNING.set(None);
+    result
+}
+
+thread_local! {
+    static TUNING: Cell<Option<TuningChoice>> = const { Cell::new(None) };
+}
+
+/// The device of this test binary, one for each tuning that is asked for. Any validation message fails the test that caused it.
 ///
 /// Without the layers (`make test` installs them) the tests still run, and say so.
 pub fn device() -> &'static Device {
-    static DEVICE: OnceLock<Device> = OnceLock::new();
-    DEVICE.get_or_init(|| {
+    static DEVICES: [OnceLock<Device>; 3] = [const { OnceLock::new() }; 3];
+    let tuning = TUNING.get().unwrap_or_else(tuning);
+    DEVICES[tuning as usize].get_or_init(|| {
         let wanted = std::env::var("HEDGEROW_DEVICE").ok();
-        open(DeviceOptions { wanted, restrict: restrict(), tuning: tuning(), ..OPTIONS })
+        open(DeviceOptions { wanted, restrict: restrict(), tuning, ..OPTIONS })
     })
 }
 
