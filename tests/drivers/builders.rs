@@ -31,11 +31,10 @@ fn assert_as_on_the_host(options: &Options, schedules: &[Schedule]) {
 
 pub fn all_give_the_bytes_of_the_host() {
     for (method, codes) in methods() {
-        for collapse in [Collapse::OFF, Collapse::SAH] {
-            let options = Options { method, codes: Some(codes), collapse, ..Options::DEFAULT };
-            let alone: &[Schedule] = if method == Method::Lbvh { &[Schedule::Workgroup] } else { &[] };
-            assert_as_on_the_host(&options, &[&[Schedule::Chain, Schedule::Persistent], alone].concat());
-        }
+        let options = Options { method, codes: Some(codes), collapse: Collapse::SAH, ..Options::DEFAULT };
+        let alone: &[Schedule] = if method == Method::Lbvh { &[Schedule::Workgroup] } else { &[] };
+        assert_as_on_the_host(&options, &[&[Schedule::Chain, Schedule::Persistent], alone].concat());
+        assert_as_on_the_host(&Options { collapse: Collapse::OFF, ..options }, &[Schedule::Chain]);
     }
 }
 

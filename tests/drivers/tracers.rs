@@ -77,9 +77,10 @@ fn assert_form<N: TracedNode>(tree: &Bvh2, rays: &[Ray]) {
     let quantised = N::FORM.is_quantised();
     let orders = if quantised { &[Order::Distance, Order::Octant][..] } else { &[Order::Distance] };
     for &order in orders {
-        for shape in shapes(order == Order::Octant) {
+        for (i, shape) in shapes(order == Order::Octant).into_iter().enumerate() {
             let tracer = Tracer::with(&device().limits, N::FORM, order, shape);
-            for query in [Query::ClosestHit, Query::AnyHit] {
+            let queries = if i == 0 { &[Query::ClosestHit, Query::AnyHit][..] } else { &[Query::ClosestHit] };
+            for &query in queries {
                 let expected: Vec<_> = rays.iter().map(|ray| wide_host::trace(&wide, ray, query, order)).collect();
                 let got = traced(&wide.to_bytes(), rays, |r, buffers| tracer.record(r, query, buffers));
                 assert_eq!(got, expected, "{tracer:?} {query:?}");
