@@ -72,6 +72,7 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "bvh" if is("wide") => bvh::wide::device::push_constants(),
         "bvh" if is("split") => bvh::split::push_constants(),
         "bvh" if is("reinsertion") => bvh::reinsertion::push_constants(),
+        "gpu" if is("divide") => gpu::probe::division_push_constants(),
         "gpu" if is("fill") => gpu::fill::push_constants(),
         "gpu" if is("pool_tree") => gpu::probe::push_constants(),
         "gpu" if is("radix_sort") => gpu::radix_sort::push_constants(),
