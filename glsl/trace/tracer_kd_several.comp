@@ -34,6 +34,9 @@ void main() {
     uint end = min(count, first + (gl_WorkGroupID.x + 1) * group_rays);
 
     HedgerowKdTree tree;
+    // Where the tree lies. Addresses go round the loop and references are made of them in each round: a reference that is one tree's
+    // or another's by the way it came (an OpPhi of pointers) kills SwiftShader.
+    uvec2 nodes_at, references_at, records_at;
     HedgerowKdWalk walk;
     HedgerowRay ray;
     HedgerowHit nearest;
@@ -57,7 +60,13 @@ void main() {
             entry = table.entry[trees - left + 1u];
             tree = hedgerow_kd_tree(entry.structure);
             hedgerow_kd_begin(ray, tree, walk);
+            nodes_at = entry.structure;
+            references_at = uvec2(tree.references);
+            records_at = uvec2(tree.records);
         }
+        tree.structure = KdStructure(nodes_at);
+        tree.references = HedgerowKdReferences(references_at);
+        tree.records = Triangles(records_at);
         going = hedgerow_kd_proceed(tree, ANY_HIT, walk);
         if (!going) {
             left--;
