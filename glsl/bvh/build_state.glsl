@@ -16,7 +16,7 @@ const uint ITEMS = ITEMS_WORD & 0xFFFFu;
 const uint NONE = 0xFFFFFFFFu;
 
 BUFFER BuildState {
-    uint pool[4 + POOL_PHASES_AT_MOST];   // a PoolState
+    uint pool[POOL_WORDS];                // a PoolState
     uint boxes_lo[3];                     // `ordered` floats
     uint boxes_hi[3];
     uint centroids_lo[3];

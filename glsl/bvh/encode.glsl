@@ -47,11 +47,11 @@ void reset_build(uint phases_behind) {
     uint scan_tasks = (DIGITS + DIGITS_A_TASK - 1) / DIGITS_A_TASK;
     uint sorted = phases_before_hierarchy();
     uint phases = sorted + phases_behind;
-    for (uint word = i; word < 4 + POOL_PHASES_AT_MOST; word += gl_WorkGroupSize.x) {
-        uint phase = word - 4;
+    for (uint word = i; word < POOL_WORDS; word += gl_WorkGroupSize.x) {
+        uint phase = word - POOL_WORD_TASKS;
         uint value = 0;
-        if (word == 3) value = phases;
-        if (word >= 4 && phase < phases) {
+        if (word == POOL_WORD_PHASES) value = phases;
+        if (word >= POOL_WORD_TASKS && phase < phases) {
             uint step = (phase - PHASES_BEFORE_SORT) % PHASES_OF_A_PASS;
             if (phase == PHASE_PLAN || phase == PHASE_SPLITS) value = 1;
             else if (phase < PHASES_BEFORE_SORT || phase >= sorted) value = tiles;
@@ -134,7 +134,7 @@ void find_bounds(uint task) {
     active_count = subgroupAdd(active_count);
     status = subgroupOr(status & ~INACTIVE);
     // Integers: the order in which the atomics arrive changes nothing.
-    Words to = Words(address_of(state_address, 4 + POOL_PHASES_AT_MOST, 4));
+    Words to = Words(address_of(state_address, POOL_WORDS, 4));
     if (!PRIVATE_COUNTERS) begin_group_bounds();
     if (subgroupElect()) {
         for (uint axis = 0; axis < 3; ++axis) {

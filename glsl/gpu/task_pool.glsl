@@ -16,16 +16,27 @@
 
 const uint POOL_PHASES_AT_MOST = 188;
 const uint POOL_STATUS_SPIN_RAN_OUT = 1;
-// Polls before a worker gives up and says so. A poll takes at least some tens of nanoseconds: seconds in all.
-const uint POOL_SPINS = 1u << 28;
+// Polls before a worker gives up and says so. A poll takes at least some tens of nanoseconds, with its pause hundreds: many
+// seconds in all.
+const uint POOL_SPINS = 1u << 26;
+// Rounds that a worker pauses between two polls, at most.
+const uint POOL_LONGEST_PAUSE = 64;
 
+// Who waits polls `done`: it has a cache line of its own, of up to 128 bytes, so that neither drawing tickets nor reading counts
+// waits for those who poll.
 BUFFER PoolState {
     uint next;      // ticket to draw
-    uint done;      // tasks finished
     uint status;
     uint phases;
+    uint room_before[29];
+    uint done;      // tasks finished
+    uint room_behind[31];
     uint tasks[POOL_PHASES_AT_MOST];
 };
+// Of a PoolState; the words of those members that a pass sets up one by one.
+const uint POOL_WORDS = 64 + POOL_PHASES_AT_MOST;
+const uint POOL_WORD_PHASES = 2;
+const uint POOL_WORD_TASKS = 64;
 
 // Where a worker is: its phase, the tickets before that phase, and its task in the phase.
 struct PoolCursor {
@@ -40,12 +51,24 @@ shared uint pool_shared_base;
 shared uint pool_shared_task;
 shared uint pool_shared_working;
 
-// Waits until `target` tasks are done; false if the spin ran out here or elsewhere.
+// Passes time; the result depends on what was polled, so that no compiler leaves it out.
+uint pool_pause(uint rounds, uint polled) {
+    for (uint round = 0; round < rounds; ++round) polled = polled * 1664525u + 1013904223u;
+    return polled;
+}
+
+// Waits until `target` tasks are done; false if the spin ran out here or elsewhere. Pauses double, so that a short wait ends at once,
+// and in a long one few polls reach memory.
 bool pool_wait(PoolState pool, uint target) {
+    uint pause = 0;
     for (uint spin = 0; spin < POOL_SPINS; ++spin) {
-        if (atomicLoad(pool.done, gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsRelaxed) >= target) return true;
+        uint done = atomicLoad(pool.done, gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsRelaxed);
+        if (done >= target) return true;
         if ((spin & 1023) == 1023
             && atomicLoad(pool.status, gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsRelaxed) != 0) return false;
+        // A poll more or less says nothing.
+        if (pool_pause(pause, done) == 0u) ++spin;
+        pause = min(2u * pause + 1u, POOL_LONGEST_PAUSE);
     }
     atomicOr(pool.status, POOL_STATUS_SPIN_RAN_OUT);
     return false;

@@ -117,12 +117,10 @@ void kd_bin_chunk(uint chunk, uint of_level) {
     for (uint c = gl_LocalInvocationIndex; c < COUNTERS; c += gl_WorkGroupSize.x) {
         if (counters[c] != 0u) atomicAdd(all.word[c], counters[c]);
     }
-    release_to_device();
-    barrier();
+    release_workgroup();
     uint arrived = 0;
     if (gl_LocalInvocationIndex == 0u) arrived = atomicAdd(all.word[COUNTERS], 1u);
-    if (!is_last_of(agree(arrived), chunks_of(count))) return;
-    acquire_from_device();
+    if (!is_last_of(arrived, chunks_of(count))) return;
     for (uint c = gl_LocalInvocationIndex; c < COUNTERS; c += gl_WorkGroupSize.x) {
         counters[c] = all.word[c];
         all.word[c] = 0u;

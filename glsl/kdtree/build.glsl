@@ -6,13 +6,20 @@
 //
 //     bin         each chunk of a large task counts the faces in bins; the last of a task chooses the plane.
 //                 Each task of no more than EXACT references is built to its leaves by one workgroup.
-//     classify    each chunk tells the sides of its references and clips what straddles the plane; the last of the level scans:
-//                 where chunks put what they have, the nodes, the tasks of the next level.
-//     distribute  each chunk moves its references to the next level, or to its leaf.
+//     classify    each chunk tells the sides of its references and clips what straddles the plane; where chunks put what they have
+//                 is summed up on the way.
+//     scan        how many nodes, leaves and tasks of the next level those of the level before them make; a workgroup a tile of tasks.
+//                 In the pool the last chunk of the level does it, and this is no phase.
+//     distribute  each chunk moves its references to the next level, or to its leaf; each tile writes its nodes, and its tasks of the
+//                 next level.
 //
 // A large task of one chunk is binned and its plane chosen when it is classified: its references are loaded by one workgroup anyway.
 //
-//   needs  one barrier between phases; subgroups of any size; workgroups of whole subgroups or less than one
+// Sums over a level are made in two steps, without waiting: a workgroup scans a *tile* of TILE items by itself, and the last tile to
+// arrive scans the tiles. A position is then that of the tile and that in the tile.
+//
+//   needs  one barrier between phases; subgroups of any size; workgroups of any size, the same in all kernels but those of subtrees,
+//          their places and gathering (build_subtrees, build_place, merge_gather), of which one subgroup has most to do
 #ifndef HEDGEROW_KDTREE_BUILD
 #define HEDGEROW_KDTREE_BUILD
 #include "gpu/pass.glsl"
@@ -28,7 +35,8 @@ layout(constant_id = 2) const uint BINS = 2;
 layout(constant_id = 3) const uint EXACT = 1;
 
 const uint NONE = 0xFFFFFFFFu;
-const uint SUBGROUPS_AT_MOST = 64;
+// Items whose sums one workgroup makes: chunks, tasks or subtrees.
+const uint TILE = 256;
 const uint LEVELS = KD_MAX_DEPTH + 1;
 const uint CHUNK = ITEMS * gl_WorkGroupSize.x;
 
@@ -54,9 +62,8 @@ struct KdTask {
     uint counters;                  // those of a task of several chunks; otherwise NONE
     uint split;
     float plane;
-    uint left;                      // where what is on the left begins in the next level
-    uint right;
-    uint leaf;                      // where the references of a leaf begin
+    uint leaf;                      // where its references begin, of those of leaves of its tile
+    uint cut;                       // the same if nothing of the level is split
 };
 
 // A subtree that one workgroup builds: the node of its root, where the others and the references wait, and where they go.
@@ -68,20 +75,36 @@ struct KdSubtree {
     uint nodes;
     uint references_at;
     uint references;
-    uint first_node;
+    uint first_node;                // of those of its tile
     uint first_reference;
 };
 
-const uint TASK_BYTES = 64;
+// What tasks make, or all tasks of the tiles before.
+struct Sums {
+    uint tasks;                     // of the next level
+    uint chunks;
+    uint subtrees;
+    uint counters;
+    uint subtree_references;
+    uint leaf_references;
+    uint split_references;          // of what is split
+    uint leaves;
+    uint inner;
+};
+
+const uint TASK_BYTES = 60;
 const uint SUBTREE_BYTES = 40;
+const uint SUMS_BYTES = 36;
 // Of the state, with room to spare, and of what a merge adds to it: kdtree/merge_state.glsl.
-const uint STATE_BYTES = 3072;
+const uint STATE_BYTES = 3584;
 
 BUFFER KdReferences { KdReference reference[]; };
 BUFFER KdTasks { KdTask task[]; };
 BUFFER KdSubtrees { KdSubtree subtree[]; };
 BUFFER KdNodes { KdNode node[]; };
-// Of a chunk, references on the left and on the right: as many as it has, then as many as all before it have.
+BUFFER KdSums { Sums tile[]; };
+// Of a chunk, references on the left and on the right: as many as it has, then as many as those before it in its tile have. Of a tile
+// of chunks the same, and of a tile of subtrees their nodes and references.
 BUFFER KdSides { uvec2 side[]; };
 
 // What a build needed: `Report` in src/kdtree/builder.rs.
@@ -97,7 +120,7 @@ struct KdReport {
 };
 
 BUFFER KdState {
-    uint pool[4 + POOL_PHASES_AT_MOST];   // a PoolState
+    uint pool[POOL_WORDS];          // a PoolState
     KdReport report;
     uvec2 references[2];
     uvec2 tasks[2];
@@ -105,6 +128,10 @@ BUFFER KdState {
     uvec2 chunks;
     uvec2 sides;
     uvec2 counters;
+    uvec2 arrivals;                 // chunks of a tile that were classified; behind the counters
+    uvec2 chunk_tiles;
+    uvec2 task_tiles;
+    uvec2 subtree_tiles;
     uvec2 nodes;                    // of subtrees
     uvec2 leaf_references;          // of subtrees
     uvec2 stacks;
@@ -125,8 +152,11 @@ BUFFER KdState {
     uint first_subtree[LEVELS];
     uint level_references[LEVELS];
     uint binned_chunks[LEVELS];     // as many as chunks if any task has several, otherwise none
-    uint classified[LEVELS];
+    uint classified[LEVELS];        // tiles of chunks
+    uint scanned[LEVELS];           // tiles of tasks
+    uint ordered;                   // tiles of subtrees
     uint straddling[LEVELS];
+    uint first_leaf[LEVELS];        // references of leaves of the levels before
     uint node_count;                // of all levels so far
     uint subtree_count;
     uint leaf_count;                // references of their leaves, those of subtrees apart
@@ -204,6 +234,22 @@ KdSides chunk_sides() {
     return KdSides(build_state().chunks);
 }
 
+KdSides chunk_tiles() {
+    return KdSides(build_state().chunk_tiles);
+}
+
+KdSums task_tiles() {
+    return KdSums(build_state().task_tiles);
+}
+
+KdSides subtree_tiles() {
+    return KdSides(build_state().subtree_tiles);
+}
+
+uint tiles_of(uint count) {
+    return (count + TILE - 1u) / TILE;
+}
+
 // Nodes that subtrees may have below their roots.
 uint subtree_node_room() {
     return node_room - level_node_room;
@@ -250,7 +296,8 @@ uint task_of_chunk(uint of_level, uint chunk) {
 
 // ---- workgroups ----
 
-shared uint partial[SUBGROUPS_AT_MOST];
+// Of each subgroup; a subgroup may be smaller than the device says. Never a short array: Mesa would unroll the loops over it.
+shared uint partial[gl_WorkGroupSize.x < 64u ? 64u : gl_WorkGroupSize.x];
 shared uint agreed;
 
 // What one step of a workgroup has written to memory, the next reads.
@@ -295,8 +342,19 @@ uint agree(uint value) {
     return agreed;
 }
 
-// Whether this is the last of so many to arrive at a counter: then what the others have written is visible.
+// Makes what the workgroup has written available, before its first invocation counts it as arrived.
+void release_workgroup() {
+    release_to_device();
+    barrier();
+    release_to_device();
+}
+
+// Whether this is the last of so many workgroups to arrive, by what the first invocation found at the counter: then what the others
+// have written is visible.
 bool is_last_of(uint arrived_before, uint count) {
-    return arrived_before + 1u == count;
+    acquire_from_device();
+    uint before = agree(arrived_before);
+    acquire_from_device();
+    return before + 1u == count;
 }
 #endif

@@ -1,8 +1,12 @@
 #version 460
-// The sides of the references of a level, and the scan behind them; workgroups share the chunks. See kdtree/build.glsl.
-#include "kdtree/phases.glsl"
+// The sides of the references of a level, and where each chunk puts what it has; workgroups share the chunks. See kdtree/build.glsl.
+#include "kdtree/classify.glsl"
+#include "kdtree/scan.glsl"
 
 void main() {
-    uint items = PoolState(state_address).tasks[bin_phase(level) + 1u];
-    for (uint i = group_number(); i < items; i += gl_NumWorkGroups.x) kd_classify(i, level);
+    uint chunks = build_state().chunk_count[level];
+    for (uint i = group_number(); i < chunks; i += gl_NumWorkGroups.x) {
+        kd_classify_chunk(i, level);
+        kd_sum_chunk(i, level);
+    }
 }

@@ -1,6 +1,6 @@
 #version 460
-// References to the next level and to leaves; workgroups share them. See kdtree/build.glsl.
-#include "kdtree/phases.glsl"
+// References to the next level and to leaves, nodes, and the tasks of the next level; workgroups share them. See kdtree/build.glsl.
+#include "kdtree/distribute.glsl"
 
 void main() {
     uint items = PoolState(state_address).tasks[bin_phase(level) + 2u];

@@ -16,7 +16,7 @@ void main() {
         else if (phase == PHASE_PLAN) kd_plan();
         else if (phase == PHASE_RECORDS) kd_records(item);
         else if (phase == PHASE_ROOT) kd_root();
-        else if (phase == PHASE_ORDER) kd_order_subtrees();
+        else if (phase == PHASE_ORDER) kd_order_subtrees(item);
         else if (phase == PHASE_PLACE) kd_place(item);
         else kd_level(phase, item);
         pool_finish(pool);

@@ -8,9 +8,10 @@
 const uint IS_LEFT = 1;
 const uint IS_RIGHT = 2;
 
-// Of the references of a chunk; and those that straddle the plane.
-shared uint side_of[CHUNK];
-shared uint straddling[CHUNK];
+// References that are classified at a time: those that straddle the plane are listed in shared memory.
+const uint BLOCK = CHUNK < 512u ? CHUNK : 512u;
+
+shared uint straddling[BLOCK];
 shared uint part_is_there[gl_WorkGroupSize.x];
 
 // Parts on the right wait at the end of the level's references, the last first.
@@ -18,16 +19,17 @@ uint waiting_place(uint k) {
     return reference_capacity - 1u - k;
 }
 
-// The parts of what straddles the plane: an invocation a side. Side by side, so that each sees what the other has found.
-void clip_straddling(KdReferences references, uint begin, uint count, uint first_place, bool fits, Box cell, uint axis, float plane) {
+// The parts of what straddles the plane: an invocation a side. Side by side, so that each sees what the other has found. Adds to what
+// the invocation has found on either side.
+void clip_straddling(KdReferences references, uint count, uint first_place, bool fits, Box cell, uint axis, float plane, inout uvec2 found) {
     float reach = build_state().reach;
+    Words all_sides = Words(build_state().sides);
     Box halves[2];
     half_cells(cell, axis, plane, halves[0], halves[1]);
     for (uint base = 0; base < 2u * count; base += gl_WorkGroupSize.x) {
         uint item = base + gl_LocalInvocationIndex, side = item & 1u;
         bool is_item = item < 2u * count;
-        uint place = is_item ? straddling[item >> 1] : 0u;
-        uint i = begin + place;
+        uint i = is_item ? straddling[item >> 1] : 0u;
         Box whole = Box(vec3(0.0), vec3(0.0)), part = whole;
         bool is_there = false;
         if (is_item) {
@@ -50,7 +52,8 @@ void clip_straddling(KdReferences references, uint begin, uint count, uint first
                     references.reference[i].lo = part.lo;
                     references.reference[i].hi = part.hi;
                 }
-                side_of[place] = (takes ? IS_LEFT : 0u) | (right ? IS_RIGHT : 0u) | waits + 1u << 2;
+                all_sides.word[i] = (takes ? IS_LEFT : 0u) | (right ? IS_RIGHT : 0u) | waits + 1u << 2;
+                found += uvec2(takes ? 1u : 0u, right ? 1u : 0u);
             } else if (takes && fits) {
                 references.reference[waits].lo = part.lo;
                 references.reference[waits].hi = part.hi;
@@ -60,59 +63,62 @@ void clip_straddling(KdReferences references, uint begin, uint count, uint first
     }
 }
 
+// The sides of a block of references by the plane of their task.
+void classify_block(KdReferences references, uint begin, uint end, KdTask t, uint of_level, inout uvec2 found) {
+    KdState state = build_state();
+    Words all_sides = Words(state.sides);
+    uint axis = t.split & 3u, straddlers = 0;
+    for (uint base = begin; base < end; base += gl_WorkGroupSize.x) {
+        uint i = base + gl_LocalInvocationIndex;
+        bvec2 is_there = bvec2(false);
+        if (i < end) {
+            Box b = Box(references.reference[i].lo, references.reference[i].hi);
+            is_there = sides_of(b, axis, t.plane, (t.split & SPLIT_LEFT_PLANAR) != 0u);
+        }
+        uint total;
+        uint at = straddlers + sum_before(all(is_there) ? 1u : 0u, total);
+        if (all(is_there)) {
+            straddling[at] = i;
+        } else if (i < end) {
+            all_sides.word[i] = (is_there.x ? IS_LEFT : 0u) | (is_there.y ? IS_RIGHT : 0u);
+            found += uvec2(is_there.x ? 1u : 0u, is_there.y ? 1u : 0u);
+        }
+        straddlers += total;
+    }
+    barrier();
+    if (straddlers == 0u) return;
+    uint first_place = 0;
+    if (gl_LocalInvocationIndex == 0u) first_place = atomicAdd(state.straddling[of_level], straddlers);
+    first_place = agree(first_place);
+    bool fits = first_place + straddlers <= reference_capacity - state.level_references[of_level];
+    if (!fits && gl_LocalInvocationIndex == 0u) atomicOr(state.is_short, 1u);
+    clip_straddling(references, straddlers, first_place, fits, Box(t.lo, t.hi), axis, t.plane, found);
+}
+
 void kd_classify_chunk(uint chunk, uint of_level) {
     KdState state = build_state();
     KdTasks tasks = tasks_of(of_level);
     KdReferences references = references_of(of_level);
-    uint t = task_of_chunk(of_level, chunk);
-    Box cell = Box(tasks.task[t].lo, tasks.task[t].hi);
-    uint first = tasks.task[t].begin, count = tasks.task[t].count;
-    uint own = chunk - tasks.task[t].first_chunk;
-    uint begin = first + own * CHUNK, end = min(begin + CHUNK, first + count);
-    if ((tasks.task[t].split & ENDS) == 0u && tasks.task[t].counters == NONE) {
+    uint i = task_of_chunk(of_level, chunk);
+    KdTask t = tasks.task[i];
+    uint begin = t.begin + (chunk - t.first_chunk) * CHUNK, end = min(begin + CHUNK, t.begin + t.count);
+    if ((t.split & ENDS) == 0u && t.counters == NONE) {
+        Box cell = Box(t.lo, t.hi);
         fill_bins(references, cell, begin, end);
-        settle(tasks, t, cell, count, best_of_bins(cell, state.area_scale, count));
+        settle(tasks, i, cell, t.count, best_of_bins(cell, state.area_scale, t.count));
         next_step();
+        t.split = tasks.task[i].split;
+        t.plane = tasks.task[i].plane;
     }
-    uint split = tasks.task[t].split;
-    uvec2 sides = uvec2(0);
-    if ((split & SPLIT) != 0u) {
-        uint axis = split & 3u;
-        float plane = tasks.task[t].plane;
-        uint straddlers = 0;
-        for (uint base = 0; base < end - begin; base += gl_WorkGroupSize.x) {
-            uint place = base + gl_LocalInvocationIndex;
-            bvec2 is_there = bvec2(false);
-            if (begin + place < end) {
-                Box b = Box(references.reference[begin + place].lo, references.reference[begin + place].hi);
-                is_there = sides_of(b, axis, plane, (split & SPLIT_LEFT_PLANAR) != 0u);
-                side_of[place] = (is_there.x ? IS_LEFT : 0u) | (is_there.y ? IS_RIGHT : 0u);
-            }
-            uint total;
-            uint at = straddlers + sum_before(all(is_there) ? 1u : 0u, total);
-            if (all(is_there)) straddling[at] = place;
-            straddlers += total;
-        }
-        barrier();
-        uint first_place = 0;
-        if (straddlers > 0u) {
-            if (gl_LocalInvocationIndex == 0u) first_place = atomicAdd(state.straddling[of_level], straddlers);
-            first_place = agree(first_place);
-        }
-        bool fits = first_place + straddlers <= reference_capacity - state.level_references[of_level];
-        if (!fits && gl_LocalInvocationIndex == 0u) atomicOr(state.is_short, 1u);
-        clip_straddling(references, begin, straddlers, first_place, fits, cell, axis, plane);
-        Words all_sides = Words(state.sides);
-        uvec2 own_sides = uvec2(0);
-        for (uint place = gl_LocalInvocationIndex; place < end - begin; place += gl_WorkGroupSize.x) {
-            uint side = side_of[place];
-            all_sides.word[begin + place] = side;
-            own_sides += uvec2(side & 1u, side >> 1 & 1u);
+    uvec2 found = uvec2(0), sides = uvec2(0);
+    if ((t.split & SPLIT) != 0u) {
+        for (uint block = begin; block < end; block += BLOCK) {
+            classify_block(references, block, min(block + BLOCK, end), t, of_level, found);
         }
         uint total;
-        sum_before(own_sides.x, total);
+        sum_before(found.x, total);
         sides.x = total;
-        sum_before(own_sides.y, total);
+        sum_before(found.y, total);
         sides.y = total;
     }
     if (gl_LocalInvocationIndex == 0u) chunk_sides().side[chunk] = sides;

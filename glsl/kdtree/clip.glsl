@@ -5,6 +5,9 @@
 #include "kdtree/build.glsl"
 #include "bvh/codes.glsl"
 
+// Whether the device's own reciprocals are correctly rounded, as those of CPUs are. Vulkan lets them err by 2.5 ulp.
+layout(constant_id = 4) const bool EXACT_RECIPROCALS = false;
+
 const float OF_SIDE = 3.814697265625e-6;                  // 2^-18
 const float OF_COORDINATE = 4.76837158203125e-7;          // 2^-21
 const float TWICE_SLACK = 7.62939453125e-6;               // 2^-17
@@ -71,12 +74,19 @@ Box cell_around(Corners c, float reach) {
     return finite_part(widened(bounds_of(c, reach), rounding_of(whole, longest_side(whole))));
 }
 
+// 1 / x with the bits of the host, of an edge that is neither too short nor too long.
+float reciprocal_of(float x) {
+    if (!EXACT_RECIPROCALS) return reciprocal_or_zero(x);
+    precise float reciprocal = 1.0 / x;
+    return reciprocal;
+}
+
 // Where the edge from a to b, which goes up along the axis, crosses the plane, within the box around it; `outer` where it is too
 // short or too long to tell.
 vec3 crossing_of(vec3 a, vec3 b, uint axis, float plane, vec3 outer) {
     precise vec3 d = b - a;
     if (d[axis] < shortest_edge() || d[axis] > longest_edge() || !is_finite(d)) return outer;
-    precise float t = (plane - a[axis]) * (1.0 / d[axis]);
+    precise float t = (plane - a[axis]) * reciprocal_of(d[axis]);
     if (t < least_normal()) t = 0.0;
     precise vec3 point = a + t * d;
     point = min(max(point, min(a, b)), max(a, b));
@@ -130,11 +140,11 @@ bool clip_triangle(Corners c, float reach, Box cell, out Box part) {
     } while (faces != 0u && count != 0u);
     // A polygon of no corners has a box from +∞ to −∞.
     Box bounds = Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
-    uint i = 0;
-    if (count != 0u) do {
+    // Not a loop that tests at its end: SwiftShader has lanes that have left such a one go on computing what is used behind it.
+    for (uint i = 0; i < count; ++i) {
         vec3 p = polygon[from + i];
         bounds = Box(min(bounds.lo, p), max(bounds.hi, p));
-    } while (++i < count);
+    }
     Box own = finite_part(widened(whole, room));
     part = common_part(common_part(widened(bounds, margin), own), cell);
     return all(lessThanEqual(part.lo, part.hi));

@@ -1,26 +1,43 @@
-// The references of a task go to its children, or to its leaf: see kdtree/build.glsl.
+// The references of a task go to its children, or to its leaf; its node, and the tasks of the next level, are written: see
+// kdtree/build.glsl.
 #ifndef HEDGEROW_KDTREE_DISTRIBUTE
 #define HEDGEROW_KDTREE_DISTRIBUTE
 #include "kdtree/classify.glsl"
+#include "kdtree/scan.glsl"
 
 Words leaf_references() {
     return Words(kd_references_at(structure_address, node_room));
 }
 
+// Whether what would have been split are leaves, for want of room.
+bool has_ended(uint of_level) {
+    return build_state().ended == of_level + 1u;
+}
+
+// Where the references of a leaf begin, the task of this number.
+uint leaf_at(uint i, KdTask t, uint of_level) {
+    Sums before = task_tiles().tile[i / TILE];
+    uint first = build_state().first_leaf[of_level] + before.leaf_references;
+    return has_ended(of_level) ? first + before.split_references + t.cut : first + t.leaf;
+}
+
 void kd_distribute_chunk(uint chunk, uint of_level) {
-    KdTasks tasks = tasks_of(of_level);
     KdReferences from = references_of(of_level), to = references_of(of_level + 1u);
-    KdTask t = tasks.task[task_of_chunk(of_level, chunk)];
+    uint number = task_of_chunk(of_level, chunk);
+    KdTask t = tasks_of(of_level).task[number];
     uint begin = t.begin + (chunk - t.first_chunk) * CHUNK, end = min(begin + CHUNK, t.begin + t.count);
-    if ((t.split & SPLIT) == 0u) {
+    Fate fate = fate_of(t, has_ended(of_level));
+    if (!fate.is_split) {
         Words leaf = leaf_references();
+        uint first = leaf_at(number, t, of_level);
         for (uint i = begin + gl_LocalInvocationIndex; i < end; i += gl_WorkGroupSize.x) {
-            leaf.word[t.leaf + (i - t.begin)] = from.reference[i].record;
+            leaf.word[first + (i - t.begin)] = from.reference[i].record;
         }
         return;
     }
     Words sides = Words(build_state().sides);
-    uvec2 at = uvec2(t.left, t.right) + chunk_sides().side[chunk] - chunk_sides().side[t.first_chunk];
+    uint first = fate.before.x + fate.before.y;
+    uvec2 at = uvec2(first, first + fate.sides.x) + sides_before(chunk) - fate.before;
     for (uint base = begin; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
         uint side = i < end ? sides.word[i] : 0u;
@@ -44,13 +61,47 @@ void kd_distribute_chunk(uint chunk, uint of_level) {
 }
 
 // Leaves of few references, an invocation each.
-void kd_distribute_leaves(uint tile, uint of_level) {
-    KdTasks tasks = tasks_of(of_level);
-    uint i = tile * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-    if (i >= build_state().task_count[of_level]) return;
-    KdTask t = tasks.task[i];
-    if ((t.split & LARGE) != 0u || (t.split & ENDS) == 0u) return;
+void write_small_leaf(KdTask t, uint first, uint of_level) {
     KdReferences from = references_of(of_level);
-    for (uint k = 0; k < t.count; ++k) leaf_references().word[t.leaf + k] = from.reference[t.begin + k].record;
+    for (uint k = 0; k < t.count; ++k) leaf_references().word[first + k] = from.reference[t.begin + k].record;
+}
+
+// The nodes of a tile of tasks, and their tasks of the next level.
+void kd_write_tile(uint tile, uint of_level) {
+    KdState state = build_state();
+    KdTasks tasks = tasks_of(of_level);
+    KdStructure structure = KdStructure(structure_address);
+    Sums sums = task_tiles().tile[tile];
+    bool level_ends = has_ended(of_level);
+    uint end = min(tile * TILE + TILE, state.task_count[of_level]);
+    uint first_node = state.first_node[of_level], next_node = state.first_node[min(of_level + 1u, LEVELS - 1u)];
+    for (uint base = tile * TILE; base < end; base += gl_WorkGroupSize.x) {
+        uint i = base + gl_LocalInvocationIndex;
+        KdTask t = tasks.task[min(i, end - 1u)];
+        Fate fate = fate_of(t, level_ends);
+        bool is_leaf = fate.is_leaf && i < end, is_split = fate.is_split && i < end;
+        KdTask left = new_task(Box(t.lo, t.hi), 0u, 0u, t.depth + 1u), right = left;
+        if (is_split) {
+            Box left_cell, right_cell;
+            half_cells(Box(t.lo, t.hi), t.split & 3u, t.plane, left_cell, right_cell);
+            uint begin = fate.before.x + fate.before.y;
+            left = new_task(left_cell, begin, fate.sides.x, t.depth + 1u);
+            right = new_task(right_cell, begin + fate.sides.x, fate.sides.y, t.depth + 1u);
+        }
+        uint child = next_node + write_tasks(of_level + 1u, left, right, sums);
+        if (is_split) {
+            structure.nodes[first_node + i] = kd_inner(t.split & 3u, t.plane, child, fate.sides.x == 0u, fate.sides.y == 0u);
+        } else if (is_leaf) {
+            uint leaf = leaf_at(i, t, of_level);
+            structure.nodes[first_node + i] = kd_leaf(leaf, t.count);
+            if ((t.split & LARGE) == 0u) write_small_leaf(t, leaf, of_level);
+        }
+    }
+}
+
+void kd_distribute(uint item, uint of_level) {
+    uint chunks = build_state().chunk_count[of_level];
+    if (item < chunks) kd_distribute_chunk(item, of_level);
+    else kd_write_tile(item - chunks, of_level);
 }
 #endif

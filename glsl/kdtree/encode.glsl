@@ -48,6 +48,14 @@ void kd_reset() {
     at = address_of(at, reference_capacity, 4u);
     state.counters = at;
     at = address_of(at, counter_capacity(), 4u * counter_words());
+    state.arrivals = at;
+    at = address_of(at, tiles_of(chunk_capacity), 4u);
+    state.chunk_tiles = at;
+    at = address_of(at, tiles_of(chunk_capacity) + 1u, 8u);
+    state.task_tiles = at;
+    at = address_of(at, tiles_of(task_capacity) + 1u, SUMS_BYTES);
+    state.subtree_tiles = at;
+    at = address_of(at, tiles_of(subtree_capacity), 8u);
     state.nodes = at;
     at = address_of(at, subtree_node_room(), 8u);
     state.leaf_references = at;
@@ -71,8 +79,11 @@ void kd_reset() {
         state.level_references[i] = 0u;
         state.binned_chunks[i] = 0u;
         state.classified[i] = 0u;
+        state.scanned[i] = 0u;
         state.straddling[i] = 0u;
+        state.first_leaf[i] = 0u;
     }
+    state.ordered = 0u;
     state.node_count = 0u;
     state.subtree_count = 0u;
     state.leaf_count = 0u;
@@ -96,7 +107,7 @@ void kd_reset() {
     state.first_record = 0u;
 }
 
-// Which primitives there are, and how long their sides are; clears a part of the counters.
+// Which primitives there are, and how long their sides are; clears a part of the counters, and of the arrivals behind them.
 void kd_count(uint tile) {
     KdState state = build_state();
     Geometry g = given_geometry();
@@ -133,7 +144,7 @@ void kd_count(uint tile) {
         atomicAdd(state.triangles_with_octave, all_with_octave);
     }
     Words all_counters = Words(state.counters);
-    uint words = counter_capacity() * counter_words(), share = (words + tile_count() - 1u) / tile_count();
+    uint words = counter_capacity() * counter_words() + tiles_of(chunk_capacity), share = (words + tile_count() - 1u) / tile_count();
     uint end = min(words, (tile + 1u) * share);
     for (uint i = tile * share + gl_LocalInvocationIndex; i < end; i += gl_WorkGroupSize.x) all_counters.word[i] = 0u;
     barrier();
@@ -175,12 +186,13 @@ void kd_records(uint tile) {
         uint total;
         uint record = at + sum_before(is_there ? 1u : 0u, total);
         at += total;
-        if (!is_there || first_record + record >= record_room) continue;
-        records.triangle[first_record + record] = Triangle(c.v0, c.v1, c.v2, first_primitive + i);
-        Box b = bounds_of(c, reach), cell = cell_around(c, reach);
-        references.reference[record] = KdReference(b.lo, first_record + record, b.hi);
-        lo = min(lo, ordered(cell.lo));
-        hi = max(hi, ordered(cell.hi));
+        if (is_there && first_record + record < record_room) {
+            records.triangle[first_record + record] = Triangle(c.v0, c.v1, c.v2, first_primitive + i);
+            Box b = bounds_of(c, reach), cell = cell_around(c, reach);
+            references.reference[record] = KdReference(b.lo, first_record + record, b.hi);
+            lo = min(lo, ordered(cell.lo));
+            hi = max(hi, ordered(cell.hi));
+        }
     }
     lo = subgroupMin(lo);
     hi = subgroupMax(hi);
@@ -205,13 +217,14 @@ void kd_root() {
         state.cell_hi = cell.hi;
         state.area_scale = count > 0u ? area_scale_of(cell) : 1.0;
         state.empty_leaves = count > 0u ? 0u : 1u;
+        Sums sums = no_sums();
+        add_task(sums, count, 0u);
+        publish_level(0u, sums, count);
     }
     next_step();
     // One task, of the first invocation.
     KdTask root = new_task(cell, 0u, gl_LocalInvocationIndex == 0u ? count : 0u, 0u), none = new_task(cell, 0u, 0u, 0u);
-    Sums sums = Sums(0u, 0u, 0u, 0u, 0u);
+    Sums sums = no_sums();
     write_tasks(0u, root, none, sums);
-    next_step();
-    publish_level(0u, sums, count);
 }
 #endif

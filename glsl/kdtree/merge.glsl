@@ -8,8 +8,9 @@
 //     push     leaves of objects' trees in leaves of the static one, and pairs of         merge_seed.comp, merge_push.glsl
 //              leaf and triangle there, in any order
 //     find     pairs of objects without trees; all are sorted by leaf, then triangle      merge_find.comp, gpu/radix_sort
-//     unique   pushed pairs are left once                                                 merge_unique.comp
-//     mark     a task for each leaf                                                       merge_mark.comp
+//     unique   pushed pairs are left once                                                 merge_unique.comp, merge_move.comp
+//     mark     the leaves, what is known of each, a task for each                         merge_mark.comp, merge_leaves.comp,
+//                                                                                         merge_describe.comp, merge_tasks.comp
 //     gather   its references                                                             merge_build.glsl
 //     ...      the levels and subtrees, as in a build, behind what there is
 //     hook     the roots to the places of the leaves; what was there is kept              merge_build.glsl
@@ -142,15 +143,20 @@ void add_pair(Place leaf, uint j) {
     Words(merge.values).word[at] = at;
 }
 
-// Pairs that count.
-uint pair_count() {
+// Pairs, some of them several times.
+uint sorted_pairs() {
     KdMerge merge = merge_state();
-    return min(merge.wanted_pairs, merge.pair_capacity) - merge.equal_pairs;
+    return min(merge.wanted_pairs, merge.pair_capacity);
+}
+
+// Each of them once.
+uint pair_count() {
+    return sorted_pairs() - merge_state().equal_pairs;
 }
 
 uint id_of_key(uint i) {
     KdMerge merge = merge_state();
-    Words keys = Words(merge.sorted_keys);
+    Words keys = Words(merge.unique_keys);
     if (merge.key_words == 1u) return keys.word[i] >> merge.record_bits;
     uint high = merge.record_bits == 0u ? 0u : keys.word[2u * i + 1u] << 32u - merge.record_bits;
     return keys.word[2u * i] >> merge.record_bits | high;
@@ -158,6 +164,6 @@ uint id_of_key(uint i) {
 
 uint record_of_key(uint i) {
     KdMerge merge = merge_state();
-    return Words(merge.sorted_keys).word[merge.key_words * i] & (1u << merge.record_bits) - 1u;
+    return Words(merge.unique_keys).word[merge.key_words * i] & (1u << merge.record_bits) - 1u;
 }
 #endif

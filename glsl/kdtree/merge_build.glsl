@@ -28,13 +28,13 @@ void kd_gather(uint m) {
     }
 }
 
-// Where subtrees go, and the header of the merged tree; by one workgroup.
-void kd_order_merged() {
+// Where the subtrees of a tile go, and by the last tile the header of the merged tree.
+void kd_order_merged(uint tile) {
     KdState state = build_state();
     KdMerge merge = merge_state();
     KdStructure structure = KdStructure(structure_address);
-    uvec2 used = order_subtrees();
-    if (gl_LocalInvocationIndex != 0u) return;
+    uvec2 used;
+    if (!order_subtrees(tile, used) || gl_LocalInvocationIndex != 0u) return;
     KdHeader header = structure.header;
     merge.status |= state.status;
     merge.level_references = state.most_references;
@@ -88,9 +88,9 @@ void kd_hook_leaf(uint m) {
     if (leaf.copies == 1u) structure.nodes[leaf.pair + 1u - side] = structure.nodes[before.second >> 4];
 }
 
-// A workgroup's worth of them.
+// A tile of them.
 void kd_hook(uint tile) {
-    uint m = tile * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
-    if (m < merge_state().marked_count) kd_hook_leaf(m);
+    uint end = min(tile * TILE + TILE, merge_state().marked_count);
+    for (uint m = tile * TILE + gl_LocalInvocationIndex; m < end; m += gl_WorkGroupSize.x) kd_hook_leaf(m);
 }
 #endif

@@ -1,7 +1,7 @@
 #version 460
 // The marked leaves built anew and put into their places in one dispatch, from the task pool. See kdtree/merge.glsl.
 //
-// needs  the state as merge_mark.comp leaves it, and one barrier before; any number of workgroups from one up
+// needs  the state as merge_tasks.comp leaves it, and one barrier before; any number of workgroups from one up
 #include "kdtree/phases.glsl"
 #include "kdtree/merge_build.glsl"
 
@@ -14,7 +14,7 @@ void main() {
         if (!cursor.working) break;
         uint phase = cursor.phase, item = cursor.task;
         if (phase == PHASE_GATHER) kd_gather(item);
-        else if (phase == PHASE_ORDER) kd_order_merged();
+        else if (phase == PHASE_ORDER) kd_order_merged(item);
         else if (phase == PHASE_PLACE) kd_place(item);
         else if (phase == PHASE_HOOK) kd_hook(item);
         else kd_level(phase, item);

@@ -81,9 +81,13 @@ void add_met(KdItem item, bool is_there) {
     if (is_there && at < merge.item_capacity) met_items().item[at] = item;
 }
 
-void push_item(KdItem item, vec3 margin, uint next) {
-    KdStructure tree = KdStructure(item.tree);
-    KdNode still = node_of(item.place), moving = tree.nodes[item.node];
+// Where the invocation has an item. All of a workgroup come here, and reach what adds together.
+void push_item(bool is_item, KdItem item, vec3 margin, uint next) {
+    KdNode still = kd_leaf(0u, 0u), moving = still;
+    if (is_item) {
+        still = node_of(item.place);
+        moving = KdStructure(item.tree).nodes[item.node];
+    }
     bool is_in_leaf = kd_is_leaf(still), is_leaf = kd_is_leaf(moving);
     KdItem left = item, right = item;
     bvec2 is_there = bvec2(false);
@@ -105,7 +109,7 @@ void push_item(KdItem item, vec3 margin, uint next) {
                          right.node != NONE && is_in(widened(right.cell, margin), item.place.cell));
     }
     add_items(left, right, is_there, next);
-    add_met(item, is_in_leaf && is_leaf);
+    add_met(item, is_item && is_in_leaf && is_leaf);
 }
 
 // The triangles of a leaf of an object's tree in a leaf of the static one, by the rule of merge_find.comp.
@@ -129,11 +133,11 @@ void kd_push(uint tile, uint of_step) {
         note_items(wanted, of_step);
         merge.item_count[(of_step + 2u) % 3u] = 0u;
     }
-    if (i >= (of_step == 0u ? merge.seed_count : items_there(wanted))) return;
-    KdItem item;
-    if (of_step == 0u) item = first_item(i);
-    else item = items_of(of_step).item[i];
-    if (item.node != NONE) push_item(item, nearness(), of_step + 1u);
+    bool is_item = i < (of_step == 0u ? merge.seed_count : items_there(wanted));
+    KdItem item = KdItem(root_place(), uvec2(0), 0u, NONE, merged_cell());
+    if (is_item && of_step == 0u) item = first_item(i);
+    else if (is_item) item = items_of(of_step).item[i];
+    push_item(is_item && item.node != NONE, item, nearness(), of_step + 1u);
 }
 
 // A tile of leaves in leaves, behind all steps.

@@ -8,17 +8,16 @@ layout(push_constant, scalar) uniform Setup {
     uvec2 state_address;
     uvec2 undo;
     uvec2 pairs;
-    uvec2 keys;
-    uvec2 values;
-    uvec2 sorted_keys;
-    uvec2 sorted_values;
+    uvec2 keys[2];
+    uvec2 values[2];
     uvec2 marked;
     uvec2 seeds;
     uvec2 items;
+    uvec2 pair_tiles;
     uint pair_capacity;
     uint marked_capacity;
     uint record_bits;
-    uint key_words;
+    uint key_words_and_sorted;      // the number of words, and << 2, which of the keys and values are sorted
     uint tiles;
     uint primitive_end;
     uint seed_count;

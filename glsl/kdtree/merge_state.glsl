@@ -68,6 +68,9 @@ BUFFER KdMerge {
     uvec2 values;
     uvec2 sorted_keys;
     uvec2 sorted_values;
+    uvec2 unique_keys;              // each pair once: the memory that was sorted from, or the same where all are different already
+    uvec2 unique_values;
+    uvec2 pair_tiles;               // of a tile of pairs, how many count; then how many before it do
     uvec2 marked;
     uvec2 seeds;
     uvec2 items;
@@ -81,6 +84,9 @@ BUFFER KdMerge {
     uint item_capacity;             // of a step
     uint item_count[3];             // of a step, of the next, and of the one after, in turn
     uint met_count;                 // leaves of objects' trees in leaves of the static one
+    uint unique_tiles;              // tiles that have arrived: of sorted pairs,
+    uint marked_tiles;              // of pairs,
+    uint described_tiles;           // and of marked leaves
     uint equal_pairs;               // of those that there is room for: what is left out, as it is there once
     uint marked_count;
     uint marked_empty;              // of them, those that get a pair
@@ -90,7 +96,7 @@ BUFFER KdMerge {
 };
 
 // In the state, behind what a build has.
-const uint MERGE_AT = 2560;
+const uint MERGE_AT = 3072;
 
 // Leaves are numbered by parent and side, as those that are empty have no node; the root is 0.
 const uint ROOT_ID = 0;

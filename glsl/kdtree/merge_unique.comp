@@ -1,26 +1,22 @@
 #version 460
-// Leaves each of the sorted pairs once: a triangle is in several leaves of its object's tree; one workgroup. See kdtree/merge.glsl.
-#include "kdtree/merge.glsl"
+// How many of the sorted pairs are there once: a triangle is in several leaves of its object's tree; workgroups share the tiles. See
+// kdtree/merge.glsl.
+#include "kdtree/merge_mark.glsl"
 
 void main() {
     KdMerge merge = merge_state();
-    Words keys = Words(merge.sorted_keys), values = Words(merge.sorted_values);
-    uint words = merge.key_words, pairs = pair_count(), kept = 0;
-    for (uint base = 0; base < pairs; base += gl_WorkGroupSize.x) {
-        uint i = min(base + gl_LocalInvocationIndex, pairs - 1u), before = max(i, 1u) - 1u, total;
-        uvec2 key = uvec2(keys.word[words * i], keys.word[words * i + words - 1u]);
-        uvec2 key_before = uvec2(keys.word[words * before], keys.word[words * before + words - 1u]);
-        uint value = values.word[i];
-        bool is_new = base + gl_LocalInvocationIndex < pairs && (i == 0u || key != key_before);
-        uint at = kept + sum_before(is_new ? 1u : 0u, total);
-        barrier();
-        // What is moved goes down, so what later turns read is as it was.
-        if (is_new && at < i) {
-            keys.word[words * at] = key.x;
-            keys.word[words * at + words - 1u] = key.y;
-            values.word[at] = value;
+    Words counts = Words(merge.pair_tiles);
+    uint pairs = sorted_pairs(), tiles = tiles_of(pairs);
+    for (uint tile = group_number(); tile < tiles; tile += gl_NumWorkGroups.x) {
+        uint end = min(tile * TILE + TILE, pairs), own = 0, count = 0, arrived = 0;
+        for (uint i = tile * TILE + gl_LocalInvocationIndex; i < end; i += gl_WorkGroupSize.x) own += is_new(i) ? 1u : 0u;
+        add_all(count, own);
+        if (gl_LocalInvocationIndex == 0u) counts.word[tile] = count;
+        release_workgroup();
+        if (gl_LocalInvocationIndex == 0u) arrived = atomicAdd(merge.unique_tiles, 1u);
+        if (is_last_of(arrived, tiles)) {
+            scan_words(counts, 0u, 1u, tiles);
+            if (gl_LocalInvocationIndex == 0u) merge.equal_pairs = pairs - counts.word[tiles];
         }
-        kept += total;
     }
-    if (gl_LocalInvocationIndex == 0u) merge.equal_pairs = pairs - kept;
 }

@@ -14,22 +14,11 @@ void kd_bin(uint item, uint of_level) {
 
 // The last chunk of a level scans it; of a level without chunks somebody must.
 void kd_classify(uint chunk, uint of_level) {
-    KdState state = build_state();
-    uint chunks = state.chunk_count[of_level];
-    if (chunks > 0u) kd_classify_chunk(chunk, of_level);
-    release_to_device();
-    barrier();
-    uint arrived = 0;
-    if (gl_LocalInvocationIndex == 0u) arrived = atomicAdd(state.classified[of_level], 1u);
-    if (!is_last_of(agree(arrived), max(chunks, 1u))) return;
-    acquire_from_device();
+    if (build_state().chunk_count[of_level] > 0u) {
+        kd_classify_chunk(chunk, of_level);
+        if (!kd_sum_chunk(chunk, of_level)) return;
+    }
     kd_scan(of_level);
-}
-
-void kd_distribute(uint item, uint of_level) {
-    uint chunks = build_state().chunk_count[of_level];
-    if (item < chunks) kd_distribute_chunk(item, of_level);
-    else kd_distribute_leaves(item - chunks, of_level);
 }
 
 // A task of the pool, of a phase of the levels.

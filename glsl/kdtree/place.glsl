@@ -1,35 +1,42 @@
 // Subtrees in their order behind the levels, and the header.
 #ifndef HEDGEROW_KDTREE_PLACE
 #define HEDGEROW_KDTREE_PLACE
-#include "kdtree/build.glsl"
+#include "kdtree/scan.glsl"
 
-// Where the nodes and the references of each subtree go; by one workgroup. Nodes and references of the structure.
-uvec2 order_subtrees() {
+// Where the nodes and the references of the subtrees of a tile go, counted in the tile. The last tile to arrive scans the tiles: true
+// for it, with how many nodes and references the structure has.
+bool order_subtrees(uint tile, out uvec2 used) {
     KdState state = build_state();
     KdSubtrees subtrees = all_subtrees();
-    uint count = state.subtree_count;
-    uint node = state.node_count, reference = state.leaf_count;
-    for (uint base = 0; base < count; base += gl_WorkGroupSize.x) {
+    KdSides tiles = subtree_tiles();
+    uint count = state.subtree_count, end = min(tile * TILE + TILE, count), arrived = 0;
+    uvec2 sum = uvec2(0);
+    for (uint base = tile * TILE; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
-        uint nodes = i < count ? subtrees.subtree[i].nodes : 0u, references = i < count ? subtrees.subtree[i].references : 0u;
+        uint nodes = i < end ? subtrees.subtree[i].nodes : 0u, references = i < end ? subtrees.subtree[i].references : 0u;
         uvec2 total;
-        uint node_at = node + sum_before(nodes, total.x), reference_at = reference + sum_before(references, total.y);
-        if (i < count) {
+        uint node_at = sum.x + sum_before(nodes, total.x), reference_at = sum.y + sum_before(references, total.y);
+        if (i < end) {
             subtrees.subtree[i].first_node = node_at;
             subtrees.subtree[i].first_reference = reference_at;
         }
-        node += total.x;
-        reference += total.y;
+        sum += total;
     }
+    if (gl_LocalInvocationIndex == 0u) tiles.side[tile] = sum;
+    release_workgroup();
+    if (gl_LocalInvocationIndex == 0u) arrived = atomicAdd(state.ordered, 1u);
+    used = uvec2(state.node_count, state.leaf_count);
+    if (!is_last_of(arrived, max(tiles_of(count), 1u))) return false;
+    used += scan_pairs(tiles, 0u, tiles_of(count));
     if (gl_LocalInvocationIndex == 0u) PoolState(state_address).tasks[PHASE_PLACE] = (count + ITEMS - 1u) / ITEMS;
-    return uvec2(node, reference);
+    return true;
 }
 
-void kd_order_subtrees() {
+void kd_order_subtrees(uint tile) {
     KdState state = build_state();
     KdStructure structure = KdStructure(structure_address);
-    uvec2 used = order_subtrees();
-    if (gl_LocalInvocationIndex != 0u) return;
+    uvec2 used;
+    if (!order_subtrees(tile, used) || gl_LocalInvocationIndex != 0u) return;
     KdHeader header;
     header.magic = MAGIC;
     header.kind = KIND_KD_TREE;
@@ -74,6 +81,9 @@ void kd_place_subtree(uint s) {
     KdSubtree t = all_subtrees().subtree[s];
     KdNodes nodes = KdNodes(state.nodes);
     Words from = Words(state.leaf_references), to = Words(kd_references_at(structure_address, node_room));
+    uvec2 first = uvec2(state.node_count, state.leaf_count) + subtree_tiles().side[s / TILE];
+    t.first_node += first.x;
+    t.first_reference += first.y;
     if (gl_LocalInvocationIndex == 0u) structure.nodes[t.node] = moved(t.root, t.first_node, t.first_reference);
     for (uint i = gl_LocalInvocationIndex; i < t.nodes; i += gl_WorkGroupSize.x) {
         structure.nodes[t.first_node + i] = moved(nodes.node[t.nodes_at + i], t.first_node, t.first_reference);

@@ -1,23 +1,65 @@
-// The end of a level, by one workgroup: where chunks put what they have, the nodes, and the tasks of the next level. See
-// kdtree/build.glsl.
+// The end of a level: where chunks put what they have, whether there is room for the next level, its nodes and tasks. See
+// kdtree/build.glsl. What a task makes is summed up first, a tile of tasks at a time; when the sums of all tiles are known, each
+// tile is written to its places.
 #ifndef HEDGEROW_KDTREE_SCAN
 #define HEDGEROW_KDTREE_SCAN
 #include "kdtree/heuristic.glsl"
 
-// Makes of the sides of each chunk those of all chunks before; the sum of all lies behind.
-uvec2 scan_chunks(uint chunks) {
-    KdSides sides = chunk_sides();
+// ---- chunks ----
+
+// Makes of so many pairs, from one on, the sums of those before, and returns the sum of all.
+uvec2 scan_pairs(KdSides pairs, uint begin, uint end) {
     uvec2 sum = uvec2(0);
-    for (uint base = 0; base < chunks; base += gl_WorkGroupSize.x) {
+    for (uint base = begin; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
-        uvec2 own = i < chunks ? sides.side[i] : uvec2(0), total;
+        uvec2 own = i < end ? pairs.side[i] : uvec2(0), total;
         uvec2 before = uvec2(sum_before(own.x, total.x), sum_before(own.y, total.y));
-        if (i < chunks) sides.side[i] = sum + before;
+        if (i < end) pairs.side[i] = sum + before;
         sum += total;
     }
+    return sum;
+}
+
+// Of tiles of primitives, which are chunks of one task, at once; the sum of all lies behind.
+uvec2 scan_chunks(uint chunks) {
+    KdSides sides = chunk_sides();
+    uvec2 sum = scan_pairs(sides, 0u, chunks);
     if (gl_LocalInvocationIndex == 0u) sides.side[chunks] = sum;
     return sum;
 }
+
+// References on the left and on the right of all chunks of the level before this one.
+uvec2 sides_before(uint chunk) {
+    return chunk_tiles().side[chunk / TILE] + chunk_sides().side[chunk];
+}
+
+// A chunk is classified. The last of a tile scans that, the last tile of the level the tiles; whether this was the last.
+bool kd_sum_chunk(uint chunk, uint of_level) {
+    KdState state = build_state();
+    KdSides tiles = chunk_tiles();
+    Words arrivals = Words(state.arrivals);
+    uint chunks = state.chunk_count[of_level];
+    uint tile = chunk / TILE, begin = tile * TILE, end = min(begin + TILE, chunks), arrived = 0;
+    release_workgroup();
+    if (gl_LocalInvocationIndex == 0u) arrived = atomicAdd(arrivals.word[tile], 1u);
+    if (!is_last_of(arrived, end - begin)) return false;
+    uvec2 sum = scan_pairs(chunk_sides(), begin, end);
+    if (gl_LocalInvocationIndex == 0u) {
+        arrivals.word[tile] = 0u;
+        tiles.side[tile] = sum;
+        // Behind all chunks: a tile of its own where the last one is full.
+        if (end == chunks) chunk_sides().side[chunks] = chunks % TILE == 0u ? uvec2(0) : sum;
+    }
+    release_workgroup();
+    if (gl_LocalInvocationIndex == 0u) arrived = atomicAdd(state.classified[of_level], 1u);
+    if (!is_last_of(arrived, tiles_of(chunks))) return false;
+    uvec2 all = scan_pairs(tiles, 0u, tiles_of(chunks));
+    if (gl_LocalInvocationIndex == 0u) tiles.side[tiles_of(chunks)] = all;
+    next_step();
+    return true;
+}
+
+// ---- tasks ----
 
 // What becomes of a task.
 struct Fate {
@@ -33,9 +75,8 @@ Fate fate_of(KdTask t, bool level_ends) {
     fate.is_split = is_large && !level_ends && (t.split & SPLIT) != 0u;
     fate.is_leaf = is_large ? !fate.is_split : (t.split & ENDS) != 0u;
     if (fate.is_split) {
-        KdSides sides = chunk_sides();
-        fate.before = sides.side[t.first_chunk];
-        fate.sides = sides.side[t.first_chunk + chunks_of(t.count)] - fate.before;
+        fate.before = sides_before(t.first_chunk);
+        fate.sides = sides_before(t.first_chunk + chunks_of(t.count)) - fate.before;
     }
     return fate;
 }
@@ -52,183 +93,229 @@ bool is_large_task(uint count) {
 KdTask new_task(Box cell, uint begin, uint count, uint depth) {
     bool ends = ends_by_rule(count, depth);
     uint split = (is_large_task(count) ? LARGE : 0u) | (ends ? ENDS : 0u);
-    return KdTask(cell.lo, begin, cell.hi, count, depth, 0u, NONE, split, 0.0, 0u, 0u, 0u);
+    return KdTask(cell.lo, begin, cell.hi, count, depth, 0u, NONE, split, 0.0, 0u, 0u);
 }
 
-uint chunks_of_task(KdTask t) {
-    return (t.split & LARGE) != 0u ? chunks_of(t.count) : 0u;
+uint chunks_of_task(uint count) {
+    return is_large_task(count) ? chunks_of(count) : 0u;
 }
 
-bool wants_counters(KdTask t) {
-    return (t.split & ENDS) == 0u && chunks_of_task(t) > 1u;
+bool wants_counters(uint count, uint depth) {
+    return !ends_by_rule(count, depth) && chunks_of_task(count) > 1u;
 }
 
-// What the next level has so far.
-struct Sums {
-    uint tasks;
-    uint chunks;
-    uint subtrees;
-    uint subtree_references;
-    uint counters;
-};
+Sums no_sums() {
+    return Sums(0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
+}
 
-// Writes as many as two tasks an invocation, in the order of the invocations.
-void write_tasks(uint of_level, KdTask left, KdTask right, inout Sums sums) {
+// Adds a task of so many references, of the next level, if it has any.
+void add_task(inout Sums sums, uint count, uint depth) {
+    sums.tasks += count > 0u ? 1u : 0u;
+    sums.chunks += chunks_of_task(count);
+    sums.subtrees += is_subtree(count, depth) ? 1u : 0u;
+    sums.counters += wants_counters(count, depth) ? 1u : 0u;
+    sums.subtree_references += is_subtree(count, depth) ? count : 0u;
+}
+
+// Adds what all invocations have of one thing; returns what those before have, behind what there was.
+uint add_all(inout uint sum, uint own) {
+    uint total, before = sum + sum_before(own, total);
+    sum += total;
+    return before;
+}
+
+// Three numbers of up to 512 each in a word: what tasks of a tile make is summed up in few words, as each sum is much code.
+uint packed(uint a, uint b, uint c) {
+    return a | b << 10 | c << 20;
+}
+
+uvec3 unpacked(uint word) {
+    return uvec3(word & 1023u, word >> 10 & 1023u, word >> 20);
+}
+
+// Adds what the invocations of a workgroup have of tasks, of up to 512, and of the leaves and splits that they are of.
+void add_all_tasks(inout Sums sums, Sums own) {
+    uint kinds = 0, fates = 0;
+    add_all(kinds, packed(own.tasks, own.subtrees, own.counters));
+    add_all(fates, packed(own.leaves, own.inner, 0u));
+    add_all(sums.chunks, own.chunks);
+    add_all(sums.subtree_references, own.subtree_references);
+    uvec3 of_kind = unpacked(kinds), of_fate = unpacked(fates);
+    sums.tasks += of_kind.x;
+    sums.subtrees += of_kind.y;
+    sums.counters += of_kind.z;
+    sums.leaves += of_fate.x;
+    sums.inner += of_fate.y;
+}
+
+// Sums up what the tasks of a tile make if the level is split, and where their leaves are in the tile.
+void kd_sum_tile(uint tile, uint of_level) {
     KdTasks tasks = tasks_of(of_level);
-    KdSubtrees subtrees = all_subtrees();
-    KdTask both[2] = KdTask[2](left, right);
-    uvec2 is_there = uvec2(left.count > 0u ? 1u : 0u, right.count > 0u ? 1u : 0u);
-    uvec2 chunks = uvec2(chunks_of_task(left), chunks_of_task(right));
-    uvec2 is_small = uvec2(is_subtree(left.count, left.depth) ? 1u : 0u, is_subtree(right.count, right.depth) ? 1u : 0u);
-    uvec2 wants = uvec2(wants_counters(left) ? 1u : 0u, wants_counters(right) ? 1u : 0u);
-    Sums total;
-    uint at = sums.tasks + sum_before(is_there.x + is_there.y, total.tasks);
-    uint chunk = sums.chunks + sum_before(chunks.x + chunks.y, total.chunks);
-    uint small = sums.subtrees + sum_before(is_small.x + is_small.y, total.subtrees);
-    uint counter = sums.counters + sum_before(wants.x + wants.y, total.counters);
-    sum_before(is_small.x * left.count + is_small.y * right.count, total.subtree_references);
-    uint first_node = build_state().node_count;
-    uint deepest = subgroupMax(max(is_there.x * left.depth, is_there.y * right.depth));
-    if (subgroupElect()) atomicMax(build_state().depth, deepest);
-    for (uint side = 0; side < 2u; ++side) {
-        KdTask t = both[0];
-        if (side == 1u) t = both[1];
-        if (is_there[side] == 1u) {
-            t.first_chunk = chunk;
-            if (wants[side] == 1u) t.counters = counter;
-            if (is_small[side] == 1u) {
-                subtrees.subtree[small].node = first_node + at;
-                subtrees.subtree[small].task = at;
-            }
-            tasks.task[at] = t;
-            at += 1u;
-            chunk += chunks[side];
-            small += is_small[side];
-            counter += wants[side];
+    Sums own = no_sums(), sums = no_sums();
+    uint end = min(tile * TILE + TILE, build_state().task_count[of_level]), cut = 0;
+    for (uint base = tile * TILE; base < end; base += gl_WorkGroupSize.x) {
+        uint i = base + gl_LocalInvocationIndex;
+        KdTask t = tasks.task[min(i, end - 1u)];
+        Fate fate = fate_of(t, false);
+        bool is_leaf = fate.is_leaf && i < end, is_split = fate.is_split && i < end;
+        if (is_split) {
+            own.inner += 1u;
+            add_task(own, fate.sides.x, t.depth + 1u);
+            add_task(own, fate.sides.y, t.depth + 1u);
+        }
+        own.leaves += is_leaf ? 1u : 0u;
+        uint leaf = add_all(sums.leaf_references, is_leaf ? t.count : 0u);
+        uint all_cut = add_all(cut, is_leaf || is_split ? t.count : 0u);
+        if (is_leaf || is_split) {
+            tasks.task[i].leaf = leaf;
+            tasks.task[i].cut = all_cut;
         }
     }
-    sums.tasks += total.tasks;
-    sums.chunks += total.chunks;
-    sums.subtrees += total.subtrees;
-    sums.subtree_references += total.subtree_references;
-    sums.counters += total.counters;
+    add_all_tasks(sums, own);
+    sums.split_references = cut - sums.leaf_references;
+    if (gl_LocalInvocationIndex == 0u) task_tiles().tile[tile] = sums;
 }
 
-// Makes known what a level has.
+// Makes of so many words, a stride apart, the sums of those before; the sum of all lies behind.
+void scan_words(Words words, uint first, uint stride, uint count) {
+    uint sum = 0;
+    for (uint base = 0; base < count; base += gl_WorkGroupSize.x) {
+        uint i = base + gl_LocalInvocationIndex;
+        uint before = add_all(sum, i < count ? words.word[first + stride * i] : 0u);
+        if (i < count) words.word[first + stride * i] = before;
+    }
+    if (gl_LocalInvocationIndex == 0u) words.word[first + stride * count] = sum;
+}
+
+// Makes of the sums of so many tiles those of all tiles before, and returns those of all.
+Sums scan_tiles(uint tiles) {
+    const uint WORDS = SUMS_BYTES / 4u;
+    for (uint word = 0; word < WORDS; ++word) scan_words(Words(build_state().task_tiles), word, WORDS, tiles);
+    next_step();
+    return task_tiles().tile[tiles];
+}
+
+// Whether there is room for what a level makes, and so many references in the next; notes what was needed. By one invocation.
+bool has_room(uint of_level, Sums sums, uint references) {
+    KdState state = build_state();
+    uint with_parts = state.level_references[of_level] + state.straddling[of_level];
+    uint cut = state.leaf_count + state.root_references + sums.leaf_references + references;
+    uint nodes = state.node_count + sums.tasks, all_subtrees = state.subtree_count + sums.subtrees;
+    state.most_references = max(state.most_references, max(references, with_parts));
+    state.most_cut = max(state.most_cut, cut);
+    state.most_nodes = max(state.most_nodes, nodes);
+    state.most_subtrees = max(state.most_subtrees, all_subtrees);
+    return references <= reference_capacity && cut <= cut_room && nodes <= level_node_room && sums.tasks <= task_capacity
+        && all_subtrees <= subtree_capacity && state.is_short == 0u;
+}
+
+// Makes known what a level has; by one invocation.
 void publish_level(uint of_level, Sums sums, uint references) {
     KdState state = build_state();
     PoolState pool = PoolState(state_address);
-    if (gl_LocalInvocationIndex != 0u || of_level >= LEVELS) return;
-    uint first_node = state.node_count, first_subtree = state.subtree_count;
+    if (of_level >= LEVELS) return;
     state.task_count[of_level] = sums.tasks;
     state.chunk_count[of_level] = sums.chunks;
     state.level_references[of_level] = references;
-    state.first_node[of_level] = first_node;
-    state.first_subtree[of_level] = first_subtree;
-    state.node_count = first_node + sums.tasks;
-    state.subtree_count = sums.subtrees;
+    state.first_node[of_level] = state.node_count;
+    state.first_subtree[of_level] = state.subtree_count;
+    state.first_leaf[of_level] = state.leaf_count;
+    state.node_count += sums.tasks;
+    state.subtree_count += sums.subtrees;
     state.root_references += sums.subtree_references;
     state.binned_chunks[of_level] = sums.counters > 0u ? sums.chunks : 0u;
     uint phase = bin_phase(of_level);
-    pool.tasks[phase] = state.binned_chunks[of_level] + sums.subtrees - first_subtree;
+    pool.tasks[phase] = state.binned_chunks[of_level] + sums.subtrees;
     pool.tasks[phase + 1u] = sums.tasks > 0u ? max(sums.chunks, 1u) : 0u;
-    pool.tasks[phase + 2u] = sums.chunks + (sums.tasks + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x;
+    pool.tasks[phase + 2u] = sums.chunks + tiles_of(sums.tasks);
+    pool.tasks[PHASE_ORDER] = max(tiles_of(state.subtree_count), 1u);
 }
 
-// What a level would add to leaves, nodes and subtrees.
-bool has_room(uint of_level, uint references) {
+// The sums of all tiles of a level are there: what the next one has. By one workgroup.
+void kd_end_level(uint of_level) {
     KdState state = build_state();
-    KdTasks tasks = tasks_of(of_level);
-    uint count = state.task_count[of_level];
-    uint in_leaves = 0, children = 0, small = 0;
-    for (uint i = gl_LocalInvocationIndex; i < count; i += gl_WorkGroupSize.x) {
-        Fate fate = fate_of(tasks.task[i], false);
-        if (fate.is_leaf) in_leaves += tasks.task[i].count;
-        if (fate.is_split) {
-            uint depth = tasks.task[i].depth + 1u;
-            children += (fate.sides.x > 0u ? 1u : 0u) + (fate.sides.y > 0u ? 1u : 0u);
-            small += (is_subtree(fate.sides.x, depth) ? 1u : 0u) + (is_subtree(fate.sides.y, depth) ? 1u : 0u);
-        }
-    }
-    uint all_in_leaves, all_children, all_small;
-    sum_before(in_leaves, all_in_leaves);
-    sum_before(children, all_children);
-    sum_before(small, all_small);
-    uint cut = state.leaf_count + state.root_references + all_in_leaves + references;
-    uint nodes = state.node_count + all_children, subtrees = state.subtree_count + all_small;
-    if (gl_LocalInvocationIndex == 0u) {
-        uint with_parts = state.level_references[of_level] + state.straddling[of_level];
-        state.most_references = max(state.most_references, max(references, with_parts));
-        state.most_cut = max(state.most_cut, cut);
-        state.most_nodes = max(state.most_nodes, nodes);
-        state.most_subtrees = max(state.most_subtrees, subtrees);
-    }
-    return references <= reference_capacity && cut <= cut_room && nodes <= level_node_room && all_children <= task_capacity
-        && subtrees <= subtree_capacity;
-}
-
-void kd_scan(uint of_level) {
-    KdState state = build_state();
-    KdTasks tasks = tasks_of(of_level);
-    KdStructure structure = KdStructure(structure_address);
-    uint count = state.task_count[of_level];
-    uvec2 moved = scan_chunks(state.chunk_count[of_level]);
-    next_step();
-    uint references = moved.x + moved.y;
-    bool fits = has_room(of_level, references) && state.is_short == 0u;
-    bool splits = references > 0u;
+    Sums sums = scan_tiles(tiles_of(state.task_count[of_level]));
+    if (gl_LocalInvocationIndex != 0u) return;
+    uint chunks = state.chunk_count[of_level];
+    uvec2 sides = chunks > 0u ? sides_before(chunks) : uvec2(0);
+    uint references = sides.x + sides.y;
+    bool fits = has_room(of_level, sums, references);
     // Where there is no room for the next level, there is none: what would have been split are leaves.
-    bool level_ends = splits && !fits;
-    if (level_ends && gl_LocalInvocationIndex == 0u) {
+    if (references > 0u && !fits) {
         state.status |= STATUS_OUT_OF_ROOM;
         state.ended = of_level + 1u;
+        state.leaf_count += sums.leaf_references + sums.split_references;
+        state.leaves += sums.leaves + sums.inner;
+        sums = no_sums();
+        references = 0u;
+    } else {
+        state.leaf_count += sums.leaf_references;
+        state.leaves += sums.leaves;
+        state.inner_nodes += sums.inner;
+        state.empty_leaves += 2u * sums.inner - sums.tasks;
     }
-    uint first_node = state.first_node[of_level], next_node = state.node_count;
-    uint leaf_at = state.leaf_count, inner_nodes = 0, leaves = 0, empty_leaves = 0;
-    Sums sums = Sums(0u, 0u, state.subtree_count, 0u, 0u);
-    for (uint base = 0; base < count; base += gl_WorkGroupSize.x) {
-        uint i = base + gl_LocalInvocationIndex;
-        bool is_task = i < count;
-        KdTask t = tasks.task[min(i, count - 1u)];
-        Fate fate = fate_of(t, level_ends);
-        fate.is_leaf = fate.is_leaf && is_task;
-        fate.is_split = fate.is_split && is_task;
-        uint in_leaves, total;
-        uint leaf = leaf_at + sum_before(fate.is_leaf ? t.count : 0u, in_leaves);
-        uint children = fate.is_split ? (fate.sides.x > 0u ? 1u : 0u) + (fate.sides.y > 0u ? 1u : 0u) : 0u;
-        uint first_child = next_node + sums.tasks + sum_before(children, total);
-        KdTask left = new_task(Box(t.lo, t.hi), 0u, 0u, t.depth + 1u), right = left;
-        if (fate.is_split) {
-            uint axis = t.split & 3u;
-            Box left_cell, right_cell;
-            half_cells(Box(t.lo, t.hi), axis, t.plane, left_cell, right_cell);
-            uint begin = fate.before.x + fate.before.y;
-            left = new_task(left_cell, begin, fate.sides.x, t.depth + 1u);
-            right = new_task(right_cell, begin + fate.sides.x, fate.sides.y, t.depth + 1u);
-            tasks.task[i].left = begin;
-            tasks.task[i].right = begin + fate.sides.x;
-            structure.nodes[first_node + i] = kd_inner(axis, t.plane, first_child, fate.sides.x == 0u, fate.sides.y == 0u);
-        } else if (fate.is_leaf) {
-            tasks.task[i].leaf = leaf;
-            tasks.task[i].split = t.split & ~SPLIT;
-            structure.nodes[first_node + i] = kd_leaf(leaf, t.count);
+    publish_level(of_level + 1u, sums, references);
+}
+
+// All of it by one workgroup.
+void kd_scan(uint of_level) {
+    uint tiles = tiles_of(build_state().task_count[of_level]);
+    for (uint tile = 0; tile < tiles; ++tile) kd_sum_tile(tile, of_level);
+    next_step();
+    kd_end_level(of_level);
+}
+
+// The last tile of a level ends it.
+void kd_scan_tile(uint tile, uint of_level) {
+    KdState state = build_state();
+    kd_sum_tile(tile, of_level);
+    release_workgroup();
+    uint arrived = 0;
+    if (gl_LocalInvocationIndex == 0u) arrived = atomicAdd(state.scanned[of_level], 1u);
+    if (is_last_of(arrived, tiles_of(state.task_count[of_level]))) kd_end_level(of_level);
+}
+
+// Writes as many as two tasks an invocation, in the order of the invocations, behind what `sums` says of the level; returns which
+// of the level the first one is.
+uint write_tasks(uint of_level, KdTask left, KdTask right, inout Sums sums) {
+    KdTasks tasks = tasks_of(of_level);
+    KdSubtrees subtrees = all_subtrees();
+    KdState state = build_state();
+    KdTask both[2] = KdTask[2](left, right);
+    Sums own = no_sums();
+    add_task(own, left.count, left.depth);
+    add_task(own, right.count, right.depth);
+    uint kinds = 0;
+    uvec3 before = unpacked(add_all(kinds, packed(own.tasks, own.subtrees, own.counters)));
+    uint first = sums.tasks + before.x, at = first;
+    uint small = sums.subtrees + before.y, counter = sums.counters + before.z;
+    uint chunk = add_all(sums.chunks, own.chunks);
+    sums.tasks += unpacked(kinds).x;
+    sums.subtrees += unpacked(kinds).y;
+    sums.counters += unpacked(kinds).z;
+    uint first_node = state.first_node[min(of_level, LEVELS - 1u)];
+    small += state.first_subtree[min(of_level, LEVELS - 1u)];
+    uint deepest = subgroupMax(max(left.count > 0u ? left.depth : 0u, right.count > 0u ? right.depth : 0u));
+    if (subgroupElect()) atomicMax(state.depth, deepest);
+    for (uint side = 0; side < 2u; ++side) {
+        KdTask t = both[0];
+        if (side == 1u) t = both[1];
+        if (t.count > 0u) {
+            t.first_chunk = chunk;
+            if (wants_counters(t.count, t.depth)) {
+                t.counters = counter;
+                counter += 1u;
+            }
+            if (is_subtree(t.count, t.depth)) {
+                subtrees.subtree[small].node = first_node + at;
+                subtrees.subtree[small].task = at;
+                small += 1u;
+            }
+            tasks.task[at] = t;
+            at += 1u;
+            chunk += chunks_of_task(t.count);
         }
-        write_tasks(of_level + 1u, left, right, sums);
-        leaf_at += in_leaves;
-        sum_before(fate.is_split ? 1u : 0u, total);
-        inner_nodes += total;
-        sum_before(fate.is_split ? 2u - children : 0u, total);
-        empty_leaves += total;
-        sum_before(fate.is_leaf ? 1u : 0u, total);
-        leaves += total;
     }
-    barrier();
-    if (gl_LocalInvocationIndex == 0u) {
-        state.leaf_count = leaf_at;
-        state.inner_nodes += inner_nodes;
-        state.leaves += leaves;
-        state.empty_leaves += empty_leaves;
-    }
-    publish_level(of_level + 1u, sums, level_ends ? 0u : references);
+    return first;
 }
 #endif

@@ -9,6 +9,7 @@
 #define HEDGEROW_KDTREE_SMALL
 #include "kdtree/heuristic.glsl"
 #include "kdtree/clip.glsl"
+#extension GL_KHR_shader_subgroup_shuffle : require
 
 // As src/kdtree/host/small.rs has it.
 const uint MOST_NODES = 254;
@@ -92,24 +93,25 @@ void consider(inout KdPlane best, Box cell, float area_scale, uint axis, float a
     if (cost != INFINITE && is_better(plane, best)) best = plane;
 }
 
-// The planes at the two faces of each lane's own box across an axis.
-void consider_faces(inout KdPlane best, uint set, uint count, uint axis, float lo, float hi, Box cell, float area_scale) {
+// The planes at the two faces of each lane's own box across an axis. The lanes of a subgroup load as many boxes as they are, and look
+// at all of them.
+void consider_faces(inout KdPlane best, uint lanes, uint set, uint count, uint axis, float lo, float hi, Box cell, float area_scale) {
     Counts at_lo = Counts(0u, 0u, 0u), at_hi = Counts(0u, 0u, 0u);
     uint tile = 0;
     do {
         float others_lo = lo, others_hi = hi;
-        if (count > gl_SubgroupSize || gl_NumSubgroups > 1u) {
+        if (count > lanes || gl_NumSubgroups > 1u) {
             uint i = (3u * set + axis) * EXACT + min(tile + gl_SubgroupInvocationID, count - 1u);
             others_lo = small_lo[i];
             others_hi = small_hi[i];
         }
-        uint turns = min(gl_SubgroupSize, count - tile), turn = 0;
+        uint turns = min(lanes, count - tile), turn = 0;
         do {
-            float l = subgroupBroadcast(others_lo, turn), h = subgroupBroadcast(others_hi, turn);
+            float l = subgroupShuffle(others_lo, turn), h = subgroupShuffle(others_hi, turn);
             count_box(at_lo, l, h, lo);
             count_box(at_hi, l, h, hi);
         } while (++turn < turns);
-        tile += gl_SubgroupSize;
+        tile += lanes;
     } while (tile < count);
     consider(best, cell, area_scale, axis, lo, at_lo);
     consider(best, cell, area_scale, axis, hi, at_hi);
@@ -119,13 +121,14 @@ void consider_faces(inout KdPlane best, uint set, uint count, uint axis, float l
 // registers, which is cheaper than shared memory, much so on lavapipe.
 KdPlane best_of_faces(uint set, uint count, Box cell, float area_scale) {
     KdPlane best = no_plane();
-    uint base = 0;
+    // However many the subgroup really has: all are active here.
+    uint lanes = subgroupBallotBitCount(subgroupBallot(true)), base = 0;
     do {
         // Who has none looks at the last one's again.
         Box own = box_of(set, min(base + gl_LocalInvocationIndex, count - 1u));
-        consider_faces(best, set, count, 0u, own.lo.x, own.hi.x, cell, area_scale);
-        consider_faces(best, set, count, 1u, own.lo.y, own.hi.y, cell, area_scale);
-        consider_faces(best, set, count, 2u, own.lo.z, own.hi.z, cell, area_scale);
+        consider_faces(best, lanes, set, count, 0u, own.lo.x, own.hi.x, cell, area_scale);
+        consider_faces(best, lanes, set, count, 1u, own.lo.y, own.hi.y, cell, area_scale);
+        consider_faces(best, lanes, set, count, 2u, own.lo.z, own.hi.z, cell, area_scale);
         base += gl_WorkGroupSize.x;
     } while (base < count);
     return best_of_all(best);

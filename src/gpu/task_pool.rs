@@ -8,18 +8,20 @@ use bytemuck::{Pod, Zeroable};
 /// Phases a pool has at most: `POOL_PHASES_AT_MOST` in task_pool.glsl.
 pub const PHASES_AT_MOST: usize = 188;
 
-/// The pool's state in device memory, 768 bytes: `PoolState` in task_pool.glsl.
+/// The pool's state in device memory, 1,008 bytes: `PoolState` in task_pool.glsl, which says what the room is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct State {
     /// The next ticket.
     pub next: u32,
-    /// Tasks finished.
-    pub done: u32,
     /// 1 if a worker waited longer than the bound and gave up: the results are not to be used.
     pub status: u32,
     /// Phases.
     pub phases: u32,
+    room_before: [u32; 29],
+    /// Tasks finished.
+    pub done: u32,
+    room_behind: [u32; 31],
     /// Tasks of each phase; may be written by the device while an earlier phase runs.
     pub tasks: [u32; PHASES_AT_MOST],
 }

@@ -123,12 +123,18 @@ pub struct RefitTuning {
 /// How builds of kd-trees are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct KdTuning {
+    /// Invocations of a workgroup, but for those that have a subtree of few references: of these, and of the task pool's, a subgroup.
+    pub group: u32,
     /// Workgroups of a dispatch, at most.
     pub groups: u32,
+    /// Workgroups that build subtrees, at most. Each has some 80 kB of scratch memory for what waits.
+    pub subtree_groups: u32,
     /// References of a chunk, which is what a workgroup takes at a time.
     pub chunk: u32,
     /// Whether the task pool is the default, or a chain of dispatches.
     pub persistent: bool,
+    /// Whether the device's reciprocals are taken as correctly rounded, or made so.
+    pub exact_reciprocals: bool,
 }
 
 /// How tracers are cut.
@@ -199,7 +205,14 @@ impl Tuning {
             // As many slots as there are bits in a word, so that siblings meet in one; half of that for structures that are over
             // before every lane has a run.
             refit: RefitTuning { run: 32, short_run: 16, small: 4096 },
-            kd: KdTuning { groups: limits.workgroup_count.min(64), chunk: 256, persistent: true },
+            kd: KdTuning {
+                group,
+                groups: limits.workgroup_count.min(64),
+                subtree_groups: limits.workgroup_count.min(64),
+                chunk: 256,
+                persistent: true,
+                exact_reciprocals: true,
+            },
             trace: TraceTuning {
                 group,
                 shared_levels: ALL_LEVELS,
@@ -249,7 +262,16 @@ impl Tuning {
                 rebraid_group: at_most(128),
             },
             refit: RefitTuning { run: 4, short_run: 4, small: 4096 },
-            kd: KdTuning { groups: limits.workgroup_count.min(1024), chunk: 512, persistent: false },
+            // 2^18 invocations that stream, 2^12 subgroups that build subtrees: all that the largest GPUs hold at a time, or most.
+            // A chunk has 768 global counters.
+            kd: KdTuning {
+                group,
+                groups: limits.workgroup_count.min(1024),
+                subtree_groups: limits.workgroup_count.min(4096),
+                chunk: 4096,
+                persistent: false,
+                exact_reciprocals: false,
+            },
             trace: TraceTuning {
                 group: at_most(limits.subgroup_size.max(64)),
                 shared_levels: 8,

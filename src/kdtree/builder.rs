@@ -7,6 +7,9 @@
 //! Min-max binning above, level by level (Papay 2025, sections 9.4 to 9.6); cells of few references are split exactly, by one
 //! workgroup to their leaves. [`super::host`] is the twin, with
 //! [`Planes::Mixed`](super::host::Planes::Mixed). `glsl/kdtree/build.glsl` is the device's side.
+//!
+//! Trees have the bytes of the twin on every device: the only reciprocals that they depend on are correctly rounded, by the device or
+//! by integers ([`crate::gpu::KdTuning::exact_reciprocals`]). Where a device flushes subnormal numbers, inputs must not lead to any.
 
 use super::layout::{self, Header, Node};
 use super::termination::{Costs, depth_limit, leaf_size};
@@ -14,7 +17,7 @@ use crate::bvh::builder::Schedule;
 use crate::bvh::geometry::{Input, Planned, Primitives};
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::shaders::{self, Shader};
-use crate::gpu::{Context, Kernel, Recorder, Region, Step};
+use crate::gpu::{Context, KdTuning, Kernel, Recorder, Region, Step, task_pool};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -206,8 +209,13 @@ pub struct Builder {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shape {
     pub workgroup: u32,
+    /// Invocations of a workgroup that has a subtree, or little else than one subgroup can do.
+    narrow: u32,
     items: u32,
     pub groups: u32,
+    /// Workgroups that build subtrees.
+    subtree_groups: u32,
+    exact_reciprocals: bool,
 }
 
 /// How much there is room for.
@@ -263,10 +271,12 @@ push_constants! {
 }
 
 /// As `glsl/kdtree/` has them.
-const STATE_BYTES: u64 = 3072;
-const REPORT_AT: u64 = 768;
+const STATE_BYTES: u64 = 3584;
+const REPORT_AT: u64 = size_of::<task_pool::State>() as u64;
 const REFERENCE_BYTES: u64 = 28;
-const TASK_BYTES: u64 = 64;
+const TASK_BYTES: u64 = 60;
+pub(super) const TILE: u32 = 256;
+const SUMS_BYTES: u64 = 36;
 const SUBTREE_BYTES: u64 = 40;
 const MAX_DEPTH: u64 = layout::MAX_DEPTH as u64;
 const MOST_NODES: u64 = 254;
@@ -304,16 +314,40 @@ impl Room {
 
 impl Shape {
     pub fn of(context: &Context, options: &Options, count: u32, schedule: Schedule) -> Shape {
-        let limits = &context.limits;
-        // Two invocations look at the two parts of a reference.
-        let workgroup = limits.subgroup_size.max(2);
         let tuning = &context.tuning.kd;
-        let groups = (count / options.exact).clamp(1, tuning.groups);
+        // Two invocations look at the two parts of a reference.
+        let narrow = context.limits.subgroup_size.max(2);
+        let most = |groups: u32| (count / options.exact).clamp(1, groups.max(1));
+        // A stack is as large as what 256 triangles or so have besides: more than 1,024 where they are little among the rest.
+        let subtree_groups = most(tuning.subtree_groups.min((count / 256).max(1024)));
+        if schedule == Schedule::Persistent {
+            let groups = options.workgroups.unwrap_or(most(tuning.groups));
+            return Shape { workgroup: narrow, groups, subtree_groups: groups, ..Shape::with(narrow, tuning) };
+        }
+        Shape { narrow, groups: most(tuning.groups), subtree_groups, ..Shape::with(tuning.group.max(2), tuning) }
+    }
+
+    fn with(workgroup: u32, tuning: &KdTuning) -> Shape {
         Shape {
             workgroup,
-            items: (tuning.chunk / workgroup).max(1),
-            groups: options.workgroups.filter(|_| schedule == Schedule::Persistent).unwrap_or(groups),
+            narrow: workgroup,
+            items: (tuning.chunk / tuning.group).max(1),
+            groups: 1,
+            subtree_groups: 1,
+            exact_reciprocals: tuning.exact_reciprocals,
         }
+    }
+
+    fn is_narrow(shader: &Shader) -> bool {
+        let narrow = [&shaders::KDTREE_BUILD_SUBTREES, &shaders::KDTREE_BUILD_PLACE, &shaders::KDTREE_MERGE_GATHER];
+        narrow.into_iter().any(|narrow| narrow.name == shader.name)
+    }
+
+    /// Workgroups of `shader` where others of the phase have `groups`: as many invocations, as far as each workgroup has memory for
+    /// what waits.
+    pub fn groups_of(&self, shader: &Shader, groups: u32) -> u32 {
+        let narrower = (self.workgroup / self.narrow).max(1);
+        if Shape::is_narrow(shader) { groups.saturating_mul(narrower).min(self.subtree_groups) } else { groups }
     }
 
     pub fn chunk(&self) -> u32 {
@@ -321,10 +355,10 @@ impl Shape {
     }
 
     pub fn kernel(&self, shader: &'static Shader, options: &Options, input: &Input) -> Kernel {
-        // The fourth is of kernels that sort.
         let source = input.source_constant(Primitives::Triangles);
-        let constants = [self.items, options.bins, options.exact, 0, source];
-        Kernel::new(shader, self.workgroup, &constants)
+        let constants = [self.items, options.bins, options.exact, self.exact_reciprocals.into(), source];
+        let workgroup = if Shape::is_narrow(shader) { self.narrow } else { self.workgroup };
+        Kernel::new(shader, workgroup, &constants)
     }
 
     /// Scratch memory of a build with so much room.
@@ -337,15 +371,20 @@ impl Shape {
             + REFERENCE_BYTES * exact * MAX_DEPTH
             + size_of::<Node>() as u64 * (MOST_NODES + 2)
             + 4 * (MOST_NODES / 2 + 2) * exact;
+        let tiles = |count: u32| count.div_ceil(TILE);
         let scratch = STATE_BYTES
             + of(level_references, 2 * REFERENCE_BYTES + 4)
             + of(tasks, 2 * TASK_BYTES)
             + of(subtrees, SUBTREE_BYTES)
             + of(chunks + 1, 8)
             + counters
+            + of(tiles(chunks), 4)
+            + of(tiles(chunks) + 1, 8)
+            + of(tiles(tasks) + 1, SUMS_BYTES)
+            + of(tiles(subtrees), 8)
             + of(nodes - level_nodes, size_of::<Node>() as u64)
             + of(references, 4)
-            + of(self.groups, stack);
+            + of(self.subtree_groups, stack);
         scratch.next_multiple_of(16)
     }
 }
@@ -393,10 +432,11 @@ pub(super) fn levels(
     groups: u32,
     step: impl Fn(&'static str, &'static Shader, u32, u32) -> Step,
 ) -> Vec<Step> {
-    let of_level: [(&'static str, &'static Shader); 4] = [
+    let of_level: [(&'static str, &'static Shader); 5] = [
         ("subtrees", &shaders::KDTREE_BUILD_SUBTREES),
         ("bin", &shaders::KDTREE_BUILD_BIN),
         ("classify", &shaders::KDTREE_BUILD_CLASSIFY),
+        ("scan", &shaders::KDTREE_BUILD_SCAN),
         ("distribute", &shaders::KDTREE_BUILD_DISTRIBUTE),
     ];
     let level = |level| of_level.map(|(phase, shader)| step(phase, shader, level, groups));
@@ -472,6 +512,7 @@ impl Builder {
                 &shaders::KDTREE_BUILD_SUBTREES,
                 &shaders::KDTREE_BUILD_BIN,
                 &shaders::KDTREE_BUILD_CLASSIFY,
+                &shaders::KDTREE_BUILD_SCAN,
                 &shaders::KDTREE_BUILD_DISTRIBUTE,
                 &shaders::KDTREE_BUILD_ORDER,
                 &shaders::KDTREE_BUILD_PLACE,
@@ -483,7 +524,7 @@ impl Builder {
     ///
     /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever reads
     /// the structure or the report, or writes the scratch memory) behind. Labels: `encode`; `subtrees`, `bin`,
-    /// `classify` and `distribute` of each level; `place`. Or `build` where the schedule is persistent.
+    /// `classify`, `scan` and `distribute` of each level; `place`. Or `build` where the schedule is persistent.
     ///
     /// # Errors
     /// The memory is too small; the input has another number of triangles or geometries than the builder; a pipeline could not be made.
@@ -505,6 +546,7 @@ impl Builder {
         let arguments = self.arguments(input, structure, scratch)?;
         let groups = self.shape.groups;
         let step = |phase, shader: &'static Shader, level, groups| {
+            let groups = self.shape.groups_of(shader, groups);
             Step::new(phase, self.kernel(shader, input), &Arguments { level, ..arguments }, groups)
         };
         if self.schedule == Schedule::Persistent {
@@ -520,7 +562,7 @@ impl Builder {
             (&shaders::KDTREE_BUILD_RECORDS, groups),
             (&shaders::KDTREE_BUILD_ROOT, 1),
         ];
-        let place = [(&shaders::KDTREE_BUILD_ORDER, 1), (&shaders::KDTREE_BUILD_PLACE, groups)];
+        let place = [(&shaders::KDTREE_BUILD_ORDER, groups), (&shaders::KDTREE_BUILD_PLACE, groups)];
         let mut steps = Vec::new();
         steps.extend(encode.map(|(shader, groups)| step("encode", shader, 0, groups)));
         steps.extend(levels(arguments.depth_limit, groups, step));

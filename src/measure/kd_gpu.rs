@@ -13,8 +13,8 @@ use crate::trace::kd_host::Traversal;
 use crate::trace::{Hit, Query, Ray, Work};
 use crate::{Error, Result};
 
-/// Phases of a build at most: encode, four of each level, place.
-const PHASES: u32 = 4 * (MAX_DEPTH + 1) + 2;
+/// Phases of a build at most: encode, five of each level, place.
+const PHASES: u32 = 5 * (MAX_DEPTH + 1) + 2;
 /// Builds until there is room for all: each may find that levels need twice as much.
 const ATTEMPTS: u32 = 8;
 

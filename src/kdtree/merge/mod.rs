@@ -96,17 +96,16 @@ push_constants! {
         state: u64,
         undo: u64,
         pairs: u64,
-        keys: u64,
-        values: u64,
-        sorted_keys: u64,
-        sorted_values: u64,
+        keys: [u64; 2],
+        values: [u64; 2],
         marked: u64,
         seeds: u64,
         items: u64,
+        pair_tiles: u64,
         pair_capacity: u32,
         marked_capacity: u32,
         record_bits: u32,
-        key_words: u32,
+        key_words_and_sorted: u32,
         tiles: u32,
         primitive_end: u32,
         seed_count: u32,
@@ -115,7 +114,7 @@ push_constants! {
 }
 
 /// As `glsl/kdtree/merge_state.glsl` has them.
-const MERGE_AT: u64 = 2560;
+const MERGE_AT: u64 = 3072;
 const PAIR_BYTES: u64 = 32;
 const MARKED_BYTES: u64 = 40;
 const UNDONE_BYTES: u64 = 12;
@@ -234,6 +233,7 @@ impl Merger {
             keys: [take(keys), take(keys)],
             values: [take(keys / 2), take(keys / 2)],
             table: take(4 * self.sort.most_table_words(pairs)),
+            pair_tiles: take(4 * u64::from(pairs.div_ceil(builder::TILE) + 1)),
             bytes: at - scratch,
         }
     }
@@ -317,7 +317,7 @@ impl Merger {
     }
 
     fn steps(&self, [structure, scratch, undo]: [u64; 3], objects: &[Object]) -> Vec<Step> {
-        let Places { pairs, marked, seeds, items, keys, values, table, .. } = self.places(scratch);
+        let Places { pairs, marked, seeds, items, keys, values, table, pair_tiles, .. } = self.places(scratch);
         let triangles: u32 = objects.iter().map(|object| object.input.primitive_count).sum();
         let bits_of = |most: u32| 32 - most.leading_zeros();
         // Leaves are numbered by parent and side from 1 on, and no key is that of a place without a pair.
@@ -336,17 +336,16 @@ impl Merger {
             state: scratch,
             undo,
             pairs,
-            keys: keys[0],
-            values: values[0],
-            sorted_keys: keys[sorted],
-            sorted_values: values[sorted],
+            keys,
+            values,
             marked,
             seeds,
             items,
+            pair_tiles,
             pair_capacity,
             marked_capacity: self.plan.marked,
             record_bits,
-            key_words,
+            key_words_and_sorted: key_words | (sorted as u32) << 2,
             tiles: objects.iter().map(tiles).sum(),
             primitive_end,
             seed_count: objects.iter().filter(|object| has_tree(object)).count() as u32,
@@ -363,7 +362,7 @@ impl Merger {
             arguments.first_primitive = object.first_primitive;
             arguments.depth_limit = MAX_DEPTH;
             arguments.leaf_size = leaf_size(self.primitive_count);
-            Step::new(phase, kernel, &arguments, groups)
+            Step::new(phase, kernel, &arguments, self.shape.groups_of(shader, groups))
         };
         let step = |phase, shader: &'static Shader, level, groups| step_of(&none, 0, phase, shader, level, groups);
         let first_tile = |i: usize| objects[..i].iter().map(tiles).sum::<u32>();
@@ -393,9 +392,16 @@ impl Merger {
         }
         steps.extend(sorting);
         if setup.seed_count > 0 {
-            steps.push(step("unique", &shaders::KDTREE_MERGE_UNIQUE, 0, 1));
+            steps.push(step("unique", &shaders::KDTREE_MERGE_UNIQUE, 0, groups));
+            steps.push(step("unique", &shaders::KDTREE_MERGE_MOVE, 0, groups));
         }
-        steps.push(step("mark", &shaders::KDTREE_MERGE_MARK, 0, 1));
+        let mark = [
+            &shaders::KDTREE_MERGE_MARK,
+            &shaders::KDTREE_MERGE_LEAVES,
+            &shaders::KDTREE_MERGE_DESCRIBE,
+            &shaders::KDTREE_MERGE_TASKS,
+        ];
+        steps.extend(mark.map(|shader| step("mark", shader, 0, groups)));
         if self.schedule == Schedule::Persistent {
             steps.push(step("build", &shaders::KDTREE_MERGE_BUILD_PERSISTENT, 0, groups));
             return steps;
@@ -406,7 +412,7 @@ impl Merger {
         steps.extend(builder::levels(MAX_DEPTH, groups, |phase, shader, level, groups| {
             step(phase, shader, level, if level == 0 { groups } else { few })
         }));
-        steps.push(step("place", &shaders::KDTREE_MERGE_ORDER, 0, 1));
+        steps.push(step("place", &shaders::KDTREE_MERGE_ORDER, 0, groups));
         steps.push(step("place", &shaders::KDTREE_BUILD_PLACE, 0, groups));
         steps.push(step("hook", &shaders::KDTREE_MERGE_HOOK, 0, groups));
         steps
@@ -422,5 +428,6 @@ struct Places {
     keys: [u64; 2],
     values: [u64; 2],
     table: u64,
+    pair_tiles: u64,
     bytes: u64,
 }
