@@ -17,8 +17,9 @@
 #include "bvh/primitives.glsl"
 #include "bvh/split_planes.glsl"
 
-// Items of an invocation in a task.
-layout(constant_id = 1) const uint ITEMS = 1;
+// Items of an invocation in a task: all kernels of a build have the word of bvh/build_state.glsl.
+layout(constant_id = 1) const uint ITEMS_WORD = 1;
+const uint ITEMS = ITEMS_WORD & 0xFFFFu;
 
 layout(push_constant, scalar) uniform Arguments {
     uvec2 vertices;
