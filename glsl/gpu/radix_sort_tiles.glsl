@@ -166,13 +166,15 @@ void radix_scatter_tile(Radix r, uint column) {
     // Lane by lane in order from here on. The first barrier ends the counters, the others what lay there before.
     for (uint word = 0; word < KEY_WORDS; ++word) {
         barrier();
-        [[unroll]] for (uint row = 0; row < TILE_ROWS; ++row) tile_words[places[row]] = word == 0 ? keys[row].x : keys[row].y;
+        // Selects: a branch for each row in one loop is more than SwiftShader's compiler can follow.
+        bvec2 is_word = bvec2(word == 0, word == 1);
+        [[unroll]] for (uint row = 0; row < TILE_ROWS; ++row) tile_words[places[row]] = mix(keys[row].y, keys[row].x, is_word.x);
         barrier();
         [[unroll]] for (uint row = 0; row < TILE_ROWS; ++row) {
-            uint in_order = tile_words[row * gl_WorkGroupSize.x + gl_LocalInvocationIndex];
+            uvec2 in_order = uvec2(tile_words[row * gl_WorkGroupSize.x + gl_LocalInvocationIndex]);
+            keys[row] = mix(keys[row], in_order, is_word);
             // A key of one word has no other, whatever the lane had behind the last.
-            if (word == 0) keys[row] = uvec2(in_order, KEY_WORDS == 1 ? 0 : keys[row].y);
-            else keys[row].y = in_order;
+            if (KEY_WORDS == 1) keys[row].y = 0;
         }
     }
     barrier();
