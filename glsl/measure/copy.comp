@@ -16,6 +16,6 @@ layout(push_constant, scalar) uniform Arguments {
 };
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = invocation_number();
     if (i < count) target.word[i] = source.word[i];
 }
