@@ -18,7 +18,6 @@ fn err(output: &Output) -> String {
 }
 
 #[test]
-#[ignore = "minutes, where shaders are not cached"]
 fn a_quick_check_passes_and_its_record_says_on_what() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("check.json");

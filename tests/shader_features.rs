@@ -49,7 +49,6 @@ fn every_capability_of_a_shader_is_required_of_the_device() {
 /// Where subgroups may be smaller than the device says, the built-in still says what the device says: kernels count subgroups instead
 /// (`gl_NumSubgroups`) and ask ballots who is there.
 #[test]
-#[ignore = "twelve kernels still do"]
 fn no_shader_reads_the_size_of_subgroups() {
     let reads: Vec<_> = modules()
         .filter(|(_, module)| {
@@ -65,7 +64,6 @@ fn no_shader_reads_the_size_of_subgroups() {
 
 /// Otherwise the feature `subgroupBroadcastDynamicId` would be required; a shuffle takes any lane.
 #[test]
-#[ignore = "kdtree/small.glsl still does"]
 fn broadcasts_are_from_lanes_known_when_a_pipeline_is_made() {
     for (name, module) in modules() {
         let is_constant = |id: u32| module.types_global_values.iter().any(|value| value.result_id == Some(id));
