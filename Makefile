@@ -6,8 +6,7 @@
 #   make bench-peers   the same on Mesa 26, whose ray queries are a peer, beside CPU crates
 #   make stability     where methods give way: report/growth.html, report/large.html, report/degenerate.html
 #   make test          the test suite, under a bound in time: a shader that hangs would hang with it
-#   make test-gpu      the suite with work cut as for a GPU, and a part of it with subgroups of 4 and 16
-#   make test-passes   passes that are cut otherwise for a GPU, by that tuning, with subgroups of 4, 8 and 16
+#   make test-gpu      the suite with work cut as for a GPU, and a check of builders and tracers with subgroups of 4 and 16
 #   make test-lanes    the suite by either tuning on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
 #   make test-drivers  every pass on a second driver, SwiftShader, by the tunings of CPUs and of GPUs
 #   make check         formatting, lints and docs, warnings denied
@@ -50,14 +49,13 @@ WITHIN := $(if $(shell command -v timeout),timeout --kill-after 10 $(TEST_BOUND)
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 RUN := $(WITHIN) $(CARGO) $(if $(NEXTEST),nextest run,test) --release
 SUITE := $(RUN) --features $(FEATURES)
-# Tests of what depends on how many lanes a subgroup has.
-WIDTH_TESTS := gpu_radix_sort gpu_scan_reduce bvh_codes bvh_lbvh bvh_methods bvh_wide bvh_refit accel_rebraid kdtree_device
-PASS_TESTS := gpu_radix_sort gpu_scan_reduce bvh_wide bvh_refit
+# What depends on how many lanes a subgroup has: groups of `hedgerow check`.
+WIDTH_GROUPS := scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,kd-build,kd-merge,trace,trace-kd
 # The libraries for C, as their users build them: without the binary and the shader compiler.
 CAPI := -p hedgerow-capi
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
-.PHONY: bench bench-all bench-peers stability test test-gpu test-passes test-lanes check prebuilt portable install-c setup test-drivers
+.PHONY: bench bench-all bench-peers stability test test-gpu test-lanes check prebuilt portable install-c setup test-drivers
 
 bench: setup
 	$(CARGO) build --release --features $(FEATURES)
@@ -94,14 +92,7 @@ test: setup
 test-gpu: setup
 	$(CARGO) test --release --features $(FEATURES) --no-run
 	HEDGEROW_TUNING=gpu $(SUITE)
-	HEDGEROW_TUNING=gpu LP_NATIVE_VECTOR_WIDTH=128 $(SUITE) $(addprefix --test ,$(WIDTH_TESTS))
-	HEDGEROW_TUNING=gpu LP_NATIVE_VECTOR_WIDTH=512 $(SUITE) $(addprefix --test ,$(WIDTH_TESTS))
-
-# What every change must pass of that.
-test-passes: setup
-	HEDGEROW_TUNING=gpu $(SUITE) $(addprefix --test ,$(PASS_TESTS))
-	HEDGEROW_TUNING=gpu LP_NATIVE_VECTOR_WIDTH=128 $(SUITE) $(addprefix --test ,$(PASS_TESTS))
-	HEDGEROW_TUNING=gpu LP_NATIVE_VECTOR_WIDTH=512 $(SUITE) $(addprefix --test ,$(PASS_TESTS))
+	for width in 128 512; do LP_NATIVE_VECTOR_WIDTH=$$width $(BIN) check --quick --tuning gpu --groups $(WIDTH_GROUPS) || exit 1; done
 
 # lavapipe alone reads these variables; subgroups of 8 and two workgroups at a time are what `make test` has on most machines.
 test-lanes: setup
