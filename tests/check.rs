@@ -38,13 +38,13 @@ fn a_quick_check_passes_and_its_record_says_on_what() {
 #[test]
 fn groups_that_crash_hang_differ_or_panic_fail_and_the_rest_goes_on() {
     let groups = "fault-crash,fault-hang,fault-differ,fault-panic,pool";
-    let done = check(&["--quick", "--groups", groups, "--limit", "40"], "crash,hang,differ,panic");
+    let done = check(&["--quick", "--groups", groups, "--limit", "20"], "crash,hang,differ,panic");
     let text = out(&done);
     assert_eq!(done.status.code(), Some(1), "{text}{}", err(&done));
     assert_eq!(text.lines().last(), Some("1 passed, 4 failed"), "{text}");
     for says in [
         "in: it aborts",
-        "no end after 40 s, in: it waits",
+        "no end after 20 s, in: it waits",
         "two words: word 1: 7, expected 2",
         "it panics: no device is like this (src/measure/check/groups/faults.rs:",
     ] {

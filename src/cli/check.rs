@@ -6,9 +6,13 @@ use crate::measure::check::supervise::{self, Outcome};
 use crate::measure::check::{self, Ground, Group, Record};
 use crate::report::numbers::bytes;
 use anyhow::{Context, bail};
+use ash::vk;
+use std::collections::BTreeMap;
 use std::io::Write;
-use std::num::NonZeroU32;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError, mpsc};
+use std::thread;
 use std::time::Duration;
 
 /// Seconds that a group may take: several times what the longest takes on a slow device that compiles every shader anew.
@@ -30,6 +34,9 @@ pub struct Arguments {
     /// Seconds that a group may take
     #[arg(long, value_name = "SECONDS", default_value = LIMIT)]
     limit: NonZeroU32,
+    /// Groups at a time [default: one; one a core on a device that is a CPU, where a kernel is compiled by one core]
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
     /// Run one group in this process: what the command starts for each
     #[arg(long, hide = true, value_name = "GROUP")]
     run_group: Option<String>,
@@ -51,13 +58,16 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         names => names.iter().map(|name| group(name)).collect::<crate::Result<_>>()?,
     };
     // A device that cannot be opened is no matter of groups: the command itself says what is there.
-    drop(common.open_device(false)?);
+    let is_cpu = common.open_device(false)?.found().kind == vk::PhysicalDeviceType::CPU;
+    let cores = thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let jobs = arguments.jobs.unwrap_or(if is_cpu { cores } else { NonZeroUsize::MIN });
+    let commands = chosen.iter().map(|group| Ok((group.name, child(common, arguments, group)?)));
+    let commands = commands.collect::<anyhow::Result<Vec<_>>>()?;
+    let limit = Duration::from_secs(arguments.limit.get().into());
     let mut record = Record::new(arguments.quick);
     let is_shown = !arguments.json.takes_stdout();
-    for group in chosen {
-        let command = child(common, arguments, group)?;
-        let limit = Duration::from_secs(arguments.limit.get().into());
-        let (outcome, ground) = supervise::run(group.name, command, limit);
+    let run = |(name, command)| supervise::run(name, command, limit);
+    let tell = |(outcome, ground): (Outcome, Option<Ground>)| {
         if let Some(ground) = ground.filter(|_| record.ground.is_none()) {
             if is_shown {
                 print(&head(&record, &ground))?;
@@ -68,7 +78,9 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
             print(&line(&outcome))?;
         }
         record.add(outcome);
-    }
+        Ok(())
+    };
+    each_in_order(commands, jobs, run, tell)?;
     arguments.json.write_each([&record])?;
     if is_shown {
         print(&format!("{} passed, {} failed", record.passed, record.failed))?;
@@ -77,6 +89,39 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         bail!("{} of {} groups failed", record.failed, record.groups.len());
     }
     Ok(())
+}
+
+/// Does so many items at a time, and tells of each as soon as it and all before it are done.
+fn each_in_order<T: Send, R: Send>(
+    items: Vec<T>,
+    jobs: NonZeroUsize,
+    run: impl Fn(T) -> R + Sync,
+    mut tell: impl FnMut(R) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let items = Mutex::new(items.into_iter().enumerate());
+    let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let (sender, results) = mpsc::channel();
+    thread::scope(|scope| {
+        for sender in vec![sender; jobs.get()] {
+            let (next, run) = (&next, &run);
+            scope.spawn(move || {
+                while let Some((i, item)) = next() {
+                    if sender.send((i, run(item))).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        let (mut waiting, mut told) = (BTreeMap::new(), 0);
+        for (i, result) in results {
+            waiting.insert(i, result);
+            while let Some(result) = waiting.remove(&told) {
+                tell(result)?;
+                told += 1;
+            }
+        }
+        Ok(())
+    })
 }
 
 /// Lines are for whoever watches: none waits for the next.
