@@ -57,7 +57,9 @@ fn updated(ours: &Ours, info: BuildInfo<'_>, ranges: &[Range], source: &Built, t
 pub fn update(cases: &mut Cases<'_>) {
     let (opaque, none) = (GeometryFlags::OPAQUE, GeometryFlags::empty());
     let triangles = |seed, counts: [usize; 2]| {
-        Part::Triangles(vec![(soup(counts[0], 0.4, seed), opaque), (soup(counts[1], 0.3, seed + 1), none)])
+        // Smaller ones where they are many: a ray that passes near some edge tells nothing.
+        let size = 0.4 * (500.0 / counts[0] as f32).sqrt().min(1.0);
+        Part::Triangles(vec![(soup(counts[0], size, seed), opaque), (soup(counts[1], 0.3, seed + 1), none)])
     };
     let all_boxes = |seed| Part::Boxes(vec![(boxes(40, 0.2, seed), none), (boxes(9, 0.3, seed + 1), opaque)]);
     let many = if cases.quick { 500 } else { 20_000 };
