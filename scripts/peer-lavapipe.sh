@@ -3,6 +3,7 @@
 #
 # Mesa 26 is the first whose acceleration structures on the CPU are sorted, and so the first that is a peer. It comes from
 # Debian's trixie-backports with the C library it was built for (60 MB); scripts/with-lavapipe.sh starts programs on it.
+# The mirror is that of the machine's own sources, or the one that HEDGEROW_DEBIAN_MIRROR names.
 # Does nothing when the folder holds it already. Needs apt-get and dpkg, x86-64, no root.
 set -euo pipefail
 [ $# = 1 ] || { echo "usage: scripts/peer-lavapipe.sh DIR" >&2; exit 2; }
@@ -21,12 +22,13 @@ rm -rf "$work"
 mkdir -p "$work"/{state/lists/partial,cache/archives/partial,etc/preferences.d,etc/trusted.gpg.d,etc/sources.list.d,etc/apt.conf.d}
 : >"$work/empty.conf"
 : >"$work/state/status"
-mirror=$(
+mirror=${HEDGEROW_DEBIAN_MIRROR:-}
+[ -n "$mirror" ] || mirror=$(
   . /etc/os-release
   [ "${ID:-}" = debian ] && apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
     awk -v release="$VERSION_CODENAME" '$2 == release && $3 == "main" { print $1; exit }'
 ) || true
-mirror=${mirror:-http://deb.debian.org/debian}
+[ -n "$mirror" ] || say "this machine's sources name no mirror of Debian: set HEDGEROW_DEBIAN_MIRROR to the address of one"
 printf "deb [signed-by=$key] %s %s main\n" "$mirror" trixie "$mirror" trixie-backports >"$work/etc/sources.list"
 export APT_CONFIG=$work/empty.conf
 apt() {

@@ -5,6 +5,7 @@
 #   scripts/setup.sh --peers      also Embree 3 (for the builders embree-*)
 #   scripts/setup.sh --browser    also Chromium (for the test that opens the report in a browser)
 #
+# HEDGEROW_DEBIAN_MIRROR names a mirror of Debian, where the sources of apt name none.
 # Does nothing, and asks no network, when all is there. Installs with apt where it is root or may use sudo; otherwise,
 # and on other systems, it says what to install by hand and exits with 1.
 #
@@ -77,7 +78,7 @@ by_hand() {
   echo "setup: missing: ${missing[*]}. Install by hand:" >&2
   cat >&2 <<'TEXT'
   Debian 12      apt install g++ cmake git python3 libvulkan-dev vulkan-validationlayers
-                 echo 'deb http://deb.debian.org/debian bookworm-backports main' > /etc/apt/sources.list.d/backports.list
+                 add the suite bookworm-backports, component main, to the sources of apt (man sources.list)
                  apt update && apt install -t bookworm-backports mesa-vulkan-drivers
   Debian 13, Ubuntu 24.04 and later
                  apt install g++ cmake git python3 libvulkan-dev vulkan-validationlayers mesa-vulkan-drivers
@@ -124,12 +125,13 @@ apt update || by_hand "apt-get update failed"
 offered() { apt-cache madison mesa-vulkan-drivers | awk -F' *[|] *' '{ print $2 }' | sort -V | tail -n 1; }
 backports() {
   local work mirror
+  mirror=${HEDGEROW_DEBIAN_MIRROR:-}
+  [ -n "$mirror" ] || mirror=$(apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
+    awk '$2 == "bookworm" && $3 == "main" { print $1; exit }')
+  [ -n "$mirror" ] || { echo "setup: no source of apt has bookworm; set HEDGEROW_DEBIAN_MIRROR to a mirror's address" >&2; return 1; }
   work=$(mktemp -d)
   mkdir -p "$work/lists/partial"
   chmod 755 "$work" "$work/lists"
-  mirror=$(apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
-    awk '$2 == "bookworm" && $3 == "main" { print $1; exit }')
-  mirror=${mirror:-http://deb.debian.org/debian}
   printf 'deb %s %s main\n' "$mirror" bookworm "$mirror" bookworm-backports >"$work/sources.list"
   local only=(-o "Dir::Etc::sourcelist=$work/sources.list" -o Dir::Etc::sourceparts=- -o "Dir::State::lists=$work/lists"
     -o Dir::Cache::pkgcache= -o Dir::Cache::srcpkgcache=)

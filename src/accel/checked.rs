@@ -237,12 +237,12 @@ fn check_update(known: &HashMap<u64, Known>, build: &Asked<'_>) -> Result<()> {
     }
     if now.geometries.len() != built.geometries.len() {
         let (now, before) = (now.geometries.len(), built.geometries.len());
-        return refuse(format!("geometryCount is {now} and was {before}; an update changes it not"));
+        return refuse(format!("geometryCount is {now} and was {before}; an update cannot change it"));
     }
     for (i, (now, before)) in now.geometries.iter().zip(&built.geometries).enumerate() {
         if now.count != before.count {
             let (now, before) = (now.count, before.count);
-            return refuse(format!("ranges[{i}].primitiveCount is {now} and was {before}; an update changes it not"));
+            return refuse(format!("ranges[{i}].primitiveCount is {now} and was {before}; an update cannot change it"));
         }
         if now != before {
             return refuse(format!("pGeometries[{i}] is {now:?} and was {before:?}; an update changes data alone"));

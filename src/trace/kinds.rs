@@ -86,7 +86,8 @@ impl FromStr for RayKind {
 /// How many rays, and which of the many random ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RayOptions {
-    /// Pixels in x and y. `Random` makes as many rays as there are pixels; the others follow from the hits.
+    /// Pixels in x and y. `Primary` and `Random` make a ray for each pixel; the other kinds start where rays have hit, so
+    /// their number follows from the hits.
     pub size: [u32; 2],
     /// Another seed gives other rays of the same kinds.
     pub seed: u64,
