@@ -6,6 +6,7 @@ use common::corpus::{self, Mesh};
 use common::device;
 use common::geometries::{MOVED, Owned};
 use common::shapes::{icosphere, placed};
+use common::twins::PLENTY;
 use hedgerow::bvh::builder::{Input, Schedule, Source};
 use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::status;
@@ -48,16 +49,6 @@ fn built_of(input: &Input, options: &Options) -> (KdTree, Report) {
     let report = bytemuck::pod_read_unaligned(&scratch[range.start as usize..]);
     (KdTree::from_bytes(&structure.read::<u8>(sizes.structure as usize)).expect("a kd-tree"), report)
 }
-
-/// Enough for scenes where most triangles straddle most planes.
-const PLENTY: Estimate = Estimate {
-    level_references: 20.0,
-    level_nodes: 20.0,
-    subtree_nodes: 20.0,
-    cut_references: 20.0,
-    subtree_references: 20.0,
-    subtrees: 20.0,
-};
 
 /// The header without what tells of room.
 fn without_room(header: &Header) -> Header {

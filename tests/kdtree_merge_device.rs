@@ -5,6 +5,7 @@ mod common;
 use common::corpus::{self, Mesh};
 use common::device;
 use common::shapes::{Corners, Random, hard_rays, icosphere, placed, soup, tree_of};
+use common::twins::PLENTY_TO_MERGE;
 use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::Buffer;
@@ -15,22 +16,7 @@ use hedgerow::kdtree::merge::{Estimate, Memory, Merger, Most, Object, Objects, O
 use hedgerow::trace::host::closest_hit;
 use hedgerow::trace::kd_host::{self, Traversal};
 
-const PLENTY: Options = Options {
-    build: builder::Options::DEFAULT,
-    estimate: Estimate {
-        pairs: 60.0,
-        items: 20.0,
-        marked: 40.0,
-        build: builder::Estimate {
-            level_references: 200.0,
-            level_nodes: 60.0,
-            subtree_nodes: 200.0,
-            cut_references: 400.0,
-            subtree_references: 400.0,
-            subtrees: 60.0,
-        },
-    },
-};
+const PLENTY: Options = Options { build: builder::Options::DEFAULT, estimate: PLENTY_TO_MERGE };
 
 /// As a chain, and by persistent workgroups.
 fn schedules() -> impl Iterator<Item = Options> {

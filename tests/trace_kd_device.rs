@@ -13,7 +13,7 @@ use hedgerow::kdtree::host::{Options, build};
 use hedgerow::kdtree::layout::{Content, KdTree, MAX_DEPTH};
 use hedgerow::trace::kd::Tracer;
 use hedgerow::trace::kd_host::{self, Traversal};
-use hedgerow::trace::tracer::{Buffers, Loads, Shape};
+use hedgerow::trace::tracer::{Loads, Shape};
 use hedgerow::trace::{Hit, Query, Ray, Work, host};
 
 const TRAVERSALS: [Traversal; 8] = [
@@ -46,25 +46,8 @@ fn traversal_of(i: usize) -> Traversal {
 }
 
 fn traced(tree: &[u8], rays: &[Ray], tracer: &Tracer, query: Query, count_work: bool) -> (Vec<Hit>, Vec<Work>) {
-    let device = device();
-    let structure = device.upload("structure", tree).expect("memory");
-    let ray_buffer = device.upload("rays", rays).expect("memory");
-    // One more than is written.
-    let hits = device.buffer("hits", size_of_val(rays) as u64 / 2 + 16).expect("memory");
-    let work = device.buffer("work", (rays.len() * size_of::<Work>()) as u64).expect("memory");
-    let unwritten = Hit { t: -1.0, primitive: 7, u: -1.0, v: -1.0 };
-    hits.write(&vec![unwritten; rays.len() + 1]);
-    let buffers = Buffers {
-        structure: structure.address(),
-        rays: ray_buffer.address(),
-        hits: hits.address(),
-        work: count_work.then_some(work.address()),
-        count: rays.len() as u32,
-    };
-    device.run(None, |recorder| tracer.record(recorder, query, &buffers)).expect("the device traces");
-    let mut all: Vec<Hit> = hits.read(rays.len() + 1);
-    assert_eq!(all.pop(), Some(unwritten), "behind the hits");
-    (all, work.read(rays.len()))
+    common::traced(device(), tree, rays, count_work, |r, buffers| tracer.record(r, query, buffers))
+        .expect("the device traces")
 }
 
 #[track_caller]

@@ -47,22 +47,8 @@ fn traced<N: TracedNode>(
     query: Query,
     count: bool,
 ) -> (Vec<Hit>, Vec<Work>) {
-    let device = device();
-    let structure = device.upload("structure", &tree.to_bytes()).expect("memory");
-    let ray_buffer = device.upload("rays", rays).expect("memory");
-    let hits = device.buffer("hits", size_of_val(rays) as u64 / 2).expect("memory");
-    let work = device.buffer("work", (rays.len() * size_of::<Work>()) as u64).expect("memory");
-    let unwritten = Hit { t: -1.0, primitive: 7, u: -1.0, v: -1.0 };
-    hits.write(&vec![unwritten; rays.len()]);
-    let buffers = Buffers {
-        structure: structure.address(),
-        rays: ray_buffer.address(),
-        hits: hits.address(),
-        work: count.then_some(work.address()),
-        count: rays.len() as u32,
-    };
-    device.run(None, |recorder| tracer.record(recorder, query, &buffers)).expect("the device traces");
-    (hits.read(rays.len()), work.read(rays.len()))
+    common::traced(device(), &tree.to_bytes(), rays, count, |r, buffers| tracer.record(r, query, buffers))
+        .expect("the device traces")
 }
 
 /// On the host as by brute force; on the device as on the host.

@@ -6,6 +6,7 @@ pub mod geometries;
 pub mod probe;
 pub mod twins;
 
+pub use hedgerow::measure::check::traced::traced;
 pub use hedgerow::measure::check::{agree, corpus, matrices, mixture, shapes, world};
 
 use hedgerow::gpu::{Device, DeviceOptions, DriverTracing, Restrict, TuningChoice};

@@ -3,28 +3,19 @@
 use super::common::corpus::{self, Mesh};
 use super::common::device;
 use super::common::shapes::{Corners, hard_rays, icosphere, placed, soup};
+use super::common::twins::{PLENTY, PLENTY_TO_MERGE};
 use super::meshes;
 use super::tracers::traced;
 use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::Buffer;
-use hedgerow::kdtree::builder::{self, Builder, Estimate, Options};
+use hedgerow::kdtree::builder::{self, Builder, Options};
 use hedgerow::kdtree::host::{self, Planes, marked};
 use hedgerow::kdtree::layout::{Header, KdTree};
 use hedgerow::kdtree::merge::{self, Memory, Merger, Most, Object, Report};
 use hedgerow::trace::Query;
 use hedgerow::trace::kd::{Tracer, TreeEntry};
 use hedgerow::trace::kd_host::{self, Traversal};
-
-/// Room for scenes where most triangles straddle most planes.
-const PLENTY: Estimate = Estimate {
-    level_references: 200.0,
-    level_nodes: 60.0,
-    subtree_nodes: 200.0,
-    cut_references: 400.0,
-    subtree_references: 400.0,
-    subtrees: 60.0,
-};
 
 const SCHEDULES: [Schedule; 2] = [Schedule::Chain, Schedule::Persistent];
 
@@ -108,8 +99,7 @@ pub fn merges_and_restores_are_those_of_the_host() {
 
 /// Merged, it is the host's tree; restored, the one that was there.
 fn merge(still: &KdTree, objects: &[Corners], schedule: Schedule, pushed: bool) {
-    let estimate = merge::Estimate { pairs: 60.0, items: 20.0, marked: 40.0, build: PLENTY };
-    let options = merge::Options { build: with(schedule), estimate };
+    let options = merge::Options { build: with(schedule), estimate: PLENTY_TO_MERGE };
     let triangles = objects.iter().map(|object| object.len() as u32).sum();
     let most = Most { objects: objects.len() as u32, triangles };
     let still = still.clone().with_room(Merger::room(&options, most)).expect("room");

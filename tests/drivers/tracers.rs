@@ -1,7 +1,7 @@
 //! Tracers of BVHs and of wide trees, cut in every way, against the host's; and wide trees as the device collapses them.
 
-use super::common::device;
 use super::common::shapes::{hard_rays, icosphere, placed, soup, tree_of};
+use super::common::{self, device};
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child};
 use hedgerow::bvh::wide::device::{OnDevice, Options};
@@ -30,25 +30,14 @@ fn shapes(lanes: bool) -> Vec<Shape> {
         .collect()
 }
 
-/// What a tracer finds, which `record` records; rays count their work.
+/// Hits and work of rays through a structure.
 pub fn traced(
     structure: &[u8],
     rays: &[Ray],
     record: impl FnOnce(&mut Recorder<'_>, &Buffers) -> hedgerow::Result<()>,
 ) -> Vec<(Hit, Work)> {
-    let structure = device().upload("structure", structure).expect("memory");
-    let ray_buffer = device().upload("rays", rays).expect("memory");
-    let hits = device().buffer("hits", size_of::<Hit>() as u64 * rays.len() as u64).expect("memory");
-    let work = device().buffer("work", size_of::<Work>() as u64 * rays.len() as u64).expect("memory");
-    let buffers = Buffers {
-        structure: structure.address(),
-        rays: ray_buffer.address(),
-        hits: hits.address(),
-        work: Some(work.address()),
-        count: rays.len() as u32,
-    };
-    device().run(None, |recorder| record(recorder, &buffers)).expect("the device traces");
-    hits.read(rays.len()).into_iter().zip(work.read(rays.len())).collect()
+    let (hits, work) = common::traced(device(), structure, rays, true, record).expect("the device traces");
+    hits.into_iter().zip(work).collect()
 }
 
 pub fn hits_and_work_are_those_of_the_host() {

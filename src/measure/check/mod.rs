@@ -4,8 +4,8 @@
 //! force. [`GROUPS`] lists them from the simplest pass to whole top levels, so that the first failure says most. Each runs in a
 //! process of its own ([`supervise`]): a crash, a hang or a lost device is one failed group.
 //!
-//! The tests share what the groups are made of: meshes that hurt ([`corpus`], [`shapes`]), trees from both sides ([`twins`]),
-//! worlds of instances built through a [`backend`], queries in a shader that is not ours ([`probe`]), and what they should report
+//! The tests share what the groups are made of: meshes that hurt ([`corpus`], [`shapes`]), trees from both sides ([`twins`]), rays
+//! through them ([`traced`]), worlds of instances built through a [`backend`], queries in a shader that is not ours ([`probe`]), and what they should report
 //! ([`world`], [`agree`]).
 
 pub mod agree;
@@ -18,6 +18,7 @@ pub mod mixture;
 pub mod probe;
 pub mod shapes;
 pub mod supervise;
+pub mod traced;
 pub mod twins;
 pub mod world;
 

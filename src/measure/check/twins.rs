@@ -1,4 +1,4 @@
-//! A tree from both sides: built on the device, and by the twins on the host with the same options.
+//! A tree from both sides: built on the device, and by the twins on the host with the same options; and room enough for any.
 
 use super::cases::Found;
 use super::corpus::Mesh;
@@ -7,6 +7,33 @@ use crate::bvh::host;
 use crate::bvh::layout::Bvh2;
 use crate::bvh::sah::Collapse;
 use crate::gpu::Device;
+use crate::kdtree::builder::Estimate;
+use crate::kdtree::merge;
+
+/// Room for kd-trees of scenes where most triangles straddle most planes.
+pub const PLENTY: Estimate = Estimate {
+    level_references: 20.0,
+    level_nodes: 20.0,
+    subtree_nodes: 20.0,
+    cut_references: 20.0,
+    subtree_references: 20.0,
+    subtrees: 20.0,
+};
+
+/// Room for objects that lie in the densest part of a kd-tree.
+pub const PLENTY_TO_MERGE: merge::Estimate = merge::Estimate {
+    pairs: 60.0,
+    items: 20.0,
+    marked: 40.0,
+    build: Estimate {
+        level_references: 200.0,
+        level_nodes: 60.0,
+        subtree_nodes: 200.0,
+        cut_references: 400.0,
+        subtree_references: 400.0,
+        subtrees: 60.0,
+    },
+};
 
 /// The device's tree over `input`.
 ///

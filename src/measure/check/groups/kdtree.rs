@@ -3,23 +3,14 @@
 use crate::bvh::builder::{Input, Schedule};
 use crate::bvh::layout::status;
 use crate::gpu::{Buffer, Device};
-use crate::kdtree::builder::{Builder, Estimate, Options, Report};
+use crate::kdtree::builder::{Builder, Options, Report};
 use crate::kdtree::host::{self, Planes, marked};
 use crate::kdtree::layout::{Header, KdTree};
 use crate::kdtree::merge::{self, Memory, Merger, Most, Object};
 use crate::measure::check::cases::{Cases, Found, same, same_all};
 use crate::measure::check::corpus::{self, Mesh};
 use crate::measure::check::shapes::{Corners, icosphere, placed, soup};
-
-/// Enough for scenes where most triangles straddle most planes.
-const PLENTY: Estimate = Estimate {
-    level_references: 20.0,
-    level_nodes: 20.0,
-    subtree_nodes: 20.0,
-    cut_references: 20.0,
-    subtree_references: 20.0,
-    subtrees: 20.0,
-};
+use crate::measure::check::twins::{PLENTY, PLENTY_TO_MERGE};
 
 fn planes(options: &Options) -> host::Options {
     host::Options { planes: Planes::Mixed { bins: options.bins, exact: options.exact }, costs: options.costs }
@@ -82,24 +73,6 @@ fn compare(got: &KdTree, expected: &KdTree) -> Found {
     same_all("record", &got.records, &expected.records)
 }
 
-/// Room for objects that lie in the densest part of a tree.
-const MERGE: merge::Options = merge::Options {
-    build: Options::DEFAULT,
-    estimate: merge::Estimate {
-        pairs: 60.0,
-        items: 20.0,
-        marked: 40.0,
-        build: Estimate {
-            level_references: 200.0,
-            level_nodes: 60.0,
-            subtree_nodes: 200.0,
-            cut_references: 400.0,
-            subtree_references: 400.0,
-            subtrees: 60.0,
-        },
-    },
-};
-
 /// What stands still, and objects that come and go.
 type World = (&'static str, Corners, Vec<Corners>);
 
@@ -123,7 +96,8 @@ pub fn merge(cases: &mut Cases<'_>) {
 }
 
 fn merged_as_on_host(device: &Device, still: &Corners, objects: &[Corners], schedule: Schedule) -> Found {
-    let options = merge::Options { build: Options { schedule: Some(schedule), ..Options::DEFAULT }, ..MERGE };
+    let options =
+        merge::Options { build: Options { schedule: Some(schedule), ..Options::DEFAULT }, estimate: PLENTY_TO_MERGE };
     let (_, positions, triangles) = corpus::soup("", still.clone());
     let meshes: Vec<Mesh> = objects.iter().map(|corners| corpus::soup("object", corners.clone())).collect();
     let most = Most {

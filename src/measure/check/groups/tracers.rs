@@ -5,15 +5,16 @@ use crate::bvh::sah::Collapse;
 use crate::bvh::wide::Form;
 use crate::bvh::wide::layout::Wide;
 use crate::bvh::wide::quantised::QuantisedNode;
-use crate::gpu::{Device, Recorder};
+use crate::gpu::Device;
 use crate::kdtree::host::{self as kd_builder, Options as KdOptions};
 use crate::kdtree::layout::KdTree;
 use crate::measure::check::cases::{Cases, Found, same_all};
 use crate::measure::check::corpus;
 use crate::measure::check::shapes::{Corners, hard_rays, icosphere, placed, rays_from_the_middle, soup, tree_with};
+use crate::measure::check::traced::traced;
 use crate::trace::kd::Tracer as KdTracer;
 use crate::trace::kd_host::{self, Traversal};
-use crate::trace::tracer::{self, Buffers, Loads, Shape};
+use crate::trace::tracer::{self, Loads, Shape};
 use crate::trace::wide::{Order, Tracer};
 use crate::trace::wide_host::{self, TracedNode};
 use crate::trace::{Hit, Query, Ray, Work, host};
@@ -52,28 +53,6 @@ fn scenes(cases: &Cases<'_>) -> Vec<Scene> {
     let rays = hard_rays(&pile, 100, 1.0, [0.0; 3], 4);
     scenes.push(Scene { name: "a thousand at one place".into(), corners: pile, rays });
     scenes
-}
-
-/// Hits and work of rays through a structure, by whatever `record` records.
-fn traced(
-    device: &Device,
-    structure: &[u8],
-    rays: &[Ray],
-    record: impl FnOnce(&mut Recorder<'_>, &Buffers) -> crate::Result<()>,
-) -> crate::Result<(Vec<Hit>, Vec<Work>)> {
-    let structure = device.upload("structure", structure)?;
-    let ray_buffer = device.upload("rays", rays)?;
-    let hits = device.upload("hits", &vec![Hit { t: -1.0, primitive: 7, u: -1.0, v: -1.0 }; rays.len()])?;
-    let work = device.buffer("work", size_of::<Work>() as u64 * rays.len() as u64)?;
-    let buffers = Buffers {
-        structure: structure.address(),
-        rays: ray_buffer.address(),
-        hits: hits.address(),
-        work: Some(work.address()),
-        count: rays.len() as u32,
-    };
-    device.run(None, |recorder| record(recorder, &buffers))?;
-    Ok((hits.read(rays.len()), work.read(rays.len())))
 }
 
 /// The same hits and work.
@@ -127,8 +106,9 @@ pub fn binary(cases: &mut Cases<'_>) {
                 cases.case(format!("{what}, the host's"), |_| as_by_brute_force(&tree, &rays, query, &expected));
                 for shape in shapes(cases.device, cases.quick) {
                     cases.case(format!("{what}, {shape:?}"), |device| {
-                        let got =
-                            traced(device, &bytes, &rays, |r, buffers| tracer::record(r, &shape, query, buffers))?;
+                        let got = traced(device, &bytes, &rays, true, |r, buffers| {
+                            tracer::record(r, &shape, query, buffers)
+                        })?;
                         as_on_host(&expected, &got)
                     });
                 }
@@ -168,7 +148,10 @@ fn wide_form<N: TracedNode>(cases: &mut Cases<'_>, name: &str, tree: &Bvh2, rays
             let expected: Vec<(Hit, Work)> = rays.iter().map(trace).collect();
             cases.case(format!("{name}, {query:?}, {tracer:?}"), |device| {
                 as_by_brute_force(tree, rays, query, &expected)?;
-                as_on_host(&expected, &traced(device, &bytes, rays, |r, buffers| tracer.record(r, query, buffers))?)
+                as_on_host(
+                    &expected,
+                    &traced(device, &bytes, rays, true, |r, buffers| tracer.record(r, query, buffers))?,
+                )
             });
         }
     }
@@ -198,7 +181,7 @@ pub fn kd(cases: &mut Cases<'_>) {
                     let tracer = KdTracer::new(device, traversal);
                     as_on_host(
                         &expected,
-                        &traced(device, &bytes, &rays, |r, buffers| tracer.record(r, query, buffers))?,
+                        &traced(device, &bytes, &rays, true, |r, buffers| tracer.record(r, query, buffers))?,
                     )
                 });
             }
