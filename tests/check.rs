@@ -55,6 +55,19 @@ fn groups_that_crash_hang_differ_or_panic_fail_and_the_rest_goes_on() {
     assert!(text.lines().any(|line| line.starts_with("passed   pool")), "{text}");
 }
 
+/// As scripts/with-lavapipe.sh starts programs.
+#[test]
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+fn groups_run_where_a_loader_was_given_the_program() {
+    let mut command = Command::new("/lib64/ld-linux-x86-64.so.2");
+    command.args(["--inhibit-rpath", "none", env!("CARGO_BIN_EXE_hedgerow")]);
+    let done = command
+        .args(["check", "--quick", "--groups", "scan,sort"])
+        .output()
+        .expect("the loader's place is part of the ABI");
+    assert_eq!(out(&done).lines().last(), Some("2 passed, 0 failed"), "{}{}", out(&done), err(&done));
+}
+
 #[test]
 fn what_is_not_there_is_named() {
     let done = check(&["--groups", "lbvh,nonsense"], "");

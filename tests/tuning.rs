@@ -9,11 +9,11 @@ use hedgerow::measure::builders::Spec;
 use hedgerow::scene::{self, LoadOptions, Scene};
 
 conditional::tests! {
-    linear_builds_give_the_same_bytes_by_either_tuning: needs::nothing(),
-    clustered_builds_give_the_same_bytes_by_either_tuning: needs::nothing(),
-    hploc_gives_the_same_bytes_by_either_tuning: needs::nothing(),
-    wide_trees_have_the_same_bytes_by_either_tuning: needs::nothing(),
-    kd_trees_have_the_same_bytes_by_either_tuning: needs::nothing(),
+    linear_builds_give_the_same_bytes_by_either_tuning: needs::no_tuning(),
+    clustered_builds_give_the_same_bytes_by_either_tuning: needs::no_tuning(),
+    hploc_gives_the_same_bytes_by_either_tuning: needs::no_tuning(),
+    wide_trees_have_the_same_bytes_by_either_tuning: needs::no_tuning(),
+    kd_trees_have_the_same_bytes_by_either_tuning: needs::no_tuning(),
     ten_real_scenes_have_the_same_bytes_by_either_tuning: needs::time("minutes, over the scenes of HEDGEROW_SCENES"),
     a_tuning_that_is_not_there_is_named_with_those_that_are: needs::nothing(),
 }

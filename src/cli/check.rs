@@ -140,7 +140,7 @@ fn group(name: &str) -> crate::Result<&'static Group> {
 
 /// This program with the same options, for one group.
 fn child(common: &Common, arguments: &Arguments, group: &Group) -> anyhow::Result<Command> {
-    let mut command = Command::new(std::env::current_exe().context("the program's own file is not known")?);
+    let mut command = supervise::this_program().context("the program's own file is not known")?;
     command.args(["check", "--run-group", group.name, "--tuning", &common.tuning.to_string()]);
     if let Some(device) = common.device() {
         command.args(["--device", device]);

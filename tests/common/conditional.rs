@@ -32,6 +32,12 @@ pub mod needs {
         Some(why.to_owned())
     }
 
+    /// A suite that is not run by a tuning in particular: the test takes both, and once is enough.
+    pub fn no_tuning() -> Needs {
+        let is_asked_for = super::variable("HEDGEROW_TUNING").is_some();
+        is_asked_for.then(|| "takes both tunings, and runs where HEDGEROW_TUNING is not set".to_owned())
+    }
+
     /// A folder of scenes that are not in the repository.
     pub fn scenes() -> Needs {
         let missing = "HEDGEROW_SCENES names no folder of scenes";

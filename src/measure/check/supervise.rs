@@ -3,7 +3,8 @@
 use super::Ground;
 use super::cases::{Difference, Message};
 use serde::{Deserialize, Serialize};
-use std::io::{BufRead, BufReader, Read};
+use std::ffi::OsString;
+use std::io::{self, BufRead, BufReader, Read};
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
@@ -30,6 +31,34 @@ pub struct Outcome {
 
 /// Lines of a child's diagnostics that are kept: the last ones say what happened.
 const LAST_LINES: usize = 4;
+
+/// This program once more, started as it was itself: where a dynamic loader was given it to run (scripts/with-lavapipe.sh), by
+/// that loader and with what stood before it.
+///
+/// # Errors
+/// The program's own file is not known.
+pub fn this_program() -> io::Result<Command> {
+    let mut command = Command::new(std::env::current_exe()?);
+    command.args(loader_arguments());
+    Ok(command)
+}
+
+/// What the command line has between the running file and the program's arguments: nothing, or what its loader was told.
+#[cfg(target_os = "linux")]
+fn loader_arguments() -> Vec<OsString> {
+    use std::os::unix::ffi::OsStringExt;
+    let line = std::fs::read("/proc/self/cmdline").unwrap_or_default();
+    let words = line.strip_suffix(b"\0").unwrap_or(&line).split(|&byte| byte == 0);
+    let words: Vec<OsString> = words.map(|word| OsString::from_vec(word.to_vec())).collect();
+    // The program's own name is the first of its arguments, and of the loader's the last.
+    let own = std::env::args_os().count();
+    words.get(1..(words.len() + 1).saturating_sub(own)).map(<[_]>::to_vec).unwrap_or_default()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn loader_arguments() -> Vec<OsString> {
+    Vec::new()
+}
 
 /// Runs a group in the process that `command` starts, at most as long as `limit`. Gives what it ran on, too, if it said so.
 pub fn run(group: &str, mut command: Command, limit: Duration) -> (Outcome, Option<Ground>) {
