@@ -4,7 +4,7 @@ use super::build::{self, Build, Counts, SCRATCH_ALIGNMENT};
 use super::checked::{Asked, Checks};
 use super::copy::clone_step;
 use super::given::not_null;
-use super::{Options, Placement, geometry};
+use super::{Options, Placement, Request, geometry};
 use crate::bvh::builder::{Builder, Job, Sizes};
 use crate::bvh::refit::Refit;
 use crate::gpu::{Context, Recorder, Step};
@@ -15,6 +15,8 @@ use std::sync::Arc;
 
 /// What the offset of a structure in its buffer must be a multiple of, as Vulkan demands it.
 pub const STRUCTURE_ALIGNMENT: u64 = 256;
+
+type Flags = vk::BuildAccelerationStructureFlagsKHR;
 
 /// Acceleration structures on the device of a [`Context`].
 ///
@@ -155,7 +157,7 @@ impl<'a> Device<'a> {
         // SAFETY: the caller's promise.
         unsafe {
             self.check(infos, ranges, &builds)?;
-            self.record_placed(commands, &builds)
+            self.record_placed(&mut Recorder::new(self.context, commands), &builds)
         }
     }
 
@@ -202,7 +204,7 @@ impl<'a> Device<'a> {
         // SAFETY: the caller's promise.
         unsafe {
             self.check(infos, ranges, &builds)?;
-            self.record_placed(commands, &builds)
+            self.record_placed(&mut Recorder::new(self.context, commands), &builds)
         }
     }
 
@@ -238,7 +240,7 @@ impl<'a> Device<'a> {
         let source = match info.mode {
             vk::BuildAccelerationStructureModeKHR::BUILD => None,
             vk::BuildAccelerationStructureModeKHR::UPDATE => {
-                if !info.flags.contains(vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE) {
+                if !info.flags.contains(Flags::ALLOW_UPDATE) {
                     return refuse("mode is UPDATE and flags lack ALLOW_UPDATE; build it with that flag".into());
                 }
                 Some(not_null("srcAccelerationStructure", info.src_acceleration_structure)?)
@@ -271,14 +273,32 @@ impl<'a> Device<'a> {
         });
         let builds = placed.collect::<Result<Vec<_>>>()?;
         // SAFETY: the caller's promise.
-        unsafe { self.record_placed(commands, &builds) }
+        let mut recorder = unsafe { Recorder::new(self.context, commands) };
+        self.record_placed(&mut recorder, &builds)
+    }
+
+    /// Makes the pipelines of these builds now, and of their updates where flags allow those, so that whoever records the same for
+    /// as many primitives later waits for none. Addresses are not looked at.
+    ///
+    /// # Errors
+    /// A request that cannot be built; a pipeline could not be made.
+    pub fn warm(&self, requests: &[Request]) -> Result<()> {
+        let placed =
+            |request: &Request, source| Ok(Placed { build: request.build(self)?, source, structure: 0, scratch: 0 });
+        let anew = requests.iter().map(|request| placed(request, None));
+        // From another structure: a copy is part of it.
+        const ANOTHER: u64 = 16;
+        let can_be_updated = |request: &&Request| request.flags.contains(Flags::ALLOW_UPDATE);
+        let updates = requests.iter().filter(can_be_updated).map(|request| placed(request, Some(ANOTHER)));
+        let builds = anew.chain(updates).collect::<Result<Vec<_>>>()?;
+        self.record_placed(&mut Recorder::warming(self.context), &builds)
     }
 
     pub(super) fn options(&self) -> &Options {
         &self.options
     }
 
-    unsafe fn record_placed(&self, commands: vk::CommandBuffer, builds: &[Placed]) -> Result<()> {
+    fn record_placed(&self, recorder: &mut Recorder<'_>, builds: &[Placed]) -> Result<()> {
         let (updates, builds_anew): (Vec<&Placed>, Vec<&Placed>) = builds.iter().partition(|p| p.source.is_some());
         let jobs: Vec<Job<'_>> = builds_anew.iter().map(|p| p.build.job(p.structure, p.scratch)).collect();
         let updates_in_place: Vec<_> = updates.iter().map(|p| p.build.update(p.structure, p.scratch)).collect();
@@ -291,8 +311,6 @@ impl<'a> Device<'a> {
             |p: &&Placed| p.source.filter(|&source| source != p.structure).map(|source| (source, p.structure));
         let copies = updates.iter().filter_map(from_another);
         prologues.extend(copies.map(|(source, target)| vec![clone_step(self.context, source, target)]));
-        // SAFETY: the caller's promise.
-        let mut recorder = unsafe { Recorder::new(self.context, commands) };
         if !prologues.is_empty() {
             recorder.chains(&prologues)?;
             recorder.barrier();

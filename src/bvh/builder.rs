@@ -11,7 +11,7 @@ use super::sah::Collapse;
 use super::split::{self, Split};
 use super::{collapse, hlbvh, hploc, layout, lbvh, lbvh_workgroup, ploc};
 use crate::gpu::radix_sort::{self, Shape};
-use crate::gpu::{BuildTuning, Context, Kernel, Recorder, Step, shaders};
+use crate::gpu::{BuildTuning, Context, Recorder, Step};
 use crate::{Error, Result};
 
 /// What to build, beside the primitives.
@@ -381,42 +381,6 @@ impl Builder {
             "build" => Some(bounds + encode + sort + hierarchy),
             _ => None,
         }
-    }
-
-    /// The kernels that [`Builder::record`] dispatches for `input`, to make their pipelines ahead with [`Context::warm`].
-    pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
-        let Builder { method, schedule, encode, .. } = self;
-        let mut kernels = encode.split.map_or(Vec::new(), |split| split.kernels(encode, input));
-        kernels.extend(match (method, schedule) {
-            (_, Schedule::Chain) => self.chain_kernels(input),
-            (Method::Lbvh, Schedule::Workgroup) => vec![encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, input)],
-            (Method::Lbvh, _) => lbvh::persistent_kernels(encode, input),
-            (Method::Hlbvh(treelets), _) => hlbvh::persistent_kernels(encode, treelets, input),
-            (&Method::Ploc { radius }, _) => ploc::persistent_kernels(encode, radius, input),
-            (Method::Hploc(_), _) => hploc::persistent_kernels(encode, &self.merging, input),
-        });
-        kernels
-    }
-
-    fn chain_kernels(&self, input: &Input) -> Vec<Kernel> {
-        let Builder { method, encode, optimise, .. } = self;
-        let hierarchy = match method {
-            Method::Lbvh => lbvh::kernels(encode, input),
-            Method::Hlbvh(treelets) => hlbvh::kernels(encode, treelets, input),
-            &Method::Ploc { radius } => ploc::kernels(encode, radius, input),
-            Method::Hploc(_) => hploc::kernels(encode, &self.merging, input),
-        };
-        let mut kernels = [encode.kernels(input), hierarchy].concat();
-        if let Some(reinsertion) = optimise {
-            kernels.extend(reinsertion.kernels());
-        }
-        if self.weighs() {
-            kernels.extend(collapse::weigh_kernels(encode));
-        }
-        if self.places() {
-            kernels.extend(collapse::place_kernels(encode, input));
-        }
-        kernels
     }
 
     /// Whether the weights of the tree must be found when it is there.

@@ -5,7 +5,7 @@
 
 use super::encode::{Arguments, Encode};
 use super::geometry::Input;
-use crate::gpu::{Kernel, Step, shaders};
+use crate::gpu::{Step, shaders};
 
 /// Bytes of the weights of so many primitives: `Weights` in weights.glsl.
 pub(super) const fn weights_bytes(count: u64) -> u64 {
@@ -17,26 +17,19 @@ pub(super) const fn weigh_bytes(count: u64) -> u64 {
     8 * count
 }
 
-/// The kernels of [`place_steps`].
-pub(super) fn place_kernels(encode: &Encode, input: &Input) -> Vec<Kernel> {
-    let tree = [&shaders::BVH_COLLAPSE_ABOVE, &shaders::BVH_COLLAPSE_PLACE].map(|shader| encode.kernel(shader));
-    tree.into_iter().chain([encode.reading_kernel(&shaders::BVH_COLLAPSE_RECORDS, input)]).collect()
-}
-
 /// The dispatches that finish a tree whose weights are known. Label: `collapse`.
 pub(super) fn place_steps(encode: &Encode, input: &Input, arguments: &Arguments) -> Vec<Step> {
-    let kernels = place_kernels(encode, input).into_iter();
-    kernels.map(|kernel| Step::new("collapse", kernel, arguments, encode.tiles())).collect()
-}
-
-const WEIGH: [&shaders::Shader; 2] = [&shaders::BVH_COLLAPSE_PARENTS, &shaders::BVH_COLLAPSE_WEIGH];
-
-/// The kernels of [`weigh_steps`].
-pub(super) fn weigh_kernels(encode: &Encode) -> Vec<Kernel> {
-    WEIGH.iter().map(|shader| encode.kernel(shader)).collect()
+    let kernels = [
+        encode.kernel(&shaders::BVH_COLLAPSE_ABOVE),
+        encode.kernel(&shaders::BVH_COLLAPSE_PLACE),
+        encode.reading_kernel(&shaders::BVH_COLLAPSE_RECORDS, input),
+    ];
+    kernels.map(|kernel| Step::new("collapse", kernel, arguments, encode.tiles())).into()
 }
 
 /// The dispatches that find the weights of any tree. Label: `collapse`.
 pub(super) fn weigh_steps(encode: &Encode, arguments: &Arguments) -> Vec<Step> {
-    WEIGH.iter().map(|shader| Step::new("collapse", encode.kernel(shader), arguments, encode.tiles())).collect()
+    [&shaders::BVH_COLLAPSE_PARENTS, &shaders::BVH_COLLAPSE_WEIGH]
+        .map(|shader| Step::new("collapse", encode.kernel(shader), arguments, encode.tiles()))
+        .into()
 }

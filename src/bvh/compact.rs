@@ -8,7 +8,7 @@
 
 use crate::Result;
 use crate::gpu::push_constants::push_constants;
-use crate::gpu::{Context, Grid, Kernel, Recorder, shaders};
+use crate::gpu::{Grid, Recorder, Step, shaders};
 
 push_constants! {
     struct Arguments {
@@ -25,11 +25,6 @@ const STEPS: [&shaders::Shader; 5] = [
     &shaders::BVH_COMPACT_RECORDS,
 ];
 
-/// The kernels that [`record`] dispatches, to make their pipelines ahead with [`crate::gpu::Context::warm`].
-pub fn kernels(context: &Context) -> Vec<Kernel> {
-    STEPS.iter().map(|shader| Grid::of(context).kernel(shader)).collect()
-}
-
 /// Records the compaction of the structure at address `source` to address `target`, both aligned to 16 bytes: five dispatches
 /// with barriers between, and no scratch memory.
 ///
@@ -41,14 +36,7 @@ pub fn kernels(context: &Context) -> Vec<Kernel> {
 /// # Errors
 /// A pipeline could not be made.
 pub fn record(recorder: &mut Recorder<'_>, source: u64, target: u64) -> Result<()> {
-    let context = recorder.context();
-    let groups = Grid::of(context).groups;
-    recorder.phase("compact");
-    for (i, kernel) in kernels(context).iter().enumerate() {
-        if i > 0 {
-            recorder.barrier();
-        }
-        recorder.dispatch(kernel, &Arguments { source, target }, groups)?;
-    }
-    Ok(())
+    let grid = Grid::of(recorder.context());
+    let step = |shader| Step::new("compact", grid.kernel(shader), &Arguments { source, target }, grid.groups);
+    recorder.chains(&[STEPS.map(step).into()])
 }

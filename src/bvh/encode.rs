@@ -187,20 +187,6 @@ impl Encode {
         Encode { items: self.bounds_items, ..self.clone() }
     }
 
-    /// The kernels of [`Encode::steps`].
-    pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
-        let sort = [&shaders::GPU_RADIX_SORT_COUNT, &shaders::GPU_RADIX_SORT_SCAN, &shaders::GPU_RADIX_SORT_SCATTER];
-        let mut reading = vec![&shaders::BVH_ENCODE_PLAN, &shaders::BVH_ENCODE_CODES];
-        if self.codes.has_grid() {
-            reading.extend([&shaders::BVH_ENCODE_CELLS, &shaders::BVH_ENCODE_PREFIXES]);
-        }
-        let mut kernels = vec![self.reset_kernel(&shaders::BVH_ENCODE_RESET)];
-        kernels.extend(sort.map(|shader| self.kernel(shader)));
-        kernels.extend(reading.into_iter().map(|shader| self.reading_kernel(shader, input)));
-        kernels.push(self.for_bounds().reading_kernel(&shaders::BVH_ENCODE_BOUNDS, input));
-        kernels
-    }
-
     /// The input's geometry as the kernels are given it, and its formats.
     pub fn checked(&self, input: &Input) -> Result<(Geometry, u32)> {
         let primitive_count = self.split.map_or(self.count, |split| split.primitives);

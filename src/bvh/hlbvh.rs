@@ -33,26 +33,6 @@ fn kernel(encode: &Encode, treelets: &Treelets, shader: &'static shaders::Shader
     encode.reading_kernel_with(shader, input, &constants)
 }
 
-/// Shaders and workgroups up to the top, and behind it.
-fn before_top(encode: &Encode) -> [(&'static shaders::Shader, u32); 4] {
-    [
-        (&shaders::BVH_HLBVH_TREELETS, encode.tiles()),
-        (&shaders::BVH_HLBVH_COUNT, encode.tiles()),
-        (&shaders::BVH_HLBVH_SCAN, 1),
-        (&shaders::BVH_HLBVH_GATHER, encode.tiles()),
-    ]
-}
-
-fn behind_levels(encode: &Encode) -> [(&'static shaders::Shader, u32); 2] {
-    [(&shaders::BVH_HLBVH_FINISH, groups(encode)), (&shaders::BVH_HLBVH_WEIGH, groups(encode))]
-}
-
-/// The kernels of [`steps`].
-pub(super) fn kernels(encode: &Encode, treelets: &Treelets, input: &Input) -> Vec<Kernel> {
-    let shaders = before_top(encode).into_iter().chain(behind_levels(encode)).map(|(shader, _)| shader);
-    shaders.chain([&shaders::BVH_HLBVH_SPLIT]).map(|shader| kernel(encode, treelets, shader, input)).collect()
-}
-
 /// The dispatches behind [`Encode::steps`]. Label: `hierarchy`.
 pub(super) fn steps(encode: &Encode, treelets: &Treelets, input: &Input, arguments: &Arguments) -> Vec<Step> {
     let step = |shader, arguments: &Arguments, groups| {
@@ -62,18 +42,16 @@ pub(super) fn steps(encode: &Encode, treelets: &Treelets, input: &Input, argumen
         // A word of the sort, which has run.
         step(shader, &Arguments { columns: level, ..*arguments }, groups)
     };
-    let levels = levels(encode.count);
-    let before = before_top(encode).into_iter().map(|(shader, groups)| step(shader, arguments, groups));
-    let top = (0..levels).map(|level| of_level(&shaders::BVH_HLBVH_SPLIT, level, groups(encode)));
-    let behind = behind_levels(encode).into_iter().map(|(shader, groups)| of_level(shader, levels, groups));
-    before.chain(top).chain(behind).collect()
-}
-
-/// The kernels of [`persistent_steps`].
-pub(super) fn persistent_kernels(encode: &Encode, treelets: &Treelets, input: &Input) -> Vec<Kernel> {
-    [&shaders::BVH_HLBVH_RESET, &shaders::BVH_HLBVH_PERSISTENT]
-        .map(|shader| kernel(encode, treelets, shader, input))
-        .into()
+    let (levels, tiles, groups) = (levels(encode.count), encode.tiles(), groups(encode));
+    let before_top = [
+        step(&shaders::BVH_HLBVH_TREELETS, arguments, tiles),
+        step(&shaders::BVH_HLBVH_COUNT, arguments, tiles),
+        step(&shaders::BVH_HLBVH_SCAN, arguments, 1),
+        step(&shaders::BVH_HLBVH_GATHER, arguments, tiles),
+    ];
+    let top = (0..levels).map(|level| of_level(&shaders::BVH_HLBVH_SPLIT, level, groups));
+    let behind = [&shaders::BVH_HLBVH_FINISH, &shaders::BVH_HLBVH_WEIGH].map(|shader| of_level(shader, levels, groups));
+    before_top.into_iter().chain(top).chain(behind).collect()
 }
 
 /// The whole build by `workers` workgroups of one dispatch. Label: `build`.
@@ -84,10 +62,6 @@ pub(super) fn persistent_steps(
     arguments: &Arguments,
     workers: u32,
 ) -> Vec<Step> {
-    let kernels = persistent_kernels(encode, treelets, input);
-    kernels
-        .into_iter()
-        .zip([1, workers])
-        .map(|(kernel, groups)| Step::new("build", kernel, arguments, groups))
-        .collect()
+    let step = |shader, groups| Step::new("build", kernel(encode, treelets, shader, input), arguments, groups);
+    vec![step(&shaders::BVH_HLBVH_RESET, 1), step(&shaders::BVH_HLBVH_PERSISTENT, workers)]
 }

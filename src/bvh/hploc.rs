@@ -53,28 +53,14 @@ impl Merging {
         let constants = [window.size, window.radius, u32::from(alone), self.team(workgroup)];
         encode.reading_kernel_with(shader, input, &constants).in_workgroups_of(workgroup)
     }
-
-    fn hierarchy_kernel(&self, encode: &Encode, input: &Input) -> Kernel {
-        self.kernel(encode, &shaders::BVH_HPLOC_HIERARCHY, input, encode.shape.workgroup.min(self.group))
-    }
-}
-
-/// The kernel of [`steps`].
-pub(super) fn kernels(encode: &Encode, merging: &Merging, input: &Input) -> Vec<Kernel> {
-    vec![merging.hierarchy_kernel(encode, input)]
 }
 
 /// The dispatch behind [`Encode::steps`]. Label: `hierarchy`.
 pub(super) fn steps(encode: &Encode, merging: &Merging, input: &Input, arguments: &Arguments) -> Vec<Step> {
-    let kernel = merging.hierarchy_kernel(encode, input);
-    let groups = encode.count.div_ceil(kernel.workgroup() * encode.items);
+    let workgroup = encode.shape.workgroup.min(merging.group);
+    let kernel = merging.kernel(encode, &shaders::BVH_HPLOC_HIERARCHY, input, workgroup);
+    let groups = encode.count.div_ceil(workgroup * encode.items);
     vec![Step::new("hierarchy", kernel, arguments, groups)]
-}
-
-/// The kernels of [`persistent_steps`].
-pub(super) fn persistent_kernels(encode: &Encode, merging: &Merging, input: &Input) -> Vec<Kernel> {
-    let all = merging.kernel(encode, &shaders::BVH_HPLOC_PERSISTENT, input, encode.shape.workgroup);
-    vec![encode.reset_kernel(&shaders::BVH_HPLOC_RESET), all]
 }
 
 /// The whole build by `workers` workgroups of one dispatch. Label: `build`.
@@ -85,10 +71,9 @@ pub(super) fn persistent_steps(
     arguments: &Arguments,
     workers: u32,
 ) -> Vec<Step> {
-    let kernels = persistent_kernels(encode, merging, input);
-    kernels
-        .into_iter()
-        .zip([1, workers])
-        .map(|(kernel, groups)| Step::new("build", kernel, arguments, groups))
-        .collect()
+    let all = merging.kernel(encode, &shaders::BVH_HPLOC_PERSISTENT, input, encode.shape.workgroup);
+    vec![
+        Step::new("build", encode.reset_kernel(&shaders::BVH_HPLOC_RESET), arguments, 1),
+        Step::new("build", all, arguments, workers),
+    ]
 }

@@ -4,12 +4,7 @@
 
 use super::encode::{Arguments, Encode};
 use super::geometry::Input;
-use crate::gpu::{Kernel, Step, shaders};
-
-/// The kernel behind [`Encode`]'s.
-pub(super) fn kernels(encode: &Encode, input: &Input) -> Vec<Kernel> {
-    vec![encode.reading_kernel(&shaders::BVH_LBVH_HIERARCHY, input)]
-}
+use crate::gpu::{Step, shaders};
 
 /// The dispatch behind [`Encode::steps`]. Label: `hierarchy`.
 pub(super) fn steps(encode: &Encode, input: &Input, arguments: &Arguments) -> Vec<Step> {
@@ -17,17 +12,11 @@ pub(super) fn steps(encode: &Encode, input: &Input, arguments: &Arguments) -> Ve
     vec![Step::new("hierarchy", kernel, arguments, encode.tiles())]
 }
 
-/// The kernels of [`persistent_steps`].
-pub(super) fn persistent_kernels(encode: &Encode, input: &Input) -> Vec<Kernel> {
-    vec![encode.reset_kernel(&shaders::BVH_LBVH_RESET), encode.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input)]
-}
-
 /// The whole build by `workers` workgroups of one dispatch. Label: `build`.
 pub(super) fn persistent_steps(encode: &Encode, input: &Input, arguments: &Arguments, workers: u32) -> Vec<Step> {
-    let kernels = persistent_kernels(encode, input);
-    kernels
-        .into_iter()
-        .zip([1, workers])
-        .map(|(kernel, groups)| Step::new("build", kernel, arguments, groups))
-        .collect()
+    let (reset, all) = (&shaders::BVH_LBVH_RESET, &shaders::BVH_LBVH_PERSISTENT);
+    vec![
+        Step::new("build", encode.reset_kernel(reset), arguments, 1),
+        Step::new("build", encode.reading_kernel(all, input), arguments, workers),
+    ]
 }

@@ -76,22 +76,10 @@ impl Kernels<'_> {
     }
 }
 
-/// The kernels of [`steps`].
-pub(super) fn kernels(encode: &Encode, radius: u32, input: &Input) -> Vec<Kernel> {
-    let chain = Kernels { encode, input, radius }.chain();
-    chain.into_iter().map(|(kernel, _)| kernel).collect()
-}
-
 /// The dispatches behind [`Encode::steps`]. Label: `hierarchy`.
 pub(super) fn steps(encode: &Encode, radius: u32, input: &Input, arguments: &Arguments) -> Vec<Step> {
     let chain = Kernels { encode, input, radius }.chain();
     chain.into_iter().map(|(kernel, groups)| Step::new("hierarchy", kernel, arguments, groups)).collect()
-}
-
-/// The kernels of [`persistent_steps`].
-pub(super) fn persistent_kernels(encode: &Encode, radius: u32, input: &Input) -> Vec<Kernel> {
-    let kernels = Kernels { encode, input, radius };
-    vec![kernels.of_pool(&shaders::BVH_PLOC_RESET), kernels.of_pool(&shaders::BVH_PLOC_PERSISTENT)]
 }
 
 /// The whole build by `workers` workgroups of one dispatch. Label: `build`.
@@ -102,10 +90,7 @@ pub(super) fn persistent_steps(
     arguments: &Arguments,
     workers: u32,
 ) -> Vec<Step> {
-    let kernels = persistent_kernels(encode, radius, input);
-    kernels
-        .into_iter()
-        .zip([1, workers])
-        .map(|(kernel, groups)| Step::new("build", kernel, arguments, groups))
-        .collect()
+    let kernels = Kernels { encode, input, radius };
+    let step = |shader, groups| Step::new("build", kernels.of_pool(shader), arguments, groups);
+    vec![step(&shaders::BVH_PLOC_RESET, 1), step(&shaders::BVH_PLOC_PERSISTENT, workers)]
 }

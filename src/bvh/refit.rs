@@ -171,15 +171,6 @@ impl Refit {
         Sizes { scratch: (4 * words).next_multiple_of(16), alignment: 16 }
     }
 
-    /// The kernels that [`Refit::record`] dispatches for `input`, to make their pipelines ahead with [`Context::warm`].
-    pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
-        let shaders = match self.schedule {
-            Schedule::Chain => &[&shaders::BVH_REFIT_LEAVES, &shaders::BVH_REFIT_CLIMB][..],
-            Schedule::Workgroup => &[&shaders::BVH_REFIT_WORKGROUP],
-        };
-        shaders.iter().map(|shader| self.kernel(shader, input)).collect()
-    }
-
     fn kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
         let source = input.source_constant(self.planned.primitives);
         Kernel::new(shader, self.workgroup, &[self.run, 0, 0, 0, source])
@@ -222,19 +213,19 @@ impl Refit {
             let update = job.update()?;
             let Job { refit, input, .. } = job;
             let costs = [refit.costs.c_t, refit.costs.c_i];
-            let kernels = refit.kernels(input);
-            match (refit.schedule, &kernels[..]) {
+            match refit.schedule {
                 _ if update.primitive_count == 0 => {}
-                (Schedule::Chain, [leaves, climb]) => {
+                Schedule::Chain => {
                     let groups = update.primitive_count.div_ceil(refit.workgroup * refit.run);
                     let arguments = arguments_of(&[update], costs);
+                    let step = |phase, shader| Step::new(phase, refit.kernel(shader, input), &arguments, groups);
                     chains.push(vec![
-                        Step::new("leaves", leaves.clone(), &arguments, groups),
-                        Step::new("climb", climb.clone(), &arguments, groups),
+                        step("leaves", &shaders::BVH_REFIT_LEAVES),
+                        step("climb", &shaders::BVH_REFIT_CLIMB),
                     ]);
                 }
-                (_, kernels) => {
-                    let kernel = &kernels[0];
+                Schedule::Workgroup => {
+                    let kernel = refit.kernel(&shaders::BVH_REFIT_WORKGROUP, input);
                     let at = *kinds.entry((kernel.clone(), costs.map(f32::to_bits))).or_insert_with(|| {
                         small.push((kernel.clone(), costs, Vec::new()));
                         small.len() - 1

@@ -135,13 +135,6 @@ impl Reinsertion {
         12 * u64::from(self.slots) + MOVE_BYTES * moves
     }
 
-    /// The kernels that [`Reinsertion::record`] dispatches beside that of [`fill`], to make their pipelines ahead with
-    /// [`crate::gpu::Context::warm`].
-    pub fn kernels(&self) -> Vec<Kernel> {
-        let shaders = [&shaders::BVH_REINSERTION_PARENTS].into_iter().chain(STEPS);
-        shaders.map(|shader| self.kernel(shader)).collect()
-    }
-
     fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
         Kernel::new(shader, self.grid.workgroup, &[self.grid.rounds, self.shared])
     }

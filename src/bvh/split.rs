@@ -21,7 +21,7 @@ use super::encode::Encode;
 use super::geometry::{Geometry, GeometryFlags, Input, Source};
 use crate::gpu::push_constants::push_constants;
 use crate::gpu::scan::{self, Scan};
-use crate::gpu::{Context, Kernel, Step, shaders};
+use crate::gpu::{Context, Step, shaders};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 
@@ -148,11 +148,6 @@ impl Split {
         }
     }
 
-    pub fn kernels(&self, encode: &Encode, input: &Input) -> Vec<Kernel> {
-        let of = |shader| encode.unsplit_kernel(shader, input);
-        BEFORE_SCAN.iter().map(|(shader, _)| of(shader)).chain(self.scan.kernels()).chain([of(REFERENCES)]).collect()
-    }
-
     /// The dispatches before those of [`Encode`]; what follows needs a barrier before. Its words and table are free until then.
     /// Label: `split`.
     pub fn steps(&self, encode: &Encode, input: &Input, build: &super::encode::Arguments) -> Vec<Step> {
@@ -174,19 +169,15 @@ impl Split {
         let step = |shader, groups| Step::new("split", encode.unsplit_kernel(shader, input), &arguments, groups);
         let tiles = encode.tiles_of(self.primitives);
         let scanned = scan::Buffers { values: build.ends, results: build.ends, sums: build.table };
-        let before = BEFORE_SCAN.iter().map(|&(shader, over_all)| step(shader, if over_all { tiles } else { 1 }));
-        let references = step(REFERENCES, encode.tiles_of(build.primitive_count));
-        before.chain(self.scan.steps("split", &scanned)).chain([references]).collect()
+        let before_scan = [
+            step(&shaders::BVH_SPLIT_RESET, 1),
+            step(&shaders::BVH_SPLIT_BOUNDS, tiles),
+            step(&shaders::BVH_SPLIT_GRID, 1),
+            step(&shaders::BVH_SPLIT_WEIGH, tiles),
+            step(&shaders::BVH_SPLIT_FACTOR, 1),
+            step(&shaders::BVH_SPLIT_COUNT, tiles),
+        ];
+        let references = step(&shaders::BVH_SPLIT_REFERENCES, encode.tiles_of(build.primitive_count));
+        before_scan.into_iter().chain(self.scan.steps("split", &scanned)).chain([references]).collect()
     }
 }
-
-/// What runs before the scan, and whether it goes over all triangles.
-const BEFORE_SCAN: [(&shaders::Shader, bool); 6] = [
-    (&shaders::BVH_SPLIT_RESET, false),
-    (&shaders::BVH_SPLIT_BOUNDS, true),
-    (&shaders::BVH_SPLIT_GRID, false),
-    (&shaders::BVH_SPLIT_WEIGH, true),
-    (&shaders::BVH_SPLIT_FACTOR, false),
-    (&shaders::BVH_SPLIT_COUNT, true),
-];
-const REFERENCES: &shaders::Shader = &shaders::BVH_SPLIT_REFERENCES;

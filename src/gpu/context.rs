@@ -230,7 +230,8 @@ impl Context {
         self.debug_utils.as_ref()
     }
 
-    /// Makes the pipelines of `kernels` now instead of when they are first recorded.
+    /// Makes the pipelines of `kernels` now instead of when they are first recorded. For those of whole passes there is
+    /// [`Recorder::warming`](super::Recorder::warming).
     ///
     /// # Errors
     /// A pipeline could not be made.

@@ -132,8 +132,11 @@ impl Step {
 ///
 /// Clobbers the bound compute pipeline and the compute push constants, nothing else.
 /// Ends the last phase when dropped.
+///
+/// [`Recorder::warming`] records nothing, and makes the pipelines of what would be recorded.
 pub struct Recorder<'a> {
     context: &'a Context,
+    /// Null where it only makes pipelines.
     commands: vk::CommandBuffer,
     timestamps: Option<&'a mut Timestamps>,
     in_phase: bool,
@@ -149,14 +152,31 @@ impl<'a> Recorder<'a> {
         Recorder { context, commands, timestamps: None, in_phase: false }
     }
 
+    /// One without a command buffer: what is recorded makes its pipelines now, and does nothing else. Whoever records the same for
+    /// as many primitives later waits for none. Nothing is done to addresses: 0 will do.
+    ///
+    /// ```no_run
+    /// # use hedgerow::bvh::builder::{Builder, Input};
+    /// # use hedgerow::gpu::{Context, Recorder};
+    /// # fn example(context: &Context, builder: &Builder, triangles: &Input) -> hedgerow::Result<()> {
+    /// builder.record(&mut Recorder::warming(context), triangles, 0, 0)
+    /// # }
+    /// ```
+    pub fn warming(context: &'a Context) -> Recorder<'a> {
+        Recorder { context, commands: vk::CommandBuffer::null(), timestamps: None, in_phase: false }
+    }
+
+    /// The device, if there is something to record into.
+    fn device(&self) -> Option<&'a ash::Device> {
+        (self.commands != vk::CommandBuffer::null()).then_some(self.context.ash_device())
+    }
+
     /// Writes a timestamp at every phase into `timestamps`, which it resets.
     pub fn timed(mut self, timestamps: &'a mut Timestamps) -> Recorder<'a> {
         timestamps.names.clear();
-        if timestamps.valid_bits > 0 {
+        if let Some(device) = self.device().filter(|_| timestamps.valid_bits > 0) {
             // SAFETY: `new`'s promise; the pool is ours.
-            unsafe {
-                self.context.ash_device().cmd_reset_query_pool(self.commands, timestamps.pool, 0, timestamps.capacity);
-            }
+            unsafe { device.cmd_reset_query_pool(self.commands, timestamps.pool, 0, timestamps.capacity) };
         }
         self.timestamps = Some(timestamps);
         self
@@ -167,7 +187,7 @@ impl<'a> Recorder<'a> {
         self.context
     }
 
-    /// The command buffer being recorded.
+    /// The command buffer being recorded; null where there is none ([`Recorder::warming`]).
     pub fn commands(&self) -> vk::CommandBuffer {
         self.commands
     }
@@ -175,7 +195,7 @@ impl<'a> Recorder<'a> {
     /// Ends the phase before and begins the phase `name`: a debug label and a timestamp.
     pub fn phase(&mut self, name: &'static str) {
         self.end_label();
-        if let Some(debug) = self.context.debug_utils() {
+        if let Some(debug) = self.debug_utils() {
             let label = CString::new(name).expect("phase names hold no zero byte");
             // SAFETY: `new`'s promise.
             unsafe {
@@ -213,8 +233,10 @@ impl<'a> Recorder<'a> {
         offset: u64,
     ) -> Result<()> {
         self.bind(kernel, bytemuck::bytes_of(arguments))?;
-        // SAFETY: the caller's promise.
-        unsafe { self.context.ash_device().cmd_dispatch_indirect(self.commands, buffer, offset) };
+        if let Some(device) = self.device() {
+            // SAFETY: the caller's promise.
+            unsafe { device.cmd_dispatch_indirect(self.commands, buffer, offset) };
+        }
         Ok(())
     }
 
@@ -250,23 +272,26 @@ impl<'a> Recorder<'a> {
                 "{groups} workgroups of {kernel:?}, which takes one row of at most {row} on this device; give less at a time"
             )));
         }
-        let device = self.context.ash_device();
         if rows > 0 {
             self.bind(kernel, arguments)?;
-            // SAFETY: `new`'s promise; the pipeline is live.
-            unsafe { device.cmd_dispatch(self.commands, row, rows, 1) };
+            if let Some(device) = self.device() {
+                // SAFETY: `new`'s promise; the pipeline is live.
+                unsafe { device.cmd_dispatch(self.commands, row, rows, 1) };
+            }
         }
         if rest > 0 {
             self.bind(&if rows > 0 { kernel.behind_rows() } else { kernel.clone() }, arguments)?;
-            // SAFETY: the same; where rows are before, the pipeline was made for it.
-            unsafe { device.cmd_dispatch_base(self.commands, 0, rows, 0, rest, 1, 1) };
+            if let Some(device) = self.device() {
+                // SAFETY: the same; where rows are before, the pipeline was made for it.
+                unsafe { device.cmd_dispatch_base(self.commands, 0, rows, 0, rest, 1, 1) };
+            }
         }
         Ok(())
     }
 
     fn bind(&mut self, kernel: &Kernel, arguments: &[u8]) -> Result<()> {
         let pipeline = self.context.pipeline(kernel)?;
-        let device = self.context.ash_device();
+        let Some(device) = self.device() else { return Ok(()) };
         // SAFETY: `new`'s promise; the pipeline is live and the arguments fit the layout's 128 bytes.
         unsafe {
             device.cmd_bind_pipeline(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline);
@@ -278,13 +303,14 @@ impl<'a> Recorder<'a> {
 
     /// Makes what dispatches before have written visible to dispatches after.
     pub fn barrier(&mut self) {
+        let Some(device) = self.device() else { return };
         let barrier = vk::MemoryBarrier::default()
             .src_access_mask(vk::AccessFlags::SHADER_WRITE)
             .dst_access_mask(vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE);
         let stage = vk::PipelineStageFlags::COMPUTE_SHADER;
         // SAFETY: `new`'s promise.
         unsafe {
-            self.context.ash_device().cmd_pipeline_barrier(
+            device.cmd_pipeline_barrier(
                 self.commands,
                 stage,
                 stage,
@@ -297,23 +323,25 @@ impl<'a> Recorder<'a> {
     }
 
     fn stamp(&mut self, at: u32) {
-        if let Some(timestamps) = self.timestamps.as_ref().filter(|timestamps| timestamps.valid_bits > 0) {
+        if let Some(device) = self.device()
+            && let Some(timestamps) = self.timestamps.as_ref().filter(|timestamps| timestamps.valid_bits > 0)
+        {
             assert!(at < timestamps.capacity, "more phases than the Timestamps have room for");
             // SAFETY: `new`'s promise; the query was reset by `timed` and is written once.
             unsafe {
-                self.context.ash_device().cmd_write_timestamp(
-                    self.commands,
-                    vk::PipelineStageFlags::BOTTOM_OF_PIPE,
-                    timestamps.pool,
-                    at,
-                );
+                device.cmd_write_timestamp(self.commands, vk::PipelineStageFlags::BOTTOM_OF_PIPE, timestamps.pool, at);
             }
         }
     }
 
+    /// What labels phases, if there is something to record into.
+    fn debug_utils(&self) -> Option<&'a ash::ext::debug_utils::Device> {
+        self.device().and(self.context.debug_utils())
+    }
+
     fn end_label(&mut self) {
         if self.in_phase
-            && let Some(debug) = self.context.debug_utils()
+            && let Some(debug) = self.debug_utils()
         {
             // SAFETY: `new`'s promise; a label is open.
             unsafe { debug.cmd_end_debug_utils_label(self.commands) };

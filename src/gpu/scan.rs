@@ -76,11 +76,6 @@ impl Scan {
         Ok(())
     }
 
-    /// The kernels of the scan.
-    pub(crate) fn kernels(&self) -> Vec<Kernel> {
-        self.dispatches().map(|(kernel, _)| kernel).into()
-    }
-
     /// The three dispatches in the phase `phase`.
     pub(crate) fn steps(&self, phase: &'static str, buffers: &Buffers) -> Vec<Step> {
         let arguments = self.arguments(buffers);

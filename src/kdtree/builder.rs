@@ -498,28 +498,6 @@ impl Builder {
         self.shape.kernel(shader, &self.options, input)
     }
 
-    /// The kernels that [`Builder::record`] dispatches for `input`, to make their pipelines ahead with [`Context::warm`].
-    pub fn kernels(&self, input: &Input) -> Vec<Kernel> {
-        let of = |shaders: &[&'static Shader]| shaders.iter().map(|shader| self.kernel(shader, input)).collect();
-        match self.schedule {
-            Schedule::Persistent => of(&[&shaders::KDTREE_BUILD_RESET, &shaders::KDTREE_BUILD_PERSISTENT]),
-            _ => of(&[
-                &shaders::KDTREE_BUILD_RESET,
-                &shaders::KDTREE_BUILD_COUNT,
-                &shaders::KDTREE_BUILD_PLAN,
-                &shaders::KDTREE_BUILD_RECORDS,
-                &shaders::KDTREE_BUILD_ROOT,
-                &shaders::KDTREE_BUILD_SUBTREES,
-                &shaders::KDTREE_BUILD_BIN,
-                &shaders::KDTREE_BUILD_CLASSIFY,
-                &shaders::KDTREE_BUILD_SCAN,
-                &shaders::KDTREE_BUILD_DISTRIBUTE,
-                &shaders::KDTREE_BUILD_ORDER,
-                &shaders::KDTREE_BUILD_PLACE,
-            ]),
-        }
-    }
-
     /// Records the build of `input` into `structure`, with scratch memory, of the bytes and alignment that [`Builder::sizes`] tells.
     ///
     /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever reads

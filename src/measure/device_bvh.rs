@@ -55,13 +55,15 @@ impl<'a> DeviceBvh<'a> {
         }
         let vertices = [device.upload("positions", &mesh.positions)?, device.upload("indices", &mesh.triangles)?];
         let input = Input::mesh(vertices[0].address(), mesh.positions.len() as u32, vertices[1].address(), count);
-        device.warm(&bvh.kernels(&input))?;
+        let structure = device.buffer("structure", sizes.structure)?;
+        let scratch = device.buffer("scratch", sizes.scratch)?;
+        bvh.record(&mut Recorder::warming(device), &input, structure.address(), scratch.address())?;
         Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
             choice: choice_of(options, &bvh),
-            structure: device.buffer("structure", sizes.structure)?,
-            scratch: device.buffer("scratch", sizes.scratch)?,
+            structure,
+            scratch,
             wide: wide.map(|tracer| WideTree::new(device, tracer, bvh.record_count())).transpose()?,
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,

@@ -4,7 +4,7 @@ use super::kd_device::KdDevice;
 use super::{BuildRun, KD_TREE, Outcome, Subject, record};
 use crate::bvh::builder::Input;
 use crate::bvh::layout::{Bvh2, status};
-use crate::gpu::{Buffer, Device, Phase, Timestamps};
+use crate::gpu::{Buffer, Device, Phase, Recorder, Timestamps};
 use crate::kdtree::builder::{Builder, Options, Report};
 use crate::kdtree::layout::{KdTree, MAX_DEPTH};
 use crate::kdtree::quality;
@@ -48,12 +48,10 @@ impl<'a> Place<'a> {
         if needed > available {
             return Err(Error::OutOfMemory { what: format!("{name} of {count} triangles"), needed, available });
         }
-        device.warm(&builder.kernels(input))?;
-        Ok(Place {
-            structure: device.buffer("structure", sizes.structure)?,
-            scratch: device.buffer("scratch", sizes.scratch)?,
-            builder,
-        })
+        let structure = device.buffer("structure", sizes.structure)?;
+        let scratch = device.buffer("scratch", sizes.scratch)?;
+        builder.record(&mut Recorder::warming(device), input, structure.region(), scratch.region())?;
+        Ok(Place { structure, scratch, builder })
     }
 
     fn report(&self) -> Report {

@@ -30,10 +30,10 @@ impl<'a> WideTree<'a> {
     pub fn new(device: &'a Device, tracer: Tracer, count: u32) -> Result<WideTree<'a>> {
         let options = Options { form: tracer.form, primitives: Primitives::Triangles, geometry_count: 1 };
         let collapse = OnDevice::new(device, &options, count);
-        collapse.warm(device)?;
         let sizes = collapse.sizes();
         let structure = device.buffer("wide structure", sizes.structure)?;
         let scratch = device.buffer("wide scratch", sizes.scratch)?;
+        collapse.record(&mut Recorder::warming(device), 0, structure.address(), scratch.address())?;
         Ok(WideTree { tracer, collapse, sizes, structure, scratch })
     }
 

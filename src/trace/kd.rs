@@ -64,8 +64,8 @@ impl Tracer {
         Tracer { traversal: Traversal { capacity, ..traversal }, shape }
     }
 
-    /// The kernel that [`Tracer::record`] takes, for [`Context::warm`](crate::gpu::Context::warm).
-    pub fn kernel(&self, query: Query, count_work: bool) -> Kernel {
+    /// The kernel that [`Tracer::record`] takes.
+    fn kernel(&self, query: Query, count_work: bool) -> Kernel {
         self.kernel_of(&shaders::TRACE_TRACER_KD, query, count_work)
     }
 

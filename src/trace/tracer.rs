@@ -135,8 +135,8 @@ push_constants! {
     }
 }
 
-/// The kernel that [`record`] takes, for [`Context::warm`](crate::gpu::Context::warm).
-pub fn kernel(shape: &Shape, query: Query, count_work: bool) -> Kernel {
+/// The kernel that [`record`] takes.
+fn kernel(shape: &Shape, query: Query, count_work: bool) -> Kernel {
     let shader = match shape.loads {
         Loads::Gathered | Loads::InVectors => &shaders::TRACE_TRACER_SINGLE,
         Loads::LaneByLane => &shaders::TRACE_TRACER_LANES,

@@ -69,11 +69,11 @@ impl Tracer {
         Tracer { form, order, shape: Shape { shared_levels, ..shape }.within(limits) }
     }
 
-    /// The kernel that [`Tracer::record`] takes, for [`Context::warm`](crate::gpu::Context::warm).
+    /// The kernel that [`Tracer::record`] takes.
     ///
     /// # Errors
     /// There is no kernel for that order of such nodes, or for such loads.
-    pub fn kernel(&self, query: Query, count_work: bool) -> Result<Kernel> {
+    fn kernel(&self, query: Query, count_work: bool) -> Result<Kernel> {
         let shader = match (self.form, self.order, self.shape.loads) {
             (Form::Four, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_TRACER_WIDE4,
             (Form::Eight, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_TRACER_WIDE8,

@@ -136,20 +136,6 @@ impl OnDevice {
         FIRST_LEVELS..(2 * full).clamp(FIRST_LEVELS, LEVELS)
     }
 
-    /// The kernels of its own that [`OnDevice::record`] dispatches, to make their pipelines ahead with [`Context::warm`].
-    pub fn kernels(&self) -> Vec<Kernel> {
-        let all = [
-            &shaders::BVH_WIDE_RESET,
-            &shaders::BVH_WIDE_OPEN_FEW,
-            &shaders::BVH_WIDE_OPEN,
-            &shaders::BVH_WIDE_NODES,
-            &shaders::BVH_WIDE_RECORDS,
-        ];
-        let is_used =
-            |shader: &&shaders::Shader| shader.name != shaders::BVH_WIDE_OPEN.name || !self.levels_by_many().is_empty();
-        all.into_iter().filter(is_used).map(|shader| self.kernel(shader)).collect()
-    }
-
     /// Records the collapsing of the `Bvh2` at address `source` into the wide tree at `target`, with scratch memory at
     /// `scratch`, of the bytes and alignment that [`OnDevice::sizes`] tells. The phase is `wide`.
     ///
@@ -199,14 +185,6 @@ impl OnDevice {
         recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_NODES), &arguments, self.grid.groups)?;
         recorder.barrier();
         recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RECORDS), &arguments, self.grid.groups)
-    }
-
-    /// Makes the pipelines of [`OnDevice::kernels`] now.
-    ///
-    /// # Errors
-    /// A pipeline could not be made.
-    pub fn warm(&self, context: &Context) -> Result<()> {
-        context.warm(&self.kernels())
     }
 }
 

@@ -47,7 +47,6 @@ pub fn built(device: &Device, options: &Options, input: &Input) -> Bvh2 {
     // Whatever was there before changes nothing.
     structure.write(&vec![0x5Au8; sizes.structure as usize]);
     scratch.write(&vec![0xA5u8; sizes.scratch as usize]);
-    device.warm(&builder.kernels(input)).expect("the kernels compile");
     device.run(None, |r| builder.record(r, input, structure.address(), scratch.address())).expect("it builds");
     let bytes = structure.read::<u8>(sizes.structure as usize);
     let tree = Bvh2::from_bytes(&bytes).expect("a structure");

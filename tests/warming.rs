@@ -1,0 +1,90 @@
+//! Whoever has warmed a context waits for no pipeline: a first build makes none.
+
+mod common;
+
+use common::{OPTIONS, corpus, open};
+use hedgerow::accel::{self, Instance, Placement, REBRAID, Request};
+use hedgerow::ash::vk::BuildAccelerationStructureFlagsKHR as Flags;
+use hedgerow::bvh::geometry::Geometry;
+use hedgerow::gpu::{Device, DeviceOptions, TuningChoice};
+use hedgerow::measure::builders::Spec;
+use hedgerow::scene::Mesh;
+
+/// A device that has no pipelines yet, by this tuning.
+fn cold(tuning: TuningChoice) -> Device {
+    open(DeviceOptions { tuning, ..OPTIONS })
+}
+
+#[test]
+fn first_builds_make_no_pipelines() {
+    let builders = [
+        "lbvh",
+        "lbvh:schedule=persistent",
+        "lbvh:codes=mip9",
+        "lbvh:codes=bin4a4",
+        "lbvh:split=0.3:optimise=fast",
+        "lbvh:width=8q",
+        "hlbvh",
+        "ploc",
+        "hploc:width=4",
+        "kd-gpu:schedule=chain",
+        "kd-gpu:schedule=persistent",
+    ];
+    let (_, positions, triangles) = corpus::random("", 3000, [-0.5; 3], [1.0; 3]);
+    let mesh = Mesh { positions, triangles };
+    for tuning in [TuningChoice::Cpu, TuningChoice::Gpu] {
+        for builder in builders {
+            // Pipelines of one builder would do for another.
+            let device = cold(tuning);
+            let before = device.pipelines().len();
+            let mut subject =
+                builder.parse::<Spec>().expect("a builder").make(Some(&device), &mesh).expect("a small scene");
+            let warm = device.pipelines().len();
+            assert!(warm > before, "{builder} {tuning}: nothing was made ahead");
+            subject.build().expect("it builds");
+            assert_eq!(device.pipelines().len(), warm, "{builder} {tuning}: not all were made ahead");
+        }
+    }
+}
+
+#[test]
+fn first_builds_of_both_levels_make_no_pipelines() {
+    let (_, positions, triangles) = corpus::random("", 3000, [-0.5; 3], [1.0; 3]);
+    for flags in [Flags::empty(), Flags::PREFER_FAST_BUILD | Flags::ALLOW_UPDATE, Flags::LOW_MEMORY, REBRAID] {
+        let device = cold(TuningChoice::Auto);
+        let ours = accel::Device::new(&device);
+        let requests = |vertices: u64, indices: u64, instances: u64| {
+            let mesh = |first: u64, count| (Geometry::mesh(vertices, 9000, indices + 12 * first), count);
+            let all = [
+                Request::triangles(&[mesh(0, 100)]),
+                Request::triangles(&[mesh(0, 3000)]),
+                Request::triangles(&[mesh(0, 1000), mesh(1000, 1500)]),
+                Request::boxes(&[(Geometry::boxes(vertices, 24), 200)]),
+                Request::instances(instances, 50),
+            ];
+            all.map(|request| request.with_flags(flags))
+        };
+        ours.warm(&requests(0, 0, 0)).expect("pipelines");
+        let warm = device.pipelines().len();
+        assert!(warm > 0, "{flags:?}: nothing was made ahead");
+
+        let vertices = device.upload("positions", &positions).expect("memory");
+        let indices = device.upload("indices", &triangles).expect("memory");
+        // All of them inactive.
+        let instances = device.upload("instances", &[<Instance as bytemuck::Zeroable>::zeroed(); 50]).expect("memory");
+        let requests = requests(vertices.address(), indices.address(), instances.address());
+        let memory = requests.each_ref().map(|request| {
+            let sizes = request.sizes(&ours).expect("sizes");
+            [sizes.structure, sizes.scratch].map(|bytes| device.buffer("memory", bytes).expect("memory"))
+        });
+        let placements = requests.iter().zip(&memory).map(|(request, [structure, scratch])| Placement {
+            request,
+            structure: structure.address(),
+            scratch: scratch.address(),
+        });
+        let placements: Vec<_> = placements.collect();
+        // SAFETY: recorded by `run`, and all memory lives until it has run.
+        device.run(None, |recorder| unsafe { ours.record(recorder.commands(), &placements) }).expect("builds");
+        assert_eq!(device.pipelines().len(), warm, "{flags:?}: not all were made ahead");
+    }
+}
