@@ -91,14 +91,13 @@ fn prebuilt(name: &str) -> PathBuf {
 }
 
 #[cfg(not(feature = "compile-shaders"))]
-fn spirv_of(_source: &Path, name: &str, _out: &Path) -> PathBuf {
-    let path = prebuilt(name);
-    assert!(
-        path.exists(),
-        "{} is missing: build with the feature `compile-shaders`, or run `make prebuilt`",
-        path.display()
-    );
-    path
+fn spirv_of(_source: &Path, name: &str, out: &Path) -> PathBuf {
+    // A copy: the target folder may outlive the sources, or meet them again in another place.
+    let (from, to) = (prebuilt(name), out.join(format!("{}.spv", name.replace('/', "."))));
+    fs::copy(&from, &to).unwrap_or_else(|error| {
+        panic!("{}: {error}: build with the feature `compile-shaders`, or run `make prebuilt`", from.display())
+    });
+    to
 }
 
 #[cfg(feature = "compile-shaders")]

@@ -98,7 +98,7 @@ impl Tracer {
     /// as [`tracer::record`] does for a `Bvh2`, with the same hits.
     ///
     /// # Errors
-    /// As of [`tracer::record`] and [`Tracer::kernel`].
+    /// As of [`tracer::record`]; there is no kernel for this order of such nodes, or for such loads.
     pub fn record(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &Buffers) -> Result<()> {
         let kernel = self.kernel(query, buffers.work.is_some())?;
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
