@@ -14,9 +14,8 @@ bool has_ended(uint of_level) {
     return build_state().ended == of_level + 1u;
 }
 
-// Where the references of a leaf begin, the task of this number.
-uint leaf_at(uint i, KdTask t, uint of_level) {
-    Sums before = task_tiles().tile[i / TILE];
+// Where the references of a leaf begin; `before` is of the tile of its task.
+uint leaf_at(Sums before, KdTask t, uint of_level) {
     uint first = build_state().first_leaf[of_level] + before.leaf_references;
     return has_ended(of_level) ? first + before.split_references + t.cut : first + t.leaf;
 }
@@ -29,7 +28,7 @@ void kd_distribute_chunk(uint chunk, uint of_level) {
     Fate fate = fate_of(t, has_ended(of_level));
     if (!fate.is_split) {
         Words leaf = leaf_references();
-        uint first = leaf_at(number, t, of_level);
+        uint first = leaf_at(task_tiles().tile[number / TILE], t, of_level);
         for (uint i = begin + gl_LocalInvocationIndex; i < end; i += gl_WorkGroupSize.x) {
             leaf.word[first + (i - t.begin)] = from.reference[i].record;
         }
@@ -92,7 +91,7 @@ void kd_write_tile(uint tile, uint of_level) {
         if (is_split) {
             structure.nodes[first_node + i] = kd_inner(t.split & 3u, t.plane, child, fate.sides.x == 0u, fate.sides.y == 0u);
         } else if (is_leaf) {
-            uint leaf = leaf_at(i, t, of_level);
+            uint leaf = leaf_at(sums, t, of_level);
             structure.nodes[first_node + i] = kd_leaf(leaf, t.count);
             if ((t.split & LARGE) == 0u) write_small_leaf(t, leaf, of_level);
         }

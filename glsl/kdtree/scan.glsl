@@ -190,9 +190,13 @@ void scan_words(Words words, uint first, uint stride, uint count) {
 // Makes of the sums of so many tiles those of all tiles before, and returns those of all.
 Sums scan_tiles(uint tiles) {
     const uint WORDS = SUMS_BYTES / 4u;
-    for (uint word = 0; word < WORDS; ++word) scan_words(Words(build_state().task_tiles), word, WORDS, tiles);
+    // Where they are is loaded before the loop: Mesa 26's lavapipe loads an address within a loop even where no lane comes there, from
+    // wherever a lane that does not would have it.
+    KdSums sums = task_tiles();
+    Words words = Words(uvec2(sums));
+    for (uint word = 0; word < WORDS; ++word) scan_words(words, word, WORDS, tiles);
     next_step();
-    return task_tiles().tile[tiles];
+    return sums.tile[tiles];
 }
 
 // Whether there is room for what a level makes, and so many references in the next; notes what was needed. By one invocation.
