@@ -162,12 +162,18 @@ impl Reinsertion {
             link_count: self.link_count(),
             padding: 0,
         };
-        let step = |shader, offset| Step::new(PHASE, self.kernel(shader), &arguments(offset), self.grid.groups);
+        let step = |shader, offset, items| {
+            Step::new(PHASE, self.kernel(shader), &arguments(offset), self.grid.groups_for(items))
+        };
+        let tried = self.link_count().div_ceil(self.stride);
         let round = |round: u32| {
             let unlock = fill::step(PHASE, scratch + words, 2 * self.slots, 0);
-            [unlock].into_iter().chain(STEPS.map(|shader| step(shader, round % self.stride)))
+            [unlock].into_iter().chain(STEPS.map(|shader| step(shader, round % self.stride, tried)))
         };
-        [step(&shaders::BVH_REINSERTION_PARENTS, 0)].into_iter().chain((0..self.rounds).flat_map(round)).collect()
+        [step(&shaders::BVH_REINSERTION_PARENTS, 0, self.slots)]
+            .into_iter()
+            .chain((0..self.rounds).flat_map(round))
+            .collect()
     }
 }
 

@@ -22,6 +22,11 @@ impl Grid {
         context.tuning.grid
     }
 
+    /// Workgroups for `most` items at most: on a GPU, starting workgroups that find nothing costs more than small work does.
+    pub fn groups_for(&self, most: u32) -> u32 {
+        most.div_ceil(self.workgroup.saturating_mul(self.rounds)).clamp(1, self.groups)
+    }
+
     /// The kernel of a shader that takes its items from the grid.
     pub fn kernel(&self, shader: &'static Shader) -> Kernel {
         Kernel::new(shader, self.workgroup, &[self.rounds])

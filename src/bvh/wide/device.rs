@@ -167,7 +167,8 @@ impl OnDevice {
         fill::record(recorder, arguments.first_children, sums_words as u32, 0)?;
         recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RESET), &arguments, 1)?;
         let few = |level, level_end| (&shaders::BVH_WIDE_OPEN_FEW, Arguments { level, level_end, ..arguments }, 1);
-        let many = |level| (&shaders::BVH_WIDE_OPEN, Arguments { level, ..arguments }, self.grid.groups);
+        let groups = self.grid.groups_for(arguments.capacity);
+        let many = |level| (&shaders::BVH_WIDE_OPEN, Arguments { level, ..arguments }, groups);
         let by_many = self.levels_by_many();
         let first = Some(few(0, by_many.start)).filter(|_| by_many.start > 0);
         let last = few(by_many.end, form.levels());
@@ -182,13 +183,13 @@ impl OnDevice {
             self.scan.record(recorder, &scan::Buffers { values: words, results: words, sums })?;
         }
         recorder.barrier();
-        recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_NODES), &arguments, self.grid.groups)?;
+        recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_NODES), &arguments, groups)?;
         recorder.barrier();
-        recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RECORDS), &arguments, self.grid.groups)
+        recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RECORDS), &arguments, self.grid.groups_for(self.count))
     }
 }
 
 /// Whether a step is dispatched as one workgroup.
 fn one_workgroup(shader: &'static shaders::Shader) -> bool {
-    [&shaders::BVH_WIDE_RESET, &shaders::BVH_WIDE_OPEN_FEW].iter().any(|few| few.name == shader.name)
+    [&shaders::BVH_WIDE_RESET, &shaders::BVH_WIDE_OPEN_FEW].contains(&shader)
 }
