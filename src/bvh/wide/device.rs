@@ -190,5 +190,5 @@ impl OnDevice {
 
 /// Whether a step is dispatched as one workgroup.
 fn one_workgroup(shader: &'static shaders::Shader) -> bool {
-    [&shaders::BVH_WIDE_RESET, &shaders::BVH_WIDE_OPEN_FEW].iter().any(|few| few.name == shader.name)
+    [&shaders::BVH_WIDE_RESET, &shaders::BVH_WIDE_OPEN_FEW].contains(&shader)
 }
