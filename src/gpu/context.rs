@@ -102,7 +102,7 @@ impl Limits {
 /// Constant 0 is the workgroup size in x by convention (`local_size_x_id = 0`); the others follow from 1 on.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Kernel {
-    shader: &'static str,
+    shader: &'static Shader,
     constants: Vec<u32>,
     /// For what is left of a dispatch behind its full rows.
     behind_rows: bool,
@@ -116,7 +116,7 @@ impl Kernel {
     pub fn new(shader: &'static Shader, workgroup: u32, constants: &[u32]) -> Kernel {
         let mut all = vec![workgroup];
         all.extend_from_slice(constants);
-        Kernel { shader: shader.name, constants: all, behind_rows: false }
+        Kernel { shader, constants: all, behind_rows: false }
     }
 
     /// The same for a dispatch whose workgroups begin behind rows of others.
@@ -129,12 +129,8 @@ impl Kernel {
         /// `OpDecorate` of four words with the decoration `SpecId`.
         const DECORATE: u32 = 4 << 16 | 71;
         const SPEC_ID: u32 = 1;
-        let words = bytemuck::pod_collect_to_vec::<u8, u32>(self.shader().spirv);
+        let words = bytemuck::pod_collect_to_vec::<u8, u32>(self.shader.spirv);
         words.windows(4).any(|w| w[0] == DECORATE && w[2] == SPEC_ID && w[3] == GROUPS_OF_A_ROW)
-    }
-
-    fn shader(&self) -> &'static Shader {
-        super::shaders::ALL.iter().find(|s| s.name == self.shader).expect("kernels name shaders of the table")
     }
 
     /// The same in workgroups of `workgroup` invocations.
@@ -145,7 +141,7 @@ impl Kernel {
 
     /// Path of its shader below `glsl/`.
     pub fn name(&self) -> &'static str {
-        self.shader
+        self.shader.name
     }
 
     /// The workgroup size in x.
@@ -267,7 +263,7 @@ impl Context {
 
     fn create_pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
         let mut words =
-            ash::util::read_spv(&mut std::io::Cursor::new(kernel.shader().spirv)).expect("build.rs wrote whole words");
+            ash::util::read_spv(&mut std::io::Cursor::new(kernel.shader.spirv)).expect("build.rs wrote whole words");
         let constants = [&kernel.constants[..], &[self.limits.workgroup_count]].concat();
         let ids = (0..kernel.constants.len() as u32).chain([GROUPS_OF_A_ROW]);
         if self.workarounds.folded_constants {

@@ -340,7 +340,7 @@ impl Shape {
 
     fn is_narrow(shader: &Shader) -> bool {
         let narrow = [&shaders::KDTREE_BUILD_SUBTREES, &shaders::KDTREE_BUILD_PLACE, &shaders::KDTREE_MERGE_GATHER];
-        narrow.into_iter().any(|narrow| narrow.name == shader.name)
+        narrow.contains(&shader)
     }
 
     /// Workgroups of `shader` where others of the phase have `groups`: as many invocations, as far as each workgroup has memory for
