@@ -8,7 +8,7 @@
 #   make test          the test suite, under a bound in time: a shader that hangs would hang with it
 #   make test-gpu      the suite with work cut as for a GPU, and a check of builders and tracers with subgroups of 4 and 16
 #   make test-lanes    the suite by either tuning on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
-#   make test-drivers  every pass on a second driver, SwiftShader, by the tunings of CPUs and of GPUs
+#   make test-drivers  every pass on a second driver, SwiftShader, by the tunings of CPUs and of GPUs; a quick check on Mesa 26
 #   make check         formatting, lints and docs, warnings denied
 #   make prebuilt      compiles glsl/ into glsl/prebuilt/, for builds without the feature compile-shaders
 #   make portable      a folder OUT that runs on any machine with a Vulkan driver: scripts/portable.sh
@@ -106,6 +106,8 @@ test-drivers: setup
 	$(CARGO) test --release --features $(FEATURES) --test drivers --no-run
 	VK_DRIVER_FILES=$(SECOND_DRIVER) VK_ICD_FILENAMES=$(SECOND_DRIVER) $(WITHIN) \
 		$(CARGO) test --release --features $(FEATURES) --test drivers -- --ignored --nocapture
+	scripts/peer-lavapipe.sh $(MESA)
+	scripts/with-lavapipe.sh $(MESA) $(BIN) check --quick
 
 check: setup
 	cargo fmt --all --check
