@@ -67,8 +67,9 @@ scenes/ or in the folder of --scenes-dir, or a generator:";
 
 /// Runs the command that the arguments name.
 pub fn main() -> ExitCode {
-    // What obvhs says of deep trees, it says of every build.
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn,obvhs=error")).init();
+    // What obvhs says of deep trees, it says of every build; usvg speaks of each bar of a chart that has no height.
+    let filter = "warn,obvhs=error,usvg=error";
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
     let cli = Cli::parse();
     match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
