@@ -190,8 +190,8 @@ void scan_words(Words words, uint first, uint stride, uint count) {
 // Makes of the sums of so many tiles those of all tiles before, and returns those of all.
 Sums scan_tiles(uint tiles) {
     const uint WORDS = SUMS_BYTES / 4u;
-    // Where they are is loaded before the loop: Mesa 26's lavapipe loads an address within a loop even where no lane comes there, from
-    // wherever a lane that does not would have it.
+    // The address is loaded before the loop. Mesa 26's lavapipe runs the loads of a loop even if no lane is in it, and then loaded this
+    // one from address 0.
     KdSums sums = task_tiles();
     Words words = Words(uvec2(sums));
     for (uint word = 0; word < WORDS; ++word) scan_words(words, word, WORDS, tiles);

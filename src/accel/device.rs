@@ -277,8 +277,8 @@ impl<'a> Device<'a> {
         self.record_placed(&mut recorder, &builds)
     }
 
-    /// Makes the pipelines of these builds now, and of their updates where flags allow those, so that whoever records the same for
-    /// as many primitives later waits for none. Addresses are not looked at.
+    /// Makes the pipelines of these builds now, and of their updates if the flags allow updates. Recording the same later, for the same
+    /// number of primitives, makes no pipeline any more. Addresses are not read.
     ///
     /// # Errors
     /// A request that cannot be built; a pipeline could not be made.

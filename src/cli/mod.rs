@@ -67,7 +67,7 @@ scenes/ or in the folder of --scenes-dir, or a generator:";
 
 /// Runs the command that the arguments name.
 pub fn main() -> ExitCode {
-    // What obvhs says of deep trees, it says of every build; usvg speaks of each bar of a chart that has no height.
+    // What obvhs says of deep trees, it says of every build; usvg warns of each bar of a chart that has no width.
     let filter = "warn,obvhs=error,usvg=error";
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
     let cli = Cli::parse();

@@ -152,8 +152,8 @@ impl<'a> Recorder<'a> {
         Recorder { context, commands, timestamps: None, in_phase: false }
     }
 
-    /// One without a command buffer: what is recorded makes its pipelines now, and does nothing else. Whoever records the same for
-    /// as many primitives later waits for none. Nothing is done to addresses: 0 will do.
+    /// A recorder without a command buffer. It makes the pipelines of what it is given, and records nothing. Recording the same
+    /// later, for the same number of primitives, makes no pipeline any more. Addresses are not read: 0 is enough.
     ///
     /// ```no_run
     /// # use hedgerow::bvh::builder::{Builder, Input};
@@ -232,8 +232,7 @@ impl<'a> Recorder<'a> {
         buffer: vk::Buffer,
         offset: u64,
     ) -> Result<()> {
-        self.bind(kernel, bytemuck::bytes_of(arguments))?;
-        if let Some(device) = self.device() {
+        if let Some(device) = self.bind(kernel, bytemuck::bytes_of(arguments))? {
             // SAFETY: the caller's promise.
             unsafe { device.cmd_dispatch_indirect(self.commands, buffer, offset) };
         }
@@ -272,33 +271,33 @@ impl<'a> Recorder<'a> {
                 "{groups} workgroups of {kernel:?}, which takes one row of at most {row} on this device; give less at a time"
             )));
         }
-        if rows > 0 {
-            self.bind(kernel, arguments)?;
-            if let Some(device) = self.device() {
-                // SAFETY: `new`'s promise; the pipeline is live.
-                unsafe { device.cmd_dispatch(self.commands, row, rows, 1) };
-            }
+        if rows > 0
+            && let Some(device) = self.bind(kernel, arguments)?
+        {
+            // SAFETY: `new`'s promise; the pipeline is live.
+            unsafe { device.cmd_dispatch(self.commands, row, rows, 1) };
         }
-        if rest > 0 {
-            self.bind(&if rows > 0 { kernel.behind_rows() } else { kernel.clone() }, arguments)?;
-            if let Some(device) = self.device() {
-                // SAFETY: the same; where rows are before, the pipeline was made for it.
-                unsafe { device.cmd_dispatch_base(self.commands, 0, rows, 0, rest, 1, 1) };
-            }
+        let behind = if rows > 0 { kernel.behind_rows() } else { kernel.clone() };
+        if rest > 0
+            && let Some(device) = self.bind(&behind, arguments)?
+        {
+            // SAFETY: the same; where rows are before, the pipeline was made for it.
+            unsafe { device.cmd_dispatch_base(self.commands, 0, rows, 0, rest, 1, 1) };
         }
         Ok(())
     }
 
-    fn bind(&mut self, kernel: &Kernel, arguments: &[u8]) -> Result<()> {
+    /// Makes the pipeline if there is none, and binds it and its arguments; the device, if there is something to record into.
+    fn bind(&mut self, kernel: &Kernel, arguments: &[u8]) -> Result<Option<&'a ash::Device>> {
         let pipeline = self.context.pipeline(kernel)?;
-        let Some(device) = self.device() else { return Ok(()) };
+        let Some(device) = self.device() else { return Ok(None) };
         // SAFETY: `new`'s promise; the pipeline is live and the arguments fit the layout's 128 bytes.
         unsafe {
             device.cmd_bind_pipeline(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline);
             let layout = self.context.layout();
             device.cmd_push_constants(self.commands, layout, vk::ShaderStageFlags::COMPUTE, 0, arguments);
         }
-        Ok(())
+        Ok(Some(device))
     }
 
     /// Makes what dispatches before have written visible to dispatches after.

@@ -4,9 +4,9 @@
 //! force. [`GROUPS`] lists them from the simplest pass to whole top levels, so that the first failure says most. Each runs in a
 //! process of its own ([`supervise`]): a crash, a hang or a lost device is one failed group.
 //!
-//! The tests share what the groups are made of: meshes that hurt ([`corpus`], [`shapes`]), trees from both sides ([`twins`]), rays
-//! through them ([`traced`]), worlds of instances built through a [`backend`], queries in a shader that is not ours ([`probe`]), and what they should report
-//! ([`world`], [`agree`]).
+//! The tests share what the groups are made of: meshes that hurt ([`corpus`], [`shapes`]), trees from both sides ([`twins`]),
+//! rays through them ([`traced`]), worlds of instances built through a [`backend`], queries in a shader that is not ours
+//! ([`probe`]), and what they should report ([`world`], [`agree`]).
 
 pub mod agree;
 pub mod backend;
