@@ -1,14 +1,16 @@
-//! Whoever has warmed a context waits for no pipeline: a first build makes none.
+//! Whoever has warmed a context waits for no pipeline: a first build or update makes none.
 
 mod common;
 
 use common::{OPTIONS, corpus, open};
 use hedgerow::accel::{self, Instance, Placement, REBRAID, Request};
-use hedgerow::ash::vk::BuildAccelerationStructureFlagsKHR as Flags;
+use hedgerow::ash::vk;
+use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::geometry::Geometry;
 use hedgerow::gpu::{Device, DeviceOptions, TuningChoice};
 use hedgerow::measure::builders::Spec;
 use hedgerow::scene::Mesh;
+use vk::BuildAccelerationStructureFlagsKHR as Flags;
 
 /// A device that has no pipelines yet, by this tuning.
 fn cold(tuning: TuningChoice) -> Device {
@@ -48,7 +50,7 @@ fn first_builds_make_no_pipelines() {
 }
 
 #[test]
-fn first_builds_of_both_levels_make_no_pipelines() {
+fn first_builds_and_updates_make_no_pipelines() {
     let (_, positions, triangles) = corpus::random("", 3000, [-0.5; 3], [1.0; 3]);
     for flags in [Flags::empty(), Flags::PREFER_FAST_BUILD | Flags::ALLOW_UPDATE, Flags::LOW_MEMORY, REBRAID] {
         let device = cold(TuningChoice::Auto);
@@ -86,5 +88,33 @@ fn first_builds_of_both_levels_make_no_pipelines() {
         // SAFETY: recorded by `run`, and all memory lives until it has run.
         device.run(None, |recorder| unsafe { ours.record(recorder.commands(), &placements) }).expect("builds");
         assert_eq!(device.pipelines().len(), warm, "{flags:?}: not all were made ahead");
+
+        if flags.contains(Flags::ALLOW_UPDATE) {
+            let [structure, scratch] = &memory[0];
+            let copy = device.buffer("another structure", structure.bytes()).expect("memory");
+            let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+                .vertex_format(vk::Format::R32G32B32_SFLOAT)
+                .vertex_data(vk::DeviceOrHostAddressConstKHR { device_address: vertices.address() })
+                .vertex_stride(12)
+                .max_vertex(8999)
+                .index_type(vk::IndexType::UINT32)
+                .index_data(vk::DeviceOrHostAddressConstKHR { device_address: indices.address() });
+            let geometry = [vk::AccelerationStructureGeometryKHR::default()
+                .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+                .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })];
+            let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+                .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
+                .mode(vk::BuildAccelerationStructureModeKHR::UPDATE)
+                .flags(flags)
+                .src_acceleration_structure(vk::AccelerationStructureKHR::from_raw(structure.address()))
+                .dst_acceleration_structure(vk::AccelerationStructureKHR::from_raw(copy.address()))
+                .geometries(&geometry)
+                .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.address() });
+            let range = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(100)];
+            // SAFETY: as above.
+            let update = |commands| unsafe { ours.cmd_build_acceleration_structures(commands, &[info], &[&range]) };
+            device.run(None, |recorder| update(recorder.commands())).expect("an update");
+            assert_eq!(device.pipelines().len(), warm, "not all of an update were made ahead");
+        }
     }
 }
