@@ -10,9 +10,9 @@
 #   make test-lanes    the suite by either tuning on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
 #   make test-drivers  every pass on a second driver, SwiftShader, by the tunings of CPUs and of GPUs; a quick check on Mesa 26
 #   make check         formatting, lints and docs, warnings denied
-#   make prebuilt      compiles glsl/ into glsl/prebuilt/, for builds without the feature compile-shaders
+#   make package       the crate that engines depend on, with compiled shaders; builds it with and without the compiler
 #   make portable      a folder OUT that runs on any machine with a Vulkan driver: scripts/portable.sh
-#   make install-c     hedgerow.h and the libraries for C into PREFIX (/usr/local); needs Rust alone
+#   make install-c     hedgerow.h and the libraries for C into PREFIX (/usr/local)
 #
 #   SETUP=true         go on without scripts/setup.sh       OUT=DIR        where reports go
 #   BENCH="…"          further arguments of `hedgerow bench`, such as -b lbvh,ploc or --runs 3
@@ -51,11 +51,9 @@ RUN := $(WITHIN) $(CARGO) $(if $(NEXTEST),nextest run,test) --release
 SUITE := $(RUN) --features $(FEATURES)
 # What depends on how many lanes a subgroup has: groups of `hedgerow check`.
 WIDTH_GROUPS := scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,kd-build,kd-merge,trace,trace-kd
-# The libraries for C, as their users build them: without the binary and the shader compiler.
-CAPI := -p hedgerow-capi
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
-.PHONY: bench bench-all bench-peers stability test test-gpu test-lanes check prebuilt portable install-c setup test-drivers
+.PHONY: bench bench-all bench-peers stability test test-gpu test-lanes check package portable install-c setup test-drivers
 
 bench: setup
 	$(CARGO) build --release --features $(FEATURES)
@@ -85,8 +83,6 @@ test: setup
 	$(CARGO) test --release --features $(FEATURES) --no-run
 	$(SUITE)
 	$(if $(NEXTEST),$(WITHIN) $(CARGO) test --release --features $(FEATURES) --doc)
-	$(CARGO) test --release $(CAPI) --no-run
-	$(RUN) $(CAPI)
 
 # What `make test` has on a CPU is the tuning of CPUs; every branch for GPUs runs here. lavapipe alone reads the width.
 test-gpu: setup
@@ -103,30 +99,26 @@ test-lanes: setup
 # One process: SwiftShader compiles every pipeline anew in each.
 test-drivers: setup
 	$(if $(HEDGEROW_SECOND_DRIVER),,scripts/second-driver.sh $(SWIFTSHADER))
-	$(CARGO) test --release --features $(FEATURES) --test drivers --no-run
+	$(CARGO) test --release --features $(FEATURES) --test main --no-run
 	VK_DRIVER_FILES=$(SECOND_DRIVER) VK_ICD_FILENAMES=$(SECOND_DRIVER) $(WITHIN) \
-		$(CARGO) test --release --features $(FEATURES) --test drivers -- --ignored --nocapture
+		$(CARGO) test --release --features $(FEATURES) --test main -- drivers:: --ignored --nocapture
 	scripts/peer-lavapipe.sh $(MESA)
 	scripts/with-lavapipe.sh $(MESA) $(BIN) check --quick
 
 check: setup
 	cargo fmt --all --check
 	$(CARGO) clippy --release --all-targets --features $(FEATURES) -- -D warnings
-	$(CARGO) clippy --release --no-default-features --lib -- -D warnings
-	$(CARGO) clippy --release $(CAPI) --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --features $(FEATURES)
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --no-default-features --lib
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps $(CAPI)
 
-prebuilt: setup
-	HEDGEROW_UPDATE_PREBUILT=1 $(CARGO) test --release --test prebuilt
+package: setup
+	scripts/package.sh
 
 portable: setup
 	@test "$(OUT)" != report || { echo "make portable: OUT=DIR names the folder to make" >&2; exit 2; }
 	scripts/portable.sh "$(OUT)"
 
 install-c:
-	cargo build --release $(CAPI)
+	$(CARGO) build --release -p hedgerow-capi
 	mkdir -p "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(PREFIX)/lib"
 	install -m 644 $(RELEASE)/include/hedgerow.h "$(DESTDIR)$(PREFIX)/include"
 	install -m 644 $(RELEASE)/libhedgerow_capi.a $(RELEASE)/libhedgerow_capi.$(SHARED) "$(DESTDIR)$(PREFIX)/lib"

@@ -9,20 +9,20 @@
 //! scenes/, or what `HEDGEROW_BENCH_SCENE` names; the device that of `HEDGEROW_DEVICE`, or the first that fits.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use hedgerow::Result;
 use hedgerow::accel;
 use hedgerow::ash;
 use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
 use hedgerow::bvh::compact;
 use hedgerow::bvh::layout::{Header, Triangle};
-use hedgerow::gpu::{Buffer, Device, DeviceOptions, DriverTracing};
-use hedgerow::measure::experiments::batch::{Batch, Workload};
-use hedgerow::measure::experiments::points::Way;
-use hedgerow::measure::structures::Structures;
-use hedgerow::scene::{self, LoadOptions, Scene};
-use hedgerow::trace::kinds::{self, RayKind, RayOptions};
 use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
 use hedgerow::trace::{Hit, Query, Ray};
+use hedgerow_lab::Result;
+use hedgerow_lab::device::{Buffer, Device, DeviceOptions, DriverTracing};
+use hedgerow_lab::measure::experiments::batch::{Batch, Workload};
+use hedgerow_lab::measure::experiments::points::Way;
+use hedgerow_lab::measure::structures::Structures;
+use hedgerow_lab::rays::kinds::{self, RayKind, RayOptions};
+use hedgerow_lab::scene::{self, LoadOptions, Scene};
 
 const SIZE: [u32; 2] = [256, 192];
 

@@ -28,7 +28,7 @@ fi
 release=${CARGO_TARGET_DIR:-target}/release
 mkdir -p "$release/portable"
 echo 'INPUT(-l:libgcc_eh.a -l:libgcc.a)' > "$release/portable/libgcc_s.so"
-scripts/cargo.sh rustc --release --bin hedgerow --features peer-obvhs -- -L "native=$(cd "$release/portable" && pwd)"
+scripts/cargo.sh rustc --release -p hedgerow-lab --bin hedgerow --features peer-obvhs -- -L "native=$(cd "$release/portable" && pwd)"
 rm -rf "$out/scenes"
 mkdir -p "$out/scenes"
 strip -o "$out/hedgerow" "$release/hedgerow"

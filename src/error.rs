@@ -7,34 +7,9 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file cannot be read or written.
-    #[error("{path}: {source}; check the path and its permissions")]
-    File {
-        /// The file or folder.
-        path: String,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A file is not what its name says; the message begins with `file:line:` or `file:` and ends with the remedy.
-    #[error("{0}")]
-    Malformed(String),
-    /// The scene cannot be used (no triangles, non-finite vertices, an unknown name).
-    #[error("{0}")]
-    Scene(String),
     /// An option or argument has a value that cannot be used.
     #[error("{0}")]
     Argument(String),
-    /// No Vulkan loader or no device at all.
-    #[error("no Vulkan: {0}; install a Vulkan driver (on Debian: libvulkan1 and mesa-vulkan-drivers)")]
-    NoVulkan(String),
-    /// The device asked for does not exist.
-    #[error("no device is called {asked:?}; there are: {available}; choose one with --device or HEDGEROW_DEVICE")]
-    NoSuchDevice {
-        /// What was asked for.
-        asked: String,
-        /// The devices there are, as `index: name`.
-        available: String,
-    },
     /// The device lacks something that the library requires.
     #[error("{device} cannot be used, it lacks: {}; choose another device or a newer driver", missing.join(", "))]
     Unsupported {
@@ -43,18 +18,6 @@ pub enum Error {
         /// Everything that is missing, not only the first.
         missing: Vec<String>,
     },
-    /// The device has too little memory.
-    #[error(
-        "{what} needs {needed} bytes of device memory, {available} are there; take a smaller scene or another device"
-    )]
-    OutOfMemory {
-        /// What the memory was for.
-        what: String,
-        /// Bytes needed.
-        needed: u64,
-        /// Bytes the device has.
-        available: u64,
-    },
     /// A Vulkan call failed.
     #[error("{call} failed: {result:?}")]
     Vulkan {
@@ -62,25 +25,6 @@ pub enum Error {
         call: &'static str,
         /// What it returned.
         result: ash::vk::Result,
-    },
-    /// A dispatch did not finish in time.
-    #[error("{what} did not finish within {seconds} s; the device may hang: try another device or a smaller scene")]
-    Timeout {
-        /// What was running.
-        what: String,
-        /// The bound that ran out.
-        seconds: u64,
-    },
-    /// The validation layers complained (with `--validation`, or in the tests).
-    #[error("Vulkan validation: {0}")]
-    Validation(String),
-    /// A chart of the report cannot be drawn.
-    #[error("the chart {chart} cannot be drawn: {reason}; the records in results.jsonl are complete without it")]
-    Chart {
-        /// Its name.
-        chart: String,
-        /// What the drawing library says.
-        reason: String,
     },
     /// A structure breaks a rule of its layout; says which node and which rule.
     #[error("invalid structure: {0}")]
@@ -91,11 +35,5 @@ impl Error {
     /// For `map_err`: names the Vulkan call that failed.
     pub fn vulkan(call: &'static str) -> impl Fn(ash::vk::Result) -> Error {
         move |result| Error::Vulkan { call, result }
-    }
-
-    /// For `map_err`: names the file that failed.
-    pub fn file(path: impl AsRef<std::path::Path>) -> impl Fn(std::io::Error) -> Error {
-        let path = path.as_ref().display().to_string();
-        move |source| Error::File { path: path.clone(), source }
     }
 }

@@ -12,7 +12,7 @@ use crate::gpu::shaders;
 use crate::kdtree::layout as kdtree;
 use crate::trace::kd::TreeEntry;
 use crate::trace::{Hit, Ray};
-use crate::{accel, bvh, gpu, measure, trace};
+use crate::{accel, bvh, gpu, trace};
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{Decoration, MemorySemantics, Op, StorageClass};
 use std::collections::{BTreeMap, BTreeSet};
@@ -72,16 +72,11 @@ fn arguments_of(shader: &str) -> Option<Layout> {
         "bvh" if is("wide") => bvh::wide::device::push_constants(),
         "bvh" if is("split") => bvh::split::push_constants(),
         "bvh" if is("reinsertion") => bvh::reinsertion::push_constants(),
-        "gpu" if is("divide") => gpu::probe::division_push_constants(),
         "gpu" if is("fill") => gpu::fill::push_constants(),
-        "gpu" if is("pool_tree") => gpu::probe::push_constants(),
         "gpu" if is("radix_sort") => gpu::radix_sort::push_constants(),
         "gpu" if is("reduce") => gpu::reduce::push_constants(),
         "gpu" if is("scan") => gpu::scan::push_constants(),
         "trace" if is("tracer") => trace::tracer::push_constants(),
-        "measure" if is("copy") => measure::copy::push_constants(),
-        "measure" if is("probe") => measure::check::probe::push_constants(),
-        "measure" if ["query", "ray_query", "driver_rays"].into_iter().any(is) => gpu::driver_rays::push_constants(),
         _ => return None,
     })
 }
@@ -185,7 +180,7 @@ struct Reflection(Module);
 
 impl Reflection {
     fn of(shader: &str) -> Reflection {
-        let path = Path::new(env!("HEDGEROW_NAMED_SPIRV")).join(format!("{}.spv", shader.replace('/', ".")));
+        let path = Path::new(env!("OUT_DIR")).join("named").join(format!("{}.spv", shader.replace('/', ".")));
         let bytes = std::fs::read(&path).expect("build.rs wrote it");
         Reflection(rspirv::dr::load_bytes(bytes).expect("SPIR-V of shaderc"))
     }
@@ -273,7 +268,7 @@ impl Reflection {
 
 #[test]
 fn push_constants_are_the_same_on_host_and_device() {
-    for shader in shaders::ALL.iter().copied().chain([&shaders::MEASURE_DRIVER_RAYS]) {
+    for shader in shaders::ALL {
         let device =
             Reflection::of(shader.name).arguments().unwrap_or_else(|| panic!("{} has no push constants", shader.name));
         let mut host = arguments_of(shader.name)

@@ -1,11 +1,9 @@
 //! A device that has less than it could: without what is optional, with inexact subgroups, with small limits, without timestamps.
-#![cfg(feature = "cli")]
 
-mod common;
-
-use common::{OPTIONS, open};
+use crate::common::{OPTIONS, open};
 use hedgerow::gpu::scan::{self, Buffers, Scan};
-use hedgerow::gpu::{Device, DeviceOptions, Timestamps, TuningChoice};
+use hedgerow::gpu::{Timestamps, TuningChoice};
+use hedgerow_lab::device::{Device, DeviceOptions};
 
 fn restricted(text: &str) -> Device {
     open(DeviceOptions { restrict: text.parse().expect("a list of restrictions"), ..OPTIONS })
@@ -40,7 +38,7 @@ fn sums(device: &Device, timestamps: Option<&mut Timestamps>) -> Vec<u32> {
 
 #[test]
 fn limits_can_only_be_lowered() {
-    let all = &common::open(OPTIONS).limits;
+    let all = &crate::common::open(OPTIONS).limits;
     let less = restricted("shared=16384,invocations=128,groups=64,timestamps=0").limits.clone();
     assert_eq!((less.shared_memory, less.workgroup_invocations, less.workgroup_count), (16384, 128, 64));
     assert_eq!((less.timestamp_bits, less.subgroup_size), (0, all.subgroup_size));
@@ -108,7 +106,7 @@ fn staged_buffers_hold_what_was_written() {
 
 #[test]
 fn too_little_memory_is_an_error_that_says_how_much_there_is() {
-    let device = common::device();
+    let device = crate::common::device();
     let Err(error) = device.buffer("a mountain", 1 << 50) else { panic!("there is no such memory") };
     let text = error.to_string();
     assert!(text.starts_with("a mountain needs 1125899906842624 bytes of device memory"), "{text}");

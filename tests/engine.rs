@@ -1,11 +1,10 @@
 //! The example engine draws its picture: a device with exactly the requirements, the engine's own memory and command buffer,
 //! and rays by the header that it includes.
-#![cfg(all(feature = "compile-shaders", feature = "cli"))]
 
 #[path = "../examples/engine.rs"]
-mod engine;
+mod example;
 
-use engine::{EYE, HEIGHT, LAMP, Model, PLACES, WIDTH};
+use example::{EYE, HEIGHT, LAMP, Model, PLACES, WIDTH};
 use glam::Vec3;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::host::lbvh;
@@ -40,7 +39,7 @@ fn light(tree: &Bvh2, corners: &dyn Fn(u32) -> [Vec3; 3], pixel: u32) -> Option<
 fn a_foreign_engine_draws_what_the_host_traces() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("engine.png");
-    engine::draw(&path).expect("the engine draws");
+    example::draw(&path).expect("the engine draws");
     let picture = image::open(&path).expect("a picture").into_rgb8();
     assert_eq!(picture.dimensions(), (WIDTH, HEIGHT));
 

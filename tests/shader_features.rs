@@ -1,12 +1,11 @@
 //! What the shaders' SPIR-V uses is what `gpu::requirements` asks of a device, and nothing else.
-#![cfg(feature = "compile-shaders")]
 
 use hedgerow::gpu::shaders;
 use rspirv::dr::{Module, Operand, load_bytes};
 use rspirv::spirv::{BuiltIn, Capability, Decoration, Op};
 
 fn modules() -> impl Iterator<Item = (&'static str, Module)> {
-    let all = shaders::ALL.iter().chain(shaders::OF_RAYS);
+    let all = shaders::ALL.iter().chain(hedgerow_lab::shaders::ALL);
     all.map(|shader| (shader.name, load_bytes(shader.spirv).expect("SPIR-V of shaderc")))
 }
 
@@ -29,7 +28,7 @@ fn required(capability: Capability) -> Option<&'static str> {
 /// What the driver's peers need beyond it: their pipelines are made only where `DriverTracing` is there.
 fn of_the_driver(shader: &str, capability: Capability) -> bool {
     match capability {
-        Capability::RayQueryKHR => shader == "measure/ray_query",
+        Capability::RayQueryKHR => ["measure/ray_query", "measure/driver_probe"].contains(&shader),
         Capability::RayTracingKHR => shader.starts_with("measure/driver_"),
         _ => false,
     }

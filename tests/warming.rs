@@ -1,15 +1,14 @@
 //! Whoever has warmed a context waits for no pipeline: a first build or update makes none.
 
-mod common;
-
-use common::{OPTIONS, corpus, open};
+use crate::common::{OPTIONS, corpus, open};
 use hedgerow::accel::{self, Instance, Placement, REBRAID, Request};
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::geometry::Geometry;
-use hedgerow::gpu::{Device, DeviceOptions, TuningChoice};
-use hedgerow::measure::builders::Spec;
-use hedgerow::scene::Mesh;
+use hedgerow::gpu::TuningChoice;
+use hedgerow_lab::device::{Device, DeviceOptions};
+use hedgerow_lab::measure::builders::Spec;
+use hedgerow_lab::scene::Mesh;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 
 /// A device that has no pipelines yet, by this tuning.

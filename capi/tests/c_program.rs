@@ -1,7 +1,6 @@
 //! `examples/trace.c` compiles without a warning, links both libraries, and traces the hits that it knows.
 //!
 //! Needs a C compiler and `<vulkan/vulkan.h>` (`scripts/setup.sh` installs both); says so and does nothing without them.
-#![cfg(unix)]
 
 use std::ffi::OsString;
 use std::io::Write;

@@ -269,7 +269,7 @@ mod ranges {
     }
 }
 use ranges::Ranges;
-#[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
+#[cfg(all(test, feature = "compile-shaders"))]
 pub(crate) use ranges::push_constants as ranges_push_constants;
 
 /// The geometries that `info` gives with the counts of their ranges.

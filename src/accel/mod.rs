@@ -87,7 +87,7 @@ impl Default for Options {
     }
 }
 
-#[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
+#[cfg(all(test, feature = "compile-shaders"))]
 pub(crate) mod push_constants {
     pub(crate) use super::build::{push_constants as geometries, ranges_push_constants as ranges};
     pub(crate) use super::copy::push_constants as copy;

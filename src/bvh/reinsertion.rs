@@ -15,7 +15,7 @@
 //!
 //! Paths of moves that are made have no node in common. That is the paper's conservative locking: gains add up, no cycle can come
 //! to be, and the area never grows. It lets fewer moves through than locking only the nodes whose links change. That is made up for
-//! by trying few links a round and more rounds ([`Options::stride`]): what was tried, with figures, is in docs/optimisation.md.
+//! by trying few links a round and more rounds ([`Options::stride`]): what was tried, with figures, is in docs/notes/optimisation.md.
 //!
 //! The leaves of the tree have one record each; collapsing comes behind it and makes leaves of whatever is deeper than tracers can
 //! walk. The twin is [`Bvh2::reinserted`](super::layout::Bvh2::reinserted): the same bytes.

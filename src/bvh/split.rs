@@ -36,7 +36,7 @@ pub struct Options {
 
 impl Options {
     /// The paper's 30% more references than triangles, at most; and at most 7 splits of each, which measured well
-    /// (docs/splitting.md).
+    /// (docs/notes/splitting.md).
     pub const DEFAULT: Options = Options { fraction: 0.3, most: 7 };
     /// As many splits as triangles.
     pub const MOST_FRACTION: f32 = 1.0;

@@ -189,7 +189,8 @@ impl Context {
     ///
     /// # Safety
     /// As [`Context::new`].
-    pub(super) unsafe fn limited(desc: &ContextDesc<'_>, limit: impl FnOnce(&mut Limits)) -> Result<Context> {
+    #[doc(hidden)]
+    pub unsafe fn limited(desc: &ContextDesc<'_>, limit: impl FnOnce(&mut Limits)) -> Result<Context> {
         let range = vk::PushConstantRange::default()
             .stage_flags(vk::ShaderStageFlags::COMPUTE)
             .size(super::requirements::PUSH_CONSTANT_BYTES);

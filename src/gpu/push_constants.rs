@@ -11,7 +11,7 @@ macro_rules! push_constants {
         #[repr(C)]
         $vis struct $name { $($(#[$member_meta])* $member_vis $member: $ty),* }
 
-        #[cfg(all(test, feature = "cli", feature = "compile-shaders"))]
+        #[cfg(all(test, feature = "compile-shaders"))]
         pub(crate) fn push_constants() -> crate::layouts::Layout {
             crate::layouts::layout_of!($name { $($member),* })
         }

@@ -4,6 +4,7 @@ use super::{Context, Kernel};
 use crate::{Error, Result};
 use ash::vk;
 use std::ffi::CString;
+use std::time::Duration;
 
 /// One phase of a build and how long it took on the device.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,9 +25,8 @@ pub struct Timestamps {
     period: f32,
     valid_bits: u32,
     names: Vec<&'static str>,
-    /// What the whole took by the host's clock, for whoever submits and waits.
-    #[cfg(feature = "cli")]
-    pub(super) waited: Option<std::time::Duration>,
+    /// What the whole took by the host's clock.
+    waited: Option<Duration>,
 }
 
 impl Timestamps {
@@ -55,14 +55,13 @@ impl Timestamps {
             period: context.limits.timestamp_period,
             valid_bits,
             names: Vec::new(),
-            #[cfg(feature = "cli")]
             waited: None,
         })
     }
 
     /// The phases of the last recording, read back; none without timestamps. Call after the command buffer has finished.
     ///
-    /// What [`super::Device`] ran has one phase without timestamps, `submit`: all of it, by the host's clock.
+    /// Without timestamps there is one phase, `submit`, if [`Timestamps::waited`] was told how long it took.
     ///
     /// # Errors
     /// The timestamps could not be read.
@@ -88,14 +87,16 @@ impl Timestamps {
         Ok(self.names.iter().enumerate().map(phase).collect())
     }
 
-    /// All of what was recorded as one phase, where it was waited for.
+    /// How long the last recording took from its submit to its end by the host's clock, which stands in where there are no
+    /// timestamps.
+    pub fn waited(&mut self, time: Duration) {
+        self.waited = Some(time);
+    }
+
+    /// All of what was recorded as one phase.
     fn submit(&self) -> Option<Phase> {
-        #[cfg(feature = "cli")]
-        if !self.names.is_empty() {
-            let milliseconds = |waited: std::time::Duration| waited.as_secs_f64() * 1e3;
-            return self.waited.map(|waited| Phase { name: "submit", milliseconds: milliseconds(waited) });
-        }
-        None
+        let waited = self.waited.filter(|_| !self.names.is_empty())?;
+        Some(Phase { name: "submit", milliseconds: waited.as_secs_f64() * 1e3 })
     }
 }
 

@@ -71,15 +71,18 @@ impl Optional {
 }
 
 /// Extensions that a device offers.
-pub(super) struct Offered(Vec<vk::ExtensionProperties>);
+#[doc(hidden)]
+pub struct Offered(Vec<vk::ExtensionProperties>);
 
 impl Offered {
-    pub(super) fn by(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Offered {
+    #[doc(hidden)]
+    pub fn by(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Offered {
         // SAFETY: the handles are the caller's and live. A device that cannot list them is taken to offer none.
         Offered(unsafe { instance.enumerate_device_extension_properties(physical_device) }.unwrap_or_default())
     }
 
-    pub(super) fn has(&self, name: &CStr) -> bool {
+    #[doc(hidden)]
+    pub fn has(&self, name: &CStr) -> bool {
         self.0.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name))
     }
 }

@@ -1,7 +1,7 @@
 //! The persistent task pool: phases of tasks in one dispatch (`glsl/gpu/task_pool.glsl`).
 //!
 //! The pool is for passes whose phases wait for each other often, or whose task counts only the device knows. It needs that
-//! workgroups which have started go on ([`super::probe`] tries it); a chain of dispatches needs nothing.
+//! workgroups which have started go on (the laboratory's `device::probe` tries it); a chain of dispatches needs nothing.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -17,13 +17,13 @@ pub struct Workarounds {
     pub driver_halves_in_order: bool,
     /// A transform multiplies the fourth component of 16-bit vertices, `firstVertex` leads to other vertices, and many a ray passes by a
     /// flat box or ends where it enters one, in the driver's own structures. lavapipe before Mesa 26 (25.0.7).
-    /// Shown by: tests/accel_blas.rs, tests/accel_boxes.rs.
+    /// Shown by: tests/accel/blas.rs, tests/accel/boxes.rs.
     pub driver_misreads_geometry: bool,
     /// A ray query through a top level with an inactive instance, or one of mask 0, crashes the process. lavapipe from Mesa 26 on
-    /// (26.1.6). Shown by: tests/accel_empty.rs, tests/accel_tlas.rs, tests/accel_facing.rs.
+    /// (26.1.6). Shown by: tests/accel/empty.rs, tests/accel/tlas.rs, tests/accel/facing.rs.
     pub driver_crashes_on_inactive_instances: bool,
     /// Active boxes beside inactive ones are lost in the driver's own structures. Every lavapipe so far (25.0.7, 26.1.6).
-    /// Shown by: tests/accel_boxes.rs.
+    /// Shown by: tests/accel/boxes.rs.
     pub driver_loses_boxes: bool,
     /// Specialisation constants are folded into a module before the driver sees it (`gpu::specialise`). SwiftShader sets their values, but
     /// takes out no code behind them; and for each loop it looks for paths through what is left, breadth first, taking a block once for
@@ -47,7 +47,8 @@ impl Workarounds {
         Workarounds::of_driver(limits.driver, limits.driver_version)
     }
 
-    pub(super) fn of_driver(driver: vk::DriverId, version: u32) -> Workarounds {
+    #[doc(hidden)]
+    pub fn of_driver(driver: vk::DriverId, version: u32) -> Workarounds {
         if driver != vk::DriverId::MESA_LLVMPIPE {
             return Workarounds { folded_constants: driver == vk::DriverId::GOOGLE_SWIFTSHADER, ..Workarounds::NONE };
         }

@@ -5,8 +5,8 @@
 //! ([`OUT_OF_ROOM`](crate::bvh::layout::status::OUT_OF_ROOM)), and the [`Report`] says what would have been enough.
 //!
 //! Min-max binning above, level by level (Papay 2025, sections 9.4 to 9.6); cells of few references are split exactly, by one
-//! workgroup to their leaves. [`super::host`] is the twin, with
-//! [`Planes::Mixed`](super::host::Planes::Mixed). `glsl/kdtree/build.glsl` is the device's side.
+//! workgroup to their leaves. [`super::twin::builder`] is the twin,
+//! `glsl/kdtree/build.glsl` the device's side.
 //!
 //! Trees have the bytes of the twin on every device: the only reciprocals that they depend on are correctly rounded, by the device or
 //! by integers ([`crate::gpu::KdTuning::exact_reciprocals`]). Where a device flushes subnormal numbers, inputs must not lead to any.
@@ -47,7 +47,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// Bins and exact splits that measured well (docs/kdtree.md), everything else chosen.
+    /// Bins and exact splits that measured well (docs/notes/kdtree.md), everything else chosen.
     pub const DEFAULT: Options = Options {
         bins: 128,
         exact: 32,
@@ -67,7 +67,7 @@ impl Options {
     pub const MOST_EXACT: u32 = 64;
 
     /// The schedule on the device of `context`; of a merge, too. The pool on a CPU: workgroups take what is left as they come, where
-    /// those of a dispatch have their shares, whichever core is slower (docs/kdtree.md). No GPU was measured, and a chain asks nothing
+    /// those of a dispatch have their shares, whichever core is slower (docs/notes/kdtree.md). No GPU was measured, and a chain asks nothing
     /// of one's progress.
     pub fn schedule_on(&self, context: &Context) -> Schedule {
         let measured = if context.tuning.kd.persistent { Schedule::Persistent } else { Schedule::Chain };

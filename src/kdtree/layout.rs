@@ -164,7 +164,8 @@ impl Inner {
 }
 
 /// The two parts of a cell on the sides of a plane.
-pub(super) fn halves(cell: &Aabb, axis: usize, plane: f32) -> [Aabb; 2] {
+#[doc(hidden)]
+pub fn halves(cell: &Aabb, axis: usize, plane: f32) -> [Aabb; 2] {
     let [mut left, mut right] = [*cell; 2];
     left.hi[axis] = plane;
     right.lo[axis] = plane;

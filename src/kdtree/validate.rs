@@ -240,11 +240,12 @@ fn invalid<T>(what: String) -> Result<T> {
     Err(Error::InvalidStructure(what))
 }
 
-#[cfg(all(test, feature = "cli"))]
+#[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kdtree::host::{Options, build};
+    use crate::kdtree::builder::Options;
     use crate::kdtree::layout::Node;
+    use crate::kdtree::twin::builder::build;
 
     /// Small triangles along a diagonal, and one all along it.
     fn tree() -> KdTree {
@@ -252,7 +253,7 @@ mod tests {
             (0..60).map(|i| [(i / 3) as f32, (i / 3 + i % 3) as f32, (i * 5 % 11) as f32]).collect();
         positions.extend([[0.0; 3], [20.0, 20.0, 10.0], [20.0, 19.0, 10.0]]);
         let triangles: Vec<[u32; 3]> = (0..21).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        build(&positions, &triangles, &Options::EXACT).expect("a small tree")
+        build(&positions, &triangles, &Options::DEFAULT).expect("a small tree")
     }
 
     #[test]

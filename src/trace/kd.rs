@@ -52,7 +52,7 @@ pub struct Tracer {
 
 impl Tracer {
     /// By this traversal, cut as [`Shape::of`] does, but with loads gathered. Stacks of up to 8 cells, which lie in registers, are the
-    /// fastest where that was measured: `docs/kdtree.md`.
+    /// fastest where that was measured: `docs/notes/kdtree.md`.
     pub fn new(context: &Context, traversal: Traversal) -> Tracer {
         Tracer::with(traversal, Shape::of(context))
     }

@@ -1,4 +1,4 @@
-//! Rays and hits: ray kinds, the tracer on the device, and the tracer and brute force on the host.
+//! Rays and hits: the tracer on the device, and the tracer and brute force on the host.
 //!
 //! A hit is a property of a ray and a triangle alone: [`triangle`] defines it, ties go to the lower primitive index, and
 //! [`slab`] proves that a box test never hides one. So every tree over the same triangles, traversed in any order, gives the
@@ -7,17 +7,12 @@
 //! - [`ray`] prepares a ray: shear, reciprocals, error bounds;
 //! - [`determinant`], [`triangle`], [`slab`] are the arithmetic, each the twin of a file in `glsl/trace/`;
 //! - [`host`] traverses on the host, [`tracer`] on the device; [`wide_host`] and [`wide`] do it in wide trees;
-//! - [`kd_host`] traverses kd-trees on the host, [`kd`] on the device, in the same ways;
-//! - `kinds` makes the rays that are measured; `files` reads and writes rays and hits.
+//! - [`kd_host`] traverses kd-trees on the host, [`kd`] on the device, in the same ways.
 
 pub mod determinant;
-#[cfg(feature = "cli")]
-pub mod files;
 pub mod host;
 pub mod kd;
 pub mod kd_host;
-#[cfg(feature = "cli")]
-pub mod kinds;
 pub mod ray;
 pub mod slab;
 pub mod tracer;

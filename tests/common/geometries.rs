@@ -4,7 +4,7 @@ use super::device;
 use super::shapes::{Corners, Random};
 use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, VertexFormat};
 use hedgerow::bvh::host::geometry::HostGeometry;
-use hedgerow::gpu::Buffer;
+use hedgerow_lab::device::Buffer;
 
 /// A matrix that turns, shears, mirrors and moves.
 pub const MOVED: [[f32; 4]; 3] = [[0.5, -2.0, 0.25, 10.0], [1.0, 0.75, 0.0, -0.3], [0.0, 0.1, -3.0, 1e-3]];

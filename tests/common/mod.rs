@@ -6,10 +6,11 @@ pub mod geometries;
 pub mod probe;
 pub mod twins;
 
-pub use hedgerow::measure::check::traced::traced;
-pub use hedgerow::measure::check::{agree, corpus, matrices, mixture, shapes, world};
+pub use hedgerow_lab::measure::check::traced::traced;
+pub use hedgerow_lab::measure::check::{agree, corpus, matrices, mixture, shapes, world};
 
-use hedgerow::gpu::{Device, DeviceOptions, DriverTracing, Restrict, TuningChoice};
+use hedgerow::gpu::TuningChoice;
+use hedgerow_lab::device::{Device, DeviceOptions, DriverTracing, Restrict};
 use std::cell::Cell;
 use std::sync::OnceLock;
 

@@ -1,12 +1,13 @@
-//! What ray queries report, and what the header for kd-trees does: `tests/shaders/` in pipelines of their own, as an engine would have them.
+//! What ray queries report, and what the header for kd-trees does: shaders in pipelines of their own, as an engine would have them.
 
 use super::device;
-pub use hedgerow::measure::check::probe::*;
 use hedgerow::trace::{Hit, Ray};
+pub use hedgerow_lab::measure::check::probe::*;
+use hedgerow_lab::shaders;
 
 /// Of the driver's structures.
 pub fn of_the_driver() -> Probe {
-    Probe::of(device(), include_bytes!(concat!(env!("OUT_DIR"), "/probe_of_the_driver.spv")))
+    Probe::of(device(), shaders::MEASURE_DRIVER_PROBE.spirv)
 }
 
 /// What a ray meets by the header for kd-trees, and by a query of a BVH in the same shader.
@@ -33,7 +34,7 @@ struct KdPush {
 
 /// Traces every ray through both.
 pub fn ask_kd_tree(kd_tree: u64, bvh: u64, rays: &[Ray]) -> Vec<KdReport> {
-    let probe = Probe::of(device(), include_bytes!(concat!(env!("OUT_DIR"), "/kd_probe.spv")));
+    let probe = Probe::of(device(), shaders::MEASURE_KD_PROBE.spirv);
     let ray_buffer = device().upload("rays", rays).expect("memory");
     let reports = device().buffer("reports", size_of::<KdReport>() as u64 * rays.len() as u64).expect("memory");
     let count = rays.len() as u32;

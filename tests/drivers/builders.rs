@@ -1,7 +1,7 @@
 //! BVHs of every method and schedule, against their twins.
 
-use super::common::twins::{assert_same, on_device, on_host};
 use super::meshes;
+use crate::common::twins::{assert_same, on_device, on_host};
 use hedgerow::bvh::builder::{Method, Options, Schedule, Treelets, Window};
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::sah::Collapse;

@@ -1,21 +1,21 @@
 //! kd-trees: built, traced, merged and restored, against the host's.
 
-use super::common::corpus::{self, Mesh};
-use super::common::device;
-use super::common::shapes::{Corners, hard_rays, icosphere, placed, soup};
-use super::common::twins::{PLENTY, PLENTY_TO_MERGE};
 use super::meshes;
 use super::tracers::traced;
+use crate::common::corpus::{self, Mesh};
+use crate::common::device;
+use crate::common::shapes::{Corners, hard_rays, icosphere, placed, soup};
+use crate::common::twins::{PLENTY, PLENTY_TO_MERGE};
 use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
-use hedgerow::gpu::Buffer;
 use hedgerow::kdtree::builder::{self, Builder, Options};
-use hedgerow::kdtree::host::{self, Planes, marked};
 use hedgerow::kdtree::layout::{Header, KdTree};
 use hedgerow::kdtree::merge::{self, Memory, Merger, Most, Object, Report};
+use hedgerow::kdtree::twin;
 use hedgerow::trace::Query;
 use hedgerow::trace::kd::{Tracer, TreeEntry};
 use hedgerow::trace::kd_host::{self, Traversal};
+use hedgerow_lab::device::Buffer;
 
 const SCHEDULES: [Schedule; 2] = [Schedule::Chain, Schedule::Persistent];
 
@@ -24,9 +24,7 @@ fn with(schedule: Schedule) -> Options {
 }
 
 fn on_host((name, positions, triangles): &Mesh) -> KdTree {
-    let Options { bins, exact, costs, .. } = Options::DEFAULT;
-    let options = host::Options { planes: Planes::Mixed { bins, exact }, costs };
-    host::build(positions, triangles, &options).unwrap_or_else(|error| panic!("{name}: {error}"))
+    twin::builder::build(positions, triangles, &Options::DEFAULT).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 fn uploaded((_, positions, triangles): &Mesh) -> (Input, [Buffer<'static>; 2]) {
@@ -116,11 +114,11 @@ fn merge(still: &KdTree, objects: &[Corners], schedule: Schedule, pushed: bool) 
     let (mut given, mut marked) = (Vec::new(), Vec::new());
     for ((input, _), (tree, (_, positions, triangles))) in inputs.iter().zip(trees.iter().zip(&meshes)) {
         given.push(Object { input: *input, first_primitive, tree: pushed.then(|| tree.address()) });
-        marked.push(marked::Object { first_primitive, positions, triangles });
+        marked.push(twin::merge::Object { first_primitive, positions, triangles });
         first_primitive += triangles.len() as u32;
     }
     let builder::Options { bins, exact, costs, .. } = Options::DEFAULT;
-    let expected = marked::merge(&still, &marked, costs, (bins, exact)).expect("a merged tree");
+    let expected = twin::merge::merge(&still, &marked, costs, (bins, exact)).expect("a merged tree");
 
     let what = format!("{schedule}, pushed: {pushed}");
     let bytes = still.header.sizes().bytes;

@@ -1,16 +1,16 @@
 //! Acceleration structures by the calls of `VK_KHR_acceleration_structure`, and queries in shaders of others.
 
-use super::common::agree::{assert_agrees, assert_reports};
-use super::common::backends::{Backend, Built, Copies, Ours};
-use super::common::device;
-use super::common::probe::{ProbeRay, ask_kd_tree};
-use super::common::shapes::{Random, boxes, hard_rays, soup, tree_of};
-use super::common::world::{Part, World};
+use crate::common::agree::{assert_agrees, assert_reports};
+use crate::common::backends::{Backend, Built, Copies, Ours};
+use crate::common::device;
+use crate::common::probe::{ProbeRay, ask_kd_tree};
+use crate::common::shapes::{Random, boxes, hard_rays, soup, tree_of};
+use crate::common::world::{Part, World};
 use hedgerow::accel::{self, Instance, REBRAID};
 use hedgerow::ash::vk;
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow::kdtree::host;
 use hedgerow::trace::kd_host::{self, Traversal};
+use hedgerow_host::kdtree as host;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 use vk::CopyAccelerationStructureModeKHR as CopyMode;
 use vk::GeometryFlagsKHR as GeometryFlags;

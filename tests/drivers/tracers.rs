@@ -1,7 +1,7 @@
 //! Tracers of BVHs and of wide trees, cut in every way, against the host's; and wide trees as the device collapses them.
 
-use super::common::shapes::{hard_rays, icosphere, placed, soup, tree_of};
-use super::common::{self, device};
+use crate::common::device;
+use crate::common::shapes::{hard_rays, icosphere, placed, soup, tree_of};
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child};
 use hedgerow::bvh::wide::device::{OnDevice, Options};
@@ -36,7 +36,7 @@ pub fn traced(
     rays: &[Ray],
     record: impl FnOnce(&mut Recorder<'_>, &Buffers) -> hedgerow::Result<()>,
 ) -> Vec<(Hit, Work)> {
-    let (hits, work) = common::traced(device(), structure, rays, true, record).expect("the device traces");
+    let (hits, work) = crate::common::traced(device(), structure, rays, true, record).expect("the device traces");
     hits.into_iter().zip(work).collect()
 }
 

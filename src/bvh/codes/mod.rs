@@ -10,7 +10,7 @@
 //! (`sections.rs`). [`Plan`] is all of it for a given scene; `glsl/bvh/codes.glsl` cooks by the same one and gives the same bits
 //! on every device: no division, square root or contraction that a driver may round its own way is trusted.
 //!
-//! `docs/codes.md` compares them.
+//! `docs/notes/codes.md` compares them.
 
 mod axis;
 mod binning;

@@ -91,7 +91,8 @@ pub(super) fn finite(corners: [[f32; 3]; 3]) -> Corners {
 }
 
 /// Boxes that are not finite or hold nothing are left out.
-pub(crate) fn finite_box(b: &Aabb) -> Result<Aabb, u32> {
+#[doc(hidden)]
+pub fn finite_box(b: &Aabb) -> Result<Aabb, u32> {
     let finite = b.lo.iter().chain(&b.hi).all(|x| x.is_finite()) && (0..3).all(|i| b.lo[i] <= b.hi[i]);
     finite.then(|| Aabb { lo: b.lo.map(|x| x + 0.0), hi: b.hi.map(|x| x + 0.0) }).ok_or(status::NON_FINITE)
 }

@@ -16,7 +16,8 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], codes: Codes, colla
 }
 
 /// The corners of triangles, or why they are left out.
-pub(crate) fn corners(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> impl Iterator<Item = Corners> {
+#[doc(hidden)]
+pub fn corners(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> impl Iterator<Item = Corners> {
     triangles.iter().map(|triangle| {
         let vertex = |v: u32| positions.get(v as usize).copied().ok_or(status::INDEX_OUT_OF_RANGE);
         geometry::finite([vertex(triangle[0])?, vertex(triangle[1])?, vertex(triangle[2])?])

@@ -13,5 +13,3 @@ pub mod ploc;
 pub mod refit;
 mod reinsertion;
 pub mod split;
-#[cfg(feature = "cli")]
-pub mod sweep;

@@ -4,7 +4,8 @@ use crate::bvh::layout::{Aabb, Bvh2, Child, Node, Record};
 
 impl<R: Record> Bvh2<R> {
     /// The leaves in the order of their records.
-    pub(super) fn leaf_children(&self) -> Vec<Child> {
+    #[doc(hidden)]
+    pub fn leaf_children(&self) -> Vec<Child> {
         if self.header.active == 0 {
             return Vec::new();
         }
@@ -15,7 +16,8 @@ impl<R: Record> Bvh2<R> {
     }
 
     /// The same records and slots, no tree and no costs.
-    pub(super) fn without_nodes(&self) -> Bvh2<R> {
+    #[doc(hidden)]
+    pub fn without_nodes(&self) -> Bvh2<R> {
         let mut tree = Bvh2 { nodes: vec![Node::UNUSED; self.nodes.len()], ..self.clone() };
         tree.header.root = Child { lo: Aabb::EMPTY.lo, index: 0, hi: Aabb::EMPTY.hi, count: 0 };
         tree.header.inner_nodes = 0;

@@ -9,7 +9,7 @@
 //! kd-tree of its own ([`Object::tree`]), and that is pushed down the static one, many triangles at once.
 //!
 //! The structure needs room: [`Merger::room`] tells how much, [`KdTree::with_room`](super::layout::KdTree::with_room) or
-//! [`builder::Options::more`](super::builder::Options::more) make it. [`super::host::marked`] is the twin, `glsl/kdtree/merge.glsl`
+//! [`builder::Options::more`](super::builder::Options::more) make it. [`super::twin::merge`] is the twin, `glsl/kdtree/merge.glsl`
 //! the device's side.
 
 mod estimate;

@@ -1,0 +1,7 @@
+//! The tests of the library for C.
+
+#[cfg(unix)]
+mod c_program;
+mod device;
+mod header;
+mod null;

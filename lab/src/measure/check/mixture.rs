@@ -1,0 +1,150 @@
+//! Worlds for re-braiding, and their structures read back: instances of all kinds of parts by all kinds of transforms.
+#![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
+
+use super::backend::{Backend, Built, Ours};
+use super::shapes::{Corners, Random, add, icosphere, soup};
+use super::world::{BuiltWorld, Part, World};
+use ash::vk;
+use hedgerow::accel::{Instance, REBRAID, top_level};
+use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Child, Record, Triangle};
+use std::collections::BTreeMap;
+use vk::GeometryFlagsKHR as GeometryFlags;
+
+const NO_TRIANGLES: Corners = Corners::new();
+
+/// A part of triangles that are not opaque.
+pub fn part(corners: Corners) -> Part {
+    Part::Triangles(vec![(corners, GeometryFlags::empty())])
+}
+
+/// A row of `count` small triangles along the diagonal of the cube −1..1: nearly nothing in a large box.
+pub fn diagonal(count: usize) -> Corners {
+    let small = soup(count, 0.2 / count as f32, 5);
+    let middle = |t: &[[f32; 3]; 3]| t[0];
+    let at = |i: usize| 2.0 * (i as f32 + 0.5) / count as f32 - 1.0;
+    small
+        .iter()
+        .enumerate()
+        .map(|(i, t)| t.map(|corner| std::array::from_fn(|k| corner[k] - middle(t)[k] + at(i))))
+        .collect()
+}
+
+/// Scaled, with no turn, and moved.
+pub fn scaled(scale: f32, [x, y, z]: [f32; 3]) -> [[f32; 4]; 3] {
+    [[scale, 0.0, 0.0, x], [0.0, scale, 0.0, y], [0.0, 0.0, scale, z]]
+}
+
+/// Instances of all kinds of parts, by all kinds of transforms: turned, sheared, mirrored, flat ones and none.
+pub fn mixture(count: usize, seed: u64) -> World {
+    let mut random = Random(seed);
+    let a_box = |random: &mut Random| {
+        let (at, size) = (random.point(1.0), random.point(0.1).map(f32::abs));
+        [at, add(at, size)]
+    };
+    let boxes: Vec<[[f32; 3]; 2]> = (0..40).map(|_| a_box(&mut random)).collect();
+    let parts = vec![
+        part(diagonal(200)),
+        part(soup(100, 0.3, seed)),
+        part(icosphere(2)),
+        Part::Boxes(vec![(boxes, GeometryFlags::empty())]),
+        part(soup(1, 0.5, seed)),
+        part(NO_TRIANGLES),
+        part(vec![[[f32::NAN; 3]; 3]; 4]),
+        part(soup(2, 0.5, seed)),
+    ];
+    let instances = (0..count)
+        .map(|i| {
+            // Most are of the first parts; some name none.
+            let number = if i % 3 == 0 { random.bits() % (parts.len() as u64 + 1) } else { 1 + random.bits() % 4 };
+            let mut m: [[f32; 4]; 3] =
+                [(); 3].map(|()| [random.signed(), random.signed(), random.signed(), 9.0 * random.signed()]);
+            match i % 11 {
+                0 => m = scaled(random.signed(), random.point(5.0)),
+                // Of no thickness, and of no size at all.
+                5 => m[1] = [0.0, 0.0, 0.0, 1.0],
+                6 if i % 5 == 0 => m = [[0.0; 4]; 3],
+                7 if i % 5 == 0 => m[2][3] = f32::INFINITY,
+                8 => m = m.map(|row| row.map(|x| 1e-3 * x)),
+                _ => {}
+            }
+            Instance::new(number, m).with_index_and_mask(i as u32, random.bits() as u8)
+        })
+        .collect();
+    World { flags: REBRAID, ..World::new(parts, instances) }
+}
+
+/// The structures of a world, read back, and the instances as they were given.
+pub struct ReadBack {
+    /// The top level.
+    pub top: Bvh2<layout::Instance>,
+    /// The instances, with the addresses of their structures.
+    pub instances: Vec<Instance>,
+    /// Structures of triangles by their addresses.
+    pub triangles: BTreeMap<u64, Bvh2<Triangle>>,
+    boxes: BTreeMap<u64, Bvh2<BoxRecord>>,
+}
+
+impl ReadBack {
+    /// Builds a world and reads it.
+    ///
+    /// # Panics
+    /// What is read is no structure.
+    pub fn new(backend: &Ours, world: &World) -> ReadBack {
+        let BuiltWorld { top, parts, .. } = &world.build(backend);
+        let bytes = |built: &Built| built.memory.read::<u8>(built.bytes as usize);
+        let (mut triangles, mut boxes) = (BTreeMap::new(), BTreeMap::new());
+        for (part, built) in world.parts.iter().zip(parts) {
+            let (address, bytes) = (backend.address(built.structure), bytes(built));
+            match part {
+                Part::Triangles(_) => drop(triangles.insert(address, Bvh2::from_bytes(&bytes).expect("triangles"))),
+                Part::Boxes(_) => drop(boxes.insert(address, Bvh2::from_bytes(&bytes).expect("boxes"))),
+            }
+        }
+        let top = Bvh2::from_bytes(&bytes(top)).expect("a top level");
+        ReadBack { top, instances: world.placed(backend, parts), triangles, boxes }
+    }
+
+    /// What an instance points to.
+    pub fn below(&self, address: u64) -> Option<top_level::Below<'_>> {
+        let triangles = self.triangles.get(&address).map(top_level::Below::from);
+        triangles.or_else(|| self.boxes.get(&address).map(top_level::Below::from))
+    }
+
+    /// Where the entries of each instance begin.
+    pub fn entries(&self) -> BTreeMap<u32, Vec<[u32; 2]>> {
+        let mut all = BTreeMap::<u32, Vec<[u32; 2]>>::new();
+        for record in self.top.records.iter().filter(|record| record.structure != 0) {
+            all.entry(record.instance).or_default().push([record.start, record.start_count]);
+        }
+        all
+    }
+
+    /// How often the entries of an instance reach each record of its structure.
+    ///
+    /// # Panics
+    /// There is no structure for what has entries.
+    pub fn reached(&self, instance: u32, starts: &[[u32; 2]]) -> Vec<u32> {
+        let address = self.instances[instance as usize].structure;
+        match (self.triangles.get(&address), self.boxes.get(&address)) {
+            (Some(structure), _) => reached(structure, starts),
+            (_, Some(structure)) => reached(structure, starts),
+            _ => panic!("instance {instance} has entries and no structure"),
+        }
+    }
+}
+
+fn reached<R: Record>(structure: &Bvh2<R>, starts: &[[u32; 2]]) -> Vec<u32> {
+    let mut counts = vec![0; structure.header.active as usize];
+    let root = structure.header.root;
+    let begins =
+        |&start: &[u32; 2]| if start[1] == layout::Instance::AT_ROOT { [root.index, root.count] } else { start };
+    let mut waiting: Vec<[u32; 2]> = starts.iter().map(begins).collect();
+    while let Some([index, count]) = waiting.pop() {
+        match count {
+            0 => waiting
+                .extend(structure.nodes[index as usize].children.map(|Child { index, count, .. }| [index, count])),
+            _ => counts[index as usize..][..count as usize].iter_mut().for_each(|n| *n += 1),
+        }
+    }
+    counts
+}

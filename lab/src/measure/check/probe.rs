@@ -1,0 +1,195 @@
+//! What queries report, ray by ray: `lab/glsl/measure/probe.comp` in a pipeline of its own, as an engine would have it.
+#![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
+use crate::device::Device;
+use crate::shaders;
+use ash::vk;
+use hedgerow::gpu::Recorder;
+
+/// A ray with its flags, and how its candidates are decided on.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct ProbeRay {
+    pub origin: [f32; 3],
+    pub t_min: f32,
+    pub direction: [f32; 3],
+    pub t_max: f32,
+    pub flags: u32,
+    pub mask: u32,
+    pub decision: u32,
+    pub generated_t: f32,
+}
+
+pub const IGNORE: u32 = 0;
+pub const CONFIRM: u32 = 1;
+pub const CONFIRM_ODD: u32 = 2;
+pub const TERMINATE: u32 = 3;
+
+/// Ray flags, as SPIR-V numbers them.
+pub mod flags {
+    pub const NONE: u32 = 0;
+    pub const OPAQUE: u32 = 1;
+    pub const NO_OPAQUE: u32 = 2;
+    pub const FIRST_HIT: u32 = 4;
+    pub const CULL_BACK: u32 = 16;
+    pub const CULL_FRONT: u32 = 32;
+    pub const CULL_OPAQUE: u32 = 64;
+    pub const CULL_NO_OPAQUE: u32 = 128;
+    pub const SKIP_TRIANGLES: u32 = 256;
+    pub const SKIP_BOXES: u32 = 512;
+}
+
+impl ProbeRay {
+    /// From `origin` along `direction`, as far as it goes; candidates are confirmed.
+    pub fn new(origin: [f32; 3], direction: [f32; 3]) -> ProbeRay {
+        ProbeRay {
+            origin,
+            t_min: 0.0,
+            direction,
+            t_max: 1e30,
+            flags: flags::NONE,
+            mask: 0xff,
+            decision: CONFIRM,
+            generated_t: 1.0,
+        }
+    }
+}
+
+/// A hit that was committed. `kind` 0: none, 1: a triangle, 2: generated.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Meeting {
+    pub kind: u32,
+    pub t: f32,
+    pub instance: u32,
+    pub custom_index: u32,
+    pub offset: u32,
+    pub geometry: u32,
+    pub primitive: u32,
+    pub is_front: u32,
+    pub barycentrics: [f32; 2],
+    pub object_origin: [f32; 3],
+    pub object_direction: [f32; 3],
+    /// Column by column.
+    pub object_to_world: [[f32; 3]; 4],
+    pub world_to_object: [[f32; 3]; 4],
+}
+
+/// What a query said of a ray.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Report {
+    pub committed: Meeting,
+    pub t_min: f32,
+    pub flags: u32,
+    pub origin: [f32; 3],
+    pub direction: [f32; 3],
+    pub candidate_count: u32,
+    pub candidates: [[u32; 4]; 8],
+    pub opaque_boxes: u32,
+}
+
+impl Report {
+    /// The candidates in an order that does not depend on the tree.
+    pub fn sorted_candidates(&self) -> Vec<[u32; 4]> {
+        let mut all = self.candidates[..self.candidates.len().min(self.candidate_count as usize)].to_vec();
+        all.sort_unstable();
+        all
+    }
+}
+
+/// The push constants of `lab/glsl/measure/probe.comp`.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Push {
+    structure: u64,
+    rays: u64,
+    reports: u64,
+    count: u32,
+    padding: u32,
+}
+
+/// A pipeline of its own, and its layout: neither of them ours.
+pub struct Probe {
+    device: &'static Device,
+    layout: vk::PipelineLayout,
+    pipeline: vk::Pipeline,
+}
+
+impl Probe {
+    /// Bytes of push constants that any of its shaders takes.
+    const PUSH_BYTES: u32 = 40;
+
+    /// For our structures.
+    pub fn ours(device: &'static Device) -> Probe {
+        Probe::of(device, shaders::MEASURE_PROBE.spirv)
+    }
+
+    /// Of a shader with workgroups of 64 and at most 40 bytes of push constants.
+    ///
+    /// # Panics
+    /// The device does not take it.
+    pub fn of(device: &'static Device, spirv: &[u8]) -> Probe {
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).expect("SPIR-V");
+        let raw = device.ash_device();
+        let range =
+            [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(Self::PUSH_BYTES)];
+        // SAFETY: the words are a module that the compiler made, and everything lives as long as the probe.
+        unsafe {
+            let layout = raw
+                .create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&range), None)
+                .expect("a layout");
+            let module =
+                raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None).expect("a module");
+            let stage = vk::PipelineShaderStageCreateInfo::default()
+                .stage(vk::ShaderStageFlags::COMPUTE)
+                .module(module)
+                .name(c"main");
+            let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
+            let pipeline =
+                raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None).expect("a pipeline")[0];
+            raw.destroy_shader_module(module, None);
+            Probe { device, layout, pipeline }
+        }
+    }
+
+    /// What a query of every ray reports.
+    ///
+    /// # Panics
+    /// The device failed.
+    pub fn ask(&self, structure: u64, rays: &[ProbeRay]) -> Vec<Report> {
+        let ray_buffer = self.device.upload("rays", rays).expect("memory");
+        let reports = self.device.buffer("reports", size_of::<Report>() as u64 * rays.len() as u64).expect("memory");
+        let count = rays.len() as u32;
+        let push = Push { structure, rays: ray_buffer.address(), reports: reports.address(), count, padding: 0 };
+        self.dispatch(bytemuck::bytes_of(&push), count);
+        reports.read(rays.len())
+    }
+
+    /// One invocation for each of `count` rays.
+    ///
+    /// # Panics
+    /// The device failed.
+    pub fn dispatch(&self, push: &[u8], count: u32) {
+        let record = |recorder: &mut Recorder<'_>| {
+            let (raw, commands) = (self.device.ash_device(), recorder.commands());
+            // SAFETY: the command buffer is being recorded, and the pipeline outlives the submit, which waits.
+            unsafe {
+                raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, self.pipeline);
+                raw.cmd_push_constants(commands, self.layout, vk::ShaderStageFlags::COMPUTE, 0, push);
+                raw.cmd_dispatch(commands, count.div_ceil(64), 1, 1);
+            }
+            Ok(())
+        };
+        self.device.run(None, record).expect("it traces");
+    }
+}
+
+impl Drop for Probe {
+    fn drop(&mut self) {
+        // SAFETY: every submit has been waited for.
+        unsafe {
+            self.device.ash_device().destroy_pipeline(self.pipeline, None);
+            self.device.ash_device().destroy_pipeline_layout(self.layout, None);
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! A tree from both sides: built on the device, and by the twins on the host with the same options; and room enough for any.
+
+use super::cases::Found;
+use super::corpus::Mesh;
+use crate::device::Device;
+use hedgerow::bvh::builder::{Builder, Input, Method, Options, Window};
+use hedgerow::bvh::host;
+use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::kdtree::builder::Estimate;
+use hedgerow::kdtree::merge;
+
+/// Room for kd-trees of scenes where most triangles straddle most planes.
+pub const PLENTY: Estimate = Estimate {
+    level_references: 20.0,
+    level_nodes: 20.0,
+    subtree_nodes: 20.0,
+    cut_references: 20.0,
+    subtree_references: 20.0,
+    subtrees: 20.0,
+};
+
+/// Room for objects that lie in the densest part of a kd-tree.
+pub const PLENTY_TO_MERGE: merge::Estimate = merge::Estimate {
+    pairs: 60.0,
+    items: 20.0,
+    marked: 40.0,
+    build: Estimate {
+        level_references: 200.0,
+        level_nodes: 60.0,
+        subtree_nodes: 200.0,
+        cut_references: 400.0,
+        subtree_references: 400.0,
+        subtrees: 60.0,
+    },
+};
+
+/// The device's tree over `input`.
+///
+/// # Panics
+/// The device failed, or left bytes that belong to no part of a tree.
+pub fn built(device: &Device, options: &Options, input: &Input) -> Bvh2 {
+    let builder = Builder::new(device, options, input.primitive_count).expect("few enough primitives");
+    let sizes = builder.sizes();
+    let structure = device.buffer("structure", sizes.structure).expect("memory");
+    let scratch = device.buffer("scratch", sizes.scratch).expect("memory");
+    // Whatever was there before changes nothing.
+    structure.write(&vec![0x5Au8; sizes.structure as usize]);
+    scratch.write(&vec![0xA5u8; sizes.scratch as usize]);
+    device.run(None, |r| builder.record(r, input, structure.address(), scratch.address())).expect("it builds");
+    let bytes = structure.read::<u8>(sizes.structure as usize);
+    let tree = Bvh2::from_bytes(&bytes).expect("a structure");
+    assert!(tree.to_bytes() == bytes, "bytes that belong to no part");
+    tree
+}
+
+/// The device's tree of a mesh.
+///
+/// # Panics
+/// As [`built`].
+pub fn on_device(device: &Device, (_, positions, triangles): &Mesh, options: &Options) -> Bvh2 {
+    let vertices = device.upload("positions", positions).expect("memory");
+    let indices = device.upload("indices", triangles).expect("memory");
+    let (corners, count) = (positions.len() as u32, triangles.len() as u32);
+    built(device, options, &Input::mesh(vertices.address(), corners, indices.address(), count))
+}
+
+/// What [`on_device`] must equal, byte for byte. The options name the codes.
+///
+/// # Panics
+/// They do not.
+pub fn on_host((_, positions, triangles): &Mesh, options: &Options) -> Bvh2 {
+    let codes = options.codes.expect("codes are named");
+    let lbvh = |collapse| match &options.split {
+        None => host::lbvh::build(positions, triangles, codes, collapse),
+        Some(split) => host::split::build(positions, triangles, split, codes, collapse),
+    };
+    if options.method == Method::Lbvh && options.optimise.is_none() {
+        // Its own collapsing leaves other bytes in slots that fall out.
+        return lbvh(options.collapse);
+    }
+    let radix = lbvh(Collapse::OFF);
+    let tree = match options.method {
+        Method::Lbvh => radix,
+        Method::Hlbvh(treelets) => {
+            let bits = treelets.bits(codes, radix.header.primitive_count);
+            host::hlbvh::build(&radix, codes, host::hlbvh::Treelets { bits, primitives: treelets.primitives })
+        }
+        Method::Ploc { radius } => host::ploc::build(&radix, radius as usize),
+        Method::Hploc(Window { size, radius }) => {
+            host::hploc::build(&radix, host::hploc::Window { size: size as usize, radius: radius as usize })
+        }
+    };
+    let tree = match &options.optimise {
+        None => tree,
+        Some(optimise) => tree.reinserted(optimise),
+    };
+    tree.collapsed(&options.collapse)
+}
+
+/// Nothing if the bytes are the same; otherwise what differs first.
+///
+/// # Errors
+/// They differ.
+pub fn compare(got: &Bvh2, expected: &Bvh2) -> Found {
+    if got.to_bytes() == expected.to_bytes() {
+        return Ok(());
+    }
+    if got.header != expected.header {
+        return Err(format!("header {:?}, expected {:?}", got.header, expected.header).into());
+    }
+    let records = got.records.iter().zip(&expected.records);
+    if let Some((i, (got, expected))) = records.enumerate().find(|(_, (a, b))| a != b) {
+        return Err(format!("record {i}: {got:?}, expected {expected:?}").into());
+    }
+    let nodes = got.nodes.iter().zip(&expected.nodes);
+    if let Some((i, (got, expected))) = nodes.enumerate().find(|(_, (a, b))| a != b) {
+        return Err(format!("node {i}: {got:?}, expected {expected:?}").into());
+    }
+    Err("other bytes".to_owned().into())
+}

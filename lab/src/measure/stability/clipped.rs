@@ -1,0 +1,85 @@
+//! The SAH cost of a tree as seen from a part of its scene: boxes are clipped to it, and areas are over its own.
+//!
+//! What rays of that part meet. Nodes over the whole of a scene that has grown count as one of the part's size, not as
+//! everything there is, and so a tree is compared with one over the part alone.
+
+use hedgerow::bvh::layout::{Aabb, Bvh2, Record};
+
+/// (c_T · Σ SA(inner) + c_I · Σ SA(leaf)·n_leaf) / SA(`part`), of boxes clipped to `part`; `None` where that has no area.
+pub fn cost<R: Record>(tree: &Bvh2<R>, part: &Aabb, c_t: f64, c_i: f64) -> Option<f64> {
+    let whole = clipped_half_area(part, part);
+    if whole.is_nan() || whole <= 0.0 {
+        return None;
+    }
+    let mut cost = 0.0;
+    let mut below = if tree.header.active == 0 { vec![] } else { vec![tree.header.root] };
+    while let Some(child) = below.pop() {
+        let area = clipped_half_area(&child.bounds(), part);
+        if child.is_leaf() {
+            cost += c_i * area * f64::from(child.count);
+        } else {
+            cost += c_t * area;
+            below.extend(tree.nodes[child.index as usize].children);
+        }
+    }
+    Some(cost / whole)
+}
+
+/// Half the surface area of what `b` and `part` share; 0 where they are apart.
+fn clipped_half_area(b: &Aabb, part: &Aabb) -> f64 {
+    let [x, y, z]: [f64; 3] =
+        std::array::from_fn(|i| f64::from(b.hi[i].min(part.hi[i])) - f64::from(b.lo[i].max(part.lo[i])));
+    if x < 0.0 || y < 0.0 || z < 0.0 { 0.0 } else { x * y + y * z + z * x }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hedgerow::bvh::codes::Code;
+    use hedgerow::bvh::host::lbvh;
+    use hedgerow::bvh::quality;
+    use hedgerow::bvh::sah::Collapse;
+
+    /// One triangle in each box, alone in its leaf.
+    fn tree(boxes: &[[[f32; 3]; 2]]) -> Bvh2 {
+        let positions: Vec<[f32; 3]> = boxes.iter().flat_map(|&[lo, hi]| [lo, hi, [hi[0], lo[1], hi[2]]]).collect();
+        let triangles: Vec<[u32; 3]> = (0..boxes.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        lbvh::build(&positions, &triangles, Code::Mc63.full(), Collapse::OFF)
+    }
+
+    #[test]
+    fn without_anything_outside_it_is_the_plain_cost() {
+        let tree =
+            tree(&[[[0.0; 3], [1.0; 3]], [[3.0, 0.0, 0.0], [4.0, 1.0, 1.0]], [[0.0, 5.0, 0.0], [1.0, 6.0, 2.0]]]);
+        let plain = quality::on_host(&tree, 3.0, 2.0).sah;
+        let clipped = cost(&tree, &tree.header.root.bounds(), 3.0, 2.0).expect("an area");
+        assert!((clipped - plain).abs() < 1e-12 * plain, "{clipped} {plain}");
+    }
+
+    #[test]
+    fn boxes_are_clipped_and_what_is_outside_costs_nothing() {
+        // Two unit boxes in the part, 2 × 1 × 1; one far away to the right, and one that reaches from inside to far above.
+        let part = Aabb { lo: [0.0; 3], hi: [2.0, 1.0, 1.0] };
+        let near = [[0.0; 3], [1.0; 3]];
+        let next = [[1.0, 0.0, 0.0], [2.0, 1.0, 1.0]];
+        let far = [[1e6, 0.0, 0.0], [1e6 + 1.0, 1.0, 1.0]];
+        // Half areas: of the part 2 + 1 + 2 = 5, of a unit box 3.
+        let two = cost(&tree(&[near, next]), &part, 3.0, 2.0).expect("an area");
+        assert_eq!(two, (3.0 * 5.0 + 2.0 * (3.0 + 3.0)) / 5.0);
+        // The root over all is clipped to the part and a node over the two is the part; the far leaf costs nothing.
+        let three = cost(&tree(&[near, next, far]), &part, 3.0, 2.0).expect("an area");
+        assert_eq!(three, (3.0 * (5.0 + 5.0) + 2.0 * (3.0 + 3.0)) / 5.0);
+        // Inside the part it is 1 × ½ × 1, half area 2.
+        let tall = [[0.0, 0.5, 0.0], [1.0, 1e6, 1.0]];
+        let one = cost(&tree(&[tall]), &part, 3.0, 2.0).expect("an area");
+        assert_eq!(one, 2.0 * 2.0 / 5.0);
+        assert_eq!(cost(&tree(&[far]), &part, 3.0, 2.0), Some(0.0));
+    }
+
+    #[test]
+    fn a_part_without_area_has_no_cost_and_an_empty_tree_none_to_speak_of() {
+        let point = Aabb { lo: [1.0; 3], hi: [1.0; 3] };
+        assert_eq!(cost(&tree(&[[[0.0; 3], [1.0; 3]]]), &point, 3.0, 2.0), None);
+        assert_eq!(cost(&tree(&[]), &Aabb { lo: [0.0; 3], hi: [1.0; 3] }, 3.0, 2.0), Some(0.0));
+    }
+}

@@ -1,0 +1,364 @@
+//! The kinds of rays that are measured (CONTRACT, "Ray kinds"): made from a scene, the same on every machine and with any
+//! number of threads.
+//!
+//! Every ray draws its random numbers from a sequence of its own, seeded with the kind and the ray's place. No library
+//! function whose last bit differs between systems takes part (points on the sphere by rejection, square roots only).
+
+use crate::scene::{Camera, Light, Mesh, Scene};
+use crate::{Error, Result};
+use glam::{DVec3, Vec3};
+use hedgerow::bvh::layout::Aabb;
+use hedgerow::trace::{Hit, Query, Ray};
+use rayon::prelude::*;
+use std::fmt;
+use std::str::FromStr;
+
+/// A kind of ray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum RayKind {
+    /// Pinhole camera, through each pixel's centre, row by row from the top.
+    Primary,
+    /// From each primary hit to a point on each light, any-hit.
+    Shadow,
+    /// Four cosine-weighted any-hit rays a primary hit, 10% of the scene's diagonal long.
+    Ao,
+    /// One cosine-weighted closest-hit ray from each primary hit.
+    Diffuse1,
+    /// One cosine-weighted closest-hit ray from each hit of `Diffuse1`.
+    Diffuse2,
+    /// Mirror direction at each primary hit, closest-hit.
+    Reflection,
+    /// Both ends uniform on the sphere around the scene's box, closest-hit.
+    Random,
+}
+
+impl RayKind {
+    /// All kinds, in the order of the contract.
+    pub const ALL: [RayKind; 7] = [
+        RayKind::Primary,
+        RayKind::Shadow,
+        RayKind::Ao,
+        RayKind::Diffuse1,
+        RayKind::Diffuse2,
+        RayKind::Reflection,
+        RayKind::Random,
+    ];
+
+    /// The name that commands and records use.
+    pub fn name(self) -> &'static str {
+        match self {
+            RayKind::Primary => "primary",
+            RayKind::Shadow => "shadow",
+            RayKind::Ao => "ao",
+            RayKind::Diffuse1 => "diffuse1",
+            RayKind::Diffuse2 => "diffuse2",
+            RayKind::Reflection => "reflection",
+            RayKind::Random => "random",
+        }
+    }
+
+    /// Which hit its rays want.
+    pub fn query(self) -> Query {
+        match self {
+            RayKind::Shadow | RayKind::Ao => Query::AnyHit,
+            _ => Query::ClosestHit,
+        }
+    }
+}
+
+impl fmt::Display for RayKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for RayKind {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<RayKind> {
+        RayKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
+            let names = RayKind::ALL.map(RayKind::name).join(", ");
+            Error::Argument(format!("no kind of ray is called {name:?}; there are {names}"))
+        })
+    }
+}
+
+/// How many rays, and which of the many random ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RayOptions {
+    /// Pixels in x and y. `Primary` and `Random` make a ray for each pixel; the other kinds start where rays have hit, so
+    /// their number follows from the hits.
+    pub size: [u32; 2],
+    /// Another seed gives other rays of the same kinds.
+    pub seed: u64,
+}
+
+/// Rays that leave a primary hit to find out how open it is.
+const AO_RAYS: u64 = 4;
+/// Their length, and the edge of the light that a scene without one gets, in diagonals of the scene's box.
+const TENTH: f32 = 0.1;
+/// How far up the shadow ray its light is: a lamp's own triangles shall not hide it.
+const AT_LIGHT: f32 = 0.9999;
+
+/// The rays of one kind. `closest_hits` traces the rays that they follow from, one hit a ray.
+///
+/// # Errors
+/// Those of `closest_hits`; an image without pixels or with more than 2^27; a scene without triangles.
+pub fn generate(
+    kind: RayKind,
+    scene: &Scene,
+    options: &RayOptions,
+    closest_hits: &mut dyn FnMut(&[Ray]) -> Result<Vec<Hit>>,
+) -> Result<Vec<Ray>> {
+    let [width, height] = options.size.map(u64::from);
+    if width * height == 0 || width * height > hedgerow::trace::MAX_RAYS.into() {
+        return Err(Error::Argument(format!(
+            "an image of {width}x{height} pixels has no rays or too many; take a size from 1x1 to 2^27 pixels"
+        )));
+    }
+    let bounds = scene.mesh.bounds();
+    if scene.mesh.triangles.is_empty() {
+        return Err(Error::Scene(format!("{}: no triangles, so there is nothing to send rays to", scene.name)));
+    }
+    let draw = |item: usize| Random::new(options.seed, kind, item as u64);
+    let primary = || primary(&scene.camera, options.size);
+    Ok(match kind {
+        RayKind::Primary => primary(),
+        RayKind::Random => random(&bounds, (width * height) as usize, draw),
+        RayKind::Shadow => {
+            let lights = lights_of(scene, &bounds);
+            from_each(&surfaces_hit(scene, &primary(), closest_hits)?, draw, |surface, random| {
+                lights.iter().map(|light| surface.towards(light, random)).collect()
+            })
+        }
+        RayKind::Ao => {
+            let length = TENTH * bounds.diagonal();
+            from_each(&surfaces_hit(scene, &primary(), closest_hits)?, draw, |surface, random| {
+                (0..AO_RAYS)
+                    .map(|_| Ray { t_max: length, ..surface.leave(random.cosine_weighted(surface.normal)) })
+                    .collect()
+            })
+        }
+        RayKind::Diffuse1 => diffuse1(scene, options, &primary(), closest_hits)?,
+        RayKind::Diffuse2 => {
+            let rays = diffuse1(scene, options, &primary(), closest_hits)?;
+            from_each(&surfaces_hit(scene, &rays, closest_hits)?, draw, |surface, random| {
+                vec![surface.leave(random.cosine_weighted(surface.normal))]
+            })
+        }
+        RayKind::Reflection => from_each(&surfaces_hit(scene, &primary(), closest_hits)?, draw, |surface, _| {
+            vec![surface.leave(surface.mirrored())]
+        }),
+    })
+}
+
+/// Where the pixels of a picture lie in space.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Frame {
+    /// Where the camera is.
+    pub eye: DVec3,
+    /// Three directions at right angles, of unit length.
+    pub forward: DVec3,
+    /// See `forward`.
+    pub right: DVec3,
+    /// See `forward`.
+    pub up: DVec3,
+    /// Half the width and half the height of the picture, at a distance of 1.
+    pub half: [f64; 2],
+}
+
+impl Frame {
+    /// Of a picture with so many pixels in x and y.
+    pub fn of(camera: &Camera, [width, height]: [u32; 2]) -> Frame {
+        let eye = dvec3(camera.eye);
+        let forward = (dvec3(camera.look) - eye).normalize_or(DVec3::NEG_Z);
+        // A camera that looks straight up has no right; any direction across will do.
+        let right = forward.cross(dvec3(camera.up)).try_normalize().unwrap_or(forward.any_orthonormal_vector());
+        let up = right.cross(forward);
+        let half_height = (f64::from(camera.fov).to_radians() / 2.0).tan();
+        let half_width = half_height * f64::from(width) / f64::from(height);
+        Frame { eye, forward, right, up, half: [half_width, half_height] }
+    }
+}
+
+fn primary(camera: &Camera, [width, height]: [u32; 2]) -> Vec<Ray> {
+    let Frame { forward, right, up, half: [half_width, half_height], .. } = Frame::of(camera, [width, height]);
+    (0..width as usize * height as usize)
+        .into_par_iter()
+        .map(|pixel| {
+            let (column, row) = (pixel % width as usize, pixel / width as usize);
+            let x = ((column as f64 + 0.5) / f64::from(width) * 2.0 - 1.0) * half_width;
+            let y = (1.0 - (row as f64 + 0.5) / f64::from(height) * 2.0) * half_height;
+            let direction = (forward + right * x + up * y).normalize();
+            Ray { origin: camera.eye, t_min: 0.0, direction: array(direction), t_max: f32::INFINITY }
+        })
+        .collect()
+}
+
+fn random(bounds: &Aabb, count: usize, draw: impl Fn(usize) -> Random + Sync) -> Vec<Ray> {
+    let centre = dvec3(bounds.centroid());
+    let radius = f64::from(bounds.diagonal()) / 2.0;
+    (0..count)
+        .into_par_iter()
+        .map(|i| {
+            let mut random = draw(i);
+            let [from, to] = [(); 2].map(|()| (centre + random.on_sphere() * radius).as_vec3());
+            Ray { origin: from.to_array(), t_min: 0.0, direction: (to - from).to_array(), t_max: 1.0 }
+        })
+        .collect()
+}
+
+fn diffuse1(
+    scene: &Scene,
+    options: &RayOptions,
+    primary: &[Ray],
+    closest_hits: &mut dyn FnMut(&[Ray]) -> Result<Vec<Hit>>,
+) -> Result<Vec<Ray>> {
+    let draw = |item: usize| Random::new(options.seed, RayKind::Diffuse1, item as u64);
+    Ok(from_each(&surfaces_hit(scene, primary, closest_hits)?, draw, |surface, random| {
+        vec![surface.leave(random.cosine_weighted(surface.normal))]
+    }))
+}
+
+/// The rays that `make` sends from each surface, in the order of the surfaces.
+fn from_each(
+    surfaces: &[Surface],
+    draw: impl Fn(usize) -> Random + Sync,
+    make: impl Fn(&Surface, &mut Random) -> Vec<Ray> + Sync,
+) -> Vec<Ray> {
+    surfaces.par_iter().enumerate().flat_map_iter(|(i, surface)| make(surface, &mut draw(i))).collect()
+}
+
+/// Lights of the scene, or one square above its box.
+fn lights_of(scene: &Scene, bounds: &Aabb) -> Vec<Light> {
+    if !scene.lights.is_empty() {
+        return scene.lights.clone();
+    }
+    let up = (0..3).max_by(|&i, &j| scene.camera.up[i].abs().total_cmp(&scene.camera.up[j].abs())).unwrap_or(1);
+    let (x, y) = ((up + 1) % 3, (up + 2) % 3);
+    let edge = TENTH * bounds.diagonal();
+    let mut corner = bounds.centroid();
+    corner[x] -= edge / 2.0;
+    corner[y] -= edge / 2.0;
+    corner[up] = if scene.camera.up[up] < 0.0 { bounds.lo[up] - edge } else { bounds.hi[up] + edge };
+    let mut edges = [[0.0; 3]; 2];
+    edges[0][x] = edge;
+    edges[1][y] = edge;
+    vec![Light { corner, edges }]
+}
+
+/// Where a ray met a surface.
+struct Surface {
+    /// Geometric normal of unit length, on the side that the ray came from.
+    normal: DVec3,
+    /// The ray's direction, of unit length.
+    incoming: DVec3,
+    /// Where rays start that leave it.
+    origin: Vec3,
+}
+
+fn surfaces_hit(
+    scene: &Scene,
+    rays: &[Ray],
+    closest_hits: &mut dyn FnMut(&[Ray]) -> Result<Vec<Hit>>,
+) -> Result<Vec<Surface>> {
+    let hits = closest_hits(rays)?;
+    Ok(rays
+        .par_iter()
+        .zip(&hits)
+        .filter(|(_, hit)| hit.is_some())
+        .map(|(ray, hit)| Surface::at(&scene.mesh, ray, hit))
+        .collect())
+}
+
+impl Surface {
+    fn at(mesh: &Mesh, ray: &Ray, hit: &Hit) -> Surface {
+        let corners = mesh.corners(hit.primitive as usize).map(dvec3);
+        let [a, b, c] = corners;
+        let incoming = dvec3(ray.direction).normalize_or(DVec3::NEG_Z);
+        let normal = (b - a).cross(c - a).normalize_or(-incoming);
+        let normal = if normal.dot(incoming) > 0.0 { -normal } else { normal };
+        // From the corners, not along the ray: the error is that of the corners' coordinates, however long the ray.
+        let point = a + (b - a) * f64::from(hit.u) + (c - a) * f64::from(hit.v);
+        Surface { normal, incoming, origin: moved_off(point, normal, corners).as_vec3() }
+    }
+
+    /// A ray from here.
+    fn leave(&self, direction: DVec3) -> Ray {
+        Ray { origin: self.origin.to_array(), t_min: 0.0, direction: array(direction), t_max: f32::INFINITY }
+    }
+
+    fn towards(&self, light: &Light, random: &mut Random) -> Ray {
+        let [first, second] = light.edges.map(dvec3);
+        let target = dvec3(light.corner) + first * random.unit() + second * random.unit();
+        Ray { t_max: AT_LIGHT, ..self.leave(target - self.origin.as_dvec3()) }
+    }
+
+    fn mirrored(&self) -> DVec3 {
+        self.incoming - self.normal * (2.0 * self.normal.dot(self.incoming))
+    }
+}
+
+/// `point` moved along `normal` so far that a ray from there does not meet the triangle again.
+///
+/// As Wächter and Binder ("A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems, 2019, chapter 6) the
+/// length goes with the unit in the last place of the coordinates, in each axis as much as the normal points there. They
+/// take 256 units and a fixed length near the origin, where units vanish; in its place the triangle's size counts here, as
+/// the rounding of a triangle test goes with that, so that a scene may have any scale.
+fn moved_off(point: DVec3, normal: DVec3, corners: [DVec3; 3]) -> DVec3 {
+    const UNITS: f64 = 128.0 / (1 << 24) as f64;
+    let magnitude = corners.iter().fold(DVec3::ZERO, |m, corner| m.max(corner.abs()));
+    let size = corners.iter().fold(0f64, |m, corner| m.max((*corner - point).abs().max_element()));
+    point + normal * (UNITS * (normal.abs().dot(magnitude) + size))
+}
+
+fn dvec3(v: [f32; 3]) -> DVec3 {
+    Vec3::from_array(v).as_dvec3()
+}
+
+fn array(v: DVec3) -> [f32; 3] {
+    v.as_vec3().to_array()
+}
+
+/// SplitMix64 (Steele, Lea, Flood 2014), one sequence an item.
+struct Random(u64);
+
+impl Random {
+    fn new(seed: u64, kind: RayKind, item: u64) -> Random {
+        let mut kinds = Random(seed);
+        let mut items = Random(kinds.bits() ^ kind as u64);
+        Random(items.bits() ^ item.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(32))
+    }
+
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ z >> 31
+    }
+
+    /// Uniform in [0, 1).
+    fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 * (-53f64).exp2()
+    }
+
+    fn on_sphere(&mut self) -> DVec3 {
+        loop {
+            let p = DVec3::from_array([(); 3].map(|()| 2.0 * self.unit() - 1.0));
+            if (1e-6..=1.0).contains(&p.length_squared()) {
+                return p.normalize();
+            }
+        }
+    }
+
+    /// A direction whose density goes with the cosine to `normal`: the normal's end moved to a point of the sphere there.
+    fn cosine_weighted(&mut self, normal: DVec3) -> DVec3 {
+        loop {
+            let direction = normal + self.on_sphere();
+            if direction.length_squared() > 1e-8 {
+                return direction.normalize();
+            }
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! Rays that are measured, and files of rays and hits.
+
+pub mod files;
+pub mod kinds;

@@ -1,0 +1,5 @@
+//! The laboratory's shaders, from the table that `build.rs` writes.
+
+use hedgerow::gpu::shaders::Shader;
+
+include!(concat!(env!("OUT_DIR"), "/shaders.rs"));

@@ -1,0 +1,119 @@
+//! `hedgerow accel`: the records and the page that it leaves, how `hedgerow bench` finds them, and what is refused.
+
+use hedgerow_lab::measure::experiments::points::{Entry, Maker, Way};
+use hedgerow_lab::report::accel;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn hedgerow(arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
+    command.args(arguments).env_remove("HEDGEROW_SCENES").output().expect("the binary starts")
+}
+
+/// Every experiment, as small as it goes: seconds.
+fn tiny(folder: &Path, more: &[&str]) -> Output {
+    let output = folder.to_str().expect("a temporary folder's name is text");
+    let arguments =
+        ["accel", "--runs", "2", "--size", "16x12", "--structures", "32", "--instances", "200", "-o", output];
+    hedgerow(&[&arguments, more].concat())
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_run_leaves_records_of_every_experiment_and_a_page_of_them() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let done = tiny(folder.path(), &["gen:forest:9", "gen:twist:400:5", "--frames", "3"]);
+    assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+    let page = folder.path().join("accel.html");
+    assert_eq!(String::from_utf8_lossy(&done.stdout).trim(), page.display().to_string());
+    let entries = accel::read(folder.path()).expect("records");
+    assert!(matches!(&entries[0], Entry::Setting(setting) if setting.command.starts_with("hedgerow accel")));
+    let is_ours = |maker: Maker| maker == Maker::Ours;
+    let (mut batches, mut top_levels, mut frames, mut rebraids) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    for entry in &entries {
+        match entry {
+            Entry::Batch(point) if point.maker.is_none_or(is_ours) => batches.push((point.structures, point.way)),
+            Entry::Tlas(point) if is_ours(point.maker) => top_levels.push(point.instances),
+            Entry::Rebraid(point) => {
+                rebraids += 1;
+                assert_eq!((point.scene.as_str(), point.instances, point.parts), ("gen:forest:9", 9, 3));
+                assert_eq!((point.off.entries, point.on.entries.is_some_and(|n| n > 9)), (Some(9), true), "{point:?}");
+                assert!(point.rays.iter().all(|rays| rays.different == 0 && rays.gain.runs == 2), "{point:?}");
+                assert!(point.overlaps > 1.0 && point.rays[0].off_work.instances > 0.0, "{point:?}");
+            }
+            Entry::Update(point) if is_ours(point.maker) => {
+                assert!(point.built_sah.is_some_and(|sah| sah > 1.0), "{point:?}");
+                // Together or not at all.
+                assert_eq!(point.growth.is_some(), point.update_ms.is_some(), "{point:?}");
+                assert_eq!(point.growth.is_some(), point.rays[0].slowdown.is_some(), "{point:?}");
+                frames.push(point.frame);
+            }
+            Entry::Failure(failure) => panic!("{failure:?}"),
+            _ => {}
+        }
+    }
+    let ways = [Way::OneCall, Way::OneSubmit, Way::SubmitEach, Way::EmptySubmits];
+    assert_eq!(batches, [2, 32].map(|count| ways.map(|way| (count, way))).concat());
+    assert_eq!((top_levels, frames, rebraids), (vec![100, 200], vec![0, 2, 4], 1));
+
+    let page = std::fs::read_to_string(page).expect("written");
+    for id in ["batches", "tlas", "rebraid", "updates", "method"] {
+        assert!(page.contains(&format!("<section id=\"{id}\">")), "{id}");
+    }
+    for chart in ["accel-batch", "accel-tlas", "accel-rebraid-gen-forest-9", "accel-update-gen-twist-400-5"] {
+        for ending in ["svg", "png"] {
+            assert!(folder.path().join(format!("charts/{chart}.{ending}")).is_file(), "{chart}.{ending}");
+        }
+    }
+    assert!(!page.contains("index.html"), "there is no page of `hedgerow bench`");
+
+    // A benchmark into the same folder finds it, and the pages name each other.
+    let output = folder.path().to_str().expect("text");
+    let bench =
+        ["bench", "gen:icosphere:1", "-b", "lbvh-host", "--runs", "1", "--size", "8x8", "--no-pictures", "-o", output];
+    let done = hedgerow(&bench);
+    assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("written");
+    assert!(read("index.html").contains("href=\"accel.html\""));
+    assert!(read("accel.html").contains("href=\"index.html\""));
+}
+
+#[test]
+fn one_experiment_is_measured_alone() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let done = tiny(folder.path(), &["--experiments", "tlas"]);
+    assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+    let entries = accel::read(folder.path()).expect("records");
+    assert!(entries[1..].iter().all(|entry| matches!(entry, Entry::Tlas(_))) && entries.len() > 2, "{entries:?}");
+}
+
+#[test]
+fn wrong_arguments_are_told_apart_from_failed_work() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (wrong, says) in [
+        (&["--experiments", "hedge"][..], "no experiment is called \"hedge\"; there are batch, tlas, rebraid, update"),
+        (&["--rays", "light"], "no kind of ray is called \"light\""),
+        (&["--runs", "0"], "--runs"),
+        (&["--structures", "0"], "--structures"),
+        (&["--size", "640"], "write WxH"),
+        (&["gen:forest:x"], "not the arguments of this generator"),
+        (&["gen:icosphere:2"], "neither instances nor an animation; take an .inst or .anim file"),
+    ] {
+        let output = folder.path().to_str().expect("text");
+        let done = hedgerow(&[&["accel", "-o", output], wrong].concat());
+        assert_eq!(done.status.code(), Some(2), "{wrong:?}: {}", err(&done));
+        assert!(err(&done).contains(says), "{wrong:?}: {}", err(&done));
+    }
+    assert_eq!(hedgerow(&["accel"]).status.code(), Some(2), "-o is missing");
+    let done = tiny(folder.path(), &["no-such-scene"]);
+    assert_eq!(done.status.code(), Some(1));
+    assert!(err(&done).contains("no-such-scene"), "{}", err(&done));
+    let file = folder.path().join("file");
+    std::fs::write(&file, "in the way").expect("written");
+    let done = tiny(&file.join("below"), &["--experiments", "tlas"]);
+    assert_eq!(done.status.code(), Some(1));
+    assert!(err(&done).contains("below") && err(&done).contains("check the path"), "{}", err(&done));
+}

@@ -1,0 +1,27 @@
+//! The tests of the laboratory.
+
+#[path = "../../../tests/common/mod.rs"]
+mod common;
+#[path = "../files.rs"]
+mod files;
+
+mod accel_command;
+mod animate;
+mod bench;
+mod check;
+mod cpu_peers;
+mod gpu_division;
+mod gpu_task_pool;
+mod measure_copy;
+mod scene_dynamic;
+mod scene_files;
+mod scene_generators;
+mod scene_gltf;
+mod scene_inst;
+mod scene_instances;
+mod scene_obj;
+mod scene_own;
+mod scene_ply;
+mod shards;
+mod stability_command;
+mod trace_kinds;

@@ -1,0 +1,109 @@
+//! `hedgerow bench --shard I/N` and `hedgerow report`: shares joined are the whole, and devices stay apart.
+
+use hedgerow_lab::measure::record::Record;
+use hedgerow_lab::report::results;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+
+const SCENES: [&str; 6] =
+    ["gen:icosphere:1", "gen:soup:700:1", "gen:stadium:2", "gen:grid:9", "gen:needles:300:2", "gen:icosphere:2"];
+
+fn started(arguments: &[&str]) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
+    command.args(arguments).env_remove("HEDGEROW_SCENES").stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().expect("the binary starts")
+}
+
+fn ended(child: Child) -> Output {
+    child.wait_with_output().expect("the binary ends")
+}
+
+/// Builders of the host: seconds, and no device.
+fn bench(output: &Path, more: &[&str]) -> Child {
+    let output = output.to_str().expect("text");
+    let fixed = ["-b", "lbvh-host,sweep", "--size", "24x16", "--runs", "1", "--rays", "primary,ao", "--no-pictures"];
+    started(&[&["bench", "-o", output], &fixed[..], &SCENES[..], more].concat())
+}
+
+#[track_caller]
+fn succeeded(output: Output) -> String {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// What is the same in every run.
+fn contents(records: &[Record]) -> Vec<(String, String, Option<u64>, Vec<String>)> {
+    let of = |r: &Record| {
+        let checksums = r.trace.iter().map(|trace| trace.checksum.clone()).collect();
+        (r.scene.clone(), r.builder.clone(), r.quality.sah.map(f64::to_bits), checksums)
+    };
+    let mut all: Vec<_> = records.iter().map(of).collect();
+    all.sort();
+    all
+}
+
+fn report(folders: &[PathBuf], output: &Path) -> Output {
+    let mut arguments = vec!["report", "-o", output.to_str().expect("text")];
+    arguments.extend(folders.iter().map(|folder| folder.to_str().expect("text")));
+    ended(started(&arguments))
+}
+
+#[test]
+fn shares_by_processes_joined_are_the_whole_matrix() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let whole = folder.path().join("whole");
+    let whole_run = bench(&whole, &[]);
+    let shares: Vec<PathBuf> = (1..=3).map(|i| folder.path().join(format!("share {i}"))).collect();
+    let runs: Vec<Child> =
+        shares.iter().zip(1..).map(|(share, i)| bench(share, &["--shard", &format!("{i}/3")])).collect();
+    succeeded(ended(whole_run));
+    runs.into_iter().for_each(|run| drop(succeeded(ended(run))));
+    let counts: Vec<usize> = shares.iter().map(|share| results::read(share).expect("records").len()).collect();
+    assert!(counts.iter().sum::<usize>() == 12 && counts.iter().all(|&n| n >= 2 && n % 2 == 0), "{counts:?}");
+
+    let joined = folder.path().join("joined");
+    let page = succeeded(report(&shares, &joined));
+    assert_eq!(page.trim(), joined.join("index.html").to_str().expect("text"));
+    let [whole, joined] = [whole, joined].map(|folder| results::read(&folder).expect("records"));
+    assert_eq!(contents(&joined), contents(&whole));
+}
+
+#[test]
+fn devices_stay_apart_and_what_is_measured_twice_is_told_once() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let one = folder.path().join("one");
+    succeeded(ended(bench(&one, &["--shard", "1/3"])));
+    let text = std::fs::read_to_string(one.join("results.jsonl")).expect("records");
+    let line = text.lines().next().expect("a record");
+    let mut record: Record = serde_json::from_str(line).expect("a record");
+    (record.device, record.driver, record.subgroup) = ("Some GPU".into(), "its driver 1.2".into(), 32);
+    let other = folder.path().join("other");
+    std::fs::create_dir(&other).expect("a folder");
+    std::fs::write(other.join("results.jsonl"), serde_json::to_string(&record).expect("JSON") + "\n").expect("a file");
+
+    let joined = folder.path().join("joined");
+    succeeded(report(&[one.clone(), other, one.clone()], &joined));
+    let page = std::fs::read_to_string(joined.join("index.html")).expect("a page");
+    assert!(page.contains("2 devices") && page.contains("Some GPU"), "{page}");
+    let gpu = results::read(&joined.join("some-gpu-its-driver-1-2")).expect("records of the GPU alone");
+    assert_eq!(gpu, [record.clone()]);
+    let mut folders = std::fs::read_dir(&joined).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let own =
+        folders.find(|path| path.is_dir() && !path.ends_with("some-gpu-its-driver-1-2")).expect("the other device");
+    assert_eq!(contents(&results::read(&own).expect("records")), contents(&results::read(&one).expect("records")));
+}
+
+#[test]
+fn wrong_folders_and_lines_are_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let says = |output: Output, status: i32, words: &str| {
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(status) && text.contains(words), "{words}: {text}");
+    };
+    let empty = folder.path().join("empty");
+    std::fs::create_dir(&empty).expect("a folder");
+    says(report(std::slice::from_ref(&empty), &folder.path().join("a")), 2, "holds none of results.jsonl");
+    std::fs::write(empty.join("results.jsonl"), "\n{\"schema\":1}\n").expect("a file");
+    says(report(&[empty], &folder.path().join("a")), 1, "results.jsonl:2: not a record");
+    says(ended(bench(&folder.path().join("b"), &["--shard", "4/3"])), 2, "\"4/3\" is not a share; write I/N");
+}

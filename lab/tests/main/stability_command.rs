@@ -1,0 +1,157 @@
+//! `hedgerow stability`: the records and pages that it leaves, how pages name each other, and what is refused.
+
+use hedgerow_lab::measure::stability::far::Side;
+use hedgerow_lab::measure::stability::large::Placement;
+use hedgerow_lab::measure::stability::points::{Degenerate, Growth, Large};
+use hedgerow_lab::report::stability;
+use hedgerow_lab::scene;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn hedgerow(arguments: &[&str], folder: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
+    command.args(arguments).arg("-o").arg(folder).env_remove("HEDGEROW_SCENES").output().expect("the binary starts")
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn read(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join(name)).expect("written")
+}
+
+/// Runs it and gives the page that it names.
+fn done(arguments: &[&str], folder: &Path, page: &str) -> String {
+    let done = hedgerow(arguments, folder);
+    assert_eq!(done.status.code(), Some(0), "{arguments:?}: {}", err(&done));
+    assert_eq!(String::from_utf8_lossy(&done.stdout).trim(), folder.join(page).display().to_string());
+    read(folder, page)
+}
+
+#[test]
+fn growth_leaves_a_point_for_every_builder_manner_and_step() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let builders = "lbvh:codes=mc63:collapse=off,lbvh-host:codes=emc64var-nosize:collapse=off";
+    let size = ["--runs", "2", "--size", "12x8"];
+    let arguments =
+        [&["stability", "growth", "gen:soup:3000:1", "-b", builders, "--steps", "20,45"], &size[..]].concat();
+    let page = done(&arguments, folder.path(), "growth.html");
+    let points: Vec<Growth> = stability::read(folder.path()).expect("records");
+    assert_eq!(points.len(), 2 * 2 * 2 * 3);
+    for point in &points {
+        assert_eq!(point.scene, "gen:soup:3000:1");
+        // Kinds that have lost nearly all of their speed are not measured further on.
+        let kinds: Vec<&str> = point.relative_mrays.keys().map(String::as_str).collect();
+        let all = ["ao", "diffuse1", "primary", "shadow"];
+        assert!(kinds.iter().all(|kind| all.contains(kind)) && (point.e > 0 || kinds == all), "{point:?}");
+        assert!(point.relative_mrays.values().all(|speed| *speed > 0.0), "{point:?}");
+        assert!(point.e > 0 || point.relative_cost == Some(1.0), "{point:?}");
+    }
+    let cost = |codes: &str, axes, side, e| {
+        let point = points.iter().find(|p| p.builder.contains(codes) && (p.axes, p.side, p.e) == (axes, side, e));
+        point.and_then(|point| point.relative_cost).expect("a device and a host builder of ours")
+    };
+    for side in Side::ALL {
+        assert!(cost("mc63", 1, side, 20) > 1.1, "all of x lies in the highest cell");
+        assert!(cost("nosize", 1, side, 45) < 1.1, "19 bits are left for 3,000 triangles");
+        assert!(cost("nosize", 3, side, 45) > 2.0, "no bit is left");
+    }
+    assert!(page.contains("<section id=\"scene-gen-soup-3000-1\">"));
+    for chart in ["growth-gen-soup-3000-1-1-plus-cost", "growth-gen-soup-3000-1-3-minus-speed-all"] {
+        for ending in ["svg", "png"] {
+            assert!(folder.path().join(format!("charts/{chart}.{ending}")).is_file(), "{chart}.{ending}");
+        }
+    }
+    let run = stability::read_run::<Growth>(folder.path()).expect("read").expect("written");
+    assert!(run.command.starts_with("hedgerow stability growth") && run.device.is_some(), "{run:?}");
+    assert_eq!((run.failures, run.notes), (vec![], vec![]));
+}
+
+#[test]
+fn large_triangles_stand_where_they_are_asked_for() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let builders = "lbvh-host:codes=mc63:collapse=off,lbvh-host:codes=mc63+concise:collapse=off";
+    let arguments =
+        ["stability", "large", "gen:soup:300:1", "-b", builders, "--steps", "20/10", "--counts", "2", "--no-rays"];
+    done(&arguments, folder.path(), "large.html");
+    let points: Vec<Large> = stability::read(folder.path()).expect("records");
+    assert_eq!(points.len(), 3 * 2 * 3);
+    let cost = |codes: &str, placement| {
+        let find = |p: &&Large| p.builder.contains(codes) && p.placement == placement && p.e == 20;
+        points.iter().find(find).and_then(|point| point.relative_cost).expect("measured")
+    };
+    // One bit is left to each axis in which the walls are large; concise bounds keep all 21, but where nothing can be cut.
+    assert!(cost("mc63:", Placement::Walls) > 1.1 && cost("mc63:", Placement::Wall) > 1.1, "{points:?}");
+    assert!(
+        cost("mc63+concise", Placement::Walls) < 1.05 && cost("mc63+concise", Placement::Wall) < 1.05,
+        "{points:?}"
+    );
+    assert!(cost("mc63+concise", Placement::Outward) > 1.1, "{points:?}");
+    assert!(points.iter().all(|point| point.relative_mrays.is_empty() && point.count == 2));
+}
+
+#[test]
+fn degenerate_scenes_are_built_the_same_every_time_and_pages_name_each_other() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let small =
+        ["stability", "degenerate", "--triangles", "70", "--builds", "3", "-b", "lbvh,lbvh:collapse=off,lbvh-host"];
+    let page = done(&small, folder.path(), "degenerate.html");
+    let points: Vec<Degenerate> = stability::read(folder.path()).expect("records");
+    assert_eq!(points.len(), 3 * scene::degenerate(0).len());
+    for point in &points {
+        assert!(!point.has_failed() && point.same_bytes == Some(true) && point.valid == Some(true), "{point:?}");
+        assert_eq!((point.rays, point.wrong), (256, Some(0)), "{point:?}");
+        assert_eq!(point.build_ms.map(|spread| spread.runs), Some(2), "{point:?}");
+    }
+    assert!(!page.contains("growth.html"));
+    let growth = ["stability", "growth", "gen:icosphere:1", "-b", "lbvh-host", "--steps", "1", "--no-rays"];
+    assert!(done(&growth, folder.path(), "growth.html").contains("href=\"degenerate.html\""));
+    assert!(read(folder.path(), "degenerate.html").contains("href=\"growth.html\""), "it was written again");
+    let bench = ["bench", "gen:icosphere:1", "-b", "lbvh-host", "--runs", "1", "--size", "8x8", "--no-pictures"];
+    let bench = hedgerow(&bench, folder.path());
+    assert_eq!(bench.status.code(), Some(0), "{}", err(&bench));
+    let index = read(folder.path(), "index.html");
+    assert!(index.contains("href=\"growth.html\"") && index.contains("href=\"degenerate.html\""));
+    assert!(!index.contains("large.html"));
+    assert!(read(folder.path(), "growth.html").contains("href=\"index.html\""));
+}
+
+#[test]
+fn points_beyond_the_floats_are_left_out_and_said_so() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let arguments =
+        ["stability", "growth", "gen:grid:9", "-b", "lbvh-host", "--axes", "1", "--steps", "60,200", "--no-rays"];
+    let page = done(&arguments, folder.path(), "growth.html");
+    let points: Vec<Growth> = stability::read(folder.path()).expect("records");
+    assert_eq!(points.iter().map(|point| point.e).collect::<Vec<_>>(), [0, 60, 0, 60]);
+    assert!(page.contains("from e = 200 on the far triangle would lie beyond the largest float"), "{page}");
+}
+
+#[test]
+fn wrong_arguments_are_told_apart_from_failed_work() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (wrong, says) in [
+        (&["hedge"][..], "unrecognized subcommand"),
+        (&["growth", "-b", "lvbh"], "no builder is called \"lvbh\""),
+        (&["growth", "--axes", "2"], "take 1 or 3"),
+        (&["growth", "--sides", "left"], "take + or -"),
+        (&["growth", "--steps", "60/0"], "LAST/STEP"),
+        (&["growth", "--rays", "light"], "no kind of ray is called \"light\""),
+        (&["large", "--placements", "roof"], "wall, walls, outward"),
+        (&["large", "--counts", "0"], "--counts"),
+        (&["degenerate", "hedge"], "no degenerate scene is called \"hedge\"; there are empty, one"),
+        (&["degenerate", "--builds", "0"], "--builds"),
+    ] {
+        let done = hedgerow(&[&["stability"], wrong].concat(), folder.path());
+        assert_eq!(done.status.code(), Some(2), "{wrong:?}: {}", err(&done));
+        assert!(err(&done).contains(says), "{wrong:?}: {}", err(&done));
+    }
+    let done = hedgerow(&["stability", "growth", "no-such-scene", "-b", "lbvh-host"], folder.path());
+    assert_eq!(done.status.code(), Some(1), "{}", err(&done));
+    let file = folder.path().join("file");
+    std::fs::write(&file, "in the way").expect("written");
+    let done = hedgerow(&["stability", "degenerate", "one", "-b", "lbvh-host"], &file.join("below"));
+    assert_eq!(done.status.code(), Some(1));
+    assert!(err(&done).contains("check the path"), "{}", err(&done));
+}

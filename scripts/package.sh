@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# The crate that engines depend on: sources and compiled shaders. Packs it in a staging folder, unpacks it, and builds it with and
+# without the shader compiler. The package stays at target/package/hedgerow-VERSION.crate.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+MOST_BYTES=5000000
+
+target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+cargo=$(pwd)/scripts/cargo.sh
+stage=$target/package/stage
+rm -rf "$stage"
+mkdir -p "$stage/spirv"
+git ls-files -z | xargs -0 cp --parents -t "$stage"
+# A folder of its own for what is built: the shaders are those of exactly these sources.
+out=$("$cargo" build --release -p hedgerow --features compile-shaders --message-format json |
+  grep '"reason":"build-script-executed"' | grep -E '#(hedgerow@)?0-9*' | grep -oE '"out_dir":"[^"]*/build/hedgerow-[0-9a-f]+/out"' |
+  tail -n 1 | cut -d '"' -f 4)
+cp "$out"/*.spv "$stage/spirv"
+
+(cd "$stage" && "$cargo" package --quiet --offline -p hedgerow --no-verify --target-dir "$target/package/build")
+package=$(ls -t "$target"/package/build/package/hedgerow-*.crate | head -n 1)
+cp "$package" "$target/package/"
+bytes=$(wc -c < "$package")
+printf 'package: %s, %s bytes\n' "$(basename "$package")" "$bytes"
+if [ "$bytes" -gt "$MOST_BYTES" ]; then
+  echo "package: more than $MOST_BYTES bytes; look at 'include' in Cargo.toml" >&2
+  exit 1
+fi
+
+unpacked=$target/package/unpacked
+rm -rf "$unpacked" "$target/package/without" "$target/package/with"
+mkdir -p "$unpacked"
+tar -xzf "$package" -C "$unpacked" --strip-components 1
+build() { (cd "$unpacked" && "$cargo" build --release --offline --target-dir "$@"); }
+SECONDS=0
+build "$target/package/without"
+printf 'package: built without the compiler in %s s\n' "$SECONDS"
+SECONDS=0
+build "$target/package/with" --features compile-shaders
+printf 'package: built with the compiler in %s s\n' "$SECONDS"

@@ -1,5 +1,0 @@
-//! The `hedgerow` binary: see `hedgerow --help`, and `cli` in the library.
-
-fn main() -> std::process::ExitCode {
-    hedgerow::cli::main()
-}

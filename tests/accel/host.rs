@@ -1,0 +1,92 @@
+//! Builds on the host have the bytes of the device's.
+
+use crate::common::backends::{Built, Ours, vk_format, vk_index_type};
+use crate::common::device;
+use crate::common::geometries::{MOVED, Owned};
+use crate::common::shapes::{boxes, soup};
+use crate::common::world::Part;
+use hedgerow::ash::vk;
+use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
+
+type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
+type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
+type Range = vk::AccelerationStructureBuildRangeInfoKHR;
+use vk::BuildAccelerationStructureFlagsKHR as Flags;
+
+fn info(geometries: &[Geometry], flags: Flags) -> BuildInfo<'_> {
+    BuildInfo::default().ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL).flags(flags).geometries(geometries)
+}
+
+/// What the host makes of geometries at host addresses.
+fn on_the_host(ours: &Ours, geometries: &[Geometry], ranges: &[Range], flags: Flags) -> Vec<u8> {
+    let info = info(geometries, flags);
+    let counts: Vec<u32> = ranges.iter().map(|r| r.primitive_count).collect();
+    let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+    let place = vk::AccelerationStructureBuildTypeKHR::HOST;
+    unsafe { ours.0.get_acceleration_structure_build_sizes(place, &info, &counts, &mut sizes) }.expect("sizes");
+    assert_eq!(sizes.build_scratch_size, 0);
+    let mut bytes = vec![0; sizes.acceleration_structure_size as usize];
+    unsafe { ours.0.build_acceleration_structures(&[info], &[ranges], &mut [&mut bytes]) }.expect("it builds");
+    bytes
+}
+
+fn on_the_device(ours: &Ours, geometries: &[Geometry], ranges: &[Range], flags: Flags) -> Vec<u8> {
+    let built = Built::new(ours, &info(geometries, flags), ranges, 0);
+    built.memory.read::<u8>(built.bytes as usize)
+}
+
+#[test]
+fn triangles_of_every_kind_have_the_devices_bytes() {
+    let ours = Ours::on(device());
+    for flags in [Flags::empty(), Flags::PREFER_FAST_BUILD, Flags::PREFER_FAST_TRACE, Flags::ALLOW_COMPACTION] {
+        let parts = [
+            Owned::of(&soup(40, 0.9, 1), VertexFormat::FLOAT3, IndexFormat::U32, 4),
+            Owned { transform: Some(MOVED), ..Owned::of(&soup(60, 0.9, 2), VertexFormat::SNORM3, IndexFormat::U16, 0) },
+            Owned::of(&soup(9, 0.9, 3), VertexFormat::HALF3, IndexFormat::NONE, 2),
+        ];
+        for parts in [&parts[..], &parts[..1], &[]] {
+            let ranges: Vec<Range> =
+                parts.iter().map(|p| Range::default().primitive_count(p.primitive_count)).collect();
+            let uploaded: Vec<_> = parts.iter().map(|p| p.upload(0, 0)).collect();
+            let on_device: Vec<Geometry> =
+                uploaded.iter().zip(parts).map(|((g, _), p)| crate::common::backends::vk_geometry(g, p)).collect();
+            let host: Vec<Geometry> = parts.iter().map(at_host_addresses).collect();
+            let expected = on_the_device(&ours, &on_device, &ranges, flags);
+            assert!(on_the_host(&ours, &host, &ranges, flags) == expected, "{} geometries, {flags:?}", parts.len());
+        }
+    }
+}
+
+fn at_host_addresses(owned: &Owned) -> Geometry {
+    let at = |bytes: *const u8| vk::DeviceOrHostAddressConstKHR { host_address: bytes.cast() };
+    let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+        .vertex_format(vk_format(owned.vertex_format))
+        .vertex_data(at(owned.vertices.as_ptr()))
+        .vertex_stride(owned.vertex_stride.into())
+        .max_vertex(owned.vertex_count.saturating_sub(1))
+        .index_type(vk_index_type(owned.index_format))
+        .index_data(at(owned.indices.as_ptr()))
+        .transform_data(at(owned.transform.as_ref().map_or(std::ptr::null(), |m| m.as_ptr().cast())));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
+        .flags(vk::GeometryFlagsKHR::OPAQUE)
+}
+
+#[test]
+fn boxes_have_the_devices_bytes_and_small_memory_is_refused() {
+    let ours = Ours::on(device());
+    let all = boxes(70, 0.2, 5);
+    let part = Part::Boxes(vec![(all.clone(), vk::GeometryFlagsKHR::OPAQUE)]);
+    let (geometries, ranges, _memory) = part.geometries(device());
+    let expected = on_the_device(&ours, &geometries, &ranges, Flags::empty());
+    let mut host = geometries.clone();
+    host[0].geometry.aabbs.data = vk::DeviceOrHostAddressConstKHR { host_address: all.as_ptr().cast() };
+    assert!(on_the_host(&ours, &host, &ranges, Flags::empty()) == expected);
+    let mut small = vec![0; expected.len() - 1];
+    let refused =
+        unsafe { ours.0.build_acceleration_structures(&[info(&host, Flags::empty())], &[&ranges], &mut [&mut small]) };
+    let message = refused.expect_err("too small").to_string();
+    assert!(message.starts_with("pInfos[0]: ") && message.contains(&expected.len().to_string()), "{message}");
+    assert!(device().validation_messages().is_ok());
+}

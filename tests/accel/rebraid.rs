@@ -1,0 +1,229 @@
+//! Re-braiding: top levels that open instances are those of the host, within the budget, and hold every primitive once.
+
+use crate::common::backends::{Backend, Ours};
+use crate::common::device;
+use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
+use crate::common::probe::{IGNORE, ProbeRay, flags};
+use crate::common::shapes::{Corners, Random, icosphere, placed, soup};
+use crate::common::world::World;
+use hedgerow::accel::{self, Instance, Options, REBRAID, top_level};
+use hedgerow::ash::vk;
+use hedgerow::bvh::layout::{self, Bvh2, Triangle, status};
+use std::collections::BTreeMap;
+use vk::BuildAccelerationStructureFlagsKHR as Flags;
+
+fn with_budget(rebraid_budget: f32) -> Ours {
+    Ours::with_options(device(), Options { rebraid_budget, ..Options::DEFAULT })
+}
+
+#[test]
+fn a_top_level_has_the_bytes_of_the_hosts() {
+    // On both sides of the size up to which one workgroup does all rounds, and of that of the builder.
+    for (count, budget) in [
+        (0, 2.0),
+        (1, 7.5),
+        (2, 1.5),
+        (30, 4.0),
+        (300, 2.0),
+        (700, 5.0),
+        (1024, 2.0),
+        (1025, 2.0),
+        (2500, 3.3),
+        (2500, 1.0),
+    ] {
+        let backend = with_budget(budget);
+        for by_pointers in [false, true] {
+            let world = World { by_pointers, ..mixture(count, count as u64) };
+            let read = ReadBack::new(&backend, &world);
+            let options = Options { rebraid_budget: budget, ..Options::DEFAULT };
+            let expected = top_level::top_level(&read.instances, |a| read.below(a), world.flags, &options);
+            let what = format!("{count} instances, budget {budget}");
+            assert_eq!(read.top.header, expected.header, "{what}");
+            let differ = read.top.records.iter().zip(&expected.records).position(|(a, b)| a != b);
+            assert_eq!(differ.map(|i| (read.top.records[i], expected.records[i])), None, "{what}");
+            assert!(read.top.to_bytes() == expected.to_bytes(), "{what}: the nodes differ");
+        }
+    }
+}
+
+#[test]
+fn what_the_flags_ask_for_is_what_the_host_builds() {
+    let world = mixture(400, 3);
+    let backend = Ours::on(device());
+    let all = [
+        Flags::empty(),
+        REBRAID | Flags::PREFER_FAST_BUILD,
+        REBRAID | Flags::PREFER_FAST_TRACE,
+        REBRAID | Flags::LOW_MEMORY,
+        REBRAID | Flags::ALLOW_UPDATE,
+    ];
+    for flags in all {
+        let read = ReadBack::new(&backend, &World { flags, ..world.clone() });
+        let expected = top_level::top_level(&read.instances, |a| read.below(a), flags, &Options::DEFAULT);
+        assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}");
+        let opens = flags.contains(REBRAID) && !flags.contains(Flags::ALLOW_UPDATE);
+        assert_eq!(read.top.header.primitive_count > 400, opens, "{flags:?}");
+        assert_eq!(read.entries().values().any(|starts| starts.len() > 1), opens, "{flags:?}");
+    }
+}
+
+#[test]
+fn entries_keep_to_the_budget_and_reach_every_primitive_once() {
+    for (count, budget) in [(1, 2.0), (50, 1.3), (400, 2.0), (400, 16.0), (1500, 2.5)] {
+        let read = ReadBack::new(&with_budget(budget), &mixture(count, 77));
+        let most = (f64::from(budget) * count as f64).ceil() as u32;
+        assert_eq!(read.top.header.primitive_count, most);
+        assert!(read.top.header.active <= most, "{count} {budget}");
+        let entries = read.entries();
+        assert_eq!(entries.values().map(Vec::len).sum::<usize>(), read.top.header.active as usize);
+        for (&instance, starts) in &entries {
+            let counts = read.reached(instance, starts);
+            assert!(
+                !counts.is_empty() && counts.iter().all(|&n| n == 1),
+                "{instance} of {count}: {starts:?} {counts:?}"
+            );
+        }
+        // Not one that can be seen is lost: what is not there has no inverse, or nothing to show.
+        for (i, instance) in read.instances.iter().enumerate().filter(|(i, _)| !entries.contains_key(&(*i as u32))) {
+            let below = |b: &Bvh2<Triangle>| b.header.active == 0;
+            let shows_nothing = instance.structure == 0 || read.triangles.get(&instance.structure).is_some_and(below);
+            let m = instance.transform.map(|row| row.map(f64::from));
+            let minor = |r: usize, s: usize, c: usize, d: usize| m[r][c] * m[s][d] - m[r][d] * m[s][c];
+            let determinant = m[0][0] * minor(1, 2, 1, 2) - m[0][1] * minor(1, 2, 0, 2) + m[0][2] * minor(1, 2, 0, 1);
+            let is_bad = determinant == 0.0 || instance.transform.iter().flatten().any(|x| !x.is_finite());
+            assert!(shows_nothing || is_bad, "{i} {instance:?}");
+        }
+        assert_eq!(read.top.header.status & !status::BAD_INSTANCE, 0);
+    }
+}
+
+#[test]
+fn the_loose_are_opened_and_the_tight_are_not() {
+    // A full sphere, a single triangle and a flat grid fill their boxes; of the rows, the larger has more to save.
+    let grid: Corners = (0..128)
+        .map(|t| {
+            let (x, z) = ((t / 2 % 8) as f32, (t / 16) as f32);
+            match t % 2 {
+                0 => [[x, 0.0, z], [x, 0.0, z + 1.0], [x + 1.0, 0.0, z]],
+                _ => [[x + 1.0, 0.0, z], [x, 0.0, z + 1.0], [x + 1.0, 0.0, z + 1.0]],
+            }
+        })
+        .collect();
+    let parts = vec![part(icosphere(3)), part(soup(1, 0.5, 1)), part(grid), part(diagonal(300))];
+    let mut instances = Vec::new();
+    for i in 0..12 {
+        let at = [3.0 * i as f32, 0.0, 0.0];
+        instances.extend([Instance::new(1, scaled(1.0, at)), Instance::new(2, scaled(1.0, at))]);
+        instances.push(Instance::new(3, scaled(0.25, at)));
+    }
+    let (small, large) = (instances.len() as u32, instances.len() as u32 + 1);
+    instances.extend([Instance::new(4, scaled(0.5, [0.0; 3])), Instance::new(4, scaled(4.0, [1.0; 3]))]);
+    let world = World { flags: REBRAID, ..World::new(parts, instances) };
+    let counts_at = |budget: f32| -> Vec<usize> {
+        let entries = ReadBack::new(&with_budget(budget), &world).entries();
+        (0..world.instances.len() as u32).map(|i| entries[&i].len()).collect()
+    };
+    for budget in [1.2, 2.0, 4.0] {
+        let counts = counts_at(budget);
+        assert!(counts[..small as usize].iter().all(|&n| n == 1), "budget {budget}: {counts:?}");
+        assert!(counts[large as usize] >= 8, "budget {budget}: {counts:?}");
+        assert!(counts[large as usize] >= counts[small as usize], "budget {budget}: {counts:?}");
+    }
+    // Of eight entries more, the large one gets nearly all: even its quarters have more to save than the small one's halves.
+    assert!(counts_at(1.2)[small as usize] <= 2);
+}
+
+#[test]
+fn candidates_are_those_of_whole_instances() {
+    let mut random = Random(41);
+    let parts = vec![part(diagonal(60)), part(soup(50, 0.4, 3)), part(placed(&diagonal(90), 1.0, [0.2, 0.0, 0.0]))];
+    let instances: Vec<Instance> = (0..60)
+        .map(|i| {
+            let m = [(); 3].map(|()| [random.signed(), random.signed(), random.signed(), random.signed()]);
+            Instance::new(1 + i % 3, m)
+        })
+        .collect();
+    let whole = World::new(parts, instances);
+    let opened = World { flags: REBRAID, ..whole.clone() };
+    let rays: Vec<ProbeRay> = (0..2000)
+        .map(|i| {
+            let origin = random.point(2.0);
+            // Some begin within the boxes, some run along the rows.
+            let to = if i % 2 == 0 { random.point(1.0) } else { origin.map(|x| -x) };
+            let ray = ProbeRay::new(origin, std::array::from_fn(|k| to[k] - origin[k]));
+            ProbeRay { flags: flags::NO_OPAQUE, decision: IGNORE, ..ray }
+        })
+        .collect();
+    let backend = with_budget(6.0);
+    let read = ReadBack::new(&backend, &opened);
+    assert!(read.entries().values().any(|starts| starts.len() > 4), "nothing is opened: no test");
+    let [expected, got] = [&whole, &opened].map(|world| {
+        let built = world.build(&backend);
+        backend.probe(built.top.structure, &rays)
+    });
+    let mut met = 0;
+    for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
+        // An any-hit shader runs once for each: neither twice nor less for what is opened.
+        assert_eq!(got.candidate_count, expected.candidate_count, "ray {i}");
+        if got.candidate_count <= 8 {
+            assert_eq!(got.sorted_candidates(), expected.sorted_candidates(), "ray {i}");
+        }
+        met += got.candidate_count;
+    }
+    assert!(met > 1000, "{met} candidates are no test");
+}
+
+#[test]
+fn the_same_input_gives_the_same_bytes_every_time() {
+    for count in [600, 3000] {
+        let world = mixture(count, 9);
+        let backend = with_budget(3.0);
+        let built = world.build(&backend);
+        let bytes = built.top.memory.read::<u8>(built.top.bytes as usize);
+        for _ in 0..5 {
+            let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+                .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
+                .flags(REBRAID)
+                .geometries(std::slice::from_ref(&built.geometry));
+            let range = vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count as u32);
+            let again = crate::common::backends::Built::new(&backend, &info, &[range], 0);
+            assert!(again.memory.read::<u8>(again.bytes as usize) == bytes, "{count}");
+        }
+    }
+}
+
+#[test]
+fn fewer_instances_than_were_planned_for_are_opened_too() {
+    // Their number lies in device memory: the entries behind it have no instance, and stay closed.
+    let world = mixture(200, 21);
+    let backend = with_budget(2.0);
+    let built = world.build(&backend);
+    let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
+        .flags(REBRAID)
+        .geometries(std::slice::from_ref(&built.geometry));
+    let top = crate::common::backends::Built::place(&backend, &info, &[200], 0);
+    let (_memory, scratch) = top.scratch(&backend, &info, &[200]);
+    let range = device().upload("range", &[120u32, 0, 0, 0]).expect("memory");
+    let info = info
+        .dst_acceleration_structure(top.structure)
+        .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch });
+    device()
+        .run(None, |recorder| unsafe {
+            let indirect: accel::Device<'_> = backend.0;
+            indirect.cmd_build_acceleration_structures_indirect(
+                recorder.commands(),
+                &[info],
+                &[range.address()],
+                &[16],
+                &[&[200]],
+            )
+        })
+        .expect("it builds");
+    let tree: Bvh2<layout::Instance> =
+        Bvh2::from_bytes(&top.memory.read::<u8>(top.bytes as usize)).expect("a top level");
+    let mut counts = BTreeMap::<u32, u32>::new();
+    tree.records.iter().filter(|r| r.structure != 0).for_each(|r| *counts.entry(r.instance).or_default() += 1);
+    assert_eq!(counts.values().sum::<u32>(), tree.header.active);
+    assert!(counts.keys().all(|&i| i < 120) && counts.values().any(|&n| n > 1), "{counts:?}");
+}

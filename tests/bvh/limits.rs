@@ -1,0 +1,53 @@
+//! Builders on devices that have little: the same bytes with 16 KiB of shared memory, 128 invocations a workgroup, few workgroups a
+//! dispatch, and subgroups that are smaller than they report.
+
+use crate::common::twins::{assert_same, on_host};
+use crate::common::{OPTIONS, corpus, open};
+use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Treelets};
+use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::layout::Bvh2;
+use hedgerow::gpu::TuningChoice;
+use hedgerow_lab::device::{Device, DeviceOptions};
+
+const METHODS: [Method; 4] = [
+    Method::Lbvh,
+    Method::Hlbvh(Treelets::DEFAULT),
+    Method::Ploc { radius: 16 },
+    Method::Ploc { radius: Method::MOST_RADIUS },
+];
+
+fn built(device: &Device, (_, positions, triangles): &corpus::Mesh, options: &Options) -> Bvh2 {
+    let vertices = device.upload("positions", positions).expect("memory");
+    let indices = device.upload("indices", triangles).expect("memory");
+    let count = triangles.len() as u32;
+    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), count);
+    let builder = Builder::new(device, options, count).expect("few enough primitives");
+    let sizes = builder.sizes();
+    let structure = device.buffer("structure", sizes.structure).expect("memory");
+    let scratch = device.buffer("scratch", sizes.scratch).expect("memory");
+    device.run(None, |r| builder.record(r, &input, structure.address(), scratch.address())).expect("it builds");
+    Bvh2::from_bytes(&structure.read::<u8>(sizes.structure as usize)).expect("a structure")
+}
+
+fn has_the_bytes_of_the_host(restrict: &str) {
+    let restrict = restrict.parse().expect("restrictions");
+    let device = open(DeviceOptions { restrict, tuning: TuningChoice::Gpu, ..OPTIONS });
+    let meshes = corpus::meshes();
+    let mesh = meshes.iter().max_by_key(|mesh| mesh.2.len()).expect("a corpus");
+    for method in METHODS {
+        let options = Options { method, codes: Some(Code::Emc64Var.full().with_bits(32)), ..Options::DEFAULT };
+        let options = Options { schedule: Some(Schedule::Chain), ..options };
+        assert_same(&built(&device, mesh, &options), &on_host(mesh, &options), &format!("{restrict:?} {method:?}"));
+    }
+}
+
+#[test]
+fn a_small_device_builds_the_same_trees() {
+    has_the_bytes_of_the_host("shared=16384,invocations=128,groups=64");
+}
+
+/// Four times as large as they are.
+#[test]
+fn subgroups_smaller_than_they_report_build_the_same_trees() {
+    has_the_bytes_of_the_host("subgroup=32,inexact");
+}

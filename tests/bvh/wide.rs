@@ -1,0 +1,199 @@
+//! Wide trees collapsed on the device equal the host's, byte for byte, over inputs that hurt, and are valid.
+
+use crate::common::{corpus, device};
+use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::geometry::Primitives;
+use hedgerow::bvh::host::lbvh;
+use hedgerow::bvh::layout::{Aabb, Bvh2, Child, Header, Node, Record, Triangle, status};
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::wide::device::{OnDevice, Options};
+use hedgerow::bvh::wide::layout::{Wide, WideNode};
+use hedgerow::bvh::wide::quantised::QuantisedNode;
+
+const GUARD: [u8; 256] = [0xA5; 256];
+
+/// The bytes in use of the wide tree that the device makes of `tree`; nothing else is written.
+fn collapsed<N: WideNode>(tree: &Bvh2) -> Vec<u8> {
+    collapsed_as::<N>(tree, tree.header.primitive_count)
+}
+
+/// The same, planned for trees of up to `count` primitives.
+fn collapsed_as<N: WideNode>(tree: &Bvh2, count: u32) -> Vec<u8> {
+    let device = device();
+    let geometry_count = tree.header.geometry_count;
+    let options = Options { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
+    let wide = OnDevice::new(device, &options, count);
+    let sizes = wide.sizes();
+    let source = device.upload("source", &tree.to_bytes()).unwrap();
+    // Whatever was there before is of no interest.
+    let guarded = |bytes: u64| [vec![0xEEu8; bytes as usize], GUARD.to_vec()].concat();
+    let target = device.upload("target", &guarded(sizes.structure)).unwrap();
+    let scratch = device.upload("scratch", &guarded(sizes.scratch)).unwrap();
+    device.run(None, |r| wide.record(r, source.address(), target.address(), scratch.address())).unwrap();
+    for (what, buffer, bytes) in [("target", &target, sizes.structure), ("scratch", &scratch, sizes.scratch)] {
+        assert_eq!(buffer.read_at::<u8>(bytes, GUARD.len()), GUARD, "wrote behind the {what}");
+    }
+    let header: Header = target.read(1)[0];
+    let used = N::FORM.bytes_in_use(&header, size_of::<Triangle>() as u64);
+    assert!(used <= sizes.structure, "{used} bytes in use of {}", sizes.structure);
+    target.read(used as usize)
+}
+
+fn assert_as_on_the_host<N: WideNode>(name: &str, tree: &Bvh2) {
+    let expected = Wide::<N>::of(tree);
+    expected.validate().unwrap_or_else(|error| panic!("{name} {}: {error}", N::FORM));
+    let bytes = collapsed::<N>(tree);
+    let got = Wide::<N>::from_bytes(&bytes).unwrap_or_else(|error| panic!("{name} {}: {error}", N::FORM));
+    assert_eq!(got.header, expected.header, "{name} {}", N::FORM);
+    for (i, (got, expected)) in got.nodes.iter().zip(&expected.nodes).enumerate() {
+        assert_eq!(got, expected, "{name} {}: node {i}", N::FORM);
+    }
+    assert!(bytes == expected.to_bytes(), "{name} {}: other bytes", N::FORM);
+}
+
+fn assert_all_forms(name: &str, tree: &Bvh2) {
+    assert_as_on_the_host::<[Child; 4]>(name, tree);
+    assert_as_on_the_host::<[Child; 8]>(name, tree);
+    assert_as_on_the_host::<QuantisedNode>(name, tree);
+}
+
+#[test]
+fn wide_trees_of_bad_scenes_have_the_bytes_of_the_host() {
+    for (name, positions, triangles) in corpus::meshes() {
+        for collapse in [Collapse::OFF, Collapse::SAH] {
+            for codes in [Code::Emc64Var.full(), Code::Mc30.full()] {
+                assert_all_forms(&name, &lbvh::build(&positions, &triangles, codes, collapse));
+            }
+        }
+    }
+}
+
+/// Triangles far apart in piles of so many equal ones: leaves of these lengths.
+fn piles(lengths: &[usize]) -> Bvh2 {
+    let mut positions = Vec::new();
+    for (i, &length) in lengths.iter().enumerate() {
+        let at = [i as f32 * 3.0, (i * i % 7) as f32 * 5.0, (i % 3) as f32];
+        let corners = [at, [at[0] + 1.0, at[1], at[2]], [at[0], at[1] + 1.0, at[2]]];
+        (0..length).for_each(|_| positions.extend(corners));
+    }
+    let triangles: Vec<[u32; 3]> = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    lbvh::build(&positions, &triangles, Code::Emc64Var.full(), Collapse::SAH)
+}
+
+#[test]
+fn leaves_of_any_length_stay_leaves() {
+    for lengths in [
+        &[254, 255, 256, 257, 1, 2, 1000, 3][..],
+        &[300; 20],
+        &[1; 9],
+        &[255],
+        &[256],
+        &[5000],
+        &[256, 1, 256, 1, 256, 1, 256, 1, 256],
+    ] {
+        let tree = piles(lengths);
+        assert_all_forms(&format!("piles of {lengths:?}"), &tree);
+        let mut found: Vec<u32> = leaves(&Wide::<QuantisedNode>::of(&tree));
+        let mut expected: Vec<u32> = leaves(&Wide::<[Child; 8]>::of(&tree));
+        found.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(found, expected, "{lengths:?}");
+        assert_eq!(found.iter().max().map(|&most| most as usize), lengths.iter().max().copied(), "{lengths:?}");
+    }
+
+    fn leaves<N: WideNode>(tree: &Wide<N>) -> Vec<u32> {
+        let long = |node: &N| node.long_leaf().map(|(_, count)| count);
+        let short = |node: &N| node.children().into_iter().flatten().filter(Child::is_leaf).map(|c| c.count).collect();
+        tree.nodes.iter().flat_map(|node| long(node).map_or_else(|| short(node), |count| vec![count])).collect()
+    }
+}
+
+/// A tree of 96 levels whose nodes all have a leaf beside a node, or beside a small tree: as deep as trees may be.
+fn deep(beside: usize) -> Bvh2 {
+    let mut tree = piles(&vec![1; 1 + 96 * beside]);
+    let mut nodes: Vec<Node> = Vec::new();
+    let leaf = |i: usize| {
+        let Aabb { lo, hi } = tree.records[i].bounds().expect("a triangle");
+        Child { lo, index: i as u32, hi, count: 1 }
+    };
+    let join = |nodes: &mut Vec<Node>, a: Child, b: Child| {
+        nodes.push(Node { children: [a, b] });
+        let Aabb { lo, hi } = a.bounds().union(&b.bounds());
+        Child { lo, index: nodes.len() as u32 - 1, hi, count: 0 }
+    };
+    let mut root = leaf(0);
+    let levels = if beside == 1 { 96 } else { 95 };
+    let mut next = 1;
+    for _ in 0..levels {
+        let mut side = leaf(next);
+        for _ in 1..beside {
+            next += 1;
+            side = join(&mut nodes, side, leaf(next));
+        }
+        next += 1;
+        root = join(&mut nodes, root, side);
+    }
+    tree.records.truncate(next);
+    tree.header.primitive_count = next as u32;
+    tree.header.active = next as u32;
+    tree.header.node_slots = next as u32 - 1;
+    tree.header.inner_nodes = nodes.len() as u32;
+    tree.header.root = root;
+    nodes.resize(next - 1, Node::UNUSED);
+    tree.nodes = nodes;
+    // The order of records is the walk's; primitive indices are whatever they are, each there once.
+    for (i, record) in tree.records.iter_mut().enumerate() {
+        record.primitive = i as u32;
+    }
+    tree.validate().expect("a deep tree");
+    tree
+}
+
+#[test]
+fn trees_as_deep_as_they_may_be_have_as_many_levels_as_tracers_can_walk() {
+    for beside in [1, 2] {
+        assert_all_forms(&format!("deep, {beside} beside"), &deep(beside));
+    }
+}
+
+/// Levels are opened by one workgroup, or the first ones and the last ones by one and those between by many: what was planned for
+/// says which.
+#[test]
+fn small_and_deep_trees_planned_as_large_ones_have_the_same_bytes() {
+    for tree in [piles(&[1]), piles(&[1; 9]), deep(1), deep(2)] {
+        for planned in [2_000, 20_000, 100_000] {
+            let planned = planned + tree.header.primitive_count;
+            assert!(collapsed_as::<[Child; 4]>(&tree, planned) == collapsed::<[Child; 4]>(&tree), "{planned}");
+            assert!(collapsed_as::<QuantisedNode>(&tree, planned) == collapsed::<QuantisedNode>(&tree), "{planned}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_traced_becomes_an_empty_tree_with_its_status() {
+    let tree = piles(&[1; 40]);
+    for bit in [status::TOO_DEEP, status::SPIN_RAN_OUT, status::WRONG_VERSION] {
+        let mut tree = tree.clone();
+        tree.header.status |= bit;
+        assert_all_forms("unusable", &tree);
+        assert_eq!(Wide::<QuantisedNode>::of(&tree).header.status & bit, bit);
+    }
+    // What is no structure at all.
+    let mut garbage = tree.clone();
+    garbage.header.magic ^= 1;
+    let bytes = collapsed::<QuantisedNode>(&garbage);
+    let wide = Wide::<QuantisedNode>::from_bytes(&bytes).expect("a wide tree");
+    wide.validate().expect("of nothing");
+    assert_eq!((wide.header.active, wide.header.status), (0, status::WRONG_VERSION));
+}
+
+#[test]
+fn twenty_collapses_give_the_same_bytes() {
+    let (_, positions, triangles) = corpus::random("20,000 random", 20_000, [0.0; 3], [1.0; 3]);
+    let tree = lbvh::build(&positions, &triangles, Code::Emc64Var.full(), Collapse::SAH);
+    let first = collapsed::<QuantisedNode>(&tree);
+    for run in 1..20 {
+        assert!(collapsed::<QuantisedNode>(&tree) == first, "run {run} gave other bytes");
+    }
+    assert_all_forms("20,000 random", &tree);
+}

@@ -1,0 +1,84 @@
+//! Everything that runs on a device, once by each tuning, on whichever driver the loader finds: `make test-drivers` runs it on
+//! SwiftShader, a driver with another compiler than lavapipe's.
+//!
+//! One process and one test: SwiftShader compiles every pipeline anew in each process, when it is made. So the time that
+//! [`Context::pipelines`](hedgerow::gpu::Context::pipelines) tells of is the compiler's, and it is bounded here: by the wall clock.
+//! Whatever else runs can only add to it, and the other thread does (one of 3.1 s took 0.2 s alone): what seems to take too long is
+//! made once more, alone.
+
+mod builders;
+mod kd_trees;
+mod structures;
+mod tracers;
+
+use crate::common::corpus::{self, Mesh};
+use crate::common::{device, open, with_tuning};
+use hedgerow::gpu::{Kernel, TuningChoice};
+use hedgerow_lab::device::DeviceOptions;
+use std::time::{Duration, Instant};
+
+/// What a pipeline may take, and one whose kernel does everything.
+const BOUNDS: [Duration; 2] = [Duration::from_secs(3), Duration::from_secs(8)];
+
+#[test]
+#[ignore = "takes minutes where pipelines are compiled anew: make test-drivers runs it on SwiftShader"]
+fn every_pass_gives_the_bytes_of_the_host_by_each_tuning() {
+    // A thread each: most of the time is the compiler's.
+    let slow: Vec<(TuningChoice, Vec<Kernel>)> = std::thread::scope(|scope| {
+        let runs = [TuningChoice::Cpu, TuningChoice::Gpu]
+            .map(|tuning| (tuning, scope.spawn(move || with_tuning(tuning, || run(tuning)))));
+        runs.map(|(tuning, run)| (tuning, run.join().expect("bytes of the host"))).into()
+    });
+    for (tuning, kernels) in slow {
+        kernels.iter().for_each(|kernel| assert_soon_made_alone(tuning, kernel));
+    }
+}
+
+/// On a device of its own, which has no pipelines yet.
+fn assert_soon_made_alone(tuning: TuningChoice, kernel: &Kernel) {
+    let device = open(DeviceOptions { tuning, ..crate::common::OPTIONS });
+    device.warm(std::slice::from_ref(kernel)).expect("the kernel compiles");
+    let (_, time) = device.pipelines().into_iter().find(|(made, _)| made == kernel).expect("the pipeline");
+    println!("{tuning}: {:6.2} s  {}, alone", time.as_secs_f32(), kernel.name());
+    assert!(time <= bound(kernel), "{} takes {time:?}, more than {:?}", kernel.name(), bound(kernel));
+}
+
+/// Every part; the kernels that took longer than they may.
+fn run(tuning: TuningChoice) -> Vec<Kernel> {
+    let parts: [(&str, fn()); 7] = [
+        ("builders", builders::all_give_the_bytes_of_the_host),
+        ("splits and optimised trees", builders::splits_and_optimised_trees_too),
+        ("tracers", tracers::hits_and_work_are_those_of_the_host),
+        ("wide trees", tracers::wide_trees_are_those_of_the_host),
+        ("accel", structures::all),
+        ("kd-trees", kd_trees::builds_and_hits_are_those_of_the_host),
+        ("merging", kd_trees::merges_and_restores_are_those_of_the_host),
+    ];
+    for (name, part) in parts {
+        let begin = Instant::now();
+        part();
+        println!("{} {tuning}: {name} in {:.1} s", device().found().name, begin.elapsed().as_secs_f32());
+    }
+    let mut pipelines = device().pipelines();
+    pipelines.sort_by_key(|(_, time)| std::cmp::Reverse(*time));
+    println!("{tuning}: {} pipelines, the slowest ten:", pipelines.len());
+    for (kernel, time) in pipelines.iter().take(10) {
+        println!("{tuning}: {:6.2} s  {}", time.as_secs_f32(), kernel.name());
+    }
+    pipelines.into_iter().filter(|(kernel, time)| *time > bound(kernel)).map(|(kernel, _)| kernel).collect()
+}
+
+fn bound(kernel: &Kernel) -> Duration {
+    let does_everything = ["_persistent", "_workgroup"].iter().any(|end| kernel.name().ends_with(end));
+    BOUNDS[usize::from(does_everything)]
+}
+
+/// Meshes that hurt and are quickly built, none with coordinates whose areas are subnormal: a device may take those for zero.
+fn meshes() -> Vec<Mesh> {
+    let is_usual = |x: &f32| !x.is_finite() || *x == 0.0 || (1e-8..1e8).contains(&x.abs());
+    let hard = hedgerow_lab::scene::degenerate(40).into_iter();
+    let hard = hard.map(|hard| (hard.name.to_owned(), hard.mesh.positions, hard.mesh.triangles));
+    let usual = hard.filter(|(_, positions, _)| positions.iter().flatten().all(is_usual));
+    let random = [3, 129, 1025].map(|count| corpus::random(&format!("random {count}"), count, [-0.5; 3], [1.0; 3]));
+    random.into_iter().chain(usual).collect()
+}

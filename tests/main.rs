@@ -1,0 +1,64 @@
+//! The tests of the library and of `hedgerow-host`, on the laboratory's device: a folder for each room.
+
+mod common;
+mod device_limits;
+mod drivers;
+mod engine;
+mod linked;
+mod shader_features;
+mod warming;
+
+mod accel {
+    mod bad;
+    mod blas;
+    mod boxes;
+    mod checked;
+    mod copy;
+    mod empty;
+    mod facing;
+    mod host;
+    mod indirect;
+    mod instances;
+    mod memory;
+    mod rays;
+    mod rebraid;
+    mod threads;
+    mod tlas;
+    mod update;
+    mod watertight;
+}
+
+mod bvh {
+    mod codes;
+    mod epo;
+    mod geometry;
+    mod lbvh;
+    mod limits;
+    mod methods;
+    mod refit;
+    mod reinsertion;
+    mod split;
+    mod wide;
+}
+
+mod gpu {
+    mod radix_sort;
+    mod scan_reduce;
+}
+
+mod kdtree {
+    mod device;
+    mod host;
+    mod merge;
+    mod merge_cost;
+    mod merge_device;
+    mod merge_device_cost;
+}
+
+mod trace {
+    mod device;
+    mod host;
+    mod kd;
+    mod kd_device;
+    mod wide;
+}
