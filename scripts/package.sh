@@ -11,10 +11,9 @@ stage=$target/package/stage
 rm -rf "$stage"
 mkdir -p "$stage/spirv"
 git ls-files -z | xargs -0 cp --parents -t "$stage"
-# A folder of its own for what is built: the shaders are those of exactly these sources.
+# Where build.rs has put the shaders of these sources.
 out=$("$cargo" build --release -p hedgerow --features compile-shaders --message-format json |
-  grep '"reason":"build-script-executed"' | grep -E '#(hedgerow@)?0-9*' | grep -oE '"out_dir":"[^"]*/build/hedgerow-[0-9a-f]+/out"' |
-  tail -n 1 | cut -d '"' -f 4)
+  grep -oE '"out_dir":"[^"]*/build/hedgerow-[0-9a-f]+/out"' | tail -n 1 | cut -d '"' -f 4)
 cp "$out"/*.spv "$stage/spirv"
 
 (cd "$stage" && "$cargo" package --quiet --offline -p hedgerow --no-verify --target-dir "$target/package/build")

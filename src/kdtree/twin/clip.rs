@@ -8,13 +8,13 @@
 //! ε = 2⁻²⁴, *s* the triangle's longest side and *c* its greatest coordinate along the axis, six cuts put what is left of a triangle
 //! off by at most 64ε·s + 6ε·c. (Of a corner that a cut makes, a + t·(b − a), t is off by 8ε: two differences, a reciprocal that a
 //! device has to 5ε, a product; t·(b − a) by two more; the sum is rounded once. Keeping it in the box around the edge brings it no
-//! farther from where it should be.) So the faces that it is cut at are moved out by 64ε·s + 8ε·c, [`rounding`], and what was right
+//! farther from where it should be.) So the faces that it is cut at are moved out by 64ε·s + 8ε·c, `rounding`, and what was right
 //! before the cut and is off by less than that is kept; and the box around the part is larger by as much, but not larger than the
 //! triangle's own: walls and tiles whose corners lie in common planes are parted by them.
 //!
 //! A ray's hit may lie beside its triangle, by a part of how far and how long it is. The tracer looks beside the ray by as much
 //! ([`crate::trace::kd_host`]), as long as no triangle is longer than it knows from the header: [`reach_of`]. For those few that are,
-//! a triangle is all that is near enough to it, [`room`].
+//! a triangle is all that is near enough to it, `room`.
 
 use crate::bvh::layout::{Aabb, SLACK, Triangle};
 
