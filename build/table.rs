@@ -19,8 +19,9 @@ pub fn file_of(name: &str) -> String {
 }
 
 /// Writes the table of all shaders below `glsl/`. `make` puts the SPIR-V of a source into OUT_DIR, in the file that it is given; several
-/// threads call it.
-pub fn write(make: impl Fn(&Path, &str) + Sync) {
+/// threads call it. Returns
+/// the names of all shaders.
+pub fn write(make: impl Fn(&Path, &str) + Sync) -> Vec<String> {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=glsl");
     let mut sources = Vec::new();
@@ -46,6 +47,7 @@ pub fn write(make: impl Fn(&Path, &str) + Sync) {
     writeln!(table, "/// Every shader, by name.\npub static ALL: &[&Shader] = &[&{names}];")
         .expect("writing to a string");
     fs::write(out_dir().join("shaders.rs"), table).expect("OUT_DIR can be written");
+    shaders.into_iter().map(|(_, name)| name).collect()
 }
 
 /// Path below `glsl/`, without extension.

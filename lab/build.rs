@@ -1,5 +1,8 @@
-//! Makes SPIR-V of the laboratory's own shaders, and the table that `src/shaders.rs` includes.
+//! Makes SPIR-V of the laboratory's own shaders, the table that `src/shaders.rs` includes, and the structs of
+//! their arguments that `src/arguments.rs` includes.
 
+#[path = "../build/arguments.rs"]
+mod arguments;
 #[path = "../build/compile.rs"]
 mod compile;
 #[path = "../build/shared_memory.rs"]
@@ -11,5 +14,6 @@ fn main() {
     println!("cargo:rerun-if-changed=../build");
     println!("cargo:rerun-if-changed=../glsl");
     let compiler = compile::Compiler { roots: &["glsl", "../glsl"] };
-    table::write(|source, file| compiler.make(source, file));
+    let names = table::write(|source, file| compiler.make(source, file));
+    arguments::write(&names);
 }

@@ -14,8 +14,6 @@ pub mod bvh;
 mod error;
 pub mod gpu;
 pub mod kdtree;
-#[cfg(all(test, feature = "compile-shaders"))]
-mod layouts;
 pub mod trace;
 
 pub use ash;

@@ -1,7 +1,7 @@
 //! A device that has less than it could: without what is optional, with inexact subgroups, with small limits, without timestamps.
 
 use crate::common::{OPTIONS, open};
-use hedgerow::gpu::scan::{self, Buffers, Scan};
+use hedgerow::gpu::scan::{Buffers, Scan};
 use hedgerow::gpu::{Timestamps, TuningChoice};
 use hedgerow_lab::device::{Device, DeviceOptions};
 
@@ -51,7 +51,7 @@ fn limits_can_only_be_lowered() {
 
 #[test]
 fn results_are_the_same_with_and_without_what_is_optional() {
-    let (expected, _) = scan::on_host(&numbers());
+    let (expected, _) = hedgerow::gpu::twin::scan::exclusive(&numbers());
     let all = with_everything();
     assert!(sums(&all, None) == expected, "with what is optional");
     for tuning in [TuningChoice::Cpu, TuningChoice::Gpu] {
@@ -89,7 +89,7 @@ fn staged_buffers_hold_what_was_written() {
     assert!(buffer.read::<u32>(0).is_empty());
     buffer.write(&[7u32]);
     assert_eq!(buffer.read::<u32>(2), [7, numbers[1]]);
-    assert!(sums(&device, None) == scan::on_host(&self::numbers()).0);
+    assert!(sums(&device, None) == hedgerow::gpu::twin::scan::exclusive(&self::numbers()).0);
     // What is uploaded while a command buffer is recorded is there when it runs.
     let scan = Scan::new(&device, COUNT);
     let sums = device.buffer("sums", 4 * u64::from(scan.sums_words())).expect("memory");
@@ -101,7 +101,10 @@ fn staged_buffers_hold_what_was_written() {
             scan.record(recorder, &buffers)
         })
         .expect("it scans");
-    assert!(values.expect("uploaded").read::<u32>(COUNT as usize) == scan::on_host(&self::numbers()).0);
+    assert!(
+        values.expect("uploaded").read::<u32>(COUNT as usize)
+            == hedgerow::gpu::twin::scan::exclusive(&self::numbers()).0
+    );
 }
 
 #[test]

@@ -7,10 +7,11 @@ mod example;
 use example::{EYE, HEIGHT, LAMP, Model, PLACES, WIDTH};
 use glam::Vec3;
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::{Hit, Ray, host};
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Ray};
 
 /// How bright the light of the lamp makes a pixel, and whether there is anything: engine.comp, with the host's tracer.
 fn light(tree: &Bvh2, corners: &dyn Fn(u32) -> [Vec3; 3], pixel: u32) -> Option<f32> {

@@ -4,6 +4,8 @@ mod common;
 mod device_limits;
 mod drivers;
 mod engine;
+mod formats;
+mod house;
 mod linked;
 mod shader_features;
 mod warming;

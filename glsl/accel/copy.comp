@@ -7,7 +7,7 @@
 #version 460
 #include "bvh/copy.glsl"
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform CopyStructureArguments {
     Structure source;
     Structure target;
 };

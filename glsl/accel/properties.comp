@@ -15,7 +15,7 @@ const uint SAH = 5;
 const uint SAH_GROWTH = 6;
 const uint STATUS = 7;
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform PropertiesArguments {
     Pairs results;
     uint property;
     uint count;

@@ -1,6 +1,6 @@
 // Re-braiding (Benthin, Woop, Wald 2017): before a top level is built, entries whose boxes are loose are opened, each replaced
 // by the two children of the node that it begins at, while the budget lasts. src/accel/rebraid.rs records the rounds, and
-// src/accel/host.rs is the twin.
+// src/accel/twin/mod.rs is the twin.
 //
 //   weigh   reads entries, the structures below     writes gains of entries that have none yet; histogram[round]
 //   select  reads gains, histogram[round]           writes sums[chunk]: entries that the round opens
@@ -29,7 +29,7 @@ BUFFER RebraidState {
     uint sums[2 * CHUNKS_AT_MOST];
 };
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform RebraidArguments {
     Entries entries;
     Floats gains;
     RebraidState state;

@@ -29,7 +29,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer M
 // A structure's header in the memory: a Structure wants addresses that are multiples of 16.
 layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer SerializedHeader { Header header; };
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform SerializeArguments {
     Structure structure;
     Memory memory;
     uint version[8];   // ours

@@ -1,4 +1,4 @@
-// The box in the world of an instance, or of a part of one: the twin of src/accel/host.rs.
+// The box in the world of an instance, or of a part of one: the twin of src/accel/twin/mod.rs.
 #ifndef HEDGEROW_ACCEL_WORLD_BOX
 #define HEDGEROW_ACCEL_WORLD_BOX
 #include "bvh/instances.glsl"

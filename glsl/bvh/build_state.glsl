@@ -31,18 +31,18 @@ BUFFER BuildState {
 
 // What a build is given: the push constants, or variables that the shader sets first. `vertices` to `transform` with
 // `vertex_stride` to `formats` are a Geometry; `code_kind` is what `kind_of_codes` takes out, collapse << 25, build flags << 26;
-// `columns` to `passes` are of the radix sort; where it has run, `columns` is the level of bvh/hlbvh_split.comp and
-// hlbvh_finish.comp.
+// `column_keys` and `passes` are of the radix sort; `level` is that of the top of treelets in bvh/hlbvh/split.comp and
+// finish.comp.
 #define BUILD_ARGUMENTS                                                                                        \
     uvec2 vertices; uvec2 indices; uvec2 transform; uvec2 structure_address; uvec2 state_address;             \
     uvec2 keys[2]; uvec2 values[2]; uvec2 ends_address; uvec2 table_address;                                  \
     uint vertex_stride; uint vertex_count; uint formats; uint primitive_count; uint code_kind;                \
     float c_t; float c_i;                                                                                     \
-    uint columns; uint column_keys; uint passes;
+    uint level; uint column_keys; uint passes;  
 #ifdef HEDGEROW_BUILD_ARGUMENTS_ARE_SET
 BUILD_ARGUMENTS
 #else
-layout(push_constant, scalar) uniform Arguments { BUILD_ARGUMENTS };
+layout(push_constant, scalar) uniform BuildArguments { BUILD_ARGUMENTS };
 #endif
 
 Geometry geometries() {

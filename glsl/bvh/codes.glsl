@@ -11,7 +11,7 @@
 #define HEDGEROW_BVH_CODES
 #include "gpu/pass.glsl"
 #include "bvh/geometry.glsl"
-#include "bvh/code_axes.glsl"
+#include "bvh/codes/axes.glsl"
 
 // What comes before the bits of the recipe: `Prefix` in src/bvh/codes/plan.rs. Kernels without have none of its code.
 layout(constant_id = 6) const uint CODE_PREFIX = 0;

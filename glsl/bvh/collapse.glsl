@@ -1,6 +1,6 @@
 // Finishing a tree whose leaves are single primitives at their sorted positions: subtrees become leaves where that is cheaper
 // (the weights say so) or where they are as deep as tracers can walk, records go to the order of a walk, left child first.
-// src/bvh/collapse.rs records the steps; src/bvh/host/collapse.rs is the twin.
+// src/bvh/collapse.rs records the steps; src/bvh/twin/collapse.rs is the twin.
 //
 //   parents  reads nodes                      writes weights: parents; arrivals (zero)
 //   weigh    reads nodes, parents             writes weights: counts, left_counts; costs; the header's costs

@@ -1,5 +1,5 @@
 // Compacts a Bvh2: the same tree depth first, left child first, without unused slots and without the records that are in no
-// leaf. src/bvh/compact.rs records the five steps, src/bvh/host/compact.rs is the twin.
+// leaf. src/bvh/compact.rs records the five steps, src/bvh/twin/compact.rs is the twin.
 //
 //   parents  reads the source                   writes places
 //   sizes    reads and writes places
@@ -38,7 +38,7 @@ const uint LARGE = 32;
 
 BUFFER Places { Place place[]; };
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform CompactArguments {
     Structure source;
     Structure target;
 };

@@ -1,5 +1,5 @@
 // From primitives to an order: the phases that every builder begins with, each a function over a task (a workgroup's worth of
-// items): dispatched one by one (bvh/encode_*.comp, gpu/radix_sort_*.comp) or from the task pool by the builder's persistent
+// items): dispatched one by one (bvh/encode/*.comp, gpu/radix_sort/*.comp) or from the task pool by the builder's persistent
 // kernel. src/bvh/encode.rs records them; a hierarchy follows.
 //
 //   reset      writes state: empty bounds, the pool
@@ -17,9 +17,9 @@
 #include "bvh/build_state.glsl"
 #include "bvh/empty.glsl"
 #include "bvh/sah.glsl"
-#include "bvh/code_sections.glsl"
-#include "bvh/code_mipping.glsl"
-#include "bvh/code_binning.glsl"
+#include "bvh/codes/sections.glsl"
+#include "bvh/codes/mipping.glsl"
+#include "bvh/codes/binning.glsl"
 
 // The order of the phases in the pool; the radix sort's three steps a pass and those of the hierarchy follow.
 const uint PHASE_BOUNDS = 0;
@@ -35,6 +35,11 @@ uint phases_before_hierarchy() {
     return PHASES_BEFORE_SORT + PHASES_OF_A_PASS * passes;
 }
 
+// Columns of the sort's table.
+uint columns_of_sort() {
+    return (primitive_count + column_keys - 1) / column_keys;
+}
+
 // ---- reset ----
 
 // `phases_behind`: phases behind the sort, of as many tasks as encode has, for the pool.
@@ -43,7 +48,7 @@ void reset_build(uint phases_behind) {
     uint i = gl_LocalInvocationIndex;
     uint tile = gl_WorkGroupSize.x * ITEMS;
     uint tiles = (primitive_count + tile - 1) / tile;
-    uint column_tasks = (columns + COLUMNS_A_TASK - 1) / COLUMNS_A_TASK;
+    uint column_tasks = (columns_of_sort() + COLUMNS_A_TASK - 1) / COLUMNS_A_TASK;
     uint scan_tasks = (DIGITS + DIGITS_A_TASK - 1) / DIGITS_A_TASK;
     uint sorted = phases_before_hierarchy();
     uint phases = sorted + phases_behind;
@@ -287,7 +292,7 @@ void encode(uint task) {
 Radix radix_of_pass(uint pass) {
     uint from = pass & 1;
     return Radix(Words(keys[from]), Words(values[from]), Words(keys[1 - from]), Words(values[1 - from]),
-                 Words(table_address), primitive_count, pass * DIGIT_BITS, columns, column_keys, pass == 0);
+                 Words(table_address), primitive_count, pass * DIGIT_BITS, columns_of_sort(), column_keys, pass == 0);
 }
 
 // ---- from the task pool ----

@@ -1,4 +1,4 @@
-// End-point overlap of a Bvh2 of triangles: src/bvh/epo.rs records the three steps, src/bvh/host/epo.rs is the twin.
+// End-point overlap of a Bvh2 of triangles: src/bvh/epo.rs records the three steps, src/bvh/twin/epo.rs is the twin.
 // Aila, Karras, Laine 2013, section 3.2.
 //
 //   parents   reads nodes                        writes parents (filled with NONE before)
@@ -19,7 +19,7 @@ const uint NONE = 0xFFFFFFFFu;
 // Areas: Σ over inner nodes of what lies in them and is not of them, the same over leaves times triangles, and of the surface.
 BUFFER Sums { vec3 of[]; };
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform EpoArguments {
     Structure structure;
     Words parents;     // of each slot, then of each record
     Sums sums;

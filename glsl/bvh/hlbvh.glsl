@@ -1,13 +1,13 @@
 // HLBVH (Pantaleoni and Luebke 2010): treelets of the radix tree, and over them a top that the surface area heuristic splits, by
-// a queue of tasks (Garanzha, Pantaleoni, McAllister 2011). src/bvh/hlbvh.rs records it; src/bvh/host/hlbvh.rs is the twin and
+// a queue of tasks (Garanzha, Pantaleoni, McAllister 2011). src/bvh/hlbvh.rs records it; src/bvh/twin/hlbvh.rs is the twin and
 // says what the papers leave open.
 //
 //   treelets  reads the primitives, keys, values    writes nodes and weights inside treelets; ends: which splits are inside
-//   count     reads ends                            writes sums: treelets of each tile          (bvh/hlbvh_treelets.glsl)
+//   count     reads ends                            writes sums: treelets of each tile          (bvh/hlbvh/treelets.glsl)
 //   scan      reads sums                            writes sums (exclusive), the number of treelets, the first task
 //   gather    reads ends, nodes, weights, sums      writes clusters: a treelet each; order 0
 //   split     reads clusters, order, tasks          writes nodes, parents, the next level's order and tasks; a level at a time
-//   finish    the same, all levels that are left of each task                                   (bvh/hlbvh_split.glsl)
+//   finish    the same, all levels that are left of each task                                   (bvh/hlbvh/split.glsl)
 //   weigh     reads nodes, parents, clusters        writes weights and costs above treelets
 //   (collapse: bvh/collapse.glsl)
 //

@@ -1,5 +1,5 @@
 // H-PLOC (Benthin et al. 2024): PLOC within each node of the radix tree, bottom-up in one pass. src/bvh/hploc.rs records it;
-// src/bvh/host/hploc.rs is the twin.
+// src/bvh/twin/hploc.rs is the twin.
 //
 //   hierarchy  reads the primitives, keys and values   writes nodes, root, costs, weights; scratch: clusters
 //   (collapse: bvh/collapse.glsl)
@@ -12,8 +12,8 @@
 // needs one barrier before, behind bvh/encode.glsl's phases; subgroups of any size
 #ifndef HEDGEROW_BVH_HPLOC
 #define HEDGEROW_BVH_HPLOC
-#include "bvh/hploc_alone.glsl"
-#include "bvh/hploc_teams.glsl"
+#include "bvh/hploc/alone.glsl"
+#include "bvh/hploc/teams.glsl"
 #include "bvh/radix_tree.glsl"
 
 // Levels of a radix tree: a code bit or a position bit each.

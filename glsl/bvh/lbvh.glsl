@@ -1,5 +1,5 @@
 // The LBVH's hierarchy: boxes, costs and collapsing bottom-up in one pass, a function over a task (a workgroup's worth of
-// positions): dispatched by bvh/lbvh_hierarchy.comp or from the task pool by bvh/lbvh_persistent.comp. src/bvh/lbvh.rs records
+// positions): dispatched by bvh/lbvh/hierarchy.comp or from the task pool by bvh/lbvh/persistent.comp. src/bvh/lbvh.rs records
 // both.
 //
 //   hierarchy  reads the primitives, keys and values   writes the structure: records, nodes, root, costs

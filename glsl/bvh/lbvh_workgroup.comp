@@ -21,7 +21,7 @@ struct Small {
     uint primitive_count;
 };
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform BuildAloneArguments {
     Small builds[2];
     float step_cost;
     float test_cost;
@@ -52,7 +52,6 @@ void main() {
     // A strip for each lane, or tiles.
     column_keys = PRIVATE_COUNTERS ? max((primitive_count + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x, 1u)
                                    : TILE_KEYS;
-    columns = (primitive_count + column_keys - 1u) / column_keys;
     passes = primitive_count < 2u ? 0u : (kind_of_codes().bits + DIGIT_BITS - 1u) / DIGIT_BITS;
     uvec2 at = build.scratch;
     state_address = take(at, given.state_bytes);
@@ -85,11 +84,11 @@ void main() {
     next_phase();
     for (uint pass = 0; pass < passes; ++pass) {
         Radix r = radix_of_pass(pass);
-        for (uint task = 0; task * COLUMNS_A_TASK < columns; ++task) radix_count(r, task);
+        for (uint task = 0; task * COLUMNS_A_TASK < columns_of_sort(); ++task) radix_count(r, task);
         next_phase();
         for (uint task = 0; task * DIGITS_A_TASK < DIGITS; ++task) radix_scan(r, task);
         next_phase();
-        for (uint task = 0; task * COLUMNS_A_TASK < columns; ++task) radix_scatter(r, task);
+        for (uint task = 0; task * COLUMNS_A_TASK < columns_of_sort(); ++task) radix_scatter(r, task);
         next_phase();
     }
     for (uint task = 0; task < tiles; ++task) lbvh_hierarchy(task);

@@ -1,5 +1,5 @@
 // PLOC (Meister and Bittner 2018): in rounds, clusters that are each other's nearest within RADIUS places become one.
-// src/bvh/ploc.rs records it; src/bvh/host/ploc.rs is the twin and says what the paper leaves open.
+// src/bvh/ploc.rs records it; src/bvh/twin/ploc.rs is the twin and says what the paper leaves open.
 //
 //   begin    reads the primitives, keys, values      writes clusters, list[0], the first round's count
 //   search   reads list[round], clusters             writes nearest

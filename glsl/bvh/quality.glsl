@@ -28,7 +28,7 @@ struct Figures {
 
 BUFFER FiguresOf { Figures tile[]; };
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform QualityArguments {
     Structure structure;
     Words parents;
     FiguresOf partials;

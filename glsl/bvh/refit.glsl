@@ -1,5 +1,5 @@
 // The phases of a refit, each a function over a task (a workgroup's worth of runs, each so many slots): dispatched one by one
-// (bvh/refit_*.comp) or all by one workgroup (bvh/refit_workgroup.comp). src/bvh/refit.rs records both.
+// (bvh/refit/*.comp) or all by one workgroup (bvh/refit/workgroup.comp). src/bvh/refit.rs records both.
 //
 //   leaves   reads the primitives, the nodes        writes the structure: records, status, boxes of leaves and of what lies in
 //                                                   one run; scratch: all
@@ -43,7 +43,7 @@ struct Update {
     uint primitive_count;
 };
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform RefitArguments {
     Update updates[2];
     float c_t;
     float c_i;

@@ -1,5 +1,5 @@
 // Parallel reinsertion: subtrees of a tree whose leaves have one record each move to where they cost less. src/bvh/reinsertion.rs
-// tells the method and records the steps; src/bvh/host/reinsertion.rs is the twin.
+// tells the method and records the steps; src/bvh/twin/reinsertion.rs is the twin.
 //
 //   parents  reads nodes                        writes parents
 //   (fill    writes gains, firsts: zero)
@@ -30,7 +30,7 @@ struct Move {
 
 BUFFER Moves { Move move[]; };
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform ReinsertionArguments {
     Structure structure;
     Words parents;      // of each slot, the link that names it
     Moves moves;

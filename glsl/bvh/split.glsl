@@ -1,6 +1,6 @@
 // References instead of triangles: large ones become several, with tighter boxes (Karras and Aila 2013, section 5). Each phase is
 // a function over a task (a workgroup's worth of items). src/bvh/split.rs records them and tells the formulas; the twin is
-// src/bvh/host/split.rs.
+// src/bvh/twin/split.rs.
 //
 //   reset       writes state: empty bounds, histogram (zero)
 //   bounds      reads the triangles                  writes state: bounds
@@ -15,13 +15,13 @@
 #ifndef HEDGEROW_BVH_SPLIT
 #define HEDGEROW_BVH_SPLIT
 #include "bvh/primitives.glsl"
-#include "bvh/split_planes.glsl"
+#include "bvh/split/planes.glsl"
 
 // Items of an invocation in a task: all kernels of a build have the word of bvh/build_state.glsl.
 layout(constant_id = 1) const uint ITEMS_WORD = 1;
 const uint ITEMS = ITEMS_WORD & 0xFFFFu;
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform SplitArguments {
     uvec2 vertices;
     uvec2 indices;
     uvec2 transform;

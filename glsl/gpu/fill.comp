@@ -7,7 +7,7 @@
 
 layout(constant_id = 1) const uint ROUNDS = 1;
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform FillArguments {
     Words words;
     uint count;
     uint value;

@@ -1,8 +1,8 @@
 // One pass of a stable radix sort over one digit: count, scan, scatter (Satish, Harris, Garland 2009: reduce, then scan).
 // Needs no progress of other workgroups. src/gpu/radix_sort.rs records it and holds its twin.
 //
-// A *column* is what one counter a digit counts: a strip of keys of one invocation (gpu/radix_sort_strips.glsl, for CPUs: no
-// atomics, no ballots, no barriers) or the tile of a workgroup (gpu/radix_sort_tiles.glsl, for GPUs: coalesced, ranked by
+// A *column* is what one counter a digit counts: a strip of keys of one invocation (gpu/radix_sort/strips.glsl, for CPUs: no
+// atomics, no ballots, no barriers) or the tile of a workgroup (gpu/radix_sort/tiles.glsl, for GPUs: coalesced, ranked by
 // ballots). The table holds a count for each digit and column, then DIGITS totals behind them.
 //
 //   count    reads keys                   writes table
@@ -63,8 +63,8 @@ uint radix_value(Radix r, uint i) {
     return r.identity ? i : r.values.word[i];
 }
 
-#include "gpu/radix_sort_strips.glsl"
-#include "gpu/radix_sort_tiles.glsl"
+#include "gpu/radix_sort/strips.glsl"
+#include "gpu/radix_sort/tiles.glsl"
 
 // The three steps as tasks of a workgroup.
 void radix_count(Radix r, uint task) {

@@ -10,7 +10,7 @@
 #define HEDGEROW_GPU_SCAN
 #include "gpu/pass.glsl"
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform ScanArguments {
     Words values;
     Words results;
     Words sums;

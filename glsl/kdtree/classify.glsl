@@ -1,4 +1,4 @@
-// What a plane makes of the references of a task, and where it goes: see kdtree/build.glsl.
+// What a plane makes of the references of a task, and where it goes: see kdtree/builder.glsl.
 #ifndef HEDGEROW_KDTREE_CLASSIFY
 #define HEDGEROW_KDTREE_CLASSIFY
 #include "kdtree/bin.glsl"

@@ -2,7 +2,7 @@
 // point of a triangle is lost.
 #ifndef HEDGEROW_KDTREE_CLIP
 #define HEDGEROW_KDTREE_CLIP
-#include "kdtree/build.glsl"
+#include "kdtree/builder.glsl"
 #include "bvh/codes.glsl"
 
 // Whether the device's own reciprocals are correctly rounded, as those of CPUs are. Vulkan lets them err by 2.5 ulp.

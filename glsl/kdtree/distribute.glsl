@@ -1,5 +1,5 @@
 // The references of a task go to its children, or to its leaf; its node, and the tasks of the next level, are written: see
-// kdtree/build.glsl.
+// kdtree/builder.glsl.
 #ifndef HEDGEROW_KDTREE_DISTRIBUTE
 #define HEDGEROW_KDTREE_DISTRIBUTE
 #include "kdtree/classify.glsl"

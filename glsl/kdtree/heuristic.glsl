@@ -1,7 +1,7 @@
 // What a plane costs: src/kdtree/host/heuristic.rs is the twin, bit for bit.
 #ifndef HEDGEROW_KDTREE_HEURISTIC
 #define HEDGEROW_KDTREE_HEURISTIC
-#include "kdtree/build.glsl"
+#include "kdtree/builder.glsl"
 
 const uint INFINITE = 0x7F800000u;
 

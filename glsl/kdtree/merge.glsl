@@ -21,7 +21,7 @@
 //   needs  one barrier between phases
 #ifndef HEDGEROW_KDTREE_MERGE
 #define HEDGEROW_KDTREE_MERGE
-#include "kdtree/merge_state.glsl"
+#include "kdtree/merge/state.glsl"
 #include "kdtree/scan.glsl"
 #include "kdtree/clip.glsl"
 

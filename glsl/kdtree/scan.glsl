@@ -1,5 +1,5 @@
 // The end of a level: where chunks put what they have, whether there is room for the next level, its nodes and tasks. See
-// kdtree/build.glsl. What a task makes is summed up first, a tile of tasks at a time; when the sums of all tiles are known, each
+// kdtree/builder.glsl. What a task makes is summed up first, a tile of tasks at a time; when the sums of all tiles are known, each
 // tile is written to its places.
 #ifndef HEDGEROW_KDTREE_SCAN
 #define HEDGEROW_KDTREE_SCAN

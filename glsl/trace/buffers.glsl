@@ -8,7 +8,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Ra
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Hits { HedgerowHit hit[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Works { uvec3 work[]; };
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform TraceArguments {
     Structure structure;
     Rays rays;
     Hits hits;

@@ -1,6 +1,6 @@
 //! Builders that run on the CPU in their own right, with as many threads as rayon has.
 //!
-//! The library's own host code (`hedgerow::bvh::host`, `hedgerow::kdtree::twin`) says what a device pass computes, on one thread.
+//! The library's own host code (`hedgerow::bvh::twin`, `hedgerow::kdtree::twin`) says what a device pass computes, on one thread.
 //! What is here is for tools that build on the CPU, and is what the builders of the device are measured against.
 //!
 //! - [`sweep`]: a BVH by the full sweep;

@@ -8,6 +8,8 @@
 //! 6. [`cli`] is the binary's commands.
 #![warn(missing_docs)]
 
+#[doc(hidden)]
+pub mod arguments;
 pub mod cli;
 pub mod device;
 mod error;

@@ -9,7 +9,7 @@ use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
 use crate::bvh::refit::{self, Refit};
 use crate::bvh::sah::Collapse;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Step, shaders};
 use crate::{Error, Result};
 use ash::vk;
@@ -174,18 +174,17 @@ impl Build {
                 Counts::OnDevice { address, stride } => {
                     let end = Geometry { flags: GeometryFlags::END, ..Geometry::mesh(0, 0, 0) };
                     let all: Vec<Geometry> = geometries.iter().copied().chain([end]).collect();
-                    let arguments = Ranges {
+                    let arguments = arguments::Ranges {
                         records: scratch,
                         ranges: address,
                         stride,
                         count: geometries.len() as u32,
                         boxes: u32::from(self.given.primitives() == Primitives::Boxes),
-                        padding: 0,
                     };
                     // The records of one chain touch no memory of each other's: the barriers between them are not needed, and
                     // geometries whose ranges lie in device memory are few.
                     let mut steps = record_steps(&all, scratch);
-                    let kernel = Kernel::new(&shaders::ACCEL_RANGES, context.tuning.small_group, &[]);
+                    let kernel = Kernel::new(&shaders::ACCEL_BUILD_RANGES, context.tuning.small_group, &[]);
                     steps.push(Step::new("geometries", kernel, &arguments, 1));
                     vec![steps]
                 }
@@ -228,49 +227,21 @@ fn collapse(flags: Flags) -> Collapse {
     }
 }
 
-push_constants! {
-    /// Push constants of `glsl/accel/geometries.comp`.
-    struct Records {
-        records: u64,
-        at: u32,
-        count: u32,
-        given: [Geometry; RECORDS_AT_ONCE],
-    }
-}
-
 /// Records that fit into the push constants.
 const RECORDS_AT_ONCE: usize = 2;
 
 /// The dispatches that write the records: they need no barrier between them.
 fn record_steps(geometries: &[Geometry], records: u64) -> Vec<Step> {
-    let kernel = Kernel::new(&shaders::ACCEL_GEOMETRIES, RECORDS_AT_ONCE as u32, &[]);
+    let kernel = Kernel::new(&shaders::ACCEL_BUILD_GEOMETRIES, RECORDS_AT_ONCE as u32, &[]);
     let step = |(i, chunk): (usize, &[Geometry])| {
         let mut given = [Geometry::mesh(0, 0, 0); RECORDS_AT_ONCE];
         given[..chunk.len()].copy_from_slice(chunk);
         let (at, count) = ((RECORDS_AT_ONCE * i) as u32, chunk.len() as u32);
-        Step::new("geometries", kernel.clone(), &Records { records, at, count, given }, 1)
+        let given = bytemuck::cast(given);
+        Step::new("geometries", kernel.clone(), &arguments::Geometries { records, at, count, given }, 1)
     };
     geometries.chunks(RECORDS_AT_ONCE).enumerate().map(step).collect()
 }
-
-/// Push constants of `glsl/accel/ranges.comp`.
-mod ranges {
-    use crate::gpu::push_constants::push_constants;
-
-    push_constants! {
-        pub struct Ranges {
-            pub records: u64,
-            pub ranges: u64,
-            pub stride: u32,
-            pub count: u32,
-            pub boxes: u32,
-            pub padding: u32,
-        }
-    }
-}
-use ranges::Ranges;
-#[cfg(all(test, feature = "compile-shaders"))]
-pub(crate) use ranges::push_constants as ranges_push_constants;
 
 /// The geometries that `info` gives with the counts of their ranges.
 ///

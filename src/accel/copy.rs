@@ -3,23 +3,15 @@
 use super::Device;
 use super::given::not_null;
 use crate::bvh::compact;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Grid, Recorder, Step, shaders};
 use crate::{Error, Result};
 use ash::vk;
 
-push_constants! {
-    /// Push constants of `glsl/accel/copy.comp`.
-    struct Arguments {
-        source: u64,
-        target: u64,
-    }
-}
-
 /// The copying of a structure as it is.
 pub(super) fn clone_step(context: &Context, source: u64, target: u64) -> Step {
     let grid = Grid::of(context);
-    Step::new("clone", grid.kernel(&shaders::ACCEL_COPY), &Arguments { source, target }, grid.groups)
+    Step::new("clone", grid.kernel(&shaders::ACCEL_COPY), &arguments::CopyStructure { source, target }, grid.groups)
 }
 
 impl Device<'_> {

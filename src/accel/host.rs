@@ -4,9 +4,9 @@ use super::build::{self, Build, Counts};
 use super::geometry::Given;
 use super::{Device, Options};
 use crate::bvh::geometry::{Geometry, IndexFormat};
-use crate::bvh::host::geometry::{Corners, HostGeometry};
-use crate::bvh::host::lbvh;
 use crate::bvh::layout::Aabb;
+use crate::bvh::twin::geometry::{Corners, HostGeometry};
+use crate::bvh::twin::lbvh;
 use crate::gpu::Context;
 use crate::{Error, Result};
 use ash::vk;
@@ -15,7 +15,7 @@ impl Device<'_> {
     /// `vkBuildAccelerationStructuresKHR`, but for where the structures go: the bytes of build i, those that a device's build of
     /// the same input writes, into `memory[i]`, to be copied to where the structure shall lie. Handles and scratch memory are
     /// not looked at. The host's builder is the plain one that the device's is tested with: one thread, no deferred operations.
-    /// Top levels are built by [`top_level`](super::top_level), which is told what lies below them.
+    /// Top levels are built by [`twin`](super::twin), which is told what lies below them.
     ///
     /// # Errors
     /// As [`Device::cmd_build_acceleration_structures`]; a build of instances, or an update; too little memory.
@@ -90,7 +90,7 @@ unsafe fn built(
             Ok(tree.with_geometries(&flags_of(geometries), build_flags).to_bytes())
         }
         Given::Instances { .. } => Err(Error::Argument(
-            "type is TOP_LEVEL; this call does not have the structures that instances name: take accel::top_level"
+            "type is TOP_LEVEL; this call does not have the structures that instances name: take accel::twin::top_level"
                 .into(),
         )),
     }

@@ -1,6 +1,5 @@
 //! Instances as the caller writes them, and the entries that top levels are built over.
-
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Step, shaders};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -44,19 +43,6 @@ impl Instance {
 /// Bytes of an `Entry` of instances.glsl.
 pub(super) const ENTRY_BYTES: u64 = 48;
 
-push_constants! {
-    /// Push constants of `glsl/accel/entries.comp`.
-    struct Arguments {
-        instances: u64,
-        entries: u64,
-        ranges: u64,
-        count: u32,
-        capacity: u32,
-        pointers: u32,
-        padding: u32,
-    }
-}
-
 /// Writes `capacity` entries, those from `count` on without an instance. `ranges`, if not 0, is the address of the range in
 /// device memory that tells how many instances there are, and where they begin behind `instances`.
 pub(super) fn entries_step(
@@ -69,8 +55,8 @@ pub(super) fn entries_step(
     capacity: u32,
 ) -> Step {
     let workgroup = context.tuning.small_group;
-    let kernel = Kernel::new(&shaders::ACCEL_ENTRIES, workgroup, &[]);
+    let kernel = Kernel::new(&shaders::ACCEL_INSTANCES_ENTRIES, workgroup, &[]);
     let pointers = u32::from(pointers);
-    let arguments = Arguments { instances, entries, ranges, count, capacity, pointers, padding: 0 };
+    let arguments = arguments::Entries { instances, entries, ranges, count, capacity, pointers };
     Step::new("entries", kernel, &arguments, capacity.div_ceil(workgroup))
 }

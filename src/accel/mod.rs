@@ -13,7 +13,7 @@
 //! A structure's bytes are the same on every device, with one exception: an instance's record holds the inverse of its matrix,
 //! which takes one division. Vulkan lets a device's quotient be 2.5 units in the last place away from the correctly rounded one.
 //! lavapipe and SwiftShader round correctly, and there the bytes are those of
-//! [`top_level`]; elsewhere its numbers are within [`top_level::INVERSE_BOUND`] of them, and everything else is the same.
+//! [`twin::top_level`]; elsewhere its numbers are within [`twin::INVERSE_BOUND`] of them, and everything else is the same.
 //!
 //! A structure is copied, compacted, kept in a file and brought back by the calls of the extension ([`serialize`]); what the
 //! device knows of it is a [`Property`], written to an address instead of a query pool.
@@ -41,7 +41,7 @@ mod properties;
 mod rebraid;
 mod request;
 pub mod serialize;
-pub mod top_level;
+pub mod twin;
 
 pub use build::SCRATCH_ALIGNMENT;
 pub use device::{Device, STRUCTURE_ALIGNMENT};
@@ -85,14 +85,4 @@ impl Default for Options {
     fn default() -> Options {
         Options::DEFAULT
     }
-}
-
-#[cfg(all(test, feature = "compile-shaders"))]
-pub(crate) mod push_constants {
-    pub(crate) use super::build::{push_constants as geometries, ranges_push_constants as ranges};
-    pub(crate) use super::copy::push_constants as copy;
-    pub(crate) use super::instances::push_constants as entries;
-    pub(crate) use super::properties::push_constants as properties;
-    pub(crate) use super::rebraid::push_constants as rebraid;
-    pub(crate) use super::serialize::push_constants as serialize;
 }

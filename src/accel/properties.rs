@@ -2,7 +2,7 @@
 
 use super::Device;
 use super::given::not_null;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Kernel, Recorder, shaders};
 use crate::{Error, Result};
 use ash::vk;
@@ -51,16 +51,6 @@ impl TryFrom<vk::QueryType> for Property {
 /// Structures whose addresses fit into the push constants beside the rest.
 const STRUCTURES_AT_ONCE: usize = 14;
 
-push_constants! {
-    /// Push constants of `glsl/accel/properties.comp`.
-    struct Arguments {
-        results: u64,
-        property: u32,
-        count: u32,
-        structures: [u64; STRUCTURES_AT_ONCE],
-    }
-}
-
 impl Device<'_> {
     /// `vkCmdWriteAccelerationStructuresPropertiesKHR`, but for where the results go: a `u64` each, from the device address
     /// `results` on, a multiple of 8. (The driver's call writes a query pool, which no shader can.) A barrier from
@@ -98,7 +88,8 @@ impl Device<'_> {
             let mut structures = [0; STRUCTURES_AT_ONCE];
             structures[..chunk.len()].copy_from_slice(chunk);
             let results = results + (8 * STRUCTURES_AT_ONCE * i) as u64;
-            let arguments = Arguments { results, property: property as u32, count: chunk.len() as u32, structures };
+            let arguments =
+                arguments::Properties { results, property: property as u32, count: chunk.len() as u32, structures };
             recorder.dispatch(&kernel, &arguments, 1)?;
         }
         Ok(())

@@ -4,7 +4,7 @@
 //! them can be told to be nearer. Opened, it stands in the tree as the two children of its structure's root, or their
 //! children…, each with a tighter box in the world. That is bought with entries, so the budget goes to where an entry more
 //! saves most area: the parent's, less its children's. (The paper opens by the largest area while a tree is built top-down;
-//! bottom-up builders need the entries before.) `glsl/accel/rebraid.glsl` has the rounds, [`top_level`](super::top_level) is the twin.
+//! bottom-up builders need the entries before.) `glsl/accel/rebraid.glsl` has the rounds, [`twin`](super::twin) is the twin.
 //!
 //! How many times as fast rays are traced, on lavapipe of Mesa 26 with two cores that others used too (load 10): the geometric
 //! mean of primary, ambient occlusion, diffuse and random rays, each the ratio of the medians of alternating runs; and what a
@@ -23,8 +23,7 @@
 //!
 //! Tried, and not worth it: weighing volume beside area, for rays that begin in boxes (city ±5%, cables −1%); opening what is
 //! tight, too (slower); more than three rounds (no change within 1%, but what is very loose among many is opened deeper: four).
-
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Step, fill, shaders};
 
 /// Times that entries are weighed and opened: `ROUNDS` in rebraid.glsl.
@@ -41,19 +40,6 @@ const SMALL: u32 = 1024;
 /// The class of a gain: two to each power of two.
 pub(super) fn class_of(gain: f32) -> u32 {
     gain.to_bits() >> 22 & (CLASSES - 1)
-}
-
-push_constants! {
-    /// Push constants of `glsl/accel/rebraid_*.comp`.
-    struct Arguments {
-        entries: u64,
-        gains: u64,
-        state: u64,
-        capacity: u32,
-        first_round: u32,
-        chunks: u32,
-        instance_count: u32,
-    }
 }
 
 /// Opening the entries of a top level.
@@ -73,7 +59,7 @@ impl Rebraid {
     pub fn steps(&self, context: &Context, count: u32, entries: u64, scratch: u64) -> Vec<Step> {
         // Enough for all cores; a chunk is a workgroup's.
         let chunks = count.div_ceil(256).clamp(1, CHUNKS);
-        let arguments = |first_round, chunks| Arguments {
+        let arguments = |first_round, chunks| arguments::Rebraid {
             entries,
             gains: scratch,
             state: scratch + 4 * u64::from(self.capacity),

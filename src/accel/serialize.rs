@@ -12,8 +12,8 @@
 
 use super::Device;
 use super::given::{aligned, not_null};
-use crate::bvh::layout::{self, Header, Instance, MAGIC, Record};
-use crate::gpu::push_constants::push_constants;
+use crate::bvh::layout::{self, Header, Instance, Record};
+use crate::gpu::arguments;
 use crate::gpu::{Grid, Recorder, shaders};
 use crate::{Error, Result};
 use ash::vk;
@@ -58,7 +58,7 @@ pub struct Head {
 
 impl Head {
     /// Of a structure with this header.
-    fn of(header: &Header, sizes: &layout::Sizes) -> Head {
+    pub(super) fn of(header: &Header, sizes: &layout::Sizes) -> Head {
         let handle_count = if header.kind == Instance::KIND { header.primitive_count.into() } else { 0 };
         Head {
             version: VERSION,
@@ -69,7 +69,7 @@ impl Head {
     }
 
     /// Where the handles lie in the structure's own bytes.
-    fn handles(&self, sizes: &layout::Sizes) -> impl Iterator<Item = Range<usize>> {
+    pub(super) fn handles(&self, sizes: &layout::Sizes) -> impl Iterator<Item = Range<usize>> {
         let first = sizes.records_offset as usize + offset_of!(Instance, structure);
         (0..self.handle_count as usize)
             .map(move |i| first + i * size_of::<Instance>())
@@ -77,17 +77,9 @@ impl Head {
     }
 }
 
-push_constants! {
-    struct Arguments {
-        structure: u64,
-        memory: u64,
-        version: [u8; 2 * vk::UUID_SIZE],
-    }
-}
-
-impl Arguments {
-    fn of(structure: u64, memory: u64) -> Arguments {
-        Arguments { structure, memory, version: VERSION }
+impl arguments::Serialize {
+    fn of(structure: u64, memory: u64) -> arguments::Serialize {
+        arguments::Serialize { structure, memory, version: bytemuck::cast(VERSION) }
     }
 }
 
@@ -111,7 +103,7 @@ impl Device<'_> {
         }
         // SAFETY: commands on the device take device addresses.
         let memory = aligned("dst", unsafe { info.dst.device_address })?;
-        let arguments = Arguments::of(not_null("src", info.src)?, memory);
+        let arguments = arguments::Serialize::of(not_null("src", info.src)?, memory);
         if let Some(checks) = &self.checks {
             checks.reads("src", info.src)?;
         }
@@ -146,7 +138,7 @@ impl Device<'_> {
         }
         // SAFETY: commands on the device take device addresses.
         let memory = aligned("src", unsafe { info.src.device_address })?;
-        let arguments = Arguments::of(not_null("dst", info.dst)?, memory);
+        let arguments = arguments::Serialize::of(not_null("dst", info.dst)?, memory);
         if let Some(checks) = &self.checks {
             checks.written(info.dst)?;
         }
@@ -170,58 +162,4 @@ impl Device<'_> {
             _ => vk::AccelerationStructureCompatibilityKHR::INCOMPATIBLE,
         }
     }
-}
-
-/// What the device writes of a structure's bytes.
-///
-/// # Errors
-/// [`Error::InvalidStructure`]: they are not those of a structure.
-pub fn write_on_host(structure: &[u8]) -> Result<Vec<u8>> {
-    let (header, sizes) = parts_of(structure)?;
-    let structure = &structure[..sizes.bytes as usize];
-    let head = Head::of(&header, &sizes);
-    let mut memory = bytemuck::bytes_of(&head).to_vec();
-    for handle in head.handles(&sizes) {
-        memory.extend_from_slice(&structure[handle]);
-    }
-    memory.extend_from_slice(structure);
-    Ok(memory)
-}
-
-/// The structure that the device reads out of the memory, with the handles that stand there.
-///
-/// # Errors
-/// [`Error::InvalidStructure`]: another version wrote it, or it is cut off. (The device makes an empty structure of it.)
-pub fn read_on_host(memory: &[u8]) -> Result<Vec<u8>> {
-    let invalid = |what: &str| Error::InvalidStructure(format!("serialised: {what}"));
-    let head = memory.get(..size_of::<Head>()).ok_or_else(|| invalid("shorter than its head"))?;
-    let head: Head = bytemuck::pod_read_unaligned(head);
-    if head.version != VERSION {
-        return Err(invalid("another version wrote it; build the structure anew"));
-    }
-    let handles = size_of::<Head>()..(size_of::<Head>() as u64 + 8 * head.handle_count) as usize;
-    let (handles, structure) = (memory.get(handles.clone()), memory.get(handles.end..));
-    let (Some(handles), Some(structure)) = (handles, structure) else { return Err(invalid("shorter than it says")) };
-    let (header, sizes) = parts_of(structure)?;
-    if head != Head::of(&header, &sizes) {
-        return Err(invalid("its head and the structure's header say different sizes"));
-    }
-    let mut structure = structure[..sizes.bytes as usize].to_vec();
-    for (at, handle) in head.handles(&sizes).zip(handles.chunks_exact(8)) {
-        structure[at].copy_from_slice(handle);
-    }
-    Ok(structure)
-}
-
-/// The header of a structure's bytes, and where its parts lie.
-fn parts_of(structure: &[u8]) -> Result<(Header, layout::Sizes)> {
-    let invalid = |what: &str| Error::InvalidStructure(what.into());
-    let header = structure.get(..size_of::<Header>()).ok_or_else(|| invalid("shorter than its header"))?;
-    let header: Header = bytemuck::pod_read_unaligned(header);
-    let record_bytes = layout::record_bytes(header.kind).filter(|_| header.magic == MAGIC);
-    let sizes = header.sizes(record_bytes.ok_or_else(|| invalid("of another kind or version"))?);
-    if (structure.len() as u64) < sizes.bytes {
-        return Err(invalid("shorter than its header says"));
-    }
-    Ok((header, sizes))
 }

@@ -1,15 +1,16 @@
 //! Trees over triangles, boxes or instances, built on the device in the caller's command buffer and memory.
 //!
 //! [`Builder::sizes`] tells the memory, [`Builder::record`] records the build. What all methods begin with is in `encode.rs`;
-//! each [`Method`] has a file of its own, and a twin in [`super::host`] with the same bytes.
+//! each [`Method`] has a file of its own, and a twin in [`super::twin`] with the same bytes.
 
 use super::codes::{Code, Codes};
-use super::encode::{Arguments, Encode};
+use super::encode::Encode;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::reinsertion::{self, Reinsertion};
 use super::sah::Collapse;
 use super::split::{self, Split};
 use super::{collapse, hlbvh, hploc, layout, lbvh, lbvh_workgroup, ploc};
+use crate::gpu::arguments;
 use crate::gpu::radix_sort::{self, Shape};
 use crate::gpu::{BuildTuning, Context, Recorder, Step};
 use crate::{Error, Result};
@@ -445,7 +446,7 @@ impl Builder {
         Ok(steps)
     }
 
-    fn chain(&self, input: &Input, arguments: &Arguments) -> Vec<Step> {
+    fn chain(&self, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
         let Builder { method, encode, optimise, .. } = self;
         // What is weighed later has leaves of one primitive until then.
         let single = if self.weighs() { arguments.without_collapse() } else { *arguments };

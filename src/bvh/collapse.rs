@@ -3,8 +3,9 @@
 //! Meister and Bittner 2018, section 4, for the collapsing. `glsl/bvh/collapse.glsl` is the device's side; the twin is
 //! [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
-use super::encode::{Arguments, Encode};
+use super::encode::Encode;
 use super::geometry::Input;
+use crate::gpu::arguments;
 use crate::gpu::{Step, shaders};
 
 /// Bytes of the weights of so many primitives: `Weights` in weights.glsl.
@@ -18,7 +19,7 @@ pub(super) const fn weigh_bytes(count: u64) -> u64 {
 }
 
 /// The dispatches that finish a tree whose weights are known. Label: `collapse`.
-pub(super) fn place_steps(encode: &Encode, input: &Input, arguments: &Arguments) -> Vec<Step> {
+pub(super) fn place_steps(encode: &Encode, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
     let kernels = [
         encode.kernel(&shaders::BVH_COLLAPSE_ABOVE),
         encode.kernel(&shaders::BVH_COLLAPSE_PLACE),
@@ -28,7 +29,7 @@ pub(super) fn place_steps(encode: &Encode, input: &Input, arguments: &Arguments)
 }
 
 /// The dispatches that find the weights of any tree. Label: `collapse`.
-pub(super) fn weigh_steps(encode: &Encode, arguments: &Arguments) -> Vec<Step> {
+pub(super) fn weigh_steps(encode: &Encode, arguments: &arguments::Build) -> Vec<Step> {
     [&shaders::BVH_COLLAPSE_PARENTS, &shaders::BVH_COLLAPSE_WEIGH]
         .map(|shader| Step::new("collapse", encode.kernel(shader), arguments, encode.tiles()))
         .into()

@@ -7,15 +7,8 @@
 //! [`Bvh2::compacted`]: super::layout::Bvh2::compacted
 
 use crate::Result;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Grid, Recorder, Step, shaders};
-
-push_constants! {
-    struct Arguments {
-        source: u64,
-        target: u64,
-    }
-}
 
 const STEPS: [&shaders::Shader; 5] = [
     &shaders::BVH_COMPACT_PARENTS,
@@ -37,6 +30,6 @@ const STEPS: [&shaders::Shader; 5] = [
 /// A pipeline could not be made.
 pub fn record(recorder: &mut Recorder<'_>, source: u64, target: u64) -> Result<()> {
     let grid = Grid::of(recorder.context());
-    let step = |shader| Step::new("compact", grid.kernel(shader), &Arguments { source, target }, grid.groups);
+    let step = |shader| Step::new("compact", grid.kernel(shader), &arguments::Compact { source, target }, grid.groups);
     recorder.chains(&[STEPS.map(step).into()])
 }

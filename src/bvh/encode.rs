@@ -8,7 +8,7 @@ use super::geometry::{Geometry, Input, Planned, Primitives};
 use super::sah::Collapse;
 use super::split::Split;
 use crate::Result;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::radix_sort::{self, Shape};
 use crate::gpu::{Kernel, Step, shaders};
 
@@ -54,35 +54,10 @@ pub(super) struct Scratch {
 /// Bytes of `BuildState` in encode.glsl, with room to spare.
 pub(super) const STATE_BYTES: u64 = 1536;
 
-push_constants! {
-    /// Push constants of `glsl/bvh/encode_*.comp` and `glsl/bvh/lbvh_*.comp`.
-    pub(super) struct Arguments {
-        pub vertices: u64,
-        pub indices: u64,
-        pub transform: u64,
-        pub structure: u64,
-        pub state: u64,
-        pub keys: [u64; 2],
-        pub values: [u64; 2],
-        pub ends: u64,
-        pub table: u64,
-        pub vertex_stride: u32,
-        pub vertex_count: u32,
-        pub formats: u32,
-        pub primitive_count: u32,
-        pub code_kind: u32,
-        pub c_t: f32,
-        pub c_i: f32,
-        pub columns: u32,
-        pub column_keys: u32,
-        pub passes: u32,
-    }
-}
-
-impl Arguments {
+impl arguments::Build {
     /// The same for a tree that is not collapsed.
-    pub fn without_collapse(&self) -> Arguments {
-        Arguments { code_kind: self.code_kind & !COLLAPSES, ..*self }
+    pub fn without_collapse(&self) -> arguments::Build {
+        arguments::Build { code_kind: self.code_kind & !COLLAPSES, ..*self }
     }
 }
 
@@ -93,7 +68,7 @@ const COLLAPSES: u32 = 1 << 25;
 
 impl Encode {
     /// Address of the scratch memory behind the weights.
-    pub fn behind_weights(&self, arguments: &Arguments) -> u64 {
+    pub fn behind_weights(&self, arguments: &arguments::Build) -> u64 {
         arguments.state + STATE_BYTES + collapse::weights_bytes(self.count.into())
     }
 
@@ -203,10 +178,10 @@ impl Encode {
     }
 
     /// What the kernels are given, with scratch memory at address `scratch`.
-    pub fn arguments(&self, input: &Input, structure: u64, scratch: u64) -> Result<Arguments> {
+    pub fn arguments(&self, input: &Input, structure: u64, scratch: u64) -> Result<arguments::Build> {
         let (geometry, formats) = self.checked(input)?;
         let parts = self.scratch();
-        Ok(Arguments {
+        Ok(arguments::Build {
             vertices: geometry.vertices,
             indices: geometry.indices,
             transform: geometry.transform,
@@ -223,7 +198,7 @@ impl Encode {
             code_kind: self.code_kind(),
             c_t: self.collapse.c_t,
             c_i: self.collapse.c_i,
-            columns: self.shape.columns(self.count),
+            level: 0,
             column_keys: self.shape.column_keys(self.count),
             passes: self.passes(),
         })
@@ -231,7 +206,7 @@ impl Encode {
 
     /// The dispatches up to the sort; what follows needs a barrier before. Labels: `bounds`, `encode`, `sort`, and for
     /// codes with a grid `cells`.
-    pub fn steps(&self, input: &Input, arguments: &Arguments) -> Vec<Step> {
+    pub fn steps(&self, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
         let reading = |phase, shader, groups| Step::new(phase, self.reading_kernel(shader, input), arguments, groups);
         let sort = radix_sort::Sort { count: self.count, bits: self.codes.bits, identity: true };
         let buffers = radix_sort::Buffers { keys: arguments.keys, values: arguments.values, table: arguments.table };

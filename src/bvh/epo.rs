@@ -5,13 +5,13 @@
 //! that are not below n, weighted by what n costs (c_T an inner node, c_I · triangles a leaf). A ray that ends in a node's box on
 //! a triangle of another subtree has to visit that node: SAH, which takes rays for endless, does not see that.
 //!
-//! `glsl/bvh/epo.glsl` is the device's side, [`super::host::epo`] the twin in double precision. The device takes any `Bvh2` of
+//! `glsl/bvh/epo.glsl` is the device's side, [`super::twin::epo`] the twin in double precision. The device takes any `Bvh2` of
 //! triangles, whatever the order of its records, and each record for a triangle of its own: trees in which several records name
 //! one triangle (after splitting) are for the twin. Its arithmetic has 24 bits: within 10⁻³ of the twin.
 
 use super::layout::node_slots;
 use crate::Result;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Recorder, fill, shaders};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -34,7 +34,7 @@ impl Figures {
     }
 }
 
-/// Sums that one invocation adds: 64 in `glsl/bvh/epo_sum.comp`.
+/// Sums that one invocation adds: 64 in `glsl/bvh/epo/sum.comp`.
 const ADDED: u32 = 64;
 
 /// Measuring a `Bvh2` of so many triangles on the device.
@@ -55,19 +55,6 @@ pub struct Buffers {
     pub scratch: u64,
     /// [`Figures`], written.
     pub result: u64,
-}
-
-push_constants! {
-    struct Arguments {
-        structure: u64,
-        parents: u64,
-        sums: u64,
-        results: u64,
-        first: u32,
-        count: u32,
-        rounds: u32,
-        padding: u32,
-    }
 }
 
 impl OnDevice {
@@ -114,7 +101,7 @@ impl OnDevice {
     /// A pipeline could not be made.
     pub fn overlaps(&self, recorder: &mut Recorder<'_>, buffers: &Buffers, records: Range<u32>) -> Result<()> {
         let (first, count) = (records.start, records.len() as u32);
-        let arguments = Arguments { first, count, ..self.arguments(buffers) };
+        let arguments = arguments::Epo { first, count, ..self.arguments(buffers) };
         let kernel = Kernel::new(&shaders::BVH_EPO_OVERLAPS, self.workgroup, &[]);
         recorder.dispatch(&kernel, &arguments, self.tiles(count))
     }
@@ -131,7 +118,7 @@ impl OnDevice {
         loop {
             let kept = count.div_ceil(ADDED).max(1);
             let results = if kept == 1 { buffers.result } else { room.next().expect("a cycle has no end") };
-            let step = Arguments { sums, results, count, ..arguments };
+            let step = arguments::Epo { sums, results, count, ..arguments };
             recorder.dispatch(&kernel, &step, kept.div_ceil(self.workgroup))?;
             if kept == 1 {
                 return Ok(());
@@ -145,9 +132,9 @@ impl OnDevice {
         count.div_ceil(self.workgroup * self.rounds)
     }
 
-    fn arguments(&self, buffers: &Buffers) -> Arguments {
+    fn arguments(&self, buffers: &Buffers) -> arguments::Epo {
         let sums = buffers.scratch + 4 * (u64::from(self.slots) + u64::from(self.records));
-        Arguments {
+        arguments::Epo {
             structure: buffers.structure,
             parents: buffers.scratch,
             sums,
@@ -155,7 +142,6 @@ impl OnDevice {
             first: 0,
             count: self.records,
             rounds: self.rounds,
-            padding: 0,
         }
     }
 }

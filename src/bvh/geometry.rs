@@ -1,6 +1,6 @@
 //! The caller's triangles: vertices and indices in the formats that Vulkan's acceleration structures take.
 //!
-//! `glsl/bvh/geometry.glsl` reads them on the device; [`host`](super::host::geometry) does the same on the host.
+//! `glsl/bvh/geometry.glsl` reads them on the device; [`host`](super::twin::geometry) does the same on the host.
 
 use crate::{Error, Result};
 use ash::vk;

@@ -1,11 +1,12 @@
 //! HLBVH on the device: treelets of the radix tree under a top that the surface area heuristic splits, level by level.
 //!
 //! Pantaleoni and Luebke 2010; Garanzha, Pantaleoni, McAllister 2011. `glsl/bvh/hlbvh.glsl` is the device's side; the twin is
-//! [`super::host::hlbvh`] with [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
+//! [`super::twin::hlbvh`] with [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
 use super::builder::Treelets;
-use super::encode::{Arguments, Encode};
+use super::encode::Encode;
 use super::geometry::Input;
+use crate::gpu::arguments;
 use crate::gpu::{Kernel, Step, shaders};
 
 /// Levels of the top that are recorded. On the host, tops of three scenes have 15 to 18 levels; of what is left behind so many
@@ -34,13 +35,12 @@ fn kernel(encode: &Encode, treelets: &Treelets, shader: &'static shaders::Shader
 }
 
 /// The dispatches behind [`Encode::steps`]. Label: `hierarchy`.
-pub(super) fn steps(encode: &Encode, treelets: &Treelets, input: &Input, arguments: &Arguments) -> Vec<Step> {
-    let step = |shader, arguments: &Arguments, groups| {
+pub(super) fn steps(encode: &Encode, treelets: &Treelets, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
+    let step = |shader, arguments: &arguments::Build, groups| {
         Step::new("hierarchy", kernel(encode, treelets, shader, input), arguments, groups)
     };
     let of_level = |shader, level, groups| {
-        // A word of the sort, which has run.
-        step(shader, &Arguments { columns: level, ..*arguments }, groups)
+        step(shader, &arguments::Build { level, ..*arguments }, groups)
     };
     let (levels, tiles, groups) = (levels(encode.count), encode.tiles(), groups(encode));
     let before_top = [
@@ -59,7 +59,7 @@ pub(super) fn persistent_steps(
     encode: &Encode,
     treelets: &Treelets,
     input: &Input,
-    arguments: &Arguments,
+    arguments: &arguments::Build,
     workers: u32,
 ) -> Vec<Step> {
     let step = |shader, groups| Step::new("build", kernel(encode, treelets, shader, input), arguments, groups);

@@ -1,11 +1,12 @@
 //! H-PLOC on the device: PLOC within each node of the radix tree, bottom-up in one pass (Benthin et al. 2024).
 //!
-//! `glsl/bvh/hploc.glsl` is the device's side; the twin is [`super::host::hploc`] with
+//! `glsl/bvh/hploc.glsl` is the device's side; the twin is [`super::twin::hploc`] with
 //! [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
 use super::builder::Window;
-use super::encode::{Arguments, Encode};
+use super::encode::Encode;
 use super::geometry::Input;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Step, shaders};
 
 /// Who merges a window. The tree is the same bytes whoever does.
@@ -56,7 +57,7 @@ impl Merging {
 }
 
 /// The dispatch behind [`Encode::steps`]. Label: `hierarchy`.
-pub(super) fn steps(encode: &Encode, merging: &Merging, input: &Input, arguments: &Arguments) -> Vec<Step> {
+pub(super) fn steps(encode: &Encode, merging: &Merging, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
     let workgroup = encode.shape.workgroup.min(merging.group);
     let kernel = merging.kernel(encode, &shaders::BVH_HPLOC_HIERARCHY, input, workgroup);
     let groups = encode.count.div_ceil(workgroup * encode.items);
@@ -68,7 +69,7 @@ pub(super) fn persistent_steps(
     encode: &Encode,
     merging: &Merging,
     input: &Input,
-    arguments: &Arguments,
+    arguments: &arguments::Build,
     workers: u32,
 ) -> Vec<Step> {
     let all = merging.kernel(encode, &shaders::BVH_HPLOC_PERSISTENT, input, encode.shape.workgroup);

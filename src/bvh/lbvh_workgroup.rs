@@ -6,43 +6,17 @@
 use super::builder::Job;
 use super::encode::STATE_BYTES;
 use crate::Result;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Kernel, Step, shaders};
 use std::collections::HashMap;
-
-/// A build for one workgroup: `Small` in lbvh_workgroup.comp.
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Small {
-    vertices: u64,
-    indices: u64,
-    transform: u64,
-    structure: u64,
-    scratch: u64,
-    vertex_stride: u32,
-    vertex_count: u32,
-    formats: u32,
-    primitive_count: u32,
-}
 
 /// Builds that fit into the push constants.
 const AT_ONCE: usize = 2;
 
-push_constants! {
-    /// Push constants of `glsl/bvh/lbvh_workgroup.comp`.
-    struct Arguments {
-        builds: [Small; AT_ONCE],
-        step_cost: f32,
-        test_cost: f32,
-        codes: u32,
-        state_bytes: u32,
-    }
-}
-
 /// The dispatches of the builds, which need no barrier between them.
 pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
     // What fills the push constants together must be of one kind.
-    let mut kinds: HashMap<(Kernel, u32, [u32; 2]), Vec<Small>> = HashMap::new();
+    let mut kinds: HashMap<(Kernel, u32, [u32; 2]), Vec<arguments::Small>> = HashMap::new();
     let mut order = Vec::new();
     for job in jobs {
         let Job { builder, input, structure, scratch } = **job;
@@ -55,7 +29,7 @@ pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
         if builds.is_empty() {
             order.push(kind);
         }
-        builds.push(Small {
+        builds.push(arguments::Small {
             vertices: geometry.vertices,
             indices: geometry.indices,
             transform: geometry.transform,
@@ -73,7 +47,7 @@ pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
         for pair in kinds[&kind].chunks(AT_ONCE) {
             let mut builds = [pair[0]; AT_ONCE];
             builds[..pair.len()].copy_from_slice(pair);
-            let arguments = Arguments {
+            let arguments = arguments::BuildAlone {
                 builds,
                 step_cost: f32::from_bits(costs[0]),
                 test_cost: f32::from_bits(costs[1]),

@@ -1,4 +1,4 @@
-//! Bounding volume hierarchies: codes, node layouts, builders on the device, and their twins on the host.
+//! Bounding volume hierarchies: codes, node layouts, builders on the device, and their twins.
 //!
 //! The way of a triangle, each step a file here and shaders of the same name in `glsl/bvh`:
 //!
@@ -9,7 +9,7 @@
 //! 5. `collapse` makes leaves where they are cheaper ([`sah`]) and orders the records: a [`layout::Bvh2`];
 //! 6. [`wide`] makes nodes of four or eight children of it, [`refit`] follows moved vertices, [`compact`] gives back room.
 //!
-//! What came of it: [`quality`] and [`epo`] measure, [`validate`] checks. [`host`] has a twin of every step, with the same bytes.
+//! What came of it: [`quality`] and [`epo`] measure, [`validate`] checks. [`twin`] has a twin of every step, with the same bytes.
 
 pub mod builder;
 pub mod codes;
@@ -20,7 +20,6 @@ pub(crate) mod encode;
 pub mod epo;
 pub mod geometry;
 mod hlbvh;
-pub mod host;
 mod hploc;
 pub mod layout;
 mod lbvh;
@@ -31,5 +30,6 @@ pub mod refit;
 pub mod reinsertion;
 pub mod sah;
 pub mod split;
+pub mod twin;
 pub mod validate;
 pub mod wide;

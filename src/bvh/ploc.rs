@@ -1,10 +1,11 @@
 //! PLOC on the device: in rounds, clusters that are each other's nearest become one (Meister and Bittner 2018).
 //!
-//! `glsl/bvh/ploc.glsl` is the device's side; the twin is [`super::host::ploc`] with
+//! `glsl/bvh/ploc.glsl` is the device's side; the twin is [`super::twin::ploc`] with
 //! [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
-use super::encode::{Arguments, Encode};
+use super::encode::Encode;
 use super::geometry::Input;
+use crate::gpu::arguments;
 use crate::gpu::{Kernel, Step, shaders};
 
 /// Clusters that one workgroup finishes in less time than rounds of all take.
@@ -77,7 +78,7 @@ impl Kernels<'_> {
 }
 
 /// The dispatches behind [`Encode::steps`]. Label: `hierarchy`.
-pub(super) fn steps(encode: &Encode, radius: u32, input: &Input, arguments: &Arguments) -> Vec<Step> {
+pub(super) fn steps(encode: &Encode, radius: u32, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
     let chain = Kernels { encode, input, radius }.chain();
     chain.into_iter().map(|(kernel, groups)| Step::new("hierarchy", kernel, arguments, groups)).collect()
 }
@@ -87,7 +88,7 @@ pub(super) fn persistent_steps(
     encode: &Encode,
     radius: u32,
     input: &Input,
-    arguments: &Arguments,
+    arguments: &arguments::Build,
     workers: u32,
 ) -> Vec<Step> {
     let kernels = Kernels { encode, input, radius };

@@ -2,9 +2,9 @@
 //!
 //! `glsl/bvh/quality.glsl` is the device's side; it takes any `Bvh2`, whoever built it.
 
-use super::layout::{Bvh2, Record, node_slots};
+use super::layout::node_slots;
 use crate::Result;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Recorder, fill, shaders};
 use bytemuck::{Pod, Zeroable};
 
@@ -75,17 +75,6 @@ pub struct OnDevice {
     rounds: u32,
 }
 
-push_constants! {
-    struct Arguments {
-        structure: u64,
-        parents: u64,
-        partials: u64,
-        result: u64,
-        rounds: u32,
-        tiles: u32,
-    }
-}
-
 impl OnDevice {
     /// For a structure of `primitive_count` triangles.
     pub fn new(context: &Context, primitive_count: u32) -> OnDevice {
@@ -110,7 +99,7 @@ impl OnDevice {
     /// # Errors
     /// A pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, structure: u64, scratch: u64, result: u64) -> Result<()> {
-        let arguments = Arguments {
+        let arguments = arguments::Quality {
             structure,
             parents: scratch,
             partials: scratch + 4 * u64::from(self.slots),
@@ -127,37 +116,4 @@ impl OnDevice {
         recorder.barrier();
         recorder.dispatch(&kernel(&shaders::BVH_QUALITY_SUM), &arguments, 1)
     }
-}
-
-/// The quality of `tree` with these costs of a step and of a test. An empty tree has zeros.
-pub fn on_host<R: Record>(tree: &Bvh2<R>, c_t: f64, c_i: f64) -> Quality {
-    let mut quality = Quality::default();
-    if tree.header.active == 0 {
-        return quality;
-    }
-    let area = |lo: [f32; 3], hi: [f32; 3]| {
-        let [x, y, z]: [f64; 3] = std::array::from_fn(|i| f64::from(hi[i]) - f64::from(lo[i]));
-        x * y + y * z + z * x
-    };
-    let mut stack = vec![(tree.header.root, 0u32)];
-    let (mut cost, mut depths) = (0.0, 0u64);
-    while let Some((child, depth)) = stack.pop() {
-        let area = area(child.lo, child.hi);
-        if child.is_leaf() {
-            cost += c_i * area * f64::from(child.count);
-            quality.leaves += 1;
-            quality.refs += u64::from(child.count);
-            quality.leaf_max = quality.leaf_max.max(child.count);
-            quality.depth_max = quality.depth_max.max(depth);
-            depths += u64::from(depth);
-        } else {
-            cost += c_t * area;
-            quality.inner += 1;
-            stack.extend(tree.nodes[child.index as usize].children.map(|c| (c, depth + 1)));
-        }
-    }
-    let root = area(tree.header.root.lo, tree.header.root.hi);
-    quality.sah = if root > 0.0 { cost / root } else { 0.0 };
-    quality.depth_avg = depths as f64 / quality.leaves as f64;
-    quality
 }

@@ -12,14 +12,14 @@
 //! and its slots lie in any order: each record names its primitive, and each node its children. Nearness in memory is worth
 //! time, however: an invocation refits a run of slots, and what lies in one needs no other.
 //! [`Header::sah_growth`](super::layout::Header::sah_growth) tells afterwards how much worse the tree has become, which is when to
-//! build anew. The twin is [`super::host::refit`]: the same bytes.
+//! build anew. The twin is [`super::twin::refit`]: the same bytes.
 
 use super::builder;
 use super::geometry::Planned;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 use super::layout::node_slots;
 use super::sah::Collapse;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Recorder, Step, radix_sort, shaders};
 use crate::{Error, Result};
 use std::collections::HashMap;
@@ -105,32 +105,8 @@ pub struct Job<'a> {
     pub scratch: u64,
 }
 
-/// `Update` in refit.glsl.
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Update {
-    vertices: u64,
-    indices: u64,
-    transform: u64,
-    structure: u64,
-    scratch: u64,
-    vertex_stride: u32,
-    vertex_count: u32,
-    formats: u32,
-    primitive_count: u32,
-}
-
 /// Updates that fit into the push constants.
 const AT_ONCE: usize = 2;
-
-push_constants! {
-    /// Push constants of `glsl/bvh/refit_*.comp`.
-    struct Arguments {
-        updates: [Update; AT_ONCE],
-        c_t: f32,
-        c_i: f32,
-    }
-}
 
 impl Refit {
     /// Refitting of structures that were built over `primitive_count` primitives, on the device of `context`.
@@ -208,7 +184,7 @@ impl Refit {
         let mut chains = Vec::new();
         // What fills the push constants together must be of one kind.
         let mut kinds: HashMap<(Kernel, [u32; 2]), usize> = HashMap::new();
-        let mut small: Vec<(Kernel, [f32; 2], Vec<Update>)> = Vec::new();
+        let mut small: Vec<(Kernel, [f32; 2], Vec<arguments::Update>)> = Vec::new();
         for job in jobs {
             let update = job.update()?;
             let Job { refit, input, .. } = job;
@@ -245,18 +221,18 @@ impl Refit {
     }
 }
 
-fn arguments_of(given: &[Update], [c_t, c_i]: [f32; 2]) -> Arguments {
+fn arguments_of(given: &[arguments::Update], [c_t, c_i]: [f32; 2]) -> arguments::Refit {
     let mut updates = [given[0]; AT_ONCE];
     updates[..given.len()].copy_from_slice(given);
-    Arguments { updates, c_t, c_i }
+    arguments::Refit { updates, c_t, c_i }
 }
 
 impl Job<'_> {
-    fn update(&self) -> Result<Update> {
+    fn update(&self) -> Result<arguments::Update> {
         let Job { refit, input, structure, scratch } = *self;
         refit.planned.check(&input)?;
         let (geometry, formats) = input.for_kernels();
-        Ok(Update {
+        Ok(arguments::Update {
             vertices: geometry.vertices,
             indices: geometry.indices,
             transform: geometry.transform,

@@ -22,7 +22,7 @@
 
 use super::layout::node_slots;
 use crate::Result;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Grid, Kernel, Recorder, Step, fill, shaders};
 use std::time::Duration;
 
@@ -82,20 +82,6 @@ pub(super) const LEAST_SHARE: f32 = 1.0 / 1_048_576.0;
 /// And more than this, the scene's longest edge being about 1: less may be made of numbers that devices take for zero.
 pub(super) const LEAST_GAIN: f32 = 1.0 / 1_152_921_504_606_846_976.0;
 
-push_constants! {
-    struct Arguments {
-        structure: u64,
-        parents: u64,
-        moves: u64,
-        gains: u64,
-        firsts: u64,
-        offset: u32,
-        stride: u32,
-        link_count: u32,
-        padding: u32,
-    }
-}
-
 /// Bytes of `Move` in reinsertion.glsl.
 const MOVE_BYTES: u64 = 12;
 /// Bytes of an entry of a search's stack, `Below` in reinsertion_search.comp.
@@ -151,7 +137,7 @@ impl Reinsertion {
     /// What [`Reinsertion::record`] records, to be recorded behind or beside other steps by [`Recorder::chains`].
     pub fn steps(&self, structure: u64, scratch: u64) -> Vec<Step> {
         let words = 4 * u64::from(self.slots);
-        let arguments = |offset: u32| Arguments {
+        let arguments = |offset: u32| arguments::Reinsertion {
             structure,
             parents: scratch,
             gains: scratch + words,
@@ -160,7 +146,6 @@ impl Reinsertion {
             offset,
             stride: self.stride,
             link_count: self.link_count(),
-            padding: 0,
         };
         let step = |shader, offset, items| {
             Step::new(PHASE, self.kernel(shader), &arguments(offset), self.grid.groups_for(items))

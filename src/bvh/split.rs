@@ -14,12 +14,12 @@
 //! keeps no other waiting. Nothing is read back; references that there are not are left out as triangles that are not finite are.
 //!
 //! A record is in the tree once for each part, with the same bytes. So rays may be shown a triangle several times, which changes
-//! no closest hit; and a leaf's box holds the part alone. [`super::host::split`] is the twin, and says why no ray loses a hit.
+//! no closest hit; and a leaf's box holds the part alone. [`super::twin::split`] is the twin, and says why no ray loses a hit.
 //! `glsl/bvh/split.glsl` is the device's side.
 
 use super::encode::Encode;
 use super::geometry::{Geometry, GeometryFlags, Input, Source};
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::scan::{self, Scan};
 use crate::gpu::{Context, Step, shaders};
 use crate::{Error, Result};
@@ -101,24 +101,6 @@ pub(super) struct Split {
 /// Bytes of `SplitState` in references.glsl, with room to spare.
 const STATE_BYTES: u64 = 3328;
 
-push_constants! {
-    /// Push constants of `glsl/bvh/split_*.comp`.
-    struct Arguments {
-        vertices: u64,
-        indices: u64,
-        transform: u64,
-        state: u64,
-        counts: u64,
-        total: u64,
-        vertex_stride: u32,
-        vertex_count: u32,
-        formats: u32,
-        primitive_count: u32,
-        reference_count: u32,
-        most_splits: u32,
-    }
-}
-
 impl Split {
     pub fn new(context: &Context, options: &Options, primitives: u32) -> Split {
         Split { primitives, most: options.most, scan: Scan::new(context, primitives) }
@@ -150,9 +132,9 @@ impl Split {
 
     /// The dispatches before those of [`Encode`]; what follows needs a barrier before. Its words and table are free until then.
     /// Label: `split`.
-    pub fn steps(&self, encode: &Encode, input: &Input, build: &super::encode::Arguments) -> Vec<Step> {
+    pub fn steps(&self, encode: &Encode, input: &Input, build: &arguments::Build) -> Vec<Step> {
         let (Geometry { vertices, indices, transform, vertex_stride, vertex_count, .. }, formats) = input.for_kernels();
-        let arguments = Arguments {
+        let arguments = arguments::Split {
             vertices,
             indices,
             transform,

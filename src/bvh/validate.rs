@@ -1,8 +1,8 @@
 //! Walks a structure on the host and says what is wrong and where.
 
 use super::cover::Parts;
-use super::host::split::around_parts;
 use super::layout::{Aabb, Bvh2, Child, Header, Instance, MAX_DEPTH, Record, node_slots};
+use super::twin::split::around_parts;
 use crate::{Error, Result};
 
 impl<R: Record> Bvh2<R> {
@@ -175,9 +175,9 @@ fn invalid(what: String) -> Result<()> {
 mod tests {
     use super::*;
     use crate::bvh::codes::Code;
-    use crate::bvh::host::lbvh;
     use crate::bvh::layout::{Node, Triangle};
     use crate::bvh::sah::Collapse;
+    use crate::bvh::twin::lbvh;
 
     fn tree(collapse: Collapse) -> Bvh2 {
         let positions: Vec<[f32; 3]> =

@@ -1,6 +1,5 @@
 //! Fills words with a value: `vkCmdFillBuffer` for memory that is known by its address.
-
-use super::push_constants::push_constants;
+use super::arguments;
 use super::{Kernel, Recorder, Step, shaders};
 use crate::Result;
 
@@ -9,25 +8,17 @@ const WORKGROUP: u32 = 64;
 /// Words of an invocation.
 const ROUNDS: u32 = 16;
 
-push_constants! {
-    struct Arguments {
-        words: u64,
-        count: u32,
-        value: u32,
-    }
-}
-
 /// Records the fill of `count` words at address `words` with `value`. One dispatch; the caller places the barriers.
 ///
 /// # Errors
 /// The pipeline could not be made.
 pub fn record(recorder: &mut Recorder<'_>, words: u64, count: u32, value: u32) -> Result<()> {
     let kernel = Kernel::new(&shaders::GPU_FILL, WORKGROUP, &[ROUNDS]);
-    recorder.dispatch(&kernel, &Arguments { words, count, value }, count.div_ceil(WORKGROUP * ROUNDS))
+    recorder.dispatch(&kernel, &arguments::Fill { words, count, value }, count.div_ceil(WORKGROUP * ROUNDS))
 }
 
 /// The same as a step of the phase `phase`.
 pub(crate) fn step(phase: &'static str, words: u64, count: u32, value: u32) -> Step {
     let kernel = Kernel::new(&shaders::GPU_FILL, WORKGROUP, &[ROUNDS]);
-    Step::new(phase, kernel, &Arguments { words, count, value }, count.div_ceil(WORKGROUP * ROUNDS))
+    Step::new(phase, kernel, &arguments::Fill { words, count, value }, count.div_ceil(WORKGROUP * ROUNDS))
 }

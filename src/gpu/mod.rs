@@ -2,10 +2,10 @@
 //!
 //! [`Context`] takes a device that the caller made and owns nothing but pipelines.
 
+pub(crate) mod arguments;
 mod context;
 pub mod fill;
 mod grid;
-pub(crate) mod push_constants;
 pub mod radix_sort;
 mod reconvergence;
 mod recorder;
@@ -18,6 +18,7 @@ pub mod shaders;
 mod specialise;
 pub mod task_pool;
 mod tuning;
+pub mod twin;
 mod workarounds;
 
 pub use context::{Context, ContextDesc, Kernel, Limits};

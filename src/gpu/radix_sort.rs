@@ -2,8 +2,7 @@
 //!
 //! Reduce, then scan (Satish, Harris, Garland 2009): each pass counts digits, scans the counts, scatters. It asks for no
 //! progress between workgroups, so it runs on any device. `glsl/gpu/radix_sort.glsl` is the device's side.
-
-use super::push_constants::push_constants;
+use super::arguments;
 use super::{Context, Kernel, Limits, Recorder, Step, shaders};
 use crate::Result;
 
@@ -158,22 +157,6 @@ pub struct Sort {
     pub identity: bool,
 }
 
-push_constants! {
-    struct Arguments {
-        keys: u64,
-        values: u64,
-        keys_out: u64,
-        values_out: u64,
-        table: u64,
-        count: u32,
-        shift: u32,
-        columns: u32,
-        column_keys: u32,
-        identity: u32,
-        padding: u32,
-    }
-}
-
 /// Records the sort. Returns the index (0 or 1) of the buffers that hold the result.
 ///
 /// Three dispatches a pass with a barrier behind each; the caller places one before the first.
@@ -206,7 +189,7 @@ pub(crate) fn steps(shape: &Shape, buffers: &Buffers, sort: &Sort) -> Vec<Step> 
     let constants = shape.constants(0, if bits > 32 { 2 } else { 1 });
     let pass = |pass: u32| -> [Step; STEPS_OF_A_PASS] {
         let (from, to) = (pass as usize % 2, (pass as usize + 1) % 2);
-        let arguments = Arguments {
+        let arguments = arguments::RadixSort {
             keys: buffers.keys[from],
             values: buffers.values[from],
             keys_out: buffers.keys[to],
@@ -217,7 +200,6 @@ pub(crate) fn steps(shape: &Shape, buffers: &Buffers, sort: &Sort) -> Vec<Step> 
             columns: shape.columns(count),
             column_keys: shape.column_keys(count),
             identity: u32::from(identity && pass == 0),
-            padding: 0,
         };
         [
             (&shaders::GPU_RADIX_SORT_COUNT, shape.column_tasks(count)),
@@ -227,12 +209,4 @@ pub(crate) fn steps(shape: &Shape, buffers: &Buffers, sort: &Sort) -> Vec<Step> 
         .map(|(shader, groups)| Step::new("sort", Kernel::new(shader, shape.workgroup, &constants), &arguments, groups))
     };
     (0..shape.passes(bits)).flat_map(pass).collect()
-}
-
-/// What the sort computes, plainly: stable by the low `bits` bits of the keys.
-pub fn on_host(keys: &[u64], values: &[u32], bits: u32) -> (Vec<u64>, Vec<u32>) {
-    let mask = if bits == 64 { u64::MAX } else { (1 << bits) - 1 };
-    let mut pairs: Vec<_> = keys.iter().copied().zip(values.iter().copied()).collect();
-    pairs.sort_by_key(|&(key, _)| key & mask);
-    pairs.into_iter().unzip()
 }

@@ -1,6 +1,5 @@
 //! Reduction of bounds: the box around many boxes.
-
-use super::push_constants::push_constants;
+use super::arguments;
 use super::{Context, Kernel, Recorder, shaders};
 use crate::Result;
 
@@ -16,15 +15,6 @@ pub struct Reduction {
     count: u32,
     workgroup: u32,
     rounds: u32,
-}
-
-push_constants! {
-    struct Arguments {
-        boxes: u64,
-        results: u64,
-        count: u32,
-        rounds: u32,
-    }
 }
 
 impl Reduction {
@@ -55,7 +45,7 @@ impl Reduction {
         loop {
             let tiles = count.div_ceil(self.tile()).max(1);
             let to = if tiles == 1 { result } else { room.next().expect("a cycle has no end") };
-            let arguments = Arguments { boxes: from, results: to, count, rounds: self.rounds };
+            let arguments = arguments::Reduce { boxes: from, results: to, count, rounds: self.rounds };
             recorder.dispatch(&kernel, &arguments, tiles)?;
             if tiles == 1 {
                 return Ok(());
@@ -64,11 +54,4 @@ impl Reduction {
             (from, count) = (to, tiles);
         }
     }
-}
-
-/// What the reduction computes, plainly.
-pub fn on_host(boxes: &[Bounds]) -> Bounds {
-    boxes.iter().fold(EMPTY, |[lo, hi], b| {
-        [std::array::from_fn(|i| lo[i].min(b[0][i])), std::array::from_fn(|i| hi[i].max(b[1][i]))]
-    })
 }

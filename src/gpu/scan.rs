@@ -1,8 +1,7 @@
 //! Exclusive scan (prefix sum) of 32-bit words.
 //!
 //! Reduce, then scan: three dispatches, no progress between workgroups asked for. `glsl/gpu/scan.glsl` is the device's side.
-
-use super::push_constants::push_constants;
+use super::arguments;
 use super::{Context, Kernel, Recorder, Step, shaders};
 use crate::Result;
 
@@ -27,16 +26,6 @@ pub struct Buffers {
     pub results: u64,
     /// [`Scan::sums_words`] words of scratch; the last of them is the total when the scan has run.
     pub sums: u64,
-}
-
-push_constants! {
-    struct Arguments {
-        values: u64,
-        results: u64,
-        sums: u64,
-        count: u32,
-        rounds: u32,
-    }
 }
 
 impl Scan {
@@ -82,8 +71,8 @@ impl Scan {
         self.dispatches().map(|(kernel, groups)| Step::new(phase, kernel, &arguments, groups)).into()
     }
 
-    fn arguments(&self, &Buffers { values, results, sums }: &Buffers) -> Arguments {
-        Arguments { values, results, sums, count: self.count, rounds: self.rounds }
+    fn arguments(&self, &Buffers { values, results, sums }: &Buffers) -> arguments::Scan {
+        arguments::Scan { values, results, sums, count: self.count, rounds: self.rounds }
     }
 
     fn dispatches(&self) -> [(Kernel, u32); 3] {
@@ -94,16 +83,4 @@ impl Scan {
             (kernel(&shaders::GPU_SCAN_APPLY), self.tiles()),
         ]
     }
-}
-
-/// What the scan computes, plainly: the sums of all words before, and the total.
-pub fn on_host(values: &[u32]) -> (Vec<u32>, u32) {
-    let mut sum = 0u32;
-    let before = |&value: &u32| {
-        let before = sum;
-        sum = sum.wrapping_add(value);
-        before
-    };
-    let scanned = values.iter().map(before).collect();
-    (scanned, sum)
 }

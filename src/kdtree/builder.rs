@@ -6,7 +6,7 @@
 //!
 //! Min-max binning above, level by level (Papay 2025, sections 9.4 to 9.6); cells of few references are split exactly, by one
 //! workgroup to their leaves. [`super::twin::builder`] is the twin,
-//! `glsl/kdtree/build.glsl` the device's side.
+//! `glsl/kdtree/builder.glsl` the device's side.
 //!
 //! Trees have the bytes of the twin on every device: the only reciprocals that they depend on are correctly rounded, by the device or
 //! by integers ([`crate::gpu::KdTuning::exact_reciprocals`]). Where a device flushes subnormal numbers, inputs must not lead to any.
@@ -15,7 +15,7 @@ use super::layout::{self, Header, Node};
 use super::termination::{Costs, depth_limit, leaf_size};
 use crate::bvh::builder::Schedule;
 use crate::bvh::geometry::{Input, Planned, Primitives};
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::shaders::{self, Shader};
 use crate::gpu::{Context, KdTuning, Kernel, Recorder, Region, Step, task_pool};
 use crate::{Error, Result};
@@ -237,39 +237,6 @@ pub(super) struct Room {
     pub records: u32,
 }
 
-push_constants! {
-    /// Push constants of `glsl/kdtree/build_*.comp`.
-    pub(super) struct Arguments {
-        vertices: u64,
-        indices: u64,
-        transform: u64,
-        structure: u64,
-        state: u64,
-        vertex_stride: u32,
-        vertex_count: u32,
-        formats: u32,
-        pub primitive_count: u32,
-        c_t: f32,
-        c_i: f32,
-        bin_part: f32,
-        pub depth_limit: u32,
-        pub leaf_size: u32,
-        pub level: u32,
-        reference_capacity: u32,
-        task_capacity: u32,
-        chunk_capacity: u32,
-        subtree_capacity: u32,
-        node_room: u32,
-        level_node_room: u32,
-        reference_room: u32,
-        cut_room: u32,
-        build_flags: u32,
-        record_room: u32,
-        pub first_tile: u32,
-        pub first_primitive: u32,
-    }
-}
-
 /// As `glsl/kdtree/` has them.
 const STATE_BYTES: u64 = 3584;
 const REPORT_AT: u64 = size_of::<task_pool::State>() as u64;
@@ -339,7 +306,7 @@ impl Shape {
     }
 
     fn is_narrow(shader: &Shader) -> bool {
-        let narrow = [&shaders::KDTREE_BUILD_SUBTREES, &shaders::KDTREE_BUILD_PLACE, &shaders::KDTREE_MERGE_GATHER];
+        let narrow = [&shaders::KDTREE_BUILDER_SUBTREES, &shaders::KDTREE_BUILDER_PLACE, &shaders::KDTREE_MERGE_GATHER];
         narrow.contains(&shader)
     }
 
@@ -389,12 +356,18 @@ impl Shape {
     }
 }
 
-impl Arguments {
+impl arguments::KdBuild {
     /// Of a build with so much room; `depth_limit` and `leaf_size` go by what `input` has.
-    pub fn new(options: &Options, room: &Room, input: &Input, structure: u64, scratch: u64) -> Arguments {
+    pub(super) fn new(
+        options: &Options,
+        room: &Room,
+        input: &Input,
+        structure: u64,
+        scratch: u64,
+    ) -> arguments::KdBuild {
         let (geometry, formats) = input.for_kernels();
         let count = input.primitive_count;
-        Arguments {
+        arguments::KdBuild {
             vertices: geometry.vertices,
             indices: geometry.indices,
             transform: geometry.transform,
@@ -433,11 +406,11 @@ pub(super) fn levels(
     step: impl Fn(&'static str, &'static Shader, u32, u32) -> Step,
 ) -> Vec<Step> {
     let of_level: [(&'static str, &'static Shader); 5] = [
-        ("subtrees", &shaders::KDTREE_BUILD_SUBTREES),
-        ("bin", &shaders::KDTREE_BUILD_BIN),
-        ("classify", &shaders::KDTREE_BUILD_CLASSIFY),
-        ("scan", &shaders::KDTREE_BUILD_SCAN),
-        ("distribute", &shaders::KDTREE_BUILD_DISTRIBUTE),
+        ("subtrees", &shaders::KDTREE_BUILDER_SUBTREES),
+        ("bin", &shaders::KDTREE_BUILDER_BIN),
+        ("classify", &shaders::KDTREE_BUILDER_CLASSIFY),
+        ("scan", &shaders::KDTREE_BUILDER_SCAN),
+        ("distribute", &shaders::KDTREE_BUILDER_DISTRIBUTE),
     ];
     let level = |level| of_level.map(|(phase, shader)| step(phase, shader, level, groups));
     (0..=depth_limit).flat_map(level).collect()
@@ -513,11 +486,11 @@ impl Builder {
         recorder.chains(&[self.steps(input, structure, scratch)?])
     }
 
-    fn arguments(&self, input: &Input, structure: u64, scratch: u64) -> Result<Arguments> {
+    fn arguments(&self, input: &Input, structure: u64, scratch: u64) -> Result<arguments::KdBuild> {
         let geometry_count = self.options.geometry_count;
         let planned = Planned { primitives: Primitives::Triangles, primitive_count: self.count, geometry_count };
         planned.check(input)?;
-        Ok(Arguments::new(&self.options, &self.room, input, structure, scratch))
+        Ok(arguments::KdBuild::new(&self.options, &self.room, input, structure, scratch))
     }
 
     fn steps(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
@@ -525,22 +498,22 @@ impl Builder {
         let groups = self.shape.groups;
         let step = |phase, shader: &'static Shader, level, groups| {
             let groups = self.shape.groups_of(shader, groups);
-            Step::new(phase, self.kernel(shader, input), &Arguments { level, ..arguments }, groups)
+            Step::new(phase, self.kernel(shader, input), &arguments::KdBuild { level, ..arguments }, groups)
         };
         if self.schedule == Schedule::Persistent {
             return Ok(vec![
-                step("build", &shaders::KDTREE_BUILD_RESET, 0, 1),
-                step("build", &shaders::KDTREE_BUILD_PERSISTENT, 0, groups),
+                step("build", &shaders::KDTREE_BUILDER_RESET, 0, 1),
+                step("build", &shaders::KDTREE_BUILDER_PERSISTENT, 0, groups),
             ]);
         }
         let encode = [
-            (&shaders::KDTREE_BUILD_RESET, 1),
-            (&shaders::KDTREE_BUILD_COUNT, groups),
-            (&shaders::KDTREE_BUILD_PLAN, 1),
-            (&shaders::KDTREE_BUILD_RECORDS, groups),
-            (&shaders::KDTREE_BUILD_ROOT, 1),
+            (&shaders::KDTREE_BUILDER_RESET, 1),
+            (&shaders::KDTREE_BUILDER_COUNT, groups),
+            (&shaders::KDTREE_BUILDER_PLAN, 1),
+            (&shaders::KDTREE_BUILDER_RECORDS, groups),
+            (&shaders::KDTREE_BUILDER_ROOT, 1),
         ];
-        let place = [(&shaders::KDTREE_BUILD_ORDER, groups), (&shaders::KDTREE_BUILD_PLACE, groups)];
+        let place = [(&shaders::KDTREE_BUILDER_ORDER, groups), (&shaders::KDTREE_BUILDER_PLACE, groups)];
         let mut steps = Vec::new();
         steps.extend(encode.map(|(shader, groups)| step("encode", shader, 0, groups)));
         steps.extend(levels(arguments.depth_limit, groups, step));

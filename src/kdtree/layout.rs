@@ -75,7 +75,7 @@ pub struct Header {
     /// What lengths were scaled by before areas were taken: [`crate::bvh::sah::area_scale`] of the root's cell.
     pub area_scale: f32,
     /// The longest side of a triangle that is referenced only where it is: rays look as far beside themselves as hits of such a one
-    /// may be ([`crate::trace::kd_host`]).
+    /// may be ([`crate::trace::twin::kd`]).
     pub reach: f32,
     /// Nodes that there is room for, where a merge may add some; as many as there are unless told.
     pub node_room: u32,

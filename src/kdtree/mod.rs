@@ -9,7 +9,7 @@
 //! 3. [`quality`] measures, [`validate`] checks.
 //!
 //! [`merge`] merges the triangles of objects that move into the tree of what stands still, and takes them out again.
-//! [`crate::trace::kd_host`] finds the hits of rays in it.
+//! [`crate::trace::twin::kd`] finds the hits of rays in it.
 
 pub mod builder;
 pub mod layout;

@@ -1,9 +1,9 @@
 //! The tracer of kd-trees on the device, recorded as [`super::tracer`] is: each [`Traversal`] is a variant of one shader, with the
-//! hits and the work that [`super::kd_host`] has.
+//! hits and the work that [`super::twin::kd`] has.
 //!
 //! ```no_run
 //! # use hedgerow::gpu::Recorder;
-//! # use hedgerow::trace::{Query, kd::Tracer, kd_host::Traversal, tracer::Buffers};
+//! # use hedgerow::trace::{Query, kd::{Tracer, Traversal}, tracer::Buffers};
 //! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: u64, hits: u64) -> hedgerow::Result<()> {
 //! let tracer = Tracer::new(recorder.context(), Traversal::short_stack_with_push_down(4));
 //! tracer.record(recorder, Query::ClosestHit, &Buffers { structure, rays, hits, work: None, count: 1 << 20 })?;
@@ -15,13 +15,40 @@
 //! Shaders of others trace by `glsl/trace/kd_tree.glsl`.
 
 use super::Query;
-use super::kd_host::Traversal;
 use super::tracer::{self, Buffers, Loads, Shape};
 use crate::Result;
 use crate::gpu::shaders::Shader;
 use crate::gpu::{Context, Kernel, Recorder, shaders};
 use crate::kdtree::layout::MAX_DEPTH;
 use bytemuck::{Pod, Zeroable};
+
+/// How a tree is walked. All find the same hits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Traversal {
+    /// Cells that may wait on the stack.
+    pub capacity: usize,
+    /// Whether the way down begins again below the root, where nothing waits above.
+    pub push_down: bool,
+}
+
+impl Traversal {
+    /// Algorithm 1: every cell that waits is on the stack.
+    pub const STACK: Traversal = Traversal { capacity: MAX_DEPTH as usize, push_down: false };
+    /// Algorithm 2, kd-restart: none is.
+    pub const RESTART: Traversal = Traversal { capacity: 0, push_down: false };
+    /// Algorithm 3: restarts begin as far down as they can.
+    pub const PUSH_DOWN: Traversal = Traversal { capacity: 0, push_down: true };
+
+    /// The last `capacity` cells are, the others are found again by restarts.
+    pub const fn short_stack(capacity: usize) -> Traversal {
+        Traversal { capacity, push_down: false }
+    }
+
+    /// Algorithm 4: and restarts begin as far down as they can.
+    pub const fn short_stack_with_push_down(capacity: usize) -> Traversal {
+        Traversal { capacity, push_down: true }
+    }
+}
 
 /// A tree of several that are traced together ([`Tracer::record_several`]). Also the head of their table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
@@ -66,7 +93,7 @@ impl Tracer {
 
     /// The kernel that [`Tracer::record`] takes.
     fn kernel(&self, query: Query, count_work: bool) -> Kernel {
-        self.kernel_of(&shaders::TRACE_TRACER_KD, query, count_work)
+        self.kernel_of(&shaders::TRACE_KD_SINGLE, query, count_work)
     }
 
     fn kernel_of(&self, shader: &'static Shader, query: Query, count_work: bool) -> Kernel {
@@ -92,7 +119,7 @@ impl Tracer {
     /// # Errors
     /// As [`Tracer::record`].
     pub fn record_several(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &Buffers) -> Result<()> {
-        let kernel = self.kernel_of(&shaders::TRACE_TRACER_KD_SEVERAL, query, buffers.work.is_some());
+        let kernel = self.kernel_of(&shaders::TRACE_KD_SEVERAL, query, buffers.work.is_some());
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
     }
 }

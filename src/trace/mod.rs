@@ -2,23 +2,21 @@
 //!
 //! A hit is a property of a ray and a triangle alone: [`triangle`] defines it, ties go to the lower primitive index, and
 //! [`slab`] proves that a box test never hides one. So every tree over the same triangles, traversed in any order, gives the
-//! same [`Hit`]s, bit for bit, and they are those of [`host::closest_hit_by_brute_force`].
+//! same [`Hit`]s, bit for bit, and they are those of [`twin::tracer::closest_hit_by_brute_force`].
 //!
 //! - [`ray`] prepares a ray: shear, reciprocals, error bounds;
 //! - [`determinant`], [`triangle`], [`slab`] are the arithmetic, each the twin of a file in `glsl/trace/`;
-//! - [`host`] traverses on the host, [`tracer`] on the device; [`wide_host`] and [`wide`] do it in wide trees;
-//! - [`kd_host`] traverses kd-trees on the host, [`kd`] on the device, in the same ways.
+//! - [`tracer`] traverses on the device, [`wide`] in wide trees, [`kd`] in kd-trees;
+//! - [`twin`] does the same on the host.
 
 pub mod determinant;
-pub mod host;
 pub mod kd;
-pub mod kd_host;
 pub mod ray;
 pub mod slab;
 pub mod tracer;
 pub mod triangle;
+pub mod twin;
 pub mod wide;
-pub mod wide_host;
 
 use bytemuck::{Pod, Zeroable};
 

@@ -22,7 +22,7 @@
 //! computed here holds the computed t; it may be cut at the best t so far, and a box that is farther than the best hit holds
 //! neither a nearer hit nor an equally near one.
 //! Where a triangle was split, its vertices may lie outside of a part's box, by as much as it is long: so much larger a slack is in
-//! the box itself (`crate::bvh::host::split`), and what is said above is true of the box of whichever part has the point on the
+//! the box itself (`crate::bvh::twin::split`), and what is said above is true of the box of whichever part has the point on the
 //! triangle; every point is in one.
 
 use super::ray::PreparedRay;

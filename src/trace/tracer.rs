@@ -12,7 +12,7 @@
 
 use super::{MAX_RAYS, Query};
 use crate::bvh::layout::MAX_DEPTH;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Limits, MOST_LANES, Recorder, shaders};
 use crate::{Error, Result};
 
@@ -33,11 +33,11 @@ pub struct Shape {
 /// How the lanes of a subgroup load what each of them needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Loads {
-    /// Each for itself, member by member (`glsl/trace/tracer_single.comp`).
+    /// Each for itself, member by member (`glsl/trace/tracer/single.comp`).
     Gathered,
     /// Each for itself, in vectors of 64 and 128 bits (`glsl/trace/vector_loads.glsl`): for GPUs, where the number of loads counts.
     InVectors,
-    /// One lane after the other (`glsl/trace/tracer_lanes.comp`): 1.2 to 1.4 times as fast where a CPU's driver makes plain
+    /// One lane after the other (`glsl/trace/tracer/lanes.comp`): 1.2 to 1.4 times as fast where a CPU's driver makes plain
     /// loads of it. The workgroup must be one subgroup, of at most [`Loads::MAX_LANES`].
     LaneByLane,
 }
@@ -113,28 +113,6 @@ pub struct Buffers {
     pub count: u32,
 }
 
-push_constants! {
-    /// Push constants of `glsl/trace/tracer_*.comp`.
-    pub struct Arguments {
-        /// Address of the structure.
-        pub structure: u64,
-        /// Address of the rays.
-        pub rays: u64,
-        /// Address of the hits, one a ray.
-        pub hits: u64,
-        /// Address of the work, one a ray, if it is counted.
-        pub works: u64,
-        /// The first ray of this dispatch.
-        pub first: u32,
-        /// Rays in all.
-        pub count: u32,
-        /// Rays of an invocation, at most.
-        pub rays_each: u32,
-        /// Zero.
-        pub padding: u32,
-    }
-}
-
 /// The kernel that [`record`] takes.
 fn kernel(shape: &Shape, query: Query, count_work: bool) -> Kernel {
     let shader = match shape.loads {
@@ -164,7 +142,7 @@ pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, query: Query, buffers:
     record_kernel(recorder, &kernel(shape, query, buffers.work.is_some()), shape, buffers)
 }
 
-/// Records the tracing of all rays by a kernel that takes [`Arguments`].
+/// Records the tracing of all rays by a kernel that takes [`arguments::Trace`].
 pub(super) fn record_kernel(
     recorder: &mut Recorder<'_>,
     kernel: &Kernel,
@@ -195,8 +173,7 @@ pub(super) fn record_kernel(
     let at_once = recorder.context().limits.workgroup_count.saturating_mul(group_rays);
     let mut first = 0;
     while first < count {
-        let arguments =
-            Arguments { structure, rays, hits, works: work.unwrap_or(0), first, count, rays_each, padding: 0 };
+        let arguments = arguments::Trace { structure, rays, hits, works: work.unwrap_or(0), first, count, rays_each };
         recorder.dispatch(kernel, &arguments, (count - first).min(at_once).div_ceil(group_rays))?;
         first += at_once.min(count - first);
     }

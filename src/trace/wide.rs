@@ -75,15 +75,13 @@ impl Tracer {
     /// There is no kernel for that order of such nodes, or for such loads.
     fn kernel(&self, query: Query, count_work: bool) -> Result<Kernel> {
         let shader = match (self.form, self.order, self.shape.loads) {
-            (Form::Four, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_TRACER_WIDE4,
-            (Form::Eight, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_TRACER_WIDE8,
+            (Form::Four, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_WIDE_FOUR,
+            (Form::Eight, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_WIDE_EIGHT,
             (Form::EightQuantised, Order::Distance, Loads::Gathered | Loads::InVectors) => {
-                &shaders::TRACE_TRACER_WIDE8Q
+                &shaders::TRACE_WIDE_EIGHT_QUANTISED
             }
-            (Form::EightQuantised, Order::Octant, Loads::Gathered | Loads::InVectors) => {
-                &shaders::TRACE_TRACER_WIDE8Q_OCTANT
-            }
-            (Form::EightQuantised, Order::Octant, Loads::LaneByLane) => &shaders::TRACE_TRACER_WIDE8Q_OCTANT_LANES,
+            (Form::EightQuantised, Order::Octant, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_WIDE_OCTANT,
+            (Form::EightQuantised, Order::Octant, Loads::LaneByLane) => &shaders::TRACE_WIDE_OCTANT_LANES,
             (form, order, loads) => {
                 return Err(Error::Argument(format!(
                     "no kernel traces {form} in the order {order:?} with loads {loads:?}; take Order::Distance with \

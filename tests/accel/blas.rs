@@ -10,10 +10,10 @@ use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::builder::{Builder, Options};
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::{GeometryFlags, IndexFormat, VertexFormat};
-use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::host::closest_hit_by_brute_force;
+use hedgerow::bvh::twin;
+use hedgerow::trace::twin::tracer::closest_hit_by_brute_force;
 use hedgerow::trace::{Hit, Ray};
 
 type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
@@ -32,7 +32,7 @@ fn on_the_host(geometries: &[Owned]) -> Bvh2 {
     let corners: Vec<_> = geometries.iter().flat_map(|g| g.view().corners().collect::<Vec<_>>()).collect();
     let codes = Codes::for_count(corners.len() as u32);
     let opaque: Vec<_> = geometries.iter().map(|g| (g.primitive_count, GeometryFlags::OPAQUE.bits())).collect();
-    host::lbvh::build_corners(corners.into_iter(), codes, Collapse::SAH).with_geometries(&opaque, 0)
+    twin::lbvh::build_corners(corners.into_iter(), codes, Collapse::SAH).with_geometries(&opaque, 0)
 }
 
 /// Rays to random points of random triangles, from around them.

@@ -6,18 +6,18 @@ use crate::common::geometries::Owned;
 use crate::common::probe::{CONFIRM_ODD, ProbeRay, Report};
 use crate::common::shapes::{Corners, Random, hard_rays, ray, soup, tree_with};
 use crate::common::world::{Part, World};
-use hedgerow::accel::serialize::{self, Head};
+use hedgerow::accel::serialize::Head;
 use hedgerow::accel::{self, Property};
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::builder::{Builder, Options};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, VertexFormat};
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::{Aabb, BoxRecord, Bvh2, Child, Header, Instance, Record, status};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::lbvh;
 use hedgerow::gpu::Recorder;
-use hedgerow::trace::host::closest_hit;
+use hedgerow::trace::twin::tracer::closest_hit;
 use hedgerow::trace::{Hit, Ray};
 use hedgerow_lab::device::{Buffer, DriverTracing};
 
@@ -351,7 +351,7 @@ fn serialising_and_back_gives_the_same_bytes() {
     for case in cases() {
         for bytes in [&case.bytes, &case.compacted] {
             let source = Guarded::of(bytes);
-            let expected = serialize::write_on_host(bytes).expect("a structure");
+            let expected = hedgerow::accel::twin::serialize::write(bytes).expect("a structure");
             assert_eq!(property(&source, Property::SerializedSize), expected.len() as u64, "{}", case.name);
             let memory = serialized(&source, expected.len());
             assert!(memory.read() == expected, "{}", case.name);
@@ -369,7 +369,7 @@ fn serialising_and_back_gives_the_same_bytes() {
             );
 
             assert!(&deserialized(&memory, bytes.len()).read() == bytes, "{}", case.name);
-            assert!(&serialize::read_on_host(&expected).expect("its own") == bytes, "{}", case.name);
+            assert!(&hedgerow::accel::twin::serialize::read(&expected).expect("its own") == bytes, "{}", case.name);
         }
     }
 }
@@ -378,7 +378,7 @@ fn serialising_and_back_gives_the_same_bytes() {
 fn handles_that_were_rewritten_come_back_in_the_instances() {
     let tree = instances(500);
     let bytes = tree.to_bytes();
-    let mut memory = serialize::write_on_host(&bytes).expect("a structure");
+    let mut memory = hedgerow::accel::twin::serialize::write(&bytes).expect("a structure");
     let handles: Vec<u64> = bytemuck::pod_collect_to_vec(&memory[56..56 + 8 * 500]);
     assert!(handles.iter().zip(&tree.records).all(|(&handle, record)| handle == record.structure));
     assert!(handles.contains(&0) && handles.iter().any(|&handle| handle > u64::from(u32::MAX)));
@@ -389,7 +389,7 @@ fn handles_that_were_rewritten_come_back_in_the_instances() {
     }
     let got = deserialized(&Guarded::of(&memory), bytes.len());
     assert!(got.read() == expected.to_bytes());
-    assert!(serialize::read_on_host(&memory).expect("its own") == expected.to_bytes());
+    assert!(hedgerow::accel::twin::serialize::read(&memory).expect("its own") == expected.to_bytes());
 }
 
 /// Triangles of two geometries and boxes, each seen twenty times.
@@ -444,7 +444,7 @@ fn a_world_that_was_read_back_answers_queries_as_before() {
         assert!(compacted.read() == Bvh2::<Instance>::from_bytes(&top).expect("a top level").compacted().to_bytes());
         assert_eq!(backend.probe(compacted.handle(), &rays), before, "compacted, {flags:?}");
 
-        let mut kept = serialize::write_on_host(&compacted.read()).expect("a structure");
+        let mut kept = hedgerow::accel::twin::serialize::write(&compacted.read()).expect("a structure");
         let parts: Vec<(u64, Guarded)> = built
             .parts
             .iter()
@@ -486,7 +486,7 @@ fn rays() -> Vec<Ray> {
 #[test]
 fn what_another_version_wrote_is_an_empty_structure_that_says_so() {
     let bytes = triangles(100, false, 1, Collapse::SAH).to_bytes();
-    let good = serialize::write_on_host(&bytes).expect("a structure");
+    let good = hedgerow::accel::twin::serialize::write(&bytes).expect("a structure");
     // A bit of each byte of the version, then sizes that are not those of the structure, then what is no structure.
     let structure = size_of::<Head>();
     let (backend, rays) = (Ours::on(device()), rays());
@@ -506,11 +506,11 @@ fn what_another_version_wrote_is_an_empty_structure_that_says_so() {
         assert_eq!((empty.header.active, empty.header.status), (0, status::WRONG_VERSION));
         assert_eq!(empty.to_bytes().len() as u64, property(&target, Property::Size));
         assert!(backend.trace(target.handle(), &rays).iter().all(|hit| !hit.is_some()), "byte {at}");
-        serialize::read_on_host(&memory).expect_err("another version's");
+        hedgerow::accel::twin::serialize::read(&memory).expect_err("another version's");
     }
     for cut in [0, 10, 56, 100, good.len() - 1] {
-        serialize::read_on_host(&good[..cut]).expect_err("cut off");
-        serialize::write_on_host(&bytes[..cut.min(bytes.len() - 1)]).expect_err("cut off");
+        hedgerow::accel::twin::serialize::read(&good[..cut]).expect_err("cut off");
+        hedgerow::accel::twin::serialize::write(&bytes[..cut.min(bytes.len() - 1)]).expect_err("cut off");
     }
     let nothing = ours().get_device_acceleration_structure_compatibility(&Default::default());
     assert_eq!(nothing, vk::AccelerationStructureCompatibilityKHR::INCOMPATIBLE);

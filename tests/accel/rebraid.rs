@@ -6,7 +6,7 @@ use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
 use crate::common::probe::{IGNORE, ProbeRay, flags};
 use crate::common::shapes::{Corners, Random, icosphere, placed, soup};
 use crate::common::world::World;
-use hedgerow::accel::{self, Instance, Options, REBRAID, top_level};
+use hedgerow::accel::{self, Instance, Options, REBRAID, twin};
 use hedgerow::ash::vk;
 use hedgerow::bvh::layout::{self, Bvh2, Triangle, status};
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ fn a_top_level_has_the_bytes_of_the_hosts() {
             let world = World { by_pointers, ..mixture(count, count as u64) };
             let read = ReadBack::new(&backend, &world);
             let options = Options { rebraid_budget: budget, ..Options::DEFAULT };
-            let expected = top_level::top_level(&read.instances, |a| read.below(a), world.flags, &options);
+            let expected = twin::top_level(&read.instances, |a| read.below(a), world.flags, &options);
             let what = format!("{count} instances, budget {budget}");
             assert_eq!(read.top.header, expected.header, "{what}");
             let differ = read.top.records.iter().zip(&expected.records).position(|(a, b)| a != b);
@@ -59,7 +59,7 @@ fn what_the_flags_ask_for_is_what_the_host_builds() {
     ];
     for flags in all {
         let read = ReadBack::new(&backend, &World { flags, ..world.clone() });
-        let expected = top_level::top_level(&read.instances, |a| read.below(a), flags, &Options::DEFAULT);
+        let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &Options::DEFAULT);
         assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}");
         let opens = flags.contains(REBRAID) && !flags.contains(Flags::ALLOW_UPDATE);
         assert_eq!(read.top.header.primitive_count > 400, opens, "{flags:?}");

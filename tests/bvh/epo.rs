@@ -4,9 +4,9 @@ use crate::common::shapes::{Corners, Random, icosphere, placed, soup, tree_with}
 use crate::common::{corpus, device};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::epo::{Buffers, Figures, OnDevice};
-use hedgerow::bvh::host;
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin;
 
 /// In pieces of so many records.
 fn on_device(tree: &Bvh2, piece: u32) -> Figures {
@@ -35,7 +35,7 @@ fn on_device(tree: &Bvh2, piece: u32) -> Figures {
 /// off where that is a 10⁴th of it. Of a figure that is nothing but rounding (boxes that touch), a 10⁶th of a step is as good as 0.
 #[track_caller]
 fn assert_as_on_the_host(name: &str, tree: &Bvh2) {
-    let expected = host::epo::epo(tree, 3.0, 2.0);
+    let expected = twin::epo::epo(tree, 3.0, 2.0);
     let figures = on_device(tree, u32::MAX);
     match (figures.epo(3.0, 2.0), expected) {
         (None, None) => {}
@@ -54,7 +54,7 @@ fn hard_meshes_have_the_overlap_of_the_host() {
     let without = ["zero area", "a hundred far away"];
     for (name, positions, triangles) in corpus::meshes().into_iter().filter(|mesh| !without.contains(&&*mesh.0)) {
         for collapse in [Collapse::OFF, Collapse::SAH] {
-            assert_as_on_the_host(&name, &host::lbvh::build(&positions, &triangles, Code::Mc63.full(), collapse));
+            assert_as_on_the_host(&name, &twin::lbvh::build(&positions, &triangles, Code::Mc63.full(), collapse));
         }
     }
 }
@@ -94,8 +94,8 @@ fn the_order_of_records_and_slots_does_not_matter() {
         other.nodes[to as usize].children = tree.nodes[from].children.map(renamed);
     }
     other.header.root = renamed(tree.header.root);
-    let expected = host::epo::epo(&tree, 3.0, 2.0).expect("there is surface");
-    let on_host = host::epo::epo(&other, 3.0, 2.0).expect("there is surface");
+    let expected = twin::epo::epo(&tree, 3.0, 2.0).expect("there is surface");
+    let on_host = twin::epo::epo(&other, 3.0, 2.0).expect("there is surface");
     assert!((on_host - expected).abs() <= 1e-12 * expected, "{on_host}, {expected}");
     assert_as_on_the_host("shuffled", &other);
 }

@@ -7,14 +7,14 @@ use crate::common::twins::{assert_same, built};
 use hedgerow::bvh::builder::{Options, Schedule};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{IndexFormat, Input, Source, VertexFormat};
-use hedgerow::bvh::host;
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin;
 
 #[track_caller]
 fn assert_as_on_the_host(geometries: &[Owned], shift: usize) -> Bvh2 {
     let corners = geometries.iter().flat_map(|g| g.view().corners().collect::<Vec<_>>());
-    let expected = host::lbvh::build_corners(corners, Code::Emc64Var.full(), Collapse::SAH);
+    let expected = twin::lbvh::build_corners(corners, Code::Emc64Var.full(), Collapse::SAH);
     let counts: Vec<_> = geometries.iter().map(|g| (g.primitive_count, 0)).collect();
     let expected = expected.with_geometries(&counts, 0);
     expected.validate().expect("a valid tree");

@@ -4,17 +4,18 @@ use crate::common::twins::{assert_same, on_device, on_host};
 use crate::common::{corpus, device};
 use hedgerow::bvh::builder::{Options, Schedule};
 use hedgerow::bvh::codes::{Code, Codes};
-use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow::bvh::quality::{self, Figures, Quality};
+use hedgerow::bvh::quality::{Figures, OnDevice, Quality};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin;
+use hedgerow::bvh::twin::quality;
 
 #[test]
 fn quality_on_the_device_equals_the_walk_on_the_host() {
     for (name, positions, triangles) in corpus::meshes() {
         for collapse in [Collapse::OFF, Collapse::SAH] {
-            let tree = host::lbvh::build(&positions, &triangles, Code::Emc64Var.full(), collapse);
-            let expected = quality::on_host(&tree, 3.0, 2.0);
+            let tree = twin::lbvh::build(&positions, &triangles, Code::Emc64Var.full(), collapse);
+            let expected = quality::of(&tree, 3.0, 2.0);
             let got = quality_on_device(&tree).quality(3.0, 2.0);
             let counts = |q: &Quality| (q.inner, q.leaves, q.refs, q.leaf_max, q.depth_max);
             assert_eq!(counts(&got), counts(&expected), "{name}");
@@ -32,7 +33,7 @@ fn quality_on_the_device_equals_the_walk_on_the_host() {
 
 fn quality_on_device(tree: &Bvh2) -> Figures {
     let device = device();
-    let measure = quality::OnDevice::new(device, tree.header.primitive_count);
+    let measure = OnDevice::new(device, tree.header.primitive_count);
     let structure = device.upload("structure", &tree.to_bytes()).unwrap();
     let scratch = device.buffer("scratch", measure.scratch_bytes()).unwrap();
     let result = device.buffer("result", size_of::<Figures>() as u64).unwrap();

@@ -8,13 +8,13 @@ use crate::common::{corpus, device};
 use hedgerow::bvh::builder::{self, Builder};
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, VertexFormat};
-use hedgerow::bvh::host;
 use hedgerow::bvh::layout::{Aabb, BoxRecord, Bvh2, Child, Instance, Record, Triangle, status};
-use hedgerow::bvh::quality;
 use hedgerow::bvh::refit::{Job, Options, Refit, Schedule};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::host::closest_hit_by_brute_force;
+use hedgerow::bvh::twin;
+use hedgerow::bvh::twin::quality;
 use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::twin::tracer::closest_hit_by_brute_force;
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::device::Buffer;
 
@@ -91,10 +91,10 @@ impl Mesh {
     }
 
     fn built(&self, collapse: Collapse) -> Bvh2 {
-        host::lbvh::build(&self.positions, &self.triangles, Codes::for_count(self.count()), collapse)
+        twin::lbvh::build(&self.positions, &self.triangles, Codes::for_count(self.count()), collapse)
     }
 
-    fn corners(&self) -> impl Iterator<Item = host::geometry::Corners> {
+    fn corners(&self) -> impl Iterator<Item = twin::geometry::Corners> {
         self.triangles.iter().map(|triangle| {
             let vertex = |v: u32| self.positions.get(v as usize).copied().ok_or(status::INDEX_OUT_OF_RANGE);
             let [a, b, c] = triangle.map(vertex);
@@ -106,7 +106,7 @@ impl Mesh {
 
     fn refitted(&self, tree: &Bvh2) -> Bvh2 {
         let mut tree = tree.clone();
-        host::refit::refit_corners(&mut tree, self.corners(), Collapse::SAH);
+        twin::refit::refit_corners(&mut tree, self.corners(), Collapse::SAH);
         tree
     }
 }
@@ -305,10 +305,10 @@ fn the_growth_is_that_of_the_sah_cost() {
         for collapse in [Collapse::SAH, Collapse::OFF] {
             let tree = mesh.built(collapse);
             assert_eq!(tree.header.sah_growth(), 1.0);
-            let before = quality::on_host(&tree, 3.0, 2.0).sah;
+            let before = quality::of(&tree, 3.0, 2.0).sah;
             for (is_worse, moved) in [(false, mesh.moved(bent(3.0))), (count > 2, mesh.moved(scattered(1)))] {
                 let refitted = assert_as_on_the_host("moved", &tree, &moved);
-                let after = quality::on_host(&refitted, 3.0, 2.0).sah;
+                let after = quality::of(&refitted, 3.0, 2.0).sah;
                 // Sums of thousands of areas in 32 bits against 64.
                 let close = |got: f32, expected: f64| (f64::from(got) - expected).abs() <= 1e-4 * expected;
                 assert!(close(refitted.header.sah(), after), "{} {after}", refitted.header.sah());
@@ -435,10 +435,10 @@ fn every_format_and_several_geometries_are_refitted_as_on_the_host() {
         let counts: Vec<(u32, u32)> = case.iter().map(|[g, _]| (g.primitive_count, 0)).collect();
         let corners = |which: usize| case.iter().flat_map(move |g| g[which].view().corners().collect::<Vec<_>>());
         let count: u32 = counts.iter().map(|&(count, _)| count).sum();
-        let tree = host::lbvh::build_corners(corners(0), Codes::for_count(count), Collapse::SAH);
+        let tree = twin::lbvh::build_corners(corners(0), Codes::for_count(count), Collapse::SAH);
         let tree = tree.with_geometries(&counts, 0);
         let mut expected = tree.clone();
-        host::refit::refit_corners(&mut expected, corners(1), Collapse::SAH);
+        twin::refit::refit_corners(&mut expected, corners(1), Collapse::SAH);
         expected.validate().expect("a valid tree");
         assert!(expected.header.active > 0 && expected.to_bytes() != tree.to_bytes(), "there is something to compare");
 
@@ -488,9 +488,9 @@ fn boxes_are_refitted_as_on_the_host() {
     for count in SIZES {
         let (given, moved) = (random_boxes(count, 2), random_boxes(count, 3));
         for collapse in [Collapse::SAH, Collapse::OFF] {
-            let tree = host::lbvh::build_aabbs(&given, Codes::for_count(count as u32), collapse);
+            let tree = twin::lbvh::build_aabbs(&given, Codes::for_count(count as u32), collapse);
             let mut expected = tree.clone();
-            host::refit::refit_aabbs(&mut expected, &moved, collapse);
+            twin::refit::refit_aabbs(&mut expected, &moved, collapse);
             expected.validate().expect("a valid tree");
             let left_out = expected.records[..tree.header.active as usize].iter().filter(|r| r.is_left_out()).count();
             assert_eq!(left_out > 0, count > 20, "some are left out that were not");
@@ -539,7 +539,7 @@ fn rays_do_not_meet_boxes_that_are_left_out() {
     (broken[3].lo, broken[3].hi) = (given[3].hi, given[3].lo);
     let ray = ProbeRay { decision: probe::IGNORE, ..ProbeRay::new([-1.0, 0.5, 0.5], [1.0, 0.0, 0.0]) };
     for collapse in [Collapse::SAH, Collapse::OFF] {
-        let tree = host::lbvh::build_aabbs(&given, Codes::for_count(5), collapse);
+        let tree = twin::lbvh::build_aabbs(&given, Codes::for_count(5), collapse);
         let options = Options { primitives: Primitives::Boxes, costs: collapse, ..Options::DEFAULT };
         let placed = Placed::new(&tree.to_bytes(), &options, 5);
         let met = || {
@@ -644,7 +644,7 @@ fn top_levels_are_refitted_to_their_entries() {
             .map(|e| if e.left_out == 0 { Ok(Aabb { lo: e.lo, hi: e.hi }) } else { Err(e.left_out & !INACTIVE) })
             .collect();
         let mut expected = tree.clone();
-        host::refit::refit_boxes(&mut expected, &boxes, |instance| fresh[instance as usize], Collapse::SAH);
+        twin::refit::refit_boxes(&mut expected, &boxes, |instance| fresh[instance as usize], Collapse::SAH);
         assert_eq!(expected.header.status, if count > 6 { status::BAD_INSTANCE } else { 0 });
         for schedule in SCHEDULES {
             let options = Options { schedule: Some(schedule), primitives: Primitives::Instances, ..Options::DEFAULT };
@@ -685,7 +685,7 @@ fn refits_of_a_batch_are_those_of_the_host() {
 fn what_was_not_planned_for_is_left_as_it_is() {
     let mesh = Mesh::random(100);
     let bytes = mesh.built(Collapse::OFF).to_bytes();
-    let boxes = host::lbvh::build_aabbs(&random_boxes(100, 2), Codes::for_count(100), Collapse::OFF).to_bytes();
+    let boxes = twin::lbvh::build_aabbs(&random_boxes(100, 2), Codes::for_count(100), Collapse::OFF).to_bytes();
     let mut no_structure = bytes.clone();
     no_structure[0] ^= 1;
     // Scratch memory for fewer primitives than the structure has; a structure of boxes; none at all.

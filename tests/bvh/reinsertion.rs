@@ -2,11 +2,11 @@
 
 use crate::common::{corpus, device};
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::host::{lbvh, ploc};
 use hedgerow::bvh::layout::{Bvh2, MAX_DEPTH};
-use hedgerow::bvh::quality;
 use hedgerow::bvh::reinsertion::{Options, Reinsertion};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::quality;
+use hedgerow::bvh::twin::{lbvh, ploc};
 
 /// The LBVH and PLOC of every mesh, with one triangle a leaf.
 fn trees() -> impl Iterator<Item = (String, Bvh2)> {
@@ -23,7 +23,7 @@ const OPTIONS: [Options; 3] = [Options::FAST, Options { rounds: 4, stride: 1 }, 
 
 /// Cost of the steps: what reinsertion lessens.
 fn area(tree: &Bvh2) -> f64 {
-    quality::on_host(tree, 1.0, 0.0).sah
+    quality::of(tree, 1.0, 0.0).sah
 }
 
 #[test]
@@ -33,7 +33,7 @@ fn optimised_trees_are_valid_with_the_same_records_and_never_worse() {
             let optimised = tree.reinserted(&options);
             assert!(optimised.records == tree.records, "{name}: other records");
             assert_eq!(optimised.header, tree.header, "{name}");
-            if quality::on_host(&optimised, 1.0, 0.0).depth_max <= MAX_DEPTH {
+            if quality::of(&optimised, 1.0, 0.0).depth_max <= MAX_DEPTH {
                 optimised.validate().unwrap_or_else(|e| panic!("{name} {options:?}: {e}"));
             }
             for collapse in [Collapse::SAH, Collapse::OFF] {

@@ -6,14 +6,16 @@ use crate::common::twins::{assert_same, built, on_device, on_host};
 use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Source, Treelets, Window};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, Primitives};
-use hedgerow::bvh::host::split::around_parts;
 use hedgerow::bvh::layout::{Aabb, Bvh2};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::split;
+use hedgerow::bvh::twin::split::around_parts;
 use hedgerow::bvh::wide::layout::{Wide4, Wide8, Wide8q};
 use hedgerow::bvh::{refit, reinsertion};
+use hedgerow::trace::twin::tracer;
+use hedgerow::trace::twin::wide as wide_host;
 use hedgerow::trace::wide::Order;
-use hedgerow::trace::{Query, Ray, host as tracer, wide_host};
+use hedgerow::trace::{Query, Ray};
 
 /// The usual, and as much as there may be.
 const SPLITS: [split::Options; 2] = [split::Options::DEFAULT, ALL];

@@ -3,9 +3,9 @@
 use crate::common::{corpus, device};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::Primitives;
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::{Aabb, Bvh2, Child, Header, Node, Record, Triangle, status};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::lbvh;
 use hedgerow::bvh::wide::device::{OnDevice, Options};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;

@@ -3,7 +3,7 @@
 use super::device;
 use super::shapes::{Corners, Random};
 use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, VertexFormat};
-use hedgerow::bvh::host::geometry::HostGeometry;
+use hedgerow::bvh::twin::geometry::HostGeometry;
 use hedgerow_lab::device::Buffer;
 
 /// A matrix that turns, shears, mirrors and moves.

@@ -3,7 +3,7 @@
 use super::device;
 use hedgerow::trace::{Hit, Ray};
 pub use hedgerow_lab::measure::check::probe::*;
-use hedgerow_lab::shaders;
+use hedgerow_lab::{arguments, shaders};
 
 /// Of the driver's structures.
 pub fn of_the_driver() -> Probe {
@@ -21,24 +21,13 @@ pub struct KdReport {
     pub geometry: [u32; 3],
 }
 
-#[derive(Clone, Copy, bytemuck::NoUninit)]
-#[repr(C)]
-struct KdPush {
-    kd_tree: u64,
-    bvh: u64,
-    rays: u64,
-    reports: u64,
-    count: u32,
-    padding: u32,
-}
-
 /// Traces every ray through both.
 pub fn ask_kd_tree(kd_tree: u64, bvh: u64, rays: &[Ray]) -> Vec<KdReport> {
     let probe = Probe::of(device(), shaders::MEASURE_KD_PROBE.spirv);
     let ray_buffer = device().upload("rays", rays).expect("memory");
     let reports = device().buffer("reports", size_of::<KdReport>() as u64 * rays.len() as u64).expect("memory");
     let count = rays.len() as u32;
-    let push = KdPush { kd_tree, bvh, rays: ray_buffer.address(), reports: reports.address(), count, padding: 0 };
+    let push = arguments::KdProbe { kd_tree, bvh, rays: ray_buffer.address(), reports: reports.address(), count };
     probe.dispatch(bytemuck::bytes_of(&push), count);
     reports.read(rays.len())
 }

@@ -13,8 +13,9 @@ use hedgerow::kdtree::layout::{Header, KdTree};
 use hedgerow::kdtree::merge::{self, Memory, Merger, Most, Object, Report};
 use hedgerow::kdtree::twin;
 use hedgerow::trace::Query;
+use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::kd::{Tracer, TreeEntry};
-use hedgerow::trace::kd_host::{self, Traversal};
+use hedgerow::trace::twin::kd as kd_host;
 use hedgerow_lab::device::Buffer;
 
 const SCHEDULES: [Schedule; 2] = [Schedule::Chain, Schedule::Persistent];

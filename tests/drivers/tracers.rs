@@ -9,9 +9,10 @@ use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::gpu::Recorder;
 use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
 use hedgerow::trace::wide::{Order, Tracer};
-use hedgerow::trace::wide_host::{self, TracedNode};
-use hedgerow::trace::{Hit, Query, Ray, Work, host};
+use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// Trees and the rays that are traced through them.
 fn cases() -> Vec<(Bvh2, Vec<Ray>)> {

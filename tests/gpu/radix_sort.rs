@@ -53,7 +53,11 @@ fn equals_its_twin(keys: &[u64], bits: u32) {
     let values: Vec<u32> = (0..keys.len() as u32).rev().collect();
     for shape in shapes() {
         let got = sorted_on_device(&shape, &keys, &values, bits);
-        assert!(got == radix_sort::on_host(&keys, &values, bits), "{} keys of {bits} bits, {shape:?}", keys.len());
+        assert!(
+            got == hedgerow::gpu::twin::radix_sort::sort(&keys, &values, bits),
+            "{} keys of {bits} bits, {shape:?}",
+            keys.len()
+        );
     }
 }
 

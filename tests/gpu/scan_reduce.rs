@@ -2,8 +2,8 @@
 
 use crate::common::{corpus::unit_floats, device};
 use hedgerow::gpu::fill;
-use hedgerow::gpu::reduce::{self, Bounds, Reduction};
-use hedgerow::gpu::scan::{self, Buffers, Scan};
+use hedgerow::gpu::reduce::{Bounds, Reduction};
+use hedgerow::gpu::scan::{Buffers, Scan};
 use proptest::prelude::*;
 
 const SIZES: [usize; 20] =
@@ -20,7 +20,7 @@ fn scan_equals_its_twin(values: &[u32]) {
         device.run(None, |r| scan.record(r, &buffers)).unwrap();
         let total = sums.read_at::<u32>(4 * u64::from(scan.sums_words() - 1), 1)[0];
         let got = (results.read::<u32>(values.len()), total);
-        assert!(got == scan::on_host(values), "{} words", values.len());
+        assert!(got == hedgerow::gpu::twin::scan::exclusive(values), "{} words", values.len());
     }
 }
 
@@ -31,7 +31,7 @@ fn reduction_equals_its_twin(boxes: &[Bounds]) {
     let to = device.buffer("result", 24).unwrap();
     let scratch = device.buffer("scratch", 24 * u64::from(reduction.scratch_boxes())).unwrap();
     device.run(None, |r| reduction.record(r, from.address(), to.address(), scratch.address())).unwrap();
-    assert_eq!(to.read::<Bounds>(1)[0], reduce::on_host(boxes), "{} boxes", boxes.len());
+    assert_eq!(to.read::<Bounds>(1)[0], hedgerow::gpu::twin::reduce::bounds(boxes), "{} boxes", boxes.len());
 }
 
 #[test]

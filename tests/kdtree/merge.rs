@@ -6,8 +6,10 @@ use crate::common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, 
 use hedgerow::bvh::layout::status;
 use hedgerow::kdtree::layout::{Header, KdTree, MAX_DEPTH, Node, Room};
 use hedgerow::kdtree::termination::Costs;
-use hedgerow::trace::kd_host::{self, Traversal};
-use hedgerow::trace::{Ray, host};
+use hedgerow::trace::Ray;
+use hedgerow::trace::kd::Traversal;
+use hedgerow::trace::twin::kd as kd_host;
+use hedgerow::trace::twin::tracer as host;
 use hedgerow_host::kdtree::merge::Merged;
 use hedgerow_host::kdtree::{Options, build};
 use proptest::prelude::*;

@@ -6,7 +6,8 @@
 use hedgerow::kdtree::layout::{KdTree, Room};
 use hedgerow::kdtree::quality;
 use hedgerow::kdtree::termination::Costs;
-use hedgerow::trace::kd_host::{Traversal, trace};
+use hedgerow::trace::kd::Traversal;
+use hedgerow::trace::twin::kd::trace;
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_host::kdtree::merge::Merged;
 use hedgerow_host::kdtree::{Options, build};

@@ -10,8 +10,9 @@ use hedgerow::kdtree::builder::{self, Builder};
 use hedgerow::kdtree::layout::{Header, KdTree, Room};
 use hedgerow::kdtree::merge::{Estimate, Memory, Merger, Most, Object, Objects, Options, Report};
 use hedgerow::kdtree::twin;
-use hedgerow::trace::host::closest_hit;
-use hedgerow::trace::kd_host::{self, Traversal};
+use hedgerow::trace::kd::Traversal;
+use hedgerow::trace::twin::kd as kd_host;
+use hedgerow::trace::twin::tracer::closest_hit;
 use hedgerow_lab::device::Buffer;
 
 const PLENTY: Options = Options { build: builder::Options::DEFAULT, estimate: PLENTY_TO_MERGE };

@@ -7,7 +7,8 @@ use crate::common::shapes::{
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
-use hedgerow::trace::{Hit, Query, Ray, Work, host};
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// Every way to cut the work: the default, those for CPUs and that for GPUs, no shared memory at all, and a stack whose levels
 /// lie half here and half there.

@@ -4,10 +4,11 @@ use crate::common::shapes::{
     Corners, Random, hard_rays, icosphere, placed, ray, rays_from_inside, soup, tree_of, tree_with,
 };
 use hedgerow::bvh::codes::Codes;
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::{Hit, Query, Ray, host};
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Query, Ray};
 use proptest::prelude::*;
 
 fn assert_hits_of_brute_force(corners: &Corners, rays: &[Ray]) {

@@ -4,8 +4,10 @@ use crate::common::corpus;
 use crate::common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, rays_from_inside, soup, tree_of};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::kdtree::layout::{Content, KdTree};
-use hedgerow::trace::kd_host::{self, Traversal};
-use hedgerow::trace::{Hit, Query, Ray, host};
+use hedgerow::trace::kd::Traversal;
+use hedgerow::trace::twin::kd as kd_host;
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_host::kdtree::{Options, build};
 use proptest::prelude::*;
 

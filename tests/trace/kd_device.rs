@@ -9,9 +9,11 @@ use crate::common::{corpus, shapes};
 use hedgerow::bvh::layout::status;
 use hedgerow::kdtree::layout::{Content, KdTree, MAX_DEPTH};
 use hedgerow::trace::kd::Tracer;
-use hedgerow::trace::kd_host::{self, Traversal};
+use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::tracer::{Loads, Shape};
-use hedgerow::trace::{Hit, Query, Ray, Work, host};
+use hedgerow::trace::twin::kd as kd_host;
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Query, Ray, Work};
 use hedgerow_host::kdtree::{Options, build};
 
 const TRAVERSALS: [Traversal; 8] = [

@@ -11,9 +11,10 @@ use hedgerow::bvh::wide::Form;
 use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::trace::tracer::{Buffers, Loads, Shape};
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
 use hedgerow::trace::wide::{Order, Tracer};
-use hedgerow::trace::wide_host::{self, TracedNode};
-use hedgerow::trace::{Hit, Query, Ray, Work, host};
+use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// Every order, and every way to cut the work: the default, that for GPUs, no shared memory at all, and a stack half here and
 /// half there.

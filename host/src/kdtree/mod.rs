@@ -5,8 +5,8 @@
 mod exact;
 pub mod merge;
 
-use hedgerow::bvh::host::geometry::Corners;
-use hedgerow::bvh::host::lbvh;
+use hedgerow::bvh::twin::geometry::Corners;
+use hedgerow::bvh::twin::lbvh;
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::kdtree::twin::{Fork, binned, grown};
@@ -97,7 +97,7 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &Options) 
     build_corners(lbvh::corners(positions, triangles), options)
 }
 
-/// The same of triangles that [`HostGeometry::corners`](hedgerow::bvh::host::geometry::HostGeometry::corners) read.
+/// The same of triangles that [`HostGeometry::corners`](hedgerow::bvh::twin::geometry::HostGeometry::corners) read.
 ///
 /// # Errors
 /// As [`build`].

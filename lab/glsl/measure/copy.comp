@@ -9,7 +9,7 @@
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Source { uvec4 word[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer Target { uvec4 word[]; };
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform CopyWordsArguments {
     Source source;
     Target target;
     uint count;

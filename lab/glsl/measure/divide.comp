@@ -6,7 +6,7 @@
 // needs   nothing of other workgroups
 #include "gpu/pass.glsl"
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform DivideArguments {
     Floats numerators;
     Floats denominators;
     Floats quotients;

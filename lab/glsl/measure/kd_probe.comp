@@ -34,7 +34,7 @@ struct KdNode {
 
 layout(buffer_reference, scalar) readonly buffer Structure { Node ray[]; };
 layout(buffer_reference, scalar) writeonly buffer KdStructure { KdNode report[]; };
-layout(push_constant, scalar) uniform Probe { uvec2 kd_tree; uvec2 bvh; Structure rays; KdStructure reports; uint count; };
+layout(push_constant, scalar) uniform KdProbeArguments { uvec2 kd_tree; uvec2 bvh; Structure rays; KdStructure reports; uint count; };
 
 Triangle hit_nearer(Node ray) {
     HedgerowRayQuery query;

@@ -9,7 +9,7 @@
 // needs   the pool zeroed, with one task in phase 0; visits zeroed; any number of workgroups from one up
 #include "gpu/task_pool.glsl"
 
-layout(push_constant, scalar) uniform Arguments {
+layout(push_constant, scalar) uniform PoolTreeArguments {
     PoolState pool;
     Words visits;
     Words loops;        // [0]: what a long loop counted to

@@ -59,7 +59,7 @@ struct Report {
 
 layout(buffer_reference, scalar) readonly buffer Rays { ProbeRay ray[]; };
 layout(buffer_reference, scalar) writeonly buffer Reports { Report report[]; };
-layout(push_constant, scalar) uniform Probe { uvec2 structure; Rays rays; Reports reports; uint count; };
+layout(push_constant, scalar) uniform ProbeArguments { uvec2 structure; Rays rays; Reports reports; uint count; };
 
 void main() {
     uint i = gl_GlobalInvocationID.x;

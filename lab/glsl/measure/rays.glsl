@@ -18,7 +18,7 @@ struct Hit {
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Rays { GivenRay ray[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer Hits { Hit hit[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) writeonly buffer Works { uvec4 work[]; };
-layout(push_constant, scalar) uniform Arguments { uvec2 structure; Rays rays; Hits hits; Works works; uint first; uint count; };
+layout(push_constant, scalar) uniform TraceQueriesArguments { uvec2 structure; Rays rays; Hits hits; Works works; uint first; uint count; };
 
 Hit no_hit() {
     return Hit(uintBitsToFloat(0x7F800000u), 0xFFFFFFFFu, 0.0, 0.0);

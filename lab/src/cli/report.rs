@@ -1,7 +1,7 @@
 //! `hedgerow report`: one page of the records of many folders.
 
 use super::Common;
-use crate::report::joined;
+use crate::report::{joined, markdown};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -12,12 +12,21 @@ pub struct Arguments {
     #[arg(value_name = "DIR", required = true)]
     folders: Vec<PathBuf>,
     /// The folder for the records together, charts and index.html
-    #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
+    #[arg(short, long, value_name = "DIR", required_unless_present = "markdown")]
+    output: Option<PathBuf>,
+    /// Write the records of hedgerow bench to a page of Markdown, such as docs/results.md
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
 }
 
 pub(super) fn run(_common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
-    let page = joined::write(&arguments.folders, &arguments.output)?;
-    writeln!(std::io::stdout().lock(), "{}", page.display())?;
+    if let Some(output) = &arguments.output {
+        let page = joined::write(&arguments.folders, output)?;
+        writeln!(std::io::stdout().lock(), "{}", page.display())?;
+    }
+    if let Some(path) = &arguments.markdown {
+        markdown::write(&arguments.folders, path)?;
+        writeln!(std::io::stdout().lock(), "{}", path.display())?;
+    }
     Ok(())
 }

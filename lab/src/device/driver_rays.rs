@@ -3,6 +3,7 @@
 
 use super::memory::Memory;
 use super::{Device, DriverTracing};
+use crate::arguments;
 use crate::shaders;
 use crate::{Error, Result};
 use ash::vk;
@@ -12,18 +13,6 @@ use hedgerow::gpu::{Kernel, Recorder};
 
 /// Invocations a workgroup of the kernel that queries.
 const WORKGROUP: u32 = 64;
-
-/// The push constants of `lab/glsl/measure/rays.glsl`.
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(crate) struct Arguments {
-    pub(crate) structure: u64,
-    pub(crate) rays: u64,
-    pub(crate) hits: u64,
-    pub(crate) works: u64,
-    pub(crate) first: u32,
-    pub(crate) count: u32,
-}
 
 /// Rays to trace through a top level of the driver's.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +36,7 @@ impl Device {
     /// The device was opened without the driver's structures; a pipeline could not be made.
     pub fn trace_by_driver(&self, recorder: &mut Recorder<'_>, rays: &DriverRays) -> hedgerow::Result<()> {
         let limits = &self.limits;
-        let arguments = |first| Arguments {
+        let arguments = |first| arguments::TraceQueries {
             structure: rays.structure,
             rays: rays.rays,
             hits: rays.hits,
@@ -111,7 +100,7 @@ impl RayPipeline {
         let functions = ash::khr::ray_tracing_pipeline::Device::new(device.ash_instance(), &device.raw);
         let range = [vk::PushConstantRange::default()
             .stage_flags(vk::ShaderStageFlags::RAYGEN_KHR)
-            .size(size_of::<Arguments>() as u32)];
+            .size(size_of::<arguments::TraceQueries>() as u32)];
         let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&range);
         // SAFETY: the device is live; what is made is destroyed by `destroy`, or below where the next step fails.
         unsafe {
@@ -134,7 +123,7 @@ impl RayPipeline {
         }
     }
 
-    fn record(&self, recorder: &mut Recorder<'_>, arguments: &Arguments, count: u32) {
+    fn record(&self, recorder: &mut Recorder<'_>, arguments: &arguments::TraceQueries, count: u32) {
         let (commands, device) = (recorder.commands(), recorder.context().ash_device());
         let [generate, miss, hit] = &self.regions;
         // SAFETY: the recorder's promise; pipeline and table live as long as the device.

@@ -12,7 +12,6 @@ pub mod probe;
 mod restrict;
 
 pub use buffer::Buffer;
-pub(crate) use driver_rays::Arguments as RayArguments;
 pub use driver_rays::DriverRays;
 pub use driver_structure::{DriverPreference, DriverSizes, DriverStructure};
 pub use driver_tracing::DriverTracing;

@@ -1,7 +1,9 @@
 //! What a driver is asked because no property tells it: that started workgroups go on, that long loops end where they should
 //! (Mesa 22.3's lavapipe ends them after 65,535 rounds and says nothing), and whether it divides exactly.
+
 use super::Device;
 use crate::Result;
+use crate::arguments;
 use crate::shaders;
 use hedgerow::gpu::Kernel;
 use hedgerow::gpu::task_pool::State;
@@ -15,16 +17,6 @@ pub struct Findings {
     pub task_pool: bool,
 }
 
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Arguments {
-    pool: u64,
-    visits: u64,
-    loops: u64,
-    loop_length: u32,
-    padding: u32,
-}
-
 /// Runs a pool of `phases` phases, 1, 2, 4, … tasks each, with `workgroups` workers. Returns the pool's state and what each
 /// task left behind; [`tree_on_host`] says what that should be.
 ///
@@ -36,7 +28,7 @@ pub fn tree(device: &Device, phases: usize, workgroups: u32, loop_length: u32) -
     let visits = device.upload("probe: visits", &vec![0u32; tasks])?;
     let loops = device.upload("probe: loop", &[0u32])?;
     let arguments =
-        Arguments { pool: pool.address(), visits: visits.address(), loops: loops.address(), loop_length, padding: 0 };
+        arguments::PoolTree { pool: pool.address(), visits: visits.address(), loops: loops.address(), loop_length };
     let kernel = Kernel::new(&shaders::MEASURE_POOL_TREE, device.limits.subgroup_size, &[]);
     device.run(None, |recorder| recorder.dispatch(&kernel, &arguments, workgroups))?;
     Ok((pool.read(1)[0], visits.read(tasks), loops.read(1)[0]))
@@ -56,19 +48,6 @@ pub fn probe(device: &Device) -> Result<Findings> {
     const LOOP: u32 = 100_000;
     let (state, visits, counted) = tree(device, PHASES, 16, LOOP)?;
     Ok(Findings { long_loops: counted == LOOP, task_pool: state.status == 0 && visits == tree_on_host(PHASES) })
-}
-
-mod divide {
-
-    #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-    #[repr(C)]
-    pub(super) struct Arguments {
-        pub numerators: u64,
-        pub denominators: u64,
-        pub quotients: u64,
-        pub count: u32,
-        pub padding: u32,
-    }
 }
 
 /// Whether `device` divides as the host does, correctly rounded, where quotients are normal. Vulkan allows an error of 2.5 ulp.
@@ -94,12 +73,11 @@ pub fn divides_exactly(device: &Device) -> Result<bool> {
     let upload = |name: &str, values: &[f32]| device.upload(name, values);
     let (above, below) = (upload("probe: numerators", &numerators)?, upload("probe: denominators", &denominators)?);
     let quotients = upload("probe: quotients", &vec![0.0; COUNT as usize])?;
-    let arguments = divide::Arguments {
+    let arguments = arguments::Divide {
         numerators: above.address(),
         denominators: below.address(),
         quotients: quotients.address(),
         count: COUNT,
-        padding: 0,
     };
     let group = device.tuning.small_group;
     let kernel = Kernel::new(&shaders::MEASURE_DIVIDE, group, &[]);

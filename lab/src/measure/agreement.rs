@@ -4,7 +4,7 @@
 //! of a ray. Anything else is an error of one of them, and brute force says whose.
 
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow::trace::host::closest_hit_by_brute_force;
+use hedgerow::trace::twin::tracer::closest_hit_by_brute_force;
 use hedgerow::trace::{Hit, Query, Ray};
 use rayon::prelude::*;
 
@@ -97,8 +97,8 @@ pub fn wrong_where_different(
 mod tests {
     use super::*;
     use hedgerow::bvh::codes::Code;
-    use hedgerow::bvh::host::lbvh;
     use hedgerow::bvh::sah::Collapse;
+    use hedgerow::bvh::twin::lbvh;
 
     fn hit(t: f32, u: f32, v: f32) -> Hit {
         Hit { t, primitive: 0, u, v }

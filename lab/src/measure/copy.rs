@@ -2,6 +2,7 @@
 
 use super::statistics::Spread;
 use crate::Result;
+use crate::arguments;
 use crate::device::Device;
 use crate::shaders;
 use hedgerow::gpu::{Kernel, Timestamps};
@@ -13,19 +14,9 @@ const RUNS: u32 = 5;
 /// Invocations a workgroup.
 const WORKGROUP: u32 = 256;
 
-/// The push constants of `lab/glsl/measure/copy.comp`.
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub(super) struct Arguments {
-    source: u64,
-    target: u64,
-    count: u32,
-    padding: u32,
-}
-
 /// What the shader takes to copy `count` times 16 bytes.
-pub(super) fn arguments(source: u64, target: u64, count: u32) -> Arguments {
-    Arguments { source, target, count, padding: 0 }
+pub(super) fn arguments(source: u64, target: u64, count: u32) -> arguments::CopyWords {
+    arguments::CopyWords { source, target, count }
 }
 
 /// Bytes a second in GB/s (10⁹) that a plain copy moves, reading and writing both counted.

@@ -6,10 +6,10 @@ use crate::Result;
 use crate::scene::Mesh;
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::Primitives;
-use hedgerow::bvh::host::{lbvh, ploc};
 use hedgerow::bvh::layout::{self, Bvh2};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::bvh::{quality, reinsertion};
+use hedgerow::bvh::twin::{lbvh, ploc};
+use hedgerow::bvh::{reinsertion, twin::quality};
 use hedgerow::trace::{self, Hit, Query, Ray, Work};
 use hedgerow_host::sweep;
 use hedgerow_host::sweep::Leaves;
@@ -116,7 +116,7 @@ impl Subject for Host<'_> {
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
-        Ok(record::Quality::of(&quality::on_host(self.built(), c_t, c_i), c_t, c_i))
+        Ok(record::Quality::of(&quality::of(self.built(), c_t, c_i), c_t, c_i))
     }
 
     fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
@@ -141,7 +141,7 @@ impl Subject for Host<'_> {
         let rays = std::mem::take(&mut self.rays);
         let tree = self.built();
         let (milliseconds, hits) =
-            timed(|| rays.par_iter().map(|ray| trace::host::trace(tree, ray, query).0).collect());
+            timed(|| rays.par_iter().map(|ray| trace::twin::tracer::trace(tree, ray, query).0).collect());
         (self.rays, self.hits) = (rays, hits);
         Ok(milliseconds)
     }
@@ -153,7 +153,7 @@ impl Subject for Host<'_> {
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
         let rays = std::mem::take(&mut self.rays);
         let tree = self.built();
-        let work = rays.par_iter().map(|ray| trace::host::trace(tree, ray, query).1).collect();
+        let work = rays.par_iter().map(|ray| trace::twin::tracer::trace(tree, ray, query).1).collect();
         self.rays = rays;
         Ok(Some(work))
     }

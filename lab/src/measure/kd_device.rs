@@ -4,8 +4,8 @@ use super::device_rays::DeviceRays;
 use crate::Result;
 use crate::device::{Buffer, Device};
 use hedgerow::kdtree::layout::KdTree;
+use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::kd::{Tracer, TreeEntry};
-use hedgerow::trace::kd_host::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// A traversal on the device with its rays; of a structure it needs the address.

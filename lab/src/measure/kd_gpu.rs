@@ -11,7 +11,7 @@ use hedgerow::gpu::{Phase, Recorder, Timestamps};
 use hedgerow::kdtree::builder::{Builder, Options, Report};
 use hedgerow::kdtree::layout::{KdTree, MAX_DEPTH};
 use hedgerow::kdtree::quality;
-use hedgerow::trace::kd_host::Traversal;
+use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// Phases of a build at most: encode, five of each level, place.

@@ -15,10 +15,11 @@ use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::{Hit, Query, Ray, Work, host};
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Query, Ray, Work};
 use rayon::prelude::*;
 
 /// Runs that do not count, before those that do.

@@ -3,8 +3,8 @@
 use crate::Result;
 use crate::device::Device;
 use hedgerow::bvh::epo::{Buffers, Figures, OnDevice};
-use hedgerow::bvh::host::epo::{Areas, Surfaces};
 use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::twin::epo::{Areas, Surfaces};
 use rayon::prelude::*;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
@@ -111,8 +111,8 @@ mod tests {
     use super::*;
     use crate::scene::{LoadOptions, load};
     use hedgerow::bvh::codes::Code;
-    use hedgerow::bvh::host::{epo, lbvh};
     use hedgerow::bvh::sah::Collapse;
+    use hedgerow::bvh::twin::{epo, lbvh};
 
     #[test]
     fn all_cores_find_what_one_does() {

@@ -1,6 +1,7 @@
 //! Acceleration structures by the calls of `VK_KHR_acceleration_structure`: ours or the driver's, and nothing else differs.
 
-use crate::device::{Buffer, Device, DriverRays, DriverTracing, RayArguments};
+use crate::arguments;
+use crate::device::{Buffer, Device, DriverRays, DriverTracing};
 use crate::measure::experiments::points;
 use crate::scene::Mesh;
 use crate::shaders;
@@ -158,7 +159,7 @@ impl<'a> Structures<'a> {
                     let tuning = &self.device.tuning.trace;
                     let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
                     let kernel = Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[u32::from(any_hit), levels]);
-                    let arguments = RayArguments { structure, rays, hits, works: 0, first: 0, count };
+                    let arguments = arguments::TraceQueries { structure, rays, hits, works: 0, first: 0, count };
                     recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
                 }
                 Maker::Driver(_) => {
@@ -184,8 +185,14 @@ impl<'a> Structures<'a> {
         let kernel = Kernel::new(&shaders::MEASURE_QUERY_WORK, device.limits.subgroup_size, &[any_hit, 0]);
         let works = device.buffer("work", 16 * u64::from(count))?;
         let (structure, works_at) = (self.address(top), works.address());
-        let arguments =
-            RayArguments { structure, rays: rays.address(), hits: hits.address(), works: works_at, first: 0, count };
+        let arguments = arguments::TraceQueries {
+            structure,
+            rays: rays.address(),
+            hits: hits.address(),
+            works: works_at,
+            first: 0,
+            count,
+        };
         device.run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup())))?;
         Ok(works.read(count as usize))
     }

@@ -16,6 +16,7 @@ pub mod joined;
 pub mod kd_trees;
 pub mod labels;
 mod lines;
+pub mod markdown;
 pub mod names;
 pub mod navigate;
 pub mod numbers;

@@ -6,9 +6,9 @@
 
 use crate::conditional::needs;
 use hedgerow::bvh::codes::Codes;
-use hedgerow::bvh::host;
 use hedgerow::bvh::layout::{Aabb, Bvh2};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin;
 use hedgerow_lab::scene::{self, LoadOptions, Mesh};
 
 crate::conditional::tests! {
@@ -87,7 +87,7 @@ fn relative_cost(mesh: &Mesh, codes: &str, far: &[[[f32; 3]; 2]]) -> f64 {
             positions.extend([a, b, a]);
             triangles.push([first, first + 1, first + 2]);
         }
-        clipped_cost(&host::lbvh::build(&positions, &triangles, codes, Collapse::OFF), &bounds(mesh))
+        clipped_cost(&twin::lbvh::build(&positions, &triangles, codes, Collapse::OFF), &bounds(mesh))
     };
     cost(far) / cost(&[])
 }

@@ -2,10 +2,11 @@
 #![cfg(any(feature = "peer-obvhs", feature = "peer-embree"))]
 
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::{Hit, Query, Ray, host};
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::measure::Subject;
 use hedgerow_lab::measure::agreement::wrong_where_different;
 use hedgerow_lab::scene::{self, Mesh};

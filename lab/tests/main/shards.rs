@@ -82,7 +82,7 @@ fn devices_stay_apart_and_what_is_measured_twice_is_told_once() {
     std::fs::write(other.join("results.jsonl"), serde_json::to_string(&record).expect("JSON") + "\n").expect("a file");
 
     let joined = folder.path().join("joined");
-    succeeded(report(&[one.clone(), other, one.clone()], &joined));
+    succeeded(report(&[one.clone(), other.clone(), one.clone()], &joined));
     let page = std::fs::read_to_string(joined.join("index.html")).expect("a page");
     assert!(page.contains("2 devices") && page.contains("Some GPU"), "{page}");
     let gpu = results::read(&joined.join("some-gpu-its-driver-1-2")).expect("records of the GPU alone");
@@ -91,6 +91,15 @@ fn devices_stay_apart_and_what_is_measured_twice_is_told_once() {
     let own =
         folders.find(|path| path.is_dir() && !path.ends_with("some-gpu-its-driver-1-2")).expect("the other device");
     assert_eq!(contents(&results::read(&own).expect("records")), contents(&results::read(&one).expect("records")));
+
+    let markdown = folder.path().join("results.md");
+    let paths = [&one, &other, &markdown].map(|path| path.to_str().expect("text"));
+    succeeded(ended(started(&["report", paths[0], paths[1], "--markdown", paths[2]])));
+    let page = std::fs::read_to_string(&markdown).expect("a page");
+    let rows = page.lines().filter(|line| line.contains(&format!("`{}`", record.builder))).count();
+    let measured = results::read(&one).expect("records").iter().filter(|r| r.builder == record.builder).count();
+    assert_eq!(rows, measured + 1, "{page}");
+    assert!(page.contains("## Some GPU\n\nits driver 1.2, commit ") && page.contains("| primary"), "{page}");
 }
 
 #[test]

@@ -2,7 +2,8 @@
 
 use crate::common::shapes::{Corners, icosphere, placed, tree_of};
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow::trace::{Hit, Query, Ray, host};
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::rays::files;
 use hedgerow_lab::rays::kinds::{RayKind, RayOptions, generate};
 use hedgerow_lab::scene::{Camera, Light, Mesh, Scene};

@@ -1,11 +1,11 @@
-//! Collapsing a `Bvh2` into a wide tree on the device (glsl/bvh/wide_collapse.glsl); [`super::host`] is the twin.
+//! Collapsing a `Bvh2` into a wide tree on the device (glsl/bvh/wide/collapse.glsl); [`super::twin`] is the twin.
 
 use super::Form;
 use crate::Result;
 use crate::bvh::builder::Sizes;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::node_slots;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::{Context, Grid, Kernel, Recorder, fill, scan, shaders};
 use std::ops::Range;
 
@@ -39,23 +39,6 @@ const LEVELS: u32 = 16;
 
 /// Words of `Levels` in wide_collapse.glsl.
 const LEVEL_WORDS: u64 = 64 + 65 + 1;
-
-push_constants! {
-    struct Arguments {
-        source: u64,
-        target: u64,
-        levels: u64,
-        opened: u64,
-        slots: u64,
-        first_children: u64,
-        first_records: u64,
-        order: u64,
-        source_slots: u32,
-        capacity: u32,
-        level: u32,
-        level_end: u32,
-    }
-}
 
 /// Where the parts of the scratch memory begin, in bytes.
 struct Scratch {
@@ -147,7 +130,7 @@ impl OnDevice {
     pub fn record(&self, recorder: &mut Recorder<'_>, source: u64, target: u64, scratch: u64) -> Result<()> {
         let form = self.options.form;
         let parts = self.scratch();
-        let arguments = Arguments {
+        let arguments = arguments::WideCollapse {
             source,
             target,
             levels: scratch + parts.levels,
@@ -166,9 +149,11 @@ impl OnDevice {
         let sums_words = (parts.order - parts.first_children) / 4;
         fill::record(recorder, arguments.first_children, sums_words as u32, 0)?;
         recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RESET), &arguments, 1)?;
-        let few = |level, level_end| (&shaders::BVH_WIDE_OPEN_FEW, Arguments { level, level_end, ..arguments }, 1);
+        let few = |level, level_end| {
+            (&shaders::BVH_WIDE_OPEN_FEW, arguments::WideCollapse { level, level_end, ..arguments }, 1)
+        };
         let groups = self.grid.groups_for(arguments.capacity);
-        let many = |level| (&shaders::BVH_WIDE_OPEN, Arguments { level, ..arguments }, groups);
+        let many = |level| (&shaders::BVH_WIDE_OPEN, arguments::WideCollapse { level, ..arguments }, groups);
         let by_many = self.levels_by_many();
         let first = Some(few(0, by_many.start)).filter(|_| by_many.start > 0);
         let last = few(by_many.end, form.levels());

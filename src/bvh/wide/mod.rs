@@ -5,12 +5,11 @@
 //! fewer steps then, and what a step loads lies together.
 //!
 //! - [`layout`] are the bytes, [`quantised`] those of the node of 80 bytes;
-//! - [`host`] collapses plainly, [`device`] in the caller's command buffer: the same bytes;
+//! - [`super::twin::wide`] collapses plainly, [`device`] in the caller's command buffer: the same bytes;
 //! - [`validate`] walks a wide tree, [`quality`] tells what it costs;
 //! - [`crate::trace::wide`] traces it.
 
 pub mod device;
-pub mod host;
 pub mod layout;
 pub mod quality;
 pub mod quantised;

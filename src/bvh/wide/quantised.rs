@@ -1,4 +1,4 @@
-//! The node of eight children in 80 bytes (Ylitie, Karras, Laine 2017, section 3; glsl/bvh/wide_quantised.glsl).
+//! The node of eight children in 80 bytes (Ylitie, Karras, Laine 2017, section 3; glsl/bvh/wide/quantised.glsl).
 //!
 //! The corners of the children's boxes are bytes in a grid of the node's own: a corner is `origin + byte · 2^exponent`, rounded
 //! as floats are, with an exponent for each axis. Bytes are chosen by that same arithmetic so that the box that comes out of

@@ -2,8 +2,8 @@
 
 use super::layout::{Wide, WideNode};
 use crate::bvh::cover::Parts;
-use crate::bvh::host::split::around_parts;
 use crate::bvh::layout::{Aabb, Instance, Record};
+use crate::bvh::twin::split::around_parts;
 use crate::bvh::validate::validate_split_primitives;
 use crate::{Error, Result};
 
@@ -184,9 +184,9 @@ fn invalid<T>(what: String) -> Result<T> {
 #[cfg(test)]
 mod tests {
     use crate::bvh::codes::Code;
-    use crate::bvh::host::lbvh;
     use crate::bvh::layout::{Child, UNUSED};
     use crate::bvh::sah::Collapse;
+    use crate::bvh::twin::lbvh;
     use crate::bvh::wide::layout::{Wide4, Wide8q};
 
     fn tree() -> crate::bvh::layout::Bvh2 {

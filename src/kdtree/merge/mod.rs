@@ -19,12 +19,12 @@ pub(crate) mod push;
 pub use estimate::{Estimate, Options, Report};
 pub use objects::{Object, Objects};
 
-use super::builder::{self, Arguments, Shape};
+use super::builder::{self, Shape};
 use super::layout::{Header, MAX_DEPTH, Room};
 use super::termination::leaf_size;
 use crate::bvh::builder::Schedule;
 use crate::bvh::geometry::{Input, Source};
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::radix_sort::{self, Buffers, Sort};
 use crate::gpu::shaders::{self, Shader};
 use crate::gpu::{Context, Kernel, Recorder, Region, Step, fill};
@@ -89,31 +89,7 @@ struct Plan {
     subtree_references: u32,
 }
 
-push_constants! {
-    /// Push constants of `glsl/kdtree/merge_setup.comp` and `merge_restore.comp`.
-    struct Setup {
-        structure: u64,
-        state: u64,
-        undo: u64,
-        pairs: u64,
-        keys: [u64; 2],
-        values: [u64; 2],
-        marked: u64,
-        seeds: u64,
-        items: u64,
-        pair_tiles: u64,
-        pair_capacity: u32,
-        marked_capacity: u32,
-        record_bits: u32,
-        key_words_and_sorted: u32,
-        tiles: u32,
-        primitive_end: u32,
-        seed_count: u32,
-        item_capacity: u32,
-    }
-}
-
-/// As `glsl/kdtree/merge_state.glsl` has them.
+/// As `glsl/kdtree/merge/state.glsl` has them.
 const MERGE_AT: u64 = 3072;
 const PAIR_BYTES: u64 = 32;
 const MARKED_BYTES: u64 = 40;
@@ -277,7 +253,7 @@ impl Merger {
     /// The memory is too small; a pipeline could not be made.
     pub fn restore(&self, recorder: &mut Recorder<'_>, memory: Memory) -> Result<()> {
         let (structure, undo) = (self.structure_of(&memory)?, self.undo_of(&memory)?);
-        let setup = Setup { structure, undo, ..Setup::zeroed() };
+        let setup = arguments::MergeSetup { structure, undo, ..arguments::MergeSetup::zeroed() };
         let groups = self.plan.marked.div_ceil(16 * self.shape.workgroup).clamp(1, self.shape.groups);
         let kernel = Kernel::new(&shaders::KDTREE_MERGE_RESTORE, self.shape.workgroup, &[]);
         recorder.chains(&[vec![Step::new("restore", kernel, &setup, groups)]])
@@ -331,7 +307,7 @@ impl Merger {
         let has_tree = |object: &Object| object.tree.is_some();
         let tiles = |object: &Object| object.input.primitive_count.div_ceil(self.shape.chunk());
         let primitive_end = objects.last().map_or(0, |last| last.first_primitive + last.input.primitive_count);
-        let setup = Setup {
+        let setup = arguments::MergeSetup {
             structure,
             state: scratch,
             undo,
@@ -356,7 +332,8 @@ impl Merger {
         let none = counted(0);
         let step_of = |object: &Object, first_tile, phase, shader: &'static Shader, level, groups| {
             let kernel = self.shape.kernel(shader, &self.options.build, &object.input);
-            let mut arguments = Arguments::new(&self.options.build, &self.room, &object.input, structure, scratch);
+            let mut arguments =
+                arguments::KdBuild::new(&self.options.build, &self.room, &object.input, structure, scratch);
             arguments.level = level;
             arguments.first_tile = first_tile;
             arguments.first_primitive = object.first_primitive;
@@ -374,9 +351,9 @@ impl Merger {
             Step::new("encode", Kernel::new(&shaders::KDTREE_MERGE_SETUP, self.shape.workgroup, &[]), &setup, 1),
             step("encode", &shaders::KDTREE_MERGE_RESET, 0, 1),
         ];
-        steps.extend(of_objects(&shaders::KDTREE_BUILD_COUNT));
+        steps.extend(of_objects(&shaders::KDTREE_BUILDER_COUNT));
         steps.push(step("encode", &shaders::KDTREE_MERGE_PLAN, 0, 1));
-        steps.extend(of_objects(&shaders::KDTREE_BUILD_RECORDS));
+        steps.extend(of_objects(&shaders::KDTREE_BUILDER_RECORDS));
         steps.push(fill::step("encode", keys[0], pair_capacity * key_words, u32::MAX));
         let each_first_tile = objects.iter().enumerate().map(|(i, object)| (*object, first_tile(i)));
         steps.extend(push::steps(seeds, self.schedule, (self.shape.workgroup, groups), each_first_tile, step));
@@ -413,7 +390,7 @@ impl Merger {
             step(phase, shader, level, if level == 0 { groups } else { few })
         }));
         steps.push(step("place", &shaders::KDTREE_MERGE_ORDER, 0, groups));
-        steps.push(step("place", &shaders::KDTREE_BUILD_PLACE, 0, groups));
+        steps.push(step("place", &shaders::KDTREE_BUILDER_PLACE, 0, groups));
         steps.push(step("hook", &shaders::KDTREE_MERGE_HOOK, 0, groups));
         steps
     }

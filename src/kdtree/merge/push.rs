@@ -2,22 +2,12 @@
 
 use super::Object;
 use crate::bvh::builder::Schedule;
-use crate::gpu::push_constants::push_constants;
+use crate::gpu::arguments;
 use crate::gpu::shaders::{self, Shader};
 use crate::gpu::{Kernel, Step};
 use crate::kdtree::layout::MAX_DEPTH;
 
-push_constants! {
-    /// Push constants of `glsl/kdtree/merge_seed.comp`.
-    struct Seed {
-        seed: u64,
-        tree: u64,
-        first_tile: u32,
-        padding: u32,
-    }
-}
-
-/// As `glsl/kdtree/merge_state.glsl` and `merge.glsl` have them.
+/// As `glsl/kdtree/merge/state.glsl` and `merge.glsl` have them.
 pub(super) const SEED_BYTES: u64 = 12;
 /// Of the items of two steps, and of leaves in leaves.
 pub(super) const ITEM_BYTES: u64 = 3 * 76;
@@ -35,7 +25,7 @@ pub(super) fn steps(
 ) -> Vec<Step> {
     let trees = objects.filter_map(|(object, first_tile)| Some((object.tree?, first_tile)));
     let seed = |(number, (tree, first_tile))| {
-        let seed = Seed { seed: seeds + SEED_BYTES * number as u64, tree, first_tile, padding: 0 };
+        let seed = arguments::MergeSeed { seed: seeds + SEED_BYTES * number as u64, tree, first_tile };
         Step::new("push", Kernel::new(&shaders::KDTREE_MERGE_SEED, workgroup, &[]), &seed, 1)
     };
     let mut steps: Vec<Step> = trees.enumerate().map(seed).collect();

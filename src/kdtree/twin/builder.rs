@@ -2,8 +2,8 @@
 
 use super::{InTurn, binned, grown};
 use crate::Result;
-use crate::bvh::host::geometry::Corners;
-use crate::bvh::host::lbvh;
+use crate::bvh::twin::geometry::Corners;
+use crate::bvh::twin::lbvh;
 use crate::kdtree::builder::Options;
 use crate::kdtree::layout::KdTree;
 
@@ -16,7 +16,7 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &Options) 
     build_corners(lbvh::corners(positions, triangles), options)
 }
 
-/// The same of triangles that [`HostGeometry::corners`](crate::bvh::host::geometry::HostGeometry::corners) read.
+/// The same of triangles that [`HostGeometry::corners`](crate::bvh::twin::geometry::HostGeometry::corners) read.
 ///
 /// # Errors
 /// As [`build`].

@@ -13,7 +13,7 @@
 //! triangle's own: walls and tiles whose corners lie in common planes are parted by them.
 //!
 //! A ray's hit may lie beside its triangle, by a part of how far and how long it is. The tracer looks beside the ray by as much
-//! ([`crate::trace::kd_host`]), as long as no triangle is longer than it knows from the header: [`reach_of`]. For those few that are,
+//! ([`crate::trace::twin::kd`]), as long as no triangle is longer than it knows from the header: [`reach_of`]. For those few that are,
 //! a triangle is all that is near enough to it, `room`.
 
 use crate::bvh::layout::{Aabb, SLACK, Triangle};

@@ -19,8 +19,8 @@ mod small;
 use super::layout::KdTree;
 use super::termination::Costs;
 use crate::Result;
-use crate::bvh::host::geometry::{self, Corners};
 use crate::bvh::layout::{Aabb, Triangle};
+use crate::bvh::twin::geometry::{self, Corners};
 use clip::{Plane, Reference};
 use heuristic::Heuristic;
 

@@ -13,7 +13,7 @@ use hedgerow::gpu::Timestamps;
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::kdtree::merge::{Memory, Merger, Most, Object, Options, Report};
 use hedgerow::kdtree::quality;
-use hedgerow::trace::kd_host::Traversal;
+use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// Phases of a restore and a merge at most.

@@ -12,7 +12,7 @@ use crate::measure::record::Memory;
 use crate::scene::Mesh;
 use hedgerow::kdtree::builder;
 use hedgerow::kdtree::layout::KdTree;
-use hedgerow::trace::kd_host::Traversal;
+use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use hedgerow_host::kdtree as host;
 

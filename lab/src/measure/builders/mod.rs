@@ -23,7 +23,7 @@ use crate::scene::Mesh;
 use crate::{Error, Result};
 use hedgerow::bvh::{builder, reinsertion};
 use hedgerow::kdtree;
-use hedgerow::trace::kd_host::Traversal;
+use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::wide::Tracer;
 use options::{OPTIMISE, RAYS, TRACE};
 use std::fmt;

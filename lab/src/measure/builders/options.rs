@@ -13,7 +13,7 @@ use hedgerow::bvh::split;
 use hedgerow::bvh::wide::Form;
 use hedgerow::kdtree;
 use hedgerow::kdtree::termination::Costs;
-use hedgerow::trace::kd_host::Traversal;
+use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::wide::Order;
 use hedgerow_host::kdtree::Planes;
 use hedgerow_host::sweep::Leaves;

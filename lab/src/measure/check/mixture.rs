@@ -5,7 +5,7 @@ use super::backend::{Backend, Built, Ours};
 use super::shapes::{Corners, Random, add, icosphere, soup};
 use super::world::{BuiltWorld, Part, World};
 use ash::vk;
-use hedgerow::accel::{Instance, REBRAID, top_level};
+use hedgerow::accel::{Instance, REBRAID, twin};
 use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Child, Record, Triangle};
 use std::collections::BTreeMap;
 use vk::GeometryFlagsKHR as GeometryFlags;
@@ -105,9 +105,9 @@ impl ReadBack {
     }
 
     /// What an instance points to.
-    pub fn below(&self, address: u64) -> Option<top_level::Below<'_>> {
-        let triangles = self.triangles.get(&address).map(top_level::Below::from);
-        triangles.or_else(|| self.boxes.get(&address).map(top_level::Below::from))
+    pub fn below(&self, address: u64) -> Option<twin::Below<'_>> {
+        let triangles = self.triangles.get(&address).map(twin::Below::from);
+        triangles.or_else(|| self.boxes.get(&address).map(twin::Below::from))
     }
 
     /// Where the entries of each instance begin.

@@ -1,5 +1,6 @@
 //! What queries report, ray by ray: `lab/glsl/measure/probe.comp` in a pipeline of its own, as an engine would have it.
 #![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
+use crate::arguments;
 use crate::device::Device;
 use crate::shaders;
 use ash::vk;
@@ -97,17 +98,6 @@ impl Report {
     }
 }
 
-/// The push constants of `lab/glsl/measure/probe.comp`.
-#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-struct Push {
-    structure: u64,
-    rays: u64,
-    reports: u64,
-    count: u32,
-    padding: u32,
-}
-
 /// A pipeline of its own, and its layout: neither of them ours.
 pub struct Probe {
     device: &'static Device,
@@ -160,7 +150,7 @@ impl Probe {
         let ray_buffer = self.device.upload("rays", rays).expect("memory");
         let reports = self.device.buffer("reports", size_of::<Report>() as u64 * rays.len() as u64).expect("memory");
         let count = rays.len() as u32;
-        let push = Push { structure, rays: ray_buffer.address(), reports: reports.address(), count, padding: 0 };
+        let push = arguments::Probe { structure, rays: ray_buffer.address(), reports: reports.address(), count };
         self.dispatch(bytemuck::bytes_of(&push), count);
         reports.read(rays.len())
     }

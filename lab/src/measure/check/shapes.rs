@@ -2,9 +2,9 @@
 #![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::lbvh;
 use hedgerow::trace::Ray;
 
 /// Triangles by their corners.

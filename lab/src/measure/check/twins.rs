@@ -4,9 +4,9 @@ use super::cases::Found;
 use super::corpus::Mesh;
 use crate::device::Device;
 use hedgerow::bvh::builder::{Builder, Input, Method, Options, Window};
-use hedgerow::bvh::host;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin;
 use hedgerow::kdtree::builder::Estimate;
 use hedgerow::kdtree::merge;
 
@@ -72,8 +72,8 @@ pub fn on_device(device: &Device, (_, positions, triangles): &Mesh, options: &Op
 pub fn on_host((_, positions, triangles): &Mesh, options: &Options) -> Bvh2 {
     let codes = options.codes.expect("codes are named");
     let lbvh = |collapse| match &options.split {
-        None => host::lbvh::build(positions, triangles, codes, collapse),
-        Some(split) => host::split::build(positions, triangles, split, codes, collapse),
+        None => twin::lbvh::build(positions, triangles, codes, collapse),
+        Some(split) => twin::split::build(positions, triangles, split, codes, collapse),
     };
     if options.method == Method::Lbvh && options.optimise.is_none() {
         // Its own collapsing leaves other bytes in slots that fall out.
@@ -84,11 +84,11 @@ pub fn on_host((_, positions, triangles): &Mesh, options: &Options) -> Bvh2 {
         Method::Lbvh => radix,
         Method::Hlbvh(treelets) => {
             let bits = treelets.bits(codes, radix.header.primitive_count);
-            host::hlbvh::build(&radix, codes, host::hlbvh::Treelets { bits, primitives: treelets.primitives })
+            twin::hlbvh::build(&radix, codes, twin::hlbvh::Treelets { bits, primitives: treelets.primitives })
         }
-        Method::Ploc { radius } => host::ploc::build(&radix, radius as usize),
+        Method::Ploc { radius } => twin::ploc::build(&radix, radius as usize),
         Method::Hploc(Window { size, radius }) => {
-            host::hploc::build(&radix, host::hploc::Window { size: size as usize, radius: radius as usize })
+            twin::hploc::build(&radix, twin::hploc::Window { size: size as usize, radius: radius as usize })
         }
     };
     let tree = match &options.optimise {

@@ -12,9 +12,10 @@ use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{self, LoadOptions, Scene, SplitMix64};
 use crate::{Error, Result};
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::{Query, Ray, host};
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Query, Ray};
 use rayon::prelude::*;
 
 /// The scenes: of different sizes, and lying differently in their bounds (closed objects, sheets, soups, long thin triangles, a few

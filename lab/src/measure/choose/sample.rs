@@ -7,10 +7,10 @@
 
 use crate::scene::SplitMix64;
 use hedgerow::bvh::codes::Codes;
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::{Aabb, BoxRecord, Bvh2};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::bvh::{quality, reinsertion};
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::bvh::{reinsertion, twin::quality};
 
 /// Boxes of a sample, at most.
 const SIZE: usize = 4096;
@@ -24,7 +24,7 @@ pub(super) fn gain(boxes: &[Aabb]) -> f64 {
 
 /// The sum of the areas of inner nodes over that of the root.
 fn cost(tree: &Bvh2<BoxRecord>) -> f64 {
-    quality::on_host(tree, 1.0, 0.0).sah
+    quality::of(tree, 1.0, 0.0).sah
 }
 
 /// Boxes drawn without putting back, in their order, and those that reach the scene's bounds: these are few, and codes depend on

@@ -10,7 +10,7 @@ use crate::scene::Mesh;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
 use hedgerow::bvh::layout::{Bvh2, Child, Header, MAGIC, Node, Record, Triangle as OurTriangle, node_slots};
-use hedgerow::bvh::quality;
+use hedgerow::bvh::twin::quality;
 use hedgerow::gpu::Phase;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use obvhs::BvhBuildParams;
@@ -198,7 +198,7 @@ impl Subject for Obvhs {
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
-        Ok(record::Quality::of(&quality::on_host(&converted(&self.tree, &self.triangles), c_t, c_i), c_t, c_i))
+        Ok(record::Quality::of(&quality::of(&converted(&self.tree, &self.triangles), c_t, c_i), c_t, c_i))
     }
 
     fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {

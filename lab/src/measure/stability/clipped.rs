@@ -36,9 +36,9 @@ fn clipped_half_area(b: &Aabb, part: &Aabb) -> f64 {
 mod tests {
     use super::*;
     use hedgerow::bvh::codes::Code;
-    use hedgerow::bvh::host::lbvh;
-    use hedgerow::bvh::quality;
     use hedgerow::bvh::sah::Collapse;
+    use hedgerow::bvh::twin::lbvh;
+    use hedgerow::bvh::twin::quality;
 
     /// One triangle in each box, alone in its leaf.
     fn tree(boxes: &[[[f32; 3]; 2]]) -> Bvh2 {
@@ -51,7 +51,7 @@ mod tests {
     fn without_anything_outside_it_is_the_plain_cost() {
         let tree =
             tree(&[[[0.0; 3], [1.0; 3]], [[3.0, 0.0, 0.0], [4.0, 1.0, 1.0]], [[0.0, 5.0, 0.0], [1.0, 6.0, 2.0]]]);
-        let plain = quality::on_host(&tree, 3.0, 2.0).sah;
+        let plain = quality::of(&tree, 3.0, 2.0).sah;
         let clipped = cost(&tree, &tree.header.root.bounds(), 3.0, 2.0).expect("an area");
         assert!((clipped - plain).abs() < 1e-12 * plain, "{clipped} {plain}");
     }

@@ -10,10 +10,10 @@ use crate::measure::statistics::Spread;
 use crate::scene::{self, Mesh, SplitMix64};
 use crate::{Error, Result};
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::host::closest_hit_by_brute_force;
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::trace::twin::tracer::closest_hit_by_brute_force;
 use hedgerow::trace::{Query, Ray};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 

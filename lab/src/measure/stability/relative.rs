@@ -11,10 +11,11 @@ use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Mesh, Scene};
 use crate::{Error, Result};
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::host::lbvh;
 use hedgerow::bvh::layout::{Aabb, Bvh2};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::{Hit, Ray, host};
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Ray};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 

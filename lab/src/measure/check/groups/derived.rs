@@ -7,10 +7,10 @@ use crate::measure::check::corpus::{Mesh, unit_floats};
 use hedgerow::bvh::builder::Input;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::Primitives;
-use hedgerow::bvh::host::{self, lbvh};
 use hedgerow::bvh::layout::{Bvh2, Child, Header, Triangle};
 use hedgerow::bvh::refit::{self, Refit};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::{self, lbvh};
 use hedgerow::bvh::wide::device::{OnDevice, Options};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
@@ -74,7 +74,7 @@ pub fn refit(cases: &mut Cases<'_>) {
 fn refit_as_on_host(device: &Device, tree: &Bvh2, mesh: &Mesh, schedule: refit::Schedule) -> Found {
     let (_, positions, triangles) = mesh;
     let mut expected = tree.clone();
-    host::refit::refit_corners(&mut expected, lbvh::corners(positions, triangles), Collapse::SAH);
+    twin::refit::refit_corners(&mut expected, lbvh::corners(positions, triangles), Collapse::SAH);
     expected.validate()?;
     let count = triangles.len() as u32;
     let (vertices, indices) = (device.upload("positions", positions)?, device.upload("indices", triangles)?);

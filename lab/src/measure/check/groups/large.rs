@@ -9,7 +9,8 @@ use hedgerow::bvh::builder::Options;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::trace::tracer::{self, Buffers, Shape};
-use hedgerow::trace::{Hit, Query, Ray, host};
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Query, Ray};
 use rayon::prelude::*;
 
 /// More workgroups than a dispatch is promised to have.

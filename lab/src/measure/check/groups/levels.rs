@@ -10,7 +10,7 @@ use crate::measure::check::probe::{CONFIRM_ODD, ProbeRay};
 use crate::measure::check::shapes::{Random, boxes, soup};
 use crate::measure::check::world::{BuiltWorld, Part, World};
 use ash::vk::{self, Handle};
-use hedgerow::accel::{Instance, Options, Property, REBRAID, serialize, top_level};
+use hedgerow::accel::{Instance, Options, Property, REBRAID, twin};
 use hedgerow::bvh::layout::{self, Bvh2, Record, Triangle};
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 use vk::CopyAccelerationStructureModeKHR as Mode;
@@ -223,7 +223,7 @@ fn copies_are_those_of_the_host<R: Record>(ours: &Ours, built: &Built) -> Found 
     let compacted = copied(ours, built.structure, compacted_bytes, Mode::COMPACT)?;
     same_all("compacted byte", &compacted.read(), &expected)?;
     let memory = serialised(ours, compacted.handle())?;
-    same_all("serialised byte", &memory.read(), &serialize::write_on_host(&expected)?)?;
+    same_all("serialised byte", &memory.read(), &twin::serialize::write(&expected)?)?;
     let back = deserialised(ours, &memory, compacted_bytes)?;
     same_all("byte brought back", &back.read(), &expected)
 }
@@ -236,7 +236,7 @@ pub fn rebraid(cases: &mut Cases<'_>) {
             cases.case(format!("{count} instances, budget {budget}, {flags:?}"), |device| {
                 let options = Options { rebraid_budget: budget, ..Options::DEFAULT };
                 let read = ReadBack::new(&Ours::with_options(device, options), &world);
-                let expected = top_level::top_level(&read.instances, |a| read.below(a), flags, &options);
+                let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &options);
                 same("header", &read.top.header, &expected.header)?;
                 same_all("record", &read.top.records, &expected.records)?;
                 same_all("node", &read.top.nodes, &expected.nodes)

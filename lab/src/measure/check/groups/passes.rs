@@ -8,7 +8,7 @@ use crate::measure::check::shapes::Random;
 use crate::shaders;
 use hedgerow::gpu::Kernel;
 use hedgerow::gpu::radix_sort::{self, Shape, Sort};
-use hedgerow::gpu::reduce::{self, Bounds, Reduction};
+use hedgerow::gpu::reduce::{Bounds, Reduction};
 use hedgerow::gpu::scan::{self, Scan};
 
 /// Around powers of two, and with these `more` and one less and one more than each.
@@ -65,7 +65,7 @@ pub(super) fn scan_is_right(device: &Device, words: &[u32]) -> Found {
     let from = device.upload("values", words)?;
     let to = device.buffer("results", 4 * words.len() as u64)?;
     let sums = device.buffer("sums", 4 * u64::from(scan.sums_words()))?;
-    let (expected, expected_total) = scan::on_host(words);
+    let (expected, expected_total) = hedgerow::gpu::twin::scan::exclusive(words);
     for results in [&to, &from] {
         let buffers = scan::Buffers { values: from.address(), results: results.address(), sums: sums.address() };
         device.run(None, |r| scan.record(r, &buffers))?;
@@ -81,7 +81,7 @@ pub(super) fn reduction_is_right(device: &Device, boxes: &[Bounds]) -> Found {
     let to = device.buffer("result", 24)?;
     let scratch = device.buffer("scratch", 24 * u64::from(reduction.scratch_boxes()))?;
     device.run(None, |r| reduction.record(r, from.address(), to.address(), scratch.address()))?;
-    same("bounds", &to.read::<Bounds>(1)[0], &reduce::on_host(boxes))
+    same("bounds", &to.read::<Bounds>(1)[0], &hedgerow::gpu::twin::reduce::bounds(boxes))
 }
 
 /// Keys of 32 and 64 bits, of as many bits as matter, with equal ones, by both shapes.
@@ -104,7 +104,7 @@ pub(super) fn sort_is_right(device: &Device, keys: &[u64], bits: u32) -> Found {
     let mask = if bits == 64 { u64::MAX } else { (1 << bits) - 1 };
     let keys: Vec<u64> = keys.iter().map(|key| key & mask).collect();
     let values: Vec<u32> = (0..keys.len() as u32).rev().collect();
-    let expected = radix_sort::on_host(&keys, &values, bits);
+    let expected = hedgerow::gpu::twin::radix_sort::sort(&keys, &values, bits);
     for (name, shape) in [
         ("strips", Shape::strips(&device.limits)),
         ("tiles", Shape::tiles(&device.limits)),

@@ -12,11 +12,13 @@ use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::trace::kd::Tracer as KdTracer;
-use hedgerow::trace::kd_host::{self, Traversal};
+use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::tracer::{self, Loads, Shape};
+use hedgerow::trace::twin::kd as kd_host;
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
 use hedgerow::trace::wide::{Order, Tracer};
-use hedgerow::trace::wide_host::{self, TracedNode};
-use hedgerow::trace::{Hit, Query, Ray, Work, host};
+use hedgerow::trace::{Hit, Query, Ray, Work};
 use hedgerow_host::kdtree::{self as kd_builder, Options as KdOptions};
 use rayon::prelude::*;
 

@@ -1,7 +1,0 @@
-#version 460
-// Treelets, bottom-up in one pass: see bvh/hlbvh.glsl for the contract.
-#include "bvh/hlbvh_treelets.glsl"
-
-void main() {
-    hlbvh_treelets(group_number());
-}

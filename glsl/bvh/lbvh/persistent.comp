@@ -1,0 +1,23 @@
+#version 460
+// All phases of the LBVH build in one dispatch, from the task pool: see bvh/lbvh.glsl for the phases' contracts.
+//
+// needs  the state as bvh/lbvh/reset.comp writes it, and one barrier before; any number of workgroups from one up
+#include "bvh/lbvh.glsl"
+
+void main() {
+    PoolState pool = PoolState(state_address);
+    PoolCursor cursor = pool_start();
+    uint sorted = phases_before_hierarchy();
+    // Every round takes a ticket; there are fewer than 2^32.
+    while (true) {
+        pool_take(pool, cursor);
+        if (!cursor.working) break;
+        if (cursor.phase < sorted) encode_from_pool(cursor.phase, cursor.task);
+        else lbvh_hierarchy(cursor.task);
+        pool_finish(pool);
+    }
+    if (gl_LocalInvocationIndex == 0 && pool.status != 0) {
+        Structure structure = Structure(structure_address);
+        atomicOr(structure.header.status, STATUS_SPIN_RAN_OUT);
+    }
+}

@@ -1,0 +1,97 @@
+// Collapses a Bvh2 into a wide tree: src/bvh/wide/device.rs records the steps, src/bvh/wide/host.rs is the twin.
+//
+//   reset            reads the source                            writes levels, opened[0]
+//   open, open_few   read the source, opened of a level          write slots, opened of the next level, levels, first_children,
+//                                                                 first_records
+//   (scans)          first_children, first_records: exclusive sums over the source's slots
+//   nodes            reads the source and all that               writes the target's header and nodes, order
+//   records          reads the source, order                     writes the target's records and table of geometries
+//
+// Which binary nodes wide ones begin with is found from the root down, a level of wide nodes after the other. The list of a
+// level is in whatever order the atomics gave; nothing of it reaches the target: a node's index is one and the number of nodes
+// that are named by nodes of lower slots, and its rank among the nodes of its parent; the sums make them. So nodes that one
+// names lie side by side, as do, of quantised nodes, the records of its leaves.
+//
+// What is no structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
+// its own status.
+//
+// needs  first_children and first_records zeroed; one barrier before, between each two, and after; any number of workgroups, but
+//        one for reset and open_few; any subgroup size; no overlap of source, target and scratch
+#ifndef HEDGEROW_BVH_WIDE_COLLAPSE
+#define HEDGEROW_BVH_WIDE_COLLAPSE
+#include "bvh/copy.glsl"
+#include "bvh/sah.glsl"
+#include "bvh/wide.glsl"
+#extension GL_EXT_control_flow_attributes : require
+
+layout(constant_id = 2) const uint WIDTH = 4;
+layout(constant_id = 3) const bool QUANTISED = false;
+// Whether what is known of a node's children is chosen by comparisons, so that it stays in registers, or by index.
+layout(constant_id = 4) const bool IN_REGISTERS = false;
+
+// src/bvh/wide/mod.rs
+const uint LEVELS_BY_AREA = 24;
+const uint LEVELS_AT_MOST = 64;
+// In place of what names a child, which is where it lies among all children of the source: twice its node's slot, and one for
+// the right one.
+const uint NO_CHILD = 0xFFFFFFFFu;
+const uint WHOLE_TREE = 0xFFFFFFFEu;
+
+// A wide node to be: the slot of the binary node that it begins with; that of its parent << 3 | which of its nodes it is.
+struct Opened {
+    uint slot;
+    uint place;
+};
+
+BUFFER Levels {
+    uint count[LEVELS_AT_MOST];
+    uint first[LEVELS_AT_MOST + 1];   // of opened: where a level begins
+    uint end;                         // of all levels that have a node
+};
+BUFFER OpenedNodes { Opened node[]; };
+
+layout(push_constant, scalar) uniform WideCollapseArguments {
+    Structure source;
+    uvec2 target;
+    Levels levels;
+    OpenedNodes opened;
+    Words slots;             // what names the children of each of opened, WIDTH words
+    Words first_children;    // of each of the source's slots, and one more: the sum
+    Words first_records;
+    Words order;             // of quantised nodes: the source's record of each of the target
+    uint source_slots;
+    uint capacity;           // of opened
+    uint level;
+    uint level_end;
+};
+
+bool can_be_collapsed(Header header) {
+    return is_structure(header) && compacted(header).active_count != 0;
+}
+
+bool is_inner(Child child) {
+    return child.count == 0;
+}
+
+// Whether a child of a wide node is a node.
+bool is_wide_node(Child child) {
+    return child.count == 0 || QUANTISED && child.count > LEAF_MAX;
+}
+
+Child child_named(uint name) {
+    if (name == WHOLE_TREE) return source.header.root;
+    return Children(address_of(wide_nodes_at(uvec2(source)), name, 32)).child[0];
+}
+
+// Which of opened are of a level: the first, and how many.
+uvec2 opened_of(uint level) {
+    uint first = min(levels.first[level], capacity);
+    return uvec2(first, min(levels.count[level], capacity - first));
+}
+
+// The next level begins where this one ends: one invocation of those that open it notes it.
+void note_end(uint level, uint end) {
+    levels.first[level + 1] = end;
+    levels.end = end;
+}
+#endif

@@ -1,0 +1,135 @@
+// The step `open` of bvh/wide/collapse.glsl: finds the children of a wide node, and lists those that are nodes.
+#ifndef HEDGEROW_BVH_WIDE_OPEN
+#define HEDGEROW_BVH_WIDE_OPEN
+#include "bvh/wide/octants.glsl"
+
+// What is known of the children so far, beside open_middle.
+uint open_name[8];
+uint open_index[8];
+uint open_count[8];
+uint open_depth[8];
+// What speaks for opening it; less than 0 for a leaf.
+float open_weight[8];
+
+// The same as `weight` in src/bvh/wide/host.rs.
+void put_child(uint at, uint name, uint depth, uint level, float scale) {
+    Child child = child_named(name);
+    float weight = level < LEVELS_BY_AREA ? scaled_half_area(Box(child.lo, child.hi), scale) : float(64 - depth);
+    weight = is_inner(child) ? weight : -1.0;
+    vec3 middle = QUANTISED ? quarter_middle(child.lo, child.hi) : vec3(0);
+    if (IN_REGISTERS) {
+        for (uint i = 0; i < 8; ++i) {
+            bool is_here = i == at;
+            open_name[i] = is_here ? name : open_name[i];
+            open_index[i] = is_here ? child.index : open_index[i];
+            open_count[i] = is_here ? child.count : open_count[i];
+            open_depth[i] = is_here ? depth : open_depth[i];
+            open_weight[i] = is_here ? weight : open_weight[i];
+            if (QUANTISED) open_middle[i] = is_here ? middle : open_middle[i];
+        }
+    } else {
+        open_name[at] = name;
+        open_index[at] = child.index;
+        open_count[at] = child.count;
+        open_depth[at] = depth;
+        open_weight[at] = weight;
+        if (QUANTISED) open_middle[at] = middle;
+    }
+}
+
+// The children of the wide node that begins with the binary node `slot`: how many.
+uint open_children(uint slot, uint level, Child root) {
+    if (!is_inner(root)) {
+        put_child(0, WHOLE_TREE, 0, level, 0.0);
+        return 1;
+    }
+    float scale = source.header.area_scale;
+    put_child(0, 2 * slot, 1, level, scale);
+    put_child(1, 2 * slot + 1, 1, level, scale);
+    uint count = 2;
+    while (count < WIDTH) {
+        uint largest = 8, opens = 0, depth = 0;
+        float weight = -1.0;
+        for (uint i = 0; i < (IN_REGISTERS ? 8 : count); ++i) {
+            if (i < count && open_weight[i] > weight) {
+                weight = open_weight[i];
+                opens = open_index[i];
+                depth = open_depth[i] + 1;
+                largest = i;
+            }
+        }
+        if (largest == 8) break;
+        put_child(largest, 2 * opens, depth, level, scale);
+        put_child(count, 2 * opens + 1, depth, level, scale);
+        count++;
+    }
+    return count;
+}
+
+// Of the binary node that a wide one begins with, whose box is that of the wide one.
+vec3 middle_of_node(uint slot) {
+    Child root = source.header.root;
+    if (!is_inner(root)) return quarter_middle(root.lo, root.hi);
+    Child left = child_named(2 * slot), right = child_named(2 * slot + 1);
+    return quarter_middle(min(left.lo, right.lo), max(left.hi, right.hi));
+}
+
+// What names a child, its index and its count; NO_CHILD for the eighth and others behind.
+uvec3 child_at(uint i) {
+    uvec3 child = uvec3(NO_CHILD, 0, 0);
+    if (IN_REGISTERS) {
+        for (uint k = 0; k < 8; ++k) child = k == i ? uvec3(open_name[k], open_index[k], open_count[k]) : child;
+    } else if (i < 8) {
+        child = uvec3(open_name[i], open_index[i], open_count[i]);
+    }
+    return child;
+}
+
+// Lists the nodes of the lanes of a subgroup in one piece. All of them come here together, those that have none, too.
+uint place_in_next_level(uint level, uint nodes) {
+    uint before = subgroupExclusiveAdd(nodes);
+    uint all = subgroupAdd(nodes);
+    uint first = 0;
+    if (subgroupElect()) first = atomicAdd(levels.count[level + 1], all);
+    return subgroupBroadcastFirst(first) + before;
+}
+
+// Opens the node `i` of a level (the first of opened, and how many), if there is one. All invocations of a workgroup come here
+// together.
+void open(uint i, uvec2 of, uint level) {
+    bool is_there = i < of.y;
+    uint at = of.x + i, slot = 0, inner = 0;
+    uint in_slot[8];
+    for (uint s = 0; s < 8; ++s) in_slot[s] = 8;
+    if (is_there) {
+        slot = opened.node[at].slot;
+        uint count = open_children(slot, level, source.header.root);
+        for (uint s = 0; s < 8; ++s) in_slot[s] = s < count ? s : 8;
+        if (QUANTISED) octant_slots(count, middle_of_node(slot), in_slot);
+
+        uint nodes = 0, records = 0;
+        for (uint s = 0; s < WIDTH; ++s) {
+            uvec3 child = child_at(in_slot[s]);
+            slots.word[at * WIDTH + s] = child.x;
+            if (child.x == NO_CHILD) continue;
+            bool is_leaf = child.z != 0;
+            if (is_leaf) records += child.z;
+            if (!is_leaf) inner++;
+            if (!is_leaf || QUANTISED && child.z > LEAF_MAX) nodes++;
+        }
+        first_children.word[slot] = nodes;
+        if (QUANTISED) first_records.word[slot] = records;
+    }
+
+    uint next = of.x + of.y + place_in_next_level(level, inner);
+    if (is_there) {
+        uint rank = 0;
+        for (uint s = 0; s < WIDTH; ++s) {
+            uvec3 child = child_at(in_slot[s]);
+            if (child.x == NO_CHILD) continue;
+            if (child.z == 0 && next < capacity) opened.node[next++] = Opened(child.y, slot << 3 | rank);
+            if (child.z == 0 || QUANTISED && child.z > LEAF_MAX) rank++;
+        }
+    }
+}
+#endif

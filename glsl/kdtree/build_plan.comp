@@ -1,7 +1,0 @@
-#version 460
-// Where the records of each tile begin; one workgroup. See kdtree/build.glsl.
-#include "kdtree/encode.glsl"
-
-void main() {
-    kd_plan();
-}

@@ -1,7 +1,0 @@
-#version 460
-// Sets the state up before a build; one workgroup. See kdtree/build.glsl.
-#include "kdtree/encode.glsl"
-
-void main() {
-    kd_reset();
-}

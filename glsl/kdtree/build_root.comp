@@ -1,7 +1,0 @@
-#version 460
-// The root's task; one workgroup. See kdtree/build.glsl.
-#include "kdtree/encode.glsl"
-
-void main() {
-    kd_root();
-}

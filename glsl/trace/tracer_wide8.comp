@@ -1,6 +1,0 @@
-#version 460
-// Nodes of 8 children as floats: see trace/tracer_wide.glsl for the contract.
-#define WIDTH 8
-#define QUANTISED 0
-#define HEDGEROW_LEVELS 336
-#include "trace/tracer_wide.glsl"

@@ -1,0 +1,6 @@
+#version 460
+// Nodes of 8 children as floats: see trace/wide/tracer.glsl for the contract.
+#define WIDTH 8
+#define QUANTISED 0
+#define HEDGEROW_LEVELS 336
+#include "trace/wide/tracer.glsl"

@@ -1,0 +1,6 @@
+#version 460
+// Nodes of 8 children as bytes: see trace/wide/tracer.glsl for the contract.
+#define WIDTH 8
+#define QUANTISED 1
+#define HEDGEROW_LEVELS 343
+#include "trace/wide/tracer.glsl"

@@ -1,0 +1,80 @@
+// Traces rays through a tree of quantised nodes, each by one invocation, on CPUs: the loop of trace/tracer/lanes.comp, with loads
+// lane by lane (trace/lanes.glsl), and the steps of trace/wide/octant.comp.
+//
+// reads   structure, rays[first..count]
+// writes  hits[first..count]; with COUNT_WORK also works[first..count]
+// needs   a barrier (shader write -> shader read) before and after; a workgroup of one subgroup of at most 16 lanes
+#version 460
+layout(local_size_x_id = 0) in;
+layout(constant_id = 1) const bool ANY_HIT = false;
+layout(constant_id = 2) const bool COUNT_WORK = false;
+layout(constant_id = 3) const uint SHARED_LEVELS = 0;
+#define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
+#define HEDGEROW_LEVELS 49
+
+#include "trace/lanes.glsl"
+#include "trace/walk_quantised.glsl"
+
+QuantisedNode quantised_node_of_each_lane(QuantisedNodes nodes, EachLane index) {
+    QuantisedNode mine;
+#define LOAD_QUANTISED(lane)                                 \
+    if (lane < lane_count) {                                 \
+        QuantisedNode theirs = nodes.node[index.value[lane]]; \
+        if (gl_SubgroupInvocationID == lane) mine = theirs;  \
+    }
+    FOR_EACH_LANE(LOAD_QUANTISED)
+    return mine;
+}
+
+void main() {
+    Triangles triangles = Triangles(wide_records_at(uvec2(structure), structure.header.node_slots, QUANTISED_NODE_BYTES));
+    QuantisedNodes nodes = QuantisedNodes(wide_nodes_at(uvec2(structure)));
+    Child root = structure.header.root;
+    bool usable = can_be_traced(structure);
+    uint group_rays = gl_WorkGroupSize.x * rays_each;
+    uint next = first + gl_WorkGroupID.x * group_rays + gl_LocalInvocationIndex;
+    uint end = min(count, first + (gl_WorkGroupID.x + 1) * group_rays);
+
+    QuantisedWalk walk;
+    walk.visits = 0;
+    walk.leaves = 0;
+    walk.left = 0;
+    bool going = false;
+    uint i;
+    bool together = true;
+    // Since all lanes took a ray: turns of the loop, and those in which this lane had a ray.
+    uint turns = 0, turns_going = 0;
+    while (true) {
+        bool none_goes = !any_lane(going);
+        if (none_goes) {
+            if (!any_lane(next < end)) break;
+            together = together && 2u * sum_of_lanes(turns_going) >= gl_WorkGroupSize.x * turns;
+            turns = 0;
+            turns_going = 0;
+        }
+        turns++;
+        if (!going && next < end && (none_goes || !together)) {
+            i = next;
+            next += gl_WorkGroupSize.x;
+            begin(rays.ray[i], root, usable, walk);
+            going = true;
+        }
+        if (going) turns_going++;
+        // A lane that needs no node loads the root; one that needs no triangle the first, if any lane is at one.
+        bool visits = at_node(walk);
+        uint index = visits ? next_node(walk) : 0u;
+        QuantisedNode node = quantised_node_of_each_lane(nodes, each_lane(index));
+        if (visits) visit(node, walk);
+        next_leaf(walk);
+        bool tests = at_triangle(walk);
+        Triangle triangle = triangle_of_each_lane(triangles, each_lane(tests ? walk.record : 0u));
+        if (tests) test(triangle, ANY_HIT, walk);
+        if (going) {
+            going = go_on(walk);
+            if (!going) {
+                hits.hit[i] = walk.hit;
+                if (COUNT_WORK) works.work[i] = walk.work;
+            }
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! What the laboratory's shaders are given: a struct for each block of push constants, which `build.rs` writes from their SPIR-V.
+
+#![allow(missing_docs, reason = "GLSL says what they are")]
+
+include!(concat!(env!("OUT_DIR"), "/arguments.rs"));

@@ -1,0 +1,208 @@
+//! Top levels on the host, plainly: entry by entry, round by round. The twin of `glsl/accel/`: the same bytes as the device's.
+
+pub mod rebraid;
+pub mod serialize;
+
+use super::build::codes;
+use super::{Instance, Options, REBRAID};
+use crate::bvh::layout::{self, Aabb, Bvh2, Child, Header, Node, Record, status};
+use crate::bvh::sah::Collapse;
+use crate::bvh::twin::lbvh;
+use ash::vk;
+
+/// What is told of a bottom-level structure.
+#[derive(Debug, Clone, Copy)]
+pub struct Below<'a> {
+    header: &'a Header,
+    nodes: &'a [Node],
+}
+
+impl<'a, R: Record> From<&'a Bvh2<R>> for Below<'a> {
+    fn from(structure: &'a Bvh2<R>) -> Below<'a> {
+        Below { header: &structure.header, nodes: &structure.nodes }
+    }
+}
+
+/// A box in the world over an instance or a part of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Entry {
+    /// The box, or why the instance is left out: bits of [`status`], 0 for one that is inactive.
+    pub bounds: Result<Aabb, u32>,
+    /// Position of the instance in the input.
+    pub instance: u32,
+    /// Where it begins in the instance's structure.
+    pub start: Child,
+    /// Whether it is all of the instance.
+    pub is_whole: bool,
+}
+
+/// The top level over `instances`, built as a [`Device`](super::Device) with these options builds it by these flags. `below`
+/// finds the bottom-level structure at an address, if there is one.
+pub fn top_level<'a>(
+    instances: &[Instance],
+    below: impl Fn(u64) -> Option<Below<'a>>,
+    flags: vk::BuildAccelerationStructureFlagsKHR,
+    options: &Options,
+) -> Bvh2<layout::Instance> {
+    let mut entries = entries(instances, &below);
+    if flags.contains(REBRAID) && !flags.contains(vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE) {
+        let capacity = options.rebraid(entries.len() as u32).capacity;
+        rebraid::rebraid(&mut entries, instances, &below, capacity);
+        let none = Entry { bounds: Err(0), instance: u32::MAX, start: Child::UNUSED, is_whole: true };
+        entries.resize(capacity as usize, none);
+    }
+    let boxes: Vec<_> = entries.iter().map(|entry| entry.bounds).collect();
+    let codes = codes(flags, boxes.len() as u32);
+    let record = |entry: u32| record_of(&entries[entry as usize], instances);
+    let mut tree = lbvh::build_boxes(&boxes, record, codes, Collapse::OFF);
+    tree.header.build_flags = flags.as_raw() & 0x1f;
+    tree
+}
+
+/// One entry for each instance (`entries.comp`).
+pub fn entries<'a>(instances: &[Instance], below: &impl Fn(u64) -> Option<Below<'a>>) -> Vec<Entry> {
+    (0..instances.len() as u32).map(|i| entry_of(i, &instances[i as usize], below)).collect()
+}
+
+fn entry_of<'a>(number: u32, instance: &Instance, below: &impl Fn(u64) -> Option<Below<'a>>) -> Entry {
+    let without = |why_not| Entry { bounds: Err(why_not), instance: number, start: Child::UNUSED, is_whole: true };
+    if instance.structure == 0 {
+        return without(0);
+    }
+    let m = &instance.transform;
+    let (Some(below), Some(_)) = (below(instance.structure), inverse_of(m)) else {
+        return without(status::BAD_INSTANCE);
+    };
+    if below.header.active == 0 || below.header.status & status::UNUSABLE != 0 {
+        return without(0);
+    }
+    let entry = Entry { is_whole: true, ..below.entry_over(number, m, below.header.root) };
+    match entry.bounds {
+        Ok(b) if b.lo.iter().chain(&b.hi).all(|x| x.is_finite()) => entry,
+        _ => without(status::BAD_INSTANCE),
+    }
+}
+
+impl Below<'_> {
+    /// The children of what is no leaf.
+    fn opened(&self, child: &Child) -> Option<[Child; 2]> {
+        if child.is_leaf() { None } else { self.nodes.get(child.index as usize).map(|node| node.children) }
+    }
+
+    /// A child's children, or of a leaf itself, some levels down.
+    fn down(&self, child: Child, levels: u32) -> Vec<Child> {
+        match self.opened(&child) {
+            Some(children) if levels > 0 => children.into_iter().flat_map(|c| self.down(c, levels - 1)).collect(),
+            _ => vec![child],
+        }
+    }
+
+    /// The box in the world around the boxes some levels below a child.
+    fn fine_box(&self, m: &[[f32; 4]; 3], child: Child, levels: u32) -> Aabb {
+        self.down(child, levels).iter().fold(Aabb::EMPTY, |b, at| b.union(&transformed_box(m, at)))
+    }
+
+    fn entry_over(&self, instance: u32, m: &[[f32; 4]; 3], child: Child) -> Entry {
+        // Where no axis turns away from the world's, a box's image is a box.
+        let keeps_boxes = m.iter().all(|row| row[..3].iter().filter(|&&x| x != 0.0).count() <= 1);
+        let bounds = self.fine_box(m, child, if keeps_boxes { 0 } else { 3 });
+        Entry { bounds: Ok(bounds), instance, start: child, is_whole: false }
+    }
+}
+
+/// The record of an entry; all zero for one that is left out.
+fn record_of(entry: &Entry, instances: &[Instance]) -> layout::Instance {
+    let none = layout::Instance { instance: entry.instance, ..bytemuck::Zeroable::zeroed() };
+    if entry.bounds.is_err() {
+        return none;
+    }
+    let given = &instances[entry.instance as usize];
+    layout::Instance {
+        to_object: inverse_of(&given.transform).unwrap_or_default(),
+        to_world: given.transform,
+        structure: given.structure,
+        index_and_mask: given.index_and_mask,
+        offset_and_flags: given.offset_and_flags,
+        start: if entry.is_whole { 0 } else { entry.start.index },
+        start_count: if entry.is_whole { layout::Instance::AT_ROOT } else { entry.start.count },
+        ..none
+    }
+}
+
+/// The box around a transformed box, not smaller by any rounding (`world_box.glsl`).
+fn transformed_box(m: &[[f32; 4]; 3], child: &Child) -> Aabb {
+    let slack_of_size = 2f32.powi(-21);
+    let mut b = Aabb::EMPTY;
+    for (row, &[x, y, z, w]) in m.iter().enumerate() {
+        let axes = [x, y, z];
+        let p: [f32; 3] = std::array::from_fn(|k| axes[k] * child.lo[k]);
+        let q: [f32; 3] = std::array::from_fn(|k| axes[k] * child.hi[k]);
+        let sum = |f: fn(f32, f32) -> f32| (f(p[0], q[0]) + f(p[1], q[1])) + f(p[2], q[2]);
+        let slack = slack_of_size * (sum(|a, b| a.abs().max(b.abs())) + w.abs());
+        b.lo[row] = (sum(f32::min) + w) - slack;
+        b.hi[row] = (sum(f32::max) + w) + slack;
+    }
+    b
+}
+
+/// The inverse of an affine matrix, by its adjugate; `None` where there is none in finite numbers (`instances.glsl`).
+/// How far the elements of an instance's inverse may be from those found here, where the device does not divide as the host does:
+/// in parts of an element; of the fourth column, in half the parts of the sum of the products that it is made of. Vulkan lets a
+/// quotient be 2.5 units in the last place away; what it is multiplied with is rounded twice.
+pub const INVERSE_BOUND: f32 = 4.0 * f32::EPSILON;
+
+/// Whether `got` is, within [`INVERSE_BOUND`], the inverse `expected` of `m`.
+pub fn is_near_inverse(got: &[[f32; 4]; 3], expected: &[[f32; 4]; 3], m: &[[f32; 4]; 3]) -> bool {
+    got.iter().zip(expected).all(|(got, expected)| {
+        let products = (0..3).map(|k| (expected[k] * m[k][3]).abs()).sum::<f32>();
+        let parts = [expected[0].abs(), expected[1].abs(), expected[2].abs(), 2.0 * products];
+        (0..4).all(|k| {
+            got[k].to_bits() == expected[k].to_bits() || (got[k] - expected[k]).abs() <= INVERSE_BOUND * parts[k]
+        })
+    })
+}
+
+fn inverse_of(m: &[[f32; 4]; 3]) -> Option<[[f32; 4]; 3]> {
+    let is_finite = |m: &[[f32; 4]; 3]| m.iter().flatten().all(|x| x.is_finite());
+    if !is_finite(m) {
+        return None;
+    }
+    let greatest = m.iter().flat_map(|row| &row[..3]).fold(0f32, |a, x| a.max(x.abs()));
+    let exponent = greatest.to_bits() >> 23 & 0xff;
+    let scale = f32::from_bits((254 - exponent).clamp(1, 254) << 23);
+    let [a, b, c] = m.map(|[x, y, z, _]| [x * scale, y * scale, z * scale]);
+    let columns = [cross(b, c), cross(c, a), cross(a, b)];
+    let determinant = a[0] * columns[0][0] + a[1] * columns[0][1] + a[2] * columns[0][2];
+    let reciprocal = scale / determinant;
+    let inverse = std::array::from_fn(|row| {
+        let r = columns.map(|column| column[row] * reciprocal);
+        [r[0], r[1], r[2], -(r[0] * m[0][3] + r[1] * m[1][3] + r[2] * m[2][3])]
+    });
+    (is_finite(&inverse) && determinant != 0.0).then_some(inverse)
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inverses_by_quotients_that_vulkan_allows_are_near() {
+        let m = [[0.3, -1.7, 0.2, 5.0], [2.1, 0.4, -0.6, -70.0], [0.1, 0.9, 1.3, 0.003]];
+        let expected = inverse_of(&m).expect("an inverse");
+        let by_quotient = |units: f32| {
+            expected.map(|row| {
+                let r: [f32; 3] = std::array::from_fn(|k| row[k] * (1.0 + units * f32::EPSILON));
+                [r[0], r[1], r[2], -(r[0] * m[0][3] + r[1] * m[1][3] + r[2] * m[2][3])]
+            })
+        };
+        assert!(is_near_inverse(&expected, &expected, &m));
+        for units in [-2.5, -1.0, 1.0, 2.5] {
+            assert!(is_near_inverse(&by_quotient(units), &expected, &m), "{units}");
+        }
+        assert!(!is_near_inverse(&by_quotient(20.0), &expected, &m));
+    }
+}

@@ -1,0 +1,58 @@
+//! Re-braiding, plainly: round by round.
+
+use super::{Below, Entry};
+use crate::accel::Instance;
+use crate::accel::rebraid::{ROUNDS, class_of};
+
+/// Opens entries, up to `capacity` of them (`rebraid.glsl`).
+pub fn rebraid<'a>(
+    entries: &mut Vec<Entry>,
+    instances: &[Instance],
+    below: &impl Fn(u64) -> Option<Below<'a>>,
+    capacity: u32,
+) {
+    for round in 0..ROUNDS {
+        let left = (capacity as usize).saturating_sub(entries.len());
+        let share = left.div_ceil((ROUNDS - round) as usize);
+        // The highest class of gain first, in a class the first.
+        let of = |entry: &Entry| &instances[entry.instance as usize];
+        let gain = |entry: &Entry| below(of(entry).structure)?.gain_of(entry, &of(entry).transform);
+        let gains: Vec<Option<f32>> = entries.iter().map(|e| e.bounds.is_ok().then(|| gain(e)).flatten()).collect();
+        let mut opened: Vec<usize> = (0..entries.len()).filter(|&i| gains[i].is_some()).collect();
+        opened.sort_by_key(|&i| (std::cmp::Reverse(gains[i].map(class_of)), i));
+        opened.truncate(share);
+        opened.sort_unstable();
+        for i in opened {
+            let (entry, instance) = (entries[i], of(&entries[i]));
+            let Some(below) = below(instance.structure) else { continue };
+            let Some(children) = below.opened(&entry.start) else { continue };
+            let [left, right] = children.map(|c| below.entry_over(entry.instance, &instance.transform, c));
+            entries[i] = left;
+            entries.push(right);
+        }
+    }
+}
+
+impl Below<'_> {
+    /// The area that is saved for each entry more, if the entry is opened once, or its children too.
+    fn gain_of(&self, entry: &Entry, m: &[[f32; 4]; 3]) -> Option<f32> {
+        let children = self.opened(&entry.start)?;
+        let whole = self.fine_box(m, entry.start, 3).half_area();
+        let halves = children.map(|child| self.fine_box(m, child, 2).half_area());
+        let mut quarters = 0.0;
+        let mut added = 1.0;
+        for (child, half) in children.iter().zip(halves) {
+            quarters += match self.opened(child) {
+                Some([a, b]) => {
+                    added += 1.0;
+                    self.fine_box(m, a, 1).half_area() + self.fine_box(m, b, 1).half_area()
+                }
+                None => half,
+            };
+        }
+        let once = whole - (halves[0] + halves[1]);
+        let twice = (whole - quarters) / added;
+        let gain = once.max(twice);
+        (whole.is_finite() && gain > 0.0).then_some(gain)
+    }
+}

@@ -1,0 +1,17 @@
+//! Builders on the host: plain, and the specification of those on the device.
+
+mod clusters;
+mod collapse;
+mod compact;
+pub mod epo;
+pub mod geometry;
+pub mod hlbvh;
+pub mod hploc;
+pub mod lbvh;
+mod over;
+pub mod ploc;
+pub mod quality;
+pub mod refit;
+mod reinsertion;
+pub mod split;
+pub mod wide;

@@ -1,0 +1,186 @@
+//! Collapsing a `Bvh2` into a wide tree, plainly: what [`crate::bvh::wide::device`] must equal, byte for byte.
+
+use crate::bvh::layout::{Aabb, Bvh2, Child, Record};
+use crate::bvh::wide::LEVELS_BY_AREA;
+use crate::bvh::wide::layout::{Slots, Wide, WideNode};
+use std::collections::BTreeMap;
+
+/// A wide node to be: the children of the binary nodes that it takes in, in slots.
+struct Opened {
+    /// The binary node that it begins with; 0 if the whole tree is a leaf.
+    slot: u32,
+    children: Slots,
+    /// Node that names it, and which of that one's nodes it is.
+    place: Option<(u32, u32)>,
+}
+
+impl<N: WideNode, R: Record> Wide<N, R> {
+    /// The wide tree of `tree`. One that is empty or cannot be traced is empty, with its status.
+    pub fn of(tree: &Bvh2<R>) -> Wide<N, R> {
+        let mut header = tree.header.compacted();
+        header.kind = Self::KIND;
+        (header.root.index, header.root.count) = (0, 0);
+        (header.node_slots, header.inner_nodes) = (1, 0);
+        let geometries = tree.geometries.clone();
+        if header.active == 0 {
+            return Wide { header, nodes: vec![N::empty()], records: Vec::new(), geometries };
+        }
+        let opened = open_all::<N, R>(tree);
+        // The nodes that a node names lie behind those that others name whose binary nodes are in lower slots; records likewise.
+        let first_children = running_sums(1, opened.iter().map(|o| (o.slot, o.node_children::<N>().count() as u32)));
+        let first_records = running_sums(0, opened.iter().map(|o| (o.slot, o.leaf_records())));
+        let mut nodes = vec![N::empty(); opened.iter().map(|o| o.node_children::<N>().count()).sum::<usize>() + 1];
+        let mut records = tree.records[..header.active as usize].to_vec();
+        for node in &opened {
+            let mut children = node.children;
+            if N::FORM.is_quantised() {
+                // The short leaves of a node side by side; long ones, which are nodes of their own, before them.
+                let mut next_record = first_records[&node.slot];
+                for long in [true, false] {
+                    let leaves =
+                        children.iter_mut().flatten().filter(|c| c.is_leaf() && (c.count > N::LEAF_MAX) == long);
+                    for leaf in leaves {
+                        let (from, to, count) = (leaf.index as usize, next_record as usize, leaf.count as usize);
+                        records[to..to + count].copy_from_slice(&tree.records[from..from + count]);
+                        leaf.index = next_record;
+                        next_record += leaf.count;
+                    }
+                }
+            }
+            let node_children = children.iter_mut().flatten().filter(|child| is_node::<N>(child));
+            for (child, index) in node_children.zip(first_children[&node.slot]..) {
+                if child.is_leaf() {
+                    nodes[index as usize] = N::of_long_leaf(child.index, child.count);
+                }
+                (child.index, child.count) = (index, 0);
+            }
+            let index = node.place.map_or(0, |(parent, rank)| first_children[&parent] + rank);
+            nodes[index as usize] = N::of(&children);
+        }
+        (header.node_slots, header.inner_nodes) = (nodes.len() as u32, nodes.len() as u32);
+        Wide { header, nodes, records, geometries }
+    }
+}
+
+impl Opened {
+    /// The children that are nodes.
+    fn node_children<N: WideNode>(&self) -> impl Iterator<Item = &Child> {
+        self.children.iter().flatten().filter(|child| is_node::<N>(child))
+    }
+
+    /// Records of the children that are leaves.
+    fn leaf_records(&self) -> u32 {
+        self.children.iter().flatten().map(|child| child.count).sum()
+    }
+}
+
+/// Whether a child of a wide node is a node: an inner one, or a leaf that is too long.
+fn is_node<N: WideNode>(child: &Child) -> bool {
+    !child.is_leaf() || child.count > N::LEAF_MAX
+}
+
+/// For each slot, `from` and the sum of those of lower slots.
+fn running_sums(from: u32, values: impl Iterator<Item = (u32, u32)>) -> BTreeMap<u32, u32> {
+    let mut sums: BTreeMap<u32, u32> = values.collect();
+    let mut sum = from;
+    for value in sums.values_mut() {
+        sum += std::mem::replace(value, sum);
+    }
+    sums
+}
+
+/// All wide nodes to be, level by level.
+fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>) -> Vec<Opened> {
+    let mut opened: Vec<Opened> = Vec::new();
+    let mut this_level = vec![(tree.header.root, None)];
+    for level in 0.. {
+        let mut next_level = Vec::new();
+        for (root, place) in this_level {
+            let children = open(tree, &root, N::FORM.width() as usize, level);
+            let mut slots = [None; 8];
+            if N::FORM.is_quantised() {
+                slots = octant_slots(&children);
+            } else {
+                slots.iter_mut().zip(&children).for_each(|(slot, child)| *slot = Some(*child));
+            }
+            let slot = if root.is_leaf() { 0 } else { root.index };
+            let node = Opened { slot, children: slots, place };
+            let inner = node.node_children::<N>().zip(0..).filter(|(child, _)| !child.is_leaf());
+            next_level.extend(inner.map(|(&child, rank)| (child, Some((slot, rank)))));
+            opened.push(node);
+        }
+        if next_level.is_empty() {
+            return opened;
+        }
+        this_level = next_level;
+    }
+    unreachable!("a tree has an end")
+}
+
+/// The children of a wide node: those of the binary node, the largest one opened again and again; far down
+/// ([`LEVELS_BY_AREA`]) the highest one. Of equal ones the first. A tree that is a leaf is its own child.
+fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32) -> Vec<Child> {
+    if root.is_leaf() {
+        return vec![*root];
+    }
+    let scale = tree.header.area_scale;
+    let weight = |child: &Child, depth: u32| match child.is_leaf() {
+        true => -1.0,
+        false if level < LEVELS_BY_AREA => child.bounds().scaled_half_area(scale),
+        false => (64 - depth) as f32,
+    };
+    // A child, what speaks for opening it, and how many levels it is below the root.
+    let below = |child: &Child, depth: u32| {
+        tree.nodes[child.index as usize].children.map(|c| (c, weight(&c, depth), depth)).to_vec()
+    };
+    let mut children = below(root, 1);
+    while children.len() < width {
+        let mut largest: Option<usize> = None;
+        for (i, (_, weight, _)) in children.iter().enumerate() {
+            if *weight > largest.map_or(-1.0, |at| children[at].1) {
+                largest = Some(i);
+            }
+        }
+        let Some(at) = largest else { break };
+        let (child, _, depth) = children[at];
+        let [left, right] = below(&child, depth + 1).try_into().expect("two children");
+        children[at] = left;
+        children.push(right);
+    }
+    children.into_iter().map(|(child, ..)| child).collect()
+}
+
+/// The children in slots by the octants that they lie in (Ylitie, Karras, Laine 2017, section 3.1): a child gains by a slot what
+/// its centre lies in the direction of that octant's corner. The paper maximises the sum of gains by auction; here children take
+/// the best slot that is left, those that lie farthest from the middle first.
+fn octant_slots(children: &[Child]) -> Slots {
+    let bounds = children.iter().fold(Aabb::EMPTY, |b, child| b.union(&child.bounds()));
+    // A quarter, so that a sum of three stays a float.
+    let middle = |b: &Aabb| -> [f32; 3] { std::array::from_fn(|i| 0.25 * b.lo[i] + 0.25 * b.hi[i]) };
+    let centre = middle(&bounds);
+    let offsets: Vec<[f32; 3]> = children
+        .iter()
+        .map(|child| {
+            let of_child = middle(&child.bounds());
+            std::array::from_fn(|i| of_child[i] - centre[i])
+        })
+        .collect();
+    let mut left: Vec<usize> = (0..children.len()).collect();
+    let mut slots = [None; 8];
+    while !left.is_empty() {
+        let distance = |i: usize| offsets[i][0].abs() + offsets[i][1].abs() + offsets[i][2].abs();
+        // Of equal ones the first.
+        let farthest = (0..left.len()).rev().max_by(|&a, &b| distance(left[a]).total_cmp(&distance(left[b])));
+        let child = left.remove(farthest.expect("some are left"));
+        let gain = |slot: usize| {
+            let [x, y, z]: [f32; 3] =
+                std::array::from_fn(|i| if slot >> i & 1 != 0 { offsets[child][i] } else { -offsets[child][i] });
+            x + y + z
+        };
+        let free = (0..8).rev().filter(|&slot: &usize| slots[slot].is_none());
+        // −0 and 0 are equal gains.
+        let best = free.max_by(|&a, &b| gain(a).partial_cmp(&gain(b)).expect("finite")).expect("eight slots");
+        slots[best] = Some(children[child]);
+    }
+    slots
+}

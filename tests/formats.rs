@@ -1,0 +1,297 @@
+//! The structs that lie in memory are the same on host and device: offsets, sizes and names, from SPIR-V reflection. And what must be
+//! `precise`, or handed over at barriers, is so in the shaders that are compiled.
+
+use hedgerow::accel::serialize::Head;
+use hedgerow::bvh::geometry::Geometry;
+use hedgerow::bvh::layout::{BoxRecord, Child, GeometryEntry, Header, Instance, Node, Triangle};
+use hedgerow::bvh::split::Reference;
+use hedgerow::bvh::wide::quantised::QuantisedNode;
+use hedgerow::gpu::shaders;
+use hedgerow::kdtree::layout as kdtree;
+use hedgerow::trace::kd::TreeEntry;
+use hedgerow::trace::{Hit, Ray};
+use rspirv::dr::{Instruction, Module, Operand};
+use rspirv::spirv::{Decoration, MemorySemantics, Op, StorageClass};
+use std::collections::{BTreeMap, BTreeSet};
+use std::mem::offset_of;
+use std::path::Path;
+
+/// A struct: its bytes, and name, offset and bytes of each member.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Layout {
+    bytes: usize,
+    members: Vec<(String, usize, usize)>,
+}
+
+/// The [`Layout`] of a Rust struct: `layout_of!(Arguments { keys, values })`, with all its members.
+macro_rules! layout_of {
+    ($name:ty { $($member:ident),* $(,)? }) => {{
+        let member = |name: &str, at: usize, bytes: usize| (name.to_string(), at, bytes);
+        Layout {
+            bytes: size_of::<$name>(),
+            members: vec![$(member(
+                stringify!($member),
+                std::mem::offset_of!($name, $member),
+                bytes_of_member(|s: &$name| &s.$member),
+            )),*],
+        }
+    }};
+}
+fn bytes_of_member<S, M>(_: fn(&S) -> &M) -> usize {
+    size_of::<M>()
+}
+
+/// The structs in memory, by their name in GLSL, as the host sees them.
+fn structs() -> BTreeMap<&'static str, Layout> {
+    let mut node = layout_of!(Node { children });
+    let right = offset_of!(Node, children) + size_of::<Child>();
+    node.members = vec![("left".into(), 0, size_of::<Child>()), ("right".into(), right, size_of::<Child>())];
+    let mut header = layout_of!(Header {
+        magic,
+        kind,
+        status,
+        primitive_count,
+        root,
+        active,
+        node_slots,
+        code_bits,
+        inner_nodes,
+        geometry_count,
+        geometry_flags,
+        build_flags,
+        area_scale,
+        cost,
+        built_cost,
+        built_area,
+        split_from,
+        reserved
+    });
+    // `active` is a reserved word of GLSL.
+    header.members[5].0 = "active_count".into();
+    // Formats and flags are one word there.
+    let mut geometry =
+        layout_of!(Geometry { vertices, indices, transform, vertex_stride, vertex_count, vertex_format, first });
+    geometry.members[5] = ("formats".into(), offset_of!(Geometry, vertex_format), 4);
+    let mut kd_header = layout_of!(kdtree::Header {
+        magic,
+        kind,
+        status,
+        primitive_count,
+        lo,
+        node_count,
+        hi,
+        reference_count,
+        active,
+        inner_nodes,
+        leaves,
+        empty_leaves,
+        geometry_count,
+        geometry_flags,
+        build_flags,
+        depth,
+        area_scale,
+        reach,
+        node_room,
+        reference_room,
+        record_room,
+        replaced_nodes,
+        replaced_references,
+        reserved
+    });
+    kd_header.members[8].0 = "active_count".into();
+    BTreeMap::from([
+        ("Child", layout_of!(Child { lo, index, hi, count })),
+        ("Node", node),
+        ("Triangle", layout_of!(Triangle { v0, v1, v2, primitive })),
+        ("Reference", layout_of!(Reference { lo, primitive, hi, left_out })),
+        ("BoxRecord", layout_of!(BoxRecord { lo, hi, primitive })),
+        ("GeometryEntry", layout_of!(GeometryEntry { first, flags })),
+        (
+            "Instance",
+            layout_of!(Instance {
+                to_object,
+                to_world,
+                structure,
+                index_and_mask,
+                offset_and_flags,
+                instance,
+                start,
+                start_count,
+                reserved
+            }),
+        ),
+        (
+            "QuantisedNode",
+            layout_of!(QuantisedNode { origin, exponents_and_nodes, first_child, first_record, counts, lo, hi }),
+        ),
+        ("Header", header),
+        ("KdHeader", kd_header),
+        ("KdNode", layout_of!(kdtree::Node { first, second })),
+        ("Geometry", geometry),
+        ("SerializedHead", layout_of!(Head { version, serialized_bytes, structure_bytes, handle_count })),
+        ("Ray", layout_of!(Ray { origin, t_min, direction, t_max })),
+        ("Hit", layout_of!(Hit { t, primitive, u, v })),
+        ("TreeEntry", layout_of!(TreeEntry { structure, first, reserved })),
+    ])
+}
+
+/// The unoptimised SPIR-V of a shader, which still has the names.
+struct Reflection(Module);
+
+impl Reflection {
+    fn of(shader: &str) -> Reflection {
+        let path = Path::new(env!("OUT_DIR")).join("named").join(format!("{}.spv", shader.replace('/', ".")));
+        let bytes = std::fs::read(&path).expect("build.rs wrote it");
+        Reflection(rspirv::dr::load_bytes(bytes).expect("SPIR-V of shaderc"))
+    }
+
+    /// The structs that lie in memory and whose names are `wanted`, as the device sees them. Headers that foreign shaders include
+    /// put the library's name before theirs: it is left out.
+    fn structs<'a>(&'a self, wanted: impl Fn(&str) -> bool + 'a) -> impl Iterator<Item = (&'a str, Layout)> {
+        let structs = self.0.types_global_values.iter().filter(|i| i.class.opcode == Op::TypeStruct);
+        structs.filter_map(move |i| {
+            let name = self.name(i.result_id?, None)?;
+            let name = name.strip_prefix("Hedgerow").unwrap_or(name);
+            Some((name, wanted(name).then(|| self.layout(i)).flatten()?))
+        })
+    }
+
+    fn ty(&self, id: u32) -> &Instruction {
+        self.0.types_global_values.iter().find(|i| i.result_id == Some(id)).expect("types are declared")
+    }
+
+    /// The name of a type, or of one of its members.
+    fn name(&self, id: u32, member: Option<u32>) -> Option<&str> {
+        let target: Vec<_> = [Operand::IdRef(id)].into_iter().chain(member.map(Operand::LiteralBit32)).collect();
+        let op = if member.is_some() { Op::MemberName } else { Op::Name };
+        let mut names = self.0.debug_names.iter().filter(|i| i.class.opcode == op);
+        names.find_map(|i| i.operands.strip_prefix(&target[..])?.first().map(Operand::unwrap_literal_string))
+    }
+
+    fn decoration(&self, id: u32, member: Option<u32>, decoration: Decoration) -> Option<usize> {
+        let mut target: Vec<_> = [Operand::IdRef(id)].into_iter().chain(member.map(Operand::LiteralBit32)).collect();
+        target.push(Operand::Decoration(decoration));
+        let mut values = self.0.annotations.iter().filter_map(|i| i.operands.strip_prefix(&target[..])?.first());
+        values.next().map(|value| value.unwrap_literal_bit32() as usize)
+    }
+
+    /// The layout of a struct; `None` for one that lies in no memory and so has no offsets.
+    fn layout(&self, block: &Instruction) -> Option<Layout> {
+        let id = block.result_id?;
+        let members = block.operands.iter().zip(0..).map(|(ty, member)| {
+            let name = self.name(id, Some(member))?.trim_end_matches("_address").to_string();
+            let offset = self.decoration(id, Some(member), Decoration::Offset)?;
+            Some((name, offset, self.bytes(ty.unwrap_id_ref())))
+        });
+        let members = members.collect::<Option<Vec<_>>>()?;
+        Some(Layout { bytes: members.last().map_or(0, |(_, offset, bytes)| offset + bytes), members })
+    }
+
+    /// Bytes of a type in memory; 0 for an array without end.
+    fn bytes(&self, id: u32) -> usize {
+        let ty = self.ty(id);
+        let operand = |i: usize| ty.operands[i].unwrap_id_ref();
+        match ty.class.opcode {
+            Op::TypeInt | Op::TypeFloat => ty.operands[0].unwrap_literal_bit32() as usize / 8,
+            Op::TypeVector => self.bytes(operand(0)) * ty.operands[1].unwrap_literal_bit32() as usize,
+            Op::TypeArray => {
+                let length = self.ty(operand(1)).operands[0].unwrap_literal_bit32() as usize;
+                length * self.stride(id, operand(0))
+            }
+            Op::TypeRuntimeArray => {
+                self.stride(id, operand(0));
+                0
+            }
+            Op::TypePointer => 8,
+            Op::TypeStruct => self.layout(ty).map_or(0, |l| l.bytes),
+            other => panic!("{other:?} lies in memory that the host shares"),
+        }
+    }
+
+    /// The stride of an array, which in scalar layout is the size of its element.
+    fn stride(&self, array: u32, element: u32) -> usize {
+        let stride = self.decoration(array, None, Decoration::ArrayStride).expect("arrays in memory have a stride");
+        assert_eq!(stride, self.bytes(element), "the stride of an array of {:?}", self.name(element, None));
+        stride
+    }
+}
+
+#[test]
+fn structs_in_memory_are_the_same_on_host_and_device() {
+    let host = structs();
+    let mut seen = BTreeSet::new();
+    for shader in shaders::ALL {
+        for (name, device) in Reflection::of(shader.name).structs(|name| host.contains_key(name)) {
+            assert_eq!(host[name], device, "{name} in {}: host left, device right", shader.name);
+            seen.insert(name.to_string());
+        }
+    }
+    assert!(seen.iter().eq(host.keys().copied()), "every struct is met in some shader: {seen:?}");
+}
+
+/// Whether every operation of a kind that rounds is one that must not be contracted with others.
+fn are_all_precise(module: &Module, op: Op) -> bool {
+    let target = |i: &Instruction| match &i.operands[..] {
+        [Operand::IdRef(id), Operand::Decoration(Decoration::NoContraction)] => Some(*id),
+        _ => None,
+    };
+    let precise: BTreeSet<u32> = module.annotations.iter().filter_map(target).collect();
+    let blocks = module.functions.iter().flat_map(|f| &f.blocks);
+    let mut operations = blocks.flat_map(|b| &b.instructions).filter(|i| i.class.opcode == op);
+    operations.all(|i| i.result_id.is_some_and(|id| precise.contains(&id)))
+}
+
+/// Where shaderc unrolls a loop, its copies are not `precise` any more: then the bits depend on the driver.
+#[test]
+fn what_is_precise_in_a_source_is_so_in_its_shader() {
+    let mut precise_shaders = 0;
+    for shader in shaders::ALL {
+        let optimised = rspirv::dr::load_bytes(shader.spirv).expect("SPIR-V of shaderc");
+        let source = Reflection::of(shader.name).0;
+        for op in [Op::FAdd, Op::FSub, Op::FMul, Op::FDiv] {
+            let is_precise = are_all_precise(&source, op);
+            assert!(!is_precise || are_all_precise(&optimised, op), "{}: {op:?}", shader.name);
+            precise_shaders += u32::from(is_precise);
+        }
+    }
+    assert!(precise_shaders > 0, "some shaders are precise throughout");
+}
+
+/// What `build/shared_memory.rs` has made of them.
+#[test]
+fn shared_memory_is_handed_over_at_barriers_alone() {
+    let (mut accesses, mut barriers) = (0, 0);
+    for shader in shaders::ALL {
+        let module = rspirv::dr::load_bytes(shader.spirv).expect("SPIR-V of shaderc");
+        let is_shared = |i: &&Instruction| i.operands.contains(&Operand::StorageClass(StorageClass::Workgroup));
+        let types: BTreeSet<_> = module.types_global_values.iter().filter(is_shared).map(|i| i.result_id).collect();
+        let pointers: BTreeSet<_> =
+            module.all_inst_iter().filter(|i| types.contains(&i.result_type)).filter_map(|i| i.result_id).collect();
+        let semantics = |id: u32| {
+            let constant = module.types_global_values.iter().find(|i| i.result_id == Some(id)).expect("a constant");
+            MemorySemantics::from_bits_retain(constant.operands[0].unwrap_literal_bit32())
+        };
+        for i in module.all_inst_iter() {
+            match (i.class.opcode, &i.operands[..]) {
+                (Op::Load | Op::Store, [Operand::IdRef(pointer), rest @ ..]) if pointers.contains(pointer) => {
+                    accesses += 1;
+                    assert!(
+                        !rest.iter().any(|operand| matches!(operand, Operand::IdScope(_))),
+                        "{}: {i:?}",
+                        shader.name
+                    );
+                }
+                (Op::ControlBarrier | Op::MemoryBarrier, [.., Operand::IdMemorySemantics(id)]) => {
+                    let has = |of: MemorySemantics| semantics(*id).contains(of);
+                    if has(MemorySemantics::WORKGROUP_MEMORY) {
+                        barriers += 1;
+                        let both = MemorySemantics::MAKE_AVAILABLE | MemorySemantics::MAKE_VISIBLE;
+                        assert!(has(MemorySemantics::ACQUIRE_RELEASE | both), "{}: {i:?}", shader.name);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+    assert!(accesses > 0 && barriers > 0, "{accesses} accesses, {barriers} barriers");
+}
