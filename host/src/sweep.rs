@@ -3,8 +3,9 @@
 //! Wald 2007, "On fast Construction of SAH-based Bounding Volume Hierarchies", section 3.2; Frantál 2019, section 3.2. Slow, and
 //! what the quality of other builders is told against.
 
-use hedgerow::bvh::layout::{Aabb, Bvh2, Child, MAX_DEPTH, Node, Record};
+use hedgerow::bvh::layout::{Bvh2, Child, MAX_DEPTH, Node, Record};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::geometry::Aabb;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -14,6 +14,7 @@ pub mod cli;
 pub mod device;
 mod error;
 pub mod measure;
+pub mod random;
 pub mod rays;
 pub mod report;
 pub mod scene;

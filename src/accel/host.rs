@@ -4,9 +4,9 @@ use super::build::{self, Build, Counts};
 use super::geometry::Given;
 use super::{Device, Options};
 use crate::bvh::geometry::{Geometry, IndexFormat};
-use crate::bvh::layout::Aabb;
 use crate::bvh::twin::geometry::{Corners, HostGeometry};
 use crate::bvh::twin::lbvh;
+use crate::geometry::Aabb;
 use crate::gpu::Context;
 use crate::{Error, Result};
 use ash::vk;
@@ -61,7 +61,7 @@ unsafe fn built(
     ranges: &[vk::AccelerationStructureBuildRangeInfoKHR],
 ) -> Result<Vec<u8>> {
     if info.mode != vk::BuildAccelerationStructureModeKHR::BUILD {
-        return Err(Error::Argument(format!("mode is {:?}; the host builds anew: BUILD", info.mode)));
+        return Err(Error::Argument(format!("mode is {:?}; the host only builds; set it to BUILD", info.mode)));
     }
     // SAFETY: the caller's promise.
     let (given, count) = unsafe { build::told(info, ranges) }?;

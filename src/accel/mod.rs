@@ -2,7 +2,7 @@
 //!
 //! [`Device`] stands where an engine has `ash::khr::acceleration_structure::Device`: the same methods take the same structs
 //! of [`ash::vk`] and record compute dispatches. What the structs can ask for and is not there is refused with an error that
-//! names the field. Who does not come from those structs asks by a [`Request`].
+//! names the field. Without those structs, use a [`Request`].
 //!
 //! A handle is the structure's device address, in the type that the structs want: it owns nothing, and lives as long as the
 //! buffer that it lies in. That buffer needs `STORAGE_BUFFER` and `SHADER_DEVICE_ADDRESS` usage, and so does scratch memory,

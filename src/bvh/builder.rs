@@ -6,10 +6,14 @@
 use super::codes::{Code, Codes};
 use super::encode::Encode;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
+pub use super::hlbvh::Treelets;
+pub use super::hploc::Window;
+use super::method::Hierarchy;
+pub use super::method::Method;
 use super::reinsertion::{self, Reinsertion};
 use super::sah::Collapse;
 use super::split::{self, Split};
-use super::{collapse, hlbvh, hploc, layout, lbvh, lbvh_workgroup, ploc};
+use super::{collapse, hploc, layout, lbvh_workgroup};
 use crate::gpu::arguments;
 use crate::gpu::radix_sort::{self, Shape};
 use crate::gpu::{BuildTuning, Context, Recorder, Step};
@@ -56,92 +60,6 @@ impl Options {
 impl Default for Options {
     fn default() -> Options {
         Options::DEFAULT
-    }
-}
-
-/// How a tree is made of the order of codes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Method {
-    /// Linear BVH: split where the highest bit of the codes changes (Lauterbach et al. 2009). The fastest build.
-    Lbvh,
-    /// Hierarchical LBVH (Pantaleoni and Luebke 2010): subtrees of the LBVH, *treelets*, under a top that the surface area heuristic
-    /// splits.
-    Hlbvh(Treelets),
-    /// Parallel locally-ordered clustering (Meister and Bittner 2018): neighbours in the order, so many places away at most, are
-    /// merged in rounds.
-    Ploc {
-        /// Neighbours on either side that a cluster looks at, 1 to [`Method::MOST_RADIUS`].
-        radius: u32,
-    },
-    /// Hierarchical PLOC (Benthin et al. 2024): neighbours in windows of the order are merged. Better trees for little more time.
-    Hploc(Window),
-}
-
-/// What is a treelet of [`Method::Hlbvh`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Treelets {
-    /// First bits of the code that its primitives share; `None` takes as many as number the primitives of the scene.
-    pub bits: Option<u32>,
-    /// Primitives that it has at most, 1 or more.
-    pub primitives: u32,
-}
-
-impl Treelets {
-    /// What measured well in cost: on sponza 1.04 of full sweep's, where 15 bits and 128 primitives have 1.09 in two thirds of the
-    /// time.
-    pub const DEFAULT: Treelets = Treelets { bits: None, primitives: 64 };
-
-    /// The bits that are taken of codes of so many, for so many primitives.
-    pub fn bits(&self, codes: Codes, primitive_count: u32) -> u32 {
-        let numbering = 32 - (primitive_count.max(2) - 1).leading_zeros();
-        self.bits.unwrap_or(numbering).min(codes.bits)
-    }
-}
-
-/// What [`Method::Hploc`] looks at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Window {
-    /// Clusters that are merged at a time: half of them from each side. Even, 4 to [`Window::MOST`].
-    pub size: u32,
-    /// Neighbours on either side that a cluster looks at, 1 or more.
-    pub radius: u32,
-}
-
-impl Window {
-    /// The most clusters of a window.
-    pub const MOST: u32 = 64;
-    /// Each cluster looks at all others: what an invocation merges by itself. Over eleven scenes trees cost 1.047 times a full
-    /// sweep's, with [`Window::PAPER`] 1.013, in more than twice the time on lavapipe.
-    pub const DEFAULT: Window = Window { size: 8, radius: 8 };
-    /// What Benthin et al. have: a subgroup of a GPU.
-    pub const PAPER: Window = Window { size: 32, radius: 8 };
-}
-
-impl Method {
-    /// The most neighbours that PLOC looks at.
-    pub const MOST_RADIUS: u32 = 256;
-
-    /// # Errors
-    /// A parameter out of range.
-    pub fn check(self) -> Result<()> {
-        match self {
-            Method::Hploc(Window { size, radius })
-                if !(4..=Window::MOST).contains(&size) || !size.is_multiple_of(2) || radius == 0 =>
-            {
-                Err(Error::Argument(format!(
-                    "H-PLOC with a window of {size} and radius {radius}: a window has an even number of clusters from 4 to {}, \
-                     and the radius is at least 1",
-                    Window::MOST
-                )))
-            }
-            Method::Hlbvh(Treelets { primitives: 0, .. }) => {
-                Err(Error::Argument("HLBVH with treelets of no primitives: they have 1 or more".into()))
-            }
-            Method::Ploc { radius } if !(1..=Method::MOST_RADIUS).contains(&radius) => {
-                Err(Error::Argument(format!("PLOC with radius {radius}: it is 1 to {}", Method::MOST_RADIUS)))
-            }
-            _ => Ok(()),
-        }
     }
 }
 
@@ -196,7 +114,7 @@ pub struct Builder {
     schedule: Schedule,
     optimise: Option<Reinsertion>,
     workers: u32,
-    /// Of [`Method::Hploc`].
+    /// What merges the windows of [`Method::Hploc`].
     merging: hploc::Merging,
     pub(super) encode: Encode,
 }
@@ -283,6 +201,8 @@ impl Builder {
         }
         // One primitive has one tree, which the LBVH's kernels make; those of PLOC crash Mesa 26's lavapipe where there are none.
         let method = if count < 2 { Method::Lbvh } else { options.method };
+        let window = if let Method::Hploc(window) = method { window } else { Window::DEFAULT };
+        let merging = hploc::Merging::of(context, window);
         let shape =
             if schedule == Schedule::Chain { Shape::of(context) } else { Shape::of(context).with_short_tiles() };
         let optimise = options.optimise.map(|options| Reinsertion::new(context, &options, count));
@@ -303,10 +223,8 @@ impl Builder {
             geometry_count: options.geometry_count,
             build_flags: options.build_flags,
             alone,
-            method_bytes: method_bytes(method, optimise.as_ref(), count.max(1).into()),
+            method_bytes: method_bytes(&*method.hierarchy(&merging), optimise.as_ref(), count.max(1).into()),
         };
-        let window = if let Method::Hploc(window) = method { window } else { Window::DEFAULT };
-        let merging = hploc::Merging::of(context, window);
         Ok(Builder { method, schedule, optimise, workers: tuning.workers, merging, encode })
     }
 
@@ -431,31 +349,28 @@ impl Builder {
         Ok(chains)
     }
 
+    /// What the method adds to a build.
+    fn hierarchy(&self) -> Box<dyn Hierarchy + '_> {
+        self.method.hierarchy(&self.merging)
+    }
+
     fn chain_of(&self, job: &Job<'_>) -> Result<Vec<Step>> {
-        let Builder { method, schedule, encode, workers, .. } = self;
+        let Builder { schedule, encode, workers, .. } = self;
         let (input, workers) = (&job.input, *workers);
         let arguments = &encode.arguments(input, job.structure, job.scratch)?;
         let mut steps = encode.split.map_or(Vec::new(), |split| split.steps(encode, input, arguments));
-        steps.extend(match (method, schedule) {
-            (_, Schedule::Chain) => self.chain(input, arguments),
-            (Method::Lbvh, _) => lbvh::persistent_steps(encode, input, arguments, workers),
-            (Method::Hlbvh(treelets), _) => hlbvh::persistent_steps(encode, treelets, input, arguments, workers),
-            (&Method::Ploc { radius }, _) => ploc::persistent_steps(encode, radius, input, arguments, workers),
-            (Method::Hploc(_), _) => hploc::persistent_steps(encode, &self.merging, input, arguments, workers),
+        steps.extend(match schedule {
+            Schedule::Chain => self.chain(input, arguments),
+            _ => self.hierarchy().persistent_steps(encode, input, arguments, workers),
         });
         Ok(steps)
     }
 
     fn chain(&self, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
-        let Builder { method, encode, optimise, .. } = self;
+        let Builder { encode, optimise, .. } = self;
         // What is weighed later has leaves of one primitive until then.
         let single = if self.weighs() { arguments.without_collapse() } else { *arguments };
-        let hierarchy = match method {
-            Method::Lbvh => lbvh::steps(encode, input, &single),
-            Method::Hlbvh(treelets) => hlbvh::steps(encode, treelets, input, &single),
-            &Method::Ploc { radius } => ploc::steps(encode, radius, input, &single),
-            Method::Hploc(_) => hploc::steps(encode, &self.merging, input, &single),
-        };
+        let hierarchy = self.hierarchy().steps(encode, input, &single);
         let mut steps = [encode.steps(input, arguments), hierarchy].concat();
         if let Some(reinsertion) = optimise {
             steps.extend(reinsertion.steps(arguments.structure, encode.behind_weights(arguments)));
@@ -471,26 +386,18 @@ impl Builder {
 }
 
 /// Bytes of scratch memory behind the state: the weights, and behind them what is needed one after the other.
-fn method_bytes(method: Method, optimise: Option<&Reinsertion>, count: u64) -> u64 {
-    /// Of a `Cluster` in clusters.glsl.
-    const CLUSTER_BYTES: u64 = 40;
-    let clusters = match method {
-        Method::Lbvh => 0,
-        Method::Hlbvh(_) => CLUSTER_BYTES * count + hlbvh::tasks_bytes(count),
-        Method::Ploc { .. } | Method::Hploc(_) => CLUSTER_BYTES * count,
-    };
+fn method_bytes(hierarchy: &dyn Hierarchy, optimise: Option<&Reinsertion>, count: u64) -> u64 {
     let optimising = optimise.map_or(0, |reinsertion| reinsertion.scratch_bytes().max(collapse::weigh_bytes(count)));
-    if method == Method::Lbvh && optimise.is_none() {
-        0
-    } else {
-        collapse::weights_bytes(count) + clusters.max(optimising)
+    match hierarchy.scratch_bytes(count).max(optimising) {
+        0 => 0,
+        bytes => collapse::weights_bytes(count) + bytes,
     }
 }
 
 /// How many primitives an invocation takes. Of two numbers, as each has its own kernels: what climbs the radix tree to the root
 /// gains by long runs.
 fn run_of(tuning: &BuildTuning, method: Method, count: u32, workgroup: u32) -> u32 {
-    let climbs = matches!(method, Method::Lbvh | Method::Hploc(_));
+    let climbs = method.climbs();
     let is_long = climbs && count >= tuning.long_run.saturating_mul(workgroup * tuning.enough_groups);
     if is_long { tuning.long_run } else { tuning.run }
 }

@@ -1,6 +1,7 @@
 //! Whether boxes cover triangles: what validation asks of the parts of split ones.
 
-use super::layout::{Aabb, Record};
+use super::layout::Record;
+use crate::geometry::Aabb;
 use crate::{Error, Result};
 
 /// Parts of split triangles, as leaves hold them: the record of each, and its leaf's box.

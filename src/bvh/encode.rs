@@ -122,6 +122,11 @@ impl Encode {
         count.div_ceil(self.shape.workgroup * self.items)
     }
 
+    /// Workgroups that share the tiles, where only the device knows how many have something to do.
+    pub fn shared_tiles(&self) -> u32 {
+        self.tiles().min(self.sharers)
+    }
+
     /// Specialisation constants 1 to 4 of every kernel.
     fn constants(&self) -> [u32; 4] {
         self.shape.constants(self.items | u32::from(self.meets_in_group) << 16, self.key_words())

@@ -4,25 +4,23 @@
 
 use super::encode::Encode;
 use super::geometry::Input;
-use crate::gpu::arguments;
-use crate::gpu::{Step, shaders};
+use super::method::Hierarchy;
+use crate::gpu::{Kernel, Step, arguments, shaders};
 
-/// The dispatch behind [`Encode::steps`]. Label: `hierarchy`.
-pub(super) fn steps(encode: &Encode, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
-    let kernel = encode.reading_kernel(&shaders::BVH_LBVH_HIERARCHY, input);
-    vec![Step::new("hierarchy", kernel, arguments, encode.tiles())]
-}
+pub(super) struct Lbvh;
 
-/// The whole build by `workers` workgroups of one dispatch. Label: `build`.
-pub(super) fn persistent_steps(
-    encode: &Encode,
-    input: &Input,
-    arguments: &arguments::Build,
-    workers: u32,
-) -> Vec<Step> {
-    let (reset, all) = (&shaders::BVH_LBVH_RESET, &shaders::BVH_LBVH_PERSISTENT);
-    vec![
-        Step::new("build", encode.reset_kernel(reset), arguments, 1),
-        Step::new("build", encode.reading_kernel(all, input), arguments, workers),
-    ]
+impl Hierarchy for Lbvh {
+    fn steps(&self, encode: &Encode, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
+        let kernel = encode.reading_kernel(&shaders::BVH_LBVH_HIERARCHY, input);
+        vec![Step::new("hierarchy", kernel, arguments, encode.tiles())]
+    }
+
+    fn persistent(&self, encode: &Encode, input: &Input) -> [Kernel; 2] {
+        let all = encode.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input);
+        [encode.reset_kernel(&shaders::BVH_LBVH_RESET), all]
+    }
+
+    fn scratch_bytes(&self, _count: u64) -> u64 {
+        0
+    }
 }

@@ -24,6 +24,7 @@ mod hploc;
 pub mod layout;
 mod lbvh;
 pub(crate) mod lbvh_workgroup;
+mod method;
 mod ploc;
 pub mod quality;
 pub mod refit;
@@ -33,3 +34,8 @@ pub mod split;
 pub mod twin;
 pub mod validate;
 pub mod wide;
+
+/// Bytes of so many clusters: `Cluster` in clusters.glsl.
+const fn clusters_bytes(count: u64) -> u64 {
+    40 * count
+}

@@ -3,10 +3,11 @@
 //! `glsl/bvh/ploc.glsl` is the device's side; the twin is [`super::twin::ploc`] with
 //! [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
+use super::clusters_bytes;
 use super::encode::Encode;
 use super::geometry::Input;
-use crate::gpu::arguments;
-use crate::gpu::{Kernel, Step, shaders};
+use super::method::Hierarchy;
+use crate::gpu::{Kernel, Step, arguments, shaders};
 
 /// Clusters that one workgroup finishes in less time than rounds of all take.
 const FINISH: u32 = 2048;
@@ -23,11 +24,6 @@ fn rounds(count: u32) -> u32 {
         rounds += 1;
     }
     rounds
-}
-
-/// The workgroups of a round, which share its tiles.
-fn groups(encode: &Encode) -> u32 {
-    encode.tiles().min(encode.sharers)
 }
 
 /// The kernels of a build with this radius.
@@ -63,10 +59,10 @@ impl Kernels<'_> {
         let Kernels { encode, .. } = self;
         let round = |round| {
             [
-                (&shaders::BVH_PLOC_SEARCH, groups(encode)),
-                (&shaders::BVH_PLOC_COUNT, groups(encode)),
+                (&shaders::BVH_PLOC_SEARCH, encode.shared_tiles()),
+                (&shaders::BVH_PLOC_COUNT, encode.shared_tiles()),
                 (&shaders::BVH_PLOC_SCAN, 1),
-                (&shaders::BVH_PLOC_MERGE, groups(encode)),
+                (&shaders::BVH_PLOC_MERGE, encode.shared_tiles()),
             ]
             .map(|(shader, groups)| (self.of_round(shader, round), groups))
         };
@@ -77,21 +73,29 @@ impl Kernels<'_> {
     }
 }
 
-/// The dispatches behind [`Encode::steps`]. Label: `hierarchy`.
-pub(super) fn steps(encode: &Encode, radius: u32, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
-    let chain = Kernels { encode, input, radius }.chain();
-    chain.into_iter().map(|(kernel, groups)| Step::new("hierarchy", kernel, arguments, groups)).collect()
+/// Looks at so many neighbours on either side.
+pub(super) struct Ploc {
+    pub radius: u32,
 }
 
-/// The whole build by `workers` workgroups of one dispatch. Label: `build`.
-pub(super) fn persistent_steps(
-    encode: &Encode,
-    radius: u32,
-    input: &Input,
-    arguments: &arguments::Build,
-    workers: u32,
-) -> Vec<Step> {
-    let kernels = Kernels { encode, input, radius };
-    let step = |shader, groups| Step::new("build", kernels.of_pool(shader), arguments, groups);
-    vec![step(&shaders::BVH_PLOC_RESET, 1), step(&shaders::BVH_PLOC_PERSISTENT, workers)]
+impl Ploc {
+    fn kernels<'a>(&self, encode: &'a Encode, input: &'a Input) -> Kernels<'a> {
+        Kernels { encode, input, radius: self.radius }
+    }
+}
+
+impl Hierarchy for Ploc {
+    fn steps(&self, encode: &Encode, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
+        let chain = self.kernels(encode, input).chain();
+        chain.into_iter().map(|(kernel, groups)| Step::new("hierarchy", kernel, arguments, groups)).collect()
+    }
+
+    fn persistent(&self, encode: &Encode, input: &Input) -> [Kernel; 2] {
+        let kernels = self.kernels(encode, input);
+        [&shaders::BVH_PLOC_RESET, &shaders::BVH_PLOC_PERSISTENT].map(|shader| kernels.of_pool(shader))
+    }
+
+    fn scratch_bytes(&self, count: u64) -> u64 {
+        clusters_bytes(count)
+    }
 }

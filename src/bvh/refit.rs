@@ -123,7 +123,7 @@ impl Refit {
         let &Options { costs, schedule, primitives, geometry_count, is_split } = options;
         if is_split {
             return Err(Error::Argument(
-                "a structure with split triangles cannot be updated: build it anew, or build it without split".into(),
+                "a structure with split triangles cannot be updated; build it again, or build it without split".into(),
             ));
         }
         let (tuning, workgroup) = (&context.tuning.refit, context.tuning.group);

@@ -1,6 +1,6 @@
 //! The surface area heuristic: costs, and when a subtree is cheaper as a leaf.
 
-use super::layout::Aabb;
+use crate::geometry::Aabb;
 
 /// Whether and by which costs subtrees are collapsed into leaves (Meister and Bittner 2018, section 4; Frantál 2019, 3.6).
 #[derive(Debug, Clone, Copy, PartialEq)]

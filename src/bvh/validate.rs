@@ -1,8 +1,9 @@
 //! Walks a structure on the host and says what is wrong and where.
 
 use super::cover::Parts;
-use super::layout::{Aabb, Bvh2, Child, Header, Instance, MAX_DEPTH, Record, node_slots};
+use super::layout::{Bvh2, Child, Header, Instance, MAX_DEPTH, Record, node_slots};
 use super::twin::split::around_parts;
+use crate::geometry::Aabb;
 use crate::{Error, Result};
 
 impl<R: Record> Bvh2<R> {

@@ -19,7 +19,8 @@
 //!
 //! A cell is what is left of the box in the header where the planes of the nodes above have cut it.
 
-use crate::bvh::layout::{self as bvh, Aabb, GeometryEntry, Triangle};
+use crate::bvh::layout::{self as bvh, GeometryEntry, Triangle};
+use crate::geometry::Aabb;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;

@@ -1,8 +1,8 @@
 //! Quality of a kd-tree: SAH cost, depth and leaf statistics, by a walk on the host.
 
 use super::layout::{Content, KdTree};
-use crate::bvh::layout::Aabb;
 use crate::bvh::quality::Quality;
+use crate::geometry::Aabb;
 
 /// The quality of `tree` with these costs of a step and of a test. Areas are those of the cells; empty leaves count in the mean
 /// depth. An empty tree has one empty leaf and costs nothing.

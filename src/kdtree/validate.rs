@@ -2,7 +2,8 @@
 
 use super::layout::{Content, Inner, KdTree, MAX_DEPTH};
 use crate::bvh::cover::{Polygon, clipped};
-use crate::bvh::layout::{Aabb, Triangle};
+use crate::bvh::layout::Triangle;
+use crate::geometry::Aabb;
 use crate::{Error, Result};
 
 impl KdTree {

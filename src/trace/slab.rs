@@ -26,7 +26,8 @@
 //! triangle; every point is in one.
 
 use super::ray::PreparedRay;
-use crate::bvh::layout::{Aabb, SLACK};
+use crate::bvh::layout::SLACK;
+use crate::geometry::Aabb;
 
 /// By how much boxes are widened whose corners are no farther from the origin along any axis; finite, that no box beyond the
 /// floats' end makes it a NaN.

@@ -8,20 +8,21 @@ use crate::common::device;
 use crate::common::geometries::Owned;
 use crate::common::matrices::{moved, rotation, scaled};
 use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, Report};
-use crate::common::shapes::{Corners, Random, boxes, soup};
+use crate::common::shapes::{Corners, boxes, soup};
 use crate::common::world::{BuiltWorld, Part, World, bottom_level, instances_at, top_level};
 use hedgerow::accel::Instance;
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::{Bvh2, Child, Header, Instance as Placed, NODES_OFFSET, Triangle, status};
+use hedgerow_lab::random::SplitMix64;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
 type Range = vk::AccelerationStructureBuildRangeInfoKHR;
 
 fn rays(count: usize) -> Vec<ProbeRay> {
-    let mut random = Random(5);
+    let mut random = SplitMix64::new(5);
     let ray = |i: usize| {
-        let (origin, target) = (random.point(4.0), random.point(1.0));
+        let (origin, target) = (random.around(4.0), random.around(1.0));
         let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
         ProbeRay { decision: [CONFIRM, IGNORE][i % 2], generated_t: 0.0, ..ray }
     };
@@ -90,7 +91,7 @@ fn triangles_with_bad_vertices_or_indices_are_left_out_and_told_of() {
 #[test]
 fn random_bits_as_vertices_make_valid_trees() {
     let ours = Ours::on(device());
-    let mut random = Random(6);
+    let mut random = SplitMix64::new(6);
     let rays = rays(64);
     for round in 0..60 {
         let count = 20 + 10 * (round % 4);
@@ -132,7 +133,7 @@ fn instances_that_cannot_be_are_left_out_and_told_of() {
     let world = World::new(parts, vec![Instance::new(1, rotation(1)), Instance::new(2, rotation(2))]);
     let good = world.build(&ours);
     let placed = world.placed(&ours, &good.parts);
-    let mut random = Random(3);
+    let mut random = SplitMix64::new(3);
     let noise: Vec<u32> = (0..1024).map(|_| random.bits() as u32).collect();
     let buffers =
         [noise, vec![0; 1024], vec![u32::MAX; 1024]].map(|w| device().upload("no structure", &w).expect("memory"));
@@ -187,7 +188,7 @@ fn instances_that_cannot_be_are_left_out_and_told_of() {
 }
 
 /// A structure's bytes after somebody else used its memory.
-fn overwritten(bytes: &[u8], how: usize, random: &mut Random) -> Vec<u8> {
+fn overwritten(bytes: &[u8], how: usize, random: &mut SplitMix64) -> Vec<u8> {
     let header: Header = bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()]);
     let mut noise = |from: usize, to: usize, bytes: &mut [u8]| bytes[from..to].fill_with(|| random.bits() as u8);
     let mut out = bytes.to_vec();
@@ -229,7 +230,7 @@ const NOTHING_LEFT: usize = 5;
 #[test]
 fn queries_of_overwritten_bottom_levels_end() {
     let ours = Ours::on(device());
-    let mut random = Random(11);
+    let mut random = SplitMix64::new(11);
     let rays = rays(128);
     for part in [
         Part::Triangles(vec![(soup(200, 0.4, 1), GeometryFlags::OPAQUE), (soup(100, 0.4, 4), GeometryFlags::empty())]),
@@ -269,9 +270,9 @@ fn queries_of_overwritten_bottom_levels_end() {
 #[test]
 fn queries_of_overwritten_top_levels_end() {
     let ours = Ours::on(device());
-    let mut random = Random(12);
+    let mut random = SplitMix64::new(12);
     let part = Part::Triangles(vec![(soup(50, 0.4, 3), GeometryFlags::OPAQUE)]);
-    let instances = (0..60).map(|i| Instance::new(1, moved(rotation(i), random.point(1.0)))).collect();
+    let instances = (0..60).map(|i| Instance::new(1, moved(rotation(i), random.around(1.0)))).collect();
     let world = World::new(vec![part], instances);
     let built = world.build(&ours);
     let original = built.top.memory.read::<u8>(built.top.bytes as usize);

@@ -3,7 +3,7 @@
 use crate::common::backends::{Backend, Built, Ours, backends, vk_format, vk_geometry};
 use crate::common::device;
 use crate::common::geometries::{MOVED, Owned};
-use crate::common::shapes::{Corners, Random, ray, soup};
+use crate::common::shapes::{Corners, ray, soup};
 use hedgerow::accel;
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
@@ -15,6 +15,7 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
 use hedgerow::trace::twin::tracer::closest_hit_by_brute_force;
 use hedgerow::trace::{Hit, Ray};
+use hedgerow_lab::random::SplitMix64;
 
 type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
 type Range = vk::AccelerationStructureBuildRangeInfoKHR;
@@ -37,7 +38,7 @@ fn on_the_host(geometries: &[Owned]) -> Bvh2 {
 
 /// Rays to random points of random triangles, from around them.
 fn rays_to(tree: &Bvh2, count: usize) -> Vec<Ray> {
-    let mut random = Random(17);
+    let mut random = SplitMix64::new(17);
     let bounds = tree.header.root.bounds();
     let radius = bounds.diagonal();
     (0..count)
@@ -45,7 +46,7 @@ fn rays_to(tree: &Bvh2, count: usize) -> Vec<Ray> {
             let t = &tree.records[random.bits() as usize % tree.header.active as usize];
             let (u, v) = (0.5 * random.signed().abs(), 0.5 * random.signed().abs());
             let target: [f32; 3] = std::array::from_fn(|k| t.v0[k] + u * (t.v1[k] - t.v0[k]) + v * (t.v2[k] - t.v0[k]));
-            let out = random.point(radius);
+            let out = random.around(radius);
             let origin: [f32; 3] = std::array::from_fn(|k| bounds.centroid()[k] + out[k]);
             ray(origin, std::array::from_fn(|k| target[k] - origin[k]))
         })

@@ -5,12 +5,13 @@ use crate::common::backends::{Backend, Built, Ours, backends};
 use crate::common::device;
 use crate::common::matrices::{rotation, scaled};
 use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, flags};
-use crate::common::shapes::{Random, boxes, soup};
+use crate::common::shapes::{boxes, soup};
 use crate::common::world::{Part, World, bottom_level, top_level};
 use hedgerow::accel::Instance;
 use hedgerow::ash::vk;
 use hedgerow::bvh::layout::{BoxRecord, Bvh2, status};
 use hedgerow_lab::device::Buffer;
+use hedgerow_lab::random::SplitMix64;
 use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
 
 type Range = vk::AccelerationStructureBuildRangeInfoKHR;
@@ -121,9 +122,9 @@ fn built(backend: &dyn Backend, given: &[(Vec<u8>, u64, Range, GeometryFlags)]) 
 }
 
 fn rays(count: usize) -> Vec<ProbeRay> {
-    let mut random = Random(77);
+    let mut random = SplitMix64::new(77);
     let ray = |i: usize| {
-        let (origin, target) = (random.point([3.0, 0.8][i % 2]), random.point(0.9));
+        let (origin, target) = (random.around([3.0, 0.8][i % 2]), random.around(0.9));
         let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
         let decision = [IGNORE, CONFIRM][i / 2 % 2];
         let flags = [flags::NONE, flags::OPAQUE, flags::NO_OPAQUE, flags::CULL_OPAQUE, flags::CULL_NO_OPAQUE][i % 5];
@@ -201,10 +202,10 @@ fn a_generated_hit_lies_where_the_shader_says_among_triangles() {
     ];
     let instances = vec![Instance::new(1, rotation(7)), Instance::new(2, rotation(8)), Instance::new(2, rotation(9))];
     let world = World::new(parts, instances);
-    let mut random = Random(12);
+    let mut random = SplitMix64::new(12);
     let rays: Vec<ProbeRay> = (0..900)
         .map(|i| {
-            let (origin, target) = (random.point(3.0), random.point(0.7));
+            let (origin, target) = (random.around(3.0), random.around(0.7));
             let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
             ProbeRay { generated_t: [0.0, 0.4, 0.6, 0.8, 1.0, 4.0][i % 6], ..ray }
         })

@@ -4,7 +4,7 @@ use crate::common::backends::{Backend, Built, Copies, Drivers, Ours, vk_geometry
 use crate::common::device;
 use crate::common::geometries::Owned;
 use crate::common::probe::{CONFIRM_ODD, ProbeRay, Report};
-use crate::common::shapes::{Corners, Random, hard_rays, ray, soup, tree_with};
+use crate::common::shapes::{Corners, hard_rays, ray, soup, tree_with};
 use crate::common::world::{Part, World};
 use hedgerow::accel::serialize::Head;
 use hedgerow::accel::{self, Property};
@@ -13,13 +13,15 @@ use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::builder::{Builder, Options};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, VertexFormat};
-use hedgerow::bvh::layout::{Aabb, BoxRecord, Bvh2, Child, Header, Instance, Record, status};
+use hedgerow::bvh::layout::{BoxRecord, Bvh2, Child, Header, Instance, Record, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
+use hedgerow::geometry::Aabb;
 use hedgerow::gpu::Recorder;
 use hedgerow::trace::twin::tracer::closest_hit;
 use hedgerow::trace::{Hit, Ray};
 use hedgerow_lab::device::{Buffer, DriverTracing};
+use hedgerow_lab::random::SplitMix64;
 
 type Mode = vk::CopyAccelerationStructureModeKHR;
 
@@ -401,7 +403,7 @@ fn world() -> World {
         Part::Triangles(vec![(triangles[..200].to_vec(), opaque), (triangles[200..].to_vec(), asked)]),
         Part::Boxes(vec![(boxes, asked)]),
     ];
-    let mut random = Random(31);
+    let mut random = SplitMix64::new(31);
     let instances = (0..40)
         .map(|i| {
             let turn = |row: usize| -> [f32; 4] {
@@ -415,10 +417,10 @@ fn world() -> World {
 }
 
 fn probe_rays() -> Vec<ProbeRay> {
-    let mut random = Random(8);
+    let mut random = SplitMix64::new(8);
     (0..2000)
         .map(|_| {
-            let (origin, target) = (random.point(8.0), random.point(4.0));
+            let (origin, target) = (random.around(8.0), random.around(4.0));
             let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
             ProbeRay { decision: CONFIRM_ODD, generated_t: 0.75, ..ray }
         })
@@ -520,7 +522,7 @@ fn what_another_version_wrote_is_an_empty_structure_that_says_so() {
 #[test]
 fn what_is_no_structure_is_copied_as_nothing() {
     let noise: Vec<u8> = {
-        let mut random = Random(4);
+        let mut random = SplitMix64::new(4);
         (0..4096).map(|_| random.bits() as u8).collect()
     };
     for content in [noise, vec![0; 4096]] {
@@ -718,10 +720,10 @@ fn hits_of_copies(backend: &dyn Copies, corners: &Corners, rays: &[Ray]) -> [Vec
 #[test]
 fn the_same_calls_of_the_driver_give_the_same_hits() {
     let corners = soup(2000, 0.5, 12);
-    let mut random = Random(9);
+    let mut random = SplitMix64::new(9);
     let rays: Vec<Ray> = (0..2000)
         .map(|_| {
-            let (origin, target) = (random.point(2.0), random.point(1.0));
+            let (origin, target) = (random.around(2.0), random.around(1.0));
             ray(origin, std::array::from_fn(|k| target[k] - origin[k]))
         })
         .collect();

@@ -6,13 +6,14 @@ use crate::common::device;
 use crate::common::geometries::Owned;
 use crate::common::matrices::{moved, rotation};
 use crate::common::probe::{CONFIRM, IGNORE, ProbeRay};
-use crate::common::shapes::{Corners, Random, soup};
+use crate::common::shapes::{Corners, soup};
 use crate::common::world::{Part, World, bottom_level};
 use hedgerow::accel::Instance;
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::{Bvh2, Triangle};
 use hedgerow_lab::device::Buffer;
+use hedgerow_lab::random::SplitMix64;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
 type Range = vk::AccelerationStructureBuildRangeInfoKHR;
@@ -66,9 +67,9 @@ fn built(backend: &dyn Backend, nothing: Nothing) -> (Built, Vec<Buffer<'static>
 }
 
 fn rays() -> Vec<ProbeRay> {
-    let mut random = Random(4);
+    let mut random = SplitMix64::new(4);
     let ray = |i: usize| {
-        let (origin, target) = (random.point(3.0), random.point(1.0));
+        let (origin, target) = (random.around(3.0), random.around(1.0));
         let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
         ProbeRay { decision: [CONFIRM, IGNORE][i % 2], ..ray }
     };

@@ -5,11 +5,12 @@ use crate::common::backends::{backends, vk_geometry};
 use crate::common::geometries::Owned;
 use crate::common::matrices::{moved, rotation, scaled};
 use crate::common::probe::{ProbeRay, flags};
-use crate::common::shapes::{Corners, Random, icosphere, onto_sphere, soup};
+use crate::common::shapes::{Corners, icosphere, onto_sphere, soup};
 use crate::common::world::{Part, World, bottom_level};
 use hedgerow::accel::Instance;
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
+use hedgerow_lab::random::SplitMix64;
 use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
 
 #[test]
@@ -73,8 +74,8 @@ fn a_sphere_shows_its_front_outside_and_its_back_inside_even_when_it_is_mirrored
             for instance_flags in kinds {
                 let instance = Instance::new(1, matrix).with_offset_and_flags(0, instance_flags);
                 let world = World::new(vec![sphere.clone()], vec![instance]);
-                let mut random = Random(6);
-                let through: Vec<[f32; 3]> = (0..60).map(|_| onto_sphere(random.point(1.0))).collect();
+                let mut random = SplitMix64::new(6);
+                let through: Vec<[f32; 3]> = (0..60).map(|_| onto_sphere(random.around(1.0))).collect();
                 // From far outside through a place near the centre: in at the front, out at the back.
                 let ray = |way: &[f32; 3]| ProbeRay::new(way.map(|x| -6.0 * x), way.map(|x| 1.01 * x + 0.003));
                 let culls = [flags::NONE, flags::CULL_BACK, flags::CULL_FRONT];
@@ -120,10 +121,10 @@ fn the_transform_of_a_geometry_that_mirrors_turns_its_triangles_round() {
         owned.transform = Some(matrix);
         let instances = vec![Instance::new(1, rotation(5)), Instance::new(1, scaled(rotation(6), [1.0, -1.0, 1.0]))];
         let world = World::new(vec![Part::Triangles(vec![(expected, GeometryFlags::OPAQUE)])], instances);
-        let mut random = Random(3);
+        let mut random = SplitMix64::new(3);
         let rays: Vec<ProbeRay> = (0..600)
             .map(|i| {
-                let (origin, way) = (random.point(4.0), random.point(1.0));
+                let (origin, way) = (random.around(4.0), random.around(1.0));
                 let towards = std::array::from_fn(|k| way[k] - origin[k]);
                 let flags = [flags::NONE, flags::CULL_BACK, flags::CULL_FRONT][i % 3];
                 ProbeRay { flags, ..ProbeRay::new(origin, towards) }

@@ -6,12 +6,13 @@ use crate::common::device;
 use crate::common::geometries::{MOVED, Owned};
 use crate::common::matrices::{moved, rotation};
 use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, Report};
-use crate::common::shapes::{Random, add, boxes, soup};
+use crate::common::shapes::{add, boxes, soup};
 use crate::common::world::{Part, World, instances_at};
 use hedgerow::accel::{Instance, REBRAID};
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::{Bvh2, Triangle};
+use hedgerow_lab::random::SplitMix64;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
 type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
@@ -67,9 +68,9 @@ fn bottom_level<'a>(geometries: &'a [vk::AccelerationStructureGeometryKHR<'a>]) 
 }
 
 fn rays(scale: f32) -> Vec<ProbeRay> {
-    let mut random = Random(9);
+    let mut random = SplitMix64::new(9);
     let ray = |i: usize| {
-        let (origin, target) = (random.point(3.0 * scale), random.point(0.8 * scale));
+        let (origin, target) = (random.around(3.0 * scale), random.around(0.8 * scale));
         let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
         ProbeRay { decision: [CONFIRM, IGNORE][i % 2], generated_t: 0.0, ..ray }
     };
@@ -182,8 +183,8 @@ fn instances_boxes_and_triangles_are_built_by_one_call() {
         Part::Triangles(vec![(soup(90, 0.3, 5), GeometryFlags::OPAQUE), (soup(60, 0.3, 6), GeometryFlags::empty())]),
         Part::Boxes(vec![(boxes(40, 0.2, 7), GeometryFlags::empty()), (boxes(9, 0.3, 8), GeometryFlags::OPAQUE)]),
     ];
-    let mut random = Random(1);
-    let instances = (0..50).map(|i| Instance::new(1 + i % 2, moved(rotation(i), random.point(1.0)))).collect();
+    let mut random = SplitMix64::new(1);
+    let instances = (0..50).map(|i| Instance::new(1 + i % 2, moved(rotation(i), random.around(1.0)))).collect();
     let world = World::new(parts, instances);
     let below = world.build(&ours);
     let placed = world.placed(&ours, &below.parts);

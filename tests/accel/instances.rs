@@ -5,11 +5,13 @@ use crate::common::backends::{Backend, Ours, backends};
 use crate::common::device;
 use crate::common::matrices::{Matrix, moved, rotation, scaled};
 use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, flags};
-use crate::common::shapes::{Corners, Random, boxes, icosphere, soup};
+use crate::common::shapes::{Corners, boxes, icosphere, soup};
 use crate::common::world::{Part, World, instances_at, top_level, transformed};
 use hedgerow::accel::Instance;
 use hedgerow::ash::vk;
-use hedgerow::bvh::layout::{Aabb, Bvh2, Instance as Placed};
+use hedgerow::bvh::layout::{Bvh2, Instance as Placed};
+use hedgerow::geometry::Aabb;
+use hedgerow_lab::random::SplitMix64;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
 type Range = vk::AccelerationStructureBuildRangeInfoKHR;
@@ -20,11 +22,11 @@ fn triangles(corners: Corners) -> Part {
 
 /// Rays in the space of an object in −1..1, brought to the world by its matrix: t stays what it is.
 fn rays_at(matrix: &Matrix, count: usize, seed: u64) -> Vec<ProbeRay> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let to_world = matrix.map(|row| row.map(f64::from));
     let bring = |p: [f32; 3], w| transformed(&to_world, p.map(f64::from), w).map(|x| x as f32);
     let ray = |i: usize| {
-        let (origin, target) = (random.point([3.0, 0.7][i / 2 % 2]), random.point(0.8));
+        let (origin, target) = (random.around([3.0, 0.7][i / 2 % 2]), random.around(0.8));
         let way = std::array::from_fn(|k| target[k] - origin[k]);
         let (flags, decision) = [(flags::SKIP_BOXES, CONFIRM), (flags::NO_OPAQUE, IGNORE)][i % 2];
         ProbeRay { flags, decision, ..ProbeRay::new(bring(origin, 1.0), bring(way, 0.0)) }
@@ -72,12 +74,12 @@ fn forest() -> World {
         [[0.3, -0.3, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 2.0]],
         [[0.0, 0.3, 0.0], [-0.3, -0.3, 0.0], [0.0, 0.0, 2.0]],
     ];
-    let mut random = Random(21);
+    let mut random = SplitMix64::new(21);
     let mut place = |i: u64| {
         let turn = std::f32::consts::PI * random.signed();
         let (s, c) = turn.sin_cos();
         let size = 1.0 + 0.5 * random.signed();
-        let [x, y, _] = random.point(150.0);
+        let [x, y, _] = random.around(150.0);
         let rows = [[c * size, -s * size, 0.0, x], [s * size, c * size, 0.0, y], [0.0, 0.0, size, 0.0]];
         Instance::new(1 + i % 2, rows).with_index_and_mask(i as u32, 1 << (i % 3))
     };
@@ -88,7 +90,7 @@ fn forest() -> World {
 #[test]
 fn twenty_thousand_instances_are_met_where_they_are() {
     let world = forest();
-    let mut random = Random(22);
+    let mut random = SplitMix64::new(22);
     let rays: Vec<ProbeRay> = (0..200)
         .map(|i| {
             // At a tree or stone: across a part of the forest and down into it.
@@ -114,10 +116,10 @@ fn shells_in_shells_are_met_in_their_order() {
     let spheres = sizes.iter().map(|&size| Instance::new(1, scaled(rotation(13), [size; 3])));
     let boxes = sizes.iter().map(|&size| Instance::new(2, scaled(rotation(14), [size; 3])));
     let world = World::new(vec![triangles(icosphere(2)), cubes], spheres.chain(boxes).collect());
-    let mut random = Random(15);
+    let mut random = SplitMix64::new(15);
     let rays: Vec<ProbeRay> = (0..500)
         .map(|i| {
-            let (origin, target) = (random.point([0.02, 0.6, 3.0][i % 3]), random.point(0.5));
+            let (origin, target) = (random.around([0.02, 0.6, 3.0][i % 3]), random.around(0.5));
             let way = std::array::from_fn(|k| target[k] - origin[k]);
             let (flags, decision) = [(flags::NONE, CONFIRM), (flags::NO_OPAQUE, IGNORE)][i / 3 % 2];
             let t_min = [0.0, 0.3][i / 6 % 2];
@@ -133,8 +135,8 @@ fn shells_in_shells_are_met_in_their_order() {
 #[test]
 fn instances_may_lie_scattered_or_behind_an_offset() {
     let parts = vec![triangles(soup(30, 0.5, 6)), triangles(soup(5, 0.9, 7))];
-    let mut random = Random(16);
-    let mut matrix = |i| moved(rotation(i), random.point(3.0));
+    let mut random = SplitMix64::new(16);
+    let mut matrix = |i| moved(rotation(i), random.around(3.0));
     let instances =
         (0..50).map(|i| Instance::new(1 + i % 2, matrix(i)).with_index_and_mask(i as u32 * 7, 0xff)).collect();
     let world = World::new(parts, instances);
@@ -221,7 +223,7 @@ fn a_bottom_level_is_queried_as_under_the_identity() {
 /// Every corner, moved in double precision, lies in the box of its entry; and the box is that of the object's box, at most.
 #[test]
 fn the_box_of_an_instance_holds_all_of_it_and_little_more() {
-    let mut random = Random(23);
+    let mut random = SplitMix64::new(23);
     let meshes = [soup(1, 1.0, 1), soup(20, 0.3, 2), icosphere(2), vec![[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]];
     let instances: Vec<Instance> = (0..2000)
         .map(|i| {
@@ -230,7 +232,7 @@ fn the_box_of_an_instance_holds_all_of_it_and_little_more() {
             let base = [rotation(i), Instance::IDENTITY, [(); 3].map(|()| [(); 4].map(|()| random.signed()))];
             let matrix = scaled(base[i as usize % 3], size);
             let away = [0.0, 1.0, 1e3, 1e6][i as usize / 3 % 4];
-            Instance::new(1 + random.bits() % 4, moved(matrix, random.point(away)))
+            Instance::new(1 + random.bits() % 4, moved(matrix, random.around(away)))
         })
         .collect();
     let world = World::new(meshes.iter().cloned().map(triangles).collect(), instances);

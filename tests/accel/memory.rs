@@ -6,11 +6,12 @@ use crate::common::device;
 use crate::common::geometries::Owned;
 use crate::common::matrices::{moved, rotation};
 use crate::common::probe::ProbeRay;
-use crate::common::shapes::{Corners, Random, boxes, soup};
+use crate::common::shapes::{Corners, boxes, soup};
 use crate::common::world::{Part, World, instances_at};
 use hedgerow::accel::{Instance, SCRATCH_ALIGNMENT};
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
+use hedgerow_lab::random::SplitMix64;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
 type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
@@ -25,9 +26,9 @@ fn at(device_address: u64) -> vk::DeviceOrHostAddressKHR {
 }
 
 fn rays(count: usize, seed: u64) -> Vec<ProbeRay> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let ray = |_| {
-        let (origin, target) = (random.point(3.0), random.point(0.8));
+        let (origin, target) = (random.around(3.0), random.around(0.8));
         ProbeRay { generated_t: 0.0, ..ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k])) }
     };
     (0..count).map(ray).collect()
@@ -45,8 +46,8 @@ fn one_scratch_memory_serves_all_builds_of_a_command_buffer() {
         Part::Triangles(Vec::new()),
         Part::Triangles(vec![(soup(1, 0.9, 6), GeometryFlags::OPAQUE)]),
     ];
-    let mut random = Random(7);
-    let instances = (0..40).map(|i| Instance::new(1 + i % 6, moved(rotation(i), random.point(1.0)))).collect();
+    let mut random = SplitMix64::new(7);
+    let instances = (0..40).map(|i| Instance::new(1 + i % 6, moved(rotation(i), random.around(1.0)))).collect();
     let world = World::new(parts, instances);
     let rays = rays(300, 8);
     for backend in backends() {
@@ -139,11 +140,11 @@ fn two_hundred_thousand_triangles_are_hit_where_they_are() {
         vec![Instance::new(1, Instance::IDENTITY)],
     );
     // From above to the middles of triangles: along the hills, and at random, most rays would be close calls.
-    let mut random = Random(10);
+    let mut random = SplitMix64::new(10);
     let rays: Vec<ProbeRay> = (0..48)
         .map(|_| {
             let [a, b, c] = hills[random.bits() as usize % hills.len()];
-            let [x, y, _] = random.point(1.0);
+            let [x, y, _] = random.around(1.0);
             ProbeRay::new([x, y, 2.0], std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0 - [x, y, 2.0][k]))
         })
         .collect();

@@ -5,10 +5,11 @@ use crate::common::backends::{Ours, backends};
 use crate::common::device;
 use crate::common::matrices::{rotation, scaled};
 use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, flags};
-use crate::common::shapes::{Random, boxes, soup};
+use crate::common::shapes::{boxes, soup};
 use crate::common::world::{Part, World};
 use hedgerow::accel::Instance;
 use hedgerow::ash::vk::GeometryFlagsKHR as GeometryFlags;
+use hedgerow_lab::random::SplitMix64;
 
 /// Triangles and boxes, each under the same matrix.
 fn world(transform: [[f32; 4]; 3]) -> World {
@@ -21,10 +22,10 @@ fn world(transform: [[f32; 4]; 3]) -> World {
 
 /// From outside and inside towards places inside, in units of `scale`; every other asks for candidates.
 fn rays(count: usize, scale: f32, length: f32, seed: u64) -> Vec<ProbeRay> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let ray = |i: usize| {
-        let origin = random.point([3.0, 0.5][i / 2 % 2] * scale);
-        let target = random.point(0.8 * scale);
+        let origin = random.around([3.0, 0.5][i / 2 % 2] * scale);
+        let target = random.around(0.8 * scale);
         let way: [f32; 3] = std::array::from_fn(|k| target[k] - origin[k]);
         let by = length / way.iter().map(|x| x * x).sum::<f32>().sqrt();
         let (flags, decision) = [(flags::SKIP_BOXES, CONFIRM), (flags::NO_OPAQUE, IGNORE)][i % 2];
@@ -53,7 +54,7 @@ fn directions_of_every_length_meet_the_same_places() {
 
 #[test]
 fn directions_along_axes_and_diagonals_meet_the_same_places() {
-    let mut random = Random(8);
+    let mut random = SplitMix64::new(8);
     let mut rays = Vec::new();
     for code in 0..5u32.pow(3) {
         // Zeros of both signs, and both ways along every axis.
@@ -63,7 +64,7 @@ fn directions_along_axes_and_diagonals_meet_the_same_places() {
             continue;
         }
         for i in 0..6 {
-            let inside = random.point(0.7);
+            let inside = random.around(0.7);
             let origin = std::array::from_fn(|k| inside[k] - [0.0, 4.0][i / 2 % 2] * direction[k]);
             let (flags, decision) = [(flags::SKIP_BOXES, CONFIRM), (flags::NO_OPAQUE, IGNORE)][i % 2];
             rays.push(ProbeRay { flags, decision, ..ProbeRay::new(origin, direction) });

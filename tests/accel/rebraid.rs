@@ -4,11 +4,12 @@ use crate::common::backends::{Backend, Ours};
 use crate::common::device;
 use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
 use crate::common::probe::{IGNORE, ProbeRay, flags};
-use crate::common::shapes::{Corners, Random, icosphere, placed, soup};
+use crate::common::shapes::{Corners, icosphere, placed, soup};
 use crate::common::world::World;
 use hedgerow::accel::{self, Instance, Options, REBRAID, twin};
 use hedgerow::ash::vk;
 use hedgerow::bvh::layout::{self, Bvh2, Triangle, status};
+use hedgerow_lab::random::SplitMix64;
 use std::collections::BTreeMap;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 
@@ -135,7 +136,7 @@ fn the_loose_are_opened_and_the_tight_are_not() {
 
 #[test]
 fn candidates_are_those_of_whole_instances() {
-    let mut random = Random(41);
+    let mut random = SplitMix64::new(41);
     let parts = vec![part(diagonal(60)), part(soup(50, 0.4, 3)), part(placed(&diagonal(90), 1.0, [0.2, 0.0, 0.0]))];
     let instances: Vec<Instance> = (0..60)
         .map(|i| {
@@ -147,9 +148,9 @@ fn candidates_are_those_of_whole_instances() {
     let opened = World { flags: REBRAID, ..whole.clone() };
     let rays: Vec<ProbeRay> = (0..2000)
         .map(|i| {
-            let origin = random.point(2.0);
+            let origin = random.around(2.0);
             // Some begin within the boxes, some run along the rows.
-            let to = if i % 2 == 0 { random.point(1.0) } else { origin.map(|x| -x) };
+            let to = if i % 2 == 0 { random.around(1.0) } else { origin.map(|x| -x) };
             let ray = ProbeRay::new(origin, std::array::from_fn(|k| to[k] - origin[k]));
             ProbeRay { flags: flags::NO_OPAQUE, decision: IGNORE, ..ray }
         })

@@ -3,14 +3,15 @@
 use crate::common::agree::assert_agrees;
 use crate::common::backends::backends;
 use crate::common::probe::{CONFIRM, CONFIRM_ODD, IGNORE, ProbeRay, TERMINATE, flags};
-use crate::common::shapes::{Random, boxes, soup};
+use crate::common::shapes::{boxes, soup};
 use crate::common::world::{Part, World, inverse};
 use hedgerow::accel::{Instance, REBRAID};
 use hedgerow::ash::vk;
+use hedgerow_lab::random::SplitMix64;
 use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
 
 /// A matrix that turns, shears, mirrors, scales and moves.
-fn moved(random: &mut Random) -> [[f32; 4]; 3] {
+fn moved(random: &mut SplitMix64) -> [[f32; 4]; 3] {
     loop {
         let m: [[f32; 4]; 3] =
             [(); 3].map(|()| [random.signed(), random.signed(), random.signed(), 4.0 * random.signed()]);
@@ -24,7 +25,7 @@ fn moved(random: &mut Random) -> [[f32; 4]; 3] {
 
 /// Three parts (two geometries of triangles, one of them opaque; one opaque; boxes) seen thirty times.
 fn world(seed: u64) -> World {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let parts = vec![
         Part::Triangles(vec![
             (soup(20, 0.5, seed), GeometryFlags::OPAQUE),
@@ -59,10 +60,10 @@ fn world(seed: u64) -> World {
 }
 
 fn rays(seed: u64, count: usize) -> Vec<ProbeRay> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let ray = |_| {
-        let origin = random.point(6.0);
-        let target = random.point(3.0);
+        let origin = random.around(6.0);
+        let target = random.around(3.0);
         let scale = 10f32.powf(2.0 * random.signed());
         ProbeRay::new(origin, std::array::from_fn(|k| scale * (target[k] - origin[k])))
     };

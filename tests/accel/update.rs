@@ -4,10 +4,11 @@ use crate::common::agree::assert_reports;
 use crate::common::backends::{Backend, Built, backends};
 use crate::common::device;
 use crate::common::probe::ProbeRay;
-use crate::common::shapes::{Random, boxes, soup};
+use crate::common::shapes::{boxes, soup};
 use crate::common::world::{Part, World};
 use hedgerow::accel::Instance;
 use hedgerow::ash::vk;
+use hedgerow_lab::random::SplitMix64;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 use vk::BuildAccelerationStructureModeKHR as Mode;
 use vk::GeometryFlagsKHR as GeometryFlags;
@@ -43,9 +44,9 @@ fn update(backend: &dyn Backend, info: BuildInfo<'_>, ranges: &[Range], source: 
 }
 
 fn rays(seed: u64) -> Vec<ProbeRay> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let ray = |_| {
-        let (origin, target) = (random.point(8.0), random.point(1.2));
+        let (origin, target) = (random.around(8.0), random.around(1.2));
         ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]))
     };
     (0..250).map(ray).collect()
@@ -162,10 +163,10 @@ fn indices_and_transforms_may_be_others() {
 
 #[test]
 fn top_levels_follow_their_instances() {
-    let mut random = Random(3);
+    let mut random = SplitMix64::new(3);
     let mut placed = |count: usize| -> Vec<Instance> {
         let one = |i: usize| {
-            let [x, y, z] = random.point(4.0);
+            let [x, y, z] = random.around(4.0);
             let s = 0.5 + random.signed().abs();
             let transform = [[0.0, -s, 0.0, x], [s, 0.0, 0.1, y], [0.0, 0.0, s, z]];
             let index = random.bits() as u32 & 0xff_ffff;

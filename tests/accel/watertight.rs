@@ -4,10 +4,11 @@
 use crate::common::backends::{Backend, backends};
 use crate::common::matrices::{Matrix, moved, rotation};
 use crate::common::probe::{CONFIRM, IGNORE, ProbeRay};
-use crate::common::shapes::{Corners, Random};
+use crate::common::shapes::Corners;
 use crate::common::world::{Part, World, transformed};
 use hedgerow::accel::Instance;
 use hedgerow::ash::vk::GeometryFlagsKHR as GeometryFlags;
+use hedgerow_lab::random::SplitMix64;
 
 /// A surface and places on it where rays must not pass: vertices and points of edges, none of them on its border.
 struct Surface {
@@ -23,12 +24,12 @@ fn between(a: [f32; 3], b: [f32; 3], part: f32) -> [f32; 3] {
 /// The square 0..1 in 2·`w`·`h` triangles, whose vertices inside are moved about in its plane by a part of a cell, and which
 /// is scaled and then moved; all of it in float32, so that neighbours share their corners' bits.
 fn square(w: usize, h: usize, jitter: f32, scale: f32, to: [f32; 3], seed: u64) -> Surface {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let mut vertices = Vec::new();
     for j in 0..=h {
         for i in 0..=w {
             let inside = (0 < i && i < w && 0 < j && j < h) as u8 as f32;
-            let [a, b, _] = random.point(jitter * inside);
+            let [a, b, _] = random.around(jitter * inside);
             let at = [(i as f32 + a) / w as f32, (j as f32 + b) / h as f32, 0.0];
             vertices.push(std::array::from_fn(|k| at[k] * scale + to[k]));
         }
@@ -54,7 +55,7 @@ fn square(w: usize, h: usize, jitter: f32, scale: f32, to: [f32; 3], seed: u64) 
 
 /// `count` triangles around a vertex, on a cone that is flatter than any ray.
 fn fan(count: usize, scale: f32, to: [f32; 3], seed: u64) -> Surface {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let place = |at: [f32; 3]| std::array::from_fn(|k| at[k] * scale + to[k]);
     let rim: Vec<[f32; 3]> = (0..count)
         .map(|i| {
@@ -72,13 +73,13 @@ fn fan(count: usize, scale: f32, to: [f32; 3], seed: u64) -> Surface {
 
 /// Two rays to each of some places: straight down, exactly through what is a vertex, and from anywhere above.
 fn rays(surface: &Surface, scale: f32, count: usize) -> Vec<(ProbeRay, [f32; 3])> {
-    let mut random = Random(surface.places.len() as u64);
+    let mut random = SplitMix64::new(surface.places.len() as u64);
     let mut all = Vec::new();
     for i in 0..count.min(surface.places.len()) {
         let at = if surface.places.len() <= count { i } else { random.bits() as usize % surface.places.len() };
         let target = surface.places[at];
         let above = [target[0], target[1], target[2] + scale];
-        let [x, y, z] = random.point(scale);
+        let [x, y, z] = random.around(scale);
         let beside = [target[0] + x, target[1] + y, target[2] + 0.5 * scale + z.abs()];
         all.push((ProbeRay::new(above, [0.0, 0.0, -1.0 / 3.0]), target));
         all.push((ProbeRay::new(beside, std::array::from_fn(|k| target[k] - beside[k])), target));

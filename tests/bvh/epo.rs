@@ -1,12 +1,13 @@
 //! End-point overlap on the device against that on the host, which cuts polygons in double precision.
 
-use crate::common::shapes::{Corners, Random, icosphere, placed, soup, tree_with};
+use crate::common::shapes::{Corners, icosphere, placed, soup, tree_with};
 use crate::common::{corpus, device};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::epo::{Buffers, Figures, OnDevice};
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
+use hedgerow_lab::random::SplitMix64;
 
 /// In pieces of so many records.
 fn on_device(tree: &Bvh2, piece: u32) -> Figures {
@@ -74,7 +75,7 @@ fn scale_and_place_change_nothing() {
 #[test]
 fn the_order_of_records_and_slots_does_not_matter() {
     let tree = tree_with(&soup(500, 0.3, 3), Collapse::OFF);
-    let mut random = Random(5);
+    let mut random = SplitMix64::new(5);
     let mut shuffled = |count: usize| {
         let mut order: Vec<u32> = (0..count as u32).collect();
         (1..count).rev().for_each(|i| order.swap(i, random.bits() as usize % (i + 1)));

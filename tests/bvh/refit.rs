@@ -3,20 +3,22 @@
 use crate::common::corpus::unit_floats;
 use crate::common::geometries::{MOVED, Owned};
 use crate::common::probe::{self, Probe, ProbeRay};
-use crate::common::shapes::{Corners, Random, hard_rays, soup};
+use crate::common::shapes::{Corners, hard_rays, soup};
 use crate::common::{corpus, device};
 use hedgerow::bvh::builder::{self, Builder};
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, VertexFormat};
-use hedgerow::bvh::layout::{Aabb, BoxRecord, Bvh2, Child, Instance, Record, Triangle, status};
+use hedgerow::bvh::layout::{BoxRecord, Bvh2, Child, Instance, Record, Triangle, status};
 use hedgerow::bvh::refit::{Job, Options, Refit, Schedule};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
 use hedgerow::bvh::twin::quality;
+use hedgerow::geometry::Aabb;
 use hedgerow::trace::tracer::{self, Buffers, Shape};
 use hedgerow::trace::twin::tracer::closest_hit_by_brute_force;
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::device::Buffer;
+use hedgerow_lab::random::SplitMix64;
 
 const SIZES: [usize; 10] = [0, 1, 2, 3, 8, 9, 64, 65, 1000, 20_000];
 const SCHEDULES: [Schedule; 2] = [Schedule::Chain, Schedule::Workgroup];
@@ -288,7 +290,7 @@ fn what_the_build_left_out_stays_out() {
 #[test]
 fn indices_may_name_other_vertices() {
     let mesh = Mesh::random(1000);
-    let mut random = Random(9);
+    let mut random = SplitMix64::new(9);
     let triangles = mesh.triangles.iter().map(|t| t.map(|_| (random.bits() % 3000) as u32)).collect();
     let other = Mesh::new(mesh.positions.clone(), triangles);
     let refitted = assert_as_on_the_host("other indices", &mesh.built(Collapse::SAH), &other);
@@ -466,10 +468,10 @@ fn every_format_and_several_geometries_are_refitted_as_on_the_host() {
 }
 
 fn random_boxes(count: usize, seed: u64) -> Vec<Aabb> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     (0..count)
         .map(|i| {
-            let (a, b) = (random.point(1.0), random.point(0.1));
+            let (a, b) = (random.around(1.0), random.around(0.1));
             let lo = std::array::from_fn(|k| a[k] - b[k].abs());
             let hi = std::array::from_fn(|k| a[k] + b[k].abs());
             match (seed % 2, i % 50) {
@@ -578,9 +580,9 @@ struct Given {
 }
 
 fn world(count: usize, seed: u64, left_out: impl Fn(usize) -> u32) -> (Vec<Entry>, Vec<Given>) {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let instance = |i: usize| {
-        let (centre, half) = (random.point(9.0), random.point(1.0).map(|x| 0.1 + x.abs()));
+        let (centre, half) = (random.around(9.0), random.around(1.0).map(|x| 0.1 + x.abs()));
         let lo = std::array::from_fn(|k| centre[k] - half[k]);
         let hi = std::array::from_fn(|k| centre[k] + half[k]);
         let [x, y, z] = centre;

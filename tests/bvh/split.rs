@@ -6,12 +6,13 @@ use crate::common::twins::{assert_same, built, on_device, on_host};
 use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Source, Treelets, Window};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, Primitives};
-use hedgerow::bvh::layout::{Aabb, Bvh2};
+use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::split;
 use hedgerow::bvh::twin::split::around_parts;
 use hedgerow::bvh::wide::layout::{Wide4, Wide8, Wide8q};
 use hedgerow::bvh::{refit, reinsertion};
+use hedgerow::geometry::Aabb;
 use hedgerow::trace::twin::tracer;
 use hedgerow::trace::twin::wide as wide_host;
 use hedgerow::trace::wide::Order;
@@ -249,7 +250,7 @@ fn what_cannot_be_split_says_so() {
     assert!(error(&Options { schedule: Some(Schedule::Workgroup), ..options }).contains("choose chain, or none"));
 
     let refit = refit::Refit::new(device, &refit::Options::from(&options), 1000);
-    assert!(refit.expect_err("refused").to_string().contains("build it anew"));
+    assert!(refit.expect_err("refused").to_string().contains("build it again"));
 
     let builder = Builder::new(device, &options, 1000).unwrap();
     let once = Geometry { flags: GeometryFlags::NO_DUPLICATES, ..Geometry::mesh(256, 3000, 256) };

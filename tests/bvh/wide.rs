@@ -3,12 +3,13 @@
 use crate::common::{corpus, device};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::Primitives;
-use hedgerow::bvh::layout::{Aabb, Bvh2, Child, Header, Node, Record, Triangle, status};
+use hedgerow::bvh::layout::{Bvh2, Child, Header, Node, Record, Triangle, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::bvh::wide::device::{OnDevice, Options};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
+use hedgerow::geometry::Aabb;
 
 const GUARD: [u8; 256] = [0xA5; 256];
 

@@ -1,10 +1,11 @@
 //! Triangles in every format, in the host's memory and on the device.
 
 use super::device;
-use super::shapes::{Corners, Random};
+use super::shapes::Corners;
 use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, VertexFormat};
 use hedgerow::bvh::twin::geometry::HostGeometry;
 use hedgerow_lab::device::Buffer;
+use hedgerow_lab::random::SplitMix64;
 
 /// A matrix that turns, shears, mirrors and moves.
 pub const MOVED: [[f32; 4]; 3] = [[0.5, -2.0, 0.25, 10.0], [1.0, 0.75, 0.0, -0.3], [0.0, 0.1, -3.0, 1e-3]];
@@ -38,7 +39,7 @@ impl Owned {
         count: u32,
         seed: u64,
     ) -> Owned {
-        let mut random = Random(seed);
+        let mut random = SplitMix64::new(seed);
         let bytes = vertex_format.component_bytes();
         let vertex_stride = bytes * vertex_format.components() + padding;
         let vertex_count = if index_format == IndexFormat::NONE { 3 * count } else { 200 };

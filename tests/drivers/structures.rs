@@ -4,7 +4,7 @@ use crate::common::agree::{assert_agrees, assert_reports};
 use crate::common::backends::{Backend, Built, Copies, Ours};
 use crate::common::device;
 use crate::common::probe::{ProbeRay, ask_kd_tree};
-use crate::common::shapes::{Random, boxes, hard_rays, soup, tree_of};
+use crate::common::shapes::{boxes, hard_rays, soup, tree_of};
 use crate::common::world::{Part, World};
 use hedgerow::accel::{self, Instance, REBRAID};
 use hedgerow::ash::vk;
@@ -12,6 +12,7 @@ use hedgerow::bvh::layout::Bvh2;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::twin::kd as kd_host;
 use hedgerow_host::kdtree as host;
+use hedgerow_lab::random::SplitMix64;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 use vk::CopyAccelerationStructureModeKHR as CopyMode;
 use vk::GeometryFlagsKHR as GeometryFlags;
@@ -30,9 +31,9 @@ fn triangles(count: usize, seed: u64) -> Part {
 
 fn world(flags: Flags, count: usize) -> World {
     let parts = vec![triangles(60, 1), triangles(9, 3), Part::Boxes(vec![(boxes(40, 0.2, 5), GeometryFlags::empty())])];
-    let mut random = Random(7);
+    let mut random = SplitMix64::new(7);
     let instance = |i: usize| {
-        let [x, y, z] = random.point(3.0);
+        let [x, y, z] = random.around(3.0);
         let transform = [[1.0, 0.25, 0.0, x], [0.0, 0.5, 0.25, y], [0.25, 0.0, 1.5, z]];
         Instance::new(1 + i as u64 % 3, transform).with_index_and_mask(i as u32, 0xff)
     };
@@ -41,9 +42,9 @@ fn world(flags: Flags, count: usize) -> World {
 }
 
 fn rays(count: usize) -> Vec<ProbeRay> {
-    let mut random = Random(9);
+    let mut random = SplitMix64::new(9);
     let ray = |_| {
-        let (origin, target) = (random.point(8.0), random.point(2.0));
+        let (origin, target) = (random.around(8.0), random.around(2.0));
         ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]))
     };
     (0..count).map(ray).collect()

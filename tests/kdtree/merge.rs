@@ -2,7 +2,7 @@
 //! a trace.
 
 use crate::common::corpus;
-use crate::common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, soup, tree_of};
+use crate::common::shapes::{Corners, hard_rays, icosphere, placed, ray, soup, tree_of};
 use hedgerow::bvh::layout::status;
 use hedgerow::kdtree::layout::{Header, KdTree, MAX_DEPTH, Node, Room};
 use hedgerow::kdtree::termination::Costs;
@@ -12,6 +12,7 @@ use hedgerow::trace::twin::kd as kd_host;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow_host::kdtree::merge::Merged;
 use hedgerow_host::kdtree::{Options, build};
+use hedgerow_lab::random::SplitMix64;
 use proptest::prelude::*;
 
 const TRAVERSALS: [Traversal; 5] = [
@@ -208,7 +209,7 @@ proptest! {
         rounded in any::<bool>(),
         seed in any::<u64>(),
     ) {
-        let mut random = Random(seed);
+        let mut random = SplitMix64::new(seed);
         // Corners on a grid: planes that are common to all trees.
         let grid = |corners: Corners| -> Corners {
             let round = |x: f32| if rounded { (8.0 * x).round() / 8.0 } else { x };
@@ -218,7 +219,7 @@ proptest! {
             .iter()
             .map(|&(count, spread)| {
                 let scale = [0.05, 0.3, 1.0, 3.0][spread];
-                grid(placed(&soup(count, size, random.bits()), scale, random.point(1.0)))
+                grid(placed(&soup(count, size, random.bits()), scale, random.around(1.0)))
             })
             .collect();
         let world = World { still: grid(soup(still, size, random.bits())), objects };
@@ -251,13 +252,15 @@ fn the_order_of_insertion_changes_nothing_and_neither_does_what_was_taken_out() 
 fn ten_thousand_insertions_and_removals_leave_no_trace() {
     let world = World {
         still: room(),
-        objects: (0..8).map(|i| placed(&soup(6 + 2 * i, 0.3, i as u64), 0.5, Random(i as u64).point(1.2))).collect(),
+        objects: (0..8)
+            .map(|i| placed(&soup(6 + 2 * i, 0.3, i as u64), 0.5, SplitMix64::new(i as u64).around(1.2)))
+            .collect(),
     };
     let room = Room { nodes: 1 << 16, references: 1 << 16, records: 1 << 10 };
     let still = kd_tree_of(&world.still, &Options::EXACT).with_room(room).expect("room");
     let trees: Vec<KdTree> = world.objects.iter().map(|object| kd_tree_of(object, &Options::BINNED)).collect();
     let mut merged = merged_with(&world.still, room);
-    let mut random = Random(1);
+    let mut random = SplitMix64::new(1);
     let mut is_in = [false; 8];
     for step in 0..10_000 {
         let object = random.bits() as usize % 8;

@@ -2,7 +2,7 @@
 
 use crate::common::corpus::{self, Mesh};
 use crate::common::device;
-use crate::common::shapes::{Corners, Random, hard_rays, icosphere, placed, soup, tree_of};
+use crate::common::shapes::{Corners, hard_rays, icosphere, placed, soup, tree_of};
 use crate::common::twins::PLENTY_TO_MERGE;
 use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
@@ -14,6 +14,7 @@ use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::twin::kd as kd_host;
 use hedgerow::trace::twin::tracer::closest_hit;
 use hedgerow_lab::device::Buffer;
+use hedgerow_lab::random::SplitMix64;
 
 const PLENTY: Options = Options { build: builder::Options::DEFAULT, estimate: PLENTY_TO_MERGE };
 
@@ -318,8 +319,8 @@ fn hits_of_a_merged_tree_are_those_of_brute_force() {
 /// Objects come and go at random, merged by the schedules in turn; now and then the tree is looked at.
 fn rounds(count: u32, look: u32) {
     let sphere = placed(&icosphere(1), 0.2, [0.0; 3]);
-    let mut random = Random(11);
-    let objects = (0..6).map(|_| placed(&sphere, 1.0, random.point(0.6))).collect();
+    let mut random = SplitMix64::new(11);
+    let objects = (0..6).map(|_| placed(&sphere, 1.0, random.around(0.6))).collect();
     let world = World { name: "rounds", still: soup(300, 0.2, 12), objects };
     let mut scene = Scene::new(&world, &PLENTY);
     let before = scene.tree().to_bytes();

@@ -1,14 +1,13 @@
 //! The host tracer: its hits are those of brute force, bit for bit, and closed surfaces have no holes.
 
-use crate::common::shapes::{
-    Corners, Random, hard_rays, icosphere, placed, ray, rays_from_inside, soup, tree_of, tree_with,
-};
+use crate::common::shapes::{Corners, hard_rays, icosphere, placed, ray, rays_from_inside, soup, tree_of, tree_with};
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray};
+use hedgerow_lab::random::SplitMix64;
 use proptest::prelude::*;
 
 fn assert_hits_of_brute_force(corners: &Corners, rays: &[Ray]) {
@@ -45,7 +44,7 @@ proptest! {
     #[test]
     fn degenerate_triangles_change_nothing(count in 1usize..40, seed in any::<u64>()) {
         let mut corners = soup(count, 0.3, seed);
-        let mut random = Random(seed);
+        let mut random = SplitMix64::new(seed);
         for triangle in &mut corners {
             let [a, b, _] = *triangle;
             match random.bits() % 6 {

@@ -1,7 +1,7 @@
 //! kd-trees traced on the host: by every traversal the hits of brute force, bit for bit.
 
 use crate::common::corpus;
-use crate::common::shapes::{Corners, Random, hard_rays, icosphere, placed, ray, rays_from_inside, soup, tree_of};
+use crate::common::shapes::{Corners, hard_rays, icosphere, placed, ray, rays_from_inside, soup, tree_of};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::kdtree::layout::{Content, KdTree};
 use hedgerow::trace::kd::Traversal;
@@ -9,6 +9,7 @@ use hedgerow::trace::twin::kd as kd_host;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_host::kdtree::{Options, build};
+use hedgerow_lab::random::SplitMix64;
 use proptest::prelude::*;
 
 const TRAVERSALS: [Traversal; 9] = [
@@ -49,7 +50,7 @@ fn both(corners: &Corners) -> [KdTree; 2] {
 
 /// Rays that start on a plane of the tree, run in it, or nearly so.
 fn rays_in_planes(tree: &KdTree, seed: u64) -> Vec<Ray> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let cell = tree.header.cell();
     let mut rays = Vec::new();
     for node in &tree.nodes {
@@ -59,7 +60,7 @@ fn rays_in_planes(tree: &KdTree, seed: u64) -> Vec<Ray> {
             (1.0 - part) * cell.lo[i] + part * cell.hi[i]
         });
         origin[inner.axis] = [inner.plane, inner.plane.next_up(), inner.plane.next_down()][rays.len() % 3];
-        let mut direction = random.point(1.0);
+        let mut direction = random.around(1.0);
         if rays.len() % 5 < 3 {
             direction[inner.axis] = [0.0, -0.0, 1e-9][rays.len() % 5];
         }
@@ -96,7 +97,7 @@ proptest! {
     #[test]
     fn degenerate_triangles_change_nothing(count in 1usize..60, seed in any::<u64>()) {
         let mut corners = soup(count, 0.3, seed);
-        let mut random = Random(seed);
+        let mut random = SplitMix64::new(seed);
         for triangle in &mut corners {
             let [a, b, _] = *triangle;
             match random.bits() % 7 {
@@ -191,11 +192,11 @@ fn a_hit_counts_strictly_between_t_min_and_t_max() {
 fn rays_from_far_away_have_the_hits_of_brute_force() {
     for corners in [icosphere(4), soup(2000, 0.01, 31)] {
         let (bvh, tree) = (tree_of(&corners), kd_tree_of(&corners, &Options::EXACT));
-        let mut random = Random(32);
+        let mut random = SplitMix64::new(32);
         let mut hits = 0;
         for i in 0..3000 {
             let distance = 10f32.powi(1 + i % 6);
-            let origin = random.point(distance);
+            let origin = random.around(distance);
             let [a, b, c] = corners[random.bits() as usize % corners.len()];
             let part = random.signed().abs();
             let target: [f32; 3] = match i % 3 {

@@ -3,7 +3,7 @@
 use crate::common::device;
 use crate::common::probe::ask_kd_tree;
 use crate::common::shapes::{
-    Corners, Random, hard_rays, icosphere, no_rays, placed, ray, rays_from_the_middle, rays_with, soup, tree_of,
+    Corners, hard_rays, icosphere, no_rays, placed, ray, rays_from_the_middle, rays_with, soup, tree_of,
 };
 use crate::common::{corpus, shapes};
 use hedgerow::bvh::layout::status;
@@ -15,6 +15,7 @@ use hedgerow::trace::twin::kd as kd_host;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use hedgerow_host::kdtree::{Options, build};
+use hedgerow_lab::random::SplitMix64;
 
 const TRAVERSALS: [Traversal; 8] = [
     Traversal::STACK,
@@ -149,13 +150,13 @@ fn rays_in_planes_are_traced_as_on_the_host() {
     }
     for options in [Options::EXACT, Options::BINNED] {
         let tree = kd_tree_of(&corners, &options);
-        let mut random = Random(52);
+        let mut random = SplitMix64::new(52);
         let mut rays = Vec::new();
         for (i, node) in tree.nodes.iter().enumerate() {
             let Content::Inner(inner) = node.content() else { continue };
-            let mut origin = random.point(1.2);
+            let mut origin = random.around(1.2);
             origin[inner.axis] = [inner.plane, inner.plane.next_up(), inner.plane.next_down()][i % 3];
-            let mut direction = random.point(1.0);
+            let mut direction = random.around(1.0);
             direction[inner.axis] = [0.0, -0.0, 1e-9, -1e-9][i % 4];
             if i % 5 < 3 {
                 direction[(inner.axis + 1) % 3] = [0.0, -0.0, 1e-9][i % 5];
@@ -269,7 +270,7 @@ fn walks_of_overwritten_trees_end() {
     let corners = soup(60, 0.2, 61);
     let tree = kd_tree_of(&corners, &Options::BINNED);
     let rays = hard_rays(&corners, 64, 1.0, [0.0; 3], 62);
-    let mut random = Random(63);
+    let mut random = SplitMix64::new(63);
     for _ in 0..20 {
         let mut broken = tree.clone();
         for node in &mut broken.nodes {

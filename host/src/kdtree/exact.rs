@@ -11,7 +11,8 @@
 //! less.
 
 use super::Threads;
-use hedgerow::bvh::layout::{Aabb, Triangle};
+use hedgerow::bvh::layout::Triangle;
+use hedgerow::geometry::Aabb;
 use hedgerow::kdtree::layout::halves;
 use hedgerow::kdtree::twin::clip::{Plane, Reference, divided};
 use hedgerow::kdtree::twin::heuristic::{Heuristic, Split};

@@ -2,7 +2,8 @@
 
 use super::Subject;
 use crate::{Error, Result};
-use hedgerow::bvh::layout::{Aabb, Bvh2, Child, SLACK};
+use hedgerow::bvh::layout::{Bvh2, Child, SLACK};
+use hedgerow::geometry::Aabb;
 use hedgerow::kdtree::layout::{self as kd, KdTree};
 use hedgerow::trace::{Hit, Ray};
 use std::ops::Range;

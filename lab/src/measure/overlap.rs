@@ -45,7 +45,7 @@ impl FromStr for Epo {
             "off" => Ok(Epo::Off),
             "cheap" => Ok(Epo::WhereCheap),
             "on" => Ok(Epo::On),
-            _ => Err(format!("{text:?} is not known; take on, off, or cheap (given up after {:?} a tree)", Epo::CHEAP)),
+            _ => Err(format!("{text:?} is unknown; use on, off, or cheap (given up after {:?} a tree)", Epo::CHEAP)),
         }
     }
 }

@@ -4,10 +4,11 @@
 //! Every ray draws its random numbers from a sequence of its own, seeded with the kind and the ray's place. No library
 //! function whose last bit differs between systems takes part (points on the sphere by rejection, square roots only).
 
+use crate::random::SplitMix64;
 use crate::scene::{Camera, Light, Mesh, Scene};
 use crate::{Error, Result};
 use glam::{DVec3, Vec3};
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use hedgerow::trace::{Hit, Query, Ray};
 use rayon::prelude::*;
 use std::fmt;
@@ -78,7 +79,7 @@ impl FromStr for RayKind {
     fn from_str(name: &str) -> Result<RayKind> {
         RayKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
             let names = RayKind::ALL.map(RayKind::name).join(", ");
-            Error::Argument(format!("no kind of ray is called {name:?}; there are {names}"))
+            Error::Argument(format!("unknown kind of ray {name:?}; choose one of {names}"))
         })
     }
 }
@@ -120,7 +121,7 @@ pub fn generate(
     if scene.mesh.triangles.is_empty() {
         return Err(Error::Scene(format!("{}: no triangles, so there is nothing to send rays to", scene.name)));
     }
-    let draw = |item: usize| Random::new(options.seed, kind, item as u64);
+    let draw = |item: usize| random_of(options.seed, kind, item as u64);
     let primary = || primary(&scene.camera, options.size);
     Ok(match kind {
         RayKind::Primary => primary(),
@@ -135,7 +136,7 @@ pub fn generate(
             let length = TENTH * bounds.diagonal();
             from_each(&surfaces_hit(scene, &primary(), closest_hits)?, draw, |surface, random| {
                 (0..AO_RAYS)
-                    .map(|_| Ray { t_max: length, ..surface.leave(random.cosine_weighted(surface.normal)) })
+                    .map(|_| Ray { t_max: length, ..surface.leave(cosine_weighted(random, surface.normal)) })
                     .collect()
             })
         }
@@ -143,7 +144,7 @@ pub fn generate(
         RayKind::Diffuse2 => {
             let rays = diffuse1(scene, options, &primary(), closest_hits)?;
             from_each(&surfaces_hit(scene, &rays, closest_hits)?, draw, |surface, random| {
-                vec![surface.leave(random.cosine_weighted(surface.normal))]
+                vec![surface.leave(cosine_weighted(random, surface.normal))]
             })
         }
         RayKind::Reflection => from_each(&surfaces_hit(scene, &primary(), closest_hits)?, draw, |surface, _| {
@@ -195,14 +196,14 @@ fn primary(camera: &Camera, [width, height]: [u32; 2]) -> Vec<Ray> {
         .collect()
 }
 
-fn random(bounds: &Aabb, count: usize, draw: impl Fn(usize) -> Random + Sync) -> Vec<Ray> {
+fn random(bounds: &Aabb, count: usize, draw: impl Fn(usize) -> SplitMix64 + Sync) -> Vec<Ray> {
     let centre = dvec3(bounds.centroid());
     let radius = f64::from(bounds.diagonal()) / 2.0;
     (0..count)
         .into_par_iter()
         .map(|i| {
             let mut random = draw(i);
-            let [from, to] = [(); 2].map(|()| (centre + random.on_sphere() * radius).as_vec3());
+            let [from, to] = [(); 2].map(|()| (centre + on_sphere(&mut random) * radius).as_vec3());
             Ray { origin: from.to_array(), t_min: 0.0, direction: (to - from).to_array(), t_max: 1.0 }
         })
         .collect()
@@ -214,17 +215,17 @@ fn diffuse1(
     primary: &[Ray],
     closest_hits: &mut dyn FnMut(&[Ray]) -> Result<Vec<Hit>>,
 ) -> Result<Vec<Ray>> {
-    let draw = |item: usize| Random::new(options.seed, RayKind::Diffuse1, item as u64);
+    let draw = |item: usize| random_of(options.seed, RayKind::Diffuse1, item as u64);
     Ok(from_each(&surfaces_hit(scene, primary, closest_hits)?, draw, |surface, random| {
-        vec![surface.leave(random.cosine_weighted(surface.normal))]
+        vec![surface.leave(cosine_weighted(random, surface.normal))]
     }))
 }
 
 /// The rays that `make` sends from each surface, in the order of the surfaces.
 fn from_each(
     surfaces: &[Surface],
-    draw: impl Fn(usize) -> Random + Sync,
-    make: impl Fn(&Surface, &mut Random) -> Vec<Ray> + Sync,
+    draw: impl Fn(usize) -> SplitMix64 + Sync,
+    make: impl Fn(&Surface, &mut SplitMix64) -> Vec<Ray> + Sync,
 ) -> Vec<Ray> {
     surfaces.par_iter().enumerate().flat_map_iter(|(i, surface)| make(surface, &mut draw(i))).collect()
 }
@@ -288,9 +289,9 @@ impl Surface {
         Ray { origin: self.origin.to_array(), t_min: 0.0, direction: array(direction), t_max: f32::INFINITY }
     }
 
-    fn towards(&self, light: &Light, random: &mut Random) -> Ray {
+    fn towards(&self, light: &Light, random: &mut SplitMix64) -> Ray {
         let [first, second] = light.edges.map(dvec3);
-        let target = dvec3(light.corner) + first * random.unit() + second * random.unit();
+        let target = dvec3(light.corner) + first * random.fine_unit() + second * random.fine_unit();
         Ray { t_max: AT_LIGHT, ..self.leave(target - self.origin.as_dvec3()) }
     }
 
@@ -320,45 +321,28 @@ fn array(v: DVec3) -> [f32; 3] {
     v.as_vec3().to_array()
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014), one sequence an item.
-struct Random(u64);
+/// The random numbers of an item: a sequence of its own.
+fn random_of(seed: u64, kind: RayKind, item: u64) -> SplitMix64 {
+    let mut kinds = SplitMix64::new(seed);
+    let mut items = SplitMix64::new(kinds.bits() ^ kind as u64);
+    SplitMix64::new(items.bits() ^ item.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(32))
+}
 
-impl Random {
-    fn new(seed: u64, kind: RayKind, item: u64) -> Random {
-        let mut kinds = Random(seed);
-        let mut items = Random(kinds.bits() ^ kind as u64);
-        Random(items.bits() ^ item.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(32))
-    }
-
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    /// Uniform in [0, 1).
-    fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 * (-53f64).exp2()
-    }
-
-    fn on_sphere(&mut self) -> DVec3 {
-        loop {
-            let p = DVec3::from_array([(); 3].map(|()| 2.0 * self.unit() - 1.0));
-            if (1e-6..=1.0).contains(&p.length_squared()) {
-                return p.normalize();
-            }
+fn on_sphere(random: &mut SplitMix64) -> DVec3 {
+    loop {
+        let p = DVec3::from_array([(); 3].map(|()| 2.0 * random.fine_unit() - 1.0));
+        if (1e-6..=1.0).contains(&p.length_squared()) {
+            return p.normalize();
         }
     }
+}
 
-    /// A direction whose density goes with the cosine to `normal`: the normal's end moved to a point of the sphere there.
-    fn cosine_weighted(&mut self, normal: DVec3) -> DVec3 {
-        loop {
-            let direction = normal + self.on_sphere();
-            if direction.length_squared() > 1e-8 {
-                return direction.normalize();
-            }
+/// A direction whose density goes with the cosine to `normal`: the normal's end moved to a point of the sphere there.
+fn cosine_weighted(random: &mut SplitMix64, normal: DVec3) -> DVec3 {
+    loop {
+        let direction = normal + on_sphere(random);
+        if direction.length_squared() > 1e-8 {
+            return direction.normalize();
         }
     }
 }

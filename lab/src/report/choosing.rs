@@ -45,7 +45,7 @@ pub(super) fn section(choices: &[Choice], records: &[&Record]) -> Markup {
                     }
                 }
             }
-            p { "Had one candidate been taken always, so many would be within the same:" }
+            p { "If one candidate were always taken, this many choices would be within the same:" }
             ul {
                 @for (builder, part) in hindsight::good_parts_of_each(&pairs, &taken) {
                     li { code { (short(&builder)) } ": " (format!("{:.0}%", 100.0 * part)) }

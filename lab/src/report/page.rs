@@ -403,7 +403,7 @@ fn method_section(report: &Report) -> Markup {
                 dd { "The builders that no other beats at both figures of a chart." }
                 dt { "Total time" }
                 dd {
-                    "A build and the rays traced until the next one. Whoever traces few rays a build needs a fast builder, whoever traces many a "
+                    "A build and the rays traced until the next one. If few rays are traced per build, a fast builder wins; if many, a "
                     "good tree; the lower envelope says from how many rays on which is best."
                 }
             }

@@ -2,7 +2,7 @@
 
 use super::{Camera, LoadOptions, Mesh, cameras, generators, lookup, no_triangles, tri};
 use crate::{Error, Result};
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 
 /// A mesh whose vertices move.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! Where to look from: good places for scenes that many use, and a place that sees everything for the others.
 
 use super::Camera;
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 
 const Y: [f32; 3] = [0.0, 1.0, 0.0];
 const Z: [f32; 3] = [0.0, 0.0, 1.0];

@@ -1,6 +1,7 @@
 //! Scenes that hurt builders and tracers: empty, equal, flat, thin, far, huge, broken. What every builder must survive.
 
-use super::{Mesh, SplitMix64, generators};
+use super::{Mesh, generators};
+use crate::random::SplitMix64;
 
 /// One of the scenes.
 #[derive(Debug, Clone)]
@@ -190,7 +191,7 @@ fn cube(size: f32) -> impl Iterator<Item = Corners> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hedgerow::bvh::layout::Aabb;
+    use hedgerow::geometry::Aabb;
 
     fn mesh(name: &str, count: u32) -> Mesh {
         degenerate(count).into_iter().find(|scene| scene.name == name).expect(name).mesh

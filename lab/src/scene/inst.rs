@@ -3,7 +3,7 @@
 
 use super::{Instance, Instances, LoadOptions, Mesh, cameras, check, lookup, obj, source};
 use crate::{Error, Result};
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use std::path::{Path, PathBuf};
 
 /// Reads the instances, in the order of the file; the objects become its parts, in theirs. A name that several objects bear

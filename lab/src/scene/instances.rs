@@ -4,7 +4,7 @@ use super::{
     Camera, Light, LoadOptions, Mesh, Scene, cameras, check, dynamic, generators, inst, load, lookup, no_triangles,
 };
 use crate::{Error, Result};
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 
 /// A scene of placed parts. Every instance names a part that is there; the methods panic where one does not.
 #[derive(Debug, Clone)]

@@ -19,12 +19,11 @@ mod instances;
 mod lookup;
 mod obj;
 mod ply;
-mod random;
 mod source;
 mod tri;
 
 use crate::{Error, Result};
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use std::path::{Path, PathBuf};
 
 pub use animation::{Animation, load_animation, load_moving};
@@ -33,7 +32,6 @@ pub use dynamic::{DynamicObject, DynamicScene, load_dynamic};
 pub use generators::generators;
 pub use instances::{Instance, Instances, load_instances, load_placed};
 pub use lookup::{list, own_folders, weight};
-pub use random::SplitMix64;
 
 /// A scene, ready to build.
 #[derive(Debug, Clone)]

@@ -6,9 +6,10 @@
 
 use crate::conditional::needs;
 use hedgerow::bvh::codes::Codes;
-use hedgerow::bvh::layout::{Aabb, Bvh2};
+use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
+use hedgerow::geometry::Aabb;
 use hedgerow_lab::scene::{self, LoadOptions, Mesh};
 
 crate::conditional::tests! {

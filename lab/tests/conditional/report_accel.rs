@@ -164,7 +164,7 @@ fn the_page_says_plainly_what_is_reached_and_what_is_not() {
         "Goals met: 4 of 5",
         "Ours is slower than the driver's batch: 1.25 times its time",
         "Over 100000 instances our build is slower than the driver's, 2.00 times its time",
-        "building anew pays from frame 5 on, where the SAH cost has grown to 1.50 times what it was",
+        "building from scratch pays from frame 5 on, where the SAH cost has grown to 1.50 times what it was",
         "update &lt;knot&gt;: 3 GiB of device memory",
         "a note &amp; more",
     ] {

@@ -174,7 +174,7 @@ proptest::proptest! {
         // What is drawn spans all exponents; the domain is what stays finite.
         let transform = transform.map(|row| row.map(|c| c.clamp(-1e15, 1e15)));
         let corners = corners.map(|p| p.map(|c| c.clamp(-1e15, 1e15)));
-        let bounds = hedgerow::bvh::layout::Aabb::around(&corners);
+        let bounds = hedgerow::geometry::Aabb::around(&corners);
         let point = std::array::from_fn(|i| {
             (bounds.lo[i] + inside[i] * (bounds.hi[i] - bounds.lo[i])).clamp(bounds.lo[i], bounds.hi[i])
         });

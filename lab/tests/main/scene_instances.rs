@@ -1,6 +1,6 @@
 //! Generators of instances: what is shared, where it stands, and which boxes overlap.
 
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use hedgerow_lab::Error;
 use hedgerow_lab::scene::{self, Instances, LoadOptions};
 

@@ -5,9 +5,10 @@ pub mod serialize;
 
 use super::build::codes;
 use super::{Instance, Options, REBRAID};
-use crate::bvh::layout::{self, Aabb, Bvh2, Child, Header, Node, Record, status};
+use crate::bvh::layout::{self, Bvh2, Child, Header, Node, Record, status};
 use crate::bvh::sah::Collapse;
 use crate::bvh::twin::lbvh;
+use crate::geometry::Aabb;
 use ash::vk;
 
 /// What is told of a bottom-level structure.

@@ -29,7 +29,7 @@ pub fn read(memory: &[u8]) -> Result<Vec<u8>> {
     let head = memory.get(..size_of::<Head>()).ok_or_else(|| invalid("shorter than its head"))?;
     let head: Head = bytemuck::pod_read_unaligned(head);
     if head.version != VERSION {
-        return Err(invalid("another version wrote it; build the structure anew"));
+        return Err(invalid("another version wrote it; build the structure again"));
     }
     let handles = size_of::<Head>()..(size_of::<Head>() as u64 + 8 * head.handle_count) as usize;
     let (handles, structure) = (memory.get(handles.clone()), memory.get(handles.end..));

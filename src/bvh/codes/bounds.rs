@@ -1,6 +1,6 @@
 //! The bounds that codes are normalised by.
 
-use crate::bvh::layout::Aabb;
+use crate::geometry::Aabb;
 
 /// What codes are normalised by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -73,12 +73,12 @@ impl FromStr for Codes {
         let named = NAMES.iter().find(|(_, n)| *n == name).map(|(code, _)| *code);
         let code = named
             .or_else(|| binning(name).map(Code::Bin))
-            .ok_or_else(|| wrong(format!("{name:?} is not known; there are {KNOWN}")))?;
+            .ok_or_else(|| wrong(format!("{name:?} is unknown; choose one of {KNOWN}")))?;
         let mut codes = code.full();
         if let Some(bounds) = bounds {
             let known = CodeBounds::ALL.iter().find(|b| b.name() == bounds && **b != CodeBounds::Full);
             let known =
-                known.ok_or_else(|| wrong(format!("+{bounds} is not known; there are {}", CodeBounds::NAMES)))?;
+                known.ok_or_else(|| wrong(format!("+{bounds} is unknown; choose one of {}", CodeBounds::NAMES)))?;
             codes = codes
                 .with_bounds(*known)
                 .ok_or_else(|| wrong(format!("{name} has a grid of its own; it takes +concise or +centroid")))?;

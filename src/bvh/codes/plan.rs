@@ -6,7 +6,7 @@ use super::mipping::Occupancy;
 use super::recipe::{Extents, Recipe};
 use super::sections::Sections;
 use super::{Code, CodeBounds, Codes};
-use crate::bvh::layout::Aabb;
+use crate::geometry::Aabb;
 
 /// The recipe of a code for a given scene.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! How a code is put together: which axis each bit is of, and where bits of the size stand between.
 
 use super::Order;
-use crate::bvh::layout::Aabb;
+use crate::geometry::Aabb;
 
 /// The axis of each coordinate bit, from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]

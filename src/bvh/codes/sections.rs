@@ -14,7 +14,7 @@
 //! are.
 
 use super::axis::{from_ordered, octaves, ordered};
-use crate::bvh::layout::Aabb;
+use crate::geometry::Aabb;
 
 /// Bits for what is huge, what is far, and one of each axis between them.
 pub(super) const PREFIX_BITS: u32 = 5;

@@ -12,10 +12,11 @@
 //! - Of two that merge, the one before is the left child, and its place is that of the new cluster. The node is in the slot
 //!   before the position of the right child's first primitive, which no other node can have.
 //!
-//! [`Aabb::scaled_half_area`]: crate::bvh::layout::Aabb::scaled_half_area
+//! [`Aabb::scaled_half_area`]: crate::geometry::Aabb::scaled_half_area
 
-use crate::bvh::layout::{Aabb, Child, Node};
+use crate::bvh::layout::{Child, Node};
 use crate::bvh::sah::SHORTEST;
+use crate::geometry::Aabb;
 
 #[derive(Clone, Copy)]
 pub(super) struct Cluster {

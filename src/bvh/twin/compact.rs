@@ -1,6 +1,7 @@
 //! Compaction, plainly: a walk that writes nodes in the order in which it meets them.
 
-use crate::bvh::layout::{Aabb, Bvh2, Child, Header, Node, Record, status};
+use crate::bvh::layout::{Bvh2, Child, Header, Node, Record, status};
+use crate::geometry::Aabb;
 
 impl Header {
     /// The header of the compacted structure: node slots for the nodes, and no records but those in leaves. Of a structure that

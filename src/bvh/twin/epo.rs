@@ -201,9 +201,10 @@ impl Polygon {
 mod tests {
     use super::*;
     use crate::bvh::codes::Code;
-    use crate::bvh::layout::{Aabb, Header, MAGIC, Node, Record, Triangle};
+    use crate::bvh::layout::{Header, MAGIC, Node, Record, Triangle};
     use crate::bvh::sah::Collapse;
     use crate::bvh::twin::lbvh;
+    use crate::geometry::Aabb;
     use bytemuck::Zeroable;
 
     type Corners = [[f32; 3]; 3];

@@ -1,7 +1,8 @@
 //! Reading the caller's triangles on the host, as `glsl/bvh/geometry.glsl` does on the device.
 
 use crate::bvh::geometry::{IndexFormat, VertexFormat};
-use crate::bvh::layout::{Aabb, GeometryEntry, status};
+use crate::bvh::layout::{GeometryEntry, status};
+use crate::geometry::Aabb;
 
 /// [`Geometry`](crate::bvh::geometry::Geometry) in the host's memory.
 #[derive(Debug, Clone, Copy)]

@@ -13,7 +13,8 @@
 //!   the p-th treelet in the order of codes, which no other node can have.
 
 use crate::bvh::codes::{Codes, Plan};
-use crate::bvh::layout::{Aabb, Bvh2, Child, Node, Record};
+use crate::bvh::layout::{Bvh2, Child, Node, Record};
+use crate::geometry::Aabb;
 
 /// What is a treelet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

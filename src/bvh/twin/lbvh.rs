@@ -6,8 +6,9 @@
 use super::geometry::{self, Corners};
 use crate::bvh::codes::{Codes, Plan};
 use crate::bvh::layout::status;
-use crate::bvh::layout::{Aabb, BoxRecord, Bvh2, Child, Header, MAGIC, Node, Record, Triangle, UNUSED, node_slots};
+use crate::bvh::layout::{BoxRecord, Bvh2, Child, Header, MAGIC, Node, Record, Triangle, UNUSED, node_slots};
 use crate::bvh::sah::Collapse;
+use crate::geometry::Aabb;
 
 /// Builds the LBVH of `triangles` over `positions`. Triangles that are not finite or name vertices that are not there are
 /// left out, and the status says so.

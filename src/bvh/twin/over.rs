@@ -1,6 +1,7 @@
 //! What builders over an order that is given take from the tree that has it.
 
-use crate::bvh::layout::{Aabb, Bvh2, Child, Node, Record};
+use crate::bvh::layout::{Bvh2, Child, Node, Record};
+use crate::geometry::Aabb;
 
 impl<R: Record> Bvh2<R> {
     /// The leaves in the order of their records.

@@ -2,8 +2,9 @@
 //! (`bvh::refit`).
 
 use super::geometry::{self, Corners};
-use crate::bvh::layout::{Aabb, BoxRecord, Bvh2, Child, Record, Triangle, status};
+use crate::bvh::layout::{BoxRecord, Bvh2, Child, Record, Triangle, status};
 use crate::bvh::sah::Collapse;
+use crate::geometry::Aabb;
 
 /// Refits a tree of triangles to those that [`HostGeometry::corners`](geometry::HostGeometry::corners) read, with the costs that
 /// it was built with.

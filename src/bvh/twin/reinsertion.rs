@@ -1,7 +1,8 @@
 //! Parallel reinsertion, plainly: the twin of [`crate::bvh::reinsertion`], where the method is told.
 
-use crate::bvh::layout::{Aabb, Bvh2, Child, Record};
+use crate::bvh::layout::{Bvh2, Child, Record};
 use crate::bvh::reinsertion::{LEAST_GAIN, LEAST_SHARE, Options, PATH, STACK};
+use crate::geometry::Aabb;
 
 const NONE: u32 = u32::MAX;
 

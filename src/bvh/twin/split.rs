@@ -14,10 +14,11 @@
 
 use super::geometry::Corners;
 use crate::bvh::codes::Codes;
-use crate::bvh::layout::{Aabb, Bvh2, SLACK, Triangle};
+use crate::bvh::layout::{Bvh2, SLACK, Triangle};
 use crate::bvh::sah::Collapse;
 use crate::bvh::split::{Options, Reference};
 use crate::bvh::twin::lbvh;
+use crate::geometry::Aabb;
 
 /// Halvings of the scene's extent.
 const LEVELS: u32 = 20;

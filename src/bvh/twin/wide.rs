@@ -1,8 +1,9 @@
 //! Collapsing a `Bvh2` into a wide tree, plainly: what [`crate::bvh::wide::device`] must equal, byte for byte.
 
-use crate::bvh::layout::{Aabb, Bvh2, Child, Record};
+use crate::bvh::layout::{Bvh2, Child, Record};
 use crate::bvh::wide::LEVELS_BY_AREA;
 use crate::bvh::wide::layout::{Slots, Wide, WideNode};
+use crate::geometry::Aabb;
 use std::collections::BTreeMap;
 
 /// A wide node to be: the children of the binary nodes that it takes in, in slots.

@@ -1,4 +1,4 @@
-//! Collapsing a `Bvh2` into a wide tree on the device (glsl/bvh/wide/collapse.glsl); [`super::twin`] is the twin.
+//! Collapsing a `Bvh2` into a wide tree on the device (glsl/bvh/wide/collapse.glsl); [`crate::bvh::twin::wide`] is the twin.
 
 use super::Form;
 use crate::Result;

@@ -1,8 +1,9 @@
 //! What a wide tree costs: a walk on the host.
 
 use super::layout::{Wide, WideNode};
-use crate::bvh::layout::{Aabb, Record};
+use crate::bvh::layout::Record;
 use crate::bvh::quality::Quality;
+use crate::geometry::Aabb;
 
 /// The quality of a wide tree, with c_t the cost of a step: of visiting one wide node, whatever its width, for it tests the boxes
 /// of all its children. So figures of different widths compare numbers of visits, not times.

@@ -13,7 +13,8 @@
 
 use super::Form;
 use super::layout::{Slots, WideNode};
-use crate::bvh::layout::{Aabb, Child};
+use crate::bvh::layout::Child;
+use crate::geometry::Aabb;
 use bytemuck::{Pod, Zeroable};
 
 /// A node of up to eight children. 80 bytes.

@@ -2,9 +2,10 @@
 
 use super::layout::{Wide, WideNode};
 use crate::bvh::cover::Parts;
-use crate::bvh::layout::{Aabb, Instance, Record};
+use crate::bvh::layout::{Instance, Record};
 use crate::bvh::twin::split::around_parts;
 use crate::bvh::validate::validate_split_primitives;
+use crate::geometry::Aabb;
 use crate::{Error, Result};
 
 impl<N: WideNode, R: Record> Wide<N, R> {

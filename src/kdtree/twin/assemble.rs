@@ -3,7 +3,8 @@
 
 use super::Subtree;
 use super::heuristic::Heuristic;
-use crate::bvh::layout::{Aabb, MAGIC, Triangle};
+use crate::bvh::layout::{MAGIC, Triangle};
+use crate::geometry::Aabb;
 use crate::kdtree::layout::{Header, KIND, KdTree, MAX_NODES, MAX_REFERENCES, Node};
 use crate::{Error, Result};
 use bytemuck::Zeroable;

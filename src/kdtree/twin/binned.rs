@@ -9,7 +9,8 @@ use super::clip::{Reference, divided};
 use super::heuristic::{Heuristic, Split};
 use super::small::Small;
 use super::{ALONE, Fork, Subtree};
-use crate::bvh::layout::{Aabb, Triangle};
+use crate::bvh::layout::Triangle;
+use crate::geometry::Aabb;
 use crate::kdtree::layout::halves;
 
 /// The tree over `references` in `cell`, by so many bins along each axis; cells of no more than `exact` references are split exactly.

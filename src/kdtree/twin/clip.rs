@@ -16,7 +16,8 @@
 //! ([`crate::trace::twin::kd`]), as long as no triangle is longer than it knows from the header: [`reach_of`]. For those few that are,
 //! a triangle is all that is near enough to it, `room`.
 
-use crate::bvh::layout::{Aabb, SLACK, Triangle};
+use crate::bvh::layout::{SLACK, Triangle};
+use crate::geometry::Aabb;
 
 /// 64ε: by what part of the longest side of its box a part may be off.
 const OF_SIDE: f32 = f32::from_bits((127 - 18) << 23);

@@ -1,8 +1,8 @@
 //! What a plane costs, and whether a cell is split at all (Papay 2025, sections 2.2 and 9.2).
 
 use super::clip::Plane;
-use crate::bvh::layout::Aabb;
 use crate::bvh::sah::area_scale;
+use crate::geometry::Aabb;
 use crate::kdtree::layout::{MAX_DEPTH, halves};
 use crate::kdtree::termination::{Costs, depth_limit, leaf_size};
 

@@ -19,8 +19,9 @@ mod small;
 use super::layout::KdTree;
 use super::termination::Costs;
 use crate::Result;
-use crate::bvh::layout::{Aabb, Triangle};
+use crate::bvh::layout::Triangle;
 use crate::bvh::twin::geometry::{self, Corners};
+use crate::geometry::Aabb;
 use clip::{Plane, Reference};
 use heuristic::Heuristic;
 

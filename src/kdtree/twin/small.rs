@@ -6,7 +6,8 @@
 use super::Subtree;
 use super::clip::{Plane, Reference, divided};
 use super::heuristic::{Heuristic, Split};
-use crate::bvh::layout::{Aabb, Triangle};
+use crate::bvh::layout::Triangle;
+use crate::geometry::Aabb;
 use crate::kdtree::layout::halves;
 
 /// Nodes that a subtree may have below its root. Cells become leaves rather than have more: no tree of the scenes measured does.

@@ -26,7 +26,8 @@
 //! enough: a primitive with a lower index may be there.
 
 use super::tracer::Nearest;
-use crate::bvh::layout::{Aabb, SLACK, status};
+use crate::bvh::layout::{SLACK, status};
+use crate::geometry::Aabb;
 use crate::kdtree::layout::{Content, Inner, KdTree, MAX_DEPTH};
 use crate::trace::kd::Traversal;
 use crate::trace::ray::PreparedRay;

@@ -4,7 +4,7 @@
 //! rays beside it would walk through the static tree's planes.
 
 use super::tree::{At, Forest, Records};
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use hedgerow::kdtree::layout::{Content, Node, halves};
 
 /// A leaf of the static tree, or beside it. Those without a node come first, parents before children: in this order they are merged.

@@ -16,8 +16,8 @@ mod tree;
 mod write;
 
 use descent::{Association, Place, partition_tree_with_tree};
-use hedgerow::bvh::layout::Aabb;
 use hedgerow::bvh::sah::area_scale;
+use hedgerow::geometry::Aabb;
 use hedgerow::kdtree::layout::{Header, KdTree, MAX_DEPTH, Node};
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::kdtree::twin::heuristic::Heuristic;

@@ -12,7 +12,8 @@
 use super::fragment::Fragment;
 use super::tree::{At, Branch, Content, Forest, Records, Tree};
 use crate::kdtree::exact;
-use hedgerow::bvh::layout::{Aabb, Triangle};
+use hedgerow::bvh::layout::Triangle;
+use hedgerow::geometry::Aabb;
 use hedgerow::kdtree::layout::{MAX_DEPTH, Node, halves};
 use hedgerow::kdtree::twin::clip::Reference;
 use hedgerow::kdtree::twin::heuristic::{Heuristic, Split};

@@ -3,7 +3,8 @@
 //! A forest only grows. Of a tree in two, just the nodes that the plane goes through are new, and the whole is still there; all go at
 //! once, with the forest.
 
-use hedgerow::bvh::layout::{Aabb, Triangle};
+use hedgerow::bvh::layout::Triangle;
+use hedgerow::geometry::Aabb;
 use hedgerow::kdtree::layout::{Content as NodeContent, KdTree, Node, halves};
 use hedgerow::kdtree::twin::clip::{Plane, Reference, bounds_of, clipped, divided};
 

@@ -304,12 +304,10 @@ mod tests {
         assert!(error_of("lvbh").contains("no builder is called \"lvbh\"; there are"));
         assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));
         assert!(error_of("lbvh-host:collapse=maybe").contains("take sah or off"));
-        assert!(error_of("lbvh:width=3").contains("width=3 is not known; take 2, 4, 8 or 8q"));
-        assert!(
-            error_of("lbvh:width=4:order=octant").contains("order=octant is not known; take distance or octant (of")
-        );
+        assert!(error_of("lbvh:width=3").contains("width=3 is unknown; use 2, 4, 8 or 8q"));
+        assert!(error_of("lbvh:width=4:order=octant").contains("order=octant is unknown; use distance or octant (of"));
         for wrong in ["lots", "-0.1", "1.5", "nan", "0.3/0", "0.3/x"] {
-            let says = format!("split={wrong} is not known; take a number from 0 to 1");
+            let says = format!("split={wrong} is unknown; use a number from 0 to 1");
             assert!(error_of(&format!("hploc:split={wrong}")).contains(&says), "{wrong}");
         }
         for wrong in ["ms", "-1ms", "infms", "20s"] {
@@ -321,18 +319,18 @@ mod tests {
         assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse, optimise"));
         assert!(error_of("driver-fast-build:codes=mc30").contains("it takes none"));
         for wrong in ["many", "1", "1025"] {
-            let says = format!("bins={wrong} is not known; take a number of bins along each axis, from 2 to 1024");
+            let says = format!("bins={wrong} is unknown; use a number of bins along each axis, from 2 to 1024");
             assert!(error_of(&format!("kd-binned:bins={wrong}")).contains(&says), "{wrong}");
         }
         for wrong in ["much", "0", "-1", "nan", "1e9"] {
-            let says = format!("kt={wrong} is not known; take a cost of a traversal step, from 0.001 to 1000");
+            let says = format!("kt={wrong} is unknown; use a cost of a traversal step, from 0.001 to 1000");
             assert!(error_of(&format!("kd-exact:kt={wrong}")).contains(&says), "{wrong}");
         }
         for wrong in ["queue", "short", "short-0", "short-42", "short-2-up", "stack-push-down"] {
-            let says = format!("traversal={wrong} is not known; take stack, restart, push-down, short-N");
+            let says = format!("traversal={wrong} is unknown; use stack, restart, push-down, short-N");
             assert!(error_of(&format!("kd-exact:traversal={wrong}")).contains(&says), "{wrong}");
         }
-        assert!(error_of("kd-exact:trace=there").contains("trace=there is not known; take host or device"));
+        assert!(error_of("kd-exact:trace=there").contains("trace=there is unknown; use host or device"));
         assert!(error_of("kd-exact:bins=8").contains("no option \"bins\"; it takes kt, ki, traversal, trace"));
         assert!(error_of("auto:rays=many").contains("no number of rays"));
         assert!(error_of("").contains("-b all"));

@@ -313,6 +313,6 @@ impl Spec {
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {
-        Error::Argument(format!("builder {self}: {}={value} is not known; take {}", option.key, option.values))
+        Error::Argument(format!("builder {self}: {}={value} is unknown; use {}", option.key, option.values))
     }
 }

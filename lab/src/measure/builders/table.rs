@@ -151,7 +151,7 @@ pub static BUILDERS: &[Builder] = &[
     .taking(&[RADIUS, CODES, COLLAPSE, OPTIMISE]),
     Builder::new(
         &"sweep",
-        "full-sweep SAH on the host: what the quality of the others is told against",
+        "full-sweep SAH on the host: the reference for the quality of the others",
         Kind::Host(|spec| spec.sweep_leaves().map(Hierarchy::Sweep)),
     )
     .taking(&[COLLAPSE, OPTIMISE, TERMINATION]),

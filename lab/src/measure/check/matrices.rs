@@ -1,14 +1,14 @@
 //! Matrices of instances.
 #![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
-use super::shapes::Random;
+use crate::random::SplitMix64;
 
 pub type Matrix = [[f32; 4]; 3];
 
 /// A rotation about an axis and by an angle that the number tells.
 pub fn rotation(number: u64) -> Matrix {
-    let mut random = Random(1000 + number);
-    let axis = random.point(1.0).map(f64::from);
+    let mut random = SplitMix64::new(1000 + number);
+    let axis = random.around(1.0).map(f64::from);
     let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
     let [x, y, z] = axis.map(|a| a / length);
     let (s, c) = (3.0 * f64::from(random.signed())).sin_cos();

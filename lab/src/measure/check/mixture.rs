@@ -2,8 +2,9 @@
 #![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
 use super::backend::{Backend, Built, Ours};
-use super::shapes::{Corners, Random, add, icosphere, soup};
+use super::shapes::{Corners, add, icosphere, soup};
 use super::world::{BuiltWorld, Part, World};
+use crate::random::SplitMix64;
 use ash::vk;
 use hedgerow::accel::{Instance, REBRAID, twin};
 use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Child, Record, Triangle};
@@ -36,9 +37,9 @@ pub fn scaled(scale: f32, [x, y, z]: [f32; 3]) -> [[f32; 4]; 3] {
 
 /// Instances of all kinds of parts, by all kinds of transforms: turned, sheared, mirrored, flat ones and none.
 pub fn mixture(count: usize, seed: u64) -> World {
-    let mut random = Random(seed);
-    let a_box = |random: &mut Random| {
-        let (at, size) = (random.point(1.0), random.point(0.1).map(f32::abs));
+    let mut random = SplitMix64::new(seed);
+    let a_box = |random: &mut SplitMix64| {
+        let (at, size) = (random.around(1.0), random.around(0.1).map(f32::abs));
         [at, add(at, size)]
     };
     let boxes: Vec<[[f32; 3]; 2]> = (0..40).map(|_| a_box(&mut random)).collect();
@@ -59,7 +60,7 @@ pub fn mixture(count: usize, seed: u64) -> World {
             let mut m: [[f32; 4]; 3] =
                 [(); 3].map(|()| [random.signed(), random.signed(), random.signed(), 9.0 * random.signed()]);
             match i % 11 {
-                0 => m = scaled(random.signed(), random.point(5.0)),
+                0 => m = scaled(random.signed(), random.around(5.0)),
                 // Of no thickness, and of no size at all.
                 5 => m[1] = [0.0, 0.0, 0.0, 1.0],
                 6 if i % 5 == 0 => m = [[0.0; 4]; 3],

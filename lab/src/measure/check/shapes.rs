@@ -1,6 +1,7 @@
 //! Meshes and rays for the tracing tests, made of nothing but numbers.
 #![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
+use crate::random::SplitMix64;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
@@ -10,44 +11,23 @@ use hedgerow::trace::Ray;
 /// Triangles by their corners.
 pub type Corners = Vec<[[f32; 3]; 3]>;
 
-/// Uniform numbers from a seed (SplitMix64).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    /// In −1..1.
-    pub fn signed(&mut self) -> f32 {
-        (self.bits() >> 40) as f32 * 2f32.powi(-23) - 1.0
-    }
-
-    pub fn point(&mut self, scale: f32) -> [f32; 3] {
-        [(); 3].map(|()| self.signed() * scale)
-    }
-}
-
 /// `count` triangles of a size of about `size` in the cube −1..1.
 pub fn soup(count: usize, size: f32, seed: u64) -> Corners {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     (0..count)
         .map(|_| {
-            let centre = random.point(1.0);
-            [(); 3].map(|()| add(centre, random.point(size)))
+            let centre = random.around(1.0);
+            [(); 3].map(|()| add(centre, random.around(size)))
         })
         .collect()
 }
 
 /// `count` boxes with edges of up to `size` that begin in the cube −1..1, by their least and greatest corners.
 pub fn boxes(count: usize, size: f32, seed: u64) -> Vec<[[f32; 3]; 2]> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     (0..count)
         .map(|_| {
-            let (at, size) = (random.point(1.0), random.point(size).map(f32::abs));
+            let (at, size) = (random.around(1.0), random.around(size).map(f32::abs));
             [at, add(at, size)]
         })
         .collect()
@@ -119,10 +99,10 @@ pub fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
 /// Rays from `offset`, the middle of a closed surface of radius `scale`, and from around it, through corners and edges: each must
 /// hit.
 pub fn rays_from_inside(corners: &Corners, count: usize, scale: f32, offset: [f32; 3]) -> Vec<Ray> {
-    let mut random = Random(7);
+    let mut random = SplitMix64::new(7);
     (0..count)
         .map(|i| {
-            let origin = if i % 2 == 0 { offset } else { add(offset, random.point(0.2 * scale)) };
+            let origin = if i % 2 == 0 { offset } else { add(offset, random.around(0.2 * scale)) };
             let [a, b, c] = corners[random.bits() as usize % corners.len()];
             let along = [0.0, 0.25, 0.5, 1.0, random.signed().abs()][i % 5];
             let inside = if i % 7 == 0 { c } else { a };
@@ -134,7 +114,7 @@ pub fn rays_from_inside(corners: &Corners, count: usize, scale: f32, offset: [f3
 
 /// From the middle of a closed surface to it: through corners and edges, and at any place between them.
 pub fn rays_from_the_middle(corners: &Corners, count: usize, scale: f32, offset: [f32; 3]) -> Vec<Ray> {
-    let mut random = Random(3);
+    let mut random = SplitMix64::new(3);
     (0..count)
         .map(|i| {
             let [a, b, c] = corners[random.bits() as usize % corners.len()];
@@ -164,23 +144,23 @@ pub fn no_rays() -> Vec<Ray> {
 /// Rays that are hard for a scene in `−scale..scale` around `offset`: random ones, along the axes and in their planes, with
 /// zeroes of both signs, through corners, edges and centres of triangles, along edges, and short ones.
 pub fn hard_rays(corners: &Corners, count: usize, scale: f32, offset: [f32; 3], seed: u64) -> Vec<Ray> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     (0..count)
         .map(|i| {
-            let origin = add(random.point(1.5 * scale), offset);
+            let origin = add(random.around(1.5 * scale), offset);
             let [a, b, c] =
                 corners.get(random.bits() as usize % corners.len().max(1)).copied().unwrap_or([[0.0; 3]; 3]);
             let to = |target: [f32; 3]| std::array::from_fn(|k| target[k] - origin[k]);
             let middle = |p: [f32; 3], q: [f32; 3]| std::array::from_fn(|k| 0.5 * p[k] + 0.5 * q[k]);
             let mut ray = match i % 8 {
-                0 => ray(origin, random.point(1.0)),
+                0 => ray(origin, random.around(1.0)),
                 1 => {
                     let mut axis = [[0.0, -0.0][i / 8 % 2]; 3];
                     axis[i / 8 % 3] = random.signed();
                     ray(origin, axis)
                 }
                 2 => {
-                    let mut plane = random.point(1.0);
+                    let mut plane = random.around(1.0);
                     plane[i / 8 % 3] = [0.0, -0.0][i / 8 % 2];
                     // From the height of a corner, so that it runs along the faces of boxes.
                     let mut origin = origin;

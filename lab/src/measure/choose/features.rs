@@ -4,8 +4,8 @@
 use super::sample;
 use crate::scene::Mesh;
 use hedgerow::bvh::codes::{Codes, Plan};
-use hedgerow::bvh::layout::Aabb;
 use hedgerow::bvh::twin::geometry::finite_box;
+use hedgerow::geometry::Aabb;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

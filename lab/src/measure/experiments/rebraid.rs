@@ -10,7 +10,7 @@ use crate::measure::statistics::{Spread, in_turn, ratios};
 use crate::scene::{Instance, Instances, Scene};
 use ash::vk;
 use hedgerow::accel::REBRAID;
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use rayon::prelude::*;
 
 type Flags = vk::BuildAccelerationStructureFlagsKHR;

@@ -3,7 +3,8 @@
 //! What rays of that part meet. Nodes over the whole of a scene that has grown count as one of the part's size, not as
 //! everything there is, and so a tree is compared with one over the part alone.
 
-use hedgerow::bvh::layout::{Aabb, Bvh2, Record};
+use hedgerow::bvh::layout::{Bvh2, Record};
+use hedgerow::geometry::Aabb;
 
 /// (c_T · Σ SA(inner) + c_I · Σ SA(leaf)·n_leaf) / SA(`part`), of boxes clipped to `part`; `None` where that has no area.
 pub fn cost<R: Record>(tree: &Bvh2<R>, part: &Aabb, c_t: f64, c_i: f64) -> Option<f64> {

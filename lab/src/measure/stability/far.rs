@@ -1,6 +1,6 @@
 //! The far triangle of the growth experiment (CONTRACT, "Records of experiments").
 
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use serde::{Deserialize, Serialize};
 
 /// In which axes the scene's bounds grow.

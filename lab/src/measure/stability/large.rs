@@ -7,7 +7,7 @@ use super::points::{Failure, Head, Large};
 use super::relative::{Part, Series, Stage, measure as measure_series};
 use crate::scene::{Mesh, Scene};
 use crate::{Error, Result};
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;

@@ -29,11 +29,11 @@ pub(super) fn section(points: &[Update]) -> Result<Option<Section>> {
     let is_missing = points.iter().any(|point| point.maker == Maker::Ours && point.update_ms.is_none());
     Ok(Some(Section {
         id: "updates",
-        title: "Updating against building anew",
+        title: "Updating against building from scratch",
         charts,
         above: html! {
             p {
-                "The vertices of a mesh move from frame to frame. Its structure is either built anew, or that of the first frame is "
+                "The vertices of a mesh move from frame to frame. Its structure is either built from scratch, or that of the first frame is "
                 "updated: it keeps its tree and gets new boxes, which takes less time and lets the tree grow worse. Both by the "
                 "device's timestamps."
             }
@@ -44,7 +44,7 @@ pub(super) fn section(points: &[Update]) -> Result<Option<Section>> {
             details {
                 summary { "Every frame" }
                 p {
-                    "Growth is what the structure itself tells of its SAH cost since it was built. Building anew pays from as many rays a "
+                    "Growth is what the structure itself tells of its SAH cost since it was built. Building from scratch pays from as many rays a "
                     "frame on, in the mix that was traced, as save by the better tree what building takes longer."
                 }
                 (scroll("Updates", table(points)))
@@ -104,7 +104,7 @@ fn quality(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
         title: format!("{scene}: what updating costs the tree"),
         alt: reading(frames),
         reading: "Growth is what the updated structure tells of its SAH cost since it was built; beside it its SAH cost, and the \
-                  time of all rays through it, over those of a structure built anew. 1 is as good as new."
+                  time of all rays through it, over those of a structure built from scratch. 1 is as good as new."
             .into(),
     };
     let x = Axis { name: "frame", is_log: false, number: &|v| tick(*v) };
@@ -127,14 +127,14 @@ fn reading(frames: &[&Update]) -> String {
     let paying = ours.iter().rev().take_while(|point| pays(point)).last();
     let verdict = match paying {
         Some(point) => format!(
-            "with {} rays a frame building anew pays from frame {} on, where the SAH cost has grown to {} times what it was",
+            "with {} rays per frame, building from scratch pays from frame {} on, where the SAH cost has grown to {} times what it was",
             short_count(rays as f64),
             point.frame,
             three_digits(point.growth.unwrap_or(f64::NAN)),
         ),
         None => match last.pays_from() {
             Some(from) => format!(
-                "with {} rays a frame building anew does not pay up to frame {}; it would there from {} rays on",
+                "with {} rays per frame, building from scratch does not pay up to frame {}; it would there from {} rays on",
                 short_count(rays as f64),
                 last.frame,
                 short_count(from)
@@ -143,7 +143,7 @@ fn reading(frames: &[&Update]) -> String {
         },
     };
     format!(
-        "from frame {} to {} the SAH cost of the updated structure grows to {} times what it was: {} times that of one built anew, \
+        "from frame {} to {} the SAH cost of the updated structure grows to {} times what it was: {} times that of one built from scratch, \
          with {} times the time of its rays; an update takes {} of a build's time; {verdict}.",
         first.frame,
         last.frame,

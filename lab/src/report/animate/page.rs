@@ -24,7 +24,7 @@ pub(super) fn page(measured: &Measured, charts: &[Chart], links: &Markup) -> Str
                     p.kicker { "hedgerow animate" }
                     h1 { (scene) ", frame by frame" }
                     p.lead {
-                        "Ways to have something to trace when some of a scene moves: all of it built anew, a tree beside the static one, a tree "
+                        "Ways to have something to trace when some of a scene moves: all of it built from scratch, a tree beside the static one, a tree "
                         "of each object, a top level over instances, and objects' trees that are merged into the static one and taken out again."
                     }
                     @if let Some(setting) = setting {
@@ -270,15 +270,15 @@ fn method(setting: Option<&Setting>) -> Markup {
             p { "The same as " a href="animate.jsonl" { "animate.jsonl" } ", where every figure is." }
             dl.terms {
                 dt { "rebuild" }
-                dd { "One kd-tree over all triangles, built anew in every frame." }
+                dd { "One kd-tree over all triangles, built from scratch in every frame." }
                 dt { "two-trees" }
                 dd { "A kd-tree of what stands still, built once, and one over all that moves. A ray goes through both, through the second no farther than it has hit in the first." }
                 dt { "tree-per-object" }
                 dd { "The same with a tree of each object." }
                 dt { "two-level" }
-                dd { "A bottom level of what stands still and of each object, and a top level built in every frame; bottom levels of what changes its shape are built anew, too. Always on the device." }
+                dd { "A bottom level of what stands still and of each object, and a top level built in every frame; bottom levels of what changes its shape are built from scratch, too. Always on the device." }
                 dt { "merge" }
-                dd { "Objects are merged into the kd-tree of what stands still, and taken out again before the next frame: both are in its time. On the device the leaves that objects are in are built anew; on the host the kd-tree of each object is built and merged." }
+                dd { "Objects are merged into the kd-tree of what stands still, and taken out again before the next frame: both are in its time. On the device the leaves that objects are in are built from scratch; on the host the kd-tree of each object is built and merged." }
                 dt { "Static trees" }
                 dd {
                     "Built once, before the clock runs"

@@ -3,7 +3,7 @@
 use crate::rays::kinds::Frame;
 use crate::scene::Camera;
 use glam::DVec3;
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use std::fmt::Write;
 
 /// Units of a path in a pixel.

@@ -4,7 +4,7 @@
 use super::{CameraPath, DynamicObject, DynamicScene, bounds, time_of};
 use crate::scene::{Camera, Instance, Light, Mesh, cameras, lookup, no_triangles};
 use crate::{Error, Result};
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use std::path::Path;
 
 /// As [`Content`](crate::scene::Content), of what moves.

@@ -20,7 +20,7 @@ mod track;
 use super::animation::{self, load_moving};
 use super::{Animation, Camera, Instance, Instances, Light, LoadOptions, Mesh, Scene, check, gltf, lookup};
 use crate::{Error, Result};
-use hedgerow::bvh::layout::Aabb;
+use hedgerow::geometry::Aabb;
 use std::borrow::Cow;
 use std::ops::Range;
 

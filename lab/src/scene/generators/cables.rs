@@ -2,7 +2,8 @@
 
 use super::tube::{self, Knot};
 use super::{Placed, series, turns};
-use crate::scene::{Mesh, SplitMix64};
+use crate::random::SplitMix64;
+use crate::scene::Mesh;
 
 const SEGMENTS: u32 = 60;
 const SIDES: u32 = 5;

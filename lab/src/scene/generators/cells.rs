@@ -1,7 +1,7 @@
 //! Spheres in a grid: instances whose boxes do not overlap, for which a top-level structure has nothing to open.
 
 use super::{Placed, meshes, side_of, turns};
-use crate::scene::SplitMix64;
+use crate::random::SplitMix64;
 
 /// Edge of a cell.
 const CELL: f32 = 2.0;

@@ -10,7 +10,7 @@
 
 use super::turns::{self, QUARTERS, Turn, turned};
 use super::{Placed, prism, side_of};
-use crate::scene::SplitMix64;
+use crate::random::SplitMix64;
 
 /// Cells along a side of a block: arms are one of them thick, as streets are wide.
 const CELLS: u32 = 32;

@@ -3,7 +3,8 @@
 
 use super::series;
 use super::vector::{add, along, cross, unit};
-use crate::scene::{Mesh, SplitMix64};
+use crate::random::SplitMix64;
+use crate::scene::Mesh;
 use std::f64::consts::{PI, TAU};
 
 /// Cells around and along a thing: each has those of its place in the row, again and again.

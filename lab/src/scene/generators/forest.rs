@@ -4,7 +4,8 @@
 use super::tube::{self, Knot};
 use super::vector::{add, along, unit};
 use super::{Placed, side_of, turns};
-use crate::scene::{Mesh, SplitMix64};
+use crate::random::SplitMix64;
+use crate::scene::Mesh;
 
 /// Metres from tree to tree.
 const PITCH: f32 = 2.2;

@@ -1,7 +1,8 @@
 //! Plain meshes: spheres, squares, an arena, and triangles anywhere.
 
 use super::vector::{add, cross, dot, unit};
-use crate::scene::{Mesh, SplitMix64};
+use crate::random::SplitMix64;
+use crate::scene::Mesh;
 use std::collections::HashMap;
 use std::f32::consts::TAU;
 

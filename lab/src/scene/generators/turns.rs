@@ -3,7 +3,8 @@
 //! A turn is a pair [c, s] of unit length, the cosine and sine of its angle: the composition of two is a product of complex
 //! numbers, and a random one needs no platform's sine.
 
-use crate::scene::{Instance, SplitMix64};
+use crate::random::SplitMix64;
+use crate::scene::Instance;
 
 /// Cosine and sine.
 pub type Turn = [f32; 2];

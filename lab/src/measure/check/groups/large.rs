@@ -3,8 +3,9 @@
 use super::passes::{reduction_is_right, scan_is_right, sort_is_right};
 use crate::measure::check::cases::{Cases, same_all};
 use crate::measure::check::corpus;
-use crate::measure::check::shapes::{Random, hard_rays, icosphere, tree_with};
+use crate::measure::check::shapes::{hard_rays, icosphere, tree_with};
 use crate::measure::check::twins::{compare, on_device, on_host};
+use crate::random::SplitMix64;
 use hedgerow::bvh::builder::Options;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::sah::Collapse;
@@ -29,7 +30,7 @@ pub fn large(cases: &mut Cases<'_>) {
     if count > room.min(MOST_ITEMS) {
         return cases.left_out(format!("{count} items: there is room for {room}"));
     }
-    let mut random = Random(3);
+    let mut random = SplitMix64::new(3);
     let keys: Vec<u64> = (0..count).map(|_| random.bits()).collect();
     let words: Vec<u32> = keys.iter().map(|key| (key >> 56) as u32).collect();
     cases.case(format!("scan of {count} words"), |device| scan_is_right(device, &words));

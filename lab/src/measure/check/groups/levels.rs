@@ -7,8 +7,9 @@ use crate::measure::check::cases::{Cases, Found, same, same_all};
 use crate::measure::check::matrices::{moved, rotation};
 use crate::measure::check::mixture::{ReadBack, mixture};
 use crate::measure::check::probe::{CONFIRM_ODD, ProbeRay};
-use crate::measure::check::shapes::{Random, boxes, soup};
+use crate::measure::check::shapes::{boxes, soup};
 use crate::measure::check::world::{BuiltWorld, Part, World};
+use crate::random::SplitMix64;
 use ash::vk::{self, Handle};
 use hedgerow::accel::{Instance, Options, Property, REBRAID, twin};
 use hedgerow::bvh::layout::{self, Bvh2, Record, Triangle};
@@ -19,9 +20,9 @@ use vk::GeometryFlagsKHR as GeometryFlags;
 type Range = vk::AccelerationStructureBuildRangeInfoKHR;
 
 fn rays(count: usize, spread: f32) -> Vec<ProbeRay> {
-    let mut random = Random(9);
+    let mut random = SplitMix64::new(9);
     let ray = |_| {
-        let (origin, target) = (random.point(8.0), random.point(spread));
+        let (origin, target) = (random.around(8.0), random.around(spread));
         let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
         ProbeRay { decision: CONFIRM_ODD, generated_t: 0.75, ..ray }
     };
@@ -102,9 +103,11 @@ fn bottom_level(device: &'static Device, before: &Part, after: &Part, in_place: 
 
 fn top_level_follows(device: &'static Device, count: usize) -> Found {
     let ours = Ours::on(device);
-    let mut random = Random(3);
+    let mut random = SplitMix64::new(3);
     let mut placed = || -> Vec<Instance> {
-        (0..count).map(|i| Instance::new(1 + i as u64 % 2, moved(rotation(random.bits()), random.point(4.0)))).collect()
+        (0..count)
+            .map(|i| Instance::new(1 + i as u64 % 2, moved(rotation(random.bits()), random.around(4.0))))
+            .collect()
     };
     let part = |count, seed| Part::Triangles(vec![(soup(count, 0.3, seed), GeometryFlags::OPAQUE)]);
     let parts = vec![part(12, 1), part(5, 2)];

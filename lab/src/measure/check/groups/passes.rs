@@ -4,7 +4,7 @@ use crate::device::Device;
 use crate::device::probe::{self, Findings};
 use crate::measure::check::cases::{Cases, Found, same, same_all};
 use crate::measure::check::corpus::unit_floats;
-use crate::measure::check::shapes::Random;
+use crate::random::SplitMix64;
 use crate::shaders;
 use hedgerow::gpu::Kernel;
 use hedgerow::gpu::radix_sort::{self, Shape, Sort};
@@ -50,7 +50,7 @@ pub fn scan_and_reduce(cases: &mut Cases<'_>) {
     let tuning = cases.device.tuning;
     let sizes = sizes(cases.quick, &[tuning.group * tuning.scan_rounds, tuning.group * tuning.reduce_rounds]);
     let most = sizes.last().copied().unwrap_or(0);
-    let mut random = Random(1);
+    let mut random = SplitMix64::new(1);
     let words: Vec<u32> = (0..most).map(|_| (random.bits() >> 52) as u32).collect();
     let mut next = unit_floats(1);
     let boxes: Vec<Bounds> = (0..most).map(|_| [[next(); 3], [next() + 1.0, next(), 2.0 * next()]]).collect();
@@ -87,7 +87,7 @@ pub(super) fn reduction_is_right(device: &Device, boxes: &[Bounds]) -> Found {
 /// Keys of 32 and 64 bits, of as many bits as matter, with equal ones, by both shapes.
 pub fn sort(cases: &mut Cases<'_>) {
     let most = if cases.quick { 20_000 } else { 300_001 };
-    let mut random = Random(2);
+    let mut random = SplitMix64::new(2);
     let keys: Vec<u64> = (0..most).map(|_| random.bits()).collect();
     for size in sizes(cases.quick, &[most as u32 - 1]) {
         cases.case(format!("{size} keys of 30 bits"), |device| sort_is_right(device, &keys[..size], 30));

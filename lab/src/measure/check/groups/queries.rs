@@ -6,8 +6,9 @@ use crate::measure::check::backend::Ours;
 use crate::measure::check::cases::{Cases, Found, same};
 use crate::measure::check::matrices::{Matrix, moved, rotation, scaled};
 use crate::measure::check::probe::{CONFIRM, CONFIRM_ODD, IGNORE, ProbeRay, TERMINATE, flags};
-use crate::measure::check::shapes::{Corners, Random, boxes as random_boxes, icosphere, soup};
+use crate::measure::check::shapes::{Corners, boxes as random_boxes, icosphere, soup};
 use crate::measure::check::world::{Part, World, inverse, transformed};
+use crate::random::SplitMix64;
 use ash::vk;
 use hedgerow::accel::{Instance, REBRAID};
 use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
@@ -26,7 +27,7 @@ fn triangles(corners: Corners, flags: GeometryFlags) -> Part {
 }
 
 /// A matrix that turns, shears, mirrors, scales and moves; not so flat that float32 has little to say of where a ray goes.
-fn any_matrix(random: &mut Random) -> Matrix {
+fn any_matrix(random: &mut SplitMix64) -> Matrix {
     loop {
         let m: Matrix = [(); 3].map(|()| [random.signed(), random.signed(), random.signed(), 4.0 * random.signed()]);
         if inverse(&m).iter().flatten().fold(0f64, |a, b| a.max(b.abs())) < 12.0 {
@@ -37,7 +38,7 @@ fn any_matrix(random: &mut Random) -> Matrix {
 
 /// Three parts of triangles and boxes, opaque or not, seen thirty times.
 fn mixed_world(seed: u64) -> World {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let none = GeometryFlags::empty();
     let parts = vec![
         Part::Triangles(vec![(soup(20, 0.5, seed), GeometryFlags::OPAQUE), (soup(15, 0.5, seed + 1), none)]),
@@ -69,9 +70,9 @@ fn mixed_world(seed: u64) -> World {
 }
 
 fn rays_of(seed: u64, count: usize) -> Vec<ProbeRay> {
-    let mut random = Random(seed);
+    let mut random = SplitMix64::new(seed);
     let ray = |_| {
-        let (origin, target) = (random.point(6.0), random.point(3.0));
+        let (origin, target) = (random.around(6.0), random.around(3.0));
         let scale = 10f32.powf(2.0 * random.signed());
         ProbeRay::new(origin, std::array::from_fn(|k| scale * (target[k] - origin[k])))
     };
@@ -156,10 +157,10 @@ pub fn facing(cases: &mut Cases<'_>) {
     let sphere: Corners = icosphere(2).into_iter().map(outward).collect();
     let kinds = [Flags::empty(), Flags::TRIANGLE_FLIP_FACING, Flags::TRIANGLE_FACING_CULL_DISABLE];
     let mirrored = scaled(rotation(2), [-1.0, 1.0, 1.0]);
-    let mut random = Random(6);
+    let mut random = SplitMix64::new(6);
     let rays: Vec<ProbeRay> = (0..180)
         .map(|i| {
-            let way = random.point(1.0);
+            let way = random.around(1.0);
             let flags = [flags::NONE, flags::CULL_BACK, flags::CULL_FRONT][i % 3];
             ProbeRay { flags, ..ProbeRay::new(way.map(|x| -6.0 * x), way.map(|x| 1.01 * x + 0.003)) }
         })
@@ -177,11 +178,11 @@ pub fn facing(cases: &mut Cases<'_>) {
 
 /// Rays in the space of an object in −1..1, brought to the world by its matrix.
 fn rays_at(matrix: &Matrix, count: usize) -> Vec<ProbeRay> {
-    let mut random = Random(5);
+    let mut random = SplitMix64::new(5);
     let to_world = matrix.map(|row| row.map(f64::from));
     let bring = |p: [f32; 3], w| transformed(&to_world, p.map(f64::from), w).map(|x| x as f32);
     let ray = |i: usize| {
-        let (origin, target) = (random.point([3.0, 0.7][i / 2 % 2]), random.point(0.8));
+        let (origin, target) = (random.around([3.0, 0.7][i / 2 % 2]), random.around(0.8));
         let way = std::array::from_fn(|k| target[k] - origin[k]);
         let (flags, decision) = [(flags::SKIP_BOXES, CONFIRM), (flags::NO_OPAQUE, IGNORE)][i % 2];
         ProbeRay { flags, decision, ..ProbeRay::new(bring(origin, 1.0), bring(way, 0.0)) }
@@ -224,18 +225,18 @@ fn forest(cases: &mut Cases<'_>) {
         [[0.3, -0.3, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 2.0]],
         [[0.0, 0.3, 0.0], [-0.3, -0.3, 0.0], [0.0, 0.0, 2.0]],
     ];
-    let mut random = Random(21);
+    let mut random = SplitMix64::new(21);
     let mut place = |i: u64| {
         let (s, c) = (std::f32::consts::PI * random.signed()).sin_cos();
         let size = 1.0 + 0.5 * random.signed();
-        let [x, y, _] = random.point(150.0);
+        let [x, y, _] = random.around(150.0);
         let rows = [[c * size, -s * size, 0.0, x], [s * size, c * size, 0.0, y], [0.0, 0.0, size, 0.0]];
         Instance::new(1 + i % 2, rows).with_index_and_mask(i as u32, 1 << (i % 3))
     };
     let instances: Vec<Instance> = (0..count).map(&mut place).collect();
     let opaque = GeometryFlags::OPAQUE;
     let world = World::new(vec![triangles(tree, opaque), triangles(soup(4, 0.6, 2), opaque)], instances);
-    let mut random = Random(22);
+    let mut random = SplitMix64::new(22);
     let rays: Vec<ProbeRay> = (0..100)
         .map(|i| {
             let aim = world.instances[random.bits() as usize % count as usize].transform;
@@ -251,10 +252,10 @@ fn forest(cases: &mut Cases<'_>) {
 /// Boxes as candidates, hits that the shader generates among triangles, and primitives and instances that are left out.
 pub fn boxes(cases: &mut Cases<'_>) {
     let none = GeometryFlags::empty();
-    let mut random = Random(12);
+    let mut random = SplitMix64::new(12);
     let rays: Vec<ProbeRay> = (0..600)
         .map(|i| {
-            let (origin, target) = (random.point(3.0), random.point(0.7));
+            let (origin, target) = (random.around(3.0), random.around(0.7));
             let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
             ProbeRay {
                 decision: [CONFIRM, IGNORE][i / 6 % 2],

@@ -24,6 +24,21 @@ impl SplitMix64 {
         (self.bits() >> 40) as f32 * (1.0 / (1 << 24) as f32)
     }
 
+    /// Uniform in 0..1, a multiple of 2^-53.
+    pub fn fine_unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 * (-53f64).exp2()
+    }
+
+    /// Uniform in −1..1, a multiple of 2^-23.
+    pub fn signed(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 * 2f32.powi(-23) - 1.0
+    }
+
+    /// Uniform in a cube around the origin, of twice `scale`.
+    pub fn around(&mut self, scale: f32) -> [f32; 3] {
+        [(); 3].map(|()| self.signed() * scale)
+    }
+
     /// Uniform in `lo`..`hi`.
     pub fn within(&mut self, lo: f32, hi: f32) -> f32 {
         lo + (hi - lo) * self.unit()
