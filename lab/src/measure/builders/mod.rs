@@ -303,7 +303,7 @@ mod tests {
     fn what_is_wrong_is_named_with_what_there_is() {
         assert!(error_of("lvbh").contains("no builder is called \"lvbh\"; there are"));
         assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));
-        assert!(error_of("lbvh-host:collapse=maybe").contains("take sah or off"));
+        assert!(error_of("lbvh-host:collapse=maybe").contains("use sah or off"));
         assert!(error_of("lbvh:width=3").contains("width=3 is unknown; use 2, 4, 8 or 8q"));
         assert!(error_of("lbvh:width=4:order=octant").contains("order=octant is unknown; use distance or octant (of"));
         for wrong in ["lots", "-0.1", "1.5", "nan", "0.3/0", "0.3/x"] {
