@@ -69,7 +69,7 @@ fn run(tuning: TuningChoice) -> Vec<Kernel> {
 }
 
 fn bound(kernel: &Kernel) -> Duration {
-    let does_everything = ["_persistent", "_workgroup"].iter().any(|end| kernel.name().ends_with(end));
+    let does_everything = ["persistent", "workgroup"].iter().any(|end| kernel.name().ends_with(end));
     BOUNDS[usize::from(does_everything)]
 }
 
