@@ -14,7 +14,9 @@ git ls-files -z | xargs -0 cp --parents -t "$stage"
 # Where build.rs has put the shaders of these sources.
 out=$("$cargo" build --release -p hedgerow --features compile-shaders --message-format json |
   grep -oE '"out_dir":"[^"]*/build/hedgerow-[0-9a-f]+/out"' | tail -n 1 | cut -d '"' -f 4)
-cp "$out"/*.spv "$out/arguments.rs" "$stage/spirv"
+# OUT_DIR may also hold shaders of former builds; the table names those of this one.
+grep -oE 'include_bytes!\("[^"]+"\)' "$out/shaders.rs" | cut -d '"' -f 2 | xargs cp -t "$stage/spirv"
+cp "$out/arguments.rs" "$stage/spirv"
 
 (cd "$stage" && "$cargo" package --quiet --offline -p hedgerow --no-verify --target-dir "$target/package/build")
 package=$(ls -t "$target"/package/build/package/hedgerow-*.crate | head -n 1)

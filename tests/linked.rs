@@ -27,7 +27,7 @@ fn who_traces_has_no_shader_of_a_builder() {
     let tests = std::env::current_exe().expect("the path of this program");
     let examples = tests.ancestors().nth(2).expect("it lies in PROFILE/deps").join("examples");
     let linked = linked(&examples.join(format!("trace_only{}", std::env::consts::EXE_SUFFIX)));
-    assert!(linked.iter().any(|name| name == "trace.tracer_single"), "what is reached is there: {linked:?}");
+    assert!(linked.iter().any(|name| name == "trace.tracer.single"), "what is reached is there: {linked:?}");
     let others: Vec<_> =
         linked.iter().filter(|name| !name.starts_with("trace.") && !name.starts_with("example")).collect();
     assert!(others.is_empty(), "{others:?}");
