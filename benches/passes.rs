@@ -18,11 +18,11 @@ use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::Result;
 use hedgerow_lab::device::{Buffer, Device, DeviceOptions, DriverTracing};
-use hedgerow_lab::measure::experiments::batch::{Batch, Workload};
-use hedgerow_lab::measure::experiments::points::Way;
-use hedgerow_lab::measure::structures::Structures;
+use hedgerow_lab::experiments::accel::batch::{Batch, Workload};
+use hedgerow_lab::experiments::accel::points::Way;
 use hedgerow_lab::rays::kinds::{self, RayKind, RayOptions};
 use hedgerow_lab::scene::{self, LoadOptions, Scene};
+use hedgerow_lab::subjects::structures::Structures;
 
 const SIZE: [u32; 2] = [256, 192];
 

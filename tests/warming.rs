@@ -7,8 +7,8 @@ use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::geometry::Geometry;
 use hedgerow::gpu::TuningChoice;
 use hedgerow_lab::device::{Device, DeviceOptions};
-use hedgerow_lab::measure::builders::Spec;
 use hedgerow_lab::scene::Mesh;
+use hedgerow_lab::subjects::builders::Spec;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 
 /// A device that has no pipelines yet, by this tuning.

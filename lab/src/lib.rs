@@ -3,9 +3,11 @@
 //! 1. [`scene`] reads triangles from files or generates them;
 //! 2. [`device`] opens a Vulkan device, with its memory;
 //! 3. [`rays`] makes the rays that are measured, and reads and writes files of them;
-//! 4. [`measure`] turns builds and hits into figures, finds where methods give way (`stability`) and which to take (`choose`);
-//! 5. [`report`] turns figures into tables and charts;
-//! 6. [`cli`] is the binary's commands.
+//! 4. [`subjects`] is what is measured: builders of ours, of the host and of others, behind one interface;
+//! 5. [`measure`] makes figures fair and keeps them as records;
+//! 6. [`report`] turns figures into tables, charts and pages;
+//! 7. [`experiments`] has a folder for each experiment: its measuring, its records, its page and its command;
+//! 8. [`cli`] is the binary: options that commands share, and those that print and keep nothing else.
 #![warn(missing_docs)]
 
 #[doc(hidden)]
@@ -13,11 +15,13 @@ pub mod arguments;
 pub mod cli;
 pub mod device;
 mod error;
+pub mod experiments;
 pub mod measure;
 pub mod random;
 pub mod rays;
 pub mod report;
 pub mod scene;
 pub mod shaders;
+pub mod subjects;
 
 pub use error::{Error, Result};

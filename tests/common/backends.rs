@@ -8,7 +8,7 @@ use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
 use hedgerow::gpu::Recorder;
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::device::{Device, DriverRays, DriverTracing};
-pub use hedgerow_lab::measure::check::backend::{Backend, BuildInfo, Built, Ours, Ranges};
+pub use hedgerow_lab::experiments::check::backend::{Backend, BuildInfo, Built, Ours, Ranges};
 
 /// Ours, and the driver's where the device has it with ray queries, which shaders of engines ask.
 pub fn backends() -> Vec<Box<dyn Backend>> {

@@ -6,8 +6,8 @@ pub mod geometries;
 pub mod probe;
 pub mod twins;
 
-pub use hedgerow_lab::measure::check::traced::traced;
-pub use hedgerow_lab::measure::check::{agree, corpus, matrices, mixture, shapes, world};
+pub use hedgerow_lab::experiments::check::traced::traced;
+pub use hedgerow_lab::experiments::check::{agree, corpus, matrices, mixture, shapes, world};
 
 use hedgerow::gpu::TuningChoice;
 use hedgerow_lab::device::{Device, DeviceOptions, DriverTracing, Restrict};

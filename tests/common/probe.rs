@@ -2,7 +2,7 @@
 
 use super::device;
 use hedgerow::trace::{Hit, Ray};
-pub use hedgerow_lab::measure::check::probe::*;
+pub use hedgerow_lab::experiments::check::probe::*;
 use hedgerow_lab::{arguments, shaders};
 
 /// Of the driver's structures.

@@ -4,8 +4,8 @@ use super::corpus::Mesh;
 use super::device;
 use hedgerow::bvh::builder::{Input, Options};
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow_lab::measure::check::twins;
-pub use hedgerow_lab::measure::check::twins::{PLENTY, PLENTY_TO_MERGE, on_host};
+use hedgerow_lab::experiments::check::twins;
+pub use hedgerow_lab::experiments::check::twins::{PLENTY, PLENTY_TO_MERGE, on_host};
 
 /// The device's tree over `input`.
 pub fn built(options: &Options, input: &Input) -> Bvh2 {

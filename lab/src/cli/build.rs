@@ -2,8 +2,8 @@
 
 use super::options::{Builders, Costs};
 use super::{Common, Json, tables, work};
+use crate::experiments::bench::matrix::Plan;
 use crate::measure::copy;
-use crate::measure::matrix::Plan;
 use crate::measure::overlap::Epo;
 use crate::rays::kinds::RayOptions;
 use anyhow::{Context, bail};

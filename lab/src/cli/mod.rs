@@ -1,27 +1,27 @@
-//! The commands of the binary, one file each. What they print and when they fail is fixed in the README's contract:
+//! The commands of the binary. Those of an [experiment](crate::experiments) stand with it, the others here, one file each. What they print and when they fail is fixed in the README's contract:
 //! results to stdout, progress and diagnostics to stderr, exit status 0 done, 1 the work failed, 2 the arguments are wrong.
 
-mod accel;
-mod animate;
-mod bench;
 mod build;
-mod check;
 mod choose;
-mod compare;
 mod devices;
-mod navigate;
-mod options;
+pub(crate) mod options;
 mod output;
 mod rays;
 mod render;
-mod report;
-mod stability;
 mod tables;
 mod trace;
-mod work;
+pub(crate) mod work;
 
-use crate::measure::builders;
+use crate::experiments::accel::command as accel;
+use crate::experiments::animate::command as animate;
+use crate::experiments::bench::command as bench;
+use crate::experiments::check::command as check;
+use crate::experiments::compare::command as compare;
+use crate::experiments::navigate::command as navigate;
+use crate::experiments::report::command as report;
+use crate::experiments::stability::command as stability;
 use crate::scene;
+use crate::subjects::builders;
 use clap::Parser;
 use std::process::ExitCode;
 

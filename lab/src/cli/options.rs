@@ -2,9 +2,9 @@
 
 use super::Bar;
 use crate::device::{Device, DeviceOptions, DriverTracing};
-use crate::measure::builders::{self, Spec};
 use crate::rays::kinds::{RayKind, RayOptions};
 use crate::scene::{self, Camera, DynamicScene, Scene};
+use crate::subjects::builders::{self, Spec};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use hedgerow::gpu::TuningChoice;
 use std::num::NonZeroUsize;

@@ -1,9 +1,9 @@
 //! `hedgerow render`: a picture of a scene, or of the work that its rays take.
 
 use super::{Bar, Common, Size, work};
-use crate::measure::builders::Spec;
 use crate::report::picture::{PictureOptions, View, picture};
 use crate::scene::Scene;
+use crate::subjects::builders::Spec;
 use anyhow::Context;
 use std::path::PathBuf;
 

@@ -1,6 +1,6 @@
 //! Records as tables for the terminal.
 
-use crate::measure::matrix::Outcome;
+use crate::experiments::bench::matrix::Outcome;
 use crate::measure::record::Record;
 use crate::report::numbers::{bytes, duration, grouped, three_digits};
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};

@@ -2,12 +2,12 @@
 
 use super::options::{Builders, Kinds};
 use super::{Common, Json, Size, tables, work};
-use crate::measure::builders::Spec;
-use crate::measure::matrix::Plan;
+use crate::experiments::bench::matrix::Plan;
 use crate::measure::overlap::Epo;
 use crate::rays::files;
 use crate::report::numbers::{grouped, three_digits};
 use crate::scene::Scene;
+use crate::subjects::builders::Spec;
 use hedgerow::trace::Query;
 use std::io::Write;
 use std::num::NonZeroU32;

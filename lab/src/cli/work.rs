@@ -2,9 +2,9 @@
 
 use super::{Bar, Common};
 use crate::device::{Device, probe};
-use crate::measure::builders::{Needs, Spec};
-use crate::measure::matrix::{self, Outcome, Plan};
+use crate::experiments::bench::matrix::{self, Outcome, Plan};
 use crate::scene::Scene;
+use crate::subjects::builders::{Needs, Spec};
 use anyhow::bail;
 
 /// Opens the device if one of `builders` needs one.

@@ -15,7 +15,7 @@ const RUNS: u32 = 5;
 const WORKGROUP: u32 = 256;
 
 /// What the shader takes to copy `count` times 16 bytes.
-pub(super) fn arguments(source: u64, target: u64, count: u32) -> arguments::CopyWords {
+pub(crate) fn arguments(source: u64, target: u64, count: u32) -> arguments::CopyWords {
     arguments::CopyWords { source, target, count }
 }
 

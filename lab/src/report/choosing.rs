@@ -8,7 +8,7 @@ use crate::measure::record::Record;
 use maud::{Markup, html};
 
 /// Empty where nothing was chosen, or nothing that was chosen was measured.
-pub(super) fn section(choices: &[Choice], records: &[&Record]) -> Markup {
+pub(crate) fn section(choices: &[Choice], records: &[&Record]) -> Markup {
     let taken: Vec<Taken> = records.iter().filter_map(|record| Taken::of(record)).collect();
     let pairs = hindsight::pairs(choices, &taken);
     let Some(part) = hindsight::good_part(&pairs) else { return html! {} };

@@ -7,8 +7,8 @@
 use crate::common::device;
 use crate::conditional::needs;
 use hedgerow::bvh::codes::{Code, Codes};
-use hedgerow_lab::measure::builders::{Needs, Spec};
 use hedgerow_lab::scene::{self, LoadOptions, Scene};
+use hedgerow_lab::subjects::builders::{Needs, Spec};
 
 crate::conditional::tests! {
     lbvh_costs_are_those_of_an_independent_program_within_half_a_percent: needs::scenes(),

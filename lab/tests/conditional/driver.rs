@@ -9,13 +9,13 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::device::{Device, DeviceOptions, DriverPreference, DriverTracing, Restrict};
-use hedgerow_lab::measure::Subject;
 use hedgerow_lab::measure::agreement::wrong_where_different;
-use hedgerow_lab::measure::builders::Spec;
-use hedgerow_lab::measure::levels::Levels;
-use hedgerow_lab::measure::peers::driver::Driver;
-use hedgerow_lab::measure::structures::Structures;
 use hedgerow_lab::scene::{self, Mesh};
+use hedgerow_lab::subjects::Subject;
+use hedgerow_lab::subjects::builders::Spec;
+use hedgerow_lab::subjects::levels::Levels;
+use hedgerow_lab::subjects::peers::driver::Driver;
+use hedgerow_lab::subjects::structures::Structures;
 use std::sync::OnceLock;
 
 crate::conditional::tests! {

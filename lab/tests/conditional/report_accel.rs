@@ -2,11 +2,11 @@
 
 use crate::browser::Browser;
 use crate::conditional::needs;
-use hedgerow_lab::measure::experiments::points::{
+use hedgerow_lab::experiments::accel::page::{self, Points};
+use hedgerow_lab::experiments::accel::points::{
     Batch, BraidedRays, Entry, Failure, Maker, Rebraid, Setting, Side, TopLevel, Update, UpdatedRays, Way, Work,
 };
 use hedgerow_lab::measure::statistics::Spread;
-use hedgerow_lab::report::accel::{self, Points};
 use std::path::Path;
 
 crate::conditional::tests! {
@@ -138,22 +138,22 @@ fn page_of(folder: &Path, entries: &[Entry]) -> String {
     for entry in entries {
         points.append(entry.clone()).expect("written");
     }
-    std::fs::read_to_string(accel::write(folder).expect("the page is written")).expect("just written")
+    std::fs::read_to_string(page::write(folder).expect("the page is written")).expect("just written")
 }
 
 fn records_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let entries = entries();
     page_of(folder.path(), &entries);
-    assert_eq!(accel::read(folder.path()).expect("written"), entries);
+    assert_eq!(page::read(folder.path()).expect("written"), entries);
     let path = folder.path().join("accel.jsonl");
     let first = std::fs::read_to_string(&path).expect("written");
     let first = first.lines().nth(1).expect("a point");
     std::fs::write(&path, format!("{first}\n{}\n", first.replace("\"batch\"", "\"hedge\""))).expect("written");
-    let error = accel::read(&path).expect_err("no such experiment").to_string();
+    let error = page::read(&path).expect_err("no such experiment").to_string();
     assert!(error.contains("accel.jsonl:2: not a record") && error.contains("hedgerow accel"), "{error}");
     std::fs::write(&path, first.replace("\"schema\":1", "\"schema\":2")).expect("written");
-    let error = accel::read(&path).expect_err("another schema").to_string();
+    let error = page::read(&path).expect_err("another schema").to_string();
     assert!(error.contains("accel.jsonl:1: schema 2, this program reads 1"), "{error}");
 }
 

@@ -2,11 +2,11 @@
 
 use crate::browser::Browser;
 use crate::conditional::needs;
-use hedgerow_lab::measure::animate::Way;
-use hedgerow_lab::measure::animate::points::{Animated, Entry, Failure, Object, Rays, Setting};
+use hedgerow_lab::experiments::animate::Way;
+use hedgerow_lab::experiments::animate::page::{self, Points};
+use hedgerow_lab::experiments::animate::points::{Animated, Entry, Failure, Object, Rays, Setting};
 use hedgerow_lab::measure::record::Memory;
 use hedgerow_lab::measure::statistics::Spread;
-use hedgerow_lab::report::animate::{self, Points};
 use std::path::Path;
 
 crate::conditional::tests! {
@@ -93,14 +93,14 @@ fn page_of(folder: &Path, entries: &[Entry]) -> String {
         points.append(entry.clone()).expect("written");
     }
     image::RgbImage::new(4, 3).save(folder.join("frame-0000.png")).expect("a picture");
-    std::fs::read_to_string(animate::write(folder).expect("the page is written")).expect("just written")
+    std::fs::read_to_string(page::write(folder).expect("the page is written")).expect("just written")
 }
 
 fn records_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let entries = entries();
     page_of(folder.path(), &entries);
-    assert_eq!(animate::read(folder.path()).expect("written"), entries);
+    assert_eq!(page::read(folder.path()).expect("written"), entries);
     let path = folder.path().join("animate.jsonl");
     let lines = std::fs::read_to_string(&path).expect("written");
     let first = lines.lines().nth(1).expect("a frame");
@@ -110,7 +110,7 @@ fn records_are_read_back_as_they_were_written() {
         (&1.into(), &"animate".into(), &"rebuild".into())
     );
     std::fs::write(&path, first.replace("\"schema\":1", "\"schema\":2")).expect("written");
-    let error = animate::read(&path).expect_err("another schema").to_string();
+    let error = page::read(&path).expect_err("another schema").to_string();
     assert!(
         error.contains("animate.jsonl:1: schema 2, this program reads 1") && error.contains("hedgerow animate"),
         "{error}"

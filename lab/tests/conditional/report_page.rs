@@ -2,10 +2,11 @@
 
 use crate::browser::Browser;
 use crate::conditional::needs;
+use hedgerow_lab::experiments::bench::matrix::{Failure, Outcome};
+use hedgerow_lab::experiments::bench::page::{Picture, Report};
+use hedgerow_lab::experiments::bench::{kd_trees, results};
 use hedgerow_lab::measure::choose::hindsight::Choice;
-use hedgerow_lab::measure::matrix::{Failure, Outcome};
 use hedgerow_lab::measure::record::{Build, Memory, Phase, Quality, Record, SCHEMA, Trace};
-use hedgerow_lab::report::{Picture, Report, kd_trees, results};
 use std::path::{Path, PathBuf};
 
 crate::conditional::tests! {

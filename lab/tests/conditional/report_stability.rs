@@ -2,11 +2,11 @@
 
 use crate::browser::Browser;
 use crate::conditional::needs;
-use hedgerow_lab::measure::stability::far::Side;
-use hedgerow_lab::measure::stability::large::Placement;
-use hedgerow_lab::measure::stability::points::{Degenerate, Failure, Growth, Head, Large, Run};
+use hedgerow_lab::experiments::stability::far::Side;
+use hedgerow_lab::experiments::stability::large::Placement;
+use hedgerow_lab::experiments::stability::page::{self, Paged, Points};
+use hedgerow_lab::experiments::stability::points::{Degenerate, Failure, Growth, Head, Large, Run};
 use hedgerow_lab::measure::statistics::Spread;
-use hedgerow_lab::report::stability::{self, Paged, Points};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -148,16 +148,16 @@ fn records_are_read_back_as_they_were_written() {
     page_of(folder.path(), &growth());
     page_of(folder.path(), &large());
     page_of(folder.path(), &degenerate());
-    assert_eq!(stability::read::<Growth>(folder.path()).expect("written"), growth());
-    assert_eq!(stability::read::<Large>(folder.path()).expect("written"), large());
-    assert_eq!(stability::read::<Degenerate>(folder.path()).expect("written"), degenerate());
+    assert_eq!(page::read::<Growth>(folder.path()).expect("written"), growth());
+    assert_eq!(page::read::<Large>(folder.path()).expect("written"), large());
+    assert_eq!(page::read::<Degenerate>(folder.path()).expect("written"), degenerate());
     let path = folder.path().join("growth.jsonl");
     let first = std::fs::read_to_string(&path).expect("written").lines().next().expect("a point").to_owned();
     std::fs::write(&path, format!("{first}\n{}\n", first.replace("\"growth\"", "\"large\""))).expect("written");
-    let error = stability::read::<Growth>(&path).expect_err("another experiment").to_string();
+    let error = page::read::<Growth>(&path).expect_err("another experiment").to_string();
     assert!(error.contains("growth.jsonl:2: experiment \"large\""), "{error}");
     std::fs::write(&path, first.replace("\"schema\":1", "\"schema\":2")).expect("written");
-    let error = stability::read::<Growth>(&path).expect_err("another schema").to_string();
+    let error = page::read::<Growth>(&path).expect_err("another schema").to_string();
     assert!(error.contains("growth.jsonl:1: schema 2, this program reads 1"), "{error}");
 }
 
@@ -195,7 +195,7 @@ fn few_points_and_none_make_a_page_all_the_same() {
     }
     // A run that was ended before its end.
     std::fs::remove_file(folder.path().join("large.run.json")).expect("just written");
-    stability::write_all(folder.path()).expect("written");
+    page::write_all(folder.path()).expect("written");
     let page = std::fs::read_to_string(folder.path().join("large.html")).expect("written");
     assert!(crate::pages::text(&page, " ").contains("ended before its end"));
 }

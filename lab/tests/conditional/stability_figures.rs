@@ -5,13 +5,13 @@
 //! HEDGEROW_SCENES names its folder.
 
 use crate::conditional::needs;
-use hedgerow_lab::measure::builders;
-use hedgerow_lab::measure::stability::far::{Axes, Side};
-use hedgerow_lab::measure::stability::growth::{self, Plan};
-use hedgerow_lab::measure::stability::points::Growth;
-use hedgerow_lab::measure::stability::relative::Stage;
+use hedgerow_lab::experiments::stability::far::{Axes, Side};
+use hedgerow_lab::experiments::stability::growth::{self, Plan};
+use hedgerow_lab::experiments::stability::points::Growth;
+use hedgerow_lab::experiments::stability::relative::Stage;
 use hedgerow_lab::rays::kinds::RayOptions;
 use hedgerow_lab::scene::{self, LoadOptions, Scene};
+use hedgerow_lab::subjects::builders;
 
 crate::conditional::tests! {
     costs_are_those_of_an_independent_program_on_either_side: needs::scene("bunny"),

@@ -3,8 +3,8 @@
 use crate::conditional::needs;
 use hedgerow::gpu::TuningChoice;
 use hedgerow_lab::device::{Device, DeviceOptions};
-use hedgerow_lab::measure::builders::Spec;
 use hedgerow_lab::scene::{self, LoadOptions, Scene};
+use hedgerow_lab::subjects::builders::Spec;
 
 crate::conditional::tests! {
     linear_builds_give_the_same_bytes_by_either_tuning: needs::no_tuning(),

@@ -1,7 +1,7 @@
 //! `hedgerow accel`: the records and the page that it leaves, how `hedgerow bench` finds them, and what is refused.
 
-use hedgerow_lab::measure::experiments::points::{Entry, Maker, Way};
-use hedgerow_lab::report::accel;
+use hedgerow_lab::experiments::accel::page;
+use hedgerow_lab::experiments::accel::points::{Entry, Maker, Way};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -29,7 +29,7 @@ fn a_run_leaves_records_of_every_experiment_and_a_page_of_them() {
     assert_eq!(done.status.code(), Some(0), "{}", err(&done));
     let page = folder.path().join("accel.html");
     assert_eq!(String::from_utf8_lossy(&done.stdout).trim(), page.display().to_string());
-    let entries = accel::read(folder.path()).expect("records");
+    let entries = page::read(folder.path()).expect("records");
     assert!(matches!(&entries[0], Entry::Setting(setting) if setting.command.starts_with("hedgerow accel")));
     let is_ours = |maker: Maker| maker == Maker::Ours;
     let (mut batches, mut top_levels, mut frames, mut rebraids) = (Vec::new(), Vec::new(), Vec::new(), 0);
@@ -86,7 +86,7 @@ fn one_experiment_is_measured_alone() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let done = tiny(folder.path(), &["--experiments", "tlas"]);
     assert_eq!(done.status.code(), Some(0), "{}", err(&done));
-    let entries = accel::read(folder.path()).expect("records");
+    let entries = page::read(folder.path()).expect("records");
     assert!(entries[1..].iter().all(|entry| matches!(entry, Entry::Tlas(_))) && entries.len() > 2, "{entries:?}");
 }
 

@@ -1,8 +1,8 @@
 //! `hedgerow animate`: the records, pictures and page that it leaves, that all ways find the same, and what is refused.
 
-use hedgerow_lab::measure::animate::Way;
-use hedgerow_lab::measure::animate::points::{Animated, Entry, Setting};
-use hedgerow_lab::report::animate;
+use hedgerow_lab::experiments::animate::Way;
+use hedgerow_lab::experiments::animate::page;
+use hedgerow_lab::experiments::animate::points::{Animated, Entry, Setting};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -50,7 +50,7 @@ fn scene_in(folder: &Path, content: &str) -> String {
 
 /// The setting and the frames; there are no failures.
 fn measured(folder: &Path) -> (Setting, Vec<Animated>) {
-    let mut entries = animate::read(folder).expect("records").into_iter();
+    let mut entries = page::read(folder).expect("records").into_iter();
     let Some(Entry::Setting(setting)) = entries.next() else { panic!("the first line is the setting") };
     let frame = |entry| match entry {
         Entry::Animate(frame) => frame,
@@ -138,7 +138,7 @@ fn an_animation_of_which_nothing_stands_still_is_measured_but_for_merging() {
     let done = tiny("gen:twist:400:5", folder.path(), &["--frames", "2", "--png", "off"]);
     assert_eq!(done.status.code(), Some(1), "{}", err(&done));
     assert!(err(&done).contains("merge: gen:twist:400:5: nothing in it stands still"), "{}", err(&done));
-    let entries = animate::read(folder.path()).expect("records");
+    let entries = page::read(folder.path()).expect("records");
     let frames = entries.iter().filter(|entry| matches!(entry, Entry::Animate(frame) if frame.trace[0].different == 0));
     assert_eq!(frames.count(), 2 * 4);
     let page = std::fs::read_to_string(folder.path().join("animate.html")).expect("written");

@@ -1,7 +1,7 @@
 //! `hedgerow bench` and `hedgerow compare`: what is written, what is refused, and what goes on when something fails.
 
+use hedgerow_lab::experiments::bench::results;
 use hedgerow_lab::measure::record::Record;
-use hedgerow_lab::report::results;
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -1,6 +1,6 @@
 //! `hedgerow check`: what is right passes, and whatever happens to a group is reported while the rest goes on.
 
-use hedgerow_lab::measure::check::{GROUPS, Record};
+use hedgerow_lab::experiments::check::{GROUPS, Record};
 use std::process::{Command, Output};
 
 fn check(arguments: &[&str], faults: &str) -> Output {
@@ -45,7 +45,7 @@ fn groups_that_crash_hang_differ_or_panic_fail_and_the_rest_goes_on() {
         "in: it aborts",
         "no end after 20 s, in: it waits",
         "two words: word 1: 7, expected 2",
-        "it panics: no device is like this (lab/src/measure/check/groups/faults.rs:",
+        "it panics: no device is like this (lab/src/experiments/check/groups/faults.rs:",
     ] {
         assert!(text.contains(says), "{says}: {text}");
     }

@@ -7,9 +7,9 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray};
-use hedgerow_lab::measure::Subject;
 use hedgerow_lab::measure::agreement::wrong_where_different;
 use hedgerow_lab::scene::{self, Mesh};
+use hedgerow_lab::subjects::Subject;
 
 fn soup() -> Mesh {
     scene::load("gen:soup:3000:7", &scene::LoadOptions::default()).expect("a generator").mesh
@@ -67,7 +67,7 @@ fn finds_our_hits(mut peer: impl Subject) {
 #[cfg(feature = "peer-obvhs")]
 mod obvhs {
     use super::*;
-    use hedgerow_lab::measure::peers::obvhs::{Obvhs, Preset};
+    use hedgerow_lab::subjects::peers::obvhs::{Obvhs, Preset};
 
     #[test]
     fn obvhs_finds_our_hits() {
@@ -95,7 +95,7 @@ mod obvhs {
 #[cfg(feature = "peer-embree")]
 mod embree {
     use super::*;
-    use hedgerow_lab::measure::peers::embree::{Embree, Preset};
+    use hedgerow_lab::subjects::peers::embree::{Embree, Preset};
 
     #[test]
     fn embree_finds_our_hits() {

@@ -1,7 +1,7 @@
 //! `hedgerow bench --shard I/N` and `hedgerow report`: shares joined are the whole, and devices stay apart.
 
+use hedgerow_lab::experiments::bench::results;
 use hedgerow_lab::measure::record::Record;
-use hedgerow_lab::report::results;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 

@@ -1,9 +1,9 @@
 //! `hedgerow stability`: the records and pages that it leaves, how pages name each other, and what is refused.
 
-use hedgerow_lab::measure::stability::far::Side;
-use hedgerow_lab::measure::stability::large::Placement;
-use hedgerow_lab::measure::stability::points::{Degenerate, Growth, Large};
-use hedgerow_lab::report::stability;
+use hedgerow_lab::experiments::stability::far::Side;
+use hedgerow_lab::experiments::stability::large::Placement;
+use hedgerow_lab::experiments::stability::page;
+use hedgerow_lab::experiments::stability::points::{Degenerate, Growth, Large};
 use hedgerow_lab::scene;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -37,7 +37,7 @@ fn growth_leaves_a_point_for_every_builder_manner_and_step() {
     let arguments =
         [&["stability", "growth", "gen:soup:3000:1", "-b", builders, "--steps", "20,45"], &size[..]].concat();
     let page = done(&arguments, folder.path(), "growth.html");
-    let points: Vec<Growth> = stability::read(folder.path()).expect("records");
+    let points: Vec<Growth> = page::read(folder.path()).expect("records");
     assert_eq!(points.len(), 2 * 2 * 2 * 3);
     for point in &points {
         assert_eq!(point.scene, "gen:soup:3000:1");
@@ -63,7 +63,7 @@ fn growth_leaves_a_point_for_every_builder_manner_and_step() {
             assert!(folder.path().join(format!("charts/{chart}.{ending}")).is_file(), "{chart}.{ending}");
         }
     }
-    let run = stability::read_run::<Growth>(folder.path()).expect("read").expect("written");
+    let run = page::read_run::<Growth>(folder.path()).expect("read").expect("written");
     assert!(run.command.starts_with("hedgerow stability growth") && run.device.is_some(), "{run:?}");
     assert_eq!((run.failures, run.notes), (vec![], vec![]));
 }
@@ -75,7 +75,7 @@ fn large_triangles_stand_where_they_are_asked_for() {
     let arguments =
         ["stability", "large", "gen:soup:300:1", "-b", builders, "--steps", "20/10", "--counts", "2", "--no-rays"];
     done(&arguments, folder.path(), "large.html");
-    let points: Vec<Large> = stability::read(folder.path()).expect("records");
+    let points: Vec<Large> = page::read(folder.path()).expect("records");
     assert_eq!(points.len(), 3 * 2 * 3);
     let cost = |codes: &str, placement| {
         let find = |p: &&Large| p.builder.contains(codes) && p.placement == placement && p.e == 20;
@@ -97,7 +97,7 @@ fn degenerate_scenes_are_built_the_same_every_time_and_pages_name_each_other() {
     let small =
         ["stability", "degenerate", "--triangles", "70", "--builds", "3", "-b", "lbvh,lbvh:collapse=off,lbvh-host"];
     let page = done(&small, folder.path(), "degenerate.html");
-    let points: Vec<Degenerate> = stability::read(folder.path()).expect("records");
+    let points: Vec<Degenerate> = page::read(folder.path()).expect("records");
     assert_eq!(points.len(), 3 * scene::degenerate(0).len());
     for point in &points {
         assert!(!point.has_failed() && point.same_bytes == Some(true) && point.valid == Some(true), "{point:?}");
@@ -123,7 +123,7 @@ fn points_beyond_the_floats_are_left_out_and_said_so() {
     let arguments =
         ["stability", "growth", "gen:grid:9", "-b", "lbvh-host", "--axes", "1", "--steps", "60,200", "--no-rays"];
     let page = done(&arguments, folder.path(), "growth.html");
-    let points: Vec<Growth> = stability::read(folder.path()).expect("records");
+    let points: Vec<Growth> = page::read(folder.path()).expect("records");
     assert_eq!(points.iter().map(|point| point.e).collect::<Vec<_>>(), [0, 60, 0, 60]);
     assert!(page.contains("from e = 200 on the far triangle would lie beyond the largest float"), "{page}");
 }

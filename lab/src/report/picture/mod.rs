@@ -4,10 +4,10 @@ mod legend;
 mod planes;
 
 use super::numbers::three_digits;
-use crate::measure::outline::{Content, Outline};
-use crate::measure::{KD_TREE, Subject};
+use crate::experiments::navigate::outline::{Content, Outline};
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::Scene;
+use crate::subjects::{KD_TREE, Subject};
 use crate::{Error, Result};
 use glam::Vec3;
 use hedgerow::trace::{Hit, Query, Ray, Work};
@@ -313,8 +313,8 @@ fn colour(place: f32) -> Rgb<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::builders::Spec;
     use crate::scene::{self, LoadOptions};
+    use crate::subjects::builders::Spec;
 
     fn of(view: View, top: Option<f32>) -> RgbImage {
         by("kd-binned", view, top)

@@ -5,8 +5,8 @@
 
 use super::legend::{self, text};
 use super::{PictureOptions, SMOOTH, Seen, averaged, decoded, smooth};
-use crate::measure::Subject;
 use crate::scene::Scene;
+use crate::subjects::Subject;
 use crate::{Error, Result};
 use glam::Vec3;
 use hedgerow::kdtree::layout::{Content, KdTree};

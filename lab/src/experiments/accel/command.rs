@@ -1,0 +1,179 @@
+//! `hedgerow accel`: batches, top levels, re-braiding and updates; records as they are measured, and a page.
+
+use crate::cli::options::{Kinds, Size};
+use crate::cli::{Bar, Common};
+use crate::device::Device;
+use crate::experiments::accel::page::{self, Points};
+use crate::experiments::accel::points::{Entry, Failure, Setting};
+use crate::experiments::accel::{Experiment, Stage, batch, rebraid, top_level, update};
+use crate::measure::provenance::{self, DeviceFacts, Machine};
+use crate::scene::{self, Animation, Instances, LoadOptions};
+use crate::subjects::peers::driver;
+use anyhow::bail;
+use ash::khr::acceleration_structure as functions;
+use std::io::Write;
+use std::num::NonZeroU32;
+use std::path::PathBuf;
+
+/// What is re-braided where no scene of instances is named: boxes that overlap in three manners, and some that do not.
+const REBRAIDED: [&str; 4] = ["gen:forest:400", "gen:city:400", "gen:cables:400", "gen:cells:1000"];
+/// What is updated where no animation is named.
+const UPDATED: [&str; 1] = ["gen:twist:20000:12"];
+
+/// Measure batches of builds, top levels, re-braiding and updates, beside the driver's by the same calls, and write records
+/// and a page
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Scenes of instances to re-braid and animations to update: files, bare names or generators [default: generated ones of
+    /// both kinds]
+    #[arg(value_name = "SCENE")]
+    scenes: Vec<String>,
+    /// What is measured, separated by commas: batch, tlas, rebraid, update
+    #[arg(long, value_name = "EXPERIMENT[,…]", value_delimiter = ',', default_value = "batch,tlas,rebraid,update")]
+    experiments: Vec<Experiment>,
+    /// Kinds of rays, separated by commas, or all
+    #[arg(long, value_name = "KIND[,KIND…]", default_value = "primary,ao,diffuse1,random")]
+    rays: Kinds,
+    /// Pixels of the picture that the rays belong to
+    #[arg(long, value_name = "WxH", default_value = "128x96")]
+    size: Size,
+    /// Counted runs of everything, after one that warms up
+    #[arg(long, value_name = "N", default_value = "5")]
+    runs: NonZeroU32,
+    /// Structures of the largest batch
+    #[arg(long, value_name = "N", default_value = "4096")]
+    structures: NonZeroU32,
+    /// Instances of the largest top level
+    #[arg(long, value_name = "N", default_value = "100000")]
+    instances: NonZeroU32,
+    /// Frames of each animation, spread evenly over all of them
+    #[arg(long, value_name = "N", default_value = "12")]
+    frames: NonZeroU32,
+    /// The folder for accel.jsonl, charts and accel.html; where it has an index.html of `hedgerow bench`, the pages name each
+    /// other
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+    let (instances, animations) = scenes(common, arguments)?;
+    // Before any work: a folder that cannot be written would lose all of it.
+    let points = Points::create(&arguments.output)?;
+    let device = common.open_device(true)?;
+    let driver = device.driver_tracing().map(|_| functions::Device::new(device.ash_instance(), device.ash_device()));
+    let bar = Bar::new(common, "opening the device", 0);
+    let say = |what: &str| bar.say(what);
+    let stage = Stage {
+        device: &device,
+        driver: driver.as_ref(),
+        runs: arguments.runs.get(),
+        kinds: &arguments.rays.0,
+        rays: arguments.size.rays(common.seed),
+        say: &say,
+    };
+    let mut run = Run { points, failures: 0 };
+    run.points.append(Entry::Setting(setting(common, arguments, &device)?))?;
+    for experiment in Experiment::ALL.into_iter().filter(|e| arguments.experiments.contains(e)) {
+        let name = experiment.name();
+        match experiment {
+            Experiment::Batch => run.one(name, |point| batch::measure(&stage, arguments.structures.get(), point))?,
+            Experiment::TopLevel => {
+                run.one(name, |point| top_level::measure(&stage, arguments.instances.get(), point))?
+            }
+            Experiment::Rebraid => {
+                for scene in &instances {
+                    run.one(&format!("{name} {}", scene.name), |point| rebraid::measure(&stage, scene, point))?;
+                }
+            }
+            Experiment::Update => {
+                for scene in &animations {
+                    let frames = arguments.frames.get();
+                    run.one(&format!("{name} {}", scene.name), |point| update::measure(&stage, scene, frames, point))?;
+                }
+            }
+        }
+    }
+    drop(bar);
+    let page = page::write(&arguments.output)?;
+    writeln!(std::io::stdout().lock(), "{}", page.display())?;
+    device.validation_messages()?;
+    if run.failures > 0 {
+        bail!("{} failed, see above and the page; the rest is measured", run.failures);
+    }
+    Ok(())
+}
+
+/// The scenes that are named, by what they are good for; the generated ones of a kind where none of it is named.
+fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<(Vec<Instances>, Vec<Animation>)> {
+    let (mut instances, mut animations) = (Vec::new(), Vec::new());
+    let bar = Bar::bytes(common, "loading");
+    let progress = |p: scene::Progress| bar.set(p.done, p.total);
+    let options = LoadOptions { folders: common.scene_folders(), progress: Some(&progress) };
+    for spec in &arguments.scenes {
+        if let Some(scene) = scene::load_placed(spec, &options)? {
+            instances.push(scene);
+        } else if let Some(animation) = scene::load_moving(spec, &options)? {
+            animations.push(animation);
+        } else {
+            return Err(crate::Error::Argument(format!(
+                "{spec}: neither instances nor an animation; take an .inst or .anim file, or a generator of such"
+            ))
+            .into());
+        }
+    }
+    if instances.is_empty() && arguments.experiments.contains(&Experiment::Rebraid) {
+        instances = REBRAIDED.iter().map(|spec| scene::load_instances(spec, &options)).collect::<crate::Result<_>>()?;
+    }
+    if animations.is_empty() && arguments.experiments.contains(&Experiment::Update) {
+        animations = UPDATED.iter().map(|spec| scene::load_animation(spec, &options)).collect::<crate::Result<_>>()?;
+    }
+    instances.iter_mut().for_each(|scene| common.aim(&mut scene.camera));
+    animations.iter_mut().for_each(|scene| common.aim(&mut scene.camera));
+    Ok((instances, animations))
+}
+
+/// Where and how it is measured.
+fn setting(common: &Common, arguments: &Arguments, device: &Device) -> crate::Result<Setting> {
+    let mut notes: Vec<String> = driver::note(device.found()).into_iter().collect();
+    if device.driver_tracing().is_none() {
+        notes.push(
+            "The driver has no acceleration structures of its own (VK_KHR_acceleration_structure) to compare with."
+                .into(),
+        );
+    }
+    let options = [
+        ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),
+        ("Image", format!("{}, seed {}", arguments.size, common.seed)),
+    ];
+    Ok(Setting {
+        machine: Machine::this(),
+        device: DeviceFacts::of(device)?,
+        commit: provenance::commit(),
+        when: provenance::now(),
+        command: provenance::command(),
+        options: options.map(|(name, value)| (name.to_owned(), value)).to_vec(),
+        notes,
+    })
+}
+
+/// A run under way.
+struct Run {
+    points: Points,
+    failures: usize,
+}
+
+impl Run {
+    /// One experiment, point by point onto the disk. What fails is noted and the rest goes on; only a folder that cannot be
+    /// written ends the run.
+    fn one(
+        &mut self,
+        name: &str,
+        measure: impl FnOnce(&mut dyn FnMut(Entry) -> crate::Result<()>) -> crate::Result<()>,
+    ) -> crate::Result<()> {
+        let points = &mut self.points;
+        let Err(error) = measure(&mut |entry| points.append(entry)) else { return Ok(()) };
+        eprintln!("hedgerow: {name}: {error}");
+        self.failures += 1;
+        self.points.append(Entry::Failure(Failure { of: name.to_owned(), what: error.to_string() }))
+    }
+}

@@ -1,0 +1,113 @@
+//! What `hedgerow accel` measures: acceleration structures as engines use them, through the calls of
+//! `VK_KHR_acceleration_structure`, ours and the driver's by the same.
+//!
+//! [`batch`]: many small structures at once; [`top_level`]: how top levels grow with their instances; [`rebraid`]: rays through
+//! top levels that are re-braided or not; [`update`]: refitting against building anew over an animation. Each gives
+//! [`points`] as it goes.
+
+pub mod batch;
+mod bundles;
+pub(crate) mod command;
+mod deforming;
+pub mod page;
+pub mod points;
+pub mod rebraid;
+pub mod top_level;
+pub mod update;
+
+use crate::device::Device;
+use crate::rays::kinds::{RayKind, RayOptions};
+use crate::subjects::structures::Structures;
+use crate::{Error, Result};
+use hedgerow::accel;
+use std::fmt;
+use std::str::FromStr;
+
+/// Runs that do not count, before those that do.
+const WARM_UPS: u32 = 1;
+
+/// One of the experiments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Experiment {
+    /// [`batch`].
+    Batch,
+    /// [`top_level`].
+    TopLevel,
+    /// [`rebraid`].
+    Rebraid,
+    /// [`update`].
+    Update,
+}
+
+impl Experiment {
+    /// All of them, in the order in which they run.
+    pub const ALL: [Experiment; 4] = [Experiment::Batch, Experiment::TopLevel, Experiment::Rebraid, Experiment::Update];
+
+    /// The name that commands and records use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Experiment::Batch => "batch",
+            Experiment::TopLevel => "tlas",
+            Experiment::Rebraid => "rebraid",
+            Experiment::Update => "update",
+        }
+    }
+}
+
+impl fmt::Display for Experiment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Experiment {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Experiment> {
+        Experiment::ALL.into_iter().find(|experiment| experiment.name() == name).ok_or_else(|| {
+            let names = Experiment::ALL.map(Experiment::name).join(", ");
+            Error::Argument(format!("no experiment is called {name:?}; there are {names}"))
+        })
+    }
+}
+
+/// What all experiments have in common.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    /// Where they run.
+    pub device: &'a Device,
+    /// The functions of the driver, where it has structures of its own.
+    pub driver: Option<&'a ash::khr::acceleration_structure::Device>,
+    /// Counted runs of everything, in turn, after one that warms up.
+    pub runs: u32,
+    /// Kinds of rays.
+    pub kinds: &'a [RayKind],
+    /// Their number and seed.
+    pub rays: RayOptions,
+    /// Is told what is being done, for a progress bar.
+    pub say: &'a dyn Fn(&str),
+}
+
+impl<'a> Stage<'a> {
+    fn ours(&self) -> Structures<'a> {
+        Structures::ours(self.device, accel::Options::DEFAULT)
+    }
+
+    fn drivers(&self) -> Option<Structures<'a>> {
+        self.driver.map(|functions| Structures::drivers(self.device, functions))
+    }
+
+    /// Ours, and the driver's where it has any.
+    fn makers(&self) -> Vec<Structures<'a>> {
+        [Some(self.ours()), self.drivers()].into_iter().flatten().collect()
+    }
+}
+
+/// What is not there yet is `None`, not an error: a call that says so refuses its arguments.
+fn where_possible<T>(result: Result<T>) -> Result<Option<T>> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(Error::Argument(_)) => Ok(None),
+        Err(error) => Err(error),
+    }
+}

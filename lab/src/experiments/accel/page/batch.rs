@@ -1,0 +1,157 @@
+//! The section of batches.
+
+use super::Section;
+use crate::Result;
+use crate::experiments::accel::points::{Batch, Maker, Way};
+use crate::report::bars::{self, Bar, Bars};
+use crate::report::chart::Caption;
+use crate::report::curves::{self, Axis, Curve};
+use crate::report::elements::{column, number, scroll, spread};
+use crate::report::numbers::{duration, duration_tick, grouped, short_count, three_digits, tick};
+use crate::report::theme::{SERIES, Tone};
+use maud::html;
+
+/// Who builds how, in the order of charts and tables.
+const SUBJECTS: [(Option<Maker>, Way); 7] = [
+    (Some(Maker::Ours), Way::OneCall),
+    (Some(Maker::Ours), Way::OneSubmit),
+    (Some(Maker::Ours), Way::SubmitEach),
+    (Some(Maker::Driver), Way::OneCall),
+    (Some(Maker::Driver), Way::OneSubmit),
+    (Some(Maker::Driver), Way::SubmitEach),
+    (None, Way::EmptySubmits),
+];
+
+/// The point of so many structures.
+pub(super) fn find(points: &[Batch], structures: u32, maker: Option<Maker>, way: Way) -> Option<&Batch> {
+    points.iter().find(|point| point.structures == structures && point.maker == maker && point.way == way)
+}
+
+fn name(maker: Option<Maker>, way: Way) -> String {
+    maker.map_or_else(|| way.name().to_owned(), |maker| format!("{}, {}", maker.name(), way.name()))
+}
+
+fn tone(maker: Option<Maker>, way: Way) -> Tone {
+    let place = SUBJECTS.iter().position(|subject| *subject == (maker, way)).unwrap_or(0);
+    // Ours begin with the first colour and the driver's with the second, as on the whole page.
+    SERIES[[0, 2, 6, 1, 3, 5, 8][place]]
+}
+
+pub(super) fn section(points: &[Batch]) -> Result<Option<Section>> {
+    let Some(most) = points.iter().map(|point| point.structures).max() else { return Ok(None) };
+    let largest: Vec<&Batch> = SUBJECTS.iter().filter_map(|&(maker, way)| find(points, most, maker, way)).collect();
+    let triangles = largest.first().map_or(0, |point| point.triangles);
+    let bar = |point: &&Batch| {
+        let time = duration(point.wall_ms.median);
+        let ratio = three_digits(point.over_our_call.median);
+        let is_base = (point.maker, point.way) == SUBJECTS[0];
+        Bar {
+            label: name(point.maker, point.way),
+            figure: if is_base { time } else { format!("{time} ({ratio} ×)") },
+            spread: point.wall_ms,
+            tone: tone(point.maker, point.way),
+        }
+    };
+    let all_bars: Vec<Bar> = largest.iter().map(bar).collect();
+    let in_words: Vec<String> = all_bars.iter().map(|bar| format!("{}: {}", bar.label, bar.figure)).collect();
+    let caption = Caption {
+        name: "accel-batch".into(),
+        title: format!("{} structures of 12 to 478 triangles", grouped(most.into())),
+        alt: in_words.join("; "),
+        reading:
+            "Shorter is better; the line through a bar goes from the fastest to the slowest run. In brackets: how many \
+                  times as long as one call of ours, in the median of the runs."
+                .into(),
+    };
+    let bars = bars::bars(
+        caption,
+        &Bars { bars: all_bars, axis: "wall-clock milliseconds", number: &|v| tick(*v), marks: Vec::new() },
+    )?;
+    let curve = |&(maker, way): &(Option<Maker>, Way)| Curve {
+        name: name(maker, way),
+        tone: tone(maker, way),
+        points: points
+            .iter()
+            .filter(|point| (point.maker, point.way) == (maker, way))
+            .map(|point| (f64::from(point.structures), point.wall_ms))
+            .collect(),
+        law: None,
+    };
+    let all: Vec<Curve> = SUBJECTS.iter().map(curve).filter(|curve| !curve.points.is_empty()).collect();
+    let caption = Caption {
+        name: "accel-batch-growth".into(),
+        title: "Time over the number of structures".into(),
+        alt: all.iter().map(|curve| curve.name.clone()).collect::<Vec<_>>().join("; "),
+        reading:
+            "Both axes are logarithmic. Where lines lie together, it makes no difference how the builds are asked for."
+                .into(),
+    };
+    let growth = curves::curves(
+        caption,
+        &all,
+        &Axis { name: "structures", is_log: true, number: &|v| short_count(*v) },
+        &Axis { name: "wall clock", is_log: true, number: &|v| duration_tick(*v) },
+    )?;
+    Ok(Some(Section {
+        id: "batches",
+        title: "Batches",
+        charts: bars.into_iter().chain(growth).collect(),
+        above: html! {
+            p {
+                "Engines build hundreds of small structures a frame. Here " (grouped(most.into())) " of them, "
+                (grouped(triangles)) " triangles together, are built in one call; in a call each with a barrier behind it, in one "
+                "command buffer; and in a call each that is submitted and waited for. By the wall's clock, recording included."
+            }
+            p { (reading(points, most)) }
+        },
+        below: html! {
+            details {
+                summary { "All figures" }
+                (scroll("Batches", html! {
+                    table.sortable {
+                        thead { tr {
+                            (column("structures", "", true)) (column("whose", "", false)) (column("how", "", false))
+                            (column("triangles", "", true)) (column("time", "ms", true)) (column("a structure", "µs", true))
+                            (column("over one call of ours", "×", true))
+                        } }
+                        tbody {
+                            @for point in points {
+                                @let whose = point.maker.map_or("–", Maker::name);
+                                tr {
+                                    (number(Some(point.structures.into()), |v| grouped(v as u64)))
+                                    td data-value=(whose) { (whose) }
+                                    td data-value=(point.way.name()) { (point.way.name()) }
+                                    (number(Some(point.triangles as f64), |v| grouped(v as u64)))
+                                    (spread(Some(point.wall_ms), three_digits))
+                                    (number(Some(1e3 * point.wall_ms.median / f64::from(point.structures)), three_digits))
+                                    (spread(Some(point.over_our_call), three_digits))
+                                }
+                            }
+                        }
+                    }
+                }))
+            }
+        },
+    }))
+}
+
+/// One call of ours against the others, in a sentence.
+fn reading(points: &[Batch], most: u32) -> String {
+    let of = |maker, way| find(points, most, Some(maker), way);
+    let Some(ours) = of(Maker::Ours, Way::OneCall) else { return String::new() };
+    let mut text = format!("One call of ours takes {}", duration(ours.wall_ms.median));
+    let singly = [Way::OneSubmit, Way::SubmitEach].map(|way| of(Maker::Ours, way));
+    if let [Some(one_submit), Some(submit_each)] = singly {
+        let [in_one, each] = [one_submit, submit_each].map(|point| three_digits(point.over_our_call.median));
+        text +=
+            &format!("; calls one by one take {in_one} times as long in one submit, and {each} times in a submit each");
+    }
+    if let Some(drivers) = of(Maker::Driver, Way::OneCall) {
+        let ratio = drivers.over_our_call.median;
+        text += &match ratio >= 1.0 {
+            true => format!(". The driver's batch takes {} times as long as ours", three_digits(ratio)),
+            false => format!(". Ours is slower than the driver's batch: {} times its time", three_digits(1.0 / ratio)),
+        };
+    }
+    text + "."
+}

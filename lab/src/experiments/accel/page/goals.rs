@@ -1,0 +1,102 @@
+//! What was to be reached, and whether it is.
+
+use super::Measured;
+use super::batch::find;
+use crate::experiments::accel::points::{BraidedRays, Maker, Rebraid, Way};
+use crate::experiments::bench::page::summary::geometric_mean;
+use crate::measure::statistics::Spread;
+
+/// Of the time of one call, that of a call each.
+const BATCH: f64 = 10.0;
+/// Of the speed of rays through plain top levels, that through re-braided ones: where boxes overlap, and where they do not.
+const REBRAID: f64 = 1.2;
+const REBRAID_APART: f64 = 0.97;
+
+/// Something to be reached.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Goal {
+    /// What, in words.
+    pub what: String,
+    /// The ratio, with how far it goes either way.
+    pub ratio: Spread,
+    /// What it is to be at least.
+    pub least: f64,
+}
+
+impl Goal {
+    /// Whether it is reached, by the median.
+    pub fn is_met(&self) -> bool {
+        self.ratio.median >= self.least
+    }
+
+    /// In a word or a few: met, missed, or either within the noise.
+    pub fn verdict(&self) -> &'static str {
+        let is_certain = (self.ratio.min >= self.least) == (self.ratio.max >= self.least);
+        match (self.is_met(), is_certain) {
+            (true, true) => "met",
+            (true, false) => "met, within the spread",
+            (false, true) => "missed",
+            (false, false) => "missed, within the spread",
+        }
+    }
+}
+
+/// All of which there are figures.
+pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
+    let mut goals = Vec::new();
+    let most = measured.batches.iter().map(|point| point.structures).max().unwrap_or(0);
+    for (maker, way, least) in [
+        (Maker::Ours, Way::OneSubmit, BATCH),
+        (Maker::Ours, Way::SubmitEach, BATCH),
+        (Maker::Driver, Way::OneCall, 1.0),
+    ] {
+        if let Some(point) = find(&measured.batches, most, Some(maker), way) {
+            let what = match maker {
+                Maker::Ours => format!("{most} structures in one call, against {}", way.name()),
+                Maker::Driver => format!("{most} structures in one call, against one call of the driver's"),
+            };
+            goals.push(Goal { what, ratio: point.over_our_call, least });
+        }
+    }
+    for point in &measured.rebraids {
+        let (least, how) = (least_gain(point), if overlaps(point) { "boxes overlap" } else { "boxes apart" });
+        if let Some(ratio) = mean_gain(&point.rays) {
+            goals.push(Goal { what: format!("{}, re-braided ({how}): all kinds of rays", point.scene), ratio, least });
+        }
+    }
+    goals
+}
+
+/// Whether re-braiding has something to gain: the box of an instance overlaps another's, in the mean.
+pub(super) fn overlaps(point: &Rebraid) -> bool {
+    point.overlaps >= 1.0
+}
+
+/// What re-braiding is to gain.
+pub(super) fn least_gain(point: &Rebraid) -> f64 {
+    if overlaps(point) { REBRAID } else { REBRAID_APART }
+}
+
+/// The geometric mean over kinds of rays, and the least and greatest median of a kind.
+pub(super) fn mean_gain(rays: &[BraidedRays]) -> Option<Spread> {
+    let medians: Vec<f64> = rays.iter().map(|rays| rays.gain.median).collect();
+    let median = geometric_mean(medians.iter().copied())?;
+    Some(Spread { median, ..Spread::of(&medians)? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_goal_within_the_spread_is_told_as_such() {
+        let goal = |median, min, max| {
+            let ratio = Spread { median, min, max, runs: 5 };
+            Goal { what: String::new(), ratio, least: 10.0 }.verdict()
+        };
+        assert_eq!(goal(12.0, 11.0, 13.0), "met");
+        assert_eq!(goal(12.0, 9.0, 13.0), "met, within the spread");
+        assert_eq!(goal(8.0, 7.0, 9.0), "missed");
+        assert_eq!(goal(8.0, 7.0, 11.0), "missed, within the spread");
+    }
+}

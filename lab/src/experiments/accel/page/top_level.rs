@@ -1,0 +1,100 @@
+//! The section of top levels.
+
+use super::Section;
+use crate::Result;
+use crate::experiments::accel::points::{Maker, TopLevel};
+use crate::measure::statistics::Spread;
+use crate::report::chart::Caption;
+use crate::report::curves::{self, Axis, Curve};
+use crate::report::elements::{column, number, scroll, spread};
+use crate::report::numbers::{duration_tick, grouped, short_count, three_digits};
+use crate::report::theme::SERIES;
+use maud::html;
+
+pub(super) fn section(points: &[TopLevel]) -> Result<Option<Section>> {
+    if points.is_empty() {
+        return Ok(None);
+    }
+    let curve = |maker: Maker, what: &str, series: usize, of: fn(&TopLevel) -> Option<Spread>| {
+        let of_maker = points.iter().filter(|point| point.maker == maker);
+        let points = of_maker.filter_map(|point| Some((f64::from(point.instances), of(point)?))).collect();
+        Curve { name: format!("{} {what}", maker.name()), tone: SERIES[series], points, law: None }.with_law()
+    };
+    let all = [
+        curve(Maker::Ours, "build", 0, |point| Some(point.build_ms)),
+        curve(Maker::Ours, "update", 2, |point| point.update_ms),
+        curve(Maker::Driver, "build", 1, |point| Some(point.build_ms)),
+        curve(Maker::Driver, "update", 5, |point| point.update_ms),
+    ];
+    let all: Vec<Curve> = all.into_iter().filter(|curve| !curve.points.is_empty()).collect();
+    let names: Vec<&str> = all.iter().map(|curve| curve.name.as_str()).collect();
+    let caption = Caption {
+        name: "accel-tlas".into(),
+        title: "Top levels: time over the number of instances".into(),
+        alt: format!("Fitted laws, time proportional to n to the power: {}.", names.join("; ")),
+        reading: format!(
+            "Both axes are logarithmic; behind the names, the power laws fitted through the medians by least squares. {}",
+            reading(points)
+        ),
+    };
+    let chart = curves::curves(
+        caption,
+        &all,
+        &Axis { name: "instances", is_log: true, number: &|v| short_count(*v) },
+        &Axis { name: "device time", is_log: true, number: &|v| duration_tick(*v) },
+    )?;
+    let an_instance = |point: &TopLevel, bytes: u64| Some(bytes as f64 / f64::from(point.instances));
+    Ok(Some(Section {
+        id: "tlas",
+        title: "Top levels",
+        charts: chart.into_iter().collect(),
+        above: html! {
+            p {
+                "A top level over instances of three spheres, each in a cell of its own, built, and updated in place after every "
+                "instance has moved by a tenth of its cell. By the device's timestamps."
+            }
+        },
+        below: scroll(
+            "Top levels",
+            html! {
+                table.sortable {
+                    thead { tr {
+                        (column("instances", "", true)) (column("whose", "", false)) (column("build", "ms", true))
+                        (column("update", "ms", true)) (column("update / build", "×", true))
+                        (column("structure", "B/instance", true)) (column("scratch", "B/instance", true))
+                    } }
+                    tbody {
+                        @for point in points {
+                            tr {
+                                (number(Some(point.instances.into()), |v| grouped(v as u64)))
+                                td data-value=(point.maker.name()) { (point.maker.name()) }
+                                (spread(Some(point.build_ms), three_digits))
+                                (spread(point.update_ms, three_digits))
+                                (number(point.update_ms.map(|update| update.median / point.build_ms.median), three_digits))
+                                (number(an_instance(point, point.structure_bytes), |v| format!("{v:.1}")))
+                                (number(an_instance(point, point.scratch_bytes), |v| format!("{v:.1}")))
+                            }
+                        }
+                    }
+                }
+            },
+        ),
+    }))
+}
+
+/// The largest top level in a sentence, ours against the driver's.
+fn reading(points: &[TopLevel]) -> String {
+    let most = points.iter().map(|point| point.instances).max().unwrap_or(0);
+    let of = |maker| points.iter().find(|point| point.instances == most && point.maker == maker);
+    let (Some(ours), Some(drivers)) = (of(Maker::Ours), of(Maker::Driver)) else { return String::new() };
+    let against = |ours: f64, drivers: f64| match drivers / ours {
+        ratio if ratio >= 1.0 => format!("{} times as fast as the driver's", three_digits(ratio)),
+        ratio => format!("slower than the driver's, {} times its time", three_digits(1.0 / ratio)),
+    };
+    let build = against(ours.build_ms.median, drivers.build_ms.median);
+    let update = match (ours.update_ms, drivers.update_ms) {
+        (Some(ours), Some(drivers)) => format!(", and our update {}", against(ours.median, drivers.median)),
+        _ => String::new(),
+    };
+    format!("Over {} instances our build is {build}{update}.", grouped(most.into()))
+}

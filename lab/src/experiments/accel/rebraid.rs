@@ -1,0 +1,121 @@
+//! Re-braiding on and off: what it takes to build, and what rays of every kind gain.
+
+use super::bundles::{self, Bundle};
+use super::points::{self, BraidedRays, Entry, Side, Work};
+use super::{Stage, WARM_UPS};
+use crate::Result;
+use crate::measure::agreement::agree;
+use crate::measure::statistics::{Spread, in_turn, ratios};
+use crate::scene::{Instance, Instances, Scene};
+use crate::subjects::levels::Levels;
+use ash::vk;
+use hedgerow::accel::REBRAID;
+use hedgerow::geometry::Aabb;
+use rayon::prelude::*;
+
+type Flags = vk::BuildAccelerationStructureFlagsKHR;
+
+/// Where the top levels stand among those that are compared.
+const OFF: usize = 0;
+const ON: usize = 1;
+const DRIVER: usize = 2;
+
+/// Measures one scene.
+///
+/// # Errors
+/// Too little memory; the device failed; the scene is too large to be flattened, which rays are made with.
+pub fn measure(stage: &Stage<'_>, instances: &Instances, point: &mut dyn FnMut(Entry) -> Result<()>) -> Result<()> {
+    let say = |what: &str| (stage.say)(&format!("re-braiding {}: {what}", instances.name));
+    say("building");
+    let mut levels =
+        vec![Levels::new(stage.ours(), instances, Flags::empty())?, Levels::new(stage.ours(), instances, REBRAID)?];
+    if let Some(drivers) = stage.drivers() {
+        levels.push(Levels::new(drivers, instances, Flags::empty())?);
+    }
+    let builds = in_turn(&mut levels, WARM_UPS, stage.runs, Levels::build);
+    let mut sides = Vec::new();
+    for (levels, builds) in levels.iter().zip(builds) {
+        let [structure_bytes, scratch_bytes] = levels.top_bytes();
+        let build_ms = Spread::of_some(&builds?)?;
+        sides.push(Side { build_ms, structure_bytes, scratch_bytes, entries: levels.entries() });
+    }
+    let scene = Scene {
+        name: instances.name.clone(),
+        mesh: instances.flatten()?,
+        camera: instances.camera,
+        lights: instances.lights.clone(),
+    };
+    say("making rays");
+    let mut rays = Vec::new();
+    for bundle in bundles::of(stage, &scene)? {
+        say(bundle.kind.name());
+        rays.push(traced(stage, &mut levels, &bundle)?);
+    }
+    point(Entry::Rebraid(points::Rebraid {
+        scene: instances.name.clone(),
+        instances: instances.instances.len() as u32,
+        parts: instances.parts.len() as u32,
+        triangles: instances.triangle_count(),
+        overlaps: overlaps(instances),
+        off: sides[OFF].clone(),
+        on: sides[ON].clone(),
+        driver: sides.get(DRIVER).cloned(),
+        rays,
+    }))
+}
+
+fn traced(stage: &Stage<'_>, levels: &mut [Levels<'_>], bundle: &Bundle<'_>) -> Result<BraidedRays> {
+    let query = bundle.kind.query();
+    let (rays, hits, count) = (&bundle.rays, &bundle.hits, bundle.count);
+    let times = in_turn(levels, WARM_UPS, stage.runs, |levels| levels.trace(rays, hits, count, query));
+    let times: Vec<Vec<f64>> = times.into_iter().collect::<Result<_>>()?;
+    let mut found = Vec::new();
+    let mut work = Vec::new();
+    for levels in &mut levels[..=ON] {
+        levels.trace(rays, hits, count, query)?;
+        found.push(bundle.read_hits());
+        work.push(Work::mean(&levels.work(rays, hits, count, query)?));
+    }
+    Ok(BraidedRays {
+        rays: bundle.kind.name().into(),
+        count: count.into(),
+        hits: found[OFF].iter().filter(|hit| hit.is_some()).count() as u64,
+        different: found[OFF].iter().zip(&found[ON]).filter(|(a, b)| !agree(query, a, b)).count() as u64,
+        off_ms: Spread::of_some(&times[OFF])?,
+        on_ms: Spread::of_some(&times[ON])?,
+        driver_ms: times.get(DRIVER).and_then(|times| Spread::of(times)),
+        gain: Spread::of_some(&ratios(&times[OFF], &times[ON]))?,
+        off_work: work[OFF],
+        on_work: work[ON],
+    })
+}
+
+/// How many other instances' boxes each one's overlaps, in the mean over at most so many; boxes are around the placed vertices.
+fn overlaps(scene: &Instances) -> f64 {
+    const SAMPLE: usize = 256;
+    let around = |instance: &Instance| {
+        let points = scene.parts[instance.part as usize].positions.iter().map(|&p| instance.place(p));
+        points.fold(Aabb::EMPTY, |bounds, point| bounds.union(&Aabb::around(&[point])))
+    };
+    let boxes: Vec<Aabb> = scene.instances.par_iter().map(around).collect();
+    let meet = |a: &Aabb, b: &Aabb| (0..3).all(|k| a.lo[k] < b.hi[k] && b.lo[k] < a.hi[k]);
+    let count = boxes.len().min(SAMPLE);
+    let others = |i: usize| {
+        let one = i * boxes.len() / count;
+        (0..boxes.len()).filter(|&other| other != one && meet(&boxes[one], &boxes[other])).count()
+    };
+    (0..count).map(others).sum::<usize>() as f64 / count.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{self, LoadOptions};
+
+    #[test]
+    fn boxes_overlap_in_a_forest_and_not_in_cells() {
+        let of = |spec| overlaps(&scene::load_instances(spec, &LoadOptions::default()).expect("a generator"));
+        assert_eq!(of("gen:cells:1000"), 0.0);
+        assert!(of("gen:forest:100") > 2.0 && of("gen:cables:100") > 50.0);
+    }
+}

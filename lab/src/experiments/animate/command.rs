@@ -1,0 +1,283 @@
+//! `hedgerow animate`: a dynamic scene frame by frame in each of the ways; records as they are measured, pictures, and a page.
+
+use crate::cli::options::{Kinds, Size};
+use crate::cli::{Bar, Common, work};
+use crate::device::Device;
+use crate::experiments::animate::page::{self, Points, standings};
+use crate::experiments::animate::points::{Entry, Object, Setting};
+use crate::experiments::animate::{Contender, Stage, Way, measure};
+use crate::measure::provenance::{self, DeviceFacts, Machine};
+use crate::report::picture::shaded_by;
+use crate::scene::{DynamicScene, Scene};
+use crate::subjects::builders::{KdBuilder, Spec};
+use anyhow::bail;
+use ash::vk;
+use std::io::Write;
+use std::num::NonZeroU32;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Build and trace a scene that moves, frame by frame in each of five ways (all anew, a static and a dynamic tree, a tree per
+/// object, two levels, merging into the static tree and restoring it), and write records, a page, and the frames as PNG
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The scene: a .dyn or .anim file, a .gltf or .glb with animations, a bare name, or gen:twist:N:FRAMES
+    scene: String,
+    /// The ways, separated by commas; hits are compared with those of the first, which also makes the pictures
+    #[arg(
+        long,
+        value_name = "WAY[,…]",
+        value_delimiter = ',',
+        default_value = "rebuild,two-trees,tree-per-object,two-level,merge"
+    )]
+    ways: Vec<Way>,
+    /// Who builds kd-trees every frame, with options: kd-gpu on the device, kd-binned and others on the host, which then traces them,
+    /// too, unless :trace=device follows
+    #[arg(short, long, value_name = "BUILDER", default_value = "kd-gpu")]
+    builder: Spec,
+    /// Who builds the kd-tree of what stands still, once, on the host
+    #[arg(long, value_name = "BUILDER", default_value = "kd-exact")]
+    static_builder: Spec,
+    /// Which frames: so many, spread evenly over all, or those from A to before B
+    #[arg(long, value_name = "N|A..B", default_value = "12")]
+    frames: Frames,
+    /// Kinds of rays, separated by commas, or all
+    #[arg(long, value_name = "KIND[,KIND…]", default_value = "primary,shadow,diffuse1")]
+    rays: Kinds,
+    /// Pixels of the pictures, and of the one that the rays belong to
+    #[arg(long, value_name = "WxH", default_value = "320x240")]
+    size: Size,
+    /// Counted runs of every build and trace, after one in the first frame that warms up
+    #[arg(long, value_name = "N", default_value = "3")]
+    runs: NonZeroU32,
+    /// Whether the frames are written as PNG
+    #[arg(long, value_name = "on|off", default_value = "on")]
+    png: Png,
+    /// The folder for animate.jsonl, charts, animate.html and frame-0000.png and so on
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+/// `--frames`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Frames {
+    /// So many, with the first, evenly over all.
+    Spread(NonZeroU32),
+    /// From one to before another.
+    Range(u32, u32),
+}
+
+impl FromStr for Frames {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Frames, String> {
+        let wrong = || format!("{text:?} are no frames; write a number of them, or A..B for those from A to before B");
+        match text.split_once("..") {
+            None => text.parse().map(Frames::Spread).map_err(|_| wrong()),
+            Some((from, to)) => match (from.parse(), to.parse()) {
+                (Ok(from), Ok(to)) if from < to => Ok(Frames::Range(from, to)),
+                _ => Err(wrong()),
+            },
+        }
+    }
+}
+
+impl Frames {
+    fn of(self, scene: &DynamicScene) -> crate::Result<Vec<u32>> {
+        let count = scene.frames;
+        match self {
+            Frames::Spread(some) => {
+                let some = some.get().min(count);
+                Ok((0..some).map(|i| (u64::from(i) * u64::from(count) / u64::from(some)) as u32).collect())
+            }
+            Frames::Range(from, to) if to <= count => Ok((from..to).collect()),
+            Frames::Range(from, to) => Err(crate::Error::Argument(format!(
+                "--frames {from}..{to}: {} has {count}, counted from 0; end at {count} or before",
+                scene.name
+            ))),
+        }
+    }
+}
+
+/// `--png`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Png {
+    On,
+    Off,
+}
+
+impl FromStr for Png {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Png, String> {
+        match text {
+            "on" => Ok(Png::On),
+            "off" => Ok(Png::Off),
+            _ => Err(format!("{text:?} is neither on nor off")),
+        }
+    }
+}
+
+fn file_of(frame: u32) -> String {
+    format!("frame-{frame:04}.png")
+}
+
+pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+    if let Some((i, way)) = arguments.ways.iter().enumerate().find(|&(i, way)| arguments.ways[..i].contains(way)) {
+        return Err(
+            crate::Error::Argument(format!("--ways names {way} twice (number {}); once is enough", i + 1)).into()
+        );
+    }
+    let builder = arguments.builder.kd()?;
+    if let KdBuilder::Device { .. } = arguments.static_builder.kd()? {
+        let what = "what stands still is built once, on the host; take kd-exact, kd-binned or kd-gpu-host";
+        return Err(crate::Error::Argument(format!("--static-builder {}: {what}", arguments.static_builder)).into());
+    }
+    let scene = common.load_dynamic(&arguments.scene)?;
+    if scene.objects.is_empty() {
+        let what =
+            "only its camera moves, so that there is nothing to build every frame; take a scene with objects that move";
+        return Err(crate::Error::Scene(format!("{}: {what}", scene.name)).into());
+    }
+    let frames = arguments.frames.of(&scene)?;
+    let device = match work::device_for(common, std::slice::from_ref(&arguments.builder))? {
+        None if arguments.ways.contains(&Way::TwoLevel) => Some(common.open_device(false)?),
+        device => device,
+    };
+    // Before any work: a folder that cannot be written would lose all of it.
+    let mut points = Points::create(&arguments.output)?;
+    points.append(Entry::Setting(setting(common, arguments, &scene, &frames, builder, device.as_ref())?))?;
+    let bar = Bar::new(common, "", frames.len() as u64 + 1);
+    let (aim, say) = (|camera: &mut _| common.aim(camera), |what: &str| bar.say(what));
+    let stage = Stage {
+        device: device.as_ref(),
+        ways: &arguments.ways,
+        builder: &arguments.builder,
+        static_builder: &arguments.static_builder,
+        runs: arguments.runs.get(),
+        kinds: &arguments.rays.0,
+        rays: arguments.size.rays(common.seed),
+        costs: [3.0, 2.0],
+        aim: &aim,
+        say: &say,
+    };
+    let mut failures = 0;
+    let mut measured = Vec::new();
+    let mut point = |entry: Entry| {
+        match &entry {
+            Entry::Failure(failure) => {
+                let frame = failure.frame.map_or(String::new(), |frame| format!(", frame {frame}"));
+                eprintln!("hedgerow: {}{frame}: {}", failure.way, failure.what);
+                failures += 1;
+            }
+            Entry::Animate(frame) => measured.push(frame.clone()),
+            Entry::Setting(_) => {}
+        }
+        points.append(entry)
+    };
+    let mut show = |frame: u32, scene: &Scene, contender: &mut dyn Contender| {
+        bar.step();
+        match arguments.png {
+            Png::On => write_picture(common, arguments, frame, scene, contender),
+            Png::Off => Ok(()),
+        }
+    };
+    let done = measure(&stage, &scene, &frames, &mut point, &mut show);
+    drop(bar);
+    let page = page::write(&arguments.output)?;
+    done?;
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}", standings::table(&measured))?;
+    writeln!(out, "{}", page.display())?;
+    if let Some(device) = &device {
+        device.validation_messages()?;
+    }
+    if failures > 0 {
+        bail!("{failures} failed or found other hits, see above and the page; the rest is measured");
+    }
+    Ok(())
+}
+
+fn write_picture(
+    common: &Common,
+    arguments: &Arguments,
+    frame: u32,
+    scene: &Scene,
+    contender: &mut dyn Contender,
+) -> crate::Result<()> {
+    let size = [arguments.size.width, arguments.size.height];
+    let image = shaded_by(scene, size, common.seed, &mut |rays, query| {
+        contender.set_rays(rays)?;
+        contender.trace(query)?;
+        contender.hits()
+    })?;
+    let path = arguments.output.join(file_of(frame));
+    image.save(&path).map_err(|error| crate::Error::file(&path)(std::io::Error::other(error)))
+}
+
+/// Where, how and of what it is measured.
+fn setting(
+    common: &Common,
+    arguments: &Arguments,
+    scene: &DynamicScene,
+    frames: &[u32],
+    builder: KdBuilder,
+    device: Option<&Device>,
+) -> crate::Result<Setting> {
+    let mut notes = Vec::new();
+    if device.is_some_and(|device| device.limits.kind == vk::PhysicalDeviceType::CPU) {
+        notes.push(
+            "The device is a CPU: figures of it say how much work the ways are, not how they stand on a GPU."
+                .to_owned(),
+        );
+    }
+    if let KdBuilder::Host { traces_on_device, .. } = builder
+        && arguments.ways.contains(&Way::TwoLevel)
+    {
+        let traced = if traces_on_device { "" } else { " and traced" };
+        notes.push(format!("Kd-trees are built{traced} by the host here, two levels by the device."));
+    }
+    let options = [
+        ("Kd-trees", format!("{} every frame, {} of what stands still", arguments.builder, arguments.static_builder)),
+        ("Runs", format!("{} of every build and trace, in turn", arguments.runs)),
+        ("Image", format!("{}, seed {}", arguments.size, common.seed)),
+        ("Frames", format!("{} of {} in {} s", frames.len(), scene.frames, scene.seconds)),
+    ];
+    let pictures = match arguments.png {
+        Png::On => frames.iter().map(|&frame| (frame, file_of(frame))).collect(),
+        Png::Off => Vec::new(),
+    };
+    let object = |o: &crate::scene::DynamicObject| Object {
+        name: o.name.clone(),
+        triangles: o.triangles.len() as u64,
+        morphs: o.morphs(),
+    };
+    Ok(Setting {
+        machine: Machine::this(),
+        device: device.map(DeviceFacts::of).transpose()?,
+        commit: provenance::commit(),
+        when: provenance::now(),
+        command: provenance::command(),
+        options: options.map(|(name, value)| (name.to_owned(), value)).to_vec(),
+        notes,
+        scene: scene.name.clone(),
+        static_triangles: scene.static_mesh.triangles.len() as u64,
+        objects: scene.objects.iter().map(object).collect(),
+        static_builder: arguments.static_builder.to_string(),
+        pictures,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_a_number_or_a_range() {
+        assert_eq!("7".parse(), Ok(Frames::Spread(NonZeroU32::new(7).expect("not 0"))));
+        assert_eq!("3..9".parse(), Ok(Frames::Range(3, 9)));
+        for wrong in ["", "0", "9..3", "4..4", "1..", "a..b", "-1"] {
+            assert!(wrong.parse::<Frames>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! A dynamic scene frame by frame, in each of five ways to have something to trace when some of it moves (Papay 2025, chapter 10 and
+//! section 11.3.2): what each frame's build takes, what its rays take then, and whether all find the same.
+//!
+//! A [`Contender`] is one of the [`Way`]s on a scene. What a way needs once (the tree of what stands still) is made before the clock
+//! runs, and so is what all need alike: vertices are placed and uploaded. Under the clock is what is done a frame to have something
+//! that can be traced, and the tracing.
+
+pub(crate) mod command;
+mod contender;
+mod merge_on_device;
+mod on_device;
+mod on_host;
+pub mod page;
+pub mod points;
+mod two_level;
+
+use crate::device::Device;
+use crate::measure::agreement::may_both_be_right;
+use crate::measure::statistics::{Spread, in_turn};
+use crate::rays::kinds::{self, RayKind, RayOptions};
+use crate::scene::{Camera, DynamicScene, Scene};
+use crate::subjects::builders::{KdBuilder, Spec};
+use crate::{Error, Result};
+pub use contender::{Contender, Frame};
+use hedgerow::kdtree::merge;
+use hedgerow::trace::{Hit, Query, Ray};
+use merge_on_device::MergeOnDevice;
+use on_device::{OnDevice, static_tree};
+use on_host::OnHost;
+use points::{Animated, Entry, Failure, Rays};
+use std::fmt;
+use std::str::FromStr;
+use two_level::TwoLevel;
+
+/// How there is something to trace in every frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Way {
+    /// One kd-tree over all triangles, built anew.
+    Rebuild,
+    /// The static tree, and one over all that moves; a ray goes through both.
+    TwoTrees,
+    /// The static tree, and one of each object; a ray goes through all.
+    TreePerObject,
+    /// A top level over bottom levels ([`hedgerow::accel`]): rigid objects are moved by their instances, those that morph built anew.
+    TwoLevel,
+    /// The static tree, which the objects' trees are merged into and taken out of.
+    Merge,
+}
+
+impl Way {
+    /// All of them, in the order of charts and tables.
+    pub const ALL: [Way; 5] = [Way::Rebuild, Way::TwoTrees, Way::TreePerObject, Way::TwoLevel, Way::Merge];
+
+    /// The name that commands and records use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Way::Rebuild => "rebuild",
+            Way::TwoTrees => "two-trees",
+            Way::TreePerObject => "tree-per-object",
+            Way::TwoLevel => "two-level",
+            Way::Merge => "merge",
+        }
+    }
+
+    /// Whether it is made of kd-trees.
+    pub fn is_of_kd_trees(self) -> bool {
+        self != Way::TwoLevel
+    }
+}
+
+impl fmt::Display for Way {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Way {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Way> {
+        Way::ALL.into_iter().find(|way| way.name() == name).ok_or_else(|| {
+            let names = Way::ALL.map(Way::name).join(", ");
+            Error::Argument(format!("no way is called {name:?}; there are {names}"))
+        })
+    }
+}
+
+/// What is measured, and how.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    /// Where what is built or traced on a device is.
+    pub device: Option<&'a Device>,
+    /// The ways, each at most once.
+    pub ways: &'a [Way],
+    /// Who builds the kd-trees of every frame.
+    pub builder: &'a Spec,
+    /// Who builds those of what stands still, once: a builder on the host.
+    pub static_builder: &'a Spec,
+    /// Counted runs of every build and trace; the first frame has one before that warms up.
+    pub runs: u32,
+    /// Kinds of rays.
+    pub kinds: &'a [RayKind],
+    /// Their number and seed.
+    pub rays: RayOptions,
+    /// Costs of a step and of a test, for SAH costs.
+    pub costs: [f64; 2],
+    /// Aims the camera where the user wants it.
+    pub aim: &'a dyn Fn(&mut Camera),
+    /// Is told what is being done, for a progress bar.
+    pub say: &'a dyn Fn(&str),
+}
+
+impl<'a> Stage<'a> {
+    /// A way on a scene, in its first frame; what it builds once is built.
+    fn contender(&self, way: Way, first: &Frame<'a>) -> Result<Box<dyn Contender + 'a>> {
+        let device =
+            || self.device.ok_or_else(|| Error::NoVulkan(format!("the way {way} needs a device, and none was opened")));
+        if way == Way::TwoLevel {
+            return Ok(Box::new(TwoLevel::new(device()?, first)?));
+        }
+        let KdBuilder::Host { options: static_options, .. } = self.static_builder.kd()? else {
+            let what = "what stands still is built once, on the host; take kd-exact, kd-binned or kd-gpu-host";
+            return Err(Error::Argument(format!("{}: {what}", self.static_builder)));
+        };
+        Ok(match self.builder.kd()? {
+            KdBuilder::Device { options, traversal } if way != Way::Merge => {
+                Box::new(OnDevice::new(way, device()?, self.builder, (&options, static_options), traversal, first)?)
+            }
+            KdBuilder::Device { options, traversal } => {
+                let still = static_tree(&first.dynamic.static_mesh, &static_options)?.ok_or_else(|| {
+                    let name = &first.dynamic.name;
+                    Error::Scene(format!("{name}: nothing in it stands still, so there is nothing to merge into"))
+                })?;
+                let options = merge::Options { build: options, ..merge::Options::DEFAULT };
+                Box::new(MergeOnDevice::new(device()?, self.builder, options, traversal, still, first)?)
+            }
+            KdBuilder::Host { options, traversal, traces_on_device } => {
+                let kd = (options, traversal, traces_on_device);
+                Box::new(OnHost::new(way, self.device, self.builder, kd, &static_options, first)?)
+            }
+        })
+    }
+}
+
+/// One of the ways under way.
+struct Running<'a> {
+    way: Way,
+    contender: Box<dyn Contender + 'a>,
+}
+
+/// Measures these frames of a scene in every way of the stage. Points come as they are measured; `show` is called once a frame with
+/// its scene and the first way, which has built it, and may trace rays by it.
+///
+/// A way that fails is noted and left out of what follows.
+///
+/// # Errors
+/// Those of `point` and `show`; a frame has vertices that are not finite; no way is left.
+pub fn measure<'a>(
+    stage: &Stage<'a>,
+    scene: &'a DynamicScene,
+    frames: &[u32],
+    point: &mut dyn FnMut(Entry) -> Result<()>,
+    show: &mut dyn FnMut(u32, &Scene, &mut dyn Contender) -> Result<()>,
+) -> Result<()> {
+    let frame_of = |number: u32| -> Result<Frame<'a>> {
+        let mut frame = Frame::new(scene, number)?;
+        (stage.aim)(&mut frame.scene.camera);
+        Ok(frame)
+    };
+    let Some(&first) = frames.first() else { return Ok(()) };
+    let first = frame_of(first)?;
+    let mut running = Vec::new();
+    for &way in stage.ways {
+        (stage.say)(&format!("{}: preparing {way}", scene.name));
+        match stage.contender(way, &first) {
+            Ok(contender) => running.push(Running { way, contender }),
+            Err(error) => point(failure(way, None, &error))?,
+        }
+    }
+    for (i, &number) in frames.iter().enumerate() {
+        let frame = frame_of(number)?;
+        (stage.say)(&format!("{}: frame {number}", scene.name));
+        let warm_ups = u32::from(i == 0);
+        let built = in_turn(&mut running, warm_ups, stage.runs, |running| {
+            running.contender.place(&frame)?;
+            running.contender.build()
+        });
+        let mut built = without_failed(&mut running, built, number, point)?;
+        let Some(leader) = running.first_mut() else {
+            return Err(Error::Argument("no way is left, see the failures".into()));
+        };
+        show(number, &frame.scene, leader.contender.as_mut())?;
+        let mut rays_of: Vec<Vec<Rays>> = running.iter().map(|_| Vec::new()).collect();
+        for &kind in stage.kinds {
+            let leader = &mut running[0].contender;
+            let rays = kinds::generate(kind, &frame.scene, &stage.rays, &mut |rays| {
+                traced(leader.as_mut(), rays, Query::ClosestHit)
+            })?;
+            if rays.is_empty() {
+                continue;
+            }
+            let traced = trace(stage, &mut running, warm_ups, kind, &rays);
+            let failed: Vec<bool> = traced.iter().map(Result::is_err).collect();
+            let traced = without_failed(&mut running, traced, number, point)?;
+            retain_by(&mut built, &failed);
+            retain_by(&mut rays_of, &failed);
+            for (all, rays) in rays_of.iter_mut().zip(traced) {
+                all.push(rays);
+            }
+            if running.is_empty() {
+                return Err(Error::Argument("no way is left, see the failures".into()));
+            }
+        }
+        for ((Running { way, contender }, built), rays) in running.iter_mut().zip(built).zip(rays_of) {
+            for wrong in rays.iter().filter(|rays| rays.different > 0) {
+                let what = format!(
+                    "{} of {} {} rays have other hits than by {}",
+                    wrong.different, wrong.count, wrong.rays, stage.ways[0]
+                );
+                point(failure(*way, Some(number), &hedgerow::Error::InvalidStructure(what).into()))?;
+            }
+            let [c_t, c_i] = stage.costs;
+            let static_triangles = scene.static_mesh.triangles.len() as u64;
+            point(Entry::Animate(Animated {
+                scene: scene.name.clone(),
+                frame: number,
+                time: frame.time,
+                way: *way,
+                builder: contender.builder().to_owned(),
+                timer: contender.timer().to_owned(),
+                static_triangles,
+                dynamic_triangles: scene.triangle_count() - static_triangles,
+                build_ms: Spread::of_some(&built)?,
+                trace: rays,
+                memory: contender.memory()?,
+                sah: contender.sah(c_t, c_i)?,
+            }))?;
+        }
+    }
+    Ok(())
+}
+
+fn failure(way: Way, frame: Option<u32>, error: &Error) -> Entry {
+    Entry::Failure(Failure { way, frame, what: error.to_string() })
+}
+
+/// The results of those that did not fail; the others are noted and run no more.
+fn without_failed<T>(
+    running: &mut Vec<Running<'_>>,
+    results: Vec<Result<T>>,
+    frame: u32,
+    point: &mut dyn FnMut(Entry) -> Result<()>,
+) -> Result<Vec<T>> {
+    let failed: Vec<bool> = results.iter().map(Result::is_err).collect();
+    let mut good = Vec::new();
+    for (running, result) in running.iter().zip(results) {
+        match result {
+            Ok(value) => good.push(value),
+            Err(error) => point(failure(running.way, Some(frame), &error))?,
+        }
+    }
+    retain_by(running, &failed);
+    Ok(good)
+}
+
+fn retain_by<T>(items: &mut Vec<T>, failed: &[bool]) {
+    let mut failed = failed.iter();
+    items.retain(|_| failed.next() != Some(&true));
+}
+
+fn traced(contender: &mut dyn Contender, rays: &[Ray], query: Query) -> Result<Vec<Hit>> {
+    contender.set_rays(rays)?;
+    contender.trace(query)?;
+    contender.hits()
+}
+
+/// The rays in every way, in turn, and their hits against those of the first.
+fn trace(
+    stage: &Stage<'_>,
+    running: &mut [Running<'_>],
+    warm_ups: u32,
+    kind: RayKind,
+    rays: &[Ray],
+) -> Vec<Result<Rays>> {
+    let query = kind.query();
+    let set: Vec<Result<()>> = running.iter_mut().map(|running| running.contender.set_rays(rays)).collect();
+    let times = in_turn(running, warm_ups, stage.runs, |running| running.contender.trace(query));
+    let mut reference: Option<(Vec<Hit>, bool)> = None;
+    let mut one = |running: &mut Running<'_>, times: Vec<f64>| {
+        let hits = running.contender.hits()?;
+        let is_kd = running.way.is_of_kd_trees();
+        let (expected, expected_is_kd) = reference.get_or_insert_with(|| (hits.clone(), is_kd));
+        let is_exact = is_kd && *expected_is_kd;
+        let is_other = |((ray, a), b): &((&Ray, &Hit), &Hit)| !is_same(is_exact, query, ray, a, b);
+        let different = rays.iter().zip(&hits).zip(expected.iter()).filter(is_other).count() as u64;
+        let met = || hits.iter().filter(|hit| hit.is_some());
+        let work = running.contender.work(query)?;
+        let mean = |of: fn(&hedgerow::trace::Work) -> u32| {
+            let work = work.as_ref()?;
+            Some(work.iter().map(|w| f64::from(of(w))).sum::<f64>() / work.len() as f64)
+        };
+        Ok(Rays {
+            rays: kind.name().to_owned(),
+            count: rays.len() as u64,
+            hits: met().count() as u64,
+            trace_ms: Spread::of_some(&times)?,
+            steps: mean(|work| work.steps),
+            tests: mean(|work| work.tests),
+            checksum: met().map(|hit| f64::from(hit.t)).sum::<f64>().to_string(),
+            different,
+        })
+    };
+    let all = running.iter_mut().zip(set).zip(times);
+    all.map(|((running, set), times)| set.and(times).and_then(|times| one(running, times))).collect()
+}
+
+/// Kd-trees find the same bit for bit, however many there are; instances are met in spaces of their own.
+fn is_same(is_exact: bool, query: Query, ray: &Ray, a: &Hit, b: &Hit) -> bool {
+    match query {
+        Query::AnyHit if is_exact => a.is_some() == b.is_some(),
+        Query::ClosestHit if is_exact => a.t.to_bits() == b.t.to_bits() && a.primitive == b.primitive,
+        _ => may_both_be_right(query, ray, a, b),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_ways_are_their_own_inverse() {
+        for way in Way::ALL {
+            assert_eq!(way.name().parse::<Way>().expect("a way"), way);
+            assert_eq!(serde_json::to_value(way).expect("JSON"), way.name());
+        }
+        assert!("two".parse::<Way>().expect_err("no way").to_string().contains("there are rebuild, two-trees"));
+    }
+
+    #[test]
+    fn kd_trees_must_find_the_same_bits_and_instances_nearly_the_same() {
+        let ray = Ray { origin: [0.0; 3], t_min: 0.0, direction: [0.0, 0.0, 1.0], t_max: 10.0 };
+        let hit = |t: f32, primitive| Hit { t, primitive, u: 0.25, v: 0.25 };
+        let (a, b) = (hit(1.0, 7), hit(1.0_f32.next_up(), 7));
+        let same = |is_exact, a: &Hit, b: &Hit| is_same(is_exact, Query::ClosestHit, &ray, a, b);
+        assert!(same(true, &a, &a) && !same(true, &a, &b) && same(false, &a, &b));
+        assert!(!same(true, &a, &hit(1.0, 8)), "another primitive");
+        assert!(!same(false, &a, &Hit::NONE) && !same(true, &a, &Hit::NONE));
+        assert!(is_same(true, Query::AnyHit, &ray, &a, &hit(0.0, 9)));
+    }
+}

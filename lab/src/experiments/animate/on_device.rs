@@ -1,0 +1,133 @@
+//! Kd-trees that the device builds every frame: all in one, all that moves, or each object.
+
+use super::contender::Group;
+use super::{Contender, Frame, Way};
+use crate::Result;
+use crate::device::{Buffer, Device};
+use crate::measure::record::Memory;
+use crate::scene::Mesh;
+use crate::subjects::Subject;
+use crate::subjects::builders::Spec;
+use crate::subjects::kd_device::KdDevice;
+use crate::subjects::kd_gpu::KdGpu;
+use hedgerow::kdtree::builder;
+use hedgerow::kdtree::layout::KdTree;
+use hedgerow::trace::kd::Traversal;
+use hedgerow::trace::{Hit, Query, Ray, Work};
+use hedgerow_host::kdtree as host;
+
+/// Trees on the device, which are traced one after the other.
+pub struct OnDevice<'a> {
+    builder: String,
+    still: Option<Buffer<'a>>,
+    parts: Vec<Part<'a>>,
+    tracer: KdDevice<'a>,
+}
+
+/// A tree that is built every frame.
+struct Part<'a> {
+    group: Group,
+    first: u32,
+    subject: KdGpu<'a>,
+}
+
+impl<'a> OnDevice<'a> {
+    /// The trees of a way other than merging, in the first frame. That of what stands still is built by the host, with the options
+    /// that stand second.
+    ///
+    /// # Errors
+    /// Too little memory; the device failed.
+    pub fn new(
+        way: Way,
+        device: &'a Device,
+        builder: &Spec,
+        (options, static_options): (&builder::Options, host::Options),
+        traversal: Traversal,
+        first: &Frame<'_>,
+    ) -> Result<OnDevice<'a>> {
+        let tracer = KdDevice::new(device, traversal)?;
+        let groups = match way {
+            Way::Rebuild => vec![Group::Whole],
+            Way::TwoTrees => vec![Group::Moving],
+            _ => Group::objects(first),
+        };
+        let builder = builder.to_string();
+        let still = match way {
+            Way::Rebuild => None,
+            _ => static_tree(&first.dynamic.static_mesh, &static_options)?,
+        };
+        let part = |group| {
+            let subject = KdGpu::new(device, &builder, &first.mesh(group), options, traversal)?;
+            Ok(Part { group, first: first.first(group), subject })
+        };
+        Ok(OnDevice {
+            still: still.map(|tree| tracer.upload(&tree)).transpose()?,
+            parts: groups.into_iter().map(part).collect::<Result<_>>()?,
+            tracer,
+            builder,
+        })
+    }
+
+    fn trees(&self) -> Vec<(u64, u32)> {
+        let still = self.still.iter().map(|still| (still.address(), 0));
+        still.chain(self.parts.iter().map(|part| (part.subject.address(), part.first))).collect()
+    }
+}
+
+/// The tree of what stands still, if anything does.
+pub(super) fn static_tree(mesh: &Mesh, options: &host::Options) -> Result<Option<KdTree>> {
+    let is_there = !mesh.triangles.is_empty();
+    Ok(is_there.then(|| host::build(&mesh.positions, &mesh.triangles, options)).transpose()?)
+}
+
+impl Contender for OnDevice<'_> {
+    fn builder(&self) -> &str {
+        &self.builder
+    }
+
+    fn timer(&self) -> &'static str {
+        self.parts.first().map_or("device", |part| part.subject.timer())
+    }
+
+    fn place(&mut self, frame: &Frame<'_>) -> Result<()> {
+        for part in &self.parts {
+            part.subject.set_positions(&frame.mesh(part.group).positions);
+        }
+        Ok(())
+    }
+
+    fn build(&mut self) -> Result<f64> {
+        self.parts.iter_mut().map(|part| Ok(part.subject.build()?.milliseconds)).sum()
+    }
+
+    fn memory(&mut self) -> Result<Memory> {
+        let parts = || self.parts.iter().map(|part| part.subject.memory());
+        let still = self.still.iter().map(|still| Some(still.bytes()));
+        let structure_bytes = still.chain(parts().map(|memory| memory.structure_bytes)).sum();
+        let scratch_bytes = parts().map(|memory| memory.scratch_bytes).sum();
+        Ok(Memory { structure_bytes, scratch_bytes, peak_bytes: None })
+    }
+
+    fn sah(&mut self, c_t: f64, c_i: f64) -> Result<Option<f64>> {
+        match (&self.still, &mut self.parts[..]) {
+            (None, [part]) => Ok(part.subject.quality(c_t, c_i)?.sah),
+            _ => Ok(None),
+        }
+    }
+
+    fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
+        self.tracer.set_rays(rays)
+    }
+
+    fn trace(&mut self, query: Query) -> Result<f64> {
+        self.tracer.trace_several(&self.trees(), query)
+    }
+
+    fn hits(&mut self) -> Result<Vec<Hit>> {
+        Ok(self.tracer.hits())
+    }
+
+    fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
+        self.tracer.work_several(&self.trees(), query)
+    }
+}

@@ -1,0 +1,426 @@
+//! The whole matrix for one scene: every builder built and traced in turn, checked, and written down.
+//!
+//! Everything that is compared runs in turn in one process (A B A B), after a warm-up that does not count: the first run of
+//! a shader compiles it. A builder that fails is left out from there on; the others go on.
+
+use crate::device::Device;
+use crate::measure::agreement::{Sample, wrong_where_different};
+use crate::measure::overlap::Epo;
+use crate::measure::provenance::{self, Machine};
+use crate::measure::record::{Build, Phase, Record, SCHEMA, Trace};
+use crate::measure::statistics::{Spread, in_turn};
+use crate::rays::kinds::{self, RayKind, RayOptions};
+use crate::scene::Scene;
+use crate::subjects::builders::Spec;
+use crate::subjects::{BuildRun, Subject};
+use crate::{Error, Result};
+use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Hit, Query, Ray, Work};
+use rayon::prelude::*;
+
+/// Runs that do not count, before those that do.
+const WARM_UPS: u32 = 1;
+/// Triangle tests that brute force may take for each kind of ray.
+const BRUTE_FORCE_TESTS: usize = 20_000_000;
+/// The rays of the leaf count variability: incoherent ones from the surfaces, one from each primary hit.
+const LCV_RAYS: RayKind = RayKind::Diffuse1;
+/// Rays that differ between two builders of which brute force looks at, at most.
+const DIFFERENCES: usize = 16;
+
+/// What is measured on every scene.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The builders.
+    pub builders: Vec<Spec>,
+    /// Counted runs of every build and of every trace.
+    pub runs: u32,
+    /// Kinds of rays.
+    pub kinds: Vec<RayKind>,
+    /// Their number and seed.
+    pub rays: RayOptions,
+    /// Cost of a traversal step in the SAH.
+    pub c_t: f64,
+    /// Cost of a triangle test in the SAH.
+    pub c_i: f64,
+    /// Whether the end-point overlap is measured.
+    pub epo: Epo,
+}
+
+/// What one builder gave on one scene.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The figures.
+    pub record: Record,
+    /// What the builder chose, see [`Subject::choice`].
+    pub choice: Option<String>,
+    /// Bytes that each phase of the record must move, see [`Subject::traffic`].
+    pub traffic: Vec<Option<u64>>,
+    /// Why `record.valid` is false.
+    pub faults: Vec<String>,
+}
+
+/// A builder that could not be measured on a scene, or a scene that could not be loaded.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct Failure {
+    /// The scene.
+    pub scene: String,
+    /// The builder; `None` if the scene itself failed.
+    pub builder: Option<String>,
+    /// What went wrong.
+    pub what: String,
+}
+
+/// A builder under measurement.
+struct Entry<'a> {
+    spec: &'a Spec,
+    subject: Box<dyn Subject + 'a>,
+    record: Record,
+    faults: Vec<String>,
+    failure: Option<Error>,
+}
+
+/// Measures every builder of `plan` on `scene`. `say` is told what is being done, for a progress bar.
+pub fn measure(
+    scene: &Scene,
+    device: Option<&Device>,
+    plan: &Plan,
+    say: &mut dyn FnMut(&str),
+) -> (Vec<Outcome>, Vec<Failure>) {
+    let fail = |spec: &Spec, error: Error| Failure {
+        scene: scene.name.clone(),
+        builder: Some(spec.to_string()),
+        what: error.to_string(),
+    };
+    let (mut entries, mut failures) = (Vec::new(), Vec::new());
+    for spec in &plan.builders {
+        match spec.make(device, &scene.mesh) {
+            Ok(subject) => {
+                let record = blank(scene, device, subject.as_ref());
+                entries.push(Entry { spec, subject, record, faults: Vec::new(), failure: None });
+            }
+            Err(error) => failures.push(fail(spec, error)),
+        }
+    }
+    let mut rounds = Rounds { entries: &mut entries };
+
+    say("building");
+    let builds = rounds.run(plan.runs, |entry| entry.subject.build());
+    for (entry, runs) in builds {
+        entry.record.build = build_of(entry.subject.timer(), &runs);
+    }
+    say("validating");
+    rounds.once(|entry| {
+        entry.record.memory = entry.subject.memory();
+        entry.record.quality = entry.subject.quality(plan.c_t, plan.c_i)?;
+        entry.record.quality.epo = entry.subject.epo(plan.c_t, plan.c_i, plan.epo)?;
+        match entry.subject.validate() {
+            Err(error @ Error::Library(hedgerow::Error::InvalidStructure(_))) => entry.faults.push(error.to_string()),
+            other => other?,
+        }
+        Ok(())
+    });
+
+    // Rays follow from hits. Those of a plain tree on the host are the same on every machine and for every builder.
+    let mesh = &scene.mesh;
+    let reference = lbvh::build(&mesh.positions, &mesh.triangles, Code::Mc63.full(), Collapse::SAH);
+    let mut closest_hits = Remembered { tree: &reference, last: Vec::new() };
+    for kind in traced_kinds(plan) {
+        say(&format!("tracing {kind} rays"));
+        let rays = kinds::generate(kind, scene, &plan.rays, &mut |rays| Ok(closest_hits.of(rays)));
+        match rays {
+            // Where nothing is hit there is nothing to follow: the kind is left out of the records.
+            Ok(rays) if rays.is_empty() => {}
+            Ok(rays) if !plan.kinds.contains(&kind) => rounds.variability(kind, &rays),
+            Ok(rays) => rounds.trace(kind, &rays, plan.runs, &reference),
+            Err(error) => failures.push(Failure {
+                scene: scene.name.clone(),
+                builder: None,
+                what: format!("{kind} rays: {error}"),
+            }),
+        }
+    }
+
+    let mut outcomes = Vec::new();
+    for entry in entries {
+        let Entry { spec, subject, mut record, faults, failure } = entry;
+        if let Some(error) = failure {
+            failures.push(fail(spec, error));
+            continue;
+        }
+        record.valid = Some(faults.is_empty());
+        let traffic = record.build.phases.iter().map(|phase| subject.traffic(&phase.name)).collect();
+        outcomes.push(Outcome { choice: subject.choice(), traffic, record, faults });
+    }
+    (outcomes, failures)
+}
+
+/// The record before anything was measured.
+fn blank(scene: &Scene, device: Option<&Device>, subject: &dyn Subject) -> Record {
+    let on_host = || (Machine::this().cpu, format!("hedgerow {}", env!("CARGO_PKG_VERSION")), 0);
+    let (device, driver, subgroup) = match device.filter(|_| subject.traces_on_device()) {
+        Some(device) => {
+            let found = device.found();
+            (found.name.clone(), found.driver.clone(), found.subgroup_size)
+        }
+        None => on_host(),
+    };
+    Record {
+        schema: SCHEMA,
+        scene: scene.name.clone(),
+        triangles: scene.mesh.triangles.len() as u64,
+        builder: subject.builder().to_owned(),
+        kind: subject.kind().to_owned(),
+        device,
+        driver,
+        subgroup,
+        commit: provenance::commit(),
+        when: provenance::now(),
+        build: build_of(subject.timer(), &[]),
+        memory: Default::default(),
+        quality: Default::default(),
+        trace: Vec::new(),
+        valid: None,
+    }
+}
+
+/// Medians of the runs; each phase's by itself.
+fn build_of(timer: &str, runs: &[BuildRun]) -> Build {
+    let times: Vec<f64> = runs.iter().map(|run| run.milliseconds).collect();
+    let spread = Spread::of(&times).unwrap_or(Spread { median: 0.0, min: 0.0, max: 0.0, runs: 0 });
+    let names = runs.first().map_or(&[][..], |run| &run.phases);
+    let phase = |(i, phase): (usize, &hedgerow::gpu::Phase)| {
+        let times: Vec<f64> = runs.iter().filter_map(|run| Some(run.phases.get(i)?.milliseconds)).collect();
+        Phase { name: phase.name.to_owned(), median_ms: Spread::of(&times).map_or(0.0, |s| s.median) }
+    };
+    Build {
+        runs: spread.runs,
+        median_ms: spread.median,
+        min_ms: spread.min,
+        max_ms: spread.max,
+        timer: timer.to_owned(),
+        phases: names.iter().enumerate().map(phase).collect(),
+    }
+}
+
+/// Closest hits on the host, of the last few sets of rays: primary rays are asked for by most kinds.
+struct Remembered<'a> {
+    tree: &'a Bvh2,
+    last: Vec<(Vec<Ray>, Vec<Hit>)>,
+}
+
+impl Remembered<'_> {
+    fn of(&mut self, rays: &[Ray]) -> Vec<Hit> {
+        if let Some((_, hits)) = self.last.iter().find(|(known, _)| known == rays) {
+            return hits.clone();
+        }
+        let hits: Vec<Hit> = rays.par_iter().map(|ray| host::closest_hit(self.tree, ray)).collect();
+        if self.last.len() == 2 {
+            self.last.pop();
+        }
+        self.last.push((rays.to_vec(), hits.clone()));
+        hits
+    }
+}
+
+/// The builders that have not failed, run in turn.
+struct Rounds<'e, 'a> {
+    entries: &'e mut Vec<Entry<'a>>,
+}
+
+impl<'a> Rounds<'_, 'a> {
+    fn live(&mut self) -> Vec<&mut Entry<'a>> {
+        self.entries.iter_mut().filter(|entry| entry.failure.is_none()).collect()
+    }
+
+    /// The samples of every builder that goes through all rounds; the others are marked as failed.
+    fn run<T>(&mut self, runs: u32, mut run: impl FnMut(&mut Entry<'a>) -> Result<T>) -> Vec<(&mut Entry<'a>, Vec<T>)> {
+        let mut live = self.live();
+        let samples = in_turn(&mut live, WARM_UPS, runs, |entry| run(entry));
+        let mut collected = Vec::new();
+        for (entry, samples) in live.into_iter().zip(samples) {
+            match samples {
+                Ok(samples) => collected.push((entry, samples)),
+                Err(error) => entry.failure = Some(error),
+            }
+        }
+        collected
+    }
+
+    /// Once for every builder, no clock running.
+    fn once(&mut self, mut run: impl FnMut(&mut Entry<'a>) -> Result<()>) {
+        for entry in self.live() {
+            entry.failure = run(entry).err();
+        }
+    }
+
+    /// Traces `rays` with every builder for the leaves that they visit, and nothing else.
+    fn variability(&mut self, kind: RayKind, rays: &[Ray]) {
+        self.once(|entry| {
+            entry.subject.set_rays(rays)?;
+            entry.record.quality.lcv = entry.subject.work(kind.query())?.as_deref().and_then(leaf_count_variability);
+            Ok(())
+        });
+    }
+
+    /// Traces `rays` with every builder and compares what they hit.
+    fn trace(&mut self, kind: RayKind, rays: &[Ray], runs: u32, truth: &Bvh2) {
+        let query = kind.query();
+        self.once(|entry| entry.subject.set_rays(rays));
+        let speeds: Vec<Option<Spread>> = {
+            let runs = self.run(runs, |entry| entry.subject.trace(query));
+            runs.iter().map(|(_, times)| Spread::of(times)).collect()
+        };
+        let sample = Sample::take(truth, rays, query, BRUTE_FORCE_TESTS);
+        let mut reference: Option<(String, Vec<Hit>)> = None;
+        let mut speeds = speeds.into_iter();
+        self.once(|entry| {
+            let milliseconds = speeds.next().flatten().map_or(f64::NAN, |s| s.median);
+            let hits = entry.subject.hits()?;
+            if let Some((i, truth)) = sample.first_wrong(rays, &hits) {
+                entry.faults.push(format!("{kind} ray {i}: found {:?}, brute force {truth:?}", hits[i]));
+            }
+            match &reference {
+                None => reference = Some((entry.record.builder.clone(), hits.clone())),
+                Some((other, others)) => {
+                    let wrong = wrong_where_different(truth, rays, query, (&hits, others), DIFFERENCES);
+                    if wrong > 0 {
+                        entry
+                            .faults
+                            .push(format!("{wrong} {kind} rays differ from {other} and are wrong by brute force"));
+                    }
+                }
+            }
+            let work = entry.subject.work(query)?;
+            if kind == LCV_RAYS {
+                entry.record.quality.lcv = work.as_deref().and_then(leaf_count_variability);
+            }
+            let mean = |of: fn(&hedgerow::trace::Work) -> u32| {
+                let work = work.as_ref().filter(|work| !work.is_empty())?;
+                Some(work.iter().map(|w| f64::from(of(w))).sum::<f64>() / work.len() as f64)
+            };
+            entry.record.trace.push(Trace {
+                rays: kind.to_string(),
+                count: rays.len() as u64,
+                hits: hits.iter().filter(|hit| hit.is_some()).count() as u64,
+                mrays_s: rays.len() as f64 / (milliseconds * 1e3),
+                steps: mean(|w| w.steps),
+                tests: mean(|w| w.tests),
+                runs,
+                checksum: checksum(query, &hits).to_string(),
+            });
+            Ok(())
+        });
+    }
+}
+
+/// The kinds that are asked for; where none is, that of the leaf count variability.
+fn traced_kinds(plan: &Plan) -> Vec<RayKind> {
+    if plan.kinds.is_empty() { vec![LCV_RAYS] } else { plan.kinds.clone() }
+}
+
+/// Standard deviation of the number of leaves that a ray visits (Aila, Karras, Laine 2013, section 3.3); `None` without rays.
+fn leaf_count_variability(work: &[Work]) -> Option<f64> {
+    let mean = |of: &dyn Fn(f64) -> f64| work.iter().map(|w| of(f64::from(w.leaves))).sum::<f64>() / work.len() as f64;
+    let leaves = mean(&|leaves| leaves);
+    (!work.is_empty()).then(|| mean(&|l| (l - leaves).powi(2)).sqrt())
+}
+
+/// Sum of t over the hits; of an any-hit query, the number of hits.
+fn checksum(query: Query, hits: &[Hit]) -> f64 {
+    let hits = hits.iter().filter(|hit| hit.is_some());
+    match query {
+        // From +0: the sum of no floats is −0.
+        Query::ClosestHit => hits.fold(0.0, |sum, hit| sum + f64::from(hit.t)),
+        Query::AnyHit => hits.count() as f64,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{self, LoadOptions};
+    use crate::subjects::builders;
+
+    fn plan(builders: &str) -> Plan {
+        Plan {
+            builders: builders::parse_list(builders).expect("known builders"),
+            runs: 2,
+            kinds: RayKind::ALL.to_vec(),
+            rays: RayOptions { size: [16, 12], seed: 1 },
+            c_t: 3.0,
+            c_i: 2.0,
+            epo: Epo::On,
+        }
+    }
+
+    #[test]
+    fn every_builder_is_measured_validated_and_traced_with_every_kind() {
+        let scene = scene::load("gen:stadium:3", &LoadOptions::default()).expect("a generator");
+        let plan = plan("lbvh-host,lbvh-host:collapse=off");
+        let (outcomes, failures) = measure(&scene, None, &plan, &mut |_| {});
+        assert!(failures.is_empty(), "{failures:?}");
+        assert_eq!(outcomes.len(), 2);
+        for outcome in &outcomes {
+            let record = &outcome.record;
+            assert_eq!(record.valid, Some(true), "{:?}", outcome.faults);
+            assert_eq!((record.build.runs, record.trace.len()), (2, RayKind::ALL.len()));
+            assert!(record.build.min_ms <= record.build.median_ms && record.build.median_ms <= record.build.max_ms);
+            assert_eq!(record.quality.refs, Some(record.triangles));
+            assert!(record.quality.epo.is_some_and(|epo| epo > 0.0), "{:?}", record.quality);
+            assert!(record.quality.lcv.is_some_and(|lcv| lcv > 0.0), "{:?}", record.quality);
+            let primary = record.rays("primary").expect("traced");
+            assert_eq!(primary.count, 16 * 12);
+            assert!(primary.steps.is_some_and(|steps| steps > 0.0), "{primary:?}");
+        }
+        let [collapsed, flat] = &outcomes[..] else { panic!("two builders") };
+        assert!(collapsed.record.quality.sah < flat.record.quality.sah, "collapsing lowers the cost");
+        for (a, b) in collapsed.record.trace.iter().zip(&flat.record.trace) {
+            assert_eq!((a.hits, &a.checksum), (b.hits, &b.checksum), "{} rays hit the same in both trees", a.rays);
+        }
+    }
+
+    #[test]
+    fn a_builder_that_needs_a_device_fails_alone() {
+        let scene = scene::load("gen:icosphere:2", &LoadOptions::default()).expect("a generator");
+        let (outcomes, failures) = measure(&scene, None, &plan("driver-fast-build,lbvh-host"), &mut |_| {});
+        assert_eq!(outcomes.len(), 1);
+        assert_eq!(failures[0].builder.as_deref(), Some("driver-fast-build"));
+    }
+
+    #[test]
+    fn leaves_are_counted_even_where_no_kind_is_traced() {
+        let scene = scene::load("gen:stadium:3", &LoadOptions::default()).expect("a generator");
+        let plan = Plan { kinds: Vec::new(), epo: Epo::Off, ..plan("lbvh-host") };
+        let (outcomes, _) = measure(&scene, None, &plan, &mut |_| {});
+        let record = &outcomes[0].record;
+        assert!(record.trace.is_empty() && record.quality.lcv.is_some() && record.quality.epo.is_none(), "{record:?}");
+    }
+
+    #[test]
+    fn variability_is_the_standard_deviation_of_the_leaves() {
+        let work = |leaves| Work { leaves, ..Work::default() };
+        // Mean 5, variance (9 + 1 + 1 + 9) / 4.
+        let lcv = leaf_count_variability(&[work(2), work(4), work(6), work(8)]).expect("four rays");
+        assert!((lcv - 5.0f64.sqrt()).abs() < 1e-12, "{lcv}");
+        assert_eq!(leaf_count_variability(&[]), None);
+    }
+
+    #[test]
+    fn medians_of_builds_are_taken_phase_by_phase() {
+        let run = |a, b| BuildRun {
+            milliseconds: a + b,
+            phases: vec![
+                hedgerow::gpu::Phase { name: "sort", milliseconds: a },
+                hedgerow::gpu::Phase { name: "hierarchy", milliseconds: b },
+            ],
+        };
+        let build = build_of("device", &[run(1.0, 9.0), run(2.0, 4.0), run(3.0, 5.0)]);
+        assert_eq!((build.median_ms, build.min_ms, build.max_ms, build.runs), (8.0, 6.0, 10.0, 3));
+        let medians: Vec<_> = build.phases.iter().map(|p| (p.name.as_str(), p.median_ms)).collect();
+        assert_eq!(medians, [("sort", 2.0), ("hierarchy", 5.0)]);
+    }
+}

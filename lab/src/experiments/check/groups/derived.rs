@@ -1,0 +1,96 @@
+//! Trees made of trees: wide ones, and those that follow their triangles.
+
+use super::builders::meshes;
+use crate::device::Device;
+use crate::experiments::check::cases::{Cases, Found, same, same_all};
+use crate::experiments::check::corpus::{Mesh, unit_floats};
+use hedgerow::bvh::builder::Input;
+use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::geometry::Primitives;
+use hedgerow::bvh::layout::{Bvh2, Child, Header, Triangle};
+use hedgerow::bvh::refit::{self, Refit};
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::{self, lbvh};
+use hedgerow::bvh::wide::device::{OnDevice, Options};
+use hedgerow::bvh::wide::layout::{Wide, WideNode};
+use hedgerow::bvh::wide::quantised::QuantisedNode;
+
+/// Bytes behind memory that nothing may touch.
+const GUARD: [u8; 256] = [0xA5; 256];
+
+pub fn wide(cases: &mut Cases<'_>) {
+    for mesh in meshes(cases) {
+        for collapse in [Collapse::OFF, Collapse::SAH] {
+            let (name, positions, triangles) = &mesh;
+            let tree = lbvh::build(positions, triangles, Code::Emc64Var.full(), collapse);
+            let what = format!("{name}, {collapse:?}");
+            cases.case(format!("{what}, 4"), |device| wide_as_on_host::<[Child; 4]>(device, &tree));
+            cases.case(format!("{what}, 8"), |device| wide_as_on_host::<[Child; 8]>(device, &tree));
+            cases.case(format!("{what}, 8q"), |device| wide_as_on_host::<QuantisedNode>(device, &tree));
+        }
+    }
+}
+
+fn wide_as_on_host<N: WideNode>(device: &Device, tree: &Bvh2) -> Found {
+    let expected = Wide::<N>::of(tree);
+    expected.validate()?;
+    let Header { primitive_count, geometry_count, .. } = tree.header;
+    let options = Options { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
+    let wide = OnDevice::new(device, &options, primitive_count);
+    let sizes = wide.sizes();
+    let source = device.upload("source", &tree.to_bytes())?;
+    let guarded = |bytes: u64| [vec![0xEEu8; bytes as usize], GUARD.to_vec()].concat();
+    let target = device.upload("target", &guarded(sizes.structure))?;
+    let scratch = device.upload("scratch", &guarded(sizes.scratch))?;
+    device.run(None, |r| wide.record(r, source.address(), target.address(), scratch.address()))?;
+    same("bytes behind the tree", &target.read_at::<u8>(sizes.structure, GUARD.len()), &GUARD.to_vec())?;
+    same("bytes behind the scratch memory", &scratch.read_at::<u8>(sizes.scratch, GUARD.len()), &GUARD.to_vec())?;
+    let header: Header = target.read(1)[0];
+    let used = N::FORM.bytes_in_use(&header, size_of::<Triangle>() as u64).min(sizes.structure);
+    let bytes = target.read::<u8>(used as usize);
+    let got = Wide::<N>::from_bytes(&bytes)?;
+    same("header", &got.header, &expected.header)?;
+    same_all("node", &got.nodes, &expected.nodes)?;
+    same_all("byte", &bytes, &expected.to_bytes())
+}
+
+pub fn refit(cases: &mut Cases<'_>) {
+    for mesh in meshes(cases) {
+        let (name, positions, triangles) = &mesh;
+        let mut next = unit_floats(3);
+        let moved: Vec<[f32; 3]> = positions.iter().map(|_| [next(), 3.0 * next(), next() - 7.0]).collect();
+        for collapse in [Collapse::SAH, Collapse::OFF] {
+            let tree = lbvh::build(positions, triangles, Code::Emc64Var.full(), collapse);
+            for schedule in [refit::Schedule::Chain, refit::Schedule::Workgroup] {
+                cases.case(format!("{name}, {collapse:?}, {schedule:?}"), |device| {
+                    let moved = (name.clone(), moved.clone(), triangles.clone());
+                    refit_as_on_host(device, &tree, &moved, schedule)
+                });
+            }
+        }
+    }
+}
+
+fn refit_as_on_host(device: &Device, tree: &Bvh2, mesh: &Mesh, schedule: refit::Schedule) -> Found {
+    let (_, positions, triangles) = mesh;
+    let mut expected = tree.clone();
+    twin::refit::refit_corners(&mut expected, lbvh::corners(positions, triangles), Collapse::SAH);
+    expected.validate()?;
+    let count = triangles.len() as u32;
+    let (vertices, indices) = (device.upload("positions", positions)?, device.upload("indices", triangles)?);
+    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), count);
+    let options = refit::Options { schedule: Some(schedule), ..refit::Options::DEFAULT };
+    let refit = Refit::new(device, &options, count)?;
+    let bytes = tree.to_bytes();
+    let structure = device.upload("structure", &[&bytes[..], &GUARD].concat())?;
+    let scratch = device.upload("scratch", &vec![0xA5u8; refit.sizes().scratch as usize])?;
+    device.run(None, |recorder| refit.record(recorder, &input, structure.address(), scratch.address()))?;
+    same("bytes behind the tree", &structure.read_at::<u8>(bytes.len() as u64, GUARD.len()), &GUARD.to_vec())?;
+    let got = Bvh2::<Triangle>::from_bytes(&structure.read::<u8>(bytes.len()))?;
+    // Points have a cost that is no number, which equals nothing.
+    let comparable =
+        |header: &Header| Header { cost: if header.cost.is_nan() { -1.0 } else { header.cost }, ..*header };
+    same("header", &comparable(&got.header), &comparable(&expected.header))?;
+    same_all("record", &got.records, &expected.records)?;
+    same_all("node", &got.nodes, &expected.nodes)
+}

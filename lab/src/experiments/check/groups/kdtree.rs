@@ -1,0 +1,141 @@
+//! kd-trees: builds by every schedule, and objects that come and go.
+
+use crate::device::{Buffer, Device};
+use crate::experiments::check::cases::{Cases, Found, same, same_all};
+use crate::experiments::check::corpus::{self, Mesh};
+use crate::experiments::check::shapes::{Corners, icosphere, placed, soup};
+use crate::experiments::check::twins::{PLENTY, PLENTY_TO_MERGE};
+use hedgerow::bvh::builder::{Input, Schedule};
+use hedgerow::bvh::layout::status;
+use hedgerow::kdtree::builder::{Builder, Options, Report};
+use hedgerow::kdtree::layout::{Header, KdTree};
+use hedgerow::kdtree::merge::{self, Memory, Merger, Most, Object};
+use hedgerow::kdtree::twin;
+
+fn meshes(cases: &Cases<'_>) -> Vec<Mesh> {
+    let sphere = corpus::soup("a sphere", placed(&icosphere(3), 1.0, [0.1, 0.2, 0.3]));
+    let random = |count: usize| corpus::random(&format!("{count} triangles"), count, [-0.5; 3], [1.0; 3]);
+    let small = [0, 1, 2, 65, 1025].map(random);
+    let hard = corpus::meshes().into_iter().chain([random(9000)]);
+    small.into_iter().chain([sphere]).chain(hard.filter(|_| !cases.quick)).collect()
+}
+
+pub fn build(cases: &mut Cases<'_>) {
+    let schedules: &[(Schedule, Option<u32>)] = match cases.quick {
+        true => &[(Schedule::Chain, None), (Schedule::Persistent, None)],
+        false => &[(Schedule::Chain, None), (Schedule::Persistent, Some(1)), (Schedule::Persistent, Some(64))],
+    };
+    let cuts: &[(u32, u32)] = if cases.quick { &[(32, 32)] } else { &[(128, 32), (7, 4)] };
+    for mesh in meshes(cases) {
+        for &(bins, exact) in cuts {
+            let options = Options { bins, exact, estimate: Some(PLENTY), ..Options::DEFAULT };
+            for &(schedule, workgroups) in schedules {
+                let what = format!("{}, {bins} bins, exact {exact}, {schedule}, {workgroups:?} workgroups", mesh.0);
+                let options = Options { schedule: Some(schedule), workgroups, ..options };
+                cases.case(what, |device| built_as_on_host(device, &mesh, &options));
+            }
+        }
+    }
+}
+
+fn built_as_on_host(device: &Device, (_, positions, triangles): &Mesh, options: &Options) -> Found {
+    let expected = twin::builder::build(positions, triangles, options)?;
+    expected.validate()?;
+    let (vertices, indices) = (device.upload("positions", positions)?, device.upload("indices", triangles)?);
+    let count = triangles.len() as u32;
+    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), count);
+    let builder = Builder::new(device, options, count)?;
+    let sizes = builder.sizes();
+    // Whatever was there before changes nothing.
+    let garbage = |bytes: u64| vec![0xA5u8; bytes as usize];
+    let structure = device.upload("structure", &garbage(sizes.structure))?;
+    let scratch = device.upload("scratch", &garbage(sizes.scratch))?;
+    device.run(None, |recorder| builder.record(recorder, &input, structure.region(), scratch.region()))?;
+    let report: Report = scratch.read_at(builder.report_range().start, 1)[0];
+    same("out of room", &(report.status & status::OUT_OF_ROOM), &0)?;
+    compare(&KdTree::from_bytes(&structure.read::<u8>(sizes.structure as usize))?, &expected)
+}
+
+/// The header without what tells of room.
+fn without_room(header: &Header) -> Header {
+    Header { node_room: 0, reference_room: 0, record_room: 0, ..*header }
+}
+
+fn compare(got: &KdTree, expected: &KdTree) -> Found {
+    same("header", &without_room(&got.header), &without_room(&expected.header))?;
+    let contents = |tree: &KdTree| tree.nodes.iter().map(|node| node.content()).collect::<Vec<_>>();
+    same_all("node", &contents(got), &contents(expected))?;
+    same_all("reference", &got.references, &expected.references)?;
+    same_all("record", &got.records, &expected.records)
+}
+
+/// What stands still, and objects that come and go.
+type World = (&'static str, Corners, Vec<Corners>);
+
+pub fn merge(cases: &mut Cases<'_>) {
+    let sphere = |scale: f32, at: [f32; 3]| placed(&icosphere(3), scale, at);
+    let worlds: [World; 6] = [
+        ("one in a soup", soup(3000, 0.1, 1), vec![sphere(0.3, [0.1, 0.2, 0.3])]),
+        ("one still", soup(1, 0.5, 6), vec![soup(100, 0.5, 7)]),
+        ("overlapping", soup(500, 0.2, 2), vec![sphere(0.3, [0.1; 3]), soup(300, 0.3, 3), sphere(0.2, [0.2; 3])]),
+        ("outside", sphere(0.5, [0.0; 3]), vec![sphere(0.5, [2.0, 0.1, 0.0]), sphere(0.1, [-0.2, -3.0, 0.0])]),
+        ("nothing still", Corners::new(), vec![sphere(0.5, [0.0; 3]), soup(100, 0.2, 5)]),
+        ("large in small", sphere(0.5, [0.0; 3]), vec![soup(40, 5.0, 9)]),
+    ];
+    for (name, still, objects) in worlds.iter().take(if cases.quick { 2 } else { 6 }) {
+        // The pool's kernels take long to compile; the build's have been tried.
+        let schedules = [Schedule::Chain, Schedule::Persistent];
+        for schedule in schedules.into_iter().take(if cases.quick { 1 } else { 2 }) {
+            cases.case(format!("{name}, {schedule}"), |device| merged_as_on_host(device, still, objects, schedule));
+        }
+    }
+}
+
+fn merged_as_on_host(device: &Device, still: &Corners, objects: &[Corners], schedule: Schedule) -> Found {
+    let options =
+        merge::Options { build: Options { schedule: Some(schedule), ..Options::DEFAULT }, estimate: PLENTY_TO_MERGE };
+    let (_, positions, triangles) = corpus::soup("", still.clone());
+    let meshes: Vec<Mesh> = objects.iter().map(|corners| corpus::soup("object", corners.clone())).collect();
+    let most = Most {
+        objects: meshes.len() as u32,
+        triangles: meshes.iter().map(|(_, _, triangles)| triangles.len() as u32).sum(),
+    };
+    let still =
+        twin::builder::build(&positions, &triangles, &options.build)?.with_room(Merger::room(&options, most))?;
+    let merger = Merger::new(device, &options, &still.header, most)?;
+    let before = still.to_bytes();
+    let structure = device.upload("structure", &before)?;
+    let garbage = |bytes: u64| vec![0xA5u8; bytes as usize];
+    let sizes = merger.sizes();
+    let (scratch, undo) =
+        (device.upload("scratch", &garbage(sizes.scratch))?, device.upload("undo", &garbage(sizes.undo))?);
+
+    let mut first_primitive = still.header.primitive_count;
+    let (mut given, mut twins) = (Vec::new(), Vec::new());
+    let mut buffers: Vec<[Buffer<'_>; 2]> = Vec::new();
+    for (_, positions, triangles) in &meshes {
+        let lists = [device.upload("positions", positions)?, device.upload("indices", triangles)?];
+        let count = triangles.len() as u32;
+        let input = Input::mesh(lists[0].address(), positions.len() as u32, lists[1].address(), count);
+        given.push(Object { input, first_primitive, tree: None });
+        twins.push(twin::merge::Object { first_primitive, positions, triangles });
+        buffers.push(lists);
+        first_primitive += count;
+    }
+    let Options { bins, exact, costs, .. } = options.build;
+    let expected = twin::merge::merge(&still, &twins, costs, (bins, exact))?;
+    expected.validate()?;
+
+    let memory = || Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+    let tree = || KdTree::from_bytes(&structure.read::<u8>(before.len()));
+    device.run(None, |recorder| merger.record(recorder, memory(), &given))?;
+    let report: merge::Report = scratch.read_at(merger.report_range().start, 1)[0];
+    same("out of room", &(report.status & status::OUT_OF_ROOM), &0)?;
+    compare(&tree()?, &expected)?;
+    device.run(None, |recorder| merger.restore(recorder, memory()))?;
+    same(
+        "the tree after a restore is the static one",
+        &(tree()?.to_bytes() == KdTree::from_bytes(&before)?.to_bytes()),
+        &true,
+    )
+}

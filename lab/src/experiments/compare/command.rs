@@ -1,0 +1,91 @@
+//! `hedgerow compare`: two runs side by side, with what may be noise marked.
+
+use crate::cli::Common;
+use crate::experiments::bench::page::summary::geometric_mean;
+use crate::experiments::bench::results;
+use crate::experiments::compare::{self, Change, Comparison};
+use crate::report::names::short;
+use crate::report::numbers::{duration, three_digits};
+use crate::report::table::STYLE;
+use comfy_table::{CellAlignment, Table};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Compare two runs of `bench`: ratios of build time, trace speed and SAH cost, and what of it may be noise
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The older results.jsonl, or the folder it is in
+    old: PathBuf,
+    /// The newer
+    new: PathBuf,
+}
+
+pub(crate) fn run(_common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+    let (old, new) = (results::read(&arguments.old)?, results::read(&arguments.new)?);
+    let found = compare::compare(&old, &new);
+    for doubt in &found.doubts {
+        eprintln!("hedgerow: warning: {doubt}");
+    }
+    if found.pairs.is_empty() {
+        anyhow::bail!(
+            "{} and {} have no builder on the same scene in common; measure the same with both",
+            arguments.old.display(),
+            arguments.new.display()
+        );
+    }
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}", table(&found.pairs))?;
+    let mean = |of: fn(&Comparison) -> Vec<f64>| geometric_mean(found.pairs.iter().flat_map(of));
+    let or_dash = |ratio: Option<f64>| ratio.map_or("–".into(), three_digits);
+    writeln!(
+        out,
+        "mean over {}: build time × {}, trace speed × {}, SAH cost × {}",
+        found.pairs.len(),
+        or_dash(mean(|p| vec![p.build_ms.ratio()])),
+        or_dash(mean(|p| p.mrays_s.iter().map(|(_, change)| change.ratio()).collect())),
+        or_dash(mean(|p| p.sah.iter().map(Change::ratio).collect())),
+    )?;
+    writeln!(out, "~ the change is inside the noise: the spreads of the runs meet")?;
+    for (which, names) in [("old", &found.only_old), ("new", &found.only_new)] {
+        if !names.is_empty() {
+            writeln!(out, "only in the {which} run: {}", names.join("; "))?;
+        }
+    }
+    Ok(())
+}
+
+fn table(pairs: &[Comparison]) -> Table {
+    let mut kinds: Vec<&str> = Vec::new();
+    for (kind, _) in pairs.iter().flat_map(|p| &p.mrays_s) {
+        if !kinds.contains(&kind.as_str()) {
+            kinds.push(kind);
+        }
+    }
+    let mut table = Table::new();
+    table.load_style(STYLE);
+    table.set_header(
+        ["scene", "builder", "build old", "new", "time ×", "SAH ×"].into_iter().chain(kinds.iter().copied()),
+    );
+    for pair in pairs {
+        let speed = |kind: &&str| pair.mrays_s.iter().find(|(k, _)| k == kind).map(|(_, change)| ratio(change));
+        let mut row = vec![
+            pair.scene.clone(),
+            short(&pair.builder),
+            duration(pair.build_ms.old),
+            duration(pair.build_ms.new),
+            ratio(&pair.build_ms),
+            pair.sah.as_ref().map_or("–".into(), |change| format!("{:.4}", change.ratio())),
+        ];
+        row.extend(kinds.iter().map(|kind| speed(kind).unwrap_or("–".into())));
+        table.add_row(row);
+    }
+    for column in table.column_iter_mut().skip(2) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+/// The ratio, with `~` before it if it may be noise.
+fn ratio(change: &Change) -> String {
+    format!("{}{:.3}", if change.is_noise { "~" } else { "" }, change.ratio())
+}

@@ -1,0 +1,257 @@
+//! Records of many folders on one page: shards of a sweep, and sweeps on several devices, which are kept apart.
+
+use crate::experiments::accel::points::Entry as AccelEntry;
+use crate::experiments::animate::points::Entry as AnimateEntry;
+use crate::experiments::bench::kd_trees::published;
+use crate::experiments::bench::matrix::Outcome;
+use crate::experiments::bench::page::Report;
+use crate::experiments::bench::results::{self, Results};
+use crate::experiments::bench::setting::Setting;
+use crate::experiments::{accel, animate};
+use crate::measure::provenance::{self, DeviceFacts, Machine};
+use crate::measure::record::Record;
+use crate::report::elements::{column, foot, head, number};
+use crate::report::names::slug;
+use crate::report::numbers::{grouped, three_digits};
+use crate::report::{beside, lines};
+use crate::{Error, Result};
+use maud::{DOCTYPE, Markup, html};
+use std::path::{Path, PathBuf};
+
+/// The file of `hedgerow bench`; those of the others are named in [`beside`].
+const RESULTS: &str = "results.jsonl";
+/// What is said where a folder does not say on which machine it was measured.
+const UNKNOWN: &str = "not in the records";
+
+/// All that was measured on a device.
+#[derive(Debug)]
+struct OfDevice {
+    name: String,
+    driver: String,
+    machine: Option<Machine>,
+    facts: Option<DeviceFacts>,
+    /// Notes and options of the runs, each once.
+    notes: Vec<String>,
+    results: Vec<Record>,
+    accel: Vec<AccelEntry>,
+    animate: Vec<AnimateEntry>,
+}
+
+/// The records of `folders`, written into `output` with their pages: `index.html` is the page of the device, or, of several, a
+/// table of all with a folder for the pages of each. Gives the path of `index.html`.
+///
+/// # Errors
+/// A folder holds no records; a line of a file is not a record; a file cannot be written.
+pub fn write(folders: &[PathBuf], output: &Path) -> Result<PathBuf> {
+    let mut devices = Vec::new();
+    for folder in folders {
+        read(folder, &mut devices)?;
+    }
+    match &mut devices[..] {
+        [device] => device.write(output)?,
+        _ => {
+            for device in &mut devices {
+                let folder = output.join(device.slug());
+                device.write(&folder)?;
+            }
+            let path = output.join("index.html");
+            std::fs::write(&path, overview(&devices)).map_err(Error::file(&path))?;
+        }
+    }
+    Ok(output.join("index.html"))
+}
+
+/// Adds what lies in a folder.
+fn read(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
+    let has = |file: &str| folder.join(file).is_file();
+    let [accel_file, animate_file] = [beside::ACCEL.records, beside::ANIMATE.records];
+    if ![RESULTS, accel_file, animate_file].into_iter().any(has) {
+        return Err(Error::Argument(format!(
+            "{} holds none of {RESULTS}, {accel_file} and {animate_file}; name folders that hedgerow bench, accel or animate wrote",
+            folder.display()
+        )));
+    }
+    if has(RESULTS) {
+        read_results(folder, devices)?;
+    }
+    if has(accel_file) {
+        let entries = accel::page::read(folder)?;
+        let setting = entries.iter().find_map(|entry| match entry {
+            AccelEntry::Setting(setting) => Some((setting.machine.clone(), setting.device.clone())),
+            _ => None,
+        });
+        if let Some((machine, facts)) = setting {
+            let device = of(devices, &facts.name.clone(), &facts.driver.clone());
+            device.machine.get_or_insert(machine);
+            device.facts.get_or_insert(facts);
+            device.accel.extend(entries);
+        }
+    }
+    if has(animate_file) {
+        let entries = animate::page::read(folder)?;
+        let setting = entries.iter().find_map(|entry| match entry {
+            AnimateEntry::Setting(setting) => Some(setting.device.clone()),
+            _ => None,
+        });
+        if let Some(facts) = setting.flatten() {
+            of(devices, &facts.name, &facts.driver).animate.extend(entries);
+        }
+    }
+    Ok(())
+}
+
+/// Adds the results of a folder. Those of builders on the host belong to the device beside which they were measured.
+fn read_results(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
+    let records = results::read(folder)?;
+    let setting = Setting::read(folder)?;
+    let facts = setting.as_ref().and_then(|setting| setting.device.clone());
+    let is_of_host = |record: &Record| record.subgroup == 0;
+    let own = records.iter().find(|record| !is_of_host(record)).map(|r| (r.device.clone(), r.driver.clone()));
+    let own = facts.as_ref().map(|facts| (facts.name.clone(), facts.driver.clone())).or(own);
+    for record in records {
+        let (name, driver) = match &own {
+            Some(own) if is_of_host(&record) => own.clone(),
+            _ => (record.device.clone(), record.driver.clone()),
+        };
+        let device = of(devices, &name, &driver);
+        // Measured twice: the later counts.
+        let is_same = |other: &Record| (&other.scene, &other.builder) == (&record.scene, &record.builder);
+        match device.results.iter_mut().find(|other| is_same(other)) {
+            Some(other) if other.when <= record.when => *other = record,
+            Some(_) => {}
+            None => device.results.push(record),
+        }
+    }
+    if let (Some((name, driver)), Some(setting)) = (own, setting) {
+        let device = of(devices, &name, &driver);
+        device.machine.get_or_insert(setting.machine);
+        device.facts = device.facts.take().or(facts);
+        for note in setting.notes {
+            if !device.notes.contains(&note) {
+                device.notes.push(note);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The device of this name and driver.
+fn of<'a>(devices: &'a mut Vec<OfDevice>, name: &str, driver: &str) -> &'a mut OfDevice {
+    let found = devices.iter().position(|device| device.name == name && device.driver == driver);
+    let found = found.unwrap_or_else(|| {
+        devices.push(OfDevice {
+            name: name.to_owned(),
+            driver: driver.to_owned(),
+            machine: None,
+            facts: None,
+            notes: Vec::new(),
+            results: Vec::new(),
+            accel: Vec::new(),
+            animate: Vec::new(),
+        });
+        devices.len() - 1
+    });
+    &mut devices[found]
+}
+
+impl OfDevice {
+    /// The folder of its pages, where there are several devices.
+    fn slug(&self) -> String {
+        slug(&format!("{} {}", self.name, self.driver))
+    }
+
+    /// Its records and pages.
+    fn write(&mut self, folder: &Path) -> Result<()> {
+        // One scene's together, whichever shard measured it.
+        self.results.sort_by(|a, b| a.scene.cmp(&b.scene));
+        let mut file = Results::create(folder)?;
+        self.results.iter().try_for_each(|record| file.append(record))?;
+        if !self.accel.is_empty() {
+            lines::write(folder, std::mem::take(&mut self.accel))?;
+        }
+        if !self.animate.is_empty() {
+            lines::write(folder, std::mem::take(&mut self.animate))?;
+            animate::page::write(folder)?;
+        }
+        self.report().write(folder)
+    }
+
+    fn report(&self) -> Report {
+        let unknown = Machine { cpu: UNKNOWN.to_owned(), cores: 0, memory: None, system: UNKNOWN.to_owned() };
+        let mut commits: Vec<&str> = self.results.iter().map(|record| record.commit.as_str()).collect();
+        commits.sort_unstable();
+        commits.dedup();
+        let outcome = |record: &Record| Outcome {
+            choice: None,
+            traffic: vec![None; record.build.phases.len()],
+            faults: if record.valid == Some(false) { vec!["see the run's own page".to_owned()] } else { Vec::new() },
+            record: record.clone(),
+        };
+        let outcomes: Vec<Outcome> = self.results.iter().map(outcome).collect();
+        let baseline = outcomes.iter().any(|o| o.record.builder == "driver-fast-build");
+        Report {
+            machine: self.machine.clone().unwrap_or(unknown),
+            device: self.facts.clone(),
+            commit: commits.join(", "),
+            when: self.results.iter().map(|record| record.when.clone()).max().unwrap_or_default(),
+            command: provenance::command(),
+            options: Vec::new(),
+            outcomes,
+            failures: Vec::new(),
+            baseline: baseline.then(|| "driver-fast-build".to_owned()),
+            notes: self.notes.clone(),
+            pictures: Vec::new(),
+            choices: Vec::new(),
+            published: published::papay(),
+        }
+    }
+}
+
+/// The page of several devices: a table of each, and the way to its own pages.
+fn overview(devices: &[OfDevice]) -> String {
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            (head(&format!("hedgerow: {} devices", devices.len())))
+            body {
+                header.hero {
+                    p.kicker { "hedgerow benchmark" }
+                    h1 { (devices.len()) " devices" }
+                    p.lead { "Each device by itself: figures of different machines are not compared." }
+                }
+                main { @for device in devices { (section(device)) } }
+                (foot(&provenance::commit(), &provenance::now()))
+            }
+        }
+    };
+    markup.into_string()
+}
+
+fn section(device: &OfDevice) -> Markup {
+    html! {
+        section {
+            h2 { (device.name) }
+            p { (device.driver) ". " a href={ (device.slug()) "/index.html" } { "All charts and figures of this device" } }
+            div.scroll tabindex="0" role="region" aria-label={ "Results of " (device.name) } {
+                table {
+                    thead { tr {
+                        (column("scene", "", false)) (column("triangles", "", true)) (column("builder", "", false))
+                        (column("build", "ms", true)) (column("build", "Mtri/s", true)) (column("SAH cost", "", true))
+                        (column("all rays", "Mrays/s", true)) (column("valid", "", false))
+                    } }
+                    tbody {
+                        @for record in &device.results {
+                            tr {
+                                td { (record.scene) } (number(Some(record.triangles as f64), |n| grouped(n as u64)))
+                                td { code { (record.builder) } }
+                                (number(Some(record.build.median_ms), three_digits)) (number(Some(record.mtris_s()), three_digits))
+                                (number(record.quality.sah, three_digits)) (number(record.mrays_s(), three_digits))
+                                td { @match record.valid { Some(true) => "yes", Some(false) => "no", None => "–" } }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Records as a page of Markdown: `docs/results.md`, the one generated file that the repository keeps.
+
+use crate::experiments::bench::results;
+use crate::measure::record::Record;
+use crate::report::numbers::three_digits;
+use crate::{Error, Result};
+use comfy_table::presets::ASCII_MARKDOWN;
+use comfy_table::{CellAlignment, Table};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Columns before those of rays.
+const COLUMNS: [&str; 6] = ["scene", "triangles", "builder", "build, ms", "SAH cost", "EPO"];
+/// The first column of numbers behind the builder.
+const FIRST_NUMBER: usize = 3;
+
+/// Writes the records of `folders` to `path`, a table for each device and commit.
+///
+/// # Errors
+/// A folder has no `results.jsonl`, or a line of it is not a record; `path` cannot be written.
+pub fn write(folders: &[PathBuf], path: &Path) -> Result<()> {
+    let mut records = Vec::new();
+    for folder in folders {
+        records.extend(results::read(folder)?);
+    }
+    std::fs::write(path, page(&records)).map_err(Error::file(path))
+}
+
+/// The page of these records.
+fn page(records: &[Record]) -> String {
+    let mut runs: BTreeMap<(&str, &str, &str), Vec<&Record>> = BTreeMap::new();
+    for record in records {
+        runs.entry((&record.device, &record.driver, &record.commit)).or_default().push(record);
+    }
+    let mut page = "# Results\n\n`hedgerow report DIR… --markdown docs/results.md` writes this page from the records of `hedgerow \
+                    bench`. Rays are in millions a second.\n"
+        .to_owned();
+    for ((device, driver, commit), records) in runs {
+        let dates = records.iter().map(|record| record.when.split('T').next().unwrap_or(&record.when));
+        let date = dates.max().unwrap_or("an unknown day");
+        let runs = records.iter().map(|record| record.build.runs).max().unwrap_or(0);
+        write!(
+            page,
+            "\n## {device}\n\n{driver}, commit {commit}, {date}, medians of {runs} runs.\n\n{}\n",
+            table(&records)
+        )
+        .expect("writing to a string");
+    }
+    page
+}
+
+fn table(records: &[&Record]) -> Table {
+    let mut kinds: Vec<&str> = Vec::new();
+    for trace in records.iter().flat_map(|record| &record.trace) {
+        if !kinds.contains(&trace.rays.as_str()) {
+            kinds.push(&trace.rays);
+        }
+    }
+    let mut table = Table::new();
+    table.load_style(ASCII_MARKDOWN).set_header(COLUMNS.iter().chain(&kinds));
+    for record in records {
+        let rays = kinds.iter().map(|kind| figure(record.rays(kind).map(|trace| trace.mrays_s)));
+        let before = [
+            record.scene.clone(),
+            record.triangles.to_string(),
+            format!("`{}`", record.builder),
+            three_digits(record.build.median_ms),
+            figure(record.quality.sah),
+            figure(record.quality.epo),
+        ];
+        table.add_row(before.into_iter().chain(rays));
+    }
+    for (i, column) in table.column_iter_mut().enumerate() {
+        if i == 1 || i >= FIRST_NUMBER {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}
+
+fn figure(value: Option<f64>) -> String {
+    value.map_or(String::new(), three_digits)
+}

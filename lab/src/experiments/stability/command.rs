@@ -1,0 +1,297 @@
+//! `hedgerow stability`: where methods give way; records as they are measured, and a page for each experiment.
+
+use crate::cli::options::{Kinds, Size, Steps};
+use crate::cli::work::device_for_those;
+use crate::cli::{Bar, Common};
+use crate::device::Device;
+use crate::experiments::stability::far::{Axes, Side};
+use crate::experiments::stability::large::Placement;
+use crate::experiments::stability::page::{self as report, Points};
+use crate::experiments::stability::points::{Failure, Run};
+use crate::experiments::stability::{self, degenerate, growth, large, relative};
+use crate::measure::provenance::{self, DeviceFacts, Machine};
+use crate::measure::record::SCHEMA;
+use crate::rays::kinds::RayKind;
+use crate::scene::{self, Scene};
+use crate::subjects::builders::{self, Spec};
+use crate::subjects::peers::driver;
+use anyhow::bail;
+use std::io::Write;
+use std::num::NonZeroU32;
+use std::path::PathBuf;
+
+/// What is grown and walled in where no scene is named.
+const SCENES: [&str; 1] = ["pigman"];
+
+/// Measure where methods give way, and write records and a page
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    #[command(subcommand)]
+    experiment: Experiment,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Experiment {
+    /// One far triangle makes the bounds of a scene 2^e times as long: growth.jsonl and growth.html
+    Growth(Growth),
+    /// Huge triangles at the edge of a scene, by the bounds that codes are normalised by: large.jsonl and large.html
+    Large(Large),
+    /// Scenes that hurt: valid trees, the same bytes each time, right hits? degenerate.jsonl and degenerate.html
+    Degenerate(Degenerate),
+}
+
+/// What growth and large primitives have in common.
+#[derive(Debug, clap::Args)]
+struct Relative {
+    /// Scenes: files, bare names or generators [default: pigman]
+    #[arg(value_name = "SCENE")]
+    scenes: Vec<String>,
+    /// Kinds of rays, separated by commas, or all
+    #[arg(long, value_name = "KIND[,KIND…]", default_value = "primary,diffuse1,ao,shadow")]
+    rays: Kinds,
+    /// Costs alone: no rays
+    #[arg(long, conflicts_with = "rays")]
+    no_rays: bool,
+    /// Pixels of the picture that the rays belong to
+    #[arg(long, value_name = "WxH", default_value = "128x96")]
+    size: Size,
+    /// Counted runs of every trace, in turn with that at e = 0, after one that warms up
+    #[arg(long, value_name = "N", default_value = "5")]
+    runs: NonZeroU32,
+    /// The folder for records, charts and the page; pages of other experiments there are linked
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+#[derive(Debug, clap::Args)]
+struct Growth {
+    #[command(flatten)]
+    relative: Relative,
+    /// Builders with their options, separated by commas, or all
+    #[arg(short, long, value_name = "BUILDER[,BUILDER…]", default_value = stability::GROWTH_BUILDERS)]
+    builder: String,
+    /// The e that are measured beside 0: a list of numbers, or LAST/STEP for every STEP up to LAST
+    #[arg(long, value_name = "E,E…|LAST/STEP", default_value = "60/2")]
+    steps: Steps,
+    /// In how many axes the bounds grow: 1, 3 or both
+    #[arg(long, value_name = "1|3", value_delimiter = ',', default_value = "1,3", value_parser = axes)]
+    axes: Vec<Axes>,
+    /// To which sides: +, - or both
+    #[arg(long, value_name = "+|-", value_delimiter = ',', default_value = "+,-", value_parser = side, allow_hyphen_values = true)]
+    sides: Vec<Side>,
+}
+
+#[derive(Debug, clap::Args)]
+struct Large {
+    #[command(flatten)]
+    relative: Relative,
+    /// Builders with their options, separated by commas, or all
+    #[arg(short, long, value_name = "BUILDER[,BUILDER…]", default_value = stability::LARGE_BUILDERS)]
+    builder: String,
+    /// The e that are measured beside 0: a list of numbers, or LAST/STEP for every STEP up to LAST
+    #[arg(long, value_name = "E,E…|LAST/STEP", default_value = "20/2")]
+    steps: Steps,
+    /// Where the triangles stand: wall (at one side), walls (at all), outward (from a corner away)
+    #[arg(long, value_name = "PLACEMENT[,…]", value_delimiter = ',', default_value = "wall,walls,outward")]
+    placements: Vec<Placement>,
+    /// How many triangles a side
+    #[arg(long, value_name = "N[,N…]", value_delimiter = ',', default_value = "1,16")]
+    counts: Vec<NonZeroU32>,
+}
+
+#[derive(Debug, clap::Args)]
+struct Degenerate {
+    /// The scenes, by the names that the page has [default: all]
+    #[arg(value_name = "SCENE")]
+    scenes: Vec<String>,
+    /// Builders with their options, separated by commas, or all
+    #[arg(short, long, value_name = "BUILDER[,BUILDER…]", default_value = stability::DEGENERATE_BUILDERS)]
+    builder: String,
+    /// Triangles of a scene
+    #[arg(long, value_name = "N", default_value = "2000")]
+    triangles: NonZeroU32,
+    /// Builds of each, whose bytes are compared
+    #[arg(long, value_name = "N", default_value = "20")]
+    builds: NonZeroU32,
+    /// The folder for records and the page; pages of other experiments there are linked
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+fn axes(text: &str) -> Result<Axes, String> {
+    let axes = Axes::ALL.into_iter().find(|axes| axes.count().to_string() == text);
+    axes.ok_or_else(|| format!("{text:?} is no number of axes; take 1 or 3"))
+}
+
+fn side(text: &str) -> Result<Side, String> {
+    Side::ALL.into_iter().find(|side| side.sign() == text).ok_or_else(|| format!("{text:?} is no side; take + or -"))
+}
+
+pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+    match &arguments.experiment {
+        Experiment::Growth(growth) => run_growth(common, growth),
+        Experiment::Large(large) => run_large(common, large),
+        Experiment::Degenerate(degenerate) => run_degenerate(common, degenerate),
+    }
+}
+
+fn run_growth(common: &Common, arguments: &Growth) -> anyhow::Result<()> {
+    let plan =
+        growth::Plan { axes: arguments.axes.clone(), sides: arguments.sides.clone(), steps: arguments.steps.0.clone() };
+    run_relative(common, &arguments.relative, &arguments.builder, &mut |stage, scene, failed, points| {
+        growth::measure(stage, scene, &plan, failed, &mut |point| points.append(&point))
+    })
+}
+
+fn run_large(common: &Common, arguments: &Large) -> anyhow::Result<()> {
+    let plan = large::Plan {
+        placements: arguments.placements.clone(),
+        counts: arguments.counts.iter().map(|count| count.get()).collect(),
+        steps: arguments.steps.0.clone(),
+    };
+    run_relative(common, &arguments.relative, &arguments.builder, &mut |stage, scene, failed, points| {
+        large::measure(stage, scene, &plan, failed, &mut |point| points.append(&point))
+    })
+}
+
+/// Measures one scene: the stage, the scene, what is told of failures, and where points go; gives notes.
+type OfScene<'m, P> =
+    dyn FnMut(&relative::Stage<'_>, &Scene, &mut dyn FnMut(Failure), &mut Points<P>) -> crate::Result<Vec<String>> + 'm;
+
+fn run_relative<P: report::Paged>(
+    common: &Common,
+    arguments: &Relative,
+    builders: &str,
+    of_scene: &mut OfScene<'_, P>,
+) -> anyhow::Result<()> {
+    let scenes: Vec<Scene> = match &arguments.scenes[..] {
+        [] => SCENES.iter().map(|spec| common.load(spec)).collect::<crate::Result<_>>()?,
+        named => named.iter().map(|spec| common.load(spec)).collect::<crate::Result<_>>()?,
+    };
+    let (device, specs) = opened(common, builders)?;
+    // Before any work: a folder that cannot be written would lose all of it.
+    let mut points = Points::<P>::create(&arguments.output)?;
+    let kinds: &[RayKind] = if arguments.no_rays { &[] } else { &arguments.rays.0 };
+    let rays = (!kinds.is_empty()).then(|| format!("{}, seed {}", arguments.size, common.seed));
+    let options = [
+        ("Runs", rays.is_some().then(|| format!("{} after a warm-up, in turn with e = 0", arguments.runs))),
+        ("Image", rays),
+    ];
+    let mut run = started(device.as_ref(), &specs, &options)?;
+    let bar = Bar::new(common, "measuring", 0);
+    let say = |what: &str| bar.say(what);
+    let stage = relative::Stage {
+        device: device.as_ref(),
+        builders: &specs,
+        runs: arguments.runs.get(),
+        kinds,
+        rays: arguments.size.rays(common.seed),
+        say: &say,
+    };
+    for scene in &scenes {
+        let mut failed = |failure: Failure| {
+            eprintln!("hedgerow: {}: {}", failure.of, failure.what);
+            run.failures.push(failure);
+        };
+        let notes = of_scene(&stage, scene, &mut failed, &mut points)?;
+        run.notes.extend(notes);
+    }
+    drop(bar);
+    finish(device.as_ref(), points, &run, run.failures.len())
+}
+
+fn run_degenerate(common: &Common, arguments: &Degenerate) -> anyhow::Result<()> {
+    let mut scenes = scene::degenerate(arguments.triangles.get());
+    if let Some(unknown) = arguments.scenes.iter().find(|name| scenes.iter().all(|scene| scene.name != **name)) {
+        let names: Vec<&str> = scenes.iter().map(|scene| scene.name).collect();
+        return Err(crate::Error::Argument(format!(
+            "no degenerate scene is called {unknown:?}; there are {}",
+            names.join(", ")
+        ))
+        .into());
+    }
+    scenes.retain(|scene| arguments.scenes.is_empty() || arguments.scenes.iter().any(|name| name == scene.name));
+    let (device, specs) = opened(common, &arguments.builder)?;
+    let mut points = Points::create(&arguments.output)?;
+    let options = [
+        ("Triangles", Some(format!("about {} a scene", arguments.triangles))),
+        ("Builds", Some(format!("{} of each, the first to warm up", arguments.builds))),
+    ];
+    let mut run = started(device.as_ref(), &specs, &options)?;
+    let bar = Bar::new(common, "measuring", scenes.len() as u64);
+    let stage = degenerate::Stage {
+        device: device.as_ref(),
+        builders: &specs,
+        builds: arguments.builds.get(),
+        seed: common.seed,
+        say: &|what| bar.say(what),
+    };
+    let mut failures = 0;
+    for scene in &scenes {
+        degenerate::measure(&stage, scene, &mut |point| {
+            for fault in &point.faults {
+                let whose = if point.is_ours { "" } else { " (a peer)" };
+                eprintln!("hedgerow: {}: {}{whose}: {fault}", point.scene, point.builder);
+            }
+            failures += usize::from(point.has_failed());
+            points.append(&point)
+        })?;
+        bar.step();
+    }
+    drop(bar);
+    run.notes.extend(peers_note(&specs));
+    finish(device.as_ref(), points, &run, failures)
+}
+
+fn peers_note(specs: &[Spec]) -> Option<String> {
+    specs.iter().any(degenerate::is_peer).then(|| {
+        "Peers get the scenes without triangles whose vertices are not there; what goes wrong with them is shown and is no \
+         failure of ours."
+            .into()
+    })
+}
+
+/// The device that the builders need, and those of them that can work here: one that came with `all` and cannot is left out.
+fn opened(common: &Common, text: &str) -> anyhow::Result<(Option<Device>, Vec<Spec>)> {
+    let asked = builders::parse_list(text)?;
+    let was_named = |spec: &Spec| text.split(',').any(|part| part.trim() == spec.to_string());
+    let (device, specs) = device_for_those(common, &asked, was_named)?;
+    Ok((device, specs.into_iter().cloned().collect()))
+}
+
+/// Where and how it is measured; nothing has failed yet.
+fn started(device: Option<&Device>, specs: &[Spec], options: &[(&str, Option<String>)]) -> crate::Result<Run> {
+    let has_driver = specs.iter().any(|spec| spec.needs() == builders::Needs::RayQuery);
+    Ok(Run {
+        schema: SCHEMA,
+        machine: Machine::this(),
+        device: device.map(DeviceFacts::of).transpose()?,
+        commit: provenance::commit(),
+        when: provenance::now(),
+        command: provenance::command(),
+        options: options.iter().filter_map(|(name, value)| Some(((*name).to_owned(), value.clone()?))).collect(),
+        notes: device.filter(|_| has_driver).and_then(|device| driver::note(device.found())).into_iter().collect(),
+        failures: Vec::new(),
+    })
+}
+
+/// Writes the run and its page.
+///
+/// # Errors
+/// They cannot be written; the validation layers said something; something failed.
+fn finish<P: report::Paged>(
+    device: Option<&Device>,
+    points: Points<P>,
+    run: &Run,
+    failures: usize,
+) -> anyhow::Result<()> {
+    let page = points.finish(run)?;
+    writeln!(std::io::stdout().lock(), "{}", page.display())?;
+    if let Some(device) = device {
+        device.validation_messages()?;
+    }
+    if failures > 0 {
+        bail!("{failures} failed, see above and the page; the rest is measured");
+    }
+    Ok(())
+}

@@ -1,0 +1,339 @@
+//! Builders by name: what `-b` takes (CONTRACT, "Builder names"), and a [`Subject`] made from it.
+//!
+//! A builder with its options is a [`Spec`]: `lbvh:codes=emc64var:collapse=off`. [`BUILDERS`] is the list of all there are;
+//! whoever adds one adds a row there.
+
+mod options;
+mod table;
+
+use super::Subject;
+use super::device_bvh::DeviceBvh;
+use super::host::Host;
+use super::kd_device::KdDevice;
+use super::kd_gpu::KdGpu;
+use super::kd_host::KdHost;
+use super::peers::driver::Driver;
+#[cfg(feature = "peer-embree")]
+use super::peers::embree::Embree;
+#[cfg(feature = "peer-obvhs")]
+use super::peers::obvhs::Obvhs;
+use crate::device::Device;
+use crate::measure::choose::Auto;
+use crate::scene::Mesh;
+use crate::{Error, Result};
+use hedgerow::bvh::{builder, reinsertion};
+use hedgerow::kdtree;
+use hedgerow::trace::kd::Traversal;
+use hedgerow::trace::wide::Tracer;
+use options::{OPTIMISE, RAYS, TRACE};
+use std::fmt;
+use std::str::FromStr;
+use std::time::Duration;
+use table::Kind;
+pub use table::{BUILDERS, Builder, BuilderOption, Needs};
+
+/// A builder with its options, as `-b` takes it. Known to exist and to have sound options once it is made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Spec {
+    name: String,
+    options: Vec<(String, String)>,
+}
+
+impl Spec {
+    /// The builder.
+    pub fn builder(&self) -> &'static Builder {
+        BUILDERS.iter().find(|b| b.name == self.name).expect("checked when the spec was parsed")
+    }
+
+    /// The value of an option, if it was given.
+    pub fn option(&self, key: &str) -> Option<&str> {
+        self.options.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str())
+    }
+
+    /// The same for so many rays a build, where it is one that chooses by them and has no number of its own.
+    pub fn for_rays(mut self, rays: f64) -> Spec {
+        let chooses = self.builder().options.iter().any(|option| option.key == RAYS.key);
+        if chooses && self.option(RAYS.key).is_none() {
+            self.options.push((RAYS.key.to_owned(), rays.to_string()));
+        }
+        self
+    }
+
+    /// What it needs of the machine: what its builder does, and a device if rays are to be traced there.
+    pub fn needs(&self) -> Needs {
+        match self.builder().needs() {
+            Needs::Nothing if self.option(TRACE.key) == Some("device") => Needs::Device,
+            needs => needs,
+        }
+    }
+
+    /// Whether it can be measured with this device.
+    pub fn is_possible(&self, device: Option<&Device>) -> bool {
+        match self.needs() {
+            Needs::Nothing => true,
+            Needs::Device => device.is_some(),
+            Needs::RayQuery => device.is_some_and(|device| device.driver_tracing().is_some()),
+        }
+    }
+
+    /// The subject: the builder on a scene, with everything uploaded that is uploaded once.
+    ///
+    /// # Errors
+    /// The device is missing or lacks something, or there is too little memory.
+    pub fn make<'a>(&self, device: Option<&'a Device>, mesh: &'a Mesh) -> Result<Box<dyn Subject + 'a>> {
+        let given =
+            || device.ok_or_else(|| Error::NoVulkan("this builder works on a device, and none was opened".into()));
+        let name = self.to_string();
+        Ok(match self.builder().kind {
+            Kind::Device(options) => Box::new(self.on_device(given()?, mesh, options(self)?)?),
+            Kind::Host(hierarchy) => Box::new(Host::new(&name, mesh, self.host_options(hierarchy(self)?)?)),
+            Kind::KdHost(options) => {
+                let (options, traversal) = (options(self)?, self.traversal()?);
+                let subject = KdHost::new(&name, mesh, options, traversal);
+                match self.traces_on_device()? {
+                    false => Box::new(subject),
+                    true => Box::new(subject.traced_by(KdDevice::new(given()?, traversal)?)),
+                }
+            }
+            Kind::KdGpu => Box::new(KdGpu::new(given()?, &name, mesh, &self.kd_gpu_options()?, self.traversal()?)?),
+            Kind::Auto => Box::new(Auto::new(given()?, &name, mesh, self.rays()?)?),
+            Kind::Driver(preference) => Box::new(Driver::new(given()?, mesh, preference)?),
+            #[cfg(feature = "peer-obvhs")]
+            Kind::Obvhs(preset) => Box::new(Obvhs::new(mesh, preset)?),
+            #[cfg(feature = "peer-embree")]
+            Kind::Embree(preset) => Box::new(Embree::new(mesh, preset)?),
+        })
+    }
+
+    /// How it builds and traces kd-trees, if it does.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if it is no builder of kd-trees.
+    pub fn kd(&self) -> Result<KdBuilder> {
+        let traversal = || self.traversal();
+        Ok(match self.builder().kind {
+            Kind::KdHost(options) => KdBuilder::Host {
+                options: options(self)?,
+                traversal: traversal()?,
+                traces_on_device: self.traces_on_device()?,
+            },
+            Kind::KdGpu => KdBuilder::Device { options: self.kd_gpu_options()?, traversal: traversal()? },
+            _ => {
+                let of_kd = |b: &&Builder| matches!(b.kind, Kind::KdHost(_) | Kind::KdGpu);
+                let names: Vec<&str> = BUILDERS.iter().filter(of_kd).map(|b| b.name).collect();
+                return Err(Error::Argument(format!("{self} builds no kd-trees; take {}", names.join(", "))));
+            }
+        })
+    }
+
+    /// A builder of ours on the device, with these options and those that depend on the device.
+    fn on_device<'a>(&self, device: &'a Device, mesh: &Mesh, mut options: builder::Options) -> Result<DeviceBvh<'a>> {
+        let (form, order) = self.form_and_order()?;
+        let wide = form.map(|form| match order {
+            None => Tracer::of(device, form),
+            Some(order) => Tracer::in_order(device, form, order),
+        });
+        if let Some(budget) = self.time_to_optimise() {
+            let pass = pass_of_reinsertion(device, mesh, &options)?;
+            options.optimise = Some(reinsertion::Options::within(budget?, pass));
+        }
+        DeviceBvh::new(device, &self.to_string(), mesh, &options, wide)
+    }
+}
+
+/// A builder of kd-trees, for those that build more than one of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum KdBuilder {
+    /// On the host.
+    Host {
+        /// What it builds.
+        options: hedgerow_host::kdtree::Options,
+        /// How its trees are traced.
+        traversal: Traversal,
+        /// Whether that is on the device.
+        traces_on_device: bool,
+    },
+    /// On the device, which traces them, too.
+    Device {
+        /// What it builds.
+        options: kdtree::builder::Options,
+        /// How its trees are traced.
+        traversal: Traversal,
+    },
+}
+
+/// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
+fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &builder::Options) -> Result<Duration> {
+    let mut subject = DeviceBvh::new(device, "", mesh, options, None)?;
+    subject.build()?;
+    let run = subject.build()?;
+    let milliseconds: f64 = run.phases.iter().filter(|p| p.name == OPTIMISE.key).map(|p| p.milliseconds).sum();
+    Ok(Duration::from_secs_f64(1e-3 * milliseconds))
+}
+
+impl FromStr for Spec {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Spec> {
+        let mut parts = text.split(':');
+        let name = parts.next().unwrap_or_default();
+        let builder = BUILDERS.iter().find(|b| b.name == name).ok_or_else(|| {
+            let names: Vec<_> = BUILDERS.iter().map(|b| b.name).collect();
+            Error::Argument(format!("no builder is called {name:?}; there are {}, or all", names.join(", ")))
+        })?;
+        let mut spec = Spec { name: name.to_owned(), options: Vec::new() };
+        for part in parts {
+            let (key, value) = part.split_once('=').ok_or_else(|| {
+                Error::Argument(format!("builder {text}: option {part:?} has no value; write {part}=VALUE"))
+            })?;
+            if !builder.options.iter().any(|option| option.key == key) {
+                let keys: Vec<_> = builder.options.iter().map(|option| option.key).collect();
+                let there_are =
+                    if keys.is_empty() { "it takes none".into() } else { format!("it takes {}", keys.join(", ")) };
+                return Err(Error::Argument(format!("builder {text}: {name} has no option {key:?}; {there_are}")));
+            }
+            if spec.option(key).is_some() {
+                return Err(Error::Argument(format!("builder {text}: {key} is given twice; give it once")));
+            }
+            spec.options.push((key.to_owned(), value.to_owned()));
+        }
+        spec.check()?;
+        Ok(spec)
+    }
+}
+
+impl fmt::Display for Spec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)?;
+        self.options.iter().try_for_each(|(key, value)| write!(f, ":{key}={value}"))
+    }
+}
+
+/// The builders that `-b` asks for: a comma-separated list, in which `all` stands for every variant of every builder.
+/// Each is there once.
+///
+/// # Errors
+/// [`Error::Argument`] says which builder or option is wrong, and what there is.
+pub fn parse_list(text: &str) -> Result<Vec<Spec>> {
+    let mut specs: Vec<Spec> = Vec::new();
+    let all = || BUILDERS.iter().flat_map(|b| b.variants.iter().copied());
+    for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+        let named: Vec<&str> = if part == "all" { all().collect() } else { vec![part] };
+        for name in named {
+            let spec = name.parse()?;
+            if !specs.contains(&spec) {
+                specs.push(spec);
+            }
+        }
+    }
+    if specs.is_empty() {
+        return Err(Error::Argument("no builder is named; take -b NAME,NAME… or -b all".into()));
+    }
+    Ok(specs)
+}
+
+/// Every builder with what it is and its options, for `--help`.
+pub fn help() -> String {
+    let mut text = String::from("Builders, each option behind a colon as in NAME:KEY=VALUE:\n");
+    for builder in BUILDERS {
+        text += &format!("  {:18} {}\n", builder.name, builder.what);
+        for option in builder.options {
+            text += &format!("  {:18}   :{}=  {}\n", "", option.key, option.values);
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hedgerow::bvh::sah::Collapse;
+
+    fn error_of(text: &str) -> String {
+        parse_list(text).expect_err(text).to_string()
+    }
+
+    #[test]
+    fn every_variant_of_every_builder_parses_and_prints_as_it_was() {
+        for variant in BUILDERS.iter().flat_map(|b| b.variants) {
+            assert_eq!(variant.parse::<Spec>().expect(variant).to_string(), *variant);
+        }
+    }
+
+    #[test]
+    fn a_list_holds_each_builder_once() {
+        let specs = parse_list("driver-fast-trace, all,driver-fast-build").expect("known");
+        assert_eq!(specs[0].to_string(), "driver-fast-trace");
+        let variants: usize = BUILDERS.iter().map(|b| b.variants.len()).sum();
+        assert_eq!(specs.len(), variants);
+    }
+
+    #[test]
+    fn options_reach_the_builder() {
+        let spec: Spec = "lbvh-host:codes=mc63+concise:collapse=off".parse().expect("known");
+        assert_eq!(spec.codes().expect("checked").map(|c| c.to_string()).as_deref(), Some("mc63+concise"));
+        assert_eq!(spec.collapse().expect("checked"), Collapse::OFF);
+        assert_eq!("lbvh-host".parse::<Spec>().expect("known").collapse().expect("checked"), Collapse::SAH);
+    }
+
+    #[test]
+    fn rays_a_build_reach_the_builder_that_chooses_by_them() {
+        let for_rays = |text: &str| text.parse::<Spec>().expect("known").for_rays(2e6).to_string();
+        assert_eq!(for_rays("auto"), "auto:rays=2000000");
+        assert_eq!(for_rays("auto:rays=5"), "auto:rays=5");
+        assert_eq!(for_rays("lbvh"), "lbvh");
+    }
+
+    #[test]
+    fn a_device_is_needed_where_rays_are_traced_on_it() {
+        let needs = |text: &str| text.parse::<Spec>().expect("known").needs();
+        assert_eq!(needs("kd-binned:trace=device"), Needs::Device);
+        assert_eq!([needs("kd-binned"), needs("kd-exact:trace=host")], [Needs::Nothing; 2]);
+        assert_eq!([needs("lbvh"), needs("driver-fast-build")], [Needs::Device, Needs::RayQuery]);
+    }
+
+    #[test]
+    fn kd_trees_are_traced_with_a_short_stack_on_the_device() {
+        let traversal = |text: &str| text.parse::<Spec>().expect("known").traversal().expect("one");
+        assert_eq!(["kd-gpu", "kd-binned:trace=device"].map(traversal), [Traversal::short_stack(4); 2]);
+        assert_eq!(["kd-binned", "kd-gpu:traversal=stack"].map(traversal), [Traversal::STACK; 2]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_what_there_is() {
+        assert!(error_of("lvbh").contains("no builder is called \"lvbh\"; there are"));
+        assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));
+        assert!(error_of("lbvh-host:collapse=maybe").contains("use sah or off"));
+        assert!(error_of("lbvh:width=3").contains("width=3 is unknown; use 2, 4, 8 or 8q"));
+        assert!(error_of("lbvh:width=4:order=octant").contains("order=octant is unknown; use distance or octant (of"));
+        for wrong in ["lots", "-0.1", "1.5", "nan", "0.3/0", "0.3/x"] {
+            let says = format!("split={wrong} is unknown; use a number from 0 to 1");
+            assert!(error_of(&format!("hploc:split={wrong}")).contains(&says), "{wrong}");
+        }
+        for wrong in ["ms", "-1ms", "infms", "20s"] {
+            assert!(error_of(&format!("lbvh:optimise={wrong}")).contains("a time for it as in 20ms"), "{wrong}");
+        }
+        assert!(error_of("lbvh-host:optimise=20ms").contains("on the host rounds are not timed"));
+        assert!(error_of("lbvh-host:codes").contains("write codes=VALUE"));
+        assert!(error_of("lbvh-host:codes=mc30:codes=mc63").contains("given twice"));
+        assert!(error_of("lbvh-host:radius=25").contains("no option \"radius\"; it takes codes, collapse, optimise"));
+        assert!(error_of("driver-fast-build:codes=mc30").contains("it takes none"));
+        for wrong in ["many", "1", "1025"] {
+            let says = format!("bins={wrong} is unknown; use a number of bins along each axis, from 2 to 1024");
+            assert!(error_of(&format!("kd-binned:bins={wrong}")).contains(&says), "{wrong}");
+        }
+        for wrong in ["much", "0", "-1", "nan", "1e9"] {
+            let says = format!("kt={wrong} is unknown; use a cost of a traversal step, from 0.001 to 1000");
+            assert!(error_of(&format!("kd-exact:kt={wrong}")).contains(&says), "{wrong}");
+        }
+        for wrong in ["queue", "short", "short-0", "short-42", "short-2-up", "stack-push-down"] {
+            let says = format!("traversal={wrong} is unknown; use stack, restart, push-down, short-N");
+            assert!(error_of(&format!("kd-exact:traversal={wrong}")).contains(&says), "{wrong}");
+        }
+        assert!(error_of("kd-exact:trace=there").contains("trace=there is unknown; use host or device"));
+        assert!(error_of("kd-exact:bins=8").contains("no option \"bins\"; it takes kt, ki, traversal, trace"));
+        assert!(error_of("auto:rays=many").contains("no number of rays"));
+        assert!(error_of("").contains("-b all"));
+        assert!(error_of(",").contains("-b all"));
+    }
+}

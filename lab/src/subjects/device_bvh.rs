@@ -1,0 +1,201 @@
+//! Our trees built on the device as subjects: timestamps around each phase, our tracer.
+
+use super::device_rays::DeviceRays;
+use super::wide::WideTree;
+use super::{BuildRun, Subject};
+use crate::device::{Buffer, Device};
+use crate::measure::overlap::{self, Epo};
+use crate::measure::record;
+use crate::scene::Mesh;
+use crate::{Error, Result};
+use hedgerow::bvh::builder::{Builder, Input, Options, Sizes};
+use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::quality::{self, Figures};
+use hedgerow::gpu::{Recorder, Timestamps};
+use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::wide::Tracer;
+use hedgerow::trace::{Hit, Query, Ray, Work};
+
+/// Phases of a build at most: split, reset and bounds, encode, sort, hierarchy, those of collapsing, wide.
+const PHASES: u32 = 12;
+
+/// A scene in our `Bvh2`, or in a wide tree made of it, built and traced on the device.
+pub struct DeviceBvh<'a> {
+    device: &'a Device,
+    builder: String,
+    choice: Option<String>,
+    bvh: Builder,
+    sizes: Sizes,
+    input: Input,
+    _vertices: [Buffer<'a>; 2],
+    structure: Buffer<'a>,
+    scratch: Buffer<'a>,
+    wide: Option<WideTree<'a>>,
+    timestamps: Timestamps,
+    rays: DeviceRays<'a>,
+}
+
+impl<'a> DeviceBvh<'a> {
+    /// Uploads `mesh` and makes room for structure and scratch, and for the wide tree if there shall be one.
+    ///
+    /// # Errors
+    /// Too many triangles, or too little memory: the error says how much is needed.
+    pub fn new(
+        device: &'a Device,
+        builder: &str,
+        mesh: &Mesh,
+        options: &Options,
+        wide: Option<Tracer>,
+    ) -> Result<DeviceBvh<'a>> {
+        let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
+        let bvh = Builder::new(device, options, count)?;
+        let sizes = bvh.sizes();
+        let (positions, indices) = (size_of_val(&mesh.positions[..]) as u64, size_of_val(&mesh.triangles[..]) as u64);
+        let (needed, available) = (positions + indices + sizes.structure + sizes.scratch, device.found().memory);
+        if needed > available {
+            return Err(Error::OutOfMemory { what: format!("{builder} of {count} triangles"), needed, available });
+        }
+        let vertices = [device.upload("positions", &mesh.positions)?, device.upload("indices", &mesh.triangles)?];
+        let input = Input::mesh(vertices[0].address(), mesh.positions.len() as u32, vertices[1].address(), count);
+        let structure = device.buffer("structure", sizes.structure)?;
+        let scratch = device.buffer("scratch", sizes.scratch)?;
+        bvh.record(&mut Recorder::warming(device), &input, structure.address(), scratch.address())?;
+        Ok(DeviceBvh {
+            device,
+            builder: builder.to_owned(),
+            choice: choice_of(options, &bvh),
+            structure,
+            scratch,
+            wide: wide.map(|tracer| WideTree::new(device, tracer, bvh.record_count())).transpose()?,
+            timestamps: Timestamps::new(device, PHASES)?,
+            bvh,
+            sizes,
+            input,
+            _vertices: vertices,
+            rays: DeviceRays::new(device)?,
+        })
+    }
+
+    /// Address of what is traced.
+    fn traced(&self) -> u64 {
+        self.wide.as_ref().map_or(self.structure.address(), WideTree::address)
+    }
+}
+
+/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`.
+fn record_trace(
+    recorder: &mut Recorder<'_>,
+    wide_tree: Option<&WideTree<'_>>,
+    query: Query,
+    buffers: &Buffers,
+) -> hedgerow::Result<()> {
+    match wide_tree {
+        None => tracer::record(recorder, &Shape::of(recorder.context()), query, buffers),
+        Some(tree) => tree.tracer.record(recorder, query, buffers),
+    }
+}
+
+/// What was left to the builder: codes and schedule.
+fn choice_of(options: &Options, bvh: &Builder) -> Option<String> {
+    let codes = options.codes.is_none().then(|| format!("codes {}", bvh.codes()));
+    let schedule = options.schedule.is_none().then(|| format!("schedule {}", bvh.schedule()));
+    let chosen: Vec<String> = codes.into_iter().chain(schedule).collect();
+    (!chosen.is_empty()).then(|| chosen.join(", "))
+}
+
+impl Subject for DeviceBvh<'_> {
+    fn builder(&self) -> &str {
+        &self.builder
+    }
+
+    fn kind(&self) -> &'static str {
+        self.wide.as_ref().map_or("bvh2", |tree| tree.tracer.form.name())
+    }
+
+    fn timer(&self) -> &'static str {
+        self.device.timer()
+    }
+
+    fn traces_on_device(&self) -> bool {
+        true
+    }
+
+    fn choice(&self) -> Option<String> {
+        self.choice.clone()
+    }
+
+    fn traffic(&self, phase: &str) -> Option<u64> {
+        self.bvh.traffic(phase, &self.input)
+    }
+
+    fn build(&mut self) -> Result<BuildRun> {
+        let (structure, scratch) = (self.structure.address(), self.scratch.address());
+        self.device.run(Some(&mut self.timestamps), |recorder| {
+            self.bvh.record(recorder, &self.input, structure, scratch)?;
+            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, structure))
+        })?;
+        let phases = self.timestamps.phases()?;
+        Ok(BuildRun { milliseconds: phases.iter().map(|p| p.milliseconds).sum(), phases })
+    }
+
+    fn memory(&self) -> record::Memory {
+        let binary = record::Memory {
+            structure_bytes: Some(self.sizes.structure),
+            scratch_bytes: Some(self.sizes.scratch),
+            peak_bytes: Some(self.sizes.structure + self.sizes.scratch),
+        };
+        self.wide.as_ref().map_or(binary.clone(), |tree| tree.memory(&binary))
+    }
+
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+        if let Some(tree) = &self.wide {
+            return tree.quality(c_t, c_i);
+        }
+        let measure = quality::OnDevice::new(self.device, self.bvh.record_count());
+        let scratch = self.device.buffer("quality: scratch", measure.scratch_bytes())?;
+        let result = self.device.buffer("quality: figures", size_of::<Figures>() as u64)?;
+        self.device.run(None, |r| measure.record(r, self.structure.address(), scratch.address(), result.address()))?;
+        Ok(record::Quality::of(&result.read::<Figures>(1)[0].quality(c_t, c_i), c_t, c_i))
+    }
+
+    fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
+        if self.bvh.record_count() != self.bvh.count() {
+            // The device takes each record for a triangle of its own.
+            return Ok(self.tree()?.and_then(|tree| overlap::on_host(&tree, c_t, c_i, epo)));
+        }
+        overlap::on_device(self.device, self.structure.address(), self.input.primitive_count, (c_t, c_i), epo)
+    }
+
+    fn tree(&mut self) -> Result<Option<Bvh2>> {
+        Ok(Some(Bvh2::from_bytes(&self.structure.read::<u8>(self.sizes.structure as usize))?))
+    }
+
+    fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
+        match &self.wide {
+            Some(tree) => Ok(Some(tree.bytes())),
+            None => Ok(Some(self.structure.read(self.sizes.structure as usize))),
+        }
+    }
+
+    fn validate(&mut self) -> Result<()> {
+        self.tree()?.map_or(Ok(()), |tree| tree.validate())?;
+        self.wide.as_ref().map_or(Ok(()), WideTree::validate)
+    }
+
+    fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
+        self.rays.set(rays)
+    }
+
+    fn trace(&mut self, query: Query) -> Result<f64> {
+        let structure = self.traced();
+        self.rays.trace(structure, |recorder, buffers| record_trace(recorder, self.wide.as_ref(), query, buffers))
+    }
+
+    fn hits(&mut self) -> Result<Vec<Hit>> {
+        Ok(self.rays.hits())
+    }
+
+    fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
+        self.rays.work(self.traced(), |recorder, buffers| record_trace(recorder, self.wide.as_ref(), query, buffers))
+    }
+}

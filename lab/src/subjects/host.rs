@@ -1,0 +1,161 @@
+//! Builders on the host as subjects: wall-clock time, the host's tracer on every core.
+
+use super::{BuildRun, Subject};
+use crate::Result;
+use crate::measure::overlap::{self, Epo};
+use crate::measure::record;
+use crate::scene::Mesh;
+use hedgerow::bvh::codes::Codes;
+use hedgerow::bvh::geometry::Primitives;
+use hedgerow::bvh::layout::{self, Bvh2};
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::{lbvh, ploc};
+use hedgerow::bvh::{reinsertion, twin::quality};
+use hedgerow::trace::{self, Hit, Query, Ray, Work};
+use hedgerow_host::sweep;
+use hedgerow_host::sweep::Leaves;
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// How a host's builder makes the tree of what is sorted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hierarchy {
+    /// `lbvh-host`: the plain LBVH that the device's is tested against.
+    Lbvh,
+    /// `ploc-host`: the plain PLOC with this radius.
+    Ploc(usize),
+    /// `sweep`: full sweep, whatever the order.
+    Sweep(Leaves),
+}
+
+/// What a builder on the host is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// How the tree is made.
+    pub hierarchy: Hierarchy,
+    /// The codes; `None` takes those that the device would take for so many triangles.
+    pub codes: Option<Codes>,
+    /// Reinsertion behind it.
+    pub reinsertion: Option<reinsertion::Options>,
+    /// Whether subtrees become leaves where that is cheaper.
+    pub collapse: Collapse,
+}
+
+/// A builder on the host.
+pub struct Host<'a> {
+    builder: String,
+    mesh: &'a Mesh,
+    options: Options,
+    codes: Codes,
+    tree: Option<Bvh2>,
+    rays: Vec<Ray>,
+    hits: Vec<Hit>,
+}
+
+impl<'a> Host<'a> {
+    /// On `mesh`.
+    pub fn new(builder: &str, mesh: &'a Mesh, options: Options) -> Host<'a> {
+        Host {
+            builder: builder.to_owned(),
+            mesh,
+            options,
+            codes: options.codes.unwrap_or_else(|| Codes::for_count(mesh.triangles.len() as u32)),
+            tree: None,
+            rays: Vec::new(),
+            hits: Vec::new(),
+        }
+    }
+
+    fn built(&mut self) -> &Bvh2 {
+        let Host { mesh, options, codes, tree, .. } = self;
+        tree.get_or_insert_with(|| {
+            let collapse = &options.collapse;
+            let lbvh = |collapse| lbvh::build(&mesh.positions, &mesh.triangles, *codes, collapse);
+            let tree = match (options.hierarchy, options.reinsertion) {
+                (Hierarchy::Lbvh, None) => return lbvh(*collapse),
+                (Hierarchy::Lbvh, _) => lbvh(Collapse::OFF),
+                (Hierarchy::Ploc(radius), _) => ploc::build(&lbvh(Collapse::OFF), radius),
+                (Hierarchy::Sweep(leaves), _) => sweep::build(&lbvh(Collapse::OFF), collapse, leaves),
+            };
+            match &options.reinsertion {
+                Some(reinsertion) => tree.reinserted(reinsertion).collapsed(collapse),
+                None => tree.collapsed(collapse),
+            }
+        })
+    }
+}
+
+/// The time of `work` in milliseconds by the wall's clock, and what it gave.
+pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let start = Instant::now();
+    let result = work();
+    (start.elapsed().as_secs_f64() * 1e3, result)
+}
+
+impl Subject for Host<'_> {
+    fn builder(&self) -> &str {
+        &self.builder
+    }
+
+    fn kind(&self) -> &'static str {
+        "bvh2"
+    }
+
+    fn timer(&self) -> &'static str {
+        "wall"
+    }
+
+    fn build(&mut self) -> Result<BuildRun> {
+        self.tree = None;
+        let (milliseconds, _) = timed(|| self.built().header.active);
+        Ok(BuildRun { milliseconds, phases: Vec::new() })
+    }
+
+    fn memory(&self) -> record::Memory {
+        let structure = layout::sizes(Primitives::Triangles.record_bytes(), self.mesh.triangles.len() as u32, 1).bytes;
+        record::Memory { structure_bytes: Some(structure), ..Default::default() }
+    }
+
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+        Ok(record::Quality::of(&quality::of(self.built(), c_t, c_i), c_t, c_i))
+    }
+
+    fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
+        Ok(overlap::on_host(self.built(), c_t, c_i, epo))
+    }
+
+    fn tree(&mut self) -> Result<Option<Bvh2>> {
+        Ok(Some(self.built().clone()))
+    }
+
+    fn choice(&self) -> Option<String> {
+        let chosen = self.options.codes.is_none() && !matches!(self.options.hierarchy, Hierarchy::Sweep(_));
+        chosen.then(|| format!("codes {}", self.codes))
+    }
+
+    fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
+        self.rays = rays.to_vec();
+        Ok(())
+    }
+
+    fn trace(&mut self, query: Query) -> Result<f64> {
+        let rays = std::mem::take(&mut self.rays);
+        let tree = self.built();
+        let (milliseconds, hits) =
+            timed(|| rays.par_iter().map(|ray| trace::twin::tracer::trace(tree, ray, query).0).collect());
+        (self.rays, self.hits) = (rays, hits);
+        Ok(milliseconds)
+    }
+
+    fn hits(&mut self) -> Result<Vec<Hit>> {
+        Ok(self.hits.clone())
+    }
+
+    fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
+        let rays = std::mem::take(&mut self.rays);
+        let tree = self.built();
+        let work = rays.par_iter().map(|ray| trace::twin::tracer::trace(tree, ray, query).1).collect();
+        self.rays = rays;
+        Ok(Some(work))
+    }
+}

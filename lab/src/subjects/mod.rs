@@ -1,0 +1,142 @@
+//! What is measured: a builder on a scene, behind one interface, ours and the peers' alike.
+
+pub mod builders;
+pub mod device_bvh;
+pub mod device_rays;
+pub mod host;
+pub mod kd_device;
+pub mod kd_gpu;
+pub mod kd_host;
+pub mod levels;
+pub mod peers;
+pub mod structures;
+pub mod wide;
+
+use crate::Result;
+use crate::measure::overlap::Epo;
+use crate::measure::record;
+use hedgerow::bvh::layout::Bvh2;
+use hedgerow::gpu;
+use hedgerow::kdtree::layout::KdTree;
+use hedgerow::trace::{Hit, Query, Ray, Work};
+
+/// [`Subject::kind`] of kd-trees.
+pub const KD_TREE: &str = "kdtree";
+
+/// One build under the clock.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BuildRun {
+    /// Milliseconds in all.
+    pub milliseconds: f64,
+    /// The phases, where the builder knows them; they sum to `milliseconds` or a little less.
+    pub phases: Vec<gpu::Phase>,
+}
+
+/// What a structure of ours says of how it was built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Outcome {
+    /// Primitives that are in it.
+    pub active: u32,
+    /// Bits of [`hedgerow::bvh::layout::status`].
+    pub status: u32,
+}
+
+/// A builder on a scene. Whatever is uploaded once is uploaded when the subject is made, not under the clock.
+///
+/// Order of calls: `build` first, any number of times; then the others.
+pub trait Subject {
+    /// Builder with its options, as `-b` takes it.
+    fn builder(&self) -> &str;
+    /// `bvh2`, `wide4`, `wide8`, `wide8q`, `kdtree`, `driver` or `host`.
+    fn kind(&self) -> &'static str;
+    /// `device` where build times are timestamps, otherwise `wall`.
+    fn timer(&self) -> &'static str;
+    /// Whether rays are traced on the device.
+    fn traces_on_device(&self) -> bool {
+        self.timer() == "device"
+    }
+    /// Builds once, from the triangles, into the same memory as before.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn build(&mut self) -> Result<BuildRun>;
+    /// Bytes of structure and scratch.
+    fn memory(&self) -> record::Memory;
+    /// Quality of the built tree with the costs of a step and of a test; figures that the builder cannot tell are `None`.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality>;
+    /// End-point overlap of the built tree with the costs of a step and of a test, if `epo` asks for it; `None` where it was not
+    /// measured.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn epo(&mut self, _c_t: f64, _c_i: f64, _epo: Epo) -> Result<Option<f64>> {
+        Ok(None)
+    }
+    /// The BVH on the host, where it is one and its layout is ours.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn tree(&mut self) -> Result<Option<Bvh2>>;
+    /// The kd-tree on the host, where it is one.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn kd_tree(&mut self) -> Result<Option<KdTree>> {
+        match self.kind() {
+            KD_TREE => Ok(self.bytes()?.map(|bytes| KdTree::from_bytes(&bytes)).transpose()?),
+            _ => Ok(None),
+        }
+    }
+    /// What the built structure's header says, where its layout is ours.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn outcome(&mut self) -> Result<Option<Outcome>> {
+        Ok(self.tree()?.map(|tree| Outcome { active: tree.header.active, status: tree.header.status }))
+    }
+    /// The bytes of what is traced, where they are ours to read: the same input gives the same.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
+        Ok(self.tree()?.map(|tree| tree.to_bytes()))
+    }
+    /// Walks whatever of the build has a layout of ours.
+    ///
+    /// # Errors
+    /// [`hedgerow::Error::InvalidStructure`] says what is wrong; the device failed.
+    fn validate(&mut self) -> Result<()> {
+        Ok(self.tree()?.map_or(Ok(()), |tree| tree.validate())?)
+    }
+    /// What the builder chose where it was left the choice, in a few words (`emc64var/32, chain`); `None` if nothing.
+    fn choice(&self) -> Option<String> {
+        None
+    }
+    /// Bytes that a phase must move: each of its inputs read once, each of its outputs written once; `None` if not known.
+    fn traffic(&self, _phase: &str) -> Option<u64> {
+        None
+    }
+    /// Brings rays to where they are traced; not under the clock.
+    ///
+    /// # Errors
+    /// Too little memory.
+    fn set_rays(&mut self, rays: &[Ray]) -> Result<()>;
+    /// Traces the rays once; milliseconds by timestamps where that is on the device, otherwise of wall-clock time.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn trace(&mut self, query: Query) -> Result<f64>;
+    /// The hits of the last `trace`, one a ray.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn hits(&mut self) -> Result<Vec<Hit>>;
+    /// Steps and tests of every ray, where the tracer counts them; not under the clock.
+    ///
+    /// # Errors
+    /// The device failed.
+    fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>>;
+}

@@ -1,0 +1,260 @@
+//! Acceleration structures by the calls of `VK_KHR_acceleration_structure`: ours or the driver's, and nothing else differs.
+
+use crate::arguments;
+use crate::device::{Buffer, Device, DriverRays, DriverTracing};
+use crate::experiments::accel::points;
+use crate::scene::Mesh;
+use crate::shaders;
+use crate::{Error, Result};
+use ash::vk;
+use hedgerow::accel;
+use hedgerow::bvh::layout::{Header, MAX_DEPTH};
+use hedgerow::gpu::{Kernel, Recorder, Timestamps};
+use hedgerow::trace::{self, Hit, Ray};
+
+pub(crate) type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
+pub(crate) type Range = vk::AccelerationStructureBuildRangeInfoKHR;
+pub(crate) type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
+pub(crate) type Sizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
+
+/// Who builds.
+#[derive(Clone)]
+enum Maker<'a> {
+    Ours(accel::Device<'a>),
+    Driver(&'a ash::khr::acceleration_structure::Device),
+}
+
+/// Structures of one maker.
+#[derive(Clone)]
+pub struct Structures<'a> {
+    pub(crate) device: &'a Device,
+    maker: Maker<'a>,
+}
+
+impl<'a> Structures<'a> {
+    /// Ours.
+    pub fn ours(device: &'a Device, options: accel::Options) -> Structures<'a> {
+        Structures { device, maker: Maker::Ours(accel::Device::with_options(device, options)) }
+    }
+
+    /// Those of the driver, whose functions are these.
+    pub fn drivers(device: &'a Device, functions: &'a ash::khr::acceleration_structure::Device) -> Structures<'a> {
+        Structures { device, maker: Maker::Driver(functions) }
+    }
+
+    /// Whose they are.
+    pub fn maker(&self) -> points::Maker {
+        match self.maker {
+            Maker::Ours(_) => points::Maker::Ours,
+            Maker::Driver(_) => points::Maker::Driver,
+        }
+    }
+
+    /// Bytes that a build of so many primitives a geometry needs.
+    pub(crate) fn sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> Result<Sizes> {
+        let mut sizes = Sizes::default();
+        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
+        match &self.maker {
+            // SAFETY: the pointers of `info` are those of live slices.
+            Maker::Ours(ours) => {
+                unsafe { ours.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) }?
+            }
+            // SAFETY: as above.
+            Maker::Driver(driver) => unsafe {
+                driver.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes)
+            },
+        }
+        Ok(sizes)
+    }
+
+    /// A structure in the place that `info` names.
+    pub(crate) fn create(
+        &self,
+        info: &vk::AccelerationStructureCreateInfoKHR<'_>,
+    ) -> Result<vk::AccelerationStructureKHR> {
+        match &self.maker {
+            // SAFETY: the buffer is live and as large as the sizes asked for.
+            Maker::Ours(ours) => Ok(unsafe { ours.create_acceleration_structure(info, None) }?),
+            // SAFETY: as above.
+            Maker::Driver(driver) => unsafe { driver.create_acceleration_structure(info, None) }
+                .map_err(Error::vulkan("vkCreateAccelerationStructureKHR")),
+        }
+    }
+
+    /// What instances and shaders take.
+    pub(crate) fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
+        let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
+        match &self.maker {
+            Maker::Ours(ours) => ours.get_acceleration_structure_device_address(&info),
+            // SAFETY: the structure is live.
+            Maker::Driver(driver) => unsafe { driver.get_acceleration_structure_device_address(&info) },
+        }
+    }
+
+    /// Ends the life of a structure that no submit uses any more.
+    pub(crate) fn destroy(&self, structure: vk::AccelerationStructureKHR) {
+        match &self.maker {
+            Maker::Ours(ours) => ours.destroy_acceleration_structure(structure, None),
+            // SAFETY: every submit of `Device` waits, so nothing uses it.
+            Maker::Driver(driver) => unsafe { driver.destroy_acceleration_structure(structure, None) },
+        }
+    }
+
+    /// Records builds; rays and builds behind it may use them.
+    pub(crate) fn build(
+        &self,
+        recorder: &mut Recorder<'_>,
+        infos: &[BuildInfo<'_>],
+        ranges: &[&[Range]],
+    ) -> hedgerow::Result<()> {
+        match &self.maker {
+            Maker::Ours(ours) => {
+                // SAFETY: all memory is live until the submit has finished, and each build's own.
+                unsafe { ours.cmd_build_acceleration_structures(recorder.commands(), infos, ranges) }?;
+                recorder.barrier();
+            }
+            Maker::Driver(driver) => {
+                let access = vk::AccessFlags::ACCELERATION_STRUCTURE_READ_KHR
+                    | vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR;
+                let barrier = [vk::MemoryBarrier::default().src_access_mask(access).dst_access_mask(access)];
+                let build = vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
+                let traces =
+                    self.device.driver_tracing().map_or(vk::PipelineStageFlags::COMPUTE_SHADER, DriverTracing::stage);
+                let after = build | traces;
+                // SAFETY: as above.
+                unsafe {
+                    driver.cmd_build_acceleration_structures(recorder.commands(), infos, ranges);
+                    recorder.context().ash_device().cmd_pipeline_barrier(
+                        recorder.commands(),
+                        build,
+                        after,
+                        vk::DependencyFlags::empty(),
+                        &barrier,
+                        &[],
+                        &[],
+                    );
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Traces rays that lie in device memory through a top level; milliseconds by the device's timestamps.
+    pub(crate) fn trace(
+        &self,
+        timestamps: &mut Timestamps,
+        top: vk::AccelerationStructureKHR,
+        (rays, hits, count): (&Buffer<'_>, &Buffer<'_>, u32),
+        query: trace::Query,
+    ) -> Result<f64> {
+        debug_assert!(rays.bytes() >= u64::from(count) * size_of::<Ray>() as u64);
+        debug_assert!(hits.bytes() >= u64::from(count) * size_of::<Hit>() as u64);
+        let (structure, any_hit) = (self.address(top), query == trace::Query::AnyHit);
+        let (rays, hits) = (rays.address(), hits.address());
+        self.device.run(Some(timestamps), |recorder| {
+            recorder.phase("trace");
+            match self.maker {
+                Maker::Ours(_) => {
+                    // As trace::tracer has it, or no level of the stack in shared memory.
+                    let tuning = &self.device.tuning.trace;
+                    let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
+                    let kernel = Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[u32::from(any_hit), levels]);
+                    let arguments = arguments::TraceQueries { structure, rays, hits, works: 0, first: 0, count };
+                    recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
+                }
+                Maker::Driver(_) => {
+                    self.device.trace_by_driver(recorder, &DriverRays { structure, rays, hits, count, any_hit })
+                }
+            }
+        })?;
+        Ok(timestamps.phases()?.iter().map(|p| p.milliseconds).sum())
+    }
+
+    /// What each of the rays meets on its way, of our structures: nodes of the top level, instances, nodes below, triangles.
+    pub(crate) fn work(
+        &self,
+        top: vk::AccelerationStructureKHR,
+        (rays, hits, count): (&Buffer<'_>, &Buffer<'_>, u32),
+        query: trace::Query,
+    ) -> Result<Vec<[u32; 4]>> {
+        let device = self.device;
+        if let Maker::Driver(_) = self.maker {
+            return Err(Error::Argument("the driver does not tell the work of its queries".into()));
+        }
+        let any_hit = u32::from(query == trace::Query::AnyHit);
+        let kernel = Kernel::new(&shaders::MEASURE_QUERY_WORK, device.limits.subgroup_size, &[any_hit, 0]);
+        let works = device.buffer("work", 16 * u64::from(count))?;
+        let (structure, works_at) = (self.address(top), works.address());
+        let arguments = arguments::TraceQueries {
+            structure,
+            rays: rays.address(),
+            hits: hits.address(),
+            works: works_at,
+            first: 0,
+            count,
+        };
+        device.run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup())))?;
+        Ok(works.read(count as usize))
+    }
+
+    /// Memory for a structure and its scratch.
+    pub(crate) fn place(&self, name: &str, info: &BuildInfo<'_>, counts: &[u32]) -> Result<Placed<'a>> {
+        let sizes = self.sizes(info, counts)?;
+        let memory = self.device.buffer(name, sizes.acceleration_structure_size)?;
+        let create = vk::AccelerationStructureCreateInfoKHR::default()
+            .buffer(memory.raw())
+            .size(sizes.acceleration_structure_size)
+            .ty(info.ty);
+        let structure = self.create(&create)?;
+        // The largest alignment that a driver may ask for.
+        let scratch = self.device.buffer("scratch", sizes.build_scratch_size.max(sizes.update_scratch_size) + 256)?;
+        Ok(Placed { owner: self.clone(), structure, sizes, scratch, memory })
+    }
+}
+
+/// A structure with its memory.
+pub(crate) struct Placed<'a> {
+    owner: Structures<'a>,
+    pub(crate) structure: vk::AccelerationStructureKHR,
+    pub(crate) sizes: Sizes,
+    scratch: Buffer<'a>,
+    memory: Buffer<'a>,
+}
+
+impl Placed<'_> {
+    /// Its head, where it is one of ours.
+    pub(crate) fn header(&self) -> Option<Header> {
+        matches!(self.owner.maker, Maker::Ours(_)).then(|| self.memory.read::<Header>(1)[0])
+    }
+
+    /// The address of its scratch memory.
+    pub(crate) fn scratch(&self) -> vk::DeviceOrHostAddressKHR {
+        vk::DeviceOrHostAddressKHR { device_address: self.scratch.address().next_multiple_of(256) }
+    }
+}
+
+impl Drop for Placed<'_> {
+    fn drop(&mut self) {
+        self.owner.destroy(self.structure);
+    }
+}
+
+/// Where a buffer begins, for what a build reads.
+pub(crate) fn address(buffer: &Buffer<'_>) -> vk::DeviceOrHostAddressConstKHR {
+    vk::DeviceOrHostAddressConstKHR { device_address: buffer.address() }
+}
+
+/// Opaque triangles of a mesh whose positions and indices lie in these buffers.
+pub(crate) fn triangles_of(mesh: &Mesh, positions: &Buffer<'_>, indices: &Buffer<'_>) -> Geometry {
+    let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+        .vertex_format(vk::Format::R32G32B32_SFLOAT)
+        .vertex_data(address(positions))
+        .vertex_stride(12)
+        .max_vertex(mesh.positions.len().saturating_sub(1) as u32)
+        .index_type(vk::IndexType::UINT32)
+        .index_data(address(indices));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
+        .flags(vk::GeometryFlagsKHR::OPAQUE)
+}

@@ -1,0 +1,106 @@
+//! A wide tree made of whatever `Bvh2` a device builder has left: the last phase of a build, and what is measured of it.
+
+use crate::Result;
+use crate::device::{Buffer, Device};
+use crate::measure::record;
+use hedgerow::bvh::builder::Sizes;
+use hedgerow::bvh::geometry::Primitives;
+use hedgerow::bvh::layout::{Child, Header, Triangle};
+use hedgerow::bvh::wide::device::{OnDevice, Options};
+use hedgerow::bvh::wide::layout::{Wide, WideNode};
+use hedgerow::bvh::wide::quantised::QuantisedNode;
+use hedgerow::bvh::wide::{Form, quality};
+use hedgerow::gpu::Recorder;
+use hedgerow::trace::wide::Tracer;
+
+/// Memory for a wide tree of triangles, its collapsing, and what traces it.
+pub struct WideTree<'a> {
+    /// What traces it.
+    pub tracer: Tracer,
+    collapse: OnDevice,
+    sizes: Sizes,
+    structure: Buffer<'a>,
+    scratch: Buffer<'a>,
+}
+
+impl<'a> WideTree<'a> {
+    /// For a `Bvh2` of `count` triangles.
+    ///
+    /// # Errors
+    /// Too little memory; a pipeline could not be made.
+    pub fn new(device: &'a Device, tracer: Tracer, count: u32) -> Result<WideTree<'a>> {
+        let options = Options { form: tracer.form, primitives: Primitives::Triangles, geometry_count: 1 };
+        let collapse = OnDevice::new(device, &options, count);
+        let sizes = collapse.sizes();
+        let structure = device.buffer("wide structure", sizes.structure)?;
+        let scratch = device.buffer("wide scratch", sizes.scratch)?;
+        collapse.record(&mut Recorder::warming(device), 0, structure.address(), scratch.address())?;
+        Ok(WideTree { tracer, collapse, sizes, structure, scratch })
+    }
+
+    /// Records the phase `wide`, behind the build of the `Bvh2` at `source`.
+    ///
+    /// # Errors
+    /// A pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, source: u64) -> hedgerow::Result<()> {
+        recorder.barrier();
+        self.collapse.record(recorder, source, self.structure.address(), self.scratch.address())
+    }
+
+    /// Address of the structure.
+    pub fn address(&self) -> u64 {
+        self.structure.address()
+    }
+
+    /// The bytes of the structure that are in use.
+    pub fn bytes(&self) -> Vec<u8> {
+        self.structure.read(self.bytes_in_use() as usize)
+    }
+
+    fn bytes_in_use(&self) -> u64 {
+        let header: Header = self.structure.read(1)[0];
+        self.tracer.form.bytes_in_use(&header, size_of::<Triangle>() as u64)
+    }
+
+    /// What the build takes beside `binary`, the memory of the `Bvh2` and of its build. The structure's bytes are those in use,
+    /// for it needs no others; at the peak all is there, as much as it may need.
+    pub fn memory(&self, binary: &record::Memory) -> record::Memory {
+        let all = [Some(self.sizes.structure + self.sizes.scratch), binary.structure_bytes, binary.scratch_bytes];
+        let peak: u64 = all.into_iter().flatten().sum();
+        let in_use = self.bytes_in_use();
+        record::Memory {
+            structure_bytes: Some(in_use),
+            scratch_bytes: Some(peak - self.sizes.structure),
+            peak_bytes: Some(peak),
+        }
+    }
+
+    /// Its quality: c_t is the cost of a step, whatever the width ([`quality::on_host`]).
+    ///
+    /// # Errors
+    /// The bytes are no such structure.
+    pub fn quality(&self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+        fn of<N: WideNode>(bytes: &[u8], c_t: f64, c_i: f64) -> Result<record::Quality> {
+            let tree = Wide::<N, Triangle>::from_bytes(bytes)?;
+            Ok(record::Quality::of(&quality::on_host(&tree, c_t, c_i), c_t, c_i))
+        }
+        match self.tracer.form {
+            Form::Four => of::<[Child; 4]>(&self.bytes(), c_t, c_i),
+            Form::Eight => of::<[Child; 8]>(&self.bytes(), c_t, c_i),
+            Form::EightQuantised => of::<QuantisedNode>(&self.bytes(), c_t, c_i),
+        }
+    }
+
+    /// Checks every rule of its layout.
+    ///
+    /// # Errors
+    /// [`Wide::validate`] names the rule that is broken.
+    pub fn validate(&self) -> Result<()> {
+        match self.tracer.form {
+            Form::Four => Wide::<[Child; 4], Triangle>::from_bytes(&self.bytes())?.validate()?,
+            Form::Eight => Wide::<[Child; 8], Triangle>::from_bytes(&self.bytes())?.validate()?,
+            Form::EightQuantised => Wide::<QuantisedNode, Triangle>::from_bytes(&self.bytes())?.validate()?,
+        }
+        Ok(())
+    }
+}
