@@ -11,6 +11,12 @@ mod arguments;
 #[path = "build/compile.rs"]
 mod compile;
 #[cfg(feature = "compile-shaders")]
+#[path = "build/push_constants.rs"]
+mod push_constants;
+#[cfg(feature = "compile-shaders")]
+#[path = "build/reflection.rs"]
+mod reflection;
+#[cfg(feature = "compile-shaders")]
 #[path = "build/shared_memory.rs"]
 mod shared_memory;
 #[path = "build/table.rs"]

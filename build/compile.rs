@@ -1,11 +1,17 @@
 //! GLSL to SPIR-V, by shaderc: optimised, with `#include`, and with shared memory that is handed over at barriers.
 
+use crate::push_constants;
 use crate::table::out_dir;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What else SPIR-V follows from than its sources.
-const THIS: &str = concat!(include_str!("compile.rs"), include_str!("shared_memory.rs"));
+const THIS: &str = concat!(
+    include_str!("compile.rs"),
+    include_str!("push_constants.rs"),
+    include_str!("reflection.rs"),
+    include_str!("shared_memory.rs")
+);
 
 /// Compiles shaders whose includes are named from one of `roots`, so that a line such as `#include "gpu/pass.glsl"` means the same
 /// everywhere.
@@ -14,8 +20,8 @@ pub struct Compiler<'a> {
 }
 
 impl Compiler<'_> {
-    /// Compiles `source` into OUT_DIR, if any of its text has changed. Beside the optimised shader lies one with its names, in the
-    /// folder `named`: for tests.
+    /// Compiles `source` into OUT_DIR, if any of its text has changed. Beside the optimised shader lie what it takes of its push
+    /// constants, and in the folder `named` one with its names.
     pub fn make(&self, source: &Path, file: &str) {
         let out = out_dir();
         let named = out.join("named");
@@ -27,10 +33,18 @@ impl Compiler<'_> {
         if path.exists() && named.join(file).exists() && fs::read_to_string(&stamp).is_ok_and(|was| was == made_of) {
             return;
         }
+        // What fails half-way is made again.
+        let _ = fs::remove_file(&stamp);
         fs::write(named.join(file), self.compile(source, shaderc::OptimizationLevel::Zero))
             .expect("OUT_DIR can be written");
-        fs::write(&path, self.compile(source, shaderc::OptimizationLevel::Performance))
-            .expect("OUT_DIR can be written");
+        let whole = self.compile(source, shaderc::OptimizationLevel::Performance);
+        // What traces by the driver's pipelines has no passes, and the host pushes the block as it is declared.
+        let is_pass = source.extension().is_some_and(|e| e == "comp");
+        let (spirv, takes) =
+            if is_pass { push_constants::only_what_is_read(file, &whole) } else { (whole, Vec::new()) };
+        let takes: String = takes.iter().map(|(offset, bytes)| format!("{offset} {bytes}\n")).collect();
+        fs::write(out.join(format!("{file}.takes")), takes).expect("OUT_DIR can be written");
+        fs::write(&path, spirv).expect("OUT_DIR can be written");
         fs::write(stamp, made_of).expect("OUT_DIR can be written");
     }
 

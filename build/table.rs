@@ -18,9 +18,13 @@ pub fn file_of(name: &str) -> String {
     format!("{}.spv", name.replace('/', "."))
 }
 
-/// Writes the table of all shaders below `glsl/`. `make` puts the SPIR-V of a source into OUT_DIR, in the file that it is given; several
-/// threads call it. Returns
-/// the names of all shaders.
+/// The name of a shader's static.
+pub fn constant_of(name: &str) -> String {
+    name.replace('/', "_").to_uppercase()
+}
+
+/// Writes the table of all shaders below `glsl/`. `make` puts the SPIR-V of a source into OUT_DIR, in the file that it is given;
+/// several threads call it. Returns the names of all shaders.
 pub fn write(make: impl Fn(&Path, &str) + Sync) -> Vec<String> {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=glsl");
@@ -29,16 +33,17 @@ pub fn write(make: impl Fn(&Path, &str) + Sync) -> Vec<String> {
     sources.sort();
     let shaders: Vec<(PathBuf, String)> =
         sources.into_iter().map(|source| (source.clone(), name_of(&source))).collect();
+    forget_others(&shaders);
     side_by_side(&shaders, |(source, name)| make(source, &file_of(name)));
 
     let mut table = String::new();
     let mut names = Vec::new();
     for (source, name) in &shaders {
-        let constant = name.replace('/', "_").to_uppercase();
-        let (file, spirv) = (source.display(), out_dir().join(file_of(name)));
+        let (constant, file, spirv) = (constant_of(name), source.display(), out_dir().join(file_of(name)));
         writeln!(
             table,
-            "/// `{file}`\npub static {constant}: Shader = Shader {{ name: {name:?}, spirv: include_bytes!({spirv:?}) }};"
+            "/// `{file}`\npub static {constant}: Shader =\n    Shader {{ name: {name:?}, spirv: include_bytes!({spirv:?}), takes: \
+             takes::{constant} }};"
         )
         .expect("writing to a string");
         names.push(constant);
@@ -54,6 +59,20 @@ pub fn write(make: impl Fn(&Path, &str) + Sync) -> Vec<String> {
 fn name_of(source: &Path) -> String {
     let stem = source.strip_prefix("glsl").expect("found below glsl").with_extension("");
     stem.to_str().expect("shader names are ASCII").replace('\\', "/")
+}
+
+/// Removes the SPIR-V that a former build left and this one does not have.
+fn forget_others(shaders: &[(PathBuf, String)]) {
+    let files: Vec<String> = shaders.iter().map(|(_, name)| file_of(name)).collect();
+    for folder in [out_dir(), out_dir().join("named")] {
+        let Ok(entries) = fs::read_dir(folder) else { continue };
+        let paths = entries.map(|entry| entry.expect("OUT_DIR can be listed").path());
+        let is_other = |path: &PathBuf| {
+            path.extension().is_some_and(|e| e == "spv")
+                && !path.file_name().is_some_and(|name| files.iter().any(|file| name == file.as_str()))
+        };
+        paths.filter(is_other).for_each(|path| fs::remove_file(path).expect("OUT_DIR can be written"));
+    }
 }
 
 /// Each of `items` once, by as many threads as cargo gives.

@@ -5,6 +5,10 @@
 mod arguments;
 #[path = "../build/compile.rs"]
 mod compile;
+#[path = "../build/push_constants.rs"]
+mod push_constants;
+#[path = "../build/reflection.rs"]
+mod reflection;
 #[path = "../build/shared_memory.rs"]
 mod shared_memory;
 #[path = "../build/table.rs"]

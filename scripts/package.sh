@@ -14,7 +14,7 @@ git ls-files -z | xargs -0 cp --parents -t "$stage"
 # Where build.rs has put the shaders of these sources.
 out=$("$cargo" build --release -p hedgerow --features compile-shaders --message-format json |
   grep -oE '"out_dir":"[^"]*/build/hedgerow-[0-9a-f]+/out"' | tail -n 1 | cut -d '"' -f 4)
-# OUT_DIR may also hold shaders of former builds; the table names those of this one.
+# Those of the table: OUT_DIR has that of the example, too.
 grep -oE 'include_bytes!\("[^"]+"\)' "$out/shaders.rs" | cut -d '"' -f 2 | xargs cp -t "$stage/spirv"
 cp "$out/arguments.rs" "$stage/spirv"
 

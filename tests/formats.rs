@@ -1,6 +1,7 @@
 //! The structs that lie in memory are the same on host and device: offsets, sizes and names, from SPIR-V reflection. And what must be
 //! `precise`, or handed over at barriers, is so in the shaders that are compiled.
 
+use crate::reflection::{bytes_of, declared, decoration, members, name_of, push_constants, stride_of};
 use hedgerow::accel::serialize::Head;
 use hedgerow::bvh::geometry::Geometry;
 use hedgerow::bvh::layout::{BoxRecord, Child, GeometryEntry, Header, Instance, Node, Triangle};
@@ -150,69 +151,34 @@ impl Reflection {
     fn structs<'a>(&'a self, wanted: impl Fn(&str) -> bool + 'a) -> impl Iterator<Item = (&'a str, Layout)> {
         let structs = self.0.types_global_values.iter().filter(|i| i.class.opcode == Op::TypeStruct);
         structs.filter_map(move |i| {
-            let name = self.name(i.result_id?, None)?;
+            let name = name_of(&self.0, i.result_id?, None)?;
             let name = name.strip_prefix("Hedgerow").unwrap_or(name);
             Some((name, wanted(name).then(|| self.layout(i)).flatten()?))
         })
-    }
-
-    fn ty(&self, id: u32) -> &Instruction {
-        self.0.types_global_values.iter().find(|i| i.result_id == Some(id)).expect("types are declared")
-    }
-
-    /// The name of a type, or of one of its members.
-    fn name(&self, id: u32, member: Option<u32>) -> Option<&str> {
-        let target: Vec<_> = [Operand::IdRef(id)].into_iter().chain(member.map(Operand::LiteralBit32)).collect();
-        let op = if member.is_some() { Op::MemberName } else { Op::Name };
-        let mut names = self.0.debug_names.iter().filter(|i| i.class.opcode == op);
-        names.find_map(|i| i.operands.strip_prefix(&target[..])?.first().map(Operand::unwrap_literal_string))
-    }
-
-    fn decoration(&self, id: u32, member: Option<u32>, decoration: Decoration) -> Option<usize> {
-        let mut target: Vec<_> = [Operand::IdRef(id)].into_iter().chain(member.map(Operand::LiteralBit32)).collect();
-        target.push(Operand::Decoration(decoration));
-        let mut values = self.0.annotations.iter().filter_map(|i| i.operands.strip_prefix(&target[..])?.first());
-        values.next().map(|value| value.unwrap_literal_bit32() as usize)
     }
 
     /// The layout of a struct; `None` for one that lies in no memory and so has no offsets.
     fn layout(&self, block: &Instruction) -> Option<Layout> {
         let id = block.result_id?;
         let members = block.operands.iter().zip(0..).map(|(ty, member)| {
-            let name = self.name(id, Some(member))?.trim_end_matches("_address").to_string();
-            let offset = self.decoration(id, Some(member), Decoration::Offset)?;
-            Some((name, offset, self.bytes(ty.unwrap_id_ref())))
+            let name = name_of(&self.0, id, Some(member))?.trim_end_matches("_address").to_string();
+            let offset = decoration(&self.0, id, Some(member), Decoration::Offset)?;
+            Some((name, offset as usize, bytes_of(&self.0, ty.unwrap_id_ref()) as usize))
         });
         let members = members.collect::<Option<Vec<_>>>()?;
         Some(Layout { bytes: members.last().map_or(0, |(_, offset, bytes)| offset + bytes), members })
     }
+}
 
-    /// Bytes of a type in memory; 0 for an array without end.
-    fn bytes(&self, id: u32) -> usize {
-        let ty = self.ty(id);
-        let operand = |i: usize| ty.operands[i].unwrap_id_ref();
-        match ty.class.opcode {
-            Op::TypeInt | Op::TypeFloat => ty.operands[0].unwrap_literal_bit32() as usize / 8,
-            Op::TypeVector => self.bytes(operand(0)) * ty.operands[1].unwrap_literal_bit32() as usize,
-            Op::TypeArray => {
-                let length = self.ty(operand(1)).operands[0].unwrap_literal_bit32() as usize;
-                length * self.stride(id, operand(0))
-            }
-            Op::TypeRuntimeArray => {
-                self.stride(id, operand(0));
-                0
-            }
-            Op::TypePointer => 8,
-            Op::TypeStruct => self.layout(ty).map_or(0, |l| l.bytes),
-            other => panic!("{other:?} lies in memory that the host shares"),
+/// In scalar layout the stride of an array is the size of its element.
+fn assert_strides(module: &Module) {
+    let is_array = |i: &&Instruction| matches!(i.class.opcode, Op::TypeArray | Op::TypeRuntimeArray);
+    for array in module.types_global_values.iter().filter(is_array) {
+        let id = array.result_id.expect("types have an id");
+        if decoration(module, id, None, Decoration::ArrayStride).is_some() {
+            let element = array.operands[0].unwrap_id_ref();
+            assert_eq!(stride_of(module, id), bytes_of(module, element), "an array of {:?}", declared(module, element));
         }
-    }
-
-    /// The stride of an array, which in scalar layout is the size of its element.
-    fn stride(&self, array: u32, element: u32) -> usize {
-        let stride = self.decoration(array, None, Decoration::ArrayStride).expect("arrays in memory have a stride");
-        assert_eq!(stride, self.bytes(element), "the stride of an array of {:?}", self.name(element, None));
-        stride
     }
 }
 
@@ -221,12 +187,38 @@ fn structs_in_memory_are_the_same_on_host_and_device() {
     let host = structs();
     let mut seen = BTreeSet::new();
     for shader in shaders::ALL {
+        assert_strides(&Reflection::of(shader.name).0);
         for (name, device) in Reflection::of(shader.name).structs(|name| host.contains_key(name)) {
             assert_eq!(host[name], device, "{name} in {}: host left, device right", shader.name);
             seen.insert(name.to_string());
         }
     }
     assert!(seen.iter().eq(host.keys().copied()), "every struct is met in some shader: {seen:?}");
+}
+
+/// What `build/push_constants.rs` has made of them.
+#[test]
+fn a_pass_has_push_constants_that_it_reads_and_no_others() {
+    let mut divided = 0;
+    for shader in shaders::ALL {
+        let module = rspirv::dr::load_bytes(shader.spirv).expect("SPIR-V of shaderc");
+        let Some((variable, block)) = push_constants(&module) else { continue };
+        let taken: u32 = shader.takes.ranges.iter().map(|(_, bytes)| bytes).sum();
+        assert!(taken <= 128 && taken == bytes_of(&module, block), "{}: {taken} bytes", shader.name);
+        let reads = |member: usize| {
+            let of_it = |i: &Instruction| match &i.operands[..] {
+                [Operand::IdRef(base), Operand::IdRef(index), ..] if *base == variable => {
+                    declared(&module, *index).operands[0].unwrap_literal_bit32() as usize == member
+                }
+                _ => false,
+            };
+            module.all_inst_iter().filter(|i| i.class.opcode == Op::AccessChain).any(of_it)
+        };
+        let members = members(&module, block).len();
+        assert!((0..members).all(reads), "{}: {:?}", shader.name, shader.takes);
+        divided += u32::from(shader.takes.ranges.len() > 1);
+    }
+    assert!(divided > 0, "some passes share a block and take different parts of it");
 }
 
 /// Whether every operation of a kind that rounds is one that must not be contracted with others.

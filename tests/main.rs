@@ -7,6 +7,8 @@ mod engine;
 mod formats;
 mod house;
 mod linked;
+#[path = "../build/reflection.rs"]
+mod reflection;
 mod shader_features;
 mod warming;
 

@@ -1,4 +1,5 @@
-// What the phases of a build share: the state, the arguments, and the barrier between phases of one workgroup.
+// What the phases of a build share: the state, the arguments, the parts of the scratch memory, and the barrier between phases of
+// one workgroup.
 #ifndef HEDGEROW_BVH_BUILD_STATE
 #define HEDGEROW_BVH_BUILD_STATE
 #include "gpu/pass.glsl"
@@ -15,6 +16,31 @@ const uint ITEMS = ITEMS_WORD & 0xFFFFu;
 
 const uint NONE = 0xFFFFFFFFu;
 
+// Where in the scratch memory each part begins, in units of 16 bytes: src/bvh/scratch.rs plans it and says when each is in use.
+// The state is the first.
+struct BuildParts {
+    uint keys[2];              // of the sort: unsorted, and of the pass before
+    uint values[2];
+    uint table;
+    uint ends;                 // of the radix tree's nodes: where the child that came first ends
+    uint child_costs[2];       // of left and right children, in climbs of the radix tree
+    uint weights;
+    uint clusters;
+    uint lists[2];             // of PLOC: the clusters of even and odd rounds; of H-PLOC the first
+    uint nearest;
+    uint sums;                 // of tiles
+    uint orders[2];            // of HLBVH: the clusters by the tasks of even and odd levels
+    uint tasks;                // of HLBVH: of even and odd levels
+    uint top_costs[2];         // of left and right children above treelets
+    uint costs;                // of nodes that are weighed when the tree is there
+    uint arrivals;
+    uint large_firsts;
+    uint large_depths;
+    uint walk;
+    uint split;                // a SplitState
+    uint references;
+};
+
 BUFFER BuildState {
     uint pool[POOL_WORDS];                // a PoolState
     uint boxes_lo[3];                     // `ordered` floats
@@ -27,23 +53,53 @@ BUFFER BuildState {
     uint cluster_counts[2];               // of PLOC: of even and odd rounds; of HLBVH the first: treelets
     uint is_forced[2];
     uint looks;                           // clusters that rounds have looked at
+    BuildParts saved_parts;               // for a kernel that does everything
 };
 
-// What a build is given: the push constants, or variables that the shader sets first. `vertices` to `transform` with
-// `vertex_stride` to `formats` are a Geometry; `code_kind` is what `kind_of_codes` takes out, collapse << 25, build flags << 26;
-// `column_keys` and `passes` are of the radix sort; `level` is that of the top of treelets in bvh/hlbvh/split.comp and
-// finish.comp.
+// What a build is given; each kernel takes what it reads. `vertices` to `transform` with `vertex_stride` to `formats` are a
+// Geometry, `column_keys` and `passes` are of the radix sort, `level` is that of the top of treelets.
 #define BUILD_ARGUMENTS                                                                                        \
-    uvec2 vertices; uvec2 indices; uvec2 transform; uvec2 structure_address; uvec2 state_address;             \
-    uvec2 keys[2]; uvec2 values[2]; uvec2 ends_address; uvec2 table_address;                                  \
-    uint vertex_stride; uint vertex_count; uint formats; uint primitive_count; uint code_kind;                \
+    uvec2 vertices; uvec2 indices; uvec2 transform; uvec2 structure_address; uvec2 scratch_address;           \
+    uint vertex_stride; uint vertex_count; uint formats; uint primitive_count;                                \
+    uint code_kind; uint collapses; uint build_flags;                                                         \
     float c_t; float c_i;                                                                                     \
-    uint level; uint column_keys; uint passes;  
-#ifdef HEDGEROW_BUILD_ARGUMENTS_ARE_SET
+    uint column_keys; uint passes; uint level;
+
+#ifdef HEDGEROW_BUILD_BY_ONE_WORKGROUP
+// Variables, which the shader sets first.
 BUILD_ARGUMENTS
+BuildParts parts;
 #else
-layout(push_constant, scalar) uniform BuildArguments { BUILD_ARGUMENTS };
+layout(push_constant, scalar) uniform BuildArguments {
+    BUILD_ARGUMENTS
+    BuildParts parts;
+};
 #endif
+
+#ifdef HEDGEROW_BUILD_BY_ONE_DISPATCH
+// A kernel that does everything would take more than push constants hold: it loads the parts out of the state, where its reset has
+// put them.
+BuildParts loaded_parts;
+#define parts loaded_parts
+#endif
+
+BuildState build_state() {
+    return BuildState(scratch_address);
+}
+
+// The address of a part.
+uvec2 part(uint at) {
+    return address_of(scratch_address, at, 16u);
+}
+
+// The sort's results.
+Words sorted_keys() {
+    return Words(part(parts.keys[passes & 1u]));
+}
+
+Words sorted_values() {
+    return Words(part(parts.values[passes & 1u]));
+}
 
 Geometry geometries() {
     return Geometry(vertices, indices, transform, vertex_stride, vertex_count, formats, 0);
@@ -52,7 +108,7 @@ Geometry geometries() {
 // The box of what a leaf holds; returns 0, or why it is left out: a status bit or INACTIVE.
 uint load_reference(Geometry g, uint reference, out Box b) {
     if (!HAS_REFERENCES) return load_box(g, reference, b);
-    Reference r = references_before(state_address, primitive_count).reference[reference];
+    Reference r = References(part(parts.references)).reference[reference];
     b = Box(r.lo, r.hi);
     return r.left_out;
 }
@@ -60,7 +116,7 @@ uint load_reference(Geometry g, uint reference, out Box b) {
 // Writes the record of what a leaf holds to its place, and tells its box; returns as load_reference does.
 uint write_reference(uvec2 records, uint position, Geometry g, uint reference, out Box b) {
     if (!HAS_REFERENCES) return write_record(records, position, g, reference, b);
-    Reference r = references_before(state_address, primitive_count).reference[reference];
+    Reference r = References(part(parts.references)).reference[reference];
     Box whole;
     if (r.primitive == NO_PRIMITIVE) Triangles(records).triangle[position] = Triangle(vec3(0), vec3(0), vec3(0), NO_PRIMITIVE);
     else write_record(records, position, g, r.primitive, whole);
@@ -71,10 +127,6 @@ uint write_reference(uvec2 records, uint position, Geometry g, uint reference, o
 CodeKind kind_of_codes() {
     return CodeKind(code_kind & 3u, code_kind >> 8 & 0x7Fu, 3u * (code_kind >> 6 & 3u), code_kind >> 2 & 3u,
                     (code_kind >> 4 & 3u) + (CODE_PREFIX == PREFIX_CELLS ? 1u : 0u), code_kind >> 15 & 0xFu, 1u << (code_kind >> 19 & 0xFu));
-}
-
-bool collapses() {
-    return (code_kind >> 25 & 1) != 0;
 }
 
 Box bounds_of_boxes(BuildState state) {

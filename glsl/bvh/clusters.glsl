@@ -1,5 +1,5 @@
-// Clusters of PLOC and H-PLOC: subtrees that wait to be merged, in the order of their first primitives. They lie behind the
-// weights, one place a primitive. Of two that merge, the one before is the left child; the node's slot is the place before the
+// Clusters of PLOC and H-PLOC: subtrees that wait to be merged, in the order of their first primitives. There is
+// one place a primitive. Of two that merge, the one before is the left child; the node's slot is the place before the
 // right child's first primitive, which no other node can have: so slots do not depend on who merges first.
 #ifndef HEDGEROW_BVH_CLUSTERS
 #define HEDGEROW_BVH_CLUSTERS
@@ -16,10 +16,14 @@ struct Cluster {
 
 BUFFER Clusters { Cluster cluster[]; };
 
+Clusters all_clusters() {
+    return Clusters(part(parts.clusters));
+}
+
 // The cluster of the primitive at a sorted position.
 Cluster cluster_of_primitive(Geometry input_geometries, uint position, float area_scale) {
     Box b;
-    load_reference(input_geometries, Words(values[passes & 1u]).word[position], b);
+    load_reference(input_geometries, sorted_values().word[position], b);
     return Cluster(b.lo, position | IS_PRIMITIVE, b.hi, 1u, leaf_cost(c_i, scaled_half_area(b, area_scale), 1u), position);
 }
 

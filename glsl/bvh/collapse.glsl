@@ -22,17 +22,17 @@
 const uint LARGE = 32;
 
 uint node_count() {
-    return max(BuildState(state_address).active_count, 1u) - 1u;
+    return max(build_state().active_count, 1u) - 1u;
 }
 
-// ---- parents, weigh: scratch memory behind the weights holds costs and arrivals ----
+// ---- parents, weigh ----
 
 Floats costs() {
-    return Floats(scratch_behind_weights());
+    return Floats(part(parts.costs));
 }
 
 Words arrivals() {
-    return Words(address_of(scratch_behind_weights(), primitive_count, 4u));
+    return Words(part(parts.arrivals));
 }
 
 void collapse_parents(uint task) {
@@ -56,7 +56,7 @@ void collapse_parents(uint task) {
 void weight_of(Weights w, Child child, out uint count, out float cost) {
     bool is_primitive = child.count != 0u;
     count = is_primitive ? 1u : w.counts.word[child.index] & ~IS_LEAF;
-    cost = is_primitive ? leaf_cost(c_i, scaled_half_area(Box(child.lo, child.hi), BuildState(state_address).plan.area_scale), 1u)
+    cost = is_primitive ? leaf_cost(c_i, scaled_half_area(Box(child.lo, child.hi), build_state().plan.area_scale), 1u)
                         : costs().value[child.index];
 }
 
@@ -68,7 +68,7 @@ void write_costs(Structure structure, float cost) {
 // From each primitive up: of two siblings the second to arrive goes on with their parent.
 void collapse_weigh(uint task) {
     Structure structure = Structure(structure_address);
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     Weights w = weights();
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
@@ -108,19 +108,19 @@ struct Place {
     bool inside;
 };
 
-// The places of large nodes. The sort has left the memory free, and methods have done with it.
+// The places of large nodes.
 Words large_firsts() {
-    return Words(ends_address);
+    return Words(part(parts.large_firsts));
 }
 
 // depth * 2, + 1 inside of a leaf.
 Words large_depths() {
-    return Words(keys[1u - (passes & 1u)]);
+    return Words(part(parts.large_depths));
 }
 
-// The sorted positions in the order of the walk. The sort has left the memory free, and methods have done with it.
+// The sorted positions in the order of the walk.
 Words walk_order() {
-    return Words(values[1u - (passes & 1u)]);
+    return Words(part(parts.walk));
 }
 
 bool is_large(uint count) {
@@ -239,7 +239,7 @@ void place_primitive(Structure structure, Weights w, uint position, inout Placed
 
 void collapse_place(uint task) {
     Structure structure = Structure(structure_address);
-    uint active_count = BuildState(state_address).active_count;
+    uint active_count = build_state().active_count;
     Weights w = weights();
     Placed placed = Placed(0u, false);
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
@@ -255,7 +255,7 @@ void collapse_place(uint task) {
 // ---- records ----
 
 void collapse_records(uint task) {
-    Words walk = walk_order(), sorted = Words(values[passes & 1u]);
+    Words walk = walk_order(), sorted = sorted_values();
     uvec2 records = records_at(structure_address, max(primitive_count, 2u) - 1u);
     Geometry input_geometries = geometries();
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;

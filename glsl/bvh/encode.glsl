@@ -44,7 +44,7 @@ uint columns_of_sort() {
 
 // `phases_behind`: phases behind the sort, of as many tasks as encode has, for the pool.
 void reset_build(uint phases_behind) {
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     uint i = gl_LocalInvocationIndex;
     uint tile = gl_WorkGroupSize.x * ITEMS;
     uint tiles = (primitive_count + tile - 1) / tile;
@@ -71,12 +71,13 @@ void reset_build(uint phases_behind) {
         state.centroids_hi[axis] = 0;
     }
     if (HAS_GRID) {
-        Words cells = Words(table_address);
+        Words cells = Words(part(parts.table));
         for (uint word = i; word < CELL_WORDS; word += gl_WorkGroupSize.x) cells.word[word] = 0;
     }
     if (i == 0) {
         state.active_count = 0;
         state.status = 0;
+        if (phases_behind != 0) state.saved_parts = parts;
     }
 }
 
@@ -139,7 +140,7 @@ void find_bounds(uint task) {
     active_count = subgroupAdd(active_count);
     status = subgroupOr(status & ~INACTIVE);
     // Integers: the order in which the atomics arrive changes nothing.
-    Words to = Words(address_of(state_address, POOL_WORDS, 4));
+    Words to = Words(address_of(scratch_address, POOL_WORDS, 4));
     if (!PRIVATE_COUNTERS) begin_group_bounds();
     if (subgroupElect()) {
         for (uint axis = 0; axis < 3; ++axis) {
@@ -182,12 +183,12 @@ void write_header(BuildState state, uint geometry_count, uint geometry_flags) {
     structure.header.inner_nodes = max(state.active_count, 1) - 1;
     structure.header.geometry_count = geometry_count;
     structure.header.geometry_flags = geometry_flags;
-    structure.header.build_flags = code_kind >> 26;
+    structure.header.build_flags = build_flags;
     structure.header.area_scale = 0.0;
     structure.header.cost = 0.0;
     structure.header.built_cost = 0.0;
     structure.header.built_area = 0.0;
-    structure.header.split_from = HAS_REFERENCES ? split_state_before(state_address).primitive_count : 0;
+    structure.header.split_from = HAS_REFERENCES ? SplitState(part(parts.split)).primitive_count : 0;
     for (uint i = 0; i < 8; ++i) structure.header.reserved[i] = 0;
     if (primitive_count < 2) mark_unused(structure, 0);
 }
@@ -212,7 +213,7 @@ void write_recipe(BuildState state, Box boxes, Box bounds) {
 
 // By the workgroup together.
 void make_plan() {
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     uint geometry_count = count_geometries(geometries()), slots = max(primitive_count, 2) - 1;
     GeometryTable table = geometry_table_at(structure_address, kind_of_records(), slots, primitive_count);
     uint geometry_flags = write_geometries_together(geometries(), geometry_count, table);
@@ -260,12 +261,12 @@ uvec2 code_of(CodeKind kind, CodePlan plan, Box b) {
 }
 
 void encode(uint task) {
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     Geometry input_geometries = geometries();
     CodeKind kind = kind_of_codes();
     CodePlan plan = state.plan;
-    Words codes = Words(keys[0]);
-    Words ends = Words(ends_address);
+    Words codes = Words(part(parts.keys[0]));
+    Words ends = Words(part(parts.ends));
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
         uint primitive = first + k * gl_WorkGroupSize.x;
@@ -282,7 +283,7 @@ void encode(uint task) {
             ends.word[primitive] = NONE;
             // Slots from active_count - 1 on have no node.
             if (primitive >= max(state.active_count, 1)) mark_unused(Structure(structure_address), primitive - 1);
-            if (passes == 0) Words(values[0]).word[primitive] = primitive;
+            if (passes == 0) Words(part(parts.values[0])).word[primitive] = primitive;
         }
     }
 }
@@ -291,8 +292,8 @@ void encode(uint task) {
 
 Radix radix_of_pass(uint pass) {
     uint from = pass & 1;
-    return Radix(Words(keys[from]), Words(values[from]), Words(keys[1 - from]), Words(values[1 - from]),
-                 Words(table_address), primitive_count, pass * DIGIT_BITS, columns_of_sort(), column_keys, pass == 0);
+    return Radix(Words(part(parts.keys[from])), Words(part(parts.values[from])), Words(part(parts.keys[1 - from])),
+                 Words(part(parts.values[1 - from])), Words(part(parts.table)), primitive_count, pass * DIGIT_BITS, columns_of_sort(), column_keys, pass == 0);
 }
 
 // ---- from the task pool ----

@@ -44,30 +44,31 @@ const uint PHASE_ABOVE = PHASE_FINISH + 2;
 const uint PHASE_PLACE = PHASE_FINISH + 3;
 const uint PHASES_BEHIND_SORT = PHASE_FINISH + 5;
 
-Clusters all_clusters() {
-    return Clusters(scratch_behind_weights());
-}
-
 uint treelet_count() {
-    return BuildState(state_address).cluster_counts[0];
+    return build_state().cluster_counts[0];
 }
 
-// The clusters in the order of a level: neighbours are of one task. The sort has left the memory free.
+// The clusters in the order of a level: neighbours are of one task.
 Words order_of(uint level) {
-    return Words(keys[level & 1u]);
+    return Words(part(parts.orders[level & 1u]));
 }
 
-// The tasks of a level: the begin and the end of each in the order, and what names it. A task has two clusters at least.
-struct Tasks {
-    Words begins;
-    Words ends;
-    Words links;
-    uint first;
+// A range of a level's order that is split in two, and what names its node. It has two clusters at least.
+struct Task {
+    uint begin;
+    uint end;
+    uint link;
 };
 
-Tasks tasks_of(uint level) {
-    uvec2 links = address_of(scratch_behind_weights(), primitive_count, 40u);
-    return Tasks(Words(values[1u - (passes & 1u)]), Words(ends_address), Words(links), (level & 1u) * (primitive_count / 2u));
+BUFFER Tasks { Task task[]; };
+
+Tasks all_tasks() {
+    return Tasks(part(parts.tasks));
+}
+
+// Where the tasks of a level begin: those of even and odd levels have room side by side.
+uint first_task(uint level) {
+    return (level & 1u) * (primitive_count / 2u);
 }
 
 // Where the number of tasks of a phase behind the sort stands.
@@ -76,7 +77,7 @@ uint pool_phase(uint phase) {
 }
 
 uint task_count(uint level) {
-    return PoolState(state_address).tasks[pool_phase(PHASE_SPLIT + level)];
+    return PoolState(scratch_address).tasks[pool_phase(PHASE_SPLIT + level)];
 }
 
 // ---- weigh ----
@@ -86,12 +87,16 @@ uint count_of(Weights w, Child child) {
     return child.count != 0u ? 1u : w.counts.word[child.index] & ~IS_LEAF;
 }
 
+float top_cost(uint slot, uint side) {
+    return Floats(part(parts.top_costs[side])).value[slot];
+}
+
 // From each treelet up: of two siblings the second to arrive goes on with their parent, whose count tells until then who arrived.
 void hlbvh_weigh(uint task) {
     Structure structure = Structure(structure_address);
     Weights w = weights();
     Clusters clusters = all_clusters();
-    float area_scale = BuildState(state_address).plan.area_scale;
+    float area_scale = build_state().plan.area_scale;
     uint count = treelet_count();
     uint first = task * tile_size() + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
@@ -102,13 +107,12 @@ void hlbvh_weigh(uint task) {
         // As many levels as there are nodes, at most.
         for (uint level = 0; level < count && link != NO_PARENT; ++level) {
             uint slot = link >> 1;
-            // The costs of left and right children: the orders have left the memory free.
-            Floats(keys[link & 1u]).value[slot] = cost;
+            Floats(part(parts.top_costs[link & 1u])).value[slot] = cost;
             release_to_device();
             if (atomicAdd(w.counts.word[slot], 1u) == 0u) break;
             acquire_from_device();
             Child left = structure.nodes[slot].left, right = structure.nodes[slot].right;
-            vec2 costs = vec2(Floats(keys[0]).value[slot], Floats(keys[1]).value[slot]);
+            vec2 costs = vec2(top_cost(slot, 0u), top_cost(slot, 1u));
             float area = scaled_half_area(Box(min(left.lo, right.lo), max(left.hi, right.hi)), area_scale);
             cost = weigh_node(w, slot, uvec2(count_of(w, left), count_of(w, right)), costs, area);
             link = w.parents.word[slot];

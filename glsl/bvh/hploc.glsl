@@ -48,7 +48,7 @@ bool is_whole(Range s, uint active_count) {
 // One step up from a subtree: whether its sibling is there. If so, `s` becomes their parent, and the clusters of both are told.
 bool step_up(Words codes, uint active_count, uint run, inout uint waiting, inout Range s, out Request request) {
     request = NO_REQUEST;
-    Words ends = Words(ends_address);
+    Words ends = Words(part(parts.ends));
     bool is_left = is_less(s.behind, s.before);
     uint parent = is_left ? s.last : s.first - 1u;
     uint end, clusters;
@@ -85,13 +85,13 @@ bool step_up(Words codes, uint active_count, uint run, inout uint waiting, inout
 }
 
 void hploc_hierarchy(uint task) {
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     Structure structure = Structure(structure_address);
     Weights w = weights();
-    Clusters clusters = Clusters(scratch_behind_weights());
+    Clusters clusters = all_clusters();
     Words list = cluster_list();
     Geometry input_geometries = geometries();
-    Words codes = Words(keys[passes & 1u]);
+    Words codes = sorted_keys();
     uint active_count = state.active_count;
     float area_scale = state.plan.area_scale;
     uint run = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;

@@ -42,7 +42,7 @@ void climb(inout Run run, float area_scale, Subtree s, inout uint unused) {
         float area = scaled_half_area(Box(s.child.lo, s.child.hi), area_scale);
         float as_leaf = leaf_cost(c_i, area, count);
         s.cost = inner_cost(c_t, area, s.cost, sibling_cost);
-        bool as_leaf_is_cheaper = collapses() && as_leaf < s.cost;
+        bool as_leaf_is_cheaper = collapses != 0 && as_leaf < s.cost;
         s.child.index = as_leaf_is_cheaper ? s.first : parent;
         s.child.count = as_leaf_is_cheaper ? count : 0;
         if (as_leaf_is_cheaper) {
@@ -55,8 +55,8 @@ void climb(inout Run run, float area_scale, Subtree s, inout uint unused) {
 void lbvh_hierarchy(uint task) {
     uvec2 records = records_at(structure_address, max(primitive_count, 2) - 1);
     Geometry input_geometries = geometries();
-    float area_scale = BuildState(state_address).plan.area_scale;
-    Words order = Words(values[passes & 1]);
+    float area_scale = build_state().plan.area_scale;
+    Words order = sorted_values();
     Run run = run_of(task);
     uint position = run.first;
     uint end = min(position + ITEMS, primitive_count);

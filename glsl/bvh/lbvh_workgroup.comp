@@ -5,7 +5,7 @@
 // writes  the structures; scratch memory of each build
 // needs   nothing of other workgroups; subgroups of any size; workgroups of whole subgroups
 #version 460
-#define HEDGEROW_BUILD_ARGUMENTS_ARE_SET
+#define HEDGEROW_BUILD_BY_ONE_WORKGROUP
 #include "bvh/lbvh.glsl"
 
 // The twin of `Small` in src/bvh/lbvh_workgroup.rs.
@@ -25,15 +25,31 @@ layout(push_constant, scalar) uniform BuildAloneArguments {
     Small builds[2];
     float step_cost;
     float test_cost;
-    uint codes;
+    uint codes_and_flags;   // codes, collapses << 25, build flags << 26: push constants are full
     uint state_bytes;
 } given;
 
-// The next part of the scratch memory, as `Lbvh::scratch` lays it out.
-uvec2 take(inout uvec2 at, uint bytes) {
-    uvec2 begin = at;
-    at = address_of(at, (bytes + 15u) / 16u, 16u);
+// The next part of the scratch memory.
+uint take(inout uint at, uint bytes) {
+    uint begin = at;
+    at += (bytes + 15u) / 16u;
     return begin;
+}
+
+// As src/bvh/scratch.rs plans them for a build by one workgroup.
+void plan_parts(uint state_bytes) {
+    uint at = 0u, sorted = passes & 1u, word_bytes = 4u * primitive_count, key_bytes = KEY_WORDS * word_bytes;
+    take(at, state_bytes);
+    parts.values[sorted] = take(at, word_bytes);
+    parts.keys[sorted] = take(at, key_bytes);
+    parts.ends = take(at, word_bytes);
+    uint behind_ends = at;
+    parts.keys[1u - sorted] = take(at, key_bytes);
+    parts.values[1u - sorted] = take(at, word_bytes);
+    parts.table = at;
+    // Behind the sort.
+    parts.child_costs[0] = take(behind_ends, word_bytes);
+    parts.child_costs[1] = take(behind_ends, word_bytes);
 }
 
 void main() {
@@ -46,22 +62,17 @@ void main() {
     vertex_count = build.vertex_count;
     formats = build.formats;
     primitive_count = build.primitive_count;
-    code_kind = given.codes;
+    scratch_address = build.scratch;
+    code_kind = given.codes_and_flags & 0x1FFFFFFu;
+    collapses = given.codes_and_flags >> 25 & 1u;
+    build_flags = given.codes_and_flags >> 26;
     c_t = given.step_cost;
     c_i = given.test_cost;
     // A strip for each lane, or tiles.
     column_keys = PRIVATE_COUNTERS ? max((primitive_count + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x, 1u)
                                    : TILE_KEYS;
     passes = primitive_count < 2u ? 0u : (kind_of_codes().bits + DIGIT_BITS - 1u) / DIGIT_BITS;
-    uvec2 at = build.scratch;
-    state_address = take(at, given.state_bytes);
-    uint key_bytes = 4u * KEY_WORDS * primitive_count;
-    keys[0] = take(at, key_bytes);
-    keys[1] = take(at, key_bytes);
-    values[0] = take(at, 4u * primitive_count);
-    values[1] = take(at, 4u * primitive_count);
-    ends_address = take(at, 4u * primitive_count);
-    table_address = at;
+    plan_parts(given.state_bytes);
 
     uint tile = gl_WorkGroupSize.x * ITEMS;
     uint tiles = (primitive_count + tile - 1u) / tile;

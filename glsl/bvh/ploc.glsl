@@ -33,28 +33,23 @@ const uint CACHED = CACHES ? gl_WorkGroupSize.x + 2u * RADIUS : 1u;
 shared vec3 cached_lo[CACHED];
 shared vec3 cached_hi[CACHED];
 
-// Where the records of the clusters of a round lie, in order. The sort has left the memory free.
+// Where the records of the clusters of a round lie, in order.
 Words cluster_list(uint round) {
-    uint is_free = 1u - (passes & 1u);
-    return Words((round & 1u) == 0u ? keys[is_free] : values[is_free]);
+    return Words(part(parts.lists[round & 1u]));
 }
 
 Words nearest_of() {
-    return Words(ends_address);
-}
-
-Clusters all_clusters() {
-    return Clusters(scratch_behind_weights());
+    return Words(part(parts.nearest));
 }
 
 uint clusters_in(uint round) {
-    return BuildState(state_address).cluster_counts[round & 1u];
+    return build_state().cluster_counts[round & 1u];
 }
 
 // ---- begin ----
 
 void ploc_begin(uint task) {
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     Clusters clusters = all_clusters();
     Geometry input_geometries = geometries();
     if (task == 0u && gl_LocalInvocationIndex == 0u) {
@@ -83,7 +78,7 @@ void ploc_search(uint task, uint round) {
     uint count = clusters_in(round);
     Words list = cluster_list(round), nearest = nearest_of();
     Clusters clusters = all_clusters();
-    float area_scale = BuildState(state_address).plan.area_scale;
+    float area_scale = build_state().plan.area_scale;
     for (uint k = 0; k < ITEMS; ++k) {
         uint begin = task * tile_size() + k * gl_WorkGroupSize.x;
         if (begin >= count) break;
@@ -141,7 +136,7 @@ uint partner_of(Words nearest, uint i, uint count, bool is_forced) {
 // How many of this invocation's strip of the tile are left.
 uint left_of_strip(uint task, uint round) {
     uint count = clusters_in(round);
-    bool is_forced = BuildState(state_address).is_forced[round & 1u] != 0u;
+    bool is_forced = build_state().is_forced[round & 1u] != 0u;
     Words nearest = nearest_of();
     uint begin = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
     uint left = 0;
@@ -154,7 +149,7 @@ void ploc_count(uint task, uint round) {
 }
 
 void ploc_scan(uint round) {
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     uint count = clusters_in(round);
     uint total = scan_tiles(tiles_of(count));
     if (gl_LocalInvocationIndex == 0u) {
@@ -169,7 +164,7 @@ void ploc_scan(uint round) {
 }
 
 void ploc_merge(uint task, uint round) {
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     Structure structure = Structure(structure_address);
     Weights w = weights();
     Clusters clusters = all_clusters();

@@ -1,5 +1,5 @@
 // What the leaves of a build hold: its primitives, or the references that bvh/split.glsl has made of triangles, each the part of
-// a triangle that lies in a box. They lie in scratch memory before the build's state.
+// a triangle that lies in a box.
 #ifndef HEDGEROW_BVH_REFERENCES
 #define HEDGEROW_BVH_REFERENCES
 #include "gpu/pass.glsl"
@@ -35,24 +35,4 @@ BUFFER SplitState {
     SplitGrid grid;
     uint histogram[SPLIT_WEIGHTS];
 };
-
-// Bytes of a SplitState, with room to spare: STATE_BYTES in src/bvh/split.rs.
-const uint SPLIT_STATE_BYTES = 3328;
-
-// end - count * stride.
-uvec2 address_before(uvec2 end, uint count, uint stride) {
-    uint high, low, borrow;
-    umulExtended(count, stride, high, low);
-    end.x = usubBorrow(end.x, low, borrow);
-    end.y -= high + borrow;
-    return end;
-}
-
-SplitState split_state_before(uvec2 build_state) {
-    return SplitState(address_before(build_state, 1u, SPLIT_STATE_BYTES));
-}
-
-References references_before(uvec2 build_state, uint count) {
-    return References(address_before(uvec2(split_state_before(build_state)), count, 32u));
-}
 #endif

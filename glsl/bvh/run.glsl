@@ -28,7 +28,6 @@ struct Run {
     Structure structure;
     Words codes;
     Words ends;
-    // The buffers that the sort has left free hold the costs of left and right children.
     Floats left_costs;
     Floats right_costs;
     uint active_count;
@@ -54,15 +53,13 @@ uint run_slot(uint level) {
 }
 
 Run run_of(uint task) {
-    uint sorted = passes & 1u;
-    uint is_free = 1u - sorted;
     Run run;
     run.structure = Structure(structure_address);
-    run.codes = Words(keys[sorted]);
-    run.ends = Words(ends_address);
-    run.left_costs = Floats(keys[is_free]);
-    run.right_costs = Floats(values[is_free]);
-    run.active_count = BuildState(state_address).active_count;
+    run.codes = sorted_keys();
+    run.ends = Words(part(parts.ends));
+    run.left_costs = Floats(part(parts.child_costs[0]));
+    run.right_costs = Floats(part(parts.child_costs[1]));
+    run.active_count = build_state().active_count;
     run.first = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
     run.waiting = 0u;
     run.group_first = task * gl_WorkGroupSize.x * ITEMS;

@@ -25,8 +25,9 @@ layout(push_constant, scalar) uniform SplitArguments {
     uvec2 vertices;
     uvec2 indices;
     uvec2 transform;
-    uvec2 state_address;        // of the build's, before which the split's is
-    uvec2 counts_address;
+    uvec2 state_address;
+    uvec2 references_address;
+    uvec2 counts_address;       // of each triangle: its weight, then its splits, then those of all before
     uvec2 total_address;
     uint vertex_stride;
     uint vertex_count;
@@ -47,7 +48,7 @@ Geometry triangles_given() {
 }
 
 SplitState state_of_split() {
-    return split_state_before(state_address);
+    return SplitState(state_address);
 }
 
 uint first_item(uint task) {
@@ -228,7 +229,7 @@ uint triangle_of_split(Words before, uint number) {
 // Each triangle's first part lies at its own place, the others behind those of all triangles, in their order.
 void write_references(uint task) {
     SplitState state = state_of_split();
-    References references = references_before(state_address, reference_count);
+    References references = References(references_address);
     Geometry given = triangles_given();
     Words before = Words(counts_address);
     uint total = Words(total_address).word[0];

@@ -11,7 +11,7 @@
 shared uint partial[gl_WorkGroupSize.x];
 
 Words sums_of_tiles() {
-    return Words(table_address);
+    return Words(part(parts.sums));
 }
 
 uint tile_size() {

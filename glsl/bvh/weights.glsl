@@ -1,14 +1,12 @@
 // What a finished tree is made with, beside its nodes: for each node its parent, how many primitives lie below it and below its
 // left child, and whether it is cheaper as a leaf. Builders that know these as they make a node write them (`weigh_node`);
-// bvh/collapse.glsl finds them for any tree. They lie in the scratch memory behind the state: src/bvh/collapse.rs.
+// bvh/collapse.glsl finds them for any tree.
 //
 // A reference names a node by its slot, or a primitive by its sorted position with IS_PRIMITIVE set.
 #ifndef HEDGEROW_BVH_WEIGHTS
 #define HEDGEROW_BVH_WEIGHTS
 #include "bvh/encode.glsl"
 
-// Bytes of BuildState with its room to spare: STATE_BYTES in src/bvh/encode.rs.
-const uint STATE_BYTES = 1536;
 const uint IS_PRIMITIVE = 1u << 31;
 // In the count of a node: it is cheaper as a leaf.
 const uint IS_LEAF = 1u << 31;
@@ -21,13 +19,8 @@ struct Weights {
 };
 
 Weights weights() {
-    uvec2 begin = address_of(state_address, 1u, STATE_BYTES);
+    uvec2 begin = part(parts.weights);
     return Weights(Words(begin), Words(address_of(begin, primitive_count, 8u)), Words(address_of(begin, primitive_count, 12u)));
-}
-
-// Where a method's own scratch memory begins: behind the weights, aligned to 16 bytes.
-uvec2 scratch_behind_weights() {
-    return address_of(state_address, 1u, STATE_BYTES + 16u * primitive_count);
 }
 
 uint parent_at(uint reference) {
@@ -53,7 +46,7 @@ float weigh_node(Weights w, uint slot, uvec2 children_counts, vec2 children_cost
     uint count = children_counts.x + children_counts.y;
     float as_leaf = leaf_cost(c_i, area, count);
     float as_inner = inner_cost(c_t, area, children_costs.x, children_costs.y);
-    bool is_leaf = collapses() && as_leaf < as_inner;
+    bool is_leaf = collapses != 0u && as_leaf < as_inner;
     w.counts.word[slot] = count | (is_leaf ? IS_LEAF : 0u);
     w.left_counts.word[slot] = children_counts.x;
     return is_leaf ? as_leaf : as_inner;

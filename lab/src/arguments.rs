@@ -2,4 +2,6 @@
 
 #![allow(missing_docs, reason = "GLSL says what they are")]
 
+use hedgerow::gpu::shaders::{Block, Takes};
+
 include!(concat!(env!("OUT_DIR"), "/arguments.rs"));

@@ -23,7 +23,7 @@
 //!
 //! Tried, and not worth it: weighing volume beside area, for rays that begin in boxes (city ±5%, cables −1%); opening what is
 //! tight, too (slower); more than three rounds (no change within 1%, but what is very loose among many is opened deeper: four).
-use crate::gpu::arguments;
+use crate::gpu::arguments::{self, REBRAID_STATE_BYTES};
 use crate::gpu::{Context, Kernel, Step, fill, shaders};
 
 /// Times that entries are weighed and opened: `ROUNDS` in rebraid.glsl.
@@ -32,8 +32,7 @@ pub(super) const ROUNDS: u32 = 4;
 const CLASSES: u32 = 512;
 /// `CHUNKS_AT_MOST` there.
 const CHUNKS: u32 = 256;
-/// Words of its `RebraidState`.
-const STATE_WORDS: u32 = ROUNDS + 1 + ROUNDS * CLASSES + 2 * CHUNKS;
+const STATE_WORDS: u32 = REBRAID_STATE_BYTES as u32 / 4;
 /// Instances up to which one workgroup does all rounds: a chain of dispatches costs more than their work.
 const SMALL: u32 = 1024;
 

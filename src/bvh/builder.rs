@@ -12,6 +12,7 @@ use super::method::Hierarchy;
 pub use super::method::Method;
 use super::reinsertion::{self, Reinsertion};
 use super::sah::Collapse;
+use super::scratch::Scratch;
 use super::split::{self, Split};
 use super::{collapse, hploc, layout, lbvh_workgroup};
 use crate::gpu::arguments;
@@ -223,7 +224,6 @@ impl Builder {
             geometry_count: options.geometry_count,
             build_flags: options.build_flags,
             alone,
-            method_bytes: method_bytes(&*method.hierarchy(&merging), optimise.as_ref(), count.max(1).into()),
         };
         Ok(Builder { method, schedule, optimise, workers: tuning.workers, merging, encode })
     }
@@ -255,8 +255,17 @@ impl Builder {
 
     /// Bytes of the structure and of the scratch memory: exactly what [`Builder::record`] uses.
     pub fn sizes(&self) -> Sizes {
-        let scratch = self.encode.scratch().bytes;
-        Sizes { structure: self.layout().bytes, scratch, alignment: 16 }
+        self.sizes_with_table(self.encode.table_words())
+    }
+
+    /// The same with a sort's table of so many words.
+    fn sizes_with_table(&self, table_words: u64) -> Sizes {
+        Sizes { structure: self.layout().bytes, scratch: self.scratch(table_words).bytes(), alignment: 16 }
+    }
+
+    fn scratch(&self, table_words: u64) -> Scratch {
+        let reinsertion = self.optimise.map(|reinsertion| reinsertion.scratch_bytes());
+        Scratch::of(&self.encode, &*self.hierarchy(), reinsertion, table_words)
     }
 
     /// Where the parts of the structure lie.
@@ -268,9 +277,7 @@ impl Builder {
     /// Bytes that suffice for builds of this many primitives and of any fewer by builders of the same options.
     pub fn sizes_at_most(&self) -> Sizes {
         let Encode { shape, count, .. } = self.encode;
-        let more = shape.most_table_words(count).saturating_sub(self.encode.table_words());
-        let sizes = self.sizes();
-        Sizes { scratch: sizes.scratch + (4 * more).next_multiple_of(16), ..sizes }
+        self.sizes_with_table(shape.most_table_words(count).max(self.encode.table_words()))
     }
 
     /// Bytes that a phase must move if it reads each of its inputs once and writes each of its outputs once: what its time is
@@ -309,7 +316,7 @@ impl Builder {
 
     /// Whether leaves and records are made when the tree is there.
     fn places(&self) -> bool {
-        self.weighs() || self.method != Method::Lbvh
+        self.weighs() || self.hierarchy().writes_weights()
     }
 
     /// Records the build of `input` into the structure at address `structure`, with scratch memory at address `scratch`,
@@ -357,23 +364,24 @@ impl Builder {
     fn chain_of(&self, job: &Job<'_>) -> Result<Vec<Step>> {
         let Builder { schedule, encode, workers, .. } = self;
         let (input, workers) = (&job.input, *workers);
-        let arguments = &encode.arguments(input, job.structure, job.scratch)?;
-        let mut steps = encode.split.map_or(Vec::new(), |split| split.steps(encode, input, arguments));
+        let scratch = &self.scratch(encode.table_words());
+        let arguments = &encode.arguments(input, job.structure, job.scratch, scratch.parts)?;
+        let mut steps = encode.split.map_or(Vec::new(), |split| split.steps(encode, input, arguments, scratch));
         steps.extend(match schedule {
-            Schedule::Chain => self.chain(input, arguments),
+            Schedule::Chain => self.chain(input, arguments, scratch),
             _ => self.hierarchy().persistent_steps(encode, input, arguments, workers),
         });
         Ok(steps)
     }
 
-    fn chain(&self, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
+    fn chain(&self, input: &Input, arguments: &arguments::Build, scratch: &Scratch) -> Vec<Step> {
         let Builder { encode, optimise, .. } = self;
         // What is weighed later has leaves of one primitive until then.
         let single = if self.weighs() { arguments.without_collapse() } else { *arguments };
         let hierarchy = self.hierarchy().steps(encode, input, &single);
         let mut steps = [encode.steps(input, arguments), hierarchy].concat();
         if let Some(reinsertion) = optimise {
-            steps.extend(reinsertion.steps(arguments.structure, encode.behind_weights(arguments)));
+            steps.extend(reinsertion.steps(arguments.structure, arguments.part(scratch.reinsertion)));
         }
         if self.weighs() {
             steps.extend(collapse::weigh_steps(encode, arguments));
@@ -382,15 +390,6 @@ impl Builder {
             steps.extend(collapse::place_steps(encode, input, arguments));
         }
         steps
-    }
-}
-
-/// Bytes of scratch memory behind the state: the weights, and behind them what is needed one after the other.
-fn method_bytes(hierarchy: &dyn Hierarchy, optimise: Option<&Reinsertion>, count: u64) -> u64 {
-    let optimising = optimise.map_or(0, |reinsertion| reinsertion.scratch_bytes().max(collapse::weigh_bytes(count)));
-    match hierarchy.scratch_bytes(count).max(optimising) {
-        0 => 0,
-        bytes => collapse::weights_bytes(count) + bytes,
     }
 }
 

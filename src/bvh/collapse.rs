@@ -8,16 +8,6 @@ use super::geometry::Input;
 use crate::gpu::arguments;
 use crate::gpu::{Step, shaders};
 
-/// Bytes of the weights of so many primitives: `Weights` in weights.glsl.
-pub(super) const fn weights_bytes(count: u64) -> u64 {
-    16 * count
-}
-
-/// Bytes behind the weights that [`weigh_steps`] needs: costs and arrivals.
-pub(super) const fn weigh_bytes(count: u64) -> u64 {
-    8 * count
-}
-
 /// The dispatches that finish a tree whose weights are known. Label: `collapse`.
 pub(super) fn place_steps(encode: &Encode, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
     let kernels = [

@@ -1,7 +1,7 @@
 //! Whether boxes cover triangles: what validation asks of the parts of split ones.
 
 use super::layout::Record;
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, Polygon};
 use crate::{Error, Result};
 
 /// Parts of split triangles, as leaves hold them: the record of each, and its leaf's box.
@@ -40,15 +40,12 @@ impl Parts {
     }
 }
 
-/// Its corners.
-pub(crate) type Polygon = Vec<[f64; 3]>;
-
 /// Whether every point of a triangle is in one of the boxes: what is left of it when they are cut out is nothing. In double
 /// precision, with room for its rounding.
 fn covers(boxes: impl Iterator<Item = Aabb>, corners: &[[f32; 3]; 3]) -> bool {
     let magnitude = corners.iter().flatten().fold(0.0, |m: f64, &x| m.max(f64::from(x.abs())));
     let slack = magnitude * 2f64.powi(-44);
-    let mut left: Vec<Polygon> = vec![corners.iter().map(|c| c.map(f64::from)).collect()];
+    let mut left: Vec<Polygon> = vec![Polygon::of(corners)];
     for b in boxes {
         let before = std::mem::take(&mut left);
         for polygon in before {
@@ -60,40 +57,25 @@ fn covers(boxes: impl Iterator<Item = Aabb>, corners: &[[f32; 3]; 3]) -> bool {
 
 /// What of a polygon is farther than `slack` outside of a box, in convex pieces.
 fn cut_out(mut polygon: Polygon, b: &Aabb, slack: f64, left: &mut Vec<Polygon>) {
-    let planes = (0..3).flat_map(|axis| [(axis, 1.0, f64::from(b.hi[axis])), (axis, -1.0, -f64::from(b.lo[axis]))]);
+    let planes = (0..3).flat_map(|axis| [(axis, 1.0, f64::from(b.hi[axis])), (axis, -1.0, f64::from(b.lo[axis]))]);
+    let heights = |polygon: &Polygon, (axis, sign, plane): (usize, f64, f64)| {
+        polygon.corners().iter().map(|p| sign * (p[axis] - plane)).collect::<Vec<f64>>()
+    };
     // What misses the box altogether stays in one piece.
-    if planes.clone().any(|(axis, sign, bound)| polygon.iter().all(|p| sign * p[axis] > bound + slack)) {
+    if planes.clone().any(|plane| heights(&polygon, plane).iter().all(|&height| height > slack)) {
         left.push(polygon);
         return;
     }
-    for (axis, sign, bound) in planes {
-        let height = |p: &[f64; 3]| sign * p[axis] - bound;
-        if polygon.iter().all(|p| height(p) <= slack) {
+    for (axis, sign, plane) in planes {
+        if heights(&polygon, (axis, sign, plane)).iter().all(|&height| height <= slack) {
             continue;
         }
-        left.push(clipped(&polygon, height));
-        polygon = clipped(&polygon, |p| -height(p));
-        if polygon.is_empty() {
+        left.push(polygon.beyond(axis, plane, sign));
+        polygon = polygon.beyond(axis, plane, -sign);
+        if polygon.corners().is_empty() {
             return;
         }
     }
-}
-
-/// The part of a convex polygon where `height` is not negative.
-pub(crate) fn clipped(polygon: &Polygon, height: impl Fn(&[f64; 3]) -> f64) -> Polygon {
-    let mut kept = Polygon::new();
-    for (i, p) in polygon.iter().enumerate() {
-        let q = &polygon[(i + 1) % polygon.len()];
-        let (from, to) = (height(p), height(q));
-        if from >= 0.0 {
-            kept.push(*p);
-        }
-        if from.min(to) < 0.0 && from.max(to) > 0.0 {
-            let t = from / (from - to);
-            kept.push(std::array::from_fn(|k| p[k] + t * (q[k] - p[k])));
-        }
-    }
-    kept
 }
 
 #[cfg(test)]

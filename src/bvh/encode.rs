@@ -3,12 +3,13 @@
 //! `glsl/bvh/encode.glsl` is the device's side.
 
 use super::codes::Codes;
-use super::collapse;
 use super::geometry::{Geometry, Input, Planned, Primitives};
 use super::sah::Collapse;
+use super::scratch::Phase;
 use super::split::Split;
 use crate::Result;
 use crate::gpu::arguments;
+use crate::gpu::plan::Plan;
 use crate::gpu::radix_sort::{self, Shape};
 use crate::gpu::{Kernel, Step, shaders};
 
@@ -37,64 +38,26 @@ pub(super) struct Encode {
     pub build_flags: u32,
     /// Whether one workgroup does everything.
     pub alone: bool,
-    /// Bytes of scratch memory behind the state that the method needs for itself.
-    pub method_bytes: u64,
 }
-
-/// Where the parts of the scratch memory begin, in bytes.
-pub(super) struct Scratch {
-    state: u64,
-    keys: [u64; 2],
-    values: [u64; 2],
-    ends: u64,
-    table: u64,
-    pub bytes: u64,
-}
-
-/// Bytes of `BuildState` in encode.glsl, with room to spare.
-pub(super) const STATE_BYTES: u64 = 1536;
 
 impl arguments::Build {
     /// The same for a tree that is not collapsed.
     pub fn without_collapse(&self) -> arguments::Build {
-        arguments::Build { code_kind: self.code_kind & !COLLAPSES, ..*self }
+        arguments::Build { collapses: 0, ..*self }
+    }
+
+    /// The address of a part of the scratch memory.
+    pub fn part(&self, at: u32) -> u64 {
+        self.scratch + Plan::<Phase>::UNIT * u64::from(at)
     }
 }
 
 /// In `SOURCE_WORD` of geometry.glsl: leaves hold references.
 const HAS_REFERENCES: u32 = 8;
-/// In `code_kind`: subtrees become leaves.
-const COLLAPSES: u32 = 1 << 25;
 
 impl Encode {
-    /// Address of the scratch memory behind the weights.
-    pub fn behind_weights(&self, arguments: &arguments::Build) -> u64 {
-        arguments.state + STATE_BYTES + collapse::weights_bytes(self.count.into())
-    }
-
     pub fn key_words(&self) -> u32 {
         if self.codes.bits > 32 { 2 } else { 1 }
-    }
-
-    pub fn scratch(&self) -> Scratch {
-        let state = self.split.map_or(0, |split| split.bytes(self.count));
-        let mut at = state + STATE_BYTES + self.method_bytes.next_multiple_of(16);
-        let mut take = |bytes: u64| {
-            let begin = at;
-            at += bytes.next_multiple_of(16);
-            begin
-        };
-        // Of nothing one: Mesa 26's lavapipe loads what is at the same address for all lanes even where no lane is active.
-        let count = u64::from(self.count.max(1));
-        let key_bytes = 4 * u64::from(self.key_words()) * count;
-        Scratch {
-            state,
-            keys: [take(key_bytes), take(key_bytes)],
-            values: [take(4 * count), take(4 * count)],
-            ends: take(4 * count),
-            table: take(4 * self.table_words()),
-            bytes: at,
-        }
     }
 
     /// Words of the sort's table, in which the codes' prefixes lie before the sort. One workgroup on a CPU gives each of its
@@ -105,7 +68,7 @@ impl Encode {
         } else {
             self.shape.table_words(self.count)
         };
-        sort.max(self.codes.prefix_words()).max(self.split.map_or(0, |split| split.table_words()))
+        sort.max(self.codes.prefix_words())
     }
 
     pub fn passes(&self) -> u32 {
@@ -176,36 +139,34 @@ impl Encode {
         Ok(input.for_kernels())
     }
 
-    /// `code_kind` in encode.glsl.
-    pub fn code_kind(&self) -> u32 {
-        let collapses = if self.collapse.enabled { COLLAPSES } else { 0 };
-        self.codes.kind_word() | collapses | self.build_flags << 26
-    }
-
-    /// What the kernels are given, with scratch memory at address `scratch`.
-    pub fn arguments(&self, input: &Input, structure: u64, scratch: u64) -> Result<arguments::Build> {
+    /// What the kernels are given, with scratch memory of this plan at address `scratch`.
+    pub fn arguments(
+        &self,
+        input: &Input,
+        structure: u64,
+        scratch: u64,
+        parts: arguments::BuildParts,
+    ) -> Result<arguments::Build> {
         let (geometry, formats) = self.checked(input)?;
-        let parts = self.scratch();
         Ok(arguments::Build {
             vertices: geometry.vertices,
             indices: geometry.indices,
             transform: geometry.transform,
             structure,
-            state: scratch + parts.state,
-            keys: parts.keys.map(|at| scratch + at),
-            values: parts.values.map(|at| scratch + at),
-            ends: scratch + parts.ends,
-            table: scratch + parts.table,
+            scratch,
             vertex_stride: geometry.vertex_stride,
             vertex_count: geometry.vertex_count,
             formats,
             primitive_count: self.count,
-            code_kind: self.code_kind(),
+            code_kind: self.codes.kind_word(),
+            collapses: self.collapse.enabled.into(),
+            build_flags: self.build_flags,
             c_t: self.collapse.c_t,
             c_i: self.collapse.c_i,
-            level: 0,
             column_keys: self.shape.column_keys(self.count),
             passes: self.passes(),
+            level: 0,
+            parts,
         })
     }
 
@@ -214,7 +175,12 @@ impl Encode {
     pub fn steps(&self, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
         let reading = |phase, shader, groups| Step::new(phase, self.reading_kernel(shader, input), arguments, groups);
         let sort = radix_sort::Sort { count: self.count, bits: self.codes.bits, identity: true };
-        let buffers = radix_sort::Buffers { keys: arguments.keys, values: arguments.values, table: arguments.table };
+        let parts = arguments.parts;
+        let buffers = radix_sort::Buffers {
+            keys: parts.keys.map(|at| arguments.part(at)),
+            values: parts.values.map(|at| arguments.part(at)),
+            table: arguments.part(parts.table),
+        };
         let bounds = self.for_bounds();
         let mut steps = vec![
             Step::new("bounds", self.reset_kernel(&shaders::BVH_ENCODE_RESET), arguments, 1),

@@ -3,11 +3,11 @@
 //! Pantaleoni and Luebke 2010; Garanzha, Pantaleoni, McAllister 2011. `glsl/bvh/hlbvh.glsl` is the device's side; the twin is
 //! [`super::twin::hlbvh`] with [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
-use super::clusters_bytes;
 use super::codes::Codes;
 use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
+use super::scratch::{Phase, Scratch};
 use crate::gpu::{Kernel, Step, arguments, shaders};
 
 /// What is a treelet of [`Method::Hlbvh`](super::builder::Method::Hlbvh).
@@ -39,11 +39,6 @@ fn levels(count: u32) -> u32 {
     (u32::BITS - count.leading_zeros() + 6).min(MOST)
 }
 
-/// Bytes behind the clusters: what names each task of two levels. A task has two treelets at least.
-const fn tasks_bytes(count: u64) -> u64 {
-    4 * count
-}
-
 fn kernel(encode: &Encode, treelets: &Treelets, shader: &'static shaders::Shader, input: &Input) -> Kernel {
     /// `BY_COUNT` in hlbvh.glsl: pipelines do not depend on the number of primitives.
     const BY_COUNT: u32 = u32::MAX;
@@ -73,7 +68,18 @@ impl Hierarchy for &Treelets {
         [&shaders::BVH_HLBVH_RESET, &shaders::BVH_HLBVH_PERSISTENT].map(|shader| kernel(encode, self, shader, input))
     }
 
-    fn scratch_bytes(&self, count: u64) -> u64 {
-        clusters_bytes(count) + tasks_bytes(count)
+    fn plan(&self, encode: &Encode, scratch: &mut Scratch) {
+        scratch.take_weights(Phase::Hierarchy);
+        scratch.take_codes(Phase::Hierarchy);
+        scratch.take_child_costs();
+        scratch.take_sort();
+        scratch.take_clusters(Phase::Gather, Phase::Above);
+        let top_costs = ["costs of left children above", "costs of right children above"];
+        scratch.parts.top_costs = top_costs.map(|name| scratch.take_words(name, Phase::Above, Phase::Above));
+        scratch.parts.orders = ["clusters of even levels", "clusters of odd levels"]
+            .map(|name| scratch.take_words(name, Phase::Gather, Phase::Top));
+        scratch.take_tasks();
+        scratch.take_sums(encode.shape.workgroup, Phase::Gather);
+        scratch.take_ends(Phase::Gather);
     }
 }

@@ -3,10 +3,10 @@
 //! `glsl/bvh/hploc.glsl` is the device's side; the twin is [`super::twin::hploc`] with
 //! [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
-use super::clusters_bytes;
 use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
+use super::scratch::{Phase, Scratch};
 use crate::gpu::{Context, Kernel, Step, arguments, shaders};
 
 /// What [`Method::Hploc`](super::builder::Method::Hploc) looks at.
@@ -58,6 +58,12 @@ impl Merging {
         }
     }
 
+    /// Of a device whose invocations merge their own windows.
+    #[cfg(test)]
+    pub fn alone() -> Merging {
+        Merging { window: Window::DEFAULT, alone: true, group: 8, shared_memory: 0 }
+    }
+
     /// Invocations of a team, in workgroups of so many: one for each place, where there is room for as many teams as that makes.
     fn team(&self, workgroup: u32) -> u32 {
         let fits = |team: u32| workgroup / team * self.window.size * PLACE_BYTES <= self.shared_memory;
@@ -88,7 +94,12 @@ impl Hierarchy for &Merging {
         [encode.reset_kernel(&shaders::BVH_HPLOC_RESET), all]
     }
 
-    fn scratch_bytes(&self, count: u64) -> u64 {
-        clusters_bytes(count)
+    fn plan(&self, _encode: &Encode, scratch: &mut Scratch) {
+        scratch.take_weights(Phase::Hierarchy);
+        scratch.take_codes(Phase::Hierarchy);
+        scratch.take_ends(Phase::Hierarchy);
+        scratch.take_sort();
+        scratch.take_clusters(Phase::Hierarchy, Phase::Hierarchy);
+        scratch.parts.lists[0] = scratch.take_words("list of clusters", Phase::Hierarchy, Phase::Hierarchy);
     }
 }

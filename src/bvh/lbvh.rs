@@ -5,6 +5,7 @@
 use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
+use super::scratch::{Phase, Scratch};
 use crate::gpu::{Kernel, Step, arguments, shaders};
 
 pub(super) struct Lbvh;
@@ -20,7 +21,15 @@ impl Hierarchy for Lbvh {
         [encode.reset_kernel(&shaders::BVH_LBVH_RESET), all]
     }
 
-    fn scratch_bytes(&self, _count: u64) -> u64 {
-        0
+    // As glsl/bvh/lbvh_workgroup.comp lays it out as well.
+    fn plan(&self, _encode: &Encode, scratch: &mut Scratch) {
+        scratch.take_codes(Phase::Hierarchy);
+        scratch.take_ends(Phase::Hierarchy);
+        scratch.take_sort();
+        scratch.take_child_costs();
+    }
+
+    fn writes_weights(&self) -> bool {
+        false
     }
 }

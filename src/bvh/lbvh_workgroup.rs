@@ -4,9 +4,8 @@
 //! no memory for their arguments this way: two fit into the push constants.
 
 use super::builder::Job;
-use super::encode::STATE_BYTES;
 use crate::Result;
-use crate::gpu::arguments;
+use crate::gpu::arguments::{self, BUILD_STATE_BYTES};
 use crate::gpu::{Kernel, Step, shaders};
 use std::collections::HashMap;
 
@@ -24,7 +23,8 @@ pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
         let (geometry, formats) = encode.checked(&input)?;
         let kernel = encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, &input);
         let costs = [encode.collapse.c_t.to_bits(), encode.collapse.c_i.to_bits()];
-        let kind = (kernel, encode.code_kind(), costs);
+        let flags = encode.codes.kind_word() | u32::from(encode.collapse.enabled) << 25 | encode.build_flags << 26;
+        let kind = (kernel, flags, costs);
         let builds = kinds.entry(kind.clone()).or_default();
         if builds.is_empty() {
             order.push(kind);
@@ -43,7 +43,7 @@ pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
     }
     let mut steps = Vec::new();
     for kind in order {
-        let (kernel, codes, costs) = &kind;
+        let (kernel, codes_and_flags, costs) = &kind;
         for pair in kinds[&kind].chunks(AT_ONCE) {
             let mut builds = [pair[0]; AT_ONCE];
             builds[..pair.len()].copy_from_slice(pair);
@@ -51,8 +51,8 @@ pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
                 builds,
                 step_cost: f32::from_bits(costs[0]),
                 test_cost: f32::from_bits(costs[1]),
-                codes: *codes,
-                state_bytes: STATE_BYTES as u32,
+                codes_and_flags: *codes_and_flags,
+                state_bytes: BUILD_STATE_BYTES as u32,
             };
             steps.push(Step::new("build", kernel.clone(), &arguments, pair.len() as u32));
         }

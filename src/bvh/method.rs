@@ -6,6 +6,7 @@ use super::hlbvh::Treelets;
 use super::hploc::{Merging, Window};
 use super::lbvh::Lbvh;
 use super::ploc::Ploc;
+use super::scratch::Scratch;
 use crate::gpu::{Kernel, Step, arguments};
 use crate::{Error, Result};
 
@@ -78,8 +79,13 @@ pub(super) trait Hierarchy {
     /// The kernels of a whole build by one dispatch: what resets its state, and what does everything.
     fn persistent(&self, encode: &Encode, input: &Input) -> [Kernel; 2];
 
-    /// Bytes of scratch memory behind the weights for `count` primitives.
-    fn scratch_bytes(&self, count: u64) -> u64;
+    /// Takes what it needs of the scratch memory, and what the phases before do, in an order in which least is left unused.
+    fn plan(&self, encode: &Encode, scratch: &mut Scratch);
+
+    /// Whether it writes the weights of the nodes, by which collapsing finishes the tree; LBVH finishes its own.
+    fn writes_weights(&self) -> bool {
+        true
+    }
 
     /// The whole build by `workers` workgroups of one dispatch. Label: `build`.
     fn persistent_steps(

@@ -30,12 +30,8 @@ pub mod quality;
 pub mod refit;
 pub mod reinsertion;
 pub mod sah;
+mod scratch;
 pub mod split;
 pub mod twin;
 pub mod validate;
 pub mod wide;
-
-/// Bytes of so many clusters: `Cluster` in clusters.glsl.
-const fn clusters_bytes(count: u64) -> u64 {
-    40 * count
-}

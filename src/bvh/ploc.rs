@@ -3,10 +3,10 @@
 //! `glsl/bvh/ploc.glsl` is the device's side; the twin is [`super::twin::ploc`] with
 //! [`Bvh2::collapsed`](super::layout::Bvh2::collapsed): the same bytes.
 
-use super::clusters_bytes;
 use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
+use super::scratch::{Phase, Scratch};
 use crate::gpu::{Kernel, Step, arguments, shaders};
 
 /// Clusters that one workgroup finishes in less time than rounds of all take.
@@ -95,7 +95,15 @@ impl Hierarchy for Ploc {
         [&shaders::BVH_PLOC_RESET, &shaders::BVH_PLOC_PERSISTENT].map(|shader| kernels.of_pool(shader))
     }
 
-    fn scratch_bytes(&self, count: u64) -> u64 {
-        clusters_bytes(count)
+    fn plan(&self, encode: &Encode, scratch: &mut Scratch) {
+        scratch.take_weights(Phase::Hierarchy);
+        scratch.take_codes(Phase::Sort);
+        scratch.take_ends(Phase::Encode);
+        scratch.take_sort();
+        scratch.take_clusters(Phase::Hierarchy, Phase::Hierarchy);
+        scratch.parts.lists = ["clusters of even rounds", "clusters of odd rounds"]
+            .map(|name| scratch.take_words(name, Phase::Hierarchy, Phase::Hierarchy));
+        scratch.parts.nearest = scratch.take_words("nearest clusters", Phase::Hierarchy, Phase::Hierarchy);
+        scratch.take_sums(encode.shape.workgroup, Phase::Hierarchy);
     }
 }

@@ -19,6 +19,7 @@
 
 use super::encode::Encode;
 use super::geometry::{Geometry, GeometryFlags, Input, Source};
+use super::scratch::Scratch;
 use crate::gpu::arguments;
 use crate::gpu::scan::{self, Scan};
 use crate::gpu::{Context, Step, shaders};
@@ -98,22 +99,14 @@ pub(super) struct Split {
     scan: Scan,
 }
 
-/// Bytes of `SplitState` in references.glsl, with room to spare.
-const STATE_BYTES: u64 = 3328;
-
 impl Split {
     pub fn new(context: &Context, options: &Options, primitives: u32) -> Split {
         Split { primitives, most: options.most, scan: Scan::new(context, primitives) }
     }
 
-    /// Bytes of scratch memory before the build's state.
-    pub fn bytes(&self, reference_count: u32) -> u64 {
-        STATE_BYTES + size_of::<Reference>() as u64 * u64::from(reference_count)
-    }
-
-    /// Words of the sort's table that splitting needs before.
-    pub fn table_words(&self) -> u64 {
-        self.scan.sums_words().into()
+    /// Bytes of the sums over tiles of triangles, the last of which is the number of all splits.
+    pub fn sums_bytes(&self) -> u64 {
+        4 * u64::from(self.scan.sums_words())
     }
 
     /// # Errors
@@ -130,17 +123,18 @@ impl Split {
         }
     }
 
-    /// The dispatches before those of [`Encode`]; what follows needs a barrier before. Its words and table are free until then.
-    /// Label: `split`.
-    pub fn steps(&self, encode: &Encode, input: &Input, build: &arguments::Build) -> Vec<Step> {
+    /// The dispatches before those of [`Encode`]; what follows needs a barrier before. Label: `split`.
+    pub fn steps(&self, encode: &Encode, input: &Input, build: &arguments::Build, scratch: &Scratch) -> Vec<Step> {
+        let (counts, sums) = (build.part(scratch.split_counts), build.part(scratch.split_sums));
         let (Geometry { vertices, indices, transform, vertex_stride, vertex_count, .. }, formats) = input.for_kernels();
         let arguments = arguments::Split {
             vertices,
             indices,
             transform,
-            state: build.state,
-            counts: build.ends,
-            total: build.table + 4 * (self.table_words() - 1),
+            state: build.part(build.parts.split),
+            references: build.part(build.parts.references),
+            counts,
+            total: sums + self.sums_bytes() - 4,
             vertex_stride,
             vertex_count,
             formats,
@@ -150,7 +144,7 @@ impl Split {
         };
         let step = |shader, groups| Step::new("split", encode.unsplit_kernel(shader, input), &arguments, groups);
         let tiles = encode.tiles_of(self.primitives);
-        let scanned = scan::Buffers { values: build.ends, results: build.ends, sums: build.table };
+        let scanned = scan::Buffers { values: counts, results: counts, sums };
         let before_scan = [
             step(&shaders::BVH_SPLIT_RESET, 1),
             step(&shaders::BVH_SPLIT_BOUNDS, tiles),

@@ -1,7 +1,7 @@
 //! The library on a device that somebody made: limits and pipelines, nothing else.
 
 use super::requirements::{self, Optional, SubgroupSizes};
-use super::shaders::Shader;
+use super::shaders::{Shader, Takes};
 use super::{Tuning, TuningChoice, Workarounds, reconvergence, specialise};
 use crate::{Error, Result};
 use ash::vk;
@@ -137,6 +137,11 @@ impl Kernel {
     pub(crate) fn in_workgroups_of(mut self, workgroup: u32) -> Kernel {
         self.constants[0] = workgroup;
         self
+    }
+
+    /// What its shader takes of a block of push constants.
+    pub(super) fn takes(&self) -> &'static Takes {
+        &self.shader.takes
     }
 
     /// Path of its shader below `glsl/`.

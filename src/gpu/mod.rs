@@ -6,6 +6,7 @@ pub(crate) mod arguments;
 mod context;
 pub mod fill;
 mod grid;
+pub(crate) mod plan;
 pub mod radix_sort;
 mod reconvergence;
 mod recorder;

@@ -34,13 +34,12 @@ impl Shape {
     pub fn strips(limits: &Limits) -> Shape {
         /// A lane's counters take 1 KiB of shared memory.
         const MOST: u32 = 8;
-        Shape {
-            workgroup: limits.subgroup_size.min(MOST),
-            digit_bits: 8,
-            private_counters: true,
-            subgroups: 0,
-            rows: 0,
-        }
+        Shape::strips_of(limits.subgroup_size.min(MOST))
+    }
+
+    /// The same with workgroups of so many invocations.
+    pub(crate) fn strips_of(workgroup: u32) -> Shape {
+        Shape { workgroup, digit_bits: 8, private_counters: true, subgroups: 0, rows: 0 }
     }
 
     /// The same for GPUs whose subgroups may be smaller than they report: small digits, so that a workgroup has many strips.

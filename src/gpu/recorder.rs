@@ -1,5 +1,6 @@
 //! Recording: phases, dispatches and barriers into the caller's command buffer, with labels and timestamps.
 
+use super::shaders::Block;
 use super::{Context, Kernel};
 use crate::{Error, Result};
 use ash::vk;
@@ -123,9 +124,10 @@ pub struct Step {
 }
 
 impl Step {
-    /// `groups` workgroups of `kernel` with `arguments` as push constants (at most 128 bytes), in the phase `phase`.
-    pub fn new<T: bytemuck::NoUninit>(phase: &'static str, kernel: Kernel, arguments: &T, groups: u32) -> Step {
-        Step { phase, kernel, arguments: bytemuck::bytes_of(arguments).to_vec(), groups }
+    /// `groups` workgroups of `kernel` with what it takes of `arguments`, in the phase `phase`.
+    pub fn new<B: Block>(phase: &'static str, kernel: Kernel, arguments: &B, groups: u32) -> Step {
+        let arguments = kernel.takes().of(arguments);
+        Step { phase, kernel, arguments, groups }
     }
 }
 
@@ -211,33 +213,12 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Dispatches `groups` workgroups of `kernel` with `arguments` as push constants (at most 128 bytes).
+    /// Dispatches `groups` workgroups of `kernel` with what it takes of `arguments`.
     ///
     /// # Errors
     /// The kernel's pipeline could not be made.
-    pub fn dispatch<T: bytemuck::NoUninit>(&mut self, kernel: &Kernel, arguments: &T, groups: u32) -> Result<()> {
-        self.dispatch_bytes(kernel, bytemuck::bytes_of(arguments), groups)
-    }
-
-    /// Like [`Recorder::dispatch`], with as many workgroups as the three words at `offset` of `buffer` say when it runs.
-    ///
-    /// # Errors
-    /// The kernel's pipeline could not be made.
-    ///
-    /// # Safety
-    /// `buffer` is live, has `INDIRECT_BUFFER` usage and three words at `offset`.
-    pub unsafe fn dispatch_indirect<T: bytemuck::NoUninit>(
-        &mut self,
-        kernel: &Kernel,
-        arguments: &T,
-        buffer: vk::Buffer,
-        offset: u64,
-    ) -> Result<()> {
-        if let Some(device) = self.bind(kernel, bytemuck::bytes_of(arguments))? {
-            // SAFETY: the caller's promise.
-            unsafe { device.cmd_dispatch_indirect(self.commands, buffer, offset) };
-        }
-        Ok(())
+    pub fn dispatch<B: Block>(&mut self, kernel: &Kernel, arguments: &B, groups: u32) -> Result<()> {
+        self.dispatch_bytes(kernel, &kernel.takes().of(arguments), groups)
     }
 
     /// Records chains of steps side by side: the first steps of all of them, a barrier, the second steps, … with no barrier

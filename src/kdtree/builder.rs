@@ -12,10 +12,11 @@
 //! by integers ([`crate::gpu::KdTuning::exact_reciprocals`]). Where a device flushes subnormal numbers, inputs must not lead to any.
 
 use super::layout::{self, Header, Node};
+use super::merge::MERGE_AT;
 use super::termination::{Costs, depth_limit, leaf_size};
 use crate::bvh::builder::Schedule;
 use crate::bvh::geometry::{Input, Planned, Primitives};
-use crate::gpu::arguments;
+use crate::gpu::arguments::{self, KD_MERGE_BYTES, KD_STATE_BYTES};
 use crate::gpu::shaders::{self, Shader};
 use crate::gpu::{Context, KdTuning, Kernel, Recorder, Region, Step, task_pool};
 use crate::{Error, Result};
@@ -239,6 +240,7 @@ pub(super) struct Room {
 
 /// As `glsl/kdtree/` has them.
 const STATE_BYTES: u64 = 3584;
+const _: () = assert!(KD_STATE_BYTES <= MERGE_AT && MERGE_AT + KD_MERGE_BYTES <= STATE_BYTES);
 const REPORT_AT: u64 = size_of::<task_pool::State>() as u64;
 const REFERENCE_BYTES: u64 = 28;
 const TASK_BYTES: u64 = 60;

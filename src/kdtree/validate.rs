@@ -1,9 +1,8 @@
 //! Walks a kd-tree on the host and says what is wrong and where.
 
 use super::layout::{Content, Inner, KdTree, MAX_DEPTH};
-use crate::bvh::cover::{Polygon, clipped};
 use crate::bvh::layout::Triangle;
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, Polygon};
 use crate::{Error, Result};
 
 impl KdTree {
@@ -51,8 +50,8 @@ impl KdTree {
     /// must be referenced there. What lies in a plane may be on either side.
     fn validate_cover(&self, record: u32) -> Result<()> {
         let Triangle { v0, v1, v2, primitive } = self.records[record as usize];
-        let polygon: Polygon = [v0, v1, v2].iter().map(|corner| corner.map(f64::from)).collect();
-        let magnitude = polygon.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let polygon = Polygon::of(&[v0, v1, v2]);
+        let magnitude = polygon.corners().iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let cover = Cover { tree: self, record, slack: magnitude * 2f64.powi(-44) };
         match cover.lacking(0, polygon).first().map(|(place, _)| place) {
             Some(Lacking::Leaf(node)) => {
@@ -126,12 +125,12 @@ impl Cover<'_> {
             None => vec![(Lacking::EmptyChild(node), polygon)],
         };
         let (axis, plane) = (inner.axis, f64::from(inner.plane));
-        let is_left = polygon.iter().any(|p| p[axis] < plane - self.slack);
-        let is_right = polygon.iter().any(|p| p[axis] > plane + self.slack);
+        let is_left = polygon.corners().iter().any(|p| p[axis] < plane - self.slack);
+        let is_right = polygon.corners().iter().any(|p| p[axis] > plane + self.slack);
         match (is_left, is_right) {
             (true, true) => {
-                let mut lacking = below(0, clipped(&polygon, |p| plane - p[axis]));
-                lacking.extend(below(1, clipped(&polygon, |p| p[axis] - plane)));
+                let mut lacking = below(0, polygon.beyond(axis, plane, -1.0));
+                lacking.extend(below(1, polygon.beyond(axis, plane, 1.0)));
                 lacking
             }
             (true, false) => below(0, polygon),

@@ -118,7 +118,7 @@ ivec3 extents_of_cells(CodeGrid grid, uvec3 cells) {
 }
 
 void find_splits() {
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     if (state.active_count == 0) return;
     CodeKind kind = kind_of_codes();
     CodeGrid grid = state.plan.grid;
@@ -135,7 +135,7 @@ void find_splits() {
     barrier();
     for (uint level = 0; level < 2 * kind.depth; ++level) split_parts(kind, grid, level);
 
-    CodeSplits splits = CodeSplits(table_address);
+    CodeSplits splits = CodeSplits(part(parts.table));
     for (uint part = gl_LocalInvocationIndex; part < part_count; part += gl_WorkGroupSize.x) {
         uvec3 first = unpack_cell(part_first[part]), last = unpack_cell(part_last[part]);
         ivec3 extents = extents_of_cells(grid, last - first + 1);
@@ -169,7 +169,7 @@ uvec2 divide_and_shift(uvec3 v, uint divisor, uint shift) {
 }
 
 CodeParts bin_parts(CodeKind kind, CodePlan plan, Box b) {
-    CodeSplits splits = CodeSplits(table_address);
+    CodeSplits splits = CodeSplits(part(parts.table));
     WideCoordinates wide = wide_coordinates(plan, b);
     CodePart part = splits.part[splits.part_of[cell_number(plan.grid, cell_by_axes(plan.grid, wide))]];
     CodeParts parts;

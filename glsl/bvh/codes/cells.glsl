@@ -48,7 +48,7 @@ uint cell_number(CodeGrid grid, uvec3 cell) {
 }
 
 void count_cells(uint task) {
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     Geometry input_geometries = geometries();
     CodeKind kind = kind_of_codes();
     CodePlan plan = state.plan;
@@ -72,7 +72,7 @@ void count_cells(uint task) {
     }
     barrier();
     // One atomic a word and task instead of one a primitive.
-    Words cells = Words(table_address);
+    Words cells = Words(part(parts.table));
     for (uint word = gl_LocalInvocationIndex; word < CELL_WORDS; word += gl_WorkGroupSize.x) {
         uint found = cells_of_task[word];
         if (found != 0) {

@@ -28,7 +28,7 @@ uint any_of_bytes(uint word) {
 }
 
 void find_layers() {
-    Words cells = Words(table_address);
+    Words cells = Words(part(parts.table));
     uint depth = kind_of_codes().depth;
     for (uint layer = depth - 1; layer > 0; --layer) {
         uint from = layer_at(layer + 1, depth), to = layer_at(layer, depth);
@@ -44,7 +44,7 @@ void find_layers() {
 
 // The bits of a cell that tell occupied cells apart: x is their number, y how many they are.
 uvec2 concise_index(uint depth, uint cell) {
-    Words cells = Words(table_address);
+    Words cells = Words(part(parts.table));
     uint index = 0, count = 0;
     for (uint layer = 1; layer <= depth; ++layer) {
         uint here = cell >> 3 * (depth - layer);

@@ -18,7 +18,7 @@ shared uvec4 bitmaps[HAS_SPLITS ? 10 : 1];
 shared uint cell_values[HAS_SPLITS ? CELLS : 1];
 // The counts as bitmaps.
 void find_bitmaps(uint count_bits) {
-    Words cells = Words(table_address);
+    Words cells = Words(part(parts.table));
     if (gl_LocalInvocationIndex == 0) {
         count_range[0] = NONE;
         count_range[1] = 1;

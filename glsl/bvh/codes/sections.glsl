@@ -87,8 +87,8 @@ void write_sections(BuildState state, Box bounds, Box fences, Box core) {
 }
 
 void find_sections() {
-    BuildState state = BuildState(state_address);
-    Sample table = Sample(table_address);
+    BuildState state = build_state();
+    Sample table = Sample(part(parts.table));
     Geometry input_geometries = geometries();
     uint taken = min(primitive_count, SECTION_SAMPLE);
     if (gl_LocalInvocationIndex == 0) {

@@ -14,12 +14,6 @@ const float LEAST_EXTENT = 7.888609052210118e-31;   // 2^-100
 const uint NO_PLANE = 0xFFFFFFFFu;
 const uint INFINITE = 0x7F800000u;
 
-struct Task {
-    uint begin;
-    uint end;
-    uint link;
-};
-
 // One side of a plane.
 struct Side {
     vec3 lo;

@@ -120,7 +120,7 @@ uint split(Task t, uint level, out uint middle) {
     Weights w = weights();
     Clusters clusters = all_clusters();
     Words from = order_of(level), to = order_of(level + 1u);
-    float area_scale = BuildState(state_address).plan.area_scale;
+    float area_scale = build_state().plan.area_scale;
     uint count = t.end - t.begin;
     bool is_swept = count <= SWEPT, is_found = false;
     Slabs slabs = Slabs(vec3(0.0), vec3(0.0));
@@ -174,9 +174,7 @@ uint split(Task t, uint level, out uint middle) {
 
 Task task_at(uint level, uint i) {
     if (level == 0u) return Task(0u, treelet_count(), NO_PARENT);
-    Tasks tasks = tasks_of(level);
-    uint at = safe_place(tasks.first + i);
-    return Task(tasks.begins.word[at], tasks.ends.word[at], tasks.links.word[at]);
+    return all_tasks().task[safe_place(first_task(level) + i)];
 }
 
 // A task of a level: its sides of two clusters or more are tasks of the next, in any order, on which nothing depends.
@@ -185,21 +183,13 @@ void hlbvh_split(uint i, uint level) {
     uint middle;
     uint slot = split(t, level, middle);
     if (gl_LocalInvocationIndex != 0u) return;
-    Tasks next = tasks_of(level + 1u);
+    Tasks tasks = all_tasks();
     uint left = middle - t.begin > 1u ? 1u : 0u, right = t.end - middle > 1u ? 1u : 0u;
     if (left + right == 0u) return;
-    PoolState pool = PoolState(state_address);
-    uint at = next.first + atomicAdd(pool.tasks[pool_phase(PHASE_SPLIT + level + 1u)], left + right);
-    if (left == 1u) {
-        next.begins.word[at] = t.begin;
-        next.ends.word[at] = middle;
-        next.links.word[at] = 2u * slot;
-    }
-    if (right == 1u) {
-        next.begins.word[at + left] = middle;
-        next.ends.word[at + left] = t.end;
-        next.links.word[at + left] = 2u * slot + 1u;
-    }
+    PoolState pool = PoolState(scratch_address);
+    uint at = first_task(level + 1u) + atomicAdd(pool.tasks[pool_phase(PHASE_SPLIT + level + 1u)], left + right);
+    if (left == 1u) tasks.task[at] = Task(t.begin, middle, 2u * slot);
+    if (right == 1u) tasks.task[at + left] = Task(middle, t.end, 2u * slot + 1u);
 }
 
 void push(inout uint level, Task t, uint of_level) {

@@ -49,7 +49,7 @@ void climb(inout Run run, Weights w, float area_scale, Subtree s) {
 void hlbvh_treelets(uint task) {
     Weights w = weights();
     Geometry input_geometries = geometries();
-    float area_scale = BuildState(state_address).plan.area_scale;
+    float area_scale = build_state().plan.area_scale;
     Run run = run_of(task);
     uint position = run.first;
     uint end = min(position + ITEMS, run.active_count);
@@ -81,11 +81,11 @@ void hlbvh_treelets(uint task) {
 
 // Whether a treelet ends at a position.
 bool ends_treelet(uint position, uint active_count) {
-    return position + 1u == active_count || Words(ends_address).word[position] == NONE;
+    return position + 1u == active_count || Words(part(parts.ends)).word[position] == NONE;
 }
 
 uint treelets_of_strip(uint task) {
-    uint active_count = BuildState(state_address).active_count;
+    uint active_count = build_state().active_count;
     uint begin = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
     uint count = 0;
     for (uint i = begin; i < min(begin + ITEMS, active_count); ++i) count += ends_treelet(i, active_count) ? 1u : 0u;
@@ -99,8 +99,8 @@ void hlbvh_count(uint task) {
 void hlbvh_scan() {
     uint count = scan_tiles(tiles_of(primitive_count));
     if (gl_LocalInvocationIndex == 0u) {
-        PoolState pool = PoolState(state_address);
-        BuildState(state_address).cluster_counts[0] = count;
+        PoolState pool = PoolState(scratch_address);
+        build_state().cluster_counts[0] = count;
         pool.tasks[pool_phase(PHASE_SPLIT)] = count > 1u ? 1u : 0u;
         pool.tasks[pool_phase(PHASE_WEIGH)] = tiles_of(count);
     }
@@ -117,7 +117,7 @@ Cluster cluster_of_treelet(Structure structure, Weights w, Geometry input_geomet
 }
 
 void hlbvh_gather(uint task) {
-    BuildState state = BuildState(state_address);
+    BuildState state = build_state();
     Structure structure = Structure(structure_address);
     Weights w = weights();
     Clusters clusters = all_clusters();

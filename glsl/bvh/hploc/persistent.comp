@@ -1,4 +1,5 @@
 #version 460
+#define HEDGEROW_BUILD_BY_ONE_DISPATCH
 // All phases of the H-PLOC build in one dispatch, from the task pool: see bvh/hploc.glsl for the phases' contracts.
 //
 // needs  the state as bvh/hploc/reset.comp writes it, and one barrier before; any number of workgroups from one up
@@ -6,7 +7,8 @@
 #include "bvh/collapse.glsl"
 
 void main() {
-    PoolState pool = PoolState(state_address);
+    parts = build_state().saved_parts;
+    PoolState pool = PoolState(scratch_address);
     PoolCursor cursor = pool_start();
     uint sorted = phases_before_hierarchy();
     // Every round takes a ticket; there are fewer than 2^32.

@@ -20,9 +20,9 @@ struct Request {
 
 const Request NO_REQUEST = Request(0u, 0u, 0u, 0u, false);
 
-// Where the records of a subtree's clusters lie, from its first position on. The sort has left the memory free.
+// Where the records of a subtree's clusters lie, from its first position on.
 Words cluster_list() {
-    return Words(keys[1u - (passes & 1u)]);
+    return Words(part(parts.lists[0]));
 }
 
 // How many clusters a window leaves, at most.

@@ -1,11 +1,13 @@
 #version 460
+#define HEDGEROW_BUILD_BY_ONE_DISPATCH
 // All phases of the LBVH build in one dispatch, from the task pool: see bvh/lbvh.glsl for the phases' contracts.
 //
 // needs  the state as bvh/lbvh/reset.comp writes it, and one barrier before; any number of workgroups from one up
 #include "bvh/lbvh.glsl"
 
 void main() {
-    PoolState pool = PoolState(state_address);
+    parts = build_state().saved_parts;
+    PoolState pool = PoolState(scratch_address);
     PoolCursor cursor = pool_start();
     uint sorted = phases_before_hierarchy();
     // Every round takes a ticket; there are fewer than 2^32.

@@ -1,4 +1,5 @@
 #version 460
+#define HEDGEROW_BUILD_BY_ONE_DISPATCH
 // All phases of the PLOC build in one dispatch, from the task pool: see bvh/ploc.glsl for the phases' contracts.
 //
 // needs  the state as bvh/ploc/reset.comp writes it, and one barrier before; any number of workgroups from one up
@@ -44,7 +45,8 @@ void ploc_from_pool(PoolState pool, uint phase, uint task) {
 }
 
 void main() {
-    PoolState pool = PoolState(state_address);
+    parts = build_state().saved_parts;
+    PoolState pool = PoolState(scratch_address);
     PoolCursor cursor = pool_start();
     uint sorted = phases_before_hierarchy();
     // Every round takes a ticket; there are fewer than 2^32.

@@ -3,6 +3,7 @@
 //! Several records of one primitive, as splitting makes them, are one surface: it belongs to every node above any of them.
 
 use crate::bvh::layout::{Bvh2, Child};
+use crate::geometry::Polygon;
 
 /// A tree made ready: which positions of a walk are below each node, and where each primitive is.
 pub struct Surfaces<'a> {
@@ -104,7 +105,7 @@ impl<'a> Surfaces<'a> {
         let mut areas = Areas { surface: polygon.area(), ..Areas::default() };
         let mut next = vec![(self.tree.header.root, polygon)];
         while let Some((child, polygon)) = next.pop() {
-            let cut = polygon.inside(&child);
+            let cut = polygon.inside(&child.bounds());
             let area = cut.area();
             if area == 0.0 {
                 continue;
@@ -132,68 +133,6 @@ impl<'a> Surfaces<'a> {
             self.below[child.index as usize]
         };
         refs[refs.partition_point(|r| r[1] < first)..].first().is_some_and(|r| r[1] < end)
-    }
-}
-
-/// More corners than a triangle and six planes give, 9: rounding may make a few of one.
-const CORNERS: usize = 16;
-
-/// A convex polygon: a triangle and what six planes make of it.
-#[derive(Clone, Copy)]
-struct Polygon {
-    corners: [[f64; 3]; CORNERS],
-    count: usize,
-}
-
-impl Polygon {
-    fn of(triangle: &[[f32; 3]; 3]) -> Polygon {
-        let mut polygon = Polygon { corners: [[0.0; 3]; CORNERS], count: 3 };
-        for (corner, v) in polygon.corners.iter_mut().zip(triangle) {
-            *corner = v.map(f64::from);
-        }
-        polygon
-    }
-
-    /// What of it lies in the child's box (Sutherland, Hodgman 1974).
-    fn inside(&self, child: &Child) -> Polygon {
-        (0..3).fold(*self, |polygon, axis| {
-            polygon.beyond(axis, f64::from(child.lo[axis]), 1.0).beyond(axis, f64::from(child.hi[axis]), -1.0)
-        })
-    }
-
-    fn beyond(&self, axis: usize, plane: f64, sign: f64) -> Polygon {
-        let mut cut = Polygon { corners: [[0.0; 3]; CORNERS], count: 0 };
-        let mut push = |corner| {
-            if let Some(place) = cut.corners.get_mut(cut.count) {
-                *place = corner;
-                cut.count += 1;
-            }
-        };
-        for i in 0..self.count {
-            let (from, to) = (self.corners[i], self.corners[(i + 1) % self.count]);
-            let (a, b) = (sign * (from[axis] - plane), sign * (to[axis] - plane));
-            if a >= 0.0 {
-                push(from);
-            }
-            if a < 0.0 && b > 0.0 || a > 0.0 && b < 0.0 {
-                let t = a / (a - b);
-                push(std::array::from_fn(|k| if k == axis { plane } else { from[k] + t * (to[k] - from[k]) }));
-            }
-        }
-        cut
-    }
-
-    fn area(&self) -> f64 {
-        let offset = |i: usize| -> [f64; 3] { std::array::from_fn(|k| self.corners[i][k] - self.corners[0][k]) };
-        let mut sum = [0.0; 3];
-        for i in 1..self.count.saturating_sub(1) {
-            let (a, b) = (offset(i), offset(i + 1));
-            for (k, sum) in sum.iter_mut().enumerate() {
-                let (x, y) = ((k + 1) % 3, (k + 2) % 3);
-                *sum += a[x] * b[y] - a[y] * b[x];
-            }
-        }
-        0.5 * sum.iter().map(|x| x * x).sum::<f64>().sqrt()
     }
 }
 

@@ -6,6 +6,7 @@ use crate::bvh::builder::Sizes;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::node_slots;
 use crate::gpu::arguments;
+use crate::gpu::plan::Plan;
 use crate::gpu::{Context, Grid, Kernel, Recorder, fill, scan, shaders};
 use std::ops::Range;
 
@@ -40,16 +41,28 @@ const LEVELS: u32 = 16;
 /// Words of `Levels` in wide_collapse.glsl.
 const LEVEL_WORDS: u64 = 64 + 65 + 1;
 
-/// Where the parts of the scratch memory begin, in bytes.
+/// What collapsing does, as far as memory is used in one and free in the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Phase {
+    /// Nodes are opened, level by level.
+    Open,
+    /// What they have becomes where it goes.
+    Scan,
+    Nodes,
+    Records,
+}
+
+/// The plan of the scratch memory, and where its parts begin, in bytes.
 struct Scratch {
+    plan: Plan<Phase>,
     levels: u64,
     opened: u64,
     slots: u64,
+    /// How many children each slot has before its own; of quantised nodes also how many records, otherwise 0.
     first_children: u64,
     first_records: u64,
     order: u64,
     sums: u64,
-    bytes: u64,
 }
 
 impl OnDevice {
@@ -74,30 +87,26 @@ impl OnDevice {
         let Options { form, primitives, geometry_count } = self.options;
         let nodes = form.nodes_at_most(self.count);
         let structure = form.bytes(primitives.record_bytes(), nodes, self.count, geometry_count);
-        Sizes { structure, scratch: self.scratch().bytes, alignment: 16 }
+        Sizes { structure, scratch: self.scratch().plan.bytes(), alignment: 16 }
     }
 
     fn scratch(&self) -> Scratch {
-        let mut at = 0;
-        let mut take = |words: u64| {
-            let begin = at;
-            at += (4 * words).next_multiple_of(16);
-            begin
-        };
+        let mut plan = Plan::new();
+        let mut take = |name, words: u64, life| Plan::<Phase>::UNIT * u64::from(plan.take(name, 4 * words, life));
         let form = self.options.form;
         let (nodes, width) = (u64::from(form.nodes_at_most(self.count)), u64::from(form.width()));
         let slots = u64::from(node_slots(self.count)) + 1;
-        let of_quantised = |words: u64| if form.is_quantised() { words } else { 0 };
-        Scratch {
-            levels: take(LEVEL_WORDS),
-            opened: take(2 * nodes),
-            slots: take(width * nodes),
-            first_children: take(slots),
-            first_records: take(of_quantised(slots)),
-            order: take(of_quantised(self.count.into())),
-            sums: take(self.scan.sums_words().into()),
-            bytes: at,
-        }
+        let levels = take("levels", LEVEL_WORDS, Phase::Open..=Phase::Nodes);
+        let opened = take("opened nodes", 2 * nodes, Phase::Open..=Phase::Nodes);
+        let children = take("what names their children", width * nodes, Phase::Open..=Phase::Nodes);
+        // Side by side: they are cleared at once.
+        let first_children = take("first children", slots, Phase::Open..=Phase::Nodes);
+        let is_quantised = form.is_quantised();
+        let first_records = if is_quantised { take("first records", slots, Phase::Open..=Phase::Nodes) } else { 0 };
+        let sums = take("sums of tiles", self.scan.sums_words().into(), Phase::Scan..=Phase::Scan);
+        let records = u64::from(self.count);
+        let order = if is_quantised { take("order of records", records, Phase::Nodes..=Phase::Records) } else { 0 };
+        Scratch { plan, levels, opened, slots: children, first_children, first_records, order, sums }
     }
 
     fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
@@ -145,9 +154,7 @@ impl OnDevice {
             level_end: 0,
         };
         recorder.phase("wide");
-        // The sums of children and of records lie side by side.
-        let sums_words = (parts.order - parts.first_children) / 4;
-        fill::record(recorder, arguments.first_children, sums_words as u32, 0)?;
+        fill::record(recorder, arguments.first_children, ((parts.sums - parts.first_children) / 4) as u32, 0)?;
         recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RESET), &arguments, 1)?;
         let few = |level, level_end| {
             (&shaders::BVH_WIDE_OPEN_FEW, arguments::WideCollapse { level, level_end, ..arguments }, 1)

@@ -90,7 +90,7 @@ struct Plan {
 }
 
 /// As `glsl/kdtree/merge/state.glsl` has them.
-const MERGE_AT: u64 = 3072;
+pub(super) const MERGE_AT: u64 = 3072;
 const PAIR_BYTES: u64 = 32;
 const MARKED_BYTES: u64 = 40;
 const UNDONE_BYTES: u64 = 12;

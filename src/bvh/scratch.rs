@@ -1,0 +1,220 @@
+//! The scratch memory of a build: what lies in it, and from which phase to which.
+
+use super::encode::Encode;
+use super::method::Hierarchy;
+use super::split::Reference;
+use crate::gpu::arguments::{self, BUILD_STATE_BYTES, BuildParts};
+use crate::gpu::plan::Plan;
+
+/// The phases of a build, as far as memory is used in one and free in the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Phase {
+    /// Triangles become references.
+    Split,
+    /// Bounds and codes.
+    Encode,
+    Sort,
+    /// The nodes; of HLBVH those of treelets.
+    Hierarchy,
+    /// Of HLBVH: the clusters of treelets.
+    Gather,
+    /// Of HLBVH: the nodes over them.
+    Top,
+    /// Of HLBVH: their weights.
+    Above,
+    Optimise,
+    Weigh,
+    /// Where records go.
+    Place,
+    Records,
+}
+
+/// Bytes of a cluster: `Cluster` in clusters.glsl.
+const CLUSTER_BYTES: u64 = 40;
+/// Bytes of a task: `Task` in hlbvh.glsl.
+const TASK_BYTES: u64 = 12;
+/// Bytes of the weights of a primitive: `Weights` in weights.glsl.
+const WEIGHTS_BYTES: u64 = 16;
+
+/// The plan of a build's scratch memory.
+#[derive(Debug, Clone)]
+pub(super) struct Scratch {
+    plan: Plan<Phase>,
+    /// What kernels are given.
+    pub parts: BuildParts,
+    /// Where the splitting counts: for each triangle, and for tiles of them.
+    pub split_counts: u32,
+    pub split_sums: u32,
+    /// Where reinsertion has its own.
+    pub reinsertion: u32,
+    count: u64,
+    key_bytes: u64,
+    table_bytes: u64,
+    /// Which of the sort's two buffers has its results.
+    sorted: usize,
+}
+
+impl Scratch {
+    /// Of a build by `method`, with reinsertion that needs so many bytes, if any, and a sort's table of so many words.
+    pub fn of(encode: &Encode, method: &dyn Hierarchy, reinsertion: Option<u64>, table_words: u64) -> Scratch {
+        let count = u64::from(encode.count);
+        let mut scratch = Scratch {
+            plan: Plan::new(),
+            parts: bytemuck::Zeroable::zeroed(),
+            split_counts: 0,
+            split_sums: 0,
+            reinsertion: 0,
+            count,
+            key_bytes: 4 * u64::from(encode.key_words()) * count,
+            table_bytes: 4 * table_words,
+            sorted: encode.passes() as usize % 2,
+        };
+        scratch.plan.take("state", BUILD_STATE_BYTES, Phase::Encode..=Phase::Records);
+        scratch.take_split(encode);
+        scratch.parts.values[scratch.sorted] =
+            scratch.plan.take("sorted values", 4 * count, Phase::Encode..=Phase::Records);
+        method.plan(encode, &mut scratch);
+        if let Some(bytes) = reinsertion {
+            scratch.reinsertion = scratch.plan.take("reinsertion", bytes, Phase::Optimise..=Phase::Optimise);
+            if !method.writes_weights() {
+                scratch.take_weights(Phase::Weigh);
+            }
+            scratch.parts.costs = scratch.take_words("costs", Phase::Weigh, Phase::Weigh);
+            scratch.parts.arrivals = scratch.take_words("arrivals", Phase::Weigh, Phase::Weigh);
+        }
+        if reinsertion.is_some() || method.writes_weights() {
+            scratch.parts.large_firsts = scratch.take_words("first records of large nodes", Phase::Place, Phase::Place);
+            scratch.parts.large_depths = scratch.take_words("depths of large nodes", Phase::Place, Phase::Place);
+            scratch.parts.walk = scratch.take_words("order of the walk", Phase::Place, Phase::Records);
+        }
+        scratch
+    }
+
+    pub fn bytes(&self) -> u64 {
+        self.plan.bytes()
+    }
+
+    /// A word for each primitive.
+    pub fn take_words(&mut self, name: &'static str, from: Phase, to: Phase) -> u32 {
+        self.plan.take(name, 4 * self.count, from..=to)
+    }
+
+    fn take_split(&mut self, encode: &Encode) {
+        let Some(split) = encode.split else { return };
+        let plan = &mut self.plan;
+        let references = size_of::<Reference>() as u64 * self.count;
+        self.parts.references = plan.take("references", references, Phase::Split..=Phase::Records);
+        self.parts.split = plan.take("splitting", arguments::SPLIT_STATE_BYTES, Phase::Split..=Phase::Encode);
+        self.split_counts = plan.take("splits", 4 * u64::from(split.primitives), Phase::Split..=Phase::Split);
+        self.split_sums = plan.take("splits of tiles", split.sums_bytes(), Phase::Split..=Phase::Split);
+    }
+
+    /// What the tree is finished by, from the phase on that writes it.
+    pub fn take_weights(&mut self, from: Phase) {
+        self.parts.weights = self.plan.take("weights", WEIGHTS_BYTES * self.count, from..=Phase::Records);
+    }
+
+    /// The codes in order, in use up to a phase.
+    pub fn take_codes(&mut self, to: Phase) {
+        self.parts.keys[self.sorted] = self.plan.take("sorted keys", self.key_bytes, Phase::Encode..=to);
+    }
+
+    /// Where climbs of the radix tree meet, in use up to a phase. Encoding writes it.
+    pub fn take_ends(&mut self, to: Phase) {
+        self.parts.ends = self.take_words("ends", Phase::Encode, to);
+    }
+
+    /// What the sort alone uses.
+    pub fn take_sort(&mut self) {
+        let life = || Phase::Encode..=Phase::Sort;
+        self.parts.keys[1 - self.sorted] = self.plan.take("other keys", self.key_bytes, life());
+        self.parts.values[1 - self.sorted] = self.plan.take("other values", 4 * self.count, life());
+        self.parts.table = self.plan.take("table", self.table_bytes, life());
+    }
+
+    /// Costs of left and right children in climbs of the radix tree.
+    pub fn take_child_costs(&mut self) {
+        self.parts.child_costs = ["costs of left children", "costs of right children"]
+            .map(|name| self.take_words(name, Phase::Hierarchy, Phase::Hierarchy));
+    }
+
+    pub fn take_clusters(&mut self, from: Phase, to: Phase) {
+        self.parts.clusters = self.plan.take("clusters", CLUSTER_BYTES * self.count, from..=to);
+    }
+
+    /// The tasks of two levels of the top; a task has two treelets at least.
+    pub fn take_tasks(&mut self) {
+        self.parts.tasks = self.plan.take("tasks", TASK_BYTES * self.count, Phase::Top..=Phase::Top);
+    }
+
+    /// A sum for each tile, of which the smallest has `workgroup` items.
+    pub fn take_sums(&mut self, workgroup: u32, phase: Phase) {
+        self.parts.sums = self.plan.take("sums of tiles", 4 * self.count.div_ceil(workgroup.into()), phase..=phase);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::builder::{Method, Primitives, Treelets, Window};
+    use crate::bvh::codes::Code;
+    use crate::bvh::hploc::Merging;
+    use crate::bvh::sah::Collapse;
+    use crate::gpu::radix_sort::Shape;
+
+    fn encode(count: u32, bits: u32, workgroup: u32) -> Encode {
+        Encode {
+            codes: Code::Emc64Var.full().with_bits(bits),
+            collapse: Collapse::SAH,
+            shape: Shape::strips_of(workgroup),
+            items: 4,
+            bounds_items: 4,
+            meets_in_group: false,
+            sharers: 64,
+            shared_left: 0,
+            count,
+            split: None,
+            primitives: Primitives::Triangles,
+            geometry_count: 1,
+            build_flags: 0,
+            alone: false,
+        }
+    }
+
+    const METHODS: [Method; 4] =
+        [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 16 }, Method::Hploc(Window::DEFAULT)];
+
+    /// As the tables of a sort grow in steps, and the parts of methods do not.
+    #[test]
+    fn parts_in_use_share_nothing_and_nothing_is_wasted_where_scenes_are_large() {
+        for (count, bits) in [(0, 32), (1, 32), (2, 64), (1000, 32), (1 << 20, 32), (1 << 20, 64), (1 << 27, 64)] {
+            for method in METHODS {
+                for reinsertion in [None, Some(15 * u64::from(count))] {
+                    let encode = encode(count, bits, 8);
+                    let merging = Merging::alone();
+                    let scratch = Scratch::of(&encode, &*method.hierarchy(&merging), reinsertion, encode.table_words());
+                    scratch.plan.assert_nothing_in_use_is_shared();
+                    let (bytes, least) = (scratch.bytes(), scratch.plan.most_in_use());
+                    assert!(count < 1 << 20 || bytes <= least + least / 16, "{method:?} of {count}: {bytes}, {least}");
+                }
+            }
+        }
+    }
+
+    /// What accel's sizes for the most primitives promise to builds of fewer.
+    #[test]
+    fn fewer_primitives_never_need_more() {
+        for method in METHODS {
+            for reinsertion in [0, 15] {
+                let bytes = |count: u32| {
+                    let (encode, merging) = (encode(count, 32, 8), Merging::alone());
+                    let reinsertion = (reinsertion > 0).then_some(reinsertion * u64::from(count));
+                    let most = encode.shape.most_table_words(count).max(encode.table_words());
+                    Scratch::of(&encode, &*method.hierarchy(&merging), reinsertion, most).bytes()
+                };
+                let sizes: Vec<u64> = (0..2000).chain((2000..300_000).step_by(997)).map(bytes).collect();
+                assert!(sizes.is_sorted(), "{method:?}");
+            }
+        }
+    }
+}
