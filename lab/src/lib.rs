@@ -17,6 +17,7 @@ pub mod device;
 mod error;
 pub mod experiments;
 pub mod measure;
+mod named;
 pub mod random;
 pub mod rays;
 pub mod report;

@@ -6,6 +6,8 @@ use crate::experiments::bench::matrix::{self, Outcome, Plan};
 use crate::scene::Scene;
 use crate::subjects::builders::{Needs, Spec};
 use anyhow::bail;
+use std::io::Write;
+use std::path::Path;
 
 /// Opens the device if one of `builders` needs one.
 ///
@@ -67,8 +69,7 @@ pub fn measured(common: &Common, scene: &Scene, device: Option<&Device>, plan: &
     let (outcomes, failures) = matrix::measure(scene, device, plan, &mut |what| bar.say(what));
     drop(bar);
     for failure in &failures {
-        let builder = failure.builder.as_deref().unwrap_or(&failure.scene);
-        eprintln!("hedgerow: {builder}: {}", failure.what);
+        eprintln!("hedgerow: {failure}");
     }
     for outcome in &outcomes {
         for fault in &outcome.faults {
@@ -89,6 +90,19 @@ pub fn finish(device: Option<&Device>, all_right: bool) -> anyhow::Result<()> {
     }
     if !all_right {
         bail!("not everything went well, see above");
+    }
+    Ok(())
+}
+
+/// Ends an experiment: says where its page is; messages of the validation layers and failures are errors.
+///
+/// # Errors
+/// One of them.
+pub fn page_written(device: Option<&Device>, page: &Path, failures: usize) -> anyhow::Result<()> {
+    writeln!(std::io::stdout().lock(), "{}", page.display())?;
+    finish(device, true)?;
+    if failures > 0 {
+        bail!("{failures} failed or were wrong, see above and the page; the rest is measured");
     }
     Ok(())
 }

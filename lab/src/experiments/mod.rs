@@ -8,3 +8,21 @@ pub mod compare;
 pub mod navigate;
 pub mod report;
 pub mod stability;
+
+use crate::Result;
+use crate::report::beside;
+use std::path::Path;
+
+/// Writes the page of each experiment but `bench` again whose records lie in `folder`, so that all name each other.
+///
+/// # Errors
+/// Records cannot be read; a file cannot be written.
+pub fn write_pages(folder: &Path) -> Result<()> {
+    if beside::ACCEL.is_in(folder) {
+        accel::page::write(folder)?;
+    }
+    if beside::ANIMATE.is_in(folder) {
+        animate::page::write(folder)?;
+    }
+    stability::page::write_all(folder)
+}

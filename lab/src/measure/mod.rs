@@ -1,7 +1,8 @@
 //! How figures are made and kept: what makes them fair and comparable, and the records they end up in.
 //!
 //! [`statistics`] (in turn, medians), [`agreement`] (right hits), [`overlap`] (a quality that takes time), [`copy`] (what the
-//! memory can do), [`provenance`] (where figures come from) and [`record`]. [`choose`] says which builder will be best, before
+//! memory can do), [`provenance`] (where figures come from), [`record`] (one builder on one scene) and [`setting`] (where and how, and what
+//! failed). [`choose`] says which builder will be best, before
 //! anything is built.
 
 pub mod agreement;
@@ -10,6 +11,7 @@ pub mod copy;
 pub mod overlap;
 pub mod provenance;
 pub mod record;
+pub mod setting;
 pub mod statistics;
 
 pub use crate::experiments::bench::total_time;

@@ -34,6 +34,11 @@ impl Spread {
         Spread::of(samples).ok_or_else(|| Error::Argument("nothing was run; take at least one run".into()))
     }
 
+    /// A figure that was taken once.
+    pub fn once(value: f64) -> Spread {
+        Spread { median: value, min: value, max: value, runs: 1 }
+    }
+
     /// Whether the two could be the same thing measured twice: their ranges from `min` to `max` meet.
     pub fn overlaps(&self, other: &Spread) -> bool {
         self.min <= other.max && other.min <= self.max

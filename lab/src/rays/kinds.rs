@@ -4,6 +4,7 @@
 //! Every ray draws its random numbers from a sequence of its own, seeded with the kind and the ray's place. No library
 //! function whose last bit differs between systems takes part (points on the sphere by rejection, square roots only).
 
+use crate::named::named;
 use crate::random::SplitMix64;
 use crate::scene::{Camera, Light, Mesh, Scene};
 use crate::{Error, Result};
@@ -11,8 +12,6 @@ use glam::{DVec3, Vec3};
 use hedgerow::geometry::Aabb;
 use hedgerow::trace::{Hit, Query, Ray};
 use rayon::prelude::*;
-use std::fmt;
-use std::str::FromStr;
 
 /// A kind of ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -33,54 +32,23 @@ pub enum RayKind {
     Random,
 }
 
+named!(RayKind, "kind of ray":
+    Primary = "primary",
+    Shadow = "shadow",
+    Ao = "ao",
+    Diffuse1 = "diffuse1",
+    Diffuse2 = "diffuse2",
+    Reflection = "reflection",
+    Random = "random",
+);
+
 impl RayKind {
-    /// All kinds, in the order of the contract.
-    pub const ALL: [RayKind; 7] = [
-        RayKind::Primary,
-        RayKind::Shadow,
-        RayKind::Ao,
-        RayKind::Diffuse1,
-        RayKind::Diffuse2,
-        RayKind::Reflection,
-        RayKind::Random,
-    ];
-
-    /// The name that commands and records use.
-    pub fn name(self) -> &'static str {
-        match self {
-            RayKind::Primary => "primary",
-            RayKind::Shadow => "shadow",
-            RayKind::Ao => "ao",
-            RayKind::Diffuse1 => "diffuse1",
-            RayKind::Diffuse2 => "diffuse2",
-            RayKind::Reflection => "reflection",
-            RayKind::Random => "random",
-        }
-    }
-
     /// Which hit its rays want.
     pub fn query(self) -> Query {
         match self {
             RayKind::Shadow | RayKind::Ao => Query::AnyHit,
             _ => Query::ClosestHit,
         }
-    }
-}
-
-impl fmt::Display for RayKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for RayKind {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<RayKind> {
-        RayKind::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| {
-            let names = RayKind::ALL.map(RayKind::name).join(", ");
-            Error::Argument(format!("unknown kind of ray {name:?}; choose one of {names}"))
-        })
     }
 }
 

@@ -30,7 +30,7 @@ pub struct Bars<'a> {
     /// What the axis is called.
     pub axis: &'a str,
     /// How its numbers are written.
-    pub number: &'a dyn Fn(&f64) -> String,
+    pub number: fn(f64) -> String,
     /// Values that bars are held against, with their names.
     pub marks: Vec<(f64, String)>,
 }
@@ -54,7 +54,7 @@ pub fn bars(caption: Caption, what: &Bars<'_>) -> Result<Option<Chart>> {
             .margin_left(name_room(bars.iter().map(|b| &b.label), LABEL_SIZE) as u32 + 10)
             .margin_right(figures as u32 + 12)
             .build_cartesian_2d(0.0..1.02 * longest, 0.0..bars.len() as f64)?;
-        mesh(&mut chart, &Axes { x: axis, y: "", x_number: number, y_number: &|_| String::new() })?;
+        mesh(&mut chart, &Axes { x: axis, y: "", x_number: &|v| number(*v), y_number: &|_| String::new() })?;
         let inner = frame(&chart);
         let row = inner.h / bars.len() as f64;
         let half = 0.5 * (0.7_f64).min(THICKNESS / row);
@@ -81,8 +81,8 @@ pub fn bars(caption: Caption, what: &Bars<'_>) -> Result<Option<Chart>> {
                 "{}: {}, from {} to {} in {} runs",
                 bar.label,
                 bar.figure,
-                number(&min),
-                number(&max),
+                number(min),
+                number(max),
                 bar.spread.runs
             );
             overlay.tip(Rect { x: inner.x, y: y - 0.5 * row, w: inner.w, h: row }, &tip);

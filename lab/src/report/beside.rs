@@ -31,6 +31,11 @@ pub const ANIMATE: Page = Page { records: "animate.jsonl", file: "animate.html",
 pub const ALL: [Page; 6] = [INDEX, ACCEL, ANIMATE, GROWTH, LARGE, DEGENERATE];
 
 impl Page {
+    /// What files of it begin with.
+    pub fn stem(&self) -> &'static str {
+        self.file.trim_end_matches(".html")
+    }
+
     /// Whether it lies, or is about to, in `folder`.
     pub fn is_in(&self, folder: &Path) -> bool {
         folder.join(self.records).is_file()

@@ -53,7 +53,7 @@ pub struct Axis<'a> {
     /// Whether its numbers are logarithmic.
     pub is_log: bool,
     /// How they are written.
-    pub number: &'a dyn Fn(&f64) -> String,
+    pub number: fn(f64) -> String,
 }
 
 /// Draws the curves. `None` if there are none, or all points have one place on the horizontal axis.
@@ -97,7 +97,7 @@ pub fn curves_and_marks(
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
         let mut chart = ChartBuilder::on(area);
         chart.x_label_area_size(46).y_label_area_size(76).margin_right(names);
-        let axes = Axes { x: x.name, y: y.name, x_number: x.number, y_number: y.number };
+        let axes = Axes { x: x.name, y: y.name, x_number: &|v| (x.number)(*v), y_number: &|v| (y.number)(*v) };
         let linear = |range: &Range<f64>| range.clone();
         match (x.is_log, y.is_log) {
             (true, true) => {

@@ -3,7 +3,7 @@
 use super::chart::Chart;
 use super::numbers::{bytes, three_digits};
 use super::theme::{self, Tone};
-use crate::measure::provenance::{DeviceFacts, Machine};
+use crate::measure::setting::Setting;
 use crate::measure::statistics::Spread;
 use maud::{Markup, PreEscaped, html};
 
@@ -42,12 +42,8 @@ fn colours() -> String {
 }
 
 /// Where and how it was measured.
-pub fn facts(
-    machine: &Machine,
-    device: Option<&DeviceFacts>,
-    [commit, when]: [&str; 2],
-    options: &[(String, String)],
-) -> Markup {
+pub fn facts(setting: &Setting) -> Markup {
+    let Setting { machine, device, commit, when, options, .. } = setting;
     html! {
         dl.facts {
             div { dt { "Processor" } dd { (machine.cpu) span { (machine.cores) " cores, " (machine.system) } } }

@@ -43,7 +43,12 @@ impl Lines {
 ///
 /// # Errors
 /// The file cannot be read; a line is not a record, or one of another schema.
-pub fn read<R: DeserializeOwned>(path: &Path, name: &str, command: &str, schema: fn(&R) -> u32) -> Result<Vec<R>> {
+pub fn read<R: DeserializeOwned>(
+    path: &Path,
+    (name, command): (&str, &str),
+    schema: fn(&R) -> u32,
+    fault: fn(&R) -> Option<String>,
+) -> Result<Vec<R>> {
     let path = if path.is_dir() { path.join(name) } else { path.to_owned() };
     let file = File::open(&path).map_err(Error::file(&path))?;
     let mut records = Vec::new();
@@ -59,6 +64,9 @@ pub fn read<R: DeserializeOwned>(path: &Path, name: &str, command: &str, schema:
         if schema(&record) != SCHEMA {
             return Err(wrong(format!("schema {}, this program reads {SCHEMA}", schema(&record))));
         }
+        if let Some(fault) = fault(&record) {
+            return Err(wrong(fault));
+        }
         records.push(record);
     }
     Ok(records)
@@ -70,6 +78,10 @@ pub trait Entry: Serialize + DeserializeOwned {
     const FILE: &'static str;
     /// The command that writes it.
     const COMMAND: &'static str;
+    /// What is wrong with an entry that is none of this file.
+    fn fault(&self) -> Option<String> {
+        None
+    }
 }
 
 /// An entry as it is written.
@@ -116,6 +128,33 @@ pub fn write<E: Entry>(folder: &Path, entries: Vec<E>) -> Result<()> {
 /// # Errors
 /// The file cannot be read; a line is not an entry of this schema.
 pub fn entries<E: Entry>(path: &Path) -> Result<Vec<E>> {
-    let lines = read(path, E::FILE, E::COMMAND, |line: &Line<E>| line.schema)?;
+    let lines = read(path, (E::FILE, E::COMMAND), |line: &Line<E>| line.schema, |line| line.entry.fault())?;
     Ok(lines.into_iter().map(|line| line.entry).collect())
+}
+
+/// Writes a file of one record.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_one(path: &Path, entry: &impl Serialize) -> Result<()> {
+    let text = serde_json::to_string(&Line { schema: SCHEMA, entry }).expect("a record has no keys but strings") + "\n";
+    std::fs::write(path, text).map_err(Error::file(path))
+}
+
+/// The record of such a file; `None` where there is none.
+///
+/// # Errors
+/// The file cannot be read, or is no such record of this schema.
+pub fn read_one<E: DeserializeOwned>(path: &Path) -> Result<Option<E>> {
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
+    let wrong =
+        |what: String| Error::Malformed(format!("{}: {what}; delete the file, or measure again", path.display()));
+    let line: Line<E> = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+    match line.schema {
+        SCHEMA => Ok(Some(line.entry)),
+        other => Err(wrong(format!("schema {other}, this program reads {SCHEMA}"))),
+    }
 }

@@ -1,14 +1,16 @@
 //! What pages are made of: charts, tables, pictures, numbers as people read them, and files of records.
 //!
-//! [`Chart`] is drawn once, as SVG, PNG and part of a page; [`bars`] and [`curves`] are its usual kinds. [`elements`] has the head,
-//! foot and tables of a page, [`theme`] its colours, [`beside`] the pages that name each other. [`lines`] reads and writes files of
+//! [`Chart`] is drawn once, as SVG, PNG and part of a page; [`bars`] and [`curves`] are its usual kinds. A [`document`](mod@document)
+//! is a whole page, [`columns`] its tables, [`elements`] the rest of it; [`theme`] its colours, [`beside`] the pages that name each other. [`lines`] reads and writes files of
 //! one record a line. [`picture`] renders scenes.
 
 pub mod bars;
 pub mod beside;
 pub mod chart;
 pub mod choosing;
+pub mod columns;
 pub mod curves;
+pub mod document;
 pub mod elements;
 pub mod labels;
 pub mod lines;

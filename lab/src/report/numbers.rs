@@ -42,6 +42,31 @@ pub fn grouped(value: u64) -> String {
     text
 }
 
+/// A count of a table: [`grouped`].
+pub fn count(value: f64) -> String {
+    grouped(value as u64)
+}
+
+/// A number of a table without digits behind the point.
+pub fn whole(value: f64) -> String {
+    format!("{value:.0}")
+}
+
+/// With one digit behind the point.
+pub fn one_decimal(value: f64) -> String {
+    format!("{value:.1}")
+}
+
+/// With two digits behind the point.
+pub fn two_decimals(value: f64) -> String {
+    format!("{value:.2}")
+}
+
+/// A size of a table: [`bytes`].
+pub fn size(value: f64) -> String {
+    bytes(value as u64)
+}
+
 /// A count in thousands, millions or billions: `66 k`, `1.4 M`.
 pub fn short_count(value: f64) -> String {
     let (scaled, unit) = match value.abs() {

@@ -259,7 +259,7 @@ fn wrong_arguments_end_with_2_and_say_what_is_right() {
         (&["build", "gen:grid:2", "-b", "lbvh-host", "--costs", "3"], "write C_T,C_I"),
         (
             &["trace", "gen:grid:2", "-b", "lbvh-host", "--rays", "light"],
-            "unknown kind of ray \"light\"; choose one of primary",
+            "no kind of ray is called \"light\"; there are primary",
         ),
         (&["trace", "gen:grid:2", "-b", "lbvh-host", "--size", "640"], "write WxH"),
         (&["trace", "gen:grid:2", "-b", "lbvh-host", "--rays-file", "x"], "--hits-file"),

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use hedgerow_lab::measure::provenance::{DeviceFacts, Machine};
+use hedgerow_lab::measure::setting::Setting;
 
 /// A machine that nobody has.
 pub fn machine() -> Machine {
@@ -18,6 +19,19 @@ pub fn device_facts() -> DeviceFacts {
         subgroup: 8,
         memory: 8 << 30,
         copy_gb_s: Some(18.3),
+    }
+}
+
+/// Where and how nothing was measured.
+pub fn setting(command: &str, runs: &str) -> Setting {
+    Setting {
+        machine: machine(),
+        device: Some(device_facts()),
+        commit: "abc1234".into(),
+        when: "2026-11-21T10:00:00Z".into(),
+        command: command.into(),
+        options: vec![("Runs".into(), runs.into())],
+        notes: vec!["a note & more".into()],
     }
 }
 

@@ -4,8 +4,9 @@ use crate::browser::Browser;
 use crate::conditional::needs;
 use hedgerow_lab::experiments::accel::page::{self, Points};
 use hedgerow_lab::experiments::accel::points::{
-    Batch, BraidedRays, Entry, Failure, Maker, Rebraid, Setting, Side, TopLevel, Update, UpdatedRays, Way, Work,
+    Batch, BraidedRays, Entry, Maker, Rebraid, Side, TopLevel, Update, UpdatedRays, Way, Work,
 };
+use hedgerow_lab::measure::setting::Failure;
 use hedgerow_lab::measure::statistics::Spread;
 use std::path::Path;
 
@@ -23,15 +24,7 @@ fn spread(median: f64) -> Spread {
 }
 
 fn setting() -> Entry {
-    Entry::Setting(Setting {
-        machine: crate::pages::machine(),
-        device: crate::pages::device_facts(),
-        commit: "abc1234".into(),
-        when: "2026-11-21T10:00:00Z".into(),
-        command: "hedgerow accel -o <folder>".into(),
-        options: vec![("Runs".into(), "5 after a warm-up".into())],
-        notes: vec!["a note & more".into()],
-    })
+    Entry::Setting(crate::pages::setting("hedgerow accel -o <folder>", "5 after a warm-up"))
 }
 
 /// One call takes 50 ms, calls one by one 12 times that; the driver's call 0.8 times.
@@ -125,8 +118,7 @@ fn updates(update_ms: Option<f64>) -> impl Iterator<Item = Entry> {
 }
 
 fn entries() -> Vec<Entry> {
-    let failure =
-        Failure { of: "update <knot>".into(), what: "3 GiB of device memory are needed, 2 GiB are there".into() };
+    let failure = Failure::named("update <knot>", "3 GiB of device memory are needed, 2 GiB are there");
     let rebraids = [rebraid("gen:forest:400", 8.2, 1.31), rebraid("gen:cells:1000", 0.0, 0.99)];
     let all = [setting()].into_iter().chain(batches()).chain(top_levels()).chain(rebraids).chain(updates(Some(1.0)));
     all.chain([Entry::Failure(failure)]).collect()

@@ -4,8 +4,9 @@ use crate::browser::Browser;
 use crate::conditional::needs;
 use hedgerow_lab::experiments::animate::Way;
 use hedgerow_lab::experiments::animate::page::{self, Points};
-use hedgerow_lab::experiments::animate::points::{Animated, Entry, Failure, Object, Rays, Setting};
+use hedgerow_lab::experiments::animate::points::{Animated, Entry, Object, Rays, SceneSetting, WayInFrame};
 use hedgerow_lab::measure::record::Memory;
+use hedgerow_lab::measure::setting::Failure;
 use hedgerow_lab::measure::statistics::Spread;
 use std::path::Path;
 
@@ -21,14 +22,11 @@ fn spread(median: f64) -> Spread {
 }
 
 fn setting() -> Entry {
-    Entry::Setting(Setting {
-        machine: crate::pages::machine(),
-        device: Some(crate::pages::device_facts()),
-        commit: "abc1234".into(),
-        when: "2026-11-21T10:00:00Z".into(),
-        command: "hedgerow animate atrium_run -o <folder>".into(),
-        options: vec![("Runs".into(), "3 of every build and trace, in turn".into())],
-        notes: vec!["a note & more".into()],
+    Entry::Setting(SceneSetting {
+        setting: crate::pages::setting(
+            "hedgerow animate atrium_run -o <folder>",
+            "3 of every build and trace, in turn",
+        ),
         scene: "atrium_run".into(),
         static_triangles: 66_450,
         objects: vec![
@@ -82,7 +80,10 @@ fn frames(count: u32) -> impl Iterator<Item = Entry> {
 }
 
 fn entries() -> Vec<Entry> {
-    let failure = Failure { way: Way::TreePerObject, frame: Some(3), what: "7 of 76800 <primary> rays".into() };
+    let failure = Failure {
+        at: WayInFrame { way: Way::TreePerObject, frame: Some(3) },
+        what: "7 of 76800 <primary> rays".into(),
+    };
     [setting()].into_iter().chain(frames(4)).chain([Entry::Failure(failure)]).collect()
 }
 

@@ -2,11 +2,12 @@
 
 use crate::browser::Browser;
 use crate::conditional::needs;
-use hedgerow_lab::experiments::bench::matrix::{Failure, Outcome};
+use hedgerow_lab::experiments::bench::matrix::{OnScene, Outcome};
 use hedgerow_lab::experiments::bench::page::{Picture, Report};
 use hedgerow_lab::experiments::bench::{kd_trees, results};
 use hedgerow_lab::measure::choose::hindsight::Choice;
 use hedgerow_lab::measure::record::{Build, Memory, Phase, Quality, Record, SCHEMA, Trace};
+use hedgerow_lab::measure::setting::{Failure, Setting};
 use std::path::{Path, PathBuf};
 
 crate::conditional::tests! {
@@ -118,21 +119,19 @@ fn report(folder: &Path) -> Report {
             pictures.push(Picture { scene: scene.into(), file, caption, alt: format!("{scene}, {view}") });
         }
     }
-    Report {
-        machine: crate::pages::machine(),
-        device: Some(crate::pages::device_facts()),
-        commit: "abc1234".into(),
-        when: "2026-11-21T10:00:00Z".into(),
-        command: "hedgerow bench -b all".into(),
+    let setting = Setting {
         options: vec![("Runs".into(), "5 after a warm-up".into()), ("Image".into(), "320x240".into())],
+        notes: Vec::new(),
+        ..crate::pages::setting("hedgerow bench -b all", "")
+    };
+    Report {
+        setting,
         outcomes,
         failures: vec![Failure {
-            scene: "hair".into(),
-            builder: Some("driver-fast-trace".into()),
+            at: OnScene { scene: "hair".into(), builder: Some("driver-fast-trace".into()) },
             what: "hair needs 3 GiB of device memory, 2 GiB are there".into(),
         }],
         baseline: Some("driver-fast-build".into()),
-        notes: Vec::new(),
         pictures,
         choices: SCENES
             .iter()

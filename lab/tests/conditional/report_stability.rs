@@ -2,11 +2,13 @@
 
 use crate::browser::Browser;
 use crate::conditional::needs;
-use hedgerow_lab::experiments::stability::far::Side;
-use hedgerow_lab::experiments::stability::large::Placement;
-use hedgerow_lab::experiments::stability::page::{self, Paged, Points};
-use hedgerow_lab::experiments::stability::points::{Degenerate, Failure, Growth, Head, Large, Run};
+use hedgerow_lab::experiments::stability::far::{FarTriangle, Side};
+use hedgerow_lab::experiments::stability::large::{HugeTriangles, Placement};
+use hedgerow_lab::experiments::stability::page::{self, Paged};
+use hedgerow_lab::experiments::stability::points::{Degenerate, Experiment, Growth, Large, Run};
+use hedgerow_lab::measure::setting::Failure;
 use hedgerow_lab::measure::statistics::Spread;
+use hedgerow_lab::report::lines::{self, Points};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -22,15 +24,8 @@ const KINDS: [&str; 4] = ["primary", "diffuse1", "ao", "shadow"];
 
 fn run(command: &str) -> Run {
     Run {
-        schema: 1,
-        machine: crate::pages::machine(),
-        device: Some(crate::pages::device_facts()),
-        commit: "abc1234".into(),
-        when: "2026-11-21T10:00:00Z".into(),
-        command: format!("hedgerow stability {command} -o <folder>"),
-        options: vec![("Runs".into(), "5 after a warm-up".into())],
-        notes: vec!["a note & more".into()],
-        failures: vec![Failure { of: "bunny, lbvh".into(), what: "3 GiB of <memory> are needed".into() }],
+        setting: crate::pages::setting(&format!("hedgerow stability {command} -o <folder>"), "5 after a warm-up"),
+        failures: vec![Failure::named("bunny, lbvh", "3 GiB of <memory> are needed")],
     }
 }
 
@@ -52,12 +47,12 @@ fn growth() -> Vec<Growth> {
             for e in (0..=60).step_by(2) {
                 let (cost, speeds) = figures(e, drop.div_ceil(axes));
                 points.push(Growth {
-                    head: Head::of::<Growth>(),
+                    experiment: Experiment::Growth,
                     scene: "bunny".into(),
                     builder: format!("lbvh:codes={codes}:collapse=off"),
-                    axes,
-                    side,
+                    by: FarTriangle { axes, side },
                     e,
+                    cost: None,
                     relative_cost: Some(cost),
                     relative_mrays: speeds,
                 });
@@ -74,13 +69,12 @@ fn large() -> Vec<Large> {
             for e in (0..=20).step_by(2) {
                 let (cost, speeds) = figures(e, drop);
                 points.push(Large {
-                    head: Head::of::<Large>(),
+                    experiment: Experiment::Large,
                     scene: "bunny".into(),
                     builder: format!("lbvh:codes={codes}:collapse=off"),
-                    placement,
-                    count: 16,
+                    by: HugeTriangles { placement, count: 16 },
                     e,
-                    cost: Some(110.0 * cost),
+                    cost: Some(Some(110.0 * cost)),
                     relative_cost: Some(cost),
                     relative_mrays: speeds,
                 });
@@ -92,7 +86,7 @@ fn large() -> Vec<Large> {
 
 fn degenerate() -> Vec<Degenerate> {
     let good = |scene: &str, builder: &str| Degenerate {
-        head: Head::of::<Degenerate>(),
+        experiment: Experiment::Degenerate,
         scene: scene.into(),
         triangles: 2000,
         builder: builder.into(),
@@ -135,12 +129,13 @@ fn degenerate() -> Vec<Degenerate> {
 }
 
 /// The page of these points.
-fn page_of<P: Paged>(folder: &Path, points: &[P]) -> String {
+fn page_of<P: Paged + Clone>(folder: &Path, points: &[P]) -> String {
     let mut file = Points::<P>::create(folder).expect("a folder of our own");
     for point in points {
-        file.append(point).expect("written");
+        file.append(point.clone()).expect("written");
     }
-    std::fs::read_to_string(file.finish(&run(P::EXPERIMENT)).expect("the page is written")).expect("just written")
+    let page = page::finish::<P>(folder, &run(P::PAGE.stem())).expect("the page is written");
+    std::fs::read_to_string(page).expect("just written")
 }
 
 fn records_are_read_back_as_they_were_written() {
@@ -148,16 +143,16 @@ fn records_are_read_back_as_they_were_written() {
     page_of(folder.path(), &growth());
     page_of(folder.path(), &large());
     page_of(folder.path(), &degenerate());
-    assert_eq!(page::read::<Growth>(folder.path()).expect("written"), growth());
-    assert_eq!(page::read::<Large>(folder.path()).expect("written"), large());
-    assert_eq!(page::read::<Degenerate>(folder.path()).expect("written"), degenerate());
+    assert_eq!(lines::entries::<Growth>(folder.path()).expect("written"), growth());
+    assert_eq!(lines::entries::<Large>(folder.path()).expect("written"), large());
+    assert_eq!(lines::entries::<Degenerate>(folder.path()).expect("written"), degenerate());
     let path = folder.path().join("growth.jsonl");
     let first = std::fs::read_to_string(&path).expect("written").lines().next().expect("a point").to_owned();
     std::fs::write(&path, format!("{first}\n{}\n", first.replace("\"growth\"", "\"large\""))).expect("written");
-    let error = page::read::<Growth>(&path).expect_err("another experiment").to_string();
+    let error = lines::entries::<Growth>(&path).expect_err("another experiment").to_string();
     assert!(error.contains("growth.jsonl:2: experiment \"large\""), "{error}");
     std::fs::write(&path, first.replace("\"schema\":1", "\"schema\":2")).expect("written");
-    let error = page::read::<Growth>(&path).expect_err("another schema").to_string();
+    let error = lines::entries::<Growth>(&path).expect_err("another schema").to_string();
     assert!(error.contains("growth.jsonl:1: schema 2, this program reads 1"), "{error}");
 }
 

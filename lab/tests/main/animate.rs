@@ -2,7 +2,7 @@
 
 use hedgerow_lab::experiments::animate::Way;
 use hedgerow_lab::experiments::animate::page;
-use hedgerow_lab::experiments::animate::points::{Animated, Entry, Setting};
+use hedgerow_lab::experiments::animate::points::{Animated, Entry, SceneSetting};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -49,7 +49,7 @@ fn scene_in(folder: &Path, content: &str) -> String {
 }
 
 /// The setting and the frames; there are no failures.
-fn measured(folder: &Path) -> (Setting, Vec<Animated>) {
+fn measured(folder: &Path) -> (SceneSetting, Vec<Animated>) {
     let mut entries = page::read(folder).expect("records").into_iter();
     let Some(Entry::Setting(setting)) = entries.next() else { panic!("the first line is the setting") };
     let frame = |entry| match entry {
@@ -114,7 +114,7 @@ fn the_host_builds_merges_and_traces_the_same_without_a_device() {
     let done = tiny(&scene, &out, &[&ways[..], &["--frames", "1..4", "--png", "off"]].concat());
     assert_eq!(done.status.code(), Some(0), "{}", err(&done));
     let (setting, frames) = measured(&out);
-    assert!(setting.device.is_none() && setting.pictures.is_empty());
+    assert!(setting.setting.device.is_none() && setting.pictures.is_empty());
     assert!(!out.join("frame-0001.png").exists());
     assert_eq!(frames.len(), 3 * 4);
     assert!(frames.iter().all(|f| f.timer == "wall" && f.builder == "kd-binned:bins=16" && f.trace.len() == 3));
@@ -128,7 +128,7 @@ fn trees_of_the_host_are_traced_on_the_device_where_that_is_asked_for() {
     let done = tiny(&scene, &out, &["-b", "kd-binned:trace=device", "--frames", "1", "--png", "off"]);
     assert_eq!(done.status.code(), Some(0), "{}", err(&done));
     let (setting, frames) = measured(&out);
-    assert!(setting.device.is_some());
+    assert!(setting.setting.device.is_some());
     assert_eq!(frames.iter().map(|frame| frame.way).collect::<Vec<_>>(), Way::ALL);
 }
 

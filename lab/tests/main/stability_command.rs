@@ -4,6 +4,7 @@ use hedgerow_lab::experiments::stability::far::Side;
 use hedgerow_lab::experiments::stability::large::Placement;
 use hedgerow_lab::experiments::stability::page;
 use hedgerow_lab::experiments::stability::points::{Degenerate, Growth, Large};
+use hedgerow_lab::report::lines;
 use hedgerow_lab::scene;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -37,7 +38,7 @@ fn growth_leaves_a_point_for_every_builder_manner_and_step() {
     let arguments =
         [&["stability", "growth", "gen:soup:3000:1", "-b", builders, "--steps", "20,45"], &size[..]].concat();
     let page = done(&arguments, folder.path(), "growth.html");
-    let points: Vec<Growth> = page::read(folder.path()).expect("records");
+    let points: Vec<Growth> = lines::entries(folder.path()).expect("records");
     assert_eq!(points.len(), 2 * 2 * 2 * 3);
     for point in &points {
         assert_eq!(point.scene, "gen:soup:3000:1");
@@ -49,7 +50,7 @@ fn growth_leaves_a_point_for_every_builder_manner_and_step() {
         assert!(point.e > 0 || point.relative_cost == Some(1.0), "{point:?}");
     }
     let cost = |codes: &str, axes, side, e| {
-        let point = points.iter().find(|p| p.builder.contains(codes) && (p.axes, p.side, p.e) == (axes, side, e));
+        let point = points.iter().find(|p| p.builder.contains(codes) && (p.by.axes, p.by.side, p.e) == (axes, side, e));
         point.and_then(|point| point.relative_cost).expect("a device and a host builder of ours")
     };
     for side in Side::ALL {
@@ -64,8 +65,8 @@ fn growth_leaves_a_point_for_every_builder_manner_and_step() {
         }
     }
     let run = page::read_run::<Growth>(folder.path()).expect("read").expect("written");
-    assert!(run.command.starts_with("hedgerow stability growth") && run.device.is_some(), "{run:?}");
-    assert_eq!((run.failures, run.notes), (vec![], vec![]));
+    assert!(run.setting.command.starts_with("hedgerow stability growth") && run.setting.device.is_some(), "{run:?}");
+    assert_eq!((run.failures, run.setting.notes), (vec![], vec![]));
 }
 
 #[test]
@@ -75,10 +76,10 @@ fn large_triangles_stand_where_they_are_asked_for() {
     let arguments =
         ["stability", "large", "gen:soup:300:1", "-b", builders, "--steps", "20/10", "--counts", "2", "--no-rays"];
     done(&arguments, folder.path(), "large.html");
-    let points: Vec<Large> = page::read(folder.path()).expect("records");
+    let points: Vec<Large> = lines::entries(folder.path()).expect("records");
     assert_eq!(points.len(), 3 * 2 * 3);
     let cost = |codes: &str, placement| {
-        let find = |p: &&Large| p.builder.contains(codes) && p.placement == placement && p.e == 20;
+        let find = |p: &&Large| p.builder.contains(codes) && p.by.placement == placement && p.e == 20;
         points.iter().find(find).and_then(|point| point.relative_cost).expect("measured")
     };
     // One bit is left to each axis in which the walls are large; concise bounds keep all 21, but where nothing can be cut.
@@ -88,7 +89,7 @@ fn large_triangles_stand_where_they_are_asked_for() {
         "{points:?}"
     );
     assert!(cost("mc63+concise", Placement::Outward) > 1.1, "{points:?}");
-    assert!(points.iter().all(|point| point.relative_mrays.is_empty() && point.count == 2));
+    assert!(points.iter().all(|point| point.relative_mrays.is_empty() && point.by.count == 2));
 }
 
 #[test]
@@ -97,7 +98,7 @@ fn degenerate_scenes_are_built_the_same_every_time_and_pages_name_each_other() {
     let small =
         ["stability", "degenerate", "--triangles", "70", "--builds", "3", "-b", "lbvh,lbvh:collapse=off,lbvh-host"];
     let page = done(&small, folder.path(), "degenerate.html");
-    let points: Vec<Degenerate> = page::read(folder.path()).expect("records");
+    let points: Vec<Degenerate> = lines::entries(folder.path()).expect("records");
     assert_eq!(points.len(), 3 * scene::degenerate(0).len());
     for point in &points {
         assert!(!point.has_failed() && point.same_bytes == Some(true) && point.valid == Some(true), "{point:?}");
@@ -123,7 +124,7 @@ fn points_beyond_the_floats_are_left_out_and_said_so() {
     let arguments =
         ["stability", "growth", "gen:grid:9", "-b", "lbvh-host", "--axes", "1", "--steps", "60,200", "--no-rays"];
     let page = done(&arguments, folder.path(), "growth.html");
-    let points: Vec<Growth> = page::read(folder.path()).expect("records");
+    let points: Vec<Growth> = lines::entries(folder.path()).expect("records");
     assert_eq!(points.iter().map(|point| point.e).collect::<Vec<_>>(), [0, 60, 0, 60]);
     assert!(page.contains("from e = 200 on the far triangle would lie beyond the largest float"), "{page}");
 }
@@ -137,7 +138,7 @@ fn wrong_arguments_are_told_apart_from_failed_work() {
         (&["growth", "--axes", "2"], "take 1 or 3"),
         (&["growth", "--sides", "left"], "take + or -"),
         (&["growth", "--steps", "60/0"], "LAST/STEP"),
-        (&["growth", "--rays", "light"], "unknown kind of ray \"light\""),
+        (&["growth", "--rays", "light"], "no kind of ray is called \"light\""),
         (&["large", "--placements", "roof"], "wall, walls, outward"),
         (&["large", "--counts", "0"], "--counts"),
         (&["degenerate", "hedge"], "no degenerate scene is called \"hedge\"; there are empty, one"),

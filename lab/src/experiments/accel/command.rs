@@ -1,17 +1,15 @@
 //! `hedgerow accel`: batches, top levels, re-braiding and updates; records as they are measured, and a page.
 
 use crate::cli::options::{Kinds, Size};
-use crate::cli::{Bar, Common};
+use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::accel::page::{self, Points};
-use crate::experiments::accel::points::{Entry, Failure, Setting};
+use crate::experiments::accel::points::Entry;
 use crate::experiments::accel::{Experiment, Stage, batch, rebraid, top_level, update};
-use crate::measure::provenance::{self, DeviceFacts, Machine};
+use crate::measure::setting::{Failure, Setting};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
-use anyhow::bail;
 use ash::khr::acceleration_structure as functions;
-use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
@@ -95,12 +93,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     }
     drop(bar);
     let page = page::write(&arguments.output)?;
-    writeln!(std::io::stdout().lock(), "{}", page.display())?;
-    device.validation_messages()?;
-    if run.failures > 0 {
-        bail!("{} failed, see above and the page; the rest is measured", run.failures);
-    }
-    Ok(())
+    work::page_written(Some(&device), &page, run.failures)
 }
 
 /// The scenes that are named, by what they are good for; the generated ones of a kind where none of it is named.
@@ -134,26 +127,12 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<(Vec<Instanc
 
 /// Where and how it is measured.
 fn setting(common: &Common, arguments: &Arguments, device: &Device) -> crate::Result<Setting> {
-    let mut notes: Vec<String> = driver::note(device.found()).into_iter().collect();
-    if device.driver_tracing().is_none() {
-        notes.push(
-            "The driver has no acceleration structures of its own (VK_KHR_acceleration_structure) to compare with."
-                .into(),
-        );
-    }
+    let notes = driver::note(device.found()).into_iter().chain(driver::missing(device)).collect();
     let options = [
         ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),
         ("Image", format!("{}, seed {}", arguments.size, common.seed)),
     ];
-    Ok(Setting {
-        machine: Machine::this(),
-        device: DeviceFacts::of(device)?,
-        commit: provenance::commit(),
-        when: provenance::now(),
-        command: provenance::command(),
-        options: options.map(|(name, value)| (name.to_owned(), value)).to_vec(),
-        notes,
-    })
+    Setting::of(Some(device), &options, notes)
 }
 
 /// A run under way.
@@ -174,6 +153,6 @@ impl Run {
         let Err(error) = measure(&mut |entry| points.append(entry)) else { return Ok(()) };
         eprintln!("hedgerow: {name}: {error}");
         self.failures += 1;
-        self.points.append(Entry::Failure(Failure { of: name.to_owned(), what: error.to_string() }))
+        self.points.append(Entry::Failure(Failure::named(name, error)))
     }
 }

@@ -16,12 +16,11 @@ pub mod top_level;
 pub mod update;
 
 use crate::device::Device;
+use crate::named::named;
 use crate::rays::kinds::{RayKind, RayOptions};
 use crate::subjects::structures::Structures;
 use crate::{Error, Result};
 use hedgerow::accel;
-use std::fmt;
-use std::str::FromStr;
 
 /// Runs that do not count, before those that do.
 const WARM_UPS: u32 = 1;
@@ -39,37 +38,7 @@ pub enum Experiment {
     Update,
 }
 
-impl Experiment {
-    /// All of them, in the order in which they run.
-    pub const ALL: [Experiment; 4] = [Experiment::Batch, Experiment::TopLevel, Experiment::Rebraid, Experiment::Update];
-
-    /// The name that commands and records use.
-    pub fn name(self) -> &'static str {
-        match self {
-            Experiment::Batch => "batch",
-            Experiment::TopLevel => "tlas",
-            Experiment::Rebraid => "rebraid",
-            Experiment::Update => "update",
-        }
-    }
-}
-
-impl fmt::Display for Experiment {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Experiment {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Experiment> {
-        Experiment::ALL.into_iter().find(|experiment| experiment.name() == name).ok_or_else(|| {
-            let names = Experiment::ALL.map(Experiment::name).join(", ");
-            Error::Argument(format!("no experiment is called {name:?}; there are {names}"))
-        })
-    }
-}
+named!(Experiment, "experiment": Batch = "batch", TopLevel = "tlas", Rebraid = "rebraid", Update = "update");
 
 /// What all experiments have in common.
 #[derive(Clone, Copy)]

@@ -1,6 +1,6 @@
 //! The lines of `accel.jsonl` (CONTRACT, "Records of experiments"). A figure that was not measured is `None`.
 
-use crate::measure::provenance::{DeviceFacts, Machine};
+use crate::measure::setting::{Failure, Setting};
 use crate::measure::statistics::Spread;
 use serde::{Deserialize, Serialize};
 
@@ -20,25 +20,6 @@ pub enum Entry {
     Update(Update),
     /// An experiment that could not be measured, or not to its end.
     Failure(Failure),
-}
-
-/// Where and how it was measured.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Setting {
-    /// The machine.
-    pub machine: Machine,
-    /// The device.
-    pub device: DeviceFacts,
-    /// Commit of the program.
-    pub commit: String,
-    /// When, RFC 3339 UTC.
-    pub when: String,
-    /// The command line that measures it again.
-    pub command: String,
-    /// Options with their values, for people.
-    pub options: Vec<(String, String)>,
-    /// What a reader must know to judge the figures, such as a peer that is none.
-    pub notes: Vec<String>,
 }
 
 /// Whose structures.
@@ -269,15 +250,6 @@ impl Update {
             self.rays.iter().map(|rays| Some(rays.built_ms.median * rays.slowdown?.median)).sum();
         Some([updated?, built]).filter(|_| built > 0.0)
     }
-}
-
-/// What could not be measured, or was wrong.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Failure {
-    /// The experiment, or the scene, with the builder and the point where it has them.
-    pub of: String,
-    /// What went wrong.
-    pub what: String,
 }
 
 #[cfg(test)]

@@ -4,13 +4,12 @@ use crate::cli::options::{Kinds, Size};
 use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::animate::page::{self, Points, standings};
-use crate::experiments::animate::points::{Entry, Object, Setting};
+use crate::experiments::animate::points::{Entry, Object, SceneSetting};
 use crate::experiments::animate::{Contender, Stage, Way, measure};
-use crate::measure::provenance::{self, DeviceFacts, Machine};
+use crate::measure::setting::Setting;
 use crate::report::picture::shaded_by;
 use crate::scene::{DynamicScene, Scene};
 use crate::subjects::builders::{KdBuilder, Spec};
-use anyhow::bail;
 use ash::vk;
 use std::io::Write;
 use std::num::NonZeroU32;
@@ -51,8 +50,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "3")]
     runs: NonZeroU32,
     /// Whether the frames are written as PNG
-    #[arg(long, value_name = "on|off", default_value = "on")]
-    png: Png,
+    #[arg(long, value_name = "on|off", default_value = "on", value_parser = on_or_off, action = clap::ArgAction::Set)]
+    png: bool,
     /// The folder for animate.jsonl, charts, animate.html and frame-0000.png and so on
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -99,22 +98,11 @@ impl Frames {
     }
 }
 
-/// `--png`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Png {
-    On,
-    Off,
-}
-
-impl FromStr for Png {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Png, String> {
-        match text {
-            "on" => Ok(Png::On),
-            "off" => Ok(Png::Off),
-            _ => Err(format!("{text:?} is neither on nor off")),
-        }
+fn on_or_off(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(format!("{text:?} is neither on nor off")),
     }
 }
 
@@ -166,8 +154,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let mut point = |entry: Entry| {
         match &entry {
             Entry::Failure(failure) => {
-                let frame = failure.frame.map_or(String::new(), |frame| format!(", frame {frame}"));
-                eprintln!("hedgerow: {}{frame}: {}", failure.way, failure.what);
+                eprintln!("hedgerow: {failure}");
                 failures += 1;
             }
             Entry::Animate(frame) => measured.push(frame.clone()),
@@ -177,25 +164,14 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     };
     let mut show = |frame: u32, scene: &Scene, contender: &mut dyn Contender| {
         bar.step();
-        match arguments.png {
-            Png::On => write_picture(common, arguments, frame, scene, contender),
-            Png::Off => Ok(()),
-        }
+        if arguments.png { write_picture(common, arguments, frame, scene, contender) } else { Ok(()) }
     };
     let done = measure(&stage, &scene, &frames, &mut point, &mut show);
     drop(bar);
     let page = page::write(&arguments.output)?;
     done?;
-    let mut out = std::io::stdout().lock();
-    writeln!(out, "{}", standings::table(&measured))?;
-    writeln!(out, "{}", page.display())?;
-    if let Some(device) = &device {
-        device.validation_messages()?;
-    }
-    if failures > 0 {
-        bail!("{failures} failed or found other hits, see above and the page; the rest is measured");
-    }
-    Ok(())
+    writeln!(std::io::stdout().lock(), "{}", standings::table(&measured))?;
+    work::page_written(device.as_ref(), &page, failures)
 }
 
 fn write_picture(
@@ -223,7 +199,7 @@ fn setting(
     frames: &[u32],
     builder: KdBuilder,
     device: Option<&Device>,
-) -> crate::Result<Setting> {
+) -> crate::Result<SceneSetting> {
     let mut notes = Vec::new();
     if device.is_some_and(|device| device.limits.kind == vk::PhysicalDeviceType::CPU) {
         notes.push(
@@ -243,23 +219,14 @@ fn setting(
         ("Image", format!("{}, seed {}", arguments.size, common.seed)),
         ("Frames", format!("{} of {} in {} s", frames.len(), scene.frames, scene.seconds)),
     ];
-    let pictures = match arguments.png {
-        Png::On => frames.iter().map(|&frame| (frame, file_of(frame))).collect(),
-        Png::Off => Vec::new(),
-    };
+    let pictures = frames.iter().filter(|_| arguments.png).map(|&frame| (frame, file_of(frame))).collect();
     let object = |o: &crate::scene::DynamicObject| Object {
         name: o.name.clone(),
         triangles: o.triangles.len() as u64,
         morphs: o.morphs(),
     };
-    Ok(Setting {
-        machine: Machine::this(),
-        device: device.map(DeviceFacts::of).transpose()?,
-        commit: provenance::commit(),
-        when: provenance::now(),
-        command: provenance::command(),
-        options: options.map(|(name, value)| (name.to_owned(), value)).to_vec(),
-        notes,
+    Ok(SceneSetting {
+        setting: Setting::of(device, &options, notes)?,
         scene: scene.name.clone(),
         static_triangles: scene.static_mesh.triangles.len() as u64,
         objects: scene.objects.iter().map(object).collect(),

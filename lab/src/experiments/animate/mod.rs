@@ -16,7 +16,9 @@ mod two_level;
 
 use crate::device::Device;
 use crate::measure::agreement::may_both_be_right;
+use crate::measure::setting::Failure;
 use crate::measure::statistics::{Spread, in_turn};
+use crate::named::named;
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Camera, DynamicScene, Scene};
 use crate::subjects::builders::{KdBuilder, Spec};
@@ -27,9 +29,7 @@ use hedgerow::trace::{Hit, Query, Ray};
 use merge_on_device::MergeOnDevice;
 use on_device::{OnDevice, static_tree};
 use on_host::OnHost;
-use points::{Animated, Entry, Failure, Rays};
-use std::fmt;
-use std::str::FromStr;
+use points::{Animated, Entry, Rays, WayInFrame};
 use two_level::TwoLevel;
 
 /// How there is something to trace in every frame.
@@ -48,41 +48,18 @@ pub enum Way {
     Merge,
 }
 
+named!(Way, "way":
+    Rebuild = "rebuild",
+    TwoTrees = "two-trees",
+    TreePerObject = "tree-per-object",
+    TwoLevel = "two-level",
+    Merge = "merge",
+);
+
 impl Way {
-    /// All of them, in the order of charts and tables.
-    pub const ALL: [Way; 5] = [Way::Rebuild, Way::TwoTrees, Way::TreePerObject, Way::TwoLevel, Way::Merge];
-
-    /// The name that commands and records use.
-    pub fn name(self) -> &'static str {
-        match self {
-            Way::Rebuild => "rebuild",
-            Way::TwoTrees => "two-trees",
-            Way::TreePerObject => "tree-per-object",
-            Way::TwoLevel => "two-level",
-            Way::Merge => "merge",
-        }
-    }
-
     /// Whether it is made of kd-trees.
     pub fn is_of_kd_trees(self) -> bool {
         self != Way::TwoLevel
-    }
-}
-
-impl fmt::Display for Way {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Way {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Way> {
-        Way::ALL.into_iter().find(|way| way.name() == name).ok_or_else(|| {
-            let names = Way::ALL.map(Way::name).join(", ");
-            Error::Argument(format!("no way is called {name:?}; there are {names}"))
-        })
     }
 }
 
@@ -242,7 +219,7 @@ pub fn measure<'a>(
 }
 
 fn failure(way: Way, frame: Option<u32>, error: &Error) -> Entry {
-    Entry::Failure(Failure { way, frame, what: error.to_string() })
+    Entry::Failure(Failure { at: WayInFrame { way, frame }, what: error.to_string() })
 }
 
 /// The results of those that did not fail; the others are noted and run no more.

@@ -1,40 +1,30 @@
 //! The lines of `animate.jsonl`. A figure that was not measured is `None`.
 
 use super::Way;
-use crate::measure::provenance::{DeviceFacts, Machine};
 use crate::measure::record::Memory;
+use crate::measure::setting::{Failure, Setting};
 use crate::measure::statistics::Spread;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// What a line says, by its `experiment`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "experiment", rename_all = "lowercase")]
 pub enum Entry {
     /// The first line: where and how the others were measured.
-    Setting(Setting),
+    Setting(SceneSetting),
     /// A frame in one of the ways.
     Animate(Animated),
     /// A way that could not be measured, or not to its end, or found something else than the first.
-    Failure(Failure),
+    Failure(Failure<WayInFrame>),
 }
 
 /// Where, how and of what it was measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Setting {
-    /// The machine.
-    pub machine: Machine,
-    /// The device, if one was used.
-    pub device: Option<DeviceFacts>,
-    /// Commit of the program.
-    pub commit: String,
-    /// When, RFC 3339 UTC.
-    pub when: String,
-    /// The command line that measures it again.
-    pub command: String,
-    /// Options with their values, for people.
-    pub options: Vec<(String, String)>,
-    /// What a reader must know to judge the figures.
-    pub notes: Vec<String>,
+pub struct SceneSetting {
+    /// As in every experiment.
+    #[serde(flatten)]
+    pub setting: Setting,
     /// The scene's name.
     pub scene: String,
     /// Triangles that stand still.
@@ -108,15 +98,20 @@ pub struct Rays {
     pub different: u64,
 }
 
-/// What could not be measured, or was wrong.
+/// A way, and the frame in which it failed; `None` before the first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Failure {
+pub struct WayInFrame {
     /// The way.
     pub way: Way,
-    /// In which frame; `None` before the first.
+    /// The frame.
     pub frame: Option<u32>,
-    /// What happened.
-    pub what: String,
+}
+
+impl fmt::Display for WayInFrame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.way.fmt(f)?;
+        self.frame.map_or(Ok(()), |frame| write!(f, ", frame {frame}"))
+    }
 }
 
 impl Animated {

@@ -2,18 +2,15 @@
 
 use super::page::{Picture, Report};
 use crate::cli::options::{Costs, Kinds, Size, perhaps_empty};
-use crate::cli::{Bar, Common};
+use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::bench::kd_trees::{self, published};
-use crate::experiments::bench::matrix::{self, Failure, Outcome, Plan};
+use crate::experiments::bench::matrix::{self, OnScene, Outcome, Plan};
 use crate::experiments::bench::results::Results;
-use crate::experiments::bench::setting::Setting;
 use crate::experiments::bench::shard::Shard;
 use crate::measure::choose::{Model, cache, candidates, hindsight};
 use crate::measure::overlap::Epo;
-use crate::measure::provenance::DeviceFacts;
-use crate::measure::provenance::{self, Machine};
-use crate::measure::record::SCHEMA;
+use crate::measure::setting::{Failure, Setting};
 use crate::report::names::slug;
 use crate::report::picture::{PictureOptions, View, picture};
 use crate::report::table;
@@ -109,11 +106,10 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         plan,
         model,
         results,
-        report: empty(device.as_ref(), notes, published)?,
+        report: Report { published, ..empty(common, arguments, device.as_ref(), notes)? },
     };
-    bench.report.options = options(common, arguments);
     bench.report.baseline = no_peer.is_none().then(|| "driver-fast-build".into());
-    setting(&bench.report).write(&arguments.output)?;
+    bench.report.write_setting(&arguments.output)?;
     for scene in &scenes {
         bench.scene(scene)?;
     }
@@ -124,18 +120,9 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     if let Some(tables) = kd_trees::text(&report.records(), &report.published) {
         writeln!(out, "{tables}")?;
     }
-    writeln!(out, "{}", arguments.output.join("index.html").display())?;
-    if let Some(device) = &device {
-        device.validation_messages()?;
-    }
+    drop(out);
     let faults = report.outcomes.iter().map(|o| o.faults.len()).sum::<usize>();
-    if !report.failures.is_empty() || faults > 0 {
-        bail!(
-            "{} failed and {faults} were wrong, see above and the report; the rest is measured",
-            report.failures.len()
-        );
-    }
-    Ok(())
+    work::page_written(device.as_ref(), &arguments.output.join("index.html"), report.failures.len() + faults)
 }
 
 /// What the scene arguments name: folders become the scene files in them.
@@ -180,18 +167,6 @@ fn shared(common: &Common, arguments: &Arguments, scenes: Vec<String>) -> Vec<St
     own.into_iter().map(|i| scenes[i].clone()).collect()
 }
 
-/// What the records need beside them, to be joined with those of other runs.
-fn setting(report: &Report) -> Setting {
-    Setting {
-        schema: SCHEMA,
-        machine: report.machine.clone(),
-        device: report.device.clone(),
-        command: report.command.clone(),
-        options: report.options.clone(),
-        notes: report.notes.clone(),
-    }
-}
-
 /// The device, with ray queries where it has them: host builders alone need none.
 fn open(common: &Common, builders: &[Spec]) -> crate::Result<Option<Device>> {
     if builders.iter().all(|spec| spec.needs() == Needs::Nothing) {
@@ -215,12 +190,7 @@ fn possible(
     let is_driver = |spec: &Spec| spec.needs() == Needs::RayQuery;
     if asked.iter().any(is_driver) {
         notes.extend(no_peer.map(str::to_owned));
-        if device.is_some_and(|device| device.driver_tracing().is_none()) {
-            notes.push(
-                "The driver has no acceleration structures of its own (VK_KHR_acceleration_structure) to compare with."
-                    .into(),
-            );
-        }
+        notes.extend(device.and_then(driver::missing));
     }
     let keep = |spec: &Spec| {
         was_named(spec) || spec.is_possible(device) && !(by_default && is_driver(spec) && no_peer.is_some())
@@ -239,34 +209,14 @@ fn calibrated(common: &Common, device: Option<&Device>) -> crate::Result<Option<
 }
 
 /// The report before anything was measured.
-fn empty(device: Option<&Device>, notes: Vec<String>, published: published::Published) -> crate::Result<Report> {
-    Ok(Report {
-        machine: Machine::this(),
-        device: device.map(DeviceFacts::of).transpose()?,
-        commit: provenance::commit(),
-        when: provenance::now(),
-        command: provenance::command(),
-        options: Vec::new(),
-        outcomes: Vec::new(),
-        failures: Vec::new(),
-        baseline: None,
-        notes,
-        pictures: Vec::new(),
-        choices: Vec::new(),
-        published,
-    })
-}
-
-/// The options that figures depend on, for people.
-fn options(common: &Common, arguments: &Arguments) -> Vec<(String, String)> {
+fn empty(common: &Common, arguments: &Arguments, device: Option<&Device>, notes: Vec<String>) -> crate::Result<Report> {
     let threads = common.threads.map_or("one a core".into(), |n| n.to_string());
-    [
+    let options = [
         ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),
         ("Image", format!("{}, seed {}", arguments.size, common.seed)),
         ("Host threads", threads),
-    ]
-    .map(|(name, value)| (name.to_owned(), value))
-    .to_vec()
+    ];
+    Ok(Report::new(Setting::of(device, &options, notes)?))
 }
 
 /// A benchmark under way.
@@ -287,7 +237,7 @@ impl Bench<'_> {
         let scene = match self.common.load(spec) {
             Ok(scene) => scene,
             Err(error) => {
-                self.failed(Failure { scene: spec.to_owned(), builder: None, what: error.to_string() });
+                self.failed(spec, error.to_string());
                 return Ok(());
             }
         };
@@ -297,7 +247,10 @@ impl Bench<'_> {
         let bar = Bar::new(self.common, &scene.name, 0);
         let say = |what: &str| bar.say(&format!("{}: {what}", scene.name));
         let (outcomes, failures) = matrix::measure(&scene, self.device, &self.plan, &mut |what| say(what));
-        failures.into_iter().for_each(|failure| self.failed(failure));
+        for failure in failures {
+            eprintln!("hedgerow: {failure}");
+            self.report.failures.push(failure);
+        }
         for outcome in &outcomes {
             self.results.append(&outcome.record)?;
             for fault in &outcome.faults {
@@ -307,16 +260,17 @@ impl Bench<'_> {
         if !self.arguments.no_pictures {
             say("pictures");
             if let Err(error) = self.pictures(&scene, &outcomes) {
-                self.failed(Failure { scene: scene.name.clone(), builder: None, what: format!("pictures: {error:#}") });
+                self.failed(&scene.name, format!("pictures: {error:#}"));
             }
         }
         self.report.outcomes.extend(outcomes);
         Ok(())
     }
 
-    fn failed(&mut self, failure: Failure) {
-        let builder = failure.builder.as_ref().map_or(String::new(), |builder| format!(" {builder}:"));
-        eprintln!("hedgerow: {}:{builder} {}", failure.scene, failure.what);
+    /// Notes that a scene failed.
+    fn failed(&mut self, scene: &str, what: String) {
+        let failure = Failure { at: OnScene { scene: scene.to_owned(), builder: None }, what };
+        eprintln!("hedgerow: {failure}");
         self.report.failures.push(failure);
     }
 

@@ -8,6 +8,7 @@ use crate::measure::agreement::{Sample, wrong_where_different};
 use crate::measure::overlap::Epo;
 use crate::measure::provenance::{self, Machine};
 use crate::measure::record::{Build, Phase, Record, SCHEMA, Trace};
+use crate::measure::setting::Failure;
 use crate::measure::statistics::{Spread, in_turn};
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::Scene;
@@ -21,6 +22,7 @@ use hedgerow::bvh::twin::lbvh;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use rayon::prelude::*;
+use std::fmt;
 
 /// Runs that do not count, before those that do.
 const WARM_UPS: u32 = 1;
@@ -63,15 +65,20 @@ pub struct Outcome {
     pub faults: Vec<String>,
 }
 
-/// A builder that could not be measured on a scene, or a scene that could not be loaded.
-#[derive(Debug, Clone, serde::Serialize)]
-pub struct Failure {
+/// A builder on a scene; no builder where the scene itself failed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OnScene {
     /// The scene.
     pub scene: String,
-    /// The builder; `None` if the scene itself failed.
+    /// The builder.
     pub builder: Option<String>,
-    /// What went wrong.
-    pub what: String,
+}
+
+impl fmt::Display for OnScene {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.scene)?;
+        self.builder.as_ref().map_or(Ok(()), |builder| write!(f, ", {builder}"))
+    }
 }
 
 /// A builder under measurement.
@@ -89,10 +96,9 @@ pub fn measure(
     device: Option<&Device>,
     plan: &Plan,
     say: &mut dyn FnMut(&str),
-) -> (Vec<Outcome>, Vec<Failure>) {
+) -> (Vec<Outcome>, Vec<Failure<OnScene>>) {
     let fail = |spec: &Spec, error: Error| Failure {
-        scene: scene.name.clone(),
-        builder: Some(spec.to_string()),
+        at: OnScene { scene: scene.name.clone(), builder: Some(spec.to_string()) },
         what: error.to_string(),
     };
     let (mut entries, mut failures) = (Vec::new(), Vec::new());
@@ -137,8 +143,7 @@ pub fn measure(
             Ok(rays) if !plan.kinds.contains(&kind) => rounds.variability(kind, &rays),
             Ok(rays) => rounds.trace(kind, &rays, plan.runs, &reference),
             Err(error) => failures.push(Failure {
-                scene: scene.name.clone(),
-                builder: None,
+                at: OnScene { scene: scene.name.clone(), builder: None },
                 what: format!("{kind} rays: {error}"),
             }),
         }
@@ -388,7 +393,7 @@ mod tests {
         let scene = scene::load("gen:icosphere:2", &LoadOptions::default()).expect("a generator");
         let (outcomes, failures) = measure(&scene, None, &plan("driver-fast-build,lbvh-host"), &mut |_| {});
         assert_eq!(outcomes.len(), 1);
-        assert_eq!(failures[0].builder.as_deref(), Some("driver-fast-build"));
+        assert_eq!(failures[0].at.builder.as_deref(), Some("driver-fast-build"));
     }
 
     #[test]

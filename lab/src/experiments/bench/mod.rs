@@ -10,6 +10,5 @@ pub mod matrix;
 pub mod page;
 pub mod pareto;
 pub mod results;
-pub mod setting;
 pub mod shard;
 pub mod total_time;

@@ -34,7 +34,7 @@ impl Results {
 /// # Errors
 /// The file cannot be read; a line is not a record of this schema.
 pub fn read(path: &Path) -> Result<Vec<Record>> {
-    lines::read(path, FILE, "hedgerow bench", |record: &Record| record.schema)
+    lines::read(path, (FILE, "hedgerow bench"), |record: &Record| record.schema, |_| None)
 }
 
 /// Writes the records as a table: one row each, three columns a kind of ray.

@@ -2,17 +2,17 @@
 
 use crate::experiments::accel::points::Entry as AccelEntry;
 use crate::experiments::animate::points::Entry as AnimateEntry;
-use crate::experiments::bench::kd_trees::published;
 use crate::experiments::bench::matrix::Outcome;
-use crate::experiments::bench::page::Report;
+use crate::experiments::bench::page::{Report, read_setting};
 use crate::experiments::bench::results::{self, Results};
-use crate::experiments::bench::setting::Setting;
 use crate::experiments::{accel, animate};
 use crate::measure::provenance::{self, DeviceFacts, Machine};
 use crate::measure::record::Record;
-use crate::report::elements::{column, foot, head, number};
+use crate::measure::setting::Setting;
+use crate::report::columns::Table;
+use crate::report::elements::{foot, head};
 use crate::report::names::slug;
-use crate::report::numbers::{grouped, three_digits};
+use crate::report::numbers::{count, three_digits};
 use crate::report::{beside, lines};
 use crate::{Error, Result};
 use maud::{DOCTYPE, Markup, html};
@@ -77,7 +77,7 @@ fn read(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
     if has(accel_file) {
         let entries = accel::page::read(folder)?;
         let setting = entries.iter().find_map(|entry| match entry {
-            AccelEntry::Setting(setting) => Some((setting.machine.clone(), setting.device.clone())),
+            AccelEntry::Setting(setting) => Some((setting.machine.clone(), setting.device.clone()?)),
             _ => None,
         });
         if let Some((machine, facts)) = setting {
@@ -90,7 +90,7 @@ fn read(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
     if has(animate_file) {
         let entries = animate::page::read(folder)?;
         let setting = entries.iter().find_map(|entry| match entry {
-            AnimateEntry::Setting(setting) => Some(setting.device.clone()),
+            AnimateEntry::Setting(setting) => Some(setting.setting.device.clone()),
             _ => None,
         });
         if let Some(facts) = setting.flatten() {
@@ -103,7 +103,7 @@ fn read(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
 /// Adds the results of a folder. Those of builders on the host belong to the device beside which they were measured.
 fn read_results(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
     let records = results::read(folder)?;
-    let setting = Setting::read(folder)?;
+    let setting = read_setting(folder)?;
     let facts = setting.as_ref().and_then(|setting| setting.device.clone());
     let is_of_host = |record: &Record| record.subgroup == 0;
     let own = records.iter().find(|record| !is_of_host(record)).map(|r| (r.device.clone(), r.driver.clone()));
@@ -171,7 +171,6 @@ impl OfDevice {
         }
         if !self.animate.is_empty() {
             lines::write(folder, std::mem::take(&mut self.animate))?;
-            animate::page::write(folder)?;
         }
         self.report().write(folder)
     }
@@ -189,21 +188,16 @@ impl OfDevice {
         };
         let outcomes: Vec<Outcome> = self.results.iter().map(outcome).collect();
         let baseline = outcomes.iter().any(|o| o.record.builder == "driver-fast-build");
-        Report {
+        let setting = Setting {
             machine: self.machine.clone().unwrap_or(unknown),
             device: self.facts.clone(),
             commit: commits.join(", "),
             when: self.results.iter().map(|record| record.when.clone()).max().unwrap_or_default(),
             command: provenance::command(),
             options: Vec::new(),
-            outcomes,
-            failures: Vec::new(),
-            baseline: baseline.then(|| "driver-fast-build".to_owned()),
             notes: self.notes.clone(),
-            pictures: Vec::new(),
-            choices: Vec::new(),
-            published: published::papay(),
-        }
+        };
+        Report { outcomes, baseline: baseline.then(|| "driver-fast-build".to_owned()), ..Report::new(setting) }
     }
 }
 
@@ -228,30 +222,25 @@ fn overview(devices: &[OfDevice]) -> String {
 }
 
 fn section(device: &OfDevice) -> Markup {
+    let valid = |record: &Record| match record.valid {
+        Some(true) => "yes",
+        Some(false) => "no",
+        None => "–",
+    };
+    let table = Table::new(format!("Results of {}", device.name), &device.results)
+        .text("scene", |record| &record.scene)
+        .number("triangles", "", |record| Some(record.triangles as f64), count)
+        .cell("builder", |record| html! { td { code { (record.builder) } } })
+        .number("build", "ms", |record| Some(record.build.median_ms), three_digits)
+        .number("build", "Mtri/s", |record| Some(record.mtris_s()), three_digits)
+        .number("SAH cost", "", |record| record.quality.sah, three_digits)
+        .number("all rays", "Mrays/s", |record| record.mrays_s(), three_digits)
+        .text("valid", move |record| valid(record));
     html! {
         section {
             h2 { (device.name) }
             p { (device.driver) ". " a href={ (device.slug()) "/index.html" } { "All charts and figures of this device" } }
-            div.scroll tabindex="0" role="region" aria-label={ "Results of " (device.name) } {
-                table {
-                    thead { tr {
-                        (column("scene", "", false)) (column("triangles", "", true)) (column("builder", "", false))
-                        (column("build", "ms", true)) (column("build", "Mtri/s", true)) (column("SAH cost", "", true))
-                        (column("all rays", "Mrays/s", true)) (column("valid", "", false))
-                    } }
-                    tbody {
-                        @for record in &device.results {
-                            tr {
-                                td { (record.scene) } (number(Some(record.triangles as f64), |n| grouped(n as u64)))
-                                td { code { (record.builder) } }
-                                (number(Some(record.build.median_ms), three_digits)) (number(Some(record.mtris_s()), three_digits))
-                                (number(record.quality.sah, three_digits)) (number(record.mrays_s(), three_digits))
-                                td { @match record.valid { Some(true) => "yes", Some(false) => "no", None => "–" } }
-                            }
-                        }
-                    }
-                }
-            }
+            (table.html())
         }
     }
 }

@@ -1,22 +1,22 @@
 //! `hedgerow stability`: where methods give way; records as they are measured, and a page for each experiment.
 
+use super::degenerate;
+use super::far::{FarTriangle, Side};
+use super::large::{HugeTriangles, Placement};
+use super::page::{self, Paged};
+use super::points::{Run, Stretched};
+use super::relative::{self, Stretch};
 use crate::cli::options::{Kinds, Size, Steps};
-use crate::cli::work::device_for_those;
+use crate::cli::work::{device_for_those, page_written};
 use crate::cli::{Bar, Common};
 use crate::device::Device;
-use crate::experiments::stability::far::{Axes, Side};
-use crate::experiments::stability::large::Placement;
-use crate::experiments::stability::page::{self as report, Points};
-use crate::experiments::stability::points::{Failure, Run};
-use crate::experiments::stability::{self, degenerate, growth, large, relative};
-use crate::measure::provenance::{self, DeviceFacts, Machine};
-use crate::measure::record::SCHEMA;
+use crate::experiments::stability;
+use crate::measure::setting::{Failure, Setting};
 use crate::rays::kinds::RayKind;
+use crate::report::lines::Points;
 use crate::scene::{self, Scene};
 use crate::subjects::builders::{self, Spec};
 use crate::subjects::peers::driver;
-use anyhow::bail;
-use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
@@ -75,7 +75,7 @@ struct Growth {
     steps: Steps,
     /// In how many axes the bounds grow: 1, 3 or both
     #[arg(long, value_name = "1|3", value_delimiter = ',', default_value = "1,3", value_parser = axes)]
-    axes: Vec<Axes>,
+    axes: Vec<u32>,
     /// To which sides: +, - or both
     #[arg(long, value_name = "+|-", value_delimiter = ',', default_value = "+,-", value_parser = side, allow_hyphen_values = true)]
     sides: Vec<Side>,
@@ -118,8 +118,8 @@ struct Degenerate {
     output: PathBuf,
 }
 
-fn axes(text: &str) -> Result<Axes, String> {
-    let axes = Axes::ALL.into_iter().find(|axes| axes.count().to_string() == text);
+fn axes(text: &str) -> Result<u32, String> {
+    let axes = text.parse().ok().filter(|axes| [1, 3].contains(axes));
     axes.ok_or_else(|| format!("{text:?} is no number of axes; take 1 or 3"))
 }
 
@@ -136,48 +136,41 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
 }
 
 fn run_growth(common: &Common, arguments: &Growth) -> anyhow::Result<()> {
-    let plan =
-        growth::Plan { axes: arguments.axes.clone(), sides: arguments.sides.clone(), steps: arguments.steps.0.clone() };
-    run_relative(common, &arguments.relative, &arguments.builder, &mut |stage, scene, failed, points| {
-        growth::measure(stage, scene, &plan, failed, &mut |point| points.append(&point))
-    })
+    let sides = |&axes: &u32| arguments.sides.iter().map(move |&side| FarTriangle { axes, side });
+    let stretches: Vec<FarTriangle> = arguments.axes.iter().flat_map(sides).collect();
+    run_relative(common, &arguments.relative, &arguments.builder, (&stretches, &arguments.steps.0))
 }
 
 fn run_large(common: &Common, arguments: &Large) -> anyhow::Result<()> {
-    let plan = large::Plan {
-        placements: arguments.placements.clone(),
-        counts: arguments.counts.iter().map(|count| count.get()).collect(),
-        steps: arguments.steps.0.clone(),
+    let counts = |&placement: &Placement| {
+        arguments.counts.iter().map(move |count| HugeTriangles { placement, count: count.get() })
     };
-    run_relative(common, &arguments.relative, &arguments.builder, &mut |stage, scene, failed, points| {
-        large::measure(stage, scene, &plan, failed, &mut |point| points.append(&point))
-    })
+    let stretches: Vec<HugeTriangles> = arguments.placements.iter().flat_map(counts).collect();
+    run_relative(common, &arguments.relative, &arguments.builder, (&stretches, &arguments.steps.0))
 }
 
-/// Measures one scene: the stage, the scene, what is told of failures, and where points go; gives notes.
-type OfScene<'m, P> =
-    dyn FnMut(&relative::Stage<'_>, &Scene, &mut dyn FnMut(Failure), &mut Points<P>) -> crate::Result<Vec<String>> + 'm;
-
-fn run_relative<P: report::Paged>(
+fn run_relative<S: Stretch>(
     common: &Common,
     arguments: &Relative,
     builders: &str,
-    of_scene: &mut OfScene<'_, P>,
-) -> anyhow::Result<()> {
+    stretches: (&[S], &[u32]),
+) -> anyhow::Result<()>
+where
+    Stretched<S>: Paged,
+{
     let scenes: Vec<Scene> = match &arguments.scenes[..] {
         [] => SCENES.iter().map(|spec| common.load(spec)).collect::<crate::Result<_>>()?,
         named => named.iter().map(|spec| common.load(spec)).collect::<crate::Result<_>>()?,
     };
     let (device, specs) = opened(common, builders)?;
     // Before any work: a folder that cannot be written would lose all of it.
-    let mut points = Points::<P>::create(&arguments.output)?;
+    let mut points = Points::<Stretched<S>>::create(&arguments.output)?;
     let kinds: &[RayKind] = if arguments.no_rays { &[] } else { &arguments.rays.0 };
-    let rays = (!kinds.is_empty()).then(|| format!("{}, seed {}", arguments.size, common.seed));
     let options = [
-        ("Runs", rays.is_some().then(|| format!("{} after a warm-up, in turn with e = 0", arguments.runs))),
-        ("Image", rays),
+        ("Runs", format!("{} after a warm-up, in turn with e = 0", arguments.runs)),
+        ("Image", format!("{}, seed {}", arguments.size, common.seed)),
     ];
-    let mut run = started(device.as_ref(), &specs, &options)?;
+    let mut run = started(device.as_ref(), &specs, if kinds.is_empty() { &[] } else { &options })?;
     let bar = Bar::new(common, "measuring", 0);
     let say = |what: &str| bar.say(what);
     let stage = relative::Stage {
@@ -190,14 +183,15 @@ fn run_relative<P: report::Paged>(
     };
     for scene in &scenes {
         let mut failed = |failure: Failure| {
-            eprintln!("hedgerow: {}: {}", failure.of, failure.what);
+            eprintln!("hedgerow: {failure}");
             run.failures.push(failure);
         };
-        let notes = of_scene(&stage, scene, &mut failed, &mut points)?;
-        run.notes.extend(notes);
+        let mut point = |point| points.append(point);
+        run.setting.notes.extend(relative::measure(&stage, scene, stretches, &mut failed, &mut point)?);
     }
     drop(bar);
-    finish(device.as_ref(), points, &run, run.failures.len())
+    let page = page::finish::<Stretched<S>>(&arguments.output, &run)?;
+    page_written(device.as_ref(), &page, run.failures.len())
 }
 
 fn run_degenerate(common: &Common, arguments: &Degenerate) -> anyhow::Result<()> {
@@ -214,8 +208,8 @@ fn run_degenerate(common: &Common, arguments: &Degenerate) -> anyhow::Result<()>
     let (device, specs) = opened(common, &arguments.builder)?;
     let mut points = Points::create(&arguments.output)?;
     let options = [
-        ("Triangles", Some(format!("about {} a scene", arguments.triangles))),
-        ("Builds", Some(format!("{} of each, the first to warm up", arguments.builds))),
+        ("Triangles", format!("about {} a scene", arguments.triangles)),
+        ("Builds", format!("{} of each, the first to warm up", arguments.builds)),
     ];
     let mut run = started(device.as_ref(), &specs, &options)?;
     let bar = Bar::new(common, "measuring", scenes.len() as u64);
@@ -234,13 +228,14 @@ fn run_degenerate(common: &Common, arguments: &Degenerate) -> anyhow::Result<()>
                 eprintln!("hedgerow: {}: {}{whose}: {fault}", point.scene, point.builder);
             }
             failures += usize::from(point.has_failed());
-            points.append(&point)
+            points.append(point)
         })?;
         bar.step();
     }
     drop(bar);
-    run.notes.extend(peers_note(&specs));
-    finish(device.as_ref(), points, &run, failures)
+    run.setting.notes.extend(peers_note(&specs));
+    let page = page::finish::<stability::points::Degenerate>(&arguments.output, &run)?;
+    page_written(device.as_ref(), &page, failures)
 }
 
 fn peers_note(specs: &[Spec]) -> Option<String> {
@@ -260,38 +255,8 @@ fn opened(common: &Common, text: &str) -> anyhow::Result<(Option<Device>, Vec<Sp
 }
 
 /// Where and how it is measured; nothing has failed yet.
-fn started(device: Option<&Device>, specs: &[Spec], options: &[(&str, Option<String>)]) -> crate::Result<Run> {
+fn started(device: Option<&Device>, specs: &[Spec], options: &[(&str, String)]) -> crate::Result<Run> {
     let has_driver = specs.iter().any(|spec| spec.needs() == builders::Needs::RayQuery);
-    Ok(Run {
-        schema: SCHEMA,
-        machine: Machine::this(),
-        device: device.map(DeviceFacts::of).transpose()?,
-        commit: provenance::commit(),
-        when: provenance::now(),
-        command: provenance::command(),
-        options: options.iter().filter_map(|(name, value)| Some(((*name).to_owned(), value.clone()?))).collect(),
-        notes: device.filter(|_| has_driver).and_then(|device| driver::note(device.found())).into_iter().collect(),
-        failures: Vec::new(),
-    })
-}
-
-/// Writes the run and its page.
-///
-/// # Errors
-/// They cannot be written; the validation layers said something; something failed.
-fn finish<P: report::Paged>(
-    device: Option<&Device>,
-    points: Points<P>,
-    run: &Run,
-    failures: usize,
-) -> anyhow::Result<()> {
-    let page = points.finish(run)?;
-    writeln!(std::io::stdout().lock(), "{}", page.display())?;
-    if let Some(device) = device {
-        device.validation_messages()?;
-    }
-    if failures > 0 {
-        bail!("{failures} failed, see above and the page; the rest is measured");
-    }
-    Ok(())
+    let note = device.filter(|_| has_driver).and_then(|device| driver::note(device.found()));
+    Ok(Run { setting: Setting::of(device, options, note.into_iter().collect())?, failures: Vec::new() })
 }

@@ -1,7 +1,7 @@
 //! `stability degenerate`: every builder over every scene of [`crate::scene::degenerate`]: whether it builds a valid tree of the
 //! same bytes each time, whether rays hit what they must, and what it costs.
 
-use super::points::{Degenerate, Head};
+use super::points::{Degenerate, Experiment};
 use crate::device::Device;
 use crate::measure::agreement::wrong_where_different;
 use crate::measure::statistics::Spread;
@@ -81,7 +81,7 @@ fn of_builder(stage: &Stage<'_>, scene: &scene::Degenerate, spec: &Spec, truth: 
         mesh.triangles.retain(|triangle| triangle.iter().all(|&v| (v as usize) < vertices));
     }
     let mut point = Degenerate {
-        head: Head::of::<Degenerate>(),
+        experiment: Experiment::Degenerate,
         scene: scene.name.to_owned(),
         triangles: scene.mesh.triangles.len() as u64,
         builder: spec.to_string(),

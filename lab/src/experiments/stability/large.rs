@@ -3,14 +3,12 @@
 //! Codes are normalised by bounds: by those of all boxes, which a huge triangle stretches as far as it reaches, or by narrower
 //! ones, which leave the scene more bits. What they save depends on where the triangles stand: [`Placement`].
 
-use super::points::{Failure, Head, Large};
-use super::relative::{Part, Series, Stage, measure as measure_series};
-use crate::scene::{Mesh, Scene};
-use crate::{Error, Result};
+use super::points::Experiment;
+use super::relative::Stretch;
+use crate::named::named;
 use hedgerow::geometry::Aabb;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use std::str::FromStr;
 
 /// Where the huge triangles stand. Each is flat in one axis and 2^e times as long as the scene in the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,19 +22,9 @@ pub enum Placement {
     Outward,
 }
 
+named!(Placement, "placement": Wall = "wall", Walls = "walls", Outward = "outward");
+
 impl Placement {
-    /// All of them.
-    pub const ALL: [Placement; 3] = [Placement::Wall, Placement::Walls, Placement::Outward];
-
-    /// As options and records have it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Placement::Wall => "wall",
-            Placement::Walls => "walls",
-            Placement::Outward => "outward",
-        }
-    }
-
     /// What it is, for titles.
     pub fn what(self) -> &'static str {
         match self {
@@ -47,111 +35,60 @@ impl Placement {
     }
 }
 
-impl fmt::Display for Placement {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Placement {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Placement> {
-        Placement::ALL.into_iter().find(|placement| placement.name() == name).ok_or_else(|| {
-            let names = Placement::ALL.map(Placement::name).join(", ");
-            Error::Argument(format!("no placement is called {name:?}; there are {names}"))
-        })
-    }
-}
-
-/// Which triangles, and how large.
-#[derive(Debug, Clone)]
-pub struct Plan {
+/// Huge triangles at the edge of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HugeTriangles {
     /// Where they stand.
-    pub placements: Vec<Placement>,
+    pub placement: Placement,
     /// How many at each side or in each plane.
-    pub counts: Vec<u32>,
-    /// The e, ascending, 0 first.
-    pub steps: Vec<u32>,
+    pub count: u32,
 }
 
 /// From one triangle of a side to the next, in parts of the scene's extent.
 const APART: f64 = 1e-3;
 
-/// The huge triangles; `None` where they have no place among the floats.
-pub fn triangles(bounds: &Aabb, placement: Placement, count: u32, e: u32) -> Option<Vec<[[f32; 3]; 3]>> {
-    let [lo, hi] = [bounds.lo, bounds.hi].map(|corner| corner.map(f64::from));
-    let extent: [f64; 3] = std::array::from_fn(|i| hi[i] - lo[i]);
-    let times = f64::from(e).exp2();
-    // In `axis` at a height of its own, in the others from `from` for 2^e extents.
-    let flat = |axis: usize, height: f64, from: &dyn Fn(usize) -> f64| -> [[f32; 3]; 3] {
-        let [x, y] = [(axis + 1) % 3, (axis + 2) % 3];
-        [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0]].map(|[right, up]| {
-            let mut corner = [0.0; 3];
-            corner[axis] = height as f32;
-            corner[x] = (from(x) + right * times * extent[x]) as f32;
-            corner[y] = (from(y) + up * times * extent[y]) as f32;
-            corner
-        })
-    };
-    let around = |i: usize| 0.5 * (lo[i] + hi[i] - times * extent[i]);
-    let mut all = Vec::new();
-    for j in 0..count {
-        let beside = APART * f64::from(j);
-        for axis in 0..3 {
-            let (above, below) = (hi[axis] + beside * extent[axis], lo[axis] - beside * extent[axis]);
-            match placement {
-                Placement::Wall if axis == 0 => all.push(flat(axis, above, &around)),
-                Placement::Wall => {}
-                Placement::Walls => all.extend([flat(axis, above, &around), flat(axis, below, &around)]),
-                Placement::Outward => all.push(flat(axis, above, &|i| hi[i])),
+impl Stretch for HugeTriangles {
+    const EXPERIMENT: Experiment = Experiment::Large;
+    const WHAT: &'static str = "the huge triangles";
+
+    fn beside(&self, bounds: &Aabb, e: u32) -> Option<Vec<[[f32; 3]; 3]>> {
+        let [lo, hi] = [bounds.lo, bounds.hi].map(|corner| corner.map(f64::from));
+        let extent: [f64; 3] = std::array::from_fn(|i| hi[i] - lo[i]);
+        let times = f64::from(e).exp2();
+        // In `axis` at a height of its own, in the others from `from` for 2^e extents.
+        let flat = |axis: usize, height: f64, from: &dyn Fn(usize) -> f64| -> [[f32; 3]; 3] {
+            let [x, y] = [(axis + 1) % 3, (axis + 2) % 3];
+            [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0]].map(|[right, up]| {
+                let mut corner = [0.0; 3];
+                corner[axis] = height as f32;
+                corner[x] = (from(x) + right * times * extent[x]) as f32;
+                corner[y] = (from(y) + up * times * extent[y]) as f32;
+                corner
+            })
+        };
+        let around = |i: usize| 0.5 * (lo[i] + hi[i] - times * extent[i]);
+        let mut all = Vec::new();
+        for j in 0..self.count {
+            let beside = APART * f64::from(j);
+            for axis in 0..3 {
+                let (above, below) = (hi[axis] + beside * extent[axis], lo[axis] - beside * extent[axis]);
+                match self.placement {
+                    Placement::Wall if axis == 0 => all.push(flat(axis, above, &around)),
+                    Placement::Wall => {}
+                    Placement::Walls => all.extend([flat(axis, above, &around), flat(axis, below, &around)]),
+                    Placement::Outward => all.push(flat(axis, above, &|i| hi[i])),
+                }
             }
         }
+        all.iter().flatten().flatten().all(|x| x.is_finite()).then_some(all)
     }
-    all.iter().flatten().flatten().all(|x| x.is_finite()).then_some(all)
 }
 
-/// Measures one scene; gives what a reader must know beside: the points that floats cannot hold.
-///
-/// # Errors
-/// The scene has no triangles; those of `point`.
-pub fn measure(
-    stage: &Stage<'_>,
-    scene: &Scene,
-    plan: &Plan,
-    failed: &mut dyn FnMut(Failure),
-    point: &mut dyn FnMut(Large) -> Result<()>,
-) -> Result<Vec<String>> {
-    let part = Part::new(stage, scene)?;
-    let mut notes = Vec::new();
-    for &placement in &plan.placements {
-        for &count in &plan.counts {
-            let mesh = |&e: &u32| Some((e, part.with(&triangles(&part.bounds, placement, count, e)?)));
-            let meshes: Vec<(u32, Mesh)> = plan.steps.iter().map_while(mesh).collect();
-            if let Some(e) = plan.steps.get(meshes.len()) {
-                notes.push(format!(
-                    "{}, {placement}: from e = {e} on the huge triangles would reach beyond the largest float; these points are \
-                     left out.",
-                    scene.name
-                ));
-            }
-            let series = Series { name: format!("{placement} of {count}"), meshes: &meshes };
-            measure_series(stage, &part, &series, failed, &mut |spec, e, figures| {
-                point(Large {
-                    head: Head::of::<Large>(),
-                    scene: scene.name.clone(),
-                    builder: spec.to_string(),
-                    placement,
-                    count,
-                    e,
-                    cost: figures.cost,
-                    relative_cost: figures.relative_cost,
-                    relative_mrays: figures.relative_mrays,
-                })
-            })?;
-        }
+impl fmt::Display for HugeTriangles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = if self.count == 1 { "one".into() } else { self.count.to_string() };
+        write!(f, "{}, {count} each", self.placement.what())
     }
-    Ok(notes)
 }
 
 #[cfg(test)]
@@ -163,8 +100,12 @@ mod tests {
 
     /// The bounds that plain and concise codes are normalised by.
     fn bounds_of(placement: Placement, count: u32, e: u32) -> [Aabb; 2] {
-        let boxes: Vec<Aabb> =
-            triangles(&BOUNDS, placement, count, e).expect("finite").iter().map(|c| Aabb::around(c)).collect();
+        let boxes: Vec<Aabb> = HugeTriangles { placement, count }
+            .beside(&BOUNDS, e)
+            .expect("finite")
+            .iter()
+            .map(|c| Aabb::around(c))
+            .collect();
         let point = |p| Aabb { lo: p, hi: p };
         // The scene's own triangles are small: their boxes are hardly more than their centroids.
         let own = [BOUNDS.lo, BOUNDS.hi].map(point);
@@ -185,7 +126,10 @@ mod tests {
         let [full, concise] = bounds_of(Placement::Walls, 1, 4);
         assert_eq!(full, Aabb { lo: [-15.0, -30.0, -60.0], hi: [17.0, 34.0, 68.0] });
         assert_eq!(concise, BOUNDS);
-        assert_eq!(triangles(&BOUNDS, Placement::Walls, 3, 1).expect("finite").len(), 18);
+        assert_eq!(
+            HugeTriangles { placement: Placement::Walls, count: 3 }.beside(&BOUNDS, 1).expect("finite").len(),
+            18
+        );
     }
 
     #[test]
@@ -198,9 +142,10 @@ mod tests {
     #[test]
     fn what_floats_cannot_hold_is_left_out() {
         let huge = Aabb { lo: [-1e38; 3], hi: [1e38; 3] };
-        assert!(triangles(&huge, Placement::Wall, 1, 1).is_some());
-        assert_eq!(triangles(&huge, Placement::Wall, 1, 4), None);
-        assert_eq!(Placement::from_str("walls").ok(), Some(Placement::Walls));
-        assert!(Placement::from_str("roof").is_err_and(|e| e.to_string().contains("wall, walls, outward")));
+        let wall = HugeTriangles { placement: Placement::Wall, count: 1 };
+        assert!(wall.beside(&huge, 1).is_some());
+        assert_eq!(wall.beside(&huge, 4), None);
+        assert_eq!("walls".parse::<Placement>().ok(), Some(Placement::Walls));
+        assert!("roof".parse::<Placement>().is_err_and(|e| e.to_string().contains("wall, walls, outward")));
     }
 }

@@ -1,6 +1,6 @@
 //! What `hedgerow stability` measures: where methods give way.
 //!
-//! [`growth`]: the bounds grow by a far triangle; [`large`]: huge triangles at the scene's edge; [`degenerate`]: scenes that
+//! [`far`]: the bounds grow by a far triangle; [`large`]: huge triangles at the scene's edge; [`degenerate`]: scenes that
 //! hurt. The first two compare a builder with itself ([`relative`]) by the cost of what stays ([`clipped`]) and the speed of its
 //! rays; [`mod@drop`] says where a tenth is lost. Each gives [`points`] as it goes.
 
@@ -9,7 +9,6 @@ pub(crate) mod command;
 pub mod degenerate;
 pub mod drop;
 pub mod far;
-pub mod growth;
 pub mod large;
 pub mod page;
 pub mod points;

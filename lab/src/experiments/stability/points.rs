@@ -1,88 +1,42 @@
 //! The lines of `growth.jsonl`, `large.jsonl` and `degenerate.jsonl` (CONTRACT, "Records of experiments"), and where and how
 //! they were measured, in a file beside each. A figure that was not measured is `None`.
 
-use super::far::Side;
-use super::large::Placement;
-pub use crate::experiments::accel::points::Failure;
-use crate::measure::provenance::{DeviceFacts, Machine};
-use crate::measure::record::SCHEMA;
+use super::far::FarTriangle;
+use super::large::HugeTriangles;
+use crate::measure::setting::{Failure, Setting};
 use crate::measure::statistics::Spread;
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
-/// A line of one of the files.
-pub trait Point: Serialize + DeserializeOwned {
-    /// The experiment that it is of.
-    const EXPERIMENT: &'static str;
-    /// The version and the experiment that the line names.
-    fn head(&self) -> &Head;
+/// What a line is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Experiment {
+    /// The bounds grow by a far triangle.
+    Growth,
+    /// Huge triangles at the scene's edge.
+    Large,
+    /// Scenes that hurt.
+    Degenerate,
 }
 
-/// How every line begins.
+/// A builder on a scene with something beside it that stretches the bounds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Head {
-    /// [`SCHEMA`].
-    pub schema: u32,
-    /// [`Point::EXPERIMENT`].
-    pub experiment: String,
-}
-
-impl Head {
-    /// Of a line of `P`.
-    pub fn of<P: Point>() -> Head {
-        Head { schema: SCHEMA, experiment: P::EXPERIMENT.into() }
-    }
-}
-
-/// A builder on a scene with one far triangle.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Growth {
-    /// Schema and experiment.
-    #[serde(flatten)]
-    pub head: Head,
+pub struct Stretched<S> {
+    /// What it is of.
+    pub experiment: Experiment,
     /// Scene name.
     pub scene: String,
     /// Builder with its options, as `-b` takes it.
     pub builder: String,
-    /// In how many axes the bounds grow: 1 or 3.
-    pub axes: u32,
-    /// Where the far triangle is.
-    pub side: Side,
-    /// The bounds are 2^e times as long.
-    pub e: u32,
-    /// [`super::clipped::cost`] over that at e = 0.
-    pub relative_cost: Option<f64>,
-    /// For each kind of ray, speed over that at e = 0: the median of ratios run by run. A kind that has fallen below a twentieth
-    /// is missing at the e that follow.
-    pub relative_mrays: BTreeMap<String, f64>,
-}
-
-impl Point for Growth {
-    const EXPERIMENT: &'static str = "growth";
-    fn head(&self) -> &Head {
-        &self.head
-    }
-}
-
-/// A builder on a scene with huge triangles at its edge.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Large {
-    /// Schema and experiment.
+    /// What stands beside the scene.
     #[serde(flatten)]
-    pub head: Head,
-    /// Scene name.
-    pub scene: String,
-    /// Builder with its options, as `-b` takes it.
-    pub builder: String,
-    /// Where the huge triangles are.
-    pub placement: Placement,
-    /// How many a side.
-    pub count: u32,
-    /// Each is 2^e times as long as the scene.
+    pub by: S,
+    /// How far it reaches: 2^e times the scene.
     pub e: u32,
-    /// [`super::clipped::cost`].
-    pub cost: Option<f64>,
+    /// [`super::clipped::cost`], where the experiment tells it.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "told")]
+    pub cost: Option<Option<f64>>,
     /// The same over that at e = 0.
     pub relative_cost: Option<f64>,
     /// For each kind of ray, speed over that at e = 0: the median of ratios run by run. A kind that has fallen below a twentieth
@@ -90,19 +44,21 @@ pub struct Large {
     pub relative_mrays: BTreeMap<String, f64>,
 }
 
-impl Point for Large {
-    const EXPERIMENT: &'static str = "large";
-    fn head(&self) -> &Head {
-        &self.head
-    }
+/// A figure that is there, be it `null`.
+fn told<'de, D: Deserializer<'de>>(value: D) -> Result<Option<Option<f64>>, D::Error> {
+    Option::deserialize(value).map(Some)
 }
+
+/// A builder on a scene with one far triangle.
+pub type Growth = Stretched<FarTriangle>;
+/// A builder on a scene with huge triangles at its edge.
+pub type Large = Stretched<HugeTriangles>;
 
 /// A builder on a degenerate scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Degenerate {
-    /// Schema and experiment.
-    #[serde(flatten)]
-    pub head: Head,
+    /// What it is of.
+    pub experiment: Experiment,
     /// Name in [`crate::scene::degenerate`].
     pub scene: String,
     /// Triangles of the input.
@@ -135,13 +91,6 @@ pub struct Degenerate {
     pub faults: Vec<String>,
 }
 
-impl Point for Degenerate {
-    const EXPERIMENT: &'static str = "degenerate";
-    fn head(&self) -> &Head {
-        &self.head
-    }
-}
-
 impl Degenerate {
     /// Whether one of ours did what it must not: an invalid tree, other bytes, a wrong hit, or none at all.
     pub fn has_failed(&self) -> bool {
@@ -152,35 +101,30 @@ impl Degenerate {
 /// Where and how the points of a file were measured, and what could not be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// [`SCHEMA`].
-    pub schema: u32,
-    /// The machine.
-    pub machine: Machine,
-    /// The device, if one was used.
-    pub device: Option<DeviceFacts>,
-    /// Commit of the program.
-    pub commit: String,
-    /// When, RFC 3339 UTC.
-    pub when: String,
-    /// The command line that measures it again.
-    pub command: String,
-    /// Options with their values, for people.
-    pub options: Vec<(String, String)>,
-    /// What a reader must know to judge the figures: points that were left out, a peer that is none.
-    pub notes: Vec<String>,
+    /// As in every experiment.
+    #[serde(flatten)]
+    pub setting: Setting,
     /// What could not be measured, or was wrong.
     pub failures: Vec<Failure>,
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::far::Side;
     use super::*;
 
     #[test]
     fn a_point_of_growth_is_the_line_of_the_contract() {
-        let line = r#"{"schema":1,"experiment":"growth","scene":"bunny","builder":"lbvh:codes=emc64var-nosize:collapse=off","axes":1,"side":"+","e":42,"relative_cost":1.03,"relative_mrays":{"primary":0.98}}"#;
-        let point: Growth = serde_json::from_str(line).expect("the contract's example");
-        assert_eq!((point.head.clone(), point.side), (Head::of::<Growth>(), Side::Positive));
+        let line = r#"{"experiment":"growth","scene":"bunny","builder":"lbvh:codes=emc64var-nosize:collapse=off","axes":1,"side":"+","e":42,"relative_cost":1.03,"relative_mrays":{"primary":0.98}}"#;
+        let point: Growth = serde_json::from_str(line).expect("the contract's example, but for its schema");
+        assert_eq!((point.experiment, point.by.side), (Experiment::Growth, Side::Positive));
+        assert_eq!(serde_json::to_string(&point).expect("JSON"), line);
+    }
+
+    #[test]
+    fn a_cost_of_a_large_scene_is_told_though_it_was_not_measured() {
+        let line = r#"{"experiment":"large","scene":"s","builder":"b","placement":"wall","count":1,"e":2,"cost":null,"relative_cost":null,"relative_mrays":{}}"#;
+        let point: Large = serde_json::from_str(line).expect("a point");
         assert_eq!(serde_json::to_string(&point).expect("JSON"), line);
     }
 }

@@ -1,9 +1,10 @@
 //! A scene that stays, and builders on it with more and more beside it: clipped costs, and speeds of the rays of what stays.
 
 use super::clipped;
-use super::points::Failure;
+use super::points::{Experiment, Stretched};
 use crate::device::Device;
 use crate::measure::agreement::wrong_where_different;
+use crate::measure::setting::Failure;
 use crate::measure::statistics::{Spread, in_turn, ratios};
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Mesh, Scene};
@@ -18,7 +19,10 @@ use hedgerow::geometry::Aabb;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Ray};
 use rayon::prelude::*;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
+use std::fmt;
 
 /// Costs of a traversal step and of a triangle test, those of the theses.
 const COSTS: (f64, f64) = (3.0, 2.0);
@@ -46,11 +50,11 @@ pub struct Stage<'a> {
 }
 
 /// The scene that stays, with rays of it.
-pub struct Part<'s> {
+struct Part<'s> {
     /// The scene.
-    pub scene: &'s Scene,
+    scene: &'s Scene,
     /// Its bounds.
-    pub bounds: Aabb,
+    bounds: Aabb,
     rays: Vec<(RayKind, Vec<Ray>)>,
 }
 
@@ -59,7 +63,7 @@ impl<'s> Part<'s> {
     ///
     /// # Errors
     /// The scene has no triangles.
-    pub fn new(stage: &Stage<'_>, scene: &'s Scene) -> Result<Part<'s>> {
+    fn new(stage: &Stage<'_>, scene: &'s Scene) -> Result<Part<'s>> {
         let tree = tree_of(&scene.mesh);
         let mut hits = |rays: &[Ray]| Ok(rays.par_iter().map(|ray| host::closest_hit(&tree, ray)).collect());
         let mut rays = Vec::new();
@@ -73,7 +77,7 @@ impl<'s> Part<'s> {
     }
 
     /// The scene with these triangles behind its own.
-    pub fn with(&self, triangles: &[[[f32; 3]; 3]]) -> Mesh {
+    fn with(&self, triangles: &[[[f32; 3]; 3]]) -> Mesh {
         let mut mesh = self.scene.mesh.clone();
         for corners in triangles {
             let first = mesh.positions.len() as u32;
@@ -88,62 +92,97 @@ fn tree_of(mesh: &Mesh) -> Bvh2 {
     lbvh::build(&mesh.positions, &mesh.triangles, Code::Mc63.full(), Collapse::SAH)
 }
 
-/// What a builder gave at one point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Figures {
-    /// [`clipped::cost`]; `None` where the builder does not give its tree.
-    pub cost: Option<f64>,
-    /// The same over that of the first point.
-    pub relative_cost: Option<f64>,
-    /// Speeds over those of the first point, by kind of ray; without those that had fallen below a twentieth before.
-    pub relative_mrays: BTreeMap<String, f64>,
+/// What stretches the bounds of a scene from beside it, the farther the greater e is.
+pub trait Stretch: Copy + PartialEq + fmt::Display + Serialize + DeserializeOwned {
+    /// What its points are of.
+    const EXPERIMENT: Experiment;
+    /// What it is, for messages.
+    const WHAT: &'static str;
+    /// Its triangles beside a scene of these bounds; `None` where they have no place among the floats.
+    fn beside(&self, bounds: &Aabb, e: u32) -> Option<Vec<[[f32; 3]; 3]>>;
 }
 
-/// The meshes of a series: the first is what the others are compared with.
-pub struct Series<'m> {
-    /// What the series is of, for messages.
-    pub name: String,
-    /// e, and the part with what is beside it.
-    pub meshes: &'m [(u32, Mesh)],
-}
-
-/// Measures every builder over a series; what fails goes to `failed`, and the rest goes on.
+/// Measures one scene with every builder, stretched in each way by each e, 0 first, which the others are compared with. What fails
+/// goes to `failed`, and the rest goes on. Gives what a reader must know beside: the points that floats cannot hold.
 ///
 /// # Errors
-/// Those of `point`, which is given the builder, e and its figures.
-pub fn measure(
+/// The scene has no triangles; those of `point`.
+pub fn measure<S: Stretch>(
+    stage: &Stage<'_>,
+    scene: &Scene,
+    (stretches, steps): (&[S], &[u32]),
+    failed: &mut dyn FnMut(Failure),
+    point: &mut dyn FnMut(Stretched<S>) -> Result<()>,
+) -> Result<Vec<String>> {
+    let part = Part::new(stage, scene)?;
+    let mut notes = Vec::new();
+    for &by in stretches {
+        let mesh = |&e: &u32| Some((e, part.with(&by.beside(&part.bounds, e)?)));
+        let meshes: Vec<(u32, Mesh)> = steps.iter().map_while(mesh).collect();
+        if let Some(e) = steps.get(meshes.len()) {
+            notes.push(format!(
+                "{}, {by}: from e = {e} on {} would lie beyond the largest float; these points are left out.",
+                scene.name,
+                S::WHAT
+            ));
+        }
+        measure_one(stage, &part, by, &meshes, failed, point)?;
+    }
+    Ok(notes)
+}
+
+/// One stretch: every builder over all its meshes.
+fn measure_one<S: Stretch>(
     stage: &Stage<'_>,
     part: &Part<'_>,
-    series: &Series<'_>,
+    by: S,
+    meshes: &[(u32, Mesh)],
     failed: &mut dyn FnMut(Failure),
-    point: &mut dyn FnMut(&Spec, u32, Figures) -> Result<()>,
+    point: &mut dyn FnMut(Stretched<S>) -> Result<()>,
 ) -> Result<()> {
-    let Some((_, first)) = series.meshes.first() else { return Ok(()) };
+    let Some((_, first)) = meshes.first() else { return Ok(()) };
     let truth = tree_of(first);
     for spec in stage.builders {
-        let of = |e: Option<u32>| {
-            let at = e.map_or(String::new(), |e| format!(", e = {e}"));
-            format!("{}, {}, {spec}{at}", part.scene.name, series.name)
-        };
+        let of = format!("{}, {by}, {spec}", part.scene.name);
         let mut base = match Base::new(stage, part, spec, first, &truth) {
             Ok(base) => base,
             Err(error) => {
-                failed(Failure { of: of(None), what: error.to_string() });
+                failed(Failure::named(of, error));
                 continue;
             }
         };
-        for (e, mesh) in series.meshes {
-            (stage.say)(&of(Some(*e)));
+        for (e, mesh) in meshes {
+            let of = format!("{of}, e = {e}");
+            (stage.say)(&of);
             match base.against(stage, spec, mesh) {
                 Ok((figures, faults)) => {
-                    faults.into_iter().for_each(|what| failed(Failure { of: of(Some(*e)), what }));
-                    point(spec, *e, figures)?;
+                    faults.into_iter().for_each(|what| failed(Failure::named(&of, what)));
+                    point(Stretched {
+                        experiment: S::EXPERIMENT,
+                        scene: part.scene.name.clone(),
+                        builder: spec.to_string(),
+                        by,
+                        e: *e,
+                        cost: (S::EXPERIMENT == Experiment::Large).then_some(figures.cost),
+                        relative_cost: figures.relative_cost,
+                        relative_mrays: figures.relative_mrays,
+                    })?;
                 }
-                Err(error) => failed(Failure { of: of(Some(*e)), what: error.to_string() }),
+                Err(error) => failed(Failure::named(of, error)),
             }
         }
     }
     Ok(())
+}
+
+/// What a builder gave at one point.
+struct Figures {
+    /// [`clipped::cost`]; `None` where the builder does not give its tree.
+    cost: Option<f64>,
+    /// The same over that of the first point.
+    relative_cost: Option<f64>,
+    /// Speeds over those of the first point, by kind of ray; without those that had fallen below a twentieth before.
+    relative_mrays: BTreeMap<String, f64>,
 }
 
 /// A builder on the first mesh of a series.

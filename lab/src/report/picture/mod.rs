@@ -5,6 +5,7 @@ mod planes;
 
 use super::numbers::three_digits;
 use crate::experiments::navigate::outline::{Content, Outline};
+use crate::named::named;
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::Scene;
 use crate::subjects::{KD_TREE, Subject};
@@ -15,8 +16,6 @@ use image::{Rgb, RgbImage};
 use legend::Scale;
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 use rayon::prelude::*;
-use std::fmt;
-use std::str::FromStr;
 
 /// What a picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -38,24 +37,17 @@ pub enum View {
     Planes,
 }
 
+named!(View, "view":
+    Shaded = "shaded",
+    Normals = "normals",
+    Steps = "steps",
+    Tests = "tests",
+    Depth = "depth",
+    LeafSize = "leaf-size",
+    Planes = "planes",
+);
+
 impl View {
-    /// All views.
-    pub const ALL: [View; 7] =
-        [View::Shaded, View::Normals, View::Steps, View::Tests, View::Depth, View::LeafSize, View::Planes];
-
-    /// Its name, as `--view` takes it.
-    pub fn name(self) -> &'static str {
-        match self {
-            View::Shaded => "shaded",
-            View::Normals => "normals",
-            View::Steps => "steps",
-            View::Tests => "tests",
-            View::Depth => "depth",
-            View::LeafSize => "leaf-size",
-            View::Planes => "planes",
-        }
-    }
-
     /// Whether a subject can be seen so, before it is built.
     ///
     /// # Errors
@@ -65,23 +57,6 @@ impl View {
             View::Planes if subject.kind() != KD_TREE => Err(planes::needs_kd_tree(subject.builder())),
             _ => Ok(()),
         }
-    }
-}
-
-impl fmt::Display for View {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for View {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<View> {
-        View::ALL.into_iter().find(|view| view.name() == name).ok_or_else(|| {
-            let names = View::ALL.map(View::name).join(", ");
-            Error::Argument(format!("no view is called {name:?}; there are {names}"))
-        })
     }
 }
 

@@ -33,6 +33,13 @@ pub fn note(found: &Found) -> Option<String> {
     })
 }
 
+/// What a reader of the figures must know where the driver has no builder to compare with.
+pub fn missing(device: &Device) -> Option<String> {
+    device.driver_tracing().is_none().then(|| {
+        "The driver has no acceleration structures of its own (VK_KHR_acceleration_structure) to compare with.".into()
+    })
+}
+
 impl<'a> Driver<'a> {
     /// Uploads `mesh` and makes room for the structure.
     ///

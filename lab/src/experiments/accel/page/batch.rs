@@ -1,15 +1,15 @@
 //! The section of batches.
 
-use super::Section;
+use super::Part;
 use crate::Result;
 use crate::experiments::accel::points::{Batch, Maker, Way};
 use crate::report::bars::{self, Bar, Bars};
 use crate::report::chart::Caption;
+use crate::report::columns::Table;
 use crate::report::curves::{self, Axis, Curve};
-use crate::report::elements::{column, number, scroll, spread};
-use crate::report::numbers::{duration, duration_tick, grouped, short_count, three_digits, tick};
+use crate::report::numbers::{count, duration, duration_tick, grouped, short_count, three_digits, tick};
 use crate::report::theme::{SERIES, Tone};
-use maud::html;
+use maud::{Markup, html};
 
 /// Who builds how, in the order of charts and tables.
 const SUBJECTS: [(Option<Maker>, Way); 7] = [
@@ -37,7 +37,7 @@ fn tone(maker: Option<Maker>, way: Way) -> Tone {
     SERIES[[0, 2, 6, 1, 3, 5, 8][place]]
 }
 
-pub(super) fn section(points: &[Batch]) -> Result<Option<Section>> {
+pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
     let Some(most) = points.iter().map(|point| point.structures).max() else { return Ok(None) };
     let largest: Vec<&Batch> = SUBJECTS.iter().filter_map(|&(maker, way)| find(points, most, maker, way)).collect();
     let triangles = largest.first().map_or(0, |point| point.triangles);
@@ -65,7 +65,7 @@ pub(super) fn section(points: &[Batch]) -> Result<Option<Section>> {
     };
     let bars = bars::bars(
         caption,
-        &Bars { bars: all_bars, axis: "wall-clock milliseconds", number: &|v| tick(*v), marks: Vec::new() },
+        &Bars { bars: all_bars, axis: "wall-clock milliseconds", number: tick, marks: Vec::new() },
     )?;
     let curve = |&(maker, way): &(Option<Maker>, Way)| Curve {
         name: name(maker, way),
@@ -89,10 +89,10 @@ pub(super) fn section(points: &[Batch]) -> Result<Option<Section>> {
     let growth = curves::curves(
         caption,
         &all,
-        &Axis { name: "structures", is_log: true, number: &|v| short_count(*v) },
-        &Axis { name: "wall clock", is_log: true, number: &|v| duration_tick(*v) },
+        &Axis { name: "structures", is_log: true, number: short_count },
+        &Axis { name: "wall clock", is_log: true, number: duration_tick },
     )?;
-    Ok(Some(Section {
+    Ok(Some(Part {
         id: "batches",
         title: "Batches",
         charts: bars.into_iter().chain(growth).collect(),
@@ -107,32 +107,23 @@ pub(super) fn section(points: &[Batch]) -> Result<Option<Section>> {
         below: html! {
             details {
                 summary { "All figures" }
-                (scroll("Batches", html! {
-                    table.sortable {
-                        thead { tr {
-                            (column("structures", "", true)) (column("whose", "", false)) (column("how", "", false))
-                            (column("triangles", "", true)) (column("time", "ms", true)) (column("a structure", "µs", true))
-                            (column("over one call of ours", "×", true))
-                        } }
-                        tbody {
-                            @for point in points {
-                                @let whose = point.maker.map_or("–", Maker::name);
-                                tr {
-                                    (number(Some(point.structures.into()), |v| grouped(v as u64)))
-                                    td data-value=(whose) { (whose) }
-                                    td data-value=(point.way.name()) { (point.way.name()) }
-                                    (number(Some(point.triangles as f64), |v| grouped(v as u64)))
-                                    (spread(Some(point.wall_ms), three_digits))
-                                    (number(Some(1e3 * point.wall_ms.median / f64::from(point.structures)), three_digits))
-                                    (spread(Some(point.over_our_call), three_digits))
-                                }
-                            }
-                        }
-                    }
-                }))
+                (every_batch(points))
             }
         },
     }))
+}
+
+fn every_batch(points: &[Batch]) -> Markup {
+    let each = |point: &Batch| 1e3 * point.wall_ms.median / f64::from(point.structures);
+    Table::new("Batches", points)
+        .number("structures", "", |point| Some(point.structures.into()), count)
+        .text("whose", |point| point.maker.map_or("–", Maker::name))
+        .text("how", |point| point.way.name())
+        .number("triangles", "", |point| Some(point.triangles as f64), count)
+        .spread("time", "ms", |point| Some(point.wall_ms), three_digits)
+        .number("a structure", "µs", move |point| Some(each(point)), three_digits)
+        .spread("over one call of ours", "×", |point| Some(point.over_our_call), three_digits)
+        .html()
 }
 
 /// One call of ours against the others, in a sentence.

@@ -5,18 +5,21 @@
 
 mod batch;
 mod goals;
-mod layout;
 mod rebraid;
 mod top_level;
 mod update;
 
-use crate::experiments::accel::points::{Batch, Entry, Failure, Rebraid, Setting, TopLevel, Update};
+use crate::Result;
+use crate::experiments::accel::points::{Batch, Entry, Rebraid, TopLevel, Update};
+use crate::measure::setting::{Failure, Setting};
 use crate::report::beside;
 use crate::report::chart::Chart;
+use crate::report::columns::Table;
+use crate::report::document::{self, Document, Section};
 use crate::report::lines;
-use crate::report::write_charts;
-use crate::{Error, Result};
-use maud::Markup;
+use crate::report::numbers::three_digits;
+use goals::Goal;
+use maud::{Markup, html};
 use std::path::{Path, PathBuf};
 
 impl lines::Entry for Entry {
@@ -63,8 +66,42 @@ impl From<Vec<Entry>> for Measured {
     }
 }
 
-/// A part of the page.
-struct Section {
+/// Writes `accel.html` and its charts into `folder`, from the `accel.jsonl` there; gives the page's path. The page names the
+/// others that lie there.
+///
+/// # Errors
+/// The records cannot be read; a file cannot be written.
+pub fn write(folder: &Path) -> Result<PathBuf> {
+    let measured = Measured::from(read(folder)?);
+    let setting = measured.setting.as_ref();
+    let parts: Vec<Part> = [
+        batch::part(&measured.batches)?,
+        top_level::part(&measured.top_levels)?,
+        rebraid::part(&measured.rebraids)?,
+        update::part(&measured.updates)?,
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let mut sections = vec![Section::new("summary", "Summary", summary(setting, &goals::goals(&measured)))];
+    sections.extend(parts.iter().map(|part| Section::new(part.id, part.title, part.body())));
+    sections.push(Section::method(Some(beside::ACCEL.records), terms()));
+    let document = Document {
+        tab: "batches, top levels, re-braiding, updates".into(),
+        kicker: "hedgerow benchmark",
+        title: "Structures as engines use them".into(),
+        lead: "Batches of small builds, top levels of many instances, re-braiding, and updates, through the calls of \
+               VK_KHR_acceleration_structure: ours in compute shaders, and the driver's by the same calls, in turn in one process."
+            .into(),
+        setting,
+        failures: document::told(&measured.failures),
+        sections,
+    };
+    document.write(folder, &beside::ACCEL, parts.iter().flat_map(|part| &part.charts))
+}
+
+/// What an experiment has on the page.
+struct Part {
     id: &'static str,
     title: &'static str,
     charts: Vec<Chart>,
@@ -73,25 +110,64 @@ struct Section {
     below: Markup,
 }
 
-/// Writes `accel.html` and its charts into `folder`, from the `accel.jsonl` there; gives the page's path. The page names the
-/// others that lie there.
-///
-/// # Errors
-/// The records cannot be read; a file cannot be written.
-pub fn write(folder: &Path) -> Result<PathBuf> {
-    let measured = Measured::from(read(folder)?);
-    let sections: Vec<Section> = [
-        batch::section(&measured.batches)?,
-        top_level::section(&measured.top_levels)?,
-        rebraid::section(&measured.rebraids)?,
-        update::section(&measured.updates)?,
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
-    write_charts(folder, sections.iter().flat_map(|section| &section.charts))?;
-    let page = layout::page(&measured, &goals::goals(&measured), &sections, &beside::links(folder, beside::ACCEL.file));
-    let path = folder.join("accel.html");
-    std::fs::write(&path, page).map_err(Error::file(&path))?;
-    Ok(path)
+impl Part {
+    fn body(&self) -> Markup {
+        html! { (self.above) (document::charts(&self.charts)) (self.below) }
+    }
+}
+
+/// What was to be reached, and whether it is.
+fn summary(setting: Option<&Setting>, goals: &[Goal]) -> Markup {
+    let (met, all) = (goals.iter().filter(|goal| goal.is_met()).count(), goals.len());
+    html! {
+        @if goals.is_empty() { p { "Nothing that has a goal was measured." } } @else {
+            p {
+                "Goals met: " (met) " of " (all) ". Ratios of times, in the median of the runs and from the least to the greatest: above 1, "
+                "the first is faster. Those over all kinds of rays are geometric means, from the kind that gains least to that which gains "
+                "most."
+            }
+        }
+        @for note in setting.map_or(&[][..], |setting| &setting.notes) { p.note { (note) } }
+        @if !goals.is_empty() { (goal_table(goals)) }
+    }
+}
+
+fn goal_table(goals: &[Goal]) -> Markup {
+    Table::new("Goals", goals)
+        .id("goals")
+        .name("what", |goal| &goal.what)
+        .spread("is", "×", |goal| Some(goal.ratio), three_digits)
+        .number("shall be at least", "×", |goal| Some(goal.least), three_digits)
+        .cell("verdict", |goal| {
+            let verdict = goal.verdict();
+            html! { td .met[goal.is_met()] .wrong[!goal.is_met()] data-value=(verdict) { (verdict) } }
+        })
+        .html()
+}
+
+fn terms() -> Markup {
+    html! {
+        dt { "In turn" }
+        dd {
+            "Everything that is compared runs in turn in one process, A B A B, after a warm-up that does not count. Ratios are taken run "
+            "by run, so that what slows down a run slows both."
+        }
+        dt { "Times" }
+        dd {
+            "Of batches by the wall's clock, from before the recording of the commands to behind the wait for them. Each submit has a command "
+            "pool and a fence of its own; what that takes stands beside them as empty submits. All others by the device's timestamps."
+        }
+        dt { "The driver" }
+        dd {
+            "Its own structures, built by the same structs with the same flags, and traced by ray queries in the same shader as ours."
+        }
+        dt { "Rays" }
+        dd {
+            b { "primary" } " through the camera's pixels; from what they hit: " b { "shadow" } " to the lights, " b { "ao" }
+            " four short rays around the normal, " b { "diffuse1" } " one cosine-weighted bounce and " b { "diffuse2" } " the next, "
+            b { "reflection" } " the mirror direction; " b { "random" } " between points of the sphere around the scene."
+        }
+        dt { "SAH cost" }
+        dd { "Expected work of a random ray: (3 · Σ area of inner nodes + 2 · Σ area × triangles of leaves) / area of the root." }
+    }
 }

@@ -1,23 +1,23 @@
 //! The section of re-braiding.
 
-use super::Section;
+use super::Part;
 use super::goals::{self, mean_gain, overlaps};
 use crate::Result;
-use crate::experiments::accel::points::{BraidedRays, Rebraid, Side};
+use crate::experiments::accel::points::{BraidedRays, Rebraid, Side, Work};
 use crate::report::bars::{self, Bar, Bars};
 use crate::report::chart::{Caption, Chart};
-use crate::report::elements::{column, number, scroll, spread};
+use crate::report::columns::Table;
 use crate::report::names::slug;
-use crate::report::numbers::{grouped, short_count, three_digits, tick};
+use crate::report::numbers::{count, grouped, short_count, three_digits, tick, whole};
 use crate::report::theme::SERIES;
 use maud::{Markup, html};
 
-pub(super) fn section(points: &[Rebraid]) -> Result<Option<Section>> {
+pub(super) fn part(points: &[Rebraid]) -> Result<Option<Part>> {
     if points.is_empty() {
         return Ok(None);
     }
     let charts: Vec<Option<Chart>> = points.iter().map(chart).collect::<Result<_>>()?;
-    Ok(Some(Section {
+    Ok(Some(Part {
         id: "rebraid",
         title: "Re-braiding",
         charts: charts.into_iter().flatten().collect(),
@@ -31,14 +31,14 @@ pub(super) fn section(points: &[Rebraid]) -> Result<Option<Section>> {
             }
         },
         below: html! {
-            (scroll("Re-braiding, building", buildings(points)))
+            (buildings(points))
             details {
                 summary { "Rays and their work" }
                 p {
                     "Nodes of the top level, instances entered, nodes below and triangles tested, in the mean over the rays: first "
                     "through the plain top level, then through the re-braided one."
                 }
-                (scroll("Re-braiding, rays", tracing(points)))
+                (tracing(points))
             }
         },
     }))
@@ -82,7 +82,7 @@ fn chart(point: &Rebraid) -> Result<Option<Chart>> {
         &Bars {
             bars: all,
             axis: "time without / time with",
-            number: &|v| tick(*v),
+            number: tick,
             marks: vec![(goal, format!("goal {goal}"))],
         },
     )
@@ -90,72 +90,42 @@ fn chart(point: &Rebraid) -> Result<Option<Chart>> {
 
 /// What building takes with and without, beside the driver's.
 fn buildings(points: &[Rebraid]) -> Markup {
-    let sides = |point: &Rebraid| -> Vec<(&'static str, Side)> {
-        let ours = [("hedgerow", &point.off), ("hedgerow, re-braided", &point.on)];
-        let all = ours.into_iter().chain(point.driver.as_ref().map(|side| ("driver", side)));
-        all.map(|(name, side)| (name, side.clone())).collect()
-    };
-    html! {
-        table.sortable {
-            thead { tr {
-                (column("scene", "", false)) (column("top level", "", false)) (column("instances", "", true))
-                (column("entries", "", true)) (column("build", "ms", true)) (column("structure", "B/instance", true))
-                (column("scratch", "B/instance", true))
-            } }
-            tbody {
-                @for point in points {
-                    @for (name, side) in sides(point) {
-                        @let an_instance = |bytes: u64| Some(bytes as f64 / f64::from(point.instances));
-                        tr {
-                            th scope="row" data-value=(point.scene) { (point.scene) }
-                            td data-value=(name) { (name) }
-                            (number(Some(point.instances.into()), |v| grouped(v as u64)))
-                            (number(side.entries.map(f64::from), |v| grouped(v as u64)))
-                            (spread(Some(side.build_ms), three_digits))
-                            (number(an_instance(side.structure_bytes), |v| format!("{v:.0}")))
-                            (number(an_instance(side.scratch_bytes), |v| format!("{v:.0}")))
-                        }
-                    }
-                }
-            }
-        }
+    let mut rows: Vec<(&Rebraid, &str, &Side)> = Vec::new();
+    for point in points {
+        rows.extend([(point, "hedgerow", &point.off), (point, "hedgerow, re-braided", &point.on)]);
+        rows.extend(point.driver.as_ref().map(|side| (point, "driver", side)));
     }
+    let an_instance = |point: &Rebraid, bytes: u64| Some(bytes as f64 / f64::from(point.instances));
+    Table::new("Re-braiding, building", rows)
+        .name("scene", |(point, ..)| &point.scene)
+        .text("top level", |(_, name, _)| *name)
+        .number("instances", "", |(point, ..)| Some(point.instances.into()), count)
+        .number("entries", "", |(.., side)| side.entries.map(f64::from), count)
+        .spread("build", "ms", |(.., side)| Some(side.build_ms), three_digits)
+        .number("structure", "B/instance", move |(point, _, side)| an_instance(point, side.structure_bytes), whole)
+        .number("scratch", "B/instance", move |(point, _, side)| an_instance(point, side.scratch_bytes), whole)
+        .html()
 }
 
 /// Every kind of ray in every scene.
 fn tracing(points: &[Rebraid]) -> Markup {
+    let rows = points.iter().flat_map(|point| point.rays.iter().map(|rays| (point.scene.as_str(), rays)));
     let mrays_s = |rays: &BraidedRays, milliseconds: f64| Some(rays.count as f64 / (milliseconds * 1e3));
-    let both = |off: f64, on: f64| {
+    let both = |rays: &BraidedRays, of: fn(&Work) -> f64| {
+        let [off, on] = [of(&rays.off_work), of(&rays.on_work)];
         html! { td.number data-value=(on) { (three_digits(off)) " → " (three_digits(on)) } }
     };
-    html! {
-        table.sortable {
-            thead { tr {
-                (column("scene", "", false)) (column("rays", "", false)) (column("count", "", true)) (column("gain", "×", true))
-                (column("without", "Mrays/s", true)) (column("with", "Mrays/s", true)) (column("driver", "Mrays/s", true))
-                (column("top nodes", "", true)) (column("instances", "", true)) (column("nodes below", "", true))
-                (column("tests", "", true))
-            } }
-            tbody {
-                @for point in points {
-                    @for rays in &point.rays {
-                        @let (off, on) = (rays.off_work, rays.on_work);
-                        tr {
-                            th scope="row" data-value=(point.scene) { (point.scene) }
-                            td data-value=(rays.rays) { (rays.rays) }
-                            (number(Some(rays.count as f64), short_count))
-                            (spread(Some(rays.gain), three_digits))
-                            (number(mrays_s(rays, rays.off_ms.median), three_digits))
-                            (number(mrays_s(rays, rays.on_ms.median), three_digits))
-                            (number(rays.driver_ms.and_then(|ms| mrays_s(rays, ms.median)), three_digits))
-                            (both(off.top_nodes, on.top_nodes))
-                            (both(off.instances, on.instances))
-                            (both(off.nodes_below, on.nodes_below))
-                            (both(off.tests, on.tests))
-                        }
-                    }
-                }
-            }
-        }
-    }
+    Table::new("Re-braiding, rays", rows)
+        .name("scene", |(scene, _)| *scene)
+        .text("rays", |(_, rays)| &rays.rays)
+        .number("count", "", |(_, rays)| Some(rays.count as f64), short_count)
+        .spread("gain", "×", |(_, rays)| Some(rays.gain), three_digits)
+        .number("without", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.off_ms.median), three_digits)
+        .number("with", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.on_ms.median), three_digits)
+        .number("driver", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.driver_ms?.median), three_digits)
+        .figure("top nodes", "", move |(_, rays)| both(rays, |work| work.top_nodes))
+        .figure("instances", "", move |(_, rays)| both(rays, |work| work.instances))
+        .figure("nodes below", "", move |(_, rays)| both(rays, |work| work.nodes_below))
+        .figure("tests", "", move |(_, rays)| both(rays, |work| work.tests))
+        .html()
 }

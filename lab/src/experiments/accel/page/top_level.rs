@@ -1,17 +1,17 @@
 //! The section of top levels.
 
-use super::Section;
+use super::Part;
 use crate::Result;
 use crate::experiments::accel::points::{Maker, TopLevel};
 use crate::measure::statistics::Spread;
 use crate::report::chart::Caption;
+use crate::report::columns::Table;
 use crate::report::curves::{self, Axis, Curve};
-use crate::report::elements::{column, number, scroll, spread};
-use crate::report::numbers::{duration_tick, grouped, short_count, three_digits};
+use crate::report::numbers::{count, duration_tick, grouped, one_decimal, short_count, three_digits};
 use crate::report::theme::SERIES;
-use maud::html;
+use maud::{Markup, html};
 
-pub(super) fn section(points: &[TopLevel]) -> Result<Option<Section>> {
+pub(super) fn part(points: &[TopLevel]) -> Result<Option<Part>> {
     if points.is_empty() {
         return Ok(None);
     }
@@ -40,11 +40,10 @@ pub(super) fn section(points: &[TopLevel]) -> Result<Option<Section>> {
     let chart = curves::curves(
         caption,
         &all,
-        &Axis { name: "instances", is_log: true, number: &|v| short_count(*v) },
-        &Axis { name: "device time", is_log: true, number: &|v| duration_tick(*v) },
+        &Axis { name: "instances", is_log: true, number: short_count },
+        &Axis { name: "device time", is_log: true, number: duration_tick },
     )?;
-    let an_instance = |point: &TopLevel, bytes: u64| Some(bytes as f64 / f64::from(point.instances));
-    Ok(Some(Section {
+    Ok(Some(Part {
         id: "tlas",
         title: "Top levels",
         charts: chart.into_iter().collect(),
@@ -54,32 +53,22 @@ pub(super) fn section(points: &[TopLevel]) -> Result<Option<Section>> {
                 "instance has moved by a tenth of its cell. By the device's timestamps."
             }
         },
-        below: scroll(
-            "Top levels",
-            html! {
-                table.sortable {
-                    thead { tr {
-                        (column("instances", "", true)) (column("whose", "", false)) (column("build", "ms", true))
-                        (column("update", "ms", true)) (column("update / build", "×", true))
-                        (column("structure", "B/instance", true)) (column("scratch", "B/instance", true))
-                    } }
-                    tbody {
-                        @for point in points {
-                            tr {
-                                (number(Some(point.instances.into()), |v| grouped(v as u64)))
-                                td data-value=(point.maker.name()) { (point.maker.name()) }
-                                (spread(Some(point.build_ms), three_digits))
-                                (spread(point.update_ms, three_digits))
-                                (number(point.update_ms.map(|update| update.median / point.build_ms.median), three_digits))
-                                (number(an_instance(point, point.structure_bytes), |v| format!("{v:.1}")))
-                                (number(an_instance(point, point.scratch_bytes), |v| format!("{v:.1}")))
-                            }
-                        }
-                    }
-                }
-            },
-        ),
+        below: every_level(points),
     }))
+}
+
+fn every_level(points: &[TopLevel]) -> Markup {
+    let an_instance = |point: &TopLevel, bytes: u64| Some(bytes as f64 / f64::from(point.instances));
+    let share = |point: &TopLevel| Some(point.update_ms?.median / point.build_ms.median);
+    Table::new("Top levels", points)
+        .number("instances", "", |point| Some(point.instances.into()), count)
+        .text("whose", |point| point.maker.name())
+        .spread("build", "ms", |point| Some(point.build_ms), three_digits)
+        .spread("update", "ms", |point| point.update_ms, three_digits)
+        .number("update / build", "×", move |point| share(point), three_digits)
+        .number("structure", "B/instance", move |point| an_instance(point, point.structure_bytes), one_decimal)
+        .number("scratch", "B/instance", move |point| an_instance(point, point.scratch_bytes), one_decimal)
+        .html()
 }
 
 /// The largest top level in a sentence, ours against the driver's.

@@ -1,18 +1,18 @@
 //! The section of updates.
 
-use super::Section;
+use super::Part;
 use crate::Result;
-use crate::experiments::accel::points::{Maker, Update, UpdatedRays};
+use crate::experiments::accel::points::{Maker, Update};
 use crate::measure::statistics::Spread;
 use crate::report::chart::{Caption, Chart};
+use crate::report::columns::Table;
 use crate::report::curves::{self, Axis, Curve};
-use crate::report::elements::{column, number, scroll, spread};
 use crate::report::names::slug;
-use crate::report::numbers::{duration_tick, grouped, short_count, three_digits, tick};
+use crate::report::numbers::{duration_tick, grouped, short_count, three_digits, tick, whole};
 use crate::report::theme::{SERIES, Tone};
 use maud::{Markup, html};
 
-pub(super) fn section(points: &[Update]) -> Result<Option<Section>> {
+pub(super) fn part(points: &[Update]) -> Result<Option<Part>> {
     let mut scenes: Vec<&str> = points.iter().map(|point| point.scene.as_str()).collect();
     scenes.dedup();
     if scenes.is_empty() {
@@ -27,7 +27,7 @@ pub(super) fn section(points: &[Update]) -> Result<Option<Section>> {
         readings.push((scene, reading(&frames)));
     }
     let is_missing = points.iter().any(|point| point.maker == Maker::Ours && point.update_ms.is_none());
-    Ok(Some(Section {
+    Ok(Some(Part {
         id: "updates",
         title: "Updating against building from scratch",
         charts,
@@ -47,7 +47,7 @@ pub(super) fn section(points: &[Update]) -> Result<Option<Section>> {
                     "Growth is what the structure itself tells of its SAH cost since it was built. Building from scratch pays from as many rays a "
                     "frame on, in the mix that was traced, as save by the better tree what building takes longer."
                 }
-                (scroll("Updates", table(points)))
+                (every_frame(points))
             }
         },
     }))
@@ -85,18 +85,17 @@ fn times(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
             in_words.join("; ")
         ),
     };
-    let x = Axis { name: "frame", is_log: false, number: &|v| tick(*v) };
-    curves::curves(caption, &all, &x, &Axis { name: "device time", is_log: true, number: &|v| duration_tick(*v) })
+    let x = Axis { name: "frame", is_log: false, number: tick };
+    curves::curves(caption, &all, &x, &Axis { name: "device time", is_log: true, number: duration_tick })
 }
 
 fn quality(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
-    let one = |value: f64| Spread { median: value, min: value, max: value, runs: 1 };
-    let against = |point: &Update| Some(one(point.updated_sah? / point.built_sah?));
+    let against = |point: &Update| Some(Spread::once(point.updated_sah? / point.built_sah?));
     let all = [
-        curve(frames, Maker::Ours, "SAH growth", SERIES[4], |point| point.growth.map(one)),
+        curve(frames, Maker::Ours, "SAH growth", SERIES[4], |point| point.growth.map(Spread::once)),
         curve(frames, Maker::Ours, "SAH / anew", SERIES[0], against),
-        curve(frames, Maker::Ours, "time of rays / anew", SERIES[2], |point| point.slowdown().map(one)),
-        curve(frames, Maker::Driver, "time of rays / anew", SERIES[5], |point| point.slowdown().map(one)),
+        curve(frames, Maker::Ours, "time of rays / anew", SERIES[2], |point| point.slowdown().map(Spread::once)),
+        curve(frames, Maker::Driver, "time of rays / anew", SERIES[5], |point| point.slowdown().map(Spread::once)),
     ];
     let all: Vec<Curve> = all.into_iter().filter(|curve| !curve.points.is_empty()).collect();
     let caption = Caption {
@@ -107,8 +106,8 @@ fn quality(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
                   time of all rays through it, over those of a structure built from scratch. 1 is as good as new."
             .into(),
     };
-    let x = Axis { name: "frame", is_log: false, number: &|v| tick(*v) };
-    curves::curves(caption, &all, &x, &Axis { name: "times as much", is_log: false, number: &|v| tick(*v) })
+    let x = Axis { name: "frame", is_log: false, number: tick };
+    curves::curves(caption, &all, &x, &Axis { name: "times as much", is_log: false, number: tick })
 }
 
 /// From where on building anew pays, in a sentence.
@@ -154,36 +153,22 @@ fn reading(frames: &[&Update]) -> String {
     )
 }
 
-fn table(points: &[Update]) -> Markup {
-    let kinds: Vec<&UpdatedRays> =
-        points.iter().max_by_key(|point| point.rays.len()).map_or(vec![], |point| point.rays.iter().collect());
-    let of =
+fn every_frame(points: &[Update]) -> Markup {
+    let most = points.iter().max_by_key(|point| point.rays.len());
+    let kinds = most.into_iter().flat_map(|point| point.rays.iter().map(|rays| rays.rays.as_str()));
+    let slowdown =
         |point: &Update, kind: &str| point.rays.iter().find(|rays| rays.rays == kind).and_then(|rays| rays.slowdown);
-    html! {
-        table.sortable {
-            thead { tr {
-                (column("scene", "", false)) (column("frame", "", true)) (column("whose", "", false)) (column("build", "ms", true))
-                (column("update", "ms", true)) (column("growth", "×", true)) (column("SAH updated", "", true))
-                (column("SAH anew", "", true))
-                @for kind in &kinds { (column(&format!("{}, updated / anew", kind.rays), "×", true)) }
-                (column("anew pays from", "rays a frame", true))
-            } }
-            tbody {
-                @for point in points {
-                    tr {
-                        th scope="row" data-value=(point.scene) { (point.scene) }
-                        (number(Some(point.frame.into()), |v| format!("{v:.0}")))
-                        td data-value=(point.maker.name()) { (point.maker.name()) }
-                        (spread(Some(point.build_ms), three_digits))
-                        (spread(point.update_ms, three_digits))
-                        (number(point.growth, three_digits))
-                        (number(point.updated_sah, three_digits))
-                        (number(point.built_sah, three_digits))
-                        @for kind in &kinds { (spread(of(point, &kind.rays), three_digits)) }
-                        (number(point.pays_from(), short_count))
-                    }
-                }
-            }
-        }
-    }
+    let table = Table::new("Updates", points)
+        .name("scene", |point| &point.scene)
+        .number("frame", "", |point| Some(point.frame.into()), whole)
+        .text("whose", |point| point.maker.name())
+        .spread("build", "ms", |point| Some(point.build_ms), three_digits)
+        .spread("update", "ms", |point| point.update_ms, three_digits)
+        .number("growth", "×", |point| point.growth, three_digits)
+        .number("SAH updated", "", |point| point.updated_sah, three_digits)
+        .number("SAH anew", "", |point| point.built_sah, three_digits);
+    let table = kinds.fold(table, |table, kind| {
+        table.spread(&format!("{kind}, updated / anew"), "×", move |point| slowdown(point, kind), three_digits)
+    });
+    table.number("anew pays from", "rays a frame", |point| point.pays_from(), short_count).html()
 }

@@ -130,8 +130,8 @@ fn frames(scene: &str, points: &[Animated]) -> Result<Option<Chart>> {
                   slowest run."
             .into(),
     };
-    let x = Axis { name: "frame", is_log: false, number: &|v| tick(*v) };
-    let y = Axis { name: "time of a frame", is_log: true, number: &|v| duration_tick(*v) };
+    let x = Axis { name: "frame", is_log: false, number: tick };
+    let y = Axis { name: "time of a frame", is_log: true, number: duration_tick };
     curves::curves(caption, &over_frames(points, total), &x, &y)
 }
 
@@ -142,7 +142,7 @@ fn builds(scene: &str, points: &[Animated]) -> Result<Option<Chart>> {
         alt: "What is built in every frame in each way: its time".into(),
         reading: "What a way must do a frame before rays can be traced; the vertical axis is logarithmic.".into(),
     };
-    let x = Axis { name: "frame", is_log: false, number: &|v| tick(*v) };
-    let y = Axis { name: "build time", is_log: true, number: &|v| duration_tick(*v) };
+    let x = Axis { name: "frame", is_log: false, number: tick };
+    let y = Axis { name: "build time", is_log: true, number: duration_tick };
     curves::curves(caption, &over_frames(points, |point| point.build_ms), &x, &y)
 }

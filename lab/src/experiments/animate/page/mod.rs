@@ -3,14 +3,15 @@
 //! The page follows from the records alone: whoever has them can write it again.
 
 mod charts;
-mod layout;
+mod parts;
 pub mod standings;
 
-use crate::experiments::animate::points::{Animated, Entry, Failure, Setting};
+use crate::Result;
+use crate::experiments::animate::points::{Animated, Entry, SceneSetting, WayInFrame};
+use crate::measure::setting::Failure;
 use crate::report::beside;
+use crate::report::document::{self, Document, Section};
 use crate::report::lines;
-use crate::report::write_charts;
-use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 impl lines::Entry for Entry {
@@ -32,9 +33,9 @@ pub fn read(path: &Path) -> Result<Vec<Entry>> {
 /// The records, by what they are of.
 #[derive(Debug, Default)]
 struct Measured {
-    setting: Option<Setting>,
+    setting: Option<SceneSetting>,
     frames: Vec<Animated>,
-    failures: Vec<Failure>,
+    failures: Vec<Failure<WayInFrame>>,
 }
 
 impl From<Vec<Entry>> for Measured {
@@ -59,9 +60,28 @@ impl From<Vec<Entry>> for Measured {
 pub fn write(folder: &Path) -> Result<PathBuf> {
     let measured = Measured::from(read(folder)?);
     let charts = charts::all(&measured)?;
-    write_charts(folder, charts.iter())?;
-    let page = layout::page(&measured, &charts, &beside::links(folder, beside::ANIMATE.file));
-    let path = folder.join(beside::ANIMATE.file);
-    std::fs::write(&path, page).map_err(Error::file(&path))?;
-    Ok(path)
+    let setting = measured.setting.as_ref();
+    let scene = setting.map_or("", |setting| setting.scene.as_str());
+    let mut sections = vec![Section::new("summary", "Summary", parts::summary(setting, &measured.frames, &charts))];
+    if let Some(setting) = setting.filter(|setting| !setting.pictures.is_empty()) {
+        sections.push(Section::new("pictures", "Frames", parts::pictures(setting)));
+    }
+    sections.extend([
+        Section::new("frames", "Every frame", parts::every_frame(&measured.frames)),
+        Section::new("published", "Published figures", parts::published()),
+        Section::method(Some(beside::ANIMATE.records), parts::terms(setting)),
+    ]);
+    let document = Document {
+        tab: format!("{scene}, frame by frame"),
+        kicker: "hedgerow animate",
+        title: format!("{scene}, frame by frame"),
+        lead: "Ways to have something to trace when some of a scene moves: all of it built from scratch, a tree beside the static \
+               one, a tree of each object, a top level over instances, and objects' trees that are merged into the static one and \
+               taken out again."
+            .into(),
+        setting: setting.map(|setting| &setting.setting),
+        failures: document::told(&measured.failures),
+        sections,
+    };
+    document.write(folder, &beside::ANIMATE, charts.iter())
 }

@@ -4,111 +4,61 @@
 pub mod published;
 
 use crate::measure::record::{Record, Trace};
-use crate::report::elements::{column, number, scroll};
+use crate::report::columns;
+use crate::report::elements::number;
 use crate::report::names::{short, slug};
-use crate::report::numbers::{grouped, three_digits};
+use crate::report::numbers::{count, grouped, one_decimal, three_digits, two_decimals};
 use crate::report::table::STYLE;
 use crate::subjects::KD_TREE;
 use comfy_table::{CellAlignment, Table};
 use maud::{Markup, html};
 use published::{Published, Row};
 
-/// A figure of a tree: its name and unit, in a record, in a file of published figures, and as text.
-struct Figure {
+/// A figure: its name and unit, in what was measured, in a file of published figures, and as text.
+struct Figure<R> {
     name: &'static str,
     unit: &'static str,
-    ours: fn(&Record) -> Option<f64>,
+    ours: fn(&R) -> Option<f64>,
     theirs: &'static str,
     text: fn(f64) -> String,
 }
 
-fn count(value: f64) -> String {
-    grouped(value as u64)
-}
-
-fn two_decimals(value: f64) -> String {
-    format!("{value:.2}")
+impl<R> Figure<R> {
+    const fn new(
+        [name, unit, theirs]: [&'static str; 3],
+        text: fn(f64) -> String,
+        ours: fn(&R) -> Option<f64>,
+    ) -> Figure<R> {
+        Figure { name, unit, ours, theirs, text }
+    }
 }
 
 fn ratio(a: Option<u64>, b: Option<u64>) -> Option<f64> {
     a.zip(b.filter(|&b| b > 0)).map(|(a, b)| a as f64 / b as f64)
 }
 
-const TREE: [Figure; 9] = [
-    Figure {
-        name: "nodes",
-        unit: "",
-        ours: |r| r.quality.inner.zip(r.quality.leaves).map(|(inner, leaves)| (inner + leaves) as f64),
-        theirs: "nodes",
-        text: count,
-    },
-    Figure {
-        name: "inner / leaves",
-        unit: "",
-        ours: |r| ratio(r.quality.inner, r.quality.leaves),
-        theirs: "inner_to_leaf",
-        text: two_decimals,
-    },
-    Figure {
-        name: "full / empty",
-        unit: "",
-        ours: |r| {
-            let full = r.quality.leaves.zip(r.quality.empty_leaves).map(|(all, empty)| all - empty);
-            ratio(full, r.quality.empty_leaves)
-        },
-        theirs: "nonempty_to_empty_leaf",
-        text: two_decimals,
-    },
-    Figure {
-        name: "leaf size",
-        unit: "mean",
-        ours: |r| r.quality.prims_per_leaf,
-        theirs: "avg_prims_leaf",
-        text: two_decimals,
-    },
-    Figure {
-        name: "leaf size",
-        unit: "most",
-        ours: |r| r.quality.prims_per_leaf_max.map(|most| most as f64),
-        theirs: "max_prims_leaf",
-        text: count,
-    },
-    Figure {
-        name: "depth",
-        unit: "mean",
-        ours: |r| r.quality.depth_avg,
-        theirs: "avg_depth",
-        text: |v| format!("{v:.1}"),
-    },
-    Figure { name: "cost", unit: "", ours: |r| r.quality.sah, theirs: "cost", text: two_decimals },
-    Figure {
-        name: "build",
-        unit: "ms",
-        ours: |r| Some(r.build.median_ms),
-        theirs: "build_dynamic_ms",
-        text: three_digits,
-    },
-    Figure {
-        name: "memory",
-        unit: "MB",
-        ours: |r| r.memory.structure_bytes.map(|bytes| bytes as f64 * 1e-6),
-        theirs: "memory_mb",
-        text: three_digits,
-    },
-];
-
-/// A figure of rays, likewise.
-struct RayFigure {
-    name: &'static str,
-    unit: &'static str,
-    ours: fn(&Trace) -> Option<f64>,
-    theirs: &'static str,
+fn full_leaves(record: &Record) -> Option<u64> {
+    Some(record.quality.leaves? - record.quality.empty_leaves?)
 }
 
-const RAYS: [RayFigure; 3] = [
-    RayFigure { name: "tests", unit: "a ray", ours: |t| t.tests, theirs: "tests_per_ray" },
-    RayFigure { name: "steps", unit: "a ray", ours: |t| t.steps, theirs: "steps_per_ray" },
-    RayFigure { name: "speed", unit: "Mrays/s", ours: |t| Some(t.mrays_s), theirs: "mrays_s" },
+const TREE: [Figure<Record>; 9] = [
+    Figure::new(["nodes", "", "nodes"], count, |r| Some((r.quality.inner? + r.quality.leaves?) as f64)),
+    Figure::new(["inner / leaves", "", "inner_to_leaf"], two_decimals, |r| ratio(r.quality.inner, r.quality.leaves)),
+    Figure::new(["full / empty", "", "nonempty_to_empty_leaf"], two_decimals, |r| {
+        ratio(full_leaves(r), r.quality.empty_leaves)
+    }),
+    Figure::new(["leaf size", "mean", "avg_prims_leaf"], two_decimals, |r| r.quality.prims_per_leaf),
+    Figure::new(["leaf size", "most", "max_prims_leaf"], count, |r| Some(r.quality.prims_per_leaf_max? as f64)),
+    Figure::new(["depth", "mean", "avg_depth"], one_decimal, |r| r.quality.depth_avg),
+    Figure::new(["cost", "", "cost"], two_decimals, |r| r.quality.sah),
+    Figure::new(["build", "ms", "build_dynamic_ms"], three_digits, |r| Some(r.build.median_ms)),
+    Figure::new(["memory", "MB", "memory_mb"], three_digits, |r| Some(r.memory.structure_bytes? as f64 * 1e-6)),
+];
+
+const RAYS: [Figure<Trace>; 3] = [
+    Figure::new(["tests", "a ray", "tests_per_ray"], three_digits, |t| t.tests),
+    Figure::new(["steps", "a ray", "steps_per_ray"], three_digits, |t| t.steps),
+    Figure::new(["speed", "Mrays/s", "mrays_s"], three_digits, |t| Some(t.mrays_s)),
 ];
 
 /// What the thesis' rays are called where kinds are.
@@ -166,96 +116,64 @@ fn with_header(numbers: usize, figures: impl Iterator<Item = String>, names: &[&
     table
 }
 
-/// Both tables for the page; nothing without a kd-tree.
+/// Both tables for the page.
 pub(crate) fn section(records: &[&Record], published: &Published) -> Markup {
     let ours = of(records);
-    if ours.is_empty() {
-        return html! {};
-    }
     html! {
-        section #kd-trees {
-            h2 { "kd-trees" }
-            p {
-                "In the tables of Papay 2025, " i { "Efficient ray tracing algorithms exploiting kd-trees on a GPU" } ", appendix D. Nodes count "
-                "leaves that hold nothing, full leaves are the others, and their size is the number of triangles in one."
+        p {
+            "In the tables of Papay 2025, " i { "Efficient ray tracing algorithms exploiting kd-trees on a GPU" } ", appendix D. Nodes count "
+            "leaves that hold nothing, full leaves are the others, and their size is the number of triangles in one."
+        }
+        @if let Some(file) = &published.file {
+            p.note { "Below each table, in grey, are the published figures of " code { (file) } ": context, never a result." }
+        } @else {
+            p.note {
+                "Below each table, in grey, is what was published there: context, not to be compared row by row. Its scenes are not ours, "
+                "not even those of the same name; what a step and a test cost in its SAH is not in the text that is left; its times are of "
+                "another machine (Ryzen 5600, one thread; RTX 4080), its nodes have 16 bytes, its rays are those of its own pictures."
             }
-            @if let Some(file) = &published.file {
-                p.note { "Below each table, in grey, are the published figures of " code { (file) } ": context, never a result." }
-            } @else {
-                p.note {
-                    "Below each table, in grey, is what was published there: context, not to be compared row by row. Its scenes are not ours, "
-                    "not even those of the same name; what a step and a test cost in its SAH is not in the text that is left; its times are of "
-                    "another machine (Ryzen 5600, one thread; RTX 4080), its nodes have 16 bytes, its rays are those of its own pictures."
-                }
-            }
-            (scroll("kd-trees", trees(&ours, &published.rows)))
-            @if ours.iter().any(|record| !record.trace.is_empty()) {
-                h3 { "Tests and steps" }
-                (scroll("Tests and steps of rays through kd-trees", rays(&ours, &published.rows)))
-            }
+        }
+        (trees(&ours, &published.rows))
+        @if ours.iter().any(|record| !record.trace.is_empty()) {
+            h3 { "Tests and steps" }
+            (rays(&ours, &published.rows))
         }
     }
 }
 
 fn trees(ours: &[&Record], published: &[Row]) -> Markup {
-    html! {
-        table.sortable #kd-tree-table {
-            caption.hidden { "kd-trees" }
-            thead { tr {
-                (column("scene", "", false)) (column("builder", "", false)) (column("triangles", "", true))
-                @for figure in &TREE { (column(figure.name, figure.unit, true)) }
-            } }
-            tbody {
-                @for record in ours {
-                    tr {
-                        th scope="row" data-value=(record.scene) { a href={ "#scene-" (slug(&record.scene)) } { (record.scene) } }
-                        td data-value=(record.builder) { (short(&record.builder)) }
-                        (number(Some(record.triangles as f64), count))
-                        @for figure in &TREE { (number((figure.ours)(record), figure.text)) }
-                    }
-                }
-            }
-            tbody.context {
-                @for row in published {
-                    tr {
-                        th scope="row" { (row.scene) } td { (row.config) }
-                        (number(row.triangles.map(|n| n as f64), count))
-                        @for figure in &TREE { (number(row.figure(figure.theirs), figure.text)) }
-                    }
-                }
-            }
+    let table = columns::Table::new("kd-trees", ours.iter().copied())
+        .id("kd-tree-table")
+        .cell("scene", |record| {
+            html! { th scope="row" data-value=(record.scene) { a href={ "#scene-" (slug(&record.scene)) } { (record.scene) } } }
+        })
+        .cell("builder", |record| html! { td data-value=(record.builder) { (short(&record.builder)) } })
+        .number("triangles", "", |record| Some(record.triangles as f64), count);
+    let table = TREE.iter().fold(table, |table, figure| {
+        table.number(figure.name, figure.unit, |record| (figure.ours)(record), figure.text)
+    });
+    table.with_context(published.iter().map(|row| {
+        html! {
+            th scope="row" { (row.scene) } td { (row.config) }
+            (number(row.triangles.map(|n| n as f64), count))
+            @for figure in &TREE { (number(row.figure(figure.theirs), figure.text)) }
         }
-    }
+    }))
 }
 
 fn rays(ours: &[&Record], published: &[Row]) -> Markup {
-    html! {
-        table.sortable {
-            caption.hidden { "Tests and steps of rays through kd-trees" }
-            thead { tr {
-                (column("scene", "", false)) (column("builder", "", false)) (column("rays", "", false))
-                @for figure in &RAYS { (column(figure.name, figure.unit, true)) }
-            } }
-            tbody {
-                @for record in ours {
-                    @for trace in &record.trace {
-                        tr {
-                            th scope="row" data-value=(record.scene) { (record.scene) }
-                            td data-value=(record.builder) { (short(&record.builder)) }
-                            td data-value=(trace.rays) { (trace.rays) }
-                            @for figure in &RAYS { (number((figure.ours)(trace), three_digits)) }
-                        }
-                    }
-                }
-            }
-            tbody.context {
-                @for row in published {
-                    tr {
-                        th scope="row" { (row.scene) } td { (row.config) } td { (THEIR_RAYS) }
-                        @for figure in &RAYS { (number(row.figure(figure.theirs), three_digits)) }
-                    }
-                }
-            }
+    let rows = ours.iter().flat_map(|record| record.trace.iter().map(|trace| (*record, trace)));
+    let table = columns::Table::new("Tests and steps of rays through kd-trees", rows)
+        .name("scene", |(record, _)| &record.scene)
+        .cell("builder", |(record, _)| html! { td data-value=(record.builder) { (short(&record.builder)) } })
+        .text("rays", |(_, trace)| &trace.rays);
+    let table = RAYS.iter().fold(table, |table, figure| {
+        table.number(figure.name, figure.unit, |(_, trace)| (figure.ours)(trace), figure.text)
+    });
+    table.with_context(published.iter().map(|row| {
+        html! {
+            th scope="row" { (row.scene) } td { (row.config) } td { (THEIR_RAYS) }
+            @for figure in &RAYS { (number(row.figure(figure.theirs), figure.text)) }
         }
-    }
+    }))
 }

@@ -4,42 +4,29 @@ pub mod charts;
 mod layout;
 pub mod summary;
 
-use crate::experiments::bench::matrix::{Failure, Outcome};
+use crate::Result;
+use crate::experiments::bench::matrix::{OnScene, Outcome};
 use crate::experiments::bench::{kd_trees, results};
-use crate::experiments::{accel, animate, stability};
+use crate::experiments::write_pages;
 use crate::measure::choose::hindsight::Choice;
-pub use crate::measure::provenance::DeviceFacts;
-use crate::measure::provenance::Machine;
 use crate::measure::record::Record;
+use crate::measure::setting::{Failure, Setting};
 use crate::report::chart::Chart;
 use crate::report::theme::Legend;
-use crate::report::{beside, write_charts};
-use crate::{Error, Result};
+use crate::report::{beside, lines};
 use std::path::Path;
 
 /// A benchmark run: everything that the page says.
 #[derive(Debug, Clone)]
 pub struct Report {
-    /// The machine.
-    pub machine: Machine,
-    /// The device, if one was used.
-    pub device: Option<DeviceFacts>,
-    /// Commit of the program.
-    pub commit: String,
-    /// When it was measured, RFC 3339 UTC.
-    pub when: String,
-    /// The command line that measures it again.
-    pub command: String,
-    /// Options with their values, for people.
-    pub options: Vec<(String, String)>,
+    /// Where and how.
+    pub setting: Setting,
     /// What was measured, scene by scene.
     pub outcomes: Vec<Outcome>,
     /// What could not be measured.
-    pub failures: Vec<Failure>,
+    pub failures: Vec<Failure<OnScene>>,
     /// The builder that the others are compared with; the first one without.
     pub baseline: Option<String>,
-    /// What a reader must know to judge the figures, such as a peer that is none.
-    pub notes: Vec<String>,
     /// Pictures of the scenes, in files below the folder.
     pub pictures: Vec<Picture>,
     /// What `auto` chose for every scene, before it was measured.
@@ -67,7 +54,40 @@ struct SceneCharts {
     charts: Vec<Chart>,
 }
 
+/// The file that says where and how the records beside it were measured, for pages that are made of them later.
+const SETTING: &str = "bench.json";
+
+/// Where and how the records in a folder were measured; `None` where that was not written.
+///
+/// # Errors
+/// The file cannot be read, or is no setting.
+pub fn read_setting(folder: &Path) -> Result<Option<Setting>> {
+    lines::read_one(&folder.join(SETTING))
+}
+
 impl Report {
+    /// Of nothing yet.
+    pub fn new(setting: Setting) -> Report {
+        Report {
+            setting,
+            outcomes: Vec::new(),
+            failures: Vec::new(),
+            baseline: None,
+            pictures: Vec::new(),
+            choices: Vec::new(),
+            published: kd_trees::published::papay(),
+        }
+    }
+
+    /// Writes where and how into a folder, before anything is measured. Commit and time stand in each record.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_setting(&self, folder: &Path) -> Result<()> {
+        let setting = Setting { commit: String::new(), when: String::new(), ..self.setting.clone() };
+        lines::write_one(&folder.join(SETTING), &setting)
+    }
+
     /// The records, in the order in which they were measured.
     pub fn records(&self) -> Vec<&Record> {
         self.outcomes.iter().map(|outcome| &outcome.record).collect()
@@ -103,16 +123,8 @@ impl Report {
         }
         let growth = charts::growth::growth(&records, &legend)?;
 
-        write_charts(folder, scenes.iter().flat_map(|s| &s.charts).chain(&growth))?;
-        let page = layout::page(self, &legend, &scenes, growth.as_ref(), &beside::links(folder, beside::INDEX.file));
-        let path = folder.join("index.html");
-        std::fs::write(&path, page).map_err(Error::file(&path))?;
-        if beside::ACCEL.is_in(folder) {
-            accel::page::write(folder)?;
-        }
-        if beside::ANIMATE.is_in(folder) {
-            animate::page::write(folder)?;
-        }
-        stability::page::write_all(folder)
+        let charts = scenes.iter().flat_map(|s| &s.charts).chain(&growth);
+        layout::document(self, &legend, &scenes, growth.as_ref()).write(folder, &beside::INDEX, charts)?;
+        write_pages(folder)
     }
 }

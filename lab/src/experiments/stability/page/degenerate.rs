@@ -1,27 +1,42 @@
 //! `degenerate.html`: who survives what.
 
+use super::Paged;
 use super::losses::different;
-use super::{Paged, Section};
+use super::stretched::other_experiment;
 use crate::Result;
-use crate::experiments::stability::points::Degenerate;
+use crate::experiments::stability::points::{Degenerate, Experiment};
 use crate::report::beside::{DEGENERATE, Page};
-use crate::report::elements::{column, number, scroll, spread};
+use crate::report::chart::Chart;
+use crate::report::columns::Table;
+use crate::report::document::Section;
+use crate::report::elements::{number, scroll};
+use crate::report::lines;
 use crate::report::names::short;
-use crate::report::numbers::{grouped, three_digits, tick};
+use crate::report::numbers::{count, three_digits, tick};
 use crate::scene;
 use maud::{Markup, html};
 
+impl lines::Entry for Degenerate {
+    const FILE: &'static str = DEGENERATE.records;
+    const COMMAND: &'static str = "hedgerow stability degenerate";
+
+    fn fault(&self) -> Option<String> {
+        other_experiment(self.experiment, Experiment::Degenerate)
+    }
+}
+
 impl Paged for Degenerate {
     const PAGE: Page = DEGENERATE;
+    const RUN: &'static str = "degenerate.run.json";
     const TITLE: [&'static str; 2] = [
         "Degenerate scenes",
         "Equal, flat, thin, far, huge, nested and broken triangles, and none at all: does every builder give a valid tree, the same bytes \
          each time, and the hits that brute force finds?",
     ];
 
-    fn failures(points: &[Degenerate]) -> Vec<String> {
+    fn failures(points: &[Degenerate]) -> Vec<(String, String)> {
         let failed = points.iter().filter(|point| point.has_failed());
-        failed.map(|point| format!("{}, {}: {}", point.scene, point.builder, point.faults.join("; "))).collect()
+        failed.map(|point| (format!("{}, {}", point.scene, point.builder), point.faults.join("; "))).collect()
     }
 
     fn summary(points: &[Degenerate]) -> Markup {
@@ -41,18 +56,15 @@ impl Paged for Degenerate {
         }
     }
 
-    fn sections(points: &[Degenerate]) -> Result<Vec<Section>> {
-        Ok(vec![Section {
-            id: "figures".into(),
-            title: "All figures".into(),
-            charts: Vec::new(),
-            above: html! { p { "A heading sorts its column. Times are by the builder's own clock: timestamps of the device, or the wall's." } },
-            below: scroll("All figures", table(points)),
-            more: Vec::new(),
-        }])
+    fn sections(points: &[Degenerate]) -> Result<(Vec<Section>, Vec<Chart>)> {
+        let body = html! {
+            p { "A heading sorts its column. Times are by the builder's own clock: timestamps of the device, or the wall's." }
+            (figures(points))
+        };
+        Ok((vec![Section::new("figures", "All figures", body)], Vec::new()))
     }
 
-    fn method() -> Markup {
+    fn terms() -> Markup {
         html! {
             dt { "The scenes" }
             dd { "Of as many triangles as asked for, but for those whose name says how many; the same every time." }
@@ -115,40 +127,31 @@ fn cell(point: Option<&Degenerate>) -> Markup {
     html! { td .wrong[point.is_ours] .none[!point.is_ours] title=(faults) { (word) } }
 }
 
-fn table(points: &[Degenerate]) -> Markup {
+fn figures(points: &[Degenerate]) -> Markup {
     let yes = |value: Option<bool>| match value {
         Some(true) => html! { td data-value="yes" { "yes" } },
         Some(false) => html! { td.wrong data-value="NO" { "NO" } },
         None => html! { td.none data-value="" { span aria-label="not measured" { "–" } } },
     };
-    html! {
-        table.sortable {
-            thead { tr {
-                (column("scene", "", false)) (column("builder", "", false)) (column("triangles", "", true)) (column("in the tree", "", true))
-                (column("depth", "", true)) (column("SAH", "", true)) (column("status", "", false)) (column("build", "ms", true))
-                (column("valid", "", false)) (column("same bytes", "", false)) (column("rays that hit", "", true)) (column("wrong", "", true))
-                (column("what is wrong", "", false))
-            } }
-            tbody {
-                @for point in points {
-                    @let status = point.status.as_ref().map_or(String::new(), |names| names.join(", "));
-                    @let faults = point.faults.join("; ");
-                    tr {
-                        th scope="row" data-value=(point.scene) { (point.scene) }
-                        td.builder data-value=(point.builder) title=(point.builder) { (short(&point.builder)) }
-                        (number(Some(point.triangles as f64), |v| grouped(v as u64)))
-                        (number(point.active.map(|n| n as f64), |v| grouped(v as u64)))
-                        (number(point.depth_max.map(|n| n as f64), |v| grouped(v as u64)))
-                        (number(point.sah, three_digits))
-                        td data-value=(status) { (status) }
-                        (spread(point.build_ms, three_digits))
-                        (yes(point.valid)) (yes(point.same_bytes))
-                        (number(Some(point.hits as f64), |v| format!("{v:.0} of {}", point.rays)))
-                        (number(point.wrong.map(|n| n as f64), |v| grouped(v as u64)))
-                        td .wrong[point.has_failed()] data-value=(faults) { (faults) }
-                    }
-                }
-            }
-        }
-    }
+    let of_count = |value: Option<u64>| value.map(|n| n as f64);
+    Table::new("All figures", points)
+        .name("scene", |point| &point.scene)
+        .cell("builder", |point| {
+            html! { td.builder data-value=(point.builder) title=(point.builder) { (short(&point.builder)) } }
+        })
+        .number("triangles", "", |point| Some(point.triangles as f64), count)
+        .number("in the tree", "", move |point| of_count(point.active), count)
+        .number("depth", "", move |point| of_count(point.depth_max), count)
+        .number("SAH", "", |point| point.sah, three_digits)
+        .text("status", |point| point.status.as_ref().map_or(String::new(), |names| names.join(", ")))
+        .spread("build", "ms", |point| point.build_ms, three_digits)
+        .cell("valid", move |point| yes(point.valid))
+        .cell("same bytes", move |point| yes(point.same_bytes))
+        .figure("rays that hit", "", |point| number(Some(point.hits as f64), |v| format!("{v:.0} of {}", point.rays)))
+        .number("wrong", "", move |point| of_count(point.wrong), count)
+        .cell("what is wrong", |point| {
+            let faults = point.faults.join("; ");
+            html! { td .wrong[point.has_failed()] data-value=(faults) { (faults) } }
+        })
+        .html()
 }

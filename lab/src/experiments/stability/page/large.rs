@@ -1,35 +1,11 @@
 //! `large.html`: what huge triangles at the edge of a scene cost, by the bounds that codes are normalised by.
 
-use super::losses::{Loss, OverE, Titled, cost_chart, different, kinds, short_codes, speed_chart};
-use super::{Paged, Section};
-use crate::Result;
-use crate::experiments::stability::large::Placement;
+use super::stretched::{Losses, Row, StretchPage};
+use crate::experiments::stability::large::HugeTriangles;
 use crate::experiments::stability::points::Large;
 use crate::report::beside::{LARGE, Page};
-use crate::report::elements::{column, number, scroll};
-use crate::report::names::slug;
 use crate::report::numbers::{three_digits, tick};
 use maud::{Markup, html};
-use std::collections::BTreeMap;
-
-impl OverE for Large {
-    fn builder(&self) -> &str {
-        &self.builder
-    }
-    fn e(&self) -> u32 {
-        self.e
-    }
-    fn relative_cost(&self) -> Option<f64> {
-        self.relative_cost
-    }
-    fn relative_mrays(&self) -> &BTreeMap<String, f64> {
-        &self.relative_mrays
-    }
-}
-
-fn placed<'p>(points: &'p [Large], scene: &str, (placement, count): (Placement, u32)) -> Vec<&'p Large> {
-    points.iter().filter(|p| p.scene == scene && p.placement == placement && p.count == count).collect()
-}
 
 /// The point of the same builder with the bounds of all boxes, if this one has others (`+concise`).
 fn with_full_bounds<'p>(points: &[&'p Large], point: &Large) -> Option<&'p Large> {
@@ -39,62 +15,23 @@ fn with_full_bounds<'p>(points: &[&'p Large], point: &Large) -> Option<&'p Large
     points.iter().copied().find(|p| p.builder == full && p.e == point.e)
 }
 
-impl Paged for Large {
+impl StretchPage for HugeTriangles {
     const PAGE: Page = LARGE;
+    const RUN: &'static str = "large.run.json";
+    const COMMAND: &'static str = "hedgerow stability large";
     const TITLE: [&'static str; 2] = [
         "Large triangles at the edge",
         "Huge triangles at the edge of a scene stretch the bounds that codes are normalised by. Concise bounds cut off what no centroid \
          needs, the same from both sides: what do they save, and where nothing?",
     ];
 
-    fn failures(_: &[Large]) -> Vec<String> {
-        Vec::new()
-    }
-
-    fn summary(points: &[Large]) -> Markup {
+    fn reading(_: &[Large]) -> Markup {
         html! {
-            p {
-                "The first e at which the scene costs a tenth more than at e = 0, or its rays have lost a tenth of their speed at two points in a row; later is better. "
-                "Beside it the cost at the greatest e, and that over the same codes' with the bounds of all boxes: below 1, narrower bounds save."
-            }
-            (scroll("Where each loses a tenth", losses(points)))
+            "Beside it the cost at the greatest e, and that over the same codes' with the bounds of all boxes: below 1, narrower bounds save."
         }
     }
 
-    fn sections(points: &[Large]) -> Result<Vec<Section>> {
-        let builders = different(points, |point| point.builder.as_str());
-        let mut sections = Vec::new();
-        for scene in different(points, |point| point.scene.as_str()) {
-            let (mut charts, mut more) = (Vec::new(), Vec::new());
-            let of_scene: Vec<&Large> = points.iter().filter(|point| point.scene == scene).collect();
-            for manner @ (placement, count) in different(&of_scene, |point| (point.placement, point.count)) {
-                let own = placed(points, scene, manner);
-                let name = format!("large-{}-{placement}-{count}", slug(scene));
-                let title = format!(
-                    "{scene}, {}, {}",
-                    placement.what(),
-                    if count == 1 { "one each".into() } else { format!("{count} each") }
-                );
-                let titled = Titled { name: &name, title: &title };
-                charts.extend(cost_chart(&own, &builders, &[], &titled)?);
-                charts.extend(speed_chart(&own, &builders, None, &titled)?);
-                for kind in kinds(points) {
-                    more.extend(speed_chart(&own, &builders, Some(kind), &titled)?);
-                }
-            }
-            sections.push(Section {
-                id: format!("scene-{}", slug(scene)),
-                title: scene.to_owned(),
-                charts,
-                above: html! {},
-                below: html! {},
-                more,
-            });
-        }
-        Ok(sections)
-    }
-
-    fn method() -> Markup {
+    fn terms() -> Markup {
         html! {
             dt { "The huge triangles" }
             dd {
@@ -120,63 +57,50 @@ impl Paged for Large {
             }
         }
     }
-}
 
-fn losses(points: &[Large]) -> Markup {
-    let kinds = kinds(points);
-    html! {
-        table.sortable #losses {
-            caption.hidden { "Where each loses a tenth" }
-            thead { tr {
-                (column("scene", "", false)) (column("triangles", "", false)) (column("a side", "", true)) (column("builder", "", false))
-                (column("cost", "e", true)) (column("cost at the end", "×", true)) (column("over full bounds'", "×", true))
-                @for kind in &kinds { (column(kind, "e", true)) }
-            } }
-            tbody {
-                @for scene in different(points, |point| point.scene.as_str()) {
-                    @for manner in different(points, |point| (point.placement, point.count)) {
-                        @let own = placed(points, scene, manner);
-                        @for builder in different(&own, |point| point.builder.as_str()) { (loss(&own, builder, &kinds)) }
-                    }
-                }
-            }
-        }
+    fn slug(&self) -> String {
+        format!("{}-{}", self.placement, self.count)
     }
-}
 
-fn loss(placed: &[&Large], builder: &str, kinds: &[&str]) -> Markup {
-    let own: Vec<&Large> = placed.iter().copied().filter(|point| point.builder == builder).collect();
-    let Some(last) = own.iter().max_by_key(|point| point.e) else { return html! {} };
-    let saved = with_full_bounds(placed, last).and_then(|full| Some(last.cost? / full.cost?));
-    html! {
-        tr {
-            th scope="row" data-value=(last.scene) { (last.scene) }
-            td data-value=(last.placement) { (last.placement) }
-            (number(Some(last.count.into()), tick))
-            td.builder data-value=(builder) title=(builder) { (short_codes(builder)) }
-            (Loss::of_cost(&own).cell())
-            (number(last.relative_cost, three_digits))
-            (number(saved, three_digits))
-            @for kind in kinds { (Loss::of_speed(&own, kind).cell()) }
-        }
+    fn own_columns<'p>(table: Losses<'p, Self>) -> Losses<'p, Self> {
+        table.text("triangles", |row| row.own[0].by.placement).number(
+            "a side",
+            "",
+            |row| Some(row.own[0].by.count.into()),
+            tick,
+        )
+    }
+
+    fn more_columns<'p>(table: Losses<'p, Self>, _: &[Large]) -> Losses<'p, Self> {
+        let saved = |row: &Row<'p, Self>| {
+            let (last, full) = (row.last(), with_full_bounds(&row.all, row.last())?);
+            Some(last.cost?? / full.cost??)
+        };
+        table.number("cost at the end", "×", |row| row.last().relative_cost, three_digits).number(
+            "over full bounds'",
+            "×",
+            saved,
+            three_digits,
+        )
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::stability::points::Head;
+    use crate::experiments::stability::large::Placement;
+    use crate::experiments::stability::points::Experiment;
+    use std::collections::BTreeMap;
 
     #[test]
     fn narrower_bounds_are_held_against_the_full_ones_of_the_same_codes() {
         let point = |builder: &str, e| Large {
-            head: Head::of::<Large>(),
+            experiment: Experiment::Large,
             scene: "s".into(),
             builder: builder.into(),
-            placement: Placement::Wall,
-            count: 1,
+            by: HugeTriangles { placement: Placement::Wall, count: 1 },
             e,
-            cost: Some(1.0),
+            cost: Some(Some(1.0)),
             relative_cost: Some(1.0),
             relative_mrays: BTreeMap::new(),
         };

@@ -3,6 +3,7 @@
 use crate::Result;
 use crate::experiments::bench::page::summary::geometric_mean;
 use crate::experiments::stability::drop;
+use crate::experiments::stability::points::Stretched;
 use crate::measure::statistics::Spread;
 use crate::rays::kinds::RayKind;
 use crate::report::chart::{Caption, Chart};
@@ -11,15 +12,6 @@ use crate::report::names::short;
 use crate::report::numbers::{three_digits, tick};
 use crate::report::theme::{SERIES, Tone};
 use maud::{Markup, html};
-use std::collections::BTreeMap;
-
-/// A point of either.
-pub(super) trait OverE {
-    fn builder(&self) -> &str;
-    fn e(&self) -> u32;
-    fn relative_cost(&self) -> Option<f64>;
-    fn relative_mrays(&self) -> &BTreeMap<String, f64>;
-}
 
 /// Where a tenth is lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,15 +34,14 @@ impl Loss {
     }
 
     /// Of the cost.
-    pub fn of_cost<P: OverE>(points: &[&P]) -> Loss {
-        let costs: Vec<(u32, f64)> =
-            points.iter().filter_map(|point| Some((point.e(), point.relative_cost()?))).collect();
+    pub fn of_cost<S>(points: &[&Stretched<S>]) -> Loss {
+        let costs: Vec<(u32, f64)> = points.iter().filter_map(|point| Some((point.e, point.relative_cost?))).collect();
         Loss::of(&costs, |cost| cost >= drop::COST)
     }
 
     /// Of the speed of a kind of ray: the first of two points in a row, as one alone may be noise; that at e = 0 is nothing else.
-    pub fn of_speed<P: OverE>(points: &[&P], kind: &str) -> Loss {
-        let measured = points.iter().filter_map(|point| Some((point.e(), *point.relative_mrays().get(kind)?)));
+    pub fn of_speed<S>(points: &[&Stretched<S>], kind: &str) -> Loss {
+        let measured = points.iter().filter_map(|point| Some((point.e, *point.relative_mrays.get(kind)?)));
         let speeds: Vec<(u32, f64)> = measured.filter(|(e, _)| *e > 0).collect();
         let next = |i: usize| speeds.get(i + 1).map_or(0.0, |(_, speed)| *speed);
         let pairs: Vec<(u32, f64)> =
@@ -90,8 +81,8 @@ pub(super) fn different<'p, P, T: PartialEq>(points: &'p [P], of: impl Fn(&'p P)
 }
 
 /// The kinds of rays that any point has.
-pub(super) fn kinds<P: OverE>(points: &[P]) -> Vec<&'static str> {
-    let is_there = |kind: &&str| points.iter().any(|point| point.relative_mrays().contains_key(*kind));
+pub(super) fn kinds<S>(points: &[Stretched<S>]) -> Vec<&'static str> {
+    let is_there = |kind: &&str| points.iter().any(|point| point.relative_mrays.contains_key(*kind));
     RayKind::ALL.map(RayKind::name).into_iter().filter(is_there).collect()
 }
 
@@ -100,15 +91,11 @@ pub(super) fn tone(builders: &[&str], builder: &str) -> Tone {
     SERIES[builders.iter().position(|b| *b == builder).unwrap_or(0) % SERIES.len()]
 }
 
-fn one(value: f64) -> Spread {
-    Spread { median: value, min: value, max: value, runs: 1 }
-}
-
 /// A curve a builder, of those that have points.
-fn curves_of<P: OverE>(points: &[&P], builders: &[&str], of: impl Fn(&P) -> Option<f64>) -> Vec<Curve> {
+fn curves_of<S>(points: &[&Stretched<S>], builders: &[&str], of: impl Fn(&Stretched<S>) -> Option<f64>) -> Vec<Curve> {
     let curve = |builder: &&str| {
-        let own = points.iter().filter(|point| point.builder() == *builder);
-        let points: Vec<_> = own.filter_map(|point| Some((f64::from(point.e()), one(of(point)?)))).collect();
+        let own = points.iter().filter(|point| point.builder == *builder);
+        let points: Vec<_> = own.filter_map(|point| Some((f64::from(point.e), Spread::once(of(point)?)))).collect();
         Curve { name: short_codes(builder), tone: tone(builders, builder), points, law: None }
     };
     builders.iter().map(curve).filter(|curve| !curve.points.is_empty()).collect()
@@ -129,93 +116,80 @@ fn ends(curves: &[Curve], what: &str) -> String {
     format!("{what} at e = {e}: {}.", curves.iter().map(end).collect::<Vec<_>>().join("; "))
 }
 
-/// A chart's name and title, without what it shows.
-pub(super) struct Titled<'a> {
-    pub name: &'a str,
-    pub title: &'a str,
-}
-
 /// Relative costs over e.
-pub(super) fn cost_chart<P: OverE>(
-    points: &[&P],
+pub(super) fn cost_chart<S>(
+    points: &[&Stretched<S>],
     builders: &[&str],
     marks: &[Mark],
-    titled: &Titled<'_>,
+    [name, title]: [&String; 2],
 ) -> Result<Option<Chart>> {
-    let all = curves_of(points, builders, P::relative_cost);
+    let all = curves_of(points, builders, |point| point.relative_cost);
     let expected = if marks.is_empty() { "" } else { " Dashed: where the thesis expects the tenth to be lost." };
     let caption = Caption {
-        name: format!("{}-cost", titled.name),
-        title: format!("{}: cost of the scene", titled.title),
+        name: format!("{}-cost", name),
+        title: format!("{}: cost of the scene", title),
         alt: ends(&all, "Relative costs"),
         reading: format!(
             "SAH cost of what stays, over that at e = 0; logarithmic, 1 is as good as there.{expected} {}",
             ends(&all, "Relative costs")
         ),
     };
-    let x = Axis { name: "e: 2^e times as long", is_log: false, number: &|v| tick(*v) };
-    curves::curves_and_marks(
-        caption,
-        &all,
-        marks,
-        &x,
-        &Axis { name: "relative cost", is_log: true, number: &|v| tick(*v) },
-    )
+    let x = Axis { name: "e: 2^e times as long", is_log: false, number: tick };
+    curves::curves_and_marks(caption, &all, marks, &x, &Axis { name: "relative cost", is_log: true, number: tick })
 }
 
 /// Relative speeds over e: of one kind of ray, or the geometric mean over all.
-pub(super) fn speed_chart<P: OverE>(
-    points: &[&P],
+pub(super) fn speed_chart<S>(
+    points: &[&Stretched<S>],
     builders: &[&str],
     kind: Option<&str>,
-    titled: &Titled<'_>,
+    [name, title]: [&String; 2],
 ) -> Result<Option<Chart>> {
-    let of = |point: &P| match kind {
-        Some(kind) => point.relative_mrays().get(kind).copied(),
-        None => geometric_mean(point.relative_mrays().values().copied()),
+    let of = |point: &Stretched<S>| match kind {
+        Some(kind) => point.relative_mrays.get(kind).copied(),
+        None => geometric_mean(point.relative_mrays.values().copied()),
     };
     let all = curves_of(points, builders, of);
     let rays = kind.map_or("all kinds of rays".to_owned(), |kind| format!("{kind} rays"));
     let mean = if kind.is_some() { "" } else { " Geometric means over the kinds of rays." };
     let caption = Caption {
-        name: format!("{}-speed-{}", titled.name, kind.unwrap_or("all")),
-        title: format!("{}: speed of {rays}", titled.title),
+        name: format!("{}-speed-{}", name, kind.unwrap_or("all")),
+        title: format!("{}: speed of {rays}", title),
         alt: ends(&all, "Relative speeds"),
         reading: format!(
             "Speed over that at e = 0, in the median of runs in turn; at e = 0 two structures of the same scene, which is the noise.{mean} {}",
             ends(&all, "Relative speeds")
         ),
     };
-    let x = Axis { name: "e: 2^e times as long", is_log: false, number: &|v| tick(*v) };
-    curves::curves(caption, &all, &x, &Axis { name: "relative speed", is_log: false, number: &|v| tick(*v) })
+    let x = Axis { name: "e: 2^e times as long", is_log: false, number: tick };
+    curves::curves(caption, &all, &x, &Axis { name: "relative speed", is_log: false, number: tick })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiments::stability::far::{FarTriangle, Side};
+    use crate::experiments::stability::points::Experiment;
+    use std::collections::BTreeMap;
 
-    struct Traced(u32, BTreeMap<String, f64>);
-
-    impl OverE for Traced {
-        fn builder(&self) -> &str {
-            "lbvh"
-        }
-        fn e(&self) -> u32 {
-            self.0
-        }
-        fn relative_cost(&self) -> Option<f64> {
-            None
-        }
-        fn relative_mrays(&self) -> &BTreeMap<String, f64> {
-            &self.1
+    fn traced(e: u32, speed: f64) -> Stretched<FarTriangle> {
+        Stretched {
+            experiment: Experiment::Growth,
+            scene: String::new(),
+            builder: "lbvh".into(),
+            by: FarTriangle { axes: 1, side: Side::Positive },
+            e,
+            cost: None,
+            relative_cost: None,
+            relative_mrays: BTreeMap::from([("ao".to_owned(), speed)]),
         }
     }
 
     #[test]
     fn one_slow_point_alone_is_noise() {
         let loss = |speeds: &[f64]| {
-            let point = |(e, speed): (usize, &f64)| Traced(2 * e as u32, BTreeMap::from([("ao".to_owned(), *speed)]));
-            let points: Vec<Traced> = speeds.iter().enumerate().map(point).collect();
+            let point = |(e, speed): (usize, &f64)| traced(2 * e as u32, *speed);
+            let points: Vec<_> = speeds.iter().enumerate().map(point).collect();
             Loss::of_speed(&points.iter().collect::<Vec<_>>(), "ao")
         };
         assert_eq!(loss(&[0.8, 0.7, 1.0, 0.9, 0.5, 0.4]), Loss::From(6));
