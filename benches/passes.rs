@@ -189,12 +189,9 @@ fn batch(c: &mut Criterion) {
         ..DeviceOptions::default()
     };
     let device = Device::new(&options).expect("a device that fits");
-    let driver = ash::khr::acceleration_structure::Device::new(device.ash_instance(), device.ash_device());
     let workload = Workload::new(&device, COUNT).expect("memory");
     let mut makers = vec![("", Structures::ours(&device, accel::Options::DEFAULT))];
-    if device.driver_tracing().is_some() {
-        makers.push((", the driver's", Structures::drivers(&device, &driver)));
-    }
+    makers.extend(Structures::drivers(&device).map(|drivers| (", the driver's", drivers)));
     let mut group = c.benchmark_group("batch");
     group.sample_size(10).throughput(Throughput::Elements(COUNT.into()));
     for (whose, structures) in makers {

@@ -45,7 +45,7 @@ impl Device {
             count: rays.count,
         };
         match self.driver_tracing() {
-            None => return Err(super::driver_structure::not_there(self)),
+            None => return Err(super::driver_is_missing(self)),
             Some(DriverTracing::Query) => {
                 let kernel = Kernel::new(&shaders::MEASURE_RAY_QUERY, WORKGROUP, &[u32::from(rays.any_hit)]);
                 let most = limits.workgroup_count.saturating_mul(WORKGROUP);

@@ -2,6 +2,7 @@
 //!
 //! NVIDIA's data-centre GPUs and older cards have acceleration structures and pipelines, but no queries.
 
+use super::Device;
 use ash::vk;
 use hedgerow::gpu::requirements::Offered;
 use std::ffi::CStr;
@@ -108,6 +109,24 @@ impl DriverFeatures {
                 info.push_next(&mut self.pipeline)
             }
         }
+    }
+}
+
+/// The driver has no structures, or the device was opened without.
+pub fn driver_is_missing(device: &Device) -> hedgerow::Error {
+    let missing =
+        "VK_KHR_acceleration_structure with VK_KHR_ray_query or VK_KHR_ray_tracing_pipeline (or was opened without)";
+    hedgerow::Error::Unsupported { device: device.found().name.clone(), missing: vec![missing.into()] }
+}
+
+impl Device {
+    /// Primitives of a structure of the driver's, at most.
+    pub fn most_primitives_of_driver(&self) -> u64 {
+        let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
+        // SAFETY: the handles are live; the structures outlive the call.
+        unsafe { self.ash_instance().get_physical_device_properties2(self.physical_device(), &mut properties) };
+        limits.max_primitive_count.min(u64::from(u32::MAX))
     }
 }
 

@@ -4,7 +4,6 @@
 
 mod buffer;
 mod driver_rays;
-mod driver_structure;
 mod driver_tracing;
 mod instance;
 mod memory;
@@ -13,8 +12,7 @@ mod restrict;
 
 pub use buffer::Buffer;
 pub use driver_rays::DriverRays;
-pub use driver_structure::{DriverPreference, DriverSizes, DriverStructure};
-pub use driver_tracing::DriverTracing;
+pub use driver_tracing::{DriverTracing, driver_is_missing};
 pub use instance::{Found, list};
 pub use restrict::Restrict;
 

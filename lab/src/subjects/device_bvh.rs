@@ -134,8 +134,7 @@ impl Subject for DeviceBvh<'_> {
             self.bvh.record(recorder, &self.input, structure, scratch)?;
             self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, structure))
         })?;
-        let phases = self.timestamps.phases()?;
-        Ok(BuildRun { milliseconds: phases.iter().map(|p| p.milliseconds).sum(), phases })
+        Ok(BuildRun::of(self.timestamps.phases()?))
     }
 
     fn memory(&self) -> record::Memory {

@@ -6,23 +6,43 @@ use hedgerow::gpu::{Recorder, Timestamps};
 use hedgerow::trace::tracer::Buffers;
 use hedgerow::trace::{Hit, Ray, Work};
 
+/// Rays in device memory, and room for their hits.
+pub struct RayBuffers<'a> {
+    /// How many.
+    pub count: u32,
+    /// The rays.
+    pub rays: Buffer<'a>,
+    /// One hit a ray, of whoever traced last.
+    pub hits: Buffer<'a>,
+}
+
+impl<'a> RayBuffers<'a> {
+    /// Uploads rays.
+    ///
+    /// # Errors
+    /// Too many rays, or too little memory.
+    pub fn new(device: &'a Device, rays: &[Ray]) -> Result<RayBuffers<'a>> {
+        let count = u32::try_from(rays.len())
+            .map_err(|_| Error::Argument(format!("{} rays; at most 4294967295 at once", rays.len())))?;
+        let hits = device.buffer("hits", size_of::<Hit>() as u64 * u64::from(count))?;
+        Ok(RayBuffers { count, rays: device.upload("rays", rays)?, hits })
+    }
+
+    /// The hits of whoever traced last.
+    pub fn read_hits(&self) -> Vec<Hit> {
+        self.hits.read(self.count as usize)
+    }
+
+    fn buffers(&self, structure: u64, work: Option<u64>) -> Buffers {
+        Buffers { structure, rays: self.rays.address(), hits: self.hits.address(), work, count: self.count }
+    }
+}
+
 /// The rays that a subject traces.
 pub struct DeviceRays<'a> {
     device: &'a Device,
     timestamps: Timestamps,
-    uploaded: Option<Uploaded<'a>>,
-}
-
-struct Uploaded<'a> {
-    count: u32,
-    rays: Buffer<'a>,
-    hits: Buffer<'a>,
-}
-
-impl Uploaded<'_> {
-    fn buffers(&self, structure: u64, work: Option<u64>) -> Buffers {
-        Buffers { structure, rays: self.rays.address(), hits: self.hits.address(), work, count: self.count }
-    }
+    uploaded: Option<RayBuffers<'a>>,
 }
 
 impl<'a> DeviceRays<'a> {
@@ -39,11 +59,9 @@ impl<'a> DeviceRays<'a> {
     /// # Errors
     /// Too many rays, or too little memory.
     pub fn set(&mut self, rays: &[Ray]) -> Result<()> {
-        let count = u32::try_from(rays.len())
-            .map_err(|_| Error::Argument(format!("{} rays; at most 4294967295 at once", rays.len())))?;
+        // Both at once may be too much.
         self.uploaded = None;
-        let hits = self.device.buffer("hits", size_of_val(rays) as u64 / 2)?;
-        self.uploaded = Some(Uploaded { count, rays: self.device.upload("rays", rays)?, hits });
+        self.uploaded = Some(RayBuffers::new(self.device, rays)?);
         Ok(())
     }
 
@@ -67,7 +85,7 @@ impl<'a> DeviceRays<'a> {
 
     /// The hits of the last [`DeviceRays::trace`].
     pub fn hits(&self) -> Vec<Hit> {
-        self.uploaded.as_ref().map_or_else(Vec::new, |u| u.hits.read(u.count as usize))
+        self.uploaded.as_ref().map_or_else(Vec::new, RayBuffers::read_hits)
     }
 
     /// The work that each ray takes, counted by what `record` records.

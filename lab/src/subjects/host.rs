@@ -1,5 +1,6 @@
 //! Builders on the host as subjects: wall-clock time, the host's tracer on every core.
 
+use super::host_rays::{HostRays, timed};
 use super::{BuildRun, Subject};
 use crate::Result;
 use crate::measure::overlap::{self, Epo};
@@ -11,11 +12,10 @@ use hedgerow::bvh::layout::{self, Bvh2};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::{lbvh, ploc};
 use hedgerow::bvh::{reinsertion, twin::quality};
-use hedgerow::trace::{self, Hit, Query, Ray, Work};
+use hedgerow::trace::twin::tracer;
+use hedgerow::trace::{Hit, Query, Ray, Work};
 use hedgerow_host::sweep;
 use hedgerow_host::sweep::Leaves;
-use rayon::prelude::*;
-use std::time::Instant;
 
 /// How a host's builder makes the tree of what is sorted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,8 +48,7 @@ pub struct Host<'a> {
     options: Options,
     codes: Codes,
     tree: Option<Bvh2>,
-    rays: Vec<Ray>,
-    hits: Vec<Hit>,
+    rays: HostRays,
 }
 
 impl<'a> Host<'a> {
@@ -61,8 +60,7 @@ impl<'a> Host<'a> {
             options,
             codes: options.codes.unwrap_or_else(|| Codes::for_count(mesh.triangles.len() as u32)),
             tree: None,
-            rays: Vec::new(),
-            hits: Vec::new(),
+            rays: HostRays::default(),
         }
     }
 
@@ -85,13 +83,6 @@ impl<'a> Host<'a> {
     }
 }
 
-/// The time of `work` in milliseconds by the wall's clock, and what it gave.
-pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
-    let start = Instant::now();
-    let result = work();
-    (start.elapsed().as_secs_f64() * 1e3, result)
-}
-
 impl Subject for Host<'_> {
     fn builder(&self) -> &str {
         &self.builder
@@ -108,7 +99,7 @@ impl Subject for Host<'_> {
     fn build(&mut self) -> Result<BuildRun> {
         self.tree = None;
         let (milliseconds, _) = timed(|| self.built().header.active);
-        Ok(BuildRun { milliseconds, phases: Vec::new() })
+        Ok(BuildRun::whole(milliseconds))
     }
 
     fn memory(&self) -> record::Memory {
@@ -134,28 +125,23 @@ impl Subject for Host<'_> {
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        self.rays = rays.to_vec();
+        self.rays.set(rays);
         Ok(())
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let rays = std::mem::take(&mut self.rays);
-        let tree = self.built();
-        let (milliseconds, hits) =
-            timed(|| rays.par_iter().map(|ray| trace::twin::tracer::trace(tree, ray, query).0).collect());
-        (self.rays, self.hits) = (rays, hits);
-        Ok(milliseconds)
+        self.built();
+        let Host { tree: Some(tree), rays, .. } = self else { return Ok(0.0) };
+        Ok(rays.trace(|ray| tracer::trace(tree, ray, query).0))
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(self.hits.clone())
+        Ok(self.rays.hits())
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        let rays = std::mem::take(&mut self.rays);
-        let tree = self.built();
-        let work = rays.par_iter().map(|ray| trace::twin::tracer::trace(tree, ray, query).1).collect();
-        self.rays = rays;
-        Ok(Some(work))
+        self.built();
+        let Host { tree: Some(tree), rays, .. } = self else { return Ok(None) };
+        Ok(Some(rays.work(|ray| tracer::trace(tree, ray, query).1)))
     }
 }

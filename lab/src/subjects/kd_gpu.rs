@@ -1,19 +1,19 @@
 //! kd-trees built and traced on the device as subjects: `kd-gpu`.
 
 use super::kd_device::KdDevice;
-use super::{BuildRun, KD_TREE, Outcome, Subject};
+use super::{BuildRun, KD_TREE, Subject};
 use crate::device::{Buffer, Device};
 use crate::measure::record;
 use crate::scene::Mesh;
 use crate::{Error, Result};
 use hedgerow::bvh::builder::Input;
-use hedgerow::bvh::layout::{Bvh2, status};
+use hedgerow::bvh::layout::status;
 use hedgerow::gpu::{Phase, Recorder, Timestamps};
 use hedgerow::kdtree::builder::{Builder, Options, Report};
 use hedgerow::kdtree::layout::{KdTree, MAX_DEPTH};
-use hedgerow::kdtree::quality;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
+use std::borrow::Cow;
 
 /// Phases of a build at most: encode, five of each level, place.
 const PHASES: u32 = 5 * (MAX_DEPTH + 1) + 2;
@@ -113,7 +113,7 @@ impl<'a> KdGpu<'a> {
                 None => phases.push(phase),
             }
         }
-        Ok(BuildRun { milliseconds: phases.iter().map(|p| p.milliseconds).sum(), phases })
+        Ok(BuildRun::of(phases))
     }
 
     fn read(&self) -> Result<KdTree> {
@@ -175,25 +175,8 @@ impl Subject for KdGpu<'_> {
         }
     }
 
-    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
-        Ok(record::Quality::of(&quality::on_host(&self.read()?, c_t, c_i), c_t, c_i))
-    }
-
-    fn tree(&mut self) -> Result<Option<Bvh2>> {
-        Ok(None)
-    }
-
-    fn outcome(&mut self) -> Result<Option<Outcome>> {
-        let header = self.read()?.header;
-        Ok(Some(Outcome { active: header.active, status: header.status }))
-    }
-
-    fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
-        Ok(Some(self.read()?.to_bytes()))
-    }
-
-    fn validate(&mut self) -> Result<()> {
-        Ok(self.read()?.validate()?)
+    fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {
+        self.read().map(|tree| Some(Cow::Owned(tree)))
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {

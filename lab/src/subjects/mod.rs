@@ -4,9 +4,11 @@ pub mod builders;
 pub mod device_bvh;
 pub mod device_rays;
 pub mod host;
+pub mod host_rays;
 pub mod kd_device;
 pub mod kd_gpu;
 pub mod kd_host;
+pub mod level;
 pub mod levels;
 pub mod peers;
 pub mod structures;
@@ -15,10 +17,12 @@ pub mod wide;
 use crate::Result;
 use crate::measure::overlap::Epo;
 use crate::measure::record;
+use crate::scene::Frame;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::gpu;
-use hedgerow::kdtree::layout::KdTree;
+use hedgerow::kdtree::{self, layout::KdTree};
 use hedgerow::trace::{Hit, Query, Ray, Work};
+use std::borrow::Cow;
 
 /// [`Subject::kind`] of kd-trees.
 pub const KD_TREE: &str = "kdtree";
@@ -32,6 +36,18 @@ pub struct BuildRun {
     pub phases: Vec<gpu::Phase>,
 }
 
+impl BuildRun {
+    /// One whose phases are not known.
+    pub fn whole(milliseconds: f64) -> BuildRun {
+        BuildRun { milliseconds, phases: Vec::new() }
+    }
+
+    /// One of these phases.
+    pub fn of(phases: Vec<gpu::Phase>) -> BuildRun {
+        BuildRun { milliseconds: phases.iter().map(|phase| phase.milliseconds).sum(), phases }
+    }
+}
+
 /// What a structure of ours says of how it was built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Outcome {
@@ -41,19 +57,26 @@ pub struct Outcome {
     pub status: u32,
 }
 
-/// A builder on a scene. Whatever is uploaded once is uploaded when the subject is made, not under the clock.
+/// A builder on a scene, which may move. Whatever is uploaded once is uploaded when the subject is made, not under the clock.
 ///
-/// Order of calls: `build` first, any number of times; then the others.
+/// Order of calls: `build` first, any number of times, `place` before it for what moves; then the others.
 pub trait Subject {
     /// Builder with its options, as `-b` takes it.
     fn builder(&self) -> &str;
-    /// `bvh2`, `wide4`, `wide8`, `wide8q`, `kdtree`, `driver` or `host`.
+    /// `bvh2`, `wide4`, `wide8`, `wide8q`, `kdtree`, `driver` (two levels, by Vulkan's calls) or `host`.
     fn kind(&self) -> &'static str;
     /// `device` where build times are timestamps, otherwise `wall`.
     fn timer(&self) -> &'static str;
     /// Whether rays are traced on the device.
     fn traces_on_device(&self) -> bool {
         self.timer() == "device"
+    }
+    /// Brings what moves to where it stands in a frame, for the next build; not under the clock. What does not move stays.
+    ///
+    /// # Errors
+    /// Too little memory.
+    fn place(&mut self, _frame: &Frame<'_>) -> Result<()> {
+        Ok(())
     }
     /// Builds once, from the triangles, into the same memory as before.
     ///
@@ -62,11 +85,17 @@ pub trait Subject {
     fn build(&mut self) -> Result<BuildRun>;
     /// Bytes of structure and scratch.
     fn memory(&self) -> record::Memory;
-    /// Quality of the built tree with the costs of a step and of a test; figures that the builder cannot tell are `None`.
+    /// Quality of the built tree with the costs of a step and of a test; figures that the builder cannot tell are `None`, as they
+    /// are where rays go through several trees.
     ///
     /// # Errors
     /// The device failed.
-    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality>;
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+        Ok(match self.kd_tree()? {
+            Some(tree) => record::Quality::of(&kdtree::quality::on_host(&tree, c_t, c_i), c_t, c_i),
+            None => record::Quality { c_t, c_i, ..Default::default() },
+        })
+    }
     /// End-point overlap of the built tree with the costs of a step and of a test, if `epo` asks for it; `None` where it was not
     /// measured.
     ///
@@ -79,22 +108,24 @@ pub trait Subject {
     ///
     /// # Errors
     /// The device failed.
-    fn tree(&mut self) -> Result<Option<Bvh2>>;
+    fn tree(&mut self) -> Result<Option<Bvh2>> {
+        Ok(None)
+    }
     /// The kd-tree on the host, where it is one.
     ///
     /// # Errors
     /// The device failed.
-    fn kd_tree(&mut self) -> Result<Option<KdTree>> {
-        match self.kind() {
-            KD_TREE => Ok(self.bytes()?.map(|bytes| KdTree::from_bytes(&bytes)).transpose()?),
-            _ => Ok(None),
-        }
+    fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {
+        Ok(None)
     }
     /// What the built structure's header says, where its layout is ours.
     ///
     /// # Errors
     /// The device failed.
     fn outcome(&mut self) -> Result<Option<Outcome>> {
+        if let Some(tree) = self.kd_tree()? {
+            return Ok(Some(Outcome { active: tree.header.active, status: tree.header.status }));
+        }
         Ok(self.tree()?.map(|tree| Outcome { active: tree.header.active, status: tree.header.status }))
     }
     /// The bytes of what is traced, where they are ours to read: the same input gives the same.
@@ -102,14 +133,20 @@ pub trait Subject {
     /// # Errors
     /// The device failed.
     fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
-        Ok(self.tree()?.map(|tree| tree.to_bytes()))
+        match self.kd_tree()? {
+            Some(tree) => Ok(Some(tree.to_bytes())),
+            None => Ok(self.tree()?.map(|tree| tree.to_bytes())),
+        }
     }
     /// Walks whatever of the build has a layout of ours.
     ///
     /// # Errors
     /// [`hedgerow::Error::InvalidStructure`] says what is wrong; the device failed.
     fn validate(&mut self) -> Result<()> {
-        Ok(self.tree()?.map_or(Ok(()), |tree| tree.validate())?)
+        match self.kd_tree()? {
+            Some(tree) => Ok(tree.validate()?),
+            None => Ok(self.tree()?.map_or(Ok(()), |tree| tree.validate())?),
+        }
     }
     /// What the builder chose where it was left the choice, in a few words (`emc64var/32, chain`); `None` if nothing.
     fn choice(&self) -> Option<String> {
@@ -134,9 +171,11 @@ pub trait Subject {
     /// # Errors
     /// The device failed.
     fn hits(&mut self) -> Result<Vec<Hit>>;
-    /// Steps and tests of every ray, where the tracer counts them; not under the clock.
+    /// Steps and tests of every ray, through all trees, where the tracer counts them; not under the clock.
     ///
     /// # Errors
     /// The device failed.
-    fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>>;
+    fn work(&mut self, _query: Query) -> Result<Option<Vec<Work>>> {
+        Ok(None)
+    }
 }

@@ -1,16 +1,18 @@
 //! Acceleration structures by the calls of `VK_KHR_acceleration_structure`: ours or the driver's, and nothing else differs.
 
+use super::device_rays::RayBuffers;
 use crate::arguments;
 use crate::device::{Buffer, Device, DriverRays, DriverTracing};
 use crate::experiments::accel::points;
 use crate::scene::Mesh;
 use crate::shaders;
 use crate::{Error, Result};
+use ash::khr::acceleration_structure as functions;
 use ash::vk;
 use hedgerow::accel;
 use hedgerow::bvh::layout::{Header, MAX_DEPTH};
 use hedgerow::gpu::{Kernel, Recorder, Timestamps};
-use hedgerow::trace::{self, Hit, Ray};
+use hedgerow::trace;
 
 pub(crate) type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
 pub(crate) type Range = vk::AccelerationStructureBuildRangeInfoKHR;
@@ -21,7 +23,7 @@ pub(crate) type Sizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
 #[derive(Clone)]
 enum Maker<'a> {
     Ours(accel::Device<'a>),
-    Driver(&'a ash::khr::acceleration_structure::Device),
+    Driver(functions::Device),
 }
 
 /// Structures of one maker.
@@ -37,9 +39,11 @@ impl<'a> Structures<'a> {
         Structures { device, maker: Maker::Ours(accel::Device::with_options(device, options)) }
     }
 
-    /// Those of the driver, whose functions are these.
-    pub fn drivers(device: &'a Device, functions: &'a ash::khr::acceleration_structure::Device) -> Structures<'a> {
-        Structures { device, maker: Maker::Driver(functions) }
+    /// Those of the driver, where it has any and the device was opened with them.
+    pub fn drivers(device: &'a Device) -> Option<Structures<'a>> {
+        device.driver_tracing()?;
+        let functions = functions::Device::new(device.ash_instance(), device.ash_device());
+        Some(Structures { device, maker: Maker::Driver(functions) })
     }
 
     /// Whose they are.
@@ -144,13 +148,11 @@ impl<'a> Structures<'a> {
         &self,
         timestamps: &mut Timestamps,
         top: vk::AccelerationStructureKHR,
-        (rays, hits, count): (&Buffer<'_>, &Buffer<'_>, u32),
+        buffers: &RayBuffers<'_>,
         query: trace::Query,
     ) -> Result<f64> {
-        debug_assert!(rays.bytes() >= u64::from(count) * size_of::<Ray>() as u64);
-        debug_assert!(hits.bytes() >= u64::from(count) * size_of::<Hit>() as u64);
         let (structure, any_hit) = (self.address(top), query == trace::Query::AnyHit);
-        let (rays, hits) = (rays.address(), hits.address());
+        let (rays, hits, count) = (buffers.rays.address(), buffers.hits.address(), buffers.count);
         self.device.run(Some(timestamps), |recorder| {
             recorder.phase("trace");
             match self.maker {
@@ -174,7 +176,7 @@ impl<'a> Structures<'a> {
     pub(crate) fn work(
         &self,
         top: vk::AccelerationStructureKHR,
-        (rays, hits, count): (&Buffer<'_>, &Buffer<'_>, u32),
+        buffers: &RayBuffers<'_>,
         query: trace::Query,
     ) -> Result<Vec<[u32; 4]>> {
         let device = self.device;
@@ -183,12 +185,13 @@ impl<'a> Structures<'a> {
         }
         let any_hit = u32::from(query == trace::Query::AnyHit);
         let kernel = Kernel::new(&shaders::MEASURE_QUERY_WORK, device.limits.subgroup_size, &[any_hit, 0]);
+        let count = buffers.count;
         let works = device.buffer("work", 16 * u64::from(count))?;
         let (structure, works_at) = (self.address(top), works.address());
         let arguments = arguments::TraceQueries {
             structure,
-            rays: rays.address(),
-            hits: hits.address(),
+            rays: buffers.rays.address(),
+            hits: buffers.hits.address(),
             works: works_at,
             first: 0,
             count,

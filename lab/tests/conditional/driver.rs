@@ -3,18 +3,19 @@
 
 use crate::common::corpus;
 use crate::conditional::Needs;
-use hedgerow::ash::{self, vk};
+use hedgerow::ash::vk;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::trace::{Hit, Query, Ray};
-use hedgerow_lab::device::{Device, DeviceOptions, DriverPreference, DriverTracing, Restrict};
+use hedgerow_lab::device::{Device, DeviceOptions, DriverTracing, Restrict};
 use hedgerow_lab::measure::agreement::wrong_where_different;
 use hedgerow_lab::scene::{self, Mesh};
 use hedgerow_lab::subjects::Subject;
 use hedgerow_lab::subjects::builders::Spec;
+use hedgerow_lab::subjects::device_rays::RayBuffers;
 use hedgerow_lab::subjects::levels::Levels;
-use hedgerow_lab::subjects::peers::driver::Driver;
+use hedgerow_lab::subjects::peers::driver::{Driver, DriverPreference};
 use hedgerow_lab::subjects::structures::Structures;
 use std::sync::OnceLock;
 
@@ -222,15 +223,13 @@ fn two_levels_are_traced_by_a_pipeline_as_by_queries() {
     };
     let rays: Vec<Ray> = (0..2000).map(ray).collect();
     let hits = [crate::common::device(), by_pipeline()].map(|device| {
-        let functions = ash::khr::acceleration_structure::Device::new(device.ash_instance(), device.ash_device());
-        let structures = Structures::drivers(device, &functions);
+        let structures = Structures::drivers(device).expect("the driver has structures");
         let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE;
         let mut levels = Levels::new(structures, &city, flags).expect("memory");
         levels.build().expect("it builds");
-        let rays_on_device = device.upload("rays", &rays).expect("memory");
-        let hits = device.buffer("hits", (rays.len() * size_of::<Hit>()) as u64).expect("memory");
-        levels.trace(&rays_on_device, &hits, rays.len() as u32, Query::ClosestHit).expect("it traces");
-        hits.read::<Hit>(rays.len())
+        let buffers = RayBuffers::new(device, &rays).expect("memory");
+        levels.trace(&buffers, Query::ClosestHit).expect("it traces");
+        buffers.read_hits()
     });
     let met = hits[0].iter().filter(|hit| hit.is_some()).count();
     assert!(met > 100, "{met} hits are no test");

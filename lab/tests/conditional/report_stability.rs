@@ -168,7 +168,8 @@ fn the_pages_say_where_a_tenth_is_lost_and_what_was_wrong() {
         assert!(crate::pages::text(&page, " ").contains(words), "{words}: {}", crate::pages::text(&page, " "));
     }
     let degenerate = crate::pages::text(&page_of(folder.path(), &degenerate()), " ");
-    for words in ["4 of 6", "needles, lbvh:codes=mc30: the header: node 3 has two parents", "other bytes", "wrong hits"]
+    for words in
+        ["4 of 6", "needles, lbvh:codes=mc30 : the header: node 3 has two parents", "other bytes", "wrong hits"]
     {
         assert!(degenerate.contains(words), "{words}: {degenerate}");
     }

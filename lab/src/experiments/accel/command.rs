@@ -9,7 +9,6 @@ use crate::experiments::accel::{Experiment, Stage, batch, rebraid, top_level, up
 use crate::measure::setting::{Failure, Setting};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
-use ash::khr::acceleration_structure as functions;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
@@ -58,12 +57,10 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     // Before any work: a folder that cannot be written would lose all of it.
     let points = Points::create(&arguments.output)?;
     let device = common.open_device(true)?;
-    let driver = device.driver_tracing().map(|_| functions::Device::new(device.ash_instance(), device.ash_device()));
     let bar = Bar::new(common, "opening the device", 0);
     let say = |what: &str| bar.say(what);
     let stage = Stage {
         device: &device,
-        driver: driver.as_ref(),
         runs: arguments.runs.get(),
         kinds: &arguments.rays.0,
         rays: arguments.size.rays(common.seed),

@@ -45,8 +45,6 @@ named!(Experiment, "experiment": Batch = "batch", TopLevel = "tlas", Rebraid = "
 pub struct Stage<'a> {
     /// Where they run.
     pub device: &'a Device,
-    /// The functions of the driver, where it has structures of its own.
-    pub driver: Option<&'a ash::khr::acceleration_structure::Device>,
     /// Counted runs of everything, in turn, after one that warms up.
     pub runs: u32,
     /// Kinds of rays.
@@ -63,7 +61,7 @@ impl<'a> Stage<'a> {
     }
 
     fn drivers(&self) -> Option<Structures<'a>> {
-        self.driver.map(|functions| Structures::drivers(self.device, functions))
+        Structures::drivers(self.device)
     }
 
     /// Ours, and the driver's where it has any.

@@ -66,19 +66,19 @@ pub fn measure(stage: &Stage<'_>, instances: &Instances, point: &mut dyn FnMut(E
 
 fn traced(stage: &Stage<'_>, levels: &mut [Levels<'_>], bundle: &Bundle<'_>) -> Result<BraidedRays> {
     let query = bundle.kind.query();
-    let (rays, hits, count) = (&bundle.rays, &bundle.hits, bundle.count);
-    let times = in_turn(levels, WARM_UPS, stage.runs, |levels| levels.trace(rays, hits, count, query));
+    let rays = &bundle.buffers;
+    let times = in_turn(levels, WARM_UPS, stage.runs, |levels| levels.trace(rays, query));
     let times: Vec<Vec<f64>> = times.into_iter().collect::<Result<_>>()?;
     let mut found = Vec::new();
     let mut work = Vec::new();
     for levels in &mut levels[..=ON] {
-        levels.trace(rays, hits, count, query)?;
-        found.push(bundle.read_hits());
-        work.push(Work::mean(&levels.work(rays, hits, count, query)?));
+        levels.trace(rays, query)?;
+        found.push(rays.read_hits());
+        work.push(Work::mean(&levels.work(rays, query)?));
     }
     Ok(BraidedRays {
         rays: bundle.kind.name().into(),
-        count: count.into(),
+        count: rays.count.into(),
         hits: found[OFF].iter().filter(|hit| hit.is_some()).count() as u64,
         different: found[OFF].iter().zip(&found[ON]).filter(|(a, b)| !agree(query, a, b)).count() as u64,
         off_ms: Spread::of_some(&times[OFF])?,

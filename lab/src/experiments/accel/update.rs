@@ -91,8 +91,7 @@ pub fn measure(
 
 /// The rays through both structures of every maker, in turn.
 fn traced(stage: &Stage<'_>, pairs: &mut [Pair<'_>], bundle: &Bundle<'_>) -> Result<Vec<UpdatedRays>> {
-    let trace =
-        |deforming: &mut Deforming<'_>| deforming.trace(&bundle.rays, &bundle.hits, bundle.count, bundle.kind.query());
+    let trace = |deforming: &mut Deforming<'_>| deforming.trace(&bundle.buffers, bundle.kind.query());
     let times = in_turn(pairs, WARM_UPS, stage.runs, |pair| {
         let updated = pair.updates.then(|| trace(&mut pair.updated)).transpose()?;
         Ok((trace(&mut pair.built)?, updated))
@@ -103,7 +102,7 @@ fn traced(stage: &Stage<'_>, pairs: &mut [Pair<'_>], bundle: &Bundle<'_>) -> Res
         let updated: Vec<f64> = times.iter().filter_map(|t| t.1).collect();
         Ok(UpdatedRays {
             rays: bundle.kind.name().into(),
-            count: bundle.count.into(),
+            count: bundle.buffers.count.into(),
             built_ms: Spread::of_some(&built)?,
             updated_ms: Spread::of(&updated),
             slowdown: Spread::of(&ratios(&updated, &built)),

@@ -5,10 +5,11 @@ use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::animate::page::{self, Points, standings};
 use crate::experiments::animate::points::{Entry, Object, SceneSetting};
-use crate::experiments::animate::{Contender, Stage, Way, measure};
+use crate::experiments::animate::{Stage, Way, measure};
 use crate::measure::setting::Setting;
 use crate::report::picture::shaded_by;
 use crate::scene::{DynamicScene, Scene};
+use crate::subjects::Subject;
 use crate::subjects::builders::{KdBuilder, Spec};
 use ash::vk;
 use std::io::Write;
@@ -162,9 +163,9 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         }
         points.append(entry)
     };
-    let mut show = |frame: u32, scene: &Scene, contender: &mut dyn Contender| {
+    let mut show = |frame: u32, scene: &Scene, subject: &mut dyn Subject| {
         bar.step();
-        if arguments.png { write_picture(common, arguments, frame, scene, contender) } else { Ok(()) }
+        if arguments.png { write_picture(common, arguments, frame, scene, subject) } else { Ok(()) }
     };
     let done = measure(&stage, &scene, &frames, &mut point, &mut show);
     drop(bar);
@@ -179,13 +180,13 @@ fn write_picture(
     arguments: &Arguments,
     frame: u32,
     scene: &Scene,
-    contender: &mut dyn Contender,
+    subject: &mut dyn Subject,
 ) -> crate::Result<()> {
     let size = [arguments.size.width, arguments.size.height];
     let image = shaded_by(scene, size, common.seed, &mut |rays, query| {
-        contender.set_rays(rays)?;
-        contender.trace(query)?;
-        contender.hits()
+        subject.set_rays(rays)?;
+        subject.trace(query)?;
+        subject.hits()
     })?;
     let path = arguments.output.join(file_of(frame));
     image.save(&path).map_err(|error| crate::Error::file(&path)(std::io::Error::other(error)))

@@ -1,20 +1,20 @@
 //! Objects that the device merges into the static tree every frame, and takes out again.
 
-use super::contender::Group;
-use super::{Contender, Frame};
 use crate::device::{Buffer, Device};
 use crate::measure::record;
+use crate::scene::{Frame, Group};
 use crate::subjects::builders::Spec;
 use crate::subjects::kd_device::KdDevice;
+use crate::subjects::{BuildRun, KD_TREE, Subject};
 use crate::{Error, Result};
 use hedgerow::bvh::geometry::Input;
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::Timestamps;
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::kdtree::merge::{Memory, Merger, Most, Object, Options, Report};
-use hedgerow::kdtree::quality;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
+use std::borrow::Cow;
 
 /// Phases of a restore and a merge at most.
 const PHASES: u32 = 400;
@@ -112,15 +112,15 @@ impl<'a> MergeOnDevice<'a> {
             tracer: KdDevice::new(device, traversal)?,
         })
     }
-
-    fn tree(&self) -> Result<KdTree> {
-        Ok(KdTree::from_bytes(&self.place.structure.read::<u8>(self.place.structure.bytes() as usize))?)
-    }
 }
 
-impl Contender for MergeOnDevice<'_> {
+impl Subject for MergeOnDevice<'_> {
     fn builder(&self) -> &str {
         &self.builder
+    }
+
+    fn kind(&self) -> &'static str {
+        KD_TREE
     }
 
     fn timer(&self) -> &'static str {
@@ -135,7 +135,7 @@ impl Contender for MergeOnDevice<'_> {
     }
 
     /// Where there was too little room, more is made, and what counts is a merge that had enough.
-    fn build(&mut self) -> Result<f64> {
+    fn build(&mut self) -> Result<BuildRun> {
         let objects: Vec<Object> = self.objects.iter().map(|moving| moving.object).collect();
         let mut attempts = 0;
         // A merge into a place that is new has nothing to take out.
@@ -153,7 +153,7 @@ impl Contender for MergeOnDevice<'_> {
             let report = self.place.report();
             let is_short = report.status & status::OUT_OF_ROOM != 0;
             if !is_short && is_whole {
-                return Ok(self.timestamps.phases()?.iter().map(|phase| phase.milliseconds).sum());
+                return Ok(BuildRun::of(self.timestamps.phases()?));
             }
             is_whole = true;
             if is_short {
@@ -169,14 +169,15 @@ impl Contender for MergeOnDevice<'_> {
         }
     }
 
-    fn memory(&mut self) -> Result<record::Memory> {
+    fn memory(&self) -> record::Memory {
         let Place { structure, scratch, undo, .. } = &self.place;
         let scratch_bytes = Some(scratch.bytes() + undo.bytes());
-        Ok(record::Memory { structure_bytes: Some(structure.bytes()), scratch_bytes, peak_bytes: None })
+        record::Memory { structure_bytes: Some(structure.bytes()), scratch_bytes, peak_bytes: None }
     }
 
-    fn sah(&mut self, c_t: f64, c_i: f64) -> Result<Option<f64>> {
-        Ok(Some(quality::on_host(&self.tree()?, c_t, c_i).sah))
+    fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {
+        let structure = &self.place.structure;
+        Ok(Some(Cow::Owned(KdTree::from_bytes(&structure.read::<u8>(structure.bytes() as usize))?)))
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {

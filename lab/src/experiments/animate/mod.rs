@@ -1,12 +1,11 @@
 //! A dynamic scene frame by frame, in each of five ways to have something to trace when some of it moves (Papay 2025, chapter 10 and
 //! section 11.3.2): what each frame's build takes, what its rays take then, and whether all find the same.
 //!
-//! A [`Contender`] is one of the [`Way`]s on a scene. What a way needs once (the tree of what stands still) is made before the clock
+//! A [`Subject`] is one of the [`Way`]s on a scene. What a way needs once (the tree of what stands still) is made before the clock
 //! runs, and so is what all need alike: vertices are placed and uploaded. Under the clock is what is done a frame to have something
 //! that can be traced, and the tracing.
 
 pub(crate) mod command;
-mod contender;
 mod merge_on_device;
 mod on_device;
 mod on_host;
@@ -20,10 +19,10 @@ use crate::measure::setting::Failure;
 use crate::measure::statistics::{Spread, in_turn};
 use crate::named::named;
 use crate::rays::kinds::{self, RayKind, RayOptions};
-use crate::scene::{Camera, DynamicScene, Scene};
+use crate::scene::{Camera, DynamicScene, Frame, Scene};
+use crate::subjects::Subject;
 use crate::subjects::builders::{KdBuilder, Spec};
 use crate::{Error, Result};
-pub use contender::{Contender, Frame};
 use hedgerow::kdtree::merge;
 use hedgerow::trace::{Hit, Query, Ray};
 use merge_on_device::MergeOnDevice;
@@ -90,7 +89,7 @@ pub struct Stage<'a> {
 
 impl<'a> Stage<'a> {
     /// A way on a scene, in its first frame; what it builds once is built.
-    fn contender(&self, way: Way, first: &Frame<'a>) -> Result<Box<dyn Contender + 'a>> {
+    fn subject(&self, way: Way, first: &Frame<'a>) -> Result<Box<dyn Subject + 'a>> {
         let device =
             || self.device.ok_or_else(|| Error::NoVulkan(format!("the way {way} needs a device, and none was opened")));
         if way == Way::TwoLevel {
@@ -123,7 +122,7 @@ impl<'a> Stage<'a> {
 /// One of the ways under way.
 struct Running<'a> {
     way: Way,
-    contender: Box<dyn Contender + 'a>,
+    subject: Box<dyn Subject + 'a>,
 }
 
 /// Measures these frames of a scene in every way of the stage. Points come as they are measured; `show` is called once a frame with
@@ -138,7 +137,7 @@ pub fn measure<'a>(
     scene: &'a DynamicScene,
     frames: &[u32],
     point: &mut dyn FnMut(Entry) -> Result<()>,
-    show: &mut dyn FnMut(u32, &Scene, &mut dyn Contender) -> Result<()>,
+    show: &mut dyn FnMut(u32, &Scene, &mut dyn Subject) -> Result<()>,
 ) -> Result<()> {
     let frame_of = |number: u32| -> Result<Frame<'a>> {
         let mut frame = Frame::new(scene, number)?;
@@ -150,8 +149,8 @@ pub fn measure<'a>(
     let mut running = Vec::new();
     for &way in stage.ways {
         (stage.say)(&format!("{}: preparing {way}", scene.name));
-        match stage.contender(way, &first) {
-            Ok(contender) => running.push(Running { way, contender }),
+        match stage.subject(way, &first) {
+            Ok(subject) => running.push(Running { way, subject }),
             Err(error) => point(failure(way, None, &error))?,
         }
     }
@@ -160,17 +159,17 @@ pub fn measure<'a>(
         (stage.say)(&format!("{}: frame {number}", scene.name));
         let warm_ups = u32::from(i == 0);
         let built = in_turn(&mut running, warm_ups, stage.runs, |running| {
-            running.contender.place(&frame)?;
-            running.contender.build()
+            running.subject.place(&frame)?;
+            Ok(running.subject.build()?.milliseconds)
         });
         let mut built = without_failed(&mut running, built, number, point)?;
         let Some(leader) = running.first_mut() else {
             return Err(Error::Argument("no way is left, see the failures".into()));
         };
-        show(number, &frame.scene, leader.contender.as_mut())?;
+        show(number, &frame.scene, leader.subject.as_mut())?;
         let mut rays_of: Vec<Vec<Rays>> = running.iter().map(|_| Vec::new()).collect();
         for &kind in stage.kinds {
-            let leader = &mut running[0].contender;
+            let leader = &mut running[0].subject;
             let rays = kinds::generate(kind, &frame.scene, &stage.rays, &mut |rays| {
                 traced(leader.as_mut(), rays, Query::ClosestHit)
             })?;
@@ -189,7 +188,7 @@ pub fn measure<'a>(
                 return Err(Error::Argument("no way is left, see the failures".into()));
             }
         }
-        for ((Running { way, contender }, built), rays) in running.iter_mut().zip(built).zip(rays_of) {
+        for ((Running { way, subject }, built), rays) in running.iter_mut().zip(built).zip(rays_of) {
             for wrong in rays.iter().filter(|rays| rays.different > 0) {
                 let what = format!(
                     "{} of {} {} rays have other hits than by {}",
@@ -204,14 +203,14 @@ pub fn measure<'a>(
                 frame: number,
                 time: frame.time,
                 way: *way,
-                builder: contender.builder().to_owned(),
-                timer: contender.timer().to_owned(),
+                builder: subject.builder().to_owned(),
+                timer: subject.timer().to_owned(),
                 static_triangles,
                 dynamic_triangles: scene.triangle_count() - static_triangles,
                 build_ms: Spread::of_some(&built)?,
                 trace: rays,
-                memory: contender.memory()?,
-                sah: contender.sah(c_t, c_i)?,
+                memory: subject.memory(),
+                sah: subject.quality(c_t, c_i)?.sah,
             }))?;
         }
     }
@@ -246,10 +245,10 @@ fn retain_by<T>(items: &mut Vec<T>, failed: &[bool]) {
     items.retain(|_| failed.next() != Some(&true));
 }
 
-fn traced(contender: &mut dyn Contender, rays: &[Ray], query: Query) -> Result<Vec<Hit>> {
-    contender.set_rays(rays)?;
-    contender.trace(query)?;
-    contender.hits()
+fn traced(subject: &mut dyn Subject, rays: &[Ray], query: Query) -> Result<Vec<Hit>> {
+    subject.set_rays(rays)?;
+    subject.trace(query)?;
+    subject.hits()
 }
 
 /// The rays in every way, in turn, and their hits against those of the first.
@@ -261,18 +260,18 @@ fn trace(
     rays: &[Ray],
 ) -> Vec<Result<Rays>> {
     let query = kind.query();
-    let set: Vec<Result<()>> = running.iter_mut().map(|running| running.contender.set_rays(rays)).collect();
-    let times = in_turn(running, warm_ups, stage.runs, |running| running.contender.trace(query));
+    let set: Vec<Result<()>> = running.iter_mut().map(|running| running.subject.set_rays(rays)).collect();
+    let times = in_turn(running, warm_ups, stage.runs, |running| running.subject.trace(query));
     let mut reference: Option<(Vec<Hit>, bool)> = None;
     let mut one = |running: &mut Running<'_>, times: Vec<f64>| {
-        let hits = running.contender.hits()?;
+        let hits = running.subject.hits()?;
         let is_kd = running.way.is_of_kd_trees();
         let (expected, expected_is_kd) = reference.get_or_insert_with(|| (hits.clone(), is_kd));
         let is_exact = is_kd && *expected_is_kd;
         let is_other = |((ray, a), b): &((&Ray, &Hit), &Hit)| !is_same(is_exact, query, ray, a, b);
         let different = rays.iter().zip(&hits).zip(expected.iter()).filter(is_other).count() as u64;
         let met = || hits.iter().filter(|hit| hit.is_some());
-        let work = running.contender.work(query)?;
+        let work = running.subject.work(query)?;
         let mean = |of: fn(&hedgerow::trace::Work) -> u32| {
             let work = work.as_ref()?;
             Some(work.iter().map(|w| f64::from(of(w))).sum::<f64>() / work.len() as f64)

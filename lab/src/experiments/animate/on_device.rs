@@ -1,20 +1,20 @@
 //! Kd-trees that the device builds every frame: all in one, all that moves, or each object.
 
-use super::contender::Group;
-use super::{Contender, Frame, Way};
+use super::Way;
 use crate::Result;
 use crate::device::{Buffer, Device};
 use crate::measure::record::Memory;
-use crate::scene::Mesh;
-use crate::subjects::Subject;
+use crate::scene::{Frame, Group, Mesh};
 use crate::subjects::builders::Spec;
 use crate::subjects::kd_device::KdDevice;
 use crate::subjects::kd_gpu::KdGpu;
+use crate::subjects::{BuildRun, KD_TREE, Subject};
 use hedgerow::kdtree::builder;
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use hedgerow_host::kdtree as host;
+use std::borrow::Cow;
 
 /// Trees on the device, which are traced one after the other.
 pub struct OnDevice<'a> {
@@ -80,9 +80,13 @@ pub(super) fn static_tree(mesh: &Mesh, options: &host::Options) -> Result<Option
     Ok(is_there.then(|| host::build(&mesh.positions, &mesh.triangles, options)).transpose()?)
 }
 
-impl Contender for OnDevice<'_> {
+impl Subject for OnDevice<'_> {
     fn builder(&self) -> &str {
         &self.builder
+    }
+
+    fn kind(&self) -> &'static str {
+        KD_TREE
     }
 
     fn timer(&self) -> &'static str {
@@ -96,21 +100,23 @@ impl Contender for OnDevice<'_> {
         Ok(())
     }
 
-    fn build(&mut self) -> Result<f64> {
-        self.parts.iter_mut().map(|part| Ok(part.subject.build()?.milliseconds)).sum()
+    fn build(&mut self) -> Result<BuildRun> {
+        let milliseconds =
+            self.parts.iter_mut().map(|part| Ok(part.subject.build()?.milliseconds)).sum::<Result<f64>>()?;
+        Ok(BuildRun::whole(milliseconds))
     }
 
-    fn memory(&mut self) -> Result<Memory> {
+    fn memory(&self) -> Memory {
         let parts = || self.parts.iter().map(|part| part.subject.memory());
         let still = self.still.iter().map(|still| Some(still.bytes()));
         let structure_bytes = still.chain(parts().map(|memory| memory.structure_bytes)).sum();
         let scratch_bytes = parts().map(|memory| memory.scratch_bytes).sum();
-        Ok(Memory { structure_bytes, scratch_bytes, peak_bytes: None })
+        Memory { structure_bytes, scratch_bytes, peak_bytes: None }
     }
 
-    fn sah(&mut self, c_t: f64, c_i: f64) -> Result<Option<f64>> {
+    fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {
         match (&self.still, &mut self.parts[..]) {
-            (None, [part]) => Ok(part.subject.quality(c_t, c_i)?.sah),
+            (None, [part]) => part.subject.kd_tree(),
             _ => Ok(None),
         }
     }

@@ -1,23 +1,22 @@
 //! Kd-trees that the host builds every frame, or merges into the static one.
 
-use super::contender::Group;
+use super::Way;
 use super::on_device::static_tree;
-use super::{Contender, Frame, Way};
-use crate::device::{Buffer, Device};
+use crate::device::Device;
 use crate::measure::record::Memory;
-use crate::scene::Mesh;
+use crate::scene::{Frame, Group, Mesh};
 use crate::subjects::builders::Spec;
-use crate::subjects::host::timed;
+use crate::subjects::host_rays::{KdRays, Numbered, timed};
 use crate::subjects::kd_device::KdDevice;
+use crate::subjects::{BuildRun, KD_TREE, Subject};
 use crate::{Error, Result};
 use hedgerow::kdtree::layout::{KdTree, Room};
-use hedgerow::kdtree::quality;
 use hedgerow::trace::kd::Traversal;
-use hedgerow::trace::twin::kd::trace;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use hedgerow_host::kdtree::merge::Merged;
 use hedgerow_host::kdtree::{Options, build};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Room for merging, for each triangle that moves: what scenes that were measured need, twice over; and for those with few. More
 /// is made where it is too little.
@@ -30,7 +29,9 @@ pub struct OnHost<'a> {
     options: Options,
     parts: Vec<Part>,
     trees: Trees,
-    tracing: Tracing<'a>,
+    rays: KdRays<'a>,
+    /// Of all trees, as they were built last.
+    bytes: u64,
 }
 
 /// What is built every frame.
@@ -51,7 +52,7 @@ enum Trees {
 
 impl Trees {
     /// Each with the number of its first primitive.
-    fn all<'t>(&'t mut self, parts: &[Part]) -> Result<Vec<(&'t KdTree, u32)>> {
+    fn all<'t>(&'t mut self, parts: &[Part]) -> Result<Vec<Numbered<'t>>> {
         Ok(match self {
             Trees::Apart { still, parts: trees } => {
                 let firsts = parts.iter().map(|part| part.first);
@@ -60,12 +61,6 @@ impl Trees {
             Trees::Merged(merged) => vec![(merged.tree()?, 0)],
         })
     }
-}
-
-/// Where rays are traced, and what for.
-enum Tracing<'a> {
-    Host { traversal: Traversal, rays: Vec<Ray>, hits: Vec<Hit> },
-    Device { tracer: Box<KdDevice<'a>>, uploaded: Vec<(Buffer<'a>, u32)> },
 }
 
 impl<'a> OnHost<'a> {
@@ -112,11 +107,9 @@ impl<'a> OnHost<'a> {
             }
             _ => Trees::Apart { still: still.map(Box::new), parts: Vec::new() },
         };
-        let tracing = match (traces_on_device, device) {
-            (false, _) => Tracing::Host { traversal, rays: Vec::new(), hits: Vec::new() },
-            (true, Some(device)) => {
-                Tracing::Device { tracer: Box::new(KdDevice::new(device, traversal)?), uploaded: Vec::new() }
-            }
+        let rays = match (traces_on_device, device) {
+            (false, _) => KdRays::on_host(traversal),
+            (true, Some(device)) => KdRays::on_device(KdDevice::new(device, traversal)?),
             (true, None) => return Err(Error::NoVulkan("rays are traced on a device, and none was opened".into())),
         };
         Ok(OnHost {
@@ -124,7 +117,8 @@ impl<'a> OnHost<'a> {
             options,
             parts: groups.into_iter().map(part).collect(),
             trees,
-            tracing,
+            rays,
+            bytes: 0,
         })
     }
 
@@ -166,49 +160,41 @@ impl<'a> OnHost<'a> {
 /// Attempts to merge, each with twice the room of the one before.
 const ATTEMPTS: u32 = 6;
 
-/// The nearest hit in all trees, of equally near ones that in the earlier; or any.
-fn through(trees: &[(&KdTree, u32)], ray: &Ray, query: Query, traversal: Traversal) -> (Hit, Work) {
-    let (mut nearest, mut work, mut ray) = (Hit::NONE, Work::default(), *ray);
-    for &(tree, first) in trees {
-        let (hit, more) = trace(tree, &ray, query, traversal);
-        work =
-            Work { steps: work.steps + more.steps, tests: work.tests + more.tests, leaves: work.leaves + more.leaves };
-        if hit.is_some() {
-            nearest = Hit { primitive: hit.primitive + first, ..hit };
-            if query == Query::AnyHit {
-                break;
-            }
-            ray.t_max = hit.t;
-        }
-    }
-    (nearest, work)
-}
-
-impl Contender for OnHost<'_> {
+impl Subject for OnHost<'_> {
     fn builder(&self) -> &str {
         &self.builder
+    }
+
+    fn kind(&self) -> &'static str {
+        KD_TREE
     }
 
     fn timer(&self) -> &'static str {
         "wall"
     }
 
+    fn traces_on_device(&self) -> bool {
+        matches!(self.rays, KdRays::Device { .. })
+    }
+
     fn place(&mut self, frame: &Frame<'_>) -> Result<()> {
         for part in &mut self.parts {
             part.mesh = frame.mesh(part.group);
         }
-        if let Tracing::Device { uploaded, .. } = &mut self.tracing {
-            uploaded.clear();
-        }
+        self.rays.forget_trees();
         Ok(())
     }
 
-    fn build(&mut self) -> Result<f64> {
+    fn build(&mut self) -> Result<BuildRun> {
         let mut attempts = 1;
         loop {
             let (milliseconds, built) = timed(|| self.build_once());
             match built {
-                Ok(()) => return Ok(milliseconds),
+                Ok(()) => {
+                    let trees = self.trees.all(&self.parts)?;
+                    self.bytes = trees.iter().map(|(tree, _)| tree.header.sizes().bytes).sum();
+                    return Ok(BuildRun::whole(milliseconds));
+                }
                 // The only argument that can be wrong here is the room.
                 Err(Error::Argument(_)) if attempts < ATTEMPTS && matches!(self.trees, Trees::Merged(_)) => {
                     self.enlarge()?;
@@ -219,65 +205,30 @@ impl Contender for OnHost<'_> {
         }
     }
 
-    fn memory(&mut self) -> Result<Memory> {
-        let trees = self.trees.all(&self.parts)?;
-        let structure_bytes = Some(trees.iter().map(|(tree, _)| tree.header.sizes().bytes).sum());
-        Ok(Memory { structure_bytes, ..Memory::default() })
+    fn memory(&self) -> Memory {
+        Memory { structure_bytes: Some(self.bytes), ..Memory::default() }
     }
 
-    fn sah(&mut self, c_t: f64, c_i: f64) -> Result<Option<f64>> {
+    fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {
         Ok(match self.trees.all(&self.parts)?[..] {
-            [(tree, _)] => Some(quality::on_host(tree, c_t, c_i).sah),
+            [(tree, _)] => Some(Cow::Borrowed(tree)),
             _ => None,
         })
     }
 
     fn set_rays(&mut self, new: &[Ray]) -> Result<()> {
-        match &mut self.tracing {
-            Tracing::Host { rays, .. } => *rays = new.to_vec(),
-            Tracing::Device { tracer, uploaded } => {
-                if uploaded.is_empty() {
-                    for (tree, first) in self.trees.all(&self.parts)? {
-                        uploaded.push((tracer.upload(tree)?, first));
-                    }
-                }
-                tracer.set_rays(new)?;
-            }
-        }
-        Ok(())
+        self.rays.set(&self.trees.all(&self.parts)?, new)
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        match &mut self.tracing {
-            Tracing::Host { traversal, rays, hits } => {
-                let trees = self.trees.all(&self.parts)?;
-                let (milliseconds, all) =
-                    timed(|| rays.par_iter().map(|ray| through(&trees, ray, query, *traversal).0).collect());
-                *hits = all;
-                Ok(milliseconds)
-            }
-            Tracing::Device { tracer, uploaded } => tracer.trace_several(&addresses(uploaded), query),
-        }
+        self.rays.trace(&self.trees.all(&self.parts)?, query)
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(match &self.tracing {
-            Tracing::Host { hits, .. } => hits.clone(),
-            Tracing::Device { tracer, .. } => tracer.hits(),
-        })
+        Ok(self.rays.hits())
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        match &self.tracing {
-            Tracing::Host { traversal, rays, .. } => {
-                let trees = self.trees.all(&self.parts)?;
-                Ok(Some(rays.par_iter().map(|ray| through(&trees, ray, query, *traversal).1).collect()))
-            }
-            Tracing::Device { tracer, uploaded } => tracer.work_several(&addresses(uploaded), query),
-        }
+        self.rays.work(&self.trees.all(&self.parts)?, query)
     }
-}
-
-fn addresses(uploaded: &[(Buffer<'_>, u32)]) -> Vec<(u64, u32)> {
-    uploaded.iter().map(|(tree, first)| (tree.address(), *first)).collect()
 }

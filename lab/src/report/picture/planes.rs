@@ -13,6 +13,7 @@ use hedgerow::kdtree::layout::{Content, KdTree};
 use hedgerow::trace::Hit;
 use image::RgbImage;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Lines across x, y and z: three that the colour-blind tell apart, too (Okabe and Ito 2008).
 const COLOURS: [[u8; 3]; 3] = [[0xD5, 0x5E, 0x00], [0x00, 0x9E, 0x73], [0x00, 0x72, 0xB2]];
@@ -40,7 +41,7 @@ impl Line {
 }
 
 pub(super) fn planes(scene: &Scene, subject: &mut dyn Subject, options: &PictureOptions) -> Result<RgbImage> {
-    let Some(tree) = subject.kd_tree()? else { return Err(needs_kd_tree(subject.builder())) };
+    let Some(tree) = subject.kd_tree()?.map(Cow::into_owned) else { return Err(needs_kd_tree(subject.builder())) };
     let rays = smooth(options.size, options.seed);
     let seen = Seen::trace(scene, subject, &rays)?;
     let size = rays.size.map(|side| side as usize);

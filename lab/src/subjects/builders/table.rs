@@ -6,8 +6,8 @@ use super::options::{
     TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
 };
 use crate::Result;
-use crate::device::DriverPreference;
 use crate::subjects::host::Hierarchy;
+use crate::subjects::peers::driver::DriverPreference;
 #[cfg(feature = "peer-embree")]
 use crate::subjects::peers::embree;
 #[cfg(feature = "peer-obvhs")]

@@ -4,22 +4,36 @@
 //! The build time is that of the bottom level alone, which is what compares with our builders; the top level of one
 //! instance, which rays cannot do without, is the phase `tlas` beside it. Structure bytes hold both.
 
-use crate::device::{Buffer, Device, DriverPreference, DriverRays, DriverStructure, Found};
+use crate::device::{Device, Found, driver_is_missing};
 use crate::measure::record;
 use crate::scene::Mesh;
+use crate::subjects::device_rays::RayBuffers;
+use crate::subjects::level::Level;
+use crate::subjects::structures::Structures;
 use crate::subjects::{BuildRun, Subject};
 use crate::{Error, Result};
-use hedgerow::bvh::layout::Bvh2;
-use hedgerow::gpu::{self, Timestamps};
-use hedgerow::trace::{Hit, Query, Ray, Work};
+use ash::vk;
+use hedgerow::accel::Instance;
+use hedgerow::gpu::Timestamps;
+use hedgerow::trace::{Hit, Query, Ray};
+
+/// What the driver is asked to be good at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum DriverPreference {
+    /// `VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_KHR`.
+    FastBuild,
+    /// `VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR`.
+    FastTrace,
+}
 
 /// A scene in the driver's acceleration structure.
 pub struct Driver<'a> {
-    device: &'a Device,
+    structures: Structures<'a>,
     preference: DriverPreference,
-    structure: DriverStructure<'a>,
+    bottom: Level<'a>,
+    top: Level<'a>,
     timestamps: Timestamps,
-    rays: Option<(u32, Buffer<'a>, Buffer<'a>)>,
+    rays: Option<RayBuffers<'a>>,
 }
 
 /// What a reader of the figures must know of this driver's builder, if anything.
@@ -44,10 +58,22 @@ impl<'a> Driver<'a> {
     /// Uploads `mesh` and makes room for the structure.
     ///
     /// # Errors
-    /// [`hedgerow::Error::Unsupported`] where the driver has no structures (or the device was opened without); too little memory.
+    /// [`hedgerow::Error::Unsupported`] where the driver has no structures (or the device was opened without); too many triangles
+    /// for it; too little memory.
     pub fn new(device: &'a Device, mesh: &Mesh, preference: DriverPreference) -> Result<Driver<'a>> {
-        let structure = DriverStructure::new(device, &mesh.positions, &mesh.triangles, preference)?;
-        Ok(Driver { device, preference, structure, timestamps: Timestamps::new(device, 2)?, rays: None })
+        let structures = Structures::drivers(device).ok_or_else(|| driver_is_missing(device))?;
+        let (count, most) = (mesh.triangles.len() as u64, device.most_primitives_of_driver());
+        if count > most {
+            let message = format!("{count} triangles, {} builds of at most {most}", device.found().name);
+            return Err(Error::Argument(format!("{message}; take a smaller scene or another builder")));
+        }
+        let flags = match preference {
+            DriverPreference::FastBuild => vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_BUILD,
+            DriverPreference::FastTrace => vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE,
+        };
+        let bottom = Level::bottom(&structures, mesh, flags)?;
+        let top = Level::top(&structures, &[bottom.instance(&structures, Instance::IDENTITY)], flags)?;
+        Ok(Driver { structures, preference, bottom, top, timestamps: Timestamps::new(device, 2)?, rays: None })
     }
 }
 
@@ -64,7 +90,7 @@ impl Subject for Driver<'_> {
     }
 
     fn timer(&self) -> &'static str {
-        self.device.timer()
+        self.structures.device.timer()
     }
 
     fn traces_on_device(&self) -> bool {
@@ -72,9 +98,12 @@ impl Subject for Driver<'_> {
     }
 
     fn build(&mut self) -> Result<BuildRun> {
-        self.device.run(Some(&mut self.timestamps), |recorder| {
-            self.structure.record(recorder);
-            Ok(())
+        let (structures, mode) = (&self.structures, vk::BuildAccelerationStructureModeKHR::BUILD);
+        structures.device.run(Some(&mut self.timestamps), |recorder| {
+            recorder.phase("build");
+            self.bottom.record(structures, recorder, mode)?;
+            recorder.phase("tlas");
+            self.top.record(structures, recorder, mode)
         })?;
         let phases = self.timestamps.phases()?;
         let bottom = phases.first().map_or(0.0, |p| p.milliseconds);
@@ -82,57 +111,27 @@ impl Subject for Driver<'_> {
     }
 
     fn memory(&self) -> record::Memory {
-        let sizes = self.structure.sizes();
-        let structure = sizes.bottom + sizes.top;
+        let ([bottom, scratch], [top, _]) = (self.bottom.bytes(), self.top.bytes());
         record::Memory {
-            structure_bytes: Some(structure),
-            scratch_bytes: Some(sizes.scratch),
-            peak_bytes: Some(structure + sizes.scratch),
+            structure_bytes: Some(bottom + top),
+            scratch_bytes: Some(scratch),
+            peak_bytes: Some(bottom + top + scratch),
         }
     }
 
-    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
-        // The driver's nodes are its own.
-        Ok(record::Quality { c_t, c_i, ..Default::default() })
-    }
-
-    fn tree(&mut self) -> Result<Option<Bvh2>> {
-        Ok(None)
-    }
-
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        let count = u32::try_from(rays.len())
-            .map_err(|_| Error::Argument(format!("{} rays; at most 4294967295 at once", rays.len())))?;
+        // Both at once may be too much.
         self.rays = None;
-        let hits = self.device.buffer("driver: hits", (rays.len() * size_of::<Hit>()) as u64)?;
-        self.rays = Some((count, self.device.upload("driver: rays", rays)?, hits));
+        self.rays = Some(RayBuffers::new(self.structures.device, rays)?);
         Ok(())
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let Some((count, rays, hits)) = &self.rays else {
-            return Ok(0.0);
-        };
-        let rays = DriverRays {
-            structure: self.structure.address(),
-            rays: rays.address(),
-            hits: hits.address(),
-            count: *count,
-            any_hit: query == Query::AnyHit,
-        };
-        let device = self.device;
-        device.run(Some(&mut self.timestamps), |recorder| {
-            recorder.phase("trace");
-            device.trace_by_driver(recorder, &rays)
-        })?;
-        Ok(self.timestamps.phases()?.iter().map(|p: &gpu::Phase| p.milliseconds).sum())
+        let Some(rays) = &self.rays else { return Ok(0.0) };
+        self.structures.trace(&mut self.timestamps, self.top.structure(), rays, query)
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(self.rays.as_ref().map_or_else(Vec::new, |(count, _, hits)| hits.read(*count as usize)))
-    }
-
-    fn work(&mut self, _query: Query) -> Result<Option<Vec<Work>>> {
-        Ok(None)
+        Ok(self.rays.as_ref().map_or_else(Vec::new, RayBuffers::read_hits))
     }
 }

@@ -4,14 +4,13 @@
 
 use crate::measure::record;
 use crate::scene::Mesh;
-use crate::subjects::host::timed;
+use crate::subjects::host_rays::timed;
 use crate::subjects::{BuildRun, Subject};
 use crate::{Error, Result};
 use embree3::{
     BufferUsage, BuildQuality, Config, Device, Format, IntersectContext, RayHit, Scene, TriangleMeshBuilder,
 };
-use hedgerow::bvh::layout::Bvh2;
-use hedgerow::trace::{Hit, Query, Ray, Work};
+use hedgerow::trace::{Hit, Query, Ray};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -146,7 +145,7 @@ impl Subject for Embree {
             self.scene.commit();
         });
         match self.device.get_error() {
-            embree3::Error::NONE => Ok(BuildRun { milliseconds, phases: Vec::new() }),
+            embree3::Error::NONE => Ok(BuildRun::whole(milliseconds)),
             error => Err(failed("rtcCommitScene")(error)),
         }
     }
@@ -159,14 +158,6 @@ impl Subject for Embree {
             scratch_bytes: Some(peak.saturating_sub(structure)),
             peak_bytes: Some(peak),
         }
-    }
-
-    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
-        Ok(record::Quality { c_t, c_i, ..Default::default() })
-    }
-
-    fn tree(&mut self) -> Result<Option<Bvh2>> {
-        Ok(None)
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
@@ -187,9 +178,5 @@ impl Subject for Embree {
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
         Ok(self.hits.clone())
-    }
-
-    fn work(&mut self, _query: Query) -> Result<Option<Vec<Work>>> {
-        Ok(None)
     }
 }

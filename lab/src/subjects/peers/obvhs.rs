@@ -6,14 +6,14 @@
 use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
 use crate::scene::Mesh;
-use crate::subjects::host::timed;
+use crate::subjects::host_rays::{HostRays, timed};
 use crate::subjects::{BuildRun, Subject};
 use crate::{Error, Result};
 use bytemuck::Zeroable;
 use hedgerow::bvh::layout::{Bvh2, Child, Header, MAGIC, Node, Record, Triangle as OurTriangle, node_slots};
 use hedgerow::bvh::twin::quality;
 use hedgerow::gpu::Phase;
-use hedgerow::trace::{Hit, Query, Ray, Work};
+use hedgerow::trace::{Hit, Query, Ray};
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::builder::build_bvh2_from_tris;
 use obvhs::bvh2::{Bvh2 as Tree, node::Bvh2Node};
@@ -59,8 +59,7 @@ pub struct Obvhs {
     tree: Tree,
     /// In the tree's order.
     ordered: Vec<RtTriangle>,
-    rays: Vec<Ray>,
-    hits: Vec<Hit>,
+    rays: HostRays,
 }
 
 impl Obvhs {
@@ -79,31 +78,7 @@ impl Obvhs {
         };
         let triangles = (0..mesh.triangles.len()).map(triangle).collect();
         let (tree, ordered) = (Tree::default(), Vec::new());
-        Ok(Obvhs { preset, triangles, tree, ordered, rays: Vec::new(), hits: Vec::new() })
-    }
-
-    /// The nearest or any hit of a ray by obvhs's traversal.
-    fn trace_one(&self, ray: &Ray, query: Query) -> Hit {
-        let walked = obvhs::ray::Ray::new(ray.origin.into(), ray.direction.into(), ray.t_min, ray.t_max);
-        let mut met = RayHit::none();
-        match query {
-            Query::ClosestHit => {
-                self.tree.ray_traverse(walked, &mut met, |ray, i| self.ordered[i].intersect(ray));
-            }
-            Query::AnyHit => {
-                self.tree.ray_traverse_miss(walked, |ray, i| {
-                    let t = self.ordered[i].intersect(ray);
-                    if t < ray.tmax {
-                        met = RayHit { t: 0.0, primitive_id: i as u32, ..met };
-                    }
-                    t
-                });
-            }
-        }
-        if met.primitive_id == obvhs::ray::INVALID_ID {
-            return Hit::NONE;
-        }
-        Hit { t: met.t, primitive: self.tree.primitive_indices[met.primitive_id as usize], u: 0.0, v: 0.0 }
+        Ok(Obvhs { preset, triangles, tree, ordered, rays: HostRays::default() })
     }
 
     /// The weights of a hit, which obvhs does not give (Möller, Trumbore 1997, in double precision).
@@ -121,6 +96,30 @@ impl Obvhs {
         let (u, v) = (from_v0.dot(across) * scale, direction.dot(from_v0.cross(e1)) * scale);
         Hit { u: u as f32, v: v as f32, ..hit }
     }
+}
+
+/// The nearest or any hit of a ray by obvhs's traversal.
+fn trace_one(tree: &Tree, ordered: &[RtTriangle], ray: &Ray, query: Query) -> Hit {
+    let walked = obvhs::ray::Ray::new(ray.origin.into(), ray.direction.into(), ray.t_min, ray.t_max);
+    let mut met = RayHit::none();
+    match query {
+        Query::ClosestHit => {
+            tree.ray_traverse(walked, &mut met, |ray, i| ordered[i].intersect(ray));
+        }
+        Query::AnyHit => {
+            tree.ray_traverse_miss(walked, |ray, i| {
+                let t = ordered[i].intersect(ray);
+                if t < ray.tmax {
+                    met = RayHit { t: 0.0, primitive_id: i as u32, ..met };
+                }
+                t
+            });
+        }
+    }
+    if met.primitive_id == obvhs::ray::INVALID_ID {
+        return Hit::NONE;
+    }
+    Hit { t: met.t, primitive: tree.primitive_indices[met.primitive_id as usize], u: 0.0, v: 0.0 }
 }
 
 /// obvhs's tree in our layout: its children lie side by side behind their parent's index.
@@ -206,28 +205,17 @@ impl Subject for Obvhs {
         Ok(overlap::on_host(&converted(&self.tree, &self.triangles), c_t, c_i, epo))
     }
 
-    fn tree(&mut self) -> Result<Option<Bvh2>> {
-        Ok(None)
-    }
-
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        self.rays = rays.to_vec();
+        self.rays.set(rays);
         Ok(())
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let mut hits = std::mem::take(&mut self.hits);
-        let (milliseconds, ()) =
-            timed(|| self.rays.par_iter().map(|ray| self.trace_one(ray, query)).collect_into_vec(&mut hits));
-        self.hits = hits;
-        Ok(milliseconds)
+        let Obvhs { tree, ordered, rays, .. } = self;
+        Ok(rays.trace(|ray| trace_one(tree, ordered, ray, query)))
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(self.rays.iter().zip(&self.hits).map(|(ray, &hit)| self.with_weights(ray, hit)).collect())
-    }
-
-    fn work(&mut self, _query: Query) -> Result<Option<Vec<Work>>> {
-        Ok(None)
+        Ok(self.rays.met().map(|(ray, &hit)| self.with_weights(ray, hit)).collect())
     }
 }
