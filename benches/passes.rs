@@ -10,7 +10,6 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hedgerow::accel;
-use hedgerow::ash;
 use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
 use hedgerow::bvh::compact;
 use hedgerow::bvh::layout::{Header, Triangle};

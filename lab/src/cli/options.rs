@@ -37,8 +37,8 @@ pub struct Common {
     #[arg(long, global = true, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub look: Option<Point>,
     /// The camera's vertical field of view
-    #[arg(long, global = true, value_name = "DEGREES")]
-    pub fov: Option<FieldOfView>,
+    #[arg(long, global = true, value_name = "DEGREES", value_parser = number(FIELD_OF_VIEW, |d| d > 0.0 && d < 180.0))]
+    pub fov: Option<f32>,
     /// Rays that are traced between two builds: what the builder auto chooses for [default: 1e7]
     #[arg(long, global = true, value_name = "N")]
     pub rays_per_build: Option<RaysPerBuild>,
@@ -139,7 +139,7 @@ impl Common {
             camera.look = look.0;
         }
         if let Some(fov) = self.fov {
-            camera.fov = fov.0;
+            camera.fov = fov;
         }
     }
 }
@@ -173,16 +173,14 @@ impl FromStr for Point {
     }
 }
 
-/// A vertical field of view in degrees.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FieldOfView(pub f32);
+/// What [`Common::fov`] is.
+const FIELD_OF_VIEW: &str = "an angle between 0 and 180 degrees";
 
-impl FromStr for FieldOfView {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<FieldOfView, String> {
-        let degrees = text.parse().ok().filter(|d: &f32| *d > 0.0 && *d < 180.0);
-        degrees.map(FieldOfView).ok_or_else(|| format!("{text:?} is not an angle between 0 and 180 degrees"))
+/// A number that `is_right`: what it is, for messages.
+pub fn number(what: &'static str, is_right: fn(f32) -> bool) -> impl TypedValueParser<Value = f32> {
+    move |text: &str| match text.parse() {
+        Ok(number) if is_right(number) => Ok(number),
+        _ => Err(format!("{text:?} is not {what}")),
     }
 }
 
@@ -298,32 +296,6 @@ impl FromStr for Steps {
     }
 }
 
-/// A number above zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Positive(pub f32);
-
-impl FromStr for Positive {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Positive, String> {
-        let number = text.parse().ok().filter(|n: &f32| *n > 0.0 && n.is_finite());
-        number.map(Positive).ok_or_else(|| format!("{text:?} is not a number above zero"))
-    }
-}
-
-/// A time in seconds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Time(pub f32);
-
-impl FromStr for Time {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Time, String> {
-        let seconds = text.parse().ok().filter(|t: &f32| t.is_finite());
-        seconds.map(Time).ok_or_else(|| format!("{text:?} is not a time; write seconds, as in 1.5"))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -373,10 +345,12 @@ mod tests {
     }
 
     #[test]
-    fn a_field_of_view_lies_between_0_and_180() {
-        assert_eq!("60".parse(), Ok(FieldOfView(60.0)));
+    fn a_number_is_what_it_is_asked_to_be() {
+        use clap::Parser;
+        let fov = |text: &str| super::super::Cli::try_parse_from(["hedgerow", "devices", "--fov", text]);
+        assert_eq!(fov("60").expect("an angle").common.fov, Some(60.0));
         for wrong in ["0", "180", "nan", "-5", "x"] {
-            assert!(wrong.parse::<FieldOfView>().is_err(), "{wrong}");
+            assert!(fov(wrong).is_err(), "{wrong}");
         }
     }
 }

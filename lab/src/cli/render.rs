@@ -1,5 +1,6 @@
 //! `hedgerow render`: a picture of a scene, or of the work that its rays take.
 
+use super::options::number;
 use super::{Bar, Common, Size, work};
 use crate::report::picture::{PictureOptions, View, picture};
 use crate::scene::Scene;
@@ -27,11 +28,11 @@ pub struct Arguments {
     size: Size,
     /// Where the colours of a heat map end [default: what 99 of 100 pixels stay below]; of planes, the deepest level that is drawn
     /// [default: as deep as lines cover a fifth of the surface]
-    #[arg(long, value_name = "VALUE")]
-    top: Option<super::options::Positive>,
+    #[arg(long, value_name = "VALUE", value_parser = number("a number above zero", |n| n > 0.0 && n.is_finite()))]
+    top: Option<f32>,
     /// When a dynamic scene is seen, in seconds [default: 0]
-    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, conflicts_with = "frame")]
-    time: Option<super::options::Time>,
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, conflicts_with = "frame", value_parser = number("a time; write seconds, as in 1.5", f32::is_finite))]
+    time: Option<f32>,
     /// Which of its frames is seen, from 0
     #[arg(long, value_name = "K")]
     frame: Option<u32>,
@@ -56,7 +57,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         view: arguments.view,
         size: [arguments.size.width, arguments.size.height],
         seed: common.seed,
-        top: arguments.top.map(|top| top.0),
+        top: arguments.top,
     };
     let image = picture(&scene, subject.as_mut(), &options)?;
     drop(bar);
@@ -78,7 +79,7 @@ fn scene(common: &Common, arguments: &Arguments) -> crate::Result<Scene> {
         let what = format!("--frame {frame}: {name} has {frames}, counted from 0; take an earlier one");
         return Err(crate::Error::Argument(what));
     }
-    let mut scene = dynamic.at(arguments.time.map_or_else(|| dynamic.time_of(frame), |time| time.0))?;
+    let mut scene = dynamic.at(arguments.time.unwrap_or_else(|| dynamic.time_of(frame)))?;
     common.aim(&mut scene.camera);
     Ok(scene)
 }

@@ -1,5 +1,6 @@
 //! One line of `results.jsonl` (CONTRACT, "One record of results.jsonl"). A figure that was not measured is `None`.
 
+use super::statistics::Spread;
 use serde::{Deserialize, Serialize};
 
 /// Version of the record; a change of names or meanings bumps it.
@@ -55,6 +56,12 @@ pub struct Build {
     pub timer: String,
     /// Medians a phase, in order.
     pub phases: Vec<Phase>,
+}
+
+impl From<&Build> for Spread {
+    fn from(build: &Build) -> Spread {
+        Spread { median: build.median_ms, min: build.min_ms, max: build.max_ms, runs: build.runs }
+    }
 }
 
 /// One phase of a build.

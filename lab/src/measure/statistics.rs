@@ -1,6 +1,7 @@
 //! Medians and spreads of repeated runs, and the order in which several subjects are run: in turn, A B A B.
 
 use crate::{Error, Result};
+use hedgerow::trace::Work;
 
 /// What repeated measurements of one thing say.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -43,6 +44,11 @@ impl Spread {
     pub fn overlaps(&self, other: &Spread) -> bool {
         self.min <= other.max && other.min <= self.max
     }
+}
+
+/// The mean of a figure of the work of rays; `None` without any.
+pub fn mean_work(work: &[Work], of: fn(&Work) -> u32) -> Option<f64> {
+    (!work.is_empty()).then(|| work.iter().map(|w| f64::from(of(w))).sum::<f64>() / work.len() as f64)
 }
 
 /// The ratios of two subjects that ran in turn, round by round: what slows down a round slows both.

@@ -2,10 +2,10 @@
 //! and where something is expected at a place, so is that.
 
 use crate::Result;
-use crate::experiments::bench::growth::PowerLaw;
 use crate::measure::statistics::Spread;
 use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, frame, log_axis, mesh, pixel, room_at_ends};
 use crate::report::labels::Rect;
+use crate::report::power_law::PowerLaw;
 use crate::report::theme::{INK, Tone};
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::prelude::*;

@@ -1,6 +1,6 @@
 //! What pages are made of: charts, tables, pictures, numbers as people read them, and files of records.
 //!
-//! [`Chart`] is drawn once, as SVG, PNG and part of a page; [`bars`] and [`curves`] are its usual kinds. A [`document`](mod@document)
+//! [`Chart`] is drawn once, as SVG, PNG and part of a page; [`bars`], [`stacked`] and [`curves`] are its usual kinds. A [`document`](mod@document)
 //! is a whole page, [`columns`] its tables, [`elements`] the rest of it; [`theme`] its colours, [`beside`] the pages that name each other. [`lines`] reads and writes files of
 //! one record a line. [`picture`] renders scenes.
 
@@ -17,7 +17,9 @@ pub mod lines;
 pub mod names;
 pub mod numbers;
 pub mod picture;
+pub mod power_law;
 pub mod raster;
+pub mod stacked;
 pub mod table;
 pub mod theme;
 

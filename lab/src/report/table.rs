@@ -11,45 +11,42 @@ pub const STYLE: TableStyle = TableStyle::new()
     .header_separator(LineStyle::none().fill('─').junction('─'))
     .bottom_border(LineStyle::none().fill('─').junction('─'));
 
-/// One row a record, in the order given.
-pub fn table(records: &[&Record]) -> Table {
+/// An empty table in our style; columns from `texts` on are aligned to the right.
+pub fn with_header<S: Into<String>>(header: impl IntoIterator<Item = S>, texts: usize) -> Table {
     let mut table = Table::new();
     table.load_style(STYLE);
-    table.set_header([
-        "scene",
-        "triangles",
-        "builder",
-        "build",
-        "min – max",
-        "Mtri/s",
-        "SAH",
-        "EPO",
-        "LCV",
-        "depth",
-        "Mrays/s",
-        "right",
-    ]);
+    table.set_header(header.into_iter().map(Into::into));
+    for column in table.column_iter_mut().skip(texts) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+/// A figure, or a dash where it was not measured.
+pub fn or_dash<T>(value: Option<T>, text: impl FnOnce(T) -> String) -> String {
+    value.map_or_else(|| "–".into(), text)
+}
+
+/// One row a record, in the order given.
+pub fn table(records: &[&Record]) -> Table {
+    let header =
+        ["scene", "builder", "triangles", "build", "min – max", "Mtri/s", "SAH", "EPO", "LCV", "depth", "Mrays/s"];
+    let mut table = with_header(header.into_iter().chain(["right"]), 2);
     for record in records {
-        let figure = |figure: Option<f64>| figure.map_or("–".into(), three_digits);
         table.add_row([
             record.scene.clone(),
-            grouped(record.triangles),
             short(&record.builder),
+            grouped(record.triangles),
             duration(record.build.median_ms),
             format!("{} – {}", three_digits(record.build.min_ms), three_digits(record.build.max_ms)),
             three_digits(record.mtris_s()),
-            figure(record.quality.sah),
-            figure(record.quality.epo),
-            figure(record.quality.lcv),
-            record.quality.depth_max.map_or("–".into(), |depth| depth.to_string()),
-            figure(record.mrays_s()),
+            or_dash(record.quality.sah, three_digits),
+            or_dash(record.quality.epo, three_digits),
+            or_dash(record.quality.lcv, three_digits),
+            or_dash(record.quality.depth_max, |depth| depth.to_string()),
+            or_dash(record.mrays_s(), three_digits),
             verdict(record.valid).to_owned(),
         ]);
-    }
-    for column in [1, 3, 4, 5, 6, 7, 8, 9, 10] {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
     }
     table
 }

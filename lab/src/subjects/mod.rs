@@ -171,6 +171,15 @@ pub trait Subject {
     /// # Errors
     /// The device failed.
     fn hits(&mut self) -> Result<Vec<Hit>>;
+    /// Traces these rays once, and gives their hits.
+    ///
+    /// # Errors
+    /// Too little memory; the device failed.
+    fn hits_of(&mut self, rays: &[Ray], query: Query) -> Result<Vec<Hit>> {
+        self.set_rays(rays)?;
+        self.trace(query)?;
+        self.hits()
+    }
     /// Steps and tests of every ray, through all trees, where the tracer counts them; not under the clock.
     ///
     /// # Errors

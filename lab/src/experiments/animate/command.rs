@@ -7,7 +7,7 @@ use crate::experiments::animate::page::{self, Points, standings};
 use crate::experiments::animate::points::{Entry, Object, SceneSetting};
 use crate::experiments::animate::{Stage, Way, measure};
 use crate::measure::setting::Setting;
-use crate::report::picture::shaded_by;
+use crate::report::picture::{PictureOptions, View, picture};
 use crate::scene::{DynamicScene, Scene};
 use crate::subjects::Subject;
 use crate::subjects::builders::{KdBuilder, Spec};
@@ -183,11 +183,8 @@ fn write_picture(
     subject: &mut dyn Subject,
 ) -> crate::Result<()> {
     let size = [arguments.size.width, arguments.size.height];
-    let image = shaded_by(scene, size, common.seed, &mut |rays, query| {
-        subject.set_rays(rays)?;
-        subject.trace(query)?;
-        subject.hits()
-    })?;
+    let options = PictureOptions { view: View::Shaded, size, seed: common.seed, top: None };
+    let image = picture(scene, subject, &options)?;
     let path = arguments.output.join(file_of(frame));
     image.save(&path).map_err(|error| crate::Error::file(&path)(std::io::Error::other(error)))
 }

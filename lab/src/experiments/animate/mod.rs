@@ -16,7 +16,7 @@ mod two_level;
 use crate::device::Device;
 use crate::measure::agreement::may_both_be_right;
 use crate::measure::setting::Failure;
-use crate::measure::statistics::{Spread, in_turn};
+use crate::measure::statistics::{Spread, in_turn, mean_work};
 use crate::named::named;
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Camera, DynamicScene, Frame, Scene};
@@ -24,7 +24,7 @@ use crate::subjects::Subject;
 use crate::subjects::builders::{KdBuilder, Spec};
 use crate::{Error, Result};
 use hedgerow::kdtree::merge;
-use hedgerow::trace::{Hit, Query, Ray};
+use hedgerow::trace::{Hit, Query, Ray, Work};
 use merge_on_device::MergeOnDevice;
 use on_device::{OnDevice, static_tree};
 use on_host::OnHost;
@@ -170,9 +170,8 @@ pub fn measure<'a>(
         let mut rays_of: Vec<Vec<Rays>> = running.iter().map(|_| Vec::new()).collect();
         for &kind in stage.kinds {
             let leader = &mut running[0].subject;
-            let rays = kinds::generate(kind, &frame.scene, &stage.rays, &mut |rays| {
-                traced(leader.as_mut(), rays, Query::ClosestHit)
-            })?;
+            let rays =
+                kinds::generate(kind, &frame.scene, &stage.rays, &mut |rays| leader.hits_of(rays, Query::ClosestHit))?;
             if rays.is_empty() {
                 continue;
             }
@@ -245,12 +244,6 @@ fn retain_by<T>(items: &mut Vec<T>, failed: &[bool]) {
     items.retain(|_| failed.next() != Some(&true));
 }
 
-fn traced(subject: &mut dyn Subject, rays: &[Ray], query: Query) -> Result<Vec<Hit>> {
-    subject.set_rays(rays)?;
-    subject.trace(query)?;
-    subject.hits()
-}
-
 /// The rays in every way, in turn, and their hits against those of the first.
 fn trace(
     stage: &Stage<'_>,
@@ -272,10 +265,7 @@ fn trace(
         let different = rays.iter().zip(&hits).zip(expected.iter()).filter(is_other).count() as u64;
         let met = || hits.iter().filter(|hit| hit.is_some());
         let work = running.subject.work(query)?;
-        let mean = |of: fn(&hedgerow::trace::Work) -> u32| {
-            let work = work.as_ref()?;
-            Some(work.iter().map(|w| f64::from(of(w))).sum::<f64>() / work.len() as f64)
-        };
+        let mean = |of: fn(&Work) -> u32| mean_work(work.as_deref()?, of);
         Ok(Rays {
             rays: kind.name().to_owned(),
             count: rays.len() as u64,

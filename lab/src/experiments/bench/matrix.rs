@@ -9,7 +9,7 @@ use crate::measure::overlap::Epo;
 use crate::measure::provenance::{self, Machine};
 use crate::measure::record::{Build, Phase, Record, SCHEMA, Trace};
 use crate::measure::setting::Failure;
-use crate::measure::statistics::{Spread, in_turn};
+use crate::measure::statistics::{Spread, in_turn, mean_work};
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::Scene;
 use crate::subjects::builders::Spec;
@@ -195,7 +195,7 @@ fn blank(scene: &Scene, device: Option<&Device>, subject: &dyn Subject) -> Recor
 /// Medians of the runs; each phase's by itself.
 fn build_of(timer: &str, runs: &[BuildRun]) -> Build {
     let times: Vec<f64> = runs.iter().map(|run| run.milliseconds).collect();
-    let spread = Spread::of(&times).unwrap_or(Spread { median: 0.0, min: 0.0, max: 0.0, runs: 0 });
+    let spread = Spread::of(&times).unwrap_or(Spread { runs: 0, ..Spread::once(0.0) });
     let names = runs.first().map_or(&[][..], |run| &run.phases);
     let phase = |(i, phase): (usize, &hedgerow::gpu::Phase)| {
         let times: Vec<f64> = runs.iter().filter_map(|run| Some(run.phases.get(i)?.milliseconds)).collect();
@@ -303,10 +303,7 @@ impl<'a> Rounds<'_, 'a> {
             if kind == LCV_RAYS {
                 entry.record.quality.lcv = work.as_deref().and_then(leaf_count_variability);
             }
-            let mean = |of: fn(&hedgerow::trace::Work) -> u32| {
-                let work = work.as_ref().filter(|work| !work.is_empty())?;
-                Some(work.iter().map(|w| f64::from(of(w))).sum::<f64>() / work.len() as f64)
-            };
+            let mean = |of: fn(&Work) -> u32| mean_work(work.as_deref()?, of);
             entry.record.trace.push(Trace {
                 rays: kind.to_string(),
                 count: rays.len() as u64,

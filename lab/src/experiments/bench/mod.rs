@@ -1,10 +1,9 @@
 //! `hedgerow bench`: builders on scenes, built and traced in turn.
 //!
 //! [`matrix`] measures and gives a [`record`](crate::measure::record) for each builder and scene; [`results`] writes them for
-//! programs, [`page`] for people. [`growth`] (time over triangles), [`pareto`] and [`total_time`] say who is best for what.
+//! programs, [`page`] for people. [`pareto`] and [`total_time`] say who is best for what.
 
 pub(crate) mod command;
-pub mod growth;
 pub mod kd_trees;
 pub mod matrix;
 pub mod page;

@@ -99,29 +99,38 @@ pub fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
 /// Rays from `offset`, the middle of a closed surface of radius `scale`, and from around it, through corners and edges: each must
 /// hit.
 pub fn rays_from_inside(corners: &Corners, count: usize, scale: f32, offset: [f32; 3]) -> Vec<Ray> {
-    let mut random = SplitMix64::new(7);
-    (0..count)
-        .map(|i| {
-            let origin = if i % 2 == 0 { offset } else { add(offset, random.around(0.2 * scale)) };
-            let [a, b, c] = corners[random.bits() as usize % corners.len()];
-            let along = [0.0, 0.25, 0.5, 1.0, random.signed().abs()][i % 5];
-            let inside = if i % 7 == 0 { c } else { a };
-            let to = |k: usize| along * (b[k] - origin[k]) + (1.0 - along) * (inside[k] - origin[k]);
-            ray(origin, std::array::from_fn(|k| to(k) / scale))
-        })
-        .collect()
+    rays_to(
+        corners,
+        count,
+        scale,
+        7,
+        |random, i| {
+            if i % 2 == 0 { offset } else { add(offset, random.around(0.2 * scale)) }
+        },
+    )
 }
 
 /// From the middle of a closed surface to it: through corners and edges, and at any place between them.
 pub fn rays_from_the_middle(corners: &Corners, count: usize, scale: f32, offset: [f32; 3]) -> Vec<Ray> {
-    let mut random = SplitMix64::new(3);
+    rays_to(corners, count, scale, 3, |_, _| offset)
+}
+
+fn rays_to(
+    corners: &Corners,
+    count: usize,
+    scale: f32,
+    seed: u64,
+    origin: impl Fn(&mut SplitMix64, usize) -> [f32; 3],
+) -> Vec<Ray> {
+    let mut random = SplitMix64::new(seed);
     (0..count)
         .map(|i| {
+            let origin = origin(&mut random, i);
             let [a, b, c] = corners[random.bits() as usize % corners.len()];
             let along = [0.0, 0.25, 0.5, 1.0, random.signed().abs()][i % 5];
             let from = if i % 7 == 0 { c } else { a };
-            let to = |k: usize| along * (b[k] - offset[k]) + (1.0 - along) * (from[k] - offset[k]);
-            ray(offset, std::array::from_fn(|k| to(k) / scale))
+            let to = |k: usize| along * (b[k] - origin[k]) + (1.0 - along) * (from[k] - origin[k]);
+            ray(origin, std::array::from_fn(|k| to(k) / scale))
         })
         .collect()
 }

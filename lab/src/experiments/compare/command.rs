@@ -6,8 +6,8 @@ use crate::experiments::bench::results;
 use crate::experiments::compare::{self, Change, Comparison};
 use crate::report::names::short;
 use crate::report::numbers::{duration, three_digits};
-use crate::report::table::STYLE;
-use comfy_table::{CellAlignment, Table};
+use crate::report::table::{or_dash, with_header};
+use comfy_table::Table;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -36,14 +36,13 @@ pub(crate) fn run(_common: &Common, arguments: &Arguments) -> anyhow::Result<()>
     let mut out = std::io::stdout().lock();
     writeln!(out, "{}", table(&found.pairs))?;
     let mean = |of: fn(&Comparison) -> Vec<f64>| geometric_mean(found.pairs.iter().flat_map(of));
-    let or_dash = |ratio: Option<f64>| ratio.map_or("–".into(), three_digits);
     writeln!(
         out,
         "mean over {}: build time × {}, trace speed × {}, SAH cost × {}",
         found.pairs.len(),
-        or_dash(mean(|p| vec![p.build_ms.ratio()])),
-        or_dash(mean(|p| p.mrays_s.iter().map(|(_, change)| change.ratio()).collect())),
-        or_dash(mean(|p| p.sah.iter().map(Change::ratio).collect())),
+        or_dash(mean(|p| vec![p.build_ms.ratio()]), three_digits),
+        or_dash(mean(|p| p.mrays_s.iter().map(|(_, change)| change.ratio()).collect()), three_digits),
+        or_dash(mean(|p| p.sah.iter().map(Change::ratio).collect()), three_digits),
     )?;
     writeln!(out, "~ the change is inside the noise: the spreads of the runs meet")?;
     for (which, names) in [("old", &found.only_old), ("new", &found.only_new)] {
@@ -61,11 +60,8 @@ fn table(pairs: &[Comparison]) -> Table {
             kinds.push(kind);
         }
     }
-    let mut table = Table::new();
-    table.load_style(STYLE);
-    table.set_header(
-        ["scene", "builder", "build old", "new", "time ×", "SAH ×"].into_iter().chain(kinds.iter().copied()),
-    );
+    let header = ["scene", "builder", "build old", "new", "time ×", "SAH ×"];
+    let mut table = with_header(header.into_iter().chain(kinds.iter().copied()), 2);
     for pair in pairs {
         let speed = |kind: &&str| pair.mrays_s.iter().find(|(k, _)| k == kind).map(|(_, change)| ratio(change));
         let mut row = vec![
@@ -78,9 +74,6 @@ fn table(pairs: &[Comparison]) -> Table {
         ];
         row.extend(kinds.iter().map(|kind| speed(kind).unwrap_or("–".into())));
         table.add_row(row);
-    }
-    for column in table.column_iter_mut().skip(2) {
-        column.set_cell_alignment(CellAlignment::Right);
     }
     table
 }

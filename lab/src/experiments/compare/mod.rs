@@ -78,8 +78,7 @@ pub fn compare(old: &[Record], new: &[Record]) -> Comparisons {
 }
 
 fn pair(old: &Record, new: &Record) -> Comparison {
-    let spread =
-        |r: &Record| Spread { median: r.build.median_ms, min: r.build.min_ms, max: r.build.max_ms, runs: r.build.runs };
+    let spread = |r: &Record| Spread::from(&r.build);
     let (before, after) = (spread(old), spread(new));
     let relative = |s: Spread| (s.max - s.min) / s.median;
     // The same machine traced as unevenly as it built.

@@ -88,9 +88,7 @@ impl Tree {
         // Every other pixel each way: enough to say which boxes are seen.
         let rays = RayOptions { size: options.size.map(|side| side.div_ceil(2)), seed: options.seed };
         let rays = kinds::generate(RayKind::Primary, scene, &rays, &mut |_| Ok(Vec::new()))?;
-        subject.set_rays(&rays)?;
-        subject.trace(Query::ClosestHit)?;
-        let seen = boxes::seen(&outline, &rays, &subject.hits()?);
+        let seen = boxes::seen(&outline, &rays, &subject.hits_of(&rays, Query::ClosestHit)?);
         let projection = Projection::of(&scene.camera, options.size);
         let [c_t, c_i] = options.costs;
         let figures = outline.figures(c_t, c_i);

@@ -90,12 +90,6 @@ pub fn picture(scene: &Scene, subject: &mut dyn Subject, options: &PictureOption
     }
 }
 
-fn traced(subject: &mut dyn Subject, rays: &[Ray], query: Query) -> Result<Vec<Hit>> {
-    subject.set_rays(rays)?;
-    subject.trace(query)?;
-    subject.hits()
-}
-
 /// The primary rays of a picture and what they meet.
 struct Seen {
     rays: Vec<Ray>,
@@ -104,12 +98,8 @@ struct Seen {
 
 impl Seen {
     fn trace(scene: &Scene, subject: &mut dyn Subject, rays: &RayOptions) -> Result<Seen> {
-        Seen::by(scene, rays, &mut |rays, query| traced(subject, rays, query))
-    }
-
-    fn by(scene: &Scene, rays: &RayOptions, trace: &mut Tracing<'_>) -> Result<Seen> {
         let rays = kinds::generate(RayKind::Primary, scene, rays, &mut |_| Ok(Vec::new()))?;
-        let hits = trace(&rays, Query::ClosestHit)?;
+        let hits = subject.hits_of(&rays, Query::ClosestHit)?;
         Ok(Seen { rays, hits })
     }
 
@@ -139,22 +129,12 @@ fn smooth(size: [u32; 2], seed: u64) -> RayOptions {
     RayOptions { size: size.map(|side| side * SMOOTH), seed }
 }
 
+/// The surfaces in the light of an even sky and a lamp.
 fn shaded(scene: &Scene, subject: &mut dyn Subject, options: &PictureOptions) -> Result<RgbImage> {
-    shaded_by(scene, options.size, options.seed, &mut |rays, query| traced(subject, rays, query))
-}
-
-/// Whatever traces rays: a hit a ray.
-pub type Tracing<'t> = dyn FnMut(&[Ray], Query) -> Result<Vec<Hit>> + 't;
-
-/// [`View::Shaded`] of whatever traces rays.
-///
-/// # Errors
-/// Those of `trace`.
-pub fn shaded_by(scene: &Scene, size: [u32; 2], seed: u64, trace: &mut Tracing<'_>) -> Result<RgbImage> {
-    let rays = smooth(size, seed);
-    let seen = Seen::by(scene, &rays, trace)?;
+    let rays = smooth(options.size, options.seed);
+    let seen = Seen::trace(scene, subject, &rays)?;
     let sky_rays = kinds::generate(RayKind::Ao, scene, &rays, &mut |_| Ok(seen.hits.clone()))?;
-    let hidden = trace(&sky_rays, Query::AnyHit)?;
+    let hidden = subject.hits_of(&sky_rays, Query::AnyHit)?;
     let surfaces = seen.hits.iter().filter(|hit| hit.is_some()).count();
     let mut skies = hidden.chunks(hidden.len().checked_div(surfaces).unwrap_or(1).max(1));
 
@@ -172,7 +152,7 @@ pub fn shaded_by(scene: &Scene, size: [u32; 2], seed: u64, trace: &mut Tracing<'
             (ambient + light * normal.dot(lamp).max(0.0)) * (0.3 + 0.7 * open)
         }
     });
-    Ok(averaged(&colours.collect::<Vec<_>>(), size))
+    Ok(averaged(&colours.collect::<Vec<_>>(), options.size))
 }
 
 fn normals(scene: &Scene, subject: &mut dyn Subject, options: &PictureOptions) -> Result<RgbImage> {

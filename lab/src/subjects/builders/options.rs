@@ -19,55 +19,50 @@ use hedgerow_host::kdtree::Planes;
 use hedgerow_host::sweep::Leaves;
 use std::time::Duration;
 
-pub(super) const CODES: BuilderOption = BuilderOption {
-    key: "codes",
-    values: "mc30, mc63, emc64sort, emc64var, emc64var-nosize, mip6, mip9, mip12 or binQaA (Q 2, 4 or 6, A 0 to 9; ~N behind: the \
+pub(super) const CODES: BuilderOption = BuilderOption::new(
+    "codes",
+    "mc30, mc63, emc64sort, emc64var, emc64var-nosize, mip6, mip9, mip12 or binQaA (Q 2, 4 or 6, A 0 to 9; ~N behind: the \
              stretch factor weighs 1/N), with +concise, +centroid, +robust or /BITS behind",
-};
-pub(super) const COLLAPSE: BuilderOption = BuilderOption { key: "collapse", values: "sah or off" };
+);
+pub(super) const COLLAPSE: BuilderOption = BuilderOption::new("collapse", "sah or off");
 pub(super) const RAYS: BuilderOption =
-    BuilderOption { key: "rays", values: "rays that are traced between two builds, 1e7 unless given" };
-pub(super) const WIDTH: BuilderOption = BuilderOption { key: "width", values: "2, 4, 8 or 8q (quantised)" };
-pub(super) const ORDER: BuilderOption = BuilderOption { key: "order", values: "distance or octant (of width=8q)" };
+    BuilderOption::new("rays", "rays that are traced between two builds, 1e7 unless given");
+pub(super) const WIDTH: BuilderOption = BuilderOption::new("width", "2, 4, 8 or 8q (quantised)");
+pub(super) const ORDER: BuilderOption = BuilderOption::new("order", "distance or octant (of width=8q)");
 pub(super) const TERMINATION: BuilderOption =
-    BuilderOption { key: "termination", values: "sah, or off: leaves of one triangle, then collapsed" };
-pub(super) const SCHEDULE: BuilderOption = BuilderOption { key: "schedule", values: "chain, persistent or workgroup" };
-pub(super) const SPLIT: BuilderOption = BuilderOption {
-    key: "split",
-    values: "a number from 0 to 1: splits of large triangles at most, as a part of all; with /N behind: of each at most N",
-};
-pub(super) const OPTIMISE: BuilderOption = BuilderOption {
-    key: "optimise",
-    values: "off, fast, medium, high, a number of passes of reinsertion, or on the device a time for it as in 20ms",
-};
-pub(super) const BITS: BuilderOption =
-    BuilderOption { key: "bits", values: "a number of bits that the codes of a treelet share" };
-pub(super) const TREELET: BuilderOption =
-    BuilderOption { key: "treelet", values: "a number of primitives at most, from 1" };
-pub(super) const WINDOW: BuilderOption =
-    BuilderOption { key: "window", values: "an even number of clusters from 4 to 64" };
-pub(super) const RADIUS: BuilderOption =
-    BuilderOption { key: "radius", values: "a number of neighbours on either side, from 1" };
-pub(super) const BINS: BuilderOption =
-    BuilderOption { key: "bins", values: "a number of bins along each axis, from 2 to 1024" };
-pub(super) const EXACT: BuilderOption = BuilderOption {
-    key: "exact",
-    values: "references of a cell that is split exactly, at most 64 of them, 0 for none; 32 unless given",
-};
+    BuilderOption::new("termination", "sah, or off: leaves of one triangle, then collapsed");
+pub(super) const SCHEDULE: BuilderOption = BuilderOption::new("schedule", "chain, persistent or workgroup");
+pub(super) const SPLIT: BuilderOption = BuilderOption::new(
+    "split",
+    "a number from 0 to 1: splits of large triangles at most, as a part of all; with /N behind: of each at most N",
+);
+pub(super) const OPTIMISE: BuilderOption = BuilderOption::new(
+    "optimise",
+    "off, fast, medium, high, a number of passes of reinsertion, or on the device a time for it as in 20ms",
+);
+pub(super) const BITS: BuilderOption = BuilderOption::new("bits", "a number of bits that the codes of a treelet share");
+pub(super) const TREELET: BuilderOption = BuilderOption::new("treelet", "a number of primitives at most, from 1");
+pub(super) const WINDOW: BuilderOption = BuilderOption::new("window", "an even number of clusters from 4 to 64");
+pub(super) const RADIUS: BuilderOption = BuilderOption::new("radius", "a number of neighbours on either side, from 1");
+pub(super) const BINS: BuilderOption = BuilderOption::new("bins", "a number of bins along each axis, from 2 to 1024");
+pub(super) const EXACT: BuilderOption = BuilderOption::new(
+    "exact",
+    "references of a cell that is split exactly, at most 64 of them, 0 for none; 32 unless given",
+);
 pub(super) const WORKGROUPS: BuilderOption =
-    BuilderOption { key: "workgroups", values: "a number of workgroups of the persistent schedule, from 1" };
+    BuilderOption::new("workgroups", "a number of workgroups of the persistent schedule, from 1");
 pub(super) const KT: BuilderOption =
-    BuilderOption { key: "kt", values: "a cost of a traversal step, from 0.001 to 1000; 3 unless given" };
+    BuilderOption::new("kt", "a cost of a traversal step, from 0.001 to 1000; 3 unless given");
 pub(super) const KI: BuilderOption =
-    BuilderOption { key: "ki", values: "a cost of a triangle test, from 0.001 to 1000; 2 unless given" };
+    BuilderOption::new("ki", "a cost of a triangle test, from 0.001 to 1000; 2 unless given");
 
-pub(super) const TRAVERSAL: BuilderOption = BuilderOption {
-    key: "traversal",
-    values: "stack, restart, push-down, short-N or short-N-push-down, N being how much a short stack holds; unless given stack on the host and short-4 on the device",
-};
+pub(super) const TRAVERSAL: BuilderOption = BuilderOption::new(
+    "traversal",
+    "stack, restart, push-down, short-N or short-N-push-down, N being how much a short stack holds; unless given stack on the host and short-4 on the device",
+);
 
 pub(super) const TRACE: BuilderOption =
-    BuilderOption { key: "trace", values: "host or device: where rays are traced; host unless given" };
+    BuilderOption::new("trace", "host or device: where rays are traced; host unless given");
 
 /// Of `ploc` where it is not told: what drivers take.
 const PLOC_RADIUS: u32 = 16;
@@ -92,13 +87,9 @@ impl Spec {
 
     /// Option `schedule`.
     fn schedule(&self) -> Result<Option<Schedule>> {
-        Ok(match self.option(SCHEDULE.key) {
-            None => None,
-            Some("chain") => Some(Schedule::Chain),
-            Some("persistent") => Some(Schedule::Persistent),
-            Some("workgroup") => Some(Schedule::Workgroup),
-            Some(other) => return Err(self.wrong_value(&SCHEDULE, other)),
-        })
+        let all =
+            [("chain", Schedule::Chain), ("persistent", Schedule::Persistent), ("workgroup", Schedule::Workgroup)];
+        self.choice(&SCHEDULE, &all)
     }
 
     /// Options `codes`, `split`, `optimise`, `collapse` and `schedule`.
@@ -136,13 +127,8 @@ impl Spec {
 
     /// Options `width`, of a wide tree, and `order`; no width where it is 2 or was not given.
     pub(super) fn form_and_order(&self) -> Result<(Option<Form>, Option<Order>)> {
-        let form = match self.option(WIDTH.key) {
-            None | Some("2") => None,
-            Some("4") => Some(Form::Four),
-            Some("8") => Some(Form::Eight),
-            Some("8q") => Some(Form::EightQuantised),
-            Some(other) => return Err(self.wrong_value(&WIDTH, other)),
-        };
+        let all = [("2", None), ("4", Some(Form::Four)), ("8", Some(Form::Eight)), ("8q", Some(Form::EightQuantised))];
+        let form = self.choice(&WIDTH, &all)?.flatten();
         let order = match self.option(ORDER.key) {
             None => None,
             Some("distance") if form.is_some() => Some(Order::Distance),
@@ -186,11 +172,7 @@ impl Spec {
 
     /// Option `trace`.
     pub(super) fn traces_on_device(&self) -> Result<bool> {
-        match self.option(TRACE.key) {
-            None | Some("host") => Ok(false),
-            Some("device") => Ok(true),
-            Some(other) => Err(self.wrong_value(&TRACE, other)),
-        }
+        Ok(self.choice(&TRACE, &[("host", false), ("device", true)])?.unwrap_or(false))
     }
 
     /// Options `kt` and `ki`.
@@ -217,10 +199,7 @@ impl Spec {
     pub(super) fn kd_gpu_options(&self) -> Result<kdtree::builder::Options> {
         let default = kdtree::builder::Options::DEFAULT;
         let costs = self.kd_options(Planes::Exact)?.costs;
-        let workgroups = match self.option(WORKGROUPS.key) {
-            None => None,
-            Some(_) => Some(self.number(&WORKGROUPS, 1)?),
-        };
+        let workgroups = self.option(WORKGROUPS.key).map(|_| self.number(&WORKGROUPS, 1)).transpose()?;
         let options = kdtree::builder::Options {
             bins: self.number(&BINS, default.bins)?,
             exact: self.number(&EXACT, default.exact)?,
@@ -250,12 +229,8 @@ impl Spec {
     /// Option `termination`, if `optimise` and `collapse` leave it a choice: both need leaves of one triangle.
     pub(super) fn sweep_leaves(&self) -> Result<Leaves> {
         let single = !self.collapse()?.enabled || self.reinsertion()?.is_some();
-        match self.option(TERMINATION.key) {
-            Some("off") => Ok(Leaves::Single),
-            None | Some("sah") if single => Ok(Leaves::Single),
-            None | Some("sah") => Ok(Leaves::Terminated),
-            Some(other) => Err(self.wrong_value(&TERMINATION, other)),
-        }
+        let wanted = self.choice(&TERMINATION, &[("off", Leaves::Single), ("sah", Leaves::Terminated)])?;
+        Ok(if single { Leaves::Single } else { wanted.unwrap_or(Leaves::Terminated) })
     }
 
     /// Option `codes`.
@@ -265,11 +240,8 @@ impl Spec {
 
     /// Option `collapse`; `sah` where it was not given.
     pub(super) fn collapse(&self) -> Result<Collapse> {
-        match self.option(COLLAPSE.key) {
-            None | Some("sah") => Ok(Collapse::SAH),
-            Some("off") => Ok(Collapse::OFF),
-            Some(other) => Err(self.wrong_value(&COLLAPSE, other)),
-        }
+        let wanted = self.choice(&COLLAPSE, &[("sah", Collapse::SAH), ("off", Collapse::OFF)])?;
+        Ok(wanted.unwrap_or(Collapse::SAH))
     }
 
     /// Option `split`; `None` where it was not given or is 0.
@@ -304,6 +276,13 @@ impl Spec {
             Some("high") => Some(Options::HIGH),
             Some(_) => Some(Options::of_passes(self.number(&OPTIMISE, 0)?)),
         })
+    }
+
+    /// What an option chooses by name, if it was given.
+    fn choice<T: Copy>(&self, option: &BuilderOption, all: &[(&str, T)]) -> Result<Option<T>> {
+        let Some(value) = self.option(option.key) else { return Ok(None) };
+        let chosen = all.iter().find(|(name, _)| *name == value).map(|(_, chosen)| *chosen);
+        chosen.map(Some).ok_or_else(|| self.wrong_value(option, value))
     }
 
     /// The value of an option that is a number, or what it is where it was not given.

@@ -36,6 +36,12 @@ pub struct BuilderOption {
     pub values: &'static str,
 }
 
+impl BuilderOption {
+    pub(super) const fn new(key: &'static str, values: &'static str) -> BuilderOption {
+        BuilderOption { key, values }
+    }
+}
+
 /// What a builder is: what it needs, which options must be sound, and how its subject is made follow from it.
 pub(super) enum Kind {
     /// One of ours on the device, with these options.

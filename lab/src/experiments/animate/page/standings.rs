@@ -2,9 +2,9 @@
 
 use crate::experiments::animate::Way;
 use crate::experiments::animate::points::Animated;
-use crate::report::numbers::{bytes, duration, three_digits};
-use crate::report::table::STYLE;
-use comfy_table::{CellAlignment, Table};
+use crate::report::numbers::{duration, size, three_digits};
+use crate::report::table::{or_dash, with_header};
+use comfy_table::Table;
 
 /// A way, in the mean over the frames of the medians of their runs.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,17 +80,11 @@ pub fn fastest(standings: &[Standing]) -> Option<&Standing> {
 pub fn table(frames: &[Animated]) -> Table {
     let all = standings(frames);
     let kinds: Vec<&String> = all.first().map_or_else(Vec::new, |s| s.trace_ms.iter().map(|(kind, _)| kind).collect());
-    let mut table = Table::new();
-    table.load_style(STYLE);
     let head = ["way", "builder", "timer", "frames", "build"].map(String::from);
     let tail = ["frame", "× fastest", "SAH", "memory"].map(String::from);
-    table.set_header(head.into_iter().chain(kinds.into_iter().cloned()).chain(tail));
-    for column in table.column_iter_mut().skip(3) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
+    let mut table = with_header(head.into_iter().chain(kinds.into_iter().cloned()).chain(tail), 3);
     let least = fastest(&all).map_or(f64::NAN, |fastest| fastest.frame_ms);
     for standing in &all {
-        let dash = |value: Option<f64>, text: &dyn Fn(f64) -> String| value.map_or("–".to_owned(), text);
         let head = [
             standing.way.name().to_owned(),
             standing.builder.clone(),
@@ -101,8 +95,8 @@ pub fn table(frames: &[Animated]) -> Table {
         let tail = [
             duration(standing.frame_ms),
             three_digits(standing.frame_ms / least),
-            dash(standing.sah, &three_digits),
-            dash(standing.structure_bytes, &|v| bytes(v as u64)),
+            or_dash(standing.sah, three_digits),
+            or_dash(standing.structure_bytes, size),
         ];
         table.add_row(head.into_iter().chain(standing.trace_ms.iter().map(|(_, ms)| duration(*ms))).chain(tail));
     }

@@ -8,9 +8,8 @@ use crate::report::columns;
 use crate::report::elements::number;
 use crate::report::names::{short, slug};
 use crate::report::numbers::{count, grouped, one_decimal, three_digits, two_decimals};
-use crate::report::table::STYLE;
+use crate::report::table::{or_dash, with_header};
 use crate::subjects::KD_TREE;
-use comfy_table::{CellAlignment, Table};
 use maud::{Markup, html};
 use published::{Published, Row};
 
@@ -69,8 +68,9 @@ pub fn of<'a>(records: &[&'a Record]) -> Vec<&'a Record> {
     records.iter().copied().filter(|record| record.kind == KD_TREE).collect()
 }
 
-fn name(name: &str, unit: &str) -> String {
-    if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
+fn header<R>(names: [&str; 3], figures: &[Figure<R>]) -> Vec<String> {
+    let figure = |f: &Figure<R>| if f.unit.is_empty() { f.name.to_owned() } else { format!("{}, {}", f.name, f.unit) };
+    names.map(str::to_owned).into_iter().chain(figures.iter().map(figure)).collect()
 }
 
 /// Both tables for the terminal, measured figures above published ones; nothing without a kd-tree.
@@ -79,41 +79,30 @@ pub fn text(records: &[&Record], published: &Published) -> Option<String> {
     if ours.is_empty() {
         return None;
     }
-    let dash = |figure: Option<f64>, text: fn(f64) -> String| figure.map_or("–".into(), text);
-    let mut trees = with_header(3, TREE.iter().map(|f| name(f.name, f.unit)), &["scene", "triangles", "builder"]);
+    let mut trees = with_header(header(["scene", "triangles", "builder"], &TREE), 3);
     for record in &ours {
-        let figures = TREE.iter().map(|f| dash((f.ours)(record), f.text));
+        let figures = TREE.iter().map(|f| or_dash((f.ours)(record), f.text));
         let head = [record.scene.clone(), grouped(record.triangles), short(&record.builder)];
         trees.add_row(head.into_iter().chain(figures));
     }
     for row in &published.rows {
-        let figures = TREE.iter().map(|f| dash(row.figure(f.theirs), f.text));
-        let triangles = row.triangles.map_or("–".into(), grouped);
+        let figures = TREE.iter().map(|f| or_dash(row.figure(f.theirs), f.text));
+        let triangles = or_dash(row.triangles, grouped);
         trees.add_row([format!("({})", row.scene), triangles, row.config.clone()].into_iter().chain(figures));
     }
-    let mut rays = with_header(3, RAYS.iter().map(|f| name(f.name, f.unit)), &["scene", "builder", "rays"]);
+    let mut rays = with_header(header(["scene", "builder", "rays"], &RAYS), 3);
     for (record, trace) in ours.iter().flat_map(|record| record.trace.iter().map(move |trace| (record, trace))) {
-        let figures = RAYS.iter().map(|f| dash((f.ours)(trace), three_digits));
+        let figures = RAYS.iter().map(|f| or_dash((f.ours)(trace), three_digits));
         rays.add_row([record.scene.clone(), short(&record.builder), trace.rays.clone()].into_iter().chain(figures));
     }
     for row in &published.rows {
-        let figures = RAYS.iter().map(|f| dash(row.figure(f.theirs), three_digits));
+        let figures = RAYS.iter().map(|f| or_dash(row.figure(f.theirs), three_digits));
         rays.add_row([format!("({})", row.scene), row.config.clone(), THEIR_RAYS.into()].into_iter().chain(figures));
     }
     let others = published.file.as_deref().unwrap_or(
         "what Papay 2025 published, of other scenes, on another machine, by costs of a step and a test that it does not tell",
     );
     Some(format!("kd-trees; in brackets {others}\n{trees}\n{rays}"))
-}
-
-fn with_header(numbers: usize, figures: impl Iterator<Item = String>, names: &[&str]) -> Table {
-    let mut table = Table::new();
-    table.load_style(STYLE);
-    table.set_header(names.iter().map(|&name| name.to_owned()).chain(figures));
-    for column in table.column_iter_mut().skip(numbers) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
 }
 
 /// Both tables for the page.

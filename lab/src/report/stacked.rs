@@ -1,0 +1,114 @@
+//! Where time goes: stacked bars, one a subject, with a key to their parts.
+
+use super::chart::{Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, frame, mesh, pixel};
+use super::labels::{Rect, name_room, text_width};
+use super::numbers::{duration, tick};
+use super::theme::{INK, MUTED, PAPER, Tone};
+use crate::Result;
+use plotters::prelude::*;
+
+/// A bar.
+#[derive(Debug, Clone)]
+pub struct Stack {
+    /// To its left.
+    pub name: String,
+    /// The colour of the name.
+    pub tone: Tone,
+    /// All of it in milliseconds, to its right.
+    pub total: f64,
+    /// From left to right.
+    pub parts: Vec<Part>,
+}
+
+/// A part of a bar.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// In the key.
+    pub name: String,
+    /// How long, in milliseconds.
+    pub milliseconds: f64,
+    /// Its colour.
+    pub tone: Tone,
+}
+
+impl Stack {
+    /// The bar in words.
+    pub fn in_words(&self) -> String {
+        let parts: Vec<String> =
+            self.parts.iter().map(|part| format!("{} {}", part.name, duration(part.milliseconds))).collect();
+        format!("{} {} ({})", self.name, duration(self.total), parts.join(", "))
+    }
+
+    fn length(&self) -> f64 {
+        self.parts.iter().map(|part| part.milliseconds).sum()
+    }
+}
+
+/// Draws the bars, whose parts are parts of `whole`. `None` if there are none.
+///
+/// # Errors
+/// The chart cannot be drawn.
+pub fn stacked(caption: Caption, axis: &str, whole: &str, stacks: &[Stack]) -> Result<Option<Chart>> {
+    let longest = stacks.iter().map(|stack| stack.total.max(stack.length())).fold(0.0, f64::max);
+    if longest <= 0.0 {
+        return Ok(None);
+    }
+    let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
+        let mut chart = ChartBuilder::on(area)
+            .x_label_area_size(46)
+            .margin_left(name_room(stacks.iter().map(|stack| &stack.name), LABEL_SIZE) as u32 + 10)
+            .margin_bottom(26)
+            .build_cartesian_2d(0.0..1.14 * longest, 0.0..stacks.len() as f64)?;
+        mesh(&mut chart, &Axes { x: axis, y: "", x_number: &|v| tick(*v), y_number: &|_| String::new() })?;
+        let inner = frame(&chart);
+        for (row, stack) in stacks.iter().enumerate() {
+            let centre = (stacks.len() - row) as f64 - 0.5;
+            let mut from = 0.0;
+            for part in &stack.parts {
+                let to = from + part.milliseconds;
+                let corners = [(from, centre - 0.32), (to, centre + 0.32)];
+                let ((x0, y1), (x1, y0)) = (pixel(&chart, corners[0]), pixel(&chart, corners[1]));
+                // SVG draws none without a width.
+                if x1 > x0 {
+                    chart.draw_series([Rectangle::new(corners, part.tone.light.filled())])?;
+                    let edge = vec![(to, centre - 0.32), (to, centre + 0.32)];
+                    chart.draw_series([PathElement::new(edge, PAPER.light.stroke_width(1))])?;
+                }
+                let share = 100.0 * part.milliseconds / stack.total;
+                let time = duration(part.milliseconds);
+                let tip = format!("{}, {}: {time}, {share:.0} % of the {whole}", stack.name, part.name);
+                overlay.tip(Rect { x: x0, y: y0, w: x1 - x0, h: y1 - y0 }, &tip);
+                from = to;
+            }
+            let (end, y) = pixel(&chart, (from, centre));
+            let label = |x, text, anchor, tone| Label { at: (x, y + 4.5), text, anchor, tone, size: LABEL_SIZE };
+            let total = duration(stack.total);
+            overlay.label(label(end + 8.0, &total, "start", MUTED));
+            overlay.name(label(inner.x - 8.0, &stack.name, "end", stack.tone));
+        }
+        let mut parts: Vec<&Part> = Vec::new();
+        for part in stacks.iter().flat_map(|stack| &stack.parts) {
+            if parts.iter().all(|other| other.name != part.name) {
+                parts.push(part);
+            }
+        }
+        key(area, overlay, &parts)
+    };
+    Chart::draw(caption, draw).map(Some)
+}
+
+/// Which colour is which part, in one row at the bottom.
+fn key(area: &Area<'_>, overlay: &mut Overlay, parts: &[&Part]) -> Drawn {
+    let (columns, rows) = area.get_pixel_range();
+    let (left, y) = (columns.start, rows.end - 8);
+    let mut x = f64::from(left) + 8.0;
+    for part in parts {
+        // The area's own coordinates begin at its corner.
+        let corner = (x as i32 - left, y - rows.start - 11);
+        area.draw(&Rectangle::new([corner, (corner.0 + 12, corner.1 + 12)], part.tone.light.filled()))?;
+        let at = (x + 17.0, f64::from(y));
+        overlay.label(Label { at, text: &part.name, anchor: "start", tone: INK, size: 12.0 });
+        x += 17.0 + text_width(&part.name, 12.0) + 16.0;
+    }
+    Ok(())
+}
