@@ -1,9 +1,9 @@
 //! `hedgerow compare`: two runs side by side, with what may be noise marked.
 
 use crate::cli::Common;
-use crate::experiments::bench::page::summary::geometric_mean;
 use crate::experiments::bench::results;
 use crate::experiments::compare::{self, Change, Comparison};
+use crate::measure::statistics::geometric_mean;
 use crate::report::names::short;
 use crate::report::numbers::{duration, three_digits};
 use crate::report::table::{or_dash, with_header};

@@ -1,6 +1,7 @@
 //! The short answer: how every builder stands against one of them, over all scenes.
 
 use crate::measure::record::Record;
+use crate::measure::statistics::geometric_mean;
 use crate::report::theme::Legend;
 
 /// A builder over all scenes that it and the baseline have in common.
@@ -48,22 +49,4 @@ pub fn standings(records: &[&Record], legend: &Legend, baseline: &str) -> Vec<St
         }
     };
     legend.builders().iter().map(standing).collect()
-}
-
-/// The mean that suits ratios: a doubling and a halving cancel. `None` of nothing.
-pub fn geometric_mean(ratios: impl Iterator<Item = f64>) -> Option<f64> {
-    let logs: Vec<f64> = ratios.filter(|r| r.is_finite() && *r > 0.0).map(f64::ln).collect();
-    (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_doubling_and_a_halving_cancel() {
-        assert!((geometric_mean([2.0, 0.5].into_iter()).expect("two") - 1.0).abs() < 1e-12);
-        assert!((geometric_mean([2.0, 8.0].into_iter()).expect("two") - 4.0).abs() < 1e-12);
-        assert_eq!(geometric_mean([f64::NAN, 0.0].into_iter()), None);
-    }
 }

@@ -1,10 +1,10 @@
 //! What growth and large primitives have in common: series over e, where they lose a tenth, and the charts of them.
 
 use crate::Result;
-use crate::experiments::bench::page::summary::geometric_mean;
 use crate::experiments::stability::drop;
 use crate::experiments::stability::points::Stretched;
 use crate::measure::statistics::Spread;
+use crate::measure::statistics::geometric_mean;
 use crate::rays::kinds::RayKind;
 use crate::report::chart::{Caption, Chart};
 use crate::report::curves::{self, Axis, Curve, Mark};
