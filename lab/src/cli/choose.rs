@@ -4,15 +4,14 @@ use super::options::{RaysPerBuild, Size};
 use super::{Bar, Common, Json, tables, work};
 use crate::device::Device;
 use crate::measure::choose::calibration::{self, Effort};
-use crate::measure::choose::hindsight::{self, Choice, Miss, Pair, Taken};
-use crate::measure::choose::model::Measured;
-use crate::measure::choose::{DEFAULT_RAYS, Estimate, Features, Model, cache, candidates};
+use crate::measure::choose::hindsight::{self, Choice, Pair};
+use crate::measure::choose::{Cost, CostRow, CostTable, DEFAULT_RAYS, SceneClass, SceneCost, cache, candidates};
+use crate::measure::total_time::{Line, lower_envelope};
 use crate::report::names::short;
 use crate::report::numbers::{duration, grouped, short_count, three_digits};
 use crate::scene::Scene;
 use std::io::Write;
 use std::num::NonZeroU32;
-use std::time::Instant;
 
 /// Milliseconds that a builder builds on a scene of `--hindsight`, and then no more.
 const ENOUGH_MS: f64 = 500.0;
@@ -41,95 +40,100 @@ pub struct Arguments {
 
 pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let device = work::device_for(common, &["auto".parse()?])?.expect("auto works on a device");
-    let model = {
+    let costs = {
         let bar = Bar::new(common, "calibrating", 0);
-        cache::model_of(&device, arguments.recalibrate, &mut |what| bar.say(what))?
+        cache::table_of(&device, arguments.recalibrate, &mut |what| bar.say(what))?
     };
     let rays = common.rays_per_build.map_or(DEFAULT_RAYS, |RaysPerBuild(rays)| rays);
     if arguments.scenes.is_empty() || arguments.recalibrate {
-        writeln!(std::io::stdout(), "{}\n", prices(&model))?;
+        writeln!(std::io::stdout(), "{}\n", builders(&costs))?;
     }
-    let (mut choices, mut expected, mut all) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut choices, mut taken) = (Vec::new(), Vec::new());
     for name in &arguments.scenes {
         let scene = common.load(name)?;
         if arguments.hindsight {
-            choices.extend(hindsight::choices(&model, &scene));
+            choices.extend(hindsight::choices(&costs, &scene));
             let measured = measured(common, arguments, &device, &scene)?;
-            let text = beside_estimates(&model, &scene, &measured);
-            writeln!(std::io::stdout(), "{text}\n")?;
-            let estimates = model.estimates(&Features::of(&scene.mesh));
-            expected.extend(estimates.iter().map(|estimate| Taken::expected(&scene.name, estimate)));
-            all.extend(measured);
+            writeln!(std::io::stdout(), "{}\n", beside_expected(&costs, &scene, &measured))?;
+            taken.extend(measured);
         } else {
-            writeln!(std::io::stdout(), "{}\n", estimates(&model, &scene, rays))?;
+            writeln!(std::io::stdout(), "{}\n", expected(&costs, &scene, rays))?;
         }
     }
     if arguments.hindsight {
-        arguments.json.write_each(&all)?;
-        writeln!(std::io::stdout(), "{}", in_hindsight(&choices, &expected, &all))?;
+        arguments.json.write_each(&taken)?;
+        writeln!(std::io::stdout(), "{}", in_hindsight(&choices, &taken))?;
     }
     work::finish(Some(&device), true)
 }
 
 /// Every candidate measured on a scene, with all kinds of rays.
-fn measured(common: &Common, arguments: &Arguments, device: &Device, scene: &Scene) -> crate::Result<Vec<Measured>> {
+fn measured(common: &Common, arguments: &Arguments, device: &Device, scene: &Scene) -> crate::Result<Vec<SceneCost>> {
     let _bar = Bar::new(common, &format!("measuring {}", scene.name), 0);
     let effort = Effort { rays: arguments.size.rays(common.seed), runs: arguments.runs.get(), enough_ms: ENOUGH_MS };
-    calibration::on_scene(device, scene, &candidates::possible(device), &effort)
+    let measured = calibration::on_scene(device, scene, &candidates::possible(device), &effort)?;
+    Ok(measured.into_iter().map(|m| SceneCost { scene: scene.name.clone(), cost: m.cost }).collect())
 }
 
-/// What the device asks for what rays do.
-fn prices(model: &Model) -> String {
-    let mut text = model.prices.lines().join("\n");
-    text += &format!("\ntimes of rays by these prices are right within {:.1}%", 100.0 * model.deviation.exp_m1());
-    text
+/// Which builder is taken for scenes of each size, from how many rays a build on.
+fn builders(costs: &CostTable) -> String {
+    let mut table = tables::table(&["scenes", "from rays a build", "builder", "build", "a ray"], 1);
+    for CostRow { class, costs } in &costs.rows {
+        let lines: Vec<Line> = costs.iter().map(Cost::line).collect();
+        for (i, stretch) in lower_envelope(&lines).into_iter().enumerate() {
+            let cost = &costs[stretch.line];
+            table.add_row([
+                if i == 0 { described(class) } else { String::new() },
+                short_count(stretch.from),
+                cost.builder.clone(),
+                duration(cost.build_ms),
+                nanoseconds(cost),
+            ]);
+        }
+    }
+    table.to_string()
+}
+
+fn described(class: &SceneClass) -> String {
+    let crowded = if class.is_crowded { ", crowded" } else { "" };
+    format!("{} triangles{crowded}", grouped(class.triangles))
+}
+
+fn nanoseconds(cost: &Cost) -> String {
+    format!("{} ns", three_digits(cost.ray_ns))
 }
 
 /// What every candidate is expected to take, the choice marked.
-fn estimates(model: &Model, scene: &Scene, rays: f64) -> String {
-    let start = Instant::now();
-    let features = Features::of(&scene.mesh);
-    let took = duration(start.elapsed().as_secs_f64() * 1e3);
-    let chosen = model.choose(&features, rays).map(|estimate| estimate.builder);
+fn expected(costs: &CostTable, scene: &Scene, rays: f64) -> String {
+    let class = SceneClass::of(&scene.mesh);
+    let chosen = costs.choose(&class, rays).map(|cost| cost.builder);
     let mut table = tables::table(&["", "builder", "build", "a ray", "in all"], 2);
-    for estimate in model.estimates(&features) {
-        let mark = if chosen.as_ref() == Some(&estimate.builder) { "→" } else { "" };
-        table.add_row([
-            mark.to_owned(),
-            estimate.builder.clone(),
-            duration(estimate.build_ms),
-            format!("{} ns", three_digits(estimate.ray_ns)),
-            duration(estimate.total_ms(rays)),
-        ]);
+    for cost in costs.costs(&class) {
+        let mark = if chosen.as_ref() == Some(&cost.builder) { "→" } else { "" };
+        let (build, ray, total) = (duration(cost.build_ms), nanoseconds(&cost), duration(cost.total_ms(rays)));
+        table.add_row([mark.to_owned(), cost.builder, build, ray, total]);
     }
-    let (name, triangles, rays) = (&scene.name, grouped(features.triangles), short_count(rays));
-    format!("{name}, {triangles} triangles, {rays} rays a build (its figures took {took})\n{table}")
+    format!("{}, {}, {} rays a build\n{table}", scene.name, described(&class), short_count(rays))
 }
 
 /// What every candidate took beside what it was expected to take.
-fn beside_estimates(model: &Model, scene: &Scene, measured: &[Measured]) -> String {
-    let features = Features::of(&scene.mesh);
+fn beside_expected(costs: &CostTable, scene: &Scene, measured: &[SceneCost]) -> String {
+    let class = SceneClass::of(&scene.mesh);
     let mut table = tables::table(&["builder", "build", "expected", "a ray", "expected"], 1);
-    for Estimate { builder, build_ms, ray_ns } in model.estimates(&features) {
-        let Some(took) = measured.iter().find(|took| took.builder == builder) else { continue };
-        table.add_row([
-            builder,
-            duration(took.build_ms),
-            duration(build_ms),
-            format!("{} ns", three_digits(took.ray_ns)),
-            format!("{} ns", three_digits(ray_ns)),
-        ]);
+    for expected in costs.costs(&class) {
+        let Some(took) = measured.iter().map(|m| &m.cost).find(|cost| cost.builder == expected.builder) else {
+            continue;
+        };
+        let builds = [took, &expected].map(|cost| duration(cost.build_ms));
+        let rays = [took, &expected].map(nanoseconds);
+        table.add_row([vec![took.builder.clone()], builds.to_vec(), rays.to_vec()].concat());
     }
-    format!("{}, {} triangles\n{table}", scene.name, grouped(features.triangles))
+    format!("{}, {}\n{table}", scene.name, described(&class))
 }
 
-/// Of choices that are not good, so many are shown.
-const WORST: usize = 12;
-
-/// Each choice beside the best, the part that is good, and why the others are not.
-fn in_hindsight(choices: &[Choice], expected: &[Taken], measured: &[Measured]) -> String {
-    let taken: Vec<Taken> = measured.iter().map(Taken::from).collect();
-    let pairs = hindsight::pairs(choices, &taken);
+/// Each choice beside the best, and the part that is good.
+fn in_hindsight(choices: &[Choice], taken: &[SceneCost]) -> String {
+    let pairs = hindsight::pairs(choices, taken);
     let mut table = tables::table(&["scene", "rays a build", "chosen", "best", "chosen / best"], 4);
     for pair in &pairs {
         let Pair { choice, best, .. } = pair;
@@ -143,30 +147,9 @@ fn in_hindsight(choices: &[Choice], expected: &[Taken], measured: &[Measured]) -
     }
     let percent = |part: f64| format!("{:.1}%", 100.0 * part);
     let part = hindsight::good_part(&pairs).map_or("–".into(), percent);
-    let mut text = format!(
-        "{table}\n{}\nwithin 10% of the best: {part} of {} choices\n",
-        worst(&pairs, expected, &taken),
-        pairs.len()
-    );
-    for (builder, part) in hindsight::good_parts_of_each(&pairs, &taken) {
-        text += &format!("  {} always: {}\n", builder, percent(part));
+    let mut text = format!("{table}\nwithin 10% of the best: {part} of {} choices\n", pairs.len());
+    for (builder, part) in hindsight::good_parts_of_each(&pairs, taken) {
+        text += &format!("  {builder} always: {}\n", percent(part));
     }
     text
-}
-
-/// The worst choices with what was expected wrongly: how many times what was expected a build and a ray took.
-fn worst(pairs: &[Pair], expected: &[Taken], taken: &[Taken]) -> String {
-    let mut bad: Vec<&Pair> = pairs.iter().filter(|pair| pair.ratio() > 1.0 + hindsight::GOOD).collect();
-    bad.sort_by(|a, b| b.ratio().total_cmp(&a.ratio()));
-    let mut table =
-        tables::table(&["worst", "rays a build", "chosen / best", "chosen: build, ray", "best: build, ray"], 1);
-    for pair in bad.into_iter().take(WORST) {
-        let misses = hindsight::misses(pair, expected, taken);
-        let [chosen, best] = misses.map_or_else(Default::default, |misses| {
-            misses.map(|Miss { build, ray }| format!("× {build:.2}, × {ray:.2} of what was expected"))
-        });
-        let Choice { scene, rays, .. } = &pair.choice;
-        table.add_row([scene.clone(), short_count(*rays), format!("{:.3}", pair.ratio()), chosen, best]);
-    }
-    table.to_string()
 }

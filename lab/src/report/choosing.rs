@@ -3,13 +3,14 @@
 use super::elements::column;
 use super::names::short;
 use super::numbers::short_count;
-use crate::measure::choose::hindsight::{self, Choice, GOOD, Pair, RAYS, Taken};
+use crate::measure::choose::SceneCost;
+use crate::measure::choose::hindsight::{self, Choice, GOOD, Pair, RAYS};
 use crate::measure::record::Record;
 use maud::{Markup, html};
 
 /// Empty where nothing was chosen, or nothing that was chosen was measured.
 pub(crate) fn section(choices: &[Choice], records: &[&Record]) -> Markup {
-    let taken: Vec<Taken> = records.iter().filter_map(|record| Taken::of(record)).collect();
+    let taken: Vec<SceneCost> = records.iter().filter_map(|record| SceneCost::of(record)).collect();
     let pairs = hindsight::pairs(choices, &taken);
     let Some(part) = hindsight::good_part(&pairs) else { return html! {} };
     let mut scenes: Vec<&str> = Vec::new();
@@ -23,8 +24,8 @@ pub(crate) fn section(choices: &[Choice], records: &[&Record]) -> Markup {
         section #choosing {
             h2 { "What auto chooses" }
             p {
-                "For each scene and number of rays a build: the builder that " code { "auto" } " takes, by a cost model of this device that has "
-                "seen none of these scenes, and how many times the best candidate's total time that takes. "
+                "For each scene and number of rays a build: the builder that " code { "auto" } " takes, by what candidates cost on generated "
+                "scenes on this device, and how many times the best candidate's total time that takes. "
                 b { (format!("{:.0}%", 100.0 * part)) } " of the " (pairs.len()) " choices are within "
                 (format!("{:.0}%", 100.0 * GOOD)) " of the best."
             }
@@ -112,7 +113,7 @@ mod tests {
         let choice = |rays, builder: &str| Choice { scene: "a".into(), rays, builder: builder.into() };
         // 1 ms + 1 µs a ray against 2 ms + 0.5 µs: they meet at 2,000 rays.
         let choices = [choice(1e4, "lbvh:width=8q"), choice(1e5, "lbvh"), choice(1e6, "hploc:width=8q")];
-        let taken: Vec<Taken> = records.iter().filter_map(|record| Taken::of(record)).collect();
+        let taken: Vec<SceneCost> = records.iter().filter_map(|record| SceneCost::of(record)).collect();
         let pairs = hindsight::pairs(&choices, &taken);
         assert_eq!(pairs.len(), 2, "what was not measured has no time");
         assert_eq!((pairs[0].ratio(), pairs[0].best.as_str()), (1.0, "lbvh:width=8q"));

@@ -9,6 +9,7 @@ mod accel_command;
 mod animate;
 mod bench;
 mod check;
+mod choose;
 mod contract;
 mod cpu_peers;
 mod gpu_division;

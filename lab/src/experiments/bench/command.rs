@@ -8,7 +8,7 @@ use crate::experiments::bench::kd_trees::{self, published};
 use crate::experiments::bench::matrix::{self, OnScene, Outcome, Plan};
 use crate::experiments::bench::results::Results;
 use crate::experiments::bench::shard::Shard;
-use crate::measure::choose::{Model, cache, candidates, hindsight};
+use crate::measure::choose::{CostTable, cache, candidates, hindsight};
 use crate::measure::overlap::Epo;
 use crate::measure::setting::{Failure, Setting};
 use crate::report::names::slug;
@@ -80,9 +80,9 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let no_peer = device.as_ref().and_then(|device| driver::note(device.found()));
     let mut notes = Vec::new();
     let mut builders = possible(asked, arguments, device.as_ref(), no_peer.as_deref(), &mut notes)?;
-    let model = builders.iter().any(|spec| spec.builder().name == "auto").then(|| calibrated(common, device.as_ref()));
-    let model = model.transpose()?.flatten();
-    if let (Some(_), Some(device)) = (&model, &device) {
+    let costs = builders.iter().any(|spec| spec.builder().name == "auto").then(|| calibrated(common, device.as_ref()));
+    let costs = costs.transpose()?.flatten();
+    if let (Some(_), Some(device)) = (&costs, &device) {
         // A choice can be held against the best only where all that could have been chosen are measured.
         for spec in candidates::possible(device) {
             if !builders.contains(&spec) {
@@ -104,7 +104,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         arguments,
         device: device.as_ref(),
         plan,
-        model,
+        costs,
         results,
         report: Report { published, ..empty(common, arguments, device.as_ref(), notes)? },
     };
@@ -202,10 +202,10 @@ fn possible(
     Ok(kept)
 }
 
-/// The cost model of the device, measured under a progress bar where it is not known.
-fn calibrated(common: &Common, device: Option<&Device>) -> crate::Result<Option<Model>> {
+/// The table of costs of the device, measured under a progress bar where it is not known.
+fn calibrated(common: &Common, device: Option<&Device>) -> crate::Result<Option<CostTable>> {
     let bar = Bar::new(common, "calibrating", 0);
-    device.map(|device| cache::model_of(device, false, &mut |what| bar.say(what))).transpose()
+    device.map(|device| cache::table_of(device, false, &mut |what| bar.say(what))).transpose()
 }
 
 /// The report before anything was measured.
@@ -226,7 +226,7 @@ struct Bench<'a> {
     device: Option<&'a Device>,
     plan: Plan,
     /// Where `auto` is measured.
-    model: Option<Model>,
+    costs: Option<CostTable>,
     results: Results,
     report: Report,
 }
@@ -241,8 +241,8 @@ impl Bench<'_> {
                 return Ok(());
             }
         };
-        if let Some(model) = &self.model {
-            self.report.choices.extend(hindsight::choices(model, &scene));
+        if let Some(costs) = &self.costs {
+            self.report.choices.extend(hindsight::choices(costs, &scene));
         }
         let bar = Bar::new(self.common, &scene.name, 0);
         let say = |what: &str| bar.say(&format!("{}: {what}", scene.name));

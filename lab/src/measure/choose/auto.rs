@@ -1,7 +1,6 @@
-//! `auto`: the builder that the cost model expects to be best, as a subject.
+//! `auto`: the builder that the table of costs expects to be best, as a subject.
 
-use super::model::Estimate;
-use super::{Features, cache};
+use super::{Cost, SceneClass, cache};
 use crate::device::Device;
 use crate::measure::builders::Spec;
 use crate::measure::overlap::Epo;
@@ -27,20 +26,20 @@ pub fn rays_of(option: Option<&str>) -> Result<f64> {
 /// What was chosen, under the name of the choice.
 pub struct Auto<'a> {
     builder: String,
-    chosen: Estimate,
+    chosen: Cost,
     rays: f64,
     subject: Box<dyn Subject + 'a>,
 }
 
 impl<'a> Auto<'a> {
-    /// Chooses for `mesh` and `rays` rays a build, by the cost model of `device`, which is measured first where it is not known.
+    /// Chooses for `mesh` and `rays` rays a build, by the table of costs of `device`, which is measured first where it is not known.
     ///
     /// # Errors
     /// The device can build no candidate; those of the chosen one.
     pub fn new(device: &'a Device, builder: &str, mesh: &'a Mesh, rays: f64) -> Result<Auto<'a>> {
-        let model = cache::model_of(device, false, &mut |what| log::info!("{what}"))?;
-        let chosen = model
-            .choose(&Features::of(mesh), rays)
+        let table = cache::table_of(device, false, &mut |what| log::info!("{what}"))?;
+        let chosen = table
+            .choose(&SceneClass::of(mesh), rays)
             .ok_or_else(|| Error::NoVulkan("no candidate of auto could be measured on this device".into()))?;
         let subject = chosen.builder.parse::<Spec>()?.make(Some(device), mesh)?;
         Ok(Auto { builder: builder.to_owned(), chosen, rays, subject })
@@ -61,7 +60,7 @@ impl Subject for Auto<'_> {
     }
 
     fn choice(&self) -> Option<String> {
-        let Estimate { builder, build_ms, ray_ns } = &self.chosen;
+        let Cost { builder, build_ms, ray_ns } = &self.chosen;
         let own = self.subject.choice().map_or(String::new(), |choice| format!(" ({choice})"));
         let rays = self.rays;
         Some(format!("{builder}{own} for {rays:e} rays a build, expected {build_ms:.3} ms and {ray_ns:.0} ns a ray"))

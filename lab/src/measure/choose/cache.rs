@@ -1,26 +1,25 @@
-//! The figures of a calibration, kept in a file: one for each device and driver.
+//! The table of costs, kept in a file: one for each device and driver.
 //!
 //! The folder is `HEDGEROW_CACHE`, or else `hedgerow` in the user's cache folder.
 
-use super::calibration;
-use super::candidates;
-use super::model::{Measured, Model};
+use super::{CostTable, calibration, candidates};
 use crate::device::Device;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Version of the figures' meaning: of the features, the scenes and the rays.
-const VERSION: u32 = 8;
+/// Version of the table's meaning: of its classes, scenes and rays.
+const VERSION: u32 = 9;
 
-/// What a file holds: the figures, and what they belong to.
+/// What a file holds: the table, and what it belongs to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Calibration {
     key: Key,
-    measured: Vec<Measured>,
+    #[serde(flatten)]
+    table: CostTable,
 }
 
-/// What the figures belong to: with another key they are measured anew.
+/// What the table belongs to: with another key it is measured anew.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Key {
     version: u32,
@@ -51,29 +50,35 @@ impl Key {
     }
 }
 
-/// The cost model of `device`: from the cache, or measured and kept. With `anew`, measured in any case. `say` is told what is being
-/// done.
+/// The table of `device`: from the cache, or measured and kept. With `anew`, measured in any case. `say` is told what is being done.
 ///
-/// A folder that cannot be written is no error: it is said, and the next one measures again.
+/// A folder that cannot be written is no error: a warning says so, and the next program measures again.
 ///
 /// # Errors
 /// The device can build no candidate.
-pub fn model_of(device: &Device, anew: bool, say: &mut dyn FnMut(&str)) -> Result<Model> {
-    let key = Key::of(device);
-    let path = folder().map(|folder| folder.join(key.file()));
-    if let Some(measured) = path.as_deref().filter(|_| !anew).and_then(|path| read(path, &key)) {
-        return Ok(Model::of(&measured));
+pub fn table_of(device: &Device, anew: bool, say: &mut dyn FnMut(&str)) -> Result<CostTable> {
+    let folder = folder();
+    if let Some(table) = folder.as_deref().filter(|_| !anew).and_then(|folder| read(folder, &Key::of(device))) {
+        return Ok(table);
     }
-    let measured = calibration::measure(device, say)?;
-    match &path {
-        Some(path) => {
-            if let Err(error) = write(path, &Calibration { key, measured: measured.clone() }) {
+    let table = calibration::measure(device, say)?;
+    match folder {
+        Some(folder) => {
+            if let Err(error) = keep(&folder, device, &table) {
                 log::warn!("the costs of builders are not kept: {error}");
             }
         }
         None => log::warn!("the costs of builders are not kept: no cache folder is known; set HEDGEROW_CACHE"),
     }
-    Ok(Model::of(&measured))
+    Ok(table)
+}
+
+/// Keeps the table of `device` in a folder, where programs with that `HEDGEROW_CACHE` find it.
+///
+/// # Errors
+/// The folder cannot be made or written.
+pub fn keep(folder: &Path, device: &Device, table: &CostTable) -> Result<()> {
+    write(folder, &Calibration { key: Key::of(device), table: table.clone() })
 }
 
 fn folder() -> Option<PathBuf> {
@@ -84,28 +89,27 @@ fn folder() -> Option<PathBuf> {
     })
 }
 
-/// The figures of a file, if they are there and belong to `key`.
-fn read(path: &Path, key: &Key) -> Option<Vec<Measured>> {
-    let text = std::fs::read_to_string(path).ok()?;
+/// The table of `key`, if its file is in the folder and belongs to it.
+fn read(folder: &Path, key: &Key) -> Option<CostTable> {
+    let text = std::fs::read_to_string(folder.join(key.file())).ok()?;
     let calibration: Calibration = serde_json::from_str(&text).ok()?;
-    (calibration.key == *key).then_some(calibration.measured)
+    (calibration.key == *key).then_some(calibration.table)
 }
 
 /// Written aside and moved: whoever reads meanwhile sees the old file or the new one.
-fn write(path: &Path, calibration: &Calibration) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
+fn write(folder: &Path, calibration: &Calibration) -> Result<()> {
+    let path = folder.join(calibration.key.file());
     std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
-    let text = serde_json::to_string(calibration).expect("figures are JSON");
+    let text = serde_json::to_string_pretty(calibration).expect("figures are JSON");
     let aside = path.with_extension(format!("json.{}", std::process::id()));
     std::fs::write(&aside, text).map_err(Error::file(&aside))?;
-    std::fs::rename(&aside, path).map_err(Error::file(path))
+    std::fs::rename(&aside, &path).map_err(Error::file(&path))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::choose::Features;
-    use crate::measure::choose::prices::RayWork;
+    use crate::measure::choose::{Cost, CostRow, SceneClass};
 
     fn calibration() -> Calibration {
         let key = Key {
@@ -115,36 +119,30 @@ mod tests {
             driver: "Mesa 25.0.7".into(),
             candidates: vec!["lbvh".into()],
         };
-        let measured = Measured {
-            scene: "a".into(),
-            features: Features { triangles: 12, values: [0.1, 0.2, 0.3, 0.4, -0.5] },
-            builder: "lbvh".into(),
-            layout: "bvh2".into(),
-            build_ms: 1.0 / 3.0,
-            ray_ns: 1e3,
-            work: RayWork { steps: 7.25, tests: 2.0 / 3.0 },
-        };
-        Calibration { key, measured: vec![measured] }
+        let cost = Cost { builder: "lbvh".into(), build_ms: 1.0 / 3.0, ray_ns: 1e3 };
+        let row = CostRow { class: SceneClass { triangles: 12, is_crowded: true }, costs: vec![cost] };
+        Calibration { key, table: CostTable { rows: vec![row] } }
     }
 
     #[test]
     fn what_was_kept_is_found_again_by_its_key_alone() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let kept = calibration();
-        let path = folder.path().join("deeper").join(kept.key.file());
-        assert_eq!(read(&path, &kept.key), None);
-        write(&path, &kept).expect("the folder is made");
-        assert_eq!(read(&path, &kept.key), Some(kept.measured.clone()));
+        let deeper = folder.path().join("deeper");
+        assert_eq!(read(&deeper, &kept.key), None);
+        write(&deeper, &kept).expect("the folder is made");
+        assert_eq!(read(&deeper, &kept.key), Some(kept.table.clone()));
         let more = vec!["lbvh".into(), "ploc".into()];
         for other in [
             Key { version: VERSION + 1, ..kept.key.clone() },
-            Key { driver: "Mesa 26.1.6".into(), ..kept.key.clone() },
+            Key { driver: "Mesa-25.0.7".into(), ..kept.key.clone() },
             Key { candidates: more, ..kept.key.clone() },
         ] {
-            assert_eq!(read(&path, &other), None, "{other:?}");
+            assert_eq!(other.file(), kept.key.file(), "the name alone does not tell them apart");
+            assert_eq!(read(&deeper, &other), None, "{other:?}");
         }
-        std::fs::write(&path, "{").expect("it is ours");
-        assert_eq!(read(&path, &kept.key), None);
+        std::fs::write(deeper.join(kept.key.file()), "{").expect("it is ours");
+        assert_eq!(read(&deeper, &kept.key), None);
     }
 
     #[test]

@@ -1,13 +1,10 @@
-//! The measured cost of every candidate on this device: a few generated scenes, built and traced.
+//! The measured costs of every candidate on this device: a few generated scenes of each size, built and traced.
 
-use super::candidates;
-use super::features::Features;
-use super::model::Measured;
-use super::prices::RayWork;
+use super::{Cost, CostRow, CostTable, SceneClass, candidates};
 use crate::device::Device;
 use crate::measure::Subject;
 use crate::measure::builders::Spec;
-use crate::measure::statistics::{Spread, in_turn};
+use crate::measure::statistics::{Spread, geometric_mean, in_turn};
 use crate::random::SplitMix64;
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{self, LoadOptions, Scene};
@@ -16,74 +13,61 @@ use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::trace::twin::tracer as host;
-use hedgerow::trace::{Query, Ray};
+use hedgerow::trace::{Query, Ray, Work};
 use rayon::prelude::*;
 
-/// The scenes: of different sizes, and lying differently in their bounds (closed objects, sheets, soups, long thin triangles, a few
-/// large ones around many small ones, towns, plants), so that every figure of [`Features`] varies by itself.
-pub const SCENES: [&str; 18] = [
-    "gen:icosphere:3",
-    "gen:icosphere:6",
-    "gen:soup:3000:1",
-    "gen:soup:30000:2",
-    "gen:grid:60",
-    "gen:grid:120",
-    "gen:stadium:5",
-    "gen:stadium:6",
-    "gen:needles:1500:1",
-    "gen:twist:20000:1",
-    "gen:city:60",
-    "gen:forest:20",
-    "gen:cells:40",
-    "gen:clutter:24:1",
-    "gen:clutter:60:2",
-    "gen:clutter:100:3",
-    "gen:clutter:150:4",
-    "gen:clutter:240:5",
+/// The scenes of each row of the table: of about the same size, and lying differently in their bounds (closed objects, sheets, soups,
+/// long thin triangles, a few large ones around many small ones, towns, plants). The last rows are of crowded scenes: an object in a
+/// huge arena.
+const ROWS: [&[&str]; 6] = [
+    &["gen:icosphere:3", "gen:needles:1500:1"],
+    &["gen:soup:3000:1", "gen:grid:60", "gen:clutter:24:1"],
+    &[
+        "gen:forest:20",
+        "gen:cells:40",
+        "gen:twist:20000:1",
+        "gen:clutter:60:2",
+        "gen:grid:120",
+        "gen:soup:30000:2",
+        "gen:clutter:100:3",
+    ],
+    &["gen:clutter:150:4", "gen:city:60", "gen:icosphere:6", "gen:clutter:240:5"],
+    &["gen:stadium:5"],
+    &["gen:stadium:6"],
 ];
-/// Scenes larger than caches. Only the fastest builds of each layout are measured there: they tell how many times its price a ray
-/// takes, and what a ray does is told by the others.
-pub const LARGE_SCENES: [&str; 8] = [
-    "gen:icosphere:7",
-    "gen:icosphere:8",
-    "gen:grid:400",
-    "gen:soup:300000:2",
-    "gen:city:300",
-    "gen:forest:500",
-    "gen:cells:700",
-    "gen:clutter:800:6",
-];
+
 /// Pixels of the picture that the rays belong to.
 const RAYS: RayOptions = RayOptions { size: [128, 96], seed: 1 };
 /// Runs that count, after one that does not.
-const RUNS: u32 = 3;
+const RUNS: u32 = 5;
 /// Milliseconds after which a builder has built enough on a scene.
 const ENOUGH_MS: f64 = 50.0;
 
-/// Measures every candidate that `device` can build on every scene of [`SCENES`], and some on [`LARGE_SCENES`]. `say` is told what is being done. A candidate that
-/// fails on a scene has no figures there.
+/// Measures the candidates that `device` can build on generated scenes. `say` is told what is being done. A candidate that fails on a
+/// scene is not in the scene's row.
 ///
 /// # Errors
 /// The device can build no candidate.
-pub fn measure(device: &Device, say: &mut dyn FnMut(&str)) -> Result<Vec<Measured>> {
-    let specs = candidates::possible(device);
-    if specs.is_empty() {
+pub fn measure(device: &Device, say: &mut dyn FnMut(&str)) -> Result<CostTable> {
+    if candidates::possible(device).is_empty() {
         return Err(Error::NoVulkan(format!("{} can build none of the candidates of auto", device.found().name)));
     }
-    let fastest: Vec<Spec> =
-        candidates::FASTEST.iter().filter_map(|name| specs.iter().find(|s| s.to_string() == *name)).cloned().collect();
-    let mut measured = Vec::new();
-    let all = SCENES.map(|name| (name, &specs));
-    let large = LARGE_SCENES.map(|name| (name, &fastest));
-    for (name, specs) in all.into_iter().chain(large) {
+    let effort = Effort { rays: RAYS, runs: RUNS, enough_ms: ENOUGH_MS };
+    let mut of_scene = |name: &&str| {
         say(&format!("calibrating on {name}"));
         let scene = load(name)?;
-        measured.extend(on_scene(device, &scene, specs, &Effort { rays: RAYS, runs: RUNS, enough_ms: ENOUGH_MS })?);
-    }
-    Ok(measured)
+        let class = SceneClass::of(&scene.mesh);
+        let measured = on_scene(device, &scene, &candidates::possible_for(device, &class), &effort)?;
+        Ok(CostRow { class, costs: paced(&measured) })
+    };
+    let mut of_row = |names: &&[&str]| {
+        let scenes: Vec<CostRow> = names.iter().map(&mut of_scene).collect::<Result<_>>()?;
+        Ok(CostRow::mean(&scenes))
+    };
+    Ok(CostTable { rows: ROWS.iter().map(&mut of_row).collect::<Result<_>>()? })
 }
 
-/// A scene of [`SCENES`], its triangles in any order: those of generators lie side by side in space, so that it would not show where
+/// A generated scene, its triangles in any order: those of generators lie side by side in space, so that it would not show where
 /// codes are too short to tell them apart.
 fn load(name: &str) -> Result<Scene> {
     let mut scene = scene::load(name, &LoadOptions::default())?;
@@ -106,26 +90,46 @@ pub struct Effort {
     pub enough_ms: f64,
 }
 
+/// What a candidate took on a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CandidateRun {
+    /// Its times.
+    pub cost: Cost,
+    /// The layout of its tree: `bvh2`, `wide8q`…
+    pub layout: &'static str,
+    /// Nodes visited and triangles tested by a ray, in the mean.
+    pub work: f64,
+}
+
+/// The times with those of rays by work: what a node or a triangle takes in the mean over trees of the same layout, times how many a
+/// ray meets. Work is counted and the same on every run. It tells trees apart that are nearer to each other than two runs are.
+fn paced(measured: &[CandidateRun]) -> Vec<Cost> {
+    let cost = |m: &CandidateRun| {
+        let alike = measured.iter().filter(|other| other.layout == m.layout);
+        let pace = geometric_mean(alike.map(|other| other.cost.ray_ns / other.work));
+        Cost { ray_ns: pace.map_or(m.cost.ray_ns, |pace| pace * m.work), ..m.cost.clone() }
+    };
+    measured.iter().map(cost).collect()
+}
+
 /// A candidate on a scene.
 struct Entry<'a> {
     spec: &'a Spec,
     subject: Box<dyn Subject + 'a>,
     builds_ms: Vec<f64>,
-    /// Steps and tests a ray.
-    work: RayWork,
+    work: f64,
 }
 
 /// The least times of builders on a scene, over several runs in turn: what disturbs a run only adds to it. One that fails has none.
 ///
 /// # Errors
 /// The scene has no triangles, or the image of the rays too many pixels.
-pub fn on_scene(device: &Device, scene: &Scene, specs: &[Spec], effort: &Effort) -> Result<Vec<Measured>> {
-    let features = Features::of(&scene.mesh);
+pub fn on_scene(device: &Device, scene: &Scene, specs: &[Spec], effort: &Effort) -> Result<Vec<CandidateRun>> {
     let rays = rays(scene, &effort.rays)?;
     let count: usize = rays.iter().map(|(_, rays)| rays.len()).sum();
     let entry = |spec| {
         let subject = Spec::make(spec, Some(device), &scene.mesh).ok()?;
-        Some(Entry { spec, subject, builds_ms: Vec::new(), work: RayWork::default() })
+        Some(Entry { spec, subject, builds_ms: Vec::new(), work: 0.0 })
     };
     let mut entries: Vec<Entry<'_>> = specs.iter().filter_map(entry).collect();
     // A run is a build and all rays; candidates take turns, as everything that is compared does.
@@ -136,29 +140,21 @@ pub fn on_scene(device: &Device, scene: &Scene, specs: &[Spec], effort: &Effort)
             entry.builds_ms.push(entry.subject.build()?.milliseconds);
         }
         let mut trace_ms = 0.0;
-        let mut work = Vec::new();
         for (query, rays) in rays.iter().filter(|(_, rays)| !rays.is_empty()) {
             entry.subject.set_rays(rays)?;
             trace_ms += entry.subject.trace(*query)?;
             if is_first {
-                work.extend(entry.subject.work(*query)?.unwrap_or_default());
+                let work = entry.subject.work(*query)?.unwrap_or_default();
+                entry.work += work.iter().map(|Work { steps, tests, .. }| f64::from(steps + tests)).sum::<f64>();
             }
-        }
-        if is_first {
-            entry.work = RayWork::mean(&work);
         }
         Ok(trace_ms)
     });
     let measured = entries.iter().zip(runs).filter_map(|(entry, runs)| {
-        Some(Measured {
-            scene: scene.name.clone(),
-            features,
-            builder: entry.spec.to_string(),
-            layout: entry.subject.kind().into(),
-            build_ms: Spread::of(&entry.builds_ms)?.min,
-            ray_ns: Spread::of(&runs.ok()?)?.min * 1e6 / count as f64,
-            work: entry.work,
-        })
+        let build_ms = Spread::of(&entry.builds_ms)?.min;
+        let ray_ns = Spread::of(&runs.ok()?)?.min * 1e6 / count as f64;
+        let cost = Cost { builder: entry.spec.to_string(), build_ms, ray_ns };
+        Some(CandidateRun { cost, layout: entry.subject.kind(), work: entry.work / count as f64 })
     });
     Ok(measured.collect())
 }
@@ -179,23 +175,36 @@ fn rays(scene: &Scene, options: &RayOptions) -> Result<[(Query, Vec<Ray>); 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::choose::features::NAMES;
 
     #[test]
-    fn every_figure_varies_over_the_scenes_and_no_two_go_together() {
-        let scenes: Vec<Features> = SCENES.iter().map(|name| Features::of(&load(name).expect(name).mesh)).collect();
-        let column = |k: usize| scenes.iter().map(move |f| f.values[k]);
-        let mean = |k: usize| column(k).sum::<f64>() / scenes.len() as f64;
-        let product =
-            |j: usize, k: usize| -> f64 { column(j).zip(column(k)).map(|(a, b)| (a - mean(j)) * (b - mean(k))).sum() };
-        for (j, one) in NAMES.iter().enumerate() {
-            assert!(product(j, j) > 0.1, "{one} is nearly the same everywhere");
-            for (k, other) in NAMES.iter().enumerate().take(j) {
-                let correlation = product(j, k) / (product(j, j) * product(k, k)).sqrt();
-                assert!(correlation.abs() < 0.97, "{one} and {other}: {correlation}");
-            }
+    fn trees_of_a_layout_are_told_apart_by_their_work() {
+        let measured = |builder: &str, layout, ray_ns, work| {
+            let cost = Cost { builder: builder.into(), build_ms: 1.0, ray_ns };
+            CandidateRun { cost, layout, work }
+        };
+        // The second was disturbed: it does less and took as long. 10 and 40 ns a node, 20 in the mean.
+        let paced = paced(&[
+            measured("a", "wide8q", 100.0, 10.0),
+            measured("b", "wide8q", 100.0, 2.5),
+            measured("c", "bvh2", 70.0, 35.0),
+        ]);
+        for (cost, expected) in paced.iter().zip([200.0, 50.0, 70.0]) {
+            assert!((cost.ray_ns - expected).abs() < 1e-9, "{cost:?}");
         }
-        let most = scenes.iter().map(|f| f.triangles).max().expect("there are scenes");
-        assert!(scenes.iter().all(|f| f.triangles >= 500) && most >= 80_000, "{scenes:?}");
+        assert_eq!(paced.len(), 3);
+    }
+
+    #[test]
+    fn rows_hold_scenes_of_one_kind_and_grow() {
+        let class = |name: &&str| SceneClass::of(&load(name).expect(name).mesh);
+        let rows: Vec<Vec<SceneClass>> = ROWS.iter().map(|names| names.iter().map(class).collect()).collect();
+        let (crowded, plain): (Vec<_>, Vec<_>) = rows.iter().partition(|row| row[0].is_crowded);
+        assert!(!plain.is_empty() && !crowded.is_empty());
+        for rows in [plain, crowded] {
+            assert!(rows.iter().flat_map(|row| row.iter()).all(|class| class.is_crowded == rows[0][0].is_crowded));
+            let least = |row: &[SceneClass]| row.iter().map(|class| class.triangles).min();
+            let most = |row: &[SceneClass]| row.iter().map(|class| class.triangles).max();
+            assert!(rows.windows(2).all(|pair| most(pair[0]) < least(pair[1])), "{rows:?}");
+        }
     }
 }

@@ -52,7 +52,7 @@ pub(super) enum Kind {
     KdHost(fn(&Spec) -> Result<hedgerow_host::kdtree::Options>),
     /// A kd-tree by ours on the device.
     KdGpu,
-    /// The one of ours on the device that the cost model chooses.
+    /// The one of ours on the device that the table of costs makes least.
     Auto,
     /// The Vulkan driver's own.
     Driver(DriverPreference),
