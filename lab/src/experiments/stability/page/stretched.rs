@@ -26,7 +26,7 @@ pub trait StretchPage: Stretch {
     const TITLE: [&'static str; 2];
     /// How the table is to be read.
     fn reading(points: &[Stretched<Self>]) -> Markup;
-    /// See [`Paged::terms`].
+    /// How it is measured: terms and what they mean.
     fn terms() -> Markup;
     /// Its part of the names of charts.
     fn slug(&self) -> String;
