@@ -10,10 +10,10 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hedgerow::accel;
-use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Input, Schedule};
 use hedgerow::bvh::compact;
 use hedgerow::bvh::layout::{Header, Triangle};
-use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
+use hedgerow::trace::tracer::{self, Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::Result;
 use hedgerow_lab::device::{Buffer, Device, DeviceOptions, DriverTracing};
@@ -47,7 +47,7 @@ struct Built<'a> {
 }
 
 impl<'a> Built<'a> {
-    fn new(device: &'a Device, scene: &Scene, options: &Options) -> Result<Built<'a>> {
+    fn new(device: &'a Device, scene: &Scene, options: &BuildOptions) -> Result<Built<'a>> {
         let mesh = &scene.mesh;
         let vertices = [device.upload("positions", &mesh.positions)?, device.upload("indices", &mesh.triangles)?];
         let input = Input::mesh(
@@ -71,8 +71,8 @@ impl<'a> Built<'a> {
     }
 
     /// Through its structure, or a copy of it.
-    fn trace(&self, structure: &Buffer<'_>, shape: &Shape, query: Query, rays: &Rays<'_>) -> Result<()> {
-        let buffers = Buffers {
+    fn trace(&self, structure: &Buffer<'_>, shape: &TraceShape, query: Query, rays: &Rays<'_>) -> Result<()> {
+        let buffers = TraceBuffers {
             structure: structure.address(),
             rays: rays.rays.address(),
             hits: rays.hits.address(),
@@ -85,7 +85,7 @@ impl<'a> Built<'a> {
     /// A compacted copy.
     fn compacted(&self) -> Result<Buffer<'a>> {
         let header: Header = self.structure.read(1)[0];
-        let bytes = header.compacted().sizes(size_of::<Triangle>() as u64).bytes;
+        let bytes = header.compacted().offsets(size_of::<Triangle>() as u64).bytes;
         let compacted = self.device.buffer("compacted", bytes)?;
         self.compact(&compacted)?;
         Ok(compacted)
@@ -111,7 +111,7 @@ impl<'a> Rays<'a> {
 
     /// The rays of a kind, through what was built.
     fn of(kind: RayKind, built: &Built<'a>, scene: &Scene) -> Result<Rays<'a>> {
-        let shape = Shape::of(built.device);
+        let shape = TraceShape::of(built.device);
         let rays = kinds::generate(kind, scene, &RayOptions { size: SIZE, seed: 1 }, &mut |rays| {
             let rays = Rays::new(built.device, rays)?;
             built.trace(&built.structure, &shape, Query::ClosestHit, &rays)?;
@@ -128,7 +128,7 @@ fn build(c: &mut Criterion) {
     let mut group = c.benchmark_group("build");
     group.sample_size(10).throughput(Throughput::Elements(scene.mesh.triangles.len() as u64));
     for schedule in [Schedule::Chain, Schedule::Persistent] {
-        let options = Options { schedule: Some(schedule), ..Options::DEFAULT };
+        let options = BuildOptions { schedule: Some(schedule), ..BuildOptions::DEFAULT };
         let built = Built::new(&device, &scene, &options).expect("it builds");
         group.bench_function(BenchmarkId::new("lbvh", schedule), |b| b.iter(|| built.build().expect("it builds")));
     }
@@ -136,13 +136,13 @@ fn build(c: &mut Criterion) {
 
 fn trace(c: &mut Criterion) {
     let (device, scene) = (device(), scene());
-    let built = Built::new(&device, &scene, &Options::DEFAULT).expect("it builds");
+    let built = Built::new(&device, &scene, &BuildOptions::DEFAULT).expect("it builds");
     let mut shapes = vec![
-        ("gathered", Shape { rays_each: 1, ..Shape::subgroups(&device.limits) }),
-        ("gathered, ray after ray", Shape::subgroups(&device.limits)),
+        ("gathered", TraceShape { rays_each: 1, ..TraceShape::subgroups(&device.limits) }),
+        ("gathered, ray after ray", TraceShape::subgroups(&device.limits)),
     ];
     if device.limits.subgroup_is_exact && device.limits.subgroup_size <= Loads::MAX_LANES {
-        shapes.push(("lane by lane", Shape::lanes(&device.limits)));
+        shapes.push(("lane by lane", TraceShape::lanes(&device.limits)));
     }
     for kind in KINDS {
         let rays = Rays::of(kind, &built, &scene).expect("rays");
@@ -159,12 +159,12 @@ fn trace(c: &mut Criterion) {
 /// What a compacted copy costs, and the rays through it beside those through what was built.
 fn compaction(c: &mut Criterion) {
     let (device, scene) = (device(), scene());
-    let built = Built::new(&device, &scene, &Options::DEFAULT).expect("it builds");
+    let built = Built::new(&device, &scene, &BuildOptions::DEFAULT).expect("it builds");
     let compacted = built.compacted().expect("memory");
     let mut group = c.benchmark_group("compact");
     group.sample_size(10).throughput(Throughput::Elements(scene.mesh.triangles.len() as u64));
     group.bench_function("compact", |b| b.iter(|| built.compact(&compacted).expect("it compacts")));
-    let shape = Shape::of(&device);
+    let shape = TraceShape::of(&device);
     for kind in KINDS {
         let rays = Rays::of(kind, &built, &scene).expect("rays");
         group.throughput(Throughput::Elements(rays.count.into()));
@@ -189,7 +189,7 @@ fn batch(c: &mut Criterion) {
     };
     let device = Device::new(&options).expect("a device that fits");
     let workload = Workload::new(&device, COUNT).expect("memory");
-    let mut makers = vec![("", Structures::ours(&device, accel::Options::DEFAULT))];
+    let mut makers = vec![("", Structures::ours(&device, accel::AccelOptions::DEFAULT))];
     makers.extend(Structures::drivers(&device).map(|drivers| (", the driver's", drivers)));
     let mut group = c.benchmark_group("batch");
     group.sample_size(10).throughput(Throughput::Elements(COUNT.into()));

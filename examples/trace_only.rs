@@ -2,10 +2,10 @@
 
 use hedgerow::gpu::Recorder;
 use hedgerow::trace::Query;
-use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 
 fn main() {
     // Reached, though not called.
-    let record: fn(&mut Recorder<'_>, &Shape, Query, &Buffers) -> hedgerow::Result<()> = tracer::record;
+    let record: fn(&mut Recorder<'_>, &TraceShape, Query, &TraceBuffers) -> hedgerow::Result<()> = tracer::record;
     std::hint::black_box(record);
 }

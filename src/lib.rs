@@ -3,7 +3,7 @@
 //! The library takes your device, your command buffer and your memory. It makes pipelines and records dispatches, nothing else.
 //!
 //! ```
-//! use hedgerow::bvh::builder::{Builder, Input, Options};
+//! use hedgerow::bvh::builder::{BuildOptions, Builder, Input};
 //! use hedgerow::trace::{Hit, Query, Ray, tracer};
 //! # use hedgerow_lab::device::{Device, DeviceOptions};
 //!
@@ -16,15 +16,15 @@
 //! let (rays, hits) = (device.upload("rays", &[ray])?, device.upload("hits", &[Hit::NONE])?);
 //!
 //! let triangles = Input::mesh(vertices.address(), 3, indices.address(), 1);
-//! let builder = Builder::new(&device, &Options::DEFAULT, triangles.primitive_count)?;
+//! let builder = Builder::new(&device, &BuildOptions::DEFAULT, triangles.primitive_count)?;
 //! let structure = device.buffer("structure", builder.sizes().structure)?;
 //! let scratch = device.buffer("scratch", builder.sizes().scratch)?;
 //! device.run(None, |recorder| {
 //!     builder.record(recorder, &triangles, structure.address(), scratch.address())?;
 //!     recorder.barrier();
 //!     let (rays, hits) = (rays.address(), hits.address());
-//!     let buffers = tracer::Buffers { structure: structure.address(), rays, hits, work: None, count: 1 };
-//!     tracer::record(recorder, &tracer::Shape::of(&device), Query::ClosestHit, &buffers)
+//!     let buffers = tracer::TraceBuffers { structure: structure.address(), rays, hits, work: None, count: 1 };
+//!     tracer::record(recorder, &tracer::TraceShape::of(&device), Query::ClosestHit, &buffers)
 //! })?;
 //! assert_eq!(hits.read::<Hit>(1)[0].t, 2.0);
 //! # Ok(())

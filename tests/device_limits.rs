@@ -1,7 +1,7 @@
 //! A device that has less than it could: without what is optional, with inexact subgroups, with small limits, without timestamps.
 
 use crate::common::{OPTIONS, open};
-use hedgerow::gpu::scan::{Buffers, Scan};
+use hedgerow::gpu::scan::{Scan, ScanBuffers};
 use hedgerow::gpu::{Timestamps, TuningChoice};
 use hedgerow_lab::device::{Device, DeviceOptions};
 
@@ -26,7 +26,7 @@ fn sums(device: &Device, timestamps: Option<&mut Timestamps>) -> Vec<u32> {
     let scan = Scan::new(device, COUNT);
     let values = device.upload("values", &numbers()).expect("memory");
     let sums = device.buffer("sums", 4 * u64::from(scan.sums_words())).expect("memory");
-    let buffers = Buffers { values: values.address(), results: values.address(), sums: sums.address() };
+    let buffers = ScanBuffers { values: values.address(), results: values.address(), sums: sums.address() };
     device
         .run(timestamps, |recorder| {
             recorder.phase("scan");
@@ -97,7 +97,7 @@ fn staged_buffers_hold_what_was_written() {
     device
         .run(None, |recorder| {
             let buffer = values.insert(device.upload("values", &self::numbers())?);
-            let buffers = Buffers { values: buffer.address(), results: buffer.address(), sums: sums.address() };
+            let buffers = ScanBuffers { values: buffer.address(), results: buffer.address(), sums: sums.address() };
             scan.record(recorder, &buffers)
         })
         .expect("it scans");

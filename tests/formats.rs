@@ -4,8 +4,8 @@
 use crate::reflection::{bytes_of, declared, decoration, members, name_of, push_constants, stride_of};
 use hedgerow::accel::serialize::Head;
 use hedgerow::bvh::geometry::Geometry;
-use hedgerow::bvh::layout::{BoxRecord, Child, GeometryEntry, Header, Instance, Node, Triangle};
-use hedgerow::bvh::split::Reference;
+use hedgerow::bvh::layout::{BoxRecord, Child, GeometryEntry, Header, InstanceRecord, Node, Triangle};
+use hedgerow::bvh::split::SplitReference;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::gpu::shaders;
 use hedgerow::kdtree::layout as kdtree;
@@ -73,7 +73,7 @@ fn structs() -> BTreeMap<&'static str, Layout> {
     let mut geometry =
         layout_of!(Geometry { vertices, indices, transform, vertex_stride, vertex_count, vertex_format, first });
     geometry.members[5] = ("formats".into(), offset_of!(Geometry, vertex_format), 4);
-    let mut kd_header = layout_of!(kdtree::Header {
+    let mut kd_header = layout_of!(kdtree::KdHeader {
         magic,
         kind,
         status,
@@ -104,12 +104,12 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         ("Child", layout_of!(Child { lo, index, hi, count })),
         ("Node", node),
         ("Triangle", layout_of!(Triangle { v0, v1, v2, primitive })),
-        ("Reference", layout_of!(Reference { lo, primitive, hi, left_out })),
+        ("Reference", layout_of!(SplitReference { lo, primitive, hi, left_out })),
         ("BoxRecord", layout_of!(BoxRecord { lo, hi, primitive })),
         ("GeometryEntry", layout_of!(GeometryEntry { first, flags })),
         (
             "Instance",
-            layout_of!(Instance {
+            layout_of!(InstanceRecord {
                 to_object,
                 to_world,
                 structure,
@@ -127,7 +127,7 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         ),
         ("Header", header),
         ("KdHeader", kd_header),
-        ("KdNode", layout_of!(kdtree::Node { first, second })),
+        ("KdNode", layout_of!(kdtree::KdNode { first, second })),
         ("Geometry", geometry),
         ("SerializedHead", layout_of!(Head { version, serialized_bytes, structure_bytes, handle_count })),
         ("Ray", layout_of!(Ray { origin, t_min, direction, t_max })),

@@ -90,7 +90,7 @@ pub unsafe extern "C" fn hedgerow_create_context(
             let context = Box::new(context);
             // The box is neither moved out of nor dropped before the structures that refer to what it holds.
             let shared: &'static Context = &*std::ptr::from_ref(&*context);
-            let options = accel::Options { checked: info.checked != vk::FALSE, ..accel::Options::DEFAULT };
+            let options = accel::AccelOptions { checked: info.checked != vk::FALSE, ..accel::AccelOptions::DEFAULT };
             let structures = accel::Device::with_options(shared, options);
             place.write(Box::into_raw(Box::new(HedgerowContext { structures, context })));
         }

@@ -5,7 +5,7 @@ use crate::pointers::{handle, reference};
 use crate::status::status;
 use crate::vulkan::{VkCommandBuffer, VkDeviceAddress, VkResult};
 use hedgerow::gpu::Recorder;
-use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 use hedgerow::trace::{Hit, MAX_RAYS, Query, Ray, Work};
 use hedgerow::{Error, Result};
 use std::mem::offset_of;
@@ -137,9 +137,9 @@ pub unsafe extern "C" fn hedgerow_cmd_trace_rays(
                 )));
             }
         }
-        let buffers = Buffers { structure, rays, hits, work: (work != 0).then_some(work), count };
+        let buffers = TraceBuffers { structure, rays, hits, work: (work != 0).then_some(work), count };
         // SAFETY: the caller's promises.
         let mut recorder = unsafe { Recorder::new(context, commands) };
-        tracer::record(&mut recorder, &Shape::of(context), query, &buffers)
+        tracer::record(&mut recorder, &TraceShape::of(context), query, &buffers)
     })
 }

@@ -1,14 +1,15 @@
 //! A build that is asked for by Vulkan's structs: what it reads, the memory it needs, and what is recorded before the builder.
 
-use super::geometry::{self, Given};
+use super::geometry::{self, BuildGeometries};
 use super::instances::{ENTRY_BYTES, entries_step};
 use super::rebraid::Rebraid;
-use super::{Options, REBRAID};
-use crate::bvh::builder::{self, Builder, Job, Sizes};
+use super::{AccelOptions, REBRAID};
+use crate::bvh::builder::{self, BuildJob, Builder};
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
 use crate::bvh::refit::{self, Refit};
 use crate::bvh::sah::Collapse;
+use crate::gpu::Sizes;
 use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Step, shaders};
 use crate::{Error, Result};
@@ -33,7 +34,7 @@ const KNOWN_FLAGS: Flags = Flags::from_raw(
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Counts {
     /// In the recording; the geometries are of their ranges.
-    Told,
+    OnHost,
     /// In device memory, `VkAccelerationStructureBuildRangeInfoKHR` so many bytes apart; the geometries begin where the caller's
     /// do, and their `first` is the most primitives that each may have.
     OnDevice { address: u64, stride: u32 },
@@ -43,12 +44,12 @@ pub(super) enum Counts {
 pub(super) struct Build {
     builder: Builder,
     refit: Refit,
-    given: Given,
+    given: BuildGeometries,
     counts: Counts,
     /// Most primitives of all geometries.
     primitive_count: u32,
     rebraid: Option<Rebraid>,
-    options: builder::Options,
+    options: builder::BuildOptions,
 }
 
 /// Where the parts of the scratch memory begin.
@@ -62,9 +63,9 @@ impl Build {
     /// A build with these flags over the primitives `given`, at most `primitive_count` in all.
     pub fn new(
         context: &Context,
-        options: &Options,
+        options: &AccelOptions,
         flags: Flags,
-        given: Given,
+        given: BuildGeometries,
         counts: Counts,
         primitive_count: u64,
     ) -> Result<Build> {
@@ -77,22 +78,22 @@ impl Build {
         let primitive_count = u32::try_from(primitive_count).unwrap_or(u32::MAX);
         let opens = flags.contains(REBRAID) && !flags.contains(Flags::ALLOW_UPDATE);
         let rebraid = match given {
-            Given::Instances { .. } if opens => Some(options.rebraid(primitive_count)),
+            BuildGeometries::Instances { .. } if opens => Some(options.rebraid(primitive_count)),
             _ => None,
         };
         let entries = rebraid.map_or(primitive_count, |rebraid| rebraid.capacity);
         let primitives = given.primitives();
-        let builder_options = builder::Options {
+        let builder_options = builder::BuildOptions {
             codes: Some(codes(flags, entries)),
             // An instance costs more than a node whatever its box: one a leaf.
             collapse: if primitives == Primitives::Instances { Collapse::OFF } else { collapse(flags) },
             primitives,
             geometry_count: given.count(),
             build_flags: flags.as_raw() & 0x1f,
-            ..builder::Options::DEFAULT
+            ..builder::BuildOptions::DEFAULT
         };
         let builder = Builder::new(context, &builder_options, entries)?;
-        let refit = Refit::new(context, &refit::Options::from(&builder_options), entries)?;
+        let refit = Refit::new(context, &refit::RefitOptions::from(&builder_options), entries)?;
         Ok(Build { builder, refit, given, counts, primitive_count, rebraid, options: builder_options })
     }
 
@@ -114,37 +115,49 @@ impl Build {
     }
 
     /// What it is over.
-    pub fn given(&self) -> &Given {
+    pub fn given(&self) -> &BuildGeometries {
         &self.given
     }
 
     /// Bytes of scratch memory that an update of what it built needs.
     pub fn update_scratch(&self) -> u64 {
-        self.scratch(0).builder + self.refit.sizes().scratch
+        self.scratch(0).builder + self.refit.scratch_bytes()
     }
 
     /// The builder's part, with scratch memory at `scratch`.
-    pub fn job(&self, structure: u64, scratch: u64) -> Job<'_> {
-        Job { builder: &self.builder, input: self.input(scratch), structure, scratch: self.scratch(scratch).builder }
+    pub fn job(&self, structure: u64, scratch: u64) -> BuildJob<'_> {
+        BuildJob {
+            builder: &self.builder,
+            input: self.input(scratch),
+            structure,
+            scratch: self.scratch(scratch).builder,
+        }
     }
 
     /// The part of an update in place, with scratch memory at `scratch`.
-    pub fn update(&self, structure: u64, scratch: u64) -> refit::Job<'_> {
-        refit::Job { refit: &self.refit, input: self.input(scratch), structure, scratch: self.scratch(scratch).builder }
+    pub fn update(&self, structure: u64, scratch: u64) -> refit::RefitJob<'_> {
+        refit::RefitJob {
+            refit: &self.refit,
+            input: self.input(scratch),
+            structure,
+            scratch: self.scratch(scratch).builder,
+        }
     }
 
     fn input(&self, scratch: u64) -> Input {
         let parts = self.scratch(scratch);
         let source = match &self.given {
-            Given::Instances { .. } => Source::Entries(parts.entries),
-            Given::Triangles(geometries) | Given::Boxes(geometries) => match (&geometries[..], self.counts) {
-                ([], _) => Source::One(Geometry::mesh(0, 0, 0)),
-                (&[geometry], Counts::Told) => Source::One(geometry),
-                (_, Counts::Told) => Source::Several { records: scratch, count: geometries.len() as u32 },
-                (_, Counts::OnDevice { .. }) => {
-                    Source::Several { records: scratch, count: geometries.len() as u32 + 1 }
+            BuildGeometries::Instances { .. } => Source::Entries(parts.entries),
+            BuildGeometries::Triangles(geometries) | BuildGeometries::Boxes(geometries) => {
+                match (&geometries[..], self.counts) {
+                    ([], _) => Source::One(Geometry::mesh(0, 0, 0)),
+                    (&[geometry], Counts::OnHost) => Source::One(geometry),
+                    (_, Counts::OnHost) => Source::Several { records: scratch, count: geometries.len() as u32 },
+                    (_, Counts::OnDevice { .. }) => {
+                        Source::Several { records: scratch, count: geometries.len() as u32 + 1 }
+                    }
                 }
-            },
+            }
         };
         Input { source, primitive_count: self.builder.count() }
     }
@@ -154,10 +167,10 @@ impl Build {
     /// [`Recorder::chains`]: crate::gpu::Recorder::chains
     pub fn prologue(&self, context: &Context, scratch: u64) -> Vec<Vec<Step>> {
         match &self.given {
-            Given::Instances { data, pointers } => {
+            BuildGeometries::Instances { data, pointers } => {
                 let parts = self.scratch(scratch);
                 let ranges = match self.counts {
-                    Counts::Told => 0,
+                    Counts::OnHost => 0,
                     Counts::OnDevice { address, .. } => address,
                 };
                 let (count, capacity) = (self.primitive_count, self.builder.count());
@@ -167,9 +180,9 @@ impl Build {
                 }
                 vec![steps]
             }
-            Given::Triangles(geometries) | Given::Boxes(geometries) => match self.counts {
-                Counts::Told if geometries.len() < 2 => Vec::new(),
-                Counts::Told => record_steps(geometries, scratch).into_iter().map(|step| vec![step]).collect(),
+            BuildGeometries::Triangles(geometries) | BuildGeometries::Boxes(geometries) => match self.counts {
+                Counts::OnHost if geometries.len() < 2 => Vec::new(),
+                Counts::OnHost => record_steps(geometries, scratch).into_iter().map(|step| vec![step]).collect(),
                 Counts::OnDevice { .. } if geometries.is_empty() => Vec::new(),
                 Counts::OnDevice { address, stride } => {
                     let end = Geometry { flags: GeometryFlags::END, ..Geometry::mesh(0, 0, 0) };
@@ -195,8 +208,8 @@ impl Build {
     /// The parts of scratch memory: records of the geometries with one more that may end them, or entries; then the builder's.
     fn scratch(&self, begin: u64) -> Scratch {
         let records = match &self.given {
-            Given::Instances { .. } => u64::from(self.builder.count()) * ENTRY_BYTES,
-            Given::Triangles(geometries) | Given::Boxes(geometries) => {
+            BuildGeometries::Instances { .. } => u64::from(self.builder.count()) * ENTRY_BYTES,
+            BuildGeometries::Triangles(geometries) | BuildGeometries::Boxes(geometries) => {
                 (geometries.len() as u64 + 1) * size_of::<Geometry>() as u64
             }
         };
@@ -250,7 +263,7 @@ fn record_steps(geometries: &[Geometry], records: u64) -> Vec<Step> {
 pub(super) unsafe fn told(
     info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
     ranges: &[vk::AccelerationStructureBuildRangeInfoKHR],
-) -> Result<(Given, u64)> {
+) -> Result<(BuildGeometries, u64)> {
     // SAFETY: the caller's promise.
     let geometries = unsafe { geometry::given(info) }?;
     if geometries.len() != ranges.len() {
@@ -269,7 +282,7 @@ pub(super) unsafe fn told(
             (count - u64::from(range.primitive_count)) as u32
         })
         .collect();
-    Ok((Given::new(info.ty, &geometries, ranges, &firsts)?, count))
+    Ok((BuildGeometries::new(info.ty, &geometries, ranges, &firsts)?, count))
 }
 
 /// The geometries that `info` gives, at most so many primitives each, whose ranges are not known.
@@ -279,7 +292,7 @@ pub(super) unsafe fn told(
 pub(super) unsafe fn at_most(
     info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
     counts: &[u32],
-) -> Result<(Given, u64)> {
+) -> Result<(BuildGeometries, u64)> {
     // SAFETY: the caller's promise.
     let geometries = unsafe { geometry::given(info) }?;
     if geometries.len() != counts.len() {
@@ -290,5 +303,5 @@ pub(super) unsafe fn at_most(
         )));
     }
     let ranges = vec![vk::AccelerationStructureBuildRangeInfoKHR::default(); counts.len()];
-    Ok((Given::new(info.ty, &geometries, &ranges, counts)?, counts.iter().copied().map(u64::from).sum()))
+    Ok((BuildGeometries::new(info.ty, &geometries, &ranges, counts)?, counts.iter().copied().map(u64::from).sum()))
 }

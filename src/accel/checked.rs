@@ -27,12 +27,12 @@ struct Known {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Built {
     flags: vk::BuildAccelerationStructureFlagsKHR,
-    geometries: Vec<Shape>,
+    geometries: Vec<BuildShape>,
 }
 
 /// What an update may not change of a geometry.
 #[derive(Debug, Clone, PartialEq)]
-struct Shape {
+struct BuildShape {
     ty: vk::GeometryTypeKHR,
     flags: vk::GeometryFlagsKHR,
     count: u32,
@@ -43,7 +43,7 @@ struct Shape {
 }
 
 /// A build that is about to be recorded.
-pub(super) struct Asked<'a> {
+pub(super) struct CheckedBuild<'a> {
     pub info: &'a vk::AccelerationStructureBuildGeometryInfoKHR<'a>,
     pub geometries: Vec<&'a vk::AccelerationStructureGeometryKHR<'a>>,
     /// The ranges; of an indirect build, the most primitives and no offsets.
@@ -71,7 +71,7 @@ impl Checks {
     }
 
     /// Checks builds against what is known and each other, and takes note of them.
-    pub fn builds(&self, asked: &[Asked<'_>]) -> Result<()> {
+    pub fn builds(&self, asked: &[CheckedBuild<'_>]) -> Result<()> {
         let mut known = self.known();
         let named = |i: usize, error: Error| match error {
             Error::Argument(what) => Error::Argument(format!("pInfos[{i}]: {what}")),
@@ -142,7 +142,7 @@ fn find<'a>(known: &'a HashMap<u64, Known>, field: &str, structure: vk::Accelera
     })
 }
 
-fn check(known: &HashMap<u64, Known>, build: &Asked<'_>) -> Result<()> {
+fn check(known: &HashMap<u64, Known>, build: &CheckedBuild<'_>) -> Result<()> {
     let info = build.info;
     let destination = find(known, "dstAccelerationStructure", info.dst_acceleration_structure)?;
     if destination.ty != info.ty && destination.ty != vk::AccelerationStructureTypeKHR::GENERIC {
@@ -223,7 +223,7 @@ fn check_addresses(
     }
 }
 
-fn check_update(known: &HashMap<u64, Known>, build: &Asked<'_>) -> Result<()> {
+fn check_update(known: &HashMap<u64, Known>, build: &CheckedBuild<'_>) -> Result<()> {
     let source = find(known, "srcAccelerationStructure", build.info.src_acceleration_structure)?;
     let Some(built) = &source.built else {
         return refuse("srcAccelerationStructure was created and not built; an update needs a build before".into());
@@ -252,7 +252,7 @@ fn check_update(known: &HashMap<u64, Known>, build: &Asked<'_>) -> Result<()> {
 }
 
 /// No memory that one build writes is another's, and none is both structure and scratch.
-fn check_overlaps(known: &HashMap<u64, Known>, asked: &[Asked<'_>]) -> Result<()> {
+fn check_overlaps(known: &HashMap<u64, Known>, asked: &[CheckedBuild<'_>]) -> Result<()> {
     let mut all: Vec<(Range<u64>, String)> = Vec::new();
     for (i, build) in asked.iter().enumerate() {
         let structure = build.info.dst_acceleration_structure.as_raw();
@@ -283,12 +283,12 @@ fn check_overlaps(known: &HashMap<u64, Known>, asked: &[Asked<'_>]) -> Result<()
     Ok(())
 }
 
-fn built_as(build: &Asked<'_>) -> Built {
+fn built_as(build: &CheckedBuild<'_>) -> Built {
     let shape = |(geometry, range): (
         &&vk::AccelerationStructureGeometryKHR<'_>,
         &vk::AccelerationStructureBuildRangeInfoKHR,
     )| {
-        let mut shape = Shape {
+        let mut shape = BuildShape {
             ty: geometry.geometry_type,
             flags: geometry.flags,
             count: range.primitive_count,

@@ -1,12 +1,13 @@
 //! The object that stands for the driver's: sizes, handles, addresses, builds.
 
 use super::build::{self, Build, Counts, SCRATCH_ALIGNMENT};
-use super::checked::{Asked, Checks};
+use super::checked::{CheckedBuild, Checks};
 use super::copy::clone_step;
 use super::given::not_null;
-use super::{Options, Placement, Request, geometry};
-use crate::bvh::builder::{Builder, Job, Sizes};
+use super::{AccelOptions, Placement, Request, geometry};
+use crate::bvh::builder::{BuildJob, Builder};
 use crate::bvh::refit::Refit;
+use crate::gpu::Sizes;
 use crate::gpu::{Context, Recorder, Step};
 use crate::{Error, Result};
 use ash::vk;
@@ -25,7 +26,7 @@ type Flags = vk::BuildAccelerationStructureFlagsKHR;
 #[derive(Clone)]
 pub struct Device<'a> {
     pub(super) context: &'a Context,
-    options: Options,
+    options: AccelOptions,
     /// Where [`Options::checked`] asks for it; shared with clones.
     pub(super) checks: Option<Arc<Checks>>,
 }
@@ -33,11 +34,11 @@ pub struct Device<'a> {
 impl<'a> Device<'a> {
     /// Structures on the device of `context`.
     pub fn new(context: &'a Context) -> Device<'a> {
-        Device::with_options(context, Options::DEFAULT)
+        Device::with_options(context, AccelOptions::DEFAULT)
     }
 
     /// The same with options.
-    pub fn with_options(context: &'a Context, options: Options) -> Device<'a> {
+    pub fn with_options(context: &'a Context, options: AccelOptions) -> Device<'a> {
         Device { context, options, checks: options.checked.then(Default::default) }
     }
 
@@ -58,7 +59,7 @@ impl<'a> Device<'a> {
     ) -> Result<()> {
         // SAFETY: the caller's promise.
         let (given, count) = unsafe { build::at_most(info, max_primitive_counts) }?;
-        let build = Build::new(self.context, &self.options, info.flags, given, Counts::Told, count)?;
+        let build = Build::new(self.context, &self.options, info.flags, given, Counts::OnHost, count)?;
         let Sizes { structure, scratch, .. } = build.sizes_at_most();
         size_info.acceleration_structure_size = structure;
         let on_host = build_type == vk::AccelerationStructureBuildTypeKHR::HOST;
@@ -149,7 +150,7 @@ impl<'a> Device<'a> {
             let build = || {
                 // SAFETY: the caller's promise.
                 let (given, count) = unsafe { build::told(info, ranges) }?;
-                self.placed(info, given, Counts::Told, count)
+                self.placed(info, given, Counts::OnHost, count)
             };
             builds.push(build().map_err(|error| within(i, error))?);
         }
@@ -213,7 +214,7 @@ impl<'a> Device<'a> {
         &self,
         infos: &[vk::AccelerationStructureBuildGeometryInfoKHR<'_>],
         ranges: impl Iterator<Item = Vec<vk::AccelerationStructureBuildRangeInfoKHR>>,
-        builds: &[Placed],
+        builds: &[PlacedBuild],
     ) -> Result<()> {
         let Some(checks) = &self.checks else { return Ok(()) };
         let asked = infos.iter().zip(ranges).zip(builds).map(|((info, ranges), placed)| {
@@ -221,7 +222,7 @@ impl<'a> Device<'a> {
             let geometries = unsafe { geometry::given(info) }?;
             let Sizes { structure, scratch, .. } = placed.build.sizes();
             let scratch_bytes = if placed.source.is_some() { placed.build.update_scratch() } else { scratch };
-            Ok(Asked { info, geometries, ranges, structure_bytes: structure, scratch_bytes })
+            Ok(CheckedBuild { info, geometries, ranges, structure_bytes: structure, scratch_bytes })
         });
         checks.builds(&asked.collect::<Result<Vec<_>>>()?)
     }
@@ -230,10 +231,10 @@ impl<'a> Device<'a> {
     fn placed(
         &self,
         info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
-        given: geometry::Given,
+        given: geometry::BuildGeometries,
         counts: Counts,
         primitive_count: u64,
-    ) -> Result<Placed> {
+    ) -> Result<PlacedBuild> {
         // SAFETY: device builds give device addresses.
         let scratch = unsafe { info.scratch_data.device_address };
         let refuse = |what: String| Err(Error::Argument(what));
@@ -256,7 +257,7 @@ impl<'a> Device<'a> {
             ));
         }
         let build = Build::new(self.context, &self.options, info.flags, given, counts, primitive_count)?;
-        Ok(Placed { build, source, structure: info.dst_acceleration_structure.as_raw(), scratch })
+        Ok(PlacedBuild { build, source, structure: info.dst_acceleration_structure.as_raw(), scratch })
     }
 
     /// Records builds that are asked for without Vulkan's structs, side by side as
@@ -269,7 +270,7 @@ impl<'a> Device<'a> {
     /// As there.
     pub unsafe fn record(&self, commands: vk::CommandBuffer, placements: &[Placement<'_>]) -> Result<()> {
         let placed = placements.iter().map(|&Placement { request, structure, scratch }| {
-            Ok(Placed { build: request.build(self)?, source: None, structure, scratch })
+            Ok(PlacedBuild { build: request.build(self)?, source: None, structure, scratch })
         });
         let builds = placed.collect::<Result<Vec<_>>>()?;
         // SAFETY: the caller's promise.
@@ -283,8 +284,9 @@ impl<'a> Device<'a> {
     /// # Errors
     /// A request that cannot be built; a pipeline could not be made.
     pub fn warm(&self, requests: &[Request]) -> Result<()> {
-        let placed =
-            |request: &Request, source| Ok(Placed { build: request.build(self)?, source, structure: 0, scratch: 0 });
+        let placed = |request: &Request, source| {
+            Ok(PlacedBuild { build: request.build(self)?, source, structure: 0, scratch: 0 })
+        };
         let anew = requests.iter().map(|request| placed(request, None));
         // From another structure: a copy is part of it.
         const ANOTHER: u64 = 16;
@@ -294,13 +296,14 @@ impl<'a> Device<'a> {
         self.record_placed(&mut Recorder::warming(self.context), &builds)
     }
 
-    pub(super) fn options(&self) -> &Options {
+    pub(super) fn options(&self) -> &AccelOptions {
         &self.options
     }
 
-    fn record_placed(&self, recorder: &mut Recorder<'_>, builds: &[Placed]) -> Result<()> {
-        let (updates, builds_anew): (Vec<&Placed>, Vec<&Placed>) = builds.iter().partition(|p| p.source.is_some());
-        let jobs: Vec<Job<'_>> = builds_anew.iter().map(|p| p.build.job(p.structure, p.scratch)).collect();
+    fn record_placed(&self, recorder: &mut Recorder<'_>, builds: &[PlacedBuild]) -> Result<()> {
+        let (updates, builds_anew): (Vec<&PlacedBuild>, Vec<&PlacedBuild>) =
+            builds.iter().partition(|p| p.source.is_some());
+        let jobs: Vec<BuildJob<'_>> = builds_anew.iter().map(|p| p.build.job(p.structure, p.scratch)).collect();
         let updates_in_place: Vec<_> = updates.iter().map(|p| p.build.update(p.structure, p.scratch)).collect();
         let mut chains = Builder::chains(&jobs)?;
         chains.extend(Refit::chains(&updates_in_place)?);
@@ -308,7 +311,7 @@ impl<'a> Device<'a> {
             builds.iter().flat_map(|p| p.build.prologue(self.context, p.scratch)).collect();
         // An update from another structure is one in place, of its copy.
         let from_another =
-            |p: &&Placed| p.source.filter(|&source| source != p.structure).map(|source| (source, p.structure));
+            |p: &&PlacedBuild| p.source.filter(|&source| source != p.structure).map(|source| (source, p.structure));
         let copies = updates.iter().filter_map(from_another);
         prologues.extend(copies.map(|(source, target)| vec![clone_step(self.context, source, target)]));
         if !prologues.is_empty() {
@@ -320,7 +323,7 @@ impl<'a> Device<'a> {
 }
 
 /// A build with its memory.
-struct Placed {
+struct PlacedBuild {
     build: Build,
     /// The structure that is updated, where it is an update.
     source: Option<u64>,

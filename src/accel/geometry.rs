@@ -29,7 +29,7 @@ pub(super) unsafe fn given<'a>(
 
 /// What a build is over: geometries of one kind.
 #[derive(Debug, Clone)]
-pub(super) enum Given {
+pub(super) enum BuildGeometries {
     /// Triangles.
     Triangles(Vec<Geometry>),
     /// Boxes.
@@ -43,14 +43,14 @@ pub(super) enum Given {
     },
 }
 
-impl Given {
+impl BuildGeometries {
     /// The geometries of a structure of type `ty`, with their ranges and the `first` of each.
     pub fn new(
         ty: vk::AccelerationStructureTypeKHR,
         geometries: &[&vk::AccelerationStructureGeometryKHR<'_>],
         ranges: &[vk::AccelerationStructureBuildRangeInfoKHR],
         firsts: &[u32],
-    ) -> Result<Given> {
+    ) -> Result<BuildGeometries> {
         match ty {
             vk::AccelerationStructureTypeKHR::TOP_LEVEL => {
                 let [geometry] = geometries else {
@@ -73,11 +73,11 @@ impl Given {
                 match kind {
                     vk::GeometryTypeKHR::TRIANGLES => {
                         let given = all.map(|((geometry, range), &first)| triangles(geometry, range, first));
-                        given.collect::<Result<_>>().map(Given::Triangles)
+                        given.collect::<Result<_>>().map(BuildGeometries::Triangles)
                     }
                     vk::GeometryTypeKHR::AABBS => {
                         let given = all.map(|((geometry, range), &first)| boxes(geometry, range, first));
-                        given.collect::<Result<_>>().map(Given::Boxes)
+                        given.collect::<Result<_>>().map(BuildGeometries::Boxes)
                     }
                     other => Err(Error::Argument(format!(
                         "geometryType is {other:?}; bottom-level structures hold TRIANGLES or AABBS"
@@ -93,17 +93,19 @@ impl Given {
     /// What the structure will hold.
     pub fn primitives(&self) -> Primitives {
         match self {
-            Given::Triangles(_) => Primitives::Triangles,
-            Given::Boxes(_) => Primitives::Boxes,
-            Given::Instances { .. } => Primitives::Instances,
+            BuildGeometries::Triangles(_) => Primitives::Triangles,
+            BuildGeometries::Boxes(_) => Primitives::Boxes,
+            BuildGeometries::Instances { .. } => Primitives::Instances,
         }
     }
 
     /// Geometries, at least 1.
     pub fn count(&self) -> u32 {
         match self {
-            Given::Triangles(geometries) | Given::Boxes(geometries) => geometries.len().max(1) as u32,
-            Given::Instances { .. } => 1,
+            BuildGeometries::Triangles(geometries) | BuildGeometries::Boxes(geometries) => {
+                geometries.len().max(1) as u32
+            }
+            BuildGeometries::Instances { .. } => 1,
         }
     }
 }
@@ -112,7 +114,7 @@ impl Given {
 fn instances(
     geometry: &vk::AccelerationStructureGeometryKHR<'_>,
     range: &vk::AccelerationStructureBuildRangeInfoKHR,
-) -> Result<Given> {
+) -> Result<BuildGeometries> {
     if geometry.geometry_type != vk::GeometryTypeKHR::INSTANCES {
         return Err(Error::Argument(format!(
             "geometryType is {:?}; top-level structures hold INSTANCES",
@@ -125,7 +127,7 @@ fn instances(
         (instances, instances.data.device_address)
     };
     let pointers = instances.array_of_pointers == vk::TRUE;
-    Ok(Given::Instances { data: address.wrapping_add(range.primitive_offset.into()), pointers })
+    Ok(BuildGeometries::Instances { data: address.wrapping_add(range.primitive_offset.into()), pointers })
 }
 
 /// The boxes of a geometry that `range` takes; `first` boxes come before.

@@ -1,8 +1,8 @@
 //! Builds on the host: the same structs with host addresses, the same bytes.
 
 use super::build::{self, Build, Counts};
-use super::geometry::Given;
-use super::{Device, Options};
+use super::geometry::BuildGeometries;
+use super::{AccelOptions, Device};
 use crate::bvh::geometry::{Geometry, IndexFormat};
 use crate::bvh::twin::geometry::{Corners, HostGeometry};
 use crate::bvh::twin::lbvh;
@@ -56,7 +56,7 @@ impl Device<'_> {
 
 unsafe fn built(
     context: &Context,
-    options: &Options,
+    options: &AccelOptions,
     info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
     ranges: &[vk::AccelerationStructureBuildRangeInfoKHR],
 ) -> Result<Vec<u8>> {
@@ -65,13 +65,13 @@ unsafe fn built(
     }
     // SAFETY: the caller's promise.
     let (given, count) = unsafe { build::told(info, ranges) }?;
-    let build = Build::new(context, options, info.flags, given, Counts::Told, count)?;
+    let build = Build::new(context, options, info.flags, given, Counts::OnHost, count)?;
     let (codes, collapse, build_flags) = build.host_options();
     let flags_of = |geometries: &[Geometry]| -> Vec<(u32, u32)> {
         geometries.iter().zip(ranges).map(|(g, range)| (range.primitive_count, g.flags.bits())).collect()
     };
     match build.given() {
-        Given::Triangles(geometries) => {
+        BuildGeometries::Triangles(geometries) => {
             let mut corners: Vec<Corners> = Vec::new();
             for (geometry, range) in geometries.iter().zip(ranges) {
                 // SAFETY: the caller's promise.
@@ -80,7 +80,7 @@ unsafe fn built(
             let tree = lbvh::build_corners(corners.into_iter(), codes, collapse);
             Ok(tree.with_geometries(&flags_of(geometries), build_flags).to_bytes())
         }
-        Given::Boxes(geometries) => {
+        BuildGeometries::Boxes(geometries) => {
             let mut boxes = Vec::new();
             for (geometry, range) in geometries.iter().zip(ranges) {
                 // SAFETY: the caller's promise.
@@ -89,7 +89,7 @@ unsafe fn built(
             let tree = lbvh::build_aabbs(&boxes, codes, collapse);
             Ok(tree.with_geometries(&flags_of(geometries), build_flags).to_bytes())
         }
-        Given::Instances { .. } => Err(Error::Argument(
+        BuildGeometries::Instances { .. } => Err(Error::Argument(
             "type is TOP_LEVEL; this call does not have the structures that instances name: take accel::twin::top_level"
                 .into(),
         )),

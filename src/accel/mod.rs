@@ -47,17 +47,17 @@ pub use build::SCRATCH_ALIGNMENT;
 pub use device::{Device, STRUCTURE_ALIGNMENT};
 pub use instances::Instance;
 pub use properties::Property;
-pub use request::{Placement, Request, RequestSizes};
+pub use request::{Placement, Request};
 
 use ash::vk;
 use rebraid::Rebraid;
 
-/// A build flag of ours: a top level may open instances (Benthin, Woop, Wald 2017), within [`Options::rebraid_budget`].
+/// A build flag of ours: a top level may open instances (Benthin, Woop, Wald 2017), within [`AccelOptions::rebraid_budget`].
 pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAccelerationStructureFlagsKHR::from_raw(1 << 30);
 
 /// What a [`Device`] does beside what the structs say.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct AccelOptions {
     /// Entries of a top level that is built with [`REBRAID`], as a multiple of its instances: at least 1.
     pub rebraid_budget: f32,
     /// Whether calls look at what takes memory of what was created and built, as Vulkan's validation would: memory that is too
@@ -67,11 +67,11 @@ pub struct Options {
     pub checked: bool,
 }
 
-impl Options {
+impl AccelOptions {
     /// Twice as many entries as instances: where scenes of all kinds whose boxes are loose gain, and memory is spared. No checks.
-    pub const DEFAULT: Options = Options { rebraid_budget: 2.0, checked: false };
+    pub const DEFAULT: AccelOptions = AccelOptions { rebraid_budget: 2.0, checked: false };
     /// The same with checks.
-    pub const CHECKED: Options = Options { checked: true, ..Options::DEFAULT };
+    pub const CHECKED: AccelOptions = AccelOptions { checked: true, ..AccelOptions::DEFAULT };
 
     /// The opening of a top level of so many instances.
     fn rebraid(&self, instance_count: u32) -> Rebraid {
@@ -81,8 +81,8 @@ impl Options {
     }
 }
 
-impl Default for Options {
-    fn default() -> Options {
-        Options::DEFAULT
+impl Default for AccelOptions {
+    fn default() -> AccelOptions {
+        AccelOptions::DEFAULT
     }
 }

@@ -15,26 +15,18 @@
 
 use super::Device;
 use super::build::{Build, Counts};
-use super::geometry::Given;
+use super::geometry::BuildGeometries;
 use crate::Result;
 use crate::bvh::geometry::Geometry;
+use crate::gpu::Sizes;
 use ash::vk;
 
 /// A structure that is to be built.
 #[derive(Debug, Clone)]
 pub struct Request {
-    pub(super) given: Given,
+    pub(super) given: BuildGeometries,
     pub(super) primitive_count: u64,
     pub(super) flags: vk::BuildAccelerationStructureFlagsKHR,
-}
-
-/// Bytes that a [`Request`] needs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RequestSizes {
-    /// The structure, aligned to [`super::STRUCTURE_ALIGNMENT`].
-    pub structure: u64,
-    /// Scratch memory of a build, aligned to [`super::SCRATCH_ALIGNMENT`].
-    pub scratch: u64,
 }
 
 /// A request with the addresses of its memory.
@@ -52,26 +44,26 @@ impl Request {
     /// A bottom-level structure of triangles: each geometry with the number of its triangles. Their `first` follows from that.
     pub fn triangles(geometries: &[(Geometry, u32)]) -> Request {
         let (geometries, primitive_count) = in_order(geometries);
-        Request::new(Given::Triangles(geometries), primitive_count)
+        Request::new(BuildGeometries::Triangles(geometries), primitive_count)
     }
 
     /// A bottom-level structure of boxes: each geometry ([`Geometry::boxes`]) with the number of its boxes.
     pub fn boxes(geometries: &[(Geometry, u32)]) -> Request {
         let (geometries, primitive_count) = in_order(geometries);
-        Request::new(Given::Boxes(geometries), primitive_count)
+        Request::new(BuildGeometries::Boxes(geometries), primitive_count)
     }
 
     /// A top level over `count` [`Instance`](super::Instance)s at an address that is a multiple of 16.
     pub fn instances(address: u64, count: u32) -> Request {
-        Request::new(Given::Instances { data: address, pointers: false }, count.into())
+        Request::new(BuildGeometries::Instances { data: address, pointers: false }, count.into())
     }
 
     /// A top level over `count` instances whose addresses lie at an address that is a multiple of 8.
     pub fn instance_pointers(address: u64, count: u32) -> Request {
-        Request::new(Given::Instances { data: address, pointers: true }, count.into())
+        Request::new(BuildGeometries::Instances { data: address, pointers: true }, count.into())
     }
 
-    fn new(given: Given, primitive_count: u64) -> Request {
+    fn new(given: BuildGeometries, primitive_count: u64) -> Request {
         Request { given, primitive_count, flags: vk::BuildAccelerationStructureFlagsKHR::empty() }
     }
 
@@ -84,13 +76,19 @@ impl Request {
     ///
     /// # Errors
     /// Unknown flags, or two that exclude each other; too many primitives.
-    pub fn sizes(&self, device: &Device<'_>) -> Result<RequestSizes> {
-        let sizes = self.build(device)?.sizes();
-        Ok(RequestSizes { structure: sizes.structure, scratch: sizes.scratch })
+    pub fn sizes(&self, device: &Device<'_>) -> Result<Sizes> {
+        Ok(Sizes { alignment: super::STRUCTURE_ALIGNMENT, ..self.build(device)?.sizes() })
     }
 
     pub(super) fn build(&self, device: &Device<'_>) -> Result<Build> {
-        Build::new(device.context, device.options(), self.flags, self.given.clone(), Counts::Told, self.primitive_count)
+        Build::new(
+            device.context,
+            device.options(),
+            self.flags,
+            self.given.clone(),
+            Counts::OnHost,
+            self.primitive_count,
+        )
     }
 }
 

@@ -12,7 +12,7 @@
 
 use super::Device;
 use super::given::{aligned, not_null};
-use crate::bvh::layout::{self, Header, Instance, Record};
+use crate::bvh::layout::{self, Header, InstanceRecord, Record};
 use crate::gpu::arguments;
 use crate::gpu::{Grid, Recorder, shaders};
 use crate::{Error, Result};
@@ -58,8 +58,8 @@ pub struct Head {
 
 impl Head {
     /// Of a structure with this header.
-    pub(super) fn of(header: &Header, sizes: &layout::Sizes) -> Head {
-        let handle_count = if header.kind == Instance::KIND { header.primitive_count.into() } else { 0 };
+    pub(super) fn of(header: &Header, sizes: &layout::BvhOffsets) -> Head {
+        let handle_count = if header.kind == InstanceRecord::KIND { header.primitive_count.into() } else { 0 };
         Head {
             version: VERSION,
             serialized_bytes: size_of::<Head>() as u64 + 8 * handle_count + sizes.bytes,
@@ -69,10 +69,10 @@ impl Head {
     }
 
     /// Where the handles lie in the structure's own bytes.
-    pub(super) fn handles(&self, sizes: &layout::Sizes) -> impl Iterator<Item = Range<usize>> {
-        let first = sizes.records_offset as usize + offset_of!(Instance, structure);
+    pub(super) fn handles(&self, sizes: &layout::BvhOffsets) -> impl Iterator<Item = Range<usize>> {
+        let first = sizes.records_offset as usize + offset_of!(InstanceRecord, structure);
         (0..self.handle_count as usize)
-            .map(move |i| first + i * size_of::<Instance>())
+            .map(move |i| first + i * size_of::<InstanceRecord>())
             .map(|at| at..at + size_of::<u64>())
     }
 }

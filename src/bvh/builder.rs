@@ -16,21 +16,21 @@ use super::scratch::Scratch;
 use super::split::{self, Split};
 use super::{collapse, hploc, layout, lbvh_workgroup};
 use crate::gpu::arguments;
-use crate::gpu::radix_sort::{self, Shape};
-use crate::gpu::{BuildTuning, Context, Recorder, Step};
+use crate::gpu::radix_sort::{self, SortShape};
+use crate::gpu::{BuildTuning, Context, Recorder, Sizes, Step};
 use crate::{Error, Result};
 
 /// What to build, beside the primitives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct BuildOptions {
     /// How the tree is made.
     pub method: Method,
     /// The codes; `None` lets [`Codes::for_count`] choose them from the number of primitives.
     pub codes: Option<Codes>,
     /// Whether large triangles are split into several references before all else, and how much.
-    pub split: Option<split::Options>,
+    pub split: Option<split::SplitOptions>,
     /// Rounds of reinsertion behind it, which take time and give a better tree.
-    pub optimise: Option<reinsertion::Options>,
+    pub optimise: Option<reinsertion::ReinsertionOptions>,
     /// Whether subtrees become leaves where that is cheaper.
     pub collapse: Collapse,
     /// How the phases are recorded; `None` takes what measured faster on this kind of device and size.
@@ -43,9 +43,9 @@ pub struct Options {
     pub build_flags: u32,
 }
 
-impl Options {
+impl BuildOptions {
     /// The LBVH of one geometry of triangles, everything chosen from the scene and the device; leaves collapsed by SAH.
-    pub const DEFAULT: Options = Options {
+    pub const DEFAULT: BuildOptions = BuildOptions {
         method: Method::Lbvh,
         codes: None,
         split: None,
@@ -58,13 +58,13 @@ impl Options {
     };
 }
 
-impl Default for Options {
-    fn default() -> Options {
-        Options::DEFAULT
+impl Default for BuildOptions {
+    fn default() -> BuildOptions {
+        BuildOptions::DEFAULT
     }
 }
 
-impl Options {
+impl BuildOptions {
     /// Whether there are kernels for the schedule.
     fn takes(&self, schedule: Schedule) -> bool {
         match schedule {
@@ -97,17 +97,6 @@ impl std::fmt::Display for Schedule {
     }
 }
 
-/// Bytes that a build needs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sizes {
-    /// The structure: see [`layout`].
-    pub structure: u64,
-    /// Scratch, free again when the build has run.
-    pub scratch: u64,
-    /// Alignment of both addresses.
-    pub alignment: u64,
-}
-
 /// The builder, specialised for one device, its options and a number of primitives.
 #[derive(Debug, Clone)]
 pub struct Builder {
@@ -122,7 +111,7 @@ pub struct Builder {
 
 /// A build with all that it is recorded with.
 #[derive(Debug, Clone, Copy)]
-pub struct Job<'a> {
+pub struct BuildJob<'a> {
     /// The builder.
     pub builder: &'a Builder,
     /// Its input.
@@ -158,7 +147,7 @@ impl Builder {
     ///
     /// # Errors
     /// More primitives than a build can take; a schedule that the method has not; splitting of what is no triangle.
-    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Result<Builder> {
+    pub fn new(context: &Context, options: &BuildOptions, primitive_count: u32) -> Result<Builder> {
         if primitive_count > radix_sort::MAX_COUNT {
             return Err(Error::Argument(format!(
                 "{primitive_count} primitives: a structure holds at most {}; split the mesh",
@@ -204,8 +193,11 @@ impl Builder {
         let method = if count < 2 { Method::Lbvh } else { options.method };
         let window = if let Method::Hploc(window) = method { window } else { Window::DEFAULT };
         let merging = hploc::Merging::of(context, window);
-        let shape =
-            if schedule == Schedule::Chain { Shape::of(context) } else { Shape::of(context).with_short_tiles() };
+        let shape = if schedule == Schedule::Chain {
+            SortShape::of(context)
+        } else {
+            SortShape::of(context).with_short_tiles()
+        };
         let optimise = options.optimise.map(|options| Reinsertion::new(context, &options, count));
         let items = if alone { tuning.alone_run } else { run_of(tuning, method, count, shape.workgroup) };
         let encode = Encode {
@@ -269,9 +261,9 @@ impl Builder {
     }
 
     /// Where the parts of the structure lie.
-    pub fn layout(&self) -> layout::Sizes {
+    pub fn layout(&self) -> layout::BvhOffsets {
         let Encode { primitives, count, geometry_count, .. } = self.encode;
-        layout::sizes(primitives.record_bytes(), count, geometry_count)
+        layout::offsets(primitives.record_bytes(), count, geometry_count)
     }
 
     /// Bytes that suffice for builds of this many primitives and of any fewer by builders of the same options.
@@ -282,6 +274,7 @@ impl Builder {
 
     /// Bytes that a phase must move if it reads each of its inputs once and writes each of its outputs once: what its time is
     /// held against. `None` for a phase that there is not, and for all of a build of split triangles.
+    #[doc(hidden)]
     pub fn traffic(&self, phase: &str, input: &Input) -> Option<u64> {
         let Source::One(geometry) = input.source else { return None };
         if self.encode.split.is_some() {
@@ -338,7 +331,7 @@ impl Builder {
     /// # Errors
     /// The input has another number of primitives than the builder.
     pub fn steps(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
-        let mut chains = Builder::chains(&[Job { builder: self, input: *input, structure, scratch }])?;
+        let mut chains = Builder::chains(&[BuildJob { builder: self, input: *input, structure, scratch }])?;
         Ok(chains.pop().unwrap_or_default())
     }
 
@@ -347,8 +340,8 @@ impl Builder {
     ///
     /// # Errors
     /// An input has another number of primitives than its builder.
-    pub fn chains(jobs: &[Job<'_>]) -> Result<Vec<Vec<Step>>> {
-        let (small, large): (Vec<&Job<'_>>, Vec<&Job<'_>>) =
+    pub fn chains(jobs: &[BuildJob<'_>]) -> Result<Vec<Vec<Step>>> {
+        let (small, large): (Vec<&BuildJob<'_>>, Vec<&BuildJob<'_>>) =
             jobs.iter().partition(|job| job.builder.schedule == Schedule::Workgroup);
         let chains = large.iter().map(|job| job.builder.chain_of(job));
         let mut chains: Vec<Vec<Step>> = chains.collect::<Result<_>>()?;
@@ -361,7 +354,7 @@ impl Builder {
         self.method.hierarchy(&self.merging)
     }
 
-    fn chain_of(&self, job: &Job<'_>) -> Result<Vec<Step>> {
+    fn chain_of(&self, job: &BuildJob<'_>) -> Result<Vec<Step>> {
         let Builder { schedule, encode, workers, .. } = self;
         let (input, workers) = (&job.input, *workers);
         let scratch = &self.scratch(encode.table_words());

@@ -6,9 +6,9 @@ use crate::{Error, Result};
 
 /// Parts of split triangles, as leaves hold them: the record of each, and its leaf's box.
 #[derive(Debug, Default)]
-pub(super) struct Parts(Vec<(u32, Aabb)>);
+pub(super) struct SplitParts(Vec<(u32, Aabb)>);
 
-impl Parts {
+impl SplitParts {
     pub fn add(&mut self, record: usize, leaf: Aabb) {
         self.0.push((record as u32, leaf));
     }

@@ -5,12 +5,12 @@
 use super::codes::Codes;
 use super::geometry::{Geometry, Input, Planned, Primitives};
 use super::sah::Collapse;
-use super::scratch::Phase;
+use super::scratch::BuildPhase;
 use super::split::Split;
 use crate::Result;
 use crate::gpu::arguments;
 use crate::gpu::plan::Plan;
-use crate::gpu::radix_sort::{self, Shape};
+use crate::gpu::radix_sort::{self, SortShape};
 use crate::gpu::{Kernel, Step, shaders};
 
 /// The phases up to the sort, for one device, codes and number of primitives.
@@ -18,7 +18,7 @@ use crate::gpu::{Kernel, Step, shaders};
 pub(super) struct Encode {
     pub codes: Codes,
     pub collapse: Collapse,
-    pub shape: Shape,
+    pub shape: SortShape,
     /// Items of an invocation in a task.
     pub items: u32,
     /// The same where a dispatch of its own finds the bounds.
@@ -48,7 +48,7 @@ impl arguments::Build {
 
     /// The address of a part of the scratch memory.
     pub fn part(&self, at: u32) -> u64 {
-        self.scratch + Plan::<Phase>::UNIT * u64::from(at)
+        self.scratch + Plan::<BuildPhase>::UNIT * u64::from(at)
     }
 }
 
@@ -176,7 +176,7 @@ impl Encode {
         let reading = |phase, shader, groups| Step::new(phase, self.reading_kernel(shader, input), arguments, groups);
         let sort = radix_sort::Sort { count: self.count, bits: self.codes.bits, identity: true };
         let parts = arguments.parts;
-        let buffers = radix_sort::Buffers {
+        let buffers = radix_sort::SortBuffers {
             keys: parts.keys.map(|at| arguments.part(at)),
             values: parts.values.map(|at| arguments.part(at)),
             table: arguments.part(parts.table),

@@ -19,13 +19,13 @@ use std::ops::Range;
 /// What the device leaves behind, 12 bytes: areas, scaled by a power of two.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Figures {
+pub struct OverlapFigures {
     inner: f32,
     leaves: f32,
     surface: f32,
 }
 
-impl Figures {
+impl OverlapFigures {
     /// The end-point overlap with these costs of a step and of a test; `None` where there is no surface, or
     /// none in 32 bits beside the scene.
     pub fn epo(&self, c_t: f64, c_i: f64) -> Option<f64> {
@@ -39,7 +39,7 @@ const ADDED: u32 = 64;
 
 /// Measuring a `Bvh2` of so many triangles on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct OnDevice {
+pub struct OverlapPass {
     slots: u32,
     records: u32,
     workgroup: u32,
@@ -48,20 +48,20 @@ pub struct OnDevice {
 
 /// Device addresses of a structure and of the memory that measuring it takes, 16-byte aligned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Buffers {
+pub struct OverlapBuffers {
     /// The `Bvh2`.
     pub structure: u64,
-    /// [`OnDevice::scratch_bytes`] bytes.
+    /// [`OverlapPass::scratch_bytes`] bytes.
     pub scratch: u64,
-    /// [`Figures`], written.
+    /// [`OverlapFigures`], written.
     pub result: u64,
 }
 
-impl OnDevice {
+impl OverlapPass {
     /// For a structure with `primitive_count` records.
-    pub fn new(context: &Context, primitive_count: u32) -> OnDevice {
+    pub fn new(context: &Context, primitive_count: u32) -> OverlapPass {
         let (workgroup, rounds) = (context.tuning.small_group, context.tuning.measure_rounds);
-        OnDevice { slots: node_slots(primitive_count), records: primitive_count, workgroup, rounds }
+        OverlapPass { slots: node_slots(primitive_count), records: primitive_count, workgroup, rounds }
     }
 
     /// Bytes of scratch memory.
@@ -70,12 +70,12 @@ impl OnDevice {
         4 * (u64::from(self.slots) + u64::from(self.records)) + 12 * u64::from(sums)
     }
 
-    /// Records all of it: [`OnDevice::begin`], [`OnDevice::overlaps`] of all records, [`OnDevice::end`]. The caller places a
+    /// Records all of it: [`OverlapPass::begin`], [`OverlapPass::overlaps`] of all records, [`OverlapPass::end`]. The caller places a
     /// barrier before and one behind.
     ///
     /// # Errors
     /// A pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, buffers: &Buffers) -> Result<()> {
+    pub fn record(&self, recorder: &mut Recorder<'_>, buffers: &OverlapBuffers) -> Result<()> {
         self.begin(recorder, buffers)?;
         recorder.barrier();
         self.overlaps(recorder, buffers, 0..self.records)?;
@@ -87,30 +87,30 @@ impl OnDevice {
     ///
     /// # Errors
     /// A pipeline could not be made.
-    pub fn begin(&self, recorder: &mut Recorder<'_>, buffers: &Buffers) -> Result<()> {
+    pub fn begin(&self, recorder: &mut Recorder<'_>, buffers: &OverlapBuffers) -> Result<()> {
         fill::record(recorder, buffers.scratch, self.slots + self.records, u32::MAX)?;
         recorder.barrier();
         let kernel = Kernel::new(&shaders::BVH_EPO_PARENTS, self.workgroup, &[]);
         recorder.dispatch(&kernel, &self.arguments(buffers), self.tiles(self.slots))
     }
 
-    /// Records the overlaps of some records, behind [`OnDevice::begin`]: the part that takes time, so that it may be done a
+    /// Records the overlaps of some records, behind [`OverlapPass::begin`]: the part that takes time, so that it may be done a
     /// piece at a time. The caller places the barriers; pieces need none between them.
     ///
     /// # Errors
     /// A pipeline could not be made.
-    pub fn overlaps(&self, recorder: &mut Recorder<'_>, buffers: &Buffers, records: Range<u32>) -> Result<()> {
+    pub fn overlaps(&self, recorder: &mut Recorder<'_>, buffers: &OverlapBuffers, records: Range<u32>) -> Result<()> {
         let (first, count) = (records.start, records.len() as u32);
         let arguments = arguments::Epo { first, count, ..self.arguments(buffers) };
         let kernel = Kernel::new(&shaders::BVH_EPO_OVERLAPS, self.workgroup, &[]);
         recorder.dispatch(&kernel, &arguments, self.tiles(count))
     }
 
-    /// Records the sum of the overlaps of all records into the [`Figures`]. The caller places the barriers.
+    /// Records the sum of the overlaps of all records into the [`OverlapFigures`]. The caller places the barriers.
     ///
     /// # Errors
     /// A pipeline could not be made.
-    pub fn end(&self, recorder: &mut Recorder<'_>, buffers: &Buffers) -> Result<()> {
+    pub fn end(&self, recorder: &mut Recorder<'_>, buffers: &OverlapBuffers) -> Result<()> {
         let kernel = Kernel::new(&shaders::BVH_EPO_SUM, self.workgroup, &[]);
         let arguments = self.arguments(buffers);
         let room = [arguments.results, arguments.results + 12 * u64::from(self.records.div_ceil(ADDED))];
@@ -132,7 +132,7 @@ impl OnDevice {
         count.div_ceil(self.workgroup * self.rounds)
     }
 
-    fn arguments(&self, buffers: &Buffers) -> arguments::Epo {
+    fn arguments(&self, buffers: &OverlapBuffers) -> arguments::Epo {
         let sums = buffers.scratch + 4 * (u64::from(self.slots) + u64::from(self.records));
         arguments::Epo {
             structure: buffers.structure,

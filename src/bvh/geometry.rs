@@ -203,7 +203,7 @@ pub enum Primitives {
     Triangles,
     /// Boxes; records are [`super::layout::BoxRecord`]s.
     Boxes,
-    /// Instances or parts of them; records are [`super::layout::Instance`]s.
+    /// Instances or parts of them; records are [`super::layout::InstanceRecord`]s.
     Instances,
 }
 
@@ -213,7 +213,7 @@ impl Primitives {
         match self {
             Primitives::Triangles => size_of::<super::layout::Triangle>() as u64,
             Primitives::Boxes => size_of::<super::layout::BoxRecord>() as u64,
-            Primitives::Instances => size_of::<super::layout::Instance>() as u64,
+            Primitives::Instances => size_of::<super::layout::InstanceRecord>() as u64,
         }
     }
 }

@@ -7,7 +7,7 @@ use super::codes::Codes;
 use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
-use super::scratch::{Phase, Scratch};
+use super::scratch::{BuildPhase, Scratch};
 use crate::gpu::{Kernel, Step, arguments, shaders};
 
 /// What is a treelet of [`Method::Hlbvh`](super::builder::Method::Hlbvh).
@@ -69,17 +69,17 @@ impl Hierarchy for &Treelets {
     }
 
     fn plan(&self, encode: &Encode, scratch: &mut Scratch) {
-        scratch.take_weights(Phase::Hierarchy);
-        scratch.take_codes(Phase::Hierarchy);
+        scratch.take_weights(BuildPhase::Hierarchy);
+        scratch.take_codes(BuildPhase::Hierarchy);
         scratch.take_child_costs();
         scratch.take_sort();
-        scratch.take_clusters(Phase::Gather, Phase::Above);
+        scratch.take_clusters(BuildPhase::Gather, BuildPhase::Above);
         let top_costs = ["costs of left children above", "costs of right children above"];
-        scratch.parts.top_costs = top_costs.map(|name| scratch.take_words(name, Phase::Above, Phase::Above));
+        scratch.parts.top_costs = top_costs.map(|name| scratch.take_words(name, BuildPhase::Above, BuildPhase::Above));
         scratch.parts.orders = ["clusters of even levels", "clusters of odd levels"]
-            .map(|name| scratch.take_words(name, Phase::Gather, Phase::Top));
+            .map(|name| scratch.take_words(name, BuildPhase::Gather, BuildPhase::Top));
         scratch.take_tasks();
-        scratch.take_sums(encode.shape.workgroup, Phase::Gather);
-        scratch.take_ends(Phase::Gather);
+        scratch.take_sums(encode.shape.workgroup, BuildPhase::Gather);
+        scratch.take_ends(BuildPhase::Gather);
     }
 }

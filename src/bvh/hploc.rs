@@ -6,7 +6,7 @@
 use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
-use super::scratch::{Phase, Scratch};
+use super::scratch::{BuildPhase, Scratch};
 use crate::gpu::{Context, Kernel, Step, arguments, shaders};
 
 /// What [`Method::Hploc`](super::builder::Method::Hploc) looks at.
@@ -95,11 +95,11 @@ impl Hierarchy for &Merging {
     }
 
     fn plan(&self, _encode: &Encode, scratch: &mut Scratch) {
-        scratch.take_weights(Phase::Hierarchy);
-        scratch.take_codes(Phase::Hierarchy);
-        scratch.take_ends(Phase::Hierarchy);
+        scratch.take_weights(BuildPhase::Hierarchy);
+        scratch.take_codes(BuildPhase::Hierarchy);
+        scratch.take_ends(BuildPhase::Hierarchy);
         scratch.take_sort();
-        scratch.take_clusters(Phase::Hierarchy, Phase::Hierarchy);
-        scratch.parts.lists[0] = scratch.take_words("list of clusters", Phase::Hierarchy, Phase::Hierarchy);
+        scratch.take_clusters(BuildPhase::Hierarchy, BuildPhase::Hierarchy);
+        scratch.parts.lists[0] = scratch.take_words("list of clusters", BuildPhase::Hierarchy, BuildPhase::Hierarchy);
     }
 }

@@ -6,11 +6,11 @@
 //! | --- | --- | --- |
 //! | [`Header`] | 128 | 0 |
 //! | [`Node`] × `node_slots` | 64 each | [`NODES_OFFSET`] |
-//! | [`Record`] × `primitive_count` | 40, 28 or 128 each | behind the nodes: [`Sizes::records_offset`] |
+//! | [`Record`] × `primitive_count` | 40, 28 or 128 each | behind the nodes: [`BvhOffsets::records_offset`] |
 //! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | behind the records |
 //!
 //! A [`Child`] names either an inner node (`count` 0) or a leaf: `count` records from `index` on, in the *primitive order*,
-//! which is the order of the records: [`Triangle`]s, [`BoxRecord`]s or, of a top level, [`Instance`]s. A slot that no child
+//! which is the order of the records: [`Triangle`]s, [`BoxRecord`]s or, of a top level, [`InstanceRecord`]s. A slot that no child
 //! names is unused: the `count` of its left child is [`UNUSED`], and nothing else of it means anything. The slots from
 //! `active` − 1 on are unused.
 
@@ -213,7 +213,7 @@ impl Record for BoxRecord {
 /// An instance, or a part of one, in a top level. 128 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Instance {
+pub struct InstanceRecord {
     /// World to object, row by row.
     pub to_object: [[f32; 4]; 3],
     /// Object to world, row by row: as the caller gave it.
@@ -228,19 +228,19 @@ pub struct Instance {
     pub instance: u32,
     /// Where to begin in the bottom-level structure, if the instance was opened: a [`Child`]'s index.
     pub start: u32,
-    /// And its count; [`Instance::AT_ROOT`] where it was not opened.
+    /// And its count; [`InstanceRecord::AT_ROOT`] where it was not opened.
     pub start_count: u32,
     /// Zero.
     pub reserved: u32,
 }
 
-impl Instance {
+impl InstanceRecord {
     /// The `start_count` of an instance that begins at its structure's root, wherever that is: the structure may be replaced by
     /// a compacted copy.
     pub const AT_ROOT: u32 = u32::MAX;
 }
 
-impl Record for Instance {
+impl Record for InstanceRecord {
     const KIND: u32 = 0x0022_0003;
 
     fn primitive(&self) -> u32 {
@@ -252,8 +252,8 @@ impl Record for Instance {
     }
 
     /// Of no structure.
-    fn left_out(instance: u32) -> Instance {
-        Instance { instance, ..Zeroable::zeroed() }
+    fn left_out(instance: u32) -> InstanceRecord {
+        InstanceRecord { instance, ..Zeroable::zeroed() }
     }
 }
 
@@ -331,7 +331,7 @@ fn ratio(a: f32, b: f32) -> f32 {
 
 /// Where the parts of a structure lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sizes {
+pub struct BvhOffsets {
     /// Byte offset of the records.
     pub records_offset: u64,
     /// Byte offset of the table of geometries.
@@ -341,17 +341,17 @@ pub struct Sizes {
 }
 
 /// The sizes of a structure of so many records of `record_bytes` bytes with the most nodes that they can need.
-pub const fn sizes(record_bytes: u64, primitive_count: u32, geometry_count: u32) -> Sizes {
-    sizes_with(record_bytes, node_slots(primitive_count), primitive_count, geometry_count)
+pub const fn offsets(record_bytes: u64, primitive_count: u32, geometry_count: u32) -> BvhOffsets {
+    offsets_with(record_bytes, node_slots(primitive_count), primitive_count, geometry_count)
 }
 
 /// The sizes of a structure of so many node slots, records of `record_bytes` bytes, and geometries.
-pub const fn sizes_with(record_bytes: u64, node_slots: u32, primitive_count: u32, geometry_count: u32) -> Sizes {
+pub const fn offsets_with(record_bytes: u64, node_slots: u32, primitive_count: u32, geometry_count: u32) -> BvhOffsets {
     let records_offset = NODES_OFFSET + node_slots as u64 * size_of::<Node>() as u64;
     let geometries_offset = records_offset + primitive_count as u64 * record_bytes;
     let entries = if geometry_count > 1 { geometry_count as u64 } else { 0 };
     let bytes = geometries_offset + entries * size_of::<GeometryEntry>() as u64;
-    Sizes { records_offset, geometries_offset, bytes }
+    BvhOffsets { records_offset, geometries_offset, bytes }
 }
 
 /// Bytes of a record of this [`Record::KIND`]; `None` where there is no such kind.
@@ -359,7 +359,7 @@ pub const fn record_bytes(kind: u32) -> Option<u64> {
     match kind {
         Triangle::KIND => Some(size_of::<Triangle>() as u64),
         BoxRecord::KIND => Some(size_of::<BoxRecord>() as u64),
-        Instance::KIND => Some(size_of::<Instance>() as u64),
+        InstanceRecord::KIND => Some(size_of::<InstanceRecord>() as u64),
         _ => None,
     }
 }
@@ -370,8 +370,8 @@ pub const fn node_slots(primitive_count: u32) -> u32 {
 }
 
 const _: () = assert!(size_of::<Header>() == 128 && size_of::<Node>() == 64 && size_of::<Triangle>() == 40);
-const _: () = assert!(size_of::<BoxRecord>() == 28 && size_of::<Instance>() == 128);
-const _: () = assert!(BoxRecord::KIND & 0xFFFF == VERSION && Instance::KIND & 0xFFFF == VERSION);
+const _: () = assert!(size_of::<BoxRecord>() == 28 && size_of::<InstanceRecord>() == 128);
+const _: () = assert!(BoxRecord::KIND & 0xFFFF == VERSION && InstanceRecord::KIND & 0xFFFF == VERSION);
 
 /// The header that a structure's bytes begin with; the first two words of every one are [`MAGIC`] and the structure's kind.
 pub(crate) fn header_of<H: Pod>(bytes: &[u8], kind: u32) -> Result<H> {
@@ -408,18 +408,18 @@ impl<R: Record> Bvh2<R> {
     /// [`Error::InvalidStructure`] if the magic, kind or length is not that of a structure of such records.
     pub fn from_bytes(bytes: &[u8]) -> Result<Bvh2<R>> {
         let header: Header = header_of(bytes, R::KIND)?;
-        let sizes = header.sizes(size_of::<R>() as u64);
-        if (bytes.len() as u64) < sizes.bytes {
-            let (has, needs) = (bytes.len(), sizes.bytes);
+        let offsets = header.offsets(size_of::<R>() as u64);
+        if (bytes.len() as u64) < offsets.bytes {
+            let (has, needs) = (bytes.len(), offsets.bytes);
             let what = format!("{has} bytes, {} primitives need {needs}", header.primitive_count);
             return Err(Error::InvalidStructure(what));
         }
         let part = |from: u64, to: u64| &bytes[from as usize..to as usize];
         Ok(Bvh2 {
             header,
-            nodes: bytemuck::pod_collect_to_vec(part(NODES_OFFSET, sizes.records_offset)),
-            records: bytemuck::pod_collect_to_vec(part(sizes.records_offset, sizes.geometries_offset)),
-            geometries: bytemuck::pod_collect_to_vec(part(sizes.geometries_offset, sizes.bytes)),
+            nodes: bytemuck::pod_collect_to_vec(part(NODES_OFFSET, offsets.records_offset)),
+            records: bytemuck::pod_collect_to_vec(part(offsets.records_offset, offsets.geometries_offset)),
+            geometries: bytemuck::pod_collect_to_vec(part(offsets.geometries_offset, offsets.bytes)),
         })
     }
 
@@ -435,7 +435,7 @@ impl<R: Record> Bvh2<R> {
 
 impl Header {
     /// Where the parts of the structure lie, if its records have `record_bytes` bytes.
-    pub const fn sizes(&self, record_bytes: u64) -> Sizes {
-        sizes_with(record_bytes, self.node_slots, self.primitive_count, self.geometry_count)
+    pub const fn offsets(&self, record_bytes: u64) -> BvhOffsets {
+        offsets_with(record_bytes, self.node_slots, self.primitive_count, self.geometry_count)
     }
 }

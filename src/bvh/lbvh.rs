@@ -5,7 +5,7 @@
 use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
-use super::scratch::{Phase, Scratch};
+use super::scratch::{BuildPhase, Scratch};
 use crate::gpu::{Kernel, Step, arguments, shaders};
 
 pub(super) struct Lbvh;
@@ -23,8 +23,8 @@ impl Hierarchy for Lbvh {
 
     // As glsl/bvh/lbvh_workgroup.comp lays it out as well.
     fn plan(&self, _encode: &Encode, scratch: &mut Scratch) {
-        scratch.take_codes(Phase::Hierarchy);
-        scratch.take_ends(Phase::Hierarchy);
+        scratch.take_codes(BuildPhase::Hierarchy);
+        scratch.take_ends(BuildPhase::Hierarchy);
         scratch.take_sort();
         scratch.take_child_costs();
     }

@@ -3,7 +3,7 @@
 //! A chain of dispatches costs a small build more than its work; many small builds in a batch need no barriers between them and
 //! no memory for their arguments this way: two fit into the push constants.
 
-use super::builder::Job;
+use super::builder::BuildJob;
 use crate::Result;
 use crate::gpu::arguments::{self, BUILD_STATE_BYTES};
 use crate::gpu::{Kernel, Step, shaders};
@@ -13,12 +13,12 @@ use std::collections::HashMap;
 const AT_ONCE: usize = 2;
 
 /// The dispatches of the builds, which need no barrier between them.
-pub(super) fn steps(jobs: &[&Job<'_>]) -> Result<Vec<Step>> {
+pub(super) fn steps(jobs: &[&BuildJob<'_>]) -> Result<Vec<Step>> {
     // What fills the push constants together must be of one kind.
     let mut kinds: HashMap<(Kernel, u32, [u32; 2]), Vec<arguments::Small>> = HashMap::new();
     let mut order = Vec::new();
     for job in jobs {
-        let Job { builder, input, structure, scratch } = **job;
+        let BuildJob { builder, input, structure, scratch } = **job;
         let encode = &builder.encode;
         let (geometry, formats) = encode.checked(&input)?;
         let kernel = encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, &input);

@@ -6,7 +6,7 @@
 use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
-use super::scratch::{Phase, Scratch};
+use super::scratch::{BuildPhase, Scratch};
 use crate::gpu::{Kernel, Step, arguments, shaders};
 
 /// Clusters that one workgroup finishes in less time than rounds of all take.
@@ -96,14 +96,14 @@ impl Hierarchy for Ploc {
     }
 
     fn plan(&self, encode: &Encode, scratch: &mut Scratch) {
-        scratch.take_weights(Phase::Hierarchy);
-        scratch.take_codes(Phase::Sort);
-        scratch.take_ends(Phase::Encode);
+        scratch.take_weights(BuildPhase::Hierarchy);
+        scratch.take_codes(BuildPhase::Sort);
+        scratch.take_ends(BuildPhase::Encode);
         scratch.take_sort();
-        scratch.take_clusters(Phase::Hierarchy, Phase::Hierarchy);
+        scratch.take_clusters(BuildPhase::Hierarchy, BuildPhase::Hierarchy);
         scratch.parts.lists = ["clusters of even rounds", "clusters of odd rounds"]
-            .map(|name| scratch.take_words(name, Phase::Hierarchy, Phase::Hierarchy));
-        scratch.parts.nearest = scratch.take_words("nearest clusters", Phase::Hierarchy, Phase::Hierarchy);
-        scratch.take_sums(encode.shape.workgroup, Phase::Hierarchy);
+            .map(|name| scratch.take_words(name, BuildPhase::Hierarchy, BuildPhase::Hierarchy));
+        scratch.parts.nearest = scratch.take_words("nearest clusters", BuildPhase::Hierarchy, BuildPhase::Hierarchy);
+        scratch.take_sums(encode.shape.workgroup, BuildPhase::Hierarchy);
     }
 }

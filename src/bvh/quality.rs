@@ -39,7 +39,7 @@ impl Quality {
 /// What the device leaves behind, 36 bytes: `Figures` in quality.glsl. Areas are relative to that of the root.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Figures {
+pub struct QualityFigures {
     inner_area: f32,
     leaf_area: f32,
     inner: u32,
@@ -50,7 +50,7 @@ pub struct Figures {
     depth_max: u32,
 }
 
-impl Figures {
+impl QualityFigures {
     /// The figures with these costs of a step and of a test.
     pub fn quality(&self, c_t: f64, c_i: f64) -> Quality {
         let depths = f64::from(self.depth_sum[0]) + f64::from(self.depth_sum[1]) * 4_294_967_296.0;
@@ -69,19 +69,19 @@ impl Figures {
 
 /// Measuring a `Bvh2` of so many triangles on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct OnDevice {
+pub struct QualityPass {
     slots: u32,
     workgroup: u32,
     rounds: u32,
 }
 
-impl OnDevice {
+impl QualityPass {
     /// For a structure of `primitive_count` triangles.
-    pub fn new(context: &Context, primitive_count: u32) -> OnDevice {
+    pub fn new(context: &Context, primitive_count: u32) -> QualityPass {
         // Figures of every invocation lie in shared memory.
-        let most = context.limits.shared_memory / size_of::<Figures>() as u32;
+        let most = context.limits.shared_memory / size_of::<QualityFigures>() as u32;
         let (workgroup, rounds) = (context.tuning.group.min(most), context.tuning.measure_rounds);
-        OnDevice { slots: node_slots(primitive_count), workgroup, rounds }
+        QualityPass { slots: node_slots(primitive_count), workgroup, rounds }
     }
 
     fn tiles(&self) -> u32 {
@@ -90,10 +90,10 @@ impl OnDevice {
 
     /// Bytes of scratch memory.
     pub fn scratch_bytes(&self) -> u64 {
-        4 * u64::from(self.slots) + u64::from(self.tiles()) * size_of::<Figures>() as u64
+        4 * u64::from(self.slots) + u64::from(self.tiles()) * size_of::<QualityFigures>() as u64
     }
 
-    /// Records the measuring of the structure at `structure` into the [`Figures`] at `result`, with scratch memory at
+    /// Records the measuring of the structure at `structure` into the [`QualityFigures`] at `result`, with scratch memory at
     /// `scratch`; all addresses 16-byte aligned. The caller places a barrier before and one behind.
     ///
     /// # Errors

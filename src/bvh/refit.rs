@@ -8,7 +8,7 @@
 //! Where those rules are broken, nothing is: a primitive that can no longer be met (NaN, an index out of range) sets its bit of
 //! the status, which stays, and is met by no ray until an update brings it back.
 //!
-//! [`Refit::sizes`] tells the memory, [`Refit::record`] records into the caller's command buffer. The structure may be compacted,
+//! [`Refit::scratch_bytes`] tells the memory, [`Refit::record`] records into the caller's command buffer. The structure may be compacted,
 //! and its slots lie in any order: each record names its primitive, and each node its children. Nearness in memory is worth
 //! time, however: an invocation refits a run of slots, and what lies in one needs no other.
 //! [`Header::sah_growth`](super::layout::Header::sah_growth) tells afterwards how much worse the tree has become, which is when to
@@ -26,11 +26,11 @@ use std::collections::HashMap;
 
 /// What was built, beside the number of its primitives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct RefitOptions {
     /// The costs that it was built with; whether it was collapsed means nothing here.
     pub costs: Collapse,
     /// How the phases are recorded; `None` takes what measured faster for the size.
-    pub schedule: Option<Schedule>,
+    pub schedule: Option<RefitSchedule>,
     /// What it was built over.
     pub primitives: Primitives,
     /// How many geometries: what [`Source::Several`] has, otherwise 1.
@@ -39,9 +39,9 @@ pub struct Options {
     pub is_split: bool,
 }
 
-impl Options {
+impl RefitOptions {
     /// One geometry of triangles, the costs of [`Collapse::SAH`].
-    pub const DEFAULT: Options = Options {
+    pub const DEFAULT: RefitOptions = RefitOptions {
         costs: Collapse::SAH,
         schedule: None,
         primitives: Primitives::Triangles,
@@ -50,36 +50,27 @@ impl Options {
     };
 }
 
-impl Default for Options {
-    fn default() -> Options {
-        Options::DEFAULT
+impl Default for RefitOptions {
+    fn default() -> RefitOptions {
+        RefitOptions::DEFAULT
     }
 }
 
-impl From<&builder::Options> for Options {
+impl From<&builder::BuildOptions> for RefitOptions {
     /// For what was built with these.
-    fn from(built: &builder::Options) -> Options {
-        let &builder::Options { collapse, primitives, geometry_count, split, .. } = built;
-        Options { costs: collapse, schedule: None, primitives, geometry_count, is_split: split.is_some() }
+    fn from(built: &builder::BuildOptions) -> RefitOptions {
+        let &builder::BuildOptions { collapse, primitives, geometry_count, split, .. } = built;
+        RefitOptions { costs: collapse, schedule: None, primitives, geometry_count, is_split: split.is_some() }
     }
 }
 
 /// How the phases of a refit are recorded. The result is the same bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Schedule {
+pub enum RefitSchedule {
     /// A dispatch a phase, with a barrier between.
     Chain,
     /// One workgroup does both, in one dispatch: for few primitives.
     Workgroup,
-}
-
-/// Bytes that a refit needs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sizes {
-    /// Scratch, free again when the refit has run: 8 to 10 bytes a primitive.
-    pub scratch: u64,
-    /// Alignment of both addresses.
-    pub alignment: u64,
 }
 
 /// Refitting structures of so many primitives, specialised for one device.
@@ -87,14 +78,14 @@ pub struct Sizes {
 pub struct Refit {
     planned: Planned,
     costs: Collapse,
-    schedule: Schedule,
+    schedule: RefitSchedule,
     workgroup: u32,
     run: u32,
 }
 
 /// A refit with all that it is recorded with.
 #[derive(Debug, Clone, Copy)]
-pub struct Job<'a> {
+pub struct RefitJob<'a> {
     /// What for.
     pub refit: &'a Refit,
     /// The primitives as they are now.
@@ -113,21 +104,21 @@ impl Refit {
     ///
     /// # Errors
     /// More primitives than a structure can hold; split triangles.
-    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Result<Refit> {
+    pub fn new(context: &Context, options: &RefitOptions, primitive_count: u32) -> Result<Refit> {
         if primitive_count > radix_sort::MAX_COUNT {
             return Err(Error::Argument(format!(
                 "{primitive_count} primitives: a structure holds at most {}",
                 radix_sort::MAX_COUNT
             )));
         }
-        let &Options { costs, schedule, primitives, geometry_count, is_split } = options;
+        let &RefitOptions { costs, schedule, primitives, geometry_count, is_split } = options;
         if is_split {
             return Err(Error::Argument(
                 "a structure with split triangles cannot be updated; build it again, or build it without split".into(),
             ));
         }
         let (tuning, workgroup) = (&context.tuning.refit, context.tuning.group);
-        let of_count = if primitive_count <= tuning.small { Schedule::Workgroup } else { Schedule::Chain };
+        let of_count = if primitive_count <= tuning.small { RefitSchedule::Workgroup } else { RefitSchedule::Chain };
         let schedule = schedule.unwrap_or(of_count);
         let run = if primitive_count <= workgroup * tuning.run { tuning.short_run } else { tuning.run };
         let planned = Planned { primitives, primitive_count, geometry_count };
@@ -135,16 +126,16 @@ impl Refit {
     }
 
     /// The schedule that is used: the choice where none was given.
-    pub fn schedule(&self) -> Schedule {
+    pub fn schedule(&self) -> RefitSchedule {
         self.schedule
     }
 
     /// Bytes of the scratch memory: they suffice for refits of fewer primitives, too.
-    pub fn sizes(&self) -> Sizes {
+    pub fn scratch_bytes(&self) -> u64 {
         let slots = node_slots(self.planned.primitive_count);
         // The way up and a cost for each slot, two words for each run.
         let words = 2 * u64::from(slots) + 2 * u64::from(slots.div_ceil(self.run));
-        Sizes { scratch: (4 * words).next_multiple_of(16), alignment: 16 }
+        (4 * words).next_multiple_of(16)
     }
 
     fn kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
@@ -152,8 +143,8 @@ impl Refit {
         Kernel::new(shader, self.workgroup, &[self.run, 0, 0, 0, source])
     }
 
-    /// Records the refit of the structure at address `structure` to `input`, with scratch memory at address `scratch`, of the
-    /// bytes and alignment that [`Refit::sizes`] tells.
+    /// Records the refit of the structure at address `structure` to `input`, with [`Refit::scratch_bytes`] of scratch memory at address
+    /// `scratch`, both aligned to 16 bytes.
     ///
     /// The structure is one that was built over as many primitives with the same options, compacted or not; one that is not is
     /// left as it is. The caller makes input and structure visible to compute shaders before, and places a barrier (compute
@@ -171,7 +162,7 @@ impl Refit {
     /// # Errors
     /// The input has another number of primitives or geometries than was planned for.
     pub fn steps(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
-        let mut chains = Refit::chains(&[Job { refit: self, input: *input, structure, scratch }])?;
+        let mut chains = Refit::chains(&[RefitJob { refit: self, input: *input, structure, scratch }])?;
         Ok(chains.pop().unwrap_or_default())
     }
 
@@ -180,18 +171,18 @@ impl Refit {
     ///
     /// # Errors
     /// An input has another number of primitives or geometries than was planned for.
-    pub fn chains(jobs: &[Job<'_>]) -> Result<Vec<Vec<Step>>> {
+    pub fn chains(jobs: &[RefitJob<'_>]) -> Result<Vec<Vec<Step>>> {
         let mut chains = Vec::new();
         // What fills the push constants together must be of one kind.
         let mut kinds: HashMap<(Kernel, [u32; 2]), usize> = HashMap::new();
         let mut small: Vec<(Kernel, [f32; 2], Vec<arguments::Update>)> = Vec::new();
         for job in jobs {
             let update = job.update()?;
-            let Job { refit, input, .. } = job;
+            let RefitJob { refit, input, .. } = job;
             let costs = [refit.costs.c_t, refit.costs.c_i];
             match refit.schedule {
                 _ if update.primitive_count == 0 => {}
-                Schedule::Chain => {
+                RefitSchedule::Chain => {
                     let groups = update.primitive_count.div_ceil(refit.workgroup * refit.run);
                     let arguments = arguments_of(&[update], costs);
                     let step = |phase, shader| Step::new(phase, refit.kernel(shader, input), &arguments, groups);
@@ -200,7 +191,7 @@ impl Refit {
                         step("climb", &shaders::BVH_REFIT_CLIMB),
                     ]);
                 }
-                Schedule::Workgroup => {
+                RefitSchedule::Workgroup => {
                     let kernel = refit.kernel(&shaders::BVH_REFIT_WORKGROUP, input);
                     let at = *kinds.entry((kernel.clone(), costs.map(f32::to_bits))).or_insert_with(|| {
                         small.push((kernel.clone(), costs, Vec::new()));
@@ -227,9 +218,9 @@ fn arguments_of(given: &[arguments::Update], [c_t, c_i]: [f32; 2]) -> arguments:
     arguments::Refit { updates, c_t, c_i }
 }
 
-impl Job<'_> {
+impl RefitJob<'_> {
     fn update(&self) -> Result<arguments::Update> {
-        let Job { refit, input, structure, scratch } = *self;
+        let RefitJob { refit, input, structure, scratch } = *self;
         refit.planned.check(&input)?;
         let (geometry, formats) = input.for_kernels();
         Ok(arguments::Update {

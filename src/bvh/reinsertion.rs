@@ -15,7 +15,7 @@
 //!
 //! Paths of moves that are made have no node in common. That is the paper's conservative locking: gains add up, no cycle can come
 //! to be, and the area never grows. It lets fewer moves through than locking only the nodes whose links change. That is made up for
-//! by trying few links a round and more rounds ([`Options::stride`]): what was tried, with figures, is in docs/notes/optimisation.md.
+//! by trying few links a round and more rounds ([`ReinsertionOptions::stride`]): what was tried, with figures, is in docs/notes/optimisation.md.
 //!
 //! The leaves of the tree have one record each; collapsing comes behind it and makes leaves of whatever is deeper than tracers can
 //! walk. The twin is [`Bvh2::reinserted`](super::layout::Bvh2::reinserted): the same bytes.
@@ -28,7 +28,7 @@ use std::time::Duration;
 
 /// How much is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Options {
+pub struct ReinsertionOptions {
     /// How many rounds there are. Time grows with them.
     pub rounds: u32,
     /// Of so many links, one is tried in a round, another in each: so many rounds are a *pass*. Where there are few links both
@@ -36,25 +36,25 @@ pub struct Options {
     pub stride: u32,
 }
 
-impl Options {
+impl ReinsertionOptions {
     /// Every link once: most of what is to be had from a good tree.
-    pub const FAST: Options = Options::of_passes(1);
+    pub const FAST: ReinsertionOptions = ReinsertionOptions::of_passes(1);
     /// Every link twice.
-    pub const MEDIUM: Options = Options::of_passes(2);
+    pub const MEDIUM: ReinsertionOptions = ReinsertionOptions::of_passes(2);
     /// Every link six times: little more is to be had from there on.
-    pub const HIGH: Options = Options::of_passes(6);
+    pub const HIGH: ReinsertionOptions = ReinsertionOptions::of_passes(6);
 
     /// So many passes, of 64 rounds each where there are enough links.
-    pub const fn of_passes(passes: u32) -> Options {
-        Options { rounds: passes.saturating_mul(STRIDE), stride: STRIDE }
+    pub const fn of_passes(passes: u32) -> ReinsertionOptions {
+        ReinsertionOptions { rounds: passes.saturating_mul(STRIDE), stride: STRIDE }
     }
 
-    /// As many rounds as there is time for in `budget`, if a pass over the same structure takes `pass`: what [`Options::FAST`] took.
-    /// Rounds of [`Options::HIGH`] at most, and possibly none.
-    pub fn within(budget: Duration, pass: Duration) -> Options {
+    /// As many rounds as there is time for in `budget`, if a pass over the same structure takes `pass`: what [`ReinsertionOptions::FAST`] took.
+    /// Rounds of [`ReinsertionOptions::HIGH`] at most, and possibly none.
+    pub fn within(budget: Duration, pass: Duration) -> ReinsertionOptions {
         // A ratio of floats; one that is not a number is none.
         let rounds = f64::from(STRIDE) * budget.as_secs_f64() / pass.as_secs_f64();
-        Options { rounds: (rounds as u32).min(Options::HIGH.rounds), stride: STRIDE }
+        ReinsertionOptions { rounds: (rounds as u32).min(ReinsertionOptions::HIGH.rounds), stride: STRIDE }
     }
 
     /// Of so many links, one is tried in a round of a structure with these node slots: in a round at least [`LEAST_LINKS`].
@@ -69,7 +69,7 @@ impl Options {
     }
 }
 
-/// Of [`Options::of_passes`].
+/// Of [`ReinsertionOptions::of_passes`].
 const STRIDE: u32 = 64;
 /// Links that are not worth a round of less.
 const LEAST_LINKS: u32 = 128;
@@ -99,7 +99,7 @@ pub struct Reinsertion {
 
 impl Reinsertion {
     /// For structures of `primitive_count` primitives.
-    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Reinsertion {
+    pub fn new(context: &Context, options: &ReinsertionOptions, primitive_count: u32) -> Reinsertion {
         let tuning = &context.tuning;
         // As many invocations as the grid has, in workgroups small enough for their stacks.
         let groups = tuning.grid.groups * (tuning.grid.workgroup / tuning.small_group).max(1);
@@ -176,19 +176,21 @@ mod tests {
 
     #[test]
     fn a_budget_has_the_rounds_that_there_is_time_for() {
-        let within = |budget, pass| Options::within(Duration::from_millis(budget), Duration::from_millis(pass)).rounds;
+        let within = |budget, pass| {
+            ReinsertionOptions::within(Duration::from_millis(budget), Duration::from_millis(pass)).rounds
+        };
         assert_eq!((within(50, 100), within(101, 100), within(1, 100)), (32, 64, 0));
-        assert_eq!(within(10_000, 100), Options::HIGH.rounds);
+        assert_eq!(within(10_000, 100), ReinsertionOptions::HIGH.rounds);
         // Where a pass is shorter than the clock's tick.
-        assert_eq!((within(0, 0), within(1, 0)), (0, Options::HIGH.rounds));
+        assert_eq!((within(0, 0), within(1, 0)), (0, ReinsertionOptions::HIGH.rounds));
     }
 
     #[test]
     fn a_pass_of_few_links_has_fewer_rounds() {
         let slots = 640;
-        assert_eq!((Options::FAST.stride_for(slots), Options::FAST.rounds_for(slots)), (10, 10));
-        assert_eq!(Options { rounds: 32, stride: 64 }.rounds_for(slots), 5);
-        assert_eq!(Options { rounds: 33, stride: 64 }.rounds_for(slots), 6);
-        assert_eq!(Options::of_passes(u32::MAX).rounds_for(2), u32::MAX / 64 + 1);
+        assert_eq!((ReinsertionOptions::FAST.stride_for(slots), ReinsertionOptions::FAST.rounds_for(slots)), (10, 10));
+        assert_eq!(ReinsertionOptions { rounds: 32, stride: 64 }.rounds_for(slots), 5);
+        assert_eq!(ReinsertionOptions { rounds: 33, stride: 64 }.rounds_for(slots), 6);
+        assert_eq!(ReinsertionOptions::of_passes(u32::MAX).rounds_for(2), u32::MAX / 64 + 1);
     }
 }

@@ -2,13 +2,13 @@
 
 use super::encode::Encode;
 use super::method::Hierarchy;
-use super::split::Reference;
+use super::split::SplitReference;
 use crate::gpu::arguments::{self, BUILD_STATE_BYTES, BuildParts};
 use crate::gpu::plan::Plan;
 
 /// The phases of a build, as far as memory is used in one and free in the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Phase {
+pub(super) enum BuildPhase {
     /// Triangles become references.
     Split,
     /// Bounds and codes.
@@ -39,7 +39,7 @@ const WEIGHTS_BYTES: u64 = 16;
 /// The plan of a build's scratch memory.
 #[derive(Debug, Clone)]
 pub(super) struct Scratch {
-    plan: Plan<Phase>,
+    plan: Plan<BuildPhase>,
     /// What kernels are given.
     pub parts: BuildParts,
     /// Where the splitting counts: for each triangle, and for tiles of them.
@@ -69,23 +69,25 @@ impl Scratch {
             table_bytes: 4 * table_words,
             sorted: encode.passes() as usize % 2,
         };
-        scratch.plan.take("state", BUILD_STATE_BYTES, Phase::Encode..=Phase::Records);
+        scratch.plan.take("state", BUILD_STATE_BYTES, BuildPhase::Encode..=BuildPhase::Records);
         scratch.take_split(encode);
         scratch.parts.values[scratch.sorted] =
-            scratch.plan.take("sorted values", 4 * count, Phase::Encode..=Phase::Records);
+            scratch.plan.take("sorted values", 4 * count, BuildPhase::Encode..=BuildPhase::Records);
         method.plan(encode, &mut scratch);
         if let Some(bytes) = reinsertion {
-            scratch.reinsertion = scratch.plan.take("reinsertion", bytes, Phase::Optimise..=Phase::Optimise);
+            scratch.reinsertion = scratch.plan.take("reinsertion", bytes, BuildPhase::Optimise..=BuildPhase::Optimise);
             if !method.writes_weights() {
-                scratch.take_weights(Phase::Weigh);
+                scratch.take_weights(BuildPhase::Weigh);
             }
-            scratch.parts.costs = scratch.take_words("costs", Phase::Weigh, Phase::Weigh);
-            scratch.parts.arrivals = scratch.take_words("arrivals", Phase::Weigh, Phase::Weigh);
+            scratch.parts.costs = scratch.take_words("costs", BuildPhase::Weigh, BuildPhase::Weigh);
+            scratch.parts.arrivals = scratch.take_words("arrivals", BuildPhase::Weigh, BuildPhase::Weigh);
         }
         if reinsertion.is_some() || method.writes_weights() {
-            scratch.parts.large_firsts = scratch.take_words("first records of large nodes", Phase::Place, Phase::Place);
-            scratch.parts.large_depths = scratch.take_words("depths of large nodes", Phase::Place, Phase::Place);
-            scratch.parts.walk = scratch.take_words("order of the walk", Phase::Place, Phase::Records);
+            scratch.parts.large_firsts =
+                scratch.take_words("first records of large nodes", BuildPhase::Place, BuildPhase::Place);
+            scratch.parts.large_depths =
+                scratch.take_words("depths of large nodes", BuildPhase::Place, BuildPhase::Place);
+            scratch.parts.walk = scratch.take_words("order of the walk", BuildPhase::Place, BuildPhase::Records);
         }
         scratch
     }
@@ -95,38 +97,38 @@ impl Scratch {
     }
 
     /// A word for each primitive.
-    pub fn take_words(&mut self, name: &'static str, from: Phase, to: Phase) -> u32 {
+    pub fn take_words(&mut self, name: &'static str, from: BuildPhase, to: BuildPhase) -> u32 {
         self.plan.take(name, 4 * self.count, from..=to)
     }
 
     fn take_split(&mut self, encode: &Encode) {
         let Some(split) = encode.split else { return };
         let plan = &mut self.plan;
-        let references = size_of::<Reference>() as u64 * self.count;
-        self.parts.references = plan.take("references", references, Phase::Split..=Phase::Records);
-        self.parts.split = plan.take("splitting", arguments::SPLIT_STATE_BYTES, Phase::Split..=Phase::Encode);
-        self.split_counts = plan.take("splits", 4 * u64::from(split.primitives), Phase::Split..=Phase::Split);
-        self.split_sums = plan.take("splits of tiles", split.sums_bytes(), Phase::Split..=Phase::Split);
+        let references = size_of::<SplitReference>() as u64 * self.count;
+        self.parts.references = plan.take("references", references, BuildPhase::Split..=BuildPhase::Records);
+        self.parts.split = plan.take("splitting", arguments::SPLIT_STATE_BYTES, BuildPhase::Split..=BuildPhase::Encode);
+        self.split_counts = plan.take("splits", 4 * u64::from(split.primitives), BuildPhase::Split..=BuildPhase::Split);
+        self.split_sums = plan.take("splits of tiles", split.sums_bytes(), BuildPhase::Split..=BuildPhase::Split);
     }
 
     /// What the tree is finished by, from the phase on that writes it.
-    pub fn take_weights(&mut self, from: Phase) {
-        self.parts.weights = self.plan.take("weights", WEIGHTS_BYTES * self.count, from..=Phase::Records);
+    pub fn take_weights(&mut self, from: BuildPhase) {
+        self.parts.weights = self.plan.take("weights", WEIGHTS_BYTES * self.count, from..=BuildPhase::Records);
     }
 
     /// The codes in order, in use up to a phase.
-    pub fn take_codes(&mut self, to: Phase) {
-        self.parts.keys[self.sorted] = self.plan.take("sorted keys", self.key_bytes, Phase::Encode..=to);
+    pub fn take_codes(&mut self, to: BuildPhase) {
+        self.parts.keys[self.sorted] = self.plan.take("sorted keys", self.key_bytes, BuildPhase::Encode..=to);
     }
 
     /// Where climbs of the radix tree meet, in use up to a phase. Encoding writes it.
-    pub fn take_ends(&mut self, to: Phase) {
-        self.parts.ends = self.take_words("ends", Phase::Encode, to);
+    pub fn take_ends(&mut self, to: BuildPhase) {
+        self.parts.ends = self.take_words("ends", BuildPhase::Encode, to);
     }
 
     /// What the sort alone uses.
     pub fn take_sort(&mut self) {
-        let life = || Phase::Encode..=Phase::Sort;
+        let life = || BuildPhase::Encode..=BuildPhase::Sort;
         self.parts.keys[1 - self.sorted] = self.plan.take("other keys", self.key_bytes, life());
         self.parts.values[1 - self.sorted] = self.plan.take("other values", 4 * self.count, life());
         self.parts.table = self.plan.take("table", self.table_bytes, life());
@@ -135,20 +137,20 @@ impl Scratch {
     /// Costs of left and right children in climbs of the radix tree.
     pub fn take_child_costs(&mut self) {
         self.parts.child_costs = ["costs of left children", "costs of right children"]
-            .map(|name| self.take_words(name, Phase::Hierarchy, Phase::Hierarchy));
+            .map(|name| self.take_words(name, BuildPhase::Hierarchy, BuildPhase::Hierarchy));
     }
 
-    pub fn take_clusters(&mut self, from: Phase, to: Phase) {
+    pub fn take_clusters(&mut self, from: BuildPhase, to: BuildPhase) {
         self.parts.clusters = self.plan.take("clusters", CLUSTER_BYTES * self.count, from..=to);
     }
 
     /// The tasks of two levels of the top; a task has two treelets at least.
     pub fn take_tasks(&mut self) {
-        self.parts.tasks = self.plan.take("tasks", TASK_BYTES * self.count, Phase::Top..=Phase::Top);
+        self.parts.tasks = self.plan.take("tasks", TASK_BYTES * self.count, BuildPhase::Top..=BuildPhase::Top);
     }
 
     /// A sum for each tile, of which the smallest has `workgroup` items.
-    pub fn take_sums(&mut self, workgroup: u32, phase: Phase) {
+    pub fn take_sums(&mut self, workgroup: u32, phase: BuildPhase) {
         self.parts.sums = self.plan.take("sums of tiles", 4 * self.count.div_ceil(workgroup.into()), phase..=phase);
     }
 }
@@ -160,13 +162,13 @@ mod tests {
     use crate::bvh::codes::Code;
     use crate::bvh::hploc::Merging;
     use crate::bvh::sah::Collapse;
-    use crate::gpu::radix_sort::Shape;
+    use crate::gpu::radix_sort::SortShape;
 
     fn encode(count: u32, bits: u32, workgroup: u32) -> Encode {
         Encode {
             codes: Code::Emc64Var.full().with_bits(bits),
             collapse: Collapse::SAH,
-            shape: Shape::strips_of(workgroup),
+            shape: SortShape::strips_of(workgroup),
             items: 4,
             bounds_items: 4,
             meets_in_group: false,

@@ -28,17 +28,17 @@ use bytemuck::{Pod, Zeroable};
 
 /// How much may be split.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
-    /// Splits, at most, as a part of the primitives: 0 to [`Options::MOST_FRACTION`]. Structure and scratch memory grow by as much.
+pub struct SplitOptions {
+    /// Splits, at most, as a part of the primitives: 0 to [`SplitOptions::MOST_FRACTION`]. Structure and scratch memory grow by as much.
     pub fraction: f32,
-    /// Splits of one triangle, at most: 1 to [`Options::MOST_SPLITS`].
+    /// Splits of one triangle, at most: 1 to [`SplitOptions::MOST_SPLITS`].
     pub most: u32,
 }
 
-impl Options {
+impl SplitOptions {
     /// The paper's 30% more references than triangles, at most; and at most 7 splits of each, which measured well
     /// (docs/notes/splitting.md).
-    pub const DEFAULT: Options = Options { fraction: 0.3, most: 7 };
+    pub const DEFAULT: SplitOptions = SplitOptions { fraction: 0.3, most: 7 };
     /// As many splits as triangles.
     pub const MOST_FRACTION: f32 = 1.0;
     /// What the budget alone bounds, as the paper has it, but for this.
@@ -52,34 +52,34 @@ impl Options {
     /// # Errors
     /// A fraction or a number of splits out of range.
     pub fn check(&self) -> Result<()> {
-        if !(0.0..=Options::MOST_FRACTION).contains(&self.fraction) {
+        if !(0.0..=SplitOptions::MOST_FRACTION).contains(&self.fraction) {
             return Err(Error::Argument(format!(
                 "split by {}: the fraction of splits is 0 to {}",
                 self.fraction,
-                Options::MOST_FRACTION
+                SplitOptions::MOST_FRACTION
             )));
         }
-        if !(1..=Options::MOST_SPLITS).contains(&self.most) {
+        if !(1..=SplitOptions::MOST_SPLITS).contains(&self.most) {
             return Err(Error::Argument(format!(
                 "at most {} splits of a triangle: that is 1 to {}",
                 self.most,
-                Options::MOST_SPLITS
+                SplitOptions::MOST_SPLITS
             )));
         }
         Ok(())
     }
 }
 
-impl Default for Options {
-    fn default() -> Options {
-        Options::DEFAULT
+impl Default for SplitOptions {
+    fn default() -> SplitOptions {
+        SplitOptions::DEFAULT
     }
 }
 
 /// A part of a triangle: what a leaf of a split tree holds. 32 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Reference {
+pub struct SplitReference {
     /// Least corner of a box that the part is in.
     pub lo: [f32; 3],
     /// The triangle; `u32::MAX` where there is no such part.
@@ -100,7 +100,7 @@ pub(super) struct Split {
 }
 
 impl Split {
-    pub fn new(context: &Context, options: &Options, primitives: u32) -> Split {
+    pub fn new(context: &Context, options: &SplitOptions, primitives: u32) -> Split {
         Split { primitives, most: options.most, scan: Scan::new(context, primitives) }
     }
 
@@ -144,7 +144,7 @@ impl Split {
         };
         let step = |shader, groups| Step::new("split", encode.unsplit_kernel(shader, input), &arguments, groups);
         let tiles = encode.tiles_of(self.primitives);
-        let scanned = scan::Buffers { values: counts, results: counts, sums };
+        let scanned = scan::ScanBuffers { values: counts, results: counts, sums };
         let before_scan = [
             step(&shaders::BVH_SPLIT_RESET, 1),
             step(&shaders::BVH_SPLIT_BOUNDS, tiles),

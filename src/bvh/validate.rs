@@ -1,7 +1,7 @@
 //! Walks a structure on the host and says what is wrong and where.
 
-use super::cover::Parts;
-use super::layout::{Bvh2, Child, Header, Instance, MAX_DEPTH, Record, node_slots};
+use super::cover::SplitParts;
+use super::layout::{Bvh2, Child, Header, InstanceRecord, MAX_DEPTH, Record, node_slots};
 use super::twin::split::around_parts;
 use crate::geometry::Aabb;
 use crate::{Error, Result};
@@ -30,7 +30,7 @@ impl<R: Record> Bvh2<R> {
 
         let mut in_leaf = vec![false; header.active as usize];
         let mut visited = vec![false; self.nodes.len()];
-        let mut parts = Parts::default();
+        let mut parts = SplitParts::default();
         // What is left to see: a child, its depth, and the node that names it.
         let mut stack = vec![(header.root, 0, None::<u32>)];
         while let Some((child, depth, parent)) = stack.pop() {
@@ -125,7 +125,7 @@ impl<R: Record> Bvh2<R> {
     /// split, every primitive at least once, as long as all records are there.
     fn validate_primitives(&self) -> Result<()> {
         let Header { kind, split_from, active, .. } = self.header;
-        if kind == Instance::KIND {
+        if kind == InstanceRecord::KIND {
             return Ok(());
         }
         if split_from != 0 {

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 /// A part of the memory.
 #[derive(Debug, Clone)]
-pub(crate) struct Part<P> {
+pub(crate) struct PlannedPart<P> {
     #[cfg_attr(not(test), expect(dead_code, reason = "tests say which parts share bytes"))]
     name: &'static str,
     life: RangeInclusive<P>,
@@ -12,7 +12,7 @@ pub(crate) struct Part<P> {
     bytes: u64,
 }
 
-impl<P: Ord> Part<P> {
+impl<P: Ord> PlannedPart<P> {
     /// Whether there is a phase in which both are in use.
     fn lives_with(&self, life: &RangeInclusive<P>) -> bool {
         self.life.start() <= life.end() && life.start() <= self.life.end()
@@ -26,7 +26,7 @@ impl<P: Ord> Part<P> {
 /// Parts of some memory and where they lie. `P` are the phases, in order.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan<P> {
-    parts: Vec<Part<P>>,
+    parts: Vec<PlannedPart<P>>,
 }
 
 impl<P: Copy + Ord + std::fmt::Debug> Plan<P> {
@@ -44,14 +44,14 @@ impl<P: Copy + Ord + std::fmt::Debug> Plan<P> {
     /// No part is empty: some drivers load what is at the same address for all lanes even where no lane is active.
     pub fn take(&mut self, name: &'static str, bytes: u64, life: RangeInclusive<P>) -> u32 {
         let with = self.parts.iter().filter(|part| part.lives_with(&life));
-        let at = with.map(Part::end).max().unwrap_or(0);
-        self.parts.push(Part { name, life, at, bytes: bytes.max(1).next_multiple_of(Self::UNIT) });
+        let at = with.map(PlannedPart::end).max().unwrap_or(0);
+        self.parts.push(PlannedPart { name, life, at, bytes: bytes.max(1).next_multiple_of(Self::UNIT) });
         u32::try_from(at / Self::UNIT).expect("memory has less than 64 GiB")
     }
 
     /// Bytes of all of it.
     pub fn bytes(&self) -> u64 {
-        self.parts.iter().map(Part::end).max().unwrap_or(0)
+        self.parts.iter().map(PlannedPart::end).max().unwrap_or(0)
     }
 
     /// Bytes that are in use in the phase that uses most: what no plan is smaller than.

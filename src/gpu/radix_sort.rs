@@ -8,7 +8,7 @@ use crate::Result;
 
 /// How the sort is cut for a device: what the pipelines are specialised with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shape {
+pub struct SortShape {
     /// Invocations a workgroup.
     pub workgroup: u32,
     /// Bits a pass sorts by.
@@ -24,50 +24,56 @@ pub struct Shape {
 /// Digits whose counts of a tile are scanned together: `SCANNED_TOGETHER` in radix_sort.glsl.
 const SCANNED_TOGETHER: u32 = 8;
 
-impl Shape {
+impl SortShape {
     /// What suits the device: strips on a CPU, tiles on a GPU.
-    pub fn of(context: &Context) -> Shape {
+    pub fn of(context: &Context) -> SortShape {
         context.tuning.sort
     }
 
     /// A strip of keys for each invocation, which counts alone: for CPUs, where an invocation is a lane of a loop.
-    pub fn strips(limits: &Limits) -> Shape {
+    pub fn strips(limits: &Limits) -> SortShape {
         /// A lane's counters take 1 KiB of shared memory.
         const MOST: u32 = 8;
-        Shape::strips_of(limits.subgroup_size.min(MOST))
+        SortShape::strips_of(limits.subgroup_size.min(MOST))
     }
 
     /// The same with workgroups of so many invocations.
-    pub(crate) fn strips_of(workgroup: u32) -> Shape {
-        Shape { workgroup, digit_bits: 8, private_counters: true, subgroups: 0, rows: 0 }
+    pub(crate) fn strips_of(workgroup: u32) -> SortShape {
+        SortShape { workgroup, digit_bits: 8, private_counters: true, subgroups: 0, rows: 0 }
     }
 
     /// The same for GPUs whose subgroups may be smaller than they report: small digits, so that a workgroup has many strips.
-    pub fn many_strips(limits: &Limits) -> Shape {
+    pub fn many_strips(limits: &Limits) -> SortShape {
         let workgroup = limits.workgroup_invocations.min(64);
-        Shape { workgroup, digit_bits: 4, private_counters: true, subgroups: 0, rows: 0 }
+        SortShape { workgroup, digit_bits: 4, private_counters: true, subgroups: 0, rows: 0 }
     }
 
     /// A tile of keys for each workgroup, ranked by ballots: for GPUs whose subgroups have the size that they report.
     ///
     /// A subgroup's counters take 1 KiB of shared memory; the keys of a tile, a word of each, lie there afterwards. Of what a
     /// small device has, half is left to others.
-    pub fn tiles(limits: &Limits) -> Shape {
+    pub fn tiles(limits: &Limits) -> SortShape {
         const SMALL: u32 = 32 << 10;
         let (most_subgroups, rows) = if limits.shared_memory < SMALL { (4, 8) } else { (8, 16) };
         let most_lanes = limits.workgroup_invocations.min(256);
         let subgroups = (most_lanes / limits.subgroup_size).clamp(1, most_subgroups);
-        Shape { workgroup: subgroups * limits.subgroup_size, digit_bits: 8, private_counters: false, subgroups, rows }
+        SortShape {
+            workgroup: subgroups * limits.subgroup_size,
+            digit_bits: 8,
+            private_counters: false,
+            subgroups,
+            rows,
+        }
     }
 
     /// The same with digits of other bits: fewer for few keys, whose passes are short beside the table.
-    pub fn with_digit_bits(self, digit_bits: u32) -> Shape {
-        Shape { digit_bits, ..self }
+    pub fn with_digit_bits(self, digit_bits: u32) -> SortShape {
+        SortShape { digit_bits, ..self }
     }
 
     /// The same with short tiles: for kernels that hold all phases, which compilers are slow with.
-    pub(crate) fn with_short_tiles(self) -> Shape {
-        Shape { rows: self.rows.min(4), ..self }
+    pub(crate) fn with_short_tiles(self) -> SortShape {
+        SortShape { rows: self.rows.min(4), ..self }
     }
 
     /// Bytes of shared memory that it takes of a workgroup.
@@ -136,12 +142,12 @@ pub const MAX_COUNT: u32 = 1 << 27;
 
 /// Device addresses of one sort. Keys are 4 bytes each, or 8 (low word first) where `bits > 32`; values are 4 bytes each.
 #[derive(Debug, Clone, Copy)]
-pub struct Buffers {
+pub struct SortBuffers {
     /// Keys and values to sort; overwritten.
     pub keys: [u64; 2],
     /// Room for keys and values, `count` each; [`record`] tells in which of the two the result is.
     pub values: [u64; 2],
-    /// [`Shape::table_words`] words.
+    /// [`SortShape::table_words`] words.
     pub table: u64,
 }
 
@@ -165,7 +171,7 @@ pub struct Sort {
 ///
 /// # Panics
 /// The count is over [`MAX_COUNT`], or the bits over 64.
-pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, buffers: &Buffers, sort: &Sort) -> Result<usize> {
+pub fn record(recorder: &mut Recorder<'_>, shape: &SortShape, buffers: &SortBuffers, sort: &Sort) -> Result<usize> {
     let steps = steps(shape, buffers, sort);
     let passes = steps.len() / STEPS_OF_A_PASS;
     recorder.chains(&[steps])?;
@@ -179,7 +185,7 @@ pub(crate) const STEPS_OF_A_PASS: usize = 3;
 ///
 /// # Panics
 /// The count is over [`MAX_COUNT`], or the bits over 64.
-pub(crate) fn steps(shape: &Shape, buffers: &Buffers, sort: &Sort) -> Vec<Step> {
+pub(crate) fn steps(shape: &SortShape, buffers: &SortBuffers, sort: &Sort) -> Vec<Step> {
     let Sort { count, bits, identity } = *sort;
     assert!(count <= MAX_COUNT && bits <= 64, "{count} keys of {bits} bits");
     if count < 2 {

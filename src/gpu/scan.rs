@@ -19,7 +19,7 @@ pub struct Scan {
 /// Device addresses of one scan, 4-byte aligned.
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub struct Buffers {
+pub struct ScanBuffers {
     /// The words.
     pub values: u64,
     /// Where the scan goes: as many words; may be `values`.
@@ -54,7 +54,7 @@ impl Scan {
     ///
     /// # Errors
     /// A pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, buffers: &Buffers) -> Result<()> {
+    pub fn record(&self, recorder: &mut Recorder<'_>, buffers: &ScanBuffers) -> Result<()> {
         let arguments = self.arguments(buffers);
         for (i, (kernel, groups)) in self.dispatches().into_iter().enumerate() {
             if i > 0 {
@@ -66,12 +66,12 @@ impl Scan {
     }
 
     /// The three dispatches in the phase `phase`.
-    pub(crate) fn steps(&self, phase: &'static str, buffers: &Buffers) -> Vec<Step> {
+    pub(crate) fn steps(&self, phase: &'static str, buffers: &ScanBuffers) -> Vec<Step> {
         let arguments = self.arguments(buffers);
         self.dispatches().map(|(kernel, groups)| Step::new(phase, kernel, &arguments, groups)).into()
     }
 
-    fn arguments(&self, &Buffers { values, results, sums }: &Buffers) -> arguments::Scan {
+    fn arguments(&self, &ScanBuffers { values, results, sums }: &ScanBuffers) -> arguments::Scan {
         arguments::Scan { values, results, sums, count: self.count, rounds: self.rounds }
     }
 

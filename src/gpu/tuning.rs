@@ -3,7 +3,7 @@
 //! A pass reads a field of [`Tuning`]; no pass asks what the device is. What would change bytes (the window of H-PLOC, code bits, the
 //! width of nodes) is an option of its builder, with one default everywhere.
 
-use super::radix_sort::Shape;
+use super::radix_sort::SortShape;
 use super::{Grid, Limits};
 use ash::vk;
 use std::fmt;
@@ -65,7 +65,7 @@ pub struct Tuning {
     /// Wide nodes up to which one workgroup opens all levels of a tree: a dispatch a level costs more.
     pub wide_alone: u32,
     /// The radix sort's cut.
-    pub sort: Shape,
+    pub sort: SortShape,
     /// Builds.
     pub build: BuildTuning,
     /// Refits.
@@ -183,7 +183,7 @@ impl Tuning {
             measure_rounds: 64,
             in_registers: false,
             wide_alone: 256,
-            sort: Shape::strips(limits),
+            sort: SortShape::strips(limits),
             build: BuildTuning {
                 run: 32,
                 // The bunny's hierarchy takes 0.85 times as long with 128 as with 32 by LBVH and by H-PLOC, and no less with 256.
@@ -240,7 +240,7 @@ impl Tuning {
             in_registers: true,
             wide_alone: 1024,
             // Tiles count on the subgroups that they were cut for.
-            sort: if limits.subgroup_is_exact { Shape::tiles(limits) } else { Shape::many_strips(limits) },
+            sort: if limits.subgroup_is_exact { SortShape::tiles(limits) } else { SortShape::many_strips(limits) },
             build: BuildTuning {
                 run: 1,
                 long_run: 1,

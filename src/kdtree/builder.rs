@@ -1,8 +1,8 @@
 //! kd-trees built on the device in the caller's command buffer and memory: `kd-gpu`.
 //!
-//! [`Builder::sizes`] tells the memory, [`Builder::record`] records the build. How many references and nodes a tree has shows only
-//! when it is built, so the sizes go by an [`Estimate`]; where that was too little, nodes are leaves, the status says so
-//! ([`OUT_OF_ROOM`](crate::bvh::layout::status::OUT_OF_ROOM)), and the [`Report`] says what would have been enough.
+//! [`KdBuilder::sizes`] tells the memory, [`KdBuilder::record`] records the build. How many references and nodes a tree has shows only
+//! when it is built, so the sizes go by an [`KdEstimate`]; where that was too little, nodes are leaves, the status says so
+//! ([`OUT_OF_ROOM`](crate::bvh::layout::status::OUT_OF_ROOM)), and the [`KdReport`] says what would have been enough.
 //!
 //! Min-max binning above, level by level (Papay 2025, sections 9.4 to 9.6); cells of few references are split exactly, by one
 //! workgroup to their leaves. [`super::twin::builder`] is the twin,
@@ -11,52 +11,52 @@
 //! Trees have the bytes of the twin on every device: the only reciprocals that they depend on are correctly rounded, by the device or
 //! by integers ([`crate::gpu::KdTuning::exact_reciprocals`]). Where a device flushes subnormal numbers, inputs must not lead to any.
 
-use super::layout::{self, Header, Node};
+use super::layout::{self, KdHeader, KdNode};
 use super::merge::MERGE_AT;
 use super::termination::{Costs, depth_limit, leaf_size};
 use crate::bvh::builder::Schedule;
 use crate::bvh::geometry::{Input, Planned, Primitives};
 use crate::gpu::arguments::{self, KD_MERGE_BYTES, KD_STATE_BYTES};
 use crate::gpu::shaders::{self, Shader};
-use crate::gpu::{Context, KdTuning, Kernel, Recorder, Region, Step, task_pool};
+use crate::gpu::{Context, KdTuning, Kernel, Recorder, Region, Sizes, Step, task_pool};
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
 /// What to build, beside the triangles.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
-    /// Bins along each axis, 2 to [`Options::MOST_BINS`].
+pub struct KdOptions {
+    /// Bins along each axis, 2 to [`KdOptions::MOST_BINS`].
     pub bins: u32,
-    /// References up to which a cell is split exactly, [`Options::LEAST_EXACT`] to [`Options::MOST_EXACT`].
+    /// References up to which a cell is split exactly, [`KdOptions::LEAST_EXACT`] to [`KdOptions::MOST_EXACT`].
     pub exact: u32,
     /// The costs by which the best plane is chosen.
     pub costs: Costs,
     /// How the phases are recorded: a chain of dispatches or one persistent dispatch; `None` takes what measured faster
-    /// ([`Options::schedule_on`]).
+    /// ([`KdOptions::schedule_on`]).
     pub schedule: Option<Schedule>,
     /// Workgroups of the persistent dispatch, 1 or more; `None` takes what keeps the device busy.
     pub workgroups: Option<u32>,
-    /// What the memory goes by; `None` takes [`Estimate::for_exact`].
-    pub estimate: Option<Estimate>,
+    /// What the memory goes by; `None` takes [`KdEstimate::for_exact`].
+    pub estimate: Option<KdEstimate>,
     /// Room in the structure beside what the build may need, for objects that are to be merged into it: [`super::merge`].
-    pub more: layout::Room,
+    pub more: layout::SpareRoom,
     /// Geometries: what [`Source::Several`](crate::bvh::geometry::Source::Several) has, otherwise 1.
     pub geometry_count: u32,
     /// `vk::BuildAccelerationStructureFlagsKHR` for the header.
     pub build_flags: u32,
 }
 
-impl Options {
+impl KdOptions {
     /// Bins and exact splits that measured well (docs/notes/kdtree.md), everything else chosen.
-    pub const DEFAULT: Options = Options {
+    pub const DEFAULT: KdOptions = KdOptions {
         bins: 128,
         exact: 32,
         costs: Costs::DEFAULT,
         schedule: None,
         workgroups: None,
         estimate: None,
-        more: layout::Room { nodes: 0, references: 0, records: 0 },
+        more: layout::SpareRoom { nodes: 0, references: 0, records: 0 },
         geometry_count: 1,
         build_flags: 0,
     };
@@ -78,19 +78,19 @@ impl Options {
     /// # Errors
     /// [`Error::Argument`] names the option that cannot be used, and what can.
     pub fn check(&self) -> Result<()> {
-        if !(2..=Options::MOST_BINS).contains(&self.bins) {
+        if !(2..=KdOptions::MOST_BINS).contains(&self.bins) {
             return Err(Error::Argument(format!(
                 "{} bins; a kd-tree is built by 2 to {}",
                 self.bins,
-                Options::MOST_BINS
+                KdOptions::MOST_BINS
             )));
         }
-        if !(Options::LEAST_EXACT..=Options::MOST_EXACT).contains(&self.exact) {
+        if !(KdOptions::LEAST_EXACT..=KdOptions::MOST_EXACT).contains(&self.exact) {
             return Err(Error::Argument(format!(
                 "exact splits of {} references; it is {} to {}",
                 self.exact,
-                Options::LEAST_EXACT,
-                Options::MOST_EXACT
+                KdOptions::LEAST_EXACT,
+                KdOptions::MOST_EXACT
             )));
         }
         if self.schedule == Some(Schedule::Workgroup) {
@@ -108,15 +108,15 @@ impl Options {
     }
 }
 
-impl Default for Options {
-    fn default() -> Options {
-        Options::DEFAULT
+impl Default for KdOptions {
+    fn default() -> KdOptions {
+        KdOptions::DEFAULT
     }
 }
 
-/// How much a tree has, of each primitive. [`Report::estimate`] makes one that suffices for the scene that was built.
+/// How much a tree has, of each primitive. [`KdReport::estimate`] makes one that suffices for the scene that was built.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub struct KdEstimate {
     /// References of a level.
     pub level_references: f32,
     /// Nodes of all levels above the subtrees of few references, their roots among them.
@@ -131,10 +131,10 @@ pub struct Estimate {
     pub subtrees: f32,
 }
 
-impl Estimate {
+impl KdEstimate {
     /// For a scene of which nothing is known. The fewer references are split exactly, the more subtrees there are.
-    pub fn for_exact(exact: u32) -> Estimate {
-        Estimate {
+    pub fn for_exact(exact: u32) -> KdEstimate {
+        KdEstimate {
             level_references: 2.0,
             level_nodes: 16.0 / exact as f32,
             subtree_nodes: 3.0,
@@ -145,10 +145,10 @@ impl Estimate {
     }
 }
 
-/// What a build needed, in the scratch memory at [`Builder::report_range`] when it has run.
+/// What a build needed, in the scratch memory at [`KdBuilder::report_range`] when it has run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Report {
+pub struct KdReport {
     /// Bits of [`crate::bvh::layout::status`].
     pub status: u32,
     /// References of the largest level, with what straddles a plane twice.
@@ -164,17 +164,17 @@ pub struct Report {
     /// Subtrees.
     pub subtrees: u32,
     /// One more than the level that was split no further for want of room, or 0. What the levels below it would have needed is not
-    /// known: a build by [`Report::estimate`] comes farther, and tells.
+    /// known: a build by [`KdReport::estimate`] comes farther, and tells.
     pub ended: u32,
 }
 
-impl Report {
+impl KdReport {
     /// What suffices for the scene of so many primitives, exactly; where levels were cut off, twice what was asked for.
-    pub fn estimate(&self, primitive_count: u32) -> Estimate {
+    pub fn estimate(&self, primitive_count: u32) -> KdEstimate {
         let more = if self.ended > 0 { 2.0 } else { 1.0 };
         let each =
             |count: u32| (f64::from(count) * more / f64::from(primitive_count.max(1))) as f32 * (1.0 + f32::EPSILON);
-        Estimate {
+        KdEstimate {
             level_references: each(self.level_references),
             level_nodes: each(self.level_nodes),
             subtree_nodes: each(self.subtree_nodes),
@@ -185,30 +185,19 @@ impl Report {
     }
 }
 
-/// Bytes that a build needs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sizes {
-    /// The structure: see [`super::layout`].
-    pub structure: u64,
-    /// Scratch, free again when the build has run and its report has been read.
-    pub scratch: u64,
-    /// Alignment of both addresses.
-    pub alignment: u64,
-}
-
 /// The builder, for one device, its options and a number of triangles.
 #[derive(Debug, Clone)]
-pub struct Builder {
-    options: Options,
+pub struct KdBuilder {
+    options: KdOptions,
     schedule: Schedule,
     count: u32,
-    shape: Shape,
-    room: Room,
+    shape: KdShape,
+    room: BuildRoom,
 }
 
 /// How work is cut for a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Shape {
+pub(super) struct KdShape {
     pub workgroup: u32,
     /// Invocations of a workgroup that has a subtree, or little else than one subgroup can do.
     narrow: u32,
@@ -221,7 +210,7 @@ pub(super) struct Shape {
 
 /// How much there is room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Room {
+pub(super) struct BuildRoom {
     pub level_references: u32,
     pub tasks: u32,
     pub chunks: u32,
@@ -252,10 +241,10 @@ const MOST_NODES: u64 = 254;
 /// The most triangles: references of a level are numbered twice over in 30 bits.
 pub const MAX_COUNT: u32 = 1 << 27;
 
-impl Room {
-    pub fn of(options: &Options, count: u32, chunk: u32) -> Room {
-        let Estimate { level_references, level_nodes, subtree_nodes, cut_references, subtree_references, subtrees } =
-            options.estimate.unwrap_or(Estimate::for_exact(options.exact));
+impl BuildRoom {
+    pub fn of(options: &KdOptions, count: u32, chunk: u32) -> BuildRoom {
+        let KdEstimate { level_references, level_nodes, subtree_nodes, cut_references, subtree_references, subtrees } =
+            options.estimate.unwrap_or(KdEstimate::for_exact(options.exact));
         // A little more where a scene is small, and what the layout can name at most.
         let each = |of_each: f32, at_least: u32, most: u64| {
             let wanted = (f64::from(of_each.max(0.0)) * f64::from(count)).ceil() as u64 + u64::from(at_least);
@@ -267,7 +256,7 @@ impl Room {
         let level_nodes = more(each(level_nodes, 16, layout::MAX_NODES / 4), options.more.nodes, layout::MAX_NODES / 4);
         let cut_references = each(cut_references.max(1.0), 64, layout::MAX_REFERENCES / 2);
         let cut_references = more(cut_references, options.more.references, layout::MAX_REFERENCES / 2);
-        Room {
+        BuildRoom {
             level_references: level,
             tasks: 2 * large,
             chunks: (level / chunk + large + 1).max(count.div_ceil(chunk) + 1),
@@ -281,8 +270,8 @@ impl Room {
     }
 }
 
-impl Shape {
-    pub fn of(context: &Context, options: &Options, count: u32, schedule: Schedule) -> Shape {
+impl KdShape {
+    pub fn of(context: &Context, options: &KdOptions, count: u32, schedule: Schedule) -> KdShape {
         let tuning = &context.tuning.kd;
         // Two invocations look at the two parts of a reference.
         let narrow = context.limits.subgroup_size.max(2);
@@ -291,13 +280,13 @@ impl Shape {
         let subtree_groups = most(tuning.subtree_groups.min((count / 256).max(1024)));
         if schedule == Schedule::Persistent {
             let groups = options.workgroups.unwrap_or(most(tuning.groups));
-            return Shape { workgroup: narrow, groups, subtree_groups: groups, ..Shape::with(narrow, tuning) };
+            return KdShape { workgroup: narrow, groups, subtree_groups: groups, ..KdShape::with(narrow, tuning) };
         }
-        Shape { narrow, groups: most(tuning.groups), subtree_groups, ..Shape::with(tuning.group.max(2), tuning) }
+        KdShape { narrow, groups: most(tuning.groups), subtree_groups, ..KdShape::with(tuning.group.max(2), tuning) }
     }
 
-    fn with(workgroup: u32, tuning: &KdTuning) -> Shape {
-        Shape {
+    fn with(workgroup: u32, tuning: &KdTuning) -> KdShape {
+        KdShape {
             workgroup,
             narrow: workgroup,
             items: (tuning.chunk / tuning.group).max(1),
@@ -316,29 +305,29 @@ impl Shape {
     /// what waits.
     pub fn groups_of(&self, shader: &Shader, groups: u32) -> u32 {
         let narrower = (self.workgroup / self.narrow).max(1);
-        if Shape::is_narrow(shader) { groups.saturating_mul(narrower).min(self.subtree_groups) } else { groups }
+        if KdShape::is_narrow(shader) { groups.saturating_mul(narrower).min(self.subtree_groups) } else { groups }
     }
 
     pub fn chunk(&self) -> u32 {
         self.workgroup * self.items
     }
 
-    pub fn kernel(&self, shader: &'static Shader, options: &Options, input: &Input) -> Kernel {
+    pub fn kernel(&self, shader: &'static Shader, options: &KdOptions, input: &Input) -> Kernel {
         let source = input.source_constant(Primitives::Triangles);
         let constants = [self.items, options.bins, options.exact, self.exact_reciprocals.into(), source];
-        let workgroup = if Shape::is_narrow(shader) { self.narrow } else { self.workgroup };
+        let workgroup = if KdShape::is_narrow(shader) { self.narrow } else { self.workgroup };
         Kernel::new(shader, workgroup, &constants)
     }
 
     /// Scratch memory of a build with so much room.
-    pub fn scratch(&self, options: &Options, room: &Room) -> u64 {
-        let Room { level_references, tasks, chunks, subtrees, level_nodes, nodes, references, .. } = *room;
+    pub fn scratch(&self, options: &KdOptions, room: &BuildRoom) -> u64 {
+        let BuildRoom { level_references, tasks, chunks, subtrees, level_nodes, nodes, references, .. } = *room;
         let of = |count: u32, bytes: u64| u64::from(count) * bytes;
         let exact = u64::from(options.exact);
         let counters = of(level_references / self.chunk() + 1, 4 * (6 * u64::from(options.bins) + 1));
         let stack = 36 * MAX_DEPTH
             + REFERENCE_BYTES * exact * MAX_DEPTH
-            + size_of::<Node>() as u64 * (MOST_NODES + 2)
+            + size_of::<KdNode>() as u64 * (MOST_NODES + 2)
             + 4 * (MOST_NODES / 2 + 2) * exact;
         let tiles = |count: u32| count.div_ceil(TILE);
         let scratch = STATE_BYTES
@@ -351,7 +340,7 @@ impl Shape {
             + of(tiles(chunks) + 1, 8)
             + of(tiles(tasks) + 1, SUMS_BYTES)
             + of(tiles(subtrees), 8)
-            + of(nodes - level_nodes, size_of::<Node>() as u64)
+            + of(nodes - level_nodes, size_of::<KdNode>() as u64)
             + of(references, 4)
             + of(self.subtree_groups, stack);
         scratch.next_multiple_of(16)
@@ -361,8 +350,8 @@ impl Shape {
 impl arguments::KdBuild {
     /// Of a build with so much room; `depth_limit` and `leaf_size` go by what `input` has.
     pub(super) fn new(
-        options: &Options,
-        room: &Room,
+        options: &KdOptions,
+        room: &BuildRoom,
         input: &Input,
         structure: u64,
         scratch: u64,
@@ -418,12 +407,12 @@ pub(super) fn levels(
     (0..=depth_limit).flat_map(level).collect()
 }
 
-impl Builder {
+impl KdBuilder {
     /// A builder of `primitive_count` triangles on the device of `context`.
     ///
     /// # Errors
     /// An option out of range; more triangles than [`MAX_COUNT`].
-    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> Result<Builder> {
+    pub fn new(context: &Context, options: &KdOptions, primitive_count: u32) -> Result<KdBuilder> {
         options.check()?;
         if primitive_count > MAX_COUNT {
             return Err(Error::Argument(format!(
@@ -431,9 +420,9 @@ impl Builder {
             )));
         }
         let schedule = options.schedule_on(context);
-        let shape = Shape::of(context, options, primitive_count, schedule);
-        let room = Room::of(options, primitive_count, shape.chunk());
-        Ok(Builder { options: *options, schedule, count: primitive_count, shape, room })
+        let shape = KdShape::of(context, options, primitive_count, schedule);
+        let room = BuildRoom::of(options, primitive_count, shape.chunk());
+        Ok(KdBuilder { options: *options, schedule, count: primitive_count, shape, room })
     }
 
     /// The schedule that is used: the choice where none was given.
@@ -446,34 +435,34 @@ impl Builder {
         self.count
     }
 
-    /// Bytes of the structure and of the scratch memory: exactly what [`Builder::record`] uses.
+    /// Bytes of the structure and of the scratch memory: exactly what [`KdBuilder::record`] uses.
     pub fn sizes(&self) -> Sizes {
         let scratch = self.shape.scratch(&self.options, &self.room);
-        Sizes { structure: self.header().sizes().bytes, scratch, alignment: 16 }
+        Sizes { structure: self.header().offsets().bytes, scratch, alignment: 16 }
     }
 
     /// What the structure's header will say of its primitives, its geometries and its room, and nothing else.
-    pub fn header(&self) -> Header {
-        Header {
+    pub fn header(&self) -> KdHeader {
+        KdHeader {
             primitive_count: self.count,
             node_room: self.room.nodes,
             reference_room: self.room.references,
             record_room: self.room.records,
             geometry_count: self.options.geometry_count,
-            ..Header::zeroed()
+            ..KdHeader::zeroed()
         }
     }
 
-    /// Where in the scratch memory the [`Report`] is, in bytes.
+    /// Where in the scratch memory the [`KdReport`] is, in bytes.
     pub fn report_range(&self) -> Range<u64> {
-        REPORT_AT..REPORT_AT + size_of::<Report>() as u64
+        REPORT_AT..REPORT_AT + size_of::<KdReport>() as u64
     }
 
     fn kernel(&self, shader: &'static Shader, input: &Input) -> Kernel {
         self.shape.kernel(shader, &self.options, input)
     }
 
-    /// Records the build of `input` into `structure`, with scratch memory, of the bytes and alignment that [`Builder::sizes`] tells.
+    /// Records the build of `input` into `structure`, with scratch memory, of the bytes and alignment that [`KdBuilder::sizes`] tells.
     ///
     /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever reads
     /// the structure or the report, or writes the scratch memory) behind. Labels: `encode`; `subtrees`, `bin`,

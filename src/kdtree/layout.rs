@@ -4,11 +4,11 @@
 //!
 //! | part | bytes | at |
 //! | --- | --- | --- |
-//! | [`Header`] | 128 | 0 |
-//! | [`Node`] × `node_room` | 8 each | [`NODES_OFFSET`] |
-//! | references × `reference_room` | 4 each: index of a record | [`Sizes::references_offset`] |
-//! | [`Triangle`] × `record_room` | 40 each | [`Sizes::records_offset`], a multiple of 8 |
-//! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | [`Sizes::geometries_offset`] |
+//! | [`KdHeader`] | 128 | 0 |
+//! | [`KdNode`] × `node_room` | 8 each | [`NODES_OFFSET`] |
+//! | references × `reference_room` | 4 each: index of a record | [`KdOffsets::references_offset`] |
+//! | [`Triangle`] × `record_room` | 40 each | [`KdOffsets::records_offset`], a multiple of 8 |
+//! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | [`KdOffsets::geometries_offset`] |
 //!
 //! The first node is the root. An empty leaf has no node: its parent says that it is empty, and a ray that would go there needs no
 //! load to know it. Builders write the nodes level by level, in each the children in the order of their parents, left before right,
@@ -28,7 +28,7 @@ use std::ops::Range;
 /// The second word of a structure; the version in the low half is that of all our layouts.
 pub const KIND: u32 = 0x0032_0000 | bvh::VERSION;
 /// Where the nodes begin.
-pub const NODES_OFFSET: u64 = size_of::<Header>() as u64;
+pub const NODES_OFFSET: u64 = size_of::<KdHeader>() as u64;
 /// The deepest tree that a tracer must be able to walk: [`super::termination::depth_limit`] of 2³² primitives is 41.
 pub const MAX_DEPTH: u32 = 41;
 /// The most nodes there can be: 28 bits name a child.
@@ -39,7 +39,7 @@ pub const MAX_REFERENCES: u64 = 1 << 30;
 /// The head of a structure. 128 bytes; the first four words are those of [`bvh::Header`].
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Header {
+pub struct KdHeader {
     /// [`bvh::MAGIC`].
     pub magic: u32,
     /// [`KIND`].
@@ -102,16 +102,16 @@ pub struct Header {
 /// Where neither child is empty, the right one is beside the left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Node {
+pub struct KdNode {
     /// See the table.
     pub first: u32,
     /// See the table.
     pub second: u32,
 }
 
-/// What a [`Node`] says.
+/// What a [`KdNode`] says.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Content {
+pub enum KdContent {
     /// A cell that is split.
     Inner(Inner),
     /// A cell that is not: its part of the references.
@@ -131,29 +131,29 @@ pub struct Inner {
 
 const LEAF: u32 = 3;
 
-impl Node {
+impl KdNode {
     /// A node that is split. `first_child` is the node of the first child that is not `empty`, less than [`MAX_NODES`].
-    pub fn inner(axis: usize, plane: f32, first_child: u32, empty: [bool; 2]) -> Node {
+    pub fn inner(axis: usize, plane: f32, first_child: u32, empty: [bool; 2]) -> KdNode {
         let [left, right] = empty.map(u32::from);
-        Node { first: plane.to_bits(), second: axis as u32 | left << 2 | right << 3 | first_child << 4 }
+        KdNode { first: plane.to_bits(), second: axis as u32 | left << 2 | right << 3 | first_child << 4 }
     }
 
     /// A leaf of `count` references from `first` on, which is less than [`MAX_REFERENCES`].
-    pub fn leaf(first: u32, count: u32) -> Node {
-        Node { first: count, second: LEAF | first << 2 }
+    pub fn leaf(first: u32, count: u32) -> KdNode {
+        KdNode { first: count, second: LEAF | first << 2 }
     }
 
     /// The node taken apart.
-    pub fn content(&self) -> Content {
-        let Node { first, second } = *self;
+    pub fn content(&self) -> KdContent {
+        let KdNode { first, second } = *self;
         if second & 3 == LEAF {
             let from = (second >> 2) as usize;
-            return Content::Leaf(from..from + first as usize);
+            return KdContent::Leaf(from..from + first as usize);
         }
         let (is_left, is_right) = (second & 4 == 0, second & 8 == 0);
         let child = second >> 4;
         let children = [is_left.then_some(child), is_right.then(|| child + u32::from(is_left))];
-        Content::Inner(Inner { axis: (second & 3) as usize, plane: f32::from_bits(first), children })
+        KdContent::Inner(Inner { axis: (second & 3) as usize, plane: f32::from_bits(first), children })
     }
 }
 
@@ -175,7 +175,7 @@ pub fn halves(cell: &Aabb, axis: usize, plane: f32) -> [Aabb; 2] {
 
 /// Where the parts of a structure lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sizes {
+pub struct KdOffsets {
     /// Byte offset of the references.
     pub references_offset: u64,
     /// Byte offset of the records.
@@ -186,31 +186,31 @@ pub struct Sizes {
     pub bytes: u64,
 }
 
-impl Header {
+impl KdHeader {
     /// The root's cell.
     pub fn cell(&self) -> Aabb {
         Aabb { lo: self.lo, hi: self.hi }
     }
 
     /// Where the parts of the structure lie.
-    pub const fn sizes(&self) -> Sizes {
-        let references_offset = NODES_OFFSET + self.node_room as u64 * size_of::<Node>() as u64;
+    pub const fn offsets(&self) -> KdOffsets {
+        let references_offset = NODES_OFFSET + self.node_room as u64 * size_of::<KdNode>() as u64;
         let records_offset =
             references_offset + (self.reference_room as u64 * size_of::<u32>() as u64).next_multiple_of(8);
         let geometries_offset = records_offset + self.record_room as u64 * size_of::<Triangle>() as u64;
         let entries = if self.geometry_count > 1 { self.geometry_count as u64 } else { 0 };
         let bytes = geometries_offset + entries * size_of::<GeometryEntry>() as u64;
-        Sizes { references_offset, records_offset, geometries_offset, bytes }
+        KdOffsets { references_offset, records_offset, geometries_offset, bytes }
     }
 }
 
-const _: () = assert!(size_of::<Header>() == 128 && size_of::<Node>() == 8);
+const _: () = assert!(size_of::<KdHeader>() == 128 && size_of::<KdNode>() == 8);
 const _: () =
-    assert!(std::mem::offset_of!(Header, primitive_count) == std::mem::offset_of!(bvh::Header, primitive_count));
+    assert!(std::mem::offset_of!(KdHeader, primitive_count) == std::mem::offset_of!(bvh::Header, primitive_count));
 
 /// How much more a structure has room for than it has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Room {
+pub struct SpareRoom {
     /// Nodes.
     pub nodes: u32,
     /// References.
@@ -223,9 +223,9 @@ pub struct Room {
 #[derive(Debug, Clone)]
 pub struct KdTree {
     /// The head.
-    pub header: Header,
+    pub header: KdHeader,
     /// The nodes, the root first.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<KdNode>,
     /// Indices of records, those of each leaf together and ascending.
     pub references: Vec<u32>,
     /// The triangles, in the order of the input.
@@ -240,8 +240,8 @@ impl KdTree {
     /// # Errors
     /// [`Error::InvalidStructure`] if the magic, kind or length is not that of a kd-tree.
     pub fn from_bytes(bytes: &[u8]) -> Result<KdTree> {
-        let header: Header = bvh::header_of(bytes, KIND)?;
-        let sizes = header.sizes();
+        let header: KdHeader = bvh::header_of(bytes, KIND)?;
+        let sizes = header.offsets();
         if (bytes.len() as u64) < sizes.bytes {
             return Err(Error::InvalidStructure(format!(
                 "{} bytes, {} nodes, {} references and {} records need {}; is it cut off?",
@@ -283,8 +283,8 @@ impl KdTree {
     ///
     /// # Errors
     /// [`Error::Argument`] if there would be room for more than the layout can name.
-    pub fn with_room(mut self, more: Room) -> Result<KdTree> {
-        let Header { node_count, reference_count, active, .. } = self.header;
+    pub fn with_room(mut self, more: SpareRoom) -> Result<KdTree> {
+        let KdHeader { node_count, reference_count, active, .. } = self.header;
         let room = |what: &str, count: u32, more: u32, most: u64| {
             let room = u64::from(count) + u64::from(more);
             u32::try_from(room).ok().filter(|_| room <= most).ok_or_else(|| {
@@ -299,7 +299,7 @@ impl KdTree {
 
     /// The structure's bytes, as the device has them.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let Sizes { references_offset, records_offset, geometries_offset, .. } = self.header.sizes();
+        let KdOffsets { references_offset, records_offset, geometries_offset, .. } = self.header.offsets();
         let mut bytes = bytemuck::bytes_of(&self.header).to_vec();
         bytes.extend_from_slice(bytemuck::cast_slice(&self.nodes));
         bytes.resize(references_offset as usize, 0);
@@ -331,28 +331,28 @@ mod tests {
             ([false, true], [Some(child), None]),
         ] {
             for axis in 0..3 {
-                let node = Node::inner(axis, -0.1, child, empty);
-                assert_eq!(node.content(), Content::Inner(Inner { axis, plane: -0.1, children }));
+                let node = KdNode::inner(axis, -0.1, child, empty);
+                assert_eq!(node.content(), KdContent::Inner(Inner { axis, plane: -0.1, children }));
             }
         }
         let last = MAX_REFERENCES as u32 - 1;
-        assert_eq!(Node::leaf(last, 1).content(), Content::Leaf(last as usize..last as usize + 1));
+        assert_eq!(KdNode::leaf(last, 1).content(), KdContent::Leaf(last as usize..last as usize + 1));
     }
 
     #[test]
     fn bytes_that_are_no_kd_tree_are_refused_by_name() {
-        let header = Header {
+        let header = KdHeader {
             magic: bvh::MAGIC,
             kind: KIND,
             node_count: 1,
             reference_count: 1,
             node_room: 1,
             reference_room: 1,
-            ..Header::zeroed()
+            ..KdHeader::zeroed()
         };
         let tree = KdTree {
             header,
-            nodes: vec![Node::leaf(0, 1)],
+            nodes: vec![KdNode::leaf(0, 1)],
             references: vec![0],
             records: Vec::new(),
             geometries: Vec::new(),
@@ -367,11 +367,11 @@ mod tests {
         let mut other = bytes.clone();
         other[4] ^= 1;
         assert!(error_of(&other).contains("of another kind or version"));
-        let roomy = KdTree { header: Header { node_room: 3, reference_room: 2, ..header }, ..tree };
+        let roomy = KdTree { header: KdHeader { node_room: 3, reference_room: 2, ..header }, ..tree };
         let more = roomy.to_bytes();
         assert_eq!(more.len(), 128 + 3 * 8 + 2 * 4);
         assert_eq!(KdTree::from_bytes(&more).expect("room for more").references, [0]);
-        let full = KdTree { header: Header { node_count: 4, ..roomy.header }, ..roomy };
+        let full = KdTree { header: KdHeader { node_count: 4, ..roomy.header }, ..roomy };
         assert!(
             error_of(&full.to_bytes()[..more.len()])
                 .contains("4 nodes, 1 references and 0 records where there is room for 3")

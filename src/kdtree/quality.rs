@@ -1,6 +1,6 @@
 //! Quality of a kd-tree: SAH cost, depth and leaf statistics, by a walk on the host.
 
-use super::layout::{Content, KdTree};
+use super::layout::{KdContent, KdTree};
 use crate::bvh::quality::Quality;
 use crate::geometry::Aabb;
 
@@ -26,11 +26,11 @@ pub fn on_host(tree: &KdTree, c_t: f64, c_i: f64) -> Quality {
             continue;
         };
         match tree.nodes[node as usize].content() {
-            Content::Leaf(range) => {
+            KdContent::Leaf(range) => {
                 cost += c_i * half_area(&cell) * range.len() as f64;
                 leaf(&mut quality, depth, range.len() as u32);
             }
-            Content::Inner(inner) => {
+            KdContent::Inner(inner) => {
                 cost += c_t * half_area(&cell);
                 quality.inner += 1;
                 let [left, right] = inner.halves(&cell);
@@ -53,18 +53,18 @@ fn half_area(cell: &Aabb) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kdtree::layout::{Header, Node};
+    use crate::kdtree::layout::{KdHeader, KdNode};
     use bytemuck::Zeroable;
 
     #[test]
     fn the_cost_of_a_tree_of_three_leaves_is_that_of_its_areas() {
         // A cube of edge 2, cut in the middle along x; its right half is cut again along y, where the lower part is empty.
-        let header = Header { lo: [0.0; 3], hi: [2.0; 3], ..Header::zeroed() };
+        let header = KdHeader { lo: [0.0; 3], hi: [2.0; 3], ..KdHeader::zeroed() };
         let nodes = vec![
-            Node::inner(0, 1.0, 1, [false, false]),
-            Node::leaf(0, 3),
-            Node::inner(1, 0.5, 3, [true, false]),
-            Node::leaf(3, 1),
+            KdNode::inner(0, 1.0, 1, [false, false]),
+            KdNode::leaf(0, 3),
+            KdNode::inner(1, 0.5, 3, [true, false]),
+            KdNode::leaf(3, 1),
         ];
         let tree = KdTree { header, nodes, references: vec![0, 1, 2, 0], records: Vec::new(), geometries: Vec::new() };
         let quality = on_host(&tree, 3.0, 2.0);

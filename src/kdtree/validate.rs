@@ -1,6 +1,6 @@
 //! Walks a kd-tree on the host and says what is wrong and where.
 
-use super::layout::{Content, Inner, KdTree, MAX_DEPTH};
+use super::layout::{Inner, KdContent, KdTree, MAX_DEPTH};
 use crate::bvh::layout::Triangle;
 use crate::geometry::{Aabb, Polygon};
 use crate::{Error, Result};
@@ -114,11 +114,11 @@ impl Cover<'_> {
     /// The parts of the triangle that are not referenced below a node, and where they should be.
     fn lacking(&self, node: u32, polygon: Polygon) -> Vec<(Lacking, Polygon)> {
         let inner = match self.tree.nodes[node as usize].content() {
-            Content::Leaf(range) => {
+            KdContent::Leaf(range) => {
                 let is_there = self.tree.references[range].binary_search(&self.record).is_ok();
                 return if is_there { Vec::new() } else { vec![(Lacking::Leaf(node), polygon)] };
             }
-            Content::Inner(inner) => inner,
+            KdContent::Inner(inner) => inner,
         };
         let below = |side: usize, polygon: Polygon| match inner.children[side] {
             Some(child) => self.lacking(child, polygon),
@@ -142,7 +142,7 @@ impl Cover<'_> {
 }
 
 /// A node that is left to see.
-struct Place {
+struct NodeVisit {
     node: u32,
     /// The node that names it.
     parent: Option<u32>,
@@ -159,8 +159,8 @@ struct Walk<'a> {
 
 impl Walk<'_> {
     fn run(&mut self, cell: Aabb) -> Result<()> {
-        let mut stack = vec![Place { node: 0, parent: None, depth: 0, cell }];
-        while let Some(Place { node, parent, depth, cell }) = stack.pop() {
+        let mut stack = vec![NodeVisit { node: 0, parent: None, depth: 0, cell }];
+        while let Some(NodeVisit { node, parent, depth, cell }) = stack.pop() {
             let named_by = parent.map_or("the header".to_owned(), |parent| format!("node {parent}"));
             if depth > MAX_DEPTH {
                 return invalid(format!("node {node} is at depth {depth}, the most is {MAX_DEPTH}"));
@@ -173,13 +173,13 @@ impl Walk<'_> {
             }
             self.found.depth = self.found.depth.max(depth);
             match content {
-                Content::Leaf(range) => self.leaf(node, range)?,
-                Content::Inner(inner) => {
+                KdContent::Leaf(range) => self.leaf(node, range)?,
+                KdContent::Inner(inner) => {
                     self.inner(node, &inner, &cell)?;
                     for (child, cell) in inner.children.into_iter().zip(inner.halves(&cell)).rev() {
                         match child {
                             Some(child) => {
-                                stack.push(Place { node: child, parent: Some(node), depth: depth + 1, cell });
+                                stack.push(NodeVisit { node: child, parent: Some(node), depth: depth + 1, cell });
                             }
                             None => self.found.empty_leaves += 1,
                         }
@@ -243,8 +243,8 @@ fn invalid<T>(what: String) -> Result<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kdtree::builder::Options;
-    use crate::kdtree::layout::Node;
+    use crate::kdtree::builder::KdOptions;
+    use crate::kdtree::layout::KdNode;
     use crate::kdtree::twin::builder::build;
 
     /// Small triangles along a diagonal, and one all along it.
@@ -253,7 +253,7 @@ mod tests {
             (0..60).map(|i| [(i / 3) as f32, (i / 3 + i % 3) as f32, (i * 5 % 11) as f32]).collect();
         positions.extend([[0.0; 3], [20.0, 20.0, 10.0], [20.0, 19.0, 10.0]]);
         let triangles: Vec<[u32; 3]> = (0..21).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        build(&positions, &triangles, &Options::DEFAULT).expect("a small tree")
+        build(&positions, &triangles, &KdOptions::DEFAULT).expect("a small tree")
     }
 
     #[test]
@@ -267,15 +267,15 @@ mod tests {
 
     fn inner_of(tree: &KdTree, node: usize) -> Inner {
         match tree.nodes[node].content() {
-            Content::Inner(inner) => inner,
-            Content::Leaf(_) => panic!("node {node} is a leaf"),
+            KdContent::Inner(inner) => inner,
+            KdContent::Leaf(_) => panic!("node {node} is a leaf"),
         }
     }
 
     /// A leaf of at least so many references.
     fn leaf_of(tree: &KdTree, count: usize) -> (usize, std::ops::Range<usize>) {
-        let leaf = |node: &Node| match node.content() {
-            Content::Leaf(range) if range.len() >= count => Some(range),
+        let leaf = |node: &KdNode| match node.content() {
+            KdContent::Leaf(range) if range.len() >= count => Some(range),
             _ => None,
         };
         tree.nodes.iter().enumerate().find_map(|(i, node)| leaf(node).map(|range| (i, range))).expect("a leaf")
@@ -294,15 +294,15 @@ mod tests {
             ("there are", |t| t.nodes[0].second |= 0xFFFF_FFF0),
             ("has two parents", |t| {
                 let Inner { axis, plane, .. } = inner_of(t, 0);
-                t.nodes[0] = Node::inner(axis, plane, 0, [false, false]);
+                t.nodes[0] = KdNode::inner(axis, plane, 0, [false, false]);
             }),
             ("is in the child that is said to be empty", |t| {
                 let Inner { axis, plane, children } = inner_of(t, 0);
-                t.nodes[0] = Node::inner(axis, plane, children[0].expect("both") + 1, [true, false]);
+                t.nodes[0] = KdNode::inner(axis, plane, children[0].expect("both") + 1, [true, false]);
             }),
             ("is in the cell and is not referenced", |t| {
                 let (leaf, range) = leaf_of(t, 2);
-                t.nodes[leaf] = Node::leaf(range.start as u32 + 1, range.len() as u32 - 1);
+                t.nodes[leaf] = KdNode::leaf(range.start as u32 + 1, range.len() as u32 - 1);
             }),
             ("a leaf of nothing", |t| {
                 let (leaf, _) = leaf_of(t, 1);
@@ -311,15 +311,15 @@ mod tests {
             ("is in two leaves", |t| {
                 // The rightmost leaf is seen last.
                 let mut last = 0;
-                while let Content::Inner(inner) = t.nodes[last].content() {
+                while let KdContent::Inner(inner) = t.nodes[last].content() {
                     last = inner.children[1].or(inner.children[0]).expect("one is not empty") as usize;
                 }
                 let other = t.nodes.iter().enumerate().find_map(|(i, node)| match node.content() {
-                    Content::Leaf(range) if i != last => Some(range),
+                    KdContent::Leaf(range) if i != last => Some(range),
                     _ => None,
                 });
                 let range = other.expect("another leaf");
-                t.nodes[last] = Node::leaf(range.start as u32, range.len() as u32);
+                t.nodes[last] = KdNode::leaf(range.start as u32, range.len() as u32);
             }),
             ("they must ascend", |t| {
                 let (_, range) = leaf_of(t, 2);

@@ -3,7 +3,7 @@
 //!
 //! ```no_run
 //! # use hedgerow::gpu::Recorder;
-//! # use hedgerow::trace::{Query, kd::{Tracer, Traversal}, tracer::Buffers};
+//! # use hedgerow::trace::{Query, kd::{Tracer, Traversal}, tracer::TraceBuffers};
 //! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: u64, hits: u64) -> hedgerow::Result<()> {
 //! let tracer = Tracer::new(recorder.context(), Traversal::short_stack_with_push_down(4));
 //! tracer.record(recorder, Query::ClosestHit, &Buffers { structure, rays, hits, work: None, count: 1 << 20 })?;
@@ -15,7 +15,7 @@
 //! Shaders of others trace by `glsl/trace/kd_tree.glsl`.
 
 use super::Query;
-use super::tracer::{self, Buffers, Loads, Shape};
+use super::tracer::{self, Loads, TraceBuffers, TraceShape};
 use crate::Result;
 use crate::gpu::shaders::Shader;
 use crate::gpu::{Context, Kernel, Recorder, shaders};
@@ -50,7 +50,7 @@ impl Traversal {
     }
 }
 
-/// A tree of several that are traced together ([`Tracer::record_several`]). Also the head of their table.
+/// A tree of several that are traced together ([`KdTracer::record_several`]). Also the head of their table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct TreeEntry {
@@ -72,26 +72,26 @@ impl TreeEntry {
 
 /// How the rays of a device go through kd-trees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Tracer {
+pub struct KdTracer {
     traversal: Traversal,
-    shape: Shape,
+    shape: TraceShape,
 }
 
-impl Tracer {
-    /// By this traversal, cut as [`Shape::of`] does, but with loads gathered. Stacks of up to 8 cells, which lie in registers, are the
+impl KdTracer {
+    /// By this traversal, cut as [`TraceShape::of`] does, but with loads gathered. Stacks of up to 8 cells, which lie in registers, are the
     /// fastest where that was measured: `docs/notes/kdtree.md`.
-    pub fn new(context: &Context, traversal: Traversal) -> Tracer {
-        Tracer::with(traversal, Shape::of(context))
+    pub fn new(context: &Context, traversal: Traversal) -> KdTracer {
+        KdTracer::with(traversal, TraceShape::of(context))
     }
 
     /// Cut as `shape` has it. Nothing lies in shared memory and loads are gathered, whatever it says.
-    pub fn with(traversal: Traversal, shape: Shape) -> Tracer {
+    pub fn with(traversal: Traversal, shape: TraceShape) -> KdTracer {
         let capacity = traversal.capacity.min(MAX_DEPTH as usize);
-        let shape = Shape { shared_levels: 0, loads: Loads::Gathered, ..shape };
-        Tracer { traversal: Traversal { capacity, ..traversal }, shape }
+        let shape = TraceShape { shared_levels: 0, loads: Loads::Gathered, ..shape };
+        KdTracer { traversal: Traversal { capacity, ..traversal }, shape }
     }
 
-    /// The kernel that [`Tracer::record`] takes.
+    /// The kernel that [`KdTracer::record`] takes.
     fn kernel(&self, query: Query, count_work: bool) -> Kernel {
         self.kernel_of(&shaders::TRACE_KD_SINGLE, query, count_work)
     }
@@ -108,7 +108,7 @@ impl Tracer {
     ///
     /// # Errors
     /// More than [`MAX_RAYS`](super::MAX_RAYS) rays; the kernel's pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &Buffers) -> Result<()> {
+    pub fn record(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &TraceBuffers) -> Result<()> {
         let kernel = self.kernel(query, buffers.work.is_some());
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
     }
@@ -117,8 +117,8 @@ impl Tracer {
     /// ends in each where the trees before it have its nearest hit; of equally near ones that in the earlier tree counts.
     ///
     /// # Errors
-    /// As [`Tracer::record`].
-    pub fn record_several(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &Buffers) -> Result<()> {
+    /// As [`KdTracer::record`].
+    pub fn record_several(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &TraceBuffers) -> Result<()> {
         let kernel = self.kernel_of(&shaders::TRACE_KD_SEVERAL, query, buffers.work.is_some());
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
     }

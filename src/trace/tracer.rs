@@ -18,7 +18,7 @@ use crate::{Error, Result};
 
 /// How the work is cut for a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Shape {
+pub struct TraceShape {
     /// Invocations a workgroup.
     pub workgroup: u32,
     /// How many entries of each ray's stack lie in shared memory; the others are private. At most
@@ -47,11 +47,11 @@ impl Loads {
     pub const MAX_LANES: u32 = MOST_LANES;
 }
 
-impl Shape {
+impl TraceShape {
     /// What is fast on a device.
-    pub fn of(context: &Context) -> Shape {
+    pub fn of(context: &Context) -> TraceShape {
         let tuning = &context.tuning.trace;
-        let shape = Shape {
+        let shape = TraceShape {
             workgroup: tuning.group,
             shared_levels: tuning.shared_levels.min(MAX_DEPTH),
             rays_each: tuning.rays_each,
@@ -67,29 +67,29 @@ impl Shape {
     /// For CPUs: workgroups of one subgroup, so that none waits for another, and the whole stack in shared memory, which is
     /// memory like any other but laid out in columns. An invocation takes ray after ray, so that it need not wait for the
     /// longest of its subgroup.
-    pub fn subgroups(limits: &Limits) -> Shape {
+    pub fn subgroups(limits: &Limits) -> TraceShape {
         let loads = Loads::Gathered;
-        Shape { workgroup: limits.subgroup_size, shared_levels: MAX_DEPTH, rays_each: 128, loads }.within(limits)
+        TraceShape { workgroup: limits.subgroup_size, shared_levels: MAX_DEPTH, rays_each: 128, loads }.within(limits)
     }
 
     /// The same with loads lane by lane, for subgroups of at most [`Loads::MAX_LANES`].
-    pub fn lanes(limits: &Limits) -> Shape {
-        Shape { loads: Loads::LaneByLane, ..Shape::subgroups(limits) }
+    pub fn lanes(limits: &Limits) -> TraceShape {
+        TraceShape { loads: Loads::LaneByLane, ..TraceShape::subgroups(limits) }
     }
 
     /// For GPUs: larger workgroups, and the few levels in shared memory that most rays stay in.
-    pub fn groups(limits: &Limits) -> Shape {
+    pub fn groups(limits: &Limits) -> TraceShape {
         let workgroup = limits.subgroup_size.max(64);
-        Shape { workgroup, shared_levels: 8, rays_each: 1, loads: Loads::InVectors }.within(limits)
+        TraceShape { workgroup, shared_levels: 8, rays_each: 1, loads: Loads::InVectors }.within(limits)
     }
 
     /// With no more levels in shared memory than there is room for.
-    pub(super) fn within(self, limits: &Limits) -> Shape {
+    pub(super) fn within(self, limits: &Limits) -> TraceShape {
         let workgroup = self.workgroup.min(limits.workgroup_invocations);
         let level_bytes = LEVEL_BYTES * workgroup;
         // One word more of each of the two arrays: they must not be empty.
         let room = limits.shared_memory.saturating_sub(LEVEL_BYTES) / level_bytes;
-        Shape { workgroup, shared_levels: self.shared_levels.min(room), ..self }
+        TraceShape { workgroup, shared_levels: self.shared_levels.min(room), ..self }
     }
 }
 
@@ -100,7 +100,7 @@ const LEVEL_BYTES: u32 = 8;
 
 /// Device addresses of what is traced, all aligned to 16 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Buffers {
+pub struct TraceBuffers {
     /// A `Bvh2`, or what else a tracer says that it takes. One whose status says that it is too deep or unfinished is traced as if it were empty.
     pub structure: u64,
     /// [`Ray`](super::Ray) × `count`.
@@ -114,7 +114,7 @@ pub struct Buffers {
 }
 
 /// The kernel that [`record`] takes.
-fn kernel(shape: &Shape, query: Query, count_work: bool) -> Kernel {
+fn kernel(shape: &TraceShape, query: Query, count_work: bool) -> Kernel {
     let shader = match shape.loads {
         Loads::Gathered | Loads::InVectors => &shaders::TRACE_TRACER_SINGLE,
         Loads::LaneByLane => &shaders::TRACE_TRACER_LANES,
@@ -123,7 +123,12 @@ fn kernel(shape: &Shape, query: Query, count_work: bool) -> Kernel {
 }
 
 /// The kernel of a shader that takes the constants of the tracers.
-pub(super) fn kernel_of(shader: &'static shaders::Shader, shape: &Shape, query: Query, count_work: bool) -> Kernel {
+pub(super) fn kernel_of(
+    shader: &'static shaders::Shader,
+    shape: &TraceShape,
+    query: Query,
+    count_work: bool,
+) -> Kernel {
     let any_hit = u32::from(query == Query::AnyHit);
     let lanes = shape.workgroup.min(Loads::MAX_LANES);
     let in_vectors = u32::from(shape.loads == Loads::InVectors);
@@ -138,7 +143,7 @@ pub(super) fn kernel_of(shader: &'static shaders::Shader, shape: &Shape, query: 
 /// # Errors
 /// More than [`MAX_RAYS`] rays; loads lane by lane in workgroups that are not one subgroup of at most
 /// [`Loads::MAX_LANES`]; the kernel's pipeline could not be made.
-pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, query: Query, buffers: &Buffers) -> Result<()> {
+pub fn record(recorder: &mut Recorder<'_>, shape: &TraceShape, query: Query, buffers: &TraceBuffers) -> Result<()> {
     record_kernel(recorder, &kernel(shape, query, buffers.work.is_some()), shape, buffers)
 }
 
@@ -146,8 +151,8 @@ pub fn record(recorder: &mut Recorder<'_>, shape: &Shape, query: Query, buffers:
 pub(super) fn record_kernel(
     recorder: &mut Recorder<'_>,
     kernel: &Kernel,
-    shape: &Shape,
-    buffers: &Buffers,
+    shape: &TraceShape,
+    buffers: &TraceBuffers,
 ) -> Result<()> {
     let limits = &recorder.context().limits;
     let subgroup = limits.subgroup_size;
@@ -161,7 +166,7 @@ pub(super) fn record_kernel(
             Loads::MAX_LANES
         )));
     }
-    let &Buffers { structure, rays, hits, work, count } = buffers;
+    let &TraceBuffers { structure, rays, hits, work, count } = buffers;
     if count > MAX_RAYS {
         return Err(Error::Argument(format!(
             "{count} rays in one call, at most {MAX_RAYS}: trace them in several calls"

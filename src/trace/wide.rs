@@ -1,7 +1,7 @@
 //! The tracer of wide trees on the device, recorded as [`super::tracer`] is: the same rays, hits and work.
 
 use super::Query;
-use super::tracer::{self, Buffers, Loads, Shape};
+use super::tracer::{self, Loads, TraceBuffers, TraceShape};
 use crate::bvh::wide::Form;
 use crate::gpu::{Context, Kernel, Limits, Recorder, shaders};
 use crate::{Error, Result};
@@ -19,13 +19,13 @@ pub enum Order {
 
 /// How the rays of a device go through trees of a form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Tracer {
+pub struct WideTracer {
     /// The nodes of the trees.
     pub form: Form,
     /// The order of children.
     pub order: Order,
     /// How the work is cut. [`Loads::LaneByLane`] is there for [`Order::Octant`] alone.
-    pub shape: Shape,
+    pub shape: TraceShape,
 }
 
 // HEDGEROW_LEVELS in glsl/trace/tracer_wide*.comp.
@@ -45,31 +45,31 @@ impl Order {
     }
 }
 
-impl Tracer {
+impl WideTracer {
     /// What is fast on a device: quantised nodes by distance on CPUs, unless loads are lane by lane there; on GPUs, of which none
     /// was measured, as their paper has it.
-    pub fn of(context: &Context, form: Form) -> Tracer {
+    pub fn of(context: &Context, form: Form) -> WideTracer {
         let by_octant = form.is_quantised() && context.tuning.trace.by_octant;
-        Tracer::in_order(context, form, if by_octant { Order::Octant } else { Order::Distance })
+        WideTracer::in_order(context, form, if by_octant { Order::Octant } else { Order::Distance })
     }
 
-    /// In this order: the shape as of [`Shape::of`], but the whole stack in shared memory on CPUs.
-    pub fn in_order(context: &Context, form: Form, order: Order) -> Tracer {
-        let mut shape = Shape::of(context);
+    /// In this order: the shape as of [`TraceShape::of`], but the whole stack in shared memory on CPUs.
+    pub fn in_order(context: &Context, form: Form, order: Order) -> WideTracer {
+        let mut shape = TraceShape::of(context);
         if order == Order::Distance {
             shape.loads = if context.tuning.trace.in_vectors { Loads::InVectors } else { Loads::Gathered };
         }
-        Tracer::with(&context.limits, form, order, shape)
+        WideTracer::with(&context.limits, form, order, shape)
     }
 
     /// With as many levels in shared memory as `shape` has for binary trees: some, or all.
-    pub fn with(limits: &Limits, form: Form, order: Order, shape: Shape) -> Tracer {
-        let all = shape.shared_levels >= Shape::subgroups(limits).shared_levels;
+    pub fn with(limits: &Limits, form: Form, order: Order, shape: TraceShape) -> WideTracer {
+        let all = shape.shared_levels >= TraceShape::subgroups(limits).shared_levels;
         let shared_levels = if all { order.stack_levels(form) } else { shape.shared_levels };
-        Tracer { form, order, shape: Shape { shared_levels, ..shape }.within(limits) }
+        WideTracer { form, order, shape: TraceShape { shared_levels, ..shape }.within(limits) }
     }
 
-    /// The kernel that [`Tracer::record`] takes.
+    /// The kernel that [`WideTracer::record`] takes.
     ///
     /// # Errors
     /// There is no kernel for that order of such nodes, or for such loads.
@@ -97,7 +97,7 @@ impl Tracer {
     ///
     /// # Errors
     /// As of [`tracer::record`]; there is no kernel for this order of such nodes, or for such loads.
-    pub fn record(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &Buffers) -> Result<()> {
+    pub fn record(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &TraceBuffers) -> Result<()> {
         let kernel = self.kernel(query, buffers.work.is_some())?;
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
     }

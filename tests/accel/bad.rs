@@ -13,7 +13,7 @@ use crate::common::world::{BuiltWorld, Part, World, bottom_level, instances_at, 
 use hedgerow::accel::Instance;
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
-use hedgerow::bvh::layout::{Bvh2, Child, Header, Instance as Placed, NODES_OFFSET, Triangle, status};
+use hedgerow::bvh::layout::{Bvh2, Child, Header, InstanceRecord as Placed, NODES_OFFSET, Triangle, status};
 use hedgerow_lab::random::SplitMix64;
 use vk::GeometryFlagsKHR as GeometryFlags;
 

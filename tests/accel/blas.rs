@@ -7,7 +7,7 @@ use crate::common::shapes::{Corners, ray, soup};
 use hedgerow::accel;
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
-use hedgerow::bvh::builder::{Builder, Options};
+use hedgerow::bvh::builder::{BuildOptions, Builder};
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::{GeometryFlags, IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::Bvh2;
@@ -339,7 +339,7 @@ fn the_sizes_of_a_maximum_suffice_for_every_smaller_count() {
     let mut most = [0; 2];
     for count in counts {
         let sizes = ours.build_sizes(&bottom_level(&geometries), &[count]);
-        let builder = Builder::new(device(), &Options::DEFAULT, count).expect("few enough").sizes();
+        let builder = Builder::new(device(), &BuildOptions::DEFAULT, count).expect("few enough").sizes();
         most = [most[0].max(builder.structure), most[1].max(builder.scratch)];
         assert!(
             sizes.acceleration_structure_size >= most[0] && sizes.build_scratch_size >= most[1],

@@ -2,7 +2,7 @@
 
 use crate::common::device;
 use crate::common::shapes::soup;
-use hedgerow::accel::{Device, Options};
+use hedgerow::accel::{AccelOptions, Device};
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
 use hedgerow::gpu::Recorder;
@@ -29,7 +29,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Bench {
-        let ours = Device::with_options(device(), Options::CHECKED);
+        let ours = Device::with_options(device(), AccelOptions::CHECKED);
         let corners = device().upload("corners", &soup(COUNT as usize, 0.3, 1)).expect("memory");
         let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
             .vertex_format(vk::Format::R32G32B32_SFLOAT)

@@ -10,10 +10,10 @@ use hedgerow::accel::serialize::Head;
 use hedgerow::accel::{self, Property};
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
-use hedgerow::bvh::builder::{Builder, Options};
+use hedgerow::bvh::builder::{BuildOptions, Builder};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, VertexFormat};
-use hedgerow::bvh::layout::{BoxRecord, Bvh2, Child, Header, Instance, Record, status};
+use hedgerow::bvh::layout::{BoxRecord, Bvh2, Child, Header, InstanceRecord, Record, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::geometry::Aabb;
@@ -76,13 +76,13 @@ fn boxes(count: usize, collapse: Collapse) -> Bvh2<BoxRecord> {
 }
 
 /// Instances of structures at made-up addresses; every fourth is left out.
-fn instances(count: u32) -> Bvh2<Instance> {
+fn instances(count: u32) -> Bvh2<InstanceRecord> {
     let boxes: Vec<Result<Aabb, u32>> = soup(count as usize, 0.1, 5)
         .iter()
         .enumerate()
         .map(|(i, c)| if i % 4 == 1 { Err(status::BAD_INSTANCE) } else { Ok(Aabb::around(c)) })
         .collect();
-    let record = |instance: u32| Instance {
+    let record = |instance: u32| InstanceRecord {
         structure: if instance % 4 == 1 { 0 } else { 0x1_0000_0000 * u64::from(instance) + 256 },
         instance,
         index_and_mask: instance * 3,
@@ -330,7 +330,7 @@ fn what_is_copied_is_hit_as_before() {
 fn boxes_of_the_device_are_compacted() {
     let given: Vec<[[f32; 3]; 2]> = soup(3000, 0.05, 3).iter().map(|c| Aabb::around(c)).map(|b| [b.lo, b.hi]).collect();
     let codes = Code::Emc64Var.full();
-    let options = Options { primitives: Primitives::Boxes, codes: Some(codes), ..Options::DEFAULT };
+    let options = BuildOptions { primitives: Primitives::Boxes, codes: Some(codes), ..BuildOptions::DEFAULT };
     let builder = Builder::new(device(), &options, given.len() as u32).expect("few enough");
     let aabbs = device().upload("boxes", &given).expect("memory");
     let geometry = Geometry { vertex_stride: 24, ..Geometry::mesh(aabbs.address(), given.len() as u32, 0) };
@@ -360,7 +360,7 @@ fn serialising_and_back_gives_the_same_bytes() {
 
             let head: Head = bytemuck::pod_read_unaligned(&expected[..size_of::<Head>()]);
             let header = header_of(bytes);
-            let handles = u64::from(if header.kind == Instance::KIND { header.primitive_count } else { 0 });
+            let handles = u64::from(if header.kind == InstanceRecord::KIND { header.primitive_count } else { 0 });
             assert_eq!(property(&source, Property::BottomLevelPointers), handles, "{}", case.name);
             let sizes = (head.serialized_bytes, head.structure_bytes, head.handle_count);
             assert_eq!(sizes, (56 + 8 * handles + bytes.len() as u64, bytes.len() as u64, handles));
@@ -443,7 +443,9 @@ fn a_world_that_was_read_back_answers_queries_as_before() {
         let top = bytes_of(&built.top);
         let compacted = Guarded::new(size_after(&built.top, Property::CompactedSize));
         copy_of(built.top.structure, compacted.handle(), Mode::COMPACT);
-        assert!(compacted.read() == Bvh2::<Instance>::from_bytes(&top).expect("a top level").compacted().to_bytes());
+        assert!(
+            compacted.read() == Bvh2::<InstanceRecord>::from_bytes(&top).expect("a top level").compacted().to_bytes()
+        );
         assert_eq!(backend.probe(compacted.handle(), &rays), before, "compacted, {flags:?}");
 
         let mut kept = hedgerow::accel::twin::serialize::write(&compacted.read()).expect("a structure");

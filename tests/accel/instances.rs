@@ -9,7 +9,7 @@ use crate::common::shapes::{Corners, boxes, icosphere, soup};
 use crate::common::world::{Part, World, instances_at, top_level, transformed};
 use hedgerow::accel::Instance;
 use hedgerow::ash::vk;
-use hedgerow::bvh::layout::{Bvh2, Instance as Placed};
+use hedgerow::bvh::layout::{Bvh2, InstanceRecord as Placed};
 use hedgerow::geometry::Aabb;
 use hedgerow_lab::random::SplitMix64;
 use vk::GeometryFlagsKHR as GeometryFlags;

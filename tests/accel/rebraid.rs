@@ -6,7 +6,7 @@ use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
 use crate::common::probe::{IGNORE, ProbeRay, flags};
 use crate::common::shapes::{Corners, icosphere, placed, soup};
 use crate::common::world::World;
-use hedgerow::accel::{self, Instance, Options, REBRAID, twin};
+use hedgerow::accel::{self, AccelOptions, Instance, REBRAID, twin};
 use hedgerow::ash::vk;
 use hedgerow::bvh::layout::{self, Bvh2, Triangle, status};
 use hedgerow_lab::random::SplitMix64;
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 
 fn with_budget(rebraid_budget: f32) -> Ours {
-    Ours::with_options(device(), Options { rebraid_budget, ..Options::DEFAULT })
+    Ours::with_options(device(), AccelOptions { rebraid_budget, ..AccelOptions::DEFAULT })
 }
 
 #[test]
@@ -36,7 +36,7 @@ fn a_top_level_has_the_bytes_of_the_hosts() {
         for by_pointers in [false, true] {
             let world = World { by_pointers, ..mixture(count, count as u64) };
             let read = ReadBack::new(&backend, &world);
-            let options = Options { rebraid_budget: budget, ..Options::DEFAULT };
+            let options = AccelOptions { rebraid_budget: budget, ..AccelOptions::DEFAULT };
             let expected = twin::top_level(&read.instances, |a| read.below(a), world.flags, &options);
             let what = format!("{count} instances, budget {budget}");
             assert_eq!(read.top.header, expected.header, "{what}");
@@ -60,7 +60,7 @@ fn what_the_flags_ask_for_is_what_the_host_builds() {
     ];
     for flags in all {
         let read = ReadBack::new(&backend, &World { flags, ..world.clone() });
-        let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &Options::DEFAULT);
+        let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &AccelOptions::DEFAULT);
         assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}");
         let opens = flags.contains(REBRAID) && !flags.contains(Flags::ALLOW_UPDATE);
         assert_eq!(read.top.header.primitive_count > 400, opens, "{flags:?}");
@@ -221,7 +221,7 @@ fn fewer_instances_than_were_planned_for_are_opened_too() {
             )
         })
         .expect("it builds");
-    let tree: Bvh2<layout::Instance> =
+    let tree: Bvh2<layout::InstanceRecord> =
         Bvh2::from_bytes(&top.memory.read::<u8>(top.bytes as usize)).expect("a top level");
     let mut counts = BTreeMap::<u32, u32>::new();
     tree.records.iter().filter(|r| r.structure != 0).for_each(|r| *counts.entry(r.instance).or_default() += 1);

@@ -2,7 +2,7 @@
 
 use crate::common::corpus;
 use crate::common::twins::{assert_same, on_device, on_host};
-use hedgerow::bvh::builder::{Options, Schedule};
+use hedgerow::bvh::builder::{BuildOptions, Schedule};
 use hedgerow::bvh::codes::Codes;
 
 const CODES: [&str; 16] = [
@@ -66,7 +66,7 @@ fn every_prefix_gives_the_bytes_of_the_host() {
     for mesh in meshes().into_iter().chain(corpus::meshes()) {
         for codes in CODES {
             let codes: Codes = codes.parse().unwrap();
-            let options = Options { codes: Some(codes), schedule: Some(Schedule::Chain), ..Options::DEFAULT };
+            let options = BuildOptions { codes: Some(codes), schedule: Some(Schedule::Chain), ..BuildOptions::DEFAULT };
             let expected = on_host(&mesh, &options);
             expected.validate().unwrap_or_else(|e| panic!("{} {codes}: {e}", mesh.0));
             assert_same(&on_device(&mesh, &options), &expected, &format!("{} {codes}", mesh.0));

@@ -3,21 +3,22 @@
 use crate::common::shapes::{Corners, icosphere, placed, soup, tree_with};
 use crate::common::{corpus, device};
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::epo::{Buffers, Figures, OnDevice};
+use hedgerow::bvh::epo::{OverlapBuffers, OverlapFigures, OverlapPass};
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
 use hedgerow_lab::random::SplitMix64;
 
 /// In pieces of so many records.
-fn on_device(tree: &Bvh2, piece: u32) -> Figures {
+fn on_device(tree: &Bvh2, piece: u32) -> OverlapFigures {
     let device = device();
     let records = tree.header.primitive_count;
-    let measure = OnDevice::new(device, records);
+    let measure = OverlapPass::new(device, records);
     let structure = device.upload("structure", &tree.to_bytes()).expect("memory");
     let scratch = device.buffer("scratch", measure.scratch_bytes()).expect("memory");
-    let result = device.buffer("result", size_of::<Figures>() as u64).expect("memory");
-    let buffers = Buffers { structure: structure.address(), scratch: scratch.address(), result: result.address() };
+    let result = device.buffer("result", size_of::<OverlapFigures>() as u64).expect("memory");
+    let buffers =
+        OverlapBuffers { structure: structure.address(), scratch: scratch.address(), result: result.address() };
     device
         .run(None, |recorder| {
             measure.begin(recorder, &buffers)?;

@@ -4,7 +4,7 @@ use crate::common::device;
 use crate::common::geometries::{MOVED, Owned, half};
 use crate::common::shapes::{Corners, soup};
 use crate::common::twins::{assert_same, built};
-use hedgerow::bvh::builder::{Options, Schedule};
+use hedgerow::bvh::builder::{BuildOptions, Schedule};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{IndexFormat, Input, Source, VertexFormat};
 use hedgerow::bvh::layout::{Bvh2, status};
@@ -38,7 +38,7 @@ fn assert_as_on_the_host(geometries: &[Owned], shift: usize) -> Bvh2 {
         };
         for schedule in [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup] {
             let (codes, schedule) = (Some(Code::Emc64Var.full()), Some(schedule));
-            let options = Options { codes, schedule, geometry_count, ..Options::DEFAULT };
+            let options = BuildOptions { codes, schedule, geometry_count, ..BuildOptions::DEFAULT };
             let got = built(&options, &Input { source, primitive_count: first });
             assert_same(&got, &expected, &format!("{source:?} {schedule:?}"));
         }
@@ -93,7 +93,7 @@ fn vertices_behind_four_billion_bytes_are_found() {
         let indices = device().upload("indices", &triangles).expect("memory");
         // Where vertex 0 would lie; nobody reads it.
         let begin = vertices.address().wrapping_sub(12 * u64::from(first));
-        let options = Options { codes: Some(Code::Emc64Var.full()), ..Options::DEFAULT };
+        let options = BuildOptions { codes: Some(Code::Emc64Var.full()), ..BuildOptions::DEFAULT };
         built(&options, &Input::mesh(begin, first + count, indices.address(), count / 3))
     };
     let expected = tree(0);

@@ -2,10 +2,10 @@
 
 use crate::common::twins::{assert_same, on_device, on_host};
 use crate::common::{corpus, device};
-use hedgerow::bvh::builder::{Options, Schedule};
+use hedgerow::bvh::builder::{BuildOptions, Schedule};
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow::bvh::quality::{Figures, OnDevice, Quality};
+use hedgerow::bvh::quality::{Quality, QualityFigures, QualityPass};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
 use hedgerow::bvh::twin::quality;
@@ -31,12 +31,12 @@ fn quality_on_the_device_equals_the_walk_on_the_host() {
     }
 }
 
-fn quality_on_device(tree: &Bvh2) -> Figures {
+fn quality_on_device(tree: &Bvh2) -> QualityFigures {
     let device = device();
-    let measure = OnDevice::new(device, tree.header.primitive_count);
+    let measure = QualityPass::new(device, tree.header.primitive_count);
     let structure = device.upload("structure", &tree.to_bytes()).unwrap();
     let scratch = device.buffer("scratch", measure.scratch_bytes()).unwrap();
-    let result = device.buffer("result", size_of::<Figures>() as u64).unwrap();
+    let result = device.buffer("result", size_of::<QualityFigures>() as u64).unwrap();
     device.run(None, |r| measure.record(r, structure.address(), scratch.address(), result.address())).unwrap();
     result.read(1)[0]
 }
@@ -62,12 +62,12 @@ fn every_code_and_schedule_gives_the_bytes_of_the_host() {
     for mesh in corpus::meshes() {
         for (codes, collapse) in KINDS {
             let codes: Codes = codes.parse().unwrap();
-            let options = Options { codes: Some(codes), collapse, ..Options::DEFAULT };
+            let options = BuildOptions { codes: Some(codes), collapse, ..BuildOptions::DEFAULT };
             let expected = on_host(&mesh, &options);
             let what = format!("{} {codes} {collapse:?}", mesh.0);
             expected.validate().unwrap_or_else(|e| panic!("{what}: {e}"));
             for schedule in [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup] {
-                let got = on_device(&mesh, &Options { schedule: Some(schedule), ..options });
+                let got = on_device(&mesh, &BuildOptions { schedule: Some(schedule), ..options });
                 assert_same(&got, &expected, &format!("{what} {schedule:?}"));
             }
         }

@@ -3,7 +3,7 @@
 
 use crate::common::twins::{assert_same, on_host};
 use crate::common::{OPTIONS, corpus, open};
-use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Treelets};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Input, Method, Schedule, Treelets};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::gpu::TuningChoice;
@@ -16,7 +16,7 @@ const METHODS: [Method; 4] = [
     Method::Ploc { radius: Method::MOST_RADIUS },
 ];
 
-fn built(device: &Device, (_, positions, triangles): &corpus::Mesh, options: &Options) -> Bvh2 {
+fn built(device: &Device, (_, positions, triangles): &corpus::Mesh, options: &BuildOptions) -> Bvh2 {
     let vertices = device.upload("positions", positions).expect("memory");
     let indices = device.upload("indices", triangles).expect("memory");
     let count = triangles.len() as u32;
@@ -35,8 +35,9 @@ fn has_the_bytes_of_the_host(restrict: &str) {
     let meshes = corpus::meshes();
     let mesh = meshes.iter().max_by_key(|mesh| mesh.2.len()).expect("a corpus");
     for method in METHODS {
-        let options = Options { method, codes: Some(Code::Emc64Var.full().with_bits(32)), ..Options::DEFAULT };
-        let options = Options { schedule: Some(Schedule::Chain), ..options };
+        let options =
+            BuildOptions { method, codes: Some(Code::Emc64Var.full().with_bits(32)), ..BuildOptions::DEFAULT };
+        let options = BuildOptions { schedule: Some(Schedule::Chain), ..options };
         assert_same(&built(&device, mesh, &options), &on_host(mesh, &options), &format!("{restrict:?} {method:?}"));
     }
 }

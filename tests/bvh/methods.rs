@@ -2,7 +2,7 @@
 
 use crate::common::corpus;
 use crate::common::twins::{assert_same, on_device, on_host};
-use hedgerow::bvh::builder::{Method, Options, Schedule, Treelets, Window};
+use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::reinsertion;
 use hedgerow::bvh::sah::Collapse;
@@ -17,12 +17,12 @@ fn equals_the_host<const N: usize>(methods: [Method; N]) {
         for (i, (method, codes)) in methods.into_iter().zip(codes.into_iter().cycle()).enumerate() {
             let schedules = if i == 0 { &[Schedule::Chain, Schedule::Persistent][..] } else { &[Schedule::Chain] };
             for collapse in [Collapse::OFF, Collapse::SAH] {
-                let options = Options { method, codes: Some(codes), collapse, ..Options::DEFAULT };
+                let options = BuildOptions { method, codes: Some(codes), collapse, ..BuildOptions::DEFAULT };
                 let expected = on_host(&mesh, &options);
                 let what = format!("{} {codes} {method:?} {collapse:?}", mesh.0);
                 expected.validate().unwrap_or_else(|e| panic!("{what}: {e}"));
                 for &schedule in schedules {
-                    let got = on_device(&mesh, &Options { schedule: Some(schedule), ..options });
+                    let got = on_device(&mesh, &BuildOptions { schedule: Some(schedule), ..options });
                     assert_same(&got, &expected, &format!("{what} {schedule:?}"));
                 }
             }
@@ -40,13 +40,13 @@ fn hlbvh_gives_the_bytes_of_the_host() {
 
 #[test]
 fn optimised_trees_are_those_of_the_host() {
-    let optimise = reinsertion::Options { rounds: 6, stride: 2 };
+    let optimise = reinsertion::ReinsertionOptions { rounds: 6, stride: 2 };
     for mesh in corpus::meshes() {
         for method in
             [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)]
         {
             let codes = Some(Code::Emc64Var.full());
-            let options = Options { method, codes, optimise: Some(optimise), ..Options::DEFAULT };
+            let options = BuildOptions { method, codes, optimise: Some(optimise), ..BuildOptions::DEFAULT };
             let expected = on_host(&mesh, &options);
             let what = format!("{} {method:?}", mesh.0);
             expected.validate().unwrap_or_else(|e| panic!("{what}: {e}"));
@@ -75,7 +75,7 @@ fn large_inputs_give_the_bytes_of_the_host() {
     for method in
         [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 3 }, Method::Hploc(Window::DEFAULT)]
     {
-        let options = Options { method, codes: Some(Code::Mc30.full()), ..Options::DEFAULT };
+        let options = BuildOptions { method, codes: Some(Code::Mc30.full()), ..BuildOptions::DEFAULT };
         let expected = on_host(&mesh, &options);
         expected.validate().unwrap_or_else(|e| panic!("{method:?}: {e}"));
         assert_same(&on_device(&mesh, &options), &expected, &format!("{method:?}"));

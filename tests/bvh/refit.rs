@@ -8,20 +8,20 @@ use crate::common::{corpus, device};
 use hedgerow::bvh::builder::{self, Builder};
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, VertexFormat};
-use hedgerow::bvh::layout::{BoxRecord, Bvh2, Child, Instance, Record, Triangle, status};
-use hedgerow::bvh::refit::{Job, Options, Refit, Schedule};
+use hedgerow::bvh::layout::{BoxRecord, Bvh2, Child, InstanceRecord, Record, Triangle, status};
+use hedgerow::bvh::refit::{Refit, RefitJob, RefitOptions, RefitSchedule};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
 use hedgerow::bvh::twin::quality;
 use hedgerow::geometry::Aabb;
-use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::tracer::closest_hit_by_brute_force;
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::device::Buffer;
 use hedgerow_lab::random::SplitMix64;
 
 const SIZES: [usize; 10] = [0, 1, 2, 3, 8, 9, 64, 65, 1000, 20_000];
-const SCHEDULES: [Schedule; 2] = [Schedule::Chain, Schedule::Workgroup];
+const SCHEDULES: [RefitSchedule; 2] = [RefitSchedule::Chain, RefitSchedule::Workgroup];
 const GUARD: usize = 256;
 
 /// A structure on the device with its scratch memory, and guards behind both.
@@ -33,15 +33,20 @@ struct Placed {
 }
 
 impl Placed {
-    fn new(structure: &[u8], options: &Options, primitive_count: u32) -> Placed {
+    fn new(structure: &[u8], options: &RefitOptions, primitive_count: u32) -> Placed {
         let refit = Refit::new(device(), options, primitive_count).expect("few enough primitives");
         let guarded = |bytes: &[u8]| device().upload("guarded", &[bytes, &[0xa5; GUARD]].concat()).expect("memory");
-        let scratch = guarded(&vec![0xa5; refit.sizes().scratch as usize]);
+        let scratch = guarded(&vec![0xa5; refit.scratch_bytes() as usize]);
         Placed { structure: guarded(structure), bytes: structure.len(), scratch, refit }
     }
 
-    fn job(&self, input: &Input) -> Job<'_> {
-        Job { refit: &self.refit, input: *input, structure: self.structure.address(), scratch: self.scratch.address() }
+    fn job(&self, input: &Input) -> RefitJob<'_> {
+        RefitJob {
+            refit: &self.refit,
+            input: *input,
+            structure: self.structure.address(),
+            scratch: self.scratch.address(),
+        }
     }
 
     fn refit(&self, input: &Input) {
@@ -52,7 +57,7 @@ impl Placed {
     /// The structure, if nothing was written behind it and the scratch memory.
     fn read(&self) -> Vec<u8> {
         let mut bytes = self.structure.read::<u8>(self.bytes + GUARD);
-        let scratch = self.scratch.read_at::<u8>(self.refit.sizes().scratch, GUARD);
+        let scratch = self.scratch.read_at::<u8>(self.refit.scratch_bytes(), GUARD);
         assert!(bytes.split_off(self.bytes).iter().chain(&scratch).all(|&b| b == 0xa5), "wrote behind its memory");
         bytes
     }
@@ -132,7 +137,7 @@ fn scattered(seed: u64) -> impl FnMut([f32; 3]) -> [f32; 3] {
 fn assert_as_on_the_host(what: &str, tree: &Bvh2, mesh: &Mesh) -> Bvh2 {
     let expected = mesh.refitted(tree);
     for schedule in SCHEDULES {
-        let options = Options { schedule: Some(schedule), ..Options::DEFAULT };
+        let options = RefitOptions { schedule: Some(schedule), ..RefitOptions::DEFAULT };
         let placed = Placed::new(&tree.to_bytes(), &options, mesh.count());
         placed.refit(&mesh.input());
         let got = Bvh2::<Triangle>::from_bytes(&placed.read()).expect("a structure");
@@ -149,9 +154,14 @@ fn assert_hits(structure: &Bvh2, rays: &[Ray], expected: &[Hit]) {
     let ray_buffer = device().upload("rays", rays).expect("memory");
     let hits = device().buffer("hits", size_of_val(expected) as u64).expect("memory");
     let count = rays.len() as u32;
-    let buffers =
-        Buffers { structure: structure.address(), rays: ray_buffer.address(), hits: hits.address(), work: None, count };
-    let shape = Shape::of(device());
+    let buffers = TraceBuffers {
+        structure: structure.address(),
+        rays: ray_buffer.address(),
+        hits: hits.address(),
+        work: None,
+        count,
+    };
+    let shape = TraceShape::of(device());
     device().run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
     assert!(hits.read::<Hit>(rays.len()) == expected);
 }
@@ -328,7 +338,7 @@ fn twenty_refits_back_to_the_start_give_the_first_bytes() {
         let mesh = Mesh::random(count);
         let tree = mesh.built(Collapse::SAH);
         for schedule in SCHEDULES {
-            let options = Options { schedule: Some(schedule), ..Options::DEFAULT };
+            let options = RefitOptions { schedule: Some(schedule), ..RefitOptions::DEFAULT };
             let placed = Placed::new(&tree.to_bytes(), &options, mesh.count());
             let mut at_the_far_end: Option<Vec<u8>> = None;
             for round in 0..20 {
@@ -458,7 +468,7 @@ fn every_format_and_several_geometries_are_refitted_as_on_the_host() {
         for source in sources {
             for schedule in SCHEDULES {
                 let geometry_count = records.len() as u32;
-                let options = Options { schedule: Some(schedule), geometry_count, ..Options::DEFAULT };
+                let options = RefitOptions { schedule: Some(schedule), geometry_count, ..RefitOptions::DEFAULT };
                 let placed = Placed::new(&tree.to_bytes(), &options, count);
                 placed.refit(&Input { source, primitive_count: count });
                 assert!(placed.read() == expected.to_bytes(), "{source:?} {schedule:?}");
@@ -513,7 +523,7 @@ fn boxes_are_refitted_as_on_the_host() {
             ] {
                 for schedule in SCHEDULES {
                     let geometry_count = counts.len().max(1) as u32;
-                    let options = Options {
+                    let options = RefitOptions {
                         schedule: Some(schedule),
                         primitives: Primitives::Boxes,
                         is_split: false,
@@ -542,7 +552,7 @@ fn rays_do_not_meet_boxes_that_are_left_out() {
     let ray = ProbeRay { decision: probe::IGNORE, ..ProbeRay::new([-1.0, 0.5, 0.5], [1.0, 0.0, 0.0]) };
     for collapse in [Collapse::SAH, Collapse::OFF] {
         let tree = twin::lbvh::build_aabbs(&given, Codes::for_count(5), collapse);
-        let options = Options { primitives: Primitives::Boxes, costs: collapse, ..Options::DEFAULT };
+        let options = RefitOptions { primitives: Primitives::Boxes, costs: collapse, ..RefitOptions::DEFAULT };
         let placed = Placed::new(&tree.to_bytes(), &options, 5);
         let met = || {
             let report = Probe::ours(device()).ask(placed.structure.address(), &[ray])[0];
@@ -624,7 +634,7 @@ fn top_levels_are_refitted_to_their_entries() {
             (Input { source, primitive_count: count as u32 }, (entries, instances))
         };
         let built = |input: &Input| {
-            let options = builder::Options { primitives: Primitives::Instances, ..builder::Options::DEFAULT };
+            let options = builder::BuildOptions { primitives: Primitives::Instances, ..builder::BuildOptions::DEFAULT };
             let builder = Builder::new(device(), &options, count as u32).expect("few enough");
             let sizes = builder.sizes();
             let structure = device().buffer("structure", sizes.structure).expect("memory");
@@ -632,14 +642,14 @@ fn top_levels_are_refitted_to_their_entries() {
             structure.write(&vec![0u8; sizes.structure as usize]);
             let (at, scratch) = (structure.address(), scratch.address());
             device().run(None, |r| builder.record(r, input, at, scratch)).expect("it builds");
-            Bvh2::<Instance>::from_bytes(&structure.read::<u8>(sizes.structure as usize)).expect("a structure")
+            Bvh2::<InstanceRecord>::from_bytes(&structure.read::<u8>(sizes.structure as usize)).expect("a structure")
         };
         let (input, _memory) = on_device(&entries, &given);
         let (moved_input, _moved_memory) = on_device(&moved, &moved_given);
         let tree = built(&input);
         tree.validate().expect("a valid tree");
         // What a build makes of the moved instances.
-        let mut fresh = vec![Instance::left_out(0); count];
+        let mut fresh = vec![InstanceRecord::left_out(0); count];
         built(&moved_input).records.iter().for_each(|record| fresh[record.instance as usize] = *record);
         let boxes: Vec<Result<Aabb, u32>> = moved
             .iter()
@@ -649,12 +659,13 @@ fn top_levels_are_refitted_to_their_entries() {
         twin::refit::refit_boxes(&mut expected, &boxes, |instance| fresh[instance as usize], Collapse::SAH);
         assert_eq!(expected.header.status, if count > 6 { status::BAD_INSTANCE } else { 0 });
         for schedule in SCHEDULES {
-            let options = Options { schedule: Some(schedule), primitives: Primitives::Instances, ..Options::DEFAULT };
+            let options =
+                RefitOptions { schedule: Some(schedule), primitives: Primitives::Instances, ..RefitOptions::DEFAULT };
             let placed = Placed::new(&tree.to_bytes(), &options, count as u32);
             placed.refit(&moved_input);
             assert!(placed.read() == expected.to_bytes(), "{count} {schedule:?}");
             placed.refit(&input);
-            let mut back = Bvh2::<Instance>::from_bytes(&placed.read()).expect("a structure");
+            let mut back = Bvh2::<InstanceRecord>::from_bytes(&placed.read()).expect("a structure");
             back.header.status = tree.header.status;
             assert!(back.to_bytes() == tree.to_bytes(), "{count} {schedule:?}: back");
         }
@@ -670,9 +681,9 @@ fn refits_of_a_batch_are_those_of_the_host() {
     let placed: Vec<Placed> = trees
         .iter()
         .zip(&meshes)
-        .map(|(tree, mesh)| Placed::new(&tree.to_bytes(), &Options::DEFAULT, mesh.count()))
+        .map(|(tree, mesh)| Placed::new(&tree.to_bytes(), &RefitOptions::DEFAULT, mesh.count()))
         .collect();
-    let jobs: Vec<Job<'_>> = placed.iter().zip(&moved).map(|(placed, mesh)| placed.job(&mesh.input())).collect();
+    let jobs: Vec<RefitJob<'_>> = placed.iter().zip(&moved).map(|(placed, mesh)| placed.job(&mesh.input())).collect();
     let chains = Refit::chains(&jobs).expect("every input is as planned");
     let small = meshes.iter().filter(|mesh| (1..=4096).contains(&mesh.count())).count();
     let large = meshes.iter().filter(|mesh| mesh.count() > 4096).count();
@@ -693,21 +704,21 @@ fn what_was_not_planned_for_is_left_as_it_is() {
     // Scratch memory for fewer primitives than the structure has; a structure of boxes; none at all.
     let few = mesh.count() - 1;
     for schedule in SCHEDULES {
-        let options = Options { schedule: Some(schedule), ..Options::DEFAULT };
+        let options = RefitOptions { schedule: Some(schedule), ..RefitOptions::DEFAULT };
         for (bytes, count) in [(&bytes, few), (&boxes, 100), (&no_structure, 100)] {
             let placed = Placed::new(bytes, &options, count);
             placed.refit(&Input { primitive_count: count, ..mesh.moved(bent(1.0)).input() });
             assert!(placed.read() == **bytes, "{count} {schedule:?}");
         }
     }
-    let refit = Refit::new(device(), &Options::DEFAULT, 100).expect("few enough");
+    let refit = Refit::new(device(), &RefitOptions::DEFAULT, 100).expect("few enough");
     let refused = |input: &Input| refit.steps(input, 256, 256).expect_err("another input").to_string();
     assert!(refused(&Input { primitive_count: 99, ..mesh.input() }).contains("planned for 100 primitives"));
     let several = Source::Several { records: 256, count: 5 };
     assert!(refused(&Input { source: several, ..mesh.input() }).contains("planned for 1 geometries"));
     let entries = Source::Entries(256);
     assert!(refused(&Input { source: entries, ..mesh.input() }).contains("planned for Triangles"));
-    let error = Refit::new(device(), &Options::DEFAULT, (1 << 27) + 1).expect_err("too many").to_string();
+    let error = Refit::new(device(), &RefitOptions::DEFAULT, (1 << 27) + 1).expect_err("too many").to_string();
     assert!(error.contains("at most 134217728"), "{error}");
 }
 
@@ -734,5 +745,5 @@ fn records_of_what_is_left_out_are_no_others() {
     assert!(!zero.is_left_out() && Triangle::left_out(3).is_left_out());
     let point = BoxRecord { lo: [1.0; 3], hi: [1.0; 3], primitive: 3 };
     assert!(!point.is_left_out() && BoxRecord::left_out(3).is_left_out());
-    assert!(Instance::left_out(3).is_left_out());
+    assert!(InstanceRecord::left_out(3).is_left_out());
 }

@@ -3,7 +3,7 @@
 use crate::common::{corpus, device};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::{Bvh2, MAX_DEPTH};
-use hedgerow::bvh::reinsertion::{Options, Reinsertion};
+use hedgerow::bvh::reinsertion::{Reinsertion, ReinsertionOptions};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::quality;
 use hedgerow::bvh::twin::{lbvh, ploc};
@@ -19,7 +19,11 @@ fn trees() -> impl Iterator<Item = (String, Bvh2)> {
 }
 
 /// Few links a round, every link, and a stride that all of them take.
-const OPTIONS: [Options; 3] = [Options::FAST, Options { rounds: 4, stride: 1 }, Options { rounds: 12, stride: 5 }];
+const OPTIONS: [ReinsertionOptions; 3] = [
+    ReinsertionOptions::FAST,
+    ReinsertionOptions { rounds: 4, stride: 1 },
+    ReinsertionOptions { rounds: 12, stride: 5 },
+];
 
 /// Cost of the steps: what reinsertion lessens.
 fn area(tree: &Bvh2) -> f64 {
@@ -51,7 +55,7 @@ fn a_tree_that_is_bad_below_becomes_better_than_a_good_one() {
     let (_, positions, triangles) = corpus::random("random 1023", 1023, [0.0; 3], [1.0; 3]);
     let lbvh = |bits| lbvh::build(&positions, &triangles, Code::Mc30.full().with_bits(bits), Collapse::OFF);
     let (bad, good) = (lbvh(6), ploc::build(&lbvh(30), 25));
-    let optimised = bad.reinserted(&Options::HIGH);
+    let optimised = bad.reinserted(&ReinsertionOptions::HIGH);
     assert!(area(&bad) > 1.3 * area(&good), "{} is not bad against {}", area(&bad), area(&good));
     assert!(area(&optimised) < area(&good), "{} against {}", area(&optimised), area(&good));
 }

@@ -3,7 +3,7 @@
 use crate::common::corpus::{self, soup};
 use crate::common::device;
 use crate::common::twins::{assert_same, built, on_device, on_host};
-use hedgerow::bvh::builder::{Builder, Input, Method, Options, Schedule, Source, Treelets, Window};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Input, Method, Schedule, Source, Treelets, Window};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, Primitives};
 use hedgerow::bvh::layout::Bvh2;
@@ -19,11 +19,11 @@ use hedgerow::trace::wide::Order;
 use hedgerow::trace::{Query, Ray};
 
 /// The usual, and as much as there may be.
-const SPLITS: [split::Options; 2] = [split::Options::DEFAULT, ALL];
-const ALL: split::Options = split::Options { fraction: 1.0, most: split::Options::MOST_SPLITS };
+const SPLITS: [split::SplitOptions; 2] = [split::SplitOptions::DEFAULT, ALL];
+const ALL: split::SplitOptions = split::SplitOptions { fraction: 1.0, most: split::SplitOptions::MOST_SPLITS };
 
 /// Without splits, collapsed by SAH.
-const WHOLE: Options = Options { codes: Some(Code::Emc64Var.full()), ..Options::DEFAULT };
+const WHOLE: BuildOptions = BuildOptions { codes: Some(Code::Emc64Var.full()), ..BuildOptions::DEFAULT };
 
 /// Triangles that reach across the scene in all directions.
 fn large(count: usize) -> corpus::Mesh {
@@ -62,8 +62,8 @@ fn meshes() -> Vec<corpus::Mesh> {
 }
 
 /// The LBVH's tree with splits, not collapsed.
-fn lbvh(mesh: &corpus::Mesh, split: split::Options) -> Bvh2 {
-    on_host(mesh, &Options { split: Some(split), collapse: Collapse::OFF, ..WHOLE })
+fn lbvh(mesh: &corpus::Mesh, split: split::SplitOptions) -> Bvh2 {
+    on_host(mesh, &BuildOptions { split: Some(split), collapse: Collapse::OFF, ..WHOLE })
 }
 
 #[test]
@@ -72,13 +72,13 @@ fn every_method_gives_the_bytes_of_the_host() {
         [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)];
     for mesh in meshes() {
         for (i, method) in methods.into_iter().enumerate() {
-            let options = Options { method, split: Some(SPLITS[i % 2]), ..WHOLE };
+            let options = BuildOptions { method, split: Some(SPLITS[i % 2]), ..WHOLE };
             let expected = on_host(&mesh, &options);
             expected.validate().unwrap_or_else(|e| panic!("{} {method:?}: {e}", mesh.0));
             // The kernels of pools take long to compile: two methods stand for all.
             let pool = matches!(method, Method::Lbvh | Method::Hploc(_));
             for schedule in [Schedule::Chain, Schedule::Persistent].into_iter().take(1 + usize::from(pool)) {
-                let got = on_device(&mesh, &Options { schedule: Some(schedule), ..options });
+                let got = on_device(&mesh, &BuildOptions { schedule: Some(schedule), ..options });
                 assert_same(&got, &expected, &format!("{} {method:?} {schedule:?}", mesh.0));
             }
         }
@@ -87,13 +87,14 @@ fn every_method_gives_the_bytes_of_the_host() {
 
 #[test]
 fn codes_with_a_grid_or_sections_and_optimised_trees_are_those_of_the_host() {
-    let options = Options { split: Some(split::Options::DEFAULT), ..WHOLE };
+    let options = BuildOptions { split: Some(split::SplitOptions::DEFAULT), ..WHOLE };
     for mesh in [large(130), mixed()] {
         for codes in ["mip6", "bin2a4", "emc64var+robust"] {
-            let options = Options { codes: Some(codes.parse().expect("known")), ..options };
+            let options = BuildOptions { codes: Some(codes.parse().expect("known")), ..options };
             assert_same(&on_device(&mesh, &options), &on_host(&mesh, &options), &format!("{} {codes}", mesh.0));
         }
-        let options = Options { optimise: Some(reinsertion::Options { rounds: 6, stride: 2 }), ..options };
+        let options =
+            BuildOptions { optimise: Some(reinsertion::ReinsertionOptions { rounds: 6, stride: 2 }), ..options };
         let expected = on_host(&mesh, &options);
         expected.validate().expect("valid");
         assert_same(&on_device(&mesh, &options), &expected, &format!("{} optimised", mesh.0));
@@ -106,7 +107,7 @@ fn splits_are_within_the_budget_and_lower_the_cost_where_few_triangles_are_large
         let count = mesh.2.len() as u32;
         for split in SPLITS {
             let tree = lbvh(&mesh, split);
-            let whole = on_host(&mesh, &Options { collapse: Collapse::OFF, ..WHOLE });
+            let whole = on_host(&mesh, &BuildOptions { collapse: Collapse::OFF, ..WHOLE });
             assert_eq!(tree.header.primitive_count, count + split.budget(count), "{}", mesh.0);
             assert!(tree.header.active >= whole.header.active, "{}: a triangle is lost", mesh.0);
             assert_eq!(tree.header.status, whole.header.status, "{}", mesh.0);
@@ -125,9 +126,9 @@ fn splits_are_within_the_budget_and_lower_the_cost_where_few_triangles_are_large
 #[test]
 fn a_fraction_too_small_for_one_split_gives_the_tree_without() {
     let mesh = large(130);
-    let split = split::Options { fraction: 0.005, ..ALL };
-    let without = Options { codes: Some(Code::Mc63.full()), ..Options::DEFAULT };
-    let tree = on_device(&mesh, &Options { split: Some(split), ..without });
+    let split = split::SplitOptions { fraction: 0.005, ..ALL };
+    let without = BuildOptions { codes: Some(Code::Mc63.full()), ..BuildOptions::DEFAULT };
+    let tree = on_device(&mesh, &BuildOptions { split: Some(split), ..without });
     assert_same(&tree, &on_host(&mesh, &without), "as without");
 }
 
@@ -178,7 +179,7 @@ fn no_ray_loses_a_hit() {
         let whole = on_host(&mesh, &WHOLE);
         for collapse in [Collapse::OFF, Collapse::SAH] {
             let method = Method::Hploc(Window::DEFAULT);
-            let tree = on_host(&mesh, &Options { method, split: Some(ALL), collapse, ..WHOLE });
+            let tree = on_host(&mesh, &BuildOptions { method, split: Some(ALL), collapse, ..WHOLE });
             tree.validate().unwrap_or_else(|e| panic!("{}: {e}", mesh.0));
             let (wide4, wide8, quantised) = (Wide4::of(&tree), Wide8::of(&tree), Wide8q::of(&tree));
             wide4.validate().unwrap_or_else(|e| panic!("{} wide4: {e}", mesh.0));
@@ -206,7 +207,7 @@ fn no_ray_loses_a_hit() {
 #[test]
 fn a_compacted_split_tree_is_valid_and_has_the_same_hits() {
     let mesh = mixed();
-    let tree = lbvh(&mesh, split::Options::DEFAULT).collapsed(&Collapse::SAH);
+    let tree = lbvh(&mesh, split::SplitOptions::DEFAULT).collapsed(&Collapse::SAH);
     let compacted = tree.compacted();
     compacted.validate().expect("valid");
     assert_eq!(compacted.header.split_from, tree.header.split_from);
@@ -236,20 +237,21 @@ fn validation_sees_a_part_that_is_lost() {
 #[test]
 fn what_cannot_be_split_says_so() {
     let device = device();
-    let options = Options { split: Some(split::Options::DEFAULT), ..Options::DEFAULT };
-    let error = |options: &Options| Builder::new(device, options, 1000).map(drop).expect_err("refused").to_string();
+    let options = BuildOptions { split: Some(split::SplitOptions::DEFAULT), ..BuildOptions::DEFAULT };
+    let error =
+        |options: &BuildOptions| Builder::new(device, options, 1000).map(drop).expect_err("refused").to_string();
     for fraction in [-0.1, 1.1, f32::NAN] {
-        let options = Options { split: Some(split::Options { fraction, ..ALL }), ..options };
+        let options = BuildOptions { split: Some(split::SplitOptions { fraction, ..ALL }), ..options };
         assert!(error(&options).contains("the fraction of splits is 0 to 1"), "{fraction}");
     }
     for most in [0, 1024] {
-        let options = Options { split: Some(split::Options { most, ..ALL }), ..options };
+        let options = BuildOptions { split: Some(split::SplitOptions { most, ..ALL }), ..options };
         assert!(error(&options).contains("that is 1 to 1023"), "{most}");
     }
-    assert!(error(&Options { primitives: Primitives::Boxes, ..options }).contains("only triangles"));
-    assert!(error(&Options { schedule: Some(Schedule::Workgroup), ..options }).contains("choose chain, or none"));
+    assert!(error(&BuildOptions { primitives: Primitives::Boxes, ..options }).contains("only triangles"));
+    assert!(error(&BuildOptions { schedule: Some(Schedule::Workgroup), ..options }).contains("choose chain, or none"));
 
-    let refit = refit::Refit::new(device, &refit::Options::from(&options), 1000);
+    let refit = refit::Refit::new(device, &refit::RefitOptions::from(&options), 1000);
     assert!(refit.expect_err("refused").to_string().contains("build it again"));
 
     let builder = Builder::new(device, &options, 1000).unwrap();
@@ -260,8 +262,9 @@ fn what_cannot_be_split_says_so() {
 
 #[test]
 fn memory_grows_by_the_budget() {
-    let sizes = |split| Builder::new(device(), &Options { split, ..Options::DEFAULT }, 10_000).unwrap().sizes();
-    let (without, with) = (sizes(None), sizes(Some(split::Options { fraction: 0.5, ..ALL })));
+    let sizes =
+        |split| Builder::new(device(), &BuildOptions { split, ..BuildOptions::DEFAULT }, 10_000).unwrap().sizes();
+    let (without, with) = (sizes(None), sizes(Some(split::SplitOptions { fraction: 0.5, ..ALL })));
     // A node and a record for each reference.
     assert_eq!(with.structure - without.structure, 5000 * (64 + 40));
     assert!(with.scratch > without.scratch + 15_000 * 32, "room for the references");
@@ -270,7 +273,7 @@ fn memory_grows_by_the_budget() {
 #[test]
 fn triangles_of_other_formats_and_of_several_geometries_are_split_alike() {
     let (device, mesh) = (device(), mixed());
-    let options = Options { split: Some(split::Options::DEFAULT), ..WHOLE };
+    let options = BuildOptions { split: Some(split::SplitOptions::DEFAULT), ..WHOLE };
     let expected = on_host(&mesh, &options);
     let count = mesh.2.len() as u32;
     // Each triangle has vertices of its own, in order: they need no indices.
@@ -288,7 +291,7 @@ fn triangles_of_other_formats_and_of_several_geometries_are_split_alike() {
     };
     let records = device.upload("geometries", &[Geometry { vertex_count: 3 * FIRST, ..whole }, second]).unwrap();
     let source = Source::Several { records: records.address(), count: 2 };
-    let options = Options { geometry_count: 2, ..options };
+    let options = BuildOptions { geometry_count: 2, ..options };
     let tree = built(&options, &Input { source, primitive_count: count });
     let expected = expected.with_geometries(&[(FIRST, 0), (count - FIRST, 0)], 0);
     assert_same(&tree, &expected, "two geometries");
@@ -298,16 +301,16 @@ fn triangles_of_other_formats_and_of_several_geometries_are_split_alike() {
 fn a_refit_leaves_a_split_structure_as_it_is() {
     let (device, mesh) = (device(), mixed());
     let count = mesh.2.len() as u32;
-    let tree = lbvh(&mesh, split::Options::DEFAULT).collapsed(&Collapse::SAH);
+    let tree = lbvh(&mesh, split::SplitOptions::DEFAULT).collapsed(&Collapse::SAH);
     // As large as one without splits, so that nothing but the header tells.
     let before = tree.compacted().to_bytes();
     let planned = tree.header.active;
-    let refit = refit::Refit::new(device, &refit::Options::DEFAULT, planned).unwrap();
+    let refit = refit::Refit::new(device, &refit::RefitOptions::DEFAULT, planned).unwrap();
     let positions: Vec<[f32; 3]> = mesh.1.iter().map(|p| p.map(|x| x + 1.0)).collect();
     let vertices = device.upload("positions", &positions).unwrap();
     let indices = device.upload("indices", &mesh.2).unwrap();
     let structure = device.upload("structure", &before).unwrap();
-    let scratch = device.buffer("scratch", refit.sizes().scratch).unwrap();
+    let scratch = device.buffer("scratch", refit.scratch_bytes()).unwrap();
     // Room for more triangles than there are: none is read.
     let input = Input::mesh(vertices.address(), 3 * count, indices.address(), planned);
     device.run(None, |r| refit.record(r, &input, structure.address(), scratch.address())).unwrap();

@@ -6,7 +6,7 @@ use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child, Header, Node, Record, Triangle, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
-use hedgerow::bvh::wide::device::{OnDevice, Options};
+use hedgerow::bvh::wide::device::{WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::geometry::Aabb;
@@ -22,8 +22,8 @@ fn collapsed<N: WideNode>(tree: &Bvh2) -> Vec<u8> {
 fn collapsed_as<N: WideNode>(tree: &Bvh2, count: u32) -> Vec<u8> {
     let device = device();
     let geometry_count = tree.header.geometry_count;
-    let options = Options { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
-    let wide = OnDevice::new(device, &options, count);
+    let options = WideOptions { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
+    let wide = WidePass::new(device, &options, count);
     let sizes = wide.sizes();
     let source = device.upload("source", &tree.to_bytes()).unwrap();
     // Whatever was there before is of no interest.

@@ -2,18 +2,18 @@
 
 use super::corpus::Mesh;
 use super::device;
-use hedgerow::bvh::builder::{Input, Options};
+use hedgerow::bvh::builder::{BuildOptions, Input};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow_lab::experiments::check::twins;
 pub use hedgerow_lab::experiments::check::twins::{PLENTY, PLENTY_TO_MERGE, on_host};
 
 /// The device's tree over `input`.
-pub fn built(options: &Options, input: &Input) -> Bvh2 {
+pub fn built(options: &BuildOptions, input: &Input) -> Bvh2 {
     twins::built(device(), options, input)
 }
 
 /// The device's tree of a mesh.
-pub fn on_device(mesh: &Mesh, options: &Options) -> Bvh2 {
+pub fn on_device(mesh: &Mesh, options: &BuildOptions) -> Bvh2 {
     twins::on_device(device(), mesh, options)
 }
 

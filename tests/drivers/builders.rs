@@ -2,7 +2,7 @@
 
 use super::meshes;
 use crate::common::twins::{assert_same, on_device, on_host};
-use hedgerow::bvh::builder::{Method, Options, Schedule, Treelets, Window};
+use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::{reinsertion, split};
@@ -17,13 +17,13 @@ fn methods() -> [(Method, Codes); 5] {
     ]
 }
 
-fn assert_as_on_the_host(options: &Options, schedules: &[Schedule]) {
+fn assert_as_on_the_host(options: &BuildOptions, schedules: &[Schedule]) {
     for mesh in meshes() {
         let expected = on_host(&mesh, options);
         let what = format!("{} {:?}", mesh.0, options.method);
         expected.validate().unwrap_or_else(|e| panic!("{what}: {e}"));
         for &schedule in schedules {
-            let got = on_device(&mesh, &Options { schedule: Some(schedule), ..*options });
+            let got = on_device(&mesh, &BuildOptions { schedule: Some(schedule), ..*options });
             assert_same(&got, &expected, &format!("{what} {schedule:?}"));
         }
     }
@@ -31,17 +31,20 @@ fn assert_as_on_the_host(options: &Options, schedules: &[Schedule]) {
 
 pub fn all_give_the_bytes_of_the_host() {
     for (method, codes) in methods() {
-        let options = Options { method, codes: Some(codes), collapse: Collapse::SAH, ..Options::DEFAULT };
+        let options = BuildOptions { method, codes: Some(codes), collapse: Collapse::SAH, ..BuildOptions::DEFAULT };
         let alone: &[Schedule] = if method == Method::Lbvh { &[Schedule::Workgroup] } else { &[] };
         assert_as_on_the_host(&options, &[&[Schedule::Chain, Schedule::Persistent], alone].concat());
-        assert_as_on_the_host(&Options { collapse: Collapse::OFF, ..options }, &[Schedule::Chain]);
+        assert_as_on_the_host(&BuildOptions { collapse: Collapse::OFF, ..options }, &[Schedule::Chain]);
     }
 }
 
 pub fn splits_and_optimised_trees_too() {
-    let optimise = Some(reinsertion::Options { rounds: 3, stride: 2 });
-    let split = Some(split::Options::DEFAULT);
+    let optimise = Some(reinsertion::ReinsertionOptions { rounds: 3, stride: 2 });
+    let split = Some(split::SplitOptions::DEFAULT);
     let codes = Some(Code::Emc64Var.full());
-    assert_as_on_the_host(&Options { codes, optimise, ..Options::DEFAULT }, &[Schedule::Chain]);
-    assert_as_on_the_host(&Options { codes, split, ..Options::DEFAULT }, &[Schedule::Chain, Schedule::Persistent]);
+    assert_as_on_the_host(&BuildOptions { codes, optimise, ..BuildOptions::DEFAULT }, &[Schedule::Chain]);
+    assert_as_on_the_host(
+        &BuildOptions { codes, split, ..BuildOptions::DEFAULT },
+        &[Schedule::Chain, Schedule::Persistent],
+    );
 }

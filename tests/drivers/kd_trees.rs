@@ -8,24 +8,24 @@ use crate::common::shapes::{Corners, hard_rays, icosphere, placed, soup};
 use crate::common::twins::{PLENTY, PLENTY_TO_MERGE};
 use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
-use hedgerow::kdtree::builder::{self, Builder, Options};
-use hedgerow::kdtree::layout::{Header, KdTree};
-use hedgerow::kdtree::merge::{self, Memory, Merger, Most, Object, Report};
+use hedgerow::kdtree::builder::{self, KdBuilder, KdOptions};
+use hedgerow::kdtree::layout::{KdHeader, KdTree};
+use hedgerow::kdtree::merge::{self, Memory, MergeCapacity, MergeReport, Merger, Object};
 use hedgerow::kdtree::twin;
 use hedgerow::trace::Query;
 use hedgerow::trace::kd::Traversal;
-use hedgerow::trace::kd::{Tracer, TreeEntry};
+use hedgerow::trace::kd::{KdTracer, TreeEntry};
 use hedgerow::trace::twin::kd as kd_host;
 use hedgerow_lab::device::Buffer;
 
 const SCHEDULES: [Schedule; 2] = [Schedule::Chain, Schedule::Persistent];
 
-fn with(schedule: Schedule) -> Options {
-    Options { schedule: Some(schedule), estimate: Some(PLENTY), ..Options::DEFAULT }
+fn with(schedule: Schedule) -> KdOptions {
+    KdOptions { schedule: Some(schedule), estimate: Some(PLENTY), ..KdOptions::DEFAULT }
 }
 
 fn on_host((name, positions, triangles): &Mesh) -> KdTree {
-    twin::builder::build(positions, triangles, &Options::DEFAULT).unwrap_or_else(|error| panic!("{name}: {error}"))
+    twin::builder::build(positions, triangles, &KdOptions::DEFAULT).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 fn uploaded((_, positions, triangles): &Mesh) -> (Input, [Buffer<'static>; 2]) {
@@ -36,7 +36,7 @@ fn uploaded((_, positions, triangles): &Mesh) -> (Input, [Buffer<'static>; 2]) {
 }
 
 fn built(input: &Input, schedule: Schedule) -> Buffer<'static> {
-    let builder = Builder::new(device(), &with(schedule), input.primitive_count).expect("a builder");
+    let builder = KdBuilder::new(device(), &with(schedule), input.primitive_count).expect("a builder");
     let sizes = builder.sizes();
     let [structure, scratch] =
         [sizes.structure, sizes.scratch].map(|bytes| device().buffer("tree", bytes).expect("memory"));
@@ -47,7 +47,7 @@ fn built(input: &Input, schedule: Schedule) -> Buffer<'static> {
 #[track_caller]
 fn assert_same(structure: &Buffer<'_>, bytes: u64, expected: &KdTree, what: &str) {
     let got = KdTree::from_bytes(&structure.read::<u8>(bytes as usize)).expect("a kd-tree");
-    let without_room = |header: &Header| Header { node_room: 0, reference_room: 0, record_room: 0, ..*header };
+    let without_room = |header: &KdHeader| KdHeader { node_room: 0, reference_room: 0, record_room: 0, ..*header };
     assert_eq!(without_room(&got.header), without_room(&expected.header), "{what}");
     assert!(got.nodes == expected.nodes, "{what}: nodes");
     assert_eq!(got.references, expected.references, "{what}");
@@ -69,7 +69,7 @@ pub fn builds_and_hits_are_those_of_the_host() {
     for traversal in
         [Traversal::STACK, Traversal::RESTART, Traversal::PUSH_DOWN, Traversal::short_stack_with_push_down(4)]
     {
-        let tracer = Tracer::new(device(), traversal);
+        let tracer = KdTracer::new(device(), traversal);
         for query in [Query::ClosestHit, Query::AnyHit] {
             let expected: Vec<_> = rays.iter().map(|ray| kd_host::trace(&tree, ray, query, traversal)).collect();
             let got = traced(&tree.to_bytes(), &rays, |r, buffers| tracer.record(r, query, buffers));
@@ -98,9 +98,9 @@ pub fn merges_and_restores_are_those_of_the_host() {
 
 /// Merged, it is the host's tree; restored, the one that was there.
 fn merge(still: &KdTree, objects: &[Corners], schedule: Schedule, pushed: bool) {
-    let options = merge::Options { build: with(schedule), estimate: PLENTY_TO_MERGE };
+    let options = merge::MergeOptions { build: with(schedule), estimate: PLENTY_TO_MERGE };
     let triangles = objects.iter().map(|object| object.len() as u32).sum();
-    let most = Most { objects: objects.len() as u32, triangles };
+    let most = MergeCapacity { objects: objects.len() as u32, triangles };
     let still = still.clone().with_room(Merger::room(&options, most)).expect("room");
     let merger = Merger::new(device(), &options, &still.header, most).expect("a merger");
     let sizes = merger.sizes();
@@ -115,17 +115,17 @@ fn merge(still: &KdTree, objects: &[Corners], schedule: Schedule, pushed: bool) 
     let (mut given, mut marked) = (Vec::new(), Vec::new());
     for ((input, _), (tree, (_, positions, triangles))) in inputs.iter().zip(trees.iter().zip(&meshes)) {
         given.push(Object { input: *input, first_primitive, tree: pushed.then(|| tree.address()) });
-        marked.push(twin::merge::Object { first_primitive, positions, triangles });
+        marked.push(twin::merge::HostObject { first_primitive, positions, triangles });
         first_primitive += triangles.len() as u32;
     }
-    let builder::Options { bins, exact, costs, .. } = Options::DEFAULT;
+    let builder::KdOptions { bins, exact, costs, .. } = KdOptions::DEFAULT;
     let expected = twin::merge::merge(&still, &marked, costs, (bins, exact)).expect("a merged tree");
 
     let what = format!("{schedule}, pushed: {pushed}");
-    let bytes = still.header.sizes().bytes;
+    let bytes = still.header.offsets().bytes;
     let before = KdTree::from_bytes(&structure.read::<u8>(bytes as usize)).expect("a kd-tree").to_bytes();
     device().run(None, |r| merger.record(r, memory, &given)).expect("a merge");
-    let report: Report = scratch.read_at(merger.report_range().start, 1)[0];
+    let report: MergeReport = scratch.read_at(merger.report_range().start, 1)[0];
     assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{what}: {report:?}");
     assert_same(&structure, bytes, &expected, &what);
     device().run(None, |r| merger.restore(r, memory)).expect("a restore");

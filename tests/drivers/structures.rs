@@ -51,7 +51,8 @@ fn rays(count: usize) -> Vec<ProbeRay> {
 }
 
 fn worlds_are_met_as_by_brute_force() {
-    let opened = Ours::with_options(device(), accel::Options { rebraid_budget: 3.0, ..accel::Options::DEFAULT });
+    let opened =
+        Ours::with_options(device(), accel::AccelOptions { rebraid_budget: 3.0, ..accel::AccelOptions::DEFAULT });
     for (backend, flags, count) in [
         (Ours::on(device()), Flags::empty(), 30),
         (Ours::on(device()), Flags::PREFER_FAST_TRACE, 30),
@@ -130,7 +131,7 @@ fn place(backend: &Ours, bytes: u64) -> Built {
 fn shaders_of_others_trace_kd_trees() {
     let corners = soup(300, 0.2, 81);
     let (_, positions, triangles) = super::corpus::soup("", corners.clone());
-    let tree = host::build(&positions, &triangles, &host::Options::BINNED).expect("a small tree");
+    let tree = host::build(&positions, &triangles, &host::HostKdOptions::BINNED).expect("a small tree");
     let rays = hard_rays(&corners, 200, 1.0, [0.0; 3], 82);
     let upload = |bytes: &[u8]| device().upload("structure", bytes).expect("memory");
     let (kd_tree, bvh) = (upload(&tree.to_bytes()), upload(&tree_of(&corners).to_bytes()));

@@ -4,14 +4,14 @@ use crate::common::device;
 use crate::common::shapes::{hard_rays, icosphere, placed, soup, tree_of};
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child};
-use hedgerow::bvh::wide::device::{OnDevice, Options};
+use hedgerow::bvh::wide::device::{WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::gpu::Recorder;
-use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
+use hedgerow::trace::tracer::{self, Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
-use hedgerow::trace::wide::{Order, Tracer};
+use hedgerow::trace::wide::{Order, WideTracer};
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// Trees and the rays that are traced through them.
@@ -21,13 +21,14 @@ fn cases() -> Vec<(Bvh2, Vec<Ray>)> {
 }
 
 /// Cut for CPUs, for GPUs, and without shared memory; lane by lane where there is a kernel for it.
-fn shapes(lanes: bool) -> Vec<Shape> {
+fn shapes(lanes: bool) -> Vec<TraceShape> {
     let limits = &device().limits;
-    let private = Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 5, loads: Loads::Gathered };
+    let private =
+        TraceShape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 5, loads: Loads::Gathered };
     let by_lanes = lanes && limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES;
-    [Shape::subgroups(limits), Shape::groups(limits), private]
+    [TraceShape::subgroups(limits), TraceShape::groups(limits), private]
         .into_iter()
-        .chain(by_lanes.then(|| Shape::lanes(limits)))
+        .chain(by_lanes.then(|| TraceShape::lanes(limits)))
         .collect()
 }
 
@@ -35,7 +36,7 @@ fn shapes(lanes: bool) -> Vec<Shape> {
 pub fn traced(
     structure: &[u8],
     rays: &[Ray],
-    record: impl FnOnce(&mut Recorder<'_>, &Buffers) -> hedgerow::Result<()>,
+    record: impl FnOnce(&mut Recorder<'_>, &TraceBuffers) -> hedgerow::Result<()>,
 ) -> Vec<(Hit, Work)> {
     let (hits, work) = crate::common::traced(device(), structure, rays, true, record).expect("the device traces");
     hits.into_iter().zip(work).collect()
@@ -68,7 +69,7 @@ fn assert_form<N: TracedNode>(tree: &Bvh2, rays: &[Ray]) {
     let orders = if quantised { &[Order::Distance, Order::Octant][..] } else { &[Order::Distance] };
     for &order in orders {
         for (i, shape) in shapes(order == Order::Octant).into_iter().enumerate() {
-            let tracer = Tracer::with(&device().limits, N::FORM, order, shape);
+            let tracer = WideTracer::with(&device().limits, N::FORM, order, shape);
             let queries = if i == 0 { &[Query::ClosestHit, Query::AnyHit][..] } else { &[Query::ClosestHit] };
             for &query in queries {
                 let expected: Vec<_> = rays.iter().map(|ray| wide_host::trace(&wide, ray, query, order)).collect();
@@ -82,8 +83,9 @@ fn assert_form<N: TracedNode>(tree: &Bvh2, rays: &[Ray]) {
 /// The bytes in use of the wide tree that the device makes.
 fn collapsed<N: TracedNode>(tree: &Bvh2) -> Vec<u8> {
     let header = &tree.header;
-    let options = Options { form: N::FORM, primitives: Primitives::Triangles, geometry_count: header.geometry_count };
-    let wide = OnDevice::new(device(), &options, header.primitive_count);
+    let options =
+        WideOptions { form: N::FORM, primitives: Primitives::Triangles, geometry_count: header.geometry_count };
+    let wide = WidePass::new(device(), &options, header.primitive_count);
     let sizes = wide.sizes();
     let source = device().upload("source", &tree.to_bytes()).expect("memory");
     let target = device().buffer("target", sizes.structure).expect("memory");

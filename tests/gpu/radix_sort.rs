@@ -2,10 +2,10 @@
 
 use crate::common::device;
 use hedgerow::gpu::Limits;
-use hedgerow::gpu::radix_sort::{self, Buffers, Shape, Sort};
+use hedgerow::gpu::radix_sort::{self, Sort, SortBuffers, SortShape};
 use proptest::prelude::*;
 
-fn sorted_on_device(shape: &Shape, keys: &[u64], values: &[u32], bits: u32) -> (Vec<u64>, Vec<u32>) {
+fn sorted_on_device(shape: &SortShape, keys: &[u64], values: &[u32], bits: u32) -> (Vec<u64>, Vec<u32>) {
     let device = device();
     let count = keys.len() as u32;
     let wide = bits > 32;
@@ -14,7 +14,7 @@ fn sorted_on_device(shape: &Shape, keys: &[u64], values: &[u32], bits: u32) -> (
     let second = device.buffer("keys", 8 * u64::from(count)).unwrap();
     let values = [device.upload("values", values).unwrap(), device.buffer("values", 4 * u64::from(count)).unwrap()];
     let table = device.buffer("table", 4 * shape.table_words(count)).unwrap();
-    let buffers = Buffers {
+    let buffers = SortBuffers {
         keys: [first.address(), second.address()],
         values: [values[0].address(), values[1].address()],
         table: table.address(),
@@ -36,15 +36,15 @@ fn sorted_on_device(shape: &Shape, keys: &[u64], values: &[u32], bits: u32) -> (
 }
 
 /// All cuts: strips of CPUs, tiles of GPUs, those of a small GPU, and strips where nobody knows how large subgroups are.
-fn shapes() -> Vec<Shape> {
+fn shapes() -> Vec<SortShape> {
     let limits = &device().limits;
-    let strips = [Shape::strips(limits), Shape::many_strips(limits)];
+    let strips = [SortShape::strips(limits), SortShape::many_strips(limits)];
     if !limits.subgroup_is_exact {
         return strips.into();
     }
     let small = Limits { shared_memory: 16 << 10, workgroup_invocations: 128, ..limits.clone() };
-    let tiles = Shape::tiles(limits);
-    [&strips[..], &[tiles, tiles.with_digit_bits(5), Shape::tiles(&small)]].concat()
+    let tiles = SortShape::tiles(limits);
+    [&strips[..], &[tiles, tiles.with_digit_bits(5), SortShape::tiles(&small)]].concat()
 }
 
 fn equals_its_twin(keys: &[u64], bits: u32) {

@@ -3,7 +3,7 @@
 use crate::common::{corpus::unit_floats, device};
 use hedgerow::gpu::fill;
 use hedgerow::gpu::reduce::{Bounds, Reduction};
-use hedgerow::gpu::scan::{Buffers, Scan};
+use hedgerow::gpu::scan::{Scan, ScanBuffers};
 use proptest::prelude::*;
 
 const SIZES: [usize; 20] =
@@ -16,7 +16,7 @@ fn scan_equals_its_twin(values: &[u32]) {
     let to = device.buffer("results", 4 * values.len() as u64).unwrap();
     let sums = device.buffer("sums", 4 * u64::from(scan.sums_words())).unwrap();
     for results in [&to, &from] {
-        let buffers = Buffers { values: from.address(), results: results.address(), sums: sums.address() };
+        let buffers = ScanBuffers { values: from.address(), results: results.address(), sums: sums.address() };
         device.run(None, |r| scan.record(r, &buffers)).unwrap();
         let total = sums.read_at::<u32>(4 * u64::from(scan.sums_words() - 1), 1)[0];
         let got = (results.read::<u32>(values.len()), total);

@@ -9,16 +9,16 @@ use hedgerow::bvh::builder::{Input, Schedule, Source};
 use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::Region;
-use hedgerow::kdtree::builder::{Builder, Estimate, Options, Report};
-use hedgerow::kdtree::layout::{Header, KdTree};
+use hedgerow::kdtree::builder::{KdBuilder, KdEstimate, KdOptions, KdReport};
+use hedgerow::kdtree::layout::{KdHeader, KdTree};
 use hedgerow::kdtree::twin;
 
-fn on_host((name, positions, triangles): &Mesh, options: &Options) -> KdTree {
+fn on_host((name, positions, triangles): &Mesh, options: &KdOptions) -> KdTree {
     twin::builder::build(positions, triangles, options).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 /// The structure and the report of a build.
-fn built((_, positions, triangles): &Mesh, options: &Options) -> (KdTree, Report) {
+fn built((_, positions, triangles): &Mesh, options: &KdOptions) -> (KdTree, KdReport) {
     let vertices = device().upload("positions", positions).expect("memory");
     let indices = device().upload("indices", triangles).expect("memory");
     built_of(
@@ -27,9 +27,9 @@ fn built((_, positions, triangles): &Mesh, options: &Options) -> (KdTree, Report
     )
 }
 
-fn built_of(input: &Input, options: &Options) -> (KdTree, Report) {
+fn built_of(input: &Input, options: &KdOptions) -> (KdTree, KdReport) {
     let device = device();
-    let builder = Builder::new(device, options, input.primitive_count).expect("options that can be used");
+    let builder = KdBuilder::new(device, options, input.primitive_count).expect("options that can be used");
     let sizes = builder.sizes();
     // Whatever was there before changes nothing.
     let garbage = |bytes: u64| vec![0xA5u8; bytes as usize];
@@ -47,8 +47,8 @@ fn built_of(input: &Input, options: &Options) -> (KdTree, Report) {
 }
 
 /// The header without what tells of room.
-fn without_room(header: &Header) -> Header {
-    Header { node_room: 0, reference_room: 0, record_room: 0, ..*header }
+fn without_room(header: &KdHeader) -> KdHeader {
+    KdHeader { node_room: 0, reference_room: 0, record_room: 0, ..*header }
 }
 
 #[track_caller]
@@ -72,7 +72,7 @@ fn the_chain_gives_the_bytes_of_the_host() {
     for mesh in meshes() {
         for (bins, exact) in [(128, 32), (7, 4), (32, 64)] {
             let schedule = Some(Schedule::Chain);
-            let options = Options { bins, exact, schedule, estimate: Some(PLENTY), ..Options::DEFAULT };
+            let options = KdOptions { bins, exact, schedule, estimate: Some(PLENTY), ..KdOptions::DEFAULT };
             let what = format!("{} bins {bins} exact {exact}", mesh.0);
             let expected = on_host(&mesh, &options);
             expected.validate().unwrap_or_else(|error| panic!("{what}: {error}"));
@@ -87,7 +87,7 @@ fn the_chain_gives_the_bytes_of_the_host() {
 #[track_caller]
 fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
     // Each triangle is as large as all of them.
-    let estimate = Estimate {
+    let estimate = KdEstimate {
         level_references: 200.0,
         level_nodes: 200.0,
         subtree_nodes: 200.0,
@@ -95,7 +95,7 @@ fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
         subtree_references: 400.0,
         subtrees: 200.0,
     };
-    let with = Options { estimate: Some(estimate), ..Options::DEFAULT };
+    let with = KdOptions { estimate: Some(estimate), ..KdOptions::DEFAULT };
     let corners = geometries.iter().flat_map(|g| g.view().corners().collect::<Vec<_>>());
     let expected = twin::builder::build_corners(corners, &with).expect("a tree");
     let flags = |i: usize| if i % 3 == 1 { GeometryFlags::OPAQUE } else { GeometryFlags::NONE };
@@ -115,7 +115,7 @@ fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
     let several = Source::Several { records: buffer.address(), count: geometry_count };
     for source in [several].into_iter().chain((records.len() == 1).then(|| Source::One(records[0]))) {
         for schedule in [Schedule::Chain, Schedule::Persistent] {
-            let options = Options { schedule: Some(schedule), geometry_count, ..with };
+            let options = KdOptions { schedule: Some(schedule), geometry_count, ..with };
             let (got, report) = built_of(&Input { source, primitive_count: first }, &options);
             assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
             assert_same(&got, &expected, &format!("{source:?} {schedule}"));
@@ -146,10 +146,10 @@ fn every_format_and_several_geometries_give_the_bytes_of_the_host() {
 #[test]
 fn any_number_of_persistent_workgroups_gives_the_bytes_of_the_host() {
     for mesh in meshes() {
-        let expected = on_host(&mesh, &Options::DEFAULT);
+        let expected = on_host(&mesh, &KdOptions::DEFAULT);
         for workgroups in [1, 2, 7, 64, 1024] {
             let (schedule, workgroups) = (Some(Schedule::Persistent), Some(workgroups));
-            let options = Options { schedule, workgroups, estimate: Some(PLENTY), ..Options::DEFAULT };
+            let options = KdOptions { schedule, workgroups, estimate: Some(PLENTY), ..KdOptions::DEFAULT };
             assert_same(&built(&mesh, &options).0, &expected, &format!("{}, {workgroups:?} workgroups", mesh.0));
         }
     }
@@ -159,18 +159,18 @@ fn any_number_of_persistent_workgroups_gives_the_bytes_of_the_host() {
 #[test]
 fn what_is_out_of_room_is_a_leaf_and_the_report_says_what_would_suffice() {
     let mesh = corpus::random("random 3000", 3000, [-0.5; 3], [1.0; 3]);
-    let expected = on_host(&mesh, &Options::DEFAULT);
-    let plenty = Estimate::for_exact(Options::DEFAULT.exact);
+    let expected = on_host(&mesh, &KdOptions::DEFAULT);
+    let plenty = KdEstimate::for_exact(KdOptions::DEFAULT.exact);
     let short = [
-        Estimate { level_references: 1.0, ..plenty },
-        Estimate { level_nodes: 0.0, ..plenty },
-        Estimate { subtree_nodes: 0.1, ..plenty },
-        Estimate { cut_references: 1.0, ..plenty },
-        Estimate { subtree_references: 1.0, ..plenty },
-        Estimate { subtrees: 0.0, ..plenty },
+        KdEstimate { level_references: 1.0, ..plenty },
+        KdEstimate { level_nodes: 0.0, ..plenty },
+        KdEstimate { subtree_nodes: 0.1, ..plenty },
+        KdEstimate { cut_references: 1.0, ..plenty },
+        KdEstimate { subtree_references: 1.0, ..plenty },
+        KdEstimate { subtrees: 0.0, ..plenty },
     ];
     for estimate in short {
-        let mut options = Options { estimate: Some(estimate), ..Options::DEFAULT };
+        let mut options = KdOptions { estimate: Some(estimate), ..KdOptions::DEFAULT };
         let (mut builds, mut should_suffice) = (0, false);
         loop {
             let (got, report) = built(&mesh, &options);
@@ -196,10 +196,10 @@ fn what_is_out_of_room_is_a_leaf_and_the_report_says_what_would_suffice() {
 fn whatever_is_short_by_little_gives_a_valid_tree() {
     let sphere = corpus::soup("sphere", placed(&icosphere(4), 1.0, [0.1, 0.2, 0.3]));
     for mesh in [sphere, corpus::random("random 9000", 9000, [-0.5; 3], [1.0; 3])] {
-        let expected = on_host(&mesh, &Options::DEFAULT);
+        let expected = on_host(&mesh, &KdOptions::DEFAULT);
         let enough =
-            built(&mesh, &Options { estimate: Some(PLENTY), ..Options::DEFAULT }).1.estimate(mesh.2.len() as u32);
-        let fields: [fn(&mut Estimate) -> &mut f32; 6] = [
+            built(&mesh, &KdOptions { estimate: Some(PLENTY), ..KdOptions::DEFAULT }).1.estimate(mesh.2.len() as u32);
+        let fields: [fn(&mut KdEstimate) -> &mut f32; 6] = [
             |e| &mut e.level_references,
             |e| &mut e.level_nodes,
             |e| &mut e.subtree_nodes,
@@ -212,7 +212,7 @@ fn whatever_is_short_by_little_gives_a_valid_tree() {
                 let mut estimate = enough;
                 *field(&mut estimate) *= factor;
                 let what = format!("{} {estimate:?}", mesh.0);
-                let (got, report) = built(&mesh, &Options { estimate: Some(estimate), ..Options::DEFAULT });
+                let (got, report) = built(&mesh, &KdOptions { estimate: Some(estimate), ..KdOptions::DEFAULT });
                 got.validate().unwrap_or_else(|error| panic!("{what}: {error}"));
                 if report.status & status::OUT_OF_ROOM == 0 {
                     assert_same(&got, &expected, &what);
@@ -226,15 +226,15 @@ fn whatever_is_short_by_little_gives_a_valid_tree() {
 fn many_builds(builds: u32) {
     let device = device();
     let mesh = corpus::random("random 400", 400, [-0.5; 3], [1.0; 3]);
-    let expected = on_host(&mesh, &Options::DEFAULT);
+    let expected = on_host(&mesh, &KdOptions::DEFAULT);
     let (_, positions, triangles) = &mesh;
     let vertices = device.upload("positions", positions).expect("memory");
     let indices = device.upload("indices", triangles).expect("memory");
     let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), 400);
     let builder = |workgroups| {
         let options =
-            Options { schedule: Some(Schedule::Persistent), workgroups: Some(workgroups), ..Options::DEFAULT };
-        Builder::new(device, &options, 400).expect("options that can be used")
+            KdOptions { schedule: Some(Schedule::Persistent), workgroups: Some(workgroups), ..KdOptions::DEFAULT };
+        KdBuilder::new(device, &options, 400).expect("options that can be used")
     };
     let most = builder(1024).sizes();
     let structure = device.buffer("structure", most.structure).expect("memory");
@@ -263,22 +263,22 @@ fn ten_thousand_builds_in_a_row_give_the_same_bytes() {
 
 #[test]
 fn options_that_cannot_be_used_are_refused_by_name() {
-    let refused = |options: Options, count: u32, says: &str| {
-        let error = Builder::new(device(), &options, count).expect_err("it cannot be used").to_string();
+    let refused = |options: KdOptions, count: u32, says: &str| {
+        let error = KdBuilder::new(device(), &options, count).expect_err("it cannot be used").to_string();
         assert!(error.contains(says), "{error}");
     };
-    let with = Options::DEFAULT;
-    refused(Options { bins: 1, ..with }, 1, "1 bins; a kd-tree is built by 2 to 256");
-    refused(Options { bins: 257, ..with }, 1, "257 bins");
-    refused(Options { exact: 3, ..with }, 1, "exact splits of 3 references; it is 4 to 64");
-    refused(Options { exact: 65, ..with }, 1, "exact splits of 65 references");
-    refused(Options { workgroups: Some(0), ..with }, 1, "no workgroups");
-    refused(Options { schedule: Some(Schedule::Workgroup), ..with }, 1, "not by one alone");
+    let with = KdOptions::DEFAULT;
+    refused(KdOptions { bins: 1, ..with }, 1, "1 bins; a kd-tree is built by 2 to 256");
+    refused(KdOptions { bins: 257, ..with }, 1, "257 bins");
+    refused(KdOptions { exact: 3, ..with }, 1, "exact splits of 3 references; it is 4 to 64");
+    refused(KdOptions { exact: 65, ..with }, 1, "exact splits of 65 references");
+    refused(KdOptions { workgroups: Some(0), ..with }, 1, "no workgroups");
+    refused(KdOptions { schedule: Some(Schedule::Workgroup), ..with }, 1, "not by one alone");
     let mut costs = with.costs;
     costs.c_i = f32::NAN;
-    refused(Options { costs, ..with }, 1, "a cost of NaN");
+    refused(KdOptions { costs, ..with }, 1, "a cost of NaN");
     refused(with, u32::MAX, "a kd-tree holds at most 134217728; split the mesh");
-    let builder = Builder::new(device(), &with, 2).expect("options that can be used");
+    let builder = KdBuilder::new(device(), &with, 2).expect("options that can be used");
     let (sizes, input) = (builder.sizes(), Input::mesh(0, 0, 0, 2));
     let region = |bytes: u64| Region { address: 0x1000, bytes };
     let error_of = |input: &Input, structure, scratch| {

@@ -7,19 +7,19 @@ use hedgerow::bvh::quality::Quality;
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::kdtree::quality;
 use hedgerow::kdtree::termination::{Costs, depth_limit};
-use hedgerow_host::kdtree::{Options, Planes, build};
+use hedgerow_host::kdtree::{HostKdOptions, Planes, build};
 
-const BOTH: [Options; 2] = [Options::EXACT, Options::BINNED];
+const BOTH: [HostKdOptions; 2] = [HostKdOptions::EXACT, HostKdOptions::BINNED];
 
 fn mesh_of(corners: &Corners) -> Mesh {
     corpus::soup("", corners.clone())
 }
 
-fn tree_of((name, positions, triangles): &Mesh, options: &Options) -> KdTree {
+fn tree_of((name, positions, triangles): &Mesh, options: &HostKdOptions) -> KdTree {
     build(positions, triangles, options).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-fn quality_of(mesh: &Mesh, options: &Options) -> Quality {
+fn quality_of(mesh: &Mesh, options: &HostKdOptions) -> Quality {
     quality::on_host(&tree_of(mesh, options), 3.0, 2.0)
 }
 
@@ -27,7 +27,7 @@ fn quality_of(mesh: &Mesh, options: &Options) -> Quality {
 fn every_scene_that_hurts_gives_a_valid_tree_that_round_trips() {
     for mesh in corpus::meshes() {
         for options in
-            BOTH.into_iter().chain([2, 3, 7, 256].map(|bins| Options { planes: Planes::Binned(bins), ..BOTH[0] }))
+            BOTH.into_iter().chain([2, 3, 7, 256].map(|bins| HostKdOptions { planes: Planes::Binned(bins), ..BOTH[0] }))
         {
             let tree = tree_of(&mesh, &options);
             tree.validate().unwrap_or_else(|error| panic!("{}, {options:?}: {error}", mesh.0));
@@ -107,7 +107,7 @@ fn perfect_splits_cost_at_most_what_bins_do() {
 fn a_dearer_step_makes_fewer_nodes() {
     let mesh = mesh_of(&soup(1000, 0.1, 5));
     for options in BOTH {
-        let inner = |c_t: f32| quality_of(&mesh, &Options { costs: Costs { c_t, c_i: 2.0 }, ..options }).inner;
+        let inner = |c_t: f32| quality_of(&mesh, &HostKdOptions { costs: Costs { c_t, c_i: 2.0 }, ..options }).inner;
         assert!(inner(1.0) > inner(3.0) && inner(3.0) > inner(30.0), "{options:?}");
     }
 }
@@ -117,7 +117,7 @@ fn empty_space_is_cut_off() {
     // Two clusters far apart: what lies between them is empty and costs no node.
     let near = placed(&soup(200, 0.2, 1), 1.0, [0.0; 3]);
     let far = placed(&soup(200, 0.2, 2), 1.0, [100.0, 0.0, 0.0]);
-    let tree = tree_of(&mesh_of(&[near, far].concat()), &Options::EXACT);
+    let tree = tree_of(&mesh_of(&[near, far].concat()), &HostKdOptions::EXACT);
     assert!(tree.header.empty_leaves > 0);
     assert_eq!(tree.header.node_count, tree.header.inner_nodes + tree.header.leaves);
 }
@@ -141,12 +141,13 @@ fn the_bytes_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn options_that_cannot_be_used_are_refused_by_name() {
     for bins in [0, 1, 1025] {
-        let error = build(&[], &[], &Options { planes: Planes::Binned(bins), ..Options::EXACT }).expect_err("bins");
+        let error =
+            build(&[], &[], &HostKdOptions { planes: Planes::Binned(bins), ..HostKdOptions::EXACT }).expect_err("bins");
         assert!(error.to_string().contains("take 2 to 1024 bins"), "{error}");
     }
     for cost in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        let error =
-            build(&[], &[], &Options { costs: Costs { c_t: 1.0, c_i: cost }, ..Options::EXACT }).expect_err("cost");
+        let error = build(&[], &[], &HostKdOptions { costs: Costs { c_t: 1.0, c_i: cost }, ..HostKdOptions::EXACT })
+            .expect_err("cost");
         assert!(error.to_string().contains("take 0.001 to 1000"), "{error}");
     }
 }

@@ -4,14 +4,14 @@
 use crate::common::corpus;
 use crate::common::shapes::{Corners, hard_rays, icosphere, placed, ray, soup, tree_of};
 use hedgerow::bvh::layout::status;
-use hedgerow::kdtree::layout::{Header, KdTree, MAX_DEPTH, Node, Room};
+use hedgerow::kdtree::layout::{KdHeader, KdNode, KdTree, MAX_DEPTH, SpareRoom};
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::trace::Ray;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::twin::kd as kd_host;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow_host::kdtree::merge::Merged;
-use hedgerow_host::kdtree::{Options, build};
+use hedgerow_host::kdtree::{HostKdOptions, build};
 use hedgerow_lab::random::SplitMix64;
 use proptest::prelude::*;
 
@@ -23,15 +23,15 @@ const TRAVERSALS: [Traversal; 5] = [
     Traversal::short_stack_with_push_down(2),
 ];
 
-const ROOM: Room = Room { nodes: 1 << 20, references: 1 << 20, records: 1 << 16 };
+const ROOM: SpareRoom = SpareRoom { nodes: 1 << 20, references: 1 << 20, records: 1 << 16 };
 
-fn kd_tree_of(corners: &Corners, options: &Options) -> KdTree {
+fn kd_tree_of(corners: &Corners, options: &HostKdOptions) -> KdTree {
     let (_, positions, triangles) = corpus::soup("", corners.clone());
     build(&positions, &triangles, options).expect("a small tree")
 }
 
-fn merged_with(still: &Corners, room: Room) -> Merged {
-    Merged::new(kd_tree_of(still, &Options::EXACT).with_room(room).expect("room"), Costs::DEFAULT)
+fn merged_with(still: &Corners, room: SpareRoom) -> Merged {
+    Merged::new(kd_tree_of(still, &HostKdOptions::EXACT).with_room(room).expect("room"), Costs::DEFAULT)
 }
 
 /// Static triangles and objects, numbered one after the other.
@@ -50,7 +50,7 @@ impl World {
     }
 
     fn insert(&self, merged: &mut Merged, object: usize) {
-        let tree = kd_tree_of(&self.objects[object], &Options::BINNED);
+        let tree = kd_tree_of(&self.objects[object], &HostKdOptions::BINNED);
         merged.insert(&object.to_string(), self.first(object), tree).expect("it is not in the tree");
     }
 
@@ -75,7 +75,7 @@ fn assert_hits_of_brute_force(what: &str, tree: &KdTree, all: &Corners, rays: &[
 
 /// Merges, validates, traces and restores. How many rays hit an object is told.
 fn assert_merges(what: &str, world: &World, seed: u64) -> usize {
-    let (still, all) = (kd_tree_of(&world.still, &Options::EXACT).with_room(ROOM).expect("room"), world.all());
+    let (still, all) = (kd_tree_of(&world.still, &HostKdOptions::EXACT).with_room(ROOM).expect("room"), world.all());
     let mut merged = world.merged();
     let tree = merged.tree().unwrap_or_else(|error| panic!("{what}: {error}"));
     tree.validate().unwrap_or_else(|error| panic!("{what}: {error}"));
@@ -237,7 +237,7 @@ fn the_order_of_insertion_changes_nothing_and_neither_does_what_was_taken_out() 
         merged.tree().expect("room");
     }
     assert!(merged.tree().expect("room").to_bytes() == bytes);
-    let far = kd_tree_of(&placed(&icosphere(1), 5.0, [50.0; 3]), &Options::BINNED);
+    let far = kd_tree_of(&placed(&icosphere(1), 5.0, [50.0; 3]), &HostKdOptions::BINNED);
     merged.insert("far", 100_000, far).expect("apart");
     assert!(merged.tree().expect("room").to_bytes() != bytes);
     for name in ["1", "far", "2"] {
@@ -256,9 +256,9 @@ fn ten_thousand_insertions_and_removals_leave_no_trace() {
             .map(|i| placed(&soup(6 + 2 * i, 0.3, i as u64), 0.5, SplitMix64::new(i as u64).around(1.2)))
             .collect(),
     };
-    let room = Room { nodes: 1 << 16, references: 1 << 16, records: 1 << 10 };
-    let still = kd_tree_of(&world.still, &Options::EXACT).with_room(room).expect("room");
-    let trees: Vec<KdTree> = world.objects.iter().map(|object| kd_tree_of(object, &Options::BINNED)).collect();
+    let room = SpareRoom { nodes: 1 << 16, references: 1 << 16, records: 1 << 10 };
+    let still = kd_tree_of(&world.still, &HostKdOptions::EXACT).with_room(room).expect("room");
+    let trees: Vec<KdTree> = world.objects.iter().map(|object| kd_tree_of(object, &HostKdOptions::BINNED)).collect();
     let mut merged = merged_with(&world.still, room);
     let mut random = SplitMix64::new(1);
     let mut is_in = [false; 8];
@@ -289,7 +289,7 @@ fn ten_thousand_insertions_and_removals_leave_no_trace() {
 #[test]
 fn what_cannot_be_inserted_or_taken_out_is_named() {
     let mut merged = merged_with(&soup(10, 0.2, 1), ROOM);
-    let ball = || kd_tree_of(&icosphere(1), &Options::BINNED);
+    let ball = || kd_tree_of(&icosphere(1), &HostKdOptions::BINNED);
     let error_of = |result: hedgerow::Result<()>| result.expect_err("wrong").to_string();
     assert!(
         error_of(merged.take_out("ball"))
@@ -312,14 +312,14 @@ fn what_cannot_be_inserted_or_taken_out_is_named() {
 fn without_room_nothing_is_merged_and_what_is_needed_is_said() {
     let corners = soup(10, 0.2, 1);
     for (room, what) in [
-        (Room { nodes: 3, ..ROOM }, "nodes, there is room for"),
-        (Room { references: 3, ..ROOM }, "references, there is room for"),
-        (Room { records: 79, ..ROOM }, "the merged tree has 91 records, there is room for 89"),
+        (SpareRoom { nodes: 3, ..ROOM }, "nodes, there is room for"),
+        (SpareRoom { references: 3, ..ROOM }, "references, there is room for"),
+        (SpareRoom { records: 79, ..ROOM }, "the merged tree has 91 records, there is room for 89"),
     ] {
-        let still = kd_tree_of(&corners, &Options::EXACT).with_room(room).expect("room").to_bytes();
+        let still = kd_tree_of(&corners, &HostKdOptions::EXACT).with_room(room).expect("room").to_bytes();
         let mut merged = merged_with(&corners, room);
-        merged.insert("small", 10, kd_tree_of(&soup(1, 0.1, 5), &Options::BINNED)).expect("apart");
-        merged.insert("ball", 100, kd_tree_of(&icosphere(1), &Options::BINNED)).expect("apart");
+        merged.insert("small", 10, kd_tree_of(&soup(1, 0.1, 5), &HostKdOptions::BINNED)).expect("apart");
+        merged.insert("ball", 100, kd_tree_of(&icosphere(1), &HostKdOptions::BINNED)).expect("apart");
         let error = merged.tree().expect_err("no room").to_string();
         assert!(error.contains(what), "{error}");
         merged.take_out("ball").expect("it is there");
@@ -333,7 +333,7 @@ fn triangles_that_cannot_be_met_are_left_out_and_the_status_says_so() {
     let mut corners = icosphere(1);
     corners[3][1][2] = f32::NAN;
     let mut merged = merged_with(&soup(10, 0.2, 1), ROOM);
-    merged.insert("broken", 10, kd_tree_of(&corners, &Options::BINNED)).expect("apart");
+    merged.insert("broken", 10, kd_tree_of(&corners, &HostKdOptions::BINNED)).expect("apart");
     let tree = merged.tree().expect("room");
     tree.validate().expect("valid");
     let header = tree.header;
@@ -350,17 +350,17 @@ fn chain(depth: u32) -> KdTree {
             [[x, 0.0, 0.0], [x, 0.5, 0.0], [x, 0.0, 0.5]]
         })
         .collect();
-    let mut tree = kd_tree_of(&corners, &Options::EXACT);
+    let mut tree = kd_tree_of(&corners, &HostKdOptions::EXACT);
     // The root at 0, then pairs; the last left child is a leaf as well, of the last triangle but one's neighbour.
-    tree.nodes = vec![Node::leaf(0, 1)];
+    tree.nodes = vec![KdNode::leaf(0, 1)];
     for level in 0..depth - 1 {
         let (parent, pair) = (tree.nodes.len() - if level == 0 { 1 } else { 2 }, tree.nodes.len() as u32);
-        tree.nodes[parent] = Node::inner(0, at(level + 1), pair, [false; 2]);
-        tree.nodes.extend([Node::leaf(depth - 1, 1), Node::leaf(level, 1)]);
+        tree.nodes[parent] = KdNode::inner(0, at(level + 1), pair, [false; 2]);
+        tree.nodes.extend([KdNode::leaf(depth - 1, 1), KdNode::leaf(level, 1)]);
     }
     tree.references = (0..depth).collect();
     let count = tree.nodes.len() as u32;
-    tree.header = Header {
+    tree.header = KdHeader {
         node_count: count,
         node_room: count,
         reference_count: depth,
@@ -379,7 +379,7 @@ fn a_static_tree_that_is_too_deep_for_planes_around_it_takes_no_object_outside()
     let still = chain(MAX_DEPTH + 1).with_room(ROOM).expect("room");
     let bytes = still.to_bytes();
     let mut merged = Merged::new(still, Costs::DEFAULT);
-    let far = kd_tree_of(&placed(&icosphere(1), 1.0, [9.0, 9.0, 0.0]), &Options::BINNED);
+    let far = kd_tree_of(&placed(&icosphere(1), 1.0, [9.0, 9.0, 0.0]), &HostKdOptions::BINNED);
     merged.insert("far", 100, far).expect("apart");
     let error = merged.tree().expect_err("too deep").to_string();
     assert!(error.contains("the static tree would be 42 deep, the most is 41"), "{error}");
@@ -396,7 +396,7 @@ fn where_a_tree_would_be_too_deep_it_has_leaves_and_says_so() {
     let all: Corners = still.records.iter().map(|t| [t.v0, t.v1, t.v2]).chain(ball.iter().copied()).collect();
     let bytes = still.to_bytes();
     let mut merged = Merged::new(still, Costs::DEFAULT);
-    merged.insert("ball", MAX_DEPTH - 1, kd_tree_of(&ball, &Options::BINNED)).expect("apart");
+    merged.insert("ball", MAX_DEPTH - 1, kd_tree_of(&ball, &HostKdOptions::BINNED)).expect("apart");
     let tree = merged.tree().expect("room");
     tree.validate().expect("valid");
     assert_eq!((tree.header.depth, tree.header.status), (MAX_DEPTH, status::DEPTH_LIMITED));

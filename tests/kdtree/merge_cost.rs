@@ -3,14 +3,14 @@
 //!
 //! `cargo test --release --test kdtree_merge_cost -- --ignored --nocapture`
 
-use hedgerow::kdtree::layout::{KdTree, Room};
+use hedgerow::kdtree::layout::{KdTree, SpareRoom};
 use hedgerow::kdtree::quality;
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::twin::kd::trace;
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_host::kdtree::merge::Merged;
-use hedgerow_host::kdtree::{Options, build};
+use hedgerow_host::kdtree::{HostKdOptions, build};
 use hedgerow_lab::rays::kinds::{self, RayKind, RayOptions};
 use hedgerow_lab::scene::{DynamicScene, LoadOptions, Mesh, Scene, load_dynamic, own_folders};
 use std::hint::black_box;
@@ -18,7 +18,7 @@ use std::time::Instant;
 
 const ROUNDS: usize = 7;
 const TRACES: usize = 9;
-const ROOM: Room = Room { nodes: 1 << 22, references: 1 << 22, records: 1 << 20 };
+const ROOM: SpareRoom = SpareRoom { nodes: 1 << 22, references: 1 << 22, records: 1 << 20 };
 
 /// Milliseconds.
 fn timed<T>(times: &mut Vec<f64>, what: impl FnOnce() -> T) -> T {
@@ -69,7 +69,9 @@ impl World {
         let objects = scene.objects.iter().zip(scene.primitives());
         World {
             scene: scene.at(time).expect("finite"),
-            still: build(positions, triangles, &Options::EXACT).and_then(|tree| tree.with_room(ROOM)).expect("room"),
+            still: build(positions, triangles, &HostKdOptions::EXACT)
+                .and_then(|tree| tree.with_room(ROOM))
+                .expect("room"),
             objects: objects
                 .map(|(object, primitives)| {
                     let mesh = Mesh { positions: object.placed(time), triangles: object.triangles.clone() };
@@ -82,11 +84,11 @@ impl World {
     /// Of all triangles from one on.
     fn tree_from(&self, first: u32) -> KdTree {
         let Mesh { positions, triangles } = &self.scene.mesh;
-        build(positions, &triangles[first as usize..], &Options::BINNED).expect("a tree")
+        build(positions, &triangles[first as usize..], &HostKdOptions::BINNED).expect("a tree")
     }
 
     fn trees(&self) -> Vec<KdTree> {
-        let tree = |mesh: &Mesh| build(&mesh.positions, &mesh.triangles, &Options::BINNED).expect("a tree");
+        let tree = |mesh: &Mesh| build(&mesh.positions, &mesh.triangles, &HostKdOptions::BINNED).expect("a tree");
         self.objects.iter().map(|(.., mesh)| tree(mesh)).collect()
     }
 

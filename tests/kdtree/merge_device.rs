@@ -6,9 +6,11 @@ use crate::common::shapes::{Corners, hard_rays, icosphere, placed, soup, tree_of
 use crate::common::twins::PLENTY_TO_MERGE;
 use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
-use hedgerow::kdtree::builder::{self, Builder};
-use hedgerow::kdtree::layout::{Header, KdTree, Room};
-use hedgerow::kdtree::merge::{Estimate, Memory, Merger, Most, Object, Objects, Options, Report};
+use hedgerow::kdtree::builder::{self, KdBuilder};
+use hedgerow::kdtree::layout::{KdHeader, KdTree, SpareRoom};
+use hedgerow::kdtree::merge::{
+    Memory, MergeCapacity, MergeEstimate, MergeOptions, MergeReport, Merger, Object, Objects,
+};
 use hedgerow::kdtree::twin;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::twin::kd as kd_host;
@@ -16,17 +18,17 @@ use hedgerow::trace::twin::tracer::closest_hit;
 use hedgerow_lab::device::Buffer;
 use hedgerow_lab::random::SplitMix64;
 
-const PLENTY: Options = Options { build: builder::Options::DEFAULT, estimate: PLENTY_TO_MERGE };
+const PLENTY: MergeOptions = MergeOptions { build: builder::KdOptions::DEFAULT, estimate: PLENTY_TO_MERGE };
 
 /// As a chain, and by persistent workgroups.
-fn schedules() -> impl Iterator<Item = Options> {
-    let persistent = [1, 2, 7, 64, 1024].map(|workgroups| builder::Options {
+fn schedules() -> impl Iterator<Item = MergeOptions> {
+    let persistent = [1, 2, 7, 64, 1024].map(|workgroups| builder::KdOptions {
         schedule: Some(Schedule::Persistent),
         workgroups: Some(workgroups),
         ..PLENTY.build
     });
-    let chain = builder::Options { schedule: Some(Schedule::Chain), ..PLENTY.build };
-    [chain].into_iter().chain(persistent).map(|build| Options { build, ..PLENTY })
+    let chain = builder::KdOptions { schedule: Some(Schedule::Chain), ..PLENTY.build };
+    [chain].into_iter().chain(persistent).map(|build| MergeOptions { build, ..PLENTY })
 }
 
 /// Static triangles and objects, numbered one after the other.
@@ -37,8 +39,8 @@ struct World {
 }
 
 impl World {
-    fn most(&self) -> Most {
-        Most {
+    fn most(&self) -> MergeCapacity {
+        MergeCapacity {
             objects: self.objects.len() as u32,
             triangles: self.objects.iter().map(|object| object.len() as u32).sum(),
         }
@@ -80,13 +82,13 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(world: &World, options: &Options) -> Scene {
+    fn new(world: &World, options: &MergeOptions) -> Scene {
         let (_, positions, triangles) = corpus::soup("", world.still.clone());
-        let still = twin::builder::build(&positions, &triangles, &builder::Options::DEFAULT).expect("a static tree");
+        let still = twin::builder::build(&positions, &triangles, &builder::KdOptions::DEFAULT).expect("a static tree");
         Scene::with(still, world, options)
     }
 
-    fn with(still: KdTree, world: &World, options: &Options) -> Scene {
+    fn with(still: KdTree, world: &World, options: &MergeOptions) -> Scene {
         let most = world.most();
         let still = still.with_room(Merger::room(options, most)).expect("room");
         let merger = Merger::new(device(), options, &still.header, most).expect("a merger");
@@ -124,7 +126,7 @@ impl Scene {
         Memory { structure: self.structure.region(), scratch: self.scratch.region(), undo: self.undo.region() }
     }
 
-    fn merge(&self, objects: &[Object]) -> Report {
+    fn merge(&self, objects: &[Object]) -> MergeReport {
         device().run(None, |recorder| self.merger.record(recorder, self.memory(), objects)).expect("a merge");
         self.scratch.read_at(self.merger.report_range().start, 1)[0]
     }
@@ -134,7 +136,7 @@ impl Scene {
     }
 
     fn tree(&self) -> KdTree {
-        let bytes = self.still.header.sizes().bytes;
+        let bytes = self.still.header.offsets().bytes;
         KdTree::from_bytes(&self.structure.read::<u8>(bytes as usize)).expect("a kd-tree")
     }
 
@@ -156,8 +158,8 @@ impl Scene {
     /// Kd-trees of the objects, built on the device.
     fn trees(&self) -> Vec<Buffer<'static>> {
         let tree = |(_, _, object): &(u32, Mesh, Object)| {
-            let builder =
-                Builder::new(device(), &builder::Options::DEFAULT, object.input.primitive_count).expect("a builder");
+            let builder = KdBuilder::new(device(), &builder::KdOptions::DEFAULT, object.input.primitive_count)
+                .expect("a builder");
             let sizes = builder.sizes();
             let [structure, scratch] =
                 [sizes.structure, sizes.scratch].map(|bytes| device().buffer("tree", bytes).expect("memory"));
@@ -179,16 +181,16 @@ impl Scene {
     fn on_host(&self, which: impl Fn(usize) -> bool) -> KdTree {
         let object = |i: usize| {
             let (first_primitive, (_, positions, triangles), _) = &self.meshes[i];
-            twin::merge::Object { first_primitive: *first_primitive, positions, triangles }
+            twin::merge::HostObject { first_primitive: *first_primitive, positions, triangles }
         };
         let objects: Vec<_> = (0..self.meshes.len()).filter(|&i| which(i)).map(object).collect();
-        let builder::Options { bins, exact, costs, .. } = builder::Options::DEFAULT;
+        let builder::KdOptions { bins, exact, costs, .. } = builder::KdOptions::DEFAULT;
         twin::merge::merge(&self.still, &objects, costs, (bins, exact)).expect("a merged tree")
     }
 }
 
-fn without_room(header: &Header) -> Header {
-    Header { node_room: 0, reference_room: 0, record_room: 0, ..*header }
+fn without_room(header: &KdHeader) -> KdHeader {
+    KdHeader { node_room: 0, reference_room: 0, record_room: 0, ..*header }
 }
 
 #[track_caller]
@@ -214,7 +216,7 @@ fn a_merge_gives_the_bytes_of_the_host_and_a_restore_those_of_the_static_tree() 
             scene.assert_in_and_out(&objects, &expected, world.name);
         }
         let header = scene.still.header;
-        let raw = scene.structure.read::<u8>(header.sizes().bytes as usize);
+        let raw = scene.structure.read::<u8>(header.offsets().bytes as usize);
         let counted = 128 + 8 * header.node_count as usize;
         assert!(raw[..counted] == scene.still.to_bytes()[..counted], "{}: raw bytes", world.name);
     }
@@ -271,7 +273,7 @@ fn chains_and_any_number_of_persistent_workgroups_give_the_same_bytes() {
             let scene = Scene::new(&world, &options);
             let trees = scene.trees();
             for which in [0b000u32, 0b101] {
-                let builder::Options { schedule, workgroups, .. } = options.build;
+                let builder::KdOptions { schedule, workgroups, .. } = options.build;
                 let what = format!("{}, {schedule:?}, {workgroups:?} workgroups, pushed {which:03b}", world.name);
                 scene.assert_in_and_out(&scene.pushed(&trees, |i| which >> i & 1 == 1), &expected, &what);
             }
@@ -285,7 +287,8 @@ fn a_tree_can_be_built_and_pushed_at_once() {
     let world = &worlds()[0];
     let scene = Scene::new(world, &PLENTY);
     let object = scene.meshes[0].2;
-    let builder = Builder::new(device(), &builder::Options::DEFAULT, object.input.primitive_count).expect("a builder");
+    let builder =
+        KdBuilder::new(device(), &builder::KdOptions::DEFAULT, object.input.primitive_count).expect("a builder");
     let sizes = builder.sizes();
     let [tree, scratch] = [sizes.structure, sizes.scratch].map(|bytes| device().buffer("tree", bytes).expect("memory"));
     device()
@@ -369,12 +372,12 @@ fn objects_come_and_go_ten_thousand_times() {
 #[test]
 fn what_the_device_builds_can_be_merged_into() {
     let world = &worlds()[0];
-    let most = Most { objects: 1, triangles: world.objects[0].len() as u32 };
+    let most = MergeCapacity { objects: 1, triangles: world.objects[0].len() as u32 };
     let (_, positions, triangles) = corpus::soup("still", world.still.clone());
     let more = Merger::room(&PLENTY, most);
-    let options = builder::Options { more, ..builder::Options::DEFAULT };
+    let options = builder::KdOptions { more, ..builder::KdOptions::DEFAULT };
     let count = triangles.len() as u32;
-    let builder = Builder::new(device(), &options, count).expect("a builder");
+    let builder = KdBuilder::new(device(), &options, count).expect("a builder");
     let sizes = builder.sizes();
     let structure = device().buffer("structure", sizes.structure).expect("memory");
     let scratch = device().buffer("scratch", sizes.scratch).expect("memory");
@@ -386,7 +389,7 @@ fn what_the_device_builds_can_be_merged_into() {
         .expect("a build");
     let still = KdTree::from_bytes(&structure.read::<u8>(sizes.structure as usize)).expect("a kd-tree");
     let header = still.header;
-    let room = Room {
+    let room = SpareRoom {
         nodes: header.node_room - header.node_count,
         references: header.reference_room - header.reference_count,
         records: header.record_room - header.active,
@@ -412,7 +415,7 @@ fn what_is_out_of_room_is_told() {
     let expected = enough.on_host(|_| true);
     let triangles = world.objects[0].len() as u32;
     let exact = report.estimate(triangles);
-    let fields: [fn(&mut Estimate) -> &mut f32; 9] = [
+    let fields: [fn(&mut MergeEstimate) -> &mut f32; 9] = [
         |e| &mut e.pairs,
         |e| &mut e.items,
         |e| &mut e.marked,
@@ -425,7 +428,7 @@ fn what_is_out_of_room_is_told() {
     ];
     for (number, field) in fields.into_iter().enumerate() {
         for factor in [0.9, 0.5, 0.0] {
-            let mut options = Options { estimate: exact, ..PLENTY };
+            let mut options = MergeOptions { estimate: exact, ..PLENTY };
             *field(&mut options.estimate) *= factor;
             for attempt in 0.. {
                 let what = format!("field {number} × {factor}, attempt {attempt}");
@@ -463,8 +466,9 @@ fn what_cannot_be_merged_is_refused_by_name() {
     assert!(error_of(&[a, a]).contains("number them apart"));
     assert!(error_of(&[Object { tree: Some(8), ..a }]).contains("a multiple of 16"));
     assert!(error_of(&[Object { first_primitive: 3, ..a }]).contains("those before end at 500"));
-    let small = Header { node_room: 5, ..scene.still.header };
-    let error = Merger::new(device(), &PLENTY, &small, Most { objects: 1, triangles: 100 }).expect_err("too small");
+    let small = KdHeader { node_room: 5, ..scene.still.header };
+    let error =
+        Merger::new(device(), &PLENTY, &small, MergeCapacity { objects: 1, triangles: 100 }).expect_err("too small");
     assert!(error.to_string().contains("room for 5 nodes"), "{error}");
     let mut objects = Objects::default();
     objects.insert("ball", a).expect("new");

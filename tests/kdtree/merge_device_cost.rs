@@ -9,8 +9,8 @@ use crate::common::shapes::Corners;
 use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::{Phase, Timestamps};
-use hedgerow::kdtree::builder::{self, Builder, Report as BuildReport};
-use hedgerow::kdtree::merge::{Estimate, Memory, Merger, Most, Object, Options, Report};
+use hedgerow::kdtree::builder::{self, KdBuilder, KdReport as BuildReport};
+use hedgerow::kdtree::merge::{Memory, MergeCapacity, MergeEstimate, MergeOptions, MergeReport, Merger, Object};
 use hedgerow_lab::device::Buffer;
 use hedgerow_lab::scene::{LoadOptions, load};
 use std::collections::BTreeMap;
@@ -70,17 +70,17 @@ fn merging_beside_building_on_the_device() {
         let still = corpus::soup(name, corners.clone());
         let moves = corpus::soup("object", patch(&corners));
         let both = corpus::soup("both", corners.iter().copied().chain(patch(&corners)).collect());
-        let options = Options::DEFAULT;
+        let options = MergeOptions::DEFAULT;
         let (count, triangles) = (still.2.len() as u32, moves.2.len() as u32);
-        let most = Most { objects: 1, triangles };
-        let build = builder::Options { more: Merger::room(&options, most), ..options.build };
+        let most = MergeCapacity { objects: 1, triangles };
+        let build = builder::KdOptions { more: Merger::room(&options, most), ..options.build };
         let (still_builder, builder) = (
-            Builder::new(device(), &build, count).expect("a builder"),
-            Builder::new(device(), &options.build, count + triangles).expect("a builder"),
+            KdBuilder::new(device(), &build, count).expect("a builder"),
+            KdBuilder::new(device(), &options.build, count + triangles).expect("a builder"),
         );
         let mergers = SCHEDULES.map(|schedule| {
-            let build = builder::Options { schedule: Some(schedule), ..options.build };
-            Merger::new(device(), &Options { build, ..options }, &still_builder.header(), most).expect("a merger")
+            let build = builder::KdOptions { schedule: Some(schedule), ..options.build };
+            Merger::new(device(), &MergeOptions { build, ..options }, &still_builder.header(), most).expect("a merger")
         });
         let buffer = |bytes: u64| device().buffer("memory", bytes).expect("memory");
         let (structure, other) = (buffer(still_builder.sizes().structure), buffer(builder.sizes().structure));
@@ -104,7 +104,7 @@ fn merging_beside_building_on_the_device() {
             }
             for (i, merger) in mergers.iter().enumerate() {
                 let merged = timed(|r| merger.record(r, memory, &[object]));
-                let report: Report = scratch.read_at(merger.report_range().start, 1)[0];
+                let report: MergeReport = scratch.read_at(merger.report_range().start, 1)[0];
                 assert_eq!(report.status, 0, "{report:?}");
                 let restored = timed(|r| merger.restore(r, memory));
                 if round > 0 {
@@ -136,16 +136,16 @@ fn pushing_beside_finding() {
         let still = corpus::soup(name, corners.clone());
         let moves = corpus::soup("object", patch(&corners));
         let (count, triangles) = (still.2.len() as u32, moves.2.len() as u32);
-        let most = Most { objects: 1, triangles };
+        let most = MergeCapacity { objects: 1, triangles };
         let buffer = |bytes: u64| device().buffer("memory", bytes).expect("memory");
         let ((still_input, _a), (input, _b)) = (input_of(&still), input_of(&moves));
-        let builder = Builder::new(device(), &builder::Options::DEFAULT, triangles).expect("a builder");
+        let builder = KdBuilder::new(device(), &builder::KdOptions::DEFAULT, triangles).expect("a builder");
         let (tree, building) = (buffer(builder.sizes().structure), buffer(builder.sizes().scratch));
         let record_tree = || timed(|r| builder.record(r, &input, tree.region(), building.region()));
         record_tree();
-        let place = |object: &Object, options: &Options| {
-            let build = builder::Options { more: Merger::room(options, most), ..builder::Options::DEFAULT };
-            let still_builder = Builder::new(device(), &build, count).expect("a builder");
+        let place = |object: &Object, options: &MergeOptions| {
+            let build = builder::KdOptions { more: Merger::room(options, most), ..builder::KdOptions::DEFAULT };
+            let still_builder = KdBuilder::new(device(), &build, count).expect("a builder");
             let merger = Merger::new(device(), options, &still_builder.header(), most).expect("a merger");
             let structure = buffer(still_builder.sizes().structure);
             let (scratch, undo) = (buffer(merger.sizes().scratch), buffer(merger.sizes().undo));
@@ -156,15 +156,15 @@ fn pushing_beside_finding() {
         for schedule in SCHEDULES {
             let ways = [None, Some(tree.address())].map(|tree| {
                 let object = Object { input, first_primitive: count, tree };
-                let build = builder::Options { schedule: Some(schedule), ..builder::Options::DEFAULT };
-                let mut options = Options { build, estimate: Estimate::WITH_TREES };
+                let build = builder::KdOptions { schedule: Some(schedule), ..builder::KdOptions::DEFAULT };
+                let mut options = MergeOptions { build, estimate: MergeEstimate::WITH_TREES };
                 loop {
                     let place = place(&object, &options);
                     let (object, merger, structure, scratch, undo) = &place;
                     let memory =
                         Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
                     timed(|r| merger.record(r, memory, &[*object]));
-                    let report: Report = scratch.read_at(merger.report_range().start, 1)[0];
+                    let report: MergeReport = scratch.read_at(merger.report_range().start, 1)[0];
                     timed(|r| merger.restore(r, memory));
                     options.estimate = report.estimate(triangles);
                     if report.status & status::OUT_OF_ROOM == 0 {

@@ -6,30 +6,30 @@ use crate::common::shapes::{
 };
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::tracer::{self, Buffers, Loads, Shape};
+use hedgerow::trace::tracer::{self, Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// Every way to cut the work: the default, those for CPUs and that for GPUs, no shared memory at all, and a stack whose levels
 /// lie half here and half there.
-fn shapes() -> Vec<Shape> {
+fn shapes() -> Vec<TraceShape> {
     let limits = &device().limits;
     let loads = Loads::Gathered;
     let mut shapes = vec![
-        Shape::of(device()),
-        Shape::subgroups(limits),
-        Shape::groups(limits),
-        Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
-        Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
+        TraceShape::of(device()),
+        TraceShape::subgroups(limits),
+        TraceShape::groups(limits),
+        TraceShape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
+        TraceShape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
     ];
     if limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES {
-        shapes.push(Shape::lanes(limits));
-        shapes.push(Shape { shared_levels: 3, rays_each: 5, ..Shape::lanes(limits) });
+        shapes.push(TraceShape::lanes(limits));
+        shapes.push(TraceShape { shared_levels: 3, rays_each: 5, ..TraceShape::lanes(limits) });
     }
     shapes
 }
 
-fn traced(tree: &Bvh2, rays: &[Ray], shape: &Shape, query: Query, count_work: bool) -> (Vec<Hit>, Vec<Work>) {
+fn traced(tree: &Bvh2, rays: &[Ray], shape: &TraceShape, query: Query, count_work: bool) -> (Vec<Hit>, Vec<Work>) {
     crate::common::traced(device(), &tree.to_bytes(), rays, count_work, |r, buffers| {
         tracer::record(r, shape, query, buffers)
     })
@@ -172,15 +172,15 @@ fn of_a_thousand_coincident_triangles_the_first_is_hit() {
 #[test]
 fn loads_lane_by_lane_need_a_workgroup_of_one_subgroup() {
     let limits = &device().limits;
-    let buffers = Buffers { structure: 16, rays: 16, hits: 16, work: None, count: 0 };
-    let shape = Shape { workgroup: 2 * limits.subgroup_size, ..Shape::lanes(limits) };
+    let buffers = TraceBuffers { structure: 16, rays: 16, hits: 16, work: None, count: 0 };
+    let shape = TraceShape { workgroup: 2 * limits.subgroup_size, ..TraceShape::lanes(limits) };
     let refused = device().run(None, |recorder| tracer::record(recorder, &shape, Query::ClosestHit, &buffers));
     assert!(refused.expect_err("two subgroups").to_string().contains("lane by lane"));
 }
 
 #[test]
 fn too_many_rays_are_refused() {
-    let buffers = Buffers { structure: 16, rays: 16, hits: 16, work: None, count: (1 << 27) + 1 };
+    let buffers = TraceBuffers { structure: 16, rays: 16, hits: 16, work: None, count: (1 << 27) + 1 };
     let refused = device().run(None, |recorder| tracer::record(recorder, &shapes()[0], Query::ClosestHit, &buffers));
     assert!(refused.expect_err("more than 2^27").to_string().contains("134217728"));
 }

@@ -3,12 +3,12 @@
 use crate::common::corpus;
 use crate::common::shapes::{Corners, hard_rays, icosphere, placed, ray, rays_from_inside, soup, tree_of};
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow::kdtree::layout::{Content, KdTree};
+use hedgerow::kdtree::layout::{KdContent, KdTree};
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::twin::kd as kd_host;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray};
-use hedgerow_host::kdtree::{Options, build};
+use hedgerow_host::kdtree::{HostKdOptions, build};
 use hedgerow_lab::random::SplitMix64;
 use proptest::prelude::*;
 
@@ -24,7 +24,7 @@ const TRAVERSALS: [Traversal; 9] = [
     Traversal::short_stack_with_push_down(4),
 ];
 
-fn kd_tree_of(corners: &Corners, options: &Options) -> KdTree {
+fn kd_tree_of(corners: &Corners, options: &HostKdOptions) -> KdTree {
     let (_, positions, triangles) = corpus::soup("", corners.clone());
     build(&positions, &triangles, options).expect("a small tree")
 }
@@ -45,7 +45,7 @@ fn assert_hits_of_brute_force(what: &str, bvh: &Bvh2, trees: &[KdTree], rays: &[
 }
 
 fn both(corners: &Corners) -> [KdTree; 2] {
-    [Options::EXACT, Options::BINNED].map(|options| kd_tree_of(corners, &options))
+    [HostKdOptions::EXACT, HostKdOptions::BINNED].map(|options| kd_tree_of(corners, &options))
 }
 
 /// Rays that start on a plane of the tree, run in it, or nearly so.
@@ -54,7 +54,7 @@ fn rays_in_planes(tree: &KdTree, seed: u64) -> Vec<Ray> {
     let cell = tree.header.cell();
     let mut rays = Vec::new();
     for node in &tree.nodes {
-        let Content::Inner(inner) = node.content() else { continue };
+        let KdContent::Inner(inner) = node.content() else { continue };
         let mut origin: [f32; 3] = std::array::from_fn(|i| {
             let part = 0.5 + 0.6 * random.signed();
             (1.0 - part) * cell.lo[i] + part * cell.hi[i]
@@ -191,7 +191,7 @@ fn a_hit_counts_strictly_between_t_min_and_t_max() {
 #[test]
 fn rays_from_far_away_have_the_hits_of_brute_force() {
     for corners in [icosphere(4), soup(2000, 0.01, 31)] {
-        let (bvh, tree) = (tree_of(&corners), kd_tree_of(&corners, &Options::EXACT));
+        let (bvh, tree) = (tree_of(&corners), kd_tree_of(&corners, &HostKdOptions::EXACT));
         let mut random = SplitMix64::new(32);
         let mut hits = 0;
         for i in 0..3000 {
@@ -253,7 +253,7 @@ fn an_empty_tree_has_no_hits_and_takes_no_work() {
 #[test]
 fn traversals_visit_the_same_leaves_and_differ_in_steps_as_they_should() {
     let corners = soup(3000, 0.05, 21);
-    let tree = kd_tree_of(&corners, &Options::EXACT);
+    let tree = kd_tree_of(&corners, &HostKdOptions::EXACT);
     let rays: Vec<Ray> = hard_rays(&corners, 800, 1.0, [0.0; 3], 22);
     let total = |traversal| {
         let works = rays.iter().map(|ray| kd_host::trace(&tree, ray, Query::ClosestHit, traversal).1);

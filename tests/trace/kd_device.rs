@@ -7,14 +7,14 @@ use crate::common::shapes::{
 };
 use crate::common::{corpus, shapes};
 use hedgerow::bvh::layout::status;
-use hedgerow::kdtree::layout::{Content, KdTree, MAX_DEPTH};
-use hedgerow::trace::kd::Tracer;
+use hedgerow::kdtree::layout::{KdContent, KdTree, MAX_DEPTH};
+use hedgerow::trace::kd::KdTracer;
 use hedgerow::trace::kd::Traversal;
-use hedgerow::trace::tracer::{Loads, Shape};
+use hedgerow::trace::tracer::{Loads, TraceShape};
 use hedgerow::trace::twin::kd as kd_host;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
-use hedgerow_host::kdtree::{Options, build};
+use hedgerow_host::kdtree::{HostKdOptions, build};
 use hedgerow_lab::random::SplitMix64;
 
 const TRAVERSALS: [Traversal; 8] = [
@@ -30,23 +30,23 @@ const TRAVERSALS: [Traversal; 8] = [
 ];
 
 /// As is the default here, and cut otherwise: as on GPUs, one ray each, a few rays each.
-fn tracers() -> Vec<Tracer> {
+fn tracers() -> Vec<KdTracer> {
     let limits = &device().limits;
     let loads = Loads::Gathered;
     let others = [
-        Shape::groups(limits),
-        Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
-        Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 0, rays_each: 5, loads },
+        TraceShape::groups(limits),
+        TraceShape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
+        TraceShape { workgroup: 4 * limits.subgroup_size, shared_levels: 0, rays_each: 5, loads },
     ];
     let pairs = TRAVERSALS.iter().zip(others.iter().cycle());
-    pairs.flat_map(|(&t, &shape)| [Tracer::new(device(), t), Tracer::with(t, shape)]).collect()
+    pairs.flat_map(|(&t, &shape)| [KdTracer::new(device(), t), KdTracer::with(t, shape)]).collect()
 }
 
 fn traversal_of(i: usize) -> Traversal {
     TRAVERSALS[i / 2]
 }
 
-fn traced(tree: &[u8], rays: &[Ray], tracer: &Tracer, query: Query, count_work: bool) -> (Vec<Hit>, Vec<Work>) {
+fn traced(tree: &[u8], rays: &[Ray], tracer: &KdTracer, query: Query, count_work: bool) -> (Vec<Hit>, Vec<Work>) {
     crate::common::traced(device(), tree, rays, count_work, |r, buffers| tracer.record(r, query, buffers))
         .expect("the device traces")
 }
@@ -83,7 +83,7 @@ fn assert_hits_of_brute_force(what: &str, corners: &Corners, tree: &KdTree, rays
     }
 }
 
-fn kd_tree_of(corners: &Corners, options: &Options) -> KdTree {
+fn kd_tree_of(corners: &Corners, options: &HostKdOptions) -> KdTree {
     let (_, positions, triangles) = corpus::soup("", corners.clone());
     build(&positions, &triangles, options).expect("a small tree")
 }
@@ -96,7 +96,7 @@ fn hits_and_work_are_those_of_the_host_at_any_scale() {
         let offset = [far * scale, -far * scale, 0.5 * far * scale];
         let corners = placed(&soup(300, size, 5), scale, offset);
         let rays = hard_rays(&corners, 500, scale, offset, 11);
-        for options in [Options::EXACT, Options::BINNED] {
+        for options in [HostKdOptions::EXACT, HostKdOptions::BINNED] {
             assert_as_on_the_host(&format!("scale {scale:e}"), &kd_tree_of(&corners, &options), &rays);
         }
     }
@@ -117,7 +117,7 @@ fn hits_are_those_of_brute_force_at_any_scale() {
         assert_hits_of_brute_force(
             &format!("scale {scale:e}"),
             &corners,
-            &kd_tree_of(&corners, &Options::BINNED),
+            &kd_tree_of(&corners, &HostKdOptions::BINNED),
             &rays,
         );
     }
@@ -126,7 +126,7 @@ fn hits_are_those_of_brute_force_at_any_scale() {
 #[test]
 fn any_number_of_rays_is_traced_and_nothing_behind_them_written() {
     let corners = icosphere(2);
-    let tree = kd_tree_of(&corners, &Options::EXACT);
+    let tree = kd_tree_of(&corners, &HostKdOptions::EXACT);
     for count in [0, 1, 7, 8, 9, 65, 1000] {
         assert_as_on_the_host("some rays", &tree, &hard_rays(&corners, count, 1.0, [0.0; 3], count as u64));
     }
@@ -136,7 +136,7 @@ fn any_number_of_rays_is_traced_and_nothing_behind_them_written() {
 #[test]
 fn deep_trees_are_walked_as_on_the_host() {
     let corners = soup(20_000, 0.02, 41);
-    let tree = kd_tree_of(&corners, &Options::BINNED);
+    let tree = kd_tree_of(&corners, &HostKdOptions::BINNED);
     assert!(tree.header.depth > 12, "{}", tree.header.depth);
     assert_as_on_the_host("deep", &tree, &hard_rays(&corners, 400, 1.0, [0.0; 3], 42));
 }
@@ -148,12 +148,12 @@ fn rays_in_planes_are_traced_as_on_the_host() {
     for x in corners.iter_mut().flatten().flatten() {
         *x = (8.0 * *x).round() / 8.0;
     }
-    for options in [Options::EXACT, Options::BINNED] {
+    for options in [HostKdOptions::EXACT, HostKdOptions::BINNED] {
         let tree = kd_tree_of(&corners, &options);
         let mut random = SplitMix64::new(52);
         let mut rays = Vec::new();
         for (i, node) in tree.nodes.iter().enumerate() {
-            let Content::Inner(inner) = node.content() else { continue };
+            let KdContent::Inner(inner) = node.content() else { continue };
             let mut origin = random.around(1.2);
             origin[inner.axis] = [inner.plane, inner.plane.next_up(), inner.plane.next_down()][i % 3];
             let mut direction = random.around(1.0);
@@ -175,7 +175,7 @@ fn every_scene_that_hurts_has_the_hits_of_brute_force() {
         let (name, corners) = (&mesh.0, corpus::corners_of(&mesh));
         let b = corners.iter().flatten().flatten().fold(0f32, |m, x| m.max(x.abs()));
         let rays = hard_rays(&corners, 64, if b > 0.0 { b.min(1e37) } else { 1.0 }, [0.0; 3], 5);
-        assert_hits_of_brute_force(name, &corners, &kd_tree_of(&corners, &Options::BINNED), &rays);
+        assert_hits_of_brute_force(name, &corners, &kd_tree_of(&corners, &HostKdOptions::BINNED), &rays);
     }
 }
 
@@ -188,11 +188,11 @@ fn closed_surfaces_do_not_leak() {
     {
         let corners = placed(&icosphere(4), scale, offset);
         let rays = rays_from_the_middle(&corners, 10_000, scale, offset);
-        let tree = kd_tree_of(&corners, &[Options::EXACT, Options::BINNED][n % 2]);
+        let tree = kd_tree_of(&corners, &[HostKdOptions::EXACT, HostKdOptions::BINNED][n % 2]);
         let bytes = tree.to_bytes();
         let mut first = None;
         for traversal in TRAVERSALS {
-            let tracer = Tracer::new(device(), traversal);
+            let tracer = KdTracer::new(device(), traversal);
             let (hits, _) = traced(&bytes, &rays, &tracer, Query::ClosestHit, false);
             for (ray, hit) in rays.iter().zip(&hits) {
                 assert!(hit.is_some(), "{traversal:?} leaks at scale {scale:e}, offset {offset:?}: {ray:?}");
@@ -204,7 +204,7 @@ fn closed_surfaces_do_not_leak() {
 
 #[test]
 fn what_is_no_ray_hits_nothing_and_ends() {
-    let tree = kd_tree_of(&icosphere(3), &Options::EXACT);
+    let tree = kd_tree_of(&icosphere(3), &HostKdOptions::EXACT);
     assert_as_on_the_host("no rays", &tree, &no_rays());
     assert_hits_of_brute_force("subnormal", &icosphere(3), &tree, &rays_with(1e-40));
 }
@@ -216,7 +216,7 @@ fn hits_at_negative_distances_are_found() {
         .into_iter()
         .map(|ray| Ray { t_min: f32::NEG_INFINITY, ..ray })
         .collect();
-    let tree = kd_tree_of(&corners, &Options::EXACT);
+    let tree = kd_tree_of(&corners, &HostKdOptions::EXACT);
     assert_as_on_the_host("negative", &tree, &rays);
     assert_hits_of_brute_force("negative", &corners, &tree, &rays);
 }
@@ -224,7 +224,7 @@ fn hits_at_negative_distances_are_found() {
 #[test]
 fn limits_are_exclusive() {
     let corners = vec![[[-1.0, -1.0, 2.0], [3.0, -1.0, 2.0], [-1.0, 3.0, 2.0]]];
-    let tree = kd_tree_of(&corners, &Options::EXACT);
+    let tree = kd_tree_of(&corners, &HostKdOptions::EXACT);
     let ends = [f32::NEG_INFINITY, 0.0, 2f32.next_down(), 2.0, 2f32.next_up(), 3.0, f32::INFINITY, f32::NAN];
     let rays: Vec<Ray> = ends
         .iter()
@@ -241,7 +241,7 @@ fn limits_are_exclusive() {
 fn of_coincident_triangles_the_first_is_hit() {
     let corners = vec![[[-1.0, -1.0, 3.0], [3.0, -1.0, 3.0], [-1.0, 3.0, 3.0]]; 1000];
     let rays = hard_rays(&corners, 100, 1.0, [0.0; 3], 4);
-    for options in [Options::EXACT, Options::BINNED] {
+    for options in [HostKdOptions::EXACT, HostKdOptions::BINNED] {
         let tree = kd_tree_of(&corners, &options);
         assert_as_on_the_host("coincident", &tree, &rays);
         let (hits, _) = traced(&tree.to_bytes(), &rays, &tracers()[0], Query::ClosestHit, false);
@@ -252,9 +252,9 @@ fn of_coincident_triangles_the_first_is_hit() {
 #[test]
 fn trees_that_are_empty_or_cannot_be_used_have_no_hits() {
     let rays = hard_rays(&icosphere(0), 40, 1.0, [0.0; 3], 1);
-    assert_as_on_the_host("empty", &kd_tree_of(&Corners::new(), &Options::BINNED), &rays);
+    assert_as_on_the_host("empty", &kd_tree_of(&Corners::new(), &HostKdOptions::BINNED), &rays);
     for bit in [status::TOO_DEEP, status::SPIN_RAN_OUT, status::WRONG_VERSION] {
-        let mut tree = kd_tree_of(&icosphere(1), &Options::BINNED);
+        let mut tree = kd_tree_of(&icosphere(1), &HostKdOptions::BINNED);
         tree.header.status |= bit;
         assert_as_on_the_host("unusable", &tree, &rays);
     }
@@ -268,7 +268,7 @@ fn trees_that_are_empty_or_cannot_be_used_have_no_hits() {
 #[test]
 fn walks_of_overwritten_trees_end() {
     let corners = soup(60, 0.2, 61);
-    let tree = kd_tree_of(&corners, &Options::BINNED);
+    let tree = kd_tree_of(&corners, &HostKdOptions::BINNED);
     let rays = hard_rays(&corners, 64, 1.0, [0.0; 3], 62);
     let mut random = SplitMix64::new(63);
     for _ in 0..20 {
@@ -286,7 +286,7 @@ fn walks_of_overwritten_trees_end() {
             *reference = random.bits() as u32;
         }
         for traversal in TRAVERSALS {
-            traced(&broken.to_bytes(), &rays, &Tracer::new(device(), traversal), Query::ClosestHit, true);
+            traced(&broken.to_bytes(), &rays, &KdTracer::new(device(), traversal), Query::ClosestHit, true);
         }
     }
 }
@@ -295,7 +295,7 @@ fn walks_of_overwritten_trees_end() {
 #[test]
 fn parts_are_found_where_there_is_room_for_more() {
     let corners = soup(200, 0.2, 71);
-    let mut tree = kd_tree_of(&corners, &Options::EXACT);
+    let mut tree = kd_tree_of(&corners, &HostKdOptions::EXACT);
     tree.header.node_room += 13;
     tree.header.reference_room += 5;
     tree.header.record_room += 7;
@@ -306,7 +306,7 @@ fn parts_are_found_where_there_is_room_for_more() {
 #[test]
 fn shaders_of_others_trace_kd_trees_by_the_header() {
     let corners = soup(500, 0.2, 81);
-    let (kd_tree, bvh) = (kd_tree_of(&corners, &Options::BINNED), tree_of(&corners));
+    let (kd_tree, bvh) = (kd_tree_of(&corners, &HostKdOptions::BINNED), tree_of(&corners));
     let kd_tree = kd_tree.with_geometries(&[(120, 1), (0, 2), (380, 0)]);
     let rays = hard_rays(&corners, 500, 1.0, [0.0; 3], 82);
     let upload = |bytes: &[u8]| device().upload("structure", bytes).expect("memory");

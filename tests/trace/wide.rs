@@ -10,31 +10,32 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::wide::Form;
 use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
-use hedgerow::trace::tracer::{Buffers, Loads, Shape};
+use hedgerow::trace::tracer::{Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
-use hedgerow::trace::wide::{Order, Tracer};
+use hedgerow::trace::wide::{Order, WideTracer};
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// Every order, and every way to cut the work: the default, that for GPUs, no shared memory at all, and a stack half here and
 /// half there.
-fn tracers(form: Form) -> Vec<Tracer> {
+fn tracers(form: Form) -> Vec<WideTracer> {
     let limits = &device().limits;
     let loads = Loads::Gathered;
-    let mut tracers = vec![Tracer::of(device(), form)];
+    let mut tracers = vec![WideTracer::of(device(), form)];
     let orders = if form.is_quantised() { &[Order::Distance, Order::Octant][..] } else { &[Order::Distance] };
     for &order in orders {
         let shapes = [
-            Shape::subgroups(limits),
-            Shape::groups(limits),
-            Shape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
-            Shape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
+            TraceShape::subgroups(limits),
+            TraceShape::groups(limits),
+            TraceShape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
+            TraceShape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
         ];
-        tracers.extend(shapes.map(|shape| Tracer::with(limits, form, order, shape)));
+        tracers.extend(shapes.map(|shape| WideTracer::with(limits, form, order, shape)));
     }
     if form.is_quantised() && limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES {
-        let few = Shape { shared_levels: 3, rays_each: 5, ..Shape::lanes(limits) };
-        tracers.extend([Shape::lanes(limits), few].map(|shape| Tracer::with(limits, form, Order::Octant, shape)));
+        let few = TraceShape { shared_levels: 3, rays_each: 5, ..TraceShape::lanes(limits) };
+        tracers
+            .extend([TraceShape::lanes(limits), few].map(|shape| WideTracer::with(limits, form, Order::Octant, shape)));
     }
     tracers
 }
@@ -42,7 +43,7 @@ fn tracers(form: Form) -> Vec<Tracer> {
 fn traced<N: TracedNode>(
     tree: &Wide<N>,
     rays: &[Ray],
-    tracer: &Tracer,
+    tracer: &WideTracer,
     query: Query,
     count: bool,
 ) -> (Vec<Hit>, Vec<Work>) {
@@ -199,13 +200,13 @@ fn of_a_thousand_coincident_triangles_the_first_is_hit() {
 #[test]
 fn what_there_is_no_kernel_for_is_refused() {
     let limits = &device().limits;
-    let buffers = Buffers { structure: 16, rays: 16, hits: 16, work: None, count: 0 };
+    let buffers = TraceBuffers { structure: 16, rays: 16, hits: 16, work: None, count: 0 };
     for (form, order, shape) in [
-        (Form::Four, Order::Octant, Shape::subgroups(limits)),
-        (Form::Eight, Order::Distance, Shape::lanes(limits)),
-        (Form::EightQuantised, Order::Distance, Shape::lanes(limits)),
+        (Form::Four, Order::Octant, TraceShape::subgroups(limits)),
+        (Form::Eight, Order::Distance, TraceShape::lanes(limits)),
+        (Form::EightQuantised, Order::Distance, TraceShape::lanes(limits)),
     ] {
-        let tracer = Tracer { form, order, shape };
+        let tracer = WideTracer { form, order, shape };
         let refused = device().run(None, |recorder| tracer.record(recorder, Query::ClosestHit, &buffers));
         assert!(refused.expect_err("no kernel").to_string().contains("no kernel traces"), "{tracer:?}");
     }

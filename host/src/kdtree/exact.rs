@@ -14,8 +14,8 @@ use super::Threads;
 use hedgerow::bvh::layout::Triangle;
 use hedgerow::geometry::Aabb;
 use hedgerow::kdtree::layout::halves;
-use hedgerow::kdtree::twin::clip::{Plane, Reference, divided};
-use hedgerow::kdtree::twin::heuristic::{Heuristic, Split};
+use hedgerow::kdtree::twin::clip::{KdPlane, KdReference, divided};
+use hedgerow::kdtree::twin::heuristic::{Heuristic, KdSplit};
 use hedgerow::kdtree::twin::{ALONE, Fork, Subtree};
 use rayon::prelude::*;
 use std::cmp::Ordering;
@@ -25,9 +25,9 @@ pub(super) fn build(
     heuristic: &Heuristic,
     records: (&[Triangle], f32),
     cell: Aabb,
-    references: Vec<Reference>,
+    references: Vec<KdReference>,
 ) -> Subtree {
-    let content = Content::sorted(references);
+    let content = CellContent::sorted(references);
     Exact { heuristic, records }.subtree(cell, content, 0)
 }
 
@@ -57,20 +57,20 @@ impl Event {
 
 /// What is in a cell, and the faces of the boxes along each axis in order.
 #[derive(Default)]
-struct Content {
-    references: Vec<Reference>,
+struct CellContent {
+    references: Vec<KdReference>,
     events: [Vec<Event>; 3],
 }
 
-impl Content {
-    fn sorted(references: Vec<Reference>) -> Content {
+impl CellContent {
+    fn sorted(references: Vec<KdReference>) -> CellContent {
         let events = [0, 1, 2].map(|axis| {
-            let faces = |(i, reference): (usize, &Reference)| faces(&reference.bounds, axis, i as u32);
+            let faces = |(i, reference): (usize, &KdReference)| faces(&reference.bounds, axis, i as u32);
             let mut events: Vec<Event> = references.iter().enumerate().flat_map(faces).collect();
             events.par_sort_unstable_by(Event::order);
             events
         });
-        Content { references, events }
+        CellContent { references, events }
     }
 }
 
@@ -88,13 +88,13 @@ struct Exact<'a> {
 }
 
 impl Exact<'_> {
-    fn subtree(&self, cell: Aabb, content: Content, depth: u32) -> Subtree {
+    fn subtree(&self, cell: Aabb, content: CellContent, depth: u32) -> Subtree {
         let count = content.references.len();
         if self.heuristic.is_leaf(count, depth) {
             return Subtree::leaf(&content.references);
         }
         let best = self.best_split(&cell, &content);
-        let Some(Split { plane, .. }) = self.heuristic.paying(best, &cell, count) else {
+        let Some(KdSplit { plane, .. }) = self.heuristic.paying(best, &cell, count) else {
             return Subtree::leaf(&content.references);
         };
         let halves = halves(&cell, plane.axis, plane.at);
@@ -110,29 +110,29 @@ impl Exact<'_> {
     }
 
     /// The cheapest plane of all axes; of equal ones that of the first axis, and there the leftmost.
-    fn best_split(&self, cell: &Aabb, content: &Content) -> Option<Split> {
+    fn best_split(&self, cell: &Aabb, content: &CellContent) -> Option<KdSplit> {
         let count = content.references.len();
         let of = |axis: usize| self.best_split_of(cell, axis, &content.events[axis], count as u32);
         let [x, y, z] = if count < ALONE { [0, 1, 2].map(of) } else { Threads.axes(of) };
-        Split::better(Split::better(x, y), z)
+        KdSplit::better(KdSplit::better(x, y), z)
     }
 
-    fn best_split_of(&self, cell: &Aabb, axis: usize, events: &[Event], count: u32) -> Option<Split> {
+    fn best_split_of(&self, cell: &Aabb, axis: usize, events: &[Event], count: u32) -> Option<KdSplit> {
         let (mut left, mut right) = (0, count);
         let mut best = None;
         for here in events.chunk_by(|a, b| a.at == b.at) {
             let of = |kind: Kind| here.iter().filter(|event| event.kind == kind).count() as u32;
             let (ends, flat) = (of(Kind::Ends), of(Kind::IsFlat));
             right -= ends + flat;
-            best = Split::better(best, self.heuristic.split(cell, (axis, here[0].at), [left, flat, right]));
+            best = KdSplit::better(best, self.heuristic.split(cell, (axis, here[0].at), [left, flat, right]));
             left += here.len() as u32 - ends;
         }
         best
     }
 
     /// What is in the two halves of a cell.
-    fn parts(&self, content: Content, plane: &Plane, halves: &[Aabb; 2]) -> [Content; 2] {
-        let mut parts = [Content::default(), Content::default()];
+    fn parts(&self, content: CellContent, plane: &KdPlane, halves: &[Aabb; 2]) -> [CellContent; 2] {
+        let mut parts = [CellContent::default(), CellContent::default()];
         // Of each reference, where it went on each side; of what straddles the plane, nothing, as its events are new.
         let mut went = vec![[NOWHERE; 2]; content.references.len()];
         let mut straddling: [Vec<u32>; 2] = Default::default();
@@ -150,7 +150,7 @@ impl Exact<'_> {
                 }
             }
         }
-        let Content { references, events } = content;
+        let CellContent { references, events } = content;
         drop(references);
         for (axis, events) in events.into_iter().enumerate() {
             for side in 0..2 {
@@ -211,26 +211,26 @@ mod tests {
             .collect()
     }
 
-    fn content_of(records: &[Triangle]) -> (Aabb, Content) {
+    fn content_of(records: &[Triangle]) -> (Aabb, CellContent) {
         let reference =
-            |(i, t): (usize, &Triangle)| Reference { bounds: bounds_of(&[t.v0, t.v1, t.v2], 9.0), record: i as u32 };
-        let references: Vec<Reference> = records.iter().enumerate().map(reference).collect();
+            |(i, t): (usize, &Triangle)| KdReference { bounds: bounds_of(&[t.v0, t.v1, t.v2], 9.0), record: i as u32 };
+        let references: Vec<KdReference> = records.iter().enumerate().map(reference).collect();
         let cell = records.iter().fold(Aabb::EMPTY, |b, t| b.union(&cell_around(&[t.v0, t.v1, t.v2], 9.0)));
-        (cell, Content::sorted(references))
+        (cell, CellContent::sorted(references))
     }
 
     /// All faces of all boxes, each with all boxes counted.
-    fn best_by_brute_force(heuristic: &Heuristic, cell: &Aabb, references: &[Reference]) -> Option<Split> {
-        let mut best: Option<Split> = None;
+    fn best_by_brute_force(heuristic: &Heuristic, cell: &Aabb, references: &[KdReference]) -> Option<KdSplit> {
+        let mut best: Option<KdSplit> = None;
         for axis in 0..3 {
             for plane in references.iter().flat_map(|r| [r.bounds.lo[axis], r.bounds.hi[axis]]) {
                 let left = references.iter().filter(|r| r.bounds.lo[axis] < plane).count() as u32;
                 let right = references.iter().filter(|r| r.bounds.hi[axis] > plane).count() as u32;
-                let is_flat = |r: &&Reference| r.bounds.lo[axis] == plane && r.bounds.hi[axis] == plane;
+                let is_flat = |r: &&KdReference| r.bounds.lo[axis] == plane && r.bounds.hi[axis] == plane;
                 let planar = references.iter().filter(is_flat).count() as u32;
                 let Some(split) = heuristic.split(cell, (axis, plane), [left, planar, right]) else { continue };
                 let is_better = best.is_none_or(|b| {
-                    let key = |s: &Split| (s.cost, s.plane.axis as f32, s.plane.at);
+                    let key = |s: &KdSplit| (s.cost, s.plane.axis as f32, s.plane.at);
                     key(&split) < key(&b)
                 });
                 if is_better {
@@ -254,11 +254,11 @@ mod tests {
             while let Some((cell, content)) = cells.pop().filter(|_| splits < 40) {
                 let split = exact.best_split(&cell, &content);
                 assert_eq!(split, best_by_brute_force(&heuristic, &cell, &content.references), "{count} {cell:?}");
-                let Some(Split { plane, .. }) = split.filter(|_| content.references.len() > 1) else { continue };
+                let Some(KdSplit { plane, .. }) = split.filter(|_| content.references.len() > 1) else { continue };
                 splits += 1;
                 let halves = halves(&cell, plane.axis, plane.at);
                 for (half, part) in halves.into_iter().zip(exact.parts(content, &plane, &halves)) {
-                    assert_eq!(part.events, Content::sorted(part.references.clone()).events, "merged as sorted");
+                    assert_eq!(part.events, CellContent::sorted(part.references.clone()).events, "merged as sorted");
                     assert!(part.references.iter().all(|r| half.contains(&r.bounds)), "boxes in their cell");
                     cells.push((half, part));
                 }

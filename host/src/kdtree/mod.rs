@@ -48,18 +48,18 @@ impl Planes {
 
 /// What a build is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct HostKdOptions {
     /// Which planes are looked at.
     pub planes: Planes,
     /// The costs by which the best is chosen.
     pub costs: Costs,
 }
 
-impl Options {
+impl HostKdOptions {
     /// Perfect splits.
-    pub const EXACT: Options = Options { planes: Planes::Exact, costs: Costs::DEFAULT };
+    pub const EXACT: HostKdOptions = HostKdOptions { planes: Planes::Exact, costs: Costs::DEFAULT };
     /// Bins.
-    pub const BINNED: Options = Options { planes: Planes::Binned(Planes::BINS), costs: Costs::DEFAULT };
+    pub const BINNED: HostKdOptions = HostKdOptions { planes: Planes::Binned(Planes::BINS), costs: Costs::DEFAULT };
 
     /// # Errors
     /// [`Error::Argument`] names the option that cannot be used, and what can.
@@ -93,7 +93,7 @@ impl Options {
 ///
 /// # Errors
 /// [`Error::Argument`] if an option cannot be used, or if there would be more nodes or references than the layout can name.
-pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &Options) -> Result<KdTree> {
+pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &HostKdOptions) -> Result<KdTree> {
     build_corners(lbvh::corners(positions, triangles), options)
 }
 
@@ -101,7 +101,7 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &Options) 
 ///
 /// # Errors
 /// As [`build`].
-pub fn build_corners(corners: impl Iterator<Item = Corners>, options: &Options) -> Result<KdTree> {
+pub fn build_corners(corners: impl Iterator<Item = Corners>, options: &HostKdOptions) -> Result<KdTree> {
     options.check()?;
     grown(corners, options.costs, |heuristic, records, cell, references| {
         let bins = match options.planes {

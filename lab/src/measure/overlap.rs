@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::device::Device;
-use hedgerow::bvh::epo::{Buffers, Figures, OnDevice};
+use hedgerow::bvh::epo::{OverlapBuffers, OverlapFigures, OverlapPass};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::twin::epo::{Areas, Surfaces};
 use rayon::prelude::*;
@@ -90,10 +90,10 @@ pub fn on_device(
     if over(deadline) {
         return Ok(None);
     }
-    let measure = OnDevice::new(device, records);
+    let measure = OverlapPass::new(device, records);
     let scratch = device.buffer("overlap: scratch", measure.scratch_bytes())?;
-    let result = device.buffer("overlap: figures", size_of::<Figures>() as u64)?;
-    let buffers = Buffers { structure, scratch: scratch.address(), result: result.address() };
+    let result = device.buffer("overlap: figures", size_of::<OverlapFigures>() as u64)?;
+    let buffers = OverlapBuffers { structure, scratch: scratch.address(), result: result.address() };
     device.run(None, |recorder| measure.begin(recorder, &buffers))?;
     for first in (0..records).step_by(PIECE as usize) {
         if over(deadline) {
@@ -103,7 +103,7 @@ pub fn on_device(
         device.run(None, |recorder| measure.overlaps(recorder, &buffers, piece))?;
     }
     device.run(None, |recorder| measure.end(recorder, &buffers))?;
-    Ok(result.read::<Figures>(1)[0].epo(c_t, c_i))
+    Ok(result.read::<OverlapFigures>(1)[0].epo(c_t, c_i))
 }
 
 #[cfg(test)]

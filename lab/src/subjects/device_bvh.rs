@@ -8,12 +8,13 @@ use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
 use crate::scene::Mesh;
 use crate::{Error, Result};
-use hedgerow::bvh::builder::{Builder, Input, Options, Sizes};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Input};
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow::bvh::quality::{self, Figures};
+use hedgerow::bvh::quality::{self, QualityFigures};
+use hedgerow::gpu::Sizes;
 use hedgerow::gpu::{Recorder, Timestamps};
-use hedgerow::trace::tracer::{self, Buffers, Shape};
-use hedgerow::trace::wide::Tracer;
+use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
+use hedgerow::trace::wide::WideTracer;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// Phases of a build at most: split, reset and bounds, encode, sort, hierarchy, those of collapsing, wide.
@@ -44,8 +45,8 @@ impl<'a> DeviceBvh<'a> {
         device: &'a Device,
         builder: &str,
         mesh: &Mesh,
-        options: &Options,
-        wide: Option<Tracer>,
+        options: &BuildOptions,
+        wide: Option<WideTracer>,
     ) -> Result<DeviceBvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let bvh = Builder::new(device, options, count)?;
@@ -87,16 +88,16 @@ fn record_trace(
     recorder: &mut Recorder<'_>,
     wide_tree: Option<&WideTree<'_>>,
     query: Query,
-    buffers: &Buffers,
+    buffers: &TraceBuffers,
 ) -> hedgerow::Result<()> {
     match wide_tree {
-        None => tracer::record(recorder, &Shape::of(recorder.context()), query, buffers),
+        None => tracer::record(recorder, &TraceShape::of(recorder.context()), query, buffers),
         Some(tree) => tree.tracer.record(recorder, query, buffers),
     }
 }
 
 /// What was left to the builder: codes and schedule.
-fn choice_of(options: &Options, bvh: &Builder) -> Option<String> {
+fn choice_of(options: &BuildOptions, bvh: &Builder) -> Option<String> {
     let codes = options.codes.is_none().then(|| format!("codes {}", bvh.codes()));
     let schedule = options.schedule.is_none().then(|| format!("schedule {}", bvh.schedule()));
     let chosen: Vec<String> = codes.into_iter().chain(schedule).collect();
@@ -150,11 +151,11 @@ impl Subject for DeviceBvh<'_> {
         if let Some(tree) = &self.wide {
             return tree.quality(c_t, c_i);
         }
-        let measure = quality::OnDevice::new(self.device, self.bvh.record_count());
+        let measure = quality::QualityPass::new(self.device, self.bvh.record_count());
         let scratch = self.device.buffer("quality: scratch", measure.scratch_bytes())?;
-        let result = self.device.buffer("quality: figures", size_of::<Figures>() as u64)?;
+        let result = self.device.buffer("quality: figures", size_of::<QualityFigures>() as u64)?;
         self.device.run(None, |r| measure.record(r, self.structure.address(), scratch.address(), result.address()))?;
-        Ok(record::Quality::of(&result.read::<Figures>(1)[0].quality(c_t, c_i), c_t, c_i))
+        Ok(record::Quality::of(&result.read::<QualityFigures>(1)[0].quality(c_t, c_i), c_t, c_i))
     }
 
     fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {

@@ -3,7 +3,7 @@
 use crate::device::{Buffer, Device};
 use crate::{Error, Result};
 use hedgerow::gpu::{Recorder, Timestamps};
-use hedgerow::trace::tracer::Buffers;
+use hedgerow::trace::tracer::TraceBuffers;
 use hedgerow::trace::{Hit, Ray, Work};
 
 /// Rays in device memory, and room for their hits.
@@ -33,8 +33,8 @@ impl<'a> RayBuffers<'a> {
         self.hits.read(self.count as usize)
     }
 
-    fn buffers(&self, structure: u64, work: Option<u64>) -> Buffers {
-        Buffers { structure, rays: self.rays.address(), hits: self.hits.address(), work, count: self.count }
+    fn buffers(&self, structure: u64, work: Option<u64>) -> TraceBuffers {
+        TraceBuffers { structure, rays: self.rays.address(), hits: self.hits.address(), work, count: self.count }
     }
 }
 
@@ -72,7 +72,7 @@ impl<'a> DeviceRays<'a> {
     pub fn trace(
         &mut self,
         structure: u64,
-        record: impl FnOnce(&mut Recorder<'_>, &Buffers) -> hedgerow::Result<()>,
+        record: impl FnOnce(&mut Recorder<'_>, &TraceBuffers) -> hedgerow::Result<()>,
     ) -> Result<f64> {
         let Some(uploaded) = &self.uploaded else { return Ok(0.0) };
         let buffers = uploaded.buffers(structure, None);
@@ -95,7 +95,7 @@ impl<'a> DeviceRays<'a> {
     pub fn work(
         &self,
         structure: u64,
-        record: impl FnOnce(&mut Recorder<'_>, &Buffers) -> hedgerow::Result<()>,
+        record: impl FnOnce(&mut Recorder<'_>, &TraceBuffers) -> hedgerow::Result<()>,
     ) -> Result<Option<Vec<Work>>> {
         let Some(uploaded) = &self.uploaded else { return Ok(None) };
         let work = self.device.buffer("work", u64::from(uploaded.count) * size_of::<Work>() as u64)?;

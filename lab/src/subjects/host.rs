@@ -36,7 +36,7 @@ pub struct Options {
     /// The codes; `None` takes those that the device would take for so many triangles.
     pub codes: Option<Codes>,
     /// Reinsertion behind it.
-    pub reinsertion: Option<reinsertion::Options>,
+    pub reinsertion: Option<reinsertion::ReinsertionOptions>,
     /// Whether subtrees become leaves where that is cheaper.
     pub collapse: Collapse,
 }
@@ -103,7 +103,8 @@ impl Subject for Host<'_> {
     }
 
     fn memory(&self) -> record::Memory {
-        let structure = layout::sizes(Primitives::Triangles.record_bytes(), self.mesh.triangles.len() as u32, 1).bytes;
+        let structure =
+            layout::offsets(Primitives::Triangles.record_bytes(), self.mesh.triangles.len() as u32, 1).bytes;
         record::Memory { structure_bytes: Some(structure), ..Default::default() }
     }
 

@@ -5,13 +5,13 @@ use crate::Result;
 use crate::device::{Buffer, Device};
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::trace::kd::Traversal;
-use hedgerow::trace::kd::{Tracer, TreeEntry};
+use hedgerow::trace::kd::{KdTracer, TreeEntry};
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// A traversal on the device with its rays; of a structure it needs the address.
 pub struct KdDevice<'a> {
     device: &'a Device,
-    tracer: Tracer,
+    tracer: KdTracer,
     rays: DeviceRays<'a>,
 }
 
@@ -21,7 +21,7 @@ impl<'a> KdDevice<'a> {
     /// # Errors
     /// The device failed.
     pub fn new(device: &'a Device, traversal: Traversal) -> Result<KdDevice<'a>> {
-        Ok(KdDevice { device, tracer: Tracer::new(device, traversal), rays: DeviceRays::new(device)? })
+        Ok(KdDevice { device, tracer: KdTracer::new(device, traversal), rays: DeviceRays::new(device)? })
     }
 
     /// Brings a tree of the host to the device.

@@ -9,7 +9,7 @@ use crate::{Error, Result};
 use hedgerow::bvh::builder::Input;
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::{Phase, Recorder, Timestamps};
-use hedgerow::kdtree::builder::{Builder, Options, Report};
+use hedgerow::kdtree::builder::{KdBuilder, KdOptions, KdReport};
 use hedgerow::kdtree::layout::{KdTree, MAX_DEPTH};
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
@@ -24,7 +24,7 @@ const ATTEMPTS: u32 = 8;
 pub struct KdGpu<'a> {
     device: &'a Device,
     name: String,
-    options: Options,
+    options: KdOptions,
     input: Input,
     vertices: [Buffer<'a>; 2],
     place: Place<'a>,
@@ -36,15 +36,15 @@ pub struct KdGpu<'a> {
 
 /// A builder and its memory.
 struct Place<'a> {
-    builder: Builder,
+    builder: KdBuilder,
     structure: Buffer<'a>,
     scratch: Buffer<'a>,
 }
 
 impl<'a> Place<'a> {
-    fn new(device: &'a Device, name: &str, options: &Options, input: &Input) -> Result<Place<'a>> {
+    fn new(device: &'a Device, name: &str, options: &KdOptions, input: &Input) -> Result<Place<'a>> {
         let count = input.primitive_count;
-        let builder = Builder::new(device, options, count)?;
+        let builder = KdBuilder::new(device, options, count)?;
         let sizes = builder.sizes();
         let (needed, available) = (sizes.structure + sizes.scratch, device.found().memory);
         if needed > available {
@@ -56,7 +56,7 @@ impl<'a> Place<'a> {
         Ok(Place { structure, scratch, builder })
     }
 
-    fn report(&self) -> Report {
+    fn report(&self) -> KdReport {
         let range = self.builder.report_range();
         bytemuck::pod_read_unaligned(&self.scratch.read::<u8>(range.end as usize)[range.start as usize..])
     }
@@ -71,7 +71,7 @@ impl<'a> KdGpu<'a> {
         device: &'a Device,
         name: &str,
         mesh: &Mesh,
-        options: &Options,
+        options: &KdOptions,
         traversal: Traversal,
     ) -> Result<KdGpu<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
@@ -161,7 +161,7 @@ impl Subject for KdGpu<'_> {
             // Both at once may be too much.
             self.place.structure = self.device.buffer("structure", 16)?;
             self.place.scratch = self.device.buffer("scratch", 16)?;
-            self.place = Place::new(self.device, &self.name, &Options { estimate, ..self.options }, &self.input)?;
+            self.place = Place::new(self.device, &self.name, &KdOptions { estimate, ..self.options }, &self.input)?;
             self.fits = !is_short;
         }
     }

@@ -9,21 +9,21 @@ use crate::scene::Mesh;
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
-use hedgerow_host::kdtree::{Options, build};
+use hedgerow_host::kdtree::{HostKdOptions, build};
 use std::borrow::Cow;
 
 /// `kd-exact` and `kd-binned`.
 pub struct KdHost<'a> {
     builder: String,
     mesh: &'a Mesh,
-    options: Options,
+    options: HostKdOptions,
     tree: Option<KdTree>,
     rays: KdRays<'a>,
 }
 
 impl<'a> KdHost<'a> {
     /// On `mesh`, to be traced in this way on the host.
-    pub fn new(builder: &str, mesh: &'a Mesh, options: Options, traversal: Traversal) -> KdHost<'a> {
+    pub fn new(builder: &str, mesh: &'a Mesh, options: HostKdOptions, traversal: Traversal) -> KdHost<'a> {
         KdHost { builder: builder.to_owned(), mesh, options, tree: None, rays: KdRays::on_host(traversal) }
     }
 
@@ -68,7 +68,7 @@ impl Subject for KdHost<'_> {
     }
 
     fn memory(&self) -> record::Memory {
-        let structure_bytes = self.tree.as_ref().map(|tree| tree.header.sizes().bytes);
+        let structure_bytes = self.tree.as_ref().map(|tree| tree.header.offsets().bytes);
         record::Memory { structure_bytes, ..Default::default() }
     }
 

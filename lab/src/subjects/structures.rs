@@ -35,7 +35,7 @@ pub struct Structures<'a> {
 
 impl<'a> Structures<'a> {
     /// Ours.
-    pub fn ours(device: &'a Device, options: accel::Options) -> Structures<'a> {
+    pub fn ours(device: &'a Device, options: accel::AccelOptions) -> Structures<'a> {
         Structures { device, maker: Maker::Ours(accel::Device::with_options(device, options)) }
     }
 

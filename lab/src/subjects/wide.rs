@@ -3,21 +3,21 @@
 use crate::Result;
 use crate::device::{Buffer, Device};
 use crate::measure::record;
-use hedgerow::bvh::builder::Sizes;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Child, Header, Triangle};
-use hedgerow::bvh::wide::device::{OnDevice, Options};
+use hedgerow::bvh::wide::device::{WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::bvh::wide::{Form, quality};
 use hedgerow::gpu::Recorder;
-use hedgerow::trace::wide::Tracer;
+use hedgerow::gpu::Sizes;
+use hedgerow::trace::wide::WideTracer;
 
 /// Memory for a wide tree of triangles, its collapsing, and what traces it.
 pub struct WideTree<'a> {
     /// What traces it.
-    pub tracer: Tracer,
-    collapse: OnDevice,
+    pub tracer: WideTracer,
+    collapse: WidePass,
     sizes: Sizes,
     structure: Buffer<'a>,
     scratch: Buffer<'a>,
@@ -28,9 +28,9 @@ impl<'a> WideTree<'a> {
     ///
     /// # Errors
     /// Too little memory; a pipeline could not be made.
-    pub fn new(device: &'a Device, tracer: Tracer, count: u32) -> Result<WideTree<'a>> {
-        let options = Options { form: tracer.form, primitives: Primitives::Triangles, geometry_count: 1 };
-        let collapse = OnDevice::new(device, &options, count);
+    pub fn new(device: &'a Device, tracer: WideTracer, count: u32) -> Result<WideTree<'a>> {
+        let options = WideOptions { form: tracer.form, primitives: Primitives::Triangles, geometry_count: 1 };
+        let collapse = WidePass::new(device, &options, count);
         let sizes = collapse.sizes();
         let structure = device.buffer("wide structure", sizes.structure)?;
         let scratch = device.buffer("wide scratch", sizes.scratch)?;

@@ -4,7 +4,7 @@
 use crate::common::{corpus, device};
 use crate::conditional::{Needs, needs};
 use hedgerow::ash::vk;
-use hedgerow::bvh::builder::{Builder, Input, Options, Schedule};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Input, Schedule};
 use std::process::Command;
 
 crate::conditional::tests! {
@@ -22,7 +22,7 @@ fn twenty_builds_give_the_same_bytes_and_touch_nothing_else() {
         corpus::random("in a plane", 3_001, [0.0; 3], [1.0, 0.0, 1.0]),
     ] {
         for schedule in [Schedule::Chain, Schedule::Persistent] {
-            let options = Options { schedule: Some(schedule), ..Options::DEFAULT };
+            let options = BuildOptions { schedule: Some(schedule), ..BuildOptions::DEFAULT };
             let lbvh = Builder::new(device, &options, triangles.len() as u32).unwrap();
             let sizes = lbvh.sizes();
             let vertices = device.upload("positions", &positions).unwrap();

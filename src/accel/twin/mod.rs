@@ -4,7 +4,7 @@ pub mod rebraid;
 pub mod serialize;
 
 use super::build::codes;
-use super::{Instance, Options, REBRAID};
+use super::{AccelOptions, Instance, REBRAID};
 use crate::bvh::layout::{self, Bvh2, Child, Header, Node, Record, status};
 use crate::bvh::sah::Collapse;
 use crate::bvh::twin::lbvh;
@@ -43,8 +43,8 @@ pub fn top_level<'a>(
     instances: &[Instance],
     below: impl Fn(u64) -> Option<Below<'a>>,
     flags: vk::BuildAccelerationStructureFlagsKHR,
-    options: &Options,
-) -> Bvh2<layout::Instance> {
+    options: &AccelOptions,
+) -> Bvh2<layout::InstanceRecord> {
     let mut entries = entries(instances, &below);
     if flags.contains(REBRAID) && !flags.contains(vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE) {
         let capacity = options.rebraid(entries.len() as u32).capacity;
@@ -112,20 +112,20 @@ impl Below<'_> {
 }
 
 /// The record of an entry; all zero for one that is left out.
-fn record_of(entry: &Entry, instances: &[Instance]) -> layout::Instance {
-    let none = layout::Instance { instance: entry.instance, ..bytemuck::Zeroable::zeroed() };
+fn record_of(entry: &Entry, instances: &[Instance]) -> layout::InstanceRecord {
+    let none = layout::InstanceRecord { instance: entry.instance, ..bytemuck::Zeroable::zeroed() };
     if entry.bounds.is_err() {
         return none;
     }
     let given = &instances[entry.instance as usize];
-    layout::Instance {
+    layout::InstanceRecord {
         to_object: inverse_of(&given.transform).unwrap_or_default(),
         to_world: given.transform,
         structure: given.structure,
         index_and_mask: given.index_and_mask,
         offset_and_flags: given.offset_and_flags,
         start: if entry.is_whole { 0 } else { entry.start.index },
-        start_count: if entry.is_whole { layout::Instance::AT_ROOT } else { entry.start.count },
+        start_count: if entry.is_whole { layout::InstanceRecord::AT_ROOT } else { entry.start.count },
         ..none
     }
 }

@@ -46,12 +46,12 @@ pub fn read(memory: &[u8]) -> Result<Vec<u8>> {
 }
 
 /// The header of a structure's bytes, and where its parts lie.
-fn parts_of(structure: &[u8]) -> Result<(Header, layout::Sizes)> {
+fn parts_of(structure: &[u8]) -> Result<(Header, layout::BvhOffsets)> {
     let invalid = |what: &str| Error::InvalidStructure(what.into());
     let header = structure.get(..size_of::<Header>()).ok_or_else(|| invalid("shorter than its header"))?;
     let header: Header = bytemuck::pod_read_unaligned(header);
     let record_bytes = layout::record_bytes(header.kind).filter(|_| header.magic == MAGIC);
-    let sizes = header.sizes(record_bytes.ok_or_else(|| invalid("of another kind or version"))?);
+    let sizes = header.offsets(record_bytes.ok_or_else(|| invalid("of another kind or version"))?);
     if (structure.len() as u64) < sizes.bytes {
         return Err(invalid("shorter than its header says"));
     }

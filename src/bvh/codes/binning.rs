@@ -66,7 +66,7 @@ type Cells = [[u32; 3]; 2];
 
 /// A part of the grid and the code within it.
 #[derive(Debug, Clone)]
-struct Part {
+struct BinPart {
     cells: Cells,
     /// The splits on the way to it.
     path: u32,
@@ -78,7 +78,7 @@ struct Part {
 #[derive(Debug, Clone)]
 pub(super) struct Splits {
     grid: Grid,
-    parts: Vec<Part>,
+    parts: Vec<BinPart>,
     /// Part of each cell.
     part_of: Vec<usize>,
 }
@@ -208,15 +208,15 @@ impl Splits {
             };
             parts = parts.into_iter().flat_map(split).collect();
         }
-        let parts: Vec<Part> = parts
+        let parts: Vec<BinPart> = parts
             .into_iter()
             .map(|(cells, path, length)| {
                 let within = extents.times(std::array::from_fn(|i| cells[1][i] - cells[0][i] + 1));
-                Part { cells, path, length, recipe: within.recipe(Order::Variable, bits) }
+                BinPart { cells, path, length, recipe: within.recipe(Order::Variable, bits) }
             })
             .collect();
         let holds =
-            |part: &Part, cell: [u32; 3]| (0..3).all(|i| (part.cells[0][i]..=part.cells[1][i]).contains(&cell[i]));
+            |part: &BinPart, cell: [u32; 3]| (0..3).all(|i| (part.cells[0][i]..=part.cells[1][i]).contains(&cell[i]));
         let part_of = (0..1 << GRID_BITS)
             .map(|number| parts.iter().position(|part| holds(part, grid.cell(number))).unwrap_or(0))
             .collect();

@@ -7,7 +7,7 @@
 //! next bit of that axis' coordinate; and, every so many bits, one bit of the primitive's size (`recipe.rs`). What far primitives
 //! would cost, others save by a *prefix* that says in which part of the scene a primitive lies, followed by the code within that
 //! part: occupied cells (`mipping.rs`), splits of a counted grid (`binning.rs`), or sections around robust bounds
-//! (`sections.rs`). [`Plan`] is all of it for a given scene; `glsl/bvh/codes.glsl` cooks by the same one and gives the same bits
+//! (`sections.rs`). [`CodePlan`] is all of it for a given scene; `glsl/bvh/codes.glsl` cooks by the same one and gives the same bits
 //! on every device: no division, square root or contraction that a driver may round its own way is trusted.
 //!
 //! `docs/notes/codes.md` compares them.
@@ -24,7 +24,7 @@ mod sections;
 
 pub use binning::Binning;
 pub use bounds::CodeBounds;
-pub use plan::Plan;
+pub use plan::CodePlan;
 
 /// Which code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

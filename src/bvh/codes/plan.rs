@@ -10,7 +10,7 @@ use crate::geometry::Aabb;
 
 /// The recipe of a code for a given scene.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct CodePlan {
     codes: Codes,
     axes: [Axis; 3],
     recipe: Recipe,
@@ -68,24 +68,24 @@ impl Size {
     }
 }
 
-impl Plan {
+impl CodePlan {
     /// The recipe of `codes` for primitives with these boxes; those that are left out have an error instead.
-    pub fn new<E>(codes: Codes, boxes: &[Result<Aabb, E>]) -> Plan {
+    pub fn new<E>(codes: Codes, boxes: &[Result<Aabb, E>]) -> CodePlan {
         let (bounds, centroids) = boxes.iter().flatten().fold((Aabb::EMPTY, Aabb::EMPTY), |(bounds, centroids), b| {
             (bounds.union(b), centroids.union(&Aabb { lo: b.centroid(), hi: b.centroid() }))
         });
         if boxes.iter().flatten().next().is_none() {
-            return Plan::within(codes, &Aabb { lo: [0.0; 3], hi: [0.0; 3] });
+            return CodePlan::within(codes, &Aabb { lo: [0.0; 3], hi: [0.0; 3] });
         }
         if codes.bounds == CodeBounds::Robust
             && let Some(sections) = Sections::of(boxes, &bounds)
         {
-            let plan = Plan::within(codes, &sections.core);
+            let plan = CodePlan::within(codes, &sections.core);
             let sections = sections.with_head(&plan.recipe.sequence);
-            return Plan { prefix: Prefix::Sections(sections), ..plan };
+            return CodePlan { prefix: Prefix::Sections(sections), ..plan };
         }
         let bounds = codes.bounds.of(&bounds, &centroids);
-        let plan = Plan::within(codes, &bounds);
+        let plan = CodePlan::within(codes, &bounds);
         let extents = Extents::of(&bounds);
         let centroids = || boxes.iter().flatten().map(|b| plan.wide_fractions(b.centroid()));
         let prefix = match codes.code {
@@ -95,12 +95,12 @@ impl Plan {
             }
             _ => Prefix::None,
         };
-        Plan { prefix, ..plan }
+        CodePlan { prefix, ..plan }
     }
 
     /// The recipe within these bounds, without a prefix.
-    fn within(codes: Codes, bounds: &Aabb) -> Plan {
-        Plan {
+    fn within(codes: Codes, bounds: &Aabb) -> CodePlan {
+        CodePlan {
             codes,
             axes: std::array::from_fn(|i| Axis::new(bounds.lo[i], bounds.hi[i])),
             recipe: Extents::of(bounds).recipe(codes.code.order(), codes.coordinate_bits()),
@@ -117,7 +117,7 @@ impl Plan {
         std::array::from_fn(|i| self.axes[i].wide_fraction(at[i]))
     }
 
-    /// The code of a primitive with this box, in the low [`Codes::bits`] bits. Never all ones: that is [`Plan::inactive`].
+    /// The code of a primitive with this box, in the low [`Codes::bits`] bits. Never all ones: that is [`CodePlan::inactive`].
     pub fn encode(&self, primitive: &Aabb) -> u64 {
         let (bits, group) = (self.codes.bits, self.codes.code.size_group());
         let coordinates = self.fractions(primitive.centroid());
@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn a_plain_code_interleaves_x_y_z_from_the_top() {
         let bounds = Aabb { lo: [0.0; 3], hi: [8.0; 3] };
-        let plan = Plan::within(Code::Mc30.full().with_bits(9), &bounds);
+        let plan = CodePlan::within(Code::Mc30.full().with_bits(9), &bounds);
         // x = 5 = 101, y = 3 = 011, z = 6 = 110 of 8 cells.
         assert_eq!(plan.encode(&box_at([5.0, 3.0, 6.0])), 0b101_011_110);
     }
@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn every_seventh_bit_is_of_the_size() {
         let bounds = Aabb { lo: [0.0; 3], hi: [1.0; 3] };
-        let plan = Plan::within(Code::Emc64Var.full().with_bits(14), &bounds);
+        let plan = CodePlan::within(Code::Emc64Var.full().with_bits(14), &bounds);
         // The whole scene as one primitive: size 1 (all ones), centroid in the middle (first bits 1, then 0).
         assert_eq!(plan.encode(&bounds), 0b11_1000_1000_0001);
         // The same centroid with no size.
@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn a_far_primitive_costs_the_long_axis_no_precision_below_42_doublings() {
         let grown = Aabb { lo: [0.0; 3], hi: [2.0_f32.powi(42), 1.0, 1.0] };
-        let plan = Plan::within(Code::Emc64VarNoSize.full(), &grown);
+        let plan = CodePlan::within(Code::Emc64VarNoSize.full(), &grown);
         // 42 bits go to x before y and z have any; 22 are left for three axes: 7 or 8 each.
         let codes: Vec<_> = (0..64).map(|i| plan.encode(&box_at([(i as f32 + 0.5) / 64.0, 0.1, 0.1]))).collect();
         assert!(codes.windows(2).all(|w| w[0] < w[1]), "64 cells along x are told apart");
@@ -191,7 +191,7 @@ mod tests {
             let middle = bounds.centroid()[0];
             let below =
                 f32::from_bits(if middle > 0.0 { middle.to_bits() - 1 } else { (-f32::MIN_POSITIVE).to_bits() });
-            let plan = Plan::within(Code::Mc63.full(), &bounds);
+            let plan = CodePlan::within(Code::Mc63.full(), &bounds);
             // By exact arithmetic: twice the distance from the low corner against the extent.
             let exact = |v: f32| 2.0 * (f64::from(v) - f64::from(lo)) >= f64::from(hi) - f64::from(lo);
             for v in [middle, below] {
@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn a_scene_far_on_the_negative_side_keeps_its_precision() {
         let grown = Aabb { lo: [-2.0_f32.powi(40), 0.0, 0.0], hi: [1.0, 1.0, 1.0] };
-        let plan = Plan::within(Code::Emc64VarNoSize.full(), &grown);
+        let plan = CodePlan::within(Code::Emc64VarNoSize.full(), &grown);
         let codes: Vec<_> = (0..64).map(|i| plan.encode(&box_at([(i as f32 + 0.5) / 64.0, 0.1, 0.1]))).collect();
         assert!(codes.windows(2).all(|w| w[0] < w[1]), "64 cells along x are told apart");
     }
@@ -215,7 +215,7 @@ mod tests {
             for code in Code::ALL {
                 for bounds in CodeBounds::ALL {
                     let Some(codes) = code.full().with_bounds(bounds) else { continue };
-                    let plan = Plan::new(codes, &corners.map(Ok::<_, u32>));
+                    let plan = CodePlan::new(codes, &corners.map(Ok::<_, u32>));
                     let [low, high] = corners.map(|b| plan.encode(&b));
                     assert!(low < high && high < plan.inactive(), "{codes} in {lo:e}..{hi:e}: {low:x} {high:x}");
                 }

@@ -176,7 +176,7 @@ impl Sections {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Code, CodeBounds, Codes, Plan};
+    use super::super::{Code, CodeBounds, CodePlan, Codes};
     use super::*;
 
     fn robust() -> Codes {
@@ -189,14 +189,14 @@ mod tests {
         cells.map(|lo| Aabb { lo, hi: lo.map(|v| v + 0.05) }).collect()
     }
 
-    fn plan(boxes: &[Aabb]) -> Plan {
-        Plan::new(robust(), &boxes.iter().map(|&b| Ok::<_, u32>(b)).collect::<Vec<_>>())
+    fn plan(boxes: &[Aabb]) -> CodePlan {
+        CodePlan::new(robust(), &boxes.iter().map(|&b| Ok::<_, u32>(b)).collect::<Vec<_>>())
     }
 
     #[test]
     fn a_scene_without_anything_far_has_the_codes_of_its_full_bounds() {
         let boxes = grid();
-        let full = Plan::new(Code::Emc64Var.full(), &boxes.iter().map(|&b| Ok::<_, u32>(b)).collect::<Vec<_>>());
+        let full = CodePlan::new(Code::Emc64Var.full(), &boxes.iter().map(|&b| Ok::<_, u32>(b)).collect::<Vec<_>>());
         let robust = plan(&boxes);
         assert!(boxes.iter().all(|b| full.encode(b) == robust.encode(b)));
     }

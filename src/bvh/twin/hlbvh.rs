@@ -12,7 +12,7 @@
 //! - Each side keeps its order. The node that splits the last order before its place p has the slot before the first position of
 //!   the p-th treelet in the order of codes, which no other node can have.
 
-use crate::bvh::codes::{Codes, Plan};
+use crate::bvh::codes::{CodePlan, Codes};
 use crate::bvh::layout::{Bvh2, Child, Node, Record};
 use crate::geometry::Aabb;
 
@@ -93,7 +93,7 @@ fn codes_of<R: Record>(radix: &Bvh2<R>, codes: Codes) -> Vec<u64> {
         let place = if is_split { leaf.index } else { radix.records[leaf.index as usize].primitive() };
         boxes[place as usize] = Ok(leaf.bounds());
     }
-    let plan = Plan::new(codes, &boxes);
+    let plan = CodePlan::new(codes, &boxes);
     leaves.iter().map(|leaf| plan.encode(&leaf.bounds())).collect()
 }
 

@@ -4,7 +4,7 @@
 //! that splits between positions i and i + 1 has slot i in both.
 
 use super::geometry::{self, Corners};
-use crate::bvh::codes::{Codes, Plan};
+use crate::bvh::codes::{CodePlan, Codes};
 use crate::bvh::layout::status;
 use crate::bvh::layout::{BoxRecord, Bvh2, Child, Header, MAGIC, Node, Record, Triangle, UNUSED, node_slots};
 use crate::bvh::sah::Collapse;
@@ -69,7 +69,7 @@ pub fn build_boxes<R: Record>(
     let bounds = active().fold(Aabb::EMPTY, |bounds, b| bounds.union(b));
     header.active = active().count() as u32;
 
-    let plan = Plan::new(codes, boxes);
+    let plan = CodePlan::new(codes, boxes);
     let mut order: Vec<(u64, u32)> =
         (0..count).map(|i| (boxes[i as usize].map_or(plan.inactive(), |b| plan.encode(&b)), i)).collect();
     order.sort_unstable();

@@ -1,7 +1,7 @@
 //! Parallel reinsertion, plainly: the twin of [`crate::bvh::reinsertion`], where the method is told.
 
 use crate::bvh::layout::{Bvh2, Child, Record};
-use crate::bvh::reinsertion::{LEAST_GAIN, LEAST_SHARE, Options, PATH, STACK};
+use crate::bvh::reinsertion::{LEAST_GAIN, LEAST_SHARE, PATH, ReinsertionOptions, STACK};
 use crate::geometry::Aabb;
 
 const NONE: u32 = u32::MAX;
@@ -18,7 +18,7 @@ struct Move {
 impl<R: Record> Bvh2<R> {
     /// The tree, in which every leaf has one record, after the passes that `options` tells: the bytes of
     /// [`crate::bvh::reinsertion`].
-    pub fn reinserted(&self, options: &Options) -> Bvh2<R> {
+    pub fn reinserted(&self, options: &ReinsertionOptions) -> Bvh2<R> {
         let mut work = Work { parents: parents_of(self), tree: self.clone() };
         let slots = self.nodes.len() as u32;
         for round in 0..options.rounds_for(slots) {

@@ -16,7 +16,7 @@ use super::geometry::Corners;
 use crate::bvh::codes::Codes;
 use crate::bvh::layout::{Bvh2, SLACK, Triangle};
 use crate::bvh::sah::Collapse;
-use crate::bvh::split::{Options, Reference};
+use crate::bvh::split::{SplitOptions, SplitReference};
 use crate::bvh::twin::lbvh;
 use crate::geometry::Aabb;
 
@@ -38,7 +38,7 @@ const INACTIVE: u32 = 1 << 31;
 pub fn build(
     positions: &[[f32; 3]],
     triangles: &[[u32; 3]],
-    options: &Options,
+    options: &SplitOptions,
     codes: Codes,
     collapse: Collapse,
 ) -> Bvh2 {
@@ -48,7 +48,7 @@ pub fn build(
 /// The same of triangles that [`HostGeometry::corners`](super::geometry::HostGeometry::corners) read.
 pub fn build_corners(
     corners: impl Iterator<Item = Corners>,
-    options: &Options,
+    options: &SplitOptions,
     codes: Codes,
     collapse: Collapse,
 ) -> Bvh2 {
@@ -68,28 +68,28 @@ pub fn build_corners(
     tree
 }
 
-fn bounds_of(&Reference { lo, hi, left_out, .. }: &Reference) -> Result<Aabb, u32> {
+fn bounds_of(&SplitReference { lo, hi, left_out, .. }: &SplitReference) -> Result<Aabb, u32> {
     if left_out == 0 { Ok(Aabb { lo, hi }) } else { Err(left_out & !INACTIVE) }
 }
 
 /// The references of triangles: the first part of each at its own place, the others behind those of all, in the order of the
 /// triangles; as many as there may be, so that the last ones may be none.
-pub fn references(corners: &[Corners], options: &Options) -> Vec<Reference> {
+pub fn references(corners: &[Corners], options: &SplitOptions) -> Vec<SplitReference> {
     let count = corners.len() as u32;
     let budget = options.budget(count);
     let bounds = corners.iter().flatten().fold(Aabb::EMPTY, |b, c| b.union(&Aabb::around(c)));
     let grid = Grid::over(&bounds);
     let weights: Vec<Option<u32>> = corners.iter().map(|c| grid.weight_of(c.as_ref().ok()?)).collect();
     let splits_of_weight = splits_within(budget, options.most, &weights);
-    let none = Reference { lo: [0.0; 3], primitive: u32::MAX, hi: [0.0; 3], left_out: INACTIVE };
+    let none = SplitReference { lo: [0.0; 3], primitive: u32::MAX, hi: [0.0; 3], left_out: INACTIVE };
     let mut others = Vec::new();
-    let mut references: Vec<Reference> = Vec::with_capacity((count + budget) as usize);
+    let mut references: Vec<SplitReference> = Vec::with_capacity((count + budget) as usize);
     for (primitive, (corners, weight)) in (0..).zip(corners.iter().zip(weights)) {
         let splits = weight.map_or(0, |weight| splits_of_weight[weight as usize]);
         let (corners, left_out) = corners.map_or_else(|status| ([[0.0; 3]; 3], status), |corners| (corners, 0));
         let part = |number| {
             let found = grid.part(&corners, splits, number);
-            found.map_or(none, |Aabb { lo, hi }| Reference { lo, primitive, hi, left_out })
+            found.map_or(none, |Aabb { lo, hi }| SplitReference { lo, primitive, hi, left_out })
         };
         references.push(part(0));
         others.extend((1..=splits).map(part));
@@ -155,7 +155,7 @@ struct Grid {
 }
 
 #[derive(Clone, Copy)]
-struct Plane {
+struct SplitPlane {
     axis: usize,
     at: f32,
     level: u32,
@@ -183,8 +183,8 @@ impl Grid {
 
     /// The most important plane that lies strictly inside of a box: that of the greatest spacing; of such ones, across the longer
     /// side of the box.
-    fn plane_in(&self, b: &Aabb) -> Option<Plane> {
-        let mut best: Option<(Plane, f32)> = None;
+    fn plane_in(&self, b: &Aabb) -> Option<SplitPlane> {
+        let mut best: Option<(SplitPlane, f32)> = None;
         for axis in (0..3).filter(|&axis| self.cell[axis] != 0.0) {
             let cell = |x: f32| ((x - self.lo[axis]) * self.cells_per_length[axis]).clamp(0.0, CELLS - 1.0) as u32;
             let (mut from, mut to) = (cell(b.lo[axis]), cell(b.hi[axis]));
@@ -206,7 +206,7 @@ impl Grid {
                     let is_better =
                         best.is_none_or(|(p, longest)| level < p.level || level == p.level && side > longest);
                     if is_better {
-                        best = Some((Plane { axis, at, level }, side));
+                        best = Some((SplitPlane { axis, at, level }, side));
                     }
                     break;
                 }
@@ -284,8 +284,8 @@ fn is_empty(b: &Aabb) -> bool {
 }
 
 /// Boxes around what of a triangle's part in a box lies on the two sides of a plane.
-fn split_at(corners: &[[f32; 3]; 3], b: &Aabb, plane: &Plane) -> [Aabb; 2] {
-    let Plane { axis, at, .. } = *plane;
+fn split_at(corners: &[[f32; 3]; 3], b: &Aabb, plane: &SplitPlane) -> [Aabb; 2] {
+    let SplitPlane { axis, at, .. } = *plane;
     let [mut below, mut above] = [Aabb::EMPTY; 2];
     for k in 0..3 {
         let (p, q) = (corners[k], corners[(k + 1) % 3]);
@@ -305,7 +305,7 @@ fn split_at(corners: &[[f32; 3]; 3], b: &Aabb, plane: &Plane) -> [Aabb; 2] {
 }
 
 /// A box around where an edge from below a plane to above it crosses.
-fn crossing_of(a: [f32; 3], b: [f32; 3], plane: &Plane) -> Aabb {
+fn crossing_of(a: [f32; 3], b: [f32; 3], plane: &SplitPlane) -> Aabb {
     let shortest = power_of_two(-60);
     let d: [f32; 3] = std::array::from_fn(|i| b[i] - a[i]);
     let mut crossing = Aabb::around(&[a, b]);

@@ -2,9 +2,9 @@
 
 use super::Form;
 use crate::Result;
-use crate::bvh::builder::Sizes;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::node_slots;
+use crate::gpu::Sizes;
 use crate::gpu::arguments;
 use crate::gpu::plan::Plan;
 use crate::gpu::{Context, Grid, Kernel, Recorder, fill, scan, shaders};
@@ -12,7 +12,7 @@ use std::ops::Range;
 
 /// What is collapsed into what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Options {
+pub struct WideOptions {
     /// The nodes of the wide tree.
     pub form: Form,
     /// What the leaves hold.
@@ -23,8 +23,8 @@ pub struct Options {
 
 /// Collapsing of a `Bvh2` of at most so many primitives, by whatever builder.
 #[derive(Debug, Clone, Copy)]
-pub struct OnDevice {
-    options: Options,
+pub struct WidePass {
+    options: WideOptions,
     count: u32,
     grid: Grid,
     few: u32,
@@ -43,7 +43,7 @@ const LEVEL_WORDS: u64 = 64 + 65 + 1;
 
 /// What collapsing does, as far as memory is used in one and free in the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Phase {
+enum WidePhase {
     /// Nodes are opened, level by level.
     Open,
     /// What they have becomes where it goes.
@@ -54,7 +54,7 @@ enum Phase {
 
 /// The plan of the scratch memory, and where its parts begin, in bytes.
 struct Scratch {
-    plan: Plan<Phase>,
+    plan: Plan<WidePhase>,
     levels: u64,
     opened: u64,
     slots: u64,
@@ -65,12 +65,12 @@ struct Scratch {
     sums: u64,
 }
 
-impl OnDevice {
+impl WidePass {
     /// For a source built of `primitive_count` primitives, or of fewer.
-    pub fn new(context: &Context, options: &Options, primitive_count: u32) -> OnDevice {
+    pub fn new(context: &Context, options: &WideOptions, primitive_count: u32) -> WidePass {
         let tuning = &context.tuning;
         let scan = scan::Scan::new(context, node_slots(primitive_count) + 1);
-        OnDevice {
+        WidePass {
             options: *options,
             count: primitive_count,
             grid: Grid::of(context),
@@ -84,7 +84,7 @@ impl OnDevice {
     /// Bytes of the wide structure, at most (its header tells how many are in use: [`Form::bytes_in_use`]), and of the scratch
     /// memory.
     pub fn sizes(&self) -> Sizes {
-        let Options { form, primitives, geometry_count } = self.options;
+        let WideOptions { form, primitives, geometry_count } = self.options;
         let nodes = form.nodes_at_most(self.count);
         let structure = form.bytes(primitives.record_bytes(), nodes, self.count, geometry_count);
         Sizes { structure, scratch: self.scratch().plan.bytes(), alignment: 16 }
@@ -92,26 +92,28 @@ impl OnDevice {
 
     fn scratch(&self) -> Scratch {
         let mut plan = Plan::new();
-        let mut take = |name, words: u64, life| Plan::<Phase>::UNIT * u64::from(plan.take(name, 4 * words, life));
+        let mut take = |name, words: u64, life| Plan::<WidePhase>::UNIT * u64::from(plan.take(name, 4 * words, life));
         let form = self.options.form;
         let (nodes, width) = (u64::from(form.nodes_at_most(self.count)), u64::from(form.width()));
         let slots = u64::from(node_slots(self.count)) + 1;
-        let levels = take("levels", LEVEL_WORDS, Phase::Open..=Phase::Nodes);
-        let opened = take("opened nodes", 2 * nodes, Phase::Open..=Phase::Nodes);
-        let children = take("what names their children", width * nodes, Phase::Open..=Phase::Nodes);
+        let levels = take("levels", LEVEL_WORDS, WidePhase::Open..=WidePhase::Nodes);
+        let opened = take("opened nodes", 2 * nodes, WidePhase::Open..=WidePhase::Nodes);
+        let children = take("what names their children", width * nodes, WidePhase::Open..=WidePhase::Nodes);
         // Side by side: they are cleared at once.
-        let first_children = take("first children", slots, Phase::Open..=Phase::Nodes);
+        let first_children = take("first children", slots, WidePhase::Open..=WidePhase::Nodes);
         let is_quantised = form.is_quantised();
-        let first_records = if is_quantised { take("first records", slots, Phase::Open..=Phase::Nodes) } else { 0 };
-        let sums = take("sums of tiles", self.scan.sums_words().into(), Phase::Scan..=Phase::Scan);
+        let first_records =
+            if is_quantised { take("first records", slots, WidePhase::Open..=WidePhase::Nodes) } else { 0 };
+        let sums = take("sums of tiles", self.scan.sums_words().into(), WidePhase::Scan..=WidePhase::Scan);
         let records = u64::from(self.count);
-        let order = if is_quantised { take("order of records", records, Phase::Nodes..=Phase::Records) } else { 0 };
+        let order =
+            if is_quantised { take("order of records", records, WidePhase::Nodes..=WidePhase::Records) } else { 0 };
         Scratch { plan, levels, opened, slots: children, first_children, first_records, order, sums }
     }
 
     fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
         let workgroup = if one_workgroup(shader) { self.few } else { self.grid.workgroup };
-        let Options { form, .. } = self.options;
+        let WideOptions { form, .. } = self.options;
         let [quantised, in_registers] = [form.is_quantised(), self.in_registers].map(u32::from);
         Kernel::new(shader, workgroup, &[self.grid.rounds, form.width(), quantised, in_registers])
     }
@@ -129,7 +131,7 @@ impl OnDevice {
     }
 
     /// Records the collapsing of the `Bvh2` at address `source` into the wide tree at `target`, with scratch memory at
-    /// `scratch`, of the bytes and alignment that [`OnDevice::sizes`] tells. The phase is `wide`.
+    /// `scratch`, of the bytes and alignment that [`WidePass::sizes`] tells. The phase is `wide`.
     ///
     /// The source is left as it is; the target stands alone. The caller places a barrier (shader write to shader read and
     /// write) before and behind.
@@ -172,7 +174,7 @@ impl OnDevice {
         let scanned = [arguments.first_children, arguments.first_records];
         for words in scanned.into_iter().take(if form.is_quantised() { 2 } else { 1 }) {
             recorder.barrier();
-            self.scan.record(recorder, &scan::Buffers { values: words, results: words, sums })?;
+            self.scan.record(recorder, &scan::ScanBuffers { values: words, results: words, sums })?;
         }
         recorder.barrier();
         recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_NODES), &arguments, groups)?;

@@ -1,8 +1,8 @@
 //! Walks a wide tree on the host and says what is wrong and where.
 
 use super::layout::{Wide, WideNode};
-use crate::bvh::cover::Parts;
-use crate::bvh::layout::{Instance, Record};
+use crate::bvh::cover::SplitParts;
+use crate::bvh::layout::{InstanceRecord, Record};
 use crate::bvh::twin::split::around_parts;
 use crate::bvh::validate::validate_split_primitives;
 use crate::geometry::Aabb;
@@ -28,7 +28,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         let mut in_leaf = vec![false; self.records.len()];
         let mut visited = vec![false; self.nodes.len()];
         visited[0] = true;
-        let mut parts = Parts::default();
+        let mut parts = SplitParts::default();
         let seen = (&mut in_leaf[..], &mut visited[..], &mut parts);
         let around = self.validate_node(0, &self.header.root.bounds(), 0, seen)?;
         if around.is_some_and(|around| around != self.header.root.bounds()) {
@@ -76,7 +76,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
 
     /// The primitive order names every primitive once; of a top level, an instance may have several entries.
     fn validate_primitives(&self) -> Result<()> {
-        if R::KIND == Instance::KIND {
+        if R::KIND == InstanceRecord::KIND {
             return Ok(());
         }
         if self.header.split_from != 0 {
@@ -95,7 +95,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         index: u32,
         bounds: &Aabb,
         level: u32,
-        seen: (&mut [bool], &mut [bool], &mut Parts),
+        seen: (&mut [bool], &mut [bool], &mut SplitParts),
     ) -> Result<Option<Aabb>> {
         let (in_leaf, visited, parts) = seen;
         if level >= N::FORM.levels() {
@@ -151,7 +151,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         named_by: u32,
         (first, count): (u32, u32),
         bounds: &Aabb,
-        (in_leaf, parts): (&mut [bool], &mut Parts),
+        (in_leaf, parts): (&mut [bool], &mut SplitParts),
     ) -> Result<Option<Aabb>> {
         let range = first as usize..first as usize + count as usize;
         if range.end > in_leaf.len() {

@@ -6,21 +6,22 @@ use bytemuck::{Pod, Zeroable};
 
 /// How to merge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct MergeOptions {
     /// Bins, exact splits and costs of what is built in leaves, the schedule and its workgroups; the rest is not looked at.
-    pub build: builder::Options,
+    pub build: builder::KdOptions,
     /// What the memory goes by.
-    pub estimate: Estimate,
+    pub estimate: MergeEstimate,
 }
 
-impl Options {
+impl MergeOptions {
     /// The builder's, and memory for objects about as dense as what they are put into.
-    pub const DEFAULT: Options = Options { build: builder::Options::DEFAULT, estimate: Estimate::DEFAULT };
+    pub const DEFAULT: MergeOptions =
+        MergeOptions { build: builder::KdOptions::DEFAULT, estimate: MergeEstimate::DEFAULT };
 }
 
-/// How much a merge has, of each triangle of objects, and of 64 more. [`Report::estimate`] makes one that suffices.
+/// How much a merge has, of each triangle of objects, and of 64 more. [`MergeReport::estimate`] makes one that suffices.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub struct MergeEstimate {
     /// Leaves of the static tree that it is in; where its object has a tree, once for each leaf of that one there.
     pub pairs: f32,
     /// Nodes of objects' trees on their way down the static one, in the step that has most, or leaves of them in its leaves; 0 where
@@ -29,16 +30,16 @@ pub struct Estimate {
     /// Leaves of the static tree that any is in.
     pub marked: f32,
     /// As a build has them, with what was in those leaves before.
-    pub build: builder::Estimate,
+    pub build: builder::KdEstimate,
 }
 
-impl Estimate {
+impl MergeEstimate {
     /// For objects of which nothing is known, but that none has a tree.
-    pub const DEFAULT: Estimate = Estimate {
+    pub const DEFAULT: MergeEstimate = MergeEstimate {
         pairs: 8.0,
         items: 0.0,
         marked: 4.0,
-        build: builder::Estimate {
+        build: builder::KdEstimate {
             level_references: 24.0,
             level_nodes: 4.0,
             subtree_nodes: 12.0,
@@ -48,13 +49,13 @@ impl Estimate {
         },
     };
     /// The same for objects with trees.
-    pub const WITH_TREES: Estimate = Estimate { pairs: 20.0, items: 4.0, ..Estimate::DEFAULT };
+    pub const WITH_TREES: MergeEstimate = MergeEstimate { pairs: 20.0, items: 4.0, ..MergeEstimate::DEFAULT };
 }
 
 /// What a merge needed, in the scratch memory at [`Merger::report_range`](super::Merger::report_range) when it has run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Report {
+pub struct MergeReport {
     /// Bits of [`crate::bvh::layout::status`].
     pub status: u32,
     /// Pairs of a static leaf and a triangle; of objects with trees, before those are left out that are there twice.
@@ -63,19 +64,19 @@ pub struct Report {
     pub marked: u32,
     /// References of these leaves and of the triangles in them, as far as pairs and leaves had room.
     pub first_references: u32,
-    /// As [`builder::Report`] has it.
+    /// As [`builder::KdReport`] has it.
     pub level_references: u32,
     /// Nodes of all levels, and what is hooked.
     pub level_nodes: u32,
-    /// As [`builder::Report`] has it.
+    /// As [`builder::KdReport`] has it.
     pub subtree_nodes: u32,
-    /// As [`builder::Report`] has it.
+    /// As [`builder::KdReport`] has it.
     pub cut_references: u32,
-    /// As [`builder::Report`] has it.
+    /// As [`builder::KdReport`] has it.
     pub subtree_references: u32,
-    /// As [`builder::Report`] has it.
+    /// As [`builder::KdReport`] has it.
     pub subtrees: u32,
-    /// As [`builder::Report`] has it.
+    /// As [`builder::KdReport`] has it.
     pub ended: u32,
     /// Nodes of objects' trees on their way, in the step that has most, or leaves of them in static leaves.
     pub items: u32,
@@ -83,19 +84,19 @@ pub struct Report {
     pub items_ended: u32,
 }
 
-impl Report {
+impl MergeReport {
     /// What suffices for so many triangles of objects; where it was not found out, twice what was asked for.
-    pub fn estimate(&self, triangles: u32) -> Estimate {
+    pub fn estimate(&self, triangles: u32) -> MergeEstimate {
         let is_known = self.status & status::OUT_OF_ROOM == 0;
         let of = |count: u32, more: f64| (f64::from(count) * more / f64::from(triangles.saturating_add(64))) as f32;
         let exactly = |count: u32| of(count, 1.0) * (1.0 + f32::EPSILON);
         let each = |count: u32| if is_known { exactly(count) } else { of(count.max(self.pairs), 2.0) };
         let pushed = |count: u32| if self.items_ended == 0 { exactly(count) } else { of(count.max(triangles), 2.0) };
-        Estimate {
+        MergeEstimate {
             pairs: pushed(self.pairs),
             items: pushed(self.items),
             marked: each(self.marked),
-            build: builder::Estimate {
+            build: builder::KdEstimate {
                 level_references: each(self.level_references),
                 level_nodes: each(self.level_nodes),
                 subtree_nodes: each(self.subtree_nodes),

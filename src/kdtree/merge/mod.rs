@@ -9,23 +9,23 @@
 //! kd-tree of its own ([`Object::tree`]), and that is pushed down the static one, many triangles at once.
 //!
 //! The structure needs room: [`Merger::room`] tells how much, [`KdTree::with_room`](super::layout::KdTree::with_room) or
-//! [`builder::Options::more`](super::builder::Options::more) make it. [`super::twin::merge`] is the twin, `glsl/kdtree/merge.glsl`
+//! [`KdOptions::more`](super::builder::KdOptions::more) make it. [`super::twin::merge`] is the twin, `glsl/kdtree/merge.glsl`
 //! the device's side.
 
 mod estimate;
 mod objects;
 pub(crate) mod push;
 
-pub use estimate::{Estimate, Options, Report};
+pub use estimate::{MergeEstimate, MergeOptions, MergeReport};
 pub use objects::{Object, Objects};
 
-use super::builder::{self, Shape};
-use super::layout::{Header, MAX_DEPTH, Room};
+use super::builder::{self, KdShape};
+use super::layout::{KdHeader, MAX_DEPTH, SpareRoom};
 use super::termination::leaf_size;
 use crate::bvh::builder::Schedule;
 use crate::bvh::geometry::{Input, Source};
 use crate::gpu::arguments;
-use crate::gpu::radix_sort::{self, Buffers, Sort};
+use crate::gpu::radix_sort::{self, Sort, SortBuffers};
 use crate::gpu::shaders::{self, Shader};
 use crate::gpu::{Context, Kernel, Recorder, Region, Step, fill};
 use crate::{Error, Result};
@@ -34,7 +34,7 @@ use std::ops::Range;
 
 /// What is merged at once at most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Most {
+pub struct MergeCapacity {
     /// Objects.
     pub objects: u32,
     /// Triangles of all of them.
@@ -43,7 +43,7 @@ pub struct Most {
 
 /// Bytes that a merge needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sizes {
+pub struct MergeSizes {
     /// Scratch, free again when the merge has run and its report has been read.
     pub scratch: u64,
     /// What was overwritten: kept until the static tree is restored.
@@ -66,20 +66,20 @@ pub struct Memory {
 /// Merges into one static tree.
 #[derive(Debug, Clone)]
 pub struct Merger {
-    options: Options,
-    most: Most,
+    options: MergeOptions,
+    most: MergeCapacity,
     primitive_count: u32,
     structure_bytes: u64,
     schedule: Schedule,
-    shape: Shape,
-    sort: radix_sort::Shape,
-    room: builder::Room,
-    plan: Plan,
+    shape: KdShape,
+    sort: radix_sort::SortShape,
+    room: builder::BuildRoom,
+    plan: MergePlan,
 }
 
 /// How much a merge has, but for what is in the structure already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Plan {
+struct MergePlan {
     pairs: u32,
     items: u32,
     marked: u32,
@@ -100,11 +100,11 @@ fn each(of_each: f32, triangles: u32) -> u32 {
     (f64::from(of_each.max(0.0)) * (f64::from(triangles) + 64.0)).ceil().min(f64::from(1 << 30)) as u32
 }
 
-impl Plan {
-    fn of(estimate: &Estimate, triangles: u32) -> Plan {
+impl MergePlan {
+    fn of(estimate: &MergeEstimate, triangles: u32) -> MergePlan {
         let of = |of_each: f32| each(of_each, triangles).max(1);
         let marked = of(estimate.marked);
-        Plan {
+        MergePlan {
             pairs: of(estimate.pairs),
             items: of(estimate.items),
             marked,
@@ -119,9 +119,9 @@ impl Plan {
 
 impl Merger {
     /// The room that a structure must have beside the static tree.
-    pub fn room(options: &Options, most: Most) -> Room {
-        let plan = Plan::of(&options.estimate, most.triangles);
-        Room {
+    pub fn room(options: &MergeOptions, most: MergeCapacity) -> SpareRoom {
+        let plan = MergePlan::of(&options.estimate, most.triangles);
+        SpareRoom {
             nodes: plan.level_nodes + plan.subtree_nodes,
             references: plan.cut_references + plan.subtree_references,
             records: most.triangles,
@@ -132,9 +132,9 @@ impl Merger {
     ///
     /// # Errors
     /// An option out of range; the structure has less room than [`Merger::room`].
-    pub fn new(context: &Context, options: &Options, still: &Header, most: Most) -> Result<Merger> {
+    pub fn new(context: &Context, options: &MergeOptions, still: &KdHeader, most: MergeCapacity) -> Result<Merger> {
         options.build.check()?;
-        let Room { nodes, references, records } = Merger::room(options, most);
+        let SpareRoom { nodes, references, records } = Merger::room(options, most);
         for (what, has, needs) in [
             ("nodes", still.node_room, nodes),
             ("references", still.reference_room, references),
@@ -148,14 +148,14 @@ impl Merger {
             }
         }
         let schedule = options.build.schedule_on(context);
-        let shape = Shape::of(context, &options.build, most.triangles.saturating_mul(4), schedule);
-        let plan = Plan::of(&options.estimate, most.triangles);
+        let shape = KdShape::of(context, &options.build, most.triangles.saturating_mul(4), schedule);
+        let plan = MergePlan::of(&options.estimate, most.triangles);
         let chunk = shape.chunk();
         let level_references =
             each(options.estimate.build.level_references, most.triangles).max(most.triangles).max(64);
         let large = level_references / (options.build.exact + 1) + 1;
         let tiles = most.triangles.div_ceil(chunk) + most.objects;
-        let room = builder::Room {
+        let room = builder::BuildRoom {
             level_references,
             tasks: (2 * large).max(plan.marked),
             chunks: (level_references / chunk + large + 1).max(tiles + 1),
@@ -166,12 +166,12 @@ impl Merger {
             references: still.reference_room,
             records: still.record_room,
         };
-        let sort = radix_sort::Shape::of(context);
+        let sort = radix_sort::SortShape::of(context);
         Ok(Merger {
             options: *options,
             most,
             primitive_count: still.primitive_count,
-            structure_bytes: still.sizes().bytes,
+            structure_bytes: still.offsets().bytes,
             schedule,
             shape,
             sort,
@@ -181,19 +181,19 @@ impl Merger {
     }
 
     /// Bytes of scratch and undo memory: what [`Merger::record`] uses at most.
-    pub fn sizes(&self) -> Sizes {
+    pub fn sizes(&self) -> MergeSizes {
         let marked = self.plan.marked;
-        let undo = size_of::<Header>() as u64 + 4 + UNDONE_BYTES * u64::from(marked);
-        Sizes { scratch: self.places(0).bytes, undo: undo.next_multiple_of(16), alignment: 16 }
+        let undo = size_of::<KdHeader>() as u64 + 4 + UNDONE_BYTES * u64::from(marked);
+        MergeSizes { scratch: self.places(0).bytes, undo: undo.next_multiple_of(16), alignment: 16 }
     }
 
-    /// Where in the scratch memory the [`Report`] is, in bytes.
+    /// Where in the scratch memory the [`MergeReport`] is, in bytes.
     pub fn report_range(&self) -> Range<u64> {
-        MERGE_AT..MERGE_AT + size_of::<Report>() as u64
+        MERGE_AT..MERGE_AT + size_of::<MergeReport>() as u64
     }
 
     fn places(&self, scratch: u64) -> Places {
-        let Plan { pairs, items, marked, .. } = self.plan;
+        let MergePlan { pairs, items, marked, .. } = self.plan;
         let mut at = scratch + self.shape.scratch(&self.options.build, &self.room);
         let mut take = |bytes: u64| {
             let begin = at;
@@ -301,7 +301,7 @@ impl Merger {
         let bits = record_bits + bits_of(2 * self.room.nodes + 2);
         let pair_capacity = each(self.options.estimate.pairs, triangles).clamp(1, self.plan.pairs);
         let sort = Sort { count: pair_capacity, bits, identity: false };
-        let sorting = radix_sort::steps(&self.sort, &Buffers { keys, values, table }, &sort);
+        let sorting = radix_sort::steps(&self.sort, &SortBuffers { keys, values, table }, &sort);
         let sorted = sorting.len() / radix_sort::STEPS_OF_A_PASS % 2;
         let key_words = if bits > 32 { 2 } else { 1 };
         let has_tree = |object: &Object| object.tree.is_some();

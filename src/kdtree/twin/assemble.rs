@@ -5,7 +5,7 @@ use super::Subtree;
 use super::heuristic::Heuristic;
 use crate::bvh::layout::{MAGIC, Triangle};
 use crate::geometry::Aabb;
-use crate::kdtree::layout::{Header, KIND, KdTree, MAX_NODES, MAX_REFERENCES, Node};
+use crate::kdtree::layout::{KIND, KdHeader, KdNode, KdTree, MAX_NODES, MAX_REFERENCES};
 use crate::{Error, Result};
 use bytemuck::Zeroable;
 
@@ -17,7 +17,7 @@ pub fn assemble(
     records: Vec<Triangle>,
     (primitive_count, status): (u32, u32),
 ) -> Result<KdTree> {
-    let mut header = Header {
+    let mut header = KdHeader {
         magic: MAGIC,
         kind: KIND,
         status,
@@ -28,13 +28,13 @@ pub fn assemble(
         geometry_count: 1,
         area_scale: heuristic.area_scale,
         reach,
-        ..Header::zeroed()
+        ..KdHeader::zeroed()
     };
     let is_empty = matches!(root, Subtree::Empty);
     header.empty_leaves = u32::from(is_empty);
-    let mut parts = Parts { header, nodes: Vec::new(), references: Vec::new() };
+    let mut parts = KdParts { header, nodes: Vec::new(), references: Vec::new() };
     parts.write(if is_empty { Vec::new() } else { vec![(root, 0)] })?;
-    let Parts { mut header, nodes, references } = parts;
+    let KdParts { mut header, nodes, references } = parts;
     header.node_count = nodes.len() as u32;
     header.reference_count = references.len() as u32;
     header.node_room = header.node_count;
@@ -44,16 +44,16 @@ pub fn assemble(
 }
 
 /// What is written so far.
-pub struct Parts {
+pub struct KdParts {
     /// Counts of what was written are added to what it has.
-    pub header: Header,
+    pub header: KdHeader,
     /// Nodes, the roots first.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<KdNode>,
     /// References, in the order of the leaves.
     pub references: Vec<u32>,
 }
 
-impl Parts {
+impl KdParts {
     /// Writes what is below these roots, none of them empty, at these depths; the roots themselves come first.
     pub fn write(&mut self, roots: Vec<(Subtree, u32)>) -> Result<()> {
         let mut level = roots;
@@ -67,7 +67,7 @@ impl Parts {
                 self.header.depth = self.header.depth.max(depth);
                 if let Subtree::Together(subtree) = subtree {
                     together.push((self.nodes.len(), depth, subtree));
-                    self.nodes.push(Node::zeroed());
+                    self.nodes.push(KdNode::zeroed());
                     continue;
                 }
                 let (node, children) = self.node_of(subtree, first_child + next.len())?;
@@ -80,7 +80,7 @@ impl Parts {
     }
 
     /// A node whose children, those that are not empty, are to lie from `first_child` on; and these.
-    fn node_of(&mut self, subtree: Subtree, first_child: usize) -> Result<(Node, Vec<Subtree>)> {
+    fn node_of(&mut self, subtree: Subtree, first_child: usize) -> Result<(KdNode, Vec<Subtree>)> {
         match subtree {
             Subtree::Empty | Subtree::Together(_) => {
                 unreachable!("an empty leaf has no node, what lies together is apart")
@@ -90,7 +90,7 @@ impl Parts {
                 within("references", first + records.len(), MAX_REFERENCES)?;
                 self.references.extend(&records);
                 self.header.leaves += 1;
-                Ok((Node::leaf(first as u32, records.len() as u32), Vec::new()))
+                Ok((KdNode::leaf(first as u32, records.len() as u32), Vec::new()))
             }
             Subtree::Inner { plane, children } => {
                 let empty = children.each_ref().map(|child| matches!(child, Subtree::Empty));
@@ -98,7 +98,7 @@ impl Parts {
                 self.header.inner_nodes += 1;
                 self.header.empty_leaves += empty.map(u32::from).iter().sum::<u32>();
                 let children = children.into_iter().filter(|child| !matches!(child, Subtree::Empty)).collect();
-                Ok((Node::inner(plane.axis, plane.at, first_child as u32, empty), children))
+                Ok((KdNode::inner(plane.axis, plane.at, first_child as u32, empty), children))
             }
         }
     }
@@ -108,7 +108,7 @@ impl Parts {
         let first_child = self.nodes.len();
         let (node, children) = self.node_of(subtree, first_child)?;
         self.nodes[at] = node;
-        self.nodes.extend(children.iter().map(|_| Node::zeroed()));
+        self.nodes.extend(children.iter().map(|_| KdNode::zeroed()));
         self.header.depth = self.header.depth.max(depth);
         children
             .into_iter()

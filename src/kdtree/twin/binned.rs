@@ -5,8 +5,8 @@
 //! are how many are on the left of a plane, sums of the second from the right how many on its right: the exact cost of each of the
 //! planes, though not of the best there is.
 
-use super::clip::{Reference, divided};
-use super::heuristic::{Heuristic, Split};
+use super::clip::{KdReference, divided};
+use super::heuristic::{Heuristic, KdSplit};
 use super::small::Small;
 use super::{ALONE, Fork, Subtree};
 use crate::bvh::layout::Triangle;
@@ -20,7 +20,7 @@ pub fn build(
     records: (&[Triangle], f32),
     (bins, exact): (u32, u32),
     cell: Aabb,
-    references: Vec<Reference>,
+    references: Vec<KdReference>,
 ) -> Subtree {
     Binned { fork, heuristic, records, bins: bins as usize, exact: exact as usize }.subtree(cell, references, 0)
 }
@@ -36,7 +36,7 @@ struct Binned<'a, F> {
 }
 
 impl<F: Fork> Binned<'_, F> {
-    fn subtree(&self, cell: Aabb, references: Vec<Reference>, depth: u32) -> Subtree {
+    fn subtree(&self, cell: Aabb, references: Vec<KdReference>, depth: u32) -> Subtree {
         let count = references.len();
         if self.heuristic.is_leaf(count, depth) {
             return Subtree::leaf(&references);
@@ -45,7 +45,7 @@ impl<F: Fork> Binned<'_, F> {
             return Small::new(self.heuristic, self.records).tree(cell, references, depth);
         }
         let best = self.best_split(&cell, &references);
-        let Some(Split { plane, .. }) = self.heuristic.paying(best, &cell, count) else {
+        let Some(KdSplit { plane, .. }) = self.heuristic.paying(best, &cell, count) else {
             return Subtree::leaf(&references);
         };
         let halves = halves(&cell, plane.axis, plane.at);
@@ -66,13 +66,13 @@ impl<F: Fork> Binned<'_, F> {
     }
 
     /// The cheapest plane of all axes; of equal ones that of the first axis, and there the leftmost.
-    fn best_split(&self, cell: &Aabb, references: &[Reference]) -> Option<Split> {
+    fn best_split(&self, cell: &Aabb, references: &[KdReference]) -> Option<KdSplit> {
         let of = |axis| self.best_split_of(cell, axis, references);
         let [x, y, z] = if references.len() < ALONE { [0, 1, 2].map(of) } else { self.fork.axes(of) };
-        Split::better(Split::better(x, y), z)
+        KdSplit::better(KdSplit::better(x, y), z)
     }
 
-    fn best_split_of(&self, cell: &Aabb, axis: usize, references: &[Reference]) -> Option<Split> {
+    fn best_split_of(&self, cell: &Aabb, axis: usize, references: &[KdReference]) -> Option<KdSplit> {
         let planes = Planes::of(cell, axis, self.bins);
         let (mut begin, mut end) = (vec![0u32; self.bins], vec![0u32; self.bins]);
         for reference in references {
@@ -87,7 +87,7 @@ impl<F: Fork> Binned<'_, F> {
             left += begin[bin - 1];
             right -= end[bin - 1];
             let split = self.heuristic.split(cell, (axis, planes.at(bin)), [left, 0, right]);
-            best = Split::better(best, split.map(|split| split.with_planar_left()));
+            best = KdSplit::better(best, split.map(|split| split.with_planar_left()));
         }
         best
     }

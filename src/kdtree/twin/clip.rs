@@ -36,7 +36,7 @@ const CORNERS: usize = 9;
 
 /// A primitive in a cell: the box of its part there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reference {
+pub struct KdReference {
     /// Within the cell; flat where the triangle is.
     pub bounds: Aabb,
     /// Index of the record.
@@ -104,7 +104,7 @@ pub fn clipped(corners: &[[f32; 3]; 3], reach: f32, cell: &Aabb) -> Option<Aabb>
 
 /// A plane across an axis, and on which side of it is what lies in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plane {
+pub struct KdPlane {
     /// The axis across which it lies.
     pub axis: usize,
     /// Its position there.
@@ -113,7 +113,7 @@ pub struct Plane {
     pub planar_left: bool,
 }
 
-impl Plane {
+impl KdPlane {
     /// Whether a box is on the left and on the right.
     pub fn sides_of(&self, b: &Aabb) -> [bool; 2] {
         let (lo, hi) = (b.lo[self.axis], b.hi[self.axis]);
@@ -124,23 +124,23 @@ impl Plane {
 
 /// What a plane makes of a reference: its parts in the two halves of its cell.
 pub fn divided(
-    reference: &Reference,
+    reference: &KdReference,
     (records, reach): (&[Triangle], f32),
-    plane: &Plane,
+    plane: &KdPlane,
     halves: &[Aabb; 2],
-) -> [Option<Reference>; 2] {
+) -> [Option<KdReference>; 2] {
     let sides = plane.sides_of(&reference.bounds);
     if sides != [true; 2] {
         return sides.map(|is_there| is_there.then_some(*reference));
     }
     let Triangle { v0, v1, v2, .. } = records[reference.record as usize];
-    let part = |cell| clipped(&[v0, v1, v2], reach, cell).map(|bounds| Reference { bounds, ..*reference });
+    let part = |cell| clipped(&[v0, v1, v2], reach, cell).map(|bounds| KdReference { bounds, ..*reference });
     let parts = halves.each_ref().map(part);
     if parts != [None; 2] {
         return parts;
     }
     // Rounding has it that the triangle is in neither: it was in the cell, and no node may lose its last reference.
-    halves.each_ref().map(|half| Some(Reference { bounds: reference.bounds.intersection(half), ..*reference }))
+    halves.each_ref().map(|half| Some(KdReference { bounds: reference.bounds.intersection(half), ..*reference }))
 }
 
 fn widened(b: &Aabb, by: [f32; 3]) -> Aabb {
@@ -278,12 +278,12 @@ mod tests {
         let records = [left, planar, both];
         let cell = cell([-1.0; 3], [4.0; 3]);
         for planar_left in [false, true] {
-            let plane = Plane { axis: 0, at: 1.0, planar_left };
+            let plane = KdPlane { axis: 0, at: 1.0, planar_left };
             let halves = crate::kdtree::layout::halves(&cell, 0, 1.0);
             let sides = [0, 1, 2].map(|record: u32| {
                 let t = records[record as usize];
                 let bounds = bounds_of(&[t.v0, t.v1, t.v2], 9.0);
-                divided(&Reference { bounds, record }, (&records, 9.0), &plane, &halves).map(|part| part.is_some())
+                divided(&KdReference { bounds, record }, (&records, 9.0), &plane, &halves).map(|part| part.is_some())
             });
             assert_eq!(sides, [[true, false], [planar_left, !planar_left], [true; 2]]);
         }

@@ -1,6 +1,6 @@
 //! What a plane costs, and whether a cell is split at all (Papay 2025, sections 2.2 and 9.2).
 
-use super::clip::Plane;
+use super::clip::KdPlane;
 use crate::bvh::sah::area_scale;
 use crate::geometry::Aabb;
 use crate::kdtree::layout::{MAX_DEPTH, halves};
@@ -8,21 +8,21 @@ use crate::kdtree::termination::{Costs, depth_limit, leaf_size};
 
 /// A plane and what it costs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Split {
+pub struct KdSplit {
     /// The plane.
-    pub plane: Plane,
+    pub plane: KdPlane,
     /// Scaled by the cell's area.
     pub cost: f32,
 }
 
-impl Split {
+impl KdSplit {
     /// With what lies in the plane on its left.
-    pub fn with_planar_left(self) -> Split {
-        Split { plane: Plane { planar_left: true, ..self.plane }, ..self }
+    pub fn with_planar_left(self) -> KdSplit {
+        KdSplit { plane: KdPlane { planar_left: true, ..self.plane }, ..self }
     }
 
     /// The cheaper one; of equal ones the first.
-    pub fn better(first: Option<Split>, second: Option<Split>) -> Option<Split> {
+    pub fn better(first: Option<KdSplit>, second: Option<KdSplit>) -> Option<KdSplit> {
         match (first, second) {
             (Some(a), Some(b)) if b.cost < a.cost => Some(b),
             (None, b) => b,
@@ -69,7 +69,7 @@ impl Heuristic {
 
     /// The split of a cell at a plane with so many references on the left, in it, and on the right; what lies in it goes where it
     /// costs less. `None` at and beyond the faces, where it would leave no volume (section 9.2).
-    pub fn split(&self, cell: &Aabb, (axis, at): (usize, f32), [left, planar, right]: [u32; 3]) -> Option<Split> {
+    pub fn split(&self, cell: &Aabb, (axis, at): (usize, f32), [left, planar, right]: [u32; 3]) -> Option<KdSplit> {
         if at <= cell.lo[axis] || at >= cell.hi[axis] {
             return None;
         }
@@ -78,7 +78,7 @@ impl Heuristic {
         let counts = if planar_left { [left + planar, right] } else { [left, planar + right] };
         let cost = self.cost(cell, areas, counts.map(|count| count as f32));
         // Of the two zeros the positive one, whichever the box had.
-        Some(Split { plane: Plane { axis, at: at + 0.0, planar_left }, cost })
+        Some(KdSplit { plane: KdPlane { axis, at: at + 0.0, planar_left }, cost })
     }
 
     /// A step in the cell, and so many tests in each of its parts.
@@ -100,7 +100,7 @@ impl Heuristic {
     }
 
     /// The split, if a leaf of so many references costs more.
-    pub fn paying(&self, split: Option<Split>, cell: &Aabb, references: usize) -> Option<Split> {
+    pub fn paying(&self, split: Option<KdSplit>, cell: &Aabb, references: usize) -> Option<KdSplit> {
         let leaf = self.costs.c_i * (cell.scaled_half_area(self.area_scale) * references as f32);
         split.filter(|split| split.cost < leaf)
     }

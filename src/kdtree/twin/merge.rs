@@ -7,15 +7,15 @@
 //! A triangle is in a leaf where clipping it to the leaf's cell leaves something, however the leaf was found; so a triangle that
 //! ends at a plane, or lies in it, is on both of its sides.
 
-use super::assemble::Parts;
-use super::clip::{Reference, bounds_of, cell_around, clipped};
+use super::assemble::KdParts;
+use super::clip::{KdReference, bounds_of, cell_around, clipped};
 use super::heuristic::Heuristic;
 use super::{InTurn, Subtree, binned};
 use crate::bvh::layout::Triangle;
 use crate::bvh::sah::area_scale;
 use crate::bvh::twin::lbvh;
 use crate::geometry::Aabb;
-use crate::kdtree::layout::{Content, Inner, KdTree, Node};
+use crate::kdtree::layout::{Inner, KdContent, KdNode, KdTree};
 use crate::kdtree::termination::Costs;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 
 /// Triangles that move; numbered from `first_primitive` on.
 #[derive(Debug, Clone, Copy)]
-pub struct Object<'a> {
+pub struct HostObject<'a> {
     /// What hits of its first triangle say.
     pub first_primitive: u32,
     /// Vertices.
@@ -37,7 +37,7 @@ pub struct Object<'a> {
 /// # Errors
 /// [`Error::Argument`] if objects are not numbered one behind the other and behind the static tree; [`Error::Argument`] if the layout
 /// cannot name what there would be.
-pub fn merge(still: &KdTree, objects: &[Object<'_>], costs: Costs, (bins, exact): (u32, u32)) -> Result<KdTree> {
+pub fn merge(still: &KdTree, objects: &[HostObject<'_>], costs: Costs, (bins, exact): (u32, u32)) -> Result<KdTree> {
     let mut header = still.header;
     let mut records = still.records.clone();
     let reach = header.reach;
@@ -69,7 +69,7 @@ pub fn merge(still: &KdTree, objects: &[Object<'_>], costs: Costs, (bins, exact)
     let heuristic = Heuristic::of_leaf(costs, &cell, still.header.primitive_count);
     let built = |leaf: &Marked| {
         let bounds =
-            |record: u32| Reference { bounds: bounds_in(&leaf.cell, &records[record as usize], reach), record };
+            |record: u32| KdReference { bounds: bounds_in(&leaf.cell, &records[record as usize], reach), record };
         let references = leaf.records(still).map(bounds).collect();
         binned::build(&InTurn, &heuristic.below(leaf.depth), (&records, reach), (bins, exact), leaf.cell, references)
     };
@@ -77,15 +77,15 @@ pub fn merge(still: &KdTree, objects: &[Object<'_>], costs: Costs, (bins, exact)
     let subtrees: Vec<Subtree> = marked.iter().map(|(_, leaf)| built(leaf)).collect();
     let roots = subtrees.into_iter().zip(&marked).map(|(subtree, (_, leaf))| (subtree, leaf.depth)).collect();
 
-    let mut parts = Parts { header, nodes: still.nodes.clone(), references: still.references.clone() };
+    let mut parts = KdParts { header, nodes: still.nodes.clone(), references: still.references.clone() };
     // A pair of nodes for each empty leaf and its sibling.
     let first_pair = parts.nodes.len();
     let pairs = marked.iter().filter(|(id, leaf)| *id != ROOT && leaf.node.is_none()).count();
-    parts.nodes.resize(first_pair + 2 * pairs, Node::zeroed());
+    parts.nodes.resize(first_pair + 2 * pairs, KdNode::zeroed());
     let first_root = parts.nodes.len();
     parts.write(roots)?;
     hook(still, &mut parts, &marked, (first_pair, first_root));
-    let Parts { mut header, nodes, references } = parts;
+    let KdParts { mut header, nodes, references } = parts;
     header.node_count = nodes.len() as u32;
     header.reference_count = references.len() as u32;
     header.node_room = header.node_room.max(header.node_count);
@@ -115,7 +115,7 @@ impl Marked {
     /// Those of the static tree, then those of objects.
     fn records<'a>(&'a self, still: &'a KdTree) -> impl Iterator<Item = u32> + 'a {
         let range = match self.node.map(|node| still.nodes[node as usize].content()) {
-            Some(Content::Leaf(range)) => range,
+            Some(KdContent::Leaf(range)) => range,
             _ => 0..0,
         };
         still.references[range].iter().chain(&self.records).copied()
@@ -157,7 +157,7 @@ impl Find<'_> {
         let mut stack = vec![Place { id: ROOT, node: root, cell, depth: 0 }];
         while let Some(place) = stack.pop() {
             let inner = match place.node.map(|node| (node, self.still.nodes[node as usize].content())) {
-                Some((node, Content::Inner(inner))) => (node, inner),
+                Some((node, KdContent::Inner(inner))) => (node, inner),
                 _ => {
                     if clipped(&corners, self.reach, &place.cell).is_some() {
                         let Place { id, node, cell, depth } = place;
@@ -179,14 +179,14 @@ impl Find<'_> {
 
 /// Puts the roots in the places of the marked leaves. An empty leaf has none: its parent gets a new pair of children, and what was
 /// its only child moves there.
-fn hook(still: &KdTree, parts: &mut Parts, marked: &[(u32, Marked)], (first_pair, first_root): (usize, usize)) {
-    let Parts { header, nodes, .. } = parts;
+fn hook(still: &KdTree, parts: &mut KdParts, marked: &[(u32, Marked)], (first_pair, first_root): (usize, usize)) {
+    let KdParts { header, nodes, .. } = parts;
     let mut moved = BTreeMap::new();
     let mut pair = first_pair as u32;
     // The moves first: what is hooked then finds its place.
     for &(id, _) in marked.iter().filter(|(id, leaf)| *id != ROOT && leaf.node.is_none()) {
         let (parent, side) = ((id - 1) / 2, (id - 1) % 2);
-        if let Content::Inner(Inner { children, .. }) = still.nodes[parent as usize].content()
+        if let KdContent::Inner(Inner { children, .. }) = still.nodes[parent as usize].content()
             && let Some(sibling) = children[1 - side as usize]
         {
             nodes[(pair + 1 - side) as usize] = still.nodes[sibling as usize];
@@ -214,8 +214,8 @@ fn hook(still: &KdTree, parts: &mut Parts, marked: &[(u32, Marked)], (first_pair
         header.replaced_nodes += 1;
         if leaf.node.is_none() {
             let (parent, side) = ((id - 1) / 2, (id - 1) % 2);
-            if let Content::Inner(Inner { axis, plane, .. }) = still.nodes[parent as usize].content() {
-                nodes[place(parent)] = Node::inner(axis, plane, pair, [false; 2]);
+            if let KdContent::Inner(Inner { axis, plane, .. }) = still.nodes[parent as usize].content() {
+                nodes[place(parent)] = KdNode::inner(axis, plane, pair, [false; 2]);
             }
             nodes[(pair + side) as usize] = root;
             pair += 2;

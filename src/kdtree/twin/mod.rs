@@ -22,7 +22,7 @@ use crate::Result;
 use crate::bvh::layout::Triangle;
 use crate::bvh::twin::geometry::{self, Corners};
 use crate::geometry::Aabb;
-use clip::{Plane, Reference};
+use clip::{KdPlane, KdReference};
 use heuristic::Heuristic;
 
 /// How the work on two sides of a plane, or along several axes, is shared out.
@@ -55,7 +55,7 @@ impl Fork for InTurn {
 pub fn grown(
     corners: impl Iterator<Item = Corners>,
     costs: Costs,
-    grow: impl FnOnce(&Heuristic, (&[Triangle], f32), Aabb, Vec<Reference>) -> Subtree,
+    grow: impl FnOnce(&Heuristic, (&[Triangle], f32), Aabb, Vec<KdReference>) -> Subtree,
 ) -> Result<KdTree> {
     let (mut status, mut primitive_count) = (0, 0u32);
     let mut records = Vec::new();
@@ -67,11 +67,11 @@ pub fn grown(
         primitive_count += 1;
     }
     let reach = clip::reach_of(&records);
-    let reference = |(record, t): (usize, &Triangle)| Reference {
+    let reference = |(record, t): (usize, &Triangle)| KdReference {
         bounds: clip::bounds_of(&[t.v0, t.v1, t.v2], reach),
         record: record as u32,
     };
-    let references: Vec<Reference> = records.iter().enumerate().map(reference).collect();
+    let references: Vec<KdReference> = records.iter().enumerate().map(reference).collect();
     let around = |t: &Triangle| clip::cell_around(&[t.v0, t.v1, t.v2], reach);
     let cell = records.iter().fold(Aabb::EMPTY, |b, t| b.union(&around(t)));
     let heuristic = Heuristic::new(costs, &cell, primitive_count);
@@ -100,7 +100,7 @@ pub enum Subtree {
     /// A cell that a plane divides.
     Inner {
         /// The plane.
-        plane: Plane,
+        plane: KdPlane,
         /// Both sides.
         children: Box<[Subtree; 2]>,
     },
@@ -110,7 +110,7 @@ pub enum Subtree {
 
 impl Subtree {
     /// A leaf of these references, ascending.
-    pub fn leaf(references: &[Reference]) -> Subtree {
+    pub fn leaf(references: &[KdReference]) -> Subtree {
         if references.is_empty() {
             return Subtree::Empty;
         }
@@ -120,7 +120,7 @@ impl Subtree {
     /// Both sides of a plane, shared out by `fork` if there is work enough.
     pub fn inner(
         fork: &impl Fork,
-        plane: Plane,
+        plane: KdPlane,
         count: usize,
         left: impl FnOnce() -> Subtree + Send,
         right: impl FnOnce() -> Subtree + Send,

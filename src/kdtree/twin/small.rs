@@ -4,8 +4,8 @@
 //! depth first, as one subgroup writes them.
 
 use super::Subtree;
-use super::clip::{Plane, Reference, divided};
-use super::heuristic::{Heuristic, Split};
+use super::clip::{KdPlane, KdReference, divided};
+use super::heuristic::{Heuristic, KdSplit};
 use crate::bvh::layout::Triangle;
 use crate::geometry::Aabb;
 use crate::kdtree::layout::halves;
@@ -27,17 +27,17 @@ impl<'a> Small<'a> {
     }
 
     /// The tree over a few references in `cell`.
-    pub fn tree(mut self, cell: Aabb, references: Vec<Reference>, depth: u32) -> Subtree {
+    pub fn tree(mut self, cell: Aabb, references: Vec<KdReference>, depth: u32) -> Subtree {
         Subtree::Together(Box::new(self.subtree(cell, references, depth)))
     }
 
-    fn subtree(&mut self, cell: Aabb, references: Vec<Reference>, depth: u32) -> Subtree {
+    fn subtree(&mut self, cell: Aabb, references: Vec<KdReference>, depth: u32) -> Subtree {
         let count = references.len();
         if references.is_empty() || self.heuristic.is_leaf(count, depth) || self.nodes + 2 > MOST_NODES {
             return Subtree::leaf(&references);
         }
         let best = self.best_split(&cell, &references);
-        let Some(Split { plane, .. }) = self.heuristic.paying(best, &cell, count) else {
+        let Some(KdSplit { plane, .. }) = self.heuristic.paying(best, &cell, count) else {
             return Subtree::leaf(&references);
         };
         let halves = halves(&cell, plane.axis, plane.at);
@@ -50,10 +50,10 @@ impl<'a> Small<'a> {
     }
 
     /// The cheapest plane of all axes; of equal ones that of the first axis, and there the leftmost.
-    fn best_split(&self, cell: &Aabb, references: &[Reference]) -> Option<Split> {
-        let mut best: Option<Split> = None;
+    fn best_split(&self, cell: &Aabb, references: &[KdReference]) -> Option<KdSplit> {
+        let mut best: Option<KdSplit> = None;
         for axis in 0..3 {
-            let mut best_of_axis: Option<Split> = None;
+            let mut best_of_axis: Option<KdSplit> = None;
             for at in references.iter().flat_map(|r| [r.bounds.lo[axis], r.bounds.hi[axis]]) {
                 let count = |is: &dyn Fn(f32, f32) -> bool| {
                     references.iter().filter(|r| is(r.bounds.lo[axis], r.bounds.hi[axis])).count() as u32
@@ -66,12 +66,12 @@ impl<'a> Small<'a> {
                     best_of_axis = Some(split);
                 }
             }
-            best = Split::better(best, best_of_axis);
+            best = KdSplit::better(best, best_of_axis);
         }
         best
     }
 
-    fn parts(&self, references: &[Reference], plane: &Plane, halves: &[Aabb; 2]) -> [Vec<Reference>; 2] {
+    fn parts(&self, references: &[KdReference], plane: &KdPlane, halves: &[Aabb; 2]) -> [Vec<KdReference>; 2] {
         let mut parts = [Vec::new(), Vec::new()];
         for reference in references {
             let divided = divided(reference, self.records, plane, halves);

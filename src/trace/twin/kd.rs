@@ -28,7 +28,7 @@
 use super::tracer::Nearest;
 use crate::bvh::layout::{SLACK, status};
 use crate::geometry::Aabb;
-use crate::kdtree::layout::{Content, Inner, KdTree, MAX_DEPTH};
+use crate::kdtree::layout::{Inner, KdContent, KdTree, MAX_DEPTH};
 use crate::trace::kd::Traversal;
 use crate::trace::ray::PreparedRay;
 use crate::trace::{Hit, Query, Ray, Work};
@@ -78,7 +78,7 @@ pub fn trace(tree: &KdTree, ray: &Ray, query: Query, traversal: Traversal) -> (H
     };
     let Some((t_in, t_out)) = line.through(&tree.header.cell()) else { return (Hit::NONE, work) };
 
-    let root = Place { node: 0, level: 0, t_in, t_out, others: f32::INFINITY };
+    let root = CellVisit { node: 0, level: 0, t_in, t_out, others: f32::INFINITY };
     let mut restart = root;
     let mut stack = VecDeque::with_capacity(traversal.capacity);
     let mut trail = Trail::default();
@@ -89,8 +89,8 @@ pub fn trace(tree: &KdTree, ray: &Ray, query: Query, traversal: Traversal) -> (H
         // Down to a leaf, as long as the cell may hold a hit.
         while place.t_in <= nearest.t {
             let inner = match tree.nodes[place.node as usize].content() {
-                Content::Inner(inner) => inner,
-                Content::Leaf(range) => {
+                KdContent::Inner(inner) => inner,
+                KdContent::Leaf(range) => {
                     work.leaves += 1;
                     for &record in &tree.references[range] {
                         work.tests += 1;
@@ -113,7 +113,7 @@ pub fn trace(tree: &KdTree, ray: &Ray, query: Query, traversal: Traversal) -> (H
                     if traversal.capacity > 0 {
                         stack.push_back(far);
                     }
-                    Place { others: place.others.min(far.t_in), ..near }
+                    CellVisit { others: place.others.min(far.t_in), ..near }
                 }
                 [near, far] => {
                     trail.set(place.level);
@@ -146,7 +146,7 @@ pub fn trace(tree: &KdTree, ray: &Ray, query: Query, traversal: Traversal) -> (H
 
 /// A node on the way, and the part of the ray that visits its cell.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct CellVisit {
     node: u32,
     level: u32,
     t_in: f32,
@@ -208,7 +208,7 @@ impl Line {
     }
 
     /// The children that are visited, the near one first: those that are not empty and have a part of the ray.
-    fn children(&self, place: &Place, inner: &Inner) -> [Option<Place>; 2] {
+    fn children(&self, place: &CellVisit, inner: &Inner) -> [Option<CellVisit>; 2] {
         let (axis, ray) = (inner.axis, &self.ray);
         let inverse = ray.inverse[axis];
         let farther = place.t_in.abs().max(place.t_out.abs());
@@ -219,7 +219,7 @@ impl Line {
         let t_out = place.t_out.min((plane + slack) * inverse);
         let t_in = place.t_in.max((plane - slack) * inverse);
         let visited = |node: Option<u32>, t_in: f32, t_out: f32| {
-            node.filter(|_| t_in <= t_out).map(|node| Place { node, level: place.level + 1, t_in, t_out, ..*place })
+            node.filter(|_| t_in <= t_out).map(|node| CellVisit { node, level: place.level + 1, t_in, t_out, ..*place })
         };
         [visited(near, place.t_in, t_out), visited(far, t_in, place.t_out)]
     }

@@ -5,7 +5,7 @@
 
 use super::tree::{At, Forest, Records};
 use hedgerow::geometry::Aabb;
-use hedgerow::kdtree::layout::{Content, Node, halves};
+use hedgerow::kdtree::layout::{KdContent, KdNode, halves};
 
 /// A leaf of the static tree, or beside it. Those without a node come first, parents before children: in this order they are merged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -42,7 +42,7 @@ pub(super) fn partition_tree_with_tree(
     forest: &mut Forest<'_>,
     tree: u32,
     records: Records<'_>,
-    (nodes, cell): (&[Node], &Aabb),
+    (nodes, cell): (&[KdNode], &Aabb),
 ) -> Vec<Association> {
     let mut descent = Descent { forest, records, nodes, associations: Vec::new() };
     let mut region = Aabb { lo: [f32::NEG_INFINITY; 3], hi: [f32::INFINITY; 3] };
@@ -71,7 +71,7 @@ pub(super) fn partition_tree_with_tree(
 struct Descent<'a, 'f> {
     forest: &'a mut Forest<'f>,
     records: Records<'a>,
-    nodes: &'a [Node],
+    nodes: &'a [KdNode],
     associations: Vec<Association>,
 }
 
@@ -83,7 +83,7 @@ impl Descent<'_, '_> {
             Place::Leaf(node) => node,
             _ => return self.associations.push(here),
         };
-        let Content::Inner(inner) = self.nodes[node as usize].content() else {
+        let KdContent::Inner(inner) = self.nodes[node as usize].content() else {
             return self.associations.push(here);
         };
         let parts = self.forest.partition_tree_with_plane(part, self.records, (inner.axis, inner.plane));
@@ -102,8 +102,13 @@ mod tests {
     use super::*;
 
     /// x at 2: on the left a leaf, on the right y at 2, of which the upper side is empty.
-    fn nodes() -> [Node; 4] {
-        [Node::inner(0, 2.0, 1, [false; 2]), Node::leaf(0, 1), Node::inner(1, 2.0, 3, [false, true]), Node::leaf(1, 1)]
+    fn nodes() -> [KdNode; 4] {
+        [
+            KdNode::inner(0, 2.0, 1, [false; 2]),
+            KdNode::leaf(0, 1),
+            KdNode::inner(1, 2.0, 3, [false, true]),
+            KdNode::leaf(1, 1),
+        ]
     }
 
     fn cell() -> Aabb {

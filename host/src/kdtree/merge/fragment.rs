@@ -1,7 +1,7 @@
 //! What is put in a leaf's place: nodes and references that are numbered from 0, and go wherever there is room.
 
 use super::tree::At;
-use hedgerow::kdtree::layout::{Content, Inner, Node};
+use hedgerow::kdtree::layout::{Inner, KdContent, KdNode};
 use hedgerow::kdtree::twin::Subtree;
 
 /// A tree in the layout of a structure, but for where its nodes and references begin, and for its references: they name triangles as
@@ -9,9 +9,9 @@ use hedgerow::kdtree::twin::Subtree;
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Fragment {
     /// `None` of an empty one.
-    pub root: Option<Node>,
+    pub root: Option<KdNode>,
     /// All but the root.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<KdNode>,
     pub references: Vec<u32>,
     pub inner_nodes: u32,
     pub leaves: u32,
@@ -24,19 +24,19 @@ pub(super) struct Fragment {
 
 impl Fragment {
     /// A leaf at a depth; `None` if there is nothing in it.
-    pub fn leaf(&mut self, references: impl Iterator<Item = u32>, depth: u32) -> Option<Node> {
+    pub fn leaf(&mut self, references: impl Iterator<Item = u32>, depth: u32) -> Option<KdNode> {
         let first = self.references.len();
         self.references.extend(references);
         let count = self.references.len() - first;
         (count > 0).then(|| {
             self.leaves += 1;
             self.depth = self.depth.max(depth);
-            Node::leaf(first as u32, count as u32)
+            KdNode::leaf(first as u32, count as u32)
         })
     }
 
     /// A node whose children are there already; `None` if both are empty.
-    pub fn inner(&mut self, (axis, at): At, children: [Option<Node>; 2]) -> Option<Node> {
+    pub fn inner(&mut self, (axis, at): At, children: [Option<KdNode>; 2]) -> Option<KdNode> {
         let empty = children.map(|child| child.is_none());
         if empty == [true; 2] {
             return None;
@@ -45,11 +45,11 @@ impl Fragment {
         self.nodes.extend(children.iter().flatten());
         self.inner_nodes += 1;
         self.empty_leaves += empty.map(u32::from).iter().sum::<u32>();
-        Some(Node::inner(axis, at, first, empty))
+        Some(KdNode::inner(axis, at, first, empty))
     }
 
     /// What a builder has made, its references by their names.
-    pub fn subtree(&mut self, subtree: &Subtree, name: &impl Fn(u32) -> u32, depth: u32) -> Option<Node> {
+    pub fn subtree(&mut self, subtree: &Subtree, name: &impl Fn(u32) -> u32, depth: u32) -> Option<KdNode> {
         match subtree {
             Subtree::Empty => None,
             Subtree::Leaf(references) => self.leaf(references.iter().map(|&reference| name(reference)), depth),
@@ -63,12 +63,12 @@ impl Fragment {
 }
 
 /// A node where what it names begins later.
-pub(super) fn moved(node: Node, nodes: u32, references: u32) -> Node {
+pub(super) fn moved(node: KdNode, nodes: u32, references: u32) -> KdNode {
     match node.content() {
-        Content::Leaf(range) => Node::leaf(range.start as u32 + references, range.len() as u32),
-        Content::Inner(Inner { axis, plane, children }) => {
+        KdContent::Leaf(range) => KdNode::leaf(range.start as u32 + references, range.len() as u32),
+        KdContent::Inner(Inner { axis, plane, children }) => {
             let first = children[0].or(children[1]).unwrap_or(0);
-            Node::inner(axis, plane, first + nodes, children.map(|child| child.is_none()))
+            KdNode::inner(axis, plane, first + nodes, children.map(|child| child.is_none()))
         }
     }
 }

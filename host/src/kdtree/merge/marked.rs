@@ -6,14 +6,14 @@ use super::partition::{Partition, Source};
 use super::tree::Forest;
 use hedgerow::bvh::layout::Triangle;
 use hedgerow::geometry::Aabb;
-use hedgerow::kdtree::layout::{Content, KdTree};
+use hedgerow::kdtree::layout::{KdContent, KdTree};
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::kdtree::twin::heuristic::Heuristic;
 use std::ops::Range;
 
 /// Something that is merged into the tree.
 #[derive(Debug)]
-pub(super) struct Object {
+pub(super) struct MarkedObject {
     pub name: String,
     pub primitives: Range<u32>,
     /// Numbered as the scene has it.
@@ -27,7 +27,7 @@ pub(super) struct Object {
     pub places: Vec<Place>,
 }
 
-impl Object {
+impl MarkedObject {
     fn source(&self) -> Source<'_> {
         Source {
             forest: Forest::over(&self.forest),
@@ -52,7 +52,7 @@ pub(super) struct Marked {
 pub(super) struct Make<'a> {
     /// The static tree.
     pub tree: &'a KdTree,
-    pub objects: &'a [Object],
+    pub objects: &'a [MarkedObject],
     pub costs: Costs,
     pub cell: Aabb,
     /// Those that objects are beyond.
@@ -66,7 +66,7 @@ impl Make<'_> {
         let mut partition = Partition { heuristic, sources: Vec::new(), made: Fragment::default() };
         let mut parts = Vec::with_capacity(marked.parts.len() + 1);
         if let Place::Leaf(node) = place
-            && let Content::Leaf(range) = self.tree.nodes[node as usize].content()
+            && let KdContent::Leaf(range) = self.tree.nodes[node as usize].content()
         {
             let records = (&self.tree.records[..], self.tree.header.reach);
             let (forest, leaf) =

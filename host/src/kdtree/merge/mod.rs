@@ -18,11 +18,11 @@ mod write;
 use descent::{Association, Place, partition_tree_with_tree};
 use hedgerow::bvh::sah::area_scale;
 use hedgerow::geometry::Aabb;
-use hedgerow::kdtree::layout::{Header, KdTree, MAX_DEPTH, Node};
+use hedgerow::kdtree::layout::{KdHeader, KdNode, KdTree, MAX_DEPTH};
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::kdtree::twin::heuristic::Heuristic;
 use hedgerow::{Error, Result};
-use marked::{Make, Marked, Object};
+use marked::{Make, Marked, MarkedObject};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -36,7 +36,7 @@ use tree::Forest;
 ///
 /// ```
 /// use hedgerow_host::kdtree::{Options, build, merge::Merged};
-/// use hedgerow::kdtree::{layout::Room, termination::Costs};
+/// use hedgerow::kdtree::{layout::SpareRoom, termination::Costs};
 ///
 /// let corners = |x: f32| [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0]];
 /// let room = Room { nodes: 64, references: 64, records: 8 };
@@ -53,16 +53,16 @@ use tree::Forest;
 pub struct Merged {
     tree: KdTree,
     /// The static tree's header.
-    still: Header,
+    still: KdHeader,
     costs: Costs,
     /// By their first primitives.
-    objects: Vec<Object>,
+    objects: Vec<MarkedObject>,
     /// The static leaves that objects have parts in: the associations of algorithm 11.
     marked: BTreeMap<Place, Marked>,
     /// What the trees of marked leaves were last made for: the root's cell, and the faces of the static one that objects are beyond.
     around: (Aabb, Vec<u8>),
     /// What the static tree's nodes were where others are in their place.
-    kept: Vec<(u32, Node)>,
+    kept: Vec<(u32, KdNode)>,
     /// Whether all objects are in the structure, and no others.
     is_merged: bool,
 }
@@ -111,7 +111,7 @@ impl Merged {
             .partition_point(|o| (o.primitives.start, o.primitives.end) < (primitives.start, primitives.end));
         self.objects.insert(
             at,
-            Object {
+            MarkedObject {
                 name: name.to_owned(),
                 primitives,
                 records,
@@ -246,8 +246,8 @@ impl Merged {
     }
 
     /// The merged tree's, but for what is counted.
-    fn header(&self, cell: Aabb) -> Header {
-        let mut header = Header { lo: cell.lo, hi: cell.hi, ..self.still };
+    fn header(&self, cell: Aabb) -> KdHeader {
+        let mut header = KdHeader { lo: cell.lo, hi: cell.hi, ..self.still };
         for object in &self.objects {
             header.primitive_count = header.primitive_count.max(object.primitives.end);
             header.reach = header.reach.max(object.reach);

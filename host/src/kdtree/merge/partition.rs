@@ -10,20 +10,20 @@
 //! `MakeTreeFromLeaves` does is not in the text that is left of it: here the surface area heuristic says all three.
 
 use super::fragment::Fragment;
-use super::tree::{At, Branch, Content, Forest, Records, Tree};
+use super::tree::{At, Branch, Forest, Records, Tree, TreeContent};
 use crate::kdtree::exact;
 use hedgerow::bvh::layout::Triangle;
 use hedgerow::geometry::Aabb;
-use hedgerow::kdtree::layout::{MAX_DEPTH, Node, halves};
-use hedgerow::kdtree::twin::clip::Reference;
-use hedgerow::kdtree::twin::heuristic::{Heuristic, Split};
+use hedgerow::kdtree::layout::{KdNode, MAX_DEPTH, halves};
+use hedgerow::kdtree::twin::clip::KdReference;
+use hedgerow::kdtree::twin::heuristic::{Heuristic, KdSplit};
 
 /// So few references are as soon a tree of their own.
 const FEW: u32 = 16;
 
 /// A tree of one of the forests.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Part {
+pub(super) struct SourcePart {
     source: usize,
     number: u32,
     tree: Tree,
@@ -45,12 +45,12 @@ pub(super) struct Partition<'a> {
 }
 
 impl Partition<'_> {
-    pub fn part(&self, source: usize, number: u32) -> Part {
-        Part { source, number, tree: self.sources[source].forest.tree(number) }
+    pub fn part(&self, source: usize, number: u32) -> SourcePart {
+        SourcePart { source, number, tree: self.sources[source].forest.tree(number) }
     }
 
     /// `PartitionTrees`: one tree in `cell` of all `parts`, which are in it.
-    pub fn partition_trees(&mut self, mut parts: Vec<Part>, cell: Aabb, depth: u32) -> Option<Node> {
+    pub fn partition_trees(&mut self, mut parts: Vec<SourcePart>, cell: Aabb, depth: u32) -> Option<KdNode> {
         loop {
             if parts.is_empty() {
                 return None;
@@ -79,9 +79,9 @@ impl Partition<'_> {
     }
 
     /// A node with this plane, and below it what is on its sides.
-    fn divided(&mut self, parts: &[Part], cell: &Aabb, at: At, depth: u32) -> Option<Node> {
+    fn divided(&mut self, parts: &[SourcePart], cell: &Aabb, at: At, depth: u32) -> Option<KdNode> {
         let mut sides = [Vec::new(), Vec::new()];
-        for &Part { source, number, .. } in parts {
+        for &SourcePart { source, number, .. } in parts {
             let Source { forest, records, .. } = &mut self.sources[source];
             let divided = forest.partition_tree_with_plane(number, *records, at);
             for (side, branch) in sides.iter_mut().zip(divided) {
@@ -97,10 +97,10 @@ impl Partition<'_> {
 
     /// `FindBestPlane`, of those that cut no tree. Unlike a builder, who knows only how many references there are, this one knows what
     /// the trees are worth.
-    fn best_clean_plane(&self, parts: &[Part], cell: &Aabb) -> Option<At> {
+    fn best_clean_plane(&self, parts: &[SourcePart], cell: &Aabb) -> Option<At> {
         let mut best: Option<(f32, At)> = None;
         for axis in 0..3 {
-            let faces = |part: &Part| [part.tree.bounds.lo[axis], part.tree.bounds.hi[axis]];
+            let faces = |part: &SourcePart| [part.tree.bounds.lo[axis], part.tree.bounds.hi[axis]];
             for at in parts.iter().flat_map(faces).filter(|&at| is_inside(cell, (axis, at))) {
                 let Some(tests) = tests_beside(parts, (axis, at)) else { continue };
                 let (cost, pays) = self.heuristic.between(cell, (axis, at), tests);
@@ -114,35 +114,35 @@ impl Partition<'_> {
     }
 
     /// `FindBestPlane`, of those of the roots.
-    fn best_root_plane(&self, parts: &[Part], cell: &Aabb) -> Option<At> {
+    fn best_root_plane(&self, parts: &[SourcePart], cell: &Aabb) -> Option<At> {
         let split = |at: At| {
             let [left, right] = counts(parts, at);
             self.heuristic.split(cell, at, [left, 0, right])
         };
-        let best = parts.iter().filter_map(|part| part.tree.root_plane()).map(split).fold(None, Split::better);
+        let best = parts.iter().filter_map(|part| part.tree.root_plane()).map(split).fold(None, KdSplit::better);
         let best = self.heuristic.paying(best, cell, total(parts) as usize);
         best.map(|split| (split.plane.axis, split.plane.at))
     }
 
     /// `Dissolve`: the trees whose root's plane is beyond the cell fall into their children. `None` where there are none.
-    fn dissolved(&self, parts: &[Part], cell: &Aabb) -> Option<Vec<Part>> {
-        let is_beyond = |part: &Part| part.tree.root_plane().is_some_and(|at| !is_inside(cell, at));
+    fn dissolved(&self, parts: &[SourcePart], cell: &Aabb) -> Option<Vec<SourcePart>> {
+        let is_beyond = |part: &SourcePart| part.tree.root_plane().is_some_and(|at| !is_inside(cell, at));
         parts.iter().any(is_beyond).then(|| {
-            let fallen = |part: &Part| match part.tree.content {
-                Content::Inner { children, .. } if is_beyond(part) => children.map(|child| self.child(part, child)),
+            let fallen = |part: &SourcePart| match part.tree.content {
+                TreeContent::Inner { children, .. } if is_beyond(part) => children.map(|child| self.child(part, child)),
                 _ => [Some(*part), None],
             };
             parts.iter().flat_map(fallen).flatten().collect()
         })
     }
 
-    fn child(&self, part: &Part, child: Branch) -> Option<Part> {
+    fn child(&self, part: &SourcePart, child: Branch) -> Option<SourcePart> {
         child.map(|number| self.part(part.source, number))
     }
 
     /// A tree that is alone in a cell that is tight enough.
-    fn as_it_is(&mut self, part: Part, cell: Aabb, depth: u32) -> Option<Node> {
-        let Content::Inner { at, children } = part.tree.content else {
+    fn as_it_is(&mut self, part: SourcePart, cell: Aabb, depth: u32) -> Option<KdNode> {
+        let TreeContent::Inner { at, children } = part.tree.content else {
             let Source { forest, first, .. } = &self.sources[part.source];
             let references = forest.leaf_references(part.number).iter();
             return self.made.leaf(references.map(|reference| first + reference.record), depth);
@@ -170,7 +170,7 @@ impl Partition<'_> {
     }
 
     /// `MakeTreeFromLeaves`: a tree over all references, none of them twice.
-    fn make_tree_from_leaves(&mut self, parts: &[Part], cell: &Aabb, depth: u32) -> Option<Node> {
+    fn make_tree_from_leaves(&mut self, parts: &[SourcePart], cell: &Aabb, depth: u32) -> Option<KdNode> {
         let gathered = self.gathered(parts);
         if self.heuristic.is_leaf(gathered.len(), depth) {
             return self.made.leaf(gathered.iter().map(|&(name, ..)| name), depth);
@@ -178,20 +178,20 @@ impl Partition<'_> {
         let triangles: Vec<Triangle> = gathered.iter().map(|(.., triangle)| *triangle).collect();
         // What is longer than another tree's reach and not than that of its own needs no room.
         let reach = parts.iter().fold(0.0, |reach: f32, part| reach.max(self.sources[part.source].records.1));
-        let reference = |(i, &(_, bounds, _)): (usize, &Gathered)| Reference { bounds, record: i as u32 };
+        let reference = |(i, &(_, bounds, _)): (usize, &Gathered)| KdReference { bounds, record: i as u32 };
         let references = gathered.iter().enumerate().map(reference).collect();
         let tree = exact::build(&self.heuristic.below(depth), (&triangles, reach), *cell, references);
         self.made.subtree(&tree, &|record| gathered[record as usize].0, depth)
     }
 
-    fn limited(&mut self, parts: &[Part], depth: u32) -> Option<Node> {
+    fn limited(&mut self, parts: &[SourcePart], depth: u32) -> Option<KdNode> {
         self.made.is_limited = true;
         let gathered = self.gathered(parts);
         self.made.leaf(gathered.iter().map(|&(name, ..)| name), depth)
     }
 
     /// All that is referenced, by ascending name; what is referenced several times once, with the box around all.
-    fn gathered(&self, parts: &[Part]) -> Vec<Gathered> {
+    fn gathered(&self, parts: &[SourcePart]) -> Vec<Gathered> {
         let mut gathered: Vec<Gathered> = Vec::new();
         let mut references = Vec::new();
         for part in parts {
@@ -216,9 +216,9 @@ type Gathered = (u32, Aabb, Triangle);
 
 /// The references on the left and on the right of a plane, as far as can be told without cutting: those of a tree that it cuts go with
 /// the extents.
-fn counts(parts: &[Part], at: At) -> [u32; 2] {
+fn counts(parts: &[SourcePart], at: At) -> [u32; 2] {
     let (axis, plane) = at;
-    parts.iter().fold([0; 2], |[left, right], Part { tree, .. }| {
+    parts.iter().fold([0; 2], |[left, right], SourcePart { tree, .. }| {
         let (lo, hi, count) = (tree.bounds.lo[axis], tree.bounds.hi[axis], tree.count);
         let on_left = if hi <= plane {
             count
@@ -235,8 +235,8 @@ fn counts(parts: &[Part], at: At) -> [u32; 2] {
 }
 
 /// What the trees on the left and on the right of a plane are worth; `None` where it cuts one.
-fn tests_beside(parts: &[Part], (axis, at): At) -> Option<[f32; 2]> {
-    parts.iter().try_fold([0.0; 2], |[left, right], Part { tree, .. }| {
+fn tests_beside(parts: &[SourcePart], (axis, at): At) -> Option<[f32; 2]> {
+    parts.iter().try_fold([0.0; 2], |[left, right], SourcePart { tree, .. }| {
         if tree.bounds.hi[axis] <= at {
             Some([left + tree.cost, right])
         } else {
@@ -245,7 +245,7 @@ fn tests_beside(parts: &[Part], (axis, at): At) -> Option<[f32; 2]> {
     })
 }
 
-fn total(parts: &[Part]) -> u32 {
+fn total(parts: &[SourcePart]) -> u32 {
     parts.iter().map(|part| part.tree.count).sum()
 }
 
@@ -257,7 +257,7 @@ fn is_inside(cell: &Aabb, (axis, at): At) -> bool {
 mod tests {
     use super::super::tree::tests::{one_leaf, quarters, triangle};
     use super::*;
-    use hedgerow::kdtree::layout::{Content as NodeContent, Inner};
+    use hedgerow::kdtree::layout::{Inner, KdContent};
     use hedgerow::kdtree::termination::Costs;
 
     const CELL: Aabb = Aabb { lo: [-1.0; 3], hi: [9.0; 3] };
@@ -277,11 +277,11 @@ mod tests {
         (text(&partition.made, root), partition.made)
     }
 
-    fn text(made: &Fragment, node: Option<Node>) -> String {
+    fn text(made: &Fragment, node: Option<KdNode>) -> String {
         match node.map(|node| node.content()) {
             None => "-".to_owned(),
-            Some(NodeContent::Leaf(range)) => format!("{:?}", &made.references[range]),
-            Some(NodeContent::Inner(Inner { axis, plane, children })) => {
+            Some(KdContent::Leaf(range)) => format!("{:?}", &made.references[range]),
+            Some(KdContent::Inner(Inner { axis, plane, children })) => {
                 let [left, right] = children.map(|child| text(made, child.map(|child| made.nodes[child as usize])));
                 format!("({}@{plane} {left} {right})", ["x", "y", "z"][axis])
             }

@@ -5,8 +5,8 @@
 
 use hedgerow::bvh::layout::Triangle;
 use hedgerow::geometry::Aabb;
-use hedgerow::kdtree::layout::{Content as NodeContent, KdTree, Node, halves};
-use hedgerow::kdtree::twin::clip::{Plane, Reference, bounds_of, clipped, divided};
+use hedgerow::kdtree::layout::{KdContent, KdNode, KdTree, halves};
+use hedgerow::kdtree::twin::clip::{KdPlane, KdReference, bounds_of, clipped, divided};
 
 /// A plane: the axis that it is across, and where it is.
 pub(super) type At = (usize, f32);
@@ -25,7 +25,7 @@ pub(super) struct Forest<'a> {
     /// How many tests a step is worth.
     step: f32,
     trees: Vec<Tree>,
-    references: Vec<Reference>,
+    references: Vec<KdReference>,
 }
 
 /// A node, which holds something, and all below it.
@@ -37,11 +37,11 @@ pub(super) struct Tree {
     pub count: u32,
     /// How many tests it is worth to a ray that meets its box.
     pub cost: f32,
-    pub content: Content,
+    pub content: TreeContent,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Content {
+pub(super) enum TreeContent {
     /// The first of its references, which are by ascending record.
     Leaf(u32),
     /// At least one child is not empty.
@@ -51,8 +51,8 @@ pub(super) enum Content {
 impl Tree {
     pub fn root_plane(&self) -> Option<At> {
         match self.content {
-            Content::Inner { at, .. } => Some(at),
-            Content::Leaf(_) => None,
+            TreeContent::Inner { at, .. } => Some(at),
+            TreeContent::Leaf(_) => None,
         }
     }
 }
@@ -76,10 +76,10 @@ impl<'a> Forest<'a> {
     }
 
     /// A tree's own references: those of a leaf.
-    pub fn leaf_references(&self, tree: u32) -> &[Reference] {
+    pub fn leaf_references(&self, tree: u32) -> &[KdReference] {
         match (self.base, self.tree(tree)) {
             (Some(base), _) if tree < self.first => base.leaf_references(tree),
-            (_, Tree { content: Content::Leaf(first), count, .. }) => {
+            (_, Tree { content: TreeContent::Leaf(first), count, .. }) => {
                 &self.references[first as usize..][..count as usize]
             }
             _ => &[],
@@ -87,19 +87,19 @@ impl<'a> Forest<'a> {
     }
 
     /// Appends what is in a tree's leaves; what is in several of them as often.
-    pub fn gather(&self, tree: u32, references: &mut Vec<Reference>) {
+    pub fn gather(&self, tree: u32, references: &mut Vec<KdReference>) {
         match self.tree(tree).content {
-            Content::Leaf(_) => references.extend_from_slice(self.leaf_references(tree)),
-            Content::Inner { children, .. } => children.iter().flatten().for_each(|&c| self.gather(c, references)),
+            TreeContent::Leaf(_) => references.extend_from_slice(self.leaf_references(tree)),
+            TreeContent::Inner { children, .. } => children.iter().flatten().for_each(|&c| self.gather(c, references)),
         }
     }
 
-    pub fn leaf(&mut self, references: impl IntoIterator<Item = Reference>) -> Branch {
+    pub fn leaf(&mut self, references: impl IntoIterator<Item = KdReference>) -> Branch {
         let first = self.references.len();
         self.references.extend(references);
         let bounds = self.references[first..].iter().fold(Aabb::EMPTY, |b, reference| b.union(&reference.bounds));
         let count = (self.references.len() - first) as u32;
-        let leaf = Tree { bounds, count, cost: count as f32, content: Content::Leaf(first as u32) };
+        let leaf = Tree { bounds, count, cost: count as f32, content: TreeContent::Leaf(first as u32) };
         (count > 0).then(|| self.push(leaf))
     }
 
@@ -111,7 +111,7 @@ impl<'a> Forest<'a> {
         // All of it where areas are too large or too small to tell.
         let part = |part: f32| if part <= 1.0 { part } else { 1.0 };
         let cost = self.step + there().map(|child| part(child.bounds.half_area() / area) * child.cost).sum::<f32>();
-        let inner = Tree { bounds, count, cost, content: Content::Inner { at, children } };
+        let inner = Tree { bounds, count, cost, content: TreeContent::Inner { at, children } };
         (count > 0).then(|| self.push(inner))
     }
 
@@ -130,17 +130,17 @@ impl<'a> Forest<'a> {
         (forest, root)
     }
 
-    fn below(&mut self, tree: &KdTree, node: &Node, cell: &Aabb) -> Branch {
+    fn below(&mut self, tree: &KdTree, node: &KdNode, cell: &Aabb) -> Branch {
         match node.content() {
-            NodeContent::Leaf(range) => {
+            KdContent::Leaf(range) => {
                 let reference = |&record: &u32| {
                     let Triangle { v0, v1, v2, .. } = tree.records[record as usize];
                     let bounds = bounds_of(&[v0, v1, v2], tree.header.reach).intersection(cell);
-                    (0..3).all(|i| bounds.lo[i] <= bounds.hi[i]).then_some(Reference { bounds, record })
+                    (0..3).all(|i| bounds.lo[i] <= bounds.hi[i]).then_some(KdReference { bounds, record })
                 };
                 self.leaf(tree.references[range].iter().filter_map(reference))
             }
-            NodeContent::Inner(inner) => {
+            KdContent::Inner(inner) => {
                 let [left, right] = inner.halves(cell);
                 let mut child = |child: Option<u32>, cell: &Aabb| {
                     child.and_then(|child| self.below(tree, &tree.nodes[child as usize], cell))
@@ -156,7 +156,7 @@ impl<'a> Forest<'a> {
         let mut forest = Forest::new(step);
         let reference = |&record: &u32| {
             let Triangle { v0, v1, v2, .. } = records.0[record as usize];
-            clipped(&[v0, v1, v2], records.1, cell).map(|bounds| Reference { bounds, record })
+            clipped(&[v0, v1, v2], records.1, cell).map(|bounds| KdReference { bounds, record })
         };
         let leaf = forest.leaf(references.iter().filter_map(reference));
         (forest, leaf)
@@ -173,8 +173,8 @@ impl<'a> Forest<'a> {
             return [None, Some(tree)];
         }
         let (own, children) = match content {
-            Content::Leaf(_) => return self.partition_primitives(tree, records, (axis, at)),
-            Content::Inner { at: own, children } => (own, children),
+            TreeContent::Leaf(_) => return self.partition_primitives(tree, records, (axis, at)),
+            TreeContent::Inner { at: own, children } => (own, children),
         };
         if own == (axis, at) {
             return children;
@@ -198,7 +198,7 @@ impl<'a> Forest<'a> {
     /// The thesis' `PartitionPrimitives`: each box is cut where the plane goes through it, and the triangle clipped anew. What of a
     /// triangle is in its cell is in its box, so that the box does for the cell.
     fn partition_primitives(&mut self, leaf: u32, records: Records<'_>, (axis, at): At) -> [Branch; 2] {
-        let plane = Plane { axis, at, planar_left: true };
+        let plane = KdPlane { axis, at, planar_left: true };
         let mut parts = [Vec::new(), Vec::new()];
         for reference in self.leaf_references(leaf) {
             let divided = divided(reference, records, &plane, &halves(&reference.bounds, axis, at));
@@ -217,20 +217,20 @@ pub(super) mod tests {
         Triangle { v0: [lo, y, 0.0], v1: [hi, y, 0.0], v2: [lo, y + 1.0, 0.0], primitive: 0 }
     }
 
-    pub fn reference(records: &[Triangle], record: u32) -> Reference {
+    pub fn reference(records: &[Triangle], record: u32) -> KdReference {
         let Triangle { v0, v1, v2, .. } = records[record as usize];
-        Reference { bounds: Aabb::around(&[v0, v1, v2]), record }
+        KdReference { bounds: Aabb::around(&[v0, v1, v2]), record }
     }
 
     /// As text: `(axis@plane left right)`, `[records]`, `-`.
     fn text(forest: &Forest<'_>, branch: Branch) -> String {
         let Some(tree) = branch else { return "-".to_owned() };
         match forest.tree(tree).content {
-            Content::Leaf(_) => {
+            TreeContent::Leaf(_) => {
                 let records: Vec<u32> = forest.leaf_references(tree).iter().map(|r| r.record).collect();
                 format!("{records:?}")
             }
-            Content::Inner { at: (axis, at), children: [left, right] } => {
+            TreeContent::Inner { at: (axis, at), children: [left, right] } => {
                 format!("({}@{at} {} {})", ["x", "y", "z"][axis], text(forest, left), text(forest, right))
             }
         }
@@ -279,7 +279,8 @@ pub(super) mod tests {
         for (part, is_left) in parts.into_iter().zip([true, false]) {
             let mut references = Vec::new();
             part.inspect(|&part| forest.gather(part, &mut references));
-            let is_there = |r: &Reference| if is_left { r.bounds.hi[at.0] <= at.1 } else { at.1 <= r.bounds.lo[at.0] };
+            let is_there =
+                |r: &KdReference| if is_left { r.bounds.hi[at.0] <= at.1 } else { at.1 <= r.bounds.lo[at.0] };
             assert!(references.iter().all(is_there), "{at:?}: {references:?}");
         }
     }

@@ -9,15 +9,15 @@ use super::descent::{Place, face};
 use super::fragment::{Fragment, moved};
 use bytemuck::Zeroable;
 use hedgerow::bvh::layout::status;
-use hedgerow::kdtree::layout::{Content, Header, Inner, KdTree, Node};
+use hedgerow::kdtree::layout::{Inner, KdContent, KdHeader, KdNode, KdTree};
 use std::collections::HashMap;
 
 /// Writes trees into a structure.
 pub(super) struct Writer<'a> {
     tree: &'a mut KdTree,
     /// Nodes of the static tree, and what they were.
-    kept: &'a mut Vec<(u32, Node)>,
-    still: Header,
+    kept: &'a mut Vec<(u32, KdNode)>,
+    still: KdHeader,
     /// For each object, what its first record is named in a [`Fragment`], and which record that is. Ascending.
     names: &'a [(u32, u32)],
     /// Where nodes are that were moved.
@@ -30,8 +30,8 @@ impl<'a> Writer<'a> {
     /// `tree` is the static tree, and `header` what it will say, but for what is counted.
     pub fn new(
         tree: &'a mut KdTree,
-        header: Header,
-        kept: &'a mut Vec<(u32, Node)>,
+        header: KdHeader,
+        kept: &'a mut Vec<(u32, KdNode)>,
         names: &'a [(u32, u32)],
     ) -> Writer<'a> {
         let still = std::mem::replace(&mut tree.header, header);
@@ -48,7 +48,7 @@ impl<'a> Writer<'a> {
             let first = self.new_nodes(2 - usize::from(is_empty));
             let mut empty = [false; 2];
             empty[side] = is_empty;
-            self.set(inside, Node::inner(axis, at, first, empty));
+            self.set(inside, KdNode::inner(axis, at, first, empty));
             self.beyond[usize::from(number)] = first + side as u32;
             inside = if is_empty { first } else { first + 1 - side as u32 };
         }
@@ -72,7 +72,7 @@ impl<'a> Writer<'a> {
         };
         let header = &mut self.tree.header;
         match self.tree.nodes[at as usize].content() {
-            Content::Leaf(range) if matches!(place, Place::Leaf(_)) => {
+            KdContent::Leaf(range) if matches!(place, Place::Leaf(_)) => {
                 header.leaves -= 1;
                 header.replaced_references += range.len() as u32;
             }
@@ -105,11 +105,11 @@ impl<'a> Writer<'a> {
     /// A node for the empty child of a node.
     fn new_child(&mut self, parent: u32) -> u32 {
         let parent = self.moved.get(&parent).copied().unwrap_or(parent);
-        let Content::Inner(Inner { axis, plane, children }) = self.tree.nodes[parent as usize].content() else {
+        let KdContent::Inner(Inner { axis, plane, children }) = self.tree.nodes[parent as usize].content() else {
             unreachable!("what has an empty child is split");
         };
         let first = self.new_nodes(2);
-        self.set(parent, Node::inner(axis, plane, first, [false; 2]));
+        self.set(parent, KdNode::inner(axis, plane, first, [false; 2]));
         let empty = if children[0].is_none() { first } else { first + 1 };
         if let Some(child) = children[0].or(children[1]) {
             let other = if empty == first { first + 1 } else { first };
@@ -122,11 +122,11 @@ impl<'a> Writer<'a> {
 
     fn new_nodes(&mut self, count: usize) -> u32 {
         let first = self.tree.nodes.len();
-        self.tree.nodes.resize(first + count, Node::zeroed());
+        self.tree.nodes.resize(first + count, KdNode::zeroed());
         first as u32
     }
 
-    fn set(&mut self, at: u32, node: Node) {
+    fn set(&mut self, at: u32, node: KdNode) {
         let before = std::mem::replace(&mut self.tree.nodes[at as usize], node);
         if at < self.still.node_count {
             self.kept.push((at, before));
@@ -135,7 +135,7 @@ impl<'a> Writer<'a> {
 }
 
 /// Makes a structure the static tree again, whose header is `still`.
-pub(super) fn restore(tree: &mut KdTree, still: &Header, kept: &mut Vec<(u32, Node)>) {
+pub(super) fn restore(tree: &mut KdTree, still: &KdHeader, kept: &mut Vec<(u32, KdNode)>) {
     for (at, node) in kept.drain(..) {
         tree.nodes[at as usize] = node;
     }

@@ -57,7 +57,7 @@ pub struct Stage<'a> {
 
 impl<'a> Stage<'a> {
     fn ours(&self) -> Structures<'a> {
-        Structures::ours(self.device, accel::Options::DEFAULT)
+        Structures::ours(self.device, accel::AccelOptions::DEFAULT)
     }
 
     fn drivers(&self) -> Option<Structures<'a>> {

@@ -11,7 +11,7 @@ use hedgerow::bvh::geometry::Input;
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::Timestamps;
 use hedgerow::kdtree::layout::KdTree;
-use hedgerow::kdtree::merge::{Memory, Merger, Most, Object, Options, Report};
+use hedgerow::kdtree::merge::{Memory, MergeCapacity, MergeOptions, MergeReport, Merger, Object};
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use std::borrow::Cow;
@@ -26,8 +26,8 @@ pub struct MergeOnDevice<'a> {
     device: &'a Device,
     builder: String,
     still: KdTree,
-    options: Options,
-    most: Most,
+    options: MergeOptions,
+    most: MergeCapacity,
     objects: Vec<Moving<'a>>,
     place: Place<'a>,
     /// Whether objects are in the tree.
@@ -54,11 +54,11 @@ struct Place<'a> {
 
 impl<'a> Place<'a> {
     /// With the static tree in place.
-    fn new(device: &'a Device, options: &Options, still: &KdTree, most: Most) -> Result<Place<'a>> {
+    fn new(device: &'a Device, options: &MergeOptions, still: &KdTree, most: MergeCapacity) -> Result<Place<'a>> {
         let tree = still.clone().with_room(Merger::room(options, most))?;
         let merger = Merger::new(device, options, &tree.header, most)?;
         let sizes = merger.sizes();
-        let structure = device.buffer("kd-tree", tree.header.sizes().bytes)?;
+        let structure = device.buffer("kd-tree", tree.header.offsets().bytes)?;
         structure.write(&tree.to_bytes());
         let (scratch, undo) = (device.buffer("scratch", sizes.scratch)?, device.buffer("undo", sizes.undo)?);
         Ok(Place { merger, structure, scratch, undo })
@@ -69,7 +69,7 @@ impl<'a> Place<'a> {
         Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() }
     }
 
-    fn report(&self) -> Report {
+    fn report(&self) -> MergeReport {
         self.scratch.read_at(self.merger.report_range().start, 1)[0]
     }
 }
@@ -82,7 +82,7 @@ impl<'a> MergeOnDevice<'a> {
     pub fn new(
         device: &'a Device,
         builder: &Spec,
-        options: Options,
+        options: MergeOptions,
         traversal: Traversal,
         still: KdTree,
         first: &Frame<'_>,
@@ -98,7 +98,7 @@ impl<'a> MergeOnDevice<'a> {
         };
         let objects: Vec<Moving<'_>> = Group::objects(first).into_iter().map(moving).collect::<Result<_>>()?;
         let triangles = objects.iter().map(|moving| moving.object.input.primitive_count).sum();
-        let most = Most { objects: objects.len() as u32, triangles };
+        let most = MergeCapacity { objects: objects.len() as u32, triangles };
         Ok(MergeOnDevice {
             device,
             builder: builder.to_string(),

@@ -108,7 +108,7 @@ impl<'a> Stage<'a> {
                     let name = &first.dynamic.name;
                     Error::Scene(format!("{name}: nothing in it stands still, so there is nothing to merge into"))
                 })?;
-                let options = merge::Options { build: options, ..merge::Options::DEFAULT };
+                let options = merge::MergeOptions { build: options, ..merge::MergeOptions::DEFAULT };
                 Box::new(MergeOnDevice::new(device()?, self.builder, options, traversal, still, first)?)
             }
             KdBuilder::Host { options, traversal, traces_on_device } => {

@@ -41,7 +41,7 @@ impl<'a> OnDevice<'a> {
         way: Way,
         device: &'a Device,
         builder: &Spec,
-        (options, static_options): (&builder::Options, host::Options),
+        (options, static_options): (&builder::KdOptions, host::HostKdOptions),
         traversal: Traversal,
         first: &Frame<'_>,
     ) -> Result<OnDevice<'a>> {
@@ -75,7 +75,7 @@ impl<'a> OnDevice<'a> {
 }
 
 /// The tree of what stands still, if anything does.
-pub(super) fn static_tree(mesh: &Mesh, options: &host::Options) -> Result<Option<KdTree>> {
+pub(super) fn static_tree(mesh: &Mesh, options: &host::HostKdOptions) -> Result<Option<KdTree>> {
     let is_there = !mesh.triangles.is_empty();
     Ok(is_there.then(|| host::build(&mesh.positions, &mesh.triangles, options)).transpose()?)
 }

@@ -10,11 +10,11 @@ use crate::subjects::host_rays::{KdRays, Numbered, timed};
 use crate::subjects::kd_device::KdDevice;
 use crate::subjects::{BuildRun, KD_TREE, Subject};
 use crate::{Error, Result};
-use hedgerow::kdtree::layout::{KdTree, Room};
+use hedgerow::kdtree::layout::{KdTree, SpareRoom};
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use hedgerow_host::kdtree::merge::Merged;
-use hedgerow_host::kdtree::{Options, build};
+use hedgerow_host::kdtree::{HostKdOptions, build};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -26,7 +26,7 @@ const ROOM_AT_LEAST: u32 = 1 << 16;
 /// Trees on the host, traced one after the other there or on the device.
 pub struct OnHost<'a> {
     builder: String,
-    options: Options,
+    options: HostKdOptions,
     parts: Vec<Part>,
     trees: Trees,
     rays: KdRays<'a>,
@@ -73,8 +73,8 @@ impl<'a> OnHost<'a> {
         way: Way,
         device: Option<&'a Device>,
         builder: &Spec,
-        (options, traversal, traces_on_device): (Options, Traversal, bool),
-        static_options: &Options,
+        (options, traversal, traces_on_device): (HostKdOptions, Traversal, bool),
+        static_options: &HostKdOptions,
         first: &Frame<'_>,
     ) -> Result<OnHost<'a>> {
         let groups = match way {
@@ -102,7 +102,7 @@ impl<'a> OnHost<'a> {
                 let moving: usize = first.dynamic.objects.iter().map(|object| object.triangles.len()).sum();
                 let moving = moving as u32;
                 let each = moving.saturating_mul(ROOM_EACH).saturating_add(ROOM_AT_LEAST);
-                let still = still.with_room(Room { nodes: each, references: each, records: moving })?;
+                let still = still.with_room(SpareRoom { nodes: each, references: each, records: moving })?;
                 Trees::Merged(Box::new(Merged::new(still, options.costs)))
             }
             _ => Trees::Apart { still: still.map(Box::new), parts: Vec::new() },
@@ -146,7 +146,7 @@ impl<'a> OnHost<'a> {
             let still = merged.restore().clone();
             let header = &still.header;
             let more = |room: u32, count: u32| (room - count).max(ROOM_AT_LEAST).saturating_mul(2);
-            let room = Room {
+            let room = SpareRoom {
                 nodes: more(header.node_room, header.node_count),
                 references: more(header.reference_room, header.reference_count),
                 records: header.record_room - header.active,
@@ -192,7 +192,7 @@ impl Subject for OnHost<'_> {
             match built {
                 Ok(()) => {
                     let trees = self.trees.all(&self.parts)?;
-                    self.bytes = trees.iter().map(|(tree, _)| tree.header.sizes().bytes).sum();
+                    self.bytes = trees.iter().map(|(tree, _)| tree.header.offsets().bytes).sum();
                     return Ok(BuildRun::whole(milliseconds));
                 }
                 // The only argument that can be wrong here is the room.

@@ -50,7 +50,7 @@ impl<'a> TwoLevel<'a> {
             let what = format!("{name}: {count} triangles; two-level numbers at most {MOST_PRIMITIVES}, leave it out");
             return Err(Error::Argument(what));
         }
-        let structures = Structures::ours(device, accel::Options::DEFAULT);
+        let structures = Structures::ours(device, accel::AccelOptions::DEFAULT);
         let mut parts = Vec::new();
         let part = |object: Option<usize>, morphs: bool, first: u32, mesh: &Mesh| {
             let flags = if morphs { Flags::empty() } else { Flags::PREFER_FAST_TRACE };

@@ -6,7 +6,7 @@ use crate::device::{Buffer, Device};
 use ash::vk;
 use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
 use hedgerow::gpu::Recorder;
-use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 use hedgerow::trace::{Hit, Query, Ray};
 
 /// What a build call takes.
@@ -44,11 +44,11 @@ pub struct Ours(pub accel::Device<'static>, Probe, &'static Device);
 impl Ours {
     /// With the defaults.
     pub fn on(device: &'static Device) -> Ours {
-        Ours::with_options(device, accel::Options::DEFAULT)
+        Ours::with_options(device, accel::AccelOptions::DEFAULT)
     }
 
     /// With these options.
-    pub fn with_options(device: &'static Device, options: accel::Options) -> Ours {
+    pub fn with_options(device: &'static Device, options: accel::AccelOptions) -> Ours {
         Ours(accel::Device::with_options(device, options), Probe::ours(device), device)
     }
 }
@@ -101,8 +101,8 @@ impl Backend for Ours {
         let ray_buffer = self.2.upload("rays", rays).expect("memory");
         let hits = self.2.buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
         let structure = self.address(structure);
-        let buffers = Buffers { structure, rays: ray_buffer.address(), hits: hits.address(), work: None, count };
-        let shape = Shape::of(self.2);
+        let buffers = TraceBuffers { structure, rays: ray_buffer.address(), hits: hits.address(), work: None, count };
+        let shape = TraceShape::of(self.2);
         self.2.run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
         hits.read(rays.len())
     }

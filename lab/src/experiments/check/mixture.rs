@@ -77,7 +77,7 @@ pub fn mixture(count: usize, seed: u64) -> World {
 /// The structures of a world, read back, and the instances as they were given.
 pub struct ReadBack {
     /// The top level.
-    pub top: Bvh2<layout::Instance>,
+    pub top: Bvh2<layout::InstanceRecord>,
     /// The instances, with the addresses of their structures.
     pub instances: Vec<Instance>,
     /// Structures of triangles by their addresses.
@@ -138,7 +138,7 @@ fn reached<R: Record>(structure: &Bvh2<R>, starts: &[[u32; 2]]) -> Vec<u32> {
     let mut counts = vec![0; structure.header.active as usize];
     let root = structure.header.root;
     let begins =
-        |&start: &[u32; 2]| if start[1] == layout::Instance::AT_ROOT { [root.index, root.count] } else { start };
+        |&start: &[u32; 2]| if start[1] == layout::InstanceRecord::AT_ROOT { [root.index, root.count] } else { start };
     let mut waiting: Vec<[u32; 2]> = starts.iter().map(begins).collect();
     while let Some([index, count]) = waiting.pop() {
         match count {

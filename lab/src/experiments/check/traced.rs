@@ -3,7 +3,7 @@
 use super::cases::{Wrong, same};
 use crate::device::Device;
 use hedgerow::gpu::Recorder;
-use hedgerow::trace::tracer::Buffers;
+use hedgerow::trace::tracer::TraceBuffers;
 use hedgerow::trace::{Hit, Ray, Work};
 
 /// The hits of `rays` through the structure, traced by whatever `record` records, and their work; without `count_work` no room
@@ -16,14 +16,14 @@ pub fn traced(
     structure: &[u8],
     rays: &[Ray],
     count_work: bool,
-    record: impl FnOnce(&mut Recorder<'_>, &Buffers) -> hedgerow::Result<()>,
+    record: impl FnOnce(&mut Recorder<'_>, &TraceBuffers) -> hedgerow::Result<()>,
 ) -> Result<(Vec<Hit>, Vec<Work>), Wrong> {
     let unwritten = Hit { t: -1.0, primitive: 7, u: -1.0, v: -1.0 };
     let structure = device.upload("structure", structure)?;
     let ray_buffer = device.upload("rays", rays)?;
     let hits = device.upload("hits", &vec![unwritten; rays.len() + 1])?;
     let work = device.upload("work", &vec![Work::default(); rays.len()])?;
-    let buffers = Buffers {
+    let buffers = TraceBuffers {
         structure: structure.address(),
         rays: ray_buffer.address(),
         hits: hits.address(),

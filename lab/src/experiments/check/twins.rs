@@ -3,15 +3,15 @@
 use super::cases::Found;
 use super::corpus::Mesh;
 use crate::device::Device;
-use hedgerow::bvh::builder::{Builder, Input, Method, Options, Window};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Input, Method, Window};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
-use hedgerow::kdtree::builder::Estimate;
+use hedgerow::kdtree::builder::KdEstimate;
 use hedgerow::kdtree::merge;
 
 /// Room for kd-trees of scenes where most triangles straddle most planes.
-pub const PLENTY: Estimate = Estimate {
+pub const PLENTY: KdEstimate = KdEstimate {
     level_references: 20.0,
     level_nodes: 20.0,
     subtree_nodes: 20.0,
@@ -21,11 +21,11 @@ pub const PLENTY: Estimate = Estimate {
 };
 
 /// Room for objects that lie in the densest part of a kd-tree.
-pub const PLENTY_TO_MERGE: merge::Estimate = merge::Estimate {
+pub const PLENTY_TO_MERGE: merge::MergeEstimate = merge::MergeEstimate {
     pairs: 60.0,
     items: 20.0,
     marked: 40.0,
-    build: Estimate {
+    build: KdEstimate {
         level_references: 200.0,
         level_nodes: 60.0,
         subtree_nodes: 200.0,
@@ -39,7 +39,7 @@ pub const PLENTY_TO_MERGE: merge::Estimate = merge::Estimate {
 ///
 /// # Panics
 /// The device failed, or left bytes that belong to no part of a tree.
-pub fn built(device: &Device, options: &Options, input: &Input) -> Bvh2 {
+pub fn built(device: &Device, options: &BuildOptions, input: &Input) -> Bvh2 {
     let builder = Builder::new(device, options, input.primitive_count).expect("few enough primitives");
     let sizes = builder.sizes();
     let structure = device.buffer("structure", sizes.structure).expect("memory");
@@ -58,7 +58,7 @@ pub fn built(device: &Device, options: &Options, input: &Input) -> Bvh2 {
 ///
 /// # Panics
 /// As [`built`].
-pub fn on_device(device: &Device, (_, positions, triangles): &Mesh, options: &Options) -> Bvh2 {
+pub fn on_device(device: &Device, (_, positions, triangles): &Mesh, options: &BuildOptions) -> Bvh2 {
     let vertices = device.upload("positions", positions).expect("memory");
     let indices = device.upload("indices", triangles).expect("memory");
     let (corners, count) = (positions.len() as u32, triangles.len() as u32);
@@ -69,7 +69,7 @@ pub fn on_device(device: &Device, (_, positions, triangles): &Mesh, options: &Op
 ///
 /// # Panics
 /// They do not.
-pub fn on_host((_, positions, triangles): &Mesh, options: &Options) -> Bvh2 {
+pub fn on_host((_, positions, triangles): &Mesh, options: &BuildOptions) -> Bvh2 {
     let codes = options.codes.expect("codes are named");
     let lbvh = |collapse| match &options.split {
         None => twin::lbvh::build(positions, triangles, codes, collapse),

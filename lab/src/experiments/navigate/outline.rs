@@ -106,11 +106,11 @@ impl Outline {
         outline.grow((Some(0), tree.header.cell()), |outline, node: &Option<u32>, cell| {
             let Some(node) = node else { return Err(outline.leaf([].into_iter())) };
             match tree.nodes[*node as usize].content() {
-                kd::Content::Leaf(range) => {
+                kd::KdContent::Leaf(range) => {
                     let records = tree.references[range].iter();
                     Err(outline.leaf(records.map(|&record| tree.records[record as usize].primitive)))
                 }
-                kd::Content::Inner(inner) => {
+                kd::KdContent::Inner(inner) => {
                     let [left, right] = inner.halves(cell);
                     Ok([(inner.children[0], left), (inner.children[1], right)])
                 }

@@ -1,7 +1,7 @@
 //! What the table of costs is looked up by: how many triangles a scene has, and whether they crowd.
 
 use crate::scene::Mesh;
-use hedgerow::bvh::codes::{Codes, Plan};
+use hedgerow::bvh::codes::{CodePlan, Codes};
 use hedgerow::bvh::twin::geometry::finite_box;
 use hedgerow::geometry::Aabb;
 use rayon::prelude::*;
@@ -32,7 +32,7 @@ fn mean_crowd(mesh: &Mesh) -> f64 {
     let count = mesh.triangles.len();
     let boxes: Vec<Result<Aabb, u32>> =
         (0..count).into_par_iter().map(|i| finite_box(&Aabb::around(&mesh.corners(i)))).collect();
-    let plan = Plan::new(Codes::for_count(count as u32), &boxes);
+    let plan = CodePlan::new(Codes::for_count(count as u32), &boxes);
     let mut codes: Vec<u64> = boxes.par_iter().flatten().map(|b| plan.encode(b)).collect();
     codes.par_sort_unstable();
     let squares: f64 = codes.chunk_by(|a, b| a == b).map(|crowd| (crowd.len() as f64).powi(2)).sum();

@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use crate::subjects::Subject;
 use crate::{Error, Result};
 use glam::Vec3;
-use hedgerow::kdtree::layout::{Content, KdTree};
+use hedgerow::kdtree::layout::{KdContent, KdTree};
 use hedgerow::trace::Hit;
 use image::RgbImage;
 use rayon::prelude::*;
@@ -116,7 +116,7 @@ fn on_one_surface([p, q]: [Vec3; 2], [at_p, at_q]: [Vec3; 2], [to_p, to_q]: [[f3
 fn dividing(tree: &KdTree, p: [f32; 3], q: [f32; 3]) -> Option<Line> {
     let mut node = (!tree.nodes.is_empty()).then_some(0);
     for depth in 0.. {
-        let Content::Inner(inner) = tree.nodes[node? as usize].content() else { return None };
+        let KdContent::Inner(inner) = tree.nodes[node? as usize].content() else { return None };
         let sides = [p, q].map(|point| usize::from(point[inner.axis] > inner.plane));
         if sides[0] != sides[1] {
             return Some(Line { depth, axis: inner.axis });
@@ -161,17 +161,17 @@ fn svg(width: f32, words: &str) -> String {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
-    use hedgerow::kdtree::layout::{Header, Node};
+    use hedgerow::kdtree::layout::{KdHeader, KdNode};
 
     #[test]
     fn two_points_are_divided_by_the_plane_of_the_last_cell_that_holds_both() {
         // A cube of edge 2, cut in the middle along x; its right half is cut again along y, where the lower part is empty.
-        let header = Header { lo: [0.0; 3], hi: [2.0; 3], ..Header::zeroed() };
+        let header = KdHeader { lo: [0.0; 3], hi: [2.0; 3], ..KdHeader::zeroed() };
         let nodes = vec![
-            Node::inner(0, 1.0, 1, [false, false]),
-            Node::leaf(0, 1),
-            Node::inner(1, 0.5, 3, [true, false]),
-            Node::leaf(1, 1),
+            KdNode::inner(0, 1.0, 1, [false, false]),
+            KdNode::leaf(0, 1),
+            KdNode::inner(1, 0.5, 3, [true, false]),
+            KdNode::leaf(1, 1),
         ];
         let tree = KdTree { header, nodes, references: vec![0, 0], records: Vec::new(), geometries: Vec::new() };
         let divided = |p, q| dividing(&tree, p, q).map(|line| (line.depth, line.axis));

@@ -24,7 +24,7 @@ use crate::{Error, Result};
 use hedgerow::bvh::{builder, reinsertion};
 use hedgerow::kdtree;
 use hedgerow::trace::kd::Traversal;
-use hedgerow::trace::wide::Tracer;
+use hedgerow::trace::wide::WideTracer;
 use options::{OPTIMISE, RAYS, TRACE};
 use std::fmt;
 use std::str::FromStr;
@@ -127,15 +127,20 @@ impl Spec {
     }
 
     /// A builder of ours on the device, with these options and those that depend on the device.
-    fn on_device<'a>(&self, device: &'a Device, mesh: &Mesh, mut options: builder::Options) -> Result<DeviceBvh<'a>> {
+    fn on_device<'a>(
+        &self,
+        device: &'a Device,
+        mesh: &Mesh,
+        mut options: builder::BuildOptions,
+    ) -> Result<DeviceBvh<'a>> {
         let (form, order) = self.form_and_order()?;
         let wide = form.map(|form| match order {
-            None => Tracer::of(device, form),
-            Some(order) => Tracer::in_order(device, form, order),
+            None => WideTracer::of(device, form),
+            Some(order) => WideTracer::in_order(device, form, order),
         });
         if let Some(budget) = self.time_to_optimise() {
             let pass = pass_of_reinsertion(device, mesh, &options)?;
-            options.optimise = Some(reinsertion::Options::within(budget?, pass));
+            options.optimise = Some(reinsertion::ReinsertionOptions::within(budget?, pass));
         }
         DeviceBvh::new(device, &self.to_string(), mesh, &options, wide)
     }
@@ -147,7 +152,7 @@ pub enum KdBuilder {
     /// On the host.
     Host {
         /// What it builds.
-        options: hedgerow_host::kdtree::Options,
+        options: hedgerow_host::kdtree::HostKdOptions,
         /// How its trees are traced.
         traversal: Traversal,
         /// Whether that is on the device.
@@ -156,14 +161,14 @@ pub enum KdBuilder {
     /// On the device, which traces them, too.
     Device {
         /// What it builds.
-        options: kdtree::builder::Options,
+        options: kdtree::builder::KdOptions,
         /// How its trees are traced.
         traversal: Traversal,
     },
 }
 
 /// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
-fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &builder::Options) -> Result<Duration> {
+fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &builder::BuildOptions) -> Result<Duration> {
     let mut subject = DeviceBvh::new(device, "", mesh, options, None)?;
     subject.build()?;
     let run = subject.build()?;

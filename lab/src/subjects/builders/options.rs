@@ -93,33 +93,33 @@ impl Spec {
     }
 
     /// Options `codes`, `split`, `optimise`, `collapse` and `schedule`.
-    pub(super) fn lbvh_options(&self) -> Result<builder::Options> {
+    pub(super) fn lbvh_options(&self) -> Result<builder::BuildOptions> {
         let schedule = self.schedule()?;
         let (codes, split) = (self.codes()?, self.split()?);
         let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
-        Ok(builder::Options { codes, split, optimise, collapse, schedule, ..builder::Options::DEFAULT })
+        Ok(builder::BuildOptions { codes, split, optimise, collapse, schedule, ..builder::BuildOptions::DEFAULT })
     }
 
     /// Those of `lbvh`, with another method.
-    fn options_with(&self, method: Method) -> Result<builder::Options> {
+    fn options_with(&self, method: Method) -> Result<builder::BuildOptions> {
         method.check()?;
-        Ok(builder::Options { method, ..self.lbvh_options()? })
+        Ok(builder::BuildOptions { method, ..self.lbvh_options()? })
     }
 
     /// Those of `lbvh`, and `bits` and `treelet`.
-    pub(super) fn hlbvh_options(&self) -> Result<builder::Options> {
+    pub(super) fn hlbvh_options(&self) -> Result<builder::BuildOptions> {
         let bits = self.option(BITS.key).map(|_| self.number(&BITS, 0)).transpose()?;
         let primitives = self.number(&TREELET, Treelets::DEFAULT.primitives)?;
         self.options_with(Method::Hlbvh(Treelets { bits, primitives }))
     }
 
     /// Those of `lbvh`, and `radius`.
-    pub(super) fn ploc_options(&self) -> Result<builder::Options> {
+    pub(super) fn ploc_options(&self) -> Result<builder::BuildOptions> {
         self.options_with(Method::Ploc { radius: self.number(&RADIUS, PLOC_RADIUS)? })
     }
 
     /// Those of `lbvh`, and `window` and `radius`.
-    pub(super) fn hploc_options(&self) -> Result<builder::Options> {
+    pub(super) fn hploc_options(&self) -> Result<builder::BuildOptions> {
         let size = self.number(&WINDOW, Window::DEFAULT.size)?;
         let radius = self.number(&RADIUS, Window::DEFAULT.radius)?;
         self.options_with(Method::Hploc(Window { size, radius }))
@@ -176,18 +176,18 @@ impl Spec {
     }
 
     /// Options `kt` and `ki`.
-    pub(super) fn kd_exact_options(&self) -> Result<hedgerow_host::kdtree::Options> {
+    pub(super) fn kd_exact_options(&self) -> Result<hedgerow_host::kdtree::HostKdOptions> {
         self.kd_options(Planes::Exact)
     }
 
     /// Options `bins`, `kt` and `ki`.
-    pub(super) fn kd_binned_options(&self) -> Result<hedgerow_host::kdtree::Options> {
+    pub(super) fn kd_binned_options(&self) -> Result<hedgerow_host::kdtree::HostKdOptions> {
         self.kd_options(Planes::Binned(self.number(&BINS, Planes::BINS)?))
     }
 
     /// Options `bins`, `exact`, `kt` and `ki`.
-    pub(super) fn kd_mixed_options(&self) -> Result<hedgerow_host::kdtree::Options> {
-        let default = kdtree::builder::Options::DEFAULT;
+    pub(super) fn kd_mixed_options(&self) -> Result<hedgerow_host::kdtree::HostKdOptions> {
+        let default = kdtree::builder::KdOptions::DEFAULT;
         let (bins, exact) = (self.number(&BINS, default.bins)?, self.number(&EXACT, default.exact)?);
         if exact > Planes::MAX_EXACT {
             return Err(self.wrong_value(&EXACT, self.option(EXACT.key).unwrap_or_default()));
@@ -196,11 +196,11 @@ impl Spec {
     }
 
     /// Options `bins`, `exact`, `kt`, `ki`, `schedule` and `workgroups`.
-    pub(super) fn kd_gpu_options(&self) -> Result<kdtree::builder::Options> {
-        let default = kdtree::builder::Options::DEFAULT;
+    pub(super) fn kd_gpu_options(&self) -> Result<kdtree::builder::KdOptions> {
+        let default = kdtree::builder::KdOptions::DEFAULT;
         let costs = self.kd_options(Planes::Exact)?.costs;
         let workgroups = self.option(WORKGROUPS.key).map(|_| self.number(&WORKGROUPS, 1)).transpose()?;
-        let options = kdtree::builder::Options {
+        let options = kdtree::builder::KdOptions {
             bins: self.number(&BINS, default.bins)?,
             exact: self.number(&EXACT, default.exact)?,
             costs,
@@ -212,13 +212,13 @@ impl Spec {
         Ok(options)
     }
 
-    fn kd_options(&self, planes: Planes) -> Result<hedgerow_host::kdtree::Options> {
+    fn kd_options(&self, planes: Planes) -> Result<hedgerow_host::kdtree::HostKdOptions> {
         let cost = |option: &BuilderOption, default: f32| {
             let Some(value) = self.option(option.key) else { return Ok(default) };
             value.parse().map_err(|_| self.wrong_value(option, value))
         };
         let costs = Costs { c_t: cost(&KT, Costs::DEFAULT.c_t)?, c_i: cost(&KI, Costs::DEFAULT.c_i)? };
-        let options = hedgerow_host::kdtree::Options { planes, costs };
+        let options = hedgerow_host::kdtree::HostKdOptions { planes, costs };
         let wrong = [(BINS, options.check_planes()), (KT, Costs::check(costs.c_t)), (KI, Costs::check(costs.c_i))];
         match wrong.iter().find(|(_, is_right)| !is_right) {
             Some((option, _)) => Err(self.wrong_value(option, self.option(option.key).unwrap_or_default())),
@@ -245,12 +245,12 @@ impl Spec {
     }
 
     /// Option `split`; `None` where it was not given or is 0.
-    fn split(&self) -> Result<Option<split::Options>> {
+    fn split(&self) -> Result<Option<split::SplitOptions>> {
         let Some(value) = self.option(SPLIT.key) else { return Ok(None) };
         let (fraction, most) = value.split_once('/').unwrap_or((value, ""));
-        let most = if most.is_empty() { Ok(split::Options::DEFAULT.most) } else { most.parse() };
+        let most = if most.is_empty() { Ok(split::SplitOptions::DEFAULT.most) } else { most.parse() };
         let (Ok(fraction), Ok(most)) = (fraction.parse(), most) else { return Err(self.wrong_value(&SPLIT, value)) };
-        let options = split::Options { fraction, most };
+        let options = split::SplitOptions { fraction, most };
         options.check().map_err(|_| self.wrong_value(&SPLIT, value))?;
         Ok((fraction > 0.0).then_some(options))
     }
@@ -264,17 +264,17 @@ impl Spec {
     }
 
     /// Option `optimise`; off where it was not given. For a time, the pass that tells how many there is time for.
-    fn reinsertion(&self) -> Result<Option<reinsertion::Options>> {
-        use reinsertion::Options;
+    fn reinsertion(&self) -> Result<Option<reinsertion::ReinsertionOptions>> {
+        use reinsertion::ReinsertionOptions;
         if let Some(time) = self.time_to_optimise() {
-            return time.map(|_| Some(Options::FAST));
+            return time.map(|_| Some(ReinsertionOptions::FAST));
         }
         Ok(match self.option(OPTIMISE.key) {
             None | Some("off") => None,
-            Some("fast") => Some(Options::FAST),
-            Some("medium") => Some(Options::MEDIUM),
-            Some("high") => Some(Options::HIGH),
-            Some(_) => Some(Options::of_passes(self.number(&OPTIMISE, 0)?)),
+            Some("fast") => Some(ReinsertionOptions::FAST),
+            Some("medium") => Some(ReinsertionOptions::MEDIUM),
+            Some("high") => Some(ReinsertionOptions::HIGH),
+            Some(_) => Some(ReinsertionOptions::of_passes(self.number(&OPTIMISE, 0)?)),
         })
     }
 

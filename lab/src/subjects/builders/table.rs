@@ -45,11 +45,11 @@ impl BuilderOption {
 /// What a builder is: what it needs, which options must be sound, and how its subject is made follow from it.
 pub(super) enum Kind {
     /// One of ours on the device, with these options.
-    Device(fn(&Spec) -> Result<builder::Options>),
+    Device(fn(&Spec) -> Result<builder::BuildOptions>),
     /// One of ours on the host, with this hierarchy.
     Host(fn(&Spec) -> Result<Hierarchy>),
     /// A kd-tree by one of ours on the host.
-    KdHost(fn(&Spec) -> Result<hedgerow_host::kdtree::Options>),
+    KdHost(fn(&Spec) -> Result<hedgerow_host::kdtree::HostKdOptions>),
     /// A kd-tree by ours on the device.
     KdGpu,
     /// The one of ours on the device that the table of costs makes least.

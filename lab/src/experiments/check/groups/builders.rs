@@ -3,7 +3,7 @@
 use crate::experiments::check::cases::{Cases, Found};
 use crate::experiments::check::corpus::{self, Mesh};
 use crate::experiments::check::twins::{compare, on_device, on_host};
-use hedgerow::bvh::builder::{Method, Options, Schedule, Treelets, Window};
+use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::{reinsertion, split};
@@ -26,27 +26,27 @@ fn sized(counts: &[usize]) -> impl Iterator<Item = Mesh> {
 }
 
 /// One tree by each of the schedules.
-fn as_on_host(cases: &mut Cases<'_>, mesh: &Mesh, options: &Options, schedules: &[Schedule]) {
+fn as_on_host(cases: &mut Cases<'_>, mesh: &Mesh, options: &BuildOptions, schedules: &[Schedule]) {
     let expected = on_host(mesh, options);
     let what = format!("{}, {}", mesh.0, options.codes.map_or_else(String::new, |codes| codes.to_string()));
     cases.case(format!("{what}, the host's tree"), |_| Ok(expected.validate()?));
     for &schedule in schedules {
-        let options = Options { schedule: Some(schedule), ..*options };
+        let options = BuildOptions { schedule: Some(schedule), ..*options };
         cases.case(format!("{what}, {:?}, {schedule}", options.method), |device| -> Found {
             compare(&on_device(device, mesh, &options), &expected)
         });
     }
 }
 
-fn by_codes(codes: Codes) -> Options {
-    Options { codes: Some(codes), ..Options::DEFAULT }
+fn by_codes(codes: Codes) -> BuildOptions {
+    BuildOptions { codes: Some(codes), ..BuildOptions::DEFAULT }
 }
 
 pub fn lbvh(cases: &mut Cases<'_>) {
     let schedules = [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup];
     for mesh in meshes(cases) {
         for (code, collapse) in [(Code::Emc64Var.full(), Collapse::SAH), (Code::Mc30.full(), Collapse::OFF)] {
-            as_on_host(cases, &mesh, &Options { collapse, ..by_codes(code) }, &schedules);
+            as_on_host(cases, &mesh, &BuildOptions { collapse, ..by_codes(code) }, &schedules);
         }
     }
     // Longer runs of primitives, where the tuning has them.
@@ -77,7 +77,7 @@ pub fn codes(cases: &mut Cases<'_>) {
     for mesh in meshes {
         for codes in CODES {
             let codes = codes.parse().expect("codes that there are");
-            as_on_host(cases, &mesh, &Options { collapse: Collapse::OFF, ..by_codes(codes) }, CHAIN);
+            as_on_host(cases, &mesh, &BuildOptions { collapse: Collapse::OFF, ..by_codes(codes) }, CHAIN);
         }
     }
 }
@@ -90,7 +90,7 @@ fn methods<const N: usize>(cases: &mut Cases<'_>, methods: [Method; N]) {
         for (i, (method, codes)) in methods.into_iter().zip(codes.into_iter().cycle()).enumerate() {
             let collapse = if i % 2 == 0 { Collapse::SAH } else { Collapse::OFF };
             let schedules = if i == 0 && !cases.quick { CHAIN_AND_POOL } else { CHAIN };
-            as_on_host(cases, &mesh, &Options { method, collapse, ..by_codes(codes) }, schedules);
+            as_on_host(cases, &mesh, &BuildOptions { method, collapse, ..by_codes(codes) }, schedules);
         }
     }
 }
@@ -114,20 +114,20 @@ pub fn hploc(cases: &mut Cases<'_>) {
 pub fn split(cases: &mut Cases<'_>) {
     let mut next = corpus::unit_floats(5);
     let across = (0..130).map(|_| std::array::from_fn(|_| std::array::from_fn(|_| next()))).collect();
-    let all = split::Options { fraction: 1.0, most: split::Options::MOST_SPLITS };
+    let all = split::SplitOptions { fraction: 1.0, most: split::SplitOptions::MOST_SPLITS };
     for mesh in meshes(cases).into_iter().chain([corpus::soup("130 triangles across the scene", across)]) {
-        for split in [split::Options::DEFAULT, all] {
-            let options = Options { split: Some(split), ..by_codes(Code::Emc64Var.full()) };
+        for split in [split::SplitOptions::DEFAULT, all] {
+            let options = BuildOptions { split: Some(split), ..by_codes(Code::Emc64Var.full()) };
             as_on_host(cases, &mesh, &options, CHAIN);
         }
     }
 }
 
 pub fn optimise(cases: &mut Cases<'_>) {
-    let optimise = Some(reinsertion::Options { rounds: 6, stride: 2 });
+    let optimise = Some(reinsertion::ReinsertionOptions { rounds: 6, stride: 2 });
     for mesh in meshes(cases) {
         for method in [Method::Lbvh, Method::Ploc { radius: 8 }] {
-            as_on_host(cases, &mesh, &Options { method, optimise, ..by_codes(Code::Emc64Var.full()) }, CHAIN);
+            as_on_host(cases, &mesh, &BuildOptions { method, optimise, ..by_codes(Code::Emc64Var.full()) }, CHAIN);
         }
     }
 }

@@ -11,7 +11,7 @@ use hedgerow::bvh::layout::{Bvh2, Child, Header, Triangle};
 use hedgerow::bvh::refit::{self, Refit};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::{self, lbvh};
-use hedgerow::bvh::wide::device::{OnDevice, Options};
+use hedgerow::bvh::wide::device::{WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 
@@ -35,8 +35,8 @@ fn wide_as_on_host<N: WideNode>(device: &Device, tree: &Bvh2) -> Found {
     let expected = Wide::<N>::of(tree);
     expected.validate()?;
     let Header { primitive_count, geometry_count, .. } = tree.header;
-    let options = Options { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
-    let wide = OnDevice::new(device, &options, primitive_count);
+    let options = WideOptions { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
+    let wide = WidePass::new(device, &options, primitive_count);
     let sizes = wide.sizes();
     let source = device.upload("source", &tree.to_bytes())?;
     let guarded = |bytes: u64| [vec![0xEEu8; bytes as usize], GUARD.to_vec()].concat();
@@ -61,7 +61,7 @@ pub fn refit(cases: &mut Cases<'_>) {
         let moved: Vec<[f32; 3]> = positions.iter().map(|_| [next(), 3.0 * next(), next() - 7.0]).collect();
         for collapse in [Collapse::SAH, Collapse::OFF] {
             let tree = lbvh::build(positions, triangles, Code::Emc64Var.full(), collapse);
-            for schedule in [refit::Schedule::Chain, refit::Schedule::Workgroup] {
+            for schedule in [refit::RefitSchedule::Chain, refit::RefitSchedule::Workgroup] {
                 cases.case(format!("{name}, {collapse:?}, {schedule:?}"), |device| {
                     let moved = (name.clone(), moved.clone(), triangles.clone());
                     refit_as_on_host(device, &tree, &moved, schedule)
@@ -71,7 +71,7 @@ pub fn refit(cases: &mut Cases<'_>) {
     }
 }
 
-fn refit_as_on_host(device: &Device, tree: &Bvh2, mesh: &Mesh, schedule: refit::Schedule) -> Found {
+fn refit_as_on_host(device: &Device, tree: &Bvh2, mesh: &Mesh, schedule: refit::RefitSchedule) -> Found {
     let (_, positions, triangles) = mesh;
     let mut expected = tree.clone();
     twin::refit::refit_corners(&mut expected, lbvh::corners(positions, triangles), Collapse::SAH);
@@ -79,11 +79,11 @@ fn refit_as_on_host(device: &Device, tree: &Bvh2, mesh: &Mesh, schedule: refit::
     let count = triangles.len() as u32;
     let (vertices, indices) = (device.upload("positions", positions)?, device.upload("indices", triangles)?);
     let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), count);
-    let options = refit::Options { schedule: Some(schedule), ..refit::Options::DEFAULT };
+    let options = refit::RefitOptions { schedule: Some(schedule), ..refit::RefitOptions::DEFAULT };
     let refit = Refit::new(device, &options, count)?;
     let bytes = tree.to_bytes();
     let structure = device.upload("structure", &[&bytes[..], &GUARD].concat())?;
-    let scratch = device.upload("scratch", &vec![0xA5u8; refit.sizes().scratch as usize])?;
+    let scratch = device.upload("scratch", &vec![0xA5u8; refit.scratch_bytes() as usize])?;
     device.run(None, |recorder| refit.record(recorder, &input, structure.address(), scratch.address()))?;
     same("bytes behind the tree", &structure.read_at::<u8>(bytes.len() as u64, GUARD.len()), &GUARD.to_vec())?;
     let got = Bvh2::<Triangle>::from_bytes(&structure.read::<u8>(bytes.len()))?;

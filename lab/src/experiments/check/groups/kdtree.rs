@@ -7,9 +7,9 @@ use crate::experiments::check::shapes::{Corners, icosphere, placed, soup};
 use crate::experiments::check::twins::{PLENTY, PLENTY_TO_MERGE};
 use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
-use hedgerow::kdtree::builder::{Builder, Options, Report};
-use hedgerow::kdtree::layout::{Header, KdTree};
-use hedgerow::kdtree::merge::{self, Memory, Merger, Most, Object};
+use hedgerow::kdtree::builder::{KdBuilder, KdOptions, KdReport};
+use hedgerow::kdtree::layout::{KdHeader, KdTree};
+use hedgerow::kdtree::merge::{self, Memory, MergeCapacity, Merger, Object};
 use hedgerow::kdtree::twin;
 
 fn meshes(cases: &Cases<'_>) -> Vec<Mesh> {
@@ -28,37 +28,37 @@ pub fn build(cases: &mut Cases<'_>) {
     let cuts: &[(u32, u32)] = if cases.quick { &[(32, 32)] } else { &[(128, 32), (7, 4)] };
     for mesh in meshes(cases) {
         for &(bins, exact) in cuts {
-            let options = Options { bins, exact, estimate: Some(PLENTY), ..Options::DEFAULT };
+            let options = KdOptions { bins, exact, estimate: Some(PLENTY), ..KdOptions::DEFAULT };
             for &(schedule, workgroups) in schedules {
                 let what = format!("{}, {bins} bins, exact {exact}, {schedule}, {workgroups:?} workgroups", mesh.0);
-                let options = Options { schedule: Some(schedule), workgroups, ..options };
+                let options = KdOptions { schedule: Some(schedule), workgroups, ..options };
                 cases.case(what, |device| built_as_on_host(device, &mesh, &options));
             }
         }
     }
 }
 
-fn built_as_on_host(device: &Device, (_, positions, triangles): &Mesh, options: &Options) -> Found {
+fn built_as_on_host(device: &Device, (_, positions, triangles): &Mesh, options: &KdOptions) -> Found {
     let expected = twin::builder::build(positions, triangles, options)?;
     expected.validate()?;
     let (vertices, indices) = (device.upload("positions", positions)?, device.upload("indices", triangles)?);
     let count = triangles.len() as u32;
     let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), count);
-    let builder = Builder::new(device, options, count)?;
+    let builder = KdBuilder::new(device, options, count)?;
     let sizes = builder.sizes();
     // Whatever was there before changes nothing.
     let garbage = |bytes: u64| vec![0xA5u8; bytes as usize];
     let structure = device.upload("structure", &garbage(sizes.structure))?;
     let scratch = device.upload("scratch", &garbage(sizes.scratch))?;
     device.run(None, |recorder| builder.record(recorder, &input, structure.region(), scratch.region()))?;
-    let report: Report = scratch.read_at(builder.report_range().start, 1)[0];
+    let report: KdReport = scratch.read_at(builder.report_range().start, 1)[0];
     same("out of room", &(report.status & status::OUT_OF_ROOM), &0)?;
     compare(&KdTree::from_bytes(&structure.read::<u8>(sizes.structure as usize))?, &expected)
 }
 
 /// The header without what tells of room.
-fn without_room(header: &Header) -> Header {
-    Header { node_room: 0, reference_room: 0, record_room: 0, ..*header }
+fn without_room(header: &KdHeader) -> KdHeader {
+    KdHeader { node_room: 0, reference_room: 0, record_room: 0, ..*header }
 }
 
 fn compare(got: &KdTree, expected: &KdTree) -> Found {
@@ -92,11 +92,13 @@ pub fn merge(cases: &mut Cases<'_>) {
 }
 
 fn merged_as_on_host(device: &Device, still: &Corners, objects: &[Corners], schedule: Schedule) -> Found {
-    let options =
-        merge::Options { build: Options { schedule: Some(schedule), ..Options::DEFAULT }, estimate: PLENTY_TO_MERGE };
+    let options = merge::MergeOptions {
+        build: KdOptions { schedule: Some(schedule), ..KdOptions::DEFAULT },
+        estimate: PLENTY_TO_MERGE,
+    };
     let (_, positions, triangles) = corpus::soup("", still.clone());
     let meshes: Vec<Mesh> = objects.iter().map(|corners| corpus::soup("object", corners.clone())).collect();
-    let most = Most {
+    let most = MergeCapacity {
         objects: meshes.len() as u32,
         triangles: meshes.iter().map(|(_, _, triangles)| triangles.len() as u32).sum(),
     };
@@ -118,18 +120,18 @@ fn merged_as_on_host(device: &Device, still: &Corners, objects: &[Corners], sche
         let count = triangles.len() as u32;
         let input = Input::mesh(lists[0].address(), positions.len() as u32, lists[1].address(), count);
         given.push(Object { input, first_primitive, tree: None });
-        twins.push(twin::merge::Object { first_primitive, positions, triangles });
+        twins.push(twin::merge::HostObject { first_primitive, positions, triangles });
         buffers.push(lists);
         first_primitive += count;
     }
-    let Options { bins, exact, costs, .. } = options.build;
+    let KdOptions { bins, exact, costs, .. } = options.build;
     let expected = twin::merge::merge(&still, &twins, costs, (bins, exact))?;
     expected.validate()?;
 
     let memory = || Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
     let tree = || KdTree::from_bytes(&structure.read::<u8>(before.len()));
     device.run(None, |recorder| merger.record(recorder, memory(), &given))?;
-    let report: merge::Report = scratch.read_at(merger.report_range().start, 1)[0];
+    let report: merge::MergeReport = scratch.read_at(merger.report_range().start, 1)[0];
     same("out of room", &(report.status & status::OUT_OF_ROOM), &0)?;
     compare(&tree()?, &expected)?;
     device.run(None, |recorder| merger.restore(recorder, memory()))?;

@@ -6,10 +6,10 @@ use crate::experiments::check::corpus;
 use crate::experiments::check::shapes::{hard_rays, icosphere, tree_with};
 use crate::experiments::check::twins::{compare, on_device, on_host};
 use crate::random::SplitMix64;
-use hedgerow::bvh::builder::Options;
+use hedgerow::bvh::builder::BuildOptions;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::tracer::{self, Buffers, Shape};
+use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray};
 use rayon::prelude::*;
@@ -39,7 +39,7 @@ pub fn large(cases: &mut Cases<'_>) {
     cases.case(format!("bounds of {count} boxes"), |device| reduction_is_right(device, &boxes));
     let triangles = count.min(WORKGROUPS * 64 + 1);
     let mesh = corpus::random(&format!("{triangles} triangles"), triangles, [-0.5; 3], [1.0; 3]);
-    let options = Options { codes: Some(Code::Mc63.full()), ..Options::DEFAULT };
+    let options = BuildOptions { codes: Some(Code::Mc63.full()), ..BuildOptions::DEFAULT };
     cases.case(format!("{triangles} triangles"), |device| {
         compare(&on_device(device, &mesh, &options), &on_host(&mesh, &options))
     });
@@ -50,7 +50,7 @@ pub fn large(cases: &mut Cases<'_>) {
 fn many_rays(cases: &mut Cases<'_>) {
     let corners = icosphere(2);
     let tree = tree_with(&corners, Collapse::SAH);
-    let shape = Shape::of(cases.device);
+    let shape = TraceShape::of(cases.device);
     let count = WORKGROUPS * if cases.quick { 1 } else { shape.workgroup as usize } + 1;
     let some = hard_rays(&corners, 5000, 1.0, [0.0; 3], 6);
     let rays: Vec<Ray> = some.iter().copied().cycle().take(count).collect();
@@ -59,7 +59,7 @@ fn many_rays(cases: &mut Cases<'_>) {
         let ray_buffer = device.upload("rays", &rays)?;
         let hits = device.buffer("hits", (size_of::<Hit>() * rays.len()) as u64)?;
         let (structure, count) = (structure.address(), rays.len() as u32);
-        let buffers = Buffers { structure, rays: ray_buffer.address(), hits: hits.address(), work: None, count };
+        let buffers = TraceBuffers { structure, rays: ray_buffer.address(), hits: hits.address(), work: None, count };
         device.run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers))?;
         let expected: Vec<Hit> = some.par_iter().map(|ray| host::closest_hit(&tree, ray)).collect();
         let expected: Vec<Hit> = expected.into_iter().cycle().take(rays.len()).collect();

@@ -11,7 +11,7 @@ use crate::experiments::check::shapes::{boxes, soup};
 use crate::experiments::check::world::{BuiltWorld, Part, World};
 use crate::random::SplitMix64;
 use ash::vk::{self, Handle};
-use hedgerow::accel::{Instance, Options, Property, REBRAID, twin};
+use hedgerow::accel::{AccelOptions, Instance, Property, REBRAID, twin};
 use hedgerow::bvh::layout::{self, Bvh2, Record, Triangle};
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 use vk::CopyAccelerationStructureModeKHR as Mode;
@@ -202,7 +202,7 @@ pub fn copies(cases: &mut Cases<'_>) {
         cases.case(format!("{count} instances"), |device| {
             let ours = Ours::on(device);
             let built = world.build(&ours);
-            copies_are_those_of_the_host::<layout::Instance>(&ours, &built.top)?;
+            copies_are_those_of_the_host::<layout::InstanceRecord>(&ours, &built.top)?;
             let rays = rays(200, 8.0);
             let before = ours.probe(built.top.structure, &rays);
             let bytes = size_after(&ours, built.top.structure, Property::CompactedSize)?;
@@ -237,7 +237,7 @@ pub fn rebraid(cases: &mut Cases<'_>) {
         for flags in [REBRAID, Flags::empty()] {
             let world = World { flags, ..mixture(count, count as u64) };
             cases.case(format!("{count} instances, budget {budget}, {flags:?}"), |device| {
-                let options = Options { rebraid_budget: budget, ..Options::DEFAULT };
+                let options = AccelOptions { rebraid_budget: budget, ..AccelOptions::DEFAULT };
                 let read = ReadBack::new(&Ours::with_options(device, options), &world);
                 let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &options);
                 same("header", &read.top.header, &expected.header)?;

@@ -7,7 +7,7 @@ use crate::experiments::check::corpus::unit_floats;
 use crate::random::SplitMix64;
 use crate::shaders;
 use hedgerow::gpu::Kernel;
-use hedgerow::gpu::radix_sort::{self, Shape, Sort};
+use hedgerow::gpu::radix_sort::{self, Sort, SortShape};
 use hedgerow::gpu::reduce::{Bounds, Reduction};
 use hedgerow::gpu::scan::{self, Scan};
 
@@ -67,7 +67,7 @@ pub(super) fn scan_is_right(device: &Device, words: &[u32]) -> Found {
     let sums = device.buffer("sums", 4 * u64::from(scan.sums_words()))?;
     let (expected, expected_total) = hedgerow::gpu::twin::scan::exclusive(words);
     for results in [&to, &from] {
-        let buffers = scan::Buffers { values: from.address(), results: results.address(), sums: sums.address() };
+        let buffers = scan::ScanBuffers { values: from.address(), results: results.address(), sums: sums.address() };
         device.run(None, |r| scan.record(r, &buffers))?;
         same("total", &sums.read_at::<u32>(4 * u64::from(scan.sums_words() - 1), 1)[0], &expected_total)?;
         same_all("word", &results.read::<u32>(words.len()), &expected)?;
@@ -106,8 +106,8 @@ pub(super) fn sort_is_right(device: &Device, keys: &[u64], bits: u32) -> Found {
     let values: Vec<u32> = (0..keys.len() as u32).rev().collect();
     let expected = hedgerow::gpu::twin::radix_sort::sort(&keys, &values, bits);
     for (name, shape) in [
-        ("strips", Shape::strips(&device.limits)),
-        ("tiles", Shape::tiles(&device.limits)),
+        ("strips", SortShape::strips(&device.limits)),
+        ("tiles", SortShape::tiles(&device.limits)),
         ("tuned", device.tuning.sort),
     ] {
         let (keys, values) = sorted(device, &shape, &keys, &values, bits)?;
@@ -119,7 +119,7 @@ pub(super) fn sort_is_right(device: &Device, keys: &[u64], bits: u32) -> Found {
 
 fn sorted(
     device: &Device,
-    shape: &Shape,
+    shape: &SortShape,
     keys: &[u64],
     values: &[u32],
     bits: u32,
@@ -130,7 +130,7 @@ fn sorted(
     let second = device.buffer("keys", 8 * u64::from(count))?;
     let values = [device.upload("values", values)?, device.buffer("values", 4 * u64::from(count))?];
     let table = device.buffer("table", 4 * shape.table_words(count))?;
-    let buffers = radix_sort::Buffers {
+    let buffers = radix_sort::SortBuffers {
         keys: [first.address(), second.address()],
         values: [values[0].address(), values[1].address()],
         table: table.address(),

@@ -11,15 +11,15 @@ use hedgerow::bvh::wide::Form;
 use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::kdtree::layout::KdTree;
-use hedgerow::trace::kd::Tracer as KdTracer;
+use hedgerow::trace::kd::KdTracer;
 use hedgerow::trace::kd::Traversal;
-use hedgerow::trace::tracer::{self, Loads, Shape};
+use hedgerow::trace::tracer::{self, Loads, TraceShape};
 use hedgerow::trace::twin::kd as kd_host;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
-use hedgerow::trace::wide::{Order, Tracer};
+use hedgerow::trace::wide::{Order, WideTracer};
 use hedgerow::trace::{Hit, Query, Ray, Work};
-use hedgerow_host::kdtree::{self as kd_builder, Options as KdOptions};
+use hedgerow_host::kdtree::{self as kd_builder, HostKdOptions as KdOptions};
 use rayon::prelude::*;
 
 const QUERIES: [Query; 2] = [Query::ClosestHit, Query::AnyHit];
@@ -79,16 +79,16 @@ fn as_by_brute_force(tree: &Bvh2, rays: &[Ray], query: Query, hits: &[(Hit, Work
 }
 
 /// The default, and cut as for the other kind of device.
-fn shapes(device: &Device, quick: bool) -> Vec<Shape> {
+fn shapes(device: &Device, quick: bool) -> Vec<TraceShape> {
     let limits = &device.limits;
-    let mut shapes = vec![Shape::of(device), Shape::subgroups(limits), Shape::groups(limits)];
+    let mut shapes = vec![TraceShape::of(device), TraceShape::subgroups(limits), TraceShape::groups(limits)];
     let lanes = limits.subgroup_size;
     if !quick {
-        let few = Shape { workgroup: 4 * lanes, shared_levels: 3, rays_each: 5, loads: Loads::Gathered };
-        shapes.push(Shape { workgroup: lanes, shared_levels: 0, rays_each: 1, loads: Loads::Gathered });
+        let few = TraceShape { workgroup: 4 * lanes, shared_levels: 3, rays_each: 5, loads: Loads::Gathered };
+        shapes.push(TraceShape { workgroup: lanes, shared_levels: 0, rays_each: 1, loads: Loads::Gathered });
         shapes.extend((few.workgroup <= limits.workgroup_invocations).then_some(few));
     }
-    let mut different: Vec<Shape> = Vec::new();
+    let mut different: Vec<TraceShape> = Vec::new();
     for shape in shapes {
         if !different.contains(&shape) {
             different.push(shape);
@@ -120,14 +120,14 @@ pub fn binary(cases: &mut Cases<'_>) {
 }
 
 /// The default, and others that its form has.
-fn wide_tracers(device: &Device, form: Form, quick: bool) -> Vec<Tracer> {
+fn wide_tracers(device: &Device, form: Form, quick: bool) -> Vec<WideTracer> {
     let limits = &device.limits;
-    let mut tracers = vec![Tracer::of(device, form)];
+    let mut tracers = vec![WideTracer::of(device, form)];
     let orders: &[Order] = if form.is_quantised() { &[Order::Distance, Order::Octant] } else { &[Order::Distance] };
     for &order in orders {
-        let all = [Shape::groups(limits), Shape::subgroups(limits)];
+        let all = [TraceShape::groups(limits), TraceShape::subgroups(limits)];
         let all = all.into_iter().take(if quick { 1 } else { 2 });
-        tracers.extend(all.map(|shape| Tracer::with(limits, form, order, shape)));
+        tracers.extend(all.map(|shape| WideTracer::with(limits, form, order, shape)));
     }
     tracers
 }
