@@ -52,7 +52,7 @@ pub(super) enum Kind {
     KdHost(fn(&Spec) -> Result<hedgerow_host::kdtree::HostKdOptions>),
     /// A kd-tree by ours on the device.
     KdGpu,
-    /// The one of ours on the device that the table of costs makes least.
+    /// The one of ours on the device that is expected to take least, by the table of costs.
     Auto,
     /// The Vulkan driver's own.
     Driver(DriverPreference),
