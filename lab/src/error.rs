@@ -31,7 +31,7 @@ pub enum Error {
     #[error("no Vulkan: {0}; install a Vulkan driver (on Debian: libvulkan1 and mesa-vulkan-drivers)")]
     NoVulkan(String),
     /// The device asked for does not exist.
-    #[error("no device is called {asked:?}; there are: {available}; choose one with --device or HEDGEROW_DEVICE")]
+    #[error("unknown device {asked:?}; there are: {available}; choose one with --device or HEDGEROW_DEVICE")]
     NoSuchDevice {
         /// What was asked for.
         asked: String,

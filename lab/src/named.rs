@@ -27,7 +27,7 @@ macro_rules! named {
             fn from_str(name: &str) -> $crate::Result<$type> {
                 $type::ALL.into_iter().find(|value| value.name() == name).ok_or_else(|| {
                     let names = $type::ALL.map($type::name).join(", ");
-                    $crate::Error::Argument(format!("no {} is called {name:?}; there are {names}", $what))
+                    $crate::Error::Argument(format!("unknown {} {name:?}; use one of {names}", $what))
                 })
             }
         }

@@ -1,11 +1,14 @@
-//! Wavefront OBJ: the lines `v`, `f` and `o`; all others make no triangle.
+//! Wavefront OBJ, by tobj.
 //!
-//! No crate reads it, for those that do name no line where a file breaks a rule, and fail on what does not matter here (a normal
-//! out of range, colours on some vertices only, Latin-1 in a comment).
+//! Two things keep us from handing the file to tobj as it is. It takes more than faces for triangles (an `l` of three points,
+//! a comment behind a face) and fails on what does not matter here (a normal out of range, colours on some vertices only,
+//! Latin-1 in a comment), so that [`Screen`] lets pass `v`, `f` and `o` alone. And its errors carry no line: where it fails,
+//! [`diagnose`] goes through the file again and names the first line that breaks a rule.
 
 use super::{LoadOptions, Mesh, source};
 use crate::{Error, Result};
 use std::borrow::Cow;
+use std::io::{self, BufRead, Read};
 use std::path::Path;
 
 /// Reads an OBJ file as one mesh; `o` and `g` mean nothing. Vertices that no face uses are left out.
@@ -27,16 +30,42 @@ enum Objects {
 
 fn parse(path: &Path, options: &LoadOptions<'_>, objects: Objects) -> Result<Vec<(String, Mesh)>> {
     let text = source::bytes(path, options)?;
-    let mut reading = Reading {
-        vertices: lines(&text).filter(|(_, line)| split(line).0 == "v").count(),
-        positions: Vec::new(),
-        objects: vec![(UNNAMED.into(), Vec::new())],
-    };
-    for (number, line) in lines(&text) {
-        let fault = |what: String| Error::Malformed(format!("{}:{number}: {what}", path.display()));
-        reading.line(&line, objects).map_err(fault)?;
+    // A single index would split a vertex wherever its normal changes.
+    let tobj_options = tobj::LoadOptions { single_index: false, triangulate: false, ..tobj::LoadOptions::default() };
+    let mut screen = Screen::new(&text, objects);
+    let no_materials = |_: &Path| Ok(Default::default());
+    let parsed = tobj::load_obj_buf(&mut screen, &tobj_options, no_materials);
+    let fault =
+        |what: &str| diagnose(path, &text).unwrap_or_else(|| malformed(path, format!("{what}; export it again")));
+    let (models, _) = parsed.map_err(|error| fault(&error.to_string()))?;
+    models.into_iter().map(|model| Ok((model.name, mesh(model.mesh).map_err(fault)?))).collect()
+}
+
+/// Fans polygons out from their first vertex. The error says what is wrong, not where.
+fn mesh(mesh: tobj::Mesh) -> Result<Mesh, &'static str> {
+    let positions: Vec<[f32; 3]> = mesh.positions.as_chunks().0.to_vec();
+    if positions.iter().flatten().any(|c| !c.is_finite()) {
+        return Err("a vertex is not finite");
     }
-    Ok(reading.meshes())
+    if mesh.face_arities.is_empty() {
+        return Ok(Mesh { positions, triangles: mesh.indices.as_chunks().0.to_vec() });
+    }
+    let mut triangles = Vec::with_capacity(mesh.indices.len());
+    let mut rest = mesh.indices.as_slice();
+    for arity in mesh.face_arities {
+        let (polygon, others) = rest.split_at(arity as usize);
+        rest = others;
+        let [first, fan @ ..] = polygon else { return Err("a face has no vertices") };
+        if fan.len() < 2 {
+            return Err("a face has fewer than three vertices");
+        }
+        triangles.extend(fan.windows(2).map(|edge| [*first, edge[0], edge[1]]));
+    }
+    Ok(Mesh { positions, triangles })
+}
+
+fn malformed(path: &Path, what: String) -> Error {
+    Error::Malformed(format!("{}: {what}", path.display()))
 }
 
 /// The lines of a file with their numbers from 1; a backslash at the end of a line joins it with the next.
@@ -53,115 +82,152 @@ fn lines(text: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     })
 }
 
-/// The keyword of a line, and what is behind it.
-fn split(line: &str) -> (&str, &str) {
-    let line = line.trim_start();
-    line.split_once(char::is_whitespace).unwrap_or((line, ""))
+/// What a line means to us.
+enum Line<'a> {
+    /// Its coordinates; a weight may follow.
+    Vertex(&'a str),
+    /// Its vertices.
+    Face(&'a str),
+    /// A new object.
+    Object(&'a str),
+    /// Something that makes no triangle.
+    Other,
 }
 
-/// What an object without a name is called.
-const UNNAMED: &str = "unnamed_object";
-
-/// A file while its lines are read.
-struct Reading {
-    /// Of the whole file: faces may name vertices that follow.
-    vertices: usize,
-    positions: Vec<[f32; 3]>,
-    objects: Vec<(String, Vec<[u32; 3]>)>,
-}
-
-impl Reading {
-    /// The error says what is wrong, not where.
-    fn line(&mut self, line: &str, objects: Objects) -> Result<(), String> {
-        let (keyword, rest) = split(line);
-        let numbers = || rest.split_once('#').map_or(rest, |(before, _)| before).split_whitespace();
+impl Line<'_> {
+    fn of(line: &str) -> Line<'_> {
+        let line = line.trim_start();
+        let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let without_comment = || rest.split_once('#').map_or(rest, |(before, _)| before);
         match keyword {
-            "v" => self.positions.push(vertex(numbers().collect())?),
-            "f" => {
-                let corners = numbers().map(|word| self.corner(word)).collect::<Result<Vec<u32>, String>>()?;
-                let [first, fan @ ..] = &corners[..] else { return Err(too_few(0)) };
-                if fan.len() < 2 {
-                    return Err(too_few(corners.len()));
-                }
-                // Polygons are fanned out from their first vertex.
-                let (_, triangles) = self.objects.last_mut().expect("there is one from the beginning");
-                triangles.extend(fan.windows(2).map(|edge| [*first, edge[0], edge[1]]));
-            }
-            "o" if objects == Objects::Named => {
-                // One without a face is none.
-                self.objects.pop_if(|(_, triangles)| triangles.is_empty());
-                let name = if rest.trim().is_empty() { UNNAMED } else { rest.trim() };
-                self.objects.push((name.to_owned(), Vec::new()));
-            }
-            _ => {}
-        }
-        Ok(())
-    }
-
-    /// The vertex that a corner of a face names.
-    fn corner(&self, word: &str) -> Result<u32, String> {
-        let wrong = || format!("{word:?} is not a vertex of a face; repair or export the file again");
-        let (before, vertices) = (self.positions.len() as i64, self.vertices as i64);
-        let mut parts = word.split('/');
-        let index: i64 = parts.next().unwrap_or_default().parse().map_err(|_| wrong())?;
-        if parts.clone().count() > 2 || !parts.all(|part| part.is_empty() || part.parse::<isize>().is_ok()) {
-            return Err(wrong());
-        }
-        match index {
-            0 => Err("face names vertex 0, vertices count from 1; add 1 to every index".into()),
-            _ if index > vertices => Err(format!("face names vertex {index}, the file has {vertices}; is it cut off?")),
-            _ if index < -before => {
-                Err(format!("face names vertex {index}, above it are {before}; is the head of the file missing?"))
-            }
-            1.. => Ok((index - 1) as u32),
-            _ => Ok((before + index) as u32),
+            "v" => Line::Vertex(without_comment()),
+            "f" => Line::Face(without_comment()),
+            "o" => Line::Object(rest),
+            _ => Line::Other,
         }
     }
+}
 
-    /// Each object with the vertices that it uses, in the order in which it does.
-    fn meshes(self) -> Vec<(String, Mesh)> {
-        const UNUSED: u32 = u32::MAX;
-        let mut new_indices = vec![UNUSED; self.positions.len()];
-        let mesh = |(name, mut triangles): (String, Vec<[u32; 3]>)| {
-            let mut used = Vec::new();
-            for corner in triangles.iter_mut().flatten() {
-                let new = &mut new_indices[*corner as usize];
-                if *new == UNUSED {
-                    *new = used.len() as u32;
-                    used.push(*corner as usize);
+/// The coordinates of a vertex line, and its weight if it has exactly one number more; more than that are colours.
+fn coordinates(vertex: &str) -> impl Iterator<Item = &str> {
+    let numbers = vertex.split_whitespace().count();
+    vertex.split_whitespace().take(if numbers == 4 { 4 } else { 3 })
+}
+
+/// The lines of a file that matter, as tobj reads them.
+struct Screen<L> {
+    lines: L,
+    objects: Objects,
+    line: Vec<u8>,
+    at: usize,
+}
+
+impl Screen<()> {
+    fn new(text: &[u8], objects: Objects) -> Screen<impl Iterator<Item = (usize, Cow<'_, str>)>> {
+        Screen { lines: lines(text), objects, line: Vec::new(), at: 0 }
+    }
+}
+
+impl<'a, L: Iterator<Item = (usize, Cow<'a, str>)>> BufRead for Screen<L> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        while self.at == self.line.len() {
+            let Some((_, line)) = self.lines.next() else { break };
+            self.at = 0;
+            self.line.clear();
+            match Line::of(&line) {
+                Line::Vertex(vertex) => {
+                    self.line.push(b'v');
+                    for number in coordinates(vertex) {
+                        self.line.push(b' ');
+                        self.line.extend_from_slice(number.as_bytes());
+                    }
+                    self.line.push(b'\n');
                 }
-                *corner = *new;
+                Line::Face(face) => self.line.extend_from_slice(format!("f {face}\n").as_bytes()),
+                Line::Object(name) if self.objects == Objects::Named => {
+                    self.line.extend_from_slice(format!("o {name}\n").as_bytes());
+                }
+                Line::Object(_) | Line::Other => {}
             }
-            used.iter().for_each(|&old| new_indices[old] = UNUSED);
-            let positions = used.into_iter().map(|old| self.positions[old]).collect();
-            (name, Mesh { positions, triangles })
+        }
+        Ok(&self.line[self.at..])
+    }
+
+    fn consume(&mut self, bytes: usize) {
+        self.at += bytes;
+    }
+}
+
+impl<'a, L: Iterator<Item = (usize, Cow<'a, str>)>> Read for Screen<L> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.fill_buf()?.read(buffer)?;
+        self.consume(read);
+        Ok(read)
+    }
+}
+
+/// The first line that breaks a rule.
+fn diagnose(path: &Path, text: &[u8]) -> Option<Error> {
+    let vertices = lines(text).filter(|(_, line)| matches!(Line::of(line), Line::Vertex(_))).count();
+    let mut before = 0;
+    lines(text).find_map(|(number, line)| {
+        let fault = match Line::of(&line) {
+            Line::Vertex(vertex) => {
+                before += 1;
+                vertex_fault(vertex)
+            }
+            Line::Face(face) => face_fault(face, before, vertices),
+            Line::Object(_) | Line::Other => None,
         };
-        self.objects.into_iter().map(mesh).collect()
-    }
+        fault.map(|fault| Error::Malformed(format!("{}:{number}: {fault}", path.display())))
+    })
 }
 
-/// The position of a vertex line. With exactly one number more, that is a weight; more than that are colours.
-fn vertex(mut words: Vec<&str>) -> Result<[f32; 3], String> {
-    words.truncate(if words.len() == 4 { 4 } else { 3 });
+fn vertex_fault(vertex: &str) -> Option<String> {
+    let words: Vec<&str> = coordinates(vertex).collect();
     if words.len() < 3 {
-        return Err(format!("vertex has {} coordinates, it needs 3; is the file cut off?", words.len()));
+        return Some(format!("vertex has {} coordinates, it needs 3; is the file cut off?", words.len()));
     }
-    let mut numbers = [1.0_f32; 4];
-    for (number, word) in numbers.iter_mut().zip(&words) {
-        *number = word.parse().map_err(|_| format!("{word:?} is not a number; repair or export the file again"))?;
+    let mut numbers = Vec::new();
+    for word in &words {
+        match word.parse::<f32>() {
+            Ok(number) => numbers.push(number),
+            Err(_) => return Some(format!("{word:?} is not a number; repair or export the file again")),
+        }
     }
-    let [x, y, z, weight] = numbers;
-    let position = [x, y, z].map(|coordinate| coordinate / weight);
-    if weight == 0.0 || !numbers.iter().chain(&position).all(|n| n.is_finite()) {
+    let weight = numbers.get(3).copied().unwrap_or(1.0);
+    let finite =
+        weight != 0.0 && numbers.iter().all(|n| n.is_finite()) && numbers.iter().all(|n| (n / weight).is_finite());
+    (!finite).then(|| {
         let written = words.join(", ");
-        return Err(format!(
-            "vertex ({written}) is not finite, every coordinate must be; repair or export the file again"
-        ));
-    }
-    Ok(position)
+        format!("vertex ({written}) is not finite, every coordinate must be; repair or export the file again")
+    })
 }
 
-fn too_few(corners: usize) -> String {
+/// `before` vertices stand above the face, `vertices` in the whole file.
+fn face_fault(face: &str, before: usize, vertices: usize) -> Option<String> {
+    let mut corners = 0;
+    for corner in face.split_whitespace() {
+        corners += 1;
+        let mut parts = corner.split('/');
+        let position = parts.next().unwrap_or_default();
+        if parts.clone().count() > 2 || !parts.all(|part| part.is_empty() || part.parse::<isize>().is_ok()) {
+            return Some(format!("{corner:?} is not a vertex of a face; repair or export the file again"));
+        }
+        match position.parse::<i64>() {
+            Err(_) => return Some(format!("{corner:?} is not a vertex of a face; repair or export the file again")),
+            Ok(0) => return Some("face names vertex 0, vertices count from 1; add 1 to every index".into()),
+            Ok(index) if index > vertices as i64 => {
+                return Some(format!("face names vertex {index}, the file has {vertices}; is it cut off?"));
+            }
+            Ok(index) if index < -(before as i64) => {
+                return Some(format!(
+                    "face names vertex {index}, above it are {before}; is the head of the file missing?"
+                ));
+            }
+            Ok(_) => {}
+        }
+    }
     let needs = "a face needs at least 3; remove it (points and lines are `p` and `l`), or is the file cut off?";
-    format!("face has {corners} vertices, {needs}")
+    (corners < 3).then(|| format!("face has {corners} vertices, {needs}"))
 }

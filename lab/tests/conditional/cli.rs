@@ -87,7 +87,7 @@ fn devices_are_listed_and_one_is_marked() {
 fn a_device_that_is_not_there_is_told_with_those_that_are() {
     for arguments in [&["devices", "--device", "nope"][..], &["--device", "nope", "devices"]] {
         let message = fails(FAILED, arguments);
-        assert!(message.contains("no device is called \"nope\"; there are: 0: "), "{message}");
+        assert!(message.contains("unknown device \"nope\"; there are: 0: "), "{message}");
     }
 }
 
@@ -252,14 +252,14 @@ fn render_shows_a_dynamic_scene_at_a_time_or_in_a_frame() {
 fn wrong_arguments_end_with_2_and_say_what_is_right() {
     for (arguments, says) in [
         (&["build", "gen:grid:2"][..], "--builder"),
-        (&["build", "gen:grid:2", "-b", "lvbh"], "no builder is called \"lvbh\"; there are"),
+        (&["build", "gen:grid:2", "-b", "lvbh"], "unknown builder \"lvbh\"; use one of"),
         (&["build", "gen:grid:2", "-b", "lbvh-host:radius=2"], "has no option \"radius\""),
         (&["build", "gen:cube:2", "-b", "lbvh-host"], "there is no such generator; there are gen:icosphere:N"),
         (&["build", "gen:grid:2", "-b", "lbvh-host", "--runs", "0"], "--runs"),
         (&["build", "gen:grid:2", "-b", "lbvh-host", "--costs", "3"], "write C_T,C_I"),
         (
             &["trace", "gen:grid:2", "-b", "lbvh-host", "--rays", "light"],
-            "no kind of ray is called \"light\"; there are primary",
+            "unknown kind of ray \"light\"; use one of primary",
         ),
         (&["trace", "gen:grid:2", "-b", "lbvh-host", "--size", "640"], "write WxH"),
         (&["trace", "gen:grid:2", "-b", "lbvh-host", "--rays-file", "x"], "--hits-file"),
@@ -307,7 +307,7 @@ fn scenes_are_found_by_name_in_the_folder_that_is_given() {
 
 fn a_device_a_driver_file_and_a_tuning_that_do_not_exist_are_named() {
     for (variable, value, message) in [
-        ("HEDGEROW_DEVICE", "nonsense", "no device is called \"nonsense\"; there are: 0: "),
+        ("HEDGEROW_DEVICE", "nonsense", "unknown device \"nonsense\"; there are: 0: "),
         ("HEDGEROW_TUNING", "nonsense", "there is no tuning \"nonsense\"; take auto, cpu or gpu"),
         ("VK_DRIVER_FILES", "/nonexistent/icd.json", "VK_DRIVER_FILES names /nonexistent/icd.json, which is not there"),
     ] {

@@ -96,7 +96,7 @@ fn pages_of_two_scenes_name_each_other() {
 
 fn what_cannot_be_drawn_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for (builders, says) in [("lvbh", "no builder is called \"lvbh\""), ("kd-binned:bins=1", "bins=1 is unknown")] {
+    for (builders, says) in [("lvbh", "unknown builder \"lvbh\""), ("kd-binned:bins=1", "bins=1 is unknown")] {
         let output = navigate("gen:icosphere:1", builders, folder.path());
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && said.contains(says), "{said}");

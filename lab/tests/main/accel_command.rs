@@ -94,8 +94,8 @@ fn one_experiment_is_measured_alone() {
 fn wrong_arguments_are_told_apart_from_failed_work() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (wrong, says) in [
-        (&["--experiments", "hedge"][..], "no experiment is called \"hedge\"; there are batch, tlas, rebraid, update"),
-        (&["--rays", "light"], "no kind of ray is called \"light\""),
+        (&["--experiments", "hedge"][..], "unknown experiment \"hedge\"; use one of batch, tlas, rebraid, update"),
+        (&["--rays", "light"], "unknown kind of ray \"light\""),
         (&["--runs", "0"], "--runs"),
         (&["--structures", "0"], "--structures"),
         (&["--size", "640"], "write WxH"),

@@ -151,7 +151,7 @@ fn what_cannot_be_animated_is_refused_with_the_remedy() {
     let scene = scene_in(folder.path(), SCENE);
     for (wrong, status, says) in [
         (&["gen:icosphere:1"][..], 1, "nothing in it moves; take a .dyn or .anim file"),
-        (&[&scene, "--ways", "rebuild,fly"], 2, "no way is called \"fly\"; there are rebuild, two-trees"),
+        (&[&scene, "--ways", "rebuild,fly"], 2, "unknown way \"fly\"; use one of rebuild, two-trees"),
         (&[&scene, "--ways", "merge,merge"], 2, "--ways names merge twice"),
         (&[&scene, "--frames", "4..9"], 2, "--frames 4..9: hop has 6, counted from 0"),
         (&[&scene, "--frames", "9..4"], 2, "\"9..4\" are no frames"),

@@ -74,5 +74,5 @@ fn what_is_not_there_is_named() {
     assert!(err(&done).contains("there is no group \"nonsense\"") && err(&done).contains("kd-merge"), "{}", err(&done));
     let done = check(&["--device", "no such device"], "");
     assert_eq!(done.status.code(), Some(1));
-    assert!(err(&done).contains("no device is called \"no such device\""), "{}", err(&done));
+    assert!(err(&done).contains("unknown device \"no such device\""), "{}", err(&done));
 }

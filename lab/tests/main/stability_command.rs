@@ -134,14 +134,14 @@ fn wrong_arguments_are_told_apart_from_failed_work() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (wrong, says) in [
         (&["hedge"][..], "unrecognized subcommand"),
-        (&["growth", "-b", "lvbh"], "no builder is called \"lvbh\""),
+        (&["growth", "-b", "lvbh"], "unknown builder \"lvbh\""),
         (&["growth", "--axes", "2"], "take 1 or 3"),
         (&["growth", "--sides", "left"], "take + or -"),
         (&["growth", "--steps", "60/0"], "LAST/STEP"),
-        (&["growth", "--rays", "light"], "no kind of ray is called \"light\""),
+        (&["growth", "--rays", "light"], "unknown kind of ray \"light\""),
         (&["large", "--placements", "roof"], "wall, walls, outward"),
         (&["large", "--counts", "0"], "--counts"),
-        (&["degenerate", "hedge"], "no degenerate scene is called \"hedge\"; there are empty, one"),
+        (&["degenerate", "hedge"], "unknown degenerate scene \"hedge\"; use one of empty, one"),
         (&["degenerate", "--builds", "0"], "--builds"),
     ] {
         let done = hedgerow(&[&["stability"], wrong].concat(), folder.path());

@@ -199,7 +199,7 @@ fn run_degenerate(common: &Common, arguments: &Degenerate) -> anyhow::Result<()>
     if let Some(unknown) = arguments.scenes.iter().find(|name| scenes.iter().all(|scene| scene.name != **name)) {
         let names: Vec<&str> = scenes.iter().map(|scene| scene.name).collect();
         return Err(crate::Error::Argument(format!(
-            "no degenerate scene is called {unknown:?}; there are {}",
+            "unknown degenerate scene {unknown:?}; use one of {}",
             names.join(", ")
         ))
         .into());

@@ -184,7 +184,7 @@ impl FromStr for Spec {
         let name = parts.next().unwrap_or_default();
         let builder = BUILDERS.iter().find(|b| b.name == name).ok_or_else(|| {
             let names: Vec<_> = BUILDERS.iter().map(|b| b.name).collect();
-            Error::Argument(format!("no builder is called {name:?}; there are {}, or all", names.join(", ")))
+            Error::Argument(format!("unknown builder {name:?}; use one of {}, or all", names.join(", ")))
         })?;
         let mut spec = Spec { name: name.to_owned(), options: Vec::new() };
         for part in parts {
@@ -306,7 +306,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named_with_what_there_is() {
-        assert!(error_of("lvbh").contains("no builder is called \"lvbh\"; there are"));
+        assert!(error_of("lvbh").contains("unknown builder \"lvbh\"; use one of"));
         assert!(error_of("lbvh-host:codes=mc31").contains("emc64var-nosize"));
         assert!(error_of("lbvh-host:collapse=maybe").contains("use sah or off"));
         assert!(error_of("lbvh:width=3").contains("width=3 is unknown; use 2, 4, 8 or 8q"));
