@@ -266,7 +266,7 @@ fn wrong_arguments_end_with_2_and_say_what_is_right() {
         (&["trace", "gen:grid:2", "-b", "lbvh-host", "--any-hit"], "--rays-file"),
         (&["rays", "gen:grid:2", "--kind", "primary"], "--output"),
         (&["render", "gen:grid:2", "-b", "lbvh-host", "-o", "a.jpg"], "a.jpg: pictures are PNG files"),
-        (&["render", "gen:grid:2", "-b", "lbvh-host", "-o", "a.png", "--view", "colour"], "there are shaded, normals"),
+        (&["render", "gen:grid:2", "-b", "lbvh-host", "-o", "a.png", "--view", "colour"], "use one of shaded, normals"),
         (
             &["render", "gen:grid:2", "-b", "lbvh-host", "-o", "a.png", "--view", "planes"],
             "lbvh-host builds no kd-tree, so there are no planes to see; choose kd-exact or kd-binned",

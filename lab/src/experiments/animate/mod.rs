@@ -300,7 +300,7 @@ mod tests {
             assert_eq!(way.name().parse::<Way>().expect("a way"), way);
             assert_eq!(serde_json::to_value(way).expect("JSON"), way.name());
         }
-        assert!("two".parse::<Way>().expect_err("no way").to_string().contains("there are rebuild, two-trees"));
+        assert!("two".parse::<Way>().expect_err("no way").to_string().contains("use one of rebuild, two-trees"));
     }
 
     #[test]

@@ -346,6 +346,6 @@ mod tests {
         for view in View::ALL {
             assert_eq!(view.name().parse::<View>().expect("a view"), view);
         }
-        assert!("colour".parse::<View>().expect_err("no view").to_string().contains("there are shaded, normals"));
+        assert!("colour".parse::<View>().expect_err("no view").to_string().contains("use one of shaded, normals"));
     }
 }
