@@ -3,10 +3,10 @@
 //!
 //! ```no_run
 //! # use hedgerow::gpu::Recorder;
-//! # use hedgerow::trace::{Query, kd::{Tracer, Traversal}, tracer::TraceBuffers};
+//! # use hedgerow::trace::{Query, kd::{KdTracer, Traversal}, tracer::TraceBuffers};
 //! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: u64, hits: u64) -> hedgerow::Result<()> {
-//! let tracer = Tracer::new(recorder.context(), Traversal::short_stack_with_push_down(4));
-//! tracer.record(recorder, Query::ClosestHit, &Buffers { structure, rays, hits, work: None, count: 1 << 20 })?;
+//! let tracer = KdTracer::new(recorder.context(), Traversal::short_stack_with_push_down(4));
+//! tracer.record(recorder, Query::ClosestHit, &TraceBuffers { structure, rays, hits, work: None, count: 1 << 20 })?;
 //! recorder.barrier();
 //! # Ok(())
 //! # }

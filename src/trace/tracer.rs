@@ -1,10 +1,10 @@
 //! The tracer on the device: rays in, hits out, recorded into the caller's command buffer.
 //!
 //! ```no_run
-//! # use hedgerow::{gpu::Recorder, trace::{Query, tracer::{self, Buffers, Shape}}};
+//! # use hedgerow::{gpu::Recorder, trace::{Query, tracer::{self, TraceBuffers, TraceShape}}};
 //! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: u64, hits: u64) -> hedgerow::Result<()> {
-//! let shape = Shape::of(recorder.context());
-//! tracer::record(recorder, &shape, Query::ClosestHit, &Buffers { structure, rays, hits, work: None, count: 1 << 20 })?;
+//! let shape = TraceShape::of(recorder.context());
+//! tracer::record(recorder, &shape, Query::ClosestHit, &TraceBuffers { structure, rays, hits, work: None, count: 1 << 20 })?;
 //! recorder.barrier();
 //! # Ok(())
 //! # }

@@ -35,15 +35,15 @@ use tree::Forest;
 /// a tree that is deeper than tracers can walk has leaves there, and the status says so ([`hedgerow::bvh::layout::status::DEPTH_LIMITED`]).
 ///
 /// ```
-/// use hedgerow_host::kdtree::{Options, build, merge::Merged};
+/// use hedgerow_host::kdtree::{HostKdOptions, build, merge::Merged};
 /// use hedgerow::kdtree::{layout::SpareRoom, termination::Costs};
 ///
 /// let corners = |x: f32| [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0]];
-/// let room = Room { nodes: 64, references: 64, records: 8 };
-/// let still = build(&corners(0.0), &[[0, 1, 2]], &Options::EXACT)?.with_room(room)?;
+/// let room = SpareRoom { nodes: 64, references: 64, records: 8 };
+/// let still = build(&corners(0.0), &[[0, 1, 2]], &HostKdOptions::EXACT)?.with_room(room)?;
 /// let bytes = still.to_bytes();
 /// let mut merged = Merged::new(still, Costs::DEFAULT);
-/// merged.insert("ball", 1, build(&corners(0.5), &[[0, 1, 2]], &Options::BINNED)?)?;
+/// merged.insert("ball", 1, build(&corners(0.5), &[[0, 1, 2]], &HostKdOptions::BINNED)?)?;
 /// assert_eq!(merged.tree()?.header.active, 2);
 /// merged.take_out("ball")?;
 /// assert_eq!(merged.tree()?.to_bytes(), bytes);
