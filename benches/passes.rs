@@ -66,7 +66,7 @@ impl<'a> Built<'a> {
     }
 
     fn build(&self) -> Result<()> {
-        let (structure, scratch) = (self.structure.address(), self.scratch.address());
+        let (structure, scratch) = (self.structure.region(), self.scratch.region());
         self.device.run(None, |recorder| self.bvh.record(recorder, &self.input, structure, scratch))
     }
 
@@ -74,8 +74,8 @@ impl<'a> Built<'a> {
     fn trace(&self, structure: &Buffer<'_>, shape: &TraceShape, query: Query, rays: &Rays<'_>) -> Result<()> {
         let buffers = TraceBuffers {
             structure: structure.address(),
-            rays: rays.rays.address(),
-            hits: rays.hits.address(),
+            rays: rays.rays.region(),
+            hits: rays.hits.region(),
             work: None,
             count: rays.count,
         };
@@ -92,7 +92,7 @@ impl<'a> Built<'a> {
     }
 
     fn compact(&self, target: &Buffer<'_>) -> Result<()> {
-        self.device.run(None, |recorder| compact::record(recorder, self.structure.address(), target.address()))
+        self.device.run(None, |recorder| compact::record(recorder, self.structure.address(), target.region()))
     }
 }
 

@@ -20,9 +20,9 @@
 //! let structure = device.buffer("structure", builder.sizes().structure)?;
 //! let scratch = device.buffer("scratch", builder.sizes().scratch)?;
 //! device.run(None, |recorder| {
-//!     builder.record(recorder, &triangles, structure.address(), scratch.address())?;
+//!     builder.record(recorder, &triangles, structure.region(), scratch.region())?;
 //!     recorder.barrier();
-//!     let (rays, hits) = (rays.address(), hits.address());
+//!     let (rays, hits) = (rays.region(), hits.region());
 //!     let buffers = tracer::TraceBuffers { structure: structure.address(), rays, hits, work: None, count: 1 };
 //!     tracer::record(recorder, &tracer::TraceShape::of(&device), Query::ClosestHit, &buffers)
 //! })?;

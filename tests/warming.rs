@@ -80,8 +80,8 @@ fn first_builds_and_updates_make_no_pipelines() {
         });
         let placements = requests.iter().zip(&memory).map(|(request, [structure, scratch])| Placement {
             request,
-            structure: structure.address(),
-            scratch: scratch.address(),
+            structure: structure.region(),
+            scratch: scratch.region(),
         });
         let placements: Vec<_> = placements.collect();
         // SAFETY: recorded by `run`, and all memory lives until it has run.

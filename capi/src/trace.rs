@@ -4,7 +4,7 @@ use crate::context::{HedgerowContext, context_of};
 use crate::pointers::{handle, reference};
 use crate::status::status;
 use crate::vulkan::{VkCommandBuffer, VkDeviceAddress, VkResult};
-use hedgerow::gpu::Recorder;
+use hedgerow::gpu::{Recorder, Region};
 use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 use hedgerow::trace::{Hit, MAX_RAYS, Query, Ray, Work};
 use hedgerow::{Error, Result};
@@ -137,7 +137,13 @@ pub unsafe extern "C" fn hedgerow_cmd_trace_rays(
                 )));
             }
         }
-        let buffers = TraceBuffers { structure, rays, hits, work: (work != 0).then_some(work), count };
+        let buffers = TraceBuffers {
+            structure,
+            rays: Region::unbounded(rays),
+            hits: Region::unbounded(hits),
+            work: (work != 0).then_some(Region::unbounded(work)),
+            count,
+        };
         // SAFETY: the caller's promises.
         let mut recorder = unsafe { Recorder::new(context, commands) };
         tracer::record(&mut recorder, &TraceShape::of(context), query, &buffers)

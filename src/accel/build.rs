@@ -9,9 +9,8 @@ use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
 use crate::bvh::refit::{self, Refit};
 use crate::bvh::sah::Collapse;
-use crate::gpu::Sizes;
 use crate::gpu::arguments;
-use crate::gpu::{Context, Kernel, Step, shaders};
+use crate::gpu::{Context, Kernel, Region, Sizes, Step, shaders};
 use crate::{Error, Result};
 use ash::vk;
 
@@ -125,22 +124,22 @@ impl Build {
     }
 
     /// The builder's part, with scratch memory at `scratch`.
-    pub fn job(&self, structure: u64, scratch: u64) -> BuildJob<'_> {
+    pub fn job(&self, structure: Region, scratch: Region) -> BuildJob<'_> {
         BuildJob {
             builder: &self.builder,
-            input: self.input(scratch),
+            input: self.input(scratch.address),
             structure,
-            scratch: self.scratch(scratch).builder,
+            scratch: scratch.behind(self.scratch(0).builder),
         }
     }
 
     /// The part of an update in place, with scratch memory at `scratch`.
-    pub fn update(&self, structure: u64, scratch: u64) -> refit::RefitJob<'_> {
+    pub fn update(&self, structure: Region, scratch: Region) -> refit::RefitJob<'_> {
         refit::RefitJob {
             refit: &self.refit,
-            input: self.input(scratch),
+            input: self.input(scratch.address),
             structure,
-            scratch: self.scratch(scratch).builder,
+            scratch: scratch.behind(self.scratch(0).builder),
         }
     }
 

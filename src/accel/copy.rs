@@ -4,7 +4,7 @@ use super::Device;
 use super::given::not_null;
 use crate::bvh::compact;
 use crate::gpu::arguments;
-use crate::gpu::{Context, Grid, Recorder, Step, shaders};
+use crate::gpu::{Context, Grid, Recorder, Region, Step, shaders};
 use crate::{Error, Result};
 use ash::vk;
 
@@ -46,7 +46,9 @@ impl Device<'_> {
             vk::CopyAccelerationStructureModeKHR::CLONE => {
                 recorder.chains(&[vec![clone_step(self.context, source, target)]])
             }
-            vk::CopyAccelerationStructureModeKHR::COMPACT => compact::record(&mut recorder, source, target),
+            vk::CopyAccelerationStructureModeKHR::COMPACT => {
+                compact::record(&mut recorder, source, Region::unbounded(target))
+            }
             mode => Err(Error::Argument(format!(
                 "mode is {mode:?}; structures are copied by CLONE or COMPACT, and to and from memory by calls of their own"
             ))),

@@ -7,8 +7,7 @@ use super::given::not_null;
 use super::{AccelOptions, Placement, Request, geometry};
 use crate::bvh::builder::{BuildJob, Builder};
 use crate::bvh::refit::Refit;
-use crate::gpu::Sizes;
-use crate::gpu::{Context, Recorder, Step};
+use crate::gpu::{Context, Recorder, Region, Sizes, Step};
 use crate::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -257,20 +256,25 @@ impl<'a> Device<'a> {
             ));
         }
         let build = Build::new(self.context, &self.options, info.flags, given, counts, primitive_count)?;
-        Ok(PlacedBuild { build, source, structure: info.dst_acceleration_structure.as_raw(), scratch })
+        let structure = Region::unbounded(info.dst_acceleration_structure.as_raw());
+        Ok(PlacedBuild { build, source, structure, scratch: Region::unbounded(scratch) })
     }
 
     /// Records builds that are asked for without Vulkan's structs, side by side as
     /// [`Device::cmd_build_acceleration_structures`] does. Nothing is checked against what was created.
     ///
     /// # Errors
-    /// A request that cannot be built; nothing is recorded then.
+    /// A request that cannot be built; memory that is too small; nothing is recorded then.
     ///
     /// # Safety
     /// As there.
     pub unsafe fn record(&self, commands: vk::CommandBuffer, placements: &[Placement<'_>]) -> Result<()> {
         let placed = placements.iter().map(|&Placement { request, structure, scratch }| {
-            Ok(PlacedBuild { build: request.build(self)?, source: None, structure, scratch })
+            let build = request.build(self)?;
+            let sizes = build.sizes();
+            structure.checked("memory for an acceleration structure", sizes.structure, sizes.alignment)?;
+            scratch.checked("scratch memory for an acceleration structure", sizes.scratch, SCRATCH_ALIGNMENT)?;
+            Ok(PlacedBuild { build, source: None, structure, scratch })
         });
         let builds = placed.collect::<Result<Vec<_>>>()?;
         // SAFETY: the caller's promise.
@@ -285,8 +289,9 @@ impl<'a> Device<'a> {
     /// A request that cannot be built; a pipeline could not be made.
     pub fn warm(&self, requests: &[Request]) -> Result<()> {
         let placed = |request: &Request, source| {
-            Ok(PlacedBuild { build: request.build(self)?, source, structure: 0, scratch: 0 })
+            Ok(PlacedBuild { build: request.build(self)?, source, structure: NOWHERE, scratch: NOWHERE })
         };
+        const NOWHERE: Region = Region::unbounded(0);
         let anew = requests.iter().map(|request| placed(request, None));
         // From another structure: a copy is part of it.
         const ANOTHER: u64 = 16;
@@ -308,10 +313,11 @@ impl<'a> Device<'a> {
         let mut chains = Builder::chains(&jobs)?;
         chains.extend(Refit::chains(&updates_in_place)?);
         let mut prologues: Vec<Vec<Step>> =
-            builds.iter().flat_map(|p| p.build.prologue(self.context, p.scratch)).collect();
+            builds.iter().flat_map(|p| p.build.prologue(self.context, p.scratch.address)).collect();
         // An update from another structure is one in place, of its copy.
-        let from_another =
-            |p: &&PlacedBuild| p.source.filter(|&source| source != p.structure).map(|source| (source, p.structure));
+        let from_another = |p: &&PlacedBuild| {
+            p.source.map(|source| (source, p.structure.address)).filter(|(source, target)| source != target)
+        };
         let copies = updates.iter().filter_map(from_another);
         prologues.extend(copies.map(|(source, target)| vec![clone_step(self.context, source, target)]));
         if !prologues.is_empty() {
@@ -327,8 +333,8 @@ struct PlacedBuild {
     build: Build,
     /// The structure that is updated, where it is an update.
     source: Option<u64>,
-    structure: u64,
-    scratch: u64,
+    structure: Region,
+    scratch: Region,
 }
 
 pub(super) fn within(build: usize, error: Error) -> Error {

@@ -1,12 +1,12 @@
 //! Builds without Vulkan's structs: what a structure is made of, in the types of [`crate::bvh::geometry`].
 //!
 //! ```no_run
-//! # use hedgerow::{accel::{Device, Instance, Placement, Request}, bvh::geometry::Geometry, Result};
+//! # use hedgerow::{accel::{Device, Instance, Placement, Request}, bvh::geometry::Geometry, gpu::Region, Result};
 //! # fn example(device: &Device<'_>, commands: hedgerow::ash::vk::CommandBuffer,
-//! #            positions: u64, indices: u64, structure: u64, scratch: u64) -> Result<()> {
+//! #            positions: u64, indices: u64, allocate: impl Fn(u64) -> Region) -> Result<()> {
 //! let mesh = Request::triangles(&[(Geometry::mesh(positions, 100, indices), 160)]);
 //! let sizes = mesh.sizes(device)?;
-//! // Memory of `sizes.structure` and `sizes.scratch` bytes at these addresses is the caller's to bring.
+//! let [structure, scratch] = [allocate(sizes.structure), allocate(sizes.scratch)];
 //! // SAFETY: `commands` is being recorded; all addresses stay valid until it has run.
 //! unsafe { device.record(commands, &[Placement { request: &mesh, structure, scratch }]) }?;
 //! # Ok(())
@@ -18,7 +18,7 @@ use super::build::{Build, Counts};
 use super::geometry::BuildGeometries;
 use crate::Result;
 use crate::bvh::geometry::Geometry;
-use crate::gpu::Sizes;
+use crate::gpu::{Region, Sizes};
 use ash::vk;
 
 /// A structure that is to be built.
@@ -29,15 +29,15 @@ pub struct Request {
     pub(super) flags: vk::BuildAccelerationStructureFlagsKHR,
 }
 
-/// A request with the addresses of its memory.
+/// A request with its memory, of [`Request::sizes`].
 #[derive(Debug, Clone, Copy)]
 pub struct Placement<'a> {
     /// What is built.
     pub request: &'a Request,
     /// Where.
-    pub structure: u64,
+    pub structure: Region,
     /// With which scratch memory.
-    pub scratch: u64,
+    pub scratch: Region,
 }
 
 impl Request {

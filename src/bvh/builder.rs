@@ -17,7 +17,7 @@ use super::split::{self, Split};
 use super::{collapse, hploc, layout, lbvh_workgroup};
 use crate::gpu::arguments;
 use crate::gpu::radix_sort::{self, SortShape};
-use crate::gpu::{BuildTuning, Context, Recorder, Sizes, Step};
+use crate::gpu::{BuildTuning, Context, Recorder, Region, Sizes, Step};
 use crate::{Error, Result};
 
 /// What to build, beside the primitives.
@@ -116,10 +116,20 @@ pub struct BuildJob<'a> {
     pub builder: &'a Builder,
     /// Its input.
     pub input: Input,
-    /// Address of the structure.
-    pub structure: u64,
-    /// Address of the scratch memory.
-    pub scratch: u64,
+    /// Memory for the structure, of [`Builder::sizes`].
+    pub structure: Region,
+    /// Scratch memory, of [`Builder::sizes`].
+    pub scratch: Region,
+}
+
+impl BuildJob<'_> {
+    /// The addresses of structure and scratch memory.
+    pub(super) fn addresses(&self) -> Result<[u64; 2]> {
+        let sizes = self.builder.sizes();
+        let structure = self.structure.checked("memory for a BVH", sizes.structure, sizes.alignment)?;
+        let scratch = self.scratch.checked("scratch memory for a BVH", sizes.scratch, sizes.alignment)?;
+        Ok([structure, scratch])
+    }
 }
 
 impl Codes {
@@ -312,25 +322,24 @@ impl Builder {
         self.weighs() || self.hierarchy().writes_weights()
     }
 
-    /// Records the build of `input` into the structure at address `structure`, with scratch memory at address `scratch`,
-    /// of the bytes and alignment that [`Builder::sizes`] tells.
+    /// Records the build of `input` into `structure`, with scratch memory, of the bytes and alignment of [`Builder::sizes`].
     ///
     /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever
     /// reads the structure, or writes the scratch memory) behind. Labels: `split`, `bounds`, `encode`, `sort`, `hierarchy`, `optimise`
     /// and `collapse` where there are such phases; or `build` where the schedule is persistent.
     ///
     /// # Errors
-    /// The input has another number of primitives than the builder; triangles are to be split of which each must be met once
+    /// The memory is too small; the input has another number of primitives than the builder; triangles are to be split of which each must be met once
     /// ([`GeometryFlags::NO_DUPLICATES`](super::geometry::GeometryFlags)); a pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: u64, scratch: u64) -> Result<()> {
+    pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: Region, scratch: Region) -> Result<()> {
         recorder.chains(&[self.steps(input, structure, scratch)?])
     }
 
     /// What [`Builder::record`] records, to be recorded beside other builds by [`Recorder::chains`].
     ///
     /// # Errors
-    /// The input has another number of primitives than the builder.
-    pub fn steps(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
+    /// As [`Builder::record`], pipelines aside.
+    pub fn steps(&self, input: &Input, structure: Region, scratch: Region) -> Result<Vec<Step>> {
         let mut chains = Builder::chains(&[BuildJob { builder: self, input: *input, structure, scratch }])?;
         Ok(chains.pop().unwrap_or_default())
     }
@@ -339,7 +348,7 @@ impl Builder {
     /// dispatch.
     ///
     /// # Errors
-    /// An input has another number of primitives than its builder.
+    /// As [`Builder::record`], pipelines aside.
     pub fn chains(jobs: &[BuildJob<'_>]) -> Result<Vec<Vec<Step>>> {
         let (small, large): (Vec<&BuildJob<'_>>, Vec<&BuildJob<'_>>) =
             jobs.iter().partition(|job| job.builder.schedule == Schedule::Workgroup);
@@ -358,7 +367,8 @@ impl Builder {
         let Builder { schedule, encode, workers, .. } = self;
         let (input, workers) = (&job.input, *workers);
         let scratch = &self.scratch(encode.table_words());
-        let arguments = &encode.arguments(input, job.structure, job.scratch, scratch.parts)?;
+        let [structure, room] = job.addresses()?;
+        let arguments = &encode.arguments(input, structure, room, scratch.parts)?;
         let mut steps = encode.split.map_or(Vec::new(), |split| split.steps(encode, input, arguments, scratch));
         steps.extend(match schedule {
             Schedule::Chain => self.chain(input, arguments, scratch),

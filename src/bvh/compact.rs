@@ -6,9 +6,10 @@
 //!
 //! [`Bvh2::compacted`]: super::layout::Bvh2::compacted
 
+use super::layout::NODES_OFFSET;
 use crate::Result;
 use crate::gpu::arguments;
-use crate::gpu::{Grid, Recorder, Step, shaders};
+use crate::gpu::{Grid, Recorder, Region, Step, shaders};
 
 const STEPS: [&shaders::Shader; 5] = [
     &shaders::BVH_COMPACT_PARENTS,
@@ -18,7 +19,7 @@ const STEPS: [&shaders::Shader; 5] = [
     &shaders::BVH_COMPACT_RECORDS,
 ];
 
-/// Records the compaction of the structure at address `source` to address `target`, both aligned to 16 bytes: five dispatches
+/// Records the compaction of the structure at address `source` to `target`, both aligned to 16 bytes: five dispatches
 /// with barriers between, and no scratch memory.
 ///
 /// The target takes as many bytes as a header with the source's counts says ([`Header::compacted`]): on the device,
@@ -27,8 +28,9 @@ const STEPS: [&shaders::Shader; 5] = [
 /// [`Header::compacted`]: super::layout::Header::compacted
 ///
 /// # Errors
-/// A pipeline could not be made.
-pub fn record(recorder: &mut Recorder<'_>, source: u64, target: u64) -> Result<()> {
+/// The target does not even hold a header, which is all that the host knows of; a pipeline could not be made.
+pub fn record(recorder: &mut Recorder<'_>, source: u64, target: Region) -> Result<()> {
+    let target = target.checked("memory for a compacted BVH", NODES_OFFSET, 16)?;
     let grid = Grid::of(recorder.context());
     let step = |shader| Step::new("compact", grid.kernel(shader), &arguments::Compact { source, target }, grid.groups);
     recorder.chains(&[STEPS.map(step).into()])

@@ -12,7 +12,7 @@
 use super::layout::node_slots;
 use crate::Result;
 use crate::gpu::arguments;
-use crate::gpu::{Context, Kernel, Recorder, fill, shaders};
+use crate::gpu::{Context, Kernel, Recorder, Region, fill, shaders};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
@@ -46,15 +46,15 @@ pub struct OverlapPass {
     rounds: u32,
 }
 
-/// Device addresses of a structure and of the memory that measuring it takes, 16-byte aligned.
+/// A structure and the memory that measuring it takes, all aligned to 16 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OverlapBuffers {
     /// The `Bvh2`.
     pub structure: u64,
     /// [`OverlapPass::scratch_bytes`] bytes.
-    pub scratch: u64,
+    pub scratch: Region,
     /// [`OverlapFigures`], written.
-    pub result: u64,
+    pub result: Region,
 }
 
 impl OverlapPass {
@@ -88,10 +88,11 @@ impl OverlapPass {
     /// # Errors
     /// A pipeline could not be made.
     pub fn begin(&self, recorder: &mut Recorder<'_>, buffers: &OverlapBuffers) -> Result<()> {
-        fill::record(recorder, buffers.scratch, self.slots + self.records, u32::MAX)?;
+        let arguments = self.arguments(buffers)?;
+        fill::record(recorder, arguments.parents, self.slots + self.records, u32::MAX)?;
         recorder.barrier();
         let kernel = Kernel::new(&shaders::BVH_EPO_PARENTS, self.workgroup, &[]);
-        recorder.dispatch(&kernel, &self.arguments(buffers), self.tiles(self.slots))
+        recorder.dispatch(&kernel, &arguments, self.tiles(self.slots))
     }
 
     /// Records the overlaps of some records, behind [`OverlapPass::begin`]: the part that takes time, so that it may be done a
@@ -101,7 +102,7 @@ impl OverlapPass {
     /// A pipeline could not be made.
     pub fn overlaps(&self, recorder: &mut Recorder<'_>, buffers: &OverlapBuffers, records: Range<u32>) -> Result<()> {
         let (first, count) = (records.start, records.len() as u32);
-        let arguments = arguments::Epo { first, count, ..self.arguments(buffers) };
+        let arguments = arguments::Epo { first, count, ..self.arguments(buffers)? };
         let kernel = Kernel::new(&shaders::BVH_EPO_OVERLAPS, self.workgroup, &[]);
         recorder.dispatch(&kernel, &arguments, self.tiles(count))
     }
@@ -112,12 +113,13 @@ impl OverlapPass {
     /// A pipeline could not be made.
     pub fn end(&self, recorder: &mut Recorder<'_>, buffers: &OverlapBuffers) -> Result<()> {
         let kernel = Kernel::new(&shaders::BVH_EPO_SUM, self.workgroup, &[]);
-        let arguments = self.arguments(buffers);
+        let arguments = self.arguments(buffers)?;
+        let result = buffers.result.checked("memory for figures", size_of::<OverlapFigures>() as u64, 16)?;
         let room = [arguments.results, arguments.results + 12 * u64::from(self.records.div_ceil(ADDED))];
         let (mut sums, mut count, mut room) = (arguments.sums, self.records, room.into_iter().cycle());
         loop {
             let kept = count.div_ceil(ADDED).max(1);
-            let results = if kept == 1 { buffers.result } else { room.next().expect("a cycle has no end") };
+            let results = if kept == 1 { result } else { room.next().expect("a cycle has no end") };
             let step = arguments::Epo { sums, results, count, ..arguments };
             recorder.dispatch(&kernel, &step, kept.div_ceil(self.workgroup))?;
             if kept == 1 {
@@ -132,16 +134,17 @@ impl OverlapPass {
         count.div_ceil(self.workgroup * self.rounds)
     }
 
-    fn arguments(&self, buffers: &OverlapBuffers) -> arguments::Epo {
-        let sums = buffers.scratch + 4 * (u64::from(self.slots) + u64::from(self.records));
-        arguments::Epo {
+    fn arguments(&self, buffers: &OverlapBuffers) -> Result<arguments::Epo> {
+        let scratch = buffers.scratch.checked("scratch memory of measuring", self.scratch_bytes(), 16)?;
+        let sums = scratch + 4 * (u64::from(self.slots) + u64::from(self.records));
+        Ok(arguments::Epo {
             structure: buffers.structure,
-            parents: buffers.scratch,
+            parents: scratch,
             sums,
             results: sums + 12 * u64::from(self.records),
             first: 0,
             count: self.records,
             rounds: self.rounds,
-        }
+        })
     }
 }

@@ -18,7 +18,8 @@ pub(super) fn steps(jobs: &[&BuildJob<'_>]) -> Result<Vec<Step>> {
     let mut kinds: HashMap<(Kernel, u32, [u32; 2]), Vec<arguments::Small>> = HashMap::new();
     let mut order = Vec::new();
     for job in jobs {
-        let BuildJob { builder, input, structure, scratch } = **job;
+        let BuildJob { builder, input, .. } = **job;
+        let [structure, scratch] = job.addresses()?;
         let encode = &builder.encode;
         let (geometry, formats) = encode.checked(&input)?;
         let kernel = encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, &input);

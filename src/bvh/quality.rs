@@ -5,7 +5,7 @@
 use super::layout::node_slots;
 use crate::Result;
 use crate::gpu::arguments;
-use crate::gpu::{Context, Kernel, Recorder, fill, shaders};
+use crate::gpu::{Context, Kernel, Recorder, Region, fill, shaders};
 use bytemuck::{Pod, Zeroable};
 
 /// What a walk over a tree finds, of whatever kind it is.
@@ -93,12 +93,14 @@ impl QualityPass {
         4 * u64::from(self.slots) + u64::from(self.tiles()) * size_of::<QualityFigures>() as u64
     }
 
-    /// Records the measuring of the structure at `structure` into the [`QualityFigures`] at `result`, with scratch memory at
-    /// `scratch`; all addresses 16-byte aligned. The caller places a barrier before and one behind.
+    /// Records the measuring of the structure at address `structure` into the [`QualityFigures`] at `result`, with scratch memory of
+    /// [`QualityPass::scratch_bytes`]; all aligned to 16 bytes. The caller places a barrier before and one behind.
     ///
     /// # Errors
-    /// A pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, structure: u64, scratch: u64, result: u64) -> Result<()> {
+    /// The memory is too small; a pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, structure: u64, scratch: Region, result: Region) -> Result<()> {
+        let scratch = scratch.checked("scratch memory of measuring", self.scratch_bytes(), 16)?;
+        let result = result.checked("memory for figures", size_of::<QualityFigures>() as u64, 16)?;
         let arguments = arguments::Quality {
             structure,
             parents: scratch,

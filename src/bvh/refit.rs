@@ -17,10 +17,10 @@
 use super::builder;
 use super::geometry::Planned;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
-use super::layout::node_slots;
+use super::layout::{NODES_OFFSET, node_slots};
 use super::sah::Collapse;
 use crate::gpu::arguments;
-use crate::gpu::{Context, Kernel, Recorder, Step, radix_sort, shaders};
+use crate::gpu::{Context, Kernel, Recorder, Region, Step, radix_sort, shaders};
 use crate::{Error, Result};
 use std::collections::HashMap;
 
@@ -90,10 +90,10 @@ pub struct RefitJob<'a> {
     pub refit: &'a Refit,
     /// The primitives as they are now.
     pub input: Input,
-    /// Address of the structure.
-    pub structure: u64,
-    /// Address of the scratch memory.
-    pub scratch: u64,
+    /// The structure.
+    pub structure: Region,
+    /// Scratch memory, of [`Refit::scratch_bytes`].
+    pub scratch: Region,
 }
 
 /// Updates that fit into the push constants.
@@ -143,8 +143,7 @@ impl Refit {
         Kernel::new(shader, self.workgroup, &[self.run, 0, 0, 0, source])
     }
 
-    /// Records the refit of the structure at address `structure` to `input`, with [`Refit::scratch_bytes`] of scratch memory at address
-    /// `scratch`, both aligned to 16 bytes.
+    /// Records the refit of `structure` to `input`, with scratch memory of [`Refit::scratch_bytes`], both aligned to 16 bytes.
     ///
     /// The structure is one that was built over as many primitives with the same options, compacted or not; one that is not is
     /// left as it is. The caller makes input and structure visible to compute shaders before, and places a barrier (compute
@@ -152,16 +151,17 @@ impl Refit {
     /// `refit` where one workgroup does both.
     ///
     /// # Errors
-    /// The input has another number of primitives or geometries than was planned for; a pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: u64, scratch: u64) -> Result<()> {
+    /// The memory is too small; the input has another number of primitives or geometries than was planned for; a pipeline could
+    /// not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: Region, scratch: Region) -> Result<()> {
         recorder.chains(&[self.steps(input, structure, scratch)?])
     }
 
     /// What [`Refit::record`] records, to be recorded beside others by [`Recorder::chains`].
     ///
     /// # Errors
-    /// The input has another number of primitives or geometries than was planned for.
-    pub fn steps(&self, input: &Input, structure: u64, scratch: u64) -> Result<Vec<Step>> {
+    /// As [`Refit::record`], pipelines aside.
+    pub fn steps(&self, input: &Input, structure: Region, scratch: Region) -> Result<Vec<Step>> {
         let mut chains = Refit::chains(&[RefitJob { refit: self, input: *input, structure, scratch }])?;
         Ok(chains.pop().unwrap_or_default())
     }
@@ -170,7 +170,7 @@ impl Refit {
     /// dispatch.
     ///
     /// # Errors
-    /// An input has another number of primitives or geometries than was planned for.
+    /// As [`Refit::record`], pipelines aside.
     pub fn chains(jobs: &[RefitJob<'_>]) -> Result<Vec<Vec<Step>>> {
         let mut chains = Vec::new();
         // What fills the push constants together must be of one kind.
@@ -223,6 +223,8 @@ impl RefitJob<'_> {
         let RefitJob { refit, input, structure, scratch } = *self;
         refit.planned.check(&input)?;
         let (geometry, formats) = input.for_kernels();
+        let structure = structure.checked("the BVH to refit", NODES_OFFSET, 16)?;
+        let scratch = scratch.checked("scratch memory of a refit", refit.scratch_bytes(), 16)?;
         Ok(arguments::Update {
             vertices: geometry.vertices,
             indices: geometry.indices,

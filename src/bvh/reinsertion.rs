@@ -20,10 +20,10 @@
 //! The leaves of the tree have one record each; collapsing comes behind it and makes leaves of whatever is deeper than tracers can
 //! walk. The twin is [`Bvh2::reinserted`](super::layout::Bvh2::reinserted): the same bytes.
 
-use super::layout::node_slots;
+use super::layout::{NODES_OFFSET, node_slots};
 use crate::Result;
 use crate::gpu::arguments;
-use crate::gpu::{Context, Grid, Kernel, Recorder, Step, fill, shaders};
+use crate::gpu::{Context, Grid, Kernel, Recorder, Region, Step, fill, shaders};
 use std::time::Duration;
 
 /// How much is done.
@@ -125,17 +125,19 @@ impl Reinsertion {
         Kernel::new(shader, self.grid.workgroup, &[self.grid.rounds, self.shared])
     }
 
-    /// Records all rounds on the structure at address `structure`, in place, with scratch memory at address `scratch`; both aligned
+    /// Records all rounds on `structure`, in place, with scratch memory of [`Reinsertion::scratch_bytes`]; both aligned
     /// to 16 bytes. Five dispatches a round with barriers between; the caller places one before and one behind. Label: `optimise`.
     ///
     /// # Errors
-    /// A pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, structure: u64, scratch: u64) -> Result<()> {
+    /// The memory is too small; a pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, structure: Region, scratch: Region) -> Result<()> {
+        let structure = structure.checked("the BVH to optimise", NODES_OFFSET, 16)?;
+        let scratch = scratch.checked("scratch memory of an optimisation", self.scratch_bytes(), 16)?;
         recorder.chains(&[self.steps(structure, scratch)])
     }
 
-    /// What [`Reinsertion::record`] records, to be recorded behind or beside other steps by [`Recorder::chains`].
-    pub fn steps(&self, structure: u64, scratch: u64) -> Vec<Step> {
+    /// What [`Reinsertion::record`] records, with addresses that were checked.
+    pub(super) fn steps(&self, structure: u64, scratch: u64) -> Vec<Step> {
         let words = 4 * u64::from(self.slots);
         let arguments = |offset: u32| arguments::Reinsertion {
             structure,

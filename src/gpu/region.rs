@@ -2,7 +2,10 @@
 
 use crate::{Error, Result};
 
-/// A part of a buffer on the device, by its address.
+/// These bytes: a part of a buffer on the device, by its address.
+///
+/// Passes take the memory that they write as regions, and refuse one that is too small or misplaced. What they only read is
+/// named by its address, as in Vulkan: counts and strides say how long it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Region {
     /// Where it begins.
@@ -12,6 +15,16 @@ pub struct Region {
 }
 
 impl Region {
+    /// Memory of which only the address is known, as in Vulkan's build structs. The caller vouches that it is large enough.
+    pub const fn unbounded(address: u64) -> Region {
+        Region { address, bytes: u64::MAX - address }
+    }
+
+    /// What is left behind the first `bytes`.
+    pub(crate) const fn behind(self, bytes: u64) -> Region {
+        Region { address: self.address + bytes, bytes: self.bytes.saturating_sub(bytes) }
+    }
+
     /// The address, if there are as many bytes as are needed from there on.
     ///
     /// # Errors

@@ -2,9 +2,9 @@
 //! hits and the work that [`super::twin::kd`] has.
 //!
 //! ```no_run
-//! # use hedgerow::gpu::Recorder;
+//! # use hedgerow::gpu::{Recorder, Region};
 //! # use hedgerow::trace::{Query, kd::{KdTracer, Traversal}, tracer::TraceBuffers};
-//! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: u64, hits: u64) -> hedgerow::Result<()> {
+//! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: Region, hits: Region) -> hedgerow::Result<()> {
 //! let tracer = KdTracer::new(recorder.context(), Traversal::short_stack_with_push_down(4));
 //! tracer.record(recorder, Query::ClosestHit, &TraceBuffers { structure, rays, hits, work: None, count: 1 << 20 })?;
 //! recorder.barrier();

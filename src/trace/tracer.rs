@@ -1,8 +1,8 @@
 //! The tracer on the device: rays in, hits out, recorded into the caller's command buffer.
 //!
 //! ```no_run
-//! # use hedgerow::{gpu::Recorder, trace::{Query, tracer::{self, TraceBuffers, TraceShape}}};
-//! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: u64, hits: u64) -> hedgerow::Result<()> {
+//! # use hedgerow::{gpu::{Recorder, Region}, trace::{Query, tracer::{self, TraceBuffers, TraceShape}}};
+//! # fn example(recorder: &mut Recorder<'_>, structure: u64, rays: Region, hits: Region) -> hedgerow::Result<()> {
 //! let shape = TraceShape::of(recorder.context());
 //! tracer::record(recorder, &shape, Query::ClosestHit, &TraceBuffers { structure, rays, hits, work: None, count: 1 << 20 })?;
 //! recorder.barrier();
@@ -10,10 +10,10 @@
 //! # }
 //! ```
 
-use super::{MAX_RAYS, Query};
+use super::{Hit, MAX_RAYS, Query, Ray, Work};
 use crate::bvh::layout::MAX_DEPTH;
 use crate::gpu::arguments;
-use crate::gpu::{Context, Kernel, Limits, MOST_LANES, Recorder, shaders};
+use crate::gpu::{Context, Kernel, Limits, MOST_LANES, Recorder, Region, shaders};
 use crate::{Error, Result};
 
 /// How the work is cut for a device.
@@ -98,17 +98,17 @@ const LEAST_WORKGROUPS: u32 = 64;
 /// Shared memory an entry of a stack: node or first triangle with its count, and distance.
 const LEVEL_BYTES: u32 = 8;
 
-/// Device addresses of what is traced, all aligned to 16 bytes.
+/// What is traced, all aligned to 16 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TraceBuffers {
-    /// A `Bvh2`, or what else a tracer says that it takes. One whose status says that it is too deep or unfinished is traced as if it were empty.
+    /// Address of a `Bvh2`, or of what else a tracer says that it takes. One whose status says that it is too deep or unfinished is traced as if it were empty.
     pub structure: u64,
     /// [`Ray`](super::Ray) × `count`.
-    pub rays: u64,
+    pub rays: Region,
     /// [`Hit`](super::Hit) × `count`, written.
-    pub hits: u64,
+    pub hits: Region,
     /// [`Work`](super::Work) × `count`, written: counting takes time, so it has a kernel of its own.
-    pub work: Option<u64>,
+    pub work: Option<Region>,
     /// How many rays; at most [`MAX_RAYS`].
     pub count: u32,
 }
@@ -141,7 +141,7 @@ pub(super) fn kernel_of(
 /// write to shader read and write) before and after.
 ///
 /// # Errors
-/// More than [`MAX_RAYS`] rays; loads lane by lane in workgroups that are not one subgroup of at most
+/// More than [`MAX_RAYS`] rays, or than the memory holds; loads lane by lane in workgroups that are not one subgroup of at most
 /// [`Loads::MAX_LANES`]; the kernel's pipeline could not be made.
 pub fn record(recorder: &mut Recorder<'_>, shape: &TraceShape, query: Query, buffers: &TraceBuffers) -> Result<()> {
     record_kernel(recorder, &kernel(shape, query, buffers.work.is_some()), shape, buffers)
@@ -172,13 +172,17 @@ pub(super) fn record_kernel(
             "{count} rays in one call, at most {MAX_RAYS}: trace them in several calls"
         )));
     }
+    let bytes = |each: usize| u64::from(count) * each as u64;
+    let rays = rays.checked("memory of rays", bytes(size_of::<Ray>()), 16)?;
+    let hits = hits.checked("memory for hits", bytes(size_of::<Hit>()), 16)?;
+    let works = work.map_or(Ok(0), |work| work.checked("memory for work", bytes(size_of::<Work>()), 16))?;
     // Enough workgroups that all cores have some to the end.
     let rays_each = (count / (shape.workgroup * LEAST_WORKGROUPS)).clamp(1, shape.rays_each);
     let group_rays = shape.workgroup * rays_each;
     let at_once = recorder.context().limits.workgroup_count.saturating_mul(group_rays);
     let mut first = 0;
     while first < count {
-        let arguments = arguments::Trace { structure, rays, hits, works: work.unwrap_or(0), first, count, rays_each };
+        let arguments = arguments::Trace { structure, rays, hits, works, first, count, rays_each };
         recorder.dispatch(kernel, &arguments, (count - first).min(at_once).div_ceil(group_rays))?;
         first += at_once.min(count - first);
     }

@@ -18,6 +18,7 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::geometry::Aabb;
 use hedgerow::gpu::Recorder;
+use hedgerow::gpu::Region;
 use hedgerow::trace::twin::tracer::closest_hit;
 use hedgerow::trace::{Hit, Ray};
 use hedgerow_lab::device::{Buffer, DriverTracing};
@@ -338,7 +339,9 @@ fn boxes_of_the_device_are_compacted() {
     let sizes = builder.sizes();
     let source = Guarded::new(sizes.structure as usize);
     let scratch = device().buffer("scratch", sizes.scratch).expect("memory");
-    run(|recorder, _| builder.record(recorder, &input, source.address(), scratch.address()));
+    run(|recorder, _| {
+        builder.record(recorder, &input, Region { address: source.address(), bytes: sizes.structure }, scratch.region())
+    });
     let boxes: Vec<Aabb> = given.iter().map(|&[lo, hi]| Aabb { lo, hi }).collect();
     let expected = lbvh::build_aabbs(&boxes, codes, Collapse::SAH);
     assert!(source.read() == expected.to_bytes());

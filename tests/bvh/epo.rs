@@ -17,8 +17,7 @@ fn on_device(tree: &Bvh2, piece: u32) -> OverlapFigures {
     let structure = device.upload("structure", &tree.to_bytes()).expect("memory");
     let scratch = device.buffer("scratch", measure.scratch_bytes()).expect("memory");
     let result = device.buffer("result", size_of::<OverlapFigures>() as u64).expect("memory");
-    let buffers =
-        OverlapBuffers { structure: structure.address(), scratch: scratch.address(), result: result.address() };
+    let buffers = OverlapBuffers { structure: structure.address(), scratch: scratch.region(), result: result.region() };
     device
         .run(None, |recorder| {
             measure.begin(recorder, &buffers)?;

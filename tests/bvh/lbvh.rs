@@ -37,7 +37,7 @@ fn quality_on_device(tree: &Bvh2) -> QualityFigures {
     let structure = device.upload("structure", &tree.to_bytes()).unwrap();
     let scratch = device.buffer("scratch", measure.scratch_bytes()).unwrap();
     let result = device.buffer("result", size_of::<QualityFigures>() as u64).unwrap();
-    device.run(None, |r| measure.record(r, structure.address(), scratch.address(), result.address())).unwrap();
+    device.run(None, |r| measure.record(r, structure.address(), scratch.region(), result.region())).unwrap();
     result.read(1)[0]
 }
 

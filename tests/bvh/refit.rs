@@ -14,6 +14,7 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
 use hedgerow::bvh::twin::quality;
 use hedgerow::geometry::Aabb;
+use hedgerow::gpu::Region;
 use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::tracer::closest_hit_by_brute_force;
 use hedgerow::trace::{Hit, Query, Ray};
@@ -44,13 +45,13 @@ impl Placed {
         RefitJob {
             refit: &self.refit,
             input: *input,
-            structure: self.structure.address(),
-            scratch: self.scratch.address(),
+            structure: self.structure.region(),
+            scratch: self.scratch.region(),
         }
     }
 
     fn refit(&self, input: &Input) {
-        let (structure, scratch) = (self.structure.address(), self.scratch.address());
+        let (structure, scratch) = (self.structure.region(), self.scratch.region());
         device().run(None, |recorder| self.refit.record(recorder, input, structure, scratch)).expect("it refits");
     }
 
@@ -156,8 +157,8 @@ fn assert_hits(structure: &Bvh2, rays: &[Ray], expected: &[Hit]) {
     let count = rays.len() as u32;
     let buffers = TraceBuffers {
         structure: structure.address(),
-        rays: ray_buffer.address(),
-        hits: hits.address(),
+        rays: ray_buffer.region(),
+        hits: hits.region(),
         work: None,
         count,
     };
@@ -640,7 +641,7 @@ fn top_levels_are_refitted_to_their_entries() {
             let structure = device().buffer("structure", sizes.structure).expect("memory");
             let scratch = device().buffer("scratch", sizes.scratch).expect("memory");
             structure.write(&vec![0u8; sizes.structure as usize]);
-            let (at, scratch) = (structure.address(), scratch.address());
+            let (at, scratch) = (structure.region(), scratch.region());
             device().run(None, |r| builder.record(r, input, at, scratch)).expect("it builds");
             Bvh2::<InstanceRecord>::from_bytes(&structure.read::<u8>(sizes.structure as usize)).expect("a structure")
         };
@@ -712,7 +713,8 @@ fn what_was_not_planned_for_is_left_as_it_is() {
         }
     }
     let refit = Refit::new(device(), &RefitOptions::DEFAULT, 100).expect("few enough");
-    let refused = |input: &Input| refit.steps(input, 256, 256).expect_err("another input").to_string();
+    const MEMORY: Region = Region::unbounded(256);
+    let refused = |input: &Input| refit.steps(input, MEMORY, MEMORY).expect_err("another input").to_string();
     assert!(refused(&Input { primitive_count: 99, ..mesh.input() }).contains("planned for 100 primitives"));
     let several = Source::Several { records: 256, count: 5 };
     assert!(refused(&Input { source: several, ..mesh.input() }).contains("planned for 1 geometries"));

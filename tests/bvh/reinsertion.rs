@@ -72,7 +72,7 @@ fn the_device_gives_the_bytes_of_the_host_and_touches_nothing_else() {
             let scratch_bytes = reinsertion.scratch_bytes();
             let scratch =
                 device.upload("scratch", &[vec![0xFF; scratch_bytes as usize], GUARD.to_vec()].concat()).unwrap();
-            device.run(None, |r| reinsertion.record(r, structure.address(), scratch.address())).unwrap();
+            device.run(None, |r| reinsertion.record(r, structure.region(), scratch.region())).unwrap();
             let got = structure.read::<u8>(bytes.len());
             assert!(got == tree.reinserted(&options).to_bytes(), "{name} {options:?}: other bytes");
             assert_eq!(

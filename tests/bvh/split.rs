@@ -13,6 +13,7 @@ use hedgerow::bvh::twin::split::around_parts;
 use hedgerow::bvh::wide::layout::{Wide4, Wide8, Wide8q};
 use hedgerow::bvh::{refit, reinsertion};
 use hedgerow::geometry::Aabb;
+use hedgerow::gpu::Region;
 use hedgerow::trace::twin::tracer;
 use hedgerow::trace::twin::wide as wide_host;
 use hedgerow::trace::wide::Order;
@@ -257,7 +258,8 @@ fn what_cannot_be_split_says_so() {
     let builder = Builder::new(device, &options, 1000).unwrap();
     let once = Geometry { flags: GeometryFlags::NO_DUPLICATES, ..Geometry::mesh(256, 3000, 256) };
     let input = Input { source: Source::One(once), primitive_count: 1000 };
-    assert!(builder.steps(&input, 256, 256).expect_err("refused").to_string().contains("once"));
+    let memory = Region::unbounded(256);
+    assert!(builder.steps(&input, memory, memory).expect_err("refused").to_string().contains("once"));
 }
 
 #[test]
@@ -313,6 +315,6 @@ fn a_refit_leaves_a_split_structure_as_it_is() {
     let scratch = device.buffer("scratch", refit.scratch_bytes()).unwrap();
     // Room for more triangles than there are: none is read.
     let input = Input::mesh(vertices.address(), 3 * count, indices.address(), planned);
-    device.run(None, |r| refit.record(r, &input, structure.address(), scratch.address())).unwrap();
+    device.run(None, |r| refit.record(r, &input, structure.region(), scratch.region())).unwrap();
     assert!(structure.read::<u8>(before.len()) == before, "other bytes");
 }

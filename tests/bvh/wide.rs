@@ -30,7 +30,7 @@ fn collapsed_as<N: WideNode>(tree: &Bvh2, count: u32) -> Vec<u8> {
     let guarded = |bytes: u64| [vec![0xEEu8; bytes as usize], GUARD.to_vec()].concat();
     let target = device.upload("target", &guarded(sizes.structure)).unwrap();
     let scratch = device.upload("scratch", &guarded(sizes.scratch)).unwrap();
-    device.run(None, |r| wide.record(r, source.address(), target.address(), scratch.address())).unwrap();
+    device.run(None, |r| wide.record(r, source.address(), target.region(), scratch.region())).unwrap();
     for (what, buffer, bytes) in [("target", &target, sizes.structure), ("scratch", &scratch, sizes.scratch)] {
         assert_eq!(buffer.read_at::<u8>(bytes, GUARD.len()), GUARD, "wrote behind the {what}");
     }

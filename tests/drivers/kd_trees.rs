@@ -10,7 +10,7 @@ use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
 use hedgerow::kdtree::builder::{self, KdBuilder, KdOptions};
 use hedgerow::kdtree::layout::{KdHeader, KdTree};
-use hedgerow::kdtree::merge::{self, Memory, MergeCapacity, MergeReport, Merger, Object};
+use hedgerow::kdtree::merge::{self, MergeCapacity, MergeMemory, MergeReport, Merger, Object};
 use hedgerow::kdtree::twin;
 use hedgerow::trace::Query;
 use hedgerow::trace::kd::Traversal;
@@ -106,7 +106,7 @@ fn merge(still: &KdTree, objects: &[Corners], schedule: Schedule, pushed: bool) 
     let sizes = merger.sizes();
     let structure = device().upload("structure", &still.to_bytes()).expect("memory");
     let [scratch, undo] = [sizes.scratch, sizes.undo].map(|bytes| device().buffer("memory", bytes).expect("memory"));
-    let memory = Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+    let memory = MergeMemory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
 
     let meshes: Vec<Mesh> = objects.iter().map(|corners| corpus::soup("object", corners.clone())).collect();
     let inputs: Vec<_> = meshes.iter().map(uploaded).collect();

@@ -91,7 +91,7 @@ fn collapsed<N: TracedNode>(tree: &Bvh2) -> Vec<u8> {
     let target = device().buffer("target", sizes.structure).expect("memory");
     let scratch = device().buffer("scratch", sizes.scratch).expect("memory");
     device()
-        .run(None, |r| wide.record(r, source.address(), target.address(), scratch.address()))
+        .run(None, |r| wide.record(r, source.address(), target.region(), scratch.region()))
         .expect("the device collapses");
     let record_bytes = size_of::<hedgerow::bvh::layout::Triangle>() as u64;
     target.read(N::FORM.bytes_in_use(&target.read(1)[0], record_bytes) as usize)

@@ -9,7 +9,7 @@ use hedgerow::bvh::layout::status;
 use hedgerow::kdtree::builder::{self, KdBuilder};
 use hedgerow::kdtree::layout::{KdHeader, KdTree, SpareRoom};
 use hedgerow::kdtree::merge::{
-    Memory, MergeCapacity, MergeEstimate, MergeOptions, MergeReport, Merger, Object, Objects,
+    MergeCapacity, MergeEstimate, MergeMemory, MergeOptions, MergeReport, Merger, Object, Objects,
 };
 use hedgerow::kdtree::twin;
 use hedgerow::trace::kd::Traversal;
@@ -122,8 +122,8 @@ impl Scene {
         Scene { still, structure, scratch, undo, meshes, _buffers: buffers, merger }
     }
 
-    fn memory(&self) -> Memory {
-        Memory { structure: self.structure.region(), scratch: self.scratch.region(), undo: self.undo.region() }
+    fn memory(&self) -> MergeMemory {
+        MergeMemory { structure: self.structure.region(), scratch: self.scratch.region(), undo: self.undo.region() }
     }
 
     fn merge(&self, objects: &[Object]) -> MergeReport {

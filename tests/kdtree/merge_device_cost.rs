@@ -10,7 +10,7 @@ use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::{Phase, Timestamps};
 use hedgerow::kdtree::builder::{self, KdBuilder, KdReport as BuildReport};
-use hedgerow::kdtree::merge::{Memory, MergeCapacity, MergeEstimate, MergeOptions, MergeReport, Merger, Object};
+use hedgerow::kdtree::merge::{MergeCapacity, MergeEstimate, MergeMemory, MergeOptions, MergeReport, Merger, Object};
 use hedgerow_lab::device::Buffer;
 use hedgerow_lab::scene::{LoadOptions, load};
 use std::collections::BTreeMap;
@@ -88,7 +88,7 @@ fn merging_beside_building_on_the_device() {
         let sizes = mergers.each_ref().map(Merger::sizes);
         let scratch = buffer(sizes.iter().map(|sizes| sizes.scratch).max().expect("schedules"));
         let undo = buffer(sizes[0].undo);
-        let memory = Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+        let memory = MergeMemory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
         let ((still_input, _a), (input, _b), (both_input, _c)) = (input_of(&still), input_of(&moves), input_of(&both));
         timed(|recorder| still_builder.record(recorder, &still_input, structure.region(), building.region()));
         let object = Object { input, first_primitive: count, tree: None };
@@ -162,7 +162,7 @@ fn pushing_beside_finding() {
                     let place = place(&object, &options);
                     let (object, merger, structure, scratch, undo) = &place;
                     let memory =
-                        Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+                        MergeMemory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
                     timed(|r| merger.record(r, memory, &[*object]));
                     let report: MergeReport = scratch.read_at(merger.report_range().start, 1)[0];
                     timed(|r| merger.restore(r, memory));
@@ -180,7 +180,7 @@ fn pushing_beside_finding() {
                 builds.push(total(&record_tree()));
                 for (i, (object, merger, structure, scratch, undo)) in ways.iter().enumerate() {
                     let memory =
-                        Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+                        MergeMemory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
                     let merged = timed(|r| merger.record(r, memory, &[*object]));
                     timed(|r| merger.restore(r, memory));
                     merges[i].push(total(&merged));

@@ -6,6 +6,7 @@ use crate::common::shapes::{
 };
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::gpu::Region;
 use hedgerow::trace::tracer::{self, Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
@@ -169,10 +170,13 @@ fn of_a_thousand_coincident_triangles_the_first_is_hit() {
     }
 }
 
+/// Of calls that are refused before they reach it.
+const MEMORY: Region = Region::unbounded(16);
+
 #[test]
 fn loads_lane_by_lane_need_a_workgroup_of_one_subgroup() {
     let limits = &device().limits;
-    let buffers = TraceBuffers { structure: 16, rays: 16, hits: 16, work: None, count: 0 };
+    let buffers = TraceBuffers { structure: 16, rays: MEMORY, hits: MEMORY, work: None, count: 0 };
     let shape = TraceShape { workgroup: 2 * limits.subgroup_size, ..TraceShape::lanes(limits) };
     let refused = device().run(None, |recorder| tracer::record(recorder, &shape, Query::ClosestHit, &buffers));
     assert!(refused.expect_err("two subgroups").to_string().contains("lane by lane"));
@@ -180,7 +184,24 @@ fn loads_lane_by_lane_need_a_workgroup_of_one_subgroup() {
 
 #[test]
 fn too_many_rays_are_refused() {
-    let buffers = TraceBuffers { structure: 16, rays: 16, hits: 16, work: None, count: (1 << 27) + 1 };
+    let buffers = TraceBuffers { structure: 16, rays: MEMORY, hits: MEMORY, work: None, count: (1 << 27) + 1 };
     let refused = device().run(None, |recorder| tracer::record(recorder, &shapes()[0], Query::ClosestHit, &buffers));
     assert!(refused.expect_err("more than 2^27").to_string().contains("134217728"));
+}
+
+#[test]
+fn too_little_memory_is_refused_by_name() {
+    let of = |bytes| Region { address: 16, bytes };
+    let (rays, hits, work) = (of(320), of(160), of(120));
+    let small = [
+        (of(319), hits, work, "memory of rays of 319"),
+        (rays, of(159), work, "memory for hits of 159"),
+        (rays, hits, of(119), "memory for work of 119"),
+    ];
+    for (rays, hits, work, expected) in small {
+        let buffers = TraceBuffers { structure: 16, rays, hits, work: Some(work), count: 10 };
+        let traced = device().run(None, |recorder| tracer::record(recorder, &shapes()[0], Query::ClosestHit, &buffers));
+        let refused = traced.expect_err("too little").to_string();
+        assert!(refused.contains(expected), "{refused}");
+    }
 }

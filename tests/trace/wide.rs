@@ -10,6 +10,7 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::wide::Form;
 use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
+use hedgerow::gpu::Region;
 use hedgerow::trace::tracer::{Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
@@ -199,8 +200,9 @@ fn of_a_thousand_coincident_triangles_the_first_is_hit() {
 
 #[test]
 fn what_there_is_no_kernel_for_is_refused() {
+    const MEMORY: Region = Region::unbounded(16);
     let limits = &device().limits;
-    let buffers = TraceBuffers { structure: 16, rays: 16, hits: 16, work: None, count: 0 };
+    let buffers = TraceBuffers { structure: 16, rays: MEMORY, hits: MEMORY, work: None, count: 0 };
     for (form, order, shape) in [
         (Form::Four, Order::Octant, TraceShape::subgroups(limits)),
         (Form::Eight, Order::Distance, TraceShape::lanes(limits)),

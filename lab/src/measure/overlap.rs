@@ -93,7 +93,7 @@ pub fn on_device(
     let measure = OverlapPass::new(device, records);
     let scratch = device.buffer("overlap: scratch", measure.scratch_bytes())?;
     let result = device.buffer("overlap: figures", size_of::<OverlapFigures>() as u64)?;
-    let buffers = OverlapBuffers { structure, scratch: scratch.address(), result: result.address() };
+    let buffers = OverlapBuffers { structure, scratch: scratch.region(), result: result.region() };
     device.run(None, |recorder| measure.begin(recorder, &buffers))?;
     for first in (0..records).step_by(PIECE as usize) {
         if over(deadline) {

@@ -60,7 +60,7 @@ impl<'a> DeviceBvh<'a> {
         let input = Input::mesh(vertices[0].address(), mesh.positions.len() as u32, vertices[1].address(), count);
         let structure = device.buffer("structure", sizes.structure)?;
         let scratch = device.buffer("scratch", sizes.scratch)?;
-        bvh.record(&mut Recorder::warming(device), &input, structure.address(), scratch.address())?;
+        bvh.record(&mut Recorder::warming(device), &input, structure.region(), scratch.region())?;
         Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
@@ -130,10 +130,9 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn build(&mut self) -> Result<BuildRun> {
-        let (structure, scratch) = (self.structure.address(), self.scratch.address());
         self.device.run(Some(&mut self.timestamps), |recorder| {
-            self.bvh.record(recorder, &self.input, structure, scratch)?;
-            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, structure))
+            self.bvh.record(recorder, &self.input, self.structure.region(), self.scratch.region())?;
+            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, self.structure.address()))
         })?;
         Ok(BuildRun::of(self.timestamps.phases()?))
     }
@@ -154,7 +153,7 @@ impl Subject for DeviceBvh<'_> {
         let measure = quality::QualityPass::new(self.device, self.bvh.record_count());
         let scratch = self.device.buffer("quality: scratch", measure.scratch_bytes())?;
         let result = self.device.buffer("quality: figures", size_of::<QualityFigures>() as u64)?;
-        self.device.run(None, |r| measure.record(r, self.structure.address(), scratch.address(), result.address()))?;
+        self.device.run(None, |r| measure.record(r, self.structure.address(), scratch.region(), result.region()))?;
         Ok(record::Quality::of(&result.read::<QualityFigures>(1)[0].quality(c_t, c_i), c_t, c_i))
     }
 

@@ -2,7 +2,7 @@
 
 use crate::device::{Buffer, Device};
 use crate::{Error, Result};
-use hedgerow::gpu::{Recorder, Timestamps};
+use hedgerow::gpu::{Recorder, Region, Timestamps};
 use hedgerow::trace::tracer::TraceBuffers;
 use hedgerow::trace::{Hit, Ray, Work};
 
@@ -33,8 +33,8 @@ impl<'a> RayBuffers<'a> {
         self.hits.read(self.count as usize)
     }
 
-    fn buffers(&self, structure: u64, work: Option<u64>) -> TraceBuffers {
-        TraceBuffers { structure, rays: self.rays.address(), hits: self.hits.address(), work, count: self.count }
+    fn buffers(&self, structure: u64, work: Option<Region>) -> TraceBuffers {
+        TraceBuffers { structure, rays: self.rays.region(), hits: self.hits.region(), work, count: self.count }
     }
 }
 
@@ -99,7 +99,7 @@ impl<'a> DeviceRays<'a> {
     ) -> Result<Option<Vec<Work>>> {
         let Some(uploaded) = &self.uploaded else { return Ok(None) };
         let work = self.device.buffer("work", u64::from(uploaded.count) * size_of::<Work>() as u64)?;
-        let buffers = uploaded.buffers(structure, Some(work.address()));
+        let buffers = uploaded.buffers(structure, Some(work.region()));
         self.device.run(None, |recorder| record(recorder, &buffers))?;
         Ok(Some(work.read(uploaded.count as usize)))
     }

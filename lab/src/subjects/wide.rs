@@ -34,7 +34,7 @@ impl<'a> WideTree<'a> {
         let sizes = collapse.sizes();
         let structure = device.buffer("wide structure", sizes.structure)?;
         let scratch = device.buffer("wide scratch", sizes.scratch)?;
-        collapse.record(&mut Recorder::warming(device), 0, structure.address(), scratch.address())?;
+        collapse.record(&mut Recorder::warming(device), 0, structure.region(), scratch.region())?;
         Ok(WideTree { tracer, collapse, sizes, structure, scratch })
     }
 
@@ -44,7 +44,7 @@ impl<'a> WideTree<'a> {
     /// A pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, source: u64) -> hedgerow::Result<()> {
         recorder.barrier();
-        self.collapse.record(recorder, source, self.structure.address(), self.scratch.address())
+        self.collapse.record(recorder, source, self.structure.region(), self.scratch.region())
     }
 
     /// Address of the structure.

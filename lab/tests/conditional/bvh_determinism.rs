@@ -34,7 +34,7 @@ fn twenty_builds_give_the_same_bytes_and_touch_nothing_else() {
             let scratch = device.upload("scratch", &guarded(sizes.scratch)).unwrap();
             let mut first: Option<Vec<u8>> = None;
             for run in 0..20 {
-                device.run(None, |r| lbvh.record(r, &input, structure.address(), scratch.address())).unwrap();
+                device.run(None, |r| lbvh.record(r, &input, structure.region(), scratch.region())).unwrap();
                 let bytes = structure.read::<u8>(sizes.structure as usize);
                 let first = first.get_or_insert_with(|| bytes.clone());
                 assert!(bytes == *first, "{name} {schedule}: run {run} gave other bytes");

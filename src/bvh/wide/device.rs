@@ -4,10 +4,9 @@ use super::Form;
 use crate::Result;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::node_slots;
-use crate::gpu::Sizes;
 use crate::gpu::arguments;
 use crate::gpu::plan::Plan;
-use crate::gpu::{Context, Grid, Kernel, Recorder, fill, scan, shaders};
+use crate::gpu::{Context, Grid, Kernel, Recorder, Region, Sizes, fill, scan, shaders};
 use std::ops::Range;
 
 /// What is collapsed into what.
@@ -130,15 +129,18 @@ impl WidePass {
         FIRST_LEVELS..(2 * full).clamp(FIRST_LEVELS, LEVELS)
     }
 
-    /// Records the collapsing of the `Bvh2` at address `source` into the wide tree at `target`, with scratch memory at
-    /// `scratch`, of the bytes and alignment that [`WidePass::sizes`] tells. The phase is `wide`.
+    /// Records the collapsing of the `Bvh2` at address `source` into the wide tree `target`, with scratch memory, of the bytes
+    /// and alignment of [`WidePass::sizes`]. The phase is `wide`.
     ///
     /// The source is left as it is; the target stands alone. The caller places a barrier (shader write to shader read and
     /// write) before and behind.
     ///
     /// # Errors
-    /// A pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, source: u64, target: u64, scratch: u64) -> Result<()> {
+    /// The memory is too small; a pipeline could not be made.
+    pub fn record(&self, recorder: &mut Recorder<'_>, source: u64, target: Region, scratch: Region) -> Result<()> {
+        let sizes = self.sizes();
+        let target = target.checked("memory for a wide tree", sizes.structure, sizes.alignment)?;
+        let scratch = scratch.checked("scratch memory for a wide tree", sizes.scratch, sizes.alignment)?;
         let form = self.options.form;
         let parts = self.scratch();
         let arguments = arguments::WideCollapse {

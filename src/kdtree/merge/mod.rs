@@ -54,7 +54,7 @@ pub struct MergeSizes {
 
 /// Where a merge works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Memory {
+pub struct MergeMemory {
     /// The static tree with its room, and then the merged one.
     pub structure: Region,
     /// Of the bytes that [`Merger::sizes`] tells.
@@ -226,7 +226,7 @@ impl Merger {
     /// # Errors
     /// The memory is too small; more objects or triangles than the merger is for; several geometries in one; primitives that are
     /// numbered twice; a pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, memory: Memory, objects: &[Object]) -> Result<()> {
+    pub fn record(&self, recorder: &mut Recorder<'_>, memory: MergeMemory, objects: &[Object]) -> Result<()> {
         let mut objects = objects.to_vec();
         objects.sort_by_key(|object| object.first_primitive);
         self.check(&objects)?;
@@ -236,11 +236,11 @@ impl Merger {
         recorder.chains(&[self.steps([structure, scratch, undo], &objects)])
     }
 
-    fn structure_of(&self, memory: &Memory) -> Result<u64> {
+    fn structure_of(&self, memory: &MergeMemory) -> Result<u64> {
         memory.structure.checked("memory of a kd-tree that is merged into", self.structure_bytes, 16)
     }
 
-    fn undo_of(&self, memory: &Memory) -> Result<u64> {
+    fn undo_of(&self, memory: &MergeMemory) -> Result<u64> {
         let sizes = self.sizes();
         memory.undo.checked("memory for what a merge overwrites", sizes.undo, sizes.alignment)
     }
@@ -251,7 +251,7 @@ impl Merger {
     ///
     /// # Errors
     /// The memory is too small; a pipeline could not be made.
-    pub fn restore(&self, recorder: &mut Recorder<'_>, memory: Memory) -> Result<()> {
+    pub fn restore(&self, recorder: &mut Recorder<'_>, memory: MergeMemory) -> Result<()> {
         let (structure, undo) = (self.structure_of(&memory)?, self.undo_of(&memory)?);
         let setup = arguments::MergeSetup { structure, undo, ..arguments::MergeSetup::zeroed() };
         let groups = self.plan.marked.div_ceil(16 * self.shape.workgroup).clamp(1, self.shape.groups);

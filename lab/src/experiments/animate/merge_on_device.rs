@@ -11,7 +11,7 @@ use hedgerow::bvh::geometry::Input;
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::Timestamps;
 use hedgerow::kdtree::layout::KdTree;
-use hedgerow::kdtree::merge::{Memory, MergeCapacity, MergeOptions, MergeReport, Merger, Object};
+use hedgerow::kdtree::merge::{MergeCapacity, MergeMemory, MergeOptions, MergeReport, Merger, Object};
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use std::borrow::Cow;
@@ -64,9 +64,9 @@ impl<'a> Place<'a> {
         Ok(Place { merger, structure, scratch, undo })
     }
 
-    fn memory(&self) -> Memory {
+    fn memory(&self) -> MergeMemory {
         let Place { structure, scratch, undo, .. } = self;
-        Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() }
+        MergeMemory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() }
     }
 
     fn report(&self) -> MergeReport {

@@ -101,7 +101,7 @@ impl Backend for Ours {
         let ray_buffer = self.2.upload("rays", rays).expect("memory");
         let hits = self.2.buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
         let structure = self.address(structure);
-        let buffers = TraceBuffers { structure, rays: ray_buffer.address(), hits: hits.address(), work: None, count };
+        let buffers = TraceBuffers { structure, rays: ray_buffer.region(), hits: hits.region(), work: None, count };
         let shape = TraceShape::of(self.2);
         self.2.run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
         hits.read(rays.len())

@@ -25,9 +25,9 @@ pub fn traced(
     let work = device.upload("work", &vec![Work::default(); rays.len()])?;
     let buffers = TraceBuffers {
         structure: structure.address(),
-        rays: ray_buffer.address(),
-        hits: hits.address(),
-        work: count_work.then_some(work.address()),
+        rays: ray_buffer.region(),
+        hits: hits.region(),
+        work: count_work.then_some(work.region()),
         count: rays.len() as u32,
     };
     device.run(None, |recorder| record(recorder, &buffers))?;

@@ -47,7 +47,7 @@ pub fn built(device: &Device, options: &BuildOptions, input: &Input) -> Bvh2 {
     // Whatever was there before changes nothing.
     structure.write(&vec![0x5Au8; sizes.structure as usize]);
     scratch.write(&vec![0xA5u8; sizes.scratch as usize]);
-    device.run(None, |r| builder.record(r, input, structure.address(), scratch.address())).expect("it builds");
+    device.run(None, |r| builder.record(r, input, structure.region(), scratch.region())).expect("it builds");
     let bytes = structure.read::<u8>(sizes.structure as usize);
     let tree = Bvh2::from_bytes(&bytes).expect("a structure");
     assert!(tree.to_bytes() == bytes, "bytes that belong to no part");

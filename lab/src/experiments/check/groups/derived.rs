@@ -42,7 +42,7 @@ fn wide_as_on_host<N: WideNode>(device: &Device, tree: &Bvh2) -> Found {
     let guarded = |bytes: u64| [vec![0xEEu8; bytes as usize], GUARD.to_vec()].concat();
     let target = device.upload("target", &guarded(sizes.structure))?;
     let scratch = device.upload("scratch", &guarded(sizes.scratch))?;
-    device.run(None, |r| wide.record(r, source.address(), target.address(), scratch.address()))?;
+    device.run(None, |r| wide.record(r, source.address(), target.region(), scratch.region()))?;
     same("bytes behind the tree", &target.read_at::<u8>(sizes.structure, GUARD.len()), &GUARD.to_vec())?;
     same("bytes behind the scratch memory", &scratch.read_at::<u8>(sizes.scratch, GUARD.len()), &GUARD.to_vec())?;
     let header: Header = target.read(1)[0];
@@ -84,7 +84,7 @@ fn refit_as_on_host(device: &Device, tree: &Bvh2, mesh: &Mesh, schedule: refit::
     let bytes = tree.to_bytes();
     let structure = device.upload("structure", &[&bytes[..], &GUARD].concat())?;
     let scratch = device.upload("scratch", &vec![0xA5u8; refit.scratch_bytes() as usize])?;
-    device.run(None, |recorder| refit.record(recorder, &input, structure.address(), scratch.address()))?;
+    device.run(None, |recorder| refit.record(recorder, &input, structure.region(), scratch.region()))?;
     same("bytes behind the tree", &structure.read_at::<u8>(bytes.len() as u64, GUARD.len()), &GUARD.to_vec())?;
     let got = Bvh2::<Triangle>::from_bytes(&structure.read::<u8>(bytes.len()))?;
     // Points have a cost that is no number, which equals nothing.

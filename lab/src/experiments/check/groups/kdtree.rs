@@ -9,7 +9,7 @@ use hedgerow::bvh::builder::{Input, Schedule};
 use hedgerow::bvh::layout::status;
 use hedgerow::kdtree::builder::{KdBuilder, KdOptions, KdReport};
 use hedgerow::kdtree::layout::{KdHeader, KdTree};
-use hedgerow::kdtree::merge::{self, Memory, MergeCapacity, Merger, Object};
+use hedgerow::kdtree::merge::{self, MergeCapacity, MergeMemory, Merger, Object};
 use hedgerow::kdtree::twin;
 
 fn meshes(cases: &Cases<'_>) -> Vec<Mesh> {
@@ -128,7 +128,7 @@ fn merged_as_on_host(device: &Device, still: &Corners, objects: &[Corners], sche
     let expected = twin::merge::merge(&still, &twins, costs, (bins, exact))?;
     expected.validate()?;
 
-    let memory = || Memory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
+    let memory = || MergeMemory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() };
     let tree = || KdTree::from_bytes(&structure.read::<u8>(before.len()));
     device.run(None, |recorder| merger.record(recorder, memory(), &given))?;
     let report: merge::MergeReport = scratch.read_at(merger.report_range().start, 1)[0];

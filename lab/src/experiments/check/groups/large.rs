@@ -59,7 +59,7 @@ fn many_rays(cases: &mut Cases<'_>) {
         let ray_buffer = device.upload("rays", &rays)?;
         let hits = device.buffer("hits", (size_of::<Hit>() * rays.len()) as u64)?;
         let (structure, count) = (structure.address(), rays.len() as u32);
-        let buffers = TraceBuffers { structure, rays: ray_buffer.address(), hits: hits.address(), work: None, count };
+        let buffers = TraceBuffers { structure, rays: ray_buffer.region(), hits: hits.region(), work: None, count };
         device.run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers))?;
         let expected: Vec<Hit> = some.par_iter().map(|ray| host::closest_hit(&tree, ray)).collect();
         let expected: Vec<Hit> = expected.into_iter().cycle().take(rays.len()).collect();
