@@ -18,7 +18,7 @@ use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::Result;
 use hedgerow_lab::device::{Buffer, Device, DeviceOptions, DriverTracing};
 use hedgerow_lab::experiments::accel::batch::{Batch, Workload};
-use hedgerow_lab::experiments::accel::points::Way;
+use hedgerow_lab::experiments::accel::points::Submission;
 use hedgerow_lab::rays::kinds::{self, RayKind, RayOptions};
 use hedgerow_lab::scene::{self, LoadOptions, Scene};
 use hedgerow_lab::subjects::structures::Structures;
@@ -195,7 +195,7 @@ fn batch(c: &mut Criterion) {
     group.sample_size(10).throughput(Throughput::Elements(COUNT.into()));
     for (whose, structures) in makers {
         let batch = Batch::new(structures, &workload).expect("memory");
-        for way in [Way::OneCall, Way::OneSubmit, Way::SubmitEach] {
+        for way in [Submission::OneCall, Submission::OneSubmit, Submission::SubmitEach] {
             let name = format!("{}{whose}", way.name());
             group.bench_function(name, |b| b.iter(|| batch.build(way, workload.count()).expect("it builds")));
         }

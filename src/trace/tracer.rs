@@ -103,11 +103,11 @@ const LEVEL_BYTES: u32 = 8;
 pub struct TraceBuffers {
     /// Address of a `Bvh2`, or of what else a tracer says that it takes. One whose status says that it is too deep or unfinished is traced as if it were empty.
     pub structure: u64,
-    /// [`Ray`](super::Ray) × `count`.
+    /// [`Ray`] × `count`.
     pub rays: Region,
-    /// [`Hit`](super::Hit) × `count`, written.
+    /// [`Hit`] × `count`, written.
     pub hits: Region,
-    /// [`Work`](super::Work) × `count`, written: counting takes time, so it has a kernel of its own.
+    /// [`Work`] × `count`, written: counting takes time, so it has a kernel of its own.
     pub work: Option<Region>,
     /// How many rays; at most [`MAX_RAYS`].
     pub count: u32,

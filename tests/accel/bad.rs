@@ -7,7 +7,7 @@ use crate::common::backends::{Backend, Built, Ours, vk_geometry};
 use crate::common::device;
 use crate::common::geometries::Owned;
 use crate::common::matrices::{moved, rotation, scaled};
-use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, Report};
+use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, ProbeReport};
 use crate::common::shapes::{Corners, boxes, soup};
 use crate::common::world::{BuiltWorld, Part, World, bottom_level, instances_at, top_level};
 use hedgerow::accel::Instance;
@@ -115,7 +115,7 @@ fn random_bits_as_vertices_make_valid_trees() {
 
 /// Whatever was met, it was met between the limits.
 #[track_caller]
-fn assert_finite(what: &str, rays: &[ProbeRay], reports: &[Report]) {
+fn assert_finite(what: &str, rays: &[ProbeRay], reports: &[ProbeReport]) {
     for (ray, report) in rays.iter().zip(reports) {
         let hit = &report.committed;
         let between = ray.t_min < hit.t && hit.t < ray.t_max || hit.kind == 2 && hit.t == ray.generated_t;

@@ -3,7 +3,7 @@
 use crate::common::backends::{Backend, Built, Copies, Drivers, Ours, vk_geometry};
 use crate::common::device;
 use crate::common::geometries::Owned;
-use crate::common::probe::{CONFIRM_ODD, ProbeRay, Report};
+use crate::common::probe::{CONFIRM_ODD, ProbeRay, ProbeReport};
 use crate::common::shapes::{Corners, hard_rays, ray, soup, tree_with};
 use crate::common::world::{Part, World};
 use hedgerow::accel::serialize::Head;
@@ -437,7 +437,7 @@ fn a_world_that_was_read_back_answers_queries_as_before() {
     let rays = probe_rays();
     for flags in [vk::BuildAccelerationStructureFlagsKHR::empty(), accel::REBRAID] {
         let built = World { flags, ..world() }.build(&backend);
-        let before: Vec<Report> = backend.probe(built.top.structure, &rays);
+        let before: Vec<ProbeReport> = backend.probe(built.top.structure, &rays);
         assert!(
             before.iter().filter(|report| report.committed.kind != 0).count() > 500,
             "rays that hit nothing are no test"

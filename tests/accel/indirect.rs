@@ -5,7 +5,7 @@ use crate::common::backends::{Backend, Built, Ours, vk_geometry};
 use crate::common::device;
 use crate::common::geometries::{MOVED, Owned};
 use crate::common::matrices::{moved, rotation};
-use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, Report};
+use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, ProbeReport};
 use crate::common::shapes::{add, boxes, soup};
 use crate::common::world::{Part, World, instances_at};
 use hedgerow::accel::{Instance, REBRAID};
@@ -78,7 +78,7 @@ fn rays(scale: f32) -> Vec<ProbeRay> {
 }
 
 /// What does not depend on the order of the tree.
-fn told(report: &Report) -> (crate::common::probe::Meeting, u32, Vec<[u32; 4]>) {
+fn told(report: &ProbeReport) -> (crate::common::probe::Meeting, u32, Vec<[u32; 4]>) {
     let candidates = if report.candidate_count > 8 { Vec::new() } else { report.sorted_candidates() };
     (report.committed, report.candidate_count, candidates)
 }

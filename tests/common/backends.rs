@@ -2,7 +2,7 @@
 
 use super::device;
 use super::geometries::Owned;
-use super::probe::{self, Probe, ProbeRay, Report};
+use super::probe::{self, Probe, ProbeRay, ProbeReport};
 use hedgerow::ash::{self, vk};
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
 use hedgerow::gpu::Recorder;
@@ -79,7 +79,7 @@ impl Backend for Drivers {
         u64::from(limits.min_acceleration_structure_scratch_offset_alignment).max(1)
     }
 
-    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<Report> {
+    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport> {
         self.1.ask(self.address(structure), rays)
     }
 

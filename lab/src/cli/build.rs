@@ -2,7 +2,7 @@
 
 use super::options::{Builders, Costs};
 use super::{Common, Json, tables, work};
-use crate::experiments::bench::matrix::Plan;
+use crate::experiments::bench::matrix::BenchPlan;
 use crate::measure::copy;
 use crate::measure::overlap::Epo;
 use crate::rays::kinds::RayOptions;
@@ -45,7 +45,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     }
     let scene = common.load(&arguments.scene)?;
     let device = work::device_for(common, builders)?;
-    let plan = Plan {
+    let plan = BenchPlan {
         builders: builders.clone(),
         runs: arguments.runs.get(),
         kinds: Vec::new(),

@@ -2,7 +2,7 @@
 
 use super::options::{Builders, Kinds};
 use super::{Common, Json, Size, tables, work};
-use crate::experiments::bench::matrix::Plan;
+use crate::experiments::bench::matrix::BenchPlan;
 use crate::measure::overlap::Epo;
 use crate::rays::files;
 use crate::report::numbers::{grouped, three_digits};
@@ -64,7 +64,7 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         writeln!(std::io::stdout(), "{}: {rays} rays, {hits} hits, {speed} Mrays/s", builders[0])?;
         return work::finish(device.as_ref(), true);
     }
-    let plan = Plan {
+    let plan = BenchPlan {
         builders: builders.clone(),
         runs: arguments.runs.get(),
         kinds: arguments.rays.0.clone(),

@@ -2,7 +2,7 @@
 
 use super::{Bar, Common};
 use crate::device::{Device, probe};
-use crate::experiments::bench::matrix::{self, Outcome, Plan};
+use crate::experiments::bench::matrix::{self, BenchPlan, Outcome};
 use crate::scene::Scene;
 use crate::subjects::builders::{Needs, Spec};
 use anyhow::bail;
@@ -64,7 +64,7 @@ fn check_driver(device: &Device, builders: &[Spec]) -> anyhow::Result<()> {
 }
 
 /// Measures `plan` on `scene`: the outcomes, and whether all went well. Failures go to stderr.
-pub fn measured(common: &Common, scene: &Scene, device: Option<&Device>, plan: &Plan) -> (Vec<Outcome>, bool) {
+pub fn measured(common: &Common, scene: &Scene, device: Option<&Device>, plan: &BenchPlan) -> (Vec<Outcome>, bool) {
     let bar = Bar::new(common, &scene.name, 0);
     let (outcomes, failures) = matrix::measure(scene, device, plan, &mut |what| bar.say(what));
     drop(bar);

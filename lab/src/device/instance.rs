@@ -49,7 +49,7 @@ const DRIVER_VARIABLES: [&str; 3] = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_
 /// # Errors
 /// No Vulkan loader, no device, or `wanted` is not there.
 pub fn list(wanted: Option<&str>) -> Result<Vec<Found>> {
-    let instance = Instance::new(false)?;
+    let instance = VulkanInstance::new(false)?;
     let mut found: Vec<_> = instance.devices()?.into_iter().map(|(_, found)| found).collect();
     let picked = pick(&found, wanted)?;
     found[picked].picked = true;
@@ -97,7 +97,7 @@ fn no_device(why: &str) -> Error {
 }
 
 /// The loader, an instance and the messages of its validation layers.
-pub(super) struct Instance {
+pub(super) struct VulkanInstance {
     // Dropped last: unloads the Vulkan library.
     entry: ManuallyDrop<ash::Entry>,
     pub raw: ash::Instance,
@@ -108,8 +108,8 @@ pub(super) struct Instance {
     messages: Arc<Mutex<Vec<String>>>,
 }
 
-impl Instance {
-    pub fn new(validation: bool) -> Result<Instance> {
+impl VulkanInstance {
+    pub fn new(validation: bool) -> Result<VulkanInstance> {
         // SAFETY: loading the system's Vulkan loader runs its initialisers, as every Vulkan program does.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| Error::NoVulkan(e.to_string()))?;
         // SAFETY: the loader is loaded.
@@ -173,7 +173,7 @@ impl Instance {
             debug = Some((utils, messenger));
         }
         let layers = layer.filter(|_| validation).map(|layer| layer.spec_version);
-        Ok(Instance { entry: ManuallyDrop::new(entry), raw, debug, has_debug_utils, layers, messages })
+        Ok(VulkanInstance { entry: ManuallyDrop::new(entry), raw, debug, has_debug_utils, layers, messages })
     }
 
     /// Validation layers complain of extensions that are younger than they are.
@@ -241,7 +241,7 @@ impl Instance {
     }
 }
 
-impl Drop for Instance {
+impl Drop for VulkanInstance {
     fn drop(&mut self) {
         // SAFETY: everything made from the instance is gone; the entry is not used afterwards.
         unsafe {

@@ -23,7 +23,7 @@ use driver_tracing::DriverFeatures;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use hedgerow::gpu::{Context, ContextDesc, Optional, Recorder, Timestamps, TuningChoice, requirements};
-use instance::{Instance, pick};
+use instance::{VulkanInstance, pick};
 use memory::Staging;
 use std::mem::ManuallyDrop;
 use std::ops::Deref;
@@ -70,7 +70,7 @@ pub struct Device {
     /// Whether the host maps all memory, or stages what it writes and reads.
     maps_memory: bool,
     staging: Mutex<Staging>,
-    instance: Instance,
+    instance: VulkanInstance,
 }
 
 impl Deref for Device {
@@ -87,7 +87,7 @@ impl Device {
     /// # Errors
     /// No Vulkan, no such device, or it lacks something that [`requirements`] names.
     pub fn new(options: &DeviceOptions) -> Result<Device> {
-        let instance = Instance::new(options.validation)?;
+        let instance = VulkanInstance::new(options.validation)?;
         let (handles, found): (Vec<_>, Vec<_>) = instance.devices()?.into_iter().unzip();
         let picked = pick(&found, options.wanted.as_deref())?;
         let (physical, found) = (handles[picked], found[picked].clone());

@@ -30,20 +30,20 @@ pub struct Record {
     /// When, RFC 3339 UTC.
     pub when: String,
     /// Build time.
-    pub build: Build,
+    pub build: BuildRecord,
     /// Bytes.
-    pub memory: Memory,
+    pub memory: MemoryRecord,
     /// Tree quality.
-    pub quality: Quality,
+    pub quality: QualityRecord,
     /// One entry a ray kind.
-    pub trace: Vec<Trace>,
+    pub trace: Vec<TraceRecord>,
     /// Whether the structure was validated and a sample of rays agreed with brute force; `None` if not checked.
     pub valid: Option<bool>,
 }
 
 /// Build time over `runs` runs after a warm-up.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Build {
+pub struct BuildRecord {
     /// Counted runs.
     pub runs: u32,
     /// Median milliseconds.
@@ -55,18 +55,18 @@ pub struct Build {
     /// Clock: `device` (timestamps) or `wall`.
     pub timer: String,
     /// Medians a phase, in order.
-    pub phases: Vec<Phase>,
+    pub phases: Vec<PhaseRecord>,
 }
 
-impl From<&Build> for Spread {
-    fn from(build: &Build) -> Spread {
+impl From<&BuildRecord> for Spread {
+    fn from(build: &BuildRecord) -> Spread {
         Spread { median: build.median_ms, min: build.min_ms, max: build.max_ms, runs: build.runs }
     }
 }
 
 /// One phase of a build.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Phase {
+pub struct PhaseRecord {
     /// Its name.
     pub name: String,
     /// Median milliseconds.
@@ -75,7 +75,7 @@ pub struct Phase {
 
 /// Memory in bytes.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Memory {
+pub struct MemoryRecord {
     /// The finished structure.
     pub structure_bytes: Option<u64>,
     /// What the build needs beside it.
@@ -86,7 +86,7 @@ pub struct Memory {
 
 /// Quality of a tree.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Quality {
+pub struct QualityRecord {
     /// SAH cost: (c_t · Σ SA(inner) + c_i · Σ SA(leaf)·n_leaf) / SA(root).
     pub sah: Option<f64>,
     /// Cost of a traversal step: of visiting a node, whatever its width.
@@ -116,10 +116,10 @@ pub struct Quality {
     pub prims_per_leaf_max: Option<u64>,
 }
 
-impl Quality {
+impl QualityRecord {
     /// The figures of a walk over a tree.
-    pub fn of(quality: &hedgerow::bvh::quality::Quality, c_t: f64, c_i: f64) -> Quality {
-        Quality {
+    pub fn of(quality: &hedgerow::bvh::quality::Quality, c_t: f64, c_i: f64) -> QualityRecord {
+        QualityRecord {
             sah: Some(quality.sah),
             c_t,
             c_i,
@@ -131,14 +131,14 @@ impl Quality {
             depth_max: Some(u64::from(quality.depth_max)),
             prims_per_leaf: Some(quality.prims_per_leaf()),
             prims_per_leaf_max: Some(quality.leaf_max.into()),
-            ..Quality::default()
+            ..QualityRecord::default()
         }
     }
 }
 
 /// Tracing of one kind of ray.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Trace {
+pub struct TraceRecord {
     /// Ray kind.
     pub rays: String,
     /// How many.
@@ -171,7 +171,7 @@ impl Record {
     }
 
     /// Tracing of one kind of ray, where it was measured.
-    pub fn rays(&self, kind: &str) -> Option<&Trace> {
+    pub fn rays(&self, kind: &str) -> Option<&TraceRecord> {
         self.trace.iter().find(|t| t.rays == kind)
     }
 }
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn a_figure_that_was_not_measured_is_null() {
         let mut record = example();
-        record.quality = Quality { c_t: 3.0, c_i: 2.0, ..Quality::default() };
+        record.quality = QualityRecord { c_t: 3.0, c_i: 2.0, ..QualityRecord::default() };
         record.valid = None;
         let value = serde_json::to_value(&record).expect("a record is JSON");
         assert!(value["quality"]["sah"].is_null() && value["valid"].is_null(), "{value}");
@@ -222,7 +222,7 @@ mod tests {
         record.build.median_ms = 250.0;
         assert_eq!(record.mtris_s(), 4.0);
         // 2 million rays at 1 Mray/s and 2 million at 4 Mrays/s: 4 million in 2.5 s.
-        let trace = |mrays_s| Trace { count: 2_000_000, mrays_s, ..record.trace[0].clone() };
+        let trace = |mrays_s| TraceRecord { count: 2_000_000, mrays_s, ..record.trace[0].clone() };
         record.trace = vec![trace(1.0), trace(4.0)];
         assert_eq!(record.mrays_s(), Some(1.6));
         record.trace.clear();

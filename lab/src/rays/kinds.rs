@@ -123,7 +123,7 @@ pub fn generate(
 
 /// Where the pixels of a picture lie in space.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Frame {
+pub(crate) struct Basis {
     /// Where the camera is.
     pub eye: DVec3,
     /// Three directions at right angles, of unit length.
@@ -136,9 +136,9 @@ pub(crate) struct Frame {
     pub half: [f64; 2],
 }
 
-impl Frame {
+impl Basis {
     /// Of a picture with so many pixels in x and y.
-    pub fn of(camera: &Camera, [width, height]: [u32; 2]) -> Frame {
+    pub fn of(camera: &Camera, [width, height]: [u32; 2]) -> Basis {
         let eye = dvec3(camera.eye);
         let forward = (dvec3(camera.look) - eye).normalize_or(DVec3::NEG_Z);
         // A camera that looks straight up has no right; any direction across will do.
@@ -146,12 +146,12 @@ impl Frame {
         let up = right.cross(forward);
         let half_height = (f64::from(camera.fov).to_radians() / 2.0).tan();
         let half_width = half_height * f64::from(width) / f64::from(height);
-        Frame { eye, forward, right, up, half: [half_width, half_height] }
+        Basis { eye, forward, right, up, half: [half_width, half_height] }
     }
 }
 
 fn primary(camera: &Camera, [width, height]: [u32; 2]) -> Vec<Ray> {
-    let Frame { forward, right, up, half: [half_width, half_height], .. } = Frame::of(camera, [width, height]);
+    let Basis { forward, right, up, half: [half_width, half_height], .. } = Basis::of(camera, [width, height]);
     (0..width as usize * height as usize)
         .into_par_iter()
         .map(|pixel| {

@@ -70,12 +70,18 @@ fn cell(pair: Option<&Pair>) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::record::{Build, Quality, SCHEMA, Trace};
+    use crate::measure::record::{BuildRecord, QualityRecord, SCHEMA, TraceRecord};
 
     fn record(builder: &str, median_ms: f64, mrays_s: f64) -> Record {
-        let build =
-            Build { runs: 1, median_ms, min_ms: median_ms, max_ms: median_ms, timer: "device".into(), phases: vec![] };
-        let trace = Trace {
+        let build = BuildRecord {
+            runs: 1,
+            median_ms,
+            min_ms: median_ms,
+            max_ms: median_ms,
+            timer: "device".into(),
+            phases: vec![],
+        };
+        let trace = TraceRecord {
             rays: "primary".into(),
             count: 100,
             hits: 50,
@@ -98,7 +104,7 @@ mod tests {
             when: "w".into(),
             build,
             memory: Default::default(),
-            quality: Quality::default(),
+            quality: QualityRecord::default(),
             trace: vec![trace],
             valid: Some(true),
         }

@@ -7,9 +7,9 @@ const Y: [f32; 3] = [0.0, 1.0, 0.0];
 const Z: [f32; 3] = [0.0, 0.0, 1.0];
 
 /// Scene, eye, look-at, up and vertical field of view.
-type Place = (&'static str, [f32; 3], [f32; 3], [f32; 3], f32);
+type KnownCamera = (&'static str, [f32; 3], [f32; 3], [f32; 3], f32);
 
-const KNOWN: [Place; 23] = [
+const KNOWN: [KnownCamera; 23] = [
     ("pigman", [2.0, 2.0, 3.0], [0.0, 0.9, 0.0], Y, 40.0),
     ("knot", [2.6, 4.6, 5.4], [0.0, 0.0, 0.0], Y, 45.0),
     ("grass", [0.3, 0.6, 2.4], [0.0, 0.3, 0.0], Y, 60.0),

@@ -1,7 +1,7 @@
 //! `.inst`: placed copies of the objects of an OBJ file, one a line: the object's `o` name and a row-major 3×4
 //! object-to-world matrix; `#` begins a comment. `NAME.inst` places the objects of `NAME_parts.obj` beside it.
 
-use super::{Instance, Instances, LoadOptions, Mesh, cameras, check, lookup, obj, source};
+use super::{Instances, LoadOptions, Mesh, SceneInstance, cameras, check, lookup, obj, source};
 use crate::{Error, Result};
 use hedgerow::geometry::Aabb;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Instances> 
         let Some((name, transform)) = instance(&place, text)? else { continue };
         let before = instances.len();
         for part in (0..names.len()).filter(|&part| names[part] == name) {
-            let instance = Instance { part: part as u32, transform };
+            let instance = SceneInstance { part: part as u32, transform };
             placed_is_finite(&place, &parts[part], &boxes[part], &instance)?;
             instances.push(instance);
         }
@@ -66,7 +66,7 @@ fn instance<'a>(place: &str, line: &'a str) -> Result<Option<(&'a str, Matrix)>>
 }
 
 /// Every vertex is finite where the instance puts it; `bounds` is around all of them.
-fn placed_is_finite(place: &str, part: &Mesh, bounds: &Aabb, instance: &Instance) -> Result<()> {
+fn placed_is_finite(place: &str, part: &Mesh, bounds: &Aabb, instance: &SceneInstance) -> Result<()> {
     // The corners of the box go as far as any vertex, so that the vertices are asked only to name the one at fault.
     let Aabb { lo, hi } = instance.place_box(bounds);
     if part.positions.is_empty() || lo.into_iter().chain(hi).all(f32::is_finite) {

@@ -14,7 +14,7 @@ pub struct Instances {
     /// What is placed; each becomes a bottom-level structure. A part that no instance names is legal.
     pub parts: Vec<Mesh>,
     /// Where the parts stand, in the order in which they are flattened.
-    pub instances: Vec<Instance>,
+    pub instances: Vec<SceneInstance>,
     /// Where to look from.
     pub camera: Camera,
     /// Lights, in world space; may be empty.
@@ -23,14 +23,14 @@ pub struct Instances {
 
 /// One placed part.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Instance {
+pub struct SceneInstance {
     /// The position in [`Instances::parts`].
     pub part: u32,
     /// Object to world, row by row; the fourth column is the translation. All finite, and so is every vertex it places.
     pub transform: [[f32; 4]; 3],
 }
 
-impl Instance {
+impl SceneInstance {
     /// Leaves the part where it is.
     pub const IDENTITY: [[f32; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
@@ -45,7 +45,7 @@ impl Instance {
 
     /// A box around every placed point of `bounds`: the one around its placed corners.
     ///
-    /// Rounding keeps the order of numbers and [`Instance::place`] grows or falls steadily along each axis of the part, so
+    /// Rounding keeps the order of numbers and [`SceneInstance::place`] grows or falls steadily along each axis of the part, so
     /// that no point of the box is placed outside, not even by a rounding error.
     pub fn place_box(&self, bounds: &Aabb) -> Aabb {
         (0..8).fold(Aabb::EMPTY, |placed, corner| {
@@ -63,7 +63,7 @@ impl Instances {
     pub(super) fn new(
         name: String,
         parts: Vec<Mesh>,
-        instances: Vec<Instance>,
+        instances: Vec<SceneInstance>,
         camera: impl Fn(&Aabb) -> Camera,
     ) -> Instances {
         let camera = cameras::known(&name).unwrap_or_else(|| camera(&bounds(&parts, &instances)));
@@ -107,10 +107,10 @@ impl Instances {
     }
 }
 
-fn bounds(parts: &[Mesh], instances: &[Instance]) -> Aabb {
+fn bounds(parts: &[Mesh], instances: &[SceneInstance]) -> Aabb {
     let corners: Vec<Vec<[f32; 3]>> = parts.iter().map(corners).collect();
     let boxes: Vec<Aabb> = corners.iter().map(|corners| Aabb::around(corners)).collect();
-    let with = |bounds: Aabb, instance: &Instance, corners: &[[f32; 3]]| {
+    let with = |bounds: Aabb, instance: &SceneInstance, corners: &[[f32; 3]]| {
         corners.iter().fold(bounds, |bounds, &corner| bounds.union(&Aabb::around(&[instance.place(corner)])))
     };
     // A corner of each instance, that most of them need not be asked for their others: those that cannot reach further out.
@@ -147,7 +147,7 @@ pub fn load_instances(spec: &str, options: &LoadOptions<'_>) -> Result<Instances
         return Ok(instances);
     }
     let Scene { name, mesh, camera, lights } = load(spec, options)?;
-    let instances = vec![Instance { part: 0, transform: Instance::IDENTITY }];
+    let instances = vec![SceneInstance { part: 0, transform: SceneInstance::IDENTITY }];
     Ok(Instances { name, parts: vec![mesh], instances, camera, lights })
 }
 

@@ -32,7 +32,7 @@ pub use degenerate::{Degenerate, degenerate};
 pub use dynamic::{DynamicObject, DynamicScene, load_dynamic};
 pub use frame::{Frame, Group};
 pub use generators::generators;
-pub use instances::{Instance, Instances, load_instances, load_placed};
+pub use instances::{Instances, SceneInstance, load_instances, load_placed};
 pub use lookup::{list, own_folders, weight};
 
 /// A scene, ready to build.

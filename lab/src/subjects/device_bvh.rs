@@ -137,8 +137,8 @@ impl Subject for DeviceBvh<'_> {
         Ok(BuildRun::of(self.timestamps.phases()?))
     }
 
-    fn memory(&self) -> record::Memory {
-        let binary = record::Memory {
+    fn memory(&self) -> record::MemoryRecord {
+        let binary = record::MemoryRecord {
             structure_bytes: Some(self.sizes.structure),
             scratch_bytes: Some(self.sizes.scratch),
             peak_bytes: Some(self.sizes.structure + self.sizes.scratch),
@@ -146,7 +146,7 @@ impl Subject for DeviceBvh<'_> {
         self.wide.as_ref().map_or(binary.clone(), |tree| tree.memory(&binary))
     }
 
-    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
         if let Some(tree) = &self.wide {
             return tree.quality(c_t, c_i);
         }
@@ -154,7 +154,7 @@ impl Subject for DeviceBvh<'_> {
         let scratch = self.device.buffer("quality: scratch", measure.scratch_bytes())?;
         let result = self.device.buffer("quality: figures", size_of::<QualityFigures>() as u64)?;
         self.device.run(None, |r| measure.record(r, self.structure.address(), scratch.region(), result.region()))?;
-        Ok(record::Quality::of(&result.read::<QualityFigures>(1)[0].quality(c_t, c_i), c_t, c_i))
+        Ok(record::QualityRecord::of(&result.read::<QualityFigures>(1)[0].quality(c_t, c_i), c_t, c_i))
     }
 
     fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {

@@ -19,7 +19,7 @@ use hedgerow_host::sweep::Leaves;
 
 /// How a host's builder makes the tree of what is sorted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Hierarchy {
+pub enum HostMethod {
     /// `lbvh-host`: the plain LBVH that the device's is tested against.
     Lbvh,
     /// `ploc-host`: the plain PLOC with this radius.
@@ -30,9 +30,9 @@ pub enum Hierarchy {
 
 /// What a builder on the host is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct HostBvhOptions {
     /// How the tree is made.
-    pub hierarchy: Hierarchy,
+    pub hierarchy: HostMethod,
     /// The codes; `None` takes those that the device would take for so many triangles.
     pub codes: Option<Codes>,
     /// Reinsertion behind it.
@@ -45,7 +45,7 @@ pub struct Options {
 pub struct Host<'a> {
     builder: String,
     mesh: &'a Mesh,
-    options: Options,
+    options: HostBvhOptions,
     codes: Codes,
     tree: Option<Bvh2>,
     rays: HostRays,
@@ -53,7 +53,7 @@ pub struct Host<'a> {
 
 impl<'a> Host<'a> {
     /// On `mesh`.
-    pub fn new(builder: &str, mesh: &'a Mesh, options: Options) -> Host<'a> {
+    pub fn new(builder: &str, mesh: &'a Mesh, options: HostBvhOptions) -> Host<'a> {
         Host {
             builder: builder.to_owned(),
             mesh,
@@ -70,10 +70,10 @@ impl<'a> Host<'a> {
             let collapse = &options.collapse;
             let lbvh = |collapse| lbvh::build(&mesh.positions, &mesh.triangles, *codes, collapse);
             let tree = match (options.hierarchy, options.reinsertion) {
-                (Hierarchy::Lbvh, None) => return lbvh(*collapse),
-                (Hierarchy::Lbvh, _) => lbvh(Collapse::OFF),
-                (Hierarchy::Ploc(radius), _) => ploc::build(&lbvh(Collapse::OFF), radius),
-                (Hierarchy::Sweep(leaves), _) => sweep::build(&lbvh(Collapse::OFF), collapse, leaves),
+                (HostMethod::Lbvh, None) => return lbvh(*collapse),
+                (HostMethod::Lbvh, _) => lbvh(Collapse::OFF),
+                (HostMethod::Ploc(radius), _) => ploc::build(&lbvh(Collapse::OFF), radius),
+                (HostMethod::Sweep(leaves), _) => sweep::build(&lbvh(Collapse::OFF), collapse, leaves),
             };
             match &options.reinsertion {
                 Some(reinsertion) => tree.reinserted(reinsertion).collapsed(collapse),
@@ -102,14 +102,14 @@ impl Subject for Host<'_> {
         Ok(BuildRun::whole(milliseconds))
     }
 
-    fn memory(&self) -> record::Memory {
+    fn memory(&self) -> record::MemoryRecord {
         let structure =
             layout::offsets(Primitives::Triangles.record_bytes(), self.mesh.triangles.len() as u32, 1).bytes;
-        record::Memory { structure_bytes: Some(structure), ..Default::default() }
+        record::MemoryRecord { structure_bytes: Some(structure), ..Default::default() }
     }
 
-    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
-        Ok(record::Quality::of(&quality::of(self.built(), c_t, c_i), c_t, c_i))
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
+        Ok(record::QualityRecord::of(&quality::of(self.built(), c_t, c_i), c_t, c_i))
     }
 
     fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
@@ -121,7 +121,7 @@ impl Subject for Host<'_> {
     }
 
     fn choice(&self) -> Option<String> {
-        let chosen = self.options.codes.is_none() && !matches!(self.options.hierarchy, Hierarchy::Sweep(_));
+        let chosen = self.options.codes.is_none() && !matches!(self.options.hierarchy, HostMethod::Sweep(_));
         chosen.then(|| format!("codes {}", self.codes))
     }
 

@@ -27,7 +27,7 @@ pub struct KdGpu<'a> {
     options: KdOptions,
     input: Input,
     vertices: [Buffer<'a>; 2],
-    place: Place<'a>,
+    place: PlacedBuilder<'a>,
     /// Whether the memory is as large as the last build has found that the scene needs.
     fits: bool,
     timestamps: Timestamps,
@@ -35,14 +35,14 @@ pub struct KdGpu<'a> {
 }
 
 /// A builder and its memory.
-struct Place<'a> {
+struct PlacedBuilder<'a> {
     builder: KdBuilder,
     structure: Buffer<'a>,
     scratch: Buffer<'a>,
 }
 
-impl<'a> Place<'a> {
-    fn new(device: &'a Device, name: &str, options: &KdOptions, input: &Input) -> Result<Place<'a>> {
+impl<'a> PlacedBuilder<'a> {
+    fn new(device: &'a Device, name: &str, options: &KdOptions, input: &Input) -> Result<PlacedBuilder<'a>> {
         let count = input.primitive_count;
         let builder = KdBuilder::new(device, options, count)?;
         let sizes = builder.sizes();
@@ -53,7 +53,7 @@ impl<'a> Place<'a> {
         let structure = device.buffer("structure", sizes.structure)?;
         let scratch = device.buffer("scratch", sizes.scratch)?;
         builder.record(&mut Recorder::warming(device), input, structure.region(), scratch.region())?;
-        Ok(Place { structure, scratch, builder })
+        Ok(PlacedBuilder { structure, scratch, builder })
     }
 
     fn report(&self) -> KdReport {
@@ -83,7 +83,7 @@ impl<'a> KdGpu<'a> {
             options: *options,
             input,
             vertices,
-            place: Place::new(device, name, options, &input)?,
+            place: PlacedBuilder::new(device, name, options, &input)?,
             fits: false,
             timestamps: Timestamps::new(device, PHASES)?,
             tracer: KdDevice::new(device, traversal)?,
@@ -101,7 +101,7 @@ impl<'a> KdGpu<'a> {
     }
 
     fn build_once(&mut self) -> Result<BuildRun> {
-        let Place { builder, structure, scratch } = &self.place;
+        let PlacedBuilder { builder, structure, scratch } = &self.place;
         self.device.run(Some(&mut self.timestamps), |recorder| {
             builder.record(recorder, &self.input, structure.region(), scratch.region())
         })?;
@@ -161,14 +161,15 @@ impl Subject for KdGpu<'_> {
             // Both at once may be too much.
             self.place.structure = self.device.buffer("structure", 16)?;
             self.place.scratch = self.device.buffer("scratch", 16)?;
-            self.place = Place::new(self.device, &self.name, &KdOptions { estimate, ..self.options }, &self.input)?;
+            self.place =
+                PlacedBuilder::new(self.device, &self.name, &KdOptions { estimate, ..self.options }, &self.input)?;
             self.fits = !is_short;
         }
     }
 
-    fn memory(&self) -> record::Memory {
+    fn memory(&self) -> record::MemoryRecord {
         let sizes = self.place.builder.sizes();
-        record::Memory {
+        record::MemoryRecord {
             structure_bytes: Some(sizes.structure),
             scratch_bytes: Some(sizes.scratch),
             peak_bytes: Some(sizes.structure + sizes.scratch),

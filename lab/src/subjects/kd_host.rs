@@ -67,9 +67,9 @@ impl Subject for KdHost<'_> {
         Ok(BuildRun::whole(milliseconds))
     }
 
-    fn memory(&self) -> record::Memory {
+    fn memory(&self) -> record::MemoryRecord {
         let structure_bytes = self.tree.as_ref().map(|tree| tree.header.offsets().bytes);
-        record::Memory { structure_bytes, ..Default::default() }
+        record::MemoryRecord { structure_bytes, ..Default::default() }
     }
 
     fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {

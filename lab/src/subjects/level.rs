@@ -1,6 +1,6 @@
 //! One level of acceleration structures: what it is built over, and where it lies.
 
-use super::structures::{BuildInfo, Geometry, Placed, Range, Structures, address, triangles_of};
+use super::structures::{BuildInfo, Geometry, PlacedStructure, Range, Structures, address, triangles_of};
 use crate::Result;
 use crate::device::Buffer;
 use crate::scene::Mesh;
@@ -19,7 +19,7 @@ pub struct Level<'a> {
     flags: Flags,
     geometry: [Geometry; 1],
     count: u32,
-    placed: Placed<'a>,
+    placed: PlacedStructure<'a>,
     /// Positions and indices, or instances.
     inputs: Vec<Buffer<'a>>,
 }

@@ -38,7 +38,7 @@ impl<'a> Levels<'a> {
             device.run(None, |recorder| part.record(&structures, recorder, Mode::BUILD))?;
             parts.push(part.without_inputs());
         }
-        let placed = |i: &crate::scene::Instance| parts[i.part as usize].instance(&structures, i.transform);
+        let placed = |i: &crate::scene::SceneInstance| parts[i.part as usize].instance(&structures, i.transform);
         let all: Vec<Instance> = scene.instances.iter().map(placed).collect();
         let top = Level::top(&structures, &all, flags)?;
         let timestamps = Timestamps::new(device, 1)?;

@@ -84,16 +84,16 @@ pub trait Subject {
     /// The device failed.
     fn build(&mut self) -> Result<BuildRun>;
     /// Bytes of structure and scratch.
-    fn memory(&self) -> record::Memory;
+    fn memory(&self) -> record::MemoryRecord;
     /// Quality of the built tree with the costs of a step and of a test; figures that the builder cannot tell are `None`, as they
     /// are where rays go through several trees.
     ///
     /// # Errors
     /// The device failed.
-    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
         Ok(match self.kd_tree()? {
-            Some(tree) => record::Quality::of(&kdtree::quality::on_host(&tree, c_t, c_i), c_t, c_i),
-            None => record::Quality { c_t, c_i, ..Default::default() },
+            Some(tree) => record::QualityRecord::of(&kdtree::quality::on_host(&tree, c_t, c_i), c_t, c_i),
+            None => record::QualityRecord { c_t, c_i, ..Default::default() },
         })
     }
     /// End-point overlap of the built tree with the costs of a step and of a test, if `epo` asks for it; `None` where it was not

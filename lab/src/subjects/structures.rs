@@ -21,7 +21,7 @@ pub(crate) type Sizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
 
 /// Who builds.
 #[derive(Clone)]
-enum Maker<'a> {
+enum Functions<'a> {
     Ours(accel::Device<'a>),
     Driver(functions::Device),
 }
@@ -30,27 +30,27 @@ enum Maker<'a> {
 #[derive(Clone)]
 pub struct Structures<'a> {
     pub(crate) device: &'a Device,
-    maker: Maker<'a>,
+    maker: Functions<'a>,
 }
 
 impl<'a> Structures<'a> {
     /// Ours.
     pub fn ours(device: &'a Device, options: accel::AccelOptions) -> Structures<'a> {
-        Structures { device, maker: Maker::Ours(accel::Device::with_options(device, options)) }
+        Structures { device, maker: Functions::Ours(accel::Device::with_options(device, options)) }
     }
 
     /// Those of the driver, where it has any and the device was opened with them.
     pub fn drivers(device: &'a Device) -> Option<Structures<'a>> {
         device.driver_tracing()?;
         let functions = functions::Device::new(device.ash_instance(), device.ash_device());
-        Some(Structures { device, maker: Maker::Driver(functions) })
+        Some(Structures { device, maker: Functions::Driver(functions) })
     }
 
     /// Whose they are.
-    pub fn maker(&self) -> points::Maker {
+    pub fn maker(&self) -> points::Implementation {
         match self.maker {
-            Maker::Ours(_) => points::Maker::Ours,
-            Maker::Driver(_) => points::Maker::Driver,
+            Functions::Ours(_) => points::Implementation::Ours,
+            Functions::Driver(_) => points::Implementation::Driver,
         }
     }
 
@@ -60,11 +60,11 @@ impl<'a> Structures<'a> {
         let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
         match &self.maker {
             // SAFETY: the pointers of `info` are those of live slices.
-            Maker::Ours(ours) => {
+            Functions::Ours(ours) => {
                 unsafe { ours.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) }?
             }
             // SAFETY: as above.
-            Maker::Driver(driver) => unsafe {
+            Functions::Driver(driver) => unsafe {
                 driver.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes)
             },
         }
@@ -78,9 +78,9 @@ impl<'a> Structures<'a> {
     ) -> Result<vk::AccelerationStructureKHR> {
         match &self.maker {
             // SAFETY: the buffer is live and as large as the sizes asked for.
-            Maker::Ours(ours) => Ok(unsafe { ours.create_acceleration_structure(info, None) }?),
+            Functions::Ours(ours) => Ok(unsafe { ours.create_acceleration_structure(info, None) }?),
             // SAFETY: as above.
-            Maker::Driver(driver) => unsafe { driver.create_acceleration_structure(info, None) }
+            Functions::Driver(driver) => unsafe { driver.create_acceleration_structure(info, None) }
                 .map_err(Error::vulkan("vkCreateAccelerationStructureKHR")),
         }
     }
@@ -89,18 +89,18 @@ impl<'a> Structures<'a> {
     pub(crate) fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
         let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
         match &self.maker {
-            Maker::Ours(ours) => ours.get_acceleration_structure_device_address(&info),
+            Functions::Ours(ours) => ours.get_acceleration_structure_device_address(&info),
             // SAFETY: the structure is live.
-            Maker::Driver(driver) => unsafe { driver.get_acceleration_structure_device_address(&info) },
+            Functions::Driver(driver) => unsafe { driver.get_acceleration_structure_device_address(&info) },
         }
     }
 
     /// Ends the life of a structure that no submit uses any more.
     pub(crate) fn destroy(&self, structure: vk::AccelerationStructureKHR) {
         match &self.maker {
-            Maker::Ours(ours) => ours.destroy_acceleration_structure(structure, None),
+            Functions::Ours(ours) => ours.destroy_acceleration_structure(structure, None),
             // SAFETY: every submit of `Device` waits, so nothing uses it.
-            Maker::Driver(driver) => unsafe { driver.destroy_acceleration_structure(structure, None) },
+            Functions::Driver(driver) => unsafe { driver.destroy_acceleration_structure(structure, None) },
         }
     }
 
@@ -112,12 +112,12 @@ impl<'a> Structures<'a> {
         ranges: &[&[Range]],
     ) -> hedgerow::Result<()> {
         match &self.maker {
-            Maker::Ours(ours) => {
+            Functions::Ours(ours) => {
                 // SAFETY: all memory is live until the submit has finished, and each build's own.
                 unsafe { ours.cmd_build_acceleration_structures(recorder.commands(), infos, ranges) }?;
                 recorder.barrier();
             }
-            Maker::Driver(driver) => {
+            Functions::Driver(driver) => {
                 let access = vk::AccessFlags::ACCELERATION_STRUCTURE_READ_KHR
                     | vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR;
                 let barrier = [vk::MemoryBarrier::default().src_access_mask(access).dst_access_mask(access)];
@@ -156,7 +156,7 @@ impl<'a> Structures<'a> {
         self.device.run(Some(timestamps), |recorder| {
             recorder.phase("trace");
             match self.maker {
-                Maker::Ours(_) => {
+                Functions::Ours(_) => {
                     // As trace::tracer has it, or no level of the stack in shared memory.
                     let tuning = &self.device.tuning.trace;
                     let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
@@ -164,7 +164,7 @@ impl<'a> Structures<'a> {
                     let arguments = arguments::TraceQueries { structure, rays, hits, works: 0, first: 0, count };
                     recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
                 }
-                Maker::Driver(_) => {
+                Functions::Driver(_) => {
                     self.device.trace_by_driver(recorder, &DriverRays { structure, rays, hits, count, any_hit })
                 }
             }
@@ -180,7 +180,7 @@ impl<'a> Structures<'a> {
         query: trace::Query,
     ) -> Result<Vec<[u32; 4]>> {
         let device = self.device;
-        if let Maker::Driver(_) = self.maker {
+        if let Functions::Driver(_) = self.maker {
             return Err(Error::Argument("the driver does not tell the work of its queries".into()));
         }
         let any_hit = u32::from(query == trace::Query::AnyHit);
@@ -201,7 +201,7 @@ impl<'a> Structures<'a> {
     }
 
     /// Memory for a structure and its scratch.
-    pub(crate) fn place(&self, name: &str, info: &BuildInfo<'_>, counts: &[u32]) -> Result<Placed<'a>> {
+    pub(crate) fn place(&self, name: &str, info: &BuildInfo<'_>, counts: &[u32]) -> Result<PlacedStructure<'a>> {
         let sizes = self.sizes(info, counts)?;
         let memory = self.device.buffer(name, sizes.acceleration_structure_size)?;
         let create = vk::AccelerationStructureCreateInfoKHR::default()
@@ -211,12 +211,12 @@ impl<'a> Structures<'a> {
         let structure = self.create(&create)?;
         // The largest alignment that a driver may ask for.
         let scratch = self.device.buffer("scratch", sizes.build_scratch_size.max(sizes.update_scratch_size) + 256)?;
-        Ok(Placed { owner: self.clone(), structure, sizes, scratch, memory })
+        Ok(PlacedStructure { owner: self.clone(), structure, sizes, scratch, memory })
     }
 }
 
 /// A structure with its memory.
-pub(crate) struct Placed<'a> {
+pub(crate) struct PlacedStructure<'a> {
     owner: Structures<'a>,
     pub(crate) structure: vk::AccelerationStructureKHR,
     pub(crate) sizes: Sizes,
@@ -224,10 +224,10 @@ pub(crate) struct Placed<'a> {
     memory: Buffer<'a>,
 }
 
-impl Placed<'_> {
+impl PlacedStructure<'_> {
     /// Its head, where it is one of ours.
     pub(crate) fn header(&self) -> Option<Header> {
-        matches!(self.owner.maker, Maker::Ours(_)).then(|| self.memory.read::<Header>(1)[0])
+        matches!(self.owner.maker, Functions::Ours(_)).then(|| self.memory.read::<Header>(1)[0])
     }
 
     /// The address of its scratch memory.
@@ -236,7 +236,7 @@ impl Placed<'_> {
     }
 }
 
-impl Drop for Placed<'_> {
+impl Drop for PlacedStructure<'_> {
     fn drop(&mut self) {
         self.owner.destroy(self.structure);
     }

@@ -64,11 +64,11 @@ impl<'a> WideTree<'a> {
 
     /// What the build takes beside `binary`, the memory of the `Bvh2` and of its build. The structure's bytes are those in use,
     /// for it needs no others; at the peak all is there, as much as it may need.
-    pub fn memory(&self, binary: &record::Memory) -> record::Memory {
+    pub fn memory(&self, binary: &record::MemoryRecord) -> record::MemoryRecord {
         let all = [Some(self.sizes.structure + self.sizes.scratch), binary.structure_bytes, binary.scratch_bytes];
         let peak: u64 = all.into_iter().flatten().sum();
         let in_use = self.bytes_in_use();
-        record::Memory {
+        record::MemoryRecord {
             structure_bytes: Some(in_use),
             scratch_bytes: Some(peak - self.sizes.structure),
             peak_bytes: Some(peak),
@@ -79,10 +79,10 @@ impl<'a> WideTree<'a> {
     ///
     /// # Errors
     /// The bytes are no such structure.
-    pub fn quality(&self, c_t: f64, c_i: f64) -> Result<record::Quality> {
-        fn of<N: WideNode>(bytes: &[u8], c_t: f64, c_i: f64) -> Result<record::Quality> {
+    pub fn quality(&self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
+        fn of<N: WideNode>(bytes: &[u8], c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
             let tree = Wide::<N, Triangle>::from_bytes(bytes)?;
-            Ok(record::Quality::of(&quality::on_host(&tree, c_t, c_i), c_t, c_i))
+            Ok(record::QualityRecord::of(&quality::on_host(&tree, c_t, c_i), c_t, c_i))
         }
         match self.tracer.form {
             Form::Four => of::<[Child; 4]>(&self.bytes(), c_t, c_i),

@@ -4,7 +4,8 @@ use crate::browser::Browser;
 use crate::conditional::needs;
 use hedgerow_lab::experiments::accel::page::{self, Points};
 use hedgerow_lab::experiments::accel::points::{
-    Batch, BraidedRays, Entry, Maker, Rebraid, Side, TopLevel, Update, UpdatedRays, Way, Work,
+    AccelEntry, Batch, BraidedRays, Implementation, MeanWork, RebraidPoint, Submission, TopLevel, TopLevelPoint,
+    Update, UpdatedRays,
 };
 use hedgerow_lab::measure::setting::Failure;
 use hedgerow_lab::measure::statistics::Spread;
@@ -23,49 +24,52 @@ fn spread(median: f64) -> Spread {
     Spread { median, min: 0.94 * median, max: 1.09 * median, runs: 5 }
 }
 
-fn setting() -> Entry {
-    Entry::Setting(crate::pages::setting("hedgerow accel -o <folder>", "5 after a warm-up"))
+fn setting() -> AccelEntry {
+    AccelEntry::Setting(crate::pages::setting("hedgerow accel -o <folder>", "5 after a warm-up"))
 }
 
 /// One call takes 50 ms, calls one by one 12 times that; the driver's call 0.8 times.
-fn batches() -> impl Iterator<Item = Entry> {
+fn batches() -> impl Iterator<Item = AccelEntry> {
     let ways = [
-        (Some(Maker::Ours), Way::OneCall, 1.0),
-        (Some(Maker::Ours), Way::OneSubmit, 12.0),
-        (Some(Maker::Ours), Way::SubmitEach, 14.0),
-        (Some(Maker::Driver), Way::OneCall, 0.8),
-        (Some(Maker::Driver), Way::OneSubmit, 0.82),
-        (Some(Maker::Driver), Way::SubmitEach, 1.9),
-        (None, Way::EmptySubmits, 1.1),
+        (Some(Implementation::Ours), Submission::OneCall, 1.0),
+        (Some(Implementation::Ours), Submission::OneSubmit, 12.0),
+        (Some(Implementation::Ours), Submission::SubmitEach, 14.0),
+        (Some(Implementation::Driver), Submission::OneCall, 0.8),
+        (Some(Implementation::Driver), Submission::OneSubmit, 0.82),
+        (Some(Implementation::Driver), Submission::SubmitEach, 1.9),
+        (None, Submission::EmptySubmits, 1.1),
     ];
     [16, 256, 4096].into_iter().flat_map(move |structures| {
         ways.map(|(maker, way, times)| {
             let wall_ms = spread(50.0 * times * f64::from(structures) / 4096.0);
             let triangles = 245 * u64::from(structures);
-            Entry::Batch(Batch { structures, triangles, maker, way, wall_ms, over_our_call: spread(times) })
+            AccelEntry::Batch(Batch { structures, triangles, maker, way, wall_ms, over_our_call: spread(times) })
         })
     })
 }
 
-fn top_levels() -> impl Iterator<Item = Entry> {
+fn top_levels() -> impl Iterator<Item = AccelEntry> {
     [100, 1_000, 10_000, 100_000].into_iter().flat_map(|instances| {
-        [(Maker::Ours, 2e-4, None), (Maker::Driver, 1e-4, Some(3e-5))].map(|(maker, build, update)| {
-            let time = |each: f64| spread(each * f64::from(instances).powf(1.1));
-            Entry::Tlas(TopLevel {
-                instances,
-                maker,
-                build_ms: time(build),
-                update_ms: update.map(time),
-                structure_bytes: 192 * u64::from(instances),
-                scratch_bytes: 64 * u64::from(instances),
-            })
-        })
+        [(Implementation::Ours, 2e-4, None), (Implementation::Driver, 1e-4, Some(3e-5))].map(
+            |(maker, build, update)| {
+                let time = |each: f64| spread(each * f64::from(instances).powf(1.1));
+                AccelEntry::Tlas(TopLevel {
+                    instances,
+                    maker,
+                    build_ms: time(build),
+                    update_ms: update.map(time),
+                    structure_bytes: 192 * u64::from(instances),
+                    scratch_bytes: 64 * u64::from(instances),
+                })
+            },
+        )
     })
 }
 
-fn rebraid(scene: &str, overlaps: f64, gain: f64) -> Entry {
-    let side = |entries| Side { build_ms: spread(0.5), structure_bytes: 76_800, scratch_bytes: 25_600, entries };
-    let work = |nodes| Work { top_nodes: nodes, instances: 3.0, nodes_below: 20.5, tests: 4.0 };
+fn rebraid(scene: &str, overlaps: f64, gain: f64) -> AccelEntry {
+    let side =
+        |entries| TopLevelPoint { build_ms: spread(0.5), structure_bytes: 76_800, scratch_bytes: 25_600, entries };
+    let work = |nodes| MeanWork { top_nodes: nodes, instances: 3.0, nodes_below: 20.5, tests: 4.0 };
     let rays = ["primary", "shadow", "ao", "diffuse1", "diffuse2", "reflection", "random"].map(|kind| BraidedRays {
         rays: kind.into(),
         count: 12_288,
@@ -78,7 +82,7 @@ fn rebraid(scene: &str, overlaps: f64, gain: f64) -> Entry {
         off_work: work(30.0),
         on_work: work(24.0),
     });
-    Entry::Rebraid(Rebraid {
+    AccelEntry::Rebraid(RebraidPoint {
         scene: scene.into(),
         instances: 400,
         parts: 3,
@@ -92,7 +96,7 @@ fn rebraid(scene: &str, overlaps: f64, gain: f64) -> Entry {
 }
 
 /// Frames of an animation whose tree grows worse by a tenth a frame; from the sixth on, building anew pays.
-fn updates(update_ms: Option<f64>) -> impl Iterator<Item = Entry> {
+fn updates(update_ms: Option<f64>) -> impl Iterator<Item = AccelEntry> {
     (0..8).map(move |frame| {
         let growth = 1.0 + 0.1 * f64::from(frame);
         let rays = UpdatedRays {
@@ -102,11 +106,11 @@ fn updates(update_ms: Option<f64>) -> impl Iterator<Item = Entry> {
             updated_ms: update_ms.map(|_| spread(6.0 * growth)),
             slowdown: update_ms.map(|_| spread(growth)),
         };
-        Entry::Update(Update {
+        AccelEntry::Update(Update {
             scene: "gen:twist:20000:8".into(),
             triangles: 19_964,
             frame,
-            maker: Maker::Ours,
+            maker: Implementation::Ours,
             build_ms: spread(4.0),
             update_ms: update_ms.map(spread),
             growth: update_ms.map(|_| growth),
@@ -117,15 +121,15 @@ fn updates(update_ms: Option<f64>) -> impl Iterator<Item = Entry> {
     })
 }
 
-fn entries() -> Vec<Entry> {
+fn entries() -> Vec<AccelEntry> {
     let failure = Failure::named("update <knot>", "3 GiB of device memory are needed, 2 GiB are there");
     let rebraids = [rebraid("gen:forest:400", 8.2, 1.31), rebraid("gen:cells:1000", 0.0, 0.99)];
     let all = [setting()].into_iter().chain(batches()).chain(top_levels()).chain(rebraids).chain(updates(Some(1.0)));
-    all.chain([Entry::Failure(failure)]).collect()
+    all.chain([AccelEntry::Failure(failure)]).collect()
 }
 
 /// The page of these records.
-fn page_of(folder: &Path, entries: &[Entry]) -> String {
+fn page_of(folder: &Path, entries: &[AccelEntry]) -> String {
     let mut points = Points::create(folder).expect("a folder of our own");
     for entry in entries {
         points.append(entry.clone()).expect("written");
@@ -166,7 +170,7 @@ fn the_page_says_plainly_what_is_reached_and_what_is_not() {
 
 fn updates_that_were_not_measured_are_told_as_such() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let entries: Vec<Entry> = [setting()].into_iter().chain(updates(None)).collect();
+    let entries: Vec<AccelEntry> = [setting()].into_iter().chain(updates(None)).collect();
     let text = crate::pages::text(&page_of(folder.path(), &entries), "");
     assert!(text.contains("updates of ours were not measured") && !text.contains("NaN"), "{text}");
     assert!(folder.path().join("charts/accel-update-gen-twist-20000-8.svg").is_file());

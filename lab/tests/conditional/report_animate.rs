@@ -2,10 +2,10 @@
 
 use crate::browser::Browser;
 use crate::conditional::needs;
-use hedgerow_lab::experiments::animate::Way;
+use hedgerow_lab::experiments::animate::AnimationMethod;
 use hedgerow_lab::experiments::animate::page::{self, Points};
-use hedgerow_lab::experiments::animate::points::{Animated, Entry, Object, Rays, SceneSetting, WayInFrame};
-use hedgerow_lab::measure::record::Memory;
+use hedgerow_lab::experiments::animate::points::{AnimateEntry, Animated, Object, Rays, SceneSetting, WayInFrame};
+use hedgerow_lab::measure::record::MemoryRecord;
 use hedgerow_lab::measure::setting::Failure;
 use hedgerow_lab::measure::statistics::Spread;
 use std::path::Path;
@@ -21,8 +21,8 @@ fn spread(median: f64) -> Spread {
     Spread { median, min: 0.94 * median, max: 1.09 * median, runs: 3 }
 }
 
-fn setting() -> Entry {
-    Entry::Setting(SceneSetting {
+fn setting() -> AnimateEntry {
+    AnimateEntry::Setting(SceneSetting {
         setting: crate::pages::setting(
             "hedgerow animate atrium_run -o <folder>",
             "3 of every build and trace, in turn",
@@ -39,15 +39,15 @@ fn setting() -> Entry {
 }
 
 /// Of each way, what a build takes and what rays take.
-const TIMES: [(Way, f64, f64); 5] = [
-    (Way::Rebuild, 640.0, 40.0),
-    (Way::TwoTrees, 90.0, 52.0),
-    (Way::TreePerObject, 96.0, 55.0),
-    (Way::TwoLevel, 20.0, 80.0),
-    (Way::Merge, 40.0, 40.0),
+const TIMES: [(AnimationMethod, f64, f64); 5] = [
+    (AnimationMethod::Rebuild, 640.0, 40.0),
+    (AnimationMethod::TwoTrees, 90.0, 52.0),
+    (AnimationMethod::TreePerObject, 96.0, 55.0),
+    (AnimationMethod::TwoLevel, 20.0, 80.0),
+    (AnimationMethod::Merge, 40.0, 40.0),
 ];
 
-fn frames(count: u32) -> impl Iterator<Item = Entry> {
+fn frames(count: u32) -> impl Iterator<Item = AnimateEntry> {
     (0..count).flat_map(|frame| {
         TIMES.map(|(way, build, trace)| {
             let rays = [("primary", 0.25), ("shadow", 0.25), ("diffuse1", 0.5)].map(|(kind, share)| Rays {
@@ -60,8 +60,8 @@ fn frames(count: u32) -> impl Iterator<Item = Entry> {
                 checksum: "1".into(),
                 different: 0,
             });
-            let on_host = way == Way::Merge;
-            Entry::Animate(Animated {
+            let on_host = way == AnimationMethod::Merge;
+            AnimateEntry::Animate(Animated {
                 scene: "atrium_run".into(),
                 frame,
                 time: 0.125 * frame as f32,
@@ -72,23 +72,23 @@ fn frames(count: u32) -> impl Iterator<Item = Entry> {
                 dynamic_triangles: 11_876,
                 build_ms: spread(build * (1.0 + 0.05 * f64::from(frame))),
                 trace: rays.to_vec(),
-                memory: Memory { structure_bytes: Some(5 << 20), ..Memory::default() },
-                sah: matches!(way, Way::Rebuild | Way::Merge).then_some(202.3),
+                memory: MemoryRecord { structure_bytes: Some(5 << 20), ..MemoryRecord::default() },
+                sah: matches!(way, AnimationMethod::Rebuild | AnimationMethod::Merge).then_some(202.3),
             })
         })
     })
 }
 
-fn entries() -> Vec<Entry> {
+fn entries() -> Vec<AnimateEntry> {
     let failure = Failure {
-        at: WayInFrame { way: Way::TreePerObject, frame: Some(3) },
+        at: WayInFrame { way: AnimationMethod::TreePerObject, frame: Some(3) },
         what: "7 of 76800 <primary> rays".into(),
     };
-    [setting()].into_iter().chain(frames(4)).chain([Entry::Failure(failure)]).collect()
+    [setting()].into_iter().chain(frames(4)).chain([AnimateEntry::Failure(failure)]).collect()
 }
 
 /// The page of these records.
-fn page_of(folder: &Path, entries: &[Entry]) -> String {
+fn page_of(folder: &Path, entries: &[AnimateEntry]) -> String {
     let mut points = Points::create(folder).expect("a folder of our own");
     for entry in entries {
         points.append(entry.clone()).expect("written");
@@ -151,5 +151,5 @@ fn the_page_holds_together_in_a_browser() {
     let sections = ["failures", "summary", "pictures", "frames", "published", "method"];
     assert_eq!(found["sections"], serde_json::json!(sections));
     assert_eq!(found["charts"], 3);
-    assert_eq!(found["ways"], serde_json::json!(Way::ALL.map(Way::name)));
+    assert_eq!(found["ways"], serde_json::json!(AnimationMethod::ALL.map(AnimationMethod::name)));
 }

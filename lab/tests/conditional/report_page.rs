@@ -6,7 +6,9 @@ use hedgerow_lab::experiments::bench::matrix::{OnScene, Outcome};
 use hedgerow_lab::experiments::bench::page::{Picture, Report};
 use hedgerow_lab::experiments::bench::{kd_trees, results};
 use hedgerow_lab::measure::choose::hindsight::Choice;
-use hedgerow_lab::measure::record::{Build, Memory, Phase, Quality, Record, SCHEMA, Trace};
+use hedgerow_lab::measure::record::{
+    BuildRecord, MemoryRecord, PhaseRecord, QualityRecord, Record, SCHEMA, TraceRecord,
+};
 use hedgerow_lab::measure::setting::{Failure, Setting};
 use std::path::{Path, PathBuf};
 
@@ -49,8 +51,8 @@ fn outcome(scene: &str, triangles: u64, builder: &(&str, &str, f64, f64, Option<
         ("driver", _) => &[("blas", 1.0), ("tlas", 0.02)],
         _ => &[],
     };
-    let phases = shares.iter().map(|(p, share)| Phase { name: (*p).into(), median_ms: share * median_ms });
-    let trace = KINDS.iter().map(|kind| Trace {
+    let phases = shares.iter().map(|(p, share)| PhaseRecord { name: (*p).into(), median_ms: share * median_ms });
+    let trace = KINDS.iter().map(|kind| TraceRecord {
         rays: (*kind).into(),
         count: if *kind == "ao" { 307_200 } else { 76_800 },
         hits: 61_000,
@@ -71,7 +73,7 @@ fn outcome(scene: &str, triangles: u64, builder: &(&str, &str, f64, f64, Option<
         subgroup: 8,
         commit: "abc1234".into(),
         when: "2026-11-21T10:00:00Z".into(),
-        build: Build {
+        build: BuildRecord {
             runs: 5,
             median_ms,
             min_ms: 0.96 * median_ms,
@@ -79,12 +81,12 @@ fn outcome(scene: &str, triangles: u64, builder: &(&str, &str, f64, f64, Option<
             timer: if host { "wall" } else { "device" }.into(),
             phases: phases.collect(),
         },
-        memory: Memory {
+        memory: MemoryRecord {
             structure_bytes: Some(112 * triangles),
             scratch_bytes: Some(28 * triangles),
             peak_bytes: None,
         },
-        quality: Quality {
+        quality: QualityRecord {
             sah: sah.map(|sah| sah * (1.0 + 0.05 * jitter(name, scene))),
             c_t: 3.0,
             c_i: 2.0,
@@ -94,7 +96,7 @@ fn outcome(scene: &str, triangles: u64, builder: &(&str, &str, f64, f64, Option<
             prims_per_leaf_max: sah.map(|_| 31),
             depth_max: sah.map(|_| 31),
             prims_per_leaf: sah.map(|_| 2.4),
-            ..Quality::default()
+            ..QualityRecord::default()
         },
         trace: trace.collect(),
         valid: Some(true),

@@ -3,7 +3,7 @@
 use crate::browser::Browser;
 use crate::conditional::needs;
 use hedgerow_lab::experiments::stability::far::{FarTriangle, Side};
-use hedgerow_lab::experiments::stability::large::{HugeTriangles, Placement};
+use hedgerow_lab::experiments::stability::large::{HugeTriangles, LargePlacement};
 use hedgerow_lab::experiments::stability::page::{self, Paged};
 use hedgerow_lab::experiments::stability::points::{Degenerate, Experiment, Growth, Large, Run};
 use hedgerow_lab::measure::setting::Failure;
@@ -64,7 +64,7 @@ fn growth() -> Vec<Growth> {
 
 fn large() -> Vec<Large> {
     let mut points = Vec::new();
-    for placement in Placement::ALL {
+    for placement in LargePlacement::ALL {
         for (codes, drop) in [("mc63", 8), ("mc63+concise", 14)] {
             for e in (0..=20).step_by(2) {
                 let (cost, speeds) = figures(e, drop);

@@ -7,7 +7,7 @@
 use crate::conditional::needs;
 use hedgerow_lab::experiments::stability::far::{FarTriangle, Side};
 use hedgerow_lab::experiments::stability::points::Growth;
-use hedgerow_lab::experiments::stability::relative::{self, Stage};
+use hedgerow_lab::experiments::stability::relative::{self, RelativeSetup};
 use hedgerow_lab::rays::kinds::RayOptions;
 use hedgerow_lab::scene::{self, LoadOptions, Scene};
 use hedgerow_lab::subjects::builders;
@@ -21,7 +21,7 @@ crate::conditional::tests! {
 fn costs(scene: &Scene, codes: &str, axes: u32, steps: &[u32]) -> Vec<Growth> {
     let specs = builders::parse_list(&format!("lbvh-host:codes={codes}:collapse=off")).expect("known");
     let rays = RayOptions { size: [1, 1], seed: 1 };
-    let stage = Stage { device: None, builders: &specs, runs: 1, kinds: &[], rays, say: &|_| {} };
+    let stage = RelativeSetup { device: None, builders: &specs, runs: 1, kinds: &[], rays, say: &|_| {} };
     let mut all: Vec<u32> = steps.to_vec();
     all.insert(0, 0);
     let triangles = Side::ALL.map(|side| FarTriangle { axes, side });

@@ -1,7 +1,7 @@
 //! `hedgerow accel`: the records and the page that it leaves, how `hedgerow bench` finds them, and what is refused.
 
 use hedgerow_lab::experiments::accel::page;
-use hedgerow_lab::experiments::accel::points::{Entry, Maker, Way};
+use hedgerow_lab::experiments::accel::points::{AccelEntry, Implementation, Submission};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -30,32 +30,32 @@ fn a_run_leaves_records_of_every_experiment_and_a_page_of_them() {
     let page = folder.path().join("accel.html");
     assert_eq!(String::from_utf8_lossy(&done.stdout).trim(), page.display().to_string());
     let entries = page::read(folder.path()).expect("records");
-    assert!(matches!(&entries[0], Entry::Setting(setting) if setting.command.starts_with("hedgerow accel")));
-    let is_ours = |maker: Maker| maker == Maker::Ours;
+    assert!(matches!(&entries[0], AccelEntry::Setting(setting) if setting.command.starts_with("hedgerow accel")));
+    let is_ours = |maker: Implementation| maker == Implementation::Ours;
     let (mut batches, mut top_levels, mut frames, mut rebraids) = (Vec::new(), Vec::new(), Vec::new(), 0);
     for entry in &entries {
         match entry {
-            Entry::Batch(point) if point.maker.is_none_or(is_ours) => batches.push((point.structures, point.way)),
-            Entry::Tlas(point) if is_ours(point.maker) => top_levels.push(point.instances),
-            Entry::Rebraid(point) => {
+            AccelEntry::Batch(point) if point.maker.is_none_or(is_ours) => batches.push((point.structures, point.way)),
+            AccelEntry::Tlas(point) if is_ours(point.maker) => top_levels.push(point.instances),
+            AccelEntry::Rebraid(point) => {
                 rebraids += 1;
                 assert_eq!((point.scene.as_str(), point.instances, point.parts), ("gen:forest:9", 9, 3));
                 assert_eq!((point.off.entries, point.on.entries.is_some_and(|n| n > 9)), (Some(9), true), "{point:?}");
                 assert!(point.rays.iter().all(|rays| rays.different == 0 && rays.gain.runs == 2), "{point:?}");
                 assert!(point.overlaps > 1.0 && point.rays[0].off_work.instances > 0.0, "{point:?}");
             }
-            Entry::Update(point) if is_ours(point.maker) => {
+            AccelEntry::Update(point) if is_ours(point.maker) => {
                 assert!(point.built_sah.is_some_and(|sah| sah > 1.0), "{point:?}");
                 // Together or not at all.
                 assert_eq!(point.growth.is_some(), point.update_ms.is_some(), "{point:?}");
                 assert_eq!(point.growth.is_some(), point.rays[0].slowdown.is_some(), "{point:?}");
                 frames.push(point.frame);
             }
-            Entry::Failure(failure) => panic!("{failure:?}"),
+            AccelEntry::Failure(failure) => panic!("{failure:?}"),
             _ => {}
         }
     }
-    let ways = [Way::OneCall, Way::OneSubmit, Way::SubmitEach, Way::EmptySubmits];
+    let ways = [Submission::OneCall, Submission::OneSubmit, Submission::SubmitEach, Submission::EmptySubmits];
     assert_eq!(batches, [2, 32].map(|count| ways.map(|way| (count, way))).concat());
     assert_eq!((top_levels, frames, rebraids), (vec![100, 200], vec![0, 2, 4], 1));
 
@@ -87,7 +87,7 @@ fn one_experiment_is_measured_alone() {
     let done = tiny(folder.path(), &["--experiments", "tlas"]);
     assert_eq!(done.status.code(), Some(0), "{}", err(&done));
     let entries = page::read(folder.path()).expect("records");
-    assert!(entries[1..].iter().all(|entry| matches!(entry, Entry::Tlas(_))) && entries.len() > 2, "{entries:?}");
+    assert!(entries[1..].iter().all(|entry| matches!(entry, AccelEntry::Tlas(_))) && entries.len() > 2, "{entries:?}");
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! `hedgerow animate`: the records, pictures and page that it leaves, that all ways find the same, and what is refused.
 
-use hedgerow_lab::experiments::animate::Way;
+use hedgerow_lab::experiments::animate::AnimationMethod;
 use hedgerow_lab::experiments::animate::page;
-use hedgerow_lab::experiments::animate::points::{Animated, Entry, SceneSetting};
+use hedgerow_lab::experiments::animate::points::{AnimateEntry, Animated, SceneSetting};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -51,9 +51,9 @@ fn scene_in(folder: &Path, content: &str) -> String {
 /// The setting and the frames; there are no failures.
 fn measured(folder: &Path) -> (SceneSetting, Vec<Animated>) {
     let mut entries = page::read(folder).expect("records").into_iter();
-    let Some(Entry::Setting(setting)) = entries.next() else { panic!("the first line is the setting") };
+    let Some(AnimateEntry::Setting(setting)) = entries.next() else { panic!("the first line is the setting") };
     let frame = |entry| match entry {
-        Entry::Animate(frame) => frame,
+        AnimateEntry::Animate(frame) => frame,
         other => panic!("{other:?}"),
     };
     (setting, entries.map(frame).collect())
@@ -68,26 +68,30 @@ fn every_way_finds_the_same_in_every_frame_and_leaves_records_pictures_and_a_pag
     let page = out.join("animate.html");
     let stdout = String::from_utf8_lossy(&done.stdout).into_owned();
     assert_eq!(stdout.lines().last(), Some(text(&page)), "{stdout}");
-    assert!(Way::ALL.iter().all(|way| stdout.contains(way.name())), "{stdout}");
+    assert!(AnimationMethod::ALL.iter().all(|way| stdout.contains(way.name())), "{stdout}");
 
     let (setting, frames) = measured(&out);
     assert_eq!((setting.scene.as_str(), setting.objects.len(), setting.pictures.len()), ("hop", 2, 3));
     assert_eq!(setting.objects.iter().map(|object| object.morphs).collect::<Vec<_>>(), [false, true]);
-    let order: Vec<(u32, Way)> = frames.iter().map(|frame| (frame.frame, frame.way)).collect();
-    assert_eq!(order, [0, 2, 4].map(|frame| Way::ALL.map(|way| (frame, way))).concat());
+    let order: Vec<(u32, AnimationMethod)> = frames.iter().map(|frame| (frame.frame, frame.way)).collect();
+    assert_eq!(order, [0, 2, 4].map(|frame| AnimationMethod::ALL.map(|way| (frame, way))).concat());
     for frame in &frames {
         let kinds: Vec<&str> = frame.trace.iter().map(|rays| rays.rays.as_str()).collect();
         assert_eq!(kinds, ["primary", "shadow", "diffuse1", "random"]);
         assert!(frame.build_ms.median > 0.0 && frame.build_ms.runs == 2, "{frame:?}");
         assert_eq!(frame.dynamic_triangles, setting.objects.iter().map(|object| object.triangles).sum::<u64>());
         assert!(frame.trace.iter().all(|rays| rays.different == 0 && rays.count > 0 && rays.steps > Some(0.0)));
-        assert_eq!(frame.sah.is_some(), matches!(frame.way, Way::Rebuild | Way::Merge), "{frame:?}");
+        assert_eq!(
+            frame.sah.is_some(),
+            matches!(frame.way, AnimationMethod::Rebuild | AnimationMethod::Merge),
+            "{frame:?}"
+        );
         assert!(frame.memory.structure_bytes > Some(0), "{frame:?}");
         let kd_gpu = ["kd-gpu", "accel"].contains(&frame.builder.as_str());
         assert!(kd_gpu && frame.timer == "device", "{frame:?}");
         // Bit for bit: so is the sum.
         let first = frames.iter().find(|other| other.frame == frame.frame).expect("itself");
-        if frame.way != Way::TwoLevel {
+        if frame.way != AnimationMethod::TwoLevel {
             for (a, b) in frame.trace.iter().zip(&first.trace) {
                 assert_eq!((&a.checksum, a.hits), (&b.checksum, b.hits), "{}", frame.way);
             }
@@ -129,7 +133,7 @@ fn trees_of_the_host_are_traced_on_the_device_where_that_is_asked_for() {
     assert_eq!(done.status.code(), Some(0), "{}", err(&done));
     let (setting, frames) = measured(&out);
     assert!(setting.setting.device.is_some());
-    assert_eq!(frames.iter().map(|frame| frame.way).collect::<Vec<_>>(), Way::ALL);
+    assert_eq!(frames.iter().map(|frame| frame.way).collect::<Vec<_>>(), AnimationMethod::ALL);
 }
 
 #[test]
@@ -139,7 +143,8 @@ fn an_animation_of_which_nothing_stands_still_is_measured_but_for_merging() {
     assert_eq!(done.status.code(), Some(1), "{}", err(&done));
     assert!(err(&done).contains("merge: gen:twist:400:5: nothing in it stands still"), "{}", err(&done));
     let entries = page::read(folder.path()).expect("records");
-    let frames = entries.iter().filter(|entry| matches!(entry, Entry::Animate(frame) if frame.trace[0].different == 0));
+    let frames =
+        entries.iter().filter(|entry| matches!(entry, AnimateEntry::Animate(frame) if frame.trace[0].different == 0));
     assert_eq!(frames.count(), 2 * 4);
     let page = std::fs::read_to_string(folder.path().join("animate.html")).expect("written");
     assert!(page.contains("id=\"failures\""));

@@ -1,6 +1,6 @@
 //! `hedgerow check`: what is right passes, and whatever happens to a group is reported while the rest goes on.
 
-use hedgerow_lab::experiments::check::{GROUPS, Record};
+use hedgerow_lab::experiments::check::{CheckRecord, GROUPS};
 use std::process::{Command, Output};
 
 fn check(arguments: &[&str], faults: &str) -> Output {
@@ -27,7 +27,7 @@ fn a_quick_check_passes_and_its_record_says_on_what() {
     for word in ["commit", "device", "driver", "limits", "tuning"] {
         assert!(text.contains(word), "{word}: {text}");
     }
-    let record: Record =
+    let record: CheckRecord =
         serde_json::from_str(&std::fs::read_to_string(file).expect("a record")).expect("a record of a check");
     assert_eq!((record.passed, record.failed, record.quick), (GROUPS.len(), 0, true));
     assert!(record.groups.iter().all(|group| group.cases > 0 || !group.left_out.is_empty()), "{record:?}");

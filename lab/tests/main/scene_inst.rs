@@ -1,7 +1,7 @@
 //! `.inst`: placed copies, kept apart or flattened in the order of the file.
 
 use crate::files::{Folder, load, pack};
-use hedgerow_lab::scene::{self, Instance, Instances, LoadOptions, Mesh};
+use hedgerow_lab::scene::{self, Instances, LoadOptions, Mesh, SceneInstance};
 
 /// Two objects whose vertices come first, as exporters write them.
 const PARTS: &str =
@@ -123,7 +123,7 @@ fn a_mesh_is_one_part_that_stands_where_it_is() {
     for spec in ["grass", "gen:soup:100:1", "hall"] {
         let options = LoadOptions { folders: scene::own_folders(), progress: None };
         let (scene, instances) = (scene::load(spec, &options).expect(spec), load_instances(spec));
-        assert_eq!(instances.instances, [Instance { part: 0, transform: Instance::IDENTITY }]);
+        assert_eq!(instances.instances, [SceneInstance { part: 0, transform: SceneInstance::IDENTITY }]);
         assert_eq!(instances.parts.len(), 1);
         assert_eq!(fingerprint(&instances.parts[0]), fingerprint(&scene.mesh));
         assert_eq!((&instances.name, instances.camera, &instances.lights), (&scene.name, scene.camera, &scene.lights));
@@ -178,7 +178,7 @@ proptest::proptest! {
         let point = std::array::from_fn(|i| {
             (bounds.lo[i] + inside[i] * (bounds.hi[i] - bounds.lo[i])).clamp(bounds.lo[i], bounds.hi[i])
         });
-        let instance = Instance { part: 0, transform };
+        let instance = SceneInstance { part: 0, transform };
         let (placed, at) = (instance.place_box(&bounds), instance.place(point));
         proptest::prop_assert!((0..3).all(|i| placed.lo[i] <= at[i] && at[i] <= placed.hi[i]), "{placed:?} {at:?}");
     }

@@ -1,7 +1,7 @@
 //! `hedgerow stability`: the records and pages that it leaves, how pages name each other, and what is refused.
 
 use hedgerow_lab::experiments::stability::far::Side;
-use hedgerow_lab::experiments::stability::large::Placement;
+use hedgerow_lab::experiments::stability::large::LargePlacement;
 use hedgerow_lab::experiments::stability::page;
 use hedgerow_lab::experiments::stability::points::{Degenerate, Growth, Large};
 use hedgerow_lab::report::lines;
@@ -83,12 +83,12 @@ fn large_triangles_stand_where_they_are_asked_for() {
         points.iter().find(find).and_then(|point| point.relative_cost).expect("measured")
     };
     // One bit is left to each axis in which the walls are large; concise bounds keep all 21, but where nothing can be cut.
-    assert!(cost("mc63:", Placement::Walls) > 1.1 && cost("mc63:", Placement::Wall) > 1.1, "{points:?}");
+    assert!(cost("mc63:", LargePlacement::Walls) > 1.1 && cost("mc63:", LargePlacement::Wall) > 1.1, "{points:?}");
     assert!(
-        cost("mc63+concise", Placement::Walls) < 1.05 && cost("mc63+concise", Placement::Wall) < 1.05,
+        cost("mc63+concise", LargePlacement::Walls) < 1.05 && cost("mc63+concise", LargePlacement::Wall) < 1.05,
         "{points:?}"
     );
-    assert!(cost("mc63+concise", Placement::Outward) > 1.1, "{points:?}");
+    assert!(cost("mc63+concise", LargePlacement::Outward) > 1.1, "{points:?}");
     assert!(points.iter().all(|point| point.relative_mrays.is_empty() && point.by.count == 2));
 }
 

@@ -13,17 +13,9 @@
 //!   the p-th treelet in the order of codes, which no other node can have.
 
 use crate::bvh::codes::{CodePlan, Codes};
+use crate::bvh::hlbvh::Treelets;
 use crate::bvh::layout::{Bvh2, Child, Node, Record};
 use crate::geometry::Aabb;
-
-/// What is a treelet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Treelets {
-    /// First bits of the code that its primitives share.
-    pub bits: u32,
-    /// Primitives that it has at most, 1 or more.
-    pub primitives: u32,
-}
 
 /// Slabs on an axis.
 const BINS: usize = 16;
@@ -63,7 +55,7 @@ pub fn build<R: Record>(radix: &Bvh2<R>, codes: Codes, limits: Treelets) -> Bvh2
     if radix.header.active > 0 {
         let mut counts = vec![1; radix.nodes.len()];
         count(radix, radix.header.root, &mut counts);
-        let shared = codes.bits - limits.bits.min(codes.bits);
+        let shared = codes.bits - limits.bits(codes, radix.header.primitive_count);
         let prefixes: Vec<u64> =
             codes_of(radix, codes).iter().map(|code| code.checked_shr(shared).unwrap_or(0)).collect();
         let is_treelet = |slot: u32| {

@@ -5,16 +5,8 @@
 //! the tree is the same on every device. Distances, ties and slots: `clusters.rs`.
 
 use super::clusters::{Cluster, merged, nearest, number};
+use crate::bvh::hploc::Window;
 use crate::bvh::layout::{Bvh2, Child, Node, Record};
-
-/// How many clusters are merged at a time, and how far each looks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Window {
-    /// Clusters of a window: half of it from each child of the radix tree's node, at most. Even.
-    pub size: usize,
-    /// Neighbours on either side that a cluster looks at.
-    pub radius: usize,
-}
 
 /// The tree that H-PLOC builds over the records of `radix`, the LBVH that is not collapsed. [`Bvh2::collapsed`] finishes it:
 /// the header's costs are zero, and the tree may be deeper than tracers can walk.
@@ -42,7 +34,7 @@ impl<R: Record> Build<'_, R> {
             return vec![Cluster::of_leaf(child)];
         }
         let [left, right] = self.radix.nodes[child.index as usize].children;
-        let half = self.window.size / 2;
+        let half = self.window.size as usize / 2;
         let mut clusters = self.clusters_of(left, half);
         clusters.extend(self.clusters_of(right, half));
         self.merge_down_to(most, &mut clusters);
@@ -53,7 +45,7 @@ impl<R: Record> Build<'_, R> {
     fn merge_down_to(&mut self, most: usize, clusters: &mut Vec<Cluster>) {
         number(clusters);
         while clusters.len() > most {
-            let nearest = nearest(clusters, self.window.radius, self.scale);
+            let nearest = nearest(clusters, self.window.radius as usize, self.scale);
             let partner = |i: usize| Some(nearest[i]).filter(|&j| nearest[j] == i);
             *clusters = merged(clusters, partner, self.nodes);
         }

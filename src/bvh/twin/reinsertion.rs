@@ -19,7 +19,7 @@ impl<R: Record> Bvh2<R> {
     /// The tree, in which every leaf has one record, after the passes that `options` tells: the bytes of
     /// [`crate::bvh::reinsertion`].
     pub fn reinserted(&self, options: &ReinsertionOptions) -> Bvh2<R> {
-        let mut work = Work { parents: parents_of(self), tree: self.clone() };
+        let mut work = LinkedTree { parents: parents_of(self), tree: self.clone() };
         let slots = self.nodes.len() as u32;
         for round in 0..options.rounds_for(slots) {
             work.round(round, options.stride_for(slots));
@@ -39,12 +39,12 @@ fn parents_of<R: Record>(tree: &Bvh2<R>) -> Vec<u32> {
     parents
 }
 
-struct Work<R: Record> {
+struct LinkedTree<R: Record> {
     tree: Bvh2<R>,
     parents: Vec<u32>,
 }
 
-impl<R: Record> Work<R> {
+impl<R: Record> LinkedTree<R> {
     /// A round; how many subtrees it has moved.
     fn round(&mut self, round: u32, stride: u32) -> usize {
         let links = 2 * self.tree.nodes.len() as u32;

@@ -88,7 +88,7 @@ pub fn clipped(corners: &[[f32; 3]; 3], reach: f32, cell: &Aabb) -> Option<Aabb>
     let margin = std::array::from_fn(|i| room[i] + rounding[i]);
     let larger = widened(cell, margin);
     let whole = Aabb::around(corners);
-    let mut polygon = Polygon::of(corners);
+    let mut polygon = ClippedTriangle::of(corners);
     for axis in 0..3 {
         if whole.hi[axis] > larger.hi[axis] {
             polygon.cut(axis, larger.hi[axis], 1.0);
@@ -152,16 +152,16 @@ fn widened(b: &Aabb, by: [f32; 3]) -> Aabb {
 /// However it is rounded, once around it every coordinate goes up once and down once at most: those of a triangle do, and what a cut
 /// puts between two corners has coordinates between theirs ([`crossing`]). So a plane is crossed twice at most, and takes at least one
 /// corner away for the two that it adds.
-struct Polygon {
+struct ClippedTriangle {
     corners: [[f32; 3]; CORNERS],
     count: usize,
 }
 
-impl Polygon {
-    fn of(triangle: &[[f32; 3]; 3]) -> Polygon {
+impl ClippedTriangle {
+    fn of(triangle: &[[f32; 3]; 3]) -> ClippedTriangle {
         let mut corners = [[0.0; 3]; CORNERS];
         corners[..3].copy_from_slice(triangle);
-        Polygon { corners, count: 3 }
+        ClippedTriangle { corners, count: 3 }
     }
 
     fn bounds(&self) -> Aabb {
@@ -312,7 +312,7 @@ mod tests {
         for _ in 0..50_000 {
             let coordinate =
                 |bits: u32| (bits >> 5) as f32 * 2f32.powi(-(bits as i32 % 32)) * [1.0, -1.0][bits as usize % 2];
-            let mut polygon = Polygon::of(&[(); 3].map(|()| [(); 3].map(|()| coordinate(random()))));
+            let mut polygon = ClippedTriangle::of(&[(); 3].map(|()| [(); 3].map(|()| coordinate(random()))));
             for axis in 0..3 {
                 for sign in [1.0, -1.0] {
                     let at = polygon.corners[random() as usize % polygon.count.max(1)][axis];

@@ -67,13 +67,13 @@ pub fn merge(still: &KdTree, objects: &[HostObject<'_>], costs: Costs, (bins, ex
     (first as u32..records.len() as u32).for_each(|record| find.record(record, cell));
 
     let heuristic = Heuristic::of_leaf(costs, &cell, still.header.primitive_count);
-    let built = |leaf: &Marked| {
+    let built = |leaf: &MarkedLeaf| {
         let bounds =
             |record: u32| KdReference { bounds: bounds_in(&leaf.cell, &records[record as usize], reach), record };
         let references = leaf.records(still).map(bounds).collect();
         binned::build(&InTurn, &heuristic.below(leaf.depth), (&records, reach), (bins, exact), leaf.cell, references)
     };
-    let marked: Vec<(u32, Marked)> = find.marked.into_iter().collect();
+    let marked: Vec<(u32, MarkedLeaf)> = find.marked.into_iter().collect();
     let subtrees: Vec<Subtree> = marked.iter().map(|(_, leaf)| built(leaf)).collect();
     let roots = subtrees.into_iter().zip(&marked).map(|(subtree, (_, leaf))| (subtree, leaf.depth)).collect();
 
@@ -102,7 +102,7 @@ fn id_of(parent: u32, side: usize) -> u32 {
 }
 
 /// A static leaf that triangles of objects are in.
-struct Marked {
+struct MarkedLeaf {
     /// `None` of an empty one.
     node: Option<u32>,
     cell: Aabb,
@@ -111,7 +111,7 @@ struct Marked {
     records: Vec<u32>,
 }
 
-impl Marked {
+impl MarkedLeaf {
     /// Those of the static tree, then those of objects.
     fn records<'a>(&'a self, still: &'a KdTree) -> impl Iterator<Item = u32> + 'a {
         let range = match self.node.map(|node| still.nodes[node as usize].content()) {
@@ -136,12 +136,12 @@ struct Find<'a> {
     still: &'a KdTree,
     records: &'a [Triangle],
     reach: f32,
-    marked: BTreeMap<u32, Marked>,
+    marked: BTreeMap<u32, MarkedLeaf>,
 }
 
 /// A node on the way down; an empty leaf has none.
 #[derive(Clone, Copy)]
-struct Place {
+struct VisitedNode {
     id: u32,
     node: Option<u32>,
     cell: Aabb,
@@ -154,14 +154,14 @@ impl Find<'_> {
         let corners = [t.v0, t.v1, t.v2];
         let bounds = bounds_of(&corners, self.reach);
         let root = (!self.still.nodes.is_empty()).then_some(0);
-        let mut stack = vec![Place { id: ROOT, node: root, cell, depth: 0 }];
+        let mut stack = vec![VisitedNode { id: ROOT, node: root, cell, depth: 0 }];
         while let Some(place) = stack.pop() {
             let inner = match place.node.map(|node| (node, self.still.nodes[node as usize].content())) {
                 Some((node, KdContent::Inner(inner))) => (node, inner),
                 _ => {
                     if clipped(&corners, self.reach, &place.cell).is_some() {
-                        let Place { id, node, cell, depth } = place;
-                        let new = || Marked { node, cell, depth, records: Vec::new() };
+                        let VisitedNode { id, node, cell, depth } = place;
+                        let new = || MarkedLeaf { node, cell, depth, records: Vec::new() };
                         self.marked.entry(id).or_insert_with(new).records.push(record);
                     }
                     continue;
@@ -171,7 +171,7 @@ impl Find<'_> {
             let sides = [bounds.lo[inner.axis] <= inner.plane, bounds.hi[inner.axis] >= inner.plane];
             for (side, cell) in inner.halves(&place.cell).into_iter().enumerate().filter(|&(side, _)| sides[side]) {
                 let (id, node) = (id_of(node, side), inner.children[side]);
-                stack.push(Place { id, node, cell, depth: place.depth + 1 });
+                stack.push(VisitedNode { id, node, cell, depth: place.depth + 1 });
             }
         }
     }
@@ -179,7 +179,7 @@ impl Find<'_> {
 
 /// Puts the roots in the places of the marked leaves. An empty leaf has none: its parent gets a new pair of children, and what was
 /// its only child moves there.
-fn hook(still: &KdTree, parts: &mut KdParts, marked: &[(u32, Marked)], (first_pair, first_root): (usize, usize)) {
+fn hook(still: &KdTree, parts: &mut KdParts, marked: &[(u32, MarkedLeaf)], (first_pair, first_root): (usize, usize)) {
     let KdParts { header, nodes, .. } = parts;
     let mut moved = BTreeMap::new();
     let mut pair = first_pair as u32;

@@ -9,7 +9,7 @@ use hedgerow::kdtree::layout::{KdContent, KdNode, halves};
 
 /// A leaf of the static tree, or beside it. Those without a node come first, parents before children: in this order they are merged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Place {
+pub(super) enum TargetLeaf {
     /// The only leaf of a tree that holds nothing.
     Root,
     /// Beyond this face of the root's cell, from 0 to 5, and not beyond those before.
@@ -23,7 +23,7 @@ pub(super) enum Place {
 /// A part of a dynamic tree and the static leaf that it belongs to.
 #[derive(Debug)]
 pub(super) struct Association {
-    pub place: Place,
+    pub place: TargetLeaf,
     /// The leaf's cell, infinite where nothing cuts it.
     pub region: Aabb,
     /// Of the leaf in the static tree.
@@ -47,7 +47,7 @@ pub(super) fn partition_tree_with_tree(
     let mut descent = Descent { forest, records, nodes, associations: Vec::new() };
     let mut region = Aabb { lo: [f32::NEG_INFINITY; 3], hi: [f32::INFINITY; 3] };
     if nodes.is_empty() {
-        return vec![Association { place: Place::Root, region, depth: 0, part: tree }];
+        return vec![Association { place: TargetLeaf::Root, region, depth: 0, part: tree }];
     }
     let mut part = tree;
     for number in 0..6 {
@@ -55,7 +55,7 @@ pub(super) fn partition_tree_with_tree(
         let parts = descent.forest.partition_tree_with_plane(part, records, (axis, at));
         let regions = halves(&region, axis, at);
         if let Some(part) = parts[side] {
-            let (place, region) = (Place::Beyond(number), regions[side]);
+            let (place, region) = (TargetLeaf::Beyond(number), regions[side]);
             descent.associations.push(Association { place, region, depth: 0, part });
         }
         region = regions[1 - side];
@@ -64,7 +64,7 @@ pub(super) fn partition_tree_with_tree(
             None => return descent.associations,
         }
     }
-    descent.push_down(Association { place: Place::Leaf(0), region, depth: 0, part });
+    descent.push_down(Association { place: TargetLeaf::Leaf(0), region, depth: 0, part });
     descent.associations
 }
 
@@ -80,7 +80,7 @@ impl Descent<'_, '_> {
     fn push_down(&mut self, here: Association) {
         let Association { place, region, depth, part } = here;
         let node = match place {
-            Place::Leaf(node) => node,
+            TargetLeaf::Leaf(node) => node,
             _ => return self.associations.push(here),
         };
         let KdContent::Inner(inner) = self.nodes[node as usize].content() else {
@@ -89,7 +89,7 @@ impl Descent<'_, '_> {
         let parts = self.forest.partition_tree_with_plane(part, self.records, (inner.axis, inner.plane));
         for ((part, child), region) in parts.into_iter().zip(inner.children).zip(inner.halves(&region)) {
             if let Some(part) = part {
-                let place = child.map_or(Place::Empty(node), Place::Leaf);
+                let place = child.map_or(TargetLeaf::Empty(node), TargetLeaf::Leaf);
                 self.push_down(Association { place, region, depth: depth + 1, part });
             }
         }
@@ -120,7 +120,7 @@ mod tests {
         let (records, mut forest, root) = quarters();
         let found = partition_tree_with_tree(&mut forest, root, (&records, 9.0), (&nodes(), &cell()));
         let places: Vec<_> = found.iter().map(|a| (a.place, a.depth, forest.tree(a.part).count)).collect();
-        assert_eq!(places, [(Place::Leaf(1), 1, 3), (Place::Leaf(3), 2, 2), (Place::Empty(2), 2, 1)]);
+        assert_eq!(places, [(TargetLeaf::Leaf(1), 1, 3), (TargetLeaf::Leaf(3), 2, 2), (TargetLeaf::Empty(2), 2, 1)]);
         assert_eq!((found[2].region.lo[..2].to_vec(), found[2].region.hi[0]), (vec![2.0, 2.0], 5.0));
     }
 
@@ -131,13 +131,13 @@ mod tests {
         let found = partition_tree_with_tree(&mut forest, leaf, (&records, 9.0), (&nodes(), &cell()));
         let places: Vec<_> = found.iter().map(|a| (a.place, forest.tree(a.part).count)).collect();
         // What is beyond two faces is with the first.
-        assert_eq!(places, [(Place::Beyond(0), 1), (Place::Beyond(1), 1), (Place::Leaf(1), 2)]);
+        assert_eq!(places, [(TargetLeaf::Beyond(0), 1), (TargetLeaf::Beyond(1), 1), (TargetLeaf::Leaf(1), 2)]);
     }
 
     #[test]
     fn in_a_tree_of_nothing_there_is_one_place() {
         let (records, mut forest, root) = quarters();
         let found = partition_tree_with_tree(&mut forest, root, (&records, 9.0), (&[], &Aabb::EMPTY));
-        assert_eq!((found.len(), found[0].place, found[0].part), (1, Place::Root, root));
+        assert_eq!((found.len(), found[0].place, found[0].part), (1, TargetLeaf::Root, root));
     }
 }

@@ -1,6 +1,6 @@
 //! What is merged, and the tree of a leaf that parts of objects are in: `PartitionTrees` of algorithm 12.
 
-use super::descent::Place;
+use super::descent::TargetLeaf;
 use super::fragment::Fragment;
 use super::partition::{Partition, Source};
 use super::tree::Forest;
@@ -24,7 +24,7 @@ pub(super) struct MarkedObject {
     /// Its tree and the parts of it.
     pub forest: Forest<'static>,
     /// The leaves that it has a part in.
-    pub places: Vec<Place>,
+    pub places: Vec<TargetLeaf>,
 }
 
 impl MarkedObject {
@@ -60,12 +60,12 @@ pub(super) struct Make<'a> {
 }
 
 impl Make<'_> {
-    pub fn of(&self, place: Place, marked: &Marked) -> Fragment {
+    pub fn of(&self, place: TargetLeaf, marked: &Marked) -> Fragment {
         let cell = marked.region.intersection(&self.cell);
         let heuristic = Heuristic::of_leaf(self.costs, &cell, self.tree.header.active);
         let mut partition = Partition { heuristic, sources: Vec::new(), made: Fragment::default() };
         let mut parts = Vec::with_capacity(marked.parts.len() + 1);
-        if let Place::Leaf(node) = place
+        if let TargetLeaf::Leaf(node) = place
             && let KdContent::Leaf(range) = self.tree.nodes[node as usize].content()
         {
             let records = (&self.tree.records[..], self.tree.header.reach);
@@ -81,7 +81,7 @@ impl Make<'_> {
             parts.push(partition.part(partition.sources.len() - 1, number));
         }
         let depth = match place {
-            Place::Beyond(face) => self.faces.partition_point(|&other| other <= face) as u32,
+            TargetLeaf::Beyond(face) => self.faces.partition_point(|&other| other <= face) as u32,
             _ => marked.depth + self.faces.len() as u32,
         };
         partition.made.root = partition.partition_trees(parts, cell, depth);

@@ -15,7 +15,7 @@ mod partition;
 mod tree;
 mod write;
 
-use descent::{Association, Place, partition_tree_with_tree};
+use descent::{Association, TargetLeaf, partition_tree_with_tree};
 use hedgerow::bvh::sah::area_scale;
 use hedgerow::geometry::Aabb;
 use hedgerow::kdtree::layout::{KdHeader, KdNode, KdTree, MAX_DEPTH};
@@ -58,7 +58,7 @@ pub struct Merged {
     /// By their first primitives.
     objects: Vec<MarkedObject>,
     /// The static leaves that objects have parts in: the associations of algorithm 11.
-    marked: BTreeMap<Place, Marked>,
+    marked: BTreeMap<TargetLeaf, Marked>,
     /// What the trees of marked leaves were last made for: the root's cell, and the faces of the static one that objects are beyond.
     around: (Aabb, Vec<u8>),
     /// What the static tree's nodes were where others are in their place.
@@ -200,8 +200,8 @@ impl Merged {
     /// Algorithm 12.
     fn merge(&mut self) -> Result<()> {
         let cell = self.objects.iter().fold(self.still.cell(), |cell, object| cell.union(&object.cell));
-        let beyond = |(&place, _): (&Place, &Marked)| match place {
-            Place::Beyond(face) => Some(face),
+        let beyond = |(&place, _): (&TargetLeaf, &Marked)| match place {
+            TargetLeaf::Beyond(face) => Some(face),
             _ => None,
         };
         let around = (cell, self.marked.iter().filter_map(beyond).collect::<Vec<u8>>());
@@ -219,7 +219,7 @@ impl Merged {
         }
         let (tree, objects) = (&self.tree, &self.objects[..]);
         let make = Make { tree, objects, costs: self.costs, cell, faces: &self.around.1 };
-        let mut changed: Vec<(&Place, &mut Marked)> =
+        let mut changed: Vec<(&TargetLeaf, &mut Marked)> =
             self.marked.iter_mut().filter(|(_, m)| m.made.is_none()).collect();
         changed.par_iter_mut().for_each(|(place, marked)| marked.made = Some(make.of(**place, marked)));
 

@@ -5,7 +5,7 @@
 //! What is beside the static tree is parted from it by planes above its root, which moves as well. Each node
 //! of the static tree is overwritten at most once, so that writing the kept ones back, in any order, restores it.
 
-use super::descent::{Place, face};
+use super::descent::{TargetLeaf, face};
 use super::fragment::{Fragment, moved};
 use bytemuck::Zeroable;
 use hedgerow::bvh::layout::status;
@@ -61,18 +61,18 @@ impl<'a> Writer<'a> {
     }
 
     /// Puts a tree in the place of a leaf. Places must come in their order.
-    pub fn swap_leaf(&mut self, place: Place, fragment: &Fragment) {
+    pub fn swap_leaf(&mut self, place: TargetLeaf, fragment: &Fragment) {
         // Clipping may have shown that nothing touches the cell.
         let Some(root) = fragment.root else { return };
         let at = match place {
-            Place::Root => self.new_nodes(1),
-            Place::Beyond(face) => self.beyond[usize::from(face)],
-            Place::Empty(parent) => self.new_child(parent),
-            Place::Leaf(node) => self.moved.get(&node).copied().unwrap_or(node),
+            TargetLeaf::Root => self.new_nodes(1),
+            TargetLeaf::Beyond(face) => self.beyond[usize::from(face)],
+            TargetLeaf::Empty(parent) => self.new_child(parent),
+            TargetLeaf::Leaf(node) => self.moved.get(&node).copied().unwrap_or(node),
         };
         let header = &mut self.tree.header;
         match self.tree.nodes[at as usize].content() {
-            KdContent::Leaf(range) if matches!(place, Place::Leaf(_)) => {
+            KdContent::Leaf(range) if matches!(place, TargetLeaf::Leaf(_)) => {
                 header.leaves -= 1;
                 header.replaced_references += range.len() as u32;
             }

@@ -1,7 +1,7 @@
 //! Many small structures: in one call, in a call each within one submit, and in a submit each.
 
-use super::points::{self, Entry, Way};
-use super::{Stage, WARM_UPS};
+use super::points::{self, AccelEntry, Submission};
+use super::{AccelSetup, WARM_UPS};
 use crate::Result;
 use crate::device::{Buffer, Device};
 use crate::measure::statistics::{Spread, in_turn, ratios};
@@ -100,20 +100,20 @@ impl<'w, 'a> Batch<'w, 'a> {
     ///
     /// # Errors
     /// A build cannot be recorded or run.
-    pub fn build(&self, way: Way, count: usize) -> Result<f64> {
+    pub fn build(&self, way: Submission, count: usize) -> Result<f64> {
         let device = self.structures.device;
         let (infos, ranges) = (&self.infos[..count], &self.ranges[..count]);
         let each = || infos.chunks(1).zip(ranges.chunks(1));
         let start = Instant::now();
         match way {
-            Way::OneCall => device.run(None, |recorder| self.structures.build(recorder, infos, ranges))?,
-            Way::OneSubmit => device.run(None, |recorder| {
+            Submission::OneCall => device.run(None, |recorder| self.structures.build(recorder, infos, ranges))?,
+            Submission::OneSubmit => device.run(None, |recorder| {
                 each().try_for_each(|(infos, ranges)| self.structures.build(recorder, infos, ranges))
             })?,
-            Way::SubmitEach => each().try_for_each(|(infos, ranges)| {
+            Submission::SubmitEach => each().try_for_each(|(infos, ranges)| {
                 device.run(None, |recorder| self.structures.build(recorder, infos, ranges))
             })?,
-            Way::EmptySubmits => each().try_for_each(|_| device.run(None, |_| Ok(())))?,
+            Submission::EmptySubmits => each().try_for_each(|_| device.run(None, |_| Ok(())))?,
         }
         Ok(start.elapsed().as_secs_f64() * 1e3)
     }
@@ -131,23 +131,23 @@ impl Drop for Batch<'_, '_> {
 ///
 /// # Errors
 /// Too little memory; the device failed.
-pub fn measure(stage: &Stage<'_>, most: u32, point: &mut dyn FnMut(Entry) -> Result<()>) -> Result<()> {
+pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut dyn FnMut(AccelEntry) -> Result<()>) -> Result<()> {
     let workload = Workload::new(stage.device, most)?;
     let makers = stage.makers();
     let batches: Vec<Batch<'_, '_>> =
         makers.iter().map(|maker| Batch::new(maker.clone(), &workload)).collect::<Result<_>>()?;
     for count in counts(most) {
         (stage.say)(&format!("batch of {count}"));
-        let ways = |batch| [Way::OneCall, Way::OneSubmit, Way::SubmitEach].map(|way| (batch, way));
-        let mut subjects: Vec<(&Batch<'_, '_>, Way)> = batches.iter().flat_map(ways).collect();
-        subjects.push((&batches[0], Way::EmptySubmits));
+        let ways = |batch| [Submission::OneCall, Submission::OneSubmit, Submission::SubmitEach].map(|way| (batch, way));
+        let mut subjects: Vec<(&Batch<'_, '_>, Submission)> = batches.iter().flat_map(ways).collect();
+        subjects.push((&batches[0], Submission::EmptySubmits));
         let samples = in_turn(&mut subjects, WARM_UPS, stage.runs, |(batch, way)| batch.build(*way, count as usize));
         let samples: Vec<Vec<f64>> = samples.into_iter().collect::<Result<_>>()?;
         for ((batch, way), times) in subjects.iter().zip(&samples) {
-            point(Entry::Batch(points::Batch {
+            point(AccelEntry::Batch(points::Batch {
                 structures: count,
                 triangles: workload.triangles(count as usize),
-                maker: (*way != Way::EmptySubmits).then(|| batch.structures.maker()),
+                maker: (*way != Submission::EmptySubmits).then(|| batch.structures.maker()),
                 way: *way,
                 wall_ms: Spread::of_some(times)?,
                 over_our_call: Spread::of_some(&ratios(times, &samples[0]))?,

@@ -1,9 +1,9 @@
 //! Rays of the kinds that are measured, in device memory: what follows from hits is traced on the device, too.
 
-use super::Stage;
+use super::AccelSetup;
 use crate::Result;
 use crate::rays::kinds::{self, RayKind};
-use crate::scene::{Instance, Instances, Scene};
+use crate::scene::{Instances, Scene, SceneInstance};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::levels::Levels;
 use ash::vk;
@@ -18,11 +18,11 @@ pub struct Bundle<'a> {
 }
 
 /// The rays of every kind of the stage to `scene`; kinds without any are left out.
-pub fn of<'a>(stage: &Stage<'a>, scene: &Scene) -> Result<Vec<Bundle<'a>>> {
+pub fn of<'a>(stage: &AccelSetup<'a>, scene: &Scene) -> Result<Vec<Bundle<'a>>> {
     let alone = Instances {
         name: scene.name.clone(),
         parts: vec![scene.mesh.clone()],
-        instances: vec![Instance { part: 0, transform: Instance::IDENTITY }],
+        instances: vec![SceneInstance { part: 0, transform: SceneInstance::IDENTITY }],
         camera: scene.camera,
         lights: Vec::new(),
     };

@@ -4,8 +4,8 @@ use crate::cli::options::{Kinds, Size};
 use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::accel::page::{self, Points};
-use crate::experiments::accel::points::Entry;
-use crate::experiments::accel::{Experiment, Stage, batch, rebraid, top_level, update};
+use crate::experiments::accel::points::AccelEntry;
+use crate::experiments::accel::{AccelSetup, Experiment, batch, rebraid, top_level, update};
 use crate::measure::setting::{Failure, Setting};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
@@ -59,7 +59,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let device = common.open_device(true)?;
     let bar = Bar::new(common, "opening the device", 0);
     let say = |what: &str| bar.say(what);
-    let stage = Stage {
+    let stage = AccelSetup {
         device: &device,
         runs: arguments.runs.get(),
         kinds: &arguments.rays.0,
@@ -67,7 +67,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         say: &say,
     };
     let mut run = Run { points, failures: 0 };
-    run.points.append(Entry::Setting(setting(common, arguments, &device)?))?;
+    run.points.append(AccelEntry::Setting(setting(common, arguments, &device)?))?;
     for experiment in Experiment::ALL.into_iter().filter(|e| arguments.experiments.contains(e)) {
         let name = experiment.name();
         match experiment {
@@ -144,12 +144,12 @@ impl Run {
     fn one(
         &mut self,
         name: &str,
-        measure: impl FnOnce(&mut dyn FnMut(Entry) -> crate::Result<()>) -> crate::Result<()>,
+        measure: impl FnOnce(&mut dyn FnMut(AccelEntry) -> crate::Result<()>) -> crate::Result<()>,
     ) -> crate::Result<()> {
         let points = &mut self.points;
         let Err(error) = measure(&mut |entry| points.append(entry)) else { return Ok(()) };
         eprintln!("hedgerow: {name}: {error}");
         self.failures += 1;
-        self.points.append(Entry::Failure(Failure::named(name, error)))
+        self.points.append(AccelEntry::Failure(Failure::named(name, error)))
     }
 }

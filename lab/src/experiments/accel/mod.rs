@@ -42,7 +42,7 @@ named!(Experiment, "experiment": Batch = "batch", TopLevel = "tlas", Rebraid = "
 
 /// What all experiments have in common.
 #[derive(Clone, Copy)]
-pub struct Stage<'a> {
+pub struct AccelSetup<'a> {
     /// Where they run.
     pub device: &'a Device,
     /// Counted runs of everything, in turn, after one that warms up.
@@ -55,7 +55,7 @@ pub struct Stage<'a> {
     pub say: &'a dyn Fn(&str),
 }
 
-impl<'a> Stage<'a> {
+impl<'a> AccelSetup<'a> {
     fn ours(&self) -> Structures<'a> {
         Structures::ours(self.device, accel::AccelOptions::DEFAULT)
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// What a line says, by its `experiment`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "experiment", rename_all = "lowercase")]
-pub enum Entry {
+pub enum AccelEntry {
     /// The first line: where and how the others were measured.
     Setting(Setting),
     /// Many small structures, built in one way.
@@ -15,7 +15,7 @@ pub enum Entry {
     /// A top level over so many instances.
     Tlas(TopLevel),
     /// A scene of instances, re-braided and not.
-    Rebraid(Rebraid),
+    Rebraid(RebraidPoint),
     /// A frame of an animation.
     Update(Update),
     /// An experiment that could not be measured, or not to its end.
@@ -25,19 +25,19 @@ pub enum Entry {
 /// Whose structures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Maker {
+pub enum Implementation {
     /// Ours.
     Ours,
     /// The driver's.
     Driver,
 }
 
-impl Maker {
+impl Implementation {
     /// As charts and tables have it.
     pub fn name(self) -> &'static str {
         match self {
-            Maker::Ours => "hedgerow",
-            Maker::Driver => "driver",
+            Implementation::Ours => "hedgerow",
+            Implementation::Driver => "driver",
         }
     }
 }
@@ -45,25 +45,25 @@ impl Maker {
 /// How many structures are built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Way {
+pub enum Submission {
     /// All in one call.
     OneCall,
     /// A call each with a barrier behind it, all in one command buffer.
     OneSubmit,
     /// A call each, submitted and waited for by itself.
     SubmitEach,
-    /// As many submits with nothing in them: what of [`Way::SubmitEach`] is no building.
+    /// As many submits with nothing in them: what of [`Submission::SubmitEach`] is no building.
     EmptySubmits,
 }
 
-impl Way {
+impl Submission {
     /// As charts and tables have it.
     pub fn name(self) -> &'static str {
         match self {
-            Way::OneCall => "one call",
-            Way::OneSubmit => "a call each, one submit",
-            Way::SubmitEach => "a call and submit each",
-            Way::EmptySubmits => "as many empty submits",
+            Submission::OneCall => "one call",
+            Submission::OneSubmit => "a call each, one submit",
+            Submission::SubmitEach => "a call and submit each",
+            Submission::EmptySubmits => "as many empty submits",
         }
     }
 }
@@ -75,10 +75,10 @@ pub struct Batch {
     pub structures: u32,
     /// Triangles of all together.
     pub triangles: u64,
-    /// Whose; nobody's are [`Way::EmptySubmits`].
-    pub maker: Option<Maker>,
+    /// Whose; nobody's are [`Submission::EmptySubmits`].
+    pub maker: Option<Implementation>,
     /// How they are built.
-    pub way: Way,
+    pub way: Submission,
     /// By the wall's clock, from before the recording to behind the wait.
     pub wall_ms: Spread,
     /// Its time over that of ours in one call, run by run.
@@ -91,7 +91,7 @@ pub struct TopLevel {
     /// Instances.
     pub instances: u32,
     /// Whose.
-    pub maker: Maker,
+    pub maker: Implementation,
     /// By the device's timestamps.
     pub build_ms: Spread,
     /// In place, with every instance moved.
@@ -104,7 +104,7 @@ pub struct TopLevel {
 
 /// A scene of instances under top levels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Rebraid {
+pub struct RebraidPoint {
     /// Scene name.
     pub scene: String,
     /// Instances.
@@ -116,18 +116,18 @@ pub struct Rebraid {
     /// How many other instances' boxes each one's overlaps, in the mean (over some hundred, where there are many).
     pub overlaps: f64,
     /// Ours, plain.
-    pub off: Side,
+    pub off: TopLevelPoint,
     /// Ours, with the flag `REBRAID`.
-    pub on: Side,
+    pub on: TopLevelPoint,
     /// The driver's.
-    pub driver: Option<Side>,
+    pub driver: Option<TopLevelPoint>,
     /// One entry a kind of ray.
     pub rays: Vec<BraidedRays>,
 }
 
 /// One of the top levels that are compared.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Side {
+pub struct TopLevelPoint {
     /// Building the top level, by the device's timestamps.
     pub build_ms: Spread,
     /// The top level.
@@ -158,14 +158,14 @@ pub struct BraidedRays {
     /// Time through the plain one over that through the re-braided one, run by run: above 1, re-braiding is faster.
     pub gain: Spread,
     /// Work a ray through the plain one.
-    pub off_work: Work,
+    pub off_work: MeanWork,
     /// Work a ray through the re-braided one.
-    pub on_work: Work,
+    pub on_work: MeanWork,
 }
 
 /// What a ray meets on its way, in the mean.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Work {
+pub struct MeanWork {
     /// Nodes of the top level.
     pub top_nodes: f64,
     /// Instances that it enters.
@@ -176,13 +176,13 @@ pub struct Work {
     pub tests: f64,
 }
 
-impl Work {
+impl MeanWork {
     /// The mean over rays.
-    pub fn mean(works: &[[u32; 4]]) -> Work {
+    pub fn mean(works: &[[u32; 4]]) -> MeanWork {
         let sum = |k: usize| works.iter().map(|work| f64::from(work[k])).sum::<f64>();
         let [top_nodes, instances, nodes_below, tests] =
             std::array::from_fn(|k| if works.is_empty() { 0.0 } else { sum(k) / works.len() as f64 });
-        Work { top_nodes, instances, nodes_below, tests }
+        MeanWork { top_nodes, instances, nodes_below, tests }
     }
 }
 
@@ -196,7 +196,7 @@ pub struct Update {
     /// The frame; the first is 0.
     pub frame: u32,
     /// Whose.
-    pub maker: Maker,
+    pub maker: Implementation,
     /// Building anew, by the device's timestamps.
     pub build_ms: Spread,
     /// Updating in place.
@@ -272,7 +272,7 @@ mod tests {
             scene: "twist".into(),
             triangles: 12,
             frame: 1,
-            maker: Maker::Ours,
+            maker: Implementation::Ours,
             build_ms: spread(build),
             update_ms: Some(spread(update)),
             growth: Some(1.5),
@@ -284,14 +284,14 @@ mod tests {
 
     #[test]
     fn an_entry_names_its_experiment_and_what_was_not_measured_is_null() {
-        let line = Entry::Update(frame(4.0, 1.0, [2.0, 3.0]));
+        let line = AccelEntry::Update(frame(4.0, 1.0, [2.0, 3.0]));
         let value = serde_json::to_value(&line).expect("JSON");
         assert_eq!(value["experiment"], "update");
         assert_eq!((&value["maker"], &value["growth"]), (&"ours".into(), &1.5.into()));
         assert!(value["built_sah"].is_null(), "{value}");
-        assert_eq!(serde_json::from_value::<Entry>(value).expect("round trip"), line);
+        assert_eq!(serde_json::from_value::<AccelEntry>(value).expect("round trip"), line);
         let text = serde_json::to_string(&line).expect("JSON");
-        assert_eq!(serde_json::from_str::<Entry>(&text).expect("round trip"), line);
+        assert_eq!(serde_json::from_str::<AccelEntry>(&text).expect("round trip"), line);
     }
 
     #[test]
@@ -308,8 +308,8 @@ mod tests {
 
     #[test]
     fn work_is_the_mean_over_rays() {
-        let mean = Work::mean(&[[1, 2, 3, 4], [3, 2, 1, 0]]);
-        assert_eq!(mean, Work { top_nodes: 2.0, instances: 2.0, nodes_below: 2.0, tests: 2.0 });
-        assert_eq!(Work::mean(&[]).tests, 0.0);
+        let mean = MeanWork::mean(&[[1, 2, 3, 4], [3, 2, 1, 0]]);
+        assert_eq!(mean, MeanWork { top_nodes: 2.0, instances: 2.0, nodes_below: 2.0, tests: 2.0 });
+        assert_eq!(MeanWork::mean(&[]).tests, 0.0);
     }
 }

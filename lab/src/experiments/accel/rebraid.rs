@@ -1,12 +1,12 @@
 //! Re-braiding on and off: what it takes to build, and what rays of every kind gain.
 
 use super::bundles::{self, Bundle};
-use super::points::{self, BraidedRays, Entry, Side, Work};
-use super::{Stage, WARM_UPS};
+use super::points::{self, AccelEntry, BraidedRays, MeanWork, TopLevelPoint};
+use super::{AccelSetup, WARM_UPS};
 use crate::Result;
 use crate::measure::agreement::agree;
 use crate::measure::statistics::{Spread, in_turn, ratios};
-use crate::scene::{Instance, Instances, Scene};
+use crate::scene::{Instances, Scene, SceneInstance};
 use crate::subjects::levels::Levels;
 use ash::vk;
 use hedgerow::accel::REBRAID;
@@ -24,7 +24,11 @@ const DRIVER: usize = 2;
 ///
 /// # Errors
 /// Too little memory; the device failed; the scene is too large to be flattened, which rays are made with.
-pub fn measure(stage: &Stage<'_>, instances: &Instances, point: &mut dyn FnMut(Entry) -> Result<()>) -> Result<()> {
+pub fn measure(
+    stage: &AccelSetup<'_>,
+    instances: &Instances,
+    point: &mut dyn FnMut(AccelEntry) -> Result<()>,
+) -> Result<()> {
     let say = |what: &str| (stage.say)(&format!("re-braiding {}: {what}", instances.name));
     say("building");
     let mut levels =
@@ -37,7 +41,7 @@ pub fn measure(stage: &Stage<'_>, instances: &Instances, point: &mut dyn FnMut(E
     for (levels, builds) in levels.iter().zip(builds) {
         let [structure_bytes, scratch_bytes] = levels.top_bytes();
         let build_ms = Spread::of_some(&builds?)?;
-        sides.push(Side { build_ms, structure_bytes, scratch_bytes, entries: levels.entries() });
+        sides.push(TopLevelPoint { build_ms, structure_bytes, scratch_bytes, entries: levels.entries() });
     }
     let scene = Scene {
         name: instances.name.clone(),
@@ -51,7 +55,7 @@ pub fn measure(stage: &Stage<'_>, instances: &Instances, point: &mut dyn FnMut(E
         say(bundle.kind.name());
         rays.push(traced(stage, &mut levels, &bundle)?);
     }
-    point(Entry::Rebraid(points::Rebraid {
+    point(AccelEntry::Rebraid(points::RebraidPoint {
         scene: instances.name.clone(),
         instances: instances.instances.len() as u32,
         parts: instances.parts.len() as u32,
@@ -64,7 +68,7 @@ pub fn measure(stage: &Stage<'_>, instances: &Instances, point: &mut dyn FnMut(E
     }))
 }
 
-fn traced(stage: &Stage<'_>, levels: &mut [Levels<'_>], bundle: &Bundle<'_>) -> Result<BraidedRays> {
+fn traced(stage: &AccelSetup<'_>, levels: &mut [Levels<'_>], bundle: &Bundle<'_>) -> Result<BraidedRays> {
     let query = bundle.kind.query();
     let rays = &bundle.buffers;
     let times = in_turn(levels, WARM_UPS, stage.runs, |levels| levels.trace(rays, query));
@@ -74,7 +78,7 @@ fn traced(stage: &Stage<'_>, levels: &mut [Levels<'_>], bundle: &Bundle<'_>) -> 
     for levels in &mut levels[..=ON] {
         levels.trace(rays, query)?;
         found.push(rays.read_hits());
-        work.push(Work::mean(&levels.work(rays, query)?));
+        work.push(MeanWork::mean(&levels.work(rays, query)?));
     }
     Ok(BraidedRays {
         rays: bundle.kind.name().into(),
@@ -93,7 +97,7 @@ fn traced(stage: &Stage<'_>, levels: &mut [Levels<'_>], bundle: &Bundle<'_>) -> 
 /// How many other instances' boxes each one's overlaps, in the mean over at most so many; boxes are around the placed vertices.
 fn overlaps(scene: &Instances) -> f64 {
     const SAMPLE: usize = 256;
-    let around = |instance: &Instance| {
+    let around = |instance: &SceneInstance| {
         let points = scene.parts[instance.part as usize].positions.iter().map(|&p| instance.place(p));
         points.fold(Aabb::EMPTY, |bounds, point| bounds.union(&Aabb::around(&[point])))
     };

@@ -1,10 +1,10 @@
 //! How top levels grow: building and updating one over 100, 1,000, 10,000… instances.
 
-use super::points::{Entry, TopLevel};
-use super::{Stage, WARM_UPS, where_possible};
+use super::points::{AccelEntry, TopLevel};
+use super::{AccelSetup, WARM_UPS, where_possible};
 use crate::Result;
 use crate::measure::statistics::{Spread, in_turn};
-use crate::scene::{self, Instance, LoadOptions};
+use crate::scene::{self, LoadOptions, SceneInstance};
 use crate::subjects::levels::Levels;
 use ash::vk;
 
@@ -16,7 +16,7 @@ const TIMES: u32 = 10;
 ///
 /// # Errors
 /// Too little memory; the device failed.
-pub fn measure(stage: &Stage<'_>, most: u32, point: &mut dyn FnMut(Entry) -> Result<()>) -> Result<()> {
+pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut dyn FnMut(AccelEntry) -> Result<()>) -> Result<()> {
     for count in counts(most) {
         (stage.say)(&format!("top level of {count}"));
         let scene = scene::load_instances(&format!("gen:cells:{count}"), &LoadOptions::default())?;
@@ -35,7 +35,7 @@ pub fn measure(stage: &Stage<'_>, most: u32, point: &mut dyn FnMut(Entry) -> Res
             let builds: Vec<f64> = samples.iter().map(|s| s.0).collect();
             let updates: Vec<f64> = samples.iter().filter_map(|s| s.1).collect();
             let [structure_bytes, scratch_bytes] = levels.top_bytes();
-            point(Entry::Tlas(TopLevel {
+            point(AccelEntry::Tlas(TopLevel {
                 instances: count,
                 maker: maker.maker(),
                 build_ms: Spread::of_some(&builds)?,
@@ -55,7 +55,7 @@ fn counts(most: u32) -> Vec<u32> {
 }
 
 /// Each in another direction.
-fn moved(i: usize, instance: &Instance) -> [[f32; 4]; 3] {
+fn moved(i: usize, instance: &SceneInstance) -> [[f32; 4]; 3] {
     let mut transform = instance.transform;
     transform[i % 3][3] += if (i / 3).is_multiple_of(2) { 0.2 } else { -0.2 };
     transform

@@ -2,8 +2,8 @@
 
 use super::bundles::{self, Bundle};
 use super::deforming::Deforming;
-use super::points::{self, Entry, UpdatedRays};
-use super::{Stage, WARM_UPS, where_possible};
+use super::points::{self, AccelEntry, UpdatedRays};
+use super::{AccelSetup, WARM_UPS, where_possible};
 use crate::Result;
 use crate::measure::statistics::{Spread, in_turn, ratios};
 use crate::scene::{Animation, Scene};
@@ -34,10 +34,10 @@ impl<'a> Pair<'a> {
 /// # Errors
 /// Too little memory; the device failed.
 pub fn measure(
-    stage: &Stage<'_>,
+    stage: &AccelSetup<'_>,
     animation: &Animation,
     frames: u32,
-    point: &mut dyn FnMut(Entry) -> Result<()>,
+    point: &mut dyn FnMut(AccelEntry) -> Result<()>,
 ) -> Result<()> {
     let mut pairs: Vec<Pair<'_>> =
         stage.makers().into_iter().map(|maker| Pair::new(maker, animation)).collect::<Result<_>>()?;
@@ -72,7 +72,7 @@ pub fn measure(
             let builds = builds?;
             let updates: Vec<f64> = builds.iter().filter_map(|b| b.1).collect();
             let updated = pair.updated.header().filter(|_| pair.updates);
-            point(Entry::Update(points::Update {
+            point(AccelEntry::Update(points::Update {
                 scene: animation.name.clone(),
                 triangles: animation.triangles.len() as u64,
                 frame: frame as u32,
@@ -90,7 +90,7 @@ pub fn measure(
 }
 
 /// The rays through both structures of every maker, in turn.
-fn traced(stage: &Stage<'_>, pairs: &mut [Pair<'_>], bundle: &Bundle<'_>) -> Result<Vec<UpdatedRays>> {
+fn traced(stage: &AccelSetup<'_>, pairs: &mut [Pair<'_>], bundle: &Bundle<'_>) -> Result<Vec<UpdatedRays>> {
     let trace = |deforming: &mut Deforming<'_>| deforming.trace(&bundle.buffers, bundle.kind.query());
     let times = in_turn(pairs, WARM_UPS, stage.runs, |pair| {
         let updated = pair.updates.then(|| trace(&mut pair.updated)).transpose()?;

@@ -4,13 +4,13 @@ use crate::cli::options::{Kinds, Size};
 use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::animate::page::{self, Points, standings};
-use crate::experiments::animate::points::{Entry, Object, SceneSetting};
-use crate::experiments::animate::{Stage, Way, measure};
+use crate::experiments::animate::points::{AnimateEntry, Object, SceneSetting};
+use crate::experiments::animate::{AnimateSetup, AnimationMethod, measure};
 use crate::measure::setting::Setting;
 use crate::report::picture::{PictureOptions, View, picture};
 use crate::scene::{DynamicScene, Scene};
 use crate::subjects::Subject;
-use crate::subjects::builders::{KdBuilder, Spec};
+use crate::subjects::builders::{KdSpec, Spec};
 use ash::vk;
 use std::io::Write;
 use std::num::NonZeroU32;
@@ -30,7 +30,7 @@ pub struct Arguments {
         value_delimiter = ',',
         default_value = "rebuild,two-trees,tree-per-object,two-level,merge"
     )]
-    ways: Vec<Way>,
+    ways: Vec<AnimationMethod>,
     /// Who builds kd-trees every frame, with options: kd-gpu on the device, kd-binned and others on the host, which then traces them,
     /// too, unless :trace=device follows
     #[arg(short, long, value_name = "BUILDER", default_value = "kd-gpu")]
@@ -118,7 +118,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         );
     }
     let builder = arguments.builder.kd()?;
-    if let KdBuilder::Device { .. } = arguments.static_builder.kd()? {
+    if let KdSpec::Device { .. } = arguments.static_builder.kd()? {
         let what = "what stands still is built once, on the host; take kd-exact, kd-binned or kd-gpu-host";
         return Err(crate::Error::Argument(format!("--static-builder {}: {what}", arguments.static_builder)).into());
     }
@@ -130,15 +130,15 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     }
     let frames = arguments.frames.of(&scene)?;
     let device = match work::device_for(common, std::slice::from_ref(&arguments.builder))? {
-        None if arguments.ways.contains(&Way::TwoLevel) => Some(common.open_device(false)?),
+        None if arguments.ways.contains(&AnimationMethod::TwoLevel) => Some(common.open_device(false)?),
         device => device,
     };
     // Before any work: a folder that cannot be written would lose all of it.
     let mut points = Points::create(&arguments.output)?;
-    points.append(Entry::Setting(setting(common, arguments, &scene, &frames, builder, device.as_ref())?))?;
+    points.append(AnimateEntry::Setting(setting(common, arguments, &scene, &frames, builder, device.as_ref())?))?;
     let bar = Bar::new(common, "", frames.len() as u64 + 1);
     let (aim, say) = (|camera: &mut _| common.aim(camera), |what: &str| bar.say(what));
-    let stage = Stage {
+    let stage = AnimateSetup {
         device: device.as_ref(),
         ways: &arguments.ways,
         builder: &arguments.builder,
@@ -152,14 +152,14 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     };
     let mut failures = 0;
     let mut measured = Vec::new();
-    let mut point = |entry: Entry| {
+    let mut point = |entry: AnimateEntry| {
         match &entry {
-            Entry::Failure(failure) => {
+            AnimateEntry::Failure(failure) => {
                 eprintln!("hedgerow: {failure}");
                 failures += 1;
             }
-            Entry::Animate(frame) => measured.push(frame.clone()),
-            Entry::Setting(_) => {}
+            AnimateEntry::Animate(frame) => measured.push(frame.clone()),
+            AnimateEntry::Setting(_) => {}
         }
         points.append(entry)
     };
@@ -195,7 +195,7 @@ fn setting(
     arguments: &Arguments,
     scene: &DynamicScene,
     frames: &[u32],
-    builder: KdBuilder,
+    builder: KdSpec,
     device: Option<&Device>,
 ) -> crate::Result<SceneSetting> {
     let mut notes = Vec::new();
@@ -205,8 +205,8 @@ fn setting(
                 .to_owned(),
         );
     }
-    if let KdBuilder::Host { traces_on_device, .. } = builder
-        && arguments.ways.contains(&Way::TwoLevel)
+    if let KdSpec::Host { traces_on_device, .. } = builder
+        && arguments.ways.contains(&AnimationMethod::TwoLevel)
     {
         let traced = if traces_on_device { "" } else { " and traced" };
         notes.push(format!("Kd-trees are built{traced} by the host here, two levels by the device."));

@@ -29,7 +29,7 @@ pub struct MergeOnDevice<'a> {
     options: MergeOptions,
     most: MergeCapacity,
     objects: Vec<Moving<'a>>,
-    place: Place<'a>,
+    place: PlacedMerger<'a>,
     /// Whether objects are in the tree.
     is_merged: bool,
     timestamps: Timestamps,
@@ -45,27 +45,32 @@ struct Moving<'a> {
 }
 
 /// A merger and its memory.
-struct Place<'a> {
+struct PlacedMerger<'a> {
     merger: Merger,
     structure: Buffer<'a>,
     scratch: Buffer<'a>,
     undo: Buffer<'a>,
 }
 
-impl<'a> Place<'a> {
+impl<'a> PlacedMerger<'a> {
     /// With the static tree in place.
-    fn new(device: &'a Device, options: &MergeOptions, still: &KdTree, most: MergeCapacity) -> Result<Place<'a>> {
+    fn new(
+        device: &'a Device,
+        options: &MergeOptions,
+        still: &KdTree,
+        most: MergeCapacity,
+    ) -> Result<PlacedMerger<'a>> {
         let tree = still.clone().with_room(Merger::room(options, most))?;
         let merger = Merger::new(device, options, &tree.header, most)?;
         let sizes = merger.sizes();
         let structure = device.buffer("kd-tree", tree.header.offsets().bytes)?;
         structure.write(&tree.to_bytes());
         let (scratch, undo) = (device.buffer("scratch", sizes.scratch)?, device.buffer("undo", sizes.undo)?);
-        Ok(Place { merger, structure, scratch, undo })
+        Ok(PlacedMerger { merger, structure, scratch, undo })
     }
 
     fn memory(&self) -> MergeMemory {
-        let Place { structure, scratch, undo, .. } = self;
+        let PlacedMerger { structure, scratch, undo, .. } = self;
         MergeMemory { structure: structure.region(), scratch: scratch.region(), undo: undo.region() }
     }
 
@@ -102,7 +107,7 @@ impl<'a> MergeOnDevice<'a> {
         Ok(MergeOnDevice {
             device,
             builder: builder.to_string(),
-            place: Place::new(device, &options, &still, most)?,
+            place: PlacedMerger::new(device, &options, &still, most)?,
             still,
             options,
             most,
@@ -163,16 +168,16 @@ impl Subject for MergeOnDevice<'_> {
                     return Err(Error::Argument(what));
                 }
                 self.options.estimate = report.estimate(self.most.triangles);
-                self.place = Place::new(self.device, &self.options, &self.still, self.most)?;
+                self.place = PlacedMerger::new(self.device, &self.options, &self.still, self.most)?;
                 (self.is_merged, is_whole) = (false, false);
             }
         }
     }
 
-    fn memory(&self) -> record::Memory {
-        let Place { structure, scratch, undo, .. } = &self.place;
+    fn memory(&self) -> record::MemoryRecord {
+        let PlacedMerger { structure, scratch, undo, .. } = &self.place;
         let scratch_bytes = Some(scratch.bytes() + undo.bytes());
-        record::Memory { structure_bytes: Some(structure.bytes()), scratch_bytes, peak_bytes: None }
+        record::MemoryRecord { structure_bytes: Some(structure.bytes()), scratch_bytes, peak_bytes: None }
     }
 
     fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {

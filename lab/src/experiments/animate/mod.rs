@@ -1,7 +1,7 @@
 //! A dynamic scene frame by frame, in each of five ways to have something to trace when some of it moves (Papay 2025, chapter 10 and
 //! section 11.3.2): what each frame's build takes, what its rays take then, and whether all find the same.
 //!
-//! A [`Subject`] is one of the [`Way`]s on a scene. What a way needs once (the tree of what stands still) is made before the clock
+//! A [`Subject`] is one of the [`AnimationMethod`]s on a scene. What a way needs once (the tree of what stands still) is made before the clock
 //! runs, and so is what all need alike: vertices are placed and uploaded. Under the clock is what is done a frame to have something
 //! that can be traced, and the tracing.
 
@@ -21,20 +21,20 @@ use crate::named::named;
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Camera, DynamicScene, Frame, Scene};
 use crate::subjects::Subject;
-use crate::subjects::builders::{KdBuilder, Spec};
+use crate::subjects::builders::{KdSpec, Spec};
 use crate::{Error, Result};
 use hedgerow::kdtree::merge;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use merge_on_device::MergeOnDevice;
 use on_device::{OnDevice, static_tree};
 use on_host::OnHost;
-use points::{Animated, Entry, Rays, WayInFrame};
+use points::{AnimateEntry, Animated, Rays, WayInFrame};
 use two_level::TwoLevel;
 
 /// How there is something to trace in every frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Way {
+pub enum AnimationMethod {
     /// One kd-tree over all triangles, built anew.
     Rebuild,
     /// The static tree, and one over all that moves; a ray goes through both.
@@ -47,7 +47,7 @@ pub enum Way {
     Merge,
 }
 
-named!(Way, "way":
+named!(AnimationMethod, "way":
     Rebuild = "rebuild",
     TwoTrees = "two-trees",
     TreePerObject = "tree-per-object",
@@ -55,20 +55,20 @@ named!(Way, "way":
     Merge = "merge",
 );
 
-impl Way {
+impl AnimationMethod {
     /// Whether it is made of kd-trees.
     pub fn is_of_kd_trees(self) -> bool {
-        self != Way::TwoLevel
+        self != AnimationMethod::TwoLevel
     }
 }
 
 /// What is measured, and how.
 #[derive(Clone, Copy)]
-pub struct Stage<'a> {
+pub struct AnimateSetup<'a> {
     /// Where what is built or traced on a device is.
     pub device: Option<&'a Device>,
     /// The ways, each at most once.
-    pub ways: &'a [Way],
+    pub ways: &'a [AnimationMethod],
     /// Who builds the kd-trees of every frame.
     pub builder: &'a Spec,
     /// Who builds those of what stands still, once: a builder on the host.
@@ -87,23 +87,23 @@ pub struct Stage<'a> {
     pub say: &'a dyn Fn(&str),
 }
 
-impl<'a> Stage<'a> {
+impl<'a> AnimateSetup<'a> {
     /// A way on a scene, in its first frame; what it builds once is built.
-    fn subject(&self, way: Way, first: &Frame<'a>) -> Result<Box<dyn Subject + 'a>> {
+    fn subject(&self, way: AnimationMethod, first: &Frame<'a>) -> Result<Box<dyn Subject + 'a>> {
         let device =
             || self.device.ok_or_else(|| Error::NoVulkan(format!("the way {way} needs a device, and none was opened")));
-        if way == Way::TwoLevel {
+        if way == AnimationMethod::TwoLevel {
             return Ok(Box::new(TwoLevel::new(device()?, first)?));
         }
-        let KdBuilder::Host { options: static_options, .. } = self.static_builder.kd()? else {
+        let KdSpec::Host { options: static_options, .. } = self.static_builder.kd()? else {
             let what = "what stands still is built once, on the host; take kd-exact, kd-binned or kd-gpu-host";
             return Err(Error::Argument(format!("{}: {what}", self.static_builder)));
         };
         Ok(match self.builder.kd()? {
-            KdBuilder::Device { options, traversal } if way != Way::Merge => {
+            KdSpec::Device { options, traversal } if way != AnimationMethod::Merge => {
                 Box::new(OnDevice::new(way, device()?, self.builder, (&options, static_options), traversal, first)?)
             }
-            KdBuilder::Device { options, traversal } => {
+            KdSpec::Device { options, traversal } => {
                 let still = static_tree(&first.dynamic.static_mesh, &static_options)?.ok_or_else(|| {
                     let name = &first.dynamic.name;
                     Error::Scene(format!("{name}: nothing in it stands still, so there is nothing to merge into"))
@@ -111,7 +111,7 @@ impl<'a> Stage<'a> {
                 let options = merge::MergeOptions { build: options, ..merge::MergeOptions::DEFAULT };
                 Box::new(MergeOnDevice::new(device()?, self.builder, options, traversal, still, first)?)
             }
-            KdBuilder::Host { options, traversal, traces_on_device } => {
+            KdSpec::Host { options, traversal, traces_on_device } => {
                 let kd = (options, traversal, traces_on_device);
                 Box::new(OnHost::new(way, self.device, self.builder, kd, &static_options, first)?)
             }
@@ -121,7 +121,7 @@ impl<'a> Stage<'a> {
 
 /// One of the ways under way.
 struct Running<'a> {
-    way: Way,
+    way: AnimationMethod,
     subject: Box<dyn Subject + 'a>,
 }
 
@@ -133,10 +133,10 @@ struct Running<'a> {
 /// # Errors
 /// Those of `point` and `show`; a frame has vertices that are not finite; no way is left.
 pub fn measure<'a>(
-    stage: &Stage<'a>,
+    stage: &AnimateSetup<'a>,
     scene: &'a DynamicScene,
     frames: &[u32],
-    point: &mut dyn FnMut(Entry) -> Result<()>,
+    point: &mut dyn FnMut(AnimateEntry) -> Result<()>,
     show: &mut dyn FnMut(u32, &Scene, &mut dyn Subject) -> Result<()>,
 ) -> Result<()> {
     let frame_of = |number: u32| -> Result<Frame<'a>> {
@@ -197,7 +197,7 @@ pub fn measure<'a>(
             }
             let [c_t, c_i] = stage.costs;
             let static_triangles = scene.static_mesh.triangles.len() as u64;
-            point(Entry::Animate(Animated {
+            point(AnimateEntry::Animate(Animated {
                 scene: scene.name.clone(),
                 frame: number,
                 time: frame.time,
@@ -216,8 +216,8 @@ pub fn measure<'a>(
     Ok(())
 }
 
-fn failure(way: Way, frame: Option<u32>, error: &Error) -> Entry {
-    Entry::Failure(Failure { at: WayInFrame { way, frame }, what: error.to_string() })
+fn failure(way: AnimationMethod, frame: Option<u32>, error: &Error) -> AnimateEntry {
+    AnimateEntry::Failure(Failure { at: WayInFrame { way, frame }, what: error.to_string() })
 }
 
 /// The results of those that did not fail; the others are noted and run no more.
@@ -225,7 +225,7 @@ fn without_failed<T>(
     running: &mut Vec<Running<'_>>,
     results: Vec<Result<T>>,
     frame: u32,
-    point: &mut dyn FnMut(Entry) -> Result<()>,
+    point: &mut dyn FnMut(AnimateEntry) -> Result<()>,
 ) -> Result<Vec<T>> {
     let failed: Vec<bool> = results.iter().map(Result::is_err).collect();
     let mut good = Vec::new();
@@ -246,7 +246,7 @@ fn retain_by<T>(items: &mut Vec<T>, failed: &[bool]) {
 
 /// The rays in every way, in turn, and their hits against those of the first.
 fn trace(
-    stage: &Stage<'_>,
+    stage: &AnimateSetup<'_>,
     running: &mut [Running<'_>],
     warm_ups: u32,
     kind: RayKind,
@@ -296,11 +296,13 @@ mod tests {
 
     #[test]
     fn names_of_ways_are_their_own_inverse() {
-        for way in Way::ALL {
-            assert_eq!(way.name().parse::<Way>().expect("a way"), way);
+        for way in AnimationMethod::ALL {
+            assert_eq!(way.name().parse::<AnimationMethod>().expect("a way"), way);
             assert_eq!(serde_json::to_value(way).expect("JSON"), way.name());
         }
-        assert!("two".parse::<Way>().expect_err("no way").to_string().contains("use one of rebuild, two-trees"));
+        assert!(
+            "two".parse::<AnimationMethod>().expect_err("no way").to_string().contains("use one of rebuild, two-trees")
+        );
     }
 
     #[test]

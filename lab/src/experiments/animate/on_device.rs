@@ -1,9 +1,9 @@
 //! Kd-trees that the device builds every frame: all in one, all that moves, or each object.
 
-use super::Way;
+use super::AnimationMethod;
 use crate::Result;
 use crate::device::{Buffer, Device};
-use crate::measure::record::Memory;
+use crate::measure::record::MemoryRecord;
 use crate::scene::{Frame, Group, Mesh};
 use crate::subjects::builders::Spec;
 use crate::subjects::kd_device::KdDevice;
@@ -38,7 +38,7 @@ impl<'a> OnDevice<'a> {
     /// # Errors
     /// Too little memory; the device failed.
     pub fn new(
-        way: Way,
+        way: AnimationMethod,
         device: &'a Device,
         builder: &Spec,
         (options, static_options): (&builder::KdOptions, host::HostKdOptions),
@@ -47,13 +47,13 @@ impl<'a> OnDevice<'a> {
     ) -> Result<OnDevice<'a>> {
         let tracer = KdDevice::new(device, traversal)?;
         let groups = match way {
-            Way::Rebuild => vec![Group::Whole],
-            Way::TwoTrees => vec![Group::Moving],
+            AnimationMethod::Rebuild => vec![Group::Whole],
+            AnimationMethod::TwoTrees => vec![Group::Moving],
             _ => Group::objects(first),
         };
         let builder = builder.to_string();
         let still = match way {
-            Way::Rebuild => None,
+            AnimationMethod::Rebuild => None,
             _ => static_tree(&first.dynamic.static_mesh, &static_options)?,
         };
         let part = |group| {
@@ -106,12 +106,12 @@ impl Subject for OnDevice<'_> {
         Ok(BuildRun::whole(milliseconds))
     }
 
-    fn memory(&self) -> Memory {
+    fn memory(&self) -> MemoryRecord {
         let parts = || self.parts.iter().map(|part| part.subject.memory());
         let still = self.still.iter().map(|still| Some(still.bytes()));
         let structure_bytes = still.chain(parts().map(|memory| memory.structure_bytes)).sum();
         let scratch_bytes = parts().map(|memory| memory.scratch_bytes).sum();
-        Memory { structure_bytes, scratch_bytes, peak_bytes: None }
+        MemoryRecord { structure_bytes, scratch_bytes, peak_bytes: None }
     }
 
     fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {

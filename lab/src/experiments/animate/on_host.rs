@@ -1,9 +1,9 @@
 //! Kd-trees that the host builds every frame, or merges into the static one.
 
-use super::Way;
+use super::AnimationMethod;
 use super::on_device::static_tree;
 use crate::device::Device;
-use crate::measure::record::Memory;
+use crate::measure::record::MemoryRecord;
 use crate::scene::{Frame, Group, Mesh};
 use crate::subjects::builders::Spec;
 use crate::subjects::host_rays::{KdRays, Numbered, timed};
@@ -70,7 +70,7 @@ impl<'a> OnHost<'a> {
     /// # Errors
     /// Too little memory; there is no device to trace on; nothing stands still that could be merged into.
     pub fn new(
-        way: Way,
+        way: AnimationMethod,
         device: Option<&'a Device>,
         builder: &Spec,
         (options, traversal, traces_on_device): (HostKdOptions, Traversal, bool),
@@ -78,8 +78,8 @@ impl<'a> OnHost<'a> {
         first: &Frame<'_>,
     ) -> Result<OnHost<'a>> {
         let groups = match way {
-            Way::Rebuild => vec![Group::Whole],
-            Way::TwoTrees => vec![Group::Moving],
+            AnimationMethod::Rebuild => vec![Group::Whole],
+            AnimationMethod::TwoTrees => vec![Group::Moving],
             _ => Group::objects(first),
         };
         let part = |group: Group| {
@@ -90,11 +90,11 @@ impl<'a> OnHost<'a> {
             Part { group, name, first: first.first(group), mesh: Mesh::default() }
         };
         let still = match way {
-            Way::Rebuild => None,
+            AnimationMethod::Rebuild => None,
             _ => static_tree(&first.dynamic.static_mesh, static_options)?,
         };
         let trees = match way {
-            Way::Merge => {
+            AnimationMethod::Merge => {
                 let name = &first.dynamic.name;
                 let still = still.ok_or_else(|| {
                     Error::Scene(format!("{name}: nothing in it stands still, so there is nothing to merge into"))
@@ -205,8 +205,8 @@ impl Subject for OnHost<'_> {
         }
     }
 
-    fn memory(&self) -> Memory {
-        Memory { structure_bytes: Some(self.bytes), ..Memory::default() }
+    fn memory(&self) -> MemoryRecord {
+        MemoryRecord { structure_bytes: Some(self.bytes), ..MemoryRecord::default() }
     }
 
     fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {

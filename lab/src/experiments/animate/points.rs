@@ -1,7 +1,7 @@
 //! The lines of `animate.jsonl`. A figure that was not measured is `None`.
 
-use super::Way;
-use crate::measure::record::Memory;
+use super::AnimationMethod;
+use crate::measure::record::MemoryRecord;
 use crate::measure::setting::{Failure, Setting};
 use crate::measure::statistics::Spread;
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use std::fmt;
 /// What a line says, by its `experiment`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "experiment", rename_all = "lowercase")]
-pub enum Entry {
+pub enum AnimateEntry {
     /// The first line: where and how the others were measured.
     Setting(SceneSetting),
     /// A frame in one of the ways.
@@ -58,7 +58,7 @@ pub struct Animated {
     /// When it is, in seconds.
     pub time: f32,
     /// The way.
-    pub way: Way,
+    pub way: AnimationMethod,
     /// Who built what is built a frame; `accel` of two levels.
     pub builder: String,
     /// What the builds were timed by: `device` (timestamps) or `wall`.
@@ -72,7 +72,7 @@ pub struct Animated {
     /// The rays, by kind.
     pub trace: Vec<Rays>,
     /// Memory of all structures together.
-    pub memory: Memory,
+    pub memory: MemoryRecord,
     /// SAH cost, where rays go through one tree.
     pub sah: Option<f64>,
 }
@@ -102,7 +102,7 @@ pub struct Rays {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WayInFrame {
     /// The way.
-    pub way: Way,
+    pub way: AnimationMethod,
     /// The frame.
     pub frame: Option<u32>,
 }

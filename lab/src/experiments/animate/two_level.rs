@@ -1,7 +1,7 @@
 //! A top level over what stands still and each object, by the calls of `VK_KHR_acceleration_structure`.
 
 use crate::device::Device;
-use crate::measure::record::Memory;
+use crate::measure::record::MemoryRecord;
 use crate::scene::{Frame, Mesh};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::level::Level;
@@ -123,10 +123,10 @@ impl Subject for TwoLevel<'_> {
         Ok(BuildRun::of(self.timestamps.phases()?))
     }
 
-    fn memory(&self) -> Memory {
+    fn memory(&self) -> MemoryRecord {
         let all = self.parts.iter().map(|part| &part.level).chain([&self.top]).map(Level::bytes);
         let [structure, scratch] = all.fold([0, 0], |sum, bytes| [sum[0] + bytes[0], sum[1] + bytes[1]]);
-        Memory { structure_bytes: Some(structure), scratch_bytes: Some(scratch), peak_bytes: None }
+        MemoryRecord { structure_bytes: Some(structure), scratch_bytes: Some(scratch), peak_bytes: None }
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {

@@ -5,7 +5,7 @@ use crate::cli::options::{Costs, Kinds, Size, perhaps_empty};
 use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::bench::kd_trees::{self, published};
-use crate::experiments::bench::matrix::{self, OnScene, Outcome, Plan};
+use crate::experiments::bench::matrix::{self, BenchPlan, OnScene, Outcome};
 use crate::experiments::bench::results::Results;
 use crate::experiments::bench::shard::Shard;
 use crate::measure::choose::{CostTable, cache, candidates, hindsight};
@@ -90,7 +90,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
             }
         }
     }
-    let plan = Plan {
+    let plan = BenchPlan {
         builders,
         runs: arguments.runs.get(),
         kinds: arguments.rays.0.clone(),
@@ -224,7 +224,7 @@ struct Bench<'a> {
     common: &'a Common,
     arguments: &'a Arguments,
     device: Option<&'a Device>,
-    plan: Plan,
+    plan: BenchPlan,
     /// Where `auto` is measured.
     costs: Option<CostTable>,
     results: Results,

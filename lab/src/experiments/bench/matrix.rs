@@ -7,7 +7,7 @@ use crate::device::Device;
 use crate::measure::agreement::{Sample, wrong_where_different};
 use crate::measure::overlap::Epo;
 use crate::measure::provenance::{self, Machine};
-use crate::measure::record::{Build, Phase, Record, SCHEMA, Trace};
+use crate::measure::record::{BuildRecord, PhaseRecord, Record, SCHEMA, TraceRecord};
 use crate::measure::setting::Failure;
 use crate::measure::statistics::{Spread, in_turn, mean_work};
 use crate::rays::kinds::{self, RayKind, RayOptions};
@@ -35,7 +35,7 @@ const DIFFERENCES: usize = 16;
 
 /// What is measured on every scene.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct BenchPlan {
     /// The builders.
     pub builders: Vec<Spec>,
     /// Counted runs of every build and of every trace.
@@ -94,7 +94,7 @@ struct Entry<'a> {
 pub fn measure(
     scene: &Scene,
     device: Option<&Device>,
-    plan: &Plan,
+    plan: &BenchPlan,
     say: &mut dyn FnMut(&str),
 ) -> (Vec<Outcome>, Vec<Failure<OnScene>>) {
     let fail = |spec: &Spec, error: Error| Failure {
@@ -193,15 +193,15 @@ fn blank(scene: &Scene, device: Option<&Device>, subject: &dyn Subject) -> Recor
 }
 
 /// Medians of the runs; each phase's by itself.
-fn build_of(timer: &str, runs: &[BuildRun]) -> Build {
+fn build_of(timer: &str, runs: &[BuildRun]) -> BuildRecord {
     let times: Vec<f64> = runs.iter().map(|run| run.milliseconds).collect();
     let spread = Spread::of(&times).unwrap_or(Spread { runs: 0, ..Spread::once(0.0) });
     let names = runs.first().map_or(&[][..], |run| &run.phases);
     let phase = |(i, phase): (usize, &hedgerow::gpu::Phase)| {
         let times: Vec<f64> = runs.iter().filter_map(|run| Some(run.phases.get(i)?.milliseconds)).collect();
-        Phase { name: phase.name.to_owned(), median_ms: Spread::of(&times).map_or(0.0, |s| s.median) }
+        PhaseRecord { name: phase.name.to_owned(), median_ms: Spread::of(&times).map_or(0.0, |s| s.median) }
     };
-    Build {
+    BuildRecord {
         runs: spread.runs,
         median_ms: spread.median,
         min_ms: spread.min,
@@ -304,7 +304,7 @@ impl<'a> Rounds<'_, 'a> {
                 entry.record.quality.lcv = work.as_deref().and_then(leaf_count_variability);
             }
             let mean = |of: fn(&Work) -> u32| mean_work(work.as_deref()?, of);
-            entry.record.trace.push(Trace {
+            entry.record.trace.push(TraceRecord {
                 rays: kind.to_string(),
                 count: rays.len() as u64,
                 hits: hits.iter().filter(|hit| hit.is_some()).count() as u64,
@@ -320,7 +320,7 @@ impl<'a> Rounds<'_, 'a> {
 }
 
 /// The kinds that are asked for; where none is, that of the leaf count variability.
-fn traced_kinds(plan: &Plan) -> Vec<RayKind> {
+fn traced_kinds(plan: &BenchPlan) -> Vec<RayKind> {
     if plan.kinds.is_empty() { vec![LCV_RAYS] } else { plan.kinds.clone() }
 }
 
@@ -347,8 +347,8 @@ mod tests {
     use crate::scene::{self, LoadOptions};
     use crate::subjects::builders;
 
-    fn plan(builders: &str) -> Plan {
-        Plan {
+    fn plan(builders: &str) -> BenchPlan {
+        BenchPlan {
             builders: builders::parse_list(builders).expect("known builders"),
             runs: 2,
             kinds: RayKind::ALL.to_vec(),
@@ -396,7 +396,7 @@ mod tests {
     #[test]
     fn leaves_are_counted_even_where_no_kind_is_traced() {
         let scene = scene::load("gen:stadium:3", &LoadOptions::default()).expect("a generator");
-        let plan = Plan { kinds: Vec::new(), epo: Epo::Off, ..plan("lbvh-host") };
+        let plan = BenchPlan { kinds: Vec::new(), epo: Epo::Off, ..plan("lbvh-host") };
         let (outcomes, _) = measure(&scene, None, &plan, &mut |_| {});
         let record = &outcomes[0].record;
         assert!(record.trace.is_empty() && record.quality.lcv.is_some() && record.quality.epo.is_none(), "{record:?}");

@@ -2,11 +2,11 @@
 #![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
 use super::backend::Backend;
-use super::probe::{IGNORE, ProbeRay, Report, TERMINATE, flags};
+use super::probe::{IGNORE, ProbeRay, ProbeReport, TERMINATE, flags};
 use super::world::{Met, World, inverse, transform_error, transformed};
 
 /// Builds the world and asks of every ray.
-pub fn probed(backend: &dyn Backend, world: &World, rays: &[ProbeRay]) -> Vec<Report> {
+pub fn probed(backend: &dyn Backend, world: &World, rays: &[ProbeRay]) -> Vec<ProbeReport> {
     let built = world.build(backend);
     let reports = backend.probe(built.top.structure, rays);
     backend.destroy(built.top.structure);
@@ -24,7 +24,7 @@ pub fn assert_agrees(backend: &dyn Backend, what: &str, world: &World, rays: &[P
 /// A report is what brute force says; rays that rounding may decide are left out, and are few. Returns how many committed to
 /// a hit.
 #[track_caller]
-pub fn assert_reports(name: &str, world: &World, rays: &[ProbeRay], reports: &[Report]) -> usize {
+pub fn assert_reports(name: &str, world: &World, rays: &[ProbeRay], reports: &[ProbeReport]) -> usize {
     let mut hits = 0;
     let mut compared = 0;
     for (i, (ray, report)) in rays.iter().zip(reports).enumerate() {
@@ -73,7 +73,7 @@ pub fn assert_reports(name: &str, world: &World, rays: &[ProbeRay], reports: &[R
 
 /// Nothing shortens the ray: everything that it meets is a candidate once.
 #[track_caller]
-fn assert_candidates(what: &str, report: &Report, meetings: &[Met]) {
+fn assert_candidates(what: &str, report: &ProbeReport, meetings: &[Met]) {
     if report.candidate_count > 8 {
         return;
     }
@@ -88,7 +88,7 @@ fn assert_candidates(what: &str, report: &Report, meetings: &[Met]) {
 
 /// What is told of the instance that was hit.
 #[track_caller]
-fn assert_instance(what: &str, world: &World, ray: &ProbeRay, report: &Report) {
+fn assert_instance(what: &str, world: &World, ray: &ProbeRay, report: &ProbeReport) {
     let got = &report.committed;
     let instance = &world.instances[got.instance as usize];
     assert_eq!(got.custom_index, instance.index_and_mask & 0xff_ffff, "{what}");

@@ -1,7 +1,7 @@
 //! Who builds and traces structures by the calls of `VK_KHR_acceleration_structure`, behind one trait: ours here, the driver's in
 //! the tests, so that one table of cases runs through both.
 
-use super::probe::{Probe, ProbeRay, Report};
+use super::probe::{Probe, ProbeRay, ProbeReport};
 use crate::device::{Buffer, Device};
 use ash::vk;
 use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
@@ -33,7 +33,7 @@ pub trait Backend {
     /// `minAccelerationStructureScratchOffsetAlignment`.
     fn scratch_alignment(&self) -> u64;
     /// What queries through a top level report.
-    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<Report>;
+    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport>;
     /// The hits of rays in a bottom-level structure.
     fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
 }
@@ -92,7 +92,7 @@ impl Backend for Ours {
         SCRATCH_ALIGNMENT
     }
 
-    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<Report> {
+    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport> {
         self.1.ask(self.address(structure), rays)
     }
 

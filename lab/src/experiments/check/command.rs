@@ -3,7 +3,7 @@
 use crate::cli::{Common, Json};
 use crate::experiments::check::cases::Message;
 use crate::experiments::check::supervise::{self, Outcome};
-use crate::experiments::check::{self, Ground, Group, Record};
+use crate::experiments::check::{self, CheckRecord, Ground, Group};
 use crate::report::numbers::bytes;
 use anyhow::{Context, bail};
 use ash::vk;
@@ -64,7 +64,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let commands = chosen.iter().map(|group| Ok((group.name, child(common, arguments, group)?)));
     let commands = commands.collect::<anyhow::Result<Vec<_>>>()?;
     let limit = Duration::from_secs(arguments.limit.get().into());
-    let mut record = Record::new(arguments.quick);
+    let mut record = CheckRecord::new(arguments.quick);
     let is_shown = !arguments.json.takes_stdout();
     let run = |(name, command)| supervise::run(name, command, limit);
     let tell = |(outcome, ground): (Outcome, Option<Ground>)| {
@@ -167,7 +167,7 @@ fn run_here(common: &Common, group: &Group, quick: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn head(record: &Record, ground: &Ground) -> String {
+fn head(record: &CheckRecord, ground: &Ground) -> String {
     let limits = &ground.limits;
     let tuning = match ground.tuning == ground.tuned_as {
         true => ground.tuning.clone(),

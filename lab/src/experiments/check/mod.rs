@@ -51,7 +51,7 @@ pub struct Ground {
     /// Vulkan version.
     pub vulkan: String,
     /// The limits that decide how work is cut.
-    pub limits: Limits,
+    pub limits: CheckLimits,
     /// The tuning that was asked for: `auto`, `cpu` or `gpu`.
     pub tuning: String,
     /// The one that was taken: `cpu` or `gpu`.
@@ -60,7 +60,7 @@ pub struct Ground {
 
 /// The part of [`hedgerow::gpu::Limits`] that a report needs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Limits {
+pub struct CheckLimits {
     /// Lanes of a subgroup.
     pub subgroup_size: u32,
     /// Invocations of a workgroup, at most.
@@ -88,7 +88,7 @@ impl Ground {
                 ash::vk::api_version_minor(version),
                 ash::vk::api_version_patch(version)
             ),
-            limits: Limits {
+            limits: CheckLimits {
                 subgroup_size: limits.subgroup_size,
                 workgroup_invocations: limits.workgroup_invocations,
                 workgroup_count: limits.workgroup_count,
@@ -111,7 +111,7 @@ fn driver_of(found: &crate::device::Found, version: u32) -> String {
 
 /// What `--json` writes: one check of a device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub struct CheckRecord {
     /// [`crate::measure::record::SCHEMA`].
     pub schema: u32,
     /// Commit of the program.
@@ -130,10 +130,10 @@ pub struct Record {
     pub groups: Vec<supervise::Outcome>,
 }
 
-impl Record {
+impl CheckRecord {
     /// Before anything was tried.
-    pub fn new(quick: bool) -> Record {
-        Record {
+    pub fn new(quick: bool) -> CheckRecord {
+        CheckRecord {
             schema: crate::measure::record::SCHEMA,
             commit: provenance::commit(),
             when: provenance::now(),

@@ -78,7 +78,7 @@ pub struct Meeting {
 /// What a query said of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub struct Report {
+pub struct ProbeReport {
     pub committed: Meeting,
     pub t_min: f32,
     pub flags: u32,
@@ -89,7 +89,7 @@ pub struct Report {
     pub opaque_boxes: u32,
 }
 
-impl Report {
+impl ProbeReport {
     /// The candidates in an order that does not depend on the tree.
     pub fn sorted_candidates(&self) -> Vec<[u32; 4]> {
         let mut all = self.candidates[..self.candidates.len().min(self.candidate_count as usize)].to_vec();
@@ -146,9 +146,10 @@ impl Probe {
     ///
     /// # Panics
     /// The device failed.
-    pub fn ask(&self, structure: u64, rays: &[ProbeRay]) -> Vec<Report> {
+    pub fn ask(&self, structure: u64, rays: &[ProbeRay]) -> Vec<ProbeReport> {
         let ray_buffer = self.device.upload("rays", rays).expect("memory");
-        let reports = self.device.buffer("reports", size_of::<Report>() as u64 * rays.len() as u64).expect("memory");
+        let reports =
+            self.device.buffer("reports", size_of::<ProbeReport>() as u64 * rays.len() as u64).expect("memory");
         let count = rays.len() as u32;
         let push = arguments::Probe { structure, rays: ray_buffer.address(), reports: reports.address(), count };
         self.dispatch(bytemuck::bytes_of(&push), count);

@@ -3,7 +3,7 @@
 use super::cases::Found;
 use super::corpus::Mesh;
 use crate::device::Device;
-use hedgerow::bvh::builder::{BuildOptions, Builder, Input, Method, Window};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Input, Method};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
@@ -82,14 +82,9 @@ pub fn on_host((_, positions, triangles): &Mesh, options: &BuildOptions) -> Bvh2
     let radix = lbvh(Collapse::OFF);
     let tree = match options.method {
         Method::Lbvh => radix,
-        Method::Hlbvh(treelets) => {
-            let bits = treelets.bits(codes, radix.header.primitive_count);
-            twin::hlbvh::build(&radix, codes, twin::hlbvh::Treelets { bits, primitives: treelets.primitives })
-        }
+        Method::Hlbvh(treelets) => twin::hlbvh::build(&radix, codes, treelets),
         Method::Ploc { radius } => twin::ploc::build(&radix, radius as usize),
-        Method::Hploc(Window { size, radius }) => {
-            twin::hploc::build(&radix, twin::hploc::Window { size: size as usize, radius: radius as usize })
-        }
+        Method::Hploc(window) => twin::hploc::build(&radix, window),
     };
     let tree = match &options.optimise {
         None => tree,

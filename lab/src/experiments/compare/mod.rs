@@ -130,7 +130,7 @@ fn doubts(old: &Record, new: &Record, doubts: &mut Vec<String>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::record::{Build, Memory, Quality, SCHEMA, Trace};
+    use crate::measure::record::{BuildRecord, MemoryRecord, QualityRecord, SCHEMA, TraceRecord};
 
     fn record(scene: &str, (min, median, max): (f64, f64, f64), mrays_s: f64, sah: Option<f64>) -> Record {
         Record {
@@ -144,7 +144,7 @@ mod tests {
             subgroup: 8,
             commit: "abc1234".into(),
             when: "2026-11-21T10:00:00Z".into(),
-            build: Build {
+            build: BuildRecord {
                 runs: 5,
                 median_ms: median,
                 min_ms: min,
@@ -152,9 +152,9 @@ mod tests {
                 timer: "device".into(),
                 phases: Vec::new(),
             },
-            memory: Memory::default(),
-            quality: Quality { sah, c_t: 3.0, c_i: 2.0, ..Quality::default() },
-            trace: vec![Trace {
+            memory: MemoryRecord::default(),
+            quality: QualityRecord { sah, c_t: 3.0, c_i: 2.0, ..QualityRecord::default() },
+            trace: vec![TraceRecord {
                 rays: "primary".into(),
                 count: 100,
                 hits: 90,

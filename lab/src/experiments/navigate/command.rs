@@ -2,7 +2,7 @@
 
 use crate::cli::options::{Builders, Costs, Size};
 use crate::cli::{Bar, Common, work};
-use crate::experiments::navigate::{Navigator, Options, Tree, backdrop};
+use crate::experiments::navigate::{NavigateOptions, Navigator, Tree, backdrop};
 use crate::measure::provenance;
 use std::io::Write;
 use std::num::NonZeroUsize;
@@ -35,7 +35,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let scene = common.load(&arguments.scene)?;
     let device = work::device_for(common, builders)?;
     let bar = Bar::new(common, &scene.name, 0);
-    let options = Options {
+    let options = NavigateOptions {
         size: [arguments.size.width, arguments.size.height],
         seed: common.seed,
         boxes: arguments.boxes.get(),

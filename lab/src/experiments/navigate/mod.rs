@@ -9,7 +9,7 @@ pub mod outline;
 mod page;
 mod projection;
 
-use crate::experiments::navigate::outline::{Level, Outline};
+use crate::experiments::navigate::outline::{Outline, OutlineLevel};
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::report::beside;
 use crate::report::names::slug;
@@ -31,12 +31,12 @@ pub struct Tree {
     /// The layout, as records have it.
     pub kind: String,
     /// Figures of each level, and what is drawn of it.
-    pub levels: Vec<(Level, Drawing)>,
+    pub levels: Vec<(OutlineLevel, Drawing)>,
 }
 
 /// How trees are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct NavigateOptions {
     /// Pixels of the picture.
     pub size: [u32; 2],
     /// Of the picture's rays to the sky.
@@ -72,7 +72,7 @@ pub struct Navigator {
 ///
 /// # Errors
 /// The device failed.
-pub fn backdrop(scene: &Scene, subject: &mut dyn Subject, options: &Options) -> Result<RgbImage> {
+pub fn backdrop(scene: &Scene, subject: &mut dyn Subject, options: &NavigateOptions) -> Result<RgbImage> {
     let options = PictureOptions { view: View::Shaded, size: options.size, seed: options.seed, top: None };
     picture(scene, subject, &options)
 }
@@ -83,7 +83,7 @@ impl Tree {
     ///
     /// # Errors
     /// The device failed; the tree is not ours to read.
-    pub fn of(scene: &Scene, subject: &mut dyn Subject, options: &Options) -> Result<Tree> {
+    pub fn of(scene: &Scene, subject: &mut dyn Subject, options: &NavigateOptions) -> Result<Tree> {
         let outline = Outline::of(subject)?;
         // Every other pixel each way: enough to say which boxes are seen.
         let rays = RayOptions { size: options.size.map(|side| side.div_ceil(2)), seed: options.seed };

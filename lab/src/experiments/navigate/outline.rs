@@ -10,7 +10,7 @@ use std::ops::Range;
 
 /// A node with its box: of a kd-tree its cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Node {
+pub struct OutlineNode {
     /// The box.
     pub bounds: Aabb,
     /// The node above; of the root itself.
@@ -32,7 +32,7 @@ pub enum Content {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outline {
     /// The nodes, the root first, level by level.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<OutlineNode>,
     /// The nodes of each level.
     pub levels: Vec<Range<usize>>,
     /// Primitives, those of each leaf together.
@@ -43,7 +43,7 @@ pub struct Outline {
 
 /// Figures of a level.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Level {
+pub struct OutlineLevel {
     /// Nodes that have children.
     pub inner: u64,
     /// Leaves, the empty ones among them.
@@ -56,7 +56,7 @@ pub struct Level {
     pub cost: f64,
 }
 
-impl Level {
+impl OutlineLevel {
     /// All nodes.
     pub fn nodes(&self) -> u64 {
         self.inner + self.leaves
@@ -146,7 +146,7 @@ impl Outline {
                     }
                     Err(leaf) => Content::Leaf(leaf),
                 };
-                self.nodes.push(Node { bounds, parent, content });
+                self.nodes.push(OutlineNode { bounds, parent, content });
             }
             self.levels.push(first..below);
             level = next;
@@ -154,11 +154,11 @@ impl Outline {
     }
 
     /// The figures of each level with the costs of a step and of a test; their costs add up to that of the tree.
-    pub fn figures(&self, c_t: f64, c_i: f64) -> Vec<Level> {
+    pub fn figures(&self, c_t: f64, c_i: f64) -> Vec<OutlineLevel> {
         let whole = self.nodes.first().map_or(0.0, |root| half_area(&root.bounds));
         let share = |bounds: &Aabb| if whole > 0.0 { half_area(bounds) / whole } else { 0.0 };
         let of_level = |range: &Range<usize>| {
-            let mut level = Level::default();
+            let mut level = OutlineLevel::default();
             for node in &self.nodes[range.clone()] {
                 match &node.content {
                     Content::Inner(_) => {
@@ -234,7 +234,7 @@ mod tests {
             let quality = subject.quality(3.0, 2.0).expect(builder);
             let outline = Outline::of(subject.as_mut()).expect(builder);
             let levels = outline.figures(3.0, 2.0);
-            let sum = |of: fn(&Level) -> u64| Some(levels.iter().map(of).sum::<u64>());
+            let sum = |of: fn(&OutlineLevel) -> u64| Some(levels.iter().map(of).sum::<u64>());
             assert_eq!(sum(|l| l.inner), quality.inner, "{builder}");
             assert_eq!(sum(|l| l.leaves), quality.leaves, "{builder}");
             assert_eq!(sum(|l| l.empty_leaves), quality.empty_leaves, "{builder}");

@@ -2,7 +2,7 @@
 
 use super::projection::UNITS;
 use super::{Navigator, Tree};
-use crate::experiments::navigate::outline::Level;
+use crate::experiments::navigate::outline::OutlineLevel;
 use crate::report::elements::{bar, foot, head, number, scroll};
 use crate::report::names::{short, slug};
 use crate::report::numbers::{grouped, three_digits};
@@ -106,7 +106,7 @@ fn stage(navigator: &Navigator, tree: &Tree) -> Markup {
 }
 
 /// A level in words.
-fn says(i: usize, level: &Level, drawn: usize) -> String {
+fn says(i: usize, level: &OutlineLevel, drawn: usize) -> String {
     let nodes = level.nodes();
     let all = if drawn as u64 == nodes { ", all drawn".into() } else { format!(", {} drawn", grouped(drawn as u64)) };
     format!("Level {i}: {} node{}{all}", grouped(nodes), if nodes == 1 { "" } else { "s" })
@@ -114,7 +114,7 @@ fn says(i: usize, level: &Level, drawn: usize) -> String {
 
 fn table(tree: &Tree, cost: f64) -> Markup {
     let is_kd_tree = tree.kind == KD_TREE;
-    let share = |level: &Level| if cost > 0.0 { 100.0 * level.cost / cost } else { 0.0 };
+    let share = |level: &OutlineLevel| if cost > 0.0 { 100.0 * level.cost / cost } else { 0.0 };
     let most = tree.levels.iter().map(|(level, _)| share(level)).fold(0.0, f64::max);
     let count = |value: u64| number(Some(value as f64), |v| grouped(v as u64));
     let above = tree.levels.iter().scan(0.0, |sum, (level, _)| {

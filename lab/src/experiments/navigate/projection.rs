@@ -1,6 +1,6 @@
 //! Boxes as the camera sees them: their edges as lines of a picture.
 
-use crate::rays::kinds::Frame;
+use crate::rays::kinds::Basis;
 use crate::scene::Camera;
 use glam::DVec3;
 use hedgerow::geometry::Aabb;
@@ -19,14 +19,14 @@ const EDGES: [(usize, usize); 12] =
 
 /// From points in space to those of a picture.
 pub struct Projection {
-    frame: Frame,
+    frame: Basis,
     size: [f64; 2],
 }
 
 impl Projection {
     /// The picture that `camera` takes, in pixels.
     pub fn of(camera: &Camera, size: [u32; 2]) -> Projection {
-        Projection { frame: Frame::of(camera, size), size: size.map(f64::from) }
+        Projection { frame: Basis::of(camera, size), size: size.map(f64::from) }
     }
 
     /// What of a segment is in the picture, in pixels from its upper left corner.

@@ -1,7 +1,7 @@
 //! Records of many folders on one page: shards of a sweep, and sweeps on several devices, which are kept apart.
 
-use crate::experiments::accel::points::Entry as AccelEntry;
-use crate::experiments::animate::points::Entry as AnimateEntry;
+use crate::experiments::accel::points::AccelEntry;
+use crate::experiments::animate::points::AnimateEntry;
 use crate::experiments::bench::matrix::Outcome;
 use crate::experiments::bench::page::{Report, read_setting};
 use crate::experiments::bench::results::{self, Results};

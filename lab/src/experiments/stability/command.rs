@@ -2,7 +2,7 @@
 
 use super::degenerate;
 use super::far::{FarTriangle, Side};
-use super::large::{HugeTriangles, Placement};
+use super::large::{HugeTriangles, LargePlacement};
 use super::page::{self, Paged};
 use super::points::{Run, Stretched};
 use super::relative::{self, Stretch};
@@ -93,7 +93,7 @@ struct Large {
     steps: Steps,
     /// Where the triangles stand: wall (at one side), walls (at all), outward (from a corner away)
     #[arg(long, value_name = "PLACEMENT[,…]", value_delimiter = ',', default_value = "wall,walls,outward")]
-    placements: Vec<Placement>,
+    placements: Vec<LargePlacement>,
     /// How many triangles a side
     #[arg(long, value_name = "N[,N…]", value_delimiter = ',', default_value = "1,16")]
     counts: Vec<NonZeroU32>,
@@ -142,7 +142,7 @@ fn run_growth(common: &Common, arguments: &Growth) -> anyhow::Result<()> {
 }
 
 fn run_large(common: &Common, arguments: &Large) -> anyhow::Result<()> {
-    let counts = |&placement: &Placement| {
+    let counts = |&placement: &LargePlacement| {
         arguments.counts.iter().map(move |count| HugeTriangles { placement, count: count.get() })
     };
     let stretches: Vec<HugeTriangles> = arguments.placements.iter().flat_map(counts).collect();
@@ -173,7 +173,7 @@ where
     let mut run = started(device.as_ref(), &specs, if kinds.is_empty() { &[] } else { &options })?;
     let bar = Bar::new(common, "measuring", 0);
     let say = |what: &str| bar.say(what);
-    let stage = relative::Stage {
+    let stage = relative::RelativeSetup {
         device: device.as_ref(),
         builders: &specs,
         runs: arguments.runs.get(),
@@ -213,7 +213,7 @@ fn run_degenerate(common: &Common, arguments: &Degenerate) -> anyhow::Result<()>
     ];
     let mut run = started(device.as_ref(), &specs, &options)?;
     let bar = Bar::new(common, "measuring", scenes.len() as u64);
-    let stage = degenerate::Stage {
+    let stage = degenerate::DegenerateSetup {
         device: device.as_ref(),
         builders: &specs,
         builds: arguments.builds.get(),

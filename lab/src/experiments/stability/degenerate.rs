@@ -26,7 +26,7 @@ const PEER_BUILDS: u32 = 3;
 const COSTS: (f64, f64) = (3.0, 2.0);
 
 /// What is measured.
-pub struct Stage<'a> {
+pub struct DegenerateSetup<'a> {
     /// Where builders that need a device run.
     pub device: Option<&'a Device>,
     /// The builders.
@@ -51,7 +51,7 @@ struct Truth {
 /// # Errors
 /// Those of `point`.
 pub fn measure(
-    stage: &Stage<'_>,
+    stage: &DegenerateSetup<'_>,
     scene: &scene::Degenerate,
     point: &mut dyn FnMut(Degenerate) -> Result<()>,
 ) -> Result<()> {
@@ -72,7 +72,7 @@ pub fn is_peer(spec: &Spec) -> bool {
     builder.needs() == Needs::RayQuery || ["obvhs-", "embree-"].iter().any(|peer| builder.name.starts_with(peer))
 }
 
-fn of_builder(stage: &Stage<'_>, scene: &scene::Degenerate, spec: &Spec, truth: &Truth) -> Degenerate {
+fn of_builder(stage: &DegenerateSetup<'_>, scene: &scene::Degenerate, spec: &Spec, truth: &Truth) -> Degenerate {
     let mut mesh = scene.mesh.clone();
     let is_ours = !is_peer(spec);
     if !is_ours {
@@ -108,7 +108,7 @@ fn of_builder(stage: &Stage<'_>, scene: &scene::Degenerate, spec: &Spec, truth: 
     point
 }
 
-fn fill(point: &mut Degenerate, stage: &Stage<'_>, spec: &Spec, mesh: &Mesh, truth: &Truth) -> Result<()> {
+fn fill(point: &mut Degenerate, stage: &DegenerateSetup<'_>, spec: &Spec, mesh: &Mesh, truth: &Truth) -> Result<()> {
     let mut subject = spec.make(stage.device, mesh)?;
     let mut times = Vec::new();
     let mut first: Option<Vec<u8>> = None;
@@ -216,7 +216,7 @@ mod tests {
 
     fn measured(builders: &str, count: u32) -> Vec<Degenerate> {
         let specs = builders::parse_list(builders).expect("known");
-        let stage = Stage { device: None, builders: &specs, builds: 3, seed: 1, say: &|_| {} };
+        let stage = DegenerateSetup { device: None, builders: &specs, builds: 3, seed: 1, say: &|_| {} };
         let mut points = Vec::new();
         for scene in scene::degenerate(count) {
             let mut keep = |point| {

@@ -1,7 +1,7 @@
 //! `stability large`: huge triangles at the edge of a scene (Riemersma 2024, section 3.3).
 //!
 //! Codes are normalised by bounds: by those of all boxes, which a huge triangle stretches as far as it reaches, or by narrower
-//! ones, which leave the scene more bits. What they save depends on where the triangles stand: [`Placement`].
+//! ones, which leave the scene more bits. What they save depends on where the triangles stand: [`LargePlacement`].
 
 use super::points::Experiment;
 use super::relative::Stretch;
@@ -13,7 +13,7 @@ use std::fmt;
 /// Where the huge triangles stand. Each is flat in one axis and 2^e times as long as the scene in the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Placement {
+pub enum LargePlacement {
     /// Upright at the positive end of x, their middles beside the scene's: its centroids stay where they were.
     Wall,
     /// The same at both ends of every axis.
@@ -22,15 +22,15 @@ pub enum Placement {
     Outward,
 }
 
-named!(Placement, "placement": Wall = "wall", Walls = "walls", Outward = "outward");
+named!(LargePlacement, "placement": Wall = "wall", Walls = "walls", Outward = "outward");
 
-impl Placement {
+impl LargePlacement {
     /// What it is, for titles.
     pub fn what(self) -> &'static str {
         match self {
-            Placement::Wall => "a wall at one side",
-            Placement::Walls => "walls at all sides",
-            Placement::Outward => "triangles that reach away",
+            LargePlacement::Wall => "a wall at one side",
+            LargePlacement::Walls => "walls at all sides",
+            LargePlacement::Outward => "triangles that reach away",
         }
     }
 }
@@ -39,7 +39,7 @@ impl Placement {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct HugeTriangles {
     /// Where they stand.
-    pub placement: Placement,
+    pub placement: LargePlacement,
     /// How many at each side or in each plane.
     pub count: u32,
 }
@@ -73,10 +73,10 @@ impl Stretch for HugeTriangles {
             for axis in 0..3 {
                 let (above, below) = (hi[axis] + beside * extent[axis], lo[axis] - beside * extent[axis]);
                 match self.placement {
-                    Placement::Wall if axis == 0 => all.push(flat(axis, above, &around)),
-                    Placement::Wall => {}
-                    Placement::Walls => all.extend([flat(axis, above, &around), flat(axis, below, &around)]),
-                    Placement::Outward => all.push(flat(axis, above, &|i| hi[i])),
+                    LargePlacement::Wall if axis == 0 => all.push(flat(axis, above, &around)),
+                    LargePlacement::Wall => {}
+                    LargePlacement::Walls => all.extend([flat(axis, above, &around), flat(axis, below, &around)]),
+                    LargePlacement::Outward => all.push(flat(axis, above, &|i| hi[i])),
                 }
             }
         }
@@ -99,7 +99,7 @@ mod tests {
     const BOUNDS: Aabb = Aabb { lo: [0.0; 3], hi: [2.0, 4.0, 8.0] };
 
     /// The bounds that plain and concise codes are normalised by.
-    fn bounds_of(placement: Placement, count: u32, e: u32) -> [Aabb; 2] {
+    fn bounds_of(placement: LargePlacement, count: u32, e: u32) -> [Aabb; 2] {
         let boxes: Vec<Aabb> = HugeTriangles { placement, count }
             .beside(&BOUNDS, e)
             .expect("finite")
@@ -116,25 +116,25 @@ mod tests {
 
     #[test]
     fn a_wall_stretches_the_bounds_of_boxes_and_not_the_concise_ones() {
-        let [full, concise] = bounds_of(Placement::Wall, 1, 4);
+        let [full, concise] = bounds_of(LargePlacement::Wall, 1, 4);
         assert_eq!(full, Aabb { lo: [0.0, -30.0, -60.0], hi: [2.0, 34.0, 68.0] });
         assert_eq!(concise, BOUNDS);
     }
 
     #[test]
     fn walls_stretch_every_axis() {
-        let [full, concise] = bounds_of(Placement::Walls, 1, 4);
+        let [full, concise] = bounds_of(LargePlacement::Walls, 1, 4);
         assert_eq!(full, Aabb { lo: [-15.0, -30.0, -60.0], hi: [17.0, 34.0, 68.0] });
         assert_eq!(concise, BOUNDS);
         assert_eq!(
-            HugeTriangles { placement: Placement::Walls, count: 3 }.beside(&BOUNDS, 1).expect("finite").len(),
+            HugeTriangles { placement: LargePlacement::Walls, count: 3 }.beside(&BOUNDS, 1).expect("finite").len(),
             18
         );
     }
 
     #[test]
     fn of_what_reaches_away_concise_bounds_can_cut_nothing() {
-        let [full, concise] = bounds_of(Placement::Outward, 1, 4);
+        let [full, concise] = bounds_of(LargePlacement::Outward, 1, 4);
         assert_eq!(full, Aabb { lo: [0.0; 3], hi: [34.0, 68.0, 136.0] });
         assert_eq!(concise, full);
     }
@@ -142,10 +142,10 @@ mod tests {
     #[test]
     fn what_floats_cannot_hold_is_left_out() {
         let huge = Aabb { lo: [-1e38; 3], hi: [1e38; 3] };
-        let wall = HugeTriangles { placement: Placement::Wall, count: 1 };
+        let wall = HugeTriangles { placement: LargePlacement::Wall, count: 1 };
         assert!(wall.beside(&huge, 1).is_some());
         assert_eq!(wall.beside(&huge, 4), None);
-        assert_eq!("walls".parse::<Placement>().ok(), Some(Placement::Walls));
-        assert!("roof".parse::<Placement>().is_err_and(|e| e.to_string().contains("wall, walls, outward")));
+        assert_eq!("walls".parse::<LargePlacement>().ok(), Some(LargePlacement::Walls));
+        assert!("roof".parse::<LargePlacement>().is_err_and(|e| e.to_string().contains("wall, walls, outward")));
     }
 }

@@ -34,7 +34,7 @@ const LOST: f64 = 0.05;
 const DIFFERENCES: usize = 16;
 
 /// What growth and large primitives have in common.
-pub struct Stage<'a> {
+pub struct RelativeSetup<'a> {
     /// Where builders that need a device run.
     pub device: Option<&'a Device>,
     /// The builders.
@@ -63,7 +63,7 @@ impl<'s> Part<'s> {
     ///
     /// # Errors
     /// The scene has no triangles.
-    fn new(stage: &Stage<'_>, scene: &'s Scene) -> Result<Part<'s>> {
+    fn new(stage: &RelativeSetup<'_>, scene: &'s Scene) -> Result<Part<'s>> {
         let tree = tree_of(&scene.mesh);
         let mut hits = |rays: &[Ray]| Ok(rays.par_iter().map(|ray| host::closest_hit(&tree, ray)).collect());
         let mut rays = Vec::new();
@@ -108,7 +108,7 @@ pub trait Stretch: Copy + PartialEq + fmt::Display + Serialize + DeserializeOwne
 /// # Errors
 /// The scene has no triangles; those of `point`.
 pub fn measure<S: Stretch>(
-    stage: &Stage<'_>,
+    stage: &RelativeSetup<'_>,
     scene: &Scene,
     (stretches, steps): (&[S], &[u32]),
     failed: &mut dyn FnMut(Failure),
@@ -133,7 +133,7 @@ pub fn measure<S: Stretch>(
 
 /// One stretch: every builder over all its meshes.
 fn measure_one<S: Stretch>(
-    stage: &Stage<'_>,
+    stage: &RelativeSetup<'_>,
     part: &Part<'_>,
     by: S,
     meshes: &[(u32, Mesh)],
@@ -196,7 +196,13 @@ struct Base<'a> {
 }
 
 impl<'a> Base<'a> {
-    fn new(stage: &Stage<'a>, part: &'a Part<'a>, spec: &Spec, mesh: &'a Mesh, truth: &'a Bvh2) -> Result<Base<'a>> {
+    fn new(
+        stage: &RelativeSetup<'a>,
+        part: &'a Part<'a>,
+        spec: &Spec,
+        mesh: &'a Mesh,
+        truth: &'a Bvh2,
+    ) -> Result<Base<'a>> {
         let mut subject = spec.make(stage.device, mesh)?;
         subject.build()?;
         let (cost, _) = cost_of(subject.as_mut(), part)?;
@@ -204,7 +210,7 @@ impl<'a> Base<'a> {
     }
 
     /// The figures of another mesh, and what is wrong with its tree or hits.
-    fn against(&mut self, stage: &Stage<'_>, spec: &Spec, mesh: &Mesh) -> Result<(Figures, Vec<String>)> {
+    fn against(&mut self, stage: &RelativeSetup<'_>, spec: &Spec, mesh: &Mesh) -> Result<(Figures, Vec<String>)> {
         let mut subject = spec.make(stage.device, mesh)?;
         subject.build()?;
         let (cost, mut faults) = cost_of(subject.as_mut(), self.part)?;
@@ -228,7 +234,13 @@ impl<'a> Base<'a> {
     }
 
     /// Speed of the rays through the other over that through the first, in the median of runs in turn.
-    fn speed(&mut self, stage: &Stage<'_>, other: &mut dyn Subject, kind: RayKind, rays: &[Ray]) -> Result<f64> {
+    fn speed(
+        &mut self,
+        stage: &RelativeSetup<'_>,
+        other: &mut dyn Subject,
+        kind: RayKind,
+        rays: &[Ray],
+    ) -> Result<f64> {
         let mut subjects: [&mut dyn Subject; 2] = [self.subject.as_mut(), other];
         for subject in &mut subjects {
             subject.set_rays(rays)?;

@@ -74,11 +74,11 @@ impl Subject for Auto<'_> {
         self.subject.build()
     }
 
-    fn memory(&self) -> record::Memory {
+    fn memory(&self) -> record::MemoryRecord {
         self.subject.memory()
     }
 
-    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
         self.subject.quality(c_t, c_i)
     }
 

@@ -2,7 +2,7 @@
 //! frame.
 
 use super::{CameraPath, DynamicObject, DynamicScene, bounds, time_of};
-use crate::scene::{Camera, Instance, Light, Mesh, cameras, lookup, no_triangles};
+use crate::scene::{Camera, Light, Mesh, SceneInstance, cameras, lookup, no_triangles};
 use crate::{Error, Result};
 use hedgerow::geometry::Aabb;
 use std::path::Path;
@@ -61,7 +61,7 @@ impl DynamicContent {
 fn is_somewhere(object: &DynamicObject, time: f32) -> bool {
     let mesh = object.mesh_at(time);
     // The corners of the box go as far as any vertex.
-    let Aabb { lo, hi } = Instance { part: 0, transform: object.transform(time) }.place_box(&Aabb::around(&mesh));
+    let Aabb { lo, hi } = SceneInstance { part: 0, transform: object.transform(time) }.place_box(&Aabb::around(&mesh));
     mesh.is_empty() || lo.into_iter().chain(hi).all(f32::is_finite)
 }
 

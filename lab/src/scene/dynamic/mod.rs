@@ -18,7 +18,7 @@ mod text;
 mod track;
 
 use super::animation::{self, load_moving};
-use super::{Animation, Camera, Instance, Instances, Light, LoadOptions, Mesh, Scene, check, gltf, lookup};
+use super::{Animation, Camera, Instances, Light, LoadOptions, Mesh, Scene, SceneInstance, check, gltf, lookup};
 use crate::{Error, Result};
 use hedgerow::geometry::Aabb;
 use std::borrow::Cow;
@@ -99,14 +99,14 @@ impl DynamicScene {
     /// once, in this order.
     pub fn instances(&self, time: f32) -> Instances {
         let static_part = (!self.static_mesh.triangles.is_empty())
-            .then(|| (self.static_mesh.clone(), Instance::IDENTITY))
+            .then(|| (self.static_mesh.clone(), SceneInstance::IDENTITY))
             .into_iter();
         let objects = self.objects.iter().map(|object| {
             let positions = object.mesh_at(time).into_owned();
             (Mesh { positions, triangles: object.triangles.clone() }, object.transform(time))
         });
         let (parts, transforms): (Vec<Mesh>, Vec<_>) = static_part.chain(objects).unzip();
-        let instances = (0..).zip(transforms).map(|(part, transform)| Instance { part, transform }).collect();
+        let instances = (0..).zip(transforms).map(|(part, transform)| SceneInstance { part, transform }).collect();
         Instances { name: self.name.clone(), parts, instances, camera: self.camera(time), lights: self.lights.clone() }
     }
 
@@ -149,14 +149,14 @@ impl DynamicObject {
         self.shape.at(time)
     }
 
-    /// Object to world at a time, row by row, as of an [`Instance`].
+    /// Object to world at a time, row by row, as of a [`SceneInstance`].
     pub fn transform(&self, time: f32) -> [[f32; 4]; 3] {
         self.motion.at(time)
     }
 
     /// The vertices at a time in the world: those of [`DynamicObject::mesh_at`] by [`DynamicObject::transform`].
     pub fn placed(&self, time: f32) -> Vec<[f32; 3]> {
-        let instance = Instance { part: 0, transform: self.transform(time) };
+        let instance = SceneInstance { part: 0, transform: self.transform(time) };
         self.mesh_at(time).iter().map(|&point| instance.place(point)).collect()
     }
 }

@@ -92,6 +92,6 @@ mod tests {
             let at = motion.at(time);
             assert!(at.iter().flatten().zip(expected.iter().flatten()).all(|(a, e)| (a - e).abs() < 1e-6), "{at:?}");
         }
-        assert_eq!(Motion::STILL.at(7.0), crate::scene::Instance::IDENTITY);
+        assert_eq!(Motion::STILL.at(7.0), crate::scene::SceneInstance::IDENTITY);
     }
 }

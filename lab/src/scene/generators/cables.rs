@@ -1,7 +1,7 @@
 //! Cables that hang across the scene: long, thin, and along the diagonals, so that boxes are huge, empty, and all overlap.
 
 use super::tube::{self, Knot};
-use super::{Placed, series, turns};
+use super::{Assembly, series, turns};
 use crate::random::SplitMix64;
 use crate::scene::Mesh;
 
@@ -26,7 +26,7 @@ const CATENARIES: [Catenary; 4] = [
 ];
 
 /// `count` cables of 600 triangles about the unit cube's middle, each near one of the two diagonals of its floor.
-pub fn place(count: u32) -> Placed {
+pub fn place(count: u32) -> Assembly {
     let parts: Vec<Mesh> = CATENARIES.iter().map(cable).collect();
     let mut random = SplitMix64::new(0);
     let instances = (0..count).map(|_| {

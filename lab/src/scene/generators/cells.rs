@@ -1,6 +1,6 @@
 //! Spheres in a grid: instances whose boxes do not overlap, for which a top-level structure has nothing to open.
 
-use super::{Placed, meshes, side_of, turns};
+use super::{Assembly, meshes, side_of, turns};
 use crate::random::SplitMix64;
 
 /// Edge of a cell.
@@ -9,7 +9,7 @@ const CELL: f32 = 2.0;
 const RADIUS: [f32; 2] = [0.5, 0.9];
 
 /// `count` spheres of 80, 320 or 1,280 triangles, one in the middle of each cell of a cube of cells, in rows.
-pub fn place(count: u32) -> Placed {
+pub fn place(count: u32) -> Assembly {
     let parts: Vec<_> = (1..=3).map(meshes::icosphere).collect();
     let mut random = SplitMix64::new(0);
     let side = side_of(count, 3);

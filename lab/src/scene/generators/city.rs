@@ -9,7 +9,7 @@
 //! wide and [`PITCH`] apart, of which yaws take less than 0.07 on each side.
 
 use super::turns::{self, QUARTERS, Turn, turned};
-use super::{Placed, prism, side_of};
+use super::{Assembly, prism, side_of};
 use crate::random::SplitMix64;
 
 /// Cells along a side of a block: arms are one of them thick, as streets are wide.
@@ -30,7 +30,7 @@ const BLOCK_YAW: f32 = 0.012;
 const PLOT_YAW: f32 = 0.05;
 
 /// `count` blocks, plot by plot on a square, of random heights.
-pub fn place(count: u32) -> Placed {
+pub fn place(count: u32) -> Assembly {
     let even = prism::closed(CELLS, ROWS, |x, z| x == 0 || z == 0);
     let uneven = prism::closed(CELLS, ROWS, |x, z| x == 0 && z < SHORT || z == 0);
     let mut random = SplitMix64::new(0);

@@ -3,7 +3,7 @@
 
 use super::tube::{self, Knot};
 use super::vector::{add, along, unit};
-use super::{Placed, side_of, turns};
+use super::{Assembly, side_of, turns};
 use crate::random::SplitMix64;
 use crate::scene::Mesh;
 
@@ -32,7 +32,7 @@ const TREES: [Tree; 3] = [
 ];
 
 /// `count` trees on a square, row by row, each a little off its place, leaning, turned and scaled.
-pub fn place(count: u32) -> Placed {
+pub fn place(count: u32) -> Assembly {
     let mut random = SplitMix64::new(0);
     let parts: Vec<Mesh> = TREES.iter().map(|tree| grow(tree, &mut random)).collect();
     let side = side_of(count, 2);

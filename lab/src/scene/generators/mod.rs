@@ -13,7 +13,7 @@ mod turns;
 mod twist;
 mod vector;
 
-use super::{Animation, Instance, Instances, Mesh, cameras};
+use super::{Animation, Instances, Mesh, SceneInstance, cameras};
 use crate::{Error, Result};
 pub(super) use meshes::needles;
 pub(super) use series::turn;
@@ -38,13 +38,13 @@ enum Recipe {
     /// Triangles for an N (none: too many to be counted), and the mesh.
     Mesh(fn(u64) -> Option<u64>, fn(u32, u64) -> Mesh),
     /// Parts and where they stand, N of them.
-    Instances(fn(u32) -> Placed),
+    Instances(fn(u32) -> Assembly),
     /// The mesh of about N triangles in its first frame, and where its vertices are in each of so many frames.
     Animation(fn(u32) -> Mesh, fn(&Mesh, u32) -> Vec<Vec<[f32; 3]>>),
 }
 
 /// Parts and their instances.
-type Placed = (Vec<Mesh>, Vec<Instance>);
+type Assembly = (Vec<Mesh>, Vec<SceneInstance>);
 
 const GENERATORS: [Generator; 11] = [
     Generator {

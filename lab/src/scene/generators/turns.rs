@@ -4,7 +4,7 @@
 //! numbers, and a random one needs no platform's sine.
 
 use crate::random::SplitMix64;
-use crate::scene::Instance;
+use crate::scene::SceneInstance;
 
 /// Cosine and sine.
 pub type Turn = [f32; 2];
@@ -39,18 +39,18 @@ pub fn turned(turn: Turn, [x, y]: [f32; 2]) -> [f32; 2] {
 }
 
 /// An upright instance: the part scaled along its axes, turned, and moved to `at`. The turn takes x towards z.
-pub fn upright(part: usize, scale: [f32; 3], [c, s]: Turn, at: [f32; 3]) -> Instance {
+pub fn upright(part: usize, scale: [f32; 3], [c, s]: Turn, at: [f32; 3]) -> SceneInstance {
     let transform = [
         [c * scale[0], 0.0, -s * scale[2], at[0]],
         [0.0, scale[1], 0.0, at[1]],
         [s * scale[0], 0.0, c * scale[2], at[2]],
     ];
-    Instance { part: part as u32, transform }
+    SceneInstance { part: part as u32, transform }
 }
 
 /// An instance that leans: the part scaled, spun about its y axis, tilted by the turn `lean` from y towards x, and that way
 /// turned to `heading`; its origin at `at`.
-pub fn leaning(part: usize, scale: f32, spin: Turn, lean: Turn, heading: Turn, at: [f32; 3]) -> Instance {
+pub fn leaning(part: usize, scale: f32, spin: Turn, lean: Turn, heading: Turn, at: [f32; 3]) -> SceneInstance {
     let ([sc, ss], [lc, ls], [hc, hs]) = (spin, lean, heading);
     // Where spin and lean take each axis; the heading turns all of them.
     let columns = [[lc * sc, -ls * sc, ss], [ls, lc, 0.0], [-lc * ss, ls * ss, sc]].map(|[x, y, z]| {
@@ -58,5 +58,5 @@ pub fn leaning(part: usize, scale: f32, spin: Turn, lean: Turn, heading: Turn, a
         [x, y, z]
     });
     let row = |i: usize| [scale * columns[0][i], scale * columns[1][i], scale * columns[2][i], at[i]];
-    Instance { part: part as u32, transform: [row(0), row(1), row(2)] }
+    SceneInstance { part: part as u32, transform: [row(0), row(1), row(2)] }
 }

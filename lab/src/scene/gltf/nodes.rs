@@ -27,7 +27,7 @@ pub(super) fn walk(file: File<'_>, channels: &Channels, content: DynamicContent)
     };
     let mut scene = Walk { file, channels, content, directional: Vec::new() };
     let mut seen = vec![false; document.nodes().len()];
-    let root = Placement::Still(Mat4::IDENTITY);
+    let root = NodeTransform::Still(Mat4::IDENTITY);
     // A stack of our own: the depth of the tree is the file's choice.
     let mut stack: Vec<_> = roots.into_iter().rev().map(|node| (node, root.clone())).collect();
     while let Some((node, parent)) = stack.pop() {
@@ -45,35 +45,35 @@ pub(super) fn walk(file: File<'_>, channels: &Channels, content: DynamicContent)
 
 /// Where a node is.
 #[derive(Clone)]
-enum Placement {
+enum NodeTransform {
     /// Always there.
     Still(Mat4),
     /// Moved by itself or by a node above it: the steps from the root down.
     Moving(Vec<Step>),
 }
 
-impl Placement {
+impl NodeTransform {
     /// That of a node below this one.
-    fn inner(&self, node: &Node<'_>, channels: &Channels) -> Placement {
+    fn inner(&self, node: &Node<'_>, channels: &Channels) -> NodeTransform {
         let local = Mat4::from_cols_array_2d(&node.transform().matrix());
         let (mut steps, step) = match (self, channels.pose(node)) {
-            (Placement::Still(outer), None) => return Placement::Still(outer * local),
-            (Placement::Still(outer), Some(pose)) => (vec![fixed(outer)], Step::Moving(pose)),
-            (Placement::Moving(steps), None) => (steps.clone(), fixed(&local)),
-            (Placement::Moving(steps), Some(pose)) => (steps.clone(), Step::Moving(pose)),
+            (NodeTransform::Still(outer), None) => return NodeTransform::Still(outer * local),
+            (NodeTransform::Still(outer), Some(pose)) => (vec![fixed(outer)], Step::Moving(pose)),
+            (NodeTransform::Moving(steps), None) => (steps.clone(), fixed(&local)),
+            (NodeTransform::Moving(steps), Some(pose)) => (steps.clone(), Step::Moving(pose)),
         };
         match (steps.last_mut(), step) {
             // Long chains below what moves stay short.
             (Some(Step::Fixed(outer)), Step::Fixed(inner)) => *outer = product(outer, &inner),
             (_, step) => steps.push(step),
         }
-        Placement::Moving(steps)
+        NodeTransform::Moving(steps)
     }
 
     fn motion(&self, seconds: f32) -> Motion {
         match self {
-            Placement::Still(to_world) => Motion::new(vec![fixed(to_world)], seconds),
-            Placement::Moving(steps) => Motion::new(steps.clone(), seconds),
+            NodeTransform::Still(to_world) => Motion::new(vec![fixed(to_world)], seconds),
+            NodeTransform::Moving(steps) => Motion::new(steps.clone(), seconds),
         }
     }
 }
@@ -97,22 +97,22 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    fn node(&mut self, node: &Node<'_>, placement: &Placement) -> Result<()> {
+    fn node(&mut self, node: &Node<'_>, placement: &NodeTransform) -> Result<()> {
         let motion = placement.motion(self.content.seconds);
         if let Some(mesh) = node.mesh() {
             self.content.skinned = self.content.skinned.or(node.skin().map(|_| node.index()));
             let parts = meshes::parts(self.file, &mesh)?;
             let weights = node.weights().or(mesh.weights()).unwrap_or_default();
             match (placement, self.channels.weights(node)) {
-                (Placement::Still(to_world), None) => {
+                (NodeTransform::Still(to_world), None) => {
                     parts.iter().try_for_each(|part| self.append(part, weights, to_world))?;
                 }
                 _ => self.object(node, &parts, weights, motion.clone())?,
             }
         }
         let to_world = match placement {
-            Placement::Still(to_world) => rows(to_world),
-            Placement::Moving(_) => motion.at(0.0),
+            NodeTransform::Still(to_world) => rows(to_world),
+            NodeTransform::Moving(_) => motion.at(0.0),
         };
         let (eye, backwards) = eye_and_backwards(&to_world);
         if self.content.camera.is_none()
@@ -123,8 +123,8 @@ impl Walk<'_> {
         {
             let fov = lens.yfov().to_degrees();
             self.content.camera = Some(match placement {
-                Placement::Still(_) => CameraPath::Still(carried(&to_world, fov)),
-                Placement::Moving(_) => CameraPath::Carried { motion, fov },
+                NodeTransform::Still(_) => CameraPath::Still(carried(&to_world, fov)),
+                NodeTransform::Moving(_) => CameraPath::Carried { motion, fov },
             });
         }
         match node.light().map(|light| self.light_type(light.index())) {

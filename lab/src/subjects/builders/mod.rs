@@ -30,7 +30,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 use table::Kind;
-pub use table::{BUILDERS, Builder, BuilderOption, Needs};
+pub use table::{BUILDERS, BuilderEntry, BuilderOption, Needs};
 
 /// A builder with its options, as `-b` takes it. Known to exist and to have sound options once it is made.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub struct Spec {
 
 impl Spec {
     /// The builder.
-    pub fn builder(&self) -> &'static Builder {
+    pub fn builder(&self) -> &'static BuilderEntry {
         BUILDERS.iter().find(|b| b.name == self.name).expect("checked when the spec was parsed")
     }
 
@@ -109,17 +109,17 @@ impl Spec {
     ///
     /// # Errors
     /// [`Error::Argument`] if it is no builder of kd-trees.
-    pub fn kd(&self) -> Result<KdBuilder> {
+    pub fn kd(&self) -> Result<KdSpec> {
         let traversal = || self.traversal();
         Ok(match self.builder().kind {
-            Kind::KdHost(options) => KdBuilder::Host {
+            Kind::KdHost(options) => KdSpec::Host {
                 options: options(self)?,
                 traversal: traversal()?,
                 traces_on_device: self.traces_on_device()?,
             },
-            Kind::KdGpu => KdBuilder::Device { options: self.kd_gpu_options()?, traversal: traversal()? },
+            Kind::KdGpu => KdSpec::Device { options: self.kd_gpu_options()?, traversal: traversal()? },
             _ => {
-                let of_kd = |b: &&Builder| matches!(b.kind, Kind::KdHost(_) | Kind::KdGpu);
+                let of_kd = |b: &&BuilderEntry| matches!(b.kind, Kind::KdHost(_) | Kind::KdGpu);
                 let names: Vec<&str> = BUILDERS.iter().filter(of_kd).map(|b| b.name).collect();
                 return Err(Error::Argument(format!("{self} builds no kd-trees; take {}", names.join(", "))));
             }
@@ -148,7 +148,7 @@ impl Spec {
 
 /// A builder of kd-trees, for those that build more than one of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum KdBuilder {
+pub enum KdSpec {
     /// On the host.
     Host {
         /// What it builds.

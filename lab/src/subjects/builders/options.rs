@@ -3,7 +3,7 @@
 use super::Spec;
 use super::table::{BuilderOption, Kind};
 use crate::measure::choose;
-use crate::subjects::host::{self, Hierarchy};
+use crate::subjects::host::{self, HostMethod};
 use crate::{Error, Result};
 use hedgerow::bvh::builder::{self, Method, Schedule, Treelets, Window};
 use hedgerow::bvh::codes::Codes;
@@ -144,13 +144,13 @@ impl Spec {
     }
 
     /// Options `codes`, `collapse` and `optimise` of a builder on the host.
-    pub(super) fn host_options(&self, hierarchy: Hierarchy) -> Result<host::Options> {
+    pub(super) fn host_options(&self, hierarchy: HostMethod) -> Result<host::HostBvhOptions> {
         if self.time_to_optimise().is_some() {
             let what = "on the host rounds are not timed; take fast, medium, high or a number of passes";
             return Err(Error::Argument(format!("builder {self}: {}: {what}", OPTIMISE.key)));
         }
         let (codes, collapse) = (self.codes()?, self.collapse()?);
-        Ok(host::Options { hierarchy, codes, reinsertion: self.reinsertion()?, collapse })
+        Ok(host::HostBvhOptions { hierarchy, codes, reinsertion: self.reinsertion()?, collapse })
     }
 
     /// Option `radius` of PLOC; 25 where it was not given.

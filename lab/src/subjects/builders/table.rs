@@ -6,7 +6,7 @@ use super::options::{
     TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
 };
 use crate::Result;
-use crate::subjects::host::Hierarchy;
+use crate::subjects::host::HostMethod;
 use crate::subjects::peers::driver::DriverPreference;
 #[cfg(feature = "peer-embree")]
 use crate::subjects::peers::embree;
@@ -16,7 +16,7 @@ use hedgerow::bvh::builder;
 use std::slice;
 
 /// A builder that can be asked for.
-pub struct Builder {
+pub struct BuilderEntry {
     /// Its name.
     pub name: &'static str,
     /// What it is, in half a sentence.
@@ -47,7 +47,7 @@ pub(super) enum Kind {
     /// One of ours on the device, with these options.
     Device(fn(&Spec) -> Result<builder::BuildOptions>),
     /// One of ours on the host, with this hierarchy.
-    Host(fn(&Spec) -> Result<Hierarchy>),
+    Host(fn(&Spec) -> Result<HostMethod>),
     /// A kd-tree by one of ours on the host.
     KdHost(fn(&Spec) -> Result<hedgerow_host::kdtree::HostKdOptions>),
     /// A kd-tree by ours on the device.
@@ -73,18 +73,18 @@ pub enum Needs {
     RayQuery,
 }
 
-impl Builder {
+impl BuilderEntry {
     /// One without options, itself its only variant: a slice borrows the name for that.
-    const fn new(name: &'static &'static str, what: &'static str, kind: Kind) -> Builder {
-        Builder { name, what, options: &[], variants: slice::from_ref(name), kind }
+    const fn new(name: &'static &'static str, what: &'static str, kind: Kind) -> BuilderEntry {
+        BuilderEntry { name, what, options: &[], variants: slice::from_ref(name), kind }
     }
 
-    const fn taking(self, options: &'static [BuilderOption]) -> Builder {
-        Builder { options, ..self }
+    const fn taking(self, options: &'static [BuilderOption]) -> BuilderEntry {
+        BuilderEntry { options, ..self }
     }
 
-    const fn in_variants(self, variants: &'static [&'static str]) -> Builder {
-        Builder { variants, ..self }
+    const fn in_variants(self, variants: &'static [&'static str]) -> BuilderEntry {
+        BuilderEntry { variants, ..self }
     }
 
     /// What it needs of the machine.
@@ -102,8 +102,8 @@ impl Builder {
 }
 
 /// Every builder, in the order in which they are listed and measured.
-pub static BUILDERS: &[Builder] = &[
-    Builder::new(
+pub static BUILDERS: &[BuilderEntry] = &[
+    BuilderEntry::new(
         &"lbvh",
         "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
         Kind::Device(Spec::lbvh_options),
@@ -118,89 +118,97 @@ pub static BUILDERS: &[Builder] = &[
         "lbvh:width=4",
         "lbvh:width=8q",
     ]),
-    Builder::new(
+    BuilderEntry::new(
         &"hlbvh",
         "hierarchical LBVH on the device: small subtrees of the LBVH under a top split by the surface area heuristic",
         Kind::Device(Spec::hlbvh_options),
     )
     .taking(&[BITS, TREELET, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER]),
-    Builder::new(
+    BuilderEntry::new(
         &"ploc",
         "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
         Kind::Device(Spec::ploc_options),
     )
     .taking(&[RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER])
     .in_variants(&["ploc", "ploc:radius=25"]),
-    Builder::new(
+    BuilderEntry::new(
         &"hploc",
         "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
         Kind::Device(Spec::hploc_options),
     )
     .taking(&[WINDOW, RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER]),
-    Builder::new(
+    BuilderEntry::new(
         &"auto",
         "the device's builder that takes least for a build and its rays, by its measured costs",
         Kind::Auto,
     )
     .taking(&[RAYS]),
-    Builder::new(
+    BuilderEntry::new(
         &"lbvh-host",
         "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte",
-        Kind::Host(|_| Ok(Hierarchy::Lbvh)),
+        Kind::Host(|_| Ok(HostMethod::Lbvh)),
     )
     .taking(&[CODES, COLLAPSE, OPTIMISE]),
-    Builder::new(
+    BuilderEntry::new(
         &"ploc-host",
         "locally-ordered clustering by one thread of the host: what `ploc` must equal, byte for byte",
-        Kind::Host(|spec| spec.ploc_radius().map(Hierarchy::Ploc)),
+        Kind::Host(|spec| spec.ploc_radius().map(HostMethod::Ploc)),
     )
     .taking(&[RADIUS, CODES, COLLAPSE, OPTIMISE]),
-    Builder::new(
+    BuilderEntry::new(
         &"sweep",
         "full-sweep SAH on the host: the reference for the quality of the others",
-        Kind::Host(|spec| spec.sweep_leaves().map(Hierarchy::Sweep)),
+        Kind::Host(|spec| spec.sweep_leaves().map(HostMethod::Sweep)),
     )
     .taking(&[COLLAPSE, OPTIMISE, TERMINATION]),
-    Builder::new(&"kd-exact", "kd-tree on the host: perfect splits by SAH", Kind::KdHost(Spec::kd_exact_options))
+    BuilderEntry::new(&"kd-exact", "kd-tree on the host: perfect splits by SAH", Kind::KdHost(Spec::kd_exact_options))
         .taking(&[KT, KI, TRAVERSAL, TRACE]),
-    Builder::new(
+    BuilderEntry::new(
         &"kd-binned",
         "kd-tree on the host: the best by SAH of equally spaced planes",
         Kind::KdHost(Spec::kd_binned_options),
     )
     .taking(&[BINS, KT, KI, TRAVERSAL, TRACE]),
-    Builder::new(
+    BuilderEntry::new(
         &"kd-gpu",
         "kd-tree on the device: bins above, level by level; perfect splits of few references below",
         Kind::KdGpu,
     )
     .taking(&[BINS, EXACT, KT, KI, SCHEDULE, WORKGROUPS, TRAVERSAL]),
-    Builder::new(
+    BuilderEntry::new(
         &"kd-gpu-host",
         "kd-tree of bins above and perfect splits below, on the host: what `kd-gpu` must equal, byte for byte",
         Kind::KdHost(Spec::kd_mixed_options),
     )
     .taking(&[BINS, EXACT, KT, KI, TRAVERSAL, TRACE]),
-    Builder::new(
+    BuilderEntry::new(
         &"driver-fast-build",
         "the Vulkan driver's own, asked to build fast",
         Kind::Driver(DriverPreference::FastBuild),
     ),
-    Builder::new(
+    BuilderEntry::new(
         &"driver-fast-trace",
         "the Vulkan driver's own, asked to trace fast",
         Kind::Driver(DriverPreference::FastTrace),
     ),
     #[cfg(feature = "peer-obvhs")]
-    Builder::new(&"obvhs-fastest", "obvhs on the CPU: PLOC alone", Kind::Obvhs(obvhs::Preset::Fastest)),
+    BuilderEntry::new(&"obvhs-fastest", "obvhs on the CPU: PLOC alone", Kind::Obvhs(obvhs::Preset::Fastest)),
     #[cfg(feature = "peer-obvhs")]
-    Builder::new(&"obvhs-fast", "obvhs on the CPU: PLOC and a little reinsertion", Kind::Obvhs(obvhs::Preset::Fast)),
+    BuilderEntry::new(
+        &"obvhs-fast",
+        "obvhs on the CPU: PLOC and a little reinsertion",
+        Kind::Obvhs(obvhs::Preset::Fast),
+    ),
     #[cfg(feature = "peer-obvhs")]
-    Builder::new(&"obvhs-medium", "obvhs on the CPU: PLOC and more reinsertion", Kind::Obvhs(obvhs::Preset::Medium)),
+    BuilderEntry::new(
+        &"obvhs-medium",
+        "obvhs on the CPU: PLOC and more reinsertion",
+        Kind::Obvhs(obvhs::Preset::Medium),
+    ),
     #[cfg(feature = "peer-embree")]
-    Builder::new(&"embree-low", "Embree on the CPU: Morton codes", Kind::Embree(embree::Preset::Low)),
+    BuilderEntry::new(&"embree-low", "Embree on the CPU: Morton codes", Kind::Embree(embree::Preset::Low)),
     #[cfg(feature = "peer-embree")]
-    Builder::new(&"embree-medium", "Embree on the CPU: binned SAH", Kind::Embree(embree::Preset::Medium)),
+    BuilderEntry::new(&"embree-medium", "Embree on the CPU: binned SAH", Kind::Embree(embree::Preset::Medium)),
     #[cfg(feature = "peer-embree")]
-    Builder::new(&"embree-high", "Embree on the CPU: SAH with spatial splits", Kind::Embree(embree::Preset::High)),
+    BuilderEntry::new(&"embree-high", "Embree on the CPU: SAH with spatial splits", Kind::Embree(embree::Preset::High)),
 ];

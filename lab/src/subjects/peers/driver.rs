@@ -110,9 +110,9 @@ impl Subject for Driver<'_> {
         Ok(BuildRun { milliseconds: bottom, phases })
     }
 
-    fn memory(&self) -> record::Memory {
+    fn memory(&self) -> record::MemoryRecord {
         let ([bottom, scratch], [top, _]) = (self.bottom.bytes(), self.top.bytes());
-        record::Memory {
+        record::MemoryRecord {
             structure_bytes: Some(bottom + top),
             scratch_bytes: Some(scratch),
             peak_bytes: Some(bottom + top + scratch),

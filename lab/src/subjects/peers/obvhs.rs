@@ -190,15 +190,15 @@ impl Subject for Obvhs {
         Ok(BuildRun { milliseconds: building + ordering, phases })
     }
 
-    fn memory(&self) -> record::Memory {
+    fn memory(&self) -> record::MemoryRecord {
         let bytes = size_of_val(&self.tree.nodes[..])
             + size_of_val(&self.tree.primitive_indices[..])
             + size_of_val(&self.ordered[..]);
-        record::Memory { structure_bytes: Some(bytes as u64), ..Default::default() }
+        record::MemoryRecord { structure_bytes: Some(bytes as u64), ..Default::default() }
     }
 
-    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::Quality> {
-        Ok(record::Quality::of(&quality::of(&converted(&self.tree, &self.triangles), c_t, c_i), c_t, c_i))
+    fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
+        Ok(record::QualityRecord::of(&quality::of(&converted(&self.tree, &self.triangles), c_t, c_i), c_t, c_i))
     }
 
     fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {

@@ -2,7 +2,7 @@
 
 use super::Part;
 use crate::Result;
-use crate::experiments::accel::points::{Batch, Maker, Way};
+use crate::experiments::accel::points::{Batch, Implementation, Submission};
 use crate::report::bars::{self, Bar, Bars};
 use crate::report::chart::Caption;
 use crate::report::columns::Table;
@@ -12,26 +12,31 @@ use crate::report::theme::{SERIES, Tone};
 use maud::{Markup, html};
 
 /// Who builds how, in the order of charts and tables.
-const SUBJECTS: [(Option<Maker>, Way); 7] = [
-    (Some(Maker::Ours), Way::OneCall),
-    (Some(Maker::Ours), Way::OneSubmit),
-    (Some(Maker::Ours), Way::SubmitEach),
-    (Some(Maker::Driver), Way::OneCall),
-    (Some(Maker::Driver), Way::OneSubmit),
-    (Some(Maker::Driver), Way::SubmitEach),
-    (None, Way::EmptySubmits),
+const SUBJECTS: [(Option<Implementation>, Submission); 7] = [
+    (Some(Implementation::Ours), Submission::OneCall),
+    (Some(Implementation::Ours), Submission::OneSubmit),
+    (Some(Implementation::Ours), Submission::SubmitEach),
+    (Some(Implementation::Driver), Submission::OneCall),
+    (Some(Implementation::Driver), Submission::OneSubmit),
+    (Some(Implementation::Driver), Submission::SubmitEach),
+    (None, Submission::EmptySubmits),
 ];
 
 /// The point of so many structures.
-pub(super) fn find(points: &[Batch], structures: u32, maker: Option<Maker>, way: Way) -> Option<&Batch> {
+pub(super) fn find(
+    points: &[Batch],
+    structures: u32,
+    maker: Option<Implementation>,
+    way: Submission,
+) -> Option<&Batch> {
     points.iter().find(|point| point.structures == structures && point.maker == maker && point.way == way)
 }
 
-fn name(maker: Option<Maker>, way: Way) -> String {
+fn name(maker: Option<Implementation>, way: Submission) -> String {
     maker.map_or_else(|| way.name().to_owned(), |maker| format!("{}, {}", maker.name(), way.name()))
 }
 
-fn tone(maker: Option<Maker>, way: Way) -> Tone {
+fn tone(maker: Option<Implementation>, way: Submission) -> Tone {
     let place = SUBJECTS.iter().position(|subject| *subject == (maker, way)).unwrap_or(0);
     // Ours begin with the first colour and the driver's with the second, as on the whole page.
     SERIES[[0, 2, 6, 1, 3, 5, 8][place]]
@@ -67,7 +72,7 @@ pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
         caption,
         &Bars { bars: all_bars, axis: "wall-clock milliseconds", number: tick, marks: Vec::new() },
     )?;
-    let curve = |&(maker, way): &(Option<Maker>, Way)| Curve {
+    let curve = |&(maker, way): &(Option<Implementation>, Submission)| Curve {
         name: name(maker, way),
         tone: tone(maker, way),
         points: points
@@ -117,7 +122,7 @@ fn every_batch(points: &[Batch]) -> Markup {
     let each = |point: &Batch| 1e3 * point.wall_ms.median / f64::from(point.structures);
     Table::new("Batches", points)
         .number("structures", "", |point| Some(point.structures.into()), count)
-        .text("whose", |point| point.maker.map_or("–", Maker::name))
+        .text("whose", |point| point.maker.map_or("–", Implementation::name))
         .text("how", |point| point.way.name())
         .number("triangles", "", |point| Some(point.triangles as f64), count)
         .spread("time", "ms", |point| Some(point.wall_ms), three_digits)
@@ -129,15 +134,15 @@ fn every_batch(points: &[Batch]) -> Markup {
 /// One call of ours against the others, in a sentence.
 fn reading(points: &[Batch], most: u32) -> String {
     let of = |maker, way| find(points, most, Some(maker), way);
-    let Some(ours) = of(Maker::Ours, Way::OneCall) else { return String::new() };
+    let Some(ours) = of(Implementation::Ours, Submission::OneCall) else { return String::new() };
     let mut text = format!("One call of ours takes {}", duration(ours.wall_ms.median));
-    let singly = [Way::OneSubmit, Way::SubmitEach].map(|way| of(Maker::Ours, way));
+    let singly = [Submission::OneSubmit, Submission::SubmitEach].map(|way| of(Implementation::Ours, way));
     if let [Some(one_submit), Some(submit_each)] = singly {
         let [in_one, each] = [one_submit, submit_each].map(|point| three_digits(point.over_our_call.median));
         text +=
             &format!("; calls one by one take {in_one} times as long in one submit, and {each} times in a submit each");
     }
-    if let Some(drivers) = of(Maker::Driver, Way::OneCall) {
+    if let Some(drivers) = of(Implementation::Driver, Submission::OneCall) {
         let ratio = drivers.over_our_call.median;
         text += &match ratio >= 1.0 {
             true => format!(". The driver's batch takes {} times as long as ours", three_digits(ratio)),

@@ -2,7 +2,7 @@
 
 use super::Measured;
 use super::batch::find;
-use crate::experiments::accel::points::{BraidedRays, Maker, Rebraid, Way};
+use crate::experiments::accel::points::{BraidedRays, Implementation, RebraidPoint, Submission};
 use crate::measure::statistics::Spread;
 use crate::measure::statistics::geometric_mean;
 
@@ -46,14 +46,14 @@ pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
     let mut goals = Vec::new();
     let most = measured.batches.iter().map(|point| point.structures).max().unwrap_or(0);
     for (maker, way, least) in [
-        (Maker::Ours, Way::OneSubmit, BATCH),
-        (Maker::Ours, Way::SubmitEach, BATCH),
-        (Maker::Driver, Way::OneCall, 1.0),
+        (Implementation::Ours, Submission::OneSubmit, BATCH),
+        (Implementation::Ours, Submission::SubmitEach, BATCH),
+        (Implementation::Driver, Submission::OneCall, 1.0),
     ] {
         if let Some(point) = find(&measured.batches, most, Some(maker), way) {
             let what = match maker {
-                Maker::Ours => format!("{most} structures in one call, against {}", way.name()),
-                Maker::Driver => format!("{most} structures in one call, against one call of the driver's"),
+                Implementation::Ours => format!("{most} structures in one call, against {}", way.name()),
+                Implementation::Driver => format!("{most} structures in one call, against one call of the driver's"),
             };
             goals.push(Goal { what, ratio: point.over_our_call, least });
         }
@@ -68,12 +68,12 @@ pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
 }
 
 /// Whether re-braiding has something to gain: the box of an instance overlaps another's, in the mean.
-pub(super) fn overlaps(point: &Rebraid) -> bool {
+pub(super) fn overlaps(point: &RebraidPoint) -> bool {
     point.overlaps >= 1.0
 }
 
 /// What re-braiding is to gain.
-pub(super) fn least_gain(point: &Rebraid) -> f64 {
+pub(super) fn least_gain(point: &RebraidPoint) -> f64 {
     if overlaps(point) { REBRAID } else { REBRAID_APART }
 }
 

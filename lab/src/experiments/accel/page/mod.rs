@@ -10,7 +10,7 @@ mod top_level;
 mod update;
 
 use crate::Result;
-use crate::experiments::accel::points::{Batch, Entry, Rebraid, TopLevel, Update};
+use crate::experiments::accel::points::{AccelEntry, Batch, RebraidPoint, TopLevel, Update};
 use crate::measure::setting::{Failure, Setting};
 use crate::report::beside;
 use crate::report::chart::Chart;
@@ -22,19 +22,19 @@ use goals::Goal;
 use maud::{Markup, html};
 use std::path::{Path, PathBuf};
 
-impl lines::Entry for Entry {
+impl lines::Entry for AccelEntry {
     const FILE: &'static str = beside::ACCEL.records;
     const COMMAND: &'static str = "hedgerow accel";
 }
 
 /// `accel.jsonl`, open for writing.
-pub type Points = lines::Points<Entry>;
+pub type Points = lines::Points<AccelEntry>;
 
 /// The lines of an `accel.jsonl`, or of the one in a folder.
 ///
 /// # Errors
 /// The file cannot be read; a line is not a record of this schema.
-pub fn read(path: &Path) -> Result<Vec<Entry>> {
+pub fn read(path: &Path) -> Result<Vec<AccelEntry>> {
     lines::entries(path)
 }
 
@@ -44,22 +44,22 @@ struct Measured {
     setting: Option<Setting>,
     batches: Vec<Batch>,
     top_levels: Vec<TopLevel>,
-    rebraids: Vec<Rebraid>,
+    rebraids: Vec<RebraidPoint>,
     updates: Vec<Update>,
     failures: Vec<Failure>,
 }
 
-impl From<Vec<Entry>> for Measured {
-    fn from(entries: Vec<Entry>) -> Measured {
+impl From<Vec<AccelEntry>> for Measured {
+    fn from(entries: Vec<AccelEntry>) -> Measured {
         let mut measured = Measured::default();
         for entry in entries {
             match entry {
-                Entry::Setting(setting) => measured.setting = Some(setting),
-                Entry::Batch(point) => measured.batches.push(point),
-                Entry::Tlas(point) => measured.top_levels.push(point),
-                Entry::Rebraid(point) => measured.rebraids.push(point),
-                Entry::Update(point) => measured.updates.push(point),
-                Entry::Failure(failure) => measured.failures.push(failure),
+                AccelEntry::Setting(setting) => measured.setting = Some(setting),
+                AccelEntry::Batch(point) => measured.batches.push(point),
+                AccelEntry::Tlas(point) => measured.top_levels.push(point),
+                AccelEntry::Rebraid(point) => measured.rebraids.push(point),
+                AccelEntry::Update(point) => measured.updates.push(point),
+                AccelEntry::Failure(failure) => measured.failures.push(failure),
             }
         }
         measured

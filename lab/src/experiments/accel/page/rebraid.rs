@@ -3,7 +3,7 @@
 use super::Part;
 use super::goals::{self, mean_gain, overlaps};
 use crate::Result;
-use crate::experiments::accel::points::{BraidedRays, Rebraid, Side, Work};
+use crate::experiments::accel::points::{BraidedRays, MeanWork, RebraidPoint, TopLevelPoint};
 use crate::report::bars::{self, Bar, Bars};
 use crate::report::chart::{Caption, Chart};
 use crate::report::columns::Table;
@@ -12,7 +12,7 @@ use crate::report::numbers::{count, grouped, short_count, three_digits, tick, wh
 use crate::report::theme::SERIES;
 use maud::{Markup, html};
 
-pub(super) fn part(points: &[Rebraid]) -> Result<Option<Part>> {
+pub(super) fn part(points: &[RebraidPoint]) -> Result<Option<Part>> {
     if points.is_empty() {
         return Ok(None);
     }
@@ -45,7 +45,7 @@ pub(super) fn part(points: &[Rebraid]) -> Result<Option<Part>> {
 }
 
 /// The gain of each kind of ray in one scene.
-fn chart(point: &Rebraid) -> Result<Option<Chart>> {
+fn chart(point: &RebraidPoint) -> Result<Option<Chart>> {
     let bar = |(i, rays): (usize, &BraidedRays)| Bar {
         label: rays.rays.clone(),
         figure: three_digits(rays.gain.median),
@@ -89,13 +89,13 @@ fn chart(point: &Rebraid) -> Result<Option<Chart>> {
 }
 
 /// What building takes with and without, beside the driver's.
-fn buildings(points: &[Rebraid]) -> Markup {
-    let mut rows: Vec<(&Rebraid, &str, &Side)> = Vec::new();
+fn buildings(points: &[RebraidPoint]) -> Markup {
+    let mut rows: Vec<(&RebraidPoint, &str, &TopLevelPoint)> = Vec::new();
     for point in points {
         rows.extend([(point, "hedgerow", &point.off), (point, "hedgerow, re-braided", &point.on)]);
         rows.extend(point.driver.as_ref().map(|side| (point, "driver", side)));
     }
-    let an_instance = |point: &Rebraid, bytes: u64| Some(bytes as f64 / f64::from(point.instances));
+    let an_instance = |point: &RebraidPoint, bytes: u64| Some(bytes as f64 / f64::from(point.instances));
     Table::new("Re-braiding, building", rows)
         .name("scene", |(point, ..)| &point.scene)
         .text("top level", |(_, name, _)| *name)
@@ -108,10 +108,10 @@ fn buildings(points: &[Rebraid]) -> Markup {
 }
 
 /// Every kind of ray in every scene.
-fn tracing(points: &[Rebraid]) -> Markup {
+fn tracing(points: &[RebraidPoint]) -> Markup {
     let rows = points.iter().flat_map(|point| point.rays.iter().map(|rays| (point.scene.as_str(), rays)));
     let mrays_s = |rays: &BraidedRays, milliseconds: f64| Some(rays.count as f64 / (milliseconds * 1e3));
-    let both = |rays: &BraidedRays, of: fn(&Work) -> f64| {
+    let both = |rays: &BraidedRays, of: fn(&MeanWork) -> f64| {
         let [off, on] = [of(&rays.off_work), of(&rays.on_work)];
         html! { td.number data-value=(on) { (three_digits(off)) " → " (three_digits(on)) } }
     };

@@ -2,7 +2,7 @@
 
 use super::Part;
 use crate::Result;
-use crate::experiments::accel::points::{Maker, TopLevel};
+use crate::experiments::accel::points::{Implementation, TopLevel};
 use crate::measure::statistics::Spread;
 use crate::report::chart::Caption;
 use crate::report::columns::Table;
@@ -15,16 +15,16 @@ pub(super) fn part(points: &[TopLevel]) -> Result<Option<Part>> {
     if points.is_empty() {
         return Ok(None);
     }
-    let curve = |maker: Maker, what: &str, series: usize, of: fn(&TopLevel) -> Option<Spread>| {
+    let curve = |maker: Implementation, what: &str, series: usize, of: fn(&TopLevel) -> Option<Spread>| {
         let of_maker = points.iter().filter(|point| point.maker == maker);
         let points = of_maker.filter_map(|point| Some((f64::from(point.instances), of(point)?))).collect();
         Curve { name: format!("{} {what}", maker.name()), tone: SERIES[series], points, law: None }.with_law()
     };
     let all = [
-        curve(Maker::Ours, "build", 0, |point| Some(point.build_ms)),
-        curve(Maker::Ours, "update", 2, |point| point.update_ms),
-        curve(Maker::Driver, "build", 1, |point| Some(point.build_ms)),
-        curve(Maker::Driver, "update", 5, |point| point.update_ms),
+        curve(Implementation::Ours, "build", 0, |point| Some(point.build_ms)),
+        curve(Implementation::Ours, "update", 2, |point| point.update_ms),
+        curve(Implementation::Driver, "build", 1, |point| Some(point.build_ms)),
+        curve(Implementation::Driver, "update", 5, |point| point.update_ms),
     ];
     let all: Vec<Curve> = all.into_iter().filter(|curve| !curve.points.is_empty()).collect();
     let names: Vec<&str> = all.iter().map(|curve| curve.name.as_str()).collect();
@@ -75,7 +75,9 @@ fn every_level(points: &[TopLevel]) -> Markup {
 fn reading(points: &[TopLevel]) -> String {
     let most = points.iter().map(|point| point.instances).max().unwrap_or(0);
     let of = |maker| points.iter().find(|point| point.instances == most && point.maker == maker);
-    let (Some(ours), Some(drivers)) = (of(Maker::Ours), of(Maker::Driver)) else { return String::new() };
+    let (Some(ours), Some(drivers)) = (of(Implementation::Ours), of(Implementation::Driver)) else {
+        return String::new();
+    };
     let against = |ours: f64, drivers: f64| match drivers / ours {
         ratio if ratio >= 1.0 => format!("{} times as fast as the driver's", three_digits(ratio)),
         ratio => format!("slower than the driver's, {} times its time", three_digits(1.0 / ratio)),

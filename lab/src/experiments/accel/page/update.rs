@@ -2,7 +2,7 @@
 
 use super::Part;
 use crate::Result;
-use crate::experiments::accel::points::{Maker, Update};
+use crate::experiments::accel::points::{Implementation, Update};
 use crate::measure::statistics::Spread;
 use crate::report::chart::{Caption, Chart};
 use crate::report::columns::Table;
@@ -26,7 +26,7 @@ pub(super) fn part(points: &[Update]) -> Result<Option<Part>> {
         charts.extend(quality(scene, &frames)?);
         readings.push((scene, reading(&frames)));
     }
-    let is_missing = points.iter().any(|point| point.maker == Maker::Ours && point.update_ms.is_none());
+    let is_missing = points.iter().any(|point| point.maker == Implementation::Ours && point.update_ms.is_none());
     Ok(Some(Part {
         id: "updates",
         title: "Updating against building from scratch",
@@ -54,7 +54,13 @@ pub(super) fn part(points: &[Update]) -> Result<Option<Part>> {
 }
 
 /// A curve over the frames of one maker.
-fn curve(frames: &[&Update], maker: Maker, name: &str, tone: Tone, of: impl Fn(&Update) -> Option<Spread>) -> Curve {
+fn curve(
+    frames: &[&Update],
+    maker: Implementation,
+    name: &str,
+    tone: Tone,
+    of: impl Fn(&Update) -> Option<Spread>,
+) -> Curve {
     let of_maker = frames.iter().filter(|point| point.maker == maker);
     let points = of_maker.filter_map(|point| Some((f64::from(point.frame), of(point)?))).collect();
     Curve { name: format!("{} {name}", maker.name()), tone, points, law: None }
@@ -62,10 +68,10 @@ fn curve(frames: &[&Update], maker: Maker, name: &str, tone: Tone, of: impl Fn(&
 
 fn times(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
     let all = [
-        curve(frames, Maker::Ours, "build", SERIES[0], |point| Some(point.build_ms)),
-        curve(frames, Maker::Ours, "update", SERIES[2], |point| point.update_ms),
-        curve(frames, Maker::Driver, "build", SERIES[1], |point| Some(point.build_ms)),
-        curve(frames, Maker::Driver, "update", SERIES[5], |point| point.update_ms),
+        curve(frames, Implementation::Ours, "build", SERIES[0], |point| Some(point.build_ms)),
+        curve(frames, Implementation::Ours, "update", SERIES[2], |point| point.update_ms),
+        curve(frames, Implementation::Driver, "build", SERIES[1], |point| Some(point.build_ms)),
+        curve(frames, Implementation::Driver, "update", SERIES[5], |point| point.update_ms),
     ];
     let all: Vec<Curve> = all.into_iter().filter(|curve| !curve.points.is_empty()).collect();
     let median = |curve: &Curve| {
@@ -92,10 +98,14 @@ fn times(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
 fn quality(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
     let against = |point: &Update| Some(Spread::once(point.updated_sah? / point.built_sah?));
     let all = [
-        curve(frames, Maker::Ours, "SAH growth", SERIES[4], |point| point.growth.map(Spread::once)),
-        curve(frames, Maker::Ours, "SAH / anew", SERIES[0], against),
-        curve(frames, Maker::Ours, "time of rays / anew", SERIES[2], |point| point.slowdown().map(Spread::once)),
-        curve(frames, Maker::Driver, "time of rays / anew", SERIES[5], |point| point.slowdown().map(Spread::once)),
+        curve(frames, Implementation::Ours, "SAH growth", SERIES[4], |point| point.growth.map(Spread::once)),
+        curve(frames, Implementation::Ours, "SAH / anew", SERIES[0], against),
+        curve(frames, Implementation::Ours, "time of rays / anew", SERIES[2], |point| {
+            point.slowdown().map(Spread::once)
+        }),
+        curve(frames, Implementation::Driver, "time of rays / anew", SERIES[5], |point| {
+            point.slowdown().map(Spread::once)
+        }),
     ];
     let all: Vec<Curve> = all.into_iter().filter(|curve| !curve.points.is_empty()).collect();
     let caption = Caption {
@@ -112,7 +122,7 @@ fn quality(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
 
 /// From where on building anew pays, in a sentence.
 fn reading(frames: &[&Update]) -> String {
-    let ours: Vec<&&Update> = frames.iter().filter(|point| point.maker == Maker::Ours).collect();
+    let ours: Vec<&&Update> = frames.iter().filter(|point| point.maker == Implementation::Ours).collect();
     let (Some(first), Some(last)) = (ours.first(), ours.last()) else {
         return "nothing of ours was measured.".into();
     };

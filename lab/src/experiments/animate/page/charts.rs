@@ -3,7 +3,7 @@
 use super::Measured;
 use super::standings::{Standing, standings};
 use crate::Result;
-use crate::experiments::animate::Way;
+use crate::experiments::animate::AnimationMethod;
 use crate::experiments::animate::points::Animated;
 use crate::measure::statistics::Spread;
 use crate::report::chart::{Caption, Chart};
@@ -13,8 +13,8 @@ use crate::report::stacked::{Part, Stack, stacked};
 use crate::report::theme::{PHASES, SERIES, Tone};
 
 /// The colour of a way, on all of the page.
-pub fn tone(way: Way) -> Tone {
-    SERIES[Way::ALL.iter().position(|&other| other == way).unwrap_or(0)]
+pub fn tone(way: AnimationMethod) -> Tone {
+    SERIES[AnimationMethod::ALL.iter().position(|&other| other == way).unwrap_or(0)]
 }
 
 /// The colour of a part of a bar: building, then the kinds of rays.
@@ -55,12 +55,12 @@ fn parts_of_frames(scene: &str, standings: &[Standing]) -> Result<Option<Chart>>
 
 /// A curve a way over the frames.
 fn over_frames(points: &[Animated], of: impl Fn(&Animated) -> Spread) -> Vec<Curve> {
-    let curve = |way: Way| {
+    let curve = |way: AnimationMethod| {
         let of_way = points.iter().filter(|point| point.way == way);
         let points = of_way.map(|point| (f64::from(point.frame), of(point))).collect();
         Curve { name: way.name().to_owned(), tone: tone(way), points, law: None }
     };
-    Way::ALL.into_iter().map(curve).filter(|curve| !curve.points.is_empty()).collect()
+    AnimationMethod::ALL.into_iter().map(curve).filter(|curve| !curve.points.is_empty()).collect()
 }
 
 fn frames(scene: &str, points: &[Animated]) -> Result<Option<Chart>> {

@@ -7,26 +7,26 @@ mod parts;
 pub mod standings;
 
 use crate::Result;
-use crate::experiments::animate::points::{Animated, Entry, SceneSetting, WayInFrame};
+use crate::experiments::animate::points::{AnimateEntry, Animated, SceneSetting, WayInFrame};
 use crate::measure::setting::Failure;
 use crate::report::beside;
 use crate::report::document::{self, Document, Section};
 use crate::report::lines;
 use std::path::{Path, PathBuf};
 
-impl lines::Entry for Entry {
+impl lines::Entry for AnimateEntry {
     const FILE: &'static str = beside::ANIMATE.records;
     const COMMAND: &'static str = "hedgerow animate";
 }
 
 /// `animate.jsonl`, open for writing.
-pub type Points = lines::Points<Entry>;
+pub type Points = lines::Points<AnimateEntry>;
 
 /// The lines of an `animate.jsonl`, or of the one in a folder.
 ///
 /// # Errors
 /// The file cannot be read; a line is not a record of this schema.
-pub fn read(path: &Path) -> Result<Vec<Entry>> {
+pub fn read(path: &Path) -> Result<Vec<AnimateEntry>> {
     lines::entries(path)
 }
 
@@ -38,14 +38,14 @@ struct Measured {
     failures: Vec<Failure<WayInFrame>>,
 }
 
-impl From<Vec<Entry>> for Measured {
-    fn from(entries: Vec<Entry>) -> Measured {
+impl From<Vec<AnimateEntry>> for Measured {
+    fn from(entries: Vec<AnimateEntry>) -> Measured {
         let mut measured = Measured::default();
         for entry in entries {
             match entry {
-                Entry::Setting(setting) => measured.setting = Some(setting),
-                Entry::Animate(frame) => measured.frames.push(frame),
-                Entry::Failure(failure) => measured.failures.push(failure),
+                AnimateEntry::Setting(setting) => measured.setting = Some(setting),
+                AnimateEntry::Animate(frame) => measured.frames.push(frame),
+                AnimateEntry::Failure(failure) => measured.failures.push(failure),
             }
         }
         measured

@@ -1,7 +1,7 @@
 //! The parts of `animate.html`.
 
 use super::standings::{Standing, fastest, standings};
-use crate::experiments::animate::Way;
+use crate::experiments::animate::AnimationMethod;
 use crate::experiments::animate::points::{Animated, SceneSetting};
 use crate::experiments::bench::kd_trees::published;
 use crate::report::chart::Chart;
@@ -121,8 +121,8 @@ pub(super) fn every_frame(frames: &[Animated]) -> Markup {
 }
 
 /// What the thesis' configurations are called here.
-fn way_of(config: &str) -> Option<Way> {
-    [("single", Way::Rebuild), ("double", Way::TwoTrees), ("merge", Way::Merge)]
+fn way_of(config: &str) -> Option<AnimationMethod> {
+    [("single", AnimationMethod::Rebuild), ("double", AnimationMethod::TwoTrees), ("merge", AnimationMethod::Merge)]
         .into_iter()
         .find_map(|(ending, way)| config.ends_with(ending).then_some(way))
 }
@@ -133,7 +133,7 @@ pub(super) fn published() -> Markup {
         .name("scene", |row| row.scene.clone())
         .number("static triangles", "", |row| row.triangles.map(|n| n as f64), count)
         .text("configuration", |row| row.config.clone())
-        .text("way", |row| way_of(&row.config).map_or("–", Way::name))
+        .text("way", |row| way_of(&row.config).map_or("–", AnimationMethod::name))
         .number("build", "ms", |row| row.figure("build_dynamic_ms"), three_digits)
         .number("frame", "s", |row| row.figure("frame_s"), three_digits)
         .number("speed", "Mrays/s", |row| row.figure("mrays_s"), three_digits)

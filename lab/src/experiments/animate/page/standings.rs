@@ -1,6 +1,6 @@
 //! The ways against each other, by means over the frames.
 
-use crate::experiments::animate::Way;
+use crate::experiments::animate::AnimationMethod;
 use crate::experiments::animate::points::Animated;
 use crate::report::numbers::{duration, size, three_digits};
 use crate::report::table::{or_dash, with_header};
@@ -10,7 +10,7 @@ use comfy_table::Table;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standing {
     /// The way.
-    pub way: Way,
+    pub way: AnimationMethod,
     /// Who built what is built a frame.
     pub builder: String,
     /// What builds were timed by.
@@ -36,13 +36,13 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// Each way in the order in which it first appears.
 pub fn standings(frames: &[Animated]) -> Vec<Standing> {
-    let mut ways: Vec<Way> = Vec::new();
+    let mut ways: Vec<AnimationMethod> = Vec::new();
     for frame in frames {
         if !ways.contains(&frame.way) {
             ways.push(frame.way);
         }
     }
-    let standing = |way: Way| {
+    let standing = |way: AnimationMethod| {
         let of_way: Vec<&Animated> = frames.iter().filter(|frame| frame.way == way).collect();
         let mut kinds: Vec<&str> = Vec::new();
         for rays in of_way.iter().flat_map(|frame| &frame.trace) {
@@ -107,10 +107,10 @@ pub fn table(frames: &[Animated]) -> Table {
 mod tests {
     use super::*;
     use crate::experiments::animate::points::Rays;
-    use crate::measure::record::Memory;
+    use crate::measure::record::MemoryRecord;
     use crate::measure::statistics::Spread;
 
-    fn frame(number: u32, way: Way, build: f64, trace: [f64; 2]) -> Animated {
+    fn frame(number: u32, way: AnimationMethod, build: f64, trace: [f64; 2]) -> Animated {
         let spread = |median: f64| Spread { median, min: median, max: median, runs: 1 };
         let rays = |(kind, ms): (&str, f64)| Rays {
             rays: kind.into(),
@@ -133,25 +133,28 @@ mod tests {
             dynamic_triangles: 2,
             build_ms: spread(build),
             trace: ["primary", "shadow"].into_iter().zip(trace).map(rays).collect(),
-            memory: Memory { structure_bytes: Some(1024), ..Memory::default() },
-            sah: (way == Way::Rebuild).then_some(50.0),
+            memory: MemoryRecord { structure_bytes: Some(1024), ..MemoryRecord::default() },
+            sah: (way == AnimationMethod::Rebuild).then_some(50.0),
         }
     }
 
     #[test]
     fn a_way_stands_by_the_means_over_its_frames() {
         let frames = [
-            frame(0, Way::Rebuild, 10.0, [1.0, 2.0]),
-            frame(0, Way::TwoTrees, 2.0, [2.0, 3.0]),
-            frame(1, Way::Rebuild, 14.0, [3.0, 2.0]),
-            frame(1, Way::TwoTrees, 4.0, [2.0, 3.0]),
+            frame(0, AnimationMethod::Rebuild, 10.0, [1.0, 2.0]),
+            frame(0, AnimationMethod::TwoTrees, 2.0, [2.0, 3.0]),
+            frame(1, AnimationMethod::Rebuild, 14.0, [3.0, 2.0]),
+            frame(1, AnimationMethod::TwoTrees, 4.0, [2.0, 3.0]),
         ];
         let all = standings(&frames);
         let [rebuild, two] = &all[..] else { panic!("{all:?}") };
-        assert_eq!((rebuild.way, rebuild.frames, rebuild.build_ms, rebuild.frame_ms), (Way::Rebuild, 2, 12.0, 16.0));
+        assert_eq!(
+            (rebuild.way, rebuild.frames, rebuild.build_ms, rebuild.frame_ms),
+            (AnimationMethod::Rebuild, 2, 12.0, 16.0)
+        );
         assert_eq!(rebuild.trace_ms, [("primary".to_owned(), 2.0), ("shadow".to_owned(), 2.0)]);
         assert_eq!((rebuild.sah, two.sah), (Some(50.0), None));
-        assert_eq!(fastest(&all).map(|s| s.way), Some(Way::TwoTrees));
+        assert_eq!(fastest(&all).map(|s| s.way), Some(AnimationMethod::TwoTrees));
         let text = table(&frames).to_string();
         assert!(text.contains("two-trees") && text.contains("8.00 ms") && text.contains("2.00"), "{text}");
     }

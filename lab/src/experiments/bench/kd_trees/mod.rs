@@ -3,7 +3,7 @@
 
 pub mod published;
 
-use crate::measure::record::{Record, Trace};
+use crate::measure::record::{Record, TraceRecord};
 use crate::report::columns;
 use crate::report::elements::number;
 use crate::report::names::{short, slug};
@@ -54,7 +54,7 @@ const TREE: [Figure<Record>; 9] = [
     Figure::new(["memory", "MB", "memory_mb"], three_digits, |r| Some(r.memory.structure_bytes? as f64 * 1e-6)),
 ];
 
-const RAYS: [Figure<Trace>; 3] = [
+const RAYS: [Figure<TraceRecord>; 3] = [
     Figure::new(["tests", "a ray", "tests_per_ray"], three_digits, |t| t.tests),
     Figure::new(["steps", "a ray", "steps_per_ray"], three_digits, |t| t.steps),
     Figure::new(["speed", "Mrays/s", "mrays_s"], three_digits, |t| Some(t.mrays_s)),

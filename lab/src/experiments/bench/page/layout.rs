@@ -4,7 +4,7 @@ use super::summary::{self, Standing};
 use super::{Picture, Report, SceneCharts};
 use crate::experiments::bench::kd_trees;
 use crate::experiments::bench::matrix::Outcome;
-use crate::measure::record::{Phase, Record, Trace};
+use crate::measure::record::{PhaseRecord, Record, TraceRecord};
 use crate::report::chart::Chart;
 use crate::report::choosing;
 use crate::report::columns::Table;
@@ -140,7 +140,7 @@ fn scene_section(report: &Report, scene: &SceneCharts, legend: &Legend) -> Secti
 fn phase_table(report: &Report, outcomes: &[&Outcome], legend: &Legend) -> Markup {
     struct Row<'o> {
         record: &'o Record,
-        phase: &'o Phase,
+        phase: &'o PhaseRecord,
         moved: Option<f64>,
     }
     let copy_gb_s = report.setting.device.as_ref().and_then(|d| d.copy_gb_s);
@@ -195,7 +195,7 @@ fn ray_table(outcomes: &[&Outcome], legend: &Legend) -> Markup {
     }
 }
 
-fn ray_cell(trace: Option<&Trace>) -> Markup {
+fn ray_cell(trace: Option<&TraceRecord>) -> Markup {
     let Some(trace) = trace else { return number(None, three_digits) };
     html! {
         td.number data-value=(trace.mrays_s) {

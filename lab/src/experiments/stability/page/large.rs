@@ -88,7 +88,7 @@ impl StretchPage for HugeTriangles {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiments::stability::large::Placement;
+    use crate::experiments::stability::large::LargePlacement;
     use crate::experiments::stability::points::Experiment;
     use std::collections::BTreeMap;
 
@@ -98,7 +98,7 @@ mod tests {
             experiment: Experiment::Large,
             scene: "s".into(),
             builder: builder.into(),
-            by: HugeTriangles { placement: Placement::Wall, count: 1 },
+            by: HugeTriangles { placement: LargePlacement::Wall, count: 1 },
             e,
             cost: Some(Some(1.0)),
             relative_cost: Some(1.0),

@@ -1,7 +1,7 @@
 //! Where the time of a build goes: its phases as stacked bars, one bar a builder.
 
 use crate::Result;
-use crate::measure::record::{Phase, Record};
+use crate::measure::record::{PhaseRecord, Record};
 use crate::report::chart::{Caption, Chart};
 use crate::report::names::{short, slug};
 use crate::report::stacked::{Part, Stack, stacked};
@@ -13,7 +13,7 @@ use crate::report::theme::Legend;
 /// The chart cannot be drawn.
 pub fn phases(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
     let Some(scene) = records.first().map(|record| &record.scene) else { return Ok(None) };
-    let part = |phase: &Phase| Part {
+    let part = |phase: &PhaseRecord| Part {
         name: phase.name.clone(),
         milliseconds: phase.median_ms,
         tone: legend.phase(&phase.name),
