@@ -2,13 +2,12 @@
 //! results to stdout, progress and diagnostics to stderr, exit status 0 done, 1 the work failed, 2 the arguments are wrong.
 
 mod build;
-mod choose;
 mod devices;
 pub(crate) mod options;
 mod output;
 mod rays;
 mod render;
-mod tables;
+pub(crate) mod tables;
 mod trace;
 pub(crate) mod work;
 
@@ -16,6 +15,7 @@ use crate::experiments::accel::command as accel;
 use crate::experiments::animate::command as animate;
 use crate::experiments::bench::command as bench;
 use crate::experiments::check::command as check;
+use crate::experiments::choose::command as choose;
 use crate::experiments::compare::command as compare;
 use crate::experiments::navigate::command as navigate;
 use crate::experiments::report::command as report;

@@ -4,6 +4,7 @@ pub mod accel;
 pub mod animate;
 pub mod bench;
 pub mod check;
+pub mod choose;
 pub mod compare;
 pub mod navigate;
 pub mod report;

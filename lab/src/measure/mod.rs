@@ -1,18 +1,14 @@
 //! How figures are made and kept: what makes them fair and comparable, and the records they end up in.
 //!
 //! [`statistics`] (in turn, medians), [`agreement`] (right hits), [`overlap`] (a quality that takes time), [`copy`] (what the
-//! memory can do), [`provenance`] (where figures come from), [`record`] (one builder on one scene) and [`setting`] (where and how, and what
-//! failed). [`choose`] says which builder will be best, before
-//! anything is built.
+//! memory can do), [`total_time`] (builds and rays together), [`provenance`] (where figures come from), [`record`] (one builder on one
+//! scene) and [`setting`] (where and how, and what failed).
 
 pub mod agreement;
-pub mod choose;
 pub mod copy;
 pub mod overlap;
 pub mod provenance;
 pub mod record;
 pub mod setting;
 pub mod statistics;
-
-pub use crate::experiments::bench::total_time;
-pub use crate::subjects::{BuildRun, Subject, builders};
+pub mod total_time;

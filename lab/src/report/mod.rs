@@ -7,7 +7,6 @@
 pub mod bars;
 pub mod beside;
 pub mod chart;
-pub mod choosing;
 pub mod columns;
 pub mod curves;
 pub mod document;

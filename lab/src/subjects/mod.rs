@@ -1,5 +1,6 @@
 //! What is measured: a builder on a scene, behind one interface, ours and the peers' alike.
 
+pub mod auto;
 pub mod builders;
 pub mod device_bvh;
 pub mod device_rays;

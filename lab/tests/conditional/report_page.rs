@@ -5,7 +5,7 @@ use crate::conditional::needs;
 use hedgerow_lab::experiments::bench::matrix::{OnScene, Outcome};
 use hedgerow_lab::experiments::bench::page::{Picture, Report};
 use hedgerow_lab::experiments::bench::{kd_trees, results};
-use hedgerow_lab::measure::choose::hindsight::Choice;
+use hedgerow_lab::experiments::choose::hindsight::Choice;
 use hedgerow_lab::measure::record::{
     BuildRecord, MemoryRecord, PhaseRecord, QualityRecord, Record, SCHEMA, TraceRecord,
 };

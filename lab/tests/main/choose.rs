@@ -1,7 +1,7 @@
 //! `hedgerow choose` and the builder `auto`, by a table of costs that a test lays into the cache.
 
 use crate::common::device;
-use hedgerow_lab::measure::choose::{Cost, CostRow, CostTable, SceneClass, cache};
+use hedgerow_lab::experiments::choose::{Cost, CostRow, CostTable, SceneClass, cache};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;

@@ -8,7 +8,7 @@ use crate::experiments::bench::kd_trees::{self, published};
 use crate::experiments::bench::matrix::{self, BenchPlan, OnScene, Outcome};
 use crate::experiments::bench::results::Results;
 use crate::experiments::bench::shard::Shard;
-use crate::measure::choose::{CostTable, cache, candidates, hindsight};
+use crate::experiments::choose::{CostTable, cache, candidates, hindsight};
 use crate::measure::overlap::Epo;
 use crate::measure::setting::{Failure, Setting};
 use crate::report::names::slug;

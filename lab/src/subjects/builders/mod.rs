@@ -18,8 +18,8 @@ use super::peers::embree::Embree;
 #[cfg(feature = "peer-obvhs")]
 use super::peers::obvhs::Obvhs;
 use crate::device::Device;
-use crate::measure::choose::Auto;
 use crate::scene::Mesh;
+use crate::subjects::auto::Auto;
 use crate::{Error, Result};
 use hedgerow::bvh::{builder, reinsertion};
 use hedgerow::kdtree;

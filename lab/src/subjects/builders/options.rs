@@ -2,7 +2,7 @@
 
 use super::Spec;
 use super::table::{BuilderOption, Kind};
-use crate::measure::choose;
+use crate::subjects::auto;
 use crate::subjects::host::{self, HostMethod};
 use crate::{Error, Result};
 use hedgerow::bvh::builder::{self, Method, Schedule, Treelets, Window};
@@ -140,7 +140,7 @@ impl Spec {
 
     /// Option `rays`.
     pub(super) fn rays(&self) -> Result<f64> {
-        choose::rays_of(self.option(RAYS.key))
+        auto::rays_of(self.option(RAYS.key))
     }
 
     /// Options `codes`, `collapse` and `optimise` of a builder on the host.

@@ -1,8 +1,8 @@
 //! The chart that decides: total time of a build and its rays, over the number of rays; and the lower envelope.
 
 use crate::Result;
-use crate::experiments::bench::total_time::{Line, Stretch, lower_envelope};
 use crate::measure::record::Record;
+use crate::measure::total_time::{Line, Stretch, lower_envelope};
 use crate::report::chart::{
     Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, best_line, frame, log_axis, mesh, pixel,
     room_at_ends,

@@ -2,7 +2,7 @@
 
 use super::SceneClass;
 use crate::device::Device;
-use crate::measure::builders::Spec;
+use crate::subjects::builders::Spec;
 
 /// For scenes whose codes tell triangles apart: builders with their options, as `-b` takes them, from the fastest build to the best
 /// tree.

@@ -109,7 +109,7 @@ fn write(folder: &Path, calibration: &Calibration) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::choose::{Cost, CostRow, SceneClass};
+    use crate::experiments::choose::{Cost, CostRow, SceneClass};
 
     fn calibration() -> Calibration {
         let key = Key {

@@ -1,11 +1,12 @@
 //! `auto`: the builder that the table of costs expects to be best, as a subject.
 
-use super::{Cost, SceneClass, cache};
 use crate::device::Device;
-use crate::measure::builders::Spec;
+use crate::experiments::choose::{Cost, SceneClass, cache};
 use crate::measure::overlap::Epo;
-use crate::measure::{BuildRun, Subject, record};
+use crate::measure::record;
 use crate::scene::Mesh;
+use crate::subjects::builders::Spec;
+use crate::subjects::{BuildRun, Subject};
 use crate::{Error, Result};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::trace::{Hit, Query, Ray, Work};

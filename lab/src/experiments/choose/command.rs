@@ -1,15 +1,16 @@
 //! `hedgerow choose`: what `auto` would build, and why; and how good its choices are in hindsight.
 
-use super::options::{RaysPerBuild, Size};
-use super::{Bar, Common, Json, tables, work};
+use super::calibration::{self, Effort};
+use super::hindsight::{self, Choice, Pair};
+use super::{Cost, CostRow, CostTable, SceneClass, SceneCost, cache, candidates};
+use crate::cli::options::{RaysPerBuild, Size};
+use crate::cli::{Bar, Common, Json, tables, work};
 use crate::device::Device;
-use crate::measure::choose::calibration::{self, Effort};
-use crate::measure::choose::hindsight::{self, Choice, Pair};
-use crate::measure::choose::{Cost, CostRow, CostTable, DEFAULT_RAYS, SceneClass, SceneCost, cache, candidates};
 use crate::measure::total_time::{Line, lower_envelope};
 use crate::report::names::short;
 use crate::report::numbers::{duration, grouped, short_count, three_digits};
 use crate::scene::Scene;
+use crate::subjects::auto::DEFAULT_RAYS;
 use std::io::Write;
 use std::num::NonZeroU32;
 
@@ -38,7 +39,7 @@ pub struct Arguments {
     json: Json,
 }
 
-pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let device = work::device_for(common, &["auto".parse()?])?.expect("auto works on a device");
     let costs = {
         let bar = Bar::new(common, "calibrating", 0);

@@ -1,11 +1,11 @@
 //! The page's section on `auto`: its choices for every scene and so many rays a build, beside the best in hindsight.
 
-use super::elements::column;
-use super::names::short;
-use super::numbers::short_count;
-use crate::measure::choose::SceneCost;
-use crate::measure::choose::hindsight::{self, Choice, GOOD, Pair, RAYS};
+use super::SceneCost;
+use super::hindsight::{self, Choice, GOOD, Pair, RAYS};
 use crate::measure::record::Record;
+use crate::report::elements::column;
+use crate::report::names::short;
+use crate::report::numbers::short_count;
 use maud::{Markup, html};
 
 /// Empty where nothing was chosen, or nothing that was chosen was measured.

@@ -2,12 +2,12 @@
 
 use super::{Cost, CostRow, CostTable, SceneClass, candidates};
 use crate::device::Device;
-use crate::measure::Subject;
-use crate::measure::builders::Spec;
 use crate::measure::statistics::{Spread, geometric_mean, in_turn};
 use crate::random::SplitMix64;
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{self, LoadOptions, Scene};
+use crate::subjects::Subject;
+use crate::subjects::builders::Spec;
 use crate::{Error, Result};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::sah::Collapse;
