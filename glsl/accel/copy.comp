@@ -1,4 +1,4 @@
-// Clones a structure: as many bytes as its header says. What is no structure becomes an empty one with the status
+// Clones a structure: the bytes that its header counts. Anything else becomes an empty one with the status
 // WRONG_VERSION.
 //
 // reads   source

@@ -55,6 +55,6 @@ void main() {
     uint i = invocation_number();
     if (i >= count) return;
     Header header = Structure(structures[i]).header;
-    // Of what is no structure: those of the structure that a copy of it is.
+    // If it is not a structure: the properties of the empty structure that a copy of it becomes.
     results.pair[i] = property_of(is_structure(header) ? header : header_of_wrong_version());
 }

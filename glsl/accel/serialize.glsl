@@ -7,7 +7,7 @@
 //   handles  reads the memory's handles     writes them into the instances of the structure
 //
 // The handles are the addresses of the structures below a top level, one a record. Memory that something else wrote becomes an
-// empty structure with the status WRONG_VERSION; what is no structure is written as what no version wrote.
+// empty structure with the status WRONG_VERSION; what is not a structure is written with a version that no library has.
 //
 // needs  one barrier before, between read and handles, and after; any number of workgroups; any subgroup size
 #ifndef HEDGEROW_ACCEL_SERIALIZE

@@ -3,7 +3,7 @@
 #define HEDGEROW_ACCEL_SERIALIZED
 #include "bvh/copy.glsl"
 
-// Who wrote it and by which version, two sizes, and how many handles follow.
+// The writer and its version, two sizes, and how many handles follow.
 const uint HEAD_PAIRS = 7;
 
 uint handle_count(Header header) {

@@ -113,7 +113,7 @@ uint load_reference(Geometry g, uint reference, out Box b) {
     return r.left_out;
 }
 
-// Writes the record of what a leaf holds to its place, and tells its box; returns as load_reference does.
+// Writes the record of a leaf's primitive to its place, and outputs its box. Returns as load_reference does.
 uint write_reference(uvec2 records, uint position, Geometry g, uint reference, out Box b) {
     if (!HAS_REFERENCES) return write_record(records, position, g, reference, b);
     Reference r = References(part(parts.references)).reference[reference];

@@ -1,7 +1,7 @@
 // Morton codes and extended Morton codes (Vinkler, Bittner, Havran 2017): src/bvh/codes explains them and is the twin.
 //
 // A code's sequence of axes has at most three stretches: bits of the longest axis alone, then two axes in turn, then three.
-// (Halving keeps the order of the extents, so whoever is next in turn stays next until a third is as long.) So a code is a
+// (Halving keeps the order of the extents, so the axis that is next stays next until a third is as long.) So a code is a
 // shift, two 2-way and three 3-way interleavings, whatever the bounds; `find_stretches` finds the stretches.
 //
 // Bit-exact on every device: coordinates are integers from the start (a float's bits, shifted), so that nothing is lost in the

@@ -14,7 +14,7 @@
 // Nobody gives this pass scratch memory, so a place of four words for each old slot lies where the records will be: nodes of a
 // tree of n records are in the slots below n - 1, and a record has seven words or more.
 //
-// What is no structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
+// Anything that is not a structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
 // its own status.
 //
 // needs  one barrier before, between each two, and after; any number of workgroups; any subgroup size; no overlap of the two

@@ -26,7 +26,7 @@ uvec2 structure_bytes(Header header) {
     return structure_bytes(header.kind, header.node_slots, header.primitive_count, header.geometry_count);
 }
 
-// Copies so many bytes (two words; a multiple of 4) between addresses that are multiples of 8. Pieces are found by address, as
+// Copies a number of bytes (two words; a multiple of 4) between addresses that are multiples of 8. Pieces are found by address, as
 // indices into memory are signed and end at 2^31.
 void copy_bytes(uvec2 from, uvec2 to, uvec2 bytes) {
     uint pairs = bytes.x >> 3 | bytes.y << 29;

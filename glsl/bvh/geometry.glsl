@@ -18,7 +18,7 @@ const uint SOURCE = SOURCE_WORD & 7u;
 // Whether leaves hold references (bvh/references.glsl) to the primitives.
 const bool HAS_REFERENCES = (SOURCE_WORD & 8u) != 0u;
 
-// Why a primitive is left out where no status bit tells of it: the caller wants it so.
+// A primitive is left out without a status bit: the caller wants it so.
 const uint INACTIVE = 1u << 31;
 
 const uint COMPONENT_FLOAT = 0;
@@ -135,7 +135,7 @@ uvec3 indices_of(Geometry g, uint triangle) {
     return v;
 }
 
-// The corners of a triangle; returns 0, or the status bit that tells why it is left out (then the corners are zero).
+// The corners of a triangle; returns 0, or the status bit for the reason that it is left out (then the corners are zero).
 uint load_corners(Geometry g, uint primitive, out Corners c) {
     if (SOURCE == SOURCE_GEOMETRIES) g = geometry_of(g, primitive);
     c = Corners(vec3(0), vec3(0), vec3(0));

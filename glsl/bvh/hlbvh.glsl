@@ -91,7 +91,7 @@ float top_cost(uint slot, uint side) {
     return Floats(part(parts.top_costs[side])).value[slot];
 }
 
-// From each treelet up: of two siblings the second to arrive goes on with their parent, whose count tells until then who arrived.
+// From each treelet up: of two siblings the second to arrive goes on with their parent, whose count holds until then which has arrived.
 void hlbvh_weigh(uint task) {
     Structure structure = Structure(structure_address);
     Weights w = weights();

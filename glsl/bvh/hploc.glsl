@@ -45,7 +45,7 @@ bool is_whole(Range s, uint active_count) {
     return s.first == 0u && s.last + 1u == active_count;
 }
 
-// One step up from a subtree: whether its sibling is there. If so, `s` becomes their parent, and the clusters of both are told.
+// One step up from a subtree: whether its sibling is there. If so, `s` becomes their parent, and the clusters of both are output.
 bool step_up(Words codes, uint active_count, uint run, inout uint waiting, inout Range s, out Request request) {
     request = NO_REQUEST;
     Words ends = Words(part(parts.ends));

@@ -49,7 +49,7 @@ vec3 cross_product(vec3 a, vec3 b) {
     return c;
 }
 
-// The inverse of an affine matrix, by its adjugate; false where there is none in finite numbers.
+// The inverse of an affine matrix, by its adjugate; false if it is not finite.
 bool inverse_of(vec4 m[3], out vec4 inverse[3]) {
     float scale = scale_of_matrix(m);
     vec3 a = m[0].xyz * scale, b = m[1].xyz * scale, c = m[2].xyz * scale;

@@ -113,7 +113,7 @@ uvec2 address_of(uvec2 base, uint index, uint stride) {
     return base;
 }
 
-// Where the records of a structure with so many node slots begin: behind the nodes.
+// Where the records of a structure with this many node slots begin: behind the nodes.
 uvec2 records_at(uvec2 structure, uint node_slots) {
     return address_of(address_of(structure, 2u, 64u), node_slots, 64u);
 }

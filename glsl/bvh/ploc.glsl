@@ -22,10 +22,10 @@
 layout(constant_id = 7) const uint RADIUS_WORD = 16;
 const uint RADIUS = RADIUS_WORD & 0xFFFFu;
 const bool CACHES = RADIUS_WORD >> 16 != 0u;
-// Clusters that rounds look at before any is forced: so many a primitive, and so many anyway.
+// Clusters that rounds may look at before merges are forced: this many per primitive, and a fixed number.
 const uint LOOKS = 16;
 const uint LOOKS_ANYWAY = 1u << 17;
-// Of a round's clusters, one in so many falls away, or it is slow.
+// A round is slow if fewer than one in this many clusters merges.
 const uint SLOW = 16;
 const uint CACHED = CACHES ? gl_WorkGroupSize.x + 2u * RADIUS : 1u;
 
@@ -189,7 +189,7 @@ void ploc_merge(uint task, uint round) {
 
 // `round` is the first that is not done yet.
 void ploc_finish(uint round) {
-    // Where there is nothing, nobody has begun.
+    // Where nothing is written, no workgroup has begun.
     uint count = primitive_count == 0u ? 0u : clusters_in(round);
     // Until rounds are forced there can be 512 of at least 256 clusters, and later every second leaves fifteen of sixteen.
     // Once at least, which changes nothing where there is one cluster or none: Mesa 26's lavapipe goes through a loop that no lane

@@ -73,7 +73,7 @@ uint load_box(Geometry g, uint primitive, out Box b) {
     return why_not;
 }
 
-// Writes the record of a primitive to its place, and tells the box; returns as load_box does. One that is left out has a
+// Writes the record of a primitive to its place, and outputs the box. Returns as load_box does. One that is left out has a
 // record of zeros.
 uint write_record(uvec2 records, uint position, Geometry g, uint primitive, out Box b) {
     uint why_not;

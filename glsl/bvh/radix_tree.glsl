@@ -5,7 +5,7 @@
 #include "gpu/radix_sort.glsl"
 
 // How the codes at two positions differ, as a number that is larger where a higher bit differs: the code's bits, then those of the
-// position, which tell equal codes apart.
+// position, which distinguish equal codes.
 uvec3 difference_of(Words codes, uint i, uint j) {
     if (KEY_WORDS == 1) return uvec3(i ^ j, codes.word[i] ^ codes.word[j], 0);
     return uvec3(i ^ j, codes.word[2 * i] ^ codes.word[2 * j], codes.word[2 * i + 1] ^ codes.word[2 * j + 1]);

@@ -1,4 +1,4 @@
-// The phases of a refit, each a function over a task (a workgroup's worth of runs, each so many slots): dispatched one by one
+// The phases of a refit, each a function over a task (a workgroup's worth of runs of slots): dispatched one by one
 // (bvh/refit/*.comp) or all by one workgroup (bvh/refit/workgroup.comp). src/bvh/refit.rs records both.
 //
 //   leaves   reads the primitives, the nodes        writes the structure: records, status, boxes of leaves and of what lies in
@@ -118,7 +118,7 @@ void leave_out(Work w, uint position, uint primitive) {
     }
 }
 
-// Makes a record anew. Returns its box, which is empty where it is left out; `status` gets why.
+// Makes a record again. Returns its box, which is empty if it is left out; `status` gets the reason.
 Box refit_record(Work w, uint position, inout uint status) {
     uint primitive = primitive_of(w, position);
     uint why_not = STATUS_INDEX_OUT_OF_RANGE;
@@ -142,7 +142,7 @@ uint end_of(Work w, uint first, uint count) {
     return first + min(count, w.record_count - min(first, w.record_count));
 }
 
-// The box of the records first..end, made anew by all lanes of the subgroup together.
+// The box of the records first..end, made again by all lanes of the subgroup together.
 Box refit_together(Work w, uint first, uint end, inout uint status) {
     // Whatever lanes there are: the real subgroup may be smaller than the device reports.
     uvec4 lanes = subgroupBallot(true);
@@ -296,7 +296,7 @@ void refit_climb(Update u, uint task) {
     uint starts = w.starts.word[run / RUN];
     uint waiting = w.waiting.word[run / RUN];
     uint slot = NONE, arrives_at = NONE;
-    // A run has so many starts, each waits there at most once for either side, and from each it is so far up.
+    // Bounds: a run has this many starts, each waits there at most once for either side, and this is the longest way up.
     for (uint round = 0; round < 3u * RUN * (MAX_DEPTH + 2u); ++round) {
         if (slot == NONE && arrives_at == NONE) {
             if (starts != 0u) {

@@ -1,5 +1,5 @@
 // Parallel reinsertion: subtrees of a tree whose leaves have one record each move to where they cost less. src/bvh/reinsertion.rs
-// tells the method and records the steps; src/bvh/twin/reinsertion.rs is the twin.
+// describes the method and records the steps; src/bvh/twin/reinsertion.rs is the twin.
 //
 //   parents  reads nodes                        writes parents
 //   (fill    writes gains, firsts: zero)

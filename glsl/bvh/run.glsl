@@ -67,7 +67,7 @@ Run run_of(uint task) {
     return run;
 }
 
-// By the workgroup together. In the second turn nobody has a run any more.
+// By the workgroup together. In the second turn no invocation has a run.
 void begin_turn(inout Run run, uint turn) {
     if (!MEETS_IN_GROUP) return;
     run.in_group = turn == 0u;

@@ -1,5 +1,5 @@
 // References instead of triangles: large ones become several, with tighter boxes (Karras and Aila 2013, section 5). Each phase is
-// a function over a task (a workgroup's worth of items). src/bvh/split.rs records them and tells the formulas; the twin is
+// a function over a task (a workgroup's worth of items). src/bvh/split.rs records them and has the formulas; the twin is
 // src/bvh/twin/split.rs.
 //
 //   reset       writes state: empty bounds, histogram (zero)

@@ -85,7 +85,7 @@ float area_inside(Surface s, vec3 lo, vec3 hi) {
     float sum = below_edge(ab0, ab1, lo.xy, hi.xy) + below_edge(bc0, bc1, lo.xy, hi.xy)
               + below_edge(cut1, ac1, lo.xy, hi.xy) - below_edge(ac0, ac1, lo.xy, hi.xy)
               + below_edge(ac0, cut0, lo.xy, hi.xy);
-    // Which way round the corners go tells the sign: what has the other one is rounding.
+    // The winding of the corners gives the sign: the other sign is rounding.
     bool over = s.b.x * s.c.y < s.b.y * s.c.x;
     return max(over ? sum : -sum, 0.0) * s.stretch;
 }

@@ -36,7 +36,7 @@ uvec2 wide_nodes_at(uvec2 structure) {
     return address_of(structure, 1u, 128u);
 }
 
-// Where the records of a structure of so many nodes of these bytes begin: behind them.
+// Where the records of a structure with this many nodes of this size begin: behind them.
 uvec2 wide_records_at(uvec2 structure, uint node_slots, uint node_bytes) {
     return address_of(wide_nodes_at(structure), node_slots, node_bytes);
 }

@@ -29,12 +29,12 @@ uint invocation_number() {
 BUFFER Words { uint word[]; };
 BUFFER Floats { float value[]; };
 
-// Makes what this invocation has written available to the device, before an atomic that tells others of it.
+// Makes what this invocation has written available to the device, before an atomic that announces it.
 void release_to_device() {
     memoryBarrier(gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsRelease | gl_SemanticsMakeAvailable);
 }
 
-// Makes what others have released visible to this invocation, after the atomic that told of it.
+// Makes what others have released visible to this invocation, after the atomic that announced it.
 void acquire_from_device() {
     memoryBarrier(gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsAcquire | gl_SemanticsMakeVisible);
 }

@@ -22,7 +22,7 @@ const uint POOL_SPINS = 1u << 26;
 // Rounds that a worker pauses between two polls, at most.
 const uint POOL_LONGEST_PAUSE = 64;
 
-// Who waits polls `done`: it has a cache line of its own, of up to 128 bytes, so that neither drawing tickets nor reading counts
+// Workers that wait poll `done`: it has a cache line of its own, of up to 128 bytes, so that neither drawing tickets nor reading counts
 // waits for those who poll.
 BUFFER PoolState {
     uint next;      // ticket to draw
@@ -74,7 +74,7 @@ bool pool_wait(PoolState pool, uint target) {
     return false;
 }
 
-// A pool that has not begun, of so many phases without tasks; by one invocation.
+// A pool that has not begun, with phases that have no tasks yet; by one invocation.
 void pool_reset(PoolState pool, uint phases) {
     pool.next = 0u;
     pool.done = 0u;

@@ -48,7 +48,7 @@ uint planes_before(BinPlanes planes, float x) {
     return bin;
 }
 
-// Counts the faces of so many references from the first of them on.
+// Counts the faces of a number of references, from the first of them on.
 void fill_bins(KdReferences references, Box cell, uint begin, uint end) {
     for (uint i = gl_LocalInvocationIndex; i < COUNTERS; i += gl_WorkGroupSize.x) counters[i] = 0u;
     barrier();

@@ -6,10 +6,10 @@
 //
 //     bin         each chunk of a large task counts the faces in bins; the last of a task chooses the plane.
 //                 Each task of no more than EXACT references is built to its leaves by one workgroup.
-//     classify    each chunk tells the sides of its references and clips what straddles the plane; where chunks put what they have
+//     classify    each chunk finds the sides of its references and clips what straddles the plane; where chunks put what they have
 //                 is summed up on the way.
 //     scan        how many nodes, leaves and tasks of the next level those of the level before them make; a workgroup a tile of tasks.
-//                 In the pool the last chunk of the level does it, and this is no phase.
+//                 In the pool the last chunk of the level does it, without a phase of its own.
 //     distribute  each chunk moves its references to the next level, or to its leaf; each tile writes its nodes, and its tasks of the
 //                 next level.
 //
@@ -349,7 +349,7 @@ void release_workgroup() {
     release_to_device();
 }
 
-// Whether this is the last of so many workgroups to arrive, by what the first invocation found at the counter: then what the others
+// Whether this is the last of these workgroups to arrive, by what the first invocation found at the counter: then what the others
 // have written is visible.
 bool is_last_of(uint arrived_before, uint count) {
     acquire_from_device();

@@ -102,7 +102,7 @@ uint faces_beyond(Box b, Box cell) {
     return faces;
 }
 
-// The box of a triangle's part in a cell; false where there is none.
+// The box of a triangle's part in a cell; false if no part is in it.
 bool clip_triangle(Corners c, float reach, Box cell, out Box part) {
     Box whole = box_around(c);
     float longest = longest_side(whole);

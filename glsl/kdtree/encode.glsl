@@ -4,7 +4,7 @@
 #include "kdtree/scan.glsl"
 #include "kdtree/clip.glsl"
 
-// A triangle is long whose longest side is so many octaves over the mean.
+// A triangle is long if its longest side is this many octaves above the mean.
 const uint LONG = 12;
 
 uint tile_count() {

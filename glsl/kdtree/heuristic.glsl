@@ -24,7 +24,7 @@ void half_cells(Box cell, uint axis, float at, out Box left, out Box right) {
     right.lo[axis] = at;
 }
 
-// The cost of a plane with so many references on the left, in it, and on the right. What lies in it is on the left, or where it
+// The cost of a plane with these numbers of references on the left, in it, and on the right. What lies in it is on the left, or where it
 // costs less. INFINITE at and beyond the faces.
 uint plane_cost(Box cell, float area_scale, uint axis, float at, uvec3 counts, bool is_planar_left, out bool planar_left) {
     planar_left = true;
@@ -40,7 +40,7 @@ uint plane_cost(Box cell, float area_scale, uint axis, float at, uvec3 counts, b
     return floatBitsToUint(cost);
 }
 
-// Whether a leaf of so many references costs more.
+// Whether a leaf of this many references costs more.
 bool pays(uint cost, Box cell, float area_scale, uint count) {
     precise float leaf = c_i * (scaled_half_area(cell, area_scale) * float(count));
     return cost < floatBitsToUint(leaf);

@@ -1,5 +1,5 @@
 // Merging on the device (Papay 2025, section 10.3): triangles of objects find the leaves of the static tree that they are in, and
-// each such *marked* leaf is built anew, as a task of the first level of a build. An object that has a tree of its own is pushed down
+// each such *marked* leaf is built again, as a task of the first level of a build. An object that has a tree of its own is pushed down
 // the static one as a tree, many triangles at once. src/kdtree/merge/mod.rs records the phases, src/kdtree/host/marked.rs is the
 // twin, bit for bit, of both ways.
 //
@@ -115,7 +115,7 @@ void places_below(Place place, KdNode node, out Place left, out Place right) {
     right.depth = place.depth + 1u;
 }
 
-// Of a tile, among the records of objects; none has any where there is no room for all.
+// Of a tile, among the records of objects. None has any if there is not room for all.
 uint first_record_of(uint tile) {
     return min(chunk_sides().side[tile].x, build_state().active_count);
 }

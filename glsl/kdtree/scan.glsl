@@ -7,7 +7,7 @@
 
 // ---- chunks ----
 
-// Makes of so many pairs, from one on, the sums of those before, and returns the sum of all.
+// Replaces a number of pairs, from one on, by the sums of those before. Returns the sum of all.
 uvec2 scan_pairs(KdSides pairs, uint begin, uint end) {
     uvec2 sum = uvec2(0);
     for (uint base = begin; base < end; base += gl_WorkGroupSize.x) {
@@ -108,7 +108,7 @@ Sums no_sums() {
     return Sums(0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
 }
 
-// Adds a task of so many references, of the next level, if it has any.
+// Adds a task of the next level with this many references, if there are any.
 void add_task(inout Sums sums, uint count, uint depth) {
     sums.tasks += count > 0u ? 1u : 0u;
     sums.chunks += chunks_of_task(count);
@@ -176,7 +176,7 @@ void kd_sum_tile(uint tile, uint of_level) {
     if (gl_LocalInvocationIndex == 0u) task_tiles().tile[tile] = sums;
 }
 
-// Makes of so many words, a stride apart, the sums of those before; the sum of all lies behind.
+// Replaces words, a stride apart, by the sums of those before. The sum of all lies behind.
 void scan_words(Words words, uint first, uint stride, uint count) {
     uint sum = 0;
     for (uint base = 0; base < count; base += gl_WorkGroupSize.x) {
@@ -187,7 +187,7 @@ void scan_words(Words words, uint first, uint stride, uint count) {
     if (gl_LocalInvocationIndex == 0u) words.word[first + stride * count] = sum;
 }
 
-// Makes of the sums of so many tiles those of all tiles before, and returns those of all.
+// Replaces the sums of tiles by those of all tiles before. Returns the sums of all.
 Sums scan_tiles(uint tiles) {
     const uint WORDS = SUMS_BYTES / 4u;
     // The address is loaded before the loop. Mesa 26's lavapipe runs the loads of a loop even if no lane is in it, and then loaded this
@@ -199,7 +199,7 @@ Sums scan_tiles(uint tiles) {
     return sums.tile[tiles];
 }
 
-// Whether there is room for what a level makes, and so many references in the next; notes what was needed. By one invocation.
+// Whether there is room for what a level makes, and for this many references in the next. Records what was needed. By one invocation.
 bool has_room(uint of_level, Sums sums, uint references) {
     KdState state = build_state();
     uint with_parts = state.level_references[of_level] + state.straddling[of_level];
@@ -244,7 +244,7 @@ void kd_end_level(uint of_level) {
     uvec2 sides = chunks > 0u ? sides_before(chunks) : uvec2(0);
     uint references = sides.x + sides.y;
     bool fits = has_room(of_level, sums, references);
-    // Where there is no room for the next level, there is none: what would have been split are leaves.
+    // Without room for the next level there is none: what would have been split becomes leaves.
     if (references > 0u && !fits) {
         state.status |= STATUS_OUT_OF_ROOM;
         state.ended = of_level + 1u;

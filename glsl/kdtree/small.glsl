@@ -124,7 +124,7 @@ KdPlane best_of_faces(uint set, uint count, Box cell, float area_scale) {
     // However many the subgroup really has: all are active here.
     uint lanes = subgroupBallotBitCount(subgroupBallot(true)), base = 0;
     do {
-        // Who has none looks at the last one's again.
+        // A lane without one looks at the last one again.
         Box own = box_of(set, min(base + gl_LocalInvocationIndex, count - 1u));
         consider_faces(best, lanes, set, count, 0u, own.lo.x, own.hi.x, cell, area_scale);
         consider_faces(best, lanes, set, count, 1u, own.lo.y, own.hi.y, cell, area_scale);
@@ -223,7 +223,7 @@ void load_references(uint set, KdReferences from, uint begin, uint count) {
     barrier();
 }
 
-// Writes the subtree to where others wait too; where there is no room, its root is a leaf.
+// Writes the subtree beside others that wait. Without room, its root becomes a leaf.
 void write_subtree(uint s, KdTask t, KdReferences level_references, KdStack stack, uvec3 tallies, uint nodes, uint references, uint depth) {
     KdState state = build_state();
     KdSubtrees subtrees = all_subtrees();

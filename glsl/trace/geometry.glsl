@@ -1,4 +1,4 @@
-// Which geometry a primitive is of, for whoever traces a structure.
+// Which geometry a primitive is of, for shaders that trace a structure.
 #ifndef HEDGEROW_TRACE_GEOMETRY
 #define HEDGEROW_TRACE_GEOMETRY
 #include "bvh/layout.glsl"

@@ -7,13 +7,13 @@
 //
 // A shader that defines HEDGEROW_KD_CAPACITY and HEDGEROW_KD_PUSH_DOWN before has another traversal than a full stack
 // (trace/walk_kd.glsl): a short stack of up to 8 cells lies in registers and is faster. One that traces several rays of a tree makes a
-// HedgerowKdTree once, by hedgerow_kd_tree(address). Primitives count through all geometries: hedgerowKdTreeGeometry tells which.
+// HedgerowKdTree once, by hedgerow_kd_tree(address). Primitives count through all geometries: hedgerowKdTreeGeometry returns which.
 //
 // reads   the structure: the caller places a barrier behind its build (shader write -> shader read)
 // needs   the features of gpu::requirements(); no descriptors, no shared memory, any subgroup size
 //
 // A triangle is hit when t_min < t < t_max; of equally near ones the lower primitive. A walk ends for every input: rays that are no
-// rays (NaN, infinite, no direction) hit nothing, and so does what is no kd-tree, is empty or cannot be used by its status.
+// rays (NaN, infinite, no direction) hit nothing, and nothing is hit in memory that holds no kd-tree, or an empty one, or one whose status says that it is unusable.
 #ifndef HEDGEROW_TRACE_KD_TREE
 #define HEDGEROW_TRACE_KD_TREE
 
@@ -45,7 +45,7 @@ HedgerowHit hedgerow_kd_trace(HedgerowKdTree tree, HedgerowRay ray, bool any_hit
     return walk.hit;
 }
 
-// The nearest hit; `primitive` is HEDGEROW_NONE where there is none.
+// The nearest hit; `primitive` is HEDGEROW_NONE without one.
 HedgerowHit hedgerowKdTreeClosestHit(uvec2 structure, vec3 origin, float t_min, vec3 direction, float t_max) {
     return hedgerow_kd_trace(hedgerow_kd_tree(structure), HedgerowRay(origin, t_min, direction, t_max), false);
 }

@@ -6,7 +6,7 @@
 //     HedgerowRayQuery query;
 //     hedgerowRayQueryInitialize(query, hedgerowAccelerationStructure(address), hedgerowRayFlagsOpaque, 0xff,
 //                                origin, t_min, direction, t_max);
-//     while (hedgerowRayQueryProceed(query)) { … }             // the candidates that are to be decided on
+//     while (hedgerowRayQueryProceed(query)) { … }             // candidates that the shader decides on
 //     if (hedgerowRayQueryGetIntersectionType(query, true) == hedgerowRayQueryCommittedIntersectionTriangle)
 //         t = hedgerowRayQueryGetIntersectionT(query, true);
 //

@@ -322,7 +322,7 @@ bool hedgerow_is_culled(HedgerowRayQuery query, bool is_opaque) {
     return (query.flags & (is_opaque ? hedgerowRayFlagsCullOpaque : hedgerowRayFlagsCullNoOpaque)) != 0u;
 }
 
-// The next triangle of the leaf; true if it is a candidate that is to be decided on.
+// The next triangle of the leaf; true if it is a candidate that the shader must decide on.
 bool hedgerow_test_triangle(inout HedgerowRayQuery query, uint at) {
     Triangle triangle = Triangles(records_at(query.structure, query.slots)).triangle[at];
     vec3 met;

@@ -22,7 +22,7 @@ const bool HEDGEROW_KD_FULL = HEDGEROW_KD_CAPACITY >= KD_MAX_DEPTH;
 // In place of the triangles that are left of a leaf: nothing at hand, take what waits.
 const uint HEDGEROW_KD_NOTHING = 0xffffffffu;
 
-// A stack of up to so many cells lies in registers, each cell in one of its own and moved on when another comes before it: no memory
+// A stack of few cells lies in registers, each cell in one of its own and moved on when another comes before it: no memory
 // is indexed, which CPUs do lane by lane (short-4 takes 0.6 to 0.7 of the time so). A larger one is a ring in private memory, which
 // lavapipe indexes a little faster than shared memory.
 const uint HEDGEROW_KD_REGISTERS = 8;
@@ -81,7 +81,7 @@ struct HedgerowKdWalk {
     uvec3 work;
 };
 
-// Where `puts` says so it waits; where there is no room, in place of what has waited longest.
+// If `puts`, the cell waits on the stack; if the stack is full, in place of the cell that has waited longest.
 void hedgerow_kd_put(bool puts, uint node, float t_in, float t_out, float others, inout HedgerowKdWalk walk) {
     if (HEDGEROW_KD_CAPACITY == 0u) return;
     uvec4 entry = uvec4(node, floatBitsToUint(t_in), floatBitsToUint(t_out), floatBitsToUint(others));

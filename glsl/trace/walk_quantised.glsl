@@ -2,7 +2,7 @@
 //
 // As Ylitie, Karras and Laine (2017, section 4) do: the children of a node that are nodes and that the ray enters are a group,
 // met from near to far by counting slots in the order of the ray's octant; what is left of a group waits as one entry. The
-// leaves that the ray enters come first. Other than there, an entry tells where the ray enters the nearest of the nodes that
+// leaves that the ray enters come first. Unlike there, an entry holds where the ray enters the nearest of the nodes that
 // wait, in the leading half of a float; a group that is farther than the best hit by then is left out.
 #ifndef HEDGEROW_TRACE_WALK_QUANTISED
 #define HEDGEROW_TRACE_WALK_QUANTISED
@@ -16,7 +16,7 @@ struct QuantisedWalk {
     HedgerowPreparedRay ray;
     // Bits of the axes in which the ray goes down.
     uint octant;
-    // The group at hand: its first node, which slots are nodes, and which places, in the order of the octant, are to be visited.
+    // The group at hand: its first node, which slots are nodes, and which places, in the order of the octant, must be visited.
     uint first_child;
     uint nodes;
     uint visits;

@@ -29,13 +29,13 @@ const KNOWN_FLAGS: Flags = Flags::from_raw(
         | REBRAID.as_raw(),
 );
 
-/// Where the numbers of primitives are told.
+/// Where the numbers of primitives come from.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Counts {
     /// In the recording; the geometries are of their ranges.
     OnHost,
-    /// In device memory, `VkAccelerationStructureBuildRangeInfoKHR` so many bytes apart; the geometries begin where the caller's
-    /// do, and their `first` is the most primitives that each may have.
+    /// In device memory, `VkAccelerationStructureBuildRangeInfoKHR` with this stride in bytes; the geometries begin where the
+    /// caller's do, and their `first` is the most primitives that each may have.
     OnDevice { address: u64, stride: u32 },
 }
 
@@ -284,7 +284,7 @@ pub(super) unsafe fn told(
     Ok((BuildGeometries::new(info.ty, &geometries, ranges, &firsts)?, count))
 }
 
-/// The geometries that `info` gives, at most so many primitives each, whose ranges are not known.
+/// The geometries of `info` with at most this many primitives each. Their ranges are not known.
 ///
 /// # Safety
 /// The pointers of `info` are valid.

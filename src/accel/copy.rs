@@ -18,8 +18,8 @@ impl Device<'_> {
     /// `vkCmdCopyAccelerationStructureKHR`: `CLONE` copies the bytes; `COMPACT` leaves out the node slots and records that the
     /// tree does not use, which takes [`Property::CompactedSize`](super::Property::CompactedSize) bytes.
     ///
-    /// Nothing is to be asked for at the build: every structure can be compacted. A top level names what lies below it by
-    /// address: one over copies is to be built anew.
+    /// No build flag is needed: every structure can be compacted. A top level names the structures below it by address, so
+    /// build it again over their copies.
     ///
     /// # Errors
     /// Another mode; a handle is null; the two are the same. Nothing is recorded then.

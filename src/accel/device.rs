@@ -13,7 +13,7 @@ use ash::vk;
 use ash::vk::Handle;
 use std::sync::Arc;
 
-/// What the offset of a structure in its buffer must be a multiple of, as Vulkan demands it.
+/// The offset of a structure in its buffer must be a multiple of this, as Vulkan requires.
 pub const STRUCTURE_ALIGNMENT: u64 = 256;
 
 type Flags = vk::BuildAccelerationStructureFlagsKHR;
@@ -165,7 +165,7 @@ impl<'a> Device<'a> {
     /// build i in device memory from `indirect_device_addresses[i]` on, `indirect_strides[i]` bytes apart.
     ///
     /// # Errors
-    /// As there; a stride is no multiple of 4.
+    /// As there; a stride is not a multiple of 4.
     ///
     /// # Safety
     /// As there; the ranges are there when it runs. A count over its maximum is taken as the maximum.
@@ -282,8 +282,8 @@ impl<'a> Device<'a> {
         self.record_placed(&mut recorder, &builds)
     }
 
-    /// Makes the pipelines of these builds now, and of their updates if the flags allow updates. Recording the same later, for the same
-    /// number of primitives, makes no pipeline any more. Addresses are not read.
+    /// Makes the pipelines of these builds now, and of their updates if the flags allow updates. Recording the same later, for
+    /// the same number of primitives, makes no pipeline any more. Addresses are not read.
     ///
     /// # Errors
     /// A request that cannot be built; a pipeline could not be made.

@@ -15,7 +15,7 @@ impl Device<'_> {
     /// `vkBuildAccelerationStructuresKHR`, but for where the structures go: the bytes of build i, those that a device's build of
     /// the same input writes, into `memory[i]`, to be copied to where the structure shall lie. Handles and scratch memory are
     /// not looked at. The host's builder is the plain one that the device's is tested with: one thread, no deferred operations.
-    /// Top levels are built by [`twin`](super::twin), which is told what lies below them.
+    /// Top levels are built by [`twin`](super::twin), which takes what lies below them.
     ///
     /// # Errors
     /// As [`Device::cmd_build_acceleration_structures`]; a build of instances, or an update; too little memory.

@@ -44,7 +44,7 @@ impl Instance {
 pub(super) const ENTRY_BYTES: u64 = 48;
 
 /// Writes `capacity` entries, those from `count` on without an instance. `ranges`, if not 0, is the address of the range in
-/// device memory that tells how many instances there are, and where they begin behind `instances`.
+/// device memory that has the number of instances, and where they begin behind `instances`.
 pub(super) fn entries_step(
     context: &Context,
     instances: u64,

@@ -52,15 +52,16 @@ pub use request::{Placement, Request};
 use ash::vk;
 use rebraid::Rebraid;
 
-/// A build flag of ours: a top level may open instances (Benthin, Woop, Wald 2017), within [`AccelOptions::rebraid_budget`].
+/// A build flag of hedgerow's own: a top level may open instances (Benthin, Woop, Wald 2017), within
+/// [`AccelOptions::rebraid_budget`].
 pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAccelerationStructureFlagsKHR::from_raw(1 << 30);
 
-/// What a [`Device`] does beside what the structs say.
+/// Choices of a [`Device`] that Vulkan's structs have no field for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AccelOptions {
     /// Entries of a top level that is built with [`REBRAID`], as a multiple of its instances: at least 1.
     pub rebraid_budget: f32,
-    /// Whether calls look at what takes memory of what was created and built, as Vulkan's validation would: memory that is too
+    /// Whether calls are checked against what was created and built, as Vulkan's validation would: memory that is too
     /// small or overlaps, misaligned data, updates without the flag or of changed counts. They return an error before anything
     /// is recorded. Structures must then be created, built and destroyed through this device and its clones. For debugging:
     /// each call takes a lock.
@@ -73,7 +74,7 @@ impl AccelOptions {
     /// The same with checks.
     pub const CHECKED: AccelOptions = AccelOptions { checked: true, ..AccelOptions::DEFAULT };
 
-    /// The opening of a top level of so many instances.
+    /// How a top level of this many instances is opened.
     fn rebraid(&self, instance_count: u32) -> Rebraid {
         // What is too much is refused by the builder.
         let capacity = (f64::from(instance_count) * f64::from(self.rebraid_budget.max(1.0))).ceil() as u32;

@@ -7,7 +7,7 @@ use crate::gpu::{Kernel, Recorder, shaders};
 use crate::{Error, Result};
 use ash::vk;
 
-/// What can be asked of a structure.
+/// A property of a structure that the device can report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum Property {
@@ -24,7 +24,7 @@ pub enum Property {
     /// The bits of an `f32`: the SAH cost ([`Header::sah`](crate::bvh::layout::Header::sah)).
     Sah = 5,
     /// The bits of an `f32`: how many times the SAH cost is what it was at the last build
-    /// ([`Header::sah_growth`](crate::bvh::layout::Header::sah_growth)); when updates have made it large, it is time to build anew.
+    /// ([`Header::sah_growth`](crate::bvh::layout::Header::sah_growth)); when updates have made it large, build again.
     SahGrowth = 6,
     /// Bits of [`status`](crate::bvh::layout::status): zero is a structure without a blemish.
     Status = 7,

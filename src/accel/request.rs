@@ -21,7 +21,7 @@ use crate::bvh::geometry::Geometry;
 use crate::gpu::{Region, Sizes};
 use ash::vk;
 
-/// A structure that is to be built.
+/// What to build: geometries or instances, and flags.
 #[derive(Debug, Clone)]
 pub struct Request {
     pub(super) given: BuildGeometries,
@@ -32,11 +32,11 @@ pub struct Request {
 /// A request with its memory, of [`Request::sizes`].
 #[derive(Debug, Clone, Copy)]
 pub struct Placement<'a> {
-    /// What is built.
+    /// What to build.
     pub request: &'a Request,
-    /// Where.
+    /// Memory for the structure.
     pub structure: Region,
-    /// With which scratch memory.
+    /// Scratch memory.
     pub scratch: Region,
 }
 
@@ -67,12 +67,12 @@ impl Request {
         Request { given, primitive_count, flags: vk::BuildAccelerationStructureFlagsKHR::empty() }
     }
 
-    /// With build flags.
+    /// The same request with these build flags.
     pub fn with_flags(self, flags: vk::BuildAccelerationStructureFlagsKHR) -> Request {
         Request { flags, ..self }
     }
 
-    /// Bytes that it needs.
+    /// The memory that the build needs.
     ///
     /// # Errors
     /// Unknown flags, or two that exclude each other; too many primitives.

@@ -6,9 +6,9 @@
 //! | handles: of a top level, the addresses of the structures below it, one a record, in the order of the records | 8 each |
 //! | the structure ([`crate::bvh::layout`]) | [`Head::structure_bytes`] |
 //!
-//! Who reads a top level back writes the addresses that the structures below it have by then in place of the handles; the handle
-//! of an instance that was left out is 0 and stays so. Those structures must be the same to the byte, read back or cloned: an
-//! instance also names the node to begin at (`Instance::start`), which compacting moves.
+//! Before a top level is read back, the caller replaces the handles by the addresses that the structures below it have by then;
+//! the handle of an instance that was left out is 0 and stays so. Those structures must be the same to the byte, read back or
+//! cloned: an instance also names the node to begin at (`Instance::start`), which compacting moves.
 
 use super::Device;
 use super::given::{aligned, not_null};
@@ -21,7 +21,7 @@ use bytemuck::{Pod, Zeroable};
 use std::mem::offset_of;
 use std::ops::Range;
 
-/// Who wrote it: this library, on whichever device. The first half of [`VERSION`].
+/// The writer: this library, on any device. The first half of [`VERSION`].
 pub const DRIVER_UUID: [u8; vk::UUID_SIZE] = *b"hedgerow, Vulkan";
 /// By which version of the layout. The second half of [`VERSION`].
 pub const COMPATIBILITY_UUID: [u8; vk::UUID_SIZE] = {
@@ -85,7 +85,7 @@ impl arguments::Serialize {
 
 impl Device<'_> {
     /// `vkCmdCopyAccelerationStructureToMemoryKHR`: serialises a structure into as many bytes as
-    /// [`Property::SerializedSize`](super::Property::SerializedSize) tells, in the [layout](self) of Vulkan.
+    /// [`Property::SerializedSize`](super::Property::SerializedSize) gives, in the [layout](self) of Vulkan.
     ///
     /// # Errors
     /// Another mode; the structure is null; the address is not a multiple of [`ALIGNMENT`]. Nothing is recorded then.
@@ -117,7 +117,7 @@ impl Device<'_> {
 
     /// `vkCmdCopyMemoryToAccelerationStructureKHR`: the structure that was serialised, with the handles that stand in the memory
     /// now. What another version wrote becomes an empty structure whose status is
-    /// [`WRONG_VERSION`](layout::status::WRONG_VERSION); [`get_device_acceleration_structure_compatibility`] tells before.
+    /// [`WRONG_VERSION`](layout::status::WRONG_VERSION); [`get_device_acceleration_structure_compatibility`] finds that out before.
     ///
     /// [`get_device_acceleration_structure_compatibility`]: Device::get_device_acceleration_structure_compatibility
     ///

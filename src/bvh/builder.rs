@@ -1,7 +1,7 @@
 //! Trees over triangles, boxes or instances, built on the device in the caller's command buffer and memory.
 //!
-//! [`Builder::sizes`] tells the memory, [`Builder::record`] records the build. What all methods begin with is in `encode.rs`;
-//! each [`Method`] has a file of its own, and a twin in [`super::twin`] with the same bytes.
+//! [`Builder::sizes`] gives the memory that a build needs, [`Builder::record`] records the build. What all methods begin with
+//! is in `encode.rs`; each [`Method`] has a file of its own, and a twin in [`super::twin`] with the same bytes.
 
 use super::codes::{Code, Codes};
 use super::encode::Encode;
@@ -23,28 +23,28 @@ use crate::{Error, Result};
 /// What to build, beside the primitives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BuildOptions {
-    /// How the tree is made.
+    /// The method that makes the tree.
     pub method: Method,
     /// The codes; `None` lets [`Codes::for_count`] choose them from the number of primitives.
     pub codes: Option<Codes>,
-    /// Whether large triangles are split into several references before all else, and how much.
+    /// Splitting of large triangles into several references, before everything else; `None` splits none.
     pub split: Option<split::SplitOptions>,
-    /// Rounds of reinsertion behind it, which take time and give a better tree.
+    /// Rounds of reinsertion after the method: they take time and give a better tree.
     pub optimise: Option<reinsertion::ReinsertionOptions>,
-    /// Whether subtrees become leaves where that is cheaper.
+    /// Whether a subtree becomes a leaf if that is cheaper.
     pub collapse: Collapse,
-    /// How the phases are recorded; `None` takes what measured faster on this kind of device and size.
+    /// How the phases are recorded; `None` takes the schedule that measured faster on such a device with this number of primitives.
     pub schedule: Option<Schedule>,
-    /// What it is built over.
+    /// What the tree is built over.
     pub primitives: Primitives,
-    /// How many geometries: what [`Source::Several`] has, otherwise 1.
+    /// The number of geometries: the count of [`Source::Several`], or 1.
     pub geometry_count: u32,
     /// `vk::BuildAccelerationStructureFlagsKHR` for the header, at most 6 bits.
     pub build_flags: u32,
 }
 
 impl BuildOptions {
-    /// The LBVH of one geometry of triangles, everything chosen from the scene and the device; leaves collapsed by SAH.
+    /// An LBVH over one geometry of triangles. The rest follows from the scene and the device; SAH collapses leaves.
     pub const DEFAULT: BuildOptions = BuildOptions {
         method: Method::Lbvh,
         codes: None,
@@ -78,12 +78,12 @@ impl BuildOptions {
 /// How the phases of a build are recorded. The result is the same bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Schedule {
-    /// A dispatch a phase, with barriers between: needs nothing of the device.
+    /// One dispatch per phase, with barriers between. Works on every device.
     Chain,
-    /// One persistent dispatch that draws tasks from a pool; needs a device whose started workgroups go on.
+    /// One persistent dispatch that draws tasks from a pool. The device must keep running workgroups that it has started.
     Persistent,
-    /// One workgroup does everything, in one dispatch: for few primitives, at most [`Builder::WORKGROUP_MAX`]. Of
-    /// [`Method::Lbvh`] alone.
+    /// One workgroup builds everything in one dispatch: for few primitives, at most [`Builder::WORKGROUP_MAX`]. Only
+    /// [`Method::Lbvh`] has it.
     Workgroup,
 }
 
@@ -97,7 +97,7 @@ impl std::fmt::Display for Schedule {
     }
 }
 
-/// The builder, specialised for one device, its options and a number of primitives.
+/// Builds structures over a number of primitives, on one device, with given options.
 #[derive(Debug, Clone)]
 pub struct Builder {
     method: Method,
@@ -109,7 +109,7 @@ pub struct Builder {
     pub(super) encode: Encode,
 }
 
-/// A build with all that it is recorded with.
+/// A builder with its input and memory, ready to be recorded.
 #[derive(Debug, Clone, Copy)]
 pub struct BuildJob<'a> {
     /// The builder.
@@ -133,11 +133,11 @@ impl BuildJob<'_> {
 }
 
 impl Codes {
-    /// The codes that a tree of `primitive_count` triangles needs: about a thousand times as many cells as triangles, in whole passes of
-    /// the sort. On scenes of 66k to 1.4M triangles that is 32 bits, and the SAH cost is within 0.6% of that with
-    /// all 64; 24 bits would cost 1.3% at 111k triangles and 7.8% at 871k. Methods that look at boxes themselves need no bits for the
-    /// size; without them, over thirteen scenes, the trees of PLOC and H-PLOC cost the same within 0.1%, and those of HLBVH 1.3% less
-    /// for 1.4 times the build.
+    /// The codes that a tree of `primitive_count` triangles needs: about a thousand times as many cells as triangles, in whole
+    /// passes of the sort. On scenes of 66k to 1.4M triangles that is 32 bits, and the SAH cost is within 0.6% of that with all
+    /// 64; 24 bits would cost 1.3% at 111k triangles and 7.8% at 871k. Methods that look at boxes themselves need no bits for
+    /// the size; without them, over thirteen scenes, the trees of PLOC and H-PLOC cost the same within 0.1%, and those of HLBVH
+    /// 1.3% less for 1.4 times the build.
     pub fn for_count(primitive_count: u32) -> Codes {
         // Bits of an index, whatever the count: what is too much is refused, not computed with.
         let bits = 32 - (primitive_count.max(2) - 1).leading_zeros() + 10;
@@ -150,13 +150,14 @@ impl Codes {
 const SHARED_BY_ALL: u32 = 4096;
 
 impl Builder {
-    /// Primitives that [`Schedule::Workgroup`] takes at most.
+    /// The most primitives that [`Schedule::Workgroup`] takes.
     pub const WORKGROUP_MAX: u32 = 1 << 16;
 
     /// A builder of `primitive_count` primitives on the device of `context`.
     ///
     /// # Errors
-    /// More primitives than a build can take; a schedule that the method has not; splitting of what is no triangle.
+    /// More primitives than a build can take; a schedule that the method does not have; splitting of primitives that are not
+    /// triangles.
     pub fn new(context: &Context, options: &BuildOptions, primitive_count: u32) -> Result<Builder> {
         if primitive_count > radix_sort::MAX_COUNT {
             return Err(Error::Argument(format!(
@@ -230,27 +231,27 @@ impl Builder {
         Ok(Builder { method, schedule, optimise, workers: tuning.workers, merging, encode })
     }
 
-    /// The method: of fewer than two primitives [`Method::Lbvh`], whatever was asked for.
+    /// The method that is used: with fewer than two primitives always [`Method::Lbvh`].
     pub fn method(&self) -> Method {
         self.method
     }
 
-    /// The codes that are used: the choice where none was given.
+    /// The codes that are used: those of the options, or the builder's choice.
     pub fn codes(&self) -> Codes {
         self.encode.codes
     }
 
-    /// Primitives that it is for.
+    /// The number of primitives that it builds over.
     pub fn count(&self) -> u32 {
         self.encode.split.map_or(self.encode.count, |split| split.primitives)
     }
 
-    /// Records that the structure has room for: as many as primitives, or with splits as the references that these may become.
+    /// Records that the structure has room for: one per primitive, or per reference that splitting may make.
     pub fn record_count(&self) -> u32 {
         self.encode.count
     }
 
-    /// The schedule that is used: the choice where none was given.
+    /// The schedule that is used: that of the options, or the builder's choice.
     pub fn schedule(&self) -> Schedule {
         self.schedule
     }
@@ -260,7 +261,7 @@ impl Builder {
         self.sizes_with_table(self.encode.table_words())
     }
 
-    /// The same with a sort's table of so many words.
+    /// The same, with a sort's table of this many words.
     fn sizes_with_table(&self, table_words: u64) -> Sizes {
         Sizes { structure: self.layout().bytes, scratch: self.scratch(table_words).bytes(), alignment: 16 }
     }
@@ -324,18 +325,18 @@ impl Builder {
 
     /// Records the build of `input` into `structure`, with scratch memory, of the bytes and alignment of [`Builder::sizes`].
     ///
-    /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever
-    /// reads the structure, or writes the scratch memory) behind. Labels: `split`, `bounds`, `encode`, `sort`, `hierarchy`, `optimise`
-    /// and `collapse` where there are such phases; or `build` where the schedule is persistent.
+    /// Before, the caller makes the input visible to compute shaders. After, it places a barrier from compute shader writes to
+    /// whatever reads the structure or writes the scratch memory. Labels: `split`, `bounds`, `encode`, `sort`, `hierarchy`,
+    /// `optimise` and `collapse`, as far as the build has such phases; or `build` if the schedule is persistent.
     ///
     /// # Errors
-    /// The memory is too small; the input has another number of primitives than the builder; triangles are to be split of which each must be met once
-    /// ([`GeometryFlags::NO_DUPLICATES`](super::geometry::GeometryFlags)); a pipeline could not be made.
+    /// The memory is too small; the input has another number of primitives than the builder; the triangles would be split, but each
+    /// must be met once ([`GeometryFlags::NO_DUPLICATES`](super::geometry::GeometryFlags)); a pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: Region, scratch: Region) -> Result<()> {
         recorder.chains(&[self.steps(input, structure, scratch)?])
     }
 
-    /// What [`Builder::record`] records, to be recorded beside other builds by [`Recorder::chains`].
+    /// The steps of [`Builder::record`]. [`Recorder::chains`] records them side by side with other builds.
     ///
     /// # Errors
     /// As [`Builder::record`], pipelines aside.
@@ -344,7 +345,7 @@ impl Builder {
         Ok(chains.pop().unwrap_or_default())
     }
 
-    /// The chains of many builds, for [`Recorder::chains`]: one each, but for builds by one workgroup, of which two share a
+    /// The chains of many builds, for [`Recorder::chains`]: one per build, except that two builds by one workgroup each share a
     /// dispatch.
     ///
     /// # Errors

@@ -80,7 +80,7 @@ impl Encode {
         self.tiles_of(self.count)
     }
 
-    /// Workgroups of a phase that goes over so many.
+    /// Workgroups of a phase over this many items.
     pub fn tiles_of(&self, count: u32) -> u32 {
         count.div_ceil(self.shape.workgroup * self.items)
     }

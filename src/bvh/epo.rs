@@ -37,7 +37,7 @@ impl OverlapFigures {
 /// Sums that one invocation adds: 64 in `glsl/bvh/epo/sum.comp`.
 const ADDED: u32 = 64;
 
-/// Measuring a `Bvh2` of so many triangles on the device.
+/// Measures the end-point overlap of a `Bvh2` on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OverlapPass {
     slots: u32,
@@ -70,8 +70,8 @@ impl OverlapPass {
         4 * (u64::from(self.slots) + u64::from(self.records)) + 12 * u64::from(sums)
     }
 
-    /// Records all of it: [`OverlapPass::begin`], [`OverlapPass::overlaps`] of all records, [`OverlapPass::end`]. The caller places a
-    /// barrier before and one behind.
+    /// Records all of it: [`OverlapPass::begin`], [`OverlapPass::overlaps`] of all records, [`OverlapPass::end`]. The caller
+    /// places a barrier before and one behind.
     ///
     /// # Errors
     /// A pipeline could not be made.

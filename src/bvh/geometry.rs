@@ -18,15 +18,15 @@ pub struct Geometry {
     pub transform: u64,
     /// Bytes from one vertex to the next, a multiple of the size of a component.
     pub vertex_stride: u32,
-    /// Vertices there are. Triangles that name others are left out.
+    /// The number of vertices. Triangles whose indices are out of range are left out.
     pub vertex_count: u32,
     /// The vertices' format.
     pub vertex_format: VertexFormat,
     /// The indices' format.
     pub index_format: IndexFormat,
-    /// What a ray meets of it.
+    /// How rays meet it.
     pub flags: GeometryFlags,
-    /// Its first primitive index: how many primitives the geometries before it have.
+    /// The index of its first primitive: the number of primitives in the geometries before it.
     pub first: u32,
 }
 
@@ -166,13 +166,13 @@ impl TryFrom<vk::IndexType> for IndexFormat {
     }
 }
 
-/// What a ray meets of a geometry.
+/// How rays meet a geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct GeometryFlags(u8);
 
 impl GeometryFlags {
-    /// Every meeting is asked of the shader.
+    /// The shader decides on every meeting.
     pub const NONE: GeometryFlags = GeometryFlags(0);
     /// Every meeting is a hit.
     pub const OPAQUE: GeometryFlags = GeometryFlags(super::layout::GEOMETRY_OPAQUE as u8);
@@ -182,7 +182,7 @@ impl GeometryFlags {
     /// The record that ends the others: primitives from its `first` on are inactive.
     pub const END: GeometryFlags = GeometryFlags(1 << 7);
 
-    /// The flags as the structure has them.
+    /// The bits of the flags in a structure.
     pub fn bits(self) -> u32 {
         self.0.into()
     }

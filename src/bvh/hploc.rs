@@ -9,10 +9,10 @@ use super::method::Hierarchy;
 use super::scratch::{BuildPhase, Scratch};
 use crate::gpu::{Context, Kernel, Step, arguments, shaders};
 
-/// What [`Method::Hploc`](super::builder::Method::Hploc) looks at.
+/// The clusters that [`Method::Hploc`](super::builder::Method::Hploc) merges at a time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Window {
-    /// Clusters that are merged at a time: half of them from each side. Even, 4 to [`Window::MOST`].
+    /// Clusters of a window: half of them from each side. Even, 4 to [`Window::MOST`].
     pub size: u32,
     /// Neighbours on either side that a cluster looks at, 1 or more.
     pub radius: u32,
@@ -21,14 +21,14 @@ pub struct Window {
 impl Window {
     /// The most clusters of a window.
     pub const MOST: u32 = 64;
-    /// Each cluster looks at all others: what an invocation merges by itself. Over eleven scenes trees cost 1.047 times a full
-    /// sweep's, with [`Window::PAPER`] 1.013, in more than twice the time on lavapipe.
+    /// Each cluster looks at all others, so that one invocation can merge a window by itself. Over eleven scenes trees cost 1.047
+    /// times a full sweep's. With [`Window::PAPER`] they cost 1.013 times that, and take more than twice the time on lavapipe.
     pub const DEFAULT: Window = Window { size: 8, radius: 8 };
-    /// What Benthin et al. have: a subgroup of a GPU.
+    /// The window of Benthin et al.: a subgroup of a GPU.
     pub const PAPER: Window = Window { size: 32, radius: 8 };
 }
 
-/// Who merges a window. The tree is the same bytes whoever does.
+/// How a window is merged. Each way gives the same bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Merging {
     window: Window,

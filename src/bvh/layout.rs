@@ -32,7 +32,7 @@ pub const MAX_DEPTH: u32 = 96;
 /// 64 units of rounding, ε = 2⁻²⁴ each ([`crate::trace::slab`]).
 pub const SLACK: f32 = f32::from_bits((127 - 18) << 23);
 
-/// Bits of [`Header::status`]. Zero is a structure without a blemish.
+/// Bits of [`Header::status`]. Zero: nothing is wrong.
 pub mod status {
     /// A primitive with NaN or infinite vertices was left out.
     pub const NON_FINITE: u32 = 1 << 0;
@@ -42,13 +42,14 @@ pub mod status {
     pub const TOO_DEEP: u32 = 1 << 2;
     /// A bounded spin ran out: the structure is not usable.
     pub const SPIN_RAN_OUT: u32 = 1 << 3;
-    /// An instance was left out: its matrix has no inverse, or it names what is no bottom-level structure.
+    /// An instance was left out: its matrix has no inverse, or it does not name a bottom-level structure.
     pub const BAD_INSTANCE: u32 = 1 << 4;
     /// Deserialised from what another version wrote: the structure is not usable.
     pub const WRONG_VERSION: u32 = 1 << 5;
     /// Subtrees at [`super::MAX_DEPTH`] became leaves: rays that come there test more than they should.
     pub const DEPTH_LIMITED: u32 = 1 << 6;
-    /// Nodes of a kd-tree became leaves, as there was no room for what is below them: rays that come there test more than they should.
+    /// Nodes of a kd-tree became leaves, as there was no room for what is below them: rays that come there test more than they
+    /// should.
     pub const OUT_OF_ROOM: u32 = 1 << 7;
     /// Bits of structures that cannot be traced: tracers take them as empty.
     pub const UNUSABLE: u32 = TOO_DEEP | SPIN_RAN_OUT | WRONG_VERSION;
@@ -71,7 +72,7 @@ pub mod status {
     }
 }
 
-/// What a node says of one child: its box and where it is. 32 bytes.
+/// A child of a node: its box and where it is. 32 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Child {
@@ -86,7 +87,7 @@ pub struct Child {
 }
 
 impl Child {
-    /// A child of an unused slot: a leaf of nothing.
+    /// A child of an unused slot: an empty leaf.
     pub const UNUSED: Child = Child { lo: Aabb::EMPTY.lo, index: u32::MAX, hi: Aabb::EMPTY.hi, count: UNUSED };
 
     /// The child's box.
@@ -109,7 +110,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// A slot that names nothing.
+    /// A slot that no node uses.
     pub const UNUSED: Node = Node { children: [Child::UNUSED; 2] };
 
     /// Whether a child names the slot.
@@ -126,10 +127,10 @@ pub trait Record: Pod + PartialEq + std::fmt::Debug {
     /// Position in the input.
     fn primitive(&self) -> u32;
 
-    /// The box around it, if it can be told without other structures.
+    /// The box around it, if no other structure is needed to find it.
     fn bounds(&self) -> Option<Aabb>;
 
-    /// The corners of a triangle; of what is none, nothing.
+    /// The corners, if it is a triangle.
     fn corners(&self) -> Option<[[f32; 3]; 3]> {
         None
     }
@@ -180,7 +181,7 @@ impl Record for Triangle {
     }
 }
 
-/// A box that stands for something that the caller's shaders know, in the primitive order. 28 bytes.
+/// A box around something that the caller's shaders intersect, in the primitive order. 28 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct BoxRecord {
@@ -340,12 +341,12 @@ pub struct BvhOffsets {
     pub bytes: u64,
 }
 
-/// The sizes of a structure of so many records of `record_bytes` bytes with the most nodes that they can need.
+/// The sizes of a structure of this many records of `record_bytes` bytes, with the most nodes that they can need.
 pub const fn offsets(record_bytes: u64, primitive_count: u32, geometry_count: u32) -> BvhOffsets {
     offsets_with(record_bytes, node_slots(primitive_count), primitive_count, geometry_count)
 }
 
-/// The sizes of a structure of so many node slots, records of `record_bytes` bytes, and geometries.
+/// The sizes of a structure of this many node slots, records of `record_bytes` bytes, and geometries.
 pub const fn offsets_with(record_bytes: u64, node_slots: u32, primitive_count: u32, geometry_count: u32) -> BvhOffsets {
     let records_offset = NODES_OFFSET + node_slots as u64 * size_of::<Node>() as u64;
     let geometries_offset = records_offset + primitive_count as u64 * record_bytes;
@@ -354,7 +355,7 @@ pub const fn offsets_with(record_bytes: u64, node_slots: u32, primitive_count: u
     BvhOffsets { records_offset, geometries_offset, bytes }
 }
 
-/// Bytes of a record of this [`Record::KIND`]; `None` where there is no such kind.
+/// Bytes of a record of this [`Record::KIND`]; `None` for an unknown kind.
 pub const fn record_bytes(kind: u32) -> Option<u64> {
     match kind {
         Triangle::KIND => Some(size_of::<Triangle>() as u64),

@@ -15,8 +15,8 @@ use crate::{Error, Result};
 pub enum Method {
     /// Linear BVH: split where the highest bit of the codes changes (Lauterbach et al. 2009). The fastest build.
     Lbvh,
-    /// Hierarchical LBVH (Pantaleoni and Luebke 2010): subtrees of the LBVH, *treelets*, under a top that the surface area heuristic
-    /// splits.
+    /// Hierarchical LBVH (Pantaleoni and Luebke 2010): subtrees of the LBVH, *treelets*, under a top that the surface area
+    /// heuristic splits.
     Hlbvh(Treelets),
     /// Parallel locally-ordered clustering (Meister and Bittner 2018): neighbours in the order, so many places away at most, are
     /// merged in rounds.

@@ -73,7 +73,7 @@ impl Kernels<'_> {
     }
 }
 
-/// Looks at so many neighbours on either side.
+/// Each cluster looks at this many neighbours on either side.
 pub(super) struct Ploc {
     pub radius: u32,
 }

@@ -1,6 +1,6 @@
 //! Quality of a tree: SAH cost, depth and leaf statistics, on the device and, plainly, on the host.
 //!
-//! `glsl/bvh/quality.glsl` is the device's side; it takes any `Bvh2`, whoever built it.
+//! `glsl/bvh/quality.glsl` is the device's side; it takes a `Bvh2` of any builder.
 
 use super::layout::node_slots;
 use crate::Result;
@@ -67,7 +67,7 @@ impl QualityFigures {
     }
 }
 
-/// Measuring a `Bvh2` of so many triangles on the device.
+/// Measures the quality of a `Bvh2` on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QualityPass {
     slots: u32,
@@ -93,8 +93,8 @@ impl QualityPass {
         4 * u64::from(self.slots) + u64::from(self.tiles()) * size_of::<QualityFigures>() as u64
     }
 
-    /// Records the measuring of the structure at address `structure` into the [`QualityFigures`] at `result`, with scratch memory of
-    /// [`QualityPass::scratch_bytes`]; all aligned to 16 bytes. The caller places a barrier before and one behind.
+    /// Records the measuring of the structure at address `structure` into the [`QualityFigures`] at `result`, with scratch
+    /// memory of [`QualityPass::scratch_bytes`]; all aligned to 16 bytes. The caller places a barrier before and one behind.
     ///
     /// # Errors
     /// The memory is too small; a pipeline could not be made.

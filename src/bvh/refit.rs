@@ -8,11 +8,11 @@
 //! Where those rules are broken, nothing is: a primitive that can no longer be met (NaN, an index out of range) sets its bit of
 //! the status, which stays, and is met by no ray until an update brings it back.
 //!
-//! [`Refit::scratch_bytes`] tells the memory, [`Refit::record`] records into the caller's command buffer. The structure may be compacted,
-//! and its slots lie in any order: each record names its primitive, and each node its children. Nearness in memory is worth
-//! time, however: an invocation refits a run of slots, and what lies in one needs no other.
-//! [`Header::sah_growth`](super::layout::Header::sah_growth) tells afterwards how much worse the tree has become, which is when to
-//! build anew. The twin is [`super::twin::refit`]: the same bytes.
+//! [`Refit::scratch_bytes`] gives the memory, [`Refit::record`] records into the caller's command buffer. The structure may be
+//! compacted, and its slots lie in any order: each record names its primitive, and each node its children. Nearness in memory
+//! is worth time, however: an invocation refits a run of slots, and what lies in one needs no other.
+//! [`Header::sah_growth`](super::layout::Header::sah_growth) says afterwards how much worse the tree has become, and so when to
+//! build again. The twin is [`super::twin::refit`]: the same bytes.
 
 use super::builder;
 use super::geometry::Planned;
@@ -73,7 +73,7 @@ pub enum RefitSchedule {
     Workgroup,
 }
 
-/// Refitting structures of so many primitives, specialised for one device.
+/// Refits structures of a given number of primitives on one device.
 #[derive(Debug, Clone)]
 pub struct Refit {
     planned: Planned,
@@ -83,10 +83,10 @@ pub struct Refit {
     run: u32,
 }
 
-/// A refit with all that it is recorded with.
+/// A refit with its input and memory, ready to be recorded.
 #[derive(Debug, Clone, Copy)]
 pub struct RefitJob<'a> {
-    /// What for.
+    /// The refit.
     pub refit: &'a Refit,
     /// The primitives as they are now.
     pub input: Input,
@@ -125,7 +125,7 @@ impl Refit {
         Ok(Refit { planned, costs, schedule, workgroup, run })
     }
 
-    /// The schedule that is used: the choice where none was given.
+    /// The schedule that is used: that of the options, or the choice for this number of primitives.
     pub fn schedule(&self) -> RefitSchedule {
         self.schedule
     }
@@ -145,10 +145,10 @@ impl Refit {
 
     /// Records the refit of `structure` to `input`, with scratch memory of [`Refit::scratch_bytes`], both aligned to 16 bytes.
     ///
-    /// The structure is one that was built over as many primitives with the same options, compacted or not; one that is not is
-    /// left as it is. The caller makes input and structure visible to compute shaders before, and places a barrier (compute
-    /// shader write to whatever reads the structure, or writes the scratch memory) behind. Labels: `leaves` and `climb`, or
-    /// `refit` where one workgroup does both.
+    /// The structure must have been built over as many primitives with the same options; it may be compacted. Any other
+    /// structure stays as it is. Before, the caller makes input and structure visible to compute shaders. After, it places a
+    /// barrier from compute shader writes to whatever reads the structure or writes the scratch memory. Labels: `leaves` and
+    /// `climb`, or `refit` where one workgroup does both.
     ///
     /// # Errors
     /// The memory is too small; the input has another number of primitives or geometries than was planned for; a pipeline could
@@ -157,7 +157,7 @@ impl Refit {
         recorder.chains(&[self.steps(input, structure, scratch)?])
     }
 
-    /// What [`Refit::record`] records, to be recorded beside others by [`Recorder::chains`].
+    /// The steps of [`Refit::record`]. [`Recorder::chains`] records them side by side with others.
     ///
     /// # Errors
     /// As [`Refit::record`], pipelines aside.
@@ -166,7 +166,7 @@ impl Refit {
         Ok(chains.pop().unwrap_or_default())
     }
 
-    /// The chains of many refits, for [`Recorder::chains`]: one each, but for those by one workgroup, of which two share a
+    /// The chains of many refits, for [`Recorder::chains`]: one per refit, except that two refits by one workgroup each share a
     /// dispatch.
     ///
     /// # Errors

@@ -9,13 +9,14 @@
 //!
 //! 1. *search*: of the subtree at each link, the move that shortens the sum of the nodes' areas most: up through all pivots, and
 //!    down on their other side as long as there may be more to gain than was found;
-//! 2. *match*: a move is made if no other across a node of its path (from the parent up to the pivot, and from there down to the new
-//!    place) gains more, or as much with a smaller link;
+//! 2. *match*: a move is made if no other across a node of its path (from the parent up to the pivot, and from there down to
+//!    the new place) gains more, or as much with a smaller link;
 //! 3. *move*: of each such path, the links, boxes and parents.
 //!
-//! Paths of moves that are made have no node in common. That is the paper's conservative locking: gains add up, no cycle can come
-//! to be, and the area never grows. It lets fewer moves through than locking only the nodes whose links change. That is made up for
-//! by trying few links a round and more rounds ([`ReinsertionOptions::stride`]): what was tried, with figures, is in docs/notes/optimisation.md.
+//! Paths of moves that are made have no node in common. That is the paper's conservative locking: gains add up, no cycle can
+//! come to be, and the area never grows. It lets fewer moves through than locking only the nodes whose links change. That is
+//! made up for by trying few links a round and more rounds ([`ReinsertionOptions::stride`]): what was tried, with figures, is
+//! in docs/notes/optimisation.md.
 //!
 //! The leaves of the tree have one record each; collapsing comes behind it and makes leaves of whatever is deeper than tracers can
 //! walk. The twin is [`Bvh2::reinserted`](super::layout::Bvh2::reinserted): the same bytes.
@@ -37,11 +38,11 @@ pub struct ReinsertionOptions {
 }
 
 impl ReinsertionOptions {
-    /// Every link once: most of what is to be had from a good tree.
+    /// Every link once: most of the gain for a good tree.
     pub const FAST: ReinsertionOptions = ReinsertionOptions::of_passes(1);
     /// Every link twice.
     pub const MEDIUM: ReinsertionOptions = ReinsertionOptions::of_passes(2);
-    /// Every link six times: little more is to be had from there on.
+    /// Every link six times: more rounds gain little.
     pub const HIGH: ReinsertionOptions = ReinsertionOptions::of_passes(6);
 
     /// So many passes, of 64 rounds each where there are enough links.
@@ -49,15 +50,15 @@ impl ReinsertionOptions {
         ReinsertionOptions { rounds: passes.saturating_mul(STRIDE), stride: STRIDE }
     }
 
-    /// As many rounds as there is time for in `budget`, if a pass over the same structure takes `pass`: what [`ReinsertionOptions::FAST`] took.
-    /// Rounds of [`ReinsertionOptions::HIGH`] at most, and possibly none.
+    /// As many rounds as there is time for in `budget`, if a pass over the same structure takes `pass`: what
+    /// [`ReinsertionOptions::FAST`] took. Rounds of [`ReinsertionOptions::HIGH`] at most, and possibly none.
     pub fn within(budget: Duration, pass: Duration) -> ReinsertionOptions {
-        // A ratio of floats; one that is not a number is none.
+        // A ratio of floats; if it is not a number, nothing is gained.
         let rounds = f64::from(STRIDE) * budget.as_secs_f64() / pass.as_secs_f64();
         ReinsertionOptions { rounds: (rounds as u32).min(ReinsertionOptions::HIGH.rounds), stride: STRIDE }
     }
 
-    /// Of so many links, one is tried in a round of a structure with these node slots: in a round at least [`LEAST_LINKS`].
+    /// The stride between links that are tried in one round of a structure with these node slots: at least [`LEAST_LINKS`] a round.
     pub(super) fn stride_for(&self, node_slots: u32) -> u32 {
         self.stride.min(2 * node_slots / LEAST_LINKS).max(1)
     }

@@ -41,8 +41,8 @@ pub fn area_scale(scene: &Aabb) -> f32 {
     f32::from_bits((scale as u32) << 23)
 }
 
-/// Edges shorter than this count as none, the scene's longest being 1 to 4. Areas are 2^-100 at least then, and differences of areas
-/// 2^-123: among the subnormals, which some devices take for zero, costs would be compared otherwise than here.
+/// Edges shorter than this count as none, the scene's longest being 1 to 4. Areas are 2^-100 at least then, and differences of
+/// areas 2^-123: among the subnormals, which some devices take for zero, costs would be compared otherwise than here.
 pub(crate) const SHORTEST: f32 = 1.0 / (1u64 << 50) as f32;
 
 impl Aabb {

@@ -55,7 +55,7 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
-    /// Of a build by `method`, with reinsertion that needs so many bytes, if any, and a sort's table of so many words.
+    /// For a build by `method`, with the bytes that reinsertion needs, if any, and the words of the sort's table.
     pub fn of(encode: &Encode, method: &dyn Hierarchy, reinsertion: Option<u64>, table_words: u64) -> Scratch {
         let count = u64::from(encode.count);
         let mut scratch = Scratch {

@@ -29,7 +29,8 @@ use bytemuck::{Pod, Zeroable};
 /// How much may be split.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SplitOptions {
-    /// Splits, at most, as a part of the primitives: 0 to [`SplitOptions::MOST_FRACTION`]. Structure and scratch memory grow by as much.
+    /// Splits, at most, as a part of the primitives: 0 to [`SplitOptions::MOST_FRACTION`]. Structure and scratch memory grow by
+    /// as much.
     pub fraction: f32,
     /// Splits of one triangle, at most: 1 to [`SplitOptions::MOST_SPLITS`].
     pub most: u32,
@@ -44,7 +45,7 @@ impl SplitOptions {
     /// What the budget alone bounds, as the paper has it, but for this.
     pub const MOST_SPLITS: u32 = 1023;
 
-    /// Splits of so many primitives, at most.
+    /// The most splits of this many primitives.
     pub fn budget(&self, primitive_count: u32) -> u32 {
         (f64::from(self.fraction) * f64::from(primitive_count)) as u32
     }
@@ -82,7 +83,7 @@ impl Default for SplitOptions {
 pub struct SplitReference {
     /// Least corner of a box that the part is in.
     pub lo: [f32; 3],
-    /// The triangle; `u32::MAX` where there is no such part.
+    /// The triangle; `u32::MAX` if there is no such part.
     pub primitive: u32,
     /// Greatest corner.
     pub hi: [f32; 3],

@@ -4,8 +4,8 @@
 
 use super::Aabb;
 
-/// Room for corners. A triangle cut at planes across the axes has 9 at most: two along planes of each axis and three edges. Rounding
-/// may make a few of one.
+/// Room for corners. A triangle cut at planes across the axes has 9 at most: two along planes of each axis and three edges.
+/// Rounding may make a few of one.
 const CORNERS: usize = 16;
 
 /// A convex polygon: what planes across the axes leave of a triangle.

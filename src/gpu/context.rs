@@ -21,20 +21,20 @@ pub struct ContextDesc<'a> {
     pub pipeline_cache: vk::PipelineCache,
     /// `VK_EXT_debug_utils` of the device, if each phase shall be labelled.
     pub debug_utils: Option<&'a ash::ext::debug_utils::Device>,
-    /// What the device was created with of [`super::Requirements::optional`]; [`Optional::NONE`] is always right.
+    /// The part of [`super::Requirements::optional`] that the device was created with; [`Optional::NONE`] is always right.
     pub optional: Optional,
-    /// How work is cut: for what the device is, unless told.
+    /// How work is cut: by default for the device's kind.
     pub tuning: TuningChoice,
 }
 
-/// What the builders must know of the device to choose sizes.
+/// Properties of the device that builders choose sizes by.
 #[derive(Debug, Clone)]
 pub struct Limits {
     /// The device's name.
     pub name: String,
     /// CPU, integrated or discrete.
     pub kind: vk::PhysicalDeviceType,
-    /// Who wrote the driver.
+    /// The driver's vendor.
     pub driver: vk::DriverId,
     /// The driver's version, in its own encoding.
     pub driver_version: u32,
@@ -44,16 +44,16 @@ pub struct Limits {
     pub subgroup_min: u32,
     /// The largest size that a subgroup may have.
     pub subgroup_max: u32,
-    /// Whether workgroups of whole subgroups have full subgroups of exactly `subgroup_size`: it is required when a pipeline is made,
-    /// or the device has one size alone. Otherwise a subgroup may be smaller, down to one invocation.
+    /// Whether workgroups of whole subgroups have full subgroups of exactly `subgroup_size`: it is required when a pipeline is
+    /// made, or the device has one size alone. Otherwise a subgroup may be smaller, down to one invocation.
     pub subgroup_is_exact: bool,
-    /// Invocations a workgroup, at most.
+    /// The most invocations of a workgroup.
     pub workgroup_invocations: u32,
-    /// Bytes of shared memory a workgroup, at most.
+    /// The most bytes of shared memory of a workgroup.
     pub shared_memory: u32,
-    /// Workgroups of a dispatch in x, at most.
+    /// The most workgroups of a dispatch in x.
     pub workgroup_count: u32,
-    /// Nanoseconds a timestamp tick.
+    /// Nanoseconds per tick of a timestamp.
     pub timestamp_period: f32,
     /// Valid bits of a timestamp in the queue family that [`super::requirements`] chooses; 0 if it has none.
     pub timestamp_bits: u32,
@@ -161,11 +161,11 @@ impl Kernel {
 pub struct Context {
     device: ash::Device,
     debug_utils: Option<ash::ext::debug_utils::Device>,
-    /// What the device is and can.
+    /// The device's limits.
     pub limits: Limits,
     /// How work is cut for it.
     pub tuning: Tuning,
-    /// What its driver's faults need.
+    /// What its driver's faults require.
     pub workarounds: Workarounds,
     optional: Optional,
     /// Subgroups of a workgroup, at most, where the size is required.
@@ -241,7 +241,8 @@ impl Context {
         kernels.iter().try_for_each(|kernel| self.pipeline(kernel).map(drop))
     }
 
-    /// The pipelines that there are, and how long each took to be made. Most drivers compile then; lavapipe, at the first dispatch.
+    /// All pipelines made so far, and how long each took. Most drivers compile at that point; lavapipe compiles at the first
+    /// dispatch.
     pub fn pipelines(&self) -> Vec<(Kernel, Duration)> {
         let pipelines = self.pipelines.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         pipelines.iter().map(|(kernel, &(_, time))| (kernel.clone(), time)).collect()
@@ -258,7 +259,7 @@ impl Context {
         Ok(pipeline)
     }
 
-    /// Whether a workgroup of so many invocations can be made of full subgroups of the size that is known.
+    /// Whether a workgroup of this many invocations consists of full subgroups of the known size.
     fn can_require_subgroups(&self, workgroup: u32) -> bool {
         let size = self.limits.subgroup_size;
         self.optional.subgroup_size_control

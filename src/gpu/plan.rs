@@ -37,9 +37,9 @@ impl<P: Copy + Ord + std::fmt::Debug> Plan<P> {
         Plan { parts: Vec::new() }
     }
 
-    /// Takes a part that is in use in the phases `life`, and returns its place in [`Plan::UNIT`]s: behind all that were taken before
-    /// and are in use with it. So no part moves up when another shrinks, and what suffices for a plan suffices for every plan of
-    /// smaller parts.
+    /// Takes a part that is in use in the phases `life`, and returns its place in [`Plan::UNIT`]s: behind all that were taken
+    /// before and are in use with it. So no part moves up when another shrinks, and what suffices for a plan suffices for every
+    /// plan of smaller parts.
     ///
     /// No part is empty: some drivers load what is at the same address for all lanes even where no lane is active.
     pub fn take(&mut self, name: &'static str, bytes: u64, life: RangeInclusive<P>) -> u32 {

@@ -37,7 +37,7 @@ impl SortShape {
         SortShape::strips_of(limits.subgroup_size.min(MOST))
     }
 
-    /// The same with workgroups of so many invocations.
+    /// The same with workgroups of this many invocations.
     pub(crate) fn strips_of(workgroup: u32) -> SortShape {
         SortShape { workgroup, digit_bits: 8, private_counters: true, subgroups: 0, rows: 0 }
     }
@@ -84,7 +84,7 @@ impl SortShape {
         4 * (counters.max(tile) + offsets)
     }
 
-    /// Digits a pass tells apart.
+    /// Digits of a pass.
     fn digits(&self) -> u32 {
         1 << self.digit_bits
     }
@@ -145,7 +145,7 @@ pub const MAX_COUNT: u32 = 1 << 27;
 pub struct SortBuffers {
     /// Keys and values to sort; overwritten.
     pub keys: [u64; 2],
-    /// Room for keys and values, `count` each; [`record`] tells in which of the two the result is.
+    /// Room for keys and values, `count` each; [`record`] returns which of the two holds the result.
     pub values: [u64; 2],
     /// [`SortShape::table_words`] words.
     pub table: u64,

@@ -62,7 +62,7 @@ impl Timestamps {
 
     /// The phases of the last recording, read back; none without timestamps. Call after the command buffer has finished.
     ///
-    /// Without timestamps there is one phase, `submit`, if [`Timestamps::waited`] was told how long it took.
+    /// Without timestamps there is one phase, `submit`, if [`Timestamps::waited`] was given how long it took.
     ///
     /// # Errors
     /// The timestamps could not be read.
@@ -101,7 +101,7 @@ impl Timestamps {
     }
 }
 
-/// Ticks from one timestamp to a later one, of a counter that has so many bits and begins again behind its last value. What the bits
+/// Ticks from one timestamp to a later one, of a counter of this many bits that wraps around. What the bits
 /// above it hold is undefined.
 fn ticks_between(from: u64, to: u64, valid_bits: u32) -> u64 {
     to.wrapping_sub(from) & (u64::MAX >> (64 - valid_bits.clamp(1, 64)))
@@ -150,19 +150,21 @@ impl<'a> Recorder<'a> {
     ///
     /// # Safety
     /// `commands` is in the recording state, outside a render pass, from a compute queue family of the context's device,
-    /// and is recorded by nobody else meanwhile. Device addresses given to the passes stay valid until it has run.
+    /// and nobody else records into it meanwhile. Device addresses given to the passes stay valid until it has run.
     pub unsafe fn new(context: &'a Context, commands: vk::CommandBuffer) -> Recorder<'a> {
         Recorder { context, commands, timestamps: None, in_phase: false }
     }
 
     /// A recorder without a command buffer. It makes the pipelines of what it is given, and records nothing. Recording the same
-    /// later, for the same number of primitives, makes no pipeline any more. Addresses are not read: 0 is enough.
+    /// later, for the same number of primitives, makes no pipeline any more. Addresses are not read:
+    /// `Region::unbounded(0)` will do.
     ///
     /// ```no_run
     /// # use hedgerow::bvh::builder::{Builder, Input};
-    /// # use hedgerow::gpu::{Context, Recorder};
+    /// # use hedgerow::gpu::{Context, Recorder, Region};
     /// # fn example(context: &Context, builder: &Builder, triangles: &Input) -> hedgerow::Result<()> {
-    /// builder.record(&mut Recorder::warming(context), triangles, 0, 0)
+    /// let nowhere = Region::unbounded(0);
+    /// builder.record(&mut Recorder::warming(context), triangles, nowhere, nowhere)
     /// # }
     /// ```
     pub fn warming(context: &'a Context) -> Recorder<'a> {
@@ -190,7 +192,7 @@ impl<'a> Recorder<'a> {
         self.context
     }
 
-    /// The command buffer being recorded; null where there is none ([`Recorder::warming`]).
+    /// The command buffer being recorded; null if there is none ([`Recorder::warming`]).
     pub fn commands(&self) -> vk::CommandBuffer {
         self.commands
     }
@@ -269,7 +271,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Makes the pipeline if there is none, and binds it and its arguments; the device, if there is something to record into.
+    /// Makes the pipeline if needed, and binds it and its arguments. Returns the device if there is a command buffer.
     fn bind(&mut self, kernel: &Kernel, arguments: &[u8]) -> Result<Option<&'a ash::Device>> {
         let pipeline = self.context.pipeline(kernel)?;
         let Some(device) = self.device() else { return Ok(None) };

@@ -9,7 +9,7 @@ pub type Bounds = [[f32; 3]; 2];
 /// The box that holds nothing.
 pub const EMPTY: Bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
 
-/// How the reduction of so many boxes is cut for a device.
+/// How a reduction of boxes is cut for a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reduction {
     count: u32,

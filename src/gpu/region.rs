@@ -2,15 +2,15 @@
 
 use crate::{Error, Result};
 
-/// These bytes: a part of a buffer on the device, by its address.
+/// A range of device memory: an address and a length.
 ///
-/// Passes take the memory that they write as regions, and refuse one that is too small or misplaced. What they only read is
-/// named by its address, as in Vulkan: counts and strides say how long it is.
+/// Passes take the memory that they write as regions, and refuse one that is too small or misaligned. For memory that they only
+/// read an address is enough, as in Vulkan: counts and strides say how long it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Region {
-    /// Where it begins.
+    /// Device address of the first byte.
     pub address: u64,
-    /// How large it is.
+    /// Length in bytes.
     pub bytes: u64,
 }
 
@@ -20,7 +20,7 @@ impl Region {
         Region { address, bytes: u64::MAX - address }
     }
 
-    /// What is left behind the first `bytes`.
+    /// The rest after the first `bytes`.
     pub(crate) const fn behind(self, bytes: u64) -> Region {
         Region { address: self.address + bytes, bytes: self.bytes.saturating_sub(bytes) }
     }

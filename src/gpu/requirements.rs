@@ -4,7 +4,7 @@ use crate::{Error, Result};
 use ash::vk;
 use std::ffi::CStr;
 
-/// What makes results no different, only faster, where a device has it and it is enabled.
+/// Features that change the speed and never the results. They count if the device has them and they are enabled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Optional {
     /// `VK_EXT_subgroup_size_control` with its features `subgroupSizeControl` and `computeFullSubgroups`: pipelines ask for full
@@ -19,7 +19,7 @@ impl Optional {
     /// Nothing is enabled that [`requirements`] did not require: always right.
     pub const NONE: Optional = Optional { subgroup_size_control: false, maximal_reconvergence: false };
 
-    /// What [`requirements`] enables where a device has it: what kernels make use of.
+    /// What [`requirements`] enables if the device has it: the features that kernels use.
     pub const DEFAULT: Optional = Optional { subgroup_size_control: true, maximal_reconvergence: false };
 
     /// What both have.
@@ -30,7 +30,7 @@ impl Optional {
         }
     }
 
-    /// What is there, as `hedgerow devices` says it.
+    /// The names of what is there, as `hedgerow devices` prints them.
     pub fn names(self) -> Vec<&'static str> {
         let subgroups = self.subgroup_size_control.then_some("subgroup size control");
         let reconvergence = self.maximal_reconvergence.then_some("maximal reconvergence");
@@ -162,7 +162,7 @@ impl Features {
     }
 }
 
-/// What [`requirements`] found of a device that can be used.
+/// What to enable on a device that can be used: the answer of [`requirements`].
 #[derive(Debug, Clone)]
 pub struct Requirements {
     /// The Vulkan version to ask for in `VkApplicationInfo` and to have on the device, at least.
@@ -171,18 +171,18 @@ pub struct Requirements {
     pub extensions: Vec<&'static CStr>,
     /// Features to enable.
     pub features: Features,
-    /// What the extensions and features hold that is optional: for [`super::ContextDesc::optional`].
+    /// The optional part of the extensions and features: pass it on as [`super::ContextDesc::optional`].
     pub optional: Optional,
-    /// What the device has of it.
+    /// The optional features that the device has.
     pub available: Optional,
     /// What a queue family must have.
     pub queue_flags: vk::QueueFlags,
-    /// The queue family to take: with compute and timestamps, without graphics where there is such a one.
+    /// The queue family to take: it has compute and timestamps, and if possible no graphics.
     pub queue_family: u32,
 }
 
 impl Requirements {
-    /// The same with what is `wanted` of what is optional, as far as the device has it.
+    /// The same with only the `wanted` optional features, as far as the device has them.
     pub fn only(mut self, wanted: Optional) -> Requirements {
         self.optional = self.available.and(wanted);
         self.extensions = self.optional.extensions();

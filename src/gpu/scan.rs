@@ -8,7 +8,7 @@ use crate::Result;
 /// The most words that are scanned at once.
 pub const MAX_COUNT: u32 = 1 << 27;
 
-/// How the scan of so many words is cut for a device.
+/// How a scan of words is cut for a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scan {
     count: u32,

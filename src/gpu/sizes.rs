@@ -1,12 +1,12 @@
 //! How much memory something takes.
 
-/// Bytes that the caller gives.
+/// Memory that the caller provides for a build, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sizes {
-    /// The structure: what stays.
+    /// Bytes of the structure, which stays.
     pub structure: u64,
-    /// Scratch memory, free again when the work has run and its report, if there is one, has been read.
+    /// Bytes of scratch memory. It is free again when the work has run and its report, if any, has been read.
     pub scratch: u64,
-    /// What both addresses are multiples of.
+    /// Both addresses must be multiples of this.
     pub alignment: u64,
 }

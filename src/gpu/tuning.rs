@@ -1,7 +1,7 @@
 //! What differs between devices and changes no byte of a result: how work is cut, and which schedule runs it.
 //!
-//! A pass reads a field of [`Tuning`]; no pass asks what the device is. What would change bytes (the window of H-PLOC, code bits, the
-//! width of nodes) is an option of its builder, with one default everywhere.
+//! A pass reads a field of [`Tuning`]; no pass asks what the device is. What would change bytes (the window of H-PLOC, code
+//! bits, the width of nodes) is an option of its builder, with one default everywhere.
 
 use super::radix_sort::SortShape;
 use super::{Grid, Limits};
@@ -93,9 +93,9 @@ pub struct BuildTuning {
     pub meets_in_group: bool,
     /// Workgroups of a persistent dispatch, and of others that share what only the device knows the number of.
     pub workers: u32,
-    /// Primitives up to which one workgroup builds everything. Of more, the chain: on lavapipe it is 1.2 to 1.5 times as fast as the
-    /// task pool (the loop around the phases costs the persistent kernel its unmasked loads, and whoever waits takes a core from
-    /// who works), and it asks nothing of the device's progress.
+    /// Primitives up to which one workgroup builds everything. Of more, the chain: on lavapipe it is 1.2 to 1.5 times as fast
+    /// as the task pool (the loop around the phases costs the persistent kernel its unmasked loads, and waiting workgroups take
+    /// a core from who works), and it asks nothing of the device's progress.
     pub small: u32,
     /// Bits of a digit of its sort: with 8, a pass spends more on its table than on a few hundred keys.
     pub small_digit_bits: u32,
@@ -123,7 +123,8 @@ pub struct RefitTuning {
 /// How builds of kd-trees are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct KdTuning {
-    /// Invocations of a workgroup, but for those that have a subtree of few references: of these, and of the task pool's, a subgroup.
+    /// Invocations of a workgroup, but for those that have a subtree of few references: of these, and of the task pool's, a
+    /// subgroup.
     pub group: u32,
     /// Workgroups of a dispatch, at most.
     pub groups: u32,

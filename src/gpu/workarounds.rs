@@ -1,10 +1,10 @@
 //! What a driver's faults need, each from the driver's id and version, with the test that shows it.
 //!
-//! A fault that costs nothing to live with has no flag: the code does what suits every driver, and a comment there says why. These
-//! are three. lavapipe of Mesa 26 loads what is at one address for all lanes even where no lane is active (`bvh::encode`,
-//! `glsl/bvh/clusters.glsl`, `glsl/bvh/ploc.glsl`, `glsl/kdtree/small.glsl` keep such addresses in range); Mesa takes each access to
-//! shared memory that makes itself visible for a fence (`build/shared_memory.rs`); lavapipe before Mesa 25 ends long loops early, which
-//! [`super::probe`] finds out by running one.
+//! A fault that costs nothing to live with has no flag: the code does what suits every driver, and a comment there says why.
+//! These are three. lavapipe of Mesa 26 loads what is at one address for all lanes even where no lane is active (`bvh::encode`,
+//! `glsl/bvh/clusters.glsl`, `glsl/bvh/ploc.glsl`, `glsl/kdtree/small.glsl` keep such addresses in range); Mesa takes each
+//! access to shared memory that makes itself visible for a fence (`build/shared_memory.rs`); lavapipe before Mesa 25 ends long
+//! loops early, which [`super::probe`] finds out by running one.
 
 use super::Limits;
 use ash::vk;
@@ -15,8 +15,8 @@ pub struct Workarounds {
     /// The driver halves the triangles of its own structures in the order of the input: they are no peer. lavapipe before Mesa 26.
     /// Shown by: `measure::peers::driver::note`, and the traces of `make bench` beside `make bench-peers`.
     pub driver_halves_in_order: bool,
-    /// A transform multiplies the fourth component of 16-bit vertices, `firstVertex` leads to other vertices, and many a ray passes by a
-    /// flat box or ends where it enters one, in the driver's own structures. lavapipe before Mesa 26 (25.0.7).
+    /// A transform multiplies the fourth component of 16-bit vertices, `firstVertex` leads to other vertices, and many a ray
+    /// passes by a flat box or ends where it enters one, in the driver's own structures. lavapipe before Mesa 26 (25.0.7).
     /// Shown by: tests/accel/blas.rs, tests/accel/boxes.rs.
     pub driver_misreads_geometry: bool,
     /// A ray query through a top level with an inactive instance, or one of mask 0, crashes the process. lavapipe from Mesa 26 on
@@ -25,10 +25,11 @@ pub struct Workarounds {
     /// Active boxes beside inactive ones are lost in the driver's own structures. Every lavapipe so far (25.0.7, 26.1.6).
     /// Shown by: tests/accel/boxes.rs.
     pub driver_loses_boxes: bool,
-    /// Specialisation constants are folded into a module before the driver sees it (`gpu::specialise`). SwiftShader sets their values, but
-    /// takes out no code behind them; and for each loop it looks for paths through what is left, breadth first, taking a block once for
-    /// each path to it (`Spirv::Function::ExistsPath`), so that each of n `if`s in sequence doubles the time: `encode_plan`, the tracers
-    /// lane by lane and every persistent kernel did not compile in minutes. Shown by: tests/drivers, which bounds the time of each pipeline.
+    /// Specialisation constants are folded into a module before the driver sees it (`gpu::specialise`). SwiftShader sets their
+    /// values, but takes out no code behind them; and for each loop it looks for paths through what is left, breadth first,
+    /// taking a block once for each path to it (`Spirv::Function::ExistsPath`), so that each of n `if`s in sequence doubles the
+    /// time: `encode_plan`, the tracers lane by lane and every persistent kernel did not compile in minutes. Shown by:
+    /// tests/drivers, which bounds the time of each pipeline.
     pub folded_constants: bool,
 }
 

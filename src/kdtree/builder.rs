@@ -1,15 +1,17 @@
 //! kd-trees built on the device in the caller's command buffer and memory: `kd-gpu`.
 //!
-//! [`KdBuilder::sizes`] tells the memory, [`KdBuilder::record`] records the build. How many references and nodes a tree has shows only
-//! when it is built, so the sizes go by an [`KdEstimate`]; where that was too little, nodes are leaves, the status says so
-//! ([`OUT_OF_ROOM`](crate::bvh::layout::status::OUT_OF_ROOM)), and the [`KdReport`] says what would have been enough.
+//! [`KdBuilder::sizes`] gives the memory that a build needs, [`KdBuilder::record`] records the build. How many references and
+//! nodes a tree has shows only when it is built, so the sizes go by an [`KdEstimate`]; where that was too little, nodes are
+//! leaves, the status says so ([`OUT_OF_ROOM`](crate::bvh::layout::status::OUT_OF_ROOM)), and the [`KdReport`] says what would
+//! have been enough.
 //!
 //! Min-max binning above, level by level (Papay 2025, sections 9.4 to 9.6); cells of few references are split exactly, by one
 //! workgroup to their leaves. [`super::twin::builder`] is the twin,
 //! `glsl/kdtree/builder.glsl` the device's side.
 //!
-//! Trees have the bytes of the twin on every device: the only reciprocals that they depend on are correctly rounded, by the device or
-//! by integers ([`crate::gpu::KdTuning::exact_reciprocals`]). Where a device flushes subnormal numbers, inputs must not lead to any.
+//! Trees have the bytes of the twin on every device: the only reciprocals that they depend on are correctly rounded, by the
+//! device or by integers ([`crate::gpu::KdTuning::exact_reciprocals`]). Where a device flushes subnormal numbers, inputs must
+//! not lead to any.
 
 use super::layout::{self, KdHeader, KdNode};
 use super::merge::MERGE_AT;
@@ -39,7 +41,7 @@ pub struct KdOptions {
     pub workgroups: Option<u32>,
     /// What the memory goes by; `None` takes [`KdEstimate::for_exact`].
     pub estimate: Option<KdEstimate>,
-    /// Room in the structure beside what the build may need, for objects that are to be merged into it: [`super::merge`].
+    /// Extra room in the structure for objects that will be merged into it: [`super::merge`].
     pub more: layout::SpareRoom,
     /// Geometries: what [`Source::Several`](crate::bvh::geometry::Source::Several) has, otherwise 1.
     pub geometry_count: u32,
@@ -62,14 +64,14 @@ impl KdOptions {
     };
     /// The most bins: their counters lie in a workgroup's shared memory.
     pub const MOST_BINS: u32 = 256;
-    /// The least number of references of exact splits: the tasks of a level are told by it.
+    /// The least number of references that an exact split may have: it bounds the tasks of a level.
     pub const LEAST_EXACT: u32 = 4;
     /// The most: looking at every plane takes time by the square.
     pub const MOST_EXACT: u32 = 64;
 
-    /// The schedule on the device of `context`; of a merge, too. The pool on a CPU: workgroups take what is left as they come, where
-    /// those of a dispatch have their shares, whichever core is slower (docs/notes/kdtree.md). No GPU was measured, and a chain asks nothing
-    /// of one's progress.
+    /// The schedule on the device of `context`; of a merge, too. The pool on a CPU: workgroups take what is left as they come,
+    /// where those of a dispatch have their shares, whichever core is slower (docs/notes/kdtree.md). No GPU was measured, and a
+    /// chain asks nothing of one's progress.
     pub fn schedule_on(&self, context: &Context) -> Schedule {
         let measured = if context.tuning.kd.persistent { Schedule::Persistent } else { Schedule::Chain };
         self.schedule.unwrap_or(measured)
@@ -164,12 +166,12 @@ pub struct KdReport {
     /// Subtrees.
     pub subtrees: u32,
     /// One more than the level that was split no further for want of room, or 0. What the levels below it would have needed is not
-    /// known: a build by [`KdReport::estimate`] comes farther, and tells.
+    /// known: a build by [`KdReport::estimate`] comes farther, and reports it.
     pub ended: u32,
 }
 
 impl KdReport {
-    /// What suffices for the scene of so many primitives, exactly; where levels were cut off, twice what was asked for.
+    /// What suffices exactly for the scene of this many primitives; twice what was asked for if levels were cut off.
     pub fn estimate(&self, primitive_count: u32) -> KdEstimate {
         let more = if self.ended > 0 { 2.0 } else { 1.0 };
         let each =
@@ -462,14 +464,15 @@ impl KdBuilder {
         self.shape.kernel(shader, &self.options, input)
     }
 
-    /// Records the build of `input` into `structure`, with scratch memory, of the bytes and alignment that [`KdBuilder::sizes`] tells.
+    /// Records the build of `input` into `structure`, with scratch memory, of the bytes and alignment of [`KdBuilder::sizes`].
     ///
-    /// The caller makes the input visible to compute shaders before, and places a barrier (compute shader write to whatever reads
-    /// the structure or the report, or writes the scratch memory) behind. Labels: `encode`; `subtrees`, `bin`,
+    /// Before, the caller makes the input visible to compute shaders. After, it places a barrier from compute shader writes to
+    /// whatever reads the structure or the report, or writes the scratch memory. Labels: `encode`; `subtrees`, `bin`,
     /// `classify`, `scan` and `distribute` of each level; `place`. Or `build` where the schedule is persistent.
     ///
     /// # Errors
-    /// The memory is too small; the input has another number of triangles or geometries than the builder; a pipeline could not be made.
+    /// The memory is too small; the input has another number of triangles or geometries than the builder; a pipeline could not
+    /// be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: Region, scratch: Region) -> Result<()> {
         let sizes = self.sizes();
         let structure = structure.checked("memory for a kd-tree", sizes.structure, sizes.alignment)?;

@@ -78,7 +78,7 @@ pub struct KdHeader {
     /// The longest side of a triangle that is referenced only where it is: rays look as far beside themselves as hits of such a one
     /// may be ([`crate::trace::twin::kd`]).
     pub reach: f32,
-    /// Nodes that there is room for, where a merge may add some; as many as there are unless told.
+    /// Nodes that there is room for: a merge may add some. By default no more than there are.
     pub node_room: u32,
     /// References that there is room for.
     pub reference_room: u32,

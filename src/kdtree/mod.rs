@@ -1,4 +1,4 @@
-//! kd-trees: the layout, the builder, and what is told of a tree (Papay 2025, "Efficient ray tracing algorithms
+//! kd-trees: the layout, the builder, and the quality of a tree (Papay 2025, "Efficient ray tracing algorithms
 //! exploiting kd-trees on a GPU").
 //!
 //! A kd-tree halves space, not the primitives: cells do not overlap, a ray meets them in its order, and every

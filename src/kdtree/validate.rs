@@ -7,9 +7,9 @@ use crate::{Error, Result};
 
 impl KdTree {
     /// Checks every rule of the layout: indices in range, no cycle and no node that none names, planes strictly inside of their
-    /// cells, a depth that tracers can walk, every reference in one leaf and none twice in it, and every point of every triangle in a
-    /// closed cell that references it, in double precision. What the header counts is there. Of a tree that something is merged
-    /// into, as many nodes and references are left over as the header says that others are in place of.
+    /// cells, a depth that tracers can walk, every reference in one leaf and none twice in it, and every point of every
+    /// triangle in a closed cell that references it, in double precision. What the header counts is there. Of a tree that
+    /// something is merged into, as many nodes and references are left over as the header says that others are in place of.
     ///
     /// # Errors
     /// [`Error::InvalidStructure`] names the first node that breaks a rule, and the rule.
@@ -46,8 +46,8 @@ impl KdTree {
         Ok(())
     }
 
-    /// Every point of a triangle is in a cell that references it: the triangle is cut at the planes, and what is left of it in a leaf
-    /// must be referenced there. What lies in a plane may be on either side.
+    /// Every point of a triangle is in a cell that references it: the triangle is cut at the planes, and what is left of it in
+    /// a leaf must be referenced there. What lies in a plane may be on either side.
     fn validate_cover(&self, record: u32) -> Result<()> {
         let Triangle { v0, v1, v2, primitive } = self.records[record as usize];
         let polygon = Polygon::of(&[v0, v1, v2]);
@@ -272,7 +272,7 @@ mod tests {
         }
     }
 
-    /// A leaf of at least so many references.
+    /// A leaf of at least this many references.
     fn leaf_of(tree: &KdTree, count: usize) -> (usize, std::ops::Range<usize>) {
         let leaf = |node: &KdNode| match node.content() {
             KdContent::Leaf(range) if range.len() >= count => Some(range),

@@ -22,29 +22,29 @@ use crate::gpu::{Context, Kernel, Recorder, shaders};
 use crate::kdtree::layout::MAX_DEPTH;
 use bytemuck::{Pod, Zeroable};
 
-/// How a tree is walked. All find the same hits.
+/// How a ray traverses a kd-tree. Every way finds the same hits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Traversal {
-    /// Cells that may wait on the stack.
+    /// The most cells that wait on the stack.
     pub capacity: usize,
-    /// Whether the way down begins again below the root, where nothing waits above.
+    /// Whether a restart begins at the lowest node above which nothing waits, not at the root.
     pub push_down: bool,
 }
 
 impl Traversal {
     /// Algorithm 1: every cell that waits is on the stack.
     pub const STACK: Traversal = Traversal { capacity: MAX_DEPTH as usize, push_down: false };
-    /// Algorithm 2, kd-restart: none is.
+    /// Algorithm 2, kd-restart: no stack.
     pub const RESTART: Traversal = Traversal { capacity: 0, push_down: false };
     /// Algorithm 3: restarts begin as far down as they can.
     pub const PUSH_DOWN: Traversal = Traversal { capacity: 0, push_down: true };
 
-    /// The last `capacity` cells are, the others are found again by restarts.
+    /// The stack holds the last `capacity` cells that wait; restarts find the others again.
     pub const fn short_stack(capacity: usize) -> Traversal {
         Traversal { capacity, push_down: false }
     }
 
-    /// Algorithm 4: and restarts begin as far down as they can.
+    /// Algorithm 4: a short stack, and restarts begin as far down as they can.
     pub const fn short_stack_with_push_down(capacity: usize) -> Traversal {
         Traversal { capacity, push_down: true }
     }
@@ -70,7 +70,7 @@ impl TreeEntry {
     }
 }
 
-/// How the rays of a device go through kd-trees.
+/// The tracer of kd-trees on a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct KdTracer {
     traversal: Traversal,
@@ -78,8 +78,8 @@ pub struct KdTracer {
 }
 
 impl KdTracer {
-    /// By this traversal, cut as [`TraceShape::of`] does, but with loads gathered. Stacks of up to 8 cells, which lie in registers, are the
-    /// fastest where that was measured: `docs/notes/kdtree.md`.
+    /// By this traversal, cut as [`TraceShape::of`] does, but with loads gathered. Stacks of up to 8 cells, which lie in
+    /// registers, are the fastest where that was measured: `docs/notes/kdtree.md`.
     pub fn new(context: &Context, traversal: Traversal) -> KdTracer {
         KdTracer::with(traversal, TraceShape::of(context))
     }
@@ -103,8 +103,8 @@ impl KdTracer {
         Kernel::new(shader, self.shape.workgroup, &constants)
     }
 
-    /// Records the tracing of all rays through the kd-tree at `buffers.structure`: as [`tracer::record`] does for a `Bvh2`, with the
-    /// same hits. What is no kd-tree there is traced as if it were an empty one.
+    /// Records the tracing of all rays through the kd-tree at `buffers.structure`: as [`tracer::record`] does for a `Bvh2`,
+    /// with the same hits. Anything else at that address is traced as an empty tree.
     ///
     /// # Errors
     /// More than [`MAX_RAYS`](super::MAX_RAYS) rays; the kernel's pipeline could not be made.
@@ -113,8 +113,9 @@ impl KdTracer {
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
     }
 
-    /// The same through several trees, one after the other: at `buffers.structure` is their [`TreeEntry::table`], of at least one. A ray
-    /// ends in each where the trees before it have its nearest hit; of equally near ones that in the earlier tree counts.
+    /// The same through several trees, one after the other: at `buffers.structure` is their [`TreeEntry::table`], of at least
+    /// one. A ray ends in each where the trees before it have its nearest hit; of equally near ones that in the earlier tree
+    /// counts.
     ///
     /// # Errors
     /// As [`KdTracer::record`].

@@ -30,17 +30,17 @@ pub const MAX_RAYS: u32 = 1 << 27;
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Ray {
-    /// Where it starts.
+    /// The origin.
     pub origin: [f32; 3],
     /// A hit counts when `t_min < t < t_max`.
     pub t_min: f32,
-    /// Where it goes; need not be of unit length, `t` is in its units.
+    /// The direction; its length is the unit of `t` and need not be 1.
     pub direction: [f32; 3],
     /// See `t_min`.
     pub t_max: f32,
 }
 
-/// What a ray met, 16 bytes, as hit files hold it.
+/// A hit, 16 bytes, as hit files hold it.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Hit {
@@ -58,13 +58,13 @@ impl Hit {
     /// No hit.
     pub const NONE: Hit = Hit { t: f32::INFINITY, primitive: u32::MAX, u: 0.0, v: 0.0 };
 
-    /// Whether something was met.
+    /// Whether it is a hit.
     pub fn is_some(&self) -> bool {
         self.primitive != u32::MAX
     }
 }
 
-/// Work that tracing one ray took, 12 bytes: what "steps" and "tests" mean in every figure.
+/// The work of tracing one ray, 12 bytes. All figures count steps and tests in this way.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Work {
@@ -76,7 +76,7 @@ pub struct Work {
     pub leaves: u32,
 }
 
-/// Whether the nearest hit is wanted or any.
+/// Which hit a ray looks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Query {
     /// The nearest hit between `t_min` and `t_max`.

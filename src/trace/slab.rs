@@ -13,17 +13,16 @@
 //!   device's reciprocal has put off by 6ε, its product and the difference), and by 24εm from the cancellation in the edge
 //!   functions, which the triangle test bounds ([`super::triangle`]).
 //!
-//! The slab distance adds at most 10εm: the corner's offset ε, its sum with the slack ε, the reciprocal 5ε and the product ε; in
-//! a node whose corners are bytes 2ε more (`quantised_boxes.glsl`: the sum with the byte's part of the grid, and the rounding of
-//! corners by whoever chose the bytes). A direction that is moved away from zero ([`super::ray`]) adds εm/4. All of it is less
-//! than 64εm = 2⁻¹⁸m ([`SLACK`]). Twice that is taken of the power of two below m: of two children that begin in the same plane,
-//! the larger shall not seem nearer. What is off by a part of the coordinates themselves, as the corners that come out of bytes
-//! are, is so by ε of the origin's at most and is in the margin. So for every box around the triangle the interval that is
-//! computed here holds the computed t; it may be cut at the best t so far, and a box that is farther than the best hit holds
-//! neither a nearer hit nor an equally near one.
-//! Where a triangle was split, its vertices may lie outside of a part's box, by as much as it is long: so much larger a slack is in
-//! the box itself (`crate::bvh::twin::split`), and what is said above is true of the box of whichever part has the point on the
-//! triangle; every point is in one.
+//! The slab distance adds at most 10εm: the corner's offset ε, its sum with the slack ε, the reciprocal 5ε and the product ε;
+//! in a node whose corners are bytes 2ε more (`quantised_boxes.glsl`: the sum with the byte's part of the grid, and the
+//! rounding of corners by the caller who chose the bytes). A direction that is moved away from zero ([`super::ray`]) adds εm/4.
+//! All of it is less than 64εm = 2⁻¹⁸m ([`SLACK`]). Twice that is taken of the power of two below m: of two children that begin
+//! in the same plane, the larger shall not seem nearer. What is off by a part of the coordinates themselves, as the corners
+//! that come out of bytes are, is so by ε of the origin's at most and is in the margin. So for every box around the triangle
+//! the interval that is computed here holds the computed t; it may be cut at the best t so far, and a box that is farther than
+//! the best hit holds neither a nearer hit nor an equally near one. Where a triangle was split, its vertices may lie outside of
+//! a part's box, by as much as it is long: so much larger a slack is in the box itself (`crate::bvh::twin::split`), and what is
+//! said above is true of the box of whichever part has the point on the triangle; every point is in one.
 
 use super::ray::PreparedRay;
 use crate::bvh::layout::SLACK;

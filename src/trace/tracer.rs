@@ -16,15 +16,15 @@ use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Limits, MOST_LANES, Recorder, Region, shaders};
 use crate::{Error, Result};
 
-/// How the work is cut for a device.
+/// How a trace is divided into workgroups on a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct TraceShape {
-    /// Invocations a workgroup.
+    /// Invocations of a workgroup.
     pub workgroup: u32,
     /// How many entries of each ray's stack lie in shared memory; the others are private. At most
     /// [`MAX_DEPTH`].
     pub shared_levels: u32,
-    /// Rays that an invocation traces one after the other, at most.
+    /// The most rays that an invocation traces one after the other.
     pub rays_each: u32,
     /// How nodes and triangles are loaded.
     pub loads: Loads,
@@ -48,7 +48,7 @@ impl Loads {
 }
 
 impl TraceShape {
-    /// What is fast on a device.
+    /// The shape that is fast on this device.
     pub fn of(context: &Context) -> TraceShape {
         let tuning = &context.tuning.trace;
         let shape = TraceShape {
@@ -98,10 +98,11 @@ const LEAST_WORKGROUPS: u32 = 64;
 /// Shared memory an entry of a stack: node or first triangle with its count, and distance.
 const LEVEL_BYTES: u32 = 8;
 
-/// What is traced, all aligned to 16 bytes.
+/// Structure, rays and memory of a trace, all aligned to 16 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TraceBuffers {
-    /// Address of a `Bvh2`, or of what else a tracer says that it takes. One whose status says that it is too deep or unfinished is traced as if it were empty.
+    /// Address of a `Bvh2`, or of another structure if the tracer takes it. One whose status says that it is too deep or
+    /// unfinished is traced as if it were empty.
     pub structure: u64,
     /// [`Ray`] × `count`.
     pub rays: Region,
@@ -109,7 +110,7 @@ pub struct TraceBuffers {
     pub hits: Region,
     /// [`Work`] × `count`, written: counting takes time, so it has a kernel of its own.
     pub work: Option<Region>,
-    /// How many rays; at most [`MAX_RAYS`].
+    /// The number of rays, at most [`MAX_RAYS`].
     pub count: u32,
 }
 
@@ -135,7 +136,7 @@ pub(super) fn kernel_of(
     Kernel::new(shader, shape.workgroup, &[any_hit, u32::from(count_work), shape.shared_levels, lanes, in_vectors])
 }
 
-/// Records the tracing of all rays: one dispatch for each as many workgroups as the device takes at once.
+/// Records the tracing of all rays: one dispatch, or several if the device cannot take all workgroups in one.
 ///
 /// Rays, structure and hits must be visible to and not used by other shaders before: the caller places a barrier (shader
 /// write to shader read and write) before and after.

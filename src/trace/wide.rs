@@ -6,7 +6,7 @@ use crate::bvh::wide::Form;
 use crate::gpu::{Context, Kernel, Limits, Recorder, shaders};
 use crate::{Error, Result};
 
-/// In which order a ray meets the children of a node.
+/// The order in which a ray visits the children of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Order {
     /// By where the ray enters them, each that waits with its distance: the fewest steps and tests.
@@ -17,14 +17,14 @@ pub enum Order {
     Octant,
 }
 
-/// How the rays of a device go through trees of a form.
+/// The tracer of wide trees of one form on a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct WideTracer {
     /// The nodes of the trees.
     pub form: Form,
     /// The order of children.
     pub order: Order,
-    /// How the work is cut. [`Loads::LaneByLane`] is there for [`Order::Octant`] alone.
+    /// How the trace is divided. Only [`Order::Octant`] has [`Loads::LaneByLane`].
     pub shape: TraceShape,
 }
 
@@ -72,7 +72,7 @@ impl WideTracer {
     /// The kernel that [`WideTracer::record`] takes.
     ///
     /// # Errors
-    /// There is no kernel for that order of such nodes, or for such loads.
+    /// No kernel visits such nodes in that order, or loads them in that way.
     fn kernel(&self, query: Query, count_work: bool) -> Result<Kernel> {
         let shader = match (self.form, self.order, self.shape.loads) {
             (Form::Four, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_WIDE_FOUR,
@@ -96,7 +96,7 @@ impl WideTracer {
     /// as [`tracer::record`] does for a `Bvh2`, with the same hits.
     ///
     /// # Errors
-    /// As of [`tracer::record`]; there is no kernel for this order of such nodes, or for such loads.
+    /// As of [`tracer::record`]; no kernel visits such nodes in this order, or loads them in this way.
     pub fn record(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &TraceBuffers) -> Result<()> {
         let kernel = self.kernel(query, buffers.work.is_some())?;
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)

@@ -169,7 +169,7 @@ uvec2 fraction_of(float v, Axis axis) {
     return is_below(fraction, distance) ? uvec2(0xFFFFFFFFu) : fraction;   // the high corner itself
 }
 
-// The same with 96 bits: so many that a grid's cells still have 64 bits of their own.
+// The same with 96 bits: enough to leave 64 bits within a grid's cell.
 uvec3 wide_fraction_of(float v, Axis axis) {
     uvec3 distance = subtract(wide_fixed_point(v, axis.exponent), wide_fixed_point(axis.corner, axis.exponent));
     if ((distance.z & 0x80000000u) != 0) return uvec3(0);

@@ -53,7 +53,7 @@ uvec2 plane_of(uvec3 first, uvec3 last, uint candidate) {
     return uvec2(2, first.z + 1 + candidate);
 }
 
-// One level of splits: candidates are numbered through all parts, so that whoever is free takes the next.
+// One level of splits: candidates are numbered through all parts, so that a free invocation takes the next.
 void split_parts(CodeKind kind, CodeGrid grid, uint level) {
     uint parts = part_count;
     uint from = parts_at(level), to = parts_at(level + 1);
@@ -106,7 +106,7 @@ void split_parts(CodeKind kind, CodeGrid grid, uint level) {
     barrier();
 }
 
-// The extents of a box of so many cells: `Extents::times` in recipe.rs.
+// The extents of a box of these numbers of cells: `Extents::times` in recipe.rs.
 ivec3 extents_of_cells(CodeGrid grid, uvec3 cells) {
     ivec3 extents;
     for (uint axis = 0; axis < 3; ++axis) {

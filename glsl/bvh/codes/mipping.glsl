@@ -42,7 +42,7 @@ void find_layers() {
     }
 }
 
-// The bits of a cell that tell occupied cells apart: x is their number, y how many they are.
+// The bits of a cell that distinguish occupied cells: x is their number, y how many they are.
 uvec2 concise_index(uint depth, uint cell) {
     Words cells = Words(part(parts.table));
     uint index = 0, count = 0;

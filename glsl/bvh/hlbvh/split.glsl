@@ -114,7 +114,7 @@ void name_node(uint link, uint slot) {
     child_words(link).word[INDEX_WORD] = slot;
 }
 
-// Splits a task of a level by the whole workgroup; tells the node's slot, and where the right side begins.
+// Splits a task of a level by the whole workgroup. Outputs the node's slot, and where the right side begins.
 uint split(Task t, uint level, out uint middle) {
     Structure structure = Structure(structure_address);
     Weights w = weights();

@@ -1,14 +1,14 @@
 // The treelets of an HLBVH: see bvh/hlbvh.glsl for the contract.
 //
 // A treelet is a subtree of the radix tree that has at most TREELET_PRIMITIVES, which share TREELET_BITS of the code, and whose
-// parent is none. The climb ends where a treelet is complete. Of the split behind a treelet's last position nobody asks for the
+// parent is none. The climb ends where a treelet is complete. Nothing asks the split behind a treelet's last position for the
 // parent: its weights hold the treelet's root and cost until the clusters are gathered, and its word in `ends` stays as it was.
 #ifndef HEDGEROW_BVH_HLBVH_TREELETS
 #define HEDGEROW_BVH_HLBVH_TREELETS
 #include "bvh/hlbvh.glsl"
 #include "bvh/run.glsl"
 
-// Whether a subtree has no parent, or one that is no treelet: one that splits at a bit that treelets share, or has too many
+// Whether a subtree has no parent, or one that is not a treelet: one that splits at a bit that treelets share, or has too many
 // primitives. Its positions begin (or end) where the subtree's do, and share all bits of the code above the one that it splits at.
 bool is_treelet(Run run, bool is_left, Subtree s) {
     if (s.first == 0u && s.last + 1u == run.active_count) return true;

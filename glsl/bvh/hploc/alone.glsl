@@ -9,7 +9,7 @@ const uint SLOTS = 8;   // the WINDOW of ALONE, at most
 
 Cluster slot_cluster[SLOTS];
 bool slot_is_there[SLOTS];
-// The distance of the nearest, and what its slot is apart from this one, by XOR; 0 where there is none.
+// The distance of the nearest, and what its slot is apart from this one, by XOR; 0 if there is none.
 float slot_distance[SLOTS];
 uint slot_apart[SLOTS];
 

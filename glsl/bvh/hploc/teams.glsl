@@ -27,15 +27,15 @@ shared uint window_goes[2 * TEAMS];
 shared uvec3 requests[gl_WorkGroupSize.x];
 shared uint replies[gl_WorkGroupSize.x];
 
-// What invocations tell each other at a step; three, so that the last but one is cleared while the next is told.
+// What invocations share at a step. There are three, so that the last but one is cleared while the next is written.
 shared uint told[3];
 uint step_number;
 
 const uint IS_WHOLE = 1u << 16;
-// What is told with a request: how many there are, and whether anybody goes on.
+// What comes with a request: how many there are, and whether any invocation goes on.
 const uint IS_WORKING = 1u << 16;
 
-// What the workgroup has written, to memory or to the windows, it sees; the lane that tells the device of it releases it there.
+// The workgroup sees what it has written, to memory or to the windows. The lane that reports it to the device releases it there.
 void team_step() {
     controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
                    gl_SemanticsAcquireRelease | gl_SemanticsMakeAvailable | gl_SemanticsMakeVisible);
@@ -47,11 +47,11 @@ void reset_teams() {
     team_step();
 }
 
-// A step, and what was told before it.
+// A step, and what was shared before it.
 uint step_and_told() {
     team_step();
     uint word = told[step_number % 3u];
-    // Read by all before this step, and next told after the one that follows.
+    // Read by all before this step, and written next after the one that follows.
     if (gl_LocalInvocationIndex == 0u) told[(step_number + 2u) % 3u] = 0u;
     step_number++;
     return word;

@@ -8,7 +8,7 @@
 void main() {
     reset_build(PHASES_BEHIND_SORT);
     barrier();
-    // What is one task; the scans tell how many the others have from the first round on.
+    // What is one task; the scans write how many the others have from the first round on.
     PoolState pool = PoolState(scratch_address);
     uint sorted = phases_before_hierarchy();
     for (uint phase = gl_LocalInvocationIndex; phase < PHASES_BEHIND_SORT; phase += gl_WorkGroupSize.x) {

@@ -1,5 +1,5 @@
 #version 460
-// The boxes above them made anew, bottom-up in one pass: see bvh/refit.glsl for the contract.
+// Makes the boxes above them again, bottom-up in one pass: see bvh/refit.glsl for the contract.
 #include "bvh/refit.glsl"
 
 void main() {

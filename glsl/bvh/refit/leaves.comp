@@ -1,5 +1,5 @@
 #version 460
-// The records made anew, and the boxes of leaves: see bvh/refit.glsl for the contract.
+// Makes the records again, and the boxes of leaves: see bvh/refit.glsl for the contract.
 #include "bvh/refit.glsl"
 
 void main() {

@@ -50,7 +50,7 @@ struct SplitPlane {
 };
 
 // The most important plane of the grid that lies strictly inside of a box: that of the greatest spacing; of such ones, across the
-// longer side of the box. False where there is none.
+// longer side of the box. False if there is none.
 bool find_plane(SplitGrid grid, Box b, out SplitPlane plane) {
     plane = SplitPlane(0, 0.0, NO_PRIMITIVE);
     float longest = 0.0;
@@ -145,7 +145,7 @@ float longest_side(Box b) {
     return max(extent.x, max(extent.y, extent.z));
 }
 
-// How many of so many splits the part in the first box has: by the longest sides, rounded.
+// How many of the splits go to the part in the first box: in proportion to the longest sides, rounded.
 uint splits_of_first(uint splits, Box first, Box second) {
     vec2 side = vec2(longest_side(first), longest_side(second));
     float longest = max(side.x, side.y);
@@ -164,7 +164,7 @@ Box padded(Box b, Box whole) {
     return Box(lo, hi);
 }
 
-// The part of a triangle with this number, of as many as its splits and one; false where there are not so many.
+// The part of a triangle by number: it has one part more than splits. False if there is no such part.
 bool find_part(SplitGrid grid, Corners c, uint splits, uint number, out Box b) {
     Box whole = box_around(c);
     b = whole;

@@ -12,7 +12,7 @@
 // that are named by nodes of lower slots, and its rank among the nodes of its parent; the sums make them. So nodes that one
 // names lie side by side, as do, of quantised nodes, the records of its leaves.
 //
-// What is no structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
+// Anything that is not a structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
 // its own status.
 //
 // needs  first_children and first_records zeroed; one barrier before, between each two, and after; any number of workgroups, but

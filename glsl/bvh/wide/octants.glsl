@@ -1,4 +1,4 @@
-// Children in slots by the octants that they lie in: the twin of `octant_slots` in src/bvh/wide/host.rs, which tells why.
+// Children in slots by the octants that they lie in: the twin of `octant_slots` in src/bvh/twin/wide.rs, which says why.
 #ifndef HEDGEROW_BVH_WIDE_OCTANTS
 #define HEDGEROW_BVH_WIDE_OCTANTS
 #include "bvh/wide/collapse.glsl"
@@ -18,7 +18,7 @@ vec3 middle_of_child(uint i) {
     return middle;
 }
 
-// The slots of the `count` children of open_middle, `centre` being that of their node: `in_slot` tells which is in each, 8 for none.
+// The slots of the `count` children of open_middle, `centre` being that of their node: `in_slot` gives the child in each, 8 for none.
 void octant_slots(uint count, vec3 centre, out uint in_slot[8]) {
     uint left = (1u << count) - 1u;
     [[unroll]] for (uint s = 0; s < 8; ++s) in_slot[s] = 8;

@@ -1,4 +1,4 @@
-// The node of eight children in 80 bytes: the twin of src/bvh/wide/quantised.rs, which tells what it is.
+// The node of eight children in 80 bytes: the twin of src/bvh/wide/quantised.rs, which describes it.
 #ifndef HEDGEROW_BVH_WIDE_QUANTISED
 #define HEDGEROW_BVH_WIDE_QUANTISED
 #include "bvh/wide.glsl"
@@ -52,7 +52,7 @@ QuantisedNode quantised_node_around(vec3 lo, vec3 hi, uint first_child, uint fir
     return node;
 }
 
-// Puts a child of this box into a slot; an empty slot has no records and is no node.
+// Puts a child of this box into a slot; an empty slot has no records and no node.
 void put_into_slot(inout QuantisedNode node, uint slot, bool is_there, vec3 lo, vec3 hi, bool is_node, uint records) {
     uint word = slot >> 2, shift = (slot & 3u) * 8;
     for (uint axis = 0; axis < 3; ++axis) {

@@ -1,5 +1,5 @@
 #version 460
-// The marked leaves built anew and put into their places in one dispatch, from the task pool. See kdtree/merge.glsl.
+// Builds the marked leaves again and puts them into their places in one dispatch, from the task pool. See kdtree/merge.glsl.
 //
 // needs  the state as merge_tasks.comp leaves it, and one barrier before; any number of workgroups from one up
 #include "kdtree/phases.glsl"

@@ -33,18 +33,18 @@ KdItem first_item(uint i) {
                   Box(header.lo, header.hi));
 }
 
-// Of so many items those that there was room for.
+// The number of items that there was room for.
 uint items_there(uint wanted) {
     return min(wanted, merge_state().item_capacity);
 }
 
-// Tiles of a step that has so many items at least.
+// Tiles of a step that has at least this many items.
 void plan_items(uint of_step, uint count) {
     PoolState pool = PoolState(state_address);
     atomicMax(pool.tasks[of_step], (items_there(count) + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x);
 }
 
-// What a step wanted; told by one invocation.
+// What a step wanted, reported by one invocation.
 void note_items(uint wanted, uint of_step) {
     KdMerge merge = merge_state();
     merge.wanted_items = max(merge.wanted_items, wanted);

@@ -24,7 +24,7 @@ struct KdMarked {
     uint node;
     uint first;                     // of its pairs
     uint count;                     // references, those of the static leaf first
-    uint own;                       // so many are of the static leaf
+    uint own;                       // how many are of the static leaf
     uint from;                      // where they are
     uint begin;                     // where all are in the first level
     uint home;                      // of the leaf, or of the parent of one that is empty: where its word is to go

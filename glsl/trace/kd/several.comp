@@ -17,7 +17,7 @@ layout(constant_id = 4) const bool PUSH_DOWN = false;
 #include "trace/buffers.glsl"
 #include "trace/walk_kd.glsl"
 
-// src/trace/kd.rs. The first is no tree: its `first` says how many follow, at least one.
+// src/trace/kd.rs. The first entry is the head: its `first` says how many follow, at least one.
 struct TreeEntry {
     uvec2 structure;
     uint first;

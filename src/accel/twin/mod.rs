@@ -11,7 +11,7 @@ use crate::bvh::twin::lbvh;
 use crate::geometry::Aabb;
 use ash::vk;
 
-/// What is told of a bottom-level structure.
+/// What a top level knows of a bottom-level structure.
 #[derive(Debug, Clone, Copy)]
 pub struct Below<'a> {
     header: &'a Header,
@@ -85,7 +85,7 @@ fn entry_of<'a>(number: u32, instance: &Instance, below: &impl Fn(u64) -> Option
 }
 
 impl Below<'_> {
-    /// The children of what is no leaf.
+    /// The children of an inner node.
     fn opened(&self, child: &Child) -> Option<[Child; 2]> {
         if child.is_leaf() { None } else { self.nodes.get(child.index as usize).map(|node| node.children) }
     }
@@ -146,7 +146,7 @@ fn transformed_box(m: &[[f32; 4]; 3], child: &Child) -> Aabb {
     b
 }
 
-/// The inverse of an affine matrix, by its adjugate; `None` where there is none in finite numbers (`instances.glsl`).
+/// The inverse of an affine matrix, by its adjugate; `None` if it is not finite (`instances.glsl`).
 /// How far the elements of an instance's inverse may be from those found here, where the device does not divide as the host does:
 /// in parts of an element; of the fourth column, in half the parts of the sum of the products that it is made of. Vulkan lets a
 /// quotient be 2.5 units in the last place away; what it is multiplied with is rounded twice.

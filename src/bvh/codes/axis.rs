@@ -43,7 +43,7 @@ impl Axis {
         distance.saturating_add(u64::try_from(more).unwrap_or(u64::MAX))
     }
 
-    /// The same with 96 bits: so many that a grid's cells still have 64 bits of their own.
+    /// The same with 96 bits: enough to leave 64 bits within a grid's cell.
     pub fn wide_fraction(&self, v: f32) -> u128 {
         let wide = |v: f32| wide_fixed_point(v, self.exponent);
         let distance = (wide(v) - wide(self.corner)).max(0) as u128;
@@ -95,8 +95,8 @@ fn wide_fixed_point(v: f32, exponent: i32) -> i128 {
 /// Bits of a fraction of an octave in [`octaves`].
 const OCTAVE_BITS: u32 = 22;
 
-/// The distance from `v` to `corner` as a piecewise linear logarithm: octaves from some far-off unit on, and [`OCTAVE_BITS`] bits of
-/// a fraction.
+/// The distance from `v` to `corner` as a piecewise linear logarithm: octaves from some far-off unit on, and [`OCTAVE_BITS`]
+/// bits of a fraction.
 pub(super) fn octaves(v: f32, corner: f32) -> u32 {
     let exponent = biased_exponent(v).max(biased_exponent(corner));
     let distance = fixed_point(v, exponent).abs_diff(fixed_point(corner, exponent)).max(1);

@@ -1,16 +1,16 @@
 //! Binning: the first splits by the SAH of a coarse counted grid (Riemersma 2024, section 3.2.3 and appendix 8.2).
 //!
-//! A grid of 2⁷ cells counts the centroids. Its cells are numbered by the bits of the shortest axis, then the middle, then the longest
-//! (the layout s-m-l): a box of cells is then a mask of four words with runs of bits, which the device counts by. A count
-//! becomes a weight: 1, for the cell is occupied, plus its place between the least and the largest count as a fraction of A bits.
-//! Q times, every box of cells is split by the plane with the least score: the SAH over cells (equation 10) and the stretch factor
-//! (9), weighted by λ (11).
+//! A grid of 2⁷ cells counts the centroids. Its cells are numbered by the bits of the shortest axis, then the middle, then the
+//! longest (the layout s-m-l): a box of cells is then a mask of four words with runs of bits, which the device counts by. A
+//! count becomes a weight: 1, for the cell is occupied, plus its place between the least and the largest count as a fraction of
+//! A bits. Q times, every box of cells is split by the plane with the least score: the SAH over cells (equation 10) and the
+//! stretch factor (9), weighted by λ (11).
 //!
 //! The thesis prints (λ − 1) · SAH' + λ · SF for the score, here and in appendix 8.2.2, and takes the minimum of scores (8.2.1: an
 //! atomic minimum). With λ below 1 that would look for the *largest* SAH cost; it must be (1 − λ), which is what is done here.
 //!
-//! A primitive's code is the path to its part, only the splits that there are, followed by a code within the cells of that part: a part
-//! that is one cell is not split, and costs no bits.
+//! A primitive's code is the path to its part, only the splits that there are, followed by a code within the cells of that
+//! part: a part that is one cell is not split, and costs no bits.
 
 use super::Order;
 use super::mipping::top;
@@ -153,8 +153,8 @@ impl Grid {
         u64::from(stretch - 1) * sah + ((factors * u64::from(weight) * u64::from(self.half_area(parent))) >> 8)
     }
 
-    /// The boxes below the plane with the least score, of x before y before z and from the low side where scores are equal; `None` for
-    /// a single cell.
+    /// The boxes below the plane with the least score, of x before y before z and from the low side where scores are equal;
+    /// `None` for a single cell.
     fn split(&self, cells: Cells, stretch: u32) -> Option<[Cells; 2]> {
         let planes = (0..3).flat_map(|axis| (cells[0][axis] + 1..=cells[1][axis]).map(move |plane| (axis, plane)));
         let halves = planes.map(|(axis, plane)| {

@@ -1,4 +1,4 @@
-//! Codes as the shaders are told of them: `CodeKind` and `CODE_PREFIX` in codes.glsl.
+//! Codes as the shaders take them: `CodeKind` and `CODE_PREFIX` in codes.glsl.
 
 use super::{Code, CodeBounds, Codes};
 

@@ -1,8 +1,9 @@
-//! Mipping: of the first bits of a code, only those that tell occupied cells apart (Riemersma 2024, section 3.2.2 and appendix 8.1).
+//! Mipping: of the first bits of a code, only those that tell occupied cells apart (Riemersma 2024, section 3.2.2 and appendix
+//! 8.1).
 //!
-//! The first bits of the code of a centroid are its cell in an *occupancy grid*, a bit a cell. Its mip layers merge eight cells into
-//! one; from the top layer down, the byte of the eight cells around a primitive says which of the three next bits are needed:
-//! those that have something on both sides. What follows is the same code continued below the cell.
+//! The first bits of the code of a centroid are its cell in an *occupancy grid*, a bit a cell. Its mip layers merge eight cells
+//! into one; from the top layer down, the byte of the eight cells around a primitive says which of the three next bits are
+//! needed: those that have something on both sides. What follows is the same code continued below the cell.
 
 use super::Order;
 use super::plan::prefixed;
@@ -46,7 +47,7 @@ pub(super) struct Occupancy {
 }
 
 impl Occupancy {
-    /// The grid of so many bits over bounds of these extents, occupied by `centroids`, and codes of `bits` bits.
+    /// The grid of this many bits over bounds of these extents, occupied by `centroids`, and codes of `bits` bits.
     pub fn new(
         grid_bits: u32,
         mut extents: Extents,

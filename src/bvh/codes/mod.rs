@@ -4,11 +4,11 @@
 //! section 3.7, and Riemersma 2024, section 2.4.3.
 //!
 //! Every code is the same recipe with other ingredients: a *sequence* of axes, from the top bit down, of which each takes the
-//! next bit of that axis' coordinate; and, every so many bits, one bit of the primitive's size (`recipe.rs`). What far primitives
-//! would cost, others save by a *prefix* that says in which part of the scene a primitive lies, followed by the code within that
-//! part: occupied cells (`mipping.rs`), splits of a counted grid (`binning.rs`), or sections around robust bounds
-//! (`sections.rs`). [`CodePlan`] is all of it for a given scene; `glsl/bvh/codes.glsl` cooks by the same one and gives the same bits
-//! on every device: no division, square root or contraction that a driver may round its own way is trusted.
+//! next bit of that axis' coordinate; and, at regular intervals, one bit of the primitive's size (`recipe.rs`). What far
+//! primitives would cost, others save by a *prefix* that says in which part of the scene a primitive lies, followed by the code
+//! within that part: occupied cells (`mipping.rs`), splits of a counted grid (`binning.rs`), or sections around robust bounds
+//! (`sections.rs`). [`CodePlan`] is all of it for a given scene; `glsl/bvh/codes.glsl` cooks by the same one and gives the same
+//! bits on every device: no division, square root or contraction that a driver may round its own way is trusted.
 //!
 //! `docs/notes/codes.md` compares them.
 

@@ -65,7 +65,7 @@ impl Extents {
         axis
     }
 
-    /// The extents of a box of so many cells of these extents, cut off to 24 bits.
+    /// The extents of a box of these numbers of cells, cut off to 24 bits.
     pub fn times(&self, cells: [u32; 3]) -> Extents {
         Extents(std::array::from_fn(|axis| {
             let product = (self.0[axis] as u32 & 0x7F_FFFF | 0x80_0000) * cells[axis];

@@ -7,11 +7,11 @@
 //! three sections: the *core*, all boxes inside the fences, encoded within its own bounds; what is *far*; and what is not inside
 //! the fences but touches the core, *huge*.
 //!
-//! A code begins with a bit for what is huge, which otherwise would lie over every node above it. The bit that sets apart what is far
-//! stands behind the first bit of each axis: only one octant of the core has the far primitives of one side in its node,
+//! A code begins with a bit for what is huge, which otherwise would lie over every node above it. The bit that sets apart what
+//! is far stands behind the first bit of each axis: only one octant of the core has the far primitives of one side in its node,
 //! and those of different sides meet in no node of their own. Coordinates of what is far or huge are linear in the core and the
-//! logarithm of the distance beyond it, so that a hundred far primitives at different distances are told apart, however far they
-//! are.
+//! logarithm of the distance beyond it, so that a hundred far primitives at different distances are told apart, however far
+//! they are.
 
 use super::axis::{from_ordered, octaves, ordered};
 use crate::geometry::Aabb;
@@ -20,7 +20,7 @@ use crate::geometry::Aabb;
 pub(super) const PREFIX_BITS: u32 = 5;
 /// Primitives that are looked at.
 const SAMPLE: u64 = 256;
-/// One of so many sampled centroids lies below the low quantile, and as many above the high one.
+/// One in this many sampled centroids lies below the low quantile, and one above the high one.
 const QUANTILE: usize = 16;
 
 /// The sections of a scene that has something far or huge.
@@ -148,7 +148,8 @@ impl Sections {
         }
     }
 
-    /// The coordinates of what is not of the core, from those within the core: the lower and the upper quarter are for what is beyond.
+    /// The coordinates of what is not of the core, from those within the core: the lower and the upper quarter are for what is
+    /// beyond.
     pub fn coordinates(&self, at: [f32; 3], within: [u64; 3]) -> [u64; 3] {
         std::array::from_fn(|axis| {
             let Some(tail) = self.tails[axis] else { return within[axis] };

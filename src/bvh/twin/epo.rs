@@ -29,7 +29,7 @@ pub struct Areas {
     pub surface: f64,
 }
 
-/// The end-point overlap of `tree` with these costs of a step and of a test; `None` where there is no surface.
+/// The end-point overlap of `tree` with these costs of a step and of a test; `None` if the surface has no area.
 pub fn epo(tree: &Bvh2, c_t: f64, c_i: f64) -> Option<f64> {
     let surfaces = Surfaces::new(tree);
     (0..surfaces.count()).fold(Areas::default(), |sum, i| sum.plus(&surfaces.areas(i))).epo(c_t, c_i)
@@ -45,7 +45,7 @@ impl Areas {
         }
     }
 
-    /// The end-point overlap with these costs; `None` where there is no surface.
+    /// The end-point overlap with these costs; `None` if the surface has no area.
     pub fn epo(&self, c_t: f64, c_i: f64) -> Option<f64> {
         (self.surface > 0.0).then(|| (c_t * self.inner + c_i * self.leaves) / self.surface)
     }

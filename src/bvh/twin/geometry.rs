@@ -28,7 +28,7 @@ pub struct HostGeometry<'a> {
 /// The corners of a triangle, or the bit of [`status`] that says why it is left out.
 pub type Corners = Result<[[f32; 3]; 3], u32>;
 
-/// The flags of a structure's header and its table, of so many primitives in each geometry, and the flags of each. There is a table
+/// The flags of a structure's header, and its table, from the number of primitives and the flags of each geometry. There is a table
 /// where there are several.
 pub(crate) fn table_of(geometries: &[(u32, u32)]) -> (u32, Vec<GeometryEntry>) {
     let flags = || geometries.iter().map(|&(_, flags)| flags);

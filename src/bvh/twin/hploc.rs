@@ -28,7 +28,7 @@ struct Build<'a, R: Record> {
 }
 
 impl<R: Record> Build<'_, R> {
-    /// The clusters that a node of the radix tree leaves for its parent: so many at most.
+    /// The clusters that a node of the radix tree leaves for its parent, at most `most`.
     fn clusters_of(&mut self, child: Child, most: usize) -> Vec<Cluster> {
         if child.is_leaf() {
             return vec![Cluster::of_leaf(child)];
@@ -41,7 +41,7 @@ impl<R: Record> Build<'_, R> {
         clusters
     }
 
-    /// Rounds of PLOC until so many clusters are left, at most.
+    /// Rounds of PLOC until at most `most` clusters are left.
     fn merge_down_to(&mut self, most: usize, clusters: &mut Vec<Cluster>) {
         number(clusters);
         while clusters.len() > most {

@@ -3,20 +3,20 @@
 //! Meister and Bittner 2018, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction". What it leaves
 //! open is settled so that the tree does not depend on who runs it:
 //!
-//! - Where all distances are equal, or boxes grow from each cluster to the next, everyone's nearest is the one before, and only the
-//!   first two merge. So once rounds have looked at 16 clusters a primitive and 131 072 more, a round of n in which fewer than
-//!   n/16 fall away is followed by a *forced* one: beside the pairs of before, 2k and 2k + 1 merge wherever neither is in a pair.
-//!   That leaves at most three quarters of them. Rounds forced wherever one is slow have cost a bathroom (salle_de_bain), whose last
-//!   2000 clusters take 170 rounds, 37%.
+//! - Where all distances are equal, or boxes grow from each cluster to the next, everyone's nearest is the one before, and only
+//!   the first two merge. So once rounds have looked at 16 clusters a primitive and 131 072 more, a round of n in which fewer
+//!   than n/16 fall away is followed by a *forced* one: beside the pairs of before, 2k and 2k + 1 merge wherever neither is in
+//!   a pair. That leaves at most three quarters of them. Rounds forced wherever one is slow have cost a bathroom
+//!   (salle_de_bain), whose last 2000 clusters take 170 rounds, 37%.
 //!
 //! Distances, ties and slots: `clusters.rs`.
 
 use super::clusters::{Cluster, merged, nearest};
 use crate::bvh::layout::{Bvh2, Record};
 
-/// Clusters that rounds look at before any is forced: so many a primitive, and so many anyway.
+/// Clusters that rounds may look at before merges are forced: this many per primitive, and a fixed number.
 const LOOKS: [usize; 2] = [16, 1 << 17];
-/// Of a round's clusters, one in so many falls away, or it is slow.
+/// A round is slow if fewer than one in this many clusters merges.
 const SLOW: usize = 16;
 
 /// The tree that PLOC builds over the records of `sorted`, in which every leaf has one record: any LBVH that is not collapsed.

@@ -1,4 +1,4 @@
-//! Parallel reinsertion, plainly: the twin of [`crate::bvh::reinsertion`], where the method is told.
+//! Parallel reinsertion, plainly: the twin of [`crate::bvh::reinsertion`], which describes the method.
 
 use crate::bvh::layout::{Bvh2, Child, Record};
 use crate::bvh::reinsertion::{LEAST_GAIN, LEAST_SHARE, PATH, ReinsertionOptions, STACK};
@@ -16,7 +16,7 @@ struct Move {
 }
 
 impl<R: Record> Bvh2<R> {
-    /// The tree, in which every leaf has one record, after the passes that `options` tells: the bytes of
+    /// The tree, in which every leaf has one record, after the passes of `options`: the bytes of
     /// [`crate::bvh::reinsertion`].
     pub fn reinserted(&self, options: &ReinsertionOptions) -> Bvh2<R> {
         let mut work = LinkedTree { parents: parents_of(self), tree: self.clone() };

@@ -239,7 +239,7 @@ impl Grid {
         Some(weight.min(WEIGHTS - 1))
     }
 
-    /// The box of the part of a triangle with this number, of as many as its splits and one, if there are so many.
+    /// The box of a triangle's part by number, if there is such a part: a triangle has one part more than splits.
     fn part(&self, corners: &[[f32; 3]; 3], mut splits: u32, mut number: u32) -> Option<Aabb> {
         let whole = Aabb::around(corners);
         let mut b = whole;
@@ -324,7 +324,7 @@ fn crossing_of(a: [f32; 3], b: [f32; 3], plane: &SplitPlane) -> Aabb {
     crossing
 }
 
-/// How many of so many splits the part in the first box has: by the longest sides, rounded.
+/// How many of the splits go to the part in the first box: in proportion to the longest sides, rounded.
 fn splits_of_first(splits: u32, first: &Aabb, second: &Aabb) -> u32 {
     let side = [first, second].map(|b| b.extent().into_iter().fold(0.0, f32::max));
     let longest = side[0].max(side[1]);

@@ -20,7 +20,7 @@ pub struct WideOptions {
     pub geometry_count: u32,
 }
 
-/// Collapsing of a `Bvh2` of at most so many primitives, by whatever builder.
+/// Collapses a `Bvh2` of any builder, with at most a given number of primitives, into a wide tree.
 #[derive(Debug, Clone, Copy)]
 pub struct WidePass {
     options: WideOptions,
@@ -80,7 +80,7 @@ impl WidePass {
         }
     }
 
-    /// Bytes of the wide structure, at most (its header tells how many are in use: [`Form::bytes_in_use`]), and of the scratch
+    /// Bytes of the wide structure, at most (its header says how many are in use: [`Form::bytes_in_use`]), and of the scratch
     /// memory.
     pub fn sizes(&self) -> Sizes {
         let WideOptions { form, primitives, geometry_count } = self.options;

@@ -14,7 +14,7 @@
 //! Costs are those of the binary tree that it was made of. Children of a node that are nodes lie side by side.
 //!
 //! Nodes of floats hold [`Child`]ren as those of a `Bvh2` do, the first ones used, the others [`Child::UNUSED`]; records lie in
-//! the order of the binary tree. Of quantised ones [`super::quantised`] tells.
+//! the order of the binary tree. [`super::quantised`] describes quantised ones.
 
 use super::Form;
 use crate::bvh::layout::{self, Child, GeometryEntry, Header, NODES_OFFSET, Record, Triangle, header_of};
@@ -95,7 +95,7 @@ pub struct Wide<N: WideNode, R: Record = Triangle> {
 }
 
 impl Form {
-    /// Bytes of a structure of so many nodes, records of `record_bytes` bytes, and geometries.
+    /// Bytes of a structure of this many nodes, records of `record_bytes` bytes, and geometries.
     pub const fn bytes(self, record_bytes: u64, nodes: u32, primitive_count: u32, geometry_count: u32) -> u64 {
         let entries = if geometry_count > 1 { geometry_count as u64 } else { 0 };
         let entries = entries * size_of::<GeometryEntry>() as u64;

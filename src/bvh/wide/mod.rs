@@ -6,7 +6,7 @@
 //!
 //! - [`layout`] are the bytes, [`quantised`] those of the node of 80 bytes;
 //! - [`super::twin::wide`] collapses plainly, [`device`] in the caller's command buffer: the same bytes;
-//! - [`validate`] walks a wide tree, [`quality`] tells what it costs;
+//! - [`validate`] walks a wide tree, [`quality`] says what it costs;
 //! - [`crate::trace::wide`] traces it.
 
 pub mod device;

@@ -5,7 +5,7 @@
 //! them holds the child's; so [`crate::trace::slab`], whose proof is for any box around the triangle, holds for it. (Tracers,
 //! which see it from the ray's origin, do not round as this does: that is in the proof's margin.)
 //!
-//! A child's slot tells the octant that it lies in, as seen from the middle of the node (section 3.1): a tracer meets the
+//! A child's slot encodes the octant that it lies in, as seen from the middle of the node (section 3.1): a tracer meets the
 //! children from near to far by counting slots in an order that follows from the signs of the ray's direction.
 //!
 //! Other than in the paper, a leaf's byte holds the number of its records, up to 255, and their place follows from the bytes of

@@ -24,8 +24,8 @@ impl MergeOptions {
 pub struct MergeEstimate {
     /// Leaves of the static tree that it is in; where its object has a tree, once for each leaf of that one there.
     pub pairs: f32,
-    /// Nodes of objects' trees on their way down the static one, in the step that has most, or leaves of them in its leaves; 0 where
-    /// no object has a tree.
+    /// Nodes of objects' trees on their way down the static one, in the step that has most, or leaves of them in its leaves; 0
+    /// where no object has a tree.
     pub items: f32,
     /// Leaves of the static tree that any is in.
     pub marked: f32,
@@ -85,7 +85,7 @@ pub struct MergeReport {
 }
 
 impl MergeReport {
-    /// What suffices for so many triangles of objects; where it was not found out, twice what was asked for.
+    /// What suffices for this many triangles of objects; twice what was asked for if the merge could not find out.
     pub fn estimate(&self, triangles: u32) -> MergeEstimate {
         let is_known = self.status & status::OUT_OF_ROOM == 0;
         let of = |count: u32, more: f64| (f64::from(count) * more / f64::from(triangles.saturating_add(64))) as f32;

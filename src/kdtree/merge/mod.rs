@@ -1,14 +1,15 @@
 //! Objects that move are merged into a kd-tree on the device, and taken out again, in the caller's command buffer and memory
 //! (Papay 2025, section 10.3).
 //!
-//! [`Merger::record`] puts triangles into a tree of what stands still: those leaves that they are in are built anew, as tasks of the
-//! builder ([`super::builder`]), and put where the leaves were; all else stays where it is. [`Merger::restore`] writes back what was
-//! overwritten. So objects come and go by a restore and a merge of those that are then to be there; [`Objects`] keeps the list.
+//! [`Merger::record`] puts triangles into a tree of what stands still: the leaves that they touch are built again, as tasks of
+//! the builder ([`super::builder`]), and put where the leaves were; all else stays where it is. [`Merger::restore`] writes back
+//! what was overwritten. So objects come and go by a restore and a merge of those that are then to be there; [`Objects`] keeps
+//! the list.
 //!
-//! There are two ways to those leaves, and the merged tree is the same by both. Triangles find them each by itself; or an object has a
-//! kd-tree of its own ([`Object::tree`]), and that is pushed down the static one, many triangles at once.
+//! There are two ways to those leaves, and the merged tree is the same by both. Triangles find them each by itself; or an
+//! object has a kd-tree of its own ([`Object::tree`]), and that is pushed down the static one, many triangles at once.
 //!
-//! The structure needs room: [`Merger::room`] tells how much, [`KdTree::with_room`](super::layout::KdTree::with_room) or
+//! The structure needs room: [`Merger::room`] gives it, [`KdTree::with_room`](super::layout::KdTree::with_room) or
 //! [`KdOptions::more`](super::builder::KdOptions::more) make it. [`super::twin::merge`] is the twin, `glsl/kdtree/merge.glsl`
 //! the device's side.
 
@@ -32,34 +33,34 @@ use crate::{Error, Result};
 use bytemuck::Zeroable;
 use std::ops::Range;
 
-/// What is merged at once at most.
+/// The most that one merge takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MergeCapacity {
-    /// Objects.
+    /// The most objects.
     pub objects: u32,
-    /// Triangles of all of them.
+    /// The most triangles of all objects together.
     pub triangles: u32,
 }
 
 /// Bytes that a merge needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MergeSizes {
-    /// Scratch, free again when the merge has run and its report has been read.
+    /// Bytes of scratch memory: free again when the merge has run and its report has been read.
     pub scratch: u64,
-    /// What was overwritten: kept until the static tree is restored.
+    /// Bytes for what the merge overwrites: kept until the static tree is restored.
     pub undo: u64,
     /// Alignment of all addresses.
     pub alignment: u64,
 }
 
-/// Where a merge works.
+/// The memory that a merge works in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MergeMemory {
-    /// The static tree with its room, and then the merged one.
+    /// The static tree with its room; the merge makes it the merged one.
     pub structure: Region,
-    /// Of the bytes that [`Merger::sizes`] tells.
+    /// Scratch memory, of [`Merger::sizes`].
     pub scratch: Region,
-    /// The same.
+    /// Memory for what is overwritten, of [`Merger::sizes`].
     pub undo: Region,
 }
 
@@ -118,7 +119,7 @@ impl MergePlan {
 }
 
 impl Merger {
-    /// The room that a structure must have beside the static tree.
+    /// The room that a structure must have in addition to the static tree.
     pub fn room(options: &MergeOptions, most: MergeCapacity) -> SpareRoom {
         let plan = MergePlan::of(&options.estimate, most.triangles);
         SpareRoom {
@@ -128,7 +129,7 @@ impl Merger {
         }
     }
 
-    /// Merges into the structure with the primitives and the room that `still` tells of; nothing else of it is looked at.
+    /// Merges into the structure with the primitives and the room of `still`; its other fields are not read.
     ///
     /// # Errors
     /// An option out of range; the structure has less room than [`Merger::room`].
@@ -216,12 +217,12 @@ impl Merger {
 
     /// Records the merge of `objects`, in any order, into the static tree at `memory.structure`, which nothing is merged into.
     ///
-    /// The caller makes the inputs and the structure visible to compute shaders before, and places a barrier (compute shader write to
-    /// whatever reads the structure or the report, writes the scratch memory or restores) behind. Where there is no room for the
-    /// items, the pairs, the leaves or their references, nothing is merged; where there is none for the levels below, nodes are leaves;
-    /// the status says so in both cases. Labels: `encode`; `push` where an object has a tree, `find` where one has none; `sort`;
-    /// `unique` where one has a tree; `mark`; those of the builder's levels, `place` and `hook`, or `build` where the schedule is
-    /// persistent.
+    /// The caller makes the inputs and the structure visible to compute shaders before, and places a barrier (compute shader
+    /// write to whatever reads the structure or the report, writes the scratch memory or restores) behind. Where there is no
+    /// room for the items, the pairs, the leaves or their references, nothing is merged; where there is none for the levels
+    /// below, nodes are leaves; the status says so in both cases. Labels: `encode`; `push` where an object has a tree, `find`
+    /// where one has none; `sort`; `unique` where one has a tree; `mark`; those of the builder's levels, `place` and `hook`, or
+    /// `build` where the schedule is persistent.
     ///
     /// # Errors
     /// The memory is too small; more objects or triangles than the merger is for; several geometries in one; primitives that are
@@ -357,7 +358,7 @@ impl Merger {
         steps.push(fill::step("encode", keys[0], pair_capacity * key_words, u32::MAX));
         let each_first_tile = objects.iter().enumerate().map(|(i, object)| (*object, first_tile(i)));
         steps.extend(push::steps(seeds, self.schedule, (self.shape.workgroup, groups), each_first_tile, step));
-        // Neighbours without trees at once: so many primitives have as many tiles.
+        // Neighbours without trees are taken together: their tiles follow from the number of their primitives.
         let mut at = 0;
         for neighbours in objects.chunk_by(|a, b| has_tree(a) == has_tree(b)) {
             let first = at;

@@ -3,20 +3,21 @@
 use crate::bvh::geometry::Input;
 use crate::{Error, Result};
 
-/// Triangles that move.
+/// An object that moves: triangles that a merge puts into the static tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Object {
     /// One geometry.
     pub input: Input,
     /// What hits of its first triangle say; behind those of the static tree, and apart from those of other objects.
     pub first_primitive: u32,
-    /// The address of a kd-tree of the same triangles as they now are, its primitives numbered from 0 on, in memory of the caller, who
-    /// makes it visible to compute shaders as the input is: [`crate::kdtree::builder`] builds one. It is pushed down the static tree
-    /// ("merging on the GPU", Papay 2025, section 10.3). Without one the triangles find their leaves each by itself.
+    /// The address of a kd-tree of the same triangles as they now are, its primitives numbered from 0 on, in memory of the
+    /// caller, who makes it visible to compute shaders as the input is: [`crate::kdtree::builder`] builds one. It is pushed
+    /// down the static tree ("merging on the GPU", Papay 2025, section 10.3). Without one the triangles find their leaves each
+    /// by itself.
     pub tree: Option<u64>,
 }
 
-/// Which objects are to be in the tree, by name.
+/// The objects that the tree should hold, by name.
 #[derive(Debug, Clone, Default)]
 pub struct Objects {
     named: Vec<(String, Object)>,
@@ -35,7 +36,7 @@ impl Objects {
         Ok(())
     }
 
-    /// Takes an object out.
+    /// Removes an object.
     ///
     /// # Errors
     /// [`Error::Argument`] if none has this name, with the names of those that are there.
@@ -50,7 +51,7 @@ impl Objects {
         }
     }
 
-    /// Those that are to be there: for [`Merger::record`](super::Merger::record).
+    /// The list of objects for [`Merger::record`](super::Merger::record).
     pub fn list(&self) -> Vec<Object> {
         self.named.iter().map(|(_, object)| *object).collect()
     }

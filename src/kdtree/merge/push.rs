@@ -14,8 +14,8 @@ pub(super) const ITEM_BYTES: u64 = 3 * 76;
 /// Each goes down in one of two trees.
 const STEPS: u32 = 2 * MAX_DEPTH + 1;
 
-/// The steps by which the trees of `objects`, each with its first tile, become pairs; none where no object has one. `step` makes one
-/// of a phase, a shader, a level and a number of workgroups.
+/// The steps by which the trees of `objects`, each with its first tile, become pairs; none where no object has one. `step`
+/// makes one of a phase, a shader, a level and a number of workgroups.
 pub(super) fn steps(
     seeds: u64,
     schedule: Schedule,

@@ -9,7 +9,7 @@ use crate::kdtree::layout::{KIND, KdHeader, KdNode, KdTree, MAX_NODES, MAX_REFER
 use crate::{Error, Result};
 use bytemuck::Zeroable;
 
-/// The structure of a root over `records`, of so many primitives and with this status.
+/// The structure of a root over `records`, with this number of primitives and this status.
 pub fn assemble(
     root: Subtree,
     heuristic: &Heuristic,

@@ -13,7 +13,7 @@ use crate::bvh::layout::Triangle;
 use crate::geometry::Aabb;
 use crate::kdtree::layout::halves;
 
-/// The tree over `references` in `cell`, by so many bins along each axis; cells of no more than `exact` references are split exactly.
+/// The tree over `references` in `cell`, with `bins` along each axis. Cells of at most `exact` references are split exactly.
 pub fn build(
     fork: &impl Fork,
     heuristic: &Heuristic,
@@ -103,7 +103,7 @@ struct Planes {
 
 impl Planes {
     fn of(cell: &Aabb, axis: usize, bins: usize) -> Planes {
-        // Halves: the extent of a scene as large as the floats is none.
+        // Halves, for the extent of a scene may exceed the largest float.
         let width = (0.5 * cell.hi[axis] - 0.5 * cell.lo[axis]) * (2.0 / bins as f32);
         Planes { lo: cell.lo[axis], width, bins_per_length: 1.0 / width, bins }
     }

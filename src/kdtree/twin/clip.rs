@@ -3,18 +3,19 @@
 //! The thesis gathers where edges and faces of triangle and box cross. Here the triangle is cut at the six faces of the cell, one
 //! after the other (Sutherland and Hodgman 1974): the same points, and no division by how steep the triangle stands to an edge.
 //!
-//! **Every point of a triangle is in a cell that references it.** A plane puts a triangle whose part ends at it on that side alone;
-//! one that lies in it on either, as the builder likes; all others on both, each clipped anew. The box of a part holds the part: with
-//! ε = 2⁻²⁴, *s* the triangle's longest side and *c* its greatest coordinate along the axis, six cuts put what is left of a triangle
-//! off by at most 64ε·s + 6ε·c. (Of a corner that a cut makes, a + t·(b − a), t is off by 8ε: two differences, a reciprocal that a
-//! device has to 5ε, a product; t·(b − a) by two more; the sum is rounded once. Keeping it in the box around the edge brings it no
-//! farther from where it should be.) So the faces that it is cut at are moved out by 64ε·s + 8ε·c, `rounding`, and what was right
-//! before the cut and is off by less than that is kept; and the box around the part is larger by as much, but not larger than the
-//! triangle's own: walls and tiles whose corners lie in common planes are parted by them.
+//! **Every point of a triangle is in a cell that references it.** A plane puts a triangle whose part ends at it on that side
+//! alone; one that lies in it on either, as the builder likes; all others on both, each clipped again. The box of a part holds
+//! the part: with ε = 2⁻²⁴, *s* the triangle's longest side and *c* its greatest coordinate along the axis, six cuts put what
+//! is left of a triangle off by at most 64ε·s + 6ε·c. (Of a corner that a cut makes, a + t·(b − a), t is off by 8ε: two
+//! differences, a reciprocal that a device has to 5ε, a product; t·(b − a) by two more; the sum is rounded once. Keeping it in
+//! the box around the edge brings it no farther from where it should be.) So the faces that it is cut at are moved out by 64ε·s
+//! + 8ε·c, `rounding`, and what was right before the cut and is off by less than that is kept; and the box around the part is
+//! larger by as much, but not larger than the triangle's own: walls and tiles whose corners lie in common planes are parted by
+//! them.
 //!
 //! A ray's hit may lie beside its triangle, by a part of how far and how long it is. The tracer looks beside the ray by as much
-//! ([`crate::trace::twin::kd`]), as long as no triangle is longer than it knows from the header: [`reach_of`]. For those few that are,
-//! a triangle is all that is near enough to it, `room`.
+//! ([`crate::trace::twin::kd`]), as long as no triangle is longer than it knows from the header: [`reach_of`]. For those few
+//! that are, a triangle is all that is near enough to it, `room`.
 
 use crate::bvh::layout::{SLACK, Triangle};
 use crate::geometry::Aabb;
@@ -25,11 +26,11 @@ const OF_SIDE: f32 = f32::from_bits((127 - 18) << 23);
 const OF_COORDINATE: f32 = f32::from_bits((127 - 21) << 23);
 /// By how much at least: more than what a device may flush to zero.
 const LEAST: f32 = f32::from_bits((127 - 120) << 23);
-/// Triangles are long whose longest side is so many octaves over the mean.
+/// A triangle is long if its longest side is this many octaves above the mean.
 const LONG: u64 = 12;
 /// Edges that are shorter along an axis are not cut there: both ends count. Their reciprocals are finite.
 const SHORTEST: f32 = f32::from_bits((127 - 100) << 23);
-/// Those that are longer are not, either: their reciprocals are subnormal, which a device may flush to zero.
+/// Longer edges are not cut either: their reciprocals are subnormal, and a device may flush those to zero.
 const LONGEST: f32 = f32::from_bits((127 + 125) << 23);
 /// Corners of a triangle that six planes have cut.
 const CORNERS: usize = 9;
@@ -82,7 +83,7 @@ pub fn cell_around(corners: &[[f32; 3]; 3], reach: f32) -> Aabb {
 
 const FINITE: Aabb = Aabb { lo: [-f32::MAX; 3], hi: [f32::MAX; 3] };
 
-/// The box of a triangle's part in a cell; `None` where there is none.
+/// The box of a triangle's part in a cell; `None` if no part is in it.
 pub fn clipped(corners: &[[f32; 3]; 3], reach: f32, cell: &Aabb) -> Option<Aabb> {
     let (room, rounding) = (room(corners, reach), rounding(corners));
     let margin = std::array::from_fn(|i| room[i] + rounding[i]);
@@ -149,9 +150,9 @@ fn widened(b: &Aabb, by: [f32; 3]) -> Aabb {
 
 /// A polygon of no more than [`CORNERS`] corners.
 ///
-/// However it is rounded, once around it every coordinate goes up once and down once at most: those of a triangle do, and what a cut
-/// puts between two corners has coordinates between theirs ([`crossing`]). So a plane is crossed twice at most, and takes at least one
-/// corner away for the two that it adds.
+/// However it is rounded, once around it every coordinate goes up once and down once at most: those of a triangle do, and what
+/// a cut puts between two corners has coordinates between theirs ([`crossing`]). So a plane is crossed twice at most, and takes
+/// at least one corner away for the two that it adds.
 struct ClippedTriangle {
     corners: [[f32; 3]; CORNERS],
     count: usize,
@@ -197,8 +198,8 @@ impl ClippedTriangle {
     }
 }
 
-/// Where the edge from a to b, which goes up along the axis, crosses the plane, within the box around the edge; `None` where it is too
-/// short or too long to tell.
+/// Where the edge from a to b, which goes up along the axis, crosses the plane, within the box around the edge; `None` where it
+/// is too short or too long to tell.
 fn crossing(a: &[f32; 3], b: &[f32; 3], axis: usize, plane: f32) -> Option<[f32; 3]> {
     let d: [f32; 3] = std::array::from_fn(|k| b[k] - a[k]);
     if !(SHORTEST..=LONGEST).contains(&d[axis]) || !d.iter().all(|d| d.is_finite()) {

@@ -42,7 +42,7 @@ pub struct Heuristic {
 }
 
 impl Heuristic {
-    /// For so many primitives, those among them that are left out too, in the root's `cell`, which is empty where all are.
+    /// For this many primitives in the root's `cell`. The count includes those that are left out; the cell is empty if all are.
     pub fn new(costs: Costs, cell: &Aabb, primitives: u32) -> Heuristic {
         Heuristic {
             costs,
@@ -52,7 +52,7 @@ impl Heuristic {
         }
     }
 
-    /// For what is merged in a leaf of a tree of so many triangles, in the leaf's `cell`: as deep as a tracer can walk.
+    /// For merging into a leaf, with cell `cell`, of a tree of this many triangles: as deep as a tracer can walk.
     pub fn of_leaf(costs: Costs, cell: &Aabb, primitives: u32) -> Heuristic {
         Heuristic { costs, area_scale: area_scale(cell), depth_limit: MAX_DEPTH, leaf_size: leaf_size(primitives) }
     }
@@ -67,8 +67,8 @@ impl Heuristic {
         references < self.leaf_size as usize || depth >= self.depth_limit
     }
 
-    /// The split of a cell at a plane with so many references on the left, in it, and on the right; what lies in it goes where it
-    /// costs less. `None` at and beyond the faces, where it would leave no volume (section 9.2).
+    /// The split of a cell at a plane, with these numbers of references on the left, in it, and on the right; what lies in it
+    /// goes where it costs less. `None` at and beyond the faces, where it would leave no volume (section 9.2).
     pub fn split(&self, cell: &Aabb, (axis, at): (usize, f32), [left, planar, right]: [u32; 3]) -> Option<KdSplit> {
         if at <= cell.lo[axis] || at >= cell.hi[axis] {
             return None;
@@ -81,13 +81,13 @@ impl Heuristic {
         Some(KdSplit { plane: KdPlane { axis, at: at + 0.0, planar_left }, cost })
     }
 
-    /// A step in the cell, and so many tests in each of its parts.
+    /// A step in the cell, and these numbers of tests in its parts.
     fn cost(&self, cell: &Aabb, areas: [f32; 2], [left, right]: [f32; 2]) -> f32 {
         let steps = self.costs.c_t * cell.scaled_half_area(self.area_scale);
         steps + self.costs.c_i * (areas[0] * left + areas[1] * right)
     }
 
-    /// The cost of a plane between trees that are worth so many tests, and whether that is less than without it.
+    /// The cost of a plane between trees that are worth this many tests, and whether it is less than without the plane.
     pub fn between(&self, cell: &Aabb, (axis, at): (usize, f32), tests: [f32; 2]) -> (f32, bool) {
         let areas = halves(cell, axis, at).map(|half| half.scaled_half_area(self.area_scale));
         let cost = self.cost(cell, areas, tests);
@@ -99,7 +99,7 @@ impl Heuristic {
         costs.c_t / costs.c_i
     }
 
-    /// The split, if a leaf of so many references costs more.
+    /// The split, if a leaf of this many references costs more.
     pub fn paying(&self, split: Option<KdSplit>, cell: &Aabb, references: usize) -> Option<KdSplit> {
         let leaf = self.costs.c_i * (cell.scaled_half_area(self.area_scale) * references as f32);
         split.filter(|split| split.cost < leaf)

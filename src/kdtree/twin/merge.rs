@@ -32,11 +32,12 @@ pub struct HostObject<'a> {
     pub triangles: &'a [[u32; 3]],
 }
 
-/// The static tree with objects merged into it, by so many bins and exact splits of so many references; its room is not looked at.
+/// The static tree with objects merged into it, by `bins`, with exact splits of at most `exact` references. The tree's room is
+/// not read.
 ///
 /// # Errors
-/// [`Error::Argument`] if objects are not numbered one behind the other and behind the static tree; [`Error::Argument`] if the layout
-/// cannot name what there would be.
+/// [`Error::Argument`] if objects are not numbered one behind the other and behind the static tree; [`Error::Argument`] if the
+/// layout cannot name what there would be.
 pub fn merge(still: &KdTree, objects: &[HostObject<'_>], costs: Costs, (bins, exact): (u32, u32)) -> Result<KdTree> {
     let mut header = still.header;
     let mut records = still.records.clone();

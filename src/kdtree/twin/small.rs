@@ -1,7 +1,7 @@
 //! Subtrees of few references, to their leaves: every face of every box is looked at, and all boxes for each of them.
 //!
-//! That takes time by the square, and no sorting: what a subgroup of a device does fastest. The nodes of such a subtree lie together,
-//! depth first, as one subgroup writes them.
+//! That takes time by the square, and no sorting: what a subgroup of a device does fastest. The nodes of such a subtree lie
+//! together, depth first, as one subgroup writes them.
 
 use super::Subtree;
 use super::clip::{KdPlane, KdReference, divided};

@@ -1,26 +1,28 @@
 //! Tracing kd-trees on the host: with a full stack, by restarts, with push-down and with a short stack (Papay 2025, algorithms 1 to
 //! 4, after Foley and Sugerman 2005 and Horn et al. 2007).
 //!
-//! All are one loop: a short stack holds the nearest of the cells that wait, and where it is empty and cells are left that it had no
-//! room for, the way down begins again: at the root, or with push-down at the last node above which nothing waits. A stack of
-//! unlimited capacity never restarts, one of none is kd-restart.
+//! All are one loop: a short stack holds the nearest of the cells that wait, and where it is empty and cells are left that it
+//! had no room for, the way down begins again: at the root, or with push-down at the last node above which nothing waits. A
+//! stack of unlimited capacity never restarts, one of none is kd-restart.
 //!
-//! **No hit is lost.** The thesis tells near, far and both by where the ray crosses the plane. But what the triangle test takes for a
-//! hit may lie beside the ray, in another cell. With t the hit's computed distance, m the farthest that a vertex of the triangle is
-//! from the origin along an axis, s the triangle's longest side: the triangle's point with the computed weights is less than
-//! [`SLACK`]·m from the ray's point at t along each axis ([`crate::trace::slab`]). That point is within |t|·|d| of the origin, d the
-//! direction's longest component, and so m ≤ (|t|·|d| + s)·(1 + 2⁻¹⁶). Every point of a triangle is in a cell that references it; and of
-//! those few triangles that are longer than the header's `reach`, all that is within 2·SLACK·s of it ([`crate::kdtree`], split
-//! clipping). So there is a point in a cell that references the triangle and is less than SLACK·(|t|·|d| + reach)·(1 + 2⁻¹⁶) from the
-//! ray's point at t; and where it is left of a plane, or in it, the ray's point at t is no farther right than that. Both children are
-//! visited by the part of the ray that is so near, at the end of its interval that is farther from the origin: twice that, and twice
-//! the ray's margin, which is for the rounding of where the planes are crossed (7ε of |t| and ε of the origin) and for a direction
-//! that is moved away from zero (ε/4 of |t|). Where the ray runs in a plane, all of it visits both.
+//! **No hit is lost.** The thesis tells near, far and both by where the ray crosses the plane. But what the triangle test takes
+//! for a hit may lie beside the ray, in another cell. With t the hit's computed distance, m the farthest that a vertex of the
+//! triangle is from the origin along an axis, s the triangle's longest side: the triangle's point with the computed weights is
+//! less than [`SLACK`]·m from the ray's point at t along each axis ([`crate::trace::slab`]). That point is within |t|·|d| of
+//! the origin, d the direction's longest component, and so m ≤ (|t|·|d| + s)·(1 + 2⁻¹⁶). Every point of a triangle is in a cell
+//! that references it; and of those few triangles that are longer than the header's `reach`, all that is within 2·SLACK·s of it
+//! ([`crate::kdtree`], split clipping). So there is a point in a cell that references the triangle and is less than
+//! SLACK·(|t|·|d| + reach)·(1 + 2⁻¹⁶) from the ray's point at t; and where it is left of a plane, or in it, the ray's point at
+//! t is no farther right than that. Both children are visited by the part of the ray that is so near, at the end of its
+//! interval that is farther from the origin: twice that, and twice the ray's margin, which is for the rounding of where the
+//! planes are crossed (7ε of |t| and ε of the origin) and for a direction that is moved away from zero (ε/4 of |t|). Where the
+//! ray runs in a plane, all of it visits both.
 //!
-//! **No cell is visited twice and none forgotten.** Intervals of cells overlap by this, so that t alone cannot tell, as in kd-restart,
-//! where to go on. A bit a level does (Laine 2010, "Restart Trail for Stackless BVH Traversal"): 0 while a far child waits, 1 where none
-//! does. When a cell is done, a one is added at the level of its parent; the carry finds the deepest child that waits. What is
-//! visited and in which order depends on the ray and the planes alone, so each way down finds the same.
+//! **No cell is visited twice and none forgotten.** Intervals of cells overlap by this, so that t alone cannot tell, as in
+//! kd-restart, where to go on. A bit a level does (Laine 2010, "Restart Trail for Stackless BVH Traversal"): 0 while a far
+//! child waits, 1 where none does. When a cell is done, a one is added at the level of its parent; the carry finds the deepest
+//! child that waits. What is visited and in which order depends on the ray and the planes alone, so each way down finds the
+//! same.
 //!
 //! **A ray ends early** only when what it has hit is nearer than where it enters each of the cells that wait. Equally near is not
 //! enough: a primitive with a lower index may be there.

@@ -5,7 +5,7 @@ use crate::trace::ray::PreparedRay;
 use crate::trace::triangle::meet;
 use crate::trace::{Hit, Query, Ray, Work, slab};
 
-/// From so many triangles on, the count of a leaf that waits takes the place of its distance (`glsl/trace/stack.glsl`).
+/// From this many triangles on, the count of a waiting leaf is stored in place of its distance (`glsl/trace/stack.glsl`).
 pub(super) const LONG_LEAF: u32 = 31;
 
 /// The nearest hit; of equally near ones that with the lower primitive index.
