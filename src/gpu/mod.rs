@@ -1,23 +1,30 @@
 //! The device: what we need of it, pipelines, recording, timing, and the primitives that every builder stands on.
 //!
-//! [`Context`] takes a device that the caller made and owns nothing but pipelines.
+//! [`Context`] takes a device that the caller made and owns nothing but pipelines. [`Recorder`] writes passes into the caller's
+//! command buffer. [`Region`] and [`Sizes`] are how memory is passed and asked for.
+//!
+//! Passes that only builders use (fill, scan, reduction, task pool) are public for the laboratory and hidden here.
 
 pub(crate) mod arguments;
 mod context;
+#[doc(hidden)]
 pub mod fill;
 mod grid;
 pub(crate) mod plan;
 pub mod radix_sort;
 mod reconvergence;
 mod recorder;
+#[doc(hidden)]
 pub mod reduce;
 mod region;
 #[doc(hidden)]
 pub mod requirements;
+#[doc(hidden)]
 pub mod scan;
 pub mod shaders;
 mod sizes;
 mod specialise;
+#[doc(hidden)]
 pub mod task_pool;
 mod tuning;
 pub mod twin;
