@@ -127,7 +127,7 @@ fn build(c: &mut Criterion) {
     let (device, scene) = (device(), scene());
     let mut group = c.benchmark_group("build");
     group.sample_size(10).throughput(Throughput::Elements(scene.mesh.triangles.len() as u64));
-    for schedule in [Schedule::Chain, Schedule::Persistent] {
+    for schedule in [Schedule::Chain, Schedule::PERSISTENT] {
         let options = BuildOptions { schedule: Some(schedule), ..BuildOptions::DEFAULT };
         let built = Built::new(&device, &scene, &options).expect("it builds");
         group.bench_function(BenchmarkId::new("lbvh", schedule), |b| b.iter(|| built.build().expect("it builds")));

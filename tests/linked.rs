@@ -1,4 +1,5 @@
-//! A program has the SPIR-V that it reaches, and no other: `examples/trace_only.rs` traces rays, and builds nothing.
+//! A program has the SPIR-V that it reaches, and no other. `examples/trace_only.rs` traces rays and builds nothing;
+//! `examples/engine.rs` builds, but never asks for the persistent schedule.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,13 +23,25 @@ fn linked(program: &Path) -> Vec<String> {
     shaders.filter(is_linked).map(name).collect()
 }
 
-#[test]
-fn who_traces_has_no_shader_of_a_builder() {
+fn linked_into_example(name: &str) -> Vec<String> {
     let tests = std::env::current_exe().expect("the path of this program");
     let examples = tests.ancestors().nth(2).expect("it lies in PROFILE/deps").join("examples");
-    let linked = linked(&examples.join(format!("trace_only{}", std::env::consts::EXE_SUFFIX)));
+    linked(&examples.join(format!("{name}{}", std::env::consts::EXE_SUFFIX)))
+}
+
+#[test]
+fn a_program_that_only_traces_has_no_shader_of_a_builder() {
+    let linked = linked_into_example("trace_only");
     assert!(linked.iter().any(|name| name == "trace.tracer.single"), "what is reached is there: {linked:?}");
     let others: Vec<_> =
         linked.iter().filter(|name| !name.starts_with("trace.") && !name.starts_with("example")).collect();
     assert!(others.is_empty(), "{others:?}");
+}
+
+#[test]
+fn a_program_that_does_not_name_the_persistent_schedule_has_none_of_its_shaders() {
+    let linked = linked_into_example("engine");
+    assert!(linked.iter().any(|name| name == "bvh.lbvh_workgroup"), "what is reached is there: {linked:?}");
+    let persistent: Vec<_> = linked.iter().filter(|name| name.ends_with(".persistent")).collect();
+    assert!(persistent.is_empty(), "{persistent:?}");
 }

@@ -10,6 +10,7 @@ pub use super::hlbvh::Treelets;
 pub use super::hploc::Window;
 use super::method::Hierarchy;
 pub use super::method::Method;
+pub use super::method::PersistentShaders;
 use super::reinsertion::{self, Reinsertion};
 use super::sah::Collapse;
 use super::scratch::Scratch;
@@ -69,7 +70,7 @@ impl BuildOptions {
     fn takes(&self, schedule: Schedule) -> bool {
         match schedule {
             Schedule::Chain => true,
-            Schedule::Persistent => self.optimise.is_none(),
+            Schedule::Persistent(_) => self.optimise.is_none(),
             Schedule::Workgroup => self.optimise.is_none() && self.split.is_none() && self.method == Method::Lbvh,
         }
     }
@@ -80,18 +81,25 @@ impl BuildOptions {
 pub enum Schedule {
     /// One dispatch per phase, with barriers between. Works on every device.
     Chain,
-    /// One persistent dispatch that draws tasks from a pool. The device must keep running workgroups that it has started.
-    Persistent,
+    /// One persistent dispatch that draws tasks from a pool: [`Schedule::PERSISTENT`]. The device must keep running workgroups
+    /// that it has started.
+    Persistent(&'static PersistentShaders),
     /// One workgroup builds everything in one dispatch: for few primitives, at most [`Builder::WORKGROUP_MAX`]. Only
     /// [`Method::Lbvh`] has it.
     Workgroup,
+}
+
+impl Schedule {
+    /// The persistent schedule of every method. The builder never chooses it, so its shaders, the largest of all, are linked
+    /// only into programs that name this constant.
+    pub const PERSISTENT: Schedule = Schedule::Persistent(&PersistentShaders::ALL);
 }
 
 impl std::fmt::Display for Schedule {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Schedule::Chain => "chain",
-            Schedule::Persistent => "persistent",
+            Schedule::Persistent(_) => "persistent",
             Schedule::Workgroup => "workgroup",
         })
     }
@@ -218,7 +226,7 @@ impl Builder {
             items,
             bounds_items: tuning.bounds_run.max(items),
             // Persistent kernels are large as they are: lavapipe's compiler takes a third longer for it.
-            meets_in_group: tuning.meets_in_group && schedule != Schedule::Persistent,
+            meets_in_group: tuning.meets_in_group && !matches!(schedule, Schedule::Persistent(_)),
             sharers: tuning.workers,
             shared_left: context.limits.shared_memory.saturating_sub(shape.shared_bytes() + SHARED_BY_ALL),
             count,
@@ -372,8 +380,12 @@ impl Builder {
         let arguments = &encode.arguments(input, structure, room, scratch.parts)?;
         let mut steps = encode.split.map_or(Vec::new(), |split| split.steps(encode, input, arguments, scratch));
         steps.extend(match schedule {
-            Schedule::Chain => self.chain(input, arguments, scratch),
-            _ => self.hierarchy().persistent_steps(encode, input, arguments, workers),
+            Schedule::Persistent(shaders) => {
+                let shader = shaders.of(self.method);
+                self.hierarchy().persistent_steps(encode, input, arguments, shader, workers)
+            }
+            // Builds by one workgroup have no chain of their own.
+            Schedule::Chain | Schedule::Workgroup => self.chain(input, arguments, scratch),
         });
         Ok(steps)
     }

@@ -8,7 +8,8 @@ use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
 use super::scratch::{BuildPhase, Scratch};
-use crate::gpu::{Kernel, Step, arguments, shaders};
+use crate::gpu::shaders::{self, Shader};
+use crate::gpu::{Kernel, Step, arguments};
 
 /// How [`Method::Hlbvh`](super::builder::Method::Hlbvh) cuts the radix tree into treelets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -39,7 +40,7 @@ fn levels(count: u32) -> u32 {
     (u32::BITS - count.leading_zeros() + 6).min(MOST)
 }
 
-fn kernel(encode: &Encode, treelets: &Treelets, shader: &'static shaders::Shader, input: &Input) -> Kernel {
+fn kernel(encode: &Encode, treelets: &Treelets, shader: &'static Shader, input: &Input) -> Kernel {
     /// `BY_COUNT` in hlbvh.glsl: pipelines do not depend on the number of primitives.
     const BY_COUNT: u32 = u32::MAX;
     let constants = [treelets.primitives, treelets.bits.unwrap_or(BY_COUNT)];
@@ -64,8 +65,8 @@ impl Hierarchy for &Treelets {
         before_top.into_iter().chain(top).chain(behind).collect()
     }
 
-    fn persistent(&self, encode: &Encode, input: &Input) -> [Kernel; 2] {
-        [&shaders::BVH_HLBVH_RESET, &shaders::BVH_HLBVH_PERSISTENT].map(|shader| kernel(encode, self, shader, input))
+    fn persistent(&self, encode: &Encode, input: &Input, shader: &'static Shader) -> [Kernel; 2] {
+        [&shaders::BVH_HLBVH_RESET, shader].map(|shader| kernel(encode, self, shader, input))
     }
 
     fn plan(&self, encode: &Encode, scratch: &mut Scratch) {

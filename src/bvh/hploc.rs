@@ -7,7 +7,8 @@ use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
 use super::scratch::{BuildPhase, Scratch};
-use crate::gpu::{Context, Kernel, Step, arguments, shaders};
+use crate::gpu::shaders::{self, Shader};
+use crate::gpu::{Context, Kernel, Step, arguments};
 
 /// The clusters that [`Method::Hploc`](super::builder::Method::Hploc) merges at a time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -74,7 +75,7 @@ impl Merging {
         if workgroup.is_multiple_of(team) { team } else { workgroup }
     }
 
-    fn kernel(&self, encode: &Encode, shader: &'static shaders::Shader, input: &Input, workgroup: u32) -> Kernel {
+    fn kernel(&self, encode: &Encode, shader: &'static Shader, input: &Input, workgroup: u32) -> Kernel {
         let Merging { window, alone, .. } = *self;
         let constants = [window.size, window.radius, u32::from(alone), self.team(workgroup)];
         encode.reading_kernel_with(shader, input, &constants).in_workgroups_of(workgroup)
@@ -89,8 +90,8 @@ impl Hierarchy for &Merging {
         vec![Step::new("hierarchy", kernel, arguments, groups)]
     }
 
-    fn persistent(&self, encode: &Encode, input: &Input) -> [Kernel; 2] {
-        let all = self.kernel(encode, &shaders::BVH_HPLOC_PERSISTENT, input, encode.shape.workgroup);
+    fn persistent(&self, encode: &Encode, input: &Input, shader: &'static Shader) -> [Kernel; 2] {
+        let all = self.kernel(encode, shader, input, encode.shape.workgroup);
         [encode.reset_kernel(&shaders::BVH_HPLOC_RESET), all]
     }
 

@@ -6,7 +6,8 @@ use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
 use super::scratch::{BuildPhase, Scratch};
-use crate::gpu::{Kernel, Step, arguments, shaders};
+use crate::gpu::shaders::{self, Shader};
+use crate::gpu::{Kernel, Step, arguments};
 
 pub(super) struct Lbvh;
 
@@ -16,9 +17,8 @@ impl Hierarchy for Lbvh {
         vec![Step::new("hierarchy", kernel, arguments, encode.tiles())]
     }
 
-    fn persistent(&self, encode: &Encode, input: &Input) -> [Kernel; 2] {
-        let all = encode.reading_kernel(&shaders::BVH_LBVH_PERSISTENT, input);
-        [encode.reset_kernel(&shaders::BVH_LBVH_RESET), all]
+    fn persistent(&self, encode: &Encode, input: &Input, shader: &'static Shader) -> [Kernel; 2] {
+        [encode.reset_kernel(&shaders::BVH_LBVH_RESET), encode.reading_kernel(shader, input)]
     }
 
     // As glsl/bvh/lbvh_workgroup.comp lays it out as well.

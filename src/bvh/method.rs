@@ -7,6 +7,7 @@ use super::hploc::{Merging, Window};
 use super::lbvh::Lbvh;
 use super::ploc::Ploc;
 use super::scratch::Scratch;
+use crate::gpu::shaders::{self, Shader};
 use crate::gpu::{Kernel, Step, arguments};
 use crate::{Error, Result};
 
@@ -71,13 +72,42 @@ impl Method {
     }
 }
 
+/// The shaders that do a whole build in one dispatch, one of each method.
+#[derive(Debug, PartialEq, Eq, Hash)]
+pub struct PersistentShaders {
+    lbvh: &'static Shader,
+    hlbvh: &'static Shader,
+    ploc: &'static Shader,
+    hploc: &'static Shader,
+}
+
+impl PersistentShaders {
+    /// All of them.
+    pub(super) const ALL: PersistentShaders = PersistentShaders {
+        lbvh: &shaders::BVH_LBVH_PERSISTENT,
+        hlbvh: &shaders::BVH_HLBVH_PERSISTENT,
+        ploc: &shaders::BVH_PLOC_PERSISTENT,
+        hploc: &shaders::BVH_HPLOC_PERSISTENT,
+    };
+
+    /// That of a method.
+    pub(super) fn of(&self, method: Method) -> &'static Shader {
+        match method {
+            Method::Lbvh => self.lbvh,
+            Method::Hlbvh(_) => self.hlbvh,
+            Method::Ploc { .. } => self.ploc,
+            Method::Hploc(_) => self.hploc,
+        }
+    }
+}
+
 /// A hierarchy over an order of codes, as one of the methods builds it.
 pub(super) trait Hierarchy {
     /// The dispatches behind [`Encode::steps`]. Label: `hierarchy`.
     fn steps(&self, encode: &Encode, input: &Input, arguments: &arguments::Build) -> Vec<Step>;
 
-    /// The kernels of a whole build by one dispatch: what resets its state, and what does everything.
-    fn persistent(&self, encode: &Encode, input: &Input) -> [Kernel; 2];
+    /// The kernels of a whole build by one dispatch: one resets its state, the other, of `shader`, does everything.
+    fn persistent(&self, encode: &Encode, input: &Input, shader: &'static Shader) -> [Kernel; 2];
 
     /// Takes what it needs of the scratch memory, and what the phases before do, in an order in which least is left unused.
     fn plan(&self, encode: &Encode, scratch: &mut Scratch);
@@ -93,9 +123,10 @@ pub(super) trait Hierarchy {
         encode: &Encode,
         input: &Input,
         arguments: &arguments::Build,
+        shader: &'static Shader,
         workers: u32,
     ) -> Vec<Step> {
-        let [reset, all] = self.persistent(encode, input);
+        let [reset, all] = self.persistent(encode, input, shader);
         vec![Step::new("build", reset, arguments, 1), Step::new("build", all, arguments, workers)]
     }
 }

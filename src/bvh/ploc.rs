@@ -7,7 +7,8 @@ use super::encode::Encode;
 use super::geometry::Input;
 use super::method::Hierarchy;
 use super::scratch::{BuildPhase, Scratch};
-use crate::gpu::{Kernel, Step, arguments, shaders};
+use crate::gpu::shaders::{self, Shader};
+use crate::gpu::{Kernel, Step, arguments};
 
 /// Clusters that one workgroup finishes in less time than rounds of all take.
 const FINISH: u32 = 2048;
@@ -45,11 +46,11 @@ impl Kernels<'_> {
     }
 
     /// Specialised for even and odd rounds.
-    fn of_round(&self, shader: &'static shaders::Shader, round: u32) -> Kernel {
+    fn of_round(&self, shader: &'static Shader, round: u32) -> Kernel {
         self.encode.reading_kernel_with(shader, self.input, &[self.radius_word(), round % 2])
     }
 
-    fn of_pool(&self, shader: &'static shaders::Shader) -> Kernel {
+    fn of_pool(&self, shader: &'static Shader) -> Kernel {
         let rounds = rounds(self.encode.count);
         self.encode.reading_kernel_with(shader, self.input, &[self.radius_word(), rounds])
     }
@@ -90,9 +91,9 @@ impl Hierarchy for Ploc {
         chain.into_iter().map(|(kernel, groups)| Step::new("hierarchy", kernel, arguments, groups)).collect()
     }
 
-    fn persistent(&self, encode: &Encode, input: &Input) -> [Kernel; 2] {
+    fn persistent(&self, encode: &Encode, input: &Input, shader: &'static Shader) -> [Kernel; 2] {
         let kernels = self.kernels(encode, input);
-        [&shaders::BVH_PLOC_RESET, &shaders::BVH_PLOC_PERSISTENT].map(|shader| kernels.of_pool(shader))
+        [&shaders::BVH_PLOC_RESET, shader].map(|shader| kernels.of_pool(shader))
     }
 
     fn plan(&self, encode: &Encode, scratch: &mut Scratch) {

@@ -16,7 +16,6 @@
 use super::layout::{self, KdHeader, KdNode};
 use super::merge::MERGE_AT;
 use super::termination::{Costs, depth_limit, leaf_size};
-use crate::bvh::builder::Schedule;
 use crate::bvh::geometry::{Input, Planned, Primitives};
 use crate::gpu::arguments::{self, KD_MERGE_BYTES, KD_STATE_BYTES};
 use crate::gpu::shaders::{self, Shader};
@@ -36,7 +35,7 @@ pub struct KdOptions {
     pub costs: Costs,
     /// How the phases are recorded: a chain of dispatches or one persistent dispatch; `None` takes what measured faster
     /// ([`KdOptions::schedule_on`]).
-    pub schedule: Option<Schedule>,
+    pub schedule: Option<KdSchedule>,
     /// Workgroups of the persistent dispatch, 1 or more; `None` takes what keeps the device busy.
     pub workgroups: Option<u32>,
     /// What the memory goes by; `None` takes [`KdEstimate::for_exact`].
@@ -47,6 +46,21 @@ pub struct KdOptions {
     pub geometry_count: u32,
     /// `vk::BuildAccelerationStructureFlagsKHR` for the header.
     pub build_flags: u32,
+}
+
+/// How the phases of a build or a merge are recorded. The result is the same bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum KdSchedule {
+    /// One dispatch per phase of each level, with barriers between. Works on every device.
+    Chain,
+    /// One persistent dispatch that draws tasks from a pool. The device must keep running workgroups that it has started.
+    Persistent,
+}
+
+impl std::fmt::Display for KdSchedule {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(if *self == KdSchedule::Chain { "chain" } else { "persistent" })
+    }
 }
 
 impl KdOptions {
@@ -72,8 +86,8 @@ impl KdOptions {
     /// The schedule on the device of `context`; of a merge, too. The pool on a CPU: workgroups take what is left as they come,
     /// where those of a dispatch have their shares, whichever core is slower (docs/notes/kdtree.md). No GPU was measured, and a
     /// chain asks nothing of one's progress.
-    pub fn schedule_on(&self, context: &Context) -> Schedule {
-        let measured = if context.tuning.kd.persistent { Schedule::Persistent } else { Schedule::Chain };
+    pub fn schedule_on(&self, context: &Context) -> KdSchedule {
+        let measured = if context.tuning.kd.persistent { KdSchedule::Persistent } else { KdSchedule::Chain };
         self.schedule.unwrap_or(measured)
     }
 
@@ -94,11 +108,6 @@ impl KdOptions {
                 KdOptions::LEAST_EXACT,
                 KdOptions::MOST_EXACT
             )));
-        }
-        if self.schedule == Some(Schedule::Workgroup) {
-            return Err(Error::Argument(
-                "kd-trees are built by a chain or by persistent workgroups, not by one alone".into(),
-            ));
         }
         if self.workgroups == Some(0) {
             return Err(Error::Argument("no workgroups; a build has 1 or more".into()));
@@ -191,7 +200,7 @@ impl KdReport {
 #[derive(Debug, Clone)]
 pub struct KdBuilder {
     options: KdOptions,
-    schedule: Schedule,
+    schedule: KdSchedule,
     count: u32,
     shape: KdShape,
     room: BuildRoom,
@@ -273,14 +282,14 @@ impl BuildRoom {
 }
 
 impl KdShape {
-    pub fn of(context: &Context, options: &KdOptions, count: u32, schedule: Schedule) -> KdShape {
+    pub fn of(context: &Context, options: &KdOptions, count: u32, schedule: KdSchedule) -> KdShape {
         let tuning = &context.tuning.kd;
         // Two invocations look at the two parts of a reference.
         let narrow = context.limits.subgroup_size.max(2);
         let most = |groups: u32| (count / options.exact).clamp(1, groups.max(1));
         // A stack is as large as what 256 triangles or so have besides: more than 1,024 where they are little among the rest.
         let subtree_groups = most(tuning.subtree_groups.min((count / 256).max(1024)));
-        if schedule == Schedule::Persistent {
+        if schedule == KdSchedule::Persistent {
             let groups = options.workgroups.unwrap_or(most(tuning.groups));
             return KdShape { workgroup: narrow, groups, subtree_groups: groups, ..KdShape::with(narrow, tuning) };
         }
@@ -427,8 +436,8 @@ impl KdBuilder {
         Ok(KdBuilder { options: *options, schedule, count: primitive_count, shape, room })
     }
 
-    /// The schedule that is used: the choice where none was given.
-    pub fn schedule(&self) -> Schedule {
+    /// The schedule that is used: that of the options, or the choice for the device.
+    pub fn schedule(&self) -> KdSchedule {
         self.schedule
     }
 
@@ -494,7 +503,7 @@ impl KdBuilder {
             let groups = self.shape.groups_of(shader, groups);
             Step::new(phase, self.kernel(shader, input), &arguments::KdBuild { level, ..arguments }, groups)
         };
-        if self.schedule == Schedule::Persistent {
+        if self.schedule == KdSchedule::Persistent {
             return Ok(vec![
                 step("build", &shaders::KDTREE_BUILDER_RESET, 0, 1),
                 step("build", &shaders::KDTREE_BUILDER_PERSISTENT, 0, groups),

@@ -36,7 +36,7 @@ fn assert_as_on_the_host(geometries: &[Owned], shift: usize) -> Bvh2 {
             Source::Several { count, .. } => count,
             _ => 1,
         };
-        for schedule in [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup] {
+        for schedule in [Schedule::Chain, Schedule::PERSISTENT, Schedule::Workgroup] {
             let (codes, schedule) = (Some(Code::Emc64Var.full()), Some(schedule));
             let options = BuildOptions { codes, schedule, geometry_count, ..BuildOptions::DEFAULT };
             let got = built(&options, &Input { source, primitive_count: first });

@@ -66,7 +66,7 @@ fn every_code_and_schedule_gives_the_bytes_of_the_host() {
             let expected = on_host(&mesh, &options);
             let what = format!("{} {codes} {collapse:?}", mesh.0);
             expected.validate().unwrap_or_else(|e| panic!("{what}: {e}"));
-            for schedule in [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup] {
+            for schedule in [Schedule::Chain, Schedule::PERSISTENT, Schedule::Workgroup] {
                 let got = on_device(&mesh, &BuildOptions { schedule: Some(schedule), ..options });
                 assert_same(&got, &expected, &format!("{what} {schedule:?}"));
             }

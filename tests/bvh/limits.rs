@@ -64,7 +64,7 @@ fn too_little_memory_is_refused_by_name() {
         let [structure, scratch] = [structure, scratch].map(|bytes| Region { address: 256, bytes });
         builder.steps(&input, structure, scratch).err().map(|error| error.to_string())
     };
-    for schedule in [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup] {
+    for schedule in [Schedule::Chain, Schedule::PERSISTENT, Schedule::Workgroup] {
         let options = BuildOptions { schedule: Some(schedule), ..BuildOptions::DEFAULT };
         assert_eq!(refused(&options, [0, 0]), None, "{schedule:?}");
         let structure = refused(&options, [1, 0]).expect("one byte too few");

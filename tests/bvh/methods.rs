@@ -15,7 +15,7 @@ fn equals_the_host<const N: usize>(methods: [Method; N]) {
     let meshes = corpus::meshes().into_iter().chain([corpus::random("random 9000", 9000, [-0.5; 3], [1.0; 3])]);
     for mesh in meshes {
         for (i, (method, codes)) in methods.into_iter().zip(codes.into_iter().cycle()).enumerate() {
-            let schedules = if i == 0 { &[Schedule::Chain, Schedule::Persistent][..] } else { &[Schedule::Chain] };
+            let schedules = if i == 0 { &[Schedule::Chain, Schedule::PERSISTENT][..] } else { &[Schedule::Chain] };
             for collapse in [Collapse::OFF, Collapse::SAH] {
                 let options = BuildOptions { method, codes: Some(codes), collapse, ..BuildOptions::DEFAULT };
                 let expected = on_host(&mesh, &options);

@@ -78,7 +78,7 @@ fn every_method_gives_the_bytes_of_the_host() {
             expected.validate().unwrap_or_else(|e| panic!("{} {method:?}: {e}", mesh.0));
             // The kernels of pools take long to compile: two methods stand for all.
             let pool = matches!(method, Method::Lbvh | Method::Hploc(_));
-            for schedule in [Schedule::Chain, Schedule::Persistent].into_iter().take(1 + usize::from(pool)) {
+            for schedule in [Schedule::Chain, Schedule::PERSISTENT].into_iter().take(1 + usize::from(pool)) {
                 let got = on_device(&mesh, &BuildOptions { schedule: Some(schedule), ..options });
                 assert_same(&got, &expected, &format!("{} {method:?} {schedule:?}", mesh.0));
             }

@@ -33,7 +33,7 @@ pub fn all_give_the_bytes_of_the_host() {
     for (method, codes) in methods() {
         let options = BuildOptions { method, codes: Some(codes), collapse: Collapse::SAH, ..BuildOptions::DEFAULT };
         let alone: &[Schedule] = if method == Method::Lbvh { &[Schedule::Workgroup] } else { &[] };
-        assert_as_on_the_host(&options, &[&[Schedule::Chain, Schedule::Persistent], alone].concat());
+        assert_as_on_the_host(&options, &[&[Schedule::Chain, Schedule::PERSISTENT], alone].concat());
         assert_as_on_the_host(&BuildOptions { collapse: Collapse::OFF, ..options }, &[Schedule::Chain]);
     }
 }
@@ -45,6 +45,6 @@ pub fn splits_and_optimised_trees_too() {
     assert_as_on_the_host(&BuildOptions { codes, optimise, ..BuildOptions::DEFAULT }, &[Schedule::Chain]);
     assert_as_on_the_host(
         &BuildOptions { codes, split, ..BuildOptions::DEFAULT },
-        &[Schedule::Chain, Schedule::Persistent],
+        &[Schedule::Chain, Schedule::PERSISTENT],
     );
 }

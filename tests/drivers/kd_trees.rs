@@ -6,9 +6,9 @@ use crate::common::corpus::{self, Mesh};
 use crate::common::device;
 use crate::common::shapes::{Corners, hard_rays, icosphere, placed, soup};
 use crate::common::twins::{PLENTY, PLENTY_TO_MERGE};
-use hedgerow::bvh::builder::{Input, Schedule};
+use hedgerow::bvh::builder::Input;
 use hedgerow::bvh::layout::status;
-use hedgerow::kdtree::builder::{self, KdBuilder, KdOptions};
+use hedgerow::kdtree::builder::{self, KdBuilder, KdOptions, KdSchedule};
 use hedgerow::kdtree::layout::{KdHeader, KdTree};
 use hedgerow::kdtree::merge::{self, MergeCapacity, MergeMemory, MergeReport, Merger, Object};
 use hedgerow::kdtree::twin;
@@ -18,9 +18,9 @@ use hedgerow::trace::kd::{KdTracer, TreeEntry};
 use hedgerow::trace::twin::kd as kd_host;
 use hedgerow_lab::device::Buffer;
 
-const SCHEDULES: [Schedule; 2] = [Schedule::Chain, Schedule::Persistent];
+const SCHEDULES: [KdSchedule; 2] = [KdSchedule::Chain, KdSchedule::Persistent];
 
-fn with(schedule: Schedule) -> KdOptions {
+fn with(schedule: KdSchedule) -> KdOptions {
     KdOptions { schedule: Some(schedule), estimate: Some(PLENTY), ..KdOptions::DEFAULT }
 }
 
@@ -35,7 +35,7 @@ fn uploaded((_, positions, triangles): &Mesh) -> (Input, [Buffer<'static>; 2]) {
     (input, [vertices, indices])
 }
 
-fn built(input: &Input, schedule: Schedule) -> Buffer<'static> {
+fn built(input: &Input, schedule: KdSchedule) -> Buffer<'static> {
     let builder = KdBuilder::new(device(), &with(schedule), input.primitive_count).expect("a builder");
     let sizes = builder.sizes();
     let [structure, scratch] =
@@ -97,7 +97,7 @@ pub fn merges_and_restores_are_those_of_the_host() {
 }
 
 /// Merged, it is the host's tree; restored, the one that was there.
-fn merge(still: &KdTree, objects: &[Corners], schedule: Schedule, pushed: bool) {
+fn merge(still: &KdTree, objects: &[Corners], schedule: KdSchedule, pushed: bool) {
     let options = merge::MergeOptions { build: with(schedule), estimate: PLENTY_TO_MERGE };
     let triangles = objects.iter().map(|object| object.len() as u32).sum();
     let most = MergeCapacity { objects: objects.len() as u32, triangles };

@@ -5,11 +5,11 @@ use crate::common::device;
 use crate::common::geometries::{MOVED, Owned};
 use crate::common::shapes::{icosphere, placed};
 use crate::common::twins::PLENTY;
-use hedgerow::bvh::builder::{Input, Schedule, Source};
+use hedgerow::bvh::builder::{Input, Source};
 use hedgerow::bvh::geometry::{Geometry, GeometryFlags, IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::Region;
-use hedgerow::kdtree::builder::{KdBuilder, KdEstimate, KdOptions, KdReport};
+use hedgerow::kdtree::builder::{KdBuilder, KdEstimate, KdOptions, KdReport, KdSchedule};
 use hedgerow::kdtree::layout::{KdHeader, KdTree};
 use hedgerow::kdtree::twin;
 
@@ -71,7 +71,7 @@ fn meshes() -> Vec<Mesh> {
 fn the_chain_gives_the_bytes_of_the_host() {
     for mesh in meshes() {
         for (bins, exact) in [(128, 32), (7, 4), (32, 64)] {
-            let schedule = Some(Schedule::Chain);
+            let schedule = Some(KdSchedule::Chain);
             let options = KdOptions { bins, exact, schedule, estimate: Some(PLENTY), ..KdOptions::DEFAULT };
             let what = format!("{} bins {bins} exact {exact}", mesh.0);
             let expected = on_host(&mesh, &options);
@@ -114,7 +114,7 @@ fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
     let geometry_count = records.len() as u32;
     let several = Source::Several { records: buffer.address(), count: geometry_count };
     for source in [several].into_iter().chain((records.len() == 1).then(|| Source::One(records[0]))) {
-        for schedule in [Schedule::Chain, Schedule::Persistent] {
+        for schedule in [KdSchedule::Chain, KdSchedule::Persistent] {
             let options = KdOptions { schedule: Some(schedule), geometry_count, ..with };
             let (got, report) = built_of(&Input { source, primitive_count: first }, &options);
             assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
@@ -148,7 +148,7 @@ fn any_number_of_persistent_workgroups_gives_the_bytes_of_the_host() {
     for mesh in meshes() {
         let expected = on_host(&mesh, &KdOptions::DEFAULT);
         for workgroups in [1, 2, 7, 64, 1024] {
-            let (schedule, workgroups) = (Some(Schedule::Persistent), Some(workgroups));
+            let (schedule, workgroups) = (Some(KdSchedule::Persistent), Some(workgroups));
             let options = KdOptions { schedule, workgroups, estimate: Some(PLENTY), ..KdOptions::DEFAULT };
             assert_same(&built(&mesh, &options).0, &expected, &format!("{}, {workgroups:?} workgroups", mesh.0));
         }
@@ -233,7 +233,7 @@ fn many_builds(builds: u32) {
     let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), 400);
     let builder = |workgroups| {
         let options =
-            KdOptions { schedule: Some(Schedule::Persistent), workgroups: Some(workgroups), ..KdOptions::DEFAULT };
+            KdOptions { schedule: Some(KdSchedule::Persistent), workgroups: Some(workgroups), ..KdOptions::DEFAULT };
         KdBuilder::new(device, &options, 400).expect("options that can be used")
     };
     let most = builder(1024).sizes();
@@ -273,7 +273,6 @@ fn options_that_cannot_be_used_are_refused_by_name() {
     refused(KdOptions { exact: 3, ..with }, 1, "exact splits of 3 references; it is 4 to 64");
     refused(KdOptions { exact: 65, ..with }, 1, "exact splits of 65 references");
     refused(KdOptions { workgroups: Some(0), ..with }, 1, "no workgroups");
-    refused(KdOptions { schedule: Some(Schedule::Workgroup), ..with }, 1, "not by one alone");
     let mut costs = with.costs;
     costs.c_i = f32::NAN;
     refused(KdOptions { costs, ..with }, 1, "a cost of NaN");

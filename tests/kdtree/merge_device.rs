@@ -4,9 +4,9 @@ use crate::common::corpus::{self, Mesh};
 use crate::common::device;
 use crate::common::shapes::{Corners, hard_rays, icosphere, placed, soup, tree_of};
 use crate::common::twins::PLENTY_TO_MERGE;
-use hedgerow::bvh::builder::{Input, Schedule};
+use hedgerow::bvh::builder::Input;
 use hedgerow::bvh::layout::status;
-use hedgerow::kdtree::builder::{self, KdBuilder};
+use hedgerow::kdtree::builder::{self, KdBuilder, KdSchedule};
 use hedgerow::kdtree::layout::{KdHeader, KdTree, SpareRoom};
 use hedgerow::kdtree::merge::{
     MergeCapacity, MergeEstimate, MergeMemory, MergeOptions, MergeReport, Merger, Object, Objects,
@@ -23,11 +23,11 @@ const PLENTY: MergeOptions = MergeOptions { build: builder::KdOptions::DEFAULT, 
 /// As a chain, and by persistent workgroups.
 fn schedules() -> impl Iterator<Item = MergeOptions> {
     let persistent = [1, 2, 7, 64, 1024].map(|workgroups| builder::KdOptions {
-        schedule: Some(Schedule::Persistent),
+        schedule: Some(KdSchedule::Persistent),
         workgroups: Some(workgroups),
         ..PLENTY.build
     });
-    let chain = builder::KdOptions { schedule: Some(Schedule::Chain), ..PLENTY.build };
+    let chain = builder::KdOptions { schedule: Some(KdSchedule::Chain), ..PLENTY.build };
     [chain].into_iter().chain(persistent).map(|build| MergeOptions { build, ..PLENTY })
 }
 

@@ -6,17 +6,17 @@
 use crate::common::corpus::{self, Mesh};
 use crate::common::device;
 use crate::common::shapes::Corners;
-use hedgerow::bvh::builder::{Input, Schedule};
+use hedgerow::bvh::builder::Input;
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::{Phase, Timestamps};
-use hedgerow::kdtree::builder::{self, KdBuilder, KdReport as BuildReport};
+use hedgerow::kdtree::builder::{self, KdBuilder, KdReport as BuildReport, KdSchedule};
 use hedgerow::kdtree::merge::{MergeCapacity, MergeEstimate, MergeMemory, MergeOptions, MergeReport, Merger, Object};
 use hedgerow_lab::device::Buffer;
 use hedgerow_lab::scene::{LoadOptions, load};
 use std::collections::BTreeMap;
 
 const ROUNDS: usize = 9;
-const SCHEDULES: [Schedule; 2] = [Schedule::Chain, Schedule::Persistent];
+const SCHEDULES: [KdSchedule; 2] = [KdSchedule::Chain, KdSchedule::Persistent];
 
 fn input_of((_, positions, triangles): &Mesh) -> (Input, [Buffer<'static>; 2]) {
     let vertices = device().upload("positions", positions).expect("memory");

@@ -21,7 +21,7 @@ fn twenty_builds_give_the_same_bytes_and_touch_nothing_else() {
         corpus::random("1 random", 1, [0.0; 3], [1.0; 3]),
         corpus::random("in a plane", 3_001, [0.0; 3], [1.0, 0.0, 1.0]),
     ] {
-        for schedule in [Schedule::Chain, Schedule::Persistent] {
+        for schedule in [Schedule::Chain, Schedule::PERSISTENT] {
             let options = BuildOptions { schedule: Some(schedule), ..BuildOptions::DEFAULT };
             let lbvh = Builder::new(device, &options, triangles.len() as u32).unwrap();
             let sizes = lbvh.sizes();

@@ -20,10 +20,9 @@ pub(crate) mod push;
 pub use estimate::{MergeEstimate, MergeOptions, MergeReport};
 pub use objects::{Object, Objects};
 
-use super::builder::{self, KdShape};
+use super::builder::{self, KdSchedule, KdShape};
 use super::layout::{KdHeader, MAX_DEPTH, SpareRoom};
 use super::termination::leaf_size;
-use crate::bvh::builder::Schedule;
 use crate::bvh::geometry::{Input, Source};
 use crate::gpu::arguments;
 use crate::gpu::radix_sort::{self, Sort, SortBuffers};
@@ -71,7 +70,7 @@ pub struct Merger {
     most: MergeCapacity,
     primitive_count: u32,
     structure_bytes: u64,
-    schedule: Schedule,
+    schedule: KdSchedule,
     shape: KdShape,
     sort: radix_sort::SortShape,
     room: builder::BuildRoom,
@@ -380,7 +379,7 @@ impl Merger {
             &shaders::KDTREE_MERGE_TASKS,
         ];
         steps.extend(mark.map(|shader| step("mark", shader, 0, groups)));
-        if self.schedule == Schedule::Persistent {
+        if self.schedule == KdSchedule::Persistent {
             steps.push(step("build", &shaders::KDTREE_MERGE_BUILD_PERSISTENT, 0, groups));
             return steps;
         }

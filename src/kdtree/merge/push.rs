@@ -1,10 +1,10 @@
 //! Objects' own trees on their way down the static one.
 
 use super::Object;
-use crate::bvh::builder::Schedule;
 use crate::gpu::arguments;
 use crate::gpu::shaders::{self, Shader};
 use crate::gpu::{Kernel, Step};
+use crate::kdtree::builder::KdSchedule;
 use crate::kdtree::layout::MAX_DEPTH;
 
 /// As `glsl/kdtree/merge/state.glsl` and `merge.glsl` have them.
@@ -18,7 +18,7 @@ const STEPS: u32 = 2 * MAX_DEPTH + 1;
 /// makes one of a phase, a shader, a level and a number of workgroups.
 pub(super) fn steps(
     seeds: u64,
-    schedule: Schedule,
+    schedule: KdSchedule,
     (workgroup, groups): (u32, u32),
     objects: impl Iterator<Item = (Object, u32)>,
     step: impl Fn(&'static str, &'static Shader, u32, u32) -> Step,
@@ -32,7 +32,7 @@ pub(super) fn steps(
     if steps.is_empty() {
         return steps;
     }
-    if schedule == Schedule::Persistent {
+    if schedule == KdSchedule::Persistent {
         steps.push(step("push", &shaders::KDTREE_MERGE_PUSH_PERSISTENT, 0, groups));
     } else {
         // Most steps have few items or none.

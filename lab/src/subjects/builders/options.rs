@@ -12,6 +12,7 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::split;
 use hedgerow::bvh::wide::Form;
 use hedgerow::kdtree;
+use hedgerow::kdtree::builder::KdSchedule;
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::wide::Order;
@@ -32,6 +33,7 @@ pub(super) const ORDER: BuilderOption = BuilderOption::new("order", "distance or
 pub(super) const TERMINATION: BuilderOption =
     BuilderOption::new("termination", "sah, or off: leaves of one triangle, then collapsed");
 pub(super) const SCHEDULE: BuilderOption = BuilderOption::new("schedule", "chain, persistent or workgroup");
+pub(super) const KD_SCHEDULE: BuilderOption = BuilderOption::new("schedule", "chain or persistent");
 pub(super) const SPLIT: BuilderOption = BuilderOption::new(
     "split",
     "a number from 0 to 1: splits of large triangles at most, as a part of all; with /N behind: of each at most N",
@@ -88,7 +90,7 @@ impl Spec {
     /// Option `schedule`.
     fn schedule(&self) -> Result<Option<Schedule>> {
         let all =
-            [("chain", Schedule::Chain), ("persistent", Schedule::Persistent), ("workgroup", Schedule::Workgroup)];
+            [("chain", Schedule::Chain), ("persistent", Schedule::PERSISTENT), ("workgroup", Schedule::Workgroup)];
         self.choice(&SCHEDULE, &all)
     }
 
@@ -200,11 +202,12 @@ impl Spec {
         let default = kdtree::builder::KdOptions::DEFAULT;
         let costs = self.kd_options(Planes::Exact)?.costs;
         let workgroups = self.option(WORKGROUPS.key).map(|_| self.number(&WORKGROUPS, 1)).transpose()?;
+        let schedules = [("chain", KdSchedule::Chain), ("persistent", KdSchedule::Persistent)];
         let options = kdtree::builder::KdOptions {
             bins: self.number(&BINS, default.bins)?,
             exact: self.number(&EXACT, default.exact)?,
             costs,
-            schedule: self.schedule()?,
+            schedule: self.choice(&KD_SCHEDULE, &schedules)?,
             workgroups,
             ..default
         };

@@ -2,8 +2,8 @@
 
 use super::Spec;
 use super::options::{
-    BINS, BITS, CODES, COLLAPSE, EXACT, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT, TERMINATION, TRACE,
-    TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
+    BINS, BITS, CODES, COLLAPSE, EXACT, KD_SCHEDULE, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT,
+    TERMINATION, TRACE, TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
 };
 use crate::Result;
 use crate::subjects::host::HostMethod;
@@ -174,7 +174,7 @@ pub static BUILDERS: &[BuilderEntry] = &[
         "kd-tree on the device: bins above, level by level; perfect splits of few references below",
         Kind::KdGpu,
     )
-    .taking(&[BINS, EXACT, KT, KI, SCHEDULE, WORKGROUPS, TRAVERSAL]),
+    .taking(&[BINS, EXACT, KT, KI, KD_SCHEDULE, WORKGROUPS, TRAVERSAL]),
     BuilderEntry::new(
         &"kd-gpu-host",
         "kd-tree of bins above and perfect splits below, on the host: what `kd-gpu` must equal, byte for byte",

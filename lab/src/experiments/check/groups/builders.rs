@@ -9,7 +9,7 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::{reinsertion, split};
 
 const CHAIN: &[Schedule] = &[Schedule::Chain];
-const CHAIN_AND_POOL: &[Schedule] = &[Schedule::Chain, Schedule::Persistent];
+const CHAIN_AND_POOL: &[Schedule] = &[Schedule::Chain, Schedule::PERSISTENT];
 
 /// Meshes of sizes around powers of two and around what a workgroup takes at a time; and those that hurt.
 pub(super) fn meshes(cases: &Cases<'_>) -> Vec<Mesh> {
@@ -43,7 +43,7 @@ fn by_codes(codes: Codes) -> BuildOptions {
 }
 
 pub fn lbvh(cases: &mut Cases<'_>) {
-    let schedules = [Schedule::Chain, Schedule::Persistent, Schedule::Workgroup];
+    let schedules = [Schedule::Chain, Schedule::PERSISTENT, Schedule::Workgroup];
     for mesh in meshes(cases) {
         for (code, collapse) in [(Code::Emc64Var.full(), Collapse::SAH), (Code::Mc30.full(), Collapse::OFF)] {
             as_on_host(cases, &mesh, &BuildOptions { collapse, ..by_codes(code) }, &schedules);

@@ -5,9 +5,9 @@ use crate::experiments::check::cases::{Cases, Found, same, same_all};
 use crate::experiments::check::corpus::{self, Mesh};
 use crate::experiments::check::shapes::{Corners, icosphere, placed, soup};
 use crate::experiments::check::twins::{PLENTY, PLENTY_TO_MERGE};
-use hedgerow::bvh::builder::{Input, Schedule};
+use hedgerow::bvh::builder::Input;
 use hedgerow::bvh::layout::status;
-use hedgerow::kdtree::builder::{KdBuilder, KdOptions, KdReport};
+use hedgerow::kdtree::builder::{KdBuilder, KdOptions, KdReport, KdSchedule};
 use hedgerow::kdtree::layout::{KdHeader, KdTree};
 use hedgerow::kdtree::merge::{self, MergeCapacity, MergeMemory, Merger, Object};
 use hedgerow::kdtree::twin;
@@ -21,9 +21,9 @@ fn meshes(cases: &Cases<'_>) -> Vec<Mesh> {
 }
 
 pub fn build(cases: &mut Cases<'_>) {
-    let schedules: &[(Schedule, Option<u32>)] = match cases.quick {
-        true => &[(Schedule::Chain, None), (Schedule::Persistent, None)],
-        false => &[(Schedule::Chain, None), (Schedule::Persistent, Some(1)), (Schedule::Persistent, Some(64))],
+    let schedules: &[(KdSchedule, Option<u32>)] = match cases.quick {
+        true => &[(KdSchedule::Chain, None), (KdSchedule::Persistent, None)],
+        false => &[(KdSchedule::Chain, None), (KdSchedule::Persistent, Some(1)), (KdSchedule::Persistent, Some(64))],
     };
     let cuts: &[(u32, u32)] = if cases.quick { &[(32, 32)] } else { &[(128, 32), (7, 4)] };
     for mesh in meshes(cases) {
@@ -84,14 +84,14 @@ pub fn merge(cases: &mut Cases<'_>) {
     ];
     for (name, still, objects) in worlds.iter().take(if cases.quick { 2 } else { 6 }) {
         // The pool's kernels take long to compile; the build's have been tried.
-        let schedules = [Schedule::Chain, Schedule::Persistent];
+        let schedules = [KdSchedule::Chain, KdSchedule::Persistent];
         for schedule in schedules.into_iter().take(if cases.quick { 1 } else { 2 }) {
             cases.case(format!("{name}, {schedule}"), |device| merged_as_on_host(device, still, objects, schedule));
         }
     }
 }
 
-fn merged_as_on_host(device: &Device, still: &Corners, objects: &[Corners], schedule: Schedule) -> Found {
+fn merged_as_on_host(device: &Device, still: &Corners, objects: &[Corners], schedule: KdSchedule) -> Found {
     let options = merge::MergeOptions {
         build: KdOptions { schedule: Some(schedule), ..KdOptions::DEFAULT },
         estimate: PLENTY_TO_MERGE,
