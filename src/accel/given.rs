@@ -1,6 +1,5 @@
-//! What the calls check of the handles and addresses that they are given.
+//! What the calls check of the handles that they are given.
 
-use super::serialize::ALIGNMENT;
 use crate::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -11,14 +10,4 @@ pub(super) fn not_null(field: &str, structure: vk::AccelerationStructureKHR) -> 
         0 => Err(Error::Argument(format!("{field} is null; create it first"))),
         address => Ok(address),
     }
-}
-
-/// Memory for a serialised structure.
-pub(super) fn aligned(field: &str, address: u64) -> Result<u64> {
-    if address == 0 || !address.is_multiple_of(ALIGNMENT) {
-        return Err(Error::Argument(format!(
-            "{field}.deviceAddress is {address:#x}; it must be a multiple of {ALIGNMENT} and not zero"
-        )));
-    }
-    Ok(address)
 }

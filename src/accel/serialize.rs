@@ -11,7 +11,7 @@
 //! cloned: an instance also names the node to begin at (`Instance::start`), which compacting moves.
 
 use super::Device;
-use super::given::{aligned, not_null};
+use super::given::not_null;
 use crate::bvh::layout::{self, Header, InstanceRecord, Record};
 use crate::gpu::arguments;
 use crate::gpu::{Grid, Recorder, shaders};
@@ -162,4 +162,14 @@ impl Device<'_> {
             _ => vk::AccelerationStructureCompatibilityKHR::INCOMPATIBLE,
         }
     }
+}
+
+/// Memory for a serialised structure.
+fn aligned(field: &str, address: u64) -> Result<u64> {
+    if address == 0 || !address.is_multiple_of(ALIGNMENT) {
+        return Err(Error::Argument(format!(
+            "{field}.deviceAddress is {address:#x}; it must be a multiple of {ALIGNMENT} and not zero"
+        )));
+    }
+    Ok(address)
 }

@@ -8,6 +8,7 @@ use super::encode::Encode;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 pub use super::hlbvh::Treelets;
 pub use super::hploc::Window;
+use super::lbvh_workgroup::{self, SmallBuild};
 use super::method::Hierarchy;
 pub use super::method::Method;
 pub use super::method::PersistentShaders;
@@ -15,7 +16,7 @@ use super::reinsertion::{self, Reinsertion};
 use super::sah::Collapse;
 use super::scratch::Scratch;
 use super::split::{self, Split};
-use super::{collapse, hploc, layout, lbvh_workgroup};
+use super::{collapse, hploc, layout};
 use crate::gpu::arguments;
 use crate::gpu::radix_sort::{self, SortShape};
 use crate::gpu::{BuildTuning, Context, Recorder, Region, Sizes, Step};
@@ -114,7 +115,7 @@ pub struct Builder {
     workers: u32,
     /// What merges the windows of [`Method::Hploc`].
     merging: hploc::Merging,
-    pub(super) encode: Encode,
+    encode: Encode,
 }
 
 /// A builder with its input and memory, ready to be recorded.
@@ -132,7 +133,7 @@ pub struct BuildJob<'a> {
 
 impl BuildJob<'_> {
     /// The addresses of structure and scratch memory.
-    pub(super) fn addresses(&self) -> Result<[u64; 2]> {
+    fn addresses(&self) -> Result<[u64; 2]> {
         let sizes = self.builder.sizes();
         let structure = self.structure.checked("memory for a BVH", sizes.structure, sizes.alignment)?;
         let scratch = self.scratch.checked("scratch memory for a BVH", sizes.scratch, sizes.alignment)?;
@@ -363,6 +364,11 @@ impl Builder {
             jobs.iter().partition(|job| job.builder.schedule == Schedule::Workgroup);
         let chains = large.iter().map(|job| job.builder.chain_of(job));
         let mut chains: Vec<Vec<Step>> = chains.collect::<Result<_>>()?;
+        let small = small.iter().map(|job| {
+            let memory = job.addresses()?;
+            Ok(SmallBuild { encode: &job.builder.encode, input: &job.input, memory })
+        });
+        let small: Vec<SmallBuild<'_>> = small.collect::<Result<_>>()?;
         chains.extend(lbvh_workgroup::steps(&small)?.into_iter().map(|step| vec![step]));
         Ok(chains)
     }

@@ -3,7 +3,8 @@
 //! A chain of dispatches costs a small build more than its work; many small builds in a batch need no barriers between them and
 //! no memory for their arguments this way: two fit into the push constants.
 
-use super::builder::BuildJob;
+use super::encode::Encode;
+use super::geometry::Input;
 use crate::Result;
 use crate::gpu::arguments::{self, BUILD_STATE_BYTES};
 use crate::gpu::{Kernel, Step, shaders};
@@ -12,17 +13,22 @@ use std::collections::HashMap;
 /// Builds that fit into the push constants.
 const AT_ONCE: usize = 2;
 
+/// A build that one workgroup does.
+pub(super) struct SmallBuild<'a> {
+    pub encode: &'a Encode,
+    pub input: &'a Input,
+    /// Addresses of structure and scratch memory.
+    pub memory: [u64; 2],
+}
+
 /// The dispatches of the builds, which need no barrier between them.
-pub(super) fn steps(jobs: &[&BuildJob<'_>]) -> Result<Vec<Step>> {
+pub(super) fn steps(small: &[SmallBuild<'_>]) -> Result<Vec<Step>> {
     // What fills the push constants together must be of one kind.
     let mut kinds: HashMap<(Kernel, u32, [u32; 2]), Vec<arguments::Small>> = HashMap::new();
     let mut order = Vec::new();
-    for job in jobs {
-        let BuildJob { builder, input, .. } = **job;
-        let [structure, scratch] = job.addresses()?;
-        let encode = &builder.encode;
-        let (geometry, formats) = encode.checked(&input)?;
-        let kernel = encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, &input);
+    for &SmallBuild { encode, input, memory: [structure, scratch] } in small {
+        let (geometry, formats) = encode.checked(input)?;
+        let kernel = encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, input);
         let costs = [encode.collapse.c_t.to_bits(), encode.collapse.c_i.to_bits()];
         let flags = encode.codes.kind_word() | u32::from(encode.collapse.enabled) << 25 | encode.build_flags << 26;
         let kind = (kernel, flags, costs);
