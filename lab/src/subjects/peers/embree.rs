@@ -150,10 +150,10 @@ impl Subject for Embree {
         }
     }
 
-    fn memory(&self) -> record::Memory {
+    fn memory(&self) -> record::MemoryRecord {
         let held = |bytes: &AtomicI64| (bytes.load(Ordering::Relaxed) - self.input_bytes).max(0) as u64;
         let (structure, peak) = (held(&self.bytes.now), held(&self.bytes.peak));
-        record::Memory {
+        record::MemoryRecord {
             structure_bytes: Some(structure),
             scratch_bytes: Some(peak.saturating_sub(structure)),
             peak_bytes: Some(peak),
