@@ -118,10 +118,10 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         );
     }
     let builder = arguments.builder.kd()?;
-    if let KdSpec::Device { .. } = arguments.static_builder.kd()? {
+    let KdSpec::Host { options: static_options, .. } = arguments.static_builder.kd()? else {
         let what = "what stands still is built once, on the host; take kd-exact, kd-binned or kd-gpu-host";
         return Err(crate::Error::Argument(format!("--static-builder {}: {what}", arguments.static_builder)).into());
-    }
+    };
     let scene = common.load_dynamic(&arguments.scene)?;
     if scene.objects.is_empty() {
         let what =
@@ -142,7 +142,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         device: device.as_ref(),
         ways: &arguments.ways,
         builder: &arguments.builder,
-        static_builder: &arguments.static_builder,
+        static_options,
         runs: arguments.runs.get(),
         kinds: &arguments.rays.0,
         rays: arguments.size.rays(common.seed),
