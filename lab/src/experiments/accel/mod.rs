@@ -8,7 +8,6 @@
 pub mod batch;
 mod bundles;
 pub(crate) mod command;
-mod deforming;
 pub mod page;
 pub mod points;
 pub mod rebraid;
@@ -66,7 +65,7 @@ impl<'a> AccelSetup<'a> {
 
     /// Ours, and the driver's where it has any.
     fn makers(&self) -> Vec<Structures<'a>> {
-        [Some(self.ours()), self.drivers()].into_iter().flatten().collect()
+        std::iter::once(self.ours()).chain(self.drivers()).collect()
     }
 }
 
@@ -77,4 +76,9 @@ fn where_possible<T>(result: Result<T>) -> Result<Option<T>> {
         Err(Error::Argument(_)) => Ok(None),
         Err(error) => Err(error),
     }
+}
+
+/// Milliseconds of all builds, and of the updates that there were.
+fn apart(samples: &[(f64, Option<f64>)]) -> (Vec<f64>, Vec<f64>) {
+    (samples.iter().map(|(build, _)| *build).collect(), samples.iter().filter_map(|(_, update)| *update).collect())
 }

@@ -2,6 +2,7 @@
 
 use crate::measure::setting::{Failure, Setting};
 use crate::measure::statistics::Spread;
+use crate::named::named;
 use serde::{Deserialize, Serialize};
 
 /// What a line says, by its `experiment`.
@@ -32,15 +33,7 @@ pub enum Implementation {
     Driver,
 }
 
-impl Implementation {
-    /// As charts and tables have it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Implementation::Ours => "hedgerow",
-            Implementation::Driver => "driver",
-        }
-    }
-}
+named!(Implementation, "maker": Ours = "hedgerow", Driver = "driver");
 
 /// How many structures are built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,17 +49,12 @@ pub enum Submission {
     EmptySubmits,
 }
 
-impl Submission {
-    /// As charts and tables have it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Submission::OneCall => "one call",
-            Submission::OneSubmit => "a call each, one submit",
-            Submission::SubmitEach => "a call and submit each",
-            Submission::EmptySubmits => "as many empty submits",
-        }
-    }
-}
+named!(Submission, "submission":
+    OneCall = "one call",
+    OneSubmit = "a call each, one submit",
+    SubmitEach = "a call and submit each",
+    EmptySubmits = "as many empty submits",
+);
 
 /// Structures of 12 to 500 triangles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

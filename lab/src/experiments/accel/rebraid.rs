@@ -31,11 +31,10 @@ pub fn measure(
 ) -> Result<()> {
     let say = |what: &str| (stage.say)(&format!("re-braiding {}: {what}", instances.name));
     say("building");
-    let mut levels =
-        vec![Levels::new(stage.ours(), instances, Flags::empty())?, Levels::new(stage.ours(), instances, REBRAID)?];
-    if let Some(drivers) = stage.drivers() {
-        levels.push(Levels::new(drivers, instances, Flags::empty())?);
-    }
+    let ours = [(stage.ours(), Flags::empty()), (stage.ours(), REBRAID)];
+    let all = ours.into_iter().chain(stage.drivers().map(|drivers| (drivers, Flags::empty())));
+    let levels = all.map(|(maker, flags)| Levels::new(maker, instances, flags));
+    let mut levels: Vec<Levels<'_>> = levels.collect::<Result<_>>()?;
     let builds = in_turn(&mut levels, WARM_UPS, stage.runs, Levels::build);
     let mut sides = Vec::new();
     for (levels, builds) in levels.iter().zip(builds) {
