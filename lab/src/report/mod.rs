@@ -26,6 +26,16 @@ use crate::{Error, Result};
 use chart::Chart;
 use std::path::Path;
 
+/// Different values in the order in which they come.
+pub fn different<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
+    values.into_iter().fold(Vec::new(), |mut different, value| {
+        if !different.contains(&value) {
+            different.push(value);
+        }
+        different
+    })
+}
+
 /// Writes charts as SVG and PNG into the folder `charts/` of `folder`; those that are there already stay.
 pub fn write_charts<'a>(folder: &Path, charts: impl Iterator<Item = &'a Chart>) -> Result<()> {
     let folder = folder.join("charts");

@@ -29,7 +29,6 @@ fn has_expected(points: &[Growth]) -> bool {
 
 impl StretchPage for FarTriangle {
     const PAGE: Page = GROWTH;
-    const RUN: &'static str = "growth.run.json";
     const COMMAND: &'static str = "hedgerow stability growth";
     const TITLE: [&'static str; 2] = [
         "Growing bounds",
@@ -93,23 +92,19 @@ impl StretchPage for FarTriangle {
         table.number("greatest cost", "×", greatest, three_digits)
     }
 
+    /// The measured drop of the codes without a grid, and where that of the others is expected.
     fn marks(points: &[&Growth], builders: &[&str]) -> Vec<Mark> {
-        marks(points, builders)
-    }
-}
-
-/// The measured drop of the codes without a grid, and where that of the others is expected.
-fn marks(points: &[&Growth], builders: &[&str]) -> Vec<Mark> {
-    let mut marks: Vec<Mark> = Vec::new();
-    for builder in builders {
-        let Some(x) = expected(points, builder) else { continue };
-        let base = drop::base(builder).unwrap_or_default();
-        if let Some(e) = Loss::of_cost(&of_builder(points, &base)).e()
-            && !marks.iter().any(|mark| mark.tone == MUTED)
-        {
-            marks.push(Mark { name: format!("{} loses 10%", drop::BASE), tone: MUTED, x: f64::from(e) });
+        let mut marks: Vec<Mark> = Vec::new();
+        for builder in builders {
+            let Some(x) = expected(points, builder) else { continue };
+            let base = drop::base(builder).unwrap_or_default();
+            if let Some(e) = Loss::of_cost(&of_builder(points, &base)).e()
+                && !marks.iter().any(|mark| mark.tone == MUTED)
+            {
+                marks.push(Mark { name: format!("{} loses 10%", drop::BASE), tone: MUTED, x: f64::from(e) });
+            }
+            marks.push(Mark { name: format!("{} expected", short_codes(builder)), tone: tone(builders, builder), x });
         }
-        marks.push(Mark { name: format!("{} expected", short_codes(builder)), tone: tone(builders, builder), x });
+        marks
     }
-    marks
 }

@@ -17,7 +17,6 @@ fn with_full_bounds<'p>(points: &[&'p Large], point: &Large) -> Option<&'p Large
 
 impl StretchPage for HugeTriangles {
     const PAGE: Page = LARGE;
-    const RUN: &'static str = "large.run.json";
     const COMMAND: &'static str = "hedgerow stability large";
     const TITLE: [&'static str; 2] = [
         "Large triangles at the edge",
