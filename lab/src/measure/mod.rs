@@ -12,3 +12,7 @@ pub mod record;
 pub mod setting;
 pub mod statistics;
 pub mod total_time;
+
+pub use record::MemoryRecord;
+pub use setting::{Failure, Setting};
+pub use statistics::{Spread, geometric_mean, in_turn, mean_work, ratios};

@@ -22,8 +22,14 @@ pub mod stacked;
 pub mod table;
 pub mod theme;
 
+pub use chart::{Caption, Chart};
+pub use columns::Table;
+pub use curves::{Axis, Curve, Mark};
+pub use document::{Document, Section};
+pub use names::{short, slug};
+pub use theme::{SERIES, Tone};
+
 use crate::{Error, Result};
-use chart::Chart;
 use std::path::Path;
 
 /// Different values in the order in which they come.

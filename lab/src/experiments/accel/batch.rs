@@ -4,7 +4,7 @@ use super::points::{self, AccelEntry, Submission};
 use super::{AccelSetup, WARM_UPS};
 use crate::Result;
 use crate::device::{Buffer, Device};
-use crate::measure::statistics::{Spread, in_turn, ratios};
+use crate::measure::{Spread, in_turn, ratios};
 use crate::scene::{self, LoadOptions};
 use crate::subjects::structures::{BuildInfo, Geometry, Range, Structures, triangles_of};
 use ash::vk;

@@ -6,7 +6,7 @@ use crate::device::Device;
 use crate::experiments::accel::page::{self, Points};
 use crate::experiments::accel::points::AccelEntry;
 use crate::experiments::accel::{AccelSetup, Experiment, batch, rebraid, top_level, update};
-use crate::measure::setting::{Failure, Setting};
+use crate::measure::{Failure, Setting};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
 use crate::{Error, Result};

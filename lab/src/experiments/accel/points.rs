@@ -1,7 +1,6 @@
 //! The lines of `accel.jsonl` (CONTRACT, "Records of experiments"). A figure that was not measured is `None`.
 
-use crate::measure::setting::{Failure, Setting};
-use crate::measure::statistics::Spread;
+use crate::measure::{Failure, Setting, Spread};
 use crate::named::named;
 use serde::{Deserialize, Serialize};
 

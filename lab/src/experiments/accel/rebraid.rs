@@ -5,7 +5,7 @@ use super::points::{self, AccelEntry, BraidedRays, MeanWork, TopLevelPoint};
 use super::{AccelSetup, WARM_UPS};
 use crate::Result;
 use crate::measure::agreement::agree;
-use crate::measure::statistics::{Spread, in_turn, ratios};
+use crate::measure::{Spread, in_turn, ratios};
 use crate::scene::{Instances, Scene, SceneInstance};
 use crate::subjects::levels::Levels;
 use ash::vk;

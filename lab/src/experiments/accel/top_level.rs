@@ -3,7 +3,7 @@
 use super::points::{AccelEntry, TopLevel};
 use super::{AccelSetup, WARM_UPS, apart, where_possible};
 use crate::Result;
-use crate::measure::statistics::{Spread, in_turn};
+use crate::measure::{Spread, in_turn};
 use crate::scene::{self, LoadOptions, SceneInstance};
 use crate::subjects::levels::Levels;
 use ash::vk;

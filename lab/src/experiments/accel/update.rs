@@ -4,7 +4,7 @@ use super::bundles::{self, Bundle};
 use super::points::{self, AccelEntry, UpdatedRays};
 use super::{AccelSetup, WARM_UPS, apart, where_possible};
 use crate::Result;
-use crate::measure::statistics::{Spread, in_turn, ratios};
+use crate::measure::{Spread, in_turn, ratios};
 use crate::scene::{Animation, Mesh, Scene};
 use crate::subjects::level::Level;
 use crate::subjects::structures::Structures;

@@ -6,7 +6,7 @@ use crate::device::Device;
 use crate::experiments::animate::page::{self, Points, standings};
 use crate::experiments::animate::points::{AnimateEntry, Object, SceneSetting};
 use crate::experiments::animate::{AnimateSetup, AnimationMethod, measure};
-use crate::measure::setting::Setting;
+use crate::measure::Setting;
 use crate::report::picture::{PictureOptions, View, picture};
 use crate::scene::{DynamicScene, Scene};
 use crate::subjects::Subject;

@@ -1,7 +1,7 @@
 //! Objects that the device merges into the static tree every frame, and takes out again.
 
 use crate::device::{Buffer, Device};
-use crate::measure::record::MemoryRecord;
+use crate::measure::MemoryRecord;
 use crate::scene::{Frame, Group};
 use crate::subjects::builders::Spec;
 use crate::subjects::kd_device::KdDevice;

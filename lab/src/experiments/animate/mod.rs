@@ -15,8 +15,7 @@ mod two_level;
 
 use crate::device::Device;
 use crate::measure::agreement::may_both_be_right;
-use crate::measure::setting::Failure;
-use crate::measure::statistics::{Spread, in_turn, mean_work};
+use crate::measure::{Failure, Spread, in_turn, mean_work};
 use crate::named::named;
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Camera, DynamicScene, Frame, Group, Mesh, Scene};

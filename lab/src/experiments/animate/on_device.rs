@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::device::{Buffer, Device};
-use crate::measure::record::MemoryRecord;
+use crate::measure::MemoryRecord;
 use crate::scene::{Frame, Group};
 use crate::subjects::builders::Spec;
 use crate::subjects::kd_device::KdDevice;

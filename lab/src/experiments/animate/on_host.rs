@@ -1,6 +1,6 @@
 //! Kd-trees that the host builds every frame, or merges into the static one.
 
-use crate::measure::record::MemoryRecord;
+use crate::measure::MemoryRecord;
 use crate::scene::{Frame, Group, Mesh};
 use crate::subjects::builders::Spec;
 use crate::subjects::host_rays::{KdRays, Numbered, timed};

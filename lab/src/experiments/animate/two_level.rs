@@ -1,7 +1,7 @@
 //! A top level over what stands still and each object, by the calls of `VK_KHR_acceleration_structure`.
 
 use crate::device::Device;
-use crate::measure::record::MemoryRecord;
+use crate::measure::MemoryRecord;
 use crate::scene::{Frame, Group, Mesh};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::level::Level;

@@ -11,9 +11,8 @@ mod projection;
 
 use crate::experiments::navigate::outline::{Outline, OutlineLevel};
 use crate::rays::kinds::{self, RayKind, RayOptions};
-use crate::report::beside;
-use crate::report::names::slug;
 use crate::report::picture::{PictureOptions, View, picture};
+use crate::report::{beside, slug};
 use crate::scene::Scene;
 use crate::subjects::Subject;
 use crate::{Error, Result};

@@ -11,7 +11,7 @@ use crate::cli::work::{device_for_those, page_written};
 use crate::cli::{Bar, Common};
 use crate::device::Device;
 use crate::experiments::stability;
-use crate::measure::setting::{Failure, Setting};
+use crate::measure::{Failure, Setting};
 use crate::rays::kinds::RayKind;
 use crate::report::lines::Points;
 use crate::scene::{self, Scene};

@@ -3,8 +3,8 @@
 
 use super::points::{Degenerate, Experiment};
 use crate::device::Device;
+use crate::measure::Spread;
 use crate::measure::agreement::wrong_where_different;
-use crate::measure::statistics::Spread;
 use crate::random::SplitMix64;
 use crate::scene::{self, Mesh};
 use crate::subjects::Subject;

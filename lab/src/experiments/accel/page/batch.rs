@@ -3,13 +3,9 @@
 use super::Part;
 use crate::Result;
 use crate::experiments::accel::points::{Batch, Implementation, Submission};
-use crate::report::bars::{self, Bar, Bars};
-use crate::report::chart::{Caption, Chart};
-use crate::report::columns::Table;
-use crate::report::curves::{self, Axis, Curve};
-use crate::report::document::{self, Section};
+use crate::report::bars::{Bar, Bars};
 use crate::report::numbers::{count, duration, duration_tick, grouped, short_count, three_digits, tick};
-use crate::report::theme::{SERIES, Tone};
+use crate::report::{Axis, Caption, Chart, Curve, SERIES, Section, Table, Tone, bars, curves, document};
 use maud::{Markup, html};
 
 /// Who builds how, in the order of charts and tables, with its colour: ours begin with the first and the driver's with the second, as

@@ -3,8 +3,7 @@
 use super::Measured;
 use super::batch::find;
 use crate::experiments::accel::points::{BraidedRays, Implementation, RebraidPoint, Submission};
-use crate::measure::statistics::Spread;
-use crate::measure::statistics::geometric_mean;
+use crate::measure::{Spread, geometric_mean};
 
 /// Of the time of one call, that of a call each.
 const BATCH: f64 = 10.0;

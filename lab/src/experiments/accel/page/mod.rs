@@ -11,16 +11,9 @@ mod update;
 
 use crate::Result;
 use crate::experiments::accel::points::{AccelEntry, Batch, Implementation, RebraidPoint, TopLevel, Update};
-use crate::measure::setting::{Failure, Setting};
-use crate::measure::statistics::Spread;
-use crate::report::beside;
-use crate::report::chart::Chart;
-use crate::report::columns::Table;
-use crate::report::curves::Curve;
-use crate::report::document::{self, Document, Section};
-use crate::report::lines;
+use crate::measure::{Failure, Setting, Spread};
 use crate::report::numbers::three_digits;
-use crate::report::theme::Tone;
+use crate::report::{Chart, Curve, Document, Section, Table, Tone, beside, document, lines};
 use goals::Goal;
 use maud::{Markup, html};
 use std::path::{Path, PathBuf};

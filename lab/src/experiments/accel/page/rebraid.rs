@@ -4,13 +4,9 @@ use super::Part;
 use super::goals::{self, mean_gain, overlaps};
 use crate::Result;
 use crate::experiments::accel::points::{BraidedRays, MeanWork, RebraidPoint, TopLevelPoint};
-use crate::report::bars::{self, Bar, Bars};
-use crate::report::chart::{Caption, Chart};
-use crate::report::columns::Table;
-use crate::report::document::{self, Section};
-use crate::report::names::slug;
+use crate::report::bars::{Bar, Bars};
 use crate::report::numbers::{count, grouped, short_count, three_digits, tick, whole};
-use crate::report::theme::SERIES;
+use crate::report::{Caption, Chart, SERIES, Section, Table, bars, document, slug};
 use maud::{Markup, html};
 
 pub(super) fn part(points: &[RebraidPoint]) -> Result<Option<Part>> {

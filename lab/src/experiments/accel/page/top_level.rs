@@ -3,12 +3,8 @@
 use super::{Part, Series, curves_of};
 use crate::Result;
 use crate::experiments::accel::points::{Implementation, TopLevel};
-use crate::report::chart::Caption;
-use crate::report::columns::Table;
-use crate::report::curves::{self, Axis, Curve};
-use crate::report::document::{self, Section};
 use crate::report::numbers::{count, duration_tick, grouped, one_decimal, short_count, three_digits};
-use crate::report::theme::SERIES;
+use crate::report::{Axis, Caption, Curve, SERIES, Section, Table, curves, document};
 use maud::{Markup, html};
 
 pub(super) fn part(points: &[TopLevel]) -> Result<Option<Part>> {

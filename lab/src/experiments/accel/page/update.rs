@@ -3,14 +3,9 @@
 use super::{Part, Series, curves_of};
 use crate::Result;
 use crate::experiments::accel::points::{Implementation, Update};
-use crate::measure::statistics::Spread;
-use crate::report::chart::{Caption, Chart};
-use crate::report::columns::Table;
-use crate::report::curves::{self, Axis, Curve};
-use crate::report::document::{self, Section};
-use crate::report::names::slug;
+use crate::measure::Spread;
 use crate::report::numbers::{duration_tick, grouped, short_count, three_digits, tick, whole};
-use crate::report::theme::SERIES;
+use crate::report::{Axis, Caption, Chart, Curve, SERIES, Section, Table, curves, document, slug};
 use maud::{Markup, html};
 
 pub(super) fn part(points: &[Update]) -> Result<Option<Part>> {

@@ -5,12 +5,11 @@ use super::standings::{Standing, standings};
 use crate::Result;
 use crate::experiments::animate::AnimationMethod;
 use crate::experiments::animate::points::Animated;
-use crate::measure::statistics::Spread;
-use crate::report::chart::{Caption, Chart};
-use crate::report::curves::{self, Axis, Curve};
+use crate::measure::Spread;
 use crate::report::numbers::{duration_tick, tick};
 use crate::report::stacked::{Part, Stack, stacked};
-use crate::report::theme::{PHASES, SERIES, Tone};
+use crate::report::theme::PHASES;
+use crate::report::{Axis, Caption, Chart, Curve, SERIES, Tone, curves};
 
 /// The colour of a way, on all of the page.
 pub fn tone(way: AnimationMethod) -> Tone {

@@ -8,10 +8,8 @@ pub mod standings;
 
 use crate::Result;
 use crate::experiments::animate::points::{AnimateEntry, Animated, SceneSetting, WayInFrame};
-use crate::measure::setting::Failure;
-use crate::report::beside;
-use crate::report::document::{self, Document, Section};
-use crate::report::lines;
+use crate::measure::Failure;
+use crate::report::{Document, Section, beside, document, lines};
 use std::path::{Path, PathBuf};
 
 impl lines::Entry for AnimateEntry {

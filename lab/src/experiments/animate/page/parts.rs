@@ -4,10 +4,8 @@ use super::standings::{Standing, fastest, standings};
 use crate::experiments::animate::AnimationMethod;
 use crate::experiments::animate::points::{Animated, SceneSetting};
 use crate::experiments::bench::kd_trees::published;
-use crate::report::chart::Chart;
-use crate::report::columns::Table;
-use crate::report::document;
 use crate::report::numbers::{count, duration, grouped, size, three_digits, whole};
+use crate::report::{Chart, Table, document};
 use maud::{Markup, html};
 
 pub(super) fn summary(setting: Option<&SceneSetting>, frames: &[Animated], charts: &[Chart]) -> Markup {

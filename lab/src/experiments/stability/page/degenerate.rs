@@ -5,14 +5,9 @@ use super::stretched::other_experiment;
 use crate::Result;
 use crate::experiments::stability::points::{Degenerate, Experiment};
 use crate::report::beside::{DEGENERATE, Page};
-use crate::report::chart::Chart;
-use crate::report::columns::Table;
-use crate::report::different;
-use crate::report::document::Section;
 use crate::report::elements::{number, scroll};
-use crate::report::lines;
-use crate::report::names::short;
 use crate::report::numbers::{count, three_digits, tick};
+use crate::report::{Chart, Section, Table, different, lines, short};
 use crate::scene;
 use maud::{Markup, html};
 

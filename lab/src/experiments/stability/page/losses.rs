@@ -3,14 +3,10 @@
 use crate::Result;
 use crate::experiments::stability::drop;
 use crate::experiments::stability::points::Stretched;
-use crate::measure::statistics::Spread;
-use crate::measure::statistics::geometric_mean;
+use crate::measure::{Spread, geometric_mean};
 use crate::rays::kinds::RayKind;
-use crate::report::chart::{Caption, Chart};
-use crate::report::curves::{self, Axis, Curve, Mark};
-use crate::report::names::short;
 use crate::report::numbers::{three_digits, tick};
-use crate::report::theme::{SERIES, Tone};
+use crate::report::{Axis, Caption, Chart, Curve, Mark, SERIES, Tone, curves, short};
 use maud::{Markup, html};
 
 /// The horizontal axis of all charts.

@@ -14,9 +14,8 @@ use super::points::{Degenerate, Growth, Large, Run};
 use crate::Result;
 use crate::experiments::write_pages;
 use crate::report::beside::Page;
-use crate::report::chart::Chart;
-use crate::report::document::{self, Document, Section};
-use crate::report::lines::{self, Entry};
+use crate::report::lines::Entry;
+use crate::report::{Chart, Document, Section, document, lines};
 use maud::{Markup, html};
 use std::path::{Path, PathBuf};
 

@@ -6,13 +6,7 @@ use crate::Result;
 use crate::experiments::stability::points::{Experiment, Stretched};
 use crate::experiments::stability::relative::Stretch;
 use crate::report::beside::Page;
-use crate::report::chart::Chart;
-use crate::report::columns::Table;
-use crate::report::curves::Mark;
-use crate::report::different;
-use crate::report::document::{self, Section};
-use crate::report::lines;
-use crate::report::names::slug;
+use crate::report::{Chart, Mark, Section, Table, different, document, lines, slug};
 use maud::{Markup, html};
 
 /// What stretches a scene, and what its page says of it.
