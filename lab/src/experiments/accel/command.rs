@@ -6,7 +6,7 @@ use crate::device::Device;
 use crate::experiments::accel::page::{self, Points};
 use crate::experiments::accel::points::AccelEntry;
 use crate::experiments::accel::{AccelSetup, Experiment, batch, rebraid, top_level, update};
-use crate::measure::{Failure, Setting};
+use crate::measure::{Failure, Setting, Sink};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
 use crate::{Error, Result};
@@ -70,7 +70,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     points.append(AccelEntry::Setting(setting(common, arguments, &device)?))?;
     let mut failures = 0;
     // Point by point onto the disk. What fails is noted and the rest goes on; only a folder that cannot be written ends the run.
-    let mut measured = |name: &str, measure: &dyn Fn(&mut dyn FnMut(AccelEntry) -> Result<()>) -> Result<()>| {
+    let mut measured = |name: &str, measure: &dyn Fn(&mut Sink<'_, AccelEntry>) -> Result<()>| {
         let Err(error) = measure(&mut |entry| points.append(entry)) else { return Ok(()) };
         eprintln!("hedgerow: {name}: {error}");
         failures += 1;

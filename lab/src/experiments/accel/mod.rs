@@ -6,7 +6,6 @@
 //! [`points`] as it goes.
 
 pub mod batch;
-mod bundles;
 pub(crate) mod command;
 pub mod page;
 pub mod points;
@@ -16,10 +15,15 @@ pub mod update;
 
 use crate::device::Device;
 use crate::named::named;
-use crate::rays::kinds::{RayKind, RayOptions};
+use crate::rays::kinds::{self, RayKind, RayOptions};
+use crate::scene::{Instances, Scene, SceneInstance};
+use crate::subjects::device_rays::RayBuffers;
+use crate::subjects::levels::Levels;
 use crate::subjects::structures::Structures;
 use crate::{Error, Result};
+use ash::vk;
 use hedgerow::accel;
+use hedgerow::trace::Query;
 
 /// Runs that do not count, before those that do.
 const WARM_UPS: u32 = 1;
@@ -66,6 +70,32 @@ impl<'a> AccelSetup<'a> {
     /// Ours, and the driver's where it has any.
     fn makers(&self) -> Vec<Structures<'a>> {
         std::iter::once(self.ours()).chain(self.drivers()).collect()
+    }
+
+    /// The rays of every kind to `scene`, in device memory; kinds without any are left out. What follows from hits is traced on the
+    /// device, too.
+    fn rays_to(&self, scene: &Scene) -> Result<Vec<(RayKind, RayBuffers<'a>)>> {
+        let alone = Instances {
+            name: scene.name.clone(),
+            parts: vec![scene.mesh.clone()],
+            instances: vec![SceneInstance { part: 0, transform: SceneInstance::IDENTITY }],
+            camera: scene.camera,
+            lights: Vec::new(),
+        };
+        let mut levels = Levels::new(self.ours(), &alone, vk::BuildAccelerationStructureFlagsKHR::empty())?;
+        levels.build()?;
+        let mut all = Vec::new();
+        for &kind in self.kinds {
+            let rays = kinds::generate(kind, scene, &self.rays, &mut |rays| {
+                let buffers = RayBuffers::new(self.device, rays)?;
+                levels.trace(&buffers, Query::ClosestHit)?;
+                Ok(buffers.read_hits())
+            })?;
+            if !rays.is_empty() {
+                all.push((kind, RayBuffers::new(self.device, &rays)?));
+            }
+        }
+        Ok(all)
     }
 }
 

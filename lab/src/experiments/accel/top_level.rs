@@ -3,7 +3,7 @@
 use super::points::{AccelEntry, TopLevel};
 use super::{AccelSetup, WARM_UPS, apart, where_possible};
 use crate::Result;
-use crate::measure::{Spread, in_turn};
+use crate::measure::{Sink, Spread, in_turn};
 use crate::scene::{self, LoadOptions, SceneInstance};
 use crate::subjects::levels::Levels;
 use ash::vk;
@@ -16,7 +16,7 @@ const TIMES: u32 = 10;
 ///
 /// # Errors
 /// Too little memory; the device failed.
-pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut dyn FnMut(AccelEntry) -> Result<()>) -> Result<()> {
+pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut Sink<'_, AccelEntry>) -> Result<()> {
     for count in counts(most) {
         (stage.say)(&format!("top level of {count}"));
         let scene = scene::load_instances(&format!("gen:cells:{count}"), &LoadOptions::default())?;

@@ -1,16 +1,18 @@
 //! Updating against building anew, over an animation: time, growth of the SAH cost, and what rays lose.
 
-use super::bundles::{self, Bundle};
 use super::points::{self, AccelEntry, UpdatedRays};
 use super::{AccelSetup, WARM_UPS, apart, where_possible};
 use crate::Result;
-use crate::measure::{Spread, in_turn, ratios};
+use crate::measure::{Sink, Spread, in_turn, ratios};
+use crate::rays::kinds::RayKind;
 use crate::scene::{Animation, Mesh, Scene};
+use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::level::Level;
 use crate::subjects::structures::Structures;
 use ash::vk;
 use hedgerow::accel::Instance;
 use hedgerow::gpu::Timestamps;
+use hedgerow::trace::Query;
 
 type Mode = vk::BuildAccelerationStructureModeKHR;
 type Flags = vk::BuildAccelerationStructureFlagsKHR;
@@ -60,9 +62,9 @@ impl<'a> Pair<'a> {
     }
 
     /// Traces rays through both; milliseconds through the one built anew, and through the updated one.
-    fn trace(&mut self, Bundle { kind, buffers }: &Bundle<'_>) -> Result<(f64, Option<f64>)> {
+    fn trace(&mut self, rays: &RayBuffers<'_>, query: Query) -> Result<(f64, Option<f64>)> {
         let Pair { structures, timestamps, updated, built, updates } = self;
-        let mut trace = |top: &Level<'_>| structures.trace(timestamps, top.structure(), buffers, kind.query());
+        let mut trace = |top: &Level<'_>| structures.trace(timestamps, top.structure(), rays, query);
         let updated = updates.then(|| trace(&updated.top)).transpose()?;
         Ok((trace(&built.top)?, updated))
     }
@@ -76,7 +78,7 @@ pub fn measure(
     stage: &AccelSetup<'_>,
     animation: &Animation,
     frames: u32,
-    point: &mut dyn FnMut(AccelEntry) -> Result<()>,
+    point: &mut Sink<'_, AccelEntry>,
 ) -> Result<()> {
     let mut pairs: Vec<Pair<'_>> =
         stage.makers().into_iter().map(|maker| Pair::new(maker, animation)).collect::<Result<_>>()?;
@@ -99,8 +101,8 @@ pub fn measure(
             lights: Vec::new(),
         };
         let mut rays = vec![Vec::new(); pairs.len()];
-        for bundle in bundles::of(stage, &scene)? {
-            for (rays, traced) in rays.iter_mut().zip(traced(stage, &mut pairs, &bundle)?) {
+        for (kind, buffers) in stage.rays_to(&scene)? {
+            for (rays, traced) in rays.iter_mut().zip(traced(stage, &mut pairs, kind, &buffers)?) {
                 rays.push(traced);
             }
         }
@@ -125,13 +127,18 @@ pub fn measure(
 }
 
 /// The rays through both structures of every maker, in turn.
-fn traced(stage: &AccelSetup<'_>, pairs: &mut [Pair<'_>], bundle: &Bundle<'_>) -> Result<Vec<UpdatedRays>> {
-    let times = in_turn(pairs, WARM_UPS, stage.runs, |pair| pair.trace(bundle));
+fn traced(
+    stage: &AccelSetup<'_>,
+    pairs: &mut [Pair<'_>],
+    kind: RayKind,
+    buffers: &RayBuffers<'_>,
+) -> Result<Vec<UpdatedRays>> {
+    let times = in_turn(pairs, WARM_UPS, stage.runs, |pair| pair.trace(buffers, kind.query()));
     let rays = times.into_iter().map(|times| {
         let (built, updated) = apart(&times?);
         Ok(UpdatedRays {
-            rays: bundle.kind.name().into(),
-            count: bundle.buffers.count.into(),
+            rays: kind.name().into(),
+            count: buffers.count.into(),
             built_ms: Spread::of_some(&built)?,
             updated_ms: Spread::of(&updated),
             slowdown: Spread::of(&ratios(&updated, &built)),

@@ -15,7 +15,7 @@ mod two_level;
 
 use crate::device::Device;
 use crate::measure::agreement::may_both_be_right;
-use crate::measure::{Failure, Spread, in_turn, mean_work};
+use crate::measure::{Failure, Sink, Spread, in_turn, mean_work};
 use crate::named::named;
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Camera, DynamicScene, Frame, Group, Mesh, Scene};
@@ -154,7 +154,7 @@ pub fn measure<'a>(
     stage: &AnimateSetup<'a>,
     scene: &'a DynamicScene,
     frames: &[u32],
-    point: &mut dyn FnMut(AnimateEntry) -> Result<()>,
+    point: &mut Sink<'_, AnimateEntry>,
     show: &mut dyn FnMut(u32, &Scene, &mut dyn Subject) -> Result<()>,
 ) -> Result<()> {
     let frame_of = |number: u32| -> Result<Frame<'a>> {
@@ -233,7 +233,7 @@ fn keep<T>(
     running: &mut Vec<Running<'_>>,
     results: Vec<Result<T>>,
     frame: u32,
-    point: &mut dyn FnMut(AnimateEntry) -> Result<()>,
+    point: &mut Sink<'_, AnimateEntry>,
     take: impl Fn(&mut Running<'_>, T),
 ) -> Result<()> {
     for (mut one, result) in std::mem::take(running).into_iter().zip(results) {

@@ -129,24 +129,18 @@ fn side(text: &str) -> Result<Side, String> {
 
 pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     match &arguments.experiment {
-        Experiment::Growth(growth) => run_growth(common, growth),
-        Experiment::Large(large) => run_large(common, large),
+        Experiment::Growth(Growth { relative, builder, steps, axes, sides }) => {
+            let both = |&axes: &u32| sides.iter().map(move |&side| FarTriangle { axes, side });
+            let stretches: Vec<FarTriangle> = axes.iter().flat_map(both).collect();
+            run_relative(common, relative, builder, (&stretches, &steps.0))
+        }
+        Experiment::Large(Large { relative, builder, steps, placements, counts }) => {
+            let each = |&placement| counts.iter().map(move |count| HugeTriangles { placement, count: count.get() });
+            let stretches: Vec<HugeTriangles> = placements.iter().flat_map(each).collect();
+            run_relative(common, relative, builder, (&stretches, &steps.0))
+        }
         Experiment::Degenerate(degenerate) => run_degenerate(common, degenerate),
     }
-}
-
-fn run_growth(common: &Common, arguments: &Growth) -> anyhow::Result<()> {
-    let sides = |&axes: &u32| arguments.sides.iter().map(move |&side| FarTriangle { axes, side });
-    let stretches: Vec<FarTriangle> = arguments.axes.iter().flat_map(sides).collect();
-    run_relative(common, &arguments.relative, &arguments.builder, (&stretches, &arguments.steps.0))
-}
-
-fn run_large(common: &Common, arguments: &Large) -> anyhow::Result<()> {
-    let counts = |&placement: &LargePlacement| {
-        arguments.counts.iter().map(move |count| HugeTriangles { placement, count: count.get() })
-    };
-    let stretches: Vec<HugeTriangles> = arguments.placements.iter().flat_map(counts).collect();
-    run_relative(common, &arguments.relative, &arguments.builder, (&stretches, &arguments.steps.0))
 }
 
 fn run_relative<S: Stretch>(
@@ -233,17 +227,13 @@ fn run_degenerate(common: &Common, arguments: &Degenerate) -> anyhow::Result<()>
         bar.step();
     }
     drop(bar);
-    run.setting.notes.extend(peers_note(&specs));
+    if specs.iter().any(degenerate::is_peer) {
+        let note = "Peers get the scenes without triangles whose vertices are not there; what goes wrong with them is shown and is no \
+                    failure of ours.";
+        run.setting.notes.push(note.into());
+    }
     let page = page::finish::<stability::points::Degenerate>(&arguments.output, &run)?;
     page_written(device.as_ref(), &page, failures)
-}
-
-fn peers_note(specs: &[Spec]) -> Option<String> {
-    specs.iter().any(degenerate::is_peer).then(|| {
-        "Peers get the scenes without triangles whose vertices are not there; what goes wrong with them is shown and is no \
-         failure of ours."
-            .into()
-    })
 }
 
 /// The device that the builders need, and those of them that can work here: one that came with `all` and cannot is left out.

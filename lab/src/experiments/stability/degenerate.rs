@@ -3,8 +3,8 @@
 
 use super::points::{Degenerate, Experiment};
 use crate::device::Device;
-use crate::measure::Spread;
 use crate::measure::agreement::wrong_where_different;
+use crate::measure::{Sink, Spread};
 use crate::random::SplitMix64;
 use crate::scene::{self, Mesh};
 use crate::subjects::Subject;
@@ -51,11 +51,7 @@ struct Truth {
 ///
 /// # Errors
 /// Those of `point`.
-pub fn measure(
-    stage: &DegenerateSetup<'_>,
-    scene: &scene::Degenerate,
-    point: &mut dyn FnMut(Degenerate) -> Result<()>,
-) -> Result<()> {
+pub fn measure(stage: &DegenerateSetup<'_>, scene: &scene::Degenerate, point: &mut Sink<'_, Degenerate>) -> Result<()> {
     let tree = lbvh::build(&scene.mesh.positions, &scene.mesh.triangles, Code::Mc63.full(), Collapse::OFF);
     let rays = rays(&tree, stage.seed);
     let expected = rays.iter().map(|ray| closest_hit_by_brute_force(&tree, ray)).collect();

@@ -4,7 +4,7 @@ use super::clipped;
 use super::points::{Experiment, Stretched};
 use crate::device::Device;
 use crate::measure::agreement::wrong_where_different;
-use crate::measure::{Failure, Spread, in_turn, ratios};
+use crate::measure::{Failure, Sink, Spread, in_turn, ratios};
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Mesh, Scene};
 use crate::subjects::Subject;
@@ -111,7 +111,7 @@ pub fn measure<S: Stretch>(
     scene: &Scene,
     (stretches, steps): (&[S], &[u32]),
     failed: &mut dyn FnMut(Failure),
-    point: &mut dyn FnMut(Stretched<S>) -> Result<()>,
+    point: &mut Sink<'_, Stretched<S>>,
 ) -> Result<Vec<String>> {
     let part = Part::new(stage, scene)?;
     let mut notes = Vec::new();
@@ -137,7 +137,7 @@ fn measure_one<S: Stretch>(
     by: S,
     meshes: &[(u32, Mesh)],
     failed: &mut dyn FnMut(Failure),
-    point: &mut dyn FnMut(Stretched<S>) -> Result<()>,
+    point: &mut Sink<'_, Stretched<S>>,
 ) -> Result<()> {
     let Some((_, first)) = meshes.first() else { return Ok(()) };
     let truth = tree_of(first);

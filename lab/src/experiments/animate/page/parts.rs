@@ -38,21 +38,17 @@ fn what_moves(setting: &SceneSetting) -> String {
 /// Who is fastest and by how much, in a sentence or two.
 fn reading(all: &[Standing]) -> String {
     let Some(best) = fastest(all) else { return "Nothing was measured to its end.".into() };
-    let times = |standing: &Standing| format!("{} × {}", three_digits(standing.frame_ms / best.frame_ms), standing.way);
+    let times = |standing: &Standing| format!("{} ({})", three_digits(standing.frame_ms / best.frame_ms), standing.way);
     let others: Vec<String> = all.iter().filter(|other| other.way != best.way).map(times).collect();
     let mut text = format!("A frame takes least by {}: {} in the mean", best.way, duration(best.frame_ms));
     if !others.is_empty() {
-        text += &format!("; the others take {} times as long", list(&others));
+        text += &format!("; the others take {} times as long", others.join(", "));
     }
     if all.iter().any(|standing| standing.timer != all[0].timer) {
         text +=
             ". Some of the builds were timed on the host and some on the device, so that a ratio of theirs says little";
     }
     text + "."
-}
-
-fn list(items: &[String]) -> String {
-    items.iter().map(|item| item.replacen(" × ", " (", 1) + ")").collect::<Vec<_>>().join(", ")
 }
 
 fn ways(all: &[Standing]) -> Markup {
