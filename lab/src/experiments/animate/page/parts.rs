@@ -99,12 +99,8 @@ pub(super) fn every_frame(frames: &[Animated]) -> Markup {
             .number("steps", "a ray", move |frame| of(frame)?.steps, three_digits)
             .number("tests", "a ray", move |frame| of(frame)?.tests, three_digits);
     }
-    let all = all.number("frame", "ms", |frame| Some(frame.frame_ms()), three_digits).number(
-        "SAH cost",
-        "",
-        |frame| frame.sah,
-        three_digits,
-    );
+    all = all.number("frame", "ms", |frame| Some(frame.frame_ms()), three_digits);
+    all = all.number("SAH cost", "", |frame| frame.sah, three_digits);
     html! {
         details {
             summary { "All figures" }

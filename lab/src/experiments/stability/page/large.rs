@@ -62,12 +62,8 @@ impl StretchPage for HugeTriangles {
     }
 
     fn own_columns<'p>(table: Losses<'p, Self>) -> Losses<'p, Self> {
-        table.text("triangles", |row| row.own[0].by.placement).number(
-            "a side",
-            "",
-            |row| Some(row.own[0].by.count.into()),
-            tick,
-        )
+        let table = table.text("triangles", |row| row.own[0].by.placement);
+        table.number("a side", "", |row| Some(row.own[0].by.count.into()), tick)
     }
 
     fn more_columns<'p>(table: Losses<'p, Self>, _: &[Large]) -> Losses<'p, Self> {
@@ -75,12 +71,8 @@ impl StretchPage for HugeTriangles {
             let (last, full) = (row.last(), with_full_bounds(&row.all, row.last())?);
             Some(last.cost?? / full.cost??)
         };
-        table.number("cost at the end", "×", |row| row.last().relative_cost, three_digits).number(
-            "over full bounds'",
-            "×",
-            saved,
-            three_digits,
-        )
+        let table = table.number("cost at the end", "×", |row| row.last().relative_cost, three_digits);
+        table.number("over full bounds'", "×", saved, three_digits)
     }
 }
 

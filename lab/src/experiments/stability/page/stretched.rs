@@ -123,12 +123,10 @@ fn losses<S: StretchPage>(points: &[Stretched<S>]) -> Markup {
             }
         }
     }
-    let table = Table::new("Where each loses a tenth", rows).id("losses").name("scene", |row| &row.own[0].scene).cell(
-        "builder",
-        |row| {
-            html! { td.builder data-value=(row.builder) title=(row.builder) { (short_codes(row.builder)) } }
-        },
-    );
+    let table = Table::new("Where each loses a tenth", rows).id("losses").name("scene", |row| &row.own[0].scene);
+    let table = table.cell("builder", |row| {
+        html! { td.builder data-value=(row.builder) title=(row.builder) { (short_codes(row.builder)) } }
+    });
     let table = S::own_columns(table).figure("cost", "e", |row| Loss::of_cost(&row.own).cell());
     let table = kinds(points).into_iter().fold(S::more_columns(table, points), |table, kind| {
         table.figure(kind, "e", move |row| Loss::of_speed(&row.own, kind).cell())
