@@ -115,10 +115,8 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<(Vec<Instanc
         } else if let Some(animation) = scene::load_moving(spec, &options)? {
             animations.push(animation);
         } else {
-            return Err(Error::Argument(format!(
-                "{spec}: neither instances nor an animation; take an .inst or .anim file, or a generator of such"
-            ))
-            .into());
+            let what = "neither instances nor an animation; take an .inst or .anim file, or a generator of such";
+            return Err(Error::Argument(format!("{spec}: {what}")).into());
         }
     }
     if instances.is_empty() && arguments.experiments.contains(&Experiment::Rebraid) {

@@ -63,13 +63,9 @@ impl<'a> AccelSetup<'a> {
         Structures::ours(self.device, accel::AccelOptions::DEFAULT)
     }
 
-    fn drivers(&self) -> Option<Structures<'a>> {
-        Structures::drivers(self.device)
-    }
-
     /// Ours, and the driver's where it has any.
     fn makers(&self) -> Vec<Structures<'a>> {
-        std::iter::once(self.ours()).chain(self.drivers()).collect()
+        std::iter::once(self.ours()).chain(Structures::drivers(self.device)).collect()
     }
 
     /// The rays of every kind to `scene`, in device memory; kinds without any are left out. What follows from hits is traced on the

@@ -9,6 +9,7 @@ use crate::rays::kinds::RayKind;
 use crate::scene::{Instances, Scene, SceneInstance};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::levels::Levels;
+use crate::subjects::structures::Structures;
 use ash::vk;
 use hedgerow::accel::REBRAID;
 use hedgerow::geometry::Aabb;
@@ -29,7 +30,7 @@ pub fn measure(stage: &AccelSetup<'_>, instances: &Instances, point: &mut Sink<'
     let say = |what: &str| (stage.say)(&format!("re-braiding {}: {what}", instances.name));
     say("building");
     let ours = [(stage.ours(), Flags::empty()), (stage.ours(), REBRAID)];
-    let all = ours.into_iter().chain(stage.drivers().map(|drivers| (drivers, Flags::empty())));
+    let all = ours.into_iter().chain(Structures::drivers(stage.device).map(|drivers| (drivers, Flags::empty())));
     let levels = all.map(|(maker, flags)| Levels::new(maker, instances, flags));
     let mut levels: Vec<Levels<'_>> = levels.collect::<Result<_>>()?;
     let builds = in_turn(&mut levels, WARM_UPS, stage.runs, Levels::build);

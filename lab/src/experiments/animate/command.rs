@@ -92,10 +92,10 @@ impl Frames {
                 Ok((0..some).map(|i| (u64::from(i) * u64::from(count) / u64::from(some)) as u32).collect())
             }
             Frames::Range(from, to) if to <= count => Ok((from..to).collect()),
-            Frames::Range(from, to) => Err(Error::Argument(format!(
-                "--frames {from}..{to}: {} has {count}, counted from 0; end at {count} or before",
-                scene.name
-            ))),
+            Frames::Range(from, to) => {
+                let what = format!("{} has {count}, counted from 0; end at {count} or before", scene.name);
+                Err(Error::Argument(format!("--frames {from}..{to}: {what}")))
+            }
         }
     }
 }

@@ -124,7 +124,7 @@ fn axes(text: &str) -> Result<u32, String> {
 }
 
 fn side(text: &str) -> Result<Side, String> {
-    Side::ALL.into_iter().find(|side| side.sign() == text).ok_or_else(|| format!("{text:?} is no side; take + or -"))
+    Side::ALL.into_iter().find(|side| side.name() == text).ok_or_else(|| format!("{text:?} is no side; take + or -"))
 }
 
 pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
@@ -192,11 +192,8 @@ fn run_degenerate(common: &Common, arguments: &Degenerate) -> anyhow::Result<()>
     let mut scenes = scene::degenerate(arguments.triangles.get());
     if let Some(unknown) = arguments.scenes.iter().find(|name| scenes.iter().all(|scene| scene.name != **name)) {
         let names: Vec<&str> = scenes.iter().map(|scene| scene.name).collect();
-        return Err(crate::Error::Argument(format!(
-            "unknown degenerate scene {unknown:?}; use one of {}",
-            names.join(", ")
-        ))
-        .into());
+        let what = format!("unknown degenerate scene {unknown:?}; use one of {}", names.join(", "));
+        return Err(crate::Error::Argument(what).into());
     }
     scenes.retain(|scene| arguments.scenes.is_empty() || arguments.scenes.iter().any(|name| name == scene.name));
     let (device, specs) = opened(common, &arguments.builder)?;

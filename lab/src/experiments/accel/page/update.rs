@@ -44,6 +44,9 @@ pub(super) fn part(points: &[Update]) -> Result<Option<Part>> {
     Ok(Some((Section::new("updates", "Updating against building from scratch", body), charts)))
 }
 
+/// The horizontal axis of all charts.
+const FRAME: Axis<'_> = Axis { name: "frame", is_log: false, number: tick };
+
 /// Where a point of a chart stands.
 fn place(point: &Update) -> (Implementation, u32) {
     (point.maker, point.frame)
@@ -63,19 +66,15 @@ fn times(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
     };
     let in_words: Vec<String> =
         all.iter().map(|curve| format!("{}: {} ms", curve.name, three_digits(median(curve)))).collect();
-    let triangles = frames.first().map_or(0, |point| point.triangles);
+    let in_words = format!("In the median over the frames, {}.", in_words.join("; "));
+    let triangles = grouped(frames.first().map_or(0, |point| point.triangles));
     let caption = Caption {
         name: format!("accel-update-{}", slug(scene)),
         title: format!("{scene}: building and updating, frame by frame"),
-        alt: format!("In the median over the frames, {}.", in_words.join("; ")),
-        reading: format!(
-            "{} triangles; the vertical axis is logarithmic. In the median over the frames, {}.",
-            grouped(triangles),
-            in_words.join("; ")
-        ),
+        reading: format!("{triangles} triangles; the vertical axis is logarithmic. {in_words}"),
+        alt: in_words,
     };
-    let x = Axis { name: "frame", is_log: false, number: tick };
-    curves::curves(caption, &all, &x, &Axis { name: "device time", is_log: true, number: duration_tick })
+    curves::curves(caption, &all, &FRAME, &Axis { name: "device time", is_log: true, number: duration_tick })
 }
 
 fn quality(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
@@ -97,8 +96,7 @@ fn quality(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
                   time of all rays through it, over those of a structure built from scratch. 1 is as good as new."
             .into(),
     };
-    let x = Axis { name: "frame", is_log: false, number: tick };
-    curves::curves(caption, &all, &x, &Axis { name: "times as much", is_log: false, number: tick })
+    curves::curves(caption, &all, &FRAME, &Axis { name: "times as much", is_log: false, number: tick })
 }
 
 /// From where on building anew pays, in a sentence.

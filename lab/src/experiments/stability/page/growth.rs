@@ -78,7 +78,7 @@ impl StretchPage for FarTriangle {
     fn own_columns<'p>(table: Losses<'p, Self>) -> Losses<'p, Self> {
         table
             .number("axes", "", |row| Some(row.own[0].by.axes.into()), tick)
-            .text("side", |row| row.own[0].by.side.sign())
+            .text("side", |row| row.own[0].by.side.name())
     }
 
     fn more_columns<'p>(mut table: Losses<'p, Self>, points: &[Growth]) -> Losses<'p, Self> {
