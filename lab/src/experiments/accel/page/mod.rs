@@ -45,30 +45,23 @@ struct Measured {
     failures: Vec<Failure>,
 }
 
-impl From<Vec<AccelEntry>> for Measured {
-    fn from(entries: Vec<AccelEntry>) -> Measured {
-        let mut measured = Measured::default();
-        for entry in entries {
-            match entry {
-                AccelEntry::Setting(setting) => measured.setting = Some(setting),
-                AccelEntry::Batch(point) => measured.batches.push(point),
-                AccelEntry::Tlas(point) => measured.top_levels.push(point),
-                AccelEntry::Rebraid(point) => measured.rebraids.push(point),
-                AccelEntry::Update(point) => measured.updates.push(point),
-                AccelEntry::Failure(failure) => measured.failures.push(failure),
-            }
-        }
-        measured
-    }
-}
-
 /// Writes `accel.html` and its charts into `folder`, from the `accel.jsonl` there; gives the page's path. The page names the
 /// others that lie there.
 ///
 /// # Errors
 /// The records cannot be read; a file cannot be written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
-    let measured = Measured::from(read(folder)?);
+    let mut measured = Measured::default();
+    for entry in read(folder)? {
+        match entry {
+            AccelEntry::Setting(setting) => measured.setting = Some(setting),
+            AccelEntry::Batch(point) => measured.batches.push(point),
+            AccelEntry::Tlas(point) => measured.top_levels.push(point),
+            AccelEntry::Rebraid(point) => measured.rebraids.push(point),
+            AccelEntry::Update(point) => measured.updates.push(point),
+            AccelEntry::Failure(failure) => measured.failures.push(failure),
+        }
+    }
     let setting = measured.setting.as_ref();
     let parts = [
         batch::part(&measured.batches)?,
