@@ -12,3 +12,10 @@ pub mod record;
 pub mod setting;
 pub mod statistics;
 pub mod total_time;
+
+pub use record::MemoryRecord;
+pub use setting::{Failure, Setting};
+pub use statistics::{Spread, geometric_mean, in_turn, mean_work, ratios};
+
+/// Takes records as soon as they are measured.
+pub type Sink<'s, R> = dyn FnMut(R) -> crate::Result<()> + 's;

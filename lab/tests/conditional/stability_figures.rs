@@ -54,7 +54,7 @@ fn costs_are_those_of_an_independent_program_on_either_side() {
         for point in costs(&bunny, codes, axes, &steps) {
             let Some((e, expected)) = known.iter().find(|(e, _)| *e == point.e) else { continue };
             let got = point.relative_cost.expect("an area");
-            let what = format!("{codes}, {} axes, side {}, e = {e}", axes, point.by.side.sign());
+            let what = format!("{codes}, {} axes, side {}, e = {e}", axes, point.by.side.name());
             assert!((got / expected - 1.0).abs() <= TOLERANCE, "{what}: {got:.3}, elsewhere {expected}");
         }
     }

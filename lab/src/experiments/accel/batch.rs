@@ -4,7 +4,7 @@ use super::points::{self, AccelEntry, Submission};
 use super::{AccelSetup, WARM_UPS};
 use crate::Result;
 use crate::device::{Buffer, Device};
-use crate::measure::statistics::{Spread, in_turn, ratios};
+use crate::measure::{Sink, Spread, in_turn, ratios};
 use crate::scene::{self, LoadOptions};
 use crate::subjects::structures::{BuildInfo, Geometry, Range, Structures, triangles_of};
 use ash::vk;
@@ -131,7 +131,7 @@ impl Drop for Batch<'_, '_> {
 ///
 /// # Errors
 /// Too little memory; the device failed.
-pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut dyn FnMut(AccelEntry) -> Result<()>) -> Result<()> {
+pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut Sink<'_, AccelEntry>) -> Result<()> {
     let workload = Workload::new(stage.device, most)?;
     let makers = stage.makers();
     let batches: Vec<Batch<'_, '_>> =

@@ -6,9 +6,10 @@ use crate::device::Device;
 use crate::experiments::accel::page::{self, Points};
 use crate::experiments::accel::points::AccelEntry;
 use crate::experiments::accel::{AccelSetup, Experiment, batch, rebraid, top_level, update};
-use crate::measure::setting::{Failure, Setting};
+use crate::measure::{Failure, Setting, Sink};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
+use crate::{Error, Result};
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
@@ -55,7 +56,7 @@ pub struct Arguments {
 pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let (instances, animations) = scenes(common, arguments)?;
     // Before any work: a folder that cannot be written would lose all of it.
-    let points = Points::create(&arguments.output)?;
+    let mut points = Points::create(&arguments.output)?;
     let device = common.open_device(true)?;
     let bar = Bar::new(common, "opening the device", 0);
     let say = |what: &str| bar.say(what);
@@ -66,31 +67,40 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         rays: arguments.size.rays(common.seed),
         say: &say,
     };
-    let mut run = Run { points, failures: 0 };
-    run.points.append(AccelEntry::Setting(setting(common, arguments, &device)?))?;
+    points.append(AccelEntry::Setting(setting(common, arguments, &device)?))?;
+    let mut failures = 0;
+    // Point by point onto the disk. What fails is noted and the rest goes on; only a folder that cannot be written ends the run.
+    let mut measured = |name: &str, measure: &dyn Fn(&mut Sink<'_, AccelEntry>) -> Result<()>| {
+        let Err(error) = measure(&mut |entry| points.append(entry)) else { return Ok(()) };
+        eprintln!("hedgerow: {name}: {error}");
+        failures += 1;
+        points.append(AccelEntry::Failure(Failure::named(name, error)))
+    };
     for experiment in Experiment::ALL.into_iter().filter(|e| arguments.experiments.contains(e)) {
         let name = experiment.name();
         match experiment {
-            Experiment::Batch => run.one(name, |point| batch::measure(&stage, arguments.structures.get(), point))?,
+            Experiment::Batch => measured(name, &|point| batch::measure(&stage, arguments.structures.get(), point))?,
             Experiment::TopLevel => {
-                run.one(name, |point| top_level::measure(&stage, arguments.instances.get(), point))?
+                measured(name, &|point| top_level::measure(&stage, arguments.instances.get(), point))?;
             }
             Experiment::Rebraid => {
                 for scene in &instances {
-                    run.one(&format!("{name} {}", scene.name), |point| rebraid::measure(&stage, scene, point))?;
+                    measured(&format!("{name} {}", scene.name), &|point| rebraid::measure(&stage, scene, point))?;
                 }
             }
             Experiment::Update => {
                 for scene in &animations {
                     let frames = arguments.frames.get();
-                    run.one(&format!("{name} {}", scene.name), |point| update::measure(&stage, scene, frames, point))?;
+                    measured(&format!("{name} {}", scene.name), &|point| {
+                        update::measure(&stage, scene, frames, point)
+                    })?;
                 }
             }
         }
     }
     drop(bar);
     let page = page::write(&arguments.output)?;
-    work::page_written(Some(&device), &page, run.failures)
+    work::page_written(Some(&device), &page, failures)
 }
 
 /// The scenes that are named, by what they are good for; the generated ones of a kind where none of it is named.
@@ -105,17 +115,15 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<(Vec<Instanc
         } else if let Some(animation) = scene::load_moving(spec, &options)? {
             animations.push(animation);
         } else {
-            return Err(crate::Error::Argument(format!(
-                "{spec}: neither instances nor an animation; take an .inst or .anim file, or a generator of such"
-            ))
-            .into());
+            let what = "neither instances nor an animation; take an .inst or .anim file, or a generator of such";
+            return Err(Error::Argument(format!("{spec}: {what}")).into());
         }
     }
     if instances.is_empty() && arguments.experiments.contains(&Experiment::Rebraid) {
-        instances = REBRAIDED.iter().map(|spec| scene::load_instances(spec, &options)).collect::<crate::Result<_>>()?;
+        instances = REBRAIDED.iter().map(|spec| scene::load_instances(spec, &options)).collect::<Result<_>>()?;
     }
     if animations.is_empty() && arguments.experiments.contains(&Experiment::Update) {
-        animations = UPDATED.iter().map(|spec| scene::load_animation(spec, &options)).collect::<crate::Result<_>>()?;
+        animations = UPDATED.iter().map(|spec| scene::load_animation(spec, &options)).collect::<Result<_>>()?;
     }
     instances.iter_mut().for_each(|scene| common.aim(&mut scene.camera));
     animations.iter_mut().for_each(|scene| common.aim(&mut scene.camera));
@@ -123,33 +131,11 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<(Vec<Instanc
 }
 
 /// Where and how it is measured.
-fn setting(common: &Common, arguments: &Arguments, device: &Device) -> crate::Result<Setting> {
+fn setting(common: &Common, arguments: &Arguments, device: &Device) -> Result<Setting> {
     let notes = driver::note(device.found()).into_iter().chain(driver::missing(device)).collect();
     let options = [
         ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),
         ("Image", format!("{}, seed {}", arguments.size, common.seed)),
     ];
     Setting::of(Some(device), &options, notes)
-}
-
-/// A run under way.
-struct Run {
-    points: Points,
-    failures: usize,
-}
-
-impl Run {
-    /// One experiment, point by point onto the disk. What fails is noted and the rest goes on; only a folder that cannot be
-    /// written ends the run.
-    fn one(
-        &mut self,
-        name: &str,
-        measure: impl FnOnce(&mut dyn FnMut(AccelEntry) -> crate::Result<()>) -> crate::Result<()>,
-    ) -> crate::Result<()> {
-        let points = &mut self.points;
-        let Err(error) = measure(&mut |entry| points.append(entry)) else { return Ok(()) };
-        eprintln!("hedgerow: {name}: {error}");
-        self.failures += 1;
-        self.points.append(AccelEntry::Failure(Failure::named(name, error)))
-    }
 }

@@ -6,9 +6,7 @@
 //! [`points`] as it goes.
 
 pub mod batch;
-mod bundles;
 pub(crate) mod command;
-mod deforming;
 pub mod page;
 pub mod points;
 pub mod rebraid;
@@ -17,10 +15,15 @@ pub mod update;
 
 use crate::device::Device;
 use crate::named::named;
-use crate::rays::kinds::{RayKind, RayOptions};
+use crate::rays::kinds::{self, RayKind, RayOptions};
+use crate::scene::{Instances, Scene, SceneInstance};
+use crate::subjects::device_rays::RayBuffers;
+use crate::subjects::levels::Levels;
 use crate::subjects::structures::Structures;
 use crate::{Error, Result};
+use ash::vk;
 use hedgerow::accel;
+use hedgerow::trace::Query;
 
 /// Runs that do not count, before those that do.
 const WARM_UPS: u32 = 1;
@@ -60,13 +63,35 @@ impl<'a> AccelSetup<'a> {
         Structures::ours(self.device, accel::AccelOptions::DEFAULT)
     }
 
-    fn drivers(&self) -> Option<Structures<'a>> {
-        Structures::drivers(self.device)
-    }
-
     /// Ours, and the driver's where it has any.
     fn makers(&self) -> Vec<Structures<'a>> {
-        [Some(self.ours()), self.drivers()].into_iter().flatten().collect()
+        std::iter::once(self.ours()).chain(Structures::drivers(self.device)).collect()
+    }
+
+    /// The rays of every kind to `scene`, in device memory; kinds without any are left out. What follows from hits is traced on the
+    /// device, too.
+    fn rays_to(&self, scene: &Scene) -> Result<Vec<(RayKind, RayBuffers<'a>)>> {
+        let alone = Instances {
+            name: scene.name.clone(),
+            parts: vec![scene.mesh.clone()],
+            instances: vec![SceneInstance { part: 0, transform: SceneInstance::IDENTITY }],
+            camera: scene.camera,
+            lights: Vec::new(),
+        };
+        let mut levels = Levels::new(self.ours(), &alone, vk::BuildAccelerationStructureFlagsKHR::empty())?;
+        levels.build()?;
+        let mut all = Vec::new();
+        for &kind in self.kinds {
+            let rays = kinds::generate(kind, scene, &self.rays, &mut |rays| {
+                let buffers = RayBuffers::new(self.device, rays)?;
+                levels.trace(&buffers, Query::ClosestHit)?;
+                Ok(buffers.read_hits())
+            })?;
+            if !rays.is_empty() {
+                all.push((kind, RayBuffers::new(self.device, &rays)?));
+            }
+        }
+        Ok(all)
     }
 }
 
@@ -77,4 +102,9 @@ fn where_possible<T>(result: Result<T>) -> Result<Option<T>> {
         Err(Error::Argument(_)) => Ok(None),
         Err(error) => Err(error),
     }
+}
+
+/// Milliseconds of all builds, and of the updates that there were.
+fn apart(samples: &[(f64, Option<f64>)]) -> (Vec<f64>, Vec<f64>) {
+    (samples.iter().map(|(build, _)| *build).collect(), samples.iter().filter_map(|(_, update)| *update).collect())
 }

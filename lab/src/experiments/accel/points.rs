@@ -1,7 +1,7 @@
 //! The lines of `accel.jsonl` (CONTRACT, "Records of experiments"). A figure that was not measured is `None`.
 
-use crate::measure::setting::{Failure, Setting};
-use crate::measure::statistics::Spread;
+use crate::measure::{Failure, Setting, Spread};
+use crate::named::named;
 use serde::{Deserialize, Serialize};
 
 /// What a line says, by its `experiment`.
@@ -32,15 +32,7 @@ pub enum Implementation {
     Driver,
 }
 
-impl Implementation {
-    /// As charts and tables have it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Implementation::Ours => "hedgerow",
-            Implementation::Driver => "driver",
-        }
-    }
-}
+named!(Implementation, "maker": Ours = "hedgerow", Driver = "driver");
 
 /// How many structures are built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,17 +48,12 @@ pub enum Submission {
     EmptySubmits,
 }
 
-impl Submission {
-    /// As charts and tables have it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Submission::OneCall => "one call",
-            Submission::OneSubmit => "a call each, one submit",
-            Submission::SubmitEach => "a call and submit each",
-            Submission::EmptySubmits => "as many empty submits",
-        }
-    }
-}
+named!(Submission, "submission":
+    OneCall = "one call",
+    OneSubmit = "a call each, one submit",
+    SubmitEach = "a call and submit each",
+    EmptySubmits = "as many empty submits",
+);
 
 /// Structures of 12 to 500 triangles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

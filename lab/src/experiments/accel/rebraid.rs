@@ -1,13 +1,15 @@
 //! Re-braiding on and off: what it takes to build, and what rays of every kind gain.
 
-use super::bundles::{self, Bundle};
 use super::points::{self, AccelEntry, BraidedRays, MeanWork, TopLevelPoint};
 use super::{AccelSetup, WARM_UPS};
 use crate::Result;
 use crate::measure::agreement::agree;
-use crate::measure::statistics::{Spread, in_turn, ratios};
+use crate::measure::{Sink, Spread, in_turn, ratios};
+use crate::rays::kinds::RayKind;
 use crate::scene::{Instances, Scene, SceneInstance};
+use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::levels::Levels;
+use crate::subjects::structures::Structures;
 use ash::vk;
 use hedgerow::accel::REBRAID;
 use hedgerow::geometry::Aabb;
@@ -24,18 +26,13 @@ const DRIVER: usize = 2;
 ///
 /// # Errors
 /// Too little memory; the device failed; the scene is too large to be flattened, which rays are made with.
-pub fn measure(
-    stage: &AccelSetup<'_>,
-    instances: &Instances,
-    point: &mut dyn FnMut(AccelEntry) -> Result<()>,
-) -> Result<()> {
+pub fn measure(stage: &AccelSetup<'_>, instances: &Instances, point: &mut Sink<'_, AccelEntry>) -> Result<()> {
     let say = |what: &str| (stage.say)(&format!("re-braiding {}: {what}", instances.name));
     say("building");
-    let mut levels =
-        vec![Levels::new(stage.ours(), instances, Flags::empty())?, Levels::new(stage.ours(), instances, REBRAID)?];
-    if let Some(drivers) = stage.drivers() {
-        levels.push(Levels::new(drivers, instances, Flags::empty())?);
-    }
+    let ours = [(stage.ours(), Flags::empty()), (stage.ours(), REBRAID)];
+    let all = ours.into_iter().chain(Structures::drivers(stage.device).map(|drivers| (drivers, Flags::empty())));
+    let levels = all.map(|(maker, flags)| Levels::new(maker, instances, flags));
+    let mut levels: Vec<Levels<'_>> = levels.collect::<Result<_>>()?;
     let builds = in_turn(&mut levels, WARM_UPS, stage.runs, Levels::build);
     let mut sides = Vec::new();
     for (levels, builds) in levels.iter().zip(builds) {
@@ -51,9 +48,9 @@ pub fn measure(
     };
     say("making rays");
     let mut rays = Vec::new();
-    for bundle in bundles::of(stage, &scene)? {
-        say(bundle.kind.name());
-        rays.push(traced(stage, &mut levels, &bundle)?);
+    for (kind, buffers) in stage.rays_to(&scene)? {
+        say(kind.name());
+        rays.push(traced(stage, &mut levels, kind, &buffers)?);
     }
     point(AccelEntry::Rebraid(points::RebraidPoint {
         scene: instances.name.clone(),
@@ -68,9 +65,13 @@ pub fn measure(
     }))
 }
 
-fn traced(stage: &AccelSetup<'_>, levels: &mut [Levels<'_>], bundle: &Bundle<'_>) -> Result<BraidedRays> {
-    let query = bundle.kind.query();
-    let rays = &bundle.buffers;
+fn traced(
+    stage: &AccelSetup<'_>,
+    levels: &mut [Levels<'_>],
+    kind: RayKind,
+    rays: &RayBuffers<'_>,
+) -> Result<BraidedRays> {
+    let query = kind.query();
     let times = in_turn(levels, WARM_UPS, stage.runs, |levels| levels.trace(rays, query));
     let times: Vec<Vec<f64>> = times.into_iter().collect::<Result<_>>()?;
     let mut found = Vec::new();
@@ -81,7 +82,7 @@ fn traced(stage: &AccelSetup<'_>, levels: &mut [Levels<'_>], bundle: &Bundle<'_>
         work.push(MeanWork::mean(&levels.work(rays, query)?));
     }
     Ok(BraidedRays {
-        rays: bundle.kind.name().into(),
+        rays: kind.name().into(),
         count: rays.count.into(),
         hits: found[OFF].iter().filter(|hit| hit.is_some()).count() as u64,
         different: found[OFF].iter().zip(&found[ON]).filter(|(a, b)| !agree(query, a, b)).count() as u64,

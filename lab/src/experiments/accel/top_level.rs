@@ -1,9 +1,9 @@
 //! How top levels grow: building and updating one over 100, 1,000, 10,000… instances.
 
 use super::points::{AccelEntry, TopLevel};
-use super::{AccelSetup, WARM_UPS, where_possible};
+use super::{AccelSetup, WARM_UPS, apart, where_possible};
 use crate::Result;
-use crate::measure::statistics::{Spread, in_turn};
+use crate::measure::{Sink, Spread, in_turn};
 use crate::scene::{self, LoadOptions, SceneInstance};
 use crate::subjects::levels::Levels;
 use ash::vk;
@@ -16,7 +16,7 @@ const TIMES: u32 = 10;
 ///
 /// # Errors
 /// Too little memory; the device failed.
-pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut dyn FnMut(AccelEntry) -> Result<()>) -> Result<()> {
+pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut Sink<'_, AccelEntry>) -> Result<()> {
     for count in counts(most) {
         (stage.say)(&format!("top level of {count}"));
         let scene = scene::load_instances(&format!("gen:cells:{count}"), &LoadOptions::default())?;
@@ -31,9 +31,7 @@ pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut dyn FnMut(AccelEnt
             Ok((build, where_possible(levels.update())?))
         });
         for ((maker, levels), samples) in makers.iter().zip(&levels).zip(samples) {
-            let samples = samples?;
-            let builds: Vec<f64> = samples.iter().map(|s| s.0).collect();
-            let updates: Vec<f64> = samples.iter().filter_map(|s| s.1).collect();
+            let (builds, updates) = apart(&samples?);
             let [structure_bytes, scratch_bytes] = levels.top_bytes();
             point(AccelEntry::Tlas(TopLevel {
                 instances: count,

@@ -1,17 +1,42 @@
 //! Updating against building anew, over an animation: time, growth of the SAH cost, and what rays lose.
 
-use super::bundles::{self, Bundle};
-use super::deforming::Deforming;
 use super::points::{self, AccelEntry, UpdatedRays};
-use super::{AccelSetup, WARM_UPS, where_possible};
+use super::{AccelSetup, WARM_UPS, apart, where_possible};
 use crate::Result;
-use crate::measure::statistics::{Spread, in_turn, ratios};
-use crate::scene::{Animation, Scene};
+use crate::measure::{Sink, Spread, in_turn, ratios};
+use crate::rays::kinds::RayKind;
+use crate::scene::{Animation, Mesh, Scene};
+use crate::subjects::device_rays::RayBuffers;
+use crate::subjects::level::Level;
 use crate::subjects::structures::Structures;
+use ash::vk;
+use hedgerow::accel::Instance;
+use hedgerow::gpu::Timestamps;
+use hedgerow::trace::Query;
+
+type Mode = vk::BuildAccelerationStructureModeKHR;
+type Flags = vk::BuildAccelerationStructureFlagsKHR;
+
+/// A mesh whose vertices move, as a bottom level under a top level of one instance.
+struct Deforming<'a> {
+    bottom: Level<'a>,
+    /// Its box follows that of the bottom level: it is built before rays are traced.
+    top: Level<'a>,
+}
+
+impl<'a> Deforming<'a> {
+    /// Uploads the mesh; nothing is built yet.
+    fn new(structures: &Structures<'a>, mesh: &Mesh) -> Result<Deforming<'a>> {
+        let bottom = Level::bottom(structures, mesh, Flags::ALLOW_UPDATE)?;
+        let top = Level::top(structures, &[bottom.instance(structures, Instance::IDENTITY)], Flags::empty())?;
+        Ok(Deforming { bottom, top })
+    }
+}
 
 /// What one maker has: a structure of the first frame that is updated, and one that is built anew each frame.
 struct Pair<'a> {
     structures: Structures<'a>,
+    timestamps: Timestamps,
     updated: Deforming<'a>,
     built: Deforming<'a>,
     /// Whether updates are possible.
@@ -21,11 +46,27 @@ struct Pair<'a> {
 impl<'a> Pair<'a> {
     fn new(structures: Structures<'a>, animation: &Animation) -> Result<Pair<'a>> {
         let mesh = animation.mesh(0);
-        let mut updated = Deforming::new(structures.clone(), &mesh)?;
-        updated.build()?;
-        let updates = where_possible(updated.update())?.is_some();
-        let built = Deforming::new(structures.clone(), &mesh)?;
-        Ok(Pair { structures, updated, built, updates })
+        let mut timestamps = Timestamps::new(structures.device, 1)?;
+        let updated = Deforming::new(&structures, &mesh)?;
+        updated.bottom.build(&structures, &mut timestamps, Mode::BUILD)?;
+        let updates = where_possible(updated.bottom.build(&structures, &mut timestamps, Mode::UPDATE))?.is_some();
+        let built = Deforming::new(&structures, &mesh)?;
+        Ok(Pair { structures, timestamps, updated, built, updates })
+    }
+
+    /// Updates the one where that is possible, and builds the other; milliseconds of the build and of the update.
+    fn build(&mut self) -> Result<(f64, Option<f64>)> {
+        let Pair { structures, timestamps, updated, built, updates } = self;
+        let update = updates.then(|| updated.bottom.build(structures, timestamps, Mode::UPDATE)).transpose()?;
+        Ok((built.bottom.build(structures, timestamps, Mode::BUILD)?, update))
+    }
+
+    /// Traces rays through both; milliseconds through the one built anew, and through the updated one.
+    fn trace(&mut self, rays: &RayBuffers<'_>, query: Query) -> Result<(f64, Option<f64>)> {
+        let Pair { structures, timestamps, updated, built, updates } = self;
+        let mut trace = |top: &Level<'_>| structures.trace(timestamps, top.structure(), rays, query);
+        let updated = updates.then(|| trace(&updated.top)).transpose()?;
+        Ok((trace(&built.top)?, updated))
     }
 }
 
@@ -37,7 +78,7 @@ pub fn measure(
     stage: &AccelSetup<'_>,
     animation: &Animation,
     frames: u32,
-    point: &mut dyn FnMut(AccelEntry) -> Result<()>,
+    point: &mut Sink<'_, AccelEntry>,
 ) -> Result<()> {
     let mut pairs: Vec<Pair<'_>> =
         stage.makers().into_iter().map(|maker| Pair::new(maker, animation)).collect::<Result<_>>()?;
@@ -45,16 +86,13 @@ pub fn measure(
         (stage.say)(&format!("updating {}: frame {frame}", animation.name));
         let positions = &animation.frames[frame];
         for pair in &pairs {
-            pair.updated.set_positions(positions);
-            pair.built.set_positions(positions);
+            pair.updated.bottom.input().write(positions);
+            pair.built.bottom.input().write(positions);
         }
-        let builds = in_turn(&mut pairs, WARM_UPS, stage.runs, |pair| {
-            let update = pair.updates.then(|| pair.updated.update()).transpose()?;
-            Ok((pair.built.build()?, update))
-        });
-        for pair in &mut pairs {
-            pair.updated.build_top()?;
-            pair.built.build_top()?;
+        let builds = in_turn(&mut pairs, WARM_UPS, stage.runs, Pair::build);
+        for Pair { structures, timestamps, updated, built, .. } in &mut pairs {
+            updated.top.build(structures, timestamps, Mode::BUILD)?;
+            built.top.build(structures, timestamps, Mode::BUILD)?;
         }
         let scene = Scene {
             name: animation.name.clone(),
@@ -63,25 +101,24 @@ pub fn measure(
             lights: Vec::new(),
         };
         let mut rays = vec![Vec::new(); pairs.len()];
-        for bundle in bundles::of(stage, &scene)? {
-            for (rays, traced) in rays.iter_mut().zip(traced(stage, &mut pairs, &bundle)?) {
+        for (kind, buffers) in stage.rays_to(&scene)? {
+            for (rays, traced) in rays.iter_mut().zip(traced(stage, &mut pairs, kind, &buffers)?) {
                 rays.push(traced);
             }
         }
         for ((pair, builds), rays) in pairs.iter().zip(builds).zip(rays) {
-            let builds = builds?;
-            let updates: Vec<f64> = builds.iter().filter_map(|b| b.1).collect();
-            let updated = pair.updated.header().filter(|_| pair.updates);
+            let (builds, updates) = apart(&builds?);
+            let updated = pair.updated.bottom.header().filter(|_| pair.updates);
             point(AccelEntry::Update(points::Update {
                 scene: animation.name.clone(),
                 triangles: animation.triangles.len() as u64,
                 frame: frame as u32,
                 maker: pair.structures.maker(),
-                build_ms: Spread::of_some(&builds.iter().map(|b| b.0).collect::<Vec<_>>())?,
+                build_ms: Spread::of_some(&builds)?,
                 update_ms: Spread::of(&updates),
                 growth: updated.map(|header| header.sah_growth().into()),
                 updated_sah: updated.map(|header| header.sah().into()),
-                built_sah: pair.built.header().map(|header| header.sah().into()),
+                built_sah: pair.built.bottom.header().map(|header| header.sah().into()),
                 rays,
             }))?;
         }
@@ -90,19 +127,18 @@ pub fn measure(
 }
 
 /// The rays through both structures of every maker, in turn.
-fn traced(stage: &AccelSetup<'_>, pairs: &mut [Pair<'_>], bundle: &Bundle<'_>) -> Result<Vec<UpdatedRays>> {
-    let trace = |deforming: &mut Deforming<'_>| deforming.trace(&bundle.buffers, bundle.kind.query());
-    let times = in_turn(pairs, WARM_UPS, stage.runs, |pair| {
-        let updated = pair.updates.then(|| trace(&mut pair.updated)).transpose()?;
-        Ok((trace(&mut pair.built)?, updated))
-    });
+fn traced(
+    stage: &AccelSetup<'_>,
+    pairs: &mut [Pair<'_>],
+    kind: RayKind,
+    buffers: &RayBuffers<'_>,
+) -> Result<Vec<UpdatedRays>> {
+    let times = in_turn(pairs, WARM_UPS, stage.runs, |pair| pair.trace(buffers, kind.query()));
     let rays = times.into_iter().map(|times| {
-        let times = times?;
-        let built: Vec<f64> = times.iter().map(|t| t.0).collect();
-        let updated: Vec<f64> = times.iter().filter_map(|t| t.1).collect();
+        let (built, updated) = apart(&times?);
         Ok(UpdatedRays {
-            rays: bundle.kind.name().into(),
-            count: bundle.buffers.count.into(),
+            rays: kind.name().into(),
+            count: buffers.count.into(),
             built_ms: Spread::of_some(&built)?,
             updated_ms: Spread::of(&updated),
             slowdown: Spread::of(&ratios(&updated, &built)),

@@ -1,12 +1,13 @@
 //! `hedgerow animate`: a dynamic scene frame by frame in each of the ways; records as they are measured, pictures, and a page.
 
+use crate::Error;
 use crate::cli::options::{Kinds, Size};
 use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::animate::page::{self, Points, standings};
 use crate::experiments::animate::points::{AnimateEntry, Object, SceneSetting};
 use crate::experiments::animate::{AnimateSetup, AnimationMethod, measure};
-use crate::measure::setting::Setting;
+use crate::measure::Setting;
 use crate::report::picture::{PictureOptions, View, picture};
 use crate::scene::{DynamicScene, Scene};
 use crate::subjects::Subject;
@@ -91,10 +92,10 @@ impl Frames {
                 Ok((0..some).map(|i| (u64::from(i) * u64::from(count) / u64::from(some)) as u32).collect())
             }
             Frames::Range(from, to) if to <= count => Ok((from..to).collect()),
-            Frames::Range(from, to) => Err(crate::Error::Argument(format!(
-                "--frames {from}..{to}: {} has {count}, counted from 0; end at {count} or before",
-                scene.name
-            ))),
+            Frames::Range(from, to) => {
+                let what = format!("{} has {count}, counted from 0; end at {count} or before", scene.name);
+                Err(Error::Argument(format!("--frames {from}..{to}: {what}")))
+            }
         }
     }
 }
@@ -113,20 +114,18 @@ fn file_of(frame: u32) -> String {
 
 pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     if let Some((i, way)) = arguments.ways.iter().enumerate().find(|&(i, way)| arguments.ways[..i].contains(way)) {
-        return Err(
-            crate::Error::Argument(format!("--ways names {way} twice (number {}); once is enough", i + 1)).into()
-        );
+        return Err(Error::Argument(format!("--ways names {way} twice (number {}); once is enough", i + 1)).into());
     }
     let builder = arguments.builder.kd()?;
-    if let KdSpec::Device { .. } = arguments.static_builder.kd()? {
+    let KdSpec::Host { options: static_options, .. } = arguments.static_builder.kd()? else {
         let what = "what stands still is built once, on the host; take kd-exact, kd-binned or kd-gpu-host";
-        return Err(crate::Error::Argument(format!("--static-builder {}: {what}", arguments.static_builder)).into());
-    }
+        return Err(Error::Argument(format!("--static-builder {}: {what}", arguments.static_builder)).into());
+    };
     let scene = common.load_dynamic(&arguments.scene)?;
     if scene.objects.is_empty() {
         let what =
             "only its camera moves, so that there is nothing to build every frame; take a scene with objects that move";
-        return Err(crate::Error::Scene(format!("{}: {what}", scene.name)).into());
+        return Err(Error::Scene(format!("{}: {what}", scene.name)).into());
     }
     let frames = arguments.frames.of(&scene)?;
     let device = match work::device_for(common, std::slice::from_ref(&arguments.builder))? {
@@ -142,7 +141,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         device: device.as_ref(),
         ways: &arguments.ways,
         builder: &arguments.builder,
-        static_builder: &arguments.static_builder,
+        static_options,
         runs: arguments.runs.get(),
         kinds: &arguments.rays.0,
         rays: arguments.size.rays(common.seed),
@@ -153,19 +152,23 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let mut failures = 0;
     let mut measured = Vec::new();
     let mut point = |entry: AnimateEntry| {
-        match &entry {
-            AnimateEntry::Failure(failure) => {
-                eprintln!("hedgerow: {failure}");
-                failures += 1;
-            }
-            AnimateEntry::Animate(frame) => measured.push(frame.clone()),
-            AnimateEntry::Setting(_) => {}
+        if let AnimateEntry::Failure(failure) = &entry {
+            eprintln!("hedgerow: {failure}");
+            failures += 1;
+        } else if let AnimateEntry::Animate(frame) = &entry {
+            measured.push(frame.clone());
         }
         points.append(entry)
     };
+    let options = PictureOptions { view: View::Shaded, size: stage.rays.size, seed: common.seed, top: None };
     let mut show = |frame: u32, scene: &Scene, subject: &mut dyn Subject| {
         bar.step();
-        if arguments.png { write_picture(common, arguments, frame, scene, subject) } else { Ok(()) }
+        if !arguments.png {
+            return Ok(());
+        }
+        let path = arguments.output.join(file_of(frame));
+        let saved = picture(scene, subject, &options)?.save(&path);
+        saved.map_err(|error| Error::file(&path)(std::io::Error::other(error)))
     };
     let done = measure(&stage, &scene, &frames, &mut point, &mut show);
     drop(bar);
@@ -173,20 +176,6 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     done?;
     writeln!(std::io::stdout().lock(), "{}", standings::table(&measured))?;
     work::page_written(device.as_ref(), &page, failures)
-}
-
-fn write_picture(
-    common: &Common,
-    arguments: &Arguments,
-    frame: u32,
-    scene: &Scene,
-    subject: &mut dyn Subject,
-) -> crate::Result<()> {
-    let size = [arguments.size.width, arguments.size.height];
-    let options = PictureOptions { view: View::Shaded, size, seed: common.seed, top: None };
-    let image = picture(scene, subject, &options)?;
-    let path = arguments.output.join(file_of(frame));
-    image.save(&path).map_err(|error| crate::Error::file(&path)(std::io::Error::other(error)))
 }
 
 /// Where, how and of what it is measured.
@@ -200,10 +189,8 @@ fn setting(
 ) -> crate::Result<SceneSetting> {
     let mut notes = Vec::new();
     if device.is_some_and(|device| device.limits.kind == vk::PhysicalDeviceType::CPU) {
-        notes.push(
-            "The device is a CPU: figures of it say how much work the ways are, not how they stand on a GPU."
-                .to_owned(),
-        );
+        let note = "The device is a CPU: figures of it say how much work the ways are, not how they stand on a GPU.";
+        notes.push(note.to_owned());
     }
     if let KdSpec::Host { traces_on_device, .. } = builder
         && arguments.ways.contains(&AnimationMethod::TwoLevel)
@@ -218,16 +205,14 @@ fn setting(
         ("Frames", format!("{} of {} in {} s", frames.len(), scene.frames, scene.seconds)),
     ];
     let pictures = frames.iter().filter(|_| arguments.png).map(|&frame| (frame, file_of(frame))).collect();
-    let object = |o: &crate::scene::DynamicObject| Object {
-        name: o.name.clone(),
-        triangles: o.triangles.len() as u64,
-        morphs: o.morphs(),
-    };
+    let objects = scene.objects.iter();
+    let objects =
+        objects.map(|o| Object { name: o.name.clone(), triangles: o.triangles.len() as u64, morphs: o.morphs() });
     Ok(SceneSetting {
         setting: Setting::of(device, &options, notes)?,
         scene: scene.name.clone(),
         static_triangles: scene.static_mesh.triangles.len() as u64,
-        objects: scene.objects.iter().map(object).collect(),
+        objects: objects.collect(),
         static_builder: arguments.static_builder.to_string(),
         pictures,
     })

@@ -1,7 +1,7 @@
 //! Objects that the device merges into the static tree every frame, and takes out again.
 
 use crate::device::{Buffer, Device};
-use crate::measure::record;
+use crate::measure::MemoryRecord;
 use crate::scene::{Frame, Group};
 use crate::subjects::builders::Spec;
 use crate::subjects::kd_device::KdDevice;
@@ -10,6 +10,7 @@ use crate::{Error, Result};
 use hedgerow::bvh::geometry::Input;
 use hedgerow::bvh::layout::status;
 use hedgerow::gpu::Timestamps;
+use hedgerow::kdtree::builder::KdOptions;
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::kdtree::merge::{MergeCapacity, MergeMemory, MergeOptions, MergeReport, Merger, Object};
 use hedgerow::trace::kd::Traversal;
@@ -87,11 +88,11 @@ impl<'a> MergeOnDevice<'a> {
     pub fn new(
         device: &'a Device,
         builder: &Spec,
-        options: MergeOptions,
-        traversal: Traversal,
+        (options, traversal): (KdOptions, Traversal),
         still: KdTree,
         first: &Frame<'_>,
     ) -> Result<MergeOnDevice<'a>> {
+        let options = MergeOptions { build: options, ..MergeOptions::DEFAULT };
         let moving = |group: Group| {
             let mesh = first.mesh(group);
             let positions = device.upload("positions", &mesh.positions)?;
@@ -143,8 +144,6 @@ impl Subject for MergeOnDevice<'_> {
     fn build(&mut self) -> Result<BuildRun> {
         let objects: Vec<Object> = self.objects.iter().map(|moving| moving.object).collect();
         let mut attempts = 0;
-        // A merge into a place that is new has nothing to take out.
-        let mut is_whole = self.is_merged;
         loop {
             let (place, is_merged) = (&self.place, self.is_merged);
             self.device.run(Some(&mut self.timestamps), |recorder| {
@@ -156,28 +155,27 @@ impl Subject for MergeOnDevice<'_> {
             })?;
             self.is_merged = true;
             let report = self.place.report();
-            let is_short = report.status & status::OUT_OF_ROOM != 0;
-            if !is_short && is_whole {
-                return Ok(BuildRun::of(self.timestamps.phases()?));
-            }
-            is_whole = true;
-            if is_short {
-                attempts += 1;
-                if attempts == ATTEMPTS {
-                    let what = format!("{ATTEMPTS} merges found too little room: {report:?}");
-                    return Err(Error::Argument(what));
+            if report.status & status::OUT_OF_ROOM == 0 {
+                // A merge into a place that is new had nothing to take out: it does not count.
+                if is_merged {
+                    return Ok(BuildRun::of(self.timestamps.phases()?));
                 }
-                self.options.estimate = report.estimate(self.most.triangles);
-                self.place = PlacedMerger::new(self.device, &self.options, &self.still, self.most)?;
-                (self.is_merged, is_whole) = (false, false);
+                continue;
             }
+            attempts += 1;
+            if attempts == ATTEMPTS {
+                return Err(Error::Argument(format!("{ATTEMPTS} merges found too little room: {report:?}")));
+            }
+            self.options.estimate = report.estimate(self.most.triangles);
+            self.place = PlacedMerger::new(self.device, &self.options, &self.still, self.most)?;
+            self.is_merged = false;
         }
     }
 
-    fn memory(&self) -> record::MemoryRecord {
+    fn memory(&self) -> MemoryRecord {
         let PlacedMerger { structure, scratch, undo, .. } = &self.place;
         let scratch_bytes = Some(scratch.bytes() + undo.bytes());
-        record::MemoryRecord { structure_bytes: Some(structure.bytes()), scratch_bytes, peak_bytes: None }
+        MemoryRecord { structure_bytes: Some(structure.bytes()), scratch_bytes, peak_bytes: None }
     }
 
     fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {

@@ -15,19 +15,20 @@ mod two_level;
 
 use crate::device::Device;
 use crate::measure::agreement::may_both_be_right;
-use crate::measure::setting::Failure;
-use crate::measure::statistics::{Spread, in_turn, mean_work};
+use crate::measure::{Failure, Sink, Spread, in_turn, mean_work};
 use crate::named::named;
 use crate::rays::kinds::{self, RayKind, RayOptions};
-use crate::scene::{Camera, DynamicScene, Frame, Scene};
+use crate::scene::{Camera, DynamicScene, Frame, Group, Mesh, Scene};
 use crate::subjects::Subject;
 use crate::subjects::builders::{KdSpec, Spec};
+use crate::subjects::host_rays::KdRays;
+use crate::subjects::kd_device::KdDevice;
 use crate::{Error, Result};
-use hedgerow::kdtree::merge;
 use hedgerow::trace::{Hit, Query, Ray, Work};
+use hedgerow_host::kdtree::HostKdOptions;
 use merge_on_device::MergeOnDevice;
-use on_device::{OnDevice, static_tree};
-use on_host::OnHost;
+use on_device::OnDevice;
+use on_host::{OnHost, Trees};
 use points::{AnimateEntry, Animated, Rays, WayInFrame};
 use two_level::TwoLevel;
 
@@ -55,13 +56,6 @@ named!(AnimationMethod, "way":
     Merge = "merge",
 );
 
-impl AnimationMethod {
-    /// Whether it is made of kd-trees.
-    pub fn is_of_kd_trees(self) -> bool {
-        self != AnimationMethod::TwoLevel
-    }
-}
-
 /// What is measured, and how.
 #[derive(Clone, Copy)]
 pub struct AnimateSetup<'a> {
@@ -71,8 +65,8 @@ pub struct AnimateSetup<'a> {
     pub ways: &'a [AnimationMethod],
     /// Who builds the kd-trees of every frame.
     pub builder: &'a Spec,
-    /// Who builds those of what stands still, once: a builder on the host.
-    pub static_builder: &'a Spec,
+    /// How that of what stands still is built, once, on the host.
+    pub static_options: HostKdOptions,
     /// Counted runs of every build and trace; the first frame has one before that warms up.
     pub runs: u32,
     /// Kinds of rays.
@@ -95,25 +89,45 @@ impl<'a> AnimateSetup<'a> {
         if way == AnimationMethod::TwoLevel {
             return Ok(Box::new(TwoLevel::new(device()?, first)?));
         }
-        let KdSpec::Host { options: static_options, .. } = self.static_builder.kd()? else {
-            let what = "what stands still is built once, on the host; take kd-exact, kd-binned or kd-gpu-host";
-            return Err(Error::Argument(format!("{}: {what}", self.static_builder)));
+        let groups = match way {
+            AnimationMethod::Rebuild => vec![Group::Whole],
+            AnimationMethod::TwoTrees => vec![Group::Moving],
+            _ => Group::objects(first),
         };
-        Ok(match self.builder.kd()? {
-            KdSpec::Device { options, traversal } if way != AnimationMethod::Merge => {
-                Box::new(OnDevice::new(way, device()?, self.builder, (&options, static_options), traversal, first)?)
+        let scene = first.dynamic;
+        let Mesh { positions, triangles } = &scene.static_mesh;
+        let has_still = way != AnimationMethod::Rebuild && !triangles.is_empty();
+        let still =
+            has_still.then(|| hedgerow_host::kdtree::build(positions, triangles, &self.static_options)).transpose()?;
+        if way == AnimationMethod::Merge && still.is_none() {
+            let name = &scene.name;
+            let what = format!("{name}: nothing in it stands still, so there is nothing to merge into");
+            return Err(Error::Scene(what));
+        }
+        Ok(match (self.builder.kd()?, still) {
+            (KdSpec::Device { options, traversal }, Some(still)) if way == AnimationMethod::Merge => {
+                Box::new(MergeOnDevice::new(device()?, self.builder, (options, traversal), still, first)?)
             }
-            KdSpec::Device { options, traversal } => {
-                let still = static_tree(&first.dynamic.static_mesh, &static_options)?.ok_or_else(|| {
-                    let name = &first.dynamic.name;
-                    Error::Scene(format!("{name}: nothing in it stands still, so there is nothing to merge into"))
-                })?;
-                let options = merge::MergeOptions { build: options, ..merge::MergeOptions::DEFAULT };
-                Box::new(MergeOnDevice::new(device()?, self.builder, options, traversal, still, first)?)
+            (KdSpec::Device { options, traversal }, still) => {
+                let kd = (&options, traversal);
+                Box::new(OnDevice::new(device()?, self.builder, kd, still, (first, groups))?)
             }
-            KdSpec::Host { options, traversal, traces_on_device } => {
-                let kd = (options, traversal, traces_on_device);
-                Box::new(OnHost::new(way, self.device, self.builder, kd, &static_options, first)?)
+            (KdSpec::Host { options, traversal, traces_on_device }, still) => {
+                let trees = match still {
+                    Some(still) if way == AnimationMethod::Merge => {
+                        let moving = scene.triangle_count() - triangles.len() as u64;
+                        Trees::merged_into(still, moving as u32, options.costs)?
+                    }
+                    still => Trees::beside(still),
+                };
+                let rays = match (traces_on_device, self.device) {
+                    (false, _) => KdRays::on_host(traversal),
+                    (true, Some(device)) => KdRays::on_device(KdDevice::new(device, traversal)?),
+                    (true, None) => {
+                        return Err(Error::NoVulkan("rays are traced on a device, and none was opened".into()));
+                    }
+                };
+                Box::new(OnHost::new(self.builder, options, (first, groups), trees, rays))
             }
         })
     }
@@ -123,6 +137,10 @@ impl<'a> AnimateSetup<'a> {
 struct Running<'a> {
     way: AnimationMethod,
     subject: Box<dyn Subject + 'a>,
+    /// Milliseconds of the builds of the frame.
+    builds: Vec<f64>,
+    /// The rays of the frame, by kind.
+    rays: Vec<Rays>,
 }
 
 /// Measures these frames of a scene in every way of the stage. Points come as they are measured; `show` is called once a frame with
@@ -136,7 +154,7 @@ pub fn measure<'a>(
     stage: &AnimateSetup<'a>,
     scene: &'a DynamicScene,
     frames: &[u32],
-    point: &mut dyn FnMut(AnimateEntry) -> Result<()>,
+    point: &mut Sink<'_, AnimateEntry>,
     show: &mut dyn FnMut(u32, &Scene, &mut dyn Subject) -> Result<()>,
 ) -> Result<()> {
     let frame_of = |number: u32| -> Result<Frame<'a>> {
@@ -150,7 +168,7 @@ pub fn measure<'a>(
     for &way in stage.ways {
         (stage.say)(&format!("{}: preparing {way}", scene.name));
         match stage.subject(way, &first) {
-            Ok(subject) => running.push(Running { way, subject }),
+            Ok(subject) => running.push(Running { way, subject, builds: Vec::new(), rays: Vec::new() }),
             Err(error) => point(failure(way, None, &error))?,
         }
     }
@@ -162,12 +180,8 @@ pub fn measure<'a>(
             running.subject.place(&frame)?;
             Ok(running.subject.build()?.milliseconds)
         });
-        let mut built = without_failed(&mut running, built, number, point)?;
-        let Some(leader) = running.first_mut() else {
-            return Err(Error::Argument("no way is left, see the failures".into()));
-        };
-        show(number, &frame.scene, leader.subject.as_mut())?;
-        let mut rays_of: Vec<Vec<Rays>> = running.iter().map(|_| Vec::new()).collect();
+        keep(&mut running, built, number, point, |running, builds| running.builds = builds)?;
+        show(number, &frame.scene, running[0].subject.as_mut())?;
         for &kind in stage.kinds {
             let leader = &mut running[0].subject;
             let rays =
@@ -176,18 +190,9 @@ pub fn measure<'a>(
                 continue;
             }
             let traced = trace(stage, &mut running, warm_ups, kind, &rays);
-            let failed: Vec<bool> = traced.iter().map(Result::is_err).collect();
-            let traced = without_failed(&mut running, traced, number, point)?;
-            retain_by(&mut built, &failed);
-            retain_by(&mut rays_of, &failed);
-            for (all, rays) in rays_of.iter_mut().zip(traced) {
-                all.push(rays);
-            }
-            if running.is_empty() {
-                return Err(Error::Argument("no way is left, see the failures".into()));
-            }
+            keep(&mut running, traced, number, point, |running, rays| running.rays.push(rays))?;
         }
-        for ((Running { way, subject }, built), rays) in running.iter_mut().zip(built).zip(rays_of) {
+        for Running { way, subject, builds, rays } in &mut running {
             for wrong in rays.iter().filter(|rays| rays.different > 0) {
                 let what = format!(
                     "{} of {} {} rays have other hits than by {}",
@@ -206,8 +211,8 @@ pub fn measure<'a>(
                 timer: subject.timer().to_owned(),
                 static_triangles,
                 dynamic_triangles: scene.triangle_count() - static_triangles,
-                build_ms: Spread::of_some(&built)?,
-                trace: rays,
+                build_ms: Spread::of_some(builds)?,
+                trace: std::mem::take(rays),
                 memory: subject.memory(),
                 sah: subject.quality(c_t, c_i)?.sah,
             }))?;
@@ -220,28 +225,30 @@ fn failure(way: AnimationMethod, frame: Option<u32>, error: &Error) -> AnimateEn
     AnimateEntry::Failure(Failure { at: WayInFrame { way, frame }, what: error.to_string() })
 }
 
-/// The results of those that did not fail; the others are noted and run no more.
-fn without_failed<T>(
+/// Hands each way its result with `take`. Those that failed are noted and run no more.
+///
+/// # Errors
+/// Those of `point`; no way is left.
+fn keep<T>(
     running: &mut Vec<Running<'_>>,
     results: Vec<Result<T>>,
     frame: u32,
-    point: &mut dyn FnMut(AnimateEntry) -> Result<()>,
-) -> Result<Vec<T>> {
-    let failed: Vec<bool> = results.iter().map(Result::is_err).collect();
-    let mut good = Vec::new();
-    for (running, result) in running.iter().zip(results) {
+    point: &mut Sink<'_, AnimateEntry>,
+    take: impl Fn(&mut Running<'_>, T),
+) -> Result<()> {
+    for (mut one, result) in std::mem::take(running).into_iter().zip(results) {
         match result {
-            Ok(value) => good.push(value),
-            Err(error) => point(failure(running.way, Some(frame), &error))?,
+            Ok(value) => {
+                take(&mut one, value);
+                running.push(one);
+            }
+            Err(error) => point(failure(one.way, Some(frame), &error))?,
         }
     }
-    retain_by(running, &failed);
-    Ok(good)
-}
-
-fn retain_by<T>(items: &mut Vec<T>, failed: &[bool]) {
-    let mut failed = failed.iter();
-    items.retain(|_| failed.next() != Some(&true));
+    if running.is_empty() {
+        return Err(Error::Argument("no way is left, see the failures".into()));
+    }
+    Ok(())
 }
 
 /// The rays in every way, in turn, and their hits against those of the first.
@@ -258,7 +265,7 @@ fn trace(
     let mut reference: Option<(Vec<Hit>, bool)> = None;
     let mut one = |running: &mut Running<'_>, times: Vec<f64>| {
         let hits = running.subject.hits()?;
-        let is_kd = running.way.is_of_kd_trees();
+        let is_kd = running.way != AnimationMethod::TwoLevel;
         let (expected, expected_is_kd) = reference.get_or_insert_with(|| (hits.clone(), is_kd));
         let is_exact = is_kd && *expected_is_kd;
         let is_other = |((ray, a), b): &((&Ray, &Hit), &Hit)| !is_same(is_exact, query, ray, a, b);

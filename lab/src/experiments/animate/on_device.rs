@@ -1,19 +1,17 @@
 //! Kd-trees that the device builds every frame: all in one, all that moves, or each object.
 
-use super::AnimationMethod;
 use crate::Result;
 use crate::device::{Buffer, Device};
-use crate::measure::record::MemoryRecord;
-use crate::scene::{Frame, Group, Mesh};
+use crate::measure::MemoryRecord;
+use crate::scene::{Frame, Group};
 use crate::subjects::builders::Spec;
 use crate::subjects::kd_device::KdDevice;
 use crate::subjects::kd_gpu::KdGpu;
 use crate::subjects::{BuildRun, KD_TREE, Subject};
-use hedgerow::kdtree::builder;
+use hedgerow::kdtree::builder::KdOptions;
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
-use hedgerow_host::kdtree as host;
 use std::borrow::Cow;
 
 /// Trees on the device, which are traced one after the other.
@@ -32,30 +30,19 @@ struct Part<'a> {
 }
 
 impl<'a> OnDevice<'a> {
-    /// The trees of a way other than merging, in the first frame. That of what stands still is built by the host, with the options
-    /// that stand second.
+    /// A tree of each of `groups`, and `still`, the tree of what stands still, if anything does.
     ///
     /// # Errors
     /// Too little memory; the device failed.
     pub fn new(
-        way: AnimationMethod,
         device: &'a Device,
         builder: &Spec,
-        (options, static_options): (&builder::KdOptions, host::HostKdOptions),
-        traversal: Traversal,
-        first: &Frame<'_>,
+        (options, traversal): (&KdOptions, Traversal),
+        still: Option<KdTree>,
+        (first, groups): (&Frame<'_>, Vec<Group>),
     ) -> Result<OnDevice<'a>> {
         let tracer = KdDevice::new(device, traversal)?;
-        let groups = match way {
-            AnimationMethod::Rebuild => vec![Group::Whole],
-            AnimationMethod::TwoTrees => vec![Group::Moving],
-            _ => Group::objects(first),
-        };
         let builder = builder.to_string();
-        let still = match way {
-            AnimationMethod::Rebuild => None,
-            _ => static_tree(&first.dynamic.static_mesh, &static_options)?,
-        };
         let part = |group| {
             let subject = KdGpu::new(device, &builder, &first.mesh(group), options, traversal)?;
             Ok(Part { group, first: first.first(group), subject })
@@ -72,12 +59,6 @@ impl<'a> OnDevice<'a> {
         let still = self.still.iter().map(|still| (still.address(), 0));
         still.chain(self.parts.iter().map(|part| (part.subject.address(), part.first))).collect()
     }
-}
-
-/// The tree of what stands still, if anything does.
-pub(super) fn static_tree(mesh: &Mesh, options: &host::HostKdOptions) -> Result<Option<KdTree>> {
-    let is_there = !mesh.triangles.is_empty();
-    Ok(is_there.then(|| host::build(&mesh.positions, &mesh.triangles, options)).transpose()?)
 }
 
 impl Subject for OnDevice<'_> {
@@ -101,9 +82,8 @@ impl Subject for OnDevice<'_> {
     }
 
     fn build(&mut self) -> Result<BuildRun> {
-        let milliseconds =
-            self.parts.iter_mut().map(|part| Ok(part.subject.build()?.milliseconds)).sum::<Result<f64>>()?;
-        Ok(BuildRun::whole(milliseconds))
+        let milliseconds = self.parts.iter_mut().map(|part| Ok(part.subject.build()?.milliseconds));
+        milliseconds.sum::<Result<f64>>().map(BuildRun::whole)
     }
 
     fn memory(&self) -> MemoryRecord {

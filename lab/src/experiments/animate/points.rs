@@ -1,9 +1,7 @@
 //! The lines of `animate.jsonl`. A figure that was not measured is `None`.
 
 use super::AnimationMethod;
-use crate::measure::record::MemoryRecord;
-use crate::measure::setting::{Failure, Setting};
-use crate::measure::statistics::Spread;
+use crate::measure::{Failure, MemoryRecord, Setting, Spread};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

@@ -1,8 +1,8 @@
 //! A top level over what stands still and each object, by the calls of `VK_KHR_acceleration_structure`.
 
 use crate::device::Device;
-use crate::measure::record::MemoryRecord;
-use crate::scene::{Frame, Mesh};
+use crate::measure::MemoryRecord;
+use crate::scene::{Frame, Group, Mesh};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::level::Level;
 use crate::subjects::structures::{BuildInfo, Range, Structures};
@@ -18,7 +18,6 @@ type Mode = vk::BuildAccelerationStructureModeKHR;
 
 /// Instances are numbered by their first primitives, in 24 bits.
 const MOST_PRIMITIVES: u64 = 1 << 24;
-const BUILDER: &str = "accel";
 
 /// The two levels on the device.
 pub struct TwoLevel<'a> {
@@ -51,18 +50,15 @@ impl<'a> TwoLevel<'a> {
             return Err(Error::Argument(what));
         }
         let structures = Structures::ours(device, accel::AccelOptions::DEFAULT);
-        let mut parts = Vec::new();
-        let part = |object: Option<usize>, morphs: bool, first: u32, mesh: &Mesh| {
+        let part = |(object, mesh): (Option<usize>, Mesh)| {
+            let morphs = object.is_some_and(|k| scene.objects[k].morphs());
             let flags = if morphs { Flags::empty() } else { Flags::PREFER_FAST_TRACE };
-            Ok::<_, Error>(Part { object, morphs, first, level: Level::bottom(&structures, mesh, flags)? })
+            let level = Level::bottom(&structures, &mesh, flags)?;
+            Ok(Part { object, morphs, first: object.map_or(0, |k| first.first(Group::Object(k))), level })
         };
-        if !scene.static_mesh.triangles.is_empty() {
-            parts.push(part(None, false, 0, &scene.static_mesh)?);
-        }
-        for (k, (object, primitives)) in scene.objects.iter().zip(scene.primitives()).enumerate() {
-            let mesh = Mesh { positions: object.mesh_at(first.time).into_owned(), triangles: object.triangles.clone() };
-            parts.push(part(Some(k), object.morphs(), primitives.start as u32, &mesh)?);
-        }
+        let still = (!scene.static_mesh.triangles.is_empty()).then_some(None);
+        let objects = still.into_iter().chain((0..scene.objects.len()).map(Some));
+        let parts: Vec<Part<'_>> = objects.zip(scene.instances(first.time).parts).map(part).collect::<Result<_>>()?;
         for part in &parts {
             device.run(None, |recorder| part.level.record(&structures, recorder, Mode::BUILD))?;
         }
@@ -82,7 +78,7 @@ fn instances(structures: &Structures<'_>, parts: &[Part<'_>], frame: &Frame<'_>)
 
 impl Subject for TwoLevel<'_> {
     fn builder(&self) -> &str {
-        BUILDER
+        "accel"
     }
 
     fn kind(&self) -> &'static str {
@@ -98,8 +94,8 @@ impl Subject for TwoLevel<'_> {
     }
 
     fn place(&mut self, frame: &Frame<'_>) -> Result<()> {
-        for part in self.parts.iter().filter(|part| part.morphs) {
-            if let Some(k) = part.object {
+        for part in &self.parts {
+            if let Some(k) = part.object.filter(|_| part.morphs) {
                 part.level.input().write(&frame.dynamic.objects[k].mesh_at(frame.time));
             }
         }
@@ -109,9 +105,9 @@ impl Subject for TwoLevel<'_> {
 
     fn build(&mut self) -> Result<BuildRun> {
         let (structures, top) = (&self.structures, &self.top);
-        let morphing = || self.parts.iter().filter(|part| part.morphs);
-        let infos: Vec<BuildInfo<'_>> = morphing().map(|part| part.level.info(Mode::BUILD)).collect();
-        let ranges: Vec<[Range; 1]> = morphing().map(|part| part.level.range()).collect();
+        let morphing: Vec<&Level<'_>> = self.parts.iter().filter(|part| part.morphs).map(|part| &part.level).collect();
+        let infos: Vec<BuildInfo<'_>> = morphing.iter().map(|level| level.info(Mode::BUILD)).collect();
+        let ranges: Vec<[Range; 1]> = morphing.iter().map(|level| level.range()).collect();
         let ranges: Vec<&[Range]> = ranges.iter().map(|range| &range[..]).collect();
         structures.device.run(Some(&mut self.timestamps), |recorder| {
             recorder.phase("build");

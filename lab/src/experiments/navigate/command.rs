@@ -2,8 +2,9 @@
 
 use crate::cli::options::{Builders, Costs, Size};
 use crate::cli::{Bar, Common, work};
-use crate::experiments::navigate::{NavigateOptions, Navigator, Tree, backdrop};
-use crate::measure::provenance;
+use crate::experiments::navigate::{NavigateOptions, Navigator, Tree};
+use crate::rays::kinds::RayOptions;
+use crate::report::picture::{PictureOptions, View, picture};
 use std::io::Write;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -36,31 +37,23 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let device = work::device_for(common, builders)?;
     let bar = Bar::new(common, &scene.name, 0);
     let options = NavigateOptions {
-        size: [arguments.size.width, arguments.size.height],
-        seed: common.seed,
+        rays: arguments.size.rays(common.seed),
         boxes: arguments.boxes.get(),
         costs: [arguments.costs.step, arguments.costs.test],
     };
-    let (mut picture, mut trees) = (None, Vec::new());
+    let (mut shaded, mut trees) = (None, Vec::new());
     for builder in builders {
         bar.say(&builder.to_string());
         let mut subject = builder.make(device.as_ref(), &scene.mesh)?;
         subject.build()?;
         trees.push(Tree::of(&scene, subject.as_mut(), &options)?);
-        if picture.is_none() {
-            picture = Some(backdrop(&scene, subject.as_mut(), &options)?);
+        if shaded.is_none() {
+            let RayOptions { size, seed } = options.rays;
+            let options = PictureOptions { view: View::Shaded, size, seed, top: None };
+            shaded = Some(picture(&scene, subject.as_mut(), &options)?);
         }
     }
-    let navigator = Navigator {
-        scene: scene.name.clone(),
-        triangles: scene.mesh.triangles.len() as u64,
-        picture: picture.unwrap_or_default(),
-        trees,
-        costs: options.costs,
-        command: provenance::command(),
-        commit: provenance::commit(),
-        when: provenance::now(),
-    };
+    let navigator = Navigator { scene: &scene, picture: shaded.unwrap_or_default(), trees, costs: options.costs };
     drop(bar);
     writeln!(std::io::stdout().lock(), "{}", navigator.write(&arguments.output)?.display())?;
     work::finish(device.as_ref(), true)

@@ -11,9 +11,7 @@ mod projection;
 
 use crate::experiments::navigate::outline::{Outline, OutlineLevel};
 use crate::rays::kinds::{self, RayKind, RayOptions};
-use crate::report::beside;
-use crate::report::names::slug;
-use crate::report::picture::{PictureOptions, View, picture};
+use crate::report::{beside, slug};
 use crate::scene::Scene;
 use crate::subjects::Subject;
 use crate::{Error, Result};
@@ -35,12 +33,10 @@ pub struct Tree {
 }
 
 /// How trees are drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct NavigateOptions {
-    /// Pixels of the picture.
-    pub size: [u32; 2],
-    /// Of the picture's rays to the sky.
-    pub seed: u64,
+    /// Pixels of the picture, and the seed of its rays to the sky.
+    pub rays: RayOptions,
     /// Boxes that are drawn of a level at most.
     pub boxes: usize,
     /// Costs of a step and of a test.
@@ -49,32 +45,15 @@ pub struct NavigateOptions {
 
 /// Everything that the page says.
 #[derive(Debug, Clone)]
-pub struct Navigator {
-    /// The scene's name.
-    pub scene: String,
-    /// Its triangles.
-    pub triangles: u64,
+pub struct Navigator<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
     /// The scene, shaded.
     pub picture: RgbImage,
     /// The trees.
     pub trees: Vec<Tree>,
     /// Costs of a step and of a test.
     pub costs: [f64; 2],
-    /// The command line that makes it again.
-    pub command: String,
-    /// Commit of the program.
-    pub commit: String,
-    /// When, RFC 3339 UTC.
-    pub when: String,
-}
-
-/// The picture that boxes are drawn over.
-///
-/// # Errors
-/// The device failed.
-pub fn backdrop(scene: &Scene, subject: &mut dyn Subject, options: &NavigateOptions) -> Result<RgbImage> {
-    let options = PictureOptions { view: View::Shaded, size: options.size, seed: options.seed, top: None };
-    picture(scene, subject, &options)
 }
 
 impl Tree {
@@ -86,10 +65,10 @@ impl Tree {
     pub fn of(scene: &Scene, subject: &mut dyn Subject, options: &NavigateOptions) -> Result<Tree> {
         let outline = Outline::of(subject)?;
         // Every other pixel each way: enough to say which boxes are seen.
-        let rays = RayOptions { size: options.size.map(|side| side.div_ceil(2)), seed: options.seed };
+        let rays = RayOptions { size: options.rays.size.map(|side| side.div_ceil(2)), ..options.rays };
         let rays = kinds::generate(RayKind::Primary, scene, &rays, &mut |_| Ok(Vec::new()))?;
         let seen = boxes::seen(&outline, &rays, &subject.hits_of(&rays, Query::ClosestHit)?);
-        let projection = Projection::of(&scene.camera, options.size);
+        let projection = Projection::of(&scene.camera, options.rays.size);
         let [c_t, c_i] = options.costs;
         let figures = outline.figures(c_t, c_i);
         let drawings =
@@ -99,14 +78,14 @@ impl Tree {
     }
 }
 
-impl Navigator {
+impl Navigator<'_> {
     /// Writes the page into `folder`, and gives its path. It names the other pages that lie there.
     ///
     /// # Errors
     /// The file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<PathBuf> {
         std::fs::create_dir_all(folder).map_err(Error::file(folder))?;
-        let file = beside::navigator_of(&slug(&self.scene));
+        let file = beside::navigator_of(&slug(&self.scene.name));
         let path = folder.join(&file);
         let page = page::page(self, &beside::links(folder, &file))?;
         std::fs::write(&path, page).map_err(Error::file(&path))?;

@@ -3,9 +3,11 @@
 use super::projection::UNITS;
 use super::{Navigator, Tree};
 use crate::experiments::navigate::outline::OutlineLevel;
+use crate::measure::provenance;
 use crate::report::elements::{bar, foot, head, number, scroll};
-use crate::report::names::{short, slug};
 use crate::report::numbers::{grouped, three_digits};
+use crate::report::{short, slug};
+use crate::scene::Scene;
 use crate::subjects::KD_TREE;
 use crate::{Error, Result};
 use base64::prelude::{BASE64_STANDARD, Engine};
@@ -16,9 +18,9 @@ const SCRIPT: &str = include_str!("navigate.js");
 /// The level that is shown first: few boxes, and their shape to be seen.
 const FIRST: usize = 4;
 
-pub(super) fn page(navigator: &Navigator, links: &Markup) -> Result<String> {
+pub(super) fn page(navigator: &Navigator<'_>, links: &Markup) -> Result<String> {
     let picture = format!("--picture:url({})", inside(&navigator.picture)?);
-    let Navigator { scene, trees, .. } = navigator;
+    let Navigator { scene: Scene { name: scene, mesh, .. }, trees, .. } = navigator;
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -30,9 +32,9 @@ pub(super) fn page(navigator: &Navigator, links: &Markup) -> Result<String> {
                     h1 { (scene) ", level by level" }
                     p.lead {
                         "The boxes of each level of " (trees.len()) @if trees.len() == 1 { " tree" } @else { " trees" } " over "
-                        (grouped(navigator.triangles)) " triangles, from the root down to the leaves."
+                        (grouped(mesh.triangles.len() as u64)) " triangles, from the root down to the leaves."
                     }
-                    p.command { span { "Made by" } code { (navigator.command) } }
+                    p.command { span { "Made by" } code { (provenance::command()) } }
                 }
                 nav aria-label="Sections" {
                     @for tree in trees { a href={ "#" (id(tree)) } { (short(&tree.builder)) } }
@@ -43,7 +45,7 @@ pub(super) fn page(navigator: &Navigator, links: &Markup) -> Result<String> {
                     @for tree in trees { (section(navigator, tree)) }
                     (method(navigator))
                 }
-                (foot(&navigator.commit, &navigator.when))
+                (foot(&provenance::commit(), &provenance::now()))
                 script { (PreEscaped(SCRIPT)) }
             }
         }
@@ -55,7 +57,7 @@ fn id(tree: &Tree) -> String {
     format!("tree-{}", slug(&tree.builder))
 }
 
-fn section(navigator: &Navigator, tree: &Tree) -> Markup {
+fn section(navigator: &Navigator<'_>, tree: &Tree) -> Markup {
     let nodes: u64 = tree.levels.iter().map(|(level, _)| level.nodes()).sum();
     let cost: f64 = tree.levels.iter().map(|(level, _)| level.cost).sum();
     html! {
@@ -72,14 +74,14 @@ fn section(navigator: &Navigator, tree: &Tree) -> Markup {
     }
 }
 
-fn stage(navigator: &Navigator, tree: &Tree) -> Markup {
+fn stage(navigator: &Navigator<'_>, tree: &Tree) -> Markup {
     let (width, height) = navigator.picture.dimensions();
     let [wide, high] = [width, height].map(|side| f64::from(side) * UNITS);
     let last = tree.levels.len() - 1;
     let first = FIRST.min(last);
     html! {
         figure.stage {
-            svg viewBox={ "0 0 " (wide) " " (high) } role="img" aria-label={ "Boxes of a level of " (tree.builder) ", over " (navigator.scene) } {
+            svg viewBox={ "0 0 " (wide) " " (high) } role="img" aria-label={ "Boxes of a level of " (tree.builder) ", over " (navigator.scene.name) } {
                 @for (i, (level, drawing)) in tree.levels.iter().enumerate() {
                     g .now[i == first] data-level=(i) data-says=(says(i, level, drawing.drawn)) {
                         @if !drawing.unseen.is_empty() { path.unseen d=(drawing.unseen) {} }
@@ -155,7 +157,7 @@ fn table(tree: &Tree, cost: f64) -> Markup {
     )
 }
 
-fn method(navigator: &Navigator) -> Markup {
+fn method(navigator: &Navigator<'_>) -> Markup {
     let [c_t, c_i] = navigator.costs;
     html! {
         section #method {

@@ -11,7 +11,7 @@ use crate::cli::work::{device_for_those, page_written};
 use crate::cli::{Bar, Common};
 use crate::device::Device;
 use crate::experiments::stability;
-use crate::measure::setting::{Failure, Setting};
+use crate::measure::{Failure, Setting};
 use crate::rays::kinds::RayKind;
 use crate::report::lines::Points;
 use crate::scene::{self, Scene};
@@ -124,29 +124,23 @@ fn axes(text: &str) -> Result<u32, String> {
 }
 
 fn side(text: &str) -> Result<Side, String> {
-    Side::ALL.into_iter().find(|side| side.sign() == text).ok_or_else(|| format!("{text:?} is no side; take + or -"))
+    Side::ALL.into_iter().find(|side| side.name() == text).ok_or_else(|| format!("{text:?} is no side; take + or -"))
 }
 
 pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     match &arguments.experiment {
-        Experiment::Growth(growth) => run_growth(common, growth),
-        Experiment::Large(large) => run_large(common, large),
+        Experiment::Growth(Growth { relative, builder, steps, axes, sides }) => {
+            let both = |&axes: &u32| sides.iter().map(move |&side| FarTriangle { axes, side });
+            let stretches: Vec<FarTriangle> = axes.iter().flat_map(both).collect();
+            run_relative(common, relative, builder, (&stretches, &steps.0))
+        }
+        Experiment::Large(Large { relative, builder, steps, placements, counts }) => {
+            let each = |&placement| counts.iter().map(move |count| HugeTriangles { placement, count: count.get() });
+            let stretches: Vec<HugeTriangles> = placements.iter().flat_map(each).collect();
+            run_relative(common, relative, builder, (&stretches, &steps.0))
+        }
         Experiment::Degenerate(degenerate) => run_degenerate(common, degenerate),
     }
-}
-
-fn run_growth(common: &Common, arguments: &Growth) -> anyhow::Result<()> {
-    let sides = |&axes: &u32| arguments.sides.iter().map(move |&side| FarTriangle { axes, side });
-    let stretches: Vec<FarTriangle> = arguments.axes.iter().flat_map(sides).collect();
-    run_relative(common, &arguments.relative, &arguments.builder, (&stretches, &arguments.steps.0))
-}
-
-fn run_large(common: &Common, arguments: &Large) -> anyhow::Result<()> {
-    let counts = |&placement: &LargePlacement| {
-        arguments.counts.iter().map(move |count| HugeTriangles { placement, count: count.get() })
-    };
-    let stretches: Vec<HugeTriangles> = arguments.placements.iter().flat_map(counts).collect();
-    run_relative(common, &arguments.relative, &arguments.builder, (&stretches, &arguments.steps.0))
 }
 
 fn run_relative<S: Stretch>(
@@ -198,11 +192,8 @@ fn run_degenerate(common: &Common, arguments: &Degenerate) -> anyhow::Result<()>
     let mut scenes = scene::degenerate(arguments.triangles.get());
     if let Some(unknown) = arguments.scenes.iter().find(|name| scenes.iter().all(|scene| scene.name != **name)) {
         let names: Vec<&str> = scenes.iter().map(|scene| scene.name).collect();
-        return Err(crate::Error::Argument(format!(
-            "unknown degenerate scene {unknown:?}; use one of {}",
-            names.join(", ")
-        ))
-        .into());
+        let what = format!("unknown degenerate scene {unknown:?}; use one of {}", names.join(", "));
+        return Err(crate::Error::Argument(what).into());
     }
     scenes.retain(|scene| arguments.scenes.is_empty() || arguments.scenes.iter().any(|name| name == scene.name));
     let (device, specs) = opened(common, &arguments.builder)?;
@@ -233,17 +224,13 @@ fn run_degenerate(common: &Common, arguments: &Degenerate) -> anyhow::Result<()>
         bar.step();
     }
     drop(bar);
-    run.setting.notes.extend(peers_note(&specs));
+    if specs.iter().any(degenerate::is_peer) {
+        let note = "Peers get the scenes without triangles whose vertices are not there; what goes wrong with them is shown and is no \
+                    failure of ours.";
+        run.setting.notes.push(note.into());
+    }
     let page = page::finish::<stability::points::Degenerate>(&arguments.output, &run)?;
     page_written(device.as_ref(), &page, failures)
-}
-
-fn peers_note(specs: &[Spec]) -> Option<String> {
-    specs.iter().any(degenerate::is_peer).then(|| {
-        "Peers get the scenes without triangles whose vertices are not there; what goes wrong with them is shown and is no \
-         failure of ours."
-            .into()
-    })
 }
 
 /// The device that the builders need, and those of them that can work here: one that came with `all` and cannot is left out.

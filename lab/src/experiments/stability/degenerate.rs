@@ -4,18 +4,19 @@
 use super::points::{Degenerate, Experiment};
 use crate::device::Device;
 use crate::measure::agreement::wrong_where_different;
-use crate::measure::statistics::Spread;
+use crate::measure::{Sink, Spread};
 use crate::random::SplitMix64;
 use crate::scene::{self, Mesh};
 use crate::subjects::Subject;
 use crate::subjects::builders::{Needs, Spec};
 use crate::{Error, Result};
+use glam::Vec3;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::{Bvh2, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::trace::twin::tracer::closest_hit_by_brute_force;
-use hedgerow::trace::{Query, Ray};
+use hedgerow::trace::{Hit, Query, Ray};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Rays of the sample.
@@ -43,22 +44,18 @@ pub struct DegenerateSetup<'a> {
 struct Truth {
     tree: Bvh2,
     rays: Vec<Ray>,
-    hits: u64,
+    expected: Vec<Hit>,
 }
 
 /// Measures every builder on one scene.
 ///
 /// # Errors
 /// Those of `point`.
-pub fn measure(
-    stage: &DegenerateSetup<'_>,
-    scene: &scene::Degenerate,
-    point: &mut dyn FnMut(Degenerate) -> Result<()>,
-) -> Result<()> {
+pub fn measure(stage: &DegenerateSetup<'_>, scene: &scene::Degenerate, point: &mut Sink<'_, Degenerate>) -> Result<()> {
     let tree = lbvh::build(&scene.mesh.positions, &scene.mesh.triangles, Code::Mc63.full(), Collapse::OFF);
     let rays = rays(&tree, stage.seed);
-    let hits = rays.iter().filter(|ray| closest_hit_by_brute_force(&tree, ray).is_some()).count() as u64;
-    let truth = Truth { tree, rays, hits };
+    let expected = rays.iter().map(|ray| closest_hit_by_brute_force(&tree, ray)).collect();
+    let truth = Truth { tree, rays, expected };
     for spec in stage.builders {
         (stage.say)(&format!("{}: {spec}", scene.name));
         point(of_builder(stage, scene, spec, &truth))?;
@@ -94,7 +91,7 @@ fn of_builder(stage: &DegenerateSetup<'_>, scene: &scene::Degenerate, spec: &Spe
         same_bytes: None,
         valid: None,
         rays: truth.rays.len() as u64,
-        hits: truth.hits,
+        hits: truth.expected.iter().filter(|hit| hit.is_some()).count() as u64,
         wrong: None,
         faults: Vec::new(),
     };
@@ -155,7 +152,7 @@ fn fill(point: &mut Degenerate, stage: &DegenerateSetup<'_>, spec: &Spec, mesh: 
 /// How many rays find something else than brute force does, as closest-hit and as any-hit rays together.
 fn wrong(subject: &mut dyn Subject, truth: &Truth) -> Result<u64> {
     subject.set_rays(&truth.rays)?;
-    let expected: Vec<_> = truth.rays.iter().map(|ray| closest_hit_by_brute_force(&truth.tree, ray)).collect();
+    let Truth { tree, rays, expected } = truth;
     let mut wrong = 0;
     for query in [Query::ClosestHit, Query::AnyHit] {
         subject.trace(query)?;
@@ -163,8 +160,7 @@ fn wrong(subject: &mut dyn Subject, truth: &Truth) -> Result<u64> {
         if hits.len() != expected.len() {
             return Err(Error::Argument(format!("{} rays, but {} hits", expected.len(), hits.len())));
         }
-        let compared = (&hits[..], &expected[..]);
-        wrong += wrong_where_different(&truth.tree, &truth.rays, query, compared, truth.rays.len()) as u64;
+        wrong += wrong_where_different(tree, rays, query, (&hits, expected), rays.len()) as u64;
     }
     Ok(wrong)
 }
@@ -175,44 +171,39 @@ fn rays(tree: &Bvh2, seed: u64) -> Vec<Ray> {
     let active = tree.header.active as usize;
     let mut random = SplitMix64::new(seed);
     let bounds = tree.header.root.bounds();
-    let middle = bounds.centroid().map(f64::from);
-    let half: [f64; 3] = std::array::from_fn(|i| f64::from(bounds.hi[i]) - middle[i]);
-    let radius = length(half).max(1e-6 * length(middle)).max(f64::from(f32::MIN_POSITIVE));
-    (0..RAYS)
-        .map(|i| {
-            if active == 0 {
-                let mut direction = [0.0; 3];
-                direction[i % 3] = 1.0;
-                return Ray { origin: random.point(-1.0, 1.0), t_min: 0.0, direction, t_max: f32::INFINITY };
-            }
-            let record = tree.records[random.bits() as usize % active];
-            let [a, b, c] = [record.v0, record.v1, record.v2].map(|v| v.map(f64::from));
-            let (u, v) = (f64::from(random.within(0.1, 0.45)), f64::from(random.within(0.1, 0.45)));
-            let target: [f64; 3] = std::array::from_fn(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
-            let outwards = random.point(-1.0, 1.0).map(f64::from);
-            let size = length(std::array::from_fn(|k| b[k] - a[k])).max(length(std::array::from_fn(|k| c[k] - a[k])));
-            let (from, distance) = if i % 2 == 0 { (middle, 3.0 * radius) } else { (target, 10.0 * size) };
-            // Where the floats end, rays begin there.
-            let place = |k: usize| (from[k] + distance * outwards[k]).clamp(f32::MIN.into(), f32::MAX.into()) as f32;
-            let origin: [f32; 3] = std::array::from_fn(place);
-            let towards: [f64; 3] = std::array::from_fn(|k| target[k] - f64::from(origin[k]));
-            let direction = match length(towards) {
-                0.0 => [1.0, 0.0, 0.0],
-                far => towards.map(|x| (x / far) as f32),
-            };
-            Ray { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
-        })
-        .collect()
-}
-
-fn length(v: [f64; 3]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+    let middle = Vec3::from(bounds.centroid()).as_dvec3();
+    let half = Vec3::from(bounds.hi).as_dvec3() - middle;
+    let radius = half.length().max(1e-6 * middle.length()).max(f64::from(f32::MIN_POSITIVE));
+    let ray = |i: usize| {
+        if active == 0 {
+            let mut direction = [0.0; 3];
+            direction[i % 3] = 1.0;
+            return Ray { origin: random.point(-1.0, 1.0), t_min: 0.0, direction, t_max: f32::INFINITY };
+        }
+        let record = tree.records[random.bits() as usize % active];
+        let [a, b, c] = [record.v0, record.v1, record.v2].map(|v| Vec3::from(v).as_dvec3());
+        let (u, v) = (f64::from(random.within(0.1, 0.45)), f64::from(random.within(0.1, 0.45)));
+        let target = a + u * (b - a) + v * (c - a);
+        let outwards = Vec3::from(random.point(-1.0, 1.0)).as_dvec3();
+        let size = (b - a).length().max((c - a).length());
+        let (from, distance) = if i.is_multiple_of(2) { (middle, 3.0 * radius) } else { (target, 10.0 * size) };
+        // Where the floats end, rays begin there.
+        let origin = (from + distance * outwards).to_array().map(|x| x.clamp(f32::MIN.into(), f32::MAX.into()) as f32);
+        let towards = target - Vec3::from(origin).as_dvec3();
+        let direction = match towards.length() {
+            0.0 => [1.0, 0.0, 0.0],
+            far => (towards / far).as_vec3().to_array(),
+        };
+        Ray { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
+    };
+    (0..RAYS).map(ray).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::subjects::builders;
+    use glam::DVec3;
 
     fn measured(builders: &str, count: u32) -> Vec<Degenerate> {
         let specs = builders::parse_list(builders).expect("known");
@@ -252,6 +243,7 @@ mod tests {
             let hits = rays.iter().filter(|ray| closest_hit_by_brute_force(&tree, ray).is_some()).count();
             let has_area = |r: &hedgerow::bvh::layout::Triangle| {
                 let [a, b, c] = [r.v0, r.v1, r.v2].map(|v| v.map(f64::from));
+                let length = |v: [f64; 3]| DVec3::from(v).length();
                 let [p, q]: [[f64; 3]; 2] = [b, c].map(|v| std::array::from_fn(|k| v[k] - a[k]));
                 let cross = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
                 length(cross) > 1e-3 * length(p) * length(q)

@@ -16,13 +16,12 @@ pub fn first(points: impl IntoIterator<Item = (u32, f64)>, is_lost: impl Fn(f64)
 /// `None` for codes without a grid.
 pub fn shift(builder: &str, axes: u32) -> Option<f64> {
     let codes = option(builder, "codes")?;
-    let bits = match (codes.strip_prefix("mip"), codes.strip_prefix("bin")) {
+    let bits: f64 = match (codes.strip_prefix("mip"), codes.strip_prefix("bin")) {
         (Some(rest), _) => rest.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()?,
         // The counting grid of binning has 7 bits, whatever the depth of the splits.
         (_, Some(rest)) if rest.starts_with(|c: char| c.is_ascii_digit()) => 7.0,
         _ => return None,
     };
-    let bits: f64 = bits;
     Some(bits / f64::from(axes))
 }
 

@@ -2,6 +2,7 @@
 
 use super::points::Experiment;
 use super::relative::Stretch;
+use crate::named::named;
 use hedgerow::geometry::Aabb;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -17,18 +18,7 @@ pub enum Side {
     Negative,
 }
 
-impl Side {
-    /// Both.
-    pub const ALL: [Side; 2] = [Side::Positive, Side::Negative];
-
-    /// As records have it.
-    pub fn sign(self) -> &'static str {
-        match self {
-            Side::Positive => "+",
-            Side::Negative => "-",
-        }
-    }
-}
+named!(Side, "side": Positive = "+", Negative = "-");
 
 /// A far triangle that makes the bounds of a scene grow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

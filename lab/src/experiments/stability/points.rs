@@ -3,8 +3,7 @@
 
 use super::far::FarTriangle;
 use super::large::HugeTriangles;
-use crate::measure::setting::{Failure, Setting};
-use crate::measure::statistics::Spread;
+use crate::measure::{Failure, Setting, Spread};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 

@@ -4,8 +4,7 @@ use super::clipped;
 use super::points::{Experiment, Stretched};
 use crate::device::Device;
 use crate::measure::agreement::wrong_where_different;
-use crate::measure::setting::Failure;
-use crate::measure::statistics::{Spread, in_turn, ratios};
+use crate::measure::{Failure, Sink, Spread, in_turn, ratios};
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Mesh, Scene};
 use crate::subjects::Subject;
@@ -112,7 +111,7 @@ pub fn measure<S: Stretch>(
     scene: &Scene,
     (stretches, steps): (&[S], &[u32]),
     failed: &mut dyn FnMut(Failure),
-    point: &mut dyn FnMut(Stretched<S>) -> Result<()>,
+    point: &mut Sink<'_, Stretched<S>>,
 ) -> Result<Vec<String>> {
     let part = Part::new(stage, scene)?;
     let mut notes = Vec::new();
@@ -138,7 +137,7 @@ fn measure_one<S: Stretch>(
     by: S,
     meshes: &[(u32, Mesh)],
     failed: &mut dyn FnMut(Failure),
-    point: &mut dyn FnMut(Stretched<S>) -> Result<()>,
+    point: &mut Sink<'_, Stretched<S>>,
 ) -> Result<()> {
     let Some((_, first)) = meshes.first() else { return Ok(()) };
     let truth = tree_of(first);
@@ -155,7 +154,8 @@ fn measure_one<S: Stretch>(
             let of = format!("{of}, e = {e}");
             (stage.say)(&of);
             match base.against(stage, spec, mesh) {
-                Ok((figures, faults)) => {
+                Ok((cost, relative_mrays, faults)) => {
+                    let over_base = cost.zip(base.cost).map(|(cost, base)| cost / base);
                     faults.into_iter().for_each(|what| failed(Failure::named(&of, what)));
                     point(Stretched {
                         experiment: S::EXPERIMENT,
@@ -163,9 +163,9 @@ fn measure_one<S: Stretch>(
                         builder: spec.to_string(),
                         by,
                         e: *e,
-                        cost: (S::EXPERIMENT == Experiment::Large).then_some(figures.cost),
-                        relative_cost: figures.relative_cost,
-                        relative_mrays: figures.relative_mrays,
+                        cost: (S::EXPERIMENT == Experiment::Large).then_some(cost),
+                        relative_cost: over_base.filter(|cost| cost.is_finite()),
+                        relative_mrays,
                     })?;
                 }
                 Err(error) => failed(Failure::named(of, error)),
@@ -175,15 +175,8 @@ fn measure_one<S: Stretch>(
     Ok(())
 }
 
-/// What a builder gave at one point.
-struct Figures {
-    /// [`clipped::cost`]; `None` where the builder does not give its tree.
-    cost: Option<f64>,
-    /// The same over that of the first point.
-    relative_cost: Option<f64>,
-    /// Speeds over those of the first point, by kind of ray; without those that had fallen below a twentieth before.
-    relative_mrays: BTreeMap<String, f64>,
-}
+/// What a builder gave at one point: cost, relative speeds, faults.
+type Figures = (Option<f64>, BTreeMap<String, f64>, Vec<String>);
 
 /// A builder on the first mesh of a series.
 struct Base<'a> {
@@ -203,18 +196,14 @@ impl<'a> Base<'a> {
         mesh: &'a Mesh,
         truth: &'a Bvh2,
     ) -> Result<Base<'a>> {
-        let mut subject = spec.make(stage.device, mesh)?;
-        subject.build()?;
-        let (cost, _) = cost_of(subject.as_mut(), part)?;
+        let (subject, cost, _) = built(stage, part, spec, mesh)?;
         Ok(Base { part, subject, cost, truth, lost: Vec::new() })
     }
 
-    /// The figures of another mesh, and what is wrong with its tree or hits.
-    fn against(&mut self, stage: &RelativeSetup<'_>, spec: &Spec, mesh: &Mesh) -> Result<(Figures, Vec<String>)> {
-        let mut subject = spec.make(stage.device, mesh)?;
-        subject.build()?;
-        let (cost, mut faults) = cost_of(subject.as_mut(), self.part)?;
-        let relative_cost = cost.zip(self.cost).map(|(cost, base)| cost / base).filter(|cost| cost.is_finite());
+    /// Of another mesh the cost, the speeds over those of this one by kind of ray (without those that had fallen below a twentieth
+    /// before), and what is wrong with its tree or hits.
+    fn against(&mut self, stage: &RelativeSetup<'_>, spec: &Spec, mesh: &Mesh) -> Result<Figures> {
+        let (mut subject, cost, mut faults) = built(stage, self.part, spec, mesh)?;
         let mut relative_mrays = BTreeMap::new();
         for (kind, rays) in &self.part.rays {
             if self.lost.contains(kind) {
@@ -230,7 +219,7 @@ impl<'a> Base<'a> {
                 faults.push(format!("{wrong} {kind} rays differ from e = 0 and are wrong by brute force"));
             }
         }
-        Ok((Figures { cost, relative_cost, relative_mrays }, faults))
+        Ok((cost, relative_mrays, faults))
     }
 
     /// Speed of the rays through the other over that through the first, in the median of runs in turn.
@@ -267,9 +256,16 @@ impl<'a> Base<'a> {
     }
 }
 
-/// The clipped cost of what was built, and what is wrong with it.
-fn cost_of(subject: &mut dyn Subject, part: &Part<'_>) -> Result<(Option<f64>, Vec<String>)> {
-    let Some(tree) = subject.tree()? else { return Ok((None, Vec::new())) };
+/// A builder's structure of a mesh, with its [`clipped::cost`] where it gives its tree, and what is wrong with that.
+fn built<'a>(
+    stage: &RelativeSetup<'a>,
+    part: &Part<'_>,
+    spec: &Spec,
+    mesh: &'a Mesh,
+) -> Result<(Box<dyn Subject + 'a>, Option<f64>, Vec<String>)> {
+    let mut subject = spec.make(stage.device, mesh)?;
+    subject.build()?;
+    let Some(tree) = subject.tree()? else { return Ok((subject, None, Vec::new())) };
     let faults = tree.validate().err().map(|error| error.to_string());
-    Ok((clipped::cost(&tree, &part.bounds, COSTS.0, COSTS.1), faults.into_iter().collect()))
+    Ok((subject, clipped::cost(&tree, &part.bounds, COSTS.0, COSTS.1), faults.into_iter().collect()))
 }

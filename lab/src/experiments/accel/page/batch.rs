@@ -3,24 +3,24 @@
 use super::Part;
 use crate::Result;
 use crate::experiments::accel::points::{Batch, Implementation, Submission};
-use crate::report::bars::{self, Bar, Bars};
-use crate::report::chart::Caption;
-use crate::report::columns::Table;
-use crate::report::curves::{self, Axis, Curve};
+use crate::report::bars::{Bar, Bars};
 use crate::report::numbers::{count, duration, duration_tick, grouped, short_count, three_digits, tick};
-use crate::report::theme::{SERIES, Tone};
+use crate::report::{Axis, Caption, Chart, Curve, SERIES, Section, Table, Tone, bars, curves, document};
 use maud::{Markup, html};
 
-/// Who builds how, in the order of charts and tables.
-const SUBJECTS: [(Option<Implementation>, Submission); 7] = [
-    (Some(Implementation::Ours), Submission::OneCall),
-    (Some(Implementation::Ours), Submission::OneSubmit),
-    (Some(Implementation::Ours), Submission::SubmitEach),
-    (Some(Implementation::Driver), Submission::OneCall),
-    (Some(Implementation::Driver), Submission::OneSubmit),
-    (Some(Implementation::Driver), Submission::SubmitEach),
-    (None, Submission::EmptySubmits),
+/// Who builds how, in the order of charts and tables, with its colour: ours begin with the first and the driver's with the second, as
+/// on the whole page.
+const SUBJECTS: [Subject; 7] = [
+    (Some(Implementation::Ours), Submission::OneCall, SERIES[0]),
+    (Some(Implementation::Ours), Submission::OneSubmit, SERIES[2]),
+    (Some(Implementation::Ours), Submission::SubmitEach, SERIES[6]),
+    (Some(Implementation::Driver), Submission::OneCall, SERIES[1]),
+    (Some(Implementation::Driver), Submission::OneSubmit, SERIES[3]),
+    (Some(Implementation::Driver), Submission::SubmitEach, SERIES[5]),
+    (None, Submission::EmptySubmits, SERIES[8]),
 ];
+
+type Subject = (Option<Implementation>, Submission, Tone);
 
 /// The point of so many structures.
 pub(super) fn find(
@@ -36,28 +36,18 @@ fn name(maker: Option<Implementation>, way: Submission) -> String {
     maker.map_or_else(|| way.name().to_owned(), |maker| format!("{}, {}", maker.name(), way.name()))
 }
 
-fn tone(maker: Option<Implementation>, way: Submission) -> Tone {
-    let place = SUBJECTS.iter().position(|subject| *subject == (maker, way)).unwrap_or(0);
-    // Ours begin with the first colour and the driver's with the second, as on the whole page.
-    SERIES[[0, 2, 6, 1, 3, 5, 8][place]]
-}
-
 pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
     let Some(most) = points.iter().map(|point| point.structures).max() else { return Ok(None) };
-    let largest: Vec<&Batch> = SUBJECTS.iter().filter_map(|&(maker, way)| find(points, most, maker, way)).collect();
-    let triangles = largest.first().map_or(0, |point| point.triangles);
-    let bar = |point: &&Batch| {
+    let triangles = points.iter().find(|point| point.structures == most).map_or(0, |point| point.triangles);
+    let bar = |&(maker, way, tone): &Subject| {
+        let point = find(points, most, maker, way)?;
         let time = duration(point.wall_ms.median);
         let ratio = three_digits(point.over_our_call.median);
-        let is_base = (point.maker, point.way) == SUBJECTS[0];
-        Bar {
-            label: name(point.maker, point.way),
-            figure: if is_base { time } else { format!("{time} ({ratio} ×)") },
-            spread: point.wall_ms,
-            tone: tone(point.maker, point.way),
-        }
+        let is_base = (maker, way) == (Some(Implementation::Ours), Submission::OneCall);
+        let figure = if is_base { time } else { format!("{time} ({ratio} ×)") };
+        Some(Bar { label: name(maker, way), figure, spread: point.wall_ms, tone })
     };
-    let all_bars: Vec<Bar> = largest.iter().map(bar).collect();
+    let all_bars: Vec<Bar> = SUBJECTS.iter().filter_map(bar).collect();
     let in_words: Vec<String> = all_bars.iter().map(|bar| format!("{}: {}", bar.label, bar.figure)).collect();
     let caption = Caption {
         name: "accel-batch".into(),
@@ -72,15 +62,10 @@ pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
         caption,
         &Bars { bars: all_bars, axis: "wall-clock milliseconds", number: tick, marks: Vec::new() },
     )?;
-    let curve = |&(maker, way): &(Option<Implementation>, Submission)| Curve {
-        name: name(maker, way),
-        tone: tone(maker, way),
-        points: points
-            .iter()
-            .filter(|point| (point.maker, point.way) == (maker, way))
-            .map(|point| (f64::from(point.structures), point.wall_ms))
-            .collect(),
-        law: None,
+    let curve = |&(maker, way, tone): &Subject| {
+        let own = points.iter().filter(|point| (point.maker, point.way) == (maker, way));
+        let points = own.map(|point| (f64::from(point.structures), point.wall_ms)).collect();
+        Curve { name: name(maker, way), tone, points, law: None }
     };
     let all: Vec<Curve> = SUBJECTS.iter().map(curve).filter(|curve| !curve.points.is_empty()).collect();
     let caption = Caption {
@@ -97,25 +82,21 @@ pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
         &Axis { name: "structures", is_log: true, number: short_count },
         &Axis { name: "wall clock", is_log: true, number: duration_tick },
     )?;
-    Ok(Some(Part {
-        id: "batches",
-        title: "Batches",
-        charts: bars.into_iter().chain(growth).collect(),
-        above: html! {
-            p {
-                "Engines build hundreds of small structures a frame. Here " (grouped(most.into())) " of them, "
-                (grouped(triangles)) " triangles together, are built in one call; in a call each with a barrier behind it, in one "
-                "command buffer; and in a call each that is submitted and waited for. By the wall's clock, recording included."
-            }
-            p { (reading(points, most)) }
-        },
-        below: html! {
-            details {
-                summary { "All figures" }
-                (every_batch(points))
-            }
-        },
-    }))
+    let charts: Vec<Chart> = bars.into_iter().chain(growth).collect();
+    let body = html! {
+        p {
+            "Engines build hundreds of small structures a frame. Here " (grouped(most.into())) " of them, "
+            (grouped(triangles)) " triangles together, are built in one call; in a call each with a barrier behind it, in one "
+            "command buffer; and in a call each that is submitted and waited for. By the wall's clock, recording included."
+        }
+        p { (reading(points, most)) }
+        (document::charts(&charts))
+        details {
+            summary { "All figures" }
+            (every_batch(points))
+        }
+    };
+    Ok(Some((Section::new("batches", "Batches", body), charts)))
 }
 
 fn every_batch(points: &[Batch]) -> Markup {

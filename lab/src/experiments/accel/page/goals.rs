@@ -3,8 +3,7 @@
 use super::Measured;
 use super::batch::find;
 use crate::experiments::accel::points::{BraidedRays, Implementation, RebraidPoint, Submission};
-use crate::measure::statistics::Spread;
-use crate::measure::statistics::geometric_mean;
+use crate::measure::{Spread, geometric_mean};
 
 /// Of the time of one call, that of a call each.
 const BATCH: f64 = 10.0;
@@ -45,16 +44,13 @@ impl Goal {
 pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
     let mut goals = Vec::new();
     let most = measured.batches.iter().map(|point| point.structures).max().unwrap_or(0);
-    for (maker, way, least) in [
-        (Implementation::Ours, Submission::OneSubmit, BATCH),
-        (Implementation::Ours, Submission::SubmitEach, BATCH),
-        (Implementation::Driver, Submission::OneCall, 1.0),
+    for (maker, way, against, least) in [
+        (Implementation::Ours, Submission::OneSubmit, Submission::OneSubmit.name(), BATCH),
+        (Implementation::Ours, Submission::SubmitEach, Submission::SubmitEach.name(), BATCH),
+        (Implementation::Driver, Submission::OneCall, "one call of the driver's", 1.0),
     ] {
         if let Some(point) = find(&measured.batches, most, Some(maker), way) {
-            let what = match maker {
-                Implementation::Ours => format!("{most} structures in one call, against {}", way.name()),
-                Implementation::Driver => format!("{most} structures in one call, against one call of the driver's"),
-            };
+            let what = format!("{most} structures in one call, against {against}");
             goals.push(Goal { what, ratio: point.over_our_call, least });
         }
     }

@@ -10,14 +10,10 @@ mod top_level;
 mod update;
 
 use crate::Result;
-use crate::experiments::accel::points::{AccelEntry, Batch, RebraidPoint, TopLevel, Update};
-use crate::measure::setting::{Failure, Setting};
-use crate::report::beside;
-use crate::report::chart::Chart;
-use crate::report::columns::Table;
-use crate::report::document::{self, Document, Section};
-use crate::report::lines;
+use crate::experiments::accel::points::{AccelEntry, Batch, Implementation, RebraidPoint, TopLevel, Update};
+use crate::measure::{Failure, Setting, Spread};
 use crate::report::numbers::three_digits;
+use crate::report::{Chart, Curve, Document, Section, Table, Tone, beside, document, lines};
 use goals::Goal;
 use maud::{Markup, html};
 use std::path::{Path, PathBuf};
@@ -49,42 +45,33 @@ struct Measured {
     failures: Vec<Failure>,
 }
 
-impl From<Vec<AccelEntry>> for Measured {
-    fn from(entries: Vec<AccelEntry>) -> Measured {
-        let mut measured = Measured::default();
-        for entry in entries {
-            match entry {
-                AccelEntry::Setting(setting) => measured.setting = Some(setting),
-                AccelEntry::Batch(point) => measured.batches.push(point),
-                AccelEntry::Tlas(point) => measured.top_levels.push(point),
-                AccelEntry::Rebraid(point) => measured.rebraids.push(point),
-                AccelEntry::Update(point) => measured.updates.push(point),
-                AccelEntry::Failure(failure) => measured.failures.push(failure),
-            }
-        }
-        measured
-    }
-}
-
 /// Writes `accel.html` and its charts into `folder`, from the `accel.jsonl` there; gives the page's path. The page names the
 /// others that lie there.
 ///
 /// # Errors
 /// The records cannot be read; a file cannot be written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
-    let measured = Measured::from(read(folder)?);
+    let mut measured = Measured::default();
+    for entry in read(folder)? {
+        match entry {
+            AccelEntry::Setting(setting) => measured.setting = Some(setting),
+            AccelEntry::Batch(point) => measured.batches.push(point),
+            AccelEntry::Tlas(point) => measured.top_levels.push(point),
+            AccelEntry::Rebraid(point) => measured.rebraids.push(point),
+            AccelEntry::Update(point) => measured.updates.push(point),
+            AccelEntry::Failure(failure) => measured.failures.push(failure),
+        }
+    }
     let setting = measured.setting.as_ref();
-    let parts: Vec<Part> = [
+    let parts = [
         batch::part(&measured.batches)?,
         top_level::part(&measured.top_levels)?,
         rebraid::part(&measured.rebraids)?,
         update::part(&measured.updates)?,
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
+    ];
+    let (parts, charts): (Vec<Section>, Vec<Vec<Chart>>) = parts.into_iter().flatten().unzip();
     let mut sections = vec![Section::new("summary", "Summary", summary(setting, &goals::goals(&measured)))];
-    sections.extend(parts.iter().map(|part| Section::new(part.id, part.title, part.body())));
+    sections.extend(parts);
     sections.push(Section::method(Some(beside::ACCEL.records), terms()));
     let document = Document {
         tab: "batches, top levels, re-braiding, updates".into(),
@@ -97,26 +84,25 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
         failures: document::told(&measured.failures),
         sections,
     };
-    document.write(folder, &beside::ACCEL, parts.iter().flat_map(|part| &part.charts))
+    document.write(folder, &beside::ACCEL, charts.iter().flatten())
 }
 
-/// What an experiment has on the page.
-struct Part {
-    id: &'static str,
-    title: &'static str,
-    charts: Vec<Chart>,
-    /// What is above the charts, and what below.
-    above: Markup,
-    below: Markup,
+/// What an experiment has on the page, and its charts.
+type Part = (Section, Vec<Chart>);
+
+/// What is drawn of one maker's points: what it is called behind the maker's name, its colour, and the figure.
+type Series<'f, P> = (Implementation, &'f str, Tone, &'f dyn Fn(&P) -> Option<Spread>);
+
+/// A curve of each of `series` that has points; `place` tells whose a point is, and where on the horizontal axis.
+fn curves_of<P>(points: &[&P], place: fn(&P) -> (Implementation, u32), series: &[Series<'_, P>]) -> Vec<Curve> {
+    let curve = |&(maker, what, tone, figure): &Series<'_, P>| {
+        let of_maker = points.iter().map(|point| (place(point), point)).filter(|((whose, _), _)| *whose == maker);
+        let points = of_maker.filter_map(|((_, x), point)| Some((f64::from(x), figure(point)?))).collect();
+        Curve { name: format!("{} {what}", maker.name()), tone, points, law: None }
+    };
+    series.iter().map(curve).filter(|curve| !curve.points.is_empty()).collect()
 }
 
-impl Part {
-    fn body(&self) -> Markup {
-        html! { (self.above) (document::charts(&self.charts)) (self.below) }
-    }
-}
-
-/// What was to be reached, and whether it is.
 fn summary(setting: Option<&Setting>, goals: &[Goal]) -> Markup {
     let (met, all) = (goals.iter().filter(|goal| goal.is_met()).count(), goals.len());
     html! {

@@ -4,12 +4,9 @@ use super::Part;
 use super::goals::{self, mean_gain, overlaps};
 use crate::Result;
 use crate::experiments::accel::points::{BraidedRays, MeanWork, RebraidPoint, TopLevelPoint};
-use crate::report::bars::{self, Bar, Bars};
-use crate::report::chart::{Caption, Chart};
-use crate::report::columns::Table;
-use crate::report::names::slug;
+use crate::report::bars::{Bar, Bars};
 use crate::report::numbers::{count, grouped, short_count, three_digits, tick, whole};
-use crate::report::theme::SERIES;
+use crate::report::{Caption, Chart, SERIES, Section, Table, bars, document, slug};
 use maud::{Markup, html};
 
 pub(super) fn part(points: &[RebraidPoint]) -> Result<Option<Part>> {
@@ -17,31 +14,27 @@ pub(super) fn part(points: &[RebraidPoint]) -> Result<Option<Part>> {
         return Ok(None);
     }
     let charts: Vec<Option<Chart>> = points.iter().map(chart).collect::<Result<_>>()?;
-    Ok(Some(Part {
-        id: "rebraid",
-        title: "Re-braiding",
-        charts: charts.into_iter().flatten().collect(),
-        above: html! {
+    let charts: Vec<Chart> = charts.into_iter().flatten().collect();
+    let body = html! {
+        p {
+            "A top level that opens instances whose boxes are loose (Benthin, Woop, Wald 2017), against one that does not: "
+            "rays of each kind through one and the other in turn, by the device's timestamps."
+        }
+        @for point in points.iter().filter(|point| point.rays.iter().any(|rays| rays.different > 0)) {
+            p.note.wrong { (point.scene) ": some rays hit something else through the re-braided top level. That is an error of ours." }
+        }
+        (document::charts(&charts))
+        (buildings(points))
+        details {
+            summary { "Rays and their work" }
             p {
-                "A top level that opens instances whose boxes are loose (Benthin, Woop, Wald 2017), against one that does not: "
-                "rays of each kind through one and the other in turn, by the device's timestamps."
+                "Nodes of the top level, instances entered, nodes below and triangles tested, in the mean over the rays: first "
+                "through the plain top level, then through the re-braided one."
             }
-            @for point in points.iter().filter(|point| point.rays.iter().any(|rays| rays.different > 0)) {
-                p.note.wrong { (point.scene) ": some rays hit something else through the re-braided top level. That is an error of ours." }
-            }
-        },
-        below: html! {
-            (buildings(points))
-            details {
-                summary { "Rays and their work" }
-                p {
-                    "Nodes of the top level, instances entered, nodes below and triangles tested, in the mean over the rays: first "
-                    "through the plain top level, then through the re-braided one."
-                }
-                (tracing(points))
-            }
-        },
-    }))
+            (tracing(points))
+        }
+    };
+    Ok(Some((Section::new("rebraid", "Re-braiding", body), charts)))
 }
 
 /// The gain of each kind of ray in one scene.

@@ -1,32 +1,25 @@
 //! The section of top levels.
 
-use super::Part;
+use super::{Part, Series, curves_of};
 use crate::Result;
 use crate::experiments::accel::points::{Implementation, TopLevel};
-use crate::measure::statistics::Spread;
-use crate::report::chart::Caption;
-use crate::report::columns::Table;
-use crate::report::curves::{self, Axis, Curve};
 use crate::report::numbers::{count, duration_tick, grouped, one_decimal, short_count, three_digits};
-use crate::report::theme::SERIES;
+use crate::report::{Axis, Caption, Curve, SERIES, Section, Table, curves, document};
 use maud::{Markup, html};
 
 pub(super) fn part(points: &[TopLevel]) -> Result<Option<Part>> {
     if points.is_empty() {
         return Ok(None);
     }
-    let curve = |maker: Implementation, what: &str, series: usize, of: fn(&TopLevel) -> Option<Spread>| {
-        let of_maker = points.iter().filter(|point| point.maker == maker);
-        let points = of_maker.filter_map(|point| Some((f64::from(point.instances), of(point)?))).collect();
-        Curve { name: format!("{} {what}", maker.name()), tone: SERIES[series], points, law: None }.with_law()
-    };
-    let all = [
-        curve(Implementation::Ours, "build", 0, |point| Some(point.build_ms)),
-        curve(Implementation::Ours, "update", 2, |point| point.update_ms),
-        curve(Implementation::Driver, "build", 1, |point| Some(point.build_ms)),
-        curve(Implementation::Driver, "update", 5, |point| point.update_ms),
+    let all: Vec<&TopLevel> = points.iter().collect();
+    let series: [Series<'_, TopLevel>; 4] = [
+        (Implementation::Ours, "build", SERIES[0], &|point| Some(point.build_ms)),
+        (Implementation::Ours, "update", SERIES[2], &|point| point.update_ms),
+        (Implementation::Driver, "build", SERIES[1], &|point| Some(point.build_ms)),
+        (Implementation::Driver, "update", SERIES[5], &|point| point.update_ms),
     ];
-    let all: Vec<Curve> = all.into_iter().filter(|curve| !curve.points.is_empty()).collect();
+    let curves = curves_of(&all, |point| (point.maker, point.instances), &series);
+    let all: Vec<Curve> = curves.into_iter().map(Curve::with_law).collect();
     let names: Vec<&str> = all.iter().map(|curve| curve.name.as_str()).collect();
     let caption = Caption {
         name: "accel-tlas".into(),
@@ -43,18 +36,16 @@ pub(super) fn part(points: &[TopLevel]) -> Result<Option<Part>> {
         &Axis { name: "instances", is_log: true, number: short_count },
         &Axis { name: "device time", is_log: true, number: duration_tick },
     )?;
-    Ok(Some(Part {
-        id: "tlas",
-        title: "Top levels",
-        charts: chart.into_iter().collect(),
-        above: html! {
-            p {
-                "A top level over instances of three spheres, each in a cell of its own, built, and updated in place after every "
-                "instance has moved by a tenth of its cell. By the device's timestamps."
-            }
-        },
-        below: every_level(points),
-    }))
+    let charts = Vec::from_iter(chart);
+    let body = html! {
+        p {
+            "A top level over instances of three spheres, each in a cell of its own, built, and updated in place after every "
+            "instance has moved by a tenth of its cell. By the device's timestamps."
+        }
+        (document::charts(&charts))
+        (every_level(points))
+    };
+    Ok(Some((Section::new("tlas", "Top levels", body), charts)))
 }
 
 fn every_level(points: &[TopLevel]) -> Markup {

@@ -1,15 +1,11 @@
 //! The section of updates.
 
-use super::Part;
+use super::{Part, Series, curves_of};
 use crate::Result;
 use crate::experiments::accel::points::{Implementation, Update};
-use crate::measure::statistics::Spread;
-use crate::report::chart::{Caption, Chart};
-use crate::report::columns::Table;
-use crate::report::curves::{self, Axis, Curve};
-use crate::report::names::slug;
+use crate::measure::Spread;
 use crate::report::numbers::{duration_tick, grouped, short_count, three_digits, tick, whole};
-use crate::report::theme::{SERIES, Tone};
+use crate::report::{Axis, Caption, Chart, Curve, SERIES, Section, Table, curves, document, slug};
 use maud::{Markup, html};
 
 pub(super) fn part(points: &[Update]) -> Result<Option<Part>> {
@@ -27,87 +23,71 @@ pub(super) fn part(points: &[Update]) -> Result<Option<Part>> {
         readings.push((scene, reading(&frames)));
     }
     let is_missing = points.iter().any(|point| point.maker == Implementation::Ours && point.update_ms.is_none());
-    Ok(Some(Part {
-        id: "updates",
-        title: "Updating against building from scratch",
-        charts,
-        above: html! {
+    let body = html! {
+        p {
+            "The vertices of a mesh move from frame to frame. Its structure is either built from scratch, or that of the first frame is "
+            "updated: it keeps its tree and gets new boxes, which takes less time and lets the tree grow worse. Both by the "
+            "device's timestamps."
+        }
+        @if is_missing { p.note { "Structures of ours were not updated here: that was not measured." } }
+        @for (scene, reading) in &readings { p { b { (scene) } ": " (reading) } }
+        (document::charts(&charts))
+        details {
+            summary { "Every frame" }
             p {
-                "The vertices of a mesh move from frame to frame. Its structure is either built from scratch, or that of the first frame is "
-                "updated: it keeps its tree and gets new boxes, which takes less time and lets the tree grow worse. Both by the "
-                "device's timestamps."
+                "Growth is what the structure itself tells of its SAH cost since it was built. Building from scratch pays from as many rays a "
+                "frame on, in the mix that was traced, as save by the better tree what building takes longer."
             }
-            @if is_missing { p.note { "Structures of ours were not updated here: that was not measured." } }
-            @for (scene, reading) in &readings { p { b { (scene) } ": " (reading) } }
-        },
-        below: html! {
-            details {
-                summary { "Every frame" }
-                p {
-                    "Growth is what the structure itself tells of its SAH cost since it was built. Building from scratch pays from as many rays a "
-                    "frame on, in the mix that was traced, as save by the better tree what building takes longer."
-                }
-                (every_frame(points))
-            }
-        },
-    }))
+            (every_frame(points))
+        }
+    };
+    Ok(Some((Section::new("updates", "Updating against building from scratch", body), charts)))
 }
 
-/// A curve over the frames of one maker.
-fn curve(
-    frames: &[&Update],
-    maker: Implementation,
-    name: &str,
-    tone: Tone,
-    of: impl Fn(&Update) -> Option<Spread>,
-) -> Curve {
-    let of_maker = frames.iter().filter(|point| point.maker == maker);
-    let points = of_maker.filter_map(|point| Some((f64::from(point.frame), of(point)?))).collect();
-    Curve { name: format!("{} {name}", maker.name()), tone, points, law: None }
+/// The horizontal axis of all charts.
+const FRAME: Axis<'_> = Axis { name: "frame", is_log: false, number: tick };
+
+/// Where a point of a chart stands.
+fn place(point: &Update) -> (Implementation, u32) {
+    (point.maker, point.frame)
 }
 
 fn times(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
-    let all = [
-        curve(frames, Implementation::Ours, "build", SERIES[0], |point| Some(point.build_ms)),
-        curve(frames, Implementation::Ours, "update", SERIES[2], |point| point.update_ms),
-        curve(frames, Implementation::Driver, "build", SERIES[1], |point| Some(point.build_ms)),
-        curve(frames, Implementation::Driver, "update", SERIES[5], |point| point.update_ms),
+    let series: [Series<'_, Update>; 4] = [
+        (Implementation::Ours, "build", SERIES[0], &|point| Some(point.build_ms)),
+        (Implementation::Ours, "update", SERIES[2], &|point| point.update_ms),
+        (Implementation::Driver, "build", SERIES[1], &|point| Some(point.build_ms)),
+        (Implementation::Driver, "update", SERIES[5], &|point| point.update_ms),
     ];
-    let all: Vec<Curve> = all.into_iter().filter(|curve| !curve.points.is_empty()).collect();
+    let all = curves_of(frames, place, &series);
     let median = |curve: &Curve| {
         let medians: Vec<f64> = curve.points.iter().map(|(_, spread)| spread.median).collect();
         Spread::of(&medians).map_or(f64::NAN, |spread| spread.median)
     };
     let in_words: Vec<String> =
         all.iter().map(|curve| format!("{}: {} ms", curve.name, three_digits(median(curve)))).collect();
-    let triangles = frames.first().map_or(0, |point| point.triangles);
+    let in_words = format!("In the median over the frames, {}.", in_words.join("; "));
+    let triangles = grouped(frames.first().map_or(0, |point| point.triangles));
     let caption = Caption {
         name: format!("accel-update-{}", slug(scene)),
         title: format!("{scene}: building and updating, frame by frame"),
-        alt: format!("In the median over the frames, {}.", in_words.join("; ")),
-        reading: format!(
-            "{} triangles; the vertical axis is logarithmic. In the median over the frames, {}.",
-            grouped(triangles),
-            in_words.join("; ")
-        ),
+        reading: format!("{triangles} triangles; the vertical axis is logarithmic. {in_words}"),
+        alt: in_words,
     };
-    let x = Axis { name: "frame", is_log: false, number: tick };
-    curves::curves(caption, &all, &x, &Axis { name: "device time", is_log: true, number: duration_tick })
+    curves::curves(caption, &all, &FRAME, &Axis { name: "device time", is_log: true, number: duration_tick })
 }
 
 fn quality(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
+    let growth = |point: &Update| point.growth.map(Spread::once);
     let against = |point: &Update| Some(Spread::once(point.updated_sah? / point.built_sah?));
-    let all = [
-        curve(frames, Implementation::Ours, "SAH growth", SERIES[4], |point| point.growth.map(Spread::once)),
-        curve(frames, Implementation::Ours, "SAH / anew", SERIES[0], against),
-        curve(frames, Implementation::Ours, "time of rays / anew", SERIES[2], |point| {
-            point.slowdown().map(Spread::once)
-        }),
-        curve(frames, Implementation::Driver, "time of rays / anew", SERIES[5], |point| {
-            point.slowdown().map(Spread::once)
-        }),
+    let slowdown = |point: &Update| point.slowdown().map(Spread::once);
+    let series: [Series<'_, Update>; 4] = [
+        (Implementation::Ours, "SAH growth", SERIES[4], &growth),
+        (Implementation::Ours, "SAH / anew", SERIES[0], &against),
+        (Implementation::Ours, "time of rays / anew", SERIES[2], &slowdown),
+        (Implementation::Driver, "time of rays / anew", SERIES[5], &slowdown),
     ];
-    let all: Vec<Curve> = all.into_iter().filter(|curve| !curve.points.is_empty()).collect();
+    let all = curves_of(frames, place, &series);
     let caption = Caption {
         name: format!("accel-growth-{}", slug(scene)),
         title: format!("{scene}: what updating costs the tree"),
@@ -116,8 +96,7 @@ fn quality(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
                   time of all rays through it, over those of a structure built from scratch. 1 is as good as new."
             .into(),
     };
-    let x = Axis { name: "frame", is_log: false, number: tick };
-    curves::curves(caption, &all, &x, &Axis { name: "times as much", is_log: false, number: tick })
+    curves::curves(caption, &all, &FRAME, &Axis { name: "times as much", is_log: false, number: tick })
 }
 
 /// From where on building anew pays, in a sentence.

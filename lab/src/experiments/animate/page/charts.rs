@@ -5,12 +5,11 @@ use super::standings::{Standing, standings};
 use crate::Result;
 use crate::experiments::animate::AnimationMethod;
 use crate::experiments::animate::points::Animated;
-use crate::measure::statistics::Spread;
-use crate::report::chart::{Caption, Chart};
-use crate::report::curves::{self, Axis, Curve};
+use crate::measure::Spread;
 use crate::report::numbers::{duration_tick, tick};
 use crate::report::stacked::{Part, Stack, stacked};
-use crate::report::theme::{PHASES, SERIES, Tone};
+use crate::report::theme::PHASES;
+use crate::report::{Axis, Caption, Chart, Curve, SERIES, Tone, curves};
 
 /// The colour of a way, on all of the page.
 pub fn tone(way: AnimationMethod) -> Tone {
@@ -26,8 +25,31 @@ fn part_tone(part: usize) -> Tone {
 pub(super) fn all(measured: &Measured) -> Result<Vec<Chart>> {
     let scene = measured.frames.first().map_or("", |frame| frame.scene.as_str());
     let standings = standings(&measured.frames);
-    let charts =
-        [parts_of_frames(scene, &standings)?, frames(scene, &measured.frames)?, builds(scene, &measured.frames)?];
+    let total = |point: &Animated| {
+        let sum = |of: fn(&Spread) -> f64| {
+            of(&point.build_ms) + point.trace.iter().map(|rays| of(&rays.trace_ms)).sum::<f64>()
+        };
+        Spread { median: sum(|s| s.median), min: sum(|s| s.min), max: sum(|s| s.max), runs: point.build_ms.runs }
+    };
+    let frames = Caption {
+        name: "animate-frames".into(),
+        title: format!("{scene}: building and tracing, frame by frame"),
+        alt: "The time of every frame in each way".into(),
+        reading: "Build and rays together; the vertical axis is logarithmic. The line through a point goes from the fastest to the \
+                  slowest run."
+            .into(),
+    };
+    let builds = Caption {
+        name: "animate-builds".into(),
+        title: format!("{scene}: building, frame by frame"),
+        alt: "What is built in every frame in each way: its time".into(),
+        reading: "What a way must do a frame before rays can be traced; the vertical axis is logarithmic.".into(),
+    };
+    let charts = [
+        parts_of_frames(scene, &standings)?,
+        over_frames(&measured.frames, frames, "time of a frame", total)?,
+        over_frames(&measured.frames, builds, "build time", |point| point.build_ms)?,
+    ];
     Ok(charts.into_iter().flatten().collect())
 }
 
@@ -54,43 +76,19 @@ fn parts_of_frames(scene: &str, standings: &[Standing]) -> Result<Option<Chart>>
 }
 
 /// A curve a way over the frames.
-fn over_frames(points: &[Animated], of: impl Fn(&Animated) -> Spread) -> Vec<Curve> {
+fn over_frames(
+    points: &[Animated],
+    caption: Caption,
+    time: &str,
+    of: impl Fn(&Animated) -> Spread,
+) -> Result<Option<Chart>> {
     let curve = |way: AnimationMethod| {
         let of_way = points.iter().filter(|point| point.way == way);
         let points = of_way.map(|point| (f64::from(point.frame), of(point))).collect();
         Curve { name: way.name().to_owned(), tone: tone(way), points, law: None }
     };
-    AnimationMethod::ALL.into_iter().map(curve).filter(|curve| !curve.points.is_empty()).collect()
-}
-
-fn frames(scene: &str, points: &[Animated]) -> Result<Option<Chart>> {
-    let total = |point: &Animated| {
-        let sum = |of: fn(&Spread) -> f64| {
-            of(&point.build_ms) + point.trace.iter().map(|rays| of(&rays.trace_ms)).sum::<f64>()
-        };
-        Spread { median: sum(|s| s.median), min: sum(|s| s.min), max: sum(|s| s.max), runs: point.build_ms.runs }
-    };
-    let caption = Caption {
-        name: "animate-frames".into(),
-        title: format!("{scene}: building and tracing, frame by frame"),
-        alt: "The time of every frame in each way".into(),
-        reading: "Build and rays together; the vertical axis is logarithmic. The line through a point goes from the fastest to the \
-                  slowest run."
-            .into(),
-    };
+    let ways = AnimationMethod::ALL.into_iter().map(curve);
+    let curves: Vec<Curve> = ways.filter(|curve| !curve.points.is_empty()).collect();
     let x = Axis { name: "frame", is_log: false, number: tick };
-    let y = Axis { name: "time of a frame", is_log: true, number: duration_tick };
-    curves::curves(caption, &over_frames(points, total), &x, &y)
-}
-
-fn builds(scene: &str, points: &[Animated]) -> Result<Option<Chart>> {
-    let caption = Caption {
-        name: "animate-builds".into(),
-        title: format!("{scene}: building, frame by frame"),
-        alt: "What is built in every frame in each way: its time".into(),
-        reading: "What a way must do a frame before rays can be traced; the vertical axis is logarithmic.".into(),
-    };
-    let x = Axis { name: "frame", is_log: false, number: tick };
-    let y = Axis { name: "build time", is_log: true, number: duration_tick };
-    curves::curves(caption, &over_frames(points, |point| point.build_ms), &x, &y)
+    curves::curves(caption, &curves, &x, &Axis { name: time, is_log: true, number: duration_tick })
 }

@@ -8,10 +8,8 @@ pub mod standings;
 
 use crate::Result;
 use crate::experiments::animate::points::{AnimateEntry, Animated, SceneSetting, WayInFrame};
-use crate::measure::setting::Failure;
-use crate::report::beside;
-use crate::report::document::{self, Document, Section};
-use crate::report::lines;
+use crate::measure::Failure;
+use crate::report::{Document, Section, beside, document, lines};
 use std::path::{Path, PathBuf};
 
 impl lines::Entry for AnimateEntry {
@@ -38,27 +36,20 @@ struct Measured {
     failures: Vec<Failure<WayInFrame>>,
 }
 
-impl From<Vec<AnimateEntry>> for Measured {
-    fn from(entries: Vec<AnimateEntry>) -> Measured {
-        let mut measured = Measured::default();
-        for entry in entries {
-            match entry {
-                AnimateEntry::Setting(setting) => measured.setting = Some(setting),
-                AnimateEntry::Animate(frame) => measured.frames.push(frame),
-                AnimateEntry::Failure(failure) => measured.failures.push(failure),
-            }
-        }
-        measured
-    }
-}
-
 /// Writes `animate.html` and its charts into `folder`, from the `animate.jsonl` there; gives the page's path. The page names the
 /// others that lie there.
 ///
 /// # Errors
 /// The records cannot be read; a file cannot be written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
-    let measured = Measured::from(read(folder)?);
+    let mut measured = Measured::default();
+    for entry in read(folder)? {
+        match entry {
+            AnimateEntry::Setting(setting) => measured.setting = Some(setting),
+            AnimateEntry::Animate(frame) => measured.frames.push(frame),
+            AnimateEntry::Failure(failure) => measured.failures.push(failure),
+        }
+    }
     let charts = charts::all(&measured)?;
     let setting = measured.setting.as_ref();
     let scene = setting.map_or("", |setting| setting.scene.as_str());

@@ -4,10 +4,8 @@ use super::standings::{Standing, fastest, standings};
 use crate::experiments::animate::AnimationMethod;
 use crate::experiments::animate::points::{Animated, SceneSetting};
 use crate::experiments::bench::kd_trees::published;
-use crate::report::chart::Chart;
-use crate::report::columns::Table;
-use crate::report::document;
 use crate::report::numbers::{count, duration, grouped, size, three_digits, whole};
+use crate::report::{Chart, Table, document};
 use maud::{Markup, html};
 
 pub(super) fn summary(setting: Option<&SceneSetting>, frames: &[Animated], charts: &[Chart]) -> Markup {
@@ -40,21 +38,17 @@ fn what_moves(setting: &SceneSetting) -> String {
 /// Who is fastest and by how much, in a sentence or two.
 fn reading(all: &[Standing]) -> String {
     let Some(best) = fastest(all) else { return "Nothing was measured to its end.".into() };
-    let times = |standing: &Standing| format!("{} × {}", three_digits(standing.frame_ms / best.frame_ms), standing.way);
+    let times = |standing: &Standing| format!("{} ({})", three_digits(standing.frame_ms / best.frame_ms), standing.way);
     let others: Vec<String> = all.iter().filter(|other| other.way != best.way).map(times).collect();
     let mut text = format!("A frame takes least by {}: {} in the mean", best.way, duration(best.frame_ms));
     if !others.is_empty() {
-        text += &format!("; the others take {} times as long", list(&others));
+        text += &format!("; the others take {} times as long", others.join(", "));
     }
     if all.iter().any(|standing| standing.timer != all[0].timer) {
         text +=
             ". Some of the builds were timed on the host and some on the device, so that a ratio of theirs says little";
     }
     text + "."
-}
-
-fn list(items: &[String]) -> String {
-    items.iter().map(|item| item.replacen(" × ", " (", 1) + ")").collect::<Vec<_>>().join(", ")
 }
 
 fn ways(all: &[Standing]) -> Markup {
@@ -105,12 +99,8 @@ pub(super) fn every_frame(frames: &[Animated]) -> Markup {
             .number("steps", "a ray", move |frame| of(frame)?.steps, three_digits)
             .number("tests", "a ray", move |frame| of(frame)?.tests, three_digits);
     }
-    let all = all.number("frame", "ms", |frame| Some(frame.frame_ms()), three_digits).number(
-        "SAH cost",
-        "",
-        |frame| frame.sah,
-        three_digits,
-    );
+    all = all.number("frame", "ms", |frame| Some(frame.frame_ms()), three_digits);
+    all = all.number("SAH cost", "", |frame| frame.sah, three_digits);
     html! {
         details {
             summary { "All figures" }

@@ -2,6 +2,7 @@
 
 use crate::experiments::animate::AnimationMethod;
 use crate::experiments::animate::points::Animated;
+use crate::report::different;
 use crate::report::numbers::{duration, size, three_digits};
 use crate::report::table::{or_dash, with_header};
 use comfy_table::Table;
@@ -36,20 +37,9 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// Each way in the order in which it first appears.
 pub fn standings(frames: &[Animated]) -> Vec<Standing> {
-    let mut ways: Vec<AnimationMethod> = Vec::new();
-    for frame in frames {
-        if !ways.contains(&frame.way) {
-            ways.push(frame.way);
-        }
-    }
     let standing = |way: AnimationMethod| {
         let of_way: Vec<&Animated> = frames.iter().filter(|frame| frame.way == way).collect();
-        let mut kinds: Vec<&str> = Vec::new();
-        for rays in of_way.iter().flat_map(|frame| &frame.trace) {
-            if !kinds.contains(&rays.rays.as_str()) {
-                kinds.push(&rays.rays);
-            }
-        }
+        let kinds = different(of_way.iter().flat_map(|frame| &frame.trace).map(|rays| rays.rays.as_str()));
         let count = of_way.len() as f64;
         let of_kind = |kind: &str| {
             let all = of_way.iter().flat_map(|frame| &frame.trace).filter(|rays| rays.rays == kind);
@@ -68,7 +58,7 @@ pub fn standings(frames: &[Animated]) -> Vec<Standing> {
             structure_bytes: mean(of_way.iter().filter_map(|f| f.memory.structure_bytes).map(|bytes| bytes as f64)),
         })
     };
-    ways.into_iter().filter_map(standing).collect()
+    different(frames.iter().map(|frame| frame.way)).into_iter().filter_map(standing).collect()
 }
 
 /// The way whose frames take least.

@@ -1,18 +1,13 @@
 //! `degenerate.html`: who survives what.
 
 use super::Paged;
-use super::losses::different;
 use super::stretched::other_experiment;
 use crate::Result;
 use crate::experiments::stability::points::{Degenerate, Experiment};
 use crate::report::beside::{DEGENERATE, Page};
-use crate::report::chart::Chart;
-use crate::report::columns::Table;
-use crate::report::document::Section;
 use crate::report::elements::{number, scroll};
-use crate::report::lines;
-use crate::report::names::short;
 use crate::report::numbers::{count, three_digits, tick};
+use crate::report::{Chart, Section, Table, different, lines, short};
 use crate::scene;
 use maud::{Markup, html};
 
@@ -27,7 +22,6 @@ impl lines::Entry for Degenerate {
 
 impl Paged for Degenerate {
     const PAGE: Page = DEGENERATE;
-    const RUN: &'static str = "degenerate.run.json";
     const TITLE: [&'static str; 2] = [
         "Degenerate scenes",
         "Equal, flat, thin, far, huge, nested and broken triangles, and none at all: does every builder give a valid tree, the same bytes \
@@ -44,7 +38,7 @@ impl Paged for Degenerate {
         let (right, all) = (ours.clone().filter(|point| !point.has_failed()).count(), ours.count());
         let peers: Vec<&Degenerate> =
             points.iter().filter(|point| !point.is_ours && !point.faults.is_empty()).collect();
-        let scenes = different(points, |point| point.scene.as_str());
+        let scenes = different(points.iter().map(|point| point.scene.as_str()));
         html! {
             p {
                 "Of ours, " b { (right) " of " (all) } " pairs of a builder and one of " (scenes.len()) " scenes are right: a tree that keeps every rule of "
@@ -89,7 +83,7 @@ fn what(scene: &str) -> Option<&'static str> {
 }
 
 fn matrix(points: &[Degenerate], scenes: &[&str]) -> Markup {
-    let builders = different(points, |point| point.builder.as_str());
+    let builders = different(points.iter().map(|point| point.builder.as_str()));
     html! {
         table #matrix {
             caption.hidden { "Who survives what" }

@@ -5,8 +5,8 @@ use super::stretched::{Losses, Row, StretchPage};
 use crate::experiments::stability::drop;
 use crate::experiments::stability::far::{FarTriangle, Side};
 use crate::experiments::stability::points::Growth;
+use crate::report::Mark;
 use crate::report::beside::{GROWTH, Page};
-use crate::report::curves::Mark;
 use crate::report::numbers::{three_digits, tick};
 use crate::report::theme::MUTED;
 use maud::{Markup, html};
@@ -29,7 +29,6 @@ fn has_expected(points: &[Growth]) -> bool {
 
 impl StretchPage for FarTriangle {
     const PAGE: Page = GROWTH;
-    const RUN: &'static str = "growth.run.json";
     const COMMAND: &'static str = "hedgerow stability growth";
     const TITLE: [&'static str; 2] = [
         "Growing bounds",
@@ -79,7 +78,7 @@ impl StretchPage for FarTriangle {
     fn own_columns<'p>(table: Losses<'p, Self>) -> Losses<'p, Self> {
         table
             .number("axes", "", |row| Some(row.own[0].by.axes.into()), tick)
-            .text("side", |row| row.own[0].by.side.sign())
+            .text("side", |row| row.own[0].by.side.name())
     }
 
     fn more_columns<'p>(mut table: Losses<'p, Self>, points: &[Growth]) -> Losses<'p, Self> {
@@ -93,23 +92,19 @@ impl StretchPage for FarTriangle {
         table.number("greatest cost", "×", greatest, three_digits)
     }
 
+    /// The measured drop of the codes without a grid, and where that of the others is expected.
     fn marks(points: &[&Growth], builders: &[&str]) -> Vec<Mark> {
-        marks(points, builders)
-    }
-}
-
-/// The measured drop of the codes without a grid, and where that of the others is expected.
-fn marks(points: &[&Growth], builders: &[&str]) -> Vec<Mark> {
-    let mut marks: Vec<Mark> = Vec::new();
-    for builder in builders {
-        let Some(x) = expected(points, builder) else { continue };
-        let base = drop::base(builder).unwrap_or_default();
-        if let Some(e) = Loss::of_cost(&of_builder(points, &base)).e()
-            && !marks.iter().any(|mark| mark.tone == MUTED)
-        {
-            marks.push(Mark { name: format!("{} loses 10%", drop::BASE), tone: MUTED, x: f64::from(e) });
+        let mut marks: Vec<Mark> = Vec::new();
+        for builder in builders {
+            let Some(x) = expected(points, builder) else { continue };
+            let base = drop::base(builder).unwrap_or_default();
+            if let Some(e) = Loss::of_cost(&of_builder(points, &base)).e()
+                && !marks.iter().any(|mark| mark.tone == MUTED)
+            {
+                marks.push(Mark { name: format!("{} loses 10%", drop::BASE), tone: MUTED, x: f64::from(e) });
+            }
+            marks.push(Mark { name: format!("{} expected", short_codes(builder)), tone: tone(builders, builder), x });
         }
-        marks.push(Mark { name: format!("{} expected", short_codes(builder)), tone: tone(builders, builder), x });
+        marks
     }
-    marks
 }

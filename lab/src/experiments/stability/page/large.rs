@@ -17,7 +17,6 @@ fn with_full_bounds<'p>(points: &[&'p Large], point: &Large) -> Option<&'p Large
 
 impl StretchPage for HugeTriangles {
     const PAGE: Page = LARGE;
-    const RUN: &'static str = "large.run.json";
     const COMMAND: &'static str = "hedgerow stability large";
     const TITLE: [&'static str; 2] = [
         "Large triangles at the edge",
@@ -63,12 +62,8 @@ impl StretchPage for HugeTriangles {
     }
 
     fn own_columns<'p>(table: Losses<'p, Self>) -> Losses<'p, Self> {
-        table.text("triangles", |row| row.own[0].by.placement).number(
-            "a side",
-            "",
-            |row| Some(row.own[0].by.count.into()),
-            tick,
-        )
+        let table = table.text("triangles", |row| row.own[0].by.placement);
+        table.number("a side", "", |row| Some(row.own[0].by.count.into()), tick)
     }
 
     fn more_columns<'p>(table: Losses<'p, Self>, _: &[Large]) -> Losses<'p, Self> {
@@ -76,12 +71,8 @@ impl StretchPage for HugeTriangles {
             let (last, full) = (row.last(), with_full_bounds(&row.all, row.last())?);
             Some(last.cost?? / full.cost??)
         };
-        table.number("cost at the end", "×", |row| row.last().relative_cost, three_digits).number(
-            "over full bounds'",
-            "×",
-            saved,
-            three_digits,
-        )
+        let table = table.number("cost at the end", "×", |row| row.last().relative_cost, three_digits);
+        table.number("over full bounds'", "×", saved, three_digits)
     }
 }
 

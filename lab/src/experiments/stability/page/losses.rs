@@ -3,15 +3,14 @@
 use crate::Result;
 use crate::experiments::stability::drop;
 use crate::experiments::stability::points::Stretched;
-use crate::measure::statistics::Spread;
-use crate::measure::statistics::geometric_mean;
+use crate::measure::{Spread, geometric_mean};
 use crate::rays::kinds::RayKind;
-use crate::report::chart::{Caption, Chart};
-use crate::report::curves::{self, Axis, Curve, Mark};
-use crate::report::names::short;
 use crate::report::numbers::{three_digits, tick};
-use crate::report::theme::{SERIES, Tone};
+use crate::report::{Axis, Caption, Chart, Curve, Mark, SERIES, Tone, curves, short};
 use maud::{Markup, html};
+
+/// The horizontal axis of all charts.
+const EXPONENT: Axis<'_> = Axis { name: "e: 2^e times as long", is_log: false, number: tick };
 
 /// Where a tenth is lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,18 +67,6 @@ impl Loss {
     }
 }
 
-/// Different values in the order in which they come.
-pub(super) fn different<'p, P, T: PartialEq>(points: &'p [P], of: impl Fn(&'p P) -> T) -> Vec<T> {
-    let mut values = Vec::new();
-    for point in points {
-        let value = of(point);
-        if !values.contains(&value) {
-            values.push(value);
-        }
-    }
-    values
-}
-
 /// The kinds of rays that any point has.
 pub(super) fn kinds<S>(points: &[Stretched<S>]) -> Vec<&'static str> {
     let is_there = |kind: &&str| points.iter().any(|point| point.relative_mrays.contains_key(*kind));
@@ -125,17 +112,17 @@ pub(super) fn cost_chart<S>(
 ) -> Result<Option<Chart>> {
     let all = curves_of(points, builders, |point| point.relative_cost);
     let expected = if marks.is_empty() { "" } else { " Dashed: where the thesis expects the tenth to be lost." };
+    let ends = ends(&all, "Relative costs");
     let caption = Caption {
-        name: format!("{}-cost", name),
-        title: format!("{}: cost of the scene", title),
-        alt: ends(&all, "Relative costs"),
+        name: format!("{name}-cost"),
+        title: format!("{title}: cost of the scene"),
         reading: format!(
-            "SAH cost of what stays, over that at e = 0; logarithmic, 1 is as good as there.{expected} {}",
-            ends(&all, "Relative costs")
+            "SAH cost of what stays, over that at e = 0; logarithmic, 1 is as good as there.{expected} {ends}"
         ),
+        alt: ends,
     };
-    let x = Axis { name: "e: 2^e times as long", is_log: false, number: tick };
-    curves::curves_and_marks(caption, &all, marks, &x, &Axis { name: "relative cost", is_log: true, number: tick })
+    let y = Axis { name: "relative cost", is_log: true, number: tick };
+    curves::curves_and_marks(caption, &all, marks, &EXPONENT, &y)
 }
 
 /// Relative speeds over e: of one kind of ray, or the geometric mean over all.
@@ -145,24 +132,22 @@ pub(super) fn speed_chart<S>(
     kind: Option<&str>,
     [name, title]: [&String; 2],
 ) -> Result<Option<Chart>> {
-    let of = |point: &Stretched<S>| match kind {
+    let all = curves_of(points, builders, |point| match kind {
         Some(kind) => point.relative_mrays.get(kind).copied(),
         None => geometric_mean(point.relative_mrays.values().copied()),
-    };
-    let all = curves_of(points, builders, of);
+    });
     let rays = kind.map_or("all kinds of rays".to_owned(), |kind| format!("{kind} rays"));
     let mean = if kind.is_some() { "" } else { " Geometric means over the kinds of rays." };
+    let ends = ends(&all, "Relative speeds");
     let caption = Caption {
-        name: format!("{}-speed-{}", name, kind.unwrap_or("all")),
-        title: format!("{}: speed of {rays}", title),
-        alt: ends(&all, "Relative speeds"),
+        name: format!("{name}-speed-{}", kind.unwrap_or("all")),
+        title: format!("{title}: speed of {rays}"),
         reading: format!(
-            "Speed over that at e = 0, in the median of runs in turn; at e = 0 two structures of the same scene, which is the noise.{mean} {}",
-            ends(&all, "Relative speeds")
+            "Speed over that at e = 0, in the median of runs in turn; at e = 0 two structures of the same scene, which is the noise.{mean} {ends}"
         ),
+        alt: ends,
     };
-    let x = Axis { name: "e: 2^e times as long", is_log: false, number: tick };
-    curves::curves(caption, &all, &x, &Axis { name: "relative speed", is_log: false, number: tick })
+    curves::curves(caption, &all, &EXPONENT, &Axis { name: "relative speed", is_log: false, number: tick })
 }
 
 #[cfg(test)]

@@ -14,9 +14,8 @@ use super::points::{Degenerate, Growth, Large, Run};
 use crate::Result;
 use crate::experiments::write_pages;
 use crate::report::beside::Page;
-use crate::report::chart::Chart;
-use crate::report::document::{self, Document, Section};
-use crate::report::lines::{self, Entry};
+use crate::report::lines::Entry;
+use crate::report::{Chart, Document, Section, document, lines};
 use maud::{Markup, html};
 use std::path::{Path, PathBuf};
 
@@ -24,12 +23,12 @@ use std::path::{Path, PathBuf};
 pub trait Paged: Entry {
     /// The page, and the file of the points.
     const PAGE: Page;
-    /// The file that says where and how they were measured.
-    const RUN: &'static str;
     /// Its title, and what it is about.
     const TITLE: [&'static str; 2];
     /// What went wrong, beside what the run says: of what, and what.
-    fn failures(points: &[Self]) -> Vec<(String, String)>;
+    fn failures(_points: &[Self]) -> Vec<(String, String)> {
+        Vec::new()
+    }
     /// What is to be seen first.
     fn summary(points: &[Self]) -> Markup;
     /// The other parts of the page, and their charts.
@@ -47,9 +46,14 @@ pub trait Paged: Entry {
 /// # Errors
 /// A file cannot be written.
 pub fn finish<P: Paged>(folder: &Path, run: &Run) -> Result<PathBuf> {
-    lines::write_one(&folder.join(P::RUN), run)?;
+    lines::write_one(&run_file::<P>(folder), run)?;
     write_pages(folder)?;
     Ok(folder.join(P::PAGE.file))
+}
+
+/// The file that says where and how the points in a folder were measured.
+fn run_file<P: Paged>(folder: &Path) -> PathBuf {
+    folder.join(format!("{}.run.json", P::PAGE.stem()))
 }
 
 /// Where and how the points in a folder were measured; `None` where that was not written: the run was ended before its end.
@@ -57,7 +61,7 @@ pub fn finish<P: Paged>(folder: &Path, run: &Run) -> Result<PathBuf> {
 /// # Errors
 /// The file cannot be read, or is of another schema.
 pub fn read_run<P: Paged>(folder: &Path) -> Result<Option<Run>> {
-    lines::read_one(&folder.join(P::RUN))
+    lines::read_one(&run_file::<P>(folder))
 }
 
 /// Writes the page of every experiment whose points lie in `folder`.

@@ -1,25 +1,18 @@
 //! What the pages of far and of huge triangles have in common: charts over e, scene by scene, and where each builder loses a tenth.
 
 use super::Paged;
-use super::losses::{Loss, cost_chart, different, kinds, short_codes, speed_chart};
+use super::losses::{Loss, cost_chart, kinds, short_codes, speed_chart};
 use crate::Result;
 use crate::experiments::stability::points::{Experiment, Stretched};
 use crate::experiments::stability::relative::Stretch;
 use crate::report::beside::Page;
-use crate::report::chart::Chart;
-use crate::report::columns::Table;
-use crate::report::curves::Mark;
-use crate::report::document::{self, Section};
-use crate::report::lines;
-use crate::report::names::slug;
+use crate::report::{Chart, Mark, Section, Table, different, document, lines, slug};
 use maud::{Markup, html};
 
 /// What stretches a scene, and what its page says of it.
 pub trait StretchPage: Stretch {
     /// See [`Paged::PAGE`].
     const PAGE: Page;
-    /// See [`Paged::RUN`].
-    const RUN: &'static str;
     /// The command that writes the points.
     const COMMAND: &'static str;
     /// See [`Paged::TITLE`].
@@ -76,12 +69,7 @@ pub(super) fn other_experiment(found: Experiment, own: Experiment) -> Option<Str
 
 impl<S: StretchPage> Paged for Stretched<S> {
     const PAGE: Page = S::PAGE;
-    const RUN: &'static str = S::RUN;
     const TITLE: [&'static str; 2] = S::TITLE;
-
-    fn failures(_: &[Self]) -> Vec<(String, String)> {
-        Vec::new()
-    }
 
     fn summary(points: &[Self]) -> Markup {
         html! {
@@ -94,12 +82,12 @@ impl<S: StretchPage> Paged for Stretched<S> {
     }
 
     fn sections(points: &[Self]) -> Result<(Vec<Section>, Vec<Chart>)> {
-        let builders = different(points, |point| point.builder.as_str());
+        let builders = different(points.iter().map(|point| point.builder.as_str()));
         let (mut sections, mut all) = (Vec::new(), Vec::new());
-        for scene in different(points, |point| point.scene.as_str()) {
+        for scene in different(points.iter().map(|point| point.scene.as_str())) {
             let (mut charts, mut more) = (Vec::new(), Vec::new());
             let of_scene: Vec<&Self> = points.iter().filter(|point| point.scene == scene).collect();
-            for by in different(&of_scene, |point| point.by) {
+            for by in different(of_scene.iter().map(|point| point.by)) {
                 let own: Vec<&Self> = of_scene.iter().copied().filter(|point| point.by == by).collect();
                 let name = format!("{}-{}", slug(scene), by.slug());
                 let titled = [&format!("{}-{name}", S::PAGE.stem()), &format!("{scene}, {by}")];
@@ -126,21 +114,19 @@ impl<S: StretchPage> Paged for Stretched<S> {
 
 fn losses<S: StretchPage>(points: &[Stretched<S>]) -> Markup {
     let mut rows: Vec<Row<'_, S>> = Vec::new();
-    for scene in different(points, |point| point.scene.as_str()) {
-        for by in different(points, |point| point.by) {
+    for scene in different(points.iter().map(|point| point.scene.as_str())) {
+        for by in different(points.iter().map(|point| point.by)) {
             let all: Vec<_> = points.iter().filter(|point| point.scene == scene && point.by == by).collect();
-            for builder in different(&all, |point| point.builder.as_str()) {
+            for builder in different(all.iter().map(|point| point.builder.as_str())) {
                 let own = all.iter().copied().filter(|point| point.builder == builder).collect();
                 rows.push(Row { builder, own, all: all.clone() });
             }
         }
     }
-    let table = Table::new("Where each loses a tenth", rows).id("losses").name("scene", |row| &row.own[0].scene).cell(
-        "builder",
-        |row| {
-            html! { td.builder data-value=(row.builder) title=(row.builder) { (short_codes(row.builder)) } }
-        },
-    );
+    let table = Table::new("Where each loses a tenth", rows).id("losses").name("scene", |row| &row.own[0].scene);
+    let table = table.cell("builder", |row| {
+        html! { td.builder data-value=(row.builder) title=(row.builder) { (short_codes(row.builder)) } }
+    });
     let table = S::own_columns(table).figure("cost", "e", |row| Loss::of_cost(&row.own).cell());
     let table = kinds(points).into_iter().fold(S::more_columns(table, points), |table, kind| {
         table.figure(kind, "e", move |row| Loss::of_speed(&row.own, kind).cell())
