@@ -165,7 +165,7 @@ impl Subject for OnHost<'_> {
             match (built, &mut self.trees) {
                 (Ok(()), _) => break milliseconds,
                 // The only argument that can be wrong here is the room.
-                (Err(Error::Argument(_)), Trees::Merged(merged)) if attempts < ATTEMPTS => {
+                (Err(error), Trees::Merged(merged)) if error.is_argument() && attempts < ATTEMPTS => {
                     enlarge(merged, self.options.costs)?;
                 }
                 (Err(error), _) => return Err(error),
