@@ -2,7 +2,7 @@
 //!
 //! NVIDIA's data-centre GPUs and older cards have acceleration structures and pipelines, but no queries.
 
-use super::Device;
+use super::{Device, properties};
 use ash::vk;
 use hedgerow::gpu::requirements::Offered;
 use std::ffi::CStr;
@@ -26,10 +26,9 @@ impl DriverTracing {
         if !STRUCTURES.iter().all(|name| offered.has(name)) {
             return Vec::new();
         }
-        let ways = [DriverTracing::Query, DriverTracing::Pipeline];
         let is_there =
             |way: &DriverTracing| offered.has(way.extension()) && way.has_features(instance, physical_device);
-        ways.into_iter().filter(is_there).collect()
+        [DriverTracing::Query, DriverTracing::Pipeline].into_iter().filter(is_there).collect()
     }
 
     /// The way to take of those that a device has, where this one is asked for. A query may be replaced by a pipeline, which is all
@@ -122,10 +121,8 @@ pub fn driver_is_missing(device: &Device) -> hedgerow::Error {
 impl Device {
     /// Primitives of a structure of the driver's, at most.
     pub fn most_primitives_of_driver(&self) -> u64 {
-        let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
-        // SAFETY: the handles are live; the structures outlive the call.
-        unsafe { self.ash_instance().get_physical_device_properties2(self.physical_device(), &mut properties) };
+        let limits: vk::PhysicalDeviceAccelerationStructurePropertiesKHR<'_> =
+            properties(self.ash_instance(), self.physical_device());
         limits.max_primitive_count.min(u64::from(u32::MAX))
     }
 }

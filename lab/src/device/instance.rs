@@ -1,6 +1,7 @@
 //! The machine's Vulkan devices: the loader, an instance with the messages of its validation layers, and which device to take.
 
-use super::DriverTracing;
+use super::memory::largest_local_heap;
+use super::{DriverTracing, locked, properties};
 use crate::{Error, Result};
 use ash::vk;
 use hedgerow::gpu::{Optional, Workarounds, requirements};
@@ -127,10 +128,7 @@ impl VulkanInstance {
         }
         let offers = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         let has_debug_utils = validation || offers(ash::ext::debug_utils::NAME);
-        let mut names = Vec::new();
-        if has_debug_utils {
-            names.push(ash::ext::debug_utils::NAME.as_ptr());
-        }
+        let mut names: Vec<_> = has_debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect();
         let mut flags = vk::InstanceCreateFlags::empty();
         if offers(ash::khr::portability_enumeration::NAME) {
             names.push(ash::khr::portability_enumeration::NAME.as_ptr());
@@ -200,19 +198,19 @@ impl VulkanInstance {
 
     /// What the validation layers have said since the last call.
     pub fn take_messages(&self) -> Vec<String> {
-        std::mem::take(&mut *self.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
+        std::mem::take(&mut *locked(&self.messages))
     }
 
     fn describe(&self, index: usize, physical: vk::PhysicalDevice) -> Found {
-        let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroup);
-        // SAFETY: the handles are live and the structures outlive the calls.
-        let memory = unsafe {
-            self.raw.get_physical_device_properties2(physical, &mut properties);
-            self.raw.get_physical_device_memory_properties(physical)
+        let driver: vk::PhysicalDeviceDriverProperties<'_> = properties(&self.raw, physical);
+        let subgroup: vk::PhysicalDeviceSubgroupProperties<'_> = properties(&self.raw, physical);
+        // SAFETY: the handles are live.
+        let (properties, memory) = unsafe {
+            (
+                self.raw.get_physical_device_properties(physical),
+                self.raw.get_physical_device_memory_properties(physical),
+            )
         };
-        let properties = properties.properties;
         let text = |c: Result<&CStr, _>| c.unwrap_or(c"?").to_string_lossy().into_owned();
         let (optional, missing) = match requirements(&self.raw, physical) {
             Ok(needs) => (needs.available, Vec::new()),
@@ -226,12 +224,7 @@ impl VulkanInstance {
             kind: properties.device_type,
             api_version: properties.api_version,
             subgroup_size: subgroup.subgroup_size,
-            memory: memory.memory_heaps[..memory.memory_heap_count as usize]
-                .iter()
-                .filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
-                .map(|h| h.size)
-                .max()
-                .unwrap_or(0),
+            memory: largest_local_heap(&memory).unwrap_or(0),
             workarounds: Workarounds::of_driver(driver.driver_id, properties.driver_version),
             driver_tracing: DriverTracing::of(&self.raw, physical),
             optional,
@@ -264,7 +257,7 @@ unsafe extern "system" fn on_message(
     unsafe {
         let messages = &*user.cast::<Mutex<Vec<String>>>();
         let text = (*data).message_as_c_str().map(|m| m.to_string_lossy().into_owned()).unwrap_or_default();
-        messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push(text);
+        locked(messages).push(text);
     }
     vk::FALSE
 }

@@ -1,5 +1,6 @@
 //! Plain meshes: spheres, squares, an arena, and triangles anywhere.
 
+use super::tube;
 use super::vector::{add, cross, dot, unit};
 use crate::random::SplitMix64;
 use crate::scene::Mesh;
@@ -23,9 +24,8 @@ pub fn icosphere(levels: u32) -> Mesh {
     // Three golden rectangles, one in each plane: (0, ±1, ±golden) and its rotations.
     for axis in 0..3 {
         for (a, b) in [(-1.0, -golden), (-1.0, golden), (1.0, -golden), (1.0, golden)] {
-            let mut corner = [0.0; 3];
-            corner[(axis + 1) % 3] = a;
-            corner[(axis + 2) % 3] = b;
+            let mut corner = [0.0, a, b];
+            corner.rotate_right(axis);
             positions.push(unit(corner));
         }
     }
@@ -69,10 +69,10 @@ fn icosahedron_faces(corners: &[[f32; 3]]) -> Vec<[u32; 3]> {
 /// Small triangles anywhere: centres uniform in the unit cube, each corner within ±0.02 of its centre.
 pub fn soup(count: u32, seed: u64) -> Mesh {
     let mut random = SplitMix64::new(seed);
-    separate(count, || {
+    Mesh::of_corners((0..count).map(|_| {
         let centre = random.point(0.0, 1.0);
         std::array::from_fn(|_| add(centre, random.point(-0.02, 0.02)))
-    })
+    }))
 }
 
 /// A flat square of `side` × `side` unit cells in the plane y = 0, two triangles each, row by row.
@@ -104,20 +104,14 @@ pub fn stadium(levels: u32) -> Mesh {
             [radius * angle.cos(), height, radius * angle.sin()]
         }));
     }
-    for ring in 0..RINGS.len() as u32 - 1 {
-        for sector in 0..SECTORS {
-            let at = |ring, sector| first + ring * SECTORS + sector % SECTORS;
-            let quad = [at(ring, sector), at(ring, sector + 1), at(ring + 1, sector + 1), at(ring + 1, sector)];
-            mesh.triangles.extend([[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]);
-        }
-    }
+    tube::join_rings(&mut mesh, first, SECTORS, RINGS.len() as u32);
     mesh
 }
 
 /// Long thin triangles anywhere: middles uniform in the unit cube, directions uniform, 0.2 to 1 long, a thousandth wide.
 pub fn needles(count: u32, seed: u64) -> Mesh {
     let mut random = SplitMix64::new(seed);
-    separate(count, || {
+    Mesh::of_corners((0..count).map(|_| {
         let middle = random.point(0.0, 1.0);
         let length = random.within(0.2, 1.0);
         let along = direction(&mut random);
@@ -125,15 +119,7 @@ pub fn needles(count: u32, seed: u64) -> Mesh {
         let end = |s: f32| std::array::from_fn(|i| middle[i] + s * 0.5 * length * along[i]);
         let tail: [f32; 3] = end(-1.0);
         [tail, add(tail, aside.map(|c| c * 0.001 * length)), end(1.0)]
-    })
-}
-
-/// `count` triangles that share no vertex.
-fn separate(count: u32, mut triangle: impl FnMut() -> [[f32; 3]; 3]) -> Mesh {
-    Mesh {
-        positions: (0..count).flat_map(|_| triangle()).collect(),
-        triangles: (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
-    }
+    }))
 }
 
 /// Uniform on the unit sphere: drawn from the ball by rejection, so that no sine or cosine of the platform is asked.

@@ -33,11 +33,15 @@ pub fn append(mesh: &mut Mesh, sides: u32, path: &[Knot]) {
         mesh.positions
             .extend(spokes.iter().map(|[c, s]| along(along(knot.at, knot.radius * c, aside), knot.radius * s, other)));
     }
-    for ring in 0..path.len() as u32 - 1 {
+    join_rings(mesh, first, sides, path.len() as u32);
+}
+
+/// Adds the quads between rings that lie one after the other from vertex `first` on, each of `sides` vertices.
+pub fn join_rings(mesh: &mut Mesh, first: u32, sides: u32, rings: u32) {
+    for ring in 0..rings - 1 {
         for side in 0..sides {
             let at = |ring, side| first + ring * sides + side % sides;
-            let quad = [at(ring, side), at(ring, side + 1), at(ring + 1, side + 1), at(ring + 1, side)];
-            mesh.triangles.extend([[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]);
+            mesh.add_quad([at(ring, side), at(ring, side + 1), at(ring + 1, side + 1), at(ring + 1, side)]);
         }
     }
 }
