@@ -3,7 +3,7 @@
 use super::memory::largest_local_heap;
 use super::{DriverTracing, locked, properties};
 use crate::{Error, Result};
-use ash::vk;
+use ash::vk::{self, DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as MessageType};
 use hedgerow::gpu::{Optional, Workarounds, requirements};
 use std::ffi::{CStr, c_void};
 use std::mem::ManuallyDrop;
@@ -114,12 +114,9 @@ impl VulkanInstance {
         // SAFETY: loading the system's Vulkan loader runs its initialisers, as every Vulkan program does.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| Error::NoVulkan(e.to_string()))?;
         // SAFETY: the loader is loaded.
-        let (layers, extensions) = unsafe {
-            (
-                entry.enumerate_instance_layer_properties().unwrap_or_default(),
-                entry.enumerate_instance_extension_properties(None).unwrap_or_default(),
-            )
-        };
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
+        // SAFETY: as above.
+        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
         let layer = layers.iter().find(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
         if validation && layer.is_none() {
             return Err(Error::Argument(
@@ -157,12 +154,8 @@ impl VulkanInstance {
         if validation {
             let utils = ash::ext::debug_utils::Instance::new(&entry, &raw);
             let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
-                .message_severity(
-                    vk::DebugUtilsMessageSeverityFlagsEXT::ERROR | vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
-                )
-                .message_type(
-                    vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
-                )
+                .message_severity(Severity::ERROR | Severity::WARNING)
+                .message_type(MessageType::VALIDATION | MessageType::PERFORMANCE)
                 .pfn_user_callback(Some(on_message))
                 .user_data(Arc::as_ptr(&messages).cast_mut().cast());
             // SAFETY: the messages outlive the messenger: both are dropped with `self`, the messenger first.
@@ -189,11 +182,8 @@ impl VulkanInstance {
             vk::Result::ERROR_INITIALIZATION_FAILED => no_device("no driver could be loaded"),
             other => Error::vulkan("vkEnumeratePhysicalDevices")(other),
         })?;
-        Ok(physical
-            .into_iter()
-            .enumerate()
-            .map(|(index, physical)| (physical, self.describe(index, physical)))
-            .collect())
+        let described = |(index, physical)| (physical, self.describe(index, physical));
+        Ok(physical.into_iter().enumerate().map(described).collect())
     }
 
     /// What the validation layers have said since the last call.
@@ -205,12 +195,9 @@ impl VulkanInstance {
         let driver: vk::PhysicalDeviceDriverProperties<'_> = properties(&self.raw, physical);
         let subgroup: vk::PhysicalDeviceSubgroupProperties<'_> = properties(&self.raw, physical);
         // SAFETY: the handles are live.
-        let (properties, memory) = unsafe {
-            (
-                self.raw.get_physical_device_properties(physical),
-                self.raw.get_physical_device_memory_properties(physical),
-            )
-        };
+        let properties = unsafe { self.raw.get_physical_device_properties(physical) };
+        // SAFETY: as above.
+        let memory = unsafe { self.raw.get_physical_device_memory_properties(physical) };
         let text = |c: Result<&CStr, _>| c.unwrap_or(c"?").to_string_lossy().into_owned();
         let (optional, missing) = match requirements(&self.raw, physical) {
             Ok(needs) => (needs.available, Vec::new()),
@@ -248,8 +235,8 @@ impl Drop for VulkanInstance {
 }
 
 unsafe extern "system" fn on_message(
-    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
-    _types: vk::DebugUtilsMessageTypeFlagsEXT,
+    _severity: Severity,
+    _types: MessageType,
     data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     user: *mut c_void,
 ) -> vk::Bool32 {

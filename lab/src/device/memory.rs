@@ -84,12 +84,9 @@ impl Device {
                 linear: true,
                 allocation_scheme: AllocationScheme::GpuAllocatorManaged,
             });
-            let allocation = match allocation {
-                Ok(allocation) => allocation,
-                Err(_) => {
-                    self.raw.destroy_buffer(raw, None);
-                    return Err(too_little());
-                }
+            let Ok(allocation) = allocation else {
+                self.raw.destroy_buffer(raw, None);
+                return Err(too_little());
             };
             if let Err(result) = self.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) {
                 self.release(Memory { raw, allocation });

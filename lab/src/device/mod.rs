@@ -286,15 +286,10 @@ impl Device {
             let visible = vk::AccessFlags::HOST_READ | vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE;
             let barrier =
                 vk::MemoryBarrier::default().src_access_mask(vk::AccessFlags::MEMORY_WRITE).dst_access_mask(visible);
-            self.raw.cmd_pipeline_barrier(
-                commands,
-                vk::PipelineStageFlags::ALL_COMMANDS,
-                vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::ALL_COMMANDS,
-                vk::DependencyFlags::empty(),
-                &[barrier],
-                &[],
-                &[],
-            );
+            let before = vk::PipelineStageFlags::ALL_COMMANDS;
+            let after = vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::ALL_COMMANDS;
+            let no_flags = vk::DependencyFlags::empty();
+            self.raw.cmd_pipeline_barrier(commands, before, after, no_flags, &[barrier], &[], &[]);
             self.raw.end_command_buffer(commands).map_err(Error::vulkan("vkEndCommandBuffer"))?;
             Ok(commands)
         }
@@ -309,15 +304,14 @@ impl Device {
             let buffers = [commands];
             let info = vk::SubmitInfo::default().command_buffers(&buffers);
             let begin = Instant::now();
-            let done =
-                self.raw.queue_submit(*queue, &[info], fence).map_err(Error::vulkan("vkQueueSubmit")).and_then(|()| {
-                    match self.raw.wait_for_fences(&[fence], true, SUBMIT_BOUND.as_nanos() as u64) {
-                        Err(vk::Result::TIMEOUT) => {
-                            Err(Error::Timeout { what: "a submit".into(), seconds: SUBMIT_BOUND.as_secs() })
-                        }
-                        other => other.map_err(Error::vulkan("vkWaitForFences")),
-                    }
-                });
+            let submitted = self.raw.queue_submit(*queue, &[info], fence).map_err(Error::vulkan("vkQueueSubmit"));
+            let wait = || self.raw.wait_for_fences(&[fence], true, SUBMIT_BOUND.as_nanos() as u64);
+            let done = submitted.and_then(|()| match wait() {
+                Err(vk::Result::TIMEOUT) => {
+                    Err(Error::Timeout { what: "a submit".into(), seconds: SUBMIT_BOUND.as_secs() })
+                }
+                other => other.map_err(Error::vulkan("vkWaitForFences")),
+            });
             if !matches!(done, Err(Error::Timeout { .. })) {
                 self.raw.destroy_fence(fence, None);
             }

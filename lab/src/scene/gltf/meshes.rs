@@ -2,8 +2,8 @@
 
 use super::{CUT_OFF, File, has_type};
 use crate::Result;
-use crate::scene::Mesh;
 use crate::scene::check::{self, malformed};
+use crate::scene::{Mesh, fan};
 use gltf::accessor::{DataType, Dimensions, Iter};
 use gltf::mesh::Mode;
 use gltf::{Primitive, Semantic};
@@ -25,13 +25,9 @@ pub(super) fn parts(file: File<'_>, mesh: &gltf::Mesh<'_>) -> Result<Vec<Part>> 
 fn part(file: File<'_>, mesh: &gltf::Mesh<'_>, primitive: &Primitive<'_>) -> Result<Option<Part>> {
     let place = format!("{}: mesh {}, primitive {}", file.path.display(), mesh.index(), primitive.index());
     let wrong = |what: &str| malformed(&place, what);
-    let fans: fn(usize, &[u32]) -> [u32; 3] = match primitive.mode() {
-        Mode::Triangles => |t, v| [v[3 * t], v[3 * t + 1], v[3 * t + 2]],
-        // Every second triangle of a strip is turned round.
-        Mode::TriangleStrip => |t, v| [v[t], v[t + 1 + t % 2], v[t + 2 - t % 2]],
-        Mode::TriangleFan => |t, v| [v[0], v[t + 1], v[t + 2]],
-        _ => return Ok(None),
-    };
+    if !matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+        return Ok(None);
+    }
     let Some(accessor) = primitive.get(&Semantic::Positions).filter(|a| a.count() > 0) else { return Ok(None) };
     if !has_type(&accessor, Dimensions::Vec3, &[DataType::F32]) {
         return Err(wrong("positions are not three 32-bit floats; export it without quantisation"));
@@ -49,14 +45,16 @@ fn part(file: File<'_>, mesh: &gltf::Mesh<'_>, primitive: &Primitive<'_>) -> Res
             reader.read_indices().ok_or_else(|| wrong(CUT_OFF))?.into_u32().collect()
         }
     };
-    let count = match primitive.mode() {
-        Mode::Triangles if !indices.len().is_multiple_of(3) => {
-            return Err(wrong(&format!("{} indices make no whole triangles; is it cut off?", indices.len())));
+    let triangles: Vec<[u32; 3]> = match (primitive.mode(), indices.as_chunks()) {
+        (Mode::TriangleFan, _) => fan(&indices).into_iter().flatten().collect(),
+        (Mode::TriangleStrip, _) => {
+            // Every second triangle of a strip is turned round.
+            let turned = |(t, v): (usize, &[u32])| [v[0], v[1 + t % 2], v[2 - t % 2]];
+            indices.windows(3).enumerate().map(turned).collect()
         }
-        Mode::Triangles => indices.len() / 3,
-        _ => indices.len().saturating_sub(2),
+        (_, (whole, [])) => whole.to_vec(),
+        _ => return Err(wrong(&format!("{} indices make no whole triangles; is it cut off?", indices.len()))),
     };
-    let triangles: Vec<[u32; 3]> = (0..count).map(|t| fans(t, &indices)).collect();
     check::indices_are_in_range(&place, &triangles, positions.len())?;
     let mut targets = Vec::new();
     for (target, accessor) in primitive.morph_targets().map(|target| target.positions()).enumerate() {
