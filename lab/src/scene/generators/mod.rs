@@ -11,10 +11,10 @@ mod series;
 mod tube;
 mod turns;
 mod twist;
-mod vector;
 
 use super::{Animation, Instances, Mesh, SceneInstance, cameras};
 use crate::{Error, Result};
+use glam::Vec3;
 pub(super) use meshes::needles;
 pub(super) use series::turn;
 
@@ -73,6 +73,11 @@ const GENERATORS: [Generator; 11] = [
 /// The least side of a square (2 dimensions) or cube (3) of at least `count` cells.
 fn side_of(count: u32, dimensions: u32) -> u32 {
     (0..).find(|side: &u32| side.pow(dimensions) >= count).unwrap_or_default()
+}
+
+/// The same direction, of length 1. By a division, unlike glam's: the bytes of scenes depend on it.
+fn unit(v: Vec3) -> Vec3 {
+    v / v.length()
 }
 
 /// The generators that [`load`](super::load) knows: the name with its arguments, and what it makes.

@@ -6,10 +6,10 @@ use super::meshes::{self, Part};
 use crate::Result;
 use crate::scene::check::{self, malformed};
 use crate::scene::dynamic::{
-    self, CameraPath, DynamicContent, DynamicObject, Motion, Shape, Step, carried, eye_and_backwards, morphed, product,
+    self, CameraPath, DynamicContent, DynamicObject, Motion, Shape, Step, carried, eye_and_backwards, morphed, rows,
 };
 use crate::scene::{Light, Mesh};
-use glam::{Mat4, Vec3};
+use glam::{DAffine3, Mat4, Vec3};
 use gltf::Node;
 use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
 use gltf::json::validation::Checked;
@@ -59,13 +59,13 @@ impl NodeTransform {
         let local = Mat4::from_cols_array_2d(&node.transform().matrix());
         let (mut steps, step) = match (self, channels.pose(node)) {
             (NodeTransform::Still(outer), None) => return NodeTransform::Still(outer * local),
-            (NodeTransform::Still(outer), Some(pose)) => (vec![fixed(outer)], Step::Moving(pose)),
-            (NodeTransform::Moving(steps), None) => (steps.clone(), fixed(&local)),
+            (NodeTransform::Still(outer), Some(pose)) => (vec![Step::Fixed(affine(outer))], Step::Moving(pose)),
+            (NodeTransform::Moving(steps), None) => (steps.clone(), Step::Fixed(affine(&local))),
             (NodeTransform::Moving(steps), Some(pose)) => (steps.clone(), Step::Moving(pose)),
         };
         match (steps.last_mut(), step) {
             // Long chains below what moves stay short.
-            (Some(Step::Fixed(outer)), Step::Fixed(inner)) => *outer = product(outer, &inner),
+            (Some(Step::Fixed(outer)), Step::Fixed(inner)) => *outer *= inner,
             (_, step) => steps.push(step),
         }
         NodeTransform::Moving(steps)
@@ -73,20 +73,15 @@ impl NodeTransform {
 
     fn motion(&self, seconds: f32) -> Motion {
         let steps = match self {
-            NodeTransform::Still(to_world) => vec![fixed(to_world)],
+            NodeTransform::Still(to_world) => vec![Step::Fixed(affine(to_world))],
             NodeTransform::Moving(steps) => steps.clone(),
         };
         Motion::new(steps, seconds)
     }
 }
 
-fn fixed(to_parent: &Mat4) -> Step {
-    Step::Fixed(rows(to_parent).map(|row| row.map(f64::from)))
-}
-
-fn rows(matrix: &Mat4) -> [[f32; 4]; 3] {
-    let columns = matrix.to_cols_array_2d();
-    std::array::from_fn(|i| columns.map(|column| column[i]))
+fn affine(matrix: &Mat4) -> DAffine3 {
+    DAffine3::from_mat4(matrix.as_dmat4())
 }
 
 /// The scene while its nodes are walked.
@@ -113,7 +108,7 @@ impl Walk<'_> {
             }
         }
         let to_world = match placement {
-            NodeTransform::Still(to_world) => rows(to_world),
+            NodeTransform::Still(to_world) => rows(&affine(to_world)),
             NodeTransform::Moving(_) => motion.at(0.0),
         };
         let (eye, backwards) = eye_and_backwards(&to_world);
