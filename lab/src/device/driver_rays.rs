@@ -97,25 +97,17 @@ impl RayPipeline {
             .stage_flags(vk::ShaderStageFlags::RAYGEN_KHR)
             .size(size_of::<arguments::TraceQueries>() as u32)];
         let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&range);
-        // SAFETY: the device is live; what is made is destroyed by `destroy`, or below where the next step fails.
-        unsafe {
-            let layout =
-                device.raw.create_pipeline_layout(&info, None).map_err(Error::vulkan("vkCreatePipelineLayout"))?;
-            let made = pipeline(device, &functions, layout, any_hit).and_then(|pipeline| {
-                let table = table(device, &functions, pipeline, &properties);
-                if table.is_err() {
-                    device.raw.destroy_pipeline(pipeline, None);
-                }
-                table.map(|(table, regions)| (pipeline, table, regions))
-            });
-            match made {
-                Ok((pipeline, table, regions)) => Ok(RayPipeline { functions, layout, pipeline, table, regions, most }),
-                Err(error) => {
-                    device.raw.destroy_pipeline_layout(layout, None);
-                    Err(error)
-                }
-            }
-        }
+        // SAFETY: the device is live; `destroy` destroys the layout, or `drop_layout` where a later step fails.
+        let layout = unsafe { device.raw.create_pipeline_layout(&info, None) }
+            .map_err(Error::vulkan("vkCreatePipelineLayout"))?;
+        // SAFETY: ours, and nothing uses it.
+        let drop_layout = |_: &Error| unsafe { device.raw.destroy_pipeline_layout(layout, None) };
+        let pipeline = pipeline(device, &functions, layout, any_hit).inspect_err(drop_layout)?;
+        // SAFETY: as above.
+        let drop_pipeline = |_: &Error| unsafe { device.raw.destroy_pipeline(pipeline, None) };
+        let table = table(device, &functions, pipeline, &properties);
+        let (table, regions) = table.inspect_err(drop_pipeline).inspect_err(drop_layout)?;
+        Ok(RayPipeline { functions, layout, pipeline, table, regions, most })
     }
 
     fn record(&self, recorder: &mut Recorder<'_>, arguments: &arguments::TraceQueries, count: u32) {

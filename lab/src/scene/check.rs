@@ -2,8 +2,10 @@
 //!
 //! `place` is the file, or the part of it in which the items are counted (`scene.glb: mesh 2, primitive 0`).
 
+use super::Mesh;
 use crate::{Error, Result};
 use std::fmt::Display;
+use std::path::Path;
 
 /// What is wrong with a file, or with a part of it.
 pub(super) fn malformed(place: impl Display, what: impl Display) -> Error {
@@ -22,9 +24,16 @@ pub(super) fn vertices_are_finite(place: impl Display, positions: &[[f32; 3]]) -
 pub(super) fn indices_are_in_range(place: impl Display, triangles: &[[u32; 3]], vertices: usize) -> Result<()> {
     let is_wrong = |triangle: &[u32; 3]| triangle.iter().any(|&v| v as usize >= vertices);
     let Some(triangle) = triangles.iter().position(is_wrong) else { return Ok(()) };
-    let wrong = triangles[triangle].into_iter().max().unwrap_or_default();
-    let place_in_mesh = format_args!("triangle {triangle} names vertex {wrong} (both from 0)");
-    Err(malformed(place, format_args!("{place_in_mesh}, there are {vertices}; is it cut off?")))
+    let vertex = triangles[triangle].into_iter().max().unwrap_or_default();
+    let named = format_args!("triangle {triangle} names vertex {vertex} (both from 0)");
+    Err(malformed(place, format_args!("{named}, there are {vertices}; is it cut off?")))
+}
+
+/// The mesh, if it keeps both rules.
+pub(super) fn checked(path: &Path, mesh: Mesh) -> Result<Mesh> {
+    vertices_are_finite(path.display(), &mesh.positions)?;
+    indices_are_in_range(path.display(), &mesh.triangles, mesh.positions.len())?;
+    Ok(mesh)
 }
 
 /// Vertices can be named by 32 bits.

@@ -14,7 +14,7 @@ use std::path::Path;
 /// Reads an OBJ file as one mesh; `o` and `g` mean nothing. Vertices that no face uses are left out.
 pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> {
     let objects = parse(path, options, Objects::Merged)?;
-    Ok(objects.into_iter().next().map(|(_, mesh)| mesh).unwrap_or_default())
+    Ok(objects.into_iter().next().unwrap_or_default().1)
 }
 
 /// Reads an OBJ file object by object: the faces behind each `o` line, under its name.

@@ -1,7 +1,7 @@
 //! PLY, ASCII and binary of either byte order, by ply-rs. Elements `vertex` (x, y, z) and `face` (vertex_indices or
 //! vertex_index) of any number type; everything else is read over.
 
-use super::check::{self, malformed};
+use super::check::{checked, malformed};
 use super::{LoadOptions, Mesh, fan, source};
 use crate::{Error, Result};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
@@ -40,9 +40,7 @@ pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> {
             _ => file.elements(&header, element, |_, Skipped| Ok(()))?,
         }
     }
-    check::vertices_are_finite(path.display(), &positions)?;
-    check::indices_are_in_range(path.display(), &triangles, positions.len())?;
-    Ok(Mesh { positions, triangles })
+    checked(path, Mesh { positions, triangles })
 }
 
 struct File<'a> {

@@ -3,7 +3,7 @@
 //! - `.tri`: `u32` vertex count V, `u32` triangle count T, V × 3 `f32`, T × 3 `u32`.
 //! - `.anim`: `u32` V, `u32` T, `u32` frame count K, T × 3 `u32`, then K frames of V × 3 `f32`.
 
-use super::check::{self, malformed};
+use super::check::{self, checked, malformed};
 use super::{LoadOptions, Mesh, source};
 use crate::{Error, Result};
 use std::io::{BufRead, ErrorKind, Read};
@@ -45,12 +45,6 @@ pub(super) fn read_frames(path: &Path, options: &LoadOptions<'_>) -> Result<Fram
     }
     words.end("frame")?;
     Ok((triangles, frames))
-}
-
-fn checked(path: &Path, mesh: Mesh) -> Result<Mesh> {
-    check::vertices_are_finite(path.display(), &mesh.positions)?;
-    check::indices_are_in_range(path.display(), &mesh.triangles, mesh.positions.len())?;
-    Ok(mesh)
 }
 
 /// The words of a file, in order.

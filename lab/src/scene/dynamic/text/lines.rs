@@ -148,8 +148,8 @@ impl Reading {
                 };
                 let key = key(line, rest, parts)?;
                 if let Some(Key { line, time, .. }) = keys.last().filter(|before| before.time >= key.time) {
-                    let wrong = key.time;
-                    return Err(format!("{wrong} s is not behind the {time} s of line {line}; sort the keys by time"));
+                    let here = key.time;
+                    return Err(format!("{here} s is not behind the {time} s of line {line}; sort the keys by time"));
                 }
                 keys.push(key);
                 Ok(())
