@@ -1,15 +1,10 @@
 //! The functions of `VK_KHR_acceleration_structure`, with a context in place of the device: [`hedgerow::accel`].
 
 use crate::context::{HedgerowContext, structures_of};
-use crate::pointers::{handle, place, reference, reference_mut, slice};
+use crate::pointers::{handle, place, reference, reference_mut, slice, slices};
 use crate::status::{status, value_or};
-use crate::vulkan::{
-    VkAccelerationStructureBuildGeometryInfoKHR, VkAccelerationStructureBuildRangeInfoKHR,
-    VkAccelerationStructureBuildSizesInfoKHR, VkAccelerationStructureBuildTypeKHR,
-    VkAccelerationStructureCreateInfoKHR, VkAccelerationStructureDeviceAddressInfoKHR, VkAccelerationStructureKHR,
-    VkAllocationCallbacks, VkCommandBuffer, VkDeviceAddress, VkResult,
-};
-use hedgerow::{Result, accel};
+use crate::vulkan::*;
+use hedgerow::accel;
 
 /// What scratch addresses must be multiples of.
 pub const HEDGEROW_SCRATCH_ALIGNMENT: u32 = 16;
@@ -36,14 +31,12 @@ pub unsafe extern "C" fn hedgerow_get_acceleration_structure_build_sizes(
     p_max_primitive_counts: *const u32,
     p_size_info: *mut VkAccelerationStructureBuildSizesInfoKHR<'_>,
 ) -> VkResult {
-    status(|| {
-        // SAFETY: the caller's promises.
-        unsafe {
-            let info = reference(p_build_info, "pBuildInfo")?;
-            let counts = slice(p_max_primitive_counts, info.geometry_count, "pMaxPrimitiveCounts")?;
-            let sizes = reference_mut(p_size_info, "pSizeInfo")?;
-            structures_of(context)?.get_acceleration_structure_build_sizes(build_type, info, counts, sizes)
-        }
+    // SAFETY: the caller's promises.
+    status(|| unsafe {
+        let info = reference(p_build_info, "pBuildInfo")?;
+        let counts = slice(p_max_primitive_counts, info.geometry_count, "pMaxPrimitiveCounts")?;
+        let sizes = reference_mut(p_size_info, "pSizeInfo")?;
+        structures_of(context)?.get_acceleration_structure_build_sizes(build_type, info, counts, sizes)
     })
 }
 
@@ -59,14 +52,12 @@ pub unsafe extern "C" fn hedgerow_create_acceleration_structure(
     p_allocator: *const VkAllocationCallbacks<'_>,
     p_acceleration_structure: *mut VkAccelerationStructureKHR,
 ) -> VkResult {
-    status(|| {
-        // SAFETY: the caller's promises.
-        unsafe {
-            let info = reference(p_create_info, "pCreateInfo")?;
-            handle(info.buffer, "pCreateInfo->buffer")?;
-            let place = place(p_acceleration_structure, "pAccelerationStructure")?;
-            place.write(structures_of(context)?.create_acceleration_structure(info, p_allocator.as_ref())?);
-        }
+    // SAFETY: the caller's promises.
+    status(|| unsafe {
+        let info = reference(p_create_info, "pCreateInfo")?;
+        handle(info.buffer, "pCreateInfo->buffer")?;
+        let place = place(p_acceleration_structure, "pAccelerationStructure")?;
+        place.write(structures_of(context)?.create_acceleration_structure(info, p_allocator.as_ref())?);
         Ok(())
     })
 }
@@ -121,18 +112,12 @@ pub unsafe extern "C" fn hedgerow_cmd_build_acceleration_structures(
     p_infos: *const VkAccelerationStructureBuildGeometryInfoKHR<'_>,
     pp_build_range_infos: *const *const VkAccelerationStructureBuildRangeInfoKHR,
 ) -> VkResult {
-    status(|| {
-        // SAFETY: the caller's promises.
-        unsafe {
-            let infos = slice(p_infos, info_count, "pInfos")?;
-            let ranges = slice(pp_build_range_infos, info_count, "ppBuildRangeInfos")?;
-            let ranges_of = |(i, &p_ranges): (usize, &*const VkAccelerationStructureBuildRangeInfoKHR)| {
-                slice(p_ranges, infos[i].geometry_count, &format!("ppBuildRangeInfos[{i}]"))
-            };
-            let ranges = ranges.iter().enumerate().map(ranges_of).collect::<Result<Vec<_>>>()?;
-            let commands = handle(command_buffer, "commandBuffer")?;
-            structures_of(context)?.cmd_build_acceleration_structures(commands, infos, &ranges)
-        }
+    // SAFETY: the caller's promises.
+    status(|| unsafe {
+        let infos = slice(p_infos, info_count, "pInfos")?;
+        let ranges = slices(pp_build_range_infos, infos, "ppBuildRangeInfos")?;
+        let commands = handle(command_buffer, "commandBuffer")?;
+        structures_of(context)?.cmd_build_acceleration_structures(commands, infos, &ranges)
     })
 }
 
@@ -151,20 +136,13 @@ pub unsafe extern "C" fn hedgerow_cmd_build_acceleration_structures_indirect(
     p_indirect_strides: *const u32,
     pp_max_primitive_counts: *const *const u32,
 ) -> VkResult {
-    status(|| {
-        // SAFETY: the caller's promises.
-        unsafe {
-            let infos = slice(p_infos, info_count, "pInfos")?;
-            let addresses = slice(p_indirect_device_addresses, info_count, "pIndirectDeviceAddresses")?;
-            let strides = slice(p_indirect_strides, info_count, "pIndirectStrides")?;
-            let counts = slice(pp_max_primitive_counts, info_count, "ppMaxPrimitiveCounts")?;
-            let counts_of = |(i, &p_counts): (usize, &*const u32)| {
-                slice(p_counts, infos[i].geometry_count, &format!("ppMaxPrimitiveCounts[{i}]"))
-            };
-            let counts = counts.iter().enumerate().map(counts_of).collect::<Result<Vec<_>>>()?;
-            let commands = handle(command_buffer, "commandBuffer")?;
-            structures_of(context)?
-                .cmd_build_acceleration_structures_indirect(commands, infos, addresses, strides, &counts)
-        }
+    // SAFETY: the caller's promises.
+    status(|| unsafe {
+        let infos = slice(p_infos, info_count, "pInfos")?;
+        let addresses = slice(p_indirect_device_addresses, info_count, "pIndirectDeviceAddresses")?;
+        let strides = slice(p_indirect_strides, info_count, "pIndirectStrides")?;
+        let counts = slices(pp_max_primitive_counts, infos, "ppMaxPrimitiveCounts")?;
+        let commands = handle(command_buffer, "commandBuffer")?;
+        structures_of(context)?.cmd_build_acceleration_structures_indirect(commands, infos, addresses, strides, &counts)
     })
 }

@@ -4,9 +4,7 @@ use crate::loader;
 use crate::pointers::{handle, place, reference};
 use crate::requirements::{HedgerowOptional, optional_of};
 use crate::status::{status, value_or};
-use crate::vulkan::{
-    PFN_vkGetInstanceProcAddr, VkBool32, VkDevice, VkInstance, VkPhysicalDevice, VkPipelineCache, VkResult,
-};
+use crate::vulkan::*;
 use hedgerow::ash::vk;
 use hedgerow::gpu::{Context, ContextDesc, TuningChoice};
 use hedgerow::{Result, accel};
@@ -68,32 +66,29 @@ pub unsafe extern "C" fn hedgerow_create_context(
     p_create_info: *const HedgerowContextCreateInfo,
     p_context: *mut *mut HedgerowContext,
 ) -> VkResult {
-    status(|| {
-        // SAFETY: the caller's promises are those of each of these.
-        unsafe {
-            let info = reference(p_create_info, "pCreateInfo")?;
-            let place = place(p_context, "pContext")?;
-            let get = info.pfn_get_instance_proc_addr;
-            let instance = loader::instance(get, info.instance)?;
-            let device = loader::device(&instance, info.device)?;
-            let labels =
-                (info.debug_labels != vk::FALSE).then(|| loader::labels(get, &instance, &device)).transpose()?;
-            let context = Context::new(&ContextDesc {
-                instance: &instance,
-                physical_device: handle(info.physical_device, "physicalDevice")?,
-                device: &device,
-                pipeline_cache: info.pipeline_cache,
-                debug_utils: labels.as_ref(),
-                optional: optional_of(info.optional)?,
-                tuning: TuningChoice::Auto,
-            })?;
-            let context = Box::new(context);
-            // The box is neither moved out of nor dropped before the structures that refer to what it holds.
-            let shared: &'static Context = &*std::ptr::from_ref(&*context);
-            let options = accel::AccelOptions { checked: info.checked != vk::FALSE, ..accel::AccelOptions::DEFAULT };
-            let structures = accel::Device::with_options(shared, options);
-            place.write(Box::into_raw(Box::new(HedgerowContext { structures, context })));
-        }
+    // SAFETY: the caller's promises are those of each of these.
+    status(|| unsafe {
+        let info = reference(p_create_info, "pCreateInfo")?;
+        let place = place(p_context, "pContext")?;
+        let get = info.pfn_get_instance_proc_addr;
+        let instance = loader::instance(get, info.instance)?;
+        let device = loader::device(&instance, info.device)?;
+        let labels = (info.debug_labels != vk::FALSE).then(|| loader::labels(get, &instance, &device)).transpose()?;
+        let context = Context::new(&ContextDesc {
+            instance: &instance,
+            physical_device: handle(info.physical_device, "physicalDevice")?,
+            device: &device,
+            pipeline_cache: info.pipeline_cache,
+            debug_utils: labels.as_ref(),
+            optional: optional_of(info.optional)?,
+            tuning: TuningChoice::Auto,
+        })?;
+        let context = Box::new(context);
+        // The box is neither moved out of nor dropped before the structures that refer to what it holds.
+        let shared: &'static Context = &*std::ptr::from_ref(&*context);
+        let options = accel::AccelOptions { checked: info.checked != vk::FALSE, ..accel::AccelOptions::DEFAULT };
+        let structures = accel::Device::with_options(shared, options);
+        place.write(Box::into_raw(Box::new(HedgerowContext { structures, context })));
         Ok(())
     })
 }

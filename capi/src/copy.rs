@@ -3,11 +3,7 @@
 use crate::context::{HedgerowContext, structures_of};
 use crate::pointers::{handle, reference, slice};
 use crate::status::{status, value_or};
-use crate::vulkan::{
-    VkAccelerationStructureCompatibilityKHR, VkAccelerationStructureKHR, VkAccelerationStructureVersionInfoKHR,
-    VkCommandBuffer, VkCopyAccelerationStructureInfoKHR, VkCopyAccelerationStructureToMemoryInfoKHR,
-    VkCopyMemoryToAccelerationStructureInfoKHR, VkDeviceAddress, VkResult,
-};
+use crate::vulkan::*;
 use hedgerow::Error;
 use hedgerow::accel::Property;
 
@@ -50,12 +46,10 @@ pub unsafe extern "C" fn hedgerow_cmd_copy_acceleration_structure(
     command_buffer: VkCommandBuffer,
     p_info: *const VkCopyAccelerationStructureInfoKHR<'_>,
 ) -> VkResult {
-    status(|| {
-        // SAFETY: the caller's promises.
-        unsafe {
-            let (commands, info) = (handle(command_buffer, "commandBuffer")?, reference(p_info, "pInfo")?);
-            structures_of(context)?.cmd_copy_acceleration_structure(commands, info)
-        }
+    // SAFETY: the caller's promises.
+    status(|| unsafe {
+        let (commands, info) = (handle(command_buffer, "commandBuffer")?, reference(p_info, "pInfo")?);
+        structures_of(context)?.cmd_copy_acceleration_structure(commands, info)
     })
 }
 
@@ -69,12 +63,10 @@ pub unsafe extern "C" fn hedgerow_cmd_copy_acceleration_structure_to_memory(
     command_buffer: VkCommandBuffer,
     p_info: *const VkCopyAccelerationStructureToMemoryInfoKHR<'_>,
 ) -> VkResult {
-    status(|| {
-        // SAFETY: the caller's promises.
-        unsafe {
-            let (commands, info) = (handle(command_buffer, "commandBuffer")?, reference(p_info, "pInfo")?);
-            structures_of(context)?.cmd_copy_acceleration_structure_to_memory(commands, info)
-        }
+    // SAFETY: the caller's promises.
+    status(|| unsafe {
+        let (commands, info) = (handle(command_buffer, "commandBuffer")?, reference(p_info, "pInfo")?);
+        structures_of(context)?.cmd_copy_acceleration_structure_to_memory(commands, info)
     })
 }
 
@@ -88,12 +80,10 @@ pub unsafe extern "C" fn hedgerow_cmd_copy_memory_to_acceleration_structure(
     command_buffer: VkCommandBuffer,
     p_info: *const VkCopyMemoryToAccelerationStructureInfoKHR<'_>,
 ) -> VkResult {
-    status(|| {
-        // SAFETY: the caller's promises.
-        unsafe {
-            let (commands, info) = (handle(command_buffer, "commandBuffer")?, reference(p_info, "pInfo")?);
-            structures_of(context)?.cmd_copy_memory_to_acceleration_structure(commands, info)
-        }
+    // SAFETY: the caller's promises.
+    status(|| unsafe {
+        let (commands, info) = (handle(command_buffer, "commandBuffer")?, reference(p_info, "pInfo")?);
+        structures_of(context)?.cmd_copy_memory_to_acceleration_structure(commands, info)
     })
 }
 

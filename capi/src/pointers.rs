@@ -1,5 +1,6 @@
 //! Pointers and handles of C: null where something must be is an error that names the parameter.
 
+use crate::vulkan::VkAccelerationStructureBuildGeometryInfoKHR;
 use hedgerow::ash::vk::Handle;
 use hedgerow::{Error, Result};
 use std::mem::MaybeUninit;
@@ -46,6 +47,24 @@ pub(crate) unsafe fn slice<'a, T>(pointer: *const T, count: u32, name: &str) -> 
         // SAFETY: the caller's promise.
         (false, _) => Ok(unsafe { std::slice::from_raw_parts(pointer, count as usize) }),
     }
+}
+
+/// For each of `infos`, what the pointer of the same place points to: an element for each geometry.
+///
+/// # Safety
+/// As [`slice`], for the pointers and for what they point to.
+pub(crate) unsafe fn slices<'a, T>(
+    pointers: *const *const T,
+    infos: &[VkAccelerationStructureBuildGeometryInfoKHR<'_>],
+    name: &str,
+) -> Result<Vec<&'a [T]>> {
+    // SAFETY: the caller's promise.
+    let pointers = unsafe { slice(pointers, infos.len() as u32, name)? };
+    let of_geometries = |(i, &pointer): (usize, &*const T)| {
+        // SAFETY: the caller's promise.
+        unsafe { slice(pointer, infos[i].geometry_count, &format!("{name}[{i}]")) }
+    };
+    pointers.iter().enumerate().map(of_geometries).collect()
 }
 
 /// `handle`, if it is one.

@@ -63,10 +63,10 @@ struct Axis<'a> {
 
 impl<'a> Axis<'a> {
     fn split_at(self, count: usize) -> (Axis<'a>, Axis<'a>) {
-        let (order, spare, areas) =
-            (self.order.split_at_mut(count), self.spare.split_at_mut(count), self.areas.split_at_mut(count));
-        let left = Axis { order: order.0, spare: spare.0, areas: areas.0 };
-        (left, Axis { order: order.1, spare: spare.1, areas: areas.1 })
+        let (left_order, order) = self.order.split_at_mut(count);
+        let (left_spare, spare) = self.spare.split_at_mut(count);
+        let (left_areas, areas) = self.areas.split_at_mut(count);
+        (Axis { order: left_order, spare: left_spare, areas: left_areas }, Axis { order, spare, areas })
     }
 
     /// Those on the left before the others, both as they were.

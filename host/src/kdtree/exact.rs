@@ -76,9 +76,9 @@ impl CellContent {
 
 fn faces(b: &Aabb, axis: usize, reference: u32) -> impl Iterator<Item = Event> + use<> {
     let (lo, hi) = (b.lo[axis], b.hi[axis]);
-    let [first, last] = if lo == hi { [Some(Kind::IsFlat), None] } else { [Some(Kind::Begins), Some(Kind::Ends)] };
-    let event = move |(at, kind): (f32, Option<Kind>)| Some(Event { at, reference, kind: kind? });
-    [(lo, first), (hi, last)].into_iter().filter_map(event)
+    let first = Event { at: lo, reference, kind: if lo == hi { Kind::IsFlat } else { Kind::Begins } };
+    let last = (lo != hi).then_some(Event { at: hi, reference, kind: Kind::Ends });
+    std::iter::once(first).chain(last)
 }
 
 struct Exact<'a> {

@@ -5,7 +5,6 @@
 mod exact;
 pub mod merge;
 
-use hedgerow::bvh::twin::geometry::Corners;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::kdtree::layout::KdTree;
 use hedgerow::kdtree::termination::Costs;
@@ -94,16 +93,8 @@ impl HostKdOptions {
 /// # Errors
 /// [`Error::Argument`] if an option cannot be used, or if there would be more nodes or references than the layout can name.
 pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &HostKdOptions) -> Result<KdTree> {
-    build_corners(lbvh::corners(positions, triangles), options)
-}
-
-/// The same of triangles that [`HostGeometry::corners`](hedgerow::bvh::twin::geometry::HostGeometry::corners) read.
-///
-/// # Errors
-/// As [`build`].
-pub fn build_corners(corners: impl Iterator<Item = Corners>, options: &HostKdOptions) -> Result<KdTree> {
     options.check()?;
-    grown(corners, options.costs, |heuristic, records, cell, references| {
+    grown(lbvh::corners(positions, triangles), options.costs, |heuristic, records, cell, references| {
         let bins = match options.planes {
             Planes::Exact => return exact::build(heuristic, records, cell, references),
             Planes::Binned(bins) => (bins, 0),

@@ -2,7 +2,7 @@
 //! shader binding table. The hits are the same.
 
 use super::memory::Memory;
-use super::{Device, DriverTracing};
+use super::{Device, DriverTracing, properties};
 use crate::arguments;
 use crate::shaders;
 use crate::{Error, Result};
@@ -35,7 +35,6 @@ impl Device {
     /// # Errors
     /// The device was opened without the driver's structures; a pipeline could not be made.
     pub fn trace_by_driver(&self, recorder: &mut Recorder<'_>, rays: &DriverRays) -> hedgerow::Result<()> {
-        let limits = &self.limits;
         let arguments = |first| arguments::TraceQueries {
             structure: rays.structure,
             rays: rays.rays,
@@ -48,13 +47,10 @@ impl Device {
             None => return Err(super::driver_is_missing(self)),
             Some(DriverTracing::Query) => {
                 let kernel = Kernel::new(&shaders::MEASURE_RAY_QUERY, WORKGROUP, &[u32::from(rays.any_hit)]);
-                let most = limits.workgroup_count.saturating_mul(WORKGROUP);
+                let most = self.limits.workgroup_count.saturating_mul(WORKGROUP);
                 for first in (0..rays.count).step_by(most as usize) {
-                    recorder.dispatch(
-                        &kernel,
-                        &arguments(first),
-                        (rays.count - first).min(most).div_ceil(WORKGROUP),
-                    )?;
+                    let count = (rays.count - first).min(most);
+                    recorder.dispatch(&kernel, &arguments(first), count.div_ceil(WORKGROUP))?;
                 }
             }
             Some(DriverTracing::Pipeline) => {
@@ -89,38 +85,29 @@ const STAGES: [(vk::ShaderStageFlags, &Shader); 3] = [
 
 impl RayPipeline {
     pub fn new(device: &Device, any_hit: bool) -> Result<RayPipeline> {
-        let mut properties = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
-        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut properties);
-        // SAFETY: the handles are live; the structures outlive the call.
-        unsafe { device.ash_instance().get_physical_device_properties2(device.physical_device(), &mut all) };
-        let limits = all.properties.limits;
+        let (instance, physical_device) = (device.ash_instance(), device.physical_device());
+        let properties: vk::PhysicalDeviceRayTracingPipelinePropertiesKHR<'_> = properties(instance, physical_device);
+        // SAFETY: the handles are live.
+        let limits = unsafe { instance.get_physical_device_properties(physical_device) }.limits;
         let width =
             u64::from(limits.max_compute_work_group_count[0]) * u64::from(limits.max_compute_work_group_size[0]);
         let most = width.min(properties.max_ray_dispatch_invocation_count.into()).min(1 << 30) as u32;
-        let functions = ash::khr::ray_tracing_pipeline::Device::new(device.ash_instance(), &device.raw);
+        let functions = ash::khr::ray_tracing_pipeline::Device::new(instance, &device.raw);
         let range = [vk::PushConstantRange::default()
             .stage_flags(vk::ShaderStageFlags::RAYGEN_KHR)
             .size(size_of::<arguments::TraceQueries>() as u32)];
         let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&range);
-        // SAFETY: the device is live; what is made is destroyed by `destroy`, or below where the next step fails.
-        unsafe {
-            let layout =
-                device.raw.create_pipeline_layout(&info, None).map_err(Error::vulkan("vkCreatePipelineLayout"))?;
-            let made = pipeline(device, &functions, layout, any_hit).and_then(|pipeline| {
-                let table = table(device, &functions, pipeline, &properties);
-                if table.is_err() {
-                    device.raw.destroy_pipeline(pipeline, None);
-                }
-                table.map(|(table, regions)| (pipeline, table, regions))
-            });
-            match made {
-                Ok((pipeline, table, regions)) => Ok(RayPipeline { functions, layout, pipeline, table, regions, most }),
-                Err(error) => {
-                    device.raw.destroy_pipeline_layout(layout, None);
-                    Err(error)
-                }
-            }
-        }
+        // SAFETY: the device is live; `destroy` destroys the layout, or `drop_layout` where a later step fails.
+        let layout = unsafe { device.raw.create_pipeline_layout(&info, None) }
+            .map_err(Error::vulkan("vkCreatePipelineLayout"))?;
+        // SAFETY: ours, and nothing uses it.
+        let drop_layout = |_: &Error| unsafe { device.raw.destroy_pipeline_layout(layout, None) };
+        let pipeline = pipeline(device, &functions, layout, any_hit).inspect_err(drop_layout)?;
+        // SAFETY: as above.
+        let drop_pipeline = |_: &Error| unsafe { device.raw.destroy_pipeline(pipeline, None) };
+        let table = table(device, &functions, pipeline, &properties);
+        let (table, regions) = table.inspect_err(drop_pipeline).inspect_err(drop_layout)?;
+        Ok(RayPipeline { functions, layout, pipeline, table, regions, most })
     }
 
     fn record(&self, recorder: &mut Recorder<'_>, arguments: &arguments::TraceQueries, count: u32) {
@@ -215,9 +202,7 @@ fn table(
         .map_err(Error::vulkan("vkGetRayTracingShaderGroupHandlesKHR"))?;
     let usage = vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
     let memory = device.memory("driver: shader binding table", 4 * stride, usage, MemoryLocation::CpuToGpu)?;
-    // SAFETY: the buffer is live and has the usage.
-    let address =
-        unsafe { device.raw.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(memory.raw)) };
+    let address = device.address_of(&memory);
     let start = address.next_multiple_of(base);
     let mapped = memory.mapped().expect("gpu-allocator maps what is visible to the host");
     for (i, handle) in handles.chunks(handle).enumerate() {
@@ -227,5 +212,5 @@ fn table(
     }
     let region =
         |i: u64| vk::StridedDeviceAddressRegionKHR { device_address: start + i * stride, stride, size: stride };
-    Ok((memory, [region(0), region(1), region(2)]))
+    Ok((memory, [0, 1, 2].map(region)))
 }

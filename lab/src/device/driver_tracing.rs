@@ -2,7 +2,8 @@
 //!
 //! NVIDIA's data-centre GPUs and older cards have acceleration structures and pipelines, but no queries.
 
-use super::Device;
+use super::{Device, properties};
+use crate::named::named;
 use ash::vk;
 use hedgerow::gpu::requirements::Offered;
 use std::ffi::CStr;
@@ -16,20 +17,21 @@ pub enum DriverTracing {
     Pipeline,
 }
 
+named!(DriverTracing, "way to trace": Query = "query", Pipeline = "pipeline");
+
 /// What a device must have for either.
 const STRUCTURES: [&CStr; 2] = [ash::khr::acceleration_structure::NAME, ash::khr::deferred_host_operations::NAME];
 
 impl DriverTracing {
-    /// What a device has of them, the way that compares best with ours first.
+    /// What a device has of them. In their order, for the query compares best with ours.
     pub(super) fn of(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> Vec<DriverTracing> {
         let offered = Offered::by(instance, physical_device);
         if !STRUCTURES.iter().all(|name| offered.has(name)) {
             return Vec::new();
         }
-        let ways = [DriverTracing::Query, DriverTracing::Pipeline];
         let is_there =
             |way: &DriverTracing| offered.has(way.extension()) && way.has_features(instance, physical_device);
-        ways.into_iter().filter(is_there).collect()
+        DriverTracing::ALL.into_iter().filter(is_there).collect()
     }
 
     /// The way to take of those that a device has, where this one is asked for. A query may be replaced by a pipeline, which is all
@@ -38,14 +40,6 @@ impl DriverTracing {
         match self {
             DriverTracing::Query => there.first().copied(),
             DriverTracing::Pipeline => there.contains(&self).then_some(self),
-        }
-    }
-
-    /// As `hedgerow devices` says it.
-    pub fn name(self) -> &'static str {
-        match self {
-            DriverTracing::Query => "query",
-            DriverTracing::Pipeline => "pipeline",
         }
     }
 
@@ -122,10 +116,8 @@ pub fn driver_is_missing(device: &Device) -> hedgerow::Error {
 impl Device {
     /// Primitives of a structure of the driver's, at most.
     pub fn most_primitives_of_driver(&self) -> u64 {
-        let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
-        // SAFETY: the handles are live; the structures outlive the call.
-        unsafe { self.ash_instance().get_physical_device_properties2(self.physical_device(), &mut properties) };
+        let limits: vk::PhysicalDeviceAccelerationStructurePropertiesKHR<'_> =
+            properties(self.ash_instance(), self.physical_device());
         limits.max_primitive_count.min(u64::from(u32::MAX))
     }
 }

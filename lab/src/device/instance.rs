@@ -1,8 +1,9 @@
 //! The machine's Vulkan devices: the loader, an instance with the messages of its validation layers, and which device to take.
 
-use super::DriverTracing;
+use super::memory::largest_local_heap;
+use super::{DriverTracing, locked, properties};
 use crate::{Error, Result};
-use ash::vk;
+use ash::vk::{self, DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as MessageType};
 use hedgerow::gpu::{Optional, Workarounds, requirements};
 use std::ffi::{CStr, c_void};
 use std::mem::ManuallyDrop;
@@ -113,12 +114,9 @@ impl VulkanInstance {
         // SAFETY: loading the system's Vulkan loader runs its initialisers, as every Vulkan program does.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| Error::NoVulkan(e.to_string()))?;
         // SAFETY: the loader is loaded.
-        let (layers, extensions) = unsafe {
-            (
-                entry.enumerate_instance_layer_properties().unwrap_or_default(),
-                entry.enumerate_instance_extension_properties(None).unwrap_or_default(),
-            )
-        };
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
+        // SAFETY: as above.
+        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
         let layer = layers.iter().find(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
         if validation && layer.is_none() {
             return Err(Error::Argument(
@@ -127,10 +125,7 @@ impl VulkanInstance {
         }
         let offers = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         let has_debug_utils = validation || offers(ash::ext::debug_utils::NAME);
-        let mut names = Vec::new();
-        if has_debug_utils {
-            names.push(ash::ext::debug_utils::NAME.as_ptr());
-        }
+        let mut names: Vec<_> = has_debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect();
         let mut flags = vk::InstanceCreateFlags::empty();
         if offers(ash::khr::portability_enumeration::NAME) {
             names.push(ash::khr::portability_enumeration::NAME.as_ptr());
@@ -159,12 +154,8 @@ impl VulkanInstance {
         if validation {
             let utils = ash::ext::debug_utils::Instance::new(&entry, &raw);
             let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
-                .message_severity(
-                    vk::DebugUtilsMessageSeverityFlagsEXT::ERROR | vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
-                )
-                .message_type(
-                    vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
-                )
+                .message_severity(Severity::ERROR | Severity::WARNING)
+                .message_type(MessageType::VALIDATION | MessageType::PERFORMANCE)
                 .pfn_user_callback(Some(on_message))
                 .user_data(Arc::as_ptr(&messages).cast_mut().cast());
             // SAFETY: the messages outlive the messenger: both are dropped with `self`, the messenger first.
@@ -191,28 +182,22 @@ impl VulkanInstance {
             vk::Result::ERROR_INITIALIZATION_FAILED => no_device("no driver could be loaded"),
             other => Error::vulkan("vkEnumeratePhysicalDevices")(other),
         })?;
-        Ok(physical
-            .into_iter()
-            .enumerate()
-            .map(|(index, physical)| (physical, self.describe(index, physical)))
-            .collect())
+        let described = |(index, physical)| (physical, self.describe(index, physical));
+        Ok(physical.into_iter().enumerate().map(described).collect())
     }
 
     /// What the validation layers have said since the last call.
     pub fn take_messages(&self) -> Vec<String> {
-        std::mem::take(&mut *self.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
+        std::mem::take(&mut *locked(&self.messages))
     }
 
     fn describe(&self, index: usize, physical: vk::PhysicalDevice) -> Found {
-        let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroup);
-        // SAFETY: the handles are live and the structures outlive the calls.
-        let memory = unsafe {
-            self.raw.get_physical_device_properties2(physical, &mut properties);
-            self.raw.get_physical_device_memory_properties(physical)
-        };
-        let properties = properties.properties;
+        let driver: vk::PhysicalDeviceDriverProperties<'_> = properties(&self.raw, physical);
+        let subgroup: vk::PhysicalDeviceSubgroupProperties<'_> = properties(&self.raw, physical);
+        // SAFETY: the handles are live.
+        let properties = unsafe { self.raw.get_physical_device_properties(physical) };
+        // SAFETY: as above.
+        let memory = unsafe { self.raw.get_physical_device_memory_properties(physical) };
         let text = |c: Result<&CStr, _>| c.unwrap_or(c"?").to_string_lossy().into_owned();
         let (optional, missing) = match requirements(&self.raw, physical) {
             Ok(needs) => (needs.available, Vec::new()),
@@ -226,12 +211,7 @@ impl VulkanInstance {
             kind: properties.device_type,
             api_version: properties.api_version,
             subgroup_size: subgroup.subgroup_size,
-            memory: memory.memory_heaps[..memory.memory_heap_count as usize]
-                .iter()
-                .filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
-                .map(|h| h.size)
-                .max()
-                .unwrap_or(0),
+            memory: largest_local_heap(&memory).unwrap_or(0),
             workarounds: Workarounds::of_driver(driver.driver_id, properties.driver_version),
             driver_tracing: DriverTracing::of(&self.raw, physical),
             optional,
@@ -255,8 +235,8 @@ impl Drop for VulkanInstance {
 }
 
 unsafe extern "system" fn on_message(
-    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
-    _types: vk::DebugUtilsMessageTypeFlagsEXT,
+    _severity: Severity,
+    _types: MessageType,
     data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     user: *mut c_void,
 ) -> vk::Bool32 {
@@ -264,7 +244,7 @@ unsafe extern "system" fn on_message(
     unsafe {
         let messages = &*user.cast::<Mutex<Vec<String>>>();
         let text = (*data).message_as_c_str().map(|m| m.to_string_lossy().into_owned()).unwrap_or_default();
-        messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push(text);
+        locked(messages).push(text);
     }
     vk::FALSE
 }

@@ -4,7 +4,7 @@
 //! A GPU's own memory is filled and read through a staging buffer, a chunk at a time. Where the device's memory is the host's (a CPU,
 //! most integrated GPUs), it is mapped.
 
-use super::Device;
+use super::{Device, locked};
 use crate::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -26,29 +26,37 @@ impl Memory {
     }
 }
 
-/// Buffers that the host maps: on the way to the device, and back. Made when first used.
-#[derive(Default)]
-pub(super) struct Staging {
-    upload: Option<Memory>,
-    download: Option<Memory>,
-}
+/// The buffers that data goes through: on the way to the device, and back.
+pub(super) const STAGING: [(&str, vk::BufferUsageFlags, MemoryLocation); 2] = [
+    ("staging: upload", vk::BufferUsageFlags::TRANSFER_SRC, MemoryLocation::CpuToGpu),
+    ("staging: download", vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu),
+];
+const UPLOAD: usize = 0;
+const DOWNLOAD: usize = 1;
 
 /// Whether the memory of a device is best mapped: its largest heap is cached by the host. What the host maps but does not cache (a GPU
 /// behind a bus) it reads a hundred times as slowly as it copies.
 pub(super) fn is_mapped(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> bool {
     // SAFETY: the handles are live.
     let memory = unsafe { instance.get_physical_device_memory_properties(physical_device) };
-    let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
-    let is_local = |heap: &&vk::MemoryHeap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
-    let largest = heaps.iter().filter(is_local).map(|heap| heap.size).max();
+    let largest = largest_local_heap(&memory);
     let wanted = vk::MemoryPropertyFlags::DEVICE_LOCAL
         | vk::MemoryPropertyFlags::HOST_VISIBLE
         | vk::MemoryPropertyFlags::HOST_COHERENT
         | vk::MemoryPropertyFlags::HOST_CACHED;
-    memory.memory_types[..memory.memory_type_count as usize].iter().any(|memory_type| {
-        let heap = heaps[memory_type.heap_index as usize];
-        memory_type.property_flags.contains(wanted) && is_local(&&heap) && Some(heap.size) == largest
+    memory.memory_types_as_slice().iter().any(|memory_type| {
+        let heap = memory.memory_heaps[memory_type.heap_index as usize];
+        memory_type.property_flags.contains(wanted) && is_local(&heap) && Some(heap.size) == largest
     })
+}
+
+/// Bytes of the largest heap that is the device's own.
+pub(super) fn largest_local_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> Option<u64> {
+    memory.memory_heaps_as_slice().iter().filter(|heap| is_local(heap)).map(|heap| heap.size).max()
+}
+
+fn is_local(heap: &vk::MemoryHeap) -> bool {
+    heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)
 }
 
 impl Device {
@@ -69,19 +77,16 @@ impl Device {
         // SAFETY: the device is live; the buffer is destroyed on failure, or by `release`.
         unsafe {
             let raw = self.raw.create_buffer(&info, None).map_err(|_| too_little())?;
-            let allocation = self.lock_allocator().allocate(&AllocationCreateDesc {
+            let allocation = locked(&self.allocator).allocate(&AllocationCreateDesc {
                 name,
                 requirements: self.raw.get_buffer_memory_requirements(raw),
                 location,
                 linear: true,
                 allocation_scheme: AllocationScheme::GpuAllocatorManaged,
             });
-            let allocation = match allocation {
-                Ok(allocation) => allocation,
-                Err(_) => {
-                    self.raw.destroy_buffer(raw, None);
-                    return Err(too_little());
-                }
+            let Ok(allocation) = allocation else {
+                self.raw.destroy_buffer(raw, None);
+                return Err(too_little());
             };
             if let Err(result) = self.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) {
                 self.release(Memory { raw, allocation });
@@ -91,27 +96,28 @@ impl Device {
         }
     }
 
+    /// The address that shaders use of a buffer with the usage for it.
+    pub(super) fn address_of(&self, memory: &Memory) -> u64 {
+        // SAFETY: the buffer is live and has the usage.
+        unsafe { self.raw.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(memory.raw)) }
+    }
+
     /// Gives it back. No submit uses it.
     pub(super) fn release(&self, memory: Memory) {
         // SAFETY: ours, and every submit waits.
         unsafe { self.raw.destroy_buffer(memory.raw, None) };
-        let _ = self.lock_allocator().free(memory.allocation);
+        let _ = locked(&self.allocator).free(memory.allocation);
     }
 
     pub(super) fn release_staging(&self) {
-        let staging = std::mem::take(&mut *self.lock_staging());
-        staging.upload.into_iter().chain(staging.download).for_each(|memory| self.release(memory));
+        let staging = std::mem::take(&mut *locked(&self.staging));
+        staging.into_iter().flatten().for_each(|memory| self.release(memory));
     }
 
     /// Copies `data` to the start of a buffer.
     pub(super) fn stage_in(&self, data: &[u8], target: vk::Buffer) -> Result<()> {
-        let mut staging = self.lock_staging();
-        let (source, mapped) = self.staged(
-            &mut staging.upload,
-            "staging: upload",
-            vk::BufferUsageFlags::TRANSFER_SRC,
-            MemoryLocation::CpuToGpu,
-        )?;
+        let mut staging = locked(&self.staging);
+        let (source, mapped) = self.staged(&mut staging, UPLOAD)?;
         for (i, chunk) in data.chunks(CHUNK).enumerate() {
             // SAFETY: mapped, at least a chunk long, and the copy out of it before has been waited for.
             unsafe { std::ptr::copy_nonoverlapping(chunk.as_ptr(), mapped, chunk.len()) };
@@ -123,13 +129,8 @@ impl Device {
 
     /// Copies what lies at `offset` of a buffer to `data`.
     pub(super) fn stage_out(&self, source: vk::Buffer, offset: u64, data: &mut [u8]) -> Result<()> {
-        let mut staging = self.lock_staging();
-        let (target, mapped) = self.staged(
-            &mut staging.download,
-            "staging: download",
-            vk::BufferUsageFlags::TRANSFER_DST,
-            MemoryLocation::GpuToCpu,
-        )?;
+        let mut staging = locked(&self.staging);
+        let (target, mapped) = self.staged(&mut staging, DOWNLOAD)?;
         for (i, chunk) in data.chunks_mut(CHUNK).enumerate() {
             let from = offset + (i * CHUNK) as u64;
             self.copy((source, from), (target, 0), chunk.len() as u64)?;
@@ -139,17 +140,14 @@ impl Device {
         Ok(())
     }
 
-    fn staged(
-        &self,
-        memory: &mut Option<Memory>,
-        name: &str,
-        usage: vk::BufferUsageFlags,
-        location: MemoryLocation,
-    ) -> Result<(vk::Buffer, *mut u8)> {
-        if memory.is_none() {
-            *memory = Some(self.memory(name, CHUNK as u64, usage, location)?);
-        }
-        let memory = memory.as_ref().expect("just made");
+    /// One of [`STAGING`], and where it is mapped.
+    fn staged(&self, staging: &mut [Option<Memory>; 2], which: usize) -> Result<(vk::Buffer, *mut u8)> {
+        let (name, usage, location) = STAGING[which];
+        let memory = match staging[which].take() {
+            Some(memory) => memory,
+            None => self.memory(name, CHUNK as u64, usage, location)?,
+        };
+        let memory = staging[which].insert(memory);
         Ok((memory.raw, memory.mapped().expect("gpu-allocator maps what is visible to the host")))
     }
 

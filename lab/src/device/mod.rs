@@ -24,7 +24,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use hedgerow::gpu::{Context, ContextDesc, Optional, Recorder, Timestamps, TuningChoice, requirements};
 use instance::{VulkanInstance, pick};
-use memory::Staging;
+use memory::Memory;
 use std::mem::ManuallyDrop;
 use std::ops::Deref;
 use std::sync::{Mutex, MutexGuard, OnceLock};
@@ -69,7 +69,8 @@ pub struct Device {
     ray_pipelines: [OnceLock<RayPipeline>; 2],
     /// Whether the host maps all memory, or stages what it writes and reads.
     maps_memory: bool,
-    staging: Mutex<Staging>,
+    /// Buffers that the host maps, of [`memory::STAGING`]; each is made when first used.
+    staging: Mutex<[Option<Memory>; 2]>,
     instance: VulkanInstance,
 }
 
@@ -96,14 +97,12 @@ impl Device {
         let optional = instance.without_what_layers_do_not_know(options.restrict.optional(wanted));
         let mut needs = needs.only(optional);
 
-        let priority = [1.0];
-        let queue =
-            vk::DeviceQueueCreateInfo::default().queue_family_index(needs.queue_family).queue_priorities(&priority);
+        let queues =
+            [vk::DeviceQueueCreateInfo::default().queue_family_index(needs.queue_family).queue_priorities(&[1.0])];
         let driver_tracing = options.driver_tracing.and_then(|way| way.among(&found.driver_tracing));
         let of_the_driver = driver_tracing.into_iter().flat_map(DriverTracing::extensions);
         let extensions: Vec<_> = needs.extensions.iter().copied().chain(of_the_driver).map(|e| e.as_ptr()).collect();
         let mut features = DriverFeatures::default();
-        let queues = [queue];
         let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
         if let Some(way) = driver_tracing {
             info = features.push_into(way, info);
@@ -195,10 +194,7 @@ impl Device {
 
     /// Bytes that one buffer may have, at most.
     fn largest_allocation(&self) -> u64 {
-        let mut limits = vk::PhysicalDeviceMaintenance3Properties::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
-        // SAFETY: the handles are live; the structures outlive the call.
-        unsafe { self.instance.raw.get_physical_device_properties2(self.physical, &mut properties) };
+        let limits: vk::PhysicalDeviceMaintenance3Properties<'_> = properties(&self.instance.raw, self.physical);
         limits.max_memory_allocation_size.min(self.found.memory)
     }
 
@@ -219,10 +215,7 @@ impl Device {
         let bytes = bytes.max(16);
         let location = if self.maps_memory { MemoryLocation::CpuToGpu } else { MemoryLocation::GpuOnly };
         let memory = self.memory(name, bytes, usage, location)?;
-        let info = vk::BufferDeviceAddressInfo::default().buffer(memory.raw);
-        // SAFETY: the buffer is live and has the usage.
-        let address = unsafe { self.raw.get_buffer_device_address(&info) };
-        Ok(Buffer { device: self, memory: Some(memory), address, bytes })
+        Ok(Buffer { device: self, address: self.address_of(&memory), memory: Some(memory), bytes })
     }
 
     /// A buffer that holds `data`.
@@ -241,10 +234,9 @@ impl Device {
     /// Those of `record`; a submit that fails or does not finish; validation messages.
     pub fn run(
         &self,
-        timestamps: Option<&mut Timestamps>,
+        mut timestamps: Option<&mut Timestamps>,
         record: impl FnOnce(&mut Recorder<'_>) -> hedgerow::Result<()>,
     ) -> Result<()> {
-        let mut timestamps = timestamps;
         let waited = self.submit(|commands| {
             // SAFETY: the command buffer is being recorded, by this call alone, and the submit is waited for.
             let recorder = unsafe { Recorder::new(&self.context, commands) };
@@ -294,22 +286,17 @@ impl Device {
             let visible = vk::AccessFlags::HOST_READ | vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE;
             let barrier =
                 vk::MemoryBarrier::default().src_access_mask(vk::AccessFlags::MEMORY_WRITE).dst_access_mask(visible);
-            self.raw.cmd_pipeline_barrier(
-                commands,
-                vk::PipelineStageFlags::ALL_COMMANDS,
-                vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::ALL_COMMANDS,
-                vk::DependencyFlags::empty(),
-                &[barrier],
-                &[],
-                &[],
-            );
+            let before = vk::PipelineStageFlags::ALL_COMMANDS;
+            let after = vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::ALL_COMMANDS;
+            let no_flags = vk::DependencyFlags::empty();
+            self.raw.cmd_pipeline_barrier(commands, before, after, no_flags, &[barrier], &[], &[]);
             self.raw.end_command_buffer(commands).map_err(Error::vulkan("vkEndCommandBuffer"))?;
             Ok(commands)
         }
     }
 
     unsafe fn submitted(&self, commands: vk::CommandBuffer) -> Result<Duration> {
-        let queue = self.queue.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let queue = locked(&self.queue);
         // SAFETY: as in `submit`; the queue is locked.
         unsafe {
             let fence =
@@ -317,15 +304,14 @@ impl Device {
             let buffers = [commands];
             let info = vk::SubmitInfo::default().command_buffers(&buffers);
             let begin = Instant::now();
-            let done =
-                self.raw.queue_submit(*queue, &[info], fence).map_err(Error::vulkan("vkQueueSubmit")).and_then(|()| {
-                    match self.raw.wait_for_fences(&[fence], true, SUBMIT_BOUND.as_nanos() as u64) {
-                        Err(vk::Result::TIMEOUT) => {
-                            Err(Error::Timeout { what: "a submit".into(), seconds: SUBMIT_BOUND.as_secs() })
-                        }
-                        other => other.map_err(Error::vulkan("vkWaitForFences")),
-                    }
-                });
+            let submitted = self.raw.queue_submit(*queue, &[info], fence).map_err(Error::vulkan("vkQueueSubmit"));
+            let wait = || self.raw.wait_for_fences(&[fence], true, SUBMIT_BOUND.as_nanos() as u64);
+            let done = submitted.and_then(|()| match wait() {
+                Err(vk::Result::TIMEOUT) => {
+                    Err(Error::Timeout { what: "a submit".into(), seconds: SUBMIT_BOUND.as_secs() })
+                }
+                other => other.map_err(Error::vulkan("vkWaitForFences")),
+            });
             if !matches!(done, Err(Error::Timeout { .. })) {
                 self.raw.destroy_fence(fence, None);
             }
@@ -346,14 +332,23 @@ impl Device {
         let messages = self.instance.take_messages();
         if messages.is_empty() { Ok(()) } else { Err(Error::Validation(messages.join("\n"))) }
     }
+}
 
-    fn lock_allocator(&self) -> MutexGuard<'_, Allocator> {
-        self.allocator.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-    }
+/// What a lock guards, even where a thread panicked that held it.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
 
-    fn lock_staging(&self) -> MutexGuard<'_, Staging> {
-        self.staging.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-    }
+/// What a physical device says of itself in one of Vulkan's structures.
+fn properties<P: vk::ExtendsPhysicalDeviceProperties2 + Default>(
+    instance: &ash::Instance,
+    physical_device: vk::PhysicalDevice,
+) -> P {
+    let mut wanted = P::default();
+    let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut wanted);
+    // SAFETY: the handles are live; the structures outlive the call.
+    unsafe { instance.get_physical_device_properties2(physical_device, &mut all) };
+    wanted
 }
 
 impl Drop for Device {

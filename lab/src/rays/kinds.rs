@@ -90,35 +90,28 @@ pub fn generate(
         return Err(Error::Scene(format!("{}: no triangles, so there is nothing to send rays to", scene.name)));
     }
     let draw = |item: usize| random_of(options.seed, kind, item as u64);
-    let primary = || primary(&scene.camera, options.size);
-    Ok(match kind {
-        RayKind::Primary => primary(),
-        RayKind::Random => random(&bounds, (width * height) as usize, draw),
-        RayKind::Shadow => {
-            let lights = lights_of(scene, &bounds);
-            from_each(&surfaces_hit(scene, &primary(), closest_hits)?, draw, |surface, random| {
-                lights.iter().map(|light| surface.towards(light, random)).collect()
-            })
+    let arriving = match kind {
+        RayKind::Primary => return Ok(primary(&scene.camera, options.size)),
+        RayKind::Random => return Ok(random(&bounds, (width * height) as usize, draw)),
+        RayKind::Diffuse2 => generate(RayKind::Diffuse1, scene, options, closest_hits)?,
+        _ => primary(&scene.camera, options.size),
+    };
+    let surfaces = surfaces_hit(scene, &arriving, closest_hits)?;
+    let lights = lights_of(scene, &bounds);
+    let diffuse = |surface: &Surface, random: &mut SplitMix64| surface.leave(cosine_weighted(random, surface.normal));
+    let leaving = |(i, surface): (usize, &Surface)| -> Vec<Ray> {
+        let mut random = draw(i);
+        match kind {
+            RayKind::Shadow => lights.iter().map(|light| surface.towards(light, &mut random)).collect(),
+            RayKind::Ao => {
+                let t_max = TENTH * bounds.diagonal();
+                (0..AO_RAYS).map(|_| Ray { t_max, ..diffuse(surface, &mut random) }).collect()
+            }
+            RayKind::Reflection => vec![surface.leave(surface.mirrored())],
+            _ => vec![diffuse(surface, &mut random)],
         }
-        RayKind::Ao => {
-            let length = TENTH * bounds.diagonal();
-            from_each(&surfaces_hit(scene, &primary(), closest_hits)?, draw, |surface, random| {
-                (0..AO_RAYS)
-                    .map(|_| Ray { t_max: length, ..surface.leave(cosine_weighted(random, surface.normal)) })
-                    .collect()
-            })
-        }
-        RayKind::Diffuse1 => diffuse1(scene, options, &primary(), closest_hits)?,
-        RayKind::Diffuse2 => {
-            let rays = diffuse1(scene, options, &primary(), closest_hits)?;
-            from_each(&surfaces_hit(scene, &rays, closest_hits)?, draw, |surface, random| {
-                vec![surface.leave(cosine_weighted(random, surface.normal))]
-            })
-        }
-        RayKind::Reflection => from_each(&surfaces_hit(scene, &primary(), closest_hits)?, draw, |surface, _| {
-            vec![surface.leave(surface.mirrored())]
-        }),
-    })
+    };
+    Ok(surfaces.par_iter().enumerate().flat_map_iter(leaving).collect())
 }
 
 /// Where the pixels of a picture lie in space.
@@ -175,27 +168,6 @@ fn random(bounds: &Aabb, count: usize, draw: impl Fn(usize) -> SplitMix64 + Sync
             Ray { origin: from.to_array(), t_min: 0.0, direction: (to - from).to_array(), t_max: 1.0 }
         })
         .collect()
-}
-
-fn diffuse1(
-    scene: &Scene,
-    options: &RayOptions,
-    primary: &[Ray],
-    closest_hits: &mut dyn FnMut(&[Ray]) -> Result<Vec<Hit>>,
-) -> Result<Vec<Ray>> {
-    let draw = |item: usize| random_of(options.seed, RayKind::Diffuse1, item as u64);
-    Ok(from_each(&surfaces_hit(scene, primary, closest_hits)?, draw, |surface, random| {
-        vec![surface.leave(cosine_weighted(random, surface.normal))]
-    }))
-}
-
-/// The rays that `make` sends from each surface, in the order of the surfaces.
-fn from_each(
-    surfaces: &[Surface],
-    draw: impl Fn(usize) -> SplitMix64 + Sync,
-    make: impl Fn(&Surface, &mut SplitMix64) -> Vec<Ray> + Sync,
-) -> Vec<Ray> {
-    surfaces.par_iter().enumerate().flat_map_iter(|(i, surface)| make(surface, &mut draw(i))).collect()
 }
 
 /// Lights of the scene, or one square above its box.

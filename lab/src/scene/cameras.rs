@@ -6,10 +6,10 @@ use hedgerow::geometry::Aabb;
 const Y: [f32; 3] = [0.0, 1.0, 0.0];
 const Z: [f32; 3] = [0.0, 0.0, 1.0];
 
-/// Scene, eye, look-at, up and vertical field of view.
+/// Scene (one that ends in a colon: all that begin so), eye, look-at, up and vertical field of view.
 type KnownCamera = (&'static str, [f32; 3], [f32; 3], [f32; 3], f32);
 
-const KNOWN: [KnownCamera; 23] = [
+const KNOWN: [KnownCamera; 26] = [
     ("pigman", [2.0, 2.0, 3.0], [0.0, 0.9, 0.0], Y, 40.0),
     ("knot", [2.6, 4.6, 5.4], [0.0, 0.0, 0.0], Y, 45.0),
     ("grass", [0.3, 0.6, 2.4], [0.0, 0.3, 0.0], Y, 60.0),
@@ -33,23 +33,18 @@ const KNOWN: [KnownCamera; 23] = [
     ("country_kitchen", [1.211, 1.805, 3.852], [0.773, 1.763, 2.954], Y, 36.0),
     ("hair", [40.0, -110.0, 35.0], [0.0, -5.0, 20.0], Z, 50.0),
     ("forest", [60.0, 32.0, 60.0], [250.0, 12.0, 250.0], Y, 60.0),
+    // The object on the floor, the stands behind it.
+    ("gen:stadium:", [127.0, 3.0, -39.0], [123.0, 1.0, -45.0], Y, 50.0),
+    // In the open corner of the room.
+    ("gen:clutter:", [0.9, 0.6, 0.9], [-0.3, 0.25, -0.3], Y, 60.0),
+    // In a street of the first plot, in the boxes of eleven blocks.
+    ("gen:city:", [0.359, 0.06, -0.1], [0.359, 0.1, -0.35], Y, 60.0),
 ];
 
 /// The camera of a scene that we know by name.
 pub(super) fn known(name: &str) -> Option<Camera> {
-    if name.starts_with("gen:stadium:") {
-        // The object on the floor, the stands behind it.
-        return Some(Camera { eye: [127.0, 3.0, -39.0], look: [123.0, 1.0, -45.0], up: Y, fov: 50.0 });
-    }
-    if name.starts_with("gen:clutter:") {
-        // In the open corner of the room.
-        return Some(Camera { eye: [0.9, 0.6, 0.9], look: [-0.3, 0.25, -0.3], up: Y, fov: 60.0 });
-    }
-    if name.starts_with("gen:city:") {
-        // In a street of the first plot, in the boxes of eleven blocks.
-        return Some(Camera { eye: [0.359, 0.06, -0.1], look: [0.359, 0.1, -0.35], up: Y, fov: 60.0 });
-    }
-    let (_, eye, look, up, fov) = *KNOWN.iter().find(|(known, ..)| *known == name)?;
+    let (_, eye, look, up, fov) =
+        *KNOWN.iter().find(|(known, ..)| *known == name || known.ends_with(':') && name.starts_with(known))?;
     Some(Camera { eye, look, up, fov })
 }
 

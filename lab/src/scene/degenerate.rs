@@ -21,133 +21,100 @@ const UNIT: Corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
 /// All of them, of about `count` triangles where the name does not say how many. The same every time.
 pub fn degenerate(count: u32) -> Vec<Degenerate> {
-    let mut list = List { count, scenes: Vec::new() };
-    list.few();
-    list.equal();
-    list.flat_and_thin();
-    list.scales();
-    list.far();
-    list.broken();
-    list.scenes
+    let groups = [few(), equal(count), flat_and_thin(count), scales(count), far(count), broken(count)];
+    groups.into_iter().flatten().collect()
 }
 
-struct List {
-    count: u32,
-    scenes: Vec<Degenerate>,
+fn scene(name: &'static str, what: &'static str, triangles: impl IntoIterator<Item = Corners>) -> Degenerate {
+    Degenerate { name, what, mesh: Mesh::of_corners(triangles) }
 }
 
-impl List {
-    fn add(&mut self, name: &'static str, what: &'static str, triangles: Vec<Corners>) {
-        let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        let mesh = Mesh { positions: triangles.into_iter().flatten().collect(), triangles: indices };
-        self.scenes.push(Degenerate { name, what, mesh });
-    }
+fn few() -> Vec<Degenerate> {
+    vec![
+        scene("empty", "no triangle at all", []),
+        scene("one", "one triangle: no inner node", [UNIT]),
+        scene("two", "two triangles: one inner node", [UNIT, moved(UNIT, [2.0; 3])]),
+    ]
+}
 
-    fn few(&mut self) {
-        self.add("empty", "no triangle at all", vec![]);
-        self.add("one", "one triangle: no inner node", vec![UNIT]);
-        self.add("two", "two triangles: one inner node", vec![UNIT, moved(UNIT, [2.0; 3])]);
-    }
+fn equal(n: u32) -> Vec<Degenerate> {
+    let half = random(n / 2, [0.0; 3], [1.0; 3]);
+    let growing = (1..=n).map(|i| around_the_origin(1.0 + i as f32));
+    let zeros = [[-0.0, 0.0, -0.0], [0.0, -0.0, 1.0], [-0.0, 1.0, 0.0]];
+    vec![
+        scene("identical", "every triangle the same", vec![UNIT; n as usize]),
+        scene("twice", "every triangle two times", [&half[..], &half[..]].concat()),
+        scene("equal centroids", "around one point, each a little larger than the one before", growing),
+        scene("points", "every corner at one point", vec![[[0.25; 3]; 3]; n as usize]),
+        scene("negative zeros", "zeros of both signs", vec![zeros; n as usize]),
+    ]
+}
 
-    fn equal(&mut self) {
-        let n = self.count;
-        self.add("identical", "every triangle the same", vec![UNIT; n as usize]);
-        self.add("twice", "every triangle two times", {
-            let half = random(n / 2, [0.0; 3], [1.0; 3]);
-            half.iter().chain(&half).copied().collect()
-        });
-        self.add("equal centroids", "around one point, each a little larger than the one before", {
-            (1..=n).map(|i| around_the_origin(1.0 + i as f32)).collect()
-        });
-        self.add("points", "every corner at one point", vec![[[0.25; 3]; 3]; n as usize]);
-        self.add("negative zeros", "zeros of both signs", {
-            let corners = [[-0.0, 0.0, -0.0], [0.0, -0.0, 1.0], [-0.0, 1.0, 0.0]];
-            vec![corners; n as usize]
-        });
-    }
+fn flat_and_thin(n: u32) -> Vec<Degenerate> {
+    let diagonal = (0..n).map(|i| moved(around_the_origin(0.5), [i as f32; 3]));
+    let flattened = |[a, b, _]: Corners| [a, b, std::array::from_fn(|i| 0.5 * a[i] + 0.5 * b[i])];
+    let without_area = random(n, [0.0; 3], [1.0; 3]).into_iter().map(flattened);
+    let needles = generators::needles(n, 1);
+    vec![
+        scene("in a plane", "flat in y", random(n, [0.0, 3.0, 0.0], [1.0, 0.0, 1.0])),
+        scene("on a line", "flat in x and y: no area", random(n, [0.0, 0.0, -5.0], [0.0, 0.0, 10.0])),
+        scene("along a line", "their middles on the diagonal, with area", diagonal),
+        scene("long street", "a thousand times as long as high", random(n, [0.0; 3], [1000.0, 1.0, 3.0])),
+        Degenerate { name: "needles", what: "a thousandth as wide as long", mesh: needles },
+        scene("zero area", "all three corners on a line, anywhere", without_area),
+    ]
+}
 
-    fn flat_and_thin(&mut self) {
-        let n = self.count;
-        self.add("in a plane", "flat in y", random(n, [0.0, 3.0, 0.0], [1.0, 0.0, 1.0]));
-        self.add("on a line", "flat in x and y: no area", random(n, [0.0, 0.0, -5.0], [0.0, 0.0, 10.0]));
-        self.add("along a line", "their middles on the diagonal, with area", {
-            (0..n).map(|i| moved(around_the_origin(0.5), [i as f32; 3])).collect()
-        });
-        self.add("long street", "a thousand times as long as high", random(n, [0.0; 3], [1000.0, 1.0, 3.0]));
-        let needles = generators::needles(n, 1);
-        self.scenes.push(Degenerate { name: "needles", what: "a thousandth as wide as long", mesh: needles });
-        self.add("zero area", "all three corners on a line, anywhere", {
-            let middle = |[a, b, _]: Corners| [a, b, std::array::from_fn(|i| 0.5 * a[i] + 0.5 * b[i])];
-            random(n, [0.0; 3], [1.0; 3]).into_iter().map(middle).collect()
-        });
-    }
+fn scales(n: u32) -> Vec<Degenerate> {
+    let mut random_numbers = SplitMix64::new(11);
+    let mut power = || power_of_two(random_numbers.within(-20.0, 20.0));
+    let mixed = (0..n).map(|_| moved(around_the_origin(power()), [power(), power(), power()]));
+    let boxes = n.div_ceil(12).max(2);
+    let box_size = |i: u32| power_of_two(100.0 * i as f32 / (boxes - 1) as f32 - 50.0);
+    let nested = (0..boxes).flat_map(|i| cube(box_size(i))).take(n as usize);
+    let row_size = |i: u32| 2f32.powi(i as i32 % 96 - 48);
+    let row = (0..n).map(|i| moved(around_the_origin(row_size(i)), [3.0 * row_size(i); 3]));
+    vec![
+        scene("mixed scales", "places and sizes from 1e-6 to 1e6", mixed),
+        scene("nested", "boxes one in another, each larger by the same factor, from 2^-50 to 2^50", nested),
+        scene("geometric row", "in a row, each twice as far and large as the one before, over and over", row),
+        scene("tiny", "coordinates of 1e-30", random(n, [1e-30; 3], [1e-30; 3])),
+        scene("huge", "coordinates of 1e30", random(n, [-1e30; 3], [2e30; 3])),
+        scene("as large as floats are", "coordinates of 3e38", random(n, [-3.0e38; 3], [3.0e38; 3])),
+    ]
+}
 
-    fn scales(&mut self) {
-        let n = self.count;
-        self.add("mixed scales", "places and sizes from 1e-6 to 1e6", {
-            let mut random = SplitMix64::new(11);
-            let mut power = || power_of_two(random.within(-20.0, 20.0));
-            (0..n).map(|_| moved(around_the_origin(power()), [power(), power(), power()])).collect()
-        });
-        self.add("nested", "boxes one in another, each larger by the same factor, from 2^-50 to 2^50", {
-            let boxes = n.div_ceil(12).max(2);
-            let size = |i: u32| power_of_two(100.0 * i as f32 / (boxes - 1) as f32 - 50.0);
-            (0..boxes).flat_map(|i| cube(size(i))).take(n as usize).collect()
-        });
-        self.add("geometric row", "in a row, each twice as far and large as the one before, over and over", {
-            let size = |i: u32| 2f32.powi(i as i32 % 96 - 48);
-            (0..n).map(|i| moved(around_the_origin(size(i)), [3.0 * size(i); 3])).collect()
-        });
-        self.add("tiny", "coordinates of 1e-30", random(n, [1e-30; 3], [1e-30; 3]));
-        self.add("huge", "coordinates of 1e30", random(n, [-1e30; 3], [2e30; 3]));
-        self.add("as large as floats are", "coordinates of 3e38", random(n, [-3.0e38; 3], [3.0e38; 3]));
-    }
+fn far(n: u32) -> Vec<Degenerate> {
+    let cube_at = |lo: f32, edge: f32| random(n, [lo; 3], [edge; 3]);
+    let near_and = |others: Vec<Corners>| cube_at(0.0, 1.0).into_iter().chain(others);
+    let mut directions = SplitMix64::new(12);
+    let mut in_any_direction = |i: u32| {
+        let distance = 2f32.powi(10 + i as i32);
+        moved(UNIT, directions.point(-1.0, 1.0).map(|x| x * distance))
+    };
+    let hundred = (0..100).map(&mut in_any_direction).collect();
+    let one_far = vec![[[1e12, 0.0, 0.0], [1e12, 1.0, 0.0], [1e12, 0.0, 1.0]]];
+    let one_huge = vec![[[-1e6, -1e6, 0.0], [1e6, -1e6, 0.0], [0.0, 1e6, 0.5]]];
+    vec![
+        scene("far from the origin", "of size 100 at 1e6: a sixteenth from float to float", cube_at(1e6, 100.0)),
+        scene("very far from the origin", "of size 1e26 at 1e30: few floats apart", cube_at(1e30, 1e26)),
+        scene("lost far from the origin", "of size 1 at 1e30: all at one float", cube_at(1e30, 1.0)),
+        scene("one far away", "one triangle at 1e12", near_and(one_far)),
+        scene("a hundred far away", "a hundred triangles from 1e3 to 1e33 in all directions", near_and(hundred)),
+        scene("one huge", "one triangle a million times as large as the scene", near_and(one_huge)),
+    ]
+}
 
-    fn far(&mut self) {
-        let n = self.count;
-        let near = || random(n, [0.0; 3], [1.0; 3]);
-        self.add(
-            "far from the origin",
-            "of size 100 at 1e6: a sixteenth from float to float",
-            random(n, [1e6; 3], [100.0; 3]),
-        );
-        self.add("very far from the origin", "of size 1e26 at 1e30: few floats apart", random(n, [1e30; 3], [1e26; 3]));
-        self.add("lost far from the origin", "of size 1 at 1e30: all at one float", random(n, [1e30; 3], [1.0; 3]));
-        self.add("one far away", "one triangle at 1e12", {
-            near().into_iter().chain([[[1e12, 0.0, 0.0], [1e12, 1.0, 0.0], [1e12, 0.0, 1.0]]]).collect()
-        });
-        self.add("a hundred far away", "a hundred triangles from 1e3 to 1e33 in all directions", {
-            let mut directions = SplitMix64::new(12);
-            let far = |i: u32| {
-                let distance = 2f32.powi(10 + i as i32);
-                moved(UNIT, directions.point(-1.0, 1.0).map(|x| x * distance))
-            };
-            near().into_iter().chain((0..100).map(far)).collect()
-        });
-        self.add("one huge", "one triangle a million times as large as the scene", {
-            near().into_iter().chain([[[-1e6, -1e6, 0.0], [1e6, -1e6, 0.0], [0.0, 1e6, 0.5]]]).collect()
-        });
-    }
-
-    fn broken(&mut self) {
-        let n = self.count as usize;
-        self.add("not finite and out of range", "NaN, infinite and missing vertices among sound ones", {
-            random(self.count, [0.0; 3], [1.0; 3])
-        });
-        let mesh = &mut self.scenes.last_mut().expect("just added").mesh;
-        for (i, corner) in mesh.positions.iter_mut().enumerate() {
-            match i % 97 {
-                10 => *corner = [f32::NAN, 0.0, 0.0],
-                41 => *corner = [0.0, f32::INFINITY, 0.0],
-                70 => *corner = [0.5, 0.5, f32::NEG_INFINITY],
-                _ => {}
-            }
-        }
-        let vertices = mesh.positions.len() as u32;
-        mesh.triangles.iter_mut().step_by(53).for_each(|triangle| triangle[2] = vertices);
-        mesh.triangles.iter_mut().skip(1).step_by(89).for_each(|triangle| triangle[0] = u32::MAX);
-        self.add("nothing finite", "every corner NaN", vec![[[f32::NAN; 3]; 3]; n]);
-    }
+fn broken(n: u32) -> Vec<Degenerate> {
+    let among_sound_ones = "NaN, infinite and missing vertices among sound ones";
+    let mut some = scene("not finite and out of range", among_sound_ones, random(n, [0.0; 3], [1.0; 3]));
+    let Mesh { positions, triangles } = &mut some.mesh;
+    positions.iter_mut().skip(10).step_by(97).for_each(|corner| *corner = [f32::NAN, 0.0, 0.0]);
+    positions.iter_mut().skip(41).step_by(97).for_each(|corner| *corner = [0.0, f32::INFINITY, 0.0]);
+    positions.iter_mut().skip(70).step_by(97).for_each(|corner| *corner = [0.5, 0.5, f32::NEG_INFINITY]);
+    triangles.iter_mut().step_by(53).for_each(|triangle| triangle[2] = positions.len() as u32);
+    triangles.iter_mut().skip(1).step_by(89).for_each(|triangle| triangle[0] = u32::MAX);
+    vec![some, scene("nothing finite", "every corner NaN", vec![[[f32::NAN; 3]; 3]; n as usize])]
 }
 
 fn moved(corners: Corners, by: [f32; 3]) -> Corners {

@@ -30,13 +30,11 @@ impl<'a> Frame<'a> {
         match group {
             Group::Whole => self.scene.mesh.clone(),
             Group::Moving => {
-                let objects = 0..self.dynamic.objects.len();
-                objects.map(|k| self.mesh(Group::Object(k))).fold(Mesh::default(), |mut all, mesh| {
-                    let first = all.positions.len() as u32;
-                    all.positions.extend(mesh.positions);
-                    all.triangles.extend(mesh.triangles.iter().map(|triangle| triangle.map(|v| v + first)));
-                    all
-                })
+                let mut all = Mesh::default();
+                for object in &self.dynamic.objects {
+                    all.append(object.placed(self.time), &object.triangles);
+                }
+                all
             }
             Group::Object(k) => {
                 let object = &self.dynamic.objects[k];

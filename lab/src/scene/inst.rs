@@ -1,7 +1,8 @@
 //! `.inst`: placed copies of the objects of an OBJ file, one a line: the object's `o` name and a row-major 3×4
 //! object-to-world matrix; `#` begins a comment. `NAME.inst` places the objects of `NAME_parts.obj` beside it.
 
-use super::{Instances, LoadOptions, Mesh, SceneInstance, cameras, check, lookup, obj, source};
+use super::check::{self, malformed};
+use super::{Instances, LoadOptions, Mesh, SceneInstance, cameras, lookup, obj, source};
 use crate::{Error, Result};
 use hedgerow::geometry::Aabb;
 use std::path::{Path, PathBuf};
@@ -26,9 +27,8 @@ pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Instances> 
         }
         if instances.len() == before {
             let (parts, names) = (parts_path.display(), names.join(", "));
-            return Err(Error::Malformed(format!(
-                "{place}: {parts} has no object {name:?}, it has {names}; correct the name"
-            )));
+            let what = format_args!("{parts} has no object {name:?}, it has {names}; correct the name");
+            return Err(malformed(place, what));
         }
     }
     Ok(Instances::new(lookup::name_of(path), parts, instances, cameras::around))
@@ -55,13 +55,13 @@ type Matrix = [[f32; 4]; 3];
 fn instance<'a>(place: &str, line: &'a str) -> Result<Option<(&'a str, Matrix)>> {
     let mut words = line.split_whitespace();
     let Some(name) = words.next() else { return Ok(None) };
-    let numbers: Vec<Option<f32>> = words.map(|word| word.parse().ok().filter(|n: &f32| n.is_finite())).collect();
-    let numbers: Option<Vec<f32>> = numbers.into_iter().collect();
+    let numbers: Option<Vec<f32>> = words.map(|word| word.parse().ok().filter(|n: &f32| n.is_finite())).collect();
     match numbers.as_deref().map(<[f32]>::as_chunks::<4>) {
         Some((&[x, y, z], [])) => Ok(Some((name, [x, y, z]))),
-        _ => Err(Error::Malformed(format!(
-            "{place}: an instance is a name and 12 finite numbers (a row-major 3x4 matrix); is the file cut off?"
-        ))),
+        _ => {
+            let what = "an instance is a name and 12 finite numbers (a row-major 3x4 matrix); is the file cut off?";
+            Err(malformed(place, what))
+        }
     }
 }
 

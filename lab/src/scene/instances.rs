@@ -87,10 +87,9 @@ impl Instances {
     pub fn flatten(&self) -> Result<Mesh> {
         let triangles = self.triangle_count();
         if triangles > Instances::MOST_FLATTENED {
+            let (name, most) = (&self.name, Instances::MOST_FLATTENED);
             return Err(Error::Scene(format!(
-                "{}: {triangles} triangles when flattened, there may be {}; take fewer instances",
-                self.name,
-                Instances::MOST_FLATTENED
+                "{name}: {triangles} triangles when flattened, there may be {most}; take fewer instances"
             )));
         }
         let vertices = self.instances.iter().map(|i| self.parts[i.part as usize].positions.len()).sum();
@@ -99,9 +98,7 @@ impl Instances {
             Mesh { positions: Vec::with_capacity(vertices), triangles: Vec::with_capacity(triangles as usize) };
         for instance in &self.instances {
             let part = &self.parts[instance.part as usize];
-            let first = mesh.positions.len() as u32;
-            mesh.positions.extend(part.positions.iter().map(|&p| instance.place(p)));
-            mesh.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
+            mesh.append(part.positions.iter().map(|&p| instance.place(p)), &part.triangles);
         }
         Ok(mesh)
     }
@@ -119,7 +116,7 @@ fn bounds(parts: &[Mesh], instances: &[SceneInstance]) -> Aabb {
     });
     instances.iter().fold(core, |bounds, instance| {
         let part = instance.part as usize;
-        if corners[part].is_empty() || contains(&bounds, &instance.place_box(&boxes[part])) {
+        if corners[part].is_empty() || bounds.contains(&instance.place_box(&boxes[part])) {
             return bounds;
         }
         with(bounds, instance, &corners[part])
@@ -131,10 +128,6 @@ fn corners(mesh: &Mesh) -> Vec<[f32; 3]> {
     let mut is_used = vec![false; mesh.positions.len()];
     mesh.triangles.iter().flatten().for_each(|&v| is_used[v as usize] = true);
     mesh.positions.iter().zip(is_used).filter_map(|(&p, is_used)| is_used.then_some(p)).collect()
-}
-
-fn contains(outer: &Aabb, inner: &Aabb) -> bool {
-    (0..3).all(|i| outer.lo[i] <= inner.lo[i] && inner.hi[i] <= outer.hi[i])
 }
 
 /// Loads the scene that `spec` names as [`load`] does, but without flattening it: an `.inst` file and the generators of

@@ -1,6 +1,7 @@
 //! From what a user types to a file: paths as they are, bare names looked up in folders of scenes.
 
 use crate::{Error, Result};
+use std::fs::DirEntry;
 use std::path::{Path, PathBuf};
 
 /// The formats, by extension, in the order in which a bare name without one is looked up.
@@ -17,13 +18,10 @@ pub fn own_folders() -> Vec<PathBuf> {
 /// # Errors
 /// The folder cannot be read.
 pub fn list(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(Error::file(folder))? {
-        let path = entry.map_err(Error::file(folder))?.path();
-        if path.is_file() && format_of(&path).is_some_and(|f| f != "dyn" && FORMATS.contains(&f.as_str())) {
-            files.push(path);
-        }
-    }
+    let entries: Vec<DirEntry> = std::fs::read_dir(folder).and_then(Iterator::collect).map_err(Error::file(folder))?;
+    let is_scene =
+        |path: &PathBuf| path.is_file() && format_of(path).is_some_and(|f| f != "dyn" && FORMATS.contains(&f.as_str()));
+    let mut files: Vec<PathBuf> = entries.iter().map(DirEntry::path).filter(is_scene).collect();
     files.sort_by_key(|path| (name_of(path), path.clone()));
     let placed: Vec<String> = files
         .iter()
@@ -53,12 +51,9 @@ pub(super) fn find(spec: &str, folders: &[PathBuf]) -> Result<PathBuf> {
         return Ok(path.into());
     }
     let is_bare = path.components().count() == 1 && !spec.ends_with(['/', '\\']);
-    if is_bare && let Some(found) = folders.iter().find_map(|folder| variants(&folder.join(spec)).find(|p| p.is_file()))
-    {
+    let places = folders.iter().filter(|_| is_bare).map(|folder| folder.join(spec)).chain([path.into()]);
+    if let Some(found) = places.flat_map(|place| variants(&place)).find(|p| p.is_file()) {
         return Ok(found);
-    }
-    if let Some(packed) = variants(path).find(|p| p.is_file()) {
-        return Ok(packed);
     }
     let looked = folders.iter().map(|f| f.display().to_string()).collect::<Vec<_>>().join(", ");
     Err(Error::Scene(if path.is_dir() {
@@ -77,7 +72,7 @@ pub(super) fn find(spec: &str, folders: &[PathBuf]) -> Result<PathBuf> {
 }
 
 /// `path` as it stands, packed, and with each extension, plain and packed.
-fn variants(path: &Path) -> impl Iterator<Item = PathBuf> {
+fn variants(path: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     let path = path.display().to_string();
     let endings = FORMATS.iter().flat_map(|f| [format!(".{f}"), format!(".{f}.zst")]);
     [String::new(), ".zst".into()].into_iter().chain(endings).map(move |ending| format!("{path}{ending}").into())

@@ -86,10 +86,35 @@ impl Mesh {
         self.triangles.iter().fold(Aabb::EMPTY, |b, t| b.union(&Aabb::around(&t.map(|v| self.positions[v as usize]))))
     }
 
+    /// Triangles that share no vertex.
+    fn of_corners(triangles: impl IntoIterator<Item = [[f32; 3]; 3]>) -> Mesh {
+        let positions: Vec<[f32; 3]> = triangles.into_iter().flatten().collect();
+        let triangles = (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        Mesh { positions, triangles }
+    }
+
+    /// Adds triangles with vertices of their own.
+    fn append(&mut self, positions: impl IntoIterator<Item = [f32; 3]>, triangles: &[[u32; 3]]) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(positions);
+        self.triangles.extend(triangles.iter().map(|triangle| triangle.map(|v| v + first)));
+    }
+
+    /// Adds the two triangles of a quad.
+    fn add_quad(&mut self, [a, b, c, d]: [u32; 4]) {
+        self.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+
     /// The corners of a triangle.
     pub fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
         self.triangles[triangle].map(|v| self.positions[v as usize])
     }
+}
+
+/// The triangles of a polygon, fanned out from its first vertex; `None` if it has fewer than three vertices.
+fn fan(polygon: &[u32]) -> Option<impl Iterator<Item = [u32; 3]>> {
+    let (first, others) = polygon.split_first()?;
+    (others.len() >= 2).then(|| others.windows(2).map(|edge| [*first, edge[0], edge[1]]))
 }
 
 /// How [`load`] finds files and tells how far it is.

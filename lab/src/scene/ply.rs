@@ -1,7 +1,8 @@
 //! PLY, ASCII and binary of either byte order, by ply-rs. Elements `vertex` (x, y, z) and `face` (vertex_indices or
 //! vertex_index) of any number type; everything else is read over.
 
-use super::{LoadOptions, Mesh, check, source};
+use super::check::{checked, malformed};
+use super::{LoadOptions, Mesh, fan, source};
 use crate::{Error, Result};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult};
@@ -16,10 +17,9 @@ pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> {
     for element in header.elements.values() {
         match element.name.as_str() {
             "vertex" => {
-                for axis in ["x", "y", "z"] {
-                    if !element.properties.contains_key(axis) {
-                        return Err(file.malformed(&format!("vertices have no property {axis:?}; export it again")));
-                    }
+                if let Some(axis) = ["x", "y", "z"].into_iter().find(|&axis| !element.properties.contains_key(axis)) {
+                    let what = format_args!("vertices have no property {axis:?}; export it again");
+                    return Err(malformed(path.display(), what));
                 }
                 file.elements(&header, element, |_, Vertex(position)| {
                     positions.push(position);
@@ -27,28 +27,20 @@ pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<Mesh> {
                 })?;
             }
             "face" => {
-                let place = path.display();
                 file.elements(&header, element, |face, Face(polygon)| {
-                    let [first, fan @ ..] = polygon.as_slice() else { return Err(too_few(&place, face, 0)) };
-                    if fan.len() < 2 {
-                        return Err(too_few(&place, face, polygon.len()));
-                    }
-                    triangles.extend(fan.windows(2).map(|edge| [*first, edge[0], edge[1]]));
+                    let fan = fan(&polygon).ok_or_else(|| {
+                        let has = format_args!("face {face} (from 0) has {} vertices", polygon.len());
+                        let remedy = "a face needs at least 3; remove it or export it again";
+                        malformed(path.display(), format_args!("{has}, {remedy}"))
+                    })?;
+                    triangles.extend(fan);
                     Ok(())
                 })?;
             }
             _ => file.elements(&header, element, |_, Skipped| Ok(()))?,
         }
     }
-    check::vertices_are_finite(path.display(), &positions)?;
-    check::indices_are_in_range(path.display(), &triangles, positions.len())?;
-    Ok(Mesh { positions, triangles })
-}
-
-fn too_few(place: &impl std::fmt::Display, face: usize, corners: usize) -> Error {
-    Error::Malformed(format!(
-        "{place}: face {face} (from 0) has {corners} vertices, a face needs at least 3; remove it or export it again"
-    ))
+    checked(path, Mesh { positions, triangles })
 }
 
 struct File<'a> {
@@ -84,7 +76,7 @@ impl File<'_> {
 
     fn error(&self, place: &str, error: ParseError) -> Error {
         if error.kind() == ErrorKind::UnexpectedEof {
-            return self.malformed(&format!("ends before {place}; is it cut off?"));
+            return malformed(self.path.display(), format_args!("ends before {place}; is it cut off?"));
         }
         let line = error.line();
         let text = error.to_string();
@@ -100,15 +92,11 @@ impl File<'_> {
         };
         match line {
             Some(line) => {
-                let path = self.path.display();
-                Error::Malformed(format!("{path}:{line}: {place}: {what}; is it cut off? repair or export it again"))
+                let at = format_args!("{}:{line}: {place}", self.path.display());
+                malformed(at, format_args!("{what}; is it cut off? repair or export it again"))
             }
             None => source::read_error(self.path, std::io::Error::new(error.kind(), format!("{place}: {what}"))),
         }
-    }
-
-    fn malformed(&self, what: &str) -> Error {
-        Error::Malformed(format!("{}: {what}", self.path.display()))
     }
 }
 
@@ -129,19 +117,12 @@ impl PropertyAccess for Vertex {
     }
 
     fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        let axis = match name {
-            "x" => 0,
-            "y" => 1,
-            "z" => 2,
-            _ => return PropertyAccessResult::Ignored,
+        let Some(axis) = ["x", "y", "z"].iter().position(|&axis| axis == name) else {
+            return PropertyAccessResult::Ignored;
         };
-        match value.to_f32_lossy() {
-            Some(value) => {
-                self.0[axis] = value;
-                PropertyAccessResult::Set
-            }
-            None => PropertyAccessResult::UnsupportedType,
-        }
+        let Some(value) = value.to_f32_lossy() else { return PropertyAccessResult::UnsupportedType };
+        self.0[axis] = value;
+        PropertyAccessResult::Set
     }
 }
 

@@ -3,7 +3,8 @@
 //! - `.tri`: `u32` vertex count V, `u32` triangle count T, V × 3 `f32`, T × 3 `u32`.
 //! - `.anim`: `u32` V, `u32` T, `u32` frame count K, T × 3 `u32`, then K frames of V × 3 `f32`.
 
-use super::{LoadOptions, Mesh, check, source};
+use super::check::{self, checked, malformed};
+use super::{LoadOptions, Mesh, source};
 use crate::{Error, Result};
 use std::io::{BufRead, ErrorKind, Read};
 use std::path::Path;
@@ -46,12 +47,6 @@ pub(super) fn read_frames(path: &Path, options: &LoadOptions<'_>) -> Result<Fram
     Ok((triangles, frames))
 }
 
-fn checked(path: &Path, mesh: Mesh) -> Result<Mesh> {
-    check::vertices_are_finite(path.display(), &mesh.positions)?;
-    check::indices_are_in_range(path.display(), &mesh.triangles, mesh.positions.len())?;
-    Ok(mesh)
-}
-
 /// The words of a file, in order.
 struct Words<'a> {
     path: &'a Path,
@@ -73,8 +68,7 @@ impl Words<'_> {
     fn anim_topology(&mut self) -> Result<([u32; 2], Vec<[u32; 3]>)> {
         let [vertices, triangles, frames] = self.head(["vertex count", "triangle count", "frame count"])?;
         if frames == 0 {
-            let path = self.path.display();
-            return Err(Error::Malformed(format!("{path}: no frames; an animation needs at least one")));
+            return Err(malformed(self.path.display(), "no frames; an animation needs at least one"));
         }
         Ok(([vertices, frames], self.triples(triangles, "triangles", |word| word)?))
     }
@@ -99,17 +93,17 @@ impl Words<'_> {
     fn end(&mut self, last: &str) -> Result<()> {
         match self.reader.read(&mut [0]) {
             Ok(0) => Ok(()),
-            Ok(_) => Err(Error::Malformed(format!(
-                "{}: goes on behind its last {last}; its counts are wrong, write it again",
-                self.path.display()
-            ))),
+            Ok(_) => {
+                let what = format_args!("goes on behind its last {last}; its counts are wrong, write it again");
+                Err(malformed(self.path.display(), what))
+            }
             Err(error) => Err(source::read_error(self.path, error)),
         }
     }
 
     fn error(&self, error: std::io::Error, what: impl Fn() -> String) -> Error {
         if error.kind() == ErrorKind::UnexpectedEof {
-            Error::Malformed(format!("{}: ends before {}; is it cut off?", self.path.display(), what()))
+            malformed(self.path.display(), format_args!("ends before {}; is it cut off?", what()))
         } else {
             source::read_error(self.path, error)
         }

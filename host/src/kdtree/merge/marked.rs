@@ -6,7 +6,7 @@ use super::partition::{Partition, Source};
 use super::tree::Forest;
 use hedgerow::bvh::layout::Triangle;
 use hedgerow::geometry::Aabb;
-use hedgerow::kdtree::layout::{KdContent, KdTree};
+use hedgerow::kdtree::layout::{KdContent, KdHeader, KdTree};
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::kdtree::twin::heuristic::Heuristic;
 use std::ops::Range;
@@ -18,9 +18,8 @@ pub(super) struct MarkedObject {
     pub primitives: Range<u32>,
     /// Numbered as the scene has it.
     pub records: Vec<Triangle>,
-    pub reach: f32,
-    pub cell: Aabb,
-    pub status: u32,
+    /// Of its tree.
+    pub header: KdHeader,
     /// Its tree and the parts of it.
     pub forest: Forest<'static>,
     /// The leaves that it has a part in.
@@ -29,11 +28,8 @@ pub(super) struct MarkedObject {
 
 impl MarkedObject {
     fn source(&self) -> Source<'_> {
-        Source {
-            forest: Forest::over(&self.forest),
-            records: (&self.records, self.reach),
-            first: self.primitives.start,
-        }
+        let records = (&self.records[..], self.header.reach);
+        Source { forest: Forest::over(&self.forest), records, first: self.primitives.start }
     }
 }
 

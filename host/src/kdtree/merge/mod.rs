@@ -103,25 +103,11 @@ impl Merged {
             marked.parts.insert(at, (primitives.start, part));
             marked.made = None;
         }
-        let header = object.header;
-        let mut records = object.records;
+        let KdTree { header, mut records, .. } = object;
         records.iter_mut().for_each(|record| record.primitive += primitives.start);
-        let at = self
-            .objects
-            .partition_point(|o| (o.primitives.start, o.primitives.end) < (primitives.start, primitives.end));
-        self.objects.insert(
-            at,
-            MarkedObject {
-                name: name.to_owned(),
-                primitives,
-                records,
-                reach: header.reach,
-                cell: header.cell(),
-                status: header.status,
-                forest,
-                places,
-            },
-        );
+        let ends = |primitives: &Range<u32>| (primitives.start, primitives.end);
+        let at = self.objects.partition_point(|other| ends(&other.primitives) < ends(&primitives));
+        self.objects.insert(at, MarkedObject { name: name.to_owned(), primitives, records, header, forest, places });
         Ok(())
     }
 
@@ -199,7 +185,7 @@ impl Merged {
 
     /// Algorithm 12.
     fn merge(&mut self) -> Result<()> {
-        let cell = self.objects.iter().fold(self.still.cell(), |cell, object| cell.union(&object.cell));
+        let cell = self.objects.iter().fold(self.still.cell(), |cell, object| cell.union(&object.header.cell()));
         let beyond = |(&place, _): (&TargetLeaf, &Marked)| match place {
             TargetLeaf::Beyond(face) => Some(face),
             _ => None,
@@ -250,8 +236,8 @@ impl Merged {
         let mut header = KdHeader { lo: cell.lo, hi: cell.hi, ..self.still };
         for object in &self.objects {
             header.primitive_count = header.primitive_count.max(object.primitives.end);
-            header.reach = header.reach.max(object.reach);
-            header.status |= object.status;
+            header.reach = header.reach.max(object.header.reach);
+            header.status |= object.header.status;
             if !object.records.is_empty() {
                 header.area_scale = area_scale(&cell);
             }
@@ -266,11 +252,9 @@ impl Merged {
             ("references", header.reference_count, header.reference_room),
             ("records", header.active, header.record_room),
         ];
-        match parts.into_iter().find(|(_, count, room)| count > room) {
-            Some((what, count, room)) => Err(Error::Argument(format!(
-                "the merged tree has {count} {what}, there is room for {room}; build the static tree with_room for more"
-            ))),
-            None => Ok(()),
-        }
+        let Some((what, count, room)) = parts.into_iter().find(|(_, count, room)| count > room) else { return Ok(()) };
+        Err(Error::Argument(format!(
+            "the merged tree has {count} {what}, there is room for {room}; build the static tree with_room for more"
+        )))
     }
 }

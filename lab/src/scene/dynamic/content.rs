@@ -2,13 +2,14 @@
 //! frame.
 
 use super::{CameraPath, DynamicObject, DynamicScene, bounds, time_of};
+use crate::Result;
+use crate::scene::check::malformed;
 use crate::scene::{Camera, Light, Mesh, SceneInstance, cameras, lookup, no_triangles};
-use crate::{Error, Result};
 use hedgerow::geometry::Aabb;
 use std::path::Path;
 
 /// As [`Content`](crate::scene::Content), of what moves.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(in crate::scene) struct DynamicContent {
     pub static_mesh: Mesh,
     pub objects: Vec<DynamicObject>,
@@ -33,24 +34,23 @@ impl DynamicContent {
         if self.static_mesh.triangles.is_empty() && self.objects.iter().all(|o| o.triangles.is_empty()) {
             return Err(no_triangles(&path.display().to_string()));
         }
-        let wrong = |frame: u32, what: &str| {
-            let (place, time) = (path.display(), time_of(frame, self.frames, self.seconds));
-            Error::Malformed(format!("{place}: in frame {frame} (from 0), at {time} s, {what}; correct its keys"))
+        let wrong = |(frame, time): (u32, f32), what: &str| {
+            let at = format_args!("in frame {frame} (from 0), at {time} s");
+            malformed(path.display(), format_args!("{at}, {what}; correct its keys"))
         };
         let times = || (0..self.frames).map(|frame| (frame, time_of(frame, self.frames, self.seconds)));
         for object in &self.objects {
-            if let Some((frame, _)) = times().find(|&(_, time)| !is_somewhere(object, time)) {
-                return Err(wrong(frame, &format!("{} is not at a finite place", object.name)));
+            if let Some(at) = times().find(|&(_, time)| !is_somewhere(object, time)) {
+                return Err(wrong(at, &format!("{} is not at a finite place", object.name)));
             }
         }
         let all = || self.static_mesh.bounds().union(&bounds(&self.objects, times().map(|(_, time)| time)));
-        let known = || cameras::known(&name);
         let camera = match self.camera {
             Some(path) => path,
-            None => CameraPath::Still(known().unwrap_or_else(|| cameras::around(&all()))),
+            None => CameraPath::Still(cameras::known(&name).unwrap_or_else(|| cameras::around(&all()))),
         };
-        if let Some((frame, _)) = times().find(|&(_, time)| !looks_somewhere(&camera.at(time))) {
-            return Err(wrong(frame, "the camera looks nowhere"));
+        if let Some(at) = times().find(|&(_, time)| !looks_somewhere(&camera.at(time))) {
+            return Err(wrong(at, "the camera looks nowhere"));
         }
         let DynamicContent { static_mesh, objects, lights, frames, seconds, .. } = self;
         Ok(DynamicScene { name, static_mesh, objects, lights, frames, seconds, camera })

@@ -26,7 +26,7 @@ use std::ops::Range;
 
 pub(super) use camera::{CameraPath, carried, eye_and_backwards};
 pub(super) use content::DynamicContent;
-pub(super) use motion::{Motion, Pose, Step, product};
+pub(super) use motion::{Motion, Pose, Step, rows};
 pub(super) use rotation::Rotation;
 pub(super) use shape::{Shape, morphed};
 pub(super) use text::read;

@@ -3,15 +3,13 @@
 use super::looped;
 use super::rotation::Rotation;
 use super::track::Track;
-
-/// An affine map, row by row; the fourth column is the translation. In 64 bits, rounded once at the end of a chain.
-pub(in crate::scene) type Affine = [[f64; 4]; 3];
+use glam::{DAffine3, DQuat, Vec3};
 
 /// How a node is placed in its parent.
 #[derive(Debug, Clone)]
 pub(in crate::scene) enum Step {
-    /// Always the same.
-    Fixed(Affine),
+    /// Always the same. In 64 bits: a chain is rounded once, at its end.
+    Fixed(DAffine3),
     /// By keys.
     Moving(Pose),
 }
@@ -47,34 +45,28 @@ impl Motion {
             Step::Fixed(affine) => *affine,
             Step::Moving(pose) => pose.at(time),
         });
-        let identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-        steps.fold(identity, |outer, inner| product(&outer, &inner)).map(|row| row.map(|c| c as f32))
+        rows(&steps.fold(DAffine3::IDENTITY, |outer, inner| outer * inner))
     }
 }
 
 impl Pose {
-    fn at(&self, time: f32) -> Affine {
-        let (translation, scale) = (self.translation.at(time), self.scale.at(time).map(f64::from));
-        let rows = self.rotation.at(time).rows();
-        std::array::from_fn(|i| {
-            let [x, y, z] = rows[i];
-            [x * scale[0], y * scale[1], z * scale[2], translation[i].into()]
-        })
+    fn at(&self, time: f32) -> DAffine3 {
+        let [scale, translation] = [&self.scale, &self.translation].map(|track| Vec3::from(track.at(time)).as_dvec3());
+        DAffine3::from_scale_rotation_translation(scale, DQuat::from_array(self.rotation.at(time).0), translation)
     }
 }
 
-/// First `inner`, then `outer`.
-pub(in crate::scene) fn product(outer: &Affine, inner: &Affine) -> Affine {
-    outer.map(|[x, y, z, w]| {
-        let column = |j: usize| x * inner[0][j] + y * inner[1][j] + z * inner[2][j];
-        [column(0), column(1), column(2), column(3) + w]
-    })
+/// The rows of a map, each rounded; the fourth column is the translation.
+pub(in crate::scene) fn rows(map: &DAffine3) -> [[f32; 4]; 3] {
+    let columns = map.to_cols_array_2d();
+    std::array::from_fn(|i| columns.map(|column| column[i] as f32))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::dynamic::track::Keys;
+    use glam::DVec3;
 
     #[test]
     fn scale_comes_first_then_rotation_then_translation_then_the_parent() {
@@ -84,7 +76,7 @@ mod tests {
             rotation: Track::still(quarter_about_z),
             scale: Track::still([2.0, 3.0, 1.0]),
         };
-        let twice = [[2.0, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 2.0, 5.0]];
+        let twice = DAffine3 { translation: 5.0 * DVec3::Z, ..DAffine3::from_scale(DVec3::splat(2.0)) };
         let motion = Motion::new(vec![Step::Fixed(twice), Step::Moving(pose)], 2.0);
         // (1, 1, 1) → (2, 3, 1) → (−3, 2, 1) → (2, 2, 1) → (4, 4, 7), half a second on.
         let expected = [[0.0, -6.0, 0.0, 10.0], [4.0, 0.0, 0.0, 0.0], [0.0, 0.0, 2.0, 5.0]];

@@ -56,21 +56,19 @@ impl Rotation {
         }
         from
     }
-
-    /// The three rows of its matrix.
-    pub fn rows(&self) -> [[f64; 3]; 3] {
-        let [x, y, z, w] = self.0;
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::{DMat3, DQuat};
+
+    impl Rotation {
+        /// The three rows of its matrix.
+        fn rows(&self) -> [[f64; 3]; 3] {
+            DMat3::from_quat(DQuat::from_array(self.0)).transpose().to_cols_array_2d()
+        }
+    }
 
     const X: [f32; 3] = [1.0, 0.0, 0.0];
     const Y: [f32; 3] = [0.0, 1.0, 0.0];

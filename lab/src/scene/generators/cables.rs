@@ -4,6 +4,7 @@ use super::tube::{self, Knot};
 use super::{Assembly, series, turns};
 use crate::random::SplitMix64;
 use crate::scene::Mesh;
+use glam::Vec3;
 
 const SEGMENTS: u32 = 60;
 const SIDES: u32 = 5;
@@ -48,7 +49,7 @@ fn cable(catenary: &Catenary) -> Mesh {
     let path: Vec<Knot> = (0..=SEGMENTS)
         .map(|i| {
             let x = f64::from(i) / f64::from(SEGMENTS);
-            Knot { at: [(x - 0.5) as f32, (height(x) - height(0.0)) as f32, 0.0], radius: RADIUS }
+            Knot { at: Vec3::new((x - 0.5) as f32, (height(x) - height(0.0)) as f32, 0.0), radius: RADIUS }
         })
         .collect();
     let mut mesh = Mesh::default();

@@ -1,10 +1,10 @@
 //! Things of all sizes in a room: what interiors have in common. Large walls, and clumps of round, flat, boxy and long things, turned
 //! any way, some fine and some coarse.
 
-use super::series;
-use super::vector::{add, along, cross, unit};
+use super::{series, unit};
 use crate::random::SplitMix64;
 use crate::scene::Mesh;
+use glam::Vec3;
 use std::f64::consts::{PI, TAU};
 
 /// Cells around and along a thing: each has those of its place in the row, again and again.
@@ -23,13 +23,13 @@ pub fn triangles(things: u64) -> Option<u64> {
 pub fn clutter(things: u32, seed: u64) -> Mesh {
     let mut random = SplitMix64::new(seed);
     let mut mesh = room();
-    let (mut middle, mut size) = ([0.0, 0.4, 0.0], 0.0);
+    let (mut middle, mut size) = (0.4 * Vec3::Y, 0.0);
     for i in 0..things {
         // Every other one is near the one before.
         middle = if i % 2 == 1 {
-            along(middle, 1.5 * size, unit(add(random.point(-1.0, 1.0), [0.0, 1e-3, 0.0])))
+            middle + 1.5 * size * unit(Vec3::from(random.point(-1.0, 1.0)) + 1e-3 * Vec3::Y)
         } else {
-            [random.within(-0.9, 0.9), random.within(0.05, 0.75), random.within(-0.9, 0.9)]
+            Vec3::new(random.within(-0.9, 0.9), random.within(0.05, 0.75), random.within(-0.9, 0.9))
         };
         // From 0.01 to 0.35, most of them small.
         let smaller = random.unit();
@@ -39,7 +39,7 @@ pub fn clutter(things: u32, seed: u64) -> Mesh {
         let cells = CELLS[i as usize % CELLS.len()];
         append(&mut mesh, cells, |u, v| {
             let p = point_of(i / CELLS.len() as u32, u, v);
-            (0..3).fold(middle, |at, k| along(at, p[k] * extent[k], axes[k]))
+            (0..3).fold(middle, |at, k| at + p[k] * extent[k] * axes[k])
         });
     }
     mesh
@@ -56,12 +56,12 @@ fn room() -> Mesh {
 }
 
 /// Three directions at right angles.
-fn frame(random: &mut SplitMix64) -> [[f32; 3]; 3] {
+fn frame(random: &mut SplitMix64) -> [Vec3; 3] {
     // Never both zero or in one line: they differ from two axes by less than half.
-    let a = unit(add([1.0, 0.0, 0.0], random.point(-0.45, 0.45)));
-    let b = add([0.0, 1.0, 0.0], random.point(-0.45, 0.45));
-    let c = unit(cross(a, b));
-    [a, cross(c, a), c]
+    let a = unit(Vec3::X + Vec3::from(random.point(-0.45, 0.45)));
+    let b = Vec3::Y + Vec3::from(random.point(-0.45, 0.45));
+    let c = unit(a.cross(b));
+    [a, c.cross(a), c]
 }
 
 /// A point of a thing's surface, u around and v along, both in 0..1.
@@ -81,10 +81,11 @@ fn point_of(kind: u32, u: f32, v: f32) -> [f32; 3] {
 }
 
 /// Adds a net of cells, two triangles each, over u and v in 0..1.
-fn append(mesh: &mut Mesh, [around, long]: [u32; 2], point: impl Fn(f32, f32) -> [f32; 3]) {
+fn append(mesh: &mut Mesh, [around, long]: [u32; 2], point: impl Fn(f32, f32) -> Vec3) {
     let first = mesh.positions.len() as u32;
     for j in 0..=long {
-        mesh.positions.extend((0..=around).map(|i| point(i as f32 / around as f32, j as f32 / long as f32)));
+        let v = j as f32 / long as f32;
+        mesh.positions.extend((0..=around).map(|i| point(i as f32 / around as f32, v).to_array()));
     }
     for cell in 0..around * long {
         let v = first + cell / around * (around + 1) + cell % around;

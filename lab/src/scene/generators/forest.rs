@@ -2,10 +2,10 @@
 //! trunk runs along the diagonal of its box, so that boxes are large, mostly empty, and many lie over each other.
 
 use super::tube::{self, Knot};
-use super::vector::{add, along, unit};
-use super::{Assembly, side_of, turns};
+use super::{Assembly, side_of, turns, unit};
 use crate::random::SplitMix64;
 use crate::scene::Mesh;
+use glam::Vec3;
 
 /// Metres from tree to tree.
 const PITCH: f32 = 2.2;
@@ -53,11 +53,12 @@ fn grow(tree: &Tree, random: &mut SplitMix64) -> Mesh {
     const TRUNK_SEGMENTS: u32 = 10;
     const BRANCH_SEGMENTS: u32 = 4;
     let mut mesh = Mesh::default();
-    let mut foot = [0.0; 3];
+    let mut foot = Vec3::ZERO;
     let trunk: Vec<Knot> = (0..=TRUNK_SEGMENTS)
         .map(|i| {
             let up = i as f32 / TRUNK_SEGMENTS as f32;
-            foot = [foot[0] + random.within(-0.08, 0.08), up * tree.height, foot[2] + random.within(-0.08, 0.08)];
+            let [dx, dz] = [(); 2].map(|()| random.within(-0.08, 0.08));
+            foot = Vec3::new(foot.x + dx, up * tree.height, foot.z + dz);
             Knot { at: foot, radius: 0.009 * tree.height * (1.0 - 0.8 * up) }
         })
         .collect();
@@ -66,35 +67,34 @@ fn grow(tree: &Tree, random: &mut SplitMix64) -> Mesh {
         // Where neighbours stand close, only the top of the trunk has branches.
         let up = 0.7 + 0.28 * (branch as f32 + random.unit()) / tree.branches as f32;
         let [c, s] = turns::any(random);
-        let mut direction = unit([c, random.within(0.1, 0.5), s]);
+        let mut direction = unit(Vec3::new(c, random.within(0.1, 0.5), s));
         let length = tree.branch_length * (1.8 - up) * random.within(0.8, 1.2);
         let mut at = on(&trunk, up);
         let radius = 0.003 * tree.height * (1.4 - up);
         let knots: Vec<Knot> = (0..=BRANCH_SEGMENTS)
             .map(|i| {
                 if i > 0 {
-                    at = along(at, length / BRANCH_SEGMENTS as f32, direction);
+                    at += length / BRANCH_SEGMENTS as f32 * direction;
                     // Branches bend, and up rather than down.
-                    direction = unit(add(direction, add(random.point(-0.25, 0.25), [0.0, 0.1, 0.0])));
+                    direction = unit(direction + (Vec3::from(random.point(-0.25, 0.25)) + 0.1 * Vec3::Y));
                 }
                 Knot { at, radius: radius * (1.0 - 0.8 * i as f32 / BRANCH_SEGMENTS as f32) }
             })
             .collect();
         tube::append(&mut mesh, 3, &knots);
         for _ in 0..tree.leaves {
-            let centre = add(on(&knots, random.within(0.5, 1.0)), random.point(-0.45, 0.45));
-            let first = mesh.positions.len() as u32;
-            mesh.positions.extend([(); 3].map(|()| add(centre, random.point(-0.2, 0.2))));
-            mesh.triangles.push([first, first + 1, first + 2]);
+            let centre = on(&knots, random.within(0.5, 1.0)) + Vec3::from(random.point(-0.45, 0.45));
+            let leaf = [(); 3].map(|()| (centre + Vec3::from(random.point(-0.2, 0.2))).to_array());
+            mesh.append(leaf, &[[0, 1, 2]]);
         }
     }
     mesh
 }
 
 /// A point of a path with evenly spaced knots, 0 at its beginning, 1 at its end.
-fn on(path: &[Knot], share: f32) -> [f32; 3] {
+fn on(path: &[Knot], share: f32) -> Vec3 {
     let segments = path.len() - 1;
     let knot = ((share * segments as f32) as usize).min(segments - 1);
     let [a, b] = [path[knot].at, path[knot + 1].at];
-    along(a, share * segments as f32 - knot as f32, add(b, a.map(|c| -c)))
+    a + (share * segments as f32 - knot as f32) * (b - a)
 }

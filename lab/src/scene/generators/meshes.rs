@@ -1,8 +1,9 @@
 //! Plain meshes: spheres, squares, an arena, and triangles anywhere.
 
-use super::vector::{add, cross, dot, unit};
+use super::{tube, unit};
 use crate::random::SplitMix64;
 use crate::scene::Mesh;
+use glam::Vec3;
 use std::collections::HashMap;
 use std::f32::consts::TAU;
 
@@ -23,10 +24,9 @@ pub fn icosphere(levels: u32) -> Mesh {
     // Three golden rectangles, one in each plane: (0, ±1, ±golden) and its rotations.
     for axis in 0..3 {
         for (a, b) in [(-1.0, -golden), (-1.0, golden), (1.0, -golden), (1.0, golden)] {
-            let mut corner = [0.0; 3];
-            corner[(axis + 1) % 3] = a;
-            corner[(axis + 2) % 3] = b;
-            positions.push(unit(corner));
+            let mut corner = [0.0, a, b];
+            corner.rotate_right(axis);
+            positions.push(unit(corner.into()).to_array());
         }
     }
     let mut triangles = icosahedron_faces(&positions);
@@ -36,8 +36,8 @@ pub fn icosphere(levels: u32) -> Mesh {
         for [a, b, c] in triangles {
             let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|edge| {
                 *midpoints.entry([edge[0].min(edge[1]), edge[0].max(edge[1])]).or_insert_with(|| {
-                    let [p, q] = edge.map(|v| positions[v as usize]);
-                    positions.push(unit(std::array::from_fn(|i| p[i] + q[i])));
+                    let [p, q] = edge.map(|v| Vec3::from(positions[v as usize]));
+                    positions.push(unit(p + q).to_array());
                     positions.len() as u32 - 1
                 })
             });
@@ -51,13 +51,14 @@ pub fn icosphere(levels: u32) -> Mesh {
 /// The triples of corners that lie an edge apart, each turned to face outwards.
 fn icosahedron_faces(corners: &[[f32; 3]]) -> Vec<[u32; 3]> {
     // Neighbours on the unit icosahedron have a dot product of 1/√5, the others at most −1/√5.
-    let adjacent = |a: usize, b: usize| dot(corners[a], corners[b]) > 0.0;
+    let corners: Vec<Vec3> = corners.iter().copied().map(Vec3::from).collect();
+    let adjacent = |a: usize, b: usize| corners[a].dot(corners[b]) > 0.0;
     let mut faces = Vec::with_capacity(20);
     for a in 0..12 {
         for b in a + 1..12 {
             for c in b + 1..12 {
                 if adjacent(a, b) && adjacent(b, c) && adjacent(c, a) {
-                    let outwards = dot(cross(corners[a], corners[b]), corners[c]) > 0.0;
+                    let outwards = corners[a].cross(corners[b]).dot(corners[c]) > 0.0;
                     faces.push(if outwards { [a, b, c] } else { [a, c, b] }.map(|v| v as u32));
                 }
             }
@@ -69,10 +70,10 @@ fn icosahedron_faces(corners: &[[f32; 3]]) -> Vec<[u32; 3]> {
 /// Small triangles anywhere: centres uniform in the unit cube, each corner within ±0.02 of its centre.
 pub fn soup(count: u32, seed: u64) -> Mesh {
     let mut random = SplitMix64::new(seed);
-    separate(count, || {
-        let centre = random.point(0.0, 1.0);
-        std::array::from_fn(|_| add(centre, random.point(-0.02, 0.02)))
-    })
+    Mesh::of_corners((0..count).map(|_| {
+        let centre = Vec3::from(random.point(0.0, 1.0));
+        [(); 3].map(|()| (centre + Vec3::from(random.point(-0.02, 0.02))).to_array())
+    }))
 }
 
 /// A flat square of `side` × `side` unit cells in the plane y = 0, two triangles each, row by row.
@@ -95,7 +96,7 @@ pub fn stadium(levels: u32) -> Mesh {
         [[0.0, 0.0], [500.0, 0.0], [500.0, 20.0], [800.0, 120.0], [800.0, 150.0], [1000.0, 260.0]];
     let mut mesh = icosphere(levels);
     for p in &mut mesh.positions {
-        *p = add(*p, [123.0, 1.0, -45.0]);
+        *p = (Vec3::from(*p) + Vec3::new(123.0, 1.0, -45.0)).to_array();
     }
     let first = mesh.positions.len() as u32;
     for [radius, height] in RINGS {
@@ -104,44 +105,29 @@ pub fn stadium(levels: u32) -> Mesh {
             [radius * angle.cos(), height, radius * angle.sin()]
         }));
     }
-    for ring in 0..RINGS.len() as u32 - 1 {
-        for sector in 0..SECTORS {
-            let at = |ring, sector| first + ring * SECTORS + sector % SECTORS;
-            let quad = [at(ring, sector), at(ring, sector + 1), at(ring + 1, sector + 1), at(ring + 1, sector)];
-            mesh.triangles.extend([[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]);
-        }
-    }
+    tube::join_rings(&mut mesh, first, SECTORS, RINGS.len() as u32);
     mesh
 }
 
 /// Long thin triangles anywhere: middles uniform in the unit cube, directions uniform, 0.2 to 1 long, a thousandth wide.
 pub fn needles(count: u32, seed: u64) -> Mesh {
     let mut random = SplitMix64::new(seed);
-    separate(count, || {
-        let middle = random.point(0.0, 1.0);
+    Mesh::of_corners((0..count).map(|_| {
+        let middle = Vec3::from(random.point(0.0, 1.0));
         let length = random.within(0.2, 1.0);
         let along = direction(&mut random);
         let aside = direction(&mut random);
-        let end = |s: f32| std::array::from_fn(|i| middle[i] + s * 0.5 * length * along[i]);
-        let tail: [f32; 3] = end(-1.0);
-        [tail, add(tail, aside.map(|c| c * 0.001 * length)), end(1.0)]
-    })
-}
-
-/// `count` triangles that share no vertex.
-fn separate(count: u32, mut triangle: impl FnMut() -> [[f32; 3]; 3]) -> Mesh {
-    Mesh {
-        positions: (0..count).flat_map(|_| triangle()).collect(),
-        triangles: (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
-    }
+        let end = |s: f32| middle + s * 0.5 * length * along;
+        let tail = end(-1.0);
+        [tail, tail + aside * 0.001 * length, end(1.0)].map(|corner| corner.to_array())
+    }))
 }
 
 /// Uniform on the unit sphere: drawn from the ball by rejection, so that no sine or cosine of the platform is asked.
-fn direction(random: &mut SplitMix64) -> [f32; 3] {
+fn direction(random: &mut SplitMix64) -> Vec3 {
     loop {
-        let p = random.point(-1.0, 1.0);
-        let square = dot(p, p);
-        if (0.01..=1.0).contains(&square) {
+        let p = Vec3::from(random.point(-1.0, 1.0));
+        if (0.01..=1.0).contains(&p.length_squared()) {
             return unit(p);
         }
     }

@@ -11,10 +11,10 @@ mod series;
 mod tube;
 mod turns;
 mod twist;
-mod vector;
 
 use super::{Animation, Instances, Mesh, SceneInstance, cameras};
 use crate::{Error, Result};
+use glam::Vec3;
 pub(super) use meshes::needles;
 pub(super) use series::turn;
 
@@ -23,14 +23,8 @@ pub(super) const MOST_TRIANGLES: u64 = 1 << 27;
 /// The most instances: what every Vulkan driver with acceleration structures takes.
 const MOST_INSTANCES: u64 = (1 << 24) - 1;
 
-/// One generator.
-struct Generator {
-    /// The name with its arguments: N, and perhaps a second one.
-    pattern: &'static str,
-    /// What N means.
-    what: &'static str,
-    recipe: Recipe,
-}
+/// One generator: its name with its arguments (N, and perhaps a second one), what N means, and how the scene is made.
+type Generator = (&'static str, &'static str, Recipe);
 
 /// How a scene is made of N and of the second argument (0 where there is none).
 #[derive(Clone, Copy)]
@@ -47,61 +41,33 @@ enum Recipe {
 type Assembly = (Vec<Mesh>, Vec<SceneInstance>);
 
 const GENERATORS: [Generator; 11] = [
-    Generator {
-        pattern: "gen:icosphere:N",
-        what: "a sphere of 20*4^N triangles",
-        recipe: Recipe::Mesh(meshes::icosphere_triangles, |n, _| meshes::icosphere(n)),
-    },
-    Generator {
-        pattern: "gen:soup:N:SEED",
-        what: "N small triangles anywhere",
-        recipe: Recipe::Mesh(Some, meshes::soup),
-    },
-    Generator {
-        pattern: "gen:grid:N",
-        what: "a flat square of 2*N*N triangles",
-        recipe: Recipe::Mesh(meshes::grid_triangles, |n, _| meshes::grid(n)),
-    },
-    Generator {
-        pattern: "gen:stadium:N",
-        what: "a sphere of 20*4^N triangles in a huge coarse arena",
-        recipe: Recipe::Mesh(meshes::icosphere_triangles, |n, _| meshes::stadium(n)),
-    },
-    Generator {
-        pattern: "gen:needles:N:SEED",
-        what: "N long thin triangles anywhere",
-        recipe: Recipe::Mesh(Some, meshes::needles),
-    },
-    Generator {
-        pattern: "gen:clutter:N:SEED",
-        what: "N things of all sizes in a room",
-        recipe: Recipe::Mesh(clutter::triangles, clutter::clutter),
-    },
-    Generator {
-        pattern: "gen:forest:N",
-        what: "N instances of 3 thin trees that lean over each other",
-        recipe: Recipe::Instances(forest::place),
-    },
-    Generator {
-        pattern: "gen:city:N",
-        what: "N instances of 2 L-shaped blocks, each in the notch of the one before, none touching",
-        recipe: Recipe::Instances(city::place),
-    },
-    Generator {
-        pattern: "gen:cables:N",
-        what: "N instances of 4 long thin cables that hang across the scene",
-        recipe: Recipe::Instances(cables::place),
-    },
-    Generator {
-        pattern: "gen:cells:N",
-        what: "N instances of 3 spheres in a grid, each in a cell of its own",
-        recipe: Recipe::Instances(cells::place),
-    },
-    Generator {
-        pattern: "gen:twist:N:FRAMES",
-        what: "an animation: a column of about N (12 or more) triangles, twisted once round over the frames",
-        recipe: Recipe::Animation(twist::column, twist::frames),
-    },
+    (
+        "gen:icosphere:N",
+        "a sphere of 20*4^N triangles",
+        Recipe::Mesh(meshes::icosphere_triangles, |n, _| meshes::icosphere(n)),
+    ),
+    ("gen:soup:N:SEED", "N small triangles anywhere", Recipe::Mesh(Some, meshes::soup)),
+    ("gen:grid:N", "a flat square of 2*N*N triangles", Recipe::Mesh(meshes::grid_triangles, |n, _| meshes::grid(n))),
+    (
+        "gen:stadium:N",
+        "a sphere of 20*4^N triangles in a huge coarse arena",
+        Recipe::Mesh(meshes::icosphere_triangles, |n, _| meshes::stadium(n)),
+    ),
+    ("gen:needles:N:SEED", "N long thin triangles anywhere", Recipe::Mesh(Some, meshes::needles)),
+    ("gen:clutter:N:SEED", "N things of all sizes in a room", Recipe::Mesh(clutter::triangles, clutter::clutter)),
+    ("gen:forest:N", "N instances of 3 thin trees that lean over each other", Recipe::Instances(forest::place)),
+    (
+        "gen:city:N",
+        "N instances of 2 L-shaped blocks, each in the notch of the one before, none touching",
+        Recipe::Instances(city::place),
+    ),
+    ("gen:cables:N", "N instances of 4 long thin cables that hang across the scene", Recipe::Instances(cables::place)),
+    ("gen:cells:N", "N instances of 3 spheres in a grid, each in a cell of its own", Recipe::Instances(cells::place)),
+    (
+        "gen:twist:N:FRAMES",
+        "an animation: a column of about N (12 or more) triangles, twisted once round over the frames",
+        Recipe::Animation(twist::column, twist::frames),
+    ),
 ];
 
 /// The least side of a square (2 dimensions) or cube (3) of at least `count` cells.
@@ -109,9 +75,14 @@ fn side_of(count: u32, dimensions: u32) -> u32 {
     (0..).find(|side: &u32| side.pow(dimensions) >= count).unwrap_or_default()
 }
 
+/// The same direction, of length 1. By a division, unlike glam's: the bytes of scenes depend on it.
+fn unit(v: Vec3) -> Vec3 {
+    v / v.length()
+}
+
 /// The generators that [`load`](super::load) knows: the name with its arguments, and what it makes.
 pub fn generators() -> impl Iterator<Item = (&'static str, &'static str)> {
-    GENERATORS.iter().map(|generator| (generator.pattern, generator.what))
+    GENERATORS.iter().map(|&(pattern, what, _)| (pattern, what))
 }
 
 /// A generator with its arguments, of a size that can be made.
@@ -132,11 +103,11 @@ impl Generated {
             return Ok(None);
         }
         let words: Vec<&str> = spec.split(':').collect();
-        let Some(generator) = GENERATORS.iter().find(|g| g.pattern.split(':').nth(1) == Some(words[1])) else {
-            let patterns = GENERATORS.map(|g| g.pattern).join(", ");
+        let is_named = |(pattern, ..): &&Generator| pattern.split(':').nth(1) == Some(words[1]);
+        let Some(&(pattern, what, recipe)) = GENERATORS.iter().find(is_named) else {
+            let patterns = GENERATORS.map(|(pattern, ..)| pattern).join(", ");
             return Err(Error::Argument(format!("{spec}: there is no such generator; there are {patterns}")));
         };
-        let Generator { pattern, what, recipe } = *generator;
         let usage = format!("{pattern} ({what})");
         let wrong = || Error::Argument(format!("{spec}: not the arguments of this generator; write {usage}"));
         if words.len() != pattern.split(':').count() {

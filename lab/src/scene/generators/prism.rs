@@ -43,8 +43,8 @@ struct Surface {
 
 impl Surface {
     fn face(&mut self, corners: [[u32; 3]; 4]) {
-        let [a, b, c, d] = corners.map(|corner| self.vertex(corner));
-        self.mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        let quad = corners.map(|corner| self.vertex(corner));
+        self.mesh.add_quad(quad);
     }
 
     fn vertex(&mut self, corner: [u32; 3]) -> u32 {

@@ -4,8 +4,9 @@
 //! node, the first in the file counts, so that of a character's gaits one is taken.
 
 use super::{CUT_OFF, File, has_type};
+use crate::Result;
+use crate::scene::check::malformed;
 use crate::scene::dynamic::{Keys, Pose, Rotation, Track, Value};
-use crate::{Error, Result};
 use gltf::Node;
 use gltf::accessor::{DataType, Dimensions, Iter};
 use gltf::animation::util::ReadOutputs;
@@ -37,7 +38,7 @@ impl Channels {
             for channel in animation.channels() {
                 channels.add(file, &channel).map_err(|what| {
                     let (path, animation) = (file.path.display(), animation.index());
-                    Error::Malformed(format!("{path}: animation {animation}, channel {}: {what}", channel.index()))
+                    malformed(format_args!("{path}: animation {animation}, channel {}", channel.index()), what)
                 })?;
             }
         }
@@ -84,18 +85,16 @@ impl Channels {
             channel.target().node().mesh().and_then(|mesh| Some(mesh.primitives().next()?.morph_targets().len()));
         let moved = self.nodes.entry(node).or_default();
         let samples = Samples { file, channel };
-        let last = match property {
-            Property::Translation => samples.set(&mut moved.translation, 3, |n| [n[0], n[1], n[2]]),
-            Property::Scale => samples.set(&mut moved.scale, 3, |n| [n[0], n[1], n[2]]),
-            Property::Rotation => {
+        let last = match (property, targets) {
+            (Property::Translation, _) => samples.set(&mut moved.translation, 3, |n| [n[0], n[1], n[2]]),
+            (Property::Scale, _) => samples.set(&mut moved.scale, 3, |n| [n[0], n[1], n[2]]),
+            (Property::Rotation, _) => {
                 samples.set(&mut moved.rotation, 4, |n| Rotation([n[0], n[1], n[2], n[3]].map(f64::from)))
             }
-            Property::MorphTargetWeights => match targets {
-                None | Some(0) => {
-                    Err(format!("moves weights of node {node}, which has no morph targets; export it again"))
-                }
-                Some(targets) => samples.set(&mut moved.weights, targets, <[f32]>::to_vec),
-            },
+            (Property::MorphTargetWeights, None | Some(0)) => {
+                Err(format!("moves weights of node {node}, which has no morph targets; export it again"))
+            }
+            (Property::MorphTargetWeights, Some(targets)) => samples.set(&mut moved.weights, targets, <[f32]>::to_vec),
         }?;
         self.last = self.last.max(last);
         Ok(())
@@ -167,16 +166,13 @@ impl Samples<'_> {
         if !has_type(&accessor, dimensions, types) || accessor.count() == 0 {
             return Err("key values are not of the type that glTF gives their property; export it again".into());
         }
-        let numbers: Vec<f32> =
-            match self.channel.reader(|buffer| self.file.bytes(buffer)).read_outputs().ok_or(CUT_OFF)? {
-                ReadOutputs::Translations(values) | ReadOutputs::Scales(values) => values.flatten().collect(),
-                ReadOutputs::Rotations(values) => values.into_f32().flatten().collect(),
-                ReadOutputs::MorphTargetWeights(values) => values.into_f32().collect(),
-            };
-        if numbers.iter().all(|n| n.is_finite()) {
-            Ok(numbers)
-        } else {
-            Err("a key value is not finite; export it again".into())
-        }
+        let outputs = self.channel.reader(|buffer| self.file.bytes(buffer)).read_outputs().ok_or(CUT_OFF)?;
+        let numbers: Vec<f32> = match outputs {
+            ReadOutputs::Translations(values) | ReadOutputs::Scales(values) => values.flatten().collect(),
+            ReadOutputs::Rotations(values) => values.into_f32().flatten().collect(),
+            ReadOutputs::MorphTargetWeights(values) => values.into_f32().collect(),
+        };
+        let is_sound = numbers.iter().all(|n| n.is_finite());
+        if is_sound { Ok(numbers) } else { Err("a key value is not finite; export it again".into()) }
     }
 }

@@ -1,8 +1,9 @@
 //! The triangles of a mesh, and where its morph targets move them.
 
 use super::{CUT_OFF, File, has_type};
-use crate::scene::{Mesh, check};
-use crate::{Error, Result};
+use crate::Result;
+use crate::scene::check::{self, malformed};
+use crate::scene::{Mesh, fan};
 use gltf::accessor::{DataType, Dimensions, Iter};
 use gltf::mesh::Mode;
 use gltf::{Primitive, Semantic};
@@ -23,41 +24,37 @@ pub(super) fn parts(file: File<'_>, mesh: &gltf::Mesh<'_>) -> Result<Vec<Part>> 
 
 fn part(file: File<'_>, mesh: &gltf::Mesh<'_>, primitive: &Primitive<'_>) -> Result<Option<Part>> {
     let place = format!("{}: mesh {}, primitive {}", file.path.display(), mesh.index(), primitive.index());
-    let wrong = |what: &str| Err(Error::Malformed(format!("{place}: {what}")));
-    let fans: fn(usize, &[u32]) -> [u32; 3] = match primitive.mode() {
-        Mode::Triangles => |t, v| [v[3 * t], v[3 * t + 1], v[3 * t + 2]],
-        // Every second triangle of a strip is turned round.
-        Mode::TriangleStrip => |t, v| [v[t], v[t + 1 + t % 2], v[t + 2 - t % 2]],
-        Mode::TriangleFan => |t, v| [v[0], v[t + 1], v[t + 2]],
-        _ => return Ok(None),
-    };
+    let wrong = |what: &str| malformed(&place, what);
+    if !matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+        return Ok(None);
+    }
     let Some(accessor) = primitive.get(&Semantic::Positions).filter(|a| a.count() > 0) else { return Ok(None) };
     if !has_type(&accessor, Dimensions::Vec3, &[DataType::F32]) {
-        return wrong("positions are not three 32-bit floats; export it without quantisation");
+        return Err(wrong("positions are not three 32-bit floats; export it without quantisation"));
     }
     let reader = primitive.reader(|buffer| file.bytes(buffer));
-    let Some(positions) = reader.read_positions() else { return wrong(CUT_OFF) };
-    let positions: Vec<[f32; 3]> = positions.collect();
+    let positions: Vec<[f32; 3]> = reader.read_positions().ok_or_else(|| wrong(CUT_OFF))?.collect();
     check::vertices_are_finite(&place, &positions)?;
     let indices: Vec<u32> = match primitive.indices() {
         None => (0..positions.len() as u32).collect(),
         Some(accessor) if accessor.count() == 0 => Vec::new(),
         Some(accessor) => {
             if !has_type(&accessor, Dimensions::Scalar, &[DataType::U8, DataType::U16, DataType::U32]) {
-                return wrong("indices are not unsigned integers; export it again");
+                return Err(wrong("indices are not unsigned integers; export it again"));
             }
-            let Some(indices) = reader.read_indices() else { return wrong(CUT_OFF) };
-            indices.into_u32().collect()
+            reader.read_indices().ok_or_else(|| wrong(CUT_OFF))?.into_u32().collect()
         }
     };
-    let count = match primitive.mode() {
-        Mode::Triangles if !indices.len().is_multiple_of(3) => {
-            return wrong(&format!("{} indices make no whole triangles; is it cut off?", indices.len()));
+    let triangles: Vec<[u32; 3]> = match (primitive.mode(), indices.as_chunks()) {
+        (Mode::TriangleFan, _) => fan(&indices).into_iter().flatten().collect(),
+        (Mode::TriangleStrip, _) => {
+            // Every second triangle of a strip is turned round.
+            let turned = |(t, v): (usize, &[u32])| [v[0], v[1 + t % 2], v[2 - t % 2]];
+            indices.windows(3).enumerate().map(turned).collect()
         }
-        Mode::Triangles => indices.len() / 3,
-        _ => indices.len().saturating_sub(2),
+        (_, (whole, [])) => whole.to_vec(),
+        _ => return Err(wrong(&format!("{} indices make no whole triangles; is it cut off?", indices.len()))),
     };
-    let triangles: Vec<[u32; 3]> = (0..count).map(|t| fans(t, &indices)).collect();
     check::indices_are_in_range(&place, &triangles, positions.len())?;
     let mut targets = Vec::new();
     for (target, accessor) in primitive.morph_targets().map(|target| target.positions()).enumerate() {
@@ -66,11 +63,10 @@ fn part(file: File<'_>, mesh: &gltf::Mesh<'_>, primitive: &Primitive<'_>) -> Res
             targets.push(vec![[0.0; 3]; positions.len()]);
             continue;
         };
-        let wrong = |what: &str| Err(Error::Malformed(format!("{place}: {what}")));
         if !has_type(&accessor, Dimensions::Vec3, &[DataType::F32]) || accessor.count() != positions.len() {
-            return wrong("not three 32-bit floats for each vertex; export it again");
+            return Err(malformed(place, "not three 32-bit floats for each vertex; export it again"));
         }
-        let Some(moves) = Iter::new(accessor, |buffer| file.bytes(buffer)) else { return wrong(CUT_OFF) };
+        let moves = Iter::new(accessor, |buffer| file.bytes(buffer)).ok_or_else(|| malformed(&place, CUT_OFF))?;
         let moves: Vec<[f32; 3]> = moves.collect();
         check::vertices_are_finite(&place, &moves)?;
         targets.push(moves);

@@ -8,9 +8,10 @@ mod channels;
 mod meshes;
 mod nodes;
 
+use super::check::malformed;
 use super::dynamic::{DynamicContent, DynamicScene};
-use super::{Content, LoadOptions, Mesh, Scene, source};
-use crate::{Error, Result};
+use super::{Content, LoadOptions, Scene, source};
+use crate::Result;
 use channels::Channels;
 use gltf::accessor::{DataType, Dimensions};
 use gltf::json::validation::Checked;
@@ -35,35 +36,32 @@ pub(super) fn read_at_rest(path: &Path, options: &LoadOptions<'_>) -> Result<Con
 /// Reads a `.gltf` or `.glb` file with its animations, all at once and over and over.
 pub(super) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<DynamicContent> {
     let bytes = source::bytes(path, options)?;
-    let file = gltf::Gltf::from_slice_without_validation(&bytes).map_err(|e| malformed(path, one_line(&e)))?;
+    let unreadable = |error: gltf::Error| {
+        let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+        let what = format_args!("{text}; is it cut off, or made for a newer glTF? export it again");
+        malformed(path.display(), what)
+    };
+    let file = gltf::Gltf::from_slice_without_validation(&bytes).map_err(unreadable)?;
     positions_are_there(path, file.document.as_json())?;
-    let document = Document::from_json(file.document.into_json()).map_err(|e| malformed(path, one_line(&e)))?;
+    let document = Document::from_json(file.document.into_json()).map_err(unreadable)?;
     for buffer in document.buffers() {
         if let buffer::Source::Uri(uri) = buffer.source()
             && !is_utf8_when_decoded(uri)
         {
-            return Err(malformed(path, format!("buffer {} has a name that is not UTF-8: {uri}", buffer.index())));
+            let what = format_args!("buffer {} has a name that is not UTF-8: {uri}", buffer.index());
+            return Err(malformed(path.display(), what));
         }
     }
-    let buffers =
-        gltf::import_buffers(&document, path.parent(), file.blob).map_err(|e| malformed(path, one_line(&e)))?;
+    let buffers = gltf::import_buffers(&document, path.parent(), file.blob).map_err(unreadable)?;
     let file = File { path, document: &document, buffers: &buffers };
     let channels = Channels::read(file)?;
     let (frames, seconds) = ((channels.seconds() * FRAME_RATE).round().max(1.0), channels.seconds());
     if frames > DynamicScene::MOST_FRAMES as f32 {
         let most = DynamicScene::MOST_FRAMES as f32 / FRAME_RATE;
-        return Err(malformed(path, format!("its animations last {seconds} s, there may be {most} s; cut them")));
+        let what = format_args!("its animations last {seconds} s, there may be {most} s; cut them");
+        return Err(malformed(path.display(), what));
     }
-    let content = DynamicContent {
-        static_mesh: Mesh::default(),
-        objects: Vec::new(),
-        camera: None,
-        lights: Vec::new(),
-        frames: frames as u32,
-        seconds,
-        skinned: None,
-    };
-    nodes::walk(file, &channels, content)
+    nodes::walk(file, &channels, DynamicContent { frames: frames as u32, seconds, ..DynamicContent::default() })
 }
 
 /// A document and the bytes of its buffers.
@@ -89,8 +87,10 @@ fn positions_are_there(path: &Path, json: &gltf::json::Root) -> Result<()> {
         for (primitive, attributes) in primitives.iter().map(|p| &p.attributes).enumerate() {
             let accessor = attributes.get(&Checked::Valid(Semantic::Positions)).map(|index| index.value());
             if let Some(accessor) = accessor.filter(|&a| a >= json.accessors.len()) {
-                let what = format!("names accessor {accessor}, the file has {}; is it cut off?", json.accessors.len());
-                return Err(malformed(path, format!("mesh {mesh}, primitive {primitive}: {what}")));
+                let place = format_args!("{}: mesh {mesh}, primitive {primitive}", path.display());
+                let there = json.accessors.len();
+                let what = format_args!("names accessor {accessor}, the file has {there}; is it cut off?");
+                return Err(malformed(place, what));
             }
         }
     }
@@ -106,27 +106,12 @@ fn is_utf8_when_decoded(uri: &str) -> bool {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
     while let [first, others @ ..] = rest {
-        let escaped = match rest {
-            [b'%', a, b, ..] => [*a, *b].map(|digit| char::from(digit).to_digit(16)),
-            _ => [None; 2],
-        };
-        if let [Some(high), Some(low)] = escaped {
-            bytes.push((16 * high + low) as u8);
-            rest = &others[2..];
-        } else {
-            bytes.push(*first);
-            rest = others;
-        }
+        let escaped = others.first_chunk().filter(|_| *first == b'%').and_then(|digits: &[u8; 2]| {
+            let [high, low] = digits.map(|digit| char::from(digit).to_digit(16));
+            Some((16 * high? + low?) as u8)
+        });
+        bytes.push(escaped.unwrap_or(*first));
+        rest = if escaped.is_some() { &others[2..] } else { others };
     }
     std::str::from_utf8(&bytes).is_ok()
-}
-
-fn one_line(error: &gltf::Error) -> String {
-    let text = error.to_string();
-    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    format!("{text}; is it cut off, or made for a newer glTF? export it again")
-}
-
-fn malformed(path: &Path, what: String) -> Error {
-    Error::Malformed(format!("{}: {what}", path.display()))
 }

@@ -1,14 +1,15 @@
 //! The tree of nodes: what each places, and whether it stands or moves.
 
+use super::File;
 use super::channels::Channels;
 use super::meshes::{self, Part};
-use super::{File, malformed};
 use crate::Result;
+use crate::scene::check::{self, malformed};
 use crate::scene::dynamic::{
-    self, CameraPath, DynamicContent, DynamicObject, Motion, Shape, Step, carried, eye_and_backwards, morphed, product,
+    self, CameraPath, DynamicContent, DynamicObject, Motion, Shape, Step, carried, eye_and_backwards, morphed, rows,
 };
-use crate::scene::{Light, check};
-use glam::{Mat4, Vec3};
+use crate::scene::{Light, Mesh};
+use glam::{DAffine3, Mat4, Vec3};
 use gltf::Node;
 use gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
 use gltf::json::validation::Checked;
@@ -32,8 +33,8 @@ pub(super) fn walk(file: File<'_>, channels: &Channels, content: DynamicContent)
     let mut stack: Vec<_> = roots.into_iter().rev().map(|node| (node, root.clone())).collect();
     while let Some((node, parent)) = stack.pop() {
         if std::mem::replace(&mut seen[node.index()], true) {
-            let what = format!("node {} has two parents, or is its own; export it again", node.index());
-            return Err(malformed(file.path, what));
+            let what = format_args!("node {} has two parents, or is its own; export it again", node.index());
+            return Err(malformed(file.path.display(), what));
         }
         let placement = parent.inner(&node, channels);
         scene.node(&node, &placement)?;
@@ -58,33 +59,29 @@ impl NodeTransform {
         let local = Mat4::from_cols_array_2d(&node.transform().matrix());
         let (mut steps, step) = match (self, channels.pose(node)) {
             (NodeTransform::Still(outer), None) => return NodeTransform::Still(outer * local),
-            (NodeTransform::Still(outer), Some(pose)) => (vec![fixed(outer)], Step::Moving(pose)),
-            (NodeTransform::Moving(steps), None) => (steps.clone(), fixed(&local)),
+            (NodeTransform::Still(outer), Some(pose)) => (vec![Step::Fixed(affine(outer))], Step::Moving(pose)),
+            (NodeTransform::Moving(steps), None) => (steps.clone(), Step::Fixed(affine(&local))),
             (NodeTransform::Moving(steps), Some(pose)) => (steps.clone(), Step::Moving(pose)),
         };
         match (steps.last_mut(), step) {
             // Long chains below what moves stay short.
-            (Some(Step::Fixed(outer)), Step::Fixed(inner)) => *outer = product(outer, &inner),
+            (Some(Step::Fixed(outer)), Step::Fixed(inner)) => *outer *= inner,
             (_, step) => steps.push(step),
         }
         NodeTransform::Moving(steps)
     }
 
     fn motion(&self, seconds: f32) -> Motion {
-        match self {
-            NodeTransform::Still(to_world) => Motion::new(vec![fixed(to_world)], seconds),
-            NodeTransform::Moving(steps) => Motion::new(steps.clone(), seconds),
-        }
+        let steps = match self {
+            NodeTransform::Still(to_world) => vec![Step::Fixed(affine(to_world))],
+            NodeTransform::Moving(steps) => steps.clone(),
+        };
+        Motion::new(steps, seconds)
     }
 }
 
-fn fixed(to_parent: &Mat4) -> Step {
-    Step::Fixed(rows(to_parent).map(|row| row.map(f64::from)))
-}
-
-fn rows(matrix: &Mat4) -> [[f32; 4]; 3] {
-    let columns = matrix.to_cols_array_2d();
-    std::array::from_fn(|i| columns.map(|column| column[i]))
+fn affine(matrix: &Mat4) -> DAffine3 {
+    DAffine3::from_mat4(matrix.as_dmat4())
 }
 
 /// The scene while its nodes are walked.
@@ -111,7 +108,7 @@ impl Walk<'_> {
             }
         }
         let to_world = match placement {
-            NodeTransform::Still(to_world) => rows(to_world),
+            NodeTransform::Still(to_world) => rows(&affine(to_world)),
             NodeTransform::Moving(_) => motion.at(0.0),
         };
         let (eye, backwards) = eye_and_backwards(&to_world);
@@ -149,28 +146,26 @@ impl Walk<'_> {
         let mesh = &mut self.content.static_mesh;
         let first = mesh.positions.len();
         check::vertices_can_be_counted(&part.place, first + part.mesh.positions.len())?;
-        let positions = morphed(&part.mesh.positions, &part.targets, weights);
-        mesh.positions.extend(positions.into_iter().map(|p| to_world.transform_point3(p.into()).to_array()));
-        check::vertices_are_finite(format!("{}, placed by its node", part.place), &mesh.positions[first..])?;
-        mesh.triangles.extend(part.mesh.triangles.iter().map(|t| t.map(|v| v + first as u32)));
-        Ok(())
+        let positions = morphed(&part.mesh.positions, &part.targets, weights).into_iter();
+        mesh.append(positions.map(|p| to_world.transform_point3(p.into()).to_array()), &part.mesh.triangles);
+        check::vertices_are_finite(format!("{}, placed by its node", part.place), &mesh.positions[first..])
     }
 
     /// Adds an object of all the parts of a node that moves or morphs.
     fn object(&mut self, node: &Node<'_>, parts: &[Part], weights: &[f32], motion: Motion) -> Result<()> {
-        let (mut base, mut triangles) = (Vec::new(), Vec::new());
+        let mut whole = Mesh::default();
         let count = parts.iter().map(|part| part.targets.len()).max().unwrap_or_default();
         let mut targets = vec![Vec::new(); count];
         for Part { place, mesh, targets: its } in parts {
-            let first = base.len();
+            let first = whole.positions.len();
             check::vertices_can_be_counted(place, first + mesh.positions.len())?;
-            base.extend_from_slice(&mesh.positions);
-            triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first as u32)));
+            whole.append(mesh.positions.iter().copied(), &mesh.triangles);
             for (target, its) in targets.iter_mut().zip(its) {
                 target.resize(first, [0.0; 3]);
                 target.extend_from_slice(its);
             }
         }
+        let Mesh { positions: base, triangles } = whole;
         if triangles.is_empty() {
             return Ok(());
         }
@@ -188,10 +183,8 @@ impl Walk<'_> {
     fn lit(self) -> DynamicContent {
         let Walk { mut content, directional, .. } = self;
         let bounds = content.static_mesh.bounds().union(&dynamic::bounds(&content.objects, [0.0]));
-        content.lights.extend(directional.into_iter().map(|towards| {
-            let far = Vec3::from(bounds.centroid()) - towards * (10.0 * bounds.diagonal());
-            point_light(far)
-        }));
+        let far = |towards: Vec3| Vec3::from(bounds.centroid()) - towards * (10.0 * bounds.diagonal());
+        content.lights.extend(directional.into_iter().map(|towards| point_light(far(towards))));
         content.lights.retain(|light| light.corner.iter().all(|c| c.is_finite()));
         content
     }

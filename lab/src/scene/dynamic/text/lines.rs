@@ -1,7 +1,8 @@
 //! The lines of a `.dyn` file, each understood by itself and checked, before any scene is loaded.
 
+use crate::Result;
 use crate::scene::DynamicScene;
-use crate::{Error, Result};
+use crate::scene::check::malformed;
 use std::path::Path;
 
 /// The vertical field of view of a camera that does not say it, in degrees.
@@ -12,25 +13,21 @@ pub(super) const FOV: f32 = 60.0;
 pub(super) struct Lines {
     pub frames: u32,
     pub seconds: f32,
-    pub static_scene: Option<Named>,
+    pub static_scene: Option<OfLine<String>>,
     pub objects: Vec<Object>,
     /// One or more, if there is a camera.
     pub camera: Option<Vec<Key>>,
 }
 
-/// A scene and the line that names it.
-#[derive(Debug)]
-pub(super) struct Named {
-    pub line: usize,
-    pub spec: String,
-}
+/// The line that says something, and what it says.
+pub(super) type OfLine<T> = (usize, T);
 
 #[derive(Debug)]
 pub(super) struct Object {
     pub name: String,
-    pub scene: Named,
-    /// The line and the seconds.
-    pub cycle: Option<(usize, f32)>,
+    pub scene: OfLine<String>,
+    /// In seconds.
+    pub cycle: Option<OfLine<f32>>,
     pub keys: Vec<Key>,
 }
 
@@ -65,8 +62,9 @@ const OF_CAMERAS: [Part; 4] =
 const MOST_DEGREES: f32 = 36_000.0;
 
 /// What the keys below belong to.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Default)]
 enum Above {
+    #[default]
     Nothing,
     Object,
     Camera,
@@ -75,28 +73,28 @@ enum Above {
 /// A file while its lines are read.
 #[derive(Default)]
 struct Reading {
-    frames: Option<(usize, u32)>,
-    seconds: Option<(usize, f32)>,
-    static_scene: Option<Named>,
+    frames: Option<OfLine<u32>>,
+    seconds: Option<OfLine<f32>>,
+    static_scene: Option<OfLine<String>>,
     objects: Vec<Object>,
-    camera: Option<(usize, Vec<Key>)>,
+    camera: Option<OfLine<Vec<Key>>>,
+    above: Above,
 }
 
 impl Lines {
     /// Reads the text of the file at `path`.
     pub fn read(path: &Path, text: &str) -> Result<Lines> {
         let mut reading = Reading::default();
-        let mut above = Above::Nothing;
         for (line, text) in (1..).zip(text.lines()) {
             let text = text.split_once('#').map_or(text, |(before, _)| before).trim();
             if !text.is_empty() {
-                let fault = reading.line(line, text, &mut above);
-                fault.map_err(|what| Error::Malformed(format!("{}:{line}: {what}", path.display())))?;
+                let fault = reading.line(line, text);
+                fault.map_err(|what| malformed(format_args!("{}:{line}", path.display()), what))?;
             }
         }
         reading.whole().map_err(|(line, what)| {
             let line = line.map_or(String::new(), |line| format!(":{line}"));
-            Error::Malformed(format!("{}{line}: {what}", path.display()))
+            malformed(format_args!("{}{line}", path.display()), what)
         })
     }
 }
@@ -105,63 +103,53 @@ impl Lines {
 type Fault = String;
 
 impl Reading {
-    fn line(&mut self, line: usize, text: &str, above: &mut Above) -> Result<(), Fault> {
+    fn line(&mut self, line: usize, text: &str) -> Result<(), Fault> {
         let (word, rest) = split(text);
         match word {
             "frames" => {
                 let most = DynamicScene::MOST_FRAMES;
-                let frames = rest.parse().ok().filter(|n| (1..=most).contains(n));
-                let frames =
-                    frames.ok_or_else(|| format!("{rest:?} is not a number of frames; write one from 1 to {most}"))?;
+                let wrong = || format!("{rest:?} is not a number of frames; write one from 1 to {most}");
+                let frames = rest.parse().ok().filter(|n| (1..=most).contains(n)).ok_or_else(wrong)?;
                 once(&mut self.frames, line, frames, "frames")
             }
             "seconds" => once(&mut self.seconds, line, duration(rest)?, "seconds"),
             "static" if rest.is_empty() => Err("static names no scene; write one behind it, as in static hall".into()),
-            "static" => match &self.static_scene {
-                Some(before) => Err(twice("static", before.line)),
-                None => {
-                    *above = Above::Nothing;
-                    self.static_scene = Some(Named { line, spec: rest.into() });
-                    Ok(())
-                }
-            },
+            "static" => {
+                self.above = Above::Nothing;
+                once(&mut self.static_scene, line, rest.into(), "static")
+            }
             "object" => {
                 let (name, spec) = split(rest);
                 if spec.is_empty() {
                     return Err("an object is a name and a scene; write it as in object ball gen:icosphere:3".into());
                 }
-                if let Some(before) = self.objects.iter().find(|object| object.name == name) {
-                    return Err(format!(
-                        "the object of line {} is called {name:?}, too; rename one",
-                        before.scene.line
-                    ));
+                if let Some(Object { scene: (before, _), .. }) = self.objects.iter().find(|o| o.name == name) {
+                    return Err(format!("the object of line {before} is called {name:?}, too; rename one"));
                 }
-                *above = Above::Object;
-                let scene = Named { line, spec: spec.into() };
+                self.above = Above::Object;
+                let scene = (line, spec.into());
                 self.objects.push(Object { name: name.into(), scene, cycle: None, keys: Vec::new() });
                 Ok(())
             }
             "camera" if !rest.is_empty() => Err(format!("{rest:?} behind camera; its keys are lines of their own")),
             "camera" => {
-                *above = Above::Camera;
+                self.above = Above::Camera;
                 once(&mut self.camera, line, Vec::new(), "camera")
             }
-            "cycle" => match (*above, self.objects.last_mut()) {
+            "cycle" => match (self.above, self.objects.last_mut()) {
                 (Above::Object, Some(object)) => once(&mut object.cycle, line, duration(rest)?, "cycle"),
                 _ => Err("a cycle without an object; write it below the one that it is of".into()),
             },
             "at" => {
-                let (parts, keys) = match (*above, self.objects.last_mut(), &mut self.camera) {
+                let (parts, keys) = match (self.above, self.objects.last_mut(), &mut self.camera) {
                     (Above::Object, Some(object), _) => (&OF_OBJECTS, &mut object.keys),
                     (Above::Camera, _, Some((_, keys))) => (&OF_CAMERAS, keys),
                     _ => return Err("a key of nothing; write it below the object or camera that it is of".into()),
                 };
                 let key = key(line, rest, parts)?;
-                if let Some(before) = keys.last().filter(|before| before.time >= key.time) {
-                    return Err(format!(
-                        "{} s is not behind the {} s of line {}; sort the keys by time",
-                        key.time, before.time, before.line
-                    ));
+                if let Some(Key { line, time, .. }) = keys.last().filter(|before| before.time >= key.time) {
+                    let here = key.time;
+                    return Err(format!("{here} s is not behind the {time} s of line {line}; sort the keys by time"));
                 }
                 keys.push(key);
                 Ok(())
@@ -177,13 +165,10 @@ impl Reading {
         let missing = |what: &str| (None, format!("does not say its {what}; write a line as in {what} 24"));
         let (_, frames) = self.frames.ok_or_else(|| missing("frames"))?;
         let (_, seconds) = self.seconds.ok_or_else(|| missing("seconds"))?;
-        let camera = match self.camera {
-            Some((line, keys)) if keys.is_empty() => {
-                return Err((Some(line), "a camera without keys; write them as in at 0 eye 0 1 5 look 0 0 0".into()));
-            }
-            Some((_, keys)) => Some(keys),
-            None => None,
-        };
+        if let Some((line, _)) = self.camera.as_ref().filter(|(_, keys)| keys.is_empty()) {
+            return Err((Some(*line), "a camera without keys; write them as in at 0 eye 0 1 5 look 0 0 0".into()));
+        }
+        let camera = self.camera.map(|(_, keys)| keys);
         let keys = self.objects.iter().flat_map(|object| &object.keys).chain(camera.iter().flatten());
         if let Some(key) = keys.into_iter().find(|key| key.time > seconds) {
             let what = format!("a key at {} s, the scene begins again after {seconds}; take an earlier time", key.time);
@@ -207,18 +192,12 @@ fn duration(text: &str) -> Result<f32, Fault> {
     seconds.ok_or_else(|| format!("{text:?} is not a time to last; write seconds above 0, as in 2.5"))
 }
 
-fn twice(what: &str, before: usize) -> Fault {
-    format!("{what} stands in line {before} already; remove one")
-}
-
-fn once<T>(place: &mut Option<(usize, T)>, line: usize, value: T, what: &str) -> Result<(), Fault> {
-    match place {
-        Some((before, _)) => Err(twice(what, *before)),
-        None => {
-            *place = Some((line, value));
-            Ok(())
-        }
+fn once<T>(place: &mut Option<OfLine<T>>, line: usize, value: T, what: &str) -> Result<(), Fault> {
+    if let Some((before, _)) = place {
+        return Err(format!("{what} stands in line {before} already; remove one"));
     }
+    *place = Some((line, value));
+    Ok(())
 }
 
 /// A time, and parts of which each stands once.
@@ -262,22 +241,22 @@ fn key(line: usize, text: &str, known: &[Part]) -> Result<Key, Fault> {
 
 /// The numbers of a part are such as it can have.
 fn meaningful(part: &str, numbers: &[f32]) -> Result<(), Fault> {
-    match (part, numbers) {
+    Err(match (part, numbers) {
         ("scale", numbers) if numbers.contains(&0.0) => {
-            Err("a scale of 0 leaves nothing of the object; take a small one".into())
+            "a scale of 0 leaves nothing of the object; take a small one".into()
         }
         ("turn", [0.0, 0.0, 0.0, _]) => {
-            Err("a turn about (0, 0, 0), an axis needs a length; write it as in turn 0 1 0 90".into())
+            "a turn about (0, 0, 0), an axis needs a length; write it as in turn 0 1 0 90".into()
         }
         ("quaternion", [0.0, 0.0, 0.0, 0.0]) => {
-            Err("the quaternion (0, 0, 0, 0) is no rotation; none at all is quaternion 0 0 0 1".into())
+            "the quaternion (0, 0, 0, 0) is no rotation; none at all is quaternion 0 0 0 1".into()
         }
         ("turn", [.., degrees]) if degrees.abs() > MOST_DEGREES => {
-            Err(format!("a turn of {degrees} degrees, there may be {MOST_DEGREES}; take fewer"))
+            format!("a turn of {degrees} degrees, there may be {MOST_DEGREES}; take fewer")
         }
         ("fov", [degrees]) if !(*degrees > 0.0 && *degrees < 180.0) => {
-            Err(format!("a field of view of {degrees} degrees; it lies between 0 and 180"))
+            format!("a field of view of {degrees} degrees; it lies between 0 and 180")
         }
-        _ => Ok(()),
-    }
+        _ => return Ok(()),
+    })
 }

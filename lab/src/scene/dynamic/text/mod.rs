@@ -7,9 +7,10 @@ mod lines;
 use super::{
     CameraPath, DynamicContent, DynamicObject, DynamicScene, Keys, Motion, Pose, Rotation, Shape, Step, Track, Value,
 };
+use crate::scene::check::malformed;
 use crate::scene::{self, Animation, LoadOptions, Mesh, Scene, lookup, source};
 use crate::{Error, Result};
-use lines::{Key, Lines, Named};
+use lines::{Key, Lines, OfLine};
 use std::path::Path;
 
 /// Reads a `.dyn` file and the scenes that it names.
@@ -22,16 +23,16 @@ pub(in crate::scene) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<D
         folders.insert(0, beside.to_owned());
     }
     let file = File { path, seconds, options: LoadOptions { folders, progress: options.progress } };
-    let (static_mesh, its_camera, lights) = match &lines.static_scene {
-        Some(named) => {
-            let Scene { mesh, camera, lights, .. } = file.named(named, scene::load)?;
-            (mesh, Some(CameraPath::Still(camera)), lights)
-        }
-        None => (Mesh::default(), None, Vec::new()),
-    };
-    let objects = lines.objects.iter().map(|object| file.object(object)).collect::<Result<_>>()?;
-    let camera = lines.camera.map(|keys| file.camera(&keys)).transpose()?.or(its_camera);
-    DynamicContent { static_mesh, objects, camera, lights, frames, seconds, skinned: None }.into_scene(path)
+    let mut content = DynamicContent { frames, seconds, ..DynamicContent::default() };
+    if let Some(named) = &lines.static_scene {
+        let Scene { mesh, camera, lights, .. } = file.named(named, scene::load)?;
+        content = DynamicContent { static_mesh: mesh, camera: Some(CameraPath::Still(camera)), lights, ..content };
+    }
+    content.objects = lines.objects.iter().map(|object| file.object(object)).collect::<Result<_>>()?;
+    if let Some(keys) = lines.camera {
+        content.camera = Some(file.camera(&keys)?);
+    }
+    content.into_scene(path)
 }
 
 /// What a file's lines are turned into a scene with.
@@ -49,31 +50,28 @@ impl File<'_> {
     }
 
     /// What `load` makes of the scene that a line names.
-    fn named<T>(&self, named: &Named, load: impl Fn(&str, &LoadOptions<'_>) -> Result<T>) -> Result<T> {
+    fn named<T>(&self, named: &OfLine<String>, load: impl Fn(&str, &LoadOptions<'_>) -> Result<T>) -> Result<T> {
         let spec = self.spec(named)?;
+        let place = self.place(named.0);
         load(&spec, &self.options).map_err(|error| match error {
-            Error::Scene(message) => Error::Scene(format!("{}: {message}", self.place(named.line))),
-            Error::Malformed(message) | Error::Argument(message) => {
-                Error::Malformed(format!("{}: {message}", self.place(named.line)))
-            }
+            Error::Scene(message) => Error::Scene(format!("{place}: {message}")),
+            Error::Malformed(message) | Error::Argument(message) => malformed(&place, message),
             other => other,
         })
     }
 
     /// A path counts from the folder of the file, too.
-    fn spec(&self, named: &Named) -> Result<String> {
-        if named.spec.starts_with("gen:") {
-            return Ok(named.spec.clone());
+    fn spec(&self, (line, spec): &OfLine<String>) -> Result<String> {
+        if spec.starts_with("gen:") {
+            return Ok(spec.clone());
         }
-        let beside = self.path.with_file_name(&named.spec);
-        let spec = if beside.is_file() { beside.display().to_string() } else { named.spec.clone() };
+        let beside = self.path.with_file_name(spec);
+        let spec = if beside.is_file() { beside.display().to_string() } else { spec.clone() };
         let is_dynamic =
             lookup::find(&spec, &self.options.folders).is_ok_and(|p| lookup::format_of(&p).as_deref() == Some("dyn"));
         if is_dynamic {
-            let place = self.place(named.line);
-            return Err(Error::Malformed(format!(
-                "{place}: {spec} is a .dyn file itself, these are not nested; name the scenes that it is made of"
-            )));
+            let what = "is a .dyn file itself, these are not nested; name the scenes that it is made of";
+            return Err(malformed(self.place(*line), format_args!("{spec} {what}")));
         }
         Ok(spec)
     }
@@ -85,10 +83,9 @@ impl File<'_> {
                 (triangles, Shape::KeyFrames { frames, seconds: cycle.map_or(self.seconds, |(_, cycle)| cycle) })
             }
             (None, Some((line, _))) => {
-                let (place, spec) = (self.place(line), &object.scene.spec);
-                return Err(Error::Malformed(format!(
-                    "{place}: {spec} does not morph, only an animation has a cycle; remove the line"
-                )));
+                let (_, spec) = &object.scene;
+                let what = format_args!("{spec} does not morph, only an animation has a cycle; remove the line");
+                return Err(malformed(self.place(line), what));
             }
             (None, None) => {
                 let Mesh { positions, triangles } = self.named(&object.scene, scene::load)?.mesh;
@@ -112,8 +109,8 @@ impl File<'_> {
         let point = |n: &[f32]| [n[0], n[1], n[2]];
         let needed = |name: &str| {
             track(keys, name, point).ok_or_else(|| {
-                let place = self.place(keys[0].line);
-                Error::Malformed(format!("{place}: no key of the camera says its {name}; write it as in {name} 0 1 5"))
+                let what = format_args!("no key of the camera says its {name}; write it as in {name} 0 1 5");
+                malformed(self.place(keys[0].line), what)
             })
         };
         Ok(CameraPath::Keys {
