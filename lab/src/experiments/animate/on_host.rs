@@ -5,7 +5,7 @@ use crate::scene::{Frame, Group, Mesh};
 use crate::subjects::builders::Spec;
 use crate::subjects::host_rays::{KdRays, Numbered, timed};
 use crate::subjects::{BuildRun, KD_TREE, Subject};
-use crate::{Error, Result};
+use crate::Result;
 use hedgerow::kdtree::layout::{KdTree, SpareRoom};
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::trace::{Hit, Query, Ray, Work};
