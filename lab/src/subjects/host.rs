@@ -9,13 +9,12 @@ use crate::scene::Mesh;
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{self, Bvh2};
+use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::bvh::twin::{lbvh, ploc};
-use hedgerow::bvh::{reinsertion, twin::quality};
+use hedgerow::bvh::twin::{lbvh, ploc, quality};
 use hedgerow::trace::twin::tracer;
 use hedgerow::trace::{Hit, Query, Ray, Work};
-use hedgerow_host::sweep;
-use hedgerow_host::sweep::Leaves;
+use hedgerow_host::sweep::{self, Leaves};
 
 /// How a host's builder makes the tree of what is sorted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +35,7 @@ pub struct HostBvhOptions {
     /// The codes; `None` takes those that the device would take for so many triangles.
     pub codes: Option<Codes>,
     /// Reinsertion behind it.
-    pub reinsertion: Option<reinsertion::ReinsertionOptions>,
+    pub reinsertion: Option<ReinsertionOptions>,
     /// Whether subtrees become leaves where that is cheaper.
     pub collapse: Collapse,
 }
@@ -90,10 +89,6 @@ impl Subject for Host<'_> {
 
     fn kind(&self) -> &'static str {
         "bvh2"
-    }
-
-    fn timer(&self) -> &'static str {
-        "wall"
     }
 
     fn build(&mut self) -> Result<BuildRun> {

@@ -1,6 +1,7 @@
 //! One level of acceleration structures: what it is built over, and where it lies.
 
-use super::structures::{BuildInfo, Geometry, PlacedStructure, Range, Structures, address, triangles_of};
+use super::device_rays::timed_run;
+use super::structures::{BuildInfo, Geometry, PlacedStructure, Range, Structures, instances_at, triangles_of};
 use crate::Result;
 use crate::device::Buffer;
 use crate::scene::Mesh;
@@ -42,10 +43,7 @@ impl<'a> Level<'a> {
     /// Too little memory.
     pub fn top(structures: &Structures<'a>, instances: &[Instance], flags: Flags) -> Result<Level<'a>> {
         let buffer = structures.device.upload("instances", instances)?;
-        let data = vk::AccelerationStructureGeometryInstancesDataKHR::default().data(address(&buffer));
-        let geometry = vk::AccelerationStructureGeometryKHR::default()
-            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
-            .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data });
+        let geometry = instances_at(buffer.address(), false);
         Level::new(structures, (Type::TOP_LEVEL, flags), geometry, instances.len() as u32, vec![buffer])
     }
 
@@ -129,10 +127,6 @@ impl<'a> Level<'a> {
     /// # Errors
     /// It cannot be recorded or run.
     pub fn build(&self, structures: &Structures<'_>, timestamps: &mut Timestamps, mode: Mode) -> Result<f64> {
-        structures.device.run(Some(timestamps), |recorder| {
-            recorder.phase("build");
-            self.record(structures, recorder, mode)
-        })?;
-        timestamps.phases().map(|phases| phases.iter().map(|phase| phase.milliseconds).sum()).map_err(Into::into)
+        timed_run(structures.device, timestamps, "build", |recorder| self.record(structures, recorder, mode))
     }
 }

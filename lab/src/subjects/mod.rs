@@ -1,6 +1,7 @@
 //! What is measured: a builder on a scene, behind one interface, ours and the peers' alike.
 
 pub mod auto;
+pub mod build_memory;
 pub mod builders;
 pub mod device_bvh;
 pub mod device_rays;
@@ -67,7 +68,9 @@ pub trait Subject {
     /// `bvh2`, `wide4`, `wide8`, `wide8q`, `kdtree`, `driver` (two levels, by Vulkan's calls) or `host`.
     fn kind(&self) -> &'static str;
     /// `device` where build times are timestamps, otherwise `wall`.
-    fn timer(&self) -> &'static str;
+    fn timer(&self) -> &'static str {
+        "wall"
+    }
     /// Whether rays are traced on the device.
     fn traces_on_device(&self) -> bool {
         self.timer() == "device"

@@ -1,6 +1,6 @@
 //! Acceleration structures by the calls of `VK_KHR_acceleration_structure`: ours or the driver's, and nothing else differs.
 
-use super::device_rays::RayBuffers;
+use super::device_rays::{RayBuffers, timed_run};
 use crate::arguments;
 use crate::device::{Buffer, Device, DriverRays, DriverTracing};
 use crate::experiments::accel::points;
@@ -12,12 +12,16 @@ use ash::vk;
 use hedgerow::accel;
 use hedgerow::bvh::layout::{Header, MAX_DEPTH};
 use hedgerow::gpu::{Kernel, Recorder, Timestamps};
-use hedgerow::trace;
+use hedgerow::trace::{self, tracer::TraceBuffers};
 
-pub(crate) type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
-pub(crate) type Range = vk::AccelerationStructureBuildRangeInfoKHR;
-pub(crate) type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
-pub(crate) type Sizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
+/// What a build call takes.
+pub type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
+/// How many primitives of a geometry, and where they begin.
+pub type Range = vk::AccelerationStructureBuildRangeInfoKHR;
+/// What is built over.
+pub type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
+/// Bytes that a structure and its builds need.
+pub type Sizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
 
 /// Who builds.
 #[derive(Clone)]
@@ -36,7 +40,12 @@ pub struct Structures<'a> {
 impl<'a> Structures<'a> {
     /// Ours.
     pub fn ours(device: &'a Device, options: accel::AccelOptions) -> Structures<'a> {
-        Structures { device, maker: Functions::Ours(accel::Device::with_options(device, options)) }
+        Structures::of(device, accel::Device::with_options(device, options))
+    }
+
+    /// Ours, by the calls of `ours`.
+    pub fn of(device: &'a Device, ours: accel::Device<'a>) -> Structures<'a> {
+        Structures { device, maker: Functions::Ours(ours) }
     }
 
     /// Those of the driver, where it has any and the device was opened with them.
@@ -151,25 +160,30 @@ impl<'a> Structures<'a> {
         buffers: &RayBuffers<'_>,
         query: trace::Query,
     ) -> Result<f64> {
-        let (structure, any_hit) = (self.address(top), query == trace::Query::AnyHit);
-        let (rays, hits, count) = (buffers.rays.address(), buffers.hits.address(), buffers.count);
-        self.device.run(Some(timestamps), |recorder| {
-            recorder.phase("trace");
-            match self.maker {
-                Functions::Ours(_) => {
-                    // As trace::tracer has it, or no level of the stack in shared memory.
-                    let tuning = &self.device.tuning.trace;
-                    let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
-                    let kernel = Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[u32::from(any_hit), levels]);
-                    let arguments = arguments::TraceQueries { structure, rays, hits, works: 0, first: 0, count };
-                    recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
-                }
-                Functions::Driver(_) => {
-                    self.device.trace_by_driver(recorder, &DriverRays { structure, rays, hits, count, any_hit })
-                }
-            }
-        })?;
-        Ok(timestamps.phases()?.iter().map(|p| p.milliseconds).sum())
+        let buffers = buffers.buffers(self.address(top), None);
+        timed_run(self.device, timestamps, "trace", |recorder| self.record_trace(recorder, &buffers, query))
+    }
+
+    /// Records the tracing of rays through a top level.
+    pub(crate) fn record_trace(
+        &self,
+        recorder: &mut Recorder<'_>,
+        buffers: &TraceBuffers,
+        query: trace::Query,
+    ) -> hedgerow::Result<()> {
+        let any_hit = query == trace::Query::AnyHit;
+        let &TraceBuffers { structure, rays, hits, count, .. } = buffers;
+        let (rays, hits) = (rays.address, hits.address);
+        if let Functions::Driver(_) = self.maker {
+            let rays = DriverRays { structure, rays, hits, count, any_hit };
+            return self.device.trace_by_driver(recorder, &rays);
+        }
+        // As trace::tracer has it, or no level of the stack in shared memory.
+        let tuning = &self.device.tuning.trace;
+        let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
+        let kernel = Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[u32::from(any_hit), levels]);
+        let arguments = arguments::TraceQueries { structure, rays, hits, works: 0, first: 0, count };
+        recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
     }
 
     /// What each of the rays meets on its way, of our structures: nodes of the top level, instances, nodes below, triangles.
@@ -188,14 +202,8 @@ impl<'a> Structures<'a> {
         let count = buffers.count;
         let works = device.buffer("work", 16 * u64::from(count))?;
         let (structure, works_at) = (self.address(top), works.address());
-        let arguments = arguments::TraceQueries {
-            structure,
-            rays: buffers.rays.address(),
-            hits: buffers.hits.address(),
-            works: works_at,
-            first: 0,
-            count,
-        };
+        let (rays, hits) = (buffers.rays.address(), buffers.hits.address());
+        let arguments = arguments::TraceQueries { structure, rays, hits, works: works_at, first: 0, count };
         device.run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup())))?;
         Ok(works.read(count as usize))
     }
@@ -242,20 +250,29 @@ impl Drop for PlacedStructure<'_> {
     }
 }
 
-/// Where a buffer begins, for what a build reads.
-pub(crate) fn address(buffer: &Buffer<'_>) -> vk::DeviceOrHostAddressConstKHR {
-    vk::DeviceOrHostAddressConstKHR { device_address: buffer.address() }
+/// An address of what a build reads.
+pub(crate) fn address(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
+    vk::DeviceOrHostAddressConstKHR { device_address }
+}
+
+/// Vulkan's struct for instances, or pointers to them.
+pub fn instances_at(at: u64, by_pointers: bool) -> Geometry {
+    let instances =
+        vk::AccelerationStructureGeometryInstancesDataKHR::default().array_of_pointers(by_pointers).data(address(at));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { instances })
 }
 
 /// Opaque triangles of a mesh whose positions and indices lie in these buffers.
 pub(crate) fn triangles_of(mesh: &Mesh, positions: &Buffer<'_>, indices: &Buffer<'_>) -> Geometry {
     let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
         .vertex_format(vk::Format::R32G32B32_SFLOAT)
-        .vertex_data(address(positions))
+        .vertex_data(address(positions.address()))
         .vertex_stride(12)
         .max_vertex(mesh.positions.len().saturating_sub(1) as u32)
         .index_type(vk::IndexType::UINT32)
-        .index_data(address(indices));
+        .index_data(address(indices.address()));
     vk::AccelerationStructureGeometryKHR::default()
         .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
         .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })

@@ -1,10 +1,10 @@
 //! The list of all builders.
 
-use super::Spec;
 use super::options::{
     BINS, BITS, CODES, COLLAPSE, EXACT, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT, TERMINATION, TRACE,
     TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
 };
+use super::{Plan, Spec};
 use crate::Result;
 use crate::subjects::host::HostMethod;
 use crate::subjects::peers::driver::DriverPreference;
@@ -12,7 +12,8 @@ use crate::subjects::peers::driver::DriverPreference;
 use crate::subjects::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use crate::subjects::peers::obvhs;
-use hedgerow::bvh::builder;
+use hedgerow::bvh::builder::Method;
+use hedgerow_host::kdtree::Planes;
 use std::slice;
 
 /// A builder that can be asked for.
@@ -25,7 +26,9 @@ pub struct BuilderEntry {
     pub options: &'static [BuilderOption],
     /// What `-b all` takes of it: specs that differ in kind, not in degree.
     pub variants: &'static [&'static str],
-    pub(super) kind: Kind,
+    /// What it needs of the machine.
+    pub needs: Needs,
+    pub(super) plan: fn(&Spec) -> Result<Plan>,
 }
 
 /// An option of a builder, `key=value`.
@@ -34,32 +37,6 @@ pub struct BuilderOption {
     pub key: &'static str,
     /// The values it takes, for people.
     pub values: &'static str,
-}
-
-impl BuilderOption {
-    pub(super) const fn new(key: &'static str, values: &'static str) -> BuilderOption {
-        BuilderOption { key, values }
-    }
-}
-
-/// What a builder is: what it needs, which options must be sound, and how its subject is made follow from it.
-pub(super) enum Kind {
-    /// One of ours on the device, with these options.
-    Device(fn(&Spec) -> Result<builder::BuildOptions>),
-    /// One of ours on the host, with this hierarchy.
-    Host(fn(&Spec) -> Result<HostMethod>),
-    /// A kd-tree by one of ours on the host.
-    KdHost(fn(&Spec) -> Result<hedgerow_host::kdtree::HostKdOptions>),
-    /// A kd-tree by ours on the device.
-    KdGpu,
-    /// The one of ours on the device that is expected to take least, by the table of costs.
-    Auto,
-    /// The Vulkan driver's own.
-    Driver(DriverPreference),
-    #[cfg(feature = "peer-obvhs")]
-    Obvhs(obvhs::Preset),
-    #[cfg(feature = "peer-embree")]
-    Embree(embree::Preset),
 }
 
 /// What a builder needs of the machine.
@@ -74,9 +51,13 @@ pub enum Needs {
 }
 
 impl BuilderEntry {
-    /// One without options, itself its only variant: a slice borrows the name for that.
-    const fn new(name: &'static &'static str, what: &'static str, kind: Kind) -> BuilderEntry {
-        BuilderEntry { name, what, options: &[], variants: slice::from_ref(name), kind }
+    /// One without options, itself its only variant: a slice borrows the name for that. It needs nothing of the machine.
+    const fn new(name: &'static &'static str, what: &'static str, plan: fn(&Spec) -> Result<Plan>) -> BuilderEntry {
+        BuilderEntry { name, what, options: &[], variants: slice::from_ref(name), needs: Needs::Nothing, plan }
+    }
+
+    const fn needing(self, needs: Needs) -> BuilderEntry {
+        BuilderEntry { needs, ..self }
     }
 
     const fn taking(self, options: &'static [BuilderOption]) -> BuilderEntry {
@@ -87,17 +68,9 @@ impl BuilderEntry {
         BuilderEntry { variants, ..self }
     }
 
-    /// What it needs of the machine.
-    pub fn needs(&self) -> Needs {
-        match self.kind {
-            Kind::Device(_) | Kind::KdGpu | Kind::Auto => Needs::Device,
-            Kind::Driver(_) => Needs::RayQuery,
-            Kind::Host(_) | Kind::KdHost(_) => Needs::Nothing,
-            #[cfg(feature = "peer-obvhs")]
-            Kind::Obvhs(_) => Needs::Nothing,
-            #[cfg(feature = "peer-embree")]
-            Kind::Embree(_) => Needs::Nothing,
-        }
+    /// Whether it has an option of this name.
+    pub(super) fn takes(&self, key: &str) -> bool {
+        self.options.iter().any(|option| option.key == key)
     }
 }
 
@@ -106,8 +79,9 @@ pub static BUILDERS: &[BuilderEntry] = &[
     BuilderEntry::new(
         &"lbvh",
         "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
-        Kind::Device(Spec::lbvh_options),
+        |spec| spec.on_device(Method::Lbvh),
     )
+    .needing(Needs::Device)
     .taking(&[CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER])
     .in_variants(&[
         "lbvh",
@@ -121,94 +95,91 @@ pub static BUILDERS: &[BuilderEntry] = &[
     BuilderEntry::new(
         &"hlbvh",
         "hierarchical LBVH on the device: small subtrees of the LBVH under a top split by the surface area heuristic",
-        Kind::Device(Spec::hlbvh_options),
+        Spec::hlbvh,
     )
+    .needing(Needs::Device)
     .taking(&[BITS, TREELET, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER]),
     BuilderEntry::new(
         &"ploc",
         "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
-        Kind::Device(Spec::ploc_options),
+        Spec::ploc,
     )
+    .needing(Needs::Device)
     .taking(&[RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER])
     .in_variants(&["ploc", "ploc:radius=25"]),
     BuilderEntry::new(
         &"hploc",
         "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
-        Kind::Device(Spec::hploc_options),
+        Spec::hploc,
     )
+    .needing(Needs::Device)
     .taking(&[WINDOW, RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER]),
     BuilderEntry::new(
         &"auto",
         "the device's builder that takes least for a build and its rays, by its measured costs",
-        Kind::Auto,
+        |spec| spec.rays().map(Plan::Auto),
     )
+    .needing(Needs::Device)
     .taking(&[RAYS]),
     BuilderEntry::new(
         &"lbvh-host",
         "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte",
-        Kind::Host(|_| Ok(HostMethod::Lbvh)),
+        |spec| spec.on_host(HostMethod::Lbvh),
     )
     .taking(&[CODES, COLLAPSE, OPTIMISE]),
     BuilderEntry::new(
         &"ploc-host",
         "locally-ordered clustering by one thread of the host: what `ploc` must equal, byte for byte",
-        Kind::Host(|spec| spec.ploc_radius().map(HostMethod::Ploc)),
+        Spec::ploc_on_host,
     )
     .taking(&[RADIUS, CODES, COLLAPSE, OPTIMISE]),
-    BuilderEntry::new(
-        &"sweep",
-        "full-sweep SAH on the host: the reference for the quality of the others",
-        Kind::Host(|spec| spec.sweep_leaves().map(HostMethod::Sweep)),
-    )
+    BuilderEntry::new(&"sweep", "full-sweep SAH on the host: the reference for the quality of the others", |spec| {
+        spec.on_host(HostMethod::Sweep(spec.sweep_leaves()?))
+    })
     .taking(&[COLLAPSE, OPTIMISE, TERMINATION]),
-    BuilderEntry::new(&"kd-exact", "kd-tree on the host: perfect splits by SAH", Kind::KdHost(Spec::kd_exact_options))
+    BuilderEntry::new(&"kd-exact", "kd-tree on the host: perfect splits by SAH", |spec| spec.kd_on_host(Planes::Exact))
         .taking(&[KT, KI, TRAVERSAL, TRACE]),
-    BuilderEntry::new(
-        &"kd-binned",
-        "kd-tree on the host: the best by SAH of equally spaced planes",
-        Kind::KdHost(Spec::kd_binned_options),
-    )
+    BuilderEntry::new(&"kd-binned", "kd-tree on the host: the best by SAH of equally spaced planes", |spec| {
+        spec.kd_on_host(Planes::Binned(spec.number(&BINS)?.unwrap_or(Planes::BINS)))
+    })
     .taking(&[BINS, KT, KI, TRAVERSAL, TRACE]),
     BuilderEntry::new(
         &"kd-gpu",
         "kd-tree on the device: bins above, level by level; perfect splits of few references below",
-        Kind::KdGpu,
+        Spec::kd_on_device,
     )
+    .needing(Needs::Device)
     .taking(&[BINS, EXACT, KT, KI, SCHEDULE, WORKGROUPS, TRAVERSAL]),
     BuilderEntry::new(
         &"kd-gpu-host",
         "kd-tree of bins above and perfect splits below, on the host: what `kd-gpu` must equal, byte for byte",
-        Kind::KdHost(Spec::kd_mixed_options),
+        Spec::kd_mixed_on_host,
     )
     .taking(&[BINS, EXACT, KT, KI, TRAVERSAL, TRACE]),
-    BuilderEntry::new(
-        &"driver-fast-build",
-        "the Vulkan driver's own, asked to build fast",
-        Kind::Driver(DriverPreference::FastBuild),
-    ),
-    BuilderEntry::new(
-        &"driver-fast-trace",
-        "the Vulkan driver's own, asked to trace fast",
-        Kind::Driver(DriverPreference::FastTrace),
-    ),
+    BuilderEntry::new(&"driver-fast-build", "the Vulkan driver's own, asked to build fast", |_| {
+        Ok(Plan::Driver(DriverPreference::FastBuild))
+    })
+    .needing(Needs::RayQuery),
+    BuilderEntry::new(&"driver-fast-trace", "the Vulkan driver's own, asked to trace fast", |_| {
+        Ok(Plan::Driver(DriverPreference::FastTrace))
+    })
+    .needing(Needs::RayQuery),
     #[cfg(feature = "peer-obvhs")]
-    BuilderEntry::new(&"obvhs-fastest", "obvhs on the CPU: PLOC alone", Kind::Obvhs(obvhs::Preset::Fastest)),
+    BuilderEntry::new(&"obvhs-fastest", "obvhs on the CPU: PLOC alone", |_| Ok(Plan::Obvhs(obvhs::Preset::Fastest))),
     #[cfg(feature = "peer-obvhs")]
-    BuilderEntry::new(
-        &"obvhs-fast",
-        "obvhs on the CPU: PLOC and a little reinsertion",
-        Kind::Obvhs(obvhs::Preset::Fast),
-    ),
+    BuilderEntry::new(&"obvhs-fast", "obvhs on the CPU: PLOC and a little reinsertion", |_| {
+        Ok(Plan::Obvhs(obvhs::Preset::Fast))
+    }),
     #[cfg(feature = "peer-obvhs")]
-    BuilderEntry::new(
-        &"obvhs-medium",
-        "obvhs on the CPU: PLOC and more reinsertion",
-        Kind::Obvhs(obvhs::Preset::Medium),
-    ),
+    BuilderEntry::new(&"obvhs-medium", "obvhs on the CPU: PLOC and more reinsertion", |_| {
+        Ok(Plan::Obvhs(obvhs::Preset::Medium))
+    }),
     #[cfg(feature = "peer-embree")]
-    BuilderEntry::new(&"embree-low", "Embree on the CPU: Morton codes", Kind::Embree(embree::Preset::Low)),
+    BuilderEntry::new(&"embree-low", "Embree on the CPU: Morton codes", |_| Ok(Plan::Embree(embree::Preset::Low))),
     #[cfg(feature = "peer-embree")]
-    BuilderEntry::new(&"embree-medium", "Embree on the CPU: binned SAH", Kind::Embree(embree::Preset::Medium)),
+    BuilderEntry::new(&"embree-medium", "Embree on the CPU: binned SAH", |_| Ok(Plan::Embree(embree::Preset::Medium))),
     #[cfg(feature = "peer-embree")]
-    BuilderEntry::new(&"embree-high", "Embree on the CPU: SAH with spatial splits", Kind::Embree(embree::Preset::High)),
+    BuilderEntry::new(&"embree-high", "Embree on the CPU: SAH with spatial splits", |_| {
+        Ok(Plan::Embree(embree::Preset::High))
+    }),
 ];

@@ -7,7 +7,8 @@
 use crate::device::{Device, Found, driver_is_missing};
 use crate::measure::record;
 use crate::scene::Mesh;
-use crate::subjects::device_rays::RayBuffers;
+use crate::subjects::build_memory::memory_record;
+use crate::subjects::device_rays::DeviceRays;
 use crate::subjects::level::Level;
 use crate::subjects::structures::Structures;
 use crate::subjects::{BuildRun, Subject};
@@ -33,7 +34,7 @@ pub struct Driver<'a> {
     bottom: Level<'a>,
     top: Level<'a>,
     timestamps: Timestamps,
-    rays: Option<RayBuffers<'a>>,
+    rays: DeviceRays<'a>,
 }
 
 /// What a reader of the figures must know of this driver's builder, if anything.
@@ -73,7 +74,8 @@ impl<'a> Driver<'a> {
         };
         let bottom = Level::bottom(&structures, mesh, flags)?;
         let top = Level::top(&structures, &[bottom.instance(&structures, Instance::IDENTITY)], flags)?;
-        Ok(Driver { structures, preference, bottom, top, timestamps: Timestamps::new(device, 2)?, rays: None })
+        let (timestamps, rays) = (Timestamps::new(device, 2)?, DeviceRays::new(device)?);
+        Ok(Driver { structures, preference, bottom, top, timestamps, rays })
     }
 }
 
@@ -112,26 +114,19 @@ impl Subject for Driver<'_> {
 
     fn memory(&self) -> record::MemoryRecord {
         let ([bottom, scratch], [top, _]) = (self.bottom.bytes(), self.top.bytes());
-        record::MemoryRecord {
-            structure_bytes: Some(bottom + top),
-            scratch_bytes: Some(scratch),
-            peak_bytes: Some(bottom + top + scratch),
-        }
+        memory_record(bottom + top, scratch)
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        // Both at once may be too much.
-        self.rays = None;
-        self.rays = Some(RayBuffers::new(self.structures.device, rays)?);
-        Ok(())
+        self.rays.set(rays)
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let Some(rays) = &self.rays else { return Ok(0.0) };
-        self.structures.trace(&mut self.timestamps, self.top.structure(), rays, query)
+        let (structures, top) = (&self.structures, self.structures.address(self.top.structure()));
+        self.rays.trace(top, |recorder, buffers| structures.record_trace(recorder, buffers, query))
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(self.rays.as_ref().map_or_else(Vec::new, RayBuffers::read_hits))
+        Ok(self.rays.hits())
     }
 }
