@@ -5,10 +5,10 @@ use super::geometries::Owned;
 use super::probe::{self, Probe, ProbeRay, ProbeReport};
 use hedgerow::ash::{self, vk};
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
-use hedgerow::gpu::Recorder;
 use hedgerow::trace::{Hit, Query, Ray};
-use hedgerow_lab::device::{Device, DriverRays, DriverTracing};
+use hedgerow_lab::device::{DriverRays, DriverTracing};
 pub use hedgerow_lab::experiments::check::backend::{Backend, BuildInfo, Built, Ours, Ranges};
+use hedgerow_lab::subjects::structures::Structures;
 
 /// Ours, and the driver's where the device has it with ray queries, which shaders of engines ask.
 pub fn backends() -> Vec<Box<dyn Backend>> {
@@ -19,13 +19,14 @@ pub fn backends() -> Vec<Box<dyn Backend>> {
     all
 }
 
-pub struct Drivers(pub ash::khr::acceleration_structure::Device, Probe);
+pub struct Drivers(pub ash::khr::acceleration_structure::Device, Probe, Structures<'static>);
 
 impl Drivers {
     /// For a device that has them.
     pub fn new() -> Drivers {
         let raw = ash::khr::acceleration_structure::Device::new(device().ash_instance(), device().ash_device());
-        Drivers(raw, probe::of_the_driver())
+        let structures = Structures::drivers(device()).expect("the driver has structures");
+        Drivers(raw, probe::of_the_driver(), structures)
     }
 }
 
@@ -34,42 +35,8 @@ impl Backend for Drivers {
         "driver"
     }
 
-    fn device(&self) -> &'static Device {
-        device()
-    }
-
-    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
-        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
-        unsafe { self.0.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) };
-        sizes
-    }
-
-    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
-        unsafe { self.0.create_acceleration_structure(info, None) }.expect("the driver makes it")
-    }
-
-    fn destroy(&self, structure: vk::AccelerationStructureKHR) {
-        unsafe { self.0.destroy_acceleration_structure(structure, None) };
-    }
-
-    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
-        let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
-        unsafe { self.0.get_acceleration_structure_device_address(&info) }
-    }
-
-    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]) {
-        let access =
-            vk::AccessFlags::ACCELERATION_STRUCTURE_READ_KHR | vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR;
-        let barrier = vk::MemoryBarrier::default().src_access_mask(access).dst_access_mask(access);
-        let build = vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
-        let after = build | vk::PipelineStageFlags::COMPUTE_SHADER;
-        let none = vk::DependencyFlags::empty();
-        unsafe {
-            self.0.cmd_build_acceleration_structures(recorder.commands(), infos, ranges);
-            let raw = recorder.context().ash_device();
-            raw.cmd_pipeline_barrier(recorder.commands(), build, after, none, &[barrier], &[], &[]);
-        }
+    fn structures(&self) -> &Structures<'static> {
+        &self.2
     }
 
     fn scratch_alignment(&self) -> u64 {

@@ -3,43 +3,64 @@
 
 use super::probe::{Probe, ProbeRay, ProbeReport};
 use crate::device::{Buffer, Device};
+use crate::subjects::device_rays::RayBuffers;
+pub use crate::subjects::structures::BuildInfo;
+use crate::subjects::structures::{Range, Sizes, Structures};
 use ash::vk;
 use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
 use hedgerow::gpu::Recorder;
-use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
+use hedgerow::trace::tracer::{self, TraceShape};
 use hedgerow::trace::{Hit, Query, Ray};
 
-/// What a build call takes.
-pub type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
 /// How many primitives of each geometry.
-pub type Ranges<'a> = &'a [vk::AccelerationStructureBuildRangeInfoKHR];
+pub type Ranges<'a> = &'a [Range];
 
 /// What an engine calls.
 pub trait Backend {
     /// Whose it is.
     fn name(&self) -> &'static str;
-    /// The device that everything lies on.
-    fn device(&self) -> &'static Device;
-    /// `vkGetAccelerationStructureBuildSizesKHR`.
-    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static>;
-    /// `vkCreateAccelerationStructureKHR`.
-    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR;
-    /// `vkDestroyAccelerationStructureKHR`.
-    fn destroy(&self, structure: vk::AccelerationStructureKHR);
-    /// `vkGetAccelerationStructureDeviceAddressKHR`.
-    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64;
-    /// `vkCmdBuildAccelerationStructuresKHR`.
-    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]);
+    /// The calls.
+    fn structures(&self) -> &Structures<'static>;
     /// `minAccelerationStructureScratchOffsetAlignment`.
     fn scratch_alignment(&self) -> u64;
     /// What queries through a top level report.
     fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport>;
     /// The hits of rays in a bottom-level structure.
     fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
+
+    /// The device that everything lies on.
+    fn device(&self) -> &'static Device {
+        self.structures().device
+    }
+
+    /// `vkGetAccelerationStructureBuildSizesKHR`.
+    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> Sizes {
+        self.structures().sizes(info, counts).expect("it can be built")
+    }
+
+    /// `vkCreateAccelerationStructureKHR`.
+    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
+        self.structures().create(info).expect("the offset is right")
+    }
+
+    /// `vkDestroyAccelerationStructureKHR`.
+    fn destroy(&self, structure: vk::AccelerationStructureKHR) {
+        self.structures().destroy(structure);
+    }
+
+    /// `vkGetAccelerationStructureDeviceAddressKHR`.
+    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
+        self.structures().address(structure)
+    }
+
+    /// `vkCmdBuildAccelerationStructuresKHR`, with a barrier behind it.
+    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]) {
+        self.structures().build(recorder, infos, ranges).expect("it can be built");
+    }
 }
 
 /// Ours: the calls of [`accel::Device`], and queries in a shader that includes our header.
-pub struct Ours(pub accel::Device<'static>, Probe, &'static Device);
+pub struct Ours(pub accel::Device<'static>, Probe, Structures<'static>);
 
 impl Ours {
     /// With the defaults.
@@ -49,7 +70,8 @@ impl Ours {
 
     /// With these options.
     pub fn with_options(device: &'static Device, options: accel::AccelOptions) -> Ours {
-        Ours(accel::Device::with_options(device, options), Probe::ours(device), device)
+        let calls = accel::Device::with_options(device, options);
+        Ours(calls.clone(), Probe::ours(device), Structures::of(device, calls))
     }
 }
 
@@ -58,34 +80,8 @@ impl Backend for Ours {
         "hedgerow"
     }
 
-    fn device(&self) -> &'static Device {
-        self.2
-    }
-
-    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
-        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
-        unsafe { self.0.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) }
-            .expect("it can be built");
-        sizes
-    }
-
-    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
-        unsafe { self.0.create_acceleration_structure(info, None) }.expect("the offset is right")
-    }
-
-    fn destroy(&self, structure: vk::AccelerationStructureKHR) {
-        self.0.destroy_acceleration_structure(structure, None);
-    }
-
-    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
-        let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
-        self.0.get_acceleration_structure_device_address(&info)
-    }
-
-    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]) {
-        unsafe { self.0.cmd_build_acceleration_structures(recorder.commands(), infos, ranges) }
-            .expect("it can be built");
+    fn structures(&self) -> &Structures<'static> {
+        &self.2
     }
 
     fn scratch_alignment(&self) -> u64 {
@@ -97,14 +93,13 @@ impl Backend for Ours {
     }
 
     fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
-        let count = rays.len() as u32;
-        let ray_buffer = self.2.upload("rays", rays).expect("memory");
-        let hits = self.2.buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
-        let structure = self.address(structure);
-        let buffers = TraceBuffers { structure, rays: ray_buffer.region(), hits: hits.region(), work: None, count };
-        let shape = TraceShape::of(self.2);
-        self.2.run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
-        hits.read(rays.len())
+        let (device, structure) = (self.device(), self.address(structure));
+        let rays = RayBuffers::new(device, rays).expect("memory");
+        let record = |r: &mut Recorder<'_>| {
+            tracer::record(r, &TraceShape::of(device), Query::ClosestHit, &rays.buffers(structure, None))
+        };
+        device.run(None, record).expect("it traces");
+        rays.read_hits()
     }
 }
 

@@ -7,7 +7,6 @@ use crate::experiments::check::{self, CheckRecord, Ground, Group};
 use crate::report::numbers::bytes;
 use anyhow::{Context, bail};
 use ash::vk;
-use std::collections::BTreeMap;
 use std::io::Write;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::process::Command;
@@ -98,29 +97,21 @@ fn each_in_order<T: Send, R: Send>(
     run: impl Fn(T) -> R + Sync,
     mut tell: impl FnMut(R) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let items = Mutex::new(items.into_iter().enumerate());
+    // A channel for each result, so that they come in order.
+    let (senders, results): (Vec<_>, Vec<_>) = items.iter().map(|_| mpsc::channel()).unzip();
+    let items = Mutex::new(items.into_iter().zip(senders));
     let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let (sender, results) = mpsc::channel();
     thread::scope(|scope| {
-        for sender in vec![sender; jobs.get()] {
-            let (next, run) = (&next, &run);
-            scope.spawn(move || {
-                while let Some((i, item)) = next() {
-                    if sender.send((i, run(item))).is_err() {
+        for _ in 0..jobs.get() {
+            scope.spawn(|| {
+                while let Some((item, sender)) = next() {
+                    if sender.send(run(item)).is_err() {
                         return;
                     }
                 }
             });
         }
-        let (mut waiting, mut told) = (BTreeMap::new(), 0);
-        for (i, result) in results {
-            waiting.insert(i, result);
-            while let Some(result) = waiting.remove(&told) {
-                tell(result)?;
-                told += 1;
-            }
-        }
-        Ok(())
+        results.into_iter().flatten().try_for_each(&mut tell)
     })
 }
 

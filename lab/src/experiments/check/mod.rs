@@ -110,7 +110,7 @@ fn driver_of(found: &crate::device::Found, version: u32) -> String {
 }
 
 /// What `--json` writes: one check of a device.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct CheckRecord {
     /// [`crate::measure::record::SCHEMA`].
     pub schema: u32,
@@ -138,10 +138,7 @@ impl CheckRecord {
             commit: provenance::commit(),
             when: provenance::now(),
             quick,
-            ground: None,
-            passed: 0,
-            failed: 0,
-            groups: Vec::new(),
+            ..CheckRecord::default()
         }
     }
 

@@ -11,7 +11,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 /// How a group went.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// The group.
     pub group: String,
@@ -63,15 +63,7 @@ fn loader_arguments() -> Vec<OsString> {
 /// Runs a group in the process that `command` starts, at most as long as `limit`. Gives what it ran on, too, if it said so.
 pub fn run(group: &str, mut command: Command, limit: Duration) -> (Outcome, Option<Ground>) {
     let begin = Instant::now();
-    let mut outcome = Outcome {
-        group: group.to_owned(),
-        passed: false,
-        seconds: 0.0,
-        cases: 0,
-        wrong: Vec::new(),
-        left_out: Vec::new(),
-        ended: None,
-    };
+    let mut outcome = Outcome { group: group.to_owned(), ..Outcome::default() };
     let mut child = match command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn() {
         Ok(child) => child,
         Err(error) => {

@@ -10,6 +10,7 @@ use crate::experiments::check::probe::{CONFIRM_ODD, ProbeRay};
 use crate::experiments::check::shapes::{boxes, soup};
 use crate::experiments::check::world::{BuiltWorld, Part, World};
 use crate::random::SplitMix64;
+use crate::subjects::structures::{Geometry, Range};
 use ash::vk::{self, Handle};
 use hedgerow::accel::{AccelOptions, Instance, Property, REBRAID, twin};
 use hedgerow::bvh::layout::{self, Bvh2, Record, Triangle};
@@ -17,7 +18,7 @@ use vk::BuildAccelerationStructureFlagsKHR as Flags;
 use vk::CopyAccelerationStructureModeKHR as Mode;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
-type Range = vk::AccelerationStructureBuildRangeInfoKHR;
+type Structure = vk::AccelerationStructureKHR;
 
 fn rays(count: usize, spread: f32) -> Vec<ProbeRay> {
     let mut random = SplitMix64::new(9);
@@ -29,10 +30,7 @@ fn rays(count: usize, spread: f32) -> Vec<ProbeRay> {
     (0..count).map(ray).collect()
 }
 
-fn info<'a>(
-    ty: vk::AccelerationStructureTypeKHR,
-    geometries: &'a [vk::AccelerationStructureGeometryKHR<'a>],
-) -> BuildInfo<'a> {
+fn info(ty: vk::AccelerationStructureTypeKHR, geometries: &[Geometry]) -> BuildInfo<'_> {
     BuildInfo::default().ty(ty).flags(Flags::ALLOW_UPDATE).geometries(geometries)
 }
 
@@ -131,8 +129,8 @@ impl Place {
         Ok(Place(device.upload("copy", &vec![0xa5u8; bytes as usize])?))
     }
 
-    fn handle(&self) -> vk::AccelerationStructureKHR {
-        vk::AccelerationStructureKHR::from_raw(self.0.address())
+    fn handle(&self) -> Structure {
+        Structure::from_raw(self.0.address())
     }
 
     fn read(&self) -> Vec<u8> {
@@ -140,7 +138,7 @@ impl Place {
     }
 }
 
-fn size_after(ours: &Ours, structure: vk::AccelerationStructureKHR, property: Property) -> crate::Result<u64> {
+fn size_after(ours: &Ours, structure: Structure, property: Property) -> crate::Result<u64> {
     let result = ours.device().buffer("property", 16)?;
     // SAFETY: the structure is built, and the results have room for one word.
     ours.device().run(None, |recorder| unsafe {
@@ -150,7 +148,7 @@ fn size_after(ours: &Ours, structure: vk::AccelerationStructureKHR, property: Pr
     Ok(result.read::<u64>(1)[0])
 }
 
-fn copied(ours: &Ours, source: vk::AccelerationStructureKHR, bytes: u64, mode: Mode) -> crate::Result<Place> {
+fn copied(ours: &Ours, source: Structure, bytes: u64, mode: Mode) -> crate::Result<Place> {
     let target = Place::new(ours.device(), bytes)?;
     let info = vk::CopyAccelerationStructureInfoKHR::default().src(source).dst(target.handle()).mode(mode);
     // SAFETY: the structure is built, and its copy has the room that the property says.
@@ -159,7 +157,7 @@ fn copied(ours: &Ours, source: vk::AccelerationStructureKHR, bytes: u64, mode: M
     Ok(target)
 }
 
-fn serialised(ours: &Ours, source: vk::AccelerationStructureKHR) -> crate::Result<Place> {
+fn serialised(ours: &Ours, source: Structure) -> crate::Result<Place> {
     let target = Place::new(ours.device(), size_after(ours, source, Property::SerializedSize)?)?;
     let info = vk::CopyAccelerationStructureToMemoryInfoKHR::default()
         .src(source)

@@ -9,6 +9,7 @@ use crate::experiments::check::probe::{CONFIRM, CONFIRM_ODD, IGNORE, ProbeRay, T
 use crate::experiments::check::shapes::{Corners, boxes as random_boxes, icosphere, soup};
 use crate::experiments::check::world::{Part, World, inverse, transformed};
 use crate::random::SplitMix64;
+use anyhow::ensure;
 use ash::vk;
 use hedgerow::accel::{Instance, REBRAID};
 use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
@@ -16,9 +17,7 @@ use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
 /// The world's reports are right, and enough rays hit for that to say something.
 fn agrees(device: &'static Device, what: &str, world: &World, rays: &[ProbeRay], least_hits: usize) -> Found {
     let hits = assert_agrees(&Ours::on(device), what, world, rays);
-    if hits < least_hits {
-        return Err(format!("{hits} rays hit, expected {least_hits} or more").into());
-    }
+    ensure!(hits >= least_hits, "{hits} rays hit, expected {least_hits} or more");
     Ok(())
 }
 
