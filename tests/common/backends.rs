@@ -5,14 +5,15 @@ use super::geometries::Owned;
 use super::probe::{self, Probe, ProbeRay, ProbeReport};
 use hedgerow::ash::{self, vk};
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
+use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::device::{DriverRays, DriverTracing};
 pub use hedgerow_lab::experiments::check::backend::{Backend, BuildInfo, Built, Ours, Ranges};
 use hedgerow_lab::subjects::structures::Structures;
 
 /// Ours, and the driver's where the device has it with ray queries, which shaders of engines ask.
-pub fn backends() -> Vec<Box<dyn Backend>> {
-    let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours::on(device()))];
+pub fn backends() -> Vec<Box<dyn Traces>> {
+    let mut all: Vec<Box<dyn Traces>> = vec![Box::new(Ours::on(device()))];
     if device().driver_tracing() == Some(DriverTracing::Query) {
         all.push(Box::new(Drivers::new()));
     }
@@ -49,7 +50,28 @@ impl Backend for Drivers {
     fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport> {
         self.1.ask(self.address(structure), rays)
     }
+}
 
+/// What traces bottom-level structures.
+pub trait Traces: Backend {
+    /// The hits of rays in a bottom-level structure.
+    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
+}
+
+impl Traces for Ours {
+    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
+        let count = rays.len() as u32;
+        let ray_buffer = self.device().upload("rays", rays).expect("memory");
+        let hits = self.device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
+        let structure = self.address(structure);
+        let buffers = TraceBuffers { structure, rays: ray_buffer.region(), hits: hits.region(), work: None, count };
+        let shape = TraceShape::of(self.device());
+        self.device().run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
+        hits.read(rays.len())
+    }
+}
+
+impl Traces for Drivers {
     /// Through a top level of one instance, which a ray query cannot do without.
     fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
         let reference = self.address(structure);
@@ -80,7 +102,7 @@ impl Backend for Drivers {
 }
 
 /// What an engine calls to copy, each call in a submit of its own.
-pub trait Copies: Backend {
+pub trait Copies: Traces {
     /// What a build must ask for so that its structure can be compacted.
     fn flags_to_compact(&self) -> vk::BuildAccelerationStructureFlagsKHR;
     fn property(&self, structure: vk::AccelerationStructureKHR, query: vk::QueryType) -> u64;

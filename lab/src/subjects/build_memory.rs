@@ -32,7 +32,8 @@ impl<'a> DeviceMesh<'a> {
 
 /// Room for what a builder makes, and for what it needs meanwhile.
 pub struct BuildMemory<'a> {
-    sizes: Sizes,
+    /// How large it is.
+    pub sizes: Sizes,
     /// The structure.
     pub structure: Buffer<'a>,
     /// What the build needs beside it.

@@ -130,8 +130,7 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn memory(&self) -> record::MemoryRecord {
-        let binary = self.memory.record();
-        self.wide.as_ref().map_or(binary.clone(), |tree| tree.memory(&binary))
+        self.wide.as_ref().map_or_else(|| self.memory.record(), |tree| tree.memory(&self.memory.sizes))
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {

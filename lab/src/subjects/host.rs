@@ -63,9 +63,10 @@ impl<'a> Host<'a> {
         }
     }
 
-    fn built(&mut self) -> &Bvh2 {
-        let Host { mesh, options, codes, tree, .. } = self;
-        tree.get_or_insert_with(|| {
+    /// The tree, built where there is none yet, and what is traced through it.
+    fn built(&mut self) -> (&Bvh2, &mut HostRays) {
+        let Host { mesh, options, codes, tree, rays, .. } = self;
+        let tree = tree.get_or_insert_with(|| {
             let collapse = &options.collapse;
             let lbvh = |collapse| lbvh::build(&mesh.positions, &mesh.triangles, *codes, collapse);
             let tree = match (options.hierarchy, options.reinsertion) {
@@ -78,7 +79,8 @@ impl<'a> Host<'a> {
                 Some(reinsertion) => tree.reinserted(reinsertion).collapsed(collapse),
                 None => tree.collapsed(collapse),
             }
-        })
+        });
+        (tree, rays)
     }
 }
 
@@ -93,7 +95,7 @@ impl Subject for Host<'_> {
 
     fn build(&mut self) -> Result<BuildRun> {
         self.tree = None;
-        let (milliseconds, _) = timed(|| self.built().header.active);
+        let (milliseconds, _) = timed(|| self.built().0.header.active);
         Ok(BuildRun::whole(milliseconds))
     }
 
@@ -104,15 +106,15 @@ impl Subject for Host<'_> {
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
-        Ok(record::QualityRecord::of(&quality::of(self.built(), c_t, c_i), c_t, c_i))
+        Ok(record::QualityRecord::of(&quality::of(self.built().0, c_t, c_i), c_t, c_i))
     }
 
     fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
-        Ok(overlap::on_host(self.built(), c_t, c_i, epo))
+        Ok(overlap::on_host(self.built().0, c_t, c_i, epo))
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {
-        Ok(Some(self.built().clone()))
+        Ok(Some(self.built().0.clone()))
     }
 
     fn choice(&self) -> Option<String> {
@@ -126,8 +128,7 @@ impl Subject for Host<'_> {
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        self.built();
-        let Host { tree: Some(tree), rays, .. } = self else { return Ok(0.0) };
+        let (tree, rays) = self.built();
         Ok(rays.trace(|ray| tracer::trace(tree, ray, query).0))
     }
 
@@ -136,8 +137,7 @@ impl Subject for Host<'_> {
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        self.built();
-        let Host { tree: Some(tree), rays, .. } = self else { return Ok(None) };
+        let (tree, rays) = self.built();
         Ok(Some(rays.work(|ray| tracer::trace(tree, ray, query).1)))
     }
 }

@@ -10,7 +10,7 @@ use crate::{Error, Result};
 use ash::khr::acceleration_structure as functions;
 use ash::vk;
 use hedgerow::accel;
-use hedgerow::bvh::layout::{Header, MAX_DEPTH};
+use hedgerow::bvh::layout::MAX_DEPTH;
 use hedgerow::gpu::{Kernel, Recorder, Timestamps};
 use hedgerow::trace::{self, tracer::TraceBuffers};
 
@@ -206,47 +206,6 @@ impl<'a> Structures<'a> {
         let arguments = arguments::TraceQueries { structure, rays, hits, works: works_at, first: 0, count };
         device.run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup())))?;
         Ok(works.read(count as usize))
-    }
-
-    /// Memory for a structure and its scratch.
-    pub(crate) fn place(&self, name: &str, info: &BuildInfo<'_>, counts: &[u32]) -> Result<PlacedStructure<'a>> {
-        let sizes = self.sizes(info, counts)?;
-        let memory = self.device.buffer(name, sizes.acceleration_structure_size)?;
-        let create = vk::AccelerationStructureCreateInfoKHR::default()
-            .buffer(memory.raw())
-            .size(sizes.acceleration_structure_size)
-            .ty(info.ty);
-        let structure = self.create(&create)?;
-        // The largest alignment that a driver may ask for.
-        let scratch = self.device.buffer("scratch", sizes.build_scratch_size.max(sizes.update_scratch_size) + 256)?;
-        Ok(PlacedStructure { owner: self.clone(), structure, sizes, scratch, memory })
-    }
-}
-
-/// A structure with its memory.
-pub(crate) struct PlacedStructure<'a> {
-    owner: Structures<'a>,
-    pub(crate) structure: vk::AccelerationStructureKHR,
-    pub(crate) sizes: Sizes,
-    scratch: Buffer<'a>,
-    memory: Buffer<'a>,
-}
-
-impl PlacedStructure<'_> {
-    /// Its head, where it is one of ours.
-    pub(crate) fn header(&self) -> Option<Header> {
-        matches!(self.owner.maker, Functions::Ours(_)).then(|| self.memory.read::<Header>(1)[0])
-    }
-
-    /// The address of its scratch memory.
-    pub(crate) fn scratch(&self) -> vk::DeviceOrHostAddressKHR {
-        vk::DeviceOrHostAddressKHR { device_address: self.scratch.address().next_multiple_of(256) }
-    }
-}
-
-impl Drop for PlacedStructure<'_> {
-    fn drop(&mut self) {
-        self.owner.destroy(self.structure);
     }
 }
 

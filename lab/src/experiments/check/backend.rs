@@ -3,14 +3,11 @@
 
 use super::probe::{Probe, ProbeRay, ProbeReport};
 use crate::device::{Buffer, Device};
-use crate::subjects::device_rays::RayBuffers;
 pub use crate::subjects::structures::BuildInfo;
 use crate::subjects::structures::{Range, Sizes, Structures};
 use ash::vk;
 use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
 use hedgerow::gpu::Recorder;
-use hedgerow::trace::tracer::{self, TraceShape};
-use hedgerow::trace::{Hit, Query, Ray};
 
 /// How many primitives of each geometry.
 pub type Ranges<'a> = &'a [Range];
@@ -25,8 +22,6 @@ pub trait Backend {
     fn scratch_alignment(&self) -> u64;
     /// What queries through a top level report.
     fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport>;
-    /// The hits of rays in a bottom-level structure.
-    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
 
     /// The device that everything lies on.
     fn device(&self) -> &'static Device {
@@ -91,16 +86,6 @@ impl Backend for Ours {
     fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport> {
         self.1.ask(self.address(structure), rays)
     }
-
-    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
-        let (device, structure) = (self.device(), self.address(structure));
-        let rays = RayBuffers::new(device, rays).expect("memory");
-        let record = |r: &mut Recorder<'_>| {
-            tracer::record(r, &TraceShape::of(device), Query::ClosestHit, &rays.buffers(structure, None))
-        };
-        device.run(None, record).expect("it traces");
-        rays.read_hits()
-    }
 }
 
 /// A structure that was built alone, and its memory.
@@ -122,13 +107,7 @@ impl Built {
         let info = info
             .dst_acceleration_structure(built.structure)
             .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.1 });
-        backend
-            .device()
-            .run(None, |recorder| {
-                backend.build(recorder, &[info], &[ranges]);
-                Ok(())
-            })
-            .expect("it builds");
+        submit_build(backend, &info, ranges).expect("it builds");
         built.bytes -= offset;
         built
     }
@@ -147,11 +126,30 @@ impl Built {
 
     /// Scratch memory for it, and its address.
     pub fn scratch(&self, backend: &dyn Backend, info: &BuildInfo<'_>, counts: &[u32]) -> (Buffer<'static>, u64) {
-        let alignment = backend.scratch_alignment();
-        let bytes = backend.build_sizes(info, counts).build_scratch_size;
-        let buffer = backend.device().buffer("scratch", bytes + 2 * alignment).expect("memory");
-        // As little aligned as is allowed.
-        let address = buffer.address().next_multiple_of(alignment) + alignment;
-        (buffer, address)
+        scratch_of(backend, backend.build_sizes(info, counts).build_scratch_size)
     }
+}
+
+/// So much scratch memory, and its address.
+///
+/// # Panics
+/// There is too little memory.
+pub fn scratch_of(backend: &dyn Backend, bytes: u64) -> (Buffer<'static>, u64) {
+    let alignment = backend.scratch_alignment();
+    let buffer = backend.device().buffer("scratch", bytes + 2 * alignment).expect("memory");
+    // As little aligned as is allowed.
+    let address = buffer.address().next_multiple_of(alignment) + alignment;
+    (buffer, address)
+}
+
+/// Builds or updates by itself.
+///
+/// # Errors
+/// The device failed.
+pub fn submit_build(backend: &dyn Backend, info: &BuildInfo<'_>, ranges: Ranges<'_>) -> crate::Result<()> {
+    let record = |recorder: &mut Recorder<'_>| {
+        backend.build(recorder, &[*info], &[ranges]);
+        Ok(())
+    };
+    backend.device().run(None, record)
 }

@@ -65,25 +65,20 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let limit = Duration::from_secs(arguments.limit.get().into());
     let mut record = CheckRecord::new(arguments.quick);
     let is_shown = !arguments.json.takes_stdout();
+    let show = |text: &str| if is_shown { print(text) } else { Ok(()) };
     let run = |(name, command)| supervise::run(name, command, limit);
     let tell = |(outcome, ground): (Outcome, Option<Ground>)| {
         if let Some(ground) = ground.filter(|_| record.ground.is_none()) {
-            if is_shown {
-                print(&head(&record, &ground))?;
-            }
+            show(&head(&record, &ground))?;
             record.ground = Some(ground);
         }
-        if is_shown {
-            print(&line(&outcome))?;
-        }
+        show(&line(&outcome))?;
         record.add(outcome);
         Ok(())
     };
     each_in_order(commands, jobs, run, tell)?;
     arguments.json.write_each([&record])?;
-    if is_shown {
-        print(&format!("{} passed, {} failed", record.passed, record.failed))?;
-    }
+    show(&format!("{} passed, {} failed", record.passed, record.failed))?;
     if record.failed > 0 {
         bail!("{} of {} groups failed", record.failed, record.groups.len());
     }

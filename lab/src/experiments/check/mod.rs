@@ -46,7 +46,7 @@ pub struct Group {
 pub struct Ground {
     /// The device's name.
     pub device: String,
-    /// Driver and version.
+    /// Driver and version as it says them; of one that says nothing the number of its version.
     pub driver: String,
     /// Vulkan version.
     pub vulkan: String,
@@ -81,7 +81,10 @@ impl Ground {
         let is_as_cpu = device.tuning == Tuning::cpu(limits);
         Ground {
             device: found.name.clone(),
-            driver: driver_of(found, limits.driver_version),
+            driver: match found.driver.trim() {
+                "" => format!("version {:#x}", limits.driver_version),
+                driver => driver.to_owned(),
+            },
             vulkan: format!(
                 "{}.{}.{}",
                 ash::vk::api_version_major(version),
@@ -98,14 +101,6 @@ impl Ground {
             tuning: choice.to_string(),
             tuned_as: if is_as_cpu { "cpu" } else { "gpu" }.to_owned(),
         }
-    }
-}
-
-/// Driver and version as it says them; of one that says nothing the number of its version.
-fn driver_of(found: &crate::device::Found, version: u32) -> String {
-    match found.driver.trim() {
-        "" => format!("version {version:#x}"),
-        driver => driver.to_owned(),
     }
 }
 

@@ -63,38 +63,32 @@ pub fn bottom_level(backend: &dyn Backend, geometries: &[Geometry], ranges: &[Ra
 impl Part {
     /// Vulkan's structs over uploaded data.
     pub fn geometries(&self, device: &'static Device) -> (Vec<Geometry>, Vec<Range>, Vec<Buffer<'static>>) {
-        let mut all = (Vec::new(), Vec::new(), Vec::new());
-        let mut add = |kind, data, flags, count: usize, memory| {
-            all.0.push(Geometry::default().geometry_type(kind).geometry(data).flags(flags));
-            all.1.push(Range::default().primitive_count(count as u32));
-            all.2.push(memory);
+        let built_over = |kind, data, flags, count: usize, memory| {
+            let geometry = Geometry::default().geometry_type(kind).geometry(data).flags(flags);
+            (geometry, Range::default().primitive_count(count as u32), memory)
+        };
+        let triangles_of = |(corners, flags): &(Corners, GeometryFlags)| {
+            let memory = device.upload("corners", corners).expect("memory");
+            let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+                .vertex_format(vk::Format::R32G32B32_SFLOAT)
+                .vertex_data(address(memory.address()))
+                .vertex_stride(12)
+                .max_vertex((3 * corners.len()).max(1) as u32 - 1)
+                .index_type(vk::IndexType::NONE_KHR);
+            let data = vk::AccelerationStructureGeometryDataKHR { triangles };
+            built_over(vk::GeometryTypeKHR::TRIANGLES, data, *flags, corners.len(), memory)
+        };
+        let boxes_of = |(boxes, flags): &(Vec<[[f32; 3]; 2]>, GeometryFlags)| {
+            let memory = device.upload("boxes", boxes).expect("memory");
+            let aabbs =
+                vk::AccelerationStructureGeometryAabbsDataKHR::default().data(address(memory.address())).stride(24);
+            let data = vk::AccelerationStructureGeometryDataKHR { aabbs };
+            built_over(vk::GeometryTypeKHR::AABBS, data, *flags, boxes.len(), memory)
         };
         match self {
-            Part::Triangles(geometries) => {
-                for (corners, flags) in geometries {
-                    let memory = device.upload("corners", corners).expect("memory");
-                    let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
-                        .vertex_format(vk::Format::R32G32B32_SFLOAT)
-                        .vertex_data(address(memory.address()))
-                        .vertex_stride(12)
-                        .max_vertex((3 * corners.len()).max(1) as u32 - 1)
-                        .index_type(vk::IndexType::NONE_KHR);
-                    let data = vk::AccelerationStructureGeometryDataKHR { triangles };
-                    add(vk::GeometryTypeKHR::TRIANGLES, data, *flags, corners.len(), memory);
-                }
-            }
-            Part::Boxes(geometries) => {
-                for (boxes, flags) in geometries {
-                    let memory = device.upload("boxes", boxes).expect("memory");
-                    let aabbs = vk::AccelerationStructureGeometryAabbsDataKHR::default()
-                        .data(address(memory.address()))
-                        .stride(24);
-                    let data = vk::AccelerationStructureGeometryDataKHR { aabbs };
-                    add(vk::GeometryTypeKHR::AABBS, data, *flags, boxes.len(), memory);
-                }
-            }
+            Part::Triangles(geometries) => geometries.iter().map(triangles_of).collect(),
+            Part::Boxes(geometries) => geometries.iter().map(boxes_of).collect(),
         }
-        all
     }
 
     /// Everything in it that a line meets, or may, as of instance 0 and opaque by its geometry alone.

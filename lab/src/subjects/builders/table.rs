@@ -28,8 +28,11 @@ pub struct BuilderEntry {
     pub variants: &'static [&'static str],
     /// What it needs of the machine.
     pub needs: Needs,
-    pub(super) plan: fn(&Spec) -> Result<Plan>,
+    pub(super) plan: Read,
 }
+
+/// Reads the options of a builder.
+type Read = fn(&Spec) -> Result<Plan>;
 
 /// An option of a builder, `key=value`.
 pub struct BuilderOption {
@@ -50,16 +53,20 @@ pub enum Needs {
     RayQuery,
 }
 
+/// One without options, itself its only variant: a slice borrows the name for that.
+const fn needing(needs: Needs, name: &'static &'static str, what: &'static str, plan: Read) -> BuilderEntry {
+    BuilderEntry { name, what, options: &[], variants: slice::from_ref(name), needs, plan }
+}
+
+const fn on_device(name: &'static &'static str, what: &'static str, plan: Read) -> BuilderEntry {
+    needing(Needs::Device, name, what, plan)
+}
+
+const fn on_host(name: &'static &'static str, what: &'static str, plan: Read) -> BuilderEntry {
+    needing(Needs::Nothing, name, what, plan)
+}
+
 impl BuilderEntry {
-    /// One without options, itself its only variant: a slice borrows the name for that. It needs nothing of the machine.
-    const fn new(name: &'static &'static str, what: &'static str, plan: fn(&Spec) -> Result<Plan>) -> BuilderEntry {
-        BuilderEntry { name, what, options: &[], variants: slice::from_ref(name), needs: Needs::Nothing, plan }
-    }
-
-    const fn needing(self, needs: Needs) -> BuilderEntry {
-        BuilderEntry { needs, ..self }
-    }
-
     const fn taking(self, options: &'static [BuilderOption]) -> BuilderEntry {
         BuilderEntry { options, ..self }
     }
@@ -76,12 +83,9 @@ impl BuilderEntry {
 
 /// Every builder, in the order in which they are listed and measured.
 pub static BUILDERS: &[BuilderEntry] = &[
-    BuilderEntry::new(
-        &"lbvh",
-        "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
-        |spec| spec.on_device(Method::Lbvh),
-    )
-    .needing(Needs::Device)
+    on_device(&"lbvh", "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass", |spec| {
+        spec.on_device(Method::Lbvh)
+    })
     .taking(&[CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER])
     .in_variants(&[
         "lbvh",
@@ -92,94 +96,79 @@ pub static BUILDERS: &[BuilderEntry] = &[
         "lbvh:width=4",
         "lbvh:width=8q",
     ]),
-    BuilderEntry::new(
+    on_device(
         &"hlbvh",
         "hierarchical LBVH on the device: small subtrees of the LBVH under a top split by the surface area heuristic",
         Spec::hlbvh,
     )
-    .needing(Needs::Device)
     .taking(&[BITS, TREELET, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER]),
-    BuilderEntry::new(
+    on_device(
         &"ploc",
         "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
         Spec::ploc,
     )
-    .needing(Needs::Device)
     .taking(&[RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER])
     .in_variants(&["ploc", "ploc:radius=25"]),
-    BuilderEntry::new(
+    on_device(
         &"hploc",
         "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
         Spec::hploc,
     )
-    .needing(Needs::Device)
     .taking(&[WINDOW, RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER]),
-    BuilderEntry::new(
+    on_device(
         &"auto",
         "the device's builder that takes least for a build and its rays, by its measured costs",
         |spec| spec.rays().map(Plan::Auto),
     )
-    .needing(Needs::Device)
     .taking(&[RAYS]),
-    BuilderEntry::new(
-        &"lbvh-host",
-        "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte",
-        |spec| spec.on_host(HostMethod::Lbvh),
-    )
+    on_host(&"lbvh-host", "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte", |spec| {
+        spec.on_host(HostMethod::Lbvh)
+    })
     .taking(&[CODES, COLLAPSE, OPTIMISE]),
-    BuilderEntry::new(
+    on_host(
         &"ploc-host",
         "locally-ordered clustering by one thread of the host: what `ploc` must equal, byte for byte",
         Spec::ploc_on_host,
     )
     .taking(&[RADIUS, CODES, COLLAPSE, OPTIMISE]),
-    BuilderEntry::new(&"sweep", "full-sweep SAH on the host: the reference for the quality of the others", |spec| {
+    on_host(&"sweep", "full-sweep SAH on the host: the reference for the quality of the others", |spec| {
         spec.on_host(HostMethod::Sweep(spec.sweep_leaves()?))
     })
     .taking(&[COLLAPSE, OPTIMISE, TERMINATION]),
-    BuilderEntry::new(&"kd-exact", "kd-tree on the host: perfect splits by SAH", |spec| spec.kd_on_host(Planes::Exact))
+    on_host(&"kd-exact", "kd-tree on the host: perfect splits by SAH", |spec| spec.kd_on_host(Planes::Exact))
         .taking(&[KT, KI, TRAVERSAL, TRACE]),
-    BuilderEntry::new(&"kd-binned", "kd-tree on the host: the best by SAH of equally spaced planes", |spec| {
+    on_host(&"kd-binned", "kd-tree on the host: the best by SAH of equally spaced planes", |spec| {
         spec.kd_on_host(Planes::Binned(spec.number(&BINS)?.unwrap_or(Planes::BINS)))
     })
     .taking(&[BINS, KT, KI, TRAVERSAL, TRACE]),
-    BuilderEntry::new(
+    on_device(
         &"kd-gpu",
         "kd-tree on the device: bins above, level by level; perfect splits of few references below",
         Spec::kd_on_device,
     )
-    .needing(Needs::Device)
     .taking(&[BINS, EXACT, KT, KI, SCHEDULE, WORKGROUPS, TRAVERSAL]),
-    BuilderEntry::new(
+    on_host(
         &"kd-gpu-host",
         "kd-tree of bins above and perfect splits below, on the host: what `kd-gpu` must equal, byte for byte",
         Spec::kd_mixed_on_host,
     )
     .taking(&[BINS, EXACT, KT, KI, TRAVERSAL, TRACE]),
-    BuilderEntry::new(&"driver-fast-build", "the Vulkan driver's own, asked to build fast", |_| {
+    needing(Needs::RayQuery, &"driver-fast-build", "the Vulkan driver's own, asked to build fast", |_| {
         Ok(Plan::Driver(DriverPreference::FastBuild))
-    })
-    .needing(Needs::RayQuery),
-    BuilderEntry::new(&"driver-fast-trace", "the Vulkan driver's own, asked to trace fast", |_| {
+    }),
+    needing(Needs::RayQuery, &"driver-fast-trace", "the Vulkan driver's own, asked to trace fast", |_| {
         Ok(Plan::Driver(DriverPreference::FastTrace))
-    })
-    .needing(Needs::RayQuery),
-    #[cfg(feature = "peer-obvhs")]
-    BuilderEntry::new(&"obvhs-fastest", "obvhs on the CPU: PLOC alone", |_| Ok(Plan::Obvhs(obvhs::Preset::Fastest))),
-    #[cfg(feature = "peer-obvhs")]
-    BuilderEntry::new(&"obvhs-fast", "obvhs on the CPU: PLOC and a little reinsertion", |_| {
-        Ok(Plan::Obvhs(obvhs::Preset::Fast))
     }),
     #[cfg(feature = "peer-obvhs")]
-    BuilderEntry::new(&"obvhs-medium", "obvhs on the CPU: PLOC and more reinsertion", |_| {
-        Ok(Plan::Obvhs(obvhs::Preset::Medium))
-    }),
+    on_host(&"obvhs-fastest", "obvhs on the CPU: PLOC alone", |_| Ok(Plan::Obvhs(obvhs::Preset::Fastest))),
+    #[cfg(feature = "peer-obvhs")]
+    on_host(&"obvhs-fast", "obvhs on the CPU: PLOC and a little reinsertion", |_| Ok(Plan::Obvhs(obvhs::Preset::Fast))),
+    #[cfg(feature = "peer-obvhs")]
+    on_host(&"obvhs-medium", "obvhs on the CPU: PLOC and more reinsertion", |_| Ok(Plan::Obvhs(obvhs::Preset::Medium))),
     #[cfg(feature = "peer-embree")]
-    BuilderEntry::new(&"embree-low", "Embree on the CPU: Morton codes", |_| Ok(Plan::Embree(embree::Preset::Low))),
+    on_host(&"embree-low", "Embree on the CPU: Morton codes", |_| Ok(Plan::Embree(embree::Preset::Low))),
     #[cfg(feature = "peer-embree")]
-    BuilderEntry::new(&"embree-medium", "Embree on the CPU: binned SAH", |_| Ok(Plan::Embree(embree::Preset::Medium))),
+    on_host(&"embree-medium", "Embree on the CPU: binned SAH", |_| Ok(Plan::Embree(embree::Preset::Medium))),
     #[cfg(feature = "peer-embree")]
-    BuilderEntry::new(&"embree-high", "Embree on the CPU: SAH with spatial splits", |_| {
-        Ok(Plan::Embree(embree::Preset::High))
-    }),
+    on_host(&"embree-high", "Embree on the CPU: SAH with spatial splits", |_| Ok(Plan::Embree(embree::Preset::High))),
 ];

@@ -13,7 +13,7 @@ use crate::subjects::level::Level;
 use crate::subjects::structures::Structures;
 use crate::subjects::{BuildRun, Subject};
 use crate::{Error, Result};
-use ash::vk;
+use ash::vk::{BuildAccelerationStructureFlagsKHR as Flags, BuildAccelerationStructureModeKHR as Mode};
 use hedgerow::accel::Instance;
 use hedgerow::gpu::Timestamps;
 use hedgerow::trace::{Hit, Query, Ray};
@@ -30,7 +30,7 @@ pub enum DriverPreference {
 /// A scene in the driver's acceleration structure.
 pub struct Driver<'a> {
     structures: Structures<'a>,
-    preference: DriverPreference,
+    name: &'static str,
     bottom: Level<'a>,
     top: Level<'a>,
     timestamps: Timestamps,
@@ -68,23 +68,20 @@ impl<'a> Driver<'a> {
             let message = format!("{count} triangles, {} builds of at most {most}", device.found().name);
             return Err(Error::Argument(format!("{message}; take a smaller scene or another builder")));
         }
-        let flags = match preference {
-            DriverPreference::FastBuild => vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_BUILD,
-            DriverPreference::FastTrace => vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE,
+        let (name, flags) = match preference {
+            DriverPreference::FastBuild => ("driver-fast-build", Flags::PREFER_FAST_BUILD),
+            DriverPreference::FastTrace => ("driver-fast-trace", Flags::PREFER_FAST_TRACE),
         };
         let bottom = Level::bottom(&structures, mesh, flags)?;
         let top = Level::top(&structures, &[bottom.instance(&structures, Instance::IDENTITY)], flags)?;
         let (timestamps, rays) = (Timestamps::new(device, 2)?, DeviceRays::new(device)?);
-        Ok(Driver { structures, preference, bottom, top, timestamps, rays })
+        Ok(Driver { structures, name, bottom, top, timestamps, rays })
     }
 }
 
 impl Subject for Driver<'_> {
     fn builder(&self) -> &str {
-        match self.preference {
-            DriverPreference::FastBuild => "driver-fast-build",
-            DriverPreference::FastTrace => "driver-fast-trace",
-        }
+        self.name
     }
 
     fn kind(&self) -> &'static str {
@@ -100,12 +97,12 @@ impl Subject for Driver<'_> {
     }
 
     fn build(&mut self) -> Result<BuildRun> {
-        let (structures, mode) = (&self.structures, vk::BuildAccelerationStructureModeKHR::BUILD);
+        let structures = &self.structures;
         structures.device.run(Some(&mut self.timestamps), |recorder| {
             recorder.phase("build");
-            self.bottom.record(structures, recorder, mode)?;
+            self.bottom.record(structures, recorder, Mode::BUILD)?;
             recorder.phase("tlas");
-            self.top.record(structures, recorder, mode)
+            self.top.record(structures, recorder, Mode::BUILD)
         })?;
         let phases = self.timestamps.phases()?;
         let bottom = phases.first().map_or(0.0, |p| p.milliseconds);
