@@ -32,10 +32,6 @@ impl Drivers {
 }
 
 impl Backend for Drivers {
-    fn name(&self) -> &'static str {
-        "driver"
-    }
-
     fn structures(&self) -> &Structures<'static> {
         &self.2
     }

@@ -104,12 +104,8 @@ impl Subject for DeviceBvh<'_> {
         self.wide.as_ref().map_or("bvh2", |tree| tree.tracer.form.name())
     }
 
-    fn timer(&self) -> &'static str {
-        self.device.timer()
-    }
-
-    fn traces_on_device(&self) -> bool {
-        true
+    fn device(&self) -> Option<&Device> {
+        Some(self.device)
     }
 
     fn choice(&self) -> Option<String> {

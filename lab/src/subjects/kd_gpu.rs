@@ -118,12 +118,8 @@ impl Subject for KdGpu<'_> {
         KD_TREE
     }
 
-    fn timer(&self) -> &'static str {
-        self.device.timer()
-    }
-
-    fn traces_on_device(&self) -> bool {
-        true
+    fn device(&self) -> Option<&Device> {
+        Some(self.device)
     }
 
     fn choice(&self) -> Option<String> {

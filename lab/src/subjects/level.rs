@@ -1,7 +1,7 @@
 //! One level of acceleration structures: what it is built over, and where it lies.
 
 use super::device_rays::timed_run;
-use super::structures::{BuildInfo, Geometry, Range, Sizes, Structures, instances_at, triangles_of};
+use super::structures::{BuildInfo, Geometry, Range, Sizes, Structure, Structures, instances_at, triangles_of};
 use crate::Result;
 use crate::device::Buffer;
 use crate::experiments::accel::points::Implementation;
@@ -23,7 +23,7 @@ pub struct Level<'a> {
     geometry: [Geometry; 1],
     /// How many triangles or instances.
     pub(super) count: u32,
-    structure: vk::AccelerationStructureKHR,
+    structure: Structure,
     sizes: Sizes,
     memory: Buffer<'a>,
     scratch: Buffer<'a>,
@@ -81,7 +81,7 @@ impl<'a> Level<'a> {
     }
 
     /// The structure.
-    pub fn structure(&self) -> vk::AccelerationStructureKHR {
+    pub fn structure(&self) -> Structure {
         self.structure
     }
 

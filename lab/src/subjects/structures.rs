@@ -12,12 +12,15 @@ use ash::vk;
 use hedgerow::accel;
 use hedgerow::bvh::layout::MAX_DEPTH;
 use hedgerow::gpu::{Kernel, Recorder, Timestamps};
-use hedgerow::trace::{self, tracer::TraceBuffers};
+use hedgerow::trace::Query;
+use hedgerow::trace::tracer::TraceBuffers;
 
 /// What a build call takes.
 pub type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
 /// How many primitives of a geometry, and where they begin.
 pub type Range = vk::AccelerationStructureBuildRangeInfoKHR;
+/// A handle.
+pub type Structure = vk::AccelerationStructureKHR;
 /// What is built over.
 pub type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
 /// Bytes that a structure and its builds need.
@@ -81,10 +84,7 @@ impl<'a> Structures<'a> {
     }
 
     /// A structure in the place that `info` names.
-    pub(crate) fn create(
-        &self,
-        info: &vk::AccelerationStructureCreateInfoKHR<'_>,
-    ) -> Result<vk::AccelerationStructureKHR> {
+    pub(crate) fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> Result<Structure> {
         match &self.maker {
             // SAFETY: the buffer is live and as large as the sizes asked for.
             Functions::Ours(ours) => Ok(unsafe { ours.create_acceleration_structure(info, None) }?),
@@ -95,7 +95,7 @@ impl<'a> Structures<'a> {
     }
 
     /// What instances and shaders take.
-    pub(crate) fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
+    pub(crate) fn address(&self, structure: Structure) -> u64 {
         let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
         match &self.maker {
             Functions::Ours(ours) => ours.get_acceleration_structure_device_address(&info),
@@ -105,7 +105,7 @@ impl<'a> Structures<'a> {
     }
 
     /// Ends the life of a structure that no submit uses any more.
-    pub(crate) fn destroy(&self, structure: vk::AccelerationStructureKHR) {
+    pub(crate) fn destroy(&self, structure: Structure) {
         match &self.maker {
             Functions::Ours(ours) => ours.destroy_acceleration_structure(structure, None),
             // SAFETY: every submit of `Device` waits, so nothing uses it.
@@ -129,23 +129,16 @@ impl<'a> Structures<'a> {
             Functions::Driver(driver) => {
                 let access = vk::AccessFlags::ACCELERATION_STRUCTURE_READ_KHR
                     | vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR;
-                let barrier = [vk::MemoryBarrier::default().src_access_mask(access).dst_access_mask(access)];
+                let barrier = vk::MemoryBarrier::default().src_access_mask(access).dst_access_mask(access);
                 let build = vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
-                let traces =
+                let trace =
                     self.device.driver_tracing().map_or(vk::PipelineStageFlags::COMPUTE_SHADER, DriverTracing::stage);
-                let after = build | traces;
+                let (raw, commands) = (self.device.ash_device(), recorder.commands());
+                let none = vk::DependencyFlags::empty();
                 // SAFETY: as above.
                 unsafe {
-                    driver.cmd_build_acceleration_structures(recorder.commands(), infos, ranges);
-                    recorder.context().ash_device().cmd_pipeline_barrier(
-                        recorder.commands(),
-                        build,
-                        after,
-                        vk::DependencyFlags::empty(),
-                        &barrier,
-                        &[],
-                        &[],
-                    );
+                    driver.cmd_build_acceleration_structures(commands, infos, ranges);
+                    raw.cmd_pipeline_barrier(commands, build, build | trace, none, &[barrier], &[], &[]);
                 }
             }
         }
@@ -156,56 +149,48 @@ impl<'a> Structures<'a> {
     pub(crate) fn trace(
         &self,
         timestamps: &mut Timestamps,
-        top: vk::AccelerationStructureKHR,
+        top: Structure,
         buffers: &RayBuffers<'_>,
-        query: trace::Query,
+        query: Query,
     ) -> Result<f64> {
         let buffers = buffers.buffers(self.address(top), None);
         timed_run(self.device, timestamps, "trace", |recorder| self.record_trace(recorder, &buffers, query))
     }
 
-    /// Records the tracing of rays through a top level.
+    /// Records the tracing of rays through a top level; their work, where there is room for it, is counted for ours alone.
     pub(crate) fn record_trace(
         &self,
         recorder: &mut Recorder<'_>,
         buffers: &TraceBuffers,
-        query: trace::Query,
+        query: Query,
     ) -> hedgerow::Result<()> {
-        let any_hit = query == trace::Query::AnyHit;
-        let &TraceBuffers { structure, rays, hits, count, .. } = buffers;
-        let (rays, hits) = (rays.address, hits.address);
+        let any_hit = query == Query::AnyHit;
+        let &TraceBuffers { structure, rays, hits, work, count } = buffers;
+        let (rays, hits, works) = (rays.address, hits.address, work.map_or(0, |work| work.address));
         if let Functions::Driver(_) = self.maker {
             let rays = DriverRays { structure, rays, hits, count, any_hit };
             return self.device.trace_by_driver(recorder, &rays);
         }
+        let (tuning, limits) = (&self.device.tuning.trace, &self.device.limits);
         // As trace::tracer has it, or no level of the stack in shared memory.
-        let tuning = &self.device.tuning.trace;
         let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
-        let kernel = Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[u32::from(any_hit), levels]);
-        let arguments = arguments::TraceQueries { structure, rays, hits, works: 0, first: 0, count };
+        let kernel = match work {
+            None => Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[u32::from(any_hit), levels]),
+            Some(_) => Kernel::new(&shaders::MEASURE_QUERY_WORK, limits.subgroup_size, &[u32::from(any_hit), 0]),
+        };
+        let arguments = arguments::TraceQueries { structure, rays, hits, works, first: 0, count };
         recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
     }
 
     /// What each of the rays meets on its way, of our structures: nodes of the top level, instances, nodes below, triangles.
-    pub(crate) fn work(
-        &self,
-        top: vk::AccelerationStructureKHR,
-        buffers: &RayBuffers<'_>,
-        query: trace::Query,
-    ) -> Result<Vec<[u32; 4]>> {
-        let device = self.device;
+    pub(crate) fn work(&self, top: Structure, buffers: &RayBuffers<'_>, query: Query) -> Result<Vec<[u32; 4]>> {
         if let Functions::Driver(_) = self.maker {
             return Err(Error::Argument("the driver does not tell the work of its queries".into()));
         }
-        let any_hit = u32::from(query == trace::Query::AnyHit);
-        let kernel = Kernel::new(&shaders::MEASURE_QUERY_WORK, device.limits.subgroup_size, &[any_hit, 0]);
-        let count = buffers.count;
-        let works = device.buffer("work", 16 * u64::from(count))?;
-        let (structure, works_at) = (self.address(top), works.address());
-        let (rays, hits) = (buffers.rays.address(), buffers.hits.address());
-        let arguments = arguments::TraceQueries { structure, rays, hits, works: works_at, first: 0, count };
-        device.run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup())))?;
-        Ok(works.read(count as usize))
+        let works = self.device.buffer("work", 16 * u64::from(buffers.count))?;
+        let traced = buffers.buffers(self.address(top), Some(works.region()));
+        self.device.run(None, |recorder| self.record_trace(recorder, &traced, query))?;
+        Ok(works.read(buffers.count as usize))
     }
 }
 

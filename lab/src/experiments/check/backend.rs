@@ -4,7 +4,7 @@
 use super::probe::{Probe, ProbeRay, ProbeReport};
 use crate::device::{Buffer, Device};
 pub use crate::subjects::structures::BuildInfo;
-use crate::subjects::structures::{Range, Sizes, Structures};
+use crate::subjects::structures::{Range, Sizes, Structure, Structures};
 use ash::vk;
 use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
 use hedgerow::gpu::Recorder;
@@ -14,14 +14,17 @@ pub type Ranges<'a> = &'a [Range];
 
 /// What an engine calls.
 pub trait Backend {
-    /// Whose it is.
-    fn name(&self) -> &'static str;
     /// The calls.
     fn structures(&self) -> &Structures<'static>;
     /// `minAccelerationStructureScratchOffsetAlignment`.
     fn scratch_alignment(&self) -> u64;
     /// What queries through a top level report.
-    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport>;
+    fn probe(&self, structure: Structure, rays: &[ProbeRay]) -> Vec<ProbeReport>;
+
+    /// Whose it is.
+    fn name(&self) -> &'static str {
+        self.structures().maker().name()
+    }
 
     /// The device that everything lies on.
     fn device(&self) -> &'static Device {
@@ -34,17 +37,17 @@ pub trait Backend {
     }
 
     /// `vkCreateAccelerationStructureKHR`.
-    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
+    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> Structure {
         self.structures().create(info).expect("the offset is right")
     }
 
     /// `vkDestroyAccelerationStructureKHR`.
-    fn destroy(&self, structure: vk::AccelerationStructureKHR) {
+    fn destroy(&self, structure: Structure) {
         self.structures().destroy(structure);
     }
 
     /// `vkGetAccelerationStructureDeviceAddressKHR`.
-    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
+    fn address(&self, structure: Structure) -> u64 {
         self.structures().address(structure)
     }
 
@@ -71,10 +74,6 @@ impl Ours {
 }
 
 impl Backend for Ours {
-    fn name(&self) -> &'static str {
-        "hedgerow"
-    }
-
     fn structures(&self) -> &Structures<'static> {
         &self.2
     }
@@ -83,7 +82,7 @@ impl Backend for Ours {
         SCRATCH_ALIGNMENT
     }
 
-    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport> {
+    fn probe(&self, structure: Structure, rays: &[ProbeRay]) -> Vec<ProbeReport> {
         self.1.ask(self.address(structure), rays)
     }
 }
@@ -91,7 +90,7 @@ impl Backend for Ours {
 /// A structure that was built alone, and its memory.
 pub struct Built {
     /// Its handle.
-    pub structure: vk::AccelerationStructureKHR,
+    pub structure: Structure,
     /// Where it lies.
     pub memory: Buffer<'static>,
     /// Bytes of it, and of what lies before it.

@@ -109,13 +109,10 @@ impl Part {
 fn meetings_of<P>(geometries: &[(Vec<P>, GeometryFlags)], met: impl Fn(&P) -> Option<Met>) -> Vec<Met> {
     let mut all = Vec::new();
     for (g, (primitives, flags)) in geometries.iter().enumerate() {
+        let is_opaque = flags.contains(GeometryFlags::OPAQUE);
         for (p, primitive) in primitives.iter().enumerate() {
             let place = [0, g as u32, p as u32];
-            all.extend(met(primitive).map(|met| Met {
-                place,
-                is_opaque: flags.contains(GeometryFlags::OPAQUE),
-                ..met
-            }));
+            all.extend(met(primitive).map(|met| Met { place, is_opaque, ..met }));
         }
     }
     all
@@ -138,14 +135,8 @@ impl World {
 
     /// Builds everything.
     pub fn build(&self, backend: &dyn Backend) -> BuiltWorld {
-        let mut memory = Vec::new();
-        let mut parts = Vec::new();
-        for part in &self.parts {
-            let (built, data) = part.build(backend);
-            parts.push(built);
-            memory.extend(data);
-        }
-        self.build_over(backend, parts, memory)
+        let (parts, memory): (_, Vec<_>) = self.parts.iter().map(|part| part.build(backend)).unzip();
+        self.build_over(backend, parts, memory.into_iter().flatten().collect())
     }
 
     /// Builds the top level over parts that are built, and keeps their memory.

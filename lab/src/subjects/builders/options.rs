@@ -87,20 +87,20 @@ impl Spec {
 
     /// Those of every builder on the device, and `bits` and `treelet`.
     pub(super) fn hlbvh(&self) -> Result<Plan> {
-        let bits = self.number(&BITS)?;
-        let primitives = self.number(&TREELET)?.unwrap_or(Treelets::DEFAULT.primitives);
+        let bits = self.parsed(&BITS)?;
+        let primitives = self.parsed(&TREELET)?.unwrap_or(Treelets::DEFAULT.primitives);
         self.on_device(Method::Hlbvh(Treelets { bits, primitives }))
     }
 
     /// Those of every builder on the device, and `radius`.
     pub(super) fn ploc(&self) -> Result<Plan> {
-        self.on_device(Method::Ploc { radius: self.number(&RADIUS)?.unwrap_or(PLOC_RADIUS) })
+        self.on_device(Method::Ploc { radius: self.parsed(&RADIUS)?.unwrap_or(PLOC_RADIUS) })
     }
 
     /// Those of every builder on the device, and `window` and `radius`.
     pub(super) fn hploc(&self) -> Result<Plan> {
-        let size = self.number(&WINDOW)?.unwrap_or(Window::DEFAULT.size);
-        let radius = self.number(&RADIUS)?.unwrap_or(Window::DEFAULT.radius);
+        let size = self.parsed(&WINDOW)?.unwrap_or(Window::DEFAULT.size);
+        let radius = self.parsed(&RADIUS)?.unwrap_or(Window::DEFAULT.radius);
         self.on_device(Method::Hploc(Window { size, radius }))
     }
 
@@ -124,7 +124,7 @@ impl Spec {
 
     /// Options `codes`, `collapse` and `optimise` of a builder on the host.
     pub(super) fn on_host(&self, hierarchy: HostMethod) -> Result<Plan> {
-        if self.is_time_to_optimise() {
+        if self.option(OPTIMISE.key).is_some_and(|value| value.ends_with("ms")) {
             let what = "on the host rounds are not timed; take fast, medium, high or a number of passes";
             return Err(Error::Argument(format!("builder {self}: {}: {what}", OPTIMISE.key)));
         }
@@ -134,7 +134,7 @@ impl Spec {
 
     /// Those of every builder on the host, and `radius`; 25 where it was not given.
     pub(super) fn ploc_on_host(&self) -> Result<Plan> {
-        match self.number(&RADIUS)?.unwrap_or(25) {
+        match self.parsed(&RADIUS)?.unwrap_or(25) {
             0 => Err(self.wrong_value(&RADIUS, "0")),
             radius => self.on_host(HostMethod::Ploc(radius as usize)),
         }
@@ -149,8 +149,8 @@ impl Spec {
 
     /// Those of every builder of kd-trees on the host, and `bins` and `exact`.
     pub(super) fn kd_mixed_on_host(&self) -> Result<Plan> {
-        let bins = self.number(&BINS)?.unwrap_or(KdOptions::DEFAULT.bins);
-        let exact = self.number(&EXACT)?.unwrap_or(KdOptions::DEFAULT.exact);
+        let bins = self.parsed(&BINS)?.unwrap_or(KdOptions::DEFAULT.bins);
+        let exact = self.parsed(&EXACT)?.unwrap_or(KdOptions::DEFAULT.exact);
         if exact > Planes::MAX_EXACT {
             return Err(self.wrong_value(&EXACT, self.option(EXACT.key).unwrap_or_default()));
         }
@@ -161,9 +161,9 @@ impl Spec {
     pub(super) fn kd_on_device(&self) -> Result<Plan> {
         let default = KdOptions::DEFAULT;
         let costs = self.kd_options(Planes::Exact)?.costs;
-        let workgroups = self.number(&WORKGROUPS)?;
-        let bins = self.number(&BINS)?.unwrap_or(default.bins);
-        let exact = self.number(&EXACT)?.unwrap_or(default.exact);
+        let workgroups = self.parsed(&WORKGROUPS)?;
+        let bins = self.parsed(&BINS)?.unwrap_or(default.bins);
+        let exact = self.parsed(&EXACT)?.unwrap_or(default.exact);
         let options = KdOptions { bins, exact, costs, schedule: self.schedule()?, workgroups, ..default };
         options.check()?;
         Ok(Plan::Kd(KdSpec::Device { options, traversal: self.traversal(true)? }))
@@ -171,15 +171,13 @@ impl Spec {
 
     /// Option `traversal`; where it was not given, what is fastest where rays are traced (docs/notes/kdtree.md).
     fn traversal(&self, on_device: bool) -> Result<Traversal> {
-        let Some(value) = self.option(TRAVERSAL.key) else {
-            return Ok(if on_device { Traversal::short_stack(4) } else { Traversal::STACK });
-        };
-        value.parse().map_err(|()| self.wrong_value(&TRAVERSAL, value))
+        let fastest = if on_device { Traversal::short_stack(4) } else { Traversal::STACK };
+        Ok(self.parsed(&TRAVERSAL)?.unwrap_or(fastest))
     }
 
     fn kd_options(&self, planes: Planes) -> Result<HostKdOptions> {
-        let c_t = self.number(&KT)?.unwrap_or(Costs::DEFAULT.c_t);
-        let c_i = self.number(&KI)?.unwrap_or(Costs::DEFAULT.c_i);
+        let c_t = self.parsed(&KT)?.unwrap_or(Costs::DEFAULT.c_t);
+        let c_i = self.parsed(&KI)?.unwrap_or(Costs::DEFAULT.c_i);
         let costs = Costs { c_t, c_i };
         let options = HostKdOptions { planes, costs };
         let wrong = [(BINS, options.check_planes()), (KT, Costs::check(costs.c_t)), (KI, Costs::check(costs.c_i))];
@@ -218,10 +216,6 @@ impl Spec {
         Ok((fraction > 0.0).then_some(options))
     }
 
-    fn is_time_to_optimise(&self) -> bool {
-        self.option(OPTIMISE.key).is_some_and(|value| value.ends_with("ms"))
-    }
-
     /// Option `optimise` where it is a time.
     fn time_to_optimise(&self) -> Result<Option<Duration>> {
         let value = self.option(OPTIMISE.key).unwrap_or_default();
@@ -238,7 +232,7 @@ impl Spec {
             Some("medium") => Some(ReinsertionOptions::MEDIUM),
             Some("high") => Some(ReinsertionOptions::HIGH),
             Some(_) if self.time_to_optimise()?.is_some() => Some(ReinsertionOptions::FAST),
-            Some(_) => self.number(&OPTIMISE)?.map(ReinsertionOptions::of_passes),
+            Some(_) => self.parsed(&OPTIMISE)?.map(ReinsertionOptions::of_passes),
         })
     }
 
@@ -249,8 +243,8 @@ impl Spec {
         chosen.map(Some).ok_or_else(|| self.wrong_value(option, value))
     }
 
-    /// The value of an option that is a number, if it was given.
-    pub(super) fn number<T: FromStr>(&self, option: &BuilderOption) -> Result<Option<T>> {
+    /// The value of an option that is parsed as it is, such as a number, if it was given.
+    pub(super) fn parsed<T: FromStr>(&self, option: &BuilderOption) -> Result<Option<T>> {
         let Some(value) = self.option(option.key) else { return Ok(None) };
         value.parse().map(Some).map_err(|_| self.wrong_value(option, value))
     }

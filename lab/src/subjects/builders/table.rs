@@ -138,7 +138,7 @@ pub static BUILDERS: &[BuilderEntry] = &[
     on_host(&"kd-exact", "kd-tree on the host: perfect splits by SAH", |spec| spec.kd_on_host(Planes::Exact))
         .taking(&[KT, KI, TRAVERSAL, TRACE]),
     on_host(&"kd-binned", "kd-tree on the host: the best by SAH of equally spaced planes", |spec| {
-        spec.kd_on_host(Planes::Binned(spec.number(&BINS)?.unwrap_or(Planes::BINS)))
+        spec.kd_on_host(Planes::Binned(spec.parsed(&BINS)?.unwrap_or(Planes::BINS)))
     })
     .taking(&[BINS, KT, KI, TRAVERSAL, TRACE]),
     on_device(

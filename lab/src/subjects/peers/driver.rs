@@ -88,12 +88,8 @@ impl Subject for Driver<'_> {
         "driver"
     }
 
-    fn timer(&self) -> &'static str {
-        self.structures.device.timer()
-    }
-
-    fn traces_on_device(&self) -> bool {
-        true
+    fn device(&self) -> Option<&Device> {
+        Some(self.structures.device)
     }
 
     fn build(&mut self) -> Result<BuildRun> {

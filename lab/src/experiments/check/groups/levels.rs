@@ -10,15 +10,13 @@ use crate::experiments::check::probe::{CONFIRM_ODD, ProbeRay};
 use crate::experiments::check::shapes::{boxes, soup};
 use crate::experiments::check::world::{BuiltWorld, Part, World};
 use crate::random::SplitMix64;
-use crate::subjects::structures::{Geometry, Range};
+use crate::subjects::structures::{Geometry, Range, Structure};
 use ash::vk::{self, Handle};
 use hedgerow::accel::{AccelOptions, Instance, Property, REBRAID, twin};
 use hedgerow::bvh::layout::{self, Bvh2, Record, Triangle};
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 use vk::CopyAccelerationStructureModeKHR as Mode;
 use vk::GeometryFlagsKHR as GeometryFlags;
-
-type Structure = vk::AccelerationStructureKHR;
 
 fn rays(count: usize, spread: f32) -> Vec<ProbeRay> {
     let mut random = SplitMix64::new(9);
