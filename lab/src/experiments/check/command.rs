@@ -1,7 +1,8 @@
 //! `hedgerow check`: whether everything is right on this device. Each group runs in a process of its own.
 
 use crate::cli::{Common, Json};
-use crate::experiments::check::cases::Message;
+use crate::device::Device;
+use crate::experiments::check::cases::{self, Cases, Message};
 use crate::experiments::check::supervise::{self, Outcome};
 use crate::experiments::check::{self, CheckRecord, Ground, Group};
 use crate::report::numbers::bytes;
@@ -139,9 +140,10 @@ fn child(common: &Common, arguments: &Arguments, group: &Group) -> anyhow::Resul
     Ok(command)
 }
 
-/// One group in this process: what it finds goes to stdout, a message a line.
+/// One group in this process: what it finds goes to stdout, a message a line. The device lives as long as the process, which ends
+/// with its group.
 fn run_here(common: &Common, group: &Group, quick: bool) -> anyhow::Result<()> {
-    let device = common.open_device(false)?;
+    let device: &'static Device = Box::leak(Box::new(common.open_device(false)?));
     let mut tell = |message: Message| {
         let text = serde_json::to_string(&message).expect("a message has no keys but strings");
         // Nobody is left to hear it: then nothing is left to do, either.
@@ -149,7 +151,10 @@ fn run_here(common: &Common, group: &Group, quick: bool) -> anyhow::Result<()> {
             std::process::exit(1);
         }
     };
-    check::run_here(group, device, common.tuning, quick, &mut tell);
+    cases::keep_panics();
+    tell(Message::Ground(Ground::of(device, common.tuning)));
+    (group.run)(&mut Cases::new(device, quick, &mut tell));
+    tell(Message::Done);
     Ok(())
 }
 

@@ -25,7 +25,7 @@ pub mod world;
 
 use crate::device::Device;
 use crate::measure::provenance;
-use cases::{Cases, Message};
+use cases::Cases;
 pub use groups::GROUPS;
 use hedgerow::gpu::{Tuning, TuningChoice};
 use serde::{Deserialize, Serialize};
@@ -147,13 +147,4 @@ impl CheckRecord {
 /// The groups to run: all, with those for tests of the check itself where the environment asks for them.
 pub fn groups() -> impl Iterator<Item = &'static Group> {
     GROUPS.iter().chain(groups::faults::asked_for())
-}
-
-/// Runs a group in this process and tells of its cases. The device lives as long as the process, which ends with its group.
-pub fn run_here(group: &Group, device: Device, choice: TuningChoice, quick: bool, tell: &mut dyn FnMut(Message)) {
-    cases::keep_panics();
-    let device: &'static Device = Box::leak(Box::new(device));
-    tell(Message::Ground(Ground::of(device, choice)));
-    (group.run)(&mut Cases::new(device, quick, tell));
-    tell(Message::Done);
 }

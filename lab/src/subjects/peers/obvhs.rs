@@ -176,9 +176,8 @@ impl Subject for Obvhs {
         let (ordering, ()) = timed(|| {
             self.tree.primitive_indices.par_iter().map(triangle).collect_into_vec(&mut self.ordered);
         });
-        let phases =
-            vec![Phase { name: "build", milliseconds: building }, Phase { name: "triangles", milliseconds: ordering }];
-        Ok(BuildRun { milliseconds: building + ordering, phases })
+        let phases = [("build", building), ("triangles", ordering)];
+        Ok(BuildRun::of(phases.map(|(name, milliseconds)| Phase { name, milliseconds }).to_vec()))
     }
 
     fn memory(&self) -> record::MemoryRecord {
