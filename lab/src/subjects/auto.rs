@@ -3,7 +3,7 @@
 use crate::device::Device;
 use crate::experiments::choose::{Cost, SceneClass, cache};
 use crate::scene::Mesh;
-use crate::subjects::builders::{Plan, Spec};
+use crate::subjects::builders::{BuilderPlan, Spec};
 use crate::subjects::device_bvh::DeviceBvh;
 use crate::{Error, Result};
 
@@ -20,8 +20,8 @@ pub fn rays_of(option: Option<&str>) -> Result<f64> {
     rays.ok_or_else(|| Error::Argument(format!("auto:rays={text} is no number of rays a build; write auto:rays=1e6")))
 }
 
-/// The builder that is chosen for `mesh` and `rays` rays a build, under the name `builder`: by the table of costs of `device`, which
-/// is measured first where it is not known.
+/// The builder that is chosen for `mesh` and `rays` rays a build, under the name `builder`. The table of costs of `device` tells
+/// which; the table is measured first where it is not known.
 ///
 /// # Errors
 /// The device can build no candidate; those of the chosen one.
@@ -30,7 +30,7 @@ pub fn chosen<'a>(device: &'a Device, builder: &str, mesh: &Mesh, rays: f64) -> 
     let Cost { builder: name, build_ms, ray_ns } = table
         .choose(&SceneClass::of(mesh), rays)
         .ok_or_else(|| Error::NoVulkan("no candidate of auto could be measured on this device".into()))?;
-    let Plan::Device(plan) = name.parse::<Spec>()?.plan()? else {
+    let BuilderPlan::Device(plan) = name.parse::<Spec>()?.plan()? else {
         return Err(Error::Argument(format!("{name} builds no BVH on the device, so auto cannot take it")));
     };
     let mut subject = plan.make(device, &name, mesh)?;

@@ -23,8 +23,8 @@ use crate::device::Device;
 use crate::scene::Mesh;
 use crate::{Error, Result};
 use options::{RAYS, TRACE, TRAVERSAL};
+pub(crate) use plan::BuilderPlan;
 pub use plan::KdSpec;
-pub(crate) use plan::Plan;
 use std::fmt;
 use std::str::FromStr;
 pub use table::{BUILDERS, BuilderEntry, BuilderOption, Needs};
@@ -76,7 +76,7 @@ impl Spec {
     ///
     /// # Errors
     /// [`Error::Argument`] if an option has a value that the builder does not take.
-    pub(crate) fn plan(&self) -> Result<Plan> {
+    pub(crate) fn plan(&self) -> Result<BuilderPlan> {
         (self.builder().plan)(self)
     }
 
@@ -89,24 +89,24 @@ impl Spec {
             || device.ok_or_else(|| Error::NoVulkan("this builder works on a device, and none was opened".into()));
         let name = self.to_string();
         Ok(match self.plan()? {
-            Plan::Device(plan) => Box::new(plan.make(given()?, &name, mesh)?),
-            Plan::Host(options) => Box::new(Host::new(&name, mesh, options)),
-            Plan::Kd(KdSpec::Host { options, traversal, traces_on_device }) => {
+            BuilderPlan::Device(plan) => Box::new(plan.make(given()?, &name, mesh)?),
+            BuilderPlan::Host(options) => Box::new(Host::new(&name, mesh, options)),
+            BuilderPlan::Kd(KdSpec::Host { options, traversal, traces_on_device }) => {
                 let rays = match traces_on_device {
                     false => KdRays::on_host(traversal),
                     true => KdRays::on_device(KdDevice::new(given()?, traversal)?),
                 };
                 Box::new(KdHost::new(&name, mesh, options, rays))
             }
-            Plan::Kd(KdSpec::Device { options, traversal }) => {
+            BuilderPlan::Kd(KdSpec::Device { options, traversal }) => {
                 Box::new(KdGpu::new(given()?, &name, mesh, &options, traversal)?)
             }
-            Plan::Auto(rays) => Box::new(auto::chosen(given()?, &name, mesh, rays)?),
-            Plan::Driver(preference) => Box::new(Driver::new(given()?, mesh, preference)?),
+            BuilderPlan::Auto(rays) => Box::new(auto::chosen(given()?, &name, mesh, rays)?),
+            BuilderPlan::Driver(preference) => Box::new(Driver::new(given()?, mesh, preference)?),
             #[cfg(feature = "peer-obvhs")]
-            Plan::Obvhs(preset) => Box::new(Obvhs::new(mesh, preset)?),
+            BuilderPlan::Obvhs(preset) => Box::new(Obvhs::new(mesh, preset)?),
             #[cfg(feature = "peer-embree")]
-            Plan::Embree(preset) => Box::new(Embree::new(mesh, preset)?),
+            BuilderPlan::Embree(preset) => Box::new(Embree::new(mesh, preset)?),
         })
     }
 
@@ -115,7 +115,7 @@ impl Spec {
     /// # Errors
     /// [`Error::Argument`] if it is no builder of kd-trees.
     pub fn kd(&self) -> Result<KdSpec> {
-        if let Plan::Kd(kd) = self.plan()? {
+        if let BuilderPlan::Kd(kd) = self.plan()? {
             return Ok(kd);
         }
         let names: Vec<&str> = BUILDERS.iter().filter(|b| b.takes(TRAVERSAL.key)).map(|b| b.name).collect();

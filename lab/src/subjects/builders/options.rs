@@ -1,6 +1,6 @@
 //! What options there are, and what a [`Spec`] says with them.
 
-use super::plan::{DevicePlan, KdSpec, Plan};
+use super::plan::{BuilderPlan, DevicePlan, KdSpec};
 use super::{BuilderOption, Spec};
 use crate::subjects::auto;
 use crate::subjects::host::{HostBvhOptions, HostMethod};
@@ -75,30 +75,30 @@ impl Spec {
     }
 
     /// Options `codes`, `split`, `optimise`, `collapse`, `schedule`, `width` and `order` of a builder on the device.
-    pub(super) fn on_device(&self, method: Method) -> Result<Plan> {
+    pub(super) fn on_device(&self, method: Method) -> Result<BuilderPlan> {
         method.check()?;
         let schedule = self.schedule()?;
         let (codes, split) = (self.codes()?, self.split()?);
         let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
         let options = BuildOptions { method, codes, split, optimise, collapse, schedule, ..BuildOptions::DEFAULT };
         let (form, order) = self.form_and_order()?;
-        Ok(Plan::Device(DevicePlan { options, form, order, time_to_optimise: self.time_to_optimise()? }))
+        Ok(BuilderPlan::Device(DevicePlan { options, form, order, time_to_optimise: self.time_to_optimise()? }))
     }
 
     /// Those of every builder on the device, and `bits` and `treelet`.
-    pub(super) fn hlbvh(&self) -> Result<Plan> {
+    pub(super) fn hlbvh(&self) -> Result<BuilderPlan> {
         let bits = self.parsed(&BITS)?;
         let primitives = self.parsed(&TREELET)?.unwrap_or(Treelets::DEFAULT.primitives);
         self.on_device(Method::Hlbvh(Treelets { bits, primitives }))
     }
 
     /// Those of every builder on the device, and `radius`.
-    pub(super) fn ploc(&self) -> Result<Plan> {
+    pub(super) fn ploc(&self) -> Result<BuilderPlan> {
         self.on_device(Method::Ploc { radius: self.parsed(&RADIUS)?.unwrap_or(PLOC_RADIUS) })
     }
 
     /// Those of every builder on the device, and `window` and `radius`.
-    pub(super) fn hploc(&self) -> Result<Plan> {
+    pub(super) fn hploc(&self) -> Result<BuilderPlan> {
         let size = self.parsed(&WINDOW)?.unwrap_or(Window::DEFAULT.size);
         let radius = self.parsed(&RADIUS)?.unwrap_or(Window::DEFAULT.radius);
         self.on_device(Method::Hploc(Window { size, radius }))
@@ -123,17 +123,17 @@ impl Spec {
     }
 
     /// Options `codes`, `collapse` and `optimise` of a builder on the host.
-    pub(super) fn on_host(&self, hierarchy: HostMethod) -> Result<Plan> {
+    pub(super) fn on_host(&self, hierarchy: HostMethod) -> Result<BuilderPlan> {
         if self.option(OPTIMISE.key).is_some_and(|value| value.ends_with("ms")) {
             let what = "on the host rounds are not timed; take fast, medium, high or a number of passes";
             return Err(Error::Argument(format!("builder {self}: {}: {what}", OPTIMISE.key)));
         }
         let (codes, collapse) = (self.codes()?, self.collapse()?);
-        Ok(Plan::Host(HostBvhOptions { hierarchy, codes, reinsertion: self.reinsertion()?, collapse }))
+        Ok(BuilderPlan::Host(HostBvhOptions { hierarchy, codes, reinsertion: self.reinsertion()?, collapse }))
     }
 
     /// Those of every builder on the host, and `radius`; 25 where it was not given.
-    pub(super) fn ploc_on_host(&self) -> Result<Plan> {
+    pub(super) fn ploc_on_host(&self) -> Result<BuilderPlan> {
         match self.parsed(&RADIUS)?.unwrap_or(25) {
             0 => Err(self.wrong_value(&RADIUS, "0")),
             radius => self.on_host(HostMethod::Ploc(radius as usize)),
@@ -141,14 +141,14 @@ impl Spec {
     }
 
     /// Options `kt`, `ki`, `traversal` and `trace` of a builder of kd-trees on the host.
-    pub(super) fn kd_on_host(&self, planes: Planes) -> Result<Plan> {
+    pub(super) fn kd_on_host(&self, planes: Planes) -> Result<BuilderPlan> {
         let options = self.kd_options(planes)?;
         let traces_on_device = self.choice(&TRACE, &[("host", false), ("device", true)])?.unwrap_or(false);
-        Ok(Plan::Kd(KdSpec::Host { options, traversal: self.traversal(traces_on_device)?, traces_on_device }))
+        Ok(BuilderPlan::Kd(KdSpec::Host { options, traversal: self.traversal(traces_on_device)?, traces_on_device }))
     }
 
     /// Those of every builder of kd-trees on the host, and `bins` and `exact`.
-    pub(super) fn kd_mixed_on_host(&self) -> Result<Plan> {
+    pub(super) fn kd_mixed_on_host(&self) -> Result<BuilderPlan> {
         let bins = self.parsed(&BINS)?.unwrap_or(KdOptions::DEFAULT.bins);
         let exact = self.parsed(&EXACT)?.unwrap_or(KdOptions::DEFAULT.exact);
         if exact > Planes::MAX_EXACT {
@@ -158,7 +158,7 @@ impl Spec {
     }
 
     /// Options `bins`, `exact`, `kt`, `ki`, `schedule`, `workgroups` and `traversal`.
-    pub(super) fn kd_on_device(&self) -> Result<Plan> {
+    pub(super) fn kd_on_device(&self) -> Result<BuilderPlan> {
         let default = KdOptions::DEFAULT;
         let costs = self.kd_options(Planes::Exact)?.costs;
         let workgroups = self.parsed(&WORKGROUPS)?;
@@ -166,7 +166,7 @@ impl Spec {
         let exact = self.parsed(&EXACT)?.unwrap_or(default.exact);
         let options = KdOptions { bins, exact, costs, schedule: self.schedule()?, workgroups, ..default };
         options.check()?;
-        Ok(Plan::Kd(KdSpec::Device { options, traversal: self.traversal(true)? }))
+        Ok(BuilderPlan::Kd(KdSpec::Device { options, traversal: self.traversal(true)? }))
     }
 
     /// Option `traversal`; where it was not given, what is fastest where rays are traced (docs/notes/kdtree.md).

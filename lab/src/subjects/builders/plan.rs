@@ -22,7 +22,7 @@ use hedgerow_host::kdtree::HostKdOptions;
 use std::time::Duration;
 
 /// What is asked for.
-pub(crate) enum Plan {
+pub(crate) enum BuilderPlan {
     /// One of ours on the device.
     Device(DevicePlan),
     /// One of ours on the host.

@@ -4,7 +4,7 @@ use super::options::{
     BINS, BITS, CODES, COLLAPSE, EXACT, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT, TERMINATION, TRACE,
     TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
 };
-use super::{Plan, Spec};
+use super::{BuilderPlan, Spec};
 use crate::Result;
 use crate::subjects::host::HostMethod;
 use crate::subjects::peers::driver::DriverPreference;
@@ -28,11 +28,11 @@ pub struct BuilderEntry {
     pub variants: &'static [&'static str],
     /// What it needs of the machine.
     pub needs: Needs,
-    pub(super) plan: Read,
+    pub(super) plan: ReadPlan,
 }
 
 /// Reads the options of a builder.
-type Read = fn(&Spec) -> Result<Plan>;
+type ReadPlan = fn(&Spec) -> Result<BuilderPlan>;
 
 /// An option of a builder, `key=value`.
 pub struct BuilderOption {
@@ -54,15 +54,15 @@ pub enum Needs {
 }
 
 /// One without options, itself its only variant: a slice borrows the name for that.
-const fn needing(needs: Needs, name: &'static &'static str, what: &'static str, plan: Read) -> BuilderEntry {
+const fn needing(needs: Needs, name: &'static &'static str, what: &'static str, plan: ReadPlan) -> BuilderEntry {
     BuilderEntry { name, what, options: &[], variants: slice::from_ref(name), needs, plan }
 }
 
-const fn on_device(name: &'static &'static str, what: &'static str, plan: Read) -> BuilderEntry {
+const fn on_device(name: &'static &'static str, what: &'static str, plan: ReadPlan) -> BuilderEntry {
     needing(Needs::Device, name, what, plan)
 }
 
-const fn on_host(name: &'static &'static str, what: &'static str, plan: Read) -> BuilderEntry {
+const fn on_host(name: &'static &'static str, what: &'static str, plan: ReadPlan) -> BuilderEntry {
     needing(Needs::Nothing, name, what, plan)
 }
 
@@ -118,7 +118,7 @@ pub static BUILDERS: &[BuilderEntry] = &[
     on_device(
         &"auto",
         "the device's builder that takes least for a build and its rays, by its measured costs",
-        |spec| spec.rays().map(Plan::Auto),
+        |spec| spec.rays().map(BuilderPlan::Auto),
     )
     .taking(&[RAYS]),
     on_host(&"lbvh-host", "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte", |spec| {
@@ -154,21 +154,27 @@ pub static BUILDERS: &[BuilderEntry] = &[
     )
     .taking(&[BINS, EXACT, KT, KI, TRAVERSAL, TRACE]),
     needing(Needs::RayQuery, &"driver-fast-build", "the Vulkan driver's own, asked to build fast", |_| {
-        Ok(Plan::Driver(DriverPreference::FastBuild))
+        Ok(BuilderPlan::Driver(DriverPreference::FastBuild))
     }),
     needing(Needs::RayQuery, &"driver-fast-trace", "the Vulkan driver's own, asked to trace fast", |_| {
-        Ok(Plan::Driver(DriverPreference::FastTrace))
+        Ok(BuilderPlan::Driver(DriverPreference::FastTrace))
     }),
     #[cfg(feature = "peer-obvhs")]
-    on_host(&"obvhs-fastest", "obvhs on the CPU: PLOC alone", |_| Ok(Plan::Obvhs(obvhs::Preset::Fastest))),
+    on_host(&"obvhs-fastest", "obvhs on the CPU: PLOC alone", |_| Ok(BuilderPlan::Obvhs(obvhs::Preset::Fastest))),
     #[cfg(feature = "peer-obvhs")]
-    on_host(&"obvhs-fast", "obvhs on the CPU: PLOC and a little reinsertion", |_| Ok(Plan::Obvhs(obvhs::Preset::Fast))),
+    on_host(&"obvhs-fast", "obvhs on the CPU: PLOC and a little reinsertion", |_| {
+        Ok(BuilderPlan::Obvhs(obvhs::Preset::Fast))
+    }),
     #[cfg(feature = "peer-obvhs")]
-    on_host(&"obvhs-medium", "obvhs on the CPU: PLOC and more reinsertion", |_| Ok(Plan::Obvhs(obvhs::Preset::Medium))),
+    on_host(&"obvhs-medium", "obvhs on the CPU: PLOC and more reinsertion", |_| {
+        Ok(BuilderPlan::Obvhs(obvhs::Preset::Medium))
+    }),
     #[cfg(feature = "peer-embree")]
-    on_host(&"embree-low", "Embree on the CPU: Morton codes", |_| Ok(Plan::Embree(embree::Preset::Low))),
+    on_host(&"embree-low", "Embree on the CPU: Morton codes", |_| Ok(BuilderPlan::Embree(embree::Preset::Low))),
     #[cfg(feature = "peer-embree")]
-    on_host(&"embree-medium", "Embree on the CPU: binned SAH", |_| Ok(Plan::Embree(embree::Preset::Medium))),
+    on_host(&"embree-medium", "Embree on the CPU: binned SAH", |_| Ok(BuilderPlan::Embree(embree::Preset::Medium))),
     #[cfg(feature = "peer-embree")]
-    on_host(&"embree-high", "Embree on the CPU: SAH with spatial splits", |_| Ok(Plan::Embree(embree::Preset::High))),
+    on_host(&"embree-high", "Embree on the CPU: SAH with spatial splits", |_| {
+        Ok(BuilderPlan::Embree(embree::Preset::High))
+    }),
 ];
