@@ -1,6 +1,6 @@
 //! Copies of structures: clones, compaction, serialisation, and the figures that tell their sizes.
 
-use crate::common::backends::{Backend, Built, Copies, Drivers, Ours, vk_geometry};
+use crate::common::backends::{Backend, Built, Copies, Drivers, Ours, Traces, vk_geometry};
 use crate::common::device;
 use crate::common::geometries::Owned;
 use crate::common::probe::{CONFIRM_ODD, ProbeRay, ProbeReport};

@@ -5,71 +5,35 @@ use super::geometries::Owned;
 use super::probe::{self, Probe, ProbeRay, ProbeReport};
 use hedgerow::ash::{self, vk};
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
-use hedgerow::gpu::Recorder;
+use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 use hedgerow::trace::{Hit, Query, Ray};
-use hedgerow_lab::device::{Device, DriverRays, DriverTracing};
+use hedgerow_lab::device::{DriverRays, DriverTracing};
 pub use hedgerow_lab::experiments::check::backend::{Backend, BuildInfo, Built, Ours, Ranges};
+use hedgerow_lab::subjects::structures::Structures;
 
 /// Ours, and the driver's where the device has it with ray queries, which shaders of engines ask.
-pub fn backends() -> Vec<Box<dyn Backend>> {
-    let mut all: Vec<Box<dyn Backend>> = vec![Box::new(Ours::on(device()))];
+pub fn backends() -> Vec<Box<dyn Traces>> {
+    let mut all: Vec<Box<dyn Traces>> = vec![Box::new(Ours::on(device()))];
     if device().driver_tracing() == Some(DriverTracing::Query) {
         all.push(Box::new(Drivers::new()));
     }
     all
 }
 
-pub struct Drivers(pub ash::khr::acceleration_structure::Device, Probe);
+pub struct Drivers(pub ash::khr::acceleration_structure::Device, Probe, Structures<'static>);
 
 impl Drivers {
     /// For a device that has them.
     pub fn new() -> Drivers {
         let raw = ash::khr::acceleration_structure::Device::new(device().ash_instance(), device().ash_device());
-        Drivers(raw, probe::of_the_driver())
+        let structures = Structures::drivers(device()).expect("the driver has structures");
+        Drivers(raw, probe::of_the_driver(), structures)
     }
 }
 
 impl Backend for Drivers {
-    fn name(&self) -> &'static str {
-        "driver"
-    }
-
-    fn device(&self) -> &'static Device {
-        device()
-    }
-
-    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
-        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
-        unsafe { self.0.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) };
-        sizes
-    }
-
-    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
-        unsafe { self.0.create_acceleration_structure(info, None) }.expect("the driver makes it")
-    }
-
-    fn destroy(&self, structure: vk::AccelerationStructureKHR) {
-        unsafe { self.0.destroy_acceleration_structure(structure, None) };
-    }
-
-    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
-        let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
-        unsafe { self.0.get_acceleration_structure_device_address(&info) }
-    }
-
-    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]) {
-        let access =
-            vk::AccessFlags::ACCELERATION_STRUCTURE_READ_KHR | vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR;
-        let barrier = vk::MemoryBarrier::default().src_access_mask(access).dst_access_mask(access);
-        let build = vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
-        let after = build | vk::PipelineStageFlags::COMPUTE_SHADER;
-        let none = vk::DependencyFlags::empty();
-        unsafe {
-            self.0.cmd_build_acceleration_structures(recorder.commands(), infos, ranges);
-            let raw = recorder.context().ash_device();
-            raw.cmd_pipeline_barrier(recorder.commands(), build, after, none, &[barrier], &[], &[]);
-        }
+    fn structures(&self) -> &Structures<'static> {
+        &self.2
     }
 
     fn scratch_alignment(&self) -> u64 {
@@ -82,7 +46,28 @@ impl Backend for Drivers {
     fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport> {
         self.1.ask(self.address(structure), rays)
     }
+}
 
+/// What traces bottom-level structures.
+pub trait Traces: Backend {
+    /// The hits of rays in a bottom-level structure.
+    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
+}
+
+impl Traces for Ours {
+    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
+        let count = rays.len() as u32;
+        let ray_buffer = self.device().upload("rays", rays).expect("memory");
+        let hits = self.device().buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
+        let structure = self.address(structure);
+        let buffers = TraceBuffers { structure, rays: ray_buffer.region(), hits: hits.region(), work: None, count };
+        let shape = TraceShape::of(self.device());
+        self.device().run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
+        hits.read(rays.len())
+    }
+}
+
+impl Traces for Drivers {
     /// Through a top level of one instance, which a ray query cannot do without.
     fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
         let reference = self.address(structure);
@@ -113,7 +98,7 @@ impl Backend for Drivers {
 }
 
 /// What an engine calls to copy, each call in a submit of its own.
-pub trait Copies: Backend {
+pub trait Copies: Traces {
     /// What a build must ask for so that its structure can be compacted.
     fn flags_to_compact(&self) -> vk::BuildAccelerationStructureFlagsKHR;
     fn property(&self, structure: vk::AccelerationStructureKHR, query: vk::QueryType) -> u64;

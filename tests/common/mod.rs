@@ -68,3 +68,10 @@ pub fn open(options: DeviceOptions) -> Device {
         })
         .expect("a Vulkan device that has what hedgerow needs")
 }
+
+/// The corners of the triangles that builders take: finite, and of vertices that there are.
+pub fn corners_of((_, positions, triangles): &corpus::Mesh) -> Vec<[[f32; 3]; 3]> {
+    let corner = |v: u32| positions.get(v as usize).copied().filter(|p| p.iter().all(|x| x.is_finite()));
+    let corners = |t: &[u32; 3]| Some([corner(t[0])?, corner(t[1])?, corner(t[2])?]);
+    triangles.iter().filter_map(corners).collect()
+}

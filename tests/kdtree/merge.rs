@@ -188,7 +188,7 @@ fn merged_trees_are_valid_and_have_the_hits_of_brute_force_and_restore_byte_for_
 
 #[test]
 fn every_scene_that_hurts_merges_into_another() {
-    let few = |mesh: &corpus::Mesh| corpus::corners_of(mesh).into_iter().take(300).collect();
+    let few = |mesh: &corpus::Mesh| crate::common::corners_of(mesh).into_iter().take(300).collect();
     let meshes: Vec<Corners> = corpus::meshes().iter().map(few).collect();
     for (i, object) in meshes.iter().enumerate() {
         for (still, name) in [(&room(), "room"), (&meshes[(i + 7) % meshes.len()], "another")] {

@@ -122,7 +122,7 @@ proptest! {
 #[test]
 fn every_scene_that_hurts_has_the_hits_of_brute_force() {
     for mesh in corpus::meshes() {
-        let (name, corners) = (&mesh.0, corpus::corners_of(&mesh));
+        let (name, corners) = (&mesh.0, crate::common::corners_of(&mesh));
         let b = corners.iter().flatten().flatten().fold(0f32, |m, x| m.max(x.abs()));
         let rays = hard_rays(&corners, 48, if b > 0.0 { b.min(1e37) } else { 1.0 }, [0.0; 3], 5);
         let trees = both(&corners);

@@ -172,7 +172,7 @@ fn rays_in_planes_are_traced_as_on_the_host() {
 #[test]
 fn every_scene_that_hurts_has_the_hits_of_brute_force() {
     for mesh in corpus::meshes() {
-        let (name, corners) = (&mesh.0, corpus::corners_of(&mesh));
+        let (name, corners) = (&mesh.0, crate::common::corners_of(&mesh));
         let b = corners.iter().flatten().flatten().fold(0f32, |m, x| m.max(x.abs()));
         let rays = hard_rays(&corners, 64, if b > 0.0 { b.min(1e37) } else { 1.0 }, [0.0; 3], 5);
         assert_hits_of_brute_force(name, &corners, &kd_tree_of(&corners, &HostKdOptions::BINNED), &rays);

@@ -1,17 +1,17 @@
 //! Our trees built on the device as subjects: timestamps around each phase, our tracer.
 
+use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::device_rays::DeviceRays;
 use super::wide::WideTree;
 use super::{BuildRun, Subject};
-use crate::device::{Buffer, Device};
+use crate::Result;
+use crate::device::Device;
 use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
 use crate::scene::Mesh;
-use crate::{Error, Result};
-use hedgerow::bvh::builder::{BuildOptions, Builder, Input};
+use hedgerow::bvh::builder::{BuildOptions, Builder};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::quality::{self, QualityFigures};
-use hedgerow::gpu::Sizes;
 use hedgerow::gpu::{Recorder, Timestamps};
 use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 use hedgerow::trace::wide::WideTracer;
@@ -23,14 +23,13 @@ const PHASES: u32 = 12;
 /// A scene in our `Bvh2`, or in a wide tree made of it, built and traced on the device.
 pub struct DeviceBvh<'a> {
     device: &'a Device,
-    builder: String,
-    choice: Option<String>,
+    /// Its name.
+    pub(super) builder: String,
+    /// What was left to choose.
+    pub(super) choice: Option<String>,
     bvh: Builder,
-    sizes: Sizes,
-    input: Input,
-    _vertices: [Buffer<'a>; 2],
-    structure: Buffer<'a>,
-    scratch: Buffer<'a>,
+    mesh: DeviceMesh<'a>,
+    memory: BuildMemory<'a>,
     wide: Option<WideTree<'a>>,
     timestamps: Timestamps,
     rays: DeviceRays<'a>,
@@ -51,35 +50,27 @@ impl<'a> DeviceBvh<'a> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let bvh = Builder::new(device, options, count)?;
         let sizes = bvh.sizes();
-        let (positions, indices) = (size_of_val(&mesh.positions[..]) as u64, size_of_val(&mesh.triangles[..]) as u64);
-        let (needed, available) = (positions + indices + sizes.structure + sizes.scratch, device.found().memory);
-        if needed > available {
-            return Err(Error::OutOfMemory { what: format!("{builder} of {count} triangles"), needed, available });
-        }
-        let vertices = [device.upload("positions", &mesh.positions)?, device.upload("indices", &mesh.triangles)?];
-        let input = Input::mesh(vertices[0].address(), mesh.positions.len() as u32, vertices[1].address(), count);
-        let structure = device.buffer("structure", sizes.structure)?;
-        let scratch = device.buffer("scratch", sizes.scratch)?;
-        bvh.record(&mut Recorder::warming(device), &input, structure.region(), scratch.region())?;
+        let mesh_bytes = size_of_val(&mesh.positions[..]) + size_of_val(&mesh.triangles[..]);
+        check_memory(device, builder, count, mesh_bytes as u64 + sizes.structure + sizes.scratch)?;
+        let mesh = DeviceMesh::new(device, &mesh.positions, &mesh.triangles)?;
+        let memory = BuildMemory::new(device, sizes)?;
+        bvh.record(&mut Recorder::warming(device), &mesh.input, memory.structure.region(), memory.scratch.region())?;
         Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
             choice: choice_of(options, &bvh),
-            structure,
-            scratch,
             wide: wide.map(|tracer| WideTree::new(device, tracer, bvh.record_count())).transpose()?,
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,
-            sizes,
-            input,
-            _vertices: vertices,
+            mesh,
+            memory,
             rays: DeviceRays::new(device)?,
         })
     }
 
     /// Address of what is traced.
     fn traced(&self) -> u64 {
-        self.wide.as_ref().map_or(self.structure.address(), WideTree::address)
+        self.wide.as_ref().map_or(self.memory.structure.address(), WideTree::address)
     }
 }
 
@@ -113,12 +104,8 @@ impl Subject for DeviceBvh<'_> {
         self.wide.as_ref().map_or("bvh2", |tree| tree.tracer.form.name())
     }
 
-    fn timer(&self) -> &'static str {
-        self.device.timer()
-    }
-
-    fn traces_on_device(&self) -> bool {
-        true
+    fn device(&self) -> Option<&Device> {
+        Some(self.device)
     }
 
     fn choice(&self) -> Option<String> {
@@ -126,24 +113,20 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn traffic(&self, phase: &str) -> Option<u64> {
-        self.bvh.traffic(phase, &self.input)
+        self.bvh.traffic(phase, &self.mesh.input)
     }
 
     fn build(&mut self) -> Result<BuildRun> {
         self.device.run(Some(&mut self.timestamps), |recorder| {
-            self.bvh.record(recorder, &self.input, self.structure.region(), self.scratch.region())?;
-            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, self.structure.address()))
+            let BuildMemory { structure, scratch, .. } = &self.memory;
+            self.bvh.record(recorder, &self.mesh.input, structure.region(), scratch.region())?;
+            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, structure.address()))
         })?;
         Ok(BuildRun::of(self.timestamps.phases()?))
     }
 
     fn memory(&self) -> record::MemoryRecord {
-        let binary = record::MemoryRecord {
-            structure_bytes: Some(self.sizes.structure),
-            scratch_bytes: Some(self.sizes.scratch),
-            peak_bytes: Some(self.sizes.structure + self.sizes.scratch),
-        };
-        self.wide.as_ref().map_or(binary.clone(), |tree| tree.memory(&binary))
+        self.wide.as_ref().map_or_else(|| self.memory.record(), |tree| tree.memory(&self.memory.sizes))
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
@@ -153,7 +136,8 @@ impl Subject for DeviceBvh<'_> {
         let measure = quality::QualityPass::new(self.device, self.bvh.record_count());
         let scratch = self.device.buffer("quality: scratch", measure.scratch_bytes())?;
         let result = self.device.buffer("quality: figures", size_of::<QualityFigures>() as u64)?;
-        self.device.run(None, |r| measure.record(r, self.structure.address(), scratch.region(), result.region()))?;
+        self.device
+            .run(None, |r| measure.record(r, self.memory.structure.address(), scratch.region(), result.region()))?;
         Ok(record::QualityRecord::of(&result.read::<QualityFigures>(1)[0].quality(c_t, c_i), c_t, c_i))
     }
 
@@ -162,18 +146,16 @@ impl Subject for DeviceBvh<'_> {
             // The device takes each record for a triangle of its own.
             return Ok(self.tree()?.and_then(|tree| overlap::on_host(&tree, c_t, c_i, epo)));
         }
-        overlap::on_device(self.device, self.structure.address(), self.input.primitive_count, (c_t, c_i), epo)
+        let count = self.mesh.input.primitive_count;
+        overlap::on_device(self.device, self.memory.structure.address(), count, (c_t, c_i), epo)
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {
-        Ok(Some(Bvh2::from_bytes(&self.structure.read::<u8>(self.sizes.structure as usize))?))
+        Ok(Some(Bvh2::from_bytes(&self.memory.bytes())?))
     }
 
     fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
-        match &self.wide {
-            Some(tree) => Ok(Some(tree.bytes())),
-            None => Ok(Some(self.structure.read(self.sizes.structure as usize))),
-        }
+        Ok(Some(self.wide.as_ref().map_or_else(|| self.memory.bytes(), WideTree::bytes)))
     }
 
     fn validate(&mut self) -> Result<()> {

@@ -33,9 +33,27 @@ impl<'a> RayBuffers<'a> {
         self.hits.read(self.count as usize)
     }
 
-    fn buffers(&self, structure: u64, work: Option<Region>) -> TraceBuffers {
+    /// What a tracer takes of them and of the structure at this address.
+    pub(crate) fn buffers(&self, structure: u64, work: Option<Region>) -> TraceBuffers {
         TraceBuffers { structure, rays: self.rays.region(), hits: self.hits.region(), work, count: self.count }
     }
+}
+
+/// Milliseconds that what `record` records takes by the device's clock, as a phase of this name.
+///
+/// # Errors
+/// It cannot be recorded or run.
+pub fn timed_run(
+    device: &Device,
+    timestamps: &mut Timestamps,
+    phase: &'static str,
+    record: impl FnOnce(&mut Recorder<'_>) -> hedgerow::Result<()>,
+) -> Result<f64> {
+    device.run(Some(&mut *timestamps), |recorder| {
+        recorder.phase(phase);
+        record(recorder)
+    })?;
+    Ok(timestamps.phases()?.iter().map(|phase| phase.milliseconds).sum())
 }
 
 /// The rays that a subject traces.
@@ -76,11 +94,7 @@ impl<'a> DeviceRays<'a> {
     ) -> Result<f64> {
         let Some(uploaded) = &self.uploaded else { return Ok(0.0) };
         let buffers = uploaded.buffers(structure, None);
-        self.device.run(Some(&mut self.timestamps), |recorder| {
-            recorder.phase("trace");
-            record(recorder, &buffers)
-        })?;
-        Ok(self.timestamps.phases()?.iter().map(|p| p.milliseconds).sum())
+        timed_run(self.device, &mut self.timestamps, "trace", |recorder| record(recorder, &buffers))
     }
 
     /// The hits of the last [`DeviceRays::trace`].

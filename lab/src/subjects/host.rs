@@ -9,13 +9,12 @@ use crate::scene::Mesh;
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{self, Bvh2};
+use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::bvh::twin::{lbvh, ploc};
-use hedgerow::bvh::{reinsertion, twin::quality};
+use hedgerow::bvh::twin::{lbvh, ploc, quality};
 use hedgerow::trace::twin::tracer;
 use hedgerow::trace::{Hit, Query, Ray, Work};
-use hedgerow_host::sweep;
-use hedgerow_host::sweep::Leaves;
+use hedgerow_host::sweep::{self, Leaves};
 
 /// How a host's builder makes the tree of what is sorted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +35,7 @@ pub struct HostBvhOptions {
     /// The codes; `None` takes those that the device would take for so many triangles.
     pub codes: Option<Codes>,
     /// Reinsertion behind it.
-    pub reinsertion: Option<reinsertion::ReinsertionOptions>,
+    pub reinsertion: Option<ReinsertionOptions>,
     /// Whether subtrees become leaves where that is cheaper.
     pub collapse: Collapse,
 }
@@ -64,9 +63,10 @@ impl<'a> Host<'a> {
         }
     }
 
-    fn built(&mut self) -> &Bvh2 {
-        let Host { mesh, options, codes, tree, .. } = self;
-        tree.get_or_insert_with(|| {
+    /// The tree, built where there is none yet, and what is traced through it.
+    fn built(&mut self) -> (&Bvh2, &mut HostRays) {
+        let Host { mesh, options, codes, tree, rays, .. } = self;
+        let tree = tree.get_or_insert_with(|| {
             let collapse = &options.collapse;
             let lbvh = |collapse| lbvh::build(&mesh.positions, &mesh.triangles, *codes, collapse);
             let tree = match (options.hierarchy, options.reinsertion) {
@@ -79,7 +79,8 @@ impl<'a> Host<'a> {
                 Some(reinsertion) => tree.reinserted(reinsertion).collapsed(collapse),
                 None => tree.collapsed(collapse),
             }
-        })
+        });
+        (tree, rays)
     }
 }
 
@@ -92,13 +93,9 @@ impl Subject for Host<'_> {
         "bvh2"
     }
 
-    fn timer(&self) -> &'static str {
-        "wall"
-    }
-
     fn build(&mut self) -> Result<BuildRun> {
         self.tree = None;
-        let (milliseconds, _) = timed(|| self.built().header.active);
+        let (milliseconds, _) = timed(|| self.built().0.header.active);
         Ok(BuildRun::whole(milliseconds))
     }
 
@@ -109,15 +106,15 @@ impl Subject for Host<'_> {
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
-        Ok(record::QualityRecord::of(&quality::of(self.built(), c_t, c_i), c_t, c_i))
+        Ok(record::QualityRecord::of(&quality::of(self.built().0, c_t, c_i), c_t, c_i))
     }
 
     fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
-        Ok(overlap::on_host(self.built(), c_t, c_i, epo))
+        Ok(overlap::on_host(self.built().0, c_t, c_i, epo))
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {
-        Ok(Some(self.built().clone()))
+        Ok(Some(self.built().0.clone()))
     }
 
     fn choice(&self) -> Option<String> {
@@ -131,8 +128,7 @@ impl Subject for Host<'_> {
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        self.built();
-        let Host { tree: Some(tree), rays, .. } = self else { return Ok(0.0) };
+        let (tree, rays) = self.built();
         Ok(rays.trace(|ray| tracer::trace(tree, ray, query).0))
     }
 
@@ -141,8 +137,7 @@ impl Subject for Host<'_> {
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        self.built();
-        let Host { tree: Some(tree), rays, .. } = self else { return Ok(None) };
+        let (tree, rays) = self.built();
         Ok(Some(rays.work(|ray| tracer::trace(tree, ray, query).1)))
     }
 }

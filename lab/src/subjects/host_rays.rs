@@ -105,7 +105,7 @@ impl<'a> KdRays<'a> {
                         trees.push((tracer.upload(tree)?, *first));
                     }
                 }
-                tracer.set_rays(new)?;
+                tracer.rays.set(new)?;
             }
         }
         Ok(())
@@ -120,7 +120,7 @@ impl<'a> KdRays<'a> {
             KdRays::Host { traversal, rays } => Ok(rays.trace(|ray| walk(through, ray, query, *traversal).0)),
             // There are no rays yet.
             KdRays::Device { trees, .. } if trees.is_empty() => Ok(0.0),
-            KdRays::Device { tracer, trees } => tracer.trace_several(&addresses(trees), query),
+            KdRays::Device { tracer, trees } => tracer.trace(&addresses(trees), query),
         }
     }
 
@@ -128,7 +128,7 @@ impl<'a> KdRays<'a> {
     pub fn hits(&self) -> Vec<Hit> {
         match self {
             KdRays::Host { rays, .. } => rays.hits(),
-            KdRays::Device { tracer, .. } => tracer.hits(),
+            KdRays::Device { tracer, .. } => tracer.rays.hits(),
         }
     }
 
@@ -140,7 +140,7 @@ impl<'a> KdRays<'a> {
         match self {
             KdRays::Host { traversal, rays } => Ok(Some(rays.work(|ray| walk(through, ray, query, *traversal).1))),
             KdRays::Device { trees, .. } if trees.is_empty() => Ok(None),
-            KdRays::Device { tracer, trees } => tracer.work_several(&addresses(trees), query),
+            KdRays::Device { tracer, trees } => tracer.work(&addresses(trees), query),
         }
     }
 }

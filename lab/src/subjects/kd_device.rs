@@ -4,15 +4,15 @@ use super::device_rays::DeviceRays;
 use crate::Result;
 use crate::device::{Buffer, Device};
 use hedgerow::kdtree::layout::KdTree;
-use hedgerow::trace::kd::Traversal;
-use hedgerow::trace::kd::{KdTracer, TreeEntry};
-use hedgerow::trace::{Hit, Query, Ray, Work};
+use hedgerow::trace::kd::{KdTracer, Traversal, TreeEntry};
+use hedgerow::trace::{Query, Work};
 
 /// A traversal on the device with its rays; of a structure it needs the address.
 pub struct KdDevice<'a> {
     device: &'a Device,
     tracer: KdTracer,
-    rays: DeviceRays<'a>,
+    /// What is traced.
+    pub rays: DeviceRays<'a>,
 }
 
 impl<'a> KdDevice<'a> {
@@ -32,57 +32,30 @@ impl<'a> KdDevice<'a> {
         self.device.upload("kd-tree", &tree.to_bytes())
     }
 
-    /// Brings rays to the device; not under the clock.
-    ///
-    /// # Errors
-    /// Too little memory.
-    pub fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        self.rays.set(rays)
-    }
-
-    /// Traces the rays once through the structure at an address: milliseconds by timestamps.
+    /// Traces the rays once through the structures, each an address and the number of its first primitive, one after the other:
+    /// milliseconds by timestamps.
     ///
     /// # Errors
     /// The device failed.
-    pub fn trace(&mut self, structure: u64, query: Query) -> Result<f64> {
-        self.rays.trace(structure, |recorder, buffers| self.tracer.record(recorder, query, buffers))
-    }
-
-    /// Traces the rays once through several structures, each an address and the number of its first primitive, one after the
-    /// other: milliseconds by timestamps.
-    ///
-    /// # Errors
-    /// The device failed.
-    pub fn trace_several(&mut self, structures: &[(u64, u32)], query: Query) -> Result<f64> {
+    pub fn trace(&mut self, structures: &[(u64, u32)], query: Query) -> Result<f64> {
+        let KdDevice { device, tracer, rays } = self;
         if let [(structure, 0)] = structures {
-            return self.trace(*structure, query);
+            return rays.trace(*structure, |recorder, buffers| tracer.record(recorder, query, buffers));
         }
-        let table = self.device.upload("kd-trees", &TreeEntry::table(structures))?;
-        self.rays.trace(table.address(), |recorder, buffers| self.tracer.record_several(recorder, query, buffers))
+        let table = device.upload("kd-trees", &TreeEntry::table(structures))?;
+        rays.trace(table.address(), |recorder, buffers| tracer.record_several(recorder, query, buffers))
     }
 
-    /// The hits of the last trace.
-    pub fn hits(&self) -> Vec<Hit> {
-        self.rays.hits()
-    }
-
-    /// Steps, tests and leaves of every ray; not under the clock.
+    /// Steps, tests and leaves of every ray through them; not under the clock.
     ///
     /// # Errors
     /// The device failed.
-    pub fn work(&self, structure: u64, query: Query) -> Result<Option<Vec<Work>>> {
-        self.rays.work(structure, |recorder, buffers| self.tracer.record(recorder, query, buffers))
-    }
-
-    /// The same through several structures, as [`KdDevice::trace_several`].
-    ///
-    /// # Errors
-    /// The device failed.
-    pub fn work_several(&self, structures: &[(u64, u32)], query: Query) -> Result<Option<Vec<Work>>> {
+    pub fn work(&self, structures: &[(u64, u32)], query: Query) -> Result<Option<Vec<Work>>> {
+        let KdDevice { device, tracer, rays } = self;
         if let [(structure, 0)] = structures {
-            return self.work(*structure, query);
+            return rays.work(*structure, |recorder, buffers| tracer.record(recorder, query, buffers));
         }
-        let table = self.device.upload("kd-trees", &TreeEntry::table(structures))?;
-        self.rays.work(table.address(), |recorder, buffers| self.tracer.record_several(recorder, query, buffers))
+        let table = device.upload("kd-trees", &TreeEntry::table(structures))?;
+        rays.work(table.address(), |recorder, buffers| tracer.record_several(recorder, query, buffers))
     }
 }

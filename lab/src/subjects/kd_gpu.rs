@@ -1,14 +1,15 @@
 //! kd-trees built and traced on the device as subjects: `kd-gpu`.
 
+use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::kd_device::KdDevice;
 use super::{BuildRun, KD_TREE, Subject};
-use crate::device::{Buffer, Device};
+use crate::device::Device;
 use crate::measure::record;
 use crate::scene::Mesh;
 use crate::{Error, Result};
 use hedgerow::bvh::builder::Input;
 use hedgerow::bvh::layout::status;
-use hedgerow::gpu::{Phase, Recorder, Timestamps};
+use hedgerow::gpu::{Phase, Recorder, Sizes, Timestamps};
 use hedgerow::kdtree::builder::{KdBuilder, KdOptions, KdReport};
 use hedgerow::kdtree::layout::{KdTree, MAX_DEPTH};
 use hedgerow::trace::kd::Traversal;
@@ -25,8 +26,7 @@ pub struct KdGpu<'a> {
     device: &'a Device,
     name: String,
     options: KdOptions,
-    input: Input,
-    vertices: [Buffer<'a>; 2],
+    mesh: DeviceMesh<'a>,
     place: PlacedBuilder<'a>,
     /// Whether the memory is as large as the last build has found that the scene needs.
     fits: bool,
@@ -37,8 +37,7 @@ pub struct KdGpu<'a> {
 /// A builder and its memory.
 struct PlacedBuilder<'a> {
     builder: KdBuilder,
-    structure: Buffer<'a>,
-    scratch: Buffer<'a>,
+    memory: BuildMemory<'a>,
 }
 
 impl<'a> PlacedBuilder<'a> {
@@ -46,19 +45,18 @@ impl<'a> PlacedBuilder<'a> {
         let count = input.primitive_count;
         let builder = KdBuilder::new(device, options, count)?;
         let sizes = builder.sizes();
-        let (needed, available) = (sizes.structure + sizes.scratch, device.found().memory);
-        if needed > available {
-            return Err(Error::OutOfMemory { what: format!("{name} of {count} triangles"), needed, available });
-        }
-        let structure = device.buffer("structure", sizes.structure)?;
-        let scratch = device.buffer("scratch", sizes.scratch)?;
-        builder.record(&mut Recorder::warming(device), input, structure.region(), scratch.region())?;
-        Ok(PlacedBuilder { structure, scratch, builder })
+        check_memory(device, name, count, sizes.structure + sizes.scratch)?;
+        let placed = PlacedBuilder { builder, memory: BuildMemory::new(device, sizes)? };
+        placed.record(&mut Recorder::warming(device), input)?;
+        Ok(placed)
+    }
+
+    fn record(&self, recorder: &mut Recorder<'_>, input: &Input) -> hedgerow::Result<()> {
+        self.builder.record(recorder, input, self.memory.structure.region(), self.memory.scratch.region())
     }
 
     fn report(&self) -> KdReport {
-        let range = self.builder.report_range();
-        bytemuck::pod_read_unaligned(&self.scratch.read::<u8>(range.end as usize)[range.start as usize..])
+        self.memory.scratch.read_at(self.builder.report_range().start, 1)[0]
     }
 }
 
@@ -74,16 +72,13 @@ impl<'a> KdGpu<'a> {
         options: &KdOptions,
         traversal: Traversal,
     ) -> Result<KdGpu<'a>> {
-        let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
-        let vertices = [device.upload("positions", &mesh.positions)?, device.upload("indices", &mesh.triangles)?];
-        let input = Input::mesh(vertices[0].address(), mesh.positions.len() as u32, vertices[1].address(), count);
+        let mesh = DeviceMesh::new(device, &mesh.positions, &mesh.triangles)?;
         Ok(KdGpu {
             device,
             name: name.to_owned(),
             options: *options,
-            input,
-            vertices,
-            place: PlacedBuilder::new(device, name, options, &input)?,
+            place: PlacedBuilder::new(device, name, options, &mesh.input)?,
+            mesh,
             fits: false,
             timestamps: Timestamps::new(device, PHASES)?,
             tracer: KdDevice::new(device, traversal)?,
@@ -92,19 +87,16 @@ impl<'a> KdGpu<'a> {
 
     /// Moves the vertices, for the next build: as many as there were.
     pub fn set_positions(&self, positions: &[[f32; 3]]) {
-        self.vertices[0].write(positions);
+        self.mesh.positions.write(positions);
     }
 
     /// Where the structure is; a build may move it.
     pub fn address(&self) -> u64 {
-        self.place.structure.address()
+        self.place.memory.structure.address()
     }
 
     fn build_once(&mut self) -> Result<BuildRun> {
-        let PlacedBuilder { builder, structure, scratch } = &self.place;
-        self.device.run(Some(&mut self.timestamps), |recorder| {
-            builder.record(recorder, &self.input, structure.region(), scratch.region())
-        })?;
+        self.device.run(Some(&mut self.timestamps), |recorder| self.place.record(recorder, &self.mesh.input))?;
         // Those of the same name, of all levels, are one.
         let mut phases: Vec<Phase> = Vec::new();
         for phase in self.timestamps.phases()? {
@@ -114,10 +106,6 @@ impl<'a> KdGpu<'a> {
             }
         }
         Ok(BuildRun::of(phases))
-    }
-
-    fn read(&self) -> Result<KdTree> {
-        Ok(KdTree::from_bytes(&self.place.structure.read::<u8>(self.place.builder.sizes().structure as usize))?)
     }
 }
 
@@ -130,12 +118,8 @@ impl Subject for KdGpu<'_> {
         KD_TREE
     }
 
-    fn timer(&self) -> &'static str {
-        self.device.timer()
-    }
-
-    fn traces_on_device(&self) -> bool {
-        true
+    fn device(&self) -> Option<&Device> {
+        Some(self.device)
     }
 
     fn choice(&self) -> Option<String> {
@@ -157,42 +141,36 @@ impl Subject for KdGpu<'_> {
                 let name = &self.name;
                 return Err(Error::Argument(format!("{name}: {ATTEMPTS} builds found too little room: {report:?}")));
             }
-            let estimate = Some(report.estimate(self.input.primitive_count));
+            let estimate = Some(report.estimate(self.mesh.input.primitive_count));
             // Both at once may be too much.
-            self.place.structure = self.device.buffer("structure", 16)?;
-            self.place.scratch = self.device.buffer("scratch", 16)?;
-            self.place =
-                PlacedBuilder::new(self.device, &self.name, &KdOptions { estimate, ..self.options }, &self.input)?;
+            self.place.memory = BuildMemory::new(self.device, Sizes { structure: 16, scratch: 16, alignment: 16 })?;
+            let options = KdOptions { estimate, ..self.options };
+            self.place = PlacedBuilder::new(self.device, &self.name, &options, &self.mesh.input)?;
             self.fits = !is_short;
         }
     }
 
     fn memory(&self) -> record::MemoryRecord {
-        let sizes = self.place.builder.sizes();
-        record::MemoryRecord {
-            structure_bytes: Some(sizes.structure),
-            scratch_bytes: Some(sizes.scratch),
-            peak_bytes: Some(sizes.structure + sizes.scratch),
-        }
+        self.place.memory.record()
     }
 
     fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {
-        self.read().map(|tree| Some(Cow::Owned(tree)))
+        Ok(Some(Cow::Owned(KdTree::from_bytes(&self.place.memory.bytes())?)))
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        self.tracer.set_rays(rays)
+        self.tracer.rays.set(rays)
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        self.tracer.trace(self.place.structure.address(), query)
+        self.tracer.trace(&[(self.address(), 0)], query)
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(self.tracer.hits())
+        Ok(self.tracer.rays.hits())
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        self.tracer.work(self.place.structure.address(), query)
+        self.tracer.work(&[(self.address(), 0)], query)
     }
 }

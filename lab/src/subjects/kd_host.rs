@@ -1,13 +1,11 @@
 //! Builders of kd-trees on the host as subjects: wall-clock time, and the host's tracer on every core or the device's.
 
 use super::host_rays::{KdRays, timed};
-use super::kd_device::KdDevice;
 use super::{BuildRun, KD_TREE, Subject};
 use crate::Result;
 use crate::measure::record;
 use crate::scene::Mesh;
 use hedgerow::kdtree::layout::KdTree;
-use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use hedgerow_host::kdtree::{HostKdOptions, build};
 use std::borrow::Cow;
@@ -22,14 +20,9 @@ pub struct KdHost<'a> {
 }
 
 impl<'a> KdHost<'a> {
-    /// On `mesh`, to be traced in this way on the host.
-    pub fn new(builder: &str, mesh: &'a Mesh, options: HostKdOptions, traversal: Traversal) -> KdHost<'a> {
-        KdHost { builder: builder.to_owned(), mesh, options, tree: None, rays: KdRays::on_host(traversal) }
-    }
-
-    /// The same, to be traced on the device.
-    pub fn traced_by(self, tracer: KdDevice<'a>) -> KdHost<'a> {
-        KdHost { rays: KdRays::on_device(tracer), ..self }
+    /// On `mesh`, to be traced by `rays`.
+    pub fn new(builder: &str, mesh: &'a Mesh, options: HostKdOptions, rays: KdRays<'a>) -> KdHost<'a> {
+        KdHost { builder: builder.to_owned(), mesh, options, tree: None, rays }
     }
 
     /// The tree, built where there is none yet, and what traces it.
@@ -49,10 +42,6 @@ impl Subject for KdHost<'_> {
 
     fn kind(&self) -> &'static str {
         KD_TREE
-    }
-
-    fn timer(&self) -> &'static str {
-        "wall"
     }
 
     fn traces_on_device(&self) -> bool {

@@ -1,8 +1,10 @@
 //! One level of acceleration structures: what it is built over, and where it lies.
 
-use super::structures::{BuildInfo, Geometry, PlacedStructure, Range, Structures, address, triangles_of};
+use super::device_rays::timed_run;
+use super::structures::{BuildInfo, Geometry, Range, Sizes, Structure, Structures, instances_at, triangles_of};
 use crate::Result;
 use crate::device::Buffer;
+use crate::experiments::accel::points::Implementation;
 use crate::scene::Mesh;
 use ash::vk;
 use hedgerow::accel::Instance;
@@ -15,11 +17,16 @@ type Type = vk::AccelerationStructureTypeKHR;
 
 /// A structure with its memory, and what it is built over.
 pub struct Level<'a> {
+    owner: Structures<'a>,
     ty: Type,
     flags: Flags,
     geometry: [Geometry; 1],
-    count: u32,
-    placed: PlacedStructure<'a>,
+    /// How many triangles or instances.
+    pub(super) count: u32,
+    structure: Structure,
+    sizes: Sizes,
+    memory: Buffer<'a>,
+    scratch: Buffer<'a>,
     /// Positions and indices, or instances.
     inputs: Vec<Buffer<'a>>,
 }
@@ -42,10 +49,7 @@ impl<'a> Level<'a> {
     /// Too little memory.
     pub fn top(structures: &Structures<'a>, instances: &[Instance], flags: Flags) -> Result<Level<'a>> {
         let buffer = structures.device.upload("instances", instances)?;
-        let data = vk::AccelerationStructureGeometryInstancesDataKHR::default().data(address(&buffer));
-        let geometry = vk::AccelerationStructureGeometryKHR::default()
-            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
-            .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data });
+        let geometry = instances_at(buffer.address(), false);
         Level::new(structures, (Type::TOP_LEVEL, flags), geometry, instances.len() as u32, vec![buffer])
     }
 
@@ -58,8 +62,16 @@ impl<'a> Level<'a> {
     ) -> Result<Level<'a>> {
         let geometry = [geometry];
         let info = BuildInfo::default().ty(ty).flags(flags).geometries(&geometry);
-        let placed = structures.place("level", &info, &[count])?;
-        Ok(Level { ty, flags, geometry, count, placed, inputs })
+        let (owner, sizes) = (structures.clone(), structures.sizes(&info, &[count])?);
+        let memory = owner.device.buffer("level", sizes.acceleration_structure_size)?;
+        let create = vk::AccelerationStructureCreateInfoKHR::default()
+            .buffer(memory.raw())
+            .size(sizes.acceleration_structure_size)
+            .ty(ty);
+        let structure = owner.create(&create)?;
+        // The largest alignment that a driver may ask for.
+        let scratch = owner.device.buffer("scratch", sizes.build_scratch_size.max(sizes.update_scratch_size) + 256)?;
+        Ok(Level { owner, ty, flags, geometry, count, structure, sizes, memory, scratch, inputs })
     }
 
     /// An instance of it with both sides of its triangles.
@@ -69,18 +81,13 @@ impl<'a> Level<'a> {
     }
 
     /// The structure.
-    pub fn structure(&self) -> vk::AccelerationStructureKHR {
-        self.placed.structure
+    pub fn structure(&self) -> Structure {
+        self.structure
     }
 
     /// The positions of a mesh, or the instances.
     pub fn input(&self) -> &Buffer<'a> {
         &self.inputs[0]
-    }
-
-    /// How many triangles or instances.
-    pub fn count(&self) -> u32 {
-        self.count
     }
 
     /// Frees what it was built over: it is not built again.
@@ -91,24 +98,25 @@ impl<'a> Level<'a> {
 
     /// Its head, where it is one of ours.
     pub fn header(&self) -> Option<Header> {
-        self.placed.header()
+        (self.owner.maker() == Implementation::Ours).then(|| self.memory.read::<Header>(1)[0])
     }
 
     /// Bytes of the structure, and of the scratch memory of a build.
     pub fn bytes(&self) -> [u64; 2] {
-        [self.placed.sizes.acceleration_structure_size, self.placed.sizes.build_scratch_size]
+        [self.sizes.acceleration_structure_size, self.sizes.build_scratch_size]
     }
 
     /// What a build call takes.
     pub fn info(&self, mode: Mode) -> BuildInfo<'_> {
+        let scratch = vk::DeviceOrHostAddressKHR { device_address: self.scratch.address().next_multiple_of(256) };
         let info = BuildInfo::default()
             .ty(self.ty)
             .flags(self.flags)
             .mode(mode)
             .geometries(&self.geometry)
-            .dst_acceleration_structure(self.placed.structure)
-            .scratch_data(self.placed.scratch());
-        if mode == Mode::UPDATE { info.src_acceleration_structure(self.placed.structure) } else { info }
+            .dst_acceleration_structure(self.structure)
+            .scratch_data(scratch);
+        if mode == Mode::UPDATE { info.src_acceleration_structure(self.structure) } else { info }
     }
 
     /// How many of what it is built over.
@@ -129,10 +137,12 @@ impl<'a> Level<'a> {
     /// # Errors
     /// It cannot be recorded or run.
     pub fn build(&self, structures: &Structures<'_>, timestamps: &mut Timestamps, mode: Mode) -> Result<f64> {
-        structures.device.run(Some(timestamps), |recorder| {
-            recorder.phase("build");
-            self.record(structures, recorder, mode)
-        })?;
-        timestamps.phases().map(|phases| phases.iter().map(|phase| phase.milliseconds).sum()).map_err(Into::into)
+        timed_run(structures.device, timestamps, "build", |recorder| self.record(structures, recorder, mode))
+    }
+}
+
+impl Drop for Level<'_> {
+    fn drop(&mut self) {
+        self.owner.destroy(self.structure);
     }
 }

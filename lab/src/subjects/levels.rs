@@ -47,7 +47,7 @@ impl<'a> Levels<'a> {
 
     /// Writes other transforms, for [`Levels::update`] or a build.
     pub fn place(&self, transforms: impl Iterator<Item = [[f32; 4]; 3]>) {
-        let mut all: Vec<Instance> = self.top.input().read(self.top.count() as usize);
+        let mut all: Vec<Instance> = self.top.input().read(self.top.count as usize);
         for (instance, transform) in all.iter_mut().zip(transforms) {
             instance.transform = transform;
         }

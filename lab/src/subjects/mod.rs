@@ -1,6 +1,7 @@
 //! What is measured: a builder on a scene, behind one interface, ours and the peers' alike.
 
 pub mod auto;
+pub mod build_memory;
 pub mod builders;
 pub mod device_bvh;
 pub mod device_rays;
@@ -16,6 +17,7 @@ pub mod structures;
 pub mod wide;
 
 use crate::Result;
+use crate::device::Device;
 use crate::measure::overlap::Epo;
 use crate::measure::record;
 use crate::scene::Frame;
@@ -66,11 +68,17 @@ pub trait Subject {
     fn builder(&self) -> &str;
     /// `bvh2`, `wide4`, `wide8`, `wide8q`, `kdtree`, `driver` (two levels, by Vulkan's calls) or `host`.
     fn kind(&self) -> &'static str;
+    /// The device, where it builds and traces there.
+    fn device(&self) -> Option<&Device> {
+        None
+    }
     /// `device` where build times are timestamps, otherwise `wall`.
-    fn timer(&self) -> &'static str;
+    fn timer(&self) -> &'static str {
+        self.device().map_or("wall", Device::timer)
+    }
     /// Whether rays are traced on the device.
     fn traces_on_device(&self) -> bool {
-        self.timer() == "device"
+        self.device().is_some() || self.timer() == "device"
     }
     /// Brings what moves to where it stands in a frame, for the next build; not under the clock. What does not move stays.
     ///

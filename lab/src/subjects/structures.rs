@@ -1,6 +1,6 @@
 //! Acceleration structures by the calls of `VK_KHR_acceleration_structure`: ours or the driver's, and nothing else differs.
 
-use super::device_rays::RayBuffers;
+use super::device_rays::{RayBuffers, timed_run};
 use crate::arguments;
 use crate::device::{Buffer, Device, DriverRays, DriverTracing};
 use crate::experiments::accel::points;
@@ -10,14 +10,21 @@ use crate::{Error, Result};
 use ash::khr::acceleration_structure as functions;
 use ash::vk;
 use hedgerow::accel;
-use hedgerow::bvh::layout::{Header, MAX_DEPTH};
+use hedgerow::bvh::layout::MAX_DEPTH;
 use hedgerow::gpu::{Kernel, Recorder, Timestamps};
-use hedgerow::trace;
+use hedgerow::trace::Query;
+use hedgerow::trace::tracer::TraceBuffers;
 
-pub(crate) type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
-pub(crate) type Range = vk::AccelerationStructureBuildRangeInfoKHR;
-pub(crate) type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
-pub(crate) type Sizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
+/// What a build call takes.
+pub type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
+/// How many primitives of a geometry, and where they begin.
+pub type Range = vk::AccelerationStructureBuildRangeInfoKHR;
+/// A handle.
+pub type Structure = vk::AccelerationStructureKHR;
+/// What is built over.
+pub type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
+/// Bytes that a structure and its builds need.
+pub type Sizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
 
 /// Who builds.
 #[derive(Clone)]
@@ -36,7 +43,12 @@ pub struct Structures<'a> {
 impl<'a> Structures<'a> {
     /// Ours.
     pub fn ours(device: &'a Device, options: accel::AccelOptions) -> Structures<'a> {
-        Structures { device, maker: Functions::Ours(accel::Device::with_options(device, options)) }
+        Structures::of(device, accel::Device::with_options(device, options))
+    }
+
+    /// Ours, by the calls of `ours`.
+    pub fn of(device: &'a Device, ours: accel::Device<'a>) -> Structures<'a> {
+        Structures { device, maker: Functions::Ours(ours) }
     }
 
     /// Those of the driver, where it has any and the device was opened with them.
@@ -72,10 +84,7 @@ impl<'a> Structures<'a> {
     }
 
     /// A structure in the place that `info` names.
-    pub(crate) fn create(
-        &self,
-        info: &vk::AccelerationStructureCreateInfoKHR<'_>,
-    ) -> Result<vk::AccelerationStructureKHR> {
+    pub(crate) fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> Result<Structure> {
         match &self.maker {
             // SAFETY: the buffer is live and as large as the sizes asked for.
             Functions::Ours(ours) => Ok(unsafe { ours.create_acceleration_structure(info, None) }?),
@@ -86,7 +95,7 @@ impl<'a> Structures<'a> {
     }
 
     /// What instances and shaders take.
-    pub(crate) fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
+    pub(crate) fn address(&self, structure: Structure) -> u64 {
         let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
         match &self.maker {
             Functions::Ours(ours) => ours.get_acceleration_structure_device_address(&info),
@@ -96,7 +105,7 @@ impl<'a> Structures<'a> {
     }
 
     /// Ends the life of a structure that no submit uses any more.
-    pub(crate) fn destroy(&self, structure: vk::AccelerationStructureKHR) {
+    pub(crate) fn destroy(&self, structure: Structure) {
         match &self.maker {
             Functions::Ours(ours) => ours.destroy_acceleration_structure(structure, None),
             // SAFETY: every submit of `Device` waits, so nothing uses it.
@@ -120,23 +129,16 @@ impl<'a> Structures<'a> {
             Functions::Driver(driver) => {
                 let access = vk::AccessFlags::ACCELERATION_STRUCTURE_READ_KHR
                     | vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR;
-                let barrier = [vk::MemoryBarrier::default().src_access_mask(access).dst_access_mask(access)];
+                let barrier = vk::MemoryBarrier::default().src_access_mask(access).dst_access_mask(access);
                 let build = vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
-                let traces =
+                let trace =
                     self.device.driver_tracing().map_or(vk::PipelineStageFlags::COMPUTE_SHADER, DriverTracing::stage);
-                let after = build | traces;
+                let (raw, commands) = (self.device.ash_device(), recorder.commands());
+                let none = vk::DependencyFlags::empty();
                 // SAFETY: as above.
                 unsafe {
-                    driver.cmd_build_acceleration_structures(recorder.commands(), infos, ranges);
-                    recorder.context().ash_device().cmd_pipeline_barrier(
-                        recorder.commands(),
-                        build,
-                        after,
-                        vk::DependencyFlags::empty(),
-                        &barrier,
-                        &[],
-                        &[],
-                    );
+                    driver.cmd_build_acceleration_structures(commands, infos, ranges);
+                    raw.cmd_pipeline_barrier(commands, build, build | trace, none, &[barrier], &[], &[]);
                 }
             }
         }
@@ -147,115 +149,74 @@ impl<'a> Structures<'a> {
     pub(crate) fn trace(
         &self,
         timestamps: &mut Timestamps,
-        top: vk::AccelerationStructureKHR,
+        top: Structure,
         buffers: &RayBuffers<'_>,
-        query: trace::Query,
+        query: Query,
     ) -> Result<f64> {
-        let (structure, any_hit) = (self.address(top), query == trace::Query::AnyHit);
-        let (rays, hits, count) = (buffers.rays.address(), buffers.hits.address(), buffers.count);
-        self.device.run(Some(timestamps), |recorder| {
-            recorder.phase("trace");
-            match self.maker {
-                Functions::Ours(_) => {
-                    // As trace::tracer has it, or no level of the stack in shared memory.
-                    let tuning = &self.device.tuning.trace;
-                    let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
-                    let kernel = Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[u32::from(any_hit), levels]);
-                    let arguments = arguments::TraceQueries { structure, rays, hits, works: 0, first: 0, count };
-                    recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
-                }
-                Functions::Driver(_) => {
-                    self.device.trace_by_driver(recorder, &DriverRays { structure, rays, hits, count, any_hit })
-                }
-            }
-        })?;
-        Ok(timestamps.phases()?.iter().map(|p| p.milliseconds).sum())
+        let buffers = buffers.buffers(self.address(top), None);
+        timed_run(self.device, timestamps, "trace", |recorder| self.record_trace(recorder, &buffers, query))
+    }
+
+    /// Records the tracing of rays through a top level; their work, where there is room for it, is counted for ours alone.
+    pub(crate) fn record_trace(
+        &self,
+        recorder: &mut Recorder<'_>,
+        buffers: &TraceBuffers,
+        query: Query,
+    ) -> hedgerow::Result<()> {
+        let any_hit = query == Query::AnyHit;
+        let &TraceBuffers { structure, rays, hits, work, count } = buffers;
+        let (rays, hits, works) = (rays.address, hits.address, work.map_or(0, |work| work.address));
+        if let Functions::Driver(_) = self.maker {
+            let rays = DriverRays { structure, rays, hits, count, any_hit };
+            return self.device.trace_by_driver(recorder, &rays);
+        }
+        let (tuning, limits) = (&self.device.tuning.trace, &self.device.limits);
+        // As trace::tracer has it, or no level of the stack in shared memory.
+        let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
+        let kernel = match work {
+            None => Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[u32::from(any_hit), levels]),
+            Some(_) => Kernel::new(&shaders::MEASURE_QUERY_WORK, limits.subgroup_size, &[u32::from(any_hit), 0]),
+        };
+        let arguments = arguments::TraceQueries { structure, rays, hits, works, first: 0, count };
+        recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
     }
 
     /// What each of the rays meets on its way, of our structures: nodes of the top level, instances, nodes below, triangles.
-    pub(crate) fn work(
-        &self,
-        top: vk::AccelerationStructureKHR,
-        buffers: &RayBuffers<'_>,
-        query: trace::Query,
-    ) -> Result<Vec<[u32; 4]>> {
-        let device = self.device;
+    pub(crate) fn work(&self, top: Structure, buffers: &RayBuffers<'_>, query: Query) -> Result<Vec<[u32; 4]>> {
         if let Functions::Driver(_) = self.maker {
             return Err(Error::Argument("the driver does not tell the work of its queries".into()));
         }
-        let any_hit = u32::from(query == trace::Query::AnyHit);
-        let kernel = Kernel::new(&shaders::MEASURE_QUERY_WORK, device.limits.subgroup_size, &[any_hit, 0]);
-        let count = buffers.count;
-        let works = device.buffer("work", 16 * u64::from(count))?;
-        let (structure, works_at) = (self.address(top), works.address());
-        let arguments = arguments::TraceQueries {
-            structure,
-            rays: buffers.rays.address(),
-            hits: buffers.hits.address(),
-            works: works_at,
-            first: 0,
-            count,
-        };
-        device.run(None, |r| r.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup())))?;
-        Ok(works.read(count as usize))
-    }
-
-    /// Memory for a structure and its scratch.
-    pub(crate) fn place(&self, name: &str, info: &BuildInfo<'_>, counts: &[u32]) -> Result<PlacedStructure<'a>> {
-        let sizes = self.sizes(info, counts)?;
-        let memory = self.device.buffer(name, sizes.acceleration_structure_size)?;
-        let create = vk::AccelerationStructureCreateInfoKHR::default()
-            .buffer(memory.raw())
-            .size(sizes.acceleration_structure_size)
-            .ty(info.ty);
-        let structure = self.create(&create)?;
-        // The largest alignment that a driver may ask for.
-        let scratch = self.device.buffer("scratch", sizes.build_scratch_size.max(sizes.update_scratch_size) + 256)?;
-        Ok(PlacedStructure { owner: self.clone(), structure, sizes, scratch, memory })
+        let works = self.device.buffer("work", 16 * u64::from(buffers.count))?;
+        let traced = buffers.buffers(self.address(top), Some(works.region()));
+        self.device.run(None, |recorder| self.record_trace(recorder, &traced, query))?;
+        Ok(works.read(buffers.count as usize))
     }
 }
 
-/// A structure with its memory.
-pub(crate) struct PlacedStructure<'a> {
-    owner: Structures<'a>,
-    pub(crate) structure: vk::AccelerationStructureKHR,
-    pub(crate) sizes: Sizes,
-    scratch: Buffer<'a>,
-    memory: Buffer<'a>,
+/// An address of what a build reads.
+pub(crate) fn address(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
+    vk::DeviceOrHostAddressConstKHR { device_address }
 }
 
-impl PlacedStructure<'_> {
-    /// Its head, where it is one of ours.
-    pub(crate) fn header(&self) -> Option<Header> {
-        matches!(self.owner.maker, Functions::Ours(_)).then(|| self.memory.read::<Header>(1)[0])
-    }
-
-    /// The address of its scratch memory.
-    pub(crate) fn scratch(&self) -> vk::DeviceOrHostAddressKHR {
-        vk::DeviceOrHostAddressKHR { device_address: self.scratch.address().next_multiple_of(256) }
-    }
-}
-
-impl Drop for PlacedStructure<'_> {
-    fn drop(&mut self) {
-        self.owner.destroy(self.structure);
-    }
-}
-
-/// Where a buffer begins, for what a build reads.
-pub(crate) fn address(buffer: &Buffer<'_>) -> vk::DeviceOrHostAddressConstKHR {
-    vk::DeviceOrHostAddressConstKHR { device_address: buffer.address() }
+/// Vulkan's struct for instances, or pointers to them.
+pub fn instances_at(at: u64, by_pointers: bool) -> Geometry {
+    let instances =
+        vk::AccelerationStructureGeometryInstancesDataKHR::default().array_of_pointers(by_pointers).data(address(at));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { instances })
 }
 
 /// Opaque triangles of a mesh whose positions and indices lie in these buffers.
 pub(crate) fn triangles_of(mesh: &Mesh, positions: &Buffer<'_>, indices: &Buffer<'_>) -> Geometry {
     let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
         .vertex_format(vk::Format::R32G32B32_SFLOAT)
-        .vertex_data(address(positions))
+        .vertex_data(address(positions.address()))
         .vertex_stride(12)
         .max_vertex(mesh.positions.len().saturating_sub(1) as u32)
         .index_type(vk::IndexType::UINT32)
-        .index_data(address(indices));
+        .index_data(address(indices.address()));
     vk::AccelerationStructureGeometryKHR::default()
         .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
         .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })

@@ -9,8 +9,7 @@ use hedgerow::bvh::wide::device::{WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::bvh::wide::{Form, quality};
-use hedgerow::gpu::Recorder;
-use hedgerow::gpu::Sizes;
+use hedgerow::gpu::{Recorder, Sizes};
 use hedgerow::trace::wide::WideTracer;
 
 /// Memory for a wide tree of triangles, its collapsing, and what traces it.
@@ -62,11 +61,10 @@ impl<'a> WideTree<'a> {
         self.tracer.form.bytes_in_use(&header, size_of::<Triangle>() as u64)
     }
 
-    /// What the build takes beside `binary`, the memory of the `Bvh2` and of its build. The structure's bytes are those in use,
+    /// What the build takes beside `binary`, which is for the `Bvh2` and its build. The structure's bytes are those in use,
     /// for it needs no others; at the peak all is there, as much as it may need.
-    pub fn memory(&self, binary: &record::MemoryRecord) -> record::MemoryRecord {
-        let all = [Some(self.sizes.structure + self.sizes.scratch), binary.structure_bytes, binary.scratch_bytes];
-        let peak: u64 = all.into_iter().flatten().sum();
+    pub fn memory(&self, binary: &Sizes) -> record::MemoryRecord {
+        let peak = self.sizes.structure + self.sizes.scratch + binary.structure + binary.scratch;
         let in_use = self.bytes_in_use();
         record::MemoryRecord {
             structure_bytes: Some(in_use),
@@ -80,15 +78,12 @@ impl<'a> WideTree<'a> {
     /// # Errors
     /// The bytes are no such structure.
     pub fn quality(&self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
-        fn of<N: WideNode>(bytes: &[u8], c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
-            let tree = Wide::<N, Triangle>::from_bytes(bytes)?;
-            Ok(record::QualityRecord::of(&quality::on_host(&tree, c_t, c_i), c_t, c_i))
-        }
-        match self.tracer.form {
-            Form::Four => of::<[Child; 4]>(&self.bytes(), c_t, c_i),
-            Form::Eight => of::<[Child; 8]>(&self.bytes(), c_t, c_i),
-            Form::EightQuantised => of::<QuantisedNode>(&self.bytes(), c_t, c_i),
-        }
+        let quality = match self.tracer.form {
+            Form::Four => quality::on_host(&self.tree::<[Child; 4]>()?, c_t, c_i),
+            Form::Eight => quality::on_host(&self.tree::<[Child; 8]>()?, c_t, c_i),
+            Form::EightQuantised => quality::on_host(&self.tree::<QuantisedNode>()?, c_t, c_i),
+        };
+        Ok(record::QualityRecord::of(&quality, c_t, c_i))
     }
 
     /// Checks every rule of its layout.
@@ -97,10 +92,14 @@ impl<'a> WideTree<'a> {
     /// [`Wide::validate`] names the rule that is broken.
     pub fn validate(&self) -> Result<()> {
         match self.tracer.form {
-            Form::Four => Wide::<[Child; 4], Triangle>::from_bytes(&self.bytes())?.validate()?,
-            Form::Eight => Wide::<[Child; 8], Triangle>::from_bytes(&self.bytes())?.validate()?,
-            Form::EightQuantised => Wide::<QuantisedNode, Triangle>::from_bytes(&self.bytes())?.validate()?,
+            Form::Four => self.tree::<[Child; 4]>()?.validate()?,
+            Form::Eight => self.tree::<[Child; 8]>()?.validate()?,
+            Form::EightQuantised => self.tree::<QuantisedNode>()?.validate()?,
         }
         Ok(())
+    }
+
+    fn tree<N: WideNode>(&self) -> Result<Wide<N, Triangle>> {
+        Ok(Wide::from_bytes(&self.bytes())?)
     }
 }

@@ -184,18 +184,18 @@ impl Subject for MergeOnDevice<'_> {
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        self.tracer.set_rays(rays)
+        self.tracer.rays.set(rays)
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        self.tracer.trace(self.place.structure.address(), query)
+        self.tracer.trace(&[(self.place.structure.address(), 0)], query)
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(self.tracer.hits())
+        Ok(self.tracer.rays.hits())
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        self.tracer.work(self.place.structure.address(), query)
+        self.tracer.work(&[(self.place.structure.address(), 0)], query)
     }
 }

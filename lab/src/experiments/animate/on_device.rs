@@ -102,18 +102,18 @@ impl Subject for OnDevice<'_> {
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        self.tracer.set_rays(rays)
+        self.tracer.rays.set(rays)
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        self.tracer.trace_several(&self.trees(), query)
+        self.tracer.trace(&self.trees(), query)
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(self.tracer.hits())
+        Ok(self.tracer.rays.hits())
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        self.tracer.work_several(&self.trees(), query)
+        self.tracer.work(&self.trees(), query)
     }
 }

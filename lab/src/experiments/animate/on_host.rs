@@ -1,11 +1,11 @@
 //! Kd-trees that the host builds every frame, or merges into the static one.
 
+use crate::Result;
 use crate::measure::MemoryRecord;
 use crate::scene::{Frame, Group, Mesh};
 use crate::subjects::builders::Spec;
 use crate::subjects::host_rays::{KdRays, Numbered, timed};
 use crate::subjects::{BuildRun, KD_TREE, Subject};
-use crate::Result;
 use hedgerow::kdtree::layout::{KdTree, SpareRoom};
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::trace::{Hit, Query, Ray, Work};

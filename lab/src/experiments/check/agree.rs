@@ -34,10 +34,10 @@ pub fn assert_reports(name: &str, world: &World, rays: &[ProbeRay], reports: &[P
         let Some(expected) = world.expected(ray) else { continue };
         compared += 1;
         let got = &report.committed;
+        let place = [got.instance, got.geometry, got.primitive];
         hits += usize::from(got.kind != 0);
         if ray.flags & flags::FIRST_HIT != 0 || ray.decision == TERMINATE {
             // Any of the meetings may be the first.
-            let place = [got.instance, got.geometry, got.primitive];
             assert!(got.kind == 0 || expected.meetings.iter().any(|met| met.place == place), "{what}: {got:?}");
             if ray.decision == TERMINATE {
                 assert!(report.candidate_count <= 1, "{what}: goes on after its end");
@@ -57,12 +57,11 @@ pub fn assert_reports(name: &str, world: &World, rays: &[ProbeRay], reports: &[P
         assert_instance(&what, world, ray, report);
         if met.is_box {
             // All that are generated are equally near: any of them may be it.
-            let place = [got.instance, got.geometry, got.primitive];
             assert!(expected.meetings.iter().any(|m| m.is_box && m.place == place), "{what}: {got:?}");
             assert_eq!(got.t, ray.generated_t, "{what}");
             continue;
         }
-        assert_eq!([got.instance, got.geometry, got.primitive], met.place, "{what}: {got:?} {met:?}");
+        assert_eq!(place, met.place, "{what}: {got:?} {met:?}");
         assert_close(&[got.t], &[met.t], met.t_error, &what);
         assert_close(&got.barycentrics, &met.weights, met.weight_error, &what);
         assert_eq!(got.is_front != 0, met.is_front, "{what}: which side");

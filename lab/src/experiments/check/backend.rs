@@ -3,43 +3,62 @@
 
 use super::probe::{Probe, ProbeRay, ProbeReport};
 use crate::device::{Buffer, Device};
+pub use crate::subjects::structures::BuildInfo;
+use crate::subjects::structures::{Range, Sizes, Structure, Structures};
 use ash::vk;
 use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
 use hedgerow::gpu::Recorder;
-use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
-use hedgerow::trace::{Hit, Query, Ray};
 
-/// What a build call takes.
-pub type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
 /// How many primitives of each geometry.
-pub type Ranges<'a> = &'a [vk::AccelerationStructureBuildRangeInfoKHR];
+pub type Ranges<'a> = &'a [Range];
 
 /// What an engine calls.
 pub trait Backend {
-    /// Whose it is.
-    fn name(&self) -> &'static str;
-    /// The device that everything lies on.
-    fn device(&self) -> &'static Device;
-    /// `vkGetAccelerationStructureBuildSizesKHR`.
-    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static>;
-    /// `vkCreateAccelerationStructureKHR`.
-    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR;
-    /// `vkDestroyAccelerationStructureKHR`.
-    fn destroy(&self, structure: vk::AccelerationStructureKHR);
-    /// `vkGetAccelerationStructureDeviceAddressKHR`.
-    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64;
-    /// `vkCmdBuildAccelerationStructuresKHR`.
-    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]);
+    /// The calls.
+    fn structures(&self) -> &Structures<'static>;
     /// `minAccelerationStructureScratchOffsetAlignment`.
     fn scratch_alignment(&self) -> u64;
     /// What queries through a top level report.
-    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport>;
-    /// The hits of rays in a bottom-level structure.
-    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit>;
+    fn probe(&self, structure: Structure, rays: &[ProbeRay]) -> Vec<ProbeReport>;
+
+    /// Whose it is.
+    fn name(&self) -> &'static str {
+        self.structures().maker().name()
+    }
+
+    /// The device that everything lies on.
+    fn device(&self) -> &'static Device {
+        self.structures().device
+    }
+
+    /// `vkGetAccelerationStructureBuildSizesKHR`.
+    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> Sizes {
+        self.structures().sizes(info, counts).expect("it can be built")
+    }
+
+    /// `vkCreateAccelerationStructureKHR`.
+    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> Structure {
+        self.structures().create(info).expect("the offset is right")
+    }
+
+    /// `vkDestroyAccelerationStructureKHR`.
+    fn destroy(&self, structure: Structure) {
+        self.structures().destroy(structure);
+    }
+
+    /// `vkGetAccelerationStructureDeviceAddressKHR`.
+    fn address(&self, structure: Structure) -> u64 {
+        self.structures().address(structure)
+    }
+
+    /// `vkCmdBuildAccelerationStructuresKHR`, with a barrier behind it.
+    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]) {
+        self.structures().build(recorder, infos, ranges).expect("it can be built");
+    }
 }
 
 /// Ours: the calls of [`accel::Device`], and queries in a shader that includes our header.
-pub struct Ours(pub accel::Device<'static>, Probe, &'static Device);
+pub struct Ours(pub accel::Device<'static>, Probe, Structures<'static>);
 
 impl Ours {
     /// With the defaults.
@@ -49,69 +68,29 @@ impl Ours {
 
     /// With these options.
     pub fn with_options(device: &'static Device, options: accel::AccelOptions) -> Ours {
-        Ours(accel::Device::with_options(device, options), Probe::ours(device), device)
+        let calls = accel::Device::with_options(device, options);
+        Ours(calls.clone(), Probe::ours(device), Structures::of(device, calls))
     }
 }
 
 impl Backend for Ours {
-    fn name(&self) -> &'static str {
-        "hedgerow"
-    }
-
-    fn device(&self) -> &'static Device {
-        self.2
-    }
-
-    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> vk::AccelerationStructureBuildSizesInfoKHR<'static> {
-        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-        let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
-        unsafe { self.0.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) }
-            .expect("it can be built");
-        sizes
-    }
-
-    fn create(&self, info: &vk::AccelerationStructureCreateInfoKHR<'_>) -> vk::AccelerationStructureKHR {
-        unsafe { self.0.create_acceleration_structure(info, None) }.expect("the offset is right")
-    }
-
-    fn destroy(&self, structure: vk::AccelerationStructureKHR) {
-        self.0.destroy_acceleration_structure(structure, None);
-    }
-
-    fn address(&self, structure: vk::AccelerationStructureKHR) -> u64 {
-        let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(structure);
-        self.0.get_acceleration_structure_device_address(&info)
-    }
-
-    fn build(&self, recorder: &mut Recorder<'_>, infos: &[BuildInfo<'_>], ranges: &[Ranges<'_>]) {
-        unsafe { self.0.cmd_build_acceleration_structures(recorder.commands(), infos, ranges) }
-            .expect("it can be built");
+    fn structures(&self) -> &Structures<'static> {
+        &self.2
     }
 
     fn scratch_alignment(&self) -> u64 {
         SCRATCH_ALIGNMENT
     }
 
-    fn probe(&self, structure: vk::AccelerationStructureKHR, rays: &[ProbeRay]) -> Vec<ProbeReport> {
+    fn probe(&self, structure: Structure, rays: &[ProbeRay]) -> Vec<ProbeReport> {
         self.1.ask(self.address(structure), rays)
-    }
-
-    fn trace(&self, structure: vk::AccelerationStructureKHR, rays: &[Ray]) -> Vec<Hit> {
-        let count = rays.len() as u32;
-        let ray_buffer = self.2.upload("rays", rays).expect("memory");
-        let hits = self.2.buffer("hits", size_of::<Hit>() as u64 * u64::from(count)).expect("memory");
-        let structure = self.address(structure);
-        let buffers = TraceBuffers { structure, rays: ray_buffer.region(), hits: hits.region(), work: None, count };
-        let shape = TraceShape::of(self.2);
-        self.2.run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers)).expect("it traces");
-        hits.read(rays.len())
     }
 }
 
 /// A structure that was built alone, and its memory.
 pub struct Built {
     /// Its handle.
-    pub structure: vk::AccelerationStructureKHR,
+    pub structure: Structure,
     /// Where it lies.
     pub memory: Buffer<'static>,
     /// Bytes of it, and of what lies before it.
@@ -127,13 +106,7 @@ impl Built {
         let info = info
             .dst_acceleration_structure(built.structure)
             .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.1 });
-        backend
-            .device()
-            .run(None, |recorder| {
-                backend.build(recorder, &[info], &[ranges]);
-                Ok(())
-            })
-            .expect("it builds");
+        submit_build(backend, &info, ranges).expect("it builds");
         built.bytes -= offset;
         built
     }
@@ -152,11 +125,30 @@ impl Built {
 
     /// Scratch memory for it, and its address.
     pub fn scratch(&self, backend: &dyn Backend, info: &BuildInfo<'_>, counts: &[u32]) -> (Buffer<'static>, u64) {
-        let alignment = backend.scratch_alignment();
-        let bytes = backend.build_sizes(info, counts).build_scratch_size;
-        let buffer = backend.device().buffer("scratch", bytes + 2 * alignment).expect("memory");
-        // As little aligned as is allowed.
-        let address = buffer.address().next_multiple_of(alignment) + alignment;
-        (buffer, address)
+        scratch_of(backend, backend.build_sizes(info, counts).build_scratch_size)
     }
+}
+
+/// So much scratch memory, and its address.
+///
+/// # Panics
+/// There is too little memory.
+pub fn scratch_of(backend: &dyn Backend, bytes: u64) -> (Buffer<'static>, u64) {
+    let alignment = backend.scratch_alignment();
+    let buffer = backend.device().buffer("scratch", bytes + 2 * alignment).expect("memory");
+    // As little aligned as is allowed.
+    let address = buffer.address().next_multiple_of(alignment) + alignment;
+    (buffer, address)
+}
+
+/// Builds or updates by itself.
+///
+/// # Errors
+/// The device failed.
+pub fn submit_build(backend: &dyn Backend, info: &BuildInfo<'_>, ranges: Ranges<'_>) -> crate::Result<()> {
+    let record = |recorder: &mut Recorder<'_>| {
+        backend.build(recorder, &[*info], &[ranges]);
+        Ok(())
+    };
+    backend.device().run(None, record)
 }

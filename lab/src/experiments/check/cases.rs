@@ -1,59 +1,33 @@
 //! Cases of a group: each is tried, and the rest go on where one fails.
 
 use crate::device::Device;
+use anyhow::{anyhow, bail, ensure};
 use serde::{Deserialize, Serialize};
-use std::fmt;
+use std::fmt::Debug;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Mutex;
 
-/// What a case found: nothing, or what is wrong.
-pub type Found = Result<(), Wrong>;
-
-/// What is wrong, and where.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Wrong(String);
-
-impl fmt::Display for Wrong {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl From<String> for Wrong {
-    fn from(what: String) -> Wrong {
-        Wrong(what)
-    }
-}
-
-impl From<hedgerow::Error> for Wrong {
-    fn from(error: hedgerow::Error) -> Wrong {
-        Wrong(error.to_string())
-    }
-}
-
-impl From<crate::Error> for Wrong {
-    fn from(error: crate::Error) -> Wrong {
-        Wrong(error.to_string())
-    }
-}
+/// What a case found: nothing, or what is wrong, and where.
+pub type Found = anyhow::Result<()>;
 
 /// Wrong, unless both are the same; `what` names them.
 ///
 /// # Errors
 /// They differ.
-pub fn same<T: PartialEq + fmt::Debug>(what: &str, got: &T, expected: &T) -> Found {
-    if got == expected { Ok(()) } else { Err(format!("{what}: {got:?}, expected {expected:?}").into()) }
+pub fn same<T: PartialEq + Debug>(what: &str, got: &T, expected: &T) -> Found {
+    ensure!(got == expected, "{what}: {got:?}, expected {expected:?}");
+    Ok(())
 }
 
 /// Wrong at the first place where the slices differ.
 ///
 /// # Errors
 /// They differ.
-pub fn same_all<T: PartialEq + fmt::Debug>(what: &str, got: &[T], expected: &[T]) -> Found {
+pub fn same_all<T: PartialEq + Debug>(what: &str, got: &[T], expected: &[T]) -> Found {
     same(&format!("number of {what}s"), &got.len(), &expected.len())?;
     match got.iter().zip(expected).position(|(a, b)| a != b) {
         None => Ok(()),
-        Some(i) => Err(format!("{what} {i}: {:?}, expected {:?}", got[i], expected[i]).into()),
+        Some(i) => bail!("{what} {i}: {:?}, expected {:?}", got[i], expected[i]),
     }
 }
 
@@ -128,7 +102,7 @@ impl<'a> Cases<'a> {
         }));
         let found = found.unwrap_or_else(|_| {
             let last = LAST_PANIC.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).take();
-            Err(Wrong(last.unwrap_or_else(|| "a panic".into())))
+            Err(anyhow!(last.unwrap_or_else(|| "a panic".into())))
         });
         if let Err(wrong) = found {
             self.wrong += 1;
@@ -148,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_difference_names_its_place() {
-        assert_eq!(same_all("word", &[1, 2, 3], &[1, 2, 3]), Ok(()));
+        assert_eq!(same_all("word", &[1, 2, 3], &[1, 2, 3]).ok(), Some(()));
         let says = |found: Found| found.expect_err("they differ").to_string();
         assert_eq!(says(same_all("word", &[1, 7, 3], &[1, 2, 3])), "word 1: 7, expected 2");
         assert_eq!(says(same_all("word", &[1], &[1, 2, 3])), "number of words: 1, expected 3");

@@ -1,13 +1,13 @@
 //! `hedgerow check`: whether everything is right on this device. Each group runs in a process of its own.
 
 use crate::cli::{Common, Json};
-use crate::experiments::check::cases::Message;
+use crate::device::Device;
+use crate::experiments::check::cases::{self, Cases, Message};
 use crate::experiments::check::supervise::{self, Outcome};
 use crate::experiments::check::{self, CheckRecord, Ground, Group};
 use crate::report::numbers::bytes;
 use anyhow::{Context, bail};
 use ash::vk;
-use std::collections::BTreeMap;
 use std::io::Write;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::process::Command;
@@ -66,25 +66,20 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let limit = Duration::from_secs(arguments.limit.get().into());
     let mut record = CheckRecord::new(arguments.quick);
     let is_shown = !arguments.json.takes_stdout();
+    let show = |text: &str| if is_shown { print(text) } else { Ok(()) };
     let run = |(name, command)| supervise::run(name, command, limit);
     let tell = |(outcome, ground): (Outcome, Option<Ground>)| {
         if let Some(ground) = ground.filter(|_| record.ground.is_none()) {
-            if is_shown {
-                print(&head(&record, &ground))?;
-            }
+            show(&head(&record, &ground))?;
             record.ground = Some(ground);
         }
-        if is_shown {
-            print(&line(&outcome))?;
-        }
+        show(&line(&outcome))?;
         record.add(outcome);
         Ok(())
     };
     each_in_order(commands, jobs, run, tell)?;
     arguments.json.write_each([&record])?;
-    if is_shown {
-        print(&format!("{} passed, {} failed", record.passed, record.failed))?;
-    }
+    show(&format!("{} passed, {} failed", record.passed, record.failed))?;
     if record.failed > 0 {
         bail!("{} of {} groups failed", record.failed, record.groups.len());
     }
@@ -98,29 +93,21 @@ fn each_in_order<T: Send, R: Send>(
     run: impl Fn(T) -> R + Sync,
     mut tell: impl FnMut(R) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let items = Mutex::new(items.into_iter().enumerate());
+    // A channel for each result, so that they come in order.
+    let (senders, results): (Vec<_>, Vec<_>) = items.iter().map(|_| mpsc::channel()).unzip();
+    let items = Mutex::new(items.into_iter().zip(senders));
     let next = || items.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let (sender, results) = mpsc::channel();
     thread::scope(|scope| {
-        for sender in vec![sender; jobs.get()] {
-            let (next, run) = (&next, &run);
-            scope.spawn(move || {
-                while let Some((i, item)) = next() {
-                    if sender.send((i, run(item))).is_err() {
+        for _ in 0..jobs.get() {
+            scope.spawn(|| {
+                while let Some((item, sender)) = next() {
+                    if sender.send(run(item)).is_err() {
                         return;
                     }
                 }
             });
         }
-        let (mut waiting, mut told) = (BTreeMap::new(), 0);
-        for (i, result) in results {
-            waiting.insert(i, result);
-            while let Some(result) = waiting.remove(&told) {
-                tell(result)?;
-                told += 1;
-            }
-        }
-        Ok(())
+        results.into_iter().flatten().try_for_each(&mut tell)
     })
 }
 
@@ -153,9 +140,10 @@ fn child(common: &Common, arguments: &Arguments, group: &Group) -> anyhow::Resul
     Ok(command)
 }
 
-/// One group in this process: what it finds goes to stdout, a message a line.
+/// One group in this process: what it finds goes to stdout, a message a line. The device lives as long as the process, which ends
+/// with its group.
 fn run_here(common: &Common, group: &Group, quick: bool) -> anyhow::Result<()> {
-    let device = common.open_device(false)?;
+    let device: &'static Device = Box::leak(Box::new(common.open_device(false)?));
     let mut tell = |message: Message| {
         let text = serde_json::to_string(&message).expect("a message has no keys but strings");
         // Nobody is left to hear it: then nothing is left to do, either.
@@ -163,7 +151,10 @@ fn run_here(common: &Common, group: &Group, quick: bool) -> anyhow::Result<()> {
             std::process::exit(1);
         }
     };
-    check::run_here(group, device, common.tuning, quick, &mut tell);
+    cases::keep_panics();
+    tell(Message::Ground(Ground::of(device, common.tuning)));
+    (group.run)(&mut Cases::new(device, quick, &mut tell));
+    tell(Message::Done);
     Ok(())
 }
 

@@ -12,13 +12,6 @@ pub fn soup(name: &str, triangles: Vec<[[f32; 3]; 3]>) -> Mesh {
     (name.into(), triangles.into_iter().flatten().collect(), indices)
 }
 
-/// The corners of the triangles that builders take: finite, and of vertices that there are.
-pub fn corners_of((_, positions, triangles): &Mesh) -> Vec<[[f32; 3]; 3]> {
-    let corner = |v: u32| positions.get(v as usize).copied().filter(|p| p.iter().all(|x| x.is_finite()));
-    let corners = |t: &[u32; 3]| Some([corner(t[0])?, corner(t[1])?, corner(t[2])?]);
-    triangles.iter().filter_map(corners).collect()
-}
-
 /// A sequence of floats in 0..1, the same for ever.
 pub fn unit_floats(seed: u64) -> impl FnMut() -> f32 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;

@@ -2,16 +2,14 @@
 #![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
 use super::backend::{Backend, Built, Ours};
-use super::shapes::{Corners, add, icosphere, soup};
+use super::shapes::{Corners, boxes_by, icosphere, soup};
 use super::world::{BuiltWorld, Part, World};
 use crate::random::SplitMix64;
 use ash::vk;
 use hedgerow::accel::{Instance, REBRAID, twin};
-use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Child, Record, Triangle};
+use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Triangle};
 use std::collections::BTreeMap;
 use vk::GeometryFlagsKHR as GeometryFlags;
-
-const NO_TRIANGLES: Corners = Corners::new();
 
 /// A part of triangles that are not opaque.
 pub fn part(corners: Corners) -> Part {
@@ -20,14 +18,9 @@ pub fn part(corners: Corners) -> Part {
 
 /// A row of `count` small triangles along the diagonal of the cube −1..1: nearly nothing in a large box.
 pub fn diagonal(count: usize) -> Corners {
-    let small = soup(count, 0.2 / count as f32, 5);
-    let middle = |t: &[[f32; 3]; 3]| t[0];
     let at = |i: usize| 2.0 * (i as f32 + 0.5) / count as f32 - 1.0;
-    small
-        .iter()
-        .enumerate()
-        .map(|(i, t)| t.map(|corner| std::array::from_fn(|k| corner[k] - middle(t)[k] + at(i))))
-        .collect()
+    let moved = |(i, t): (usize, &[[f32; 3]; 3])| t.map(|corner| std::array::from_fn(|k| corner[k] - t[0][k] + at(i)));
+    soup(count, 0.2 / count as f32, 5).iter().enumerate().map(moved).collect()
 }
 
 /// Scaled, with no turn, and moved.
@@ -38,18 +31,14 @@ pub fn scaled(scale: f32, [x, y, z]: [f32; 3]) -> [[f32; 4]; 3] {
 /// Instances of all kinds of parts, by all kinds of transforms: turned, sheared, mirrored, flat ones and none.
 pub fn mixture(count: usize, seed: u64) -> World {
     let mut random = SplitMix64::new(seed);
-    let a_box = |random: &mut SplitMix64| {
-        let (at, size) = (random.around(1.0), random.around(0.1).map(f32::abs));
-        [at, add(at, size)]
-    };
-    let boxes: Vec<[[f32; 3]; 2]> = (0..40).map(|_| a_box(&mut random)).collect();
+    let boxes = boxes_by(&mut random, 40, 0.1);
     let parts = vec![
         part(diagonal(200)),
         part(soup(100, 0.3, seed)),
         part(icosphere(2)),
         Part::Boxes(vec![(boxes, GeometryFlags::empty())]),
         part(soup(1, 0.5, seed)),
-        part(NO_TRIANGLES),
+        part(Corners::new()),
         part(vec![[[f32::NAN; 3]; 3]; 4]),
         part(soup(2, 0.5, seed)),
     ];
@@ -82,7 +71,8 @@ pub struct ReadBack {
     pub instances: Vec<Instance>,
     /// Structures of triangles by their addresses.
     pub triangles: BTreeMap<u64, Bvh2<Triangle>>,
-    boxes: BTreeMap<u64, Bvh2<BoxRecord>>,
+    /// Structures of boxes by theirs.
+    pub boxes: BTreeMap<u64, Bvh2<BoxRecord>>,
 }
 
 impl ReadBack {
@@ -110,42 +100,4 @@ impl ReadBack {
         let triangles = self.triangles.get(&address).map(twin::Below::from);
         triangles.or_else(|| self.boxes.get(&address).map(twin::Below::from))
     }
-
-    /// Where the entries of each instance begin.
-    pub fn entries(&self) -> BTreeMap<u32, Vec<[u32; 2]>> {
-        let mut all = BTreeMap::<u32, Vec<[u32; 2]>>::new();
-        for record in self.top.records.iter().filter(|record| record.structure != 0) {
-            all.entry(record.instance).or_default().push([record.start, record.start_count]);
-        }
-        all
-    }
-
-    /// How often the entries of an instance reach each record of its structure.
-    ///
-    /// # Panics
-    /// There is no structure for what has entries.
-    pub fn reached(&self, instance: u32, starts: &[[u32; 2]]) -> Vec<u32> {
-        let address = self.instances[instance as usize].structure;
-        match (self.triangles.get(&address), self.boxes.get(&address)) {
-            (Some(structure), _) => reached(structure, starts),
-            (_, Some(structure)) => reached(structure, starts),
-            _ => panic!("instance {instance} has entries and no structure"),
-        }
-    }
-}
-
-fn reached<R: Record>(structure: &Bvh2<R>, starts: &[[u32; 2]]) -> Vec<u32> {
-    let mut counts = vec![0; structure.header.active as usize];
-    let root = structure.header.root;
-    let begins =
-        |&start: &[u32; 2]| if start[1] == layout::InstanceRecord::AT_ROOT { [root.index, root.count] } else { start };
-    let mut waiting: Vec<[u32; 2]> = starts.iter().map(begins).collect();
-    while let Some([index, count]) = waiting.pop() {
-        match count {
-            0 => waiting
-                .extend(structure.nodes[index as usize].children.map(|Child { index, count, .. }| [index, count])),
-            _ => counts[index as usize..][..count as usize].iter_mut().for_each(|n| *n += 1),
-        }
-    }
-    counts
 }

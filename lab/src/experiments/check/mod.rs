@@ -25,7 +25,7 @@ pub mod world;
 
 use crate::device::Device;
 use crate::measure::provenance;
-use cases::{Cases, Message};
+use cases::Cases;
 pub use groups::GROUPS;
 use hedgerow::gpu::{Tuning, TuningChoice};
 use serde::{Deserialize, Serialize};
@@ -46,7 +46,7 @@ pub struct Group {
 pub struct Ground {
     /// The device's name.
     pub device: String,
-    /// Driver and version.
+    /// Driver and version as it says them; of one that says nothing the number of its version.
     pub driver: String,
     /// Vulkan version.
     pub vulkan: String,
@@ -81,7 +81,10 @@ impl Ground {
         let is_as_cpu = device.tuning == Tuning::cpu(limits);
         Ground {
             device: found.name.clone(),
-            driver: driver_of(found, limits.driver_version),
+            driver: match found.driver.trim() {
+                "" => format!("version {:#x}", limits.driver_version),
+                driver => driver.to_owned(),
+            },
             vulkan: format!(
                 "{}.{}.{}",
                 ash::vk::api_version_major(version),
@@ -101,16 +104,8 @@ impl Ground {
     }
 }
 
-/// Driver and version as it says them; of one that says nothing the number of its version.
-fn driver_of(found: &crate::device::Found, version: u32) -> String {
-    match found.driver.trim() {
-        "" => format!("version {version:#x}"),
-        driver => driver.to_owned(),
-    }
-}
-
 /// What `--json` writes: one check of a device.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct CheckRecord {
     /// [`crate::measure::record::SCHEMA`].
     pub schema: u32,
@@ -138,10 +133,7 @@ impl CheckRecord {
             commit: provenance::commit(),
             when: provenance::now(),
             quick,
-            ground: None,
-            passed: 0,
-            failed: 0,
-            groups: Vec::new(),
+            ..CheckRecord::default()
         }
     }
 
@@ -155,13 +147,4 @@ impl CheckRecord {
 /// The groups to run: all, with those for tests of the check itself where the environment asks for them.
 pub fn groups() -> impl Iterator<Item = &'static Group> {
     GROUPS.iter().chain(groups::faults::asked_for())
-}
-
-/// Runs a group in this process and tells of its cases. The device lives as long as the process, which ends with its group.
-pub fn run_here(group: &Group, device: Device, choice: TuningChoice, quick: bool, tell: &mut dyn FnMut(Message)) {
-    cases::keep_panics();
-    let device: &'static Device = Box::leak(Box::new(device));
-    tell(Message::Ground(Ground::of(device, choice)));
-    (group.run)(&mut Cases::new(device, quick, tell));
-    tell(Message::Done);
 }

@@ -53,6 +53,11 @@ impl ProbeRay {
             generated_t: 1.0,
         }
     }
+
+    /// From `origin` to `target`, which is at t = 1, and beyond.
+    pub fn to(origin: [f32; 3], target: [f32; 3]) -> ProbeRay {
+        ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]))
+    }
 }
 
 /// A hit that was committed. `kind` 0: none, 1: a triangle, 2: generated.
@@ -92,7 +97,7 @@ pub struct ProbeReport {
 impl ProbeReport {
     /// The candidates in an order that does not depend on the tree.
     pub fn sorted_candidates(&self) -> Vec<[u32; 4]> {
-        let mut all = self.candidates[..self.candidates.len().min(self.candidate_count as usize)].to_vec();
+        let mut all: Vec<_> = self.candidates.into_iter().take(self.candidate_count as usize).collect();
         all.sort_unstable();
         all
     }

@@ -1,6 +1,7 @@
 //! Meshes and rays for the tracing tests, made of nothing but numbers.
 #![allow(missing_docs, reason = "names and types say it all: groups and tests are the only readers")]
 
+use super::corpus;
 use crate::random::SplitMix64;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::Bvh2;
@@ -24,13 +25,16 @@ pub fn soup(count: usize, size: f32, seed: u64) -> Corners {
 
 /// `count` boxes with edges of up to `size` that begin in the cube −1..1, by their least and greatest corners.
 pub fn boxes(count: usize, size: f32, seed: u64) -> Vec<[[f32; 3]; 2]> {
-    let mut random = SplitMix64::new(seed);
-    (0..count)
-        .map(|_| {
-            let (at, size) = (random.around(1.0), random.around(size).map(f32::abs));
-            [at, add(at, size)]
-        })
-        .collect()
+    boxes_by(&mut SplitMix64::new(seed), count, size)
+}
+
+/// The same by the next numbers of `random`.
+pub fn boxes_by(random: &mut SplitMix64, count: usize, size: f32) -> Vec<[[f32; 3]; 2]> {
+    let mut one = || {
+        let (at, size) = (random.around(1.0), random.around(size).map(f32::abs));
+        [at, add(at, size)]
+    };
+    (0..count).map(|_| one()).collect()
 }
 
 /// A closed mesh of 20·4^`levels` triangles with corners on the sphere around the origin.
@@ -86,8 +90,7 @@ pub fn tree_of(corners: &Corners) -> Bvh2 {
 
 /// The host's LBVH.
 pub fn tree_with(corners: &Corners, collapse: Collapse) -> Bvh2 {
-    let positions: Vec<[f32; 3]> = corners.iter().flatten().copied().collect();
-    let triangles: Vec<[u32; 3]> = (0..corners.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let (_, positions, triangles) = corpus::soup("", corners.clone());
     lbvh::build(&positions, &triangles, Code::Emc64Var.full(), collapse)
 }
 
@@ -99,15 +102,8 @@ pub fn ray(origin: [f32; 3], direction: [f32; 3]) -> Ray {
 /// Rays from `offset`, the middle of a closed surface of radius `scale`, and from around it, through corners and edges: each must
 /// hit.
 pub fn rays_from_inside(corners: &Corners, count: usize, scale: f32, offset: [f32; 3]) -> Vec<Ray> {
-    rays_to(
-        corners,
-        count,
-        scale,
-        7,
-        |random, i| {
-            if i % 2 == 0 { offset } else { add(offset, random.around(0.2 * scale)) }
-        },
-    )
+    let around = |random: &mut SplitMix64| add(offset, random.around(0.2 * scale));
+    rays_to(corners, count, scale, 7, |random, i| if i % 2 == 0 { offset } else { around(random) })
 }
 
 /// From the middle of a closed surface to it: through corners and edges, and at any place between them.
@@ -157,8 +153,8 @@ pub fn hard_rays(corners: &Corners, count: usize, scale: f32, offset: [f32; 3], 
     (0..count)
         .map(|i| {
             let origin = add(random.around(1.5 * scale), offset);
-            let [a, b, c] =
-                corners.get(random.bits() as usize % corners.len().max(1)).copied().unwrap_or([[0.0; 3]; 3]);
+            let number = random.bits() as usize % corners.len().max(1);
+            let [a, b, c] = corners.get(number).copied().unwrap_or_default();
             let to = |target: [f32; 3]| std::array::from_fn(|k| target[k] - origin[k]);
             let middle = |p: [f32; 3], q: [f32; 3]| std::array::from_fn(|k| 0.5 * p[k] + 0.5 * q[k]);
             let mut ray = match i % 8 {

@@ -11,7 +11,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 /// How a group went.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// The group.
     pub group: String,
@@ -63,15 +63,7 @@ fn loader_arguments() -> Vec<OsString> {
 /// Runs a group in the process that `command` starts, at most as long as `limit`. Gives what it ran on, too, if it said so.
 pub fn run(group: &str, mut command: Command, limit: Duration) -> (Outcome, Option<Ground>) {
     let begin = Instant::now();
-    let mut outcome = Outcome {
-        group: group.to_owned(),
-        passed: false,
-        seconds: 0.0,
-        cases: 0,
-        wrong: Vec::new(),
-        left_out: Vec::new(),
-        ended: None,
-    };
+    let mut outcome = Outcome { group: group.to_owned(), ..Outcome::default() };
     let mut child = match command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn() {
         Ok(child) => child,
         Err(error) => {
@@ -82,13 +74,8 @@ pub fn run(group: &str, mut command: Command, limit: Duration) -> (Outcome, Opti
     let (sender, messages) = mpsc::channel();
     let lines = BufReader::new(child.stdout.take().expect("stdout is piped")).lines();
     // A driver may write to stdout what it likes.
-    let reader = thread::spawn(move || {
-        for message in lines.map_while(Result::ok).filter_map(|line| serde_json::from_str::<Message>(&line).ok()) {
-            if sender.send(message).is_err() {
-                return;
-            }
-        }
-    });
+    let mut sent = lines.map_while(Result::ok).filter_map(|line| serde_json::from_str::<Message>(&line).ok());
+    let reader = thread::spawn(move || sent.try_for_each(|message| sender.send(message)));
     let mut diagnostics = child.stderr.take().expect("stderr is piped");
     let listener = thread::spawn(move || {
         let mut text = Vec::new();

@@ -1,6 +1,6 @@
 //! Rays through a structure on the device: what is found, and with how much work.
 
-use super::cases::{Wrong, same};
+use super::cases::same;
 use crate::device::Device;
 use hedgerow::gpu::Recorder;
 use hedgerow::trace::tracer::TraceBuffers;
@@ -17,7 +17,7 @@ pub fn traced(
     rays: &[Ray],
     count_work: bool,
     record: impl FnOnce(&mut Recorder<'_>, &TraceBuffers) -> hedgerow::Result<()>,
-) -> Result<(Vec<Hit>, Vec<Work>), Wrong> {
+) -> anyhow::Result<(Vec<Hit>, Vec<Work>)> {
     let unwritten = Hit { t: -1.0, primitive: 7, u: -1.0, v: -1.0 };
     let structure = device.upload("structure", structure)?;
     let ray_buffer = device.upload("rays", rays)?;

@@ -1,14 +1,16 @@
 //! A tree from both sides: built on the device, and by the twins on the host with the same options; and room enough for any.
 
-use super::cases::Found;
+use super::cases::{Found, same_all};
 use super::corpus::Mesh;
 use crate::device::Device;
+use crate::subjects::build_memory::{BuildMemory, DeviceMesh};
+use anyhow::{bail, ensure};
 use hedgerow::bvh::builder::{BuildOptions, Builder, Input, Method};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
 use hedgerow::kdtree::builder::KdEstimate;
-use hedgerow::kdtree::merge;
+use hedgerow::kdtree::merge::MergeEstimate;
 
 /// Room for kd-trees of scenes where most triangles straddle most planes.
 pub const PLENTY: KdEstimate = KdEstimate {
@@ -21,7 +23,7 @@ pub const PLENTY: KdEstimate = KdEstimate {
 };
 
 /// Room for objects that lie in the densest part of a kd-tree.
-pub const PLENTY_TO_MERGE: merge::MergeEstimate = merge::MergeEstimate {
+pub const PLENTY_TO_MERGE: MergeEstimate = MergeEstimate {
     pairs: 60.0,
     items: 20.0,
     marked: 40.0,
@@ -42,8 +44,7 @@ pub const PLENTY_TO_MERGE: merge::MergeEstimate = merge::MergeEstimate {
 pub fn built(device: &Device, options: &BuildOptions, input: &Input) -> Bvh2 {
     let builder = Builder::new(device, options, input.primitive_count).expect("few enough primitives");
     let sizes = builder.sizes();
-    let structure = device.buffer("structure", sizes.structure).expect("memory");
-    let scratch = device.buffer("scratch", sizes.scratch).expect("memory");
+    let BuildMemory { structure, scratch, .. } = BuildMemory::new(device, sizes).expect("memory");
     // Whatever was there before changes nothing.
     structure.write(&vec![0x5Au8; sizes.structure as usize]);
     scratch.write(&vec![0xA5u8; sizes.scratch as usize]);
@@ -59,10 +60,8 @@ pub fn built(device: &Device, options: &BuildOptions, input: &Input) -> Bvh2 {
 /// # Panics
 /// As [`built`].
 pub fn on_device(device: &Device, (_, positions, triangles): &Mesh, options: &BuildOptions) -> Bvh2 {
-    let vertices = device.upload("positions", positions).expect("memory");
-    let indices = device.upload("indices", triangles).expect("memory");
-    let (corners, count) = (positions.len() as u32, triangles.len() as u32);
-    built(device, options, &Input::mesh(vertices.address(), corners, indices.address(), count))
+    let mesh = DeviceMesh::new(device, positions, triangles).expect("memory");
+    built(device, options, &mesh.input)
 }
 
 /// What [`on_device`] must equal, byte for byte. The options name the codes.
@@ -86,11 +85,10 @@ pub fn on_host((_, positions, triangles): &Mesh, options: &BuildOptions) -> Bvh2
         Method::Ploc { radius } => twin::ploc::build(&radix, radius as usize),
         Method::Hploc(window) => twin::hploc::build(&radix, window),
     };
-    let tree = match &options.optimise {
-        None => tree,
-        Some(optimise) => tree.reinserted(optimise),
-    };
-    tree.collapsed(&options.collapse)
+    match &options.optimise {
+        None => tree.collapsed(&options.collapse),
+        Some(optimise) => tree.reinserted(optimise).collapsed(&options.collapse),
+    }
 }
 
 /// Nothing if the bytes are the same; otherwise what differs first.
@@ -101,16 +99,8 @@ pub fn compare(got: &Bvh2, expected: &Bvh2) -> Found {
     if got.to_bytes() == expected.to_bytes() {
         return Ok(());
     }
-    if got.header != expected.header {
-        return Err(format!("header {:?}, expected {:?}", got.header, expected.header).into());
-    }
-    let records = got.records.iter().zip(&expected.records);
-    if let Some((i, (got, expected))) = records.enumerate().find(|(_, (a, b))| a != b) {
-        return Err(format!("record {i}: {got:?}, expected {expected:?}").into());
-    }
-    let nodes = got.nodes.iter().zip(&expected.nodes);
-    if let Some((i, (got, expected))) = nodes.enumerate().find(|(_, (a, b))| a != b) {
-        return Err(format!("node {i}: {got:?}, expected {expected:?}").into());
-    }
-    Err("other bytes".to_owned().into())
+    ensure!(got.header == expected.header, "header {:?}, expected {:?}", got.header, expected.header);
+    same_all("record", &got.records, &expected.records)?;
+    same_all("node", &got.nodes, &expected.nodes)?;
+    bail!("other bytes")
 }

@@ -5,14 +5,14 @@ use super::backend::{Backend, Built};
 use super::probe::{CONFIRM, CONFIRM_ODD, ProbeRay, flags};
 use super::shapes::Corners;
 use crate::device::{Buffer, Device};
+pub use crate::subjects::structures::instances_at;
+use crate::subjects::structures::{BuildInfo, Geometry, Range, address};
 use ash::vk;
+use glam::DVec3;
 use hedgerow::accel::Instance;
 
 type Flags = vk::GeometryInstanceFlagsKHR;
 type GeometryFlags = vk::GeometryFlagsKHR;
-type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
-type Range = vk::AccelerationStructureBuildRangeInfoKHR;
-
 /// Geometries of a bottom-level structure, each with its flags.
 #[derive(Clone)]
 pub enum Part {
@@ -40,19 +40,6 @@ pub struct BuiltWorld {
     _memory: Vec<Buffer<'static>>,
 }
 
-fn address(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
-    vk::DeviceOrHostAddressConstKHR { device_address }
-}
-
-/// Vulkan's struct for instances, or pointers to them.
-pub fn instances_at(at: u64, by_pointers: bool) -> Geometry {
-    let instances =
-        vk::AccelerationStructureGeometryInstancesDataKHR::default().array_of_pointers(by_pointers).data(address(at));
-    vk::AccelerationStructureGeometryKHR::default()
-        .geometry_type(vk::GeometryTypeKHR::INSTANCES)
-        .geometry(vk::AccelerationStructureGeometryDataKHR { instances })
-}
-
 /// Builds a top level of them alone.
 pub fn top_level(
     backend: &dyn Backend,
@@ -60,7 +47,7 @@ pub fn top_level(
     range: Range,
     flags: vk::BuildAccelerationStructureFlagsKHR,
 ) -> Built {
-    let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+    let info = BuildInfo::default()
         .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
         .flags(flags)
         .geometries(std::slice::from_ref(instances));
@@ -69,49 +56,47 @@ pub fn top_level(
 
 /// Builds a bottom level of them alone.
 pub fn bottom_level(backend: &dyn Backend, geometries: &[Geometry], ranges: &[Range]) -> Built {
-    let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
-        .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
-        .geometries(geometries);
+    let info = BuildInfo::default().ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL).geometries(geometries);
     Built::new(backend, &info, ranges, 0)
 }
 
 impl Part {
     /// Vulkan's structs over uploaded data.
     pub fn geometries(&self, device: &'static Device) -> (Vec<Geometry>, Vec<Range>, Vec<Buffer<'static>>) {
-        let mut all = (Vec::new(), Vec::new(), Vec::new());
-        let mut add = |kind, data, flags, count: usize, memory| {
-            let geometry =
-                vk::AccelerationStructureGeometryKHR::default().geometry_type(kind).geometry(data).flags(flags);
-            all.0.push(geometry);
-            all.1.push(Range::default().primitive_count(count as u32));
-            all.2.push(memory);
+        let built_over = |kind, data, flags, count: usize, memory| {
+            let geometry = Geometry::default().geometry_type(kind).geometry(data).flags(flags);
+            (geometry, Range::default().primitive_count(count as u32), memory)
+        };
+        let triangles_of = |(corners, flags): &(Corners, GeometryFlags)| {
+            let memory = device.upload("corners", corners).expect("memory");
+            let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+                .vertex_format(vk::Format::R32G32B32_SFLOAT)
+                .vertex_data(address(memory.address()))
+                .vertex_stride(12)
+                .max_vertex((3 * corners.len()).max(1) as u32 - 1)
+                .index_type(vk::IndexType::NONE_KHR);
+            let data = vk::AccelerationStructureGeometryDataKHR { triangles };
+            built_over(vk::GeometryTypeKHR::TRIANGLES, data, *flags, corners.len(), memory)
+        };
+        let boxes_of = |(boxes, flags): &(Vec<[[f32; 3]; 2]>, GeometryFlags)| {
+            let memory = device.upload("boxes", boxes).expect("memory");
+            let aabbs =
+                vk::AccelerationStructureGeometryAabbsDataKHR::default().data(address(memory.address())).stride(24);
+            let data = vk::AccelerationStructureGeometryDataKHR { aabbs };
+            built_over(vk::GeometryTypeKHR::AABBS, data, *flags, boxes.len(), memory)
         };
         match self {
-            Part::Triangles(geometries) => {
-                for (corners, flags) in geometries {
-                    let memory = device.upload("corners", corners).expect("memory");
-                    let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
-                        .vertex_format(vk::Format::R32G32B32_SFLOAT)
-                        .vertex_data(address(memory.address()))
-                        .vertex_stride(12)
-                        .max_vertex((3 * corners.len()).max(1) as u32 - 1)
-                        .index_type(vk::IndexType::NONE_KHR);
-                    let data = vk::AccelerationStructureGeometryDataKHR { triangles };
-                    add(vk::GeometryTypeKHR::TRIANGLES, data, *flags, corners.len(), memory);
-                }
-            }
-            Part::Boxes(geometries) => {
-                for (boxes, flags) in geometries {
-                    let memory = device.upload("boxes", boxes).expect("memory");
-                    let aabbs = vk::AccelerationStructureGeometryAabbsDataKHR::default()
-                        .data(address(memory.address()))
-                        .stride(24);
-                    let data = vk::AccelerationStructureGeometryDataKHR { aabbs };
-                    add(vk::GeometryTypeKHR::AABBS, data, *flags, boxes.len(), memory);
-                }
-            }
+            Part::Triangles(geometries) => geometries.iter().map(triangles_of).collect(),
+            Part::Boxes(geometries) => geometries.iter().map(boxes_of).collect(),
         }
-        all
+    }
+
+    /// Everything in it that a line meets, or may, as of instance 0 and opaque by its geometry alone.
+    fn meetings(&self, line: &Line) -> Vec<Met> {
+        match self {
+            Part::Triangles(geometries) => meetings_of(geometries, |triangle| triangle_met(triangle, line)),
+            Part::Boxes(geometries) => meetings_of(geometries, |corners| box_met(corners, line)),
+        }
     }
 
     /// Builds it alone.
@@ -119,6 +104,18 @@ impl Part {
         let (geometries, ranges, memory) = self.geometries(backend.device());
         (bottom_level(backend, &geometries, &ranges), memory)
     }
+}
+
+fn meetings_of<P>(geometries: &[(Vec<P>, GeometryFlags)], met: impl Fn(&P) -> Option<Met>) -> Vec<Met> {
+    let mut all = Vec::new();
+    for (g, (primitives, flags)) in geometries.iter().enumerate() {
+        let is_opaque = flags.contains(GeometryFlags::OPAQUE);
+        for (p, primitive) in primitives.iter().enumerate() {
+            let place = [0, g as u32, p as u32];
+            all.extend(met(primitive).map(|met| Met { place, is_opaque, ..met }));
+        }
+    }
+    all
 }
 
 impl World {
@@ -138,14 +135,8 @@ impl World {
 
     /// Builds everything.
     pub fn build(&self, backend: &dyn Backend) -> BuiltWorld {
-        let mut memory = Vec::new();
-        let mut parts = Vec::new();
-        for part in &self.parts {
-            let (built, data) = part.build(backend);
-            parts.push(built);
-            memory.extend(data);
-        }
-        self.build_over(backend, parts, memory)
+        let (parts, memory): (_, Vec<_>) = self.parts.iter().map(|part| part.build(backend)).unzip();
+        self.build_over(backend, parts, memory.into_iter().flatten().collect())
     }
 
     /// Builds the top level over parts that are built, and keeps their memory.
@@ -153,12 +144,10 @@ impl World {
         let placed = self.placed(backend, &parts);
         let mut instances = backend.device().upload("instances", &placed).expect("memory");
         if self.by_pointers {
-            let pointers: Vec<u64> =
-                (0..placed.len() as u64).map(|i| instances.address() + i * size_of::<Instance>() as u64).collect();
-            memory.push(std::mem::replace(
-                &mut instances,
-                backend.device().upload("pointers", &pointers).expect("memory"),
-            ));
+            let pointer = |i| instances.address() + (i * size_of::<Instance>()) as u64;
+            let pointers: Vec<u64> = (0..placed.len()).map(pointer).collect();
+            let pointers = backend.device().upload("pointers", &pointers).expect("memory");
+            memory.push(std::mem::replace(&mut instances, pointers));
         }
         let geometry = instances_at(instances.address(), self.by_pointers);
         let range = Range::default().primitive_count(placed.len() as u32);
@@ -176,43 +165,24 @@ impl World {
             }
             let instance_flags = Flags::from_raw(instance.offset_and_flags >> 24);
             let line = Line::in_object(&instance.transform, ray);
-            let is_opaque = |geometry: GeometryFlags| {
-                let mut is_opaque = geometry.contains(GeometryFlags::OPAQUE);
-                is_opaque |= instance_flags.contains(Flags::FORCE_OPAQUE);
-                is_opaque &= !instance_flags.contains(Flags::FORCE_NO_OPAQUE);
-                (is_opaque || ray.flags & flags::OPAQUE != 0) && ray.flags & flags::NO_OPAQUE == 0
-            };
-            let is_culled =
-                |is_opaque: bool| ray.flags & (if is_opaque { flags::CULL_OPAQUE } else { flags::CULL_NO_OPAQUE }) != 0;
-            let mut add = |geometry: usize, primitive: usize, is_opaque: bool, met: Met| {
-                if !is_culled(is_opaque) {
-                    let place = [i as u32, geometry as u32, primitive as u32];
-                    all.push(Met { place, is_opaque, ..met });
-                }
-            };
-            match &self.parts[instance.structure as usize - 1] {
-                Part::Triangles(_) if ray.flags & flags::SKIP_TRIANGLES != 0 => {}
-                Part::Boxes(_) if ray.flags & flags::SKIP_BOXES != 0 => {}
-                Part::Triangles(geometries) => {
-                    for (g, (corners, geometry_flags)) in geometries.iter().enumerate() {
-                        for (p, triangle) in corners.iter().enumerate() {
-                            let Some(mut met) = triangle_met(triangle, &line) else { continue };
-                            met.is_front ^= instance_flags.contains(Flags::TRIANGLE_FLIP_FACING);
-                            let culled = if met.is_front { flags::CULL_FRONT } else { flags::CULL_BACK };
-                            if ray.flags & culled == 0 || instance_flags.contains(Flags::TRIANGLE_FACING_CULL_DISABLE) {
-                                add(g, p, is_opaque(*geometry_flags), met);
-                            }
-                        }
+            for mut met in self.parts[instance.structure as usize - 1].meetings(&line) {
+                met.place[0] = i as u32;
+                met.is_opaque |= instance_flags.contains(Flags::FORCE_OPAQUE);
+                met.is_opaque &= !instance_flags.contains(Flags::FORCE_NO_OPAQUE);
+                met.is_opaque |= ray.flags & flags::OPAQUE != 0;
+                met.is_opaque &= ray.flags & flags::NO_OPAQUE == 0;
+                let mut culled = if met.is_opaque { flags::CULL_OPAQUE } else { flags::CULL_NO_OPAQUE };
+                if met.is_box {
+                    culled |= flags::SKIP_BOXES;
+                } else {
+                    culled |= flags::SKIP_TRIANGLES;
+                    met.is_front ^= instance_flags.contains(Flags::TRIANGLE_FLIP_FACING);
+                    if !instance_flags.contains(Flags::TRIANGLE_FACING_CULL_DISABLE) {
+                        culled |= if met.is_front { flags::CULL_FRONT } else { flags::CULL_BACK };
                     }
                 }
-                Part::Boxes(geometries) => {
-                    for (g, (boxes, geometry_flags)) in geometries.iter().enumerate() {
-                        for (p, corners) in boxes.iter().enumerate() {
-                            if let Some(met) = box_met(corners, &line) {
-                                add(g, p, is_opaque(*geometry_flags), met);
-                            }
-                        }
-                    }
+                if ray.flags & culled == 0 {
+                    all.push(met);
                 }
             }
         }
@@ -263,7 +233,7 @@ pub struct Expected {
 }
 
 /// What a ray meets, or may.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Met {
     pub t: f64,
     pub weights: [f64; 2],
@@ -282,8 +252,8 @@ pub struct Met {
 
 /// A ray in the space of an instance.
 struct Line {
-    origin: [f64; 3],
-    direction: [f64; 3],
+    origin: DVec3,
+    direction: DVec3,
     limits: [f64; 2],
     /// How far off float32 may place its origin, and a point at t = 1 in addition.
     origin_error: f64,
@@ -295,8 +265,8 @@ impl Line {
         let (origin, direction) = (ray.origin.map(f64::from), ray.direction.map(f64::from));
         let to_object = inverse(transform);
         Line {
-            origin: transformed(&to_object, origin, 1.0),
-            direction: transformed(&to_object, direction, 0.0),
+            origin: transformed(&to_object, origin, 1.0).into(),
+            direction: transformed(&to_object, direction, 0.0).into(),
             limits: [ray.t_min.into(), ray.t_max.into()],
             origin_error: transform_error(transform, origin, 1.0),
             direction_error: transform_error(transform, direction, 0.0),
@@ -304,8 +274,8 @@ impl Line {
     }
 
     /// How far off a point at t may be beside something at `corner`.
-    fn error_at(&self, t: f64, corner: [f64; 3]) -> f64 {
-        self.origin_error + t.abs() * self.direction_error + PRECISION * length(corner)
+    fn error_at(&self, t: f64, corner: DVec3) -> f64 {
+        self.origin_error + t.abs() * self.direction_error + PRECISION * corner.length()
     }
 }
 
@@ -315,12 +285,12 @@ const PRECISION: f64 = 1e-6;
 /// How far off float32 may be in the transform of a point (or, with w = 0, of a direction) to the space of an instance: each
 /// row of the inverse is a product of two columns divided by the determinant, and lost digits of these.
 pub fn transform_error(to_world: &[[f32; 4]; 3], p: [f64; 3], w: f64) -> f64 {
-    let column = |k: usize| to_world.map(|row| f64::from(row[k]));
+    let column = |k: usize| DVec3::from(to_world.map(|row| f64::from(row[k])));
     let columns = [column(0), column(1), column(2)];
-    let determinant = dot(columns[0], cross(columns[1], columns[2])).abs();
-    let lengths = columns.map(length);
-    let rows = lengths.map(|own| lengths[0] * lengths[1] * lengths[2] / own / determinant);
-    PRECISION * length(rows) * (length(p) + w * length(column(3)))
+    let determinant = columns[0].dot(columns[1].cross(columns[2])).abs();
+    let lengths = columns.map(DVec3::length);
+    let rows = DVec3::from(lengths.map(|own| lengths[0] * lengths[1] * lengths[2] / own / determinant));
+    PRECISION * rows.length() * (DVec3::from(p).length() + w * column(3).length())
 }
 
 pub type Matrix = [[f64; 4]; 3];
@@ -332,74 +302,42 @@ pub fn transformed(m: &Matrix, p: [f64; 3], w: f64) -> [f64; 3] {
 /// The inverse of an affine matrix, by Cramer's rule.
 pub fn inverse(m: &[[f32; 4]; 3]) -> Matrix {
     let m: Matrix = m.map(|row| row.map(f64::from));
-    let row = |i: usize| [m[i][0], m[i][1], m[i][2]];
-    let columns = [cross(row(1), row(2)), cross(row(2), row(0)), cross(row(0), row(1))];
-    let determinant = dot(row(0), columns[0]);
+    let row = |i: usize| DVec3::new(m[i][0], m[i][1], m[i][2]);
+    let columns = [row(1).cross(row(2)), row(2).cross(row(0)), row(0).cross(row(1))];
+    let determinant = row(0).dot(columns[0]);
+    let offset = DVec3::from(m.map(|row| row[3]));
     std::array::from_fn(|i| {
-        let r = columns.map(|column| column[i] / determinant);
-        [r[0], r[1], r[2], -dot(r, [m[0][3], m[1][3], m[2][3]])]
+        let r = DVec3::from(columns.map(|column| column[i] / determinant));
+        [r.x, r.y, r.z, -r.dot(offset)]
     })
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn length(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
 }
 
 /// Möller and Trumbore 1997. Nothing where even rounding does not lead to a meeting.
 fn triangle_met(triangle: &[[f32; 3]; 3], line: &Line) -> Option<Met> {
-    let [v0, v1, v2] = triangle.map(|v| v.map(f64::from));
-    let (e1, e2, from_v0) = (minus(v1, v0), minus(v2, v0), minus(line.origin, v0));
-    let (normal, across) = (cross(e1, e2), cross(line.direction, e2));
-    let determinant = dot(e1, across);
-    if length(normal) == 0.0 {
+    let [v0, v1, v2] = triangle.map(|v| DVec3::from(v.map(f64::from)));
+    let (e1, e2, from_v0) = (v1 - v0, v2 - v0, line.origin - v0);
+    let (normal, across) = (e1.cross(e2), line.direction.cross(e2));
+    if normal.length() == 0.0 {
         return None;
     }
-    let q = cross(from_v0, e1);
-    let [u, v, t] = [dot(from_v0, across), dot(line.direction, q), dot(e2, q)].map(|x| x / determinant);
+    let q = from_v0.cross(e1);
+    let [u, v, t] = [from_v0.dot(across), line.direction.dot(q), e2.dot(q)].map(|x| x / e1.dot(across));
     // The front is where the normal looks, by the right hand: clockwise in left-handed coordinates, as the field says it.
-    let is_front = dot(normal, line.direction) < 0.0;
-    let mut met = Met {
-        t,
-        weights: [u, v],
-        place: [0; 3],
-        is_front,
-        is_opaque: false,
-        is_box: false,
-        t_error: f64::INFINITY,
-        weight_error: f64::INFINITY,
-        is_met: false,
-        is_unsure: true,
-    };
-    let farthest = if length(v0) > length(v1).max(length(v2)) {
-        v0
-    } else if length(v1) > length(v2) {
-        v1
-    } else {
-        v2
-    };
-    let cosine = dot(normal, line.direction).abs() / (length(normal) * length(line.direction));
+    let is_front = normal.dot(line.direction) < 0.0;
+    let (t_error, weight_error) = (f64::INFINITY, f64::INFINITY);
+    let mut met = Met { t, weights: [u, v], is_front, t_error, weight_error, is_unsure: true, ..Met::default() };
+    let farthest = farther(v0, farther(v1, v2));
+    let cosine = normal.dot(line.direction).abs() / (normal.length() * line.direction.length());
     if cosine < 1e-6 {
         // In its plane: no meeting, unless rounding takes the ray out of it.
-        let off = dot(from_v0, normal).abs() / length(normal);
-        let near = (length(from_v0) + length(e1) + length(e2)) / length(line.direction);
-        return (off < line.error_at(near, farthest) && dot(normal, line.direction) != 0.0).then_some(met);
+        let off = from_v0.dot(normal).abs() / normal.length();
+        let near = (from_v0.length() + e1.length() + e2.length()) / line.direction.length();
+        return (off < line.error_at(near, farthest) && normal.dot(line.direction) != 0.0).then_some(met);
     }
     let error = line.error_at(t, farthest) / cosine;
-    let longest = length(e1).max(length(e2)).max(length(minus(v2, v1)));
-    met.t_error = error / length(line.direction);
-    met.weight_error = error * longest / length(normal);
+    let longest = e1.length().max(e2.length()).max((v2 - v1).length());
+    met.t_error = error / line.direction.length();
+    met.weight_error = error * longest / normal.length();
     let inside = u.min(v).min(1.0 - u - v);
     let from_limits = (t - line.limits[0]).min(line.limits[1] - t);
     met.is_met = inside >= 0.0 && from_limits > 0.0;
@@ -407,20 +345,25 @@ fn triangle_met(triangle: &[[f32; 3]; 3], line: &Line) -> Option<Met> {
     (inside > -met.weight_error && from_limits > -met.t_error).then_some(met)
 }
 
+/// The one that is farther from the origin.
+fn farther(a: DVec3, b: DVec3) -> DVec3 {
+    if a.length() > b.length() { a } else { b }
+}
+
 /// The same for a box, which implementations may enlarge a little.
 fn box_met(corners: &[[f32; 3]; 2], line: &Line) -> Option<Met> {
-    let corners = corners.map(|corner| corner.map(f64::from));
-    if corners[0][0].is_nan() {
+    let corners = corners.map(|corner| DVec3::from(corner.map(f64::from)));
+    if corners[0].x.is_nan() {
         return None;
     }
-    let farthest = if length(corners[0]) > length(corners[1]) { corners[0] } else { corners[1] };
-    let until = length(minus(farthest, line.origin)) / length(line.direction);
+    let farthest = farther(corners[0], corners[1]);
+    let until = (farthest - line.origin).length() / line.direction.length();
     let error = line.error_at(until, farthest);
-    let t_error = error / length(line.direction);
+    let t_error = error / line.direction.length();
     let enter_within = |by: f64, late: f64| -> Option<f64> {
         let (mut enter, mut leave) = (line.limits[0] - late, line.limits[1] + late);
-        for (k, (least, most)) in corners[0].iter().zip(&corners[1]).enumerate() {
-            let (lo, hi) = (least - by, most + by);
+        for k in 0..3 {
+            let (lo, hi) = (corners[0][k] - by, corners[1][k] + by);
             if line.direction[k] == 0.0 {
                 if !(lo <= line.origin[k] && line.origin[k] <= hi) {
                     return None;
@@ -438,14 +381,10 @@ fn box_met(corners: &[[f32; 3]; 2], line: &Line) -> Option<Met> {
     let sure = enter_within(-error, 0.0).is_some();
     enter_within(error, t_error).map(|possible| Met {
         t: enter.unwrap_or(possible),
-        weights: [0.0; 2],
-        place: [0; 3],
-        is_front: false,
-        is_opaque: false,
         is_box: true,
         t_error,
-        weight_error: 0.0,
         is_met: enter.is_some(),
         is_unsure: !sure,
+        ..Met::default()
     })
 }

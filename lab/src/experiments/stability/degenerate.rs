@@ -66,7 +66,7 @@ pub fn measure(stage: &DegenerateSetup<'_>, scene: &scene::Degenerate, point: &m
 /// Whether a builder is somebody else's.
 pub fn is_peer(spec: &Spec) -> bool {
     let builder = spec.builder();
-    builder.needs() == Needs::RayQuery || ["obvhs-", "embree-"].iter().any(|peer| builder.name.starts_with(peer))
+    builder.needs == Needs::RayQuery || ["obvhs-", "embree-"].iter().any(|peer| builder.name.starts_with(peer))
 }
 
 fn of_builder(stage: &DegenerateSetup<'_>, scene: &scene::Degenerate, spec: &Spec, truth: &Truth) -> Degenerate {

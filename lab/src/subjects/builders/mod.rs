@@ -4,11 +4,13 @@
 //! whoever adds one adds a row there.
 
 mod options;
+mod plan;
 mod table;
 
 use super::Subject;
-use super::device_bvh::DeviceBvh;
+use super::auto;
 use super::host::Host;
+use super::host_rays::KdRays;
 use super::kd_device::KdDevice;
 use super::kd_gpu::KdGpu;
 use super::kd_host::KdHost;
@@ -19,17 +21,12 @@ use super::peers::embree::Embree;
 use super::peers::obvhs::Obvhs;
 use crate::device::Device;
 use crate::scene::Mesh;
-use crate::subjects::auto::Auto;
 use crate::{Error, Result};
-use hedgerow::bvh::{builder, reinsertion};
-use hedgerow::kdtree;
-use hedgerow::trace::kd::Traversal;
-use hedgerow::trace::wide::WideTracer;
-use options::{OPTIMISE, RAYS, TRACE};
+use options::{RAYS, TRACE, TRAVERSAL};
+pub(crate) use plan::BuilderPlan;
+pub use plan::KdSpec;
 use std::fmt;
 use std::str::FromStr;
-use std::time::Duration;
-use table::Kind;
 pub use table::{BUILDERS, BuilderEntry, BuilderOption, Needs};
 
 /// A builder with its options, as `-b` takes it. Known to exist and to have sound options once it is made.
@@ -52,8 +49,7 @@ impl Spec {
 
     /// The same for so many rays a build, where it is one that chooses by them and has no number of its own.
     pub fn for_rays(mut self, rays: f64) -> Spec {
-        let chooses = self.builder().options.iter().any(|option| option.key == RAYS.key);
-        if chooses && self.option(RAYS.key).is_none() {
+        if self.builder().takes(RAYS.key) && self.option(RAYS.key).is_none() {
             self.options.push((RAYS.key.to_owned(), rays.to_string()));
         }
         self
@@ -61,7 +57,7 @@ impl Spec {
 
     /// What it needs of the machine: what its builder does, and a device if rays are to be traced there.
     pub fn needs(&self) -> Needs {
-        match self.builder().needs() {
+        match self.builder().needs {
             Needs::Nothing if self.option(TRACE.key) == Some("device") => Needs::Device,
             needs => needs,
         }
@@ -76,6 +72,14 @@ impl Spec {
         }
     }
 
+    /// What it asks for.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if an option has a value that the builder does not take.
+    pub(crate) fn plan(&self) -> Result<BuilderPlan> {
+        (self.builder().plan)(self)
+    }
+
     /// The subject: the builder on a scene, with everything uploaded that is uploaded once.
     ///
     /// # Errors
@@ -84,24 +88,25 @@ impl Spec {
         let given =
             || device.ok_or_else(|| Error::NoVulkan("this builder works on a device, and none was opened".into()));
         let name = self.to_string();
-        Ok(match self.builder().kind {
-            Kind::Device(options) => Box::new(self.on_device(given()?, mesh, options(self)?)?),
-            Kind::Host(hierarchy) => Box::new(Host::new(&name, mesh, self.host_options(hierarchy(self)?)?)),
-            Kind::KdHost(options) => {
-                let (options, traversal) = (options(self)?, self.traversal()?);
-                let subject = KdHost::new(&name, mesh, options, traversal);
-                match self.traces_on_device()? {
-                    false => Box::new(subject),
-                    true => Box::new(subject.traced_by(KdDevice::new(given()?, traversal)?)),
-                }
+        Ok(match self.plan()? {
+            BuilderPlan::Device(plan) => Box::new(plan.make(given()?, &name, mesh)?),
+            BuilderPlan::Host(options) => Box::new(Host::new(&name, mesh, options)),
+            BuilderPlan::Kd(KdSpec::Host { options, traversal, traces_on_device }) => {
+                let rays = match traces_on_device {
+                    false => KdRays::on_host(traversal),
+                    true => KdRays::on_device(KdDevice::new(given()?, traversal)?),
+                };
+                Box::new(KdHost::new(&name, mesh, options, rays))
             }
-            Kind::KdGpu => Box::new(KdGpu::new(given()?, &name, mesh, &self.kd_gpu_options()?, self.traversal()?)?),
-            Kind::Auto => Box::new(Auto::new(given()?, &name, mesh, self.rays()?)?),
-            Kind::Driver(preference) => Box::new(Driver::new(given()?, mesh, preference)?),
+            BuilderPlan::Kd(KdSpec::Device { options, traversal }) => {
+                Box::new(KdGpu::new(given()?, &name, mesh, &options, traversal)?)
+            }
+            BuilderPlan::Auto(rays) => Box::new(auto::chosen(given()?, &name, mesh, rays)?),
+            BuilderPlan::Driver(preference) => Box::new(Driver::new(given()?, mesh, preference)?),
             #[cfg(feature = "peer-obvhs")]
-            Kind::Obvhs(preset) => Box::new(Obvhs::new(mesh, preset)?),
+            BuilderPlan::Obvhs(preset) => Box::new(Obvhs::new(mesh, preset)?),
             #[cfg(feature = "peer-embree")]
-            Kind::Embree(preset) => Box::new(Embree::new(mesh, preset)?),
+            BuilderPlan::Embree(preset) => Box::new(Embree::new(mesh, preset)?),
         })
     }
 
@@ -110,70 +115,12 @@ impl Spec {
     /// # Errors
     /// [`Error::Argument`] if it is no builder of kd-trees.
     pub fn kd(&self) -> Result<KdSpec> {
-        let traversal = || self.traversal();
-        Ok(match self.builder().kind {
-            Kind::KdHost(options) => KdSpec::Host {
-                options: options(self)?,
-                traversal: traversal()?,
-                traces_on_device: self.traces_on_device()?,
-            },
-            Kind::KdGpu => KdSpec::Device { options: self.kd_gpu_options()?, traversal: traversal()? },
-            _ => {
-                let of_kd = |b: &&BuilderEntry| matches!(b.kind, Kind::KdHost(_) | Kind::KdGpu);
-                let names: Vec<&str> = BUILDERS.iter().filter(of_kd).map(|b| b.name).collect();
-                return Err(Error::Argument(format!("{self} builds no kd-trees; take {}", names.join(", "))));
-            }
-        })
-    }
-
-    /// A builder of ours on the device, with these options and those that depend on the device.
-    fn on_device<'a>(
-        &self,
-        device: &'a Device,
-        mesh: &Mesh,
-        mut options: builder::BuildOptions,
-    ) -> Result<DeviceBvh<'a>> {
-        let (form, order) = self.form_and_order()?;
-        let wide = form.map(|form| match order {
-            None => WideTracer::of(device, form),
-            Some(order) => WideTracer::in_order(device, form, order),
-        });
-        if let Some(budget) = self.time_to_optimise() {
-            let pass = pass_of_reinsertion(device, mesh, &options)?;
-            options.optimise = Some(reinsertion::ReinsertionOptions::within(budget?, pass));
+        if let BuilderPlan::Kd(kd) = self.plan()? {
+            return Ok(kd);
         }
-        DeviceBvh::new(device, &self.to_string(), mesh, &options, wide)
+        let names: Vec<&str> = BUILDERS.iter().filter(|b| b.takes(TRAVERSAL.key)).map(|b| b.name).collect();
+        Err(Error::Argument(format!("{self} builds no kd-trees; take {}", names.join(", "))))
     }
-}
-
-/// A builder of kd-trees, for those that build more than one of a scene.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum KdSpec {
-    /// On the host.
-    Host {
-        /// What it builds.
-        options: hedgerow_host::kdtree::HostKdOptions,
-        /// How its trees are traced.
-        traversal: Traversal,
-        /// Whether that is on the device.
-        traces_on_device: bool,
-    },
-    /// On the device, which traces them, too.
-    Device {
-        /// What it builds.
-        options: kdtree::builder::KdOptions,
-        /// How its trees are traced.
-        traversal: Traversal,
-    },
-}
-
-/// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
-fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &builder::BuildOptions) -> Result<Duration> {
-    let mut subject = DeviceBvh::new(device, "", mesh, options, None)?;
-    subject.build()?;
-    let run = subject.build()?;
-    let milliseconds: f64 = run.phases.iter().filter(|p| p.name == OPTIMISE.key).map(|p| p.milliseconds).sum();
-    Ok(Duration::from_secs_f64(1e-3 * milliseconds))
 }
 
 impl FromStr for Spec {
@@ -191,7 +138,7 @@ impl FromStr for Spec {
             let (key, value) = part.split_once('=').ok_or_else(|| {
                 Error::Argument(format!("builder {text}: option {part:?} has no value; write {part}=VALUE"))
             })?;
-            if !builder.options.iter().any(|option| option.key == key) {
+            if !builder.takes(key) {
                 let keys: Vec<_> = builder.options.iter().map(|option| option.key).collect();
                 let there_are =
                     if keys.is_empty() { "it takes none".into() } else { format!("it takes {}", keys.join(", ")) };
@@ -202,7 +149,7 @@ impl FromStr for Spec {
             }
             spec.options.push((key.to_owned(), value.to_owned()));
         }
-        spec.check()?;
+        spec.plan()?;
         Ok(spec)
     }
 }
@@ -253,6 +200,7 @@ pub fn help() -> String {
 mod tests {
     use super::*;
     use hedgerow::bvh::sah::Collapse;
+    use hedgerow::trace::kd::Traversal;
 
     fn error_of(text: &str) -> String {
         parse_list(text).expect_err(text).to_string()
@@ -299,7 +247,9 @@ mod tests {
 
     #[test]
     fn kd_trees_are_traced_with_a_short_stack_on_the_device() {
-        let traversal = |text: &str| text.parse::<Spec>().expect("known").traversal().expect("one");
+        let traversal = |text: &str| match text.parse::<Spec>().expect("known").kd().expect("one") {
+            KdSpec::Host { traversal, .. } | KdSpec::Device { traversal, .. } => traversal,
+        };
         assert_eq!(["kd-gpu", "kd-binned:trace=device"].map(traversal), [Traversal::short_stack(4); 2]);
         assert_eq!(["kd-binned", "kd-gpu:traversal=stack"].map(traversal), [Traversal::STACK; 2]);
     }

@@ -1,10 +1,10 @@
 //! The list of all builders.
 
-use super::Spec;
 use super::options::{
     BINS, BITS, CODES, COLLAPSE, EXACT, KD_SCHEDULE, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT,
     TERMINATION, TRACE, TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
 };
+use super::{BuilderPlan, Spec};
 use crate::Result;
 use crate::subjects::host::HostMethod;
 use crate::subjects::peers::driver::DriverPreference;
@@ -12,7 +12,8 @@ use crate::subjects::peers::driver::DriverPreference;
 use crate::subjects::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use crate::subjects::peers::obvhs;
-use hedgerow::bvh::builder;
+use hedgerow::bvh::builder::Method;
+use hedgerow_host::kdtree::Planes;
 use std::slice;
 
 /// A builder that can be asked for.
@@ -25,8 +26,13 @@ pub struct BuilderEntry {
     pub options: &'static [BuilderOption],
     /// What `-b all` takes of it: specs that differ in kind, not in degree.
     pub variants: &'static [&'static str],
-    pub(super) kind: Kind,
+    /// What it needs of the machine.
+    pub needs: Needs,
+    pub(super) plan: ReadPlan,
 }
+
+/// Reads the options of a builder.
+type ReadPlan = fn(&Spec) -> Result<BuilderPlan>;
 
 /// An option of a builder, `key=value`.
 pub struct BuilderOption {
@@ -34,32 +40,6 @@ pub struct BuilderOption {
     pub key: &'static str,
     /// The values it takes, for people.
     pub values: &'static str,
-}
-
-impl BuilderOption {
-    pub(super) const fn new(key: &'static str, values: &'static str) -> BuilderOption {
-        BuilderOption { key, values }
-    }
-}
-
-/// What a builder is: what it needs, which options must be sound, and how its subject is made follow from it.
-pub(super) enum Kind {
-    /// One of ours on the device, with these options.
-    Device(fn(&Spec) -> Result<builder::BuildOptions>),
-    /// One of ours on the host, with this hierarchy.
-    Host(fn(&Spec) -> Result<HostMethod>),
-    /// A kd-tree by one of ours on the host.
-    KdHost(fn(&Spec) -> Result<hedgerow_host::kdtree::HostKdOptions>),
-    /// A kd-tree by ours on the device.
-    KdGpu,
-    /// The one of ours on the device that is expected to take least, by the table of costs.
-    Auto,
-    /// The Vulkan driver's own.
-    Driver(DriverPreference),
-    #[cfg(feature = "peer-obvhs")]
-    Obvhs(obvhs::Preset),
-    #[cfg(feature = "peer-embree")]
-    Embree(embree::Preset),
 }
 
 /// What a builder needs of the machine.
@@ -73,12 +53,20 @@ pub enum Needs {
     RayQuery,
 }
 
-impl BuilderEntry {
-    /// One without options, itself its only variant: a slice borrows the name for that.
-    const fn new(name: &'static &'static str, what: &'static str, kind: Kind) -> BuilderEntry {
-        BuilderEntry { name, what, options: &[], variants: slice::from_ref(name), kind }
-    }
+/// One without options, itself its only variant: a slice borrows the name for that.
+const fn needing(needs: Needs, name: &'static &'static str, what: &'static str, plan: ReadPlan) -> BuilderEntry {
+    BuilderEntry { name, what, options: &[], variants: slice::from_ref(name), needs, plan }
+}
 
+const fn on_device(name: &'static &'static str, what: &'static str, plan: ReadPlan) -> BuilderEntry {
+    needing(Needs::Device, name, what, plan)
+}
+
+const fn on_host(name: &'static &'static str, what: &'static str, plan: ReadPlan) -> BuilderEntry {
+    needing(Needs::Nothing, name, what, plan)
+}
+
+impl BuilderEntry {
     const fn taking(self, options: &'static [BuilderOption]) -> BuilderEntry {
         BuilderEntry { options, ..self }
     }
@@ -87,27 +75,17 @@ impl BuilderEntry {
         BuilderEntry { variants, ..self }
     }
 
-    /// What it needs of the machine.
-    pub fn needs(&self) -> Needs {
-        match self.kind {
-            Kind::Device(_) | Kind::KdGpu | Kind::Auto => Needs::Device,
-            Kind::Driver(_) => Needs::RayQuery,
-            Kind::Host(_) | Kind::KdHost(_) => Needs::Nothing,
-            #[cfg(feature = "peer-obvhs")]
-            Kind::Obvhs(_) => Needs::Nothing,
-            #[cfg(feature = "peer-embree")]
-            Kind::Embree(_) => Needs::Nothing,
-        }
+    /// Whether it has an option of this name.
+    pub(super) fn takes(&self, key: &str) -> bool {
+        self.options.iter().any(|option| option.key == key)
     }
 }
 
 /// Every builder, in the order in which they are listed and measured.
 pub static BUILDERS: &[BuilderEntry] = &[
-    BuilderEntry::new(
-        &"lbvh",
-        "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass",
-        Kind::Device(Spec::lbvh_options),
-    )
+    on_device(&"lbvh", "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass", |spec| {
+        spec.on_device(Method::Lbvh)
+    })
     .taking(&[CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER])
     .in_variants(&[
         "lbvh",
@@ -118,97 +96,85 @@ pub static BUILDERS: &[BuilderEntry] = &[
         "lbvh:width=4",
         "lbvh:width=8q",
     ]),
-    BuilderEntry::new(
+    on_device(
         &"hlbvh",
         "hierarchical LBVH on the device: small subtrees of the LBVH under a top split by the surface area heuristic",
-        Kind::Device(Spec::hlbvh_options),
+        Spec::hlbvh,
     )
     .taking(&[BITS, TREELET, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER]),
-    BuilderEntry::new(
+    on_device(
         &"ploc",
         "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
-        Kind::Device(Spec::ploc_options),
+        Spec::ploc,
     )
     .taking(&[RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER])
     .in_variants(&["ploc", "ploc:radius=25"]),
-    BuilderEntry::new(
+    on_device(
         &"hploc",
         "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
-        Kind::Device(Spec::hploc_options),
+        Spec::hploc,
     )
     .taking(&[WINDOW, RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER]),
-    BuilderEntry::new(
+    on_device(
         &"auto",
         "the device's builder that takes least for a build and its rays, by its measured costs",
-        Kind::Auto,
+        |spec| spec.rays().map(BuilderPlan::Auto),
     )
     .taking(&[RAYS]),
-    BuilderEntry::new(
-        &"lbvh-host",
-        "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte",
-        Kind::Host(|_| Ok(HostMethod::Lbvh)),
-    )
+    on_host(&"lbvh-host", "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte", |spec| {
+        spec.on_host(HostMethod::Lbvh)
+    })
     .taking(&[CODES, COLLAPSE, OPTIMISE]),
-    BuilderEntry::new(
+    on_host(
         &"ploc-host",
         "locally-ordered clustering by one thread of the host: what `ploc` must equal, byte for byte",
-        Kind::Host(|spec| spec.ploc_radius().map(HostMethod::Ploc)),
+        Spec::ploc_on_host,
     )
     .taking(&[RADIUS, CODES, COLLAPSE, OPTIMISE]),
-    BuilderEntry::new(
-        &"sweep",
-        "full-sweep SAH on the host: the reference for the quality of the others",
-        Kind::Host(|spec| spec.sweep_leaves().map(HostMethod::Sweep)),
-    )
+    on_host(&"sweep", "full-sweep SAH on the host: the reference for the quality of the others", |spec| {
+        spec.on_host(HostMethod::Sweep(spec.sweep_leaves()?))
+    })
     .taking(&[COLLAPSE, OPTIMISE, TERMINATION]),
-    BuilderEntry::new(&"kd-exact", "kd-tree on the host: perfect splits by SAH", Kind::KdHost(Spec::kd_exact_options))
+    on_host(&"kd-exact", "kd-tree on the host: perfect splits by SAH", |spec| spec.kd_on_host(Planes::Exact))
         .taking(&[KT, KI, TRAVERSAL, TRACE]),
-    BuilderEntry::new(
-        &"kd-binned",
-        "kd-tree on the host: the best by SAH of equally spaced planes",
-        Kind::KdHost(Spec::kd_binned_options),
-    )
+    on_host(&"kd-binned", "kd-tree on the host: the best by SAH of equally spaced planes", |spec| {
+        spec.kd_on_host(Planes::Binned(spec.parsed(&BINS)?.unwrap_or(Planes::BINS)))
+    })
     .taking(&[BINS, KT, KI, TRAVERSAL, TRACE]),
-    BuilderEntry::new(
+    on_device(
         &"kd-gpu",
         "kd-tree on the device: bins above, level by level; perfect splits of few references below",
-        Kind::KdGpu,
+        Spec::kd_on_device,
     )
     .taking(&[BINS, EXACT, KT, KI, KD_SCHEDULE, WORKGROUPS, TRAVERSAL]),
-    BuilderEntry::new(
+    on_host(
         &"kd-gpu-host",
         "kd-tree of bins above and perfect splits below, on the host: what `kd-gpu` must equal, byte for byte",
-        Kind::KdHost(Spec::kd_mixed_options),
+        Spec::kd_mixed_on_host,
     )
     .taking(&[BINS, EXACT, KT, KI, TRAVERSAL, TRACE]),
-    BuilderEntry::new(
-        &"driver-fast-build",
-        "the Vulkan driver's own, asked to build fast",
-        Kind::Driver(DriverPreference::FastBuild),
-    ),
-    BuilderEntry::new(
-        &"driver-fast-trace",
-        "the Vulkan driver's own, asked to trace fast",
-        Kind::Driver(DriverPreference::FastTrace),
-    ),
+    needing(Needs::RayQuery, &"driver-fast-build", "the Vulkan driver's own, asked to build fast", |_| {
+        Ok(BuilderPlan::Driver(DriverPreference::FastBuild))
+    }),
+    needing(Needs::RayQuery, &"driver-fast-trace", "the Vulkan driver's own, asked to trace fast", |_| {
+        Ok(BuilderPlan::Driver(DriverPreference::FastTrace))
+    }),
     #[cfg(feature = "peer-obvhs")]
-    BuilderEntry::new(&"obvhs-fastest", "obvhs on the CPU: PLOC alone", Kind::Obvhs(obvhs::Preset::Fastest)),
+    on_host(&"obvhs-fastest", "obvhs on the CPU: PLOC alone", |_| Ok(BuilderPlan::Obvhs(obvhs::Preset::Fastest))),
     #[cfg(feature = "peer-obvhs")]
-    BuilderEntry::new(
-        &"obvhs-fast",
-        "obvhs on the CPU: PLOC and a little reinsertion",
-        Kind::Obvhs(obvhs::Preset::Fast),
-    ),
+    on_host(&"obvhs-fast", "obvhs on the CPU: PLOC and a little reinsertion", |_| {
+        Ok(BuilderPlan::Obvhs(obvhs::Preset::Fast))
+    }),
     #[cfg(feature = "peer-obvhs")]
-    BuilderEntry::new(
-        &"obvhs-medium",
-        "obvhs on the CPU: PLOC and more reinsertion",
-        Kind::Obvhs(obvhs::Preset::Medium),
-    ),
+    on_host(&"obvhs-medium", "obvhs on the CPU: PLOC and more reinsertion", |_| {
+        Ok(BuilderPlan::Obvhs(obvhs::Preset::Medium))
+    }),
     #[cfg(feature = "peer-embree")]
-    BuilderEntry::new(&"embree-low", "Embree on the CPU: Morton codes", Kind::Embree(embree::Preset::Low)),
+    on_host(&"embree-low", "Embree on the CPU: Morton codes", |_| Ok(BuilderPlan::Embree(embree::Preset::Low))),
     #[cfg(feature = "peer-embree")]
-    BuilderEntry::new(&"embree-medium", "Embree on the CPU: binned SAH", Kind::Embree(embree::Preset::Medium)),
+    on_host(&"embree-medium", "Embree on the CPU: binned SAH", |_| Ok(BuilderPlan::Embree(embree::Preset::Medium))),
     #[cfg(feature = "peer-embree")]
-    BuilderEntry::new(&"embree-high", "Embree on the CPU: SAH with spatial splits", Kind::Embree(embree::Preset::High)),
+    on_host(&"embree-high", "Embree on the CPU: SAH with spatial splits", |_| {
+        Ok(BuilderPlan::Embree(embree::Preset::High))
+    }),
 ];

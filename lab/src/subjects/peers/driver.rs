@@ -7,12 +7,13 @@
 use crate::device::{Device, Found, driver_is_missing};
 use crate::measure::record;
 use crate::scene::Mesh;
-use crate::subjects::device_rays::RayBuffers;
+use crate::subjects::build_memory::memory_record;
+use crate::subjects::device_rays::DeviceRays;
 use crate::subjects::level::Level;
 use crate::subjects::structures::Structures;
 use crate::subjects::{BuildRun, Subject};
 use crate::{Error, Result};
-use ash::vk;
+use ash::vk::{BuildAccelerationStructureFlagsKHR as Flags, BuildAccelerationStructureModeKHR as Mode};
 use hedgerow::accel::Instance;
 use hedgerow::gpu::Timestamps;
 use hedgerow::trace::{Hit, Query, Ray};
@@ -29,11 +30,11 @@ pub enum DriverPreference {
 /// A scene in the driver's acceleration structure.
 pub struct Driver<'a> {
     structures: Structures<'a>,
-    preference: DriverPreference,
+    name: &'static str,
     bottom: Level<'a>,
     top: Level<'a>,
     timestamps: Timestamps,
-    rays: Option<RayBuffers<'a>>,
+    rays: DeviceRays<'a>,
 }
 
 /// What a reader of the figures must know of this driver's builder, if anything.
@@ -67,43 +68,37 @@ impl<'a> Driver<'a> {
             let message = format!("{count} triangles, {} builds of at most {most}", device.found().name);
             return Err(Error::Argument(format!("{message}; take a smaller scene or another builder")));
         }
-        let flags = match preference {
-            DriverPreference::FastBuild => vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_BUILD,
-            DriverPreference::FastTrace => vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE,
+        let (name, flags) = match preference {
+            DriverPreference::FastBuild => ("driver-fast-build", Flags::PREFER_FAST_BUILD),
+            DriverPreference::FastTrace => ("driver-fast-trace", Flags::PREFER_FAST_TRACE),
         };
         let bottom = Level::bottom(&structures, mesh, flags)?;
         let top = Level::top(&structures, &[bottom.instance(&structures, Instance::IDENTITY)], flags)?;
-        Ok(Driver { structures, preference, bottom, top, timestamps: Timestamps::new(device, 2)?, rays: None })
+        let (timestamps, rays) = (Timestamps::new(device, 2)?, DeviceRays::new(device)?);
+        Ok(Driver { structures, name, bottom, top, timestamps, rays })
     }
 }
 
 impl Subject for Driver<'_> {
     fn builder(&self) -> &str {
-        match self.preference {
-            DriverPreference::FastBuild => "driver-fast-build",
-            DriverPreference::FastTrace => "driver-fast-trace",
-        }
+        self.name
     }
 
     fn kind(&self) -> &'static str {
         "driver"
     }
 
-    fn timer(&self) -> &'static str {
-        self.structures.device.timer()
-    }
-
-    fn traces_on_device(&self) -> bool {
-        true
+    fn device(&self) -> Option<&Device> {
+        Some(self.structures.device)
     }
 
     fn build(&mut self) -> Result<BuildRun> {
-        let (structures, mode) = (&self.structures, vk::BuildAccelerationStructureModeKHR::BUILD);
+        let structures = &self.structures;
         structures.device.run(Some(&mut self.timestamps), |recorder| {
             recorder.phase("build");
-            self.bottom.record(structures, recorder, mode)?;
+            self.bottom.record(structures, recorder, Mode::BUILD)?;
             recorder.phase("tlas");
-            self.top.record(structures, recorder, mode)
+            self.top.record(structures, recorder, Mode::BUILD)
         })?;
         let phases = self.timestamps.phases()?;
         let bottom = phases.first().map_or(0.0, |p| p.milliseconds);
@@ -112,26 +107,19 @@ impl Subject for Driver<'_> {
 
     fn memory(&self) -> record::MemoryRecord {
         let ([bottom, scratch], [top, _]) = (self.bottom.bytes(), self.top.bytes());
-        record::MemoryRecord {
-            structure_bytes: Some(bottom + top),
-            scratch_bytes: Some(scratch),
-            peak_bytes: Some(bottom + top + scratch),
-        }
+        memory_record(bottom + top, scratch)
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
-        // Both at once may be too much.
-        self.rays = None;
-        self.rays = Some(RayBuffers::new(self.structures.device, rays)?);
-        Ok(())
+        self.rays.set(rays)
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let Some(rays) = &self.rays else { return Ok(0.0) };
-        self.structures.trace(&mut self.timestamps, self.top.structure(), rays, query)
+        let (structures, top) = (&self.structures, self.structures.address(self.top.structure()));
+        self.rays.trace(top, |recorder, buffers| structures.record_trace(recorder, buffers, query))
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
-        Ok(self.rays.as_ref().map_or_else(Vec::new, RayBuffers::read_hits))
+        Ok(self.rays.hits())
     }
 }

@@ -27,19 +27,12 @@ pub enum Preset {
 }
 
 impl Preset {
-    fn name(self) -> &'static str {
+    /// The builder's name, and what Embree takes for it.
+    fn name_and_quality(self) -> (&'static str, BuildQuality) {
         match self {
-            Preset::Low => "embree-low",
-            Preset::Medium => "embree-medium",
-            Preset::High => "embree-high",
-        }
-    }
-
-    fn quality(self) -> BuildQuality {
-        match self {
-            Preset::Low => BuildQuality::LOW,
-            Preset::Medium => BuildQuality::MEDIUM,
-            Preset::High => BuildQuality::HIGH,
+            Preset::Low => ("embree-low", BuildQuality::LOW),
+            Preset::Medium => ("embree-medium", BuildQuality::MEDIUM),
+            Preset::High => ("embree-high", BuildQuality::HIGH),
         }
     }
 }
@@ -53,7 +46,7 @@ struct Bytes {
 
 /// A scene in Embree.
 pub struct Embree {
-    preset: Preset,
+    name: &'static str,
     device: Device,
     scene: Scene<'static>,
     geometry: u32,
@@ -86,9 +79,10 @@ impl Embree {
             true
         });
         let mut scene = device.create_scene().map_err(failed("rtcNewScene"))?;
-        scene.set_build_quality(preset.quality());
+        let (name, quality) = preset.name_and_quality();
+        scene.set_build_quality(quality);
         let mut geometry = TriangleMeshBuilder::new(&device).map_err(failed("rtcNewGeometry"))?;
-        geometry.set_build_quality(preset.quality());
+        geometry.set_build_quality(quality);
         geometry
             .set_new_buffer::<[f32; 3]>(BufferUsage::VERTEX, 0, Format::FLOAT3, 12, mesh.positions.len())
             .map_err(failed("rtcSetNewGeometryBuffer"))?
@@ -99,7 +93,7 @@ impl Embree {
             .copy_from_slice(&mesh.triangles);
         let geometry = scene.attach_geometry(&geometry.commit());
         let input_bytes = bytes.now.load(Ordering::Relaxed);
-        Ok(Embree { preset, device, scene, geometry, bytes, input_bytes, rays: Vec::new(), hits: Vec::new() })
+        Ok(Embree { name, device, scene, geometry, bytes, input_bytes, rays: Vec::new(), hits: Vec::new() })
     }
 
     fn trace_one(&self, context: &mut IntersectContext, ray: &Ray, query: Query) -> Hit {
@@ -124,15 +118,11 @@ impl Embree {
 
 impl Subject for Embree {
     fn builder(&self) -> &str {
-        self.preset.name()
+        self.name
     }
 
     fn kind(&self) -> &'static str {
         "host"
-    }
-
-    fn timer(&self) -> &'static str {
-        "wall"
     }
 
     fn build(&mut self) -> Result<BuildRun> {

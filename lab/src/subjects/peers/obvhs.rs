@@ -35,26 +35,20 @@ pub enum Preset {
 }
 
 impl Preset {
-    fn name(self) -> &'static str {
+    /// The builder's name, and what obvhs takes for it.
+    fn name_and_parameters(self) -> (&'static str, BvhBuildParams) {
         match self {
-            Preset::Fastest => "obvhs-fastest",
-            Preset::Fast => "obvhs-fast",
-            Preset::Medium => "obvhs-medium",
-        }
-    }
-
-    fn parameters(self) -> BvhBuildParams {
-        match self {
-            Preset::Fastest => BvhBuildParams::fastest_build(),
-            Preset::Fast => BvhBuildParams::fast_build(),
-            Preset::Medium => BvhBuildParams::medium_build(),
+            Preset::Fastest => ("obvhs-fastest", BvhBuildParams::fastest_build()),
+            Preset::Fast => ("obvhs-fast", BvhBuildParams::fast_build()),
+            Preset::Medium => ("obvhs-medium", BvhBuildParams::medium_build()),
         }
     }
 }
 
 /// A scene in obvhs's binary tree.
 pub struct Obvhs {
-    preset: Preset,
+    name: &'static str,
+    parameters: BvhBuildParams,
     triangles: Vec<Triangle>,
     tree: Tree,
     /// In the tree's order.
@@ -77,8 +71,9 @@ impl Obvhs {
             Triangle { v0, v1, v2 }
         };
         let triangles = (0..mesh.triangles.len()).map(triangle).collect();
-        let (tree, ordered) = (Tree::default(), Vec::new());
-        Ok(Obvhs { preset, triangles, tree, ordered, rays: HostRays::default() })
+        let (name, parameters) = preset.name_and_parameters();
+        let (tree, ordered, rays) = (Tree::default(), Vec::new(), HostRays::default());
+        Ok(Obvhs { name, parameters, triangles, tree, ordered, rays })
     }
 
     /// The weights of a hit, which obvhs does not give (Möller, Trumbore 1997, in double precision).
@@ -166,28 +161,23 @@ fn converted(tree: &Tree, triangles: &[Triangle]) -> Bvh2 {
 
 impl Subject for Obvhs {
     fn builder(&self) -> &str {
-        self.preset.name()
+        self.name
     }
 
     fn kind(&self) -> &'static str {
         "host"
     }
 
-    fn timer(&self) -> &'static str {
-        "wall"
-    }
-
     fn build(&mut self) -> Result<BuildRun> {
         let (building, tree) =
-            timed(|| build_bvh2_from_tris(&self.triangles, self.preset.parameters(), &mut Duration::default()));
+            timed(|| build_bvh2_from_tris(&self.triangles, self.parameters, &mut Duration::default()));
         self.tree = tree;
         let triangle = |&i: &u32| RtTriangle::from(&self.triangles[i as usize]);
         let (ordering, ()) = timed(|| {
             self.tree.primitive_indices.par_iter().map(triangle).collect_into_vec(&mut self.ordered);
         });
-        let phases =
-            vec![Phase { name: "build", milliseconds: building }, Phase { name: "triangles", milliseconds: ordering }];
-        Ok(BuildRun { milliseconds: building + ordering, phases })
+        let phases = [("build", building), ("triangles", ordering)];
+        Ok(BuildRun::of(phases.map(|(name, milliseconds)| Phase { name, milliseconds }).to_vec()))
     }
 
     fn memory(&self) -> record::MemoryRecord {

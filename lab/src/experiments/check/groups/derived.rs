@@ -4,11 +4,11 @@ use super::builders::meshes;
 use crate::device::Device;
 use crate::experiments::check::cases::{Cases, Found, same, same_all};
 use crate::experiments::check::corpus::{Mesh, unit_floats};
-use hedgerow::bvh::builder::Input;
+use crate::subjects::build_memory::DeviceMesh;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child, Header, Triangle};
-use hedgerow::bvh::refit::{self, Refit};
+use hedgerow::bvh::refit::{Refit, RefitOptions, RefitSchedule};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::{self, lbvh};
 use hedgerow::bvh::wide::device::{WideOptions, WidePass};
@@ -61,7 +61,7 @@ pub fn refit(cases: &mut Cases<'_>) {
         let moved: Vec<[f32; 3]> = positions.iter().map(|_| [next(), 3.0 * next(), next() - 7.0]).collect();
         for collapse in [Collapse::SAH, Collapse::OFF] {
             let tree = lbvh::build(positions, triangles, Code::Emc64Var.full(), collapse);
-            for schedule in [refit::RefitSchedule::Chain, refit::RefitSchedule::Workgroup] {
+            for schedule in [RefitSchedule::Chain, RefitSchedule::Workgroup] {
                 cases.case(format!("{name}, {collapse:?}, {schedule:?}"), |device| {
                     let moved = (name.clone(), moved.clone(), triangles.clone());
                     refit_as_on_host(device, &tree, &moved, schedule)
@@ -71,20 +71,19 @@ pub fn refit(cases: &mut Cases<'_>) {
     }
 }
 
-fn refit_as_on_host(device: &Device, tree: &Bvh2, mesh: &Mesh, schedule: refit::RefitSchedule) -> Found {
+fn refit_as_on_host(device: &Device, tree: &Bvh2, mesh: &Mesh, schedule: RefitSchedule) -> Found {
     let (_, positions, triangles) = mesh;
     let mut expected = tree.clone();
     twin::refit::refit_corners(&mut expected, lbvh::corners(positions, triangles), Collapse::SAH);
     expected.validate()?;
     let count = triangles.len() as u32;
-    let (vertices, indices) = (device.upload("positions", positions)?, device.upload("indices", triangles)?);
-    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), count);
-    let options = refit::RefitOptions { schedule: Some(schedule), ..refit::RefitOptions::DEFAULT };
+    let mesh = DeviceMesh::new(device, positions, triangles)?;
+    let options = RefitOptions { schedule: Some(schedule), ..RefitOptions::DEFAULT };
     let refit = Refit::new(device, &options, count)?;
     let bytes = tree.to_bytes();
     let structure = device.upload("structure", &[&bytes[..], &GUARD].concat())?;
     let scratch = device.upload("scratch", &vec![0xA5u8; refit.scratch_bytes() as usize])?;
-    device.run(None, |recorder| refit.record(recorder, &input, structure.region(), scratch.region()))?;
+    device.run(None, |recorder| refit.record(recorder, &mesh.input, structure.region(), scratch.region()))?;
     same("bytes behind the tree", &structure.read_at::<u8>(bytes.len() as u64, GUARD.len()), &GUARD.to_vec())?;
     let got = Bvh2::<Triangle>::from_bytes(&structure.read::<u8>(bytes.len()))?;
     // Points have a cost that is no number, which equals nothing.

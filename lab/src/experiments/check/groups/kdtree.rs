@@ -5,7 +5,7 @@ use crate::experiments::check::cases::{Cases, Found, same, same_all};
 use crate::experiments::check::corpus::{self, Mesh};
 use crate::experiments::check::shapes::{Corners, icosphere, placed, soup};
 use crate::experiments::check::twins::{PLENTY, PLENTY_TO_MERGE};
-use hedgerow::bvh::builder::Input;
+use crate::subjects::build_memory::DeviceMesh;
 use hedgerow::bvh::layout::status;
 use hedgerow::kdtree::builder::{KdBuilder, KdOptions, KdReport, KdSchedule};
 use hedgerow::kdtree::layout::{KdHeader, KdTree};
@@ -38,31 +38,28 @@ pub fn build(cases: &mut Cases<'_>) {
     }
 }
 
+/// Memory for a build: whatever was there before changes nothing.
+fn garbage<'a>(device: &'a Device, name: &str, bytes: u64) -> crate::Result<Buffer<'a>> {
+    device.upload(name, &vec![0xA5u8; bytes as usize])
+}
+
 fn built_as_on_host(device: &Device, (_, positions, triangles): &Mesh, options: &KdOptions) -> Found {
     let expected = twin::builder::build(positions, triangles, options)?;
     expected.validate()?;
-    let (vertices, indices) = (device.upload("positions", positions)?, device.upload("indices", triangles)?);
-    let count = triangles.len() as u32;
-    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), count);
-    let builder = KdBuilder::new(device, options, count)?;
+    let mesh = DeviceMesh::new(device, positions, triangles)?;
+    let builder = KdBuilder::new(device, options, mesh.input.primitive_count)?;
     let sizes = builder.sizes();
-    // Whatever was there before changes nothing.
-    let garbage = |bytes: u64| vec![0xA5u8; bytes as usize];
-    let structure = device.upload("structure", &garbage(sizes.structure))?;
-    let scratch = device.upload("scratch", &garbage(sizes.scratch))?;
-    device.run(None, |recorder| builder.record(recorder, &input, structure.region(), scratch.region()))?;
+    let structure = garbage(device, "structure", sizes.structure)?;
+    let scratch = garbage(device, "scratch", sizes.scratch)?;
+    device.run(None, |recorder| builder.record(recorder, &mesh.input, structure.region(), scratch.region()))?;
     let report: KdReport = scratch.read_at(builder.report_range().start, 1)[0];
     same("out of room", &(report.status & status::OUT_OF_ROOM), &0)?;
     compare(&KdTree::from_bytes(&structure.read::<u8>(sizes.structure as usize))?, &expected)
 }
 
-/// The header without what tells of room.
-fn without_room(header: &KdHeader) -> KdHeader {
-    KdHeader { node_room: 0, reference_room: 0, record_room: 0, ..*header }
-}
-
 fn compare(got: &KdTree, expected: &KdTree) -> Found {
-    same("header", &without_room(&got.header), &without_room(&expected.header))?;
+    let without_room = |tree: &KdTree| KdHeader { node_room: 0, reference_room: 0, record_room: 0, ..tree.header };
+    same("header", &without_room(got), &without_room(expected))?;
     let contents = |tree: &KdTree| tree.nodes.iter().map(|node| node.content()).collect::<Vec<_>>();
     same_all("node", &contents(got), &contents(expected))?;
     same_all("reference", &got.references, &expected.references)?;
@@ -107,22 +104,19 @@ fn merged_as_on_host(device: &Device, still: &Corners, objects: &[Corners], sche
     let merger = Merger::new(device, &options, &still.header, most)?;
     let before = still.to_bytes();
     let structure = device.upload("structure", &before)?;
-    let garbage = |bytes: u64| vec![0xA5u8; bytes as usize];
     let sizes = merger.sizes();
-    let (scratch, undo) =
-        (device.upload("scratch", &garbage(sizes.scratch))?, device.upload("undo", &garbage(sizes.undo))?);
+    let scratch = garbage(device, "scratch", sizes.scratch)?;
+    let undo = garbage(device, "undo", sizes.undo)?;
 
     let mut first_primitive = still.header.primitive_count;
     let (mut given, mut twins) = (Vec::new(), Vec::new());
-    let mut buffers: Vec<[Buffer<'_>; 2]> = Vec::new();
+    let mut uploaded: Vec<DeviceMesh<'_>> = Vec::new();
     for (_, positions, triangles) in &meshes {
-        let lists = [device.upload("positions", positions)?, device.upload("indices", triangles)?];
-        let count = triangles.len() as u32;
-        let input = Input::mesh(lists[0].address(), positions.len() as u32, lists[1].address(), count);
-        given.push(Object { input, first_primitive, tree: None });
+        let mesh = DeviceMesh::new(device, positions, triangles)?;
+        given.push(Object { input: mesh.input, first_primitive, tree: None });
         twins.push(twin::merge::HostObject { first_primitive, positions, triangles });
-        buffers.push(lists);
-        first_primitive += count;
+        uploaded.push(mesh);
+        first_primitive += triangles.len() as u32;
     }
     let KdOptions { bins, exact, costs, .. } = options.build;
     let expected = twin::merge::merge(&still, &twins, costs, (bins, exact))?;
@@ -135,9 +129,6 @@ fn merged_as_on_host(device: &Device, still: &Corners, objects: &[Corners], sche
     same("out of room", &(report.status & status::OUT_OF_ROOM), &0)?;
     compare(&tree()?, &expected)?;
     device.run(None, |recorder| merger.restore(recorder, memory()))?;
-    same(
-        "the tree after a restore is the static one",
-        &(tree()?.to_bytes() == KdTree::from_bytes(&before)?.to_bytes()),
-        &true,
-    )
+    let is_as_before = tree()?.to_bytes() == KdTree::from_bytes(&before)?.to_bytes();
+    same("the tree after a restore is the static one", &is_as_before, &true)
 }

@@ -6,10 +6,11 @@ use crate::experiments::check::corpus;
 use crate::experiments::check::shapes::{hard_rays, icosphere, tree_with};
 use crate::experiments::check::twins::{compare, on_device, on_host};
 use crate::random::SplitMix64;
+use crate::subjects::device_rays::RayBuffers;
 use hedgerow::bvh::builder::BuildOptions;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
+use hedgerow::trace::tracer::{self, TraceShape};
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray};
 use rayon::prelude::*;
@@ -56,13 +57,11 @@ fn many_rays(cases: &mut Cases<'_>) {
     let rays: Vec<Ray> = some.iter().copied().cycle().take(count).collect();
     cases.case(format!("{count} rays"), |device| {
         let structure = device.upload("structure", &tree.to_bytes())?;
-        let ray_buffer = device.upload("rays", &rays)?;
-        let hits = device.buffer("hits", (size_of::<Hit>() * rays.len()) as u64)?;
-        let (structure, count) = (structure.address(), rays.len() as u32);
-        let buffers = TraceBuffers { structure, rays: ray_buffer.region(), hits: hits.region(), work: None, count };
+        let traced = RayBuffers::new(device, &rays)?;
+        let buffers = traced.buffers(structure.address(), None);
         device.run(None, |r| tracer::record(r, &shape, Query::ClosestHit, &buffers))?;
         let expected: Vec<Hit> = some.par_iter().map(|ray| host::closest_hit(&tree, ray)).collect();
         let expected: Vec<Hit> = expected.into_iter().cycle().take(rays.len()).collect();
-        same_all("hit of ray", &hits.read::<Hit>(rays.len()), &expected)
+        same_all("hit of ray", &traced.read_hits(), &expected)
     });
 }

@@ -2,7 +2,7 @@
 
 use crate::device::{Buffer, Device};
 use crate::experiments::check::agree::assert_reports;
-use crate::experiments::check::backend::{Backend, BuildInfo, Built, Ours};
+use crate::experiments::check::backend::{Backend, BuildInfo, Built, Ours, scratch_of, submit_build};
 use crate::experiments::check::cases::{Cases, Found, same, same_all};
 use crate::experiments::check::matrices::{moved, rotation};
 use crate::experiments::check::mixture::{ReadBack, mixture};
@@ -10,6 +10,7 @@ use crate::experiments::check::probe::{CONFIRM_ODD, ProbeRay};
 use crate::experiments::check::shapes::{boxes, soup};
 use crate::experiments::check::world::{BuiltWorld, Part, World};
 use crate::random::SplitMix64;
+use crate::subjects::structures::{Geometry, Range, Structure};
 use ash::vk::{self, Handle};
 use hedgerow::accel::{AccelOptions, Instance, Property, REBRAID, twin};
 use hedgerow::bvh::layout::{self, Bvh2, Record, Triangle};
@@ -17,42 +18,29 @@ use vk::BuildAccelerationStructureFlagsKHR as Flags;
 use vk::CopyAccelerationStructureModeKHR as Mode;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
-type Range = vk::AccelerationStructureBuildRangeInfoKHR;
-
 fn rays(count: usize, spread: f32) -> Vec<ProbeRay> {
     let mut random = SplitMix64::new(9);
     let ray = |_| {
-        let (origin, target) = (random.around(8.0), random.around(spread));
-        let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
+        let ray = ProbeRay::to(random.around(8.0), random.around(spread));
         ProbeRay { decision: CONFIRM_ODD, generated_t: 0.75, ..ray }
     };
     (0..count).map(ray).collect()
 }
 
-fn info<'a>(
-    ty: vk::AccelerationStructureTypeKHR,
-    geometries: &'a [vk::AccelerationStructureGeometryKHR<'a>],
-) -> BuildInfo<'a> {
+fn info(ty: vk::AccelerationStructureTypeKHR, geometries: &[Geometry]) -> BuildInfo<'_> {
     BuildInfo::default().ty(ty).flags(Flags::ALLOW_UPDATE).geometries(geometries)
 }
 
 /// Updates `source` into `target`, with scratch memory of the size that an update asks for.
 fn updated(ours: &Ours, info: BuildInfo<'_>, ranges: &[Range], source: &Built, target: &Built) -> Found {
     let counts: Vec<u32> = ranges.iter().map(|range| range.primitive_count).collect();
-    let alignment = ours.scratch_alignment();
-    let bytes = ours.build_sizes(&info, &counts).update_scratch_size + alignment;
-    let scratch = ours.device().buffer("scratch", bytes)?;
-    let scratch_data = vk::DeviceOrHostAddressKHR { device_address: scratch.address().next_multiple_of(alignment) };
+    let (_scratch, scratch) = scratch_of(ours, ours.build_sizes(&info, &counts).update_scratch_size);
     let info = info
         .mode(vk::BuildAccelerationStructureModeKHR::UPDATE)
         .src_acceleration_structure(source.structure)
         .dst_acceleration_structure(target.structure)
-        .scratch_data(scratch_data);
-    ours.device().run(None, |recorder| {
-        ours.build(recorder, &[info], &[ranges]);
-        Ok(())
-    })?;
-    Ok(())
+        .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch });
+    Ok(submit_build(ours, &info, ranges)?)
 }
 
 pub fn update(cases: &mut Cases<'_>) {
@@ -87,11 +75,8 @@ fn bottom_level(device: &'static Device, before: &Part, after: &Part, in_place: 
     let counts: Vec<u32> = ranges.iter().map(|range| range.primitive_count).collect();
     let first = Built::new(&ours, &asked, &ranges, 0);
     let other = Built::place(&ours, &asked, &counts, 0);
-    let contents: Vec<Vec<u8>> = match after {
-        Part::Triangles(all) => all.iter().map(|(corners, _)| bytemuck::cast_slice(corners).to_vec()).collect(),
-        Part::Boxes(all) => all.iter().map(|(boxes, _)| bytemuck::cast_slice(boxes).to_vec()).collect(),
-    };
-    memory.iter().zip(contents).for_each(|(buffer, bytes)| buffer.write(&bytes));
+    let (_, _, moved) = after.geometries(device);
+    memory.iter().zip(&moved).for_each(|(buffer, moved)| buffer.write(&bytes_of(moved)));
     updated(&ours, asked, &ranges, &first, if in_place { &first } else { &other })?;
     let target = if in_place { first } else { other };
     let world = World::new(vec![after.clone()], vec![Instance::new(1, Instance::IDENTITY)]);
@@ -123,65 +108,61 @@ fn top_level_follows(device: &'static Device, count: usize) -> Found {
     Ok(())
 }
 
-/// Memory for a copy, and its handle.
-struct Place(Buffer<'static>);
-
-impl Place {
-    fn new(device: &'static Device, bytes: u64) -> crate::Result<Place> {
-        Ok(Place(device.upload("copy", &vec![0xa5u8; bytes as usize])?))
-    }
-
-    fn handle(&self) -> vk::AccelerationStructureKHR {
-        vk::AccelerationStructureKHR::from_raw(self.0.address())
-    }
-
-    fn read(&self) -> Vec<u8> {
-        self.0.read(self.0.bytes() as usize)
-    }
+fn bytes_of(buffer: &Buffer<'_>) -> Vec<u8> {
+    buffer.read(buffer.bytes() as usize)
 }
 
-fn size_after(ours: &Ours, structure: vk::AccelerationStructureKHR, property: Property) -> crate::Result<u64> {
+/// Memory for a copy.
+fn room(ours: &Ours, bytes: u64) -> crate::Result<Buffer<'static>> {
+    ours.device().upload("copy", &vec![0xa5u8; bytes as usize])
+}
+
+/// The handle of a structure of ours, by its memory.
+fn handle(memory: &Buffer<'_>) -> Structure {
+    Structure::from_raw(memory.address())
+}
+
+/// Submits a call of ours.
+fn run(ours: &Ours, call: impl FnOnce(vk::CommandBuffer) -> hedgerow::Result<()>) -> crate::Result<()> {
+    ours.device().run(None, |recorder| call(recorder.commands()))
+}
+
+fn size_after(ours: &Ours, structure: Structure, property: Property) -> crate::Result<u64> {
     let result = ours.device().buffer("property", 16)?;
     // SAFETY: the structure is built, and the results have room for one word.
-    ours.device().run(None, |recorder| unsafe {
-        let commands = recorder.commands();
+    run(ours, |commands| unsafe {
         ours.0.cmd_write_acceleration_structures_properties(commands, &[structure], property, result.address())
     })?;
     Ok(result.read::<u64>(1)[0])
 }
 
-fn copied(ours: &Ours, source: vk::AccelerationStructureKHR, bytes: u64, mode: Mode) -> crate::Result<Place> {
-    let target = Place::new(ours.device(), bytes)?;
-    let info = vk::CopyAccelerationStructureInfoKHR::default().src(source).dst(target.handle()).mode(mode);
+fn copied(ours: &Ours, source: Structure, bytes: u64, mode: Mode) -> crate::Result<Buffer<'static>> {
+    let target = room(ours, bytes)?;
+    let info = vk::CopyAccelerationStructureInfoKHR::default().src(source).dst(handle(&target)).mode(mode);
     // SAFETY: the structure is built, and its copy has the room that the property says.
-    ours.device()
-        .run(None, |recorder| unsafe { ours.0.cmd_copy_acceleration_structure(recorder.commands(), &info) })?;
+    run(ours, |commands| unsafe { ours.0.cmd_copy_acceleration_structure(commands, &info) })?;
     Ok(target)
 }
 
-fn serialised(ours: &Ours, source: vk::AccelerationStructureKHR) -> crate::Result<Place> {
-    let target = Place::new(ours.device(), size_after(ours, source, Property::SerializedSize)?)?;
+fn serialised(ours: &Ours, source: Structure) -> crate::Result<Buffer<'static>> {
+    let target = room(ours, size_after(ours, source, Property::SerializedSize)?)?;
     let info = vk::CopyAccelerationStructureToMemoryInfoKHR::default()
         .src(source)
-        .dst(vk::DeviceOrHostAddressKHR { device_address: target.0.address() })
+        .dst(vk::DeviceOrHostAddressKHR { device_address: target.address() })
         .mode(Mode::SERIALIZE);
     // SAFETY: as above.
-    ours.device().run(None, |recorder| unsafe {
-        ours.0.cmd_copy_acceleration_structure_to_memory(recorder.commands(), &info)
-    })?;
+    run(ours, |commands| unsafe { ours.0.cmd_copy_acceleration_structure_to_memory(commands, &info) })?;
     Ok(target)
 }
 
-fn deserialised(ours: &Ours, memory: &Place, bytes: u64) -> crate::Result<Place> {
-    let target = Place::new(ours.device(), bytes)?;
+fn deserialised(ours: &Ours, memory: &Buffer<'_>, bytes: u64) -> crate::Result<Buffer<'static>> {
+    let target = room(ours, bytes)?;
     let info = vk::CopyMemoryToAccelerationStructureInfoKHR::default()
-        .src(vk::DeviceOrHostAddressConstKHR { device_address: memory.0.address() })
-        .dst(target.handle())
+        .src(vk::DeviceOrHostAddressConstKHR { device_address: memory.address() })
+        .dst(handle(&target))
         .mode(Mode::DESERIALIZE);
     // SAFETY: the memory holds what was serialised.
-    ours.device().run(None, |recorder| unsafe {
-        ours.0.cmd_copy_memory_to_acceleration_structure(recorder.commands(), &info)
-    })?;
+    run(ours, |commands| unsafe { ours.0.cmd_copy_memory_to_acceleration_structure(commands, &info) })?;
     Ok(target)
 }
 
@@ -207,7 +188,7 @@ pub fn copies(cases: &mut Cases<'_>) {
             let before = ours.probe(built.top.structure, &rays);
             let bytes = size_after(&ours, built.top.structure, Property::CompactedSize)?;
             let compacted = copied(&ours, built.top.structure, bytes, Mode::COMPACT)?;
-            same_all("report of ray", &ours.probe(compacted.handle(), &rays), &before)
+            same_all("report of ray", &ours.probe(handle(&compacted), &rays), &before)
         });
     }
 }
@@ -219,16 +200,16 @@ fn copies_are_those_of_the_host<R: Record>(ours: &Ours, built: &Built) -> Found 
     let bytes = tree.to_bytes();
     same("size", &size_after(ours, built.structure, Property::Size)?, &(bytes.len() as u64))?;
     let clone = copied(ours, built.structure, bytes.len() as u64, Mode::CLONE)?;
-    same_all("cloned byte", &clone.read(), &bytes)?;
+    same_all("cloned byte", &bytes_of(&clone), &bytes)?;
     let expected = tree.compacted().to_bytes();
     let compacted_bytes = size_after(ours, built.structure, Property::CompactedSize)?;
     same("compacted size", &compacted_bytes, &(expected.len() as u64))?;
     let compacted = copied(ours, built.structure, compacted_bytes, Mode::COMPACT)?;
-    same_all("compacted byte", &compacted.read(), &expected)?;
-    let memory = serialised(ours, compacted.handle())?;
-    same_all("serialised byte", &memory.read(), &twin::serialize::write(&expected)?)?;
+    same_all("compacted byte", &bytes_of(&compacted), &expected)?;
+    let memory = serialised(ours, handle(&compacted))?;
+    same_all("serialised byte", &bytes_of(&memory), &twin::serialize::write(&expected)?)?;
     let back = deserialised(ours, &memory, compacted_bytes)?;
-    same_all("byte brought back", &back.read(), &expected)
+    same_all("byte brought back", &bytes_of(&back), &expected)
 }
 
 pub fn rebraid(cases: &mut Cases<'_>) {

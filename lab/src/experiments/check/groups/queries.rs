@@ -9,16 +9,16 @@ use crate::experiments::check::probe::{CONFIRM, CONFIRM_ODD, IGNORE, ProbeRay, T
 use crate::experiments::check::shapes::{Corners, boxes as random_boxes, icosphere, soup};
 use crate::experiments::check::world::{Part, World, inverse, transformed};
 use crate::random::SplitMix64;
+use anyhow::ensure;
 use ash::vk;
+use glam::Vec3;
 use hedgerow::accel::{Instance, REBRAID};
 use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
 
 /// The world's reports are right, and enough rays hit for that to say something.
 fn agrees(device: &'static Device, what: &str, world: &World, rays: &[ProbeRay], least_hits: usize) -> Found {
     let hits = assert_agrees(&Ours::on(device), what, world, rays);
-    if hits < least_hits {
-        return Err(format!("{hits} rays hit, expected {least_hits} or more").into());
-    }
+    ensure!(hits >= least_hits, "{hits} rays hit, expected {least_hits} or more");
     Ok(())
 }
 
@@ -149,9 +149,7 @@ fn masks(cases: &mut Cases<'_>) {
 /// A sphere shows its front outside and its back inside, however its instance is mirrored; and culling goes by that.
 pub fn facing(cases: &mut Cases<'_>) {
     let outward = |[a, b, c]: [[f32; 3]; 3]| {
-        let volume = a[0] * (b[1] * c[2] - b[2] * c[1])
-            + a[1] * (b[2] * c[0] - b[0] * c[2])
-            + a[2] * (b[0] * c[1] - b[1] * c[0]);
+        let volume = Vec3::from(a).dot(Vec3::from(b).cross(c.into()));
         if volume > 0.0 { [a, b, c] } else { [a, c, b] }
     };
     let sphere: Corners = icosphere(2).into_iter().map(outward).collect();
@@ -242,8 +240,8 @@ fn forest(cases: &mut Cases<'_>) {
             let aim = world.instances[random.bits() as usize % count as usize].transform;
             let [x, y] = [0, 1].map(|k| aim[k][3] + 0.1 * random.signed());
             let origin = [[x + 4.0, y - 3.0, 0.5], [x + 9.0, y + 5.0, 90.0]][i % 2];
-            let way = std::array::from_fn(|k| [x, y, 0.3][k] - origin[k]);
-            ProbeRay { mask: [1, 0xff, 6][i % 3], t_max: [1.0, 2.0][i % 2], ..ProbeRay::new(origin, way) }
+            let ray = ProbeRay::to(origin, [x, y, 0.3]);
+            ProbeRay { mask: [1, 0xff, 6][i % 3], t_max: [1.0, 2.0][i % 2], ..ray }
         })
         .collect();
     cases.case(format!("{count} instances"), |device| agrees(device, "forest", &world, &rays, 20));
@@ -255,13 +253,8 @@ pub fn boxes(cases: &mut Cases<'_>) {
     let mut random = SplitMix64::new(12);
     let rays: Vec<ProbeRay> = (0..600)
         .map(|i| {
-            let (origin, target) = (random.around(3.0), random.around(0.7));
-            let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
-            ProbeRay {
-                decision: [CONFIRM, IGNORE][i / 6 % 2],
-                generated_t: [0.0, 0.4, 0.6, 0.8, 1.0, 4.0][i % 6],
-                ..ray
-            }
+            let (decision, generated_t) = ([CONFIRM, IGNORE][i / 6 % 2], [0.0, 0.4, 0.6, 0.8, 1.0, 4.0][i % 6]);
+            ProbeRay { decision, generated_t, ..ProbeRay::to(random.around(3.0), random.around(0.7)) }
         })
         .collect();
     let lists =

@@ -10,10 +10,9 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::wide::Form;
 use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
-use hedgerow::kdtree::layout::KdTree;
-use hedgerow::trace::kd::KdTracer;
-use hedgerow::trace::kd::Traversal;
-use hedgerow::trace::tracer::{self, Loads, TraceShape};
+use hedgerow::gpu::Recorder;
+use hedgerow::trace::kd::{KdTracer, Traversal};
+use hedgerow::trace::tracer::{self, Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::kd as kd_host;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
@@ -57,23 +56,31 @@ fn scenes(cases: &Cases<'_>) -> Vec<Scene> {
     scenes
 }
 
-/// The same hits and work.
-fn as_on_host(expected: &[(Hit, Work)], (hits, work): &(Vec<Hit>, Vec<Work>)) -> Found {
+/// What `record` records finds the same hits with the same work.
+fn as_on_host(
+    device: &Device,
+    structure: &[u8],
+    rays: &[Ray],
+    expected: &[(Hit, Work)],
+    record: impl FnOnce(&mut Recorder<'_>, &TraceBuffers) -> hedgerow::Result<()>,
+) -> Found {
+    let (hits, work) = traced(device, structure, rays, true, record)?;
     let (expected_hits, expected_work): (Vec<Hit>, Vec<Work>) = expected.iter().copied().unzip();
-    same_all("hit of ray", hits, &expected_hits)?;
-    same_all("work of ray", work, &expected_work)
+    same_all("hit of ray", &hits, &expected_hits)?;
+    same_all("work of ray", &work, &expected_work)
 }
 
 /// The closest hits of brute force; of any-hit whether there is one.
 fn as_by_brute_force(tree: &Bvh2, rays: &[Ray], query: Query, hits: &[(Hit, Work)]) -> Found {
+    let hits = hits.iter().map(|(hit, _)| hit);
     match query {
         Query::ClosestHit => {
             let expected: Vec<Hit> = rays.par_iter().map(|ray| host::closest_hit_by_brute_force(tree, ray)).collect();
-            same_all("hit of ray", &hits.iter().map(|(hit, _)| *hit).collect::<Vec<_>>(), &expected)
+            same_all("hit of ray", &hits.copied().collect::<Vec<_>>(), &expected)
         }
         Query::AnyHit => {
             let expected: Vec<f32> = rays.par_iter().map(|ray| host::any_hit_by_brute_force(tree, ray).t).collect();
-            same_all("any hit of ray", &hits.iter().map(|(hit, _)| hit.t).collect::<Vec<_>>(), &expected)
+            same_all("any hit of ray", &hits.map(|hit| hit.t).collect::<Vec<_>>(), &expected)
         }
     }
 }
@@ -108,10 +115,9 @@ pub fn binary(cases: &mut Cases<'_>) {
                 cases.case(format!("{what}, the host's"), |_| as_by_brute_force(&tree, &rays, query, &expected));
                 for shape in shapes(cases.device, cases.quick) {
                     cases.case(format!("{what}, {shape:?}"), |device| {
-                        let got = traced(device, &bytes, &rays, true, |r, buffers| {
+                        as_on_host(device, &bytes, &rays, &expected, |r, buffers| {
                             tracer::record(r, &shape, query, buffers)
-                        })?;
-                        as_on_host(&expected, &got)
+                        })
                     });
                 }
             }
@@ -150,10 +156,7 @@ fn wide_form<N: TracedNode>(cases: &mut Cases<'_>, name: &str, tree: &Bvh2, rays
             let expected: Vec<(Hit, Work)> = rays.iter().map(trace).collect();
             cases.case(format!("{name}, {query:?}, {tracer:?}"), |device| {
                 as_by_brute_force(tree, rays, query, &expected)?;
-                as_on_host(
-                    &expected,
-                    &traced(device, &bytes, rays, true, |r, buffers| tracer.record(r, query, buffers))?,
-                )
+                as_on_host(device, &bytes, rays, &expected, |r, buffers| tracer.record(r, query, buffers))
             });
         }
     }
@@ -177,20 +180,14 @@ pub fn kd(cases: &mut Cases<'_>) {
         let (bvh, bytes) = (tree_with(&corners, Collapse::SAH), tree.to_bytes());
         for &traversal in &all[..if cases.quick { 1 } else { all.len() }] {
             for query in QUERIES {
-                let expected = kd_expected(&tree, &rays, query, traversal);
+                let trace = |ray: &Ray| kd_host::trace(&tree, ray, query, traversal);
+                let expected: Vec<(Hit, Work)> = rays.iter().map(trace).collect();
                 cases.case(format!("{name}, {query:?}, {traversal:?}"), |device| {
                     as_by_brute_force(&bvh, &rays, query, &expected)?;
                     let tracer = KdTracer::new(device, traversal);
-                    as_on_host(
-                        &expected,
-                        &traced(device, &bytes, &rays, true, |r, buffers| tracer.record(r, query, buffers))?,
-                    )
+                    as_on_host(device, &bytes, &rays, &expected, |r, buffers| tracer.record(r, query, buffers))
                 });
             }
         }
     }
-}
-
-fn kd_expected(tree: &KdTree, rays: &[Ray], query: Query, traversal: Traversal) -> Vec<(Hit, Work)> {
-    rays.iter().map(|ray| kd_host::trace(tree, ray, query, traversal)).collect()
 }

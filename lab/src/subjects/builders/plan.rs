@@ -1,0 +1,100 @@
+//! What a [`Spec`](super::Spec) asks for, its options as values; and a builder of ours on the device made from that.
+
+use super::options::OPTIMISE;
+use crate::Result;
+use crate::device::Device;
+use crate::scene::Mesh;
+use crate::subjects::Subject;
+use crate::subjects::device_bvh::DeviceBvh;
+use crate::subjects::host::HostBvhOptions;
+use crate::subjects::peers::driver::DriverPreference;
+#[cfg(feature = "peer-embree")]
+use crate::subjects::peers::embree;
+#[cfg(feature = "peer-obvhs")]
+use crate::subjects::peers::obvhs;
+use hedgerow::bvh::builder::BuildOptions;
+use hedgerow::bvh::reinsertion::ReinsertionOptions;
+use hedgerow::bvh::wide::Form;
+use hedgerow::kdtree::builder::KdOptions;
+use hedgerow::trace::kd::Traversal;
+use hedgerow::trace::wide::{Order, WideTracer};
+use hedgerow_host::kdtree::HostKdOptions;
+use std::time::Duration;
+
+/// What is asked for.
+pub(crate) enum BuilderPlan {
+    /// One of ours on the device.
+    Device(DevicePlan),
+    /// One of ours on the host.
+    Host(HostBvhOptions),
+    /// A kd-tree by one of ours.
+    Kd(KdSpec),
+    /// The one of ours on the device that is expected to take least for so many rays a build, by the table of costs.
+    Auto(f64),
+    /// The Vulkan driver's own.
+    Driver(DriverPreference),
+    #[cfg(feature = "peer-obvhs")]
+    Obvhs(obvhs::Preset),
+    #[cfg(feature = "peer-embree")]
+    Embree(embree::Preset),
+}
+
+/// A builder of kd-trees, for those that build more than one of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum KdSpec {
+    /// On the host.
+    Host {
+        /// What it builds.
+        options: HostKdOptions,
+        /// How its trees are traced.
+        traversal: Traversal,
+        /// Whether that is on the device.
+        traces_on_device: bool,
+    },
+    /// On the device, which traces them, too.
+    Device {
+        /// What it builds.
+        options: KdOptions,
+        /// How its trees are traced.
+        traversal: Traversal,
+    },
+}
+
+/// A builder of ours on the device.
+pub(crate) struct DevicePlan {
+    pub(super) options: BuildOptions,
+    /// Of the wide tree, where there shall be one.
+    pub(super) form: Option<Form>,
+    /// The order in which that is traced, where it was given.
+    pub(super) order: Option<Order>,
+    /// How long reinsertion may take, where it was given a time.
+    pub(super) time_to_optimise: Option<Duration>,
+}
+
+impl DevicePlan {
+    /// The builder on a scene, with the options that depend on the device.
+    ///
+    /// # Errors
+    /// Those of [`DeviceBvh::new`].
+    pub(crate) fn make<'a>(&self, device: &'a Device, name: &str, mesh: &Mesh) -> Result<DeviceBvh<'a>> {
+        let wide = self.form.map(|form| match self.order {
+            None => WideTracer::of(device, form),
+            Some(order) => WideTracer::in_order(device, form, order),
+        });
+        let mut options = self.options;
+        if let Some(time) = self.time_to_optimise {
+            let pass = pass_of_reinsertion(device, mesh, &options)?;
+            options.optimise = Some(ReinsertionOptions::within(time, pass));
+        }
+        DeviceBvh::new(device, name, mesh, &options, wide)
+    }
+}
+
+/// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
+fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &BuildOptions) -> Result<Duration> {
+    let mut subject = DeviceBvh::new(device, "", mesh, options, None)?;
+    subject.build()?;
+    let run = subject.build()?;
+    let milliseconds: f64 = run.phases.iter().filter(|p| p.name == OPTIMISE.key).map(|p| p.milliseconds).sum();
+    Ok(Duration::from_secs_f64(1e-3 * milliseconds))
+}
