@@ -3,6 +3,7 @@
 use crate::experiments::bench::matrix::Outcome;
 use crate::measure::record::Record;
 use crate::report::numbers::{bytes, duration, grouped, three_digits};
+use crate::report::table::styled;
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
 /// A line below the header, and nothing else.
@@ -10,13 +11,7 @@ const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().f
 
 /// An empty table in our style; columns from `numbers` on are aligned to the right.
 pub fn table(header: &[&str], numbers: usize) -> Table {
-    let mut table = Table::new();
-    table.load_style(STYLE);
-    table.set_header(header.iter().copied());
-    for column in table.column_iter_mut().skip(numbers) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
+    styled(STYLE, header.iter().copied(), numbers)
 }
 
 fn or_dash<T>(value: Option<T>, text: impl FnOnce(T) -> String) -> String {

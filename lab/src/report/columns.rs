@@ -7,6 +7,7 @@ use maud::{Markup, html};
 /// A table over rows of a kind, which is sorted by pressing a heading.
 pub struct Table<'a, R> {
     label: String,
+    caption: Option<&'a str>,
     id: Option<&'a str>,
     rows: Vec<R>,
     columns: Vec<(Markup, Cell<'a, R>)>,
@@ -18,12 +19,17 @@ type Cell<'a, R> = Box<dyn Fn(&R) -> Markup + 'a>;
 impl<'a, R> Table<'a, R> {
     /// With its label, for those who cannot see it; no columns yet.
     pub fn new(label: impl Into<String>, rows: impl IntoIterator<Item = R>) -> Self {
-        Table { label: label.into(), id: None, rows: rows.into_iter().collect(), columns: Vec::new() }
+        Table { label: label.into(), caption: None, id: None, rows: rows.into_iter().collect(), columns: Vec::new() }
     }
 
     /// With an identifier, for links and scripts.
     pub fn id(self, id: &'a str) -> Self {
         Table { id: Some(id), ..self }
+    }
+
+    /// With a caption that is not its label.
+    pub fn caption(self, caption: &'a str) -> Self {
+        Table { caption: Some(caption), ..self }
     }
 
     /// What the row is called.
@@ -86,7 +92,7 @@ impl<'a, R> Table<'a, R> {
         let mut context = context.peekable();
         let table = html! {
             table.sortable id=[self.id] {
-                caption.hidden { (self.label) }
+                caption.hidden { (self.caption.unwrap_or(&self.label)) }
                 thead { tr { @for (heading, _) in &self.columns { (heading) } } }
                 tbody { @for row in &self.rows { tr { @for (_, cell) in &self.columns { (cell(row)) } } } }
                 @if context.peek().is_some() { tbody.context { @for row in context { tr { (row) } } } }

@@ -115,8 +115,8 @@ pub fn figure(chart: &Chart) -> Markup {
         figure.chart {
             div.canvas { (PreEscaped(chart.inline())) }
             figcaption {
-                (chart.reading) " "
-                span.files { a href={ "charts/" (chart.name) ".svg" } { "SVG" } " " a href={ "charts/" (chart.name) ".png" } { "PNG" } }
+                (chart.caption.reading) " "
+                span.files { a href={ "charts/" (chart.caption.name) ".svg" } { "SVG" } " " a href={ "charts/" (chart.caption.name) ".png" } { "PNG" } }
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::measure::record::Record;
 use crate::report::lines::{self, Lines};
+use crate::report::names::distinct;
 use crate::{Error, Result};
 use std::path::Path;
 
@@ -43,12 +44,7 @@ pub fn read(path: &Path) -> Result<Vec<Record>> {
 /// The file cannot be written.
 pub fn write_csv(path: &Path, records: &[&Record]) -> Result<()> {
     let wrong = |e: csv::Error| Error::file(path)(e.into());
-    let mut kinds: Vec<&str> = Vec::new();
-    for trace in records.iter().flat_map(|r| &r.trace) {
-        if !kinds.contains(&trace.rays.as_str()) {
-            kinds.push(&trace.rays);
-        }
-    }
+    let kinds = distinct(records.iter().flat_map(|r| &r.trace).map(|trace| trace.rays.as_str()));
     let mut table = csv::Writer::from_path(path).map_err(wrong)?;
     let per_kind = kinds.iter().flat_map(|kind| ["mrays_s", "steps", "tests"].map(|figure| format!("{kind}_{figure}")));
     table.write_record(COLUMNS.iter().map(|(name, _)| (*name).to_owned()).chain(per_kind)).map_err(wrong)?;

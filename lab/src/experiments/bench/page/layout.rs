@@ -22,12 +22,12 @@ use maud::{Markup, html};
 pub(super) fn document<'r>(
     report: &'r Report,
     legend: &Legend,
-    scenes: &[SceneCharts],
+    scenes: &[SceneCharts<'_>],
     growth: Option<&Chart>,
 ) -> Document<'r> {
     let records = report.records();
     let mut sections = vec![Section::new("summary", "Summary", summary(report, &records, legend))];
-    sections.extend(scenes.iter().map(|scene| scene_section(report, scene, legend)));
+    sections.extend(scenes.iter().map(|(scene, charts)| scene_section(report, scene, charts, legend)));
     if !kd_trees::of(&records).is_empty() {
         sections.push(Section::new("kd-trees", "kd-trees", kd_trees::section(&records, &report.published)));
     }
@@ -40,13 +40,13 @@ pub(super) fn document<'r>(
     sections.push(Section::new("results", "All figures", results(&records, legend)));
     sections.push(Section::method(None, terms(report)));
     Document {
-        tab: format!("{} scenes, {} builders", scenes.len(), legend.builders().len()),
+        tab: format!("{} scenes, {} builders", scenes.len(), legend.builders.len()),
         kicker: "hedgerow benchmark",
         title: "Build speed against tree quality".into(),
         lead: format!(
             "{} builders of acceleration structures on {} scenes, built and traced in turn in one process; trees of ours \
              validated on the host, a sample of every kind of ray checked against brute force.",
-            legend.builders().len(),
+            legend.builders.len(),
             scenes.len()
         ),
         setting: Some(&report.setting),
@@ -112,14 +112,14 @@ fn named(builder: &str, record: Option<&Record>, legend: &Legend) -> Markup {
     html! { th scope="row" data-value=(builder) { (builder_name(builder, record, legend)) } }
 }
 
-fn scene_section(report: &Report, scene: &SceneCharts, legend: &Legend) -> Section {
-    let outcomes: Vec<&Outcome> = report.outcomes.iter().filter(|o| o.record.scene == scene.scene).collect();
+fn scene_section(report: &Report, scene: &str, charts: &[Chart], legend: &Legend) -> Section {
+    let outcomes: Vec<&Outcome> = report.outcomes.iter().filter(|o| o.record.scene == scene).collect();
     let triangles = outcomes.first().map_or(0, |o| o.record.triangles);
-    let pictures: Vec<&Picture> = report.pictures.iter().filter(|p| p.scene == scene.scene).collect();
-    let id = format!("scene-{}", slug(&scene.scene));
+    let pictures: Vec<&Picture> = report.pictures.iter().filter(|p| p.scene == scene).collect();
+    let id = format!("scene-{}", slug(scene));
     let content = html! {
         section.scene #(id) {
-            h2 { (scene.scene) span.count { (grouped(triangles)) " triangles" } }
+            h2 { (scene) span.count { (grouped(triangles)) " triangles" } }
             @if !pictures.is_empty() {
                 div.pictures {
                     @for picture in pictures {
@@ -127,13 +127,13 @@ fn scene_section(report: &Report, scene: &SceneCharts, legend: &Legend) -> Secti
                     }
                 }
             }
-            div.charts { @for chart in &scene.charts { (figure(chart)) } }
+            div.charts { @for chart in charts { (figure(chart)) } }
             (phase_table(report, &outcomes, legend))
             (ray_table(&outcomes, legend))
             (choices(&outcomes, legend))
         }
     };
-    Section { id, name: scene.scene.clone(), content }
+    Section { id, name: scene.to_owned(), content }
 }
 
 /// Each phase beside what a plain copy of the bytes that it must move would take.
