@@ -2,7 +2,7 @@
 
 use super::beside::{self, Page};
 use super::chart::Chart;
-use super::elements::{facts, figure, foot, head, measured_by};
+use super::elements::{facts, figure, foot, head};
 use super::write_charts;
 use crate::measure::setting::{Failure, Setting};
 use crate::{Error, Result};
@@ -90,14 +90,19 @@ impl Document<'_> {
                         p.kicker { (self.kicker) }
                         h1 { (self.title) }
                         p.lead { (self.lead) }
-                        @if let Some(setting) = self.setting { (facts(setting)) (measured_by(&setting.command)) }
+                        @if let Some(setting) = self.setting { (facts(setting)) }
                     }
                     nav aria-label="Sections" {
                         @for section in &self.sections { a href={ "#" (section.id) } { (section.name) } }
                         (links)
                     }
                     main {
-                        @if !self.failures.is_empty() { (warning(&self.failures)) }
+                        @if !self.failures.is_empty() {
+                            section.warning #failures {
+                                h2 { "What went wrong" }
+                                ul { @for (of, what) in &self.failures { li { b { (of) } ": " (what) } } }
+                            }
+                        }
                         @for section in &self.sections { (section.content) }
                     }
                     @if let Some(setting) = self.setting { (foot(&setting.commit, &setting.when)) }
@@ -105,14 +110,5 @@ impl Document<'_> {
             }
         };
         markup.into_string()
-    }
-}
-
-fn warning(failures: &[(String, String)]) -> Markup {
-    html! {
-        section.warning #failures {
-            h2 { "What went wrong" }
-            ul { @for (of, what) in failures { li { b { (of) } ": " (what) } } }
-        }
     }
 }

@@ -41,9 +41,9 @@ fn colours() -> String {
     format!(":root{{{light}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n")
 }
 
-/// Where and how it was measured.
+/// Where and how it was measured, with the command line that measures it again.
 pub fn facts(setting: &Setting) -> Markup {
-    let Setting { machine, device, commit, when, options, .. } = setting;
+    let Setting { machine, device, commit, when, command, options, .. } = setting;
     html! {
         dl.facts {
             div { dt { "Processor" } dd { (machine.cpu) span { (machine.cores) " cores, " (machine.system) } } }
@@ -58,12 +58,8 @@ pub fn facts(setting: &Setting) -> Markup {
             div { dt { "Commit" } dd { code { (commit) } span { (when) } } }
             @for (name, value) in options { div { dt { (name) } dd { (value) } } }
         }
+        p.command { span { "Measured by" } code { (command) } }
     }
-}
-
-/// The command line that measures it again.
-pub fn measured_by(command: &str) -> Markup {
-    html! { p.command { span { "Measured by" } code { (command) } } }
 }
 
 /// A heading that sorts its column when pressed.

@@ -6,28 +6,15 @@ use crate::report::names::distinct;
 use crate::{Error, Result};
 use std::path::Path;
 
-const FILE: &str = "results.jsonl";
+/// The name of the file of records.
+pub const FILE: &str = "results.jsonl";
 
-/// `results.jsonl`, open for writing: each record is on the disk as soon as it is measured.
-#[derive(Debug)]
-pub struct Results(Lines);
-
-impl Results {
-    /// Makes `folder` and an empty `results.jsonl` in it.
-    ///
-    /// # Errors
-    /// The folder cannot be made or written to.
-    pub fn create(folder: &Path) -> Result<Results> {
-        Lines::create(folder, FILE).map(Results)
-    }
-
-    /// Appends a record.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn append(&mut self, record: &Record) -> Result<()> {
-        self.0.append(record)
-    }
+/// Makes `folder` and an empty `results.jsonl` in it, open for writing.
+///
+/// # Errors
+/// The folder cannot be made or written to.
+pub fn create(folder: &Path) -> Result<Lines> {
+    Lines::create(folder, FILE)
 }
 
 /// The records of a `results.jsonl`, or of the one in a folder.
