@@ -1,6 +1,6 @@
 //! Tables of a page: each column says once what it is called and what its cells hold.
 
-use super::elements::{column, number, scroll, spread};
+use super::elements::{number, scroll};
 use crate::measure::statistics::Spread;
 use maud::{Markup, html};
 
@@ -49,9 +49,8 @@ impl<'a, R> Table<'a, R> {
     }
 
     /// Cells of any kind.
-    pub fn cell(mut self, heading: &str, of: impl Fn(&R) -> Markup + 'a) -> Self {
-        self.columns.push((column(heading, "", false), Box::new(of)));
-        self
+    pub fn cell(self, heading: &str, of: impl Fn(&R) -> Markup + 'a) -> Self {
+        self.column(heading, "", false, of)
     }
 
     /// A figure; a dash where it was not measured.
@@ -73,12 +72,27 @@ impl<'a, R> Table<'a, R> {
         of: impl Fn(&R) -> Option<Spread> + 'a,
         text: fn(f64) -> String,
     ) -> Self {
-        self.figure(heading, unit, move |row| spread(of(row), text))
+        self.figure(heading, unit, move |row| match of(row) {
+            Some(Spread { median, min, max, .. }) => html! {
+                td.number data-value=(median) { (text(median)) small { (text(min)) " – " (text(max)) } }
+            },
+            None => number(None, text),
+        })
     }
 
     /// Cells with figures of any kind.
-    pub fn figure(mut self, heading: &str, unit: &str, of: impl Fn(&R) -> Markup + 'a) -> Self {
-        self.columns.push((column(heading, unit, true), Box::new(of)));
+    pub fn figure(self, heading: &str, unit: &str, of: impl Fn(&R) -> Markup + 'a) -> Self {
+        self.column(heading, unit, true, of)
+    }
+
+    /// A column, whose heading sorts it when pressed.
+    fn column(mut self, name: &str, unit: &str, is_number: bool, of: impl Fn(&R) -> Markup + 'a) -> Self {
+        let heading = html! {
+            th scope="col" .number[is_number] aria-sort="none" {
+                button type="button" { (name) @if !unit.is_empty() { " " small { (unit) } } }
+            }
+        };
+        self.columns.push((heading, Box::new(of)));
         self
     }
 

@@ -4,7 +4,6 @@ use super::chart::Chart;
 use super::numbers::{bytes, three_digits};
 use super::theme::{self, Tone};
 use crate::measure::setting::Setting;
-use crate::measure::statistics::Spread;
 use maud::{Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("page.css");
@@ -62,15 +61,6 @@ pub fn facts(setting: &Setting) -> Markup {
     }
 }
 
-/// A heading that sorts its column when pressed.
-pub fn column(name: &str, unit: &str, is_number: bool) -> Markup {
-    html! {
-        th scope="col" .number[is_number] aria-sort="none" {
-            button type="button" { (name) @if !unit.is_empty() { " " small { (unit) } } }
-        }
-    }
-}
-
 /// A cell with a figure; a dash where it was not measured.
 pub fn number(value: Option<f64>, text: impl Fn(f64) -> String) -> Markup {
     match value.filter(|v| v.is_finite()) {
@@ -87,16 +77,6 @@ pub fn bar(value: Option<f64>, greatest: f64) -> Markup {
             html! { td.number.bar data-value=(value) style=(share) { (three_digits(value)) } }
         }
         None => number(None, three_digits),
-    }
-}
-
-/// A cell with the median of a spread, its least and greatest below.
-pub fn spread(value: Option<Spread>, text: impl Fn(f64) -> String) -> Markup {
-    match value {
-        Some(Spread { median, min, max, .. }) => html! {
-            td.number data-value=(median) { (text(median)) small { (text(min)) " – " (text(max)) } }
-        },
-        None => number(None, text),
     }
 }
 

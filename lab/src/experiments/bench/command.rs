@@ -103,17 +103,16 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         c_i: arguments.costs.test,
         epo: arguments.epo,
     };
-    let mut bench = Bench {
-        common,
-        arguments,
-        device: device.as_ref(),
-        plan,
-        costs,
-        results,
-        report: Report { published, ..empty(common, arguments, device.as_ref(), notes)? },
-    };
-    bench.report.baseline = no_peer.is_none().then(|| "driver-fast-build".into());
-    bench.report.write_setting(&arguments.output)?;
+    let options = [
+        ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),
+        ("Image", format!("{}, seed {}", arguments.size, common.seed)),
+        ("Host threads", common.threads.map_or("one a core".into(), |n| n.to_string())),
+    ];
+    let setting = Setting::of(device.as_ref(), &options, notes)?;
+    let baseline = no_peer.is_none().then(|| "driver-fast-build".into());
+    let report = Report { published, baseline, ..Report::new(setting) };
+    report.write_setting(&arguments.output)?;
+    let mut bench = Bench { common, arguments, device: device.as_ref(), plan, costs, results, report };
     for scene in &scenes {
         bench.scene(scene)?;
     }
@@ -196,17 +195,6 @@ fn possible(
         bail!("none of the builders can work here: {}; choose others with -b", arguments.builder);
     }
     Ok(kept)
-}
-
-/// The report before anything was measured.
-fn empty(common: &Common, arguments: &Arguments, device: Option<&Device>, notes: Vec<String>) -> crate::Result<Report> {
-    let threads = common.threads.map_or("one a core".into(), |n| n.to_string());
-    let options = [
-        ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),
-        ("Image", format!("{}, seed {}", arguments.size, common.seed)),
-        ("Host threads", threads),
-    ];
-    Ok(Report::new(Setting::of(device, &options, notes)?))
 }
 
 /// A benchmark under way.

@@ -116,7 +116,7 @@ pub fn measure(
             Err(error) => failures.push(fail(spec, error)),
         }
     }
-    let mut rounds = Rounds { entries: &mut entries };
+    let mut rounds = Rounds { entries };
 
     say("building");
     let builds = rounds.run(plan.runs, |entry| entry.subject.build());
@@ -154,7 +154,7 @@ pub fn measure(
     }
 
     let mut outcomes = Vec::new();
-    for entry in entries {
+    for entry in rounds.entries {
         let Entry { spec, subject, mut record, faults, failure } = entry;
         if let Some(error) = failure {
             failures.push(fail(spec, error));
@@ -232,11 +232,11 @@ impl Remembered<'_> {
 }
 
 /// The builders that have not failed, run in turn.
-struct Rounds<'e, 'a> {
-    entries: &'e mut Vec<Entry<'a>>,
+struct Rounds<'a> {
+    entries: Vec<Entry<'a>>,
 }
 
-impl<'a> Rounds<'_, 'a> {
+impl<'a> Rounds<'a> {
     fn live(&mut self) -> Vec<&mut Entry<'a>> {
         self.entries.iter_mut().filter(|entry| entry.failure.is_none()).collect()
     }

@@ -25,14 +25,14 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
     let scene = &first.scene;
     let lines: Vec<Line> = traced.iter().map(|t| t.1).collect();
     let envelope = lower_envelope(&lines);
-    let name = |stretch: &Stretch| short(&traced[stretch.line].0.builder);
+    let winners_in_words = verdict(&envelope, &|stretch: &Stretch| short(&traced[stretch.line].0.builder));
     let caption = Caption {
         name: format!("{}-total-time", slug(scene)),
         title: format!("{scene}: total time of a build and its rays"),
-        alt: format!("The lower envelope: {}.", verdict(&envelope, &name)),
+        alt: format!("The lower envelope: {winners_in_words}."),
         reading: format!(
-            "The gold line is the lower envelope, and the strip above says whose it is: {}. Both axes are logarithmic.",
-            verdict(&envelope, &name)
+            "The gold line is the lower envelope, and the strip above says whose it is: {winners_in_words}. Both axes are \
+             logarithmic."
         ),
     };
     let rays = ray_range(&lines, &envelope);
