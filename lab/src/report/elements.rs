@@ -4,7 +4,7 @@ use super::chart::Chart;
 use super::numbers::{bytes, three_digits};
 use super::theme::{self, Tone};
 use crate::measure::setting::Setting;
-use maud::{Markup, PreEscaped, html};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -21,6 +21,15 @@ pub fn head(title: &str) -> Markup {
             style { (PreEscaped(colours())) (PreEscaped(STYLE)) }
         }
     }
+}
+
+/// A page with this in its body.
+pub fn page(title: &str, body: &Markup) -> String {
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" { (head(title)) body { (body) } }
+    };
+    markup.into_string()
 }
 
 /// The end of a page: who made it, and the script.

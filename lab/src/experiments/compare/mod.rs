@@ -80,8 +80,7 @@ pub fn compare(old: &[Record], new: &[Record]) -> Comparisons {
 }
 
 fn pair(old: &Record, new: &Record) -> Comparison {
-    let spread = |r: &Record| Spread::from(&r.build);
-    let (before, after) = (spread(old), spread(new));
+    let [before, after] = [old, new].map(|record| Spread::from(&record.build));
     let relative = |s: Spread| (s.max - s.min) / s.median;
     // The same machine traced as unevenly as it built.
     let trace_noise = relative(before).max(relative(after)).max(LEAST_TRACE_NOISE);

@@ -10,13 +10,13 @@ use crate::measure::provenance::{self, DeviceFacts, Machine};
 use crate::measure::record::Record;
 use crate::measure::setting::Setting;
 use crate::report::columns::Table;
-use crate::report::elements::{foot, head};
+use crate::report::elements::{foot, page};
 use crate::report::names::{distinct, slug};
 use crate::report::numbers::{count, three_digits};
 use crate::report::table::or_dash;
 use crate::report::{beside, lines};
 use crate::{Error, Result};
-use maud::{DOCTYPE, Markup, html};
+use maud::{Markup, html};
 use std::path::{Path, PathBuf};
 
 /// What is said where a folder does not say on which machine it was measured.
@@ -80,7 +80,7 @@ fn read(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
             _ => None,
         });
         if let Some((machine, facts)) = setting {
-            let device = of(devices, &facts.name.clone(), &facts.driver.clone());
+            let device = of(devices, &facts.name, &facts.driver);
             device.machine.get_or_insert(machine);
             device.facts.get_or_insert(facts);
             device.accel.extend(entries);
@@ -189,22 +189,16 @@ impl OfDevice {
 
 /// The page of several devices: a table of each, and the way to its own pages.
 fn overview(devices: &[OfDevice]) -> String {
-    let markup = html! {
-        (DOCTYPE)
-        html lang="en" {
-            (head(&format!("hedgerow: {} devices", devices.len())))
-            body {
-                header.hero {
-                    p.kicker { "hedgerow benchmark" }
-                    h1 { (devices.len()) " devices" }
-                    p.lead { "Each device by itself: figures of different machines are not compared." }
-                }
-                main { @for device in devices { (section(device)) } }
-                (foot(&provenance::commit(), &provenance::now()))
-            }
+    let body = html! {
+        header.hero {
+            p.kicker { "hedgerow benchmark" }
+            h1 { (devices.len()) " devices" }
+            p.lead { "Each device by itself: figures of different machines are not compared." }
         }
+        main { @for device in devices { (section(device)) } }
+        (foot(&provenance::commit(), &provenance::now()))
     };
-    markup.into_string()
+    page(&format!("hedgerow: {} devices", devices.len()), &body)
 }
 
 fn section(device: &OfDevice) -> Markup {

@@ -37,15 +37,11 @@ fn ratio(a: Option<u64>, b: Option<u64>) -> Option<f64> {
     a.zip(b.filter(|&b| b > 0)).map(|(a, b)| a as f64 / b as f64)
 }
 
-fn full_leaves(record: &Record) -> Option<u64> {
-    Some(record.quality.leaves? - record.quality.empty_leaves?)
-}
-
 const TREE: [Figure<Record>; 9] = [
     Figure::new(["nodes", "", "nodes"], count, |r| Some((r.quality.inner? + r.quality.leaves?) as f64)),
     Figure::new(["inner / leaves", "", "inner_to_leaf"], two_decimals, |r| ratio(r.quality.inner, r.quality.leaves)),
     Figure::new(["full / empty", "", "nonempty_to_empty_leaf"], two_decimals, |r| {
-        ratio(full_leaves(r), r.quality.empty_leaves)
+        ratio(Some(r.quality.leaves? - r.quality.empty_leaves?), r.quality.empty_leaves)
     }),
     Figure::new(["leaf size", "mean", "avg_prims_leaf"], two_decimals, |r| r.quality.prims_per_leaf),
     Figure::new(["leaf size", "most", "max_prims_leaf"], count, |r| Some(r.quality.prims_per_leaf_max? as f64)),
