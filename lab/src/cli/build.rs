@@ -9,7 +9,7 @@ use crate::rays::kinds::RayOptions;
 use anyhow::{Context, bail};
 use std::io::Write;
 use std::num::NonZeroU32;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Pixels of the picture whose rays count leaves.
 const LEAF_COUNT_RAYS: [u32; 2] = [128, 96];
@@ -61,7 +61,8 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         let Some(bytes) = subject.bytes()? else {
             bail!("the structure of {} is the driver's own and cannot be written; choose another builder", builders[0]);
         };
-        write(path, &bytes).with_context(|| format!("the tree of {}", builders[0]))?;
+        let written = std::fs::write(path, &bytes).map_err(crate::Error::file(path));
+        written.with_context(|| format!("the tree of {}", builders[0]))?;
     }
     arguments.json.write_each(outcomes.iter().map(|outcome| &outcome.record))?;
     if !arguments.json.takes_stdout() {
@@ -72,8 +73,4 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         }
     }
     work::finish(device.as_ref(), all_right)
-}
-
-fn write(path: &Path, bytes: &[u8]) -> crate::Result<()> {
-    std::fs::write(path, bytes).map_err(crate::Error::file(path))
 }

@@ -3,8 +3,8 @@
 use super::{Common, Json, tables};
 use crate::device;
 use crate::device::Found;
+use crate::measure::provenance::{kind_of, vulkan_of};
 use crate::report::numbers::bytes;
-use ash::vk;
 use comfy_table::Table;
 use std::io::Write;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ struct Row<'a> {
     index: usize,
     name: &'a str,
     driver: &'a str,
-    kind: &'static str,
+    kind: String,
     api_version: String,
     subgroup_size: u32,
     memory_bytes: u64,
@@ -46,19 +46,12 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
 }
 
 fn row(found: &Found) -> Row<'_> {
-    let version = found.api_version;
     Row {
         index: found.index,
         name: &found.name,
         driver: &found.driver,
-        kind: match found.kind {
-            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
-            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
-            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
-            vk::PhysicalDeviceType::CPU => "cpu",
-            _ => "other",
-        },
-        api_version: format!("{}.{}", vk::api_version_major(version), vk::api_version_minor(version)),
+        kind: kind_of(found).trim_end_matches(" GPU").to_lowercase(),
+        api_version: vulkan_of(found),
         subgroup_size: found.subgroup_size,
         memory_bytes: found.memory,
         driver_tracing: found.driver_tracing.iter().map(|way| way.name()).collect(),
@@ -79,7 +72,7 @@ fn table(rows: &[Row<'_>]) -> Table {
             row.index.to_string(),
             row.name.to_owned(),
             row.driver.to_owned(),
-            row.kind.to_owned(),
+            row.kind.clone(),
             row.api_version.clone(),
             row.subgroup_size.to_string(),
             bytes(row.memory_bytes),

@@ -110,10 +110,8 @@ fn is_usage(error: &anyhow::Error) -> bool {
 
 /// Whether the reader of our output has seen enough (`hedgerow devices | head -1`).
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
-    error
-        .chain()
-        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
-        .any(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+    let mut of_the_system = error.chain().filter_map(|cause| cause.downcast_ref::<std::io::Error>());
+    of_the_system.any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
 }
 
 #[cfg(test)]

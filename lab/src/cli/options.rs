@@ -3,6 +3,7 @@
 use super::Bar;
 use crate::device::{Device, DeviceOptions, DriverTracing};
 use crate::rays::kinds::{RayKind, RayOptions};
+use crate::report::names::distinct;
 use crate::scene::{self, Camera, DynamicScene, Scene};
 use crate::subjects::builders::{self, Spec};
 use clap::builder::{OsStringValueParser, TypedValueParser};
@@ -132,15 +133,9 @@ impl Common {
 
     /// Moves a camera to where `--eye`, `--look` and `--fov` ask for it.
     pub fn aim(&self, camera: &mut Camera) {
-        if let Some(eye) = self.eye {
-            camera.eye = eye.0;
-        }
-        if let Some(look) = self.look {
-            camera.look = look.0;
-        }
-        if let Some(fov) = self.fov {
-            camera.fov = fov;
-        }
+        camera.eye = self.eye.map_or(camera.eye, |Point(eye)| eye);
+        camera.look = self.look.map_or(camera.look, |Point(look)| look);
+        camera.fov = self.fov.unwrap_or(camera.fov);
     }
 }
 
@@ -240,14 +235,8 @@ impl FromStr for Kinds {
         if text == "all" {
             return Ok(Kinds(RayKind::ALL.to_vec()));
         }
-        let mut kinds = Vec::new();
-        for name in text.split(',') {
-            let kind = name.trim().parse()?;
-            if !kinds.contains(&kind) {
-                kinds.push(kind);
-            }
-        }
-        Ok(Kinds(kinds))
+        let kinds: crate::Result<Vec<RayKind>> = text.split(',').map(|name| name.trim().parse()).collect();
+        Ok(Kinds(distinct(kinds?)))
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::experiments::bench::matrix::Outcome;
 use crate::measure::record::Record;
 use crate::report::numbers::{bytes, duration, grouped, three_digits};
+use crate::report::table::styled;
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
 /// A line below the header, and nothing else.
@@ -10,13 +11,7 @@ const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().f
 
 /// An empty table in our style; columns from `numbers` on are aligned to the right.
 pub fn table(header: &[&str], numbers: usize) -> Table {
-    let mut table = Table::new();
-    table.load_style(STYLE);
-    table.set_header(header.iter().copied());
-    for column in table.column_iter_mut().skip(numbers) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
+    styled(STYLE, header.iter().copied(), numbers)
 }
 
 fn or_dash<T>(value: Option<T>, text: impl FnOnce(T) -> String) -> String {
@@ -38,20 +33,19 @@ pub fn build(outcome: &Outcome, copy_gb_s: Option<f64>) -> String {
     if let Some(choice) = &outcome.choice {
         text += &format!("\nchosen: {choice}");
     }
-    let speed = record.triangles as f64 / (build.median_ms * 1e3);
+    let [median, min, max] = [build.median_ms, build.min_ms, build.max_ms].map(duration);
+    let (runs, timer, speed) = (build.runs, &build.timer, three_digits(record.mtris_s()));
     text += &format!(
-        "\nbuilt in {} ({} to {}, {} runs, {} clock): {} million triangles a second\n",
-        duration(build.median_ms),
-        duration(build.min_ms),
-        duration(build.max_ms),
-        build.runs,
-        build.timer,
-        three_digits(speed)
+        "\nbuilt in {median} ({min} to {max}, {runs} runs, {timer} clock): {speed} million triangles a second\n"
     );
     if !build.phases.is_empty() {
         let header = ["phase", "time", "share", "must move", "GB/s", "a copy of it", "of the copy's speed"];
         let mut phases = table(&header, 1);
-        let mut add = |name: &str, milliseconds: f64, traffic: Option<u64>| {
+        let traffic = outcome.traffic.iter().copied().chain(std::iter::repeat(None));
+        let each = build.phases.iter().map(|phase| (phase.name.as_str(), phase.median_ms)).zip(traffic);
+        // Of all, if it is known of each.
+        let all = (("all", build.median_ms), outcome.traffic.iter().copied().sum::<Option<u64>>());
+        for ((name, milliseconds), traffic) in each.chain([all]) {
             let copy = traffic.zip(copy_gb_s).map(|(bytes, rate)| bytes as f64 / (rate * 1e6));
             phases.add_row([
                 name.to_owned(),
@@ -62,13 +56,7 @@ pub fn build(outcome: &Outcome, copy_gb_s: Option<f64>) -> String {
                 or_dash(copy, duration),
                 or_dash(copy, |copy| format!("{:.0}%", 100.0 * copy / milliseconds)),
             ]);
-        };
-        for (phase, traffic) in build.phases.iter().zip(outcome.traffic.iter().copied().chain(std::iter::repeat(None)))
-        {
-            add(&phase.name, phase.median_ms, traffic);
         }
-        // Of all, if it is known of each.
-        add("all", build.median_ms, outcome.traffic.iter().copied().sum());
         text += &format!("{phases}\n");
     }
     let (q, m) = (&record.quality, &record.memory);
@@ -76,13 +64,9 @@ pub fn build(outcome: &Outcome, copy_gb_s: Option<f64>) -> String {
     for column in [1, 3] {
         figures.column_mut(column).into_iter().for_each(|c| c.set_cell_alignment(CellAlignment::Right));
     }
+    let sah_cost = format!("SAH cost (c_T {}, c_I {})", q.c_t, q.c_i);
     let rows = [
-        (
-            format!("SAH cost (c_T {}, c_I {})", q.c_t, q.c_i),
-            or_dash(q.sah, three_decimals),
-            "structure",
-            m.structure_bytes,
-        ),
+        (sah_cost, or_dash(q.sah, three_decimals), "structure", m.structure_bytes),
         ("end-point overlap".into(), or_dash(q.epo, three_decimals), "", None),
         ("leaf count variability".into(), or_dash(q.lcv, three_decimals), "", None),
         ("inner nodes".into(), or_dash(q.inner, grouped), "scratch", m.scratch_bytes),

@@ -2,13 +2,14 @@
 
 use super::options::{Builders, Kinds};
 use super::{Common, Json, Size, tables, work};
+use crate::device::Device;
 use crate::experiments::bench::matrix::BenchPlan;
 use crate::measure::overlap::Epo;
 use crate::rays::files;
 use crate::report::numbers::{grouped, three_digits};
 use crate::scene::Scene;
 use crate::subjects::builders::Spec;
-use hedgerow::trace::Query;
+use hedgerow::trace::{Hit, Query, Ray};
 use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -56,10 +57,10 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     if let Some((rays_file, hits_file)) = files {
         let query = if arguments.any_hit { Query::AnyHit } else { Query::ClosestHit };
         let rays = files::read_rays(rays_file)?;
-        let traced = trace_file(&scene, device.as_ref(), &builders[0], &rays, query)?;
-        files::write_hits(hits_file, &traced.hits)?;
-        let hits = traced.hits.iter().filter(|hit| hit.is_some()).count() as u64;
-        let speed = rays.len() as f64 / (traced.milliseconds * 1e3);
+        let (hits, milliseconds) = traced(&scene, device.as_ref(), &builders[0], &rays, query)?;
+        files::write_hits(hits_file, &hits)?;
+        let hits = hits.iter().filter(|hit| hit.is_some()).count() as u64;
+        let speed = rays.len() as f64 / (milliseconds * 1e3);
         let (rays, hits, speed) = (grouped(rays.len() as u64), grouped(hits), three_digits(speed));
         writeln!(std::io::stdout(), "{}: {rays} rays, {hits} hits, {speed} Mrays/s", builders[0])?;
         return work::finish(device.as_ref(), true);
@@ -84,20 +85,16 @@ pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     work::finish(device.as_ref(), all_right)
 }
 
-struct Traced {
-    hits: Vec<hedgerow::trace::Hit>,
-    milliseconds: f64,
-}
-
-fn trace_file(
+/// The hits of `rays`, and the milliseconds that they took.
+fn traced(
     scene: &Scene,
-    device: Option<&crate::device::Device>,
+    device: Option<&Device>,
     builder: &Spec,
-    rays: &[hedgerow::trace::Ray],
+    rays: &[Ray],
     query: Query,
-) -> crate::Result<Traced> {
+) -> crate::Result<(Vec<Hit>, f64)> {
     if rays.is_empty() {
-        return Ok(Traced { hits: Vec::new(), milliseconds: f64::NAN });
+        return Ok((Vec::new(), f64::NAN));
     }
     let mut subject = builder.make(device, &scene.mesh)?;
     subject.build()?;
@@ -105,5 +102,5 @@ fn trace_file(
     // The first run of a shader compiles it.
     subject.trace(query)?;
     let milliseconds = subject.trace(query)?;
-    Ok(Traced { hits: subject.hits()?, milliseconds })
+    Ok((subject.hits()?, milliseconds))
 }

@@ -64,9 +64,7 @@ impl Sample {
     /// The first ray of the sample whose hit is wrong, and what it should have been.
     pub fn first_wrong(&self, rays: &[Ray], hits: &[Hit]) -> Option<(usize, Hit)> {
         let wrong = |(&i, truth): (&usize, &Hit)| {
-            let right =
-                agree(self.query, &hits[i], truth) || on_the_edge(&rays[i], truth) || on_the_edge(&rays[i], &hits[i]);
-            (!right).then_some((i, *truth))
+            (!may_both_be_right(self.query, &rays[i], &hits[i], truth)).then_some((i, *truth))
         };
         self.indices.iter().zip(&self.truth).find_map(wrong)
     }
@@ -87,8 +85,7 @@ pub fn wrong_where_different(
         .par_iter()
         .filter(|&&i| {
             let truth = closest_hit_by_brute_force(tree, &rays[i]);
-            !agree(query, &hits[i], &truth)
-                && ![truth, hits[i], reference[i]].iter().any(|hit| on_the_edge(&rays[i], hit))
+            !may_both_be_right(query, &rays[i], &hits[i], &truth) && !on_the_edge(&rays[i], &reference[i])
         })
         .count()
 }

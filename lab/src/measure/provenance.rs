@@ -2,7 +2,7 @@
 
 use super::copy;
 use crate::Result;
-use crate::device::Device;
+use crate::device::{Device, Found};
 use ash::vk;
 use std::process::Command;
 use std::sync::OnceLock;
@@ -93,6 +93,22 @@ pub struct DeviceFacts {
     pub copy_gb_s: Option<f64>,
 }
 
+/// What kind of device it is.
+pub fn kind_of(found: &Found) -> &'static str {
+    match found.kind {
+        vk::PhysicalDeviceType::DISCRETE_GPU => "discrete GPU",
+        vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated GPU",
+        vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual GPU",
+        vk::PhysicalDeviceType::CPU => "CPU",
+        _ => "other",
+    }
+}
+
+/// The Vulkan version of a device, as `1.3`.
+pub fn vulkan_of(found: &Found) -> String {
+    format!("{}.{}", vk::api_version_major(found.api_version), vk::api_version_minor(found.api_version))
+}
+
 impl DeviceFacts {
     /// What `device` says of itself, and the rate of a plain copy on it.
     ///
@@ -100,19 +116,11 @@ impl DeviceFacts {
     /// Too little memory; the device failed.
     pub fn of(device: &Device) -> Result<DeviceFacts> {
         let found = device.found();
-        let version = found.api_version;
-        let kind = match found.kind {
-            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete GPU",
-            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated GPU",
-            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual GPU",
-            vk::PhysicalDeviceType::CPU => "CPU",
-            _ => "other",
-        };
         Ok(DeviceFacts {
             name: found.name.clone(),
             driver: found.driver.clone(),
-            kind: kind.into(),
-            vulkan: format!("{}.{}", vk::api_version_major(version), vk::api_version_minor(version)),
+            kind: kind_of(found).into(),
+            vulkan: vulkan_of(found),
             subgroup: found.subgroup_size,
             memory: found.memory,
             copy_gb_s: Some(copy::rate_gb_s(device)?),

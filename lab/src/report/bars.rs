@@ -2,9 +2,10 @@
 
 use crate::Result;
 use crate::measure::statistics::Spread;
-use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, frame, mesh, pixel};
+use crate::report::chart::{Area, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay};
 use crate::report::labels::{Rect, name_room, text_width};
-use crate::report::theme::{INK, MUTED, Tone};
+use crate::report::plot::{self, Axis, Plot, Room};
+use crate::report::theme::{INK, Tone};
 use plotters::prelude::*;
 
 /// Pixels of a bar's height, at most.
@@ -47,50 +48,38 @@ pub fn bars(caption: Caption, what: &Bars<'_>) -> Result<Option<Chart>> {
         return Ok(None);
     }
     let figures = bars.iter().map(|b| text_width(&b.figure, LABEL_SIZE)).fold(0.0, f64::max);
+    let room = Room {
+        top: if marks.is_empty() { 0 } else { 22 },
+        left: name_room(bars.iter().map(|b| &b.label), LABEL_SIZE) as u32 + 10,
+        right: figures as u32 + 12,
+        ..Room::default()
+    };
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
-        let mut chart = ChartBuilder::on(area)
-            .x_label_area_size(46)
-            .margin_top(if marks.is_empty() { 0 } else { 22 })
-            .margin_left(name_room(bars.iter().map(|b| &b.label), LABEL_SIZE) as u32 + 10)
-            .margin_right(figures as u32 + 12)
-            .build_cartesian_2d(0.0..1.02 * longest, 0.0..bars.len() as f64)?;
-        mesh(&mut chart, &Axes { x: axis, y: "", x_number: &|v| number(*v), y_number: &|_| String::new() })?;
-        let inner = frame(&chart);
-        let row = inner.h / bars.len() as f64;
+        let count = bars.len() as f64;
+        let values = Axis { name: axis, is_log: false, number: *number };
+        let mut plot = Plot::new(area, &room, (&values, 0.0..1.02 * longest), (&plot::BARS, 0.0..count))?;
+        let Rect { x: left, y: top, w: width, h: height } = plot.frame;
+        let row = height / count;
         let half = 0.5 * (0.7_f64).min(THICKNESS / row);
         for (i, bar) in bars.iter().enumerate() {
+            let Bar { label, figure, spread: Spread { median, min, max, runs }, tone } = bar;
             let centre = (bars.len() - i) as f64 - 0.5;
-            let Spread { median, min, max, .. } = bar.spread;
-            let corners = [(0.0, centre - half), (median, centre + half)];
-            chart.draw_series([Rectangle::new(corners, bar.tone.light.filled())])?;
-            let whisker = |value: f64, half: f64| vec![(value, centre - half), (value, centre + half)];
-            let ink = INK.light.stroke_width(1);
-            // Less than a pixel has no length that could be drawn.
-            if chart.backend_coord(&(min, centre)) != chart.backend_coord(&(max, centre)) {
-                chart.draw_series([PathElement::new(vec![(min, centre), (max, centre)], ink)])?;
+            let corners = [(0.0, centre - half), (*median, centre + half)];
+            plot.chart.draw_series([Rectangle::new(corners, tone.light.filled())])?;
+            plot.whisker((*min, centre), (*max, centre))?;
+            for end in [*min, *max] {
+                let edge = [(end, centre - 0.4 * half), (end, centre + 0.4 * half)];
+                plot.line(edge, INK.light.stroke_width(1))?;
             }
-            for end in [min, max] {
-                chart.draw_series([PathElement::new(whisker(end, 0.4 * half), ink)])?;
-            }
-            let (end, y) = pixel(&chart, (max.max(median), centre));
-            let at = (end + 8.0, y + 4.5);
-            overlay.label(Label { at, text: &bar.figure, anchor: "start", tone: MUTED, size: LABEL_SIZE });
-            let at = (inner.x - 8.0, y + 4.5);
-            overlay.name(Label { at, text: &bar.label, anchor: "end", tone: bar.tone, size: LABEL_SIZE });
-            let tip = format!(
-                "{}: {}, from {} to {} in {} runs",
-                bar.label,
-                bar.figure,
-                number(min),
-                number(max),
-                bar.spread.runs
-            );
-            overlay.tip(Rect { x: inner.x, y: y - 0.5 * row, w: inner.w, h: row }, &tip);
+            let (end, y) = plot.pixel((max.max(*median), centre));
+            overlay.label_bar(y, (left, label, *tone), (end, figure));
+            let [least, most] = [*min, *max].map(number);
+            let tip = format!("{label}: {figure}, from {least} to {most} in {runs} runs");
+            overlay.tip(Rect { x: left, y: y - 0.5 * row, w: width, h: row }, &tip);
         }
         for (value, name) in marks {
-            let line = vec![(*value, 0.0), (*value, bars.len() as f64)];
-            chart.draw_series([PathElement::new(line, INK.light.stroke_width(2))])?;
-            let at = (pixel(&chart, (*value, 0.0)).0, inner.y - 7.0);
+            plot.line([(*value, 0.0), (*value, count)], INK.light.stroke_width(2))?;
+            let at = (plot.pixel((*value, 0.0)).0, top - 7.0);
             overlay.label(Label { at, text: name, anchor: "middle", tone: INK, size: 12.0 });
         }
         Ok(())

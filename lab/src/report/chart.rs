@@ -1,16 +1,12 @@
 //! A chart: drawn once by plotters, then labelled; as a file of its own, as a picture, and inside the page.
 
 use super::labels::{self, Rect};
-use super::numbers::log_ticks;
 use super::raster::rasterise;
-use super::theme::{self, BEST, GRID, INK, MUTED, PAPER, Tone};
+use super::theme::{self, INK, MUTED, PAPER, Tone};
 use crate::{Error, Result};
 use plotters::coord::Shift;
-use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
-use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::prelude::*;
 use std::fmt::Write as _;
-use std::ops::Range;
 
 /// Width and height of every chart in pixels, before scaling.
 pub const SIZE: (u32, u32) = (760, 460);
@@ -22,6 +18,14 @@ pub const LABEL_SIZE: f64 = 13.0;
 /// A finished chart.
 #[derive(Debug, Clone)]
 pub struct Chart {
+    /// What it is named by.
+    pub caption: Caption,
+    svg: String,
+}
+
+/// What every chart needs to be named by.
+#[derive(Debug, Clone, Default)]
+pub struct Caption {
     /// Stem of its files, and its identifier on the page.
     pub name: String,
     /// What it is.
@@ -29,20 +33,6 @@ pub struct Chart {
     /// What it shows, in words, for whoever cannot see it.
     pub alt: String,
     /// What a reader shall take from it; one or two sentences.
-    pub reading: String,
-    svg: String,
-}
-
-/// What every chart needs to be named by.
-#[derive(Debug, Clone, Default)]
-pub struct Caption {
-    /// See [`Chart::name`].
-    pub name: String,
-    /// See [`Chart::title`].
-    pub title: String,
-    /// See [`Chart::alt`].
-    pub alt: String,
-    /// See [`Chart::reading`].
     pub reading: String,
 }
 
@@ -86,8 +76,7 @@ impl Chart {
             ink = theme::hex(INK.light),
             overlay = overlay.svg,
         );
-        let Caption { name, title, alt, reading } = caption;
-        Ok(Chart { name, title, alt, reading, svg })
+        Ok(Chart { caption, svg })
     }
 
     /// The chart as an SVG file.
@@ -108,7 +97,7 @@ impl Chart {
     /// # Errors
     /// [`Error::Chart`] if the SVG cannot be read back or the picture cannot be packed.
     pub fn png(&self) -> Result<Vec<u8>> {
-        let wrong = |reason: String| Error::Chart { chart: self.name.clone(), reason };
+        let wrong = |reason: String| Error::Chart { chart: self.caption.name.clone(), reason };
         let size = (SIZE.0 as f32 * PNG_SCALE, SIZE.1 as f32 * PNG_SCALE);
         let pixels = rasterise(&self.svg, (size.0 as u32, size.1 as u32), PNG_SCALE).map_err(wrong)?;
         pixels.encode_png().map_err(|e| wrong(e.to_string()))
@@ -165,50 +154,43 @@ impl Overlay {
 
     /// A thin line, from a label to what it names.
     pub fn leader(&mut self, from: (f64, f64), to: (f64, f64), tone: Tone) {
-        let _ = writeln!(
-            self.svg,
-            "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{}\" stroke-width=\"1\" opacity=\"0.6\"/>",
-            from.0,
-            from.1,
-            to.0,
-            to.1,
-            theme::hex(tone.light),
-        );
+        self.line(from, to, tone, "stroke-width=\"1\" opacity=\"0.6\"");
     }
 
     /// A dashed line, for what is expected and not measured.
     pub fn dashes(&mut self, from: (f64, f64), to: (f64, f64), tone: Tone) {
+        self.line(from, to, tone, "stroke-width=\"1.5\" stroke-dasharray=\"5 4\"");
+    }
+
+    fn line(&mut self, (x1, y1): (f64, f64), (x2, y2): (f64, f64), tone: Tone, style: &str) {
+        let stroke = theme::hex(tone.light);
         let _ = writeln!(
             self.svg,
-            "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{}\" stroke-width=\"1.5\" \
-             stroke-dasharray=\"5 4\"/>",
-            from.0,
-            from.1,
-            to.0,
-            to.1,
-            theme::hex(tone.light),
+            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"{stroke}\" {style}/>"
         );
     }
 
     /// A coloured rectangle.
-    pub fn band(&mut self, Rect { x, y, w, h }: Rect, tone: Tone) {
-        let w = w.max(1.0);
-        let fill = theme::hex(tone.light);
-        let _ = writeln!(
-            self.svg,
-            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" rx=\"2\" fill=\"{fill}\"/>"
-        );
+    pub fn band(&mut self, place: Rect, tone: Tone) {
+        self.rectangle(place, &format!("rx=\"2\" fill=\"{}\"/>", theme::hex(tone.light)));
     }
 
     /// An invisible rectangle that shows `text` when pointed at.
-    pub fn tip(&mut self, Rect { x, y, w, h }: Rect, text: &str) {
+    pub fn tip(&mut self, place: Rect, text: &str) {
+        self.rectangle(place, &format!("opacity=\"0\"><title>{}</title></rect>", escape(text)));
+    }
+
+    fn rectangle(&mut self, Rect { x, y, w, h }: Rect, rest: &str) {
         // A phase of no time has no width, and SVG draws no such rectangle.
         let w = w.max(1.0);
-        let _ = writeln!(
-            self.svg,
-            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" opacity=\"0\"><title>{}</title></rect>",
-            escape(text),
-        );
+        let _ = writeln!(self.svg, "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" {rest}");
+    }
+
+    /// What stands beside a bar at the height `y`: its name to the left of `begin`, its figure to the right of `end`.
+    pub fn label_bar(&mut self, y: f64, (begin, name, tone): (f64, &str, Tone), (end, figure): (f64, &str)) {
+        let label = |x, text, anchor, tone| Label { at: (x, y + 4.5), text, anchor, tone, size: LABEL_SIZE };
+        self.label(label(end + 8.0, figure, "start", MUTED));
+        self.name(label(begin - 8.0, name, "end", tone));
     }
 
     /// Labels the points of a chart, each beside its anchor, without covering each other nor, where there is room, `lines`;
@@ -233,7 +215,7 @@ impl Overlay {
         }
     }
 
-    /// Labels lines at their right ends, spread so that they do not cover each other; [`room_at_ends`] is the margin for it.
+    /// Labels lines at their right ends, spread so that they do not cover each other; [`room_at_ends`](super::plot::room_at_ends) is the margin for it.
     pub fn label_ends(&mut self, ends: &[(f64, f64)], texts: &[(String, Tone)], frame: Rect) {
         let heights: Vec<f64> = ends.iter().map(|e| e.1).collect();
         let moved = labels::spread(&heights, 17.0, frame.y + 6.0, frame.y + frame.h - 6.0);
@@ -243,83 +225,4 @@ impl Overlay {
             self.name(Label { at, text, anchor: "start", tone: *tone, size: LABEL_SIZE });
         }
     }
-}
-
-/// The margin to the right of a chart whose lines have labels at their ends.
-pub fn room_at_ends<S: AsRef<str>>(names: impl IntoIterator<Item = S>) -> u32 {
-    labels::name_room(names, LABEL_SIZE) as u32 + 24
-}
-
-/// plotters' text size for a text of so many pixels: its SVG back end divides by 1.24.
-fn text(pixels: f64, tone: Tone) -> TextStyle<'static> {
-    ("sans-serif", pixels * 1.24).into_font().color(&tone.light)
-}
-
-/// A logarithmic axis, with numbers at [`log_ticks`].
-pub fn log_axis(range: Range<f64>) -> WithKeyPoints<LogCoord<f64>> {
-    let ticks = log_ticks(range.start, range.end);
-    range.log_scale().with_key_points(ticks)
-}
-
-/// What the axes are called and how their numbers are written.
-pub struct Axes<'a> {
-    /// Under the horizontal axis.
-    pub x: &'a str,
-    /// Beside the vertical axis; empty if the chart labels it itself.
-    pub y: &'a str,
-    /// Numbers of the horizontal axis.
-    pub x_number: &'a dyn Fn(&f64) -> String,
-    /// Numbers of the vertical axis.
-    pub y_number: &'a dyn Fn(&f64) -> String,
-}
-
-/// Grid, axes and their numbers.
-pub fn mesh<X, Y>(chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>, axes: &Axes<'_>) -> Drawn
-where
-    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
-    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
-{
-    let mut mesh = chart.configure_mesh();
-    mesh.light_line_style(TRANSPARENT)
-        .bold_line_style(GRID.light)
-        .axis_style(MUTED.light)
-        .label_style(text(12.0, MUTED))
-        .axis_desc_style(text(13.0, MUTED))
-        .x_desc(axes.x)
-        .x_label_formatter(axes.x_number)
-        .y_label_formatter(axes.y_number)
-        .x_labels(8)
-        .y_labels(8);
-    if axes.y.is_empty() {
-        mesh.disable_y_mesh().disable_y_axis();
-    } else {
-        mesh.y_desc(axes.y);
-    }
-    mesh.draw()?;
-    Ok(())
-}
-
-/// The plotting area in pixels of the chart.
-pub fn frame<X, Y>(chart: &ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>) -> Rect
-where
-    X: Ranged<ValueType = f64>,
-    Y: Ranged<ValueType = f64>,
-{
-    let (x, y) = chart.plotting_area().get_pixel_range();
-    Rect { x: f64::from(x.start), y: f64::from(y.start), w: f64::from(x.end - x.start), h: f64::from(y.end - y.start) }
-}
-
-/// Where a value lies, in pixels of the chart.
-pub fn pixel<X, Y>(chart: &ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>, at: (f64, f64)) -> (f64, f64)
-where
-    X: Ranged<ValueType = f64>,
-    Y: Ranged<ValueType = f64>,
-{
-    let (x, y) = chart.backend_coord(&at);
-    (f64::from(x), f64::from(y))
-}
-
-/// The style of frontiers and envelopes: wide, behind the marks.
-pub fn best_line() -> ShapeStyle {
-    BEST.light.mix(0.65).stroke_width(6)
 }

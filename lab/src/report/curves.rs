@@ -3,13 +3,14 @@
 
 use crate::Result;
 use crate::measure::statistics::Spread;
-use crate::report::chart::{Area, Axes, Caption, Chart, Drawn, Overlay, frame, log_axis, mesh, pixel, room_at_ends};
+use crate::report::chart::{Area, Caption, Chart, Drawn, Overlay};
 use crate::report::labels::Rect;
+use crate::report::plot::{Plot, Room, room_at_ends};
 use crate::report::power_law::PowerLaw;
-use crate::report::theme::{INK, Tone};
-use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use crate::report::theme::Tone;
 use plotters::prelude::*;
-use std::ops::Range;
+
+pub use crate::report::plot::Axis;
 
 /// One subject.
 #[derive(Debug, Clone)]
@@ -46,16 +47,6 @@ pub struct Mark {
     pub x: f64,
 }
 
-/// An axis.
-pub struct Axis<'a> {
-    /// What it is called.
-    pub name: &'a str,
-    /// Whether its numbers are logarithmic.
-    pub is_log: bool,
-    /// How they are written.
-    pub number: fn(f64) -> String,
-}
-
 /// Draws the curves. `None` if there are none, or all points have one place on the horizontal axis.
 ///
 /// # Errors
@@ -85,89 +76,67 @@ pub fn curves_and_marks(
         return Ok(None);
     }
     let x_range = if x.is_log { 0.8 * left..1.2 * right } else { left..right + 0.02 * (right - left) };
-    let y_range = if y.is_log { 0.7 * low..1.4 * high } else { 0.0..1.1 * high };
+    let (bottom, top) = if y.is_log { (0.7 * low, 1.4 * high) } else { (0.0, 1.1 * high) };
     // Room for the names of marks, a line each, above the curves.
     let room = 0.06 * marks.len() as f64;
-    let y_range = match y.is_log {
-        true => y_range.start..y_range.end * (y_range.end / y_range.start).powf(room / (1.0 - room).max(0.2)),
-        false => y_range.start..y_range.end / (1.0 - room).max(0.2),
-    };
+    let share = (1.0 - room).max(0.2);
+    let top = if y.is_log { top * (top / bottom).powf(room / share) } else { top / share };
     let marks: Vec<&Mark> = marks.iter().filter(|mark| (left..=right).contains(&mark.x)).collect();
-    let names = room_at_ends(curves.iter().map(|curve| &curve.name));
+    let shown: Vec<&Curve> = curves.iter().filter(|curve| !curve.points.is_empty()).collect();
+    let room = Room { left: 76, right: room_at_ends(curves.iter().map(|curve| &curve.name)), ..Room::default() };
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
-        let mut chart = ChartBuilder::on(area);
-        chart.x_label_area_size(46).y_label_area_size(76).margin_right(names);
-        let axes = Axes { x: x.name, y: y.name, x_number: &|v| (x.number)(*v), y_number: &|v| (y.number)(*v) };
-        let linear = |range: &Range<f64>| range.clone();
-        match (x.is_log, y.is_log) {
-            (true, true) => {
-                let chart = chart.build_cartesian_2d(log_axis(x_range.clone()), log_axis(y_range.clone()))?;
-                drawn(chart, overlay, (curves, &marks), &axes, x_range.end)
-            }
-            (true, false) => {
-                let chart = chart.build_cartesian_2d(log_axis(x_range.clone()), linear(&y_range))?;
-                drawn(chart, overlay, (curves, &marks), &axes, x_range.end)
-            }
-            (false, true) => {
-                let chart = chart.build_cartesian_2d(linear(&x_range), log_axis(y_range.clone()))?;
-                drawn(chart, overlay, (curves, &marks), &axes, x_range.end)
-            }
-            (false, false) => {
-                let chart = chart.build_cartesian_2d(linear(&x_range), linear(&y_range))?;
-                drawn(chart, overlay, (curves, &marks), &axes, x_range.end)
-            }
+        let end = x_range.end;
+        let mut plot = Plot::new(area, &room, (x, x_range), (y, bottom..top))?;
+        draw_marks(&plot, overlay, &marks);
+        let mut ends = Vec::new();
+        for curve in &shown {
+            let height = draw_curve(&mut plot, overlay, curve, x, y)?;
+            ends.push(plot.pixel((end, height)));
         }
+        let texts: Vec<_> = shown.iter().map(|curve| (curve.name.clone(), curve.tone)).collect();
+        overlay.label_ends(&ends, &texts, plot.frame);
+        Ok(())
     };
     Chart::draw(caption, draw).map(Some)
 }
 
-fn drawn<X, Y>(
-    mut chart: ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>,
-    overlay: &mut Overlay,
-    (curves, marks): (&[Curve], &[&Mark]),
-    axes: &Axes<'_>,
-    end: f64,
-) -> Drawn
-where
-    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
-    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
-{
-    mesh(&mut chart, axes)?;
-    let area = frame(&chart);
-    let places: Vec<f64> = marks.iter().map(|mark| pixel(&chart, (mark.x, 1.0)).0).collect();
-    for (mark, &x) in marks.iter().zip(&places) {
-        overlay.dashes((x, area.y), (x, area.y + area.h), mark.tone);
+fn draw_marks(plot: &Plot<'_, '_>, overlay: &mut Overlay, marks: &[&Mark]) {
+    let frame = plot.frame;
+    let mut tops = Vec::new();
+    for mark in marks {
+        let x = plot.pixel((mark.x, 1.0)).0;
+        overlay.dashes((x, frame.y), (x, frame.y + frame.h), mark.tone);
+        tops.push((x, frame.y + 8.0));
     }
-    let tops: Vec<(f64, f64)> = places.iter().map(|&x| (x, area.y + 8.0)).collect();
     let names: Vec<_> = marks.iter().map(|mark| (mark.name.clone(), mark.tone)).collect();
-    overlay.label_points(&tops, &names, &[], area);
-    let shown: Vec<&Curve> = curves.iter().filter(|curve| !curve.points.is_empty()).collect();
-    let mut ends = Vec::new();
-    for curve in &shown {
-        let Curve { points, tone, .. } = curve;
-        let (first, last) = (points[0].0, points[points.len() - 1].0);
-        let line: Vec<(f64, f64)> = match curve.law {
-            Some(law) => [first, last].map(|x| (x, law.at(x))).to_vec(),
-            None => points.iter().map(|(x, spread)| (*x, spread.median)).collect(),
-        };
-        let height = line[line.len() - 1].1;
-        chart.draw_series([PathElement::new(line, tone.light.stroke_width(2))])?;
-        for &(x, Spread { median, min, max, runs }) in points {
-            // Less than a pixel has no length that could be drawn.
-            if chart.backend_coord(&(x, min)) != chart.backend_coord(&(x, max)) {
-                chart.draw_series([PathElement::new(vec![(x, min), (x, max)], INK.light.stroke_width(1))])?;
-            }
-            chart.draw_series([Circle::new((x, median), 4, tone.light.filled())])?;
-            let at = pixel(&chart, (x, median));
-            let [median, min, max] = [median, min, max].map(|v| (axes.y_number)(&v));
-            let x = (axes.x_number)(&x);
-            let spread = if runs > 1 { format!(", from {min} to {max} in {runs} runs") } else { String::new() };
-            let tip = format!("{}\n{x}: {median}{spread}", curve.name);
-            overlay.tip(Rect { x: at.0 - 7.0, y: at.1 - 7.0, w: 14.0, h: 14.0 }, &tip);
-        }
-        ends.push((pixel(&chart, (end, height)).0, pixel(&chart, (end, height)).1));
+    overlay.label_points(&tops, &names, &[], frame);
+}
+
+/// Draws a curve, and gives its height at the right end.
+fn draw_curve(
+    plot: &mut Plot<'_, '_>,
+    overlay: &mut Overlay,
+    curve: &Curve,
+    x_axis: &Axis<'_>,
+    y_axis: &Axis<'_>,
+) -> std::result::Result<f64, Box<dyn std::error::Error>> {
+    let Curve { points, tone, .. } = curve;
+    let (first, last) = (points[0].0, points[points.len() - 1].0);
+    let line: Vec<(f64, f64)> = match curve.law {
+        Some(law) => [first, last].map(|x| (x, law.at(x))).to_vec(),
+        None => points.iter().map(|(x, spread)| (*x, spread.median)).collect(),
+    };
+    let height = line[line.len() - 1].1;
+    plot.line(line, tone.light.stroke_width(2))?;
+    for &(x, Spread { median, min, max, runs }) in points {
+        plot.whisker((x, min), (x, max))?;
+        plot.chart.draw_series([Circle::new((x, median), 4, tone.light.filled())])?;
+        let at = plot.pixel((x, median));
+        let [median, min, max] = [median, min, max].map(y_axis.number);
+        let x = (x_axis.number)(x);
+        let spread = if runs > 1 { format!(", from {min} to {max} in {runs} runs") } else { String::new() };
+        let tip = format!("{}\n{x}: {median}{spread}", curve.name);
+        overlay.tip(Rect { x: at.0 - 7.0, y: at.1 - 7.0, w: 14.0, h: 14.0 }, &tip);
     }
-    let texts: Vec<_> = shown.iter().map(|curve| (curve.name.clone(), curve.tone)).collect();
-    overlay.label_ends(&ends, &texts, area);
-    Ok(())
+    Ok(height)
 }

@@ -2,11 +2,11 @@
 
 use super::beside::{self, Page};
 use super::chart::Chart;
-use super::elements::{facts, figure, foot, head, measured_by};
+use super::elements::{facts, figure, foot, page};
 use super::write_charts;
 use crate::measure::setting::{Failure, Setting};
 use crate::{Error, Result};
-use maud::{DOCTYPE, Markup, html};
+use maud::{Markup, html};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -80,39 +80,29 @@ impl Document<'_> {
     }
 
     fn html(&self, links: &Markup) -> String {
-        let markup = html! {
-            (DOCTYPE)
-            html lang="en" {
-                (head(&format!("hedgerow: {}", self.tab)))
-                body {
-                    a.skip href="#summary" { "Skip to the results" }
-                    header.hero {
-                        p.kicker { (self.kicker) }
-                        h1 { (self.title) }
-                        p.lead { (self.lead) }
-                        @if let Some(setting) = self.setting { (facts(setting)) (measured_by(&setting.command)) }
-                    }
-                    nav aria-label="Sections" {
-                        @for section in &self.sections { a href={ "#" (section.id) } { (section.name) } }
-                        (links)
-                    }
-                    main {
-                        @if !self.failures.is_empty() { (warning(&self.failures)) }
-                        @for section in &self.sections { (section.content) }
-                    }
-                    @if let Some(setting) = self.setting { (foot(&setting.commit, &setting.when)) }
-                }
+        let body = html! {
+            a.skip href="#summary" { "Skip to the results" }
+            header.hero {
+                p.kicker { (self.kicker) }
+                h1 { (self.title) }
+                p.lead { (self.lead) }
+                @if let Some(setting) = self.setting { (facts(setting)) }
             }
+            nav aria-label="Sections" {
+                @for section in &self.sections { a href={ "#" (section.id) } { (section.name) } }
+                (links)
+            }
+            main {
+                @if !self.failures.is_empty() {
+                    section.warning #failures {
+                        h2 { "What went wrong" }
+                        ul { @for (of, what) in &self.failures { li { b { (of) } ": " (what) } } }
+                    }
+                }
+                @for section in &self.sections { (section.content) }
+            }
+            @if let Some(setting) = self.setting { (foot(&setting.commit, &setting.when)) }
         };
-        markup.into_string()
-    }
-}
-
-fn warning(failures: &[(String, String)]) -> Markup {
-    html! {
-        section.warning #failures {
-            h2 { "What went wrong" }
-            ul { @for (of, what) in failures { li { b { (of) } ": " (what) } } }
-        }
+        page(&format!("hedgerow: {}", self.tab), &body)
     }
 }

@@ -4,8 +4,7 @@ use super::chart::Chart;
 use super::numbers::{bytes, three_digits};
 use super::theme::{self, Tone};
 use crate::measure::setting::Setting;
-use crate::measure::statistics::Spread;
-use maud::{Markup, PreEscaped, html};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -22,6 +21,15 @@ pub fn head(title: &str) -> Markup {
             style { (PreEscaped(colours())) (PreEscaped(STYLE)) }
         }
     }
+}
+
+/// A page with this in its body.
+pub fn page(title: &str, body: &Markup) -> String {
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" { (head(title)) body { (body) } }
+    };
+    markup.into_string()
 }
 
 /// The end of a page: who made it, and the script.
@@ -41,9 +49,9 @@ fn colours() -> String {
     format!(":root{{{light}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n")
 }
 
-/// Where and how it was measured.
+/// Where and how it was measured, with the command line that measures it again.
 pub fn facts(setting: &Setting) -> Markup {
-    let Setting { machine, device, commit, when, options, .. } = setting;
+    let Setting { machine, device, commit, when, command, options, .. } = setting;
     html! {
         dl.facts {
             div { dt { "Processor" } dd { (machine.cpu) span { (machine.cores) " cores, " (machine.system) } } }
@@ -58,20 +66,7 @@ pub fn facts(setting: &Setting) -> Markup {
             div { dt { "Commit" } dd { code { (commit) } span { (when) } } }
             @for (name, value) in options { div { dt { (name) } dd { (value) } } }
         }
-    }
-}
-
-/// The command line that measures it again.
-pub fn measured_by(command: &str) -> Markup {
-    html! { p.command { span { "Measured by" } code { (command) } } }
-}
-
-/// A heading that sorts its column when pressed.
-pub fn column(name: &str, unit: &str, is_number: bool) -> Markup {
-    html! {
-        th scope="col" .number[is_number] aria-sort="none" {
-            button type="button" { (name) @if !unit.is_empty() { " " small { (unit) } } }
-        }
+        p.command { span { "Measured by" } code { (command) } }
     }
 }
 
@@ -94,16 +89,6 @@ pub fn bar(value: Option<f64>, greatest: f64) -> Markup {
     }
 }
 
-/// A cell with the median of a spread, its least and greatest below.
-pub fn spread(value: Option<Spread>, text: impl Fn(f64) -> String) -> Markup {
-    match value {
-        Some(Spread { median, min, max, .. }) => html! {
-            td.number data-value=(median) { (text(median)) small { (text(min)) " – " (text(max)) } }
-        },
-        None => number(None, text),
-    }
-}
-
 /// A table that may be wider than the page.
 pub fn scroll(label: &str, table: Markup) -> Markup {
     html! { div.scroll tabindex="0" role="region" aria-label=(label) { (table) } }
@@ -115,8 +100,8 @@ pub fn figure(chart: &Chart) -> Markup {
         figure.chart {
             div.canvas { (PreEscaped(chart.inline())) }
             figcaption {
-                (chart.reading) " "
-                span.files { a href={ "charts/" (chart.name) ".svg" } { "SVG" } " " a href={ "charts/" (chart.name) ".png" } { "PNG" } }
+                (chart.caption.reading) " "
+                span.files { a href={ "charts/" (chart.caption.name) ".svg" } { "SVG" } " " a href={ "charts/" (chart.caption.name) ".png" } { "PNG" } }
             }
         }
     }

@@ -1,6 +1,6 @@
 //! What pages are made of: charts, tables, pictures, numbers as people read them, and files of records.
 //!
-//! [`Chart`] is drawn once, as SVG, PNG and part of a page; [`bars`], [`stacked`] and [`curves`] are its usual kinds. A [`document`](mod@document)
+//! [`Chart`] is drawn once, as SVG, PNG and part of a page; [`bars`], [`stacked`] and [`curves`] are its usual kinds, and a [`plot`] is the part with axes. A [`document`](mod@document)
 //! is a whole page, [`columns`] its tables, [`elements`] the rest of it; [`theme`] its colours, [`beside`] the pages that name each other. [`lines`] reads and writes files of
 //! one record a line. [`picture`] renders scenes.
 
@@ -16,6 +16,7 @@ pub mod lines;
 pub mod names;
 pub mod numbers;
 pub mod picture;
+pub mod plot;
 pub mod power_law;
 pub mod raster;
 pub mod stacked;
@@ -47,7 +48,7 @@ pub fn write_charts<'a>(folder: &Path, charts: impl Iterator<Item = &'a Chart>) 
     let folder = folder.join("charts");
     std::fs::create_dir_all(&folder).map_err(Error::file(&folder))?;
     for chart in charts {
-        let [svg, png] = ["svg", "png"].map(|extension| folder.join(format!("{}.{extension}", chart.name)));
+        let [svg, png] = ["svg", "png"].map(|extension| folder.join(format!("{}.{extension}", chart.caption.name)));
         if png.is_file() && std::fs::read(&svg).is_ok_and(|content| content == chart.svg().as_bytes()) {
             continue;
         }

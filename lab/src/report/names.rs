@@ -1,4 +1,4 @@
-//! Short names of builders for labels: what `-b` takes, less what every reader knows.
+//! Names as pages and files have them: short ones of builders for labels, which are what `-b` takes less what every reader knows.
 
 /// `lbvh:codes=emc64var:collapse=off` as `lbvh emc64var, uncollapsed`.
 pub fn short(builder: &str) -> String {
@@ -18,12 +18,19 @@ pub fn short(builder: &str) -> String {
 
 /// A name that files and HTML identifiers can have: ASCII letters, digits and `-`.
 pub fn slug(name: &str) -> String {
-    let mut slug: String =
-        name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
-    while slug.contains("--") {
-        slug = slug.replace("--", "-");
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+    words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
+}
+
+/// Each once, in the order in which they first appear.
+pub fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut kept = Vec::new();
+    for item in items {
+        if !kept.contains(&item) {
+            kept.push(item);
+        }
     }
-    slug.trim_matches('-').to_owned()
+    kept
 }
 
 #[cfg(test)]

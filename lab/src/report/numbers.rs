@@ -32,14 +32,8 @@ pub fn log_ticks(lo: f64, hi: f64) -> Vec<f64> {
 /// With a thin space between thousands: `262 267`.
 pub fn grouped(value: u64) -> String {
     let digits = value.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push('\u{2009}');
-        }
-        text.push(digit);
-    }
-    text
+    let groups = digits.as_bytes().rchunks(3).rev();
+    groups.map(String::from_utf8_lossy).collect::<Vec<_>>().join("\u{2009}")
 }
 
 /// A count of a table: [`grouped`].

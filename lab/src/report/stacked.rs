@@ -1,9 +1,10 @@
 //! Where time goes: stacked bars, one a subject, with a key to their parts.
 
-use super::chart::{Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, frame, mesh, pixel};
+use super::chart::{Area, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay};
 use super::labels::{Rect, name_room, text_width};
 use super::numbers::{duration, tick};
-use super::theme::{INK, MUTED, PAPER, Tone};
+use super::plot::{self, Axis, Plot, Room};
+use super::theme::{INK, PAPER, Tone};
 use crate::Result;
 use plotters::prelude::*;
 
@@ -38,10 +39,6 @@ impl Stack {
             self.parts.iter().map(|part| format!("{} {}", part.name, duration(part.milliseconds))).collect();
         format!("{} {} ({})", self.name, duration(self.total), parts.join(", "))
     }
-
-    fn length(&self) -> f64 {
-        self.parts.iter().map(|part| part.milliseconds).sum()
-    }
 }
 
 /// Draws the bars, whose parts are parts of `whole`. `None` if there are none.
@@ -49,30 +46,28 @@ impl Stack {
 /// # Errors
 /// The chart cannot be drawn.
 pub fn stacked(caption: Caption, axis: &str, whole: &str, stacks: &[Stack]) -> Result<Option<Chart>> {
-    let longest = stacks.iter().map(|stack| stack.total.max(stack.length())).fold(0.0, f64::max);
+    let length = |stack: &Stack| stack.parts.iter().map(|part| part.milliseconds).sum::<f64>();
+    let longest = stacks.iter().map(|stack| stack.total.max(length(stack))).fold(0.0, f64::max);
     if longest <= 0.0 {
         return Ok(None);
     }
+    let left = name_room(stacks.iter().map(|stack| &stack.name), LABEL_SIZE) as u32 + 10;
+    let room = Room { left, bottom: 26, ..Room::default() };
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
-        let mut chart = ChartBuilder::on(area)
-            .x_label_area_size(46)
-            .margin_left(name_room(stacks.iter().map(|stack| &stack.name), LABEL_SIZE) as u32 + 10)
-            .margin_bottom(26)
-            .build_cartesian_2d(0.0..1.14 * longest, 0.0..stacks.len() as f64)?;
-        mesh(&mut chart, &Axes { x: axis, y: "", x_number: &|v| tick(*v), y_number: &|_| String::new() })?;
-        let inner = frame(&chart);
+        let times = Axis { name: axis, is_log: false, number: tick };
+        let rows = 0.0..stacks.len() as f64;
+        let mut plot = Plot::new(area, &room, (&times, 0.0..1.14 * longest), (&plot::BARS, rows))?;
         for (row, stack) in stacks.iter().enumerate() {
             let centre = (stacks.len() - row) as f64 - 0.5;
             let mut from = 0.0;
             for part in &stack.parts {
                 let to = from + part.milliseconds;
                 let corners = [(from, centre - 0.32), (to, centre + 0.32)];
-                let ((x0, y1), (x1, y0)) = (pixel(&chart, corners[0]), pixel(&chart, corners[1]));
+                let ((x0, y1), (x1, y0)) = (plot.pixel(corners[0]), plot.pixel(corners[1]));
                 // SVG draws none without a width.
                 if x1 > x0 {
-                    chart.draw_series([Rectangle::new(corners, part.tone.light.filled())])?;
-                    let edge = vec![(to, centre - 0.32), (to, centre + 0.32)];
-                    chart.draw_series([PathElement::new(edge, PAPER.light.stroke_width(1))])?;
+                    plot.chart.draw_series([Rectangle::new(corners, part.tone.light.filled())])?;
+                    plot.line([(to, centre - 0.32), (to, centre + 0.32)], PAPER.light.stroke_width(1))?;
                 }
                 let share = 100.0 * part.milliseconds / stack.total;
                 let time = duration(part.milliseconds);
@@ -80,11 +75,8 @@ pub fn stacked(caption: Caption, axis: &str, whole: &str, stacks: &[Stack]) -> R
                 overlay.tip(Rect { x: x0, y: y0, w: x1 - x0, h: y1 - y0 }, &tip);
                 from = to;
             }
-            let (end, y) = pixel(&chart, (from, centre));
-            let label = |x, text, anchor, tone| Label { at: (x, y + 4.5), text, anchor, tone, size: LABEL_SIZE };
-            let total = duration(stack.total);
-            overlay.label(label(end + 8.0, &total, "start", MUTED));
-            overlay.name(label(inner.x - 8.0, &stack.name, "end", stack.tone));
+            let (end, y) = plot.pixel((from, centre));
+            overlay.label_bar(y, (plot.frame.x, &stack.name, stack.tone), (end, &duration(stack.total)));
         }
         let mut parts: Vec<&Part> = Vec::new();
         for part in stacks.iter().flat_map(|stack| &stack.parts) {

@@ -13,8 +13,13 @@ pub const STYLE: TableStyle = TableStyle::new()
 
 /// An empty table in our style; columns from `texts` on are aligned to the right.
 pub fn with_header<S: Into<String>>(header: impl IntoIterator<Item = S>, texts: usize) -> Table {
+    styled(STYLE, header, texts)
+}
+
+/// An empty table in any style; columns from `texts` on are aligned to the right.
+pub fn styled<S: Into<String>>(style: TableStyle, header: impl IntoIterator<Item = S>, texts: usize) -> Table {
     let mut table = Table::new();
-    table.load_style(STYLE);
+    table.load_style(style);
     table.set_header(header.into_iter().map(Into::into));
     for column in table.column_iter_mut().skip(texts) {
         column.set_cell_alignment(CellAlignment::Right);

@@ -2,6 +2,7 @@
 //!
 //! Charts are drawn in the light colours; on the page each becomes a CSS variable that the dark scheme overrides.
 
+use super::names::distinct;
 use crate::measure::record::Record;
 use plotters::style::RGBColor;
 
@@ -73,34 +74,21 @@ pub fn hex(colour: RGBColor) -> String {
 /// What stands for what on the whole page.
 #[derive(Debug, Clone, Default)]
 pub struct Legend {
-    builders: Vec<String>,
-    phases: Vec<String>,
+    /// All builders, in order.
+    pub builders: Vec<String>,
+    /// All phases, in order.
+    pub phases: Vec<String>,
 }
 
 impl Legend {
     /// Colours for everything in `records`, in order of appearance.
-    pub fn of<'a>(records: impl IntoIterator<Item = &'a Record>) -> Legend {
-        let mut legend = Legend::default();
-        let note = |names: &mut Vec<String>, name: &str| {
-            if !names.iter().any(|n| n == name) {
-                names.push(name.to_owned());
-            }
-        };
-        for record in records {
-            note(&mut legend.builders, &record.builder);
-            record.build.phases.iter().for_each(|phase| note(&mut legend.phases, &phase.name));
+    pub fn of<'a>(records: impl IntoIterator<Item = &'a Record, IntoIter: Clone>) -> Legend {
+        let records = records.into_iter();
+        let phases = records.clone().flat_map(|record| &record.build.phases);
+        Legend {
+            builders: distinct(records.map(|record| record.builder.clone())),
+            phases: distinct(phases.map(|phase| phase.name.clone())),
         }
-        legend
-    }
-
-    /// All builders, in order.
-    pub fn builders(&self) -> &[String] {
-        &self.builders
-    }
-
-    /// All phases, in order.
-    pub fn phases(&self) -> &[String] {
-        &self.phases
     }
 
     /// The colour of a builder.

@@ -238,7 +238,7 @@ fn the_csv_has_a_row_a_record_and_columns_for_every_kind_of_ray() {
 fn records_are_read_back_as_they_were_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let report = report(folder.path());
-    let mut file = results::Results::create(folder.path()).expect("a folder of our own");
+    let mut file = results::create(folder.path()).expect("a folder of our own");
     for record in report.records() {
         file.append(record).expect("written");
         let so_far = results::read(folder.path()).expect("what was appended is there at once");

@@ -6,11 +6,13 @@ use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::bench::kd_trees::{self, published};
 use crate::experiments::bench::matrix::{self, BenchPlan, OnScene, Outcome};
-use crate::experiments::bench::results::Results;
+use crate::experiments::bench::results;
 use crate::experiments::bench::shard::Shard;
-use crate::experiments::choose::{CostTable, cache, candidates, hindsight};
+use crate::experiments::choose::command::calibrated;
+use crate::experiments::choose::{CostTable, candidates, hindsight};
 use crate::measure::overlap::Epo;
 use crate::measure::setting::{Failure, Setting};
+use crate::report::lines::Lines;
 use crate::report::names::slug;
 use crate::report::picture::{PictureOptions, View, picture};
 use crate::report::table;
@@ -75,13 +77,15 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let published = arguments.published.as_deref().filter(|file| !file.as_os_str().is_empty());
     let published = published.map_or_else(|| Ok(published::papay()), published::read)?;
     // Before any work: a folder that cannot be written would lose all of it.
-    let results = Results::create(&arguments.output)?;
-    let device = open(common, &asked)?;
+    let results = results::create(&arguments.output)?;
+    // Host builders alone need no device. One is opened with ray queries where it has them.
+    let needs_device = asked.iter().any(|spec| spec.needs() != Needs::Nothing);
+    let device = needs_device.then(|| common.open_device(true)).transpose()?;
     let no_peer = device.as_ref().and_then(|device| driver::note(device.found()));
     let mut notes = Vec::new();
     let mut builders = possible(asked, arguments, device.as_ref(), no_peer.as_deref(), &mut notes)?;
-    let costs = builders.iter().any(|spec| spec.builder().name == "auto").then(|| calibrated(common, device.as_ref()));
-    let costs = costs.transpose()?.flatten();
+    let chooses = builders.iter().any(|spec| spec.builder().name == "auto");
+    let costs = device.as_ref().filter(|_| chooses).map(|device| calibrated(common, device, false)).transpose()?;
     if let (Some(_), Some(device)) = (&costs, &device) {
         // A choice can be held against the best only where all that could have been chosen are measured.
         for spec in candidates::possible(device) {
@@ -99,17 +103,16 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         c_i: arguments.costs.test,
         epo: arguments.epo,
     };
-    let mut bench = Bench {
-        common,
-        arguments,
-        device: device.as_ref(),
-        plan,
-        costs,
-        results,
-        report: Report { published, ..empty(common, arguments, device.as_ref(), notes)? },
-    };
-    bench.report.baseline = no_peer.is_none().then(|| "driver-fast-build".into());
-    bench.report.write_setting(&arguments.output)?;
+    let options = [
+        ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),
+        ("Image", format!("{}, seed {}", arguments.size, common.seed)),
+        ("Host threads", common.threads.map_or("one a core".into(), |n| n.to_string())),
+    ];
+    let setting = Setting::of(device.as_ref(), &options, notes)?;
+    let baseline = no_peer.is_none().then(|| "driver-fast-build".into());
+    let report = Report { published, baseline, ..Report::new(setting) };
+    report.write_setting(&arguments.output)?;
+    let mut bench = Bench { common, arguments, device: device.as_ref(), plan, costs, results, report };
     for scene in &scenes {
         bench.scene(scene)?;
     }
@@ -167,14 +170,6 @@ fn shared(common: &Common, arguments: &Arguments, scenes: Vec<String>) -> Vec<St
     own.into_iter().map(|i| scenes[i].clone()).collect()
 }
 
-/// The device, with ray queries where it has them: host builders alone need none.
-fn open(common: &Common, builders: &[Spec]) -> crate::Result<Option<Device>> {
-    if builders.iter().all(|spec| spec.needs() == Needs::Nothing) {
-        return Ok(None);
-    }
-    common.open_device(true).map(Some)
-}
-
 /// The builders that can be measured. One that was named stays, and fails where it must; one that came with `all` or by
 /// default is left out, with a note.
 fn possible(
@@ -202,23 +197,6 @@ fn possible(
     Ok(kept)
 }
 
-/// The table of costs of the device, measured under a progress bar where it is not known.
-fn calibrated(common: &Common, device: Option<&Device>) -> crate::Result<Option<CostTable>> {
-    let bar = Bar::new(common, "calibrating", 0);
-    device.map(|device| cache::table_of(device, false, &mut |what| bar.say(what))).transpose()
-}
-
-/// The report before anything was measured.
-fn empty(common: &Common, arguments: &Arguments, device: Option<&Device>, notes: Vec<String>) -> crate::Result<Report> {
-    let threads = common.threads.map_or("one a core".into(), |n| n.to_string());
-    let options = [
-        ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),
-        ("Image", format!("{}, seed {}", arguments.size, common.seed)),
-        ("Host threads", threads),
-    ];
-    Ok(Report::new(Setting::of(device, &options, notes)?))
-}
-
 /// A benchmark under way.
 struct Bench<'a> {
     common: &'a Common,
@@ -227,7 +205,7 @@ struct Bench<'a> {
     plan: BenchPlan,
     /// Where `auto` is measured.
     costs: Option<CostTable>,
-    results: Results,
+    results: Lines,
     report: Report,
 }
 
@@ -237,7 +215,7 @@ impl Bench<'_> {
         let scene = match self.common.load(spec) {
             Ok(scene) => scene,
             Err(error) => {
-                self.failed(spec, error.to_string());
+                self.failed(OnScene::failure(spec, None, error));
                 return Ok(());
             }
         };
@@ -247,10 +225,7 @@ impl Bench<'_> {
         let bar = Bar::new(self.common, &scene.name, 0);
         let say = |what: &str| bar.say(&format!("{}: {what}", scene.name));
         let (outcomes, failures) = matrix::measure(&scene, self.device, &self.plan, &mut |what| say(what));
-        for failure in failures {
-            eprintln!("hedgerow: {failure}");
-            self.report.failures.push(failure);
-        }
+        failures.into_iter().for_each(|failure| self.failed(failure));
         for outcome in &outcomes {
             self.results.append(&outcome.record)?;
             for fault in &outcome.faults {
@@ -260,16 +235,15 @@ impl Bench<'_> {
         if !self.arguments.no_pictures {
             say("pictures");
             if let Err(error) = self.pictures(&scene, &outcomes) {
-                self.failed(&scene.name, format!("pictures: {error:#}"));
+                self.failed(OnScene::failure(&scene.name, None, format!("pictures: {error:#}")));
             }
         }
         self.report.outcomes.extend(outcomes);
         Ok(())
     }
 
-    /// Notes that a scene failed.
-    fn failed(&mut self, scene: &str, what: String) {
-        let failure = Failure { at: OnScene { scene: scene.to_owned(), builder: None }, what };
+    /// Notes a failure.
+    fn failed(&mut self, failure: Failure<OnScene>) {
         eprintln!("hedgerow: {failure}");
         self.report.failures.push(failure);
     }

@@ -74,6 +74,14 @@ pub struct OnScene {
     pub builder: Option<String>,
 }
 
+impl OnScene {
+    /// What went wrong with a builder on a scene, or with the scene itself.
+    pub fn failure(scene: &str, builder: Option<&Spec>, what: impl ToString) -> Failure<OnScene> {
+        let at = OnScene { scene: scene.to_owned(), builder: builder.map(Spec::to_string) };
+        Failure { at, what: what.to_string() }
+    }
+}
+
 impl fmt::Display for OnScene {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.scene)?;
@@ -97,10 +105,7 @@ pub fn measure(
     plan: &BenchPlan,
     say: &mut dyn FnMut(&str),
 ) -> (Vec<Outcome>, Vec<Failure<OnScene>>) {
-    let fail = |spec: &Spec, error: Error| Failure {
-        at: OnScene { scene: scene.name.clone(), builder: Some(spec.to_string()) },
-        what: error.to_string(),
-    };
+    let fail = |spec: &Spec, error: Error| OnScene::failure(&scene.name, Some(spec), error);
     let (mut entries, mut failures) = (Vec::new(), Vec::new());
     for spec in &plan.builders {
         match spec.make(device, &scene.mesh) {
@@ -111,7 +116,7 @@ pub fn measure(
             Err(error) => failures.push(fail(spec, error)),
         }
     }
-    let mut rounds = Rounds { entries: &mut entries };
+    let mut rounds = Rounds { entries };
 
     say("building");
     let builds = rounds.run(plan.runs, |entry| entry.subject.build());
@@ -134,7 +139,9 @@ pub fn measure(
     let mesh = &scene.mesh;
     let reference = lbvh::build(&mesh.positions, &mesh.triangles, Code::Mc63.full(), Collapse::SAH);
     let mut closest_hits = Remembered { tree: &reference, last: Vec::new() };
-    for kind in traced_kinds(plan) {
+    // Where no kind is asked for, that of the leaf count variability is traced.
+    let kinds = if plan.kinds.is_empty() { &[LCV_RAYS] } else { &plan.kinds[..] };
+    for &kind in kinds {
         say(&format!("tracing {kind} rays"));
         let rays = kinds::generate(kind, scene, &plan.rays, &mut |rays| Ok(closest_hits.of(rays)));
         match rays {
@@ -142,15 +149,12 @@ pub fn measure(
             Ok(rays) if rays.is_empty() => {}
             Ok(rays) if !plan.kinds.contains(&kind) => rounds.variability(kind, &rays),
             Ok(rays) => rounds.trace(kind, &rays, plan.runs, &reference),
-            Err(error) => failures.push(Failure {
-                at: OnScene { scene: scene.name.clone(), builder: None },
-                what: format!("{kind} rays: {error}"),
-            }),
+            Err(error) => failures.push(OnScene::failure(&scene.name, None, format!("{kind} rays: {error}"))),
         }
     }
 
     let mut outcomes = Vec::new();
-    for entry in entries {
+    for entry in rounds.entries {
         let Entry { spec, subject, mut record, faults, failure } = entry;
         if let Some(error) = failure {
             failures.push(fail(spec, error));
@@ -165,13 +169,9 @@ pub fn measure(
 
 /// The record before anything was measured.
 fn blank(scene: &Scene, device: Option<&Device>, subject: &dyn Subject) -> Record {
-    let on_host = || (Machine::this().cpu, format!("hedgerow {}", env!("CARGO_PKG_VERSION")), 0);
-    let (device, driver, subgroup) = match device.filter(|_| subject.traces_on_device()) {
-        Some(device) => {
-            let found = device.found();
-            (found.name.clone(), found.driver.clone(), found.subgroup_size)
-        }
-        None => on_host(),
+    let (device, driver, subgroup) = match device.filter(|_| subject.traces_on_device()).map(Device::found) {
+        Some(found) => (found.name.clone(), found.driver.clone(), found.subgroup_size),
+        None => (Machine::this().cpu, format!("hedgerow {}", env!("CARGO_PKG_VERSION")), 0),
     };
     Record {
         schema: SCHEMA,
@@ -232,11 +232,11 @@ impl Remembered<'_> {
 }
 
 /// The builders that have not failed, run in turn.
-struct Rounds<'e, 'a> {
-    entries: &'e mut Vec<Entry<'a>>,
+struct Rounds<'a> {
+    entries: Vec<Entry<'a>>,
 }
 
-impl<'a> Rounds<'_, 'a> {
+impl<'a> Rounds<'a> {
     fn live(&mut self) -> Vec<&mut Entry<'a>> {
         self.entries.iter_mut().filter(|entry| entry.failure.is_none()).collect()
     }
@@ -293,9 +293,8 @@ impl<'a> Rounds<'_, 'a> {
                 Some((other, others)) => {
                     let wrong = wrong_where_different(truth, rays, query, (&hits, others), DIFFERENCES);
                     if wrong > 0 {
-                        entry
-                            .faults
-                            .push(format!("{wrong} {kind} rays differ from {other} and are wrong by brute force"));
+                        let fault = format!("{wrong} {kind} rays differ from {other} and are wrong by brute force");
+                        entry.faults.push(fault);
                     }
                 }
             }
@@ -317,11 +316,6 @@ impl<'a> Rounds<'_, 'a> {
             Ok(())
         });
     }
-}
-
-/// The kinds that are asked for; where none is, that of the leaf count variability.
-fn traced_kinds(plan: &BenchPlan) -> Vec<RayKind> {
-    if plan.kinds.is_empty() { vec![LCV_RAYS] } else { plan.kinds.clone() }
 }
 
 /// Standard deviation of the number of leaves that a ray visits (Aila, Karras, Laine 2013, section 3.3); `None` without rays.

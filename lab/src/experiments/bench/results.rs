@@ -2,31 +2,19 @@
 
 use crate::measure::record::Record;
 use crate::report::lines::{self, Lines};
+use crate::report::names::distinct;
 use crate::{Error, Result};
 use std::path::Path;
 
-const FILE: &str = "results.jsonl";
+/// The name of the file of records.
+pub const FILE: &str = "results.jsonl";
 
-/// `results.jsonl`, open for writing: each record is on the disk as soon as it is measured.
-#[derive(Debug)]
-pub struct Results(Lines);
-
-impl Results {
-    /// Makes `folder` and an empty `results.jsonl` in it.
-    ///
-    /// # Errors
-    /// The folder cannot be made or written to.
-    pub fn create(folder: &Path) -> Result<Results> {
-        Lines::create(folder, FILE).map(Results)
-    }
-
-    /// Appends a record.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn append(&mut self, record: &Record) -> Result<()> {
-        self.0.append(record)
-    }
+/// Makes `folder` and an empty `results.jsonl` in it, open for writing.
+///
+/// # Errors
+/// The folder cannot be made or written to.
+pub fn create(folder: &Path) -> Result<Lines> {
+    Lines::create(folder, FILE)
 }
 
 /// The records of a `results.jsonl`, or of the one in a folder.
@@ -43,12 +31,7 @@ pub fn read(path: &Path) -> Result<Vec<Record>> {
 /// The file cannot be written.
 pub fn write_csv(path: &Path, records: &[&Record]) -> Result<()> {
     let wrong = |e: csv::Error| Error::file(path)(e.into());
-    let mut kinds: Vec<&str> = Vec::new();
-    for trace in records.iter().flat_map(|r| &r.trace) {
-        if !kinds.contains(&trace.rays.as_str()) {
-            kinds.push(&trace.rays);
-        }
-    }
+    let kinds = distinct(records.iter().flat_map(|r| &r.trace).map(|trace| trace.rays.as_str()));
     let mut table = csv::Writer::from_path(path).map_err(wrong)?;
     let per_kind = kinds.iter().flat_map(|kind| ["mrays_s", "steps", "tests"].map(|figure| format!("{kind}_{figure}")));
     table.write_record(COLUMNS.iter().map(|(name, _)| (*name).to_owned()).chain(per_kind)).map_err(wrong)?;

@@ -4,6 +4,7 @@
 
 use super::{CostTable, calibration, candidates};
 use crate::device::Device;
+use crate::report::names::slug;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -43,10 +44,7 @@ impl Key {
 
     /// The file's name: letters and digits of device and driver, all else a hyphen.
     fn file(&self) -> String {
-        let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
-        let words = format!("{} {}", self.device, self.driver).chars().map(plain).collect::<String>();
-        let words: Vec<&str> = words.split('-').filter(|word| !word.is_empty()).collect();
-        format!("costs-{}.json", words.join("-"))
+        format!("costs-{}.json", slug(&format!("{} {}", self.device, self.driver)))
     }
 }
 

@@ -36,12 +36,8 @@ const ROWS: [&[&str]; 6] = [
     &["gen:stadium:6"],
 ];
 
-/// Pixels of the picture that the rays belong to.
-const RAYS: RayOptions = RayOptions { size: [128, 96], seed: 1 };
-/// Runs that count, after one that does not.
-const RUNS: u32 = 5;
-/// Milliseconds after which a builder has built enough on a scene.
-const ENOUGH_MS: f64 = 50.0;
+/// How much the calibration measures.
+const EFFORT: Effort = Effort { rays: RayOptions { size: [128, 96], seed: 1 }, runs: 5, enough_ms: 50.0 };
 
 /// Measures the candidates that `device` can build on generated scenes. `say` is told what is being done. A candidate that fails on a
 /// scene is not in the scene's row.
@@ -52,12 +48,11 @@ pub fn measure(device: &Device, say: &mut dyn FnMut(&str)) -> Result<CostTable> 
     if candidates::possible(device).is_empty() {
         return Err(Error::NoVulkan(format!("{} can build none of the candidates of auto", device.found().name)));
     }
-    let effort = Effort { rays: RAYS, runs: RUNS, enough_ms: ENOUGH_MS };
     let mut of_scene = |name: &&str| {
         say(&format!("calibrating on {name}"));
         let scene = load(name)?;
         let class = SceneClass::of(&scene.mesh);
-        let measured = on_scene(device, &scene, &candidates::possible_for(device, &class), &effort)?;
+        let measured = on_scene(device, &scene, &candidates::possible_for(device, &class), &EFFORT)?;
         Ok(CostRow { class, costs: paced(&measured) })
     };
     let mut of_row = |names: &&[&str]| {

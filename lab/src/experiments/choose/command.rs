@@ -41,10 +41,7 @@ pub struct Arguments {
 
 pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let device = work::device_for(common, &["auto".parse()?])?.expect("auto works on a device");
-    let costs = {
-        let bar = Bar::new(common, "calibrating", 0);
-        cache::table_of(&device, arguments.recalibrate, &mut |what| bar.say(what))?
-    };
+    let costs = calibrated(common, &device, arguments.recalibrate)?;
     let rays = common.rays_per_build.map_or(DEFAULT_RAYS, |RaysPerBuild(rays)| rays);
     if arguments.scenes.is_empty() || arguments.recalibrate {
         writeln!(std::io::stdout(), "{}\n", builders(&costs))?;
@@ -66,6 +63,12 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         writeln!(std::io::stdout(), "{}", in_hindsight(&choices, &taken))?;
     }
     work::finish(Some(&device), true)
+}
+
+/// The table of costs of the device, measured under a progress bar where it is not known, or with `anew`.
+pub(crate) fn calibrated(common: &Common, device: &Device, anew: bool) -> crate::Result<CostTable> {
+    let bar = Bar::new(common, "calibrating", 0);
+    cache::table_of(device, anew, &mut |what| bar.say(what))
 }
 
 /// Every candidate measured on a scene, with all kinds of rays.

@@ -3,8 +3,8 @@
 use super::SceneCost;
 use super::hindsight::{self, Choice, GOOD, Pair, RAYS};
 use crate::measure::record::Record;
-use crate::report::elements::column;
-use crate::report::names::short;
+use crate::report::columns::Table;
+use crate::report::names::{distinct, short};
 use crate::report::numbers::short_count;
 use maud::{Markup, html};
 
@@ -13,13 +13,15 @@ pub(crate) fn section(choices: &[Choice], records: &[&Record]) -> Markup {
     let taken: Vec<SceneCost> = records.iter().filter_map(|record| SceneCost::of(record)).collect();
     let pairs = hindsight::pairs(choices, &taken);
     let Some(part) = hindsight::good_part(&pairs) else { return html! {} };
-    let mut scenes: Vec<&str> = Vec::new();
-    for pair in &pairs {
-        if !scenes.contains(&pair.choice.scene.as_str()) {
-            scenes.push(&pair.choice.scene);
-        }
-    }
+    let scenes = distinct(pairs.iter().map(|pair| pair.choice.scene.as_str()));
     let of = |scene: &str, rays: f64| pairs.iter().find(|p| p.choice.scene == scene && p.choice.rays == rays);
+    let table = Table::new("Choices beside the best", scenes)
+        .id("choices-table")
+        .caption("Choices of auto beside the best in hindsight")
+        .name("scene", |scene| *scene);
+    let table = RAYS.into_iter().fold(table, |table, rays| {
+        table.figure(&short_count(rays), "rays a build", move |scene| cell(of(scene, rays)))
+    });
     html! {
         section #choosing {
             h2 { "What auto chooses" }
@@ -29,23 +31,7 @@ pub(crate) fn section(choices: &[Choice], records: &[&Record]) -> Markup {
                 b { (format!("{:.0}%", 100.0 * part)) } " of the " (pairs.len()) " choices are within "
                 (format!("{:.0}%", 100.0 * GOOD)) " of the best."
             }
-            div.scroll tabindex="0" role="region" aria-label="Choices beside the best" {
-                table.sortable #choices-table {
-                    caption.hidden { "Choices of auto beside the best in hindsight" }
-                    thead { tr {
-                        (column("scene", "", false))
-                        @for rays in RAYS { (column(&short_count(rays), "rays a build", true)) }
-                    } }
-                    tbody {
-                        @for scene in scenes {
-                            tr {
-                                th scope="row" data-value=(scene) { (scene) }
-                                @for rays in RAYS { (cell(of(scene, rays))) }
-                            }
-                        }
-                    }
-                }
-            }
+            (table.html())
             p { "If one candidate were always taken, this many choices would be within the same:" }
             ul {
                 @for (builder, part) in hindsight::good_parts_of_each(&pairs, &taken) {

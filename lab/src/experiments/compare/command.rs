@@ -4,7 +4,7 @@ use crate::cli::Common;
 use crate::experiments::bench::results;
 use crate::experiments::compare::{self, Change, Comparison};
 use crate::measure::statistics::geometric_mean;
-use crate::report::names::short;
+use crate::report::names::{distinct, short};
 use crate::report::numbers::{duration, three_digits};
 use crate::report::table::{or_dash, with_header};
 use comfy_table::Table;
@@ -54,26 +54,20 @@ pub(crate) fn run(_common: &Common, arguments: &Arguments) -> anyhow::Result<()>
 }
 
 fn table(pairs: &[Comparison]) -> Table {
-    let mut kinds: Vec<&str> = Vec::new();
-    for (kind, _) in pairs.iter().flat_map(|p| &p.mrays_s) {
-        if !kinds.contains(&kind.as_str()) {
-            kinds.push(kind);
-        }
-    }
+    let kinds = distinct(pairs.iter().flat_map(|p| &p.mrays_s).map(|(kind, _)| kind.as_str()));
     let header = ["scene", "builder", "build old", "new", "time ×", "SAH ×"];
     let mut table = with_header(header.into_iter().chain(kinds.iter().copied()), 2);
     for pair in pairs {
-        let speed = |kind: &&str| pair.mrays_s.iter().find(|(k, _)| k == kind).map(|(_, change)| ratio(change));
-        let mut row = vec![
+        let speed = |kind: &&str| or_dash(pair.mrays_s.iter().find(|(k, _)| k == kind), |(_, change)| ratio(change));
+        let figures = [
             pair.scene.clone(),
             short(&pair.builder),
             duration(pair.build_ms.old),
             duration(pair.build_ms.new),
             ratio(&pair.build_ms),
-            pair.sah.as_ref().map_or("–".into(), |change| format!("{:.4}", change.ratio())),
+            or_dash(pair.sah, |change| format!("{:.4}", change.ratio())),
         ];
-        row.extend(kinds.iter().map(|kind| speed(kind).unwrap_or("–".into())));
-        table.add_row(row);
+        table.add_row(figures.into_iter().chain(kinds.iter().map(speed)));
     }
     table
 }

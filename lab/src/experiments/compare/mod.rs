@@ -4,6 +4,7 @@ pub(crate) mod command;
 
 use crate::measure::record::Record;
 use crate::measure::statistics::Spread;
+use crate::report::names::distinct;
 
 /// A change of a trace speed below this share may always be noise: records hold no spread of it.
 const LEAST_TRACE_NOISE: f64 = 0.03;
@@ -57,29 +58,29 @@ pub struct Comparisons {
 /// Compares two runs. Of several records of one builder on one scene the last counts.
 pub fn compare(old: &[Record], new: &[Record]) -> Comparisons {
     let is_same = |a: &Record, b: &Record| a.scene == b.scene && a.builder == b.builder;
-    let counts = |records: &[Record]| -> Vec<Record> {
-        let last = |(i, record): (usize, &Record)| !records[i + 1..].iter().any(|later| is_same(later, record));
-        records.iter().enumerate().filter(|&(i, r)| last((i, r))).map(|(_, r)| r.clone()).collect()
+    let last = |records: &[Record]| -> Vec<Record> {
+        let is_last = |i: &usize| !records[i + 1..].iter().any(|later| is_same(later, &records[*i]));
+        (0..records.len()).filter(is_last).map(|i| records[i].clone()).collect()
     };
-    let (old, new) = (counts(old), counts(new));
+    let (old, new) = (last(old), last(new));
     let name = |r: &Record| format!("{}, {}", r.scene, r.builder);
     let mut found = Comparisons::default();
     for after in &new {
         match old.iter().find(|before| is_same(before, after)) {
             Some(before) => {
                 found.pairs.push(pair(before, after));
-                doubts(before, after, &mut found.doubts);
+                found.doubts.extend(doubts(before, after));
             }
             None => found.only_new.push(name(after)),
         }
     }
+    found.doubts = distinct(found.doubts);
     found.only_old = old.iter().filter(|b| !new.iter().any(|a| is_same(a, b))).map(name).collect();
     found
 }
 
 fn pair(old: &Record, new: &Record) -> Comparison {
-    let spread = |r: &Record| Spread::from(&r.build);
-    let (before, after) = (spread(old), spread(new));
+    let [before, after] = [old, new].map(|record| Spread::from(&record.build));
     let relative = |s: Spread| (s.max - s.min) / s.median;
     // The same machine traced as unevenly as it built.
     let trace_noise = relative(before).max(relative(after)).max(LEAST_TRACE_NOISE);
@@ -88,11 +89,9 @@ fn pair(old: &Record, new: &Record) -> Comparison {
         let is_noise = (new / old).ln().abs() <= trace_noise.ln_1p();
         Some((trace.rays.clone(), Change { old, new, is_noise }))
     });
-    let sah = old
-        .quality
-        .sah
-        .zip(new.quality.sah)
-        .filter(|_| (old.quality.c_t, old.quality.c_i) == (new.quality.c_t, new.quality.c_i));
+    let (old_tree, new_tree) = (&old.quality, &new.quality);
+    let is_same_cost = (old_tree.c_t, old_tree.c_i) == (new_tree.c_t, new_tree.c_i);
+    let sah = old_tree.sah.zip(new_tree.sah).filter(|_| is_same_cost);
     Comparison {
         scene: new.scene.clone(),
         builder: new.builder.clone(),
@@ -102,29 +101,24 @@ fn pair(old: &Record, new: &Record) -> Comparison {
     }
 }
 
-fn doubts(old: &Record, new: &Record, doubts: &mut Vec<String>) {
-    let mut add = |doubt: String| {
-        if !doubts.contains(&doubt) {
-            doubts.push(doubt);
-        }
-    };
+fn doubts(old: &Record, new: &Record) -> Vec<String> {
+    let mut doubts = Vec::new();
     if old.device != new.device || old.driver != new.driver {
-        add(format!(
+        doubts.push(format!(
             "measured on {} ({}) and on {} ({}): figures of different machines do not compare",
             old.device, old.driver, new.device, new.driver
         ));
     }
     if old.triangles != new.triangles {
-        add(format!("{} had {} triangles and has {}", new.scene, old.triangles, new.triangles));
+        doubts.push(format!("{} had {} triangles and has {}", new.scene, old.triangles, new.triangles));
     }
-    let counts = |r: &Record| r.trace.iter().map(|t| (t.rays.clone(), t.count)).collect::<Vec<_>>();
-    let other = counts(new).into_iter().any(|(kind, n)| old.rays(&kind).is_some_and(|t| t.count != n));
-    if other {
-        add(format!("{} was traced with another number of rays", new.scene));
+    if new.trace.iter().any(|after| old.rays(&after.rays).is_some_and(|before| before.count != after.count)) {
+        doubts.push(format!("{} was traced with another number of rays", new.scene));
     }
     if old.build.runs < 3 || new.build.runs < 3 {
-        add("fewer than three runs say little of the noise".into());
+        doubts.push("fewer than three runs say little of the noise".into());
     }
+    doubts
 }
 
 #[cfg(test)]

@@ -4,33 +4,32 @@ use crate::experiments::accel::points::AccelEntry;
 use crate::experiments::animate::points::AnimateEntry;
 use crate::experiments::bench::matrix::Outcome;
 use crate::experiments::bench::page::{Report, read_setting};
-use crate::experiments::bench::results::{self, Results};
+use crate::experiments::bench::results;
 use crate::experiments::{accel, animate};
 use crate::measure::provenance::{self, DeviceFacts, Machine};
 use crate::measure::record::Record;
 use crate::measure::setting::Setting;
 use crate::report::columns::Table;
-use crate::report::elements::{foot, head};
-use crate::report::names::slug;
+use crate::report::elements::{foot, page};
+use crate::report::names::{distinct, slug};
 use crate::report::numbers::{count, three_digits};
+use crate::report::table::or_dash;
 use crate::report::{beside, lines};
 use crate::{Error, Result};
-use maud::{DOCTYPE, Markup, html};
+use maud::{Markup, html};
 use std::path::{Path, PathBuf};
 
-/// The file of `hedgerow bench`; those of the others are named in [`beside`].
-const RESULTS: &str = "results.jsonl";
 /// What is said where a folder does not say on which machine it was measured.
 const UNKNOWN: &str = "not in the records";
 
 /// All that was measured on a device.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct OfDevice {
     name: String,
     driver: String,
     machine: Option<Machine>,
     facts: Option<DeviceFacts>,
-    /// Notes and options of the runs, each once.
+    /// Notes of the runs.
     notes: Vec<String>,
     results: Vec<Record>,
     accel: Vec<AccelEntry>,
@@ -51,8 +50,7 @@ pub fn write(folders: &[PathBuf], output: &Path) -> Result<PathBuf> {
         [device] => device.write(output)?,
         _ => {
             for device in &mut devices {
-                let folder = output.join(device.slug());
-                device.write(&folder)?;
+                device.write(&output.join(device.slug()))?;
             }
             let path = output.join("index.html");
             std::fs::write(&path, overview(&devices)).map_err(Error::file(&path))?;
@@ -65,13 +63,14 @@ pub fn write(folders: &[PathBuf], output: &Path) -> Result<PathBuf> {
 fn read(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
     let has = |file: &str| folder.join(file).is_file();
     let [accel_file, animate_file] = [beside::ACCEL.records, beside::ANIMATE.records];
-    if ![RESULTS, accel_file, animate_file].into_iter().any(has) {
+    if ![results::FILE, accel_file, animate_file].into_iter().any(has) {
         return Err(Error::Argument(format!(
-            "{} holds none of {RESULTS}, {accel_file} and {animate_file}; name folders that hedgerow bench, accel or animate wrote",
-            folder.display()
+            "{} holds none of {}, {accel_file} and {animate_file}; name folders that hedgerow bench, accel or animate wrote",
+            folder.display(),
+            results::FILE
         )));
     }
-    if has(RESULTS) {
+    if has(results::FILE) {
         read_results(folder, devices)?;
     }
     if has(accel_file) {
@@ -81,7 +80,7 @@ fn read(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
             _ => None,
         });
         if let Some((machine, facts)) = setting {
-            let device = of(devices, &facts.name.clone(), &facts.driver.clone());
+            let device = of(devices, &facts.name, &facts.driver);
             device.machine.get_or_insert(machine);
             device.facts.get_or_insert(facts);
             device.accel.extend(entries);
@@ -126,11 +125,7 @@ fn read_results(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
         let device = of(devices, &name, &driver);
         device.machine.get_or_insert(setting.machine);
         device.facts = device.facts.take().or(facts);
-        for note in setting.notes {
-            if !device.notes.contains(&note) {
-                device.notes.push(note);
-            }
-        }
+        device.notes.extend(setting.notes);
     }
     Ok(())
 }
@@ -139,16 +134,7 @@ fn read_results(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
 fn of<'a>(devices: &'a mut Vec<OfDevice>, name: &str, driver: &str) -> &'a mut OfDevice {
     let found = devices.iter().position(|device| device.name == name && device.driver == driver);
     let found = found.unwrap_or_else(|| {
-        devices.push(OfDevice {
-            name: name.to_owned(),
-            driver: driver.to_owned(),
-            machine: None,
-            facts: None,
-            notes: Vec::new(),
-            results: Vec::new(),
-            accel: Vec::new(),
-            animate: Vec::new(),
-        });
+        devices.push(OfDevice { name: name.to_owned(), driver: driver.to_owned(), ..OfDevice::default() });
         devices.len() - 1
     });
     &mut devices[found]
@@ -164,7 +150,7 @@ impl OfDevice {
     fn write(&mut self, folder: &Path) -> Result<()> {
         // One scene's together, whichever shard measured it.
         self.results.sort_by(|a, b| a.scene.cmp(&b.scene));
-        let mut file = Results::create(folder)?;
+        let mut file = results::create(folder)?;
         self.results.iter().try_for_each(|record| file.append(record))?;
         if !self.accel.is_empty() {
             lines::write(folder, std::mem::take(&mut self.accel))?;
@@ -195,7 +181,7 @@ impl OfDevice {
             when: self.results.iter().map(|record| record.when.clone()).max().unwrap_or_default(),
             command: provenance::command(),
             options: Vec::new(),
-            notes: self.notes.clone(),
+            notes: distinct(self.notes.iter().cloned()),
         };
         Report { outcomes, baseline: baseline.then(|| "driver-fast-build".to_owned()), ..Report::new(setting) }
     }
@@ -203,30 +189,20 @@ impl OfDevice {
 
 /// The page of several devices: a table of each, and the way to its own pages.
 fn overview(devices: &[OfDevice]) -> String {
-    let markup = html! {
-        (DOCTYPE)
-        html lang="en" {
-            (head(&format!("hedgerow: {} devices", devices.len())))
-            body {
-                header.hero {
-                    p.kicker { "hedgerow benchmark" }
-                    h1 { (devices.len()) " devices" }
-                    p.lead { "Each device by itself: figures of different machines are not compared." }
-                }
-                main { @for device in devices { (section(device)) } }
-                (foot(&provenance::commit(), &provenance::now()))
-            }
+    let body = html! {
+        header.hero {
+            p.kicker { "hedgerow benchmark" }
+            h1 { (devices.len()) " devices" }
+            p.lead { "Each device by itself: figures of different machines are not compared." }
         }
+        main { @for device in devices { (section(device)) } }
+        (foot(&provenance::commit(), &provenance::now()))
     };
-    markup.into_string()
+    page(&format!("hedgerow: {} devices", devices.len()), &body)
 }
 
 fn section(device: &OfDevice) -> Markup {
-    let valid = |record: &Record| match record.valid {
-        Some(true) => "yes",
-        Some(false) => "no",
-        None => "–",
-    };
+    let yes_or_no = |is_valid| if is_valid { "yes" } else { "no" }.to_owned();
     let table = Table::new(format!("Results of {}", device.name), &device.results)
         .text("scene", |record| &record.scene)
         .number("triangles", "", |record| Some(record.triangles as f64), count)
@@ -235,7 +211,7 @@ fn section(device: &OfDevice) -> Markup {
         .number("build", "Mtri/s", |record| Some(record.mtris_s()), three_digits)
         .number("SAH cost", "", |record| record.quality.sah, three_digits)
         .number("all rays", "Mrays/s", |record| record.mrays_s(), three_digits)
-        .text("valid", move |record| valid(record));
+        .text("valid", move |record| or_dash(record.valid, yes_or_no));
     html! {
         section {
             h2 { (device.name) }

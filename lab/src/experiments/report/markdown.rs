@@ -2,7 +2,9 @@
 
 use crate::experiments::bench::results;
 use crate::measure::record::Record;
+use crate::report::names::distinct;
 use crate::report::numbers::three_digits;
+use crate::report::table::styled;
 use crate::{Error, Result};
 use comfy_table::presets::ASCII_MARKDOWN;
 use comfy_table::{CellAlignment, Table};
@@ -51,14 +53,9 @@ fn page(records: &[Record]) -> String {
 }
 
 fn table(records: &[&Record]) -> Table {
-    let mut kinds: Vec<&str> = Vec::new();
-    for trace in records.iter().flat_map(|record| &record.trace) {
-        if !kinds.contains(&trace.rays.as_str()) {
-            kinds.push(&trace.rays);
-        }
-    }
-    let mut table = Table::new();
-    table.load_style(ASCII_MARKDOWN).set_header(COLUMNS.iter().chain(&kinds));
+    let kinds = distinct(records.iter().flat_map(|record| &record.trace).map(|trace| trace.rays.as_str()));
+    let mut table = styled(ASCII_MARKDOWN, COLUMNS.into_iter().chain(kinds.iter().copied()), FIRST_NUMBER);
+    table.column_mut(1).expect("triangles").set_cell_alignment(CellAlignment::Right);
     for record in records {
         let rays = kinds.iter().map(|kind| figure(record.rays(kind).map(|trace| trace.mrays_s)));
         let before = [
@@ -70,11 +67,6 @@ fn table(records: &[&Record]) -> Table {
             figure(record.quality.epo),
         ];
         table.add_row(before.into_iter().chain(rays));
-    }
-    for (i, column) in table.column_iter_mut().enumerate() {
-        if i == 1 || i >= FIRST_NUMBER {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
     }
     table
 }

@@ -38,16 +38,9 @@ pub(super) fn text((x, y): (f32, f32), anchor: &str, words: &str) -> String {
     format!("<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\" font-size=\"12\" fill=\"{ink}\">{words}</text>")
 }
 
-/// What the colours of a heat map mean.
-pub(super) struct Scale {
-    /// At the dark and at the bright end.
-    pub ends: [String; 2],
-    /// Between them.
-    pub middle: String,
-}
-
-impl Scale {
-    pub fn svg(&self, width: f32) -> String {
+/// `image` above what the colours of a heat map mean: at the dark and at the bright end, and in words between them.
+pub(super) fn with_scale(image: RgbImage, [low, high]: [String; 2], middle: &str) -> Result<RgbImage> {
+    below(image, |width| {
         const STOPS: u32 = 16;
         let stops: String = (0..=STOPS)
             .map(|i| {
@@ -56,14 +49,13 @@ impl Scale {
                 format!("<stop offset=\"{place}\" stop-color=\"rgb({r},{g},{b})\"/>")
             })
             .collect();
-        let [low, high] = &self.ends;
         format!(
             "<defs><linearGradient id=\"heat\">{stops}</linearGradient></defs>\
              <rect x=\"10\" y=\"8\" width=\"{bar}\" height=\"12\" fill=\"url(#heat)\"/>{}{}{}",
-            text((10.0, 36.0), "start", low),
-            text((width / 2.0, 36.0), "middle", &self.middle),
-            text((width - 10.0, 36.0), "end", high),
+            text((10.0, 36.0), "start", &low),
+            text((width / 2.0, 36.0), "middle", middle),
+            text((width - 10.0, 36.0), "end", &high),
             bar = width - 20.0,
         )
-    }
+    })
 }

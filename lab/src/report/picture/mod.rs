@@ -13,7 +13,6 @@ use crate::{Error, Result};
 use glam::Vec3;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use image::{Rgb, RgbImage};
-use legend::Scale;
 use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 use rayon::prelude::*;
 
@@ -186,8 +185,7 @@ fn depth(scene: &Scene, subject: &mut dyn Subject, options: &PictureOptions) -> 
     let colour = |t: f32| 1.0 - (t - nearest) / (farthest - nearest).max(f32::MIN_POSITIVE);
     let image = heat_map(&values, options.size, colour);
     let [near, far] = [nearest, farthest].map(|t| if t.is_finite() { three_digits(f64::from(t)) } else { "-".into() });
-    let scale = Scale { ends: [format!("{far}+"), near], middle: "distance from the eye".into() };
-    legend::below(image, |width| scale.svg(width))
+    legend::with_scale(image, [format!("{far}+"), near], "distance from the eye")
 }
 
 fn work(
@@ -228,11 +226,8 @@ fn counts(values: &[Option<f32>], options: &PictureOptions, what: &str) -> Resul
     let mean = there().map(f64::from).sum::<f64>() / there().count().max(1) as f64;
     let most = there().fold(0.0, f32::max);
     let image = heat_map(values, options.size, |v| v / top);
-    let scale = Scale {
-        ends: ["0".into(), format!("{top}+")],
-        middle: format!("{what}: mean {}, most {most}", three_digits(mean)),
-    };
-    legend::below(image, |width| scale.svg(width))
+    let words = format!("{what}: mean {}, most {most}", three_digits(mean));
+    legend::with_scale(image, ["0".into(), format!("{top}+")], &words)
 }
 
 /// What the share `share` of the values stays below.

@@ -10,6 +10,7 @@ use crate::report::names::{short, slug};
 use crate::report::numbers::{count, grouped, one_decimal, three_digits, two_decimals};
 use crate::report::table::{or_dash, with_header};
 use crate::subjects::KD_TREE;
+use comfy_table::Table;
 use maud::{Markup, html};
 use published::{Published, Row};
 
@@ -36,15 +37,11 @@ fn ratio(a: Option<u64>, b: Option<u64>) -> Option<f64> {
     a.zip(b.filter(|&b| b > 0)).map(|(a, b)| a as f64 / b as f64)
 }
 
-fn full_leaves(record: &Record) -> Option<u64> {
-    Some(record.quality.leaves? - record.quality.empty_leaves?)
-}
-
 const TREE: [Figure<Record>; 9] = [
     Figure::new(["nodes", "", "nodes"], count, |r| Some((r.quality.inner? + r.quality.leaves?) as f64)),
     Figure::new(["inner / leaves", "", "inner_to_leaf"], two_decimals, |r| ratio(r.quality.inner, r.quality.leaves)),
     Figure::new(["full / empty", "", "nonempty_to_empty_leaf"], two_decimals, |r| {
-        ratio(full_leaves(r), r.quality.empty_leaves)
+        ratio(Some(r.quality.leaves? - r.quality.empty_leaves?), r.quality.empty_leaves)
     }),
     Figure::new(["leaf size", "mean", "avg_prims_leaf"], two_decimals, |r| r.quality.prims_per_leaf),
     Figure::new(["leaf size", "most", "max_prims_leaf"], count, |r| Some(r.quality.prims_per_leaf_max? as f64)),
@@ -68,9 +65,10 @@ pub fn of<'a>(records: &[&'a Record]) -> Vec<&'a Record> {
     records.iter().copied().filter(|record| record.kind == KD_TREE).collect()
 }
 
-fn header<R>(names: [&str; 3], figures: &[Figure<R>]) -> Vec<String> {
+/// An empty table for the terminal, with columns for names and figures.
+fn table<R>(names: [&str; 3], figures: &[Figure<R>]) -> Table {
     let figure = |f: &Figure<R>| if f.unit.is_empty() { f.name.to_owned() } else { format!("{}, {}", f.name, f.unit) };
-    names.map(str::to_owned).into_iter().chain(figures.iter().map(figure)).collect()
+    with_header(names.map(str::to_owned).into_iter().chain(figures.iter().map(figure)), 3)
 }
 
 /// Both tables for the terminal, measured figures above published ones; nothing without a kd-tree.
@@ -79,25 +77,23 @@ pub fn text(records: &[&Record], published: &Published) -> Option<String> {
     if ours.is_empty() {
         return None;
     }
-    let mut trees = with_header(header(["scene", "triangles", "builder"], &TREE), 3);
-    for record in &ours {
+    let mut trees = table(["scene", "triangles", "builder"], &TREE);
+    let mut rays = table(["scene", "builder", "rays"], &RAYS);
+    for record in ours {
+        let (scene, builder) = (record.scene.clone(), short(&record.builder));
         let figures = TREE.iter().map(|f| or_dash((f.ours)(record), f.text));
-        let head = [record.scene.clone(), grouped(record.triangles), short(&record.builder)];
-        trees.add_row(head.into_iter().chain(figures));
+        trees.add_row([scene.clone(), grouped(record.triangles), builder.clone()].into_iter().chain(figures));
+        for trace in &record.trace {
+            let figures = RAYS.iter().map(|f| or_dash((f.ours)(trace), f.text));
+            rays.add_row([scene.clone(), builder.clone(), trace.rays.clone()].into_iter().chain(figures));
+        }
     }
     for row in &published.rows {
+        let (scene, builder) = (format!("({})", row.scene), row.config.clone());
         let figures = TREE.iter().map(|f| or_dash(row.figure(f.theirs), f.text));
-        let triangles = or_dash(row.triangles, grouped);
-        trees.add_row([format!("({})", row.scene), triangles, row.config.clone()].into_iter().chain(figures));
-    }
-    let mut rays = with_header(header(["scene", "builder", "rays"], &RAYS), 3);
-    for (record, trace) in ours.iter().flat_map(|record| record.trace.iter().map(move |trace| (record, trace))) {
-        let figures = RAYS.iter().map(|f| or_dash((f.ours)(trace), three_digits));
-        rays.add_row([record.scene.clone(), short(&record.builder), trace.rays.clone()].into_iter().chain(figures));
-    }
-    for row in &published.rows {
-        let figures = RAYS.iter().map(|f| or_dash(row.figure(f.theirs), three_digits));
-        rays.add_row([format!("({})", row.scene), row.config.clone(), THEIR_RAYS.into()].into_iter().chain(figures));
+        trees.add_row([scene.clone(), or_dash(row.triangles, grouped), builder.clone()].into_iter().chain(figures));
+        let figures = RAYS.iter().map(|f| or_dash(row.figure(f.theirs), f.text));
+        rays.add_row([scene, builder, THEIR_RAYS.to_owned()].into_iter().chain(figures));
     }
     let others = published.file.as_deref().unwrap_or(
         "what Papay 2025 published, of other scenes, on another machine, by costs of a step and a test that it does not tell",

@@ -52,12 +52,12 @@ pub struct Published {
 
 /// Those of Papay 2025.
 pub fn papay() -> Published {
-    Published { file: None, rows: parse(PAPAY).expect("a file of our own") }
+    Published { file: None, rows: parse(PAPAY, "static", "nodes").expect("a file of our own") }
 }
 
 /// Those of Papay 2025 of scenes that move: by the way in which there is something to trace, on the host and on the device.
 pub fn papay_dynamic() -> Vec<Row> {
-    parse_kind(PAPAY_DYNAMIC, "dynamic", "frame_s").expect("a file of our own")
+    parse(PAPAY_DYNAMIC, "dynamic", "frame_s").expect("a file of our own")
 }
 
 /// Those of a file with the columns `table,kind,scene,config,metric,value`: of its static scenes the builders that have a tree.
@@ -66,7 +66,7 @@ pub fn papay_dynamic() -> Vec<Row> {
 /// The file cannot be read, or a line is not one of those.
 pub fn read(path: &Path) -> Result<Published> {
     let text = std::fs::read_to_string(path).map_err(Error::file(path))?;
-    let rows = parse(&text).map_err(|error| {
+    let rows = parse(&text, "static", "nodes").map_err(|error| {
         Error::Malformed(format!(
             "{}: {error}; published figures are lines of table,kind,scene,config,metric,value",
             path.display()
@@ -75,12 +75,8 @@ pub fn read(path: &Path) -> Result<Published> {
     Ok(Published { file: Some(path.display().to_string()), rows })
 }
 
-fn parse(text: &str) -> std::result::Result<Vec<Row>, csv::Error> {
-    parse_kind(text, "static", "nodes")
-}
-
 /// The rows of a kind that have a figure: smaller scenes first, each builder where it first appears.
-fn parse_kind(text: &str, of: &str, needed: &str) -> std::result::Result<Vec<Row>, csv::Error> {
+fn parse(text: &str, of: &str, needed: &str) -> std::result::Result<Vec<Row>, csv::Error> {
     let mut rows: Vec<Row> = Vec::new();
     let mut triangles = BTreeMap::new();
     for line in csv::Reader::from_reader(text.as_bytes()).into_deserialize() {

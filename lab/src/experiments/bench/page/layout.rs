@@ -10,7 +10,7 @@ use crate::report::chart::Chart;
 use crate::report::columns::Table;
 use crate::report::document::{self, Document, Section};
 use crate::report::elements::{bar, figure, number};
-use crate::report::names::{short, slug};
+use crate::report::names::{distinct, short, slug};
 use crate::report::numbers::{
     count, duration, grouped, one_decimal, short_count, size, three_digits, two_decimals, whole,
 };
@@ -22,12 +22,12 @@ use maud::{Markup, html};
 pub(super) fn document<'r>(
     report: &'r Report,
     legend: &Legend,
-    scenes: &[SceneCharts],
+    scenes: &[SceneCharts<'_>],
     growth: Option<&Chart>,
 ) -> Document<'r> {
     let records = report.records();
     let mut sections = vec![Section::new("summary", "Summary", summary(report, &records, legend))];
-    sections.extend(scenes.iter().map(|scene| scene_section(report, scene, legend)));
+    sections.extend(scenes.iter().map(|(scene, charts)| scene_section(report, scene, charts, legend)));
     if !kd_trees::of(&records).is_empty() {
         sections.push(Section::new("kd-trees", "kd-trees", kd_trees::section(&records, &report.published)));
     }
@@ -40,13 +40,13 @@ pub(super) fn document<'r>(
     sections.push(Section::new("results", "All figures", results(&records, legend)));
     sections.push(Section::method(None, terms(report)));
     Document {
-        tab: format!("{} scenes, {} builders", scenes.len(), legend.builders().len()),
+        tab: format!("{} scenes, {} builders", scenes.len(), legend.builders.len()),
         kicker: "hedgerow benchmark",
         title: "Build speed against tree quality".into(),
         lead: format!(
             "{} builders of acceleration structures on {} scenes, built and traced in turn in one process; trees of ours \
              validated on the host, a sample of every kind of ray checked against brute force.",
-            legend.builders().len(),
+            legend.builders.len(),
             scenes.len()
         ),
         setting: Some(&report.setting),
@@ -63,13 +63,13 @@ fn failures(report: &Report) -> Vec<(String, String)> {
     document::told(&report.failures).into_iter().chain(wrong).collect()
 }
 
-/// A builder's name with its colour, and where it works if not on the device by our shaders.
-fn builder_name(builder: &str, record: Option<&Record>, legend: &Legend) -> Markup {
-    let peer = record.and_then(|record| match (record.kind.as_str(), record.build.timer.as_str()) {
+/// The name of a record's builder with its colour, and where it works if not on the device by our shaders.
+fn builder_name(Record { builder, kind, build, .. }: &Record, legend: &Legend) -> Markup {
+    let peer = match (kind.as_str(), build.timer.as_str()) {
         ("driver", _) => Some("driver"),
         (_, "wall") => Some("host"),
         _ => None,
-    });
+    };
     html! {
         span.builder title=(builder) {
             i.dot style={ "background:var(--" (legend.builder(builder).variable) ")" } {}
@@ -87,10 +87,10 @@ fn summary(report: &Report, records: &[&Record], legend: &Legend) -> Markup {
     let standings = summary::standings(records, legend, baseline);
     let most = |of: fn(&Standing) -> Option<f64>| standings.iter().filter_map(of).fold(0.0, f64::max);
     let (build_most, trace_most) = (most(|s| s.build), most(|s| s.trace));
-    let first = |builder: &str| records.iter().find(|r| r.builder == builder).copied();
+    let first = |builder: &str| records.iter().find(|r| r.builder == builder).expect("standings are of records");
     let table = Table::new(format!("Every builder against {}", short(baseline)), &standings)
         .id("summary-table")
-        .cell("builder", |standing| named(&standing.builder, first(&standing.builder), legend))
+        .cell("builder", |standing| named(first(&standing.builder), legend))
         .number("scenes", "", |standing| Some(standing.scenes as f64), whole)
         .figure("build speed", "×", move |standing| bar(standing.build, build_most))
         .figure("trace speed", "×", move |standing| bar(standing.trace, trace_most))
@@ -108,18 +108,18 @@ fn summary(report: &Report, records: &[&Record], legend: &Legend) -> Markup {
 }
 
 /// The cell that names a row by its builder.
-fn named(builder: &str, record: Option<&Record>, legend: &Legend) -> Markup {
-    html! { th scope="row" data-value=(builder) { (builder_name(builder, record, legend)) } }
+fn named(record: &Record, legend: &Legend) -> Markup {
+    html! { th scope="row" data-value=(record.builder) { (builder_name(record, legend)) } }
 }
 
-fn scene_section(report: &Report, scene: &SceneCharts, legend: &Legend) -> Section {
-    let outcomes: Vec<&Outcome> = report.outcomes.iter().filter(|o| o.record.scene == scene.scene).collect();
+fn scene_section(report: &Report, scene: &str, charts: &[Chart], legend: &Legend) -> Section {
+    let outcomes: Vec<&Outcome> = report.outcomes.iter().filter(|o| o.record.scene == scene).collect();
     let triangles = outcomes.first().map_or(0, |o| o.record.triangles);
-    let pictures: Vec<&Picture> = report.pictures.iter().filter(|p| p.scene == scene.scene).collect();
-    let id = format!("scene-{}", slug(&scene.scene));
+    let pictures: Vec<&Picture> = report.pictures.iter().filter(|p| p.scene == scene).collect();
+    let id = format!("scene-{}", slug(scene));
     let content = html! {
         section.scene #(id) {
-            h2 { (scene.scene) span.count { (grouped(triangles)) " triangles" } }
+            h2 { (scene) span.count { (grouped(triangles)) " triangles" } }
             @if !pictures.is_empty() {
                 div.pictures {
                     @for picture in pictures {
@@ -127,13 +127,13 @@ fn scene_section(report: &Report, scene: &SceneCharts, legend: &Legend) -> Secti
                     }
                 }
             }
-            div.charts { @for chart in &scene.charts { (figure(chart)) } }
+            div.charts { @for chart in charts { (figure(chart)) } }
             (phase_table(report, &outcomes, legend))
             (ray_table(&outcomes, legend))
             (choices(&outcomes, legend))
         }
     };
-    Section { id, name: scene.scene.clone(), content }
+    Section { id, name: scene.to_owned(), content }
 }
 
 /// Each phase beside what a plain copy of the bytes that it must move would take.
@@ -155,7 +155,7 @@ fn phase_table(report: &Report, outcomes: &[&Outcome], legend: &Legend) -> Marku
     let copy = move |row: &Row<'_>| Some(row.moved? / (copy_gb_s? * 1e6));
     let label = "Phases beside a plain copy";
     let table = Table::new(label, rows)
-        .cell("builder", |row| named(&row.record.builder, Some(row.record), legend))
+        .cell("builder", |row| named(row.record, legend))
         .text("phase", |row| &row.phase.name)
         .number("time", "ms", |row| Some(row.phase.median_ms), three_digits)
         .number("share", "%", |row| Some(100.0 * row.phase.median_ms / row.record.build.median_ms), whole)
@@ -182,7 +182,7 @@ fn ray_table(outcomes: &[&Outcome], legend: &Legend) -> Markup {
     };
     let label = "Speed, steps and tests for each kind of ray";
     let rows = outcomes.iter().map(|outcome| &outcome.record);
-    let table = Table::new(label, rows).cell("builder", |record| named(&record.builder, Some(record), legend));
+    let table = Table::new(label, rows).cell("builder", |record| named(record, legend));
     let table = most.record.trace.iter().fold(table, |table, kind| {
         table.figure(&kind.rays, &short_count(kind.count as f64), |record| ray_cell(record.rays(&kind.rays)))
     });
@@ -209,24 +209,17 @@ fn ray_cell(trace: Option<&TraceRecord>) -> Markup {
 
 /// What the builders chose where they were left the choice; builders that chose the same stand together.
 fn choices(outcomes: &[&Outcome], legend: &Legend) -> Markup {
-    let mut chosen: Vec<(&str, Vec<&Record>)> = Vec::new();
-    for outcome in outcomes {
-        let Some(choice) = outcome.choice.as_deref() else { continue };
-        match chosen.iter_mut().find(|(known, _)| *known == choice) {
-            Some((_, records)) => records.push(&outcome.record),
-            None => chosen.push((choice, vec![&outcome.record])),
-        }
-    }
+    let chosen = distinct(outcomes.iter().filter_map(|outcome| outcome.choice.as_deref()));
     html! {
         @if !chosen.is_empty() {
             h3 { "Chosen for this scene and device" }
             ul.choices {
-                @for (choice, records) in chosen {
+                @for choice in chosen {
                     li {
                         code { (choice) } " by "
-                        @for (i, record) in records.iter().enumerate() {
+                        @for (i, outcome) in outcomes.iter().filter(|o| o.choice.as_deref() == Some(choice)).enumerate() {
                             @if i > 0 { ", " }
-                            (builder_name(&record.builder, Some(record), legend))
+                            (builder_name(&outcome.record, legend))
                         }
                     }
                 }
@@ -244,9 +237,7 @@ fn results(records: &[&Record], legend: &Legend) -> Markup {
         .cell("scene", |record| {
             html! { th scope="row" data-value=(record.scene) { a href={ "#scene-" (slug(&record.scene)) } { (record.scene) } } }
         })
-        .cell("builder", |record| {
-            html! { td data-value=(record.builder) { (builder_name(&record.builder, Some(record), legend)) } }
-        })
+        .cell("builder", |record| html! { td data-value=(record.builder) { (builder_name(record, legend)) } })
         .number("triangles", "", |record| Some(record.triangles as f64), count)
         .number("build", "ms", |record| Some(record.build.median_ms), three_digits)
         .figure("min – max", "ms", |record| {

@@ -14,6 +14,7 @@ use crate::measure::setting::{Failure, Setting};
 use crate::report::chart::Chart;
 use crate::report::theme::Legend;
 use crate::report::{beside, lines};
+use charts::scatter::{SAH_COST, TRACE_SPEED, scatter};
 use std::path::Path;
 
 /// A benchmark run: everything that the page says.
@@ -48,11 +49,8 @@ pub struct Picture {
     pub alt: String,
 }
 
-/// The charts of one scene.
-struct SceneCharts {
-    scene: String,
-    charts: Vec<Chart>,
-}
+/// A scene and its charts.
+type SceneCharts<'r> = (&'r str, Vec<Chart>);
 
 /// The file that says where and how the records beside it were measured, for pages that are made of them later.
 const SETTING: &str = "bench.json";
@@ -110,20 +108,20 @@ impl Report {
         let legend = Legend::of(records.iter().copied());
         results::write_csv(&folder.join("results.csv"), &records)?;
 
-        let mut scenes = Vec::new();
+        let mut scenes: Vec<SceneCharts<'_>> = Vec::new();
         for scene in self.scenes() {
             let of_scene: Vec<&Record> = records.iter().copied().filter(|r| r.scene == scene).collect();
             let charts = [
-                charts::scatter::trace_speed(&of_scene, &legend)?,
-                charts::scatter::sah_cost(&of_scene, &legend)?,
+                scatter(&of_scene, &legend, &TRACE_SPEED)?,
+                scatter(&of_scene, &legend, &SAH_COST)?,
                 charts::total_time::total_time(&of_scene, &legend)?,
                 charts::phases::phases(&of_scene, &legend)?,
             ];
-            scenes.push(SceneCharts { scene: scene.to_owned(), charts: charts.into_iter().flatten().collect() });
+            scenes.push((scene, charts.into_iter().flatten().collect()));
         }
         let growth = charts::growth::growth(&records, &legend)?;
 
-        let charts = scenes.iter().flat_map(|s| &s.charts).chain(&growth);
+        let charts = scenes.iter().flat_map(|(_, charts)| charts).chain(&growth);
         layout::document(self, &legend, &scenes, growth.as_ref()).write(folder, &beside::INDEX, charts)?;
         write_pages(folder)
     }

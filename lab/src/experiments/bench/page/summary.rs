@@ -21,7 +21,7 @@ pub struct Standing {
 
 /// What every builder is compared with: the `wanted` one where it was measured, otherwise the first.
 pub fn baseline<'a>(legend: &'a Legend, wanted: Option<&str>) -> Option<&'a str> {
-    let builders = legend.builders();
+    let builders = &legend.builders;
     builders.iter().find(|b| Some(b.as_str()) == wanted).or(builders.first()).map(String::as_str)
 }
 
@@ -48,5 +48,5 @@ pub fn standings(records: &[&Record], legend: &Legend, baseline: &str) -> Vec<St
             sah: ratio(sah_baseline, |r| r.quality.sah),
         }
     };
-    legend.builders().iter().map(standing).collect()
+    legend.builders.iter().map(standing).collect()
 }

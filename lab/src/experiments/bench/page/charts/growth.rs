@@ -20,7 +20,7 @@ pub fn growth(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         Curve { name: short(builder), tone: legend.builder(builder), points, law: None }.with_law()
     };
-    let curves: Vec<Curve> = legend.builders().iter().map(curve).filter(|curve| !curve.points.is_empty()).collect();
+    let curves: Vec<Curve> = legend.builders.iter().map(curve).filter(|curve| !curve.points.is_empty()).collect();
     let exponents: Vec<&str> =
         curves.iter().filter(|curve| curve.law.is_some()).map(|curve| curve.name.as_str()).collect();
     let caption = Caption {

@@ -7,6 +7,9 @@ use crate::report::names::{short, slug};
 use crate::report::stacked::{Part, Stack, stacked};
 use crate::report::theme::Legend;
 
+const READING: &str = "One bar a builder, its phases from left to right in the order in which they run. The table below says \
+    how far each is from the time that a plain copy of the bytes it must move would take.";
+
 /// The phases of every builder on one scene that tells them. `None` if none does.
 ///
 /// # Errors
@@ -29,10 +32,7 @@ pub fn phases(records: &[&Record], legend: &Legend) -> Result<Option<Chart>> {
         name: format!("{}-phases", slug(scene)),
         title: format!("{scene}: where the build time goes"),
         alt: stacks.iter().map(Stack::in_words).collect::<Vec<_>>().join("; "),
-        reading:
-            "One bar a builder, its phases from left to right in the order in which they run. The table below says how \
-                  far each is from the time that a plain copy of the bytes it must move would take."
-                .into(),
+        reading: READING.into(),
     };
     stacked(caption, "milliseconds", "build", &stacks)
 }

@@ -3,15 +3,13 @@
 use crate::Result;
 use crate::measure::record::Record;
 use crate::measure::total_time::{Line, Stretch, lower_envelope};
-use crate::report::chart::{
-    Area, Axes, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay, best_line, frame, log_axis, mesh, pixel,
-    room_at_ends,
-};
+use crate::report::chart::{Area, Caption, Chart, Drawn, LABEL_SIZE, Label, Overlay};
 use crate::report::labels::Rect;
 use crate::report::names::{short, slug};
 use crate::report::numbers::{duration_tick, short_count};
+use crate::report::plot::{Axis, Plot, Room, best_line, room_at_ends};
 use crate::report::theme::{Legend, MUTED, Tone};
-use plotters::prelude::*;
+use plotters::style::Color;
 
 /// Points a curve.
 const STEPS: usize = 72;
@@ -27,14 +25,14 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
     let scene = &first.scene;
     let lines: Vec<Line> = traced.iter().map(|t| t.1).collect();
     let envelope = lower_envelope(&lines);
-    let name = |stretch: &Stretch| short(&traced[stretch.line].0.builder);
+    let winners_in_words = verdict(&envelope, &|stretch: &Stretch| short(&traced[stretch.line].0.builder));
     let caption = Caption {
         name: format!("{}-total-time", slug(scene)),
         title: format!("{scene}: total time of a build and its rays"),
-        alt: format!("The lower envelope: {}.", verdict(&envelope, &name)),
+        alt: format!("The lower envelope: {winners_in_words}."),
         reading: format!(
-            "The gold line is the lower envelope, and the strip above says whose it is: {}. Both axes are logarithmic.",
-            verdict(&envelope, &name)
+            "The gold line is the lower envelope, and the strip above says whose it is: {winners_in_words}. Both axes are \
+             logarithmic."
         ),
     };
     let rays = ray_range(&lines, &envelope);
@@ -42,37 +40,21 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
     let least = lines.iter().map(|l| l.at(rays.0)).fold(f64::INFINITY, f64::min);
     let greatest = lines.iter().map(|l| l.at(rays.1)).fold(0.0, f64::max);
     let texts: Vec<_> = traced.iter().map(|(r, _)| (short(&r.builder), legend.builder(&r.builder))).collect();
+    let room = Room { top: 34, left: 76, right: room_at_ends(texts.iter().map(|t| &t.0)), ..Room::default() };
     let draw = |area: &Area<'_>, overlay: &mut Overlay| -> Drawn {
-        let mut chart = ChartBuilder::on(area)
-            .x_label_area_size(46)
-            .y_label_area_size(76)
-            .margin_top(34)
-            .margin_right(room_at_ends(texts.iter().map(|t| &t.0)))
-            .build_cartesian_2d(log_axis(rays.0..rays.1), log_axis(0.8 * least..1.2 * greatest))?;
-        let axes = Axes {
-            x: "rays traced a build",
-            y: "build and rays",
-            x_number: &|v| short_count(*v),
-            y_number: &|v| duration_tick(*v),
-        };
-        mesh(&mut chart, &axes)?;
+        let x = Axis { name: "rays traced a build", is_log: true, number: short_count };
+        let y = Axis { name: "build and rays", is_log: true, number: duration_tick };
+        let mut plot = Plot::new(area, &room, (&x, rays.0..rays.1), (&y, 0.8 * least..1.2 * greatest))?;
         let lowest = |&r: &f64| (r, lines.iter().map(|l| l.at(r)).fold(f64::INFINITY, f64::min));
-        chart.draw_series([PathElement::new(samples.iter().map(lowest).collect::<Vec<_>>(), best_line())])?;
-        for (record, line) in &traced {
+        plot.line(samples.iter().map(lowest).collect::<Vec<_>>(), best_line())?;
+        for (line, (_, tone)) in lines.iter().zip(&texts) {
             let curve: Vec<_> = samples.iter().map(|&r| (r, line.at(r))).collect();
-            let tone = legend.builder(&record.builder);
-            chart.draw_series([PathElement::new(curve, tone.light.stroke_width(2))])?;
+            plot.line(curve, tone.light.stroke_width(2))?;
         }
-        let ends: Vec<_> = lines.iter().map(|l| pixel(&chart, (rays.1, l.at(rays.1)))).collect();
-        overlay.label_ends(&ends, &texts, frame(&chart));
-        let strip = frame(&chart);
-        winners(
-            overlay,
-            &envelope,
-            |rays_a_build| pixel(&chart, (rays_a_build, greatest)).0,
-            strip,
-            |stretch| (name(stretch), legend.builder(&traced[stretch.line].0.builder)),
-        );
+        let ends: Vec<_> = lines.iter().map(|l| plot.pixel((rays.1, l.at(rays.1)))).collect();
+        overlay.label_ends(&ends, &texts, plot.frame);
+        let x_of = |rays_a_build: f64| plot.pixel((rays_a_build, greatest)).0;
+        winners(overlay, plot.frame, &envelope, &texts, x_of);
         Ok(())
     };
     Chart::draw(caption, draw).map(Some)
@@ -81,39 +63,29 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
 /// A strip above the chart: who is best for so many rays, in the colours of the builders, and where they take over.
 fn winners(
     overlay: &mut Overlay,
+    frame: Rect,
     envelope: &[Stretch],
+    names: &[(String, Tone)],
     x_of: impl Fn(f64) -> f64,
-    inner: Rect,
-    who: impl Fn(&Stretch) -> (String, Tone),
 ) {
     const HEIGHT: f64 = 9.0;
-    let y = inner.y - 34.0;
-    let end = inner.x + inner.w;
-    overlay.label(Label {
-        at: (end + 15.0, y + HEIGHT),
-        text: "← best",
-        anchor: "start",
-        tone: MUTED,
-        size: LABEL_SIZE,
-    });
+    let y = frame.y - 34.0;
+    let end = frame.x + frame.w;
+    let label = |overlay: &mut Overlay, at, text: &str, anchor, size| {
+        overlay.label(Label { at, text, anchor, tone: MUTED, size });
+    };
+    label(overlay, (end + 15.0, y + HEIGHT), "← best", "start", LABEL_SIZE);
     let mut last_label = f64::NEG_INFINITY;
     for (i, stretch) in envelope.iter().enumerate() {
-        let left = if i == 0 { inner.x } else { x_of(stretch.from) };
+        let left = if i == 0 { frame.x } else { x_of(stretch.from) };
         let right = envelope.get(i + 1).map_or(end, |next| x_of(next.from));
-        let (name, tone) = who(stretch);
+        let (name, tone) = &names[stretch.line];
         let band = Rect { x: left, y, w: right - left, h: HEIGHT };
-        overlay.band(band, tone);
-        overlay.tip(band, &name);
+        overlay.band(band, *tone);
+        overlay.tip(band, name);
         // Two that follow closely share a place: the first is written, the caption has them all.
         if i > 0 && left - last_label > 55.0 {
-            let text = short_count(stretch.from);
-            overlay.label(Label {
-                at: (left, y + HEIGHT + 15.0),
-                text: &text,
-                anchor: "middle",
-                tone: MUTED,
-                size: 12.0,
-            });
+            label(overlay, (left, y + HEIGHT + 15.0), &short_count(stretch.from), "middle", 12.0);
             last_label = left;
         }
     }
