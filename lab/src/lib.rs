@@ -7,7 +7,8 @@
 //! 5. [`measure`] makes figures fair and keeps them as records;
 //! 6. [`report`] turns figures into tables, charts and pages;
 //! 7. [`experiments`] has a folder for each experiment: its measuring, its records, its page and its command;
-//! 8. [`cli`] is the binary: options that commands share, and those that print and keep nothing else.
+//! 8. [`cli`] has the options that commands share, and the commands that print and keep nothing else;
+//! 9. [`program`] is the binary: the list of all commands.
 #![warn(missing_docs)]
 
 #[doc(hidden)]
@@ -18,6 +19,7 @@ mod error;
 pub mod experiments;
 pub mod measure;
 mod named;
+pub mod program;
 pub mod random;
 pub mod rays;
 pub mod report;

@@ -1,5 +1,5 @@
-//! The `hedgerow` binary: see `hedgerow --help`, and `cli` in the library.
+//! The `hedgerow` binary: see `hedgerow --help`, and `program` in the library.
 
 fn main() -> std::process::ExitCode {
-    hedgerow_lab::cli::main()
+    hedgerow_lab::program::main()
 }

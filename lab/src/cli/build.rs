@@ -38,7 +38,7 @@ pub struct Arguments {
     json: Json,
 }
 
-pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let builders = &common.builders(&arguments.builder.0);
     if arguments.output.is_some() && builders.len() > 1 {
         return Err(crate::Error::Argument("-o takes the structure of one builder; name one with -b".into()).into());

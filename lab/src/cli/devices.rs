@@ -34,7 +34,7 @@ struct Row<'a> {
     picked: bool,
 }
 
-pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let found = device::list(common.device())?;
     let rows: Vec<_> = found.iter().map(row).collect();
     let json = Json { json: arguments.json.clone() };

@@ -27,7 +27,7 @@ pub struct Arguments {
     size: Size,
 }
 
-pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let scene = common.load(&arguments.scene)?;
     let bar = Bar::new(common, &format!("tracing for {} rays", arguments.kind), 0);
     let mesh = &scene.mesh;

@@ -38,7 +38,7 @@ pub struct Arguments {
     frame: Option<u32>,
 }
 
-pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     if !arguments.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         let name = arguments.output.display();
         return Err(

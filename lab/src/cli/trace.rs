@@ -44,7 +44,7 @@ pub struct Arguments {
     json: Json,
 }
 
-pub(super) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     let builders = &common.builders(&arguments.builder.0);
     let files = arguments.rays_file.as_deref().zip(arguments.hits_file.as_deref());
     if files.is_some() && (builders.len() > 1 || arguments.json.json.is_some()) {

@@ -27,21 +27,11 @@ pub use chart::{Caption, Chart};
 pub use columns::Table;
 pub use curves::{Axis, Curve, Mark};
 pub use document::{Document, Section};
-pub use names::{short, slug};
+pub use names::{distinct, short, slug};
 pub use theme::{SERIES, Tone};
 
 use crate::{Error, Result};
 use std::path::Path;
-
-/// Different values in the order in which they come.
-pub fn different<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
-    values.into_iter().fold(Vec::new(), |mut different, value| {
-        if !different.contains(&value) {
-            different.push(value);
-        }
-        different
-    })
-}
 
 /// Writes charts as SVG and PNG into the folder `charts/` of `folder`; those that are there already stay.
 pub fn write_charts<'a>(folder: &Path, charts: impl Iterator<Item = &'a Chart>) -> Result<()> {

@@ -74,8 +74,14 @@ pub fn run(group: &str, mut command: Command, limit: Duration) -> (Outcome, Opti
     let (sender, messages) = mpsc::channel();
     let lines = BufReader::new(child.stdout.take().expect("stdout is piped")).lines();
     // A driver may write to stdout what it likes.
-    let mut sent = lines.map_while(Result::ok).filter_map(|line| serde_json::from_str::<Message>(&line).ok());
-    let reader = thread::spawn(move || sent.try_for_each(|message| sender.send(message)));
+    let sent = lines.map_while(Result::ok).filter_map(|line| serde_json::from_str::<Message>(&line).ok());
+    let reader = thread::spawn(move || {
+        for message in sent {
+            if sender.send(message).is_err() {
+                return;
+            }
+        }
+    });
     let mut diagnostics = child.stderr.take().expect("stderr is piped");
     let listener = thread::spawn(move || {
         let mut text = Vec::new();

@@ -362,8 +362,9 @@ fn box_met(corners: &[[f32; 3]; 2], line: &Line) -> Option<Met> {
     let t_error = error / line.direction.length();
     let enter_within = |by: f64, late: f64| -> Option<f64> {
         let (mut enter, mut leave) = (line.limits[0] - late, line.limits[1] + late);
+        let [lows, highs] = [corners[0] - by, corners[1] + by];
         for k in 0..3 {
-            let (lo, hi) = (corners[0][k] - by, corners[1][k] + by);
+            let (lo, hi) = (lows[k], highs[k]);
             if line.direction[k] == 0.0 {
                 if !(lo <= line.origin[k] && line.origin[k] <= hi) {
                     return None;

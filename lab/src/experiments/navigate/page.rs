@@ -4,7 +4,7 @@ use super::projection::UNITS;
 use super::{Navigator, Tree};
 use crate::experiments::navigate::outline::OutlineLevel;
 use crate::measure::provenance;
-use crate::report::elements::{bar, foot, head, number, scroll};
+use crate::report::elements::{self, bar, foot, number, scroll};
 use crate::report::numbers::{grouped, three_digits};
 use crate::report::{short, slug};
 use crate::scene::Scene;
@@ -12,7 +12,7 @@ use crate::subjects::KD_TREE;
 use crate::{Error, Result};
 use base64::prelude::{BASE64_STANDARD, Engine};
 use image::RgbImage;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 
 const SCRIPT: &str = include_str!("navigate.js");
 /// The level that is shown first: few boxes, and their shape to be seen.
@@ -21,36 +21,30 @@ const FIRST: usize = 4;
 pub(super) fn page(navigator: &Navigator<'_>, links: &Markup) -> Result<String> {
     let picture = format!("--picture:url({})", inside(&navigator.picture)?);
     let Navigator { scene: Scene { name: scene, mesh, .. }, trees, .. } = navigator;
-    let markup = html! {
-        (DOCTYPE)
-        html lang="en" {
-            (head(&format!("hedgerow: trees of {scene}, level by level")))
-            body {
-                @if let Some(tree) = trees.first() { a.skip href={ "#" (id(tree)) } { "Skip to the first tree" } }
-                header.hero {
-                    p.kicker { "hedgerow navigate" }
-                    h1 { (scene) ", level by level" }
-                    p.lead {
-                        "The boxes of each level of " (trees.len()) @if trees.len() == 1 { " tree" } @else { " trees" } " over "
-                        (grouped(mesh.triangles.len() as u64)) " triangles, from the root down to the leaves."
-                    }
-                    p.command { span { "Made by" } code { (provenance::command()) } }
-                }
-                nav aria-label="Sections" {
-                    @for tree in trees { a href={ "#" (id(tree)) } { (short(&tree.builder)) } }
-                    a href="#method" { "What is drawn" }
-                    (links)
-                }
-                main style=(picture) {
-                    @for tree in trees { (section(navigator, tree)) }
-                    (method(navigator))
-                }
-                (foot(&provenance::commit(), &provenance::now()))
-                script { (PreEscaped(SCRIPT)) }
+    let body = html! {
+        @if let Some(tree) = trees.first() { a.skip href={ "#" (id(tree)) } { "Skip to the first tree" } }
+        header.hero {
+            p.kicker { "hedgerow navigate" }
+            h1 { (scene) ", level by level" }
+            p.lead {
+                "The boxes of each level of " (trees.len()) @if trees.len() == 1 { " tree" } @else { " trees" } " over "
+                (grouped(mesh.triangles.len() as u64)) " triangles, from the root down to the leaves."
             }
+            p.command { span { "Made by" } code { (provenance::command()) } }
         }
+        nav aria-label="Sections" {
+            @for tree in trees { a href={ "#" (id(tree)) } { (short(&tree.builder)) } }
+            a href="#method" { "What is drawn" }
+            (links)
+        }
+        main style=(picture) {
+            @for tree in trees { (section(navigator, tree)) }
+            (method(navigator))
+        }
+        (foot(&provenance::commit(), &provenance::now()))
+        script { (PreEscaped(SCRIPT)) }
     };
-    Ok(markup.into_string())
+    Ok(elements::page(&format!("hedgerow: trees of {scene}, level by level"), &body))
 }
 
 fn id(tree: &Tree) -> String {

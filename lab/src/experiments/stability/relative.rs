@@ -256,13 +256,11 @@ impl<'a> Base<'a> {
     }
 }
 
+/// A structure, its cost where it gives its tree, and what is wrong with that.
+type BuiltSubject<'a> = (Box<dyn Subject + 'a>, Option<f64>, Vec<String>);
+
 /// A builder's structure of a mesh, with its [`clipped::cost`] where it gives its tree, and what is wrong with that.
-fn built<'a>(
-    stage: &RelativeSetup<'a>,
-    part: &Part<'_>,
-    spec: &Spec,
-    mesh: &'a Mesh,
-) -> Result<(Box<dyn Subject + 'a>, Option<f64>, Vec<String>)> {
+fn built<'a>(stage: &RelativeSetup<'a>, part: &Part<'_>, spec: &Spec, mesh: &'a Mesh) -> Result<BuiltSubject<'a>> {
     let mut subject = spec.make(stage.device, mesh)?;
     subject.build()?;
     let Some(tree) = subject.tree()? else { return Ok((subject, None, Vec::new())) };

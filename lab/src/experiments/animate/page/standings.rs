@@ -2,7 +2,7 @@
 
 use crate::experiments::animate::AnimationMethod;
 use crate::experiments::animate::points::Animated;
-use crate::report::different;
+use crate::report::distinct;
 use crate::report::numbers::{duration, size, three_digits};
 use crate::report::table::{or_dash, with_header};
 use comfy_table::Table;
@@ -39,7 +39,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 pub fn standings(frames: &[Animated]) -> Vec<Standing> {
     let standing = |way: AnimationMethod| {
         let of_way: Vec<&Animated> = frames.iter().filter(|frame| frame.way == way).collect();
-        let kinds = different(of_way.iter().flat_map(|frame| &frame.trace).map(|rays| rays.rays.as_str()));
+        let kinds = distinct(of_way.iter().flat_map(|frame| &frame.trace).map(|rays| rays.rays.as_str()));
         let count = of_way.len() as f64;
         let of_kind = |kind: &str| {
             let all = of_way.iter().flat_map(|frame| &frame.trace).filter(|rays| rays.rays == kind);
@@ -58,7 +58,7 @@ pub fn standings(frames: &[Animated]) -> Vec<Standing> {
             structure_bytes: mean(of_way.iter().filter_map(|f| f.memory.structure_bytes).map(|bytes| bytes as f64)),
         })
     };
-    different(frames.iter().map(|frame| frame.way)).into_iter().filter_map(standing).collect()
+    distinct(frames.iter().map(|frame| frame.way)).into_iter().filter_map(standing).collect()
 }
 
 /// The way whose frames take least.

@@ -7,7 +7,7 @@ use crate::experiments::stability::points::{Degenerate, Experiment};
 use crate::report::beside::{DEGENERATE, Page};
 use crate::report::elements::{number, scroll};
 use crate::report::numbers::{count, three_digits, tick};
-use crate::report::{Chart, Section, Table, different, lines, short};
+use crate::report::{Chart, Section, Table, distinct, lines, short};
 use crate::scene;
 use maud::{Markup, html};
 
@@ -38,7 +38,7 @@ impl Paged for Degenerate {
         let (right, all) = (ours.clone().filter(|point| !point.has_failed()).count(), ours.count());
         let peers: Vec<&Degenerate> =
             points.iter().filter(|point| !point.is_ours && !point.faults.is_empty()).collect();
-        let scenes = different(points.iter().map(|point| point.scene.as_str()));
+        let scenes = distinct(points.iter().map(|point| point.scene.as_str()));
         html! {
             p {
                 "Of ours, " b { (right) " of " (all) } " pairs of a builder and one of " (scenes.len()) " scenes are right: a tree that keeps every rule of "
@@ -83,7 +83,7 @@ fn what(scene: &str) -> Option<&'static str> {
 }
 
 fn matrix(points: &[Degenerate], scenes: &[&str]) -> Markup {
-    let builders = different(points.iter().map(|point| point.builder.as_str()));
+    let builders = distinct(points.iter().map(|point| point.builder.as_str()));
     html! {
         table #matrix {
             caption.hidden { "Who survives what" }

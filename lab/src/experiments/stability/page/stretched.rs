@@ -6,7 +6,7 @@ use crate::Result;
 use crate::experiments::stability::points::{Experiment, Stretched};
 use crate::experiments::stability::relative::Stretch;
 use crate::report::beside::Page;
-use crate::report::{Chart, Mark, Section, Table, different, document, lines, slug};
+use crate::report::{Chart, Mark, Section, Table, distinct, document, lines, slug};
 use maud::{Markup, html};
 
 /// What stretches a scene, and what its page says of it.
@@ -82,12 +82,12 @@ impl<S: StretchPage> Paged for Stretched<S> {
     }
 
     fn sections(points: &[Self]) -> Result<(Vec<Section>, Vec<Chart>)> {
-        let builders = different(points.iter().map(|point| point.builder.as_str()));
+        let builders = distinct(points.iter().map(|point| point.builder.as_str()));
         let (mut sections, mut all) = (Vec::new(), Vec::new());
-        for scene in different(points.iter().map(|point| point.scene.as_str())) {
+        for scene in distinct(points.iter().map(|point| point.scene.as_str())) {
             let (mut charts, mut more) = (Vec::new(), Vec::new());
             let of_scene: Vec<&Self> = points.iter().filter(|point| point.scene == scene).collect();
-            for by in different(of_scene.iter().map(|point| point.by)) {
+            for by in distinct(of_scene.iter().map(|point| point.by)) {
                 let own: Vec<&Self> = of_scene.iter().copied().filter(|point| point.by == by).collect();
                 let name = format!("{}-{}", slug(scene), by.slug());
                 let titled = [&format!("{}-{name}", S::PAGE.stem()), &format!("{scene}, {by}")];
@@ -114,10 +114,10 @@ impl<S: StretchPage> Paged for Stretched<S> {
 
 fn losses<S: StretchPage>(points: &[Stretched<S>]) -> Markup {
     let mut rows: Vec<Row<'_, S>> = Vec::new();
-    for scene in different(points.iter().map(|point| point.scene.as_str())) {
-        for by in different(points.iter().map(|point| point.by)) {
+    for scene in distinct(points.iter().map(|point| point.scene.as_str())) {
+        for by in distinct(points.iter().map(|point| point.by)) {
             let all: Vec<_> = points.iter().filter(|point| point.scene == scene && point.by == by).collect();
-            for builder in different(all.iter().map(|point| point.builder.as_str())) {
+            for builder in distinct(all.iter().map(|point| point.builder.as_str())) {
                 let own = all.iter().copied().filter(|point| point.builder == builder).collect();
                 rows.push(Row { builder, own, all: all.clone() });
             }
