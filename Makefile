@@ -56,25 +56,25 @@ SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 .PHONY: bench bench-all bench-peers stability test test-gpu test-lanes check package portable install-c setup test-drivers
 
 bench: setup
-	$(CARGO) build --release --features $(FEATURES)
+	$(CARGO) build --release -p hedgerow-lab --features $(FEATURES)
 	$(BIN) accel $(QUICK) -o $(OUT) $(ACCEL)
 	$(BIN) bench -o $(OUT) $(BENCH)
 
 bench-all: setup
 	@test -d "$(SCENES)" || { echo "make bench-all: SCENES=DIR (or HEDGEROW_SCENES) names the folder of scenes" >&2; exit 2; }
-	$(CARGO) build --release --features $(FEATURES)
+	$(CARGO) build --release -p hedgerow-lab --features $(FEATURES)
 	$(BIN) accel -o $(OUT) $(ACCEL)
 	$(BIN) bench --all --scenes-dir "$(SCENES)" -o $(OUT) $(BENCH)
 
 bench-peers: setup
 	scripts/peer-lavapipe.sh $(MESA)
-	$(CARGO) build --release --features $(FEATURES)
+	$(CARGO) build --release -p hedgerow-lab --features $(FEATURES)
 	scripts/with-lavapipe.sh $(MESA) $(BIN) accel -o $(OUT) $(ACCEL)
 	scripts/with-lavapipe.sh $(MESA) $(BIN) bench $(if $(SCENES),--all --scenes-dir "$(SCENES)") -b $(PEER_BUILDERS) \
 		-o $(OUT) $(BENCH)
 
 stability: setup
-	$(CARGO) build --release --features $(FEATURES)
+	$(CARGO) build --release -p hedgerow-lab --features $(FEATURES)
 	$(BIN) stability growth -o $(OUT) $(STABILITY)
 	$(BIN) stability large -o $(OUT) $(STABILITY)
 	$(BIN) stability degenerate -o $(OUT)
