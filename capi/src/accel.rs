@@ -15,11 +15,11 @@ const _: () = assert!(
         && HEDGEROW_STRUCTURE_ALIGNMENT as u64 == accel::STRUCTURE_ALIGNMENT
 );
 
-/// A build flag of ours: a top level may open instances whose boxes are loose (re-braiding).
+/// A build flag of hedgerow's own: a top level may open instances whose boxes are loose (re-braiding).
 pub const HEDGEROW_BUILD_ACCELERATION_STRUCTURE_REBRAID_BIT: u32 = 1 << 30;
 const _: () = assert!(HEDGEROW_BUILD_ACCELERATION_STRUCTURE_REBRAID_BIT == accel::REBRAID.as_raw());
 
-/// `vkGetAccelerationStructureBuildSizesKHR`: bytes that a build of at most so many primitives a geometry needs.
+/// `vkGetAccelerationStructureBuildSizesKHR`: bytes that a build of at most this many primitives a geometry needs.
 ///
 /// # Safety
 /// As Vulkan's. Addresses in the geometries are not looked at.

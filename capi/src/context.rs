@@ -59,7 +59,7 @@ pub(crate) unsafe fn structures_of<'a>(context: *const HedgerowContext) -> Resul
 /// Wraps a device.
 ///
 /// # Safety
-/// The device was created from `instance` and `physicalDevice` with what hedgerow_create_requirements told, and outlives
+/// The device was created from `instance` and `physicalDevice` with what hedgerow_create_requirements returned, and outlives
 /// the context.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hedgerow_create_context(

@@ -14,7 +14,7 @@ pub type HedgerowOptional = u32;
 /// `VK_EXT_subgroup_size_control` with its features `subgroupSizeControl` and `computeFullSubgroups`.
 pub const HEDGEROW_OPTIONAL_SUBGROUP_SIZE_CONTROL: HedgerowOptional = 1;
 /// `VK_KHR_shader_maximal_reconvergence` with its feature `shaderMaximalReconvergence`. hedgerow_create_requirements leaves it out, as
-/// no kernel relies on it: whoever enables it sets the bit.
+/// no kernel relies on it: if you enable it, set the bit.
 pub const HEDGEROW_OPTIONAL_MAXIMAL_RECONVERGENCE: HedgerowOptional = 2;
 
 fn bits_of(optional: Optional) -> HedgerowOptional {

@@ -70,7 +70,7 @@ fn remember(text: String) {
 fn text_of(panic: &(dyn Any + Send)) -> &str {
     (panic.downcast_ref::<&str>().copied())
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("for a reason that is no text")
+        .unwrap_or("for a reason that is not text")
 }
 
 #[cfg(test)]

@@ -94,7 +94,7 @@ fn query_of(query: HedgerowQuery) -> Result<Query> {
 /// Device addresses of what is traced, all multiples of 16.
 #[repr(C)]
 pub struct HedgerowTraceInfo {
-    /// What hedgerow_get_acceleration_structure_device_address told.
+    /// What hedgerow_get_acceleration_structure_device_address returned.
     pub structure: VkDeviceAddress,
     /// HedgerowRay for each ray.
     pub rays: VkDeviceAddress,

@@ -1,7 +1,7 @@
 //! Full sweep, plainly: top-down, at each node the best by SAH of all splits of all three orders by centroid.
 //!
 //! Wald 2007, "On fast Construction of SAH-based Bounding Volume Hierarchies", section 3.2; Frantál 2019, section 3.2. Slow, and
-//! what the quality of other builders is told against.
+//! what the quality of other builders is compared with.
 
 use hedgerow::bvh::layout::{Bvh2, Child, MAX_DEPTH, Node, Record};
 use hedgerow::bvh::sah::Collapse;

@@ -1,5 +1,5 @@
-//! The program `hedgerow`: its list of commands. Results go to stdout, progress and diagnostics to stderr. The exit status is 0 if the
-//! work is done, 1 if it failed, 2 if the arguments are wrong.
+//! The program `hedgerow`: its list of commands. Results go to stdout, progress and diagnostics to stderr. The exit status is 0
+//! if the work is done, 1 if it failed, 2 if the arguments are wrong.
 
 use crate::cli::{Common, build, devices, rays, render, trace};
 use crate::experiments::accel::command as accel;

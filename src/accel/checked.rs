@@ -136,7 +136,7 @@ impl Checks {
 fn find<'a>(known: &'a HashMap<u64, Known>, field: &str, structure: vk::AccelerationStructureKHR) -> Result<&'a Known> {
     known.get(&structure.as_raw()).ok_or_else(|| {
         Error::Argument(format!(
-            "{field} {:#x} is no structure of this device; create it with the same accel::Device, and destroy it later",
+            "{field} {:#x} is not a structure of this device; create it with the same accel::Device, and destroy it later",
             structure.as_raw()
         ))
     })

@@ -29,7 +29,7 @@ impl FromStr for TuningChoice {
             "auto" | "" => Ok(TuningChoice::Auto),
             "cpu" => Ok(TuningChoice::Cpu),
             "gpu" => Ok(TuningChoice::Gpu),
-            _ => Err(format!("there is no tuning {text:?}; take auto, cpu or gpu")),
+            _ => Err(format!("unknown tuning {text:?}; use one of auto, cpu, gpu")),
         }
     }
 }

@@ -134,10 +134,10 @@ fn places_that_do_not_fit_are_refused() {
     let top = create(256, bench.bytes, vk::AccelerationStructureTypeKHR::TOP_LEVEL);
     bench.assert_refused(info.dst_acceleration_structure(top), all(), &["type is BOTTOM_LEVEL", "TOP_LEVEL"]);
     let nowhere = vk::AccelerationStructureKHR::from_raw(buffer.address() + 512);
-    bench.assert_refused(info.dst_acceleration_structure(nowhere), all(), &["is no structure of this device"]);
+    bench.assert_refused(info.dst_acceleration_structure(nowhere), all(), &["is not a structure of this device"]);
     let gone = create(512, bench.bytes, bottom);
     bench.ours.destroy_acceleration_structure(gone, None);
-    bench.assert_refused(info.dst_acceleration_structure(gone), all(), &["is no structure of this device"]);
+    bench.assert_refused(info.dst_acceleration_structure(gone), all(), &["is not a structure of this device"]);
 }
 
 #[test]

@@ -3,12 +3,12 @@
 //!
 //! Between two faces of boxes the cost is linear, so its least value is at a face. Each box begins and ends along each axis: two
 //! events, sorted once. A sweep over them in order knows how many boxes are on either side. The events of what lies on one side of
-//! the plane go to that side in the order that they have; what straddles it is clipped anew, and has new events, which are few,
+//! the plane go to that side in the order that they have; what straddles it is clipped again, and has new events, which are few,
 //! sorted by themselves and merged.
 //!
-//! At a common position boxes end before others begin, so that all that ends there is on the left alone, and all that begins there
-//! on the right. Between the two are the events of boxes that are flat across the axis, one each: they go to the side where they cost
-//! less.
+//! At a common position boxes end before others begin, so that all that ends there is on the left alone, and all that begins
+//! there on the right. Between the two are the events of boxes that are flat across the axis, one each: they go to the side
+//! where they cost less.
 
 use super::Threads;
 use hedgerow::bvh::layout::Triangle;

@@ -25,7 +25,7 @@ impl Fork for Threads {
 pub enum Planes {
     /// Every face of every box: perfect splits (Wald and Havran 2006).
     Exact,
-    /// Between so many bins along each axis (Shevtsov, Soupikov and Kapustin 2007).
+    /// Between this many bins along each axis (Shevtsov, Soupikov and Kapustin 2007).
     Binned(u32),
     /// The same in cells of more than `exact` references, and every face of every box in the others: what the device builds.
     Mixed {
@@ -37,7 +37,8 @@ pub enum Planes {
 }
 
 impl Planes {
-    /// Bins unless told. The thesis' number is not in the text that is left of it; 32 is a subgroup's lanes on its device.
+    /// The default number of bins. The thesis' number is not in the text that is left of it; 32 is a subgroup's lanes on its
+    /// device.
     pub const BINS: u32 = 32;
     /// The most bins there may be.
     pub const MAX_BINS: u32 = 1024;
@@ -77,7 +78,7 @@ impl HostKdOptions {
         }
     }
 
-    /// Whether there can be so many bins.
+    /// Whether there can be this many bins.
     pub fn check_planes(&self) -> bool {
         match self.planes {
             Planes::Exact => true,

@@ -113,7 +113,7 @@ impl Common {
         Ok(scene)
     }
 
-    /// Loads a dynamic scene under a progress bar; its camera is to be aimed at each time.
+    /// Loads a dynamic scene under a progress bar; each time its camera is aimed again.
     ///
     /// # Errors
     /// The scene cannot be found, read or used, or nothing in it moves.

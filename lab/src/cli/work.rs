@@ -44,7 +44,7 @@ pub fn device_for_those<'b>(
     Ok((Some(device), possible))
 }
 
-/// Asks the driver what no property tells: a driver that fails here would give wrong figures in silence.
+/// Asks the driver what no property says: a driver that fails here would give wrong figures in silence.
 fn check_driver(device: &Device, builders: &[Spec]) -> anyhow::Result<()> {
     let findings = probe::probe(device)?;
     let found = device.found();

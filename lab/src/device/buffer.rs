@@ -82,7 +82,7 @@ impl Buffer<'_> {
         self.memory.as_ref().expect("held until the drop")
     }
 
-    /// Where the host sees it, unless its data is to be staged.
+    /// Where the host sees it, unless its data must be staged.
     fn mapped(&self) -> Option<*mut u8> {
         self.memory().mapped().filter(|_| self.device.maps_memory())
     }

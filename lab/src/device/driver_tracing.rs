@@ -8,7 +8,7 @@ use ash::vk;
 use hedgerow::gpu::requirements::Offered;
 use std::ffi::CStr;
 
-/// Who walks the driver's structures.
+/// What walks the driver's structures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum DriverTracing {
     /// A compute shader, by `VK_KHR_ray_query`.

@@ -1,8 +1,8 @@
 //! Memory of the binary's and the tests' own device: buffers with what they are bound to, and the way of data into memory that the
 //! host does not map.
 //!
-//! A GPU's own memory is filled and read through a staging buffer, a chunk at a time. Where the device's memory is the host's (a CPU,
-//! most integrated GPUs), it is mapped.
+//! A GPU's own memory is filled and read through a staging buffer, a chunk at a time. Where the device's memory is the host's
+//! (a CPU, most integrated GPUs), it is mapped.
 
 use super::{Device, locked};
 use crate::{Error, Result};
@@ -34,8 +34,8 @@ pub(super) const STAGING: [(&str, vk::BufferUsageFlags, MemoryLocation); 2] = [
 const UPLOAD: usize = 0;
 const DOWNLOAD: usize = 1;
 
-/// Whether the memory of a device is best mapped: its largest heap is cached by the host. What the host maps but does not cache (a GPU
-/// behind a bus) it reads a hundred times as slowly as it copies.
+/// Whether the memory of a device is best mapped: its largest heap is cached by the host. What the host maps but does not cache
+/// (a GPU behind a bus) it reads a hundred times as slowly as it copies.
 pub(super) fn is_mapped(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> bool {
     // SAFETY: the handles are live.
     let memory = unsafe { instance.get_physical_device_memory_properties(physical_device) };

@@ -40,7 +40,7 @@ pub struct DeviceOptions {
     /// Enable the driver's own acceleration structures where it has them, to be traced like this: [`DriverTracing::Query`] falls
     /// back on pipelines, [`DriverTracing::Pipeline`] is meant.
     pub driver_tracing: Option<DriverTracing>,
-    /// How work is cut: for what the device is, unless told.
+    /// How work is cut: by default for the kind of device.
     pub tuning: TuningChoice,
     /// Enable maximal reconvergence where the device has it.
     pub maximal_reconvergence: bool,

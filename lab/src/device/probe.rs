@@ -1,4 +1,4 @@
-//! What a driver is asked because no property tells it: that started workgroups go on, and that long loops end where they should
+//! What a driver is asked because no property says it: that started workgroups go on, and that long loops end where they should
 //! (Mesa 22.3's lavapipe ends them after 65,535 rounds and says nothing). And how far a driver may divide inexactly.
 
 use super::Device;

@@ -13,10 +13,10 @@ pub struct Setting {
     pub machine: Machine,
     /// The device, if one was used.
     pub device: Option<DeviceFacts>,
-    /// Commit of the program; empty where each record tells it.
+    /// Commit of the program; empty if each record has it.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub commit: String,
-    /// When, RFC 3339 UTC; empty where each record tells it.
+    /// When, RFC 3339 UTC; empty if each record has it.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub when: String,
     /// The command line that measures it again.

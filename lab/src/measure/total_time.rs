@@ -24,7 +24,7 @@ impl Line {
     }
 }
 
-/// A stretch of the lower envelope: from so many rays a build on, this line is the lowest.
+/// A stretch of the lower envelope: from this many rays per build on, this line is the lowest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stretch {
     /// Index of the line.

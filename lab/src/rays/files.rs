@@ -8,7 +8,7 @@ use std::path::Path;
 /// Reads a ray file: 32 bytes a ray.
 ///
 /// # Errors
-/// The file cannot be read, or its length is no multiple of 32.
+/// The file cannot be read, or its length is not a multiple of 32.
 pub fn read_rays(path: impl AsRef<Path>) -> Result<Vec<Ray>> {
     read(path.as_ref(), "rays", "f32 origin.xyz, t_min, direction.xyz, t_max")
 }
@@ -24,7 +24,7 @@ pub fn write_rays(path: impl AsRef<Path>, rays: &[Ray]) -> Result<()> {
 /// Reads a hit file: 16 bytes a ray.
 ///
 /// # Errors
-/// The file cannot be read, or its length is no multiple of 16.
+/// The file cannot be read, or its length is not a multiple of 16.
 pub fn read_hits(path: impl AsRef<Path>) -> Result<Vec<Hit>> {
     read(path.as_ref(), "hits", "f32 t, u32 primitive index, f32 u, v")
 }

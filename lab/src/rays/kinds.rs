@@ -130,7 +130,7 @@ pub(crate) struct Basis {
 }
 
 impl Basis {
-    /// Of a picture with so many pixels in x and y.
+    /// Of a picture with this many pixels in x and y.
     pub fn of(camera: &Camera, [width, height]: [u32; 2]) -> Basis {
         let eye = dvec3(camera.eye);
         let forward = (dvec3(camera.look) - eye).normalize_or(DVec3::NEG_Z);

@@ -30,7 +30,7 @@ pub struct Caption {
     pub name: String,
     /// What it is.
     pub title: String,
-    /// What it shows, in words, for whoever cannot see it.
+    /// What it shows, in words, for people who cannot see it.
     pub alt: String,
     /// What a reader shall take from it; one or two sentences.
     pub reading: String,
@@ -215,7 +215,8 @@ impl Overlay {
         }
     }
 
-    /// Labels lines at their right ends, spread so that they do not cover each other; [`room_at_ends`](super::plot::room_at_ends) is the margin for it.
+    /// Labels lines at their right ends, spread so that they do not cover each other;
+    /// [`room_at_ends`](super::plot::room_at_ends) is the margin for it.
     pub fn label_ends(&mut self, ends: &[(f64, f64)], texts: &[(String, Tone)], frame: Rect) {
         let heights: Vec<f64> = ends.iter().map(|e| e.1).collect();
         let moved = labels::spread(&heights, 17.0, frame.y + 6.0, frame.y + frame.h - 6.0);

@@ -72,7 +72,7 @@ pub fn read<R: DeserializeOwned>(
     Ok(records)
 }
 
-/// What the lines of a file say, of several kinds, each told by its `experiment`.
+/// What the lines of a file say, of several kinds, each marked by its `experiment`.
 pub trait Entry: Serialize + DeserializeOwned {
     /// The name of the file.
     const FILE: &'static str;
@@ -144,7 +144,7 @@ pub fn write_one(path: &Path, entry: &impl Serialize) -> Result<()> {
 /// The record of such a file; `None` where there is none.
 ///
 /// # Errors
-/// The file cannot be read, or is no such record of this schema.
+/// The file cannot be read, or is not such a record of this schema.
 pub fn read_one<E: DeserializeOwned>(path: &Path) -> Result<Option<E>> {
     if !path.is_file() {
         return Ok(None);

@@ -1,8 +1,9 @@
 //! What pages are made of: charts, tables, pictures, numbers as people read them, and files of records.
 //!
-//! [`Chart`] is drawn once, as SVG, PNG and part of a page; [`bars`], [`stacked`] and [`curves`] are its usual kinds, and a [`plot`] is the part with axes. A [`document`](mod@document)
-//! is a whole page, [`columns`] its tables, [`elements`] the rest of it; [`theme`] its colours, [`beside`] the pages that name each other. [`lines`] reads and writes files of
-//! one record a line. [`picture`] renders scenes.
+//! [`Chart`] is drawn once, as SVG, PNG and part of a page; [`bars`], [`stacked`] and [`curves`] are its usual kinds, and a
+//! [`plot`] is the part with axes. A [`document`](mod@document) is a whole page, [`columns`] its tables, [`elements`] the rest
+//! of it; [`theme`] its colours, [`beside`] the pages that name each other. [`lines`] reads and writes files of one record a
+//! line. [`picture`] renders scenes.
 
 pub mod bars;
 pub mod beside;

@@ -165,7 +165,7 @@ impl<'a, 'b> Plot<'a, 'b> {
     }
 }
 
-/// plotters' text size for a text of so many pixels: its SVG back end divides by 1.24.
+/// plotters' text size for a text of this many pixels: its SVG back end divides by 1.24.
 fn text(pixels: f64, tone: Tone) -> TextStyle<'static> {
     ("sans-serif", pixels * 1.24).into_font().color(&tone.light)
 }

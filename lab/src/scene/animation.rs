@@ -32,7 +32,7 @@ impl Animation {
     /// The mesh in a frame; the first is 0.
     ///
     /// # Panics
-    /// There is no such frame.
+    /// There is no frame of this number.
     pub fn mesh(&self, frame: usize) -> Mesh {
         Mesh { positions: self.frames[frame].clone(), triangles: self.triangles.clone() }
     }
@@ -47,7 +47,7 @@ pub(super) fn bounds(triangles: &[[u32; 3]], frames: &[Vec<[f32; 3]>]) -> Aabb {
 /// Loads all frames of the animation that `spec` names: an `.anim` file or a generator of one (`gen:twist:20000:24`).
 ///
 /// # Errors
-/// As [`load`](super::load), and [`Error::Scene`] if the scene is no animation.
+/// As [`load`](super::load), and [`Error::Scene`] if the scene is not an animation.
 pub fn load_animation(spec: &str, options: &LoadOptions<'_>) -> Result<Animation> {
     load_moving(spec, options)?
         .ok_or_else(|| Error::Scene(format!("{spec}: not an animation; take an .anim file or gen:twist:N:FRAMES")))

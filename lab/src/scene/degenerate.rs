@@ -173,7 +173,7 @@ mod tests {
             let few = ["empty", "one", "two"].contains(&scene.name);
             assert!(few && count <= 2 || (600..=700).contains(&count), "{}: {count}", scene.name);
         }
-        // Whoever asks for nothing gets nothing that breaks.
+        // Nothing asked for is nothing broken.
         assert!(degenerate(0).iter().all(|scene| scene.mesh.triangles.len() <= 101));
     }
 

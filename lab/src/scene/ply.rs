@@ -84,7 +84,7 @@ impl File<'_> {
         let first = text.lines().next().unwrap_or_default();
         let first = first.strip_prefix("Line ").and_then(|rest| rest.split_once(": ")).map_or(first, |(_, what)| what);
         let what = match (field("String: '"), field("Error: ")) {
-            // What the grammar expected instead is no help to people.
+            // What the grammar expected instead does not help people.
             (Some(row), Some(why)) if why.contains("expected one of") => {
                 format!("{:?} cannot be read, numbers must be finite", row.trim_end_matches('\''))
             }

@@ -13,11 +13,13 @@ pub const DEFAULT_RAYS: f64 = 1e7;
 /// The value of the option `rays`: a number of rays a build.
 ///
 /// # Errors
-/// [`Error::Argument`] if it is no number from 0 on.
+/// [`Error::Argument`] if it is not a number from 0 on.
 pub fn rays_of(option: Option<&str>) -> Result<f64> {
     let Some(text) = option else { return Ok(DEFAULT_RAYS) };
     let rays = text.parse().ok().filter(|rays: &f64| *rays >= 0.0 && rays.is_finite());
-    rays.ok_or_else(|| Error::Argument(format!("auto:rays={text} is no number of rays a build; write auto:rays=1e6")))
+    rays.ok_or_else(|| {
+        Error::Argument(format!("auto:rays={text} is not a number of rays per build; write auto:rays=1e6"))
+    })
 }
 
 /// The builder that is chosen for `mesh` and `rays` rays a build, under the name `builder`. The table of costs of `device` tells

@@ -71,7 +71,7 @@ pub fn memory_record(structure: u64, scratch: u64) -> record::MemoryRecord {
     }
 }
 
-/// Whether the device has as much memory as `builder` needs for so many triangles.
+/// Whether the device has the memory that `builder` needs for this many triangles.
 ///
 /// # Errors
 /// [`Error::OutOfMemory`] says how much is needed, and how much there is.

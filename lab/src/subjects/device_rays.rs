@@ -12,7 +12,7 @@ pub struct RayBuffers<'a> {
     pub count: u32,
     /// The rays.
     pub rays: Buffer<'a>,
-    /// One hit a ray, of whoever traced last.
+    /// One hit a ray, of the last trace.
     pub hits: Buffer<'a>,
 }
 
@@ -28,7 +28,7 @@ impl<'a> RayBuffers<'a> {
         Ok(RayBuffers { count, rays: device.upload("rays", rays)?, hits })
     }
 
-    /// The hits of whoever traced last.
+    /// The hits of the last trace.
     pub fn read_hits(&self) -> Vec<Hit> {
         self.hits.read(self.count as usize)
     }

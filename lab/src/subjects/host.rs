@@ -32,7 +32,7 @@ pub enum HostMethod {
 pub struct HostBvhOptions {
     /// How the tree is made.
     pub hierarchy: HostMethod,
-    /// The codes; `None` takes those that the device would take for so many triangles.
+    /// The codes; `None` takes those that the device would take for this many triangles.
     pub codes: Option<Codes>,
     /// Reinsertion behind it.
     pub reinsertion: Option<ReinsertionOptions>,

@@ -147,7 +147,7 @@ pub trait Subject {
             None => Ok(self.tree()?.map(|tree| tree.to_bytes())),
         }
     }
-    /// Walks whatever of the build has a layout of ours.
+    /// Walks the parts of the build that have our layout.
     ///
     /// # Errors
     /// [`hedgerow::Error::InvalidStructure`] says what is wrong; the device failed.

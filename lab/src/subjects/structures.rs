@@ -26,7 +26,7 @@ pub type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
 /// Bytes that a structure and its builds need.
 pub type Sizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
 
-/// Who builds.
+/// The functions that build.
 #[derive(Clone)]
 enum Functions<'a> {
     Ours(accel::Device<'a>),
@@ -66,7 +66,7 @@ impl<'a> Structures<'a> {
         }
     }
 
-    /// Bytes that a build of so many primitives a geometry needs.
+    /// Bytes that a build of this many primitives a geometry needs.
     pub(crate) fn sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> Result<Sizes> {
         let mut sizes = Sizes::default();
         let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
@@ -185,7 +185,7 @@ impl<'a> Structures<'a> {
     /// What each of the rays meets on its way, of our structures: nodes of the top level, instances, nodes below, triangles.
     pub(crate) fn work(&self, top: Structure, buffers: &RayBuffers<'_>, query: Query) -> Result<Vec<[u32; 4]>> {
         if let Functions::Driver(_) = self.maker {
-            return Err(Error::Argument("the driver does not tell the work of its queries".into()));
+            return Err(Error::Argument("the driver does not report the work of its queries".into()));
         }
         let works = self.device.buffer("work", 16 * u64::from(buffers.count))?;
         let traced = buffers.buffers(self.address(top), Some(works.region()));

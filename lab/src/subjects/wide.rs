@@ -76,7 +76,7 @@ impl<'a> WideTree<'a> {
     /// Its quality: c_t is the cost of a step, whatever the width ([`quality::on_host`]).
     ///
     /// # Errors
-    /// The bytes are no such structure.
+    /// The bytes are not such a structure.
     pub fn quality(&self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
         let quality = match self.tracer.form {
             Form::Four => quality::on_host(&self.tree::<[Child; 4]>()?, c_t, c_i),

@@ -254,7 +254,7 @@ fn wrong_arguments_end_with_2_and_say_what_is_right() {
         (&["build", "gen:grid:2"][..], "--builder"),
         (&["build", "gen:grid:2", "-b", "lvbh"], "unknown builder \"lvbh\"; use one of"),
         (&["build", "gen:grid:2", "-b", "lbvh-host:radius=2"], "has no option \"radius\""),
-        (&["build", "gen:cube:2", "-b", "lbvh-host"], "there is no such generator; there are gen:icosphere:N"),
+        (&["build", "gen:cube:2", "-b", "lbvh-host"], "unknown generator; use one of gen:icosphere:N"),
         (&["build", "gen:grid:2", "-b", "lbvh-host", "--runs", "0"], "--runs"),
         (&["build", "gen:grid:2", "-b", "lbvh-host", "--costs", "3"], "write C_T,C_I"),
         (
@@ -308,7 +308,7 @@ fn scenes_are_found_by_name_in_the_folder_that_is_given() {
 fn a_device_a_driver_file_and_a_tuning_that_do_not_exist_are_named() {
     for (variable, value, message) in [
         ("HEDGEROW_DEVICE", "nonsense", "unknown device \"nonsense\"; there are: 0: "),
-        ("HEDGEROW_TUNING", "nonsense", "there is no tuning \"nonsense\"; take auto, cpu or gpu"),
+        ("HEDGEROW_TUNING", "nonsense", "unknown tuning \"nonsense\"; use one of auto, cpu, gpu"),
         ("VK_DRIVER_FILES", "/nonexistent/icd.json", "VK_DRIVER_FILES names /nonexistent/icd.json, which is not there"),
     ] {
         let output = Command::new(env!("CARGO_BIN_EXE_hedgerow"))

@@ -172,7 +172,7 @@ fn updates_that_were_not_measured_are_told_as_such() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let entries: Vec<AccelEntry> = [setting()].into_iter().chain(updates(None)).collect();
     let text = crate::pages::text(&page_of(folder.path(), &entries), "");
-    assert!(text.contains("updates of ours were not measured") && !text.contains("NaN"), "{text}");
+    assert!(text.contains("our updates were not measured") && !text.contains("NaN"), "{text}");
     assert!(folder.path().join("charts/accel-update-gen-twist-20000-8.svg").is_file());
 }
 

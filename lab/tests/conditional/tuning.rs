@@ -123,7 +123,7 @@ fn ten_real_scenes_have_the_same_bytes_by_either_tuning() {
 
 fn a_tuning_that_is_not_there_is_named_with_those_that_are() {
     let error = "fast".parse::<TuningChoice>().expect_err("there is none");
-    assert_eq!(error, "there is no tuning \"fast\"; take auto, cpu or gpu");
+    assert_eq!(error, "unknown tuning \"fast\"; use one of auto, cpu, gpu");
     for choice in [TuningChoice::Auto, TuningChoice::Cpu, TuningChoice::Gpu] {
         assert_eq!(choice.to_string().parse(), Ok(choice));
     }

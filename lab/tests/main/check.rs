@@ -71,7 +71,7 @@ fn groups_run_where_a_loader_was_given_the_program() {
 fn what_is_not_there_is_named() {
     let done = check(&["--groups", "lbvh,nonsense"], "");
     assert_eq!(done.status.code(), Some(2));
-    assert!(err(&done).contains("there is no group \"nonsense\"") && err(&done).contains("kd-merge"), "{}", err(&done));
+    assert!(err(&done).contains("unknown group \"nonsense\"") && err(&done).contains("kd-merge"), "{}", err(&done));
     let done = check(&["--device", "no such device"], "");
     assert_eq!(done.status.code(), Some(1));
     assert!(err(&done).contains("unknown device \"no such device\""), "{}", err(&done));

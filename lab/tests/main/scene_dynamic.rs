@@ -244,7 +244,7 @@ fn wrong_lines_are_told_with_their_number() {
         ("at -1 scale 2", ":4: a key begins with its time"),
         ("at nan scale 2", ":4: a key begins with its time"),
         ("at 1", ":4: a key that says nothing"),
-        ("at 1 eye 0 0 0", ":4: \"eye\" is no part of this key; those are move X Y Z, turn"),
+        ("at 1 eye 0 0 0", ":4: \"eye\" is not part of this key; use move X Y Z, turn"),
         ("at 1 scale 2 scale 2", ":4: scale stands twice in one key"),
         ("at 1 scale 2 2", ":4: scale has 2 finite numbers; write scale S or scale X Y Z"),
         ("at 1 move 1 2 inf", ":4: move has 2 finite numbers before \"inf\"; write move X Y Z"),
@@ -252,7 +252,7 @@ fn wrong_lines_are_told_with_their_number() {
         ("at 1 turn 0 1 0 9 quaternion 0 0 0 1", ":4: turn and quaternion are both the rotation"),
         ("at 1 turn 0 0 0 9", ":4: a turn about (0, 0, 0)"),
         ("at 1 turn 0 1 0 1e9", ":4: a turn of 1000000000 degrees, there may be 36000"),
-        ("at 1 quaternion 0 0 0 0", ":4: the quaternion (0, 0, 0, 0) is no rotation"),
+        ("at 1 quaternion 0 0 0 0", ":4: the quaternion (0, 0, 0, 0) is not a rotation"),
         ("at 1 scale 0", ":4: a scale of 0 leaves nothing"),
         ("at 1 scale 2\n\nat 1 scale 3", ":6: 1 s is not behind the 1 s of line 4"),
         ("at 3 scale 2", ":4: a key at 3 s, the scene begins again after 2"),
@@ -283,7 +283,7 @@ fn a_scene_that_cannot_be_loaded_is_told_with_the_line_that_names_it() {
     let message = with("static sponza");
     assert!(message.starts_with(":3: there is no scene \"sponza\", neither as a file nor in "), "{message}");
     assert!(message.ends_with("name a file, or a folder with --scenes-dir"), "{message}");
-    assert!(with("object t gen:cube:3").starts_with(":3: gen:cube:3: there is no such generator"));
+    assert!(with("object t gen:cube:3").starts_with(":3: gen:cube:3: unknown generator"));
     assert!(with("object t ./none.obj").starts_with(":3: ./none.obj: no such file"));
     assert!(with("object t scene.dyn").contains("scene.dyn is a .dyn file itself, these are not nested"));
     let folder = Folder::new();

@@ -1,13 +1,14 @@
 //! Algorithm 11: a dynamic tree is pushed down the planes of the static tree, to the leaves that parts of it are in.
 //!
-//! What is outside of the static tree's cell, of which the thesis says nothing, is cut off at its faces first: were the cell larger,
-//! rays beside it would walk through the static tree's planes.
+//! What is outside of the static tree's cell, of which the thesis says nothing, is cut off at its faces first: were the cell
+//! larger, rays beside it would walk through the static tree's planes.
 
 use super::tree::{At, Forest, Records};
 use hedgerow::geometry::Aabb;
 use hedgerow::kdtree::layout::{KdContent, KdNode, halves};
 
-/// A leaf of the static tree, or beside it. Those without a node come first, parents before children: in this order they are merged.
+/// A leaf of the static tree, or beside it. Those without a node come first, parents before children: in this order they are
+/// merged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum TargetLeaf {
     /// The only leaf of a tree that holds nothing.

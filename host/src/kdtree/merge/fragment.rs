@@ -4,8 +4,8 @@ use super::tree::At;
 use hedgerow::kdtree::layout::{Inner, KdContent, KdNode};
 use hedgerow::kdtree::twin::Subtree;
 
-/// A tree in the layout of a structure, but for where its nodes and references begin, and for its references: they name triangles as
-/// the trees that were merged do.
+/// A tree in the layout of a structure, but for where its nodes and references begin, and for its references: they name
+/// triangles as the trees that were merged do.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Fragment {
     /// `None` of an empty one.

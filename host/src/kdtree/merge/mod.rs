@@ -1,5 +1,6 @@
-//! Merging: the trees of objects that move are merged into the tree of what stands still, and taken out again (Papay 2025, chapter 10,
-//! algorithms 9 to 12, after Eleftheriades 2010, "Accelerating ray tracing for dynamic scenes using kd-tree merging").
+//! Merging: the trees of objects that move are merged into the tree of what stands still, and taken out again (Papay 2025,
+//! chapter 10, algorithms 9 to 12, after Eleftheriades 2010, "Accelerating ray tracing for dynamic scenes using kd-tree
+//! merging").
 //!
 //! 1. `descent`: an object's tree is pushed down the planes of the static tree (algorithm 11) by cutting it in two along each
 //!    (algorithm 9, `tree`);
@@ -30,9 +31,10 @@ use tree::Forest;
 
 /// A static tree, and the objects that are in it.
 ///
-/// What is merged depends on the static tree and on which objects are in it, not on the order in which they came. An object's primitives are
-/// numbered from where the caller says, so that hits tell whose they are. Objects may be outside of the static tree's cell;
-/// a tree that is deeper than tracers can walk has leaves there, and the status says so ([`hedgerow::bvh::layout::status::DEPTH_LIMITED`]).
+/// What is merged depends on the static tree and on which objects are in it, not on the order in which they came. An object's
+/// primitives are numbered from where the caller says, so that hits tell whose they are. Objects may be outside of the static
+/// tree's cell; a tree that is deeper than tracers can walk has leaves there, and the status says so
+/// ([`hedgerow::bvh::layout::status::DEPTH_LIMITED`]).
 ///
 /// ```
 /// use hedgerow_host::kdtree::{HostKdOptions, build, merge::Merged};
@@ -59,7 +61,8 @@ pub struct Merged {
     objects: Vec<MarkedObject>,
     /// The static leaves that objects have parts in: the associations of algorithm 11.
     marked: BTreeMap<TargetLeaf, Marked>,
-    /// What the trees of marked leaves were last made for: the root's cell, and the faces of the static one that objects are beyond.
+    /// What the trees of marked leaves were last made for: the root's cell, and the faces of the static one that objects are
+    /// beyond.
     around: (Aabb, Vec<u8>),
     /// What the static tree's nodes were where others are in their place.
     kept: Vec<(u32, KdNode)>,
@@ -68,8 +71,8 @@ pub struct Merged {
 }
 
 impl Merged {
-    /// The static tree alone. It must be valid, and have room for what is to be merged into it ([`KdTree::with_room`]). `costs` are those
-    /// by which planes are chosen where there are several trees.
+    /// The static tree alone. It must be valid, and have room for what is to be merged into it ([`KdTree::with_room`]). `costs`
+    /// are those by which planes are chosen where there are several trees.
     pub fn new(tree: KdTree, costs: Costs) -> Merged {
         Merged {
             still: tree.header,
@@ -86,7 +89,8 @@ impl Merged {
     /// Inserts an object by its tree, which must be valid. Its primitives are numbered from `first_primitive` on.
     ///
     /// # Errors
-    /// [`Error::Argument`] if an object has this name, or some of these primitives are those of the static tree or of another object.
+    /// [`Error::Argument`] if an object has this name, or some of these primitives are those of the static tree or of another
+    /// object.
     pub fn insert(&mut self, name: &str, first_primitive: u32, object: KdTree) -> Result<()> {
         let primitives = self.check(name, first_primitive, object.header.primitive_count)?;
         self.unmerge();
@@ -145,12 +149,12 @@ impl Merged {
         &self.tree
     }
 
-    /// The static tree with all objects merged into it. Made anew is what has changed since the last call.
+    /// The static tree with all objects merged into it. Only what has changed since the last call is made again.
     ///
     /// # Errors
-    /// [`Error::Argument`] if there is no room for it, and says how much is needed; or if the static tree cannot have planes around it for
-    /// objects beside it, as it would be too deep (no builder's is). The objects stay inserted; some of them taken out, there may be
-    /// room for the others.
+    /// [`Error::Argument`] if there is no room for it, and says how much is needed; or if the static tree cannot have planes
+    /// around it for objects beside it, as it would be too deep (no builder's is). The objects stay inserted; some of them
+    /// taken out, there may be room for the others.
     pub fn tree(&mut self) -> Result<&KdTree> {
         if !self.is_merged {
             self.merge()?;

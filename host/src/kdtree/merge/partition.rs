@@ -4,10 +4,11 @@
 //! has trees on both sides, or where cutting off empty space pays. Where there is none, the trees are through each other, and the
 //! planes of their roots are looked at: the tree of the plane falls into its children, and the others are cut.
 //!
-//! Deviations. The thesis removes the roots of all trees and takes one of their planes; here the other trees keep theirs, as in its
-//! `MergeBSPTrees`. Where all trees are leaves, it looks for clean planes before it makes a tree of them; here that tree is
-//! the exact builder's, which looks at those planes too, and so it is where there are few references in all. Which clean plane is best, how `IsTightlyBounding` tells and what
-//! `MakeTreeFromLeaves` does is not in the text that is left of it: here the surface area heuristic says all three.
+//! Deviations. The thesis removes the roots of all trees and takes one of their planes; here the other trees keep theirs, as in
+//! its `MergeBSPTrees`. Where all trees are leaves, it looks for clean planes before it makes a tree of them; here that tree is
+//! the exact builder's, which looks at those planes too, and so it is where there are few references in all. Which clean plane
+//! is best, how `IsTightlyBounding` tells and what `MakeTreeFromLeaves` does is not in the text that is left of it: here the
+//! surface area heuristic says all three.
 
 use super::fragment::Fragment;
 use super::tree::{At, Branch, Forest, Records, Tree, TreeContent};
@@ -95,8 +96,8 @@ impl Partition<'_> {
         self.made.inner(at, [left, right])
     }
 
-    /// `FindBestPlane`, of those that cut no tree. Unlike a builder, who knows only how many references there are, this one knows what
-    /// the trees are worth.
+    /// `FindBestPlane`, of those that cut no tree. Unlike a builder, who knows only how many references there are, this one
+    /// knows what the trees are worth.
     fn best_clean_plane(&self, parts: &[SourcePart], cell: &Aabb) -> Option<At> {
         let mut best: Option<(f32, At)> = None;
         for axis in 0..3 {
@@ -214,8 +215,8 @@ impl Partition<'_> {
 /// A triangle's name, its box and itself.
 type Gathered = (u32, Aabb, Triangle);
 
-/// The references on the left and on the right of a plane, as far as can be told without cutting: those of a tree that it cuts go with
-/// the extents.
+/// The references on the left and on the right of a plane, as far as can be told without cutting: those of a tree that it cuts
+/// go with the extents.
 fn counts(parts: &[SourcePart], at: At) -> [u32; 2] {
     let (axis, plane) = at;
     parts.iter().fold([0; 2], |[left, right], SourcePart { tree, .. }| {

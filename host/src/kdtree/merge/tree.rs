@@ -1,7 +1,7 @@
 //! Trees that are taken apart, and algorithm 9: a tree in two along a plane.
 //!
-//! A forest only grows. Of a tree in two, just the nodes that the plane goes through are new, and the whole is still there; all go at
-//! once, with the forest.
+//! A forest only grows. Of a tree in two, just the nodes that the plane goes through are new, and the whole is still there; all
+//! go at once, with the forest.
 
 use hedgerow::bvh::layout::Triangle;
 use hedgerow::geometry::Aabb;
@@ -120,8 +120,8 @@ impl<'a> Forest<'a> {
         self.first + self.trees.len() as u32 - 1
     }
 
-    /// A structure as a tree that can be taken apart. Triangles that straddle the planes of the structure are not clipped, but their
-    /// boxes are: they will be, where they are cut.
+    /// A structure as a tree that can be taken apart. Triangles that straddle the planes of the structure are not clipped, but
+    /// their boxes are: they will be, where they are cut.
     pub fn of(tree: &KdTree, step: f32) -> (Forest<'a>, Branch) {
         let mut forest = Forest::new(step);
         forest.trees.reserve(tree.nodes.len());
@@ -162,8 +162,8 @@ impl<'a> Forest<'a> {
         (forest, leaf)
     }
 
-    /// Algorithm 9, `PartitionTreeWithPlane` (Eleftheriades 2010): what of a tree is on the left of a plane and what on its right. What
-    /// lies in the plane is on the left.
+    /// Algorithm 9, `PartitionTreeWithPlane` (Eleftheriades 2010): what of a tree is on the left of a plane and what on its
+    /// right. What lies in the plane is on the left.
     pub fn partition_tree_with_plane(&mut self, tree: u32, records: Records<'_>, (axis, at): At) -> [Branch; 2] {
         let Tree { bounds, content, .. } = self.tree(tree);
         if bounds.hi[axis] <= at {
@@ -195,8 +195,8 @@ impl<'a> Forest<'a> {
         }
     }
 
-    /// The thesis' `PartitionPrimitives`: each box is cut where the plane goes through it, and the triangle clipped anew. What of a
-    /// triangle is in its cell is in its box, so that the box does for the cell.
+    /// The thesis' `PartitionPrimitives`: each box is cut where the plane goes through it, and the triangle clipped again. What
+    /// of a triangle is in its cell is in its box, so that the box does for the cell.
     fn partition_primitives(&mut self, leaf: u32, records: Records<'_>, (axis, at): At) -> [Branch; 2] {
         let plane = KdPlane { axis, at, planar_left: true };
         let mut parts = [Vec::new(), Vec::new()];

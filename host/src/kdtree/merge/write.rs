@@ -1,9 +1,9 @@
 //! `SwapLeaf` of algorithm 12, and back: trees are written in the place of static leaves, and what they overwrite is kept.
 //!
-//! All that is new stands behind the static nodes, references and records. A leaf that has a node has its tree's root there. An empty
-//! leaf has none: its parent gets a new pair of children, to which the one that it had is moved, and the nodes below that stay. Each node
-//! What is beside the static tree is parted from it by planes above its root, which moves as well. Each node
-//! of the static tree is overwritten at most once, so that writing the kept ones back, in any order, restores it.
+//! All that is new stands behind the static nodes, references and records. A leaf that has a node has its tree's root there. An
+//! empty leaf has none: its parent gets a new pair of children, to which the one that it had is moved, and the nodes below that
+//! stay. Each node What is beside the static tree is parted from it by planes above its root, which moves as well. Each node of
+//! the static tree is overwritten at most once, so that writing the kept ones back, in any order, restores it.
 
 use super::descent::{TargetLeaf, face};
 use super::fragment::{Fragment, moved};

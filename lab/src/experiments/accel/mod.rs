@@ -2,7 +2,7 @@
 //! `VK_KHR_acceleration_structure`, ours and the driver's by the same.
 //!
 //! [`batch`]: many small structures at once; [`top_level`]: how top levels grow with their instances; [`rebraid`]: rays through
-//! top levels that are re-braided or not; [`update`]: refitting against building anew over an animation. Each gives
+//! top levels that are re-braided or not; [`update`]: refitting against building again over an animation. Each gives
 //! [`points`] as it goes.
 
 pub mod batch;
@@ -54,7 +54,7 @@ pub struct AccelSetup<'a> {
     pub kinds: &'a [RayKind],
     /// Their number and seed.
     pub rays: RayOptions,
-    /// Is told what is being done, for a progress bar.
+    /// Is called with what is being done, for a progress bar.
     pub say: &'a dyn Fn(&str),
 }
 

@@ -12,7 +12,7 @@ pub enum AccelEntry {
     Setting(Setting),
     /// Many small structures, built in one way.
     Batch(Batch),
-    /// A top level over so many instances.
+    /// A top level over this many instances.
     Tlas(TopLevel),
     /// A scene of instances, re-braided and not.
     Rebraid(RebraidPoint),
@@ -44,7 +44,7 @@ pub enum Submission {
     OneSubmit,
     /// A call each, submitted and waited for by itself.
     SubmitEach,
-    /// As many submits with nothing in them: what of [`Submission::SubmitEach`] is no building.
+    /// As many submits with nothing in them: what of [`Submission::SubmitEach`] is not building.
     EmptySubmits,
 }
 
@@ -121,7 +121,7 @@ pub struct TopLevelPoint {
     pub structure_bytes: u64,
     /// What its build needs beside it.
     pub scratch_bytes: u64,
-    /// What its leaves hold: instances, those that were opened as their parts; `None` where the maker does not tell.
+    /// What its leaves hold: instances, those that were opened as their parts; `None` if the implementation does not report it.
     pub entries: Option<u32>,
 }
 
@@ -173,7 +173,7 @@ impl MeanWork {
     }
 }
 
-/// A frame of an animation, with the structure of the first frame updated, and built anew.
+/// A frame of an animation, with the structure of the first frame updated, and built again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Update {
     /// Scene name.
@@ -184,15 +184,15 @@ pub struct Update {
     pub frame: u32,
     /// Whose.
     pub maker: Implementation,
-    /// Building anew, by the device's timestamps.
+    /// Building again, by the device's timestamps.
     pub build_ms: Spread,
     /// Updating in place.
     pub update_ms: Option<Spread>,
-    /// How many times the SAH cost of the updated structure is what it was when built, as the structure itself tells.
+    /// How many times the SAH cost of the updated structure is what it was when built, as the structure itself reports.
     pub growth: Option<f64>,
     /// SAH cost of the updated structure.
     pub updated_sah: Option<f64>,
-    /// SAH cost of that which was built anew.
+    /// SAH cost of that which was built again.
     pub built_sah: Option<f64>,
     /// One entry a kind of ray.
     pub rays: Vec<UpdatedRays>,
@@ -205,7 +205,7 @@ pub struct UpdatedRays {
     pub rays: String,
     /// How many.
     pub count: u64,
-    /// Through the structure that was built anew, by the device's timestamps.
+    /// Through the structure that was built again, by the device's timestamps.
     pub built_ms: Spread,
     /// Through the updated one.
     pub updated_ms: Option<Spread>,
@@ -214,13 +214,13 @@ pub struct UpdatedRays {
 }
 
 impl Update {
-    /// Time of all rays through the updated structure over that through the one built anew.
+    /// Time of all rays through the updated structure over that through the one built again.
     pub fn slowdown(&self) -> Option<f64> {
         let [updated, built] = self.tracing()?;
         Some(updated / built)
     }
 
-    /// From how many rays a frame on, in the mix that was traced, building anew takes less time than updating: what a build
+    /// From how many rays a frame on, in the mix that was traced, building again takes less time than updating: what a build
     /// takes longer, over what a ray does. `None` if never, or if it was not measured.
     pub fn pays_from(&self) -> Option<f64> {
         let rays: f64 = self.rays.iter().map(|rays| rays.count as f64).sum();

@@ -95,7 +95,7 @@ fn traced(
     })
 }
 
-/// How many other instances' boxes each one's overlaps, in the mean over at most so many; boxes are around the placed vertices.
+/// How many other instances' boxes each one's overlaps, in the mean over at most this many; boxes are around the placed vertices.
 fn overlaps(scene: &Instances) -> f64 {
     const SAMPLE: usize = 256;
     let around = |instance: &SceneInstance| {

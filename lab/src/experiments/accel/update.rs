@@ -1,4 +1,4 @@
-//! Updating against building anew, over an animation: time, growth of the SAH cost, and what rays lose.
+//! Updating against building again, over an animation: time, growth of the SAH cost, and what rays lose.
 
 use super::points::{self, AccelEntry, UpdatedRays};
 use super::{AccelSetup, WARM_UPS, apart, where_possible};
@@ -33,7 +33,7 @@ impl<'a> Deforming<'a> {
     }
 }
 
-/// What one maker has: a structure of the first frame that is updated, and one that is built anew each frame.
+/// What one maker has: a structure of the first frame that is updated, and one that is built again each frame.
 struct Pair<'a> {
     structures: Structures<'a>,
     timestamps: Timestamps,
@@ -61,7 +61,7 @@ impl<'a> Pair<'a> {
         Ok((built.bottom.build(structures, timestamps, Mode::BUILD)?, update))
     }
 
-    /// Traces rays through both; milliseconds through the one built anew, and through the updated one.
+    /// Traces rays through both; milliseconds through the one built again, and through the updated one.
     fn trace(&mut self, rays: &RayBuffers<'_>, query: Query) -> Result<(f64, Option<f64>)> {
         let Pair { structures, timestamps, updated, built, updates } = self;
         let mut trace = |top: &Level<'_>| structures.trace(timestamps, top.structure(), rays, query);

@@ -32,14 +32,14 @@ pub struct Arguments {
         default_value = "rebuild,two-trees,tree-per-object,two-level,merge"
     )]
     ways: Vec<AnimationMethod>,
-    /// Who builds kd-trees every frame, with options: kd-gpu on the device, kd-binned and others on the host, which then traces them,
-    /// too, unless :trace=device follows
+    /// Builder of the kd-trees of every frame, with options: kd-gpu on the device, kd-binned and others on the host, which then
+    /// traces them, too, unless :trace=device follows
     #[arg(short, long, value_name = "BUILDER", default_value = "kd-gpu")]
     builder: Spec,
-    /// Who builds the kd-tree of what stands still, once, on the host
+    /// Builder of the kd-tree of what stands still: runs once, on the host
     #[arg(long, value_name = "BUILDER", default_value = "kd-exact")]
     static_builder: Spec,
-    /// Which frames: so many, spread evenly over all, or those from A to before B
+    /// Which frames: a number, spread evenly over all, or A..B, those from A to before B
     #[arg(long, value_name = "N|A..B", default_value = "12")]
     frames: Frames,
     /// Kinds of rays, separated by commas, or all

@@ -1,9 +1,9 @@
-//! A dynamic scene frame by frame, in each of five ways to have something to trace when some of it moves (Papay 2025, chapter 10 and
-//! section 11.3.2): what each frame's build takes, what its rays take then, and whether all find the same.
+//! A dynamic scene frame by frame, in each of five ways to have something to trace when some of it moves (Papay 2025, chapter
+//! 10 and section 11.3.2): what each frame's build takes, what its rays take then, and whether all find the same.
 //!
-//! A [`Subject`] is one of the [`AnimationMethod`]s on a scene. What a way needs once (the tree of what stands still) is made before the clock
-//! runs, and so is what all need alike: vertices are placed and uploaded. Under the clock is what is done a frame to have something
-//! that can be traced, and the tracing.
+//! A [`Subject`] is one of the [`AnimationMethod`]s on a scene. What a way needs once (the tree of what stands still) is made
+//! before the clock runs, and so is what all need alike: vertices are placed and uploaded. Under the clock is what is done a
+//! frame to have something that can be traced, and the tracing.
 
 pub(crate) mod command;
 mod merge_on_device;
@@ -36,13 +36,14 @@ use two_level::TwoLevel;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AnimationMethod {
-    /// One kd-tree over all triangles, built anew.
+    /// One kd-tree over all triangles, built again.
     Rebuild,
     /// The static tree, and one over all that moves; a ray goes through both.
     TwoTrees,
     /// The static tree, and one of each object; a ray goes through all.
     TreePerObject,
-    /// A top level over bottom levels ([`hedgerow::accel`]): rigid objects are moved by their instances, those that morph built anew.
+    /// A top level over bottom levels ([`hedgerow::accel`]): rigid objects are moved by their instances, those that morph built
+    /// again.
     TwoLevel,
     /// The static tree, which the objects' trees are merged into and taken out of.
     Merge,
@@ -63,7 +64,7 @@ pub struct AnimateSetup<'a> {
     pub device: Option<&'a Device>,
     /// The ways, each at most once.
     pub ways: &'a [AnimationMethod],
-    /// Who builds the kd-trees of every frame.
+    /// The builder of the kd-trees of every frame.
     pub builder: &'a Spec,
     /// How that of what stands still is built, once, on the host.
     pub static_options: HostKdOptions,
@@ -77,7 +78,7 @@ pub struct AnimateSetup<'a> {
     pub costs: [f64; 2],
     /// Aims the camera where the user wants it.
     pub aim: &'a dyn Fn(&mut Camera),
-    /// Is told what is being done, for a progress bar.
+    /// Is called with what is being done, for a progress bar.
     pub say: &'a dyn Fn(&str),
 }
 

@@ -29,7 +29,7 @@ pub struct SceneSetting {
     pub static_triangles: u64,
     /// What moves.
     pub objects: Vec<Object>,
-    /// Who built the tree of what stands still, once.
+    /// The builder of the tree of what stands still.
     pub static_builder: String,
     /// Pictures of frames, in files beside the records: the frame and the file.
     pub pictures: Vec<(u32, String)>,
@@ -57,7 +57,7 @@ pub struct Animated {
     pub time: f32,
     /// The way.
     pub way: AnimationMethod,
-    /// Who built what is built a frame; `accel` of two levels.
+    /// The builder of what is built each frame; `accel` for two levels.
     pub builder: String,
     /// What the builds were timed by: `device` (timestamps) or `wall`.
     pub timer: String,

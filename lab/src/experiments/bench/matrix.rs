@@ -98,7 +98,7 @@ struct Entry<'a> {
     failure: Option<Error>,
 }
 
-/// Measures every builder of `plan` on `scene`. `say` is told what is being done, for a progress bar.
+/// Measures every builder of `plan` on `scene`. `say` is called with what is being done, for a progress bar.
 pub fn measure(
     scene: &Scene,
     device: Option<&Device>,

@@ -85,7 +85,7 @@ fn assert_candidates(what: &str, report: &ProbeReport, meetings: &[Met]) {
     assert_eq!(got, expected, "{what}: candidates");
 }
 
-/// What is told of the instance that was hit.
+/// What is known of the instance that was hit.
 #[track_caller]
 fn assert_instance(what: &str, world: &World, ray: &ProbeRay, report: &ProbeReport) {
     let got = &report.committed;

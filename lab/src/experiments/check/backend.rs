@@ -1,4 +1,4 @@
-//! Who builds and traces structures by the calls of `VK_KHR_acceleration_structure`, behind one trait: ours here, the driver's in
+//! Building and tracing structures by the calls of `VK_KHR_acceleration_structure`, behind one trait: ours here, the driver's in
 //! the tests, so that one table of cases runs through both.
 
 use super::probe::{Probe, ProbeRay, ProbeReport};

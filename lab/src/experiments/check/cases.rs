@@ -40,7 +40,7 @@ pub struct Difference {
     pub what: String,
 }
 
-/// What a group says while it runs, to whoever started its process.
+/// What a group says while it runs, to the program that started its process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Message {

@@ -15,7 +15,7 @@ use std::sync::{Mutex, PoisonError, mpsc};
 use std::thread;
 use std::time::Duration;
 
-/// Seconds that a group may take: several times what the longest takes on a slow device that compiles every shader anew.
+/// Seconds that a group may take: several times what the longest takes on a slow device that has to compile every shader.
 const LIMIT: &str = "240";
 
 /// Check every builder, tracer and call on this device against host twins and brute force
@@ -57,7 +57,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         [] => check::groups().collect(),
         names => names.iter().map(|name| group(name)).collect::<crate::Result<_>>()?,
     };
-    // A device that cannot be opened is no matter of groups: the command itself says what is there.
+    // A device that cannot be opened is not the fault of a group: the command itself says what is there.
     let is_cpu = common.open_device(false)?.found().kind == vk::PhysicalDeviceType::CPU;
     let cores = thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let jobs = arguments.jobs.unwrap_or(if is_cpu { cores } else { NonZeroUsize::MIN });
@@ -86,7 +86,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// Does so many items at a time, and tells of each as soon as it and all before it are done.
+/// Does a number of items at a time, and reports each as soon as it and all before it are done.
 fn each_in_order<T: Send, R: Send>(
     items: Vec<T>,
     jobs: NonZeroUsize,
@@ -111,7 +111,7 @@ fn each_in_order<T: Send, R: Send>(
     })
 }
 
-/// Lines are for whoever watches: none waits for the next.
+/// Lines are for people who watch: none waits for the next.
 fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{text}")?;
@@ -121,7 +121,7 @@ fn print(text: &str) -> anyhow::Result<()> {
 fn group(name: &str) -> crate::Result<&'static Group> {
     check::groups().find(|group| group.name == name).ok_or_else(|| {
         let names: Vec<&str> = check::GROUPS.iter().map(|group| group.name).collect();
-        crate::Error::Argument(format!("there is no group {name:?}; take some of {}", names.join(", ")))
+        crate::Error::Argument(format!("unknown group {name:?}; use some of {}", names.join(", ")))
     })
 }
 

@@ -5,7 +5,7 @@ use crate::random::SplitMix64;
 
 pub type Matrix = [[f32; 4]; 3];
 
-/// A rotation about an axis and by an angle that the number tells.
+/// A rotation about an axis and by an angle, both from the number.
 pub fn rotation(number: u64) -> Matrix {
     let mut random = SplitMix64::new(1000 + number);
     let axis = random.around(1.0).map(f64::from);

@@ -79,7 +79,7 @@ impl ReadBack {
     /// Builds a world and reads it.
     ///
     /// # Panics
-    /// What is read is no structure.
+    /// What is read is not a structure.
     pub fn new(backend: &Ours, world: &World) -> ReadBack {
         let BuiltWorld { top, parts, .. } = &world.build(backend);
         let bytes = |built: &Built| built.memory.read::<u8>(built.bytes as usize);

@@ -115,7 +115,7 @@ pub struct CheckRecord {
     pub when: String,
     /// Whether only a part of the cases was tried.
     pub quick: bool,
-    /// The device; `None` if no group got as far as to tell.
+    /// The device; `None` if no group got so far.
     pub ground: Option<Ground>,
     /// Groups that passed.
     pub passed: usize,

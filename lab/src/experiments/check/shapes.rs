@@ -141,7 +141,7 @@ pub fn rays_with(bad: f32) -> Vec<Ray> {
     [ray([0.0; 3], [bad; 3])].into_iter().chain((0..8).map(of_word)).collect()
 }
 
-/// What is no ray, or nearly none.
+/// What is not a ray, or nearly none.
 pub fn no_rays() -> Vec<Ray> {
     [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, 1e38].map(rays_with).concat()
 }

@@ -378,7 +378,7 @@ fn box_met(corners: &[[f32; 3]; 2], line: &Line) -> Option<Met> {
         (enter <= leave).then_some(enter)
     };
     let enter = enter_within(0.0, 0.0);
-    // Limits are inclusive for boxes, and an origin on one's face is no question of rounding.
+    // Limits are inclusive for boxes, and an origin on one's face is exact.
     let sure = enter_within(-error, 0.0).is_some();
     enter_within(error, t_error).map(|possible| Met {
         t: enter.unwrap_or(possible),

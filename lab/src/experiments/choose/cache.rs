@@ -20,7 +20,7 @@ struct Calibration {
     table: CostTable,
 }
 
-/// What the table belongs to: with another key it is measured anew.
+/// What the table belongs to: with another key it is measured again.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Key {
     version: u32,
@@ -48,9 +48,10 @@ impl Key {
     }
 }
 
-/// The table of `device`: from the cache, or measured and kept. With `anew`, measured in any case. `say` is told what is being done.
+/// The table of `device`: from the cache, or measured and kept. With `anew`, measured in any case. `say` is called with what is
+/// being done.
 ///
-/// A folder that cannot be written is no error: a warning says so, and the next program measures again.
+/// A folder that cannot be written is not an error: a warning says so, and the next program measures again.
 ///
 /// # Errors
 /// The device can build no candidate.
@@ -94,7 +95,7 @@ fn read(folder: &Path, key: &Key) -> Option<CostTable> {
     (calibration.key == *key).then_some(calibration.table)
 }
 
-/// Written aside and moved: whoever reads meanwhile sees the old file or the new one.
+/// Written aside and moved: a program that reads meanwhile sees the old file or the new one.
 fn write(folder: &Path, calibration: &Calibration) -> Result<()> {
     let path = folder.join(calibration.key.file());
     std::fs::create_dir_all(folder).map_err(Error::file(folder))?;

@@ -16,9 +16,9 @@ use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Query, Ray, Work};
 use rayon::prelude::*;
 
-/// The scenes of each row of the table: of about the same size, and lying differently in their bounds (closed objects, sheets, soups,
-/// long thin triangles, a few large ones around many small ones, towns, plants). The last rows are of crowded scenes: an object in a
-/// huge arena.
+/// The scenes of each row of the table: of about the same size, and lying differently in their bounds (closed objects, sheets,
+/// soups, long thin triangles, a few large ones around many small ones, towns, plants). The last rows are of crowded scenes: an
+/// object in a huge arena.
 const ROWS: [&[&str]; 6] = [
     &["gen:icosphere:3", "gen:needles:1500:1"],
     &["gen:soup:3000:1", "gen:grid:60", "gen:clutter:24:1"],
@@ -39,8 +39,8 @@ const ROWS: [&[&str]; 6] = [
 /// How much the calibration measures.
 const EFFORT: Effort = Effort { rays: RayOptions { size: [128, 96], seed: 1 }, runs: 5, enough_ms: 50.0 };
 
-/// Measures the candidates that `device` can build on generated scenes. `say` is told what is being done. A candidate that fails on a
-/// scene is not in the scene's row.
+/// Measures the candidates that `device` can build on generated scenes. `say` is called with what is being done. A candidate
+/// that fails on a scene is not in the scene's row.
 ///
 /// # Errors
 /// The device can build no candidate.
@@ -81,7 +81,8 @@ pub struct Effort {
     pub rays: RayOptions,
     /// Runs that count, after one that does not.
     pub runs: u32,
-    /// A builder that has built twice, and for so many milliseconds, builds no more: what disturbs so long a time is small beside it.
+    /// A builder that has built twice, and for this many milliseconds, builds no more: what disturbs so long a time is small
+    /// beside it.
     pub enough_ms: f64,
 }
 
@@ -96,8 +97,9 @@ pub struct CandidateRun {
     pub work: f64,
 }
 
-/// The times with those of rays by work: what a node or a triangle takes in the mean over trees of the same layout, times how many a
-/// ray meets. Work is counted and the same on every run. It tells trees apart that are nearer to each other than two runs are.
+/// The times with those of rays by work: what a node or a triangle takes in the mean over trees of the same layout, times how
+/// many a ray meets. Work is counted and the same on every run. It tells trees apart that are nearer to each other than two
+/// runs are.
 fn paced(measured: &[CandidateRun]) -> Vec<Cost> {
     let cost = |m: &CandidateRun| {
         let alike = measured.iter().filter(|other| other.layout == m.layout);

@@ -7,9 +7,10 @@ use crate::subjects::builders::Spec;
 /// For scenes whose codes tell triangles apart: builders with their options, as `-b` takes them, from the fastest build to the best
 /// tree.
 ///
-/// A row more is a candidate more: it is measured with the others the next time, for the cache takes no table of other candidates.
-/// The list is short on purpose. Trees that are traced within 10% of each other cannot be told apart by a calibration, and a builder
-/// that never wins by 10% only adds a chance to be taken by mistake. docs/notes/auto.md has the figures.
+/// A row more is a candidate more: it is measured with the others the next time, for the cache takes no table of other
+/// candidates. The list is short on purpose. Trees that are traced within 10% of each other cannot be told apart by a
+/// calibration, and a builder that never wins by 10% only adds a chance to be taken by mistake. docs/notes/auto.md has the
+/// figures.
 const PLAIN: [&str; 5] = [
     "lbvh",
     "lbvh:width=8q",

@@ -43,7 +43,7 @@ fn mean_crowd(mesh: &Mesh) -> f64 {
 mod tests {
     use super::*;
 
-    /// Tiny triangles, so many at each place along a line.
+    /// Tiny triangles, this many at each place along a line.
     fn mesh(crowds: &[(f32, usize)]) -> Mesh {
         let at = |&(x, count): &(f32, usize)| vec![[[x, 0.0, 0.0], [x + 1e-6, 0.0, 0.0], [x, 1e-6, 0.0]]; count];
         let corners: Vec<[[f32; 3]; 3]> = crowds.iter().flat_map(at).collect();

@@ -8,7 +8,7 @@ pub const RAYS: [f64; 6] = [1e4, 1e5, 1e6, 1e7, 1e8, 1e9];
 /// A choice is good if it takes at most this part more than the best.
 pub const GOOD: f64 = 0.1;
 
-/// What was chosen for a scene and so many rays a build, before it was measured.
+/// What was chosen for a scene and a number of rays per build, before it was measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
     /// The scene.

@@ -1,4 +1,4 @@
-//! The page's section on `auto`: its choices for every scene and so many rays a build, beside the best in hindsight.
+//! The page's section on `auto`: its choices for every scene and a number of rays per build, beside the best in hindsight.
 
 use super::SceneCost;
 use super::hindsight::{self, Choice, GOOD, Pair, RAYS};

@@ -38,7 +38,7 @@ pub struct Comparison {
     pub build_ms: Change,
     /// Trace speed of each kind of ray that both have, in Mrays/s; more is better.
     pub mrays_s: Vec<(String, Change)>,
-    /// SAH cost, where both tell it; less is better. The same tree has the same cost: any difference is real.
+    /// SAH cost, if both have it; less is better. The same tree has the same cost: any difference is real.
     pub sah: Option<Change>,
 }
 

@@ -8,7 +8,7 @@ use std::fmt::Write;
 
 /// Units of a path in a pixel.
 pub const UNITS: f64 = 10.0;
-/// Lines end so many pixels outside of the picture, where no end of one is seen.
+/// Lines end this many pixels outside of the picture, where no end of one is seen.
 const MARGIN: f64 = 4.0;
 /// What is nearer than this, relative to how far away a segment reaches, has no place in the picture.
 const NEAR: f64 = 1e-6;

@@ -120,11 +120,11 @@ struct Degenerate {
 
 fn axes(text: &str) -> Result<u32, String> {
     let axes = text.parse().ok().filter(|axes| [1, 3].contains(axes));
-    axes.ok_or_else(|| format!("{text:?} is no number of axes; take 1 or 3"))
+    axes.ok_or_else(|| format!("{text:?} is not a number of axes; use 1 or 3"))
 }
 
 fn side(text: &str) -> Result<Side, String> {
-    Side::ALL.into_iter().find(|side| side.name() == text).ok_or_else(|| format!("{text:?} is no side; take + or -"))
+    Side::ALL.into_iter().find(|side| side.name() == text).ok_or_else(|| format!("{text:?} is not a side; use + or -"))
 }
 
 pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {

@@ -36,7 +36,7 @@ pub struct DegenerateSetup<'a> {
     pub builds: u32,
     /// Seed of the rays.
     pub seed: u64,
-    /// Is told what is being done, for a progress bar.
+    /// Is called with what is being done, for a progress bar.
     pub say: &'a dyn Fn(&str),
 }
 
@@ -122,7 +122,7 @@ fn fill(point: &mut Degenerate, stage: &DegenerateSetup<'_>, spec: &Spec, mesh: 
     }
     // The first build compiles the shaders; it counts where it is the only one.
     point.build_ms = Spread::of(times.get(1..).filter(|times| !times.is_empty()).unwrap_or(&times));
-    // Whatever has bytes of ours can be validated, be it a BVH or not.
+    // Any structure with our layout can be validated, BVH or not.
     if first.is_some() {
         let error = subject.validate().err();
         point.valid = Some(error.is_none());

@@ -33,7 +33,7 @@ pub struct Stretched<S> {
     pub by: S,
     /// How far it reaches: 2^e times the scene.
     pub e: u32,
-    /// [`super::clipped::cost`], where the experiment tells it.
+    /// [`super::clipped::cost`], if the experiment has it.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "told")]
     pub cost: Option<Option<f64>>,
     /// The same over that at e = 0.
@@ -64,7 +64,7 @@ pub struct Degenerate {
     pub triangles: u64,
     /// Builder with its options, as `-b` takes it.
     pub builder: String,
-    /// Whether it is one of ours: a peer's faults are shown and are no failures.
+    /// Whether it is one of ours: a peer's faults are reported but do not fail the run.
     pub is_ours: bool,
     /// Triangles that the tree holds.
     pub active: Option<u64>,

@@ -44,7 +44,7 @@ pub struct RelativeSetup<'a> {
     pub kinds: &'a [RayKind],
     /// Their number and seed.
     pub rays: RayOptions,
-    /// Is told what is being done, for a progress bar.
+    /// Is called with what is being done, for a progress bar.
     pub say: &'a dyn Fn(&str),
 }
 

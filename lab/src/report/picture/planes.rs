@@ -21,7 +21,7 @@ const COLOURS: [[u8; 3]; 3] = [[0xD5, 0x5E, 0x00], [0x00, 0x9E, 0x73], [0x00, 0x
 const COVERED: f32 = 0.2;
 /// How much of a line's colour is left on the deepest level that is drawn.
 const FAINTEST: f32 = 0.3;
-/// Lines of so many levels, from the root's on, are [`WIDEST`].
+/// Lines of this many levels, from the root's on, are [`WIDEST`].
 const WIDE: u32 = 4;
 /// How wide, in rays: two pixels.
 const WIDEST: usize = 2 * SMOOTH as usize;

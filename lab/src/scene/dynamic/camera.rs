@@ -11,7 +11,7 @@ use glam::Vec3;
 pub(in crate::scene) enum CameraPath {
     /// It stands.
     Still(Camera),
-    /// Each part of it by its own keys, from the beginning again every so many seconds.
+    /// Each part of it by its own keys, again from the beginning after each period in seconds.
     Keys { eye: Track<[f32; 3]>, look: Track<[f32; 3]>, up: Track<[f32; 3]>, fov: Track<f32>, seconds: f32 },
     /// As a node of a scene carries it, which it looks along backwards.
     Carried { motion: Motion, fov: f32 },

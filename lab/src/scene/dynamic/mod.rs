@@ -168,7 +168,7 @@ fn looped(time: f32, seconds: f32) -> f32 {
     if time < seconds { time } else { 0.0 }
 }
 
-/// The time of a frame of so many in so many seconds.
+/// The time of a frame, from the number of frames and the seconds that they cover.
 fn time_of(frame: u32, frames: u32, seconds: f32) -> f32 {
     seconds * frame as f32 / frames as f32
 }

@@ -1,5 +1,5 @@
-//! Things of all sizes in a room: what interiors have in common. Large walls, and clumps of round, flat, boxy and long things, turned
-//! any way, some fine and some coarse.
+//! Things of all sizes in a room: what interiors have in common. Large walls, and clumps of round, flat, boxy and long things,
+//! turned any way, some fine and some coarse.
 
 use super::{series, unit};
 use crate::random::SplitMix64;

@@ -33,7 +33,7 @@ enum Recipe {
     Mesh(fn(u64) -> Option<u64>, fn(u32, u64) -> Mesh),
     /// Parts and where they stand, N of them.
     Instances(fn(u32) -> Assembly),
-    /// The mesh of about N triangles in its first frame, and where its vertices are in each of so many frames.
+    /// The mesh of about N triangles in its first frame, and where its vertices are in each of this many frames.
     Animation(fn(u32) -> Mesh, fn(&Mesh, u32) -> Vec<Vec<[f32; 3]>>),
 }
 
@@ -94,7 +94,7 @@ pub(super) struct Generated {
 }
 
 impl Generated {
-    /// What `spec` names; `None` if it is no generator's name at all (without `gen:`).
+    /// What `spec` names; `None` if it does not name a generator (without `gen:`).
     ///
     /// # Errors
     /// [`Error::Argument`] with the usage.
@@ -106,7 +106,7 @@ impl Generated {
         let is_named = |(pattern, ..): &&Generator| pattern.split(':').nth(1) == Some(words[1]);
         let Some(&(pattern, what, recipe)) = GENERATORS.iter().find(is_named) else {
             let patterns = GENERATORS.map(|(pattern, ..)| pattern).join(", ");
-            return Err(Error::Argument(format!("{spec}: there is no such generator; there are {patterns}")));
+            return Err(Error::Argument(format!("{spec}: unknown generator; use one of {patterns}")));
         };
         let usage = format!("{pattern} ({what})");
         let wrong = || Error::Argument(format!("{spec}: not the arguments of this generator; write {usage}"));

@@ -1,4 +1,4 @@
-//! A column that is twisted more from frame to frame: a tree that is only refitted grows worse, one that is built anew does
+//! A column that is twisted more from frame to frame: a tree that is only refitted grows worse, one that is built again does
 //! not.
 
 use super::turns::turned;

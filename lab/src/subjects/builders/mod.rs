@@ -1,7 +1,7 @@
 //! Builders by name: what `-b` takes (CONTRACT, "Builder names"), and a [`Subject`] made from it.
 //!
 //! A builder with its options is a [`Spec`]: `lbvh:codes=emc64var:collapse=off`. [`BUILDERS`] is the list of all there are;
-//! whoever adds one adds a row there.
+//! to add one, add a row there.
 
 mod options;
 mod plan;
@@ -47,7 +47,7 @@ impl Spec {
         self.options.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str())
     }
 
-    /// The same for so many rays a build, where it is one that chooses by them and has no number of its own.
+    /// The same for a number of rays per build, where it is one that chooses by them and has no number of its own.
     pub fn for_rays(mut self, rays: f64) -> Spec {
         if self.builder().takes(RAYS.key) && self.option(RAYS.key).is_none() {
             self.options.push((RAYS.key.to_owned(), rays.to_string()));
@@ -55,7 +55,7 @@ impl Spec {
         self
     }
 
-    /// What it needs of the machine: what its builder does, and a device if rays are to be traced there.
+    /// What it needs of the machine: what its builder does, and a device if rays are traced there.
     pub fn needs(&self) -> Needs {
         match self.builder().needs {
             Needs::Nothing if self.option(TRACE.key) == Some("device") => Needs::Device,
@@ -113,7 +113,7 @@ impl Spec {
     /// How it builds and traces kd-trees, if it does.
     ///
     /// # Errors
-    /// [`Error::Argument`] if it is no builder of kd-trees.
+    /// [`Error::Argument`] if it is not a builder of kd-trees.
     pub fn kd(&self) -> Result<KdSpec> {
         if let BuilderPlan::Kd(kd) = self.plan()? {
             return Ok(kd);

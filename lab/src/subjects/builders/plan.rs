@@ -29,7 +29,7 @@ pub(crate) enum BuilderPlan {
     Host(HostBvhOptions),
     /// A kd-tree by one of ours.
     Kd(KdSpec),
-    /// The one of ours on the device that is expected to take least for so many rays a build, by the table of costs.
+    /// The one of ours on the device that is expected to take least for a number of rays per build, by the table of costs.
     Auto(f64),
     /// The Vulkan driver's own.
     Driver(DriverPreference),

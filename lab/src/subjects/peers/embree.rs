@@ -126,7 +126,7 @@ impl Subject for Embree {
     }
 
     fn build(&mut self) -> Result<BuildRun> {
-        // Marked as changed, or Embree would see that nothing is to be done.
+        // Marked as changed, or Embree would see that nothing has changed.
         self.scene.update_geometry_buffer(self.geometry, BufferUsage::VERTEX, 0);
         self.scene.update_geometry_buffer(self.geometry, BufferUsage::INDEX, 0);
         self.bytes.peak.store(0, Ordering::Relaxed);

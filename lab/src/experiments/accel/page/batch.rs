@@ -8,8 +8,8 @@ use crate::report::numbers::{count, duration, duration_tick, grouped, short_coun
 use crate::report::{Axis, Caption, Chart, Curve, SERIES, Section, Table, Tone, bars, curves, document};
 use maud::{Markup, html};
 
-/// Who builds how, in the order of charts and tables, with its colour: ours begin with the first and the driver's with the second, as
-/// on the whole page.
+/// Builders and their ways, in the order of charts and tables, with its colour: ours begin with the first and the driver's with
+/// the second, as on the whole page.
 const SUBJECTS: [Subject; 7] = [
     (Some(Implementation::Ours), Submission::OneCall, SERIES[0]),
     (Some(Implementation::Ours), Submission::OneSubmit, SERIES[2]),
@@ -22,7 +22,7 @@ const SUBJECTS: [Subject; 7] = [
 
 type Subject = (Option<Implementation>, Submission, Tone);
 
-/// The point of so many structures.
+/// The point of this many structures.
 pub(super) fn find(
     points: &[Batch],
     structures: u32,
@@ -108,7 +108,7 @@ fn every_batch(points: &[Batch]) -> Markup {
         .number("triangles", "", |point| Some(point.triangles as f64), count)
         .spread("time", "ms", |point| Some(point.wall_ms), three_digits)
         .number("a structure", "µs", move |point| Some(each(point)), three_digits)
-        .spread("over one call of ours", "×", |point| Some(point.over_our_call), three_digits)
+        .spread("over one call, ours", "×", |point| Some(point.over_our_call), three_digits)
         .html()
 }
 
@@ -116,7 +116,7 @@ fn every_batch(points: &[Batch]) -> Markup {
 fn reading(points: &[Batch], most: u32) -> String {
     let of = |maker, way| find(points, most, Some(maker), way);
     let Some(ours) = of(Implementation::Ours, Submission::OneCall) else { return String::new() };
-    let mut text = format!("One call of ours takes {}", duration(ours.wall_ms.median));
+    let mut text = format!("One call takes {}", duration(ours.wall_ms.median));
     let singly = [Submission::OneSubmit, Submission::SubmitEach].map(|way| of(Implementation::Ours, way));
     if let [Some(one_submit), Some(submit_each)] = singly {
         let [in_one, each] = [one_submit, submit_each].map(|point| three_digits(point.over_our_call.median));

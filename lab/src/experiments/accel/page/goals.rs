@@ -18,7 +18,7 @@ pub(super) struct Goal {
     pub what: String,
     /// The ratio, with how far it goes either way.
     pub ratio: Spread,
-    /// What it is to be at least.
+    /// The least that it should be.
     pub least: f64,
 }
 

@@ -1,6 +1,6 @@
 //! `accel.jsonl` and `accel.html`: what `hedgerow accel` measures, as programs read it and as people do.
 //!
-//! The page follows from the records alone: whoever has them can write it again, and `hedgerow bench` does, so that the pages
+//! The page follows from the records alone: anyone who has them can write it again, and `hedgerow bench` does, so that the pages
 //! name each other.
 
 mod batch;
@@ -93,7 +93,7 @@ type Part = (Section, Vec<Chart>);
 /// What is drawn of one maker's points: what it is called behind the maker's name, its colour, and the figure.
 type Series<'f, P> = (Implementation, &'f str, Tone, &'f dyn Fn(&P) -> Option<Spread>);
 
-/// A curve of each of `series` that has points; `place` tells whose a point is, and where on the horizontal axis.
+/// A curve of each of `series` that has points; `place` gives whose a point is, and where on the horizontal axis.
 fn curves_of<P>(points: &[&P], place: fn(&P) -> (Implementation, u32), series: &[Series<'_, P>]) -> Vec<Curve> {
     let curve = |&(maker, what, tone, figure): &Series<'_, P>| {
         let of_maker = points.iter().map(|point| (place(point), point)).filter(|((whose, _), _)| *whose == maker);

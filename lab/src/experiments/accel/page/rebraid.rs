@@ -21,7 +21,7 @@ pub(super) fn part(points: &[RebraidPoint]) -> Result<Option<Part>> {
             "rays of each kind through one and the other in turn, by the device's timestamps."
         }
         @for point in points.iter().filter(|point| point.rays.iter().any(|rays| rays.different > 0)) {
-            p.note.wrong { (point.scene) ": some rays hit something else through the re-braided top level. That is an error of ours." }
+            p.note.wrong { (point.scene) ": some rays hit something else through the re-braided top level. That is a fault of hedgerow." }
         }
         (document::charts(&charts))
         (buildings(points))

@@ -29,14 +29,15 @@ pub(super) fn part(points: &[Update]) -> Result<Option<Part>> {
             "updated: it keeps its tree and gets new boxes, which takes less time and lets the tree grow worse. Both by the "
             "device's timestamps."
         }
-        @if is_missing { p.note { "Structures of ours were not updated here: that was not measured." } }
+        @if is_missing { p.note { "Updates of our structures were not measured in this run." } }
         @for (scene, reading) in &readings { p { b { (scene) } ": " (reading) } }
         (document::charts(&charts))
         details {
             summary { "Every frame" }
             p {
-                "Growth is what the structure itself tells of its SAH cost since it was built. Building from scratch pays from as many rays a "
-                "frame on, in the mix that was traced, as save by the better tree what building takes longer."
+                "Growth is how far the SAH cost has grown since the build, as the structure itself reports it. The last column has "
+                "the rays per frame, in the mix that was traced, from which a build from scratch pays: then the better tree saves as "
+                "much time as the build takes longer."
             }
             (every_frame(points))
         }
@@ -83,30 +84,30 @@ fn quality(scene: &str, frames: &[&Update]) -> Result<Option<Chart>> {
     let slowdown = |point: &Update| point.slowdown().map(Spread::once);
     let series: [Series<'_, Update>; 4] = [
         (Implementation::Ours, "SAH growth", SERIES[4], &growth),
-        (Implementation::Ours, "SAH / anew", SERIES[0], &against),
-        (Implementation::Ours, "time of rays / anew", SERIES[2], &slowdown),
-        (Implementation::Driver, "time of rays / anew", SERIES[5], &slowdown),
+        (Implementation::Ours, "SAH / rebuilt", SERIES[0], &against),
+        (Implementation::Ours, "time of rays / rebuilt", SERIES[2], &slowdown),
+        (Implementation::Driver, "time of rays / rebuilt", SERIES[5], &slowdown),
     ];
     let all = curves_of(frames, place, &series);
     let caption = Caption {
         name: format!("accel-growth-{}", slug(scene)),
         title: format!("{scene}: what updating costs the tree"),
         alt: reading(frames),
-        reading: "Growth is what the updated structure tells of its SAH cost since it was built; beside it its SAH cost, and the \
+        reading: "Growth is how far the SAH cost of the updated structure has grown since it was built; beside it its SAH cost, and the \
                   time of all rays through it, over those of a structure built from scratch. 1 is as good as new."
             .into(),
     };
     curves::curves(caption, &all, &FRAME, &Axis { name: "times as much", is_log: false, number: tick })
 }
 
-/// From where on building anew pays, in a sentence.
+/// From where on building again pays, in a sentence.
 fn reading(frames: &[&Update]) -> String {
     let ours: Vec<&&Update> = frames.iter().filter(|point| point.maker == Implementation::Ours).collect();
     let (Some(first), Some(last)) = (ours.first(), ours.last()) else {
-        return "nothing of ours was measured.".into();
+        return "our structures were not measured.".into();
     };
     let Some(update_ms) = last.update_ms else {
-        return "updates of ours were not measured.".into();
+        return "our updates were not measured.".into();
     };
     let rays: u64 = last.rays.iter().map(|rays| rays.count).sum();
     let faster = last.build_ms.median / update_ms.median;
@@ -155,9 +156,9 @@ fn every_frame(points: &[Update]) -> Markup {
         .spread("update", "ms", |point| point.update_ms, three_digits)
         .number("growth", "×", |point| point.growth, three_digits)
         .number("SAH updated", "", |point| point.updated_sah, three_digits)
-        .number("SAH anew", "", |point| point.built_sah, three_digits);
+        .number("SAH rebuilt", "", |point| point.built_sah, three_digits);
     let table = kinds.fold(table, |table, kind| {
-        table.spread(&format!("{kind}, updated / anew"), "×", move |point| slowdown(point, kind), three_digits)
+        table.spread(&format!("{kind}, updated / rebuilt"), "×", move |point| slowdown(point, kind), three_digits)
     });
-    table.number("anew pays from", "rays a frame", |point| point.pays_from(), short_count).html()
+    table.number("a build pays from", "rays a frame", |point| point.pays_from(), short_count).html()
 }

@@ -1,6 +1,7 @@
-//! `animate.jsonl` and `animate.html`: a scene that moves, frame by frame in each of the ways, as programs read it and as people do.
+//! `animate.jsonl` and `animate.html`: a scene that moves, frame by frame in each of the ways, as programs read it and as
+//! people do.
 //!
-//! The page follows from the records alone: whoever has them can write it again.
+//! The page follows from the records alone: anyone who has them can write it again.
 
 mod charts;
 mod parts;

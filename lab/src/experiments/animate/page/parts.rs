@@ -35,7 +35,7 @@ fn what_moves(setting: &SceneSetting) -> String {
     format!("{still} triangles stand still; {} move, in {objects}, {of_them}.", grouped(moving))
 }
 
-/// Who is fastest and by how much, in a sentence or two.
+/// Which way is fastest, and by how much, in a sentence or two.
 fn reading(all: &[Standing]) -> String {
     let Some(best) = fastest(all) else { return "Nothing was measured to its end.".into() };
     let times = |standing: &Standing| format!("{} ({})", three_digits(standing.frame_ms / best.frame_ms), standing.way);

@@ -12,7 +12,7 @@ use comfy_table::Table;
 pub struct Standing {
     /// The way.
     pub way: AnimationMethod,
-    /// Who built what is built a frame.
+    /// The builder of what is built each frame.
     pub builder: String,
     /// What builds were timed by.
     pub timer: String,

@@ -1,5 +1,5 @@
-//! kd-trees in the tables of Papay 2025, appendix D: trees with their nodes, leaves, depth, cost, time and memory, and the tests and
-//! steps of rays. What the thesis has measured itself stands below as context.
+//! kd-trees in the tables of Papay 2025, appendix D: trees with their nodes, leaves, depth, cost, time and memory, and the
+//! tests and steps of rays. What the thesis has measured itself stands below as context.
 
 pub mod published;
 
@@ -96,7 +96,7 @@ pub fn text(records: &[&Record], published: &Published) -> Option<String> {
         rays.add_row([scene, builder, THEIR_RAYS.to_owned()].into_iter().chain(figures));
     }
     let others = published.file.as_deref().unwrap_or(
-        "what Papay 2025 published, of other scenes, on another machine, by costs of a step and a test that it does not tell",
+        "what Papay 2025 published, of other scenes, on another machine, by costs of a step and a test that it does not give",
     );
     Some(format!("kd-trees; in brackets {others}\n{trees}\n{rays}"))
 }

@@ -45,7 +45,7 @@ pub struct Picture {
     pub file: String,
     /// What it is.
     pub caption: String,
-    /// What it shows, for whoever cannot see it.
+    /// What it shows, for people who cannot see it.
     pub alt: String,
 }
 
@@ -58,13 +58,13 @@ const SETTING: &str = "bench.json";
 /// Where and how the records in a folder were measured; `None` where that was not written.
 ///
 /// # Errors
-/// The file cannot be read, or is no setting.
+/// The file cannot be read, or is not a setting.
 pub fn read_setting(folder: &Path) -> Result<Option<Setting>> {
     lines::read_one(&folder.join(SETTING))
 }
 
 impl Report {
-    /// Of nothing yet.
+    /// Without figures yet.
     pub fn new(setting: Setting) -> Report {
         Report {
             setting,

@@ -25,7 +25,7 @@ pub fn baseline<'a>(legend: &'a Legend, wanted: Option<&str>) -> Option<&'a str>
     builders.iter().find(|b| Some(b.as_str()) == wanted).or(builders.first()).map(String::as_str)
 }
 
-/// What SAH costs are compared with: the baseline, or the first builder that tells its cost where the baseline does not.
+/// What SAH costs are compared with: the baseline, or the first builder that reports its cost if the baseline does not.
 pub fn sah_baseline<'a>(records: &[&'a Record], baseline: &str) -> Option<&'a str> {
     let mut told = records.iter().filter(|r| r.quality.sah.is_some()).map(|r| r.builder.as_str());
     told.clone().find(|builder| *builder == baseline).or_else(|| told.next())

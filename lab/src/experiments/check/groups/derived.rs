@@ -86,7 +86,7 @@ fn refit_as_on_host(device: &Device, tree: &Bvh2, mesh: &Mesh, schedule: RefitSc
     device.run(None, |recorder| refit.record(recorder, &mesh.input, structure.region(), scratch.region()))?;
     same("bytes behind the tree", &structure.read_at::<u8>(bytes.len() as u64, GUARD.len()), &GUARD.to_vec())?;
     let got = Bvh2::<Triangle>::from_bytes(&structure.read::<u8>(bytes.len()))?;
-    // Points have a cost that is no number, which equals nothing.
+    // Points have a cost that is not a number, which equals nothing.
     let comparable =
         |header: &Header| Header { cost: if header.cost.is_nan() { -1.0 } else { header.cost }, ..*header };
     same("header", &comparable(&got.header), &comparable(&expected.header))?;

@@ -47,7 +47,7 @@ pub fn large(cases: &mut Cases<'_>) {
     many_rays(cases);
 }
 
-/// As many rays as there are invocations in so many workgroups, each with its own hit.
+/// As many rays as there are invocations in this many workgroups, each with its own hit.
 fn many_rays(cases: &mut Cases<'_>) {
     let corners = icosphere(2);
     let tree = tree_with(&corners, Collapse::SAH);

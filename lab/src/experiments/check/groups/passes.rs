@@ -22,7 +22,7 @@ fn sizes(quick: bool, more: &[u32]) -> Vec<usize> {
     sizes
 }
 
-/// Memory keeps what is written, and the driver does as Vulkan says where no property tells.
+/// Memory keeps what is written, and the driver does as Vulkan says where no property says.
 pub fn device(cases: &mut Cases<'_>) {
     for bytes in [4usize, 64 << 10, (16 << 20) + 4] {
         cases.case(format!("{bytes} bytes to the device and back"), |device| {

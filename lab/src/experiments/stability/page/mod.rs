@@ -1,7 +1,7 @@
 //! What `hedgerow stability` measures, as programs read it and as people do: for each experiment a file of points, a file that
 //! says where and how they were measured, and a page.
 //!
-//! The page follows from the two files alone: whoever has them can write it again, and other commands do, so that the pages
+//! The page follows from the two files alone: anyone who has them can write it again, and other commands do, so that the pages
 //! name each other.
 
 mod degenerate;
@@ -29,7 +29,7 @@ pub trait Paged: Entry {
     fn failures(_points: &[Self]) -> Vec<(String, String)> {
         Vec::new()
     }
-    /// What is to be seen first.
+    /// What to look at first.
     fn summary(points: &[Self]) -> Markup;
     /// The other parts of the page, and their charts.
     ///

@@ -17,7 +17,7 @@ pub trait StretchPage: Stretch {
     const COMMAND: &'static str;
     /// See [`Paged::TITLE`].
     const TITLE: [&'static str; 2];
-    /// How the table is to be read.
+    /// How to read the table.
     fn reading(points: &[Stretched<Self>]) -> Markup;
     /// How it is measured: terms and what they mean.
     fn terms() -> Markup;

@@ -210,7 +210,7 @@ fn key(line: usize, text: &str, known: &[Part]) -> Result<Key, Fault> {
     while !rest.is_empty() {
         let (word, behind) = split(rest);
         let Some(&(name, counts, usage)) = known.iter().find(|(name, ..)| *name == word) else {
-            return Err(format!("{word:?} is no part of this key; those are {}", written()));
+            return Err(format!("{word:?} is not part of this key; use {}", written()));
         };
         if parts.iter().any(|(part, _)| *part == name) {
             return Err(format!("{name} stands twice in one key; remove one"));
@@ -249,7 +249,7 @@ fn meaningful(part: &str, numbers: &[f32]) -> Result<(), Fault> {
             "a turn about (0, 0, 0), an axis needs a length; write it as in turn 0 1 0 90".into()
         }
         ("quaternion", [0.0, 0.0, 0.0, 0.0]) => {
-            "the quaternion (0, 0, 0, 0) is no rotation; none at all is quaternion 0 0 0 1".into()
+            "the quaternion (0, 0, 0, 0) is not a rotation; write quaternion 0 0 0 1 for no rotation".into()
         }
         ("turn", [.., degrees]) if degrees.abs() > MOST_DEGREES => {
             format!("a turn of {degrees} degrees, there may be {MOST_DEGREES}; take fewer")

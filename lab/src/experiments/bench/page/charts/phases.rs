@@ -10,7 +10,7 @@ use crate::report::theme::Legend;
 const READING: &str = "One bar a builder, its phases from left to right in the order in which they run. The table below says \
     how far each is from the time that a plain copy of the bytes it must move would take.";
 
-/// The phases of every builder on one scene that tells them. `None` if none does.
+/// The phases of every builder on one scene, as far as builders report them. `None` if none does.
 ///
 /// # Errors
 /// The chart cannot be drawn.

@@ -115,7 +115,7 @@ pub fn scatter(records: &[&Record], legend: &Legend, against: &Against) -> Resul
     Chart::draw(caption, draw).map(Some)
 }
 
-/// A mark that tells where the builder works: ours on the device a disc, the driver a square, the host a triangle.
+/// A mark for where the builder works: ours on the device a disc, the driver a square, the host a triangle.
 fn draw_mark(plot: &mut Plot<'_, '_>, record: &Record, at: (f64, f64), style: ShapeStyle) -> Drawn {
     match (record.kind.as_str(), record.build.timer.as_str()) {
         ("driver", _) => plot.chart.draw_series([EmptyElement::at(at) + Rectangle::new([(-5, -5), (6, 6)], style)])?,

@@ -60,7 +60,7 @@ pub fn total_time(records: &[&Record], legend: &Legend) -> Result<Option<Chart>>
     Chart::draw(caption, draw).map(Some)
 }
 
-/// A strip above the chart: who is best for so many rays, in the colours of the builders, and where they take over.
+/// A strip above the chart: the best builder for each number of rays, in the colours of the builders, and where they take over.
 fn winners(
     overlay: &mut Overlay,
     frame: Rect,
