@@ -287,7 +287,7 @@ mod tests {
         }
         assert!(error_of("kd-exact:trace=there").contains("trace=there is unknown; use host or device"));
         assert!(error_of("kd-exact:bins=8").contains("no option \"bins\"; it takes kt, ki, traversal, trace"));
-        assert!(error_of("auto:rays=many").contains("no number of rays"));
+        assert!(error_of("auto:rays=many").contains("is not a number of rays per build"));
         assert!(error_of("").contains("-b all"));
         assert!(error_of(",").contains("-b all"));
     }
