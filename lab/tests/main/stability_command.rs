@@ -135,8 +135,8 @@ fn wrong_arguments_are_told_apart_from_failed_work() {
     for (wrong, says) in [
         (&["hedge"][..], "unrecognized subcommand"),
         (&["growth", "-b", "lvbh"], "unknown builder \"lvbh\""),
-        (&["growth", "--axes", "2"], "take 1 or 3"),
-        (&["growth", "--sides", "left"], "take + or -"),
+        (&["growth", "--axes", "2"], "use 1 or 3"),
+        (&["growth", "--sides", "left"], "use + or -"),
         (&["growth", "--steps", "60/0"], "LAST/STEP"),
         (&["growth", "--rays", "light"], "unknown kind of ray \"light\""),
         (&["large", "--placements", "roof"], "wall, walls, outward"),
