@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 const BOUNDS: [Duration; 2] = [Duration::from_secs(3), Duration::from_secs(8)];
 
 #[test]
-#[ignore = "takes minutes where pipelines are compiled anew: make test-drivers runs it on SwiftShader"]
+#[ignore = "takes minutes, as SwiftShader compiles all pipelines in each process: make test-drivers runs it there"]
 fn every_pass_gives_the_bytes_of_the_host_by_each_tuning() {
     // A thread each: most of the time is the compiler's.
     let slow: Vec<(TuningChoice, Vec<Kernel>)> = std::thread::scope(|scope| {
