@@ -7,7 +7,7 @@ use crate::subjects::builders::{BuilderPlan, Spec};
 use crate::subjects::device_bvh::DeviceBvh;
 use crate::{Error, Result};
 
-/// Rays a build where nobody says: some frames of a game.
+/// Rays per build by default: some frames of a game.
 pub const DEFAULT_RAYS: f64 = 1e7;
 
 /// The value of the option `rays`: a number of rays a build.
@@ -22,8 +22,8 @@ pub fn rays_of(option: Option<&str>) -> Result<f64> {
     })
 }
 
-/// The builder that is chosen for `mesh` and `rays` rays a build, under the name `builder`. The table of costs of `device` tells
-/// which; the table is measured first where it is not known.
+/// The builder that is chosen for `mesh` and `rays` rays per build, under the name `builder`. The choice follows from the table
+/// of costs of `device`, which is measured first if there is none yet.
 ///
 /// # Errors
 /// The device can build no candidate; those of the chosen one.

@@ -1,7 +1,7 @@
 //! One level of acceleration structures: what it is built over, and where it lies.
 
 use super::device_rays::timed_run;
-use super::structures::{BuildInfo, Geometry, Range, Sizes, Structure, Structures, instances_at, triangles_of};
+use super::structures::{BuildInfo, BuildSizes, Geometry, Range, Structure, Structures, instances_at, triangles_of};
 use crate::Result;
 use crate::device::Buffer;
 use crate::experiments::accel::points::Implementation;
@@ -24,7 +24,7 @@ pub struct Level<'a> {
     /// How many triangles or instances.
     pub(super) count: u32,
     structure: Structure,
-    sizes: Sizes,
+    sizes: BuildSizes,
     memory: Buffer<'a>,
     scratch: Buffer<'a>,
     /// Positions and indices, or instances.

@@ -24,7 +24,7 @@ pub type Structure = vk::AccelerationStructureKHR;
 /// What is built over.
 pub type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
 /// Bytes that a structure and its builds need.
-pub type Sizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
+pub type BuildSizes = vk::AccelerationStructureBuildSizesInfoKHR<'static>;
 
 /// The functions that build.
 #[derive(Clone)]
@@ -67,8 +67,8 @@ impl<'a> Structures<'a> {
     }
 
     /// Bytes that a build of this many primitives a geometry needs.
-    pub(crate) fn sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> Result<Sizes> {
-        let mut sizes = Sizes::default();
+    pub(crate) fn sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> Result<BuildSizes> {
+        let mut sizes = BuildSizes::default();
         let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
         match &self.maker {
             // SAFETY: the pointers of `info` are those of live slices.

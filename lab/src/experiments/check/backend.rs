@@ -4,7 +4,7 @@
 use super::probe::{Probe, ProbeRay, ProbeReport};
 use crate::device::{Buffer, Device};
 pub use crate::subjects::structures::BuildInfo;
-use crate::subjects::structures::{Range, Sizes, Structure, Structures};
+use crate::subjects::structures::{BuildSizes, Range, Structure, Structures};
 use ash::vk;
 use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
 use hedgerow::gpu::Recorder;
@@ -32,7 +32,7 @@ pub trait Backend {
     }
 
     /// `vkGetAccelerationStructureBuildSizesKHR`.
-    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> Sizes {
+    fn build_sizes(&self, info: &BuildInfo<'_>, counts: &[u32]) -> BuildSizes {
         self.structures().sizes(info, counts).expect("it can be built")
     }
 
