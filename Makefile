@@ -35,7 +35,7 @@ SWIFTSHADER := $(CACHE)/swiftshader
 # The ICD file of the second driver; another one may be named.
 SECOND_DRIVER := $(or $(HEDGEROW_SECOND_DRIVER),$(SWIFTSHADER)/swiftshader.json)
 comma := ,
-EMBREE_BUILDERS := ,embree-low,embree-medium,embree-high
+EMBREE_BUILDERS := ,embree-low,embree-medium,embree-high,embree-medium-tree,embree-high-tree
 # The CPU peers that can be built here: Embree where it is installed (scripts/setup.sh --peers). The same features
 # everywhere, so that nothing is compiled twice.
 EMBREE := $(shell PATH="$$PATH:/sbin" ldconfig -p 2>/dev/null | grep -q 'libembree3\.so ' && echo yes)

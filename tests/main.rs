@@ -36,6 +36,7 @@ mod bvh {
     mod codes;
     mod epo;
     mod geometry;
+    mod host;
     mod lbvh;
     mod limits;
     mod methods;

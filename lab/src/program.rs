@@ -8,6 +8,7 @@ use crate::experiments::bench::command as bench;
 use crate::experiments::check::command as check;
 use crate::experiments::choose::command as choose;
 use crate::experiments::compare::command as compare;
+use crate::experiments::cpu_builders::command as cpu_builders;
 use crate::experiments::navigate::command as navigate;
 use crate::experiments::report::command as report;
 use crate::experiments::stability::command as stability;
@@ -30,6 +31,7 @@ struct Cli {
 enum Command {
     Check(check::Arguments),
     Bench(bench::Arguments),
+    CpuBuilders(cpu_builders::Arguments),
     Accel(accel::Arguments),
     Animate(animate::Arguments),
     Stability(stability::Arguments),
@@ -75,6 +77,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     match &cli.command {
         Command::Check(arguments) => check::run(common, arguments),
         Command::Bench(arguments) => bench::run(common, arguments),
+        Command::CpuBuilders(arguments) => cpu_builders::run(common, arguments),
         Command::Accel(arguments) => accel::run(common, arguments),
         Command::Animate(arguments) => animate::run(common, arguments),
         Command::Stability(arguments) => stability::run(common, arguments),

@@ -120,7 +120,7 @@ impl Node {
 }
 
 /// What the leaves of a structure hold.
-pub trait Record: Pod + PartialEq + std::fmt::Debug {
+pub trait Record: Pod + PartialEq + std::fmt::Debug + Send + Sync {
     /// The second word of the structure.
     const KIND: u32;
 

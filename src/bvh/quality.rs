@@ -13,6 +13,10 @@ use bytemuck::{Pod, Zeroable};
 pub struct Quality {
     /// SAH cost (CONTRACT): (c_T · Σ SA(inner) + c_I · Σ SA(leaf)·n_leaf) / SA(root), the root included.
     pub sah: f64,
+    /// Its first sum: Σ SA(inner) / SA(root), the root included.
+    pub sah_inner: f64,
+    /// Its second sum: Σ SA(leaf)·n_leaf / SA(root).
+    pub sah_leaf: f64,
     /// Inner nodes.
     pub inner: u64,
     /// Leaves, those that hold nothing among them.
@@ -30,6 +34,14 @@ pub struct Quality {
 }
 
 impl Quality {
+    /// Sets the SAH cost and its two sums, from sums of areas and the root's, by the costs of a step and of a test. Without area
+    /// at the root all are 0.
+    pub(crate) fn set_cost(&mut self, [inner, leaf]: [f64; 2], root: f64, [c_t, c_i]: [f64; 2]) {
+        let relative = |area: f64| if root > 0.0 { area / root } else { 0.0 };
+        (self.sah_inner, self.sah_leaf) = (relative(inner), relative(leaf));
+        self.sah = c_t * self.sah_inner + c_i * self.sah_leaf;
+    }
+
     /// Mean triangles in a leaf that has any; 0 where none has.
     pub fn prims_per_leaf(&self) -> f64 {
         self.refs as f64 / (self.leaves - self.empty_leaves).max(1) as f64
@@ -54,8 +66,7 @@ impl QualityFigures {
     /// The figures with these costs of a step and of a test.
     pub fn quality(&self, c_t: f64, c_i: f64) -> Quality {
         let depths = f64::from(self.depth_sum[0]) + f64::from(self.depth_sum[1]) * 4_294_967_296.0;
-        Quality {
-            sah: c_t * f64::from(self.inner_area) + c_i * f64::from(self.leaf_area),
+        let mut quality = Quality {
             inner: self.inner.into(),
             leaves: self.leaves.into(),
             empty_leaves: 0,
@@ -63,7 +74,10 @@ impl QualityFigures {
             leaf_max: self.leaf_max,
             depth_avg: if self.leaves == 0 { 0.0 } else { depths / f64::from(self.leaves) },
             depth_max: self.depth_max,
-        }
+            ..Quality::default()
+        };
+        quality.set_cost([self.inner_area, self.leaf_area].map(f64::from), 1.0, [c_t, c_i]);
+        quality
     }
 }
 

@@ -17,7 +17,7 @@ pub fn on_host(tree: &KdTree, c_t: f64, c_i: f64) -> Quality {
         quality.depth_max = quality.depth_max.max(depth);
         depths += u64::from(depth);
     };
-    let mut cost = 0.0;
+    let (mut inner_area, mut leaf_area) = (0.0, 0.0);
     let root = tree.header.cell();
     let mut stack = vec![((!tree.nodes.is_empty()).then_some(0), root, 0)];
     while let Some((node, cell, depth)) = stack.pop() {
@@ -27,11 +27,11 @@ pub fn on_host(tree: &KdTree, c_t: f64, c_i: f64) -> Quality {
         };
         match tree.nodes[node as usize].content() {
             KdContent::Leaf(range) => {
-                cost += c_i * half_area(&cell) * range.len() as f64;
+                leaf_area += half_area(&cell) * range.len() as f64;
                 leaf(&mut quality, depth, range.len() as u32);
             }
             KdContent::Inner(inner) => {
-                cost += c_t * half_area(&cell);
+                inner_area += half_area(&cell);
                 quality.inner += 1;
                 let [left, right] = inner.halves(&cell);
                 stack.push((inner.children[1], right, depth + 1));
@@ -39,8 +39,7 @@ pub fn on_host(tree: &KdTree, c_t: f64, c_i: f64) -> Quality {
             }
         }
     }
-    let whole = half_area(&root);
-    quality.sah = if whole > 0.0 { cost / whole } else { 0.0 };
+    quality.set_cost([inner_area, leaf_area], half_area(&root), [c_t, c_i]);
     quality.depth_avg = depths as f64 / quality.leaves as f64;
     quality
 }
@@ -69,10 +68,13 @@ mod tests {
         let tree = KdTree { header, nodes, references: vec![0, 1, 2, 0], records: Vec::new(), geometries: Vec::new() };
         let quality = on_host(&tree, 3.0, 2.0);
         // Half areas: 12 the root, 8 a half, 1·1.5 + 1.5·2 + 2·1 = 6.5 the upper part.
-        let sah = (3.0 * (12.0 + 8.0) + 2.0 * (3.0 * 8.0 + 6.5)) / 12.0;
-        assert!((quality.sah - sah).abs() < 1e-12, "{}", quality.sah);
+        let (inner, leaf) = ((12.0 + 8.0) / 12.0, (3.0 * 8.0 + 6.5) / 12.0);
+        assert!((quality.sah_inner - inner).abs() + (quality.sah_leaf - leaf).abs() < 1e-12, "{quality:?}");
+        assert_eq!(quality.sah, 3.0 * quality.sah_inner + 2.0 * quality.sah_leaf);
         let expected = Quality {
             sah: quality.sah,
+            sah_inner: quality.sah_inner,
+            sah_leaf: quality.sah_leaf,
             inner: 2,
             leaves: 3,
             empty_leaves: 1,

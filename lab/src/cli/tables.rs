@@ -35,9 +35,12 @@ pub fn build(outcome: &Outcome, copy_gb_s: Option<f64>) -> String {
     }
     let [median, min, max] = [build.median_ms, build.min_ms, build.max_ms].map(duration);
     let (runs, timer, speed) = (build.runs, &build.timer, three_digits(record.mtris_s()));
-    text += &format!(
-        "\nbuilt in {median} ({min} to {max}, {runs} runs, {timer} clock): {speed} million triangles a second\n"
-    );
+    text += &format!("\nbuilt in {median} ({min} to {max}, {runs} runs, {timer} clock)");
+    if let Some((threads, cpu)) = build.threads.zip(build.cpu_median_ms) {
+        let plural = if threads == 1 { "" } else { "s" };
+        text += &format!(" by {threads} thread{plural}, {} of CPU time", duration(cpu));
+    }
+    text += &format!(": {speed} million triangles a second\n");
     if !build.phases.is_empty() {
         let header = ["phase", "time", "share", "must move", "GB/s", "a copy of it", "of the copy's speed"];
         let mut phases = table(&header, 1);
@@ -67,10 +70,12 @@ pub fn build(outcome: &Outcome, copy_gb_s: Option<f64>) -> String {
     let sah_cost = format!("SAH cost (c_T {}, c_I {})", q.c_t, q.c_i);
     let rows = [
         (sah_cost, or_dash(q.sah, three_decimals), "structure", m.structure_bytes),
+        ("area of inner nodes / the root's".into(), or_dash(q.sah_inner, three_decimals), "scratch", m.scratch_bytes),
+        ("area of leaves · triangles / the root's".into(), or_dash(q.sah_leaf, three_decimals), "peak", m.peak_bytes),
         ("end-point overlap".into(), or_dash(q.epo, three_decimals), "", None),
         ("leaf count variability".into(), or_dash(q.lcv, three_decimals), "", None),
-        ("inner nodes".into(), or_dash(q.inner, grouped), "scratch", m.scratch_bytes),
-        ("leaves".into(), or_dash(q.leaves, grouped), "peak", m.peak_bytes),
+        ("inner nodes".into(), or_dash(q.inner, grouped), "", None),
+        ("leaves".into(), or_dash(q.leaves, grouped), "", None),
         ("leaves without a triangle".into(), or_dash(q.empty_leaves, grouped), "", None),
         ("triangles a leaf, mean".into(), or_dash(q.prims_per_leaf, three_digits), "", None),
         ("triangles a leaf, most".into(), or_dash(q.prims_per_leaf_max, grouped), "", None),

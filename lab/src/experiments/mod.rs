@@ -6,6 +6,7 @@ pub mod bench;
 pub mod check;
 pub mod choose;
 pub mod compare;
+pub mod cpu_builders;
 pub mod navigate;
 pub mod report;
 pub mod stability;
@@ -19,6 +20,9 @@ use std::path::Path;
 /// # Errors
 /// Records cannot be read; a file cannot be written.
 pub fn write_pages(folder: &Path) -> Result<()> {
+    if beside::CPU_BUILDERS.is_in(folder) {
+        cpu_builders::page::write(folder)?;
+    }
     if beside::ACCEL.is_in(folder) {
         accel::page::write(folder)?;
     }

@@ -42,7 +42,7 @@ pub struct Record {
 }
 
 /// Build time over `runs` runs after a warm-up.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct BuildRecord {
     /// Counted runs.
     pub runs: u32,
@@ -56,6 +56,19 @@ pub struct BuildRecord {
     pub timer: String,
     /// Medians a phase, in order.
     pub phases: Vec<PhaseRecord>,
+    /// Threads that built, of builders on the CPU. Not in the contract, as all below: where it is not known, the record has no
+    /// such name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub threads: Option<u32>,
+    /// Median milliseconds of CPU time that the process took, on all its threads.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cpu_median_ms: Option<f64>,
+    /// Least CPU time of a run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cpu_min_ms: Option<f64>,
+    /// Greatest CPU time of a run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cpu_max_ms: Option<f64>,
 }
 
 impl From<&BuildRecord> for Spread {
@@ -80,7 +93,7 @@ pub struct MemoryRecord {
     pub structure_bytes: Option<u64>,
     /// What the build needs beside it.
     pub scratch_bytes: Option<u64>,
-    /// The most that was held at once.
+    /// The most that was held at once, without the input.
     pub peak_bytes: Option<u64>,
 }
 
@@ -114,6 +127,12 @@ pub struct QualityRecord {
     /// Most primitives in a leaf. Not in the contract: where it was not measured, the record has no such name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prims_per_leaf_max: Option<u64>,
+    /// The first sum of the SAH cost, Σ SA(inner) / SA(root). Not in the contract either, nor is the second.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sah_inner: Option<f64>,
+    /// The second sum, Σ SA(leaf)·n_leaf / SA(root).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sah_leaf: Option<f64>,
 }
 
 impl QualityRecord {
@@ -131,6 +150,8 @@ impl QualityRecord {
             depth_max: Some(u64::from(quality.depth_max)),
             prims_per_leaf: Some(quality.prims_per_leaf()),
             prims_per_leaf_max: Some(quality.leaf_max.into()),
+            sah_inner: Some(quality.sah_inner),
+            sah_leaf: Some(quality.sah_leaf),
             ..QualityRecord::default()
         }
     }

@@ -1,5 +1,6 @@
 //! Builders of kd-trees on the host as subjects: wall-clock time, and the host's tracer on every core or the device's.
 
+use super::host_build::HeapPeak;
 use super::host_rays::{KdRays, timed};
 use super::{BuildRun, KD_TREE, Subject};
 use crate::Result;
@@ -16,13 +17,14 @@ pub struct KdHost<'a> {
     mesh: &'a Mesh,
     options: HostKdOptions,
     tree: Option<KdTree>,
+    peak: HeapPeak,
     rays: KdRays<'a>,
 }
 
 impl<'a> KdHost<'a> {
     /// On `mesh`, to be traced by `rays`.
     pub fn new(builder: &str, mesh: &'a Mesh, options: HostKdOptions, rays: KdRays<'a>) -> KdHost<'a> {
-        KdHost { builder: builder.to_owned(), mesh, options, tree: None, rays }
+        KdHost { builder: builder.to_owned(), mesh, options, tree: None, peak: HeapPeak::default(), rays }
     }
 
     /// The tree, built where there is none yet, and what traces it.
@@ -51,14 +53,17 @@ impl Subject for KdHost<'_> {
     fn build(&mut self) -> Result<BuildRun> {
         self.tree = None;
         self.rays.forget_trees();
-        let (milliseconds, built) = timed(|| self.built().map(drop));
-        built?;
-        Ok(BuildRun::whole(milliseconds))
+        let (mesh, options) = (self.mesh, self.options);
+        let (built, run) = self.peak.measured(rayon::current_num_threads() as u32, || {
+            let (milliseconds, built) = timed(|| build(&mesh.positions, &mesh.triangles, &options));
+            (built, BuildRun::whole(milliseconds))
+        });
+        self.tree = Some(built?);
+        Ok(run)
     }
 
     fn memory(&self) -> record::MemoryRecord {
-        let structure_bytes = self.tree.as_ref().map(|tree| tree.header.offsets().bytes);
-        record::MemoryRecord { structure_bytes, ..Default::default() }
+        self.peak.memory(self.tree.as_ref().map(|tree| tree.header.offsets().bytes))
     }
 
     fn kd_tree(&mut self) -> Result<Option<Cow<'_, KdTree>>> {

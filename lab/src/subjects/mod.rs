@@ -6,6 +6,7 @@ pub mod builders;
 pub mod device_bvh;
 pub mod device_rays;
 pub mod host;
+pub mod host_build;
 pub mod host_rays;
 pub mod kd_device;
 pub mod kd_gpu;
@@ -13,6 +14,7 @@ pub mod kd_host;
 pub mod level;
 pub mod levels;
 pub mod peers;
+pub mod retraced;
 pub mod structures;
 pub mod wide;
 
@@ -37,17 +39,28 @@ pub struct BuildRun {
     pub milliseconds: f64,
     /// The phases, where the builder knows them; they sum to `milliseconds` or a little less.
     pub phases: Vec<gpu::Phase>,
+    /// What it took beside time, where it ran on the CPU.
+    pub on_cpu: Option<OnCpu>,
+}
+
+/// What a build on the CPU took beside wall-clock time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnCpu {
+    /// Threads that built.
+    pub threads: u32,
+    /// Milliseconds of CPU time of the process, on all its threads.
+    pub milliseconds: f64,
 }
 
 impl BuildRun {
     /// One whose phases are not known.
     pub fn whole(milliseconds: f64) -> BuildRun {
-        BuildRun { milliseconds, phases: Vec::new() }
+        BuildRun { milliseconds, phases: Vec::new(), on_cpu: None }
     }
 
     /// One of these phases.
     pub fn of(phases: Vec<gpu::Phase>) -> BuildRun {
-        BuildRun { milliseconds: phases.iter().map(|phase| phase.milliseconds).sum(), phases }
+        BuildRun { milliseconds: phases.iter().map(|phase| phase.milliseconds).sum(), phases, on_cpu: None }
     }
 }
 

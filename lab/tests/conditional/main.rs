@@ -16,6 +16,7 @@ mod driver;
 mod navigate;
 mod report_accel;
 mod report_animate;
+mod report_cpu_builders;
 mod report_page;
 mod report_stability;
 mod scene_shared;
@@ -32,6 +33,7 @@ fn main() -> std::process::ExitCode {
         ("navigate", navigate::tests()),
         ("report_accel", report_accel::tests()),
         ("report_animate", report_animate::tests()),
+        ("report_cpu_builders", report_cpu_builders::tests()),
         ("report_page", report_page::tests()),
         ("report_stability", report_stability::tests()),
         ("scene_shared", scene_shared::tests()),

@@ -80,6 +80,7 @@ fn outcome(scene: &str, triangles: u64, builder: &(&str, &str, f64, f64, Option<
             max_ms: 1.09 * median_ms,
             timer: if host { "wall" } else { "device" }.into(),
             phases: phases.collect(),
+            ..BuildRecord::default()
         },
         memory: MemoryRecord {
             structure_bytes: Some(112 * triangles),

@@ -3,13 +3,14 @@
 use std::process::Command;
 
 /// Each command with its options that are relied on.
-const COMMANDS: [(&str, &[&str]); 14] = [
+const COMMANDS: [(&str, &[&str]); 15] = [
     ("devices", &["--json"]),
     ("build", &["--builder", "--json", "--output", "--runs", "--costs", "--epo"]),
     ("trace", &["--builder", "--rays", "--size", "--json", "--rays-file", "--hits-file", "--any-hit"]),
     ("rays", &["--kind", "--output", "--size"]),
     ("render", &["--builder", "--output", "--view"]),
     ("bench", &["--builder", "--rays", "--runs", "--output", "--shard"]),
+    ("cpu-builders", &["--builder", "--size", "--runs", "--quick", "--json", "--output"]),
     ("stability", &[]),
     ("compare", &[]),
     ("check", &["--quick", "--json"]),

@@ -95,12 +95,67 @@ mod obvhs {
 #[cfg(feature = "peer-embree")]
 mod embree {
     use super::*;
+    use hedgerow_lab::measure::overlap::Epo;
+    use hedgerow_lab::subjects::builders::Spec;
     use hedgerow_lab::subjects::peers::embree::{Embree, Preset};
 
     #[test]
     fn embree_finds_our_hits() {
         for preset in [Preset::Low, Preset::Medium, Preset::High] {
             finds_our_hits(Embree::new(&soup(), preset).expect("the mesh fits"));
+        }
+    }
+
+    const TREES: [&str; 3] = ["embree-low-tree", "embree-medium-tree", "embree-high-tree"];
+
+    #[test]
+    fn trees_of_embree_are_valid_and_have_the_hits_of_brute_force() {
+        for (scene, builder) in
+            ["gen:soup:3000:7", "gen:needles:2000:3"].into_iter().flat_map(|s| TREES.map(|b| (s, b)))
+        {
+            let mesh = scene::load(scene, &scene::LoadOptions::default()).expect("a generator").mesh;
+            let mut peer = builder.parse::<Spec>().expect("known").make(None, &mesh).expect("it fits");
+            // Twice, for what a first build leaves behind must not matter to the second.
+            for _ in 0..2 {
+                let run = peer.build().expect("it builds");
+                let phases: Vec<_> = run.phases.iter().map(|phase| phase.name).collect();
+                assert_eq!(phases, ["boxes", "build", "convert"]);
+                assert!(run.on_cpu.is_some_and(|on_cpu| on_cpu.milliseconds > 0.0), "{run:?}");
+            }
+            peer.validate().unwrap_or_else(|error| panic!("{scene}, {builder}: {error}"));
+            let quality = peer.quality(3.0, 2.0).expect("its layout is ours");
+            let refs = quality.refs.expect("told");
+            match builder {
+                "embree-high-tree" => assert!(refs > mesh.triangles.len() as u64, "{scene}: some are split"),
+                _ => assert_eq!(refs, mesh.triangles.len() as u64),
+            }
+            assert!(quality.sah > Some(0.0) && peer.epo(3.0, 2.0, Epo::On).expect("on the host") > Some(0.0));
+            let (plain, rays) = (tree_of(&mesh), rays(&mesh));
+            let hits = peer.hits_of(&rays, Query::ClosestHit).expect("one hit a ray");
+            let by_force: Vec<Hit> = rays.iter().map(|ray| host::closest_hit_by_brute_force(&plain, ray)).collect();
+            assert_eq!(hits, by_force, "{scene}, {builder}");
+            let any = peer.hits_of(&rays, Query::AnyHit).expect("one hit a ray");
+            assert!(any.iter().zip(&by_force).all(|(a, b)| a.is_some() == b.is_some()), "{scene}, {builder}");
+            let work = peer.work(Query::ClosestHit).expect("on the host").expect("our tracer counts");
+            assert!(work.iter().any(|work| work.steps > 0 && work.tests > 0));
+        }
+    }
+
+    #[test]
+    fn trees_of_embree_leave_out_what_is_broken_and_hold_what_is_small() {
+        for builder in TREES {
+            let mut mesh = soup();
+            mesh.positions[0] = [f32::NAN; 3];
+            let broken = mesh.triangles.iter().filter(|triangle| triangle.contains(&0)).count();
+            for count in [0, 1, 2, mesh.triangles.len()] {
+                let part = Mesh { triangles: mesh.triangles[mesh.triangles.len() - count..].to_vec(), ..mesh.clone() };
+                let mut peer = builder.parse::<Spec>().expect("known").make(None, &part).expect("it fits");
+                peer.build().expect("it builds");
+                peer.validate().unwrap_or_else(|error| panic!("{builder}, {count}: {error}"));
+                let outcome = peer.outcome().expect("on the host").expect("our layout");
+                let there = if count == mesh.triangles.len() { count - broken } else { count };
+                assert!(outcome.active as usize >= there, "{builder}: {outcome:?}");
+            }
         }
     }
 }

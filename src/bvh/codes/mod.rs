@@ -21,10 +21,13 @@ mod name;
 mod plan;
 mod recipe;
 mod sections;
+mod tables;
 
 pub use binning::Binning;
 pub use bounds::CodeBounds;
 pub use plan::CodePlan;
+#[doc(hidden)]
+pub use tables::CodeTables;
 
 /// Which code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

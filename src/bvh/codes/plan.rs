@@ -11,16 +11,16 @@ use crate::geometry::Aabb;
 /// The recipe of a code for a given scene.
 #[derive(Debug, Clone)]
 pub struct CodePlan {
-    codes: Codes,
+    pub(super) codes: Codes,
     axes: [Axis; 3],
-    recipe: Recipe,
+    pub(super) recipe: Recipe,
     size: Size,
-    prefix: Prefix,
+    pub(super) prefix: Prefix,
 }
 
 /// What comes before the bits of the recipe.
 #[derive(Debug, Clone)]
-enum Prefix {
+pub(super) enum Prefix {
     None,
     Sections(Sections),
     Cells(Occupancy),
@@ -98,6 +98,18 @@ impl CodePlan {
         CodePlan { prefix, ..plan }
     }
 
+    /// The same from the bounds of boxes and of centroids, where `codes` want nothing else of them.
+    #[doc(hidden)]
+    pub fn of_bounds(codes: Codes, boxes: &Aabb, centroids: impl FnOnce() -> Aabb) -> Option<CodePlan> {
+        let bounds = match codes.bounds {
+            CodeBounds::Robust => return None,
+            _ if codes.has_grid() => return None,
+            CodeBounds::Full => *boxes,
+            CodeBounds::Centroid | CodeBounds::Concise => codes.bounds.of(boxes, &centroids()),
+        };
+        Some(CodePlan::within(codes, &bounds))
+    }
+
     /// The recipe within these bounds, without a prefix.
     fn within(codes: Codes, bounds: &Aabb) -> CodePlan {
         CodePlan {
@@ -120,17 +132,24 @@ impl CodePlan {
     /// The code of a primitive with this box, in the low [`Codes::bits`] bits. Never all ones: that is [`CodePlan::inactive`].
     pub fn encode(&self, primitive: &Aabb) -> u64 {
         let (bits, group) = (self.codes.bits, self.codes.code.size_group());
-        let coordinates = self.fractions(primitive.centroid());
+        self.encode_with(primitive, |coordinates, size| self.recipe.encode(coordinates, size, group, bits))
+    }
+
+    /// The same by a recipe that gives what the plan's own would of coordinates and a size.
+    pub(super) fn encode_with(&self, primitive: &Aabb, recipe: impl Fn([u64; 3], u32) -> u64) -> u64 {
+        let bits = self.codes.bits;
+        let size = || if self.codes.code.size_group() == 0 { 0 } else { self.size.of(primitive) };
+        let coordinates = || self.fractions(primitive.centroid());
         let code = match &self.prefix {
-            Prefix::None => self.recipe.encode(coordinates, self.size.of(primitive), group, bits),
+            Prefix::None => recipe(coordinates(), size()),
             Prefix::Sections(sections) => {
                 let section = sections.section_of(primitive);
                 let (coordinates, size) = if section.is_core() {
-                    (coordinates, self.size.of(primitive))
+                    (coordinates(), size())
                 } else {
-                    (sections.coordinates(primitive.centroid(), coordinates), 0xFFFF)
+                    (sections.coordinates(primitive.centroid(), coordinates()), 0xFFFF)
                 };
-                sections.insert(section, self.recipe.encode(coordinates, size, group, bits), bits)
+                sections.insert(section, recipe(coordinates, size), bits)
             }
             Prefix::Cells(cells) => cells.encode(self.wide_fractions(primitive.centroid()), bits),
             Prefix::Splits(splits) => splits.encode(self.wide_fractions(primitive.centroid()), bits),

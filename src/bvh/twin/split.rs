@@ -272,7 +272,7 @@ pub fn around_parts(whole: &Aabb) -> Aabb {
 }
 
 /// The box of a part, larger by the slack that the vertices of its triangle, whose box is `whole`, need.
-fn padded(b: &Aabb, whole: &Aabb) -> Aabb {
+pub fn padded(b: &Aabb, whole: &Aabb) -> Aabb {
     let slack = SLACK * whole.extent().into_iter().fold(0.0, f32::max);
     let lo = std::array::from_fn(|i| b.lo[i] - (slack + power_of_two(-22) * b.lo[i].abs()));
     let hi = std::array::from_fn(|i| b.hi[i] + (slack + power_of_two(-22) * b.hi[i].abs()));
@@ -281,6 +281,11 @@ fn padded(b: &Aabb, whole: &Aabb) -> Aabb {
 
 fn is_empty(b: &Aabb) -> bool {
     (0..3).any(|i| b.lo[i] > b.hi[i])
+}
+
+/// Boxes around what of a triangle's part in a box lies below and above a plane across an axis. Together they hold all of it.
+pub fn halves(corners: &[[f32; 3]; 3], b: &Aabb, axis: usize, at: f32) -> [Aabb; 2] {
+    split_at(corners, b, &SplitPlane { axis, at, level: 0 })
 }
 
 /// Boxes around what of a triangle's part in a box lies on the two sides of a plane.

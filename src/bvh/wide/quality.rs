@@ -20,21 +20,21 @@ pub fn on_host<N: WideNode, R: Record>(tree: &Wide<N, R>, c_t: f64, c_i: f64) ->
         x * y + y * z + z * x
     };
     let root = area(&tree.header.root.bounds());
-    let (mut cost, mut depths) = (0.0, 0u64);
+    let (mut leaf_area, mut depths) = (0.0, 0u64);
     let mut leaf = |quality: &mut Quality, area: f64, count: u32, depth: u32| {
-        cost += c_i * area * f64::from(count);
+        leaf_area += area * f64::from(count);
         quality.leaves += 1;
         quality.refs += u64::from(count);
         quality.leaf_max = quality.leaf_max.max(count);
         quality.depth_max = quality.depth_max.max(depth);
         depths += u64::from(depth);
     };
-    let mut steps = 0.0;
+    let mut inner_area = 0.0;
     let mut stack = vec![(0u32, root, 0u32)];
     while let Some((index, node_area, depth)) = stack.pop() {
         let node = &tree.nodes[index as usize];
         quality.inner += 1;
-        steps += c_t * node_area;
+        inner_area += node_area;
         if let Some((_, count)) = node.long_leaf() {
             leaf(&mut quality, node_area, count, depth);
         }
@@ -47,7 +47,7 @@ pub fn on_host<N: WideNode, R: Record>(tree: &Wide<N, R>, c_t: f64, c_i: f64) ->
             }
         }
     }
-    quality.sah = if root > 0.0 { (steps + cost) / root } else { 0.0 };
+    quality.set_cost([inner_area, leaf_area], root, [c_t, c_i]);
     quality.depth_avg = depths as f64 / quality.leaves as f64;
     quality
 }

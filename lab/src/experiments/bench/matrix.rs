@@ -22,6 +22,7 @@ use hedgerow::bvh::twin::lbvh;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Runs that do not count, before those that do.
@@ -66,7 +67,7 @@ pub struct Outcome {
 }
 
 /// A builder on a scene; no builder where the scene itself failed.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OnScene {
     /// The scene.
     pub scene: String,
@@ -89,13 +90,25 @@ impl fmt::Display for OnScene {
     }
 }
 
+/// A subject that takes part in the rounds.
+pub struct Entrant<'a> {
+    /// The subject.
+    pub subject: Box<dyn Subject + 'a>,
+    /// Whether rays go through what it builds; otherwise it is built, and its tree measured, but for the end-point overlap.
+    pub is_traced: bool,
+}
+
+/// Gives, of a subject whose tree is measured, subjects that trace the same tree in other ways. They have records of their own,
+/// with the figures of the build.
+pub type Besides<'b, 'a> = dyn FnMut(&mut dyn Subject) -> Result<Vec<Box<dyn Subject + 'a>>> + 'b;
+
 /// A builder under measurement.
 struct Entry<'a> {
-    spec: &'a Spec,
     subject: Box<dyn Subject + 'a>,
     record: Record,
     faults: Vec<String>,
     failure: Option<Error>,
+    is_traced: bool,
 }
 
 /// Measures every builder of `plan` on `scene`. `say` is called with what is being done, for a progress bar.
@@ -105,35 +118,53 @@ pub fn measure(
     plan: &BenchPlan,
     say: &mut dyn FnMut(&str),
 ) -> (Vec<Outcome>, Vec<Failure<OnScene>>) {
-    let fail = |spec: &Spec, error: Error| OnScene::failure(&scene.name, Some(spec), error);
-    let (mut entries, mut failures) = (Vec::new(), Vec::new());
+    let (mut entrants, mut failures) = (Vec::new(), Vec::new());
     for spec in &plan.builders {
         match spec.make(device, &scene.mesh) {
-            Ok(subject) => {
-                let record = blank(scene, device, subject.as_ref());
-                entries.push(Entry { spec, subject, record, faults: Vec::new(), failure: None });
-            }
-            Err(error) => failures.push(fail(spec, error)),
+            Ok(subject) => entrants.push(Entrant { subject, is_traced: true }),
+            Err(error) => failures.push(OnScene::failure(&scene.name, Some(spec), error)),
         }
     }
-    let mut rounds = Rounds { entries };
+    let (outcomes, more) = measure_subjects(scene, device, entrants, plan, &mut |_| Ok(Vec::new()), say);
+    failures.extend(more);
+    (outcomes, failures)
+}
+
+/// Measures subjects on `scene` as `plan` has it, whose builders are not looked at.
+pub fn measure_subjects<'a>(
+    scene: &Scene,
+    device: Option<&Device>,
+    entrants: Vec<Entrant<'a>>,
+    plan: &BenchPlan,
+    besides: &mut Besides<'_, 'a>,
+    say: &mut dyn FnMut(&str),
+) -> (Vec<Outcome>, Vec<Failure<OnScene>>) {
+    let entry = |Entrant { subject, is_traced }| {
+        let record = blank(scene, device, &*subject);
+        Entry { subject, record, faults: Vec::new(), failure: None, is_traced }
+    };
+    let mut failures = Vec::new();
+    let mut rounds = Rounds { entries: entrants.into_iter().map(entry).collect() };
 
     say("building");
-    let builds = rounds.run(plan.runs, |entry| entry.subject.build());
+    let builds = all_rounds(rounds.live(), plan.runs, |entry| entry.subject.build());
     for (entry, runs) in builds {
         entry.record.build = build_of(entry.subject.timer(), &runs);
     }
     say("validating");
-    rounds.once(|entry| {
+    once(rounds.live(), |entry| {
         entry.record.memory = entry.subject.memory();
         entry.record.quality = entry.subject.quality(plan.c_t, plan.c_i)?;
-        entry.record.quality.epo = entry.subject.epo(plan.c_t, plan.c_i, plan.epo)?;
+        let epo = if entry.is_traced { plan.epo } else { Epo::Off };
+        entry.record.quality.epo = entry.subject.epo(plan.c_t, plan.c_i, epo)?;
         match entry.subject.validate() {
             Err(error @ Error::Library(hedgerow::Error::InvalidStructure(_))) => entry.faults.push(error.to_string()),
             other => other?,
         }
         Ok(())
     });
+
+    rounds.entries = rounds.entries.into_iter().flat_map(|entry| with_others(entry, scene, device, besides)).collect();
 
     // Rays follow from hits. Those of a plain tree on the host are the same on every machine and for every builder.
     let mesh = &scene.mesh;
@@ -155,16 +186,49 @@ pub fn measure(
 
     let mut outcomes = Vec::new();
     for entry in rounds.entries {
-        let Entry { spec, subject, mut record, faults, failure } = entry;
+        let Entry { subject, mut record, faults, failure, is_traced } = entry;
         if let Some(error) = failure {
-            failures.push(fail(spec, error));
+            let at = OnScene { scene: scene.name.clone(), builder: Some(record.builder) };
+            failures.push(Failure { at, what: error.to_string() });
             continue;
         }
-        record.valid = Some(faults.is_empty());
+        record.valid = (is_traced || !faults.is_empty()).then_some(faults.is_empty());
         let traffic = record.build.phases.iter().map(|phase| subject.traffic(&phase.name)).collect();
         outcomes.push(Outcome { choice: subject.choice(), traffic, record, faults });
     }
     (outcomes, failures)
+}
+
+/// An entry whose tree is measured, and behind it those of the subjects that trace the same tree.
+fn with_others<'a>(
+    mut entry: Entry<'a>,
+    scene: &Scene,
+    device: Option<&Device>,
+    besides: &mut Besides<'_, 'a>,
+) -> Vec<Entry<'a>> {
+    if entry.failure.is_some() {
+        return vec![entry];
+    }
+    let others = match besides(entry.subject.as_mut()) {
+        Ok(others) => others,
+        Err(error) => {
+            entry.failure = Some(error);
+            return vec![entry];
+        }
+    };
+    let mut all = vec![entry];
+    for subject in others {
+        let Entry { record: of_build, faults, .. } = &all[0];
+        let record = Record {
+            build: of_build.build.clone(),
+            memory: of_build.memory.clone(),
+            quality: of_build.quality.clone(),
+            ..blank(scene, device, &*subject)
+        };
+        let faults = faults.clone();
+        all.push(Entry { subject, record, faults, failure: None, is_traced: true });
+    }
+    all
 }
 
 /// The record before anything was measured.
@@ -201,6 +265,8 @@ fn build_of(timer: &str, runs: &[BuildRun]) -> BuildRecord {
         let times: Vec<f64> = runs.iter().filter_map(|run| Some(run.phases.get(i)?.milliseconds)).collect();
         PhaseRecord { name: phase.name.to_owned(), median_ms: Spread::of(&times).map_or(0.0, |s| s.median) }
     };
+    let on_cpu: Vec<f64> = runs.iter().filter_map(|run| Some(run.on_cpu?.milliseconds)).collect();
+    let cpu = Spread::of(&on_cpu);
     BuildRecord {
         runs: spread.runs,
         median_ms: spread.median,
@@ -208,6 +274,10 @@ fn build_of(timer: &str, runs: &[BuildRun]) -> BuildRecord {
         max_ms: spread.max,
         timer: timer.to_owned(),
         phases: names.iter().enumerate().map(phase).collect(),
+        threads: runs.last().and_then(|run| run.on_cpu).map(|on_cpu| on_cpu.threads),
+        cpu_median_ms: cpu.map(|cpu| cpu.median),
+        cpu_min_ms: cpu.map(|cpu| cpu.min),
+        cpu_max_ms: cpu.map(|cpu| cpu.max),
     }
 }
 
@@ -241,30 +311,14 @@ impl<'a> Rounds<'a> {
         self.entries.iter_mut().filter(|entry| entry.failure.is_none()).collect()
     }
 
-    /// The samples of every builder that goes through all rounds; the others are marked as failed.
-    fn run<T>(&mut self, runs: u32, mut run: impl FnMut(&mut Entry<'a>) -> Result<T>) -> Vec<(&mut Entry<'a>, Vec<T>)> {
-        let mut live = self.live();
-        let samples = in_turn(&mut live, WARM_UPS, runs, |entry| run(entry));
-        let mut collected = Vec::new();
-        for (entry, samples) in live.into_iter().zip(samples) {
-            match samples {
-                Ok(samples) => collected.push((entry, samples)),
-                Err(error) => entry.failure = Some(error),
-            }
-        }
-        collected
-    }
-
-    /// Once for every builder, no clock running.
-    fn once(&mut self, mut run: impl FnMut(&mut Entry<'a>) -> Result<()>) {
-        for entry in self.live() {
-            entry.failure = run(entry).err();
-        }
+    /// Those of them that rays go through.
+    fn traced(&mut self) -> Vec<&mut Entry<'a>> {
+        self.live().into_iter().filter(|entry| entry.is_traced).collect()
     }
 
     /// Traces `rays` with every builder for the leaves that they visit, and nothing else.
     fn variability(&mut self, kind: RayKind, rays: &[Ray]) {
-        self.once(|entry| {
+        once(self.traced(), |entry| {
             entry.subject.set_rays(rays)?;
             entry.record.quality.lcv = entry.subject.work(kind.query())?.as_deref().and_then(leaf_count_variability);
             Ok(())
@@ -274,15 +328,15 @@ impl<'a> Rounds<'a> {
     /// Traces `rays` with every builder and compares what they hit.
     fn trace(&mut self, kind: RayKind, rays: &[Ray], runs: u32, truth: &Bvh2) {
         let query = kind.query();
-        self.once(|entry| entry.subject.set_rays(rays));
+        once(self.traced(), |entry| entry.subject.set_rays(rays));
         let speeds: Vec<Option<Spread>> = {
-            let runs = self.run(runs, |entry| entry.subject.trace(query));
+            let runs = all_rounds(self.traced(), runs, |entry| entry.subject.trace(query));
             runs.iter().map(|(_, times)| Spread::of(times)).collect()
         };
         let sample = Sample::take(truth, rays, query, BRUTE_FORCE_TESTS);
         let mut reference: Option<(String, Vec<Hit>)> = None;
         let mut speeds = speeds.into_iter();
-        self.once(|entry| {
+        once(self.traced(), |entry| {
             let milliseconds = speeds.next().flatten().map_or(f64::NAN, |s| s.median);
             let hits = entry.subject.hits()?;
             if let Some((i, truth)) = sample.first_wrong(rays, &hits) {
@@ -318,6 +372,30 @@ impl<'a> Rounds<'a> {
     }
 }
 
+/// The samples of every builder that goes through all rounds; the others are marked as failed.
+fn all_rounds<'e, 'a, T>(
+    mut entries: Vec<&'e mut Entry<'a>>,
+    runs: u32,
+    mut run: impl FnMut(&mut Entry<'a>) -> Result<T>,
+) -> Vec<(&'e mut Entry<'a>, Vec<T>)> {
+    let samples = in_turn(&mut entries, WARM_UPS, runs, |entry| run(entry));
+    let mut collected = Vec::new();
+    for (entry, samples) in entries.into_iter().zip(samples) {
+        match samples {
+            Ok(samples) => collected.push((entry, samples)),
+            Err(error) => entry.failure = Some(error),
+        }
+    }
+    collected
+}
+
+/// Once for every builder, no clock running.
+fn once<'a>(entries: Vec<&mut Entry<'a>>, mut run: impl FnMut(&mut Entry<'a>) -> Result<()>) {
+    for entry in entries {
+        entry.failure = run(entry).err();
+    }
+}
+
 /// Standard deviation of the number of leaves that a ray visits (Aila, Karras, Laine 2013, section 3.3); `None` without rays.
 fn leaf_count_variability(work: &[Work]) -> Option<f64> {
     let mean = |of: &dyn Fn(f64) -> f64| work.iter().map(|w| of(f64::from(w.leaves))).sum::<f64>() / work.len() as f64;
@@ -339,7 +417,7 @@ fn checksum(query: Query, hits: &[Hit]) -> f64 {
 mod tests {
     use super::*;
     use crate::scene::{self, LoadOptions};
-    use crate::subjects::builders;
+    use crate::subjects::{OnCpu, builders};
 
     fn plan(builders: &str) -> BenchPlan {
         BenchPlan {
@@ -366,6 +444,8 @@ mod tests {
             assert_eq!((record.build.runs, record.trace.len()), (2, RayKind::ALL.len()));
             assert!(record.build.min_ms <= record.build.median_ms && record.build.median_ms <= record.build.max_ms);
             assert_eq!(record.quality.refs, Some(record.triangles));
+            let sums = record.quality.sah_inner.zip(record.quality.sah_leaf);
+            assert_eq!(record.quality.sah, sums.map(|(inner, leaf)| 3.0 * inner + 2.0 * leaf));
             assert!(record.quality.epo.is_some_and(|epo| epo > 0.0), "{:?}", record.quality);
             assert!(record.quality.lcv.is_some_and(|lcv| lcv > 0.0), "{:?}", record.quality);
             let primary = record.rays("primary").expect("traced");
@@ -408,15 +488,17 @@ mod tests {
     #[test]
     fn medians_of_builds_are_taken_phase_by_phase() {
         let run = |a, b| BuildRun {
-            milliseconds: a + b,
-            phases: vec![
+            on_cpu: Some(OnCpu { threads: 2, milliseconds: 2.0 * b }),
+            ..BuildRun::of(vec![
                 hedgerow::gpu::Phase { name: "sort", milliseconds: a },
                 hedgerow::gpu::Phase { name: "hierarchy", milliseconds: b },
-            ],
+            ])
         };
         let build = build_of("device", &[run(1.0, 9.0), run(2.0, 4.0), run(3.0, 5.0)]);
         assert_eq!((build.median_ms, build.min_ms, build.max_ms, build.runs), (8.0, 6.0, 10.0, 3));
         let medians: Vec<_> = build.phases.iter().map(|p| (p.name.as_str(), p.median_ms)).collect();
         assert_eq!(medians, [("sort", 2.0), ("hierarchy", 5.0)]);
+        assert_eq!((build.threads, build.cpu_median_ms), (Some(2), Some(10.0)));
+        assert_eq!((build.cpu_min_ms, build.cpu_max_ms), (Some(8.0), Some(18.0)));
     }
 }

@@ -48,7 +48,7 @@ pub fn write_csv(path: &Path, records: &[&Record]) -> Result<()> {
 /// A column: its name, and its value in a record.
 type Column = (&'static str, fn(&Record) -> String);
 
-const COLUMNS: [Column; 31] = [
+const COLUMNS: [Column; 35] = [
     ("scene", |r| r.scene.clone()),
     ("triangles", |r| r.triangles.to_string()),
     ("builder", |r| r.builder.clone()),
@@ -63,11 +63,15 @@ const COLUMNS: [Column; 31] = [
     ("build_ms", |r| r.build.median_ms.to_string()),
     ("build_min_ms", |r| r.build.min_ms.to_string()),
     ("build_max_ms", |r| r.build.max_ms.to_string()),
+    ("threads", |r| text(r.build.threads)),
+    ("cpu_ms", |r| text(r.build.cpu_median_ms)),
     ("mtris_s", |r| r.mtris_s().to_string()),
     ("structure_bytes", |r| text(r.memory.structure_bytes)),
     ("scratch_bytes", |r| text(r.memory.scratch_bytes)),
     ("peak_bytes", |r| text(r.memory.peak_bytes)),
     ("sah", |r| text(r.quality.sah)),
+    ("sah_inner", |r| text(r.quality.sah_inner)),
+    ("sah_leaf", |r| text(r.quality.sah_leaf)),
     ("epo", |r| text(r.quality.epo)),
     ("lcv", |r| text(r.quality.lcv)),
     ("inner", |r| text(r.quality.inner)),

@@ -65,7 +65,7 @@ mod tests {
             min_ms: median_ms,
             max_ms: median_ms,
             timer: "device".into(),
-            phases: vec![],
+            ..BuildRecord::default()
         };
         let trace = TraceRecord {
             rays: "primary".into(),

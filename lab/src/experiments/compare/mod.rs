@@ -144,7 +144,7 @@ mod tests {
                 min_ms: min,
                 max_ms: max,
                 timer: "device".into(),
-                phases: Vec::new(),
+                ..BuildRecord::default()
             },
             memory: MemoryRecord::default(),
             quality: QualityRecord { sah, c_t: 3.0, c_i: 2.0, ..QualityRecord::default() },

@@ -19,6 +19,7 @@ use super::peers::driver::Driver;
 use super::peers::embree::Embree;
 #[cfg(feature = "peer-obvhs")]
 use super::peers::obvhs::Obvhs;
+use super::retraced::{Retraced, TreeTracer};
 use crate::device::Device;
 use crate::scene::Mesh;
 use crate::{Error, Result};
@@ -88,9 +89,9 @@ impl Spec {
         let given =
             || device.ok_or_else(|| Error::NoVulkan("this builder works on a device, and none was opened".into()));
         let name = self.to_string();
-        Ok(match self.plan()? {
+        let subject: Box<dyn Subject + 'a> = match self.plan()? {
             BuilderPlan::Device(plan) => Box::new(plan.make(given()?, &name, mesh)?),
-            BuilderPlan::Host(options) => Box::new(Host::new(&name, mesh, options)),
+            BuilderPlan::Host(plan) => Box::new(Host::new(&name, mesh, plan)?),
             BuilderPlan::Kd(KdSpec::Host { options, traversal, traces_on_device }) => {
                 let rays = match traces_on_device {
                     false => KdRays::on_host(traversal),
@@ -107,6 +108,11 @@ impl Spec {
             BuilderPlan::Obvhs(preset) => Box::new(Obvhs::new(mesh, preset)?),
             #[cfg(feature = "peer-embree")]
             BuilderPlan::Embree(preset) => Box::new(Embree::new(mesh, preset)?),
+        };
+        Ok(match self.tracer()? {
+            None => subject,
+            Some(TreeTracer::Host) => Box::new(Retraced::by_builder(&name, subject, None)?),
+            Some(TreeTracer::Device) => Box::new(Retraced::by_builder(&name, subject, Some(given()?))?),
         })
     }
 
@@ -139,7 +145,7 @@ impl FromStr for Spec {
                 Error::Argument(format!("builder {text}: option {part:?} has no value; write {part}=VALUE"))
             })?;
             if !builder.takes(key) {
-                let keys: Vec<_> = builder.options.iter().map(|option| option.key).collect();
+                let keys: Vec<_> = builder.all_options().map(|option| option.key).collect();
                 let there_are =
                     if keys.is_empty() { "it takes none".into() } else { format!("it takes {}", keys.join(", ")) };
                 return Err(Error::Argument(format!("builder {text}: {name} has no option {key:?}; {there_are}")));
@@ -150,6 +156,7 @@ impl FromStr for Spec {
             spec.options.push((key.to_owned(), value.to_owned()));
         }
         spec.plan()?;
+        spec.tracer()?;
         Ok(spec)
     }
 }
@@ -189,7 +196,7 @@ pub fn help() -> String {
     let mut text = String::from("Builders, each option behind a colon as in NAME:KEY=VALUE:\n");
     for builder in BUILDERS {
         text += &format!("  {:18} {}\n", builder.name, builder.what);
-        for option in builder.options {
+        for option in builder.all_options() {
             text += &format!("  {:18}   :{}=  {}\n", "", option.key, option.values);
         }
     }
@@ -199,6 +206,7 @@ pub fn help() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::subjects::host::HostPlan;
     use hedgerow::bvh::sah::Collapse;
     use hedgerow::trace::kd::Traversal;
 
@@ -230,6 +238,16 @@ mod tests {
     }
 
     #[test]
+    fn a_builder_on_the_host_has_the_threads_that_it_is_given() {
+        let threads = |text: &str| match text.parse::<Spec>().expect("known").plan().expect("checked") {
+            BuilderPlan::Host(HostPlan::Built { threads, .. }) => threads.map(|threads| threads.get()),
+            _ => panic!("{text} is built on the host"),
+        };
+        let given = ["sweep:threads=1", "binned:axes=all:threads=2", "bonsai-p2:threads=1024", "binned"].map(threads);
+        assert_eq!(given, [Some(1), Some(2), Some(1024), None]);
+    }
+
+    #[test]
     fn rays_a_build_reach_the_builder_that_chooses_by_them() {
         let for_rays = |text: &str| text.parse::<Spec>().expect("known").for_rays(2e6).to_string();
         assert_eq!(for_rays("auto"), "auto:rays=2000000");
@@ -242,6 +260,7 @@ mod tests {
         let needs = |text: &str| text.parse::<Spec>().expect("known").needs();
         assert_eq!(needs("kd-binned:trace=device"), Needs::Device);
         assert_eq!([needs("kd-binned"), needs("kd-exact:trace=host")], [Needs::Nothing; 2]);
+        assert_eq!([needs("sweep:trace=device"), needs("sweep:trace=host")], [Needs::Device, Needs::Nothing]);
         assert_eq!([needs("lbvh"), needs("driver-fast-build")], [Needs::Device, Needs::RayQuery]);
     }
 
@@ -285,8 +304,14 @@ mod tests {
             let says = format!("traversal={wrong} is unknown; use stack, restart, push-down, short-N");
             assert!(error_of(&format!("kd-exact:traversal={wrong}")).contains(&says), "{wrong}");
         }
+        assert!(error_of("sweep:trace=there").contains("trace=there is unknown; use host or device"));
         assert!(error_of("kd-exact:trace=there").contains("trace=there is unknown; use host or device"));
         assert!(error_of("kd-exact:bins=8").contains("no option \"bins\"; it takes kt, ki, traversal, trace"));
+        for wrong in ["some", "0", "-1", "1025"] {
+            let says = format!("threads={wrong} is unknown; use a number of threads that build, from 1 to 1024");
+            assert!(error_of(&format!("sweep:threads={wrong}")).contains(&says), "{wrong}");
+        }
+        assert!(error_of("lbvh-host:threads=2").contains("no option \"threads\""));
         assert!(error_of("auto:rays=many").contains("is not a number of rays per build"));
         assert!(error_of("").contains("-b all"));
         assert!(error_of(",").contains("-b all"));

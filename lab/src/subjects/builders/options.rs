@@ -1,9 +1,11 @@
 //! What options there are, and what a [`Spec`] says with them.
 
 use super::plan::{BuilderPlan, DevicePlan, KdSpec};
+use super::table::{BUILDERS, BuilderEntry};
 use super::{BuilderOption, Spec};
 use crate::subjects::auto;
-use crate::subjects::host::{HostBvhOptions, HostMethod};
+use crate::subjects::host::{HostPlan, TwinPlan};
+use crate::subjects::retraced::TreeTracer;
 use crate::{Error, Result};
 use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
 use hedgerow::bvh::codes::Codes;
@@ -15,8 +17,14 @@ use hedgerow::kdtree::builder::{KdOptions, KdSchedule};
 use hedgerow::kdtree::termination::Costs;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::wide::Order;
+use hedgerow_host::bvh::binned::{BinnedAxes, BinnedOptions, Bins};
+use hedgerow_host::bvh::{
+    AacOptions, BonsaiOptions, HostBvhOptions, HostMethod, HostOptimise, IncrementalOptions, IncrementalOrder,
+    Inefficiency, InsertionOptions, Termination,
+};
 use hedgerow_host::kdtree::{HostKdOptions, Planes};
-use hedgerow_host::sweep::Leaves;
+use std::num::NonZeroU32;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -35,6 +43,26 @@ pub(super) const WIDTH: BuilderOption = option("width", "2, 4, 8 or 8q (quantise
 pub(super) const ORDER: BuilderOption = option("order", "distance or octant (of width=8q)");
 pub(super) const TERMINATION: BuilderOption =
     option("termination", "sah, or off: leaves of one triangle, then collapsed");
+pub(super) const TERMINATION_FLAT: BuilderOption = option(
+    "termination",
+    "sah, or off: leaves of one triangle, then collapsed, or flat: also a leaf where centroids are in a plane along the axes",
+);
+pub(super) const LEAF: BuilderOption = option("leaf", "a number of triangles from 1 to 255 that always are a leaf");
+pub(super) const AXES: BuilderOption = option("axes", "longest or all");
+pub(super) const HOST_BINS: BuilderOption =
+    option("bins", "a number of bins from 2 to 256, or adaptive: 4 + 2 √n of n triangles");
+pub(super) const MINI: BuilderOption =
+    option("mini", "a number of triangles at most in a mini tree, from 1 to 1000000");
+pub(super) const PRUNE: BuilderOption =
+    option("prune", "off, or a number from 0 to 100: mini trees of more than this part of their mean area are pruned");
+pub(super) const DELTA: BuilderOption =
+    option("delta", "a number of triangles from 2 to 1000: fewer are clustered without regard to the order of codes");
+pub(super) const EPSILON: BuilderOption = option(
+    "epsilon",
+    "a number of tenths from 0 to 5: n triangles leave about n^(1/2 - epsilon) clusters to their parent",
+);
+pub(super) const THREADS: BuilderOption =
+    option("threads", "a number of threads that build, from 1 to 1024; unless given, as --threads says");
 pub(super) const SCHEDULE: BuilderOption = option("schedule", "chain, persistent or workgroup");
 pub(super) const KD_SCHEDULE: BuilderOption = option("schedule", "chain or persistent");
 pub(super) const SPLIT: BuilderOption = option(
@@ -45,6 +73,16 @@ pub(super) const OPTIMISE: BuilderOption = option(
     "optimise",
     "off, fast, medium, high, a number of passes of reinsertion, or on the device a time for it as in 20ms",
 );
+pub(super) const HOST_OPTIMISE: BuilderOption = option(
+    "optimise",
+    "off; fast, medium, high or a number of passes of reinsertion; insertion, or by one measure alone insertion-sum, \
+             insertion-min or insertion-area",
+);
+pub(super) const BATCH: BuilderOption =
+    option("batch", "a number of triangles from 1 to 100000000 that are put in between two optimisations");
+pub(super) const INSERT_ORDER: BuilderOption = option("order", "file or shuffled");
+pub(super) const SEARCH: BuilderOption =
+    option("search", "a number from 1 to 65536 of triangles that look for their places at once");
 pub(super) const BITS: BuilderOption = option("bits", "a number of bits that the codes of a treelet share");
 pub(super) const TREELET: BuilderOption = option("treelet", "a number of primitives at most, from 1");
 pub(super) const WINDOW: BuilderOption = option("window", "an even number of clusters from 4 to 64");
@@ -63,6 +101,13 @@ pub(super) const TRAVERSAL: BuilderOption = option(
 );
 
 pub(super) const TRACE: BuilderOption = option("trace", "host or device: where rays are traced; host unless given");
+pub(super) static TRACE_TREE: BuilderOption = option(
+    "trace",
+    "host or device: where our tracer takes rays through the tree; unless given, its own does on the host",
+);
+
+/// Threads that a builder may have of its own.
+const MOST_THREADS: NonZeroU32 = NonZeroU32::new(1024).expect("not 0");
 
 /// Of `ploc` where it is not told: what drivers take.
 const PLOC_RADIUS: u32 = 16;
@@ -123,22 +168,109 @@ impl Spec {
         auto::rays_of(self.option(RAYS.key))
     }
 
-    /// Options `codes`, `collapse` and `optimise` of a builder on the host.
-    pub(super) fn on_host(&self, hierarchy: HostMethod) -> Result<BuilderPlan> {
+    /// Options `codes`, `collapse` and `optimise` of the twin of `lbvh`.
+    pub(super) fn twin(&self) -> Result<BuilderPlan> {
+        let (codes, collapse, reinsertion) = (self.codes()?, self.collapse()?, self.reinsertion_on_host()?);
+        Ok(BuilderPlan::Host(HostPlan::Twin(TwinPlan { codes, reinsertion, collapse })))
+    }
+
+    /// Options `radius`, 25 where it was not given, and those of every builder on the host.
+    pub(super) fn ploc_on_host(&self) -> Result<BuilderPlan> {
+        let radius = self.within(&RADIUS, 1..=usize::MAX)?.unwrap_or(25);
+        self.on_host(HostMethod::Ploc { radius })
+    }
+
+    /// Options `delta` and `epsilon`, where they differ from the preset's, and those of every builder on the host.
+    pub(super) fn aac(&self, preset: AacOptions) -> Result<BuilderPlan> {
+        let delta = self.within(&DELTA, 2..=AacOptions::MAX_DELTA)?.unwrap_or(preset.delta);
+        let epsilon = self.within(&EPSILON, 0..=AacOptions::MAX_EPSILON)?.unwrap_or(preset.epsilon);
+        self.on_host(HostMethod::Aac(AacOptions { delta, epsilon }))
+    }
+
+    /// Options `bins`, `leaf`, `axes` and `termination` of the binned builder, and those of every builder on the host.
+    pub(super) fn binned(&self) -> Result<BuilderPlan> {
+        let default = BinnedOptions::WALD;
+        let bins = match self.option(HOST_BINS.key) {
+            Some("adaptive") => Bins::Adaptive,
+            Some(_) => self.within(&HOST_BINS, 2..=Bins::MOST)?.map_or(default.bins, Bins::Fixed),
+            None => default.bins,
+        };
+        let axes = [("longest", BinnedAxes::Longest), ("all", BinnedAxes::All)];
+        let options = BinnedOptions {
+            bins,
+            leaf: self.within(&LEAF, 1..=255)?.unwrap_or(default.leaf),
+            axes: self.choice(&AXES, &axes)?.unwrap_or(default.axes),
+            flat_leaves: self.option(TERMINATION_FLAT.key) == Some("flat"),
+        };
+        self.on_host(HostMethod::Binned(options))
+    }
+
+    /// Options `mini` and `prune`, where they differ from the preset's, and those of every builder on the host.
+    pub(super) fn bonsai(&self, preset: BonsaiOptions) -> Result<BuilderPlan> {
+        let mini = self.within(&MINI, 1..=1_000_000)?.unwrap_or(preset.mini);
+        let prune = match self.option(PRUNE.key) {
+            Some("off") => None,
+            Some(_) => self.within(&PRUNE, 0.0..=100.0)?,
+            None => preset.prune,
+        };
+        self.on_host(HostMethod::Bonsai(BonsaiOptions { mini, prune }))
+    }
+
+    /// Options `codes`, `termination`, `collapse`, `optimise` and `threads` of a builder of BVHs on the host.
+    pub(super) fn on_host(&self, method: HostMethod) -> Result<BuilderPlan> {
+        let all = [("off", Termination::Single), ("sah", Termination::Sah), ("flat", Termination::Sah)];
+        let (option, known) = match method {
+            HostMethod::Binned(_) => (&TERMINATION_FLAT, &all[..]),
+            _ => (&TERMINATION, &all[..2]),
+        };
+        let termination = self.choice(option, known)?.unwrap_or(Termination::Sah);
+        let optimise = self.optimise_on_host()?;
+        let options =
+            HostBvhOptions { codes: self.codes()?, collapse: self.collapse()?, termination, optimise, method };
+        options.check()?;
+        let threads = self.within(&THREADS, NonZeroU32::MIN..=MOST_THREADS)?;
+        Ok(BuilderPlan::Host(HostPlan::Built { options, threads }))
+    }
+
+    /// Options `batch`, `order` and `search`, and those of every builder on the host.
+    pub(super) fn incremental(&self) -> Result<BuilderPlan> {
+        let paper = IncrementalOptions::PAPER;
+        let orders = [("file", IncrementalOrder::File), ("shuffled", IncrementalOrder::Shuffled)];
+        self.on_host(HostMethod::Incremental(IncrementalOptions {
+            batch: self.within(&BATCH, 1..=100_000_000)?.unwrap_or(paper.batch),
+            order: self.choice(&INSERT_ORDER, &orders)?.unwrap_or(paper.order),
+            search: self.within(&SEARCH, 1..=IncrementalOptions::MOST_SEARCHES)?.unwrap_or(paper.search),
+            ..paper
+        }))
+    }
+
+    /// A builder on the host with all options chosen but `collapse` and `threads`.
+    pub(super) fn preset(&self, options: HostBvhOptions) -> Result<BuilderPlan> {
+        let options = HostBvhOptions { collapse: self.collapse()?, ..options };
+        let threads = self.within(&THREADS, NonZeroU32::MIN..=MOST_THREADS)?;
+        Ok(BuilderPlan::Host(HostPlan::Built { options, threads }))
+    }
+
+    /// Option `optimise` of a builder of BVHs on the host that may also insert.
+    fn optimise_on_host(&self) -> Result<HostOptimise> {
+        let measure = match self.option(HOST_OPTIMISE.key) {
+            Some("insertion") => Inefficiency::Combined,
+            Some("insertion-sum") => Inefficiency::Sum,
+            Some("insertion-min") => Inefficiency::Min,
+            Some("insertion-area") => Inefficiency::Area,
+            Some(value) if value.starts_with("insertion") => return Err(self.wrong_value(&HOST_OPTIMISE, value)),
+            _ => return Ok(self.reinsertion_on_host()?.map_or(HostOptimise::Off, HostOptimise::Reinsertion)),
+        };
+        Ok(HostOptimise::Insertion(InsertionOptions::by(measure)))
+    }
+
+    /// Option `optimise` of a builder on the host, which takes no time for it.
+    fn reinsertion_on_host(&self) -> Result<Option<ReinsertionOptions>> {
         if self.option(OPTIMISE.key).is_some_and(|value| value.ends_with("ms")) {
             let what = "on the host rounds are not timed; take fast, medium, high or a number of passes";
             return Err(Error::Argument(format!("builder {self}: {}: {what}", OPTIMISE.key)));
         }
-        let (codes, collapse) = (self.codes()?, self.collapse()?);
-        Ok(BuilderPlan::Host(HostBvhOptions { hierarchy, codes, reinsertion: self.reinsertion()?, collapse }))
-    }
-
-    /// Those of every builder on the host, and `radius`; 25 where it was not given.
-    pub(super) fn ploc_on_host(&self) -> Result<BuilderPlan> {
-        match self.parsed(&RADIUS)?.unwrap_or(25) {
-            0 => Err(self.wrong_value(&RADIUS, "0")),
-            radius => self.on_host(HostMethod::Ploc(radius as usize)),
-        }
+        self.reinsertion()
     }
 
     /// Options `kt`, `ki`, `traversal` and `trace` of a builder of kd-trees on the host.
@@ -146,6 +278,14 @@ impl Spec {
         let options = self.kd_options(planes)?;
         let traces_on_device = self.choice(&TRACE, &[("host", false), ("device", true)])?.unwrap_or(false);
         Ok(BuilderPlan::Kd(KdSpec::Host { options, traversal: self.traversal(traces_on_device)?, traces_on_device }))
+    }
+
+    /// Where our tracer takes rays through a BVH of the host, if that was given.
+    pub(super) fn tracer(&self) -> Result<Option<TreeTracer>> {
+        if !self.builder().builds_bvh_on_host() {
+            return Ok(None);
+        }
+        self.choice(&TRACE_TREE, &[("host", TreeTracer::Host), ("device", TreeTracer::Device)])
     }
 
     /// Those of every builder of kd-trees on the host, and `bins` and `exact`.
@@ -190,13 +330,6 @@ impl Spec {
         }
     }
 
-    /// Option `termination`, if `optimise` and `collapse` leave it a choice: both need leaves of one triangle.
-    pub(super) fn sweep_leaves(&self) -> Result<Leaves> {
-        let single = !self.collapse()?.enabled || self.reinsertion()?.is_some();
-        let wanted = self.choice(&TERMINATION, &[("off", Leaves::Single), ("sah", Leaves::Terminated)])?;
-        Ok(if single { Leaves::Single } else { wanted.unwrap_or(Leaves::Terminated) })
-    }
-
     /// Option `codes`.
     pub(super) fn codes(&self) -> Result<Option<Codes>> {
         Ok(self.option(CODES.key).map(str::parse).transpose()?)
@@ -234,6 +367,12 @@ impl Spec {
             Some("fast") => Some(ReinsertionOptions::FAST),
             Some("medium") => Some(ReinsertionOptions::MEDIUM),
             Some("high") => Some(ReinsertionOptions::HIGH),
+            Some(value) if value.starts_with("insertion") => {
+                let inserts = |entry: &&BuilderEntry| entry.options.iter().any(|o| o.values == HOST_OPTIMISE.values);
+                let names: Vec<&str> = BUILDERS.iter().filter(inserts).map(|entry| entry.name).collect();
+                let what = format!("{}={value} is for builders on the CPU: {}", OPTIMISE.key, names.join(", "));
+                return Err(Error::Argument(format!("builder {self}: {what}; use {} here", OPTIMISE.values)));
+            }
             Some(_) if self.time_to_optimise()?.is_some() => Some(ReinsertionOptions::FAST),
             Some(_) => self.parsed(&OPTIMISE)?.map(ReinsertionOptions::of_passes),
         })
@@ -250,6 +389,13 @@ impl Spec {
     pub(super) fn parsed<T: FromStr>(&self, option: &BuilderOption) -> Result<Option<T>> {
         let Some(value) = self.option(option.key) else { return Ok(None) };
         value.parse().map(Some).map_err(|_| self.wrong_value(option, value))
+    }
+
+    /// The same of a number within these bounds.
+    fn within<T: FromStr + PartialOrd>(&self, option: &BuilderOption, bounds: RangeInclusive<T>) -> Result<Option<T>> {
+        let number = self.parsed(option)?;
+        let is_within = number.as_ref().is_none_or(|number| bounds.contains(number));
+        if is_within { Ok(number) } else { Err(self.wrong_value(option, self.option(option.key).unwrap_or_default())) }
     }
 
     fn wrong_value(&self, option: &BuilderOption, value: &str) -> Error {

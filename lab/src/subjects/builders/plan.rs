@@ -6,7 +6,7 @@ use crate::device::Device;
 use crate::scene::Mesh;
 use crate::subjects::Subject;
 use crate::subjects::device_bvh::DeviceBvh;
-use crate::subjects::host::HostBvhOptions;
+use crate::subjects::host::HostPlan;
 use crate::subjects::peers::driver::DriverPreference;
 #[cfg(feature = "peer-embree")]
 use crate::subjects::peers::embree;
@@ -26,7 +26,7 @@ pub(crate) enum BuilderPlan {
     /// One of ours on the device.
     Device(DevicePlan),
     /// One of ours on the host.
-    Host(HostBvhOptions),
+    Host(HostPlan),
     /// A kd-tree by one of ours.
     Kd(KdSpec),
     /// The one of ours on the device that is expected to take least for a number of rays per build, by the table of costs.

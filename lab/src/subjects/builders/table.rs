@@ -1,18 +1,21 @@
 //! The list of all builders.
 
 use super::options::{
-    BINS, BITS, CODES, COLLAPSE, EXACT, KD_SCHEDULE, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT,
-    TERMINATION, TRACE, TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
+    AXES, BATCH, BINS, BITS, CODES, COLLAPSE, DELTA, EPSILON, EXACT, HOST_BINS, HOST_OPTIMISE, INSERT_ORDER,
+    KD_SCHEDULE, KI, KT, LEAF, MINI, OPTIMISE, ORDER, PRUNE, RADIUS, RAYS, SCHEDULE, SEARCH, SPLIT, TERMINATION,
+    TERMINATION_FLAT, THREADS, TRACE, TRACE_TREE, TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
 };
 use super::{BuilderPlan, Spec};
 use crate::Result;
-use crate::subjects::host::HostMethod;
+#[cfg(feature = "peer-embree")]
+use crate::subjects::host::HostPlan;
 use crate::subjects::peers::driver::DriverPreference;
 #[cfg(feature = "peer-embree")]
 use crate::subjects::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use crate::subjects::peers::obvhs;
 use hedgerow::bvh::builder::Method;
+use hedgerow_host::bvh::{AacOptions, BonsaiOptions, HostBvhOptions, HostMethod};
 use hedgerow_host::kdtree::Planes;
 use std::slice;
 
@@ -75,9 +78,19 @@ impl BuilderEntry {
         BuilderEntry { variants, ..self }
     }
 
+    /// Its options, with the one of all builders of BVHs on the host.
+    pub fn all_options(&self) -> impl Iterator<Item = &'static BuilderOption> {
+        self.options.iter().chain(self.builds_bvh_on_host().then_some(&TRACE_TREE))
+    }
+
     /// Whether it has an option of this name.
     pub(super) fn takes(&self, key: &str) -> bool {
-        self.options.iter().any(|option| option.key == key)
+        self.all_options().any(|option| option.key == key)
+    }
+
+    /// Whether it builds a BVH on the host; builders of kd-trees there say themselves where rays are traced.
+    pub fn builds_bvh_on_host(&self) -> bool {
+        self.needs == Needs::Nothing && self.options.iter().all(|option| option.key != TRACE.key)
     }
 }
 
@@ -122,19 +135,69 @@ pub static BUILDERS: &[BuilderEntry] = &[
     )
     .taking(&[RAYS]),
     on_host(&"lbvh-host", "the same LBVH by one thread of the host: what `lbvh` must equal, byte for byte", |spec| {
-        spec.on_host(HostMethod::Lbvh)
+        spec.twin()
     })
     .taking(&[CODES, COLLAPSE, OPTIMISE]),
     on_host(
         &"ploc-host",
-        "locally-ordered clustering by one thread of the host: what `ploc` must equal, byte for byte",
+        "parallel locally-ordered clustering on the host: nearest neighbours in the order of codes merged in rounds",
         Spec::ploc_on_host,
     )
-    .taking(&[RADIUS, CODES, COLLAPSE, OPTIMISE]),
+    .taking(&[RADIUS, CODES, COLLAPSE, HOST_OPTIMISE, THREADS]),
     on_host(&"sweep", "full-sweep SAH on the host: the reference for the quality of the others", |spec| {
-        spec.on_host(HostMethod::Sweep(spec.sweep_leaves()?))
+        spec.on_host(HostMethod::Sweep)
     })
-    .taking(&[COLLAPSE, OPTIMISE, TERMINATION]),
+    .taking(&[COLLAPSE, HOST_OPTIMISE, TERMINATION, THREADS]),
+    on_host(&"binned", "binned SAH on the host: the best of the planes between bins, top-down", Spec::binned)
+        .taking(&[HOST_BINS, LEAF, AXES, TERMINATION_FLAT, COLLAPSE, HOST_OPTIMISE, THREADS])
+        .in_variants(&["binned", "binned:axes=all"]),
+    on_host(&"bonsai", "sweeps over parts of 512 triangles on the host, and one over their trees", |spec| {
+        spec.bonsai(BonsaiOptions::PLAIN)
+    })
+    .taking(&[MINI, PRUNE, TERMINATION, COLLAPSE, HOST_OPTIMISE, THREADS]),
+    on_host(&"bonsai-p", "the same with large mini trees pruned", |spec| spec.bonsai(BonsaiOptions::PRUNED)).taking(&[
+        MINI,
+        PRUNE,
+        TERMINATION,
+        COLLAPSE,
+        HOST_OPTIMISE,
+        THREADS,
+    ]),
+    on_host(&"bonsai-p2", "the same with parts of 4096 triangles, pruned further", |spec| {
+        spec.bonsai(BonsaiOptions::PRUNED_FINE)
+    })
+    .taking(&[MINI, PRUNE, TERMINATION, COLLAPSE, HOST_OPTIMISE, THREADS]),
+    on_host(
+        &"aac-hq",
+        "approximate agglomerative clustering on the host: bottom-up along the order of codes, nearest clusters first",
+        |spec| spec.aac(AacOptions::HIGH_QUALITY),
+    )
+    .taking(&[DELTA, EPSILON, CODES, COLLAPSE, HOST_OPTIMISE, THREADS]),
+    on_host(&"aac-fast", "the same with fewer clusters at a time", |spec| spec.aac(AacOptions::FAST)).taking(&[
+        DELTA,
+        EPSILON,
+        CODES,
+        COLLAPSE,
+        HOST_OPTIMISE,
+        THREADS,
+    ]),
+    on_host(
+        &"incremental",
+        "incremental construction on the host: one triangle after the other is put where it costs least",
+        Spec::incremental,
+    )
+    .taking(&[BATCH, INSERT_ORDER, SEARCH, COLLAPSE, HOST_OPTIMISE, THREADS])
+    .in_variants(&["incremental", "incremental:optimise=insertion"]),
+    on_host(&"host-fast", "the builder on the host to take where the build must be fast: aac-fast", |spec| {
+        spec.preset(HostBvhOptions::FAST)
+    })
+    .taking(&[COLLAPSE, THREADS]),
+    on_host(
+        &"host-best",
+        "the builder on the host to take where rays must be fast: sweep:optimise=insertion",
+        |spec| spec.preset(HostBvhOptions::BEST),
+    )
+    .taking(&[COLLAPSE, THREADS]),
     on_host(&"kd-exact", "kd-tree on the host: perfect splits by SAH", |spec| spec.kd_on_host(Planes::Exact))
         .taking(&[KT, KI, TRAVERSAL, TRACE]),
     on_host(&"kd-binned", "kd-tree on the host: the best by SAH of equally spaced planes", |spec| {
@@ -176,5 +239,19 @@ pub static BUILDERS: &[BuilderEntry] = &[
     #[cfg(feature = "peer-embree")]
     on_host(&"embree-high", "Embree on the CPU: SAH with spatial splits", |_| {
         Ok(BuilderPlan::Embree(embree::Preset::High))
+    }),
+    #[cfg(feature = "peer-embree")]
+    on_host(
+        &"embree-low-tree",
+        "the tree that Embree's rtcBuildBVH makes by Morton codes, traced by our tracer; phase build is Embree's alone, convert ours",
+        |_| Ok(BuilderPlan::Host(HostPlan::Embree(embree::Preset::Low))),
+    ),
+    #[cfg(feature = "peer-embree")]
+    on_host(&"embree-medium-tree", "the same by binned SAH", |_| {
+        Ok(BuilderPlan::Host(HostPlan::Embree(embree::Preset::Medium)))
+    }),
+    #[cfg(feature = "peer-embree")]
+    on_host(&"embree-high-tree", "the same by SAH with spatial splits: a triangle may be in several leaves", |_| {
+        Ok(BuilderPlan::Host(HostPlan::Embree(embree::Preset::High)))
     }),
 ];

@@ -102,7 +102,7 @@ impl Subject for Driver<'_> {
         })?;
         let phases = self.timestamps.phases()?;
         let bottom = phases.first().map_or(0.0, |p| p.milliseconds);
-        Ok(BuildRun { milliseconds: bottom, phases })
+        Ok(BuildRun { milliseconds: bottom, ..BuildRun::of(phases) })
     }
 
     fn memory(&self) -> record::MemoryRecord {

@@ -4,6 +4,7 @@
 
 use crate::measure::record;
 use crate::scene::Mesh;
+use crate::subjects::host_build::on_cpu;
 use crate::subjects::host_rays::timed;
 use crate::subjects::{BuildRun, Subject};
 use crate::{Error, Result};
@@ -27,12 +28,21 @@ pub enum Preset {
 }
 
 impl Preset {
-    /// The builder's name, and what Embree takes for it.
-    fn name_and_quality(self) -> (&'static str, BuildQuality) {
+    /// The builder's name.
+    fn name(self) -> &'static str {
         match self {
-            Preset::Low => ("embree-low", BuildQuality::LOW),
-            Preset::Medium => ("embree-medium", BuildQuality::MEDIUM),
-            Preset::High => ("embree-high", BuildQuality::HIGH),
+            Preset::Low => "embree-low",
+            Preset::Medium => "embree-medium",
+            Preset::High => "embree-high",
+        }
+    }
+
+    /// What Embree takes for it.
+    pub(super) fn quality(self) -> BuildQuality {
+        match self {
+            Preset::Low => BuildQuality::LOW,
+            Preset::Medium => BuildQuality::MEDIUM,
+            Preset::High => BuildQuality::HIGH,
         }
     }
 }
@@ -47,6 +57,7 @@ struct Bytes {
 /// A scene in Embree.
 pub struct Embree {
     name: &'static str,
+    threads: u32,
     device: Device,
     scene: Scene<'static>,
     geometry: u32,
@@ -57,7 +68,7 @@ pub struct Embree {
     hits: Vec<Hit>,
 }
 
-fn failed(call: &'static str) -> impl Fn(embree3::Error) -> Error {
+pub(super) fn failed(call: &'static str) -> impl Fn(embree3::Error) -> Error {
     move |error| {
         Error::Argument(format!("{call} failed: {error:?}; Embree cannot build this scene, leave embree-* out"))
     }
@@ -69,7 +80,8 @@ impl Embree {
     /// # Errors
     /// Embree refuses the scene or has too little memory.
     pub fn new(mesh: &Mesh, preset: Preset) -> Result<Embree> {
-        let config = Config { threads: rayon::current_num_threads() as u32, start_threads: true, ..Config::default() };
+        let threads = rayon::current_num_threads() as u32;
+        let config = Config { threads, start_threads: true, ..Config::default() };
         let device = Device::with_config(config).map_err(failed("rtcNewDevice"))?;
         let bytes = Arc::new(Bytes::default());
         let seen = Arc::clone(&bytes);
@@ -79,7 +91,7 @@ impl Embree {
             true
         });
         let mut scene = device.create_scene().map_err(failed("rtcNewScene"))?;
-        let (name, quality) = preset.name_and_quality();
+        let (name, quality) = (preset.name(), preset.quality());
         scene.set_build_quality(quality);
         let mut geometry = TriangleMeshBuilder::new(&device).map_err(failed("rtcNewGeometry"))?;
         geometry.set_build_quality(quality);
@@ -93,7 +105,7 @@ impl Embree {
             .copy_from_slice(&mesh.triangles);
         let geometry = scene.attach_geometry(&geometry.commit());
         let input_bytes = bytes.now.load(Ordering::Relaxed);
-        Ok(Embree { name, device, scene, geometry, bytes, input_bytes, rays: Vec::new(), hits: Vec::new() })
+        Ok(Embree { name, threads, device, scene, geometry, bytes, input_bytes, rays: Vec::new(), hits: Vec::new() })
     }
 
     fn trace_one(&self, context: &mut IntersectContext, ray: &Ray, query: Query) -> Hit {
@@ -130,12 +142,15 @@ impl Subject for Embree {
         self.scene.update_geometry_buffer(self.geometry, BufferUsage::VERTEX, 0);
         self.scene.update_geometry_buffer(self.geometry, BufferUsage::INDEX, 0);
         self.bytes.peak.store(0, Ordering::Relaxed);
-        let (milliseconds, ()) = timed(|| {
-            self.scene.commit_geometry(self.geometry);
-            self.scene.commit();
+        let ((), run) = on_cpu(self.threads, || {
+            let (milliseconds, ()) = timed(|| {
+                self.scene.commit_geometry(self.geometry);
+                self.scene.commit();
+            });
+            ((), BuildRun::whole(milliseconds))
         });
         match self.device.get_error() {
-            embree3::Error::NONE => Ok(BuildRun::whole(milliseconds)),
+            embree3::Error::NONE => Ok(run),
             error => Err(failed("rtcCommitScene")(error)),
         }
     }

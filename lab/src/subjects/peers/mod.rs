@@ -3,5 +3,7 @@
 pub mod driver;
 #[cfg(feature = "peer-embree")]
 pub mod embree;
+#[cfg(feature = "peer-embree")]
+pub mod embree_tree;
 #[cfg(feature = "peer-obvhs")]
 pub mod obvhs;

@@ -6,11 +6,12 @@
 use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
 use crate::scene::Mesh;
+use crate::subjects::host_build::on_cpu;
 use crate::subjects::host_rays::{HostRays, timed};
 use crate::subjects::{BuildRun, Subject};
 use crate::{Error, Result};
 use bytemuck::Zeroable;
-use hedgerow::bvh::layout::{Bvh2, Child, Header, MAGIC, Node, Record, Triangle as OurTriangle, node_slots};
+use hedgerow::bvh::layout::{Bvh2, Child, Header, MAGIC, Node, Record, Triangle as OurTriangle};
 use hedgerow::bvh::twin::quality;
 use hedgerow::gpu::Phase;
 use hedgerow::trace::{Hit, Query, Ray};
@@ -132,7 +133,6 @@ fn converted(tree: &Tree, triangles: &[Triangle]) -> Bvh2 {
     header.root = child(root, 0);
     header.active = tree.primitive_indices.len() as u32;
     header.primitive_count = header.active;
-    header.node_slots = node_slots(header.active);
     let mut nodes = Vec::new();
     let mut inner = if root.is_leaf() { Vec::new() } else { vec![root.first_index] };
     let mut next = 0;
@@ -150,6 +150,9 @@ fn converted(tree: &Tree, triangles: &[Triangle]) -> Bvh2 {
         nodes.push(Node { children });
     }
     header.inner_nodes = nodes.len() as u32;
+    // A structure has a slot even where its root is a leaf.
+    header.node_slots = header.inner_nodes.max(1);
+    nodes.resize(header.node_slots as usize, Node::UNUSED);
     let record = |&primitive: &u32| {
         let Triangle { v0, v1, v2 } = &triangles[primitive as usize];
         let [v0, v1, v2] = [v0, v1, v2].map(|v| v.to_array());
@@ -169,15 +172,18 @@ impl Subject for Obvhs {
     }
 
     fn build(&mut self) -> Result<BuildRun> {
-        let (building, tree) =
-            timed(|| build_bvh2_from_tris(&self.triangles, self.parameters, &mut Duration::default()));
-        self.tree = tree;
-        let triangle = |&i: &u32| RtTriangle::from(&self.triangles[i as usize]);
-        let (ordering, ()) = timed(|| {
-            self.tree.primitive_indices.par_iter().map(triangle).collect_into_vec(&mut self.ordered);
+        let ((), run) = on_cpu(rayon::current_num_threads() as u32, || {
+            let (building, tree) =
+                timed(|| build_bvh2_from_tris(&self.triangles, self.parameters, &mut Duration::default()));
+            self.tree = tree;
+            let triangle = |&i: &u32| RtTriangle::from(&self.triangles[i as usize]);
+            let (ordering, ()) = timed(|| {
+                self.tree.primitive_indices.par_iter().map(triangle).collect_into_vec(&mut self.ordered);
+            });
+            let phases = [("build", building), ("triangles", ordering)];
+            ((), BuildRun::of(phases.map(|(name, milliseconds)| Phase { name, milliseconds }).to_vec()))
         });
-        let phases = [("build", building), ("triangles", ordering)];
-        Ok(BuildRun::of(phases.map(|(name, milliseconds)| Phase { name, milliseconds }).to_vec()))
+        Ok(run)
     }
 
     fn memory(&self) -> record::MemoryRecord {
@@ -193,6 +199,15 @@ impl Subject for Obvhs {
 
     fn epo(&mut self, c_t: f64, c_i: f64, epo: Epo) -> Result<Option<f64>> {
         Ok(overlap::on_host(&converted(&self.tree, &self.triangles), c_t, c_i, epo))
+    }
+
+    fn tree(&mut self) -> Result<Option<Bvh2>> {
+        Ok(Some(converted(&self.tree, &self.triangles)))
+    }
+
+    fn validate(&mut self) -> Result<()> {
+        // The peer's own tracer walks the peer's own layout: rules of ours bind it only where our tracer takes over.
+        Ok(())
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {

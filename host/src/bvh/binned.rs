@@ -1,0 +1,471 @@
+//! Binned SAH: top-down, at each node the best of the planes between a few bins of the centroids.
+//!
+//! Wald 2007, "On fast Construction of SAH-based Bounding Volume Hierarchies"; Frantál 2019, section 3.1. Items are moved, not
+//! indices, so that every pass over a node reads memory in order. Large nodes are binned and divided by all threads, a piece
+//! each; small ones are built side by side. Pieces do not depend on the number of threads, bins are minima, maxima and counts,
+//! and items keep their order on both sides: the tree is the same for any number of threads.
+
+use super::bounds::{Bounds, Item, around};
+use super::sweep::HALVED_FROM;
+use super::topology::{LEAF, Topology};
+use super::{ALONE, DIVIDED_ABOVE};
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::{Error, Result};
+use rayon::prelude::*;
+
+/// How nodes are binned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BinnedOptions {
+    /// How many bins there are along an axis.
+    pub bins: Bins,
+    /// Nodes of at most this many primitives are leaves, whatever they cost; 1 to 255.
+    pub leaf: u32,
+    /// Which axes are binned.
+    pub axes: BinnedAxes,
+    /// Whether a node without extent along any axis is a leaf, as in Frantál 2019: a floor then is one leaf, however many
+    /// triangles it has. Only to show what that does.
+    pub flat_leaves: bool,
+}
+
+/// How many bins a node has along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bins {
+    /// This many, 2 to [`Bins::MOST`].
+    Fixed(u32),
+    /// 4 + 2 ⌊√n⌋ for n primitives (Frantál 2019, equation 8), at most [`Bins::MOST`].
+    Adaptive,
+}
+
+impl Bins {
+    /// The most there may be.
+    pub const MOST: u32 = 256;
+
+    fn of(self, count: usize) -> usize {
+        let bins = match self {
+            Bins::Fixed(bins) => bins as usize,
+            Bins::Adaptive => 4 + 2 * count.isqrt(),
+        };
+        bins.clamp(2, Bins::MOST as usize)
+    }
+}
+
+/// Which axes are binned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BinnedAxes {
+    /// The one along which centroids extend farthest: fast.
+    Longest,
+    /// All three.
+    All,
+}
+
+impl BinnedOptions {
+    /// What Wald takes: 16 bins of the longest axis. Leaves are made by their cost alone.
+    pub const WALD: BinnedOptions =
+        BinnedOptions { bins: Bins::Fixed(16), leaf: 1, axes: BinnedAxes::Longest, flat_leaves: false };
+}
+
+impl BinnedOptions {
+    pub(super) fn check(&self) -> Result<()> {
+        match (self.bins, self.leaf) {
+            (Bins::Fixed(bins), _) if !(2..=Bins::MOST).contains(&bins) => {
+                Err(Error::Argument(format!("{bins} bins cannot be used; take 2 to {} bins", Bins::MOST)))
+            }
+            (_, leaf) if !(1..=255).contains(&leaf) => {
+                Err(Error::Argument(format!("leaves of {leaf} primitives cannot be used; take 1 to 255 primitives")))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// From this many items on a node is binned and divided by all threads.
+const TOGETHER: usize = 1 << 16;
+/// What one of them takes at a time.
+const PIECE: usize = 1 << 13;
+/// A node of this many items at most has fewer of them than bins, or not many more.
+const FEW: usize = 16;
+/// Centroids whose extent is less than this part of the scene's are not told apart by an axis.
+const LEAST_EXTENT: f32 = 1.0 / (1u64 << 60) as f32;
+/// An extent of centroids that Frantál 2019 takes for none.
+const FLAT: f32 = 1e-7;
+
+/// The tree over `items`, which it brings into another order. `scale` is what their lengths were scaled by.
+pub(super) fn build(
+    mut items: Vec<Item>,
+    scale: f32,
+    costs: &Collapse,
+    single: bool,
+    options: &BinnedOptions,
+) -> Topology {
+    let mut tree = Topology::new(items.len());
+    let mut spare = vec![Item::NONE; items.len()];
+    let flat = if options.flat_leaves { 2.0 * FLAT * scale } else { 0.0 };
+    let build = Build { costs, single, options, flat };
+    let node = build.measured(&items);
+    build.subtree(&mut items, &mut spare, &mut tree.splits, node, 0);
+    tree.order.par_iter_mut().with_min_len(ALONE).zip(&items).for_each(|(i, item)| *i = item.primitive());
+    tree
+}
+
+/// A node before it is split: the box around its items, and that around their centroids (twice them).
+#[derive(Debug, Clone, Copy)]
+struct Unsplit {
+    bounds: Bounds,
+    centroids: Bounds,
+}
+
+impl Unsplit {
+    const EMPTY: Unsplit = Unsplit { bounds: Bounds::EMPTY, centroids: Bounds::EMPTY };
+
+    #[inline(always)]
+    fn add(&mut self, item: &Item) {
+        let bounds = item.bounds();
+        self.bounds = self.bounds.union(bounds);
+        self.centroids = self.centroids.union(Bounds::point(bounds.lo + bounds.hi));
+    }
+
+    #[inline(always)]
+    fn union(self, other: Unsplit) -> Unsplit {
+        Unsplit { bounds: self.bounds.union(other.bounds), centroids: self.centroids.union(other.centroids) }
+    }
+}
+
+/// What lies in a bin.
+#[derive(Debug, Clone, Copy)]
+struct Bin {
+    items: Unsplit,
+    count: u32,
+}
+
+impl Bin {
+    const EMPTY: Bin = Bin { items: Unsplit::EMPTY, count: 0 };
+
+    fn union(self, other: Bin) -> Bin {
+        Bin { items: self.items.union(other.items), count: self.count + other.count }
+    }
+}
+
+/// Equal bins along an axis.
+#[derive(Debug, Clone, Copy)]
+struct Grid {
+    axis: usize,
+    least: f32,
+    per_length: f32,
+    bins: usize,
+}
+
+impl Grid {
+    /// Over what extends that far; `None` where centroids cannot be told apart.
+    fn new(centroids: &Bounds, axis: usize, bins: usize) -> Option<Grid> {
+        let (least, most) = (centroids.lo[axis], centroids.hi[axis]);
+        let extent = most - least;
+        (extent > LEAST_EXTENT).then(|| Grid { axis, least, per_length: bins as f32 / extent, bins })
+    }
+
+    /// How many bins it is from the first one's beginning.
+    #[inline(always)]
+    fn place(&self, item: &Item) -> f32 {
+        (item.centroid_on(self.axis) - self.least) * self.per_length
+    }
+
+    #[inline(always)]
+    fn bin_of(&self, item: &Item) -> usize {
+        (self.place(item) as usize).min(self.bins - 1)
+    }
+}
+
+/// A plane: its cost, and how many bins are on its left.
+type Plane = (f32, usize);
+
+/// A node that is split: how many items are on the left, and what lies on either side.
+struct Divided {
+    left_count: usize,
+    left: Unsplit,
+    right: Unsplit,
+}
+
+struct Build<'a> {
+    costs: &'a Collapse,
+    single: bool,
+    options: &'a BinnedOptions,
+    /// Extents of centroids up to this make a leaf.
+    flat: f32,
+}
+
+impl Build<'_> {
+    fn measured(&self, items: &[Item]) -> Unsplit {
+        let of = |items: &[Item]| {
+            let mut all = Unsplit::EMPTY;
+            items.iter().for_each(|item| all.add(item));
+            all
+        };
+        items.par_chunks(PIECE).map(of).reduce(|| Unsplit::EMPTY, Unsplit::union)
+    }
+
+    /// Divides `items` among the subtrees whose slots are `splits`.
+    fn subtree(&self, items: &mut [Item], spare: &mut [Item], splits: &mut [u32], node: Unsplit, depth: u32) {
+        let Some((split, splits)) = splits.split_first_mut() else { return };
+        let count = items.len();
+        let Some(Divided { left_count, left, right }) = self.divide(items, spare, &node, depth) else {
+            *split = LEAF;
+            return;
+        };
+        *split = left_count as u32;
+        let (left_items, right_items) = items.split_at_mut(left_count);
+        let (left_spare, right_spare) = spare.split_at_mut(left_count);
+        let (left_splits, right_splits) = splits.split_at_mut(left_count - 1);
+        let mut on_left = || self.subtree(left_items, left_spare, left_splits, left, depth + 1);
+        let mut on_right = || self.subtree(right_items, right_spare, right_splits, right, depth + 1);
+        if count < ALONE || depth >= DIVIDED_ABOVE {
+            on_left();
+            on_right();
+        } else {
+            rayon::join(on_left, on_right);
+        }
+    }
+
+    /// Brings what is on the left before the others; `None` if the node is a leaf. Not inlined: its bins would lie on the stack
+    /// once for each level.
+    #[inline(never)]
+    fn divide(&self, items: &mut [Item], spare: &mut [Item], node: &Unsplit, depth: u32) -> Option<Divided> {
+        let edges = (node.centroids.hi - node.centroids.lo).min_element();
+        if !self.single && (items.len() <= self.options.leaf as usize || edges < self.flat) {
+            return None;
+        }
+        let area = node.bounds.half_area();
+        let bins = self.options.bins.of(items.len());
+        let grid = |axis| Grid::new(&node.centroids, axis, bins);
+        let grids = match self.options.axes {
+            BinnedAxes::Longest => [grid(node.centroids.longest_edge().0), None, None],
+            BinnedAxes::All => [0, 1, 2].map(grid),
+        };
+        if depth >= HALVED_FROM || grids.iter().all(Option::is_none) {
+            return self.halved(items, area);
+        }
+        if items.len() <= FEW {
+            return self.divide_few(items, spare, area, &grids);
+        }
+        if bins <= 16 {
+            self.divide_by::<16>(items, spare, area, &grids)
+        } else {
+            self.divide_by::<{ Bins::MOST as usize }>(items, spare, area, &grids)
+        }
+    }
+
+    fn is_leaf(&self, area: f32, count: usize, cost: f32) -> bool {
+        !self.single && self.costs.leaf_cost(area, count as u32) < self.costs.inner_cost(area, cost, 0.0)
+    }
+
+    /// Splits in the middle of the order, as centroids do not tell items apart.
+    fn halved(&self, items: &[Item], area: f32) -> Option<Divided> {
+        let (left, right) = items.split_at(items.len() / 2);
+        let cost = self.costs.leaf_cost(around(left).half_area(), left.len() as u32)
+            + self.costs.leaf_cost(around(right).half_area(), right.len() as u32);
+        let divided = || Divided { left_count: left.len(), left: self.measured(left), right: self.measured(right) };
+        (!self.is_leaf(area, items.len(), cost)).then(divided)
+    }
+
+    /// By the plane between at most `N` bins of an axis that costs least; of equal ones the first, along the first axis.
+    fn divide_by<const N: usize>(
+        &self,
+        items: &mut [Item],
+        spare: &mut [Item],
+        area: f32,
+        grids: &[Option<Grid>; 3],
+    ) -> Option<Divided> {
+        let mut best: Option<(Plane, Grid, [Bin; N])> = None;
+        for grid in grids.iter().flatten() {
+            let bins = filled::<N>(items, grid);
+            let plane = self.best_plane(&bins[..grid.bins]);
+            if best.as_ref().is_none_or(|best| plane.0 < best.0.0) {
+                best = Some((plane, *grid, bins));
+            }
+        }
+        let ((cost, bin), grid, bins) = best?;
+        if self.is_leaf(area, items.len(), cost) {
+            return None;
+        }
+        let side = |bins: &[Bin]| bins.iter().fold(Bin::EMPTY, |all, bin| all.union(*bin));
+        let (left, right) = (side(&bins[..bin]), side(&bins[bin..grid.bins]));
+        let left_count = left.count as usize;
+        // That is, `grid.bin_of(item) < bin`.
+        partition(items, spare, left_count, |item| grid.place(item) < bin as f32);
+        Some(Divided { left_count, left: left.items, right: right.items })
+    }
+
+    /// The best plane between bins, of which the first and the last hold something.
+    fn best_plane(&self, bins: &[Bin]) -> Plane {
+        let mut right_costs = [0.0; Bins::MOST as usize];
+        let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+        for (bin, cost) in bins.iter().zip(&mut right_costs).skip(1).rev() {
+            bounds = bounds.union(bin.items.bounds);
+            count += bin.count;
+            *cost = self.costs.leaf_cost(bounds.half_area(), count);
+        }
+        let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+        let mut best = (f32::INFINITY, 1);
+        for (at, right_cost) in (1..bins.len()).zip(&right_costs[1..]) {
+            bounds = bounds.union(bins[at - 1].items.bounds);
+            count += bins[at - 1].count;
+            let cost = self.costs.leaf_cost(bounds.half_area(), count) + right_cost;
+            if cost < best.0 {
+                best = (cost, at);
+            }
+        }
+        best
+    }
+
+    /// The same for a few items, in the order of their bins: most bins are empty then.
+    fn divide_few(
+        &self,
+        items: &mut [Item],
+        spare: &mut [Item],
+        area: f32,
+        grids: &[Option<Grid>; 3],
+    ) -> Option<Divided> {
+        let count = items.len();
+        // Whatever the leaves below will be, each item is in one that is no smaller than itself.
+        let least: f32 = items.iter().map(|item| self.costs.leaf_cost(item.bounds().half_area(), 1)).sum();
+        if self.is_leaf(area, count, least) {
+            return None;
+        }
+        let mut best = (f32::INFINITY, 0, [0; FEW]);
+        for grid in grids.iter().flatten() {
+            let order = in_order_of_bins(items, grid);
+            let (cost, left_count) = self.best_plane_of_few(items, &order);
+            if cost < best.0 || best.1 == 0 {
+                best = (cost, left_count, order);
+            }
+        }
+        let (cost, left_count, order) = best;
+        if self.is_leaf(area, count, cost) {
+            return None;
+        }
+        spare.copy_from_slice(items);
+        for (item, key) in items.iter_mut().zip(order) {
+            *item = spare[(key & 0xff) as usize];
+        }
+        let side = |items: &[Item]| {
+            let mut all = Unsplit::EMPTY;
+            items.iter().for_each(|item| all.add(item));
+            all
+        };
+        let (left, right) = items.split_at(left_count);
+        Some(Divided { left_count, left: side(left), right: side(right) })
+    }
+
+    /// The cost of the best plane, and how many items are on its left, of items in the order of their bins.
+    fn best_plane_of_few(&self, items: &[Item], order: &[u32; FEW]) -> Plane {
+        let count = items.len();
+        let item = |at: usize| &items[(order[at] & 0xff) as usize];
+        let mut right_costs = [0.0; FEW];
+        let mut bounds = Bounds::EMPTY;
+        for at in (1..count).rev() {
+            bounds = bounds.union(item(at).bounds());
+            right_costs[at] = self.costs.leaf_cost(bounds.half_area(), (count - at) as u32);
+        }
+        let mut bounds = Bounds::EMPTY;
+        let mut best = (f32::INFINITY, 0);
+        for at in 1..count {
+            bounds = bounds.union(item(at - 1).bounds());
+            if order[at - 1] >> 8 != order[at] >> 8 {
+                let cost = self.costs.leaf_cost(bounds.half_area(), at as u32) + right_costs[at];
+                if cost < best.0 || best.1 == 0 {
+                    best = (cost, at);
+                }
+            }
+        }
+        best
+    }
+}
+
+/// The bin of each item, and its place in the eight bits below, in the order of the bins.
+fn in_order_of_bins(items: &[Item], grid: &Grid) -> [u32; FEW] {
+    let mut order = [u32::MAX; FEW];
+    for (i, item) in items.iter().enumerate() {
+        let key = (grid.bin_of(item) << 8 | i) as u32;
+        let mut at = i;
+        while at > 0 && order[at - 1] > key {
+            order[at] = order[at - 1];
+            at -= 1;
+        }
+        order[at] = key;
+    }
+    order
+}
+
+/// The bins of a grid, the first of `N`, by all threads if there are many items.
+fn filled<const N: usize>(items: &[Item], grid: &Grid) -> [Bin; N] {
+    let union = |mut a: [Bin; N], b: [Bin; N]| {
+        a.iter_mut().zip(b).for_each(|(a, b)| *a = a.union(b));
+        a
+    };
+    let fill = |items: &[Item]| {
+        let mut bins = [Bin::EMPTY; N];
+        let mut others = bins;
+        let add = |bins: &mut [Bin; N], item: &Item| {
+            let bin = &mut bins[grid.bin_of(item)];
+            bin.items.add(item);
+            bin.count += 1;
+        };
+        // Neighbours often are in the same bin: two sets of bins, as the one need not wait for the other.
+        let pairs = items.chunks_exact(2);
+        pairs.remainder().iter().for_each(|item| add(&mut bins, item));
+        for pair in pairs {
+            add(&mut bins, &pair[0]);
+            add(&mut others, &pair[1]);
+        }
+        union(bins, others)
+    };
+    if items.len() < TOGETHER {
+        return fill(items);
+    }
+    items.par_chunks(PIECE).map(fill).reduce(|| [Bin::EMPTY; N], union)
+}
+
+/// Brings the `left_count` items that are on the left before the others, both as they were.
+pub(super) fn partition(
+    items: &mut [Item],
+    spare: &mut [Item],
+    left_count: usize,
+    is_left: impl Fn(&Item) -> bool + Sync,
+) {
+    if items.len() < TOGETHER {
+        let right = spread(items, spare, is_left);
+        items[left_count..].copy_from_slice(&spare[..right]);
+        return;
+    }
+    let counts: Vec<usize> =
+        items.par_chunks(PIECE).map(|piece| piece.iter().filter(|item| is_left(item)).count()).collect();
+    let (mut left, mut right) = spare.split_at_mut(left_count);
+    let mut places = Vec::with_capacity(counts.len());
+    for (piece, &on_left) in items.chunks(PIECE).zip(&counts) {
+        let (left_place, left_rest) = left.split_at_mut(on_left);
+        let (right_place, right_rest) = right.split_at_mut(piece.len() - on_left);
+        places.push((piece, left_place, right_place));
+        (left, right) = (left_rest, right_rest);
+    }
+    places.into_par_iter().for_each(|(piece, left, right)| {
+        let (mut left, mut right) = (left.iter_mut(), right.iter_mut());
+        for item in piece {
+            let place = if is_left(item) { left.next() } else { right.next() };
+            *place.expect("counted before") = *item;
+        }
+    });
+    items.par_chunks_mut(PIECE).zip(spare.par_chunks(PIECE)).for_each(|(to, from)| to.copy_from_slice(from));
+}
+
+/// Items on the left move up, the others go to `spare`: how many those are.
+fn spread(items: &mut [Item], spare: &mut [Item], is_left: impl Fn(&Item) -> bool) -> usize {
+    let (mut left, mut right) = (0, 0);
+    for at in 0..items.len() {
+        let item = items[at];
+        let is_left = is_left(&item);
+        // Both are written and one of them stays: a branch here would be guessed wrongly half the time.
+        items[left] = item;
+        spare[right] = item;
+        left += usize::from(is_left);
+        right += usize::from(!is_left);
+    }
+    right
+}

@@ -1,0 +1,275 @@
+//! BVHs built on the CPU: top-down, bottom-up and by insertion, on all threads of the rayon pool that [`build`] is called in.
+//!
+//! The methods are those that Frantál compares in "Ray Tracing with Bounding Volume Hierarchies on a CPU" (2019). Each gives the
+//! same bytes whatever the number of threads.
+//!
+//! A build goes through phases: `boxes` reads the primitives, `order` sorts them by code where the method wants that, `build`
+//! makes the tree, `optimise` moves subtrees, `collapse` makes leaves, and `layout` writes the tree depth first.
+
+mod aac;
+pub mod binned;
+mod bonsai;
+mod bounds;
+mod finish;
+mod incremental;
+mod input;
+mod insertion;
+mod order;
+mod ploc;
+pub mod sweep;
+mod topology;
+
+pub use aac::AacOptions;
+pub use binned::BinnedOptions;
+pub use bonsai::BonsaiOptions;
+use bounds::{Bounds, Item};
+use glam::Vec3A;
+use hedgerow::bvh::codes::Codes;
+use hedgerow::bvh::layout::{BoxRecord, Bvh2, Record, Triangle, status};
+use hedgerow::bvh::reinsertion::ReinsertionOptions;
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::geometry::finite_box;
+use hedgerow::geometry::Aabb;
+use hedgerow::{Error, Result};
+pub use incremental::{IncrementalOptions, IncrementalOrder};
+use input::Input;
+pub use insertion::{Inefficiency, InsertionOptions};
+use rayon::prelude::*;
+use std::time::Instant;
+use topology::Topology;
+
+/// Fewer primitives than this are not worth another thread.
+const ALONE: usize = 4096;
+/// From this depth on one thread builds a subtree, however large it is.
+const DIVIDED_ABOVE: u32 = 48;
+
+/// How a tree is built.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum HostMethod {
+    /// The best of all splits along all axes, top-down.
+    Sweep,
+    /// The best of the planes between bins, top-down.
+    Binned(BinnedOptions),
+    /// Sweeps over parts, and one over their trees.
+    Bonsai(BonsaiOptions),
+    /// Approximate agglomerative clustering along the radix tree of the codes, bottom-up.
+    Aac(AacOptions),
+    /// Parallel locally-ordered clustering: neighbours in the order of the codes that are each other's nearest merge in rounds.
+    Ploc {
+        /// How many neighbours on either side are looked at, at least 1.
+        radius: usize,
+    },
+    /// One primitive after the other is put where it costs least.
+    Incremental(IncrementalOptions),
+}
+
+impl HostMethod {
+    /// Whether it begins with the order of codes.
+    pub const fn sorts(&self) -> bool {
+        matches!(self, HostMethod::Aac(_) | HostMethod::Ploc { .. })
+    }
+}
+
+/// What [`build`] is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HostBvhOptions {
+    /// How the tree is built.
+    pub method: HostMethod,
+    /// The codes of a method that begins with their order; `None` takes [`Codes::for_count`] of all primitives.
+    pub codes: Option<Codes>,
+    /// The costs of a step and of a test; and whether subtrees become leaves where that is cheaper.
+    pub collapse: Collapse,
+    /// When a top-down method stops.
+    pub termination: Termination,
+    /// What moves subtrees before leaves are made.
+    pub optimise: HostOptimise,
+}
+
+impl HostBvhOptions {
+    /// What a method does where nothing else is said: leaves by SAH with the costs of the theses.
+    pub const fn of(method: HostMethod) -> HostBvhOptions {
+        HostBvhOptions {
+            method,
+            codes: None,
+            collapse: Collapse::SAH,
+            termination: Termination::Sah,
+            optimise: HostOptimise::Off,
+        }
+    }
+
+    /// The least time for a tree that is worth it: AAC-Fast. Measured in docs/notes/cpu_builders.md.
+    pub const FAST: HostBvhOptions = HostBvhOptions::of(HostMethod::Aac(AacOptions::FAST));
+
+    /// The best trees: a sweep, and insertion behind it.
+    pub const BEST: HostBvhOptions = HostBvhOptions {
+        optimise: HostOptimise::Insertion(InsertionOptions::PAPER),
+        ..HostBvhOptions::of(HostMethod::Sweep)
+    };
+
+    /// Whether more than one thread makes the tree. What is before and behind that always runs on all threads.
+    pub const fn is_parallel(&self) -> bool {
+        match (&self.method, &self.optimise) {
+            (_, HostOptimise::Insertion(_)) => false,
+            (HostMethod::Incremental(options), _) => options.search > 1,
+            _ => true,
+        }
+    }
+
+    /// Whether [`build`] can use them.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] names the option that cannot be used, and what can.
+    pub fn check(&self) -> Result<()> {
+        match &self.method {
+            HostMethod::Sweep => Ok(()),
+            HostMethod::Aac(options) => options.check(),
+            HostMethod::Ploc { radius: 0 } => {
+                Err(Error::Argument("a radius of 0 cannot be used; take 1 or more clusters".into()))
+            }
+            HostMethod::Ploc { .. } => Ok(()),
+            HostMethod::Binned(options) => options.check(),
+            HostMethod::Bonsai(options) => options.check(),
+            HostMethod::Incremental(options) => options.check(),
+        }?;
+        match &self.optimise {
+            HostOptimise::Off | HostOptimise::Reinsertion(_) => Ok(()),
+            HostOptimise::Insertion(options) => options.check(),
+        }
+    }
+}
+
+/// When a top-down method splits a node no further.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Termination {
+    /// Where one primitive is left: leaves are made by collapsing.
+    Single,
+    /// Where a leaf is cheaper than the best split into two leaves.
+    Sah,
+}
+
+/// What makes a tree better that is built.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum HostOptimise {
+    /// Nothing.
+    Off,
+    /// Parallel reinsertion, as on the device, here on one thread.
+    Reinsertion(ReinsertionOptions),
+    /// Insertion-based optimisation: slow, and the best there is for a tree of any builder.
+    Insertion(InsertionOptions),
+}
+
+/// A tree, and how its build went.
+#[derive(Debug, Clone)]
+pub struct Built<R: Record> {
+    /// The tree, its nodes depth first.
+    pub tree: Bvh2<R>,
+    /// Name and milliseconds of each phase, in order.
+    pub phases: Vec<(&'static str, f64)>,
+}
+
+/// Builds the BVH of `triangles` over `positions`. Triangles that are not finite or name vertices that are not there are left
+/// out, and the status says so.
+///
+/// # Errors
+/// An option cannot be used: [`HostBvhOptions::check`].
+pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &HostBvhOptions) -> Result<Built<Triangle>> {
+    let corners = |primitive: u32| triangles[primitive as usize].map(|v| positions.get(v as usize));
+    let bounds = |primitive| {
+        let [Some(v0), Some(v1), Some(v2)] = corners(primitive) else { return Err(status::INDEX_OUT_OF_RANGE) };
+        let corners = [v0, v1, v2].map(|v| Vec3A::from_array(*v) + 0.0);
+        let is_finite = corners.iter().all(|v| v.is_finite());
+        if is_finite { Ok(Bounds::of_triangle(corners)) } else { Err(status::NON_FINITE) }
+    };
+    let record = |primitive| {
+        let [v0, v1, v2] = corners(primitive).map(|v| v.expect("a triangle in the tree has vertices").map(|x| x + 0.0));
+        Triangle { v0, v1, v2, primitive }
+    };
+    build_of(triangles.len(), bounds, record, options)
+}
+
+/// Builds the BVH of boxes; one that is not finite or is inside out is left out.
+///
+/// # Errors
+/// As those of [`build`].
+pub fn build_aabbs(boxes: &[Aabb], options: &HostBvhOptions) -> Result<Built<BoxRecord>> {
+    let finite = |primitive: u32| finite_box(&boxes[primitive as usize]);
+    let record = |primitive| {
+        let Aabb { lo, hi } = finite(primitive).expect("a box in the tree is finite");
+        BoxRecord { lo, hi, primitive }
+    };
+    build_of(boxes.len(), |primitive| finite(primitive).map(|bounds| Bounds::of(&bounds)), record, options)
+}
+
+/// Names the times between calls.
+struct Phases {
+    since: Instant,
+    phases: Vec<(&'static str, f64)>,
+}
+
+impl Phases {
+    /// The time since the last call was that of this phase.
+    fn end(&mut self, name: &'static str) {
+        self.phases.push((name, self.since.elapsed().as_secs_f64() * 1e3));
+        self.since = Instant::now();
+    }
+}
+
+fn build_of<R: Record>(
+    count: usize,
+    bounds: impl Fn(u32) -> Result<Bounds, u32> + Sync,
+    record: impl Fn(u32) -> R + Sync,
+    options: &HostBvhOptions,
+) -> Result<Built<R>> {
+    options.check()?;
+    let HostBvhOptions { method, codes, collapse, termination, optimise } = options;
+    // Both want leaves of one primitive.
+    let is_single = *termination == Termination::Single || !collapse.enabled || *optimise != HostOptimise::Off;
+    let mut phases = Phases { since: Instant::now(), phases: Vec::new() };
+    let mut input = Input::new(count, &bounds);
+    phases.end("boxes");
+    let mut sorted = Vec::new();
+    if method.sorts() {
+        sorted = order::sort(&mut input, codes.unwrap_or_else(|| Codes::for_count(count as u32)));
+        phases.end("order");
+    }
+    let mut tree = match method {
+        HostMethod::Sweep => sweep::build(&input.items, collapse, is_single),
+        HostMethod::Binned(options) => {
+            binned::build(std::mem::take(&mut input.items), input.item_scale, collapse, is_single, options)
+        }
+        HostMethod::Bonsai(options) => bonsai::build(std::mem::take(&mut input.items), collapse, is_single, options),
+        HostMethod::Aac(options) => aac::build(&input.items, &sorted, options),
+        HostMethod::Ploc { radius } => ploc::build(&input.items, *radius),
+        HostMethod::Incremental(options) => incremental::build(&input.items, options),
+    };
+    phases.end("build");
+    tree = match optimise {
+        HostOptimise::Off => tree,
+        HostOptimise::Reinsertion(options) => {
+            let records = finish::records(&tree.order, &record);
+            let collapsed = finish::collapse(&mut tree, &records, &Collapse::OFF, input.scale);
+            let tree = finish::layout(&input, &tree, &collapsed, records);
+            // What was too deep is in leaves from here on.
+            input.status |= tree.header.status & status::DEPTH_LIMITED;
+            Topology::of_tree(&tree.reinserted(options))
+        }
+        HostOptimise::Insertion(options) => {
+            let item = |&primitive: &u32| {
+                let bounds = bounds(primitive).expect("a primitive in the tree has a box");
+                Item::new(bounds, primitive, 1).scaled(input.item_scale)
+            };
+            let items: Vec<Item> = tree.order.par_iter().with_min_len(ALONE).map(item).collect();
+            insertion::optimise(tree, &items, collapse, options)
+        }
+    };
+    if *optimise != HostOptimise::Off {
+        phases.end("optimise");
+    }
+    let records = finish::records(&tree.order, &record);
+    phases.end("records");
+    let collapsed = finish::collapse(&mut tree, &records, collapse, input.scale);
+    phases.end("collapse");
+    let tree = finish::layout(&input, &tree, &collapsed, records);
+    phases.end("layout");
+    Ok(Built { tree, phases: phases.phases })
+}
