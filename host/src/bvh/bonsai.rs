@@ -195,3 +195,87 @@ fn measured(items: &[Item], order: &[u32], splits: &[u32], nodes: &mut [MiniNode
     };
     *node
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::bounds::tests::boxes;
+
+    /// Pruning as the thesis has it (section 3.3.3). It walks depth first to the first node smaller than the threshold. What was
+    /// left behind on the way, and that node, are roots; what still waits is pruned in the same way; the path to the node is
+    /// deleted. The stack of the path only says what is deleted, and is not kept here.
+    fn pruned_by_stacks(mini: &MiniTree<'_>, threshold: f32) -> Vec<Span> {
+        /// What the walk does next.
+        enum Step {
+            Visit(Span),
+            /// Both children have been walked and hold nothing small: their parent takes their place among the roots.
+            Join(Span),
+        }
+        let mut pruned = Vec::new();
+        let mut to_check = vec![Span::whole(mini.items.len())];
+        while let Some(span) = to_check.pop() {
+            if mini.node_of(span).area <= threshold {
+                pruned.push(span);
+                continue;
+            }
+            let (mut traversal, mut roots) = (vec![Step::Visit(span)], Vec::new());
+            while let Some(step) = traversal.pop() {
+                match step {
+                    Step::Join(parent) => {
+                        roots.truncate(roots.len() - 2);
+                        roots.push(parent);
+                    }
+                    Step::Visit(node) if mini.node_of(node).area < threshold => {
+                        roots.push(node);
+                        let waiting = traversal.drain(..).filter_map(|step| match step {
+                            Step::Visit(node) => Some(node),
+                            Step::Join(_) => None,
+                        });
+                        to_check.extend(waiting);
+                    }
+                    Step::Visit(node) => match mini.children_of(node) {
+                        None => roots.push(node),
+                        Some([left, right]) => {
+                            traversal.extend([Step::Join(node), Step::Visit(right), Step::Visit(left)])
+                        }
+                    },
+                }
+            }
+            pruned.extend(roots);
+        }
+        pruned
+    }
+
+    impl MiniTree<'_> {
+        fn node_of(&self, span: Span) -> MiniNode {
+            let items: Vec<Item> = self.tree.order[span.primitives()].iter().map(|&i| self.items[i as usize]).collect();
+            let bounds = crate::bvh::bounds::around(&items);
+            MiniNode { bounds, area: bounds.half_area(), least_leaf: f32::NAN }
+        }
+
+        fn children_of(&self, span: Span) -> Option<[Span; 2]> {
+            let split = (span.count > 1).then(|| self.tree.splits[span.slot as usize])?;
+            (split != LEAF).then(|| span.children(split))
+        }
+    }
+
+    #[test]
+    fn pruning_is_that_of_the_thesis_with_its_stacks() {
+        let mut roots_seen = Vec::new();
+        for count in [1, 2, 3, 40, 300] {
+            let items = boxes(count);
+            for single in [false, true] {
+                let mini = MiniTree::new(&items, &Collapse::SAH, single);
+                for part in [0.0, 0.001, 0.01, 0.03, 0.1, 0.3, 0.9, 1.5] {
+                    let threshold = part * mini.whole.area;
+                    let key = |span: &Span| (span.first, span.count);
+                    let ours: Vec<_> = mini.roots(0, threshold).iter().map(|root| key(&root.span)).collect();
+                    let theirs: Vec<_> = pruned_by_stacks(&mini, threshold).iter().map(key).collect();
+                    assert_eq!(ours, theirs, "{count} boxes, {part} of their area");
+                    roots_seen.push(ours.len());
+                }
+            }
+        }
+        assert!(roots_seen.iter().any(|&roots| roots > 50) && roots_seen.contains(&1));
+    }
+}

@@ -148,8 +148,19 @@ pub(crate) fn around(items: &[Item]) -> Bounds {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// Small boxes in a cube, some of which are equal.
+    pub fn boxes(count: u32) -> Vec<Item> {
+        let at = |i: u32, step: u32| (i.wrapping_mul(step) >> 8) as f32 / (1 << 24) as f32;
+        let of = |i: u32| {
+            let j = if i % 7 == 3 { i / 2 } else { i };
+            let lo = Vec3A::new(at(j, 2_654_435_761), at(j, 805_459_861), at(j, 3_674_653_429));
+            Item::new(Bounds { lo, hi: lo + 0.2 * at(j, 97_654_321) }, i, 1)
+        };
+        (0..count).map(of).collect()
+    }
 
     #[test]
     fn an_area_is_that_of_the_scaled_box_bit_for_bit() {

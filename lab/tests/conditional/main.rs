@@ -9,6 +9,7 @@ mod files;
 mod pages;
 
 mod bvh_determinism;
+mod bvh_frantal_costs;
 mod bvh_growth;
 mod bvh_reference_costs;
 mod cli;
@@ -26,6 +27,7 @@ mod tuning;
 fn main() -> std::process::ExitCode {
     conditional::run(vec![
         ("bvh_determinism", bvh_determinism::tests()),
+        ("bvh_frantal_costs", bvh_frantal_costs::tests()),
         ("bvh_growth", bvh_growth::tests()),
         ("bvh_reference_costs", bvh_reference_costs::tests()),
         ("cli", cli::tests()),

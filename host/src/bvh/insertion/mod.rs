@@ -328,20 +328,9 @@ impl InsertionTree {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bvh::bounds::tests::boxes;
     use crate::bvh::sweep;
-    use glam::Vec3A;
     use hedgerow::bvh::sah::Collapse;
-
-    /// Small boxes in a cube, some of which are equal.
-    pub(super) fn boxes(count: u32) -> Vec<Item> {
-        let at = |i: u32, step: u32| (i.wrapping_mul(step) >> 8) as f32 / (1 << 24) as f32;
-        let of = |i: u32| {
-            let j = if i % 7 == 3 { i / 2 } else { i };
-            let lo = Vec3A::new(at(j, 2_654_435_761), at(j, 805_459_861), at(j, 3_674_653_429));
-            Item::new(Bounds { lo, hi: lo + 0.2 * at(j, 97_654_321) }, i, 1)
-        };
-        (0..count).map(of).collect()
-    }
 
     pub(super) fn swept(items: &[Item]) -> InsertionTree {
         let topology = sweep::positions(items, &Collapse::SAH, true);

@@ -132,9 +132,9 @@ impl Search {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{boxes, swept};
+    use super::super::tests::swept;
     use super::*;
-    use crate::bvh::bounds::Bounds;
+    use crate::bvh::bounds::{Bounds, tests::boxes};
     use glam::Vec3A;
 
     /// Every place in the tree.
