@@ -41,6 +41,7 @@ impl Aabb {
     }
 
     /// The middle: (lo + hi) / 2, each half taken first so that huge boxes do not overflow.
+    #[inline]
     pub fn centroid(&self) -> [f32; 3] {
         std::array::from_fn(|i| 0.5 * self.lo[i] + 0.5 * self.hi[i])
     }

@@ -10,8 +10,9 @@ pub(super) struct Axis {
     shift: u32,
     /// The low corner.
     lo: i64,
-    /// The same as it was given.
+    /// The same as it was given, and the high corner.
     corner: f32,
+    far: f32,
     /// (2⁶⁴ / extent − 1) · 2⁶³, rounded up, for the shifted extent; 0 for a flat axis.
     inverse: u64,
 }
@@ -24,12 +25,12 @@ impl Axis {
         let wide = wide_fixed_point(hi, exponent) - wide_fixed_point(lo, exponent);
         let extent = ((wide + 0xFFFF_FFFF) >> 32) as u64;
         if extent == 0 {
-            return Axis { exponent, shift: 0, lo: low, corner: lo, inverse: 0 };
+            return Axis { exponent, shift: 0, lo: low, corner: lo, far: lo, inverse: 0 };
         }
         let shift = extent.leading_zeros();
         let extent = u128::from(extent << shift);
         let inverse = (((1 << 64) - extent) << 63).div_ceil(extent) as u64;
-        Axis { exponent, shift, lo: low, corner: lo, inverse }
+        Axis { exponent, shift, lo: low, corner: lo, far: hi, inverse }
     }
 
     /// Where `v` lies between the corners, as a 64-bit fraction; what is outside lies in the corner.
@@ -58,6 +59,49 @@ impl Axis {
     }
 }
 
+/// The first bits of an axis' fractions, in double precision: fast, and only where rounding cannot change them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cells {
+    corner: f64,
+    per_length: f64,
+    /// How near to a border of cells a place is that may be on either side.
+    margin: f64,
+    /// How many cells there are.
+    count: f64,
+    bits: u32,
+}
+
+impl Cells {
+    /// Adding this rounds to an integer, which is in the low bits then, a negative one as well.
+    const ROUNDING: f64 = (3u64 << 51) as f64;
+
+    /// The first `bits` bits; `None` where doubles tell too little.
+    pub fn new(axis: &Axis, bits: u32) -> Option<Cells> {
+        let corner = f64::from(axis.corner);
+        let extent = f64::from(axis.far) - corner;
+        let count = (1u64 << bits.min(32)) as f64;
+        let per_length = count / extent;
+        let largest = f64::from(axis.corner.abs().max(axis.far.abs()));
+        // Differences of doubles, units of 2⁻⁶², and denormals that are 0 there.
+        let lost = largest / (1u64 << 50) as f64 + 2.0 * f64::from(f32::MIN_POSITIVE);
+        let margin = lost * per_length + 1.0 / (1u64 << 20) as f64;
+        (axis.inverse != 0 && bits <= 32 && margin < 0.25).then_some(Cells { corner, per_length, margin, count, bits })
+    }
+
+    /// Those bits of the fraction, at the top; `None` near a border.
+    #[inline]
+    pub fn fraction(&self, v: f32) -> Option<u64> {
+        let place = (f64::from(v) - self.corner) * self.per_length;
+        let rounded = place - 0.5 + Cells::ROUNDING;
+        let within = place - (rounded - Cells::ROUNDING);
+        let is_sure = place > self.margin
+            && place < self.count - self.margin
+            && within > self.margin
+            && within < 1.0 - self.margin;
+        is_sure.then(|| rounded.to_bits() << (64 - self.bits))
+    }
+}
+
 /// The largest fraction of 96 bits.
 const WIDE_MAX: u128 = (1 << 96) - 1;
 
@@ -66,17 +110,13 @@ fn biased_exponent(v: f32) -> i32 {
 }
 
 /// A float in units of 2⁻⁶² of what the exponent bounds; what is smaller than a unit is cut off, what is larger than the bound is
-/// the bound.
+/// the bound. Denormals are 0.
 fn fixed_point(v: f32, exponent: i32) -> i64 {
-    let own = biased_exponent(v);
-    let mantissa = if own == 0 { 0 } else { i64::from(v.to_bits() & 0x7F_FFFF | 0x80_0000) };
-    let shift = own - exponent + 38;
-    let magnitude = match shift {
-        39.. => (1 << 62) - 1,
-        0.. => mantissa << shift,
-        _ => mantissa >> (-shift).min(63),
-    };
-    if v.is_sign_negative() { -magnitude } else { magnitude }
+    const BOUND: i64 = (1 << 62) - 1;
+    // 2^(188 − exponent), and exact: any float and any unit are far from the ends of doubles.
+    let units = f64::from_bits(((1023 + 188 - exponent) as u64) << 52);
+    let normal = if biased_exponent(v) == 0 { 0.0 } else { v };
+    ((f64::from(normal) * units) as i64).clamp(-BOUND, BOUND)
 }
 
 /// The same in units of 2⁻⁹⁴.
@@ -119,6 +159,49 @@ pub(super) fn from_ordered(bits: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn units_are_what_shifting_the_mantissa_gives() {
+        let shifted = |v: f32, exponent: i32| {
+            let own = biased_exponent(v);
+            let mantissa = if own == 0 { 0 } else { i128::from(v.to_bits() & 0x7F_FFFF | 0x80_0000) };
+            let magnitude = match own - exponent + 38 {
+                39.. => (1 << 62) - 1,
+                shift @ 0.. => (mantissa << shift) as i64,
+                shift => (mantissa >> (-shift).min(63)) as i64,
+            };
+            if v < 0.0 { -magnitude } else { magnitude }
+        };
+        for exponent in [0, 1, 40, 63, 64, 100, 127, 150, 190, 254] {
+            for own in 0..=254u32 {
+                for mantissa in [0, 1, 0x40_0000, 0x55_5555, 0x7F_FFFF] {
+                    let v = f32::from_bits(own << 23 | mantissa);
+                    for v in [v, -v] {
+                        assert_eq!(fixed_point(v, exponent), shifted(v, exponent), "{v:e} by {exponent}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cells_are_the_first_bits_of_fractions_wherever_they_are_told() {
+        for (lo, hi) in [(0.0, 1.0), (-3.0, 5.5), (1e6, 1e6 + 10.0), (-1e30, 1e30), (1e-30, 3e-30), (-1e-38, 2e-38)] {
+            let axis = Axis::new(lo, hi);
+            for bits in [1, 8, 16] {
+                let Some(cells) = Cells::new(&axis, bits) else { continue };
+                let told = (0..=4096).filter_map(|i| {
+                    let v = lo + (hi - lo) * (i as f32 / 4096.0) * 1.01;
+                    let told = cells.fraction(v)?;
+                    assert_eq!(told >> (64 - bits), axis.fraction(v) >> (64 - bits), "{v:e} of {lo:e} to {hi:e}");
+                    Some(told)
+                });
+                // What lies on a border is not told.
+                assert!(told.count() > 2000, "{lo:e} to {hi:e}, {bits} bits");
+            }
+        }
+        assert!(Cells::new(&Axis::new(1e30, 1e30), 8).is_none());
+    }
 
     #[test]
     fn octaves_grow_with_the_distance_and_by_one_for_a_doubling() {

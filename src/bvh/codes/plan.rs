@@ -12,7 +12,7 @@ use crate::geometry::Aabb;
 #[derive(Debug, Clone)]
 pub struct CodePlan {
     pub(super) codes: Codes,
-    axes: [Axis; 3],
+    pub(super) axes: [Axis; 3],
     pub(super) recipe: Recipe,
     size: Size,
     pub(super) prefix: Prefix,
@@ -58,13 +58,15 @@ impl Size {
     }
 
     /// Diagonal of the box over that of the scene, as a 16-bit fraction.
+    #[inline]
     fn of(&self, primitive: &Aabb) -> u32 {
         let extent: [f32; 3] =
             std::array::from_fn(|i| primitive.hi[i] * self.prescale - primitive.lo[i] * self.prescale);
         let squared = (extent[0] * extent[0] + extent[1] * extent[1] + extent[2] * extent[2]) * self.reciprocal;
         // The square root is taken of the fraction as an integer: the same on every device.
         let fixed = if squared >= 1.0 { u32::MAX } else { (squared * 4_294_967_296.0) as u32 };
-        fixed.isqrt()
+        // Of 32 bits the root in double precision, cut off, is the integer's.
+        f64::from(fixed).sqrt() as u32
     }
 }
 
@@ -135,10 +137,16 @@ impl CodePlan {
         self.encode_with(primitive, |coordinates, size| self.recipe.encode(coordinates, size, group, bits))
     }
 
-    /// The same by a recipe that gives what the plan's own would of coordinates and a size.
+    /// The size of a primitive as a 16-bit fraction, where the code has bits of it.
+    #[inline]
+    pub(super) fn size_of(&self, primitive: &Aabb) -> u32 {
+        if self.codes.code.size_group() == 0 { 0 } else { self.size.of(primitive) }
+    }
+
+    /// [`CodePlan::encode`] by a recipe that gives what the plan's own would of coordinates and a size.
     pub(super) fn encode_with(&self, primitive: &Aabb, recipe: impl Fn([u64; 3], u32) -> u64) -> u64 {
         let bits = self.codes.bits;
-        let size = || if self.codes.code.size_group() == 0 { 0 } else { self.size.of(primitive) };
+        let size = || self.size_of(primitive);
         let coordinates = || self.fractions(primitive.centroid());
         let code = match &self.prefix {
             Prefix::None => recipe(coordinates(), size()),
@@ -158,6 +166,7 @@ impl CodePlan {
     }
 
     /// The code of primitives that are left out: it sorts behind all others.
+    #[inline]
     pub fn inactive(&self) -> u64 {
         u64::MAX >> (64 - self.codes.bits)
     }

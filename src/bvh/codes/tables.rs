@@ -1,6 +1,7 @@
 //! The same codes faster, for builders on the host: a bit of a coordinate always lands on the same bit of the code, so what the
 //! bytes of coordinates make of a code is looked up.
 
+use super::axis::Cells;
 use super::plan::{CodePlan, Prefix};
 use super::recipe::Recipe;
 use crate::geometry::Aabb;
@@ -19,6 +20,8 @@ pub struct CodeTables<'a> {
     size: [OfByte; 2],
     /// Whether the code takes any of it.
     has_recipe: bool,
+    /// The bits of coordinates that the code takes, where that is all and doubles tell them.
+    cells: Option<[Cells; 3]>,
 }
 
 /// What a byte makes of the code whose bits make `of_bit` of it.
@@ -38,7 +41,7 @@ impl<'a> CodeTables<'a> {
         let recipe: &Recipe = &plan.recipe;
         let (group, bits) = (plan.codes.code.size_group(), plan.codes.bits);
         let has_recipe = matches!(plan.prefix, Prefix::None | Prefix::Sections(_));
-        let coordinates = std::array::from_fn(|axis| {
+        let coordinates: [Vec<OfByte>; 3] = std::array::from_fn(|axis| {
             let taken = recipe.sequence.iter().filter(|&&of| of == axis).count() as u32;
             let of = |coordinate| {
                 let mut coordinates = [0; 3];
@@ -49,23 +52,44 @@ impl<'a> CodeTables<'a> {
             (0..bytes).map(|byte| of_byte(|bit| of(1 << (56 - 8 * byte + bit)))).collect()
         });
         let size = [8, 0].map(|shift| of_byte(|bit| recipe.encode([0; 3], 1 << (shift + bit), group, bits)));
-        CodeTables { plan, coordinates, size, has_recipe }
+        let cells = |axis: usize| Cells::new(&plan.axes[axis], 8 * coordinates[axis].len().max(1) as u32);
+        let cells = match (&plan.prefix, cells(0), cells(1), cells(2)) {
+            (Prefix::None, Some(x), Some(y), Some(z)) => Some([x, y, z]),
+            _ => None,
+        };
+        CodeTables { plan, coordinates, size, has_recipe, cells }
     }
 
     /// [`CodePlan::encode`].
+    #[inline]
     pub fn encode(&self, primitive: &Aabb) -> u64 {
-        if !self.has_recipe {
-            return self.plan.encode(primitive);
+        if let Some(coordinates) = self.coordinates_of(primitive) {
+            return self.code(coordinates, self.plan.size_of(primitive)).min(self.plan.inactive() - 1);
         }
-        self.plan.encode_with(primitive, |coordinates, size| {
-            let mut code = self.size[0][(size >> 8) as usize & 0xFF] | self.size[1][size as usize & 0xFF];
-            for (tables, coordinate) in self.coordinates.iter().zip(coordinates) {
-                for (table, byte) in tables.iter().zip(coordinate.to_be_bytes()) {
-                    code |= table[byte as usize];
-                }
+        match self.has_recipe {
+            true => self.plan.encode_with(primitive, |coordinates, size| self.code(coordinates, size)),
+            false => self.plan.encode(primitive),
+        }
+    }
+
+    /// The coordinates as far as the code takes them, where they are told fast.
+    #[inline]
+    fn coordinates_of(&self, primitive: &Aabb) -> Option<[u64; 3]> {
+        let [x, y, z] = self.cells.as_ref()?;
+        let [at_x, at_y, at_z] = primitive.centroid();
+        Some([x.fraction(at_x)?, y.fraction(at_y)?, z.fraction(at_z)?])
+    }
+
+    /// What the recipe makes of coordinates and a size.
+    #[inline]
+    fn code(&self, coordinates: [u64; 3], size: u32) -> u64 {
+        let mut code = self.size[0][(size >> 8) as usize & 0xFF] | self.size[1][size as usize & 0xFF];
+        for (tables, coordinate) in self.coordinates.iter().zip(coordinates) {
+            for (table, byte) in tables.iter().zip(coordinate.to_be_bytes()) {
+                code |= table[byte as usize];
             }
-            code
-        })
+        }
+        code
     }
 }
 
