@@ -1,14 +1,16 @@
 //! Binned SAH: top-down, at each node the best of the planes between a few bins of the centroids.
 //!
 //! Wald 2007, "On fast Construction of SAH-based Bounding Volume Hierarchies"; Frantál 2019, section 3.1. Items are moved, not
-//! indices, so that every pass over a node reads memory in order. Large nodes are binned and divided by all threads, a piece
-//! each; small ones are built side by side. Pieces do not depend on the number of threads, bins are minima, maxima and counts,
-//! and items keep their order on both sides: the tree is the same for any number of threads.
+//! indices, so that every pass over a node reads memory in order: from one array to the other, and back at the next level. Large
+//! nodes are binned and divided by all threads, a piece each; small ones are built side by side. Pieces do not depend on the number
+//! of threads, bins are minima, maxima and counts, and items keep their order on both sides: the tree is the same for any number of
+//! threads.
 
 use super::bounds::{Bounds, Item, around};
 use super::sweep::HALVED_FROM;
 use super::topology::{LEAF, Topology};
 use super::{ALONE, DIVIDED_ABOVE};
+use bytemuck::zeroed_vec;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::{Error, Result};
 use rayon::prelude::*;
@@ -89,7 +91,7 @@ const LEAST_EXTENT: f32 = 1.0 / (1u64 << 60) as f32;
 /// An extent of centroids that Frantál 2019 takes for none.
 const FLAT: f32 = 1e-7;
 
-/// The tree over `items`, which it brings into another order. `scale` is what their lengths were scaled by.
+/// The tree over `items`. `scale` is what their lengths were scaled by.
 pub(super) fn build(
     mut items: Vec<Item>,
     scale: f32,
@@ -98,13 +100,28 @@ pub(super) fn build(
     options: &BinnedOptions,
 ) -> Topology {
     let mut tree = Topology::new(items.len());
-    let mut spare = vec![Item::NONE; items.len()];
+    let mut spare: Vec<Item> = zeroed_vec(items.len());
     let flat = if options.flat_leaves { 2.0 * FLAT * scale } else { 0.0 };
     let build = Build { costs, single, options, flat };
     let node = build.measured(&items);
-    build.subtree(&mut items, &mut spare, &mut tree.splits, node, 0);
-    tree.order.par_iter_mut().with_min_len(ALONE).zip(&items).for_each(|(i, item)| *i = item.primitive());
+    let whole = Part { items: &mut items, spare: &mut spare, order: &mut tree.order, splits: &mut tree.splits };
+    build.subtree(whole, node, 0);
     tree
+}
+
+/// What a subtree is built over, room for as many items, and where it is written.
+struct Part<'a> {
+    items: &'a mut [Item],
+    spare: &'a mut [Item],
+    order: &'a mut [u32],
+    splits: &'a mut [u32],
+}
+
+impl Part<'_> {
+    /// Writes its primitives: they are in a leaf.
+    fn end(self) {
+        self.order.iter_mut().zip(self.items).for_each(|(primitive, item)| *primitive = item.primitive());
+    }
 }
 
 /// A node before it is split: the box around its items, and that around their centroids (twice them).
@@ -180,6 +197,8 @@ type Plane = (f32, usize);
 /// A node that is split: how many items are on the left, and what lies on either side.
 struct Divided {
     left_count: usize,
+    /// Whether the items are in `spare` now.
+    is_moved: bool,
     left: Unsplit,
     right: Unsplit,
 }
@@ -202,32 +221,36 @@ impl Build<'_> {
         items.par_chunks(PIECE).map(of).reduce(|| Unsplit::EMPTY, Unsplit::union)
     }
 
-    /// Divides `items` among the subtrees whose slots are `splits`.
-    fn subtree(&self, items: &mut [Item], spare: &mut [Item], splits: &mut [u32], node: Unsplit, depth: u32) {
-        let Some((split, splits)) = splits.split_first_mut() else { return };
-        let count = items.len();
-        let Some(Divided { left_count, left, right }) = self.divide(items, spare, &node, depth) else {
-            *split = LEAF;
-            return;
+    fn subtree(&self, part: Part<'_>, node: Unsplit, depth: u32) {
+        if part.splits.is_empty() {
+            return part.end();
+        }
+        let count = part.items.len();
+        let Some(Divided { left_count, is_moved, left, right }) = self.divide(part.items, part.spare, &node, depth)
+        else {
+            part.splits[0] = LEAF;
+            return part.end();
         };
-        *split = left_count as u32;
+        part.splits[0] = left_count as u32;
+        let (items, spare) = if is_moved { (part.spare, part.items) } else { (part.items, part.spare) };
         let (left_items, right_items) = items.split_at_mut(left_count);
         let (left_spare, right_spare) = spare.split_at_mut(left_count);
-        let (left_splits, right_splits) = splits.split_at_mut(left_count - 1);
-        let mut on_left = || self.subtree(left_items, left_spare, left_splits, left, depth + 1);
-        let mut on_right = || self.subtree(right_items, right_spare, right_splits, right, depth + 1);
+        let (left_order, right_order) = part.order.split_at_mut(left_count);
+        let (left_splits, right_splits) = part.splits[1..].split_at_mut(left_count - 1);
+        let on_left = Part { items: left_items, spare: left_spare, order: left_order, splits: left_splits };
+        let on_right = Part { items: right_items, spare: right_spare, order: right_order, splits: right_splits };
         if count < ALONE || depth >= DIVIDED_ABOVE {
-            on_left();
-            on_right();
+            self.subtree(on_left, left, depth + 1);
+            self.subtree(on_right, right, depth + 1);
         } else {
-            rayon::join(on_left, on_right);
+            rayon::join(|| self.subtree(on_left, left, depth + 1), || self.subtree(on_right, right, depth + 1));
         }
     }
 
     /// Brings what is on the left before the others; `None` if the node is a leaf. Not inlined: its bins would lie on the stack
     /// once for each level.
     #[inline(never)]
-    fn divide(&self, items: &mut [Item], spare: &mut [Item], node: &Unsplit, depth: u32) -> Option<Divided> {
+    fn divide(&self, items: &[Item], spare: &mut [Item], node: &Unsplit, depth: u32) -> Option<Divided> {
         let edges = (node.centroids.hi - node.centroids.lo).min_element();
         if !self.single && (items.len() <= self.options.leaf as usize || edges < self.flat) {
             return None;
@@ -261,14 +284,17 @@ impl Build<'_> {
         let (left, right) = items.split_at(items.len() / 2);
         let cost = self.costs.leaf_cost(around(left).half_area(), left.len() as u32)
             + self.costs.leaf_cost(around(right).half_area(), right.len() as u32);
-        let divided = || Divided { left_count: left.len(), left: self.measured(left), right: self.measured(right) };
+        let divided = || {
+            let (left_count, is_moved) = (left.len(), false);
+            Divided { left_count, is_moved, left: self.measured(left), right: self.measured(right) }
+        };
         (!self.is_leaf(area, items.len(), cost)).then(divided)
     }
 
     /// By the plane between at most `N` bins of an axis that costs least; of equal ones the first, along the first axis.
     fn divide_by<const N: usize>(
         &self,
-        items: &mut [Item],
+        items: &[Item],
         spare: &mut [Item],
         area: f32,
         grids: &[Option<Grid>; 3],
@@ -290,7 +316,7 @@ impl Build<'_> {
         let left_count = left.count as usize;
         // That is, `grid.bin_of(item) < bin`.
         partition(items, spare, left_count, |item| grid.place(item) < bin as f32);
-        Some(Divided { left_count, left: left.items, right: right.items })
+        Some(Divided { left_count, is_moved: true, left: left.items, right: right.items })
     }
 
     /// The best plane between bins, of which the first and the last hold something.
@@ -316,13 +342,7 @@ impl Build<'_> {
     }
 
     /// The same for a few items, in the order of their bins: most bins are empty then.
-    fn divide_few(
-        &self,
-        items: &mut [Item],
-        spare: &mut [Item],
-        area: f32,
-        grids: &[Option<Grid>; 3],
-    ) -> Option<Divided> {
+    fn divide_few(&self, items: &[Item], spare: &mut [Item], area: f32, grids: &[Option<Grid>; 3]) -> Option<Divided> {
         let count = items.len();
         // Whatever the leaves below will be, each item is in one that is no smaller than itself.
         let least: f32 = items.iter().map(|item| self.costs.leaf_cost(item.bounds().half_area(), 1)).sum();
@@ -341,17 +361,16 @@ impl Build<'_> {
         if self.is_leaf(area, count, cost) {
             return None;
         }
-        spare.copy_from_slice(items);
-        for (item, key) in items.iter_mut().zip(order) {
-            *item = spare[(key & 0xff) as usize];
+        for (item, key) in spare.iter_mut().zip(order) {
+            *item = items[(key & 0xff) as usize];
         }
         let side = |items: &[Item]| {
             let mut all = Unsplit::EMPTY;
             items.iter().for_each(|item| all.add(item));
             all
         };
-        let (left, right) = items.split_at(left_count);
-        Some(Divided { left_count, left: side(left), right: side(right) })
+        let (left, right) = spare.split_at(left_count);
+        Some(Divided { left_count, is_moved: true, left: side(left), right: side(right) })
     }
 
     /// The cost of the best plane, and how many items are on its left, of items in the order of their bins.
@@ -379,6 +398,11 @@ impl Build<'_> {
     }
 }
 
+/// Whether all threads work on a node together. One that has no others reads its items once, and in place.
+fn is_for_all(items: &[Item]) -> bool {
+    items.len() >= TOGETHER && rayon::current_num_threads() > 1
+}
+
 /// The bin of each item, and its place in the eight bits below, in the order of the bins.
 fn in_order_of_bins(items: &[Item], grid: &Grid) -> [u32; FEW] {
     let mut order = [u32::MAX; FEW];
@@ -402,13 +426,17 @@ fn filled<const N: usize>(items: &[Item], grid: &Grid) -> [Bin; N] {
     };
     let fill = |items: &[Item]| {
         let mut bins = [Bin::EMPTY; N];
-        let mut others = bins;
         let add = |bins: &mut [Bin; N], item: &Item| {
             let bin = &mut bins[grid.bin_of(item)];
             bin.items.add(item);
             bin.count += 1;
         };
+        if items.len() < 4 * N {
+            items.iter().for_each(|item| add(&mut bins, item));
+            return bins;
+        }
         // Neighbours often are in the same bin: two sets of bins, as the one need not wait for the other.
+        let mut others = bins;
         let pairs = items.chunks_exact(2);
         pairs.remainder().iter().for_each(|item| add(&mut bins, item));
         for pair in pairs {
@@ -417,27 +445,20 @@ fn filled<const N: usize>(items: &[Item], grid: &Grid) -> [Bin; N] {
         }
         union(bins, others)
     };
-    if items.len() < TOGETHER {
+    if !is_for_all(items) {
         return fill(items);
     }
     items.par_chunks(PIECE).map(fill).reduce(|| [Bin::EMPTY; N], union)
 }
 
-/// Brings the `left_count` items that are on the left before the others, both as they were.
-pub(super) fn partition(
-    items: &mut [Item],
-    spare: &mut [Item],
-    left_count: usize,
-    is_left: impl Fn(&Item) -> bool + Sync,
-) {
-    if items.len() < TOGETHER {
-        let right = spread(items, spare, is_left);
-        items[left_count..].copy_from_slice(&spare[..right]);
-        return;
+/// Writes the `left_count` items that are on the left before the others, both in the order that they were in.
+pub(super) fn partition(items: &[Item], to: &mut [Item], left_count: usize, is_left: impl Fn(&Item) -> bool + Sync) {
+    if !is_for_all(items) {
+        return spread(items, to, left_count, is_left);
     }
     let counts: Vec<usize> =
         items.par_chunks(PIECE).map(|piece| piece.iter().filter(|item| is_left(item)).count()).collect();
-    let (mut left, mut right) = spare.split_at_mut(left_count);
+    let (mut left, mut right) = to.split_at_mut(left_count);
     let mut places = Vec::with_capacity(counts.len());
     for (piece, &on_left) in items.chunks(PIECE).zip(&counts) {
         let (left_place, left_rest) = left.split_at_mut(on_left);
@@ -452,20 +473,16 @@ pub(super) fn partition(
             *place.expect("counted before") = *item;
         }
     });
-    items.par_chunks_mut(PIECE).zip(spare.par_chunks(PIECE)).for_each(|(to, from)| to.copy_from_slice(from));
 }
 
-/// Items on the left move up, the others go to `spare`: how many those are.
-fn spread(items: &mut [Item], spare: &mut [Item], is_left: impl Fn(&Item) -> bool) -> usize {
-    let (mut left, mut right) = (0, 0);
-    for at in 0..items.len() {
-        let item = items[at];
-        let is_left = is_left(&item);
-        // Both are written and one of them stays: a branch here would be guessed wrongly half the time.
-        items[left] = item;
-        spare[right] = item;
+/// The same by one thread.
+fn spread(items: &[Item], to: &mut [Item], left_count: usize, is_left: impl Fn(&Item) -> bool) {
+    let (mut left, mut right) = (0, left_count);
+    for item in items {
+        let is_left = is_left(item);
+        // Chosen without a branch, which would be guessed wrongly half the time.
+        to[if is_left { left } else { right }] = *item;
         left += usize::from(is_left);
         right += usize::from(!is_left);
     }
-    right
 }

@@ -14,6 +14,7 @@ use super::bounds::{Bounds, Item};
 use super::sweep;
 use super::topology::{LEAF, Span, Topology};
 use super::{ALONE, DIVIDED_ABOVE};
+use bytemuck::zeroed_vec;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::{Error, Result};
 use rayon::prelude::*;
@@ -50,7 +51,7 @@ impl BonsaiOptions {
 
 /// The tree over `items`, which it brings into another order.
 pub(super) fn build(mut items: Vec<Item>, costs: &Collapse, single: bool, options: &BonsaiOptions) -> Topology {
-    let mut spare = vec![Item::NONE; items.len()];
+    let mut spare: Vec<Item> = zeroed_vec(items.len());
     let sizes = parts(&mut items, &mut spare, options.mini as usize, 0);
     drop(spare);
     let mut rest = &items[..];
@@ -99,6 +100,7 @@ fn parts(items: &mut [Item], spare: &mut [Item], most: usize, depth: u32) -> Vec
         left_count = count / 2;
     } else {
         partition(items, spare, left_count, is_left);
+        items.par_chunks_mut(ALONE).zip(spare.par_chunks(ALONE)).for_each(|(to, from)| to.copy_from_slice(from));
     }
     let (left_items, right_items) = items.split_at_mut(left_count);
     let (left_spare, right_spare) = spare.split_at_mut(left_count);
