@@ -1,5 +1,6 @@
 //! Boxes as builders on the CPU work with them: two vectors of four lanes, in lengths that areas are finite in.
 
+use bytemuck::Zeroable;
 use glam::{Mat4, Vec3A, Vec3Swizzles, Vec4};
 use hedgerow::geometry::Aabb;
 
@@ -77,7 +78,7 @@ fn sum_of_faces(edges: Vec3A) -> f32 {
 }
 
 /// What a tree is built over: a box, which primitive it is of, and for how many primitives it counts. 32 bytes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Zeroable)]
 #[repr(C, align(16))]
 pub(crate) struct Item {
     lo: [f32; 3],
@@ -87,7 +88,7 @@ pub(crate) struct Item {
 }
 
 impl Item {
-    /// Of no primitive: its weight is 0.
+    /// Of no primitive: its weight is 0, as that of one whose bytes are all 0.
     pub const NONE: Item = Item { lo: [0.0; 3], primitive: NORMAL, hi: [0.0; 3], weight: NORMAL };
 
     /// What `index` names, of `weight` primitives.

@@ -9,10 +9,10 @@ use super::bounds::Bounds;
 use super::input::Input;
 use super::topology::{LEAF, Span, Topology};
 use super::{ALONE, DIVIDED_ABOVE};
+use bytemuck::zeroed_vec;
 use glam::Vec3A;
 use hedgerow::bvh::layout::{Bvh2, Child, MAX_DEPTH, Node, Record, status};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::geometry::Aabb;
 use rayon::prelude::*;
 
 /// The records of the leaves from left to right.
@@ -20,50 +20,40 @@ pub(super) fn records<R: Record>(order: &[u32], record: impl Fn(u32) -> R + Sync
     order.par_iter().with_min_len(ALONE).map(|&primitive| record(primitive)).collect()
 }
 
-/// What is known of a subtree, in its slot.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Subtree {
-    bounds: Aabb,
-    /// Inner nodes; none in a leaf.
-    inner: u32,
-}
-
-/// The same, and what its parent decides by.
+/// What the parent of a subtree decides by.
 struct Measured {
     bounds: Bounds,
     cost: f32,
+    /// Inner nodes; none in a leaf.
     inner: u32,
     /// Whether it was cut off at [`MAX_DEPTH`].
     is_limited: bool,
 }
 
-/// Subtrees of a tree whose leaves are final.
+/// A tree whose leaves are final.
 pub(super) struct Collapsed {
-    subtrees: Vec<Subtree>,
+    /// Of each slot, the inner nodes of the subtree.
+    inner: Vec<u32>,
     root: Measured,
 }
 
 /// Makes leaves of the subtrees that are cheaper as such, if `collapse` is enabled, and of those at [`MAX_DEPTH`].
 pub(super) fn collapse<R: Record>(tree: &mut Topology, records: &[R], collapse: &Collapse, scale: f32) -> Collapsed {
-    let none = Subtree { bounds: Aabb::EMPTY, inner: 0 };
-    let mut subtrees = vec![none; tree.splits.len()];
+    let mut inner = vec![0; tree.splits.len()];
     let walk = Walk { collapse, scale };
-    let root = walk.subtree(Part { splits: &mut tree.splits, subtrees: &mut subtrees, records }, 0);
-    Collapsed { subtrees, root }
+    let root = walk.subtree(Part { splits: &mut tree.splits, inner: &mut inner, records }, 0);
+    Collapsed { inner, root }
 }
 
 /// The tree itself.
 pub(super) fn layout<R: Record>(input: &Input, tree: &Topology, collapsed: &Collapsed, records: Vec<R>) -> Bvh2<R> {
-    let Collapsed { subtrees, root } = collapsed;
+    let Collapsed { inner, root } = collapsed;
     let mut header = input.header::<R>();
-    let mut nodes = vec![Node::UNUSED; root.inner.max(1) as usize];
-    let layout = Layout { splits: &tree.splits, subtrees, records: &records };
+    // Pages of zeros come with the threads that write them.
+    let mut nodes: Vec<Node> = if root.inner == 0 { vec![Node::UNUSED] } else { zeroed_vec(root.inner as usize) };
     if header.active > 0 {
-        let whole = Span::whole(records.len());
-        header.root = layout.child(whole, 0);
-        if root.inner > 0 {
-            layout.place(whole, &mut nodes, 0);
-        }
+        let layout = Layout { splits: &tree.splits, inner, records: &records };
+        header.root = layout.child(Span::whole(records.len()), &mut nodes[..root.inner as usize], 0);
         (header.cost, header.built_cost) = (root.cost, root.cost);
         header.built_area = input.bounds.scaled_half_area(input.scale);
     }
@@ -79,7 +69,8 @@ pub(super) fn layout<R: Record>(input: &Input, tree: &Topology, collapsed: &Coll
 /// A subtree of the topology, with room for what is found out.
 struct Part<'a, R> {
     splits: &'a mut [u32],
-    subtrees: &'a mut [Subtree],
+    /// For the inner nodes of each slot.
+    inner: &'a mut [u32],
     records: &'a [R],
 }
 
@@ -94,7 +85,7 @@ impl Walk<'_> {
     }
 
     fn leaf<R: Record>(&self, records: &[R]) -> Measured {
-        let bounds = records.iter().fold(Bounds::EMPTY, |bounds, record| bounds.union(bounds_of(record)));
+        let bounds = around(records);
         let cost =
             if records.is_empty() { 0.0 } else { self.collapse.leaf_cost(self.area(&bounds), records.len() as u32) };
         Measured { bounds, cost, inner: 0, is_limited: false }
@@ -116,8 +107,8 @@ impl Walk<'_> {
 
     /// A subtree whose root is at `depth`. No deeper than [`MAX_DEPTH`], however deep the tree is.
     fn subtree<R: Record>(&self, part: Part<'_, R>, depth: u32) -> Measured {
-        let Part { splits, subtrees, records } = part;
-        let (Some((split, splits)), Some((subtree, subtrees))) = (splits.split_first_mut(), subtrees.split_first_mut())
+        let Part { splits, inner, records } = part;
+        let (Some((split, splits)), Some((own_inner, inner))) = (splits.split_first_mut(), inner.split_first_mut())
         else {
             return self.leaf(records);
         };
@@ -127,9 +118,9 @@ impl Walk<'_> {
             let left_count = *split as usize;
             let (left_records, right_records) = records.split_at(left_count);
             let (left_splits, right_splits) = splits.split_at_mut(left_count - 1);
-            let (left_subtrees, right_subtrees) = subtrees.split_at_mut(left_count - 1);
-            let left = Part { splits: left_splits, subtrees: left_subtrees, records: left_records };
-            let right = Part { splits: right_splits, subtrees: right_subtrees, records: right_records };
+            let (left_inner, right_inner) = inner.split_at_mut(left_count - 1);
+            let left = Part { splits: left_splits, inner: left_inner, records: left_records };
+            let right = Part { splits: right_splits, inner: right_inner, records: right_records };
             let (left, right) = if records.len() < ALONE || depth >= DIVIDED_ABOVE {
                 (self.subtree(left, depth + 1), self.subtree(right, depth + 1))
             } else {
@@ -140,15 +131,8 @@ impl Walk<'_> {
         if measured.inner == 0 {
             *split = LEAF;
         }
-        *subtree = measured.subtree();
+        *own_inner = measured.inner;
         measured
-    }
-}
-
-impl Measured {
-    fn subtree(&self) -> Subtree {
-        let bounds = Aabb { lo: self.bounds.lo.to_array(), hi: self.bounds.hi.to_array() };
-        Subtree { bounds, inner: self.inner }
     }
 }
 
@@ -159,48 +143,41 @@ fn bounds_of<R: Record>(record: &R) -> Bounds {
     }
 }
 
+/// The box around records.
+fn around<R: Record>(records: &[R]) -> Bounds {
+    records.iter().fold(Bounds::EMPTY, |bounds, record| bounds.union(bounds_of(record)))
+}
+
 struct Layout<'a, R> {
     splits: &'a [u32],
-    subtrees: &'a [Subtree],
+    inner: &'a [u32],
     records: &'a [R],
 }
 
 impl<R: Record> Layout<'_, R> {
-    /// What names a subtree whose nodes begin at `node`.
-    fn child(&self, span: Span, node: u32) -> Child {
-        if span.count == 1 {
-            let Aabb { lo, hi } = self.records[span.first as usize].bounds().expect("a record of this crate has a box");
-            return Child { lo, index: span.first, hi, count: 1 };
-        }
-        let Subtree { bounds: Aabb { lo, hi }, inner } = self.subtrees[span.slot as usize];
-        match inner {
-            0 => Child { lo, index: span.first, hi, count: span.count },
-            _ => Child { lo, index: node, hi, count: 0 },
-        }
-    }
-
     fn inner(&self, span: Span) -> u32 {
-        if span.count == 1 { 0 } else { self.subtrees[span.slot as usize].inner }
+        if span.count == 1 { 0 } else { self.inner[span.slot as usize] }
     }
 
-    /// Writes the nodes of a subtree that is not a leaf; the first is number `at`.
-    fn place(&self, span: Span, nodes: &mut [Node], at: u32) {
-        let (node, nodes) = nodes.split_first_mut().expect("an inner node has a place");
+    /// Writes the nodes of a subtree, of which the first is number `at`, and gives what names it.
+    fn child(&self, span: Span, nodes: &mut [Node], at: u32) -> Child {
+        let (bounds, index, count) = match nodes.split_first_mut() {
+            None => (around(&self.records[span.primitives()]), span.first, span.count),
+            Some((node, below)) => (self.place(span, node, below, at), at, 0),
+        };
+        Child { lo: bounds.lo.to_array(), index, hi: bounds.hi.to_array(), count }
+    }
+
+    /// Writes a node and those below it; the box around them.
+    fn place(&self, span: Span, node: &mut Node, below: &mut [Node], at: u32) -> Bounds {
         let [left, right] = span.children(self.splits[span.slot as usize]);
         let left_inner = self.inner(left);
-        let (left_at, right_at) = (at + 1, at + 1 + left_inner);
-        *node = Node { children: [self.child(left, left_at), self.child(right, right_at)] };
-        let (left_nodes, right_nodes) = nodes.split_at_mut(left_inner as usize);
-        let place = |span: Span, nodes: &mut [Node], at| {
-            if !nodes.is_empty() {
-                self.place(span, nodes, at);
-            }
-        };
-        if (span.count as usize) < ALONE {
-            place(left, left_nodes, left_at);
-            place(right, right_nodes, right_at);
-        } else {
-            rayon::join(|| place(left, left_nodes, left_at), || place(right, right_nodes, right_at));
-        }
+        let (left_nodes, right_nodes) = below.split_at_mut(left_inner as usize);
+        let mut on_left = || self.child(left, left_nodes, at + 1);
+        let mut on_right = || self.child(right, right_nodes, at + 1 + left_inner);
+        let (left, right) =
+            if (span.count as usize) < ALONE { (on_left(), on_right()) } else { rayon::join(on_left, on_right) };
+        node.children = [left, right];
+        Bounds::of(&left.bounds()).union(Bounds::of(&right.bounds()))
     }
 }

@@ -2,6 +2,7 @@
 
 use super::ALONE;
 use super::bounds::{Bounds, Item};
+use bytemuck::zeroed_vec;
 use hedgerow::bvh::layout::{Child, Header, MAGIC, Record};
 use hedgerow::bvh::sah::area_scale;
 use hedgerow::geometry::Aabb;
@@ -33,7 +34,8 @@ pub(crate) struct Input {
 impl Input {
     /// Reads `count` boxes; those in whose place is a reason are left out.
     pub fn new(count: usize, bounds_of: impl Fn(u32) -> Result<Bounds, u32> + Sync) -> Input {
-        let mut items = vec![Item::NONE; count];
+        // Pages of zeros come with the threads that write them.
+        let mut items: Vec<Item> = zeroed_vec(count);
         let read = |(piece, items): (usize, &mut [Item])| {
             let (mut around, mut status) = (Bounds::EMPTY, 0);
             for (primitive, item) in ((piece * ALONE) as u32..).zip(items) {
@@ -50,7 +52,9 @@ impl Input {
         let both = |a: (Bounds, u32), b: (Bounds, u32)| (a.0.union(b.0), a.1 | b.1);
         let pieces = items.par_chunks_mut(ALONE).enumerate().map(read);
         let (around, status) = pieces.reduce(|| (Bounds::EMPTY, 0), both);
-        items.retain(|item| item.weight() > 0);
+        if status != 0 {
+            items.retain(|item| item.weight() > 0);
+        }
         let bounds = Aabb { lo: around.lo.to_array(), hi: around.hi.to_array() };
         let scale = area_scale(&bounds);
         if !MODEST.contains(&scale) {

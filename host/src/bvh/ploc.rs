@@ -8,6 +8,7 @@
 use super::ALONE;
 use super::bounds::{Bounds, Item};
 use super::topology::{Merge, Topology};
+use bytemuck::zeroed_vec;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -21,7 +22,7 @@ pub(super) fn build(items: &[Item], radius: usize) -> Topology {
     let count = items.len();
     let of_place = |(place, item): (usize, &Item)| Item::new(item.bounds(), place as u32, 1);
     let mut clusters: Vec<Item> = items.par_iter().enumerate().with_min_len(ALONE).map(of_place).collect();
-    let mut next = vec![Item::NONE; count];
+    let mut next: Vec<Item> = zeroed_vec(count);
     let mut nearest = vec![0; count];
     let mut merges = vec![Merge::default(); count.saturating_sub(1)];
     let most_looks = LOOKS[0] * count + LOOKS[1];

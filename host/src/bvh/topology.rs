@@ -6,6 +6,7 @@
 
 use super::{ALONE, DIVIDED_ABOVE};
 use hedgerow::bvh::layout::{Bvh2, Record};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// In a slot: all primitives of the subtree are in one leaf.
@@ -61,7 +62,11 @@ pub(crate) struct Merge {
 impl Merge {
     /// Those of single primitives that wait to be merged.
     pub fn none(count: usize) -> Vec<Merge> {
-        (0..count as u32).map(|place| Merge { left: 0, right: place, left_count: 0 }).collect()
+        (0..count as u32)
+            .into_par_iter()
+            .with_min_len(ALONE)
+            .map(|place| Merge { left: 0, right: place, left_count: 0 })
+            .collect()
     }
 
     /// Merges the subtrees of two representatives, the smaller one first, in what is known of the places from `first` on.

@@ -6,7 +6,7 @@
 use super::AacOptions;
 
 /// Nodes of fewer primitives than this are looked up.
-const KNOWN: usize = 4096;
+const KNOWN: usize = 1024;
 /// Words of a product of ten factors of 33 bits.
 const WORDS: usize = 6;
 

@@ -188,7 +188,7 @@ pub static BUILDERS: &[BuilderEntry] = &[
     )
     .taking(&[BATCH, INSERT_ORDER, SEARCH, COLLAPSE, HOST_OPTIMISE, THREADS])
     .in_variants(&["incremental", "incremental:optimise=insertion"]),
-    on_host(&"host-fast", "the builder on the host to take where the build must be fast: aac-fast", |spec| {
+    on_host(&"host-fast", "the builder on the host to take where the build must be fast: aac-fast:epsilon=3", |spec| {
         spec.preset(HostBvhOptions::FAST)
     })
     .taking(&[COLLAPSE, THREADS]),
