@@ -24,8 +24,9 @@ thread_local! {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CountingAllocator;
 
+/// Bytes that are taken, or less than 0 that are given back: by the allocator, and by libraries of other languages that tell.
 #[inline]
-fn count(bytes: isize) {
+pub fn count(bytes: isize) {
     let pending = PENDING.get() + bytes;
     if pending.abs() < BATCH {
         PENDING.set(pending);

@@ -1,7 +1,5 @@
 //! Builders on the host as subjects: wall-clock time, the host's tracer on every core.
 
-#[cfg(feature = "peer-embree")]
-use super::host_build::on_cpu;
 use super::host_build::{BuildThreads, HeapPeak};
 use super::host_rays::{HostRays, timed};
 #[cfg(feature = "peer-embree")]
@@ -120,7 +118,7 @@ impl<'a> Host<'a> {
         self.tree = None;
         #[cfg(feature = "peer-embree")]
         if let Some(embree) = &mut self.embree {
-            let (tree, run) = on_cpu(embree.threads(), || match embree.build(self.mesh) {
+            let (tree, run) = self.peak.measured(embree.threads(), || match embree.build(self.mesh) {
                 Ok((tree, run)) => (Ok(tree), run),
                 Err(error) => (Err(error), BuildRun::whole(0.0)),
             });

@@ -15,7 +15,8 @@ fn records(builders: &str, more: &[&str]) -> Vec<Record> {
 
 #[test]
 fn a_record_of_a_builder_on_the_cpu_says_what_the_build_took() {
-    for record in records("binned,sweep:threads=2,bonsai:threads=1,lbvh-host,kd-binned", &[]) {
+    let of_embree = if cfg!(feature = "peer-embree") { ",embree-medium-tree,embree-high-tree" } else { "" };
+    for record in records(&format!("binned,sweep:threads=2,bonsai:threads=1,lbvh-host,kd-binned{of_embree}"), &[]) {
         let (build, memory, builder) = (&record.build, &record.memory, &record.builder);
         assert!(build.threads.is_some(), "{builder}");
         let cpu = [build.cpu_min_ms, build.cpu_median_ms, build.cpu_max_ms].map(|ms| ms.expect("measured"));

@@ -6,6 +6,7 @@
 
 use super::embree::{Preset, failed};
 use crate::Result;
+use crate::measure::heap;
 use crate::scene::Mesh;
 use crate::subjects::BuildRun;
 use crate::subjects::host_rays::timed;
@@ -41,6 +42,10 @@ impl EmbreeTrees {
         let threads = rayon::current_num_threads() as u32;
         let config = Config { threads, start_threads: true, ..Config::default() };
         let device = Device::with_config(config).map_err(failed("rtcNewDevice"))?;
+        device.set_memory_monitor_function(|change, _| {
+            heap::count(change);
+            true
+        });
         let bvh = device.create_bvh().map_err(failed("rtcNewBVH"))?;
         Ok(EmbreeTrees { preset, threads, bvh, primitives: Vec::new() })
     }
