@@ -4,6 +4,7 @@
 
 use crate::bvh_reference_costs::{compare, cost, load};
 use crate::conditional::needs;
+use hedgerow_lab::experiments::cpu_builders::frantal::Group;
 use std::ops::RangeInclusive;
 
 crate::conditional::tests! {
@@ -30,12 +31,6 @@ const DRAGON: [(&str, f64, f64); 12] = [
     ("ploc-host:codes=mc63:radius=25", 155.8, 0.02),
     ("ploc-host:codes=mc63:radius=100", 156.1, 0.02),
 ];
-
-/// Scenes of single things.
-const OBJECTS: [&str; 5] = ["bunny.obj", "armadillo.obj", "dragon.tri", "motorbike.obj", "hair.tri"];
-/// Buildings, from inside.
-const ARCHITECTURE: [&str; 5] =
-    ["sponza.obj", "classroom.obj", "samurai_monastery.obj", "salle_de_bain.tri", "country_kitchen.tri"];
 
 /// A builder, and the bands that its geometric means over full sweep are in: of objects, and of architecture.
 type Bands = (&'static str, RangeInclusive<f64>, RangeInclusive<f64>);
@@ -88,29 +83,29 @@ fn dragon_optimised_by_insertion_has_the_published_costs_as_one_of_ten_real_scen
 
 fn builders_over_ten_real_scenes_are_in_the_published_bands() {
     for (builder, objects, architecture) in bands() {
-        for (scenes, band) in [(OBJECTS, objects), (ARCHITECTURE, architecture)] {
-            let mean = mean(&scenes, builder, "sweep");
-            assert!(band.contains(&mean), "{builder}: {mean:.4} over {scenes:?}, not in {band:?}");
+        for (group, band) in [(Group::Objects, objects), (Group::Architecture, architecture)] {
+            let mean = mean(group.scenes(), builder, "sweep");
+            assert!(band.contains(&mean), "{builder}: {mean:.4} over {group:?}, not in {band:?}");
         }
     }
 }
 
 fn insertion_over_ten_real_scenes_is_in_the_published_bands() {
-    for (scenes, band) in [(OBJECTS, 0.96..=1.0), (ARCHITECTURE, 0.7..=0.85)] {
-        let of_sweep = mean(&scenes, "sweep:optimise=insertion", "sweep");
-        assert!(band.contains(&of_sweep), "{of_sweep:.4} over {scenes:?}, not in {band:?}");
-        let of_incremental = mean(&scenes, "incremental:optimise=insertion", "sweep:optimise=insertion");
-        assert!((0.98..=1.02).contains(&of_incremental), "{of_incremental:.4} over {scenes:?}");
+    for (group, band) in [(Group::Objects, 0.96..=1.0), (Group::Architecture, 0.7..=0.85)] {
+        let of_sweep = mean(group.scenes(), "sweep:optimise=insertion", "sweep");
+        assert!(band.contains(&of_sweep), "{of_sweep:.4} over {group:?}, not in {band:?}");
+        let of_incremental = mean(group.scenes(), "incremental:optimise=insertion", "sweep:optimise=insertion");
+        assert!((0.98..=1.02).contains(&of_incremental), "{of_incremental:.4} over {group:?}");
     }
 }
 
 fn insertion_costs_at_most_0_86_of_full_sweep_in_the_mean_of_architecture() {
-    let mean = mean(&ARCHITECTURE[..3], "sweep:optimise=insertion", "sweep");
+    let mean = mean(&Group::Architecture.scenes()[..3], "sweep:optimise=insertion", "sweep");
     assert!(mean <= 0.86, "{mean:.4} of full sweep");
 }
 
 fn codes_that_halve_the_longest_axis_save_an_eighth_of_a_flat_scene() {
     // Other codes halve the thin axis of the terrain as often as the long ones. On the thesis' Pompeii the ratio is 1 / 0.745.
-    let ratio = mean(&["terrain_jacksboro.obj"], "aac-fast:codes=emc64var", "aac-fast:codes=mc63");
+    let ratio = mean(&["terrain_jacksboro"], "aac-fast:codes=emc64var", "aac-fast:codes=mc63");
     assert!(ratio <= 1.0 / 1.15, "{ratio:.4}");
 }

@@ -70,10 +70,15 @@ impl Group {
 
     /// Of one of our scenes.
     pub fn of(scene: &str) -> Group {
-        match scene {
-            "bunny" | "armadillo" | "dragon" | "motorbike" | "hair" => Group::Objects,
-            "sponza" | "classroom" | "samurai_monastery" | "salle_de_bain" | "country_kitchen" => Group::Architecture,
-            _ => Group::Others,
+        Group::ALL.into_iter().find(|group| group.scenes().contains(&scene)).unwrap_or(Group::Others)
+    }
+
+    /// Our scenes that are such.
+    pub fn scenes(self) -> &'static [&'static str] {
+        match self {
+            Group::Objects => &["bunny", "armadillo", "dragon", "motorbike", "hair"],
+            Group::Architecture => &["sponza", "classroom", "samurai_monastery", "salle_de_bain", "country_kitchen"],
+            Group::Others => &[],
         }
     }
 

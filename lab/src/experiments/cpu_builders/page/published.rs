@@ -132,7 +132,7 @@ fn ratios(group: Group, scenes: &[OnScene<'_>]) -> Markup {
         h3 { (group.name()) ", over " (BASE) }
         @match group {
             Group::Others => p { "Geometric means over " (names.join(", ")) ". The thesis has no such scenes." },
-            _ if names.is_empty() => p { "None of these scenes was measured: " (scenes_of(group).join(", ")) "." },
+            _ if names.is_empty() => p { "None of these scenes was measured: " (group.scenes().join(", ")) "." },
             _ => p {
                 "Geometric means over " (names.join(", ")) ". In brackets, over the "
                 @if group == Group::Objects { "8 objects" } @else { "12 architectural scenes" }
@@ -140,14 +140,6 @@ fn ratios(group: Group, scenes: &[OnScene<'_>]) -> Markup {
             },
         }
         @if !rows.is_empty() { (table.html()) }
-    }
-}
-
-fn scenes_of(group: Group) -> &'static [&'static str] {
-    match group {
-        Group::Objects => &["bunny", "armadillo", "dragon", "motorbike", "hair"],
-        Group::Architecture => &["sponza", "classroom", "samurai_monastery", "salle_de_bain", "country_kitchen"],
-        Group::Others => &[],
     }
 }
 
