@@ -91,11 +91,16 @@ fn builders_over_ten_real_scenes_are_in_the_published_bands() {
 }
 
 fn insertion_over_ten_real_scenes_is_in_the_published_bands() {
-    for (group, band) in [(Group::Objects, 0.96..=1.0), (Group::Architecture, 0.7..=0.85)] {
+    // The published means behind insertion, of incremental construction over sweep: 1.012 / 0.991 and 0.817 / 0.816.
+    let groups = [(Group::Objects, 0.96..=1.0, 1.012 / 0.991), (Group::Architecture, 0.7..=0.85, 0.817 / 0.816)];
+    for (group, band, published) in groups {
         let of_sweep = mean(group.scenes(), "sweep:optimise=insertion", "sweep");
         assert!(band.contains(&of_sweep), "{of_sweep:.4} over {group:?}, not in {band:?}");
         let of_incremental = mean(group.scenes(), "incremental:optimise=insertion", "sweep:optimise=insertion");
-        assert!((0.98..=1.02).contains(&of_incremental), "{of_incremental:.4} over {group:?}");
+        assert!(
+            (of_incremental / published - 1.0).abs() < 0.01,
+            "{of_incremental:.4} over {group:?}, not {published:.4}"
+        );
     }
 }
 
