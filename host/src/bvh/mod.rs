@@ -226,15 +226,28 @@ fn build_of<R: Record>(
     Ok(rayon::scope(|_| build_on_thread(count, &bounds, &record, options)))
 }
 
+/// The tree over `items`, by their codes if the method sorted them. Both are given back before records and nodes want memory.
+fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOptions) -> Topology {
+    let HostBvhOptions { method, collapse, termination, optimise, .. } = options;
+    // Both want leaves of one primitive.
+    let is_single = *termination == Termination::Single || !collapse.enabled || *optimise != HostOptimise::Off;
+    match method {
+        HostMethod::Sweep => sweep::build(&items, collapse, is_single),
+        HostMethod::Binned(options) => binned::build(items, scale, collapse, is_single, options),
+        HostMethod::Bonsai(options) => bonsai::build(items, collapse, is_single, options),
+        HostMethod::Aac(options) => aac::build(&items, &codes, options),
+        HostMethod::Ploc { radius } => ploc::build(&items, *radius),
+        HostMethod::Incremental(options) => incremental::build(&items, options),
+    }
+}
+
 fn build_on_thread<R: Record>(
     count: usize,
     bounds: &(impl Fn(u32) -> Result<Bounds, u32> + Sync),
     record: &(impl Fn(u32) -> R + Sync),
     options: &HostBvhOptions,
 ) -> Built<R> {
-    let HostBvhOptions { method, codes, collapse, termination, optimise } = options;
-    // Both want leaves of one primitive.
-    let is_single = *termination == Termination::Single || !collapse.enabled || *optimise != HostOptimise::Off;
+    let HostBvhOptions { method, codes, collapse, optimise, .. } = options;
     let mut phases = Phases { since: Instant::now(), phases: Vec::new() };
     let mut input = Input::new(count, bounds);
     phases.end("boxes");
@@ -243,16 +256,7 @@ fn build_on_thread<R: Record>(
         sorted = order::sort(&mut input, codes.unwrap_or_else(|| Codes::for_count(count as u32)));
         phases.end("order");
     }
-    let mut tree = match method {
-        HostMethod::Sweep => sweep::build(&input.items, collapse, is_single),
-        HostMethod::Binned(options) => {
-            binned::build(std::mem::take(&mut input.items), input.item_scale, collapse, is_single, options)
-        }
-        HostMethod::Bonsai(options) => bonsai::build(std::mem::take(&mut input.items), collapse, is_single, options),
-        HostMethod::Aac(options) => aac::build(&input.items, &sorted, options),
-        HostMethod::Ploc { radius } => ploc::build(&input.items, *radius),
-        HostMethod::Incremental(options) => incremental::build(&input.items, options),
-    };
+    let mut tree = topology(std::mem::take(&mut input.items), input.item_scale, sorted, options);
     phases.end("build");
     tree = match optimise {
         HostOptimise::Off => tree,
