@@ -247,9 +247,7 @@ impl Build<'_> {
         }
     }
 
-    /// Brings what is on the left before the others; `None` if the node is a leaf. Not inlined: its bins would lie on the stack
-    /// once for each level.
-    #[inline(never)]
+    /// Brings what is on the left before the others; `None` if the node is a leaf.
     fn divide(&self, items: &[Item], spare: &mut [Item], node: &Unsplit, depth: u32) -> Option<Divided> {
         let edges = (node.centroids.hi - node.centroids.lo).min_element();
         if !self.single && (items.len() <= self.options.leaf as usize || edges < self.flat) {
@@ -291,7 +289,9 @@ impl Build<'_> {
         (!self.is_leaf(area, items.len(), cost)).then(divided)
     }
 
-    /// By the plane between at most `N` bins of an axis that costs least; of equal ones the first, along the first axis.
+    /// By the plane between at most `N` bins of an axis that costs least; of equal ones the first, along the first axis. Not inlined:
+    /// its bins would lie on the stack once for each level, and small nodes would pay for the room of 256.
+    #[inline(never)]
     fn divide_by<const N: usize>(
         &self,
         items: &[Item],
@@ -299,20 +299,22 @@ impl Build<'_> {
         area: f32,
         grids: &[Option<Grid>; 3],
     ) -> Option<Divided> {
-        let mut best: Option<(Plane, Grid, [Bin; N])> = None;
+        let mut best: Option<(Plane, Grid)> = None;
+        let (mut bins, mut of_best) = (&mut [Bin::EMPTY; N], &mut [Bin::EMPTY; N]);
         for grid in grids.iter().flatten() {
-            let bins = filled::<N>(items, grid);
-            let plane = self.best_plane(&bins[..grid.bins]);
-            if best.as_ref().is_none_or(|best| plane.0 < best.0.0) {
-                best = Some((plane, *grid, bins));
+            fill(items, grid, bins);
+            let plane = self.best_plane::<N>(&bins[..grid.bins]);
+            if best.is_none_or(|best| plane.0 < best.0.0) {
+                best = Some((plane, *grid));
+                std::mem::swap(&mut bins, &mut of_best);
             }
         }
-        let ((cost, bin), grid, bins) = best?;
+        let ((cost, bin), grid) = best?;
         if self.is_leaf(area, items.len(), cost) {
             return None;
         }
         let side = |bins: &[Bin]| bins.iter().fold(Bin::EMPTY, |all, bin| all.union(*bin));
-        let (left, right) = (side(&bins[..bin]), side(&bins[bin..grid.bins]));
+        let (left, right) = (side(&of_best[..bin]), side(&of_best[bin..grid.bins]));
         let left_count = left.count as usize;
         // That is, `grid.bin_of(item) < bin`.
         partition(items, spare, left_count, |item| grid.place(item) < bin as f32);
@@ -320,8 +322,8 @@ impl Build<'_> {
     }
 
     /// The best plane between bins, of which the first and the last hold something.
-    fn best_plane(&self, bins: &[Bin]) -> Plane {
-        let mut right_costs = [0.0; Bins::MOST as usize];
+    fn best_plane<const N: usize>(&self, bins: &[Bin]) -> Plane {
+        let mut right_costs = [0.0; N];
         let (mut bounds, mut count) = (Bounds::EMPTY, 0);
         for (bin, cost) in bins.iter().zip(&mut right_costs).skip(1).rev() {
             bounds = bounds.union(bin.items.bounds);
@@ -418,37 +420,48 @@ fn in_order_of_bins(items: &[Item], grid: &Grid) -> [u32; FEW] {
     order
 }
 
-/// The bins of a grid, the first of `N`, by all threads if there are many items.
-fn filled<const N: usize>(items: &[Item], grid: &Grid) -> [Bin; N] {
+/// Fills the bins of a grid, the first of `N`, by all threads if there are many items.
+fn fill<const N: usize>(items: &[Item], grid: &Grid, bins: &mut [Bin; N]) {
+    if !is_for_all(items) {
+        return fill_alone(items, grid, bins);
+    }
+    let of_piece = |items: &[Item]| {
+        let mut bins = [Bin::EMPTY; N];
+        fill_alone(items, grid, &mut bins);
+        bins
+    };
     let union = |mut a: [Bin; N], b: [Bin; N]| {
-        a.iter_mut().zip(b).for_each(|(a, b)| *a = a.union(b));
+        unite(&mut a, &b);
         a
     };
-    let fill = |items: &[Item]| {
-        let mut bins = [Bin::EMPTY; N];
-        let add = |bins: &mut [Bin; N], item: &Item| {
-            let bin = &mut bins[grid.bin_of(item)];
-            bin.items.add(item);
-            bin.count += 1;
-        };
-        if items.len() < 4 * N {
-            items.iter().for_each(|item| add(&mut bins, item));
-            return bins;
-        }
-        // Neighbours often are in the same bin: two sets of bins, as the one need not wait for the other.
-        let mut others = bins;
-        let pairs = items.chunks_exact(2);
-        pairs.remainder().iter().for_each(|item| add(&mut bins, item));
-        for pair in pairs {
-            add(&mut bins, &pair[0]);
-            add(&mut others, &pair[1]);
-        }
-        union(bins, others)
+    *bins = items.par_chunks(PIECE).map(of_piece).reduce(|| [Bin::EMPTY; N], union);
+}
+
+/// The same by one thread.
+fn fill_alone<const N: usize>(items: &[Item], grid: &Grid, bins: &mut [Bin; N]) {
+    let add = |bins: &mut [Bin; N], item: &Item| {
+        let bin = &mut bins[grid.bin_of(item)];
+        bin.items.add(item);
+        bin.count += 1;
     };
-    if !is_for_all(items) {
-        return fill(items);
+    bins[..grid.bins].fill(Bin::EMPTY);
+    if items.len() < 4 * N {
+        return items.iter().for_each(|item| add(bins, item));
     }
-    items.par_chunks(PIECE).map(fill).reduce(|| [Bin::EMPTY; N], union)
+    // Neighbours often are in the same bin: two sets of bins, as the one need not wait for the other.
+    let mut others = [Bin::EMPTY; N];
+    let pairs = items.chunks_exact(2);
+    pairs.remainder().iter().for_each(|item| add(bins, item));
+    for pair in pairs {
+        add(bins, &pair[0]);
+        add(&mut others, &pair[1]);
+    }
+    unite(&mut bins[..grid.bins], &others[..grid.bins]);
+}
+
+/// Adds what is in other bins.
+fn unite(bins: &mut [Bin], others: &[Bin]) {
+    bins.iter_mut().zip(others).for_each(|(bin, other)| *bin = bin.union(*other));
 }
 
 /// Writes the `left_count` items that are on the left before the others, both in the order that they were in.
