@@ -33,6 +33,7 @@ mod accel {
 }
 
 mod bvh {
+    mod child_order;
     mod codes;
     mod epo;
     mod geometry;

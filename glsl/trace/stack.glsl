@@ -78,4 +78,39 @@ void hedgerow_put(uint level, HedgerowWaiting waiting) {
 HedgerowWaiting hedgerow_taken(uint level) {
     return hedgerow_unpacked(hedgerow_entry(level));
 }
+
+// The first word of an entry alone.
+void hedgerow_put_child(uint level, uint child) {
+#ifdef HEDGEROW_SHARED_LEVELS
+    if (HEDGEROW_PRIVATE_LEVELS == 0u || level < HEDGEROW_SHARED_LEVELS) {
+        hedgerow_shared_child[level * gl_WorkGroupSize.x + gl_LocalInvocationIndex] = child;
+        return;
+    }
+    level -= HEDGEROW_SHARED_LEVELS;
+#endif
+    hedgerow_private[level].x = child;
+}
+
+uint hedgerow_child(uint level) {
+#ifdef HEDGEROW_SHARED_LEVELS
+    if (HEDGEROW_PRIVATE_LEVELS == 0u || level < HEDGEROW_SHARED_LEVELS) {
+        return hedgerow_shared_child[level * gl_WorkGroupSize.x + gl_LocalInvocationIndex];
+    }
+    level -= HEDGEROW_SHARED_LEVELS;
+#endif
+    return hedgerow_private[level].x;
+}
+
+// A child that is taken however far it is: half of an entry, but for a long leaf.
+void hedgerow_put_anyway(uint level, uint index, uint count) {
+    if (count >= HEDGEROW_LONG_LEAF) hedgerow_put(level, HedgerowWaiting(index, count, 0.0));
+    else hedgerow_put_child(level, index | count << HEDGEROW_INDEX_BITS);
+}
+
+// Its index and count.
+uvec2 hedgerow_taken_anyway(uint level) {
+    uint child = hedgerow_child(level), count = child >> HEDGEROW_INDEX_BITS;
+    if (count == HEDGEROW_LONG_LEAF) count = hedgerow_entry(level).y;
+    return uvec2(child & (1u << HEDGEROW_INDEX_BITS) - 1u, count);
+}
 #endif

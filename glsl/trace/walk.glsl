@@ -1,7 +1,8 @@
 // One ray on its way through a tree, step by step: the twin of src/trace/host.rs, visit for visit.
 //
-// The nearer child first; a child that waits is left out if it is farther than the best hit by then. The kernels decide in
-// which order lanes take their steps; each step is the same for all of them.
+// The nearer child first; a child that waits is left out if it is farther than the best hit by then. A ray that ends at any hit may
+// instead take the left child first, wherever it is, of a tree whose children are in order (bvh/child_order.glsl). The kernels decide
+// in which order lanes take their steps; each step is the same for all of them.
 #ifndef HEDGEROW_TRACE_WALK
 #define HEDGEROW_TRACE_WALK
 #include "trace/buffers.glsl"
@@ -67,6 +68,21 @@ void visit(Node node, inout Walk walk) {
     count_leaf(walk);
 }
 
+// The same where the left child comes first, wherever it is.
+void visit_left_first(Node node, inout Walk walk) {
+    walk.work.x++;
+    bool enters_left, enters_right;
+    hedgerow_enter(walk.ray, node.left.lo, node.left.hi, walk.best, enters_left);
+    hedgerow_enter(walk.ray, node.right.lo, node.right.hi, walk.best, enters_right);
+    if (enters_left && enters_right) {
+        hedgerow_put_anyway(walk.level, node.right.index, node.right.count);
+        walk.level++;
+    }
+    walk.index = enters_left ? node.left.index : node.right.index;
+    walk.left = enters_left ? node.left.count : enters_right ? node.right.count : NOTHING;
+    count_leaf(walk);
+}
+
 void test(Triangle triangle, bool any_hit, inout Walk walk) {
     walk.work.y++;
     walk.index++;
@@ -84,6 +100,17 @@ bool go_on(inout Walk walk) {
     HedgerowWaiting waiting = hedgerow_taken(walk.level);
     walk.index = waiting.index;
     walk.left = waiting.enter <= walk.best ? waiting.count : NOTHING;
+    count_leaf(walk);
+    return true;
+}
+
+// The same where it was put there by `visit_left_first`.
+bool go_on_left_first(inout Walk walk) {
+    if (walk.level == 0u) return false;
+    walk.level--;
+    uvec2 waiting = hedgerow_taken_anyway(walk.level);
+    walk.index = waiting.x;
+    walk.left = waiting.y;
     count_leaf(walk);
     return true;
 }

@@ -7,11 +7,13 @@
 //! 3. `lbvh`, `hlbvh`, `ploc` or `hploc` makes the tree; [`builder`] is where a caller chooses;
 //! 4. [`reinsertion`] makes it better, if asked;
 //! 5. `collapse` makes leaves where they are cheaper ([`sah`]) and orders the records: a [`layout::Bvh2`];
-//! 6. [`wide`] makes nodes of four or eight children of it, [`refit`] follows moved vertices, [`compact`] gives back room.
+//! 6. [`wide`] makes nodes of four or eight children of it, [`refit`] follows moved vertices, [`compact`] gives back room,
+//!    [`child_order`] says which child rays look into first that end at any hit.
 //!
 //! What came of it: [`quality`] and [`epo`] measure, [`validate`] checks. [`twin`] has a twin of every step, with the same bytes.
 
 pub mod builder;
+pub mod child_order;
 pub mod codes;
 mod collapse;
 pub mod compact;

@@ -114,13 +114,20 @@ pub struct TraceBuffers {
     pub count: u32,
 }
 
-/// The kernel that [`record`] takes.
-fn kernel(shape: &TraceShape, query: Query, count_work: bool) -> Kernel {
-    let shader = match shape.loads {
+/// The shader that tracing in a `Bvh2` takes.
+fn shader(shape: &TraceShape) -> &'static shaders::Shader {
+    match shape.loads {
         Loads::Gathered | Loads::InVectors => &shaders::TRACE_TRACER_SINGLE,
         Loads::LaneByLane => &shaders::TRACE_TRACER_LANES,
-    };
-    kernel_of(shader, shape, query, count_work)
+    }
+}
+
+/// The constants of all tracers.
+fn constants(shape: &TraceShape, query: Query, count_work: bool) -> [u32; 5] {
+    let any_hit = u32::from(query == Query::AnyHit);
+    let lanes = shape.workgroup.min(Loads::MAX_LANES);
+    let in_vectors = u32::from(shape.loads == Loads::InVectors);
+    [any_hit, u32::from(count_work), shape.shared_levels, lanes, in_vectors]
 }
 
 /// The kernel of a shader that takes the constants of the tracers.
@@ -130,10 +137,7 @@ pub(super) fn kernel_of(
     query: Query,
     count_work: bool,
 ) -> Kernel {
-    let any_hit = u32::from(query == Query::AnyHit);
-    let lanes = shape.workgroup.min(Loads::MAX_LANES);
-    let in_vectors = u32::from(shape.loads == Loads::InVectors);
-    Kernel::new(shader, shape.workgroup, &[any_hit, u32::from(count_work), shape.shared_levels, lanes, in_vectors])
+    Kernel::new(shader, shape.workgroup, &constants(shape, query, count_work))
 }
 
 /// Records the tracing of all rays: one dispatch, or several if the device cannot take all workgroups in one.
@@ -145,7 +149,20 @@ pub(super) fn kernel_of(
 /// More than [`MAX_RAYS`] rays, or than the memory holds; loads lane by lane in workgroups that are not one subgroup of at most
 /// [`Loads::MAX_LANES`]; the kernel's pipeline could not be made.
 pub fn record(recorder: &mut Recorder<'_>, shape: &TraceShape, query: Query, buffers: &TraceBuffers) -> Result<()> {
-    record_kernel(recorder, &kernel(shape, query, buffers.work.is_some()), shape, buffers)
+    record_kernel(recorder, &kernel_of(shader(shape), shape, query, buffers.work.is_some()), shape, buffers)
+}
+
+/// The same for rays that end at any hit, in a `Bvh2` whose children are in an order (`bvh::child_order`): the left child of each node
+/// comes first, wherever it is, and no distances are kept.
+///
+/// # Errors
+/// As [`record`].
+pub fn record_left_first(recorder: &mut Recorder<'_>, shape: &TraceShape, buffers: &TraceBuffers) -> Result<()> {
+    let [any_hit, count_work, shared_levels, lanes, in_vectors] =
+        constants(shape, Query::AnyHit, buffers.work.is_some());
+    let left_first = 1;
+    let constants = [any_hit, count_work, shared_levels, lanes, in_vectors, left_first];
+    record_kernel(recorder, &Kernel::new(shader(shape), shape.workgroup, &constants), shape, buffers)
 }
 
 /// Records the tracing of all rays by a kernel that takes [`arguments::Trace`].

@@ -45,10 +45,11 @@ fn assert_soon_made_alone(tuning: TuningChoice, kernel: &Kernel) {
 
 /// Every part; the kernels that took longer than they may.
 fn run(tuning: TuningChoice) -> Vec<Kernel> {
-    let parts: [(&str, fn()); 7] = [
+    let parts: [(&str, fn()); 8] = [
         ("builders", builders::all_give_the_bytes_of_the_host),
         ("splits and optimised trees", builders::splits_and_optimised_trees_too),
         ("tracers", tracers::hits_and_work_are_those_of_the_host),
+        ("children in order", tracers::children_in_order_are_those_of_the_host),
         ("wide trees", tracers::wide_trees_are_those_of_the_host),
         ("accel", structures::all),
         ("kd-trees", kd_trees::builds_and_hits_are_those_of_the_host),

@@ -2,8 +2,10 @@
 
 use crate::common::device;
 use crate::common::shapes::{hard_rays, icosphere, placed, soup, tree_of};
+use hedgerow::bvh::child_order::{ChildOrder, ChildOrderPass};
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child};
+use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::wide::device::{WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
@@ -51,6 +53,31 @@ pub fn hits_and_work_are_those_of_the_host() {
                 assert_eq!(got, expected, "{shape:?} {query:?}");
             }
         }
+    }
+}
+
+pub fn children_in_order_are_those_of_the_host() {
+    for (tree, rays) in cases() {
+        for order in ChildOrder::ALL {
+            let expected = tree.clone().in_child_order(order, &Collapse::SAH);
+            let pass = ChildOrderPass::new(device(), order, Collapse::SAH, tree.header.primitive_count);
+            let bytes = tree.to_bytes();
+            let structure = device().upload("structure", &bytes).expect("memory");
+            let scratch = device().buffer("scratch", pass.scratch_bytes()).expect("memory");
+            device().run(None, |r| pass.record(r, structure.region(), scratch.region())).expect("the device works");
+            assert!(structure.read::<u8>(bytes.len()) == expected.to_bytes(), "{order:?}: other bytes");
+            if order == ChildOrder::MoreHitsForItsCost {
+                assert_left_first(&expected, &rays);
+            }
+        }
+    }
+}
+
+fn assert_left_first(tree: &Bvh2, rays: &[Ray]) {
+    let expected: Vec<_> = rays.iter().map(|ray| host::trace_left_first(tree, ray)).collect();
+    for shape in shapes(true) {
+        let got = traced(&tree.to_bytes(), rays, |r, buffers| tracer::record_left_first(r, &shape, buffers));
+        assert_eq!(got, expected, "{shape:?}");
     }
 }
 

@@ -14,9 +14,16 @@ layout(constant_id = 1) const bool ANY_HIT = false;
 layout(constant_id = 2) const bool COUNT_WORK = false;
 layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
+// Of rays that end at any hit.
+layout(constant_id = 6) const bool LEFT_FIRST = false;
 
 #include "trace/lanes.glsl"
 #include "trace/walk.glsl"
+
+void step_to(Node node, inout Walk walk) {
+    if (LEFT_FIRST) visit_left_first(node, walk);
+    else visit(node, walk);
+}
 
 void main() {
     Triangles triangles = triangles_of(structure);
@@ -52,13 +59,13 @@ void main() {
         // A lane that needs no node loads that of any lane that does: the root is one, or no lane is at a node.
         for (uint visits = 0; visits < 2; visits++) {
             EachLane nodes = each_lane(at_node(walk) ? walk.index : root.index);
-            if (at_node(walk)) visit(node_of_each_lane(structure, nodes), walk);
+            if (at_node(walk)) step_to(node_of_each_lane(structure, nodes), walk);
         }
         // There is a first triangle, or no lane is at one.
         EachLane tests = each_lane(at_triangle(walk) ? walk.index : 0u);
         if (at_triangle(walk)) test(triangle_of_each_lane(triangles, tests), ANY_HIT, walk);
         if (going && walk.left == NOTHING) {
-            going = go_on(walk);
+            going = LEFT_FIRST ? go_on_left_first(walk) : go_on(walk);
             if (!going) {
                 hits.hit[i] = walk.hit;
                 if (COUNT_WORK) works.work[i] = walk.work;

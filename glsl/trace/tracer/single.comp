@@ -16,9 +16,16 @@ layout(constant_id = 1) const bool ANY_HIT = false;
 layout(constant_id = 2) const bool COUNT_WORK = false;
 layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
+// Of rays that end at any hit.
+layout(constant_id = 6) const bool LEFT_FIRST = false;
 
 #include "trace/vector_loads.glsl"
 #include "trace/walk.glsl"
+
+void step_to(Node node, inout Walk walk) {
+    if (LEFT_FIRST) visit_left_first(node, walk);
+    else visit(node, walk);
+}
 
 void main() {
     Triangles triangles = triangles_of(structure);
@@ -39,11 +46,11 @@ void main() {
             begin(rays.ray[i], root, usable, walk);
             going = true;
         }
-        if (at_node(walk)) visit(node_at(structure, walk.index), walk);
-        if (at_node(walk)) visit(node_at(structure, walk.index), walk);
+        if (at_node(walk)) step_to(node_at(structure, walk.index), walk);
+        if (at_node(walk)) step_to(node_at(structure, walk.index), walk);
         if (at_triangle(walk)) test(triangle_at(triangles, walk.index), ANY_HIT, walk);
         if (walk.left == NOTHING) {
-            going = go_on(walk);
+            going = LEFT_FIRST ? go_on_left_first(walk) : go_on(walk);
             if (!going) {
                 hits.hit[i] = walk.hit;
                 if (COUNT_WORK) works.work[i] = walk.work;

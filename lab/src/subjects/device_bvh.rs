@@ -9,7 +9,8 @@ use crate::device::Device;
 use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
 use crate::scene::Mesh;
-use hedgerow::bvh::builder::{BuildOptions, Builder};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Input};
+use hedgerow::bvh::child_order::{ChildOrder, ChildOrderPass};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::quality::{self, QualityFigures};
 use hedgerow::gpu::{Recorder, Timestamps};
@@ -31,12 +32,15 @@ pub struct DeviceBvh<'a> {
     mesh: DeviceMesh<'a>,
     memory: BuildMemory<'a>,
     wide: Option<WideTree<'a>>,
+    /// Puts the children in order behind a build.
+    child_order: Option<ChildOrderPass>,
     timestamps: Timestamps,
     rays: DeviceRays<'a>,
 }
 
 impl<'a> DeviceBvh<'a> {
-    /// Uploads `mesh` and makes room for structure and scratch, and for the wide tree if there shall be one.
+    /// Uploads `mesh` and makes room for structure and scratch, and for the wide tree if there shall be one. Children of a binary tree
+    /// may have an order, for rays that end at any hit.
     ///
     /// # Errors
     /// Too many triangles, or too little memory: the error says how much is needed.
@@ -46,20 +50,26 @@ impl<'a> DeviceBvh<'a> {
         mesh: &Mesh,
         options: &BuildOptions,
         wide: Option<WideTracer>,
+        any_hit: Option<ChildOrder>,
     ) -> Result<DeviceBvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let bvh = Builder::new(device, options, count)?;
-        let sizes = bvh.sizes();
+        let child_order = any_hit.map(|order| ChildOrderPass::new(device, order, options.collapse, bvh.record_count()));
+        let mut sizes = bvh.sizes();
+        // The build is done with its scratch memory by then.
+        sizes.scratch = sizes.scratch.max(child_order.map_or(0, |pass| pass.scratch_bytes()));
         let mesh_bytes = size_of_val(&mesh.positions[..]) + size_of_val(&mesh.triangles[..]);
         check_memory(device, builder, count, mesh_bytes as u64 + sizes.structure + sizes.scratch)?;
         let mesh = DeviceMesh::new(device, &mesh.positions, &mesh.triangles)?;
         let memory = BuildMemory::new(device, sizes)?;
-        bvh.record(&mut Recorder::warming(device), &mesh.input, memory.structure.region(), memory.scratch.region())?;
+        let mut warming = Recorder::warming(device);
+        record_build(&mut warming, &bvh, child_order.as_ref(), &mesh.input, &memory)?;
         Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
             choice: choice_of(options, &bvh),
             wide: wide.map(|tracer| WideTree::new(device, tracer, bvh.record_count())).transpose()?,
+            child_order,
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,
             mesh,
@@ -74,16 +84,45 @@ impl<'a> DeviceBvh<'a> {
     }
 }
 
-/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`.
+/// Records the build of the `Bvh2`, and the order of its children if they have one.
+fn record_build(
+    recorder: &mut Recorder<'_>,
+    bvh: &Builder,
+    child_order: Option<&ChildOrderPass>,
+    input: &Input,
+    BuildMemory { structure, scratch, .. }: &BuildMemory<'_>,
+) -> hedgerow::Result<()> {
+    bvh.record(recorder, input, structure.region(), scratch.region())?;
+    let Some(pass) = child_order else { return Ok(()) };
+    recorder.barrier();
+    pass.record(recorder, structure.region(), scratch.region())
+}
+
+/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`, whose children may be in order.
 fn record_trace(
     recorder: &mut Recorder<'_>,
     wide_tree: Option<&WideTree<'_>>,
+    is_ordered: bool,
     query: Query,
     buffers: &TraceBuffers,
 ) -> hedgerow::Result<()> {
     match wide_tree {
-        None => tracer::record(recorder, &TraceShape::of(recorder.context()), query, buffers),
+        None => record_binary(recorder, is_ordered, query, buffers),
         Some(tree) => tree.tracer.record(recorder, query, buffers),
+    }
+}
+
+/// Records the tracing of a `Bvh2`.
+pub(super) fn record_binary(
+    recorder: &mut Recorder<'_>,
+    is_ordered: bool,
+    query: Query,
+    buffers: &TraceBuffers,
+) -> hedgerow::Result<()> {
+    let shape = TraceShape::of(recorder.context());
+    match query {
+        Query::AnyHit if is_ordered => tracer::record_left_first(recorder, &shape, buffers),
+        _ => tracer::record(recorder, &shape, query, buffers),
     }
 }
 
@@ -118,9 +157,8 @@ impl Subject for DeviceBvh<'_> {
 
     fn build(&mut self) -> Result<BuildRun> {
         self.device.run(Some(&mut self.timestamps), |recorder| {
-            let BuildMemory { structure, scratch, .. } = &self.memory;
-            self.bvh.record(recorder, &self.mesh.input, structure.region(), scratch.region())?;
-            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, structure.address()))
+            record_build(recorder, &self.bvh, self.child_order.as_ref(), &self.mesh.input, &self.memory)?;
+            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, self.memory.structure.address()))
         })?;
         Ok(BuildRun::of(self.timestamps.phases()?))
     }
@@ -168,8 +206,8 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let structure = self.traced();
-        self.rays.trace(structure, |recorder, buffers| record_trace(recorder, self.wide.as_ref(), query, buffers))
+        let (structure, wide, is_ordered) = (self.traced(), self.wide.as_ref(), self.child_order.is_some());
+        self.rays.trace(structure, |recorder, buffers| record_trace(recorder, wide, is_ordered, query, buffers))
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
@@ -177,6 +215,7 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        self.rays.work(self.traced(), |recorder, buffers| record_trace(recorder, self.wide.as_ref(), query, buffers))
+        let (wide, is_ordered) = (self.wide.as_ref(), self.child_order.is_some());
+        self.rays.work(self.traced(), |recorder, buffers| record_trace(recorder, wide, is_ordered, query, buffers))
     }
 }

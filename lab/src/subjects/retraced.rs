@@ -1,18 +1,20 @@
 //! BVHs of the host traced by our tracer, on the host or on the device, whoever built them: trees are compared apart from the
 //! tracers that come with them.
 
+use super::device_bvh::record_binary;
 use super::device_rays::DeviceRays;
-use super::host_rays::HostRays;
-use super::{BuildRun, Outcome, Subject};
+use super::host_rays::{HostRays, timed};
+use super::{BuildRun, OnCpu, Outcome, Subject};
 use crate::device::{Buffer, Device};
 use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
 use crate::scene::Frame;
 use crate::{Error, Result};
+use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::quality;
-use hedgerow::gpu::Recorder;
-use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
+use hedgerow::gpu::Phase;
 use hedgerow::trace::twin::tracer as on_host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
@@ -44,10 +46,15 @@ pub struct Retraced<'a> {
     builder: String,
     source: Source<'a>,
     tracing: Tracing<'a>,
+    /// Of the children of what a builder builds, for rays that end at any hit.
+    child_order: Option<ChildOrder>,
+    /// What was built last, its children in that order.
+    ordered: Option<Bvh2>,
 }
 
 impl<'a> Retraced<'a> {
-    /// What `subject` builds, traced on `device`, or on the host where there is none.
+    /// What `subject` builds, traced on `device`, or on the host where there is none. Where children have an order, that is a phase of
+    /// the build.
     ///
     /// # Errors
     /// The device failed.
@@ -55,8 +62,9 @@ impl<'a> Retraced<'a> {
         builder: &str,
         subject: Box<dyn Subject + 'a>,
         device: Option<&'a Device>,
+        child_order: Option<ChildOrder>,
     ) -> Result<Retraced<'a>> {
-        Retraced::new(builder, Source::Builder(subject), device)
+        Ok(Retraced { child_order, ..Retraced::new(builder, Source::Builder(subject), device)? })
     }
 
     /// A tree that is there already: it cannot be built again.
@@ -72,16 +80,12 @@ impl<'a> Retraced<'a> {
             None => Tracing::Host { tree: None, rays: HostRays::default() },
             Some(device) => Tracing::Device { device, tree: None, rays: Box::new(DeviceRays::new(device)?) },
         };
-        Ok(Retraced { builder: builder.to_owned(), source, tracing })
+        Ok(Retraced { builder: builder.to_owned(), source, tracing, child_order: None, ordered: None })
     }
 
     /// A copy of the tree that is traced. It holds together: one that does not might be walked without end.
     fn sound_tree(&mut self) -> Result<Bvh2> {
-        let tree = match &mut self.source {
-            Source::Tree(tree) => Some(tree.clone()),
-            Source::Builder(subject) => subject.tree()?,
-        };
-        let tree = tree.ok_or_else(|| {
+        let tree = self.tree()?.ok_or_else(|| {
             let what = "the builder does not show its tree, so that our tracer has none; leave trace= out";
             Error::Argument(format!("{}: {what}", self.builder))
         })?;
@@ -96,8 +100,20 @@ impl<'a> Retraced<'a> {
         }
     }
 
-    fn record_trace(recorder: &mut Recorder<'_>, query: Query, buffers: &TraceBuffers) -> hedgerow::Result<()> {
-        tracer::record(recorder, &TraceShape::of(recorder.context()), query, buffers)
+    /// Builds, and puts the children in order if they have one.
+    fn run(&mut self) -> Result<BuildRun> {
+        let Source::Builder(subject) = &mut self.source else {
+            return Err(Error::Argument(format!("{}: its tree came from elsewhere", self.builder)));
+        };
+        self.ordered = None;
+        let mut run = subject.build()?;
+        let Some((order, tree)) = self.child_order.zip(subject.tree()?) else { return Ok(run) };
+        let (milliseconds, tree) = timed(|| tree.in_child_order(order, &Collapse::SAH));
+        self.ordered = Some(tree);
+        run.milliseconds += milliseconds;
+        run.phases.push(Phase { name: "order", milliseconds });
+        run.on_cpu = run.on_cpu.map(|on_cpu| OnCpu { milliseconds: on_cpu.milliseconds + milliseconds, ..on_cpu });
+        Ok(run)
     }
 }
 
@@ -126,10 +142,7 @@ impl Subject for Retraced<'_> {
             Tracing::Host { tree, .. } => *tree = None,
             Tracing::Device { tree, .. } => *tree = None,
         }
-        match &mut self.source {
-            Source::Builder(subject) => subject.build(),
-            Source::Tree(_) => Err(Error::Argument(format!("{}: its tree came from elsewhere", self.builder))),
-        }
+        self.run()
     }
 
     fn memory(&self) -> record::MemoryRecord {
@@ -154,7 +167,11 @@ impl Subject for Retraced<'_> {
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {
+        if self.child_order.is_some() && self.ordered.is_none() {
+            self.run()?;
+        }
         match &mut self.source {
+            Source::Builder(_) if self.ordered.is_some() => Ok(self.ordered.clone()),
             Source::Builder(subject) => subject.tree(),
             Source::Tree(tree) => Ok(Some(tree.clone())),
         }
@@ -192,10 +209,11 @@ impl Subject for Retraced<'_> {
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
+        let is_ordered = self.child_order.is_some();
         match &mut self.tracing {
-            Tracing::Host { tree: Some(tree), rays } => Ok(rays.trace(|ray| on_host::trace(tree, ray, query).0)),
+            Tracing::Host { tree: Some(tree), rays } => Ok(rays.trace(|ray| traced(tree, is_ordered, ray, query).0)),
             Tracing::Device { tree: Some(tree), rays, .. } => {
-                rays.trace(tree.address(), |recorder, buffers| Self::record_trace(recorder, query, buffers))
+                rays.trace(tree.address(), |recorder, buffers| record_binary(recorder, is_ordered, query, buffers))
             }
             // There are no rays yet.
             _ => Ok(0.0),
@@ -210,13 +228,24 @@ impl Subject for Retraced<'_> {
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
+        let is_ordered = self.child_order.is_some();
         match &self.tracing {
-            Tracing::Host { tree: Some(tree), rays } => Ok(Some(rays.work(|ray| on_host::trace(tree, ray, query).1))),
+            Tracing::Host { tree: Some(tree), rays } => {
+                Ok(Some(rays.work(|ray| traced(tree, is_ordered, ray, query).1)))
+            }
             Tracing::Device { tree: Some(tree), rays, .. } => {
-                rays.work(tree.address(), |recorder, buffers| Self::record_trace(recorder, query, buffers))
+                rays.work(tree.address(), |recorder, buffers| record_binary(recorder, is_ordered, query, buffers))
             }
             _ => Ok(None),
         }
+    }
+}
+
+/// What a ray finds on the host, and its work.
+fn traced(tree: &Bvh2, is_ordered: bool, ray: &Ray, query: Query) -> (Hit, Work) {
+    match query {
+        Query::AnyHit if is_ordered => on_host::trace_left_first(tree, ray),
+        _ => on_host::trace(tree, ray, query),
     }
 }
 
@@ -253,5 +282,26 @@ mod tests {
         let mut given = Retraced::of_tree("sweep:trace=host", tree, None).expect("no device");
         assert_eq!(given.hits_of(&rays(), query).expect("traced"), hits);
         assert!(given.build().expect_err("it has no builder").to_string().contains("came from elsewhere"));
+    }
+
+    #[test]
+    fn an_order_of_children_is_a_phase_of_the_build_and_keeps_the_hits() {
+        let mesh = load("gen:icosphere:3", &LoadOptions::default()).expect("a generator").mesh;
+        let make = |spec: &str| spec.parse::<Spec>().expect(spec).make(None, &mesh).expect(spec);
+        let (mut near, mut ordered) = (make("sweep:any-hit=near"), make("sweep:any-hit=opaque"));
+        let run = ordered.build().expect("built");
+        assert_eq!(run.phases.last().map(|phase| phase.name), Some("order"));
+        let sum: f64 = run.phases.iter().map(|phase| phase.milliseconds).sum();
+        assert!((sum / run.milliseconds - 1.0).abs() < 1e-9, "{run:?}");
+        for query in [Query::ClosestHit, Query::AnyHit] {
+            let hits = ordered.hits_of(&rays(), query).expect("traced");
+            let expected = near.hits_of(&rays(), query).expect("traced");
+            assert!(hits.iter().any(Hit::is_some));
+            assert!(hits.iter().zip(&expected).all(|(a, b)| a.t == b.t), "{query:?}");
+        }
+        // Both sides of a sphere are as good as each other; the tree itself is in order.
+        let tree = near.tree().expect("read").expect("a BVH");
+        let in_order = tree.in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
+        assert!(ordered.tree().expect("read").expect("a BVH").to_bytes() == in_order.to_bytes());
     }
 }

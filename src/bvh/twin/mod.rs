@@ -1,5 +1,6 @@
 //! Builders on the host: plain, and the specification of those on the device.
 
+mod child_order;
 mod clusters;
 mod collapse;
 mod compact;

@@ -22,6 +22,23 @@ pub fn any_hit(tree: &Bvh2, ray: &Ray) -> Hit {
 ///
 /// A tree whose status says that it cannot be used is traced as if it were empty, as the device must.
 pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
+    walk(tree, ray, query, FirstChild::Nearest)
+}
+
+/// Any hit, by the walk that takes the left child of each node first: for trees in an order of children
+/// ([`crate::bvh::child_order`]).
+pub fn trace_left_first(tree: &Bvh2, ray: &Ray) -> (Hit, Work) {
+    walk(tree, ray, Query::AnyHit, FirstChild::Left)
+}
+
+/// Which child of a node a ray looks into first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FirstChild {
+    Nearest,
+    Left,
+}
+
+fn walk(tree: &Bvh2, ray: &Ray, query: Query, first: FirstChild) -> (Hit, Work) {
     let mut work = Work::default();
     let mut nearest = Nearest::new(ray.t_max);
     let usable = tree.header.active != 0 && tree.header.status & status::UNUSABLE == 0;
@@ -35,8 +52,7 @@ pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
         next = None;
         if child.is_leaf() {
             work.leaves += 1;
-            let first = child.index as usize;
-            for triangle in &tree.records[first..first + child.count as usize] {
+            for triangle in &tree.records[child.index as usize..][..child.count as usize] {
                 work.tests += 1;
                 nearest.consider(&ray, triangle);
                 if query == Query::AnyHit && nearest.hit.is_some() {
@@ -48,6 +64,10 @@ pub fn trace(tree: &Bvh2, ray: &Ray, query: Query) -> (Hit, Work) {
             let [left, right] = tree.nodes[child.index as usize].children;
             let boxes = [left.bounds(), right.bounds()];
             match boxes.map(|b| slab::enter(&ray, &b, nearest.t)).into() {
+                (Some(_), Some(_)) if first == FirstChild::Left => {
+                    waiting.push((f32::NEG_INFINITY, right));
+                    next = Some(left);
+                }
                 (Some(l), Some(r)) => {
                     let (near, far) = if r < l { (right, (l, left)) } else { (left, (r, right)) };
                     let entered = if far.1.count < LONG_LEAF { far.0 } else { f32::NEG_INFINITY };

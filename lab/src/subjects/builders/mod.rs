@@ -111,8 +111,10 @@ impl Spec {
         };
         Ok(match self.tracer()? {
             None => subject,
-            Some(TreeTracer::Host) => Box::new(Retraced::by_builder(&name, subject, None)?),
-            Some(TreeTracer::Device) => Box::new(Retraced::by_builder(&name, subject, Some(given()?))?),
+            Some(TreeTracer::Host) => Box::new(Retraced::by_builder(&name, subject, None, self.any_hit()?)?),
+            Some(TreeTracer::Device) => {
+                Box::new(Retraced::by_builder(&name, subject, Some(given()?), self.any_hit()?)?)
+            }
         })
     }
 
@@ -312,6 +314,11 @@ mod tests {
             assert!(error_of(&format!("sweep:threads={wrong}")).contains(&says), "{wrong}");
         }
         assert!(error_of("lbvh-host:threads=2").contains("no option \"threads\""));
+        assert!(error_of("sweep:any-hit=far").contains("any-hit=far is unknown; use near, or an order of children"));
+        assert!(
+            error_of("lbvh:width=4:any-hit=sato").contains("orders of children are for nodes of two; take width=2")
+        );
+        assert!(error_of("kd-exact:any-hit=sato").contains("no option \"any-hit\""));
         assert!(error_of("auto:rays=many").contains("is not a number of rays per build"));
         assert!(error_of("").contains("-b all"));
         assert!(error_of(",").contains("-b all"));

@@ -8,6 +8,7 @@ use crate::subjects::host::{HostPlan, TwinPlan};
 use crate::subjects::retraced::TreeTracer;
 use crate::{Error, Result};
 use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
+use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::sah::Collapse;
@@ -101,7 +102,12 @@ pub(super) const TRAVERSAL: BuilderOption = option(
 );
 
 pub(super) const TRACE: BuilderOption = option("trace", "host or device: where rays are traced; host unless given");
-pub(super) static TRACE_TREE: BuilderOption = option(
+pub(super) const ANY_HIT: BuilderOption = option(
+    "any-hit",
+    "near, or an order of children, the first of which our tracer looks into first for rays that end at any hit: rtsah, sato, \
+     prim-sato or opaque",
+);
+pub(super) const TRACE_TREE: BuilderOption = option(
     "trace",
     "host or device: where our tracer takes rays through the tree; unless given, its own does on the host",
 );
@@ -128,7 +134,24 @@ impl Spec {
         let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
         let options = BuildOptions { method, codes, split, optimise, collapse, schedule, ..BuildOptions::DEFAULT };
         let (form, order) = self.form_and_order()?;
-        Ok(BuilderPlan::Device(DevicePlan { options, form, order, time_to_optimise: self.time_to_optimise()? }))
+        let (any_hit, time_to_optimise) = (self.any_hit()?, self.time_to_optimise()?);
+        if form.is_some() && any_hit.is_some() {
+            let what = "orders of children are for nodes of two; take width=2, or any-hit=near";
+            return Err(Error::Argument(format!("builder {self}: {what}")));
+        }
+        Ok(BuilderPlan::Device(DevicePlan { options, form, order, any_hit, time_to_optimise }))
+    }
+
+    /// Option `any-hit`: the order of children, if there is one.
+    pub(super) fn any_hit(&self) -> Result<Option<ChildOrder>> {
+        let all = [
+            ("near", None),
+            ("rtsah", Some(ChildOrder::Cheaper)),
+            ("sato", Some(ChildOrder::LargerBox)),
+            ("prim-sato", Some(ChildOrder::LargerPrimitives)),
+            ("opaque", Some(ChildOrder::MoreHitsForItsCost)),
+        ];
+        Ok(self.choice(&ANY_HIT, &all)?.flatten())
     }
 
     /// Those of every builder on the device, and `bits` and `treelet`.
@@ -280,12 +303,14 @@ impl Spec {
         Ok(BuilderPlan::Kd(KdSpec::Host { options, traversal: self.traversal(traces_on_device)?, traces_on_device }))
     }
 
-    /// Where our tracer takes rays through a BVH of the host, if that was given.
+    /// Where our tracer takes rays through a BVH of the host, if that was given or children have an order.
     pub(super) fn tracer(&self) -> Result<Option<TreeTracer>> {
         if !self.builder().builds_bvh_on_host() {
             return Ok(None);
         }
-        self.choice(&TRACE_TREE, &[("host", TreeTracer::Host), ("device", TreeTracer::Device)])
+        let tracer = self.choice(&TRACE_TREE, &[("host", TreeTracer::Host), ("device", TreeTracer::Device)])?;
+        // An order of children is for our tracer.
+        Ok(tracer.or(self.any_hit()?.map(|_| TreeTracer::Host)))
     }
 
     /// Those of every builder of kd-trees on the host, and `bins` and `exact`.

@@ -13,6 +13,7 @@ use crate::subjects::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use crate::subjects::peers::obvhs;
 use hedgerow::bvh::builder::BuildOptions;
+use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::wide::Form;
 use hedgerow::kdtree::builder::KdOptions;
@@ -67,6 +68,8 @@ pub(crate) struct DevicePlan {
     pub(super) form: Option<Form>,
     /// The order in which that is traced, where it was given.
     pub(super) order: Option<Order>,
+    /// The order of children, for rays that end at any hit.
+    pub(super) any_hit: Option<ChildOrder>,
     /// How long reinsertion may take, where it was given a time.
     pub(super) time_to_optimise: Option<Duration>,
 }
@@ -86,13 +89,13 @@ impl DevicePlan {
             let pass = pass_of_reinsertion(device, mesh, &options)?;
             options.optimise = Some(ReinsertionOptions::within(time, pass));
         }
-        DeviceBvh::new(device, name, mesh, &options, wide)
+        DeviceBvh::new(device, name, mesh, &options, wide, self.any_hit)
     }
 }
 
 /// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
 fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &BuildOptions) -> Result<Duration> {
-    let mut subject = DeviceBvh::new(device, "", mesh, options, None)?;
+    let mut subject = DeviceBvh::new(device, "", mesh, options, None, None)?;
     subject.build()?;
     let run = subject.build()?;
     let milliseconds: f64 = run.phases.iter().filter(|p| p.name == OPTIMISE.key).map(|p| p.milliseconds).sum();

@@ -1,7 +1,7 @@
 //! The list of all builders.
 
 use super::options::{
-    AXES, BATCH, BINS, BITS, CODES, COLLAPSE, DELTA, EPSILON, EXACT, HOST_BINS, HOST_OPTIMISE, INSERT_ORDER,
+    ANY_HIT, AXES, BATCH, BINS, BITS, CODES, COLLAPSE, DELTA, EPSILON, EXACT, HOST_BINS, HOST_OPTIMISE, INSERT_ORDER,
     KD_SCHEDULE, KI, KT, LEAF, MINI, OPTIMISE, ORDER, PRUNE, RADIUS, RAYS, SCHEDULE, SEARCH, SPLIT, TERMINATION,
     TERMINATION_FLAT, THREADS, TRACE, TRACE_TREE, TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
 };
@@ -78,9 +78,10 @@ impl BuilderEntry {
         BuilderEntry { variants, ..self }
     }
 
-    /// Its options, with the one of all builders of BVHs on the host.
+    /// Its options, with those of all builders of BVHs on the host.
     pub fn all_options(&self) -> impl Iterator<Item = &'static BuilderOption> {
-        self.options.iter().chain(self.builds_bvh_on_host().then_some(&TRACE_TREE))
+        let of_bvh = if self.builds_bvh_on_host() { &[&TRACE_TREE, &ANY_HIT][..] } else { &[] };
+        self.options.iter().chain(of_bvh.iter().copied())
     }
 
     /// Whether it has an option of this name.
@@ -99,7 +100,7 @@ pub static BUILDERS: &[BuilderEntry] = &[
     on_device(&"lbvh", "linear BVH on the device: codes, radix sort, hierarchy bottom-up in one pass", |spec| {
         spec.on_device(Method::Lbvh)
     })
-    .taking(&[CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER])
+    .taking(&[CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER, ANY_HIT])
     .in_variants(&[
         "lbvh",
         "lbvh:codes=mc30",
@@ -114,20 +115,20 @@ pub static BUILDERS: &[BuilderEntry] = &[
         "hierarchical LBVH on the device: small subtrees of the LBVH under a top split by the surface area heuristic",
         Spec::hlbvh,
     )
-    .taking(&[BITS, TREELET, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER]),
+    .taking(&[BITS, TREELET, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER, ANY_HIT]),
     on_device(
         &"ploc",
         "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
         Spec::ploc,
     )
-    .taking(&[RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER])
+    .taking(&[RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER, ANY_HIT])
     .in_variants(&["ploc", "ploc:radius=25"]),
     on_device(
         &"hploc",
         "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
         Spec::hploc,
     )
-    .taking(&[WINDOW, RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER]),
+    .taking(&[WINDOW, RADIUS, CODES, SPLIT, OPTIMISE, COLLAPSE, SCHEDULE, WIDTH, ORDER, ANY_HIT]),
     on_device(
         &"auto",
         "the device's builder that takes least for a build and its rays, by its measured costs",

@@ -1,10 +1,11 @@
-//! Trees made of trees: wide ones, and those that follow their triangles.
+//! Trees made of trees: wide ones, those that follow their triangles, and those whose children have an order.
 
 use super::builders::meshes;
 use crate::device::Device;
 use crate::experiments::check::cases::{Cases, Found, same, same_all};
 use crate::experiments::check::corpus::{Mesh, unit_floats};
 use crate::subjects::build_memory::DeviceMesh;
+use hedgerow::bvh::child_order::{ChildOrder, ChildOrderPass};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child, Header, Triangle};
@@ -92,4 +93,27 @@ fn refit_as_on_host(device: &Device, tree: &Bvh2, mesh: &Mesh, schedule: RefitSc
     same("header", &comparable(&got.header), &comparable(&expected.header))?;
     same_all("record", &got.records, &expected.records)?;
     same_all("node", &got.nodes, &expected.nodes)
+}
+
+pub fn child_order(cases: &mut Cases<'_>) {
+    for (name, positions, triangles) in meshes(cases) {
+        let tree = lbvh::build(&positions, &triangles, Code::Emc64Var.full(), Collapse::SAH);
+        for order in ChildOrder::ALL {
+            cases.case(format!("{name}, {order:?}"), |device| child_order_as_on_host(device, &tree, order));
+        }
+    }
+}
+
+fn child_order_as_on_host(device: &Device, tree: &Bvh2, order: ChildOrder) -> Found {
+    let expected = tree.clone().in_child_order(order, &Collapse::SAH);
+    expected.validate()?;
+    let pass = ChildOrderPass::new(device, order, Collapse::SAH, tree.header.primitive_count);
+    let bytes = tree.to_bytes();
+    let structure = device.upload("structure", &[&bytes[..], &GUARD].concat())?;
+    let scratch = device.upload("scratch", &vec![0xA5u8; pass.scratch_bytes() as usize])?;
+    device.run(None, |recorder| pass.record(recorder, structure.region(), scratch.region()))?;
+    same("bytes behind the tree", &structure.read_at::<u8>(bytes.len() as u64, GUARD.len()), &GUARD.to_vec())?;
+    let got = Bvh2::<Triangle>::from_bytes(&structure.read::<u8>(bytes.len()))?;
+    same_all("node", &got.nodes, &expected.nodes)?;
+    same_all("byte", &got.to_bytes(), &expected.to_bytes())
 }

@@ -5,6 +5,7 @@ use crate::experiments::check::cases::{Cases, Found, same_all};
 use crate::experiments::check::corpus;
 use crate::experiments::check::shapes::{Corners, hard_rays, icosphere, placed, rays_from_the_middle, soup, tree_with};
 use crate::experiments::check::traced::traced;
+use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::layout::{Bvh2, Child};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::wide::Form;
@@ -121,7 +122,23 @@ pub fn binary(cases: &mut Cases<'_>) {
                     });
                 }
             }
+            left_first(cases, &format!("{name}, {collapse:?}"), &tree, &rays);
         }
+    }
+}
+
+/// Rays that end at any hit, through children in an order.
+fn left_first(cases: &mut Cases<'_>, name: &str, tree: &Bvh2, rays: &[Ray]) {
+    let tree = tree.clone().in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
+    let expected: Vec<(Hit, Work)> = rays.iter().map(|ray| host::trace_left_first(&tree, ray)).collect();
+    let what = format!("{name}, left first");
+    cases.case(format!("{what}, the host's"), |_| as_by_brute_force(&tree, rays, Query::AnyHit, &expected));
+    for shape in shapes(cases.device, cases.quick) {
+        cases.case(format!("{what}, {shape:?}"), |device| {
+            as_on_host(device, &tree.to_bytes(), rays, &expected, |r, buffers| {
+                tracer::record_left_first(r, &shape, buffers)
+            })
+        });
     }
 }
 
