@@ -11,6 +11,7 @@ pub mod binned;
 mod bonsai;
 mod bounds;
 mod finish;
+pub mod heuristic;
 mod incremental;
 mod input;
 mod insertion;

@@ -1,0 +1,94 @@
+//! What a split costs other than by surface area (van Kralingen 2023, "Evaluating Alternatives to the Surface Area Heuristic",
+//! chapter 3).
+//!
+//! A heuristic that looks at a box alone is a *measure of rays* ([`RayMeasure`]): how many rays of a set meet the box.
+//!
+//! - [`interior`]: rays that begin anywhere in the scene; [`flux`] and [`angle`] are its arithmetic;
+//! - [`preferred`]: rays of a camera, from a point or in a direction; [`picture`] is the camera's.
+
+mod angle;
+mod flux;
+pub mod interior;
+mod picture;
+pub mod preferred;
+
+use hedgerow::geometry::Aabb;
+use hedgerow::{Error, Result};
+pub use interior::InteriorForm;
+pub use picture::Pinhole;
+pub use preferred::{Preferred, PreferredRays};
+
+/// How many rays of a set meet a box: the whole of a heuristic that looks at nothing but the box.
+///
+/// Only ratios matter. No box should be met by fewer rays than a box in it; those that are say so.
+pub trait RayMeasure: Sync {
+    /// The rays that meet `bounds`, a box that is not empty.
+    fn rays(&self, bounds: &Aabb) -> f32;
+}
+
+fn checked_weight(weight: f32) -> Result<()> {
+    let error = || Error::Argument(format!("rays cannot have a weight of {weight}; take 0 to 1"));
+    (0.0..=1.0).contains(&weight).then_some(()).ok_or_else(error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers from 0 to 1 (xorshift64*, Vigna 2016).
+    pub struct Random(u64);
+
+    impl Random {
+        pub fn new(seed: u64) -> Random {
+            Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
+        }
+
+        pub fn unit(&mut self) -> f64 {
+            self.0 ^= self.0 >> 12;
+            self.0 ^= self.0 << 25;
+            self.0 ^= self.0 >> 27;
+            (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64
+        }
+
+        /// Uniform on the sphere.
+        pub fn direction(&mut self) -> [f64; 3] {
+            let (z, turn) = (2.0 * self.unit() - 1.0, std::f64::consts::TAU * self.unit());
+            let radius = (1.0 - z * z).sqrt();
+            [radius * turn.cos(), radius * turn.sin(), z]
+        }
+    }
+
+    /// A box in a box. One in eight is flat.
+    pub fn part_of(bounds: &Aabb, random: &mut Random) -> Aabb {
+        let Aabb { mut lo, mut hi } = *bounds;
+        for k in 0..3 {
+            let at = [random.unit(), random.unit()].map(|part| lo[k] + part as f32 * (hi[k] - lo[k]));
+            (lo[k], hi[k]) = (at[0].min(at[1]), at[0].max(at[1]));
+        }
+        if random.unit() < 0.125 {
+            let k = (3.0 * random.unit()) as usize;
+            hi[k] = lo[k];
+        }
+        Aabb { lo, hi }
+    }
+
+    /// Whether a ray meets a box, by slabs in double precision.
+    pub fn meets(bounds: &Aabb, from: [f64; 3], direction: [f64; 3]) -> bool {
+        let (mut near, mut far) = (0.0, f64::INFINITY);
+        for k in 0..3 {
+            let at = [bounds.lo[k], bounds.hi[k]].map(|x| (f64::from(x) - from[k]) / direction[k]);
+            near = f64::max(near, at[0].min(at[1]));
+            far = f64::min(far, at[0].max(at[1]));
+        }
+        near <= far
+    }
+
+    #[test]
+    fn a_weight_is_a_part() {
+        assert!(checked_weight(0.0).is_ok() && checked_weight(1.0).is_ok());
+        for weight in [-0.1, 1.1, f32::NAN] {
+            let error = checked_weight(weight).expect_err("no part").to_string();
+            assert!(error.contains(&weight.to_string()) && error.contains("0 to 1"), "{error}");
+        }
+    }
+}
