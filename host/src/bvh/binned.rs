@@ -6,12 +6,11 @@
 //! of threads, bins are minima, maxima and counts, and items keep their order on both sides: the tree is the same for any number of
 //! threads.
 
-use super::bounds::{Bounds, Item, around};
-use super::sweep::HALVED_FROM;
-use super::topology::{LEAF, Topology};
-use super::{ALONE, DIVIDED_ABOVE};
+use super::bounds::{Bounds, Item};
+use super::heuristic::split_cost::{Side, SplitCost, growing};
+use super::top_down::{self, Candidates, HALVED_FROM, LeafRule};
+use super::topology::Topology;
 use bytemuck::zeroed_vec;
-use hedgerow::bvh::sah::Collapse;
 use hedgerow::{Error, Result};
 use rayon::prelude::*;
 
@@ -93,34 +92,39 @@ const FLAT: f32 = 1e-7;
 
 /// The tree over `items`. `scale` is what their lengths were scaled by.
 pub(super) fn build(
+    by: &impl SplitCost,
     mut items: Vec<Item>,
     scale: f32,
-    costs: &Collapse,
-    single: bool,
+    rule: LeafRule<'_>,
     options: &BinnedOptions,
 ) -> Topology {
     let mut tree = Topology::new(items.len());
     let mut spare: Vec<Item> = zeroed_vec(items.len());
     let flat = if options.flat_leaves { 2.0 * FLAT * scale } else { 0.0 };
-    let build = Build { costs, single, options, flat };
-    let node = build.measured(&items);
-    let whole = Part { items: &mut items, spare: &mut spare, order: &mut tree.order, splits: &mut tree.splits };
-    build.subtree(whole, node, 0);
+    let node = measured(&items);
+    let whole = Part { items: &mut items, spare: &mut spare, order: &mut tree.order, node };
+    top_down::build(&Binned { rule, options, flat }, by, whole, &mut tree.splits);
     tree
 }
 
-/// What a subtree is built over, room for as many items, and where it is written.
+/// The items of a node, room for as many, and where their primitives are written.
 struct Part<'a> {
     items: &'a mut [Item],
     spare: &'a mut [Item],
     order: &'a mut [u32],
-    splits: &'a mut [u32],
+    node: Unsplit,
 }
 
-impl Part<'_> {
-    /// Writes its primitives: they are in a leaf.
-    fn end(self) {
-        self.order.iter_mut().zip(self.items).for_each(|(primitive, item)| *primitive = item.primitive());
+impl<'a> Part<'a> {
+    /// Its first items, and the others.
+    fn split_at(self, left_count: usize, [left, right]: [Unsplit; 2]) -> [Part<'a>; 2] {
+        let (left_items, items) = self.items.split_at_mut(left_count);
+        let (left_spare, spare) = self.spare.split_at_mut(left_count);
+        let (left_order, order) = self.order.split_at_mut(left_count);
+        [
+            Part { items: left_items, spare: left_spare, order: left_order, node: left },
+            Part { items, spare, order, node: right },
+        ]
     }
 }
 
@@ -152,13 +156,21 @@ impl Unsplit {
 struct Bin {
     items: Unsplit,
     count: u32,
+    /// How many of them are seen, where the heuristic knows of that.
+    seen: u32,
 }
 
 impl Bin {
-    const EMPTY: Bin = Bin { items: Unsplit::EMPTY, count: 0 };
+    const EMPTY: Bin = Bin { items: Unsplit::EMPTY, count: 0, seen: 0 };
 
     fn union(self, other: Bin) -> Bin {
-        Bin { items: self.items.union(other.items), count: self.count + other.count }
+        let (count, seen) = (self.count + other.count, self.seen + other.seen);
+        Bin { items: self.items.union(other.items), count, seen }
+    }
+
+    #[inline(always)]
+    fn side(&self) -> Side {
+        Side { bounds: self.items.bounds, count: self.count, seen: self.seen }
     }
 }
 
@@ -194,115 +206,137 @@ impl Grid {
 /// A plane: its cost, and how many bins are on its left.
 type Plane = (f32, usize);
 
-/// A node that is split: how many items are on the left, and what lies on either side.
-struct Divided {
-    left_count: usize,
-    /// Whether the items are in `spare` now.
-    is_moved: bool,
-    left: Unsplit,
-    right: Unsplit,
+/// The split of a node.
+enum Split {
+    /// In the middle of the order.
+    Halved,
+    /// At the beginning of a bin of a grid; what lies on either side.
+    AtBin { grid: Grid, bin: usize, sides: Box<[Bin; 2]> },
+    /// Of a few items in this order, after so many.
+    OfFew { order: [u8; FEW], left_count: usize },
 }
 
-struct Build<'a> {
-    costs: &'a Collapse,
-    single: bool,
+/// What nodes are split by.
+struct Binned<'a> {
+    rule: LeafRule<'a>,
     options: &'a BinnedOptions,
     /// Extents of centroids up to this make a leaf.
     flat: f32,
 }
 
-impl Build<'_> {
-    fn measured(&self, items: &[Item]) -> Unsplit {
-        let of = |items: &[Item]| {
-            let mut all = Unsplit::EMPTY;
-            items.iter().for_each(|item| all.add(item));
-            all
-        };
-        items.par_chunks(PIECE).map(of).reduce(|| Unsplit::EMPTY, Unsplit::union)
-    }
+impl Candidates for Binned<'_> {
+    type Part<'a> = Part<'a>;
+    type Split = Split;
 
-    fn subtree(&self, part: Part<'_>, node: Unsplit, depth: u32) {
-        if part.splits.is_empty() {
-            return part.end();
-        }
-        let count = part.items.len();
-        let Some(Divided { left_count, is_moved, left, right }) = self.divide(part.items, part.spare, &node, depth)
-        else {
-            part.splits[0] = LEAF;
-            return part.end();
-        };
-        part.splits[0] = left_count as u32;
-        let (items, spare) = if is_moved { (part.spare, part.items) } else { (part.items, part.spare) };
-        let (left_items, right_items) = items.split_at_mut(left_count);
-        let (left_spare, right_spare) = spare.split_at_mut(left_count);
-        let (left_order, right_order) = part.order.split_at_mut(left_count);
-        let (left_splits, right_splits) = part.splits[1..].split_at_mut(left_count - 1);
-        let on_left = Part { items: left_items, spare: left_spare, order: left_order, splits: left_splits };
-        let on_right = Part { items: right_items, spare: right_spare, order: right_order, splits: right_splits };
-        if count < ALONE || depth >= DIVIDED_ABOVE {
-            self.subtree(on_left, left, depth + 1);
-            self.subtree(on_right, right, depth + 1);
-        } else {
-            rayon::join(|| self.subtree(on_left, left, depth + 1), || self.subtree(on_right, right, depth + 1));
-        }
-    }
-
-    /// Brings what is on the left before the others; `None` if the node is a leaf.
-    fn divide(&self, items: &[Item], spare: &mut [Item], node: &Unsplit, depth: u32) -> Option<Divided> {
+    #[inline(always)]
+    fn best<C: SplitCost>(&self, by: &C, here: &C::Here, part: &mut Part<'_>, depth: u32) -> Option<Split> {
+        let Part { items, node, .. } = part;
         let edges = (node.centroids.hi - node.centroids.lo).min_element();
-        if !self.single && (items.len() <= self.options.leaf as usize || edges < self.flat) {
+        if !self.rule.single && (items.len() <= self.options.leaf as usize || edges < self.flat) {
             return None;
         }
-        let area = node.bounds.half_area();
         let bins = self.options.bins.of(items.len());
         let grid = |axis| Grid::new(&node.centroids, axis, bins);
         let grids = match self.options.axes {
             BinnedAxes::Longest => [grid(node.centroids.longest_edge().0), None, None],
             BinnedAxes::All => [0, 1, 2].map(grid),
         };
+        let search = Search { by, here, rule: self.rule, items, weight: by.of_node(here, &node.bounds) };
         if depth >= HALVED_FROM || grids.iter().all(Option::is_none) {
-            return self.halved(items, area);
-        }
-        if items.len() <= FEW {
-            return self.divide_few(items, spare, area, &grids);
-        }
-        if bins <= 16 {
-            self.divide_by::<16>(items, spare, area, &grids)
+            search.halved()
+        } else if items.len() <= FEW {
+            search.of_few(&grids)
+        } else if bins <= 16 {
+            search.at_bin::<16>(&grids)
         } else {
-            self.divide_by::<{ Bins::MOST as usize }>(items, spare, area, &grids)
+            search.at_bin::<{ Bins::MOST as usize }>(&grids)
         }
     }
 
-    fn is_leaf(&self, area: f32, count: usize, cost: f32) -> bool {
-        !self.single && self.costs.leaf_cost(area, count as u32) < self.costs.inner_cost(area, cost, 0.0)
+    fn sides(&self, by: &impl SplitCost, part: &Part<'_>, split: Option<&Split>) -> [Side; 2] {
+        let items = &*part.items;
+        match split {
+            None => [side(by, items), Side::EMPTY],
+            Some(Split::Halved) => halves(items).map(|half| side(by, half)),
+            Some(Split::AtBin { sides, .. }) => sides.each_ref().map(Bin::side),
+            Some(Split::OfFew { order, left_count }) => {
+                let (left, right) = order[..items.len()].split_at(*left_count);
+                let of = |&place: &u8| side_of(by, &items[place as usize]);
+                [left, right].map(|places| places.iter().map(of).fold(Side::EMPTY, Side::union))
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn divide<'a>(&self, part: Self::Part<'a>, split: Split) -> (usize, [Self::Part<'a>; 2]) {
+        let Part { items, spare, order, node } = part;
+        let (left_count, sides) = match split {
+            Split::Halved => {
+                let sides = halves(items).map(measured);
+                let left_count = items.len() / 2;
+                return (left_count, Part { items, spare, order, node }.split_at(left_count, sides));
+            }
+            Split::AtBin { grid, bin, sides } => {
+                let [left, right] = *sides;
+                // That is, `grid.bin_of(item) < bin`.
+                partition(items, spare, left.count as usize, |item| grid.place(item) < bin as f32);
+                (left.count as usize, [left.items, right.items])
+            }
+            Split::OfFew { order, left_count } => {
+                for (item, place) in spare.iter_mut().zip(order) {
+                    *item = items[place as usize];
+                }
+                let (left, right) = spare.split_at(left_count);
+                (left_count, [left, right].map(measured_alone))
+            }
+        };
+        // The items are in the other array now.
+        (left_count, Part { items: spare, spare: items, order, node }.split_at(left_count, sides))
+    }
+
+    fn end(&self, part: Part<'_>) {
+        part.order.iter_mut().zip(part.items).for_each(|(primitive, item)| *primitive = item.primitive());
+    }
+}
+
+/// The search for the split of a node.
+struct Search<'a, C: SplitCost> {
+    by: &'a C,
+    here: &'a C::Here,
+    rule: LeafRule<'a>,
+    items: &'a [Item],
+    /// Of the node itself.
+    weight: f32,
+}
+
+impl<C: SplitCost> Search<'_, C> {
+    #[inline(always)]
+    fn is_leaf(&self, cost: f32) -> bool {
+        self.rule.is_leaf(self.weight, self.items.len() as u32, cost)
+    }
+
+    /// The cost of each side together with all before it.
+    #[inline(always)]
+    fn costs(&self, sides: impl Iterator<Item = Side>) -> impl Iterator<Item = f32> {
+        let costs = self.rule.costs;
+        self.by.of_sides(self.here, growing(sides)).map(|(weight, side)| costs.leaf_cost(weight, side.count))
     }
 
     /// Splits in the middle of the order, as centroids do not tell items apart.
-    fn halved(&self, items: &[Item], area: f32) -> Option<Divided> {
-        let (left, right) = items.split_at(items.len() / 2);
-        let cost = self.costs.leaf_cost(around(left).half_area(), left.len() as u32)
-            + self.costs.leaf_cost(around(right).half_area(), right.len() as u32);
-        let divided = || {
-            let (left_count, is_moved) = (left.len(), false);
-            Divided { left_count, is_moved, left: self.measured(left), right: self.measured(right) }
-        };
-        (!self.is_leaf(area, items.len(), cost)).then(divided)
+    fn halved(&self) -> Option<Split> {
+        let sides = halves(self.items).map(|half| side(self.by, half));
+        let cost: f32 = sides.into_iter().flat_map(|side| self.costs(std::iter::once(side))).sum();
+        (!self.is_leaf(cost)).then_some(Split::Halved)
     }
 
     /// By the plane between at most `N` bins of an axis that costs least; of equal ones the first, along the first axis. Not inlined:
     /// its bins would lie on the stack once for each level, and small nodes would pay for the room of 256.
     #[inline(never)]
-    fn divide_by<const N: usize>(
-        &self,
-        items: &[Item],
-        spare: &mut [Item],
-        area: f32,
-        grids: &[Option<Grid>; 3],
-    ) -> Option<Divided> {
+    fn at_bin<const N: usize>(&self, grids: &[Option<Grid>; 3]) -> Option<Split> {
         let mut best: Option<(Plane, Grid)> = None;
         let (mut bins, mut of_best) = (&mut [Bin::EMPTY; N], &mut [Bin::EMPTY; N]);
         for grid in grids.iter().flatten() {
-            fill(items, grid, bins);
+            fill(self.by, self.items, grid, bins);
             let plane = self.best_plane::<N>(&bins[..grid.bins]);
             if best.is_none_or(|best| plane.0 < best.0.0) {
                 best = Some((plane, *grid));
@@ -310,32 +344,22 @@ impl Build<'_> {
             }
         }
         let ((cost, bin), grid) = best?;
-        if self.is_leaf(area, items.len(), cost) {
+        if self.is_leaf(cost) {
             return None;
         }
         let side = |bins: &[Bin]| bins.iter().fold(Bin::EMPTY, |all, bin| all.union(*bin));
-        let (left, right) = (side(&of_best[..bin]), side(&of_best[bin..grid.bins]));
-        let left_count = left.count as usize;
-        // That is, `grid.bin_of(item) < bin`.
-        partition(items, spare, left_count, |item| grid.place(item) < bin as f32);
-        Some(Divided { left_count, is_moved: true, left: left.items, right: right.items })
+        Some(Split::AtBin { grid, bin, sides: Box::new([side(&of_best[..bin]), side(&of_best[bin..grid.bins])]) })
     }
 
     /// The best plane between bins, of which the first and the last hold something.
     fn best_plane<const N: usize>(&self, bins: &[Bin]) -> Plane {
         let mut right_costs = [0.0; N];
-        let (mut bounds, mut count) = (Bounds::EMPTY, 0);
-        for (bin, cost) in bins.iter().zip(&mut right_costs).skip(1).rev() {
-            bounds = bounds.union(bin.items.bounds);
-            count += bin.count;
-            *cost = self.costs.leaf_cost(bounds.half_area(), count);
-        }
-        let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+        let from_right = self.costs(bins[1..].iter().rev().map(Bin::side));
+        right_costs[1..bins.len()].iter_mut().rev().zip(from_right).for_each(|(place, cost)| *place = cost);
+        let from_left = self.costs(bins[..bins.len() - 1].iter().map(Bin::side));
         let mut best = (f32::INFINITY, 1);
-        for (at, right_cost) in (1..bins.len()).zip(&right_costs[1..]) {
-            bounds = bounds.union(bins[at - 1].items.bounds);
-            count += bins[at - 1].count;
-            let cost = self.costs.leaf_cost(bounds.half_area(), count) + right_cost;
+        for ((left_cost, right_cost), at) in from_left.zip(&right_costs[1..]).zip(1..) {
+            let cost = left_cost + right_cost;
             if cost < best.0 {
                 best = (cost, at);
             }
@@ -344,53 +368,42 @@ impl Build<'_> {
     }
 
     /// The same for a few items, in the order of their bins: most bins are empty then.
-    fn divide_few(&self, items: &[Item], spare: &mut [Item], area: f32, grids: &[Option<Grid>; 3]) -> Option<Divided> {
-        let count = items.len();
-        // Whatever the leaves below will be, each item is in one that is no smaller than itself.
-        let least: f32 = items.iter().map(|item| self.costs.leaf_cost(item.bounds().half_area(), 1)).sum();
-        if self.is_leaf(area, count, least) {
-            return None;
+    #[inline(always)]
+    fn of_few(&self, grids: &[Option<Grid>; 3]) -> Option<Split> {
+        if C::GROWS && !self.rule.single {
+            // Whatever the leaves below will be, each item is in one that is no smaller than itself.
+            let least = self.items.iter().map(|item| {
+                let weight = self.by.of_node(self.here, &item.bounds());
+                self.rule.costs.leaf_cost(weight, 1)
+            });
+            if self.is_leaf(least.sum()) {
+                return None;
+            }
         }
         let mut best = (f32::INFINITY, 0, [0; FEW]);
         for grid in grids.iter().flatten() {
-            let order = in_order_of_bins(items, grid);
-            let (cost, left_count) = self.best_plane_of_few(items, &order);
+            let order = in_order_of_bins(self.items, grid);
+            let (cost, left_count) = self.best_plane_of_few(&order);
             if cost < best.0 || best.1 == 0 {
                 best = (cost, left_count, order);
             }
         }
         let (cost, left_count, order) = best;
-        if self.is_leaf(area, count, cost) {
-            return None;
-        }
-        for (item, key) in spare.iter_mut().zip(order) {
-            *item = items[(key & 0xff) as usize];
-        }
-        let side = |items: &[Item]| {
-            let mut all = Unsplit::EMPTY;
-            items.iter().for_each(|item| all.add(item));
-            all
-        };
-        let (left, right) = spare.split_at(left_count);
-        Some(Divided { left_count, is_moved: true, left: side(left), right: side(right) })
+        (!self.is_leaf(cost)).then(|| Split::OfFew { order: order.map(|key| key as u8), left_count })
     }
 
     /// The cost of the best plane, and how many items are on its left, of items in the order of their bins.
-    fn best_plane_of_few(&self, items: &[Item], order: &[u32; FEW]) -> Plane {
-        let count = items.len();
-        let item = |at: usize| &items[(order[at] & 0xff) as usize];
+    fn best_plane_of_few(&self, order: &[u32; FEW]) -> Plane {
+        let order = &order[..self.items.len()];
+        let side = |key: &u32| side_of(self.by, &self.items[(key & 0xff) as usize]);
         let mut right_costs = [0.0; FEW];
-        let mut bounds = Bounds::EMPTY;
-        for at in (1..count).rev() {
-            bounds = bounds.union(item(at).bounds());
-            right_costs[at] = self.costs.leaf_cost(bounds.half_area(), (count - at) as u32);
-        }
-        let mut bounds = Bounds::EMPTY;
+        let from_right = self.costs(order[1..].iter().rev().map(side));
+        right_costs[1..order.len()].iter_mut().rev().zip(from_right).for_each(|(place, cost)| *place = cost);
+        let from_left = self.costs(order[..order.len() - 1].iter().map(side));
         let mut best = (f32::INFINITY, 0);
-        for at in 1..count {
-            bounds = bounds.union(item(at - 1).bounds());
+        for ((left_cost, right_cost), at) in from_left.zip(&right_costs[1..]).zip(1..) {
             if order[at - 1] >> 8 != order[at] >> 8 {
-                let cost = self.costs.leaf_cost(bounds.half_area(), at as u32) + right_costs[at];
+                let cost = left_cost + right_cost;
                 if cost < best.0 || best.1 == 0 {
                     best = (cost, at);
                 }
@@ -398,6 +411,34 @@ impl Build<'_> {
         }
         best
     }
+}
+
+/// Both halves of the order.
+fn halves(items: &[Item]) -> [&[Item]; 2] {
+    let (left, right) = items.split_at(items.len() / 2);
+    [left, right]
+}
+
+#[inline(always)]
+fn side_of(by: &impl SplitCost, item: &Item) -> Side {
+    Side::of(item, by.is_seen(item))
+}
+
+fn side(by: &impl SplitCost, items: &[Item]) -> Side {
+    items.iter().fold(Side::EMPTY, |all, item| all.union(side_of(by, item)))
+}
+
+/// The boxes of a node over these items, by all threads if there are many.
+fn measured(items: &[Item]) -> Unsplit {
+    items.par_chunks(PIECE).map(measured_alone).reduce(|| Unsplit::EMPTY, Unsplit::union)
+}
+
+/// The same by one thread.
+#[inline(always)]
+fn measured_alone(items: &[Item]) -> Unsplit {
+    let mut all = Unsplit::EMPTY;
+    items.iter().for_each(|item| all.add(item));
+    all
 }
 
 /// Whether all threads work on a node together. One that has no others reads its items once, and in place.
@@ -421,13 +462,13 @@ fn in_order_of_bins(items: &[Item], grid: &Grid) -> [u32; FEW] {
 }
 
 /// Fills the bins of a grid, the first of `N`, by all threads if there are many items.
-fn fill<const N: usize>(items: &[Item], grid: &Grid, bins: &mut [Bin; N]) {
+fn fill<const N: usize>(by: &impl SplitCost, items: &[Item], grid: &Grid, bins: &mut [Bin; N]) {
     if !is_for_all(items) {
-        return fill_alone(items, grid, bins);
+        return fill_alone(by, items, grid, bins);
     }
     let of_piece = |items: &[Item]| {
         let mut bins = [Bin::EMPTY; N];
-        fill_alone(items, grid, &mut bins);
+        fill_alone(by, items, grid, &mut bins);
         bins
     };
     let union = |mut a: [Bin; N], b: [Bin; N]| {
@@ -438,11 +479,12 @@ fn fill<const N: usize>(items: &[Item], grid: &Grid, bins: &mut [Bin; N]) {
 }
 
 /// The same by one thread.
-fn fill_alone<const N: usize>(items: &[Item], grid: &Grid, bins: &mut [Bin; N]) {
+fn fill_alone<const N: usize>(by: &impl SplitCost, items: &[Item], grid: &Grid, bins: &mut [Bin; N]) {
     let add = |bins: &mut [Bin; N], item: &Item| {
         let bin = &mut bins[grid.bin_of(item)];
         bin.items.add(item);
         bin.count += 1;
+        bin.seen += u32::from(by.is_seen(item));
     };
     bins[..grid.bins].fill(Bin::EMPTY);
     if items.len() < 4 * N {
@@ -497,5 +539,76 @@ fn spread(items: &[Item], to: &mut [Item], left_count: usize, is_left: impl Fn(&
         to[if is_left { left } else { right }] = *item;
         left += usize::from(is_left);
         right += usize::from(!is_left);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bounds::{around, tests::boxes};
+    use super::super::heuristic::split_cost::Area;
+    use super::super::topology::LEAF;
+    use super::*;
+    use hedgerow::bvh::sah::Collapse;
+
+    /// The items on either side of a plane.
+    type Sides = [Vec<Item>; 2];
+
+    /// The same, plainly: every plane is tried, with boxes made anew.
+    fn plain(items: &[Item], rule: LeafRule<'_>, options: &BinnedOptions, tree: &mut Topology) {
+        let centroids = items.iter().fold(Bounds::EMPTY, |all, item| all.union(Bounds::point(item.centroid())));
+        let cost = |items: &[Item]| rule.costs.leaf_cost(around(items).half_area(), items.len() as u32);
+        let axes = if options.axes == BinnedAxes::All { vec![0, 1, 2] } else { vec![centroids.longest_edge().0] };
+        let bins = options.bins.of(items.len());
+        let grids: Vec<Grid> = axes.into_iter().filter_map(|axis| Grid::new(&centroids, axis, bins)).collect();
+        let mut best: Option<(f32, Sides)> = None;
+        let mut consider = |sides: Sides| {
+            let cost = cost(&sides[0]) + cost(&sides[1]);
+            let is_split = sides.iter().all(|side| !side.is_empty());
+            if is_split && best.as_ref().is_none_or(|best| cost < best.0) {
+                best = Some((cost, sides));
+            }
+        };
+        for grid in &grids {
+            let mut items = items.to_vec();
+            if items.len() <= FEW {
+                items.sort_by_key(|item| grid.bin_of(item));
+            }
+            (1..bins).for_each(|bin| {
+                consider(
+                    [true, false].map(|is_left| {
+                        items.iter().copied().filter(|item| (grid.bin_of(item) < bin) == is_left).collect()
+                    }),
+                )
+            });
+        }
+        if grids.is_empty() {
+            consider(halves(items).map(<[Item]>::to_vec));
+        }
+        let is_leaf = |cost| rule.is_leaf(around(items).half_area(), items.len() as u32, cost);
+        let is_small = !rule.single && items.len() <= options.leaf as usize;
+        let Some((_, [left, right])) = best.filter(|best| !is_small && !is_leaf(best.0)) else {
+            tree.splits.extend(items.iter().skip(1).map(|_| LEAF));
+            return tree.order.extend(items.iter().map(Item::primitive));
+        };
+        tree.splits.push(left.len() as u32);
+        plain(&left, rule, options, tree);
+        plain(&right, rule, options, tree);
+    }
+
+    #[test]
+    fn bins_give_the_best_plane_of_all_at_every_node() {
+        let wald = BinnedOptions::WALD;
+        let all = BinnedOptions { bins: Bins::Adaptive, axes: BinnedAxes::All, ..wald };
+        for options in [wald, all, BinnedOptions { bins: Bins::Fixed(2), leaf: 3, ..all }] {
+            for count in [1, 2, 3, 16, 17, 150, 700] {
+                for single in [false, true] {
+                    let rule = LeafRule { costs: &Collapse::SAH, single };
+                    let mut expected = Topology { order: Vec::new(), splits: Vec::new() };
+                    plain(&boxes(count), rule, &options, &mut expected);
+                    let found = build(&Area, boxes(count), 1.0, rule, &options);
+                    assert!(found == expected, "{count} boxes, {options:?}, {single}");
+                }
+            }
+        }
     }
 }

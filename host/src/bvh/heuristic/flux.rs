@@ -71,32 +71,31 @@ impl FluxTable {
     /// less.
     fn normalised(mut self) -> FluxTable {
         let walls = (0..3).flat_map(|axis| [(axis, 0.0), (axis, 1.0)]);
-        let flux: f64 = walls.map(|(axis, at)| self.through(axis, at, [0.0, 1.0], [0.0, 1.0])).sum();
+        let ends = [0.0, 1.0].map(Place::new);
+        let through = |(axis, at)| self.through(axis, &Place::new(at), ends.each_ref(), ends.each_ref());
+        let flux: f64 = walls.map(through).sum();
         self.planes.as_flattened_mut().iter_mut().for_each(|sum| *sum /= flux);
         self
     }
 
-    /// The integral over a rectangle across `axis` at `at`, with these extents along the next axis and the one after it. All are
-    /// parts of the box's edges, from 0 to 1.
-    pub fn through(&self, axis: usize, at: f64, [u0, u1]: [f64; 2], [v0, v1]: [f64; 2]) -> f64 {
-        if u1 <= u0 || v1 <= v0 {
+    /// The integral over a rectangle across `axis` at `at`, with these extents along the next axis and the one after it.
+    pub fn through(&self, axis: usize, at: &Place, u: [&Place; 2], v: [&Place; 2]) -> f64 {
+        if u[1].at <= u[0].at || v[1].at <= v[0].at {
             return 0.0;
         }
-        let (first, part) = cell(at);
-        let up_to = |u: f64, v: f64| {
-            let of = |plane: usize| self.up_to(axis * POINTS + plane, u, v);
-            (1.0 - part) * of(first) + part * of(first + 1)
+        let of_plane = |plane: usize| {
+            let up_to = |u, v| self.up_to(axis * POINTS + plane, u, v);
+            up_to(u[1], v[1]) - up_to(u[0], v[1]) - up_to(u[1], v[0]) + up_to(u[0], v[0])
         };
-        up_to(u1, v1) - up_to(u0, v1) - up_to(u1, v0) + up_to(u0, v0)
+        let below = if at.part < 1.0 { (1.0 - at.part) * of_plane(at.step) } else { 0.0 };
+        if at.part > 0.0 { below + at.part * of_plane(at.step + 1) } else { below }
     }
 
     /// The integral in a plane from its corner to (u, v).
-    fn up_to(&self, plane: usize, u: f64, v: f64) -> f64 {
-        let ((i, s), (j, t)) = (cell(u), cell(v));
+    fn up_to(&self, plane: usize, u: &Place, v: &Place) -> f64 {
         let sums = |i: usize, j: usize| self.planes[(plane * POINTS + i) * POINTS + j];
-        // What a function that is linear in a cell adds up to, up to this part of the cell.
-        let weights = |number, part: f64| [part - 0.5 * part * part, 0.5 * part * part].map(|x| x * step(number));
-        let ([u0, u1], [v0, v1]) = (weights(i, s), weights(j, t));
+        let (i, j) = (u.step, v.step);
+        let ([u0, u1], [v0, v1]) = (u.weights, v.weights);
         let [[both, along_u, along_v, value], [_, next_along_u, _, next_v]] = [sums(i, j), sums(i, j + 1)];
         let [[_, _, next_along_v, next_u], [.., opposite]] = [sums(i + 1, j), sums(i + 1, j + 1)];
         both + v0 * along_u
@@ -106,13 +105,29 @@ impl FluxTable {
     }
 }
 
-/// The step that a place is in, and how far in it is; both places and parts are from 0 to 1.
-fn cell(place: f64) -> (usize, f64) {
-    let place = place.clamp(0.0, 1.0);
-    let from_wall = ((place.min(1.0 - place) + 0.0625).sqrt() - 0.25) * STEPS as f64;
-    let steps = if place < 0.5 { from_wall } else { STEPS as f64 - from_wall };
-    let number = (steps as usize).min(STEPS - 1);
-    (number, ((place - place_of(number)) / step(number)).clamp(0.0, 1.0))
+/// A place along an axis, from 0 to 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    at: f64,
+    /// The step that it is in.
+    step: usize,
+    /// How far in it, from 0 to 1.
+    part: f64,
+    /// What the points on either side of it add to the integral of what is linear between them, from the step's beginning on.
+    weights: [f64; 2],
+}
+
+impl Place {
+    pub fn new(at: f64) -> Place {
+        let at = at.clamp(0.0, 1.0);
+        let from_wall = ((at.min(1.0 - at) + 0.0625).sqrt() - 0.25) * STEPS as f64;
+        let steps = if at < 0.5 { from_wall } else { STEPS as f64 - from_wall };
+        let number = (steps as usize).min(STEPS - 1);
+        let length = step(number);
+        let part = ((at - place_of(number)) / length).clamp(0.0, 1.0);
+        let weights = [part - 0.5 * part * part, 0.5 * part * part].map(|weight| weight * length);
+        Place { at, step: number, part, weights }
+    }
 }
 
 /// The flux at the points of a plane across an axis, row by row.
@@ -190,7 +205,10 @@ mod tests {
     #[test]
     fn rectangles_side_by_side_add_up_and_a_small_one_has_the_flux_of_its_place() {
         let table = FluxTable::new([1.0; 3]);
-        let of = |u, v| table.through(1, 0.37, u, v);
+        let of = |u: [f64; 2], v: [f64; 2]| {
+            let [[u0, u1], [v0, v1]] = [u, v].map(|extent| extent.map(Place::new));
+            table.through(1, &Place::new(0.37), [&u0, &u1], [&v0, &v1])
+        };
         let parts = of([0.1, 0.43], [0.2, 0.77]) + of([0.43, 0.9], [0.2, 0.77]);
         assert!((parts - of([0.1, 0.9], [0.2, 0.77])).abs() < 1e-14);
         let place = [0.31 + 5e-6, 0.37, 0.71 + 5e-6];

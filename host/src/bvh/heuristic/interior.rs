@@ -9,7 +9,7 @@
 //! p(N) = \[V(N) + Σ over the faces of N of ∫ M_k\] / 2V(S), where M_k is the flux ([`super::flux`]) and no integral over the scene
 //! is left. The approximations of the paper are here for comparison.
 
-use super::flux::FluxTable;
+use super::flux::{FluxTable, Place};
 use super::{RayMeasure, angle};
 use hedgerow::geometry::Aabb;
 
@@ -73,9 +73,10 @@ impl Interior {
     /// By the flux through the faces.
     fn by_flux(&self, flux: &FluxTable, extents: &Extents) -> f64 {
         let parts: Extents = std::array::from_fn(|k| extents[k].map(|x| x / self.edges[k]));
+        let places = parts.map(|extent| extent.map(Place::new));
         let faces = |k: usize| {
-            let through = |at: f64| flux.through(k, at, parts[(k + 1) % 3], parts[(k + 2) % 3]);
-            through(parts[k][0]) + through(parts[k][1])
+            let [u, v] = [(k + 1) % 3, (k + 2) % 3].map(|k| places[k].each_ref());
+            flux.through(k, &places[k][0], u, v) + flux.through(k, &places[k][1], u, v)
         };
         0.5 * (volume(&parts) + (0..3).map(faces).sum::<f64>())
     }

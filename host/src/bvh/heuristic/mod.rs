@@ -5,18 +5,79 @@
 //!
 //! - [`interior`]: rays that begin anywhere in the scene; [`flux`] and [`angle`] are its arithmetic;
 //! - [`preferred`]: rays of a camera, from a point or in a direction; [`picture`] is the camera's.
+//!
+//! Builders see none of that: they are given a `SplitCost`. Trees by another heuristic than the surface area go down to single
+//! primitives, and leaves are made by collapsing: a heuristic that calls both children certain, or neither likely, would stop at
+//! once ([`Termination::Heuristic`] does).
 
 mod angle;
 mod flux;
 pub mod interior;
 mod picture;
 pub mod preferred;
+pub(super) mod split_cost;
 
+#[cfg(doc)]
+use super::Termination;
+use super::{HostMethod, bounds::Bounds};
 use hedgerow::geometry::Aabb;
 use hedgerow::{Error, Result};
+use interior::Interior;
 pub use interior::InteriorForm;
 pub use picture::Pinhole;
+use preferred::PreferredMeasure;
 pub use preferred::{Preferred, PreferredRays};
+
+/// What splits cost.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Heuristic {
+    /// By the surface area of boxes.
+    #[default]
+    Sah,
+    /// By the rays that begin anywhere in the scene and meet a box. A scene without volume is built by surface area.
+    Interior(InteriorForm),
+    /// By the rays of a camera, of a point or in one direction that meet a box.
+    Preferred(Preferred),
+}
+
+impl Heuristic {
+    /// Whether `method` can build by it.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] names the method or the option that cannot be used, and what can.
+    pub fn check(&self, method: &HostMethod) -> Result<()> {
+        let is_top_down = matches!(method, HostMethod::Sweep | HostMethod::Binned(_));
+        if *self != Heuristic::Sah && !is_top_down {
+            let error = format!("{method:?} does not build by a heuristic; take Sweep or Binned, or Heuristic::Sah");
+            return Err(Error::Argument(error));
+        }
+        match self {
+            Heuristic::Sah | Heuristic::Interior(_) => Ok(()),
+            Heuristic::Preferred(preferred) => preferred.check(),
+        }
+    }
+
+    /// For the scene in this box, whose lengths are scaled by `scale`.
+    pub(super) fn prepared(&self, scene: &Bounds, scale: f32) -> Prepared {
+        let scene = scene.aabb();
+        fn boxed(measure: Option<impl RayMeasure + 'static>) -> Prepared {
+            measure.map_or(Prepared::Area, |measure| Prepared::Rays(Box::new(measure)))
+        }
+        match self {
+            Heuristic::Sah => Prepared::Area,
+            Heuristic::Interior(form) => boxed(Interior::new(*form, &scene)),
+            Heuristic::Preferred(preferred) => boxed(PreferredMeasure::new(&preferred.scaled(scale), &scene)),
+        }
+    }
+}
+
+/// A heuristic made ready for a scene.
+pub(super) enum Prepared {
+    /// The surface area; and what any other is where it knows of nothing.
+    Area,
+    /// A measure of rays.
+    Rays(Box<dyn RayMeasure>),
+}
 
 /// How many rays of a set meet a box: the whole of a heuristic that looks at nothing but the box.
 ///
