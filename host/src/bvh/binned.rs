@@ -213,7 +213,7 @@ enum Split {
     /// At the beginning of a bin of a grid; what lies on either side.
     AtBin { grid: Grid, bin: usize, sides: Box<[Bin; 2]> },
     /// Of a few items in this order, after so many.
-    OfFew { order: [u8; FEW], left_count: usize },
+    OfFew { order: [u32; FEW], left_count: usize },
 }
 
 /// What nodes are split by.
@@ -261,8 +261,8 @@ impl Candidates for Binned<'_> {
             Some(Split::AtBin { sides, .. }) => sides.each_ref().map(Bin::side),
             Some(Split::OfFew { order, left_count }) => {
                 let (left, right) = order[..items.len()].split_at(*left_count);
-                let of = |&place: &u8| side_of(by, &items[place as usize]);
-                [left, right].map(|places| places.iter().map(of).fold(Side::EMPTY, Side::union))
+                let of = |key: &u32| side_of(by, &items[place_of(*key)]);
+                [left, right].map(|keys| keys.iter().map(of).fold(Side::EMPTY, Side::union))
             }
         }
     }
@@ -283,11 +283,11 @@ impl Candidates for Binned<'_> {
                 (left.count as usize, [left.items, right.items])
             }
             Split::OfFew { order, left_count } => {
-                for (item, place) in spare.iter_mut().zip(order) {
-                    *item = items[place as usize];
+                for (item, key) in spare.iter_mut().zip(order) {
+                    *item = items[place_of(key)];
                 }
                 let (left, right) = spare.split_at(left_count);
-                (left_count, [left, right].map(measured_alone))
+                (left_count, [measured_alone(left), measured_alone(right)])
             }
         };
         // The items are in the other array now.
@@ -389,13 +389,14 @@ impl<C: SplitCost> Search<'_, C> {
             }
         }
         let (cost, left_count, order) = best;
-        (!self.is_leaf(cost)).then(|| Split::OfFew { order: order.map(|key| key as u8), left_count })
+        (!self.is_leaf(cost)).then_some(Split::OfFew { order, left_count })
     }
 
     /// The cost of the best plane, and how many items are on its left, of items in the order of their bins.
+    #[inline(always)]
     fn best_plane_of_few(&self, order: &[u32; FEW]) -> Plane {
         let order = &order[..self.items.len()];
-        let side = |key: &u32| side_of(self.by, &self.items[(key & 0xff) as usize]);
+        let side = |key: &u32| side_of(self.by, &self.items[place_of(*key)]);
         let mut right_costs = [0.0; FEW];
         let from_right = self.costs(order[1..].iter().rev().map(side));
         right_costs[1..order.len()].iter_mut().rev().zip(from_right).for_each(|(place, cost)| *place = cost);
@@ -446,7 +447,14 @@ fn is_for_all(items: &[Item]) -> bool {
     items.len() >= TOGETHER && rayon::current_num_threads() > 1
 }
 
+/// The place of an item that [`in_order_of_bins`] keeps beside its bin.
+#[inline(always)]
+fn place_of(key: u32) -> usize {
+    (key & 0xff) as usize
+}
+
 /// The bin of each item, and its place in the eight bits below, in the order of the bins.
+#[inline(always)]
 fn in_order_of_bins(items: &[Item], grid: &Grid) -> [u32; FEW] {
     let mut order = [u32::MAX; FEW];
     for (i, item) in items.iter().enumerate() {

@@ -193,7 +193,7 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &HostBvhOp
 /// # Errors
 /// An option or the heuristic cannot be used: [`HostBvhOptions::check`], [`Heuristic::check`].
 pub fn build_by(
-    heuristic: &Heuristic,
+    heuristic: &Heuristic<'_>,
     positions: &[[f32; 3]],
     triangles: &[[u32; 3]],
     options: &HostBvhOptions,
@@ -224,7 +224,7 @@ pub fn build_aabbs(boxes: &[Aabb], options: &HostBvhOptions) -> Result<Built<Box
 ///
 /// # Errors
 /// As those of [`build_by`].
-pub fn build_aabbs_by(heuristic: &Heuristic, boxes: &[Aabb], options: &HostBvhOptions) -> Result<Built<BoxRecord>> {
+pub fn build_aabbs_by(heuristic: &Heuristic<'_>, boxes: &[Aabb], options: &HostBvhOptions) -> Result<Built<BoxRecord>> {
     let finite = |primitive: u32| finite_box(&boxes[primitive as usize]);
     let record = |primitive| {
         let Aabb { lo, hi } = finite(primitive).expect("a box in the tree is finite");
@@ -252,16 +252,16 @@ fn build_of<R: Record>(
     count: usize,
     bounds: impl Fn(u32) -> Result<Bounds, u32> + Sync,
     record: impl Fn(u32) -> R + Sync,
-    (options, heuristic): (&HostBvhOptions, &Heuristic),
+    (options, heuristic): (&HostBvhOptions, &Heuristic<'_>),
 ) -> Result<Built<R>> {
     options.check()?;
-    heuristic.check(&options.method)?;
+    heuristic.check(&options.method, count)?;
     // On a thread of the pool: one outside it would wait and be woken again at every parallel step.
     Ok(rayon::scope(|_| build_on_thread(count, &bounds, &record, (options, heuristic))))
 }
 
 /// The tree over `items`, by their codes if the method sorted them. Both are given back before records and nodes want memory.
-fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOptions, by: &Prepared) -> Topology {
+fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOptions, by: &Prepared<'_>) -> Topology {
     let HostBvhOptions { method, collapse, termination, optimise, .. } = options;
     let is_by_area = matches!(by, Prepared::Area);
     // All three want leaves of one primitive; and costs by a heuristic are not those that leaves are made by.
@@ -274,6 +274,8 @@ fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOpti
         HostMethod::Sweep | HostMethod::Binned(_) => match by {
             Prepared::Area => top_down(&Area, items, scale, rule, method),
             Prepared::Rays(measure) => top_down(&ByRays(&**measure), items, scale, rule, method),
+            Prepared::Distribution(rays) => top_down(rays, items, scale, rule, method),
+            Prepared::Occlusion(seen) => top_down(seen, items, scale, rule, method),
         },
         HostMethod::Bonsai(options) => bonsai::build(items, collapse, single, options),
         HostMethod::Aac(options) => aac::build(&items, &codes, options),
@@ -294,7 +296,7 @@ fn build_on_thread<R: Record>(
     count: usize,
     bounds: &(impl Fn(u32) -> Result<Bounds, u32> + Sync),
     record: &(impl Fn(u32) -> R + Sync),
-    (options, heuristic): (&HostBvhOptions, &Heuristic),
+    (options, heuristic): (&HostBvhOptions, &Heuristic<'_>),
 ) -> Built<R> {
     let HostBvhOptions { method, codes, collapse, optimise, .. } = options;
     let mut phases = Phases { since: Instant::now(), phases: Vec::new() };
@@ -306,7 +308,8 @@ fn build_on_thread<R: Record>(
         phases.end("order");
     }
     let items = std::mem::take(&mut input.items);
-    let by = heuristic.prepared(&Bounds::of(&input.bounds).scaled(input.item_scale), input.item_scale);
+    let scene = Bounds::of(&input.bounds).scaled(input.item_scale);
+    let by = heuristic.prepared(&items, &scene, input.item_scale);
     if *heuristic != Heuristic::Sah {
         phases.end("heuristic");
     }
@@ -346,21 +349,22 @@ fn build_on_thread<R: Record>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use heuristic::{InteriorForm, Pinhole, Preferred, PreferredRays};
+    use heuristic::distribution::tests::sample;
+    use heuristic::{InteriorForm, Occlusion, Pinhole, Preferred, PreferredRays, RayDistribution, RaySegment};
 
     /// Boxes of the items that other tests take.
     fn boxes(count: u32) -> Vec<Aabb> {
         bounds::tests::boxes(count).iter().map(|item| item.bounds().aabb()).collect()
     }
 
-    fn tree(heuristic: &Heuristic, boxes: &[Aabb], options: &HostBvhOptions) -> Bvh2<BoxRecord> {
+    fn tree(heuristic: &Heuristic<'_>, boxes: &[Aabb], options: &HostBvhOptions) -> Bvh2<BoxRecord> {
         build_aabbs_by(heuristic, boxes, options).expect("options that can be used").tree
     }
 
     const METHODS: [HostMethod; 2] =
         [HostMethod::Sweep, HostMethod::Binned(BinnedOptions { axes: binned::BinnedAxes::All, ..BinnedOptions::WALD })];
 
-    fn measures() -> Vec<Heuristic> {
+    fn measures() -> Vec<Heuristic<'static>> {
         let camera =
             Pinhole { eye: [0.3, 0.4, -0.2], look: [0.6, 0.5, 1.0], up: [0.0, 1.0, 0.0], fov: 60.0, aspect: 1.5 };
         let preferred = [
@@ -387,6 +391,110 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Half of the boxes are seen: those whose number has an odd number of bits.
+    fn seen(count: usize) -> Vec<bool> {
+        (0..count).map(|i| i.count_ones() % 2 == 1).collect()
+    }
+
+    #[test]
+    fn rays_and_seen_primitives_give_valid_trees_the_same_on_any_number_of_threads() {
+        let boxes = boxes(2 * ALONE as u32);
+        let (rays, seen) = (sample(9_000), seen(boxes.len()));
+        let by_rays = Heuristic::Distribution(RayDistribution::of(&rays));
+        for heuristic in [by_rays, Heuristic::Occlusion(Occlusion::of(&seen))] {
+            for method in METHODS {
+                for termination in [Termination::Sah, Termination::Heuristic] {
+                    let options = HostBvhOptions { termination, ..HostBvhOptions::of(method) };
+                    let tree_on = |threads| {
+                        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+                        pool.install(|| tree(&heuristic, &boxes, &options))
+                    };
+                    let one = tree_on(1);
+                    one.validate().unwrap_or_else(|error| panic!("{method:?}, {termination:?}: {error}"));
+                    assert!(one.to_bytes() == tree_on(3).to_bytes(), "{method:?}, {termination:?}");
+                    let by_area = tree(&Heuristic::Sah, &boxes, &options);
+                    assert!(one.to_bytes() != by_area.to_bytes(), "{method:?}, {termination:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_heuristic_that_knows_of_nothing_gives_the_bytes_of_the_surface_area() {
+        let boxes = boxes(700);
+        let elsewhere =
+            [RaySegment { from: [9.0; 3], direction: [1.0, 0.0, 0.0], t_end: f32::INFINITY, weight: 1.0 }; 3];
+        let (all, none) = ([true; 700], [false; 700]);
+        let heuristics = [
+            Heuristic::Distribution(RayDistribution::of(&[])),
+            Heuristic::Distribution(RayDistribution::of(&elsewhere)),
+            Heuristic::Occlusion(Occlusion::of(&all)),
+            Heuristic::Occlusion(Occlusion::of(&none)),
+        ];
+        for method in METHODS {
+            for termination in [Termination::Sah, Termination::Single, Termination::Heuristic] {
+                let options = HostBvhOptions { termination, ..HostBvhOptions::of(method) };
+                let by_area = tree(&Heuristic::Sah, &boxes, &options).to_bytes();
+                for heuristic in &heuristics {
+                    assert!(tree(heuristic, &boxes, &options).to_bytes() == by_area, "{method:?}, {termination:?}");
+                }
+            }
+        }
+    }
+
+    /// How many nodes and leaves these rays meet, whatever they hit.
+    fn visits(tree: &Bvh2<BoxRecord>, rays: &[RaySegment]) -> usize {
+        let meets = |bounds: &Aabb, ray: &RaySegment| {
+            let (mut near, mut far) = (0.0, f64::from(ray.t_end));
+            for k in 0..3 {
+                let at = [bounds.lo[k], bounds.hi[k]].map(|x| f64::from(x - ray.from[k]) / f64::from(ray.direction[k]));
+                (near, far) = (f64::max(near, at[0].min(at[1])), f64::min(far, at[0].max(at[1])));
+            }
+            near <= far
+        };
+        let visits_of = |ray: &RaySegment| {
+            let (mut visits, mut next) = (0, vec![tree.header.root]);
+            while let Some(child) = next.pop() {
+                visits += 1;
+                if !child.is_leaf() {
+                    let children = tree.nodes[child.index as usize].children;
+                    next.extend(children.into_iter().filter(|child| meets(&child.bounds(), ray)));
+                }
+            }
+            visits
+        };
+        rays.iter().map(visits_of).sum()
+    }
+
+    #[test]
+    fn rays_like_those_of_the_sample_meet_fewer_nodes() {
+        let boxes = boxes(3_000);
+        let rays = sample(4_000);
+        let (known, others) = rays.split_at(3_000);
+        for method in METHODS {
+            let options = HostBvhOptions { collapse: Collapse::OFF, ..HostBvhOptions::of(method) };
+            let visits_of = |heuristic: Heuristic<'_>| visits(&tree(&heuristic, &boxes, &options), others);
+            let [by_rays, by_area] =
+                [Heuristic::Distribution(RayDistribution::of(known)), Heuristic::Sah].map(visits_of);
+            assert!(by_rays < by_area, "{method:?}: {by_rays}, by area {by_area}");
+        }
+    }
+
+    #[test]
+    fn what_hides_much_is_split_off_first() {
+        // Twelve boxes along x. The four on the left are seen; by area they would be split in the middle.
+        let at = |i: u32| Aabb { lo: [i as f32, 0.0, 0.0], hi: [i as f32 + 0.9, 1.0, 1.0] };
+        let boxes: Vec<Aabb> = (0..12).map(at).collect();
+        let seen: Vec<bool> = (0..12).map(|i| i < 4).collect();
+        let options = HostBvhOptions { collapse: Collapse::OFF, ..HostBvhOptions::of(HostMethod::Sweep) };
+        let left_edge_of_right = |heuristic: Heuristic<'_>| {
+            let tree = tree(&heuristic, &boxes, &options);
+            tree.nodes[tree.header.root.index as usize].children[1].lo[0]
+        };
+        assert_eq!(left_edge_of_right(Heuristic::Sah), 6.0);
+        assert_eq!(left_edge_of_right(Heuristic::Occlusion(Occlusion::of(&seen))), 4.0);
     }
 
     #[test]

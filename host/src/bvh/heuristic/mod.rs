@@ -6,31 +6,43 @@
 //! - [`interior`]: rays that begin anywhere in the scene; [`flux`] and [`angle`] are its arithmetic;
 //! - [`preferred`]: rays of a camera, from a point or in a direction; [`picture`] is the camera's.
 //!
+//! Others know more of a node than its box:
+//!
+//! - [`distribution`]: rays that were traced;
+//! - [`occlusion`]: primitives that rays ended on.
+//!
 //! Builders see none of that: they are given a `SplitCost`. Trees by another heuristic than the surface area go down to single
 //! primitives, and leaves are made by collapsing: a heuristic that calls both children certain, or neither likely, would stop at
 //! once ([`Termination::Heuristic`] does).
 
 mod angle;
+pub mod distribution;
 mod flux;
 pub mod interior;
+pub mod occlusion;
 mod picture;
 pub mod preferred;
 pub(super) mod split_cost;
 
+use super::HostMethod;
 #[cfg(doc)]
 use super::Termination;
-use super::{HostMethod, bounds::Bounds};
+use super::bounds::{Bounds, Item};
+use distribution::Distribution;
+pub use distribution::{RayDistribution, RaySegment};
 use hedgerow::geometry::Aabb;
 use hedgerow::{Error, Result};
 use interior::Interior;
 pub use interior::InteriorForm;
+pub use occlusion::Occlusion;
+use occlusion::Seen;
 pub use picture::Pinhole;
 use preferred::PreferredMeasure;
 pub use preferred::{Preferred, PreferredRays};
 
 /// What splits cost.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Heuristic {
+pub enum Heuristic<'a> {
     /// By the surface area of boxes.
     #[default]
     Sah,
@@ -38,14 +50,18 @@ pub enum Heuristic {
     Interior(InteriorForm),
     /// By the rays of a camera, of a point or in one direction that meet a box.
     Preferred(Preferred),
+    /// By the rays of a sample that meet a node. Without any in the scene it is built by surface area.
+    Distribution(RayDistribution<'a>),
+    /// By the primitives of a node that rays ended on. If all or none are seen it is built by surface area.
+    Occlusion(Occlusion<'a>),
 }
 
-impl Heuristic {
-    /// Whether `method` can build by it.
+impl<'a> Heuristic<'a> {
+    /// Whether `method` can build a tree over `count` primitives by it.
     ///
     /// # Errors
     /// [`Error::Argument`] names the method or the option that cannot be used, and what can.
-    pub fn check(&self, method: &HostMethod) -> Result<()> {
+    pub fn check(&self, method: &HostMethod, count: usize) -> Result<()> {
         let is_top_down = matches!(method, HostMethod::Sweep | HostMethod::Binned(_));
         if *self != Heuristic::Sah && !is_top_down {
             let error = format!("{method:?} does not build by a heuristic; take Sweep or Binned, or Heuristic::Sah");
@@ -54,29 +70,37 @@ impl Heuristic {
         match self {
             Heuristic::Sah | Heuristic::Interior(_) => Ok(()),
             Heuristic::Preferred(preferred) => preferred.check(),
+            Heuristic::Distribution(rays) => rays.check(),
+            Heuristic::Occlusion(occlusion) => occlusion.check(count),
         }
     }
 
-    /// For the scene in this box, whose lengths are scaled by `scale`.
-    pub(super) fn prepared(&self, scene: &Bounds, scale: f32) -> Prepared {
-        let scene = scene.aabb();
-        fn boxed(measure: Option<impl RayMeasure + 'static>) -> Prepared {
-            measure.map_or(Prepared::Area, |measure| Prepared::Rays(Box::new(measure)))
+    /// For a tree over `items`, whose lengths are scaled by `scale`; they lie in the box `scene`.
+    pub(super) fn prepared(&self, items: &[Item], scene: &Bounds, scale: f32) -> Prepared<'a> {
+        fn boxed<'a>(measure: impl RayMeasure + 'static) -> Prepared<'a> {
+            Prepared::Rays(Box::new(measure))
         }
-        match self {
-            Heuristic::Sah => Prepared::Area,
-            Heuristic::Interior(form) => boxed(Interior::new(*form, &scene)),
-            Heuristic::Preferred(preferred) => boxed(PreferredMeasure::new(&preferred.scaled(scale), &scene)),
-        }
+        let prepared = match self {
+            Heuristic::Sah => None,
+            Heuristic::Interior(form) => Interior::new(*form, &scene.aabb()).map(boxed),
+            Heuristic::Preferred(rays) => PreferredMeasure::new(&rays.scaled(scale), &scene.aabb()).map(boxed),
+            Heuristic::Distribution(rays) => Distribution::new(rays, scene, scale).map(Prepared::Distribution),
+            Heuristic::Occlusion(occlusion) => Seen::new(occlusion, items).map(Prepared::Occlusion),
+        };
+        prepared.unwrap_or(Prepared::Area)
     }
 }
 
 /// A heuristic made ready for a scene.
-pub(super) enum Prepared {
+pub(super) enum Prepared<'a> {
     /// The surface area; and what any other is where it knows of nothing.
     Area,
     /// A measure of rays.
     Rays(Box<dyn RayMeasure>),
+    /// A sample of rays.
+    Distribution(Distribution),
+    /// Primitives that are seen, and others.
+    Occlusion(Seen<'a>),
 }
 
 /// How many rays of a set meet a box: the whole of a heuristic that looks at nothing but the box.
