@@ -16,6 +16,8 @@
 //! once ([`Termination::Heuristic`] does).
 
 mod angle;
+#[cfg(test)]
+mod builds;
 pub mod distribution;
 mod flux;
 pub mod interior;
