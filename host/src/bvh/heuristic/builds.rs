@@ -152,6 +152,34 @@ fn what_hides_much_is_split_off_first() {
 }
 
 #[test]
+fn how_large_a_scene_is_changes_no_split() {
+    let (boxes, rays) = (boxes(500), sample(2_000));
+    // Scenes of these sizes are scaled before they are built.
+    for scale in [1.0 / (1u64 << 60) as f32, (1u64 << 60) as f32] {
+        let scaled = |v: [f32; 3]| v.map(|x| x * scale);
+        let large: Vec<Aabb> = boxes.iter().map(|b| Aabb { lo: scaled(b.lo), hi: scaled(b.hi) }).collect();
+        let large_rays: Vec<RaySegment> =
+            rays.iter().map(|ray| RaySegment { from: scaled(ray.from), t_end: ray.t_end * scale, ..*ray }).collect();
+        let of_rays = |rays| Heuristic::Distribution(RayDistribution::of(rays));
+        let large_of = |heuristic: Heuristic<'static>| match heuristic {
+            Heuristic::Preferred(rays) => Heuristic::Preferred(rays.scaled(scale)),
+            other => other,
+        };
+        let pairs = measures().into_iter().map(|heuristic| (heuristic, large_of(heuristic)));
+        for (heuristic, of_large) in pairs.chain([(of_rays(&rays), of_rays(&large_rays))]) {
+            for method in METHODS {
+                let shape = |heuristic, boxes: &[Aabb]| {
+                    let tree = tree(heuristic, boxes, &HostBvhOptions::of(method));
+                    let children = tree.nodes.iter().flat_map(|node| node.children.map(|c| (c.index, c.count)));
+                    (children.collect::<Vec<_>>(), tree.records.iter().map(|r| r.primitive).collect::<Vec<_>>())
+                };
+                assert!(shape(&heuristic, &boxes) == shape(&of_large, &large), "{scale}: {of_large:?}, {method:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_planar_scene_is_built_by_area_where_rays_begin_inside_it() {
     let flat: Vec<Aabb> = boxes(300)
         .into_iter()

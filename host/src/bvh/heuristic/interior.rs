@@ -6,7 +6,7 @@
 //! angle under which x sees N.
 //!
 //! A ray that meets a convex box has two ends of its stretch in it: each is a crossing of a face or an end of the ray. So
-//! p(N) = \[V(N) + Σ over the faces of N of ∫ M_k\] / 2V(S), where M_k is the flux ([`super::flux`]) and no integral over the scene
+//! p(N) = \[V(N) + Σ over the faces of N of ∫ M_k\] / 2V(S), where M_k is the flux (`flux.rs`) and no integral over the scene
 //! is left. The approximations of the paper are here for comparison.
 
 use super::flux::{FluxTable, Place};

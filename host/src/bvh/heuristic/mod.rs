@@ -3,8 +3,8 @@
 //!
 //! A heuristic that looks at a box alone is a *measure of rays* ([`RayMeasure`]): how many rays of a set meet the box.
 //!
-//! - [`interior`]: rays that begin anywhere in the scene; [`flux`] and [`angle`] are its arithmetic;
-//! - [`preferred`]: rays of a camera, from a point or in a direction; [`picture`] is the camera's.
+//! - [`interior`]: rays that begin anywhere in the scene;
+//! - [`preferred`]: rays of a camera, from a point or in a direction.
 //!
 //! Others know more of a node than its box:
 //!
