@@ -24,6 +24,15 @@ impl Bounds {
         Bounds { lo: Vec3A::from_array(bounds.lo), hi: Vec3A::from_array(bounds.hi) }
     }
 
+    pub fn aabb(&self) -> Aabb {
+        Aabb { lo: self.lo.to_array(), hi: self.hi.to_array() }
+    }
+
+    /// With its lengths times `scale`, a power of two.
+    pub fn scaled(self, scale: f32) -> Bounds {
+        Bounds { lo: self.lo * scale, hi: self.hi * scale }
+    }
+
     pub fn point(p: Vec3A) -> Bounds {
         Bounds { lo: p, hi: p }
     }
@@ -144,6 +153,7 @@ impl Item {
 }
 
 /// The box around them.
+#[cfg(test)]
 pub(crate) fn around(items: &[Item]) -> Bounds {
     items.iter().fold(Bounds::EMPTY, |bounds, item| bounds.union(item.bounds()))
 }

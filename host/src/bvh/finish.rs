@@ -81,7 +81,7 @@ struct Walk<'a> {
 
 impl Walk<'_> {
     fn area(&self, bounds: &Bounds) -> f32 {
-        Bounds { lo: bounds.lo * self.scale, hi: bounds.hi * self.scale }.half_area()
+        bounds.scaled(self.scale).half_area()
     }
 
     fn leaf<R: Record>(&self, records: &[R]) -> Measured {

@@ -3,20 +3,23 @@
 //! The methods are those that Frantál compares in "Ray Tracing with Bounding Volume Hierarchies on a CPU" (2019). Each gives the
 //! same bytes whatever the number of threads.
 //!
-//! A build goes through phases: `boxes` reads the primitives, `order` sorts them by code where the method wants that, `build`
-//! makes the tree, `optimise` moves subtrees, `collapse` makes leaves, and `layout` writes the tree depth first.
+//! A build goes through phases: `boxes` reads the primitives, `order` sorts them by code where the method wants that, `heuristic`
+//! makes another heuristic than the surface area ready, `build` makes the tree, `optimise` moves subtrees, `collapse` makes leaves,
+//! and `layout` writes the tree depth first.
 
 mod aac;
 pub mod binned;
 mod bonsai;
 mod bounds;
 mod finish;
+pub mod heuristic;
 mod incremental;
 mod input;
 mod insertion;
 mod order;
 mod ploc;
 pub mod sweep;
+mod top_down;
 mod topology;
 
 pub use aac::AacOptions;
@@ -31,11 +34,15 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::geometry::finite_box;
 use hedgerow::geometry::Aabb;
 use hedgerow::{Error, Result};
+pub use heuristic::Heuristic;
+use heuristic::Prepared;
+use heuristic::split_cost::{Area, ByRays, SplitCost};
 pub use incremental::{IncrementalOptions, IncrementalOrder};
 use input::Input;
 pub use insertion::{Inefficiency, InsertionOptions};
 use rayon::prelude::*;
 use std::time::Instant;
+use top_down::LeafRule;
 use topology::Topology;
 
 /// Fewer primitives than this are not worth another thread.
@@ -144,8 +151,12 @@ impl HostBvhOptions {
 pub enum Termination {
     /// Where one primitive is left: leaves are made by collapsing.
     Single,
-    /// Where a leaf is cheaper than the best split into two leaves.
+    /// Where a leaf is cheaper than the best split into two leaves, by surface area. A build by another heuristic goes on to single
+    /// primitives.
     Sah,
+    /// The same by the heuristic that the tree is built by, as van Kralingen 2023 has it (equation 5). Leaves may be huge where the
+    /// heuristic knows of no rays: to show what that does.
+    Heuristic,
 }
 
 /// What makes a tree better that is built.
@@ -174,6 +185,19 @@ pub struct Built<R: Record> {
 /// # Errors
 /// An option cannot be used: [`HostBvhOptions::check`].
 pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &HostBvhOptions) -> Result<Built<Triangle>> {
+    build_by(&Heuristic::Sah, positions, triangles, options)
+}
+
+/// The same with splits that cost what `heuristic` says, by [`HostMethod::Sweep`] or [`HostMethod::Binned`].
+///
+/// # Errors
+/// An option or the heuristic cannot be used: [`HostBvhOptions::check`], [`Heuristic::check`].
+pub fn build_by(
+    heuristic: &Heuristic<'_>,
+    positions: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    options: &HostBvhOptions,
+) -> Result<Built<Triangle>> {
     let corners = |primitive: u32| triangles[primitive as usize].map(|v| positions.get(v as usize));
     let bounds = |primitive| {
         let [Some(v0), Some(v1), Some(v2)] = corners(primitive) else { return Err(status::INDEX_OUT_OF_RANGE) };
@@ -185,7 +209,7 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &HostBvhOp
         let [v0, v1, v2] = corners(primitive).map(|v| v.expect("a triangle in the tree has vertices").map(|x| x + 0.0));
         Triangle { v0, v1, v2, primitive }
     };
-    build_of(triangles.len(), bounds, record, options)
+    build_of(triangles.len(), bounds, record, (options, heuristic))
 }
 
 /// Builds the BVH of boxes; one that is not finite or is inside out is left out.
@@ -193,12 +217,21 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &HostBvhOp
 /// # Errors
 /// As those of [`build`].
 pub fn build_aabbs(boxes: &[Aabb], options: &HostBvhOptions) -> Result<Built<BoxRecord>> {
+    build_aabbs_by(&Heuristic::Sah, boxes, options)
+}
+
+/// The same with splits that cost what `heuristic` says.
+///
+/// # Errors
+/// As those of [`build_by`].
+pub fn build_aabbs_by(heuristic: &Heuristic<'_>, boxes: &[Aabb], options: &HostBvhOptions) -> Result<Built<BoxRecord>> {
     let finite = |primitive: u32| finite_box(&boxes[primitive as usize]);
     let record = |primitive| {
         let Aabb { lo, hi } = finite(primitive).expect("a box in the tree is finite");
         BoxRecord { lo, hi, primitive }
     };
-    build_of(boxes.len(), |primitive| finite(primitive).map(|bounds| Bounds::of(&bounds)), record, options)
+    let bounds = |primitive| finite(primitive).map(|bounds| Bounds::of(&bounds));
+    build_of(boxes.len(), bounds, record, (options, heuristic))
 }
 
 /// Names the times between calls.
@@ -219,25 +252,43 @@ fn build_of<R: Record>(
     count: usize,
     bounds: impl Fn(u32) -> Result<Bounds, u32> + Sync,
     record: impl Fn(u32) -> R + Sync,
-    options: &HostBvhOptions,
+    (options, heuristic): (&HostBvhOptions, &Heuristic<'_>),
 ) -> Result<Built<R>> {
     options.check()?;
+    heuristic.check(&options.method, count)?;
     // On a thread of the pool: one outside it would wait and be woken again at every parallel step.
-    Ok(rayon::scope(|_| build_on_thread(count, &bounds, &record, options)))
+    Ok(rayon::scope(|_| build_on_thread(count, &bounds, &record, (options, heuristic))))
 }
 
 /// The tree over `items`, by their codes if the method sorted them. Both are given back before records and nodes want memory.
-fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOptions) -> Topology {
+fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOptions, by: &Prepared<'_>) -> Topology {
     let HostBvhOptions { method, collapse, termination, optimise, .. } = options;
-    // Both want leaves of one primitive.
-    let is_single = *termination == Termination::Single || !collapse.enabled || *optimise != HostOptimise::Off;
+    let is_by_area = matches!(by, Prepared::Area);
+    // All three want leaves of one primitive; and costs by a heuristic are not those that leaves are made by.
+    let single = *termination == Termination::Single
+        || !collapse.enabled
+        || *optimise != HostOptimise::Off
+        || *termination == Termination::Sah && !is_by_area;
+    let rule = LeafRule { costs: collapse, single };
     match method {
-        HostMethod::Sweep => sweep::build(&items, collapse, is_single),
-        HostMethod::Binned(options) => binned::build(items, scale, collapse, is_single, options),
-        HostMethod::Bonsai(options) => bonsai::build(items, collapse, is_single, options),
+        HostMethod::Sweep | HostMethod::Binned(_) => match by {
+            Prepared::Area => top_down(&Area, items, scale, rule, method),
+            Prepared::Rays(measure) => top_down(&ByRays(&**measure), items, scale, rule, method),
+            Prepared::Distribution(rays) => top_down(rays, items, scale, rule, method),
+            Prepared::Occlusion(seen) => top_down(seen, items, scale, rule, method),
+        },
+        HostMethod::Bonsai(options) => bonsai::build(items, collapse, single, options),
         HostMethod::Aac(options) => aac::build(&items, &codes, options),
         HostMethod::Ploc { radius } => ploc::build(&items, *radius),
         HostMethod::Incremental(options) => incremental::build(&items, options),
+    }
+}
+
+/// By a method whose splits cost what `by` says.
+fn top_down(by: &impl SplitCost, items: Vec<Item>, scale: f32, rule: LeafRule<'_>, method: &HostMethod) -> Topology {
+    match method {
+        HostMethod::Binned(options) => binned::build(by, items, scale, rule, options),
+        _ => sweep::build(by, &items, rule),
     }
 }
 
@@ -245,7 +296,7 @@ fn build_on_thread<R: Record>(
     count: usize,
     bounds: &(impl Fn(u32) -> Result<Bounds, u32> + Sync),
     record: &(impl Fn(u32) -> R + Sync),
-    options: &HostBvhOptions,
+    (options, heuristic): (&HostBvhOptions, &Heuristic<'_>),
 ) -> Built<R> {
     let HostBvhOptions { method, codes, collapse, optimise, .. } = options;
     let mut phases = Phases { since: Instant::now(), phases: Vec::new() };
@@ -256,7 +307,13 @@ fn build_on_thread<R: Record>(
         sorted = order::sort(&mut input, codes.unwrap_or_else(|| Codes::for_count(count as u32)));
         phases.end("order");
     }
-    let mut tree = topology(std::mem::take(&mut input.items), input.item_scale, sorted, options);
+    let items = std::mem::take(&mut input.items);
+    let scene = Bounds::of(&input.bounds).scaled(input.item_scale);
+    let by = heuristic.prepared(&items, &scene, input.item_scale);
+    if *heuristic != Heuristic::Sah {
+        phases.end("heuristic");
+    }
+    let mut tree = topology(items, input.item_scale, sorted, options, &by);
     phases.end("build");
     tree = match optimise {
         HostOptimise::Off => tree,

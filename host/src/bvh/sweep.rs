@@ -4,20 +4,22 @@
 //! sections 2.3.1 and 3.3.1. The orders are sorted once, before the first split: whatever the split, what is on the left keeps its
 //! order, and so does what is on the right. Slow, and what the quality of other builders is compared with.
 
-use super::bounds::{Bounds, Item};
-use super::topology::{LEAF, Topology};
-use super::{ALONE, DIVIDED_ABOVE};
-use hedgerow::bvh::layout::MAX_DEPTH;
+use super::ALONE;
+use super::bounds::Item;
+use super::heuristic::split_cost::{Area, Side, SplitCost, growing};
+use super::top_down::{self, Candidates, HALVED_FROM, LeafRule};
+use super::topology::Topology;
 use hedgerow::bvh::sah::Collapse;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// From this depth on nodes are split in the middle: 2³¹ primitives then end above [`MAX_DEPTH`].
-pub(super) const HALVED_FROM: u32 = MAX_DEPTH - 32;
-
-/// The tree over `items`, of which each counts for its weight. A node becomes a leaf where that is cheaper than its best split;
-/// with `single` it never does. The order is of positions in `items`.
+/// The tree over `items` by surface area, each counting for its weight. A node becomes a leaf where that is cheaper than its best
+/// split; with `single` it never does. The order is of positions in `items`.
 pub(super) fn positions(items: &[Item], costs: &Collapse, single: bool) -> Topology {
+    positions_by(&Area, items, LeafRule { costs, single })
+}
+
+fn positions_by(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topology {
     let count = items.len();
     let mut tree = Topology::new(count);
     if count == 0 {
@@ -35,17 +37,17 @@ pub(super) fn positions(items: &[Item], costs: &Collapse, single: bool) -> Topol
         let order: Vec<u32> = keys.into_iter().map(|key| key as u32).collect();
         (order, vec![0; count], vec![0.0; count])
     });
-    let sweep = Sweep { items, costs, single, is_left: (0..count).map(|_| AtomicBool::new(false)).collect() };
-    let axes = buffers.each_mut().map(|(order, spare, areas)| Axis { order, spare, areas });
-    sweep.subtree(axes, &mut tree.splits, 0);
+    let sweep = Sweep { items, rule, is_left: (0..count).map(|_| AtomicBool::new(false)).collect() };
+    let axes = buffers.each_mut().map(|(order, spare, weights)| Axis { order, spare, weights });
+    top_down::build(&sweep, by, axes, &mut tree.splits);
     let [(order, ..), ..] = buffers;
     tree.order = order;
     tree
 }
 
 /// The tree over the primitives of `items`.
-pub(super) fn build(items: &[Item], costs: &Collapse, single: bool) -> Topology {
-    let mut tree = positions(items, costs, single);
+pub(super) fn build(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topology {
+    let mut tree = positions_by(by, items, rule);
     tree.order.par_iter_mut().with_min_len(ALONE).for_each(|i| *i = items[*i as usize].primitive());
     tree
 }
@@ -60,15 +62,16 @@ fn ascending(x: f32) -> u32 {
 struct Axis<'a> {
     order: &'a mut [u32],
     spare: &'a mut [u32],
-    areas: &'a mut [f32],
+    /// Of what is from a place on.
+    weights: &'a mut [f32],
 }
 
 impl<'a> Axis<'a> {
     fn split_at(self, count: usize) -> (Axis<'a>, Axis<'a>) {
         let (left_order, order) = self.order.split_at_mut(count);
         let (left_spare, spare) = self.spare.split_at_mut(count);
-        let (left_areas, areas) = self.areas.split_at_mut(count);
-        (Axis { order: left_order, spare: left_spare, areas: left_areas }, Axis { order, spare, areas })
+        let (left_weights, weights) = self.weights.split_at_mut(count);
+        (Axis { order: left_order, spare: left_spare, weights: left_weights }, Axis { order, spare, weights })
     }
 
     /// Those on the left before the others, both as they were.
@@ -96,25 +99,37 @@ fn better(a: Split, b: Split) -> bool {
 
 struct Sweep<'a> {
     items: &'a [Item],
-    costs: &'a Collapse,
-    single: bool,
+    rule: LeafRule<'a>,
     /// Of each item, whether the last split has put it on the left.
     is_left: Vec<AtomicBool>,
 }
 
-impl Sweep<'_> {
-    /// Divides the items of `axes` among the subtrees whose slots are `splits`.
-    fn subtree(&self, mut axes: [Axis<'_>; 3], splits: &mut [u32], depth: u32) {
-        let Some((split, splits)) = splits.split_first_mut() else { return };
-        let count = axes[0].order.len();
-        let (axis, (cost, _, left_count), bounds, weight) = self.best_split(&mut axes);
-        let area = bounds.half_area();
-        if !self.single && self.costs.leaf_cost(area, weight) < self.costs.inner_cost(area, cost, 0.0) {
-            *split = LEAF;
-            return;
+impl Candidates for Sweep<'_> {
+    type Part<'a> = [Axis<'a>; 3];
+    /// An axis, and how many items are on the left.
+    type Split = (usize, usize);
+
+    fn best<C: SplitCost>(
+        &self,
+        by: &C,
+        here: &C::Here,
+        axes: &mut [Axis<'_>; 3],
+        depth: u32,
+    ) -> Option<(usize, usize)> {
+        let (axis, (cost, _, left_count), whole) = self.best_split(by, here, axes);
+        if self.rule.is_leaf(by.of_node(here, &whole.bounds), whole.count, cost) {
+            return None;
         }
-        let left_count = if depth >= HALVED_FROM { count / 2 } else { left_count };
-        *split = left_count as u32;
+        Some((axis, if depth >= HALVED_FROM { axes[0].order.len() / 2 } else { left_count }))
+    }
+
+    fn sides(&self, by: &impl SplitCost, axes: &[Axis<'_>; 3], split: Option<&(usize, usize)>) -> [Side; 2] {
+        let &(axis, left_count) = split.unwrap_or(&(0, axes[0].order.len()));
+        let (left, right) = axes[axis].order.split_at(left_count);
+        [left, right].map(|order| order.iter().map(|&i| self.side(by, i)).fold(Side::EMPTY, Side::union))
+    }
+
+    fn divide<'a>(&self, mut axes: Self::Part<'a>, (axis, left_count): (usize, usize)) -> (usize, [Self::Part<'a>; 2]) {
         for (at, &i) in axes[axis].order.iter().enumerate() {
             self.is_left[i as usize].store(at < left_count, Ordering::Relaxed);
         }
@@ -122,57 +137,124 @@ impl Sweep<'_> {
             axes[other].partition(&self.is_left);
         }
         let [(x0, x1), (y0, y1), (z0, z1)] = axes.map(|axis| axis.split_at(left_count));
-        let (left_splits, right_splits) = splits.split_at_mut(left_count - 1);
-        let left = || self.subtree([x0, y0, z0], left_splits, depth + 1);
-        let right = || self.subtree([x1, y1, z1], right_splits, depth + 1);
-        if count < ALONE || depth >= DIVIDED_ABOVE {
-            left();
-            right();
-        } else {
-            rayon::join(left, right);
-        }
+        (left_count, [[x0, y0, z0], [x1, y1, z1]])
     }
 
-    /// The best split and its axis, the first of equal axes; the box around all items, and their weight.
-    fn best_split(&self, axes: &mut [Axis<'_>; 3]) -> (usize, Split, Bounds, u32) {
+    /// The first of the orders already is that of the leaves.
+    fn end(&self, _axes: [Axis<'_>; 3]) {}
+}
+
+impl Sweep<'_> {
+    fn side(&self, by: &impl SplitCost, i: u32) -> Side {
+        let item = &self.items[i as usize];
+        Side::of(item, by.is_seen(item))
+    }
+
+    /// The best split and its axis, the first of equal axes; and all items.
+    fn best_split<C: SplitCost>(&self, by: &C, here: &C::Here, axes: &mut [Axis<'_>; 3]) -> (usize, Split, Side) {
         let [x, y, z] = axes;
+        let of = |axis| self.best_split_of(by, here, axis);
         let [x, y, z] = if x.order.len() < ALONE {
-            [self.best_split_of(x), self.best_split_of(y), self.best_split_of(z)]
+            [of(x), of(y), of(z)]
         } else {
-            let of = |axis| self.best_split_of(axis);
             let (x, (y, z)) = rayon::join(|| of(x), || rayon::join(|| of(y), || of(z)));
             [x, y, z]
         };
-        let (bounds, weight) = (x.1, x.2);
+        let whole = x.1;
         let best = [y.0, z.0]
             .into_iter()
             .zip(1..)
             .fold((0, x.0), |best, (split, axis)| if better(best.1, split) { (axis, split) } else { best });
-        (best.0, best.1, bounds, weight)
+        (best.0, best.1, whole)
     }
 
-    fn best_split_of(&self, axis: &mut Axis<'_>) -> (Split, Bounds, u32) {
+    fn best_split_of<C: SplitCost>(&self, by: &C, here: &C::Here, axis: &mut Axis<'_>) -> (Split, Side) {
         let count = axis.order.len();
-        let item = |i: u32| &self.items[i as usize];
-        let (mut right, mut weight) = (Bounds::EMPTY, 0);
-        for (&i, area) in axis.order.iter().zip(axis.areas.iter_mut()).rev() {
-            right = right.union(item(i).bounds());
-            weight += item(i).weight();
-            *area = right.half_area();
+        let side = |&i: &u32| self.side(by, i);
+        let mut whole = Side::EMPTY;
+        let from_right = by.of_sides(here, growing(axis.order.iter().rev().map(side)));
+        for ((weight, side), place) in from_right.zip(axis.weights.iter_mut().rev()) {
+            (*place, whole) = (weight, side);
         }
         let mut best = (f32::INFINITY, usize::MAX, 1);
-        let (mut left, mut on_left) = (Bounds::EMPTY, 0);
-        for at in 1..count {
-            let item = item(axis.order[at - 1]);
-            left = left.union(item.bounds());
-            on_left += item.weight();
-            let cost = self.costs.leaf_cost(left.half_area(), on_left)
-                + self.costs.leaf_cost(axis.areas[at], weight - on_left);
+        let from_left = by.of_sides(here, growing(axis.order[..count - 1].iter().map(side)));
+        for ((weight, left), at) in from_left.zip(1..) {
+            let costs = self.rule.costs;
+            let cost =
+                costs.leaf_cost(weight, left.count) + costs.leaf_cost(axis.weights[at], whole.count - left.count);
             let split = (cost, (2 * at).abs_diff(count), at);
             if better(best, split) {
                 best = split;
             }
         }
-        (best, right, weight)
+        (best, whole)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::bounds::tests::boxes;
+    use crate::bvh::bounds::{Bounds, around};
+    use crate::bvh::topology::LEAF;
+
+    /// The same, plainly: every split of every node is tried, with boxes made anew.
+    fn plain(items: &[Item], rule: LeafRule<'_>, tree: &mut Topology) {
+        let sorted = |axis: usize| {
+            let mut items = items.to_vec();
+            items.sort_by(|a, b| {
+                a.centroid_on(axis).total_cmp(&b.centroid_on(axis)).then(a.primitive().cmp(&b.primitive()))
+            });
+            items
+        };
+        let cost = |side: &[Item]| rule.costs.leaf_cost(around(side).half_area(), weight(side));
+        let split = |axis: usize| {
+            let items = sorted(axis);
+            let of =
+                move |at: usize| (cost(&items[..at]) + cost(&items[at..]), (2 * at).abs_diff(items.len()), axis, at);
+            (1..sorted(axis).len()).map(of).collect::<Vec<_>>()
+        };
+        let all = (0..3).flat_map(split);
+        // Of equal ones the first.
+        let best = all.reduce(|best, split| if (split.0, split.1) < (best.0, best.1) { split } else { best });
+        let is_split = best.is_some_and(|best| !rule.is_leaf(around(items).half_area(), weight(items), best.0));
+        let Some((_, _, axis, at)) = best.filter(|_| is_split) else {
+            tree.splits.extend(items.iter().skip(1).map(|_| LEAF));
+            return tree.order.extend(sorted(0).iter().map(Item::primitive));
+        };
+        tree.splits.push(at as u32);
+        let items = sorted(axis);
+        plain(&items[..at], rule, tree);
+        plain(&items[at..], rule, tree);
+    }
+
+    fn weight(items: &[Item]) -> u32 {
+        items.iter().map(Item::weight).sum()
+    }
+
+    #[test]
+    fn a_sweep_takes_the_best_of_all_splits_at_every_node() {
+        for count in [1, 2, 3, 20, 150, 400] {
+            // Some of them count twice, as in the top of a bonsai.
+            let twice = |item: Item| Item::new(item.bounds(), item.primitive(), 1 + item.primitive() % 5 / 4);
+            for items in [boxes(count), boxes(count).into_iter().map(twice).collect()] {
+                for single in [false, true] {
+                    let rule = LeafRule { costs: &Collapse::SAH, single };
+                    let mut expected = Topology { order: Vec::new(), splits: Vec::new() };
+                    plain(&items, rule, &mut expected);
+                    let found = build(&Area, &items, rule);
+                    assert_eq!(found.splits, expected.splits, "{count} boxes, {single}");
+                    assert_eq!(found.order, expected.order, "{count} boxes, {single}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_in_one_place_are_halved() {
+        let one = Bounds { lo: glam::Vec3A::ZERO, hi: glam::Vec3A::ONE };
+        let items: Vec<Item> = (0..64).map(|i| Item::new(one, i, 1)).collect();
+        let tree = build(&Area, &items, LeafRule { costs: &Collapse::SAH, single: true });
+        assert_eq!((tree.splits[0], tree.splits[1], tree.splits[32]), (32, 16, 16));
     }
 }
