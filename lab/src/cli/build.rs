@@ -56,7 +56,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     };
     let (outcomes, all_right) = work::measured(common, &scene, device.as_ref(), &plan);
     if let Some(path) = &arguments.output {
-        let mut subject = builders[0].make(device.as_ref(), &scene.mesh)?;
+        let mut subject = builders[0].make_for(device.as_ref(), &scene)?;
         subject.build()?;
         let Some(bytes) = subject.bytes()? else {
             bail!("the structure of {} is the driver's own and cannot be written; choose another builder", builders[0]);

@@ -49,7 +49,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let builders = std::slice::from_ref(&arguments.builder);
     let device = work::device_for(common, builders)?;
     let bar = Bar::new(common, "building", 0);
-    let mut subject = arguments.builder.make(device.as_ref(), &scene.mesh)?;
+    let mut subject = arguments.builder.make_for(device.as_ref(), &scene)?;
     arguments.view.check(subject.as_ref())?;
     subject.build()?;
     bar.say("tracing");

@@ -4,6 +4,7 @@ use super::host_build::{BuildThreads, HeapPeak};
 use super::host_rays::{HostRays, timed};
 #[cfg(feature = "peer-embree")]
 use super::peers::{embree, embree_tree::EmbreeTrees};
+use super::taught::Taught;
 use super::{BuildRun, Subject};
 use crate::Result;
 use crate::measure::overlap::{self, Epo};
@@ -81,6 +82,7 @@ pub struct Host<'a> {
     builder: String,
     mesh: &'a Mesh,
     plan: HostPlan,
+    taught: Taught,
     threads: BuildThreads,
     #[cfg(feature = "peer-embree")]
     embree: Option<EmbreeTrees>,
@@ -90,11 +92,15 @@ pub struct Host<'a> {
 }
 
 impl<'a> Host<'a> {
-    /// On `mesh`.
+    /// On `mesh`, by what it was taught.
     ///
     /// # Errors
-    /// The system does not start as many threads as the builder asks for, or Embree does not start.
-    pub fn new(builder: &str, mesh: &'a Mesh, plan: HostPlan) -> Result<Host<'a>> {
+    /// The system does not start as many threads as the builder asks for, or Embree does not start; the builder cannot use what it was
+    /// taught.
+    pub fn new(builder: &str, mesh: &'a Mesh, plan: HostPlan, taught: Taught) -> Result<Host<'a>> {
+        if let HostPlan::Built { options, .. } = &plan {
+            taught.heuristic().check(&options.method, mesh.triangles.len())?;
+        }
         let threads = BuildThreads::new(plan.own_threads())?;
         let (builder, peak, rays) = (builder.to_owned(), HeapPeak::default(), HostRays::default());
         Ok(Host {
@@ -106,6 +112,7 @@ impl<'a> Host<'a> {
             builder,
             mesh,
             plan,
+            taught,
             threads,
             peak,
             tree: None,
@@ -125,10 +132,11 @@ impl<'a> Host<'a> {
             self.tree = Some(tree?);
             return Ok(run);
         }
-        let (mesh, plan, threads) = (self.mesh, self.plan, &self.threads);
+        let (mesh, plan, threads, heuristic) = (self.mesh, self.plan, &self.threads, self.taught.heuristic());
         let build = || match plan {
             HostPlan::Built { options, .. } => {
-                let built = bvh::build(&mesh.positions, &mesh.triangles, &options).expect("checked with the spec");
+                let built = bvh::build_by(&heuristic, &mesh.positions, &mesh.triangles, &options);
+                let built = built.expect("checked when it was made");
                 let phases = built.phases.into_iter().map(|(name, milliseconds)| Phase { name, milliseconds });
                 (built.tree, BuildRun::of(phases.collect()))
             }

@@ -16,6 +16,7 @@ pub mod levels;
 pub mod peers;
 pub mod retraced;
 pub mod structures;
+pub mod taught;
 pub mod wide;
 
 use crate::Result;

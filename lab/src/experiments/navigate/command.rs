@@ -44,7 +44,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let (mut shaded, mut trees) = (None, Vec::new());
     for builder in builders {
         bar.say(&builder.to_string());
-        let mut subject = builder.make(device.as_ref(), &scene.mesh)?;
+        let mut subject = builder.make_for(device.as_ref(), &scene)?;
         subject.build()?;
         trees.push(Tree::of(&scene, subject.as_mut(), &options)?);
         if shaded.is_none() {

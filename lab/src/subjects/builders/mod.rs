@@ -20,8 +20,9 @@ use super::peers::embree::Embree;
 #[cfg(feature = "peer-obvhs")]
 use super::peers::obvhs::Obvhs;
 use super::retraced::{Retraced, TreeTracer};
+use super::taught::Taught;
 use crate::device::Device;
-use crate::scene::Mesh;
+use crate::scene::{Mesh, Scene};
 use crate::{Error, Result};
 use options::{RAYS, TRACE, TRAVERSAL};
 pub(crate) use plan::BuilderPlan;
@@ -81,17 +82,30 @@ impl Spec {
         (self.builder().plan)(self)
     }
 
-    /// The subject: the builder on a scene, with everything uploaded that is uploaded once.
+    /// The subject: the builder on a mesh, with everything uploaded that is uploaded once.
     ///
     /// # Errors
-    /// The device is missing or lacks something, or there is too little memory.
+    /// The device is missing or lacks something, or there is too little memory; the builder learns from a camera or from rays
+    /// ([`Spec::make_for`]).
     pub fn make<'a>(&self, device: Option<&'a Device>, mesh: &'a Mesh) -> Result<Box<dyn Subject + 'a>> {
+        self.made(device, mesh, self.heuristic()?.taught(None)?)
+    }
+
+    /// The same on the mesh of a scene, of whose camera and rays it may learn.
+    ///
+    /// # Errors
+    /// Those of [`Spec::make`].
+    pub fn make_for<'a>(&self, device: Option<&'a Device>, scene: &'a Scene) -> Result<Box<dyn Subject + 'a>> {
+        self.made(device, &scene.mesh, self.heuristic()?.taught(Some(scene))?)
+    }
+
+    fn made<'a>(&self, device: Option<&'a Device>, mesh: &'a Mesh, taught: Taught) -> Result<Box<dyn Subject + 'a>> {
         let given =
             || device.ok_or_else(|| Error::NoVulkan("this builder works on a device, and none was opened".into()));
         let name = self.to_string();
         let subject: Box<dyn Subject + 'a> = match self.plan()? {
             BuilderPlan::Device(plan) => Box::new(plan.make(given()?, &name, mesh)?),
-            BuilderPlan::Host(plan) => Box::new(Host::new(&name, mesh, plan)?),
+            BuilderPlan::Host(plan) => Box::new(Host::new(&name, mesh, plan, taught)?),
             BuilderPlan::Kd(KdSpec::Host { options, traversal, traces_on_device }) => {
                 let rays = match traces_on_device {
                     false => KdRays::on_host(traversal),
@@ -159,6 +173,7 @@ impl FromStr for Spec {
         }
         spec.plan()?;
         spec.tracer()?;
+        spec.heuristic()?;
         Ok(spec)
     }
 }

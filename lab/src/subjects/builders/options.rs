@@ -3,9 +3,12 @@
 use super::plan::{BuilderPlan, DevicePlan, KdSpec};
 use super::table::{BUILDERS, BuilderEntry};
 use super::{BuilderOption, Spec};
+use crate::rays::kinds::RayKind;
+use crate::rays::sample;
 use crate::subjects::auto;
 use crate::subjects::host::{HostPlan, TwinPlan};
 use crate::subjects::retraced::TreeTracer;
+use crate::subjects::taught::{CameraRays, HeuristicSpec};
 use crate::{Error, Result};
 use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
 use hedgerow::bvh::child_order::ChildOrder;
@@ -19,6 +22,7 @@ use hedgerow::kdtree::termination::Costs;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::wide::Order;
 use hedgerow_host::bvh::binned::{BinnedAxes, BinnedOptions, Bins};
+use hedgerow_host::bvh::heuristic::InteriorForm;
 use hedgerow_host::bvh::{
     AacOptions, BonsaiOptions, HostBvhOptions, HostMethod, HostOptimise, IncrementalOptions, IncrementalOrder,
     Inefficiency, InsertionOptions, Termination,
@@ -44,10 +48,27 @@ pub(super) const WIDTH: BuilderOption = option("width", "2, 4, 8 or 8q (quantise
 pub(super) const ORDER: BuilderOption = option("order", "distance or octant (of width=8q)");
 pub(super) const TERMINATION: BuilderOption =
     option("termination", "sah, or off: leaves of one triangle, then collapsed");
+pub(super) const TERMINATION_BY: BuilderOption = option(
+    "termination",
+    "sah, off: leaves of one triangle, then collapsed, or heuristic: a leaf where the heuristic finds it cheaper",
+);
 pub(super) const TERMINATION_FLAT: BuilderOption = option(
     "termination",
-    "sah, or off: leaves of one triangle, then collapsed, or flat: also a leaf where centroids are in a plane along the axes",
+    "sah, off: leaves of one triangle, then collapsed, heuristic: a leaf where the heuristic finds it cheaper, or flat: also a leaf \
+     where centroids are in a plane along the axes",
 );
+pub(super) const HEURISTIC: BuilderOption = option(
+    "heuristic",
+    "sah, interior, interior-hq, interior-fast, perspective, parallel, spherical, rdh or osah: what splits cost; leaves are made by sah",
+);
+pub(super) const TEACHING_RAYS: BuilderOption = option(
+    "rays",
+    "all, or kinds of rays with + between: those that rdh and osah learn from; primary+shadow+ao+diffuse1+diffuse2 unless given",
+);
+pub(super) const SAMPLE: BuilderOption =
+    option("sample", "a number of rays from 0 to 100000000 that rdh learns from, at most; 262144 unless given");
+pub(super) const WEIGHT: BuilderOption =
+    option("weight", "a number from 0 to 1: what cameras and rays weigh beside the area; 0.9 unless given");
 pub(super) const LEAF: BuilderOption = option("leaf", "a number of triangles from 1 to 255 that always are a leaf");
 pub(super) const AXES: BuilderOption = option("axes", "longest or all");
 pub(super) const HOST_BINS: BuilderOption =
@@ -241,9 +262,15 @@ impl Spec {
 
     /// Options `codes`, `termination`, `collapse`, `optimise` and `threads` of a builder of BVHs on the host.
     pub(super) fn on_host(&self, method: HostMethod) -> Result<BuilderPlan> {
-        let all = [("off", Termination::Single), ("sah", Termination::Sah), ("flat", Termination::Sah)];
+        let all = [
+            ("off", Termination::Single),
+            ("sah", Termination::Sah),
+            ("heuristic", Termination::Heuristic),
+            ("flat", Termination::Sah),
+        ];
         let (option, known) = match method {
             HostMethod::Binned(_) => (&TERMINATION_FLAT, &all[..]),
+            HostMethod::Sweep => (&TERMINATION_BY, &all[..3]),
             _ => (&TERMINATION, &all[..2]),
         };
         let termination = self.choice(option, known)?.unwrap_or(Termination::Sah);
@@ -253,6 +280,33 @@ impl Spec {
         options.check()?;
         let threads = self.within(&THREADS, NonZeroU32::MIN..=MOST_THREADS)?;
         Ok(BuilderPlan::Host(HostPlan::Built { options, threads }))
+    }
+
+    /// Options `heuristic`, `rays`, `sample` and `weight`.
+    pub(super) fn heuristic(&self) -> Result<HeuristicSpec> {
+        let kinds = match self.option(TEACHING_RAYS.key).filter(|_| self.builder().takes(HEURISTIC.key)) {
+            None => sample::FRAME.to_vec(),
+            Some("all") => RayKind::ALL.to_vec(),
+            Some(kinds) => {
+                let of_name = |name: &str| name.parse().map_err(|_| self.wrong_value(&TEACHING_RAYS, kinds));
+                kinds.split('+').map(of_name).collect::<Result<_>>()?
+            }
+        };
+        let most = self.within(&SAMPLE, 0..=100_000_000)?.unwrap_or(sample::MOST);
+        let weight = self.within(&WEIGHT, 0.0..=1.0)?.unwrap_or(0.9);
+        let camera = |rays| HeuristicSpec::Camera { rays, weight };
+        Ok(match self.option(HEURISTIC.key) {
+            None | Some("sah") => HeuristicSpec::Sah,
+            Some("interior") => HeuristicSpec::Interior(InteriorForm::Exact),
+            Some("interior-hq") => HeuristicSpec::Interior(InteriorForm::HighQuality),
+            Some("interior-fast") => HeuristicSpec::Interior(InteriorForm::Fast),
+            Some("perspective") => camera(CameraRays::Perspective),
+            Some("parallel") => camera(CameraRays::Parallel),
+            Some("spherical") => camera(CameraRays::Spherical),
+            Some("rdh") => HeuristicSpec::Distribution { kinds, most, weight },
+            Some("osah") => HeuristicSpec::Occlusion { kinds, weight },
+            Some(other) => return Err(self.wrong_value(&HEURISTIC, other)),
+        })
     }
 
     /// Options `batch`, `order` and `search`, and those of every builder on the host.

@@ -1,9 +1,10 @@
 //! The list of all builders.
 
 use super::options::{
-    ANY_HIT, AXES, BATCH, BINS, BITS, CODES, COLLAPSE, DELTA, EPSILON, EXACT, HOST_BINS, HOST_OPTIMISE, INSERT_ORDER,
-    KD_SCHEDULE, KI, KT, LEAF, MINI, OPTIMISE, ORDER, PRUNE, RADIUS, RAYS, SCHEDULE, SEARCH, SPLIT, TERMINATION,
-    TERMINATION_FLAT, THREADS, TRACE, TRACE_TREE, TRAVERSAL, TREELET, WIDTH, WINDOW, WORKGROUPS,
+    ANY_HIT, AXES, BATCH, BINS, BITS, CODES, COLLAPSE, DELTA, EPSILON, EXACT, HEURISTIC, HOST_BINS, HOST_OPTIMISE,
+    INSERT_ORDER, KD_SCHEDULE, KI, KT, LEAF, MINI, OPTIMISE, ORDER, PRUNE, RADIUS, RAYS, SAMPLE, SCHEDULE, SEARCH,
+    SPLIT, TEACHING_RAYS, TERMINATION, TERMINATION_BY, TERMINATION_FLAT, THREADS, TRACE, TRACE_TREE, TRAVERSAL,
+    TREELET, WEIGHT, WIDTH, WINDOW, WORKGROUPS,
 };
 use super::{BuilderPlan, Spec};
 use crate::Result;
@@ -148,9 +149,21 @@ pub static BUILDERS: &[BuilderEntry] = &[
     on_host(&"sweep", "full-sweep SAH on the host: the reference for the quality of the others", |spec| {
         spec.on_host(HostMethod::Sweep)
     })
-    .taking(&[COLLAPSE, HOST_OPTIMISE, TERMINATION, THREADS]),
+    .taking(&[HEURISTIC, TEACHING_RAYS, SAMPLE, WEIGHT, TERMINATION_BY, COLLAPSE, HOST_OPTIMISE, THREADS]),
     on_host(&"binned", "binned SAH on the host: the best of the planes between bins, top-down", Spec::binned)
-        .taking(&[HOST_BINS, LEAF, AXES, TERMINATION_FLAT, COLLAPSE, HOST_OPTIMISE, THREADS])
+        .taking(&[
+            HOST_BINS,
+            LEAF,
+            AXES,
+            HEURISTIC,
+            TEACHING_RAYS,
+            SAMPLE,
+            WEIGHT,
+            TERMINATION_FLAT,
+            COLLAPSE,
+            HOST_OPTIMISE,
+            THREADS,
+        ])
         .in_variants(&["binned", "binned:axes=all"]),
     on_host(&"bonsai", "sweeps over parts of 512 triangles on the host, and one over their trees", |spec| {
         spec.bonsai(BonsaiOptions::PLAIN)

@@ -1,0 +1,106 @@
+//! Rays that teach a builder: a sample of what a frame traces, and what it sees. They are never those that are measured: their seed is
+//! their own.
+
+use super::kinds::{self, RayKind, RayOptions};
+use crate::Result;
+use crate::scene::Scene;
+use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::trace::twin::tracer;
+use hedgerow::trace::{Hit, Ray};
+use hedgerow_host::bvh::heuristic::RaySegment;
+use rayon::prelude::*;
+
+/// What a frame of a renderer traces.
+pub const FRAME: [RayKind; 5] = [RayKind::Primary, RayKind::Shadow, RayKind::Ao, RayKind::Diffuse1, RayKind::Diffuse2];
+/// Rays of a sample, at most, unless another number is given.
+pub const MOST: usize = 1 << 18;
+/// Pixels of the picture that a sample is of.
+const SAMPLED: [u32; 2] = [320, 180];
+/// Pixels of the picture that shows what is seen.
+const SEEN: [u32; 2] = [640, 480];
+/// No command draws its rays with this one.
+const SEED: u64 = 0x7465_6163_6865_7273;
+
+/// The rays of these kinds with their hits, kind by kind.
+fn traced(scene: &Scene, kinds: &[RayKind], size: [u32; 2]) -> Result<Vec<(Ray, Hit)>> {
+    let mesh = &scene.mesh;
+    let tree = lbvh::build(&mesh.positions, &mesh.triangles, Code::Mc63.full(), Collapse::SAH);
+    let closest = |rays: &[Ray]| -> Vec<Hit> { rays.par_iter().map(|ray| tracer::closest_hit(&tree, ray)).collect() };
+    let options = RayOptions { size, seed: SEED };
+    let mut all = Vec::new();
+    for &kind in kinds {
+        let rays = kinds::generate(kind, scene, &options, &mut |rays| Ok(closest(rays)))?;
+        let hits = closest(&rays);
+        all.extend(rays.into_iter().zip(hits));
+    }
+    Ok(all)
+}
+
+/// At most `most` rays of a frame of these kinds, each from its origin to where it ends; every so many, so that each kind and each part
+/// of the picture keeps its share.
+///
+/// # Errors
+/// The scene has no triangles.
+pub fn segments(scene: &Scene, kinds: &[RayKind], most: usize) -> Result<Vec<RaySegment>> {
+    if most == 0 {
+        return Ok(Vec::new());
+    }
+    let all = traced(scene, kinds, SAMPLED)?;
+    let stride = all.len().div_ceil(most).max(1);
+    let segment = |(ray, hit): &(Ray, Hit)| RaySegment {
+        from: ray.origin,
+        direction: ray.direction,
+        t_end: if hit.is_some() { hit.t } else { ray.t_max },
+        weight: stride as f32,
+    };
+    Ok(all.iter().step_by(stride).map(segment).collect())
+}
+
+/// Of each triangle, whether a ray of a frame of these kinds ends on it.
+///
+/// # Errors
+/// The scene has no triangles.
+pub fn seen(scene: &Scene, kinds: &[RayKind]) -> Result<Vec<bool>> {
+    let mut seen = vec![false; scene.mesh.triangles.len()];
+    for (_, hit) in traced(scene, kinds, SEEN)?.iter().filter(|(_, hit)| hit.is_some()) {
+        seen[hit.primitive as usize] = true;
+    }
+    Ok(seen)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{LoadOptions, load};
+
+    fn scene(name: &str) -> Scene {
+        load(name, &LoadOptions::default()).expect("a generator")
+    }
+
+    #[test]
+    fn a_sample_is_as_large_as_asked_for_and_stands_for_all_rays() {
+        let scene = scene("gen:stadium:3");
+        let all = segments(&scene, &FRAME, usize::MAX).expect("rays");
+        assert!(all.len() > 2000 && all.iter().all(|segment| segment.weight == 1.0));
+        let few = segments(&scene, &FRAME, 1000).expect("rays");
+        assert!((500..=1000).contains(&few.len()), "{} rays", few.len());
+        let weight: f32 = few.iter().map(|segment| segment.weight).sum();
+        assert!((weight / all.len() as f32 - 1.0).abs() < 0.01, "{weight} of {}", all.len());
+        assert!(segments(&scene, &FRAME, 0).expect("none").is_empty());
+    }
+
+    #[test]
+    fn segments_end_where_rays_hit_and_what_they_end_on_is_seen() {
+        let scene = scene("gen:icosphere:3");
+        let primary = segments(&scene, &[RayKind::Primary], usize::MAX).expect("rays");
+        assert_eq!(primary.len(), 320 * 180);
+        let ended = primary.iter().filter(|segment| segment.t_end.is_finite()).count();
+        assert!((1000..56_000).contains(&ended), "{ended} rays end on the sphere");
+        // Of a closed sphere the camera sees less than half.
+        let seen = seen(&scene, &[RayKind::Primary]).expect("rays").into_iter().filter(|&seen| seen).count();
+        let triangles = scene.mesh.triangles.len();
+        assert!((triangles / 8..triangles / 2).contains(&seen), "{seen} of {triangles} triangles");
+    }
+}

@@ -1,0 +1,117 @@
+//! What a builder on the host is taught by: nothing but areas, a scene's camera, or rays that were traced before.
+
+use crate::rays::kinds::{Basis, RayKind};
+use crate::rays::sample;
+use crate::scene::Scene;
+use crate::{Error, Result};
+use hedgerow_host::bvh::heuristic::{
+    Heuristic, InteriorForm, Occlusion, Pinhole, Preferred, PreferredRays, RayDistribution, RaySegment,
+};
+
+/// A heuristic as a spec names it, before a scene is known.
+#[derive(Debug, Clone, PartialEq)]
+pub enum HeuristicSpec {
+    /// The surface area.
+    Sah,
+    /// Rays from anywhere in the scene.
+    Interior(InteriorForm),
+    /// The scene's camera.
+    Camera {
+        /// Which rays of it.
+        rays: CameraRays,
+        /// Their weight beside the area.
+        weight: f32,
+    },
+    /// A sample of rays, by which of them meet a box.
+    Distribution {
+        /// Their kinds.
+        kinds: Vec<RayKind>,
+        /// How many, at most.
+        most: usize,
+        /// Their weight beside the area, where there are many.
+        weight: f32,
+    },
+    /// A frame, by the triangles that are seen.
+    Occlusion {
+        /// The kinds of its rays.
+        kinds: Vec<RayKind>,
+        /// The weight of what is seen beside the area.
+        weight: f32,
+    },
+}
+
+/// Rays of a camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CameraRays {
+    /// Those through the pixels of its picture.
+    Perspective,
+    /// All that go where it looks.
+    Parallel,
+    /// All that begin where it is.
+    Spherical,
+}
+
+/// The width over the height of the picture that a camera teaches by.
+const ASPECT: f32 = 4.0 / 3.0;
+
+/// The same with what the scene gives.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Taught {
+    /// What needs nothing of the scene but its box, or a camera.
+    Box(Heuristic<'static>),
+    /// Rays, and their weight.
+    Rays(Vec<RaySegment>, f32),
+    /// Of each triangle whether it is seen, and the weight of that.
+    Seen(Vec<bool>, f32),
+}
+
+impl HeuristicSpec {
+    /// With the camera and the rays of `scene`; `None` where there is nothing but a mesh.
+    ///
+    /// # Errors
+    /// The heuristic needs more than a mesh; the scene has no triangles.
+    pub fn taught(&self, scene: Option<&Scene>) -> Result<Taught> {
+        let scene = || {
+            let what = "this heuristic learns from a camera or from rays, and there is only a mesh here; take bench, \
+                        build, trace, render or cpu-builders, or heuristic=sah or interior";
+            scene.ok_or_else(|| Error::Argument(what.into()))
+        };
+        Ok(match self {
+            HeuristicSpec::Sah => Taught::Box(Heuristic::Sah),
+            HeuristicSpec::Interior(form) => Taught::Box(Heuristic::Interior(*form)),
+            HeuristicSpec::Camera { rays, weight } => {
+                let rays = rays_of(*rays, scene()?);
+                Taught::Box(Heuristic::Preferred(Preferred { rays, weight: *weight }))
+            }
+            HeuristicSpec::Distribution { kinds, most, weight } => {
+                Taught::Rays(sample::segments(scene()?, kinds, *most)?, *weight)
+            }
+            HeuristicSpec::Occlusion { kinds, weight } => Taught::Seen(sample::seen(scene()?, kinds)?, *weight),
+        })
+    }
+}
+
+fn rays_of(rays: CameraRays, scene: &Scene) -> PreferredRays {
+    let camera = &scene.camera;
+    match rays {
+        CameraRays::Perspective => {
+            let (eye, look, up, fov) = (camera.eye, camera.look, camera.up, camera.fov);
+            PreferredRays::Perspective(Pinhole { eye, look, up, fov, aspect: ASPECT })
+        }
+        CameraRays::Parallel => PreferredRays::Parallel(Basis::of(camera, [4, 3]).forward.as_vec3().to_array()),
+        CameraRays::Spherical => PreferredRays::Spherical(camera.eye),
+    }
+}
+
+impl Taught {
+    /// What the builder takes.
+    pub fn heuristic(&self) -> Heuristic<'_> {
+        match self {
+            Taught::Box(heuristic) => *heuristic,
+            Taught::Rays(segments, weight) => {
+                Heuristic::Distribution(RayDistribution { weight: *weight, ..RayDistribution::of(segments) })
+            }
+            Taught::Seen(seen, weight) => Heuristic::Occlusion(Occlusion { weight: *weight, ..Occlusion::of(seen) }),
+        }
+    }
+}
