@@ -14,6 +14,7 @@ mod finish;
 mod incremental;
 mod input;
 mod insertion;
+pub mod optimal;
 mod order;
 mod ploc;
 pub mod sweep;
@@ -34,6 +35,7 @@ use hedgerow::{Error, Result};
 pub use incremental::{IncrementalOptions, IncrementalOrder};
 use input::Input;
 pub use insertion::{Inefficiency, InsertionOptions};
+pub use optimal::top::TopOptions;
 use rayon::prelude::*;
 use std::time::Instant;
 use topology::Topology;
@@ -135,6 +137,7 @@ impl HostBvhOptions {
         match &self.optimise {
             HostOptimise::Off | HostOptimise::Reinsertion(_) => Ok(()),
             HostOptimise::Insertion(options) => options.check(),
+            HostOptimise::Top(options) => options.check(),
         }
     }
 }
@@ -157,6 +160,8 @@ pub enum HostOptimise {
     Reinsertion(ReinsertionOptions),
     /// Insertion-based optimisation: slow, and the best there is for a tree of any builder.
     Insertion(InsertionOptions),
+    /// The cheapest top by planes over the largest subtrees.
+    Top(TopOptions),
 }
 
 /// A tree, and how its build went.
@@ -194,11 +199,14 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &HostBvhOp
 /// As those of [`build`].
 pub fn build_aabbs(boxes: &[Aabb], options: &HostBvhOptions) -> Result<Built<BoxRecord>> {
     let finite = |primitive: u32| finite_box(&boxes[primitive as usize]);
-    let record = |primitive| {
-        let Aabb { lo, hi } = finite(primitive).expect("a box in the tree is finite");
-        BoxRecord { lo, hi, primitive }
-    };
+    let record = |primitive| box_record(boxes, primitive);
     build_of(boxes.len(), |primitive| finite(primitive).map(|bounds| Bounds::of(&bounds)), record, options)
+}
+
+/// The record of a box that is finite.
+fn box_record(boxes: &[Aabb], primitive: u32) -> BoxRecord {
+    let Aabb { lo, hi } = finite_box(&boxes[primitive as usize]).expect("a box in the tree is finite");
+    BoxRecord { lo, hi, primitive }
 }
 
 /// Names the times between calls.
@@ -241,6 +249,15 @@ fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOpti
     }
 }
 
+/// The items of a tree from left to right.
+fn items_of(tree: &Topology, bounds: &(impl Fn(u32) -> Result<Bounds, u32> + Sync), scale: f32) -> Vec<Item> {
+    let item = |&primitive: &u32| {
+        let bounds = bounds(primitive).expect("a primitive in the tree has a box");
+        Item::new(bounds, primitive, 1).scaled(scale)
+    };
+    tree.order.par_iter().with_min_len(ALONE).map(item).collect()
+}
+
 fn build_on_thread<R: Record>(
     count: usize,
     bounds: &(impl Fn(u32) -> Result<Bounds, u32> + Sync),
@@ -269,12 +286,12 @@ fn build_on_thread<R: Record>(
             Topology::of_tree(&tree.reinserted(options))
         }
         HostOptimise::Insertion(options) => {
-            let item = |&primitive: &u32| {
-                let bounds = bounds(primitive).expect("a primitive in the tree has a box");
-                Item::new(bounds, primitive, 1).scaled(input.item_scale)
-            };
-            let items: Vec<Item> = tree.order.par_iter().with_min_len(ALONE).map(item).collect();
+            let items = items_of(&tree, bounds, input.item_scale);
             insertion::optimise(tree, &items, collapse, options)
+        }
+        HostOptimise::Top(options) => {
+            let items = items_of(&tree, bounds, input.item_scale);
+            optimal::top::optimise(tree, &items, collapse, options)
         }
     };
     if *optimise != HostOptimise::Off {
