@@ -1,7 +1,8 @@
 //! BVHs built on the CPU: top-down, bottom-up and by insertion, on all threads of the rayon pool that [`build`] is called in.
 //!
-//! The methods are those that Frantál compares in "Ray Tracing with Bounding Volume Hierarchies on a CPU" (2019). Each gives the
-//! same bytes whatever the number of threads.
+//! The methods are those that Frantál compares in "Ray Tracing with Bounding Volume Hierarchies on a CPU" (2019), and `sbvh`, which
+//! splits triangles. Each gives the same bytes whatever the number of threads. What the cheapest tree over a few boxes would cost
+//! is in [`optimal`].
 //!
 //! A build goes through phases: `boxes` reads the primitives, `order` sorts them by code where the method wants that, `build`
 //! makes the tree, `optimise` moves subtrees, `collapse` makes leaves, and `layout` writes the tree depth first.
@@ -17,6 +18,7 @@ mod insertion;
 pub mod optimal;
 mod order;
 mod ploc;
+mod sbvh;
 pub mod sweep;
 mod topology;
 
@@ -37,6 +39,7 @@ use input::Input;
 pub use insertion::{Inefficiency, InsertionOptions};
 pub use optimal::top::TopOptions;
 use rayon::prelude::*;
+pub use sbvh::SbvhOptions;
 use std::time::Instant;
 use topology::Topology;
 
@@ -63,6 +66,8 @@ pub enum HostMethod {
     },
     /// One primitive after the other is put where it costs least.
     Incremental(IncrementalOptions),
+    /// The best of the planes between bins, top-down, of objects or of space: triangles are split. Boxes that are no triangles are not.
+    Sbvh(SbvhOptions),
 }
 
 impl HostMethod {
@@ -133,6 +138,7 @@ impl HostBvhOptions {
             HostMethod::Binned(options) => options.check(),
             HostMethod::Bonsai(options) => options.check(),
             HostMethod::Incremental(options) => options.check(),
+            HostMethod::Sbvh(options) => options.check(),
         }?;
         match &self.optimise {
             HostOptimise::Off | HostOptimise::Reinsertion(_) => Ok(()),
@@ -234,28 +240,33 @@ fn build_of<R: Record>(
     Ok(rayon::scope(|_| build_on_thread(count, &bounds, &record, options)))
 }
 
+impl HostBvhOptions {
+    /// Whether leaves have one primitive when the tree is built: those that make it better, and other leaves later, want that.
+    fn is_single(&self) -> bool {
+        self.termination == Termination::Single || !self.collapse.enabled || self.optimise != HostOptimise::Off
+    }
+}
+
 /// The tree over `items`, by their codes if the method sorted them. Both are given back before records and nodes want memory.
 fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOptions) -> Topology {
-    let HostBvhOptions { method, collapse, termination, optimise, .. } = options;
-    // Both want leaves of one primitive.
-    let is_single = *termination == Termination::Single || !collapse.enabled || *optimise != HostOptimise::Off;
-    match method {
+    let (collapse, is_single) = (&options.collapse, options.is_single());
+    match &options.method {
         HostMethod::Sweep => sweep::build(&items, collapse, is_single),
         HostMethod::Binned(options) => binned::build(items, scale, collapse, is_single, options),
         HostMethod::Bonsai(options) => bonsai::build(items, collapse, is_single, options),
         HostMethod::Aac(options) => aac::build(&items, &codes, options),
         HostMethod::Ploc { radius } => ploc::build(&items, *radius),
         HostMethod::Incremental(options) => incremental::build(&items, options),
+        HostMethod::Sbvh(_) => unreachable!("its tree is over references"),
     }
 }
 
-/// The items of a tree from left to right.
-fn items_of(tree: &Topology, bounds: &(impl Fn(u32) -> Result<Bounds, u32> + Sync), scale: f32) -> Vec<Item> {
-    let item = |&primitive: &u32| {
-        let bounds = bounds(primitive).expect("a primitive in the tree has a box");
-        Item::new(bounds, primitive, 1).scaled(scale)
-    };
-    tree.order.par_iter().with_min_len(ALONE).map(item).collect()
+/// What the numbers in a tree's order stand for.
+enum Numbered {
+    /// Primitives.
+    Primitives,
+    /// References to them, of which there may be several to one.
+    References(Vec<Item>),
 }
 
 fn build_on_thread<R: Record>(
@@ -273,35 +284,84 @@ fn build_on_thread<R: Record>(
         sorted = order::sort(&mut input, codes.unwrap_or_else(|| Codes::for_count(count as u32)));
         phases.end("order");
     }
-    let mut tree = topology(std::mem::take(&mut input.items), input.item_scale, sorted, options);
+    let bounds = |primitive: u32| bounds(primitive).expect("a primitive in the tree has a box");
+    let items = std::mem::take(&mut input.items);
+    let (mut tree, numbered) = match method {
+        HostMethod::Sbvh(of_sbvh) => {
+            let corners = |primitive| record(primitive).corners();
+            let scene = sbvh::Scene { corners, bounds, around: &input.bounds, scale: input.item_scale };
+            let sbvh::SplitTree { tree, references, is_split } =
+                sbvh::build(items, &scene, collapse, options.is_single(), of_sbvh);
+            input.refer(references.len(), is_split);
+            (tree, Numbered::References(references))
+        }
+        _ => (topology(items, input.item_scale, sorted, options), Numbered::Primitives),
+    };
     phases.end("build");
-    tree = match optimise {
+    if *optimise != HostOptimise::Off {
+        tree = match &numbered {
+            Numbered::Primitives => optimised(tree, &mut input, bounds, options),
+            Numbered::References(references) => {
+                optimised(tree, &mut input, |number| references[number as usize].bounds(), options)
+            }
+        };
+        phases.end("optimise");
+    }
+    let tree = match numbered {
+        Numbered::Primitives => {
+            let records = finish::records(&tree.order, record);
+            phases.end("records");
+            let collapsed = finish::collapse(&mut tree, &records, collapse, input.scale);
+            phases.end("collapse");
+            finish::layout(&input, &tree, &collapsed, records)
+        }
+        Numbered::References(references) => {
+            let mut parts: Vec<Item> = tree.order.iter().map(|&number| references[number as usize]).collect();
+            let collapsed = sbvh::collapse(&mut tree, &mut parts, collapse, input.scale);
+            input.refer(parts.len(), input.is_split);
+            phases.end("collapse");
+            let primitives: Vec<u32> = parts.iter().map(Item::primitive).collect();
+            let records = finish::records(&primitives, record);
+            phases.end("records");
+            finish::layout_parts(&input, &tree, &collapsed, &parts, records)
+        }
+    };
+    phases.end("layout");
+    Built { tree, phases: phases.phases }
+}
+
+/// The tree made better, where each number in its order has the box that `bounds` says.
+fn optimised(
+    mut tree: Topology,
+    input: &mut Input,
+    bounds: impl Fn(u32) -> Bounds + Sync,
+    options: &HostBvhOptions,
+) -> Topology {
+    let items = |tree: &Topology, scale| -> Vec<Item> {
+        let item = |&number: &u32| Item::new(bounds(number), number, 1).scaled(scale);
+        tree.order.par_iter().with_min_len(ALONE).map(item).collect()
+    };
+    match &options.optimise {
         HostOptimise::Off => tree,
         HostOptimise::Reinsertion(options) => {
-            let records = finish::records(&tree.order, record);
+            let boxed = |number| {
+                let Bounds { lo, hi } = bounds(number);
+                BoxRecord { lo: lo.to_array(), hi: hi.to_array(), primitive: number }
+            };
+            let records = finish::records(&tree.order, boxed);
             let collapsed = finish::collapse(&mut tree, &records, &Collapse::OFF, input.scale);
-            let tree = finish::layout(&input, &tree, &collapsed, records);
+            let tree = finish::layout(input, &tree, &collapsed, records);
             // What was too deep is in leaves from here on.
             input.status |= tree.header.status & status::DEPTH_LIMITED;
             Topology::of_tree(&tree.reinserted(options))
         }
-        HostOptimise::Insertion(options) => {
-            let items = items_of(&tree, bounds, input.item_scale);
-            insertion::optimise(tree, &items, collapse, options)
+        HostOptimise::Insertion(of_insertion) => {
+            let items = items(&tree, input.item_scale);
+            insertion::optimise(tree, &items, &options.collapse, of_insertion)
         }
-        HostOptimise::Top(options) => {
-            let items = items_of(&tree, bounds, input.item_scale);
-            optimal::top::optimise(tree, &items, collapse, options)
+        HostOptimise::Top(of_top) => {
+            let items = items(&tree, input.item_scale);
+            optimal::top::optimise(tree, &items, &options.collapse, of_top)
         }
-    };
-    if *optimise != HostOptimise::Off {
-        phases.end("optimise");
     }
-    let records = finish::records(&tree.order, record);
-    phases.end("records");
-    let collapsed = finish::collapse(&mut tree, &records, collapse, input.scale);
-    phases.end("collapse");
-    let tree = finish::layout(&input, &tree, &collapsed, records);
-    phases.end("layout");
-    Built { tree, phases: phases.phases }
 }
