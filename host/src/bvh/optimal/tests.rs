@@ -190,3 +190,86 @@ fn equal_boxes_far_away_and_tiny_are_searched_as_others_are() {
         assert!(tree.header.cost <= sweep_cost(&boxes, &Collapse::SAH) * (1.0 + 1e-5));
     }
 }
+
+/// Cells of a grid of 3 × 3 × 3 in a random order.
+fn cells(random: &mut Random) -> Vec<[f32; 3]> {
+    let mut cells: Vec<[f32; 3]> = (0..27).map(|i| [i % 3, i / 3 % 3, i / 9].map(|x| x as f32)).collect();
+    for i in (1..cells.len()).rev() {
+        cells.swap(i, (random.next() * (i + 1) as f32) as usize);
+    }
+    cells
+}
+
+/// A rotation about a random axis, by a random quaternion.
+fn rotation(random: &mut Random) -> impl Fn([f32; 3]) -> [f32; 3] + use<> {
+    let q = [0; 4].map(|_| random.next() - 0.5);
+    let length = q.iter().map(|x| x * x).sum::<f32>().sqrt().max(1e-3);
+    let q = glam::Quat::from_array(q.map(|x| x / length));
+    move |p| (q * glam::Vec3::from_array(p)).to_array()
+}
+
+/// Triangles of one shape, turned and moved at random, each in its cell of a grid: section 4.4 of the thesis, its scenes' second kind,
+/// and with the faces of a regular tetrahedron its third.
+fn displaced(shape: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Aabb> {
+    let mut random = Random::new(seed);
+    let cells = cells(&mut random);
+    let mut boxes = Vec::new();
+    for cell in &cells[..count] {
+        let turn = rotation(&mut random);
+        let moved = cell.map(|x| x + 0.3 * (random.next() - 0.5));
+        let place = |corner: [f32; 3]| {
+            let turned = turn(corner);
+            std::array::from_fn(|i| turned[i] + moved[i])
+        };
+        boxes.extend(shape.iter().map(|triangle| Aabb::around(&triangle.map(place))));
+    }
+    boxes
+}
+
+const TRIANGLE: [[[f32; 3]; 3]; 1] = [[[0.35, 0.0, 0.0], [-0.175, 0.303, 0.0], [-0.175, -0.303, 0.0]]];
+
+fn tetrahedron() -> [[[f32; 3]; 3]; 4] {
+    let corners =
+        [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]].map(|c| c.map(|x| 0.25 * x));
+    [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]].map(|face| face.map(|i: usize| corners[i]))
+}
+
+/// How many times the optimum a greedy sweep costs, from the least to the most.
+fn greedy_over_optimum(scenes: impl Iterator<Item = Vec<Aabb>>, costs: &Collapse) -> Vec<f32> {
+    let ratio =
+        |boxes: Vec<Aabb>| sweep_cost(&boxes, costs) / of_planes(&boxes, costs).expect("few boxes").tree.header.cost;
+    let mut ratios: Vec<f32> = scenes.map(ratio).collect();
+    ratios.sort_by(f32::total_cmp);
+    ratios
+}
+
+fn mean(ratios: &[f32]) -> f32 {
+    ratios.iter().sum::<f32>() / ratios.len() as f32
+}
+
+/// The thesis finds no difference for tetrahedra, whose faces belong together.
+#[test]
+fn greedy_sweeps_over_tetrahedra_lose_next_to_nothing() {
+    let scenes = (0..25).map(|seed| displaced(&tetrahedron(), 4, seed));
+    let ratios = greedy_over_optimum(scenes, &Collapse::SAH);
+    assert!(mean(&ratios) < 1.01, "{ratios:?}");
+}
+
+#[test]
+#[ignore = "takes a minute or so; prints the figures of the thesis's chapter 4, and some beyond 15 triangles"]
+fn figures_of_chapter_four() {
+    for costs in [Collapse::SAH, Collapse { c_t: 1.0, c_i: 1.0, ..Collapse::SAH }] {
+        let print = |name: String, ratios: Vec<f32>| {
+            let high = ratios[(ratios.len() * 95).div_ceil(100) - 1];
+            println!("{name}, {costs:?}: mean {:.4}, 95th percentile {high:.4}", mean(&ratios));
+        };
+        for count in [3, 5, 7, 9, 11, 13, 15, 20, 25, 30, 40] {
+            let scenes = (0..if count < 40 { 50 } else { 10 }).map(|seed| random_triangles(count, seed));
+            print(format!("{count} random triangles"), greedy_over_optimum(scenes, &costs));
+        }
+        let triangles = (0..25).map(|seed| displaced(&TRIANGLE, 12, seed));
+        print("12 displaced triangles".into(), greedy_over_optimum(triangles, &costs));
+        let tetrahedra = (0..25).map(|seed| displaced(&tetrahedron(), 4, seed));
+        print("4 displaced tetrahedra".into(), greedy_over_optimum(tetrahedra, &costs));
+    }
+}

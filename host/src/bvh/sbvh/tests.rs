@@ -310,6 +310,39 @@ fn triangles_that_cannot_be_met_are_left_out() {
     built(&none, &by(SbvhOptions::PAPER)).validate().expect("valid");
 }
 
+/// Each triangle is as large as all before it, so that a tree that is split well has one on a level.
+fn growing(count: i32) -> Corners {
+    let triangle = |i: i32| {
+        let x = 2f32.powi(i);
+        [[x, 0.0, 0.0], [-x, x, 0.5 * x], [-x, -x, 0.25 * x]]
+    };
+    (0..count).map(triangle).collect()
+}
+
+#[test]
+fn trees_that_would_be_deep_end_in_time() {
+    let corners = growing(110);
+    for sbvh in options() {
+        for optimise in [HostOptimise::Off, HostOptimise::Top(TopOptions { subtrees: 20 })] {
+            let tree = built(&corners, &HostBvhOptions { optimise, collapse: Collapse::OFF, ..by(sbvh) });
+            tree.validate().unwrap_or_else(|error| panic!("{sbvh:?}: {error}"));
+            for ray in rays(&corners, 100, 71) {
+                assert_eq!(closest_hit(&tree, &ray), closest_hit_by_brute_force(&tree, &ray), "{sbvh:?}, {ray:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn ten_thousand_equal_triangles_are_built_at_once() {
+    let corners = vec![soup(1, 0.5, 3)[0]; 10_000];
+    let start = std::time::Instant::now();
+    for sbvh in options() {
+        built(&corners, &by(sbvh)).validate().expect("valid");
+    }
+    assert!(start.elapsed().as_secs_f64() < 20.0, "{:?}", start.elapsed());
+}
+
 #[test]
 fn boxes_are_not_split() {
     let boxes: Vec<Aabb> = needles(300, 61).iter().map(|corners| Aabb::around(corners)).collect();
