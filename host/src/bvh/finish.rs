@@ -77,7 +77,8 @@ fn layout_over<B: Boxed>(
         let layout = Layout { splits: &tree.splits, inner, records };
         header.root = layout.child(Span::whole(records.len()), &mut nodes[..root.inner as usize], 0);
         (header.cost, header.built_cost) = (root.cost, root.cost);
-        header.built_area = input.bounds.scaled_half_area(input.scale);
+        // Of the root's box, which is larger than the scene's where it is around parts.
+        header.built_area = header.root.bounds().scaled_half_area(input.scale);
     }
     header.primitive_count = header.active;
     header.node_slots = nodes.len() as u32;

@@ -20,6 +20,7 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::geometry::finite_box;
 use hedgerow::geometry::Aabb;
 use hedgerow::{Error, Result};
+use std::collections::HashMap;
 
 /// The most boxes that [`of_planes`] takes: a set of them is a word.
 pub const MOST_BY_PLANES: usize = 64;
@@ -107,7 +108,7 @@ struct Found {
     cost: f64,
     sets: usize,
     /// Of each set of several entries in the tree, what is on the left; 0 if it is a leaf.
-    left: std::collections::HashMap<u64, u64>,
+    left: HashMap<u64, u64>,
 }
 
 impl Found {

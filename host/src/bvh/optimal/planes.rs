@@ -59,8 +59,8 @@ impl Split {
     const NONE: Split = Split { left: 0, least: 0.0, adds: 0.0 };
 }
 
-/// Room for all splits of a set: in each place how many entries are on the left.
-type Splits = [[Split; MOST_BY_PLANES]; 3];
+/// All splits of a set along an axis: in each place that with as many entries on the left.
+type Splits = [Split; MOST_BY_PLANES];
 
 /// By which splits of equal cost are told apart, as a sweep does: the distance from the middle, the axis, and the place.
 type Rank = (usize, usize, usize);
@@ -152,7 +152,8 @@ impl Planes<'_> {
 
     /// The least cost of a set of several entries, and what is on the left then; 0 if the set is a leaf.
     fn best_split(&mut self, set: u64) -> (f64, u64) {
-        let mut splits = [[Split::NONE; MOST_BY_PLANES]; 3];
+        // Not on the stack: there are as many levels as entries.
+        let mut splits = vec![[Split::NONE; MOST_BY_PLANES]; 3];
         let side = self.splits(set, &mut splits);
         let (step, count) = (step_cost(self.costs, &side.bounds), set.count_ones() as usize);
         let mut best = Best { set, step, cost: self.leaf(&side), rank: (usize::MAX, 0, 0), left: 0 };
@@ -201,7 +202,7 @@ impl Planes<'_> {
     }
 
     /// All splits of a set, and the set itself.
-    fn splits(&self, set: u64, splits: &mut Splits) -> Side {
+    fn splits(&self, set: u64, splits: &mut [Splits]) -> Side {
         let count = set.count_ones() as usize;
         let mut side = Side::EMPTY;
         for (order, splits) in self.orders.iter().zip(splits) {

@@ -173,6 +173,10 @@ fn trees_are_valid_and_hits_are_those_of_brute_force() {
             for options in [sah, HostBvhOptions { collapse: Collapse::OFF, ..sah }] {
                 let tree = built(&corners, &options);
                 tree.validate().unwrap_or_else(|error| panic!("{name}, {options:?}: {error}"));
+                assert!(
+                    tree.header.cost == 0.0 || tree.header.sah() == 0.0 || tree.header.sah_growth() == 1.0,
+                    "{name}"
+                );
                 split += u32::from(tree.header.split_from != 0);
                 let most = (f64::from(sbvh.budget) * corners.len() as f64) as u32;
                 assert!(tree.header.active <= most, "{name}, {options:?}: {} references", tree.header.active);
