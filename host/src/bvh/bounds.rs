@@ -153,7 +153,6 @@ impl Item {
 }
 
 /// The box around them.
-#[cfg(test)]
 pub(crate) fn around(items: &[Item]) -> Bounds {
     items.iter().fold(Bounds::EMPTY, |bounds, item| bounds.union(item.bounds()))
 }

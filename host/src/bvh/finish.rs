@@ -5,13 +5,13 @@
 //! `hedgerow::bvh::collapse`, on all threads: subtrees of [`ALONE`] primitives are walked by one, what is above them by as many as
 //! there are.
 
-use super::bounds::Bounds;
+use super::bounds::{Bounds, Item};
 use super::input::Input;
 use super::topology::{LEAF, Span, Topology};
 use super::{ALONE, DIVIDED_ABOVE};
 use bytemuck::zeroed_vec;
 use glam::Vec3A;
-use hedgerow::bvh::layout::{Bvh2, Child, MAX_DEPTH, Node, Record, status};
+use hedgerow::bvh::layout::{Bvh2, Child, Header, MAX_DEPTH, Node, Record, status};
 use hedgerow::bvh::sah::Collapse;
 use rayon::prelude::*;
 
@@ -38,7 +38,7 @@ pub(super) struct Collapsed {
 }
 
 /// Makes leaves of the subtrees that are cheaper as such, if `collapse` is enabled, and of those at [`MAX_DEPTH`].
-pub(super) fn collapse<R: Record>(tree: &mut Topology, records: &[R], collapse: &Collapse, scale: f32) -> Collapsed {
+pub(super) fn collapse<B: Boxed>(tree: &mut Topology, records: &[B], collapse: &Collapse, scale: f32) -> Collapsed {
     let mut inner = vec![0; tree.splits.len()];
     let walk = Walk { collapse, scale };
     let root = walk.subtree(Part { splits: &mut tree.splits, inner: &mut inner, records }, 0);
@@ -47,15 +47,38 @@ pub(super) fn collapse<R: Record>(tree: &mut Topology, records: &[R], collapse: 
 
 /// The tree itself.
 pub(super) fn layout<R: Record>(input: &Input, tree: &Topology, collapsed: &Collapsed, records: Vec<R>) -> Bvh2<R> {
+    let (header, nodes) = layout_over(input.header::<R>(), input, tree, collapsed, &records);
+    Bvh2 { header, nodes, records, geometries: Vec::new() }
+}
+
+/// The tree over parts of primitives: its leaves have the boxes of `parts`, which are as many as the records.
+pub(super) fn layout_parts<R: Record>(
+    input: &Input,
+    tree: &Topology,
+    collapsed: &Collapsed,
+    parts: &[Item],
+    records: Vec<R>,
+) -> Bvh2<R> {
+    let (header, nodes) = layout_over(input.header::<R>(), input, tree, collapsed, parts);
+    Bvh2 { header, nodes, records, geometries: Vec::new() }
+}
+
+fn layout_over<B: Boxed>(
+    mut header: Header,
+    input: &Input,
+    tree: &Topology,
+    collapsed: &Collapsed,
+    records: &[B],
+) -> (Header, Vec<Node>) {
     let Collapsed { inner, root } = collapsed;
-    let mut header = input.header::<R>();
     // Pages of zeros come with the threads that write them.
     let mut nodes: Vec<Node> = if root.inner == 0 { vec![Node::UNUSED] } else { zeroed_vec(root.inner as usize) };
     if header.active > 0 {
-        let layout = Layout { splits: &tree.splits, inner, records: &records };
+        let layout = Layout { splits: &tree.splits, inner, records };
         header.root = layout.child(Span::whole(records.len()), &mut nodes[..root.inner as usize], 0);
         (header.cost, header.built_cost) = (root.cost, root.cost);
-        header.built_area = input.bounds.scaled_half_area(input.scale);
+        // Of the root's box, which is larger than the scene's where it is around parts.
+        header.built_area = header.root.bounds().scaled_half_area(input.scale);
     }
     header.primitive_count = header.active;
     header.node_slots = nodes.len() as u32;
@@ -63,15 +86,36 @@ pub(super) fn layout<R: Record>(input: &Input, tree: &Topology, collapsed: &Coll
     if root.is_limited {
         header.status |= status::DEPTH_LIMITED;
     }
-    Bvh2 { header, nodes, records, geometries: Vec::new() }
+    (header, nodes)
+}
+
+/// What leaves are made of, as far as their boxes go.
+pub(super) trait Boxed: Sync {
+    /// The box around it.
+    fn around(&self) -> Bounds;
+}
+
+impl<R: Record> Boxed for R {
+    fn around(&self) -> Bounds {
+        match self.corners() {
+            Some(corners) => Bounds::of_triangle(corners.map(Vec3A::from_array)),
+            None => Bounds::of(&self.bounds().expect("a record of this crate has a box")),
+        }
+    }
+}
+
+impl Boxed for Item {
+    fn around(&self) -> Bounds {
+        self.bounds()
+    }
 }
 
 /// A subtree of the topology, with room for what is found out.
-struct Part<'a, R> {
+struct Part<'a, B> {
     splits: &'a mut [u32],
     /// For the inner nodes of each slot.
     inner: &'a mut [u32],
-    records: &'a [R],
+    records: &'a [B],
 }
 
 struct Walk<'a> {
@@ -84,7 +128,7 @@ impl Walk<'_> {
         bounds.scaled(self.scale).half_area()
     }
 
-    fn leaf<R: Record>(&self, records: &[R]) -> Measured {
+    fn leaf<B: Boxed>(&self, records: &[B]) -> Measured {
         let bounds = around(records);
         let cost =
             if records.is_empty() { 0.0 } else { self.collapse.leaf_cost(self.area(&bounds), records.len() as u32) };
@@ -106,7 +150,7 @@ impl Walk<'_> {
     }
 
     /// A subtree whose root is at `depth`. No deeper than [`MAX_DEPTH`], however deep the tree is.
-    fn subtree<R: Record>(&self, part: Part<'_, R>, depth: u32) -> Measured {
+    fn subtree<B: Boxed>(&self, part: Part<'_, B>, depth: u32) -> Measured {
         let Part { splits, inner, records } = part;
         let (Some((split, splits)), Some((own_inner, inner))) = (splits.split_first_mut(), inner.split_first_mut())
         else {
@@ -136,25 +180,18 @@ impl Walk<'_> {
     }
 }
 
-fn bounds_of<R: Record>(record: &R) -> Bounds {
-    match record.corners() {
-        Some(corners) => Bounds::of_triangle(corners.map(Vec3A::from_array)),
-        None => Bounds::of(&record.bounds().expect("a record of this crate has a box")),
-    }
-}
-
 /// The box around records.
-fn around<R: Record>(records: &[R]) -> Bounds {
-    records.iter().fold(Bounds::EMPTY, |bounds, record| bounds.union(bounds_of(record)))
+fn around<B: Boxed>(records: &[B]) -> Bounds {
+    records.iter().fold(Bounds::EMPTY, |bounds, record| bounds.union(record.around()))
 }
 
-struct Layout<'a, R> {
+struct Layout<'a, B> {
     splits: &'a [u32],
     inner: &'a [u32],
-    records: &'a [R],
+    records: &'a [B],
 }
 
-impl<R: Record> Layout<'_, R> {
+impl<B: Boxed> Layout<'_, B> {
     fn inner(&self, span: Span) -> u32 {
         if span.count == 1 { 0 } else { self.inner[span.slot as usize] }
     }

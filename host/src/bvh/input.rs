@@ -23,8 +23,10 @@ pub(crate) struct Input {
     pub bounds: Aabb,
     /// The power of two that lengths are scaled by where areas are kept: [`area_scale`].
     pub scale: f32,
-    /// How many that are; the items may be taken away.
+    /// How many records the tree has: one an item, though the items may be taken away, or as many as there are references.
     active: u32,
+    /// Whether those are references to primitives that were split.
+    pub is_split: bool,
     /// Bits of [`hedgerow::bvh::layout::status`].
     pub status: u32,
     /// Bits of the codes that they were sorted by.
@@ -61,7 +63,22 @@ impl Input {
             items.par_iter_mut().with_min_len(ALONE).for_each(|item| *item = item.scaled(scale));
         }
         let item_scale = if MODEST.contains(&scale) { 1.0 } else { scale };
-        Input { active: items.len() as u32, items, count, item_scale, bounds, scale, status, code_bits: 0 }
+        Input {
+            active: items.len() as u32,
+            is_split: false,
+            items,
+            count,
+            item_scale,
+            bounds,
+            scale,
+            status,
+            code_bits: 0,
+        }
+    }
+
+    /// The tree is over `count` references; `is_split` says whether any is to a part of a primitive alone.
+    pub fn refer(&mut self, count: usize, is_split: bool) {
+        (self.active, self.is_split) = (count as u32, is_split);
     }
 
     /// The header of a tree that is not built yet.
@@ -74,6 +91,7 @@ impl Input {
             active,
             code_bits: self.code_bits,
             geometry_count: 1,
+            split_from: if self.is_split { self.count as u32 } else { 0 },
             area_scale: if active == 0 { 0.0 } else { self.scale },
             root: Child { lo: Aabb::EMPTY.lo, index: 0, hi: Aabb::EMPTY.hi, count: 0 },
             ..bytemuck::Zeroable::zeroed()

@@ -1,7 +1,8 @@
 //! BVHs built on the CPU: top-down, bottom-up and by insertion, on all threads of the rayon pool that [`build`] is called in.
 //!
-//! The methods are those that Frantál compares in "Ray Tracing with Bounding Volume Hierarchies on a CPU" (2019). Each gives the
-//! same bytes whatever the number of threads.
+//! The methods are those that Frantál compares in "Ray Tracing with Bounding Volume Hierarchies on a CPU" (2019), and `sbvh`, which
+//! splits triangles. Each gives the same bytes whatever the number of threads. What the cheapest tree over a few boxes would cost
+//! is in [`optimal`].
 //!
 //! A build goes through phases: `boxes` reads the primitives, `order` sorts them by code where the method wants that, `heuristic`
 //! makes another heuristic than the surface area ready, `build` makes the tree, `optimise` moves subtrees, `collapse` makes leaves,
@@ -11,13 +12,16 @@ mod aac;
 pub mod binned;
 mod bonsai;
 mod bounds;
+mod build;
 mod finish;
 pub mod heuristic;
 mod incremental;
 mod input;
 mod insertion;
+pub mod optimal;
 mod order;
 mod ploc;
+mod sbvh;
 pub mod sweep;
 mod top_down;
 mod topology;
@@ -25,7 +29,7 @@ mod topology;
 pub use aac::AacOptions;
 pub use binned::BinnedOptions;
 pub use bonsai::BonsaiOptions;
-use bounds::{Bounds, Item};
+use bounds::Bounds;
 use glam::Vec3A;
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::layout::{BoxRecord, Bvh2, Record, Triangle, status};
@@ -35,15 +39,10 @@ use hedgerow::bvh::twin::geometry::finite_box;
 use hedgerow::geometry::Aabb;
 use hedgerow::{Error, Result};
 pub use heuristic::Heuristic;
-use heuristic::Prepared;
-use heuristic::split_cost::{Area, ByRays, SplitCost};
 pub use incremental::{IncrementalOptions, IncrementalOrder};
-use input::Input;
 pub use insertion::{Inefficiency, InsertionOptions};
-use rayon::prelude::*;
-use std::time::Instant;
-use top_down::LeafRule;
-use topology::Topology;
+pub use optimal::top::TopOptions;
+pub use sbvh::SbvhOptions;
 
 /// Fewer primitives than this are not worth another thread.
 const ALONE: usize = 4096;
@@ -68,6 +67,8 @@ pub enum HostMethod {
     },
     /// One primitive after the other is put where it costs least.
     Incremental(IncrementalOptions),
+    /// The best of the planes between bins, top-down, of objects or of space: triangles are split. Boxes that are no triangles are not.
+    Sbvh(SbvhOptions),
 }
 
 impl HostMethod {
@@ -123,7 +124,14 @@ impl HostBvhOptions {
         }
     }
 
-    /// Whether [`build`] can use them.
+    /// Whether leaves have one primitive when the tree is built: those that make it better, and other leaves later, want that.
+    const fn is_single(&self) -> bool {
+        matches!(self.termination, Termination::Single)
+            || !self.collapse.enabled
+            || !matches!(self.optimise, HostOptimise::Off)
+    }
+
+    /// Whether [`build()`] can use them.
     ///
     /// # Errors
     /// [`Error::Argument`] names the option that cannot be used, and what can.
@@ -138,10 +146,12 @@ impl HostBvhOptions {
             HostMethod::Binned(options) => options.check(),
             HostMethod::Bonsai(options) => options.check(),
             HostMethod::Incremental(options) => options.check(),
+            HostMethod::Sbvh(options) => options.check(),
         }?;
         match &self.optimise {
             HostOptimise::Off | HostOptimise::Reinsertion(_) => Ok(()),
             HostOptimise::Insertion(options) => options.check(),
+            HostOptimise::Top(options) => options.check(),
         }
     }
 }
@@ -168,6 +178,8 @@ pub enum HostOptimise {
     Reinsertion(ReinsertionOptions),
     /// Insertion-based optimisation: slow, and the best there is for a tree of any builder.
     Insertion(InsertionOptions),
+    /// The cheapest top by planes over the largest subtrees.
+    Top(TopOptions),
 }
 
 /// A tree, and how its build went.
@@ -209,7 +221,7 @@ pub fn build_by(
         let [v0, v1, v2] = corners(primitive).map(|v| v.expect("a triangle in the tree has vertices").map(|x| x + 0.0));
         Triangle { v0, v1, v2, primitive }
     };
-    build_of(triangles.len(), bounds, record, (options, heuristic))
+    build::build_of(triangles.len(), bounds, record, (options, heuristic))
 }
 
 /// Builds the BVH of boxes; one that is not finite or is inside out is left out.
@@ -226,122 +238,13 @@ pub fn build_aabbs(boxes: &[Aabb], options: &HostBvhOptions) -> Result<Built<Box
 /// As those of [`build_by`].
 pub fn build_aabbs_by(heuristic: &Heuristic<'_>, boxes: &[Aabb], options: &HostBvhOptions) -> Result<Built<BoxRecord>> {
     let finite = |primitive: u32| finite_box(&boxes[primitive as usize]);
-    let record = |primitive| {
-        let Aabb { lo, hi } = finite(primitive).expect("a box in the tree is finite");
-        BoxRecord { lo, hi, primitive }
-    };
+    let record = |primitive| box_record(boxes, primitive);
     let bounds = |primitive| finite(primitive).map(|bounds| Bounds::of(&bounds));
-    build_of(boxes.len(), bounds, record, (options, heuristic))
+    build::build_of(boxes.len(), bounds, record, (options, heuristic))
 }
 
-/// Names the times between calls.
-struct Phases {
-    since: Instant,
-    phases: Vec<(&'static str, f64)>,
-}
-
-impl Phases {
-    /// The time since the last call was that of this phase.
-    fn end(&mut self, name: &'static str) {
-        self.phases.push((name, self.since.elapsed().as_secs_f64() * 1e3));
-        self.since = Instant::now();
-    }
-}
-
-fn build_of<R: Record>(
-    count: usize,
-    bounds: impl Fn(u32) -> Result<Bounds, u32> + Sync,
-    record: impl Fn(u32) -> R + Sync,
-    (options, heuristic): (&HostBvhOptions, &Heuristic<'_>),
-) -> Result<Built<R>> {
-    options.check()?;
-    heuristic.check(&options.method, count)?;
-    // On a thread of the pool: one outside it would wait and be woken again at every parallel step.
-    Ok(rayon::scope(|_| build_on_thread(count, &bounds, &record, (options, heuristic))))
-}
-
-/// The tree over `items`, by their codes if the method sorted them. Both are given back before records and nodes want memory.
-fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOptions, by: &Prepared<'_>) -> Topology {
-    let HostBvhOptions { method, collapse, termination, optimise, .. } = options;
-    let is_by_area = matches!(by, Prepared::Area);
-    // All three want leaves of one primitive; and costs by a heuristic are not those that leaves are made by.
-    let single = *termination == Termination::Single
-        || !collapse.enabled
-        || *optimise != HostOptimise::Off
-        || *termination == Termination::Sah && !is_by_area;
-    let rule = LeafRule { costs: collapse, single };
-    match method {
-        HostMethod::Sweep | HostMethod::Binned(_) => match by {
-            Prepared::Area => top_down(&Area, items, scale, rule, method),
-            Prepared::Rays(measure) => top_down(&ByRays(&**measure), items, scale, rule, method),
-            Prepared::Distribution(rays) => top_down(rays, items, scale, rule, method),
-            Prepared::Occlusion(seen) => top_down(seen, items, scale, rule, method),
-        },
-        HostMethod::Bonsai(options) => bonsai::build(items, collapse, single, options),
-        HostMethod::Aac(options) => aac::build(&items, &codes, options),
-        HostMethod::Ploc { radius } => ploc::build(&items, *radius),
-        HostMethod::Incremental(options) => incremental::build(&items, options),
-    }
-}
-
-/// By a method whose splits cost what `by` says.
-fn top_down(by: &impl SplitCost, items: Vec<Item>, scale: f32, rule: LeafRule<'_>, method: &HostMethod) -> Topology {
-    match method {
-        HostMethod::Binned(options) => binned::build(by, items, scale, rule, options),
-        _ => sweep::build(by, &items, rule),
-    }
-}
-
-fn build_on_thread<R: Record>(
-    count: usize,
-    bounds: &(impl Fn(u32) -> Result<Bounds, u32> + Sync),
-    record: &(impl Fn(u32) -> R + Sync),
-    (options, heuristic): (&HostBvhOptions, &Heuristic<'_>),
-) -> Built<R> {
-    let HostBvhOptions { method, codes, collapse, optimise, .. } = options;
-    let mut phases = Phases { since: Instant::now(), phases: Vec::new() };
-    let mut input = Input::new(count, bounds);
-    phases.end("boxes");
-    let mut sorted = Vec::new();
-    if method.sorts() {
-        sorted = order::sort(&mut input, codes.unwrap_or_else(|| Codes::for_count(count as u32)));
-        phases.end("order");
-    }
-    let items = std::mem::take(&mut input.items);
-    let scene = Bounds::of(&input.bounds).scaled(input.item_scale);
-    let by = heuristic.prepared(&items, &scene, input.item_scale);
-    if *heuristic != Heuristic::Sah {
-        phases.end("heuristic");
-    }
-    let mut tree = topology(items, input.item_scale, sorted, options, &by);
-    phases.end("build");
-    tree = match optimise {
-        HostOptimise::Off => tree,
-        HostOptimise::Reinsertion(options) => {
-            let records = finish::records(&tree.order, record);
-            let collapsed = finish::collapse(&mut tree, &records, &Collapse::OFF, input.scale);
-            let tree = finish::layout(&input, &tree, &collapsed, records);
-            // What was too deep is in leaves from here on.
-            input.status |= tree.header.status & status::DEPTH_LIMITED;
-            Topology::of_tree(&tree.reinserted(options))
-        }
-        HostOptimise::Insertion(options) => {
-            let item = |&primitive: &u32| {
-                let bounds = bounds(primitive).expect("a primitive in the tree has a box");
-                Item::new(bounds, primitive, 1).scaled(input.item_scale)
-            };
-            let items: Vec<Item> = tree.order.par_iter().with_min_len(ALONE).map(item).collect();
-            insertion::optimise(tree, &items, collapse, options)
-        }
-    };
-    if *optimise != HostOptimise::Off {
-        phases.end("optimise");
-    }
-    let records = finish::records(&tree.order, record);
-    phases.end("records");
-    let collapsed = finish::collapse(&mut tree, &records, collapse, input.scale);
-    phases.end("collapse");
-    let tree = finish::layout(&input, &tree, &collapsed, records);
-    phases.end("layout");
-    Built { tree, phases: phases.phases }
+/// The record of a box that is finite.
+fn box_record(boxes: &[Aabb], primitive: u32) -> BoxRecord {
+    let Aabb { lo, hi } = finite_box(&boxes[primitive as usize]).expect("a box in the tree is finite");
+    BoxRecord { lo, hi, primitive }
 }

@@ -1,0 +1,266 @@
+//! SBVH: top-down, at each node the best split of its primitives by bins, or where its sides overlap the best split of space.
+//!
+//! Stich, Friedrich, Dietrich 2009, "Spatial Splits in Bounding Volume Hierarchies". A spatial split cuts the triangles that cross
+//! its plane: both children then have a *reference* to the triangle, with the box of its part. The spatial split is taken where it
+//! costs less than the object split, not wherever it is looked for (which is how van Kralingen 2023, listing 3, has it). A triangle
+//! that crosses is left whole on one side where that costs less (the paper's reference unsplitting), in the order of the
+//! references. The budget of references is divided among the children of a node by their references, so that the tree is the same
+//! for any number of threads.
+//!
+//! **No ray loses a hit.** `hedgerow::bvh::twin::split` has the proof: it needs halves that both have the cut, wherever the plane is,
+//! and boxes of parts that are larger by the slack of its `padded`. The boxes here come from its `halves`, and are padded at the end.
+//! In between, lengths may be scaled by a power of two, which moves what is less than 2⁻¹²⁶ then by 2⁻¹⁵⁰ at most. Triangles whose
+//! longest side is less than 2⁻⁶⁰ then are not cut, and scenes neither whose extent is not 2⁻⁴⁰ to 2¹²⁰, so that the padding is more.
+
+mod leaves;
+mod object;
+mod spatial;
+
+pub(super) use leaves::collapse;
+
+use super::bounds::{Bounds, Item};
+use super::top_down::HALVED_FROM;
+use super::topology::{LEAF, Topology};
+use super::{ALONE, DIVIDED_ABOVE};
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::split::padded;
+use hedgerow::geometry::Aabb;
+use hedgerow::{Error, Result};
+
+/// How triangles are split, and how many references there may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SbvhOptions {
+    /// Spatial splits are looked for where the boxes of the object split's sides have at least this part of the scene's area in
+    /// common: 0 (at every node) to 1 (nowhere).
+    pub alpha: f32,
+    /// The most references, as a multiple of the triangles: 1 to [`SbvhOptions::MOST_BUDGET`].
+    pub budget: f32,
+    /// How many bins there are along an axis, for either kind of split: 2 to [`SbvhOptions::MOST_BINS`].
+    pub bins: u32,
+}
+
+impl SbvhOptions {
+    /// The paper's α of 10⁻⁵; twice as many references as triangles at most, and 32 bins.
+    pub const PAPER: SbvhOptions = SbvhOptions { alpha: 1e-5, budget: 2.0, bins: 32 };
+    /// The greatest budget.
+    pub const MOST_BUDGET: f32 = 16.0;
+    /// The most bins.
+    pub const MOST_BINS: u32 = 128;
+
+    pub(super) fn check(&self) -> Result<()> {
+        let SbvhOptions { alpha, budget, bins } = *self;
+        let (most_budget, most_bins) = (SbvhOptions::MOST_BUDGET, SbvhOptions::MOST_BINS);
+        let wrong = |what: String| Err(Error::Argument(what));
+        if !(0.0..=1.0).contains(&alpha) {
+            return wrong(format!("an alpha of {alpha} cannot be used; take 0 to 1"));
+        }
+        if !(1.0..=most_budget).contains(&budget) {
+            return wrong(format!(
+                "a budget of {budget} references a triangle cannot be used; take 1 to {most_budget}"
+            ));
+        }
+        if !(2..=most_bins).contains(&bins) {
+            return wrong(format!("{bins} bins cannot be used; take 2 to {most_bins} bins"));
+        }
+        Ok(())
+    }
+}
+
+/// From this depth on no triangle is split.
+const WHOLE_FROM: u32 = 48;
+/// What is shorter, in the lengths of the items, is not cut.
+const SHORTEST_CUT: f32 = 1.0 / (1u64 << 60) as f32;
+/// In place of a reference's weight: its box is that of its triangle, or that of a part.
+const WHOLE: u32 = 1;
+const PART: u32 = 2;
+
+/// What a tree is built over besides its items.
+pub(super) struct Scene<'a, C, B> {
+    /// The corners of a primitive that is a triangle.
+    pub corners: C,
+    /// The box of a primitive.
+    pub bounds: B,
+    /// The box around all primitives.
+    pub around: &'a Aabb,
+    /// What the lengths of the items were scaled by.
+    pub scale: f32,
+}
+
+/// A tree over references.
+pub(super) struct SplitTree {
+    /// The tree, in whose order are numbers of references.
+    pub tree: Topology,
+    /// Boxes in the lengths of the input, and the primitives that they are of.
+    pub references: Vec<Item>,
+    /// Whether any triangle was split.
+    pub is_split: bool,
+}
+
+/// The tree over `items`.
+pub(super) fn build<C, B>(
+    items: Vec<Item>,
+    scene: &Scene<'_, C, B>,
+    costs: &Collapse,
+    single: bool,
+    options: &SbvhOptions,
+) -> SplitTree
+where
+    C: Fn(u32) -> Option<[[f32; 3]; 3]> + Sync,
+    B: Fn(u32) -> Bounds + Sync,
+{
+    let room = ((f64::from(options.budget) - 1.0) * items.len() as f64) as usize;
+    let corners = |primitive: u32| {
+        let corners = (scene.corners)(primitive).expect("only triangles are split");
+        corners.map(|corner| corner.map(|x| x * scene.scale))
+    };
+    let area = super::bounds::around(&items).half_area();
+    let can_split = options.alpha < 1.0
+        && is_in_reach(scene.around)
+        && items.first().is_some_and(|item| (scene.corners)(item.primitive()).is_some());
+    let least_overlap = if can_split { options.alpha * area } else { f32::INFINITY };
+    let build = Build { corners, costs, single, bins: options.bins as usize, least_overlap };
+    let mut out = Written::default();
+    if !items.is_empty() {
+        build.subtree(items, 0, room, &mut out);
+    }
+    let is_split = out.references.iter().any(|reference| reference.weight() == PART);
+    out.references.iter_mut().for_each(|reference| *reference = scene.finished(reference));
+    let order = (0..out.references.len() as u32).collect();
+    SplitTree { tree: Topology { order, splits: out.splits }, references: out.references, is_split }
+}
+
+/// Whether a scene is of a size that its triangles can be split at.
+fn is_in_reach(scene: &Aabb) -> bool {
+    let power_of_two = |exponent: i32| f32::from_bits(((127 + exponent) as u32) << 23);
+    let longest = scene.extent().into_iter().fold(0.0, f32::max);
+    let farthest = scene.lo.iter().chain(&scene.hi).fold(0.0, |m: f32, x| m.max(x.abs()));
+    longest >= power_of_two(-40) && farthest <= power_of_two(120)
+}
+
+impl<C, B> Scene<'_, C, B>
+where
+    C: Fn(u32) -> Option<[[f32; 3]; 3]>,
+    B: Fn(u32) -> Bounds,
+{
+    /// A reference with its box in the lengths of the input, larger by the slack of parts if it is one.
+    fn finished(&self, reference: &Item) -> Item {
+        let primitive = reference.primitive();
+        let whole = (self.bounds)(primitive);
+        if reference.weight() == WHOLE {
+            return Item::new(whole, primitive, 1);
+        }
+        let bounds = reference.scaled(1.0 / self.scale).bounds();
+        Item::new(Bounds::of(&padded(&aabb(bounds), &aabb(whole))), primitive, 1)
+    }
+}
+
+fn aabb(bounds: Bounds) -> Aabb {
+    Aabb { lo: bounds.lo.to_array(), hi: bounds.hi.to_array() }
+}
+
+/// A node before it is split: the box around its references, and that around their centroids (twice them).
+struct Unsplit {
+    bounds: Bounds,
+    centroids: Bounds,
+}
+
+impl Unsplit {
+    fn of(references: &[Item]) -> Unsplit {
+        let empty = Unsplit { bounds: Bounds::EMPTY, centroids: Bounds::EMPTY };
+        references.iter().fold(empty, |all, reference| Unsplit {
+            bounds: all.bounds.union(reference.bounds()),
+            centroids: all.centroids.union(Bounds::point(reference.centroid())),
+        })
+    }
+}
+
+/// What lies on either side of a split.
+#[derive(Clone, Copy)]
+struct Side {
+    bounds: Bounds,
+    count: usize,
+}
+
+impl Side {
+    const EMPTY: Side = Side { bounds: Bounds::EMPTY, count: 0 };
+
+    fn add(self, bounds: Bounds, count: usize) -> Side {
+        Side { bounds: self.bounds.union(bounds), count: self.count + count }
+    }
+
+    fn cost(&self, costs: &Collapse) -> f32 {
+        costs.leaf_cost(self.bounds.half_area(), self.count as u32)
+    }
+}
+
+/// The part of a tree that is written, from left to right.
+#[derive(Default)]
+struct Written {
+    references: Vec<Item>,
+    splits: Vec<u32>,
+}
+
+struct Build<'a, C> {
+    /// Of a primitive, in the lengths of the items.
+    corners: C,
+    costs: &'a Collapse,
+    single: bool,
+    bins: usize,
+    /// Sides of an object split with less area in common are not looked at any further.
+    least_overlap: f32,
+}
+
+impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Build<'_, C> {
+    /// Writes the subtree over `references`, of which there may be `room` more.
+    fn subtree(&self, references: Vec<Item>, depth: u32, room: usize, out: &mut Written) {
+        let count = references.len();
+        let sides = if count == 1 { None } else { self.divided(&references, depth, room) };
+        let Some([left, right]) = sides else {
+            out.splits.resize(out.splits.len() + count - 1, LEAF);
+            return out.references.extend(references);
+        };
+        drop(references);
+        let both = left.len() + right.len();
+        let room = room - (both - count);
+        let left_room = (room as u128 * left.len() as u128 / both as u128) as usize;
+        let (slot, first) = (out.splits.len(), out.references.len());
+        out.splits.push(LEAF);
+        if both < ALONE || depth >= DIVIDED_ABOVE {
+            self.subtree(left, depth + 1, left_room, out);
+            out.splits[slot] = (out.references.len() - first) as u32;
+            self.subtree(right, depth + 1, room - left_room, out);
+        } else {
+            let mut of_right = Written::default();
+            let on_left = || {
+                self.subtree(left, depth + 1, left_room, out);
+                out.splits[slot] = (out.references.len() - first) as u32;
+            };
+            rayon::join(on_left, || self.subtree(right, depth + 1, room - left_room, &mut of_right));
+            out.references.extend(of_right.references);
+            out.splits.extend(of_right.splits);
+        }
+    }
+
+    /// The references on both sides of the best split; `None` if the node is a leaf.
+    fn divided(&self, references: &[Item], depth: u32, room: usize) -> Option<[Vec<Item>; 2]> {
+        let node = Unsplit::of(references);
+        let object = if depth >= HALVED_FROM { self.halved(references) } else { self.object_split(references, &node) };
+        let is_overlap = || self.least_overlap < f32::INFINITY && object.overlap() >= self.least_overlap;
+        let spatial = (depth < WHOLE_FROM && is_overlap())
+            .then(|| self.spatial_split(references, &node.bounds, room))
+            .flatten()
+            .filter(|spatial| spatial.cost < object.cost);
+        let cost = spatial.as_ref().map_or(object.cost, |spatial| spatial.cost);
+        let area = node.bounds.half_area();
+        let is_leaf = self.costs.leaf_cost(area, references.len() as u32) < self.costs.inner_cost(area, cost, 0.0);
+        if is_leaf && !self.single {
+            return None;
+        }
+        // More references are not worth it where a leaf is cheaper.
+        let by_space = spatial.filter(|_| !is_leaf).and_then(|spatial| self.cut(references, &spatial));
+        Some(by_space.unwrap_or_else(|| object.divide(references)))
+    }
+}
+
+#[cfg(test)]
+mod tests;
