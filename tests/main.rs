@@ -37,6 +37,7 @@ mod bvh {
     mod codes;
     mod epo;
     mod geometry;
+    mod heuristics;
     mod host;
     mod lbvh;
     mod limits;

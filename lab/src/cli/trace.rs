@@ -96,7 +96,7 @@ fn traced(
     if rays.is_empty() {
         return Ok((Vec::new(), f64::NAN));
     }
-    let mut subject = builder.make_for(device, &scene)?;
+    let mut subject = builder.make_for(device, scene)?;
     subject.build()?;
     subject.set_rays(rays)?;
     // The first run of a shader compiles it.

@@ -258,7 +258,7 @@ impl Bench<'_> {
         for (i, (outcome, _)) in counting.iter().enumerate() {
             let builder = &outcome.record.builder;
             let spec: Spec = builder.parse()?;
-            let mut subject = spec.make_for(self.device, &scene)?;
+            let mut subject = spec.make_for(self.device, scene)?;
             subject.build()?;
             let views: &[View] = if i == 0 { &[View::Shaded, View::Steps] } else { &[View::Steps] };
             for &view in views {

@@ -120,7 +120,7 @@ pub fn measure(
 ) -> (Vec<Outcome>, Vec<Failure<OnScene>>) {
     let (mut entrants, mut failures) = (Vec::new(), Vec::new());
     for spec in &plan.builders {
-        match spec.make_for(device, &scene) {
+        match spec.make_for(device, scene) {
             Ok(subject) => entrants.push(Entrant { subject, is_traced: true }),
             Err(error) => failures.push(OnScene::failure(&scene.name, Some(spec), error)),
         }

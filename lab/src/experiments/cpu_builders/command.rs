@@ -188,7 +188,7 @@ fn measure(
     for spec in &plan.builders {
         let of_one = on_one_thread(spec);
         for (spec, is_traced) in [Some((spec, true)), of_one.as_ref().map(|spec| (spec, false))].into_iter().flatten() {
-            match spec.make_for(None, &scene) {
+            match spec.make_for(None, scene) {
                 Ok(subject) => entrants.push(Entrant { subject, is_traced }),
                 Err(error) => failures.push(OnScene::failure(&scene.name, Some(spec), error)),
             }

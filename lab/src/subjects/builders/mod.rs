@@ -334,6 +334,16 @@ mod tests {
             error_of("lbvh:width=4:any-hit=sato").contains("orders of children are for nodes of two; take width=2")
         );
         assert!(error_of("kd-exact:any-hit=sato").contains("no option \"any-hit\""));
+        assert!(error_of("sweep:heuristic=best").contains("heuristic=best is unknown; use sah, interior"));
+        assert!(error_of("bonsai:heuristic=rdh").contains("bonsai has no option \"heuristic\""));
+        assert!(error_of("binned:heuristic=rdh:rays=primary+light").contains("rays=primary+light is unknown; use all"));
+        assert!(error_of("binned:heuristic=osah:weight=2").contains("weight=2 is unknown; use a number from 0 to 1"));
+        assert!(error_of("sweep:optimise=top-65").contains("optimise=top-65 is unknown; use off"));
+        assert!(error_of("sbvh:budget=0.5").contains("budget=0.5 is unknown; use a number from 1 to 16"));
+        let mesh = Mesh::default();
+        let error =
+            "sweep:heuristic=perspective".parse::<Spec>().expect("known").make(None, &mesh).err().expect("no camera");
+        assert!(error.to_string().contains("there is only a mesh here"), "{error}");
         assert!(error_of("auto:rays=many").contains("is not a number of rays per build"));
         assert!(error_of("").contains("-b all"));
         assert!(error_of(",").contains("-b all"));

@@ -25,7 +25,7 @@ use hedgerow_host::bvh::binned::{BinnedAxes, BinnedOptions, Bins};
 use hedgerow_host::bvh::heuristic::InteriorForm;
 use hedgerow_host::bvh::{
     AacOptions, BonsaiOptions, HostBvhOptions, HostMethod, HostOptimise, IncrementalOptions, IncrementalOrder,
-    Inefficiency, InsertionOptions, Termination,
+    Inefficiency, InsertionOptions, SbvhOptions, Termination, TopOptions,
 };
 use hedgerow_host::kdtree::{HostKdOptions, Planes};
 use std::num::NonZeroU32;
@@ -73,6 +73,13 @@ pub(super) const LEAF: BuilderOption = option("leaf", "a number of triangles fro
 pub(super) const AXES: BuilderOption = option("axes", "longest or all");
 pub(super) const HOST_BINS: BuilderOption =
     option("bins", "a number of bins from 2 to 256, or adaptive: 4 + 2 √n of n triangles");
+pub(super) const SBVH_BINS: BuilderOption = option("bins", "a number of bins from 2 to 128, for splits of either kind");
+pub(super) const ALPHA: BuilderOption = option(
+    "alpha",
+    "a number from 0 to 1: triangles are split where sides overlap by this part of the scene's area; 1e-5 unless given",
+);
+pub(super) const BUDGET: BuilderOption =
+    option("budget", "a number from 1 to 16: references at most, for each triangle; 2 unless given");
 pub(super) const MINI: BuilderOption =
     option("mini", "a number of triangles at most in a mini tree, from 1 to 1000000");
 pub(super) const PRUNE: BuilderOption =
@@ -98,7 +105,7 @@ pub(super) const OPTIMISE: BuilderOption = option(
 pub(super) const HOST_OPTIMISE: BuilderOption = option(
     "optimise",
     "off; fast, medium, high or a number of passes of reinsertion; insertion, or by one measure alone insertion-sum, \
-             insertion-min or insertion-area",
+             insertion-min or insertion-area; top, or top-N: the best top over N subtrees, 2 to 64 and 32 unless given",
 );
 pub(super) const BATCH: BuilderOption =
     option("batch", "a number of triangles from 1 to 100000000 that are put in between two optimisations");
@@ -135,6 +142,9 @@ pub(super) const TRACE_TREE: BuilderOption = option(
 
 /// Threads that a builder may have of its own.
 const MOST_THREADS: NonZeroU32 = NonZeroU32::new(1024).expect("not 0");
+
+/// Subtrees that the best top is sought over where it is not told: 64 may take a minute.
+const TOP_SUBTREES: u32 = 32;
 
 /// Of `ploc` where it is not told: what drivers take.
 const PLOC_RADIUS: u32 = 16;
@@ -249,6 +259,16 @@ impl Spec {
         self.on_host(HostMethod::Binned(options))
     }
 
+    /// Options `alpha`, `budget` and `bins`, and those of every builder on the host.
+    pub(super) fn sbvh(&self) -> Result<BuilderPlan> {
+        let paper = SbvhOptions::PAPER;
+        self.on_host(HostMethod::Sbvh(SbvhOptions {
+            alpha: self.within(&ALPHA, 0.0..=1.0)?.unwrap_or(paper.alpha),
+            budget: self.within(&BUDGET, 1.0..=SbvhOptions::MOST_BUDGET)?.unwrap_or(paper.budget),
+            bins: self.within(&SBVH_BINS, 2..=SbvhOptions::MOST_BINS)?.unwrap_or(paper.bins),
+        }))
+    }
+
     /// Options `mini` and `prune`, where they differ from the preset's, and those of every builder on the host.
     pub(super) fn bonsai(&self, preset: BonsaiOptions) -> Result<BuilderPlan> {
         let mini = self.within(&MINI, 1..=1_000_000)?.unwrap_or(preset.mini);
@@ -336,6 +356,12 @@ impl Spec {
             Some("insertion-min") => Inefficiency::Min,
             Some("insertion-area") => Inefficiency::Area,
             Some(value) if value.starts_with("insertion") => return Err(self.wrong_value(&HOST_OPTIMISE, value)),
+            Some("top") => return Ok(HostOptimise::Top(TopOptions { subtrees: TOP_SUBTREES })),
+            Some(value) if value.starts_with("top-") => {
+                let subtrees = value["top-".len()..].parse().ok().filter(|subtrees| (2..=64).contains(subtrees));
+                let subtrees = subtrees.ok_or_else(|| self.wrong_value(&HOST_OPTIMISE, value))?;
+                return Ok(HostOptimise::Top(TopOptions { subtrees }));
+            }
             _ => return Ok(self.reinsertion_on_host()?.map_or(HostOptimise::Off, HostOptimise::Reinsertion)),
         };
         Ok(HostOptimise::Insertion(InsertionOptions::by(measure)))

@@ -1,10 +1,10 @@
 //! The list of all builders.
 
 use super::options::{
-    ANY_HIT, AXES, BATCH, BINS, BITS, CODES, COLLAPSE, DELTA, EPSILON, EXACT, HEURISTIC, HOST_BINS, HOST_OPTIMISE,
-    INSERT_ORDER, KD_SCHEDULE, KI, KT, LEAF, MINI, OPTIMISE, ORDER, PRUNE, RADIUS, RAYS, SAMPLE, SCHEDULE, SEARCH,
-    SPLIT, TEACHING_RAYS, TERMINATION, TERMINATION_BY, TERMINATION_FLAT, THREADS, TRACE, TRACE_TREE, TRAVERSAL,
-    TREELET, WEIGHT, WIDTH, WINDOW, WORKGROUPS,
+    ALPHA, ANY_HIT, AXES, BATCH, BINS, BITS, BUDGET, CODES, COLLAPSE, DELTA, EPSILON, EXACT, HEURISTIC, HOST_BINS,
+    HOST_OPTIMISE, INSERT_ORDER, KD_SCHEDULE, KI, KT, LEAF, MINI, OPTIMISE, ORDER, PRUNE, RADIUS, RAYS, SAMPLE,
+    SBVH_BINS, SCHEDULE, SEARCH, SPLIT, TEACHING_RAYS, TERMINATION, TERMINATION_BY, TERMINATION_FLAT, THREADS, TRACE,
+    TRACE_TREE, TRAVERSAL, TREELET, WEIGHT, WIDTH, WINDOW, WORKGROUPS,
 };
 use super::{BuilderPlan, Spec};
 use crate::Result;
@@ -165,6 +165,15 @@ pub static BUILDERS: &[BuilderEntry] = &[
             THREADS,
         ])
         .in_variants(&["binned", "binned:axes=all"]),
+    on_host(&"sbvh", "binned SAH on the host that also splits triangles between bins of space", Spec::sbvh).taking(&[
+        ALPHA,
+        BUDGET,
+        SBVH_BINS,
+        TERMINATION,
+        COLLAPSE,
+        HOST_OPTIMISE,
+        THREADS,
+    ]),
     on_host(&"bonsai", "sweeps over parts of 512 triangles on the host, and one over their trees", |spec| {
         spec.bonsai(BonsaiOptions::PLAIN)
     })
