@@ -3,6 +3,7 @@
 //! A builder with its options is a [`Spec`]: `lbvh:codes=emc64var:collapse=off`. [`BUILDERS`] is the list of all there are;
 //! to add one, add a row there.
 
+mod host_options;
 mod options;
 mod plan;
 mod table;
