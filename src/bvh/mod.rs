@@ -17,6 +17,7 @@ pub mod child_order;
 pub mod codes;
 mod collapse;
 pub mod compact;
+pub mod counts;
 pub(crate) mod cover;
 pub(crate) mod encode;
 pub mod epo;
