@@ -65,6 +65,7 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         built_cost,
         built_area,
         split_from,
+        child_order,
         reserved
     });
     // `active` is a reserved word of GLSL.

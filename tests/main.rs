@@ -17,12 +17,14 @@ mod accel {
     mod blas;
     mod boxes;
     mod checked;
+    mod child_order;
     mod copy;
     mod empty;
     mod facing;
     mod host;
     mod indirect;
     mod instances;
+    mod link_counts;
     mod memory;
     mod rays;
     mod rebraid;

@@ -1,7 +1,7 @@
 //! Whoever has warmed a context waits for no pipeline: a first build or update makes none.
 
 use crate::common::{OPTIONS, corpus, open};
-use hedgerow::accel::{self, Instance, Placement, REBRAID, Request};
+use hedgerow::accel::{self, ANY_HIT_ORDER, Instance, Placement, REBRAID, Request};
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::geometry::Geometry;
@@ -25,7 +25,8 @@ fn first_builds_make_no_pipelines() {
         "lbvh:codes=bin4a4",
         "lbvh:split=0.3:optimise=fast",
         "lbvh:width=8q",
-        "hlbvh",
+        "lbvh:any-hit=opaque",
+        "hlbvh:any-hit=sato",
         "ploc",
         "hploc:width=4",
         "kd-gpu:schedule=chain",
@@ -51,7 +52,9 @@ fn first_builds_make_no_pipelines() {
 #[test]
 fn first_builds_and_updates_make_no_pipelines() {
     let (_, positions, triangles) = corpus::random("", 3000, [-0.5; 3], [1.0; 3]);
-    for flags in [Flags::empty(), Flags::PREFER_FAST_BUILD | Flags::ALLOW_UPDATE, Flags::LOW_MEMORY, REBRAID] {
+    for flags in
+        [Flags::empty(), Flags::PREFER_FAST_BUILD | Flags::ALLOW_UPDATE, Flags::LOW_MEMORY, REBRAID, ANY_HIT_ORDER]
+    {
         let device = cold(TuningChoice::Auto);
         let ours = accel::Device::new(&device);
         let requests = |vertices: u64, indices: u64, instances: u64| {

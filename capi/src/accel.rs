@@ -18,6 +18,9 @@ const _: () = assert!(
 /// A build flag of hedgerow's own: a top level may open instances whose boxes are loose (re-braiding).
 pub const HEDGEROW_BUILD_ACCELERATION_STRUCTURE_REBRAID_BIT: u32 = 1 << 30;
 const _: () = assert!(HEDGEROW_BUILD_ACCELERATION_STRUCTURE_REBRAID_BIT == accel::REBRAID.as_raw());
+/// Another: children get an order for rays that end at their first hit, which queries with TerminateOnFirstHit follow.
+pub const HEDGEROW_BUILD_ACCELERATION_STRUCTURE_ANY_HIT_ORDER_BIT: u32 = 1 << 29;
+const _: () = assert!(HEDGEROW_BUILD_ACCELERATION_STRUCTURE_ANY_HIT_ORDER_BIT == accel::ANY_HIT_ORDER.as_raw());
 
 /// `vkGetAccelerationStructureBuildSizesKHR`: bytes that a build of at most this many primitives a geometry needs.
 ///

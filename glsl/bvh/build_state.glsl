@@ -23,7 +23,7 @@ struct BuildParts {
     uint values[2];
     uint table;
     uint ends;                 // of the radix tree's nodes: where the child that came first ends
-    uint child_costs[2];       // of left and right children, in climbs of the radix tree
+    uint child_costs[2];       // of left and right children, in climbs of the radix tree; behind them weights (bvh/run.glsl)
     uint weights;
     uint clusters;
     uint lists[2];             // of PLOC: the clusters of even and odd rounds; of H-PLOC the first

@@ -44,9 +44,9 @@ void copy_bytes(uvec2 from, uvec2 to, uvec2 bytes) {
 
 // The header of a structure of nothing that stands for what this version cannot read.
 Header header_of_wrong_version() {
-    uint reserved[8];
-    for (uint i = 0; i < 8; ++i) reserved[i] = 0;
-    return Header(MAGIC, KIND_TRIANGLES, STATUS_WRONG_VERSION, 0, empty_root(), 0, 1, 0, 0, 1, 0, 0, 0.0, 0.0, 0.0, 0.0, 0, reserved);
+    uint reserved[7];
+    for (uint i = 0; i < 7; ++i) reserved[i] = 0;
+    return Header(MAGIC, KIND_TRIANGLES, STATUS_WRONG_VERSION, 0, empty_root(), 0, 1, 0, 0, 1, 0, 0, 0.0, 0.0, 0.0, 0.0, 0, 0, reserved);
 }
 
 // One invocation of the dispatch writes it.

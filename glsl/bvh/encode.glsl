@@ -189,7 +189,8 @@ void write_header(BuildState state, uint geometry_count, uint geometry_flags) {
     structure.header.built_cost = 0.0;
     structure.header.built_area = 0.0;
     structure.header.split_from = HAS_REFERENCES ? SplitState(part(parts.split)).primitive_count : 0;
-    for (uint i = 0; i < 8; ++i) structure.header.reserved[i] = 0;
+    structure.header.child_order = 0;
+    for (uint i = 0; i < 7; ++i) structure.header.reserved[i] = 0;
     if (primitive_count < 2) mark_unused(structure, 0);
 }
 

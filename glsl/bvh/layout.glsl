@@ -91,7 +91,8 @@ struct Header {
     float built_cost;
     float built_area;
     uint split_from;
-    uint reserved[8];
+    uint child_order;         // 1: left children are those that rays look into first that end at any hit
+    uint reserved[7];
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer Structure {

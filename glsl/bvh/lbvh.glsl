@@ -8,6 +8,9 @@
 #ifndef HEDGEROW_BVH_LBVH
 #define HEDGEROW_BVH_LBVH
 #include "bvh/encode.glsl"
+
+// ChildOrder::rule in src/bvh/child_order.rs, or 0: children stay as the codes have them.
+layout(constant_id = 7) const uint RULE = 0;
 #include "bvh/run.glsl"
 
 // Marks the slots below a leaf over the positions first..=last; how many had a node of the tree.
@@ -22,6 +25,34 @@ uint free_slots(Structure structure, uint first, uint last) {
     return freed;
 }
 
+// Puts the children of the node at hand in order, of which `s` has the box; its weight, if it is no leaf. No other invocation looks at
+// the node any more.
+Weight order_children(Run run, uint slot, bool is_left, float area, Subtree own, Sibling sibling, float area_scale) {
+    Child left = own.child, right = sibling.child;
+    Weight of_left = own.weight, of_right = sibling.weight;
+    if (!is_left) {
+        left = sibling.child;
+        right = own.child;
+        of_left = sibling.weight;
+        of_right = own.weight;
+    }
+    vec2 areas = vec2(scaled_half_area(Box(left.lo, left.hi), area_scale), scaled_half_area(Box(right.lo, right.hi), area_scale));
+    bool swaps;
+    Weight weight = weight_in_order(of_left, of_right, areas, area, c_t, swaps);
+    if (swaps) {
+        run.structure.nodes[slot].left = right;
+        run.structure.nodes[slot].right = left;
+    }
+    return weight;
+}
+
+// The area by which a ray meets the primitive of a record with this half area of its box; of a triangle that was split what the box
+// has room for.
+float area_of_record(uvec2 records, uint position, float box_area, float area_scale) {
+    if (!HAS_AREAS || kind_of_records() != KIND_TRIANGLES) return box_area;
+    return min(area_of_triangle(Triangles(records).triangle[position], area_scale), box_area);
+}
+
 // From a subtree up, as far as siblings are there.
 void climb(inout Run run, float area_scale, Subtree s, inout uint unused) {
     Structure structure = run.structure;
@@ -32,16 +63,18 @@ void climb(inout Run run, float area_scale, Subtree s, inout uint unused) {
             structure.header.root = s.child;
             structure.header.cost = s.cost;
             structure.header.built_cost = s.cost;
+            if (RULE != AS_BUILT && s.child.count == 0u) structure.header.child_order = 1u;
             break;
         }
         bool is_left = is_left_child(s);
         uint parent = parent_of(s, is_left);
-        float sibling_cost;
-        if (!step_up(run, is_left, parent, s, sibling_cost)) break;
+        Subtree own = s;
+        Sibling sibling;
+        if (!step_up(run, is_left, parent, s, sibling)) break;
         uint count = s.last - s.first + 1;
         float area = scaled_half_area(Box(s.child.lo, s.child.hi), area_scale);
         float as_leaf = leaf_cost(c_i, area, count);
-        s.cost = inner_cost(c_t, area, s.cost, sibling_cost);
+        s.cost = inner_cost(c_t, area, s.cost, sibling.cost);
         bool as_leaf_is_cheaper = collapses != 0 && as_leaf < s.cost;
         s.child.index = as_leaf_is_cheaper ? s.first : parent;
         s.child.count = as_leaf_is_cheaper ? count : 0;
@@ -49,6 +82,12 @@ void climb(inout Run run, float area_scale, Subtree s, inout uint unused) {
             s.cost = as_leaf;
             unused += free_slots(structure, s.first, s.last);
         }
+        if (HAS_AREAS) {
+            precise float area_of_both = own.area + sibling.area;
+            s.area = area_of_both;
+        }
+        if (RULE != AS_BUILT && as_leaf_is_cheaper) s.weight = weight_of_leaf(s.area, area, count, c_i);
+        else if (RULE != AS_BUILT) s.weight = order_children(run, parent, is_left, area, own, sibling, area_scale);
     }
 }
 
@@ -75,7 +114,12 @@ void lbvh_hierarchy(uint task) {
                 s.first = position;
                 s.last = position;
                 s.child = Child(b.lo, position, b.hi, 1);
-                s.cost = leaf_cost(c_i, scaled_half_area(b, area_scale), 1);
+                float area = scaled_half_area(b, area_scale);
+                s.cost = leaf_cost(c_i, area, 1);
+                if (RULE != AS_BUILT && climbs) {
+                    s.area = area_of_record(records, position, area, area_scale);
+                    s.weight = weight_of_leaf(s.area, area, 1u, c_i);
+                }
                 position++;
             } else if (run.waiting > 0) {
                 s = take_waiting(run, min(end, run.active_count));

@@ -48,8 +48,9 @@ void plan_parts(uint state_bytes) {
     parts.values[1u - sorted] = take(at, word_bytes);
     parts.table = at;
     // Behind the sort.
-    parts.child_costs[0] = take(behind_ends, word_bytes);
-    parts.child_costs[1] = take(behind_ends, word_bytes);
+    uint weight_bytes = HAS_WEIGHTS ? 3u * word_bytes : 0u;
+    parts.child_costs[0] = take(behind_ends, word_bytes + weight_bytes);
+    parts.child_costs[1] = take(behind_ends, word_bytes + weight_bytes);
 }
 
 void main() {

@@ -5,10 +5,13 @@
 // On a GPU runs are short, and a fence for the device costs hundreds of cycles. There a task has two turns. In the first,
 // invocations meet in shared memory, as far as the workgroup's positions go, with fences for the workgroup alone. In the second
 // those subtrees go on whose siblings reach beyond it, a few for each level: they meet those of other workgroups.
+//
+// Where children get an order on the way (RULE, of bvh/child_weights.glsl), subtrees have weights beside their costs.
 #ifndef HEDGEROW_BVH_RUN
 #define HEDGEROW_BVH_RUN
 #include "bvh/build_state.glsl"
 #include "bvh/radix_tree.glsl"
+#include "bvh/child_weights.glsl"
 
 // A finished subtree over the positions first..=last, and how the codes differ before and behind it.
 struct Subtree {
@@ -18,6 +21,24 @@ struct Subtree {
     uvec3 behind;
     Child child;
     float cost;
+    Weight weight;
+    float area;    // of its primitives
+};
+
+// What a node's children are weighed by, beside their costs.
+struct ChildWeight {
+    Weight weight;
+    float area;
+};
+
+BUFFER ChildWeights { ChildWeight of[]; };
+
+// The sibling of a subtree that has stepped up.
+struct Sibling {
+    Child child;
+    float cost;
+    Weight weight;
+    float area;
 };
 
 const bool MEETS_IN_GROUP = ITEMS_WORD >> 16 != 0u;
@@ -30,6 +51,8 @@ struct Run {
     Words ends;
     Floats left_costs;
     Floats right_costs;
+    ChildWeights left_weights;     // behind the costs
+    ChildWeights right_weights;
     uint active_count;
     uint first;
     uint waiting;
@@ -59,6 +82,8 @@ Run run_of(uint task) {
     run.ends = Words(part(parts.ends));
     run.left_costs = Floats(part(parts.child_costs[0]));
     run.right_costs = Floats(part(parts.child_costs[1]));
+    run.left_weights = ChildWeights(address_of(uvec2(run.left_costs), primitive_count, 4u));
+    run.right_weights = ChildWeights(address_of(uvec2(run.right_costs), primitive_count, 4u));
     run.active_count = build_state().active_count;
     run.first = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
     run.waiting = 0u;
@@ -84,6 +109,24 @@ void end_turn() {
     if (MEETS_IN_GROUP) next_phase();
 }
 
+void load_weight(Run run, bool is_left, uint parent, out Weight weight, out float area) {
+    weight = Weight(0.0, 0.0);
+    area = 0.0;
+    if (!HAS_WEIGHTS) return;
+    ChildWeight of_child;
+    if (is_left) of_child = run.left_weights.of[parent];
+    else of_child = run.right_weights.of[parent];
+    weight = of_child.weight;
+    area = of_child.area;
+}
+
+void store_weight(Run run, bool is_left, uint parent, Subtree s) {
+    if (!HAS_WEIGHTS) return;
+    ChildWeight of_child = ChildWeight(s.weight, s.area);
+    if (is_left) run.left_weights.of[parent] = of_child;
+    else run.right_weights.of[parent] = of_child;
+}
+
 // The next subtree, from this split on, whose sibling has not come in the workgroup.
 bool take_left_over(Run run, inout uint split, out Subtree s) {
     for (; split < GROUP_SPLITS; split += gl_WorkGroupSize.x) {
@@ -96,6 +139,7 @@ bool take_left_over(Run run, inout uint split, out Subtree s) {
         if (is_left) s.child = run.structure.nodes[parent].left;
         else s.child = run.structure.nodes[parent].right;
         s.cost = is_left ? run.left_costs.value[parent] : run.right_costs.value[parent];
+        load_weight(run, is_left, parent, s.weight, s.area);
         split += gl_WorkGroupSize.x;
         return true;
     }
@@ -112,6 +156,7 @@ Subtree take_waiting(inout Run run, uint end) {
     s.first = run_firsts[run_slot(run.waiting)];
     s.child = run.structure.nodes[s.last].left;
     s.cost = run.left_costs.value[s.last];
+    load_weight(run, true, s.last, s.weight, s.area);
     return s;
 }
 
@@ -149,7 +194,7 @@ uint meet_in_device(Run run, uint parent, uint end) {
 }
 
 // Whether the sibling is there; then `s` has the positions and the box of both.
-bool step_up(inout Run run, bool is_left, uint parent, inout Subtree s, out float sibling_cost) {
+bool step_up(inout Run run, bool is_left, uint parent, inout Subtree s, out Sibling sibling) {
     if (is_left) {
         run.structure.nodes[parent].left = s.child;
         run.left_costs.value[parent] = s.cost;
@@ -157,6 +202,7 @@ bool step_up(inout Run run, bool is_left, uint parent, inout Subtree s, out floa
         run.structure.nodes[parent].right = s.child;
         run.right_costs.value[parent] = s.cost;
     }
+    store_weight(run, is_left, parent, s);
     uint end = NONE;
     if (is_left && s.first >= run.first) {
         run_firsts[run_slot(run.waiting)] = s.first;
@@ -170,20 +216,20 @@ bool step_up(inout Run run, bool is_left, uint parent, inout Subtree s, out floa
         else end = meet_in_device(run, parent, own_end);
     }
     if (end != NONE) {
-        Child sibling;
         if (is_left) {
             s.last = end;
             s.behind = difference_behind(run.codes, s.last, run.active_count);
-            sibling = run.structure.nodes[parent].right;
-            sibling_cost = run.right_costs.value[parent];
+            sibling.child = run.structure.nodes[parent].right;
+            sibling.cost = run.right_costs.value[parent];
         } else {
             s.first = end;
             s.before = difference_before(run.codes, s.first);
-            sibling = run.structure.nodes[parent].left;
-            sibling_cost = run.left_costs.value[parent];
+            sibling.child = run.structure.nodes[parent].left;
+            sibling.cost = run.left_costs.value[parent];
         }
-        s.child.lo = min(s.child.lo, sibling.lo);
-        s.child.hi = max(s.child.hi, sibling.hi);
+        load_weight(run, !is_left, parent, sibling.weight, sibling.area);
+        s.child.lo = min(s.child.lo, sibling.child.lo);
+        s.child.hi = max(s.child.hi, sibling.child.hi);
     }
     return end != NONE;
 }

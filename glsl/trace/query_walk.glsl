@@ -3,6 +3,10 @@
 // The stack is one: the entries of the bottom-level structure at hand lie above those of the top level. Each round takes a step
 // of each kind that there is to take (what waits, an instance, a node, a primitive): invocations that wait for each other's steps
 // are fewer than with a loop for each kind.
+//
+// A query that ends at its first hit keeps no distances, as nothing is nearer than the end of its ray until then; in a structure whose
+// children are in order (bvh/child_order.glsl) it takes the left child first, wherever that is. What a query asks for is mostly known
+// when its shader is compiled, and then nothing is left of the other way.
 #ifndef HEDGEROW_TRACE_QUERY_WALK
 #define HEDGEROW_TRACE_QUERY_WALK
 #include "bvh/layout.glsl"
@@ -48,6 +52,31 @@ const uint HEDGEROW_MOST = 1u << 27;
 #define HEDGEROW_COUNT(member)
 #endif
 
+// A shader that defines HEDGEROW_LINK_COUNTS, the name of a function `uvec2 f(uvec2 structure)` of its own, has counted what its rays
+// do below each node of bottom-level structures: `entered` and `hits` of LinkCount in src/bvh/counts.rs, `work` is left as it is. The
+// function gives the address of a structure's counts, which are added to, or 0 to have none. Where an instance begins there is no link.
+// A hit counts at the link of its leaf alone: those of a node are those of the leaves below it. It counts when the query ends: at the
+// first hit, where that ends it, or when hedgerowRayQueryProceed returns false.
+#ifdef HEDGEROW_LINK_COUNTS
+layout(buffer_reference, scalar, buffer_reference_align = 4) nonprivate buffer HedgerowCounts { uint word[]; };
+const uint HEDGEROW_LINK_COUNT_WORDS = 3u;
+const uint HEDGEROW_ENTERED = 0u;
+const uint HEDGEROW_HITS = 1u;
+const uint HEDGEROW_NO_LINK = 0xffffffffu;
+
+struct HedgerowLink {
+    uvec2 counts;   // of the structure
+    uint link;      // 2 * slot + 1 for a right child
+};
+
+uint hedgerow_waiting_links[HEDGEROW_LEVELS];
+
+void hedgerow_count(HedgerowLink at, uint which) {
+    if (at.link == HEDGEROW_NO_LINK || all(equal(at.counts, uvec2(0)))) return;
+    atomicAdd(HedgerowCounts(at.counts).word[HEDGEROW_LINK_COUNT_WORDS * at.link + which], 1u);
+}
+#endif
+
 struct HedgerowMeeting {
     uint type;
     float t;
@@ -76,6 +105,7 @@ struct HedgerowRayQuery {
     uint instance;            // record in the top level
     uint instance_flags;
     uint records;
+    bool left_first;
     // Where its entries of the stack begin, and whether it is below the one that is queried.
     uint bottom;
     bool is_below;
@@ -91,6 +121,10 @@ struct HedgerowRayQuery {
     HedgerowMeeting committed;
 #ifdef HEDGEROW_COUNTS_WORK
     uvec4 work;
+#endif
+#ifdef HEDGEROW_LINK_COUNTS
+    HedgerowLink at;
+    HedgerowLink hit_at;
 #endif
 };
 
@@ -127,6 +161,10 @@ void hedgerow_widen_for(uint kind, inout HedgerowPreparedRay prepared) {
     prepared.margin *= 8.0;
 }
 
+bool hedgerow_ends_at_first_hit(HedgerowRayQuery query) {
+    return (query.flags & hedgerowRayFlagsTerminateOnFirstHit) != 0u;
+}
+
 // Nothing is at hand, and nothing waits.
 void hedgerow_end(inout HedgerowRayQuery query) {
     query.left = HEDGEROW_NOTHING;
@@ -151,12 +189,17 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
 #ifdef HEDGEROW_COUNTS_WORK
     query.work = uvec4(0u);
 #endif
+#ifdef HEDGEROW_LINK_COUNTS
+    query.at = HedgerowLink(uvec2(0u), HEDGEROW_NO_LINK);
+    query.hit_at = query.at;
+#endif
     hedgerow_end(query);
     query.index = 0u;
     query.top_slots = 0u;
     query.top_kind = 0u;
     query.slots = 0u;
     query.records = 0u;
+    query.left_first = false;
     query.kind = 0u;
     query.geometry_flags = 0u;
     query.rounds = 0u;
@@ -167,6 +210,7 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.top_kind = header.kind;
     query.slots = header.node_slots;
     query.records = header.primitive_count;
+    query.left_first = hedgerow_ends_at_first_hit(query) && header.child_order != 0u;
     query.kind = header.kind;
     query.geometry_flags = header.geometry_flags;
     query.rounds = hedgerow_rounds(header);
@@ -177,7 +221,18 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
         hedgerow_can_be_traced(header) && !hedgerow_skips(flags, header.kind)) {
         query.index = header.root.index;
         query.left = header.root.count;
+#ifdef HEDGEROW_LINK_COUNTS
+        if (header.kind != KIND_INSTANCES) query.at.counts = HEDGEROW_LINK_COUNTS(structure);
+#endif
     }
+}
+
+// What counts at the end counts once.
+void hedgerow_count_hit(inout HedgerowRayQuery query) {
+#ifdef HEDGEROW_LINK_COUNTS
+    hedgerow_count(query.hit_at, HEDGEROW_HITS);
+    query.hit_at.link = HEDGEROW_NO_LINK;
+#endif
 }
 
 // The geometry of a primitive.
@@ -218,7 +273,20 @@ bool hedgerow_comes_before(HedgerowRayQuery query) {
 void hedgerow_commit(inout HedgerowRayQuery query) {
     query.committed = query.candidate;
     query.best = query.candidate.t;
-    if ((query.flags & hedgerowRayFlagsTerminateOnFirstHit) != 0u) hedgerow_end(query);
+#ifdef HEDGEROW_LINK_COUNTS
+    query.hit_at = query.at;
+#endif
+    if (hedgerow_ends_at_first_hit(query)) {
+        hedgerow_count_hit(query);
+        hedgerow_end(query);
+    }
+}
+
+// What the ray enters at this distance waits.
+void hedgerow_put_off(inout HedgerowRayQuery query, uint index, uint count, float enter) {
+    if (hedgerow_ends_at_first_hit(query)) hedgerow_put_anyway(query.level, index, count);
+    else hedgerow_put(query.level, HedgerowWaiting(index, count, enter));
+    query.level++;
 }
 
 void hedgerow_visit(inout HedgerowRayQuery query) {
@@ -235,12 +303,18 @@ void hedgerow_visit(inout HedgerowRayQuery query) {
     bool enters_a, enters_b;
     float enter_a = hedgerow_enter(query.prepared, a.lo, a.hi, query.best, enters_a);
     float enter_b = hedgerow_enter(query.prepared, b.lo, b.hi, query.best, enters_b);
-    bool b_first = enters_b && (!enters_a || enter_b < enter_a);
+    bool b_first = enters_b && (!enters_a || (enter_b < enter_a && !query.left_first));
     bool has_room = query.level - query.bottom < MAX_DEPTH;
     if (enters_a && enters_b && has_room) {
-        hedgerow_put(query.level, b_first ? HedgerowWaiting(a.index, a.count, enter_a) : HedgerowWaiting(b.index, b.count, enter_b));
-        query.level++;
+#ifdef HEDGEROW_LINK_COUNTS
+        hedgerow_waiting_links[query.level] = 2u * query.index + (b_first ? 0u : 1u);
+#endif
+        hedgerow_put_off(query, b_first ? a.index : b.index, b_first ? a.count : b.count, b_first ? enter_a : enter_b);
     }
+#ifdef HEDGEROW_LINK_COUNTS
+    query.at.link = 2u * query.index + (b_first ? 1u : 0u);
+    if (enters_a || enters_b) hedgerow_count(query.at, HEDGEROW_ENTERED);
+#endif
     query.index = b_first ? b.index : a.index;
     query.left = enters_a || enters_b ? b_first ? b.count : a.count : HEDGEROW_NOTHING;
 }
@@ -270,13 +344,13 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     }
     // The rest of the leaf waits.
     if (query.left != HEDGEROW_NOTHING && query.level - query.floor < MAX_DEPTH) {
-        hedgerow_put(query.level, HedgerowWaiting(query.index, query.left, -HEDGEROW_INFINITY));
-        query.level++;
+        hedgerow_put_off(query, query.index, query.left, -HEDGEROW_INFINITY);
     }
     query.prepared = prepared;
     query.structure = instance.structure;
     query.slots = header.node_slots;
     query.records = header.primitive_count;
+    query.left_first = hedgerow_ends_at_first_hit(query) && header.child_order != 0u;
     query.top_rounds = query.rounds;
     query.rounds = hedgerow_rounds(header);
     query.is_below = true;
@@ -286,6 +360,9 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     query.instance_flags = flags;
     query.bottom = query.level;
     bool is_whole = instance.start_count == AT_ROOT;
+#ifdef HEDGEROW_LINK_COUNTS
+    query.at = HedgerowLink(HEDGEROW_LINK_COUNTS(instance.structure), HEDGEROW_NO_LINK);
+#endif
     query.index = is_whole ? header.root.index : instance.start;
     query.left = is_whole ? header.root.count : instance.start_count;
 }
@@ -298,10 +375,14 @@ void hedgerow_leave_instance(inout HedgerowRayQuery query) {
     query.structure = query.top;
     query.slots = query.top_slots;
     query.records = header.primitive_count;
+    query.left_first = hedgerow_ends_at_first_hit(query) && header.child_order != 0u;
     query.kind = query.top_kind;
     query.bottom = query.floor;
     query.rounds = query.top_rounds;
     query.is_below = false;
+#ifdef HEDGEROW_LINK_COUNTS
+    query.at = HedgerowLink(uvec2(0u), HEDGEROW_NO_LINK);
+#endif
 }
 
 // Whether a meeting with the geometry of the primitive is a hit without asking.
@@ -371,10 +452,20 @@ bool hedgerow_go_on(inout HedgerowRayQuery query) {
         return true;
     }
     query.level--;
-    HedgerowWaiting waiting = hedgerow_taken(query.level);
-    query.index = waiting.index;
-    // Equally far is not too far: an equally near hit that comes before may be there.
-    query.left = waiting.enter <= query.best ? waiting.count : HEDGEROW_NOTHING;
+    if (hedgerow_ends_at_first_hit(query)) {
+        uvec2 waiting = hedgerow_taken_anyway(query.level);
+        query.index = waiting.x;
+        query.left = waiting.y;
+    } else {
+        HedgerowWaiting waiting = hedgerow_taken(query.level);
+        query.index = waiting.index;
+        // Equally far is not too far: an equally near hit that comes before may be there.
+        query.left = waiting.enter <= query.best ? waiting.count : HEDGEROW_NOTHING;
+    }
+#ifdef HEDGEROW_LINK_COUNTS
+    query.at.link = hedgerow_waiting_links[query.level];
+    if (query.left != HEDGEROW_NOTHING) hedgerow_count(query.at, HEDGEROW_ENTERED);
+#endif
     return true;
 }
 
@@ -386,7 +477,10 @@ bool hedgerow_proceed(inout HedgerowRayQuery query) {
     while (query.rounds != 0u) {
         query.rounds--;
         while (query.left == HEDGEROW_NOTHING) {
-            if (!hedgerow_go_on(query)) return false;
+            if (!hedgerow_go_on(query)) {
+                hedgerow_count_hit(query);
+                return false;
+            }
         }
         if (hedgerow_has_record(query) && query.kind == KIND_INSTANCES) hedgerow_enter_instance(query);
         if (query.left == 0u) hedgerow_visit(query);

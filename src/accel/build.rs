@@ -3,12 +3,13 @@
 use super::geometry::{self, BuildGeometries};
 use super::instances::{ENTRY_BYTES, entries_step};
 use super::rebraid::Rebraid;
-use super::{AccelOptions, REBRAID};
+use super::{ANY_HIT_ORDER, AccelOptions, REBRAID};
 use crate::bvh::builder::{self, BuildJob, Builder};
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
 use crate::bvh::refit::{self, Refit};
 use crate::bvh::sah::Collapse;
+use crate::bvh::twin::lbvh::Finish;
 use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Region, Sizes, Step, shaders};
 use crate::{Error, Result};
@@ -26,7 +27,8 @@ const KNOWN_FLAGS: Flags = Flags::from_raw(
         | Flags::PREFER_FAST_TRACE.as_raw()
         | Flags::PREFER_FAST_BUILD.as_raw()
         | Flags::LOW_MEMORY.as_raw()
-        | REBRAID.as_raw(),
+        | REBRAID.as_raw()
+        | ANY_HIT_ORDER.as_raw(),
 );
 
 /// Where the numbers of primitives come from.
@@ -86,6 +88,7 @@ impl Build {
             codes: Some(codes(flags, entries)),
             // An instance costs more than a node whatever its box: one a leaf.
             collapse: if primitives == Primitives::Instances { Collapse::OFF } else { collapse(flags) },
+            child_order: super::child_order(flags),
             primitives,
             geometry_count: given.count(),
             build_flags: flags.as_raw() & 0x1f,
@@ -108,9 +111,10 @@ impl Build {
         Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
     }
 
-    /// What the host's builder takes: codes, collapsing, flags.
-    pub fn host_options(&self) -> (Codes, Collapse, u32) {
-        (self.builder.codes(), self.options.collapse, self.options.build_flags)
+    /// What the host's builder takes: codes, collapsing and order of children, flags.
+    pub fn host_options(&self) -> (Codes, Finish, u32) {
+        let builder::BuildOptions { collapse, child_order, build_flags, .. } = self.options;
+        (self.builder.codes(), Finish { collapse, child_order }, build_flags)
     }
 
     /// What it is over.

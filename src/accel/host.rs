@@ -66,7 +66,7 @@ unsafe fn built(
     // SAFETY: the caller's promise.
     let (given, count) = unsafe { build::told(info, ranges) }?;
     let build = Build::new(context, options, info.flags, given, Counts::OnHost, count)?;
-    let (codes, collapse, build_flags) = build.host_options();
+    let (codes, finish, build_flags) = build.host_options();
     let flags_of = |geometries: &[Geometry]| -> Vec<(u32, u32)> {
         geometries.iter().zip(ranges).map(|(g, range)| (range.primitive_count, g.flags.bits())).collect()
     };
@@ -77,7 +77,7 @@ unsafe fn built(
                 // SAFETY: the caller's promise.
                 corners.extend(unsafe { triangles(geometry, range.primitive_count) }.corners());
             }
-            let tree = lbvh::build_corners(corners.into_iter(), codes, collapse);
+            let tree = lbvh::build_corners(corners.into_iter(), codes, finish);
             Ok(tree.with_geometries(&flags_of(geometries), build_flags).to_bytes())
         }
         BuildGeometries::Boxes(geometries) => {
@@ -86,7 +86,7 @@ unsafe fn built(
                 // SAFETY: the caller's promise.
                 boxes.extend((0..range.primitive_count).map(|i| unsafe { box_at(geometry, i) }));
             }
-            let tree = lbvh::build_aabbs(&boxes, codes, collapse);
+            let tree = lbvh::build_aabbs(&boxes, codes, finish);
             Ok(tree.with_geometries(&flags_of(geometries), build_flags).to_bytes())
         }
         BuildGeometries::Instances { .. } => Err(Error::Argument(

@@ -28,6 +28,7 @@
 //! | `ALLOW_UPDATE` | `UPDATE` may follow: boxes move with their primitives, the tree stays ([`crate::bvh::refit`]); no re-braiding, as an opened instance cannot be refitted |
 //! | `ALLOW_COMPACTION` | larger leaves, as with `LOW_MEMORY`; every structure can be compacted |
 //! | [`REBRAID`] | a top level opens instances whose boxes are loose |
+//! | [`ANY_HIT_ORDER`] | children have an order for rays that end at their first hit |
 
 mod build;
 mod checked;
@@ -49,12 +50,25 @@ pub use instances::Instance;
 pub use properties::Property;
 pub use request::{Placement, Request};
 
+use crate::bvh::child_order::ChildOrder;
 use ash::vk;
 use rebraid::Rebraid;
 
 /// A build flag of hedgerow's own: a top level may open instances (Benthin, Woop, Wald 2017), within
 /// [`AccelOptions::rebraid_budget`].
 pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAccelerationStructureFlagsKHR::from_raw(1 << 30);
+
+/// Another of hedgerow's own: the children of all nodes get an order for rays that end at their first hit, by
+/// [`ChildOrder::MoreHitsForItsCost`]. Queries with `TerminateOnFirstHit` then look into the left child first instead of the nearer one.
+/// Which of them hit something stays the same, and so does everything about other queries. Updates and copies keep the order. A flag and
+/// no choice of the device: each structure that shadow rays meet pays for its own, at the bottom and at the top.
+pub const ANY_HIT_ORDER: vk::BuildAccelerationStructureFlagsKHR =
+    vk::BuildAccelerationStructureFlagsKHR::from_raw(1 << 29);
+
+/// The order of children that a build with these flags makes.
+fn child_order(flags: vk::BuildAccelerationStructureFlagsKHR) -> Option<ChildOrder> {
+    flags.contains(ANY_HIT_ORDER).then_some(ChildOrder::MoreHitsForItsCost)
+}
 
 /// Choices of a [`Device`] that Vulkan's structs have no field for.
 #[derive(Debug, Clone, Copy, PartialEq)]

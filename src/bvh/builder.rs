@@ -3,6 +3,7 @@
 //! [`Builder::sizes`] gives the memory that a build needs, [`Builder::record`] records the build. What all methods begin with
 //! is in `encode.rs`; each [`Method`] has a file of its own, and a twin in [`super::twin`] with the same bytes.
 
+use super::child_order::{ChildOrder, ChildOrderPass};
 use super::codes::{Code, Codes};
 use super::encode::Encode;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
@@ -35,6 +36,8 @@ pub struct BuildOptions {
     pub optimise: Option<reinsertion::ReinsertionOptions>,
     /// Whether a subtree becomes a leaf if that is cheaper.
     pub collapse: Collapse,
+    /// The order of children for rays that end at their first hit; `None` leaves them as the method makes them.
+    pub child_order: Option<ChildOrder>,
     /// How the phases are recorded; `None` takes the schedule that measured faster on such a device with this number of primitives.
     pub schedule: Option<Schedule>,
     /// What the tree is built over.
@@ -53,6 +56,7 @@ impl BuildOptions {
         split: None,
         optimise: None,
         collapse: Collapse::SAH,
+        child_order: None,
         schedule: None,
         primitives: Primitives::Triangles,
         geometry_count: 1,
@@ -116,6 +120,8 @@ pub struct Builder {
     /// What merges the windows of [`Method::Hploc`].
     merging: hploc::Merging,
     encode: Encode,
+    /// What puts children in order when the tree is there; [`Method::Lbvh`] does it on the way, if nothing moves them later.
+    child_order: Option<ChildOrderPass>,
 }
 
 /// A builder with its input and memory, ready to be recorded.
@@ -219,10 +225,14 @@ impl Builder {
             SortShape::of(context).with_short_tiles()
         };
         let optimise = options.optimise.map(|options| Reinsertion::new(context, &options, count));
+        let orders_on_the_way = method == Method::Lbvh && optimise.is_none();
+        let behind = options.child_order.filter(|_| !orders_on_the_way);
+        let child_order = behind.map(|order| ChildOrderPass::new(context, order, options.collapse, count));
         let items = if alone { tuning.alone_run } else { run_of(tuning, method, count, shape.workgroup) };
         let encode = Encode {
             codes: options.codes.unwrap_or_else(|| Codes::for_count(count)),
             collapse: options.collapse,
+            child_order: options.child_order.filter(|_| orders_on_the_way),
             shape: if alone { shape.with_digit_bits(tuning.small_digit_bits) } else { shape },
             items,
             bounds_items: tuning.bounds_run.max(items),
@@ -237,7 +247,7 @@ impl Builder {
             build_flags: options.build_flags,
             alone,
         };
-        Ok(Builder { method, schedule, optimise, workers: tuning.workers, merging, encode })
+        Ok(Builder { method, schedule, optimise, workers: tuning.workers, merging, encode, child_order })
     }
 
     /// The method that is used: with fewer than two primitives always [`Method::Lbvh`].
@@ -272,7 +282,9 @@ impl Builder {
 
     /// The same, with a sort's table of this many words.
     fn sizes_with_table(&self, table_words: u64) -> Sizes {
-        Sizes { structure: self.layout().bytes, scratch: self.scratch(table_words).bytes(), alignment: 16 }
+        // A build is done with its scratch memory when its children get an order.
+        let scratch = self.scratch(table_words).bytes().max(self.child_order.map_or(0, |pass| pass.scratch_bytes()));
+        Sizes { structure: self.layout().bytes, scratch, alignment: 16 }
     }
 
     fn scratch(&self, table_words: u64) -> Scratch {
@@ -336,7 +348,7 @@ impl Builder {
     ///
     /// Before, the caller makes the input visible to compute shaders. After, it places a barrier from compute shader writes to
     /// whatever reads the structure or writes the scratch memory. Labels: `split`, `bounds`, `encode`, `sort`, `hierarchy`,
-    /// `optimise` and `collapse`, as far as the build has such phases; or `build` if the schedule is persistent.
+    /// `optimise`, `collapse` and `order`, as far as the build has such phases; or `build` if the schedule is persistent.
     ///
     /// # Errors
     /// The memory is too small; the input has another number of primitives than the builder; the triangles would be split, but each
@@ -393,6 +405,9 @@ impl Builder {
             // Builds by one workgroup have no chain of their own.
             Schedule::Chain | Schedule::Workgroup => self.chain(input, arguments, scratch),
         });
+        if let Some(pass) = self.child_order {
+            steps.extend(pass.steps(job.structure, job.scratch)?);
+        }
         Ok(steps)
     }
 

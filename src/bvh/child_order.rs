@@ -7,10 +7,12 @@
 //! where h_l / C_l > h_r / C_r**, whatever p_lr is. The published rules, and the one that contains them, are settings of h and C:
 //! [`ChildOrder`].
 //!
-//! [`ChildOrderPass`] puts the children of a finished `Bvh2` in order, whoever built it: the left one is the one to look into first. Hits
-//! stay what they are, but which triangle a ray names that ends at any hit. [`crate::trace::tracer::record_left_first`] is the walk that
-//! profits. `glsl/bvh/child_order.glsl` is the device's side, [`Bvh2::in_child_order`](super::layout::Bvh2::in_child_order) the twin: the
-//! same bytes.
+//! [`BuildOptions::child_order`](super::builder::BuildOptions::child_order) asks a builder for an order; [`ChildOrderPass`] puts the children
+//! of a finished `Bvh2` in order, whoever built it. The left one is then the one to look into first, and the header says so. Hits
+//! stay what they are, but which triangle a ray names that ends at any hit. [`crate::trace::tracer::record_left_first`] and queries of
+//! `glsl/trace/query.glsl` are the walks that profit. `glsl/bvh/child_order.glsl` is the device's side,
+//! [`Bvh2::in_child_order`](super::layout::Bvh2::in_child_order) the twin: the same bytes. An LBVH puts its children in order while it is
+//! built (`glsl/bvh/lbvh.glsl`): the same rules, the areas of a leaf's primitives being added up in another order.
 
 use super::layout::{NODES_OFFSET, node_slots};
 use super::sah::Collapse;
@@ -29,7 +31,8 @@ pub enum ChildOrder {
     /// Occlusion Rays"), with p_lr = p_l + p_r − 1.
     Cheaper,
     /// The one with the larger h / C, for opaque primitives: in a leaf of half area A a primitive of area a ends a ray with the
-    /// probability a / A (Cauchy and Crofton), independently of the others.
+    /// probability a / A (Cauchy and Crofton). Those of a leaf are taken to be side by side, so that the probabilities add up to 1 at
+    /// most.
     MoreHitsForItsCost,
 }
 
@@ -37,6 +40,16 @@ impl ChildOrder {
     /// All of them.
     pub const ALL: [ChildOrder; 4] =
         [ChildOrder::LargerBox, ChildOrder::LargerPrimitives, ChildOrder::Cheaper, ChildOrder::MoreHitsForItsCost];
+
+    /// `RULE` of glsl/bvh/child_weights.glsl; 0 is no order.
+    pub(super) fn rule(self) -> u32 {
+        self as u32 + 1
+    }
+
+    /// Whether it looks at what is below a child.
+    pub(super) fn has_weights(self) -> bool {
+        self != ChildOrder::LargerBox
+    }
 }
 
 /// Puts the children of a `Bvh2` in order on the device.
@@ -94,9 +107,13 @@ impl ChildOrderPass {
         };
         let groups = self.slots.div_ceil(self.workgroup * self.rounds);
         let step = |shader| {
-            let kernel = Kernel::new(shader, self.workgroup, &[self.order as u32]);
+            let kernel = Kernel::new(shader, self.workgroup, &[self.order.rule()]);
             Step::new("order", kernel, &arguments, groups)
         };
-        Ok(vec![step(&shaders::BVH_CHILD_ORDER_PARENTS), step(&shaders::BVH_CHILD_ORDER_CLIMB)])
+        let mut steps = vec![step(&shaders::BVH_CHILD_ORDER_CLIMB)];
+        if self.order.has_weights() {
+            steps.insert(0, step(&shaders::BVH_CHILD_ORDER_PARENTS));
+        }
+        Ok(steps)
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! `glsl/bvh/encode.glsl` is the device's side.
 
+use super::child_order::ChildOrder;
 use super::codes::Codes;
 use super::geometry::{Geometry, Input, Planned, Primitives};
 use super::sah::Collapse;
@@ -18,6 +19,8 @@ use crate::gpu::{Kernel, Step, shaders};
 pub(super) struct Encode {
     pub codes: Codes,
     pub collapse: Collapse,
+    /// The order that children get in the hierarchy.
+    pub child_order: Option<ChildOrder>,
     pub shape: SortShape,
     /// Items of an invocation in a task.
     pub items: u32,
@@ -110,6 +113,11 @@ impl Encode {
         let references = if self.split.is_some() { HAS_REFERENCES } else { 0 };
         let source = [input.source_constant(self.primitives) | references, self.codes.prefix_number()];
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source, more].concat())
+    }
+
+    /// A kernel that reads primitives and makes an LBVH of them.
+    pub fn lbvh_kernel(&self, shader: &'static shaders::Shader, input: &Input) -> Kernel {
+        self.reading_kernel_with(shader, input, &[self.child_order.map_or(0, ChildOrder::rule)])
     }
 
     /// A kernel that reads primitives before they are split.

@@ -72,7 +72,7 @@ impl Hierarchy for &Treelets {
     fn plan(&self, encode: &Encode, scratch: &mut Scratch) {
         scratch.take_weights(BuildPhase::Hierarchy);
         scratch.take_codes(BuildPhase::Hierarchy);
-        scratch.take_child_costs();
+        scratch.take_child_costs(None);
         scratch.take_sort();
         scratch.take_clusters(BuildPhase::Gather, BuildPhase::Above);
         let top_costs = ["costs of left children above", "costs of right children above"];

@@ -310,8 +310,11 @@ pub struct Header {
     pub built_area: f32,
     /// Where triangles were split, and several records may be of one: primitives of the input. Otherwise 0.
     pub split_from: u32,
+    /// 1: the children of all nodes have an order ([`crate::bvh::child_order`]), and the left one is what rays look into first that end
+    /// at any hit. 0: they are as the build left them. Copies and updates keep it.
+    pub child_order: u32,
     /// Zero.
-    pub reserved: [u32; 8],
+    pub reserved: [u32; 7],
 }
 
 impl Header {

@@ -28,7 +28,7 @@ pub(super) fn steps(small: &[SmallBuild<'_>]) -> Result<Vec<Step>> {
     let mut order = Vec::new();
     for &SmallBuild { encode, input, memory: [structure, scratch] } in small {
         let (geometry, formats) = encode.checked(input)?;
-        let kernel = encode.reading_kernel(&shaders::BVH_LBVH_WORKGROUP, input);
+        let kernel = encode.lbvh_kernel(&shaders::BVH_LBVH_WORKGROUP, input);
         let costs = [encode.collapse.c_t.to_bits(), encode.collapse.c_i.to_bits()];
         let flags = encode.codes.kind_word() | u32::from(encode.collapse.enabled) << 25 | encode.build_flags << 26;
         let kind = (kernel, flags, costs);

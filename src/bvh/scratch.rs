@@ -1,5 +1,6 @@
 //! The scratch memory of a build: what lies in it, and from which phase to which.
 
+use super::child_order::ChildOrder;
 use super::encode::Encode;
 use super::method::Hierarchy;
 use super::split::SplitReference;
@@ -35,6 +36,8 @@ const CLUSTER_BYTES: u64 = 40;
 const TASK_BYTES: u64 = 12;
 /// Bytes of the weights of a primitive: `Weights` in weights.glsl.
 const WEIGHTS_BYTES: u64 = 16;
+/// Bytes of what a child is ordered by: `ChildWeight` in run.glsl.
+const CHILD_WEIGHT_BYTES: u64 = 12;
 
 /// The plan of a build's scratch memory.
 #[derive(Debug, Clone)]
@@ -134,10 +137,13 @@ impl Scratch {
         self.parts.table = self.plan.take("table", self.table_bytes, life());
     }
 
-    /// Costs of left and right children in climbs of the radix tree.
-    pub fn take_child_costs(&mut self) {
-        self.parts.child_costs = ["costs of left children", "costs of right children"]
-            .map(|name| self.take_words(name, BuildPhase::Hierarchy, BuildPhase::Hierarchy));
+    /// Costs of left and right children in climbs of the radix tree, and what they are ordered by.
+    pub fn take_child_costs(&mut self, order: Option<ChildOrder>) {
+        let weight_bytes = if order.is_some_and(ChildOrder::has_weights) { CHILD_WEIGHT_BYTES } else { 0 };
+        let bytes = (4 + weight_bytes) * self.count;
+        let life = || BuildPhase::Hierarchy..=BuildPhase::Hierarchy;
+        self.parts.child_costs =
+            ["costs of left children", "costs of right children"].map(|name| self.plan.take(name, bytes, life()));
     }
 
     pub fn take_clusters(&mut self, from: BuildPhase, to: BuildPhase) {
@@ -168,6 +174,7 @@ mod tests {
         Encode {
             codes: Code::Emc64Var.full().with_bits(bits),
             collapse: Collapse::SAH,
+            child_order: None,
             shape: SortShape::strips_of(workgroup),
             items: 4,
             bounds_items: 4,

@@ -1,13 +1,18 @@
 //! The order of children: the device's is the twin's, byte for byte; hits stay; and the better child comes first.
 
 use crate::common::shapes::{Corners, hard_rays, icosphere, soup, tree_of, tree_with};
-use crate::common::{corpus, device};
+use crate::common::twins::{assert_same, on_device, on_host};
+use crate::common::{corpus, device, with_tuning};
+use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
 use hedgerow::bvh::child_order::{ChildOrder, ChildOrderPass};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::{BoxRecord, Bvh2, Child, Record};
+use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::bvh::twin::lbvh;
+use hedgerow::bvh::split::SplitOptions;
+use hedgerow::bvh::twin::lbvh::{self, Finish};
 use hedgerow::geometry::Aabb;
+use hedgerow::gpu::TuningChoice;
 use hedgerow::trace::tracer::{self, Loads, TraceShape};
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
@@ -82,6 +87,56 @@ fn memory_that_is_too_small_is_refused_by_name() {
     let small = hedgerow::gpu::Region { bytes: pass.scratch_bytes() - 1, ..memory.region() };
     let error = pass.steps(memory.region(), small).expect_err("too small").to_string();
     assert!(error.contains("scratch memory of an order of children"), "{error}");
+}
+
+/// By every schedule of an LBVH, which orders children on the way, also where invocations meet in workgroups; and behind other methods.
+#[test]
+fn builds_have_the_order_of_the_host() {
+    let splits = Some(SplitOptions::DEFAULT);
+    let optimise = Some(ReinsertionOptions { rounds: 2, stride: 2 });
+    let meshes = corpus::meshes().into_iter().chain([corpus::random("random 9000", 9000, [-0.5; 3], [1.0; 3])]);
+    for (i, mesh) in meshes.enumerate() {
+        for order in ChildOrder::ALL {
+            let codes = Some(Code::Emc64Var.full());
+            let lbvh = BuildOptions { codes, child_order: Some(order), ..BuildOptions::DEFAULT };
+            let more = [
+                BuildOptions { split: splits, ..lbvh },
+                BuildOptions { optimise, ..lbvh },
+                BuildOptions { method: Method::Ploc { radius: 8 }, ..lbvh },
+                BuildOptions { method: Method::Hploc(Window::DEFAULT), ..lbvh },
+                BuildOptions { method: Method::Hlbvh(Treelets::DEFAULT), collapse: Collapse::OFF, ..lbvh },
+            ];
+            let by = |schedule| BuildOptions { schedule: Some(schedule), ..lbvh };
+            let mut all =
+                vec![by(Schedule::Chain), by(Schedule::Workgroup), BuildOptions { collapse: Collapse::OFF, ..lbvh }];
+            if order == ChildOrder::MoreHitsForItsCost {
+                all.extend(more);
+            }
+            for options in all {
+                let expected = on_host(&mesh, &options);
+                let is_in_order = u32::from(!expected.header.root.is_leaf() && expected.header.active > 0);
+                assert_eq!(expected.header.child_order, is_in_order, "{}, {options:?}", mesh.0);
+                assert_same(&on_device(&mesh, &options), &expected, &format!("{}, {options:?}", mesh.0));
+                if i % 3 == 0 && options.method == Method::Lbvh {
+                    let got = with_tuning(TuningChoice::Gpu, || on_device(&mesh, &options));
+                    assert_same(&got, &expected, &format!("{} as on a GPU, {options:?}", mesh.0));
+                }
+            }
+        }
+    }
+}
+
+/// An order on the way is the order behind, but for the order in which areas are added up: the same work.
+#[test]
+fn an_order_on_the_way_is_worth_the_one_behind() {
+    let corners: Corners = soup(2000, 0.02, 8).into_iter().chain(soup(60, 1.0, 9)).collect();
+    let (order, collapse) = (ChildOrder::MoreHitsForItsCost, Collapse::SAH);
+    let built = |finish: Finish| lbvh::build_corners(corners.iter().copied().map(Ok), Code::Emc64Var.full(), finish);
+    let behind = built(collapse.into()).in_child_order(order, &collapse);
+    let on_the_way = built(Finish { collapse, child_order: Some(order) });
+    let different = behind.nodes.iter().zip(&on_the_way.nodes).filter(|(a, b)| a.is_used() && a != b).count();
+    assert_eq!(on_the_way.header, behind.header);
+    assert!(different <= 2, "{different} of {} nodes", behind.header.inner_nodes);
 }
 
 fn shapes() -> Vec<TraceShape> {

@@ -6,6 +6,8 @@
 #ifndef HEDGEROW_BVH_HLBVH_TREELETS
 #define HEDGEROW_BVH_HLBVH_TREELETS
 #include "bvh/hlbvh.glsl"
+// Children stay as the codes have them.
+const uint RULE = 0;
 #include "bvh/run.glsl"
 
 // Whether a subtree has no parent, or one that is not a treelet: one that splits at a bit that treelets share, or has too many
@@ -34,14 +36,14 @@ void climb(inout Run run, Weights w, float area_scale, Subtree s) {
         }
         uint parent = parent_of(s, is_left);
         w.parents.word[parent_at(reference_of(s.child))] = 2u * parent + (is_left ? 0u : 1u);
-        float sibling_cost;
-        if (!step_up(run, is_left, parent, s, sibling_cost)) break;
+        Sibling sibling;
+        if (!step_up(run, is_left, parent, s, sibling)) break;
         // No treelet ends there, which siblings that met within the run have not said yet.
         run.ends.word[parent] = s.first;
         s.child.index = parent;
         s.child.count = 0u;
         float area = scaled_half_area(Box(s.child.lo, s.child.hi), area_scale);
-        vec2 costs = is_left ? vec2(s.cost, sibling_cost) : vec2(sibling_cost, s.cost);
+        vec2 costs = is_left ? vec2(s.cost, sibling.cost) : vec2(sibling.cost, s.cost);
         s.cost = weigh_node(w, parent, uvec2(parent + 1u - s.first, s.last - parent), costs, area);
     }
 }

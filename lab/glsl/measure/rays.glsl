@@ -1,4 +1,8 @@
 // Rays and hits of the shaders that are measured: the same for the driver's structures and ours.
+#ifndef HEDGEROW_MEASURE_RAYS
+#define HEDGEROW_MEASURE_RAYS
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_buffer_reference : require
 layout(constant_id = 1) const bool ANY_HIT = false;
 
 struct GivenRay {
@@ -23,3 +27,4 @@ layout(push_constant, scalar) uniform TraceQueriesArguments { uvec2 structure; R
 Hit no_hit() {
     return Hit(uintBitsToFloat(0x7F800000u), 0xFFFFFFFFu, 0.0, 0.0);
 }
+#endif

@@ -2,6 +2,7 @@
 
 use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::device_rays::DeviceRays;
+use super::queries::{self, QueryWork};
 use super::wide::WideTree;
 use super::{BuildRun, Subject};
 use crate::Result;
@@ -9,8 +10,7 @@ use crate::device::Device;
 use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
 use crate::scene::Mesh;
-use hedgerow::bvh::builder::{BuildOptions, Builder, Input};
-use hedgerow::bvh::child_order::{ChildOrder, ChildOrderPass};
+use hedgerow::bvh::builder::{BuildOptions, Builder};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::quality::{self, QualityFigures};
 use hedgerow::gpu::{Recorder, Timestamps};
@@ -20,6 +20,25 @@ use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// Phases of a build at most: split, reset and bounds, encode, sort, hierarchy, those of collapsing, wide.
 const PHASES: u32 = 12;
+
+/// How rays go through a tree that is built on the device.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Walk {
+    /// By the tracer of binary trees.
+    Tracer,
+    /// By queries in a shader.
+    Query,
+    /// Through a wide tree that is made of the binary one.
+    Wide(WideTracer),
+}
+
+/// How rays go through a binary tree.
+#[derive(Debug, Clone, Copy)]
+struct BinaryWalk {
+    by_query: bool,
+    /// Whether the children have an order.
+    is_ordered: bool,
+}
 
 /// A scene in our `Bvh2`, or in a wide tree made of it, built and traced on the device.
 pub struct DeviceBvh<'a> {
@@ -32,15 +51,13 @@ pub struct DeviceBvh<'a> {
     mesh: DeviceMesh<'a>,
     memory: BuildMemory<'a>,
     wide: Option<WideTree<'a>>,
-    /// Puts the children in order behind a build.
-    child_order: Option<ChildOrderPass>,
+    binary: BinaryWalk,
     timestamps: Timestamps,
     rays: DeviceRays<'a>,
 }
 
 impl<'a> DeviceBvh<'a> {
-    /// Uploads `mesh` and makes room for structure and scratch, and for the wide tree if there shall be one. Children of a binary tree
-    /// may have an order, for rays that end at any hit.
+    /// Uploads `mesh` and makes room for structure and scratch, and for the wide tree if there shall be one.
     ///
     /// # Errors
     /// Too many triangles, or too little memory: the error says how much is needed.
@@ -49,27 +66,26 @@ impl<'a> DeviceBvh<'a> {
         builder: &str,
         mesh: &Mesh,
         options: &BuildOptions,
-        wide: Option<WideTracer>,
-        any_hit: Option<ChildOrder>,
+        walk: Walk,
     ) -> Result<DeviceBvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let bvh = Builder::new(device, options, count)?;
-        let child_order = any_hit.map(|order| ChildOrderPass::new(device, order, options.collapse, bvh.record_count()));
-        let mut sizes = bvh.sizes();
-        // The build is done with its scratch memory by then.
-        sizes.scratch = sizes.scratch.max(child_order.map_or(0, |pass| pass.scratch_bytes()));
+        let sizes = bvh.sizes();
         let mesh_bytes = size_of_val(&mesh.positions[..]) + size_of_val(&mesh.triangles[..]);
         check_memory(device, builder, count, mesh_bytes as u64 + sizes.structure + sizes.scratch)?;
         let mesh = DeviceMesh::new(device, &mesh.positions, &mesh.triangles)?;
         let memory = BuildMemory::new(device, sizes)?;
         let mut warming = Recorder::warming(device);
-        record_build(&mut warming, &bvh, child_order.as_ref(), &mesh.input, &memory)?;
+        bvh.record(&mut warming, &mesh.input, memory.structure.region(), memory.scratch.region())?;
         Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
             choice: choice_of(options, &bvh),
-            wide: wide.map(|tracer| WideTree::new(device, tracer, bvh.record_count())).transpose()?,
-            child_order,
+            wide: match walk {
+                Walk::Wide(tracer) => Some(WideTree::new(device, tracer, bvh.record_count())?),
+                Walk::Tracer | Walk::Query => None,
+            },
+            binary: BinaryWalk { by_query: walk == Walk::Query, is_ordered: options.child_order.is_some() },
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,
             mesh,
@@ -84,30 +100,17 @@ impl<'a> DeviceBvh<'a> {
     }
 }
 
-/// Records the build of the `Bvh2`, and the order of its children if they have one.
-fn record_build(
-    recorder: &mut Recorder<'_>,
-    bvh: &Builder,
-    child_order: Option<&ChildOrderPass>,
-    input: &Input,
-    BuildMemory { structure, scratch, .. }: &BuildMemory<'_>,
-) -> hedgerow::Result<()> {
-    bvh.record(recorder, input, structure.region(), scratch.region())?;
-    let Some(pass) = child_order else { return Ok(()) };
-    recorder.barrier();
-    pass.record(recorder, structure.region(), scratch.region())
-}
-
-/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`, whose children may be in order.
+/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`.
 fn record_trace(
     recorder: &mut Recorder<'_>,
     wide_tree: Option<&WideTree<'_>>,
-    is_ordered: bool,
+    binary: BinaryWalk,
     query: Query,
     buffers: &TraceBuffers,
 ) -> hedgerow::Result<()> {
     match wide_tree {
-        None => record_binary(recorder, is_ordered, query, buffers),
+        None if binary.by_query => queries::record(recorder, query, buffers),
+        None => record_binary(recorder, binary.is_ordered, query, buffers),
         Some(tree) => tree.tracer.record(recorder, query, buffers),
     }
 }
@@ -157,7 +160,8 @@ impl Subject for DeviceBvh<'_> {
 
     fn build(&mut self) -> Result<BuildRun> {
         self.device.run(Some(&mut self.timestamps), |recorder| {
-            record_build(recorder, &self.bvh, self.child_order.as_ref(), &self.mesh.input, &self.memory)?;
+            let BuildMemory { structure, scratch, .. } = &self.memory;
+            self.bvh.record(recorder, &self.mesh.input, structure.region(), scratch.region())?;
             self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, self.memory.structure.address()))
         })?;
         Ok(BuildRun::of(self.timestamps.phases()?))
@@ -206,16 +210,24 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let (structure, wide, is_ordered) = (self.traced(), self.wide.as_ref(), self.child_order.is_some());
-        self.rays.trace(structure, |recorder, buffers| record_trace(recorder, wide, is_ordered, query, buffers))
+        let (structure, wide, binary) = (self.traced(), self.wide.as_ref(), self.binary);
+        self.rays.trace(structure, |recorder, buffers| record_trace(recorder, wide, binary, query, buffers))
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
         Ok(self.rays.hits())
     }
 
+    /// Queries do not count their leaves.
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        let (wide, is_ordered) = (self.wide.as_ref(), self.child_order.is_some());
-        self.rays.work(self.traced(), |recorder, buffers| record_trace(recorder, wide, is_ordered, query, buffers))
+        let (wide, binary) = (self.wide.as_ref(), self.binary);
+        let record =
+            |recorder: &mut Recorder<'_>, buffers: &TraceBuffers| record_trace(recorder, wide, binary, query, buffers);
+        if !binary.by_query {
+            return self.rays.work(self.traced(), record);
+        }
+        let of_ray = |[_, _, steps, tests]: QueryWork| Work { steps, tests, leaves: 0 };
+        let work: Option<Vec<QueryWork>> = self.rays.work(self.traced(), record)?;
+        Ok(work.map(|all| all.into_iter().map(of_ray).collect()))
     }
 }

@@ -4,7 +4,7 @@ use crate::device::{Buffer, Device};
 use crate::{Error, Result};
 use hedgerow::gpu::{Recorder, Region, Timestamps};
 use hedgerow::trace::tracer::TraceBuffers;
-use hedgerow::trace::{Hit, Ray, Work};
+use hedgerow::trace::{Hit, Ray};
 
 /// Rays in device memory, and room for their hits.
 pub struct RayBuffers<'a> {
@@ -102,17 +102,17 @@ impl<'a> DeviceRays<'a> {
         self.uploaded.as_ref().map_or_else(Vec::new, RayBuffers::read_hits)
     }
 
-    /// The work that each ray takes, counted by what `record` records.
+    /// The work that each ray takes, counted by what `record` records as such a `W`.
     ///
     /// # Errors
     /// Too little memory; the device failed.
-    pub fn work(
+    pub fn work<W: bytemuck::Pod>(
         &self,
         structure: u64,
         record: impl FnOnce(&mut Recorder<'_>, &TraceBuffers) -> hedgerow::Result<()>,
-    ) -> Result<Option<Vec<Work>>> {
+    ) -> Result<Option<Vec<W>>> {
         let Some(uploaded) = &self.uploaded else { return Ok(None) };
-        let work = self.device.buffer("work", u64::from(uploaded.count) * size_of::<Work>() as u64)?;
+        let work = self.device.buffer("work", u64::from(uploaded.count) * size_of::<W>() as u64)?;
         let buffers = uploaded.buffers(structure, Some(work.region()));
         self.device.run(None, |recorder| record(recorder, &buffers))?;
         Ok(Some(work.read(uploaded.count as usize)))

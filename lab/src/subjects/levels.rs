@@ -7,7 +7,7 @@ use super::structures::Structures;
 use crate::Result;
 use crate::scene::Instances;
 use ash::vk;
-use hedgerow::accel::Instance;
+use hedgerow::accel::{ANY_HIT_ORDER, Instance};
 use hedgerow::gpu::Timestamps;
 use hedgerow::trace;
 
@@ -22,7 +22,8 @@ pub struct Levels<'a> {
 }
 
 impl<'a> Levels<'a> {
-    /// Uploads and builds the parts; the top level has memory and is not built yet. `flags` are those of the top level.
+    /// Uploads and builds the parts; the top level has memory and is not built yet. `flags` are those of the top level;
+    /// [`ANY_HIT_ORDER`] holds for the parts, too.
     ///
     /// # Errors
     /// Too little memory; the structs ask for what there is not.
@@ -32,9 +33,10 @@ impl<'a> Levels<'a> {
         flags: vk::BuildAccelerationStructureFlagsKHR,
     ) -> Result<Levels<'a>> {
         let device = structures.device;
+        let of_parts = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE | flags & ANY_HIT_ORDER;
         let mut parts = Vec::new();
         for mesh in &scene.parts {
-            let part = Level::bottom(&structures, mesh, vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)?;
+            let part = Level::bottom(&structures, mesh, of_parts)?;
             device.run(None, |recorder| part.record(&structures, recorder, Mode::BUILD))?;
             parts.push(part.without_inputs());
         }

@@ -14,6 +14,7 @@ pub mod kd_host;
 pub mod level;
 pub mod levels;
 pub mod peers;
+pub mod queries;
 pub mod retraced;
 pub mod structures;
 pub mod taught;

@@ -1,17 +1,15 @@
 //! Acceleration structures by the calls of `VK_KHR_acceleration_structure`: ours or the driver's, and nothing else differs.
 
 use super::device_rays::{RayBuffers, timed_run};
-use crate::arguments;
+use super::queries::{self, QueryWork};
 use crate::device::{Buffer, Device, DriverRays, DriverTracing};
 use crate::experiments::accel::points;
 use crate::scene::Mesh;
-use crate::shaders;
 use crate::{Error, Result};
 use ash::khr::acceleration_structure as functions;
 use ash::vk;
 use hedgerow::accel;
-use hedgerow::bvh::layout::MAX_DEPTH;
-use hedgerow::gpu::{Kernel, Recorder, Timestamps};
+use hedgerow::gpu::{Recorder, Timestamps};
 use hedgerow::trace::Query;
 use hedgerow::trace::tracer::TraceBuffers;
 
@@ -164,26 +162,19 @@ impl<'a> Structures<'a> {
         buffers: &TraceBuffers,
         query: Query,
     ) -> hedgerow::Result<()> {
-        let any_hit = query == Query::AnyHit;
-        let &TraceBuffers { structure, rays, hits, work, count } = buffers;
-        let (rays, hits, works) = (rays.address, hits.address, work.map_or(0, |work| work.address));
-        if let Functions::Driver(_) = self.maker {
-            let rays = DriverRays { structure, rays, hits, count, any_hit };
-            return self.device.trace_by_driver(recorder, &rays);
+        match self.maker {
+            Functions::Ours(_) => queries::record(recorder, query, buffers),
+            Functions::Driver(_) => {
+                let any_hit = query == Query::AnyHit;
+                let &TraceBuffers { structure, rays, hits, count, .. } = buffers;
+                let rays = DriverRays { structure, rays: rays.address, hits: hits.address, count, any_hit };
+                self.device.trace_by_driver(recorder, &rays)
+            }
         }
-        let (tuning, limits) = (&self.device.tuning.trace, &self.device.limits);
-        // As trace::tracer has it, or no level of the stack in shared memory.
-        let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
-        let kernel = match work {
-            None => Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[u32::from(any_hit), levels]),
-            Some(_) => Kernel::new(&shaders::MEASURE_QUERY_WORK, limits.subgroup_size, &[u32::from(any_hit), 0]),
-        };
-        let arguments = arguments::TraceQueries { structure, rays, hits, works, first: 0, count };
-        recorder.dispatch(&kernel, &arguments, count.div_ceil(kernel.workgroup()))
     }
 
     /// What each of the rays meets on its way, of our structures: nodes of the top level, instances, nodes below, triangles.
-    pub(crate) fn work(&self, top: Structure, buffers: &RayBuffers<'_>, query: Query) -> Result<Vec<[u32; 4]>> {
+    pub(crate) fn work(&self, top: Structure, buffers: &RayBuffers<'_>, query: Query) -> Result<Vec<QueryWork>> {
         if let Functions::Driver(_) = self.maker {
             return Err(Error::Argument("the driver does not report the work of its queries".into()));
         }

@@ -4,10 +4,10 @@ pub mod rebraid;
 pub mod serialize;
 
 use super::build::codes;
-use super::{AccelOptions, Instance, REBRAID};
+use super::{AccelOptions, Instance, REBRAID, child_order};
 use crate::bvh::layout::{self, Bvh2, Child, Header, Node, Record, status};
 use crate::bvh::sah::Collapse;
-use crate::bvh::twin::lbvh;
+use crate::bvh::twin::lbvh::{self, Finish};
 use crate::geometry::Aabb;
 use ash::vk;
 
@@ -55,7 +55,8 @@ pub fn top_level<'a>(
     let boxes: Vec<_> = entries.iter().map(|entry| entry.bounds).collect();
     let codes = codes(flags, boxes.len() as u32);
     let record = |entry: u32| record_of(&entries[entry as usize], instances);
-    let mut tree = lbvh::build_boxes(&boxes, record, codes, Collapse::OFF);
+    let finish = Finish { collapse: Collapse::OFF, child_order: child_order(flags) };
+    let mut tree = lbvh::build_boxes(&boxes, record, codes, finish);
     tree.header.build_flags = flags.as_raw() & 0x1f;
     tree
 }

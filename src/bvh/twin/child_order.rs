@@ -15,76 +15,85 @@ impl<R: Record> Bvh2<R> {
         let usable = self.header.active != 0 && self.header.status & status::UNUSABLE == 0;
         let root = self.header.root;
         if usable && !root.is_leaf() {
-            Ordering { order, costs, scale: self.header.area_scale }.subtree(&mut self, root.index);
+            self.header.child_order = 1;
+            Ordering { order, costs: *costs, scale: self.header.area_scale }.subtree(&mut self, root.index);
         }
         self
     }
 }
 
 /// What a ray gains in a subtree, and what that costs.
-#[derive(Debug, Clone, Copy)]
-struct Weight {
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Weight {
     gain: f32,
     cost: f32,
 }
 
-struct Ordering<'a> {
-    order: ChildOrder,
-    costs: &'a Collapse,
-    scale: f32,
+/// A rule, the costs of a step and of a test, and what lengths are scaled by before areas are taken.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ordering {
+    pub order: ChildOrder,
+    pub costs: Collapse,
+    pub scale: f32,
 }
 
-impl Ordering<'_> {
+impl Ordering {
     /// Puts a node and all below it in order. No deeper than tracers walk.
     fn subtree<R: Record>(&self, tree: &mut Bvh2<R>, slot: u32) -> Weight {
         let children = tree.nodes[slot as usize].children;
-        let weights = children.map(|child| self.weight_of(tree, &child));
+        let weights = children
+            .map(|child| if child.is_leaf() { self.weight_of(tree, &child) } else { self.subtree(tree, child.index) });
+        self.node(&mut tree.nodes[slot as usize].children, weights)
+    }
+
+    /// Puts the children of a node in order; its weight.
+    pub fn node(&self, children: &mut [Child; 2], weights: [Weight; 2]) -> Weight {
         let area = children[0].bounds().union(&children[1].bounds()).scaled_half_area(self.scale);
-        let shares = children.map(|child| share(child.bounds().scaled_half_area(self.scale), area, 1.0));
+        let areas = children.map(|child| child.bounds().scaled_half_area(self.scale));
+        let shares = areas.map(|of_child| share(of_child, area, 1.0));
         let both = (shares[0] + shares[1] - 1.0).max(0.0);
         let ([left, right], [p_left, p_right]) = (weights, shares);
-        if !self.is_right_first(weights, shares, both) {
+        let swaps = match self.order {
+            ChildOrder::LargerBox => areas[1] > areas[0],
+            _ => self.is_right_first(weights, shares, both),
+        };
+        if !swaps {
             return self.joined(weights, shares, both);
         }
-        tree.nodes[slot as usize].children.swap(0, 1);
+        children.swap(0, 1);
         self.joined([right, left], [p_right, p_left], both)
     }
 
-    fn weight_of<R: Record>(&self, tree: &mut Bvh2<R>, child: &Child) -> Weight {
-        let below = if child.is_leaf() { self.weight_of_leaf(tree, child) } else { self.subtree(tree, child.index) };
-        match self.order {
-            ChildOrder::LargerBox => Weight { gain: child.bounds().scaled_half_area(self.scale), cost: 1.0 },
-            _ => below,
-        }
+    fn weight_of<R: Record>(&self, tree: &Bvh2<R>, leaf: &Child) -> Weight {
+        let leaf_area = leaf.bounds().scaled_half_area(self.scale);
+        let records = &tree.records[leaf.index as usize..][..leaf.count as usize];
+        let area = records.iter().fold(0.0, |area, record| area + self.area_of(record, leaf_area));
+        self.leaf(area, leaf_area, leaf.count)
     }
 
-    fn weight_of_leaf<R: Record>(&self, tree: &Bvh2<R>, leaf: &Child) -> Weight {
-        let leaf_area = leaf.bounds().scaled_half_area(self.scale);
-        let (mut area, mut misses) = (0.0, 1.0);
-        for record in &tree.records[leaf.index as usize..][..leaf.count as usize] {
-            let of_record = self.area_of(record, leaf_area);
-            area += of_record;
-            misses *= 1.0 - share(of_record, leaf_area, 0.0);
-        }
-        let (count, hits) = (leaf.count as f32, 1.0 - misses);
+    /// The weight of a leaf by the area of its primitives, the half area of its box, and their number.
+    pub fn leaf(&self, area_of_primitives: f32, leaf_area: f32, count: u32) -> Weight {
+        let count = count as f32;
         let cost = self.costs.c_i * count;
+        let hits = share(area_of_primitives, leaf_area, 0.0);
         match self.order {
-            ChildOrder::LargerPrimitives => Weight { gain: area, cost: count },
+            ChildOrder::LargerPrimitives => Weight { gain: area_of_primitives, cost: count },
             ChildOrder::MoreHitsForItsCost => Weight { gain: hits, cost: cost * (1.0 - 0.5 * hits) },
             _ => Weight { gain: 1.0, cost },
         }
     }
 
     /// The area by which a ray meets a record: a convex body is met by its half area, as a triangle by its whole. What an instance
-    /// holds fills its leaf.
-    fn area_of<R: Record>(&self, record: &R, leaf_area: f32) -> f32 {
-        match record.corners() {
+    /// holds fills its leaf. Of a triangle that was split it is not more than the leaf has room for.
+    pub fn area_of<R: Record>(&self, record: &R, leaf_area: f32) -> f32 {
+        let area = match record.corners() {
             Some(corners) => self.area_of_triangle(corners),
             None if R::KIND == BoxRecord::KIND => {
                 record.bounds().map_or(leaf_area, |bounds| bounds.scaled_half_area(self.scale))
             }
             None => leaf_area,
-        }
+        };
+        area.min(leaf_area)
     }
 
     fn area_of_triangle(&self, corners: [[f32; 3]; 3]) -> f32 {

@@ -15,9 +15,8 @@
 use super::geometry::Corners;
 use crate::bvh::codes::Codes;
 use crate::bvh::layout::{Bvh2, SLACK, Triangle};
-use crate::bvh::sah::Collapse;
 use crate::bvh::split::{SplitOptions, SplitReference};
-use crate::bvh::twin::lbvh;
+use crate::bvh::twin::lbvh::{self, Finish};
 use crate::geometry::Aabb;
 
 /// Halvings of the scene's extent.
@@ -40,9 +39,9 @@ pub fn build(
     triangles: &[[u32; 3]],
     options: &SplitOptions,
     codes: Codes,
-    collapse: Collapse,
+    finish: impl Into<Finish>,
 ) -> Bvh2 {
-    build_corners(lbvh::corners(positions, triangles), options, codes, collapse)
+    build_corners(lbvh::corners(positions, triangles), options, codes, finish)
 }
 
 /// The same of triangles that [`HostGeometry::corners`](super::geometry::HostGeometry::corners) read.
@@ -50,11 +49,11 @@ pub fn build_corners(
     corners: impl Iterator<Item = Corners>,
     options: &SplitOptions,
     codes: Codes,
-    collapse: Collapse,
+    finish: impl Into<Finish>,
 ) -> Bvh2 {
     let corners: Vec<Corners> = corners.collect();
     if options.budget(corners.len() as u32) == 0 {
-        return lbvh::build_corners(corners.into_iter(), codes, collapse);
+        return lbvh::build_corners(corners.into_iter(), codes, finish);
     }
     let references = references(&corners, options);
     let boxes: Vec<Result<Aabb, u32>> = references.iter().map(bounds_of).collect();
@@ -63,7 +62,7 @@ pub fn build_corners(
         let [v0, v1, v2] = corners.get(primitive as usize).copied().and_then(Result::ok).unwrap_or([[0.0; 3]; 3]);
         Triangle { v0, v1, v2, primitive }
     };
-    let mut tree = lbvh::build_boxes(&boxes, record, codes, collapse);
+    let mut tree = lbvh::build_boxes(&boxes, record, codes, finish);
     tree.header.split_from = corners.len() as u32;
     tree
 }

@@ -9,6 +9,7 @@ use hedgerow::bvh::builder::{BuildOptions, Builder, Input, Method};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
+use hedgerow::bvh::twin::lbvh::Finish;
 use hedgerow::kdtree::builder::KdEstimate;
 use hedgerow::kdtree::merge::MergeEstimate;
 
@@ -70,24 +71,29 @@ pub fn on_device(device: &Device, (_, positions, triangles): &Mesh, options: &Bu
 /// They do not.
 pub fn on_host((_, positions, triangles): &Mesh, options: &BuildOptions) -> Bvh2 {
     let codes = options.codes.expect("codes are named");
-    let lbvh = |collapse| match &options.split {
-        None => twin::lbvh::build(positions, triangles, codes, collapse),
-        Some(split) => twin::split::build(positions, triangles, split, codes, collapse),
+    let lbvh = |finish: Finish| match &options.split {
+        None => twin::lbvh::build(positions, triangles, codes, finish),
+        Some(split) => twin::split::build(positions, triangles, split, codes, finish),
     };
+    let (collapse, child_order) = (options.collapse, options.child_order);
     if options.method == Method::Lbvh && options.optimise.is_none() {
         // Its own collapsing leaves other bytes in slots that fall out.
-        return lbvh(options.collapse);
+        return lbvh(Finish { collapse, child_order });
     }
-    let radix = lbvh(Collapse::OFF);
+    let radix = lbvh(Collapse::OFF.into());
     let tree = match options.method {
         Method::Lbvh => radix,
         Method::Hlbvh(treelets) => twin::hlbvh::build(&radix, codes, treelets),
         Method::Ploc { radius } => twin::ploc::build(&radix, radius as usize),
         Method::Hploc(window) => twin::hploc::build(&radix, window),
     };
-    match &options.optimise {
-        None => tree.collapsed(&options.collapse),
-        Some(optimise) => tree.reinserted(optimise).collapsed(&options.collapse),
+    let tree = match &options.optimise {
+        None => tree.collapsed(&collapse),
+        Some(optimise) => tree.reinserted(optimise).collapsed(&collapse),
+    };
+    match child_order {
+        None => tree,
+        Some(order) => tree.in_child_order(order, &collapse),
     }
 }
 

@@ -9,7 +9,7 @@ pub use crate::subjects::structures::instances_at;
 use crate::subjects::structures::{BuildInfo, Geometry, Range, address};
 use ash::vk;
 use glam::DVec3;
-use hedgerow::accel::Instance;
+use hedgerow::accel::{ANY_HIT_ORDER, Instance};
 
 type Flags = vk::GeometryInstanceFlagsKHR;
 type GeometryFlags = vk::GeometryFlagsKHR;
@@ -101,8 +101,19 @@ impl Part {
 
     /// Builds it alone.
     pub fn build(&self, backend: &dyn Backend) -> (Built, Vec<Buffer<'static>>) {
+        self.build_with(backend, vk::BuildAccelerationStructureFlagsKHR::empty())
+    }
+
+    /// The same with build flags.
+    pub fn build_with(
+        &self,
+        backend: &dyn Backend,
+        flags: vk::BuildAccelerationStructureFlagsKHR,
+    ) -> (Built, Vec<Buffer<'static>>) {
         let (geometries, ranges, memory) = self.geometries(backend.device());
-        (bottom_level(backend, &geometries, &ranges), memory)
+        let bottom = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
+        let info = BuildInfo::default().ty(bottom).flags(flags).geometries(&geometries);
+        (Built::new(backend, &info, &ranges, 0), memory)
     }
 }
 
@@ -133,9 +144,10 @@ impl World {
         self.instances.iter().map(|i| Instance { structure: structure(i.structure), ..*i }).collect()
     }
 
-    /// Builds everything.
+    /// Builds everything. Of the flags, which are the top level's, [`ANY_HIT_ORDER`] holds for the parts, too.
     pub fn build(&self, backend: &dyn Backend) -> BuiltWorld {
-        let (parts, memory): (_, Vec<_>) = self.parts.iter().map(|part| part.build(backend)).unzip();
+        let (parts, memory): (_, Vec<_>) =
+            self.parts.iter().map(|part| part.build_with(backend, self.flags & ANY_HIT_ORDER)).unzip();
         self.build_over(backend, parts, memory.into_iter().flatten().collect())
     }
 

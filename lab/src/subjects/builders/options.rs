@@ -69,6 +69,8 @@ pub(super) const ANY_HIT: BuilderOption = option(
     "near, or an order of children, the first of which our tracer looks into first for rays that end at any hit: rtsah, sato, \
      prim-sato or opaque",
 );
+pub(super) const WALK: BuilderOption =
+    option("walk", "tracer, or query: rays go through a tree with nodes of two by queries, as in an engine's shader");
 pub(super) const TRACE_TREE: BuilderOption = option(
     "trace",
     "host or device: where our tracer takes rays through the tree; unless given, its own does on the host",
@@ -85,20 +87,28 @@ impl Spec {
         self.choice(&SCHEDULE, &all)
     }
 
-    /// Options `codes`, `split`, `optimise`, `collapse`, `schedule`, `width` and `order` of a builder on the device.
+    /// Options `codes`, `split`, `optimise`, `collapse`, `schedule`, `width`, `order`, `any-hit` and `walk` of a builder
+    /// on the device.
     pub(super) fn on_device(&self, method: Method) -> Result<BuilderPlan> {
         method.check()?;
         let schedule = self.schedule()?;
         let (codes, split) = (self.codes()?, self.split()?);
         let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
-        let options = BuildOptions { method, codes, split, optimise, collapse, schedule, ..BuildOptions::DEFAULT };
+        let child_order = self.any_hit()?;
+        let options =
+            BuildOptions { method, codes, split, optimise, collapse, child_order, schedule, ..BuildOptions::DEFAULT };
         let (form, order) = self.form_and_order()?;
-        let (any_hit, time_to_optimise) = (self.any_hit()?, self.time_to_optimise()?);
-        if form.is_some() && any_hit.is_some() {
+        let time_to_optimise = self.time_to_optimise()?;
+        if form.is_some() && child_order.is_some() {
             let what = "orders of children are for nodes of two; take width=2, or any-hit=near";
             return Err(Error::Argument(format!("builder {self}: {what}")));
         }
-        Ok(BuilderPlan::Device(DevicePlan { options, form, order, any_hit, time_to_optimise }))
+        let by_query = self.choice(&WALK, &[("tracer", false), ("query", true)])?.unwrap_or(false);
+        if form.is_some() && by_query {
+            let what = "queries are for nodes of two; take width=2, or walk=tracer";
+            return Err(Error::Argument(format!("builder {self}: {what}")));
+        }
+        Ok(BuilderPlan::Device(DevicePlan { options, form, by_query, order, time_to_optimise }))
     }
 
     /// Option `any-hit`: the order of children, if there is one.

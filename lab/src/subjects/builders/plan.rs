@@ -5,7 +5,7 @@ use crate::Result;
 use crate::device::Device;
 use crate::scene::Mesh;
 use crate::subjects::Subject;
-use crate::subjects::device_bvh::DeviceBvh;
+use crate::subjects::device_bvh::{DeviceBvh, Walk};
 use crate::subjects::host::HostPlan;
 use crate::subjects::peers::driver::DriverPreference;
 #[cfg(feature = "peer-embree")]
@@ -13,7 +13,6 @@ use crate::subjects::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use crate::subjects::peers::obvhs;
 use hedgerow::bvh::builder::BuildOptions;
-use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::wide::Form;
 use hedgerow::kdtree::builder::KdOptions;
@@ -66,10 +65,10 @@ pub(crate) struct DevicePlan {
     pub(super) options: BuildOptions,
     /// Of the wide tree, where there shall be one.
     pub(super) form: Option<Form>,
+    /// Whether rays go through the binary tree by queries.
+    pub(super) by_query: bool,
     /// The order in which that is traced, where it was given.
     pub(super) order: Option<Order>,
-    /// The order of children, for rays that end at any hit.
-    pub(super) any_hit: Option<ChildOrder>,
     /// How long reinsertion may take, where it was given a time.
     pub(super) time_to_optimise: Option<Duration>,
 }
@@ -80,22 +79,24 @@ impl DevicePlan {
     /// # Errors
     /// Those of [`DeviceBvh::new`].
     pub(crate) fn make<'a>(&self, device: &'a Device, name: &str, mesh: &Mesh) -> Result<DeviceBvh<'a>> {
-        let wide = self.form.map(|form| match self.order {
-            None => WideTracer::of(device, form),
-            Some(order) => WideTracer::in_order(device, form, order),
-        });
+        let walk = match (self.form, self.order) {
+            (None, _) if self.by_query => Walk::Query,
+            (None, _) => Walk::Tracer,
+            (Some(form), None) => Walk::Wide(WideTracer::of(device, form)),
+            (Some(form), Some(order)) => Walk::Wide(WideTracer::in_order(device, form, order)),
+        };
         let mut options = self.options;
         if let Some(time) = self.time_to_optimise {
             let pass = pass_of_reinsertion(device, mesh, &options)?;
             options.optimise = Some(ReinsertionOptions::within(time, pass));
         }
-        DeviceBvh::new(device, name, mesh, &options, wide, self.any_hit)
+        DeviceBvh::new(device, name, mesh, &options, walk)
     }
 }
 
 /// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
 fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &BuildOptions) -> Result<Duration> {
-    let mut subject = DeviceBvh::new(device, "", mesh, options, None, None)?;
+    let mut subject = DeviceBvh::new(device, "", mesh, options, Walk::Tracer)?;
     subject.build()?;
     let run = subject.build()?;
     let milliseconds: f64 = run.phases.iter().filter(|p| p.name == OPTIMISE.key).map(|p| p.milliseconds).sum();

@@ -4,6 +4,7 @@ use crate::experiments::check::cases::{Cases, Found};
 use crate::experiments::check::corpus::{self, Mesh};
 use crate::experiments::check::twins::{compare, on_device, on_host};
 use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
+use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::codes::{Code, Codes};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::{reinsertion, split};
@@ -53,6 +54,31 @@ pub fn lbvh(cases: &mut Cases<'_>) {
     let count = if cases.quick { 40_000 } else { 140_000 };
     for mesh in sized(&[count]) {
         as_on_host(cases, &mesh, &by_codes(Code::Mc63.full()), CHAIN_AND_POOL);
+    }
+}
+
+/// Children in every order, which an LBVH gets on the way and others behind.
+pub fn in_child_order(cases: &mut Cases<'_>) {
+    let schedules = [Schedule::Chain, Schedule::Workgroup];
+    let optimise = Some(reinsertion::ReinsertionOptions { rounds: 2, stride: 2 });
+    let split = Some(split::SplitOptions::DEFAULT);
+    for mesh in meshes(cases) {
+        for order in ChildOrder::ALL {
+            let in_order = BuildOptions { child_order: Some(order), ..by_codes(Code::Emc64Var.full()) };
+            as_on_host(cases, &mesh, &in_order, &schedules);
+            let others = [
+                BuildOptions { collapse: Collapse::OFF, ..in_order },
+                BuildOptions { split, ..in_order },
+                BuildOptions { optimise, ..in_order },
+                BuildOptions { method: Method::Ploc { radius: 8 }, ..in_order },
+            ];
+            // One for each rule: all would take long.
+            as_on_host(cases, &mesh, &others[order as usize], CHAIN);
+        }
+    }
+    let opaque = BuildOptions { child_order: Some(ChildOrder::MoreHitsForItsCost), ..by_codes(Code::Mc63.full()) };
+    for mesh in sized(&[if cases.quick { 40_000 } else { 140_000 }]) {
+        as_on_host(cases, &mesh, &opaque, CHAIN_AND_POOL);
     }
 }
 
