@@ -63,6 +63,7 @@ mod kdtree {
 }
 
 mod trace {
+    mod counts;
     mod device;
     mod host;
     mod kd;

@@ -3,7 +3,7 @@
 // twin: the same bytes.
 //
 //   parents  reads nodes                      writes parents; waits: 1 and how many of a node's children are inner nodes, or 0
-//   climb    reads nodes, records, parents    writes nodes: children in order; scratch: weights, waits
+//   climb    reads nodes, records, parents    writes nodes: children in order, and counts with them; scratch: weights, waits
 //
 // A climb begins at each node over two leaves; of two inner children the second that is done goes on with their parent. A structure
 // that is larger than was planned for, or cannot be traced, is left as it is.
@@ -12,6 +12,7 @@
 #ifndef HEDGEROW_BVH_CHILD_ORDER
 #define HEDGEROW_BVH_CHILD_ORDER
 #include "gpu/pass.glsl"
+#include "bvh/counts.glsl"
 #include "bvh/layout.glsl"
 #include "bvh/sah.glsl"
 
@@ -23,6 +24,9 @@ const uint LARGER_BOX = 0;
 const uint LARGER_PRIMITIVES = 1;
 const uint CHEAPER = 2;
 const uint MORE_HITS_FOR_ITS_COST = 3;
+// Whether counts of rays say what comes first, beside that rule.
+layout(constant_id = 2) const bool BY_COUNTS = false;
+const float PRIOR_RAYS = 8.0;
 
 // Squared lengths below this are those of nothing: some devices take what they are made of for zero.
 const float LEAST_SQUARE = 7.888609052210118e-31;   // 2^-100
@@ -40,6 +44,7 @@ layout(push_constant, scalar) uniform ChildOrderArguments {
     Words parents;
     Words waits;
     Weights weights;
+    LinkCounts counts;
     uint slots;        // at most
     uint rounds;       // slots of an invocation
     float c_t;
@@ -165,6 +170,20 @@ Weight joined(Weight first, Weight second, vec2 shares, float both) {
     return Weight(gain, cost);
 }
 
+// By rays that went into the child at a link, and by as much as PRIOR_RAYS do of what is known without them.
+Weight learned(uint link, Weight without_rays) {
+    LinkCount of_rays = counts.count[link];
+    precise float gain = float(of_rays.hits) + PRIOR_RAYS * without_rays.gain;
+    precise float cost = float(of_rays.work) + PRIOR_RAYS * without_rays.cost;
+    return Weight(gain, cost);
+}
+
+void swap_counts(uint slot) {
+    LinkCount left = counts.count[2u * slot];
+    counts.count[2u * slot] = counts.count[2u * slot + 1u];
+    counts.count[2u * slot + 1u] = left;
+}
+
 // Puts the children of a node in order, whose own are.
 void order_node(uint slot, uint node_slots) {
     Child left = structure.nodes[slot].left, right = structure.nodes[slot].right;
@@ -174,8 +193,10 @@ void order_node(uint slot, uint node_slots) {
                        share(scaled_half_area(Box(right.lo, right.hi), scale), area, 1.0));
     precise float both = max(shares.x + shares.y - 1.0, 0.0);
     Weight of_left = weight_of(left, node_slots), of_right = weight_of(right, node_slots);
-    bool swaps = is_right_first(of_left, of_right, shares, both);
+    bool swaps = BY_COUNTS ? is_right_first(learned(2u * slot, of_left), learned(2u * slot + 1u, of_right), shares, both)
+                           : is_right_first(of_left, of_right, shares, both);
     if (swaps) {
+        if (BY_COUNTS) swap_counts(slot);
         structure.nodes[slot].left = right;
         structure.nodes[slot].right = left;
     }

@@ -1,25 +1,24 @@
 //! Our trees built on the device as subjects: timestamps around each phase, our tracer.
 
+use super::any_hit::{AnyHit, OrderedChildren};
 use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::device_rays::DeviceRays;
-use super::wide::WideTree;
-use super::{BuildRun, Subject};
+use super::wide::{WidePlan, WideTree};
+use super::{BuildRun, Subject, joined_choices};
 use crate::Result;
 use crate::device::Device;
 use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
 use crate::scene::Mesh;
 use hedgerow::bvh::builder::{BuildOptions, Builder, Input};
-use hedgerow::bvh::child_order::{ChildOrder, ChildOrderPass};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::quality::{self, QualityFigures};
 use hedgerow::gpu::{Recorder, Timestamps};
 use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
-use hedgerow::trace::wide::WideTracer;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
-/// Phases of a build at most: split, reset and bounds, encode, sort, hierarchy, those of collapsing, wide.
-const PHASES: u32 = 12;
+/// Phases of a build at most: split, reset and bounds, encode, sort, hierarchy, those of collapsing, rays, order, wide.
+const PHASES: u32 = 14;
 
 /// A scene in our `Bvh2`, or in a wide tree made of it, built and traced on the device.
 pub struct DeviceBvh<'a> {
@@ -33,7 +32,7 @@ pub struct DeviceBvh<'a> {
     memory: BuildMemory<'a>,
     wide: Option<WideTree<'a>>,
     /// Puts the children in order behind a build.
-    child_order: Option<ChildOrderPass>,
+    child_order: Option<OrderedChildren<'a>>,
     timestamps: Timestamps,
     rays: DeviceRays<'a>,
 }
@@ -49,15 +48,16 @@ impl<'a> DeviceBvh<'a> {
         builder: &str,
         mesh: &Mesh,
         options: &BuildOptions,
-        wide: Option<WideTracer>,
-        any_hit: Option<ChildOrder>,
+        wide: Option<&WidePlan>,
+        any_hit: &AnyHit,
     ) -> Result<DeviceBvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let bvh = Builder::new(device, options, count)?;
-        let child_order = any_hit.map(|order| ChildOrderPass::new(device, order, options.collapse, bvh.record_count()));
+        let ordered = |order| OrderedChildren::new(device, order, options.collapse, bvh.record_count());
+        let child_order = any_hit.order.as_ref().map(ordered).transpose()?;
         let mut sizes = bvh.sizes();
         // The build is done with its scratch memory by then.
-        sizes.scratch = sizes.scratch.max(child_order.map_or(0, |pass| pass.scratch_bytes()));
+        sizes.scratch = sizes.scratch.max(child_order.as_ref().map_or(0, |pass| pass.scratch_bytes()));
         let mesh_bytes = size_of_val(&mesh.positions[..]) + size_of_val(&mesh.triangles[..]);
         check_memory(device, builder, count, mesh_bytes as u64 + sizes.structure + sizes.scratch)?;
         let mesh = DeviceMesh::new(device, &mesh.positions, &mesh.triangles)?;
@@ -67,8 +67,8 @@ impl<'a> DeviceBvh<'a> {
         Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
-            choice: choice_of(options, &bvh),
-            wide: wide.map(|tracer| WideTree::new(device, tracer, bvh.record_count())).transpose()?,
+            choice: joined_choices([choice_of(options, &bvh), any_hit.choice.clone()]),
+            wide: wide.map(|plan| WideTree::new(device, plan, bvh.record_count())).transpose()?,
             child_order,
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,
@@ -88,7 +88,7 @@ impl<'a> DeviceBvh<'a> {
 fn record_build(
     recorder: &mut Recorder<'_>,
     bvh: &Builder,
-    child_order: Option<&ChildOrderPass>,
+    child_order: Option<&OrderedChildren<'_>>,
     input: &Input,
     BuildMemory { structure, scratch, .. }: &BuildMemory<'_>,
 ) -> hedgerow::Result<()> {
@@ -130,8 +130,7 @@ pub(super) fn record_binary(
 fn choice_of(options: &BuildOptions, bvh: &Builder) -> Option<String> {
     let codes = options.codes.is_none().then(|| format!("codes {}", bvh.codes()));
     let schedule = options.schedule.is_none().then(|| format!("schedule {}", bvh.schedule()));
-    let chosen: Vec<String> = codes.into_iter().chain(schedule).collect();
-    (!chosen.is_empty()).then(|| chosen.join(", "))
+    joined_choices([codes, schedule])
 }
 
 impl Subject for DeviceBvh<'_> {
@@ -158,7 +157,7 @@ impl Subject for DeviceBvh<'_> {
     fn build(&mut self) -> Result<BuildRun> {
         self.device.run(Some(&mut self.timestamps), |recorder| {
             record_build(recorder, &self.bvh, self.child_order.as_ref(), &self.mesh.input, &self.memory)?;
-            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, self.memory.structure.address()))
+            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, self.memory.structure.region()))
         })?;
         Ok(BuildRun::of(self.timestamps.phases()?))
     }

@@ -1,7 +1,8 @@
 //! The order of children for rays that end at their first hit, plainly: see [`crate::bvh::child_order`] for the rules. The same bytes as
 //! the device's.
 
-use crate::bvh::child_order::ChildOrder;
+use crate::bvh::child_order::{ChildOrder, PRIOR_RAYS};
+use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{BoxRecord, Bvh2, Child, Record, status};
 use crate::bvh::sah::Collapse;
 
@@ -11,11 +12,25 @@ const LEAST_SQUARE: f32 = 1.0 / (1u128 << 100) as f32;
 impl<R: Record> Bvh2<R> {
     /// The same tree with the children of each node in order, the one to look into first on the left. A tree that cannot be traced stays as
     /// it is.
-    pub fn in_child_order(mut self, order: ChildOrder, costs: &Collapse) -> Bvh2<R> {
+    pub fn in_child_order(self, order: ChildOrder, costs: &Collapse) -> Bvh2<R> {
+        self.ordered(order, costs, &mut [])
+    }
+
+    /// The same with an order that rays have taught ([`ChildOrderPass::record_by_counts`](crate::bvh::child_order::ChildOrderPass)), by counts of
+    /// its links; they are swapped with the children.
+    ///
+    /// # Panics
+    /// There are fewer than two counts a node slot.
+    pub fn in_order_of_counts(self, counts: &mut [LinkCount], costs: &Collapse) -> Bvh2<R> {
+        assert!(counts.len() >= 2 * self.nodes.len(), "two counts a node slot");
+        self.ordered(ChildOrder::MoreHitsForItsCost, costs, counts)
+    }
+
+    fn ordered(mut self, order: ChildOrder, costs: &Collapse, counts: &mut [LinkCount]) -> Bvh2<R> {
         let usable = self.header.active != 0 && self.header.status & status::UNUSABLE == 0;
         let root = self.header.root;
         if usable && !root.is_leaf() {
-            Ordering { order, costs, scale: self.header.area_scale }.subtree(&mut self, root.index);
+            Ordering { order, costs, counts, scale: self.header.area_scale }.subtree(&mut self, root.index);
         }
         self
     }
@@ -31,26 +46,32 @@ struct Weight {
 struct Ordering<'a> {
     order: ChildOrder,
     costs: &'a Collapse,
+    /// Of each link, where rays teach.
+    counts: &'a mut [LinkCount],
     scale: f32,
 }
 
 impl Ordering<'_> {
     /// Puts a node and all below it in order. No deeper than tracers walk.
-    fn subtree<R: Record>(&self, tree: &mut Bvh2<R>, slot: u32) -> Weight {
+    fn subtree<R: Record>(&mut self, tree: &mut Bvh2<R>, slot: u32) -> Weight {
         let children = tree.nodes[slot as usize].children;
-        let weights = children.map(|child| self.weight_of(tree, &child));
+        let weights = [self.weight_of(tree, &children[0]), self.weight_of(tree, &children[1])];
         let area = children[0].bounds().union(&children[1].bounds()).scaled_half_area(self.scale);
         let shares = children.map(|child| share(child.bounds().scaled_half_area(self.scale), area, 1.0));
         let both = (shares[0] + shares[1] - 1.0).max(0.0);
         let ([left, right], [p_left, p_right]) = (weights, shares);
-        if !self.is_right_first(weights, shares, both) {
+        let compared = [0, 1].map(|side| self.learned(2 * slot as usize + side, weights[side]));
+        if !self.is_right_first(compared, shares, both) {
             return self.joined(weights, shares, both);
         }
         tree.nodes[slot as usize].children.swap(0, 1);
+        if !self.counts.is_empty() {
+            self.counts.swap(2 * slot as usize, 2 * slot as usize + 1);
+        }
         self.joined([right, left], [p_right, p_left], both)
     }
 
-    fn weight_of<R: Record>(&self, tree: &mut Bvh2<R>, child: &Child) -> Weight {
+    fn weight_of<R: Record>(&mut self, tree: &mut Bvh2<R>, child: &Child) -> Weight {
         let below = if child.is_leaf() { self.weight_of_leaf(tree, child) } else { self.subtree(tree, child.index) };
         match self.order {
             ChildOrder::LargerBox => Weight { gain: child.bounds().scaled_half_area(self.scale), cost: 1.0 },
@@ -93,6 +114,15 @@ impl Ordering<'_> {
         let n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
         let square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
         if square >= LEAST_SQUARE { 0.5 * square_root(square) } else { 0.0 }
+    }
+
+    /// By rays that went into the child at a link, and by as much as a few do of what is known without them.
+    fn learned(&self, link: usize, without_rays: Weight) -> Weight {
+        let Some(of_rays) = self.counts.get(link) else { return without_rays };
+        Weight {
+            gain: of_rays.hits as f32 + PRIOR_RAYS * without_rays.gain,
+            cost: of_rays.work as f32 + PRIOR_RAYS * without_rays.cost,
+        }
     }
 
     /// Whether the right child comes first. `shares` are of the rays in the node those that meet each child, `both` those that meet both.

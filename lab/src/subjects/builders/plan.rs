@@ -3,8 +3,10 @@
 use super::options::OPTIMISE;
 use crate::Result;
 use crate::device::Device;
+use crate::rays::sample::TeachingRays;
 use crate::scene::Mesh;
 use crate::subjects::Subject;
+use crate::subjects::any_hit::AnyHit;
 use crate::subjects::device_bvh::DeviceBvh;
 use crate::subjects::host::HostPlan;
 use crate::subjects::peers::driver::DriverPreference;
@@ -12,14 +14,15 @@ use crate::subjects::peers::driver::DriverPreference;
 use crate::subjects::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use crate::subjects::peers::obvhs;
+use crate::subjects::wide::WidePlan;
 use hedgerow::bvh::builder::BuildOptions;
-use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::wide::Form;
 use hedgerow::kdtree::builder::KdOptions;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::wide::{Order, WideTracer};
 use hedgerow_host::kdtree::HostKdOptions;
+use std::rc::Rc;
 use std::time::Duration;
 
 /// What is asked for.
@@ -61,6 +64,15 @@ pub enum KdSpec {
     },
 }
 
+/// What rays of the scene have taught, or will.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct TaughtTree {
+    /// How rays that end at any hit are traced.
+    pub(crate) any_hit: AnyHit,
+    /// Rays by whose visits wide nodes are opened, if not by area.
+    pub(crate) opened_by: Option<Rc<TeachingRays>>,
+}
+
 /// A builder of ours on the device.
 pub(crate) struct DevicePlan {
     pub(super) options: BuildOptions,
@@ -68,34 +80,41 @@ pub(crate) struct DevicePlan {
     pub(super) form: Option<Form>,
     /// The order in which that is traced, where it was given.
     pub(super) order: Option<Order>,
-    /// The order of children, for rays that end at any hit.
-    pub(super) any_hit: Option<ChildOrder>,
     /// How long reinsertion may take, where it was given a time.
     pub(super) time_to_optimise: Option<Duration>,
 }
 
 impl DevicePlan {
-    /// The builder on a scene, with the options that depend on the device.
+    /// The builder on a scene, with the options that depend on the device or that rays teach.
     ///
     /// # Errors
     /// Those of [`DeviceBvh::new`].
-    pub(crate) fn make<'a>(&self, device: &'a Device, name: &str, mesh: &Mesh) -> Result<DeviceBvh<'a>> {
-        let wide = self.form.map(|form| match self.order {
-            None => WideTracer::of(device, form),
-            Some(order) => WideTracer::in_order(device, form, order),
+    pub(crate) fn make<'a>(
+        &self,
+        device: &'a Device,
+        name: &str,
+        mesh: &Mesh,
+        taught: &TaughtTree,
+    ) -> Result<DeviceBvh<'a>> {
+        let wide = self.form.map(|form| {
+            let tracer = match self.order {
+                None => WideTracer::of(device, form),
+                Some(order) => WideTracer::in_order(device, form, order),
+            };
+            WidePlan { tracer, opened_by: taught.opened_by.clone() }
         });
         let mut options = self.options;
         if let Some(time) = self.time_to_optimise {
             let pass = pass_of_reinsertion(device, mesh, &options)?;
             options.optimise = Some(ReinsertionOptions::within(time, pass));
         }
-        DeviceBvh::new(device, name, mesh, &options, wide, self.any_hit)
+        DeviceBvh::new(device, name, mesh, &options, wide.as_ref(), &taught.any_hit)
     }
 }
 
 /// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
 fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &BuildOptions) -> Result<Duration> {
-    let mut subject = DeviceBvh::new(device, "", mesh, options, None, None)?;
+    let mut subject = DeviceBvh::new(device, "", mesh, options, None, &AnyHit::NEAR)?;
     subject.build()?;
     let run = subject.build()?;
     let milliseconds: f64 = run.phases.iter().filter(|p| p.name == OPTIMISE.key).map(|p| p.milliseconds).sum();
