@@ -151,7 +151,8 @@ impl CountPass {
             return Err(Error::Argument(what.into()));
         }
         if ray_count > MAX_RAYS {
-            let what = format!("{ray_count} rays to count in one call, at most {MAX_RAYS}: count them in several calls");
+            let what =
+                format!("{ray_count} rays to count in one call, at most {MAX_RAYS}: count them in several calls");
             return Err(Error::Argument(what));
         }
         let rays = rays.checked("memory of rays", u64::from(ray_count) * size_of::<Ray>() as u64, 16)?;
@@ -169,8 +170,7 @@ impl CountPass {
         let at_once = recorder.context().limits.workgroup_count.saturating_mul(group_rays);
         let mut begin = 0;
         while begin < count {
-            let arguments =
-                arguments::CountRays { structure, rays, tallies, first, stride, begin, count, rays_each };
+            let arguments = arguments::CountRays { structure, rays, tallies, first, stride, begin, count, rays_each };
             recorder.dispatch(&kernel, &arguments, (count - begin).min(at_once).div_ceil(group_rays))?;
             begin += at_once.min(count - begin);
         }
@@ -224,17 +224,21 @@ impl CountPass {
         let kernel = Kernel::new(&shaders::TRACE_COUNTS_GATHER, self.workgroup, &[]);
         let groups = slots.div_ceil(self.workgroup * rounds);
         recorder.chains(&[vec![
-            child_order::parents_step("rays", self.workgroup, &arguments::ChildOrder {
-                structure,
-                parents,
-                waits,
-                weights: 0,
-                counts: 0,
-                slots,
-                rounds,
-                c_t: 0.0,
-                c_i: 0.0,
-            }),
+            child_order::parents_step(
+                "rays",
+                self.workgroup,
+                &arguments::ChildOrder {
+                    structure,
+                    parents,
+                    waits,
+                    weights: 0,
+                    counts: 0,
+                    slots,
+                    rounds,
+                    c_t: 0.0,
+                    c_i: 0.0,
+                },
+            ),
             Step::new("rays", kernel, &arguments, groups),
         ]])
     }

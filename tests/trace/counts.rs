@@ -13,11 +13,8 @@ use hedgerow::trace::counts::{CountPass, CountedRays, CountedWalk, Earlier, Tall
 use hedgerow::trace::twin::{counts as host, tracer};
 use hedgerow::trace::{Query, Ray};
 
-const WALKS: [CountedWalk; 3] = [
-    CountedWalk::AsTraced(Query::ClosestHit),
-    CountedWalk::AsTraced(Query::AnyHit),
-    CountedWalk::Exhaustive,
-];
+const WALKS: [CountedWalk; 3] =
+    [CountedWalk::AsTraced(Query::ClosestHit), CountedWalk::AsTraced(Query::AnyHit), CountedWalk::Exhaustive];
 const GUARD: [u8; 64] = [0xA5; 64];
 
 fn on_host(tree: &Bvh2, rays: &[Ray], walk: CountedWalk) -> Vec<LinkCount> {

@@ -58,16 +58,14 @@ const LEFT_FIRST: f64 = 0.92;
 ///
 /// # Errors
 /// Those of making, building and tracing.
-pub fn chosen<'a>(
-    teaching: &TeachingRays,
-    make: impl Fn(AnyHit) -> Result<Box<dyn Subject + 'a>>,
-) -> Result<AnyHit> {
+pub fn chosen<'a>(teaching: &TeachingRays, make: impl Fn(AnyHit) -> Result<Box<dyn Subject + 'a>>) -> Result<AnyHit> {
     let near = work_by_kind(teaching, make(AnyHit::NEAR)?)?;
     let mut best = (0.0, "near", None);
     for (name, order) in candidates(teaching) {
         let any_hit = AnyHit { order: Some(order.clone()), choice: None };
         let work = work_by_kind(teaching, make(any_hit)?)?;
-        let ratios = work.iter().zip(&near).filter(|(_, near)| **near > 0.0).map(|(work, near)| LEFT_FIRST * work / near);
+        let ratios =
+            work.iter().zip(&near).filter(|(_, near)| **near > 0.0).map(|(work, near)| LEFT_FIRST * work / near);
         let logs: Vec<f64> = ratios.map(f64::ln).collect();
         let mean = logs.iter().sum::<f64>() / logs.len().max(1) as f64;
         if logs.iter().all(|log| *log <= 0.0) && mean < best.0 {
@@ -153,5 +151,45 @@ impl<'a> OrderedChildren<'a> {
         let Some(counted) = &self.counted else { return self.order.record(recorder, structure, scratch) };
         counted.record(recorder, structure, scratch)?;
         self.order.record_by_counts(recorder, structure, counted.counts(), scratch)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rays::sample;
+    use crate::scene::{LoadOptions, Scene, load};
+    use crate::subjects::builders::Spec;
+
+    fn subject<'a>(spec: &str, scene: &'a Scene) -> Box<dyn Subject + 'a> {
+        spec.parse::<Spec>().expect(spec).make_for(None, scene).expect(spec)
+    }
+
+    #[test]
+    fn rays_are_a_phase_of_the_build_and_the_chosen_order_takes_no_more_work() {
+        let scene = load("gen:stadium:3", &LoadOptions::default()).expect("a generator");
+        let run = subject("binned:any-hit=rays", &scene).build().expect("built");
+        let names: Vec<&str> = run.phases.iter().rev().map(|phase| phase.name).take(2).collect();
+        assert_eq!(names, ["order", "rays"]);
+
+        let teaching = TeachingRays::of(&scene, &sample::ANY_HIT, 4000).expect("rays");
+        assert!(teaching.by_kind.iter().all(|(_, rays)| (1..=4000).contains(&rays.len())));
+        let near = work_by_kind(&teaching, subject("binned:any-hit=near", &scene)).expect("counted");
+        let chosen = subject("binned:any-hit=auto", &scene);
+        let choice = chosen.choice().expect("what was chosen");
+        assert!(choice.contains("any-hit "), "{choice}");
+        let work = work_by_kind(&teaching, chosen).expect("counted");
+        for (work, near) in work.iter().zip(&near) {
+            assert!(LEFT_FIRST * work <= 1.02 * near, "{choice}: {work} of work, near {near}");
+        }
+    }
+
+    #[test]
+    fn rays_teach_where_there_is_a_scene() {
+        let scene = load("gen:icosphere:1", &LoadOptions::default()).expect("a generator");
+        for spec in ["sweep:any-hit=rays", "sweep:any-hit=auto"] {
+            let error = spec.parse::<Spec>().expect(spec).make(None, &scene.mesh).err().expect("only a mesh");
+            assert!(error.to_string().contains("there is only a mesh here"), "{error}");
+        }
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{Bvh2, Child, Record};
-use crate::bvh::wide::{LEVELS_BY_AREA, PRIOR_RAYS};
 use crate::bvh::wide::layout::{Slots, Wide, WideNode};
+use crate::bvh::wide::{LEVELS_BY_AREA, PRIOR_RAYS};
 use crate::geometry::Aabb;
 use std::collections::BTreeMap;
 

@@ -29,8 +29,8 @@ use crate::rays::sample::{self, TeachingRays};
 use crate::scene::{Mesh, Scene};
 use crate::{Error, Result};
 use options::{RAYS, TRACE, TRAVERSAL};
-pub(crate) use plan::{BuilderPlan, TaughtTree};
 pub use plan::KdSpec;
+pub(crate) use plan::{BuilderPlan, TaughtTree};
 use std::fmt;
 use std::rc::Rc;
 use std::str::FromStr;
@@ -373,6 +373,8 @@ mod tests {
         assert!(
             error_of("lbvh:width=4:any-hit=sato").contains("orders of children are for nodes of two; take width=2")
         );
+        assert!(error_of("lbvh:open=rays").contains("open=rays is unknown; use area, or rays (of width=4, 8 or 8q)"));
+        assert!(error_of("lbvh:width=8:open=visits").contains("open=visits is unknown; use area, or rays"));
         assert!(error_of("kd-exact:any-hit=sato").contains("no option \"any-hit\""));
         assert!(error_of("sweep:heuristic=best").contains("heuristic=best is unknown; use sah, interior"));
         assert!(error_of("bonsai:heuristic=rdh").contains("bonsai has no option \"heuristic\""));
