@@ -124,12 +124,12 @@ impl ChildOrderPass {
         let groups = self.slots.div_ceil(self.workgroup * self.rounds);
         let constants = [order as u32, u32::from(counts != 0)];
         let climb = Kernel::new(&shaders::BVH_CHILD_ORDER_CLIMB, self.workgroup, &constants);
-        Ok(vec![parents_step("order", self.workgroup, &arguments), Step::new("order", climb, &arguments, groups)])
+        let step = |kernel| Step::new("order", kernel, &arguments, groups);
+        Ok(vec![step(parents_kernel(self.workgroup)), step(climb)])
     }
 }
 
-/// The step that finds the parent of each node, and how many of its children are nodes: what every climb from the leaves begins with.
-pub(crate) fn parents_step(phase: &'static str, workgroup: u32, arguments: &arguments::ChildOrder) -> Step {
-    let groups = arguments.slots.div_ceil(workgroup * arguments.rounds);
-    Step::new(phase, Kernel::new(&shaders::BVH_CHILD_ORDER_PARENTS, workgroup, &[]), arguments, groups)
+/// The kernel that finds the parent of each node, and how many of its children are nodes: what a climb from the leaves begins with.
+pub(crate) fn parents_kernel(workgroup: u32) -> Kernel {
+    Kernel::new(&shaders::BVH_CHILD_ORDER_PARENTS, workgroup, &[])
 }

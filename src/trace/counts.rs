@@ -32,7 +32,7 @@ use crate::bvh::child_order;
 use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{NODES_OFFSET, node_slots};
 use crate::bvh::sah::Collapse;
-use crate::gpu::{Context, Kernel, Recorder, Region, Step, arguments, fill, shaders};
+use crate::gpu::{Context, Kernel, Recorder, Region, arguments, fill, shaders};
 use crate::{Error, Result};
 
 /// Where a ray that is counted goes.
@@ -120,20 +120,19 @@ impl CountPass {
 
     /// Records that tallies begin from nothing. Gathering leaves them so, too.
     ///
-    /// The caller places a barrier between this and what is recorded next. Label: `rays`.
+    /// The caller places a barrier between this and what is recorded next.
     ///
     /// # Errors
     /// The memory is too small; a pipeline could not be made.
     pub fn record_clear(&self, recorder: &mut Recorder<'_>, tallies: &Tallies) -> Result<()> {
         let words = self.checked(tallies)?.1;
-        recorder.phase("rays");
         fill::record(recorder, words, (self.tally_bytes() / 4) as u32, 0)
     }
 
     /// Records the counting of rays. The same structure is traced by others meanwhile, if they like.
     ///
     /// The caller places a barrier before, from what has written rays and structure and from clearing, and one behind. Kinds of rays
-    /// that are counted one after the other need none between them. Label: `rays`.
+    /// that are counted one after the other need none between them.
     ///
     /// # Errors
     /// The stride is 0; more than [`MAX_RAYS`] rays, or than the memory holds; a pipeline could not be made.
@@ -164,7 +163,6 @@ impl CountPass {
         };
         let TraceShape { workgroup, shared_levels, .. } = self.shape;
         let kernel = Kernel::new(&shaders::TRACE_COUNTS_RAYS, workgroup, &[walk, 0, shared_levels]);
-        recorder.phase("rays");
         let rays_each = self.shape.rays_each_of(count);
         let group_rays = workgroup * rays_each;
         let at_once = recorder.context().limits.workgroup_count.saturating_mul(group_rays);
@@ -184,7 +182,7 @@ impl CountPass {
     /// A subtree's work is that of all rays that went into its links, `c_T` a node and `c_I` a primitive of a leaf, whether or not a ray has
     /// ended before it met all of them.
     ///
-    /// The caller places a barrier before and behind. Label: `rays`.
+    /// The caller places a barrier before and behind.
     ///
     /// # Errors
     /// The memory is too small; a pipeline could not be made.
@@ -221,26 +219,21 @@ impl CountPass {
             c_i,
             halvings,
         };
-        let kernel = Kernel::new(&shaders::TRACE_COUNTS_GATHER, self.workgroup, &[]);
         let groups = slots.div_ceil(self.workgroup * rounds);
-        recorder.chains(&[vec![
-            child_order::parents_step(
-                "rays",
-                self.workgroup,
-                &arguments::ChildOrder {
-                    structure,
-                    parents,
-                    waits,
-                    weights: 0,
-                    counts: 0,
-                    slots,
-                    rounds,
-                    c_t: 0.0,
-                    c_i: 0.0,
-                },
-            ),
-            Step::new("rays", kernel, &arguments, groups),
-        ]])
+        let climb = arguments::ChildOrder {
+            structure,
+            parents,
+            waits,
+            weights: 0,
+            counts: 0,
+            slots,
+            rounds,
+            c_t: 0.0,
+            c_i: 0.0,
+        };
+        recorder.dispatch(&child_order::parents_kernel(self.workgroup), &climb, groups)?;
+        recorder.barrier();
+        recorder.dispatch(&Kernel::new(&shaders::TRACE_COUNTS_GATHER, self.workgroup, &[]), &arguments, groups)
     }
 
     /// Addresses of the structure and of the tallies.

@@ -54,6 +54,7 @@ impl<'a> Counted<'a> {
     /// The memory is too small; a pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, structure: Region, scratch: Region) -> hedgerow::Result<()> {
         let tallies = Tallies { structure, tallies: self.tallies.region() };
+        recorder.phase("rays");
         self.pass.record_clear(recorder, &tallies)?;
         recorder.barrier();
         for (walk, ray_count, rays) in &self.samples {
