@@ -50,7 +50,7 @@ NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 RUN := $(WITHIN) $(CARGO) $(if $(NEXTEST),nextest run,test) --release
 SUITE := $(RUN) --features $(FEATURES)
 # What depends on how many lanes a subgroup has: groups of `hedgerow check`.
-WIDTH_GROUPS := scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,child-order,kd-build,kd-merge,trace,trace-kd
+WIDTH_GROUPS := scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,child-order,ray-counts,kd-build,kd-merge,trace,trace-kd
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
 .PHONY: bench bench-all bench-peers stability test test-gpu test-lanes check package portable install-c setup test-drivers

@@ -65,6 +65,7 @@ mod kdtree {
 }
 
 mod trace {
+    mod counts;
     mod device;
     mod host;
     mod kd;

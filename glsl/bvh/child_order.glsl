@@ -3,7 +3,8 @@
 // twin: the same bytes.
 //
 //   parents  reads nodes                      writes parents; waits: 1 and how many of a node's children are inner nodes, or 0
-//   climb    reads nodes, records, parents    writes the header: child_order; nodes: children in order; scratch: weights, waits
+//   climb    reads nodes, records, parents    writes the header: child_order; nodes: children in order, and counts with them;
+//                                             scratch: weights, waits
 //
 // Where boxes alone say which child comes first, climb is all, and nothing climbs.
 //
@@ -14,6 +15,7 @@
 #ifndef HEDGEROW_BVH_CHILD_ORDER
 #define HEDGEROW_BVH_CHILD_ORDER
 #include "gpu/pass.glsl"
+#include "bvh/counts.glsl"
 #include "bvh/layout.glsl"
 
 // ChildOrder::rule in src/bvh/child_order.rs.
@@ -22,6 +24,10 @@ layout(constant_id = 1) const uint RULE = 1;
 
 const uint NO_PARENT = 0xFFFFFFFFu;
 
+// Whether counts of rays say what comes first, beside that rule.
+layout(constant_id = 2) const bool BY_COUNTS = false;
+const float PRIOR_RAYS = 8.0;
+
 BUFFER Weights { Weight weight[]; };
 
 layout(push_constant, scalar) uniform ChildOrderArguments {
@@ -29,6 +35,7 @@ layout(push_constant, scalar) uniform ChildOrderArguments {
     Words parents;
     Words waits;
     Weights weights;
+    LinkCounts counts;
     uint slots;        // at most
     uint rounds;       // slots of an invocation
     float c_t;
@@ -85,16 +92,33 @@ Weight weight_of(Child child, float area, uint node_slots) {
     return weight_of_leaf(area_of_primitives, area, child.count, c_i);
 }
 
+// By rays that went into the child at a link, and by as much as PRIOR_RAYS do of what is known without them.
+Weight learned(uint link, Weight without_rays) {
+    LinkCount of_rays = counts.count[link];
+    precise float gain = float(of_rays.hits) + PRIOR_RAYS * without_rays.gain;
+    precise float cost = float(of_rays.work) + PRIOR_RAYS * without_rays.cost;
+    return Weight(gain, cost);
+}
+
+void swap_counts(uint slot) {
+    LinkCount left = counts.count[2u * slot];
+    counts.count[2u * slot] = counts.count[2u * slot + 1u];
+    counts.count[2u * slot + 1u] = left;
+}
+
 // Puts the children of a node in order, whose own are.
 void order_node(uint slot, uint node_slots) {
     Child left = structure.nodes[slot].left, right = structure.nodes[slot].right;
     float scale = structure.header.area_scale;
     float area = scaled_half_area(Box(min(left.lo, right.lo), max(left.hi, right.hi)), scale);
     vec2 areas = vec2(scaled_half_area(Box(left.lo, left.hi), scale), scaled_half_area(Box(right.lo, right.hi), scale));
-    Weight of_left = weight_of(left, areas.x, node_slots), of_right = weight_of(right, areas.y, node_slots);
+    Weights2 known = Weights2(weight_of(left, areas.x, node_slots), weight_of(right, areas.y, node_slots));
+    Weights2 compared = known;
+    if (BY_COUNTS) compared = Weights2(learned(2u * slot, known.left), learned(2u * slot + 1u, known.right));
     bool swaps;
-    Weight weight = weight_in_order(of_left, of_right, areas, area, c_t, swaps);
+    Weight weight = weight_in_order(known, compared, areas, area, c_t, swaps);
     if (swaps) {
+        if (BY_COUNTS) swap_counts(slot);
         structure.nodes[slot].left = right;
         structure.nodes[slot].right = left;
     }

@@ -93,12 +93,19 @@ Weight joined(Weight first, Weight second, vec2 shares, float both, float step_c
     return Weight(gain, cost);
 }
 
-// Of a node of two children, their boxes having these areas and the one around both `area`: its weight, and whether they swap places.
-Weight weight_in_order(Weight left, Weight right, vec2 areas, float area, float step_cost, out bool swaps) {
+// Of both children of a node.
+struct Weights2 {
+    Weight left;
+    Weight right;
+};
+
+// Of a node of two children, their boxes having these areas and the one around both `area`: its weight, and whether they swap places by
+// what they are compared by.
+Weight weight_in_order(Weights2 w, Weights2 compared, vec2 areas, float area, float step_cost, out bool swaps) {
     vec2 shares = RULE == LARGER_BOX ? areas : vec2(share(areas.x, area, 1.0), share(areas.y, area, 1.0));
     precise float both = max(shares.x + shares.y - 1.0, 0.0);
-    swaps = is_right_first(left, right, shares, both, step_cost);
-    if (swaps) return joined(right, left, shares.yx, both, step_cost);
-    return joined(left, right, shares, both, step_cost);
+    swaps = is_right_first(compared.left, compared.right, shares, both, step_cost);
+    if (swaps) return joined(w.right, w.left, shares.yx, both, step_cost);
+    return joined(w.left, w.right, shares, both, step_cost);
 }
 #endif

@@ -29,16 +29,15 @@ uint free_slots(Structure structure, uint first, uint last) {
 // the node any more.
 Weight order_children(Run run, uint slot, bool is_left, float area, Subtree own, Sibling sibling, float area_scale) {
     Child left = own.child, right = sibling.child;
-    Weight of_left = own.weight, of_right = sibling.weight;
+    Weights2 w = Weights2(own.weight, sibling.weight);
     if (!is_left) {
         left = sibling.child;
         right = own.child;
-        of_left = sibling.weight;
-        of_right = own.weight;
+        w = Weights2(sibling.weight, own.weight);
     }
     vec2 areas = vec2(scaled_half_area(Box(left.lo, left.hi), area_scale), scaled_half_area(Box(right.lo, right.hi), area_scale));
     bool swaps;
-    Weight weight = weight_in_order(of_left, of_right, areas, area, c_t, swaps);
+    Weight weight = weight_in_order(w, w, areas, area, c_t, swaps);
     if (swaps) {
         run.structure.nodes[slot].left = right;
         run.structure.nodes[slot].right = left;

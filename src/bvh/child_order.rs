@@ -14,6 +14,7 @@
 //! [`Bvh2::in_child_order`](super::layout::Bvh2::in_child_order) the twin: the same bytes. An LBVH puts its children in order while it is
 //! built (`glsl/bvh/lbvh.glsl`): the same rules, the areas of a leaf's primitives being added up in another order.
 
+use super::counts::LinkCount;
 use super::layout::{NODES_OFFSET, node_slots};
 use super::sah::Collapse;
 use crate::Result;
@@ -51,6 +52,9 @@ impl ChildOrder {
         self != ChildOrder::LargerBox
     }
 }
+
+/// How many rays the rule without rays ([`ChildOrder::MoreHitsForItsCost`]) stands for, where counts of rays say what comes first.
+pub(crate) const PRIOR_RAYS: f32 = 8.0;
 
 /// Puts the children of a `Bvh2` in order on the device.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,6 +96,30 @@ impl ChildOrderPass {
     /// # Errors
     /// The memory is too small.
     pub fn steps(&self, structure: Region, scratch: Region) -> Result<Vec<Step>> {
+        self.steps_by(self.order, structure, 0, scratch)
+    }
+
+    /// Records the same with an order that rays have taught: first comes the child with more hits for its work by `counts`
+    /// ([`LinkCount`](super::counts::LinkCount) × 2 for each node slot, of rays that were counted exhaustively). [`ChildOrder::MoreHitsForItsCost`]
+    /// weighs as much as 8 rays into each child, whatever the order of this pass is. Counts of children that are swapped are swapped,
+    /// too, so that they stay those of their links.
+    ///
+    /// # Errors
+    /// As [`ChildOrderPass::record`].
+    pub fn record_by_counts(
+        &self,
+        recorder: &mut Recorder<'_>,
+        structure: Region,
+        counts: Region,
+        scratch: Region,
+    ) -> Result<()> {
+        let counts_bytes = 2 * size_of::<LinkCount>() as u64 * u64::from(self.slots);
+        let counts = counts.checked("counts of rays that teach an order of children", counts_bytes, 4)?;
+        recorder.chains(&[self.steps_by(ChildOrder::MoreHitsForItsCost, structure, counts, scratch)?])
+    }
+
+    /// The steps by counts, where there are any.
+    fn steps_by(&self, order: ChildOrder, structure: Region, counts: u64, scratch: Region) -> Result<Vec<Step>> {
         let structure = structure.checked("the BVH whose children are put in order", NODES_OFFSET, 16)?;
         let scratch = scratch.checked("scratch memory of an order of children", self.scratch_bytes(), 16)?;
         let slots = u64::from(self.slots);
@@ -100,20 +128,25 @@ impl ChildOrderPass {
             parents: scratch + 8 * slots,
             waits: scratch + 12 * slots,
             weights: scratch,
+            counts,
             slots: self.slots,
             rounds: self.rounds,
             c_t: self.costs.c_t,
             c_i: self.costs.c_i,
         };
         let groups = self.slots.div_ceil(self.workgroup * self.rounds);
-        let step = |shader| {
-            let kernel = Kernel::new(shader, self.workgroup, &[self.order.rule()]);
-            Step::new("order", kernel, &arguments, groups)
-        };
-        let mut steps = vec![step(&shaders::BVH_CHILD_ORDER_CLIMB)];
-        if self.order.has_weights() {
-            steps.insert(0, step(&shaders::BVH_CHILD_ORDER_PARENTS));
+        let constants = [order.rule(), u32::from(counts != 0)];
+        let climb = Kernel::new(&shaders::BVH_CHILD_ORDER_CLIMB, self.workgroup, &constants);
+        let step = |kernel| Step::new("order", kernel, &arguments, groups);
+        let mut steps = vec![step(climb)];
+        if order.has_weights() {
+            steps.insert(0, step(parents_kernel(self.workgroup)));
         }
         Ok(steps)
     }
+}
+
+/// The kernel that finds the parent of each node, and how many of its children are nodes: what a climb from the leaves begins with.
+pub(crate) fn parents_kernel(workgroup: u32) -> Kernel {
+    Kernel::new(&shaders::BVH_CHILD_ORDER_PARENTS, workgroup, &[])
 }

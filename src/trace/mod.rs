@@ -7,8 +7,10 @@
 //! - [`ray`] prepares a ray: shear, reciprocals, error bounds;
 //! - [`determinant`], [`triangle`], [`slab`] are the arithmetic, each the twin of a file in `glsl/trace/`;
 //! - [`tracer`] traverses on the device, [`wide`] in wide trees, [`kd`] in kd-trees;
+//! - [`counts`] says where rays go in a tree;
 //! - [`twin`] does the same on the host.
 
+pub mod counts;
 pub mod determinant;
 pub mod kd;
 pub mod ray;

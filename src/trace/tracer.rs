@@ -83,6 +83,11 @@ impl TraceShape {
         TraceShape { workgroup, shared_levels: 8, rays_each: 1, loads: Loads::InVectors }.within(limits)
     }
 
+    /// Rays of an invocation where there are `count`: enough workgroups that all cores have some to the end.
+    pub(super) fn rays_each_of(&self, count: u32) -> u32 {
+        (count / (self.workgroup * LEAST_WORKGROUPS)).clamp(1, self.rays_each)
+    }
+
     /// With no more levels in shared memory than there is room for.
     pub(super) fn within(self, limits: &Limits) -> TraceShape {
         let workgroup = self.workgroup.min(limits.workgroup_invocations);
@@ -194,8 +199,7 @@ pub(super) fn record_kernel(
     let rays = rays.checked("memory of rays", bytes(size_of::<Ray>()), 16)?;
     let hits = hits.checked("memory for hits", bytes(size_of::<Hit>()), 16)?;
     let works = work.map_or(Ok(0), |work| work.checked("memory for work", bytes(size_of::<Work>()), 16))?;
-    // Enough workgroups that all cores have some to the end.
-    let rays_each = (count / (shape.workgroup * LEAST_WORKGROUPS)).clamp(1, shape.rays_each);
+    let rays_each = shape.rays_each_of(count);
     let group_rays = shape.workgroup * rays_each;
     let at_once = recorder.context().limits.workgroup_count.saturating_mul(group_rays);
     let mut first = 0;

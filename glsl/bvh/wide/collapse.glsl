@@ -20,6 +20,7 @@
 #ifndef HEDGEROW_BVH_WIDE_COLLAPSE
 #define HEDGEROW_BVH_WIDE_COLLAPSE
 #include "bvh/copy.glsl"
+#include "bvh/counts.glsl"
 #include "bvh/sah.glsl"
 #include "bvh/wide.glsl"
 #extension GL_EXT_control_flow_attributes : require
@@ -28,9 +29,12 @@ layout(constant_id = 2) const uint WIDTH = 4;
 layout(constant_id = 3) const bool QUANTISED = false;
 // Whether what is known of a node's children is chosen by comparisons, so that it stays in registers, or by index.
 layout(constant_id = 4) const bool IN_REGISTERS = false;
+// Whether the child that most rays went into is opened, rather than the largest.
+layout(constant_id = 6) const bool BY_VISITS = false;
 
 // src/bvh/wide/mod.rs
 const uint LEVELS_BY_AREA = 24;
+const float PRIOR_RAYS = 8.0;
 const uint LEVELS_AT_MOST = 64;
 // In place of what names a child, which is where it lies among all children of the source: twice its node's slot, and one for
 // the right one.
@@ -55,6 +59,7 @@ layout(push_constant, scalar) uniform WideCollapseArguments {
     uvec2 target;
     Levels levels;
     OpenedNodes opened;
+    LinkCounts counts;       // of the source's links, by visits
     Words slots;             // what names the children of each of opened, WIDTH words
     Words first_children;    // of each of the source's slots, and one more: the sum
     Words first_records;

@@ -11,10 +11,19 @@ uint open_depth[8];
 // What speaks for opening it; less than 0 for a leaf.
 float open_weight[8];
 
-// The same as `weight` in src/bvh/wide/host.rs.
+// What speaks for opening a child that is an inner node.
+float weight_by_visits(uint name, Child child, float scale) {
+    Child root = source.header.root;
+    precise float visits = float(counts.count[name].entered) * scaled_half_area(Box(root.lo, root.hi), scale);
+    precise float weight = visits + PRIOR_RAYS * scaled_half_area(Box(child.lo, child.hi), scale);
+    return weight;
+}
+
+// The same as `weight` in src/bvh/twin/wide.rs.
 void put_child(uint at, uint name, uint depth, uint level, float scale) {
     Child child = child_named(name);
     float weight = level < LEVELS_BY_AREA ? scaled_half_area(Box(child.lo, child.hi), scale) : float(64 - depth);
+    if (BY_VISITS && level < LEVELS_BY_AREA && is_inner(child)) weight = weight_by_visits(name, child, scale);
     weight = is_inner(child) ? weight : -1.0;
     vec3 middle = QUANTISED ? quarter_middle(child.lo, child.hi) : vec3(0);
     if (IN_REGISTERS) {

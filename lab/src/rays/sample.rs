@@ -11,11 +11,16 @@ use hedgerow::trace::twin::tracer;
 use hedgerow::trace::{Hit, Ray};
 use hedgerow_host::bvh::heuristic::RaySegment;
 use rayon::prelude::*;
+use std::rc::Rc;
 
 /// What a frame of a renderer traces.
 pub const FRAME: [RayKind; 5] = [RayKind::Primary, RayKind::Shadow, RayKind::Ao, RayKind::Diffuse1, RayKind::Diffuse2];
 /// Rays of a sample, at most, unless another number is given.
 pub const MOST: usize = 1 << 18;
+/// Kinds of rays that end at any hit.
+pub const ANY_HIT: [RayKind; 2] = [RayKind::Shadow, RayKind::Ao];
+/// Of each kind that teaches an order of children or how to open wide nodes, at most.
+pub const MOST_OF_KIND: usize = 1 << 16;
 /// Pixels of the picture that a sample is of.
 const SAMPLED: [u32; 2] = [320, 180];
 /// Pixels of the picture that shows what is seen.
@@ -25,6 +30,11 @@ const SEED: u64 = 0x7465_6163_6865_7273;
 
 /// The rays of these kinds with their hits, kind by kind.
 fn traced(scene: &Scene, kinds: &[RayKind], size: [u32; 2]) -> Result<Vec<(Ray, Hit)>> {
+    Ok(traced_by_kind(scene, kinds, size)?.into_iter().flatten().collect())
+}
+
+/// The same, each kind apart.
+fn traced_by_kind(scene: &Scene, kinds: &[RayKind], size: [u32; 2]) -> Result<Vec<Vec<(Ray, Hit)>>> {
     let mesh = &scene.mesh;
     let tree = lbvh::build(&mesh.positions, &mesh.triangles, Code::Mc63.full(), Collapse::SAH);
     let closest = |rays: &[Ray]| -> Vec<Hit> { rays.par_iter().map(|ray| tracer::closest_hit(&tree, ray)).collect() };
@@ -33,7 +43,7 @@ fn traced(scene: &Scene, kinds: &[RayKind], size: [u32; 2]) -> Result<Vec<(Ray, 
     for &kind in kinds {
         let rays = kinds::generate(kind, scene, &options, &mut |rays| Ok(closest(rays)))?;
         let hits = closest(&rays);
-        all.extend(rays.into_iter().zip(hits));
+        all.push(rays.into_iter().zip(hits).collect());
     }
     Ok(all)
 }
@@ -56,6 +66,32 @@ pub fn segments(scene: &Scene, kinds: &[RayKind], most: usize) -> Result<Vec<Ray
         weight: stride as f32,
     };
     Ok(all.iter().step_by(stride).map(segment).collect())
+}
+
+/// Rays that teach, each kind apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TeachingRays {
+    /// Those of each kind.
+    pub by_kind: Vec<(RayKind, Vec<Ray>)>,
+}
+
+impl TeachingRays {
+    /// At most this many of each of these kinds, from all parts of the picture.
+    ///
+    /// # Errors
+    /// The scene has no triangles.
+    pub fn of(scene: &Scene, kinds: &[RayKind], most: usize) -> Result<TeachingRays> {
+        let of_kind = |(kind, all): (&RayKind, Vec<(Ray, Hit)>)| {
+            let stride = all.len().div_ceil(most.max(1)).max(1);
+            (*kind, all.iter().step_by(stride).map(|(ray, _)| *ray).collect())
+        };
+        Ok(TeachingRays { by_kind: kinds.iter().zip(traced_by_kind(scene, kinds, SAMPLED)?).map(of_kind).collect() })
+    }
+
+    /// All of them, kind by kind.
+    pub fn all(&self) -> Rc<[Ray]> {
+        self.by_kind.iter().flat_map(|(_, rays)| rays).copied().collect()
+    }
 }
 
 /// Of each triangle, whether a ray of a frame of these kinds ends on it.

@@ -3,7 +3,7 @@
 use crate::device::Device;
 use crate::experiments::choose::{Cost, SceneClass, cache};
 use crate::scene::Mesh;
-use crate::subjects::builders::{BuilderPlan, Spec};
+use crate::subjects::builders::{BuilderPlan, Spec, TaughtTree};
 use crate::subjects::device_bvh::DeviceBvh;
 use crate::{Error, Result};
 
@@ -35,7 +35,7 @@ pub fn chosen<'a>(device: &'a Device, builder: &str, mesh: &Mesh, rays: f64) -> 
     let BuilderPlan::Device(plan) = name.parse::<Spec>()?.plan()? else {
         return Err(Error::Argument(format!("{name} builds no BVH on the device, so auto cannot take it")));
     };
-    let mut subject = plan.make(device, &name, mesh)?;
+    let mut subject = plan.make(device, &name, mesh, &TaughtTree::default())?;
     let own = subject.choice.map_or(String::new(), |choice| format!(" ({choice})"));
     subject.choice =
         Some(format!("{name}{own} for {rays:e} rays a build, expected {build_ms:.3} ms and {ray_ns:.0} ns a ray"));

@@ -1,35 +1,35 @@
 //! Our trees built on the device as subjects: timestamps around each phase, our tracer.
 
+use super::any_hit::{AnyHit, ChildrenBy, TaughtOrder};
 use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::device_rays::DeviceRays;
 use super::queries::{self, QueryWork};
-use super::wide::WideTree;
-use super::{BuildRun, Subject};
+use super::wide::{WidePlan, WideTree};
+use super::{BuildRun, Subject, joined_choices};
 use crate::Result;
 use crate::device::Device;
 use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
 use crate::scene::Mesh;
-use hedgerow::bvh::builder::{BuildOptions, Builder};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Input};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::quality::{self, QualityFigures};
 use hedgerow::gpu::{Recorder, Timestamps};
 use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
-use hedgerow::trace::wide::WideTracer;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
-/// Phases of a build at most: split, reset and bounds, encode, sort, hierarchy, those of collapsing, wide.
-const PHASES: u32 = 12;
+/// Phases of a build at most: split, reset and bounds, encode, sort, hierarchy, those of collapsing, rays, order, wide.
+const PHASES: u32 = 14;
 
 /// How rays go through a tree that is built on the device.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Walk {
     /// By the tracer of binary trees.
     Tracer,
     /// By queries in a shader.
     Query,
     /// Through a wide tree that is made of the binary one.
-    Wide(WideTracer),
+    Wide(WidePlan),
 }
 
 /// How rays go through a binary tree.
@@ -52,6 +52,8 @@ pub struct DeviceBvh<'a> {
     memory: BuildMemory<'a>,
     wide: Option<WideTree<'a>>,
     binary: BinaryWalk,
+    /// Puts the children in an order that rays teach, behind a build.
+    taught_order: Option<TaughtOrder<'a>>,
     timestamps: Timestamps,
     rays: DeviceRays<'a>,
 }
@@ -66,26 +68,37 @@ impl<'a> DeviceBvh<'a> {
         builder: &str,
         mesh: &Mesh,
         options: &BuildOptions,
-        walk: Walk,
+        (walk, any_hit): (&Walk, &AnyHit),
     ) -> Result<DeviceBvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
+        let (child_order, teaching) = match &any_hit.order {
+            None => (options.child_order, None),
+            Some(ChildrenBy::Rule(order)) => (Some(*order), None),
+            Some(ChildrenBy::Rays(rays)) => (None, Some(rays)),
+        };
+        let options = &BuildOptions { child_order, ..*options };
         let bvh = Builder::new(device, options, count)?;
-        let sizes = bvh.sizes();
+        let taught = |rays| TaughtOrder::new(device, rays, options.collapse, bvh.record_count());
+        let taught_order = teaching.map(|rays| taught(rays)).transpose()?;
+        let mut sizes = bvh.sizes();
+        // The build is done with its scratch memory by then.
+        sizes.scratch = sizes.scratch.max(taught_order.as_ref().map_or(0, TaughtOrder::scratch_bytes));
         let mesh_bytes = size_of_val(&mesh.positions[..]) + size_of_val(&mesh.triangles[..]);
         check_memory(device, builder, count, mesh_bytes as u64 + sizes.structure + sizes.scratch)?;
         let mesh = DeviceMesh::new(device, &mesh.positions, &mesh.triangles)?;
         let memory = BuildMemory::new(device, sizes)?;
         let mut warming = Recorder::warming(device);
-        bvh.record(&mut warming, &mesh.input, memory.structure.region(), memory.scratch.region())?;
+        record_build(&mut warming, &bvh, taught_order.as_ref(), &mesh.input, &memory)?;
         Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
-            choice: choice_of(options, &bvh),
+            choice: joined_choices([choice_of(options, &bvh), any_hit.choice.clone()]),
             wide: match walk {
-                Walk::Wide(tracer) => Some(WideTree::new(device, tracer, bvh.record_count())?),
+                Walk::Wide(plan) => Some(WideTree::new(device, plan, bvh.record_count())?),
                 Walk::Tracer | Walk::Query => None,
             },
-            binary: BinaryWalk { by_query: walk == Walk::Query, is_ordered: options.child_order.is_some() },
+            binary: BinaryWalk { by_query: matches!(walk, Walk::Query), is_ordered: any_hit.order.is_some() },
+            taught_order,
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,
             mesh,
@@ -100,7 +113,21 @@ impl<'a> DeviceBvh<'a> {
     }
 }
 
-/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`.
+/// Records the build of the `Bvh2`, and the order of its children if rays teach one.
+fn record_build(
+    recorder: &mut Recorder<'_>,
+    bvh: &Builder,
+    taught_order: Option<&TaughtOrder<'_>>,
+    input: &Input,
+    BuildMemory { structure, scratch, .. }: &BuildMemory<'_>,
+) -> hedgerow::Result<()> {
+    bvh.record(recorder, input, structure.region(), scratch.region())?;
+    let Some(order) = taught_order else { return Ok(()) };
+    recorder.barrier();
+    order.record(recorder, structure.region(), scratch.region())
+}
+
+/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`, whose children may be in order.
 fn record_trace(
     recorder: &mut Recorder<'_>,
     wide_tree: Option<&WideTree<'_>>,
@@ -133,8 +160,7 @@ pub(super) fn record_binary(
 fn choice_of(options: &BuildOptions, bvh: &Builder) -> Option<String> {
     let codes = options.codes.is_none().then(|| format!("codes {}", bvh.codes()));
     let schedule = options.schedule.is_none().then(|| format!("schedule {}", bvh.schedule()));
-    let chosen: Vec<String> = codes.into_iter().chain(schedule).collect();
-    (!chosen.is_empty()).then(|| chosen.join(", "))
+    joined_choices([codes, schedule])
 }
 
 impl Subject for DeviceBvh<'_> {
@@ -160,9 +186,8 @@ impl Subject for DeviceBvh<'_> {
 
     fn build(&mut self) -> Result<BuildRun> {
         self.device.run(Some(&mut self.timestamps), |recorder| {
-            let BuildMemory { structure, scratch, .. } = &self.memory;
-            self.bvh.record(recorder, &self.mesh.input, structure.region(), scratch.region())?;
-            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, self.memory.structure.address()))
+            record_build(recorder, &self.bvh, self.taught_order.as_ref(), &self.mesh.input, &self.memory)?;
+            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, self.memory.structure.region()))
         })?;
         Ok(BuildRun::of(self.timestamps.phases()?))
     }

@@ -1,8 +1,10 @@
 //! What is measured: a builder on a scene, behind one interface, ours and the peers' alike.
 
+pub mod any_hit;
 pub mod auto;
 pub mod build_memory;
 pub mod builders;
+pub mod counted;
 pub mod device_bvh;
 pub mod device_rays;
 pub mod host;
@@ -64,6 +66,12 @@ impl BuildRun {
     pub fn of(phases: Vec<gpu::Phase>) -> BuildRun {
         BuildRun { milliseconds: phases.iter().map(|phase| phase.milliseconds).sum(), phases, on_cpu: None }
     }
+}
+
+/// Several choices in one, if there are any.
+fn joined_choices(choices: impl IntoIterator<Item = Option<String>>) -> Option<String> {
+    let all: Vec<String> = choices.into_iter().flatten().collect();
+    (!all.is_empty()).then(|| all.join(", "))
 }
 
 /// What a structure of ours says of how it was built.

@@ -1,20 +1,18 @@
 //! BVHs of the host traced by our tracer, on the host or on the device, whoever built them: trees are compared apart from the
 //! tracers that come with them.
 
+use super::any_hit::{AnyHit, ordered_on_host};
 use super::device_bvh::record_binary;
 use super::device_rays::DeviceRays;
-use super::host_rays::{HostRays, timed};
-use super::{BuildRun, OnCpu, Outcome, Subject};
+use super::host_rays::HostRays;
+use super::{BuildRun, OnCpu, Outcome, Subject, joined_choices};
 use crate::device::{Buffer, Device};
 use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
 use crate::scene::Frame;
 use crate::{Error, Result};
-use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::quality;
-use hedgerow::gpu::Phase;
 use hedgerow::trace::twin::tracer as on_host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
@@ -46,8 +44,8 @@ pub struct Retraced<'a> {
     builder: String,
     source: Source<'a>,
     tracing: Tracing<'a>,
-    /// Of the children of what a builder builds, for rays that end at any hit.
-    child_order: Option<ChildOrder>,
+    /// How rays that end at any hit go through what a builder builds.
+    any_hit: AnyHit,
     /// What was built last, its children in that order.
     ordered: Option<Bvh2>,
 }
@@ -62,9 +60,9 @@ impl<'a> Retraced<'a> {
         builder: &str,
         subject: Box<dyn Subject + 'a>,
         device: Option<&'a Device>,
-        child_order: Option<ChildOrder>,
+        any_hit: AnyHit,
     ) -> Result<Retraced<'a>> {
-        Ok(Retraced { child_order, ..Retraced::new(builder, Source::Builder(subject), device)? })
+        Ok(Retraced { any_hit, ..Retraced::new(builder, Source::Builder(subject), device)? })
     }
 
     /// A tree that is there already: it cannot be built again.
@@ -80,7 +78,7 @@ impl<'a> Retraced<'a> {
             None => Tracing::Host { tree: None, rays: HostRays::default() },
             Some(device) => Tracing::Device { device, tree: None, rays: Box::new(DeviceRays::new(device)?) },
         };
-        Ok(Retraced { builder: builder.to_owned(), source, tracing, child_order: None, ordered: None })
+        Ok(Retraced { builder: builder.to_owned(), source, tracing, any_hit: AnyHit::NEAR, ordered: None })
     }
 
     /// A copy of the tree that is traced. It holds together: one that does not might be walked without end.
@@ -107,11 +105,12 @@ impl<'a> Retraced<'a> {
         };
         self.ordered = None;
         let mut run = subject.build()?;
-        let Some((order, tree)) = self.child_order.zip(subject.tree()?) else { return Ok(run) };
-        let (milliseconds, tree) = timed(|| tree.in_child_order(order, &Collapse::SAH));
+        let Some((order, tree)) = self.any_hit.order.as_ref().zip(subject.tree()?) else { return Ok(run) };
+        let (phases, tree) = ordered_on_host(tree, order);
         self.ordered = Some(tree);
+        let milliseconds: f64 = phases.iter().map(|phase| phase.milliseconds).sum();
         run.milliseconds += milliseconds;
-        run.phases.push(Phase { name: "order", milliseconds });
+        run.phases.extend(phases);
         run.on_cpu = run.on_cpu.map(|on_cpu| OnCpu { milliseconds: on_cpu.milliseconds + milliseconds, ..on_cpu });
         Ok(run)
     }
@@ -167,7 +166,7 @@ impl Subject for Retraced<'_> {
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {
-        if self.child_order.is_some() && self.ordered.is_none() {
+        if self.any_hit.order.is_some() && self.ordered.is_none() {
             self.run()?;
         }
         match &mut self.source {
@@ -185,10 +184,11 @@ impl Subject for Retraced<'_> {
     }
 
     fn choice(&self) -> Option<String> {
-        match &self.source {
+        let of_builder = match &self.source {
             Source::Builder(subject) => subject.choice(),
             Source::Tree(_) => None,
-        }
+        };
+        joined_choices([of_builder, self.any_hit.choice.clone()])
     }
 
     fn set_rays(&mut self, new: &[Ray]) -> Result<()> {
@@ -209,7 +209,7 @@ impl Subject for Retraced<'_> {
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let is_ordered = self.child_order.is_some();
+        let is_ordered = self.any_hit.order.is_some();
         match &mut self.tracing {
             Tracing::Host { tree: Some(tree), rays } => Ok(rays.trace(|ray| traced(tree, is_ordered, ray, query).0)),
             Tracing::Device { tree: Some(tree), rays, .. } => {
@@ -228,7 +228,7 @@ impl Subject for Retraced<'_> {
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        let is_ordered = self.child_order.is_some();
+        let is_ordered = self.any_hit.order.is_some();
         match &self.tracing {
             Tracing::Host { tree: Some(tree), rays } => {
                 Ok(Some(rays.work(|ray| traced(tree, is_ordered, ray, query).1)))
@@ -254,6 +254,8 @@ mod tests {
     use super::*;
     use crate::scene::{LoadOptions, load};
     use crate::subjects::builders::Spec;
+    use hedgerow::bvh::child_order::ChildOrder;
+    use hedgerow::bvh::sah::Collapse;
 
     fn rays() -> Vec<Ray> {
         let ray = |i: u8| Ray {

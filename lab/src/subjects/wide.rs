@@ -1,16 +1,21 @@
 //! A wide tree made of whatever `Bvh2` a device builder has left: the last phase of a build, and what is measured of it.
 
+use super::counted::Counted;
 use crate::Result;
 use crate::device::{Buffer, Device};
 use crate::measure::record;
+use crate::rays::sample::TeachingRays;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Child, Header, Triangle};
+use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::wide::device::{WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::bvh::wide::{Form, quality};
-use hedgerow::gpu::{Recorder, Sizes};
+use hedgerow::gpu::{Recorder, Region, Sizes};
+use hedgerow::trace::counts::CountedWalk;
 use hedgerow::trace::wide::WideTracer;
+use std::rc::Rc;
 
 /// Memory for a wide tree of triangles, its collapsing, and what traces it.
 pub struct WideTree<'a> {
@@ -20,6 +25,17 @@ pub struct WideTree<'a> {
     sizes: Sizes,
     structure: Buffer<'a>,
     scratch: Buffer<'a>,
+    /// Rays by whose visits nodes are opened, if not by area.
+    counted: Option<Counted<'a>>,
+}
+
+/// What a wide tree is traced by, and how its nodes are opened.
+#[derive(Debug, Clone)]
+pub struct WidePlan {
+    /// What traces it.
+    pub tracer: WideTracer,
+    /// Rays by whose visits nodes are opened, if not by area.
+    pub opened_by: Option<Rc<TeachingRays>>,
 }
 
 impl<'a> WideTree<'a> {
@@ -27,23 +43,36 @@ impl<'a> WideTree<'a> {
     ///
     /// # Errors
     /// Too little memory; a pipeline could not be made.
-    pub fn new(device: &'a Device, tracer: WideTracer, count: u32) -> Result<WideTree<'a>> {
+    pub fn new(device: &'a Device, plan: &WidePlan, count: u32) -> Result<WideTree<'a>> {
+        let tracer = plan.tracer;
         let options = WideOptions { form: tracer.form, primitives: Primitives::Triangles, geometry_count: 1 };
         let collapse = WidePass::new(device, &options, count);
         let sizes = collapse.sizes();
         let structure = device.buffer("wide structure", sizes.structure)?;
-        let scratch = device.buffer("wide scratch", sizes.scratch)?;
-        collapse.record(&mut Recorder::warming(device), 0, structure.region(), scratch.region())?;
-        Ok(WideTree { tracer, collapse, sizes, structure, scratch })
+        let counted = plan.opened_by.as_ref().map(|teaching| {
+            let samples = teaching.by_kind.iter().map(|(kind, rays)| (CountedWalk::AsTraced(kind.query()), &rays[..]));
+            Counted::new(device, samples, Collapse::SAH, count)
+        });
+        let counted = counted.transpose()?;
+        let counting = counted.as_ref().map_or(0, Counted::scratch_bytes);
+        let scratch = device.buffer("wide scratch", sizes.scratch.max(counting))?;
+        let tree = WideTree { tracer, collapse, sizes, structure, scratch, counted };
+        tree.record(&mut Recorder::warming(device), Region::unbounded(16))?;
+        Ok(tree)
     }
 
-    /// Records the phase `wide`, behind the build of the `Bvh2` at `source`.
+    /// Records the phase `wide`, behind the build of the `Bvh2` at `source`; before it `rays`, where nodes are opened by visits.
     ///
     /// # Errors
     /// A pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, source: u64) -> hedgerow::Result<()> {
+    pub fn record(&self, recorder: &mut Recorder<'_>, source: Region) -> hedgerow::Result<()> {
         recorder.barrier();
-        self.collapse.record(recorder, source, self.structure.region(), self.scratch.region())
+        let (target, scratch) = (self.structure.region(), self.scratch.region());
+        let Some(counted) = &self.counted else {
+            return self.collapse.record(recorder, source.address, target, scratch);
+        };
+        counted.record(recorder, source, scratch)?;
+        self.collapse.record_by_visits(recorder, source.address, counted.counts(), target, scratch)
     }
 
     /// Address of the structure.

@@ -1,7 +1,8 @@
 //! The order of children for rays that end at their first hit, plainly: see [`crate::bvh::child_order`] for the rules. The same bytes as
 //! the device's.
 
-use crate::bvh::child_order::ChildOrder;
+use crate::bvh::child_order::{ChildOrder, PRIOR_RAYS};
+use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{BoxRecord, Bvh2, Child, Record, status};
 use crate::bvh::sah::Collapse;
 
@@ -11,12 +12,27 @@ const LEAST_SQUARE: f32 = 1.0 / (1u128 << 100) as f32;
 impl<R: Record> Bvh2<R> {
     /// The same tree with the children of each node in order, the one to look into first on the left. A tree that cannot be traced stays as
     /// it is.
-    pub fn in_child_order(mut self, order: ChildOrder, costs: &Collapse) -> Bvh2<R> {
+    pub fn in_child_order(self, order: ChildOrder, costs: &Collapse) -> Bvh2<R> {
+        self.ordered(order, costs, &mut [])
+    }
+
+    /// The same with an order that rays have taught ([`ChildOrderPass::record_by_counts`](crate::bvh::child_order::ChildOrderPass)), by counts of
+    /// its links; they are swapped with the children.
+    ///
+    /// # Panics
+    /// There are fewer than two counts a node slot.
+    pub fn in_order_of_counts(self, counts: &mut [LinkCount], costs: &Collapse) -> Bvh2<R> {
+        assert!(counts.len() >= 2 * self.nodes.len(), "two counts a node slot");
+        self.ordered(ChildOrder::MoreHitsForItsCost, costs, counts)
+    }
+
+    fn ordered(mut self, order: ChildOrder, costs: &Collapse, counts: &mut [LinkCount]) -> Bvh2<R> {
         let usable = self.header.active != 0 && self.header.status & status::UNUSABLE == 0;
         let root = self.header.root;
         if usable && !root.is_leaf() {
             self.header.child_order = 1;
-            Ordering { order, costs: *costs, scale: self.header.area_scale }.subtree(&mut self, root.index);
+            let ordering = Ordering { order, costs: *costs, scale: self.header.area_scale };
+            ordering.subtree(&mut self, counts, root.index);
         }
         self
     }
@@ -39,15 +55,22 @@ pub(super) struct Ordering {
 
 impl Ordering {
     /// Puts a node and all below it in order. No deeper than tracers walk.
-    fn subtree<R: Record>(&self, tree: &mut Bvh2<R>, slot: u32) -> Weight {
+    fn subtree<R: Record>(&self, tree: &mut Bvh2<R>, counts: &mut [LinkCount], slot: u32) -> Weight {
         let children = tree.nodes[slot as usize].children;
-        let weights = children
-            .map(|child| if child.is_leaf() { self.weight_of(tree, &child) } else { self.subtree(tree, child.index) });
-        self.node(&mut tree.nodes[slot as usize].children, weights)
+        let weights = children.map(|child| {
+            if child.is_leaf() { self.weight_of(tree, &child) } else { self.subtree(tree, counts, child.index) }
+        });
+        let links = [2 * slot as usize, 2 * slot as usize + 1];
+        let compared = [0, 1].map(|side| learned(counts.get(links[side]), weights[side]));
+        let (swaps, weight) = self.node(&mut tree.nodes[slot as usize].children, weights, compared);
+        if swaps && !counts.is_empty() {
+            counts.swap(links[0], links[1]);
+        }
+        weight
     }
 
-    /// Puts the children of a node in order; its weight.
-    pub fn node(&self, children: &mut [Child; 2], weights: [Weight; 2]) -> Weight {
+    /// Puts the children of a node in order by what they are compared by; whether they were swapped, and its weight.
+    pub fn node(&self, children: &mut [Child; 2], weights: [Weight; 2], compared: [Weight; 2]) -> (bool, Weight) {
         let area = children[0].bounds().union(&children[1].bounds()).scaled_half_area(self.scale);
         let areas = children.map(|child| child.bounds().scaled_half_area(self.scale));
         let shares = areas.map(|of_child| share(of_child, area, 1.0));
@@ -55,13 +78,13 @@ impl Ordering {
         let ([left, right], [p_left, p_right]) = (weights, shares);
         let swaps = match self.order {
             ChildOrder::LargerBox => areas[1] > areas[0],
-            _ => self.is_right_first(weights, shares, both),
+            _ => self.is_right_first(compared, shares, both),
         };
         if !swaps {
-            return self.joined(weights, shares, both);
+            return (false, self.joined(weights, shares, both));
         }
         children.swap(0, 1);
-        self.joined([right, left], [p_right, p_left], both)
+        (true, self.joined([right, left], [p_right, p_left], both))
     }
 
     fn weight_of<R: Record>(&self, tree: &Bvh2<R>, leaf: &Child) -> Weight {
@@ -122,6 +145,15 @@ impl Ordering {
             ChildOrder::MoreHitsForItsCost => Weight { gain: hits, cost },
             _ => Weight { gain: first.gain + second.gain, cost: first.cost + second.cost },
         }
+    }
+}
+
+/// By rays that went into a child, and by as much as a few do of what is known without them.
+fn learned(of_rays: Option<&LinkCount>, without_rays: Weight) -> Weight {
+    let Some(of_rays) = of_rays else { return without_rays };
+    Weight {
+        gain: of_rays.hits as f32 + PRIOR_RAYS * without_rays.gain,
+        cost: of_rays.work as f32 + PRIOR_RAYS * without_rays.cost,
     }
 }
 

@@ -176,7 +176,7 @@ impl<R: Record> Tree<R> {
         } else {
             let child = Child { lo: bounds.lo, index: split as u32, hi: bounds.hi, count: 0 };
             let weights = [left.weight, right.weight];
-            let in_order = |ordering: Ordering| ordering.node(&mut self.nodes[split].children, weights);
+            let in_order = |ordering: Ordering| ordering.node(&mut self.nodes[split].children, weights, weights).1;
             let weight = self.ordering.map(in_order).unwrap_or_default();
             Subtree { child, cost: inner_cost, weight, area }
         }

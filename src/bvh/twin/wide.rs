@@ -1,8 +1,9 @@
 //! Collapsing a `Bvh2` into a wide tree, plainly: what [`crate::bvh::wide::device`] must equal, byte for byte.
 
+use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{Bvh2, Child, Record};
-use crate::bvh::wide::LEVELS_BY_AREA;
 use crate::bvh::wide::layout::{Slots, Wide, WideNode};
+use crate::bvh::wide::{LEVELS_BY_AREA, PRIOR_RAYS};
 use crate::geometry::Aabb;
 use std::collections::BTreeMap;
 
@@ -18,6 +19,19 @@ struct Opened {
 impl<N: WideNode, R: Record> Wide<N, R> {
     /// The wide tree of `tree`. One that is empty or cannot be traced is empty, with its status.
     pub fn of(tree: &Bvh2<R>) -> Wide<N, R> {
+        Wide::opened_by(tree, &[])
+    }
+
+    /// The same, where the child that most rays went into is opened, by counts of the tree's links.
+    ///
+    /// # Panics
+    /// There are fewer than two counts a node slot.
+    pub fn of_visits(tree: &Bvh2<R>, counts: &[LinkCount]) -> Wide<N, R> {
+        assert!(counts.len() >= 2 * tree.nodes.len(), "two counts a node slot");
+        Wide::opened_by(tree, counts)
+    }
+
+    fn opened_by(tree: &Bvh2<R>, counts: &[LinkCount]) -> Wide<N, R> {
         let mut header = tree.header.compacted();
         header.kind = Self::KIND;
         (header.root.index, header.root.count) = (0, 0);
@@ -26,7 +40,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         if header.active == 0 {
             return Wide { header, nodes: vec![N::empty()], records: Vec::new(), geometries };
         }
-        let opened = open_all::<N, R>(tree);
+        let opened = open_all::<N, R>(tree, counts);
         // The nodes that a node names lie behind those that others name whose binary nodes are in lower slots; records likewise.
         let first_children = running_sums(1, opened.iter().map(|o| (o.slot, o.node_children::<N>().count() as u32)));
         let first_records = running_sums(0, opened.iter().map(|o| (o.slot, o.leaf_records())));
@@ -91,13 +105,13 @@ fn running_sums(from: u32, values: impl Iterator<Item = (u32, u32)>) -> BTreeMap
 }
 
 /// All wide nodes to be, level by level.
-fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>) -> Vec<Opened> {
+fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &[LinkCount]) -> Vec<Opened> {
     let mut opened: Vec<Opened> = Vec::new();
     let mut this_level = vec![(tree.header.root, None)];
     for level in 0.. {
         let mut next_level = Vec::new();
         for (root, place) in this_level {
-            let children = open(tree, &root, N::FORM.width() as usize, level);
+            let children = open(tree, &root, N::FORM.width() as usize, level, counts);
             let mut slots = [None; 8];
             if N::FORM.is_quantised() {
                 slots = octant_slots(&children);
@@ -118,21 +132,29 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>) -> Vec<Opened> {
     unreachable!("a tree has an end")
 }
 
-/// The children of a wide node: those of the binary node, the largest one opened again and again; far down
-/// ([`LEVELS_BY_AREA`]) the highest one. Of equal ones the first. A tree that is a leaf is its own child.
-fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32) -> Vec<Child> {
+/// The children of a wide node: those of the binary node, the largest one opened again and again, or, where there are counts, the one
+/// that most rays went into; far down ([`LEVELS_BY_AREA`]) the highest one. Of equal ones the first. A tree that is a leaf is its
+/// own child.
+fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32, counts: &[LinkCount]) -> Vec<Child> {
     if root.is_leaf() {
         return vec![*root];
     }
     let scale = tree.header.area_scale;
-    let weight = |child: &Child, depth: u32| match child.is_leaf() {
-        true => -1.0,
-        false if level < LEVELS_BY_AREA => child.bounds().scaled_half_area(scale),
-        false => (64 - depth) as f32,
+    let whole_area = tree.header.root.bounds().scaled_half_area(scale);
+    let weight = |link: u32, child: &Child, depth: u32| {
+        let area = child.bounds().scaled_half_area(scale);
+        match counts.get(link as usize) {
+            _ if child.is_leaf() => -1.0,
+            _ if level >= LEVELS_BY_AREA => (64 - depth) as f32,
+            Some(count) => count.entered as f32 * whole_area + PRIOR_RAYS * area,
+            None => area,
+        }
     };
     // A child, what speaks for opening it, and how many levels it is below the root.
     let below = |child: &Child, depth: u32| {
-        tree.nodes[child.index as usize].children.map(|c| (c, weight(&c, depth), depth)).to_vec()
+        let links = [2 * child.index, 2 * child.index + 1].into_iter();
+        let children = links.zip(tree.nodes[child.index as usize].children);
+        children.map(|(link, c)| (c, weight(link, &c, depth), depth)).collect::<Vec<_>>()
     };
     let mut children = below(root, 1);
     while children.len() < width {

@@ -2,6 +2,7 @@
 
 use super::Form;
 use crate::Result;
+use crate::bvh::counts::LinkCount;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::node_slots;
 use crate::gpu::arguments;
@@ -110,11 +111,14 @@ impl WidePass {
         Scratch { plan, levels, opened, slots: children, first_children, first_records, order, sums }
     }
 
-    fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
+    fn kernel(&self, shader: &'static shaders::Shader, by_visits: u32) -> Kernel {
         let workgroup = if one_workgroup(shader) { self.few } else { self.grid.workgroup };
         let WideOptions { form, .. } = self.options;
         let [quantised, in_registers] = [form.is_quantised(), self.in_registers].map(u32::from);
-        Kernel::new(shader, workgroup, &[self.grid.rounds, form.width(), quantised, in_registers])
+        // What `SOURCE_WORD` of glsl/bvh/geometry.glsl is without a value.
+        let source_word = 0;
+        let constants = [self.grid.rounds, form.width(), quantised, in_registers, source_word, by_visits];
+        Kernel::new(shader, workgroup, &constants)
     }
 
     /// The levels that are opened by many workgroups, a dispatch each. Those before and behind are done by one workgroup, which
@@ -138,6 +142,37 @@ impl WidePass {
     /// # Errors
     /// The memory is too small; a pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, source: u64, target: Region, scratch: Region) -> Result<()> {
+        self.record_by(recorder, source, 0, target, scratch)
+    }
+
+    /// Records the same, but opens the child that most rays went into, by `counts` of the source's links
+    /// ([`LinkCount`] × 2 for each node slot that a source of so many primitives has, aligned to 4 bytes).
+    ///
+    /// # Errors
+    /// As [`WidePass::record`].
+    pub fn record_by_visits(
+        &self,
+        recorder: &mut Recorder<'_>,
+        source: u64,
+        counts: Region,
+        target: Region,
+        scratch: Region,
+    ) -> Result<()> {
+        let counts_bytes = 2 * size_of::<LinkCount>() as u64 * u64::from(node_slots(self.count));
+        let counts = counts.checked("counts of rays by which wide nodes are opened", counts_bytes, 4)?;
+        self.record_by(recorder, source, counts, target, scratch)
+    }
+
+    /// By counts, where there are any.
+    fn record_by(
+        &self,
+        recorder: &mut Recorder<'_>,
+        source: u64,
+        counts: u64,
+        target: Region,
+        scratch: Region,
+    ) -> Result<()> {
+        let kernel = |shader| self.kernel(shader, u32::from(counts != 0));
         let sizes = self.sizes();
         let target = target.checked("memory for a wide tree", sizes.structure, sizes.alignment)?;
         let scratch = scratch.checked("scratch memory for a wide tree", sizes.scratch, sizes.alignment)?;
@@ -148,6 +183,7 @@ impl WidePass {
             target,
             levels: scratch + parts.levels,
             opened: scratch + parts.opened,
+            counts,
             slots: scratch + parts.slots,
             first_children: scratch + parts.first_children,
             first_records: scratch + parts.first_records,
@@ -159,7 +195,7 @@ impl WidePass {
         };
         recorder.phase("wide");
         fill::record(recorder, arguments.first_children, ((parts.sums - parts.first_children) / 4) as u32, 0)?;
-        recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RESET), &arguments, 1)?;
+        recorder.dispatch(&kernel(&shaders::BVH_WIDE_RESET), &arguments, 1)?;
         let few = |level, level_end| {
             (&shaders::BVH_WIDE_OPEN_FEW, arguments::WideCollapse { level, level_end, ..arguments }, 1)
         };
@@ -170,7 +206,7 @@ impl WidePass {
         let last = few(by_many.end, form.levels());
         for (shader, arguments, groups) in first.into_iter().chain(by_many.map(many)).chain([last]) {
             recorder.barrier();
-            recorder.dispatch(&self.kernel(shader), &arguments, groups)?;
+            recorder.dispatch(&kernel(shader), &arguments, groups)?;
         }
         let sums = scratch + parts.sums;
         let scanned = [arguments.first_children, arguments.first_records];
@@ -179,9 +215,9 @@ impl WidePass {
             self.scan.record(recorder, &scan::ScanBuffers { values: words, results: words, sums })?;
         }
         recorder.barrier();
-        recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_NODES), &arguments, groups)?;
+        recorder.dispatch(&kernel(&shaders::BVH_WIDE_NODES), &arguments, groups)?;
         recorder.barrier();
-        recorder.dispatch(&self.kernel(&shaders::BVH_WIDE_RECORDS), &arguments, self.grid.groups_for(self.count))
+        recorder.dispatch(&kernel(&shaders::BVH_WIDE_RECORDS), &arguments, self.grid.groups_for(self.count))
     }
 }
 

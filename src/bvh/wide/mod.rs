@@ -2,7 +2,8 @@
 //!
 //! A wide node takes the place of a few binary ones: it begins with the two children of one, and the child of the largest
 //! surface area is replaced by its own two as long as there is room (Wald, Benthin, Boulos 2008, section 3.1). A ray takes
-//! fewer steps then, and what a step loads lies together.
+//! fewer steps then, and what a step loads lies together. Where rays were counted, the child that most of them went into may be
+//! replaced instead (Gu, He, Blelloch 2015, "Ray Specialized Contraction on Bounding Volume Hierarchies").
 //!
 //! - [`layout`] are the bytes, [`quantised`] those of the node of 80 bytes;
 //! - [`super::twin::wide`] collapses plainly, [`device`] in the caller's command buffer: the same bytes;
@@ -26,7 +27,10 @@ pub enum Form {
     EightQuantised,
 }
 
-/// Levels of wide nodes that are opened by surface area. Nodes further down are opened level by level, so that a node takes in
+/// How many rays, spread by surface area, stand beside those that were counted.
+pub(crate) const PRIOR_RAYS: f32 = 8.0;
+
+/// Levels of wide nodes that are opened by surface area or by visits. Nodes further down are opened level by level, so that a node takes in
 /// two binary levels of four children and three of eight, however the tree is shaped: what a ray puts off is bounded by that.
 /// Trees of scenes end long before.
 pub const LEVELS_BY_AREA: u32 = 24;

@@ -1,5 +1,6 @@
-//! The tracers on the host, plainly: the same hits and the same work as on the device.
+//! The tracers on the host, plainly: the same hits, the same work and the same counts as on the device.
 
+pub mod counts;
 pub mod kd;
 pub mod tracer;
 pub mod wide;

@@ -9,6 +9,7 @@ mod plan;
 mod table;
 
 use super::Subject;
+use super::any_hit::{self, AnyHit, AnyHitSpec, ChildrenBy};
 use super::auto;
 use super::host::Host;
 use super::host_rays::KdRays;
@@ -23,12 +24,15 @@ use super::peers::obvhs::Obvhs;
 use super::retraced::{Retraced, TreeTracer};
 use super::taught::Taught;
 use crate::device::Device;
+use crate::rays::kinds::RayKind;
+use crate::rays::sample::{self, TeachingRays};
 use crate::scene::{Mesh, Scene};
 use crate::{Error, Result};
 use options::{RAYS, TRACE, TRAVERSAL};
-pub(crate) use plan::BuilderPlan;
 pub use plan::KdSpec;
+pub(crate) use plan::{BuilderPlan, TaughtTree};
 use std::fmt;
+use std::rc::Rc;
 use std::str::FromStr;
 pub use table::{BUILDERS, BuilderEntry, BuilderOption, Needs};
 
@@ -89,7 +93,7 @@ impl Spec {
     /// The device is missing or lacks something, or there is too little memory; the builder learns from a camera or from rays
     /// ([`Spec::make_for`]).
     pub fn make<'a>(&self, device: Option<&'a Device>, mesh: &'a Mesh) -> Result<Box<dyn Subject + 'a>> {
-        self.made(device, mesh, self.heuristic()?.taught(None)?)
+        self.made_of(device, mesh, None)
     }
 
     /// The same on the mesh of a scene, of whose camera and rays it may learn.
@@ -97,15 +101,51 @@ impl Spec {
     /// # Errors
     /// Those of [`Spec::make`].
     pub fn make_for<'a>(&self, device: Option<&'a Device>, scene: &'a Scene) -> Result<Box<dyn Subject + 'a>> {
-        self.made(device, &scene.mesh, self.heuristic()?.taught(Some(scene))?)
+        self.made_of(device, &scene.mesh, Some(scene))
     }
 
-    fn made<'a>(&self, device: Option<&'a Device>, mesh: &'a Mesh, taught: Taught) -> Result<Box<dyn Subject + 'a>> {
+    /// With the rays of the scene that teach an order of children, where some do.
+    fn made_of<'a>(
+        &self,
+        device: Option<&'a Device>,
+        mesh: &'a Mesh,
+        scene: Option<&'a Scene>,
+    ) -> Result<Box<dyn Subject + 'a>> {
+        let taught = self.heuristic()?.taught(scene)?;
+        let rays = |kinds: &[RayKind]| {
+            let what = "it learns from rays, and there is only a mesh here; take bench, build, trace or render, or any-hit=opaque and \
+                        open=area";
+            let scene = scene.ok_or_else(|| Error::Argument(format!("builder {self}: {what}")))?;
+            TeachingRays::of(scene, kinds, sample::MOST_OF_KIND)
+        };
+        let mut tree = TaughtTree::default();
+        if self.is_opened_by_rays()? {
+            tree.opened_by = Some(Rc::new(rays(&sample::FRAME)?));
+        }
+        let ordered = |order| AnyHit { order: Some(order), choice: None };
+        tree.any_hit = match self.any_hit()? {
+            None => AnyHit::NEAR,
+            Some(AnyHitSpec::Rule(order)) => ordered(ChildrenBy::Rule(order)),
+            Some(AnyHitSpec::Rays) => ordered(ChildrenBy::Rays(rays(&sample::ANY_HIT)?.all())),
+            Some(AnyHitSpec::Auto) => any_hit::chosen(&rays(&sample::ANY_HIT)?, |any_hit| {
+                self.made(device, mesh, taught.clone(), TaughtTree { any_hit, ..tree.clone() })
+            })?,
+        };
+        self.made(device, mesh, taught, tree)
+    }
+
+    fn made<'a>(
+        &self,
+        device: Option<&'a Device>,
+        mesh: &'a Mesh,
+        taught: Taught,
+        tree: TaughtTree,
+    ) -> Result<Box<dyn Subject + 'a>> {
         let given =
             || device.ok_or_else(|| Error::NoVulkan("this builder works on a device, and none was opened".into()));
         let name = self.to_string();
         let subject: Box<dyn Subject + 'a> = match self.plan()? {
-            BuilderPlan::Device(plan) => Box::new(plan.make(given()?, &name, mesh)?),
+            BuilderPlan::Device(plan) => Box::new(plan.make(given()?, &name, mesh, &tree)?),
             BuilderPlan::Host(plan) => Box::new(Host::new(&name, mesh, plan, taught)?),
             BuilderPlan::Kd(KdSpec::Host { options, traversal, traces_on_device }) => {
                 let rays = match traces_on_device {
@@ -126,10 +166,8 @@ impl Spec {
         };
         Ok(match self.tracer()? {
             None => subject,
-            Some(TreeTracer::Host) => Box::new(Retraced::by_builder(&name, subject, None, self.any_hit()?)?),
-            Some(TreeTracer::Device) => {
-                Box::new(Retraced::by_builder(&name, subject, Some(given()?), self.any_hit()?)?)
-            }
+            Some(TreeTracer::Host) => Box::new(Retraced::by_builder(&name, subject, None, tree.any_hit)?),
+            Some(TreeTracer::Device) => Box::new(Retraced::by_builder(&name, subject, Some(given()?), tree.any_hit)?),
         })
     }
 
@@ -174,6 +212,7 @@ impl FromStr for Spec {
         }
         spec.plan()?;
         spec.tracer()?;
+        spec.any_hit()?;
         spec.heuristic()?;
         Ok(spec)
     }
@@ -334,6 +373,8 @@ mod tests {
         assert!(
             error_of("lbvh:width=4:any-hit=sato").contains("orders of children are for nodes of two; take width=2")
         );
+        assert!(error_of("lbvh:open=rays").contains("open=rays is unknown; use area, or rays (of width=4, 8 or 8q)"));
+        assert!(error_of("lbvh:width=8:open=visits").contains("open=visits is unknown; use area, or rays"));
         assert!(error_of("kd-exact:any-hit=sato").contains("no option \"any-hit\""));
         assert!(error_of("sweep:heuristic=best").contains("heuristic=best is unknown; use sah, interior"));
         assert!(error_of("bonsai:heuristic=rdh").contains("bonsai has no option \"heuristic\""));

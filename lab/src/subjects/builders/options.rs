@@ -4,6 +4,7 @@ use super::host_options::HOST_OPTIMISE;
 use super::plan::{BuilderPlan, DevicePlan, KdSpec};
 use super::table::{BUILDERS, BuilderEntry};
 use super::{BuilderOption, Spec};
+use crate::subjects::any_hit::AnyHitSpec;
 use crate::subjects::auto;
 use crate::subjects::retraced::TreeTracer;
 use crate::{Error, Result};
@@ -36,6 +37,8 @@ pub(super) const COLLAPSE: BuilderOption = option("collapse", "sah or off");
 pub(super) const RAYS: BuilderOption = option("rays", "rays that are traced between two builds, 1e7 unless given");
 pub(super) const WIDTH: BuilderOption = option("width", "2, 4, 8 or 8q (quantised)");
 pub(super) const ORDER: BuilderOption = option("order", "distance or octant (of width=8q)");
+pub(super) const OPEN: BuilderOption =
+    option("open", "area, or rays (of width=4, 8 or 8q): wide nodes are opened where most rays of the scene go in");
 pub(super) const SCHEDULE: BuilderOption = option("schedule", "chain, persistent or workgroup");
 pub(super) const KD_SCHEDULE: BuilderOption = option("schedule", "chain or persistent");
 pub(super) const SPLIT: BuilderOption = option(
@@ -67,7 +70,7 @@ pub(super) const TRACE: BuilderOption = option("trace", "host or device: where r
 pub(super) const ANY_HIT: BuilderOption = option(
     "any-hit",
     "near, or an order of children, the first of which our tracer looks into first for rays that end at any hit: rtsah, sato, \
-     prim-sato or opaque",
+     prim-sato, opaque, rays (learned from rays of the scene), or auto: the one with the least work for those rays",
 );
 pub(super) const WALK: BuilderOption =
     option("walk", "tracer, or query: rays go through a tree with nodes of two by queries, as in an engine's shader");
@@ -94,12 +97,13 @@ impl Spec {
         let schedule = self.schedule()?;
         let (codes, split) = (self.codes()?, self.split()?);
         let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
-        let child_order = self.any_hit()?;
-        let options =
-            BuildOptions { method, codes, split, optimise, collapse, child_order, schedule, ..BuildOptions::DEFAULT };
+        let options = BuildOptions { method, codes, split, optimise, collapse, schedule, ..BuildOptions::DEFAULT };
         let (form, order) = self.form_and_order()?;
         let time_to_optimise = self.time_to_optimise()?;
-        if form.is_some() && child_order.is_some() {
+        if form.is_none() && self.is_opened_by_rays()? {
+            return Err(self.wrong_value(&OPEN, "rays"));
+        }
+        if form.is_some() && self.any_hit()?.is_some() {
             let what = "orders of children are for nodes of two; take width=2, or any-hit=near";
             return Err(Error::Argument(format!("builder {self}: {what}")));
         }
@@ -111,14 +115,22 @@ impl Spec {
         Ok(BuilderPlan::Device(DevicePlan { options, form, by_query, order, time_to_optimise }))
     }
 
+    /// Option `open`: whether wide nodes are opened by visits of rays.
+    pub(super) fn is_opened_by_rays(&self) -> Result<bool> {
+        Ok(self.choice(&OPEN, &[("area", false), ("rays", true)])?.unwrap_or(false))
+    }
+
     /// Option `any-hit`: the order of children, if there is one.
-    pub(super) fn any_hit(&self) -> Result<Option<ChildOrder>> {
+    pub(super) fn any_hit(&self) -> Result<Option<AnyHitSpec>> {
+        let rule = |order| Some(AnyHitSpec::Rule(order));
         let all = [
             ("near", None),
-            ("rtsah", Some(ChildOrder::Cheaper)),
-            ("sato", Some(ChildOrder::LargerBox)),
-            ("prim-sato", Some(ChildOrder::LargerPrimitives)),
-            ("opaque", Some(ChildOrder::MoreHitsForItsCost)),
+            ("rtsah", rule(ChildOrder::Cheaper)),
+            ("sato", rule(ChildOrder::LargerBox)),
+            ("prim-sato", rule(ChildOrder::LargerPrimitives)),
+            ("opaque", rule(ChildOrder::MoreHitsForItsCost)),
+            ("rays", Some(AnyHitSpec::Rays)),
+            ("auto", Some(AnyHitSpec::Auto)),
         ];
         Ok(self.choice(&ANY_HIT, &all)?.flatten())
     }

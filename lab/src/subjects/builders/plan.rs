@@ -3,15 +3,19 @@
 use super::options::OPTIMISE;
 use crate::Result;
 use crate::device::Device;
+use crate::rays::sample::TeachingRays;
 use crate::scene::Mesh;
 use crate::subjects::Subject;
+use crate::subjects::any_hit::AnyHit;
 use crate::subjects::device_bvh::{DeviceBvh, Walk};
 use crate::subjects::host::HostPlan;
 use crate::subjects::peers::driver::DriverPreference;
+use crate::subjects::wide::WidePlan;
 #[cfg(feature = "peer-embree")]
 use crate::subjects::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use crate::subjects::peers::obvhs;
+use crate::subjects::wide::WidePlan;
 use hedgerow::bvh::builder::BuildOptions;
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::wide::Form;
@@ -19,6 +23,7 @@ use hedgerow::kdtree::builder::KdOptions;
 use hedgerow::trace::kd::Traversal;
 use hedgerow::trace::wide::{Order, WideTracer};
 use hedgerow_host::kdtree::HostKdOptions;
+use std::rc::Rc;
 use std::time::Duration;
 
 /// What is asked for.
@@ -60,6 +65,15 @@ pub enum KdSpec {
     },
 }
 
+/// What rays of the scene have taught, or will.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct TaughtTree {
+    /// How rays that end at any hit are traced.
+    pub(crate) any_hit: AnyHit,
+    /// Rays by whose visits wide nodes are opened, if not by area.
+    pub(crate) opened_by: Option<Rc<TeachingRays>>,
+}
+
 /// A builder of ours on the device.
 pub(crate) struct DevicePlan {
     pub(super) options: BuildOptions,
@@ -74,29 +88,40 @@ pub(crate) struct DevicePlan {
 }
 
 impl DevicePlan {
-    /// The builder on a scene, with the options that depend on the device.
+    /// The builder on a scene, with the options that depend on the device or that rays teach.
     ///
     /// # Errors
     /// Those of [`DeviceBvh::new`].
-    pub(crate) fn make<'a>(&self, device: &'a Device, name: &str, mesh: &Mesh) -> Result<DeviceBvh<'a>> {
-        let walk = match (self.form, self.order) {
-            (None, _) if self.by_query => Walk::Query,
-            (None, _) => Walk::Tracer,
-            (Some(form), None) => Walk::Wide(WideTracer::of(device, form)),
-            (Some(form), Some(order)) => Walk::Wide(WideTracer::in_order(device, form, order)),
+    pub(crate) fn make<'a>(
+        &self,
+        device: &'a Device,
+        name: &str,
+        mesh: &Mesh,
+        taught: &TaughtTree,
+    ) -> Result<DeviceBvh<'a>> {
+        let walk = match self.form {
+            None if self.by_query => Walk::Query,
+            None => Walk::Tracer,
+            Some(form) => {
+                let tracer = match self.order {
+                    None => WideTracer::of(device, form),
+                    Some(order) => WideTracer::in_order(device, form, order),
+                };
+                Walk::Wide(WidePlan { tracer, opened_by: taught.opened_by.clone() })
+            }
         };
         let mut options = self.options;
         if let Some(time) = self.time_to_optimise {
             let pass = pass_of_reinsertion(device, mesh, &options)?;
             options.optimise = Some(ReinsertionOptions::within(time, pass));
         }
-        DeviceBvh::new(device, name, mesh, &options, walk)
+        DeviceBvh::new(device, name, mesh, &options, (&walk, &taught.any_hit))
     }
 }
 
 /// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
 fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &BuildOptions) -> Result<Duration> {
-    let mut subject = DeviceBvh::new(device, "", mesh, options, Walk::Tracer)?;
+    let mut subject = DeviceBvh::new(device, "", mesh, options, (&Walk::Tracer, &AnyHit::NEAR))?;
     subject.build()?;
     let run = subject.build()?;
     let milliseconds: f64 = run.phases.iter().filter(|p| p.name == OPTIMISE.key).map(|p| p.milliseconds).sum();

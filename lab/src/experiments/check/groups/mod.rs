@@ -1,6 +1,7 @@
 //! The groups, from the simplest pass to whole top levels.
 
 mod builders;
+mod counts;
 mod derived;
 pub(super) mod faults;
 mod kdtree;
@@ -33,6 +34,7 @@ pub const GROUPS: &[Group] = &[
     group("refit", "refitting to moved triangles against its twin", derived::refit),
     group("child-order", "children in every order against its twin", derived::child_order),
     group("ordered", "builds with children in every order against their twin", builders::in_child_order),
+    group("ray-counts", "rays counted by links, and what they teach, against their twins", counts::ray_counts),
     group("kd-build", "kd-trees by every schedule against their twin", kdtree::build),
     group("kd-merge", "objects merged into a kd-tree and out again against their twin", kdtree::merge),
     group("trace", "every binary tracer against its twin and brute force", tracers::binary),
