@@ -10,7 +10,6 @@ use crate::subjects::any_hit::AnyHit;
 use crate::subjects::device_bvh::{DeviceBvh, Walk};
 use crate::subjects::host::HostPlan;
 use crate::subjects::peers::driver::DriverPreference;
-use crate::subjects::wide::WidePlan;
 #[cfg(feature = "peer-embree")]
 use crate::subjects::peers::embree;
 #[cfg(feature = "peer-obvhs")]
