@@ -27,6 +27,17 @@ pub enum TreeTracer {
     Device,
 }
 
+/// How rays that end at any hit go through a tree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AnyHitWalk {
+    /// The nearest child first.
+    Near,
+    /// The left child first, as the builder left them.
+    Built,
+    /// The left child first, put in an order behind the build.
+    Ordered(ChildOrder),
+}
+
 /// Where trees come from.
 enum Source<'a> {
     /// A builder, which builds again whenever it is asked.
@@ -46,9 +57,9 @@ pub struct Retraced<'a> {
     builder: String,
     source: Source<'a>,
     tracing: Tracing<'a>,
-    /// Of the children of what a builder builds, for rays that end at any hit.
-    child_order: Option<ChildOrder>,
-    /// What was built last, its children in that order.
+    /// Through what a builder builds.
+    any_hit: AnyHitWalk,
+    /// What was built last, its children in an order.
     ordered: Option<Bvh2>,
 }
 
@@ -62,9 +73,9 @@ impl<'a> Retraced<'a> {
         builder: &str,
         subject: Box<dyn Subject + 'a>,
         device: Option<&'a Device>,
-        child_order: Option<ChildOrder>,
+        any_hit: AnyHitWalk,
     ) -> Result<Retraced<'a>> {
-        Ok(Retraced { child_order, ..Retraced::new(builder, Source::Builder(subject), device)? })
+        Ok(Retraced { any_hit, ..Retraced::new(builder, Source::Builder(subject), device)? })
     }
 
     /// A tree that is there already: it cannot be built again.
@@ -80,7 +91,7 @@ impl<'a> Retraced<'a> {
             None => Tracing::Host { tree: None, rays: HostRays::default() },
             Some(device) => Tracing::Device { device, tree: None, rays: Box::new(DeviceRays::new(device)?) },
         };
-        Ok(Retraced { builder: builder.to_owned(), source, tracing, child_order: None, ordered: None })
+        Ok(Retraced { builder: builder.to_owned(), source, tracing, any_hit: AnyHitWalk::Near, ordered: None })
     }
 
     /// A copy of the tree that is traced. It holds together: one that does not might be walked without end.
@@ -107,7 +118,8 @@ impl<'a> Retraced<'a> {
         };
         self.ordered = None;
         let mut run = subject.build()?;
-        let Some((order, tree)) = self.child_order.zip(subject.tree()?) else { return Ok(run) };
+        let AnyHitWalk::Ordered(order) = self.any_hit else { return Ok(run) };
+        let Some(tree) = subject.tree()? else { return Ok(run) };
         let (milliseconds, tree) = timed(|| tree.in_child_order(order, &Collapse::SAH));
         self.ordered = Some(tree);
         run.milliseconds += milliseconds;
@@ -167,7 +179,7 @@ impl Subject for Retraced<'_> {
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {
-        if self.child_order.is_some() && self.ordered.is_none() {
+        if matches!(self.any_hit, AnyHitWalk::Ordered(_)) && self.ordered.is_none() {
             self.run()?;
         }
         match &mut self.source {
@@ -209,7 +221,7 @@ impl Subject for Retraced<'_> {
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let is_ordered = self.child_order.is_some();
+        let is_ordered = self.any_hit != AnyHitWalk::Near;
         match &mut self.tracing {
             Tracing::Host { tree: Some(tree), rays } => Ok(rays.trace(|ray| traced(tree, is_ordered, ray, query).0)),
             Tracing::Device { tree: Some(tree), rays, .. } => {
@@ -228,7 +240,7 @@ impl Subject for Retraced<'_> {
     }
 
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        let is_ordered = self.child_order.is_some();
+        let is_ordered = self.any_hit != AnyHitWalk::Near;
         match &self.tracing {
             Tracing::Host { tree: Some(tree), rays } => {
                 Ok(Some(rays.work(|ray| traced(tree, is_ordered, ray, query).1)))

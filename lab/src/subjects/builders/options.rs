@@ -1,11 +1,11 @@
 //! What options there are, and what a [`Spec`] says with them.
 
-use super::host_options::HOST_OPTIMISE;
+use super::host_options::{HEURISTIC, HOST_OPTIMISE};
 use super::plan::{BuilderPlan, DevicePlan, KdSpec};
 use super::table::{BUILDERS, BuilderEntry};
 use super::{BuilderOption, Spec};
 use crate::subjects::auto;
-use crate::subjects::retraced::TreeTracer;
+use crate::subjects::retraced::{AnyHitWalk, TreeTracer};
 use crate::{Error, Result};
 use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
 use hedgerow::bvh::child_order::ChildOrder;
@@ -67,7 +67,7 @@ pub(super) const TRACE: BuilderOption = option("trace", "host or device: where r
 pub(super) const ANY_HIT: BuilderOption = option(
     "any-hit",
     "near, or an order of children, the first of which our tracer looks into first for rays that end at any hit: rtsah, sato, \
-     prim-sato or opaque",
+     prim-sato, opaque, or built: as a heuristic on the host has them, which is what srdh does unless told otherwise",
 );
 pub(super) const TRACE_TREE: BuilderOption = option(
     "trace",
@@ -93,7 +93,7 @@ impl Spec {
         let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
         let options = BuildOptions { method, codes, split, optimise, collapse, schedule, ..BuildOptions::DEFAULT };
         let (form, order) = self.form_and_order()?;
-        let (any_hit, time_to_optimise) = (self.any_hit()?, self.time_to_optimise()?);
+        let (any_hit, time_to_optimise) = (self.any_hit_on_device()?, self.time_to_optimise()?);
         if form.is_some() && any_hit.is_some() {
             let what = "orders of children are for nodes of two; take width=2, or any-hit=near";
             return Err(Error::Argument(format!("builder {self}: {what}")));
@@ -101,16 +101,30 @@ impl Spec {
         Ok(BuilderPlan::Device(DevicePlan { options, form, order, any_hit, time_to_optimise }))
     }
 
-    /// Option `any-hit`: the order of children, if there is one.
-    pub(super) fn any_hit(&self) -> Result<Option<ChildOrder>> {
+    /// Option `any-hit`: how rays that end at any hit go through the tree.
+    pub(super) fn any_hit(&self) -> Result<AnyHitWalk> {
         let all = [
-            ("near", None),
-            ("rtsah", Some(ChildOrder::Cheaper)),
-            ("sato", Some(ChildOrder::LargerBox)),
-            ("prim-sato", Some(ChildOrder::LargerPrimitives)),
-            ("opaque", Some(ChildOrder::MoreHitsForItsCost)),
+            ("near", AnyHitWalk::Near),
+            ("rtsah", AnyHitWalk::Ordered(ChildOrder::Cheaper)),
+            ("sato", AnyHitWalk::Ordered(ChildOrder::LargerBox)),
+            ("prim-sato", AnyHitWalk::Ordered(ChildOrder::LargerPrimitives)),
+            ("opaque", AnyHitWalk::Ordered(ChildOrder::MoreHitsForItsCost)),
+            ("built", AnyHitWalk::Built),
         ];
-        Ok(self.choice(&ANY_HIT, &all)?.flatten())
+        let unless_given = if self.option(HEURISTIC.key) == Some("srdh") { AnyHitWalk::Built } else { AnyHitWalk::Near };
+        Ok(self.choice(&ANY_HIT, &all)?.unwrap_or(unless_given))
+    }
+
+    /// The same on the device, where builders leave children as they come.
+    fn any_hit_on_device(&self) -> Result<Option<ChildOrder>> {
+        match self.any_hit()? {
+            AnyHitWalk::Near => Ok(None),
+            AnyHitWalk::Ordered(order) => Ok(Some(order)),
+            AnyHitWalk::Built => {
+                let what = "builders on the device have no order of children of their own; take any-hit=opaque";
+                Err(Error::Argument(format!("builder {self}: {what}")))
+            }
+        }
     }
 
     /// Those of every builder on the device, and `bits` and `treelet`.
@@ -164,7 +178,7 @@ impl Spec {
         }
         let tracer = self.choice(&TRACE_TREE, &[("host", TreeTracer::Host), ("device", TreeTracer::Device)])?;
         // An order of children is for our tracer.
-        Ok(tracer.or(self.any_hit()?.map(|_| TreeTracer::Host)))
+        Ok(tracer.or((self.any_hit()? != AnyHitWalk::Near).then_some(TreeTracer::Host)))
     }
 
     /// Those of every builder of kd-trees on the host, and `bins` and `exact`.
