@@ -150,9 +150,8 @@ fn a_tree_for_shadow_rays_is_less_work_for_others_like_them() {
     let sample = Sample::of(rays(11), &by_area);
     let for_shadows = build_by(&sample.shadow(), &mesh.1, &mesh.2, &options).expect("sound options").tree;
     let others = rays(12);
-    let work = |of: &dyn Fn(&Ray) -> Work| -> u32 {
-        others.iter().map(of).map(|work| 3 * work.steps + 2 * work.tests).sum()
-    };
+    let work =
+        |of: &dyn Fn(&Ray) -> Work| -> u32 { others.iter().map(of).map(|work| 3 * work.steps + 2 * work.tests).sum() };
     let near_first = work(&|ray| trace(&by_area, ray, Query::AnyHit).1);
     let left_first = work(&|ray| trace_left_first(&for_shadows, ray).1);
     let hit = others.iter().filter(|ray| closest_hit(&by_area, ray).is_some()).count();

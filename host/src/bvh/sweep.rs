@@ -139,7 +139,12 @@ impl Candidates for Sweep<'_> {
         }
     }
 
-    fn divide<'a>(&self, part: Self::Part<'a>, (axis, left_count): (usize, usize), first: First) -> [Self::Part<'a>; 2] {
+    fn divide<'a>(
+        &self,
+        part: Self::Part<'a>,
+        (axis, left_count): (usize, usize),
+        first: First,
+    ) -> [Self::Part<'a>; 2] {
         let Part { mut axes, slots } = part;
         for (at, &i) in axes[axis].order.iter().enumerate() {
             self.is_left[i as usize].store(at < left_count, Ordering::Relaxed);

@@ -76,9 +76,10 @@ impl<'a> Heuristic<'a> {
     pub fn check(&self, method: &HostMethod, count: usize) -> Result<()> {
         let (takes, instead) = match (self, method) {
             (Heuristic::Sah, _) => (true, ""),
-            (Heuristic::OcclusionComplete(_), _) => {
-                (matches!(method, HostMethod::Sbvh(_)), "a heuristic that divides primitives; take Sbvh, or Heuristic::Occlusion")
-            }
+            (Heuristic::OcclusionComplete(_), _) => (
+                matches!(method, HostMethod::Sbvh(_)),
+                "a heuristic that divides primitives; take Sbvh, or Heuristic::Occlusion",
+            ),
             (_, HostMethod::Sweep | HostMethod::Binned(_) | HostMethod::Sbvh(_)) => (true, ""),
             _ => (false, "a heuristic; take Sweep, Binned or Sbvh, or Heuristic::Sah"),
         };
@@ -105,9 +106,7 @@ impl<'a> Heuristic<'a> {
             Heuristic::Preferred(rays) => PreferredMeasure::new(&rays.scaled(scale), &scene.aabb()).map(boxed),
             Heuristic::Distribution(rays) => Distribution::new(rays, scene, scale).map(Prepared::Distribution),
             Heuristic::Occlusion(occlusion) => Seen::new(occlusion, items).map(Prepared::Occlusion),
-            Heuristic::OcclusionComplete(occlusion) => {
-                Seen::new(occlusion, items).map(Prepared::OcclusionComplete)
-            }
+            Heuristic::OcclusionComplete(occlusion) => Seen::new(occlusion, items).map(Prepared::OcclusionComplete),
             Heuristic::Shadow(rays) => Shadows::new(rays, count, scene, scale).map(Prepared::Shadow),
         };
         prepared.unwrap_or(Prepared::Area)

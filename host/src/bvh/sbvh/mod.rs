@@ -23,10 +23,10 @@ use super::bounds::{Bounds, Item};
 use super::heuristic::split_cost::{First, Side, Space, SplitCost};
 use super::top_down::{self, Candidates, HALVED_FROM, LeafRule};
 use super::topology::{LEAF, Topology};
-use object::ObjectSplit;
 use hedgerow::bvh::twin::split::padded;
 use hedgerow::geometry::Aabb;
 use hedgerow::{Error, Result};
+use object::ObjectSplit;
 
 /// How triangles are split, and how many references there may be.
 #[derive(Debug, Clone, Copy, PartialEq)]

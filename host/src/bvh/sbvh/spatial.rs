@@ -280,13 +280,11 @@ mod tests {
             Side { bounds, count: 5, seen: 0 }
         };
         // Half areas are 2 of a side, 2.02 of the left one with all of it and 2.2 of the right one: 18.1, 19 and, cut, 20.
-        for (takes_whole, expected) in [
-            ([true, true], [5, 4]),
-            ([false, true], [4, 5]),
-            ([true, false], [5, 4]),
-            ([false, false], [5, 5]),
-        ] {
-            let split = SpatialSplit { cost: 0.0, axis: 0, at: 0.5, sides: [side(0.0, 0.5), side(0.5, 1.0)], takes_whole };
+        for (takes_whole, expected) in
+            [([true, true], [5, 4]), ([false, true], [4, 5]), ([true, false], [5, 4]), ([false, false], [5, 5])]
+        {
+            let split =
+                SpatialSplit { cost: 0.0, axis: 0, at: 0.5, sides: [side(0.0, 0.5), side(0.5, 1.0)], takes_whole };
             let found = build.cut(&references, &split).expect("both sides have some");
             assert_eq!(found.each_ref().map(Vec::len), expected, "{takes_whole:?}");
             let parts = found.concat().iter().filter(|reference| reference.weight() == PART).count();

@@ -200,9 +200,7 @@ impl Spec {
             Some("spherical") => camera(CameraRays::Spherical),
             Some("rdh") => HeuristicSpec::Distribution { kinds, most, weight },
             Some("osah") => seen(kinds, OcclusionRules::Plain),
-            Some("osah-complete") if self.builder().splits_triangles() => {
-                seen(kinds, OcclusionRules::Complete)
-            }
+            Some("osah-complete") if self.builder().splits_triangles() => seen(kinds, OcclusionRules::Complete),
             Some("osah-complete") => {
                 let what = "osah-complete divides triangles; take sbvh:heuristic=osah-complete, or heuristic=osah";
                 return Err(Error::Argument(format!("builder {self}: {what}")));

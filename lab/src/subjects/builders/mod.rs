@@ -173,7 +173,9 @@ impl FromStr for Spec {
                 let keys: Vec<_> = builder.all_options().map(|option| option.key).collect();
                 let there_are =
                     if keys.is_empty() { "it takes none".into() } else { format!("it takes {}", keys.join(", ")) };
-                return Err(Error::Argument(format!("builder {text}: {name} has no option {key:?}; {there_are}{of_others}")));
+                return Err(Error::Argument(format!(
+                    "builder {text}: {name} has no option {key:?}; {there_are}{of_others}"
+                )));
             }
             if spec.option(key).is_some() {
                 return Err(Error::Argument(format!("builder {text}: {key} is given twice; give it once")));

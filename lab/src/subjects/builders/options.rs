@@ -111,7 +111,8 @@ impl Spec {
             ("opaque", AnyHitWalk::Ordered(ChildOrder::MoreHitsForItsCost)),
             ("built", AnyHitWalk::Built),
         ];
-        let unless_given = if self.option(HEURISTIC.key) == Some("srdh") { AnyHitWalk::Built } else { AnyHitWalk::Near };
+        let unless_given =
+            if self.option(HEURISTIC.key) == Some("srdh") { AnyHitWalk::Built } else { AnyHitWalk::Near };
         Ok(self.choice(&ANY_HIT, &all)?.unwrap_or(unless_given))
     }
 
