@@ -1,12 +1,13 @@
 //! A build from its primitives to the tree, phase by phase.
 
 use super::bounds::{Bounds, Item};
+use super::heuristic::occlusion_complete::{Complete, Planes};
 use super::heuristic::split_cost::{Area, ByRays, SplitCost};
 use super::heuristic::{Heuristic, Prepared};
 use super::input::Input;
 use super::top_down::LeafRule;
 use super::topology::Topology;
-use super::{ALONE, Built, HostBvhOptions, HostMethod, HostOptimise, Termination};
+use super::{ALONE, Built, HostBvhOptions, HostMethod, HostOptimise, SbvhOptions, Termination};
 use super::{aac, binned, bonsai, finish, incremental, insertion, optimal, order, ploc, sbvh, sweep};
 use hedgerow::Result;
 use hedgerow::bvh::codes::Codes;
@@ -42,21 +43,28 @@ pub(super) fn build_of<R: Record>(
     Ok(rayon::scope(|_| build_on_thread(count, &bounds, &record, (options, heuristic))))
 }
 
-/// The tree over `items`, by their codes if the method sorted them. Both are given back before records and nodes want memory.
-fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOptions, by: &Prepared<'_>) -> Topology {
-    let HostBvhOptions { method, collapse, termination, .. } = options;
+/// Where nodes of a tree by this heuristic are split no further.
+fn leaf_rule<'a>(options: &'a HostBvhOptions, by: &Prepared<'_>) -> LeafRule<'a> {
     // Costs by a heuristic are not those that leaves are made by.
     let is_by_area = matches!(by, Prepared::Area);
-    let single = options.is_single() || *termination == Termination::Sah && !is_by_area;
-    let rule = LeafRule { costs: collapse, single };
+    let single = options.is_single() || options.termination == Termination::Sah && !is_by_area;
+    LeafRule { costs: &options.collapse, single }
+}
+
+/// The tree over `items`, by their codes if the method sorted them. Both are given back before records and nodes want memory.
+fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOptions, by: &Prepared<'_>) -> Topology {
+    let HostBvhOptions { method, collapse, .. } = options;
+    let rule = leaf_rule(options, by);
     match method {
         HostMethod::Sweep | HostMethod::Binned(_) => match by {
             Prepared::Area => top_down(&Area, items, scale, rule, method),
             Prepared::Rays(measure) => top_down(&ByRays(&**measure), items, scale, rule, method),
             Prepared::Distribution(rays) => top_down(rays, items, scale, rule, method),
             Prepared::Occlusion(seen) => top_down(seen, items, scale, rule, method),
+            Prepared::OcclusionComplete(_) => unreachable!("it was checked that triangles may be split"),
+            Prepared::Shadow(rays) => top_down(rays, items, scale, rule, method),
         },
-        HostMethod::Bonsai(options) => bonsai::build(items, collapse, single, options),
+        HostMethod::Bonsai(options) => bonsai::build(items, collapse, rule.single, options),
         HostMethod::Aac(options) => aac::build(&items, &codes, options),
         HostMethod::Ploc { radius } => ploc::build(&items, *radius),
         HostMethod::Incremental(options) => incremental::build(&items, options),
@@ -69,6 +77,31 @@ fn top_down(by: &impl SplitCost, items: Vec<Item>, scale: f32, rule: LeafRule<'_
     match method {
         HostMethod::Binned(options) => binned::build(by, items, scale, rule, options),
         _ => sweep::build(by, &items, rule),
+    }
+}
+
+/// The tree over references to `items`.
+fn split_tree<C, B>(
+    items: Vec<Item>,
+    scene: &sbvh::Scene<'_, C, B>,
+    rule: LeafRule<'_>,
+    options: &SbvhOptions,
+    by: &Prepared<'_>,
+) -> sbvh::SplitTree
+where
+    C: Fn(u32) -> Option<[[f32; 3]; 3]> + Sync,
+    B: Fn(u32) -> Bounds + Sync,
+{
+    match by {
+        Prepared::Area => sbvh::build(&Area, items, scene, rule, options),
+        Prepared::Rays(measure) => sbvh::build(&ByRays(&**measure), items, scene, rule, options),
+        Prepared::Distribution(rays) => sbvh::build(rays, items, scene, rule, options),
+        Prepared::Occlusion(seen) => sbvh::build(seen, items, scene, rule, options),
+        Prepared::OcclusionComplete(seen) => {
+            let planes = if sbvh::can_split(&items, scene, options) { Planes::Space } else { Planes::Objects };
+            sbvh::build(&Complete::new(seen, planes, items.len()), items, scene, rule, options)
+        }
+        Prepared::Shadow(rays) => sbvh::build(rays, items, scene, rule, options),
     }
 }
 
@@ -97,7 +130,7 @@ fn build_on_thread<R: Record>(
     }
     let bounds = |primitive: u32| bounds(primitive).expect("a primitive in the tree has a box");
     let items = std::mem::take(&mut input.items);
-    let by = heuristic.prepared(&items, &Bounds::of(&input.bounds).scaled(input.item_scale), input.item_scale);
+    let by = heuristic.prepared((&items, count), &Bounds::of(&input.bounds).scaled(input.item_scale), input.item_scale);
     if *heuristic != Heuristic::Sah {
         phases.end("heuristic");
     }
@@ -106,7 +139,7 @@ fn build_on_thread<R: Record>(
             let corners = |primitive| record(primitive).corners();
             let scene = sbvh::Scene { corners, bounds, around: &input.bounds, scale: input.item_scale };
             let sbvh::SplitTree { tree, references, is_split } =
-                sbvh::build(items, &scene, collapse, options.is_single(), of_sbvh);
+                split_tree(items, &scene, leaf_rule(options, &by), of_sbvh, &by);
             input.refer(references.len(), is_split);
             (tree, Numbered::References(references))
         }

@@ -6,8 +6,8 @@
 
 use super::ALONE;
 use super::bounds::Item;
-use super::heuristic::split_cost::{Area, Side, SplitCost, growing};
-use super::top_down::{self, Candidates, HALVED_FROM, LeafRule};
+use super::heuristic::split_cost::{Area, AxisSplits, First, Place, Side, SplitCost, growing};
+use super::top_down::{self, Candidates, HALVED_FROM, LeafRule, divided_slots};
 use super::topology::Topology;
 use hedgerow::bvh::sah::Collapse;
 use rayon::prelude::*;
@@ -39,7 +39,7 @@ fn positions_by(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topo
     });
     let sweep = Sweep { items, rule, is_left: (0..count).map(|_| AtomicBool::new(false)).collect() };
     let axes = buffers.each_mut().map(|(order, spare, weights)| Axis { order, spare, weights });
-    top_down::build(&sweep, by, axes, &mut tree.splits);
+    top_down::build(&sweep, by, Part { axes, slots: &mut tree.splits });
     let [(order, ..), ..] = buffers;
     tree.order = order;
     tree
@@ -90,6 +90,12 @@ impl<'a> Axis<'a> {
     }
 }
 
+/// The items of a node, and where its subtree is written.
+struct Part<'a> {
+    axes: [Axis<'a>; 3],
+    slots: &'a mut [u32],
+}
+
 /// A split: its cost, how far it is from the middle, and how many items are on the left. The less the better.
 type Split = (f32, usize, usize);
 
@@ -105,43 +111,59 @@ struct Sweep<'a> {
 }
 
 impl Candidates for Sweep<'_> {
-    type Part<'a> = [Axis<'a>; 3];
+    type Part<'a> = Part<'a>;
     /// An axis, and how many items are on the left.
     type Split = (usize, usize);
 
-    fn best<C: SplitCost>(
-        &self,
-        by: &C,
-        here: &C::Here,
-        axes: &mut [Axis<'_>; 3],
-        depth: u32,
-    ) -> Option<(usize, usize)> {
-        let (axis, (cost, _, left_count), whole) = self.best_split(by, here, axes);
+    fn count(&self, part: &Part<'_>) -> usize {
+        part.axes[0].order.len()
+    }
+
+    fn best<C: SplitCost>(&self, by: &C, here: &C::Here, part: &mut Part<'_>, depth: u32) -> Option<(usize, usize)> {
+        let (axis, (cost, _, left_count), whole) = self.best_split(by, here, &mut part.axes);
         if self.rule.is_leaf(by.of_node(here, &whole.bounds), whole.count, cost) {
             return None;
         }
-        Some((axis, if depth >= HALVED_FROM { axes[0].order.len() / 2 } else { left_count }))
+        Some((axis, if depth >= HALVED_FROM { self.count(part) / 2 } else { left_count }))
     }
 
-    fn sides(&self, by: &impl SplitCost, axes: &[Axis<'_>; 3], split: Option<&(usize, usize)>) -> [Side; 2] {
-        let &(axis, left_count) = split.unwrap_or(&(0, axes[0].order.len()));
-        let (left, right) = axes[axis].order.split_at(left_count);
+    fn sides(&self, by: &impl SplitCost, part: &Part<'_>, split: Option<&(usize, usize)>) -> [Side; 2] {
+        let &(axis, left_count) = split.unwrap_or(&(0, self.count(part)));
+        let (left, right) = part.axes[axis].order.split_at(left_count);
         [left, right].map(|order| order.iter().map(|&i| self.side(by, i)).fold(Side::EMPTY, Side::union))
     }
 
-    fn divide<'a>(&self, mut axes: Self::Part<'a>, (axis, left_count): (usize, usize)) -> (usize, [Self::Part<'a>; 2]) {
+    fn members(&self, part: &Part<'_>, &(axis, left_count): &(usize, usize), each: &mut dyn FnMut(usize, u32)) {
+        for (at, &i) in part.axes[axis].order.iter().enumerate() {
+            each(usize::from(at >= left_count), self.items[i as usize].primitive());
+        }
+    }
+
+    fn divide<'a>(
+        &self,
+        part: Self::Part<'a>,
+        (axis, left_count): (usize, usize),
+        first: First,
+    ) -> [Self::Part<'a>; 2] {
+        let Part { mut axes, slots } = part;
         for (at, &i) in axes[axis].order.iter().enumerate() {
             self.is_left[i as usize].store(at < left_count, Ordering::Relaxed);
         }
         for other in (0..3).filter(|&other| other != axis) {
             axes[other].partition(&self.is_left);
         }
+        let counts = [left_count, axes[axis].order.len() - left_count];
+        if first == First::Right {
+            axes.iter_mut().for_each(|axis| axis.order.rotate_left(left_count));
+        }
+        let [left_count, _] = first.in_order(counts);
+        let [left_slots, right_slots] = divided_slots(slots, left_count);
         let [(x0, x1), (y0, y1), (z0, z1)] = axes.map(|axis| axis.split_at(left_count));
-        (left_count, [[x0, y0, z0], [x1, y1, z1]])
+        [Part { axes: [x0, y0, z0], slots: left_slots }, Part { axes: [x1, y1, z1], slots: right_slots }]
     }
 
     /// The first of the orders already is that of the leaves.
-    fn end(&self, _axes: [Axis<'_>; 3]) {}
+    fn end(&self, _part: Part<'_>) {}
 }
 
 impl Sweep<'_> {
@@ -169,6 +191,9 @@ impl Sweep<'_> {
     }
 
     fn best_split_of<C: SplitCost>(&self, by: &C, here: &C::Here, axis: &mut Axis<'_>) -> (Split, Side) {
+        if C::BY_BOTH {
+            return self.best_split_by_both(by, here, axis.order);
+        }
         let count = axis.order.len();
         let side = |&i: &u32| self.side(by, i);
         let mut whole = Side::EMPTY;
@@ -188,6 +213,24 @@ impl Sweep<'_> {
             }
         }
         (best, whole)
+    }
+
+    /// The same by a heuristic whose sides cost something together alone.
+    fn best_split_by_both<C: SplitCost>(&self, by: &C, here: &C::Here, order: &[u32]) -> (Split, Side) {
+        let side = |&i: &u32| self.side(by, i);
+        let lefts: Vec<Side> = growing(order.iter().map(side)).collect();
+        let mut rights: Vec<Side> = growing(order[1..].iter().rev().map(side)).collect();
+        rights.reverse();
+        let (&whole, lefts) = lefts.split_last().expect("a node has items");
+        let place = |(at, &i): (usize, &u32)| {
+            let primitive = self.items[i as usize].primitive();
+            Place { primitive, first: at, last: at }
+        };
+        let splits = AxisSplits { lefts, rights: &rights };
+        let costs = by.of_splits(here, &splits, order.iter().enumerate().map(place), self.rule.costs);
+        let of = |(cost, at): (f32, usize)| (cost, (2 * at).abs_diff(order.len()), at);
+        let all = costs.into_iter().zip(1..).map(of);
+        (all.fold((f32::INFINITY, usize::MAX, 1), |best, split| if better(split, best) { split } else { best }), whole)
     }
 }
 

@@ -25,6 +25,8 @@ pub enum AnyHitSpec {
     Rays,
     /// Whatever takes the least work for rays that teach.
     Auto,
+    /// That in which the builder has left them.
+    Built,
 }
 
 /// An order of children.
@@ -34,6 +36,8 @@ pub enum ChildrenBy {
     Rule(ChildOrder),
     /// That these rays teach.
     Rays(Rc<[Ray]>),
+    /// In which the builder has left them.
+    Built,
 }
 
 /// How rays that end at any hit are traced.
@@ -48,6 +52,11 @@ pub struct AnyHit {
 impl AnyHit {
     /// The nearest child first.
     pub const NEAR: AnyHit = AnyHit { order: None, choice: None };
+
+    /// Whether children are put in order behind a build.
+    pub fn reorders(&self) -> bool {
+        !matches!(self.order, None | Some(ChildrenBy::Built))
+    }
 }
 
 /// A unit of work takes this part of its time where no distances are kept: docs/notes/ray_counts.md.
@@ -101,6 +110,7 @@ fn work_by_kind(teaching: &TeachingRays, mut subject: Box<dyn Subject + '_>) -> 
 pub fn ordered_on_host(tree: Bvh2, order: &ChildrenBy) -> (Vec<Phase>, Bvh2) {
     let costs = Collapse::SAH;
     match order {
+        ChildrenBy::Built => (Vec::new(), tree),
         ChildrenBy::Rule(order) => {
             let (milliseconds, tree) = timed(|| tree.in_child_order(*order, &costs));
             (vec![Phase { name: "order", milliseconds }], tree)

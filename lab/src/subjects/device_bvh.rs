@@ -72,7 +72,7 @@ impl<'a> DeviceBvh<'a> {
     ) -> Result<DeviceBvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let (child_order, teaching) = match &any_hit.order {
-            None => (options.child_order, None),
+            None | Some(ChildrenBy::Built) => (options.child_order, None),
             Some(ChildrenBy::Rule(order)) => (Some(*order), None),
             Some(ChildrenBy::Rays(rays)) => (None, Some(rays)),
         };

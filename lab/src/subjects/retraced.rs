@@ -105,6 +105,9 @@ impl<'a> Retraced<'a> {
         };
         self.ordered = None;
         let mut run = subject.build()?;
+        if !self.any_hit.reorders() {
+            return Ok(run);
+        }
         let Some((order, tree)) = self.any_hit.order.as_ref().zip(subject.tree()?) else { return Ok(run) };
         let (phases, tree) = ordered_on_host(tree, order);
         self.ordered = Some(tree);
@@ -166,7 +169,7 @@ impl Subject for Retraced<'_> {
     }
 
     fn tree(&mut self) -> Result<Option<Bvh2>> {
-        if self.any_hit.order.is_some() && self.ordered.is_none() {
+        if self.any_hit.reorders() && self.ordered.is_none() {
             self.run()?;
         }
         match &mut self.source {

@@ -1,11 +1,11 @@
 //! What a builder on the host is taught by: nothing but areas, a scene's camera, or rays that were traced before.
 
 use crate::rays::kinds::{Basis, RayKind};
-use crate::rays::sample;
+use crate::rays::sample::{self, ShadowSample};
 use crate::scene::Scene;
 use crate::{Error, Result};
 use hedgerow_host::bvh::heuristic::{
-    Heuristic, InteriorForm, Occlusion, Pinhole, Preferred, PreferredRays, RayDistribution, RaySegment,
+    Heuristic, InteriorForm, Occlusion, Pinhole, Preferred, PreferredRays, RayDistribution, RaySegment, ShadowRays,
 };
 
 /// A heuristic as a spec names it, before a scene is known.
@@ -37,7 +37,27 @@ pub enum HeuristicSpec {
         kinds: Vec<RayKind>,
         /// The weight of what is seen beside the area.
         weight: f32,
+        /// By which rules.
+        rules: OcclusionRules,
     },
+    /// A sample of rays that end at any hit, by which of them look into a box before they are done.
+    Shadow {
+        /// Their kinds.
+        kinds: Vec<RayKind>,
+        /// How many, at most.
+        most: usize,
+        /// Their weight beside the area, where there are many.
+        weight: f32,
+    },
+}
+
+/// How a tree is built by what is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OcclusionRules {
+    /// As the paper's formula has it.
+    Plain,
+    /// With all rules of its authors.
+    Complete,
 }
 
 /// Rays of a camera.
@@ -61,8 +81,10 @@ pub enum Taught {
     Box(Heuristic<'static>),
     /// Rays, and their weight.
     Rays(Vec<RaySegment>, f32),
-    /// Of each triangle whether it is seen, and the weight of that.
-    Seen(Vec<bool>, f32),
+    /// Of each triangle whether it is seen, the weight of that, and the rules.
+    Seen(Vec<bool>, f32, OcclusionRules),
+    /// Rays that end at any hit with all their hits, and their weight.
+    Shadows(ShadowSample, f32),
 }
 
 impl HeuristicSpec {
@@ -86,7 +108,12 @@ impl HeuristicSpec {
             HeuristicSpec::Distribution { kinds, most, weight } => {
                 Taught::Rays(sample::segments(scene()?, kinds, *most)?, *weight)
             }
-            HeuristicSpec::Occlusion { kinds, weight } => Taught::Seen(sample::seen(scene()?, kinds)?, *weight),
+            HeuristicSpec::Occlusion { kinds, weight, rules } => {
+                Taught::Seen(sample::seen(scene()?, kinds)?, *weight, *rules)
+            }
+            HeuristicSpec::Shadow { kinds, most, weight } => {
+                Taught::Shadows(sample::shadows(scene()?, kinds, *most)?, *weight)
+            }
         })
     }
 }
@@ -111,7 +138,16 @@ impl Taught {
             Taught::Rays(segments, weight) => {
                 Heuristic::Distribution(RayDistribution { weight: *weight, ..RayDistribution::of(segments) })
             }
-            Taught::Seen(seen, weight) => Heuristic::Occlusion(Occlusion { weight: *weight, ..Occlusion::of(seen) }),
+            Taught::Seen(seen, weight, rules) => {
+                let occlusion = Occlusion { weight: *weight, ..Occlusion::of(seen) };
+                match rules {
+                    OcclusionRules::Plain => Heuristic::Occlusion(occlusion),
+                    OcclusionRules::Complete => Heuristic::OcclusionComplete(occlusion),
+                }
+            }
+            Taught::Shadows(ShadowSample { segments, ends, hits }, weight) => {
+                Heuristic::Shadow(ShadowRays { segments, ends, hits, weight: *weight })
+            }
         }
     }
 }

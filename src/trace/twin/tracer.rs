@@ -89,6 +89,32 @@ fn walk(tree: &Bvh2, ray: &Ray, query: Query, first: FirstChild) -> (Hit, Work) 
     (nearest.hit_of(query), work)
 }
 
+/// The primitives of all hits of a ray, each once, in ascending order.
+pub fn all_hits(tree: &Bvh2, ray: &Ray) -> Vec<u32> {
+    let usable = tree.header.active != 0 && tree.header.status & status::UNUSABLE == 0;
+    let t_max = ray.t_max;
+    let Some(ray) = PreparedRay::new(ray).filter(|_| usable) else { return Vec::new() };
+    let mut hits = Vec::new();
+    let mut waiting = vec![tree.header.root];
+    while let Some(child) = waiting.pop() {
+        if child.is_leaf() {
+            let leaf = &tree.records[child.index as usize..][..child.count as usize];
+            let is_met = |triangle: &&Triangle| {
+                let mut nearest = Nearest::new(t_max);
+                nearest.consider(&ray, triangle);
+                nearest.hit.is_some()
+            };
+            hits.extend(leaf.iter().filter(is_met).map(|triangle| triangle.primitive));
+        } else {
+            let children = tree.nodes[child.index as usize].children;
+            waiting.extend(children.into_iter().filter(|child| slab::enter(&ray, &child.bounds(), t_max).is_some()));
+        }
+    }
+    hits.sort_unstable();
+    hits.dedup();
+    hits
+}
+
 /// The nearest hit by testing every triangle: what every tracer must find.
 pub fn closest_hit_by_brute_force(tree: &Bvh2, ray: &Ray) -> Hit {
     brute_force(tree, ray).hit

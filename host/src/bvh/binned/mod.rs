@@ -9,8 +9,8 @@
 mod bins;
 
 use super::bounds::Item;
-use super::heuristic::split_cost::{Side, SplitCost, growing};
-use super::top_down::{self, Candidates, HALVED_FROM, LeafRule};
+use super::heuristic::split_cost::{AxisSplits, First, Place, Side, SplitCost, growing};
+use super::top_down::{self, Candidates, HALVED_FROM, LeafRule, divided_slots};
 use super::topology::Topology;
 pub(super) use bins::partition;
 use bins::{Bin, FEW, Grid, Unsplit, fill, in_order_of_bins, measured, measured_alone, place_of, side, side_of};
@@ -97,16 +97,18 @@ pub(super) fn build(
     let mut spare: Vec<Item> = zeroed_vec(items.len());
     let flat = if options.flat_leaves { 2.0 * FLAT * scale } else { 0.0 };
     let node = measured(&items);
-    let whole = Part { items: &mut items, spare: &mut spare, order: &mut tree.order, node };
-    top_down::build(&Binned { rule, options, flat }, by, whole, &mut tree.splits);
+    let Topology { order, splits } = &mut tree;
+    let whole = Part { items: &mut items, spare: &mut spare, order, slots: splits, node };
+    top_down::build(&Binned { rule, options, flat }, by, whole);
     tree
 }
 
-/// The items of a node, room for as many, and where their primitives are written.
+/// The items of a node, room for as many, and where their primitives and the node's subtree are written.
 struct Part<'a> {
     items: &'a mut [Item],
     spare: &'a mut [Item],
     order: &'a mut [u32],
+    slots: &'a mut [u32],
     node: Unsplit,
 }
 
@@ -116,9 +118,10 @@ impl<'a> Part<'a> {
         let (left_items, items) = self.items.split_at_mut(left_count);
         let (left_spare, spare) = self.spare.split_at_mut(left_count);
         let (left_order, order) = self.order.split_at_mut(left_count);
+        let [left_slots, slots] = divided_slots(self.slots, left_count);
         [
-            Part { items: left_items, spare: left_spare, order: left_order, node: left },
-            Part { items, spare, order, node: right },
+            Part { items: left_items, spare: left_spare, order: left_order, slots: left_slots, node: left },
+            Part { items, spare, order, slots, node: right },
         ]
     }
 }
@@ -149,6 +152,11 @@ impl Candidates for Binned<'_> {
     type Split = Split;
 
     #[inline(always)]
+    fn count(&self, part: &Part<'_>) -> usize {
+        part.items.len()
+    }
+
+    #[inline(always)]
     fn best<C: SplitCost>(&self, by: &C, here: &C::Here, part: &mut Part<'_>, depth: u32) -> Option<Split> {
         let Part { items, node, .. } = part;
         let edges = (node.centroids.hi - node.centroids.lo).min_element();
@@ -164,7 +172,7 @@ impl Candidates for Binned<'_> {
         let search = Search { by, here, rule: self.rule, items, weight: by.of_node(here, &node.bounds) };
         if depth >= HALVED_FROM || grids.iter().all(Option::is_none) {
             search.halved()
-        } else if items.len() <= FEW {
+        } else if items.len() <= FEW && !C::BY_BOTH {
             search.of_few(&grids)
         } else if bins <= 16 {
             search.at_bin::<16>(&grids)
@@ -187,14 +195,33 @@ impl Candidates for Binned<'_> {
         }
     }
 
+    fn members(&self, part: &Part<'_>, split: &Split, each: &mut dyn FnMut(usize, u32)) {
+        let items = &*part.items;
+        let all = |side: usize, items: &[Item], each: &mut dyn FnMut(usize, u32)| {
+            items.iter().for_each(|item| each(side, item.primitive()));
+        };
+        match split {
+            Split::Halved => halves(items).iter().zip(0..).for_each(|(half, side)| all(side, half, each)),
+            Split::AtBin { grid, bin, .. } => {
+                items.iter().for_each(|item| each(usize::from(grid.bin_of(item) >= *bin), item.primitive()));
+            }
+            Split::OfFew { order, left_count } => {
+                for (at, key) in order[..items.len()].iter().enumerate() {
+                    each(usize::from(at >= *left_count), items[place_of(*key)].primitive());
+                }
+            }
+        }
+    }
+
     #[inline(always)]
-    fn divide<'a>(&self, part: Self::Part<'a>, split: Split) -> (usize, [Self::Part<'a>; 2]) {
-        let Part { items, spare, order, node } = part;
+    fn divide<'a>(&self, part: Self::Part<'a>, split: Split, first: First) -> [Self::Part<'a>; 2] {
+        let Part { items, spare, order, slots, node } = part;
+        let count = items.len();
         let (left_count, sides) = match split {
             Split::Halved => {
                 let sides = halves(items).map(measured);
-                let left_count = items.len() / 2;
-                return (left_count, Part { items, spare, order, node }.split_at(left_count, sides));
+                spare.copy_from_slice(items);
+                (count / 2, sides)
             }
             Split::AtBin { grid, bin, sides } => {
                 let [left, right] = *sides;
@@ -211,7 +238,12 @@ impl Candidates for Binned<'_> {
             }
         };
         // The items are in the other array now.
-        (left_count, Part { items: spare, spare: items, order, node }.split_at(left_count, sides))
+        let (items, spare) = (spare, items);
+        if first == First::Right {
+            items.rotate_left(left_count);
+        }
+        let [left_count, _] = first.in_order([left_count, count - left_count]);
+        Part { items, spare, order, slots, node }.split_at(left_count, first.in_order(sides))
     }
 
     fn end(&self, part: Part<'_>) {
@@ -257,7 +289,7 @@ impl<C: SplitCost> Search<'_, C> {
         let (mut bins, mut of_best) = (&mut [Bin::EMPTY; N], &mut [Bin::EMPTY; N]);
         for grid in grids.iter().flatten() {
             fill(self.by, self.items, grid, bins);
-            let plane = self.best_plane::<N>(&bins[..grid.bins]);
+            let plane = self.best_plane::<N>(&bins[..grid.bins], grid);
             if best.is_none_or(|best| plane.0 < best.0.0) {
                 best = Some((plane, *grid));
                 std::mem::swap(&mut bins, &mut of_best);
@@ -272,7 +304,10 @@ impl<C: SplitCost> Search<'_, C> {
     }
 
     /// The best plane between bins, of which the first and the last hold something.
-    fn best_plane<const N: usize>(&self, bins: &[Bin]) -> Plane {
+    fn best_plane<const N: usize>(&self, bins: &[Bin], grid: &Grid) -> Plane {
+        if C::BY_BOTH {
+            return self.best_plane_by_both(bins, grid);
+        }
         let mut right_costs = [0.0; N];
         let from_right = self.costs(bins[1..].iter().rev().map(Bin::side));
         right_costs[1..bins.len()].iter_mut().rev().zip(from_right).for_each(|(place, cost)| *place = cost);
@@ -285,6 +320,20 @@ impl<C: SplitCost> Search<'_, C> {
             }
         }
         best
+    }
+
+    /// The same by a heuristic whose sides cost something together alone.
+    fn best_plane_by_both(&self, bins: &[Bin], grid: &Grid) -> Plane {
+        let lefts: Vec<Side> = growing(bins[..bins.len() - 1].iter().map(Bin::side)).collect();
+        let mut rights: Vec<Side> = growing(bins[1..].iter().rev().map(Bin::side)).collect();
+        rights.reverse();
+        let place = |item: &Item| {
+            let bin = grid.bin_of(item);
+            Place { primitive: item.primitive(), first: bin, last: bin }
+        };
+        let splits = AxisSplits { lefts: &lefts, rights: &rights };
+        let costs = self.by.of_splits(self.here, &splits, self.items.iter().map(place), self.rule.costs);
+        costs.into_iter().zip(1..).fold((f32::INFINITY, 1), |best, plane| if plane.0 < best.0 { plane } else { best })
     }
 
     /// The same for a few items, in the order of their bins: most bins are empty then.

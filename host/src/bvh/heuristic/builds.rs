@@ -1,10 +1,12 @@
 //! Builds by heuristics: valid, the same on any number of threads, and by surface area where a heuristic knows of nothing.
 
 use super::distribution::tests::sample;
-use super::{Heuristic, InteriorForm, Occlusion, Pinhole, Preferred, PreferredRays, RayDistribution, RaySegment};
+use super::{
+    Heuristic, InteriorForm, Occlusion, Pinhole, Preferred, PreferredRays, RayDistribution, RaySegment, ShadowRays,
+};
 use crate::bvh::binned::BinnedAxes;
 use crate::bvh::bounds::tests as items;
-use crate::bvh::{ALONE, BinnedOptions, HostBvhOptions, HostMethod, Termination, build_aabbs_by};
+use crate::bvh::{ALONE, BinnedOptions, HostBvhOptions, HostMethod, SbvhOptions, Termination, build_aabbs_by};
 use hedgerow::bvh::layout::{BoxRecord, Bvh2};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::geometry::Aabb;
@@ -18,8 +20,28 @@ fn tree(heuristic: &Heuristic<'_>, boxes: &[Aabb], options: &HostBvhOptions) -> 
     build_aabbs_by(heuristic, boxes, options).expect("options that can be used").tree
 }
 
-const METHODS: [HostMethod; 2] =
-    [HostMethod::Sweep, HostMethod::Binned(BinnedOptions { axes: BinnedAxes::All, ..BinnedOptions::WALD })];
+const METHODS: [HostMethod; 3] = [
+    HostMethod::Sweep,
+    HostMethod::Binned(BinnedOptions { axes: BinnedAxes::All, ..BinnedOptions::WALD }),
+    HostMethod::Sbvh(SbvhOptions::PAPER),
+];
+
+/// Up to three boxes that each ray is said to meet, and where those of each end.
+fn hits(rays: usize, boxes: usize) -> (Vec<u32>, Vec<u32>) {
+    let hits: Vec<Vec<u32>> = (0..rays)
+        .map(|ray| {
+            let mut hits: Vec<u32> = (0..ray % 4).map(|i| ((7 * ray + 131 * i * i) % boxes) as u32).collect();
+            hits.sort_unstable();
+            hits.dedup();
+            hits
+        })
+        .collect();
+    let end = |end: &mut u32, hits: &Vec<u32>| {
+        *end += hits.len() as u32;
+        Some(*end)
+    };
+    (hits.iter().scan(0, end).collect(), hits.concat())
+}
 
 fn measures() -> Vec<Heuristic<'static>> {
     let camera = Pinhole { eye: [0.3, 0.4, -0.2], look: [0.6, 0.5, 1.0], up: [0.0, 1.0, 0.0], fov: 60.0, aspect: 1.5 };
@@ -58,9 +80,16 @@ fn seen(count: usize) -> Vec<bool> {
 fn rays_and_seen_primitives_give_valid_trees_the_same_on_any_number_of_threads() {
     let boxes = boxes(2 * ALONE as u32);
     let (rays, seen) = (sample(9_000), seen(boxes.len()));
+    let (ends, hits) = hits(rays.len(), boxes.len());
     let by_rays = Heuristic::Distribution(RayDistribution::of(&rays));
-    for heuristic in [by_rays, Heuristic::Occlusion(Occlusion::of(&seen))] {
+    let by_shadows = Heuristic::Shadow(ShadowRays { segments: &rays, ends: &ends, hits: &hits, weight: 0.9 });
+    let complete = Heuristic::OcclusionComplete(Occlusion::of(&seen));
+    for heuristic in [by_rays, by_shadows, Heuristic::Occlusion(Occlusion::of(&seen)), complete] {
         for method in METHODS {
+            if heuristic.check(&method, boxes.len()).is_err() {
+                assert_eq!(heuristic, complete);
+                continue;
+            }
             for termination in [Termination::Sah, Termination::Heuristic] {
                 let options = HostBvhOptions { termination, ..HostBvhOptions::of(method) };
                 let tree_on = |threads| {
@@ -87,12 +116,16 @@ fn a_heuristic_that_knows_of_nothing_gives_the_bytes_of_the_surface_area() {
         Heuristic::Distribution(RayDistribution::of(&elsewhere)),
         Heuristic::Occlusion(Occlusion::of(&all)),
         Heuristic::Occlusion(Occlusion::of(&none)),
+        Heuristic::Shadow(ShadowRays { segments: &[], ends: &[], hits: &[], weight: 0.9 }),
+        Heuristic::Shadow(ShadowRays { segments: &elsewhere, ends: &[0; 3], hits: &[], weight: 0.9 }),
+        Heuristic::OcclusionComplete(Occlusion::of(&all)),
+        Heuristic::OcclusionComplete(Occlusion::of(&none)),
     ];
     for method in METHODS {
         for termination in [Termination::Sah, Termination::Single, Termination::Heuristic] {
             let options = HostBvhOptions { termination, ..HostBvhOptions::of(method) };
             let by_area = tree(&Heuristic::Sah, &boxes, &options).to_bytes();
-            for heuristic in &heuristics {
+            for heuristic in heuristics.iter().filter(|heuristic| heuristic.check(&method, 700).is_ok()) {
                 assert!(tree(heuristic, &boxes, &options).to_bytes() == by_area, "{method:?}, {termination:?}");
             }
         }
@@ -213,8 +246,11 @@ fn a_method_that_does_not_go_top_down_names_those_that_do() {
     let options = HostBvhOptions::of(HostMethod::Ploc { radius: 10 });
     let heuristic = Heuristic::Interior(InteriorForm::Exact);
     let error = build_aabbs_by(&heuristic, &boxes(3), &options).expect_err("has no splits").to_string();
-    assert!(error.contains("Ploc") && error.contains("Sweep or Binned"), "{error}");
+    assert!(error.contains("Ploc") && error.contains("take Sweep, Binned or Sbvh"), "{error}");
     assert!(build_aabbs_by(&Heuristic::Sah, &boxes(3), &options).is_ok());
+    let complete = Heuristic::OcclusionComplete(Occlusion::of(&[true, false, true]));
+    let error = build_aabbs_by(&complete, &boxes(3), &HostBvhOptions::of(HostMethod::Sweep)).expect_err("divides");
+    assert!(error.to_string().contains("take Sbvh"), "{error}");
 }
 
 #[test]

@@ -10,14 +10,14 @@
 //! count the rays of all. That holds in floats too, as each step of the test is monotone in the box.
 
 use super::checked_weight;
-use super::split_cost::{Side, SplitCost};
+use super::split_cost::{Area, First, Members, Side, SplitCost};
 use crate::bvh::bounds::Bounds;
 use glam::Vec3A;
 use hedgerow::{Error, Result};
 use rayon::prelude::*;
 
 /// Fewer rays than this are not worth another thread.
-const PIECE: usize = 2048;
+pub(super) const PIECE: usize = 2048;
 /// A component of a direction that is less than this part of the largest is moved away from 0, so that no product is NaN.
 const FLATTEST: f64 = 1.0 / (1u64 << 26) as f64;
 /// Rays end so much later, as a part of their length: one that ends on a surface shall meet the box around that, which may be flat.
@@ -41,6 +41,17 @@ impl RaySegment {
         let RaySegment { from, direction, t_end, weight } = self;
         let is_finite = from.iter().chain(direction).chain([weight]).all(|x| x.is_finite());
         is_finite && direction.iter().any(|&x| x != 0.0) && *t_end >= 0.0 && *weight >= 0.0
+    }
+
+    /// Whether a tree can be built for these.
+    pub(super) fn check_all(segments: &[RaySegment]) -> Result<()> {
+        match segments.iter().position(|segment| !segment.is_sound()) {
+            None => Ok(()),
+            Some(i) => Err(Error::Argument(format!(
+                "ray {i} of the sample cannot be used ({:?}); take finite rays with a direction that end at 0 or later",
+                segments[i]
+            ))),
+        }
     }
 }
 
@@ -71,28 +82,22 @@ impl<'a> RayDistribution<'a> {
             let error = format!("a weight cannot grow by {} with each ray; take 0 or more", self.growth);
             return Err(Error::Argument(error));
         }
-        match self.segments.iter().position(|segment| !segment.is_sound()) {
-            None => Ok(()),
-            Some(i) => Err(Error::Argument(format!(
-                "ray {i} of the sample cannot be used ({:?}); take finite rays with a direction that end at 0 or later",
-                self.segments[i]
-            ))),
-        }
+        RaySegment::check_all(self.segments)
     }
 }
 
 /// A ray made ready for boxes.
 #[derive(Debug, Clone, Copy)]
-struct Segment {
+pub(super) struct Segment {
     from: Vec3A,
     /// Reciprocal of the direction, whose largest component is 1.
     inverse: Vec3A,
     t_end: f32,
-    weight: f64,
+    pub weight: f64,
 }
 
 impl Segment {
-    fn new(segment: &RaySegment, scale: f32) -> Segment {
+    pub fn new(segment: &RaySegment, scale: f32) -> Segment {
         let RaySegment { from, direction, t_end, weight } = *segment;
         let largest = direction.iter().fold(0.0, |most: f64, &x| most.max(f64::from(x).abs()));
         let inverse = |x: f32| {
@@ -107,10 +112,17 @@ impl Segment {
         }
     }
 
+    /// Whether it meets a box that is not empty.
     #[inline(always)]
-    fn meets(&self, bounds: &Bounds) -> bool {
+    pub fn meets(&self, bounds: &Bounds) -> bool {
         let (a, b) = ((bounds.lo - self.from) * self.inverse, (bounds.hi - self.from) * self.inverse);
         a.min(b).max_element().max(0.0) <= a.max(b).min_element().min(self.t_end)
+    }
+
+    /// Whether it meets a box; one that is empty it does not.
+    #[inline(always)]
+    pub fn meets_some(&self, bounds: &Bounds) -> bool {
+        bounds.lo.cmple(bounds.hi).all() && self.meets(bounds)
     }
 }
 
@@ -182,6 +194,7 @@ impl Distribution {
 
 impl SplitCost for Distribution {
     type Here = Rays;
+    type Rival = Area;
 
     fn root(&self, whole: impl FnOnce() -> Side) -> Rays {
         self.on(&whole(), &(0..self.segments.len() as u32).collect::<Vec<_>>())
@@ -196,8 +209,8 @@ impl SplitCost for Distribution {
         self.weights(here, &sides).into_iter().zip(sides)
     }
 
-    fn divide(&self, here: Rays, sides: impl FnOnce() -> [Side; 2]) -> [Rays; 2] {
-        sides().map(|side| self.on(&side, &here.segments))
+    fn divide(&self, here: Rays, sides: impl FnOnce() -> [Side; 2], _members: &Members<'_>) -> (First, [Rays; 2]) {
+        (First::Left, sides().map(|side| self.on(&side, &here.segments)))
     }
 }
 

@@ -9,7 +9,8 @@
 //! Others know more of a node than its box:
 //!
 //! - [`distribution`]: rays that were traced;
-//! - [`occlusion`]: primitives that rays ended on.
+//! - [`occlusion`]: primitives that rays ended on, and `occlusion_complete`: the same with its authors' rules;
+//! - [`shadow`]: rays that end at any hit, with all that they meet.
 //!
 //! Builders see none of that: they are given a `SplitCost`. Trees by another heuristic than the surface area go down to single
 //! primitives, and leaves are made by collapsing: a heuristic that calls both children certain, or neither likely, would stop at
@@ -22,8 +23,10 @@ pub mod distribution;
 mod flux;
 pub mod interior;
 pub mod occlusion;
+pub(super) mod occlusion_complete;
 mod picture;
 pub mod preferred;
+pub mod shadow;
 pub(super) mod split_cost;
 
 use super::HostMethod;
@@ -41,6 +44,8 @@ use occlusion::Seen;
 pub use picture::Pinhole;
 use preferred::PreferredMeasure;
 pub use preferred::{Preferred, PreferredRays};
+pub use shadow::ShadowRays;
+use shadow::Shadows;
 
 /// What splits cost.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -56,6 +61,11 @@ pub enum Heuristic<'a> {
     Distribution(RayDistribution<'a>),
     /// By the primitives of a node that rays ended on. If all or none are seen it is built by surface area.
     Occlusion(Occlusion<'a>),
+    /// The same with all rules of its authors, by [`HostMethod::Sbvh`] alone. They take 128 bins.
+    OcclusionComplete(Occlusion<'a>),
+    /// By the shadow rays of a sample, for a walk that takes left children first. Without any in the scene it is built by surface
+    /// area.
+    Shadow(ShadowRays<'a>),
 }
 
 impl<'a> Heuristic<'a> {
@@ -64,21 +74,29 @@ impl<'a> Heuristic<'a> {
     /// # Errors
     /// [`Error::Argument`] names the method or the option that cannot be used, and what can.
     pub fn check(&self, method: &HostMethod, count: usize) -> Result<()> {
-        let is_top_down = matches!(method, HostMethod::Sweep | HostMethod::Binned(_));
-        if *self != Heuristic::Sah && !is_top_down {
-            let error = format!("{method:?} does not build by a heuristic; take Sweep or Binned, or Heuristic::Sah");
-            return Err(Error::Argument(error));
+        let (takes, instead) = match (self, method) {
+            (Heuristic::Sah, _) => (true, ""),
+            (Heuristic::OcclusionComplete(_), _) => (
+                matches!(method, HostMethod::Sbvh(_)),
+                "a heuristic that divides primitives; take Sbvh, or Heuristic::Occlusion",
+            ),
+            (_, HostMethod::Sweep | HostMethod::Binned(_) | HostMethod::Sbvh(_)) => (true, ""),
+            _ => (false, "a heuristic; take Sweep, Binned or Sbvh, or Heuristic::Sah"),
+        };
+        if !takes {
+            return Err(Error::Argument(format!("{method:?} does not build by {instead}")));
         }
         match self {
             Heuristic::Sah | Heuristic::Interior(_) => Ok(()),
             Heuristic::Preferred(preferred) => preferred.check(),
             Heuristic::Distribution(rays) => rays.check(),
-            Heuristic::Occlusion(occlusion) => occlusion.check(count),
+            Heuristic::Occlusion(occlusion) | Heuristic::OcclusionComplete(occlusion) => occlusion.check(count),
+            Heuristic::Shadow(rays) => rays.check(count),
         }
     }
 
-    /// For a tree over `items`, whose lengths are scaled by `scale`; they lie in the box `scene`.
-    pub(super) fn prepared(&self, items: &[Item], scene: &Bounds, scale: f32) -> Prepared<'a> {
+    /// For a tree over `items` of `count` primitives, in lengths scaled by `scale`; they lie in the box `scene`.
+    pub(super) fn prepared(&self, (items, count): (&[Item], usize), scene: &Bounds, scale: f32) -> Prepared<'a> {
         fn boxed<'a>(measure: impl RayMeasure + 'static) -> Prepared<'a> {
             Prepared::Rays(Box::new(measure))
         }
@@ -88,6 +106,8 @@ impl<'a> Heuristic<'a> {
             Heuristic::Preferred(rays) => PreferredMeasure::new(&rays.scaled(scale), &scene.aabb()).map(boxed),
             Heuristic::Distribution(rays) => Distribution::new(rays, scene, scale).map(Prepared::Distribution),
             Heuristic::Occlusion(occlusion) => Seen::new(occlusion, items).map(Prepared::Occlusion),
+            Heuristic::OcclusionComplete(occlusion) => Seen::new(occlusion, items).map(Prepared::OcclusionComplete),
+            Heuristic::Shadow(rays) => Shadows::new(rays, count, scene, scale).map(Prepared::Shadow),
         };
         prepared.unwrap_or(Prepared::Area)
     }
@@ -103,6 +123,10 @@ pub(super) enum Prepared<'a> {
     Distribution(Distribution),
     /// Primitives that are seen, and others.
     Occlusion(Seen<'a>),
+    /// The same, with the rules of the heuristic's authors.
+    OcclusionComplete(Seen<'a>),
+    /// A sample of shadow rays.
+    Shadow(Shadows),
 }
 
 /// How many rays of a set meet a box: the whole of a heuristic that looks at nothing but the box.

@@ -7,10 +7,10 @@
 //! ones are more than there are on either side of the other. Elsewhere, and where all primitives or none are seen, the surface area
 //! decides.
 //!
-//! What the authors' builder has besides is not here: a limit of the depth, splits that divide primitives, and an order of children.
+//! What the authors' builder has besides is in [`super::occlusion_complete`].
 
 use super::checked_weight;
-use super::split_cost::{Side, SplitCost};
+use super::split_cost::{Area, First, Members, Side, SplitCost};
 use crate::bvh::bounds::{Bounds, Item};
 use hedgerow::{Error, Result};
 
@@ -46,25 +46,36 @@ impl<'a> Occlusion<'a> {
 
 /// The seen primitives of a scene in which there are others too.
 pub(crate) struct Seen<'a> {
-    seen: &'a [bool],
-    weight: f32,
+    pub(super) seen: &'a [bool],
+    pub(super) weight: f32,
 }
 
 /// What of a node is seen.
 pub(crate) struct SeenHere {
-    seen: u32,
-    count: u32,
+    pub seen: u32,
+    pub count: u32,
     /// The node's half area.
     area: f32,
 }
 
 impl SeenHere {
-    fn of(side: &Side) -> SeenHere {
+    pub fn of(side: &Side) -> SeenHere {
         SeenHere { seen: side.seen, count: side.count, area: side.bounds.half_area() }
     }
 
-    fn is_mixed(&self) -> bool {
+    /// Whether some primitives are seen and some are not.
+    pub fn is_mixed(&self) -> bool {
         0 < self.seen && self.seen < self.count
+    }
+
+    /// Equation 16 with this w; the area of a side where all primitives or none are seen.
+    pub fn weight_of(&self, side: &Side, w: f32) -> f32 {
+        let area = side.bounds.half_area();
+        if !self.is_mixed() {
+            return area;
+        }
+        let by_area = if self.area > 0.0 { area / self.area } else { 0.0 };
+        w * side.seen as f32 / self.seen as f32 + (1.0 - w) * by_area
     }
 }
 
@@ -80,6 +91,7 @@ impl<'a> Seen<'a> {
 
 impl SplitCost for Seen<'_> {
     type Here = SeenHere;
+    type Rival = Area;
 
     fn root(&self, whole: impl FnOnce() -> Side) -> SeenHere {
         SeenHere::of(&whole())
@@ -94,29 +106,31 @@ impl SplitCost for Seen<'_> {
     }
 
     fn of_sides(&self, here: &SeenHere, sides: impl Iterator<Item = Side>) -> impl Iterator<Item = (f32, Side)> {
-        let of = |side: Side| {
-            let area = side.bounds.half_area();
-            if !here.is_mixed() {
-                return (area, side);
-            }
-            let by_area = if here.area > 0.0 { area / here.area } else { 0.0 };
-            (self.weight * side.seen as f32 / here.seen as f32 + (1.0 - self.weight) * by_area, side)
-        };
-        sides.map(of)
+        sides.map(|side| (here.weight_of(&side, self.weight), side))
     }
 
-    fn divide(&self, _here: SeenHere, sides: impl FnOnce() -> [Side; 2]) -> [SeenHere; 2] {
-        sides().each_ref().map(SeenHere::of)
+    fn divide(
+        &self,
+        _here: SeenHere,
+        sides: impl FnOnce() -> [Side; 2],
+        _members: &Members<'_>,
+    ) -> (First, [SeenHere; 2]) {
+        (First::Left, sides().each_ref().map(SeenHere::of))
     }
 
-    fn compares(&self, here: &SeenHere) -> bool {
-        here.is_mixed()
+    fn rival(&self, here: &SeenHere) -> Option<Area> {
+        here.is_mixed().then_some(Area)
     }
 
-    fn prefers(&self, [left, right]: &[Side; 2], by_area: &[Side; 2]) -> bool {
-        let hidden = if left.seen < right.seen { left.count } else { right.count };
-        hidden > by_area[0].count.max(by_area[1].count)
+    fn prefers(&self, own: &[Side; 2], by_area: &[Side; 2]) -> bool {
+        hides_more(own, by_area)
     }
+}
+
+/// Equation 17: whether a split hides more primitives than there are on either side of the one by area.
+pub(super) fn hides_more([left, right]: &[Side; 2], by_area: &[Side; 2]) -> bool {
+    let hidden = if left.seen < right.seen { left.count } else { right.count };
+    hidden > by_area[0].count.max(by_area[1].count)
 }
 
 #[cfg(test)]

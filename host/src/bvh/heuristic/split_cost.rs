@@ -5,6 +5,7 @@
 
 use super::RayMeasure;
 use crate::bvh::bounds::{Bounds, Item};
+use hedgerow::bvh::sah::Collapse;
 
 /// What lies on one side of a split.
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +26,12 @@ impl Side {
         Side { bounds: item.bounds(), count: item.weight(), seen: u32::from(is_seen) }
     }
 
+    /// Of one reference, which counts once.
+    #[inline(always)]
+    pub fn of_one(bounds: Bounds, is_seen: bool) -> Side {
+        Side { bounds, count: 1, seen: u32::from(is_seen) }
+    }
+
     #[inline(always)]
     pub fn union(self, other: Side) -> Side {
         let (count, seen) = (self.count + other.count, self.seen + other.seen);
@@ -41,12 +48,65 @@ pub(crate) fn growing(sides: impl Iterator<Item = Side>) -> impl Iterator<Item =
     })
 }
 
+/// The splits of a node along an axis. Each left side is in the next one, each right side in the one before.
+pub(crate) struct AxisSplits<'a> {
+    pub lefts: &'a [Side],
+    pub rights: &'a [Side],
+}
+
+/// Where an item is among the splits of an axis.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    pub primitive: u32,
+    /// It is in the left sides from this one on.
+    pub first: usize,
+    /// It is in the right sides before this one. That is `first`, unless the item is divided.
+    pub last: usize,
+}
+
+/// Which side of a split becomes the left child.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum First {
+    Left,
+    Right,
+}
+
+impl First {
+    /// What belongs to both sides, that of the left child before the other.
+    #[inline(always)]
+    pub fn in_order<T>(self, [left, right]: [T; 2]) -> [T; 2] {
+        match self {
+            First::Left => [left, right],
+            First::Right => [right, left],
+        }
+    }
+}
+
+/// Calls back with the side of each item, 0 or 1, and its primitive.
+pub(crate) type Members<'a> = dyn Fn(&mut dyn FnMut(usize, u32)) + 'a;
+
+/// Where planes that divide items are looked at, by builders that have some.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Space {
+    Nowhere,
+    /// Where the sides of the best split of whole items overlap.
+    Overlaps,
+    /// At this node.
+    Here,
+    /// At this node, and no split of whole items unless there is none of space.
+    Alone,
+}
+
 /// What costs splits by a heuristic.
 pub(crate) trait SplitCost: Sync {
     /// What it knows of a node besides its box.
     type Here: Send + Sync;
+    /// What its splits are compared with.
+    type Rival: SplitCost<Here = ()>;
     /// Whether no box weighs less than one in it.
     const GROWS: bool = false;
+    /// Whether a side's cost depends on the other one, so that only [`SplitCost::of_splits`] knows it.
+    const BY_BOTH: bool = false;
 
     /// What it knows of the root.
     fn root(&self, whole: impl FnOnce() -> Side) -> Self::Here;
@@ -63,17 +123,55 @@ pub(crate) trait SplitCost: Sync {
     /// Those of sides that splits of a node may have. Each is in the next.
     fn of_sides(&self, here: &Self::Here, sides: impl Iterator<Item = Side>) -> impl Iterator<Item = (f32, Side)>;
 
-    /// What it knows of both sides of the split that was taken.
-    fn divide(&self, here: Self::Here, sides: impl FnOnce() -> [Side; 2]) -> [Self::Here; 2];
+    /// What splits of an axis cost, where each of a node's items is in one place.
+    fn of_splits(
+        &self,
+        here: &Self::Here,
+        splits: &AxisSplits<'_>,
+        _places: impl Iterator<Item = Place>,
+        costs: &Collapse,
+    ) -> Vec<f32> {
+        let cost = |(weight, side): (f32, Side)| costs.leaf_cost(weight, side.count);
+        // A part may be so thin that nothing is left of its box. No ray meets that.
+        let is_empty = |side: &&Side| side.bounds.lo.cmpgt(side.bounds.hi).any();
+        let thin = splits.lefts.iter().take_while(is_empty).count();
+        let mut all = vec![0.0; splits.lefts.len()];
+        let from_left = self.of_sides(here, splits.lefts[thin..].iter().copied());
+        from_left.zip(&mut all[thin..]).for_each(|(left, all)| *all = cost(left));
+        let thin = splits.rights.iter().rev().take_while(is_empty).count();
+        let from_right = self.of_sides(here, splits.rights.iter().rev().skip(thin).copied());
+        from_right.zip(all.iter_mut().rev().skip(thin)).for_each(|(right, all)| *all += cost(right));
+        all
+    }
 
-    /// Whether its best split of the node is compared with the best one by area.
+    /// What it knows of both sides of the split that was taken, and which becomes the left child.
+    fn divide(
+        &self,
+        here: Self::Here,
+        sides: impl FnOnce() -> [Side; 2],
+        members: &Members<'_>,
+    ) -> (First, [Self::Here; 2]);
+
+    /// Whether items may be divided in the node.
     #[inline(always)]
-    fn compares(&self, _here: &Self::Here) -> bool {
-        false
+    fn space(&self, _here: &Self::Here) -> Space {
+        Space::Overlaps
+    }
+
+    /// Whether an item that crosses the plane of a split may be left whole on this side.
+    #[inline(always)]
+    fn takes_whole(&self, _here: &Self::Here, _side: &Side) -> bool {
+        true
+    }
+
+    /// What its best split of the node is compared with, if with anything: the best one by another cost.
+    #[inline(always)]
+    fn rival(&self, _here: &Self::Here) -> Option<Self::Rival> {
+        None
     }
 
     /// Whether its own split is taken then.
-    fn prefers(&self, _own: &[Side; 2], _by_area: &[Side; 2]) -> bool {
+    fn prefers(&self, _own: &[Side; 2], _rival: &[Side; 2]) -> bool {
         true
     }
 }
@@ -83,6 +181,7 @@ pub(crate) struct Area;
 
 impl SplitCost for Area {
     type Here = ();
+    type Rival = Area;
     const GROWS: bool = true;
 
     #[inline(always)]
@@ -99,8 +198,8 @@ impl SplitCost for Area {
     }
 
     #[inline(always)]
-    fn divide(&self, _here: (), _sides: impl FnOnce() -> [Side; 2]) -> [(); 2] {
-        [(); 2]
+    fn divide(&self, _here: (), _sides: impl FnOnce() -> [Side; 2], _members: &Members<'_>) -> (First, [(); 2]) {
+        (First::Left, [(); 2])
     }
 }
 
@@ -109,6 +208,7 @@ pub(crate) struct ByRays<'a>(pub &'a dyn RayMeasure);
 
 impl SplitCost for ByRays<'_> {
     type Here = ();
+    type Rival = Area;
 
     fn root(&self, _whole: impl FnOnce() -> Side) {}
 
@@ -120,7 +220,7 @@ impl SplitCost for ByRays<'_> {
         sides.map(|side| (self.0.rays(&side.bounds.aabb()), side))
     }
 
-    fn divide(&self, _here: (), _sides: impl FnOnce() -> [Side; 2]) -> [(); 2] {
-        [(); 2]
+    fn divide(&self, _here: (), _sides: impl FnOnce() -> [Side; 2], _members: &Members<'_>) -> (First, [(); 2]) {
+        (First::Left, [(); 2])
     }
 }

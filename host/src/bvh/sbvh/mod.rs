@@ -18,14 +18,15 @@ mod spatial;
 
 pub(super) use leaves::collapse;
 
+use super::ALONE;
 use super::bounds::{Bounds, Item};
-use super::top_down::HALVED_FROM;
+use super::heuristic::split_cost::{First, Side, Space, SplitCost};
+use super::top_down::{self, Candidates, HALVED_FROM, LeafRule};
 use super::topology::{LEAF, Topology};
-use super::{ALONE, DIVIDED_ABOVE};
-use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::split::padded;
 use hedgerow::geometry::Aabb;
 use hedgerow::{Error, Result};
+use object::ObjectSplit;
 
 /// How triangles are split, and how many references there may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,12 +97,21 @@ pub(super) struct SplitTree {
     pub is_split: bool,
 }
 
+/// Whether any triangle of a tree over `items` may be split.
+pub(super) fn can_split<C, B>(items: &[Item], scene: &Scene<'_, C, B>, options: &SbvhOptions) -> bool
+where
+    C: Fn(u32) -> Option<[[f32; 3]; 3]>,
+{
+    let is_triangle = |item: &Item| (scene.corners)(item.primitive()).is_some();
+    options.alpha < 1.0 && is_in_reach(scene.around) && items.first().is_some_and(is_triangle)
+}
+
 /// The tree over `items`.
 pub(super) fn build<C, B>(
+    by: &impl SplitCost,
     items: Vec<Item>,
     scene: &Scene<'_, C, B>,
-    costs: &Collapse,
-    single: bool,
+    rule: LeafRule<'_>,
     options: &SbvhOptions,
 ) -> SplitTree
 where
@@ -114,14 +124,13 @@ where
         corners.map(|corner| corner.map(|x| x * scene.scale))
     };
     let area = super::bounds::around(&items).half_area();
-    let can_split = options.alpha < 1.0
-        && is_in_reach(scene.around)
-        && items.first().is_some_and(|item| (scene.corners)(item.primitive()).is_some());
-    let least_overlap = if can_split { options.alpha * area } else { f32::INFINITY };
-    let build = Build { corners, costs, single, bins: options.bins as usize, least_overlap };
+    let least_overlap = can_split(&items, scene, options).then_some(options.alpha * area);
+    let build = Build { corners, rule, bins: options.bins as usize, least_overlap };
     let mut out = Written::default();
     if !items.is_empty() {
-        build.subtree(items, 0, room, &mut out);
+        let mut root = Subtree::default();
+        top_down::build(&build, by, Part { references: items, room, place: &mut root });
+        out.write(root);
     }
     let is_split = out.references.iter().any(|reference| reference.weight() == PART);
     out.references.iter_mut().for_each(|reference| *reference = scene.finished(reference));
@@ -174,91 +183,150 @@ impl Unsplit {
     }
 }
 
-/// What lies on either side of a split.
-#[derive(Clone, Copy)]
-struct Side {
-    bounds: Bounds,
-    count: usize,
+/// A subtree that is built: how many references it has is known at its end alone.
+enum Subtree {
+    Leaf(Vec<Item>),
+    Node(Box<[Subtree; 2]>),
 }
 
-impl Side {
-    const EMPTY: Side = Side { bounds: Bounds::EMPTY, count: 0 };
-
-    fn add(self, bounds: Bounds, count: usize) -> Side {
-        Side { bounds: self.bounds.union(bounds), count: self.count + count }
-    }
-
-    fn cost(&self, costs: &Collapse) -> f32 {
-        costs.leaf_cost(self.bounds.half_area(), self.count as u32)
+impl Default for Subtree {
+    fn default() -> Subtree {
+        Subtree::Leaf(Vec::new())
     }
 }
 
-/// The part of a tree that is written, from left to right.
+/// A tree that is written, from left to right.
 #[derive(Default)]
 struct Written {
     references: Vec<Item>,
     splits: Vec<u32>,
 }
 
+impl Written {
+    fn write(&mut self, subtree: Subtree) {
+        match subtree {
+            Subtree::Leaf(references) => {
+                self.splits.resize(self.splits.len() + references.len() - 1, LEAF);
+                self.references.extend(references);
+            }
+            Subtree::Node(children) => {
+                let [left, right] = *children;
+                let (slot, first) = (self.splits.len(), self.references.len());
+                self.splits.push(LEAF);
+                self.write(left);
+                self.splits[slot] = (self.references.len() - first) as u32;
+                self.write(right);
+            }
+        }
+    }
+}
+
+/// The references of a node, how many more there may be, and where its subtree is put.
+struct Part<'a> {
+    references: Vec<Item>,
+    room: usize,
+    place: &'a mut Subtree,
+}
+
+/// What nodes are split by.
 struct Build<'a, C> {
     /// Of a primitive, in the lengths of the items.
     corners: C,
-    costs: &'a Collapse,
-    single: bool,
+    rule: LeafRule<'a>,
     bins: usize,
-    /// Sides of an object split with less area in common are not looked at any further.
-    least_overlap: f32,
+    /// Sides of an object split with less area in common are not looked at any further; none if nothing may be split.
+    least_overlap: Option<f32>,
 }
 
-impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Build<'_, C> {
-    /// Writes the subtree over `references`, of which there may be `room` more.
-    fn subtree(&self, references: Vec<Item>, depth: u32, room: usize, out: &mut Written) {
-        let count = references.len();
-        let sides = if count == 1 { None } else { self.divided(&references, depth, room) };
-        let Some([left, right]) = sides else {
-            out.splits.resize(out.splits.len() + count - 1, LEAF);
-            return out.references.extend(references);
+/// The search for the split of a node.
+struct Search<'a, S: SplitCost, C> {
+    by: &'a S,
+    here: &'a S::Here,
+    build: &'a Build<'a, C>,
+}
+
+impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Candidates for Build<'_, C> {
+    type Part<'a> = Part<'a>;
+    /// The references on both sides.
+    type Split = [Vec<Item>; 2];
+
+    fn count(&self, part: &Part<'_>) -> usize {
+        part.references.len()
+    }
+
+    fn best<S: SplitCost>(&self, by: &S, here: &S::Here, part: &mut Part<'_>, depth: u32) -> Option<[Vec<Item>; 2]> {
+        Search { by, here, build: self }.divided(&part.references, depth, part.room)
+    }
+
+    fn sides(&self, by: &impl SplitCost, part: &Part<'_>, split: Option<&[Vec<Item>; 2]>) -> [Side; 2] {
+        let search = |references: &[Item]| {
+            let side = |reference: &Item| Side::of_one(reference.bounds(), by.is_seen(reference));
+            references.iter().map(side).fold(Side::EMPTY, Side::union)
         };
-        drop(references);
-        let both = left.len() + right.len();
-        let room = room - (both - count);
-        let left_room = (room as u128 * left.len() as u128 / both as u128) as usize;
-        let (slot, first) = (out.splits.len(), out.references.len());
-        out.splits.push(LEAF);
-        if both < ALONE || depth >= DIVIDED_ABOVE {
-            self.subtree(left, depth + 1, left_room, out);
-            out.splits[slot] = (out.references.len() - first) as u32;
-            self.subtree(right, depth + 1, room - left_room, out);
-        } else {
-            let mut of_right = Written::default();
-            let on_left = || {
-                self.subtree(left, depth + 1, left_room, out);
-                out.splits[slot] = (out.references.len() - first) as u32;
-            };
-            rayon::join(on_left, || self.subtree(right, depth + 1, room - left_room, &mut of_right));
-            out.references.extend(of_right.references);
-            out.splits.extend(of_right.splits);
+        match split {
+            None => [search(&part.references), Side::EMPTY],
+            Some(sides) => sides.each_ref().map(|side| search(side)),
         }
     }
 
+    fn members(&self, _part: &Part<'_>, split: &[Vec<Item>; 2], each: &mut dyn FnMut(usize, u32)) {
+        for (side, references) in split.iter().enumerate() {
+            references.iter().for_each(|reference| each(side, reference.primitive()));
+        }
+    }
+
+    fn divide<'a>(&self, part: Self::Part<'a>, split: [Vec<Item>; 2], first: First) -> [Self::Part<'a>; 2] {
+        let [left, right] = first.in_order(split);
+        let both = left.len() + right.len();
+        let room = part.room - (both - part.references.len());
+        let left_room = (room as u128 * left.len() as u128 / both as u128) as usize;
+        *part.place = Subtree::Node(Box::default());
+        let Subtree::Node(children) = part.place else { unreachable!("it was just made") };
+        let [left_place, right_place] = &mut **children;
+        [
+            Part { references: left, room: left_room, place: left_place },
+            Part { references: right, room: room - left_room, place: right_place },
+        ]
+    }
+
+    fn end(&self, part: Part<'_>) {
+        *part.place = Subtree::Leaf(part.references);
+    }
+}
+
+impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
     /// The references on both sides of the best split; `None` if the node is a leaf.
     fn divided(&self, references: &[Item], depth: u32, room: usize) -> Option<[Vec<Item>; 2]> {
         let node = Unsplit::of(references);
-        let object = if depth >= HALVED_FROM { self.halved(references) } else { self.object_split(references, &node) };
-        let is_overlap = || self.least_overlap < f32::INFINITY && object.overlap() >= self.least_overlap;
-        let spatial = (depth < WHOLE_FROM && is_overlap())
-            .then(|| self.spatial_split(references, &node.bounds, room))
-            .flatten()
-            .filter(|spatial| spatial.cost < object.cost);
-        let cost = spatial.as_ref().map_or(object.cost, |spatial| spatial.cost);
-        let area = node.bounds.half_area();
-        let is_leaf = self.costs.leaf_cost(area, references.len() as u32) < self.costs.inner_cost(area, cost, 0.0);
-        if is_leaf && !self.single {
+        let objects = || -> ObjectSplit {
+            if depth >= HALVED_FROM { self.halved(references) } else { self.object_split(references, &node) }
+        };
+        let may_split = if depth < WHOLE_FROM { self.build.least_overlap } else { None };
+        let space = || self.spatial_split(references, &node.bounds, room);
+        let (object, spatial) = match (may_split, self.by.space(self.here)) {
+            (None, _) | (_, Space::Nowhere) => (Some(objects()), None),
+            (Some(least), Space::Overlaps) => {
+                let object = objects();
+                let spatial = if object.overlap() >= least { space() } else { None };
+                (Some(object), spatial)
+            }
+            (Some(_), Space::Here) => (Some(objects()), space()),
+            (Some(_), Space::Alone) => match space() {
+                None => (Some(objects()), None),
+                spatial => (None, spatial),
+            },
+        };
+        let of_object = object.as_ref().map_or(f32::INFINITY, |object| object.cost);
+        let spatial = spatial.filter(|spatial| spatial.cost < of_object || object.is_none());
+        let cost = spatial.as_ref().map_or(of_object, |spatial| spatial.cost);
+        let (weight, count) = (self.by.of_node(self.here, &node.bounds), references.len() as u32);
+        if self.build.rule.is_leaf(weight, count, cost) {
             return None;
         }
         // More references are not worth it where a leaf is cheaper.
-        let by_space = spatial.filter(|_| !is_leaf).and_then(|spatial| self.cut(references, &spatial));
-        Some(by_space.unwrap_or_else(|| object.divide(references)))
+        let is_leaf = LeafRule { single: false, ..self.build.rule }.is_leaf(weight, count, cost);
+        let by_space = spatial.filter(|_| !is_leaf).and_then(|spatial| self.build.cut(references, &spatial));
+        Some(by_space.unwrap_or_else(|| object.unwrap_or_else(objects).divide(references)))
     }
 }
 

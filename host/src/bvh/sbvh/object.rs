@@ -1,7 +1,8 @@
 //! Object splits: each reference is on one side, by the bin of its centroid.
 
-use super::{ALONE, Build, Side, Unsplit};
-use crate::bvh::bounds::{Bounds, Item};
+use super::{ALONE, Search, Unsplit};
+use crate::bvh::bounds::{Bounds, Item, around};
+use crate::bvh::heuristic::split_cost::{AxisSplits, Place, Side, SplitCost, growing};
 use rayon::prelude::*;
 
 /// Centroids whose extent is less than this part of the scene's are not told apart by an axis.
@@ -66,10 +67,11 @@ impl ObjectSplit {
     }
 }
 
-impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Build<'_, C> {
+impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
     /// The plane between bins that costs least, of equal ones the first along the first axis.
     pub(super) fn object_split(&self, references: &[Item], node: &Unsplit) -> ObjectSplit {
-        let of_axis = |axis| Some(self.object_split_by(references, Grid::new(&node.centroids, axis, self.bins)?));
+        let bins = self.build.bins;
+        let of_axis = |axis| Some(self.object_split_by(references, Grid::new(&node.centroids, axis, bins)?));
         let splits = of_axes(references.len(), of_axis);
         let cheaper = |a: ObjectSplit, b: ObjectSplit| if b.cost < a.cost { b } else { a };
         splits.into_iter().flatten().reduce(cheaper).unwrap_or_else(|| self.halved(references))
@@ -78,28 +80,43 @@ impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Build<'_, C> {
     /// Half of the references on either side, in the order that they are in.
     pub(super) fn halved(&self, references: &[Item]) -> ObjectSplit {
         let (left, right) = references.split_at(references.len() / 2);
-        let sides = [left, right].map(|side| Side { bounds: crate::bvh::bounds::around(side), count: side.len() });
-        let [left, right] = sides.map(|side| side.cost(self.costs));
-        ObjectSplit { cost: left + right, sides: sides.map(|side| side.bounds), by: By::Order }
+        let side = |references: &[Item]| {
+            references.iter().map(|reference| self.side_of(reference)).fold(Side::EMPTY, Side::union)
+        };
+        let places = references.iter().enumerate().map(|(at, reference)| {
+            let side = usize::from(at >= left.len());
+            Place { primitive: reference.primitive(), first: side, last: side }
+        });
+        let splits = AxisSplits { lefts: &[side(left)], rights: &[side(right)] };
+        let cost = self.by.of_splits(self.here, &splits, places, self.build.rule.costs)[0];
+        ObjectSplit { cost, sides: [left, right].map(around), by: By::Order }
+    }
+
+    /// One reference.
+    pub(super) fn side_of(&self, reference: &Item) -> Side {
+        Side::of_one(reference.bounds(), self.by.is_seen(reference))
     }
 
     fn object_split_by(&self, references: &[Item], grid: Grid) -> ObjectSplit {
         let mut bins = vec![Side::EMPTY; grid.bins];
         for reference in references {
             let bin = &mut bins[grid.bin_of(reference)];
-            *bin = bin.add(reference.bounds(), 1);
+            *bin = bin.union(self.side_of(reference));
         }
-        let mut rights = vec![Side::EMPTY; grid.bins + 1];
-        for bin in (1..grid.bins).rev() {
-            rights[bin] = rights[bin + 1].add(bins[bin].bounds, bins[bin].count);
-        }
+        let lefts: Vec<Side> = growing(bins[..grid.bins - 1].iter().copied()).collect();
+        let mut rights: Vec<Side> = growing(bins[1..].iter().rev().copied()).collect();
+        rights.reverse();
+        let places = references.iter().map(|reference| {
+            let bin = grid.bin_of(reference);
+            Place { primitive: reference.primitive(), first: bin, last: bin }
+        });
+        let splits = AxisSplits { lefts: &lefts, rights: &rights };
+        let costs = self.by.of_splits(self.here, &splits, places, self.build.rule.costs);
         let mut best = ObjectSplit { cost: f32::INFINITY, sides: [Bounds::EMPTY; 2], by: By::Bins(grid, 1) };
-        let mut left = Side::EMPTY;
-        for bin in 1..grid.bins {
-            left = left.add(bins[bin - 1].bounds, bins[bin - 1].count);
-            let cost = left.cost(self.costs) + rights[bin].cost(self.costs);
+        for (bin, &cost) in (1..).zip(&costs) {
             if cost < best.cost {
-                best = ObjectSplit { cost, sides: [left.bounds, rights[bin].bounds], by: By::Bins(grid, bin) };
+                let sides = [lefts[bin - 1].bounds, rights[bin - 1].bounds];
+                best = ObjectSplit { cost, sides, by: By::Bins(grid, bin) };
             }
         }
         best

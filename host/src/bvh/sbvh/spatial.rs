@@ -1,8 +1,9 @@
 //! Spatial splits: references are cut at a plane, or left whole on one side of it.
 
 use super::object::of_axes;
-use super::{Build, PART, SHORTEST_CUT, Side, aabb};
+use super::{Build, PART, SHORTEST_CUT, Search, aabb};
 use crate::bvh::bounds::{Bounds, Item};
+use crate::bvh::heuristic::split_cost::{AxisSplits, Place, Side, SplitCost, growing};
 use glam::Vec3A;
 use hedgerow::bvh::twin::split::halves;
 
@@ -12,14 +13,21 @@ pub(super) struct SpatialSplit {
     axis: usize,
     at: f32,
     sides: [Side; 2],
+    /// Whether what crosses may be left whole on a side.
+    takes_whole: [bool; 2],
 }
 
-/// A bin of space: the parts of references in it, how many begin in it, and how many end.
+/// A bin of space: the parts of references in it, how many begin in it, and how many end; the boxes of both are those of the parts.
 #[derive(Clone, Copy)]
 struct Bin {
-    bounds: Bounds,
-    begin: usize,
-    end: usize,
+    begin: Side,
+    end: Side,
+}
+
+impl Bin {
+    fn add(&mut self, part: Bounds) {
+        self.begin.bounds = self.begin.bounds.union(part);
+    }
 }
 
 /// Equal bins of a node's box along an axis.
@@ -63,53 +71,64 @@ impl Slabs {
     }
 }
 
-impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Build<'_, C> {
+impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
     /// The plane between bins of space that costs least and adds no more references than there is room for.
     pub(super) fn spatial_split(&self, references: &[Item], node: &Bounds, room: usize) -> Option<SpatialSplit> {
-        let of_axis = |axis| self.spatial_split_by(references, &Slabs::new(node, axis, self.bins)?, room);
+        let of_axis = |axis| self.spatial_split_by(references, &Slabs::new(node, axis, self.build.bins)?, room);
         let splits = of_axes(references.len(), of_axis);
         splits.into_iter().flatten().reduce(|a, b| if b.cost < a.cost { b } else { a })
     }
 
     fn spatial_split_by(&self, references: &[Item], slabs: &Slabs, room: usize) -> Option<SpatialSplit> {
         let bins = self.filled(references, slabs);
-        let mut rights = vec![Side::EMPTY; bins.len() + 1];
-        for bin in (1..bins.len()).rev() {
-            rights[bin] = rights[bin + 1].add(bins[bin].bounds, bins[bin].end);
-        }
-        let mut best: Option<SpatialSplit> = None;
-        let mut left = Side::EMPTY;
-        for bin in 1..bins.len() {
-            left = left.add(bins[bin - 1].bounds, bins[bin - 1].begin);
-            let right = rights[bin];
-            let cost = left.cost(self.costs) + right.cost(self.costs);
-            let is_possible = left.count > 0 && right.count > 0 && left.count + right.count - references.len() <= room;
-            if is_possible && best.as_ref().is_none_or(|best| cost < best.cost) {
-                best = Some(SpatialSplit { cost, axis: slabs.axis, at: slabs.borders[bin], sides: [left, right] });
+        let lefts: Vec<Side> = growing(bins[..bins.len() - 1].iter().map(|bin| bin.begin)).collect();
+        let mut rights: Vec<Side> = growing(bins[1..].iter().rev().map(|bin| bin.end)).collect();
+        rights.reverse();
+        let places = references.iter().map(|reference| {
+            let (first, last) = slabs.bins_of(&reference.bounds());
+            Place { primitive: reference.primitive(), first, last }
+        });
+        let splits = AxisSplits { lefts: &lefts, rights: &rights };
+        let costs = self.by.of_splits(self.here, &splits, places, self.build.rule.costs);
+        let most = references.len() + room;
+        let mut best: Option<(f32, usize)> = None;
+        for (i, &cost) in costs.iter().enumerate() {
+            let [left, right] = [lefts[i].count, rights[i].count];
+            let is_possible = left > 0 && right > 0 && left as usize + right as usize <= most;
+            if is_possible && best.is_none_or(|best| cost < best.0) {
+                best = Some((cost, i));
             }
         }
-        best
+        let (cost, i) = best?;
+        let sides = [lefts[i], rights[i]];
+        let takes_whole = sides.map(|side| self.by.takes_whole(self.here, &side));
+        Some(SpatialSplit { cost, axis: slabs.axis, at: slabs.borders[i + 1], sides, takes_whole })
     }
 
     /// The bins, with the references chopped at their borders.
     fn filled(&self, references: &[Item], slabs: &Slabs) -> Vec<Bin> {
-        let empty = Bin { bounds: Bounds::EMPTY, begin: 0, end: 0 };
-        let mut bins = vec![empty; slabs.borders.len() - 1];
+        let mut bins = vec![Bin { begin: Side::EMPTY, end: Side::EMPTY }; slabs.borders.len() - 1];
         for reference in references {
             let bounds = reference.bounds();
             let (first, last) = slabs.bins_of(&bounds);
-            bins[first].begin += 1;
-            bins[last].end += 1;
+            let seen = u32::from(self.by.is_seen(reference));
+            bins[first].begin.count += 1;
+            bins[first].begin.seen += seen;
+            bins[last].end.count += 1;
+            bins[last].end.seen += seen;
             if first == last {
-                bins[first].bounds = bins[first].bounds.union(bounds);
+                bins[first].add(bounds);
             } else {
-                let outline = Outline::new((self.corners)(reference.primitive()), slabs.axis);
+                let outline = Outline::new((self.build.corners)(reference.primitive()), slabs.axis);
                 outline.chop(&bounds, &slabs.borders[first..=last + 1], &mut bins[first..=last]);
             }
         }
+        bins.iter_mut().for_each(|bin| bin.end.bounds = bin.begin.bounds);
         bins
     }
+}
 
+impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Build<'_, C> {
     /// The references of the parts below and above a plane.
     fn parts(&self, reference: &Item, axis: usize, at: f32) -> [Option<Item>; 2] {
         let primitive = reference.primitive();
@@ -122,8 +141,9 @@ impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Build<'_, C> {
 
     /// The references on both sides of a plane; `None` if one of them has none in the end.
     pub(super) fn cut(&self, references: &[Item], split: &SpatialSplit) -> Option<[Vec<Item>; 2]> {
-        let SpatialSplit { axis, at, sides, .. } = *split;
-        let mut cut = Cut { sides, references: sides.map(|side| Vec::with_capacity(side.count)) };
+        let SpatialSplit { axis, at, sides, takes_whole, .. } = *split;
+        let room = |side: Side| Vec::with_capacity(side.count as usize);
+        let mut cut = Cut { sides, takes_whole, references: sides.map(room) };
         for reference in references {
             let Bounds { lo, hi } = reference.bounds();
             if lo[axis] >= at {
@@ -186,7 +206,7 @@ impl Outline {
                 corners.fold(at_begin.1.union(at_end.1), |around, &corner| around.union(Bounds::point(corner)));
             let part = Bounds { lo: around.lo.max(reference.lo), hi: around.hi.min(reference.hi) };
             if part.lo.cmple(part.hi).all() {
-                bin.bounds = bin.bounds.union(part);
+                bin.add(part);
             }
             at_begin = at_end;
         }
@@ -196,6 +216,7 @@ impl Outline {
 /// A node while it is cut: both sides, as if all that crosses and was not seen yet were cut.
 struct Cut {
     sides: [Side; 2],
+    takes_whole: [bool; 2],
     references: [Vec<Item>; 2],
 }
 
@@ -218,8 +239,11 @@ impl Cut {
         }
     }
 
-    /// What both sides cost with a reference that crosses on one side alone.
+    /// What both sides cost by area with a reference that crosses on one side alone.
     fn cost_whole(&self, reference: &Item, on: usize) -> f32 {
+        if !self.takes_whole[on] {
+            return f32::INFINITY;
+        }
         let (own, other) = (&self.sides[on], &self.sides[1 - on]);
         let area = own.bounds.union(reference.bounds()).half_area();
         area * own.count as f32 + other.bounds.half_area() * (other.count as f32 - 1.0)
@@ -230,5 +254,41 @@ impl Cut {
         self.sides[on].bounds = self.sides[on].bounds.union(reference.bounds());
         self.sides[1 - on].count -= 1;
         self.references[on].push(*reference);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::top_down::LeafRule;
+    use super::*;
+    use hedgerow::bvh::sah::Collapse;
+
+    /// Five references on either side of a plane, of which one reaches a hundredth beyond it.
+    #[test]
+    fn what_crosses_is_left_whole_where_that_is_cheaper_and_allowed() {
+        let corners = [[0.4, 0.0, 0.0], [0.51, 0.0, 0.1], [0.51, 0.1, 0.0]];
+        let rule = LeafRule { costs: &Collapse::SAH, single: true };
+        let build = Build { corners: |_| corners, rule, bins: 2, least_overlap: Some(0.0) };
+        let item = |lo: [f32; 3], hi: [f32; 3], primitive: u32| {
+            Item::new(Bounds { lo: Vec3A::from_array(lo), hi: Vec3A::from_array(hi) }, primitive, 1)
+        };
+        let mut references = vec![item([0.4, 0.0, 0.0], [0.51, 0.1, 0.1], 0)];
+        references.extend((1..5).map(|i| item([0.0; 3], [0.5, 1.0, 1.0], i)));
+        references.extend((5..9).map(|i| item([0.5, 0.0, 0.0], [1.0; 3], i)));
+        let side = |lo: f32, hi: f32| {
+            let bounds = Bounds { lo: Vec3A::new(lo, 0.0, 0.0), hi: Vec3A::new(hi, 1.0, 1.0) };
+            Side { bounds, count: 5, seen: 0 }
+        };
+        // Half areas are 2 of a side, 2.02 of the left one with all of it and 2.2 of the right one: 18.1, 19 and, cut, 20.
+        for (takes_whole, expected) in
+            [([true, true], [5, 4]), ([false, true], [4, 5]), ([true, false], [5, 4]), ([false, false], [5, 5])]
+        {
+            let split =
+                SpatialSplit { cost: 0.0, axis: 0, at: 0.5, sides: [side(0.0, 0.5), side(0.5, 1.0)], takes_whole };
+            let found = build.cut(&references, &split).expect("both sides have some");
+            assert_eq!(found.each_ref().map(Vec::len), expected, "{takes_whole:?}");
+            let parts = found.concat().iter().filter(|reference| reference.weight() == PART).count();
+            assert_eq!(parts, if takes_whole == [false; 2] { 2 } else { 0 });
+        }
     }
 }

@@ -1,13 +1,16 @@
 use super::*;
 use crate::bvh::binned::{BinnedAxes, Bins};
+use crate::bvh::heuristic::{Heuristic, Occlusion};
 use crate::bvh::{
     BinnedOptions, HostBvhOptions, HostMethod, HostOptimise, InsertionOptions, Termination, TopOptions, build,
-    build_aabbs,
+    build_aabbs, build_by,
 };
-use hedgerow::bvh::layout::{Bvh2, Record, status};
+use hedgerow::bvh::layout::{Bvh2, Child, Record, status};
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
+use hedgerow::bvh::sah::Collapse;
 use hedgerow::trace::twin::tracer::{closest_hit, closest_hit_by_brute_force};
 use hedgerow::trace::{Hit, Ray};
+use std::collections::BTreeSet;
 
 type Corners = Vec<[[f32; 3]; 3]>;
 
@@ -353,6 +356,46 @@ fn boxes_are_not_split() {
     let tree = build_aabbs(&boxes, &by(SbvhOptions::PAPER)).expect("sound options").tree;
     tree.validate().expect("valid");
     assert_eq!((tree.header.split_from, tree.records.len()), (0, 300));
+}
+
+fn by_seen(corners: &Corners, seen: &[bool]) -> Bvh2 {
+    let (positions, triangles) = mesh(corners);
+    let complete = Heuristic::OcclusionComplete(Occlusion::of(seen));
+    let options = HostBvhOptions { collapse: Collapse::OFF, ..by(SbvhOptions::PAPER) };
+    build_by(&complete, &positions, &triangles, &options).expect("sound options").tree
+}
+
+/// The seen triangles below a child; in no node there are more of them on the right than on the left.
+fn seen_below(tree: &Bvh2, child: &Child, seen: &[bool]) -> BTreeSet<u32> {
+    if child.is_leaf() {
+        let records = &tree.records[child.index as usize..(child.index + child.count) as usize];
+        return records.iter().map(Record::primitive).filter(|&primitive| seen[primitive as usize]).collect();
+    }
+    let [left, right] = tree.nodes[child.index as usize].children.each_ref().map(|child| seen_below(tree, child, seen));
+    assert!(left.len() >= right.len(), "{}, {}", left.len(), right.len());
+    &left | &right
+}
+
+#[test]
+fn with_all_rules_of_occlusion_more_is_seen_on_the_left_in_every_node() {
+    let corners = mixed(1000, 14);
+    let seen: Vec<bool> = (0..corners.len()).map(|i| i % 7 < 2).collect();
+    let tree = by_seen(&corners, &seen);
+    tree.validate().expect("valid");
+    assert_ne!(tree.header.split_from, 0);
+    assert_eq!(seen_below(&tree, &tree.header.root, &seen).len(), seen.iter().filter(|&&seen| seen).count());
+}
+
+#[test]
+fn what_nobody_sees_is_not_split() {
+    let small = moved(soup(300, 0.05, 15), -3.0);
+    let corners: Corners = small.into_iter().chain(needles(200, 16)).collect();
+    let seen: Vec<bool> = (0..corners.len()).map(|i| i < 300).collect();
+    let tree = by_seen(&corners, &seen);
+    tree.validate().expect("valid");
+    assert_eq!(tree.header.split_from, 0);
+    let unseen: Vec<bool> = seen.iter().map(|seen| !seen).collect();
+    assert_ne!(by_seen(&corners, &unseen).header.split_from, 0);
 }
 
 #[test]

@@ -6,9 +6,10 @@ use super::{BuilderOption, Spec};
 use crate::rays::kinds::RayKind;
 use crate::rays::sample;
 use crate::subjects::host::{HostPlan, TwinPlan};
-use crate::subjects::taught::{CameraRays, HeuristicSpec};
+use crate::subjects::taught::{CameraRays, HeuristicSpec, OcclusionRules};
 use crate::{Error, Result};
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
+use hedgerow::trace::Query;
 use hedgerow_host::bvh::binned::{BinnedAxes, BinnedOptions, Bins};
 use hedgerow_host::bvh::heuristic::InteriorForm;
 use hedgerow_host::bvh::{
@@ -30,21 +31,30 @@ pub(super) const TERMINATION_FLAT: BuilderOption = option(
 );
 pub(super) const HEURISTIC: BuilderOption = option(
     "heuristic",
-    "sah, interior, interior-hq, interior-fast, perspective, parallel, spherical, rdh or osah: what splits cost; leaves are made by sah",
+    "sah, interior, interior-hq, interior-fast, perspective, parallel, spherical, rdh, osah or srdh: what splits cost; leaves are made by sah",
+);
+pub(super) const HEURISTIC_OF_SPLITS: BuilderOption = option(
+    "heuristic",
+    "sah, interior, interior-hq, interior-fast, perspective, parallel, spherical, rdh, osah, osah-complete or srdh: what splits cost; \
+     leaves are made by sah",
 );
 pub(super) const TEACHING_RAYS: BuilderOption = option(
     "rays",
-    "all, or kinds of rays with + between: those that rdh and osah learn from; primary+shadow+ao+diffuse1+diffuse2 unless given",
+    "all, or kinds of rays with + between: those that rdh, osah and srdh learn from; unless given primary+shadow+ao+diffuse1+diffuse2, \
+     and shadow+ao for srdh",
 );
 pub(super) const SAMPLE: BuilderOption =
-    option("sample", "a number of rays from 0 to 100000000 that rdh learns from, at most; 262144 unless given");
+    option("sample", "a number of rays from 0 to 100000000 that rdh and srdh learn from, at most; 262144 unless given");
 pub(super) const WEIGHT: BuilderOption =
     option("weight", "a number from 0 to 1: what cameras and rays weigh beside the area; 0.9 unless given");
 pub(super) const LEAF: BuilderOption = option("leaf", "a number of triangles from 1 to 255 that always are a leaf");
 pub(super) const AXES: BuilderOption = option("axes", "longest or all");
 pub(super) const HOST_BINS: BuilderOption =
     option("bins", "a number of bins from 2 to 256, or adaptive: 4 + 2 √n of n triangles");
-pub(super) const SBVH_BINS: BuilderOption = option("bins", "a number of bins from 2 to 128, for splits of either kind");
+pub(super) const SBVH_BINS: BuilderOption = option(
+    "bins",
+    "a number of bins from 2 to 128, for splits of either kind; 32 unless given, and 128 for osah-complete",
+);
 pub(super) const ALPHA: BuilderOption = option(
     "alpha",
     "a number from 0 to 1: triangles are split where sides overlap by this part of the scene's area; 1e-5 unless given",
@@ -121,10 +131,12 @@ impl Spec {
     /// Options `alpha`, `budget` and `bins`, and those of every builder on the host.
     pub(super) fn sbvh(&self) -> Result<BuilderPlan> {
         let paper = SbvhOptions::PAPER;
+        let is_complete = self.option(HEURISTIC.key) == Some("osah-complete");
+        let bins = if is_complete { SbvhOptions::MOST_BINS } else { paper.bins };
         self.on_host(HostMethod::Sbvh(SbvhOptions {
             alpha: self.within(&ALPHA, 0.0..=1.0)?.unwrap_or(paper.alpha),
             budget: self.within(&BUDGET, 1.0..=SbvhOptions::MOST_BUDGET)?.unwrap_or(paper.budget),
-            bins: self.within(&SBVH_BINS, 2..=SbvhOptions::MOST_BINS)?.unwrap_or(paper.bins),
+            bins: self.within(&SBVH_BINS, 2..=SbvhOptions::MOST_BINS)?.unwrap_or(bins),
         }))
     }
 
@@ -149,7 +161,7 @@ impl Spec {
         ];
         let (option, known) = match method {
             HostMethod::Binned(_) => (&TERMINATION_FLAT, &all[..]),
-            HostMethod::Sweep => (&TERMINATION_BY, &all[..3]),
+            HostMethod::Sweep | HostMethod::Sbvh(_) => (&TERMINATION_BY, &all[..3]),
             _ => (&TERMINATION, &all[..2]),
         };
         let termination = self.choice(option, known)?.unwrap_or(Termination::Sah);
@@ -163,7 +175,10 @@ impl Spec {
 
     /// Options `heuristic`, `rays`, `sample` and `weight`.
     pub(super) fn heuristic(&self) -> Result<HeuristicSpec> {
-        let kinds = match self.option(TEACHING_RAYS.key).filter(|_| self.builder().takes(HEURISTIC.key)) {
+        let given = self.option(TEACHING_RAYS.key).filter(|_| self.builder().takes(HEURISTIC.key));
+        let heuristic = self.option(HEURISTIC.key);
+        let kinds = match given {
+            None if heuristic == Some("srdh") => sample::ANY_HIT.to_vec(),
             None => sample::FRAME.to_vec(),
             Some("all") => RayKind::ALL.to_vec(),
             Some(kinds) => {
@@ -174,7 +189,8 @@ impl Spec {
         let most = self.within(&SAMPLE, 0..=100_000_000)?.unwrap_or(sample::MOST);
         let weight = self.within(&WEIGHT, 0.0..=1.0)?.unwrap_or(0.9);
         let camera = |rays| HeuristicSpec::Camera { rays, weight };
-        Ok(match self.option(HEURISTIC.key) {
+        let seen = |kinds, rules| HeuristicSpec::Occlusion { kinds, weight, rules };
+        Ok(match heuristic {
             None | Some("sah") => HeuristicSpec::Sah,
             Some("interior") => HeuristicSpec::Interior(InteriorForm::Exact),
             Some("interior-hq") => HeuristicSpec::Interior(InteriorForm::HighQuality),
@@ -183,7 +199,19 @@ impl Spec {
             Some("parallel") => camera(CameraRays::Parallel),
             Some("spherical") => camera(CameraRays::Spherical),
             Some("rdh") => HeuristicSpec::Distribution { kinds, most, weight },
-            Some("osah") => HeuristicSpec::Occlusion { kinds, weight },
+            Some("osah") => seen(kinds, OcclusionRules::Plain),
+            Some("osah-complete") if self.builder().splits_triangles() => seen(kinds, OcclusionRules::Complete),
+            Some("osah-complete") => {
+                let what = "osah-complete divides triangles; take sbvh:heuristic=osah-complete, or heuristic=osah";
+                return Err(Error::Argument(format!("builder {self}: {what}")));
+            }
+            Some("srdh") if kinds.iter().all(|kind| kind.query() == Query::AnyHit) => {
+                HeuristicSpec::Shadow { kinds, most, weight }
+            }
+            Some("srdh") => {
+                let what = "srdh learns from rays that end at any hit; take rays=shadow, ao or shadow+ao";
+                return Err(Error::Argument(format!("builder {self}: {what}")));
+            }
             Some(other) => return Err(self.wrong_value(&HEURISTIC, other)),
         })
     }

@@ -28,6 +28,7 @@ use crate::rays::kinds::RayKind;
 use crate::rays::sample::{self, TeachingRays};
 use crate::scene::{Mesh, Scene};
 use crate::{Error, Result};
+use host_options::HEURISTIC;
 use options::{RAYS, TRACE, TRAVERSAL};
 pub use plan::KdSpec;
 pub(crate) use plan::{BuilderPlan, TaughtTree};
@@ -126,6 +127,7 @@ impl Spec {
         tree.any_hit = match self.any_hit()? {
             None => AnyHit::NEAR,
             Some(AnyHitSpec::Rule(order)) => ordered(ChildrenBy::Rule(order)),
+            Some(AnyHitSpec::Built) => ordered(ChildrenBy::Built),
             Some(AnyHitSpec::Rays) => ordered(ChildrenBy::Rays(rays(&sample::ANY_HIT)?.all())),
             Some(AnyHitSpec::Auto) => any_hit::chosen(&rays(&sample::ANY_HIT)?, |any_hit| {
                 self.made(device, mesh, taught.clone(), TaughtTree { any_hit, ..tree.clone() })
@@ -184,6 +186,12 @@ impl Spec {
     }
 }
 
+/// Behind what a builder takes: which take an option.
+fn takers_of(key: &str) -> String {
+    let names: Vec<&str> = BUILDERS.iter().filter(|builder| builder.takes(key)).map(|builder| builder.name).collect();
+    format!("; builders with {key}= are {}", names.join(", "))
+}
+
 impl FromStr for Spec {
     type Err = Error;
 
@@ -200,10 +208,13 @@ impl FromStr for Spec {
                 Error::Argument(format!("builder {text}: option {part:?} has no value; write {part}=VALUE"))
             })?;
             if !builder.takes(key) {
+                let of_others = if key == HEURISTIC.key { takers_of(key) } else { String::new() };
                 let keys: Vec<_> = builder.all_options().map(|option| option.key).collect();
                 let there_are =
                     if keys.is_empty() { "it takes none".into() } else { format!("it takes {}", keys.join(", ")) };
-                return Err(Error::Argument(format!("builder {text}: {name} has no option {key:?}; {there_are}")));
+                return Err(Error::Argument(format!(
+                    "builder {text}: {name} has no option {key:?}; {there_are}{of_others}"
+                )));
             }
             if spec.option(key).is_some() {
                 return Err(Error::Argument(format!("builder {text}: {key} is given twice; give it once")));
@@ -378,6 +389,10 @@ mod tests {
         assert!(error_of("kd-exact:any-hit=sato").contains("no option \"any-hit\""));
         assert!(error_of("sweep:heuristic=best").contains("heuristic=best is unknown; use sah, interior"));
         assert!(error_of("bonsai:heuristic=rdh").contains("bonsai has no option \"heuristic\""));
+        assert!(error_of("lbvh:heuristic=rdh").contains("builders with heuristic= are sweep, binned, sbvh"));
+        assert!(error_of("sweep:heuristic=osah-complete").contains("take sbvh:heuristic=osah-complete"));
+        assert!(error_of("binned:heuristic=srdh:rays=primary").contains("take rays=shadow, ao or shadow+ao"));
+        assert!(error_of("hploc:any-hit=built").contains("no order of children of their own; take any-hit=opaque"));
         assert!(error_of("binned:heuristic=rdh:rays=primary+light").contains("rays=primary+light is unknown; use all"));
         assert!(error_of("binned:heuristic=osah:weight=2").contains("weight=2 is unknown; use a number from 0 to 1"));
         assert!(error_of("sweep:optimise=top-65").contains("optimise=top-65 is unknown; use off"));

@@ -1,6 +1,6 @@
 //! What options there are, and what a [`Spec`] says with them.
 
-use super::host_options::HOST_OPTIMISE;
+use super::host_options::{HEURISTIC, HOST_OPTIMISE};
 use super::plan::{BuilderPlan, DevicePlan, KdSpec};
 use super::table::{BUILDERS, BuilderEntry};
 use super::{BuilderOption, Spec};
@@ -70,7 +70,8 @@ pub(super) const TRACE: BuilderOption = option("trace", "host or device: where r
 pub(super) const ANY_HIT: BuilderOption = option(
     "any-hit",
     "near, or an order of children, the first of which our tracer looks into first for rays that end at any hit: rtsah, sato, \
-     prim-sato, opaque, rays (learned from rays of the scene), or auto: the one with the least work for those rays",
+     prim-sato, opaque, rays (learned from rays of the scene), auto: the one with the least work for those rays, or built: as a heuristic \
+     on the host has them, which is what srdh does unless told otherwise",
 );
 pub(super) const WALK: BuilderOption =
     option("walk", "tracer, or query: rays go through a tree with nodes of two by queries, as in an engine's shader");
@@ -103,7 +104,12 @@ impl Spec {
         if form.is_none() && self.is_opened_by_rays()? {
             return Err(self.wrong_value(&OPEN, "rays"));
         }
-        if form.is_some() && self.any_hit()?.is_some() {
+        let any_hit = self.any_hit()?;
+        if any_hit == Some(AnyHitSpec::Built) {
+            let what = "builders on the device have no order of children of their own; take any-hit=opaque";
+            return Err(Error::Argument(format!("builder {self}: {what}")));
+        }
+        if form.is_some() && any_hit.is_some() {
             let what = "orders of children are for nodes of two; take width=2, or any-hit=near";
             return Err(Error::Argument(format!("builder {self}: {what}")));
         }
@@ -129,10 +135,12 @@ impl Spec {
             ("sato", rule(ChildOrder::LargerBox)),
             ("prim-sato", rule(ChildOrder::LargerPrimitives)),
             ("opaque", rule(ChildOrder::MoreHitsForItsCost)),
+            ("built", Some(AnyHitSpec::Built)),
             ("rays", Some(AnyHitSpec::Rays)),
             ("auto", Some(AnyHitSpec::Auto)),
         ];
-        Ok(self.choice(&ANY_HIT, &all)?.flatten())
+        let of_srdh = (self.option(HEURISTIC.key) == Some("srdh")).then_some(AnyHitSpec::Built);
+        Ok(self.choice(&ANY_HIT, &all)?.unwrap_or(of_srdh))
     }
 
     /// Those of every builder on the device, and `bits` and `treelet`.

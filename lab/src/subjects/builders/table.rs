@@ -1,8 +1,9 @@
 //! The list of all builders.
 
 use super::host_options::{
-    ALPHA, AXES, BATCH, BUDGET, DELTA, EPSILON, HEURISTIC, HOST_BINS, HOST_OPTIMISE, INSERT_ORDER, LEAF, MINI, PRUNE,
-    SAMPLE, SBVH_BINS, SEARCH, TEACHING_RAYS, TERMINATION, TERMINATION_BY, TERMINATION_FLAT, THREADS, WEIGHT,
+    ALPHA, AXES, BATCH, BUDGET, DELTA, EPSILON, HEURISTIC, HEURISTIC_OF_SPLITS, HOST_BINS, HOST_OPTIMISE, INSERT_ORDER,
+    LEAF, MINI, PRUNE, SAMPLE, SBVH_BINS, SEARCH, TEACHING_RAYS, TERMINATION, TERMINATION_BY, TERMINATION_FLAT,
+    THREADS, WEIGHT,
 };
 use super::options::{
     ANY_HIT, BINS, BITS, CODES, COLLAPSE, EXACT, KD_SCHEDULE, KI, KT, OPEN, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE,
@@ -92,6 +93,11 @@ impl BuilderEntry {
         self.all_options().any(|option| option.key == key)
     }
 
+    /// Whether it splits triangles, and its heuristics may know of that.
+    pub(super) fn splits_triangles(&self) -> bool {
+        self.options.iter().any(|option| option.values == HEURISTIC_OF_SPLITS.values)
+    }
+
     /// Whether it builds a BVH on the host; builders of kd-trees there say themselves where rays are traced.
     pub fn builds_bvh_on_host(&self) -> bool {
         self.needs == Needs::Nothing && self.options.iter().all(|option| option.key != TRACE.key)
@@ -171,7 +177,11 @@ pub static BUILDERS: &[BuilderEntry] = &[
         ALPHA,
         BUDGET,
         SBVH_BINS,
-        TERMINATION,
+        HEURISTIC_OF_SPLITS,
+        TEACHING_RAYS,
+        SAMPLE,
+        WEIGHT,
+        TERMINATION_BY,
         COLLAPSE,
         HOST_OPTIMISE,
         THREADS,
