@@ -25,6 +25,7 @@ use super::taught::Taught;
 use crate::device::Device;
 use crate::scene::{Mesh, Scene};
 use crate::{Error, Result};
+use host_options::{HEURISTIC, SAMPLE, TEACHING_RAYS, WEIGHT};
 use options::{RAYS, TRACE, TRAVERSAL};
 pub(crate) use plan::BuilderPlan;
 pub use plan::KdSpec;
@@ -89,7 +90,7 @@ impl Spec {
     /// The device is missing or lacks something, or there is too little memory; the builder learns from a camera or from rays
     /// ([`Spec::make_for`]).
     pub fn make<'a>(&self, device: Option<&'a Device>, mesh: &'a Mesh) -> Result<Box<dyn Subject + 'a>> {
-        self.made(device, mesh, self.heuristic()?.taught(None)?)
+        self.make_taught(device, mesh, self.heuristic()?.taught(None)?)
     }
 
     /// The same on the mesh of a scene, of whose camera and rays it may learn.
@@ -97,10 +98,46 @@ impl Spec {
     /// # Errors
     /// Those of [`Spec::make`].
     pub fn make_for<'a>(&self, device: Option<&'a Device>, scene: &'a Scene) -> Result<Box<dyn Subject + 'a>> {
-        self.made(device, &scene.mesh, self.heuristic()?.taught(Some(scene))?)
+        self.make_taught(device, &scene.mesh, self.heuristic()?.taught(Some(scene))?)
     }
 
-    fn made<'a>(&self, device: Option<&'a Device>, mesh: &'a Mesh, taught: Taught) -> Result<Box<dyn Subject + 'a>> {
+    /// Whether it learns from what a camera sees, so that another view gives another structure.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if an option has a value that the builder does not take.
+    pub fn learns_from_a_view(&self) -> Result<bool> {
+        Ok(self.heuristic()?.learns_from_a_view())
+    }
+
+    /// The same builder by areas alone.
+    pub fn untaught(&self) -> Spec {
+        let teaching = [HEURISTIC.key, TEACHING_RAYS.key, SAMPLE.key, WEIGHT.key];
+        let is_other = |(key, _): &&(String, String)| !teaching.contains(&key.as_str());
+        // Elsewhere `rays` is another option.
+        if !self.builder().takes(HEURISTIC.key) {
+            return self.clone();
+        }
+        Spec { name: self.name.clone(), options: self.options.iter().filter(is_other).cloned().collect() }
+    }
+
+    /// What the camera and the rays of a scene teach it.
+    ///
+    /// # Errors
+    /// The scene has no triangles.
+    pub fn taught_by(&self, scene: &Scene) -> Result<Taught> {
+        self.heuristic()?.taught(Some(scene))
+    }
+
+    /// The subject on a mesh by what it was taught before, be it by another view of the mesh.
+    ///
+    /// # Errors
+    /// Those of [`Spec::make`].
+    pub fn make_taught<'a>(
+        &self,
+        device: Option<&'a Device>,
+        mesh: &'a Mesh,
+        taught: Taught,
+    ) -> Result<Box<dyn Subject + 'a>> {
         let given =
             || device.ok_or_else(|| Error::NoVulkan("this builder works on a device, and none was opened".into()));
         let name = self.to_string();
@@ -237,6 +274,18 @@ mod tests {
         for variant in BUILDERS.iter().flat_map(|b| b.variants) {
             assert_eq!(variant.parse::<Spec>().expect(variant).to_string(), *variant);
         }
+    }
+
+    #[test]
+    fn a_builder_that_learns_has_one_by_areas_beside_it() {
+        let spec = |text: &str| text.parse::<Spec>().expect("known");
+        let taught = spec("binned:axes=all:heuristic=rdh:rays=primary+ao:sample=1000:weight=0.5:bins=10");
+        assert!(taught.learns_from_a_view().expect("checked"));
+        assert_eq!(taught.untaught().to_string(), "binned:axes=all:bins=10");
+        for none in ["binned:axes=all", "sweep:heuristic=interior", "hploc:radius=8", "auto:rays=1e6"] {
+            assert!(!spec(none).learns_from_a_view().expect("checked"), "{none}");
+        }
+        assert_eq!(spec("auto:rays=1e6").untaught(), spec("auto:rays=1e6"));
     }
 
     #[test]
