@@ -8,8 +8,13 @@
 //! - *Ageing.* A tree has lived T frames and has lost Σ by them. If the next T frames go as these did, a rebuild loses Σ again and costs
 //!   its price, and the present tree loses what it loses now in each of them: rebuild where `T · now > price + Σ`. Where losses grow
 //!   evenly, that is the period of least cost. Where they jump at once and stay, it rebuilds in every frame or in none.
-//! - *Surprise.* What a tree loses beyond what trees before it lost at its age goes into a purse, and when the purse holds the price, it
-//!   is spent (ski rental: at most twice what the best would have lost). Without this, a loss that comes late and stays would be borne.
+//!   A tree of one frame has shown nothing yet: there counts what the tree before it lost at that age.
+//! - *Surprise.* What a tree loses beyond what trees before it lost at its age goes into a purse, and when the purse holds the price twice,
+//!   a rebuild is bought (as skis are after renting them). Without this, a loss that comes early and stays would be borne for ever. Twice,
+//!   as the price is sure and what is won is not: flights end, and the loss may be the view's.
+
+/// Prices of a build that must have been lost by surprise before one is bought.
+const SURPRISE: f64 = 2.0;
 
 /// What the sample of a frame says, once the frame is traced.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,8 +63,8 @@ impl GainRule {
     pub fn rebuilds(&self, build_ms: f64) -> bool {
         let Some(last) = self.losses.last() else { return false };
         let lived = self.losses.len();
-        let next_ms = last.max(self.known.get(lived).copied().unwrap_or(0.0)) * self.plain_ms;
-        lived as f64 * next_ms > build_ms + self.lost_ms || self.purse_ms > build_ms
+        let next = if lived == 1 { last.max(self.expected(1)) } else { *last };
+        lived as f64 * next * self.plain_ms > build_ms + self.lost_ms || self.purse_ms > SURPRISE * build_ms
     }
 
     /// Another tree stands from here on.
@@ -148,10 +153,13 @@ mod tests {
             assert!(all[0] as f64 <= 52.0 + build_ms / 20.0, "{build_ms}: {all:?}");
         }
         assert!(rebuilds(200, 4000.0, door).is_empty(), "150 frames do not earn it");
+        // Through a door in frame 3, when a tree has not lived long enough to judge by: after two prices of 95 ms, in ten frames.
+        let early = |frame: usize, built: usize| if built < 3 && frame >= 3 { 0.9 } else { 0.7 };
+        assert_eq!(rebuilds(200, 95.0, early), [13]);
     }
 
     #[test]
-    fn its_total_is_near_that_of_the_best_fixed_cadence() {
+    fn its_total_is_within_a_hundredth_or_two_of_the_best_fixed_cadence_where_ageing_is_even_or_ends() {
         let ageing = |rate: f64| move |frame: usize, built: usize| (0.7 + rate * (frame - built) as f64).min(0.95);
         for rate in [0.0, 0.002, 0.02, 0.2] {
             for build_ms in [1.0, 10.0, 100.0, 1000.0] {
@@ -159,7 +167,7 @@ mod tests {
                 let fixed = |period: usize| of(&(1..48).filter(|frame| frame % period == 0).collect::<Vec<_>>());
                 let best = (1..=48).map(fixed).fold(f64::INFINITY, f64::min);
                 let ours = of(&rebuilds(48, build_ms, ageing(rate)));
-                assert!(ours <= 1.1 * best, "rate {rate}, {build_ms} ms: {ours} against {best}");
+                assert!(ours <= 1.02 * best, "rate {rate}, {build_ms} ms: {ours} against {best}");
             }
         }
     }
