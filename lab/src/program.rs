@@ -9,6 +9,7 @@ use crate::experiments::check::command as check;
 use crate::experiments::choose::command as choose;
 use crate::experiments::compare::command as compare;
 use crate::experiments::cpu_builders::command as cpu_builders;
+use crate::experiments::fly::command as fly;
 use crate::experiments::navigate::command as navigate;
 use crate::experiments::report::command as report;
 use crate::experiments::stability::command as stability;
@@ -34,6 +35,7 @@ enum Command {
     CpuBuilders(cpu_builders::Arguments),
     Accel(accel::Arguments),
     Animate(animate::Arguments),
+    Fly(fly::Arguments),
     Stability(stability::Arguments),
     Choose(choose::Arguments),
     Compare(compare::Arguments),
@@ -80,6 +82,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::CpuBuilders(arguments) => cpu_builders::run(common, arguments),
         Command::Accel(arguments) => accel::run(common, arguments),
         Command::Animate(arguments) => animate::run(common, arguments),
+        Command::Fly(arguments) => fly::run(common, arguments),
         Command::Stability(arguments) => stability::run(common, arguments),
         Command::Choose(arguments) => choose::run(common, arguments),
         Command::Compare(arguments) => compare::run(common, arguments),

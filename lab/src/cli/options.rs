@@ -4,11 +4,11 @@ use super::Bar;
 use crate::device::{Device, DeviceOptions, DriverTracing};
 use crate::rays::kinds::{RayKind, RayOptions};
 use crate::report::names::distinct;
-use crate::scene::{self, Camera, DynamicScene, Scene};
+use crate::scene::{self, Camera, DynamicScene, Flight, Scene};
 use crate::subjects::builders::{self, Spec};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use hedgerow::gpu::TuningChoice;
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -119,6 +119,14 @@ impl Common {
     /// The scene cannot be found, read or used, or nothing in it moves.
     pub fn load_dynamic(&self, spec: &str) -> crate::Result<DynamicScene> {
         self.loaded(spec, scene::load_dynamic)
+    }
+
+    /// Loads a scene with the way of a camera under a progress bar; see [`scene::load_flight`].
+    ///
+    /// # Errors
+    /// The scene cannot be found, read or used; the path cannot be read.
+    pub fn load_flight(&self, spec: &str, path: Option<&Path>) -> crate::Result<Flight> {
+        self.loaded(spec, |spec, options| scene::load_flight(spec, path, options))
     }
 
     fn loaded<T>(
@@ -285,9 +293,64 @@ impl FromStr for Steps {
     }
 }
 
+/// `--frames`: which frames of a scene or path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frames {
+    /// So many, with the first, evenly over all.
+    Spread(NonZeroU32),
+    /// From one to before another.
+    Range(u32, u32),
+}
+
+impl FromStr for Frames {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Frames, String> {
+        let wrong = || format!("{text:?} are no frames; write a number of them, or A..B for those from A to before B");
+        match text.split_once("..") {
+            None => text.parse().map(Frames::Spread).map_err(|_| wrong()),
+            Some((from, to)) => match (from.parse(), to.parse()) {
+                (Ok(from), Ok(to)) if from < to => Ok(Frames::Range(from, to)),
+                _ => Err(wrong()),
+            },
+        }
+    }
+}
+
+impl Frames {
+    /// Those of a scene or path of this name that has `count`.
+    ///
+    /// # Errors
+    /// It has fewer.
+    pub fn of(self, name: &str, count: u32) -> crate::Result<Vec<u32>> {
+        match self {
+            Frames::Spread(some) => {
+                let some = some.get().min(count);
+                Ok((0..some).map(|i| (u64::from(i) * u64::from(count) / u64::from(some)) as u32).collect())
+            }
+            Frames::Range(from, to) if to <= count => Ok((from..to).collect()),
+            Frames::Range(from, to) => {
+                let what = format!("{name} has {count}, counted from 0; end at {count} or before");
+                Err(crate::Error::Argument(format!("--frames {from}..{to}: {what}")))
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn frames_are_a_number_or_a_range() {
+        assert_eq!("7".parse(), Ok(Frames::Spread(NonZeroU32::new(7).expect("not 0"))));
+        assert_eq!("3..9".parse(), Ok(Frames::Range(3, 9)));
+        for wrong in ["", "0", "9..3", "4..4", "1..", "a..b", "-1"] {
+            assert!(wrong.parse::<Frames>().is_err(), "{wrong}");
+        }
+        assert_eq!(Frames::Range(3, 5).of("hop", 6).expect("there are"), [3, 4]);
+        assert_eq!("3".parse::<Frames>().expect("three").of("hop", 6).expect("there are"), [0, 2, 4]);
+    }
 
     #[test]
     fn a_point_is_three_finite_numbers() {

@@ -7,6 +7,7 @@ pub mod check;
 pub mod choose;
 pub mod compare;
 pub mod cpu_builders;
+pub mod fly;
 pub mod navigate;
 pub mod report;
 pub mod stability;
@@ -28,6 +29,9 @@ pub fn write_pages(folder: &Path) -> Result<()> {
     }
     if beside::ANIMATE.is_in(folder) {
         animate::page::write(folder)?;
+    }
+    if beside::FLY.is_in(folder) {
+        fly::page::write(folder)?;
     }
     stability::page::write_all(folder)
 }

@@ -27,12 +27,15 @@ pub const DEGENERATE: Page = Page { records: "degenerate.jsonl", file: "degenera
 /// `hedgerow animate`.
 pub const ANIMATE: Page = Page { records: "animate.jsonl", file: "animate.html", name: "Moving scenes" };
 
+/// `hedgerow fly`.
+pub const FLY: Page = Page { records: "fly.jsonl", file: "fly.html", name: "Camera paths" };
+
 /// `hedgerow cpu-builders`.
 pub const CPU_BUILDERS: Page =
     Page { records: "cpu-builders.jsonl", file: "cpu-builders.html", name: "Builders on the CPU" };
 
 /// All of them.
-pub const ALL: [Page; 7] = [INDEX, CPU_BUILDERS, ACCEL, ANIMATE, GROWTH, LARGE, DEGENERATE];
+pub const ALL: [Page; 8] = [INDEX, CPU_BUILDERS, ACCEL, ANIMATE, FLY, GROWTH, LARGE, DEGENERATE];
 
 impl Page {
     /// What files of it begin with.

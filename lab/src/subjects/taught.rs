@@ -88,6 +88,11 @@ pub enum Taught {
 }
 
 impl HeuristicSpec {
+    /// Whether it learns from what a camera sees, so that another view teaches otherwise.
+    pub fn learns_from_a_view(&self) -> bool {
+        !matches!(self, HeuristicSpec::Sah | HeuristicSpec::Interior(_))
+    }
+
     /// With the camera and the rays of `scene`; `None` where there is nothing but a mesh.
     ///
     /// # Errors
@@ -131,6 +136,16 @@ fn rays_of(rays: CameraRays, scene: &Scene) -> PreferredRays {
 }
 
 impl Taught {
+    /// How many rays taught it, where they do one by one.
+    pub fn rays(&self) -> Option<u64> {
+        if let Taught::Rays(segments, _) = self { Some(segments.len() as u64) } else { None }
+    }
+
+    /// How many triangles were seen, where that is what it learns.
+    pub fn seen(&self) -> Option<u64> {
+        if let Taught::Seen(seen, _) = self { Some(seen.iter().filter(|&&seen| seen).count() as u64) } else { None }
+    }
+
     /// What the builder takes.
     pub fn heuristic(&self) -> Heuristic<'_> {
         match self {

@@ -14,6 +14,7 @@ mod bvh_growth;
 mod bvh_reference_costs;
 mod cli;
 mod driver;
+mod flights;
 mod navigate;
 mod report_accel;
 mod report_animate;
@@ -32,6 +33,7 @@ fn main() -> std::process::ExitCode {
         ("bvh_reference_costs", bvh_reference_costs::tests()),
         ("cli", cli::tests()),
         ("driver", driver::tests()),
+        ("flights", flights::tests()),
         ("navigate", navigate::tests()),
         ("report_accel", report_accel::tests()),
         ("report_animate", report_animate::tests()),

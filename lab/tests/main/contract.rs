@@ -3,7 +3,7 @@
 use std::process::Command;
 
 /// Each command with its options that are relied on.
-const COMMANDS: [(&str, &[&str]); 15] = [
+const COMMANDS: [(&str, &[&str]); 16] = [
     ("devices", &["--json"]),
     ("build", &["--builder", "--json", "--output", "--runs", "--costs", "--epo"]),
     ("trace", &["--builder", "--rays", "--size", "--json", "--rays-file", "--hits-file", "--any-hit"]),
@@ -17,6 +17,7 @@ const COMMANDS: [(&str, &[&str]); 15] = [
     ("report", &["--output", "--markdown"]),
     ("accel", &["--output"]),
     ("animate", &["--output"]),
+    ("fly", &["--builder", "--cadence", "--output"]),
     ("navigate", &["--output"]),
     ("choose", &["--rays-per-build", "--recalibrate", "--hindsight"]),
 ];

@@ -13,6 +13,7 @@ mod choose;
 mod contract;
 mod cpu_builders;
 mod cpu_peers;
+mod fly;
 mod gpu_division;
 mod gpu_task_pool;
 mod host_records;

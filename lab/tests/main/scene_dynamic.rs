@@ -63,6 +63,26 @@ fn objects_are_moved_turned_and_scaled_between_their_keys() {
 }
 
 #[test]
+fn a_smooth_camera_goes_along_curves_and_is_as_long_up() {
+    let text = |camera: &str| {
+        let camera = format!(
+            "{camera}\n at 0 eye 0 0 5 look 0 0 0 up 0 2 0 fov 40\n at 1 eye 2 0 5 look 1 0 0\n at 2 eye 2 0 9 look 2 0 0 fov 60\n"
+        );
+        scene_of(&format!("frames 4\nseconds 2\nstatic triangle.obj\n{camera}"))
+    };
+    let (smooth, straight) = (text("camera smooth"), text("camera"));
+    for time in [0.0, 1.0, 1.999_999_9] {
+        assert!(is_near(&[smooth.camera(time).eye], &[straight.camera(time).eye]), "both meet the keys");
+    }
+    // Tangents (2, 0, 0) and (1, 0, 2); half-way (1, 0, 5) + ((2, 0, 0) − (1, 0, 2)) / 8.
+    assert!(is_near(&[smooth.camera(0.5).eye], &[[1.125, 0.0, 4.75]]), "{:?}", smooth.camera(0.5));
+    assert_eq!(straight.camera(0.5).eye, [1.0, 0.0, 5.0]);
+    // The look goes in equal steps, the angle evenly all the time, and up has the length of 1.
+    assert!(is_near(&[smooth.camera(0.5).look], &[[0.5, 0.0, 0.0]]));
+    assert_eq!((smooth.camera(0.5).fov, smooth.camera(0.5).up), (45.0, [0.0, 1.0, 0.0]));
+}
+
+#[test]
 fn a_part_of_a_key_goes_from_the_last_that_names_it_to_the_next() {
     let scene = scene_of(
         "frames 1\nseconds 4\nobject t triangle.obj\n at 0 move 0 0 0\n at 1 scale 1\n at 2 scale 3 2 1\n at 4 move 8 0 0\n",
@@ -231,7 +251,7 @@ fn wrong_lines_are_told_with_their_number() {
         ("static", ":4: static names no scene"),
         ("object ball", ":4: an object is a name and a scene"),
         ("object t square.obj", ":4: the object of line 3 is called \"t\", too"),
-        ("camera now", ":4: \"now\" behind camera"),
+        ("camera now", ":4: \"now\" behind camera; its keys are lines of their own; smooth alone may stand there"),
         ("camera", ":4: a camera without keys"),
         ("camera\nat 0 eye 0 0 1 look 0 0 0\ncamera", ":6: camera stands in line 4 already"),
         ("camera\nat 0 look 0 0 0", ":5: no key of the camera says its eye"),

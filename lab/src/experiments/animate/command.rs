@@ -1,7 +1,7 @@
 //! `hedgerow animate`: a dynamic scene frame by frame in each of the ways; records as they are measured, pictures, and a page.
 
 use crate::Error;
-use crate::cli::options::{Kinds, Size};
+use crate::cli::options::{Frames, Kinds, Size};
 use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::animate::page::{self, Points, standings};
@@ -16,7 +16,6 @@ use ash::vk;
 use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 /// Build and trace a scene that moves, frame by frame in each of five ways (all anew, a static and a dynamic tree, a tree per
 /// object, two levels, merging into the static tree and restoring it), and write records, a page, and the frames as PNG
@@ -59,47 +58,6 @@ pub struct Arguments {
     output: PathBuf,
 }
 
-/// `--frames`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Frames {
-    /// So many, with the first, evenly over all.
-    Spread(NonZeroU32),
-    /// From one to before another.
-    Range(u32, u32),
-}
-
-impl FromStr for Frames {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Frames, String> {
-        let wrong = || format!("{text:?} are no frames; write a number of them, or A..B for those from A to before B");
-        match text.split_once("..") {
-            None => text.parse().map(Frames::Spread).map_err(|_| wrong()),
-            Some((from, to)) => match (from.parse(), to.parse()) {
-                (Ok(from), Ok(to)) if from < to => Ok(Frames::Range(from, to)),
-                _ => Err(wrong()),
-            },
-        }
-    }
-}
-
-impl Frames {
-    fn of(self, scene: &DynamicScene) -> crate::Result<Vec<u32>> {
-        let count = scene.frames;
-        match self {
-            Frames::Spread(some) => {
-                let some = some.get().min(count);
-                Ok((0..some).map(|i| (u64::from(i) * u64::from(count) / u64::from(some)) as u32).collect())
-            }
-            Frames::Range(from, to) if to <= count => Ok((from..to).collect()),
-            Frames::Range(from, to) => {
-                let what = format!("{} has {count}, counted from 0; end at {count} or before", scene.name);
-                Err(Error::Argument(format!("--frames {from}..{to}: {what}")))
-            }
-        }
-    }
-}
-
 fn on_or_off(text: &str) -> Result<bool, String> {
     match text {
         "on" => Ok(true),
@@ -127,7 +85,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
             "only its camera moves, so that there is nothing to build every frame; take a scene with objects that move";
         return Err(Error::Scene(format!("{}: {what}", scene.name)).into());
     }
-    let frames = arguments.frames.of(&scene)?;
+    let frames = arguments.frames.of(&scene.name, scene.frames)?;
     let device = match work::device_for(common, std::slice::from_ref(&arguments.builder))? {
         None if arguments.ways.contains(&AnimationMethod::TwoLevel) => Some(common.open_device(false)?),
         device => device,
@@ -216,18 +174,4 @@ fn setting(
         static_builder: arguments.static_builder.to_string(),
         pictures,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_are_a_number_or_a_range() {
-        assert_eq!("7".parse(), Ok(Frames::Spread(NonZeroU32::new(7).expect("not 0"))));
-        assert_eq!("3..9".parse(), Ok(Frames::Range(3, 9)));
-        for wrong in ["", "0", "9..3", "4..4", "1..", "a..b", "-1"] {
-            assert!(wrong.parse::<Frames>().is_err(), "{wrong}");
-        }
-    }
 }

@@ -1,8 +1,8 @@
 //! Where to look from at any time.
 
-use super::looped;
 use super::motion::Motion;
 use super::track::Track;
+use super::{looped, smooth};
 use crate::scene::Camera;
 use glam::Vec3;
 
@@ -18,12 +18,25 @@ pub(in crate::scene) enum CameraPath {
 }
 
 impl CameraPath {
+    /// Along curves through these eyes and looks at these times, the last of which is when it begins again; the rest as `still` has it.
+    pub fn smooth(times: &[f32], (eyes, looks): (Vec<[f32; 3]>, Vec<[f32; 3]>), still: Camera) -> CameraPath {
+        let curve = |points: &[[f32; 3]]| Track::new(times.to_vec(), smooth::catmull_rom(times, points));
+        CameraPath::Keys {
+            eye: curve(&eyes),
+            look: curve(&looks),
+            up: Track::still(still.up),
+            fov: Track::still(still.fov),
+            seconds: times[times.len() - 1],
+        }
+    }
+
     pub fn at(&self, time: f32) -> Camera {
         match self {
             CameraPath::Still(camera) => *camera,
             CameraPath::Keys { eye, look, up, fov, seconds } => {
                 let time = looped(time, *seconds);
-                Camera { eye: eye.at(time), look: look.at(time), up: up.at(time), fov: fov.at(time) }
+                let up = Vec3::from(up.at(time)).normalize_or(Vec3::Y).into();
+                Camera { eye: eye.at(time), look: look.at(time), up, fov: fov.at(time) }
             }
             CameraPath::Carried { motion, fov } => carried(&motion.at(time), *fov),
         }

@@ -65,7 +65,8 @@ fn is_somewhere(object: &DynamicObject, time: f32) -> bool {
     mesh.is_empty() || lo.into_iter().chain(hi).all(f32::is_finite)
 }
 
-fn looks_somewhere(camera: &Camera) -> bool {
+/// It has a place, a direction, and an angle that a picture can have.
+pub(in crate::scene) fn looks_somewhere(camera: &Camera) -> bool {
     let Camera { eye, look, fov, .. } = camera;
     eye.iter().chain(look).all(|c| c.is_finite()) && eye != look && *fov > 0.0 && *fov < 180.0
 }

@@ -14,6 +14,7 @@ mod content;
 mod motion;
 mod rotation;
 mod shape;
+mod smooth;
 mod text;
 mod track;
 
@@ -25,11 +26,11 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 pub(super) use camera::{CameraPath, carried, eye_and_backwards};
-pub(super) use content::DynamicContent;
+pub(super) use content::{DynamicContent, looks_somewhere};
 pub(super) use motion::{Motion, Pose, Step, rows};
 pub(super) use rotation::Rotation;
 pub(super) use shape::{Shape, morphed};
-pub(super) use text::read;
+pub(super) use text::{Flown, read, read_path};
 pub(super) use track::{Keys, Track, Value};
 
 /// A scene of which parts move, over and over.
@@ -169,7 +170,7 @@ fn looped(time: f32, seconds: f32) -> f32 {
 }
 
 /// The time of a frame, from the number of frames and the seconds that they cover.
-fn time_of(frame: u32, frames: u32, seconds: f32) -> f32 {
+pub(super) fn time_of(frame: u32, frames: u32, seconds: f32) -> f32 {
     seconds * frame as f32 / frames as f32
 }
 

@@ -28,8 +28,8 @@ use crate::rays::kinds::RayKind;
 use crate::rays::sample::{self, TeachingRays};
 use crate::scene::{Mesh, Scene};
 use crate::{Error, Result};
-use host_options::HEURISTIC;
-use options::{RAYS, TRACE, TRAVERSAL};
+use host_options::{HEURISTIC, SAMPLE, TEACHING_RAYS, WEIGHT};
+use options::{ANY_HIT, OPEN, RAYS, TRACE, TRAVERSAL};
 pub use plan::KdSpec;
 pub(crate) use plan::{BuilderPlan, TaughtTree};
 use std::fmt;
@@ -94,7 +94,7 @@ impl Spec {
     /// The device is missing or lacks something, or there is too little memory; the builder learns from a camera or from rays
     /// ([`Spec::make_for`]).
     pub fn make<'a>(&self, device: Option<&'a Device>, mesh: &'a Mesh) -> Result<Box<dyn Subject + 'a>> {
-        self.made_of(device, mesh, None)
+        self.make_taught(device, mesh, self.lessons(device, mesh, None)?)
     }
 
     /// The same on the mesh of a scene, of whose camera and rays it may learn.
@@ -102,17 +102,42 @@ impl Spec {
     /// # Errors
     /// Those of [`Spec::make`].
     pub fn make_for<'a>(&self, device: Option<&'a Device>, scene: &'a Scene) -> Result<Box<dyn Subject + 'a>> {
-        self.made_of(device, &scene.mesh, Some(scene))
+        self.make_taught(device, &scene.mesh, self.taught_by(device, scene)?)
     }
 
-    /// With the rays of the scene that teach an order of children, where some do.
-    fn made_of<'a>(
-        &self,
-        device: Option<&'a Device>,
-        mesh: &'a Mesh,
-        scene: Option<&'a Scene>,
-    ) -> Result<Box<dyn Subject + 'a>> {
-        let taught = self.heuristic()?.taught(scene)?;
+    /// Whether it learns from what a camera sees, so that another view gives another structure.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if an option has a value that the builder does not take.
+    pub fn learns_from_a_view(&self) -> Result<bool> {
+        let has_taught_order = matches!(self.any_hit()?, Some(AnyHitSpec::Rays | AnyHitSpec::Auto));
+        Ok(self.heuristic()?.learns_from_a_view() || has_taught_order || self.is_opened_by_rays()?)
+    }
+
+    /// The same builder by areas alone.
+    pub fn untaught(&self) -> Spec {
+        // Where no heuristic can be chosen, `rays` is another option.
+        let of_heuristics = match self.builder().takes(HEURISTIC.key) {
+            true => &[HEURISTIC.key, TEACHING_RAYS.key, SAMPLE.key, WEIGHT.key][..],
+            false => &[],
+        };
+        let teaches = |key: &str, value: &str| {
+            of_heuristics.contains(&key) || [ANY_HIT.key, OPEN.key].contains(&key) && ["rays", "auto"].contains(&value)
+        };
+        let options = self.options.iter().filter(|(key, value)| !teaches(key, value)).cloned().collect();
+        Spec { name: self.name.clone(), options }
+    }
+
+    /// What the camera and the rays of a scene teach it.
+    ///
+    /// # Errors
+    /// The scene has no triangles; the device lacks something.
+    pub fn taught_by(&self, device: Option<&Device>, scene: &Scene) -> Result<Lessons> {
+        self.lessons(device, &scene.mesh, Some(scene))
+    }
+
+    fn lessons(&self, device: Option<&Device>, mesh: &Mesh, scene: Option<&Scene>) -> Result<Lessons> {
+        let heuristic = self.heuristic()?.taught(scene)?;
         let rays = |kinds: &[RayKind]| {
             let what = "it learns from rays, and there is only a mesh here; take bench, build, trace or render, or any-hit=opaque and \
                         open=area";
@@ -130,25 +155,29 @@ impl Spec {
             Some(AnyHitSpec::Built) => ordered(ChildrenBy::Built),
             Some(AnyHitSpec::Rays) => ordered(ChildrenBy::Rays(rays(&sample::ANY_HIT)?.all())),
             Some(AnyHitSpec::Auto) => any_hit::chosen(&rays(&sample::ANY_HIT)?, |any_hit| {
-                self.made(device, mesh, taught.clone(), TaughtTree { any_hit, ..tree.clone() })
+                let lessons = Lessons { heuristic: heuristic.clone(), tree: TaughtTree { any_hit, ..tree.clone() } };
+                self.make_taught(device, mesh, lessons)
             })?,
         };
-        self.made(device, mesh, taught, tree)
+        Ok(Lessons { heuristic, tree })
     }
 
-    fn made<'a>(
+    /// The subject on a mesh by what it was taught before, be it by another view of the mesh.
+    ///
+    /// # Errors
+    /// Those of [`Spec::make`].
+    pub fn make_taught<'a>(
         &self,
         device: Option<&'a Device>,
         mesh: &'a Mesh,
-        taught: Taught,
-        tree: TaughtTree,
+        Lessons { heuristic, tree }: Lessons,
     ) -> Result<Box<dyn Subject + 'a>> {
         let given =
             || device.ok_or_else(|| Error::NoVulkan("this builder works on a device, and none was opened".into()));
         let name = self.to_string();
         let subject: Box<dyn Subject + 'a> = match self.plan()? {
             BuilderPlan::Device(plan) => Box::new(plan.make(given()?, &name, mesh, &tree)?),
-            BuilderPlan::Host(plan) => Box::new(Host::new(&name, mesh, plan, taught)?),
+            BuilderPlan::Host(plan) => Box::new(Host::new(&name, mesh, plan, heuristic)?),
             BuilderPlan::Kd(KdSpec::Host { options, traversal, traces_on_device }) => {
                 let rays = match traces_on_device {
                     false => KdRays::on_host(traversal),
@@ -184,6 +213,13 @@ impl Spec {
         let names: Vec<&str> = BUILDERS.iter().filter(|b| b.takes(TRAVERSAL.key)).map(|b| b.name).collect();
         Err(Error::Argument(format!("{self} builds no kd-trees; take {}", names.join(", "))))
     }
+}
+
+/// What a scene has taught a builder.
+#[derive(Debug, Clone)]
+pub struct Lessons {
+    heuristic: Taught,
+    tree: TaughtTree,
 }
 
 /// Behind what a builder takes: which take an option.
@@ -287,6 +323,18 @@ mod tests {
         for variant in BUILDERS.iter().flat_map(|b| b.variants) {
             assert_eq!(variant.parse::<Spec>().expect(variant).to_string(), *variant);
         }
+    }
+
+    #[test]
+    fn a_builder_that_learns_has_one_by_areas_beside_it() {
+        let spec = |text: &str| text.parse::<Spec>().expect("known");
+        let taught = spec("binned:axes=all:heuristic=rdh:rays=primary+ao:sample=1000:weight=0.5:bins=10");
+        assert!(taught.learns_from_a_view().expect("checked"));
+        assert_eq!(taught.untaught().to_string(), "binned:axes=all:bins=10");
+        for none in ["binned:axes=all", "sweep:heuristic=interior", "hploc:radius=8", "auto:rays=1e6"] {
+            assert!(!spec(none).learns_from_a_view().expect("checked"), "{none}");
+        }
+        assert_eq!(spec("auto:rays=1e6").untaught(), spec("auto:rays=1e6"));
     }
 
     #[test]

@@ -15,8 +15,25 @@ pub(super) struct Lines {
     pub seconds: f32,
     pub static_scene: Option<OfLine<String>>,
     pub objects: Vec<Object>,
-    /// One or more, if there is a camera.
-    pub camera: Option<Vec<Key>>,
+    pub camera: Option<CameraKeys>,
+}
+
+/// The keys of a camera.
+#[derive(Debug)]
+pub(super) struct CameraKeys {
+    /// How it goes from key to key.
+    pub way: Way,
+    /// One or more.
+    pub keys: Vec<Key>,
+}
+
+/// How a camera goes from key to key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// Straight, with a corner at each key.
+    Straight,
+    /// Along a curve.
+    Smooth,
 }
 
 /// The line that says something, and what it says.
@@ -77,7 +94,7 @@ struct Reading {
     seconds: Option<OfLine<f32>>,
     static_scene: Option<OfLine<String>>,
     objects: Vec<Object>,
-    camera: Option<OfLine<Vec<Key>>>,
+    camera: Option<OfLine<CameraKeys>>,
     above: Above,
 }
 
@@ -131,10 +148,17 @@ impl Reading {
                 self.objects.push(Object { name: name.into(), scene, cycle: None, keys: Vec::new() });
                 Ok(())
             }
-            "camera" if !rest.is_empty() => Err(format!("{rest:?} behind camera; its keys are lines of their own")),
             "camera" => {
+                let way = match rest {
+                    "" => Way::Straight,
+                    "smooth" => Way::Smooth,
+                    _ => {
+                        let what = "its keys are lines of their own; smooth alone may stand there";
+                        return Err(format!("{rest:?} behind camera; {what}"));
+                    }
+                };
                 self.above = Above::Camera;
-                once(&mut self.camera, line, Vec::new(), "camera")
+                once(&mut self.camera, line, CameraKeys { way, keys: Vec::new() }, "camera")
             }
             "cycle" => match (self.above, self.objects.last_mut()) {
                 (Above::Object, Some(object)) => once(&mut object.cycle, line, duration(rest)?, "cycle"),
@@ -143,7 +167,7 @@ impl Reading {
             "at" => {
                 let (parts, keys) = match (self.above, self.objects.last_mut(), &mut self.camera) {
                     (Above::Object, Some(object), _) => (&OF_OBJECTS, &mut object.keys),
-                    (Above::Camera, _, Some((_, keys))) => (&OF_CAMERAS, keys),
+                    (Above::Camera, _, Some((_, camera))) => (&OF_CAMERAS, &mut camera.keys),
                     _ => return Err("a key of nothing; write it below the object or camera that it is of".into()),
                 };
                 let key = key(line, rest, parts)?;
@@ -165,11 +189,12 @@ impl Reading {
         let missing = |what: &str| (None, format!("does not say its {what}; write a line as in {what} 24"));
         let (_, frames) = self.frames.ok_or_else(|| missing("frames"))?;
         let (_, seconds) = self.seconds.ok_or_else(|| missing("seconds"))?;
-        if let Some((line, _)) = self.camera.as_ref().filter(|(_, keys)| keys.is_empty()) {
+        if let Some((line, _)) = self.camera.as_ref().filter(|(_, camera)| camera.keys.is_empty()) {
             return Err((Some(*line), "a camera without keys; write them as in at 0 eye 0 1 5 look 0 0 0".into()));
         }
-        let camera = self.camera.map(|(_, keys)| keys);
-        let keys = self.objects.iter().flat_map(|object| &object.keys).chain(camera.iter().flatten());
+        let camera = self.camera.map(|(_, camera)| camera);
+        let of_camera = camera.iter().flat_map(|camera| &camera.keys);
+        let keys = self.objects.iter().flat_map(|object| &object.keys).chain(of_camera);
         if let Some(key) = keys.into_iter().find(|key| key.time > seconds) {
             let what = format!("a key at {} s, the scene begins again after {seconds}; take an earlier time", key.time);
             return Err((Some(key.line), what));

@@ -6,11 +6,12 @@ mod lines;
 
 use super::{
     CameraPath, DynamicContent, DynamicObject, DynamicScene, Keys, Motion, Pose, Rotation, Shape, Step, Track, Value,
+    smooth,
 };
 use crate::scene::check::malformed;
 use crate::scene::{self, Animation, LoadOptions, Mesh, Scene, lookup, source};
 use crate::{Error, Result};
-use lines::{Key, Lines, OfLine};
+use lines::{CameraKeys, Key, Lines, OfLine, Way};
 use std::path::Path;
 
 /// Reads a `.dyn` file and the scenes that it names.
@@ -30,7 +31,7 @@ pub(in crate::scene) fn read(path: &Path, options: &LoadOptions<'_>) -> Result<D
     }
     content.objects = lines.objects.iter().map(|object| file.object(object)).collect::<Result<_>>()?;
     if let Some(keys) = lines.camera {
-        content.camera = Some(file.camera(&keys)?);
+        content.camera = Some(camera(path, seconds, &keys)?);
     }
     content.into_scene(path)
 }
@@ -104,29 +105,72 @@ impl File<'_> {
         };
         Ok(DynamicObject { name, triangles, shape, motion: Motion::new(vec![Step::Moving(pose)], self.seconds) })
     }
+}
 
-    fn camera(&self, keys: &[Key]) -> Result<CameraPath> {
-        let point = |n: &[f32]| [n[0], n[1], n[2]];
-        let needed = |name: &str| {
-            track(keys, name, point).ok_or_else(|| {
-                let what = format_args!("no key of the camera says its {name}; write it as in {name} 0 1 5");
-                malformed(self.place(keys[0].line), what)
-            })
-        };
-        Ok(CameraPath::Keys {
-            eye: needed("eye")?,
-            look: needed("look")?,
-            up: track(keys, "up", point).unwrap_or_else(|| Track::still([0.0, 1.0, 0.0])),
-            fov: track(keys, "fov", |n| n[0]).unwrap_or_else(|| Track::still(lines::FOV)),
-            seconds: self.seconds,
+/// The camera of a file that begins again after `seconds`.
+fn camera(path: &Path, seconds: f32, camera: &CameraKeys) -> Result<CameraPath> {
+    let keys = &camera.keys;
+    let points = |part: &str| match camera.way {
+        Way::Straight => track(keys, part, point),
+        Way::Smooth => curve(keys, part),
+    };
+    let needed = |name: &str| {
+        points(name).ok_or_else(|| {
+            let what = format_args!("no key of the camera says its {name}; write it as in {name} 0 1 5");
+            malformed(format_args!("{}:{}", path.display(), keys[0].line), what)
         })
+    };
+    Ok(CameraPath::Keys {
+        eye: needed("eye")?,
+        look: needed("look")?,
+        up: points("up").unwrap_or_else(|| Track::still([0.0, 1.0, 0.0])),
+        fov: track(keys, "fov", |n| n[0]).unwrap_or_else(|| Track::still(lines::FOV)),
+        seconds,
+    })
+}
+
+fn point(numbers: &[f32]) -> [f32; 3] {
+    [numbers[0], numbers[1], numbers[2]]
+}
+
+/// A camera's way with the frames that it is shown in, apart from any scene.
+#[derive(Debug, Clone)]
+pub(in crate::scene) struct Flown {
+    pub camera: CameraPath,
+    pub frames: u32,
+    pub seconds: f32,
+}
+
+/// Reads the text of a camera's path: `frames`, `seconds` and `camera` with its keys, as in a `.dyn` file. `path` is where it stands,
+/// for messages.
+pub(in crate::scene) fn read_path(path: &Path, text: &str) -> Result<Flown> {
+    let lines = Lines::read(path, text)?;
+    let Lines { frames, seconds, .. } = lines;
+    let wrong = |line: usize, what: &str| malformed(format_args!("{}:{line}", path.display()), what);
+    let placed = lines.static_scene.iter().map(|(line, _)| *line).chain(lines.objects.iter().map(|o| o.scene.0));
+    if let Some(line) = placed.min() {
+        return Err(wrong(
+            line,
+            "a path has a camera and nothing else; remove the line, or name the file as the scene",
+        ));
     }
+    let Some(keys) = lines.camera else {
+        return Err(malformed(path.display(), "no camera; write a line camera smooth with keys below"));
+    };
+    Ok(Flown { camera: camera(path, seconds, &keys)?, frames, seconds })
 }
 
 /// The keys that name a part, straight from each to the next; `None` if none does.
 fn track<V: Value>(keys: &[Key], part: &str, value: impl Fn(&[f32]) -> V) -> Option<Track<V>> {
     let keys: Vec<(f32, V)> = keys.iter().filter_map(|key| Some((key.time, value(key.part(part)?)))).collect();
     (!keys.is_empty()).then(|| of(keys))
+}
+
+/// The keys that name a part, along a curve; `None` if none does.
+fn curve(keys: &[Key], part: &str) -> Option<Track<[f32; 3]>> {
+    let (times, points): (Vec<f32>, Vec<[f32; 3]>) =
+        keys.iter().filter_map(|key| Some((key.time, point(key.part(part)?)))).unzip();
+    (!times.is_empty()).then(|| Track::new(times.clone(), smooth::catmull_rom(&times, &points)))
 }
 
 fn of<V: Value>(keys: Vec<(f32, V)>) -> Track<V> {
