@@ -31,8 +31,11 @@ pub const ANIMATE: Page = Page { records: "animate.jsonl", file: "animate.html",
 pub const CPU_BUILDERS: Page =
     Page { records: "cpu-builders.jsonl", file: "cpu-builders.html", name: "Builders on the CPU" };
 
+/// `hedgerow predict`.
+pub const PREDICT: Page = Page { records: "predict.jsonl", file: "predict.html", name: "What predicts tracing" };
+
 /// All of them.
-pub const ALL: [Page; 7] = [INDEX, CPU_BUILDERS, ACCEL, ANIMATE, GROWTH, LARGE, DEGENERATE];
+pub const ALL: [Page; 8] = [INDEX, CPU_BUILDERS, PREDICT, ACCEL, ANIMATE, GROWTH, LARGE, DEGENERATE];
 
 impl Page {
     /// What files of it begin with.

@@ -17,6 +17,7 @@ use hedgerow::bvh::twin::quality;
 use hedgerow::gpu::Phase;
 use hedgerow::trace::twin::tracer as on_host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
+use std::rc::Rc;
 
 /// Where our tracer works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,12 +33,12 @@ enum Source<'a> {
     /// A builder, which builds again whenever it is asked.
     Builder(Box<dyn Subject + 'a>),
     /// Somebody who has built one already.
-    Tree(Bvh2),
+    Tree(Rc<Bvh2>),
 }
 
 /// What takes rays through them.
 enum Tracing<'a> {
-    Host { tree: Option<Bvh2>, rays: HostRays },
+    Host { tree: Option<Rc<Bvh2>>, rays: HostRays },
     Device { device: &'a Device, tree: Option<Buffer<'a>>, rays: Box<DeviceRays<'a>> },
 }
 
@@ -67,11 +68,11 @@ impl<'a> Retraced<'a> {
         Ok(Retraced { child_order, ..Retraced::new(builder, Source::Builder(subject), device)? })
     }
 
-    /// A tree that is there already: it cannot be built again.
+    /// A tree that is there already: it cannot be built again. On the host it is not copied.
     ///
     /// # Errors
     /// The device failed.
-    pub fn of_tree(builder: &str, tree: Bvh2, device: Option<&'a Device>) -> Result<Retraced<'a>> {
+    pub fn of_tree(builder: &str, tree: Rc<Bvh2>, device: Option<&'a Device>) -> Result<Retraced<'a>> {
         Retraced::new(builder, Source::Tree(tree), device)
     }
 
@@ -83,9 +84,13 @@ impl<'a> Retraced<'a> {
         Ok(Retraced { builder: builder.to_owned(), source, tracing, child_order: None, ordered: None })
     }
 
-    /// A copy of the tree that is traced. It holds together: one that does not might be walked without end.
-    fn sound_tree(&mut self) -> Result<Bvh2> {
-        let tree = self.tree()?.ok_or_else(|| {
+    /// The tree that is traced. It holds together: one that does not might be walked without end.
+    fn sound_tree(&mut self) -> Result<Rc<Bvh2>> {
+        let tree = match &self.source {
+            Source::Tree(tree) => Some(Rc::clone(tree)),
+            Source::Builder(_) => self.tree()?.map(Rc::new),
+        };
+        let tree = tree.ok_or_else(|| {
             let what = "the builder does not show its tree, so that our tracer has none; leave trace= out";
             Error::Argument(format!("{}: {what}", self.builder))
         })?;
@@ -173,14 +178,14 @@ impl Subject for Retraced<'_> {
         match &mut self.source {
             Source::Builder(_) if self.ordered.is_some() => Ok(self.ordered.clone()),
             Source::Builder(subject) => subject.tree(),
-            Source::Tree(tree) => Ok(Some(tree.clone())),
+            Source::Tree(tree) => Ok(Some(Bvh2::clone(tree))),
         }
     }
 
     fn outcome(&mut self) -> Result<Option<Outcome>> {
         match &mut self.source {
             Source::Builder(subject) => subject.outcome(),
-            Source::Tree(Bvh2 { header, .. }) => Ok(Some(Outcome { active: header.active, status: header.status })),
+            Source::Tree(tree) => Ok(Some(Outcome { active: tree.header.active, status: tree.header.status })),
         }
     }
 
@@ -279,7 +284,7 @@ mod tests {
         assert_eq!(again.hits_of(&rays(), query).expect("traced"), hits);
         assert_eq!(again.work(query).expect("counted"), own.work(query).expect("counted"));
         let tree = own.tree().expect("read").expect("a BVH");
-        let mut given = Retraced::of_tree("sweep:trace=host", tree, None).expect("no device");
+        let mut given = Retraced::of_tree("sweep:trace=host", Rc::new(tree), None).expect("no device");
         assert_eq!(given.hits_of(&rays(), query).expect("traced"), hits);
         assert!(given.build().expect_err("it has no builder").to_string().contains("came from elsewhere"));
     }

@@ -3,7 +3,7 @@
 use std::process::Command;
 
 /// Each command with its options that are relied on.
-const COMMANDS: [(&str, &[&str]); 15] = [
+const COMMANDS: [(&str, &[&str]); 16] = [
     ("devices", &["--json"]),
     ("build", &["--builder", "--json", "--output", "--runs", "--costs", "--epo"]),
     ("trace", &["--builder", "--rays", "--size", "--json", "--rays-file", "--hits-file", "--any-hit"]),
@@ -11,6 +11,7 @@ const COMMANDS: [(&str, &[&str]); 15] = [
     ("render", &["--builder", "--output", "--view"]),
     ("bench", &["--builder", "--rays", "--runs", "--output", "--shard"]),
     ("cpu-builders", &["--builder", "--size", "--runs", "--quick", "--json", "--output"]),
+    ("predict", &["--builder", "--rays", "--size", "--runs", "--no-device", "--output"]),
     ("stability", &[]),
     ("compare", &[]),
     ("check", &["--quick", "--json"]),

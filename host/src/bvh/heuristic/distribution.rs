@@ -83,12 +83,12 @@ impl<'a> RayDistribution<'a> {
 
 /// A ray made ready for boxes.
 #[derive(Debug, Clone, Copy)]
-struct Segment {
+pub(super) struct Segment {
     from: Vec3A,
     /// Reciprocal of the direction, whose largest component is 1.
     inverse: Vec3A,
     t_end: f32,
-    weight: f64,
+    pub(super) weight: f64,
 }
 
 impl Segment {
@@ -108,7 +108,7 @@ impl Segment {
     }
 
     #[inline(always)]
-    fn meets(&self, bounds: &Bounds) -> bool {
+    pub(super) fn meets(&self, bounds: &Bounds) -> bool {
         let (a, b) = ((bounds.lo - self.from) * self.inverse, (bounds.hi - self.from) * self.inverse);
         a.min(b).max_element().max(0.0) <= a.max(b).min_element().min(self.t_end)
     }
@@ -116,7 +116,7 @@ impl Segment {
 
 /// The sample, made ready for a scene.
 pub(crate) struct Distribution {
-    segments: Vec<Segment>,
+    pub(super) segments: Vec<Segment>,
     weight: f64,
     growth: f64,
 }

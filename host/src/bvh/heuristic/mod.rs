@@ -11,6 +11,8 @@
 //! - [`distribution`]: rays that were traced;
 //! - [`occlusion`]: primitives that rays ended on.
 //!
+//! What a finished tree costs by one is [`Heuristic::cost`].
+//!
 //! Builders see none of that: they are given a `SplitCost`. Trees by another heuristic than the surface area go down to single
 //! primitives, and leaves are made by collapsing: a heuristic that calls both children certain, or neither likely, would stop at
 //! once ([`Termination::Heuristic`] does).
@@ -18,6 +20,7 @@
 mod angle;
 #[cfg(test)]
 mod builds;
+mod cost;
 pub mod distribution;
 mod flux;
 pub mod interior;
