@@ -17,7 +17,7 @@ use hedgerow::bvh::twin::quality;
 use hedgerow::gpu::Phase;
 use hedgerow::trace::twin::tracer as on_host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// Where our tracer works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,12 +33,12 @@ enum Source<'a> {
     /// A builder, which builds again whenever it is asked.
     Builder(Box<dyn Subject + 'a>),
     /// Somebody who has built one already.
-    Tree(Rc<Bvh2>),
+    Tree(Arc<Bvh2>),
 }
 
 /// What takes rays through them.
 enum Tracing<'a> {
-    Host { tree: Option<Rc<Bvh2>>, rays: HostRays },
+    Host { tree: Option<Arc<Bvh2>>, rays: HostRays },
     Device { device: &'a Device, tree: Option<Buffer<'a>>, rays: Box<DeviceRays<'a>> },
 }
 
@@ -72,7 +72,7 @@ impl<'a> Retraced<'a> {
     ///
     /// # Errors
     /// The device failed.
-    pub fn of_tree(builder: &str, tree: Rc<Bvh2>, device: Option<&'a Device>) -> Result<Retraced<'a>> {
+    pub fn of_tree(builder: &str, tree: Arc<Bvh2>, device: Option<&'a Device>) -> Result<Retraced<'a>> {
         Retraced::new(builder, Source::Tree(tree), device)
     }
 
@@ -85,10 +85,10 @@ impl<'a> Retraced<'a> {
     }
 
     /// The tree that is traced. It holds together: one that does not might be walked without end.
-    fn sound_tree(&mut self) -> Result<Rc<Bvh2>> {
+    fn sound_tree(&mut self) -> Result<Arc<Bvh2>> {
         let tree = match &self.source {
-            Source::Tree(tree) => Some(Rc::clone(tree)),
-            Source::Builder(_) => self.tree()?.map(Rc::new),
+            Source::Tree(tree) => Some(Arc::clone(tree)),
+            Source::Builder(_) => self.tree()?.map(Arc::new),
         };
         let tree = tree.ok_or_else(|| {
             let what = "the builder does not show its tree, so that our tracer has none; leave trace= out";
@@ -284,7 +284,7 @@ mod tests {
         assert_eq!(again.hits_of(&rays(), query).expect("traced"), hits);
         assert_eq!(again.work(query).expect("counted"), own.work(query).expect("counted"));
         let tree = own.tree().expect("read").expect("a BVH");
-        let mut given = Retraced::of_tree("sweep:trace=host", Rc::new(tree), None).expect("no device");
+        let mut given = Retraced::of_tree("sweep:trace=host", Arc::new(tree), None).expect("no device");
         assert_eq!(given.hits_of(&rays(), query).expect("traced"), hits);
         assert!(given.build().expect_err("it has no builder").to_string().contains("came from elsewhere"));
     }

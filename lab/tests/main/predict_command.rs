@@ -21,7 +21,8 @@ const TREES: &str = "binned:axes=all:termination=off,lbvh-host,sweep,binned:axes
 #[test]
 fn a_run_leaves_records_and_a_page_that_says_what_they_tell() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let done = run(folder.path(), &["gen:stadium:3", "gen:icosphere:3", "-b", TREES, "--no-device", "--rays", "primary,ao"]);
+    let done =
+        run(folder.path(), &["gen:stadium:3", "gen:icosphere:3", "-b", TREES, "--no-device", "--rays", "primary,ao"]);
     assert_eq!(done.status.code(), Some(0), "{}", err(&done));
     let records = record::read(folder.path()).expect("records");
     assert_eq!(records.len(), 2 * 5);
@@ -43,7 +44,12 @@ fn a_run_leaves_records_and_a_page_that_says_what_they_tell() {
     let all = samples(&records);
     assert_eq!(Scope::pooled(Tracer::Host).points(&all).len(), 2 * 4);
     let page = std::fs::read_to_string(folder.path().join("predict.html")).expect("a page");
-    for text in ["Traced on the host alone", "The reference is binned:axes=all:termination=off", "What a build pays for", "Soda Hall"] {
+    for text in [
+        "Traced on the host alone",
+        "The reference is binned:axes=all:termination=off",
+        "What a build pays for",
+        "Soda Hall",
+    ] {
         assert!(page.contains(text), "{text} is not on the page");
     }
     for file in ["charts/predict-sah.svg", "charts/predict-work.png", "predict.json"] {

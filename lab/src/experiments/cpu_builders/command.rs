@@ -22,7 +22,7 @@ use ash::vk;
 use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// In the names of records that the page alone shows: the table of the terminal has one row a builder.
 const TRACED_BY_OURS: &str = ":trace=";
@@ -218,11 +218,11 @@ fn traced_besides<'a>(
     subject: &mut dyn Subject,
     device: Option<&'a Device>,
 ) -> crate::Result<Vec<Box<dyn Subject + 'a>>> {
-    let Some(tree) = subject.tree()?.map(Rc::new) else { return Ok(Vec::new()) };
+    let Some(tree) = subject.tree()?.map(Arc::new) else { return Ok(Vec::new()) };
     let mut others: Vec<Box<dyn Subject + 'a>> = Vec::new();
     if subject.kind() == "host" {
         let name = format!("{}{BY_HOST}", subject.builder());
-        others.push(Box::new(Retraced::of_tree(&name, Rc::clone(&tree), None)?));
+        others.push(Box::new(Retraced::of_tree(&name, Arc::clone(&tree), None)?));
     }
     if let Some(device) = device {
         let name = format!("{}{BY_DEVICE}", subject.builder());

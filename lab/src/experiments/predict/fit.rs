@@ -7,6 +7,8 @@ use crate::measure::correlation::pearson;
 const FINE: u32 = 100;
 /// Steps of α and of β, where both are sought.
 const COARSE: u32 = 50;
+/// Correlations that differ by less differ by rounding.
+const SAME: f64 = 1e-9;
 
 /// (1 − α) SAH + α EPO with the α, in hundredths, whose logarithms correlate best with those of the times; of equals the least.
 pub fn alpha(points: &[Point<'_>]) -> Option<Weights> {
@@ -41,7 +43,7 @@ fn best(points: &[Point<'_>], needed: &[usize], candidates: impl Iterator<Item =
     for weights in candidates {
         let predictions: Option<Vec<f64>> = points.iter().map(|point| point.prediction(&weights)).collect();
         let Some(r) = predictions.and_then(|predictions| pearson(&predictions, &times)) else { continue };
-        if best.is_none_or(|(most, _)| r > most) {
+        if best.is_none_or(|(most, _)| r > most + SAME) {
             best = Some((r, weights));
         }
     }

@@ -21,7 +21,7 @@ use hedgerow::bvh::twin::{lbvh, quality};
 use hedgerow::trace::twin::tracer;
 use hedgerow::trace::{Hit, Ray};
 use rayon::prelude::*;
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// What a step and a test cost in static figures, as in the theses.
 pub const COSTS: [f64; 2] = [3.0, 2.0];
@@ -120,7 +120,7 @@ pub fn measure(
     let mesh = &scene.mesh;
     let truth = lbvh::build(&mesh.positions, &mesh.triangles, Code::Mc63.full(), Collapse::SAH);
     let closest = |rays: &[Ray]| rays.par_iter().map(|ray| tracer::closest_hit(&truth, ray)).collect::<Vec<Hit>>();
-    let mut generate = |kind| kinds::generate(kind, scene, &plan.rays, &mut |rays| Ok(closest(rays)));
+    let generate = |kind| kinds::generate(kind, scene, &plan.rays, &mut |rays| Ok(closest(rays)));
     say("counting leaves");
     trees.count_leaves(&generate(LCV_RAYS)?);
     for &kind in &plan.kinds {
@@ -188,8 +188,8 @@ impl<'a> Trees<'a> {
             host: Vec::new(),
             device: Vec::new(),
         };
-        let (name, tree, number) = (record.builder.clone(), Rc::new(tree), self.records.len());
-        let on = |device| Retraced::of_tree(&name, Rc::clone(&tree), device);
+        let (name, tree, number) = (record.builder.clone(), Arc::new(tree), self.records.len());
+        let on = |device| Retraced::of_tree(&name, Arc::clone(&tree), device);
         let mut traced = vec![Traced { tree: number, tracer: Tracer::Host, subject: on(None)?, has: None }];
         if device.is_some() {
             traced.push(Traced { tree: number, tracer: Tracer::Device, subject: on(device)?, has: None });

@@ -43,10 +43,13 @@ pub(super) fn section(samples: &[Sample]) -> Markup {
             whole,
         );
     }
-    let of_scene = |scene| (scene.to_owned(), Scope { scene: Some(scene), ..pooled });
-    let by_scene: Vec<_> = scenes(&theirs).into_iter().map(of_scene).collect();
-    let of_kind = |kind| (kind.to_owned(), Scope { kind, ..pooled });
-    let by_kind: Vec<_> = kinds(&theirs, Tracer::Host).into_iter().map(of_kind).collect();
+    let scope_of = |scene| Scope { scene: Some(scene), ..pooled };
+    let by_scene: Vec<(String, Scope<'_>)> =
+        scenes(&theirs).into_iter().map(|scene: &str| (scene.to_owned(), scope_of(scene))).collect();
+    let by_kind: Vec<(String, Scope<'_>)> = kinds(&theirs, Tracer::Host)
+        .into_iter()
+        .map(|kind: &str| (kind.to_owned(), Scope { kind, ..pooled }))
+        .collect();
     html! {
         p {
             (SOURCE) " prints times, steps, tests, SAH and EPO of five trees on eight scenes, and no correlation. These are computed from its "
