@@ -11,6 +11,7 @@ use crate::experiments::compare::command as compare;
 use crate::experiments::cpu_builders::command as cpu_builders;
 use crate::experiments::fly::command as fly;
 use crate::experiments::navigate::command as navigate;
+use crate::experiments::predict::command as predict;
 use crate::experiments::report::command as report;
 use crate::experiments::stability::command as stability;
 use crate::scene;
@@ -33,6 +34,7 @@ enum Command {
     Check(check::Arguments),
     Bench(bench::Arguments),
     CpuBuilders(cpu_builders::Arguments),
+    Predict(predict::Arguments),
     Accel(accel::Arguments),
     Animate(animate::Arguments),
     Fly(fly::Arguments),
@@ -80,6 +82,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Check(arguments) => check::run(common, arguments),
         Command::Bench(arguments) => bench::run(common, arguments),
         Command::CpuBuilders(arguments) => cpu_builders::run(common, arguments),
+        Command::Predict(arguments) => predict::run(common, arguments),
         Command::Accel(arguments) => accel::run(common, arguments),
         Command::Animate(arguments) => animate::run(common, arguments),
         Command::Fly(arguments) => fly::run(common, arguments),

@@ -9,6 +9,7 @@ pub mod compare;
 pub mod cpu_builders;
 pub mod fly;
 pub mod navigate;
+pub mod predict;
 pub mod report;
 pub mod stability;
 
@@ -23,6 +24,9 @@ use std::path::Path;
 pub fn write_pages(folder: &Path) -> Result<()> {
     if beside::CPU_BUILDERS.is_in(folder) {
         cpu_builders::page::write(folder)?;
+    }
+    if beside::PREDICT.is_in(folder) {
+        predict::page::write(folder)?;
     }
     if beside::ACCEL.is_in(folder) {
         accel::page::write(folder)?;

@@ -34,8 +34,11 @@ pub const FLY: Page = Page { records: "fly.jsonl", file: "fly.html", name: "Came
 pub const CPU_BUILDERS: Page =
     Page { records: "cpu-builders.jsonl", file: "cpu-builders.html", name: "Builders on the CPU" };
 
+/// `hedgerow predict`.
+pub const PREDICT: Page = Page { records: "predict.jsonl", file: "predict.html", name: "What predicts tracing" };
+
 /// All of them.
-pub const ALL: [Page; 8] = [INDEX, CPU_BUILDERS, ACCEL, ANIMATE, FLY, GROWTH, LARGE, DEGENERATE];
+pub const ALL: [Page; 9] = [INDEX, CPU_BUILDERS, PREDICT, ACCEL, ANIMATE, FLY, GROWTH, LARGE, DEGENERATE];
 
 impl Page {
     /// What files of it begin with.

@@ -15,6 +15,7 @@ use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::twin::quality;
 use hedgerow::trace::twin::tracer as on_host;
 use hedgerow::trace::{Hit, Query, Ray, Work};
+use std::sync::Arc;
 
 /// Where our tracer works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,12 +31,12 @@ enum Source<'a> {
     /// A builder, which builds again whenever it is asked.
     Builder(Box<dyn Subject + 'a>),
     /// Somebody who has built one already.
-    Tree(Bvh2),
+    Tree(Arc<Bvh2>),
 }
 
 /// What takes rays through them.
 enum Tracing<'a> {
-    Host { tree: Option<Bvh2>, rays: HostRays },
+    Host { tree: Option<Arc<Bvh2>>, rays: HostRays },
     Device { device: &'a Device, tree: Option<Buffer<'a>>, rays: Box<DeviceRays<'a>> },
 }
 
@@ -65,11 +66,11 @@ impl<'a> Retraced<'a> {
         Ok(Retraced { any_hit, ..Retraced::new(builder, Source::Builder(subject), device)? })
     }
 
-    /// A tree that is there already: it cannot be built again.
+    /// A tree that is there already: it cannot be built again. On the host it is not copied.
     ///
     /// # Errors
     /// The device failed.
-    pub fn of_tree(builder: &str, tree: Bvh2, device: Option<&'a Device>) -> Result<Retraced<'a>> {
+    pub fn of_tree(builder: &str, tree: Arc<Bvh2>, device: Option<&'a Device>) -> Result<Retraced<'a>> {
         Retraced::new(builder, Source::Tree(tree), device)
     }
 
@@ -81,9 +82,13 @@ impl<'a> Retraced<'a> {
         Ok(Retraced { builder: builder.to_owned(), source, tracing, any_hit: AnyHit::NEAR, ordered: None })
     }
 
-    /// A copy of the tree that is traced. It holds together: one that does not might be walked without end.
-    fn sound_tree(&mut self) -> Result<Bvh2> {
-        let tree = self.tree()?.ok_or_else(|| {
+    /// The tree that is traced. It holds together: one that does not might be walked without end.
+    fn sound_tree(&mut self) -> Result<Arc<Bvh2>> {
+        let tree = match &self.source {
+            Source::Tree(tree) => Some(Arc::clone(tree)),
+            Source::Builder(_) => self.tree()?.map(Arc::new),
+        };
+        let tree = tree.ok_or_else(|| {
             let what = "the builder does not show its tree, so that our tracer has none; leave trace= out";
             Error::Argument(format!("{}: {what}", self.builder))
         })?;
@@ -175,14 +180,14 @@ impl Subject for Retraced<'_> {
         match &mut self.source {
             Source::Builder(_) if self.ordered.is_some() => Ok(self.ordered.clone()),
             Source::Builder(subject) => subject.tree(),
-            Source::Tree(tree) => Ok(Some(tree.clone())),
+            Source::Tree(tree) => Ok(Some(Bvh2::clone(tree))),
         }
     }
 
     fn outcome(&mut self) -> Result<Option<Outcome>> {
         match &mut self.source {
             Source::Builder(subject) => subject.outcome(),
-            Source::Tree(Bvh2 { header, .. }) => Ok(Some(Outcome { active: header.active, status: header.status })),
+            Source::Tree(tree) => Ok(Some(Outcome { active: tree.header.active, status: tree.header.status })),
         }
     }
 
@@ -284,7 +289,7 @@ mod tests {
         assert_eq!(again.hits_of(&rays(), query).expect("traced"), hits);
         assert_eq!(again.work(query).expect("counted"), own.work(query).expect("counted"));
         let tree = own.tree().expect("read").expect("a BVH");
-        let mut given = Retraced::of_tree("sweep:trace=host", tree, None).expect("no device");
+        let mut given = Retraced::of_tree("sweep:trace=host", Arc::new(tree), None).expect("no device");
         assert_eq!(given.hits_of(&rays(), query).expect("traced"), hits);
         assert!(given.build().expect_err("it has no builder").to_string().contains("came from elsewhere"));
     }

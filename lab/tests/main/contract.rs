@@ -11,6 +11,7 @@ const COMMANDS: [(&str, &[&str]); 16] = [
     ("render", &["--builder", "--output", "--view"]),
     ("bench", &["--builder", "--rays", "--runs", "--output", "--shard"]),
     ("cpu-builders", &["--builder", "--size", "--runs", "--quick", "--json", "--output"]),
+    ("predict", &["--builder", "--rays", "--size", "--runs", "--no-device", "--output"]),
     ("stability", &[]),
     ("compare", &[]),
     ("check", &["--quick", "--json"]),

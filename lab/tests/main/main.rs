@@ -18,6 +18,7 @@ mod gpu_division;
 mod gpu_task_pool;
 mod host_records;
 mod measure_copy;
+mod predict_command;
 mod scene_dynamic;
 mod scene_files;
 mod scene_generators;

@@ -128,7 +128,7 @@ impl Segment {
 
 /// The sample, made ready for a scene.
 pub(crate) struct Distribution {
-    segments: Vec<Segment>,
+    pub(super) segments: Vec<Segment>,
     weight: f64,
     growth: f64,
 }

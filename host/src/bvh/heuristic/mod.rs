@@ -12,6 +12,8 @@
 //! - [`occlusion`]: primitives that rays ended on, and `occlusion_complete`: the same with its authors' rules;
 //! - [`shadow`]: rays that end at any hit, with all that they meet.
 //!
+//! What a finished tree costs by one is [`Heuristic::cost`].
+//!
 //! Builders see none of that: they are given a `SplitCost`. Trees by another heuristic than the surface area go down to single
 //! primitives, and leaves are made by collapsing: a heuristic that calls both children certain, or neither likely, would stop at
 //! once ([`Termination::Heuristic`] does).
@@ -19,6 +21,7 @@
 mod angle;
 #[cfg(test)]
 mod builds;
+mod cost;
 pub mod distribution;
 mod flux;
 pub mod interior;

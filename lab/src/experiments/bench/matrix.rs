@@ -30,7 +30,7 @@ const WARM_UPS: u32 = 1;
 /// Triangle tests that brute force may take for each kind of ray.
 const BRUTE_FORCE_TESTS: usize = 20_000_000;
 /// The rays of the leaf count variability: incoherent ones from the surfaces, one from each primary hit.
-const LCV_RAYS: RayKind = RayKind::Diffuse1;
+pub(crate) const LCV_RAYS: RayKind = RayKind::Diffuse1;
 /// Rays that differ between two builders of which brute force looks at, at most.
 const DIFFERENCES: usize = 16;
 
@@ -397,7 +397,7 @@ fn once<'a>(entries: Vec<&mut Entry<'a>>, mut run: impl FnMut(&mut Entry<'a>) ->
 }
 
 /// Standard deviation of the number of leaves that a ray visits (Aila, Karras, Laine 2013, section 3.3); `None` without rays.
-fn leaf_count_variability(work: &[Work]) -> Option<f64> {
+pub(crate) fn leaf_count_variability(work: &[Work]) -> Option<f64> {
     let mean = |of: &dyn Fn(f64) -> f64| work.iter().map(|w| of(f64::from(w.leaves))).sum::<f64>() / work.len() as f64;
     let leaves = mean(&|leaves| leaves);
     (!work.is_empty()).then(|| mean(&|l| (l - leaves).powi(2)).sqrt())

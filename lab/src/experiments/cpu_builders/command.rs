@@ -22,6 +22,7 @@ use ash::vk;
 use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// In the names of records that the page alone shows: the table of the terminal has one row a builder.
 const TRACED_BY_OURS: &str = ":trace=";
@@ -70,9 +71,12 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         Some(list) => Choice::of(builders::parse_list(list)?)?,
         None => Choice::by_default(arguments.quick),
     };
-    let scenes = scenes(arguments)?;
+    let scenes = scenes(&arguments.scenes)?;
     let mut notes: Vec<String> = choice.note().into_iter().collect();
-    let device = device(common, arguments, &mut notes)?;
+    let device = match arguments.no_device {
+        true => host_alone(&mut notes),
+        false => device_if_any(common, &mut notes)?,
+    };
     if choice.builders.iter().all(|spec| on_one_thread(spec).is_none()) {
         notes.push("No builder of this run takes threads=1: there are no times of one thread.".into());
     }
@@ -125,9 +129,9 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
 }
 
 /// The scenes that are named, or those of the repository.
-fn scenes(arguments: &Arguments) -> anyhow::Result<Vec<String>> {
-    if !arguments.scenes.is_empty() {
-        return Ok(arguments.scenes.clone());
+pub(crate) fn scenes(named: &[String]) -> anyhow::Result<Vec<String>> {
+    if !named.is_empty() {
+        return Ok(named.to_vec());
     }
     let own = scene::own_folders().into_iter().find(|folder| folder.is_dir());
     let folder = own.context("there is no folder scenes/ here; name scenes")?;
@@ -136,12 +140,14 @@ fn scenes(arguments: &Arguments) -> anyhow::Result<Vec<String>> {
     Ok(files.map(|file| file.display().to_string()).collect())
 }
 
+/// No device: the reader is told.
+pub(crate) fn host_alone(notes: &mut Vec<String>) -> Option<Device> {
+    notes.push("Traced on the host alone, as --no-device asks.".into());
+    None
+}
+
 /// The device on which trees are traced, too. One that was asked for must be there; otherwise the host is enough.
-fn device(common: &Common, arguments: &Arguments, notes: &mut Vec<String>) -> anyhow::Result<Option<Device>> {
-    if arguments.no_device {
-        notes.push("Traced on the host alone, as --no-device asks.".into());
-        return Ok(None);
-    }
+pub(crate) fn device_if_any(common: &Common, notes: &mut Vec<String>) -> anyhow::Result<Option<Device>> {
     match common.open_device(false) {
         Ok(device) => {
             if device.limits.kind == vk::PhysicalDeviceType::CPU {
@@ -212,11 +218,11 @@ fn traced_besides<'a>(
     subject: &mut dyn Subject,
     device: Option<&'a Device>,
 ) -> crate::Result<Vec<Box<dyn Subject + 'a>>> {
-    let Some(tree) = subject.tree()? else { return Ok(Vec::new()) };
+    let Some(tree) = subject.tree()?.map(Arc::new) else { return Ok(Vec::new()) };
     let mut others: Vec<Box<dyn Subject + 'a>> = Vec::new();
     if subject.kind() == "host" {
         let name = format!("{}{BY_HOST}", subject.builder());
-        others.push(Box::new(Retraced::of_tree(&name, tree.clone(), None)?));
+        others.push(Box::new(Retraced::of_tree(&name, Arc::clone(&tree), None)?));
     }
     if let Some(device) = device {
         let name = format!("{}{BY_DEVICE}", subject.builder());

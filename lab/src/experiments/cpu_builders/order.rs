@@ -1,5 +1,7 @@
 //! Whether a cost orders the times that rays take: of pairs of builders, how many it orders rightly, and the rank correlation.
 
+use crate::measure::correlation::{pearson, ranks};
+
 /// Times that differ by less are taken for one time measured twice.
 pub const SAME_TIME: f64 = 0.02;
 
@@ -36,7 +38,7 @@ pub fn ordering(costs: &[f64], times: &[f64]) -> Option<Ordering> {
             }
         }
     }
-    Some(Ordering { pairs, right, rank: correlation(&ranks(costs), &ranks(times)) })
+    Some(Ordering { pairs, right, rank: pearson(&ranks(costs), &ranks(times)) })
 }
 
 fn differ(a: f64, b: f64) -> bool {
@@ -59,29 +61,6 @@ pub fn furthest_off(costs: &[f64], times: &[f64]) -> Option<(usize, usize)> {
         }
     }
     worst.map(|(_, pair)| pair)
-}
-
-/// The place of each value in their order from 1 on; equal ones share the mean of their places.
-fn ranks(values: &[f64]) -> Vec<f64> {
-    let rank = |value: &f64| {
-        let below = values.iter().filter(|other| *other < value).count() as f64;
-        let equal = values.iter().filter(|other| *other == value).count() as f64;
-        below + 0.5 * (equal + 1.0)
-    };
-    values.iter().map(rank).collect()
-}
-
-/// Pearson's correlation; `None` where one of them does not vary.
-fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let (mean_a, mean_b) = (mean(a), mean(b));
-    let [mut ab, mut aa, mut bb] = [0.0; 3];
-    for (a, b) in a.iter().zip(b) {
-        ab += (a - mean_a) * (b - mean_b);
-        aa += (a - mean_a).powi(2);
-        bb += (b - mean_b).powi(2);
-    }
-    (aa > 0.0 && bb > 0.0).then(|| ab / (aa * bb).sqrt())
 }
 
 #[cfg(test)]
@@ -108,8 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_values_share_their_places_and_near_times_are_no_pair() {
-        assert_eq!(ranks(&[5.0, 1.0, 5.0, 9.0]), [2.5, 1.0, 2.5, 4.0]);
+    fn near_times_are_no_pair() {
         // 100 and 101 differ by less than two percent: two pairs are left.
         let found = ordering(&[3.0, 2.0, 1.0], &[100.0, 101.0, 50.0]).expect("three");
         assert_eq!((found.pairs, found.right), (2, 2));
