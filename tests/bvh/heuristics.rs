@@ -65,7 +65,7 @@ fn trees_by_any_heuristic_are_valid_over_every_scene_that_hurts_and_have_the_hit
         let seen: Vec<bool> = (0..mesh.2.len()).map(|i| i % 3 == 0).collect();
         for heuristic in heuristics(&mesh, &segments, &seen) {
             // A camera that cannot see is refused, which has tests of its own.
-            if heuristic.check(&HostMethod::Sweep, mesh.2.len()).is_err() {
+            if heuristic.check(&HostBvhOptions::of(HostMethod::Sweep), mesh.2.len()).is_err() {
                 continue;
             }
             for method in [HostMethod::Sweep, HostMethod::Binned(BinnedOptions::WALD)] {

@@ -7,6 +7,7 @@
 use super::ALONE;
 use super::bounds::Item;
 use super::heuristic::split_cost::{Area, Side, SplitCost, growing};
+use super::look_ahead::{LookAhead, Ranked};
 use super::top_down::{self, Candidates, HALVED_FROM, LeafRule};
 use super::topology::Topology;
 use hedgerow::bvh::sah::Collapse;
@@ -20,6 +21,15 @@ pub(super) fn positions(items: &[Item], costs: &Collapse, single: bool) -> Topol
 }
 
 fn positions_by(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topology {
+    tree_over(items, rule, |sweep, axes, splits| top_down::build(sweep, by, axes, splits))
+}
+
+/// The tree over `items` by what splits a node with all of them.
+fn tree_over<'a>(
+    items: &'a [Item],
+    rule: LeafRule<'a>,
+    build: impl FnOnce(&Sweep<'a>, [Axis<'_>; 3], &mut [u32]),
+) -> Topology {
     let count = items.len();
     let mut tree = Topology::new(count);
     if count == 0 {
@@ -39,7 +49,7 @@ fn positions_by(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topo
     });
     let sweep = Sweep { items, rule, is_left: (0..count).map(|_| AtomicBool::new(false)).collect() };
     let axes = buffers.each_mut().map(|(order, spare, weights)| Axis { order, spare, weights });
-    top_down::build(&sweep, by, axes, &mut tree.splits);
+    build(&sweep, axes, &mut tree.splits);
     let [(order, ..), ..] = buffers;
     tree.order = order;
     tree
@@ -47,7 +57,19 @@ fn positions_by(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topo
 
 /// The tree over the primitives of `items`.
 pub(super) fn build(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topology {
-    let mut tree = positions_by(by, items, rule);
+    of_primitives(positions_by(by, items, rule), items)
+}
+
+/// The same by surface area, of whose splits at most `most` are judged at a node.
+pub(super) fn build_ahead(items: &[Item], rule: LeafRule<'_>, most: u32) -> Topology {
+    let tree = tree_over(items, rule, |sweep, axes, splits| {
+        top_down::build(&LookAhead::new(sweep, rule, most), &Area, axes, splits);
+    });
+    of_primitives(tree, items)
+}
+
+/// A tree over primitives in place of positions in `items`.
+fn of_primitives(mut tree: Topology, items: &[Item]) -> Topology {
     tree.order.par_iter_mut().with_min_len(ALONE).for_each(|i| *i = items[*i as usize].primitive());
     tree
 }
@@ -89,6 +111,9 @@ impl<'a> Axis<'a> {
         self.order[left..].copy_from_slice(&self.spare[..right]);
     }
 }
+
+/// In how many stretches an order is divided, of each of which one split is judged: neighbours differ by little.
+const STRETCHES: usize = 16;
 
 /// A split: its cost, how far it is from the middle, and how many items are on the left. The less the better.
 type Split = (f32, usize, usize);
@@ -150,16 +175,23 @@ impl Sweep<'_> {
         Side::of(item, by.is_seen(item))
     }
 
+    /// What is found along each axis, by several threads if there are many items.
+    fn along_axes<T: Send>(axes: &mut [Axis<'_>; 3], of: impl Fn(&mut Axis<'_>) -> T + Sync) -> [T; 3] {
+        let [x, y, z] = axes;
+        if x.order.len() < ALONE {
+            return [of(x), of(y), of(z)];
+        }
+        let (x, (y, z)) = rayon::join(|| of(x), || rayon::join(|| of(y), || of(z)));
+        [x, y, z]
+    }
+
     /// The best split and its axis, the first of equal axes; and all items.
     fn best_split<C: SplitCost>(&self, by: &C, here: &C::Here, axes: &mut [Axis<'_>; 3]) -> (usize, Split, Side) {
-        let [x, y, z] = axes;
-        let of = |axis| self.best_split_of(by, here, axis);
-        let [x, y, z] = if x.order.len() < ALONE {
-            [of(x), of(y), of(z)]
-        } else {
-            let (x, (y, z)) = rayon::join(|| of(x), || rayon::join(|| of(y), || of(z)));
-            [x, y, z]
-        };
+        let [x, y, z] = Self::along_axes(axes, |axis| {
+            let (splits, whole) = self.splits(by, here, axis);
+            let first = (f32::INFINITY, usize::MAX, 1);
+            (splits.fold(first, |best, split| if better(best, split) { split } else { best }), whole)
+        });
         let whole = x.1;
         let best = [y.0, z.0]
             .into_iter()
@@ -168,7 +200,14 @@ impl Sweep<'_> {
         (best.0, best.1, whole)
     }
 
-    fn best_split_of<C: SplitCost>(&self, by: &C, here: &C::Here, axis: &mut Axis<'_>) -> (Split, Side) {
+    /// All splits along an axis, and all items.
+    #[inline(always)]
+    fn splits<'s, C: SplitCost>(
+        &'s self,
+        by: &'s C,
+        here: &'s C::Here,
+        axis: &'s mut Axis<'_>,
+    ) -> (impl Iterator<Item = Split>, Side) {
         let count = axis.order.len();
         let side = |&i: &u32| self.side(by, i);
         let mut whole = Side::EMPTY;
@@ -176,18 +215,54 @@ impl Sweep<'_> {
         for ((weight, side), place) in from_right.zip(axis.weights.iter_mut().rev()) {
             (*place, whole) = (weight, side);
         }
-        let mut best = (f32::INFINITY, usize::MAX, 1);
+        let (costs, weights) = (self.rule.costs, &*axis.weights);
         let from_left = by.of_sides(here, growing(axis.order[..count - 1].iter().map(side)));
-        for ((weight, left), at) in from_left.zip(1..) {
-            let costs = self.rule.costs;
-            let cost =
-                costs.leaf_cost(weight, left.count) + costs.leaf_cost(axis.weights[at], whole.count - left.count);
-            let split = (cost, (2 * at).abs_diff(count), at);
-            if better(best, split) {
-                best = split;
+        let splits = from_left.zip(1..).map(move |((weight, left), at)| {
+            let cost = costs.leaf_cost(weight, left.count) + costs.leaf_cost(weights[at], whole.count - left.count);
+            (cost, (2 * at).abs_diff(count), at)
+        });
+        (splits, whole)
+    }
+}
+
+impl Ranked for Sweep<'_> {
+    fn count(axes: &[Axis<'_>; 3]) -> usize {
+        axes[0].order.len()
+    }
+
+    /// One of each stretch.
+    fn cheapest(&self, axes: &mut [Axis<'_>; 3], depth: u32, most: usize) -> Vec<(usize, usize)> {
+        let count = axes[0].order.len();
+        let of_axes = Self::along_axes(axes, |axis| {
+            let (splits, whole) = self.splits(&Area, &(), axis);
+            let mut best = [(f32::INFINITY, usize::MAX, 1); STRETCHES];
+            for split in splits {
+                let best = &mut best[split.2 * STRETCHES / count];
+                if better(*best, split) {
+                    *best = split;
+                }
             }
+            (best, whole)
+        });
+        let whole = of_axes[0].1;
+        let numbered = |(axis, (best, _)): (usize, ([Split; STRETCHES], Side))| best.map(|split: Split| (axis, split));
+        let mut all: Vec<(usize, Split)> = (0..).zip(of_axes).flat_map(numbered).collect();
+        all.retain(|(_, (cost, ..))| *cost < f32::INFINITY);
+        all.sort_by(|(_, a), (_, b)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        match all.first() {
+            Some(&(_, (cost, ..))) if depth < HALVED_FROM => {
+                if self.rule.is_leaf(whole.bounds.half_area(), whole.count, cost) {
+                    return Vec::new();
+                }
+                all.iter().take(most).map(|&(axis, (.., left_count))| (axis, left_count)).collect()
+            }
+            _ => self.best(&Area, &(), axes, depth).into_iter().collect(),
         }
-        (best, whole)
+    }
+
+    fn copies(&self, axes: &[Axis<'_>; 3], &(axis, left_count): &(usize, usize)) -> [Vec<Item>; 2] {
+        let (left, right) = axes[axis].order.split_at(left_count);
+        [left, right].map(|order| order.iter().map(|&i| self.items[i as usize]).collect())
     }
 }
 

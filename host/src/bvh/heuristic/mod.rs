@@ -26,7 +26,7 @@ mod picture;
 pub mod preferred;
 pub(super) mod split_cost;
 
-use super::HostMethod;
+use super::HostBvhOptions;
 #[cfg(doc)]
 use super::Termination;
 use super::bounds::{Bounds, Item};
@@ -59,14 +59,19 @@ pub enum Heuristic<'a> {
 }
 
 impl<'a> Heuristic<'a> {
-    /// Whether `method` can build a tree over `count` primitives by it.
+    /// Whether a tree over `count` primitives can be built by it with these options.
     ///
     /// # Errors
     /// [`Error::Argument`] names the method or the option that cannot be used, and what can.
-    pub fn check(&self, method: &HostMethod, count: usize) -> Result<()> {
-        let is_top_down = matches!(method, HostMethod::Sweep | HostMethod::Binned(_));
-        if *self != Heuristic::Sah && !is_top_down {
+    pub fn check(&self, options: &HostBvhOptions, count: usize) -> Result<()> {
+        let HostBvhOptions { method, look_ahead, .. } = options;
+        if *self != Heuristic::Sah && !method.is_top_down() {
             let error = format!("{method:?} does not build by a heuristic; take Sweep or Binned, or Heuristic::Sah");
+            return Err(Error::Argument(error));
+        }
+        if *self != Heuristic::Sah && *look_ahead > 1 {
+            let error =
+                format!("looking ahead at {look_ahead} splits is by surface area; take Heuristic::Sah, or 1 split");
             return Err(Error::Argument(error));
         }
         match self {

@@ -1,8 +1,9 @@
 //! The list of all builders.
 
 use super::host_options::{
-    ALPHA, AXES, BATCH, BUDGET, DELTA, EPSILON, HEURISTIC, HOST_BINS, HOST_OPTIMISE, INSERT_ORDER, LEAF, MINI, PRUNE,
-    SAMPLE, SBVH_BINS, SEARCH, TEACHING_RAYS, TERMINATION, TERMINATION_BY, TERMINATION_FLAT, THREADS, WEIGHT,
+    ALPHA, AXES, BATCH, BUDGET, DELTA, EPSILON, HEURISTIC, HOST_BINS, HOST_OPTIMISE, INSERT_ORDER, LEAF, LOOK_AHEAD,
+    MINI, PRUNE, SAMPLE, SBVH_BINS, SEARCH, TEACHING_RAYS, TERMINATION, TERMINATION_BY, TERMINATION_FLAT, THREADS,
+    WEIGHT,
 };
 use super::options::{
     ANY_HIT, BINS, BITS, CODES, COLLAPSE, EXACT, KD_SCHEDULE, KI, KT, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE, SPLIT,
@@ -151,7 +152,17 @@ pub static BUILDERS: &[BuilderEntry] = &[
     on_host(&"sweep", "full-sweep SAH on the host: the reference for the quality of the others", |spec| {
         spec.on_host(HostMethod::Sweep)
     })
-    .taking(&[HEURISTIC, TEACHING_RAYS, SAMPLE, WEIGHT, TERMINATION_BY, COLLAPSE, HOST_OPTIMISE, THREADS]),
+    .taking(&[
+        HEURISTIC,
+        TEACHING_RAYS,
+        SAMPLE,
+        WEIGHT,
+        LOOK_AHEAD,
+        TERMINATION_BY,
+        COLLAPSE,
+        HOST_OPTIMISE,
+        THREADS,
+    ]),
     on_host(&"binned", "binned SAH on the host: the best of the planes between bins, top-down", Spec::binned)
         .taking(&[
             HOST_BINS,
@@ -161,6 +172,7 @@ pub static BUILDERS: &[BuilderEntry] = &[
             TEACHING_RAYS,
             SAMPLE,
             WEIGHT,
+            LOOK_AHEAD,
             TERMINATION_FLAT,
             COLLAPSE,
             HOST_OPTIMISE,
