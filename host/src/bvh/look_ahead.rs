@@ -118,7 +118,6 @@ mod tests {
         items(count).iter().map(|item| item.bounds().aabb()).collect()
     }
 
-    /// The splits of a part, as if they were judged by nothing.
     #[test]
     fn one_split_is_the_best_one_whatever_its_trees_cost() {
         // By the path of those that look ahead, which a build with one split does not take.

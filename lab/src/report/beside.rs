@@ -24,6 +24,8 @@ pub const GROWTH: Page = Page { records: "growth.jsonl", file: "growth.html", na
 pub const LARGE: Page = Page { records: "large.jsonl", file: "large.html", name: "Large triangles" };
 /// `hedgerow stability degenerate`.
 pub const DEGENERATE: Page = Page { records: "degenerate.jsonl", file: "degenerate.html", name: "Degenerate scenes" };
+/// `hedgerow stability greedy`.
+pub const GREEDY: Page = Page { records: "greedy.jsonl", file: "greedy.html", name: "Greedy trees" };
 /// `hedgerow animate`.
 pub const ANIMATE: Page = Page { records: "animate.jsonl", file: "animate.html", name: "Moving scenes" };
 
@@ -32,7 +34,7 @@ pub const CPU_BUILDERS: Page =
     Page { records: "cpu-builders.jsonl", file: "cpu-builders.html", name: "Builders on the CPU" };
 
 /// All of them.
-pub const ALL: [Page; 7] = [INDEX, CPU_BUILDERS, ACCEL, ANIMATE, GROWTH, LARGE, DEGENERATE];
+pub const ALL: [Page; 8] = [INDEX, CPU_BUILDERS, ACCEL, ANIMATE, GROWTH, LARGE, DEGENERATE, GREEDY];
 
 impl Page {
     /// What files of it begin with.
