@@ -4,7 +4,7 @@
 #                      report/accel.html; at most three minutes on two cores
 #   make bench-all     every scene of the folder SCENES (or HEDGEROW_SCENES)
 #   make bench-peers   the same on Mesa 26, whose ray queries are a peer, beside CPU crates
-#   make stability     where methods give way: report/growth.html, report/large.html, report/degenerate.html
+#   make stability     where methods give way: report/growth.html, large.html, degenerate.html, greedy.html
 #   make test          the test suite, under a bound in time: a shader that hangs would hang with it
 #   make test-gpu      the suite with work cut as for a GPU, and a check of builders and tracers with subgroups of 4 and 16
 #   make test-lanes    the suite by either tuning on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
@@ -78,6 +78,7 @@ stability: setup
 	$(BIN) stability growth -o $(OUT) $(STABILITY)
 	$(BIN) stability large -o $(OUT) $(STABILITY)
 	$(BIN) stability degenerate -o $(OUT)
+	$(BIN) stability greedy -o $(OUT)
 
 test: setup
 	$(CARGO) test --release --features $(FEATURES) --no-run

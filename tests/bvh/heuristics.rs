@@ -96,7 +96,7 @@ fn trees_by_any_heuristic_are_valid_over_every_scene_that_hurts_and_have_the_hit
                 HostMethod::Sbvh(SbvhOptions { alpha: 1.0, ..SbvhOptions::PAPER }),
             ] {
                 // A camera that cannot see is refused, and so are rules that divide primitives: both have tests of their own.
-                if heuristic.check(&method, mesh.2.len()).is_err() {
+                if heuristic.check(&HostBvhOptions::of(method), mesh.2.len()).is_err() {
                     continue;
                 }
                 for termination in [Termination::Sah, Termination::Heuristic] {

@@ -38,7 +38,7 @@ pub(super) fn build_of<R: Record>(
     (options, heuristic): (&HostBvhOptions, &Heuristic<'_>),
 ) -> Result<Built<R>> {
     options.check()?;
-    heuristic.check(&options.method, count)?;
+    heuristic.check(options, count)?;
     // On a thread of the pool: one outside it would wait and be woken again at every parallel step.
     Ok(rayon::scope(|_| build_on_thread(count, &bounds, &record, (options, heuristic))))
 }
@@ -53,9 +53,11 @@ fn leaf_rule<'a>(options: &'a HostBvhOptions, by: &Prepared<'_>) -> LeafRule<'a>
 
 /// The tree over `items`, by their codes if the method sorted them. Both are given back before records and nodes want memory.
 fn topology(items: Vec<Item>, scale: f32, codes: Vec<u64>, options: &HostBvhOptions, by: &Prepared<'_>) -> Topology {
-    let HostBvhOptions { method, collapse, .. } = options;
+    let HostBvhOptions { method, collapse, look_ahead, .. } = options;
     let rule = leaf_rule(options, by);
     match method {
+        HostMethod::Sweep if *look_ahead > 1 => sweep::build_ahead(&items, rule, *look_ahead),
+        HostMethod::Binned(options) if *look_ahead > 1 => binned::build_ahead(items, scale, rule, options, *look_ahead),
         HostMethod::Sweep | HostMethod::Binned(_) => match by {
             Prepared::Area => top_down(&Area, items, scale, rule, method),
             Prepared::Rays(measure) => top_down(&ByRays(&**measure), items, scale, rule, method),

@@ -18,6 +18,7 @@ pub mod heuristic;
 mod incremental;
 mod input;
 mod insertion;
+mod look_ahead;
 pub mod optimal;
 mod order;
 mod ploc;
@@ -76,6 +77,11 @@ impl HostMethod {
     pub const fn sorts(&self) -> bool {
         matches!(self, HostMethod::Aac(_) | HostMethod::Ploc { .. })
     }
+
+    /// Whether it chooses among splits of all primitives of a node.
+    const fn is_top_down(&self) -> bool {
+        matches!(self, HostMethod::Sweep | HostMethod::Binned(_))
+    }
 }
 
 /// What [`build`] is asked for.
@@ -91,6 +97,9 @@ pub struct HostBvhOptions {
     pub termination: Termination,
     /// What moves subtrees before leaves are made.
     pub optimise: HostOptimise,
+    /// How many of a node's best splits are judged by temporary trees, 1 to 64; 1 takes the best without. More is for
+    /// [`HostMethod::Sweep`] and [`HostMethod::Binned`], and takes that many times as long and more.
+    pub look_ahead: u32,
 }
 
 impl HostBvhOptions {
@@ -102,6 +111,7 @@ impl HostBvhOptions {
             collapse: Collapse::SAH,
             termination: Termination::Sah,
             optimise: HostOptimise::Off,
+            look_ahead: 1,
         }
     }
 
@@ -136,6 +146,11 @@ impl HostBvhOptions {
     /// # Errors
     /// [`Error::Argument`] names the option that cannot be used, and what can.
     pub fn check(&self) -> Result<()> {
+        look_ahead::check(self.look_ahead)?;
+        if self.look_ahead > 1 && !self.method.is_top_down() {
+            let error = format!("{:?} cannot look ahead; take Sweep or Binned, or 1 split", self.method);
+            return Err(Error::Argument(error));
+        }
         match &self.method {
             HostMethod::Sweep => Ok(()),
             HostMethod::Aac(options) => options.check(),

@@ -7,6 +7,7 @@
 use super::ALONE;
 use super::bounds::Item;
 use super::heuristic::split_cost::{Area, AxisSplits, First, Place, Side, SplitCost, growing};
+use super::look_ahead::{LookAhead, Ranked};
 use super::top_down::{self, Candidates, HALVED_FROM, LeafRule, divided_slots};
 use super::topology::Topology;
 use hedgerow::bvh::sah::Collapse;
@@ -20,6 +21,11 @@ pub(super) fn positions(items: &[Item], costs: &Collapse, single: bool) -> Topol
 }
 
 fn positions_by(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topology {
+    tree_over(items, rule, |sweep, whole| top_down::build(sweep, by, whole))
+}
+
+/// The tree over `items` by what splits a node with all of them.
+fn tree_over<'a>(items: &'a [Item], rule: LeafRule<'a>, build: impl FnOnce(&Sweep<'a>, Part<'_>)) -> Topology {
     let count = items.len();
     let mut tree = Topology::new(count);
     if count == 0 {
@@ -39,7 +45,7 @@ fn positions_by(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topo
     });
     let sweep = Sweep { items, rule, is_left: (0..count).map(|_| AtomicBool::new(false)).collect() };
     let axes = buffers.each_mut().map(|(order, spare, weights)| Axis { order, spare, weights });
-    top_down::build(&sweep, by, Part { axes, slots: &mut tree.splits });
+    build(&sweep, Part { axes, slots: &mut tree.splits });
     let [(order, ..), ..] = buffers;
     tree.order = order;
     tree
@@ -47,7 +53,18 @@ fn positions_by(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topo
 
 /// The tree over the primitives of `items`.
 pub(super) fn build(by: &impl SplitCost, items: &[Item], rule: LeafRule<'_>) -> Topology {
-    let mut tree = positions_by(by, items, rule);
+    of_primitives(positions_by(by, items, rule), items)
+}
+
+/// The same by surface area, of whose splits at most `most` are judged at a node.
+pub(super) fn build_ahead(items: &[Item], rule: LeafRule<'_>, most: u32) -> Topology {
+    let ahead = |sweep: &Sweep<'_>, whole: Part<'_>| top_down::build(&LookAhead::new(sweep, rule, most), &Area, whole);
+    let tree = tree_over(items, rule, ahead);
+    of_primitives(tree, items)
+}
+
+/// A tree over primitives in place of positions in `items`.
+fn of_primitives(mut tree: Topology, items: &[Item]) -> Topology {
     tree.order.par_iter_mut().with_min_len(ALONE).for_each(|i| *i = items[*i as usize].primitive());
     tree
 }
@@ -96,11 +113,19 @@ struct Part<'a> {
     slots: &'a mut [u32],
 }
 
+/// In how many stretches an order is divided, of each of which one split is judged: neighbours differ by little.
+const STRETCHES: usize = 16;
+
 /// A split: its cost, how far it is from the middle, and how many items are on the left. The less the better.
 type Split = (f32, usize, usize);
 
-fn better(a: Split, b: Split) -> bool {
-    (b.0, b.1) < (a.0, a.1)
+/// Stands for no split yet.
+const NO_SPLIT: Split = (f32::INFINITY, usize::MAX, 1);
+
+/// The better one, of equal ones the first.
+#[inline(always)]
+fn better(a: Split, b: Split) -> Split {
+    if (b.0, b.1) < (a.0, a.1) { b } else { a }
 }
 
 struct Sweep<'a> {
@@ -172,47 +197,33 @@ impl Sweep<'_> {
         Side::of(item, by.is_seen(item))
     }
 
+    /// What is found along each axis, by several threads if there are many items.
+    fn along_axes<T: Send>(axes: &mut [Axis<'_>; 3], of: impl Fn(&mut Axis<'_>) -> T + Sync) -> [T; 3] {
+        let [x, y, z] = axes;
+        if x.order.len() < ALONE {
+            return [of(x), of(y), of(z)];
+        }
+        let (x, (y, z)) = rayon::join(|| of(x), || rayon::join(|| of(y), || of(z)));
+        [x, y, z]
+    }
+
     /// The best split and its axis, the first of equal axes; and all items.
     fn best_split<C: SplitCost>(&self, by: &C, here: &C::Here, axes: &mut [Axis<'_>; 3]) -> (usize, Split, Side) {
-        let [x, y, z] = axes;
-        let of = |axis| self.best_split_of(by, here, axis);
-        let [x, y, z] = if x.order.len() < ALONE {
-            [of(x), of(y), of(z)]
-        } else {
-            let (x, (y, z)) = rayon::join(|| of(x), || rayon::join(|| of(y), || of(z)));
-            [x, y, z]
+        let [x, y, z] = Self::along_axes(axes, |axis| self.best_split_of(by, here, axis));
+        let choose = |best: (usize, Split), (split, axis): (Split, usize)| {
+            let better = better(best.1, split);
+            if better == best.1 { best } else { (axis, better) }
         };
-        let whole = x.1;
-        let best = [y.0, z.0]
-            .into_iter()
-            .zip(1..)
-            .fold((0, x.0), |best, (split, axis)| if better(best.1, split) { (axis, split) } else { best });
-        (best.0, best.1, whole)
+        let best = [(y.0, 1), (z.0, 2)].into_iter().fold((0, x.0), choose);
+        (best.0, best.1, x.1)
     }
 
     fn best_split_of<C: SplitCost>(&self, by: &C, here: &C::Here, axis: &mut Axis<'_>) -> (Split, Side) {
         if C::BY_BOTH {
             return self.best_split_by_both(by, here, axis.order);
         }
-        let count = axis.order.len();
-        let side = |&i: &u32| self.side(by, i);
-        let mut whole = Side::EMPTY;
-        let from_right = by.of_sides(here, growing(axis.order.iter().rev().map(side)));
-        for ((weight, side), place) in from_right.zip(axis.weights.iter_mut().rev()) {
-            (*place, whole) = (weight, side);
-        }
-        let mut best = (f32::INFINITY, usize::MAX, 1);
-        let from_left = by.of_sides(here, growing(axis.order[..count - 1].iter().map(side)));
-        for ((weight, left), at) in from_left.zip(1..) {
-            let costs = self.rule.costs;
-            let cost =
-                costs.leaf_cost(weight, left.count) + costs.leaf_cost(axis.weights[at], whole.count - left.count);
-            let split = (cost, (2 * at).abs_diff(count), at);
-            if better(best, split) {
-                best = split;
-            }
-        }
-        (best, whole)
+        let (splits, whole) = self.splits(by, here, axis);
+        (splits.fold(NO_SPLIT, better), whole)
     }
 
     /// The same by a heuristic whose sides cost something together alone.
@@ -230,7 +241,66 @@ impl Sweep<'_> {
         let costs = by.of_splits(here, &splits, order.iter().enumerate().map(place), self.rule.costs);
         let of = |(cost, at): (f32, usize)| (cost, (2 * at).abs_diff(order.len()), at);
         let all = costs.into_iter().zip(1..).map(of);
-        (all.fold((f32::INFINITY, usize::MAX, 1), |best, split| if better(split, best) { split } else { best }), whole)
+        (all.fold(NO_SPLIT, better), whole)
+    }
+
+    /// All splits along an axis, and all items.
+    #[inline(always)]
+    fn splits<'s, C: SplitCost>(
+        &'s self,
+        by: &'s C,
+        here: &'s C::Here,
+        axis: &'s mut Axis<'_>,
+    ) -> (impl Iterator<Item = Split>, Side) {
+        let count = axis.order.len();
+        let side = |&i: &u32| self.side(by, i);
+        let mut whole = Side::EMPTY;
+        let from_right = by.of_sides(here, growing(axis.order.iter().rev().map(side)));
+        for ((weight, side), place) in from_right.zip(axis.weights.iter_mut().rev()) {
+            (*place, whole) = (weight, side);
+        }
+        let (costs, weights) = (self.rule.costs, &*axis.weights);
+        let from_left = by.of_sides(here, growing(axis.order[..count - 1].iter().map(side)));
+        let splits = from_left.zip(1..).map(move |((weight, left), at)| {
+            let cost = costs.leaf_cost(weight, left.count) + costs.leaf_cost(weights[at], whole.count - left.count);
+            (cost, (2 * at).abs_diff(count), at)
+        });
+        (splits, whole)
+    }
+}
+
+impl Ranked for Sweep<'_> {
+    /// One of each stretch.
+    fn cheapest(&self, part: &mut Part<'_>, depth: u32, most: usize) -> Vec<(usize, usize)> {
+        let count = Candidates::count(self, part);
+        let of_axes = Self::along_axes(&mut part.axes, |axis| {
+            let (splits, whole) = self.splits(&Area, &(), axis);
+            let mut best = [NO_SPLIT; STRETCHES];
+            for split in splits {
+                let best = &mut best[split.2 * STRETCHES / count];
+                *best = better(*best, split);
+            }
+            (best, whole)
+        });
+        let whole = of_axes[0].1;
+        let numbered = |(axis, (best, _)): (usize, ([Split; STRETCHES], Side))| best.map(|split: Split| (axis, split));
+        let mut all: Vec<(usize, Split)> = (0..).zip(of_axes).flat_map(numbered).collect();
+        all.retain(|(_, (cost, ..))| *cost < f32::INFINITY);
+        all.sort_by(|(_, a), (_, b)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        match all.first() {
+            Some(&(_, (cost, ..))) if depth < HALVED_FROM => {
+                if self.rule.is_leaf(whole.bounds.half_area(), whole.count, cost) {
+                    return Vec::new();
+                }
+                all.iter().take(most).map(|&(axis, (.., left_count))| (axis, left_count)).collect()
+            }
+            _ => self.best(&Area, &(), part, depth).into_iter().collect(),
+        }
+    }
+
+    fn copies(&self, part: &Part<'_>, &(axis, left_count): &(usize, usize)) -> [Vec<Item>; 2] {
+        let (left, right) = part.axes[axis].order.split_at(left_count);
+        [left, right].map(|order| order.iter().map(|&i| self.items[i as usize]).collect())
     }
 }
 

@@ -24,6 +24,8 @@ pub const GROWTH: Page = Page { records: "growth.jsonl", file: "growth.html", na
 pub const LARGE: Page = Page { records: "large.jsonl", file: "large.html", name: "Large triangles" };
 /// `hedgerow stability degenerate`.
 pub const DEGENERATE: Page = Page { records: "degenerate.jsonl", file: "degenerate.html", name: "Degenerate scenes" };
+/// `hedgerow stability greedy`.
+pub const GREEDY: Page = Page { records: "greedy.jsonl", file: "greedy.html", name: "Greedy trees" };
 /// `hedgerow animate`.
 pub const ANIMATE: Page = Page { records: "animate.jsonl", file: "animate.html", name: "Moving scenes" };
 
@@ -38,7 +40,8 @@ pub const CPU_BUILDERS: Page =
 pub const PREDICT: Page = Page { records: "predict.jsonl", file: "predict.html", name: "What predicts tracing" };
 
 /// All of them.
-pub const ALL: [Page; 9] = [INDEX, CPU_BUILDERS, PREDICT, ACCEL, ANIMATE, FLY, GROWTH, LARGE, DEGENERATE];
+pub const ALL: [Page; 10] =
+    [INDEX, CPU_BUILDERS, PREDICT, ACCEL, ANIMATE, FLY, GROWTH, LARGE, DEGENERATE, GREEDY];
 
 impl Page {
     /// What files of it begin with.

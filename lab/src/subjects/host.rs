@@ -99,7 +99,7 @@ impl<'a> Host<'a> {
     /// taught.
     pub fn new(builder: &str, mesh: &'a Mesh, plan: HostPlan, taught: Taught) -> Result<Host<'a>> {
         if let HostPlan::Built { options, .. } = &plan {
-            taught.heuristic().check(&options.method, mesh.triangles.len())?;
+            taught.heuristic().check(options, mesh.triangles.len())?;
         }
         let threads = BuildThreads::new(plan.own_threads())?;
         let (builder, peak, rays) = (builder.to_owned(), HeapPeak::default(), HostRays::default());

@@ -3,7 +3,7 @@
 use hedgerow_lab::experiments::stability::far::Side;
 use hedgerow_lab::experiments::stability::large::LargePlacement;
 use hedgerow_lab::experiments::stability::page;
-use hedgerow_lab::experiments::stability::points::{Degenerate, Growth, Large};
+use hedgerow_lab::experiments::stability::points::{Degenerate, Greedy, GreedyKind, Growth, Large};
 use hedgerow_lab::report::lines;
 use hedgerow_lab::scene;
 use std::path::Path;
@@ -119,6 +119,22 @@ fn degenerate_scenes_are_built_the_same_every_time_and_pages_name_each_other() {
 }
 
 #[test]
+fn greedy_trees_are_measured_beside_the_cheapest_over_scenes_made_and_real() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let arguments = ["stability", "greedy", "gen:icosphere:3", "--seeds", "4", "--most", "15"];
+    let page = done(&arguments, folder.path(), "greedy.html");
+    let points: Vec<Greedy> = lines::entries(folder.path()).expect("records");
+    let of = |kind| points.iter().filter(|point| point.kind == kind).count();
+    // 3 to 15 random triangles, 12 displaced ones; 4 tetrahedra have 16 faces.
+    assert_eq!(GreedyKind::ALL.map(of), [13 * 4, 2, 0, 2, 2]);
+    assert!(points.iter().all(|point| point.ratio() >= 1.0 - 1e-5 && point.optimum > 0.0), "{points:?}");
+    assert!(page.contains("icosphere") && page.contains("From 8 triangles on, the excess"), "{page}");
+    let again = tempfile::tempdir().expect("a temporary folder");
+    done(&arguments, again.path(), "greedy.html");
+    assert_eq!(read(again.path(), "greedy.jsonl"), read(folder.path(), "greedy.jsonl"), "the same on any number of threads");
+}
+
+#[test]
 fn points_beyond_the_floats_are_left_out_and_said_so() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let arguments =
@@ -136,6 +152,7 @@ fn wrong_arguments_are_told_apart_from_failed_work() {
         (&["hedge"][..], "unrecognized subcommand"),
         (&["growth", "-b", "lvbh"], "unknown builder \"lvbh\""),
         (&["growth", "--axes", "2"], "use 1 or 3"),
+        (&["greedy", "--most", "65"], "65 is not in 3..=64"),
         (&["growth", "--sides", "left"], "use + or -"),
         (&["growth", "--steps", "60/0"], "LAST/STEP"),
         (&["growth", "--rays", "light"], "unknown kind of ray \"light\""),

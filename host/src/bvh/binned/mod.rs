@@ -7,6 +7,8 @@
 //! threads.
 
 mod bins;
+mod ranked;
+pub(super) mod trial;
 
 use super::bounds::Item;
 use super::heuristic::split_cost::{AxisSplits, First, Place, Side, SplitCost, growing};
@@ -16,6 +18,7 @@ pub(super) use bins::partition;
 use bins::{Bin, FEW, Grid, Unsplit, fill, in_order_of_bins, measured, measured_alone, place_of, side, side_of};
 use bytemuck::zeroed_vec;
 use hedgerow::{Error, Result};
+pub(super) use ranked::build_ahead;
 
 /// How nodes are binned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,18 +91,22 @@ const FLAT: f32 = 1e-7;
 /// The tree over `items`. `scale` is what their lengths were scaled by.
 pub(super) fn build(
     by: &impl SplitCost,
-    mut items: Vec<Item>,
+    items: Vec<Item>,
     scale: f32,
     rule: LeafRule<'_>,
     options: &BinnedOptions,
 ) -> Topology {
+    let binned = Binned::new(scale, rule, options);
+    tree_over(items, |whole| top_down::build(&binned, by, whole))
+}
+
+/// The tree over `items` by what splits a part of them.
+fn tree_over(mut items: Vec<Item>, build: impl FnOnce(Part<'_>)) -> Topology {
     let mut tree = Topology::new(items.len());
     let mut spare: Vec<Item> = zeroed_vec(items.len());
-    let flat = if options.flat_leaves { 2.0 * FLAT * scale } else { 0.0 };
     let node = measured(&items);
     let Topology { order, splits } = &mut tree;
-    let whole = Part { items: &mut items, spare: &mut spare, order, slots: splits, node };
-    top_down::build(&Binned { rule, options, flat }, by, whole);
+    build(Part { items: &mut items, spare: &mut spare, order, slots: splits, node });
     tree
 }
 
@@ -147,6 +154,37 @@ struct Binned<'a> {
     flat: f32,
 }
 
+impl<'a> Binned<'a> {
+    fn new(scale: f32, rule: LeafRule<'a>, options: &'a BinnedOptions) -> Binned<'a> {
+        Binned { rule, options, flat: if options.flat_leaves { 2.0 * FLAT * scale } else { 0.0 } }
+    }
+
+    /// The bins of a part along the axes that are looked at; none where centroids do not tell its items apart, or it is too deep.
+    #[inline(always)]
+    fn grids(&self, part: &Part<'_>, depth: u32) -> [Option<Grid>; 3] {
+        let Part { items, node, .. } = part;
+        let bins = self.options.bins.of(items.len());
+        let grid = |axis| Grid::new(&node.centroids, axis, bins);
+        match self.options.axes {
+            _ if depth >= HALVED_FROM => [None; 3],
+            BinnedAxes::Longest => [grid(node.centroids.longest_edge().0), None, None],
+            BinnedAxes::All => [0, 1, 2].map(grid),
+        }
+    }
+
+    /// Whether a part is a leaf, whatever that costs.
+    #[inline(always)]
+    fn is_told_a_leaf(&self, Part { items, node, .. }: &Part<'_>) -> bool {
+        let edges = (node.centroids.hi - node.centroids.lo).min_element();
+        !self.rule.single && (items.len() <= self.options.leaf as usize || edges < self.flat)
+    }
+
+    #[inline(always)]
+    fn search<'s, C: SplitCost>(&'s self, by: &'s C, here: &'s C::Here, part: &'s Part<'_>) -> Search<'s, C> {
+        Search { by, here, rule: self.rule, items: part.items, weight: by.of_node(here, &part.node.bounds) }
+    }
+}
+
 impl Candidates for Binned<'_> {
     type Part<'a> = Part<'a>;
     type Split = Split;
@@ -158,21 +196,13 @@ impl Candidates for Binned<'_> {
 
     #[inline(always)]
     fn best<C: SplitCost>(&self, by: &C, here: &C::Here, part: &mut Part<'_>, depth: u32) -> Option<Split> {
-        let Part { items, node, .. } = part;
-        let edges = (node.centroids.hi - node.centroids.lo).min_element();
-        if !self.rule.single && (items.len() <= self.options.leaf as usize || edges < self.flat) {
+        if self.is_told_a_leaf(part) {
             return None;
         }
-        let bins = self.options.bins.of(items.len());
-        let grid = |axis| Grid::new(&node.centroids, axis, bins);
-        let grids = match self.options.axes {
-            BinnedAxes::Longest => [grid(node.centroids.longest_edge().0), None, None],
-            BinnedAxes::All => [0, 1, 2].map(grid),
-        };
-        let search = Search { by, here, rule: self.rule, items, weight: by.of_node(here, &node.bounds) };
-        if depth >= HALVED_FROM || grids.iter().all(Option::is_none) {
-            search.halved()
-        } else if items.len() <= FEW && !C::BY_BOTH {
+        let grids = self.grids(part, depth);
+        let search = self.search(by, here, part);
+        let Some(bins) = grids.iter().flatten().map(|grid| grid.bins).next() else { return search.halved() };
+        if part.items.len() <= FEW && !C::BY_BOTH {
             search.of_few(&grids)
         } else if bins <= 16 {
             search.at_bin::<16>(&grids)
@@ -308,18 +338,18 @@ impl<C: SplitCost> Search<'_, C> {
         if C::BY_BOTH {
             return self.best_plane_by_both(bins, grid);
         }
+        let first = (f32::INFINITY, 1);
+        self.planes::<N>(bins).fold(first, |best, plane| if plane.0 < best.0 { plane } else { best })
+    }
+
+    /// All planes between bins.
+    #[inline(always)]
+    fn planes<const N: usize>(&self, bins: &[Bin]) -> impl Iterator<Item = Plane> {
         let mut right_costs = [0.0; N];
         let from_right = self.costs(bins[1..].iter().rev().map(Bin::side));
         right_costs[1..bins.len()].iter_mut().rev().zip(from_right).for_each(|(place, cost)| *place = cost);
         let from_left = self.costs(bins[..bins.len() - 1].iter().map(Bin::side));
-        let mut best = (f32::INFINITY, 1);
-        for ((left_cost, right_cost), at) in from_left.zip(&right_costs[1..]).zip(1..) {
-            let cost = left_cost + right_cost;
-            if cost < best.0 {
-                best = (cost, at);
-            }
-        }
-        best
+        from_left.zip(1..).map(move |(left_cost, at)| (left_cost + right_costs[at], at))
     }
 
     /// The same by a heuristic whose sides cost something together alone.

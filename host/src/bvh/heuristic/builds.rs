@@ -86,7 +86,7 @@ fn rays_and_seen_primitives_give_valid_trees_the_same_on_any_number_of_threads()
     let complete = Heuristic::OcclusionComplete(Occlusion::of(&seen));
     for heuristic in [by_rays, by_shadows, Heuristic::Occlusion(Occlusion::of(&seen)), complete] {
         for method in METHODS {
-            if heuristic.check(&method, boxes.len()).is_err() {
+            if heuristic.check(&HostBvhOptions::of(method), boxes.len()).is_err() {
                 assert_eq!(heuristic, complete);
                 continue;
             }
@@ -125,7 +125,7 @@ fn a_heuristic_that_knows_of_nothing_gives_the_bytes_of_the_surface_area() {
         for termination in [Termination::Sah, Termination::Single, Termination::Heuristic] {
             let options = HostBvhOptions { termination, ..HostBvhOptions::of(method) };
             let by_area = tree(&Heuristic::Sah, &boxes, &options).to_bytes();
-            for heuristic in heuristics.iter().filter(|heuristic| heuristic.check(&method, 700).is_ok()) {
+            for heuristic in heuristics.iter().filter(|heuristic| heuristic.check(&HostBvhOptions::of(method), 700).is_ok()) {
                 assert!(tree(heuristic, &boxes, &options).to_bytes() == by_area, "{method:?}, {termination:?}");
             }
         }

@@ -32,7 +32,7 @@ pub mod preferred;
 pub mod shadow;
 pub(super) mod split_cost;
 
-use super::HostMethod;
+use super::{HostBvhOptions, HostMethod};
 #[cfg(doc)]
 use super::Termination;
 use super::bounds::{Bounds, Item};
@@ -72,11 +72,12 @@ pub enum Heuristic<'a> {
 }
 
 impl<'a> Heuristic<'a> {
-    /// Whether `method` can build a tree over `count` primitives by it.
+    /// Whether a tree over `count` primitives can be built by it with these options.
     ///
     /// # Errors
     /// [`Error::Argument`] names the method or the option that cannot be used, and what can.
-    pub fn check(&self, method: &HostMethod, count: usize) -> Result<()> {
+    pub fn check(&self, options: &HostBvhOptions, count: usize) -> Result<()> {
+        let HostBvhOptions { method, look_ahead, .. } = options;
         let (takes, instead) = match (self, method) {
             (Heuristic::Sah, _) => (true, ""),
             (Heuristic::OcclusionComplete(_), _) => (
@@ -88,6 +89,11 @@ impl<'a> Heuristic<'a> {
         };
         if !takes {
             return Err(Error::Argument(format!("{method:?} does not build by {instead}")));
+        }
+        if *self != Heuristic::Sah && *look_ahead > 1 {
+            let error =
+                format!("looking ahead at {look_ahead} splits is by surface area; take Heuristic::Sah, or 1 split");
+            return Err(Error::Argument(error));
         }
         match self {
             Heuristic::Sah | Heuristic::Interior(_) => Ok(()),

@@ -2,6 +2,7 @@
 
 use super::degenerate;
 use super::far::{FarTriangle, Side};
+use super::greedy::{self, GreedySetup};
 use super::large::{HugeTriangles, LargePlacement};
 use super::page::{self, Paged};
 use super::points::{Run, Stretched};
@@ -38,6 +39,8 @@ enum Experiment {
     Large(Large),
     /// Scenes that hurt: valid trees, the same bytes each time, right hits? degenerate.jsonl and degenerate.html
     Degenerate(Degenerate),
+    /// What greedy trees over up to 64 triangles cost beside the cheapest ones: greedy.jsonl and greedy.html
+    Greedy(Greedy),
 }
 
 /// What growth and large primitives have in common.
@@ -118,6 +121,22 @@ struct Degenerate {
     output: PathBuf,
 }
 
+#[derive(Debug, clap::Args)]
+struct Greedy {
+    /// Scenes of which parts are measured, too: files, bare names or generators [default: pigman]
+    #[arg(value_name = "SCENE")]
+    scenes: Vec<String>,
+    /// Random scenes of each size up to 30 triangles; of the other kinds half as many, and fewer of more triangles
+    #[arg(long, value_name = "N", default_value = "50")]
+    seeds: NonZeroU32,
+    /// Triangles of a scene at most; from 50 on each takes many seconds
+    #[arg(long, value_name = "N", default_value = "64", value_parser = clap::value_parser!(u32).range(3..=64))]
+    most: u32,
+    /// The folder for records, charts and the page; pages of other experiments there are linked
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
 fn axes(text: &str) -> Result<u32, String> {
     let axes = text.parse().ok().filter(|axes| [1, 3].contains(axes));
     axes.ok_or_else(|| format!("{text:?} is not a number of axes; use 1 or 3"))
@@ -140,7 +159,34 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
             run_relative(common, relative, builder, (&stretches, &steps.0))
         }
         Experiment::Degenerate(degenerate) => run_degenerate(common, degenerate),
+        Experiment::Greedy(greedy) => run_greedy(common, greedy),
     }
+}
+
+/// The scenes of these names, or those that are taken where none is named.
+fn loaded(common: &Common, named: &[String]) -> crate::Result<Vec<Scene>> {
+    match named {
+        [] => SCENES.iter().map(|spec| common.load(spec)).collect(),
+        named => named.iter().map(|spec| common.load(spec)).collect(),
+    }
+}
+
+fn run_greedy(common: &Common, arguments: &Greedy) -> anyhow::Result<()> {
+    let scenes = loaded(common, &arguments.scenes)?;
+    let mut points = Points::create(&arguments.output)?;
+    let options = [("Random scenes", format!("{} of each size, the first with seed {}", arguments.seeds, common.seed))];
+    let run = started(None, &[], &options)?;
+    let bar = Bar::new(common, "measuring", 0);
+    let setup = GreedySetup {
+        seeds: arguments.seeds.get(),
+        most: arguments.most,
+        first_seed: common.seed,
+        say: &|what| bar.say(what),
+    };
+    greedy::measure(&setup, &scenes, &mut |point| points.append(point))?;
+    drop(bar);
+    let page = page::finish::<stability::points::Greedy>(&arguments.output, &run)?;
+    page_written(None, &page, 0)
 }
 
 fn run_relative<S: Stretch>(
@@ -152,10 +198,7 @@ fn run_relative<S: Stretch>(
 where
     Stretched<S>: Paged,
 {
-    let scenes: Vec<Scene> = match &arguments.scenes[..] {
-        [] => SCENES.iter().map(|spec| common.load(spec)).collect::<crate::Result<_>>()?,
-        named => named.iter().map(|spec| common.load(spec)).collect::<crate::Result<_>>()?,
-    };
+    let scenes = loaded(common, &arguments.scenes)?;
     let (device, specs) = opened(common, builders)?;
     // Before any work: a folder that cannot be written would lose all of it.
     let mut points = Points::<Stretched<S>>::create(&arguments.output)?;

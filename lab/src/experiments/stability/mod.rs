@@ -1,7 +1,7 @@
 //! What `hedgerow stability` measures: where methods give way.
 //!
 //! [`far`]: the bounds grow by a far triangle; [`large`]: huge triangles at the scene's edge; [`degenerate`]: scenes that
-//! hurt. The first two compare a builder with itself ([`relative`]) by the cost of what stays ([`clipped`]) and the speed of its
+//! hurt; [`greedy`]: what greedy trees cost over the cheapest ones. The first two compare a builder with itself ([`relative`]) by the cost of what stays ([`clipped`]) and the speed of its
 //! rays; [`mod@drop`] says where a tenth is lost. Each gives [`points`] as it goes.
 
 pub mod clipped;
@@ -9,6 +9,7 @@ pub(crate) mod command;
 pub mod degenerate;
 pub mod drop;
 pub mod far;
+pub mod greedy;
 pub mod large;
 pub mod page;
 pub mod points;

@@ -1,4 +1,4 @@
-//! The lines of `growth.jsonl`, `large.jsonl` and `degenerate.jsonl` (CONTRACT, "Records of experiments"), and where and how
+//! The lines of `growth.jsonl`, `large.jsonl`, `degenerate.jsonl` and `greedy.jsonl` (CONTRACT, "Records of experiments"), and where and how
 //! they were measured, in a file beside each. A figure that was not measured is `None`.
 
 use super::far::FarTriangle;
@@ -17,6 +17,8 @@ pub enum Experiment {
     Large,
     /// Scenes that hurt.
     Degenerate,
+    /// Greedy trees beside the cheapest ones.
+    Greedy,
 }
 
 /// A builder on a scene with something beside it that stretches the bounds.
@@ -97,6 +99,68 @@ impl Degenerate {
     }
 }
 
+/// A greedy full sweep over a few triangles, and the cheapest tree by sorted planes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Greedy {
+    /// What it is of.
+    pub experiment: Experiment,
+    /// How the triangles were made or chosen.
+    pub kind: GreedyKind,
+    /// The scene that they are a part of, if they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<String>,
+    /// How many there are.
+    pub triangles: u32,
+    /// What made or chose them.
+    pub seed: u64,
+    /// SAH cost of the sweep.
+    pub greedy: f64,
+    /// The same of the cheapest tree.
+    pub optimum: f64,
+    /// How many sets of triangles the search has split.
+    pub sets: u64,
+}
+
+impl Greedy {
+    /// The sweep's cost over the optimum; 1 where both are 0.
+    pub fn ratio(&self) -> f64 {
+        if self.optimum > 0.0 { self.greedy / self.optimum } else { 1.0 }
+    }
+}
+
+/// Kinds of scenes of a few triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GreedyKind {
+    /// Corners anywhere in a cube.
+    Random,
+    /// One shape, turned and moved in cells of a grid.
+    Displaced,
+    /// The faces of tetrahedra, likewise.
+    Tetrahedra,
+    /// Triangles of a scene, drawn by their areas.
+    Sampled,
+    /// Neighbours in a scene.
+    Near,
+}
+
+impl GreedyKind {
+    /// All of them.
+    pub const ALL: [GreedyKind; 5] =
+        [GreedyKind::Random, GreedyKind::Displaced, GreedyKind::Tetrahedra, GreedyKind::Sampled, GreedyKind::Near];
+
+    /// Its name, as records have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            GreedyKind::Random => "random",
+            GreedyKind::Displaced => "displaced",
+            GreedyKind::Tetrahedra => "tetrahedra",
+            GreedyKind::Sampled => "sampled",
+            GreedyKind::Near => "near",
+        }
+    }
+}
+
 /// Where and how the points of a file were measured, and what could not be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Run {
@@ -118,6 +182,17 @@ mod tests {
         let point: Growth = serde_json::from_str(line).expect("the contract's example, but for its schema");
         assert_eq!((point.experiment, point.by.side), (Experiment::Growth, Side::Positive));
         assert_eq!(serde_json::to_string(&point).expect("JSON"), line);
+    }
+
+    #[test]
+    fn a_point_of_the_greedy_experiment_is_a_line_that_names_its_scene_where_it_has_one() {
+        let line = r#"{"experiment":"greedy","kind":"random","triangles":15,"seed":3,"greedy":21.5,"optimum":20.0,"sets":2067}"#;
+        let point: Greedy = serde_json::from_str(line).expect("a point");
+        assert_eq!((point.scene.as_deref(), point.ratio()), (None, 1.075));
+        assert_eq!(serde_json::to_string(&point).expect("JSON"), line);
+        for kind in GreedyKind::ALL {
+            assert_eq!(serde_json::to_string(&kind).expect("JSON"), format!("\"{}\"", kind.name()));
+        }
     }
 
     #[test]

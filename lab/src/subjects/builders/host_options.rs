@@ -47,6 +47,8 @@ pub(super) const SAMPLE: BuilderOption =
     option("sample", "a number of rays from 0 to 100000000 that rdh and srdh learn from, at most; 262144 unless given");
 pub(super) const WEIGHT: BuilderOption =
     option("weight", "a number from 0 to 1: what cameras and rays weigh beside the area; 0.9 unless given");
+pub(super) const LOOK_AHEAD: BuilderOption =
+    option("look-ahead", "a number of splits of a node from 1 to 64, judged by temporary trees below; 1 unless given");
 pub(super) const LEAF: BuilderOption = option("leaf", "a number of triangles from 1 to 255 that always are a leaf");
 pub(super) const AXES: BuilderOption = option("axes", "longest or all");
 pub(super) const HOST_BINS: BuilderOption =
@@ -166,8 +168,9 @@ impl Spec {
         };
         let termination = self.choice(option, known)?.unwrap_or(Termination::Sah);
         let optimise = self.optimise_on_host()?;
-        let options =
-            HostBvhOptions { codes: self.codes()?, collapse: self.collapse()?, termination, optimise, method };
+        let look_ahead = self.within(&LOOK_AHEAD, 1..=64)?.unwrap_or(1);
+        let (codes, collapse) = (self.codes()?, self.collapse()?);
+        let options = HostBvhOptions { codes, collapse, termination, optimise, method, look_ahead };
         options.check()?;
         let threads = self.within(&THREADS, NonZeroU32::MIN..=MOST_THREADS)?;
         Ok(BuilderPlan::Host(HostPlan::Built { options, threads }))

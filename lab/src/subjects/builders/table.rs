@@ -2,8 +2,8 @@
 
 use super::host_options::{
     ALPHA, AXES, BATCH, BUDGET, DELTA, EPSILON, HEURISTIC, HEURISTIC_OF_SPLITS, HOST_BINS, HOST_OPTIMISE, INSERT_ORDER,
-    LEAF, MINI, PRUNE, SAMPLE, SBVH_BINS, SEARCH, TEACHING_RAYS, TERMINATION, TERMINATION_BY, TERMINATION_FLAT,
-    THREADS, WEIGHT,
+    LEAF, LOOK_AHEAD, MINI, PRUNE, SAMPLE, SBVH_BINS, SEARCH, TEACHING_RAYS, TERMINATION, TERMINATION_BY,
+    TERMINATION_FLAT, THREADS, WEIGHT,
 };
 use super::options::{
     ANY_HIT, BINS, BITS, CODES, COLLAPSE, EXACT, KD_SCHEDULE, KI, KT, OPEN, OPTIMISE, ORDER, RADIUS, RAYS, SCHEDULE,
@@ -157,7 +157,17 @@ pub static BUILDERS: &[BuilderEntry] = &[
     on_host(&"sweep", "full-sweep SAH on the host: the reference for the quality of the others", |spec| {
         spec.on_host(HostMethod::Sweep)
     })
-    .taking(&[HEURISTIC, TEACHING_RAYS, SAMPLE, WEIGHT, TERMINATION_BY, COLLAPSE, HOST_OPTIMISE, THREADS]),
+    .taking(&[
+        HEURISTIC,
+        TEACHING_RAYS,
+        SAMPLE,
+        WEIGHT,
+        LOOK_AHEAD,
+        TERMINATION_BY,
+        COLLAPSE,
+        HOST_OPTIMISE,
+        THREADS,
+    ]),
     on_host(&"binned", "binned SAH on the host: the best of the planes between bins, top-down", Spec::binned)
         .taking(&[
             HOST_BINS,
@@ -167,6 +177,7 @@ pub static BUILDERS: &[BuilderEntry] = &[
             TEACHING_RAYS,
             SAMPLE,
             WEIGHT,
+            LOOK_AHEAD,
             TERMINATION_FLAT,
             COLLAPSE,
             HOST_OPTIMISE,

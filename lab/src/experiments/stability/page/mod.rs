@@ -5,12 +5,13 @@
 //! name each other.
 
 mod degenerate;
+mod greedy;
 mod growth;
 mod large;
 mod losses;
 mod stretched;
 
-use super::points::{Degenerate, Growth, Large, Run};
+use super::points::{Degenerate, Greedy, Growth, Large, Run};
 use crate::Result;
 use crate::experiments::write_pages;
 use crate::report::beside::Page;
@@ -71,7 +72,8 @@ pub fn read_run<P: Paged>(folder: &Path) -> Result<Option<Run>> {
 pub fn write_all(folder: &Path) -> Result<()> {
     write::<Growth>(folder)?;
     write::<Large>(folder)?;
-    write::<Degenerate>(folder)
+    write::<Degenerate>(folder)?;
+    write::<Greedy>(folder)
 }
 
 fn write<P: Paged>(folder: &Path) -> Result<()> {
