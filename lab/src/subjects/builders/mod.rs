@@ -335,6 +335,8 @@ mod tests {
             error_of("lbvh:width=4:any-hit=sato").contains("orders of children are for nodes of two; take width=2")
         );
         assert!(error_of("kd-exact:any-hit=sato").contains("no option \"any-hit\""));
+        assert!(error_of("lbvh:walk=there").contains("walk=there is unknown; use tracer, or query"));
+        assert!(error_of("lbvh:width=4:walk=query").contains("queries are for nodes of two; take width=2"));
         assert!(error_of("sweep:heuristic=best").contains("heuristic=best is unknown; use sah, interior"));
         assert!(error_of("bonsai:heuristic=rdh").contains("bonsai has no option \"heuristic\""));
         assert!(error_of("binned:heuristic=rdh:rays=primary+light").contains("rays=primary+light is unknown; use all"));
