@@ -100,9 +100,9 @@ impl ChildOrderPass {
     }
 
     /// Records the same with an order that rays have taught: first comes the child with more hits for its work by `counts`
-    /// ([`LinkCount`](super::counts::LinkCount) × 2 for each node slot, of rays that were counted exhaustively). [`ChildOrder::MoreHitsForItsCost`]
-    /// weighs as much as 8 rays into each child, whatever the order of this pass is. Counts of children that are swapped are swapped,
-    /// too, so that they stay those of their links.
+    /// ([`LinkCount`] × 2 for each node slot, of rays that were counted exhaustively). [`ChildOrder::MoreHitsForItsCost`] weighs as much as
+    /// 8 rays into each child, whatever the order of this pass is. Counts of children that are swapped are swapped, too, so that they
+    /// stay those of their links.
     ///
     /// # Errors
     /// As [`ChildOrderPass::record`].

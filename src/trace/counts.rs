@@ -179,8 +179,8 @@ impl CountPass {
     /// [`CountPass::scratch_bytes`], aligned to 8. Those of nodes behind the structure's own are not written. In a structure of more
     /// primitives than was planned for nothing is counted.
     ///
-    /// A subtree's work is that of all rays that went into its links, `c_T` a node and `c_I` a primitive of a leaf, whether or not a ray has
-    /// ended before it met all of them.
+    /// A subtree's work is that of all rays that went into its links, `c_T` a node and `c_I` a primitive of a leaf, whether or not a ray
+    /// has ended before it met all of them.
     ///
     /// The caller places a barrier before and behind.
     ///

@@ -16,8 +16,8 @@ impl<R: Record> Bvh2<R> {
         self.ordered(order, costs, &mut [])
     }
 
-    /// The same with an order that rays have taught ([`ChildOrderPass::record_by_counts`](crate::bvh::child_order::ChildOrderPass)), by counts of
-    /// its links; they are swapped with the children.
+    /// The same with an order that rays have taught, by counts of its links; they are swapped with the children. The twin of
+    /// [`ChildOrderPass::record_by_counts`](crate::bvh::child_order::ChildOrderPass::record_by_counts).
     ///
     /// # Panics
     /// There are fewer than two counts a node slot.

@@ -8,8 +8,8 @@ use crate::trace::ray::PreparedRay;
 use crate::trace::twin::tracer::{LONG_LEAF, Nearest};
 use crate::trace::{Query, Ray, slab};
 
-/// Adds what these rays do in `tree` to `counts`, two for each of its node slots. A tree that cannot be traced, or whose root is a leaf, has
-/// no links.
+/// Adds what these rays do in `tree` to `counts`, two for each of its node slots. A tree that cannot be traced, or whose root is a leaf,
+/// has no links.
 ///
 /// # Panics
 /// There are fewer counts than links.
