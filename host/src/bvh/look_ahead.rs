@@ -106,6 +106,8 @@ mod tests {
     use crate::bvh::binned::BinnedAxes;
     use crate::bvh::bounds::tests::boxes as items;
     use crate::bvh::heuristic::InteriorForm;
+    use crate::bvh::heuristic::split_cost::Area;
+    use crate::bvh::optimal::tests::random_triangles;
     use crate::bvh::{
         ALONE, AacOptions, BinnedOptions, Heuristic, HostBvhOptions, HostMethod, Termination, build_aabbs,
         build_aabbs_by,
@@ -128,12 +130,11 @@ mod tests {
         // By the path of those that look ahead, which a build with one split does not take.
         for (count, single) in [(40, false), (700, true), (5000, false)] {
             let rule = LeafRule { costs: &Collapse::SAH, single };
-            let plain = crate::bvh::sweep::build(&crate::bvh::heuristic::split_cost::Area, &items(count), rule);
+            let plain = crate::bvh::sweep::build(&Area, &items(count), rule);
             assert!(crate::bvh::sweep::build_ahead(&items(count), rule, 1) == plain, "{count} boxes by sweep");
             for axes in [BinnedAxes::Longest, BinnedAxes::All] {
                 let options = BinnedOptions { axes, ..BinnedOptions::WALD };
-                let area = &crate::bvh::heuristic::split_cost::Area;
-                let plain = crate::bvh::binned::build(area, items(count), 1.0, rule, &options);
+                let plain = crate::bvh::binned::build(&Area, items(count), 1.0, rule, &options);
                 let ahead = crate::bvh::binned::build_ahead(items(count), 1.0, rule, &options, 1);
                 assert!(ahead == plain, "{count} boxes, {axes:?}");
             }
@@ -157,6 +158,22 @@ mod tests {
                 let plain = build_aabbs(&boxes, &HostBvhOptions { look_ahead: 1, ..options }).expect("sound options");
                 assert!(one != plain.tree.to_bytes(), "{options:?}");
             }
+        }
+    }
+
+    #[test]
+    fn trees_that_look_ahead_cost_less_in_the_mean() {
+        for method in METHODS {
+            let cost = |look_ahead, boxes: &[Aabb]| {
+                let options = HostBvhOptions { look_ahead, ..HostBvhOptions::of(method) };
+                build_aabbs(boxes, &options).expect("sound options").tree.header.cost
+            };
+            let ratio = |seed| {
+                let boxes = random_triangles(400, seed);
+                cost(8, &boxes) / cost(1, &boxes)
+            };
+            let mean = (0..8).map(ratio).sum::<f32>() / 8.0;
+            assert!(mean < 0.99, "{method:?}: {mean}");
         }
     }
 

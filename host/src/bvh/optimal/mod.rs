@@ -153,4 +153,4 @@ fn entries_of(mut set: u64) -> impl Iterator<Item = usize> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

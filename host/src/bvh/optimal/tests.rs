@@ -21,7 +21,7 @@ impl Random {
 }
 
 /// The boxes of triangles whose corners are anywhere in a cube, as in section 4.4 of the thesis.
-pub(super) fn random_triangles(count: usize, seed: u64) -> Vec<Aabb> {
+pub(in crate::bvh) fn random_triangles(count: usize, seed: u64) -> Vec<Aabb> {
     let mut random = Random::new(seed);
     let mut corner = || [0; 3].map(|_| random.next());
     (0..count).map(|_| Aabb::around(&[corner(), corner(), corner()])).collect()
