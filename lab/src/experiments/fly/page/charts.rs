@@ -62,10 +62,11 @@ fn work_over_frames(frames: &[&FlownFrame], scene: &str, builder: &str) -> Resul
     all.retain(|curve| !curve.points.is_empty());
     let caption = Caption {
         name: format!("fly-work-{}-{}", slug(scene), slug(builder)),
-        title: format!("{scene}: work a ray with {}, frame by frame", short(builder)),
+        title: format!("{scene}: work a ray, frame by frame"),
         alt: format!("Work a ray in every frame with {builder}, a line a cadence"),
-        reading: "3 a step and 2 a test, over rays of all kinds. Where lines of cadences lie apart, trees grow stale."
-            .into(),
+        reading: format!(
+            "With {builder}. 3 a step and 2 a test, over rays of all kinds. Where lines of cadences lie apart, trees grow stale."
+        ),
     };
     let x = Axis { name: "frame", is_log: false, number: tick };
     curves::curves(caption, &all, &x, &Axis { name: "work a ray", is_log: false, number: tick })
@@ -75,10 +76,11 @@ fn total_times(measured: &Measured, scene: &str, (size, traced): ([u32; 2], [u32
     let scale = scale(size, traced);
     let all = totals(&measured.frames);
     let of_scene = all.iter().filter(|total| total.scene == scene && total.is_for(size));
+    let builders = distinct(measured.frames.iter().map(|frame| frame.builder.as_str()));
     let stack = |(place, total): (usize, &Total)| {
         let part = |name: &str, milliseconds, tone| Part { name: name.into(), milliseconds, tone };
         Stack {
-            name: format!("{}, {}", short(&total.builder), total.cadence),
+            name: format!("{}, {}", label(&total.builder, &builders), total.cadence),
             tone: tone(total.cadence, place),
             total: total.at(scale),
             parts: vec![
@@ -92,9 +94,34 @@ fn total_times(measured: &Measured, scene: &str, (size, traced): ([u32; 2], [u32
     let picture = picture(size);
     let caption = Caption {
         name: format!("fly-total-{}-{picture}", slug(scene)),
-        title: format!("{scene}: total time of the flight, builds charged, pictures of {picture}"),
+        title: format!("{scene}: the whole flight, builds charged, {picture}"),
         alt: stacks.iter().map(Stack::in_words).collect::<Vec<_>>().join("; "),
         reading: "One bar a builder and cadence. Shorter is better. Tracing is that of the small pictures, times the ratio of pixels.".into(),
     };
     stacked(caption, "milliseconds of the flight", "flight", &stacks)
+}
+
+/// A builder by its name and what it learns from, where no other of `all` is called so: bars have little room for names.
+fn label(builder: &str, all: &[&str]) -> String {
+    let brief = |builder: &str| {
+        let mut parts = builder.split(':');
+        let name = parts.next().unwrap_or_default().to_owned();
+        let of_learning = ["heuristic=", "rays="];
+        let values = parts.filter_map(|part| of_learning.iter().find_map(|key| part.strip_prefix(key)));
+        values.fold(name, |label, value| label + " " + value)
+    };
+    let own = brief(builder);
+    if all.iter().filter(|other| brief(other) == own).count() > 1 { short(builder) } else { own }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn builders_are_called_by_what_they_learn_from_unless_two_were_called_the_same() {
+        let rdh = "binned:axes=all:bins=10:heuristic=rdh:rays=primary";
+        assert_eq!(label(rdh, &["hploc", rdh]), "binned rdh primary");
+        assert_eq!(label("hploc:radius=8", &["hploc", "hploc:radius=8"]), "hploc radius 8");
+    }
 }
