@@ -30,10 +30,8 @@ fn a_run_leaves_records_and_a_page_that_says_what_they_tell() {
     for record in &records {
         assert_eq!(record.host.iter().map(|rays| rays.rays.as_str()).collect::<Vec<_>>(), ["primary", "ao"]);
         assert!(record.device.is_empty() && record.lcv.is_some() && record.epo.is_some(), "{record:?}");
-        assert_eq!(record.own.len(), if record.scene == "gen:stadium:3" { 6 } else { record.own.len() });
+        assert_eq!(record.own.len(), 6, "{record:?}");
         assert!(record.host.iter().all(|rays| rays.ns.min > 0.0 && rays.steps > 0.0), "{record:?}");
-        // Rays that end visit fewer nodes than lines that go on through the whole scene.
-        assert!(record.sah > 0.0 && record.own["interior"] > 0.0, "{record:?}");
     }
     let of = |builder: &str| {
         records.iter().find(|record| record.scene == "gen:stadium:3" && record.builder == builder).expect(builder)
@@ -87,7 +85,6 @@ fn what_cannot_be_compared_is_refused_before_any_work() {
         (&["-b", "sweep,kd-exact"], "a kd-tree is not compared with BVHs"),
         (&["-b", "sweep,binned:trace=device"], "leave trace= out"),
         (&["--rays", ""], "unknown kind of ray"),
-        (&["--runs", "0"], "0"),
     ] {
         let done = run(folder.path(), &[&["gen:icosphere:1"], wrong].concat());
         assert_eq!(done.status.code(), Some(2), "{wrong:?}: {}", err(&done));

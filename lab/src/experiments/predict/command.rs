@@ -8,7 +8,6 @@ use crate::cli::{Bar, Common, work};
 use crate::experiments::bench::matrix::OnScene;
 use crate::experiments::cpu_builders::command::{device_if_any, host_alone, scenes};
 use crate::measure::Setting;
-use crate::rays::kinds::RayKind;
 use crate::report::beside;
 use crate::report::lines::Lines;
 use std::num::NonZeroU32;

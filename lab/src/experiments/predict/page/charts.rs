@@ -72,7 +72,7 @@ fn scatter(predictor: &Predictor, scenes: &[&str], clouds: &[Cloud<'_>]) -> Resu
         title: format!("{}: told against measured", predictor.name),
         alt: words.clone(),
         reading: format!(
-            "{}. Circles are the host, squares the device; the dashes are where both ratios are one. {words}.",
+            "{}. Circles are the host, squares the device; the dashes are where both ratios are equal. {words}.",
             predictor.what
         ),
     };
