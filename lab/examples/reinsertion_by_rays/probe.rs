@@ -2,7 +2,7 @@
 
 use super::frames::{rays_of, work};
 use super::measures::Area;
-use super::search::{LinkedTree, Measure};
+use super::search::{LinkedTree, Measure, Move};
 use hedgerow::bvh::builder::Window;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::Bvh2;
@@ -11,15 +11,32 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::{hploc, lbvh, quality, refit};
 use hedgerow_lab::scene::{LoadOptions, Scene, load_animation};
 
-/// Of a tree, the sum of the best gains of the links of a round, for all links, over the root's area.
-fn probed(tree: &Bvh2, round: u32) -> f64 {
+/// Sums of gains that a search finds, for all links, over the root's area.
+#[derive(Clone, Copy, Default)]
+struct Probed {
+    /// Of the best moves of the links of a round.
+    best: f64,
+    /// Of those that would be made.
+    made: f64,
+    /// Of the best moves of the links of four rounds.
+    best_of_four: f64,
+    /// Of those that would be made, each round for itself.
+    made_of_four: f64,
+}
+
+fn probed(tree: &Bvh2) -> Probed {
     let linked = LinkedTree::new(tree.clone());
     let mut area = Area::default();
-    area.prepare(&linked, round);
+    area.prepare(&linked, 0);
     let stride = linked.stride();
-    let moves = linked.moves(&area, round % stride, stride);
-    let sum: f64 = moves.iter().map(|m| f64::from(m.gain)).sum();
-    sum * f64::from(stride) / f64::from(linked.area(&tree.header.root.bounds()))
+    let unit = f64::from(stride) / f64::from(linked.area(&tree.header.root.bounds()));
+    let sum = |moves: &[Move]| unit * moves.iter().map(|m| f64::from(m.gain)).sum::<f64>();
+    let rounds: [[f64; 2]; 4] = std::array::from_fn(|k| {
+        let moves = linked.moves(&area, 17 * k as u32 % stride, stride);
+        [sum(&moves), sum(&linked.settled(&moves))]
+    });
+    let mean = |i: usize| rounds.iter().map(|round| round[i]).sum::<f64>() / 4.0;
+    Probed { best: rounds[0][0], made: rounds[0][1], best_of_four: mean(0), made_of_four: mean(1) }
 }
 
 /// A line a frame: what was probed, what a pass wins in the cost of steps and in work, and how the cost has grown.
@@ -32,7 +49,7 @@ pub fn run(name: &str, passes: u32, every: usize) {
     let mut tree = start.collapsed(&Collapse::SAH);
     let first = quality::of(&tree, 3.0, 2.0).sah;
     println!("{name}: {} triangles, {} frames, {passes} passes at the build", triangles.len(), animation.frames.len());
-    let mut rows: Vec<[f64; 6]> = Vec::new();
+    let mut rows: Vec<[f64; 7]> = Vec::new();
     for number in (0..animation.frames.len()).step_by(every) {
         let mesh = animation.mesh(number);
         refit::refit_corners(&mut tree, lbvh::corners(&mesh.positions, &mesh.triangles), Collapse::SAH);
@@ -43,31 +60,19 @@ pub fn run(name: &str, passes: u32, every: usize) {
         let total = |tree: &Bvh2| work(tree, &frame).iter().sum::<f64>();
         let (before, after) = (sah(&tree), sah(&better));
         let (work_before, work_after) = (total(&tree), total(&better));
-        let probes: Vec<f64> = (0..4).map(|k| 3.0 * probed(&tree, 17 * k)).collect();
-        let row = [
-            probes[0] / before,
-            probes.iter().sum::<f64>() / 4.0 / before,
-            (before - after) / before,
-            (work_before - work_after) / work_before,
-            before / first - 1.0,
-            f64::from(number as u32),
-        ];
-        println!(
-            "  frame {number:3}  probe {:.4}  of four {:.4}  won sah {:.4}  won work {:.4}  growth {:.4}",
-            row[0], row[1], row[2], row[3], row[4]
-        );
+        let Probed { best, made, best_of_four, made_of_four } = probed(&tree);
+        let [best, made, best_of_four, made_of_four] =
+            [best, made, best_of_four, made_of_four].map(|x| 3.0 * x / before);
+        let won = [(before - after) / before, (work_before - work_after) / work_before];
+        let row = [best, made, best_of_four, made_of_four, before / first - 1.0, won[0], won[1]];
+        println!("  frame {number:3}  {}", row.map(|x| format!("{x:8.4}")).join(""));
         rows.push(row);
     }
-    let r = |a: usize, b: usize| correlation(&rows.iter().map(|row| [row[a], row[b]]).collect::<Vec<_>>());
-    println!(
-        "  r: probe, sah {:.3}  of four, sah {:.3}  probe, work {:.3}  of four, work {:.3}  growth, sah {:.3}  growth, work {:.3}",
-        r(0, 2),
-        r(1, 2),
-        r(0, 3),
-        r(1, 3),
-        r(4, 2),
-        r(4, 3)
-    );
+    let names = ["best", "made", "best of four", "made of four", "growth"];
+    for (i, what) in names.iter().enumerate() {
+        let r = |with: usize| correlation(&rows.iter().map(|row| [row[i], row[with]]).collect::<Vec<_>>());
+        println!("  {what:14} r with the cost that a pass wins {:.3}, with the work {:.3}", r(5), r(6));
+    }
 }
 
 fn correlation(pairs: &[[f64; 2]]) -> f64 {

@@ -89,7 +89,16 @@ impl LinkedTree {
 
     pub fn round<M: Measure>(&mut self, measure: &mut M, round: u32) -> usize {
         measure.prepare(self, round);
-        let moves = self.moves(measure, round % self.stride(), self.stride());
+        let won = self.settled(&self.moves(measure, round % self.stride(), self.stride()));
+        for m in &won {
+            measure.moves(self, m, self.top(m));
+            self.make(m);
+        }
+        won.len()
+    }
+
+    /// Those that are first on all nodes of their path.
+    pub fn settled(&self, moves: &[Move]) -> Vec<Move> {
         let mut gains = vec![0.0f32; self.tree.nodes.len()];
         let mut first = vec![NONE; self.tree.nodes.len()];
         for (m, slot) in moves.iter().flat_map(|m| self.path(m).map(move |slot| (m, slot as usize))) {
@@ -101,12 +110,7 @@ impl LinkedTree {
             }
         }
         let wins = |m: &&Move| self.path(m).all(|slot| first[slot as usize] == m.link);
-        let won: Vec<Move> = moves.iter().filter(wins).copied().collect();
-        for m in &won {
-            measure.moves(self, m, self.top(m));
-            self.make(m);
-        }
-        won.len()
+        moves.iter().filter(wins).copied().collect()
     }
 
     pub fn child(&self, link: u32) -> Child {
