@@ -22,7 +22,7 @@ pub(super) fn rows(samples: &[Sample], scope: Scope<'_>) -> Vec<Row> {
 }
 
 /// The one that goes with time best.
-fn best<'r>(rows: &'r [Row], is_wanted: impl Fn(&Predictor) -> bool) -> Option<&'r Row> {
+fn best(rows: &[Row], is_wanted: impl Fn(&Predictor) -> bool) -> Option<&Row> {
     let r = |row: &Row| row.1.correlation.pearson.unwrap_or(-1.0);
     rows.iter().filter(|row| is_wanted(row.0)).max_by(|a, b| r(a).total_cmp(&r(b)))
 }
