@@ -138,12 +138,15 @@ fn rays_of(rays: CameraRays, scene: &Scene) -> PreferredRays {
 impl Taught {
     /// How many rays taught it, where they do one by one.
     pub fn rays(&self) -> Option<u64> {
-        if let Taught::Rays(segments, _) = self { Some(segments.len() as u64) } else { None }
+        match self {
+            Taught::Rays(segments, _) | Taught::Shadows(ShadowSample { segments, .. }, _) => Some(segments.len() as u64),
+            Taught::Box(_) | Taught::Seen(..) => None,
+        }
     }
 
     /// How many triangles were seen, where that is what it learns.
     pub fn seen(&self) -> Option<u64> {
-        if let Taught::Seen(seen, _) = self { Some(seen.iter().filter(|&&seen| seen).count() as u64) } else { None }
+        if let Taught::Seen(seen, ..) = self { Some(seen.iter().filter(|&&seen| seen).count() as u64) } else { None }
     }
 
     /// What the builder takes.

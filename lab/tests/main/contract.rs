@@ -3,7 +3,7 @@
 use std::process::Command;
 
 /// Each command with its options that are relied on.
-const COMMANDS: [(&str, &[&str]); 16] = [
+const COMMANDS: [(&str, &[&str]); 17] = [
     ("devices", &["--json"]),
     ("build", &["--builder", "--json", "--output", "--runs", "--costs", "--epo"]),
     ("trace", &["--builder", "--rays", "--size", "--json", "--rays-file", "--hits-file", "--any-hit"]),

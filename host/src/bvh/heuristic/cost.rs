@@ -4,10 +4,10 @@
 //! With the rays of another measure in place of the areas it is their work, if none ended early: C_F = (c_t Σ F(inner) + c_i Σ
 //! F(leaf) · its primitives) / F(root). A top-down builder makes it small split by split, and never sees the sum.
 
-use super::distribution::{Distribution, RayDistribution};
+use super::distribution::{Distribution, RayDistribution, Segment};
 use super::interior::Interior;
 use super::preferred::{Preferred, PreferredMeasure};
-use super::{Heuristic, Occlusion, RayMeasure};
+use super::{Heuristic, Occlusion, RayMeasure, ShadowRays};
 use crate::bvh::bounds::Bounds;
 use hedgerow::bvh::layout::{Bvh2, Child, Record};
 use hedgerow::geometry::Aabb;
@@ -17,7 +17,8 @@ use rayon::prelude::*;
 impl Heuristic<'_> {
     /// C_F of `tree` with these costs of a step and of a test, in the unit of the SAH cost. What a heuristic counts beside its own
     /// rays, the surface area, is left out: of preferred rays, of a sample and of seen primitives it is the work of those alone.
-    /// Rays of a sample end where they ended; what is met on the way is met in no order. `None` where the heuristic knows of
+    /// Rays of a sample end where they ended; what is met on the way is met in no order. Shadow rays go left first, each to its first
+    /// hit. `None` where the heuristic knows of
     /// nothing: an empty tree, a scene without volume, no ray that meets it, no primitive that is seen.
     ///
     /// # Errors
@@ -40,7 +41,13 @@ impl Heuristic<'_> {
                 rays.check()?;
                 of_sample(tree, rays, costs)
             }
-            Heuristic::Occlusion(occlusion) => of_seen(&walk, tree, occlusion, costs)?,
+            Heuristic::Occlusion(occlusion) | Heuristic::OcclusionComplete(occlusion) => {
+                of_seen(&walk, tree, occlusion, costs)?
+            }
+            Heuristic::Shadow(rays) => {
+                rays.check(usize::MAX)?;
+                of_shadows(tree, rays, costs)
+            }
         })
     }
 }
@@ -95,7 +102,7 @@ fn of_preferred(walk: &Walk, preferred: &Preferred, scene: &Aabb, costs: [f64; 2
 /// The mean work of the rays of a sample that meet the scene.
 fn of_sample<R: Record>(tree: &Bvh2<R>, rays: &RayDistribution<'_>, costs: [f64; 2]) -> Option<f64> {
     let sample = Distribution::new(rays, &Bounds::of(&tree.header.root.bounds()), 1.0)?;
-    let work_of = |segment: &super::distribution::Segment| {
+    let work_of = |segment: &Segment| {
         let (mut sum, mut next) = (0.0, vec![tree.header.root]);
         while let Some(child) = next.pop() {
             if segment.meets(&Bounds::of(&child.bounds())) {
@@ -110,6 +117,38 @@ fn of_sample<R: Record>(tree: &Bvh2<R>, rays: &RayDistribution<'_>, costs: [f64;
     let works: Vec<f64> = sample.segments.par_iter().map(|segment| segment.weight * work_of(segment)).collect();
     let weight: f64 = sample.segments.iter().map(|segment| segment.weight).sum();
     Some(works.iter().sum::<f64>() / weight)
+}
+
+/// The mean work of the shadow rays that meet the scene, left children first, each to its first hit.
+fn of_shadows<R: Record>(tree: &Bvh2<R>, rays: &ShadowRays<'_>, costs: [f64; 2]) -> Option<f64> {
+    let root = tree.header.root;
+    let work_of = |i: usize| {
+        let segment = Segment::new(&rays.segments[i], 1.0);
+        let begin = if i == 0 { 0 } else { rays.ends[i - 1] };
+        let hits = &rays.hits[begin as usize..rays.ends[i] as usize];
+        let weight = if segment.meets(&Bounds::of(&root.bounds())) { segment.weight } else { 0.0 };
+        let (mut sum, mut next) = (0.0, vec![root]);
+        while let Some(child) = next.pop() {
+            if !segment.meets(&Bounds::of(&child.bounds())) {
+                continue;
+            }
+            if !child.is_leaf() {
+                sum += costs[0];
+                next.extend(tree.nodes[child.index as usize].children.iter().rev());
+                continue;
+            }
+            for record in &tree.records[child.index as usize..(child.index + child.count) as usize] {
+                sum += costs[1];
+                if hits.contains(&record.primitive()) {
+                    return [weight * sum, weight];
+                }
+            }
+        }
+        [weight * sum, weight]
+    };
+    let of_rays: Vec<[f64; 2]> = (0..rays.segments.len()).into_par_iter().map(work_of).collect();
+    let [work, weight] = of_rays.iter().fold([0.0; 2], |[work, weight], ray| [work + ray[0], weight + ray[1]]);
+    Some(work / weight).filter(|cost| cost.is_finite())
 }
 
 /// The mean work of going down to a primitive that is seen.
@@ -190,6 +229,20 @@ mod tests {
         // One of two is seen: who looks for it goes through the root, and tests one.
         let seen = [true, false];
         assert_eq!(cost(Heuristic::Occlusion(Occlusion::of(&seen)), &tree), Some(5.0));
+    }
+
+    #[test]
+    fn shadow_rays_go_left_first_to_their_first_hit() {
+        let tree = halves();
+        let ray = RaySegment { from: [-1.0, 0.5, 0.5], direction: [1.0, 0.0, 0.0], t_end: 9.0, weight: 1.0 };
+        let of = |hits: &[u32]| {
+            let (segments, ends) = ([ray], [hits.len() as u32]);
+            cost(Heuristic::Shadow(ShadowRays { segments: &segments, ends: &ends, hits, weight: 1.0 }), &tree)
+        };
+        // Blocked by the half on the left; by the other one; by nothing.
+        assert_eq!([of(&[0]), of(&[1]), of(&[])], [Some(5.0), Some(7.0), Some(7.0)]);
+        let none = ShadowRays { segments: &[], ends: &[], hits: &[], weight: 1.0 };
+        assert_eq!(cost(Heuristic::Shadow(none), &tree), None);
     }
 
     #[test]

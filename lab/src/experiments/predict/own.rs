@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::rays::sample;
 use crate::scene::Scene;
-use crate::subjects::taught::{CameraRays, HeuristicSpec, Taught};
+use crate::subjects::taught::{CameraRays, HeuristicSpec, OcclusionRules, Taught};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow_host::bvh::heuristic::InteriorForm;
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ impl OwnCosts {
             "interior-fast" => HeuristicSpec::Interior(InteriorForm::Fast),
             "perspective" => HeuristicSpec::Camera { rays: CameraRays::Perspective, weight: 1.0 },
             "rdh" => HeuristicSpec::Distribution { kinds: kinds(), most: sample::MOST, weight: 1.0 },
-            _ => HeuristicSpec::Occlusion { kinds: kinds(), weight: 1.0 },
+            _ => HeuristicSpec::Occlusion { kinds: kinds(), weight: 1.0, rules: OcclusionRules::Plain },
         };
         NAMES
             .into_iter()

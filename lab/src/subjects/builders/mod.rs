@@ -222,6 +222,24 @@ pub struct Lessons {
     tree: TaughtTree,
 }
 
+impl Lessons {
+    /// How many rays taught it, where they do one by one.
+    pub fn rays(&self) -> Option<u64> {
+        let TaughtTree { any_hit, opened_by } = &self.tree;
+        let of_order = match &any_hit.order {
+            Some(ChildrenBy::Rays(rays)) => Some(rays.len() as u64),
+            _ => None,
+        };
+        let of_nodes = opened_by.as_ref().map(|teaching| teaching.by_kind.iter().map(|(_, rays)| rays.len() as u64).sum());
+        [self.heuristic.rays(), of_order, of_nodes].into_iter().flatten().reduce(|a, b| a + b)
+    }
+
+    /// How many triangles were seen, where that is what it learns.
+    pub fn seen(&self) -> Option<u64> {
+        self.heuristic.seen()
+    }
+}
+
 /// Behind what a builder takes: which take an option.
 fn takers_of(key: &str) -> String {
     let names: Vec<&str> = BUILDERS.iter().filter(|builder| builder.takes(key)).map(|builder| builder.name).collect();
