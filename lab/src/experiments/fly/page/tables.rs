@@ -184,8 +184,13 @@ fn table(
 ) -> Markup {
     let scenes = columns.measured.scenes();
     let rows = scenes.iter().flat_map(|scene| KINDS.map(|kind| (scene.clone(), kind)));
+    // A tree that is kept is no row of what is rebuilt.
+    let is_of = |frame: &FlownFrame| matches!(view, View::Static) || view == View::Flown(frame.cadence);
     let has = |(scene, (kind, _)): &Row| {
-        HEURISTICS.iter().any(|(_, option)| columns.figure(scene, kind, option, (what, view)).is_some())
+        HEURISTICS.iter().any(|(_, option)| {
+            let frames = columns.frames(scene, option, view);
+            frames.iter().all(|frame| is_of(frame)) && mean(frames, kind, what).is_some()
+        })
     };
     let rows: Vec<Row> = rows.filter(has).collect();
     if rows.is_empty() {
