@@ -176,8 +176,8 @@ impl CountPass {
     }
 
     /// Records that tallies become counts: of [`CountPass::counts_bytes`], aligned to 4 bytes, with scratch memory of
-    /// [`CountPass::scratch_bytes`], aligned to 8. Those of nodes behind the structure's own are not written. In a structure of more
-    /// primitives than was planned for nothing is counted.
+    /// [`CountPass::scratch_bytes`], aligned to 8. Those of nodes behind the structure's own are not written. In a structure that has no
+    /// links, or more primitives than was planned for, nothing is counted: what was before is kept, halved or dropped.
     ///
     /// A subtree's work is that of all rays that went into its links, `c_T` a node and `c_I` a primitive of a leaf, whether or not a ray
     /// has ended before it met all of them.

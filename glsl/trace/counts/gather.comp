@@ -64,12 +64,15 @@ void gather_node(uint slot, uint node_slots) {
     for (uint i = 0; i < TALLY_WORDS; ++i) tallies.word[tally + i] = 0u;
 }
 
+// Of a slot without links.
+void gather_nothing(uint slot) {
+    count_link(2u * slot, LinkCount(0u, 0u, 0u));
+    count_link(2u * slot + 1u, LinkCount(0u, 0u, 0u));
+}
+
 void gather(uint slot, uint node_slots) {
     uint waiting = waits.word[slot];
-    if (waiting == UNUSED) {
-        count_link(2u * slot, LinkCount(0u, 0u, 0u));
-        count_link(2u * slot + 1u, LinkCount(0u, 0u, 0u));
-    }
+    if (waiting == UNUSED) gather_nothing(slot);
     if (waiting != 0u) return;
     // As many levels as a tree has at most.
     for (uint level = 0; level <= MAX_DEPTH; ++level) {
@@ -89,5 +92,7 @@ void main() {
     for (uint round = 0; round < rounds; ++round) {
         uint slot = first + round * gl_WorkGroupSize.x;
         if (slot < node_slots) gather(slot, node_slots);
+        // A structure that cannot be traced has no links, but what was counted before is dropped all the same.
+        else if (node_slots == 0u && slot < slots) gather_nothing(slot);
     }
 }

@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn a_ray_that_ends_at_any_hit_knows_all_that_it_meets() {
-        let scene = scene("gen:stadium:3");
+        let scene = scene("gen:soup:400:7");
         let sample = shadows(&scene, &ANY_HIT, 500).expect("rays");
         assert!((250..=500).contains(&sample.segments.len()), "{} rays", sample.segments.len());
         let tree = tree_of(&scene);

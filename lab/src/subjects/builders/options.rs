@@ -101,7 +101,8 @@ impl Spec {
         let options = BuildOptions { method, codes, split, optimise, collapse, schedule, ..BuildOptions::DEFAULT };
         let (form, order) = self.form_and_order()?;
         let time_to_optimise = self.time_to_optimise()?;
-        if form.is_none() && self.is_opened_by_rays()? {
+        let is_opened_by_rays = self.is_opened_by_rays()?;
+        if form.is_none() && is_opened_by_rays {
             return Err(self.wrong_value(&OPEN, "rays"));
         }
         let any_hit = self.any_hit()?;
