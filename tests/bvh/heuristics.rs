@@ -18,9 +18,8 @@ fn corners_of(mesh: &Mesh) -> Corners {
     mesh.2.iter().map(|triangle| triangle.map(vertex)).collect()
 }
 
-/// Rays, what of them builders learn from, and all that they meet.
+/// What builders learn of rays, and all that these meet.
 struct Sample {
-    rays: Vec<Ray>,
     segments: Vec<RaySegment>,
     ends: Vec<u32>,
     hits: Vec<u32>,
@@ -40,7 +39,7 @@ impl Sample {
             hits.extend(all_hits(tree, ray));
             ends.push(hits.len() as u32);
         }
-        Sample { segments: rays.iter().map(segment).collect(), rays, ends, hits }
+        Sample { segments: rays.iter().map(segment).collect(), ends, hits }
     }
 
     fn shadow(&self) -> Heuristic<'_> {

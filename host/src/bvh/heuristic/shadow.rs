@@ -376,7 +376,12 @@ mod tests {
         let mut random = Random::new(3);
         let rays = sample(400);
         for count in [2, 3, 17, 90] {
-            let mut items = boxes(count);
+            // Large ones, so that many rays meet more than one.
+            let grown = |item: &Item| {
+                let Bounds { lo, hi } = item.bounds();
+                Item::new(Bounds { lo: lo - 0.1, hi: hi + 0.1 }, item.primitive(), 1)
+            };
+            let mut items: Vec<Item> = boxes(count).iter().map(grown).collect();
             let axis = count as usize % 3;
             items.sort_by(|a, b| a.centroid_on(axis).total_cmp(&b.centroid_on(axis)));
             // A ray hits some of the boxes that it meets.
