@@ -119,8 +119,8 @@ fn the_work_of_the_roots_links_is_that_of_the_tracer() {
     let hits = rays.iter().filter(|ray| tracer::any_hit(&tree, ray).is_some()).count() as u32;
     assert!(hits > 100, "{hits} hits");
     assert_eq!(counts[root].hits + counts[root + 1].hits, hits);
-    for link in 0..counts.len() {
-        assert!(counts[link].hits <= counts[link].entered, "link {link}: {:?}", counts[link]);
+    for (link, count) in counts.iter().enumerate() {
+        assert!(count.hits <= count.entered, "link {link}: {count:?}");
     }
 }
 
@@ -135,8 +135,8 @@ fn exhaustive_counts_do_not_depend_on_the_order_of_children() {
     let (counts, of_swapped) =
         (on_host(&tree, &rays, CountedWalk::Exhaustive), on_host(&swapped, &rays, CountedWalk::Exhaustive));
     assert!(counts.iter().any(|count| count.hits > 0));
-    for link in 0..counts.len() {
-        assert_eq!(counts[link], of_swapped[link ^ 1], "link {link}");
+    for (link, count) in counts.iter().enumerate() {
+        assert_eq!(*count, of_swapped[link ^ 1], "link {link}");
     }
 }
 

@@ -121,7 +121,7 @@ impl Flux {
         for corner in 0..8 {
             let pick = |axis: usize| corners[corner >> axis & 1][axis];
             let low = 3 - (corner as u32).count_ones();
-            let sign = if low % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if low.is_multiple_of(2) { 1.0 } else { -1.0 };
             sum += sign * up_to([pick(0), pick(1), pick(2)]);
         }
         (0.5 * sum.max(0.0)) as f32

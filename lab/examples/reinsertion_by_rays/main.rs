@@ -62,7 +62,7 @@ fn run(scene: &Scene, ways: &[&str], rounds: u32, before: u32) {
     for way in ways {
         let begun = Instant::now();
         let tree = taught(&start, way, rounds, &teacher);
-        if *way == "area" && rounds % 64 == 0 && start.nodes.len() > 8192 {
+        if *way == "area" && rounds.is_multiple_of(64) && start.nodes.len() > 8192 {
             let options = ReinsertionOptions::of_passes(rounds / 64);
             assert!(tree.nodes == start.reinserted(&options).nodes, "the search is not the library's");
         }

@@ -129,7 +129,7 @@ impl Measure for Counts<'_> {
     type Here = (f32, f32);
 
     fn prepare(&mut self, tree: &LinkedTree, round: u32) {
-        if round % self.every == 0 {
+        if round.is_multiple_of(self.every) {
             let counts = self.sample.entered(&tree.tree);
             self.entered = counts.iter().map(|&count| count as f32).collect();
             self.rays = self.sample.rays.len() as f32;

@@ -40,8 +40,7 @@ pub const CPU_BUILDERS: Page =
 pub const PREDICT: Page = Page { records: "predict.jsonl", file: "predict.html", name: "What predicts tracing" };
 
 /// All of them.
-pub const ALL: [Page; 10] =
-    [INDEX, CPU_BUILDERS, PREDICT, ACCEL, ANIMATE, FLY, GROWTH, LARGE, DEGENERATE, GREEDY];
+pub const ALL: [Page; 10] = [INDEX, CPU_BUILDERS, PREDICT, ACCEL, ANIMATE, FLY, GROWTH, LARGE, DEGENERATE, GREEDY];
 
 impl Page {
     /// What files of it begin with.

@@ -139,7 +139,9 @@ impl Taught {
     /// How many rays taught it, where they do one by one.
     pub fn rays(&self) -> Option<u64> {
         match self {
-            Taught::Rays(segments, _) | Taught::Shadows(ShadowSample { segments, .. }, _) => Some(segments.len() as u64),
+            Taught::Rays(segments, _) | Taught::Shadows(ShadowSample { segments, .. }, _) => {
+                Some(segments.len() as u64)
+            }
             Taught::Box(_) | Taught::Seen(..) => None,
         }
     }

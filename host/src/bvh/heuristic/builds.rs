@@ -125,7 +125,9 @@ fn a_heuristic_that_knows_of_nothing_gives_the_bytes_of_the_surface_area() {
         for termination in [Termination::Sah, Termination::Single, Termination::Heuristic] {
             let options = HostBvhOptions { termination, ..HostBvhOptions::of(method) };
             let by_area = tree(&Heuristic::Sah, &boxes, &options).to_bytes();
-            for heuristic in heuristics.iter().filter(|heuristic| heuristic.check(&HostBvhOptions::of(method), 700).is_ok()) {
+            for heuristic in
+                heuristics.iter().filter(|heuristic| heuristic.check(&HostBvhOptions::of(method), 700).is_ok())
+            {
                 assert!(tree(heuristic, &boxes, &options).to_bytes() == by_area, "{method:?}, {termination:?}");
             }
         }

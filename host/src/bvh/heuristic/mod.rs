@@ -32,10 +32,10 @@ pub mod preferred;
 pub mod shadow;
 pub(super) mod split_cost;
 
-use super::{HostBvhOptions, HostMethod};
 #[cfg(doc)]
 use super::Termination;
 use super::bounds::{Bounds, Item};
+use super::{HostBvhOptions, HostMethod};
 use distribution::Distribution;
 pub use distribution::{RayDistribution, RaySegment};
 use hedgerow::geometry::Aabb;

@@ -230,7 +230,8 @@ impl Lessons {
             Some(ChildrenBy::Rays(rays)) => Some(rays.len() as u64),
             _ => None,
         };
-        let of_nodes = opened_by.as_ref().map(|teaching| teaching.by_kind.iter().map(|(_, rays)| rays.len() as u64).sum());
+        let of_nodes =
+            opened_by.as_ref().map(|teaching| teaching.by_kind.iter().map(|(_, rays)| rays.len() as u64).sum());
         [self.heuristic.rays(), of_order, of_nodes].into_iter().flatten().reduce(|a, b| a + b)
     }
 
