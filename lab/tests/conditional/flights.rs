@@ -20,7 +20,8 @@ const SCENES: [(&str, f32); 9] = [
     ("salle_de_bain", 0.9),
     ("san_francisco", 0.4),
     ("samurai_monastery", 0.4),
-    ("minecraft_region", 0.4),
+    // From outside at first, by the camera that comes with the scene.
+    ("minecraft_region", 0.25),
     ("dragon", 0.1),
     ("bunny", 0.1),
 ];
