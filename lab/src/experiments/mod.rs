@@ -10,6 +10,7 @@ pub mod cpu_builders;
 pub mod fly;
 pub mod navigate;
 pub mod predict;
+pub mod published;
 pub mod report;
 pub mod stability;
 

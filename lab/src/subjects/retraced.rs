@@ -26,6 +26,19 @@ pub enum TreeTracer {
     Device,
 }
 
+impl TreeTracer {
+    /// Both.
+    pub const ALL: [TreeTracer; 2] = [TreeTracer::Host, TreeTracer::Device];
+
+    /// In a word.
+    pub fn name(self) -> &'static str {
+        match self {
+            TreeTracer::Host => "host",
+            TreeTracer::Device => "device",
+        }
+    }
+}
+
 /// Where trees come from.
 enum Source<'a> {
     /// A builder, which builds again whenever it is asked.

@@ -1,25 +1,17 @@
 //! `hedgerow accel`: the records and the page that it leaves, how `hedgerow bench` finds them, and what is refused.
 
+use crate::program::{err, hedgerow, text};
 use hedgerow_lab::experiments::accel::page;
 use hedgerow_lab::experiments::accel::points::{AccelEntry, Implementation, Submission};
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn hedgerow(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
-    command.args(arguments).env_remove("HEDGEROW_SCENES").output().expect("the binary starts")
-}
+use std::process::Output;
 
 /// Every experiment, as small as it goes: seconds.
 fn tiny(folder: &Path, more: &[&str]) -> Output {
-    let output = folder.to_str().expect("a temporary folder's name is text");
+    let output = text(folder);
     let arguments =
         ["accel", "--runs", "2", "--size", "16x12", "--structures", "32", "--instances", "200", "-o", output];
     hedgerow(&[&arguments, more].concat())
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! `hedgerow animate`: the records, pictures and page that it leaves, that all ways find the same, and what is refused.
 
+use crate::program::{err, hedgerow, text};
 use hedgerow_lab::experiments::animate::AnimationMethod;
 use hedgerow_lab::experiments::animate::page;
 use hedgerow_lab::experiments::animate::points::{AnimateEntry, Animated, SceneSetting};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 /// A ball that hops through clutter, and a mesh that changes its shape where it turns.
 const SCENE: &str = "
@@ -22,19 +23,6 @@ object twist gen:twist:300:4
 camera
   at 0  eye 2 1.5 2  look 0 0.2 0
 ";
-
-fn hedgerow(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
-    command.args(arguments).env_remove("HEDGEROW_SCENES").output().expect("the binary starts")
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a temporary folder's name is text")
-}
 
 /// Two runs a frame of a few rays: seconds.
 fn tiny(scene: &str, folder: &Path, more: &[&str]) -> Output {

@@ -1,26 +1,18 @@
 //! `hedgerow bench` and `hedgerow compare`: what is written, what is refused, and what goes on when something fails.
 
+use crate::program::{err, hedgerow, out, text};
 use hedgerow_lab::experiments::bench::results;
 use hedgerow_lab::measure::record::Record;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn hedgerow(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
-    command.args(arguments).env_remove("HEDGEROW_SCENES").output().expect("the binary starts")
-}
+use std::process::Output;
 
 /// Two builders of the host on small scenes: seconds, and no device.
 fn bench(folder: &Path, more: &[&str]) -> Output {
-    let output = folder.to_str().expect("a temporary folder's name is text");
+    let output = text(folder);
     let mut arguments =
         vec!["bench", "-b", "lbvh-host,lbvh-host:collapse=off", "--size", "24x16", "--runs", "3", "-o", output];
     arguments.extend(more);
     hedgerow(&arguments)
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn status(output: &Output) -> Option<i32> {
@@ -54,7 +46,7 @@ fn a_run_leaves_records_a_table_charts_pictures_and_a_page() {
     for picture in ["pictures/gen-icosphere-2.png", "pictures/gen-icosphere-2-steps-lbvh-host.png"] {
         assert!(folder.path().join(picture).is_file() && page.contains(picture), "{picture} is missing");
     }
-    let table = String::from_utf8_lossy(&done.stdout).into_owned();
+    let table = out(&done);
     assert!(table.contains("lbvh-host uncollapsed") && table.contains("index.html"), "{table}");
 }
 
@@ -88,7 +80,7 @@ fn kd_trees_are_told_in_the_tables_of_the_thesis_beside_its_own_figures() {
     for (says, times) in [("CPU approx", 20), ("Its scenes are not ours", 1), ("170.45<", 1)] {
         assert_eq!(text.matches(says).count(), times, "{says}");
     }
-    let table = String::from_utf8_lossy(&done.stdout).into_owned();
+    let table = out(&done);
     assert!(table.contains("full / empty") && table.contains("(Sibenik)"), "{table}");
 
     let file = folder.path().join("others.csv");
@@ -170,7 +162,7 @@ fn two_runs_of_the_same_program_compare_with_equal_costs() {
     let [old, new] = runs.each_ref().map(|run| run.path().to_str().expect("text"));
     let done = hedgerow(&["compare", old, new]);
     assert_eq!(status(&done), Some(0), "{}", err(&done));
-    let table = String::from_utf8_lossy(&done.stdout).into_owned();
+    let table = out(&done);
     assert_eq!(table.matches(" 1.0000 ").count(), 2, "the same trees have the same SAH cost: {table}");
     assert!(table.contains("mean over 2"), "{table}");
     let done = hedgerow(&["compare", old, "/no/such/results.jsonl"]);

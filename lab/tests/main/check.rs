@@ -1,19 +1,11 @@
 //! `hedgerow check`: what is right passes, and whatever happens to a group is reported while the rest goes on.
 
+use crate::program::{err, out, program};
 use hedgerow_lab::experiments::check::{CheckRecord, GROUPS};
 use std::process::{Command, Output};
 
 fn check(arguments: &[&str], faults: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
-    command.arg("check").args(arguments).env("HEDGEROW_CHECK_FAULTS", faults).output().expect("the binary starts")
-}
-
-fn out(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    program(&["check"]).args(arguments).env("HEDGEROW_CHECK_FAULTS", faults).output().expect("the binary starts")
 }
 
 #[test]

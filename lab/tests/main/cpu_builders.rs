@@ -1,24 +1,16 @@
 //! `hedgerow cpu-builders`: what is written, what adds up, and what is refused.
 
+use crate::program::{err, hedgerow, text};
 use hedgerow_lab::experiments::cpu_builders::page;
 use hedgerow_lab::measure::record::Record;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn hedgerow(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
-    command.args(arguments).env_remove("HEDGEROW_SCENES").output().expect("the binary starts")
-}
+use std::process::Output;
 
 /// Two builders on a scene of the repository: seconds.
 fn run(folder: &Path, more: &[&str]) -> Output {
-    let folder = folder.to_str().expect("a temporary folder's name is text");
+    let folder = text(folder);
     let arguments = ["cpu-builders", "--quick", "--size", "16x12", "--epo", "off", "-o", folder];
     hedgerow(&[&arguments, more].concat())
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn names(records: &[Record]) -> Vec<(&str, &str)> {

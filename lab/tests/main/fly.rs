@@ -1,26 +1,14 @@
 //! `hedgerow fly`: the records and the page that it leaves, which frames teach, and what is refused.
 
+use crate::program::{err, hedgerow, out, text};
 use hedgerow_lab::experiments::fly::cadence::Cadence;
 use hedgerow_lab::experiments::fly::page;
 use hedgerow_lab::experiments::fly::points::{FlownFrame, FlownPath, FlownTree, FlyEntry, FlySetting};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 const PLAIN: &str = "binned:axes=all:bins=4";
 const RDH: &str = "binned:axes=all:bins=4:heuristic=rdh:sample=2000";
-
-fn hedgerow(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
-    command.args(arguments).env_remove("HEDGEROW_SCENES").output().expect("the binary starts")
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("a temporary folder's name is text")
-}
 
 /// One run a frame of a few rays.
 fn tiny(folder: &Path, more: &[&str]) -> Output {
@@ -67,7 +55,7 @@ fn trees_are_built_at_their_cadence_and_taught_by_the_frame_before() {
     );
     assert_eq!(done.status.code(), Some(0), "{}", err(&done));
     let page = folder.path().join("fly.html");
-    let stdout = String::from_utf8_lossy(&done.stdout).into_owned();
+    let stdout = out(&done);
     assert_eq!(stdout.lines().last(), Some(text(&page)), "{stdout}");
 
     let all = records(folder.path());

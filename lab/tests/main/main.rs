@@ -19,6 +19,7 @@ mod gpu_task_pool;
 mod host_records;
 mod measure_copy;
 mod predict_command;
+mod program;
 mod scene_dynamic;
 mod scene_files;
 mod scene_generators;

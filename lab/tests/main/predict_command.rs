@@ -1,19 +1,16 @@
 //! `hedgerow predict`: what is written of a small scene, and what is refused.
 
-use hedgerow_lab::experiments::predict::record::{self, Tracer};
+use crate::program::{err, hedgerow, text};
+use hedgerow_lab::experiments::predict::record;
 use hedgerow_lab::experiments::predict::samples::{Scope, samples};
+use hedgerow_lab::subjects::retraced::TreeTracer;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 fn run(folder: &Path, more: &[&str]) -> Output {
-    let folder = folder.to_str().expect("a temporary folder's name is text");
+    let folder = text(folder);
     let arguments = ["predict", "--size", "24x18", "--runs", "1", "-o", folder];
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
-    command.args([&arguments, more].concat()).env_remove("HEDGEROW_SCENES").output().expect("the binary starts")
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    hedgerow(&[&arguments, more].concat())
 }
 
 const TREES: &str = "binned:axes=all:termination=off,lbvh-host,sweep,binned:axes=all:heuristic=rdh,sbvh";
@@ -40,7 +37,7 @@ fn a_run_leaves_records_and_a_page_that_says_what_they_tell() {
     assert!(by_area.sah < by_codes.sah, "{} {}", by_area.sah, by_codes.sah);
     assert!(by_area.own["rdh"] > of("binned:axes=all:heuristic=rdh").own["rdh"], "a tree by rays costs them less");
     let all = samples(&records);
-    assert_eq!(Scope::pooled(Tracer::Host).points(&all).len(), 2 * 4);
+    assert_eq!(Scope::pooled(TreeTracer::Host).points(&all).len(), 2 * 4);
     let page = std::fs::read_to_string(folder.path().join("predict.html")).expect("a page");
     for text in [
         "Traced on the host alone",

@@ -1,17 +1,17 @@
 //! `hedgerow bench --shard I/N` and `hedgerow report`: shares joined are the whole, and devices stay apart.
 
+use crate::program::{err, out, program, text};
 use hedgerow_lab::experiments::bench::results;
+use hedgerow_lab::experiments::fly;
 use hedgerow_lab::measure::record::Record;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Output, Stdio};
 
 const SCENES: [&str; 6] =
     ["gen:icosphere:1", "gen:soup:700:1", "gen:stadium:2", "gen:grid:9", "gen:needles:300:2", "gen:icosphere:2"];
 
 fn started(arguments: &[&str]) -> Child {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
-    command.args(arguments).env_remove("HEDGEROW_SCENES").stdout(Stdio::piped()).stderr(Stdio::piped());
-    command.spawn().expect("the binary starts")
+    program(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary starts")
 }
 
 fn ended(child: Child) -> Output {
@@ -20,7 +20,7 @@ fn ended(child: Child) -> Output {
 
 /// Builders of the host: seconds, and no device.
 fn bench(output: &Path, more: &[&str]) -> Child {
-    let output = output.to_str().expect("text");
+    let output = text(output);
     let fixed = ["-b", "lbvh-host,sweep", "--size", "24x16", "--runs", "1", "--rays", "primary,ao", "--no-pictures"];
     started(&[&["bench", "-o", output], &fixed[..], &SCENES[..], more].concat())
 }
@@ -28,7 +28,7 @@ fn bench(output: &Path, more: &[&str]) -> Child {
 #[track_caller]
 fn succeeded(output: Output) -> String {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8_lossy(&output.stdout).into_owned()
+    out(&output)
 }
 
 /// What is the same in every run.
@@ -43,8 +43,8 @@ fn contents(records: &[Record]) -> Vec<(String, String, Option<u64>, Vec<String>
 }
 
 fn report(folders: &[PathBuf], output: &Path) -> Output {
-    let mut arguments = vec!["report", "-o", output.to_str().expect("text")];
-    arguments.extend(folders.iter().map(|folder| folder.to_str().expect("text")));
+    let mut arguments = vec!["report", "-o", text(output)];
+    arguments.extend(folders.iter().map(|folder| text(folder)));
     ended(started(&arguments))
 }
 
@@ -103,10 +103,29 @@ fn devices_stay_apart_and_what_is_measured_twice_is_told_once() {
 }
 
 #[test]
+fn camera_paths_of_several_folders_are_on_one_page() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let fixed = ["--frames", "0..2", "--cadence", "never", "-b", "sweep", "--size", "16x12", "--frame-size", "16x12"];
+    let flown = |scene: &str, output: &Path| {
+        let arguments = [&["fly", scene, "--runs", "1", "-o", text(output)], &fixed[..]].concat();
+        succeeded(ended(started(&arguments)));
+        fly::page::read(output).expect("records")
+    };
+    let folders = ["one", "other"].map(|name| folder.path().join(name));
+    let scenes = ["gen:clutter:20:1", "gen:clutter:30:1"];
+    let all = [0, 1].map(|i| flown(scenes[i], &folders[i])).concat();
+    let joined = folder.path().join("joined");
+    succeeded(report(&folders, &joined));
+    assert_eq!(fly::page::read(&joined).expect("records"), all);
+    let page = std::fs::read_to_string(joined.join("fly.html")).expect("a page");
+    assert!(scenes.iter().all(|scene| page.contains(scene)), "{page}");
+}
+
+#[test]
 fn wrong_folders_and_lines_are_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let says = |output: Output, status: i32, words: &str| {
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let text = err(&output);
         assert!(output.status.code() == Some(status) && text.contains(words), "{words}: {text}");
     };
     let empty = folder.path().join("empty");

@@ -1,5 +1,6 @@
 //! `hedgerow stability`: the records and pages that it leaves, how pages name each other, and what is refused.
 
+use crate::program::{err, program};
 use hedgerow_lab::experiments::stability::far::Side;
 use hedgerow_lab::experiments::stability::large::LargePlacement;
 use hedgerow_lab::experiments::stability::page;
@@ -7,15 +8,10 @@ use hedgerow_lab::experiments::stability::points::{Degenerate, Greedy, GreedyKin
 use hedgerow_lab::report::lines;
 use hedgerow_lab::scene;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 fn hedgerow(arguments: &[&str], folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hedgerow"));
-    command.args(arguments).arg("-o").arg(folder).env_remove("HEDGEROW_SCENES").output().expect("the binary starts")
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    program(arguments).arg("-o").arg(folder).output().expect("the binary starts")
 }
 
 fn read(folder: &Path, name: &str) -> String {

@@ -4,6 +4,7 @@ use super::choice::BASE;
 use crate::measure::record::{QualityRecord, Record, TraceRecord};
 use crate::report::names::distinct;
 use crate::subjects::builders::BUILDERS;
+use crate::subjects::retraced::TreeTracer;
 
 /// Behind the name of a builder that one thread runs.
 pub const ONE_THREAD: &str = ":threads=1";
@@ -14,28 +15,6 @@ pub const BY_DEVICE: &str = ":trace=device";
 
 /// Families of builders that are somebody else's.
 const PEERS: [&str; 2] = ["obvhs", "embree"];
-
-/// Where our tracer works.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tracer {
-    /// On the host.
-    Host,
-    /// On the device.
-    Device,
-}
-
-impl Tracer {
-    /// Both.
-    pub const ALL: [Tracer; 2] = [Tracer::Host, Tracer::Device];
-
-    /// In a word.
-    pub fn name(self) -> &'static str {
-        match self {
-            Tracer::Host => "host",
-            Tracer::Device => "device",
-        }
-    }
-}
 
 /// A builder on a scene.
 #[derive(Debug, Clone)]
@@ -67,15 +46,15 @@ impl<'r> Measured<'r> {
     }
 
     /// The record of our tracer.
-    pub fn traced(&self, tracer: Tracer) -> Option<&'r Record> {
+    pub fn traced(&self, tracer: TreeTracer) -> Option<&'r Record> {
         match tracer {
-            Tracer::Host => self.by_host.or(self.own.filter(|_| !self.has_own_tracer())),
-            Tracer::Device => self.by_device,
+            TreeTracer::Host => self.by_host.or(self.own.filter(|_| !self.has_own_tracer())),
+            TreeTracer::Device => self.by_device,
         }
     }
 
     /// Rays of a kind by our tracer.
-    pub fn rays(&self, tracer: Tracer, kind: &str) -> Option<&'r TraceRecord> {
+    pub fn rays(&self, tracer: TreeTracer, kind: &str) -> Option<&'r TraceRecord> {
         self.traced(tracer)?.rays(kind)
     }
 

@@ -53,10 +53,10 @@ fn predictions(points: &[Point<'_>], weights: impl Fn(&str) -> Option<Weights>) 
 #[cfg(test)]
 mod tests {
     use super::super::predictor::ALL;
-    use super::super::record::Tracer;
     use super::super::samples::Scope;
     use super::super::samples::tests::sample;
     use super::*;
+    use crate::subjects::retraced::TreeTracer;
 
     fn predictor(name: &str) -> &'static Predictor {
         ALL.iter().find(|predictor| predictor.name == name).expect(name)
@@ -69,7 +69,7 @@ mod tests {
             all.push(sample(scene, "reference", 7.0 * scale, &[7.0, 1.0]));
             all.extend([3.0, 5.0, 9.0].map(|sah| sample(scene, "x", sah * scale, &[sah, 0.0])));
         }
-        let points = Scope::pooled(Tracer::Host).points(&all);
+        let points = Scope::pooled(TreeTracer::Host).points(&all);
         let sah = found(predictor("SAH"), &points);
         assert_eq!(sah.correlation.n, 6);
         assert!((sah.correlation.pearson.expect("it varies") - 1.0).abs() < 1e-12);
@@ -89,7 +89,7 @@ mod tests {
             }
         }
         let best = predictor("SAH–EPO, best α");
-        let of = |scene: Option<&str>| found(best, &Scope { scene, ..Scope::pooled(Tracer::Host) }.points(&all));
+        let of = |scene: Option<&str>| found(best, &Scope { scene, ..Scope::pooled(TreeTracer::Host) }.points(&all));
         assert_eq!(of(Some("a")).fitted.as_deref(), Some("α 0.00"));
         assert_eq!(of(Some("b")).fitted.as_deref(), Some("α 1.00"));
         assert!((of(Some("b")).correlation.pearson.expect("varies") - 1.0).abs() < 1e-12);

@@ -1,7 +1,7 @@
 //! Trees of a scene, built and traced in turn: every tree by the same two tracers of ours, whoever built it.
 
 use super::own::OwnCosts;
-use super::record::{RaysRecord, Tracer, TreeRecord};
+use super::record::{RaysRecord, TreeRecord};
 use crate::Result;
 use crate::device::Device;
 use crate::experiments::bench::matrix::{LCV_RAYS, OnScene, leaf_count_variability};
@@ -13,6 +13,7 @@ use crate::scene::Scene;
 use crate::subjects::Subject;
 use crate::subjects::builders::Spec;
 use crate::subjects::retraced::Retraced;
+use crate::subjects::retraced::TreeTracer;
 use crate::{Error, report};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::Bvh2;
@@ -71,7 +72,7 @@ impl Building<'_> {
 struct Traced<'a> {
     /// The number of its record.
     tree: usize,
-    tracer: Tracer,
+    tracer: TreeTracer,
     subject: Retraced<'a>,
     /// The kind of the rays that it has.
     has: Option<RayKind>,
@@ -190,9 +191,9 @@ impl<'a> Trees<'a> {
         };
         let (name, tree, number) = (record.builder.clone(), Arc::new(tree), self.records.len());
         let on = |device| Retraced::of_tree(&name, Arc::clone(&tree), device);
-        let mut traced = vec![Traced { tree: number, tracer: Tracer::Host, subject: on(None)?, has: None }];
+        let mut traced = vec![Traced { tree: number, tracer: TreeTracer::Host, subject: on(None)?, has: None }];
         if device.is_some() {
-            traced.push(Traced { tree: number, tracer: Tracer::Device, subject: on(device)?, has: None });
+            traced.push(Traced { tree: number, tracer: TreeTracer::Device, subject: on(device)?, has: None });
         }
         self.records.push(record);
         self.traced.extend(traced);
@@ -201,7 +202,7 @@ impl<'a> Trees<'a> {
 
     /// Leaf count variability of every tree.
     fn count_leaves(&mut self, rays: &[Ray]) {
-        for traced in self.traced.iter_mut().filter(|traced| traced.tracer == Tracer::Host) {
+        for traced in self.traced.iter_mut().filter(|traced| traced.tracer == TreeTracer::Host) {
             let counted = traced.subject.set_rays(rays).and_then(|()| traced.subject.work(LCV_RAYS.query()));
             // What fails here fails again where rays are traced, and is told there.
             let work = counted.ok().flatten();
@@ -235,8 +236,8 @@ impl<'a> Trees<'a> {
                 })
             });
             match (figures, traced.tracer) {
-                (Ok(figures), Tracer::Host) => self.records[traced.tree].host.push(figures),
-                (Ok(figures), Tracer::Device) => self.records[traced.tree].device.push(figures),
+                (Ok(figures), TreeTracer::Host) => self.records[traced.tree].host.push(figures),
+                (Ok(figures), TreeTracer::Device) => self.records[traced.tree].device.push(figures),
                 (Err(error), _) => self.fail(traced.tree, error),
             }
         }

@@ -1,6 +1,7 @@
 //! How many rays a build pays for: the time that it takes beyond the reference's, over what a ray takes less.
 
-use super::record::{RaysRecord, Tracer, TreeRecord};
+use super::record::{RaysRecord, TreeRecord};
+use crate::subjects::retraced::TreeTracer;
 
 /// When a tree is the better choice.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,7 +80,7 @@ pub fn gains(records: &[TreeRecord]) -> Vec<Gain<'_>> {
             let pays = Pays::of((ms, &rays), (reference_ms, &others));
             Some(RayGain { ns: rays.ns.median, less: others.ns.median - rays.ns.median, pays })
         };
-        Some(Gain { tree, build: ms / reference_ms, rays: Tracer::ALL.map(by) })
+        Some(Gain { tree, build: ms / reference_ms, rays: TreeTracer::ALL.map(by) })
     };
     records.iter().filter(|tree| !tree.is_reference()).filter_map(gain).collect()
 }

@@ -5,31 +5,10 @@ use super::published;
 use crate::Result;
 use crate::measure::Spread;
 use crate::report::{beside, lines};
+use crate::subjects::retraced::TreeTracer;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// Where our tracer works, or whose figures they are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tracer {
-    /// On every core of the host.
-    Host,
-    /// On the device.
-    Device,
-}
-
-impl Tracer {
-    /// Both.
-    pub const ALL: [Tracer; 2] = [Tracer::Host, Tracer::Device];
-
-    /// In a word.
-    pub fn name(self) -> &'static str {
-        match self {
-            Tracer::Host => "host",
-            Tracer::Device => "device",
-        }
-    }
-}
 
 /// A tree on a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -79,15 +58,15 @@ pub struct RaysRecord {
 
 impl TreeRecord {
     /// The rays of a tracer.
-    pub fn rays(&self, tracer: Tracer) -> &[RaysRecord] {
+    pub fn rays(&self, tracer: TreeTracer) -> &[RaysRecord] {
         match tracer {
-            Tracer::Host => &self.host,
-            Tracer::Device => &self.device,
+            TreeTracer::Host => &self.host,
+            TreeTracer::Device => &self.device,
         }
     }
 
     /// All kinds of rays together, each by its number; `None` without any.
-    pub fn all_rays(&self, tracer: Tracer) -> Option<RaysRecord> {
+    pub fn all_rays(&self, tracer: TreeTracer) -> Option<RaysRecord> {
         let all = self.rays(tracer);
         let count: u64 = all.iter().map(|rays| rays.count).sum();
         let mean = |of: fn(&RaysRecord) -> f64| {
@@ -153,9 +132,9 @@ mod tests {
             host: vec![rays("primary", 100, 100.0), rays("ao", 300, 500.0)],
             device: Vec::new(),
         };
-        let all = record.all_rays(Tracer::Host).expect("two kinds");
+        let all = record.all_rays(TreeTracer::Host).expect("two kinds");
         assert_eq!((all.count, all.ns.median, all.ns.min, all.steps), (400, 400.0, 200.0, 40.0));
-        assert_eq!(record.all_rays(Tracer::Device), None);
+        assert_eq!(record.all_rays(TreeTracer::Device), None);
         let line = serde_json::to_string(&record).expect("JSON");
         assert_eq!(serde_json::from_str::<TreeRecord>(&line).expect("a record"), record);
     }

@@ -3,7 +3,8 @@
 
 use super::own;
 use super::published::ALL_RAYS;
-use super::record::{Tracer, TreeRecord};
+use super::record::TreeRecord;
+use crate::subjects::retraced::TreeTracer;
 
 /// How many figures there are.
 pub const FIGURES: usize = 5 + own::NAMES.len();
@@ -33,7 +34,7 @@ pub struct Sample {
     /// The kind of rays, or [`ALL_RAYS`].
     pub kind: String,
     /// Who traced them.
-    pub tracer: Tracer,
+    pub tracer: TreeTracer,
     /// Nanoseconds a ray.
     pub ns: f64,
     /// What is known of the tree: in the order of the constants here.
@@ -55,7 +56,7 @@ impl Sample {
 pub fn samples(records: &[TreeRecord]) -> Vec<Sample> {
     let mut all = Vec::new();
     for record in records {
-        for tracer in Tracer::ALL {
+        for tracer in TreeTracer::ALL {
             for rays in record.rays(tracer).iter().chain(&record.all_rays(tracer)) {
                 let mut figures = [None; FIGURES];
                 figures[..OWN].copy_from_slice(&[
@@ -112,7 +113,7 @@ fn log_ratio(value: f64, reference: f64) -> Option<f64> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scope<'a> {
     /// Who traced.
-    pub tracer: Tracer,
+    pub tracer: TreeTracer,
     /// The kind of rays.
     pub kind: &'a str,
     /// The scene; `None` takes all of them, without the references: those lie at 0, one a scene, whatever the figures say.
@@ -121,7 +122,7 @@ pub struct Scope<'a> {
 
 impl Scope<'_> {
     /// All kinds of rays together, on all scenes.
-    pub fn pooled(tracer: Tracer) -> Scope<'static> {
+    pub fn pooled(tracer: TreeTracer) -> Scope<'static> {
         Scope { tracer, kind: ALL_RAYS, scene: None }
     }
 
@@ -149,7 +150,7 @@ pub(super) mod tests {
             scene: scene.into(),
             builder: builder.into(),
             kind: ALL_RAYS.into(),
-            tracer: Tracer::Host,
+            tracer: TreeTracer::Host,
             ns,
             figures: all,
             is_reference: builder == "reference",
@@ -163,7 +164,7 @@ pub(super) mod tests {
             sample("a", "x", 20.0, &[50.0, 3.0]),
             sample("b", "x", 7.0, &[1.0]),
         ];
-        let points = Scope::pooled(Tracer::Host).points(&all);
+        let points = Scope::pooled(TreeTracer::Host).points(&all);
         assert_eq!(points.len(), 1, "b has no reference, and a's own is left out");
         let mut sah = [0.0; FIGURES];
         sah[SAH] = 1.0;
@@ -174,8 +175,8 @@ pub(super) mod tests {
         let mut lcv = [0.0; FIGURES];
         lcv[LCV] = 1.0;
         assert_eq!(points[0].prediction(&lcv), None, "it was not measured");
-        let of_a = Scope { scene: Some("a"), ..Scope::pooled(Tracer::Host) };
+        let of_a = Scope { scene: Some("a"), ..Scope::pooled(TreeTracer::Host) };
         assert_eq!(of_a.points(&all).len(), 2, "on a scene the reference is a point");
-        assert!(Scope::pooled(Tracer::Device).points(&all).is_empty());
+        assert!(Scope::pooled(TreeTracer::Device).points(&all).is_empty());
     }
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Write one page of the records of many folders: shards of a sweep, or several devices, which are kept apart
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Folders that hedgerow bench, accel or animate wrote
+    /// Folders that hedgerow bench, accel, animate or fly wrote
     #[arg(value_name = "DIR", required = true)]
     folders: Vec<PathBuf>,
     /// The folder for the records together, charts and index.html

@@ -5,7 +5,8 @@ use crate::experiments::animate::points::AnimateEntry;
 use crate::experiments::bench::matrix::Outcome;
 use crate::experiments::bench::page::{Report, read_setting};
 use crate::experiments::bench::results;
-use crate::experiments::{accel, animate};
+use crate::experiments::fly::points::FlyEntry;
+use crate::experiments::{accel, animate, fly};
 use crate::measure::provenance::{self, DeviceFacts, Machine};
 use crate::measure::record::Record;
 use crate::measure::setting::Setting;
@@ -21,6 +22,8 @@ use std::path::{Path, PathBuf};
 
 /// What is said where a folder does not say on which machine it was measured.
 const UNKNOWN: &str = "not in the records";
+/// In place of a driver, where everything was measured on the host.
+const NO_DRIVER: &str = "without a device";
 
 /// All that was measured on a device.
 #[derive(Debug, Default)]
@@ -34,6 +37,7 @@ struct OfDevice {
     results: Vec<Record>,
     accel: Vec<AccelEntry>,
     animate: Vec<AnimateEntry>,
+    fly: Vec<FlyEntry>,
 }
 
 /// The records of `folders`, written into `output` with their pages: `index.html` is the page of the device, or, of several, a
@@ -62,10 +66,11 @@ pub fn write(folders: &[PathBuf], output: &Path) -> Result<PathBuf> {
 /// Adds what lies in a folder.
 fn read(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
     let has = |file: &str| folder.join(file).is_file();
-    let [accel_file, animate_file] = [beside::ACCEL.records, beside::ANIMATE.records];
-    if ![results::FILE, accel_file, animate_file].into_iter().any(has) {
+    let [accel_file, animate_file, fly_file] = [beside::ACCEL, beside::ANIMATE, beside::FLY].map(|page| page.records);
+    if ![results::FILE, accel_file, animate_file, fly_file].into_iter().any(has) {
         return Err(Error::Argument(format!(
-            "{} holds none of {}, {accel_file} and {animate_file}; name folders that hedgerow bench, accel or animate wrote",
+            "{} holds none of {}, {accel_file}, {animate_file} and {fly_file}; name folders that hedgerow bench, accel, animate or fly \
+             wrote",
             folder.display(),
             results::FILE
         )));
@@ -89,14 +94,35 @@ fn read(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
     if has(animate_file) {
         let entries = animate::page::read(folder)?;
         let setting = entries.iter().find_map(|entry| match entry {
-            AnimateEntry::Setting(setting) => Some(setting.setting.device.clone()),
+            AnimateEntry::Setting(setting) => Some(&setting.setting),
             _ => None,
         });
-        if let Some(facts) = setting.flatten() {
-            of(devices, &facts.name, &facts.driver).animate.extend(entries);
+        if let Some(device) = setting.map(|setting| of_setting(devices, setting)) {
+            device.animate.extend(entries);
+        }
+    }
+    if has(fly_file) {
+        let entries = fly::page::read(folder)?;
+        let setting = entries.iter().find_map(|entry| match entry {
+            FlyEntry::Setting(setting) => Some(&setting.setting),
+            _ => None,
+        });
+        if let Some(device) = setting.map(|setting| of_setting(devices, setting)) {
+            device.fly.extend(entries);
         }
     }
     Ok(())
+}
+
+/// The device of a run; one that is called as the processor, where it had none.
+fn of_setting<'a>(devices: &'a mut Vec<OfDevice>, setting: &Setting) -> &'a mut OfDevice {
+    let device = match &setting.device {
+        Some(facts) => of(devices, &facts.name, &facts.driver),
+        None => of(devices, &setting.machine.cpu, NO_DRIVER),
+    };
+    device.machine.get_or_insert(setting.machine.clone());
+    device.facts = device.facts.take().or(setting.device.clone());
+    device
 }
 
 /// Adds the results of a folder. Those of builders on the host belong to the device beside which they were measured.
@@ -157,6 +183,9 @@ impl OfDevice {
         }
         if !self.animate.is_empty() {
             lines::write(folder, std::mem::take(&mut self.animate))?;
+        }
+        if !self.fly.is_empty() {
+            lines::write(folder, std::mem::take(&mut self.fly))?;
         }
         self.report().write(folder)
     }

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::experiments::bench::pareto;
-use crate::experiments::cpu_builders::measured::{Measured, OnScene, Tracer, family};
+use crate::experiments::cpu_builders::measured::{Measured, OnScene, family};
 use crate::report::chart::{Area, Caption, Chart, Drawn, Overlay};
 use crate::report::labels::Rect;
 use crate::report::names::{distinct, short, slug};
@@ -10,6 +10,7 @@ use crate::report::numbers::{duration, duration_tick, three_digits, tick};
 use crate::report::plot::{Axis, Plot, Room, best_line};
 use crate::report::stacked::{Part, Stack, stacked};
 use crate::report::theme::{PHASES, SERIES, Tone};
+use crate::subjects::retraced::TreeTracer;
 use plotters::prelude::*;
 
 /// Families in the order of their colours.
@@ -46,17 +47,17 @@ pub(super) fn of_scene(scene: &OnScene<'_>) -> Result<Vec<Chart>> {
         figures: of(&figure),
     };
     let mut all = vec![cost("SAH", |m| m.quality()?.sah), cost("EPO", |m| m.quality()?.epo)];
-    let speed = |of_what: &str, tracer: Tracer, figures| Against {
+    let speed = |of_what: &str, tracer: TreeTracer, figures| Against {
         name: slug(&format!("{of_what} {}", tracer.name())),
         title: format!("{of_what}, {}", tracer.name()),
         axis: format!("{of_what}, million a second →"),
         is_cost: false,
         figures,
     };
-    all.extend(Tracer::ALL.map(|tracer| speed("all rays", tracer, of(&|m| m.traced(tracer)?.mrays_s()))));
+    all.extend(TreeTracer::ALL.map(|tracer| speed("all rays", tracer, of(&|m| m.traced(tracer)?.mrays_s()))));
     for kind in scene.kinds() {
         all.extend(
-            Tracer::ALL
+            TreeTracer::ALL
                 .map(|tracer| speed(&format!("{kind} rays"), tracer, of(&|m| Some(m.rays(tracer, kind)?.mrays_s)))),
         );
     }

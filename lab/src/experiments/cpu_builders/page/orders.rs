@@ -1,11 +1,12 @@
 //! Whether SAH and EPO order the times of rays.
 
-use crate::experiments::cpu_builders::measured::{OnScene, Tracer};
+use crate::experiments::cpu_builders::measured::OnScene;
 use crate::experiments::cpu_builders::order::{Ordering, furthest_off, ordering};
 use crate::measure::record::{QualityRecord, Record};
 use crate::report::columns::Table;
 use crate::report::names::short;
 use crate::report::numbers::{two_decimals, whole};
+use crate::subjects::retraced::TreeTracer;
 use maud::{Markup, html};
 
 /// What all kinds of rays together are called.
@@ -19,7 +20,7 @@ const EPO: Cost = |quality| quality.epo;
 /// A kind of ray on a scene by a tracer.
 struct Row<'r> {
     scene: &'r str,
-    tracer: Tracer,
+    tracer: TreeTracer,
     kind: &'r str,
     builders: usize,
     by_sah: Option<Ordering>,
@@ -33,7 +34,7 @@ fn time(record: &Record, kind: &str) -> Option<f64> {
 }
 
 /// The builders with a cost and a time.
-fn both<'s>(scene: &'s OnScene<'_>, tracer: Tracer, kind: &str, cost: Cost) -> (Vec<&'s str>, Vec<f64>, Vec<f64>) {
+fn both<'s>(scene: &'s OnScene<'_>, tracer: TreeTracer, kind: &str, cost: Cost) -> (Vec<&'s str>, Vec<f64>, Vec<f64>) {
     let of = |m: &'s crate::experiments::cpu_builders::measured::Measured<'_>| {
         Some((m.builder.as_str(), cost(m.quality()?)?, time(m.traced(tracer)?, kind)?))
     };
@@ -49,7 +50,7 @@ fn both<'s>(scene: &'s OnScene<'_>, tracer: Tracer, kind: &str, cost: Cost) -> (
 fn rows<'s>(scenes: &'s [OnScene<'_>]) -> Vec<Row<'s>> {
     let mut rows = Vec::new();
     for scene in scenes {
-        for tracer in Tracer::ALL {
+        for tracer in TreeTracer::ALL {
             for kind in [ALL_RAYS].into_iter().chain(scene.kinds()) {
                 let by = |cost: Cost| {
                     let (_, costs, times) = both(scene, tracer, kind, cost);
@@ -70,7 +71,7 @@ fn percent(share: Option<f64>) -> String {
 }
 
 /// What a scene says, by a tracer: how well both costs order its builders, and where SAH is furthest off.
-fn sentence(scene: &OnScene<'_>, tracer: Tracer) -> Option<String> {
+fn sentence(scene: &OnScene<'_>, tracer: TreeTracer) -> Option<String> {
     let (names, costs, times) = both(scene, tracer, ALL_RAYS, SAH);
     let by_sah = ordering(&costs, &times)?;
     let (_, epos, of_epos) = both(scene, tracer, ALL_RAYS, EPO);
@@ -92,7 +93,7 @@ fn sentence(scene: &OnScene<'_>, tracer: Tracer) -> Option<String> {
 }
 
 /// Both costs over all scenes and kinds of rays, by a tracer.
-fn overall(rows: &[Row<'_>], tracer: Tracer) -> Option<String> {
+fn overall(rows: &[Row<'_>], tracer: TreeTracer) -> Option<String> {
     let share = |of: fn(&Row<'_>) -> Option<Ordering>| {
         let found: Vec<Ordering> =
             rows.iter().filter(|row| row.tracer == tracer && row.kind != ALL_RAYS).filter_map(of).collect();
@@ -116,7 +117,7 @@ pub(super) fn section(scenes: &[OnScene<'_>]) -> Markup {
         return html! { p { "Two builders must be traced before anything has an order." } };
     }
     let of_scenes =
-        scenes.iter().flat_map(|scene| Tracer::ALL.into_iter().filter_map(|tracer| sentence(scene, tracer)));
+        scenes.iter().flat_map(|scene| TreeTracer::ALL.into_iter().filter_map(|tracer| sentence(scene, tracer)));
     let share = |found: Option<Ordering>| Some(100.0 * found?.share()?);
     let table = Table::new("How SAH and EPO order the times of rays", &rows)
         .id("order-table")
@@ -131,7 +132,7 @@ pub(super) fn section(scenes: &[OnScene<'_>]) -> Markup {
         .number("EPO", "rank correlation", |row| row.by_epo?.rank, two_decimals);
     html! {
         p { "A cost is worth what it says of speed: of two trees, the one that costs less shall be the faster one." }
-        @for sentence in Tracer::ALL.into_iter().filter_map(|tracer| overall(&rows, tracer)) { p { b { (sentence) } } }
+        @for sentence in TreeTracer::ALL.into_iter().filter_map(|tracer| overall(&rows, tracer)) { p { b { (sentence) } } }
         ul { @for sentence in of_scenes { li { (sentence) } } }
         details { summary { "Each scene, tracer and kind of ray" } (table.html()) }
     }

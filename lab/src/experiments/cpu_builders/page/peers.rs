@@ -1,11 +1,12 @@
 //! Our builders on the host beside those of others, in one table.
 
 use super::scenes::named;
-use crate::experiments::cpu_builders::measured::{Measured, OnScene, Tracer};
+use crate::experiments::cpu_builders::measured::{Measured, OnScene};
 use crate::measure::record::{Record, TraceRecord};
 use crate::report::columns::Table;
 use crate::report::names::slug;
 use crate::report::numbers::{one_decimal, three_digits, two_decimals};
+use crate::subjects::retraced::TreeTracer;
 use maud::{Markup, html};
 
 /// Ours: presets for whoever wants one, and what they stand on.
@@ -21,7 +22,7 @@ fn mean(record: Option<&Record>, of: fn(&TraceRecord) -> Option<f64>) -> Option<
 
 /// The record in which steps and tests are counted: our tracer's, wherever it worked.
 fn counted<'r>(measured: &Measured<'r>) -> Option<&'r Record> {
-    Tracer::ALL.into_iter().find_map(|tracer| measured.traced(tracer))
+    TreeTracer::ALL.into_iter().find_map(|tracer| measured.traced(tracer))
 }
 
 pub(super) fn section(scenes: &[OnScene<'_>]) -> Markup {
@@ -46,8 +47,8 @@ pub(super) fn section(scenes: &[OnScene<'_>]) -> Markup {
             |(_, m)| m.own().filter(|_| m.has_own_tracer())?.mrays_s(),
             three_digits,
         )
-        .number("rays", "million/s, our host", |(_, m)| m.traced(Tracer::Host)?.mrays_s(), three_digits)
-        .number("rays", "million/s, our device", |(_, m)| m.traced(Tracer::Device)?.mrays_s(), three_digits);
+        .number("rays", "million/s, our host", |(_, m)| m.traced(TreeTracer::Host)?.mrays_s(), three_digits)
+        .number("rays", "million/s, our device", |(_, m)| m.traced(TreeTracer::Device)?.mrays_s(), three_digits);
     html! {
         p {
             "Ours are " (OURS.join(", ")) ", as far as they were measured. Steps, tests and speeds are means over all rays of all kinds. Our "

@@ -7,12 +7,13 @@ use crate::experiments::cpu_builders::frantal::tables::{Comparable, Line, TABLES
 use crate::experiments::cpu_builders::frantal::{
     COUNTERPARTS, Counterpart, DRAGON_TRIANGLES, Group, MACHINE, SOURCE, dragon, mean, parallel_binning,
 };
-use crate::experiments::cpu_builders::measured::{Measured, OnScene, Tracer};
+use crate::experiments::cpu_builders::measured::{Measured, OnScene};
 use crate::measure::geometric_mean;
 use crate::report::columns::Table;
 use crate::report::elements::number;
 use crate::report::names::distinct;
 use crate::report::numbers::{one_decimal, three_digits, two_decimals};
+use crate::subjects::retraced::TreeTracer;
 use maud::{Markup, html};
 
 /// A figure of ours with the published one in brackets; a dash where ours was not measured.
@@ -89,7 +90,7 @@ type Compared = (&'static str, &'static str, &'static str, fn(&Measured<'_>) -> 
 
 /// Time a ray of our host's tracer.
 fn ray_time(measured: &Measured<'_>, kind: &str) -> Option<f64> {
-    Some(1.0 / measured.rays(Tracer::Host, kind)?.mrays_s)
+    Some(1.0 / measured.rays(TreeTracer::Host, kind)?.mrays_s)
 }
 
 const COMPARED: [Compared; 9] = [
@@ -98,10 +99,10 @@ const COMPARED: [Compared; 9] = [
     ("Σ leaf", "", "leaf", |m| m.quality()?.sah_leaf),
     ("build", "one thread", "build", |m| m.one_thread_ms()),
     ("time", "primary", "primary_time", |m| ray_time(m, "primary")),
-    ("steps", "primary", "primary_steps", |m| m.rays(Tracer::Host, "primary")?.steps),
-    ("tests", "primary", "primary_tests", |m| m.rays(Tracer::Host, "primary")?.tests),
+    ("steps", "primary", "primary_steps", |m| m.rays(TreeTracer::Host, "primary")?.steps),
+    ("tests", "primary", "primary_tests", |m| m.rays(TreeTracer::Host, "primary")?.tests),
     ("time", "primary, shadow", "primary_shadow_time", |m| {
-        let [primary, shadow] = ["primary", "shadow"].map(|kind| m.rays(Tracer::Host, kind));
+        let [primary, shadow] = ["primary", "shadow"].map(|kind| m.rays(TreeTracer::Host, kind));
         Some([primary?, shadow?].iter().map(|trace| trace.count as f64 / trace.mrays_s).sum())
     }),
     ("time", "random", "random_time", |m| ray_time(m, "random")),

@@ -1,7 +1,7 @@
 //! A scene: its charts, its trees, their builds, and their rays.
 
 use super::charts::tone;
-use crate::experiments::cpu_builders::measured::{Measured, OnScene, Tracer};
+use crate::experiments::cpu_builders::measured::{Measured, OnScene};
 use crate::measure::record::{BuildRecord, Record};
 use crate::report::chart::Chart;
 use crate::report::columns::Table;
@@ -9,6 +9,7 @@ use crate::report::document::{Section, charts};
 use crate::report::elements::number;
 use crate::report::names::{short, slug};
 use crate::report::numbers::{grouped, one_decimal, size, three_digits, two_decimals, whole};
+use crate::subjects::retraced::TreeTracer;
 use maud::{Markup, html};
 
 /// The charts that stand open: SAH, EPO, and all rays by both tracers; the others are folded.
@@ -59,8 +60,8 @@ fn trees(scene: &OnScene<'_>) -> Markup {
         .number("EPO", "", |m| m.quality()?.epo, two_decimals)
         .number("build", "ms, one thread", |m| m.one_thread_ms(), three_digits)
         .number("build", "ms, all threads", |m| m.build_ms(), three_digits)
-        .number("rays", "million/s, host", |m| m.traced(Tracer::Host)?.mrays_s(), three_digits)
-        .number("rays", "million/s, device", |m| m.traced(Tracer::Device)?.mrays_s(), three_digits)
+        .number("rays", "million/s, host", |m| m.traced(TreeTracer::Host)?.mrays_s(), three_digits)
+        .number("rays", "million/s, device", |m| m.traced(TreeTracer::Device)?.mrays_s(), three_digits)
         .html()
 }
 
@@ -100,7 +101,7 @@ fn rays(scene: &OnScene<'_>) -> Markup {
     if kinds.is_empty() {
         return html! {};
     }
-    let by = |tracer: Tracer| {
+    let by = |tracer: TreeTracer| {
         let table = table(format!("Rays through the trees of {}, {}", scene.scene, tracer.name()), scene);
         kinds.iter().fold(table, |table, &kind| table.figure(kind, "", move |m| cell(m, tracer, kind))).html()
     };
@@ -109,7 +110,7 @@ fn rays(scene: &OnScene<'_>) -> Markup {
         details {
             summary { "Speed, steps and tests of each kind of ray" }
             p { "Million rays a second, and below it inner nodes visited and triangles tested a ray." }
-            @for tracer in Tracer::ALL.into_iter().filter(|&tracer| is_traced(tracer)) {
+            @for tracer in TreeTracer::ALL.into_iter().filter(|&tracer| is_traced(tracer)) {
                 h3 { "Our tracer on the " (tracer.name()) }
                 (by(tracer))
             }
@@ -117,7 +118,7 @@ fn rays(scene: &OnScene<'_>) -> Markup {
     }
 }
 
-fn cell(measured: &Measured<'_>, tracer: Tracer, kind: &str) -> Markup {
+fn cell(measured: &Measured<'_>, tracer: TreeTracer, kind: &str) -> Markup {
     let Some(trace) = measured.rays(tracer, kind) else { return number(None, three_digits) };
     html! {
         td.number data-value=(trace.mrays_s) {

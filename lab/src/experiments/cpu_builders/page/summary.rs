@@ -2,12 +2,13 @@
 
 use super::with_base;
 use crate::experiments::cpu_builders::choice::BASE;
-use crate::experiments::cpu_builders::measured::{Measured, OnScene, Tracer};
+use crate::experiments::cpu_builders::measured::{Measured, OnScene};
 use crate::measure::geometric_mean;
 use crate::report::columns::Table;
 use crate::report::elements::{bar, number};
 use crate::report::names::{distinct, short};
 use crate::report::numbers::{two_decimals, whole};
+use crate::subjects::retraced::TreeTracer;
 use maud::{Markup, html};
 
 /// A figure of a builder on a scene.
@@ -26,8 +27,8 @@ const FIGURES: [Of; 6] = [
     |m| Some(1.0 / m.one_thread_ms()?),
     |m| m.quality()?.sah,
     |m| m.quality()?.epo,
-    |m| m.traced(Tracer::Host)?.mrays_s(),
-    |m| m.traced(Tracer::Device)?.mrays_s(),
+    |m| m.traced(TreeTracer::Host)?.mrays_s(),
+    |m| m.traced(TreeTracer::Device)?.mrays_s(),
 ];
 
 fn rows<'s>(scenes: &'s [OnScene<'_>]) -> Vec<Row<'s>> {

@@ -1,9 +1,10 @@
 //! The thesis' tables 2 to 6 and A.1 to A.8 in its layout: rows are scenes and kinds of rays, columns heuristics.
 
 use super::Measured;
-use super::published::{Beside, Published};
+use super::published::{Beside, ratio};
 use crate::experiments::fly::cadence::Cadence;
 use crate::experiments::fly::points::{FlownFrame, FlownRays};
+use crate::experiments::published;
 use crate::report::Table;
 use crate::report::numbers::{three_digits, two_decimals};
 use maud::{Markup, html};
@@ -159,7 +160,7 @@ fn cell(value: Option<f64>, sah: Option<f64>, published: [Option<f64>; 2]) -> Ma
 
 /// All tables.
 pub(super) fn section(measured: &Measured) -> Markup {
-    let (columns, published) = (Columns::of(measured), Published::read());
+    let columns = Columns::of(measured);
     html! {
         p {
             "In each cell first what was measured here, with its ratio to SAH; then, behind the bar, what the thesis has. That is its figure "
@@ -168,20 +169,15 @@ pub(super) fn section(measured: &Measured) -> Markup {
             "rebuilt, so that it is what trees of tables 5 and 6 are put over."
         }
         @for (number, caption, metric, what, view) in lines() {
-            (table(&columns, &published, (number, caption), (metric, what, view)))
-            @if number == "2" { (costs(measured, &columns, &published)) }
+            (table(&columns, (number, caption), (metric, what, view)))
+            @if number == "2" { (costs(measured, &columns)) }
         }
         (representative_rays(&columns))
         (errata())
     }
 }
 
-fn table(
-    columns: &Columns<'_>,
-    published: &Published,
-    (number, caption): (&str, &str),
-    (metric, what, view): (&str, What, View),
-) -> Markup {
+fn table(columns: &Columns<'_>, (number, caption): (&str, &str), (metric, what, view): (&str, What, View)) -> Markup {
     let scenes = columns.measured.scenes();
     let rows = scenes.iter().flat_map(|scene| KINDS.map(|kind| (scene.clone(), kind)));
     // A tree that is kept is no row of what is rebuilt.
@@ -203,20 +199,20 @@ fn table(
         table.figure(there, "", move |(scene, (kind, row))| {
             let value = columns.figure(scene, kind, here, (what, view));
             let sah = columns.figure(scene, kind, HEURISTICS[0].1, (what, view));
-            cell(value, sah.filter(|_| here != HEURISTICS[0].1), beside(published, scene, (metric, row), there))
+            cell(value, sah.filter(|_| here != HEURISTICS[0].1), beside(scene, (metric, row), there))
         })
     });
     html! { details open[number == "2"] { summary { (label) } (table.html()) } }
 }
 
 /// The figure and the ratio that stand beside ours.
-fn beside(published: &Published, scene: &str, (metric, row): (&str, &str), heuristic: &str) -> [Option<f64>; 2] {
+fn beside(scene: &str, (metric, row): (&str, &str), heuristic: &str) -> [Option<f64>; 2] {
     let beside = Beside::of(scene);
     let figure = match beside {
-        Beside::Same(there) => published.of(metric, there, row, heuristic),
+        Beside::Same(there) => published::of(metric, there, row, heuristic),
         _ => None,
     };
-    [figure, published.ratio(metric, beside, row, heuristic).filter(|_| heuristic != HEURISTICS[0].0)]
+    [figure, ratio(metric, beside, row, heuristic).filter(|_| heuristic != HEURISTICS[0].0)]
 }
 
 /// Weights of the overlap in table 3, as it has them from Aila et al. 2013; of other scenes their mean.
@@ -230,7 +226,7 @@ fn alpha(scene: &str) -> f64 {
 }
 
 /// Table 3: what trees cost by measures that no ray is traced for.
-fn costs(measured: &Measured, columns: &Columns<'_>, published: &Published) -> Markup {
+fn costs(measured: &Measured, columns: &Columns<'_>) -> Markup {
     const ROWS: [&str; 3] = ["SAH", "EPO", "SAH+EPO"];
     let cost = |scene: &str, heuristic: &str, row: &str| -> Option<f64> {
         let frame = *columns.frames(scene, heuristic, View::Static).first()?;
@@ -258,7 +254,7 @@ fn costs(measured: &Measured, columns: &Columns<'_>, published: &Published) -> M
                 (Beside::Same(_), "SAH+EPO") => "SAH+EPO _{a=0.61}",
                 (_, row) => row,
             };
-            cell(cost(scene, here, row), sah, beside(published, scene, ("cost_static", row_there), there))
+            cell(cost(scene, here, row), sah, beside(scene, ("cost_static", row_there), there))
         })
     });
     html! {

@@ -4,7 +4,7 @@ use super::{scenes, tracers};
 use crate::Result;
 use crate::experiments::predict::found::{Found, found};
 use crate::experiments::predict::predictor::{self, Predictor};
-use crate::experiments::predict::record::{Tracer, short};
+use crate::experiments::predict::record::short;
 use crate::experiments::predict::samples::{Point, Sample, Scope};
 use crate::report::chart::{Area, Caption, Chart, Drawn, Overlay};
 use crate::report::document;
@@ -13,12 +13,13 @@ use crate::report::names::slug;
 use crate::report::numbers::two_decimals;
 use crate::report::plot::{Axis, Plot, Room};
 use crate::report::theme::{MUTED, SERIES, Tone};
+use crate::subjects::retraced::TreeTracer;
 use maud::{Markup, html};
 use plotters::prelude::*;
 
 /// The points of a tracer, and what was found.
 struct Cloud<'s> {
-    tracer: Tracer,
+    tracer: TreeTracer,
     points: Vec<Point<'s>>,
     found: Found,
 }
@@ -90,7 +91,7 @@ fn scatter(predictor: &Predictor, scenes: &[&str], clouds: &[Cloud<'_>]) -> Resu
             for (ratios, number) in found.ratios.iter().zip(&found.numbers) {
                 let tree = points[*number].tree;
                 let (at, style) = ((ratios[0].ln(), ratios[1].ln()), tone(scenes, &tree.scene).light.filled());
-                if *tracer == Tracer::Host {
+                if *tracer == TreeTracer::Host {
                     plot.chart.draw_series([Circle::new(at, 4, style)])?;
                 } else {
                     plot.chart.draw_series([EmptyElement::at(at) + Rectangle::new([(-4, -4), (5, 5)], style)])?;

@@ -5,12 +5,13 @@ mod pay;
 mod tables;
 mod thesis;
 
-use super::record::{self, Tracer};
+use super::record;
 use super::samples::{Sample, Scope, samples};
 use crate::Result;
 use crate::experiments::bench::matrix::OnScene;
 use crate::measure::{Failure, Setting};
 use crate::report::{Document, Section, beside, distinct, document, lines};
+use crate::subjects::retraced::TreeTracer;
 use maud::{Markup, html};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -77,12 +78,12 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
 }
 
 /// The tracers that have traced.
-fn tracers(samples: &[Sample]) -> impl Iterator<Item = Tracer> {
-    Tracer::ALL.into_iter().filter(|tracer| samples.iter().any(|sample| sample.tracer == *tracer))
+fn tracers(samples: &[Sample]) -> impl Iterator<Item = TreeTracer> {
+    TreeTracer::ALL.into_iter().filter(|tracer| samples.iter().any(|sample| sample.tracer == *tracer))
 }
 
 /// The kinds of rays by a tracer, all together first.
-fn kinds(samples: &[Sample], tracer: Tracer) -> Vec<&str> {
+fn kinds(samples: &[Sample], tracer: TreeTracer) -> Vec<&str> {
     let all = samples.iter().filter(|sample| sample.tracer == tracer).map(|sample| sample.kind.as_str());
     let pooled = Scope::pooled(tracer).kind;
     distinct([pooled].into_iter().chain(all))

@@ -2,11 +2,12 @@
 
 use super::super::record::short;
 use crate::experiments::predict::pay::{Gain, Pays, RayGain, gains};
-use crate::experiments::predict::record::{Tracer, TreeRecord};
+use crate::experiments::predict::record::TreeRecord;
 use crate::measure::geometric_mean;
 use crate::report::elements::number;
 use crate::report::numbers::{duration, one_decimal, three_digits, two_decimals, whole};
 use crate::report::{Table, distinct};
+use crate::subjects::retraced::TreeTracer;
 use maud::{Markup, html};
 
 /// A builder over all scenes.
@@ -59,7 +60,7 @@ pub(super) fn section(records: &[TreeRecord]) -> Markup {
         .number("build", "ms", |gain| Some(gain.tree.build_ms.median), three_digits)
         .number("build", "× reference", |gain| Some(gain.build), two_decimals);
     for (at, tracer) in
-        Tracer::ALL.into_iter().enumerate().filter(|(at, _)| all.iter().any(|gain| gain.rays[*at].is_some()))
+        TreeTracer::ALL.into_iter().enumerate().filter(|(at, _)| all.iter().any(|gain| gain.rays[*at].is_some()))
     {
         over_scenes = over_scenes
             .number(

@@ -3,12 +3,12 @@
 use super::{kinds, scenes, tracers};
 use crate::experiments::predict::found::{Found, found};
 use crate::experiments::predict::predictor::{self, Predictor};
-use crate::experiments::predict::record::Tracer;
 use crate::experiments::predict::samples::{Sample, Scope};
 use crate::measure::correlation::Correlation;
 use crate::report::Table;
 use crate::report::elements::number;
 use crate::report::numbers::{two_decimals, whole};
+use crate::subjects::retraced::TreeTracer;
 use maud::{Markup, html};
 
 /// A predictor with what was found of it.
@@ -50,8 +50,9 @@ fn in_words((predictor, found): &Row) -> String {
 }
 
 pub(super) fn summary(samples: &[Sample]) -> Markup {
-    let of_tracer = |tracer: Tracer| (tracer, rows(samples, Scope::pooled(tracer)));
-    let all: Vec<(Tracer, Vec<Row>)> = tracers(samples).map(of_tracer).filter(|(_, rows)| !rows.is_empty()).collect();
+    let of_tracer = |tracer: TreeTracer| (tracer, rows(samples, Scope::pooled(tracer)));
+    let all: Vec<(TreeTracer, Vec<Row>)> =
+        tracers(samples).map(of_tracer).filter(|(_, rows)| !rows.is_empty()).collect();
     if all.is_empty() {
         return html! { p { "Two trees of a scene must be traced before a figure can tell them apart." } };
     }
@@ -69,7 +70,7 @@ pub(super) fn summary(samples: &[Sample]) -> Markup {
     }
 }
 
-fn pooled(tracer: Tracer, rows: &[Row]) -> Markup {
+fn pooled(tracer: TreeTracer, rows: &[Row]) -> Markup {
     let table = Table::new(format!("All rays on all scenes, {}", tracer.name()), rows)
         .name("figure", |row| row.0.name)
         .text("what it is", |row| row.0.what)
@@ -102,7 +103,7 @@ pub(super) fn matrix(label: String, heading: &str, samples: &[Sample], scopes: &
 }
 
 pub(super) fn by_kind(samples: &[Sample]) -> Markup {
-    let scopes = |tracer: Tracer| -> Vec<(String, Scope<'_>)> {
+    let scopes = |tracer: TreeTracer| -> Vec<(String, Scope<'_>)> {
         kinds(samples, tracer).into_iter().map(|kind| (kind.to_owned(), Scope { tracer, kind, scene: None })).collect()
     };
     html! {
@@ -115,11 +116,11 @@ pub(super) fn by_kind(samples: &[Sample]) -> Markup {
 }
 
 pub(super) fn by_scene(samples: &[Sample]) -> Markup {
-    let all_rays = |tracer: Tracer| -> Vec<(String, Scope<'_>)> {
+    let all_rays = |tracer: TreeTracer| -> Vec<(String, Scope<'_>)> {
         let scope = |scene| Scope { scene: Some(scene), ..Scope::pooled(tracer) };
         scenes(samples).into_iter().map(|scene| (scene.to_owned(), scope(scene))).collect()
     };
-    let each_kind = |tracer: Tracer| -> Vec<(String, Scope<'_>)> {
+    let each_kind = |tracer: TreeTracer| -> Vec<(String, Scope<'_>)> {
         let of_scene = |scene| {
             let of_kind = move |kind| (format!("{scene}, {kind}"), Scope { tracer, kind, scene: Some(scene) });
             kinds(samples, tracer).into_iter().skip(1).map(of_kind)

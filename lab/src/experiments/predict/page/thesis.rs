@@ -3,11 +3,11 @@
 use super::tables::{self, interval, matrix, rows};
 use super::{kinds, scenes, tracers};
 use crate::experiments::predict::published::{self, OUTLIER, SOURCE};
-use crate::experiments::predict::record::Tracer;
 use crate::experiments::predict::samples::{Sample, Scope};
 use crate::measure::correlation::Correlation;
 use crate::report::Table;
 use crate::report::numbers::{two_decimals, whole};
+use crate::subjects::retraced::TreeTracer;
 use maud::{Markup, html};
 
 /// What was found of one predictor by the thesis' figures, and by ours.
@@ -19,11 +19,11 @@ struct Row {
 
 pub(super) fn section(samples: &[Sample]) -> Markup {
     let theirs = published::samples();
-    let pooled = Scope::pooled(Tracer::Host);
-    let ours: Vec<(Tracer, Vec<tables::Row>)> =
+    let pooled = Scope::pooled(TreeTracer::Host);
+    let ours: Vec<(TreeTracer, Vec<tables::Row>)> =
         tracers(samples).map(|tracer| (tracer, rows(samples, Scope::pooled(tracer)))).collect();
     let row = |(predictor, found): tables::Row| {
-        let correlation = |(_, rows): &(Tracer, Vec<tables::Row>)| {
+        let correlation = |(_, rows): &(TreeTracer, Vec<tables::Row>)| {
             rows.iter().find(|row| row.0.name == predictor.name).map(|row| row.1.correlation)
         };
         Row { name: predictor.name, theirs: found.correlation, ours: ours.iter().map(correlation).collect() }
@@ -46,7 +46,7 @@ pub(super) fn section(samples: &[Sample]) -> Markup {
     let scope_of = |scene| Scope { scene: Some(scene), ..pooled };
     let by_scene: Vec<(String, Scope<'_>)> =
         scenes(&theirs).into_iter().map(|scene: &str| (scene.to_owned(), scope_of(scene))).collect();
-    let by_kind: Vec<(String, Scope<'_>)> = kinds(&theirs, Tracer::Host)
+    let by_kind: Vec<(String, Scope<'_>)> = kinds(&theirs, TreeTracer::Host)
         .into_iter()
         .map(|kind: &str| (kind.to_owned(), Scope { kind, ..pooled }))
         .collect();

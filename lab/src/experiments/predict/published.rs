@@ -1,11 +1,9 @@
-//! What van Kralingen 2023 has published of static scenes, as data: tables 2, 3 and A.1 to A.8. Context that stands beside measured
-//! figures, never a result.
+//! What van Kralingen 2023 has published of static scenes, as samples beside ours: tables 2, 3 and A.1 to A.8.
 
-use super::record::Tracer;
 use super::samples::{EPO, FIGURES, SAH, STEPS, Sample, TESTS};
+use crate::experiments::published::{FIGURES as PUBLISHED, of};
 use crate::report::distinct;
-use serde::Deserialize;
-use std::sync::LazyLock;
+use crate::subjects::retraced::TreeTracer;
 
 /// Where the figures are from.
 pub const SOURCE: &str = "van Kralingen 2023, \"Evaluating Alternatives to the Surface Area Heuristic\"";
@@ -25,27 +23,6 @@ const KINDS: [(&str, &str); 6] = [
     ("diffuse 2 nd", "diffuse2"),
 ];
 
-/// A published figure.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct Figure {
-    /// What it is of.
-    pub metric: String,
-    /// The scene's name there.
-    pub scene: String,
-    /// The kind of rays there, or the cost.
-    pub rays_or_cost: String,
-    /// The heuristic's name there.
-    pub heuristic: String,
-    /// The figure.
-    pub value: f64,
-}
-
-/// The published figures.
-static PUBLISHED: LazyLock<Vec<Figure>> = LazyLock::new(|| {
-    let text = include_str!("vankralingen2023.csv");
-    csv::Reader::from_reader(text.as_bytes()).into_deserialize().collect::<Result<_, _>>().expect("a file of our own")
-});
-
 /// The trees of the thesis with each kind of rays, as if traced by the host; without those of [`OUTLIER`].
 pub fn samples() -> Vec<Sample> {
     let scenes = distinct(PUBLISHED.iter().map(|figure| figure.scene.as_str()));
@@ -53,12 +30,7 @@ pub fn samples() -> Vec<Sample> {
     let mut all = Vec::new();
     for scene in scenes {
         for heuristic in heuristics.iter().filter(|name| **name != OUTLIER) {
-            let of = |metric: &str, what: &str| {
-                let is_it = |f: &&Figure| {
-                    (&*f.metric, &*f.scene, &*f.rays_or_cost, &*f.heuristic) == (metric, scene, what, heuristic)
-                };
-                PUBLISHED.iter().find(is_it).map(|figure| figure.value)
-            };
+            let of = |metric: &str, what: &str| of(metric, scene, what, heuristic);
             for (there, kind) in KINDS {
                 let Some(ns) = of("ns_per_ray_static", there) else { continue };
                 let mut figures = [None; FIGURES];
@@ -68,7 +40,7 @@ pub fn samples() -> Vec<Sample> {
                     scene: scene.to_owned(),
                     builder: (*heuristic).to_owned(),
                     kind: kind.to_owned(),
-                    tracer: Tracer::Host,
+                    tracer: TreeTracer::Host,
                     ns,
                     figures,
                     is_reference: *heuristic == REFERENCE,
@@ -97,7 +69,7 @@ mod tests {
     /// Pearson's correlation of plain ratios to the SAH tree's, as the study of the thesis has them.
     fn of_ratios(name: &str, scene: Option<&str>) -> f64 {
         let all = samples();
-        let points = Scope { scene, ..Scope::pooled(Tracer::Host) }.points(&all);
+        let points = Scope { scene, ..Scope::pooled(TreeTracer::Host) }.points(&all);
         assert_eq!(points.len(), if scene.is_none() { 32 } else { 5 });
         let ratio = |log: Option<f64>| log.expect("published").exp();
         let predicted: Vec<f64> = points.iter().map(|point| ratio(point.prediction(&weights(name)))).collect();
