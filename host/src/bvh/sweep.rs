@@ -122,10 +122,25 @@ type Split = (f32, usize, usize);
 /// Stands for no split yet.
 const NO_SPLIT: Split = (f32::INFINITY, usize::MAX, 1);
 
-/// The better one, of equal ones the first.
+/// Puts the better one in the first one's place; of equal ones that one stays.
 #[inline(always)]
-fn better(a: Split, b: Split) -> Split {
-    if (b.0, b.1) < (a.0, a.1) { b } else { a }
+fn improve(best: &mut Split, other: Split) -> bool {
+    let is_better = (other.0, other.1) < (best.0, best.1);
+    // A branch: it is seldom taken, and the next split need not wait for this one.
+    if is_better {
+        *best = other;
+    }
+    is_better
+}
+
+/// The best of all.
+#[inline(always)]
+fn best_of(splits: impl Iterator<Item = Split>) -> Split {
+    let mut best = NO_SPLIT;
+    splits.for_each(|split| {
+        improve(&mut best, split);
+    });
+    best
 }
 
 struct Sweep<'a> {
@@ -210,12 +225,13 @@ impl Sweep<'_> {
     /// The best split and its axis, the first of equal axes; and all items.
     fn best_split<C: SplitCost>(&self, by: &C, here: &C::Here, axes: &mut [Axis<'_>; 3]) -> (usize, Split, Side) {
         let [x, y, z] = Self::along_axes(axes, |axis| self.best_split_of(by, here, axis));
-        let choose = |best: (usize, Split), (split, axis): (Split, usize)| {
-            let better = better(best.1, split);
-            if better == best.1 { best } else { (axis, better) }
-        };
-        let best = [(y.0, 1), (z.0, 2)].into_iter().fold((0, x.0), choose);
-        (best.0, best.1, x.1)
+        let (mut axis, mut best) = (0, x.0);
+        for (other, split) in [(1, y.0), (2, z.0)] {
+            if improve(&mut best, split) {
+                axis = other;
+            }
+        }
+        (axis, best, x.1)
     }
 
     fn best_split_of<C: SplitCost>(&self, by: &C, here: &C::Here, axis: &mut Axis<'_>) -> (Split, Side) {
@@ -223,7 +239,7 @@ impl Sweep<'_> {
             return self.best_split_by_both(by, here, axis.order);
         }
         let (splits, whole) = self.splits(by, here, axis);
-        (splits.fold(NO_SPLIT, better), whole)
+        (best_of(splits), whole)
     }
 
     /// The same by a heuristic whose sides cost something together alone.
@@ -240,8 +256,7 @@ impl Sweep<'_> {
         let splits = AxisSplits { lefts, rights: &rights };
         let costs = by.of_splits(here, &splits, order.iter().enumerate().map(place), self.rule.costs);
         let of = |(cost, at): (f32, usize)| (cost, (2 * at).abs_diff(order.len()), at);
-        let all = costs.into_iter().zip(1..).map(of);
-        (all.fold(NO_SPLIT, better), whole)
+        (best_of(costs.into_iter().zip(1..).map(of)), whole)
     }
 
     /// All splits along an axis, and all items.
@@ -261,8 +276,8 @@ impl Sweep<'_> {
         }
         let (costs, weights) = (self.rule.costs, &*axis.weights);
         let from_left = by.of_sides(here, growing(axis.order[..count - 1].iter().map(side)));
-        let splits = from_left.zip(1..).map(move |((weight, left), at)| {
-            let cost = costs.leaf_cost(weight, left.count) + costs.leaf_cost(weights[at], whole.count - left.count);
+        let splits = from_left.zip(&weights[1..]).zip(1_usize..).map(move |(((weight, left), &right_weight), at)| {
+            let cost = costs.leaf_cost(weight, left.count) + costs.leaf_cost(right_weight, whole.count - left.count);
             (cost, (2 * at).abs_diff(count), at)
         });
         (splits, whole)
@@ -277,8 +292,7 @@ impl Ranked for Sweep<'_> {
             let (splits, whole) = self.splits(&Area, &(), axis);
             let mut best = [NO_SPLIT; STRETCHES];
             for split in splits {
-                let best = &mut best[split.2 * STRETCHES / count];
-                *best = better(*best, split);
+                improve(&mut best[split.2 * STRETCHES / count], split);
             }
             (best, whole)
         });

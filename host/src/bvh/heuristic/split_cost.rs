@@ -32,6 +32,12 @@ impl Side {
         Side { bounds, count: 1, seen: u32::from(is_seen) }
     }
 
+    /// Whether its box has nothing in it.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.bounds.lo.cmpgt(self.bounds.hi).any()
+    }
+
     #[inline(always)]
     pub fn union(self, other: Side) -> Side {
         let (count, seen) = (self.count + other.count, self.seen + other.seen);
@@ -42,10 +48,42 @@ impl Side {
 /// Each together with all before it.
 #[inline(always)]
 pub(crate) fn growing(sides: impl Iterator<Item = Side>) -> impl Iterator<Item = Side> {
-    sides.scan(Side::EMPTY, |all, side| {
+    growing_on(Side::EMPTY, sides)
+}
+
+/// The same, and together with `all`.
+#[inline(always)]
+fn growing_on(all: Side, sides: impl Iterator<Item = Side>) -> impl Iterator<Item = Side> {
+    sides.scan(all, |all, side| {
         *all = all.union(side);
         Some(*all)
     })
+}
+
+/// What the planes between bins cost by a heuristic of which each side costs something on its own. Of a bin, `of_left` is what a plane
+/// behind it has on the left, `of_right` what one before it has on the right.
+#[inline(always)]
+pub(crate) fn of_planes<C: SplitCost, B>(
+    (by, here): (&C, &C::Here),
+    bins: &[B],
+    [of_left, of_right]: [fn(&B) -> Side; 2],
+    costs: &Collapse,
+) -> Vec<f32> {
+    let cost = |(weight, side): (f32, Side)| costs.leaf_cost(weight, side.count);
+    let around = |bins: &[B], of: fn(&B) -> Side| bins.iter().map(of).fold(Side::EMPTY, Side::union);
+    let planes = bins.len() - 1;
+    let mut all = vec![0.0; planes];
+    // A part may be so thin that nothing is left of its box. No ray meets that.
+    let thin = bins[..planes].iter().take_while(|bin| of_left(bin).is_empty()).count();
+    let lefts = growing_on(around(&bins[..thin], of_left), bins[thin..planes].iter().map(of_left));
+    let from_left = by.of_sides(here, lefts);
+    all[thin..].iter_mut().zip(from_left).for_each(|(all, left)| *all = cost(left));
+    let thin = bins[1..].iter().rev().take_while(|bin| of_right(bin).is_empty()).count();
+    let (bins, thin_bins) = bins[1..].split_at(planes - thin);
+    let rights = growing_on(around(thin_bins, of_right), bins.iter().rev().map(of_right));
+    let from_right = by.of_sides(here, rights);
+    all[..bins.len()].iter_mut().rev().zip(from_right).for_each(|(all, right)| *all += cost(right));
+    all
 }
 
 /// The splits of a node along an axis. Each left side is in the next one, each right side in the one before.
@@ -131,17 +169,11 @@ pub(crate) trait SplitCost: Sync {
         _places: impl Iterator<Item = Place>,
         costs: &Collapse,
     ) -> Vec<f32> {
-        let cost = |(weight, side): (f32, Side)| costs.leaf_cost(weight, side.count);
-        // A part may be so thin that nothing is left of its box. No ray meets that.
-        let is_empty = |side: &&Side| side.bounds.lo.cmpgt(side.bounds.hi).any();
-        let thin = splits.lefts.iter().take_while(is_empty).count();
-        let mut all = vec![0.0; splits.lefts.len()];
-        let from_left = self.of_sides(here, splits.lefts[thin..].iter().copied());
-        from_left.zip(&mut all[thin..]).for_each(|(left, all)| *all = cost(left));
-        let thin = splits.rights.iter().rev().take_while(is_empty).count();
-        let from_right = self.of_sides(here, splits.rights.iter().rev().skip(thin).copied());
-        from_right.zip(all.iter_mut().rev().skip(thin)).for_each(|(right, all)| *all += cost(right));
-        all
+        let cost = |side: &Side| -> f32 {
+            let weighed = (!side.is_empty()).then_some(*side).into_iter();
+            self.of_sides(here, weighed).map(|(weight, side)| costs.leaf_cost(weight, side.count)).sum()
+        };
+        splits.lefts.iter().zip(splits.rights).map(|(left, right)| cost(left) + cost(right)).collect()
     }
 
     /// What it knows of both sides of the split that was taken, and which becomes the left child.

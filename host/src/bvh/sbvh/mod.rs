@@ -20,7 +20,7 @@ pub(super) use leaves::collapse;
 
 use super::ALONE;
 use super::bounds::{Bounds, Item};
-use super::heuristic::split_cost::{First, Side, Space, SplitCost};
+use super::heuristic::split_cost::{AxisSplits, First, Place, Side, Space, SplitCost, growing, of_planes};
 use super::top_down::{self, Candidates, HALVED_FROM, LeafRule};
 use super::topology::{LEAF, Topology};
 use hedgerow::bvh::twin::split::padded;
@@ -327,6 +327,20 @@ impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
         let is_leaf = LeafRule { single: false, ..self.build.rule }.is_leaf(weight, count, cost);
         let by_space = spatial.filter(|_| !is_leaf).and_then(|spatial| self.build.cut(references, &spatial));
         Some(by_space.unwrap_or_else(|| object.unwrap_or_else(objects).divide(references)))
+    }
+
+    /// What the planes between bins cost, of whose items each is in one place; of a bin, what is on the left of a plane behind it, and
+    /// on the right of one before it.
+    #[inline(always)]
+    fn costs<B>(&self, bins: &[B], of: [fn(&B) -> Side; 2], places: impl Iterator<Item = Place>) -> Vec<f32> {
+        let costs = self.build.rule.costs;
+        if !S::BY_BOTH {
+            return of_planes((self.by, self.here), bins, of, costs);
+        }
+        let lefts: Vec<Side> = growing(bins[..bins.len() - 1].iter().map(of[0])).collect();
+        let mut rights: Vec<Side> = growing(bins[1..].iter().rev().map(of[1])).collect();
+        rights.reverse();
+        self.by.of_splits(self.here, &AxisSplits { lefts: &lefts, rights: &rights }, places, costs)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{ALONE, Search, Unsplit};
 use crate::bvh::bounds::{Bounds, Item, around};
-use crate::bvh::heuristic::split_cost::{AxisSplits, Place, Side, SplitCost, growing};
+use crate::bvh::heuristic::split_cost::{Place, Side, SplitCost};
 use rayon::prelude::*;
 
 /// Centroids whose extent is less than this part of the scene's are not told apart by an axis.
@@ -87,8 +87,7 @@ impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
             let side = usize::from(at >= left.len());
             Place { primitive: reference.primitive(), first: side, last: side }
         });
-        let splits = AxisSplits { lefts: &[side(left)], rights: &[side(right)] };
-        let cost = self.by.of_splits(self.here, &splits, places, self.build.rule.costs)[0];
+        let cost = self.costs(&[left, right].map(side), [|side| *side, |side| *side], places)[0];
         ObjectSplit { cost, sides: [left, right].map(around), by: By::Order }
     }
 
@@ -103,23 +102,15 @@ impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
             let bin = &mut bins[grid.bin_of(reference)];
             *bin = bin.union(self.side_of(reference));
         }
-        let lefts: Vec<Side> = growing(bins[..grid.bins - 1].iter().copied()).collect();
-        let mut rights: Vec<Side> = growing(bins[1..].iter().rev().copied()).collect();
-        rights.reverse();
         let places = references.iter().map(|reference| {
             let bin = grid.bin_of(reference);
             Place { primitive: reference.primitive(), first: bin, last: bin }
         });
-        let splits = AxisSplits { lefts: &lefts, rights: &rights };
-        let costs = self.by.of_splits(self.here, &splits, places, self.build.rule.costs);
-        let mut best = ObjectSplit { cost: f32::INFINITY, sides: [Bounds::EMPTY; 2], by: By::Bins(grid, 1) };
-        for (bin, &cost) in (1..).zip(&costs) {
-            if cost < best.cost {
-                let sides = [lefts[bin - 1].bounds, rights[bin - 1].bounds];
-                best = ObjectSplit { cost, sides, by: By::Bins(grid, bin) };
-            }
-        }
-        best
+        let costs = self.costs(&bins, [|bin| *bin, |bin| *bin], places);
+        let cheaper = |best: (usize, f32), plane: (usize, f32)| if plane.1 < best.1 { plane } else { best };
+        let (bin, cost) = (1..).zip(costs).fold((1, f32::INFINITY), cheaper);
+        let of = |bins: &[Side]| bins.iter().fold(Bounds::EMPTY, |all, bin| all.union(bin.bounds));
+        ObjectSplit { cost, sides: [of(&bins[..bin]), of(&bins[bin..])], by: By::Bins(grid, bin) }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::object::of_axes;
 use super::{Build, PART, SHORTEST_CUT, Search, aabb};
 use crate::bvh::bounds::{Bounds, Item};
-use crate::bvh::heuristic::split_cost::{AxisSplits, Place, Side, SplitCost, growing};
+use crate::bvh::heuristic::split_cost::{Place, Side, SplitCost};
 use glam::Vec3A;
 use hedgerow::bvh::twin::split::halves;
 
@@ -17,16 +17,43 @@ pub(super) struct SpatialSplit {
     takes_whole: [bool; 2],
 }
 
-/// A bin of space: the parts of references in it, how many begin in it, and how many end; the boxes of both are those of the parts.
+/// A bin of space: around the parts of references in it, how many references begin in it, and how many end.
 #[derive(Clone, Copy)]
 struct Bin {
-    begin: Side,
-    end: Side,
+    parts: Bounds,
+    begin: Count,
+    end: Count,
 }
 
 impl Bin {
+    const EMPTY: Bin = Bin { parts: Bounds::EMPTY, begin: Count { all: 0, seen: 0 }, end: Count { all: 0, seen: 0 } };
+
     fn add(&mut self, part: Bounds) {
-        self.begin.bounds = self.begin.bounds.union(part);
+        self.parts = self.parts.union(part);
+    }
+
+    /// The parts, and the references that begin here: each is on the left of a plane that is behind its beginning.
+    fn of_left(&self) -> Side {
+        Side { bounds: self.parts, count: self.begin.all, seen: self.begin.seen }
+    }
+
+    /// The parts, and the references that end here: each is on the right of a plane that is before its end.
+    fn of_right(&self) -> Side {
+        Side { bounds: self.parts, count: self.end.all, seen: self.end.seen }
+    }
+}
+
+/// How many references, and how many of them are seen.
+#[derive(Clone, Copy)]
+struct Count {
+    all: u32,
+    seen: u32,
+}
+
+impl Count {
+    fn add_one(&mut self, seen: u32) {
+        self.all += 1;
+        self.seen += seen;
     }
 }
 
@@ -81,41 +108,38 @@ impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
 
     fn spatial_split_by(&self, references: &[Item], slabs: &Slabs, room: usize) -> Option<SpatialSplit> {
         let bins = self.filled(references, slabs);
-        let lefts: Vec<Side> = growing(bins[..bins.len() - 1].iter().map(|bin| bin.begin)).collect();
-        let mut rights: Vec<Side> = growing(bins[1..].iter().rev().map(|bin| bin.end)).collect();
-        rights.reverse();
         let places = references.iter().map(|reference| {
             let (first, last) = slabs.bins_of(&reference.bounds());
             Place { primitive: reference.primitive(), first, last }
         });
-        let splits = AxisSplits { lefts: &lefts, rights: &rights };
-        let costs = self.by.of_splits(self.here, &splits, places, self.build.rule.costs);
+        let costs = self.costs(&bins, [Bin::of_left, Bin::of_right], places);
         let most = references.len() + room;
         let mut best: Option<(f32, usize)> = None;
-        for (i, &cost) in costs.iter().enumerate() {
-            let [left, right] = [lefts[i].count, rights[i].count];
-            let is_possible = left > 0 && right > 0 && left as usize + right as usize <= most;
+        let [mut left, mut right] = [0, references.len()];
+        for ((bin, cost), at) in bins.iter().zip(costs).zip(1..) {
+            left += bin.begin.all as usize;
+            right -= bin.end.all as usize;
+            let is_possible = left > 0 && right > 0 && left + right <= most;
             if is_possible && best.is_none_or(|best| cost < best.0) {
-                best = Some((cost, i));
+                best = Some((cost, at));
             }
         }
-        let (cost, i) = best?;
-        let sides = [lefts[i], rights[i]];
+        let (cost, at) = best?;
+        let around = |bins: &[Bin], of: fn(&Bin) -> Side| bins.iter().map(of).fold(Side::EMPTY, Side::union);
+        let sides = [around(&bins[..at], Bin::of_left), around(&bins[at..], Bin::of_right)];
         let takes_whole = sides.map(|side| self.by.takes_whole(self.here, &side));
-        Some(SpatialSplit { cost, axis: slabs.axis, at: slabs.borders[i + 1], sides, takes_whole })
+        Some(SpatialSplit { cost, axis: slabs.axis, at: slabs.borders[at], sides, takes_whole })
     }
 
     /// The bins, with the references chopped at their borders.
     fn filled(&self, references: &[Item], slabs: &Slabs) -> Vec<Bin> {
-        let mut bins = vec![Bin { begin: Side::EMPTY, end: Side::EMPTY }; slabs.borders.len() - 1];
+        let mut bins = vec![Bin::EMPTY; slabs.borders.len() - 1];
         for reference in references {
             let bounds = reference.bounds();
             let (first, last) = slabs.bins_of(&bounds);
             let seen = u32::from(self.by.is_seen(reference));
-            bins[first].begin.count += 1;
-            bins[first].begin.seen += seen;
-            bins[last].end.count += 1;
-            bins[last].end.seen += seen;
+            bins[first].begin.add_one(seen);
+            bins[last].end.add_one(seen);
             if first == last {
                 bins[first].add(bounds);
             } else {
@@ -123,7 +147,6 @@ impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
                 outline.chop(&bounds, &slabs.borders[first..=last + 1], &mut bins[first..=last]);
             }
         }
-        bins.iter_mut().for_each(|bin| bin.end.bounds = bin.begin.bounds);
         bins
     }
 }
