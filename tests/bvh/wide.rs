@@ -1,6 +1,7 @@
 //! Wide trees collapsed on the device equal the host's, byte for byte, over inputs that hurt, and are valid.
 
 use crate::common::{corpus, device};
+use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child, Header, Node, Record, Triangle, status};
@@ -52,10 +53,92 @@ fn assert_as_on_the_host<N: WideNode>(name: &str, tree: &Bvh2) {
     assert!(bytes == expected.to_bytes(), "{name} {}: other bytes", N::FORM);
 }
 
+/// Also of the tree with its children in order.
 fn assert_all_forms(name: &str, tree: &Bvh2) {
     assert_as_on_the_host::<[Child; 4]>(name, tree);
     assert_as_on_the_host::<[Child; 8]>(name, tree);
     assert_as_on_the_host::<QuantisedNode>(name, tree);
+    let ordered = tree.clone().in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
+    let name = format!("{name} in order");
+    assert_as_on_the_host::<[Child; 4]>(&name, &ordered);
+    assert_as_on_the_host::<[Child; 8]>(&name, &ordered);
+    assert_as_on_the_host::<QuantisedNode>(&name, &ordered);
+}
+
+/// The primitives below a child of a binary tree, left children first.
+fn met_in(tree: &Bvh2, child: &Child, met: &mut Vec<u32>) {
+    if child.is_leaf() {
+        met.extend(tree.records[child.index as usize..][..child.count as usize].iter().map(|record| record.primitive));
+    } else {
+        tree.nodes[child.index as usize].children.iter().for_each(|child| met_in(tree, child, met));
+    }
+}
+
+/// The same below a wide node, by slots.
+fn met_in_wide<N: WideNode>(tree: &Wide<N>, node: u32, met: &mut Vec<u32>) {
+    let leaf = |first: u32, count: u32, met: &mut Vec<u32>| {
+        met.extend(tree.records[first as usize..][..count as usize].iter().map(|record| record.primitive));
+    };
+    let node = &tree.nodes[node as usize];
+    if let Some((first, count)) = node.long_leaf() {
+        leaf(first, count, met);
+    }
+    for child in node.children().iter().flatten() {
+        if child.is_leaf() {
+            leaf(child.index, child.count, met);
+        } else {
+            met_in_wide(tree, child.index, met);
+        }
+    }
+}
+
+#[track_caller]
+fn assert_met_in_order<N: WideNode>(tree: &Bvh2) {
+    let wide = Wide::<N>::of(tree);
+    assert_eq!(wide.header.child_order, tree.header.child_order, "{}", N::FORM);
+    let (mut expected, mut met) = (Vec::new(), Vec::new());
+    met_in(tree, &tree.header.root, &mut expected);
+    met_in_wide(&wide, 0, &mut met);
+    assert_eq!(met, expected, "{}", N::FORM);
+}
+
+#[test]
+fn children_in_order_lie_as_the_binary_walk_meets_them() {
+    let (_, positions, triangles) = corpus::random("3,000 random", 3_000, [0.0; 3], [1.0; 3]);
+    let random = lbvh::build(&positions, &triangles, Code::Emc64Var.full(), Collapse::SAH);
+    let lengths: Vec<usize> = (0..70).map(|i| [1, 2, 300, 5][i % 4]).collect();
+    for tree in [random, piles(&lengths), deep(2), piles(&[300])] {
+        for order in ChildOrder::ALL {
+            let ordered = tree.clone().in_child_order(order, &Collapse::SAH);
+            assert_met_in_order::<[Child; 4]>(&ordered);
+            assert_met_in_order::<[Child; 8]>(&ordered);
+            assert_met_in_order::<QuantisedNode>(&ordered);
+        }
+    }
+}
+
+/// What an order is not: other children. Nodes open the same ones, whatever slots those go to.
+#[test]
+fn an_order_leaves_nodes_their_children() {
+    fn children_of<N: WideNode>(tree: &Bvh2) -> Vec<Vec<[u32; 6]>> {
+        let bits = |child: &Child| [child.lo, child.hi].concat().iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        let of_node = |node: &N| {
+            let mut all: Vec<[u32; 6]> =
+                node.children().iter().flatten().map(|child| bits(child).try_into().expect("six")).collect();
+            all.sort_unstable();
+            all
+        };
+        let mut all: Vec<_> = Wide::<N>::of(tree).nodes.iter().map(of_node).collect();
+        all.sort_unstable();
+        all
+    }
+    let (_, positions, triangles) = corpus::random("3,000 random", 3_000, [0.0; 3], [1.0; 3]);
+    let tree = lbvh::build(&positions, &triangles, Code::Emc64Var.full(), Collapse::SAH);
+    let ordered = tree.clone().in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
+    assert!(Wide::<[Child; 8]>::of(&tree).nodes != Wide::<[Child; 8]>::of(&ordered).nodes, "nothing was ordered");
+    assert_eq!(children_of::<[Child; 4]>(&ordered), children_of::<[Child; 4]>(&tree));
+    assert_eq!(children_of::<[Child; 8]>(&ordered), children_of::<[Child; 8]>(&tree));
+    assert_eq!(children_of::<QuantisedNode>(&ordered), children_of::<QuantisedNode>(&tree));
 }
 
 #[test]

@@ -12,6 +12,10 @@
 // that are named by nodes of lower slots, and its rank among the nodes of its parent; the sums make them. So nodes that one
 // names lie side by side, as do, of quantised nodes, the records of its leaves.
 //
+// Where the source's children have an order (bvh/child_order.glsl), those of a wide node lie in their slots as the walk that takes left
+// children first meets them, and the target's header says so, too. Otherwise nodes of floats have them as they were opened, and quantised
+// ones by octants.
+//
 // Anything that is not a structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
 // its own status.
 //

@@ -10,6 +10,8 @@ uint open_count[8];
 uint open_depth[8];
 // What speaks for opening it; less than 0 for a leaf.
 float open_weight[8];
+// Which child comes first, second and so on where the source's left-first walk meets them: four bits each.
+uint open_order;
 
 // What speaks for opening a child that is an inner node.
 float weight_by_visits(uint name, Child child, float scale) {
@@ -46,8 +48,18 @@ void put_child(uint at, uint name, uint depth, uint level, float scale) {
     }
 }
 
+// Where child `opened` was, its two children come: itself, which is the left one now, and `right` right behind it.
+void put_right_behind(uint opened_child, uint right) {
+    uint place = 0;
+    while (place < 7 && (open_order >> 4 * place & 15u) != opened_child) ++place;
+    uint bits = 4 * (place + 1);
+    uint behind = place < 6 ? open_order >> bits << bits + 4 : 0;
+    open_order = open_order & (1u << bits) - 1u | right << bits | behind;
+}
+
 // The children of the wide node that begins with the binary node `slot`: how many.
 uint open_children(uint slot, uint level, Child root) {
+    open_order = 0x10u;
     if (!is_inner(root)) {
         put_child(0, WHOLE_TREE, 0, level, 0.0);
         return 1;
@@ -70,6 +82,7 @@ uint open_children(uint slot, uint level, Child root) {
         if (largest == 8) break;
         put_child(largest, 2 * opens, depth, level, scale);
         put_child(count, 2 * opens + 1, depth, level, scale);
+        put_right_behind(largest, count);
         count++;
     }
     return count;
@@ -113,8 +126,9 @@ void open(uint i, uvec2 of, uint level) {
     if (is_there) {
         slot = opened.node[at].slot;
         uint count = open_children(slot, level, source.header.root);
-        for (uint s = 0; s < 8; ++s) in_slot[s] = s < count ? s : 8;
-        if (QUANTISED) octant_slots(count, middle_of_node(slot), in_slot);
+        bool has_order = source.header.child_order != 0;
+        for (uint s = 0; s < 8; ++s) in_slot[s] = s < count ? has_order ? open_order >> 4 * s & 15u : s : 8;
+        if (QUANTISED && !has_order) octant_slots(count, middle_of_node(slot), in_slot);
 
         uint nodes = 0, records = 0;
         for (uint s = 0; s < WIDTH; ++s) {

@@ -127,7 +127,7 @@ fn record_build(
     order.record(recorder, structure.region(), scratch.region())
 }
 
-/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`, whose children may be in order.
+/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`; the children of either may be in order.
 fn record_trace(
     recorder: &mut Recorder<'_>,
     wide_tree: Option<&WideTree<'_>>,
@@ -138,7 +138,7 @@ fn record_trace(
     match wide_tree {
         None if binary.by_query => queries::record(recorder, query, buffers),
         None => record_binary(recorder, binary.is_ordered, query, buffers),
-        Some(tree) => tree.tracer.record(recorder, query, buffers),
+        Some(tree) => tree.record_trace(recorder, query, buffers),
     }
 }
 

@@ -113,7 +113,7 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &[LinkCount]) -> Vec
         for (root, place) in this_level {
             let children = open(tree, &root, N::FORM.width() as usize, level, counts);
             let mut slots = [None; 8];
-            if N::FORM.is_quantised() {
+            if N::FORM.is_quantised() && tree.header.child_order == 0 {
                 slots = octant_slots(&children);
             } else {
                 slots.iter_mut().zip(&children).for_each(|(slot, child)| *slot = Some(*child));
@@ -134,7 +134,7 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &[LinkCount]) -> Vec
 
 /// The children of a wide node: those of the binary node, the largest one opened again and again, or, where there are counts, the one
 /// that most rays went into; far down ([`LEVELS_BY_AREA`]) the highest one. Of equal ones the first. A tree that is a leaf is its
-/// own child.
+/// own child. Children come as they were opened; where the tree's have an order, as the walk that takes left ones first meets them.
 fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32, counts: &[LinkCount]) -> Vec<Child> {
     if root.is_leaf() {
         return vec![*root];
@@ -157,6 +157,8 @@ fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32, count
         children.map(|(link, c)| (c, weight(link, &c, depth), depth)).collect::<Vec<_>>()
     };
     let mut children = below(root, 1);
+    // Which of them comes first, second and so on in the walk that takes left children first.
+    let mut order = vec![0, 1];
     while children.len() < width {
         let mut largest: Option<usize> = None;
         for (i, (_, weight, _)) in children.iter().enumerate() {
@@ -168,9 +170,12 @@ fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32, count
         let (child, _, depth) = children[at];
         let [left, right] = below(&child, depth + 1).try_into().expect("two children");
         children[at] = left;
+        let place = order.iter().position(|&child| child == at).expect("all of them are there");
+        order.insert(place + 1, children.len());
         children.push(right);
     }
-    children.into_iter().map(|(child, ..)| child).collect()
+    let in_order = |place: usize| if tree.header.child_order != 0 { order[place] } else { place };
+    (0..children.len()).map(|place| children[in_order(place)].0).collect()
 }
 
 /// The children in slots by the octants that they lie in (Ylitie, Karras, Laine 2017, section 3.1): a child gains by a slot what
