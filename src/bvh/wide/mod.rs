@@ -30,6 +30,10 @@ pub enum Form {
 /// How many rays, spread by surface area, stand beside those that were counted.
 pub(crate) const PRIOR_RAYS: f32 = 8.0;
 
+/// What rays of work stand beside those that were counted in each child, where children are put in order by hits: as many as
+/// [`PRIOR_RAYS`], each of which takes a step of 3 and ends nowhere.
+pub(crate) const PRIOR_WORK: f32 = 24.0;
+
 /// Levels of wide nodes that are opened by surface area or by visits. Nodes further down are opened level by level, so that a node takes in
 /// two binary levels of four children and three of eight, however the tree is shaped: what a ray puts off is bounded by that.
 /// Trees of scenes end long before.
