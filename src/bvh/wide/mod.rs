@@ -5,6 +5,9 @@
 //! fewer steps then, and what a step loads lies together. Where rays were counted, the child that most of them went into may be
 //! replaced instead (Gu, He, Blelloch 2015, "Ray Specialized Contraction on Bounding Volume Hierarchies").
 //!
+//! Where the children of the source have an order ([`super::child_order`]), those of a wide node lie in their slots as rays shall look
+//! into them that end at any hit, and the header says so, too.
+//!
 //! - [`layout`] are the bytes, [`quantised`] those of the node of 80 bytes;
 //! - [`super::twin::wide`] collapses plainly, [`device`] in the caller's command buffer: the same bytes;
 //! - [`validate`] walks a wide tree, [`quality`] says what it costs;
