@@ -26,6 +26,7 @@ fn first_builds_make_no_pipelines() {
         "lbvh:split=0.3:optimise=fast",
         "lbvh:width=8q",
         "lbvh:any-hit=opaque",
+        "lbvh:width=8:any-hit=opaque",
         "hlbvh:any-hit=sato",
         "ploc",
         "hploc:width=4",

@@ -10,6 +10,7 @@
 #include "trace/buffers.glsl"
 #include "trace/nearest.glsl"
 #include "trace/quantised_boxes.glsl"
+#include "trace/quantised_slots.glsl"
 #include "trace/stack.glsl"
 
 struct QuantisedWalk {
@@ -82,7 +83,7 @@ uint next_node(inout QuantisedWalk walk) {
         hedgerow_put_entry(walk.level, uvec2(walk.first_child, walk.enter | walk.nodes << 8 | walk.visits));
         walk.level++;
     }
-    return walk.first_child + uint(bitCount(walk.nodes & (1u << slot) - 1u));
+    return walk.first_child + rank_of_node(walk.nodes, slot);
 }
 
 // The leading half of a float that is not above `enter`.
@@ -120,23 +121,13 @@ void visit(QuantisedNode node, inout QuantisedWalk walk) {
     walk.leaves = in_octant(entered & ~walk.nodes, walk.octant);
 }
 
-// The sum of the bytes of both words that are below that of a slot.
-uint sum_below(uvec2 bytes, uint slot) {
-    uint shift = (slot & 3u) * 8;
-    uint below = (1u << shift) - 1u;
-    uvec2 words = slot < 4 ? uvec2(bytes.x & below, 0u) : uvec2(bytes.x, bytes.y & below);
-    uvec2 halves = (words & 0x00FF00FFu) + (words >> 8 & 0x00FF00FFu);
-    uint sum = halves.x + halves.y;
-    return (sum & 0xFFFFu) + (sum >> 16);
-}
-
 // The next leaf, if the last one is done.
 void next_leaf(inout QuantisedWalk walk) {
     if (walk.left != 0u || walk.leaves == 0u) return;
     uint slot = uint(findLSB(walk.leaves)) ^ walk.octant;
     walk.leaves &= walk.leaves - 1u;
     walk.record = walk.first_record + sum_below(walk.counts, slot);
-    walk.left = (slot < 4 ? walk.counts.x : walk.counts.y) >> ((slot & 3u) * 8) & 0xFFu;
+    walk.left = byte_of_slot(walk.counts, slot);
     if (walk.left != 0u) walk.work.z++;
 }
 

@@ -1,7 +1,10 @@
-// A step of trace/walk.glsl at a node of WIDTH children as floats: the twin of src/trace/wide_host.rs, visit for visit.
+// A step of trace/walk.glsl at a node of WIDTH children as floats: the twin of src/trace/twin/wide.rs, visit for visit.
 //
 // The children that the ray enters are sorted by where it does; the nearest is at hand then, the others wait, the farthest
 // below. So many may wait at once that a shader defines HEDGEROW_LEVELS (src/trace/wide.rs, `Order::stack_levels`).
+//
+// With LEFT_FIRST, for rays that end at any hit, they are met by slots instead: that in the lowest one is at hand, and which others the
+// ray enters is a mask of bits beside their node. When the ray goes down, those two words wait: one entry a level, and nothing to sort.
 #ifndef HEDGEROW_TRACE_WALK_WIDE
 #define HEDGEROW_TRACE_WALK_WIDE
 #include "trace/vector_loads.glsl"
@@ -43,6 +46,31 @@ void in_order(uint a, uint b) {
     wide_count[b] = swap ? count : wide_count[b];
 }
 
+// LEFT_FIRST: the node whose children are looked into one after the other, and the slots of those that are left. A shader sets the latter
+// to 0 where a ray begins.
+uint wide_node;
+uint wide_rest;
+
+// The child in the lowest slot is at hand. What was left of the node above waits.
+void go_to_leftmost(inout Walk walk) {
+    walk.work.x++;
+    if (wide_rest != 0u) {
+        hedgerow_put_entry(walk.level, uvec2(wide_node, wide_rest));
+        walk.level++;
+    }
+    wide_node = walk.index;
+    wide_rest = 0u;
+    walk.left = NOTHING;
+    [[unroll]] for (uint i = WIDTH; i-- > 0;) {
+        bool enters = wide_enter[i] < HEDGEROW_INFINITY;
+        walk.index = enters ? wide_index[i] : walk.index;
+        walk.left = enters ? wide_count[i] : walk.left;
+        wide_rest |= enters ? 1u << i : 0u;
+    }
+    wide_rest &= wide_rest - 1u;
+    count_leaf(walk);
+}
+
 // The nearest child is at hand, the others wait.
 void go_to_nearest(inout Walk walk) {
     walk.work.x++;
@@ -71,6 +99,11 @@ void go_to_nearest(inout Walk walk) {
     count_leaf(walk);
 }
 
+void go_to_first(inout Walk walk) {
+    if (LEFT_FIRST) go_to_leftmost(walk);
+    else go_to_nearest(walk);
+}
+
 void enter_child(uint i, Child child, Walk walk) {
     bool enters;
     float enter = hedgerow_enter(walk.ray, child.lo, child.hi, walk.best, enters);
@@ -87,6 +120,11 @@ void visit_wide(WideNode node, inout Walk walk) {
     ENTER_CHILD(4); ENTER_CHILD(5); ENTER_CHILD(6); ENTER_CHILD(7);
 #endif
 #undef ENTER_CHILD
-    go_to_nearest(walk);
+    go_to_first(walk);
+}
+
+// Index and count of the child in a slot.
+uvec2 wide_child_in_slot(WideNodes nodes, uint node, uint slot) {
+    return uvec2(nodes.node[node].child[slot].index, nodes.node[node].child[slot].count);
 }
 #endif

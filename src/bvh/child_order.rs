@@ -10,7 +10,7 @@
 //! [`BuildOptions::child_order`](super::builder::BuildOptions::child_order) asks a builder for an order; [`ChildOrderPass`] puts the children
 //! of a finished `Bvh2` in order, whoever built it. The left one is then the one to look into first, and the header says so. Hits
 //! stay what they are, but which triangle a ray names that ends at any hit. [`crate::trace::tracer::record_left_first`] and queries of
-//! `glsl/trace/query.glsl` are the walks that profit. `glsl/bvh/child_order.glsl` is the device's side,
+//! `glsl/trace/query.glsl` are the walks that profit, and [`crate::trace::wide::Order::LeftFirst`] in wide trees made of such. `glsl/bvh/child_order.glsl` is the device's side,
 //! [`Bvh2::in_child_order`](super::layout::Bvh2::in_child_order) the twin: the same bytes. An LBVH puts its children in order while it is
 //! built (`glsl/bvh/lbvh.glsl`): the same rules, the areas of a leaf's primitives being added up in another order.
 

@@ -311,7 +311,8 @@ pub struct Header {
     /// Where triangles were split, and several records may be of one: primitives of the input. Otherwise 0.
     pub split_from: u32,
     /// 1: the children of all nodes have an order ([`crate::bvh::child_order`]), and the left one is what rays look into first that end
-    /// at any hit. 0: they are as the build left them. Copies and updates keep it.
+    /// at any hit. 0: they are as the build left them. Copies and updates keep it,
+    /// and wide trees made of the structure have it.
     pub child_order: u32,
     /// Zero.
     pub reserved: [u32; 7],

@@ -145,6 +145,13 @@ pub(super) fn kernel_of(
     Kernel::new(shader, shape.workgroup, &constants(shape, query, count_work))
 }
 
+/// The same for rays that end at any hit, left children first.
+pub(super) fn kernel_left_first(shader: &'static shaders::Shader, shape: &TraceShape, count_work: bool) -> Kernel {
+    let [any_hit, count_work, shared_levels, lanes, in_vectors] = constants(shape, Query::AnyHit, count_work);
+    let left_first = 1;
+    Kernel::new(shader, shape.workgroup, &[any_hit, count_work, shared_levels, lanes, in_vectors, left_first])
+}
+
 /// Records the tracing of all rays: one dispatch, or several if the device cannot take all workgroups in one.
 ///
 /// Rays, structure and hits must be visible to and not used by other shaders before: the caller places a barrier (shader
@@ -163,11 +170,8 @@ pub fn record(recorder: &mut Recorder<'_>, shape: &TraceShape, query: Query, buf
 /// # Errors
 /// As [`record`].
 pub fn record_left_first(recorder: &mut Recorder<'_>, shape: &TraceShape, buffers: &TraceBuffers) -> Result<()> {
-    let [any_hit, count_work, shared_levels, lanes, in_vectors] =
-        constants(shape, Query::AnyHit, buffers.work.is_some());
-    let left_first = 1;
-    let constants = [any_hit, count_work, shared_levels, lanes, in_vectors, left_first];
-    record_kernel(recorder, &Kernel::new(shader(shape), shape.workgroup, &constants), shape, buffers)
+    let kernel = kernel_left_first(shader(shape), shape, buffers.work.is_some());
+    record_kernel(recorder, &kernel, shape, buffers)
 }
 
 /// Records the tracing of all rays by a kernel that takes [`arguments::Trace`].

@@ -15,6 +15,9 @@ pub enum Order {
     /// those of a node waiting as one entry (Ylitie, Karras, Laine 2017): less to sort and to keep. Over seven scenes it takes
     /// 1.0 to 1.2 times the steps and 1.0 to 1.3 times the tests, the most of primary and random rays; lavapipe is as fast.
     Octant,
+    /// By slots, wherever the children are: for rays that end at any hit, in trees whose children have an order
+    /// ([`crate::bvh::child_order`]). No distances are kept, nothing is sorted, and those of a node wait as one entry.
+    LeftFirst,
 }
 
 /// The tracer of wide trees of one form on a device.
@@ -28,11 +31,14 @@ pub struct WideTracer {
     pub shape: TraceShape,
 }
 
-// HEDGEROW_LEVELS in glsl/trace/tracer_wide*.comp.
+// HEDGEROW_LEVELS in glsl/trace/wide/*.comp.
 const _: () = assert!(Order::Distance.stack_levels(Form::Four) == 180);
 const _: () = assert!(Order::Distance.stack_levels(Form::Eight) == 336);
 const _: () = assert!(Order::Distance.stack_levels(Form::EightQuantised) == 343);
 const _: () = assert!(Order::Octant.stack_levels(Form::EightQuantised) == 49);
+const _: () = assert!(Order::LeftFirst.stack_levels(Form::Four) == 60);
+const _: () = assert!(Order::LeftFirst.stack_levels(Form::Eight) == 48);
+const _: () = assert!(Order::LeftFirst.stack_levels(Form::EightQuantised) == 49);
 
 impl Order {
     /// Entries of the stack of a ray, as many as the levels of nodes that a tree can have: by distance, of each of them all
@@ -40,7 +46,7 @@ impl Order {
     pub const fn stack_levels(self, form: Form) -> u32 {
         match self {
             Order::Distance => form.levels() * (form.width() - 1),
-            Order::Octant => form.levels(),
+            Order::Octant | Order::LeftFirst => form.levels(),
         }
     }
 }
@@ -53,10 +59,11 @@ impl WideTracer {
         WideTracer::in_order(context, form, if by_octant { Order::Octant } else { Order::Distance })
     }
 
-    /// In this order: the shape as of [`TraceShape::of`], but the whole stack in shared memory on CPUs.
+    /// In this order: the shape as of [`TraceShape::of`], but the whole stack in shared memory on CPUs, and no loads lane by lane
+    /// but by [`Order::Octant`].
     pub fn in_order(context: &Context, form: Form, order: Order) -> WideTracer {
         let mut shape = TraceShape::of(context);
-        if order == Order::Distance {
+        if order != Order::Octant {
             shape.loads = if context.tuning.trace.in_vectors { Loads::InVectors } else { Loads::Gathered };
         }
         WideTracer::with(&context.limits, form, order, shape)
@@ -72,31 +79,42 @@ impl WideTracer {
     /// The kernel that [`WideTracer::record`] takes.
     ///
     /// # Errors
-    /// No kernel visits such nodes in that order, or loads them in that way.
+    /// No kernel visits such nodes in that order, or loads them in that way; the nearest hit is not found by
+    /// [`Order::LeftFirst`].
     fn kernel(&self, query: Query, count_work: bool) -> Result<Kernel> {
         let shader = match (self.form, self.order, self.shape.loads) {
-            (Form::Four, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_WIDE_FOUR,
-            (Form::Eight, Order::Distance, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_WIDE_EIGHT,
-            (Form::EightQuantised, Order::Distance, Loads::Gathered | Loads::InVectors) => {
-                &shaders::TRACE_WIDE_EIGHT_QUANTISED
-            }
-            (Form::EightQuantised, Order::Octant, Loads::Gathered | Loads::InVectors) => &shaders::TRACE_WIDE_OCTANT,
             (Form::EightQuantised, Order::Octant, Loads::LaneByLane) => &shaders::TRACE_WIDE_OCTANT_LANES,
-            (form, order, loads) => {
-                return Err(Error::Argument(format!(
-                    "no kernel traces {form} in the order {order:?} with loads {loads:?}; take Order::Distance with \
-                     Loads::Gathered, or Order::Octant of wide8q"
-                )));
-            }
+            (form, order, Loads::LaneByLane) => return Err(self.no_kernel(form, order)),
+            (Form::EightQuantised, Order::Octant, _) => &shaders::TRACE_WIDE_OCTANT,
+            (form, Order::Octant, _) => return Err(self.no_kernel(form, Order::Octant)),
+            (Form::Four, ..) => &shaders::TRACE_WIDE_FOUR,
+            (Form::Eight, ..) => &shaders::TRACE_WIDE_EIGHT,
+            (Form::EightQuantised, ..) => &shaders::TRACE_WIDE_EIGHT_QUANTISED,
         };
-        Ok(tracer::kernel_of(shader, &self.shape, query, count_work))
+        match (self.order, query) {
+            (Order::LeftFirst, Query::AnyHit) => Ok(tracer::kernel_left_first(shader, &self.shape, count_work)),
+            (Order::LeftFirst, Query::ClosestHit) => Err(Error::Argument(
+                "Order::LeftFirst is for rays that end at any hit; take Order::Distance for the closest".into(),
+            )),
+            _ => Ok(tracer::kernel_of(shader, &self.shape, query, count_work)),
+        }
+    }
+
+    fn no_kernel(&self, form: Form, order: Order) -> Error {
+        let loads = self.shape.loads;
+        Error::Argument(format!(
+            "no kernel traces {form} in the order {order:?} with loads {loads:?}; take Order::Distance with \
+             Loads::Gathered, or Order::Octant of wide8q"
+        ))
     }
 
     /// Records the tracing of all rays through the wide tree at `buffers.structure`, which is of this form and holds triangles:
-    /// as [`tracer::record`] does for a `Bvh2`, with the same hits.
+    /// as [`tracer::record`] does for a `Bvh2`, with the same hits. By [`Order::LeftFirst`] a ray that ends at any hit may name another
+    /// triangle.
     ///
     /// # Errors
-    /// As of [`tracer::record`]; no kernel visits such nodes in this order, or loads them in this way.
+    /// As of [`tracer::record`]; no kernel visits such nodes in this order, or loads them in this way; the closest hit is asked for by
+    /// [`Order::LeftFirst`].
     pub fn record(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &TraceBuffers) -> Result<()> {
         let kernel = self.kernel(query, buffers.work.is_some())?;
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)

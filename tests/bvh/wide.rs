@@ -1,15 +1,25 @@
 //! Wide trees collapsed on the device equal the host's, byte for byte, over inputs that hurt, and are valid.
 
+use crate::common::shapes::{hard_rays, soup, tree_of};
 use crate::common::{corpus, device};
+use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::counts::LinkCount;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child, Header, Node, Record, Triangle, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
-use hedgerow::bvh::wide::device::{WideOptions, WidePass};
+use hedgerow::bvh::twin::wide::LinkCounts;
+use hedgerow::bvh::wide::device::{WideCounts, WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::geometry::Aabb;
+use hedgerow::trace::counts::CountedWalk;
+use hedgerow::trace::twin::counts as host_counts;
+use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
+use hedgerow::trace::wide::Order;
+use hedgerow::trace::{Query, Ray};
+use std::collections::HashMap;
 
 const GUARD: [u8; 256] = [0xA5; 256];
 
@@ -18,8 +28,17 @@ fn collapsed<N: WideNode>(tree: &Bvh2) -> Vec<u8> {
     collapsed_as::<N>(tree, tree.header.primitive_count)
 }
 
+/// The same by counts of links.
+fn collapsed_by<N: WideNode>(tree: &Bvh2, counts: &WideCounts) -> Vec<u8> {
+    collapsed_with::<N>(tree, tree.header.primitive_count, counts)
+}
+
 /// The same, planned for trees of up to `count` primitives.
 fn collapsed_as<N: WideNode>(tree: &Bvh2, count: u32) -> Vec<u8> {
+    collapsed_with::<N>(tree, count, &WideCounts::default())
+}
+
+fn collapsed_with<N: WideNode>(tree: &Bvh2, count: u32, counts: &WideCounts) -> Vec<u8> {
     let device = device();
     let geometry_count = tree.header.geometry_count;
     let options = WideOptions { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
@@ -30,7 +49,8 @@ fn collapsed_as<N: WideNode>(tree: &Bvh2, count: u32) -> Vec<u8> {
     let guarded = |bytes: u64| [vec![0xEEu8; bytes as usize], GUARD.to_vec()].concat();
     let target = device.upload("target", &guarded(sizes.structure)).unwrap();
     let scratch = device.upload("scratch", &guarded(sizes.scratch)).unwrap();
-    device.run(None, |r| wide.record(r, source.address(), target.region(), scratch.region())).unwrap();
+    let (target_at, scratch_at) = (target.region(), scratch.region());
+    device.run(None, |r| wide.record_by_counts(r, source.address(), counts, target_at, scratch_at)).unwrap();
     for (what, buffer, bytes) in [("target", &target, sizes.structure), ("scratch", &scratch, sizes.scratch)] {
         assert_eq!(buffer.read_at::<u8>(bytes, GUARD.len()), GUARD, "wrote behind the {what}");
     }
@@ -52,10 +72,152 @@ fn assert_as_on_the_host<N: WideNode>(name: &str, tree: &Bvh2) {
     assert!(bytes == expected.to_bytes(), "{name} {}: other bytes", N::FORM);
 }
 
+/// Also of the tree with its children in order.
 fn assert_all_forms(name: &str, tree: &Bvh2) {
     assert_as_on_the_host::<[Child; 4]>(name, tree);
     assert_as_on_the_host::<[Child; 8]>(name, tree);
     assert_as_on_the_host::<QuantisedNode>(name, tree);
+    let ordered = tree.clone().in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
+    let name = format!("{name} in order");
+    assert_as_on_the_host::<[Child; 4]>(&name, &ordered);
+    assert_as_on_the_host::<[Child; 8]>(&name, &ordered);
+    assert_as_on_the_host::<QuantisedNode>(&name, &ordered);
+}
+
+/// The primitives below a child of a binary tree, left children first.
+fn met_in(tree: &Bvh2, child: &Child, met: &mut Vec<u32>) {
+    if child.is_leaf() {
+        met.extend(tree.records[child.index as usize..][..child.count as usize].iter().map(|record| record.primitive));
+    } else {
+        tree.nodes[child.index as usize].children.iter().for_each(|child| met_in(tree, child, met));
+    }
+}
+
+/// The same below a wide node, by slots.
+fn met_in_wide<N: WideNode>(tree: &Wide<N>, node: u32, met: &mut Vec<u32>) {
+    let leaf = |first: u32, count: u32, met: &mut Vec<u32>| {
+        met.extend(tree.records[first as usize..][..count as usize].iter().map(|record| record.primitive));
+    };
+    let node = &tree.nodes[node as usize];
+    if let Some((first, count)) = node.long_leaf() {
+        leaf(first, count, met);
+    }
+    for child in node.children().iter().flatten() {
+        if child.is_leaf() {
+            leaf(child.index, child.count, met);
+        } else {
+            met_in_wide(tree, child.index, met);
+        }
+    }
+}
+
+#[track_caller]
+fn assert_met_in_order<N: WideNode>(tree: &Bvh2) {
+    let wide = Wide::<N>::of(tree);
+    assert_eq!(wide.header.child_order, tree.header.child_order, "{}", N::FORM);
+    let (mut expected, mut met) = (Vec::new(), Vec::new());
+    met_in(tree, &tree.header.root, &mut expected);
+    met_in_wide(&wide, 0, &mut met);
+    assert_eq!(met, expected, "{}", N::FORM);
+}
+
+#[test]
+fn children_in_order_lie_as_the_binary_walk_meets_them() {
+    let (_, positions, triangles) = corpus::random("3,000 random", 3_000, [0.0; 3], [1.0; 3]);
+    let random = lbvh::build(&positions, &triangles, Code::Emc64Var.full(), Collapse::SAH);
+    let lengths: Vec<usize> = (0..70).map(|i| [1, 2, 300, 5][i % 4]).collect();
+    for tree in [random, piles(&lengths), deep(2), piles(&[300])] {
+        for order in ChildOrder::ALL {
+            let ordered = tree.clone().in_child_order(order, &Collapse::SAH);
+            assert_met_in_order::<[Child; 4]>(&ordered);
+            assert_met_in_order::<[Child; 8]>(&ordered);
+            assert_met_in_order::<QuantisedNode>(&ordered);
+        }
+    }
+}
+
+/// Boxes tell which link a child is; `None` where two have the same.
+fn counts_by_box(tree: &Bvh2, counts: &[LinkCount]) -> HashMap<([u32; 6], bool), Option<LinkCount>> {
+    let mut by_box = HashMap::new();
+    for (slot, node) in tree.nodes.iter().enumerate().filter(|(_, node)| node.is_used()) {
+        for (side, child) in node.children.iter().enumerate() {
+            let count = counts[2 * slot + side];
+            by_box.entry(key(child)).and_modify(|same| *same = None).or_insert(Some(count));
+        }
+    }
+    by_box
+}
+
+fn key(child: &Child) -> ([u32; 6], bool) {
+    let [a, b] = [child.lo, child.hi].map(|corner| corner.map(f32::to_bits));
+    ([a[0], a[1], a[2], b[0], b[1], b[2]], child.is_leaf())
+}
+
+#[test]
+fn children_that_end_more_rays_for_their_work_come_first() {
+    let corners = soup(3_000, 0.1, 7);
+    let rays = hard_rays(&corners, 4_000, 1.0, [0.0; 3], 11);
+    let tree = tree_of(&corners);
+    let mut counts = vec![LinkCount::default(); 2 * tree.nodes.len()];
+    host_counts::count(&tree, &rays, CountedWalk::Exhaustive, &Collapse::SAH, &mut counts);
+    let ordered = tree.in_order_of_counts(&mut counts, &Collapse::SAH);
+    assert_by_hits::<[Child; 4]>(&ordered, &counts, &rays);
+    assert_by_hits::<[Child; 8]>(&ordered, &counts, &rays);
+    assert_by_hits::<QuantisedNode>(&ordered, &counts, &rays);
+
+    fn assert_by_hits<N: TracedNode>(tree: &Bvh2, counts: &[LinkCount], rays: &[Ray]) {
+        let wide = Wide::<N>::of_counts(tree, &LinkCounts { ordered_by: counts, ..LinkCounts::default() });
+        wide.validate().expect("valid");
+        let buffer = device().upload("counts", counts).expect("memory");
+        let on_device = WideCounts { ordered_by: Some(buffer.region()), ..WideCounts::default() };
+        assert!(collapsed_by::<N>(tree, &on_device) == wide.to_bytes(), "{}: other bytes", N::FORM);
+        let by_walk = Wide::<N>::of(tree);
+        assert!(wide.to_bytes() != by_walk.to_bytes(), "{}: nothing was put in order", N::FORM);
+        for ray in rays {
+            let [by_hits, by_walk] =
+                [&wide, &by_walk].map(|wide| wide_host::trace(wide, ray, Query::AnyHit, Order::LeftFirst).0);
+            assert_eq!(by_hits.t, by_walk.t, "{} {ray:?}", N::FORM);
+        }
+        if N::FORM.is_quantised() {
+            return;
+        }
+        let by_box = counts_by_box(tree, counts);
+        let (mut pairs, worth) = (0, |a: &LinkCount, b: &LinkCount| f64::from(a.hits) * (f64::from(b.work) + 24.0));
+        for node in &wide.nodes {
+            let known: Vec<LinkCount> =
+                node.children().iter().flatten().filter_map(|child| by_box[&key(child)]).collect();
+            for pair in known.windows(2) {
+                pairs += 1;
+                let [first, second] = [worth(&pair[0], &pair[1]), worth(&pair[1], &pair[0])];
+                assert!(first >= second * (1.0 - 1e-6), "{}: {pair:?}", N::FORM);
+            }
+        }
+        assert!(pairs > 500, "{}: {pairs}", N::FORM);
+    }
+}
+
+/// What an order is not: other children. Nodes open the same ones, whatever slots those go to.
+#[test]
+fn an_order_leaves_nodes_their_children() {
+    fn children_of<N: WideNode>(tree: &Bvh2) -> Vec<Vec<[u32; 6]>> {
+        let bits = |child: &Child| [child.lo, child.hi].concat().iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        let of_node = |node: &N| {
+            let mut all: Vec<[u32; 6]> =
+                node.children().iter().flatten().map(|child| bits(child).try_into().expect("six")).collect();
+            all.sort_unstable();
+            all
+        };
+        let mut all: Vec<_> = Wide::<N>::of(tree).nodes.iter().map(of_node).collect();
+        all.sort_unstable();
+        all
+    }
+    let (_, positions, triangles) = corpus::random("3,000 random", 3_000, [0.0; 3], [1.0; 3]);
+    let tree = lbvh::build(&positions, &triangles, Code::Emc64Var.full(), Collapse::SAH);
+    let ordered = tree.clone().in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
+    assert!(Wide::<[Child; 8]>::of(&tree).nodes != Wide::<[Child; 8]>::of(&ordered).nodes, "nothing was ordered");
+    assert_eq!(children_of::<[Child; 4]>(&ordered), children_of::<[Child; 4]>(&tree));
+    assert_eq!(children_of::<[Child; 8]>(&ordered), children_of::<[Child; 8]>(&tree));
+    assert_eq!(children_of::<QuantisedNode>(&ordered), children_of::<QuantisedNode>(&tree));
 }
 
 #[test]

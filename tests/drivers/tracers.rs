@@ -83,21 +83,33 @@ fn assert_left_first(tree: &Bvh2, rays: &[Ray]) {
 
 pub fn wide_trees_are_those_of_the_host() {
     for (tree, rays) in cases() {
+        let ordered = tree.clone().in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
         assert_form::<[Child; 4]>(&tree, &rays);
         assert_form::<[Child; 8]>(&tree, &rays);
         assert_form::<QuantisedNode>(&tree, &rays);
+        assert_form::<[Child; 4]>(&ordered, &rays);
+        assert_form::<[Child; 8]>(&ordered, &rays);
+        assert_form::<QuantisedNode>(&ordered, &rays);
     }
 }
 
+/// Where children have an order, the left one is taken first.
 fn assert_form<N: TracedNode>(tree: &Bvh2, rays: &[Ray]) {
     let wide = Wide::<N>::of(tree);
     assert!(collapsed::<N>(tree) == wide.to_bytes(), "{}: other bytes", N::FORM);
-    let quantised = N::FORM.is_quantised();
-    let orders = if quantised { &[Order::Distance, Order::Octant][..] } else { &[Order::Distance] };
+    let orders = match N::FORM.is_quantised() {
+        _ if tree.header.child_order != 0 => &[Order::LeftFirst][..],
+        true => &[Order::Distance, Order::Octant],
+        false => &[Order::Distance],
+    };
     for &order in orders {
         for (i, shape) in shapes(order == Order::Octant).into_iter().enumerate() {
             let tracer = WideTracer::with(&device().limits, N::FORM, order, shape);
-            let queries = if i == 0 { &[Query::ClosestHit, Query::AnyHit][..] } else { &[Query::ClosestHit] };
+            let queries = match order {
+                Order::LeftFirst => &[Query::AnyHit][..],
+                _ if i == 0 => &[Query::ClosestHit, Query::AnyHit],
+                _ => &[Query::ClosestHit],
+            };
             for &query in queries {
                 let expected: Vec<_> = rays.iter().map(|ray| wide_host::trace(&wide, ray, query, order)).collect();
                 let got = traced(&wide.to_bytes(), rays, |r, buffers| tracer.record(r, query, buffers));

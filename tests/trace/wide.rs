@@ -5,6 +5,7 @@ use crate::common::device;
 use crate::common::shapes::{
     Corners, hard_rays, icosphere, no_rays, placed, ray, rays_from_the_middle, soup, tree_of, tree_with,
 };
+use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::layout::{Bvh2, Child, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::wide::Form;
@@ -17,22 +18,25 @@ use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
 use hedgerow::trace::wide::{Order, WideTracer};
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
-/// Every order, and every way to cut the work: the default, that for GPUs, no shared memory at all, and a stack half here and
-/// half there.
-fn tracers(form: Form) -> Vec<WideTracer> {
+/// An order with every way to cut the work: that for CPUs, that for GPUs, no shared memory at all, and a stack half here and half there.
+fn tracers_in_order(form: Form, order: Order) -> [WideTracer; 4] {
     let limits = &device().limits;
     let loads = Loads::Gathered;
+    let shapes = [
+        TraceShape::subgroups(limits),
+        TraceShape::groups(limits),
+        TraceShape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
+        TraceShape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
+    ];
+    shapes.map(|shape| WideTracer::with(limits, form, order, shape))
+}
+
+/// The default, and every order for either query.
+fn tracers(form: Form) -> Vec<WideTracer> {
+    let limits = &device().limits;
     let mut tracers = vec![WideTracer::of(device(), form)];
     let orders = if form.is_quantised() { &[Order::Distance, Order::Octant][..] } else { &[Order::Distance] };
-    for &order in orders {
-        let shapes = [
-            TraceShape::subgroups(limits),
-            TraceShape::groups(limits),
-            TraceShape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
-            TraceShape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
-        ];
-        tracers.extend(shapes.map(|shape| WideTracer::with(limits, form, order, shape)));
-    }
+    orders.iter().for_each(|&order| tracers.extend(tracers_in_order(form, order)));
     if form.is_quantised() && limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES {
         let few = TraceShape { shared_levels: 3, rays_each: 5, ..TraceShape::lanes(limits) };
         tracers
@@ -83,11 +87,42 @@ fn assert_form<N: TracedNode>(tree: &Bvh2, rays: &[Ray]) {
     }
 }
 
+/// Rays that end at any hit, left children first in a tree in order: they name the triangles that they name in the binary tree, and on
+/// the device as on the host. The closest hits are what they were.
+#[track_caller]
+fn assert_left_first<N: TracedNode>(tree: &Bvh2, rays: &[Ray]) {
+    let ordered = tree.clone().in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
+    let wide = Wide::<N>::of(&ordered);
+    wide.validate().expect("a valid tree");
+    let expected: Vec<(Hit, Work)> =
+        rays.iter().map(|ray| wide_host::trace(&wide, ray, Query::AnyHit, Order::LeftFirst)).collect();
+    for (ray, (hit, _)) in rays.iter().zip(&expected) {
+        assert_eq!(*hit, host::trace_left_first(&ordered, ray).0, "{} {ray:?}", N::FORM);
+        for order in [Order::Distance, Order::Octant] {
+            let any = wide_host::trace(&wide, ray, Query::AnyHit, order).0;
+            assert_eq!(any.t, hit.t, "{} {order:?} {ray:?}", N::FORM);
+            let closest = wide_host::trace(&wide, ray, Query::ClosestHit, order).0;
+            assert_eq!(closest, host::closest_hit(tree, ray), "{} {order:?} {ray:?}", N::FORM);
+        }
+    }
+    for tracer in tracers_in_order(N::FORM, Order::LeftFirst) {
+        let (hits, work) = traced(&wide, rays, &tracer, Query::AnyHit, true);
+        let (alone, _) = traced(&wide, rays, &tracer, Query::AnyHit, false);
+        for (i, ray) in rays.iter().enumerate() {
+            assert_eq!((hits[i], work[i]), expected[i], "{tracer:?} {ray:?}");
+            assert_eq!(alone[i], expected[i].0, "{tracer:?} {ray:?}");
+        }
+    }
+}
+
 #[track_caller]
 fn assert_all_forms(tree: &Bvh2, rays: &[Ray]) {
     assert_form::<[Child; 4]>(tree, rays);
     assert_form::<[Child; 8]>(tree, rays);
     assert_form::<QuantisedNode>(tree, rays);
+    assert_left_first::<[Child; 4]>(tree, rays);
+    assert_left_first::<[Child; 8]>(tree, rays);
+    assert_left_first::<QuantisedNode>(tree, rays);
 }
 
 #[test]
@@ -211,5 +246,13 @@ fn what_there_is_no_kernel_for_is_refused() {
         let tracer = WideTracer { form, order, shape };
         let refused = device().run(None, |recorder| tracer.record(recorder, Query::ClosestHit, &buffers));
         assert!(refused.expect_err("no kernel").to_string().contains("no kernel traces"), "{tracer:?}");
+    }
+    for form in Form::ALL {
+        let lanes = WideTracer { form, order: Order::LeftFirst, shape: TraceShape::lanes(limits) };
+        let refused = device().run(None, |recorder| lanes.record(recorder, Query::AnyHit, &buffers));
+        assert!(refused.expect_err("no kernel").to_string().contains("no kernel traces"), "{lanes:?}");
+        let tracer = WideTracer::in_order(device(), form, Order::LeftFirst);
+        let refused = device().run(None, |recorder| tracer.record(recorder, Query::ClosestHit, &buffers));
+        assert!(refused.expect_err("the closest hit").to_string().contains("end at any hit"), "{tracer:?}");
     }
 }

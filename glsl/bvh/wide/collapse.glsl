@@ -12,6 +12,10 @@
 // that are named by nodes of lower slots, and its rank among the nodes of its parent; the sums make them. So nodes that one
 // names lie side by side, as do, of quantised nodes, the records of its leaves.
 //
+// Where the source's children have an order (bvh/child_order.glsl), those of a wide node lie in their slots as the walk that takes left
+// children first meets them, or by hits, and the target's header says so, too. Otherwise nodes of floats have them as they were opened, and quantised
+// ones by octants.
+//
 // Anything that is not a structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
 // its own status.
 //
@@ -31,10 +35,13 @@ layout(constant_id = 3) const bool QUANTISED = false;
 layout(constant_id = 4) const bool IN_REGISTERS = false;
 // Whether the child that most rays went into is opened, rather than the largest.
 layout(constant_id = 6) const bool BY_VISITS = false;
+// Whether children in order are those first that end more rays for their work.
+layout(constant_id = 7) const bool BY_HITS = false;
 
 // src/bvh/wide/mod.rs
 const uint LEVELS_BY_AREA = 24;
 const float PRIOR_RAYS = 8.0;
+const float PRIOR_WORK = 24.0;
 const uint LEVELS_AT_MOST = 64;
 // In place of what names a child, which is where it lies among all children of the source: twice its node's slot, and one for
 // the right one.
@@ -60,6 +67,7 @@ layout(push_constant, scalar) uniform WideCollapseArguments {
     Levels levels;
     OpenedNodes opened;
     LinkCounts counts;       // of the source's links, by visits
+    LinkCounts hits;         // of the same, by hits
     Words slots;             // what names the children of each of opened, WIDTH words
     Words first_children;    // of each of the source's slots, and one more: the sum
     Words first_records;

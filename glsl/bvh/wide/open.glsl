@@ -10,6 +10,8 @@ uint open_count[8];
 uint open_depth[8];
 // What speaks for opening it; less than 0 for a leaf.
 float open_weight[8];
+// Which child comes first, second and so on where the source's left-first walk meets them: four bits each.
+uint open_order;
 
 // What speaks for opening a child that is an inner node.
 float weight_by_visits(uint name, Child child, float scale) {
@@ -46,8 +48,27 @@ void put_child(uint at, uint name, uint depth, uint level, float scale) {
     }
 }
 
+// Where child `opened` was, its two children come: itself, which is the left one now, and `right` right behind it.
+void put_right_behind(uint opened_child, uint right) {
+    uint place = 0;
+    while (place < 7 && (open_order >> 4 * place & 15u) != opened_child) ++place;
+    uint bits = 4 * (place + 1);
+    uint behind = place < 6 ? open_order >> bits << bits + 4 : 0;
+    open_order = open_order & (1u << bits) - 1u | right << bits | behind;
+}
+
+// Whether the rays that went into the first of two children ended there for less work than those in the second. A few rays that take a
+// step and end nowhere stand beside those of each.
+bool ends_more_rays(uint first_name, uint second_name) {
+    LinkCount first = hits.count[first_name], second = hits.count[second_name];
+    precise float of_first = float(first.hits) * (float(second.work) + PRIOR_WORK);
+    precise float of_second = float(second.hits) * (float(first.work) + PRIOR_WORK);
+    return of_first > of_second;
+}
+
 // The children of the wide node that begins with the binary node `slot`: how many.
 uint open_children(uint slot, uint level, Child root) {
+    open_order = 0x10u;
     if (!is_inner(root)) {
         put_child(0, WHOLE_TREE, 0, level, 0.0);
         return 1;
@@ -70,6 +91,7 @@ uint open_children(uint slot, uint level, Child root) {
         if (largest == 8) break;
         put_child(largest, 2 * opens, depth, level, scale);
         put_child(count, 2 * opens + 1, depth, level, scale);
+        put_right_behind(largest, count);
         count++;
     }
     return count;
@@ -94,6 +116,18 @@ uvec3 child_at(uint i) {
     return child;
 }
 
+// Children that end more rays for their work first; equal ones stay as they are.
+void order_by_hits(uint count) {
+    for (uint place = 1; place < count; ++place) {
+        for (uint at = place; at > 0; --at) {
+            uint here = open_order >> 4 * at & 15u, before = open_order >> 4 * (at - 1) & 15u;
+            if (!ends_more_rays(child_at(here).x, child_at(before).x)) break;
+            uint swap = here ^ before;
+            open_order ^= swap << 4 * at | swap << 4 * (at - 1);
+        }
+    }
+}
+
 // Lists the nodes of the lanes of a subgroup in one piece. All of them come here together, those that have none, too.
 uint place_in_next_level(uint level, uint nodes) {
     uint before = subgroupExclusiveAdd(nodes);
@@ -113,8 +147,10 @@ void open(uint i, uvec2 of, uint level) {
     if (is_there) {
         slot = opened.node[at].slot;
         uint count = open_children(slot, level, source.header.root);
-        for (uint s = 0; s < 8; ++s) in_slot[s] = s < count ? s : 8;
-        if (QUANTISED) octant_slots(count, middle_of_node(slot), in_slot);
+        bool has_order = source.header.child_order != 0;
+        if (BY_HITS && has_order) order_by_hits(count);
+        for (uint s = 0; s < 8; ++s) in_slot[s] = s < count ? has_order ? open_order >> 4 * s & 15u : s : 8;
+        if (QUANTISED && !has_order) octant_slots(count, middle_of_node(slot), in_slot);
 
         uint nodes = 0, records = 0;
         for (uint s = 0; s < WIDTH; ++s) {

@@ -87,16 +87,17 @@ impl<'a> DeviceBvh<'a> {
         check_memory(device, builder, count, mesh_bytes as u64 + sizes.structure + sizes.scratch)?;
         let mesh = DeviceMesh::new(device, &mesh.positions, &mesh.triangles)?;
         let memory = BuildMemory::new(device, sizes)?;
+        let wide = match walk {
+            Walk::Wide(plan) => Some(WideTree::new(device, plan, bvh.record_count())?),
+            Walk::Tracer | Walk::Query => None,
+        };
         let mut warming = Recorder::warming(device);
-        record_build(&mut warming, &bvh, taught_order.as_ref(), &mesh.input, &memory)?;
+        record_build(&mut warming, &bvh, (taught_order.as_ref(), wide.as_ref()), &mesh.input, &memory)?;
         Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
             choice: joined_choices([choice_of(options, &bvh), any_hit.choice.clone()]),
-            wide: match walk {
-                Walk::Wide(plan) => Some(WideTree::new(device, plan, bvh.record_count())?),
-                Walk::Tracer | Walk::Query => None,
-            },
+            wide,
             binary: BinaryWalk { by_query: matches!(walk, Walk::Query), is_ordered: any_hit.order.is_some() },
             taught_order,
             timestamps: Timestamps::new(device, PHASES)?,
@@ -113,21 +114,23 @@ impl<'a> DeviceBvh<'a> {
     }
 }
 
-/// Records the build of the `Bvh2`, and the order of its children if rays teach one.
+/// Records the build of the `Bvh2`, the order of its children if rays teach one, and the wide tree if there shall be one.
 fn record_build(
     recorder: &mut Recorder<'_>,
     bvh: &Builder,
-    taught_order: Option<&TaughtOrder<'_>>,
+    (taught_order, wide): (Option<&TaughtOrder<'_>>, Option<&WideTree<'_>>),
     input: &Input,
     BuildMemory { structure, scratch, .. }: &BuildMemory<'_>,
 ) -> hedgerow::Result<()> {
     bvh.record(recorder, input, structure.region(), scratch.region())?;
-    let Some(order) = taught_order else { return Ok(()) };
-    recorder.barrier();
-    order.record(recorder, structure.region(), scratch.region())
+    if let Some(order) = taught_order {
+        recorder.barrier();
+        order.record(recorder, structure.region(), scratch.region())?;
+    }
+    wide.map_or(Ok(()), |tree| tree.record(recorder, structure.region(), taught_order.map(TaughtOrder::counts)))
 }
 
-/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`, whose children may be in order.
+/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`; the children of either may be in order.
 fn record_trace(
     recorder: &mut Recorder<'_>,
     wide_tree: Option<&WideTree<'_>>,
@@ -138,7 +141,7 @@ fn record_trace(
     match wide_tree {
         None if binary.by_query => queries::record(recorder, query, buffers),
         None => record_binary(recorder, binary.is_ordered, query, buffers),
-        Some(tree) => tree.tracer.record(recorder, query, buffers),
+        Some(tree) => tree.record_trace(recorder, query, buffers),
     }
 }
 
@@ -186,8 +189,8 @@ impl Subject for DeviceBvh<'_> {
 
     fn build(&mut self) -> Result<BuildRun> {
         self.device.run(Some(&mut self.timestamps), |recorder| {
-            record_build(recorder, &self.bvh, self.taught_order.as_ref(), &self.mesh.input, &self.memory)?;
-            self.wide.as_ref().map_or(Ok(()), |tree| tree.record(recorder, self.memory.structure.region()))
+            let behind = (self.taught_order.as_ref(), self.wide.as_ref());
+            record_build(recorder, &self.bvh, behind, &self.mesh.input, &self.memory)
         })?;
         Ok(BuildRun::of(self.timestamps.phases()?))
     }

@@ -8,12 +8,14 @@ use crate::rays::sample::TeachingRays;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Child, Header, Triangle};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::bvh::wide::device::{WideOptions, WidePass};
+use hedgerow::bvh::wide::device::{WideCounts, WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::bvh::wide::{Form, quality};
 use hedgerow::gpu::{Recorder, Region, Sizes};
+use hedgerow::trace::Query;
 use hedgerow::trace::counts::CountedWalk;
+use hedgerow::trace::tracer::TraceBuffers;
 use hedgerow::trace::wide::WideTracer;
 use std::rc::Rc;
 
@@ -21,6 +23,7 @@ use std::rc::Rc;
 pub struct WideTree<'a> {
     /// What traces it.
     pub tracer: WideTracer,
+    left_first: Option<WideTracer>,
     collapse: WidePass,
     sizes: Sizes,
     structure: Buffer<'a>,
@@ -34,6 +37,8 @@ pub struct WideTree<'a> {
 pub struct WidePlan {
     /// What traces it.
     pub tracer: WideTracer,
+    /// What takes rays through it that end at any hit, where its children have an order.
+    pub left_first: Option<WideTracer>,
     /// Rays by whose visits nodes are opened, if not by area.
     pub opened_by: Option<Rc<TeachingRays>>,
 }
@@ -42,9 +47,9 @@ impl<'a> WideTree<'a> {
     /// For a `Bvh2` of `count` triangles.
     ///
     /// # Errors
-    /// Too little memory; a pipeline could not be made.
+    /// Too little memory.
     pub fn new(device: &'a Device, plan: &WidePlan, count: u32) -> Result<WideTree<'a>> {
-        let tracer = plan.tracer;
+        let WidePlan { tracer, left_first, .. } = *plan;
         let options = WideOptions { form: tracer.form, primitives: Primitives::Triangles, geometry_count: 1 };
         let collapse = WidePass::new(device, &options, count);
         let sizes = collapse.sizes();
@@ -56,23 +61,41 @@ impl<'a> WideTree<'a> {
         let counted = counted.transpose()?;
         let counting = counted.as_ref().map_or(0, Counted::scratch_bytes);
         let scratch = device.buffer("wide scratch", sizes.scratch.max(counting))?;
-        let tree = WideTree { tracer, collapse, sizes, structure, scratch, counted };
-        tree.record(&mut Recorder::warming(device), Region::unbounded(16))?;
-        Ok(tree)
+        Ok(WideTree { tracer, left_first, collapse, sizes, structure, scratch, counted })
     }
 
-    /// Records the phase `wide`, behind the build of the `Bvh2` at `source`; before it `rays`, where nodes are opened by visits.
+    /// Records the phase `wide`, behind the build of the `Bvh2` at `source`; before it `rays`, where nodes are opened by visits. Where
+    /// rays have taught the order of children, `ordered_by` is what was counted of them.
     ///
     /// # Errors
     /// A pipeline could not be made.
-    pub fn record(&self, recorder: &mut Recorder<'_>, source: Region) -> hedgerow::Result<()> {
+    pub fn record(
+        &self,
+        recorder: &mut Recorder<'_>,
+        source: Region,
+        ordered_by: Option<Region>,
+    ) -> hedgerow::Result<()> {
         recorder.barrier();
         let (target, scratch) = (self.structure.region(), self.scratch.region());
-        let Some(counted) = &self.counted else {
-            return self.collapse.record(recorder, source.address, target, scratch);
-        };
-        counted.record(recorder, source, scratch)?;
-        self.collapse.record_by_visits(recorder, source.address, counted.counts(), target, scratch)
+        if let Some(counted) = &self.counted {
+            counted.record(recorder, source, scratch)?;
+        }
+        let counts = WideCounts { opened_by: self.counted.as_ref().map(Counted::counts), ordered_by };
+        self.collapse.record_by_counts(recorder, source.address, &counts, target, scratch)
+    }
+
+    /// Records the tracing of rays through it.
+    ///
+    /// # Errors
+    /// Those of [`WideTracer::record`].
+    pub fn record_trace(
+        &self,
+        recorder: &mut Recorder<'_>,
+        query: Query,
+        buffers: &TraceBuffers,
+    ) -> hedgerow::Result<()> {
+        let left_first = self.left_first.filter(|_| query == Query::AnyHit);
+        left_first.unwrap_or(self.tracer).record(recorder, query, buffers)
     }
 
     /// Address of the structure.

@@ -4,8 +4,8 @@ use crate::browser::Browser;
 use crate::conditional::needs;
 use hedgerow_lab::experiments::accel::page::{self, Points};
 use hedgerow_lab::experiments::accel::points::{
-    AccelEntry, Batch, BraidedRays, Implementation, MeanWork, RebraidPoint, Submission, TopLevel, TopLevelPoint,
-    Update, UpdatedRays,
+    AccelEntry, AnyHitPoint, Batch, FlaggedRays, Implementation, MeanWork, RebraidPoint, Submission, TopLevel,
+    TopLevelPoint, Update, UpdatedRays,
 };
 use hedgerow_lab::measure::setting::Failure;
 use hedgerow_lab::measure::statistics::Spread;
@@ -70,7 +70,7 @@ fn rebraid(scene: &str, overlaps: f64, gain: f64) -> AccelEntry {
     let side =
         |entries| TopLevelPoint { build_ms: spread(0.5), structure_bytes: 76_800, scratch_bytes: 25_600, entries };
     let work = |nodes| MeanWork { top_nodes: nodes, instances: 3.0, nodes_below: 20.5, tests: 4.0 };
-    let rays = ["primary", "shadow", "ao", "diffuse1", "diffuse2", "reflection", "random"].map(|kind| BraidedRays {
+    let rays = ["primary", "shadow", "ao", "diffuse1", "diffuse2", "reflection", "random"].map(|kind| FlaggedRays {
         rays: kind.into(),
         count: 12_288,
         hits: 9_000,
@@ -92,6 +92,19 @@ fn rebraid(scene: &str, overlaps: f64, gain: f64) -> AccelEntry {
         on: side(Some(800)),
         driver: Some(side(None)),
         rays: rays.to_vec(),
+    })
+}
+
+fn any_hit(scene: &str, gain: f64) -> AccelEntry {
+    let AccelEntry::Rebraid(RebraidPoint { rays, .. }) = rebraid(scene, 1.0, gain) else { unreachable!() };
+    AccelEntry::AnyHit(AnyHitPoint {
+        scene: scene.into(),
+        instances: 400,
+        parts: 3,
+        triangles: 400_000,
+        off_build_ms: spread(0.5),
+        on_build_ms: spread(0.6),
+        rays: rays.into_iter().filter(|rays| ["shadow", "ao"].contains(&rays.rays.as_str())).collect(),
     })
 }
 
@@ -124,7 +137,13 @@ fn updates(update_ms: Option<f64>) -> impl Iterator<Item = AccelEntry> {
 fn entries() -> Vec<AccelEntry> {
     let failure = Failure::named("update <knot>", "3 GiB of device memory are needed, 2 GiB are there");
     let rebraids = [rebraid("gen:forest:400", 8.2, 1.31), rebraid("gen:cells:1000", 0.0, 0.99)];
-    let all = [setting()].into_iter().chain(batches()).chain(top_levels()).chain(rebraids).chain(updates(Some(1.0)));
+    let all = [setting()]
+        .into_iter()
+        .chain(batches())
+        .chain(top_levels())
+        .chain(rebraids)
+        .chain([any_hit("gen:forest:400", 1.2)]);
+    let all = all.chain(updates(Some(1.0)));
     all.chain([AccelEntry::Failure(failure)]).collect()
 }
 
@@ -194,9 +213,9 @@ fn the_page_holds_together_in_a_browser() {
       verdicts: all("#goals tbody td:last-child").map((cell) => cell.textContent),
     };"##;
     let found = browser.look(&folder.path().join("accel.html"), look);
-    let sections = ["failures", "summary", "batches", "tlas", "rebraid", "updates", "method"];
+    let sections = ["failures", "summary", "batches", "tlas", "rebraid", "any-hit", "updates", "method"];
     assert_eq!(found["sections"], serde_json::json!(sections));
-    assert_eq!(found["charts"], 2 + 1 + 2 + 2);
+    assert_eq!(found["charts"], 2 + 1 + 2 + 1 + 2);
     assert_eq!(found["goals"], 5);
     assert_eq!(found["verdicts"], serde_json::json!(["met", "met", "missed", "met", "met"]));
 }

@@ -24,7 +24,8 @@ fn a_run_leaves_records_of_every_experiment_and_a_page_of_them() {
     let entries = page::read(folder.path()).expect("records");
     assert!(matches!(&entries[0], AccelEntry::Setting(setting) if setting.command.starts_with("hedgerow accel")));
     let is_ours = |maker: Implementation| maker == Implementation::Ours;
-    let (mut batches, mut top_levels, mut frames, mut rebraids) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    let (mut batches, mut top_levels, mut frames, mut rebraids, mut any_hits) =
+        (Vec::new(), Vec::new(), Vec::new(), 0, 0);
     for entry in &entries {
         match entry {
             AccelEntry::Batch(point) if point.maker.is_none_or(is_ours) => batches.push((point.structures, point.way)),
@@ -35,6 +36,14 @@ fn a_run_leaves_records_of_every_experiment_and_a_page_of_them() {
                 assert_eq!((point.off.entries, point.on.entries.is_some_and(|n| n > 9)), (Some(9), true), "{point:?}");
                 assert!(point.rays.iter().all(|rays| rays.different == 0 && rays.gain.runs == 2), "{point:?}");
                 assert!(point.overlaps > 1.0 && point.rays[0].off_work.instances > 0.0, "{point:?}");
+            }
+            AccelEntry::AnyHit(point) => {
+                any_hits += 1;
+                assert_eq!((point.scene.as_str(), point.instances), ("gen:forest:9", 9));
+                let kinds: Vec<&str> = point.rays.iter().map(|rays| rays.rays.as_str()).collect();
+                assert_eq!(kinds, ["shadow", "ao"]);
+                assert!(point.rays.iter().all(|rays| rays.different == 0 && rays.gain.runs == 2), "{point:?}");
+                assert!(point.rays.iter().any(|rays| rays.on_work != rays.off_work), "nothing was in order: {point:?}");
             }
             AccelEntry::Update(point) if is_ours(point.maker) => {
                 assert!(point.built_sah.is_some_and(|sah| sah > 1.0), "{point:?}");
@@ -49,13 +58,14 @@ fn a_run_leaves_records_of_every_experiment_and_a_page_of_them() {
     }
     let ways = [Submission::OneCall, Submission::OneSubmit, Submission::SubmitEach, Submission::EmptySubmits];
     assert_eq!(batches, [2, 32].map(|count| ways.map(|way| (count, way))).concat());
-    assert_eq!((top_levels, frames, rebraids), (vec![100, 200], vec![0, 2, 4], 1));
+    assert_eq!((top_levels, frames, rebraids, any_hits), (vec![100, 200], vec![0, 2, 4], 1, 1));
 
     let page = std::fs::read_to_string(page).expect("written");
-    for id in ["batches", "tlas", "rebraid", "updates", "method"] {
+    for id in ["batches", "tlas", "rebraid", "any-hit", "updates", "method"] {
         assert!(page.contains(&format!("<section id=\"{id}\">")), "{id}");
     }
-    for chart in ["accel-batch", "accel-tlas", "accel-rebraid-gen-forest-9", "accel-update-gen-twist-400-5"] {
+    let of_forest = ["accel-rebraid-gen-forest-9", "accel-any-hit-gen-forest-9"];
+    for chart in ["accel-batch", "accel-tlas", "accel-update-gen-twist-400-5"].into_iter().chain(of_forest) {
         for ending in ["svg", "png"] {
             assert!(folder.path().join(format!("charts/{chart}.{ending}")).is_file(), "{chart}.{ending}");
         }
@@ -86,7 +96,10 @@ fn one_experiment_is_measured_alone() {
 fn wrong_arguments_are_told_apart_from_failed_work() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (wrong, says) in [
-        (&["--experiments", "hedge"][..], "unknown experiment \"hedge\"; use one of batch, tlas, rebraid, update"),
+        (
+            &["--experiments", "hedge"][..],
+            "unknown experiment \"hedge\"; use one of batch, tlas, rebraid, any-hit, update",
+        ),
         (&["--rays", "light"], "unknown kind of ray \"light\""),
         (&["--runs", "0"], "--runs"),
         (&["--structures", "0"], "--structures"),

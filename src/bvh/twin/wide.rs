@@ -3,9 +3,19 @@
 use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{Bvh2, Child, Record};
 use crate::bvh::wide::layout::{Slots, Wide, WideNode};
-use crate::bvh::wide::{LEVELS_BY_AREA, PRIOR_RAYS};
+use crate::bvh::wide::{LEVELS_BY_AREA, PRIOR_RAYS, PRIOR_WORK};
 use crate::geometry::Aabb;
 use std::collections::BTreeMap;
+
+/// What rays did in a tree, two counts for each node slot; empty where nothing was counted. The same as
+/// [`WideCounts`](crate::bvh::wide::device::WideCounts).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct LinkCounts<'a> {
+    /// The child that most rays went into is opened, rather than the largest.
+    pub opened_by: &'a [LinkCount],
+    /// Children in order are those first that end more rays for their work.
+    pub ordered_by: &'a [LinkCount],
+}
 
 /// A wide node to be: the children of the binary nodes that it takes in, in slots.
 struct Opened {
@@ -19,19 +29,17 @@ struct Opened {
 impl<N: WideNode, R: Record> Wide<N, R> {
     /// The wide tree of `tree`. One that is empty or cannot be traced is empty, with its status.
     pub fn of(tree: &Bvh2<R>) -> Wide<N, R> {
-        Wide::opened_by(tree, &[])
+        Wide::of_counts(tree, &LinkCounts::default())
     }
 
-    /// The same, where the child that most rays went into is opened, by counts of the tree's links.
+    /// The same by counts of the tree's links.
     ///
     /// # Panics
-    /// There are fewer than two counts a node slot.
-    pub fn of_visits(tree: &Bvh2<R>, counts: &[LinkCount]) -> Wide<N, R> {
-        assert!(counts.len() >= 2 * tree.nodes.len(), "two counts a node slot");
-        Wide::opened_by(tree, counts)
-    }
-
-    fn opened_by(tree: &Bvh2<R>, counts: &[LinkCount]) -> Wide<N, R> {
+    /// There are some, but fewer than two a node slot.
+    pub fn of_counts(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> Wide<N, R> {
+        for counts in [counts.opened_by, counts.ordered_by] {
+            assert!(counts.is_empty() || counts.len() >= 2 * tree.nodes.len(), "two counts a node slot");
+        }
         let mut header = tree.header.compacted();
         header.kind = Self::KIND;
         (header.root.index, header.root.count) = (0, 0);
@@ -105,7 +113,7 @@ fn running_sums(from: u32, values: impl Iterator<Item = (u32, u32)>) -> BTreeMap
 }
 
 /// All wide nodes to be, level by level.
-fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &[LinkCount]) -> Vec<Opened> {
+fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> Vec<Opened> {
     let mut opened: Vec<Opened> = Vec::new();
     let mut this_level = vec![(tree.header.root, None)];
     for level in 0.. {
@@ -113,7 +121,7 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &[LinkCount]) -> Vec
         for (root, place) in this_level {
             let children = open(tree, &root, N::FORM.width() as usize, level, counts);
             let mut slots = [None; 8];
-            if N::FORM.is_quantised() {
+            if N::FORM.is_quantised() && tree.header.child_order == 0 {
                 slots = octant_slots(&children);
             } else {
                 slots.iter_mut().zip(&children).for_each(|(slot, child)| *slot = Some(*child));
@@ -134,8 +142,8 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &[LinkCount]) -> Vec
 
 /// The children of a wide node: those of the binary node, the largest one opened again and again, or, where there are counts, the one
 /// that most rays went into; far down ([`LEVELS_BY_AREA`]) the highest one. Of equal ones the first. A tree that is a leaf is its
-/// own child.
-fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32, counts: &[LinkCount]) -> Vec<Child> {
+/// own child. Children come as they were opened; where the tree's have an order, as the walk that takes left ones first meets them, or by hits.
+fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32, counts: &LinkCounts<'_>) -> Vec<Child> {
     if root.is_leaf() {
         return vec![*root];
     }
@@ -143,34 +151,55 @@ fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32, count
     let whole_area = tree.header.root.bounds().scaled_half_area(scale);
     let weight = |link: u32, child: &Child, depth: u32| {
         let area = child.bounds().scaled_half_area(scale);
-        match counts.get(link as usize) {
+        match counts.opened_by.get(link as usize) {
             _ if child.is_leaf() => -1.0,
             _ if level >= LEVELS_BY_AREA => (64 - depth) as f32,
             Some(count) => count.entered as f32 * whole_area + PRIOR_RAYS * area,
             None => area,
         }
     };
-    // A child, what speaks for opening it, and how many levels it is below the root.
+    // A child, what speaks for opening it, how many levels it is below the root, and its link.
     let below = |child: &Child, depth: u32| {
         let links = [2 * child.index, 2 * child.index + 1].into_iter();
         let children = links.zip(tree.nodes[child.index as usize].children);
-        children.map(|(link, c)| (c, weight(link, &c, depth), depth)).collect::<Vec<_>>()
+        children.map(|(link, c)| (c, weight(link, &c, depth), depth, link)).collect::<Vec<_>>()
     };
     let mut children = below(root, 1);
+    // Which of them comes first, second and so on in the walk that takes left children first.
+    let mut order = vec![0, 1];
     while children.len() < width {
         let mut largest: Option<usize> = None;
-        for (i, (_, weight, _)) in children.iter().enumerate() {
+        for (i, (_, weight, ..)) in children.iter().enumerate() {
             if *weight > largest.map_or(-1.0, |at| children[at].1) {
                 largest = Some(i);
             }
         }
         let Some(at) = largest else { break };
-        let (child, _, depth) = children[at];
+        let (child, _, depth, _) = children[at];
         let [left, right] = below(&child, depth + 1).try_into().expect("two children");
         children[at] = left;
+        let place = order.iter().position(|&child| child == at).expect("all of them are there");
+        order.insert(place + 1, children.len());
         children.push(right);
     }
-    children.into_iter().map(|(child, ..)| child).collect()
+    if !counts.ordered_by.is_empty() {
+        let ends_more = |a: usize, b: usize| ends_more_rays([a, b].map(|i| counts.ordered_by[children[i].3 as usize]));
+        // Insertion, as the device does, so that equal ones stay as they are.
+        for mut at in 1..order.len() {
+            while at > 0 && ends_more(order[at], order[at - 1]) {
+                order.swap(at, at - 1);
+                at -= 1;
+            }
+        }
+    }
+    let in_order = |place: usize| if tree.header.child_order != 0 { order[place] } else { place };
+    (0..children.len()).map(|place| children[in_order(place)].0).collect()
+}
+
+/// Whether the rays that went into the first of two children ended there for less work than those in the second.
+fn ends_more_rays([first, second]: [LinkCount; 2]) -> bool {
+    let worth = |hits: &LinkCount, beside: &LinkCount| hits.hits as f32 * (beside.work as f32 + PRIOR_WORK);
+    worth(&first, &second) > worth(&second, &first)
 }
 
 /// The children in slots by the octants that they lie in (Ylitie, Karras, Laine 2017, section 3.1): a child gains by a slot what

@@ -21,6 +21,18 @@ pub struct WideOptions {
     pub geometry_count: u32,
 }
 
+/// Counts of a source's links that wide nodes learn from ([`LinkCount`] × 2 for each node slot that a source of so many primitives has,
+/// aligned to 4 bytes); none of them unless told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct WideCounts {
+    /// The child that most rays went into is opened, rather than the largest.
+    pub opened_by: Option<Region>,
+    /// Of a source whose children have an order, those of a wide node come first that end more rays for their work: by rays that were
+    /// counted exhaustively ([`crate::trace::counts::CountedWalk::Exhaustive`]). Without it they come as the walk of the source meets
+    /// them, where a child that ends few rays may come early as it lies beside one that ends many.
+    pub ordered_by: Option<Region>,
+}
+
 /// Collapses a `Bvh2` of any builder, with at most a given number of primitives, into a wide tree.
 #[derive(Debug, Clone, Copy)]
 pub struct WidePass {
@@ -111,13 +123,13 @@ impl WidePass {
         Scratch { plan, levels, opened, slots: children, first_children, first_records, order, sums }
     }
 
-    fn kernel(&self, shader: &'static shaders::Shader, by_visits: u32) -> Kernel {
+    fn kernel(&self, shader: &'static shaders::Shader, [by_visits, by_hits]: [u32; 2]) -> Kernel {
         let workgroup = if one_workgroup(shader) { self.few } else { self.grid.workgroup };
         let WideOptions { form, .. } = self.options;
         let [quantised, in_registers] = [form.is_quantised(), self.in_registers].map(u32::from);
         // What `SOURCE_WORD` of glsl/bvh/geometry.glsl is without a value.
         let source_word = 0;
-        let constants = [self.grid.rounds, form.width(), quantised, in_registers, source_word, by_visits];
+        let constants = [self.grid.rounds, form.width(), quantised, in_registers, source_word, by_visits, by_hits];
         Kernel::new(shader, workgroup, &constants)
     }
 
@@ -142,37 +154,26 @@ impl WidePass {
     /// # Errors
     /// The memory is too small; a pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, source: u64, target: Region, scratch: Region) -> Result<()> {
-        self.record_by(recorder, source, 0, target, scratch)
+        self.record_by_counts(recorder, source, &WideCounts::default(), target, scratch)
     }
 
-    /// Records the same, but opens the child that most rays went into, by `counts` of the source's links
-    /// ([`LinkCount`] × 2 for each node slot that a source of so many primitives has, aligned to 4 bytes).
+    /// Records the same by counts of the source's links.
     ///
     /// # Errors
     /// As [`WidePass::record`].
-    pub fn record_by_visits(
+    pub fn record_by_counts(
         &self,
         recorder: &mut Recorder<'_>,
         source: u64,
-        counts: Region,
+        counts: &WideCounts,
         target: Region,
         scratch: Region,
     ) -> Result<()> {
         let counts_bytes = 2 * size_of::<LinkCount>() as u64 * u64::from(node_slots(self.count));
-        let counts = counts.checked("counts of rays by which wide nodes are opened", counts_bytes, 4)?;
-        self.record_by(recorder, source, counts, target, scratch)
-    }
-
-    /// By counts, where there are any.
-    fn record_by(
-        &self,
-        recorder: &mut Recorder<'_>,
-        source: u64,
-        counts: u64,
-        target: Region,
-        scratch: Region,
-    ) -> Result<()> {
-        let kernel = |shader| self.kernel(shader, u32::from(counts != 0));
+        let checked = |counts: Option<Region>, what| counts.map_or(Ok(0), |c| c.checked(what, counts_bytes, 4));
+        let visits = checked(counts.opened_by, "counts of rays by which wide nodes are opened")?;
+        let hits = checked(counts.ordered_by, "counts of rays by which children of wide nodes are put in order")?;
+        let kernel = |shader| self.kernel(shader, [visits, hits].map(|counts| u32::from(counts != 0)));
         let sizes = self.sizes();
         let target = target.checked("memory for a wide tree", sizes.structure, sizes.alignment)?;
         let scratch = scratch.checked("scratch memory for a wide tree", sizes.scratch, sizes.alignment)?;
@@ -183,7 +184,8 @@ impl WidePass {
             target,
             levels: scratch + parts.levels,
             opened: scratch + parts.opened,
-            counts,
+            counts: visits,
+            hits,
             slots: scratch + parts.slots,
             first_children: scratch + parts.first_children,
             first_records: scratch + parts.first_records,

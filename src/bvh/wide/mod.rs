@@ -5,6 +5,9 @@
 //! fewer steps then, and what a step loads lies together. Where rays were counted, the child that most of them went into may be
 //! replaced instead (Gu, He, Blelloch 2015, "Ray Specialized Contraction on Bounding Volume Hierarchies").
 //!
+//! Where the children of the source have an order ([`super::child_order`]), those of a wide node lie in their slots as rays shall look
+//! into them that end at any hit, and the header says so, too.
+//!
 //! - [`layout`] are the bytes, [`quantised`] those of the node of 80 bytes;
 //! - [`super::twin::wide`] collapses plainly, [`device`] in the caller's command buffer: the same bytes;
 //! - [`validate`] walks a wide tree, [`quality`] says what it costs;
@@ -29,6 +32,10 @@ pub enum Form {
 
 /// How many rays, spread by surface area, stand beside those that were counted.
 pub(crate) const PRIOR_RAYS: f32 = 8.0;
+
+/// What rays of work stand beside those that were counted in each child, where children are put in order by hits: as many as
+/// [`PRIOR_RAYS`], each of which takes a step of 3 and ends nowhere.
+pub(crate) const PRIOR_WORK: f32 = 24.0;
 
 /// Levels of wide nodes that are opened by surface area or by visits. Nodes further down are opened level by level, so that a node takes in
 /// two binary levels of four children and three of eight, however the tree is shaped: what a ray puts off is bounded by that.

@@ -6,7 +6,8 @@
 //! which see it from the ray's origin, do not round as this does: that is in the proof's margin.)
 //!
 //! A child's slot encodes the octant that it lies in, as seen from the middle of the node (section 3.1): a tracer meets the
-//! children from near to far by counting slots in an order that follows from the signs of the ray's direction.
+//! children from near to far by counting slots in an order that follows from the signs of the ray's direction. Where the children
+//! of the source have an order, slots are in that order instead ([`super`]).
 //!
 //! Other than in the paper, a leaf's byte holds the number of its records, up to 255, and their place follows from the bytes of
 //! the slots before. A longer leaf is a node of its own that holds nothing but its range.

@@ -46,13 +46,18 @@ impl TracedNode for QuantisedNode {
 /// The hit, and the steps (nodes visited, long leaves among them) and tests that it took in this order.
 ///
 /// A tree whose status says that it cannot be used is traced as if it were empty, as the device must.
+///
+/// # Panics
+/// The closest hit is asked for by [`Order::LeftFirst`].
 pub fn trace<N: TracedNode>(tree: &Wide<N>, ray: &Ray, query: Query, order: Order) -> (Hit, Work) {
+    assert!(order != Order::LeftFirst || query == Query::AnyHit, "left first is for rays that end at any hit");
     let mut walk = Walk { tree, query, nearest: Nearest::new(ray.t_max), work: Work::default() };
     let usable = tree.header.active != 0 && tree.header.status & status::UNUSABLE == 0;
     if let Some(ray) = PreparedRay::new(ray).filter(|_| usable) {
         match order {
             Order::Distance => walk.by_distance(&ray),
             Order::Octant => walk.by_octant(&ray),
+            Order::LeftFirst => walk.left_first(&ray),
         }
     }
     (walk.nearest.hit_of(query), walk.work)
@@ -145,6 +150,31 @@ impl<N: TracedNode> Walk<'_, N> {
                     waiting.push((if waits { distance } else { f32::NEG_INFINITY }, child));
                 }
             }
+        }
+    }
+
+    /// The children in their slots, one after the other, each with all that is below it.
+    fn left_first(&mut self, ray: &PreparedRay) {
+        let mut waiting = vec![Child { index: 0, count: 0, ..self.tree.header.root }];
+        while let Some(child) = waiting.pop() {
+            if child.is_leaf() {
+                if self.leaf(ray, child.index, child.count) {
+                    return;
+                }
+                continue;
+            }
+            self.work.steps += 1;
+            let node = &self.tree.nodes[child.index as usize];
+            if let Some((first, count)) = node.long_leaf() {
+                if self.leaf(ray, first, count) {
+                    return;
+                }
+                continue;
+            }
+            let entered = node.enters(ray, self.nearest.t).into_iter().zip(node.children());
+            let entered = entered.filter(|(enter, _)| enter.is_some_and(|enter| enter < f32::INFINITY));
+            let children: Vec<Child> = entered.filter_map(|(_, child)| child).collect();
+            waiting.extend(children.into_iter().rev());
         }
     }
 

@@ -1,11 +1,11 @@
-//! `hedgerow accel`: batches, top levels, re-braiding and updates; records as they are measured, and a page.
+//! `hedgerow accel`: batches, top levels, re-braiding, orders of children and updates; records as they are measured, and a page.
 
 use crate::cli::options::{Kinds, Size};
 use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::accel::page::{self, Points};
 use crate::experiments::accel::points::AccelEntry;
-use crate::experiments::accel::{AccelSetup, Experiment, batch, rebraid, top_level, update};
+use crate::experiments::accel::{AccelSetup, Experiment, any_hit, batch, rebraid, top_level, update};
 use crate::measure::{Failure, Setting, Sink};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
@@ -18,7 +18,7 @@ const REBRAIDED: [&str; 4] = ["gen:forest:400", "gen:city:400", "gen:cables:400"
 /// What is updated where no animation is named.
 const UPDATED: [&str; 1] = ["gen:twist:20000:12"];
 
-/// Measure batches of builds, top levels, re-braiding and updates, beside the driver's by the same calls, and write records
+/// Measure batches of builds, top levels, re-braiding, orders of children and updates, beside the driver's by the same calls, and write records
 /// and a page
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -26,8 +26,13 @@ pub struct Arguments {
     /// both kinds]
     #[arg(value_name = "SCENE")]
     scenes: Vec<String>,
-    /// What is measured, separated by commas: batch, tlas, rebraid, update
-    #[arg(long, value_name = "EXPERIMENT[,…]", value_delimiter = ',', default_value = "batch,tlas,rebraid,update")]
+    /// What is measured, separated by commas: batch, tlas, rebraid, any-hit (always with shadow and ao rays), update
+    #[arg(
+        long,
+        value_name = "EXPERIMENT[,…]",
+        value_delimiter = ',',
+        default_value = "batch,tlas,rebraid,any-hit,update"
+    )]
     experiments: Vec<Experiment>,
     /// Kinds of rays, separated by commas, or all
     #[arg(long, value_name = "KIND[,KIND…]", default_value = "primary,ao,diffuse1,random")]
@@ -88,6 +93,11 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
                     measured(&format!("{name} {}", scene.name), &|point| rebraid::measure(&stage, scene, point))?;
                 }
             }
+            Experiment::AnyHit => {
+                for scene in &instances {
+                    measured(&format!("{name} {}", scene.name), &|point| any_hit::measure(&stage, scene, point))?;
+                }
+            }
             Experiment::Update => {
                 for scene in &animations {
                     let frames = arguments.frames.get();
@@ -119,7 +129,9 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<(Vec<Instanc
             return Err(Error::Argument(format!("{spec}: {what}")).into());
         }
     }
-    if instances.is_empty() && arguments.experiments.contains(&Experiment::Rebraid) {
+    if instances.is_empty()
+        && arguments.experiments.iter().any(|e| [Experiment::Rebraid, Experiment::AnyHit].contains(e))
+    {
         instances = REBRAIDED.iter().map(|spec| scene::load_instances(spec, &options)).collect::<Result<_>>()?;
     }
     if animations.is_empty() && arguments.experiments.contains(&Experiment::Update) {

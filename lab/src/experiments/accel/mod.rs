@@ -2,9 +2,10 @@
 //! `VK_KHR_acceleration_structure`, ours and the driver's by the same.
 //!
 //! [`batch`]: many small structures at once; [`top_level`]: how top levels grow with their instances; [`rebraid`]: rays through
-//! top levels that are re-braided or not; [`update`]: refitting against building again over an animation. Each gives
-//! [`points`] as it goes.
+//! top levels that are re-braided or not; [`any_hit`]: rays that end at any hit through children in order or not; [`update`]:
+//! refitting against building again over an animation. Each gives [`points`] as it goes.
 
+pub mod any_hit;
 pub mod batch;
 pub(crate) mod command;
 pub mod page;
@@ -37,11 +38,19 @@ pub enum Experiment {
     TopLevel,
     /// [`rebraid`].
     Rebraid,
+    /// [`any_hit`].
+    AnyHit,
     /// [`update`].
     Update,
 }
 
-named!(Experiment, "experiment": Batch = "batch", TopLevel = "tlas", Rebraid = "rebraid", Update = "update");
+named!(Experiment, "experiment":
+    Batch = "batch",
+    TopLevel = "tlas",
+    Rebraid = "rebraid",
+    AnyHit = "any-hit",
+    Update = "update",
+);
 
 /// What all experiments have in common.
 #[derive(Clone, Copy)]

@@ -16,6 +16,9 @@ pub enum AccelEntry {
     Tlas(TopLevel),
     /// A scene of instances, re-braided and not.
     Rebraid(RebraidPoint),
+    /// A scene of instances, its children in order for rays that end at any hit, and not.
+    #[serde(rename = "any-hit")]
+    AnyHit(AnyHitPoint),
     /// A frame of an animation.
     Update(Update),
     /// An experiment that could not be measured, or not to its end.
@@ -109,7 +112,7 @@ pub struct RebraidPoint {
     /// The driver's.
     pub driver: Option<TopLevelPoint>,
     /// One entry a kind of ray.
-    pub rays: Vec<BraidedRays>,
+    pub rays: Vec<FlaggedRays>,
 }
 
 /// One of the top levels that are compared.
@@ -125,9 +128,28 @@ pub struct TopLevelPoint {
     pub entries: Option<u32>,
 }
 
-/// Rays of a kind through both.
+/// A scene of instances whose structures of both levels have their children in order, or not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BraidedRays {
+pub struct AnyHitPoint {
+    /// Scene name.
+    pub scene: String,
+    /// Instances.
+    pub instances: u32,
+    /// What they are instances of.
+    pub parts: u32,
+    /// Triangles, each as often as it is seen.
+    pub triangles: u64,
+    /// Building our top level, plain.
+    pub off_build_ms: Spread,
+    /// Building our top level with the flag `ANY_HIT_ORDER`.
+    pub on_build_ms: Spread,
+    /// One entry a kind of ray that ends at any hit.
+    pub rays: Vec<FlaggedRays>,
+}
+
+/// Rays of a kind through structures that were built without a flag, and with it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FlaggedRays {
     /// Ray kind.
     pub rays: String,
     /// How many.
@@ -136,17 +158,17 @@ pub struct BraidedRays {
     pub hits: u64,
     /// Of how many the two of ours say different hits; there should be none.
     pub different: u64,
-    /// Through the plain top level, by the device's timestamps.
+    /// Without the flag, by the device's timestamps.
     pub off_ms: Spread,
-    /// Through the re-braided one.
+    /// With it.
     pub on_ms: Spread,
     /// Through the driver's.
     pub driver_ms: Option<Spread>,
-    /// Time through the plain one over that through the re-braided one, run by run: above 1, re-braiding is faster.
+    /// Time without over time with it, run by run: above 1, rays are faster with the flag.
     pub gain: Spread,
-    /// Work a ray through the plain one.
+    /// Work a ray without it.
     pub off_work: MeanWork,
-    /// Work a ray through the re-braided one.
+    /// Work a ray with it.
     pub on_work: MeanWork,
 }
 

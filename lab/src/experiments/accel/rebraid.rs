@@ -1,6 +1,6 @@
 //! Re-braiding on and off: what it takes to build, and what rays of every kind gain.
 
-use super::points::{self, AccelEntry, BraidedRays, MeanWork, TopLevelPoint};
+use super::points::{self, AccelEntry, FlaggedRays, MeanWork, TopLevelPoint};
 use super::{AccelSetup, WARM_UPS};
 use crate::Result;
 use crate::measure::agreement::agree;
@@ -40,18 +40,8 @@ pub fn measure(stage: &AccelSetup<'_>, instances: &Instances, point: &mut Sink<'
         let build_ms = Spread::of_some(&builds?)?;
         sides.push(TopLevelPoint { build_ms, structure_bytes, scratch_bytes, entries: levels.entries() });
     }
-    let scene = Scene {
-        name: instances.name.clone(),
-        mesh: instances.flatten()?,
-        camera: instances.camera,
-        lights: instances.lights.clone(),
-    };
     say("making rays");
-    let mut rays = Vec::new();
-    for (kind, buffers) in stage.rays_to(&scene)? {
-        say(kind.name());
-        rays.push(traced(stage, &mut levels, kind, &buffers)?);
-    }
+    let rays = all_traced(stage, instances, &mut levels, &say)?;
     point(AccelEntry::Rebraid(points::RebraidPoint {
         scene: instances.name.clone(),
         instances: instances.instances.len() as u32,
@@ -65,12 +55,33 @@ pub fn measure(stage: &AccelSetup<'_>, instances: &Instances, point: &mut Sink<'
     }))
 }
 
+/// All kinds of rays to a scene of instances, through its levels.
+pub(super) fn all_traced(
+    stage: &AccelSetup<'_>,
+    instances: &Instances,
+    levels: &mut [Levels<'_>],
+    say: &dyn Fn(&str),
+) -> Result<Vec<FlaggedRays>> {
+    let scene = Scene {
+        name: instances.name.clone(),
+        mesh: instances.flatten()?,
+        camera: instances.camera,
+        lights: instances.lights.clone(),
+    };
+    let trace = |(kind, buffers): (RayKind, RayBuffers<'_>)| {
+        say(kind.name());
+        traced(stage, levels, kind, &buffers)
+    };
+    stage.rays_to(&scene)?.into_iter().map(trace).collect()
+}
+
+/// Rays of a kind through levels without a flag, with it, and the driver's where they are there.
 fn traced(
     stage: &AccelSetup<'_>,
     levels: &mut [Levels<'_>],
     kind: RayKind,
     rays: &RayBuffers<'_>,
-) -> Result<BraidedRays> {
+) -> Result<FlaggedRays> {
     let query = kind.query();
     let times = in_turn(levels, WARM_UPS, stage.runs, |levels| levels.trace(rays, query));
     let times: Vec<Vec<f64>> = times.into_iter().collect::<Result<_>>()?;
@@ -81,7 +92,7 @@ fn traced(
         found.push(rays.read_hits());
         work.push(MeanWork::mean(&levels.work(rays, query)?));
     }
-    Ok(BraidedRays {
+    Ok(FlaggedRays {
         rays: kind.name().into(),
         count: rays.count.into(),
         hits: found[OFF].iter().filter(|hit| hit.is_some()).count() as u64,

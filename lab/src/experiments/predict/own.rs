@@ -9,7 +9,7 @@ use hedgerow_host::bvh::heuristic::InteriorForm;
 use std::collections::BTreeMap;
 
 /// The heuristics, as `heuristic=` has them.
-pub const NAMES: [&str; 6] = ["interior", "interior-hq", "interior-fast", "perspective", "rdh", "osah"];
+pub const NAMES: [&str; 7] = ["interior", "interior-hq", "interior-fast", "perspective", "rdh", "osah", "srdh"];
 
 /// The heuristics with what a scene gives them: its camera, and rays with the seed of those that teach.
 pub struct OwnCosts(Vec<(&'static str, Taught)>);
@@ -27,6 +27,7 @@ impl OwnCosts {
             "interior-fast" => HeuristicSpec::Interior(InteriorForm::Fast),
             "perspective" => HeuristicSpec::Camera { rays: CameraRays::Perspective, weight: 1.0 },
             "rdh" => HeuristicSpec::Distribution { kinds: kinds(), most: sample::MOST, weight: 1.0 },
+            "srdh" => HeuristicSpec::Shadow { kinds: sample::ANY_HIT.to_vec(), most: sample::MOST, weight: 1.0 },
             _ => HeuristicSpec::Occlusion { kinds: kinds(), weight: 1.0, rules: OcclusionRules::Plain },
         };
         NAMES
@@ -66,5 +67,7 @@ mod tests {
         let (by_area, by_rays) = (costs("binned:axes=all:termination=off"), costs("binned:axes=all:heuristic=rdh"));
         assert_eq!(by_area.keys().map(String::as_str).collect::<Vec<_>>().len(), NAMES.len());
         assert!(by_rays["rdh"] < by_area["rdh"], "{by_rays:?} {by_area:?}");
+        let by_shadows = costs("binned:axes=all:heuristic=srdh");
+        assert!(by_shadows["srdh"] < by_area["srdh"], "{by_shadows:?} {by_area:?}");
     }
 }

@@ -50,7 +50,7 @@ const fn own(number: usize, what: &'static str) -> Predictor {
 }
 
 /// All of them, in the order of the tables.
-pub const ALL: [Predictor; 16] = [
+pub const ALL: [Predictor; 17] = [
     known("SAH", "SAH cost", one(SAH)),
     known("EPO", "end-point overlap", one(EPO)),
     known("SAH–EPO", "0.29 SAH + 0.71 EPO", two((SAH, 1.0 - ALPHA), (EPO, ALPHA))),
@@ -73,6 +73,7 @@ pub const ALL: [Predictor; 16] = [
     own(3, "cost to the camera's rays"),
     own(4, "cost to a sample of rays, other ones than those that are timed"),
     own(5, "cost of going down to what rays end on"),
+    own(6, "cost to a sample of shadow and ao rays that go left first, each to its first hit"),
     known("steps", "inner nodes that a ray visits", one(STEPS)),
     known("tests", "triangles that a ray tests", one(TESTS)),
     known("work", "3 steps + 2 tests", two((STEPS, 3.0), (TESTS, 2.0))),

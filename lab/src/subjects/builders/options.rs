@@ -110,10 +110,6 @@ impl Spec {
             let what = "builders on the device have no order of children of their own; take any-hit=opaque";
             return Err(Error::Argument(format!("builder {self}: {what}")));
         }
-        if form.is_some() && any_hit.is_some() {
-            let what = "orders of children are for nodes of two; take width=2, or any-hit=near";
-            return Err(Error::Argument(format!("builder {self}: {what}")));
-        }
         let by_query = self.choice(&WALK, &[("tracer", false), ("query", true)])?.unwrap_or(false);
         if form.is_some() && by_query {
             let what = "queries are for nodes of two; take width=2, or walk=tracer";

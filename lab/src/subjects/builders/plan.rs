@@ -102,11 +102,15 @@ impl DevicePlan {
             None if self.by_query => Walk::Query,
             None => Walk::Tracer,
             Some(form) => {
+                let is_ordered = taught.any_hit.order.is_some();
+                let left_first = is_ordered.then(|| WideTracer::in_order(device, form, Order::LeftFirst));
                 let tracer = match self.order {
+                    // Where children have an order, their slots say nothing of octants.
+                    None if is_ordered => WideTracer::in_order(device, form, Order::Distance),
                     None => WideTracer::of(device, form),
                     Some(order) => WideTracer::in_order(device, form, order),
                 };
-                Walk::Wide(WidePlan { tracer, opened_by: taught.opened_by.clone() })
+                Walk::Wide(WidePlan { tracer, left_first, opened_by: taught.opened_by.clone() })
             }
         };
         let mut options = self.options;

@@ -2,7 +2,7 @@
 
 use super::Measured;
 use super::batch::find;
-use crate::experiments::accel::points::{BraidedRays, Implementation, RebraidPoint, Submission};
+use crate::experiments::accel::points::{FlaggedRays, Implementation, RebraidPoint, Submission};
 use crate::measure::{Spread, geometric_mean};
 
 /// Of the time of one call, that of a call each.
@@ -74,7 +74,7 @@ pub(super) fn least_gain(point: &RebraidPoint) -> f64 {
 }
 
 /// The geometric mean over kinds of rays, and the least and greatest median of a kind.
-pub(super) fn mean_gain(rays: &[BraidedRays]) -> Option<Spread> {
+pub(super) fn mean_gain(rays: &[FlaggedRays]) -> Option<Spread> {
     let medians: Vec<f64> = rays.iter().map(|rays| rays.gain.median).collect();
     let median = geometric_mean(medians.iter().copied())?;
     Some(Spread { median, ..Spread::of(&medians)? })

@@ -3,6 +3,7 @@
 //! The page follows from the records alone: anyone who has them can write it again, and `hedgerow bench` does, so that the pages
 //! name each other.
 
+mod any_hit;
 mod batch;
 mod goals;
 mod rebraid;
@@ -10,7 +11,9 @@ mod top_level;
 mod update;
 
 use crate::Result;
-use crate::experiments::accel::points::{AccelEntry, Batch, Implementation, RebraidPoint, TopLevel, Update};
+use crate::experiments::accel::points::{
+    AccelEntry, AnyHitPoint, Batch, Implementation, RebraidPoint, TopLevel, Update,
+};
 use crate::measure::{Failure, Setting, Spread};
 use crate::report::numbers::three_digits;
 use crate::report::{Chart, Curve, Document, Section, Table, Tone, beside, document, lines};
@@ -41,6 +44,7 @@ struct Measured {
     batches: Vec<Batch>,
     top_levels: Vec<TopLevel>,
     rebraids: Vec<RebraidPoint>,
+    any_hits: Vec<AnyHitPoint>,
     updates: Vec<Update>,
     failures: Vec<Failure>,
 }
@@ -58,6 +62,7 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
             AccelEntry::Batch(point) => measured.batches.push(point),
             AccelEntry::Tlas(point) => measured.top_levels.push(point),
             AccelEntry::Rebraid(point) => measured.rebraids.push(point),
+            AccelEntry::AnyHit(point) => measured.any_hits.push(point),
             AccelEntry::Update(point) => measured.updates.push(point),
             AccelEntry::Failure(failure) => measured.failures.push(failure),
         }
@@ -67,6 +72,7 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
         batch::part(&measured.batches)?,
         top_level::part(&measured.top_levels)?,
         rebraid::part(&measured.rebraids)?,
+        any_hit::part(&measured.any_hits)?,
         update::part(&measured.updates)?,
     ];
     let (parts, charts): (Vec<Section>, Vec<Vec<Chart>>) = parts.into_iter().flatten().unzip();
@@ -77,7 +83,7 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
         tab: "batches, top levels, re-braiding, updates".into(),
         kicker: "hedgerow benchmark",
         title: "Structures as engines use them".into(),
-        lead: "Batches of small builds, top levels of many instances, re-braiding, and updates, through the calls of \
+        lead: "Batches of small builds, top levels of many instances, re-braiding, orders of children, and updates, through the calls of \
                VK_KHR_acceleration_structure: ours in compute shaders, and the driver's by the same calls, in turn in one process."
             .into(),
         setting,

@@ -3,7 +3,7 @@
 use super::Part;
 use super::goals::{self, mean_gain, overlaps};
 use crate::Result;
-use crate::experiments::accel::points::{BraidedRays, MeanWork, RebraidPoint, TopLevelPoint};
+use crate::experiments::accel::points::{FlaggedRays, MeanWork, RebraidPoint, TopLevelPoint};
 use crate::report::bars::{Bar, Bars};
 use crate::report::numbers::{count, grouped, short_count, three_digits, tick, whole};
 use crate::report::{Caption, Chart, SERIES, Section, Table, bars, document, slug};
@@ -39,7 +39,7 @@ pub(super) fn part(points: &[RebraidPoint]) -> Result<Option<Part>> {
 
 /// The gain of each kind of ray in one scene.
 fn chart(point: &RebraidPoint) -> Result<Option<Chart>> {
-    let bar = |(i, rays): (usize, &BraidedRays)| Bar {
+    let bar = |(i, rays): (usize, &FlaggedRays)| Bar {
         label: rays.rays.clone(),
         figure: three_digits(rays.gain.median),
         spread: rays.gain,
@@ -103,8 +103,8 @@ fn buildings(points: &[RebraidPoint]) -> Markup {
 /// Every kind of ray in every scene.
 fn tracing(points: &[RebraidPoint]) -> Markup {
     let rows = points.iter().flat_map(|point| point.rays.iter().map(|rays| (point.scene.as_str(), rays)));
-    let mrays_s = |rays: &BraidedRays, milliseconds: f64| Some(rays.count as f64 / (milliseconds * 1e3));
-    let both = |rays: &BraidedRays, of: fn(&MeanWork) -> f64| {
+    let mrays_s = |rays: &FlaggedRays, milliseconds: f64| Some(rays.count as f64 / (milliseconds * 1e3));
+    let both = |rays: &FlaggedRays, of: fn(&MeanWork) -> f64| {
         let [off, on] = [of(&rays.off_work), of(&rays.on_work)];
         html! { td.number data-value=(on) { (three_digits(off)) " → " (three_digits(on)) } }
     };

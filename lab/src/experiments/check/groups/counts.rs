@@ -11,7 +11,8 @@ use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child, Header, Triangle};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
-use hedgerow::bvh::wide::device::{WideOptions, WidePass};
+use hedgerow::bvh::twin::wide::LinkCounts;
+use hedgerow::bvh::wide::device::{WideCounts, WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::trace::counts::{CountPass, CountedRays, CountedWalk, Earlier, Tallies};
@@ -30,10 +31,14 @@ pub fn ray_counts(cases: &mut Cases<'_>) {
         }
         let counted = counted(&tree, &rays, CountedWalk::Exhaustive);
         cases.case(format!("{name}, order of children"), |device| order_as_on_host(device, &tree, &counted));
-        let what = format!("{name}, opened by visits");
-        cases.case(format!("{what}, 4"), |device| wide_as_on_host::<[Child; 4]>(device, &tree, &counted));
-        cases.case(format!("{what}, 8"), |device| wide_as_on_host::<[Child; 8]>(device, &tree, &counted));
-        cases.case(format!("{what}, 8q"), |device| wide_as_on_host::<QuantisedNode>(device, &tree, &counted));
+        let mut swapped = counted.clone();
+        let ordered = tree.clone().in_order_of_counts(&mut swapped, &Collapse::SAH);
+        for (tree, counted, how) in [(tree, counted, "opened by visits"), (ordered, swapped, "in order of hits")] {
+            let what = format!("{name}, {how}");
+            cases.case(format!("{what}, 4"), |device| wide_as_on_host::<[Child; 4]>(device, &tree, &counted));
+            cases.case(format!("{what}, 8"), |device| wide_as_on_host::<[Child; 8]>(device, &tree, &counted));
+            cases.case(format!("{what}, 8q"), |device| wide_as_on_host::<QuantisedNode>(device, &tree, &counted));
+        }
     }
 }
 
@@ -80,8 +85,16 @@ fn order_as_on_host(device: &Device, tree: &Bvh2, counted: &[LinkCount]) -> Foun
     same_all("count of link", &of_links.read::<LinkCount>(counted.len()), &expected_counts)
 }
 
+/// Opened by visits, or, where children have an order, put in order by hits.
 fn wide_as_on_host<N: WideNode>(device: &Device, tree: &Bvh2, counted: &[LinkCount]) -> Found {
-    let expected = Wide::<N>::of_visits(tree, counted);
+    let is_ordered = tree.header.child_order != 0;
+    let expected = Wide::<N>::of_counts(
+        tree,
+        &match is_ordered {
+            false => LinkCounts { opened_by: counted, ..LinkCounts::default() },
+            true => LinkCounts { ordered_by: counted, ..LinkCounts::default() },
+        },
+    );
     expected.validate()?;
     let Header { primitive_count, geometry_count, .. } = tree.header;
     let options = WideOptions { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
@@ -91,9 +104,12 @@ fn wide_as_on_host<N: WideNode>(device: &Device, tree: &Bvh2, counted: &[LinkCou
     let of_links = device.upload("counts", counted)?;
     let target = device.buffer("target", sizes.structure)?;
     let scratch = device.buffer("scratch", sizes.scratch)?;
-    device.run(None, |r| {
-        wide.record_by_visits(r, source.address(), of_links.region(), target.region(), scratch.region())
-    })?;
+    let region = Some(of_links.region());
+    let counts = match is_ordered {
+        false => WideCounts { opened_by: region, ordered_by: None },
+        true => WideCounts { opened_by: None, ordered_by: region },
+    };
+    device.run(None, |r| wide.record_by_counts(r, source.address(), &counts, target.region(), scratch.region()))?;
     let header: Header = target.read(1)[0];
     let used = N::FORM.bytes_in_use(&header, size_of::<Triangle>() as u64).min(sizes.structure);
     let bytes = target.read::<u8>(used as usize);

@@ -24,10 +24,13 @@ pub fn wide(cases: &mut Cases<'_>) {
         for collapse in [Collapse::OFF, Collapse::SAH] {
             let (name, positions, triangles) = &mesh;
             let tree = lbvh::build(positions, triangles, Code::Emc64Var.full(), collapse);
-            let what = format!("{name}, {collapse:?}");
-            cases.case(format!("{what}, 4"), |device| wide_as_on_host::<[Child; 4]>(device, &tree));
-            cases.case(format!("{what}, 8"), |device| wide_as_on_host::<[Child; 8]>(device, &tree));
-            cases.case(format!("{what}, 8q"), |device| wide_as_on_host::<QuantisedNode>(device, &tree));
+            let ordered = tree.clone().in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
+            for (tree, which) in [(tree, ""), (ordered, ", in order")] {
+                let what = format!("{name}, {collapse:?}{which}");
+                cases.case(format!("{what}, 4"), |device| wide_as_on_host::<[Child; 4]>(device, &tree));
+                cases.case(format!("{what}, 8"), |device| wide_as_on_host::<[Child; 8]>(device, &tree));
+                cases.case(format!("{what}, 8q"), |device| wide_as_on_host::<QuantisedNode>(device, &tree));
+            }
         }
     }
 }

@@ -142,11 +142,18 @@ fn left_first(cases: &mut Cases<'_>, name: &str, tree: &Bvh2, rays: &[Ray]) {
     }
 }
 
-/// The default, and others that its form has.
-fn wide_tracers(device: &Device, form: Form, quick: bool) -> Vec<WideTracer> {
+/// The default, and others that its form has; for rays that end at any hit, where children have an order, those that take the left one
+/// first.
+fn wide_tracers(device: &Device, form: Form, quick: bool, is_ordered: bool) -> Vec<WideTracer> {
     let limits = &device.limits;
-    let mut tracers = vec![WideTracer::of(device, form)];
-    let orders: &[Order] = if form.is_quantised() { &[Order::Distance, Order::Octant] } else { &[Order::Distance] };
+    let first =
+        if is_ordered { WideTracer::in_order(device, form, Order::LeftFirst) } else { WideTracer::of(device, form) };
+    let mut tracers = vec![first];
+    let orders: &[Order] = match form.is_quantised() {
+        _ if is_ordered => &[Order::LeftFirst],
+        true => &[Order::Distance, Order::Octant],
+        false => &[Order::Distance],
+    };
     for &order in orders {
         let all = [TraceShape::groups(limits), TraceShape::subgroups(limits)];
         let all = all.into_iter().take(if quick { 1 } else { 2 });
@@ -165,10 +172,13 @@ pub fn wide(cases: &mut Cases<'_>) {
 }
 
 fn wide_form<N: TracedNode>(cases: &mut Cases<'_>, name: &str, tree: &Bvh2, rays: &[Ray]) {
-    let wide = Wide::<N>::of(tree);
-    let bytes = wide.to_bytes();
-    for query in QUERIES {
-        for tracer in wide_tracers(cases.device, N::FORM, cases.quick) {
+    let ordered = tree.clone().in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
+    for (query, tree, is_ordered) in
+        [(Query::ClosestHit, tree, false), (Query::AnyHit, tree, false), (Query::AnyHit, &ordered, true)]
+    {
+        let wide = Wide::<N>::of(tree);
+        let bytes = wide.to_bytes();
+        for tracer in wide_tracers(cases.device, N::FORM, cases.quick, is_ordered) {
             let trace = |ray: &Ray| wide_host::trace(&wide, ray, query, tracer.order);
             let expected: Vec<(Hit, Work)> = rays.iter().map(trace).collect();
             cases.case(format!("{name}, {query:?}, {tracer:?}"), |device| {
