@@ -6,15 +6,17 @@
 const uint STACK = 32;
 // Of those, the first that lie in shared memory: a GPU has an invocation's own arrays far away.
 layout(constant_id = 2) const uint SHARED_ENTRIES = 0;
-// A gain counts if it is more than this share of the pivot's area (less may be rounding) and more than this (less may be made of
+// A gain counts if it is more than this share of the pivot's cost (less may be rounding) and more than this (less may be made of
 // numbers that devices take for zero).
 const float LEAST_SHARE = 1.0 / 1048576.0;
 const float LEAST_GAIN = 1.0 / 1152921504606846976.0;
 
 struct Search {
     Box moving;
-    float moving_area;
+    float moving_cost;
     float scale;
+    float of_rays;
+    uint sibling;    // the link beside the one that moves
     uint pivot;
     float least;     // what a gain must exceed at this pivot
     uint best_to;
@@ -46,22 +48,23 @@ float bar(Search s) {
     return max(s.best_gain, s.least);
 }
 
-// The new node has at least the area of what moves.
+// The new node has at least the cost of what moves.
 bool may_gain(Search s, Below b) {
-    precise float most = b.saved - s.moving_area;
+    precise float most = b.saved - s.moving_cost;
     return b.slot != NONE && most > bar(s);
 }
 
 // What a move to link `at`, where `child` hangs, would gain.
 Below look(inout Search s, uint at, Child child, float saved) {
-    float merged = scaled_half_area(around(box_of(child), s.moving), s.scale);
+    float merged = cost_of(around(box_of(child), s.moving), s.scale, s.of_rays);
     precise float gain = saved - merged;
-    if (gain > bar(s)) {
+    // Beside its sibling it is already: what seems to be gained there is rounding, and the move would tie a cycle.
+    if (gain > bar(s) && at != s.sibling) {
         s.best_to = at;
         s.best_pivot = s.pivot;
         s.best_gain = gain;
     }
-    precise float below = saved - (merged - scaled_half_area(box_of(child), s.scale));
+    precise float below = saved - (merged - cost_at(at, child, s.scale));
     return Below(child.count == 0u ? child.index : NONE, below);
 }
 
@@ -100,15 +103,17 @@ bool is_path_walkable(uint to, uint pivot) {
 Move search(uint link) {
     uint parent = link >> 1, root = structure.header.root.index;
     Move none = Move(NONE, NONE, 0u);
-    if (structure.nodes[parent].left.count == UNUSED || parent == root) return none;
+    if (!is_used(parent) || parent == root) return none;
     Search s;
     s.moving = box_of(child_at(link));
     s.scale = structure.header.area_scale;
-    s.moving_area = scaled_half_area(s.moving, s.scale);
+    s.of_rays = ratio();
+    s.moving_cost = cost_at(link, child_at(link), s.scale);
+    s.sibling = link ^ 1u;
     s.best_to = NONE;
     s.best_pivot = NONE;
     s.best_gain = 0.0;
-    // What all nodes shorten by, less the area of a new one; so far, the parent's area.
+    // What all nodes cost less, without a new one; so far, the parent's cost.
     precise float saved = 0.0;
     // What is left below the pivot on the side that the subtree leaves.
     Box left_behind;
@@ -117,9 +122,9 @@ Move search(uint link) {
         s.pivot = at >> 1;
         Node node = structure.nodes[s.pivot];
         Child other = (at & 1u) == 0u ? node.right : node.left;
-        float pivot_area = scaled_half_area(around(box_of(node.left), box_of(node.right)), s.scale);
-        if (level == 0u) saved = pivot_area;
-        s.least = max(LEAST_SHARE * pivot_area, LEAST_GAIN);
+        float pivot_cost = cost_of(around(box_of(node.left), box_of(node.right)), s.scale, s.of_rays);
+        if (level == 0u) saved = pivot_cost;
+        s.least = max(LEAST_SHARE * pivot_cost, LEAST_GAIN);
         Below next = look(s, at ^ 1u, other, saved);
         search_below(s, next);
         if (s.pivot == root) break;
@@ -127,7 +132,7 @@ Move search(uint link) {
             left_behind = box_of(other);
         } else {
             left_behind = around(left_behind, box_of(other));
-            saved = saved + (pivot_area - scaled_half_area(left_behind, s.scale));
+            saved = saved + (pivot_cost - cost_of(left_behind, s.scale, s.of_rays));
         }
         at = parents.word[s.pivot];
     }
