@@ -15,7 +15,7 @@
 //
 //   (fill    writes totals: zero)
 //   totals   reads nodes, grid                  adds to totals: area and rays of all nodes
-//   links    reads nodes, grid, totals          writes costs; totals: the ratio
+//   links    reads nodes, grid, totals          writes costs; totals: the ratio, the root's cost
 //
 // To see what could be won and move nothing, in place of the others behind search:
 //
@@ -65,10 +65,11 @@ layout(push_constant, scalar) uniform ReinsertionArguments {
     float by_rays;      // what rays weigh in the whole tree's cost, its area being 1
 };
 
-// Words of the totals: two 64-bit sums, and the bits of a float.
+// Words of the totals: two sums of 64 bits, and the bits of floats.
 const uint TOTALS_AREA = 0;
 const uint TOTALS_RAYS = 2;
 const uint TOTALS_RATIO = 4;
+const uint TOTALS_ROOT = 5;      // what the root costs
 
 // Words of what a probe finds, `Probed` in src/bvh/reinsertion.rs: 64 bits, a number, and the bits of a float.
 const uint SUMS_GAINS = 0;

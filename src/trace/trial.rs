@@ -145,11 +145,7 @@ impl Trial {
         recorder.phase("trial");
         recorder.dispatch(&self.grid.kernel(&shaders::TRACE_TRIAL_DECIDE), &arguments, 1)?;
         recorder.barrier();
-        recorder.dispatch(
-            &self.grid.kernel(&shaders::TRACE_TRIAL_TAKE),
-            &arguments,
-            self.grid.groups_for(self.slots),
-        )
+        recorder.dispatch(&self.grid.kernel(&shaders::TRACE_TRIAL_TAKE), &arguments, self.grid.groups_for(self.slots))
     }
 
     /// Addresses of tree, copy and result.

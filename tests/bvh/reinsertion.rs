@@ -100,7 +100,8 @@ fn taught(tree: &Bvh2, count: u32) -> Vec<(Ray, Hit)> {
     let middle = bounds.centroid();
     let ray = |i: u32| {
         let part = [7919 * i % 1009, 6101 * i % 1013, 4001 * i % 1019].map(|k| k as f32 / 1019.0);
-        let direction = std::array::from_fn(|k| (bounds.hi[k] - middle[k]) * part[k] + 1e-3 * (bounds.hi[0] - middle[0]));
+        let direction =
+            std::array::from_fn(|k| (bounds.hi[k] - middle[k]) * part[k] + 1e-3 * (bounds.hi[0] - middle[0]));
         Ray { origin: middle, t_min: 0.0, direction, t_max: f32::INFINITY }
     };
     (0..count).map(ray).map(|ray| (ray, tracer::closest_hit(tree, &ray))).collect()
@@ -154,7 +155,11 @@ fn rounds_by_rays_and_their_probe_are_those_of_the_host() {
         ] {
             let expected = tree.reinserted_by(&options, 3, &on_host).expect("a share");
             let (got, probed) = by_rays_on_device(&tree, &options, 3, cost);
-            assert!(got.to_bytes() == expected.to_bytes(), "{name}, {cost:?}: another tree", cost = cost.map(|cost| cost.1));
+            assert!(
+                got.to_bytes() == expected.to_bytes(),
+                "{name}, {cost:?}: another tree",
+                cost = cost.map(|cost| cost.1)
+            );
             assert_eq!(probed, tree.probed(&ReinsertionOptions::PROBE, &on_host).expect("a share"), "{name}");
             moved += usize::from(got.nodes != tree.nodes);
             gained += usize::from(probed.gains > 0);
@@ -249,10 +254,7 @@ fn what_rounds_cannot_take_is_refused_by_name() {
     let pass = Reinsertion::new(device, &ReinsertionOptions::FAST, 100);
     let of = |bytes| Region { address: 16, bytes };
     let refused = |cost: Cost, scratch: u64| {
-        device
-            .run(None, |r| pass.record_rounds(r, of(1 << 20), &cost, of(scratch)))
-            .expect_err("refused")
-            .to_string()
+        device.run(None, |r| pass.record_rounds(r, of(1 << 20), &cost, of(scratch))).expect_err("refused").to_string()
     };
     let by_rays = |bytes, share| Cost::Rays { grid: of(bytes), share };
     for share in [-0.1, 1.0, f32::NAN] {

@@ -1,7 +1,9 @@
 //! The grid of rays: the device's is the twin's, number for number, and says how many rays meet a box.
 
 use crate::common::device;
-use crate::common::shapes::{Corners, hard_rays, icosphere, no_rays, placed, rays_from_inside, soup, tree_of, tree_with};
+use crate::common::shapes::{
+    Corners, hard_rays, icosphere, no_rays, placed, rays_from_inside, soup, tree_of, tree_with,
+};
 use hedgerow::bvh::flux::{CELLS, FluxGrid, GRID_BYTES, MAX_FLUX_RAYS};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
@@ -26,7 +28,11 @@ fn on_device(tree: &Bvh2, samples: &[&[Ray]], stride: u32) -> Vec<u8> {
         .iter()
         .map(|rays| {
             let hits = hits_of(tree, rays);
-            (rays.len() as u32, device.upload("rays", rays).expect("memory"), device.upload("hits", &hits).expect("memory"))
+            (
+                rays.len() as u32,
+                device.upload("rays", rays).expect("memory"),
+                device.upload("hits", &hits).expect("memory"),
+            )
         })
         .collect();
     let taken: Vec<FluxRays> = uploaded
@@ -39,18 +45,14 @@ fn on_device(tree: &Bvh2, samples: &[&[Ray]], stride: u32) -> Vec<u8> {
             stride,
         })
         .collect();
-    device
-        .run(None, |r| FluxPass::new(device).record(r, structure.region(), &taken, grid.region()))
-        .expect("filled");
+    device.run(None, |r| FluxPass::new(device).record(r, structure.region(), &taken, grid.region())).expect("filled");
     assert_eq!(grid.read_at::<u8>(GRID_BYTES, GUARD.len()), GUARD, "wrote behind the grid");
     grid.read::<u8>(GRID_BYTES as usize)
 }
 
 fn on_host(tree: &Bvh2, samples: &[&[Ray]], stride: usize) -> FluxGrid {
-    let taken: Vec<(Ray, Hit)> = samples
-        .iter()
-        .flat_map(|rays| rays.iter().copied().zip(hits_of(tree, rays)).step_by(stride))
-        .collect();
+    let taken: Vec<(Ray, Hit)> =
+        samples.iter().flat_map(|rays| rays.iter().copied().zip(hits_of(tree, rays)).step_by(stride)).collect();
     flux::fill(tree, taken.iter().map(|(ray, hit)| (ray, hit)))
 }
 
@@ -64,7 +66,8 @@ fn assert_as_on_the_host(what: &str, tree: &Bvh2, samples: &[&[Ray]], stride: u3
 
 #[test]
 fn the_grid_is_that_of_the_host_at_any_scale() {
-    for (size, scale, far) in [(0.3, 1.0, 0.0), (1.0, 1.0, 3.0), (0.2, 1e-10, 0.0), (0.2, 1e15, 1.0), (0.2, 1e30, 0.0)] {
+    for (size, scale, far) in [(0.3, 1.0, 0.0), (1.0, 1.0, 3.0), (0.2, 1e-10, 0.0), (0.2, 1e15, 1.0), (0.2, 1e30, 0.0)]
+    {
         let offset = [far * scale, -far * scale, 0.5 * far * scale];
         let corners = placed(&soup(300, size, 5), scale, offset);
         let rays = hard_rays(&corners, 1_000, scale, offset, 11);
@@ -117,9 +120,8 @@ fn boxes_of_whole_cells_have_the_segments_that_meet_them() {
         (word >> 8) as f32 / (1 << 24) as f32
     };
     // Some begin or end out of the room.
-    let segments: Vec<(Ray, Hit)> = (0..300)
-        .map(|_| straight([0; 3].map(|_| 1.4 * next() - 0.2), [0; 3].map(|_| 1.4 * next() - 0.2)))
-        .collect();
+    let segments: Vec<(Ray, Hit)> =
+        (0..300).map(|_| straight([0; 3].map(|_| 1.4 * next() - 0.2), [0; 3].map(|_| 1.4 * next() - 0.2))).collect();
     let grid = flux::fill(&tree, segments.iter().map(|(ray, hit)| (ray, hit)));
     let mut met = 0.0;
     for _ in 0..200 {
@@ -163,10 +165,7 @@ fn what_is_no_sample_is_refused_by_name() {
     let of = |bytes| Region { address: 16, bytes };
     let rays = FluxRays { rays: of(320), hits: of(160), ray_count: 10, first: 0, stride: 1 };
     let refused = |rays: &[FluxRays], grid: Region| {
-        device
-            .run(None, |r| FluxPass::new(device).record(r, of(1 << 20), rays, grid))
-            .expect_err("refused")
-            .to_string()
+        device.run(None, |r| FluxPass::new(device).record(r, of(1 << 20), rays, grid)).expect_err("refused").to_string()
     };
     let grid = of(GRID_BYTES);
     assert!(refused(&[FluxRays { stride: 0, ..rays }], grid).contains("take a stride of 1"));

@@ -97,10 +97,7 @@ fn what_is_no_trial_is_refused_by_name() {
     let trees = TrialTrees { structure: of(1 << 20), copy: of(1 << 20), result: of(24) };
     let rays = CountedRays { rays: of(320), ray_count: 10, first: 0, stride: 1 };
     let refused = |rays: CountedRays, trees: TrialTrees| {
-        device
-            .run(None, |r| trial.record_rays(r, Query::ClosestHit, &rays, &trees))
-            .expect_err("refused")
-            .to_string()
+        device.run(None, |r| trial.record_rays(r, Query::ClosestHit, &rays, &trees)).expect_err("refused").to_string()
     };
     assert!(refused(CountedRays { stride: 0, ..rays }, trees).contains("take a stride of 1"));
     assert!(refused(CountedRays { ray_count: 11, ..rays }, trees).contains("memory of rays of 320"));

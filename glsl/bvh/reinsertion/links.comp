@@ -22,7 +22,11 @@ float weighed_ratio() {
 
 void main() {
     float of_rays = weighed_ratio(), scale = structure.header.area_scale;
-    if (grid_item(0) == 0u) totals.word[TOTALS_RATIO] = floatBitsToUint(of_rays);
+    if (grid_item(0) == 0u) {
+        totals.word[TOTALS_RATIO] = floatBitsToUint(of_rays);
+        uint root = min(structure.header.root.index, link_count / 2u - 1u);
+        totals.word[TOTALS_ROOT] = floatBitsToUint(is_used(root) ? cost_of(box_of_node(root), scale, of_rays) : 0.0);
+    }
     for (uint k = 0, link = grid_item(0); link < link_count; link = grid_item(++k)) {
         if (!is_used(link >> 1)) continue;
         costs.value[link] = cost_of(box_of(child_at(link)), scale, of_rays);

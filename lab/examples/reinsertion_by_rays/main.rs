@@ -62,7 +62,11 @@ fn run(device: &Device, scene: &Scene, shares: &[f32], rounds: u32, before: u32)
     let found = device.buffer("found", size_of::<Probed>() as u64)?;
     let samples = taught(device, &built, &teacher)?;
     let teaching: u32 = samples.iter().map(|(count, ..)| count).sum();
-    println!("{}: {count} triangles, {teaching} rays teach, {} rounds after {before} passes", scene.name, pass.rounds());
+    println!(
+        "{}: {count} triangles, {teaching} rays teach, {} rounds after {before} passes",
+        scene.name,
+        pass.rounds()
+    );
     let start: Vec<f64> = tested.iter().map(|frame| total(&works(device, &built, frame)?)).collect::<Result<_>>()?;
     let mut by_area: Option<Vec<Vec<f64>>> = None;
     for share in [None].into_iter().chain(shares.iter().copied().map(Some)) {
@@ -78,7 +82,8 @@ fn run(device: &Device, scene: &Scene, shares: &[f32], rounds: u32, before: u32)
                 stride: 1,
             })
             .collect();
-        let fill = |recorder: &mut Recorder<'_>| FluxPass::new(device).record(recorder, copy.region(), &rays, grid.region());
+        let fill =
+            |recorder: &mut Recorder<'_>| FluxPass::new(device).record(recorder, copy.region(), &rays, grid.region());
         // Once to make pipelines, and once to be timed.
         let _ = milliseconds(device, fill)?;
         let filling = milliseconds(device, fill)?;
@@ -166,10 +171,7 @@ fn total(work: &[f64]) -> Result<f64> {
     Ok(work.iter().sum())
 }
 
-fn milliseconds(
-    device: &Device,
-    record: impl FnOnce(&mut Recorder<'_>) -> hedgerow::Result<()>,
-) -> Result<f64> {
+fn milliseconds(device: &Device, record: impl FnOnce(&mut Recorder<'_>) -> hedgerow::Result<()>) -> Result<f64> {
     let mut timestamps = Timestamps::new(device, 4)?;
     device.run(Some(&mut timestamps), record)?;
     Ok(timestamps.phases()?.iter().map(|phase| phase.milliseconds).sum())

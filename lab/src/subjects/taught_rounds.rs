@@ -76,3 +76,45 @@ impl<'a> TaughtRounds<'a> {
         self.pass.record_rounds(recorder, structure, &cost, scratch)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::device::{Device, DeviceOptions};
+    use crate::scene::{LoadOptions, load};
+    use crate::subjects::Subject;
+    use crate::subjects::builders::Spec;
+    use hedgerow::trace::Query;
+
+    #[test]
+    fn rounds_that_rays_teach_are_phases_of_the_build_and_take_less_work() {
+        let device = Device::new(&DeviceOptions::default()).expect("a device");
+        let scene = load("gen:stadium:3", &LoadOptions::default()).expect("a generator");
+        let rays = crate::rays::sample::TeachingRays::of(&scene, &crate::rays::sample::ANY_HIT, 2000).expect("rays");
+        let work = |spec: &str| {
+            let mut subject: Box<dyn Subject + '_> =
+                spec.parse::<Spec>().expect(spec).make_for(Some(&device), &scene).expect(spec);
+            let run = subject.build().expect("built");
+            subject.validate().expect("sound");
+            subject.set_rays(&rays.all()).expect("memory");
+            let work = subject.work(Query::AnyHit).expect("traced").expect("counted");
+            let names: Vec<&str> = run.phases.iter().map(|phase| phase.name).collect();
+            (names, work.iter().map(|work| u64::from(3 * work.steps + 2 * work.tests)).sum::<u64>())
+        };
+        let (_, before) = work("lbvh:codes=mc30");
+        let (phases, after) = work("lbvh:codes=mc30:optimise=fast:by=rays");
+        assert_eq!(phases[phases.len() - 3..], ["rays", "flux", "optimise"]);
+        assert!(after < before, "{after} of work, {before} before");
+    }
+
+    #[test]
+    fn what_rays_cannot_teach_is_refused_by_name() {
+        let error = |spec: &str| spec.parse::<Spec>().expect_err(spec).to_string();
+        assert!(error("lbvh:by=rays").contains("take optimise=fast"));
+        assert!(error("lbvh:by=rays:optimise=20ms").contains("take optimise=fast"));
+        assert!(error("lbvh:by=rays:optimise=fast:any-hit=opaque").contains("any-hit=near"));
+        assert!(error("lbvh:by=light:optimise=fast").contains("by"));
+        let spec: Spec = "hploc:optimise=fast:by=rays".parse().expect("known");
+        assert!(spec.learns_from_a_view().expect("checked"));
+        assert_eq!(spec.untaught().to_string(), "hploc:optimise=fast");
+    }
+}

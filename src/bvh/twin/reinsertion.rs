@@ -38,7 +38,7 @@ impl<R: Record> Bvh2<R> {
     /// [`crate::bvh::reinsertion`].
     pub fn reinserted(&self, options: &ReinsertionOptions) -> Bvh2<R> {
         let scale = self.header.area_scale;
-        self.after_rounds(options, 0, |bounds| bounds.scaled_half_area(scale))
+        self.after_rounds(options, 0, |bounds| bounds.scaled_half_area(scale), false)
     }
 
     /// The finished tree after the rounds of `options`, from `first_round` on: the bytes of
@@ -52,7 +52,8 @@ impl<R: Record> Bvh2<R> {
         first_round: u32,
         cost: &CostOnHost<'_>,
     ) -> Result<Bvh2<R>> {
-        let mut tree = self.after_rounds(options, first_round, self.cost_by(cost)?);
+        let by_rays = *cost != CostOnHost::Area;
+        let mut tree = self.after_rounds(options, first_round, self.cost_by(cost)?, by_rays);
         if !tree.header.root.is_leaf() && tree.is_too_deep() {
             tree.header.status |= status::TOO_DEEP;
         }
@@ -64,7 +65,12 @@ impl<R: Record> Bvh2<R> {
     /// # Errors
     /// The share is out of range.
     pub fn probed(&self, options: &ReinsertionOptions, cost: &CostOnHost<'_>) -> Result<Probed> {
-        let work = LinkedTree { parents: parents_of(self), tree: self.clone(), cost: self.cost_by(cost)? };
+        let work = LinkedTree {
+            parents: parents_of(self),
+            tree: self.clone(),
+            cost: self.cost_by(cost)?,
+            by_rays: *cost != CostOnHost::Area,
+        };
         let slots = self.nodes.len() as u32;
         let stride = options.stride_for(slots);
         let root_area = self.header.root.bounds().scaled_half_area(self.header.area_scale);
@@ -84,8 +90,9 @@ impl<R: Record> Bvh2<R> {
         options: &ReinsertionOptions,
         first_round: u32,
         cost: impl Fn(&Aabb) -> f32,
+        by_rays: bool,
     ) -> Bvh2<R> {
-        let mut work = LinkedTree { parents: parents_of(self), tree: self.clone(), cost };
+        let mut work = LinkedTree { parents: parents_of(self), tree: self.clone(), cost, by_rays };
         let slots = self.nodes.len() as u32;
         let (rounds, stride) = (options.rounds_for(slots), options.stride_for(slots));
         for round in 0..rounds {
@@ -165,6 +172,8 @@ struct LinkedTree<R: Record, C> {
     parents: Vec<u32>,
     /// Of the node with a box.
     cost: C,
+    /// Whether that takes a grid, which is asked where it must be.
+    by_rays: bool,
 }
 
 impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
@@ -209,6 +218,12 @@ impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
         self.child(2 * slot).bounds().union(&self.child(2 * slot + 1).bounds())
     }
 
+    /// The box by which the node in a slot has its cost. By rays costs are kept for what hangs from a link.
+    fn bounds_by(&self, slot: u32) -> Aabb {
+        let is_root = slot == self.tree.header.root.index;
+        if self.by_rays && !is_root { self.child(self.parents[slot as usize]).bounds() } else { self.bounds(slot) }
+    }
+
     /// The node above another.
     fn above(&self, slot: u32) -> u32 {
         self.parents[slot as usize] / 2
@@ -223,19 +238,20 @@ impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
         let moving = self.child(link).bounds();
         let mut best = Move { link, to: NONE, pivot: NONE, gain: 0.0 };
         // What all nodes cost less, without a new one; so far, the parent's cost.
-        let mut saved = self.cost(&self.bounds(parent));
+        let mut saved = self.cost(&self.bounds_by(parent));
         // What is left below the pivot on the side that the subtree leaves.
         let mut left_behind = Aabb::EMPTY;
         let mut at = link;
         for _ in 0..PATH {
             let pivot = at / 2;
-            let pivot_cost = self.cost(&self.bounds(pivot));
+            let pivot_cost = self.cost(&self.bounds_by(pivot));
             self.search_below(at ^ 1, pivot, saved, pivot_cost, &moving, &mut best);
             if pivot == root {
                 break;
             }
             left_behind = left_behind.union(&self.child(at ^ 1).bounds());
-            if pivot != parent {
+            // What is inside of a box, and does not touch its faces, leaves it as it is.
+            if pivot != parent && !(self.by_rays && left_behind == self.bounds(pivot)) {
                 saved += pivot_cost - self.cost(&left_behind);
             }
             at = self.parents[pivot as usize];
@@ -246,23 +262,38 @@ impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
     /// Looks at the subtree at link `at`, on the other side of the pivot.
     fn search_below(&self, at: u32, pivot: u32, saved: f32, pivot_cost: f32, moving: &Aabb, best: &mut Move) {
         let moving_cost = self.cost(moving);
-        let link = best.link;
+        let scale = self.tree.header.area_scale;
+        let (link, by_rays) = (best.link, |bounds: &Aabb, cost: f32| cost - bounds.scaled_half_area(scale));
         let bar = |best: &Move| best.gain.max((LEAST_SHARE * pivot_cost).max(LEAST_GAIN));
+        let below = |child: &Child, saved: f32, merged: f32| {
+            let left = saved - (merged - self.cost(&child.bounds()));
+            (if child.is_leaf() { NONE } else { child.index }, left)
+        };
         // What a move to `at` would gain; and of the node there, the slot and what would be saved if the move went below.
         let look = |at: u32, saved: f32, best: &mut Move| {
             let child = self.child(at);
-            let merged = self.cost(&child.bounds().union(moving));
+            let bounds = child.bounds().union(moving);
+            if self.by_rays {
+                let own = self.cost(&child.bounds());
+                let least =
+                    bounds.scaled_half_area(scale) + by_rays(&child.bounds(), own).max(by_rays(moving, moving_cost));
+                let is_useless_below = child.is_leaf() || saved - (least - own) - moving_cost <= bar(best);
+                if saved - least <= bar(best) && is_useless_below {
+                    return (NONE, 0.0);
+                }
+            }
+            let merged = self.cost(&bounds);
             let gain = saved - merged;
-            // Beside its sibling it is already: what seems to be gained there is rounding, and the move would tie a cycle.
-            if gain > bar(best) && at != link ^ 1 {
+            if gain > bar(best) {
                 *best = Move { link, to: at, pivot, gain };
             }
-            let below = saved - (merged - self.cost(&child.bounds()));
-            (if child.is_leaf() { NONE } else { child.index }, below)
+            below(&child, saved, merged)
         };
         // The new node has at least the cost of what moves.
         let may_gain = |(slot, saved): (u32, f32), best: &Move| slot != NONE && saved - moving_cost > bar(best);
-        let mut stack = vec![look(at, saved, best)];
+        // A move beside the own sibling would tie a cycle. It is never looked at: the box around both is the parent's.
+        let first = if at == link ^ 1 { below(&self.child(at), saved, pivot_cost) } else { look(at, saved, best) };
+        let mut stack = vec![first];
         while let Some(next) = stack.pop() {
             if !may_gain(next, best) {
                 continue;
@@ -362,7 +393,7 @@ mod tests {
             asked.set(asked.get() + 1);
             1.0 + 1.0 / asked.get() as f32
         };
-        let work = LinkedTree { parents: parents_of(&tree), tree: tree.clone(), cost: falling };
+        let work = LinkedTree { parents: parents_of(&tree), tree: tree.clone(), cost: falling, by_rays: false };
         let mut moved = 0;
         for link in 0..2 * tree.nodes.len() as u32 {
             if let Some(m) = work.search(link) {
@@ -375,7 +406,9 @@ mod tests {
 
     #[test]
     fn a_sum_has_its_first_24_bits() {
-        for (sum, expected) in [(1, 1.0), (0xFF_FFFF, 16_777_215.0), (0x1FF_FFFF, 33_554_430.0), (1 << 40, 1.099_511_6e12)] {
+        for (sum, expected) in
+            [(1, 1.0), (0xFF_FFFF, 16_777_215.0), (0x1FF_FFFF, 33_554_430.0), (1 << 40, 1.099_511_6e12)]
+        {
             assert_eq!(leading(sum, 1.0), expected);
         }
     }

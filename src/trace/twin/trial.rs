@@ -20,8 +20,10 @@ pub fn work<'r>(tree: &Bvh2, rays: impl IntoIterator<Item = &'r Ray>, query: Que
 /// Puts `copy` in the place of `tree` if the work of rays in it is less by more than 1%, and the other way round if not.
 pub fn decide(tree: &mut Bvh2, copy: &mut Bvh2, work: [u64; 2]) -> TrialResult {
     let (a, b) = (&tree.header, &copy.header);
-    let is_of_one =
-        a.primitive_count == b.primitive_count && a.active == b.active && a.inner_nodes == b.inner_nodes && a.node_slots == b.node_slots;
+    let is_of_one = a.primitive_count == b.primitive_count
+        && a.active == b.active
+        && a.inner_nodes == b.inner_nodes
+        && a.node_slots == b.node_slots;
     let [of_tree, of_copy] = work.map(u128::from);
     let is_taken = is_of_one && b.status & status::UNUSABLE == 0 && 100 * of_copy < 99 * of_tree;
     if is_of_one {

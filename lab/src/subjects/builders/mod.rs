@@ -111,7 +111,10 @@ impl Spec {
     /// [`Error::Argument`] if an option has a value that the builder does not take.
     pub fn learns_from_a_view(&self) -> Result<bool> {
         let has_taught_order = matches!(self.any_hit()?, Some(AnyHitSpec::Rays | AnyHitSpec::Auto));
-        Ok(self.heuristic()?.learns_from_a_view() || has_taught_order || self.is_opened_by_rays()? || self.is_optimised_by_rays()?)
+        Ok(self.heuristic()?.learns_from_a_view()
+            || has_taught_order
+            || self.is_opened_by_rays()?
+            || self.is_optimised_by_rays()?)
     }
 
     /// The same builder by areas alone.
@@ -122,7 +125,8 @@ impl Spec {
             false => &[],
         };
         let teaches = |key: &str, value: &str| {
-            of_heuristics.contains(&key) || [ANY_HIT.key, OPEN.key, BY.key].contains(&key) && ["rays", "auto"].contains(&value)
+            of_heuristics.contains(&key)
+                || [ANY_HIT.key, OPEN.key, BY.key].contains(&key) && ["rays", "auto"].contains(&value)
         };
         let options = self.options.iter().filter(|(key, value)| !teaches(key, value)).cloned().collect();
         Spec { name: self.name.clone(), options }

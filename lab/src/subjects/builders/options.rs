@@ -116,7 +116,8 @@ impl Spec {
                 return Err(Error::Argument(format!("builder {self}: {what}")));
             }
             if any_hit.is_some_and(|order| order != AnyHitSpec::Rays) {
-                let what = "rounds by rays take an order of children away; take any-hit=near or any-hit=rays with by=rays";
+                let what =
+                    "rounds by rays take an order of children away; take any-hit=near or any-hit=rays with by=rays";
                 return Err(Error::Argument(format!("builder {self}: {what}")));
             }
         }
