@@ -67,8 +67,10 @@ mod kdtree {
 mod trace {
     mod counts;
     mod device;
+    mod flux;
     mod host;
     mod kd;
     mod kd_device;
+    mod trial;
     mod wide;
 }

@@ -6,16 +6,35 @@
 //   search   reads nodes, parents               writes moves, gains
 //   match    reads parents, moves, gains        writes firsts
 //   settle   reads parents, moves, firsts       writes moves: only those that are made are left
-//   move     reads moves                        writes nodes, parents
+//   move     reads moves                        writes nodes, parents; the header: children have no order any more
 //
 // The first once, the others in each round, for every link of which offset + k · stride is one.
+//
+// By rays (BY_RAYS) a box costs its area and, times a ratio, the rays that meet it on a grid (bvh/flux.glsl). There are two steps behind
+// the first, once, and search and move have the costs of boxes at links beside them:
+//
+//   (fill    writes totals: zero)
+//   totals   reads nodes, grid                  adds to totals: area and rays of all nodes
+//   links    reads nodes, grid, totals          writes costs; totals: the ratio, the root's cost
+//
+// To see what could be won and move nothing, in place of the others behind search:
+//
+//   gains    reads moves                        adds to sums
+//
+// Where a tree that is traced was changed, behind all:
+//
+//   depths   reads parents                      writes the header: the status, if it is deeper than tracers can walk
 //
 // needs  one barrier before, between each two, and after; any number of workgroups; any subgroup size
 #ifndef HEDGEROW_BVH_REINSERTION
 #define HEDGEROW_BVH_REINSERTION
 #include "gpu/grid.glsl"
 #include "bvh/layout.glsl"
+#include "bvh/flux.glsl"
 #include "bvh/sah.glsl"
+
+// Whether rays say where nodes cost least, beside areas.
+layout(constant_id = 3) const bool BY_RAYS = false;
 
 const uint NONE = 0xFFFFFFFFu;
 // Nodes that a path may have on either side.
@@ -36,13 +55,34 @@ layout(push_constant, scalar) uniform ReinsertionArguments {
     Moves moves;
     Words gains;        // of the moves across each node, the largest gain
     Words firsts;       // and of those with it, the complement of the smallest link
+    FluxGrid grid;
+    Floats costs;       // of the boxes at links
+    Words totals;       // TOTALS_…
+    Words sums;         // SUMS_…
     uint offset;
     uint stride;
     uint link_count;
+    float by_rays;      // what rays weigh in the whole tree's cost, its area being 1
 };
+
+// Words of the totals: two sums of 64 bits, and the bits of floats.
+const uint TOTALS_AREA = 0;
+const uint TOTALS_RAYS = 2;
+const uint TOTALS_RATIO = 4;
+const uint TOTALS_ROOT = 5;      // what the root costs
+
+// Words of what a probe finds, `Probed` in src/bvh/reinsertion.rs: 64 bits, a number, and the bits of a float.
+const uint SUMS_GAINS = 0;
+const uint SUMS_TRIED = 2;
+const uint SUMS_ROOT_AREA = 3;
 
 uint link_of(uint k) {
     return offset + k * stride;
+}
+
+// A compacted tree has fewer slots than were planned for; behind them lie records.
+bool is_used(uint slot) {
+    return slot < structure.header.node_slots && structure.nodes[slot].left.count != UNUSED;
 }
 
 // How many links the round tries.
@@ -63,9 +103,50 @@ Box around(Box a, Box b) {
     return Box(min(a.lo, b.lo), max(a.hi, b.hi));
 }
 
+// What a ray weighs against area.
+float ratio() {
+    return BY_RAYS ? uintBitsToFloat(totals.word[TOTALS_RATIO]) : 0.0;
+}
+
+// Of a node with this box.
+float cost_of(Box b, float scale, float of_rays) {
+    float area = scaled_half_area(b, scale);
+    if (!BY_RAYS) return area;
+    precise float cost = area + of_rays * flux_of(grid, b);
+    return cost;
+}
+
+// Of a node with the box of this child at a link.
+float cost_at(uint link, Child child, float scale) {
+    return BY_RAYS ? costs.value[link] : scaled_half_area(box_of(child), scale);
+}
+
 // The node above another.
 uint above(uint slot) {
     return parents.word[slot] >> 1;
+}
+
+Box box_of_node(uint slot) {
+    return around(box_of(structure.nodes[slot].left), box_of(structure.nodes[slot].right));
+}
+
+// A sum of 64 bits in two words.
+struct Sum64 {
+    uint low;
+    uint high;
+};
+
+void add_to(inout Sum64 sum, uint more) {
+    uint carry;
+    sum.low = uaddCarry(sum.low, more, carry);
+    sum.high += carry;
+}
+
+void add_to_words(Words words, uint at, Sum64 sum) {
+    if ((sum.low | sum.high) == 0u) return;
+    uint before = atomicAdd(words.word[at], sum.low);
+    uint carry = before > 0xFFFFFFFFu - sum.low ? 1u : 0u;
+    if (sum.high + carry != 0u) atomicAdd(words.word[at + 1u], sum.high + carry);
 }
 
 // The nodes that a move changes: from the parent up to the pivot, and to the node above the parent in any case; and from the new

@@ -8,14 +8,21 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Ra
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Hits { HedgerowHit hit[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Works { uvec3 work[]; };
 
+layout(buffer_reference, scalar, buffer_reference_align = 4) nonprivate buffer Sums { uint word[]; };
+
 layout(push_constant, scalar) uniform TraceArguments {
     Structure structure;
     Rays rays;
     Hits hits;
     Works works;
+    Sums sums;         // of trial/work.comp, as all behind rays_each: it takes a part of the rays, and adds up their work
     uint first;
     uint count;
     uint rays_each;
+    uint stride;
+    uint start;
+    uint c_t;
+    uint c_i;
 };
 
 bool can_be_traced(Structure structure) {

@@ -5,7 +5,7 @@
 //! 1. [`geometry`] is what a caller gives; [`split`] makes several references of a large triangle, if asked;
 //! 2. `encode` finds bounds, computes [`codes`] and sorts by them;
 //! 3. `lbvh`, `hlbvh`, `ploc` or `hploc` makes the tree; [`builder`] is where a caller chooses;
-//! 4. [`reinsertion`] makes it better, if asked;
+//! 4. [`reinsertion`] makes it better, if asked, by area or by the [`flux`] of rays;
 //! 5. `collapse` makes leaves where they are cheaper ([`sah`]) and orders the records: a [`layout::Bvh2`];
 //! 6. [`wide`] makes nodes of four or eight children of it, [`refit`] follows moved vertices, [`compact`] gives back room,
 //!    [`child_order`] says which child rays look into first that end at any hit.
@@ -21,6 +21,7 @@ pub mod counts;
 pub(crate) mod cover;
 pub(crate) mod encode;
 pub mod epo;
+pub mod flux;
 pub mod geometry;
 mod hlbvh;
 mod hploc;

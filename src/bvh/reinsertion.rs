@@ -18,13 +18,21 @@
 //! made up for by trying few links a round and more rounds ([`ReinsertionOptions::stride`]): what was tried, with figures, is
 //! in docs/notes/optimisation.md.
 //!
-//! The leaves of the tree have one record each; collapsing comes behind it and makes leaves of whatever is deeper than tracers can
-//! walk. The twin is [`Bvh2::reinserted`](super::layout::Bvh2::reinserted): the same bytes.
+//! What a node costs may be its area alone, or a mixture with the rays of a sample that meet its box ([`Cost::Rays`]): what rays have done
+//! lately is a better guess of the next frame than areas are. An engine records a few rounds a frame on a copy of the tree in use, and
+//! [`crate::trace::trial`] takes the copy where it takes less work. [`Reinsertion::record_probe`] asks what rounds would win, and moves
+//! nothing. docs/reinsertion.md has the whole way.
+//!
+//! The leaves of the tree that a builder optimises have one record each; collapsing comes behind it and makes leaves of whatever is deeper than tracers can
+//! walk. In a tree that is finished, leaves move as they are. The twins are [`Bvh2::reinserted`](super::layout::Bvh2::reinserted) and
+//! [`Bvh2::reinserted_by`](super::layout::Bvh2::reinserted_by): the same bytes.
 
+use super::flux::GRID_BYTES;
 use super::layout::{NODES_OFFSET, node_slots};
-use crate::Result;
 use crate::gpu::arguments;
 use crate::gpu::{Context, Grid, Kernel, Recorder, Region, Step, fill, shaders};
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
 use std::time::Duration;
 
 /// How much is done.
@@ -44,6 +52,8 @@ impl ReinsertionOptions {
     pub const MEDIUM: ReinsertionOptions = ReinsertionOptions::of_passes(2);
     /// Every link six times: more rounds gain little.
     pub const HIGH: ReinsertionOptions = ReinsertionOptions::of_passes(6);
+    /// A sixteenth of all links: what a probe looks at.
+    pub const PROBE: ReinsertionOptions = ReinsertionOptions { rounds: 4, stride: STRIDE };
 
     /// So many passes, of 64 rounds each where there are enough links.
     pub const fn of_passes(passes: u32) -> ReinsertionOptions {
@@ -70,6 +80,70 @@ impl ReinsertionOptions {
     }
 }
 
+/// What the node with a box costs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cost {
+    /// Its area.
+    Area,
+    /// Partly the rays that meet it.
+    Rays {
+        /// A grid that [`crate::trace::flux::FluxPass`] has filled, over the box of the same scene. Without rays in it the cost is the area.
+        grid: Region,
+        /// Which part of the whole tree's cost is by rays when rounds begin, from 0 to [`Cost::MOST`]. The rest is by area.
+        share: f32,
+    },
+}
+
+impl Cost {
+    /// A share of rays with which the next frame's rays took least work: docs/notes/reinsertion_by_rays.md.
+    pub const SHARE: f32 = 0.9;
+    /// The largest share. Boxes that no ray has met must not be free.
+    pub const MOST: f32 = 0.99;
+
+    /// Address of the grid, or 0, and what rays weigh in the whole tree's cost, the area being 1.
+    fn checked(&self) -> Result<(u64, f32)> {
+        match *self {
+            Cost::Area => Ok((0, 0.0)),
+            Cost::Rays { grid, share } => {
+                Ok((grid.checked("a grid of rays that teach reinsertion", GRID_BYTES, 16)?, weight_of(share)?))
+            }
+        }
+    }
+}
+
+/// What rays weigh in the whole tree's cost, its area being 1.
+///
+/// # Errors
+/// The share is not from 0 to [`Cost::MOST`].
+pub(super) fn weight_of(share: f32) -> Result<f32> {
+    if (0.0..=Cost::MOST).contains(&share) {
+        return Ok(share / (1.0 - share));
+    }
+    let most = Cost::MOST;
+    Err(Error::Argument(format!("a share of {share} by rays; take one from 0, which is by area, to {most}")))
+}
+
+/// What a search without moves has found.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Probed {
+    /// What the best moves gain, each for itself: scaled half areas of nodes, in parts of 2⁻³².
+    pub gains: u64,
+    /// Links that were looked at.
+    pub tried: u32,
+    /// Scaled half area of the root.
+    pub root_area: f32,
+}
+
+impl Probed {
+    /// What moves of all links of a tree with these node slots would gain, over the root's area; 0 of a tree without links. Moves stand in
+    /// each other's way: it is a measure of what a pass wins, and not in the same unit.
+    pub fn relative_gain(&self, node_slots: u32) -> f64 {
+        let parts = f64::from(self.tried) * f64::from(self.root_area) * 4_294_967_296.0;
+        if parts > 0.0 { self.gains as f64 * 2.0 * f64::from(node_slots) / parts } else { 0.0 }
+    }
+}
+
 /// Of [`ReinsertionOptions::of_passes`].
 const STRIDE: u32 = 64;
 /// Links that are not worth a round of less.
@@ -85,6 +159,8 @@ pub(super) const LEAST_GAIN: f32 = 1.0 / 1_152_921_504_606_846_976.0;
 
 /// Bytes of `Move` in reinsertion.glsl.
 const MOVE_BYTES: u64 = 12;
+/// Of two sums and a ratio by rays; a multiple of 16.
+const TOTALS_BYTES: u64 = 32;
 /// Bytes of an entry of a search's stack, `Below` in reinsertion_search.comp.
 const ENTRY_BYTES: u32 = 8;
 
@@ -94,6 +170,7 @@ pub struct Reinsertion {
     slots: u32,
     stride: u32,
     rounds: u32,
+    first_round: u32,
     grid: Grid,
     shared: u32,
 }
@@ -109,7 +186,18 @@ impl Reinsertion {
         let bytes = ENTRY_BYTES * tuning.small_group;
         let shared = tuning.build.reinsertion_shared.min(context.limits.shared_memory / bytes).min(STACK as u32);
         let slots = node_slots(primitive_count);
-        Reinsertion { slots, stride: options.stride_for(slots), rounds: options.rounds_for(slots), grid, shared }
+        let (stride, rounds) = (options.stride_for(slots), options.rounds_for(slots));
+        Reinsertion { slots, stride, rounds, first_round: 0, grid, shared }
+    }
+
+    /// The same from another round on: where a pass goes over many frames, the number of rounds that there were.
+    pub fn from_round(self, first_round: u32) -> Reinsertion {
+        Reinsertion { first_round: first_round % self.stride, ..self }
+    }
+
+    /// How many rounds are recorded: those of the options, and fewer where there are few links.
+    pub fn rounds(&self) -> u32 {
+        self.rounds
     }
 
     fn link_count(&self) -> u32 {
@@ -122,8 +210,17 @@ impl Reinsertion {
         12 * u64::from(self.slots) + MOVE_BYTES * moves
     }
 
-    fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
-        Kernel::new(shader, self.grid.workgroup, &[self.grid.rounds, self.shared])
+    /// Bytes of scratch memory by rays: 8 for each node slot more.
+    pub fn scratch_bytes_by_rays(&self) -> u64 {
+        self.scratch_bytes() + 4 * u64::from(self.link_count()) + TOTALS_BYTES
+    }
+
+    fn scratch_bytes_for(&self, cost: &Cost) -> u64 {
+        if *cost == Cost::Area { self.scratch_bytes() } else { self.scratch_bytes_by_rays() }
+    }
+
+    fn kernel(&self, shader: &'static shaders::Shader, by_rays: bool) -> Kernel {
+        Kernel::new(shader, self.grid.workgroup, &[self.grid.rounds, self.shared, by_rays.into()])
     }
 
     /// Records all rounds on `structure`, in place, with scratch memory of [`Reinsertion::scratch_bytes`]; both aligned
@@ -137,35 +234,148 @@ impl Reinsertion {
         recorder.chains(&[self.steps(structure, scratch)])
     }
 
+    /// Records all rounds on a finished tree, in place, with scratch memory of [`Reinsertion::scratch_bytes`], or of
+    /// [`Reinsertion::scratch_bytes_by_rays`] by [`Cost::Rays`]; all aligned to 16 bytes. The structure has as many primitives as was planned
+    /// for. No ray may be traced in it meanwhile.
+    ///
+    /// Nodes change and records do not. An order of children is lost, and the header says so. Its SAH cost stays as it was: a refit sets it.
+    /// A tree that becomes deeper than tracers can walk has the status [`TOO_DEEP`](super::layout::status::TOO_DEEP) and is traced as if it
+    /// were empty. So rounds go to a copy, which [`crate::trace::trial`] may refuse.
+    ///
+    /// Five dispatches a round with barriers between; the caller places one before and one behind. Label: `optimise`.
+    ///
+    /// # Errors
+    /// The memory is too small; the share is out of range; a pipeline could not be made.
+    pub fn record_rounds(
+        &self,
+        recorder: &mut Recorder<'_>,
+        structure: Region,
+        cost: &Cost,
+        scratch: Region,
+    ) -> Result<()> {
+        let structure = structure.checked("the BVH to optimise", NODES_OFFSET, 16)?;
+        let scratch = scratch.checked("scratch memory of an optimisation", self.scratch_bytes_for(cost), 16)?;
+        let run = self.run(structure, scratch, cost)?;
+        let rounds = (0..self.rounds).flat_map(|round| run.round(round));
+        let depths = run.step(&shaders::BVH_REINSERTION_DEPTHS, 0, self.slots);
+        recorder.chains(&[run.begin().into_iter().chain(rounds).chain([depths]).collect()])
+    }
+
+    /// Records a search that moves nothing, with scratch memory as of [`Reinsertion::record_rounds`]. It writes what it has found to
+    /// `found`, a [`Probed`] aligned to 8 bytes. [`ReinsertionOptions::PROBE`] looks at enough links: a sum over fewer does not say what a
+    /// pass would win.
+    ///
+    /// Two dispatches a round with barriers between; the caller places one before and one behind. Label: `probe`.
+    ///
+    /// # Errors
+    /// As [`Reinsertion::record_rounds`].
+    pub fn record_probe(
+        &self,
+        recorder: &mut Recorder<'_>,
+        structure: Region,
+        cost: &Cost,
+        scratch: Region,
+        found: Region,
+    ) -> Result<()> {
+        let structure = structure.checked("the BVH to probe", NODES_OFFSET, 16)?;
+        let scratch = scratch.checked("scratch memory of a probe", self.scratch_bytes_for(cost), 16)?;
+        let sums = found.checked("memory for what a probe finds", size_of::<Probed>() as u64, 8)?;
+        let run = Run { phase: "probe", sums, ..self.run(structure, scratch, cost)? };
+        let clear = fill::step(run.phase, sums, size_of::<Probed>() as u32 / 4, 0);
+        let offsets = self.probed_offsets();
+        let looks = offsets.flat_map(|offset| {
+            [&shaders::BVH_REINSERTION_SEARCH, &shaders::BVH_REINSERTION_GAINS]
+                .map(|shader| run.step(shader, offset, run.tried()))
+        });
+        recorder.chains(&[[clear].into_iter().chain(run.begin()).chain(looks).collect()])
+    }
+
+    /// The first links of the rounds of a probe.
+    fn probed_offsets(&self) -> impl Iterator<Item = u32> + use<> {
+        probed_offsets(self.rounds, self.stride)
+    }
+
     /// What [`Reinsertion::record`] records, with addresses that were checked.
     pub(super) fn steps(&self, structure: u64, scratch: u64) -> Vec<Step> {
-        let words = 4 * u64::from(self.slots);
-        let arguments = |offset: u32| arguments::Reinsertion {
+        let run = self.run(structure, scratch, &Cost::Area).expect("areas have nothing to check");
+        run.begin().into_iter().chain((0..self.rounds).flat_map(|round| run.round(round))).collect()
+    }
+
+    fn run(&self, structure: u64, scratch: u64, cost: &Cost) -> Result<Run> {
+        let (grid, by_rays) = cost.checked()?;
+        Ok(Run { of: *self, phase: "optimise", structure, scratch, grid, by_rays, sums: 0 })
+    }
+}
+
+/// The first links of the rounds of a probe: spread over all, left and right children.
+pub(super) fn probed_offsets(rounds: u32, stride: u32) -> impl Iterator<Item = u32> {
+    (0..rounds.min(stride)).map(move |k| 17 * k % stride)
+}
+
+/// Steps on a structure, with addresses that were checked.
+struct Run {
+    of: Reinsertion,
+    phase: &'static str,
+    structure: u64,
+    scratch: u64,
+    grid: u64,
+    by_rays: f32,
+    sums: u64,
+}
+
+impl Run {
+    fn arguments(&self, offset: u32) -> arguments::Reinsertion {
+        let Run { of, structure, scratch, grid, by_rays, sums, .. } = *self;
+        let words = 4 * u64::from(of.slots);
+        let behind = scratch + of.scratch_bytes();
+        arguments::Reinsertion {
             structure,
             parents: scratch,
             gains: scratch + words,
             firsts: scratch + 2 * words,
             moves: scratch + 3 * words,
+            grid,
+            costs: behind + TOTALS_BYTES,
+            totals: behind,
+            sums,
             offset,
-            stride: self.stride,
-            link_count: self.link_count(),
-        };
-        let step = |shader, offset, items| {
-            Step::new(PHASE, self.kernel(shader), &arguments(offset), self.grid.groups_for(items))
-        };
-        let tried = self.link_count().div_ceil(self.stride);
-        let round = |round: u32| {
-            let unlock = fill::step(PHASE, scratch + words, 2 * self.slots, 0);
-            [unlock].into_iter().chain(STEPS.map(|shader| step(shader, round % self.stride, tried)))
-        };
-        [step(&shaders::BVH_REINSERTION_PARENTS, 0, self.slots)]
-            .into_iter()
-            .chain((0..self.rounds).flat_map(round))
-            .collect()
+            stride: of.stride,
+            link_count: of.link_count(),
+            by_rays,
+        }
+    }
+
+    fn step(&self, shader: &'static shaders::Shader, offset: u32, items: u32) -> Step {
+        let kernel = self.of.kernel(shader, self.grid != 0);
+        Step::new(self.phase, kernel, &self.arguments(offset), self.of.grid.groups_for(items))
+    }
+
+    /// How many links a round tries.
+    fn tried(&self) -> u32 {
+        self.of.link_count().div_ceil(self.of.stride)
+    }
+
+    /// What comes before all rounds.
+    fn begin(&self) -> Vec<Step> {
+        let slots = self.of.slots;
+        let mut steps = vec![self.step(&shaders::BVH_REINSERTION_PARENTS, 0, slots)];
+        if self.grid != 0 {
+            let totals = self.arguments(0).totals;
+            steps.push(fill::step(self.phase, totals, (TOTALS_BYTES / 4) as u32, 0));
+            steps.push(self.step(&shaders::BVH_REINSERTION_TOTALS, 0, slots));
+            steps.push(self.step(&shaders::BVH_REINSERTION_LINKS, 0, 2 * slots));
+        }
+        steps
+    }
+
+    fn round(&self, round: u32) -> impl Iterator<Item = Step> {
+        let offset = (self.of.first_round + round) % self.of.stride;
+        let gains = self.arguments(0).gains;
+        let unlock = fill::step(self.phase, gains, 2 * self.of.slots, 0);
+        [unlock].into_iter().chain(STEPS.map(|shader| self.step(shader, offset, self.tried())))
     }
 }
 
-const PHASE: &str = "optimise";
 const STEPS: [&shaders::Shader; 4] = [
     &shaders::BVH_REINSERTION_SEARCH,
     &shaders::BVH_REINSERTION_MATCH,

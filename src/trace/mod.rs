@@ -7,15 +7,17 @@
 //! - [`ray`] prepares a ray: shear, reciprocals, error bounds;
 //! - [`determinant`], [`triangle`], [`slab`] are the arithmetic, each the twin of a file in `glsl/trace/`;
 //! - [`tracer`] traverses on the device, [`wide`] in wide trees, [`kd`] in kd-trees;
-//! - [`counts`] says where rays go in a tree;
+//! - [`counts`] says where rays go in a tree, [`flux`] where in space; [`trial`] takes the better of two trees;
 //! - [`twin`] does the same on the host.
 
 pub mod counts;
 pub mod determinant;
+pub mod flux;
 pub mod kd;
 pub mod ray;
 pub mod slab;
 pub mod tracer;
+pub mod trial;
 pub mod triangle;
 pub mod twin;
 pub mod wide;

@@ -206,9 +206,23 @@ pub(super) fn record_kernel(
     let rays_each = shape.rays_each_of(count);
     let group_rays = shape.workgroup * rays_each;
     let at_once = recorder.context().limits.workgroup_count.saturating_mul(group_rays);
+    let arguments = arguments::Trace {
+        structure,
+        rays,
+        hits,
+        works,
+        first: 0,
+        count,
+        rays_each,
+        stride: 1,
+        start: 0,
+        c_t: 0,
+        c_i: 0,
+        sums: 0,
+    };
     let mut first = 0;
     while first < count {
-        let arguments = arguments::Trace { structure, rays, hits, works, first, count, rays_each };
+        let arguments = arguments::Trace { first, ..arguments };
         recorder.dispatch(kernel, &arguments, (count - first).min(at_once).div_ceil(group_rays))?;
         first += at_once.min(count - first);
     }

@@ -6,15 +6,17 @@
 const uint STACK = 32;
 // Of those, the first that lie in shared memory: a GPU has an invocation's own arrays far away.
 layout(constant_id = 2) const uint SHARED_ENTRIES = 0;
-// A gain counts if it is more than this share of the pivot's area (less may be rounding) and more than this (less may be made of
+// A gain counts if it is more than this share of the pivot's cost (less may be rounding) and more than this (less may be made of
 // numbers that devices take for zero).
 const float LEAST_SHARE = 1.0 / 1048576.0;
 const float LEAST_GAIN = 1.0 / 1152921504606846976.0;
 
 struct Search {
     Box moving;
-    float moving_area;
+    float moving_cost;
     float scale;
+    float moving_by_rays;   // the part of its cost that is not its area
+    float of_rays;
     uint pivot;
     float least;     // what a gain must exceed at this pivot
     uint best_to;
@@ -46,23 +48,43 @@ float bar(Search s) {
     return max(s.best_gain, s.least);
 }
 
-// The new node has at least the area of what moves.
+// The new node has at least the cost of what moves.
 bool may_gain(Search s, Below b) {
-    precise float most = b.saved - s.moving_area;
+    precise float most = b.saved - s.moving_cost;
     return b.slot != NONE && most > bar(s);
+}
+
+// What would be saved below a child that a move has grown to this cost.
+Below below(uint at, Child child, float saved, float merged, Search s) {
+    precise float left = saved - (merged - cost_at(at, child, s.scale));
+    return Below(child.count == 0u ? child.index : NONE, left);
+}
+
+// What a box by rays costs at least, around what moves and a child of this cost: to ask the grid takes many times as long.
+float least_cost(Search s, Box merged, Child child, float cost) {
+    precise float by_rays = cost - scaled_half_area(box_of(child), s.scale);
+    precise float least = scaled_half_area(merged, s.scale) + max(by_rays, s.moving_by_rays);
+    return least;
 }
 
 // What a move to link `at`, where `child` hangs, would gain.
 Below look(inout Search s, uint at, Child child, float saved) {
-    float merged = scaled_half_area(around(box_of(child), s.moving), s.scale);
+    Box box = around(box_of(child), s.moving);
+    if (BY_RAYS) {
+        float own = costs.value[at];
+        float least = least_cost(s, box, child, own);
+        precise float most = saved - least;
+        precise float most_below = saved - (least - own) - s.moving_cost;
+        if (most <= bar(s) && (child.count != 0u || most_below <= bar(s))) return Below(NONE, 0.0);
+    }
+    float merged = cost_of(box, s.scale, s.of_rays);
     precise float gain = saved - merged;
     if (gain > bar(s)) {
         s.best_to = at;
         s.best_pivot = s.pivot;
         s.best_gain = gain;
     }
-    precise float below = saved - (merged - scaled_half_area(box_of(child), s.scale));
-    return Below(child.count == 0u ? child.index : NONE, below);
+    return below(at, child, saved, merged, s);
 }
 
 // Into the subtree on the other side of the pivot.
@@ -97,18 +119,26 @@ bool is_path_walkable(uint to, uint pivot) {
     return false;
 }
 
+// Of a node, by rays.
+float known_cost(uint slot, uint root) {
+    return slot == root ? uintBitsToFloat(totals.word[TOTALS_ROOT]) : costs.value[parents.word[slot]];
+}
+
 Move search(uint link) {
     uint parent = link >> 1, root = structure.header.root.index;
     Move none = Move(NONE, NONE, 0u);
-    if (structure.nodes[parent].left.count == UNUSED || parent == root) return none;
+    if (!is_used(parent) || parent == root) return none;
     Search s;
     s.moving = box_of(child_at(link));
     s.scale = structure.header.area_scale;
-    s.moving_area = scaled_half_area(s.moving, s.scale);
+    s.of_rays = ratio();
+    s.moving_cost = cost_at(link, child_at(link), s.scale);
+    precise float moving_by_rays = s.moving_cost - scaled_half_area(s.moving, s.scale);
+    s.moving_by_rays = moving_by_rays;
     s.best_to = NONE;
     s.best_pivot = NONE;
     s.best_gain = 0.0;
-    // What all nodes shorten by, less the area of a new one; so far, the parent's area.
+    // What all nodes cost less, without a new one; so far, the parent's cost.
     precise float saved = 0.0;
     // What is left below the pivot on the side that the subtree leaves.
     Box left_behind;
@@ -117,17 +147,22 @@ Move search(uint link) {
         s.pivot = at >> 1;
         Node node = structure.nodes[s.pivot];
         Child other = (at & 1u) == 0u ? node.right : node.left;
-        float pivot_area = scaled_half_area(around(box_of(node.left), box_of(node.right)), s.scale);
-        if (level == 0u) saved = pivot_area;
-        s.least = max(LEAST_SHARE * pivot_area, LEAST_GAIN);
-        Below next = look(s, at ^ 1u, other, saved);
+        Box pivot_box = around(box_of(node.left), box_of(node.right));
+        float pivot_cost = BY_RAYS ? known_cost(s.pivot, root) : scaled_half_area(pivot_box, s.scale);
+        if (level == 0u) saved = pivot_cost;
+        s.least = max(LEAST_SHARE * pivot_cost, LEAST_GAIN);
+        // A move beside the own sibling would tie a cycle. It is never looked at: the box around both is the parent's.
+        Below next;
+        if (level == 0u) next = below(at ^ 1u, other, saved, pivot_cost, s);
+        else next = look(s, at ^ 1u, other, saved);
         search_below(s, next);
         if (s.pivot == root) break;
         if (level == 0u) {
             left_behind = box_of(other);
         } else {
             left_behind = around(left_behind, box_of(other));
-            saved = saved + (pivot_area - scaled_half_area(left_behind, s.scale));
+            // What is inside of a box, and does not touch its faces, leaves it as it is.
+            if (!BY_RAYS || left_behind != pivot_box) saved = saved + (pivot_cost - cost_of(left_behind, s.scale, s.of_rays));
         }
         at = parents.word[s.pivot];
     }

@@ -1,28 +1,32 @@
-//! Whether rays can teach reinsertion where to move subtrees: work of the next frame's rays, over that after as many rounds by area.
+//! What rays win that teach reinsertion, on the device: work of the next frame's rays, over that after as many rounds by area.
 //!
-//! reinsertion_by_rays SCENE,… WAY,… [ROUNDS [PASSES]]: after so many passes by area, so many rounds in each way. A way is area,
-//! density:SHARE, clamped:SHARE, union:SHARE[:EVERY], flux:SHARE:CELLS or exact:SHARE:RAYS.
+//! reinsertion_by_rays SCENE,… SHARE,… [ROUNDS [PASSES]]: an H-PLOC after so many passes by area, finished; on copies of it so many rounds
+//! by area and by each share of rays. Or reinsertion_by_rays ANIMATION,… probe EVERY PASSES.
 
-mod flux;
 mod frames;
-mod measures;
 mod probe;
-mod search;
 
-use flux::Flux;
-use frames::{Sample, later, rays_of, work};
-use hedgerow::bvh::builder::Window;
+use frames::{Frame, later, rays_of};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Method, Window};
 use hedgerow::bvh::codes::Code;
-use hedgerow::bvh::layout::Bvh2;
-use hedgerow::bvh::reinsertion::ReinsertionOptions;
+use hedgerow::bvh::flux::GRID_BYTES;
+use hedgerow::bvh::layout::{Bvh2, Triangle};
+use hedgerow::bvh::reinsertion::{Cost, Probed, Reinsertion, ReinsertionOptions};
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::bvh::twin::{hploc, lbvh, quality};
+use hedgerow::bvh::twin::quality;
+use hedgerow::gpu::{Recorder, Timestamps, TuningChoice};
+use hedgerow::trace::flux::{FluxPass, FluxRays};
+use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
+use hedgerow::trace::{Hit, Query, Ray, Work};
+use hedgerow_lab::Result;
+use hedgerow_lab::device::{Buffer, Device, DeviceOptions};
 use hedgerow_lab::scene::{LoadOptions, Scene, load};
-use measures::{Area, ByFlux, Counts, Exact, Rule};
-use search::{LinkedTree, Measure};
-use std::time::Instant;
+use hedgerow_lab::subjects::build_memory::DeviceMesh;
 
-fn main() {
+/// Rays that teach, at most.
+const TEACHING: usize = 1 << 18;
+
+fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number =
         |at: usize, otherwise: u32| arguments.get(at).map_or(otherwise, |text| text.parse().expect("a number"));
@@ -30,92 +34,145 @@ fn main() {
     if arguments[1] == "probe" {
         // The frames between those that are looked at, and the passes at the build.
         arguments[0].split(',').for_each(|name| probe::run(name, before, rounds as usize));
-        return;
+        return Ok(());
     }
-    let ways: Vec<&str> = arguments[1].split(',').collect();
+    let device = Device::new(&DeviceOptions { tuning: TuningChoice::Auto, ..DeviceOptions::default() })?;
+    let shares: Vec<f32> = arguments[1].split(',').map(|text| text.parse().expect("a share")).collect();
     for name in arguments[0].split(',') {
         let folders = std::env::var_os("HEDGEROW_SCENES").map(Into::into).into_iter().collect();
-        let scene = load(name, &LoadOptions { folders, ..LoadOptions::default() }).expect("a scene");
-        run(&scene, &ways, rounds, before);
+        let scene = load(name, &LoadOptions { folders, ..LoadOptions::default() })?;
+        run(&device, &scene, &shares, rounds, before)?;
     }
+    Ok(())
 }
 
-fn run(scene: &Scene, ways: &[&str], rounds: u32, before: u32) {
-    let mesh = &scene.mesh;
-    let radix = lbvh::build(&mesh.positions, &mesh.triangles, Code::Mc63.full(), Collapse::OFF);
-    let start = hploc::build(&radix, Window::DEFAULT);
-    let start = start.reinserted(&ReinsertionOptions::of_passes(before));
-    let finished = start.collapsed(&Collapse::SAH);
-    let bounds = mesh.bounds();
-    let frame = |steps: f32, size, seed| rays_of(scene, &finished, later(&scene.camera, &bounds, steps), size, seed);
-    let teacher = Sample::new(&frame(0.0, [320, 180], 77), 1 << 18);
+fn run(device: &Device, scene: &Scene, shares: &[f32], rounds: u32, before: u32) -> Result<()> {
+    let built = built(device, scene, before)?;
+    let bounds = scene.mesh.bounds();
+    let frame = |steps: f32, size, seed| rays_of(scene, &built, later(&scene.camera, &bounds, steps), size, seed);
+    let teacher = frame(0.0, [320, 180], 77);
     // The same picture with other rays; the next frame; one further on.
     let tested = [frame(0.0, [160, 120], 1), frame(1.0, [160, 120], 2), frame(4.0, [160, 120], 3)];
+    let count = built.header.primitive_count;
+    let options = ReinsertionOptions { rounds, ..ReinsertionOptions::FAST };
+    let pass = Reinsertion::new(device, &options, count);
+    let probe = Reinsertion::new(device, &ReinsertionOptions::PROBE, count);
+    let scratch = device.buffer("scratch", pass.scratch_bytes_by_rays().max(probe.scratch_bytes_by_rays()))?;
+    let grid = device.buffer("grid", GRID_BYTES)?;
+    let found = device.buffer("found", size_of::<Probed>() as u64)?;
+    let samples = taught(device, &built, &teacher)?;
+    let teaching: u32 = samples.iter().map(|(count, ..)| count).sum();
     println!(
-        "{}: {} triangles, {} rays teach, {rounds} rounds after {before} passes",
+        "{}: {count} triangles, {teaching} rays teach, {} rounds after {before} passes",
         scene.name,
-        mesh.triangles.len(),
-        teacher.rays.len()
+        pass.rounds()
     );
-    let start_work = tested.each_ref().map(|frame| work(&finished, frame).iter().sum::<f64>());
-    let mut by_area: Option<[Vec<f64>; 3]> = None;
-    for way in ways {
-        let begun = Instant::now();
-        let tree = taught(&start, way, rounds, &teacher);
-        if *way == "area" && rounds.is_multiple_of(64) && start.nodes.len() > 8192 {
-            let options = ReinsertionOptions::of_passes(rounds / 64);
-            assert!(tree.nodes == start.reinserted(&options).nodes, "the search is not the library's");
-        }
-        let seconds = begun.elapsed().as_secs_f64();
-        let tree = tree.collapsed(&Collapse::SAH);
-        let works = tested.each_ref().map(|frame| work(&tree, frame));
-        let by_area = by_area.get_or_insert_with(|| works.clone());
-        let total = |k: usize| works[k].iter().sum::<f64>() / by_area[k].iter().sum::<f64>();
-        let kinds: Vec<String> = works[1].iter().zip(&by_area[1]).map(|(a, b)| format!("{:.3}", a / b)).collect();
+    let start: Vec<f64> = tested.iter().map(|frame| total(&works(device, &built, frame)?)).collect::<Result<_>>()?;
+    let mut by_area: Option<Vec<Vec<f64>>> = None;
+    for share in [None].into_iter().chain(shares.iter().copied().map(Some)) {
+        let copy = device.upload("a copy", &built.to_bytes())?;
+        let cost = share.map_or(Cost::Area, |share| Cost::Rays { grid: grid.region(), share });
+        let rays: Vec<FluxRays> = samples
+            .iter()
+            .map(|(ray_count, rays, hits)| FluxRays {
+                rays: rays.region(),
+                hits: hits.region(),
+                ray_count: *ray_count,
+                first: 0,
+                stride: 1,
+            })
+            .collect();
+        let fill =
+            |recorder: &mut Recorder<'_>| FluxPass::new(device).record(recorder, copy.region(), &rays, grid.region());
+        // Once to make pipelines, and once to be timed.
+        let _ = milliseconds(device, fill)?;
+        let filling = milliseconds(device, fill)?;
+        let probes =
+            |r: &mut Recorder<'_>| probe.record_probe(r, copy.region(), &cost, scratch.region(), found.region());
+        let _ = milliseconds(device, probes)?;
+        let probing = milliseconds(device, probes)?;
+        let optimising = milliseconds(device, |r| pass.record_rounds(r, copy.region(), &cost, scratch.region()))?;
+        let probed: Probed = found.read(1)[0];
+        let tree = Bvh2::<Triangle>::from_bytes(&copy.read::<u8>(built.to_bytes().len()))?;
+        tree.validate()?;
+        let now: Vec<Vec<f64>> = tested.iter().map(|frame| works(device, &tree, frame)).collect::<Result<_>>()?;
+        let by_area = by_area.get_or_insert_with(|| now.clone());
+        let sum = |work: &Vec<f64>| work.iter().sum::<f64>();
+        let ratio = |k: usize| sum(&now[k]) / sum(&by_area[k]);
+        let kinds: Vec<String> = now[1].iter().zip(&by_area[1]).map(|(a, b)| format!("{:.3}", a / b)).collect();
+        let way = share.map_or("area".to_owned(), |share| format!("rays, {share}"));
         println!(
-            "  {way:24} same {:.3}  next {:.3}  further {:.3}  next by kind {}  next over start {:.3}  sah {:.2}  {seconds:.1} s",
-            total(0),
-            total(1),
-            total(2),
+            "  {way:10} same {:.3}  next {:.3}  further {:.3}  next by kind {}  next over start {:.3}  sah {:.2}  flux {filling:.1} ms  \
+             rounds {optimising:.0} ms  probe {probing:.1} ms, {:.4}",
+            ratio(0),
+            ratio(1),
+            ratio(2),
             kinds.join(" "),
-            works[1].iter().sum::<f64>() / start_work[1],
+            sum(&now[1]) / start[1],
             quality::of(&tree, 3.0, 2.0).sah,
+            probed.relative_gain(tree.header.node_slots),
         );
     }
+    Ok(())
 }
 
-fn taught(start: &Bvh2, way: &str, rounds: u32, teacher: &Sample) -> Bvh2 {
-    let words: Vec<&str> = way.split(':').collect();
-    let number = |at: usize, otherwise: f32| words.get(at).map_or(otherwise, |text| text.parse().expect("a number"));
-    let share = number(1, 0.5);
-    let counts = |rule| Counts::new(teacher, rule, share, number(2, 8.0) as u32);
-    let few = |rays: f32| {
-        let stride = teacher.rays.len().div_ceil(rays as usize).max(1);
-        Sample { rays: teacher.rays.iter().step_by(stride).copied().collect() }
+/// An H-PLOC with leaves as they are cheapest.
+fn built(device: &Device, scene: &Scene, passes: u32) -> Result<Bvh2> {
+    let options = BuildOptions {
+        method: Method::Hploc(Window::DEFAULT),
+        codes: Some(Code::Mc63.full()),
+        optimise: (passes > 0).then(|| ReinsertionOptions::of_passes(passes)),
+        collapse: Collapse::SAH,
+        ..BuildOptions::DEFAULT
     };
-    match words[0] {
-        "area" => optimised(start, &mut Area::default(), rounds),
-        "density" => optimised(start, &mut counts(Rule::Density), rounds),
-        "clamped" => optimised(start, &mut counts(Rule::Clamped), rounds),
-        "union" => optimised(start, &mut counts(Rule::Union), rounds),
-        "flux" => {
-            let flux = Flux::new(&teacher.segments(start), &start.header.root.bounds(), number(2, 64.0) as usize);
-            let nodes = Vec::new();
-            optimised(start, &mut ByFlux { flux: &flux, share, by_area: 1.0, by_rays: 0.0, nodes }, rounds)
-        }
-        "exact" => {
-            let segments = few(number(2, 16384.0)).segments(start);
-            optimised(start, &mut Exact::new(&segments, share), rounds)
-        }
-        other => panic!("{other}: no such way"),
-    }
+    let mesh = DeviceMesh::new(device, &scene.mesh.positions, &scene.mesh.triangles)?;
+    let builder = Builder::new(device, &options, scene.mesh.triangles.len() as u32)?;
+    let sizes = builder.sizes();
+    let structure = device.buffer("structure", sizes.structure)?;
+    let scratch = device.buffer("scratch", sizes.scratch)?;
+    device.run(None, |r| builder.record(r, &mesh.input, structure.region(), scratch.region()))?;
+    Ok(Bvh2::from_bytes(&structure.read::<u8>(sizes.structure as usize))?)
 }
 
-fn optimised(start: &Bvh2, measure: &mut impl Measure, rounds: u32) -> Bvh2 {
-    let mut work = LinkedTree::new(start.clone());
-    let rounds = rounds * work.stride() / 64;
-    for round in 0..rounds {
-        work.round(measure, round);
-    }
-    work.tree
+/// Rays that teach with their closest hits, kind by kind: every so many of a frame.
+fn taught<'a>(device: &'a Device, tree: &Bvh2, frame: &Frame) -> Result<Vec<(u32, Buffer<'a>, Buffer<'a>)>> {
+    let all: usize = frame.iter().map(|(_, rays)| rays.len()).sum();
+    let stride = all.div_ceil(TEACHING).max(1);
+    let of_kind = |(_, rays): &(Query, Vec<Ray>)| {
+        let rays: Vec<Ray> = rays.iter().step_by(stride).copied().collect();
+        let hits = frames::closest(tree, &rays);
+        Ok((rays.len() as u32, device.upload("rays", &rays)?, device.upload("hits", &hits)?))
+    };
+    frame.iter().map(of_kind).collect()
+}
+
+/// 3 a step and 2 a test of all rays, by kind.
+fn works(device: &Device, tree: &Bvh2, frame: &Frame) -> Result<Vec<f64>> {
+    let structure = device.upload("structure", &tree.to_bytes())?;
+    let of_kind = |(query, rays): &(Query, Vec<Ray>)| {
+        let uploaded = device.upload("rays", rays)?;
+        let hits = device.buffer("hits", (rays.len() * size_of::<Hit>()) as u64)?;
+        let work = device.buffer("work", (rays.len() * size_of::<Work>()) as u64)?;
+        let buffers = TraceBuffers {
+            structure: structure.address(),
+            rays: uploaded.region(),
+            hits: hits.region(),
+            work: Some(work.region()),
+            count: rays.len() as u32,
+        };
+        device.run(None, |r| tracer::record(r, &TraceShape::of(device), *query, &buffers))?;
+        let all: Vec<Work> = work.read(rays.len());
+        Ok(all.iter().map(|work| f64::from(3 * work.steps + 2 * work.tests)).sum())
+    };
+    frame.iter().map(of_kind).collect()
+}
+
+fn total(work: &[f64]) -> Result<f64> {
+    Ok(work.iter().sum())
+}
+
+fn milliseconds(device: &Device, record: impl FnOnce(&mut Recorder<'_>) -> hedgerow::Result<()>) -> Result<f64> {
+    let mut timestamps = Timestamps::new(device, 4)?;
+    device.run(Some(&mut timestamps), record)?;
+    Ok(timestamps.phases()?.iter().map(|phase| phase.milliseconds).sum())
 }

@@ -1,43 +1,14 @@
 //! Whether a search without moves says what a pass of reinsertion would win, in trees that were refitted for some frames.
 
 use super::frames::{rays_of, work};
-use super::measures::Area;
-use super::search::{LinkedTree, Measure, Move};
 use hedgerow::bvh::builder::Window;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::reinsertion::CostOnHost;
 use hedgerow::bvh::twin::{hploc, lbvh, quality, refit};
 use hedgerow_lab::scene::{LoadOptions, Scene, load_animation};
-
-/// Sums of gains that a search finds, for all links, over the root's area.
-#[derive(Clone, Copy, Default)]
-struct Probed {
-    /// Of the best moves of the links of a round.
-    best: f64,
-    /// Of those that would be made.
-    made: f64,
-    /// Of the best moves of the links of four rounds.
-    best_of_four: f64,
-    /// Of those that would be made, each round for itself.
-    made_of_four: f64,
-}
-
-fn probed(tree: &Bvh2) -> Probed {
-    let linked = LinkedTree::new(tree.clone());
-    let mut area = Area::default();
-    area.prepare(&linked, 0);
-    let stride = linked.stride();
-    let unit = f64::from(stride) / f64::from(linked.area(&tree.header.root.bounds()));
-    let sum = |moves: &[Move]| unit * moves.iter().map(|m| f64::from(m.gain)).sum::<f64>();
-    let rounds: [[f64; 2]; 4] = std::array::from_fn(|k| {
-        let moves = linked.moves(&area, 17 * k as u32 % stride, stride);
-        [sum(&moves), sum(&linked.settled(&moves))]
-    });
-    let mean = |i: usize| rounds.iter().map(|round| round[i]).sum::<f64>() / 4.0;
-    Probed { best: rounds[0][0], made: rounds[0][1], best_of_four: mean(0), made_of_four: mean(1) }
-}
 
 /// A line a frame: what was probed, what a pass wins in the cost of steps and in work, and how the cost has grown.
 pub fn run(name: &str, passes: u32, every: usize) {
@@ -49,7 +20,7 @@ pub fn run(name: &str, passes: u32, every: usize) {
     let mut tree = start.collapsed(&Collapse::SAH);
     let first = quality::of(&tree, 3.0, 2.0).sah;
     println!("{name}: {} triangles, {} frames, {passes} passes at the build", triangles.len(), animation.frames.len());
-    let mut rows: Vec<[f64; 7]> = Vec::new();
+    let mut rows: Vec<[f64; 4]> = Vec::new();
     for number in (0..animation.frames.len()).step_by(every) {
         let mesh = animation.mesh(number);
         refit::refit_corners(&mut tree, lbvh::corners(&mesh.positions, &mesh.triangles), Collapse::SAH);
@@ -57,21 +28,19 @@ pub fn run(name: &str, passes: u32, every: usize) {
         let better = tree.reinserted(&ReinsertionOptions::FAST);
         let scene = Scene { name: name.to_owned(), mesh, camera: animation.camera, lights: Vec::new() };
         let frame = rays_of(&scene, &tree, animation.camera, [120, 90], 1);
-        let total = |tree: &Bvh2| work(tree, &frame).iter().sum::<f64>();
         let (before, after) = (sah(&tree), sah(&better));
-        let (work_before, work_after) = (total(&tree), total(&better));
-        let Probed { best, made, best_of_four, made_of_four } = probed(&tree);
-        let [best, made, best_of_four, made_of_four] =
-            [best, made, best_of_four, made_of_four].map(|x| 3.0 * x / before);
+        let (work_before, work_after) = (work(&tree, &frame), work(&better, &frame));
+        let probed = tree.probed(&ReinsertionOptions::PROBE, &CostOnHost::Area).expect("areas");
+        let gain = 3.0 * probed.relative_gain(tree.header.node_slots) / before;
         let won = [(before - after) / before, (work_before - work_after) / work_before];
-        let row = [best, made, best_of_four, made_of_four, before / first - 1.0, won[0], won[1]];
+        let row = [gain, before / first - 1.0, won[0], won[1]];
         println!("  frame {number:3}  {}", row.map(|x| format!("{x:8.4}")).join(""));
         rows.push(row);
     }
-    let names = ["best", "made", "best of four", "made of four", "growth"];
+    let names = ["a 16th", "growth"];
     for (i, what) in names.iter().enumerate() {
         let r = |with: usize| correlation(&rows.iter().map(|row| [row[i], row[with]]).collect::<Vec<_>>());
-        println!("  {what:14} r with the cost that a pass wins {:.3}, with the work {:.3}", r(5), r(6));
+        println!("  {what:14} r with the cost that a pass wins {:.3}, with the work {:.3}", r(2), r(3));
     }
 }
 

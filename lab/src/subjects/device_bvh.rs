@@ -4,22 +4,25 @@ use super::any_hit::{AnyHit, ChildrenBy, TaughtOrder};
 use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::device_rays::DeviceRays;
 use super::queries::{self, QueryWork};
+use super::taught_rounds::TaughtRounds;
 use super::wide::{WidePlan, WideTree};
 use super::{BuildRun, Subject, joined_choices};
 use crate::Result;
 use crate::device::Device;
 use crate::measure::overlap::{self, Epo};
 use crate::measure::record;
+use crate::rays::sample::TeachingRays;
 use crate::scene::Mesh;
 use hedgerow::bvh::builder::{BuildOptions, Builder, Input};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::quality::{self, QualityFigures};
+use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::gpu::{Recorder, Timestamps};
 use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
-/// Phases of a build at most: split, reset and bounds, encode, sort, hierarchy, those of collapsing, rays, order, wide.
-const PHASES: u32 = 14;
+/// Phases of a build at most: split, reset and bounds, encode, sort, hierarchy, those of collapsing, rays, flux, optimise, order, wide.
+const PHASES: u32 = 18;
 
 /// How rays go through a tree that is built on the device.
 #[derive(Debug, Clone)]
@@ -40,6 +43,30 @@ struct BinaryWalk {
     is_ordered: bool,
 }
 
+/// What rays teach a finished tree, behind a build.
+struct Behind<'a> {
+    rounds: Option<TaughtRounds<'a>>,
+    /// Puts the children in an order.
+    order: Option<TaughtOrder<'a>>,
+}
+
+impl Behind<'_> {
+    fn scratch_bytes(&self) -> u64 {
+        let of_rounds = self.rounds.as_ref().map_or(0, TaughtRounds::scratch_bytes);
+        of_rounds.max(self.order.as_ref().map_or(0, TaughtOrder::scratch_bytes))
+    }
+}
+
+/// How a tree is traced, and what rays teach it.
+pub struct Teaching<'t> {
+    /// How rays go through it.
+    pub walk: &'t Walk,
+    /// How rays go that end at any hit.
+    pub any_hit: &'t AnyHit,
+    /// Rays that teach rounds of reinsertion, which are not in the options of the build then.
+    pub rounds: Option<(&'t TeachingRays, ReinsertionOptions)>,
+}
+
 /// A scene in our `Bvh2`, or in a wide tree made of it, built and traced on the device.
 pub struct DeviceBvh<'a> {
     device: &'a Device,
@@ -52,8 +79,7 @@ pub struct DeviceBvh<'a> {
     memory: BuildMemory<'a>,
     wide: Option<WideTree<'a>>,
     binary: BinaryWalk,
-    /// Puts the children in an order that rays teach, behind a build.
-    taught_order: Option<TaughtOrder<'a>>,
+    taught: Behind<'a>,
     timestamps: Timestamps,
     rays: DeviceRays<'a>,
 }
@@ -68,7 +94,7 @@ impl<'a> DeviceBvh<'a> {
         builder: &str,
         mesh: &Mesh,
         options: &BuildOptions,
-        (walk, any_hit): (&Walk, &AnyHit),
+        Teaching { walk, any_hit, rounds }: Teaching<'_>,
     ) -> Result<DeviceBvh<'a>> {
         let count = u32::try_from(mesh.triangles.len()).unwrap_or(u32::MAX);
         let (child_order, teaching) = match &any_hit.order {
@@ -79,10 +105,14 @@ impl<'a> DeviceBvh<'a> {
         let options = &BuildOptions { child_order, ..*options };
         let bvh = Builder::new(device, options, count)?;
         let taught = |rays| TaughtOrder::new(device, rays, options.collapse, bvh.record_count());
-        let taught_order = teaching.map(|rays| taught(rays)).transpose()?;
+        let of_rounds = |(rays, options): (_, _)| TaughtRounds::new(device, rays, &options, bvh.record_count());
+        let taught = Behind {
+            rounds: rounds.map(of_rounds).transpose()?,
+            order: teaching.map(|rays| taught(rays)).transpose()?,
+        };
         let mut sizes = bvh.sizes();
         // The build is done with its scratch memory by then.
-        sizes.scratch = sizes.scratch.max(taught_order.as_ref().map_or(0, TaughtOrder::scratch_bytes));
+        sizes.scratch = sizes.scratch.max(taught.scratch_bytes());
         let mesh_bytes = size_of_val(&mesh.positions[..]) + size_of_val(&mesh.triangles[..]);
         check_memory(device, builder, count, mesh_bytes as u64 + sizes.structure + sizes.scratch)?;
         let mesh = DeviceMesh::new(device, &mesh.positions, &mesh.triangles)?;
@@ -92,14 +122,14 @@ impl<'a> DeviceBvh<'a> {
             Walk::Tracer | Walk::Query => None,
         };
         let mut warming = Recorder::warming(device);
-        record_build(&mut warming, &bvh, (taught_order.as_ref(), wide.as_ref()), &mesh.input, &memory)?;
+        record_build(&mut warming, &bvh, (&taught, wide.as_ref()), &mesh.input, &memory)?;
         Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
             choice: joined_choices([choice_of(options, &bvh), any_hit.choice.clone()]),
             wide,
             binary: BinaryWalk { by_query: matches!(walk, Walk::Query), is_ordered: any_hit.order.is_some() },
-            taught_order,
+            taught,
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,
             mesh,
@@ -114,20 +144,25 @@ impl<'a> DeviceBvh<'a> {
     }
 }
 
-/// Records the build of the `Bvh2`, the order of its children if rays teach one, and the wide tree if there shall be one.
+/// Records the build of the `Bvh2`, what rays teach it, and the wide tree if there shall be one.
 fn record_build(
     recorder: &mut Recorder<'_>,
     bvh: &Builder,
-    (taught_order, wide): (Option<&TaughtOrder<'_>>, Option<&WideTree<'_>>),
+    (taught, wide): (&Behind<'_>, Option<&WideTree<'_>>),
     input: &Input,
     BuildMemory { structure, scratch, .. }: &BuildMemory<'_>,
 ) -> hedgerow::Result<()> {
     bvh.record(recorder, input, structure.region(), scratch.region())?;
-    if let Some(order) = taught_order {
+    if let Some(rounds) = &taught.rounds {
+        recorder.barrier();
+        rounds.record(recorder, structure.region(), scratch.region())?;
+    }
+    if let Some(order) = &taught.order {
         recorder.barrier();
         order.record(recorder, structure.region(), scratch.region())?;
     }
-    wide.map_or(Ok(()), |tree| tree.record(recorder, structure.region(), taught_order.map(TaughtOrder::counts)))
+    let counts = taught.order.as_ref().map(TaughtOrder::counts);
+    wide.map_or(Ok(()), |tree| tree.record(recorder, structure.region(), counts))
 }
 
 /// Records the tracing of the wide tree, where there is one, or of the `Bvh2`; the children of either may be in order.
@@ -189,7 +224,7 @@ impl Subject for DeviceBvh<'_> {
 
     fn build(&mut self) -> Result<BuildRun> {
         self.device.run(Some(&mut self.timestamps), |recorder| {
-            let behind = (self.taught_order.as_ref(), self.wide.as_ref());
+            let behind = (&self.taught, self.wide.as_ref());
             record_build(recorder, &self.bvh, behind, &self.mesh.input, &self.memory)
         })?;
         Ok(BuildRun::of(self.timestamps.phases()?))

@@ -20,6 +20,7 @@ pub mod queries;
 pub mod retraced;
 pub mod structures;
 pub mod taught;
+pub mod taught_rounds;
 pub mod wide;
 
 use crate::Result;

@@ -13,6 +13,6 @@ mod over;
 pub mod ploc;
 pub mod quality;
 pub mod refit;
-mod reinsertion;
+pub mod reinsertion;
 pub mod split;
 pub mod wide;

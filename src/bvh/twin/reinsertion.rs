@@ -1,7 +1,11 @@
 //! Parallel reinsertion, plainly: the twin of [`crate::bvh::reinsertion`], which describes the method.
 
-use crate::bvh::layout::{Bvh2, Child, Record};
-use crate::bvh::reinsertion::{LEAST_GAIN, LEAST_SHARE, PATH, ReinsertionOptions, STACK};
+use crate::Result;
+use crate::bvh::flux::{FluxGrid, quotient};
+use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Record, status};
+use crate::bvh::reinsertion::{
+    LEAST_GAIN, LEAST_SHARE, PATH, Probed, ReinsertionOptions, STACK, probed_offsets, weight_of,
+};
 use crate::geometry::Aabb;
 
 const NONE: u32 = u32::MAX;
@@ -15,17 +19,141 @@ struct Move {
     gain: f32,
 }
 
+/// What the node with a box costs, as [`crate::bvh::reinsertion::Cost`] says it on the device.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CostOnHost<'a> {
+    /// Its area.
+    Area,
+    /// Partly the rays that meet it.
+    Rays {
+        /// Of the rays.
+        grid: &'a FluxGrid,
+        /// Which part of the whole tree's cost is by rays.
+        share: f32,
+    },
+}
+
 impl<R: Record> Bvh2<R> {
     /// The tree, in which every leaf has one record, after the passes of `options`: the bytes of
     /// [`crate::bvh::reinsertion`].
     pub fn reinserted(&self, options: &ReinsertionOptions) -> Bvh2<R> {
-        let mut work = LinkedTree { parents: parents_of(self), tree: self.clone() };
+        let scale = self.header.area_scale;
+        self.after_rounds(options, 0, |bounds| bounds.scaled_half_area(scale), false)
+    }
+
+    /// The finished tree after the rounds of `options`, from `first_round` on: the bytes of
+    /// [`record_rounds`](crate::bvh::reinsertion::Reinsertion::record_rounds).
+    ///
+    /// # Errors
+    /// The share is out of range.
+    pub fn reinserted_by(
+        &self,
+        options: &ReinsertionOptions,
+        first_round: u32,
+        cost: &CostOnHost<'_>,
+    ) -> Result<Bvh2<R>> {
+        let by_rays = *cost != CostOnHost::Area;
+        let mut tree = self.after_rounds(options, first_round, self.cost_by(cost)?, by_rays);
+        if !tree.header.root.is_leaf() && tree.is_too_deep() {
+            tree.header.status |= status::TOO_DEEP;
+        }
+        Ok(tree)
+    }
+
+    /// What moves would gain: the numbers of [`record_probe`](crate::bvh::reinsertion::Reinsertion::record_probe).
+    ///
+    /// # Errors
+    /// The share is out of range.
+    pub fn probed(&self, options: &ReinsertionOptions, cost: &CostOnHost<'_>) -> Result<Probed> {
+        let work = LinkedTree {
+            parents: parents_of(self),
+            tree: self.clone(),
+            cost: self.cost_by(cost)?,
+            by_rays: *cost != CostOnHost::Area,
+        };
         let slots = self.nodes.len() as u32;
-        for round in 0..options.rounds_for(slots) {
-            work.round(round, options.stride_for(slots));
+        let stride = options.stride_for(slots);
+        let root_area = self.header.root.bounds().scaled_half_area(self.header.area_scale);
+        let mut probed = Probed { root_area, ..Probed::default() };
+        for link in probed_offsets(options.rounds_for(slots), stride)
+            .flat_map(|offset| (offset..2 * slots).step_by(stride as usize))
+        {
+            probed.tried += 1;
+            // Exact: a float below 2²⁴ has 32 bits behind the point at most that count.
+            probed.gains += work.search(link).map_or(0, |m| (f64::from(m.gain) * 4_294_967_296.0) as u64);
+        }
+        Ok(probed)
+    }
+
+    fn after_rounds(
+        &self,
+        options: &ReinsertionOptions,
+        first_round: u32,
+        cost: impl Fn(&Aabb) -> f32,
+        by_rays: bool,
+    ) -> Bvh2<R> {
+        let mut work = LinkedTree { parents: parents_of(self), tree: self.clone(), cost, by_rays };
+        let slots = self.nodes.len() as u32;
+        let (rounds, stride) = (options.rounds_for(slots), options.stride_for(slots));
+        for round in 0..rounds {
+            work.round(first_round % stride + round, stride);
+        }
+        if rounds > 0 {
+            work.tree.header.child_order = 0;
         }
         work.tree
     }
+
+    fn cost_by<'c>(&self, cost: &CostOnHost<'c>) -> Result<impl Fn(&Aabb) -> f32 + use<'c, R>> {
+        let scale = self.header.area_scale;
+        let (grid, ratio) = match *cost {
+            CostOnHost::Area => (None, 0.0),
+            CostOnHost::Rays { grid, share } => (Some(grid), self.ratio(grid, weight_of(share)?)),
+        };
+        Ok(move |bounds: &Aabb| {
+            let area = bounds.scaled_half_area(scale);
+            grid.map_or(area, |grid| area + ratio * grid.rays(bounds))
+        })
+    }
+
+    /// What the area of all nodes is to the rays that meet them, times `weight`. Without rays or area nothing.
+    fn ratio(&self, grid: &FluxGrid, weight: f32) -> f32 {
+        let boxes = self.nodes.iter().filter(|node| node.is_used());
+        let boxes = boxes.map(|node| node.children[0].bounds().union(&node.children[1].bounds()));
+        let (mut area, mut rays) = (0u64, 0u64);
+        for bounds in boxes {
+            area += (bounds.scaled_half_area(self.header.area_scale) * PARTS_OF_AREA) as u64;
+            rays += (grid.rays(&bounds) * PARTS_OF_RAYS) as u64;
+        }
+        if area == 0 || rays == 0 || weight == 0.0 {
+            return 0.0;
+        }
+        quotient(weight * leading(area, 1.0 / PARTS_OF_AREA), leading(rays, 1.0 / PARTS_OF_RAYS))
+    }
+
+    /// Whether a child is deeper than tracers can walk.
+    fn is_too_deep(&self) -> bool {
+        let mut open = vec![(self.header.root, 0)];
+        while let Some((child, depth)) = open.pop() {
+            if depth > MAX_DEPTH {
+                return true;
+            }
+            if !child.is_leaf() && self.header.active > 0 {
+                open.extend(self.nodes[child.index as usize].children.map(|below| (below, depth + 1)));
+            }
+        }
+        false
+    }
+}
+
+/// In which area and rays of all nodes are added up.
+const PARTS_OF_AREA: f32 = (1u64 << 24) as f32;
+const PARTS_OF_RAYS: f32 = 256.0;
+
+/// The first 24 bits of a sum, in its unit.
+fn leading(sum: u64, unit: f32) -> f32 {
+    let shift = (40 - sum.leading_zeros() as i32).max(0);
+    (sum >> shift) as f32 * unit * f32::from_bits((127 + shift as u32) << 23)
 }
 
 /// Of each slot, the link that names it.
@@ -39,12 +167,16 @@ fn parents_of<R: Record>(tree: &Bvh2<R>) -> Vec<u32> {
     parents
 }
 
-struct LinkedTree<R: Record> {
+struct LinkedTree<R: Record, C> {
     tree: Bvh2<R>,
     parents: Vec<u32>,
+    /// Of the node with a box.
+    cost: C,
+    /// Whether that takes a grid, which is asked where it must be.
+    by_rays: bool,
 }
 
-impl<R: Record> LinkedTree<R> {
+impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
     /// A round; how many subtrees it has moved.
     fn round(&mut self, round: u32, stride: u32) -> usize {
         let links = 2 * self.tree.nodes.len() as u32;
@@ -77,13 +209,19 @@ impl<R: Record> LinkedTree<R> {
         &mut self.tree.nodes[link as usize / 2].children[link as usize % 2]
     }
 
-    fn area(&self, bounds: &Aabb) -> f32 {
-        bounds.scaled_half_area(self.tree.header.area_scale)
+    fn cost(&self, bounds: &Aabb) -> f32 {
+        (self.cost)(bounds)
     }
 
     /// The box of the node in a slot.
     fn bounds(&self, slot: u32) -> Aabb {
         self.child(2 * slot).bounds().union(&self.child(2 * slot + 1).bounds())
+    }
+
+    /// The box by which the node in a slot has its cost. By rays costs are kept for what hangs from a link.
+    fn bounds_by(&self, slot: u32) -> Aabb {
+        let is_root = slot == self.tree.header.root.index;
+        if self.by_rays && !is_root { self.child(self.parents[slot as usize]).bounds() } else { self.bounds(slot) }
     }
 
     /// The node above another.
@@ -99,21 +237,22 @@ impl<R: Record> LinkedTree<R> {
         }
         let moving = self.child(link).bounds();
         let mut best = Move { link, to: NONE, pivot: NONE, gain: 0.0 };
-        // What all nodes shorten by, less the area of a new one; so far, the parent's area.
-        let mut saved = self.area(&self.bounds(parent));
+        // What all nodes cost less, without a new one; so far, the parent's cost.
+        let mut saved = self.cost(&self.bounds_by(parent));
         // What is left below the pivot on the side that the subtree leaves.
         let mut left_behind = Aabb::EMPTY;
         let mut at = link;
         for _ in 0..PATH {
             let pivot = at / 2;
-            let pivot_area = self.area(&self.bounds(pivot));
-            self.search_below(at ^ 1, pivot, saved, pivot_area, &moving, &mut best);
+            let pivot_cost = self.cost(&self.bounds_by(pivot));
+            self.search_below(at ^ 1, pivot, saved, pivot_cost, &moving, &mut best);
             if pivot == root {
                 break;
             }
             left_behind = left_behind.union(&self.child(at ^ 1).bounds());
-            if pivot != parent {
-                saved += pivot_area - self.area(&left_behind);
+            // What is inside of a box, and does not touch its faces, leaves it as it is.
+            if pivot != parent && !(self.by_rays && left_behind == self.bounds(pivot)) {
+                saved += pivot_cost - self.cost(&left_behind);
             }
             at = self.parents[pivot as usize];
         }
@@ -121,24 +260,40 @@ impl<R: Record> LinkedTree<R> {
     }
 
     /// Looks at the subtree at link `at`, on the other side of the pivot.
-    fn search_below(&self, at: u32, pivot: u32, saved: f32, pivot_area: f32, moving: &Aabb, best: &mut Move) {
-        let moving_area = self.area(moving);
-        let link = best.link;
-        let bar = |best: &Move| best.gain.max((LEAST_SHARE * pivot_area).max(LEAST_GAIN));
+    fn search_below(&self, at: u32, pivot: u32, saved: f32, pivot_cost: f32, moving: &Aabb, best: &mut Move) {
+        let moving_cost = self.cost(moving);
+        let scale = self.tree.header.area_scale;
+        let (link, by_rays) = (best.link, |bounds: &Aabb, cost: f32| cost - bounds.scaled_half_area(scale));
+        let bar = |best: &Move| best.gain.max((LEAST_SHARE * pivot_cost).max(LEAST_GAIN));
+        let below = |child: &Child, saved: f32, merged: f32| {
+            let left = saved - (merged - self.cost(&child.bounds()));
+            (if child.is_leaf() { NONE } else { child.index }, left)
+        };
         // What a move to `at` would gain; and of the node there, the slot and what would be saved if the move went below.
         let look = |at: u32, saved: f32, best: &mut Move| {
             let child = self.child(at);
-            let merged = self.area(&child.bounds().union(moving));
+            let bounds = child.bounds().union(moving);
+            if self.by_rays {
+                let own = self.cost(&child.bounds());
+                let least =
+                    bounds.scaled_half_area(scale) + by_rays(&child.bounds(), own).max(by_rays(moving, moving_cost));
+                let is_useless_below = child.is_leaf() || saved - (least - own) - moving_cost <= bar(best);
+                if saved - least <= bar(best) && is_useless_below {
+                    return (NONE, 0.0);
+                }
+            }
+            let merged = self.cost(&bounds);
             let gain = saved - merged;
             if gain > bar(best) {
                 *best = Move { link, to: at, pivot, gain };
             }
-            let below = saved - (merged - self.area(&child.bounds()));
-            (if child.is_leaf() { NONE } else { child.index }, below)
+            below(&child, saved, merged)
         };
-        // The new node has at least the area of what moves.
-        let may_gain = |(slot, saved): (u32, f32), best: &Move| slot != NONE && saved - moving_area > bar(best);
-        let mut stack = vec![look(at, saved, best)];
+        // The new node has at least the cost of what moves.
+        let may_gain = |(slot, saved): (u32, f32), best: &Move| slot != NONE && saved - moving_cost > bar(best);
+        // A move beside the own sibling would tie a cycle. It is never looked at: the box around both is the parent's.
+        let first = if at == link ^ 1 { below(&self.child(at), saved, pivot_cost) } else { look(at, saved, best) };
+        let mut stack = vec![first];
         while let Some(next) = stack.pop() {
             if !may_gain(next, best) {
                 continue;
@@ -211,5 +366,50 @@ impl<R: Record> LinkedTree<R> {
     fn set_box(&mut self, link: u32, bounds: &Aabb) {
         let child = self.child_mut(link);
         (child.lo, child.hi) = (bounds.lo, bounds.hi);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::codes::Code;
+    use crate::bvh::sah::Collapse;
+    use crate::bvh::twin::lbvh;
+    use std::cell::Cell;
+
+    /// A cost that is less each time that it is asked for has every move gain, and the one beside the own sibling first of all. Making that
+    /// move would hang the parent below itself.
+    #[test]
+    fn a_subtree_does_not_move_to_where_it_is() {
+        let corner = |i: usize| {
+            let [x, y, z] = [7919 * i % 101, 6101 * i % 97, 4001 * i % 89].map(|k| k as f32);
+            [[x, y, z], [x + 1.0, y, z], [x, y + 1.0, z]]
+        };
+        let positions: Vec<[f32; 3]> = (0..64).flat_map(corner).collect();
+        let triangles: Vec<[u32; 3]> = (0..64).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let tree = lbvh::build(&positions, &triangles, Code::Mc30.full(), Collapse::OFF);
+        let asked = Cell::new(0u32);
+        let falling = |_: &Aabb| {
+            asked.set(asked.get() + 1);
+            1.0 + 1.0 / asked.get() as f32
+        };
+        let work = LinkedTree { parents: parents_of(&tree), tree: tree.clone(), cost: falling, by_rays: false };
+        let mut moved = 0;
+        for link in 0..2 * tree.nodes.len() as u32 {
+            if let Some(m) = work.search(link) {
+                assert_ne!(m.to, link ^ 1, "link {link} stays where it is");
+                moved += 1;
+            }
+        }
+        assert!(moved > 10, "{moved} moves");
+    }
+
+    #[test]
+    fn a_sum_has_its_first_24_bits() {
+        for (sum, expected) in
+            [(1, 1.0), (0xFF_FFFF, 16_777_215.0), (0x1FF_FFFF, 33_554_430.0), (1 << 40, 1.099_511_6e12)]
+        {
+            assert_eq!(leading(sum, 1.0), expected);
+        }
     }
 }

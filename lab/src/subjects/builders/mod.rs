@@ -29,7 +29,7 @@ use crate::rays::sample::{self, TeachingRays};
 use crate::scene::{Mesh, Scene};
 use crate::{Error, Result};
 use host_options::{HEURISTIC, SAMPLE, TEACHING_RAYS, WEIGHT};
-use options::{ANY_HIT, OPEN, RAYS, TRACE, TRAVERSAL};
+use options::{ANY_HIT, BY, OPEN, RAYS, TRACE, TRAVERSAL};
 pub use plan::KdSpec;
 pub(crate) use plan::{BuilderPlan, TaughtTree};
 use std::fmt;
@@ -111,7 +111,10 @@ impl Spec {
     /// [`Error::Argument`] if an option has a value that the builder does not take.
     pub fn learns_from_a_view(&self) -> Result<bool> {
         let has_taught_order = matches!(self.any_hit()?, Some(AnyHitSpec::Rays | AnyHitSpec::Auto));
-        Ok(self.heuristic()?.learns_from_a_view() || has_taught_order || self.is_opened_by_rays()?)
+        Ok(self.heuristic()?.learns_from_a_view()
+            || has_taught_order
+            || self.is_opened_by_rays()?
+            || self.is_optimised_by_rays()?)
     }
 
     /// The same builder by areas alone.
@@ -122,7 +125,8 @@ impl Spec {
             false => &[],
         };
         let teaches = |key: &str, value: &str| {
-            of_heuristics.contains(&key) || [ANY_HIT.key, OPEN.key].contains(&key) && ["rays", "auto"].contains(&value)
+            of_heuristics.contains(&key)
+                || [ANY_HIT.key, OPEN.key, BY.key].contains(&key) && ["rays", "auto"].contains(&value)
         };
         let options = self.options.iter().filter(|(key, value)| !teaches(key, value)).cloned().collect();
         Spec { name: self.name.clone(), options }
@@ -139,14 +143,17 @@ impl Spec {
     fn lessons(&self, device: Option<&Device>, mesh: &Mesh, scene: Option<&Scene>) -> Result<Lessons> {
         let heuristic = self.heuristic()?.taught(scene)?;
         let rays = |kinds: &[RayKind]| {
-            let what = "it learns from rays, and there is only a mesh here; take bench, build, trace or render, or any-hit=opaque and \
-                        open=area";
+            let what = "it learns from rays, and there is only a mesh here; take bench, build, trace or render, or any-hit=opaque, \
+                        open=area and by=area";
             let scene = scene.ok_or_else(|| Error::Argument(format!("builder {self}: {what}")))?;
             TeachingRays::of(scene, kinds, sample::MOST_OF_KIND)
         };
         let mut tree = TaughtTree::default();
         if self.is_opened_by_rays()? {
             tree.opened_by = Some(Rc::new(rays(&sample::FRAME)?));
+        }
+        if self.is_optimised_by_rays()? {
+            tree.reinserted_by = Some(Rc::new(rays(&sample::FRAME)?));
         }
         let ordered = |order| AnyHit { order: Some(order), choice: None };
         tree.any_hit = match self.any_hit()? {
@@ -225,14 +232,14 @@ pub struct Lessons {
 impl Lessons {
     /// How many rays taught it, where they do one by one.
     pub fn rays(&self) -> Option<u64> {
-        let TaughtTree { any_hit, opened_by } = &self.tree;
+        let TaughtTree { any_hit, opened_by, reinserted_by } = &self.tree;
         let of_order = match &any_hit.order {
             Some(ChildrenBy::Rays(rays)) => Some(rays.len() as u64),
             _ => None,
         };
-        let of_nodes =
-            opened_by.as_ref().map(|teaching| teaching.by_kind.iter().map(|(_, rays)| rays.len() as u64).sum());
-        [self.heuristic.rays(), of_order, of_nodes].into_iter().flatten().reduce(|a, b| a + b)
+        let of_sample = |teaching: &Rc<TeachingRays>| teaching.by_kind.iter().map(|(_, rays)| rays.len() as u64).sum();
+        let [of_nodes, of_rounds] = [opened_by, reinserted_by].map(|sample| sample.as_ref().map(of_sample));
+        [self.heuristic.rays(), of_order, of_nodes, of_rounds].into_iter().flatten().reduce(|a, b| a + b)
     }
 
     /// How many triangles were seen, where that is what it learns.

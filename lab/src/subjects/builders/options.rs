@@ -49,6 +49,10 @@ pub(super) const OPTIMISE: BuilderOption = option(
     "optimise",
     "off, fast, medium, high, a number of passes of reinsertion, or on the device a time for it as in 20ms",
 );
+pub(super) const BY: BuilderOption = option(
+    "by",
+    "area, or rays (with optimise=): reinsertion moves subtrees of the finished tree to where few rays of the scene go",
+);
 pub(super) const BITS: BuilderOption = option("bits", "a number of bits that the codes of a treelet share");
 pub(super) const TREELET: BuilderOption = option("treelet", "a number of primitives at most, from 1");
 pub(super) const WINDOW: BuilderOption = option("window", "an even number of clusters from 4 to 64");
@@ -91,7 +95,7 @@ impl Spec {
         self.choice(&SCHEDULE, &all)
     }
 
-    /// Options `codes`, `split`, `optimise`, `collapse`, `schedule`, `width`, `order`, `any-hit` and `walk` of a builder
+    /// Options `codes`, `split`, `optimise`, `by`, `collapse`, `schedule`, `width`, `order`, `any-hit` and `walk` of a builder
     /// on the device.
     pub(super) fn on_device(&self, method: Method) -> Result<BuilderPlan> {
         method.check()?;
@@ -106,6 +110,17 @@ impl Spec {
             return Err(self.wrong_value(&OPEN, "rays"));
         }
         let any_hit = self.any_hit()?;
+        if self.is_optimised_by_rays()? {
+            if optimise.is_none() || time_to_optimise.is_some() {
+                let what = "by=rays is for a number of passes; take optimise=fast, medium, high or a number with it";
+                return Err(Error::Argument(format!("builder {self}: {what}")));
+            }
+            if any_hit.is_some_and(|order| order != AnyHitSpec::Rays) {
+                let what =
+                    "rounds by rays take an order of children away; take any-hit=near or any-hit=rays with by=rays";
+                return Err(Error::Argument(format!("builder {self}: {what}")));
+            }
+        }
         if any_hit == Some(AnyHitSpec::Built) {
             let what = "builders on the device have no order of children of their own; take any-hit=opaque";
             return Err(Error::Argument(format!("builder {self}: {what}")));
@@ -121,6 +136,11 @@ impl Spec {
     /// Option `open`: whether wide nodes are opened by visits of rays.
     pub(super) fn is_opened_by_rays(&self) -> Result<bool> {
         Ok(self.choice(&OPEN, &[("area", false), ("rays", true)])?.unwrap_or(false))
+    }
+
+    /// Option `by`: whether reinsertion learns from rays.
+    pub(super) fn is_optimised_by_rays(&self) -> Result<bool> {
+        Ok(self.choice(&BY, &[("area", false), ("rays", true)])?.unwrap_or(false))
     }
 
     /// Option `any-hit`: the order of children, if there is one.

@@ -7,7 +7,7 @@ use crate::rays::sample::TeachingRays;
 use crate::scene::Mesh;
 use crate::subjects::Subject;
 use crate::subjects::any_hit::AnyHit;
-use crate::subjects::device_bvh::{DeviceBvh, Walk};
+use crate::subjects::device_bvh::{DeviceBvh, Teaching, Walk};
 use crate::subjects::host::HostPlan;
 use crate::subjects::peers::driver::DriverPreference;
 #[cfg(feature = "peer-embree")]
@@ -71,6 +71,8 @@ pub(crate) struct TaughtTree {
     pub(crate) any_hit: AnyHit,
     /// Rays by whose visits wide nodes are opened, if not by area.
     pub(crate) opened_by: Option<Rc<TeachingRays>>,
+    /// Rays by whose flux rounds of reinsertion move subtrees of the finished tree, if not by area in that of single triangles.
+    pub(crate) reinserted_by: Option<Rc<TeachingRays>>,
 }
 
 /// A builder of ours on the device.
@@ -118,13 +120,23 @@ impl DevicePlan {
             let pass = pass_of_reinsertion(device, mesh, &options)?;
             options.optimise = Some(ReinsertionOptions::within(time, pass));
         }
-        DeviceBvh::new(device, name, mesh, &options, (&walk, &taught.any_hit))
+        let rounds = match &taught.reinserted_by {
+            Some(rays) => options.optimise.take().map(|options| (&**rays, options)),
+            None => None,
+        };
+        DeviceBvh::new(device, name, mesh, &options, Teaching { walk: &walk, any_hit: &taught.any_hit, rounds })
     }
 }
 
 /// What a pass of reinsertion takes on this scene, by the second of two builds: the first warms up.
 fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &BuildOptions) -> Result<Duration> {
-    let mut subject = DeviceBvh::new(device, "", mesh, options, (&Walk::Tracer, &AnyHit::NEAR))?;
+    let mut subject = DeviceBvh::new(
+        device,
+        "",
+        mesh,
+        options,
+        Teaching { walk: &Walk::Tracer, any_hit: &AnyHit::NEAR, rounds: None },
+    )?;
     subject.build()?;
     let run = subject.build()?;
     let milliseconds: f64 = run.phases.iter().filter(|p| p.name == OPTIMISE.key).map(|p| p.milliseconds).sum();

@@ -4,6 +4,7 @@ mod builders;
 mod counts;
 mod derived;
 pub(super) mod faults;
+mod flux;
 mod kdtree;
 mod large;
 mod levels;
@@ -35,6 +36,11 @@ pub const GROUPS: &[Group] = &[
     group("child-order", "children in every order against its twin", derived::child_order),
     group("ordered", "builds with children in every order against their twin", builders::in_child_order),
     group("ray-counts", "rays counted by links, and what they teach, against their twins", counts::ray_counts),
+    group(
+        "by-rays",
+        "the flux of rays, reinsertion that it teaches, and trees on trial, against their twins",
+        flux::by_rays,
+    ),
     group("kd-build", "kd-trees by every schedule against their twin", kdtree::build),
     group("kd-merge", "objects merged into a kd-tree and out again against their twin", kdtree::merge),
     group("trace", "every binary tracer against its twin and brute force", tracers::binary),
