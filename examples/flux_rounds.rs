@@ -36,6 +36,18 @@ const ROUNDS: ReinsertionOptions = ReinsertionOptions { rounds: 16, stride: 64 }
 
 fn main() -> Result<()> {
     let device = Device::new(&DeviceOptions { tuning: TuningChoice::Auto, ..DeviceOptions::default() })?;
+    fly(&device, 12, |frame, work, trial| {
+        print!("frame {frame:2}: {work:.1} of work a ray");
+        if let Some(TrialResult { work: [before, after], is_taken, .. }) = trial {
+            let what = if is_taken == 1 { "taken" } else { "not taken" };
+            print!("; the copy takes {:.3} of it and is {what}", after as f64 / before.max(1) as f64);
+        }
+        println!();
+    })
+}
+
+/// Flies for some frames, and tells the work a ray of each, and how the trial went if there was one.
+pub fn fly(device: &Device, frames: u32, mut told: impl FnMut(u32, f64, Option<TrialResult>)) -> Result<()> {
     let mut scene = scene::load("gen:stadium:4", &LoadOptions::default())?;
     let tree = lbvh::build(&scene.mesh.positions, &scene.mesh.triangles, Code::Mc30.full(), Collapse::SAH);
     let primitives = tree.header.primitive_count;
@@ -46,12 +58,12 @@ fn main() -> Result<()> {
     let result = device.buffer("result", size_of::<TrialResult>() as u64)?;
     let trees = TrialTrees { structure: structure.region(), copy: copy.region(), result: result.region() };
     let grid = device.buffer("grid", GRID_BYTES)?;
-    let scratch = device.buffer("scratch", Reinsertion::new(&device, &ROUNDS, primitives).scratch_bytes_by_rays())?;
-    let trial = Trial::new(&device, Collapse::SAH, primitives);
+    let scratch = device.buffer("scratch", Reinsertion::new(device, &ROUNDS, primitives).scratch_bytes_by_rays())?;
+    let trial = Trial::new(device, Collapse::SAH, primitives);
     let cost = Cost::Rays { grid: grid.region(), share: Cost::SHARE };
     let mut rounds_made = 0;
 
-    for frame in 0..12 {
+    for frame in 0..frames {
         scene.camera.eye[0] += 0.02 * frame as f32;
         let rays = bounced_rays(&scene, &tree)?;
         let ray_count = rays.len() as u32;
@@ -59,7 +71,7 @@ fn main() -> Result<()> {
         let hits = device.buffer("hits", u64::from(ray_count) * size_of::<Hit>() as u64)?;
         let work = device.buffer("work", u64::from(ray_count) * size_of::<Work>() as u64)?;
         let step = frame % FRAMES_A_TRIAL;
-        let rounds = Reinsertion::new(&device, &ROUNDS, primitives).from_round(rounds_made);
+        let rounds = Reinsertion::new(device, &ROUNDS, primitives).from_round(rounds_made);
         device.run(None, |recorder| {
             let buffers = TraceBuffers {
                 structure: trees.structure.address,
@@ -68,7 +80,7 @@ fn main() -> Result<()> {
                 work: Some(work.region()),
                 count: ray_count,
             };
-            tracer::record(recorder, &TraceShape::of(&device), Query::ClosestHit, &buffers)?;
+            tracer::record(recorder, &TraceShape::of(device), Query::ClosestHit, &buffers)?;
             let first = frame % STRIDE;
             if step == FRAMES_A_TRIAL - 1 {
                 let part = CountedRays { rays: rays.region(), ray_count, first, stride: STRIDE };
@@ -81,22 +93,20 @@ fn main() -> Result<()> {
             recorder.barrier();
             if step == 0 {
                 let part = FluxRays { rays: rays.region(), hits: hits.region(), ray_count, first, stride: STRIDE };
-                FluxPass::new(&device).record(recorder, trees.structure, &[part], grid.region())?;
+                FluxPass::new(device).record(recorder, trees.structure, &[part], grid.region())?;
                 recorder.barrier();
             }
             rounds.record_rounds(recorder, trees.copy, &cost, scratch.region())
         })?;
         let all: Vec<Work> = work.read(ray_count as usize);
         let sum: u64 = all.iter().map(|work| u64::from(3 * work.steps + 2 * work.tests)).sum();
-        print!("frame {frame:2}: {ray_count} rays, {:.1} of work a ray", sum as f64 / f64::from(ray_count.max(1)));
+        let work = sum as f64 / f64::from(ray_count.max(1));
         if step == FRAMES_A_TRIAL - 1 {
-            let TrialResult { work: [before, after], is_taken, .. } = result.read(1)[0];
-            let what = if is_taken == 1 { "taken" } else { "not taken" };
-            print!("; the copy takes {:.3} of it and is {what}", after as f64 / before.max(1) as f64);
+            told(frame, work, Some(result.read(1)[0]));
         } else {
             rounds_made += rounds.rounds();
+            told(frame, work, None);
         }
-        println!();
     }
     Ok(())
 }
