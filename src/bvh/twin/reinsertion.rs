@@ -377,8 +377,8 @@ mod tests {
     use crate::bvh::twin::lbvh;
     use std::cell::Cell;
 
-    /// A cost that is less each time that it is asked for has every move gain, and the one beside the own sibling first of all. Making that
-    /// move would hang the parent below itself.
+    /// Every box costs 1 but the fourth that a search asks for. Who looks at the own sibling asks for the box around both then, and finds
+    /// the only move that gains; making it would hang the parent below itself. Who does not asks for the sibling's own.
     #[test]
     fn a_subtree_does_not_move_to_where_it_is() {
         let corner = |i: usize| {
@@ -389,19 +389,15 @@ mod tests {
         let triangles: Vec<[u32; 3]> = (0..64).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         let tree = lbvh::build(&positions, &triangles, Code::Mc30.full(), Collapse::OFF);
         let asked = Cell::new(0u32);
-        let falling = |_: &Aabb| {
+        let cost = |_: &Aabb| {
             asked.set(asked.get() + 1);
-            1.0 + 1.0 / asked.get() as f32
+            if asked.get() == 4 { 0.5 } else { 1.0 }
         };
-        let work = LinkedTree { parents: parents_of(&tree), tree: tree.clone(), cost: falling, by_rays: false };
-        let mut moved = 0;
+        let work = LinkedTree { parents: parents_of(&tree), tree: tree.clone(), cost, by_rays: false };
         for link in 0..2 * tree.nodes.len() as u32 {
-            if let Some(m) = work.search(link) {
-                assert_ne!(m.to, link ^ 1, "link {link} stays where it is");
-                moved += 1;
-            }
+            asked.set(0);
+            assert!(work.search(link).is_none(), "link {link} moves");
         }
-        assert!(moved > 10, "{moved} moves");
     }
 
     #[test]

@@ -1,20 +1,17 @@
 //! Counts of rays by links, and what they teach: the order of children and wide nodes.
 
 use super::builders::meshes;
+use super::derived::of_all_widths;
 use crate::device::Device;
-use crate::experiments::check::cases::{Cases, Found, same, same_all};
+use crate::experiments::check::cases::{Cases, Found, same_all};
 use crate::experiments::check::shapes::{hard_rays, soup};
 use hedgerow::bvh::child_order::{ChildOrder, ChildOrderPass};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::counts::LinkCount;
-use hedgerow::bvh::geometry::Primitives;
-use hedgerow::bvh::layout::{Bvh2, Child, Header, Triangle};
+use hedgerow::bvh::layout::{Bvh2, Triangle};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::bvh::twin::wide::LinkCounts;
-use hedgerow::bvh::wide::device::{WideCounts, WideOptions, WidePass};
-use hedgerow::bvh::wide::layout::{Wide, WideNode};
-use hedgerow::bvh::wide::quantised::QuantisedNode;
 use hedgerow::trace::counts::{CountPass, CountedRays, CountedWalk, Earlier, Tallies};
 use hedgerow::trace::twin::counts;
 use hedgerow::trace::{Query, Ray};
@@ -33,12 +30,10 @@ pub fn ray_counts(cases: &mut Cases<'_>) {
         cases.case(format!("{name}, order of children"), |device| order_as_on_host(device, &tree, &counted));
         let mut swapped = counted.clone();
         let ordered = tree.clone().in_order_of_counts(&mut swapped, &Collapse::SAH);
-        for (tree, counted, how) in [(tree, counted, "opened by visits"), (ordered, swapped, "in order of hits")] {
-            let what = format!("{name}, {how}");
-            cases.case(format!("{what}, 4"), |device| wide_as_on_host::<[Child; 4]>(device, &tree, &counted));
-            cases.case(format!("{what}, 8"), |device| wide_as_on_host::<[Child; 8]>(device, &tree, &counted));
-            cases.case(format!("{what}, 8q"), |device| wide_as_on_host::<QuantisedNode>(device, &tree, &counted));
-        }
+        let opened = LinkCounts { opened_by: &counted, ..LinkCounts::default() };
+        of_all_widths(cases, &format!("{name}, opened by visits"), &tree, &opened);
+        let in_order = LinkCounts { ordered_by: &swapped, ..LinkCounts::default() };
+        of_all_widths(cases, &format!("{name}, in order of hits"), &ordered, &in_order);
     }
 }
 
@@ -83,38 +78,4 @@ fn order_as_on_host(device: &Device, tree: &Bvh2, counted: &[LinkCount]) -> Foun
     let got = Bvh2::<Triangle>::from_bytes(&structure.read::<u8>(bytes.len()))?;
     same_all("node", &got.nodes, &expected.nodes)?;
     same_all("count of link", &of_links.read::<LinkCount>(counted.len()), &expected_counts)
-}
-
-/// Opened by visits, or, where children have an order, put in order by hits.
-fn wide_as_on_host<N: WideNode>(device: &Device, tree: &Bvh2, counted: &[LinkCount]) -> Found {
-    let is_ordered = tree.header.child_order != 0;
-    let expected = Wide::<N>::of_counts(
-        tree,
-        &match is_ordered {
-            false => LinkCounts { opened_by: counted, ..LinkCounts::default() },
-            true => LinkCounts { ordered_by: counted, ..LinkCounts::default() },
-        },
-    );
-    expected.validate()?;
-    let Header { primitive_count, geometry_count, .. } = tree.header;
-    let options = WideOptions { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
-    let wide = WidePass::new(device, &options, primitive_count);
-    let sizes = wide.sizes();
-    let source = device.upload("source", &tree.to_bytes())?;
-    let of_links = device.upload("counts", counted)?;
-    let target = device.buffer("target", sizes.structure)?;
-    let scratch = device.buffer("scratch", sizes.scratch)?;
-    let region = Some(of_links.region());
-    let counts = match is_ordered {
-        false => WideCounts { opened_by: region, ordered_by: None },
-        true => WideCounts { opened_by: None, ordered_by: region },
-    };
-    device.run(None, |r| wide.record_by_counts(r, source.address(), &counts, target.region(), scratch.region()))?;
-    let header: Header = target.read(1)[0];
-    let used = N::FORM.bytes_in_use(&header, size_of::<Triangle>() as u64).min(sizes.structure);
-    let bytes = target.read::<u8>(used as usize);
-    let got = Wide::<N>::from_bytes(&bytes)?;
-    same("header", &got.header, &expected.header)?;
-    same_all("node", &got.nodes, &expected.nodes)?;
-    same_all("byte", &bytes, &expected.to_bytes())
 }

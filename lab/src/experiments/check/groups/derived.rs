@@ -1,18 +1,20 @@
 //! Trees made of trees: wide ones, those that follow their triangles, and those whose children have an order.
 
 use super::builders::meshes;
-use crate::device::Device;
+use crate::device::{Buffer, Device};
 use crate::experiments::check::cases::{Cases, Found, same, same_all};
 use crate::experiments::check::corpus::{Mesh, unit_floats};
 use crate::subjects::build_memory::DeviceMesh;
 use hedgerow::bvh::child_order::{ChildOrder, ChildOrderPass};
 use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::counts::LinkCount;
 use hedgerow::bvh::geometry::Primitives;
 use hedgerow::bvh::layout::{Bvh2, Child, Header, Triangle};
 use hedgerow::bvh::refit::{Refit, RefitOptions, RefitSchedule};
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::wide::LinkCounts;
 use hedgerow::bvh::twin::{self, lbvh};
-use hedgerow::bvh::wide::device::{WideOptions, WidePass};
+use hedgerow::bvh::wide::device::{WideCounts, WideOptions, WidePass};
 use hedgerow::bvh::wide::layout::{Wide, WideNode};
 use hedgerow::bvh::wide::quantised::QuantisedNode;
 
@@ -27,16 +29,21 @@ pub fn wide(cases: &mut Cases<'_>) {
             let ordered = tree.clone().in_child_order(ChildOrder::MoreHitsForItsCost, &Collapse::SAH);
             for (tree, which) in [(tree, ""), (ordered, ", in order")] {
                 let what = format!("{name}, {collapse:?}{which}");
-                cases.case(format!("{what}, 4"), |device| wide_as_on_host::<[Child; 4]>(device, &tree));
-                cases.case(format!("{what}, 8"), |device| wide_as_on_host::<[Child; 8]>(device, &tree));
-                cases.case(format!("{what}, 8q"), |device| wide_as_on_host::<QuantisedNode>(device, &tree));
+                of_all_widths(cases, &what, &tree, &LinkCounts::default());
             }
         }
     }
 }
 
-fn wide_as_on_host<N: WideNode>(device: &Device, tree: &Bvh2) -> Found {
-    let expected = Wide::<N>::of(tree);
+/// Trees of wide nodes of every form, by counts of the tree's links if there are some.
+pub(super) fn of_all_widths(cases: &mut Cases<'_>, what: &str, tree: &Bvh2, counts: &LinkCounts<'_>) {
+    cases.case(format!("{what}, 4"), |device| wide_as_on_host::<[Child; 4]>(device, tree, counts));
+    cases.case(format!("{what}, 8"), |device| wide_as_on_host::<[Child; 8]>(device, tree, counts));
+    cases.case(format!("{what}, 8q"), |device| wide_as_on_host::<QuantisedNode>(device, tree, counts));
+}
+
+fn wide_as_on_host<N: WideNode>(device: &Device, tree: &Bvh2, counts: &LinkCounts<'_>) -> Found {
+    let expected = Wide::<N>::of_counts(tree, counts);
     expected.validate()?;
     let Header { primitive_count, geometry_count, .. } = tree.header;
     let options = WideOptions { form: N::FORM, primitives: Primitives::Triangles, geometry_count };
@@ -46,7 +53,11 @@ fn wide_as_on_host<N: WideNode>(device: &Device, tree: &Bvh2) -> Found {
     let guarded = |bytes: u64| [vec![0xEEu8; bytes as usize], GUARD.to_vec()].concat();
     let target = device.upload("target", &guarded(sizes.structure))?;
     let scratch = device.upload("scratch", &guarded(sizes.scratch))?;
-    device.run(None, |r| wide.record(r, source.address(), target.region(), scratch.region()))?;
+    let upload = |counts: &[LinkCount]| (!counts.is_empty()).then(|| device.upload("counts", counts)).transpose();
+    let [opened_by, ordered_by] = [upload(counts.opened_by)?, upload(counts.ordered_by)?];
+    let [opened_by, ordered_by] = [&opened_by, &ordered_by].map(|counts| counts.as_ref().map(Buffer::region));
+    let counts = WideCounts { opened_by, ordered_by };
+    device.run(None, |r| wide.record_by_counts(r, source.address(), &counts, target.region(), scratch.region()))?;
     same("bytes behind the tree", &target.read_at::<u8>(sizes.structure, GUARD.len()), &GUARD.to_vec())?;
     same("bytes behind the scratch memory", &scratch.read_at::<u8>(sizes.scratch, GUARD.len()), &GUARD.to_vec())?;
     let header: Header = target.read(1)[0];
