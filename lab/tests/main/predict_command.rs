@@ -27,7 +27,7 @@ fn a_run_leaves_records_and_a_page_that_says_what_they_tell() {
     for record in &records {
         assert_eq!(record.host.iter().map(|rays| rays.rays.as_str()).collect::<Vec<_>>(), ["primary", "ao"]);
         assert!(record.device.is_empty() && record.lcv.is_some() && record.epo.is_some(), "{record:?}");
-        assert_eq!(record.own.len(), 6, "{record:?}");
+        assert_eq!(record.own.len(), 7, "{record:?}");
         assert!(record.host.iter().all(|rays| rays.ns.min > 0.0 && rays.steps > 0.0), "{record:?}");
     }
     let of = |builder: &str| {

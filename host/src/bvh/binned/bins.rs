@@ -36,29 +36,6 @@ impl Unsplit {
     }
 }
 
-/// What lies in a bin.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Bin {
-    pub items: Unsplit,
-    pub count: u32,
-    /// How many of them are seen, where the heuristic knows of that.
-    pub seen: u32,
-}
-
-impl Bin {
-    pub const EMPTY: Bin = Bin { items: Unsplit::EMPTY, count: 0, seen: 0 };
-
-    pub fn union(self, other: Bin) -> Bin {
-        let (count, seen) = (self.count + other.count, self.seen + other.seen);
-        Bin { items: self.items.union(other.items), count, seen }
-    }
-
-    #[inline(always)]
-    pub fn side(&self) -> Side {
-        Side { bounds: self.items.bounds, count: self.count, seen: self.seen }
-    }
-}
-
 /// Equal bins along an axis.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
@@ -96,6 +73,16 @@ pub(super) fn side_of(by: &impl SplitCost, item: &Item) -> Side {
 
 pub(super) fn side(by: &impl SplitCost, items: &[Item]) -> Side {
     items.iter().fold(Side::EMPTY, |all, item| all.union(side_of(by, item)))
+}
+
+/// Around the centroids of items (twice them), by all threads if there are many.
+pub(super) fn centroids(items: &[Item]) -> Bounds {
+    let alone =
+        |items: &[Item]| items.iter().fold(Bounds::EMPTY, |all, item| all.union(Bounds::point(item.centroid())));
+    if !is_for_all(items) {
+        return alone(items);
+    }
+    items.par_chunks(PIECE).map(alone).reduce(|| Bounds::EMPTY, Bounds::union)
 }
 
 /// The boxes of a node over these items, by all threads if there are many.
@@ -138,48 +125,61 @@ pub(super) fn in_order_of_bins(items: &[Item], grid: &Grid) -> [u32; FEW] {
     order
 }
 
-/// Fills the bins of a grid, the first of `N`, by all threads if there are many items.
-pub(super) fn fill<const N: usize>(by: &impl SplitCost, items: &[Item], grid: &Grid, bins: &mut [Bin; N]) {
+/// Adds items to the bins of grids along one axis each, the first of `N`; by all threads if there are many items.
+pub(super) fn fill<const N: usize>(by: &impl SplitCost, items: &[Item], grids: &[Grid], bins: &mut [[Side; N]]) {
     if !is_for_all(items) {
-        return fill_alone(by, items, grid, bins);
+        return fill_alone(by, items, grids, bins);
     }
+    let empty = || vec![[Side::EMPTY; N]; grids.len()];
     let of_piece = |items: &[Item]| {
-        let mut bins = [Bin::EMPTY; N];
-        fill_alone(by, items, grid, &mut bins);
+        let mut bins = empty();
+        fill_alone(by, items, grids, &mut bins);
         bins
     };
-    let union = |mut a: [Bin; N], b: [Bin; N]| {
-        unite(&mut a, &b);
+    let union = |mut a: Vec<[Side; N]>, b: Vec<[Side; N]>| {
+        a.iter_mut().zip(&b).for_each(|(a, b)| unite(a, b));
         a
     };
-    *bins = items.par_chunks(PIECE).map(of_piece).reduce(|| [Bin::EMPTY; N], union);
+    bins.copy_from_slice(&items.par_chunks(PIECE).map(of_piece).reduce(empty, union));
 }
 
 /// The same by one thread.
-fn fill_alone<const N: usize>(by: &impl SplitCost, items: &[Item], grid: &Grid, bins: &mut [Bin; N]) {
-    let add = |bins: &mut [Bin; N], item: &Item| {
-        let bin = &mut bins[grid.bin_of(item)];
-        bin.items.add(item);
-        bin.count += 1;
-        bin.seen += u32::from(by.is_seen(item));
-    };
-    bins[..grid.bins].fill(Bin::EMPTY);
+fn fill_alone<const N: usize>(by: &impl SplitCost, items: &[Item], grids: &[Grid], bins: &mut [[Side; N]]) {
+    if let ([x, y, z], [of_x, of_y, of_z]) = (grids, &mut *bins) {
+        // An item is read once for all axes, and what is added along one need not wait for another.
+        return items.iter().for_each(|item| {
+            add(by, item, x, of_x);
+            add(by, item, y, of_y);
+            add(by, item, z, of_z);
+        });
+    }
+    grids.iter().zip(bins).for_each(|(grid, bins)| fill_along(by, items, grid, bins));
+}
+
+#[inline(always)]
+fn add<const N: usize>(by: &impl SplitCost, item: &Item, grid: &Grid, bins: &mut [Side; N]) {
+    let bin = &mut bins[grid.bin_of(item)];
+    *bin = bin.union(side_of(by, item));
+}
+
+/// The same along one axis.
+fn fill_along<const N: usize>(by: &impl SplitCost, items: &[Item], grid: &Grid, bins: &mut [Side; N]) {
     if items.len() < 4 * N {
-        return items.iter().for_each(|item| add(bins, item));
+        return items.iter().for_each(|item| add(by, item, grid, bins));
     }
     // Neighbours often are in the same bin: two sets of bins, as the one need not wait for the other.
-    let mut others = [Bin::EMPTY; N];
+    let mut others = [Side::EMPTY; N];
     let pairs = items.chunks_exact(2);
-    pairs.remainder().iter().for_each(|item| add(bins, item));
+    pairs.remainder().iter().for_each(|item| add(by, item, grid, bins));
     for pair in pairs {
-        add(bins, &pair[0]);
-        add(&mut others, &pair[1]);
+        add(by, &pair[0], grid, bins);
+        add(by, &pair[1], grid, &mut others);
     }
     unite(&mut bins[..grid.bins], &others[..grid.bins]);
 }
 
 /// Adds what is in other bins.
-fn unite(bins: &mut [Bin], others: &[Bin]) {
+fn unite(bins: &mut [Side], others: &[Side]) {
     bins.iter_mut().zip(others).for_each(|(bin, other)| *bin = bin.union(*other));
 }
 

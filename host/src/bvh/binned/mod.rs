@@ -15,7 +15,7 @@ use super::heuristic::split_cost::{AxisSplits, First, Place, Side, SplitCost, gr
 use super::top_down::{self, Candidates, HALVED_FROM, LeafRule, divided_slots};
 use super::topology::Topology;
 pub(super) use bins::partition;
-use bins::{Bin, FEW, Grid, Unsplit, fill, in_order_of_bins, measured, measured_alone, place_of, side, side_of};
+use bins::{FEW, Grid, Unsplit, centroids, fill, in_order_of_bins, measured, measured_alone, place_of, side, side_of};
 use bytemuck::zeroed_vec;
 use hedgerow::{Error, Result};
 pub(super) use ranked::build_ahead;
@@ -141,7 +141,7 @@ enum Split {
     /// In the middle of the order.
     Halved,
     /// At the beginning of a bin of a grid; what lies on either side.
-    AtBin { grid: Grid, bin: usize, sides: Box<[Bin; 2]> },
+    AtBin { grid: Grid, bin: usize, sides: [Side; 2] },
     /// Of a few items in this order, after so many.
     OfFew { order: [u32; FEW], left_count: usize },
 }
@@ -216,7 +216,7 @@ impl Candidates for Binned<'_> {
         match split {
             None => [side(by, items), Side::EMPTY],
             Some(Split::Halved) => halves(items).map(|half| side(by, half)),
-            Some(Split::AtBin { sides, .. }) => sides.each_ref().map(Bin::side),
+            Some(Split::AtBin { sides, .. }) => *sides,
             Some(Split::OfFew { order, left_count }) => {
                 let (left, right) = order[..items.len()].split_at(*left_count);
                 let of = |key: &u32| side_of(by, &items[place_of(*key)]);
@@ -254,10 +254,12 @@ impl Candidates for Binned<'_> {
                 (count / 2, sides)
             }
             Split::AtBin { grid, bin, sides } => {
-                let [left, right] = *sides;
+                let left_count = sides[0].count as usize;
                 // That is, `grid.bin_of(item) < bin`.
-                partition(items, spare, left.count as usize, |item| grid.place(item) < bin as f32);
-                (left.count as usize, [left.items, right.items])
+                partition(items, spare, left_count, |item| grid.place(item) < bin as f32);
+                let (left, right) = spare.split_at(left_count);
+                let of = |side: Side, items: &[Item]| Unsplit { bounds: side.bounds, centroids: centroids(items) };
+                (left_count, [of(sides[0], left), of(sides[1], right)])
             }
             Split::OfFew { order, left_count } => {
                 for (item, key) in spare.iter_mut().zip(order) {
@@ -315,26 +317,24 @@ impl<C: SplitCost> Search<'_, C> {
     /// its bins would lie on the stack once for each level, and small nodes would pay for the room of 256.
     #[inline(never)]
     fn at_bin<const N: usize>(&self, grids: &[Option<Grid>; 3]) -> Option<Split> {
-        let mut best: Option<(Plane, Grid)> = None;
-        let (mut bins, mut of_best) = (&mut [Bin::EMPTY; N], &mut [Bin::EMPTY; N]);
-        for grid in grids.iter().flatten() {
-            fill(self.by, self.items, grid, bins);
-            let plane = self.best_plane::<N>(&bins[..grid.bins], grid);
-            if best.is_none_or(|best| plane.0 < best.0.0) {
-                best = Some((plane, *grid));
-                std::mem::swap(&mut bins, &mut of_best);
-            }
-        }
-        let ((cost, bin), grid) = best?;
+        let mut present = [(*grids).into_iter().flatten().next()?; 3];
+        let count = present.iter_mut().zip(grids.iter().flatten()).map(|(place, grid)| *place = *grid).count();
+        let mut bins = [[Side::EMPTY; N]; 3];
+        let (grids, bins) = (&present[..count], &mut bins[..count]);
+        fill(self.by, self.items, grids, bins);
+        let planes = grids.iter().zip(&*bins).map(|(grid, bins)| self.best_plane::<N>(&bins[..grid.bins], grid));
+        let cheaper = |a: (usize, Plane), b: (usize, Plane)| if b.1.0 < a.1.0 { b } else { a };
+        let (axis, (cost, bin)) = planes.enumerate().reduce(cheaper)?;
         if self.is_leaf(cost) {
             return None;
         }
-        let side = |bins: &[Bin]| bins.iter().fold(Bin::EMPTY, |all, bin| all.union(*bin));
-        Some(Split::AtBin { grid, bin, sides: Box::new([side(&of_best[..bin]), side(&of_best[bin..grid.bins])]) })
+        let (grid, bins) = (grids[axis], &bins[axis]);
+        let around = |bins: &[Side]| bins.iter().copied().fold(Side::EMPTY, Side::union);
+        Some(Split::AtBin { grid, bin, sides: [around(&bins[..bin]), around(&bins[bin..grid.bins])] })
     }
 
     /// The best plane between bins, of which the first and the last hold something.
-    fn best_plane<const N: usize>(&self, bins: &[Bin], grid: &Grid) -> Plane {
+    fn best_plane<const N: usize>(&self, bins: &[Side], grid: &Grid) -> Plane {
         if C::BY_BOTH {
             return self.best_plane_by_both(bins, grid);
         }
@@ -344,18 +344,18 @@ impl<C: SplitCost> Search<'_, C> {
 
     /// All planes between bins.
     #[inline(always)]
-    fn planes<const N: usize>(&self, bins: &[Bin]) -> impl Iterator<Item = Plane> {
+    fn planes<const N: usize>(&self, bins: &[Side]) -> impl Iterator<Item = Plane> {
         let mut right_costs = [0.0; N];
-        let from_right = self.costs(bins[1..].iter().rev().map(Bin::side));
+        let from_right = self.costs(bins[1..].iter().rev().copied());
         right_costs[1..bins.len()].iter_mut().rev().zip(from_right).for_each(|(place, cost)| *place = cost);
-        let from_left = self.costs(bins[..bins.len() - 1].iter().map(Bin::side));
+        let from_left = self.costs(bins[..bins.len() - 1].iter().copied());
         from_left.zip(1..).map(move |(left_cost, at)| (left_cost + right_costs[at], at))
     }
 
     /// The same by a heuristic whose sides cost something together alone.
-    fn best_plane_by_both(&self, bins: &[Bin], grid: &Grid) -> Plane {
-        let lefts: Vec<Side> = growing(bins[..bins.len() - 1].iter().map(Bin::side)).collect();
-        let mut rights: Vec<Side> = growing(bins[1..].iter().rev().map(Bin::side)).collect();
+    fn best_plane_by_both(&self, bins: &[Side], grid: &Grid) -> Plane {
+        let lefts: Vec<Side> = growing(bins[..bins.len() - 1].iter().copied()).collect();
+        let mut rights: Vec<Side> = growing(bins[1..].iter().rev().copied()).collect();
         rights.reverse();
         let place = |item: &Item| {
             let bin = grid.bin_of(item);

@@ -1,9 +1,9 @@
 //! The best few planes between bins, and the tree by those that look ahead.
 
-use super::bins::{Bin, Grid, fill, place_of};
+use super::bins::{Grid, fill, place_of};
 use super::{Binned, BinnedOptions, Bins, FEW, Part, Plane, Split, halves, tree_over};
 use crate::bvh::bounds::Item;
-use crate::bvh::heuristic::split_cost::Area;
+use crate::bvh::heuristic::split_cost::{Area, Side};
 use crate::bvh::look_ahead::{LookAhead, Ranked};
 use crate::bvh::top_down::{self, Candidates, LeafRule};
 use crate::bvh::topology::Topology;
@@ -33,9 +33,9 @@ impl Ranked for Binned<'_> {
         }
         let search = self.search(&Area, &(), part);
         let mut all: Vec<(Plane, usize)> = Vec::new();
-        let mut bins = vec![[Bin::EMPTY; MOST]; grids.len()];
-        for (at, (grid, bins)) in grids.iter().zip(&mut bins).enumerate() {
-            fill(&Area, part.items, grid, bins);
+        let mut bins = vec![[Side::EMPTY; MOST]; grids.len()];
+        fill(&Area, part.items, &grids, &mut bins);
+        for (at, (grid, bins)) in grids.iter().zip(&bins).enumerate() {
             let bins = &bins[..grid.bins];
             // A plane behind an empty bin splits as the one before does.
             let planes = search.planes::<MOST>(bins).filter(|&(_, plane)| bins[plane - 1].count > 0);
@@ -46,10 +46,10 @@ impl Ranked for Binned<'_> {
         if all.first().is_none_or(|&((cost, _), _)| search.is_leaf(cost)) {
             return Vec::new();
         }
-        let side = |bins: &[Bin]| bins.iter().fold(Bin::EMPTY, |all, bin| all.union(*bin));
+        let side = |bins: &[Side]| bins.iter().copied().fold(Side::EMPTY, Side::union);
         let split = |&((_, bin), at): &(Plane, usize)| {
             let (left, right) = bins[at][..grids[at].bins].split_at(bin);
-            Split::AtBin { grid: grids[at], bin, sides: Box::new([side(left), side(right)]) }
+            Split::AtBin { grid: grids[at], bin, sides: [side(left), side(right)] }
         };
         all.iter().take(most).map(split).collect()
     }
