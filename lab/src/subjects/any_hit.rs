@@ -59,18 +59,21 @@ impl AnyHit {
     }
 }
 
-/// A unit of work takes this part of its time where no distances are kept: docs/notes/ray_counts.md, and any_hit_queries.md for wide nodes.
+/// A unit of work takes this part of its time where no distances are kept: docs/notes/any_hit_queries.md.
 fn left_first(kind: &str) -> f64 {
     match kind {
-        "wide4" => 0.98,
-        "wide8" => 0.94,
-        "wide8q" => 0.93,
-        _ => 0.92,
+        "wide4" => 1.0,
+        "wide8" => 0.98,
+        "wide8q" => 0.95,
+        _ => 1.06,
     }
 }
 
+/// No kind of rays may take more than this part of its time by the nearest child first.
+const MOST: f64 = 1.05;
+
 /// Of all orders and the nearest child first, the one with the least work for rays that teach, of subjects that `make` makes: by the
-/// geometric mean over their kinds, and for none of them more than the nearest child first, each unit of work by its time.
+/// geometric mean over their kinds, each unit of work by its time, and for none of them more than [`MOST`].
 ///
 /// # Errors
 /// Those of making, building and tracing.
@@ -86,7 +89,7 @@ pub fn chosen<'a>(teaching: &TeachingRays, make: impl Fn(AnyHit) -> Result<Box<d
             work.iter().zip(&near).filter(|(_, near)| **near > 0.0).map(|(work, near)| of_a_unit * work / near);
         let logs: Vec<f64> = ratios.map(f64::ln).collect();
         let mean = logs.iter().sum::<f64>() / logs.len().max(1) as f64;
-        if logs.iter().all(|log| *log <= 0.0) && mean < best.0 {
+        if logs.iter().all(|log| *log <= MOST.ln()) && mean < best.0 {
             best = (mean, name, Some(order));
         }
     }
@@ -197,9 +200,11 @@ mod tests {
         let choice = chosen.choice().expect("what was chosen");
         assert!(choice.contains("any-hit "), "{choice}");
         let work = work_by_kind(&teaching, chosen).expect("counted");
-        for (work, near) in work.iter().zip(&near) {
-            assert!(left_first("bvh2") * work <= 1.02 * near, "{choice}: {work} of work, near {near}");
-        }
+        let of_a_unit = if choice == "any-hit near" { 1.0 } else { left_first("bvh2") };
+        let ratios: Vec<f64> = work.iter().zip(&near).map(|(work, near)| of_a_unit * work / near).collect();
+        // These are other rays than those that taught, a few thousand: two parts in a hundred.
+        assert!(ratios.iter().product::<f64>() <= 1.02 * 1.02, "{choice}: {ratios:?}");
+        assert!(ratios.iter().all(|ratio| *ratio <= 1.02 * MOST), "{choice}: {ratios:?}");
     }
 
     #[test]
