@@ -73,7 +73,8 @@ fn left_first(kind: &str) -> f64 {
 const MOST: f64 = 1.05;
 
 /// Of all orders and the nearest child first, the one with the least work for rays that teach, of subjects that `make` makes: by the
-/// geometric mean over their kinds, each unit of work by its time, and for none of them more than 1.05 of its time by the nearest child first.
+/// geometric mean over their kinds, each unit of work by its time, and for none of them more than 1.05 of its time by the nearest child
+/// first.
 ///
 /// # Errors
 /// Those of making, building and tracing.
