@@ -81,13 +81,10 @@ fn read(folder: &Path, devices: &mut Vec<OfDevice>) -> Result<()> {
     if has(accel_file) {
         let entries = accel::page::read(folder)?;
         let setting = entries.iter().find_map(|entry| match entry {
-            AccelEntry::Setting(setting) => Some((setting.machine.clone(), setting.device.clone()?)),
+            AccelEntry::Setting(setting) => Some(setting),
             _ => None,
         });
-        if let Some((machine, facts)) = setting {
-            let device = of(devices, &facts.name, &facts.driver);
-            device.machine.get_or_insert(machine);
-            device.facts.get_or_insert(facts);
+        if let Some(device) = setting.map(|setting| of_setting(devices, setting)) {
             device.accel.extend(entries);
         }
     }

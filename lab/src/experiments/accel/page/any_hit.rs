@@ -1,11 +1,12 @@
 //! The section of children in order.
 
 use super::Part;
+use super::flagged::{both, gains, mrays_s};
 use crate::Result;
 use crate::experiments::accel::points::{AnyHitPoint, FlaggedRays, MeanWork};
-use crate::report::bars::{Bar, Bars};
+use crate::report::bars::Bars;
 use crate::report::numbers::{count, grouped, short_count, three_digits, tick, whole};
-use crate::report::{Caption, Chart, SERIES, Section, Table, bars, document, slug};
+use crate::report::{Caption, Chart, Section, Table, bars, document, slug};
 use maud::{Markup, html};
 
 pub(super) fn part(points: &[AnyHitPoint]) -> Result<Option<Part>> {
@@ -32,20 +33,13 @@ pub(super) fn part(points: &[AnyHitPoint]) -> Result<Option<Part>> {
 
 /// The gain of each kind of ray in one scene.
 fn chart(point: &AnyHitPoint) -> Result<Option<Chart>> {
-    let bar = |(i, rays): (usize, &FlaggedRays)| Bar {
-        label: rays.rays.clone(),
-        figure: three_digits(rays.gain.median),
-        spread: rays.gain,
-        tone: SERIES[i % SERIES.len()],
-    };
-    let all: Vec<Bar> = point.rays.iter().enumerate().map(bar).collect();
-    let in_words: Vec<String> = all.iter().map(|bar| format!("{} {}", bar.label, bar.figure)).collect();
+    let (all, in_words) = gains(&point.rays);
     let hits = |rays: &FlaggedRays| format!("{}% of {} rays hit", whole(100.0 * share(rays)), rays.rays);
     let hits: Vec<String> = point.rays.iter().map(hits).collect();
     let caption = Caption {
         name: format!("accel-any-hit-{}", slug(&point.scene)),
         title: format!("{}: speed with children in order over speed without", point.scene),
-        alt: in_words.join("; "),
+        alt: in_words,
         reading: format!(
             "{} instances of {} parts; {}. Right of 1, the order is faster. A ray that misses gains nothing by an order: it meets all \
              that it can. The line through a bar goes from the least to the greatest of the runs.",
@@ -79,11 +73,6 @@ fn work(work: &MeanWork) -> f64 {
 
 fn tracing(points: &[AnyHitPoint]) -> Markup {
     let rows = points.iter().flat_map(|point| point.rays.iter().map(|rays| (point.scene.as_str(), rays)));
-    let mrays_s = |rays: &FlaggedRays, milliseconds: f64| Some(rays.count as f64 / (milliseconds * 1e3));
-    let both = |rays: &FlaggedRays, of: fn(&MeanWork) -> f64| {
-        let [off, on] = [of(&rays.off_work), of(&rays.on_work)];
-        html! { td.number data-value=(on) { (three_digits(off)) " → " (three_digits(on)) } }
-    };
     Table::new("Children in order, rays", rows)
         .name("scene", |(scene, _)| *scene)
         .text("rays", |(_, rays)| &rays.rays)

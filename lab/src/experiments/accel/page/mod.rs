@@ -5,6 +5,7 @@
 
 mod any_hit;
 mod batch;
+mod flagged;
 mod goals;
 mod rebraid;
 mod top_level;

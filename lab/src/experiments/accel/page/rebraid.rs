@@ -1,12 +1,13 @@
 //! The section of re-braiding.
 
 use super::Part;
+use super::flagged::{both, gains, mrays_s};
 use super::goals::{self, mean_gain, overlaps};
 use crate::Result;
-use crate::experiments::accel::points::{FlaggedRays, MeanWork, RebraidPoint, TopLevelPoint};
-use crate::report::bars::{Bar, Bars};
+use crate::experiments::accel::points::{RebraidPoint, TopLevelPoint};
+use crate::report::bars::Bars;
 use crate::report::numbers::{count, grouped, short_count, three_digits, tick, whole};
-use crate::report::{Caption, Chart, SERIES, Section, Table, bars, document, slug};
+use crate::report::{Caption, Chart, Section, Table, bars, document, slug};
 use maud::{Markup, html};
 
 pub(super) fn part(points: &[RebraidPoint]) -> Result<Option<Part>> {
@@ -39,14 +40,7 @@ pub(super) fn part(points: &[RebraidPoint]) -> Result<Option<Part>> {
 
 /// The gain of each kind of ray in one scene.
 fn chart(point: &RebraidPoint) -> Result<Option<Chart>> {
-    let bar = |(i, rays): (usize, &FlaggedRays)| Bar {
-        label: rays.rays.clone(),
-        figure: three_digits(rays.gain.median),
-        spread: rays.gain,
-        tone: SERIES[i % SERIES.len()],
-    };
-    let all: Vec<Bar> = point.rays.iter().enumerate().map(bar).collect();
-    let in_words: Vec<String> = all.iter().map(|bar| format!("{} {}", bar.label, bar.figure)).collect();
+    let (all, in_words) = gains(&point.rays);
     let mean = mean_gain(&point.rays).map_or(f64::NAN, |gain| gain.median);
     let slowest = point.rays.iter().min_by(|a, b| a.gain.median.total_cmp(&b.gain.median));
     let slower = match slowest {
@@ -60,7 +54,7 @@ fn chart(point: &RebraidPoint) -> Result<Option<Chart>> {
     let caption = Caption {
         name: format!("accel-rebraid-{}", slug(&point.scene)),
         title: format!("{}: speed with re-braiding over speed without", point.scene),
-        alt: in_words.join("; "),
+        alt: in_words,
         reading: format!(
             "{} instances of {} parts; {boxes}. Right of 1, re-braiding is faster: {} in the geometric mean over kinds{slower}. \
              The line through a bar goes from the least to the greatest of the runs.",
@@ -103,11 +97,6 @@ fn buildings(points: &[RebraidPoint]) -> Markup {
 /// Every kind of ray in every scene.
 fn tracing(points: &[RebraidPoint]) -> Markup {
     let rows = points.iter().flat_map(|point| point.rays.iter().map(|rays| (point.scene.as_str(), rays)));
-    let mrays_s = |rays: &FlaggedRays, milliseconds: f64| Some(rays.count as f64 / (milliseconds * 1e3));
-    let both = |rays: &FlaggedRays, of: fn(&MeanWork) -> f64| {
-        let [off, on] = [of(&rays.off_work), of(&rays.on_work)];
-        html! { td.number data-value=(on) { (three_digits(off)) " → " (three_digits(on)) } }
-    };
     Table::new("Re-braiding, rays", rows)
         .name("scene", |(scene, _)| *scene)
         .text("rays", |(_, rays)| &rays.rays)
