@@ -38,6 +38,11 @@ pub struct FluxRays {
 }
 
 impl FluxRays {
+    /// All of so many rays.
+    pub fn all(rays: Region, hits: Region, ray_count: u32) -> FluxRays {
+        FluxRays { rays, hits, ray_count, first: 0, stride: 1 }
+    }
+
     /// How many are taken.
     fn taken(&self) -> u32 {
         self.ray_count.saturating_sub(self.first).div_ceil(self.stride.max(1))

@@ -74,13 +74,7 @@ fn run(device: &Device, scene: &Scene, shares: &[f32], rounds: u32, before: u32)
         let cost = share.map_or(Cost::Area, |share| Cost::Rays { grid: grid.region(), share });
         let rays: Vec<FluxRays> = samples
             .iter()
-            .map(|(ray_count, rays, hits)| FluxRays {
-                rays: rays.region(),
-                hits: hits.region(),
-                ray_count: *ray_count,
-                first: 0,
-                stride: 1,
-            })
+            .map(|(ray_count, rays, hits)| FluxRays::all(rays.region(), hits.region(), *ray_count))
             .collect();
         let fill =
             |recorder: &mut Recorder<'_>| FluxPass::new(device).record(recorder, copy.region(), &rays, grid.region());

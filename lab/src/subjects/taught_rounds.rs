@@ -62,12 +62,8 @@ impl<'a> TaughtRounds<'a> {
             tracer::record(recorder, &shape, Query::ClosestHit, &buffers)?;
         }
         recorder.barrier();
-        let of = |(ray_count, rays, hits): &(u32, Buffer<'_>, Buffer<'_>)| FluxRays {
-            rays: rays.region(),
-            hits: hits.region(),
-            ray_count: *ray_count,
-            first: 0,
-            stride: 1,
+        let of = |(ray_count, rays, hits): &(u32, Buffer<'_>, Buffer<'_>)| {
+            FluxRays::all(rays.region(), hits.region(), *ray_count)
         };
         let samples: Vec<FluxRays> = self.samples.iter().map(of).collect();
         FluxPass::new(recorder.context()).record(recorder, structure, &samples, self.grid.region())?;
