@@ -113,13 +113,15 @@ uint load_reference(Geometry g, uint reference, out Box b) {
     return r.left_out;
 }
 
-// Writes the record of a leaf's primitive to its place, and outputs its box. Returns as load_reference does.
-uint write_reference(uvec2 records, uint position, Geometry g, uint reference, out Box b) {
-    if (!HAS_REFERENCES) return write_record(records, position, g, reference, b);
+// Writes the record of a leaf's primitive to its place, and outputs the leaf's box and, of a triangle, its corners. Returns as
+// load_reference does.
+uint write_reference(uvec2 records, uint position, Geometry g, uint reference, out Box b, out Corners c) {
+    if (!HAS_REFERENCES) return write_record(records, position, g, reference, b, c);
     Reference r = References(part(parts.references)).reference[reference];
     Box whole;
+    c = Corners(vec3(0), vec3(0), vec3(0));
     if (r.primitive == NO_PRIMITIVE) Triangles(records).triangle[position] = Triangle(vec3(0), vec3(0), vec3(0), NO_PRIMITIVE);
-    else write_record(records, position, g, r.primitive, whole);
+    else write_record(records, position, g, r.primitive, whole, c);
     b = Box(r.lo, r.hi);
     return r.left_out;
 }

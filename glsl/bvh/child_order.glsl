@@ -71,7 +71,10 @@ void child_order_parents(uint slot, uint node_slots) {
 // The area by which a ray meets a record: a convex body is met by its half area, as a triangle by its whole. What an instance holds fills
 // its leaf.
 float area_of_record(uvec2 records, uint kind, uint at, float scale, float leaf_area) {
-    if (kind == KIND_TRIANGLES) return min(area_of_triangle(Triangles(records).triangle[at], scale), leaf_area);
+    if (kind == KIND_TRIANGLES) {
+        Triangle t = Triangles(records).triangle[at];
+        return min(area_of_triangle(t.v0, t.v1, t.v2, scale), leaf_area);
+    }
     if (kind != KIND_BOXES) return leaf_area;
     BoxRecord b = BoxRecords(records).box[at];
     return min(scaled_half_area(Box(b.lo, b.hi), scale), leaf_area);

@@ -51,9 +51,9 @@ float share(float part, float whole, float otherwise) {
     return whole > 0.0 ? min(ratio, 1.0) : otherwise;
 }
 
-float area_of_triangle(Triangle t, float scale) {
-    precise vec3 a = t.v1 * scale - t.v0 * scale;
-    precise vec3 b = t.v2 * scale - t.v0 * scale;
+float area_of_triangle(vec3 v0, vec3 v1, vec3 v2, float scale) {
+    precise vec3 a = v1 * scale - v0 * scale;
+    precise vec3 b = v2 * scale - v0 * scale;
     precise vec3 n = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
     precise float square = n.x * n.x + n.y * n.y + n.z * n.z;
     return square >= LEAST_SQUARE ? 0.5 * square_root(square) : 0.0;

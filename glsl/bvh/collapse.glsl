@@ -262,8 +262,9 @@ void collapse_records(uint task) {
     for (uint k = 0; k < ITEMS; ++k) {
         uint position = first + k * gl_WorkGroupSize.x;
         Box b;
+        Corners c;
         if (position < primitive_count) {
-            write_reference(records, position, input_geometries, sorted.word[walk.word[position]], b);
+            write_reference(records, position, input_geometries, sorted.word[walk.word[position]], b, c);
         }
     }
 }

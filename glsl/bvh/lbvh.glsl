@@ -45,11 +45,10 @@ Weight order_children(Run run, uint slot, bool is_left, float area, Subtree own,
     return weight;
 }
 
-// The area by which a ray meets the primitive of a record with this half area of its box; of a triangle that was split what the box
-// has room for.
-float area_of_record(uvec2 records, uint position, float box_area, float area_scale) {
+// The area by which a ray meets a primitive with this half area of its box; of a triangle that was split what the box has room for.
+float area_of_primitive(Corners c, float box_area, float area_scale) {
     if (!HAS_AREAS || kind_of_records() != KIND_TRIANGLES) return box_area;
-    return min(area_of_triangle(Triangles(records).triangle[position], area_scale), box_area);
+    return min(area_of_triangle(c.v0, c.v1, c.v2, area_scale), box_area);
 }
 
 // From a subtree up, as far as siblings are there.
@@ -108,7 +107,8 @@ void lbvh_hierarchy(uint task) {
             bool climbs = true;
             if (position < end) {
                 Box b;
-                write_reference(records, position, input_geometries, order.word[position], b);
+                Corners c;
+                write_reference(records, position, input_geometries, order.word[position], b, c);
                 climbs = position < run.active_count;
                 s.first = position;
                 s.last = position;
@@ -116,7 +116,7 @@ void lbvh_hierarchy(uint task) {
                 float area = scaled_half_area(b, area_scale);
                 s.cost = leaf_cost(c_i, area, 1);
                 if (RULE != AS_BUILT && climbs) {
-                    s.area = area_of_record(records, position, area, area_scale);
+                    s.area = area_of_primitive(c, area, area_scale);
                     s.weight = weight_of_leaf(s.area, area, 1u, c_i);
                 }
                 position++;

@@ -73,10 +73,11 @@ uint load_box(Geometry g, uint primitive, out Box b) {
     return why_not;
 }
 
-// Writes the record of a primitive to its place, and outputs the box. Returns as load_box does. One that is left out has a
-// record of zeros.
-uint write_record(uvec2 records, uint position, Geometry g, uint primitive, out Box b) {
+// Writes the record of a primitive to its place, and outputs its box and, of a triangle, its corners. Returns as load_box does. One that
+// is left out has a record of zeros.
+uint write_record(uvec2 records, uint position, Geometry g, uint primitive, out Box b, out Corners c) {
     uint why_not;
+    c = Corners(vec3(0), vec3(0), vec3(0));
     if (SOURCE == SOURCE_ENTRIES) {
         Entry entry = Entries(g.vertices).entry[primitive];
         Instances(records).instance[position] = record_of(entry);
@@ -86,7 +87,6 @@ uint write_record(uvec2 records, uint position, Geometry g, uint primitive, out 
         why_not = load_given_box(g, primitive, b);
         BoxRecords(records).box[position] = BoxRecord(b.lo, b.hi, primitive);
     } else {
-        Corners c;
         why_not = load_corners(g, primitive, c);
         Triangles(records).triangle[position] = Triangle(c.v0, c.v1, c.v2, primitive);
         b = box_around(c);

@@ -123,7 +123,8 @@ Box refit_record(Work w, uint position, inout uint status) {
     uint primitive = primitive_of(w, position);
     uint why_not = STATUS_INDEX_OUT_OF_RANGE;
     Box b;
-    if (primitive < w.primitive_count) why_not = write_record(w.records, position, w.geometry, primitive, b);
+    Corners c;
+    if (primitive < w.primitive_count) why_not = write_record(w.records, position, w.geometry, primitive, b, c);
     if (why_not == 0u) return b;
     status |= why_not;
     leave_out(w, position, primitive);
