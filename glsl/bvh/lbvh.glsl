@@ -25,24 +25,21 @@ uint free_slots(Structure structure, uint first, uint last) {
     return freed;
 }
 
-// Puts the children of the node at hand in order, of which `s` has the box; its weight, if it is no leaf. No other invocation looks at
-// the node any more.
-Weight order_children(Run run, uint slot, bool is_left, float area, Subtree own, Sibling sibling, float area_scale) {
-    Child left = own.child, right = sibling.child;
-    Weights2 w = Weights2(own.weight, sibling.weight);
-    if (!is_left) {
-        left = sibling.child;
-        right = own.child;
-        w = Weights2(sibling.weight, own.weight);
-    }
-    vec2 areas = vec2(scaled_half_area(Box(left.lo, left.hi), area_scale), scaled_half_area(Box(right.lo, right.hi), area_scale));
-    bool swaps;
-    Weight weight = weight_in_order(w, w, areas, area, c_t, swaps);
-    if (swaps) {
-        run.structure.nodes[slot].left = right;
-        run.structure.nodes[slot].right = left;
-    }
-    return weight;
+// The weight of the node over a subtree and its sibling, with this half area, and whether its children swap places.
+Weight weight_of_node(bool is_left, float area, Subtree own, Sibling sibling, float area_scale, out bool swaps) {
+    float own_area = scaled_half_area(Box(own.child.lo, own.child.hi), area_scale);
+    float other_area = scaled_half_area(Box(sibling.child.lo, sibling.child.hi), area_scale);
+    Weights2 w = is_left ? Weights2(own.weight, sibling.weight) : Weights2(sibling.weight, own.weight);
+    vec2 areas = is_left ? vec2(own_area, other_area) : vec2(other_area, own_area);
+    return weight_in_order(w, w, areas, area, c_t, swaps);
+}
+
+// Children are where they shall stay: one that is not written yet, or both of those that swap. No other invocation looks at the node any
+// more.
+void place_children(Run run, uint slot, bool is_left, bool is_written, bool swaps, Child own, Child sibling) {
+    bool is_first = is_left != swaps;
+    if (swaps || !is_written) run.children.child[child_number(slot, is_first)] = own;
+    if (swaps) run.children.child[child_number(slot, !is_first)] = sibling;
 }
 
 // The area by which a ray meets a primitive with this half area of its box; of a triangle that was split what the box has room for.
@@ -66,6 +63,7 @@ void climb(inout Run run, float area_scale, Subtree s, inout uint unused) {
         }
         bool is_left = is_left_child(s);
         uint parent = parent_of(s, is_left);
+        bool is_written = RULE == AS_BUILT || !meets_in_run(run, is_left);
         Subtree own = s;
         Sibling sibling;
         if (!step_up(run, is_left, parent, s, sibling)) break;
@@ -76,16 +74,20 @@ void climb(inout Run run, float area_scale, Subtree s, inout uint unused) {
         bool as_leaf_is_cheaper = collapses != 0 && as_leaf < s.cost;
         s.child.index = as_leaf_is_cheaper ? s.first : parent;
         s.child.count = as_leaf_is_cheaper ? count : 0;
-        if (as_leaf_is_cheaper) {
-            s.cost = as_leaf;
-            unused += free_slots(structure, s.first, s.last);
-        }
         if (HAS_AREAS) {
             precise float area_of_both = own.area + sibling.area;
             s.area = area_of_both;
         }
-        if (RULE != AS_BUILT && as_leaf_is_cheaper) s.weight = weight_of_leaf(s.area, area, count, c_i);
-        else if (RULE != AS_BUILT) s.weight = order_children(run, parent, is_left, area, own, sibling, area_scale);
+        if (RULE != AS_BUILT) {
+            bool swaps = false;
+            if (as_leaf_is_cheaper) s.weight = weight_of_leaf(s.area, area, count, c_i);
+            else s.weight = weight_of_node(is_left, area, own, sibling, area_scale, swaps);
+            place_children(run, parent, is_left, is_written, swaps, own.child, sibling.child);
+        }
+        if (as_leaf_is_cheaper) {
+            s.cost = as_leaf;
+            unused += free_slots(structure, s.first, s.last);
+        }
     }
 }
 

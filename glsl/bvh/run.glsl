@@ -33,6 +33,16 @@ struct ChildWeight {
 
 BUFFER ChildWeights { ChildWeight of[]; };
 
+// Children of nodes by number: where lanes take a left and a right one, a load or store of either side does for both.
+layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer Children { Child child[]; };
+
+// A header is as long as so many children.
+const uint HEADER_CHILDREN = 4;
+
+uint child_number(uint slot, bool is_left) {
+    return HEADER_CHILDREN + 2u * slot + (is_left ? 0u : 1u);
+}
+
 // The sibling of a subtree that has stepped up.
 struct Sibling {
     Child child;
@@ -47,6 +57,7 @@ const uint TURNS = MEETS_IN_GROUP ? 2u : 1u;
 // A run from a position on, or NONE once its leaves are done; how many left children wait in it.
 struct Run {
     Structure structure;
+    Children children;    // of all nodes: `child_number`
     Words codes;
     Words ends;
     Floats left_costs;
@@ -78,6 +89,7 @@ uint run_slot(uint level) {
 Run run_of(uint task) {
     Run run;
     run.structure = Structure(structure_address);
+    run.children = Children(structure_address);
     run.codes = sorted_keys();
     run.ends = Words(part(parts.ends));
     run.left_costs = Floats(part(parts.child_costs[0]));
@@ -109,22 +121,21 @@ void end_turn() {
     if (MEETS_IN_GROUP) next_phase();
 }
 
+Floats costs_of(Run run, bool is_left) {
+    return Floats(is_left ? uvec2(run.left_costs) : uvec2(run.right_costs));
+}
+
+ChildWeights weights_of(Run run, bool is_left) {
+    return ChildWeights(is_left ? uvec2(run.left_weights) : uvec2(run.right_weights));
+}
+
 void load_weight(Run run, bool is_left, uint parent, out Weight weight, out float area) {
     weight = Weight(0.0, 0.0);
     area = 0.0;
     if (!HAS_WEIGHTS) return;
-    ChildWeight of_child;
-    if (is_left) of_child = run.left_weights.of[parent];
-    else of_child = run.right_weights.of[parent];
+    ChildWeight of_child = weights_of(run, is_left).of[parent];
     weight = of_child.weight;
     area = of_child.area;
-}
-
-void store_weight(Run run, bool is_left, uint parent, Subtree s) {
-    if (!HAS_WEIGHTS) return;
-    ChildWeight of_child = ChildWeight(s.weight, s.area);
-    if (is_left) run.left_weights.of[parent] = of_child;
-    else run.right_weights.of[parent] = of_child;
 }
 
 // The next subtree, from this split on, whose sibling has not come in the workgroup.
@@ -136,9 +147,8 @@ bool take_left_over(Run run, inout uint split, out Subtree s) {
         bool is_left = (end & LEFT_SIDE) != 0u;
         s.first = is_left ? end & ~LEFT_SIDE : parent + 1u;
         s.last = is_left ? parent : end;
-        if (is_left) s.child = run.structure.nodes[parent].left;
-        else s.child = run.structure.nodes[parent].right;
-        s.cost = is_left ? run.left_costs.value[parent] : run.right_costs.value[parent];
+        s.child = run.children.child[child_number(parent, is_left)];
+        s.cost = costs_of(run, is_left).value[parent];
         load_weight(run, is_left, parent, s.weight, s.area);
         split += gl_WorkGroupSize.x;
         return true;
@@ -193,21 +203,25 @@ uint meet_in_device(Run run, uint parent, uint end) {
     return other;
 }
 
-// Whether the sibling is there; then `s` has the positions and the box of both.
+// Whether the sibling is the last that waits in the run: then no other invocation asks for the child.
+bool meets_in_run(Run run, bool is_left) {
+    return !is_left && run.waiting > 0u;
+}
+
+// Whether the sibling is there; then `s` has the positions and the box of both. Where children get an order and met in the run, the right
+// one is not written yet, as it may belong on the left.
 bool step_up(inout Run run, bool is_left, uint parent, inout Subtree s, out Sibling sibling) {
-    if (is_left) {
-        run.structure.nodes[parent].left = s.child;
-        run.left_costs.value[parent] = s.cost;
-    } else {
-        run.structure.nodes[parent].right = s.child;
-        run.right_costs.value[parent] = s.cost;
+    bool in_run = meets_in_run(run, is_left);
+    if (RULE == AS_BUILT || !in_run) run.children.child[child_number(parent, is_left)] = s.child;
+    if (!in_run) {
+        costs_of(run, is_left).value[parent] = s.cost;
+        if (HAS_WEIGHTS) weights_of(run, is_left).of[parent] = ChildWeight(s.weight, s.area);
     }
-    store_weight(run, is_left, parent, s);
     uint end = NONE;
     if (is_left && s.first >= run.first) {
         run_firsts[run_slot(run.waiting)] = s.first;
         run.waiting++;
-    } else if (!is_left && run.waiting > 0u) {
+    } else if (in_run) {
         run.waiting--;
         end = run_firsts[run_slot(run.waiting)];
     } else {
@@ -219,14 +233,12 @@ bool step_up(inout Run run, bool is_left, uint parent, inout Subtree s, out Sibl
         if (is_left) {
             s.last = end;
             s.behind = difference_behind(run.codes, s.last, run.active_count);
-            sibling.child = run.structure.nodes[parent].right;
-            sibling.cost = run.right_costs.value[parent];
         } else {
             s.first = end;
             s.before = difference_before(run.codes, s.first);
-            sibling.child = run.structure.nodes[parent].left;
-            sibling.cost = run.left_costs.value[parent];
         }
+        sibling.child = run.children.child[child_number(parent, !is_left)];
+        sibling.cost = costs_of(run, !is_left).value[parent];
         load_weight(run, !is_left, parent, sibling.weight, sibling.area);
         s.child.lo = min(s.child.lo, sibling.child.lo);
         s.child.hi = max(s.child.hi, sibling.child.hi);

@@ -70,10 +70,10 @@ fn left_first(kind: &str) -> f64 {
 }
 
 /// No kind of rays may take more than this part of its time by the nearest child first.
-const MOST: f64 = 1.05;
+const MOST: f64 = 1.02;
 
 /// Of all orders and the nearest child first, the one with the least work for rays that teach, of subjects that `make` makes: by the
-/// geometric mean over their kinds, each unit of work by its time, and for none of them more than 1.05 of its time by the nearest child
+/// geometric mean over their kinds, each unit of work by its time, and for none of them more than 1.02 of its time by the nearest child
 /// first.
 ///
 /// # Errors
