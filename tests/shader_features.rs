@@ -25,6 +25,11 @@ fn required(capability: Capability) -> Option<&'static str> {
     })
 }
 
+/// What a module needs that stands beside one without it, and is taken where the device has it: `gpu::Optional`.
+fn of_the_module(shader: &str, capability: Capability) -> bool {
+    capability == Capability::Int64 && shader.ends_with("_int64")
+}
+
 /// What the driver's peers need beyond it: their pipelines are made only where `DriverTracing` is there.
 fn of_the_driver(shader: &str, capability: Capability) -> bool {
     match capability {
@@ -39,7 +44,8 @@ fn every_capability_of_a_shader_is_required_of_the_device() {
     for (name, module) in modules() {
         for declared in &module.capabilities {
             let Operand::Capability(capability) = declared.operands[0] else { unreachable!("OpCapability names one") };
-            let known = required(capability).is_some() || of_the_driver(name, capability);
+            let known =
+                required(capability).is_some() || of_the_module(name, capability) || of_the_driver(name, capability);
             assert!(known, "{name} needs {capability:?}, which src/gpu/requirements.rs does not ask for");
         }
     }

@@ -16,17 +16,22 @@ pub const HEDGEROW_OPTIONAL_SUBGROUP_SIZE_CONTROL: HedgerowOptional = 1;
 /// `VK_KHR_shader_maximal_reconvergence` with its feature `shaderMaximalReconvergence`. hedgerow_create_requirements leaves it out, as
 /// no kernel relies on it: if you enable it, set the bit.
 pub const HEDGEROW_OPTIONAL_MAXIMAL_RECONVERGENCE: HedgerowOptional = 2;
+/// The feature `shaderInt64`: on CPUs, tracers load elements of 64 bits. hedgerow_create_requirements leaves it out, as it lies in
+/// `VkPhysicalDeviceFeatures`, which is yours: if you enable it there, set the bit.
+pub const HEDGEROW_OPTIONAL_INT64: HedgerowOptional = 4;
 
 fn bits_of(optional: Optional) -> HedgerowOptional {
     let bit = |has: bool, bit| if has { bit } else { 0 };
     bit(optional.subgroup_size_control, HEDGEROW_OPTIONAL_SUBGROUP_SIZE_CONTROL)
         | bit(optional.maximal_reconvergence, HEDGEROW_OPTIONAL_MAXIMAL_RECONVERGENCE)
+        | bit(optional.int64, HEDGEROW_OPTIONAL_INT64)
 }
 
 pub(crate) fn optional_of(bits: HedgerowOptional) -> Result<Optional> {
     let optional = Optional {
         subgroup_size_control: bits & HEDGEROW_OPTIONAL_SUBGROUP_SIZE_CONTROL != 0,
         maximal_reconvergence: bits & HEDGEROW_OPTIONAL_MAXIMAL_RECONVERGENCE != 0,
+        int64: bits & HEDGEROW_OPTIONAL_INT64 != 0,
     };
     if bits_of(optional) != bits {
         return Err(Error::Argument(format!("optional is {bits:#x}; it must be of the bits HEDGEROW_OPTIONAL_*")));

@@ -1,9 +1,12 @@
-// Nodes and triangles as tracers load them: member by member, or in vectors. A GPU takes a node of 64 bytes by four loads of 128 bits,
+// Nodes and triangles as tracers load them: member by member, in vectors, or with HEDGEROW_INT64 in elements of 64 bits. A GPU takes a node of 64 bytes by four loads of 128 bits,
 // and a triangle by five of 64, where members one by one are sixteen and ten; and memory that nothing writes while rays are traced may lie in
-// its read-only cache. Where lanes gather (CPUs), a vector is as many gathers as it has words.
+// its read-only cache. Where lanes gather (CPUs), a vector is as many gathers as it has words, and an element of 64 bits is one.
 #ifndef HEDGEROW_TRACE_VECTOR_LOADS
 #define HEDGEROW_TRACE_VECTOR_LOADS
 #include "bvh/layout.glsl"
+#ifdef HEDGEROW_INT64
+#include "trace/long_loads.glsl"
+#endif
 
 // 4 is taken by trace/lanes.glsl.
 layout(constant_id = 5) const bool IN_VECTORS = false;
@@ -17,14 +20,21 @@ Child child_of_quads(uvec4 lo, uvec4 hi) {
 
 // Nodes are fewer than 2^27: no product here is over 2^32.
 Node node_at(Structure structure, uint index) {
+#ifdef HEDGEROW_INT64
+    return hedgerow_long_node(address_of(uvec2(structure), 2u + index, 64u));
+#else
     if (!IN_VECTORS) return structure.nodes[index];
     // Behind the header's 128 bytes.
     Quads node = Quads(address_of(uvec2(structure), 1u, 128u));
     uint at = 4u * index;
     return Node(child_of_quads(node.quad[at], node.quad[at + 1u]), child_of_quads(node.quad[at + 2u], node.quad[at + 3u]));
+#endif
 }
 
 Triangle triangle_at(Triangles triangles, uint index) {
+#ifdef HEDGEROW_INT64
+    return hedgerow_long_triangle(address_of(uvec2(triangles), index, 40u));
+#else
     if (!IN_VECTORS) return triangles.triangle[index];
     Pairs triangle = Pairs(uvec2(triangles));
     uint at = 5u * index;
@@ -32,5 +42,6 @@ Triangle triangle_at(Triangles triangles, uint index) {
     vec2 c = uintBitsToFloat(triangle.pair[at + 2u]), d = uintBitsToFloat(triangle.pair[at + 3u]);
     uvec2 e = triangle.pair[at + 4u];
     return Triangle(vec3(a, b.x), vec3(b.y, c), vec3(d, uintBitsToFloat(e.x)), e.y);
+#endif
 }
 #endif

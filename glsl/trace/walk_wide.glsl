@@ -19,13 +19,20 @@ struct WideNode {
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer WideNodes { WideNode node[]; };
 
 WideNode wide_node_at(WideNodes nodes, uint index) {
+    WideNode node;
+#ifdef HEDGEROW_INT64
+    HedgerowLongs longs = HedgerowLongs(address_of(uvec2(nodes), index, 32u * WIDTH));
+    [[unroll]] for (uint i = 0; i < WIDTH; ++i) {
+        node.child[i] = child_of_quads(hedgerow_quad_of(longs, 4u * i), hedgerow_quad_of(longs, 4u * i + 2u));
+    }
+#else
     if (!IN_VECTORS) return nodes.node[index];
     Quads quads = Quads(uvec2(nodes));
-    WideNode node;
     [[unroll]] for (uint i = 0; i < WIDTH; ++i) {
         uint at = 2u * (WIDTH * index + i);
         node.child[i] = child_of_quads(quads.quad[at], quads.quad[at + 1u]);
     }
+#endif
     return node;
 }
 

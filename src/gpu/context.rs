@@ -47,6 +47,8 @@ pub struct Limits {
     /// Whether workgroups of whole subgroups have full subgroups of exactly `subgroup_size`: it is required when a pipeline is
     /// made, or the device has one size alone. Otherwise a subgroup may be smaller, down to one invocation.
     pub subgroup_is_exact: bool,
+    /// Whether shaders may have integers of 64 bits: [`Optional::int64`].
+    pub int64: bool,
     /// The most invocations of a workgroup.
     pub workgroup_invocations: u32,
     /// The most bytes of shared memory of a workgroup.
@@ -82,6 +84,7 @@ impl Limits {
             subgroup_min: sizes.least,
             subgroup_max: sizes.most.min(128).max(subgroup_size),
             subgroup_is_exact: optional.subgroup_size_control || sizes.least == sizes.most,
+            int64: optional.int64,
             workgroup_invocations: properties.limits.max_compute_work_group_invocations,
             shared_memory: properties.limits.max_compute_shared_memory_size,
             workgroup_count: properties.limits.max_compute_work_group_count[0],

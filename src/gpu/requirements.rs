@@ -13,20 +13,25 @@ pub struct Optional {
     /// `VK_KHR_shader_maximal_reconvergence` with its feature `shaderMaximalReconvergence`: lanes meet again where the source
     /// says. No kernel relies on it, so it is enabled only where [`Requirements::only`] asks for it.
     pub maximal_reconvergence: bool,
+    /// The feature `shaderInt64`: on CPUs, tracers and queries load elements of 64 bits, 1.1 to 1.2 times as fast. It lies in
+    /// `VkPhysicalDeviceFeatures`, which an engine fills in itself, so that it is enabled only where [`Requirements::only`] asks for it;
+    /// whoever enables it there says so in [`super::ContextDesc::optional`].
+    pub int64: bool,
 }
 
 impl Optional {
     /// Nothing is enabled that [`requirements`] did not require: always right.
-    pub const NONE: Optional = Optional { subgroup_size_control: false, maximal_reconvergence: false };
+    pub const NONE: Optional = Optional { subgroup_size_control: false, maximal_reconvergence: false, int64: false };
 
-    /// What [`requirements`] enables if the device has it: the features that kernels use.
-    pub const DEFAULT: Optional = Optional { subgroup_size_control: true, maximal_reconvergence: false };
+    /// What [`requirements`] enables if the device has it: the features that kernels use and that lie in structures of their own.
+    pub const DEFAULT: Optional = Optional { subgroup_size_control: true, ..Optional::NONE };
 
     /// What both have.
     pub fn and(self, other: Optional) -> Optional {
         Optional {
             subgroup_size_control: self.subgroup_size_control && other.subgroup_size_control,
             maximal_reconvergence: self.maximal_reconvergence && other.maximal_reconvergence,
+            int64: self.int64 && other.int64,
         }
     }
 
@@ -34,7 +39,8 @@ impl Optional {
     pub fn names(self) -> Vec<&'static str> {
         let subgroups = self.subgroup_size_control.then_some("subgroup size control");
         let reconvergence = self.maximal_reconvergence.then_some("maximal reconvergence");
-        subgroups.into_iter().chain(reconvergence).collect()
+        let int64 = self.int64.then_some("64-bit integers");
+        subgroups.into_iter().chain(reconvergence).chain(int64).collect()
     }
 
     fn extensions(self) -> Vec<&'static CStr> {
@@ -60,12 +66,14 @@ impl Optional {
         }
         // SAFETY: the handles are the caller's and live; the structures are chained and outlive the call.
         unsafe { instance.get_physical_device_features2(physical_device, &mut features) };
+        let int64 = features.features.shader_int64 != vk::FALSE;
         let full = subgroups.subgroup_size_control & subgroups.compute_full_subgroups != vk::FALSE;
         Optional {
             subgroup_size_control: offers_subgroups
                 && full
                 && SubgroupSizes::of(instance, physical_device).can_be_required,
             maximal_reconvergence: offers_reconvergence && reconvergence.shader_maximal_reconvergence != vk::FALSE,
+            int64,
         }
     }
 }
@@ -125,6 +133,7 @@ impl SubgroupSizes {
 /// The required ones are core in Vulkan 1.2: no extension, no 64-bit integers, no float atomics.
 #[derive(Debug, Clone, Copy)]
 pub struct Features {
+    vulkan_1_0: vk::PhysicalDeviceFeatures2<'static>,
     vulkan_1_2: vk::PhysicalDeviceVulkan12Features<'static>,
     subgroups: vk::PhysicalDeviceSubgroupSizeControlFeatures<'static>,
     reconvergence: vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR<'static>,
@@ -132,7 +141,9 @@ pub struct Features {
 
 impl Features {
     fn with(optional: Optional) -> Features {
+        let int64 = vk::PhysicalDeviceFeatures::default().shader_int64(optional.int64);
         Features {
+            vulkan_1_0: vk::PhysicalDeviceFeatures2::default().features(int64),
             vulkan_1_2: vk::PhysicalDeviceVulkan12Features::default()
                 .buffer_device_address(true)
                 .vulkan_memory_model(true)
@@ -149,7 +160,8 @@ impl Features {
     /// Chains the features behind `info`. Vulkan allows each structure once in a chain: if yours holds a
     /// `VkPhysicalDeviceVulkan12Features`, set `bufferDeviceAddress`, `vulkanMemoryModel`, `vulkanMemoryModelDeviceScope` and
     /// `scalarBlockLayout` there instead; if it holds a `VkPhysicalDeviceVulkan13Features`, `subgroupSizeControl` and
-    /// `computeFullSubgroups`, or take [`Requirements::only`] what you want.
+    /// `computeFullSubgroups`, or take [`Requirements::only`] what you want. Where [`Optional::int64`] is asked for, a
+    /// `VkPhysicalDeviceFeatures2` is among them: `pEnabledFeatures` must then be null.
     pub fn push_into<'a>(&'a mut self, info: vk::DeviceCreateInfo<'a>) -> vk::DeviceCreateInfo<'a> {
         let mut info = info.push_next(&mut self.vulkan_1_2);
         if self.subgroups.subgroup_size_control != vk::FALSE {
@@ -157,6 +169,9 @@ impl Features {
         }
         if self.reconvergence.shader_maximal_reconvergence != vk::FALSE {
             info = info.push_next(&mut self.reconvergence);
+        }
+        if self.vulkan_1_0.features.shader_int64 != vk::FALSE {
+            info = info.push_next(&mut self.vulkan_1_0);
         }
         info
     }

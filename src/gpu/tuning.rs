@@ -151,6 +151,8 @@ pub struct TraceTuning {
     pub lane_by_lane: bool,
     /// Whether each lane loads them in vectors, or member by member.
     pub in_vectors: bool,
+    /// Whether each lane loads them in elements of 64 bits, where it loads for itself and not in vectors.
+    pub in_longs: bool,
     /// Whether rays meet the children of quantised nodes by octants, or by distance.
     pub by_octant: bool,
 }
@@ -220,6 +222,8 @@ impl Tuning {
                 rays_each: 128,
                 lane_by_lane,
                 in_vectors: false,
+                // Lanes gather: half of the gathers.
+                in_longs: limits.int64,
                 by_octant: lane_by_lane,
             },
         }
@@ -279,6 +283,7 @@ impl Tuning {
                 rays_each: 1,
                 lane_by_lane: false,
                 in_vectors: true,
+                in_longs: false,
                 by_octant: true,
             },
         }

@@ -37,6 +37,9 @@ pub enum Loads {
     Gathered,
     /// Each for itself, in vectors of 64 and 128 bits (`glsl/trace/vector_loads.glsl`): for GPUs, where the number of loads counts.
     InVectors,
+    /// Each for itself, in elements of 64 bits (`glsl/trace/long_loads.glsl`): for CPUs, where lanes gather. The device must have
+    /// [`Optional::int64`](crate::gpu::Optional::int64).
+    InLongs,
     /// One lane after the other (`glsl/trace/tracer/lanes.comp`): 1.2 to 1.4 times as fast where a CPU's driver makes plain
     /// loads of it. The workgroup must be one subgroup, of at most [`Loads::MAX_LANES`].
     LaneByLane,
@@ -58,6 +61,7 @@ impl TraceShape {
             loads: match () {
                 () if tuning.lane_by_lane => Loads::LaneByLane,
                 () if tuning.in_vectors => Loads::InVectors,
+                () if tuning.in_longs => Loads::InLongs,
                 () => Loads::Gathered,
             },
         };
@@ -123,6 +127,7 @@ pub struct TraceBuffers {
 fn shader(shape: &TraceShape) -> &'static shaders::Shader {
     match shape.loads {
         Loads::Gathered | Loads::InVectors => &shaders::TRACE_TRACER_SINGLE,
+        Loads::InLongs => &shaders::TRACE_TRACER_SINGLE_INT64,
         Loads::LaneByLane => &shaders::TRACE_TRACER_LANES,
     }
 }
@@ -159,7 +164,7 @@ pub(super) fn kernel_left_first(shader: &'static shaders::Shader, shape: &TraceS
 ///
 /// # Errors
 /// More than [`MAX_RAYS`] rays, or than the memory holds; loads lane by lane in workgroups that are not one subgroup of at most
-/// [`Loads::MAX_LANES`]; the kernel's pipeline could not be made.
+/// [`Loads::MAX_LANES`], or of 64 bits without [`Optional::int64`](crate::gpu::Optional::int64); the kernel's pipeline could not be made.
 pub fn record(recorder: &mut Recorder<'_>, shape: &TraceShape, query: Query, buffers: &TraceBuffers) -> Result<()> {
     record_kernel(recorder, &kernel_of(shader(shape), shape, query, buffers.work.is_some()), shape, buffers)
 }
@@ -183,6 +188,12 @@ pub(super) fn record_kernel(
 ) -> Result<()> {
     let limits = &recorder.context().limits;
     let subgroup = limits.subgroup_size;
+    if shape.loads == Loads::InLongs && !limits.int64 {
+        return Err(Error::Argument(
+            "loads in elements of 64 bits, without Optional::int64 of the device; enable shaderInt64 and say so, or take Loads::Gathered"
+                .into(),
+        ));
+    }
     let is_one = shape.workgroup == subgroup && subgroup <= Loads::MAX_LANES && limits.subgroup_is_exact;
     if shape.loads == Loads::LaneByLane && !is_one {
         let or_fewer = if limits.subgroup_is_exact { "" } else { " or fewer" };

@@ -64,7 +64,12 @@ impl WideTracer {
     pub fn in_order(context: &Context, form: Form, order: Order) -> WideTracer {
         let mut shape = TraceShape::of(context);
         if order != Order::Octant {
-            shape.loads = if context.tuning.trace.in_vectors { Loads::InVectors } else { Loads::Gathered };
+            let tuning = &context.tuning.trace;
+            shape.loads = match () {
+                () if tuning.in_vectors => Loads::InVectors,
+                () if tuning.in_longs => Loads::InLongs,
+                () => Loads::Gathered,
+            };
         }
         WideTracer::with(&context.limits, form, order, shape)
     }
@@ -85,10 +90,14 @@ impl WideTracer {
         let shader = match (self.form, self.order, self.shape.loads) {
             (Form::EightQuantised, Order::Octant, Loads::LaneByLane) => &shaders::TRACE_WIDE_OCTANT_LANES,
             (form, order, Loads::LaneByLane) => return Err(self.no_kernel(form, order)),
+            (Form::EightQuantised, Order::Octant, Loads::InLongs) => &shaders::TRACE_WIDE_OCTANT_INT64,
             (Form::EightQuantised, Order::Octant, _) => &shaders::TRACE_WIDE_OCTANT,
             (form, Order::Octant, _) => return Err(self.no_kernel(form, Order::Octant)),
+            (Form::Four, _, Loads::InLongs) => &shaders::TRACE_WIDE_FOUR_INT64,
             (Form::Four, ..) => &shaders::TRACE_WIDE_FOUR,
+            (Form::Eight, _, Loads::InLongs) => &shaders::TRACE_WIDE_EIGHT_INT64,
             (Form::Eight, ..) => &shaders::TRACE_WIDE_EIGHT,
+            (Form::EightQuantised, _, Loads::InLongs) => &shaders::TRACE_WIDE_EIGHT_QUANTISED_INT64,
             (Form::EightQuantised, ..) => &shaders::TRACE_WIDE_EIGHT_QUANTISED,
         };
         match (self.order, query) {

@@ -144,6 +144,9 @@ fn shapes() -> Vec<TraceShape> {
     let few =
         TraceShape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads: Loads::Gathered };
     let mut shapes = vec![TraceShape::of(device()), TraceShape::subgroups(limits), TraceShape::groups(limits), few];
+    if limits.int64 {
+        shapes.push(TraceShape { loads: Loads::InLongs, ..few });
+    }
     if limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES {
         shapes.push(TraceShape::lanes(limits));
     }

@@ -23,6 +23,9 @@ fn shapes() -> Vec<TraceShape> {
         TraceShape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
         TraceShape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
     ];
+    if limits.int64 {
+        shapes.push(TraceShape { loads: Loads::InLongs, ..TraceShape::subgroups(limits) });
+    }
     if limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES {
         shapes.push(TraceShape::lanes(limits));
         shapes.push(TraceShape { shared_levels: 3, rays_each: 5, ..TraceShape::lanes(limits) });

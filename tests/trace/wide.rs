@@ -19,16 +19,19 @@ use hedgerow::trace::wide::{Order, WideTracer};
 use hedgerow::trace::{Hit, Query, Ray, Work};
 
 /// An order with every way to cut the work: that for CPUs, that for GPUs, no shared memory at all, and a stack half here and half there.
-fn tracers_in_order(form: Form, order: Order) -> [WideTracer; 4] {
+fn tracers_in_order(form: Form, order: Order) -> Vec<WideTracer> {
     let limits = &device().limits;
     let loads = Loads::Gathered;
-    let shapes = [
+    let mut shapes = vec![
         TraceShape::subgroups(limits),
         TraceShape::groups(limits),
         TraceShape { workgroup: limits.subgroup_size, shared_levels: 0, rays_each: 1, loads },
         TraceShape { workgroup: 4 * limits.subgroup_size, shared_levels: 3, rays_each: 5, loads },
     ];
-    shapes.map(|shape| WideTracer::with(limits, form, order, shape))
+    if limits.int64 {
+        shapes.push(TraceShape { loads: Loads::InLongs, ..TraceShape::subgroups(limits) });
+    }
+    shapes.into_iter().map(|shape| WideTracer::with(limits, form, order, shape)).collect()
 }
 
 /// The default, and every order for either query.
