@@ -17,7 +17,8 @@ const WITHOUT_TWIN: [(&str, &str); 7] = [
 ];
 
 /// What twins share, and is the plain form of no pass of its own.
-const SHARED_BY_TWINS: [&str; 8] = [
+const SHARED_BY_TWINS: [&str; 9] = [
+    "bvh/build",
     "bvh/clusters",
     "bvh/geometry",
     "bvh/over",

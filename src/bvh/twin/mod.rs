@@ -1,5 +1,6 @@
 //! Builders on the host: plain, and the specification of those on the device.
 
+mod build;
 mod child_order;
 mod clusters;
 mod collapse;
@@ -16,3 +17,5 @@ pub mod refit;
 pub mod reinsertion;
 pub mod split;
 pub mod wide;
+
+pub use build::build;

@@ -5,11 +5,9 @@ use super::corpus::Mesh;
 use crate::device::Device;
 use crate::subjects::build_memory::{BuildMemory, DeviceMesh};
 use anyhow::{bail, ensure};
-use hedgerow::bvh::builder::{BuildOptions, Builder, Input, Method};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Input};
 use hedgerow::bvh::layout::Bvh2;
-use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
-use hedgerow::bvh::twin::lbvh::Finish;
 use hedgerow::kdtree::builder::KdEstimate;
 use hedgerow::kdtree::merge::MergeEstimate;
 
@@ -71,30 +69,10 @@ pub fn on_device(device: &Device, (_, positions, triangles): &Mesh, options: &Bu
 /// They do not.
 pub fn on_host((_, positions, triangles): &Mesh, options: &BuildOptions) -> Bvh2 {
     let codes = options.codes.expect("codes are named");
-    let lbvh = |finish: Finish| match &options.split {
+    twin::build(options, codes, |finish| match &options.split {
         None => twin::lbvh::build(positions, triangles, codes, finish),
         Some(split) => twin::split::build(positions, triangles, split, codes, finish),
-    };
-    let (collapse, child_order) = (options.collapse, options.child_order);
-    if options.method == Method::Lbvh && options.optimise.is_none() {
-        // Its own collapsing leaves other bytes in slots that fall out.
-        return lbvh(Finish { collapse, child_order });
-    }
-    let radix = lbvh(Collapse::OFF.into());
-    let tree = match options.method {
-        Method::Lbvh => radix,
-        Method::Hlbvh(treelets) => twin::hlbvh::build(&radix, codes, treelets),
-        Method::Ploc { radius } => twin::ploc::build(&radix, radius as usize),
-        Method::Hploc(window) => twin::hploc::build(&radix, window),
-    };
-    let tree = match &options.optimise {
-        None => tree.collapsed(&collapse),
-        Some(optimise) => tree.reinserted(optimise).collapsed(&collapse),
-    };
-    match child_order {
-        None => tree,
-        Some(order) => tree.in_child_order(order, &collapse),
-    }
+    })
 }
 
 /// Nothing if the bytes are the same; otherwise what differs first.

@@ -1,0 +1,33 @@
+//! A builder's tree by its options, from the LBVH's: what [`Builder`](crate::bvh::builder::Builder) records one after the other.
+
+use super::lbvh::Finish;
+use super::{hlbvh, hploc, ploc};
+use crate::bvh::builder::{BuildOptions, Method};
+use crate::bvh::codes::Codes;
+use crate::bvh::layout::{Bvh2, Record};
+use crate::bvh::sah::Collapse;
+
+/// The tree that a builder with these options makes by `codes`, where `lbvh` gives LBVHs over its primitives, or their parts. The codes
+/// of the options are not looked at.
+pub fn build<R: Record>(options: &BuildOptions, codes: Codes, lbvh: impl FnOnce(Finish) -> Bvh2<R>) -> Bvh2<R> {
+    let (collapse, child_order) = (options.collapse, options.child_order);
+    if options.method == Method::Lbvh && options.optimise.is_none() {
+        // Its own collapsing leaves other bytes in slots that fall out.
+        return lbvh(Finish { collapse, child_order });
+    }
+    let radix = lbvh(Collapse::OFF.into());
+    let tree = match options.method {
+        Method::Lbvh => radix,
+        Method::Hlbvh(treelets) => hlbvh::build(&radix, codes, treelets),
+        Method::Ploc { radius } => ploc::build(&radix, radius as usize),
+        Method::Hploc(window) => hploc::build(&radix, window),
+    };
+    let tree = match &options.optimise {
+        None => tree.collapsed(&collapse),
+        Some(optimise) => tree.reinserted(optimise).collapsed(&collapse),
+    };
+    match child_order {
+        None => tree,
+        Some(order) => tree.in_child_order(order, &collapse),
+    }
+}
