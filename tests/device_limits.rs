@@ -1,9 +1,19 @@
 //! A device that has less than it could: without what is optional, with inexact subgroups, with small limits, without timestamps.
 
 use crate::common::{OPTIONS, open};
+use hedgerow::accel::AccelOptions;
+use hedgerow::ash::vk;
 use hedgerow::gpu::scan::{Scan, ScanBuffers};
 use hedgerow::gpu::{Timestamps, TuningChoice};
+use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::device::{Device, DeviceOptions};
+use hedgerow_lab::random::SplitMix64;
+use hedgerow_lab::scene::{Instances, LoadOptions, load_instances};
+use hedgerow_lab::subjects::device_rays::RayBuffers;
+use hedgerow_lab::subjects::levels::Levels;
+use hedgerow_lab::subjects::structures::Structures;
+
+type Flags = vk::BuildAccelerationStructureFlagsKHR;
 
 fn restricted(text: &str) -> Device {
     open(DeviceOptions { restrict: text.parse().expect("a list of restrictions"), ..OPTIONS })
@@ -61,6 +71,36 @@ fn results_are_the_same_with_and_without_what_is_optional() {
             assert!(sums(&device, None) == expected, "{tuning}, {restrict:?}");
         }
     }
+}
+
+/// What rays hit in a scene of instances, by queries.
+fn hits(device: &Device, scene: &Instances, rays: &[Ray]) -> Vec<Hit> {
+    let structures = Structures::ours(device, AccelOptions::DEFAULT);
+    let mut levels = Levels::new(structures, scene, Flags::PREFER_FAST_TRACE).expect("memory");
+    levels.build().expect("it builds");
+    let buffers = RayBuffers::new(device, rays).expect("memory");
+    levels.trace(&buffers, Query::ClosestHit).expect("it traces");
+    buffers.read_hits()
+}
+
+#[test]
+fn rays_hit_the_same_by_loads_of_64_bits_and_without_them() {
+    let scene = load_instances("gen:forest:20", &LoadOptions::default()).expect("a generator");
+    let mut random = SplitMix64::new(3);
+    let centre = scene.camera.look;
+    let mut rays = Vec::new();
+    for _ in 0..5000 {
+        let (from, to) = (random.around(8.0), random.around(3.0));
+        let origin = std::array::from_fn(|k| centre[k] + from[k]);
+        rays.push(Ray { origin, t_min: 0.0, direction: std::array::from_fn(|k| to[k] - from[k]), t_max: f32::INFINITY });
+    }
+    let cpu = DeviceOptions { tuning: TuningChoice::Cpu, ..OPTIONS };
+    let with = open(cpu.clone());
+    let without = open(DeviceOptions { restrict: "inexact".parse().expect("a restriction"), ..cpu });
+    assert_eq!((with.limits.int64, without.limits.int64), (with.tuning.trace.in_longs, false));
+    let (with, without) = (hits(&with, &scene, &rays), hits(&without, &scene, &rays));
+    assert!(without.iter().filter(|hit| hit.is_some()).count() > 500);
+    assert!(with == without);
 }
 
 #[test]

@@ -118,8 +118,8 @@ fn structs() -> BTreeMap<&'static str, Layout> {
                 offset_and_flags,
                 instance,
                 start,
-                start_count,
-                reserved
+                slots,
+                records
             }),
         ),
         (

@@ -119,8 +119,8 @@ float gain_of(Entry entry) {
     if (entry.left_out != 0u) return NO_GAIN;
     GivenInstance given = instance_of(entry);
     Structure structure = Structure(given.structure);
-    uint slots = structure.header.node_slots;
-    uvec2 begin = begin_of(entry, structure);
+    uint slots = entry.slots & INDEX_MASK;
+    uvec2 begin = begin_at(entry.start, entry.records);
     Child children[2];
     if (!open_child(structure, slots, Child(entry.lo, begin.x, entry.hi, begin.y), children)) return NO_GAIN;
     Box whole = empty_box();
@@ -150,9 +150,8 @@ float gain_of(Entry entry) {
 }
 
 // The entry over one child of the node that another begins at.
-Entry entry_over(Entry parent, vec4 m[3], Structure structure, Child child) {
-    Box b = world_box(m, structure, child);
-    return Entry(b.lo, parent.instance, b.hi, child.index, child.count, 0u, parent.given);
+Entry entry_below(Entry parent, vec4 m[3], Structure structure, Child child) {
+    return entry_over(world_box(m, structure, child), parent.instance, child, parent.slots, parent.records, parent.given);
 }
 
 void open(uint i, uint behind) {
@@ -160,9 +159,9 @@ void open(uint i, uint behind) {
     GivenInstance given = instance_of(entry);
     Structure structure = Structure(given.structure);
     // What has a gain begins at an inner node.
-    Node node = structure.nodes[begin_of(entry, structure).x];
-    entries.entry[i] = entry_over(entry, given.to_world, structure, node.left);
-    entries.entry[behind] = entry_over(entry, given.to_world, structure, node.right);
+    Node node = structure.nodes[begin_at(entry.start, entry.records).x];
+    entries.entry[i] = entry_below(entry, given.to_world, structure, node.left);
+    entries.entry[behind] = entry_below(entry, given.to_world, structure, node.right);
     gains.value[i] = UNKNOWN;
     gains.value[behind] = UNKNOWN;
 }

@@ -16,10 +16,12 @@ struct Entry {
     vec3 lo;
     uint instance;
     vec3 hi;
-    uint start;               // a Child's index and count, in the instance's structure
-    uint start_count;         // or AT_ROOT: so that the structure may be replaced by a compacted copy
-    uint left_out;            // 0, or why it is
+    uint start;               // in the instance's structure, with `slots` and `records` as in an Instance
+    uint slots;
+    uint records;
     uvec2 given;              // address of the GivenInstance
+    uint left_out;            // 0, or why it is
+    uint reserved;
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer GivenInstances { GivenInstance instance[]; };
@@ -30,10 +32,17 @@ GivenInstance instance_of(Entry entry) {
     return GivenInstances(entry.given).instance[0];
 }
 
-// Where an entry over a structure begins: a Child's index and count.
-uvec2 begin_of(Entry entry, Structure structure) {
-    if (entry.start_count != AT_ROOT) return uvec2(entry.start, entry.start_count);
-    return uvec2(structure.header.root.index, structure.header.root.count);
+// One that is left out, and why.
+Entry entry_left_out(uint instance, uvec2 given, uint why) {
+    return Entry(vec3(0), instance, vec3(0), 0u, 0u, 0u, given, why, 0u);
+}
+
+// Over a child in a structure of which so many records may be looked at. What something else wrote there names no more of them.
+Entry entry_over(Box b, uint instance, Child child, uint slots, uint records, uvec2 given) {
+    uint index = min(child.index, INDEX_MASK);
+    uint start = index | min(child.count, UP_TO_LAST) << INDEX_BITS;
+    uint last = child.count >= UP_TO_LAST ? min(index + min(child.count, INDEX_MASK), records) : records;
+    return Entry(b.lo, instance, b.hi, start, slots, last, given, 0u, 0u);
 }
 
 // 2^-k, where 2^k is about the greatest of a matrix: what it is scaled by so that its determinant neither overflows nor vanishes.
@@ -75,6 +84,6 @@ Instance record_of(Entry entry) {
     vec4 to_object[3];
     inverse_of(given.to_world, to_object);
     return Instance(to_object, given.to_world, given.structure, given.index_and_mask, given.offset_and_flags, entry.instance,
-                    entry.start, entry.start_count, 0);
+                    entry.start, entry.slots, entry.records);
 }
 #endif

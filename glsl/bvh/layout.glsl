@@ -10,14 +10,21 @@
 
 const uint MAGIC = 0x72676468u;
 // What the leaves hold.
-const uint KIND_TRIANGLES = 0x00020003u;
-const uint KIND_BOXES = 0x00120003u;
-const uint KIND_INSTANCES = 0x00220003u;
+const uint KIND_TRIANGLES = 0x00020004u;
+const uint KIND_BOXES = 0x00120004u;
+const uint KIND_INSTANCES = 0x00220004u;
 const uint MAX_DEPTH = 96;
 // The count of a child that no tree has: its slot is unused.
 const uint UNUSED = 0xFFFFFFFFu;
-// The count of where an instance begins that was not opened: wherever its structure's root is.
-const uint AT_ROOT = 0xFFFFFFFFu;
+// Indices of nodes and records are below 2^27: what an instance knows of its structure lies in the bits above some of them.
+const uint INDEX_BITS = 27;
+const uint INDEX_MASK = (1u << INDEX_BITS) - 1u;
+// In place of a leaf's count in those bits: it goes as far as records may be looked at.
+const uint UP_TO_LAST = 31;
+const uint FORM_BOXES = 1u << INDEX_BITS;
+const uint FORM_LEFT_FIRST = 2u << INDEX_BITS;
+const uint FORM_ALL_OPAQUE = 4u << INDEX_BITS;
+const uint FORM_ANY_OPAQUE = 8u << INDEX_BITS;
 
 const uint STATUS_NON_FINITE = 1u << 0;
 const uint STATUS_INDEX_OUT_OF_RANGE = 1u << 1;
@@ -63,9 +70,9 @@ struct Instance {
     uint index_and_mask;      // custom index, mask << 24
     uint offset_and_flags;    // offset in the shader binding table, flags << 24
     uint instance;
-    uint start;               // where to begin in the structure: a Child's index and count
-    uint start_count;         // or AT_ROOT
-    uint reserved;
+    uint start;               // where to begin in the structure: a Child's index, its count or UP_TO_LAST above
+    uint slots;               // nodes of the structure, its FORM above
+    uint records;             // of the structure that may be looked at
 };
 
 struct GeometryEntry {
@@ -121,6 +128,21 @@ uvec2 records_at(uvec2 structure, uint node_slots) {
 
 uint record_bytes(uint kind) {
     return kind == KIND_INSTANCES ? 128u : kind == KIND_BOXES ? 28u : 40u;
+}
+
+// What rays need of a structure's header, beside how many nodes it has.
+uint form_of(Header header) {
+    uint form = header.kind == KIND_BOXES ? FORM_BOXES : 0u;
+    if (header.child_order != 0u) form |= FORM_LEFT_FIRST;
+    if ((header.geometry_flags & GEOMETRY_OPAQUE) != 0u) form |= FORM_ALL_OPAQUE;
+    if ((header.geometry_flags >> 8 & GEOMETRY_OPAQUE) != 0u) form |= FORM_ANY_OPAQUE;
+    return form;
+}
+
+// Where an instance begins: a Child's index and count.
+uvec2 begin_at(uint start, uint records) {
+    uint index = start & INDEX_MASK, count = start >> INDEX_BITS;
+    return uvec2(index, count == UP_TO_LAST ? records - index : count);
 }
 
 Triangles triangles_of(Structure structure) {

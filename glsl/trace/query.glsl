@@ -100,16 +100,16 @@ uint hedgerowRayQueryGetIntersectionInstanceShaderBindingTableRecordOffset(Hedge
 
 uint hedgerowRayQueryGetIntersectionGeometryIndex(HedgerowRayQuery query, bool committed) {
     HedgerowMeeting met = hedgerow_met(query, committed);
-    uvec2 structure = hedgerow_instance_of(query, met).structure;
-    return hedgerow_geometry_of(structure, hedgerow_primitive_of(structure, met)).index;
+    Instance instance = hedgerow_instance_of(query, met);
+    return hedgerow_geometry_of(instance.structure, instance.slots & INDEX_MASK, hedgerow_primitive_of(instance, met)).index;
 }
 
 // The primitive's position in its geometry.
 uint hedgerowRayQueryGetIntersectionPrimitiveIndex(HedgerowRayQuery query, bool committed) {
     HedgerowMeeting met = hedgerow_met(query, committed);
-    uvec2 structure = hedgerow_instance_of(query, met).structure;
-    uint primitive = hedgerow_primitive_of(structure, met);
-    return primitive - hedgerow_geometry_of(structure, primitive).first;
+    Instance instance = hedgerow_instance_of(query, met);
+    uint primitive = hedgerow_primitive_of(instance, met);
+    return primitive - hedgerow_geometry_of(instance.structure, instance.slots & INDEX_MASK, primitive).first;
 }
 
 // The weights of the second and the third vertex.
@@ -149,8 +149,7 @@ mat4x3 hedgerowRayQueryGetIntersectionWorldToObject(HedgerowRayQuery query, bool
 // The corners of the triangle, in the object's space.
 void hedgerowRayQueryGetIntersectionTriangleVertexPositions(HedgerowRayQuery query, bool committed, out vec3 positions[3]) {
     HedgerowMeeting met = hedgerow_met(query, committed);
-    HedgerowStructure structure = HedgerowStructure(hedgerow_instance_of(query, met).structure);
-    HedgerowTriangle triangle = triangles_of(structure).triangle[met.record];
+    HedgerowTriangle triangle = Triangles(hedgerow_records_of(hedgerow_instance_of(query, met))).triangle[met.record];
     positions = vec3[3](triangle.v0, triangle.v1, triangle.v2);
 }
 

@@ -12,6 +12,7 @@
 #include "bvh/layout.glsl"
 #define HEDGEROW_LEVELS (2 * MAX_DEPTH * HEDGEROW_QUERIES)
 #include "trace/geometry.glsl"
+#include "trace/query_loads.glsl"
 #include "trace/ray.glsl"
 #include "trace/slab.glsl"
 #include "trace/stack.glsl"
@@ -93,19 +94,21 @@ struct HedgerowRayQuery {
     uint flags;
     uint cull_mask;
     uvec2 top;                // the structure that is queried
+    bool top_has_instances;
     uint top_slots;
-    uint top_kind;
+    uint top_records;
+    uint top_form;
     uint floor;               // where its entries of the stack begin
-    // The structure at hand, and the ray in its space.
+    // The structure at hand, and the ray in its space: behind an instance not before a node is at hand, as another instance may be next.
     uvec2 structure;
+    bool has_instances;
     uint slots;
+    uint records;
+    uint form;
+    bool is_prepared;
     HedgerowPreparedRay prepared;
-    uint kind;
-    uint geometry_flags;
     uint instance;            // record in the top level
     uint instance_flags;
-    uint records;
-    bool left_first;
     // Where its entries of the stack begin, and whether it is below the one that is queried.
     uint bottom;
     bool is_below;
@@ -142,27 +145,36 @@ bool hedgerow_can_be_traced(Header header) {
 
 // More rounds than the walk of a structure takes: each node and each record is seen once and may wait once. One that was
 // overwritten may be a circle.
-uint hedgerow_rounds(Header header) {
-    return 2u * (min(header.node_slots, HEDGEROW_MOST) + min(header.primitive_count, HEDGEROW_MOST)) + 4u;
+uint hedgerow_rounds(uint slots, uint records) {
+    return 2u * (min(slots, HEDGEROW_MOST) + min(records, HEDGEROW_MOST)) + 4u;
 }
 
-bool hedgerow_skips(uint flags, uint kind) {
-    return kind == KIND_TRIANGLES && (flags & hedgerowRayFlagsSkipTriangles) != 0u ||
-           kind == KIND_BOXES && (flags & hedgerowRayFlagsSkipAABB) != 0u;
+// Of what a bottom-level structure holds.
+bool hedgerow_skips(uint flags, uint form) {
+    return (flags & ((form & FORM_BOXES) != 0u ? hedgerowRayFlagsSkipAABB : hedgerowRayFlagsSkipTriangles)) != 0u;
 }
 
+// The ray made ready for the tests, and whether it can hit anything.
+//
 // In a top level, boxes must hold what a ray hits in the space of an instance: a place that is off there by 64 units of rounding
 // of the largest component of its distance (src/trace/slab.rs), which a rotation may make 3 times as many of it in the world; and
 // as the ray went through the inverse of the transform, by a few units of its coordinates. Eight times the slack holds both. (A
 // transform that stretches one axis against another makes as much more of it; what it does to boxes is in accel/world_box.glsl.)
-void hedgerow_widen_for(uint kind, inout HedgerowPreparedRay prepared) {
-    if (kind != KIND_INSTANCES) return;
-    prepared.slack *= 8.0;
-    prepared.margin *= 8.0;
+bool hedgerow_prepare_for(bool instances, HedgerowRay ray, out HedgerowPreparedRay prepared) {
+    bool goes = hedgerow_prepare(ray, prepared);
+    if (instances) {
+        prepared.slack *= 8.0;
+        prepared.margin *= 8.0;
+    }
+    return goes;
 }
 
 bool hedgerow_ends_at_first_hit(HedgerowRayQuery query) {
     return (query.flags & hedgerowRayFlagsTerminateOnFirstHit) != 0u;
+}
+
+bool hedgerow_goes_left_first(HedgerowRayQuery query) {
+    return hedgerow_ends_at_first_hit(query) && (query.form & FORM_LEFT_FIRST) != 0u;
 }
 
 // Nothing is at hand, and nothing waits.
@@ -173,6 +185,15 @@ void hedgerow_end(inout HedgerowRayQuery query) {
     query.is_below = false;
 }
 
+// The structure that is queried is at hand.
+void hedgerow_take_top(inout HedgerowRayQuery query) {
+    query.structure = query.top;
+    query.has_instances = query.top_has_instances;
+    query.slots = query.top_slots;
+    query.records = query.top_records;
+    query.form = query.top_form;
+}
+
 void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint flags, uint cull_mask, HedgerowRay ray) {
     const HedgerowMeeting nothing = HedgerowMeeting(HEDGEROW_MET_NOTHING, ray.t_max, 0.0, 0.0, 0u, 0u, false, false);
     query.ray = ray;
@@ -180,7 +201,6 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.cull_mask = cull_mask;
     query.top = structure;
     query.floor = 2u * MAX_DEPTH * slot;
-    query.structure = structure;
     query.instance = 0u;
     query.instance_flags = 0u;
     query.best = ray.t_max;
@@ -195,34 +215,33 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
 #endif
     hedgerow_end(query);
     query.index = 0u;
+    query.top_has_instances = false;
     query.top_slots = 0u;
-    query.top_kind = 0u;
-    query.slots = 0u;
-    query.records = 0u;
-    query.left_first = false;
-    query.kind = 0u;
-    query.geometry_flags = 0u;
+    query.top_records = 0u;
+    query.top_form = 0u;
     query.rounds = 0u;
     query.top_rounds = 0u;
-    if (all(equal(structure, uvec2(0)))) return;
-    Header header = Structure(structure).header;
-    query.top_slots = header.node_slots;
-    query.top_kind = header.kind;
-    query.slots = header.node_slots;
-    query.records = header.primitive_count;
-    query.left_first = hedgerow_ends_at_first_hit(query) && header.child_order != 0u;
-    query.kind = header.kind;
-    query.geometry_flags = header.geometry_flags;
-    query.rounds = hedgerow_rounds(header);
-    // As in Vulkan, a mask without bits lets the ray meet nothing.
-    bool goes = hedgerow_prepare(ray, query.prepared);
-    hedgerow_widen_for(header.kind, query.prepared);
-    if (goes && cull_mask != 0u &&
-        hedgerow_can_be_traced(header) && !hedgerow_skips(flags, header.kind)) {
-        query.index = header.root.index;
-        query.left = header.root.count;
+    bool goes = false;
+    uvec2 root = uvec2(0u, HEDGEROW_NOTHING);
+    if (any(notEqual(structure, uvec2(0)))) {
+        Header header = Structure(structure).header;
+        query.top_has_instances = header.kind == KIND_INSTANCES;
+        query.top_slots = header.node_slots;
+        query.top_records = header.primitive_count;
+        query.top_form = form_of(header);
+        query.rounds = hedgerow_rounds(header.node_slots, header.primitive_count);
+        root = uvec2(header.root.index, header.root.count);
+        // As in Vulkan, a mask without bits lets the ray meet nothing.
+        goes = hedgerow_can_be_traced(header) && cull_mask != 0u;
+    }
+    hedgerow_take_top(query);
+    bool skips = !query.has_instances && hedgerow_skips(flags, query.form);
+    query.is_prepared = true;
+    if (hedgerow_prepare_for(query.has_instances, ray, query.prepared) && goes && !skips) {
+        query.index = root.x;
+        query.left = root.y;
 #ifdef HEDGEROW_LINK_COUNTS
-        if (header.kind != KIND_INSTANCES) query.at.counts = HEDGEROW_LINK_COUNTS(structure);
+        if (!query.has_instances) query.at.counts = HEDGEROW_LINK_COUNTS(structure);
 #endif
     }
 }
@@ -235,9 +254,11 @@ void hedgerow_count_hit(inout HedgerowRayQuery query) {
 #endif
 }
 
-// The geometry of a primitive.
-HedgerowGeometry hedgerow_geometry_of(uvec2 structure, uint primitive) {
+// The geometry of a primitive of a structure with so many nodes, as whoever asks knows it. Where something else lies there by now, the
+// first: its header may name any place.
+HedgerowGeometry hedgerow_geometry_of(uvec2 structure, uint slots, uint primitive) {
     Header header = Structure(structure).header;
+    if (header.magic != MAGIC || header.node_slots != slots) return HedgerowGeometry(0u, 0u, 0u);
     if (header.geometry_count <= 1u) return HedgerowGeometry(0u, 0u, header.geometry_flags);
     GeometryTable table = geometry_table_at(structure, header.kind, header.node_slots, header.primitive_count);
     return hedgerow_geometry_in(table, header.geometry_count, primitive);
@@ -251,13 +272,17 @@ HedgerowMeeting hedgerow_met(HedgerowRayQuery query, bool committed) {
 
 // The instance of a meeting: of a bottom-level structure that is queried itself, one without a transform.
 Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
-    if (query.top_kind == KIND_INSTANCES) return Instances(records_at(query.top, query.top_slots)).instance[met.instance];
+    if (query.top_has_instances) return Instances(records_at(query.top, query.top_slots)).instance[met.instance];
     const vec4 identity[3] = vec4[3](vec4(1, 0, 0, 0), vec4(0, 1, 0, 0), vec4(0, 0, 1, 0));
-    return Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, 0u, 0u);
+    return Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, query.top_slots, query.top_records);
 }
 
-uint hedgerow_primitive_of(uvec2 structure, HedgerowMeeting met) {
-    uvec2 records = records_at(structure, Structure(structure).header.node_slots);
+uvec2 hedgerow_records_of(Instance instance) {
+    return records_at(instance.structure, instance.slots & INDEX_MASK);
+}
+
+uint hedgerow_primitive_of(Instance instance, HedgerowMeeting met) {
+    uvec2 records = hedgerow_records_of(instance);
     return met.type == HEDGEROW_MET_BOX ? BoxRecords(records).box[met.record].primitive
                                         : Triangles(records).triangle[met.record].primitive;
 }
@@ -267,7 +292,7 @@ bool hedgerow_comes_before(HedgerowRayQuery query) {
     if (query.committed.type == HEDGEROW_MET_NOTHING) return false;
     Instance a = hedgerow_instance_of(query, query.candidate), b = hedgerow_instance_of(query, query.committed);
     if (a.instance != b.instance) return a.instance < b.instance;
-    return hedgerow_primitive_of(a.structure, query.candidate) < hedgerow_primitive_of(b.structure, query.committed);
+    return hedgerow_primitive_of(a, query.candidate) < hedgerow_primitive_of(b, query.committed);
 }
 
 void hedgerow_commit(inout HedgerowRayQuery query) {
@@ -294,16 +319,20 @@ void hedgerow_visit(inout HedgerowRayQuery query) {
         query.left = HEDGEROW_NOTHING;
         return;
     }
+    if (!query.is_prepared) {
+        hedgerow_prepare_for(query.has_instances, query.ray, query.prepared);
+        query.is_prepared = true;
+    }
 #ifdef HEDGEROW_COUNTS_WORK
-    if (query.kind == KIND_INSTANCES) query.work.x += 1u;
+    if (query.has_instances) query.work.x += 1u;
     else query.work.z += 1u;
 #endif
-    Node node = Structure(query.structure).nodes[query.index];
+    Node node = hedgerow_node_at(query.structure, query.index);
     Child a = node.left, b = node.right;
     bool enters_a, enters_b;
     float enter_a = hedgerow_enter(query.prepared, a.lo, a.hi, query.best, enters_a);
     float enter_b = hedgerow_enter(query.prepared, b.lo, b.hi, query.best, enters_b);
-    bool b_first = enters_b && (!enters_a || (enter_b < enter_a && !query.left_first));
+    bool b_first = enters_b && (!enters_a || (enter_b < enter_a && !hedgerow_goes_left_first(query)));
     bool has_room = query.level - query.bottom < MAX_DEPTH;
     if (enters_a && enters_b && has_room) {
 #ifdef HEDGEROW_LINK_COUNTS
@@ -330,53 +359,44 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     uint at = query.index;
     hedgerow_step(query);
     if (at >= query.records) return;
-    Instance instance = Instances(records_at(query.top, query.top_slots)).instance[at];
+    Instance instance = hedgerow_instance_at(records_at(query.top, query.top_slots), at);
     uint flags = instance.offset_and_flags >> 24;
     if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
     HEDGEROW_COUNT(y);
-    Header header = Structure(instance.structure).header;
+    if (hedgerow_skips(query.flags, instance.slots)) return;
     HedgerowRay ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
                                   hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
     HedgerowPreparedRay prepared;
-    bool goes = hedgerow_prepare(ray, prepared);
-    if (!goes || !hedgerow_can_be_traced(header) || header.kind == KIND_INSTANCES || hedgerow_skips(query.flags, header.kind)) {
-        return;
-    }
+    if (!hedgerow_prepare(ray, prepared)) return;
     // The rest of the leaf waits.
     if (query.left != HEDGEROW_NOTHING && query.level - query.floor < MAX_DEPTH) {
         hedgerow_put_off(query, query.index, query.left, -HEDGEROW_INFINITY);
     }
     query.prepared = prepared;
+    query.is_prepared = true;
     query.structure = instance.structure;
-    query.slots = header.node_slots;
-    query.records = header.primitive_count;
-    query.left_first = hedgerow_ends_at_first_hit(query) && header.child_order != 0u;
+    query.has_instances = false;
+    query.slots = instance.slots & INDEX_MASK;
+    query.records = instance.records;
+    query.form = instance.slots & ~INDEX_MASK;
     query.top_rounds = query.rounds;
-    query.rounds = hedgerow_rounds(header);
+    query.rounds = hedgerow_rounds(query.slots, query.records);
     query.is_below = true;
-    query.kind = header.kind;
-    query.geometry_flags = header.geometry_flags;
     query.instance = at;
     query.instance_flags = flags;
     query.bottom = query.level;
-    bool is_whole = instance.start_count == AT_ROOT;
 #ifdef HEDGEROW_LINK_COUNTS
     query.at = HedgerowLink(HEDGEROW_LINK_COUNTS(instance.structure), HEDGEROW_NO_LINK);
 #endif
-    query.index = is_whole ? header.root.index : instance.start;
-    query.left = is_whole ? header.root.count : instance.start_count;
+    uvec2 begin = begin_at(instance.start, instance.records);
+    query.index = begin.x;
+    query.left = begin.y;
 }
 
 // Back to the top level.
 void hedgerow_leave_instance(inout HedgerowRayQuery query) {
-    Header header = Structure(query.top).header;
-    hedgerow_prepare(query.ray, query.prepared);
-    hedgerow_widen_for(query.top_kind, query.prepared);
-    query.structure = query.top;
-    query.slots = query.top_slots;
-    query.records = header.primitive_count;
-    query.left_first = hedgerow_ends_at_first_hit(query) && header.child_order != 0u;
-    query.kind = query.top_kind;
+    hedgerow_take_top(query);
+    query.is_prepared = false;
     query.bottom = query.floor;
     query.rounds = query.top_rounds;
     query.is_below = false;
@@ -387,10 +407,9 @@ void hedgerow_leave_instance(inout HedgerowRayQuery query) {
 
 // Whether a meeting with the geometry of the primitive is a hit without asking.
 bool hedgerow_is_opaque(HedgerowRayQuery query, uint primitive) {
-    uint all_have = query.geometry_flags, any_has = query.geometry_flags >> 8;
-    bool is_opaque = (all_have & GEOMETRY_OPAQUE) != 0u;
-    if (!is_opaque && (any_has & GEOMETRY_OPAQUE) != 0u) {
-        is_opaque = (hedgerow_geometry_of(query.structure, primitive).flags & GEOMETRY_OPAQUE) != 0u;
+    bool is_opaque = (query.form & FORM_ALL_OPAQUE) != 0u;
+    if (!is_opaque && (query.form & FORM_ANY_OPAQUE) != 0u) {
+        is_opaque = (hedgerow_geometry_of(query.structure, query.slots, primitive).flags & GEOMETRY_OPAQUE) != 0u;
     }
     if ((query.instance_flags & HEDGEROW_INSTANCE_FORCE_OPAQUE) != 0u) is_opaque = true;
     if ((query.instance_flags & HEDGEROW_INSTANCE_FORCE_NO_OPAQUE) != 0u) is_opaque = false;
@@ -405,7 +424,7 @@ bool hedgerow_is_culled(HedgerowRayQuery query, bool is_opaque) {
 
 // The next triangle of the leaf; true if it is a candidate that the shader must decide on.
 bool hedgerow_test_triangle(inout HedgerowRayQuery query, uint at) {
-    Triangle triangle = Triangles(records_at(query.structure, query.slots)).triangle[at];
+    Triangle triangle = hedgerow_triangle_at(records_at(query.structure, query.slots), at);
     vec3 met;
     bool is_front;
     if (!hedgerow_meet_facing(query.prepared, triangle.v0, triangle.v1, triangle.v2, met, is_front)) return false;
@@ -441,7 +460,7 @@ bool hedgerow_test(inout HedgerowRayQuery query) {
     hedgerow_step(query);
     HEDGEROW_COUNT(w);
     if (at >= query.records) return false;
-    return query.kind == KIND_BOXES ? hedgerow_test_box(query, at) : hedgerow_test_triangle(query, at);
+    return (query.form & FORM_BOXES) != 0u ? hedgerow_test_box(query, at) : hedgerow_test_triangle(query, at);
 }
 
 // Takes what waits; false at the end of the walk.
@@ -482,9 +501,9 @@ bool hedgerow_proceed(inout HedgerowRayQuery query) {
                 return false;
             }
         }
-        if (hedgerow_has_record(query) && query.kind == KIND_INSTANCES) hedgerow_enter_instance(query);
+        if (hedgerow_has_record(query) && query.has_instances) hedgerow_enter_instance(query);
         if (query.left == 0u) hedgerow_visit(query);
-        if (hedgerow_has_record(query) && query.kind != KIND_INSTANCES && hedgerow_test(query)) return true;
+        if (hedgerow_has_record(query) && !query.has_instances && hedgerow_test(query)) return true;
     }
     return false;
 }

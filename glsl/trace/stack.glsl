@@ -20,18 +20,18 @@ struct HedgerowWaiting {
 };
 
 // Nodes and triangles of a structure are fewer than 2^27 (radix_sort::MAX_COUNT), which leaves these bits for the count.
-const uint HEDGEROW_INDEX_BITS = 27;
+const uint HEDGEROW_WAITING_BITS = 27;
 const uint HEDGEROW_LONG_LEAF = 31;
 
 uvec2 hedgerow_packed(HedgerowWaiting waiting) {
     bool long_leaf = waiting.count >= HEDGEROW_LONG_LEAF;
-    return uvec2(waiting.index | min(waiting.count, HEDGEROW_LONG_LEAF) << HEDGEROW_INDEX_BITS,
+    return uvec2(waiting.index | min(waiting.count, HEDGEROW_LONG_LEAF) << HEDGEROW_WAITING_BITS,
                  long_leaf ? waiting.count : floatBitsToUint(waiting.enter));
 }
 
 HedgerowWaiting hedgerow_unpacked(uvec2 entry) {
-    uint count = entry.x >> HEDGEROW_INDEX_BITS;
-    uint index = entry.x & (1u << HEDGEROW_INDEX_BITS) - 1u;
+    uint count = entry.x >> HEDGEROW_WAITING_BITS;
+    uint index = entry.x & (1u << HEDGEROW_WAITING_BITS) - 1u;
     if (count == HEDGEROW_LONG_LEAF) return HedgerowWaiting(index, entry.y, -HEDGEROW_INFINITY);
     return HedgerowWaiting(index, count, uintBitsToFloat(entry.y));
 }
@@ -104,13 +104,13 @@ uint hedgerow_child(uint level) {
 // A child that is taken however far it is: half of an entry, but for a long leaf.
 void hedgerow_put_anyway(uint level, uint index, uint count) {
     if (count >= HEDGEROW_LONG_LEAF) hedgerow_put(level, HedgerowWaiting(index, count, 0.0));
-    else hedgerow_put_child(level, index | count << HEDGEROW_INDEX_BITS);
+    else hedgerow_put_child(level, index | count << HEDGEROW_WAITING_BITS);
 }
 
 // Its index and count.
 uvec2 hedgerow_taken_anyway(uint level) {
-    uint child = hedgerow_child(level), count = child >> HEDGEROW_INDEX_BITS;
+    uint child = hedgerow_child(level), count = child >> HEDGEROW_WAITING_BITS;
     if (count == HEDGEROW_LONG_LEAF) count = hedgerow_entry(level).y;
-    return uvec2(child & (1u << HEDGEROW_INDEX_BITS) - 1u, count);
+    return uvec2(child & (1u << HEDGEROW_WAITING_BITS) - 1u, count);
 }
 #endif

@@ -3,13 +3,11 @@
 use super::geometry::{self, BuildGeometries};
 use super::instances::{ENTRY_BYTES, entries_step};
 use super::rebraid::Rebraid;
-use super::{ANY_HIT_ORDER, AccelOptions, REBRAID};
-use crate::bvh::builder::{self, BuildJob, Builder};
+use super::{AccelOptions, quality};
+use crate::bvh::builder::{BuildJob, BuildOptions, Builder};
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
 use crate::bvh::refit::{self, Refit};
-use crate::bvh::sah::Collapse;
-use crate::bvh::twin::lbvh::Finish;
 use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Region, Sizes, Step, shaders};
 use crate::{Error, Result};
@@ -19,17 +17,6 @@ type Flags = vk::BuildAccelerationStructureFlagsKHR;
 
 /// What scratch addresses must be multiples of: `minAccelerationStructureScratchOffsetAlignment`.
 pub const SCRATCH_ALIGNMENT: u64 = 16;
-
-/// Flags that a build may have.
-const KNOWN_FLAGS: Flags = Flags::from_raw(
-    Flags::ALLOW_UPDATE.as_raw()
-        | Flags::ALLOW_COMPACTION.as_raw()
-        | Flags::PREFER_FAST_TRACE.as_raw()
-        | Flags::PREFER_FAST_BUILD.as_raw()
-        | Flags::LOW_MEMORY.as_raw()
-        | REBRAID.as_raw()
-        | ANY_HIT_ORDER.as_raw(),
-);
 
 /// Where the numbers of primitives come from.
 #[derive(Debug, Clone, Copy)]
@@ -50,7 +37,7 @@ pub(super) struct Build {
     /// Most primitives of all geometries.
     primitive_count: u32,
     rebraid: Option<Rebraid>,
-    options: builder::BuildOptions,
+    options: BuildOptions,
 }
 
 /// Where the parts of the scratch memory begin.
@@ -70,32 +57,21 @@ impl Build {
         counts: Counts,
         primitive_count: u64,
     ) -> Result<Build> {
-        if !KNOWN_FLAGS.contains(flags) {
-            return Err(Error::Argument(format!("flags are {flags:?}; take some of {KNOWN_FLAGS:?}")));
-        }
-        if flags.contains(Flags::PREFER_FAST_TRACE | Flags::PREFER_FAST_BUILD) {
-            return Err(Error::Argument("flags ask for a fast trace and for a fast build; take one".into()));
-        }
+        quality::check(flags)?;
         let primitive_count = u32::try_from(primitive_count).unwrap_or(u32::MAX);
-        let opens = flags.contains(REBRAID) && !flags.contains(Flags::ALLOW_UPDATE);
-        let rebraid = match given {
-            BuildGeometries::Instances { .. } if opens => Some(options.rebraid(primitive_count)),
+        let primitives = given.primitives();
+        let capacity = match primitives {
+            Primitives::Instances => quality::opened_to(flags, options, primitive_count),
             _ => None,
         };
-        let entries = rebraid.map_or(primitive_count, |rebraid| rebraid.capacity);
-        let primitives = given.primitives();
-        let builder_options = builder::BuildOptions {
-            codes: Some(codes(flags, entries)),
-            // An instance costs more than a node whatever its box: one a leaf.
-            collapse: if primitives == Primitives::Instances { Collapse::OFF } else { collapse(flags) },
-            child_order: super::child_order(flags),
-            primitives,
+        let entries = capacity.unwrap_or(primitive_count);
+        let builder_options = BuildOptions {
             geometry_count: given.count(),
-            build_flags: flags.as_raw() & 0x1f,
-            ..builder::BuildOptions::DEFAULT
+            ..quality::build_options(flags, options, primitives, entries)
         };
         let builder = Builder::new(context, &builder_options, entries)?;
         let refit = Refit::new(context, &refit::RefitOptions::from(&builder_options), entries)?;
+        let rebraid = capacity.map(|capacity| Rebraid { capacity });
         Ok(Build { builder, refit, given, counts, primitive_count, rebraid, options: builder_options })
     }
 
@@ -111,10 +87,9 @@ impl Build {
         Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
     }
 
-    /// What the host's builder takes: codes, collapsing and order of children, flags.
-    pub fn host_options(&self) -> (Codes, Finish, u32) {
-        let builder::BuildOptions { collapse, child_order, build_flags, .. } = self.options;
-        (self.builder.codes(), Finish { collapse, child_order }, build_flags)
+    /// What the host's builder takes, and the codes.
+    pub fn host_options(&self) -> (BuildOptions, Codes) {
+        (BuildOptions { method: self.builder.method(), ..self.options }, self.builder.codes())
     }
 
     /// What it is over.
@@ -218,28 +193,6 @@ impl Build {
         };
         let rebraid = begin + records.next_multiple_of(SCRATCH_ALIGNMENT);
         Scratch { entries: begin, rebraid, builder: rebraid + self.rebraid.map_or(0, |r| r.scratch_bytes()) }
-    }
-}
-
-/// The codes that the flags ask for: a fast build sorts by 8 bits less, a fast trace by 8 more; low memory keeps them in one
-/// word, which saves 8 bytes of scratch a primitive.
-pub(super) fn codes(flags: Flags, primitive_count: u32) -> Codes {
-    let codes = Codes::for_count(primitive_count);
-    let bits = match () {
-        () if flags.contains(Flags::PREFER_FAST_BUILD) => codes.bits.saturating_sub(8).max(8),
-        () if flags.contains(Flags::PREFER_FAST_TRACE) => (codes.bits + 8).min(64),
-        () => codes.bits,
-    };
-    codes.code.full().with_bits(if flags.contains(Flags::LOW_MEMORY) { bits.min(32) } else { bits })
-}
-
-/// How subtrees are collapsed: where memory counts, tests are taken to be cheaper than they are, so that leaves are larger and
-/// nodes fewer. Compacted structures then have 56 to 59 bytes a triangle instead of 64 to 70 on eleven scenes of twelve.
-fn collapse(flags: Flags) -> Collapse {
-    if flags.intersects(Flags::ALLOW_COMPACTION | Flags::LOW_MEMORY) {
-        Collapse { c_i: 1.25, ..Collapse::SAH }
-    } else {
-        Collapse::SAH
     }
 }
 

@@ -5,7 +5,7 @@ use super::geometry::BuildGeometries;
 use super::{AccelOptions, Device};
 use crate::bvh::geometry::{Geometry, IndexFormat};
 use crate::bvh::twin::geometry::{Corners, HostGeometry};
-use crate::bvh::twin::lbvh;
+use crate::bvh::twin::{self, lbvh};
 use crate::geometry::Aabb;
 use crate::gpu::Context;
 use crate::{Error, Result};
@@ -66,7 +66,7 @@ unsafe fn built(
     // SAFETY: the caller's promise.
     let (given, count) = unsafe { build::told(info, ranges) }?;
     let build = Build::new(context, options, info.flags, given, Counts::OnHost, count)?;
-    let (codes, finish, build_flags) = build.host_options();
+    let (options, codes) = build.host_options();
     let flags_of = |geometries: &[Geometry]| -> Vec<(u32, u32)> {
         geometries.iter().zip(ranges).map(|(g, range)| (range.primitive_count, g.flags.bits())).collect()
     };
@@ -77,8 +77,8 @@ unsafe fn built(
                 // SAFETY: the caller's promise.
                 corners.extend(unsafe { triangles(geometry, range.primitive_count) }.corners());
             }
-            let tree = lbvh::build_corners(corners.into_iter(), codes, finish);
-            Ok(tree.with_geometries(&flags_of(geometries), build_flags).to_bytes())
+            let lbvh = |finish| lbvh::build_corners(corners.into_iter(), codes, finish);
+            Ok(twin::build(&options, codes, lbvh).with_geometries(&flags_of(geometries), options.build_flags).to_bytes())
         }
         BuildGeometries::Boxes(geometries) => {
             let mut boxes = Vec::new();
@@ -86,8 +86,8 @@ unsafe fn built(
                 // SAFETY: the caller's promise.
                 boxes.extend((0..range.primitive_count).map(|i| unsafe { box_at(geometry, i) }));
             }
-            let tree = lbvh::build_aabbs(&boxes, codes, finish);
-            Ok(tree.with_geometries(&flags_of(geometries), build_flags).to_bytes())
+            let lbvh = |finish| lbvh::build_aabbs(&boxes, codes, finish);
+            Ok(twin::build(&options, codes, lbvh).with_geometries(&flags_of(geometries), options.build_flags).to_bytes())
         }
         BuildGeometries::Instances { .. } => Err(Error::Argument(
             "type is TOP_LEVEL; this call does not have the structures that instances name: take accel::twin::top_level"

@@ -41,7 +41,7 @@ impl Instance {
 }
 
 /// Bytes of an `Entry` of instances.glsl.
-pub(super) const ENTRY_BYTES: u64 = 48;
+pub(super) const ENTRY_BYTES: u64 = 56;
 
 /// Writes `capacity` entries, those from `count` on without an instance. `ranges`, if not 0, is the address of the range in
 /// device memory that has the number of instances, and where they begin behind `instances`.

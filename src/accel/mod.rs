@@ -18,12 +18,19 @@
 //! A structure is copied, compacted, kept in a file and brought back by the calls of the extension ([`serialize`]); what the
 //! device knows of it is a [`Property`], written to an address instead of a query pool.
 //!
-//! The build flags, and what each changes:
+//! Three kinds of builds, by flag. Build and rays are beside those of `PREFER_FAST_BUILD`: geometric means of eight scenes and seven
+//! kinds of rays, on Mesa 26's lavapipe.
+//!
+//! | preference | bottom levels | top levels | build | rays |
+//! | --- | --- | --- | --- | --- |
+//! | `PREFER_FAST_BUILD` | an LBVH by codes of 8 bits less | the same | 1.0 | 1.0 |
+//! | none | H-PLOC, of over 2,048 primitives: of those measured, the least time for a build and ten rays a triangle | an LBVH and a pass of [reinsertion](crate::bvh::reinsertion) | 2.2 | 1.09 |
+//! | `PREFER_FAST_TRACE` | H-PLOC and half a pass of reinsertion | the same as without, and opens instances ([`REBRAID`]) | 7 | 1.15 |
+//!
+//! What other flags change:
 //!
 //! | flag | |
 //! | --- | --- |
-//! | `PREFER_FAST_BUILD` | Morton codes of 8 bits less: a pass of the sort less |
-//! | `PREFER_FAST_TRACE` | codes of 8 bits more |
 //! | `LOW_MEMORY` | larger leaves, so that compacted copies are smaller; codes of at most 32 bits: 20 bytes of scratch a primitive instead of 28, from 4 million on |
 //! | `ALLOW_UPDATE` | `UPDATE` may follow: boxes move with their primitives, the tree stays ([`crate::bvh::refit`]); no re-braiding, as an opened instance cannot be refitted |
 //! | `ALLOW_COMPACTION` | larger leaves, as with `LOW_MEMORY`; every structure can be compacted |
@@ -39,6 +46,7 @@ mod given;
 mod host;
 mod instances;
 mod properties;
+mod quality;
 mod rebraid;
 mod request;
 pub mod serialize;
@@ -50,31 +58,31 @@ pub use instances::Instance;
 pub use properties::Property;
 pub use request::{Placement, Request};
 
-use crate::bvh::child_order::ChildOrder;
+use crate::bvh::codes::Codes;
 use ash::vk;
-use rebraid::Rebraid;
 
 /// A build flag of hedgerow's own: a top level may open instances (Benthin, Woop, Wald 2017), within
 /// [`AccelOptions::rebraid_budget`].
 pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAccelerationStructureFlagsKHR::from_raw(1 << 30);
 
 /// Another of hedgerow's own: the children of all nodes get an order for rays that end at their first hit, by
-/// [`ChildOrder::MoreHitsForItsCost`]. Queries with `TerminateOnFirstHit` then look into the left child first instead of the nearer one.
+/// [`ChildOrder::MoreHitsForItsCost`](crate::bvh::child_order::ChildOrder::MoreHitsForItsCost). Queries with `TerminateOnFirstHit` then look into the left child first instead of the nearer one.
 /// Which of them hit something stays the same, and so does everything about other queries. Updates and copies keep the order. A flag and
 /// no choice of the device: each structure that shadow rays meet pays for its own, at the bottom and at the top.
 pub const ANY_HIT_ORDER: vk::BuildAccelerationStructureFlagsKHR =
     vk::BuildAccelerationStructureFlagsKHR::from_raw(1 << 29);
 
-/// The order of children that a build with these flags makes.
-fn child_order(flags: vk::BuildAccelerationStructureFlagsKHR) -> Option<ChildOrder> {
-    flags.contains(ANY_HIT_ORDER).then_some(ChildOrder::MoreHitsForItsCost)
-}
-
 /// Choices of a [`Device`] that Vulkan's structs have no field for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AccelOptions {
-    /// Entries of a top level that is built with [`REBRAID`], as a multiple of its instances: at least 1.
+    /// Entries of a top level that opens instances ([`REBRAID`], `PREFER_FAST_TRACE`), as a multiple of its instances. At 1 and below
+    /// none is opened.
     pub rebraid_budget: f32,
+    /// The codes that bottom levels are sorted by; `None` takes [`Codes::for_count`]. Flags do not change those that are given.
+    pub bottom_codes: Option<Codes>,
+    /// The same of top levels; `None` takes those by number, too, but with [`CodeBounds::Robust`](crate::bvh::codes::CodeBounds::Robust):
+    /// an instance far from the others costs them nothing.
+    pub top_codes: Option<Codes>,
     /// Whether calls are checked against what was created and built, as Vulkan's validation would: memory that is too
     /// small or overlaps, misaligned data, updates without the flag or of changed counts. They return an error before anything
     /// is recorded. Structures must then be created, built and destroyed through this device and its clones. For debugging:
@@ -83,17 +91,11 @@ pub struct AccelOptions {
 }
 
 impl AccelOptions {
-    /// Twice as many entries as instances: where scenes of all kinds whose boxes are loose gain, and memory is spared. No checks.
-    pub const DEFAULT: AccelOptions = AccelOptions { rebraid_budget: 2.0, checked: false };
+    /// Four times as many entries as instances: where scenes of all kinds whose boxes are loose gain, and memory is spared. No checks.
+    pub const DEFAULT: AccelOptions =
+        AccelOptions { rebraid_budget: 4.0, bottom_codes: None, top_codes: None, checked: false };
     /// The same with checks.
     pub const CHECKED: AccelOptions = AccelOptions { checked: true, ..AccelOptions::DEFAULT };
-
-    /// How a top level of this many instances is opened.
-    fn rebraid(&self, instance_count: u32) -> Rebraid {
-        // What is too much is refused by the builder.
-        let capacity = (f64::from(instance_count) * f64::from(self.rebraid_budget.max(1.0))).ceil() as u32;
-        Rebraid { capacity }
-    }
 }
 
 impl Default for AccelOptions {

@@ -160,7 +160,7 @@ pub struct Triangle {
 }
 
 impl Record for Triangle {
-    const KIND: u32 = 0x0002_0003;
+    const KIND: u32 = 0x0002_0004;
 
     fn primitive(&self) -> u32 {
         self.primitive
@@ -194,7 +194,7 @@ pub struct BoxRecord {
 }
 
 impl Record for BoxRecord {
-    const KIND: u32 = 0x0012_0003;
+    const KIND: u32 = 0x0012_0004;
 
     fn primitive(&self) -> u32 {
         self.primitive
@@ -227,22 +227,57 @@ pub struct InstanceRecord {
     pub offset_and_flags: u32,
     /// Position in the input.
     pub instance: u32,
-    /// Where to begin in the bottom-level structure, if the instance was opened: a [`Child`]'s index.
+    /// Where to begin in the bottom-level structure: in the lower 27 bits a [`Child`]'s index, above them its count, or
+    /// [`InstanceRecord::UP_TO_LAST`].
     pub start: u32,
-    /// And its count; [`InstanceRecord::AT_ROOT`] where it was not opened.
-    pub start_count: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// [`Header::node_slots`] of that structure; in the upper 5 bits what else rays need of it: `FORM_` constants.
+    pub slots: u32,
+    /// Records of that structure that may be looked at.
+    pub records: u32,
 }
 
 impl InstanceRecord {
-    /// The `start_count` of an instance that begins at its structure's root, wherever that is: the structure may be replaced by
-    /// a compacted copy.
-    pub const AT_ROOT: u32 = u32::MAX;
+    /// In place of the count of a leaf that has at least as many records: they go up to the last that may be looked at.
+    pub const UP_TO_LAST: u32 = 31;
+    /// The leaves hold boxes, not triangles.
+    pub const FORM_BOXES: u32 = 1 << InstanceRecord::INDEX_BITS;
+    /// Left children are those that rays look into first that end at any hit.
+    pub const FORM_LEFT_FIRST: u32 = 2 << InstanceRecord::INDEX_BITS;
+    /// All geometries are opaque.
+    pub const FORM_ALL_OPAQUE: u32 = 4 << InstanceRecord::INDEX_BITS;
+    /// Some are.
+    pub const FORM_ANY_OPAQUE: u32 = 8 << InstanceRecord::INDEX_BITS;
+
+    const INDEX_BITS: u32 = 27;
+
+    /// The record with what it knows of its structure: where it begins there, and what rays need of the header.
+    #[must_use]
+    pub fn over(self, child: &Child, header: &Header) -> InstanceRecord {
+        let is_long = child.count >= InstanceRecord::UP_TO_LAST;
+        let forms = [
+            (header.kind == BoxRecord::KIND, InstanceRecord::FORM_BOXES),
+            (header.child_order != 0, InstanceRecord::FORM_LEFT_FIRST),
+            (header.geometry_flags & GEOMETRY_OPAQUE != 0, InstanceRecord::FORM_ALL_OPAQUE),
+            (header.geometry_flags >> 8 & GEOMETRY_OPAQUE != 0, InstanceRecord::FORM_ANY_OPAQUE),
+        ];
+        let form = forms.iter().map(|&(is_so, form)| if is_so { form } else { 0 }).sum::<u32>();
+        InstanceRecord {
+            start: child.index | child.count.min(InstanceRecord::UP_TO_LAST) << InstanceRecord::INDEX_BITS,
+            slots: header.node_slots | form,
+            records: if is_long { child.index + child.count } else { header.primitive_count },
+            ..self
+        }
+    }
+
+    /// Where it begins in its structure: a [`Child`]'s index and count.
+    pub fn begin(&self) -> [u32; 2] {
+        let (index, count) = (self.start & ((1 << InstanceRecord::INDEX_BITS) - 1), self.start >> InstanceRecord::INDEX_BITS);
+        [index, if count == InstanceRecord::UP_TO_LAST { self.records - index } else { count }]
+    }
 }
 
 impl Record for InstanceRecord {
-    const KIND: u32 = 0x0022_0003;
+    const KIND: u32 = 0x0022_0004;
 
     fn primitive(&self) -> u32 {
         self.instance

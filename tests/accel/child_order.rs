@@ -8,13 +8,15 @@ use crate::common::mixture::ReadBack;
 use crate::common::probe::{CONFIRM, CONFIRM_ODD, IGNORE, ProbeRay, ProbeReport, flags};
 use crate::common::shapes::{Corners, boxes, hard_rays, soup};
 use crate::common::world::{Part, World};
-use hedgerow::accel::{ANY_HIT_ORDER, AccelOptions, Instance, REBRAID, twin};
+use hedgerow::accel::{ANY_HIT_ORDER, AccelOptions, Instance, REBRAID, twin as levels};
 use hedgerow::ash::vk;
+use hedgerow::bvh::builder::{BuildOptions, Method, Window};
 use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::layout::{Bvh2, Header, Triangle};
+use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::bvh::twin::lbvh::{self, Finish};
+use hedgerow::bvh::twin::{self, lbvh::{self, Finish}};
 use hedgerow::gpu::Recorder;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Query, Ray};
@@ -95,7 +97,7 @@ fn queries_hit_where_they_did_before() {
 fn both_levels_are_those_of_the_host() {
     for flags in [ANY_HIT_ORDER, ANY_HIT_ORDER | REBRAID] {
         let read = ReadBack::new(&Ours::on(device()), &World { flags, ..world(5) });
-        let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &AccelOptions::DEFAULT);
+        let expected = levels::top_level(&read.instances, |a| read.below(a), flags, &AccelOptions::DEFAULT);
         assert_eq!(expected.header.child_order, 1);
         assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}: the top level");
         assert!(read.triangles.values().all(|tree| tree.header.child_order == 1), "{flags:?}: below");
@@ -175,9 +177,15 @@ fn queries_take_the_left_child_first() {
     });
     assert_ne!(plain, ordered);
     // As `Levels` builds parts: PREFER_FAST_TRACE.
+    let options = BuildOptions {
+        method: Method::Hploc(Window::DEFAULT),
+        optimise: Some(ReinsertionOptions { rounds: 32, ..ReinsertionOptions::FAST }),
+        child_order: IN_ORDER.child_order,
+        ..BuildOptions::DEFAULT
+    };
     let codes = Codes::for_count(corners.len() as u32);
-    let codes = codes.code.full().with_bits((codes.bits + 8).min(64));
-    let tree = lbvh::build_corners(corners.iter().copied().map(Ok), codes, IN_ORDER);
+    let lbvh = |finish| lbvh::build_corners(corners.iter().copied().map(Ok), codes, finish);
+    let tree = twin::build(&options, codes, lbvh);
     for (ray, got) in rays.iter().zip(&ordered) {
         let expected = host::trace_left_first(&tree, ray).1;
         assert_eq!(*got, [expected.steps, expected.tests], "{ray:?}");

@@ -21,7 +21,7 @@ fn with_budget(rebraid_budget: f32) -> Ours {
 fn entries_of(read: &ReadBack) -> BTreeMap<u32, Vec<[u32; 2]>> {
     let mut all = BTreeMap::<u32, Vec<[u32; 2]>>::new();
     for record in read.top.records.iter().filter(|record| record.structure != 0) {
-        all.entry(record.instance).or_default().push([record.start, record.start_count]);
+        all.entry(record.instance).or_default().push(record.begin());
     }
     all
 }
@@ -38,10 +38,7 @@ fn reached_by(read: &ReadBack, instance: u32, starts: &[[u32; 2]]) -> Vec<u32> {
 
 fn reached<R: Record>(structure: &Bvh2<R>, starts: &[[u32; 2]]) -> Vec<u32> {
     let mut counts = vec![0; structure.header.active as usize];
-    let root = structure.header.root;
-    let begins =
-        |&start: &[u32; 2]| if start[1] == layout::InstanceRecord::AT_ROOT { [root.index, root.count] } else { start };
-    let mut waiting: Vec<[u32; 2]> = starts.iter().map(begins).collect();
+    let mut waiting = starts.to_vec();
     while let Some([index, count]) = waiting.pop() {
         match count {
             0 => waiting
@@ -89,15 +86,16 @@ fn what_the_flags_ask_for_is_what_the_host_builds() {
     let all = [
         Flags::empty(),
         REBRAID | Flags::PREFER_FAST_BUILD,
-        REBRAID | Flags::PREFER_FAST_TRACE,
+        Flags::PREFER_FAST_TRACE,
         REBRAID | Flags::LOW_MEMORY,
         REBRAID | Flags::ALLOW_UPDATE,
+        Flags::PREFER_FAST_TRACE | Flags::ALLOW_UPDATE,
     ];
     for flags in all {
         let read = ReadBack::new(&backend, &World { flags, ..world.clone() });
         let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &AccelOptions::DEFAULT);
         assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}");
-        let opens = flags.contains(REBRAID) && !flags.contains(Flags::ALLOW_UPDATE);
+        let opens = flags.intersects(REBRAID | Flags::PREFER_FAST_TRACE) && !flags.contains(Flags::ALLOW_UPDATE);
         assert_eq!(read.top.header.primitive_count > 400, opens, "{flags:?}");
         assert_eq!(entries_of(&read).values().any(|starts| starts.len() > 1), opens, "{flags:?}");
     }

@@ -575,9 +575,11 @@ struct Entry {
     instance: u32,
     hi: [f32; 3],
     start: u32,
-    start_count: u32,
-    left_out: u32,
+    slots: u32,
+    records: u32,
     given: u64,
+    left_out: u32,
+    reserved: u32,
 }
 
 /// An instance as the caller gives it: `GivenInstance` there.
@@ -604,9 +606,11 @@ fn world(count: usize, seed: u64, left_out: impl Fn(usize) -> u32) -> (Vec<Entry
             instance: i as u32,
             hi,
             start: number,
-            start_count: number % 3,
-            left_out: left_out(i),
+            slots: number % 3,
+            records: number % 7,
             given: 0,
+            left_out: left_out(i),
+            reserved: 0,
         };
         (
             entry,

@@ -21,23 +21,23 @@ bool is_finite_matrix(vec4 m[3]) {
 
 // Of the instance at an address.
 Entry entry_of(uvec2 given_at, uint i) {
-    Entry entry = Entry(vec3(0), i, vec3(0), 0, 0, INACTIVE, given_at);
+    Entry entry = entry_left_out(i, given_at, INACTIVE);
     GivenInstance given = instance_of(entry);
     if (all(equal(given.structure, uvec2(0)))) return entry;
     entry.left_out = STATUS_BAD_INSTANCE;
     vec4 inverse[3];
     if (!is_finite_matrix(given.to_world) || !inverse_of(given.to_world, inverse)) return entry;
     Structure structure = Structure(given.structure);
-    uint kind = structure.header.kind;
-    if (structure.header.magic != MAGIC || kind != KIND_TRIANGLES && kind != KIND_BOXES) return entry;
+    Header header = structure.header;
+    if (header.magic != MAGIC || header.kind != KIND_TRIANGLES && header.kind != KIND_BOXES) return entry;
     entry.left_out = INACTIVE;
-    if (structure.header.active_count == 0u || (structure.header.status & STATUS_UNUSABLE) != 0u) return entry;
-    Child root = structure.header.root;
-    Box b = world_box(given.to_world, structure, root);
+    if (header.active_count == 0u || (header.status & STATUS_UNUSABLE) != 0u) return entry;
+    Box b = world_box(given.to_world, structure, header.root);
     // Too far away to be a number.
     entry.left_out = STATUS_BAD_INSTANCE;
     if (!is_finite(b.lo) || !is_finite(b.hi)) return entry;
-    return Entry(b.lo, i, b.hi, 0u, AT_ROOT, 0u, given_at);
+    uint slots = min(header.node_slots, INDEX_MASK) | form_of(header);
+    return entry_over(b, i, header.root, slots, header.primitive_count, given_at);
 }
 
 void main() {
@@ -50,7 +50,7 @@ void main() {
         there = min(range.word[0], count);
         from = address_of(from, range.word[1], 1u);
     }
-    if (i >= there) entries.entry[i] = Entry(vec3(0), 0xFFFFFFFFu, vec3(0), 0, 0, INACTIVE, uvec2(0));
+    if (i >= there) entries.entry[i] = entry_left_out(0xFFFFFFFFu, uvec2(0), INACTIVE);
     else if (pointers != 0u) entries.entry[i] = entry_of(Pointers(from).pointer[i], i);
     else entries.entry[i] = entry_of(address_of(from, i, 64u), i);
 }

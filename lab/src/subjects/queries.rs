@@ -21,8 +21,9 @@ pub(crate) fn record(recorder: &mut Recorder<'_>, query: Query, buffers: &TraceB
     let (tuning, limits) = (&recorder.context().tuning.trace, &recorder.context().limits);
     // As trace::tracer has it, or no level of the stack in shared memory.
     let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
+    let shader = if tuning.in_longs { &shaders::MEASURE_QUERY_INT64 } else { &shaders::MEASURE_QUERY };
     let kernel = match work {
-        None => Kernel::new(&shaders::MEASURE_QUERY, tuning.group, &[any_hit, levels]),
+        None => Kernel::new(shader, tuning.group, &[any_hit, levels]),
         Some(_) => Kernel::new(&shaders::MEASURE_QUERY_WORK, limits.subgroup_size, &[any_hit, 0]),
     };
     let arguments = arguments::TraceQueries { structure, rays, hits, works, first: 0, count };

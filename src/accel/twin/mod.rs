@@ -3,11 +3,11 @@
 pub mod rebraid;
 pub mod serialize;
 
-use super::build::codes;
-use super::{AccelOptions, Instance, REBRAID, child_order};
+use super::{AccelOptions, Instance, quality};
+use crate::bvh::builder::{Method, Primitives};
+use crate::bvh::codes::Codes;
 use crate::bvh::layout::{self, Bvh2, Child, Header, Node, Record, status};
-use crate::bvh::sah::Collapse;
-use crate::bvh::twin::lbvh::{self, Finish};
+use crate::bvh::{self, twin::lbvh};
 use crate::geometry::Aabb;
 use ash::vk;
 
@@ -33,8 +33,6 @@ pub struct Entry {
     pub instance: u32,
     /// Where it begins in the instance's structure.
     pub start: Child,
-    /// Whether it is all of the instance.
-    pub is_whole: bool,
 }
 
 /// The top level over `instances`, built as a [`Device`](super::Device) with these options builds it by these flags. `below`
@@ -46,18 +44,21 @@ pub fn top_level<'a>(
     options: &AccelOptions,
 ) -> Bvh2<layout::InstanceRecord> {
     let mut entries = entries(instances, &below);
-    if flags.contains(REBRAID) && !flags.contains(vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE) {
-        let capacity = options.rebraid(entries.len() as u32).capacity;
+    if let Some(capacity) = quality::opened_to(flags, options, entries.len() as u32) {
         rebraid::rebraid(&mut entries, instances, &below, capacity);
-        let none = Entry { bounds: Err(0), instance: u32::MAX, start: Child::UNUSED, is_whole: true };
+        let none = Entry { bounds: Err(0), instance: u32::MAX, start: Child::UNUSED };
         entries.resize(capacity as usize, none);
     }
     let boxes: Vec<_> = entries.iter().map(|entry| entry.bounds).collect();
-    let codes = codes(flags, boxes.len() as u32);
-    let record = |entry: u32| record_of(&entries[entry as usize], instances);
-    let finish = Finish { collapse: Collapse::OFF, child_order: child_order(flags) };
-    let mut tree = lbvh::build_boxes(&boxes, record, codes, finish);
-    tree.header.build_flags = flags.as_raw() & 0x1f;
+    let mut options = quality::build_options(flags, options, Primitives::Instances, boxes.len() as u32);
+    // As the builder does.
+    if boxes.len() < 2 {
+        options.method = Method::Lbvh;
+    }
+    let codes = options.codes.unwrap_or_else(|| Codes::for_count(boxes.len() as u32));
+    let record = |entry: u32| record_of(&entries[entry as usize], instances, &below);
+    let mut tree = bvh::twin::build(&options, codes, |finish| lbvh::build_boxes(&boxes, record, codes, finish));
+    tree.header.build_flags = options.build_flags;
     tree
 }
 
@@ -67,7 +68,7 @@ pub fn entries<'a>(instances: &[Instance], below: &impl Fn(u64) -> Option<Below<
 }
 
 fn entry_of<'a>(number: u32, instance: &Instance, below: &impl Fn(u64) -> Option<Below<'a>>) -> Entry {
-    let without = |why_not| Entry { bounds: Err(why_not), instance: number, start: Child::UNUSED, is_whole: true };
+    let without = |why_not| Entry { bounds: Err(why_not), instance: number, start: Child::UNUSED };
     if instance.structure == 0 {
         return without(0);
     }
@@ -78,7 +79,7 @@ fn entry_of<'a>(number: u32, instance: &Instance, below: &impl Fn(u64) -> Option
     if below.header.active == 0 || below.header.status & status::UNUSABLE != 0 {
         return without(0);
     }
-    let entry = Entry { is_whole: true, ..below.entry_over(number, m, below.header.root) };
+    let entry = below.entry_over(number, m, below.header.root);
     match entry.bounds {
         Ok(b) if b.lo.iter().chain(&b.hi).all(|x| x.is_finite()) => entry,
         _ => without(status::BAD_INSTANCE),
@@ -108,27 +109,31 @@ impl Below<'_> {
         // Where no axis turns away from the world's, a box's image is a box.
         let keeps_boxes = m.iter().all(|row| row[..3].iter().filter(|&&x| x != 0.0).count() <= 1);
         let bounds = self.fine_box(m, child, if keeps_boxes { 0 } else { 3 });
-        Entry { bounds: Ok(bounds), instance, start: child, is_whole: false }
+        Entry { bounds: Ok(bounds), instance, start: child }
     }
 }
 
 /// The record of an entry; all zero for one that is left out.
-fn record_of(entry: &Entry, instances: &[Instance]) -> layout::InstanceRecord {
+fn record_of<'a>(
+    entry: &Entry,
+    instances: &[Instance],
+    below: &impl Fn(u64) -> Option<Below<'a>>,
+) -> layout::InstanceRecord {
     let none = layout::InstanceRecord { instance: entry.instance, ..bytemuck::Zeroable::zeroed() };
     if entry.bounds.is_err() {
         return none;
     }
     let given = &instances[entry.instance as usize];
-    layout::InstanceRecord {
+    let Some(below) = below(given.structure) else { return none };
+    let record = layout::InstanceRecord {
         to_object: inverse_of(&given.transform).unwrap_or_default(),
         to_world: given.transform,
         structure: given.structure,
         index_and_mask: given.index_and_mask,
         offset_and_flags: given.offset_and_flags,
-        start: if entry.is_whole { 0 } else { entry.start.index },
-        start_count: if entry.is_whole { layout::InstanceRecord::AT_ROOT } else { entry.start.count },
         ..none
-    }
+    };
+    record.over(&entry.start, below.header)
 }
 
 /// The box around a transformed box, not smaller by any rounding (`world_box.glsl`).

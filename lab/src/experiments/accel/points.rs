@@ -105,9 +105,9 @@ pub struct RebraidPoint {
     pub triangles: u64,
     /// How many other instances' boxes each one's overlaps, in the mean (over some hundred, where there are many).
     pub overlaps: f64,
-    /// Ours, plain.
+    /// Ours, with no instance opened.
     pub off: TopLevelPoint,
-    /// Ours, with the flag `REBRAID`.
+    /// Ours, re-braided.
     pub on: TopLevelPoint,
     /// The driver's.
     pub driver: Option<TopLevelPoint>,

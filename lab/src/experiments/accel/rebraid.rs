@@ -1,4 +1,5 @@
-//! Re-braiding on and off: what it takes to build, and what rays of every kind gain.
+//! Structures as `PREFER_FAST_TRACE` alone makes them, beside the driver's by the same flag; and the same with no instance opened: what
+//! re-braiding takes to build, and what rays of every kind gain.
 
 use super::points::{self, AccelEntry, FlaggedRays, MeanWork, TopLevelPoint};
 use super::{AccelSetup, WARM_UPS};
@@ -11,7 +12,7 @@ use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::levels::Levels;
 use crate::subjects::structures::Structures;
 use ash::vk;
-use hedgerow::accel::REBRAID;
+use hedgerow::accel::AccelOptions;
 use hedgerow::geometry::Aabb;
 use rayon::prelude::*;
 
@@ -29,9 +30,10 @@ const DRIVER: usize = 2;
 pub fn measure(stage: &AccelSetup<'_>, instances: &Instances, point: &mut Sink<'_, AccelEntry>) -> Result<()> {
     let say = |what: &str| (stage.say)(&format!("re-braiding {}: {what}", instances.name));
     say("building");
-    let ours = [(stage.ours(), Flags::empty()), (stage.ours(), REBRAID)];
-    let all = ours.into_iter().chain(Structures::drivers(stage.device).map(|drivers| (drivers, Flags::empty())));
-    let levels = all.map(|(maker, flags)| Levels::new(maker, instances, flags));
+    let unopened = AccelOptions { rebraid_budget: 1.0, ..AccelOptions::DEFAULT };
+    let ours = [Structures::ours(stage.device, unopened), stage.ours()];
+    let all = ours.into_iter().chain(Structures::drivers(stage.device));
+    let levels = all.map(|maker| Levels::new(maker, instances, Flags::PREFER_FAST_TRACE));
     let mut levels: Vec<Levels<'_>> = levels.collect::<Result<_>>()?;
     let builds = in_turn(&mut levels, WARM_UPS, stage.runs, Levels::build);
     let mut sides = Vec::new();

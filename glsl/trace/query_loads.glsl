@@ -1,0 +1,49 @@
+// What a query loads: nodes, triangles and records of instances, each invocation its own.
+//
+// A shader that defines HEDGEROW_INT64 before it includes trace/query.glsl loads elements of 64 bits: see trace/long_loads.glsl. The same
+// rays then hit the same.
+#ifndef HEDGEROW_TRACE_QUERY_LOADS
+#define HEDGEROW_TRACE_QUERY_LOADS
+#include "bvh/layout.glsl"
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer HedgerowNodes { Node node[]; };
+
+// Of a node in a structure, behind the header's 128 bytes.
+uvec2 hedgerow_node_address(uvec2 structure, uint index) {
+    return address_of(structure, 2u + index, 64u);
+}
+
+#ifdef HEDGEROW_INT64
+#include "trace/long_loads.glsl"
+
+Node hedgerow_node_at(uvec2 structure, uint index) {
+    return hedgerow_long_node(hedgerow_node_address(structure, index));
+}
+
+Triangle hedgerow_triangle_at(uvec2 triangles, uint index) {
+    return hedgerow_long_triangle(address_of(triangles, index, 40u));
+}
+
+// Without `to_world`, which no ray needs on its way.
+Instance hedgerow_instance_at(uvec2 instances, uint index) {
+    HedgerowLongs at = HedgerowLongs(address_of(instances, index, 128u));
+    const vec4 none[3] = vec4[3](vec4(0.0), vec4(0.0), vec4(0.0));
+    vec4 to_object[3] = vec4[3](uintBitsToFloat(hedgerow_quad_of(at, 0u)), uintBitsToFloat(hedgerow_quad_of(at, 2u)),
+                                uintBitsToFloat(hedgerow_quad_of(at, 4u)));
+    uvec4 a = hedgerow_quad_of(at, 12u), b = hedgerow_quad_of(at, 14u);
+    return Instance(to_object, none, a.xy, a.z, a.w, b.x, b.y, b.z, b.w);
+}
+#else
+Node hedgerow_node_at(uvec2 structure, uint index) {
+    return HedgerowNodes(hedgerow_node_address(structure, index)).node[0];
+}
+
+Triangle hedgerow_triangle_at(uvec2 triangles, uint index) {
+    return Triangles(triangles).triangle[index];
+}
+
+Instance hedgerow_instance_at(uvec2 instances, uint index) {
+    return Instances(instances).instance[index];
+}
+#endif
+#endif

@@ -1,0 +1,107 @@
+//! What build flags ask for: the method that makes a structure, its codes, its leaves.
+//!
+//! A flag changes the tree and never what rays hit. `PREFER_FAST_BUILD` sorts and joins, and nothing else. `PREFER_FAST_TRACE` merges
+//! neighbours by surface area and moves subtrees to where they cost less, for about as long as a driver's build takes; its top levels
+//! open instances. Without either, a build pays for what ten rays a triangle bring back.
+
+use super::{ANY_HIT_ORDER, AccelOptions, REBRAID};
+use crate::bvh::builder::{BuildOptions, Method, Primitives, Window};
+use crate::bvh::child_order::ChildOrder;
+use crate::bvh::codes::{CodeBounds, Codes};
+use crate::bvh::reinsertion::ReinsertionOptions;
+use crate::bvh::sah::Collapse;
+use crate::{Error, Result};
+use ash::vk;
+
+type Flags = vk::BuildAccelerationStructureFlagsKHR;
+
+/// Flags that a build may have.
+const KNOWN: Flags = Flags::from_raw(
+    Flags::ALLOW_UPDATE.as_raw()
+        | Flags::ALLOW_COMPACTION.as_raw()
+        | Flags::PREFER_FAST_TRACE.as_raw()
+        | Flags::PREFER_FAST_BUILD.as_raw()
+        | Flags::LOW_MEMORY.as_raw()
+        | REBRAID.as_raw()
+        | ANY_HIT_ORDER.as_raw(),
+);
+
+/// Primitives up to which a build without a preference is an LBVH: one workgroup makes it in one dispatch.
+const FEW: u32 = 2048;
+
+/// Half a pass of reinsertion: that and H-PLOC take as long as a driver's fast trace on Mesa's lavapipe.
+const HALF_A_PASS: ReinsertionOptions =
+    ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds / 2, ..ReinsertionOptions::FAST };
+
+/// # Errors
+/// Unknown flags, or two that exclude each other.
+pub(super) fn check(flags: Flags) -> Result<()> {
+    if !KNOWN.contains(flags) {
+        return Err(Error::Argument(format!("flags are {flags:?}; take some of {KNOWN:?}")));
+    }
+    if flags.contains(Flags::PREFER_FAST_TRACE | Flags::PREFER_FAST_BUILD) {
+        return Err(Error::Argument("flags ask for a fast trace and for a fast build; take one".into()));
+    }
+    Ok(())
+}
+
+/// Entries of a top level over so many instances; `None` if none of them is opened, as an opened instance cannot be refitted.
+pub(super) fn opened_to(flags: Flags, options: &AccelOptions, instance_count: u32) -> Option<u32> {
+    let asked = flags.intersects(REBRAID | Flags::PREFER_FAST_TRACE) && !flags.contains(Flags::ALLOW_UPDATE);
+    let opens = asked && options.rebraid_budget > 1.0;
+    // What is too much is refused by the builder.
+    opens.then(|| (f64::from(instance_count) * f64::from(options.rebraid_budget)).ceil() as u32)
+}
+
+/// What the builder is asked for over so many primitives, or entries of a top level.
+pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Primitives, count: u32) -> BuildOptions {
+    let is_top = primitives == Primitives::Instances;
+    BuildOptions {
+        method: if is_top { Method::Lbvh } else { bottom_method(flags, count) },
+        optimise: if is_top { top_optimise(flags) } else { bottom_optimise(flags) },
+        codes: Some(codes(flags, options, is_top, count)),
+        // An instance costs more than a node whatever its box: one a leaf.
+        collapse: if is_top { Collapse::OFF } else { collapse(flags) },
+        child_order: flags.contains(ANY_HIT_ORDER).then_some(ChildOrder::MoreHitsForItsCost),
+        primitives,
+        build_flags: flags.as_raw() & 0x1f,
+        ..BuildOptions::DEFAULT
+    }
+}
+
+fn bottom_method(flags: Flags, count: u32) -> Method {
+    let is_quick = flags.contains(Flags::PREFER_FAST_BUILD) || (!flags.contains(Flags::PREFER_FAST_TRACE) && count <= FEW);
+    if is_quick { Method::Lbvh } else { Method::Hploc(Window::DEFAULT) }
+}
+
+fn bottom_optimise(flags: Flags) -> Option<ReinsertionOptions> {
+    flags.contains(Flags::PREFER_FAST_TRACE).then_some(HALF_A_PASS)
+}
+
+/// A top level has few entries and all rays go through it: a pass of reinsertion brings back more than it takes. H-PLOC before that would
+/// not gain more, and a tree of opened instances less.
+fn top_optimise(flags: Flags) -> Option<ReinsertionOptions> {
+    (!flags.contains(Flags::PREFER_FAST_BUILD)).then_some(ReinsertionOptions::FAST)
+}
+
+/// A fast build sorts by 8 bits less; low memory keeps codes in one word, which saves 8 bytes of scratch a primitive. What lies far from
+/// the others would put them all into one cell of a top level: its bounds are robust.
+fn codes(flags: Flags, options: &AccelOptions, is_top: bool, count: u32) -> Codes {
+    if let Some(codes) = if is_top { options.top_codes } else { options.bottom_codes } {
+        return codes;
+    }
+    let codes = Codes::for_count(count);
+    let bits = if flags.contains(Flags::PREFER_FAST_BUILD) { codes.bits.saturating_sub(8).max(8) } else { codes.bits };
+    let bounds = if is_top { CodeBounds::Robust } else { CodeBounds::Full };
+    Codes { bounds, ..codes }.with_bits(if flags.contains(Flags::LOW_MEMORY) { bits.min(32) } else { bits })
+}
+
+/// How subtrees are collapsed: where memory counts, tests are taken to be cheaper than they are, so that leaves are larger and
+/// nodes fewer. Compacted structures then have 56 to 59 bytes a triangle instead of 64 to 70 on eleven scenes of twelve.
+fn collapse(flags: Flags) -> Collapse {
+    if flags.intersects(Flags::ALLOW_COMPACTION | Flags::LOW_MEMORY) {
+        Collapse { c_i: 1.25, ..Collapse::SAH }
+    } else {
+        Collapse::SAH
+    }
+}
