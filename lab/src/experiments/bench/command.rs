@@ -24,9 +24,12 @@ use std::io::Write;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
-/// What is measured where `-b` does not say: ours in their main variants, and the driver's.
-const DEFAULT_BUILDERS: &str =
-    "lbvh,lbvh:codes=mc30,lbvh:codes=emc64var,lbvh:collapse=off,driver-fast-build,driver-fast-trace";
+/// What is measured where `-b` does not say: from the fastest build to the fastest rays, on the device and the host, and those of others.
+const DEFAULT_BUILDERS: &str = if cfg!(feature = "peer-obvhs") {
+    "lbvh,hlbvh,ploc,hploc,hploc:width=8q,hploc:optimise=fast,kd-gpu,binned,driver-fast-build,driver-fast-trace,obvhs-fastest"
+} else {
+    "lbvh,hlbvh,ploc,hploc,hploc:width=8q,hploc:optimise=fast,kd-gpu,binned,driver-fast-build,driver-fast-trace"
+};
 /// Pixels of the report's pictures.
 const PICTURE: [u32; 2] = [480, 320];
 
