@@ -107,20 +107,14 @@ uvec2 kinds_in(uvec2 range, Selection s) {
     return sum;
 }
 
-float half_area(Box b) {
-    precise vec3 e = b.hi - b.lo;
-    precise float area = e.x * e.y + e.y * e.z + e.z * e.x;
-    return area;
-}
-
 // The area that rays need not enter any more for each entry more, if the entry is opened once, or its children too: from the
 // eight boxes below it, transformed.
 float gain_of(Entry entry) {
     if (entry.left_out != 0u) return NO_GAIN;
     GivenInstance given = instance_of(entry);
     Structure structure = Structure(given.structure);
-    uint slots = entry.slots & INDEX_MASK;
-    uvec2 begin = begin_at(entry.start, entry.records);
+    uint slots = entry.slots;
+    uvec2 begin = begin_at(entry.start, slots, entry.records);
     Child children[2];
     if (!open_child(structure, slots, Child(entry.lo, begin.x, entry.hi, begin.y), children)) return NO_GAIN;
     Box whole = empty_box();
@@ -151,17 +145,20 @@ float gain_of(Entry entry) {
 
 // The entry over one child of the node that another begins at.
 Entry entry_below(Entry parent, vec4 m[3], Structure structure, Child child) {
-    return entry_over(world_box(m, structure, child), parent.instance, child, parent.slots, parent.records, parent.given);
+    Box b = world_box(m, structure, parent.slots, child);
+    return entry_over(b, parent.instance, child, parent.slots, parent.records, parent.given);
 }
 
 void open(uint i, uint behind) {
     Entry entry = entries.entry[i];
     GivenInstance given = instance_of(entry);
     Structure structure = Structure(given.structure);
-    // What has a gain begins at an inner node.
-    Node node = structure.nodes[begin_at(entry.start, entry.records).x];
-    entries.entry[i] = entry_below(entry, given.to_world, structure, node.left);
-    entries.entry[behind] = entry_below(entry, given.to_world, structure, node.right);
+    uvec2 begin = begin_at(entry.start, entry.slots, entry.records);
+    Child parts[2];
+    // What has a gain can be opened.
+    open_child(structure, entry.slots, Child(entry.lo, begin.x, entry.hi, begin.y), parts);
+    entries.entry[i] = entry_below(entry, given.to_world, structure, parts[0]);
+    entries.entry[behind] = entry_below(entry, given.to_world, structure, parts[1]);
     gains.value[i] = UNKNOWN;
     gains.value[behind] = UNKNOWN;
 }

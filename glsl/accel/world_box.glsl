@@ -1,15 +1,7 @@
 // The box in the world of an instance, or of a part of one: the twin of src/accel/twin/mod.rs.
 #ifndef HEDGEROW_ACCEL_WORLD_BOX
 #define HEDGEROW_ACCEL_WORLD_BOX
-#include "bvh/instances.glsl"
-
-Box empty_box() {
-    return Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
-}
-
-Box united(Box a, Box b) {
-    return Box(min(a.lo, b.lo), max(a.hi, b.hi));
-}
+#include "accel/parts.glsl"
 
 // The box around a transformed box, not smaller by any rounding.
 Box transformed_box(vec4 m[3], vec3 lo, vec3 hi) {
@@ -37,19 +29,6 @@ bool keeps_boxes(vec4 m[3]) {
     return keeps;
 }
 
-// The two children of an inner node; of a leaf twice itself, and false.
-bool open_child(Structure structure, uint slots, Child child, out Child children[2]) {
-    bool opens = child.count == 0u && child.index < slots;
-    children[0] = child;
-    children[1] = child;
-    if (opens) {
-        Node node = structure.nodes[child.index];
-        children[0] = node.left;
-        children[1] = node.right;
-    }
-    return opens;
-}
-
 // The box in the world around the boxes of a child's two children.
 Box box_of_pair(vec4 m[3], Structure structure, uint slots, Child child) {
     Child pair[2];
@@ -59,10 +38,9 @@ Box box_of_pair(vec4 m[3], Structure structure, uint slots, Child child) {
 
 // The box in the world of what is below `child` of a structure: where its own would be loose, around the boxes of the eight
 // that are three levels below.
-Box world_box(vec4 m[3], Structure structure, Child child) {
+Box world_box(vec4 m[3], Structure structure, uint slots, Child child) {
     if (keeps_boxes(m)) return transformed_box(m, child.lo, child.hi);
     Box b = empty_box();
-    uint slots = structure.header.node_slots;
     Child children[2];
     open_child(structure, slots, child, children);
     for (uint side = 0; side < 2; ++side) {

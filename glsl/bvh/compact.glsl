@@ -14,7 +14,7 @@
 // Nobody gives this pass scratch memory, so a place of four words for each old slot lies where the records will be: nodes of a
 // tree of n records are in the slots below n - 1, and a record has seven words or more.
 //
-// Anything that is not a structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
+// A tree of quantised nodes has no holes: it is copied. Anything that is not a structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
 // its own status.
 //
 // needs  one barrier before, between each two, and after; any number of workgroups; any subgroup size; no overlap of the two
@@ -46,7 +46,7 @@ layout(push_constant, scalar) uniform CompactArguments {
 // How many slots may hold a node.
 uint slots_to_see(Header header) {
     Header becomes = compacted(header);
-    return is_structure(header) && becomes.inner_nodes != 0 ? min(header.node_slots, becomes.active_count - 1) : 0;
+    return is_binary(header) && becomes.inner_nodes != 0 ? min(header.node_slots, becomes.active_count - 1) : 0;
 }
 
 Places places_of(Header header) {

@@ -10,10 +10,15 @@
 // Eight bytes: what every part of a structure is aligned to, in whatever it is copied from or to.
 layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Pairs { uvec2 pair[]; };
 
-// Whether a header is one of this layout: what else may lie there says nothing of sizes.
-bool is_structure(Header header) {
+// Whether a header is one of a binary tree of this layout: what else may lie there says nothing of sizes.
+bool is_binary(Header header) {
     return header.magic == MAGIC &&
            (header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || header.kind == KIND_INSTANCES);
+}
+
+// Or one of quantised nodes.
+bool is_structure(Header header) {
+    return is_binary(header) || header.magic == MAGIC && is_quantised(header.kind);
 }
 
 // Bytes of a structure, as two words: an address behind address 0.

@@ -37,9 +37,15 @@ Entry entry_left_out(uint instance, uvec2 given, uint why) {
     return Entry(vec3(0), instance, vec3(0), 0u, 0u, 0u, given, why, 0u);
 }
 
-// Over a child in a structure of which so many records may be looked at. What something else wrote there names no more of them.
+// Over a child in a structure of which so many records may be looked at, or over slots of a quantised node, which are the child's
+// `count` then. What something else wrote there names no more of them.
 Entry entry_over(Box b, uint instance, Child child, uint slots, uint records, uvec2 given) {
     uint index = min(child.index, INDEX_MASK);
+    if ((slots & FORM_QUANTISED) != 0u) {
+        uint above = child.count >> 32u - INDEX_BITS << INDEX_BITS;
+        uint last = records & INDEX_MASK | above;
+        return Entry(b.lo, instance, b.hi, index | child.count << INDEX_BITS, slots, last, given, 0u, 0u);
+    }
     uint start = index | min(child.count, UP_TO_LAST) << INDEX_BITS;
     uint last = child.count >= UP_TO_LAST ? min(index + min(child.count, INDEX_MASK), records) : records;
     return Entry(b.lo, instance, b.hi, start, slots, last, given, 0u, 0u);

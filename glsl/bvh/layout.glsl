@@ -13,6 +13,9 @@ const uint MAGIC = 0x72676468u;
 const uint KIND_TRIANGLES = 0x00020004u;
 const uint KIND_BOXES = 0x00120004u;
 const uint KIND_INSTANCES = 0x00220004u;
+// The same in nodes of eight children as bytes (bvh/wide.glsl).
+const uint KIND_TRIANGLES_8Q = 0x01080004u;
+const uint KIND_BOXES_8Q = 0x01180004u;
 const uint MAX_DEPTH = 96;
 // The count of a child that no tree has: its slot is unused.
 const uint UNUSED = 0xFFFFFFFFu;
@@ -25,6 +28,9 @@ const uint FORM_BOXES = 1u << INDEX_BITS;
 const uint FORM_LEFT_FIRST = 2u << INDEX_BITS;
 const uint FORM_ALL_OPAQUE = 4u << INDEX_BITS;
 const uint FORM_ANY_OPAQUE = 8u << INDEX_BITS;
+const uint FORM_QUANTISED = 16u << INDEX_BITS;
+// Of an instance of quantised nodes: all slots of a node.
+const uint ALL_SLOTS = 0xFFu;
 
 const uint STATUS_NON_FINITE = 1u << 0;
 const uint STATUS_INDEX_OUT_OF_RANGE = 1u << 1;
@@ -70,10 +76,11 @@ struct Instance {
     uint index_and_mask;      // custom index, mask << 24
     uint offset_and_flags;    // offset in the shader binding table, flags << 24
     uint instance;
-    uint start;               // where to begin in the structure: a Child's index, its count or UP_TO_LAST above
+    uint start;               // where to begin in the structure: a Child's index, its count or UP_TO_LAST above; or a quantised node
     uint slots;               // nodes of the structure, its FORM above
     uint records;             // of the structure that may be looked at
 };
+// Of quantised nodes, the bits above `start` and those above `records` are the slots of the node that the instance begins with.
 
 struct GeometryEntry {
     uint first;
@@ -126,23 +133,33 @@ uvec2 records_at(uvec2 structure, uint node_slots) {
     return address_of(address_of(structure, 2u, 64u), node_slots, 64u);
 }
 
+bool is_quantised(uint kind) {
+    return kind == KIND_TRIANGLES_8Q || kind == KIND_BOXES_8Q;
+}
+
+bool has_boxes(uint kind) {
+    return kind == KIND_BOXES || kind == KIND_BOXES_8Q;
+}
+
 uint record_bytes(uint kind) {
-    return kind == KIND_INSTANCES ? 128u : kind == KIND_BOXES ? 28u : 40u;
+    return kind == KIND_INSTANCES ? 128u : has_boxes(kind) ? 28u : 40u;
 }
 
 // What rays need of a structure's header, beside how many nodes it has.
 uint form_of(Header header) {
-    uint form = header.kind == KIND_BOXES ? FORM_BOXES : 0u;
+    uint form = has_boxes(header.kind) ? FORM_BOXES : 0u;
+    if (is_quantised(header.kind)) form |= FORM_QUANTISED;
     if (header.child_order != 0u) form |= FORM_LEFT_FIRST;
     if ((header.geometry_flags & GEOMETRY_OPAQUE) != 0u) form |= FORM_ALL_OPAQUE;
     if ((header.geometry_flags >> 8 & GEOMETRY_OPAQUE) != 0u) form |= FORM_ANY_OPAQUE;
     return form;
 }
 
-// Where an instance begins: a Child's index and count.
-uvec2 begin_at(uint start, uint records) {
-    uint index = start & INDEX_MASK, count = start >> INDEX_BITS;
-    return uvec2(index, count == UP_TO_LAST ? records - index : count);
+// Where an instance begins: a Child's index and count; of quantised nodes a node, and which of its slots.
+uvec2 begin_at(uint start, uint slots, uint records) {
+    uint index = start & INDEX_MASK, above = start >> INDEX_BITS;
+    if ((slots & FORM_QUANTISED) != 0u) return uvec2(index, above | records >> INDEX_BITS << 32u - INDEX_BITS);
+    return uvec2(index, above == UP_TO_LAST ? records - index : above);
 }
 
 Triangles triangles_of(Structure structure) {
@@ -163,7 +180,8 @@ uint geometry_index_of(GeometryTable table, uint count, uint primitive) {
 // Where the table of geometries lies, if there are several: behind the records. An address, for a reference made of another
 // reference makes SwiftShader crash.
 uvec2 geometry_table_address(uvec2 structure, uint kind, uint node_slots, uint primitive_count) {
-    return address_of(records_at(structure, node_slots), primitive_count, record_bytes(kind));
+    uvec2 records = address_of(address_of(structure, 1u, 128u), node_slots, is_quantised(kind) ? 80u : 64u);
+    return address_of(records, primitive_count, record_bytes(kind));
 }
 
 GeometryTable geometry_table_at(uvec2 structure, uint kind, uint node_slots, uint primitive_count) {

@@ -4,7 +4,7 @@
 // needs   the feature shaderInt64 (gpu::Optional::int64 in src/gpu/requirements.rs)
 #ifndef HEDGEROW_TRACE_LONG_LOADS
 #define HEDGEROW_TRACE_LONG_LOADS
-#include "bvh/layout.glsl"
+#include "bvh/wide.glsl"
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer HedgerowLongs { uint64_t element[]; };
@@ -30,5 +30,12 @@ Triangle hedgerow_long_triangle(uvec2 address) {
     uvec4 a = hedgerow_quad_of(at, 0u), b = hedgerow_quad_of(at, 2u);
     uvec2 c = hedgerow_pair_of(at, 4u);
     return Triangle(uintBitsToFloat(a.xyz), uintBitsToFloat(uvec3(a.w, b.xy)), uintBitsToFloat(uvec3(b.zw, c.x)), c.y);
+}
+
+QuantisedNode hedgerow_long_quantised_node(uvec2 address) {
+    HedgerowLongs at = HedgerowLongs(address);
+    uvec4 a = hedgerow_quad_of(at, 0u), b = hedgerow_quad_of(at, 2u), c = hedgerow_quad_of(at, 4u), d = hedgerow_quad_of(at, 6u);
+    uvec4 e = hedgerow_quad_of(at, 8u);
+    return QuantisedNode(a.xyz, a.w, b.x, b.y, b.zw, uvec2[](c.xy, c.zw, d.xy), uvec2[](d.zw, e.xy, e.zw));
 }
 #endif

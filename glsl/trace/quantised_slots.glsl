@@ -21,4 +21,17 @@ uint sum_below(uvec2 bytes, uint slot) {
 uint rank_of_node(uint nodes, uint slot) {
     return uint(bitCount(nodes & (1u << slot) - 1u));
 }
+
+// A mask of slots as one of places, or back: the bit of slot s goes to place s ^ octant.
+uint in_octant(uint mask, uint octant) {
+    if ((octant & 1u) != 0u) mask = mask >> 1 & 0x55u | mask << 1 & 0xAAu;
+    if ((octant & 2u) != 0u) mask = mask >> 2 & 0x33u | mask << 2 & 0xCCu;
+    if ((octant & 4u) != 0u) mask = mask >> 4 & 0x0Fu | mask << 4 & 0xF0u;
+    return mask;
+}
+
+// The leading half of a float that is not above `enter`.
+uint leading_half(float enter) {
+    return enter >= 0.0 ? floatBitsToUint(enter) & 0xFFFF0000u : 0xFF800000u;
+}
 #endif

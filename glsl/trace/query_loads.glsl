@@ -4,7 +4,7 @@
 // rays then hit the same.
 #ifndef HEDGEROW_TRACE_QUERY_LOADS
 #define HEDGEROW_TRACE_QUERY_LOADS
-#include "bvh/layout.glsl"
+#include "bvh/wide.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer HedgerowNodes { Node node[]; };
 
@@ -18,6 +18,10 @@ uvec2 hedgerow_node_address(uvec2 structure, uint index) {
 
 Node hedgerow_node_at(uvec2 structure, uint index) {
     return hedgerow_long_node(hedgerow_node_address(structure, index));
+}
+
+QuantisedNode hedgerow_quantised_node_at(uvec2 structure, uint index) {
+    return hedgerow_long_quantised_node(address_of(wide_nodes_at(structure), index, QUANTISED_NODE_BYTES));
 }
 
 Triangle hedgerow_triangle_at(uvec2 triangles, uint index) {
@@ -36,6 +40,10 @@ Instance hedgerow_instance_at(uvec2 instances, uint index) {
 #else
 Node hedgerow_node_at(uvec2 structure, uint index) {
     return HedgerowNodes(hedgerow_node_address(structure, index)).node[0];
+}
+
+QuantisedNode hedgerow_quantised_node_at(uvec2 structure, uint index) {
+    return QuantisedNodes(address_of(wide_nodes_at(structure), index, QUANTISED_NODE_BYTES)).node[0];
 }
 
 Triangle hedgerow_triangle_at(uvec2 triangles, uint index) {

@@ -7,11 +7,17 @@
 // A query that ends at its first hit keeps no distances, as nothing is nearer than the end of its ray until then; in a structure whose
 // children are in order (bvh/child_order.glsl) it takes the left child first, wherever that is. What a query asks for is mostly known
 // when its shader is compiled, and then nothing is left of the other way.
+//
+// Structures below may be of nodes of two or of eight (bvh/wide.glsl), whose children are met as trace/walk_quantised.glsl meets them. A
+// shader that defines HEDGEROW_WITHOUT_QUANTISED leaves the latter out: rays then pass what is made of them.
 #ifndef HEDGEROW_TRACE_QUERY_WALK
 #define HEDGEROW_TRACE_QUERY_WALK
+#extension GL_EXT_control_flow_attributes : require
 #include "bvh/layout.glsl"
 #define HEDGEROW_LEVELS (2 * MAX_DEPTH * HEDGEROW_QUERIES)
 #include "trace/geometry.glsl"
+#include "trace/quantised_boxes.glsl"
+#include "trace/quantised_slots.glsl"
 #include "trace/query_loads.glsl"
 #include "trace/ray.glsl"
 #include "trace/slab.glsl"
@@ -109,6 +115,16 @@ struct HedgerowRayQuery {
     HedgerowPreparedRay prepared;
     uint instance;            // record in the top level
     uint instance_flags;
+    // Of quantised nodes: those of the one at hand that are nodes and that the ray has yet to enter, as an entry of the stack has them
+    // (first of its nodes; where the ray enters the nearest in a half, which slots are nodes, which are left); its leaves, likewise; the
+    // bits of the axes in which the ray goes down; the slots that the ray may enter of the node where it begins.
+    uint first_child;
+    uint group;
+    uint first_record;
+    uvec2 counts;
+    uint leaves;
+    uint octant;
+    uint begin_slots;
     // Where its entries of the stack begin, and whether it is below the one that is queried.
     uint bottom;
     bool is_below;
@@ -140,6 +156,9 @@ vec3 hedgerow_transformed(vec4 rows[3], vec4 p) {
 
 bool hedgerow_can_be_traced(Header header) {
     bool known = header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || header.kind == KIND_INSTANCES;
+#ifndef HEDGEROW_WITHOUT_QUANTISED
+    known = known || is_quantised(header.kind);
+#endif
     return header.magic == MAGIC && known && header.active_count != 0u && (header.status & STATUS_UNUSABLE) == 0u;
 }
 
@@ -177,9 +196,31 @@ bool hedgerow_goes_left_first(HedgerowRayQuery query) {
     return hedgerow_ends_at_first_hit(query) && (query.form & FORM_LEFT_FIRST) != 0u;
 }
 
+bool hedgerow_is_quantised(HedgerowRayQuery query) {
+#ifdef HEDGEROW_WITHOUT_QUANTISED
+    return false;
+#else
+    return (query.form & FORM_QUANTISED) != 0u;
+#endif
+}
+
+// Of quantised nodes nothing is at hand.
+void hedgerow_drop_group(inout HedgerowRayQuery query) {
+    query.group = 0u;
+    query.leaves = 0u;
+}
+
+// At a quantised node, of which the ray may enter these slots.
+void hedgerow_begin_quantised(inout HedgerowRayQuery query, uint slots) {
+    query.begin_slots = slots;
+    uvec3 down = floatBitsToUint(query.prepared.inverse) >> 31;
+    query.octant = hedgerow_goes_left_first(query) ? 0u : down.x | down.y << 1 | down.z << 2;
+}
+
 // Nothing is at hand, and nothing waits.
 void hedgerow_end(inout HedgerowRayQuery query) {
     query.left = HEDGEROW_NOTHING;
+    hedgerow_drop_group(query);
     query.level = query.floor;
     query.bottom = query.floor;
     query.is_below = false;
@@ -221,6 +262,11 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.top_form = 0u;
     query.rounds = 0u;
     query.top_rounds = 0u;
+    query.first_child = 0u;
+    query.first_record = 0u;
+    query.counts = uvec2(0u);
+    query.octant = 0u;
+    query.begin_slots = ALL_SLOTS;
     bool goes = false;
     uvec2 root = uvec2(0u, HEDGEROW_NOTHING);
     if (any(notEqual(structure, uvec2(0)))) {
@@ -240,6 +286,7 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     if (hedgerow_prepare_for(query.has_instances, ray, query.prepared) && goes && !skips) {
         query.index = root.x;
         query.left = root.y;
+        if (hedgerow_is_quantised(query)) hedgerow_begin_quantised(query, ALL_SLOTS);
 #ifdef HEDGEROW_LINK_COUNTS
         if (!query.has_instances) query.at.counts = HEDGEROW_LINK_COUNTS(structure);
 #endif
@@ -274,11 +321,17 @@ HedgerowMeeting hedgerow_met(HedgerowRayQuery query, bool committed) {
 Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
     if (query.top_has_instances) return Instances(records_at(query.top, query.top_slots)).instance[met.instance];
     const vec4 identity[3] = vec4[3](vec4(1, 0, 0, 0), vec4(0, 1, 0, 0), vec4(0, 0, 1, 0));
-    return Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, query.top_slots, query.top_records);
+    return Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, query.top_slots | query.top_form, query.top_records);
+}
+
+// The records of a bottom-level structure.
+uvec2 hedgerow_records_in(uvec2 structure, uint slots, uint form) {
+    if ((form & FORM_QUANTISED) != 0u) return wide_records_at(structure, slots, QUANTISED_NODE_BYTES);
+    return records_at(structure, slots);
 }
 
 uvec2 hedgerow_records_of(Instance instance) {
-    return records_at(instance.structure, instance.slots & INDEX_MASK);
+    return hedgerow_records_in(instance.structure, instance.slots & INDEX_MASK, instance.slots);
 }
 
 uint hedgerow_primitive_of(Instance instance, HedgerowMeeting met) {
@@ -314,6 +367,65 @@ void hedgerow_put_off(inout HedgerowRayQuery query, uint index, uint count, floa
     query.level++;
 }
 
+// The children of a quantised node that the ray enters are at hand: leaves first, then nodes from near to far.
+void hedgerow_visit_quantised(inout HedgerowRayQuery query) {
+#ifdef HEDGEROW_COUNTS_WORK
+    query.work.z += 1u;
+#endif
+    QuantisedNode node = hedgerow_quantised_node_at(query.structure, query.index);
+    query.left = HEDGEROW_NOTHING;
+    if (node.exponents_and_nodes == LONG_LEAF) {
+        query.index = node.first_record;
+        if (node.first_child != 0u) query.left = node.first_child;
+        return;
+    }
+    float enters[8];
+    enter_quantised(query.prepared, node, query.best, enters);
+    uint entered = 0u;
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+        if (enters[slot] < HEDGEROW_INFINITY) entered |= 1u << slot;
+    }
+    entered &= query.begin_slots;
+    query.begin_slots = ALL_SLOTS;
+    uint nodes = node.exponents_and_nodes >> 24;
+    uint visits = in_octant(entered & nodes, query.octant);
+    uint others = in_octant(visits & visits - 1u, query.octant);
+    float nearest = HEDGEROW_INFINITY;
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+        if ((others >> slot & 1u) != 0u) nearest = min(nearest, enters[slot]);
+    }
+    query.first_child = node.first_child;
+    query.group = leading_half(nearest) | nodes << 8 | visits;
+    query.first_record = node.first_record;
+    query.counts = node.counts;
+    query.leaves = in_octant(entered & ~nodes, query.octant);
+}
+
+// The next leaf or node of those at hand; whether there was any.
+bool hedgerow_take_of_group(inout HedgerowRayQuery query) {
+    if (query.leaves != 0u) {
+        uint slot = uint(findLSB(query.leaves)) ^ query.octant;
+        query.leaves &= query.leaves - 1u;
+        uint count = byte_of_slot(query.counts, slot);
+        query.index = query.first_record + sum_below(query.counts, slot);
+        // A slot without a child may be among them.
+        query.left = count != 0u ? count : HEDGEROW_NOTHING;
+        return true;
+    }
+    uint visits = query.group & 0xFFu;
+    if (visits == 0u) return false;
+    uint slot = uint(findLSB(visits)) ^ query.octant;
+    uint left = visits & visits - 1u;
+    query.index = query.first_child + rank_of_node(query.group >> 8 & 0xFFu, slot);
+    query.left = 0u;
+    if (left != 0u && query.level - query.bottom < MAX_DEPTH) {
+        hedgerow_put_entry(query.level, uvec2(query.first_child, query.group ^ visits ^ left));
+        query.level++;
+    }
+    query.group = 0u;
+    return true;
+}
+
 void hedgerow_visit(inout HedgerowRayQuery query) {
     if (query.index >= query.slots) {
         query.left = HEDGEROW_NOTHING;
@@ -322,6 +434,10 @@ void hedgerow_visit(inout HedgerowRayQuery query) {
     if (!query.is_prepared) {
         hedgerow_prepare_for(query.has_instances, query.ray, query.prepared);
         query.is_prepared = true;
+    }
+    if (hedgerow_is_quantised(query)) {
+        hedgerow_visit_quantised(query);
+        return;
     }
 #ifdef HEDGEROW_COUNTS_WORK
     if (query.has_instances) query.work.x += 1u;
@@ -364,6 +480,9 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
     HEDGEROW_COUNT(y);
     if (hedgerow_skips(query.flags, instance.slots)) return;
+#ifdef HEDGEROW_WITHOUT_QUANTISED
+    if ((instance.slots & FORM_QUANTISED) != 0u) return;
+#endif
     HedgerowRay ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
                                   hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
     HedgerowPreparedRay prepared;
@@ -377,8 +496,8 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     query.structure = instance.structure;
     query.has_instances = false;
     query.slots = instance.slots & INDEX_MASK;
-    query.records = instance.records;
     query.form = instance.slots & ~INDEX_MASK;
+    query.records = hedgerow_is_quantised(query) ? instance.records & INDEX_MASK : instance.records;
     query.top_rounds = query.rounds;
     query.rounds = hedgerow_rounds(query.slots, query.records);
     query.is_below = true;
@@ -388,9 +507,13 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
 #ifdef HEDGEROW_LINK_COUNTS
     query.at = HedgerowLink(HEDGEROW_LINK_COUNTS(instance.structure), HEDGEROW_NO_LINK);
 #endif
-    uvec2 begin = begin_at(instance.start, instance.records);
+    uvec2 begin = begin_at(instance.start, instance.slots, instance.records);
     query.index = begin.x;
     query.left = begin.y;
+    if (hedgerow_is_quantised(query)) {
+        query.left = 0u;
+        hedgerow_begin_quantised(query, begin.y);
+    }
 }
 
 // Back to the top level.
@@ -424,7 +547,7 @@ bool hedgerow_is_culled(HedgerowRayQuery query, bool is_opaque) {
 
 // The next triangle of the leaf; true if it is a candidate that the shader must decide on.
 bool hedgerow_test_triangle(inout HedgerowRayQuery query, uint at) {
-    Triangle triangle = hedgerow_triangle_at(records_at(query.structure, query.slots), at);
+    Triangle triangle = hedgerow_triangle_at(hedgerow_records_in(query.structure, query.slots, query.form), at);
     vec3 met;
     bool is_front;
     if (!hedgerow_meet_facing(query.prepared, triangle.v0, triangle.v1, triangle.v2, met, is_front)) return false;
@@ -443,7 +566,7 @@ bool hedgerow_test_triangle(inout HedgerowRayQuery query, uint at) {
 
 // The same for a box: always a candidate, as only the shader knows what is in it.
 bool hedgerow_test_box(inout HedgerowRayQuery query, uint at) {
-    BoxRecord box = BoxRecords(records_at(query.structure, query.slots)).box[at];
+    BoxRecord box = BoxRecords(hedgerow_records_in(query.structure, query.slots, query.form)).box[at];
     // Inside out where an update has left it out.
     if (box.lo.x > box.hi.x) return false;
     bool entered;
@@ -465,12 +588,21 @@ bool hedgerow_test(inout HedgerowRayQuery query) {
 
 // Takes what waits; false at the end of the walk.
 bool hedgerow_go_on(inout HedgerowRayQuery query) {
+    bool is_quantised_at_hand = hedgerow_is_quantised(query);
+    if (is_quantised_at_hand && hedgerow_take_of_group(query)) return true;
     if (query.level == query.bottom) {
         if (!query.is_below) return false;
         hedgerow_leave_instance(query);
         return true;
     }
     query.level--;
+    if (is_quantised_at_hand) {
+        uvec2 waiting = hedgerow_entry(query.level);
+        query.first_child = waiting.x;
+        // Equally far is not too far: an equally near hit that comes before may be there.
+        query.group = uintBitsToFloat(waiting.y & 0xFFFF0000u) <= query.best ? waiting.y : 0u;
+        return true;
+    }
     if (hedgerow_ends_at_first_hit(query)) {
         uvec2 waiting = hedgerow_taken_anyway(query.level);
         query.index = waiting.x;

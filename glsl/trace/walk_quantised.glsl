@@ -38,14 +38,6 @@ struct QuantisedWalk {
     uvec3 work;
 };
 
-// A mask of slots as one of places, or back: the bit of slot s goes to place s ^ octant.
-uint in_octant(uint mask, uint octant) {
-    if ((octant & 1u) != 0u) mask = mask >> 1 & 0x55u | mask << 1 & 0xAAu;
-    if ((octant & 2u) != 0u) mask = mask >> 2 & 0x33u | mask << 2 & 0xCCu;
-    if ((octant & 4u) != 0u) mask = mask >> 4 & 0x0Fu | mask << 4 & 0xF0u;
-    return mask;
-}
-
 // At the root; a ray that cannot hit anything has nothing at hand and nothing that waits.
 void begin(HedgerowRay ray, Child root, bool usable, out QuantisedWalk walk) {
     bool goes = hedgerow_prepare(ray, walk.ray) && usable;
@@ -84,11 +76,6 @@ uint next_node(inout QuantisedWalk walk) {
         walk.level++;
     }
     return walk.first_child + rank_of_node(walk.nodes, slot);
-}
-
-// The leading half of a float that is not above `enter`.
-uint leading_half(float enter) {
-    return enter >= 0.0 ? floatBitsToUint(enter) & 0xFFFF0000u : 0xFF800000u;
 }
 
 void visit(QuantisedNode node, inout QuantisedWalk walk) {

@@ -8,6 +8,8 @@ use crate::bvh::builder::{BuildJob, BuildOptions, Builder};
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
 use crate::bvh::refit::{self, Refit};
+use crate::bvh::wide::Form;
+use crate::bvh::wide::device::{WideOptions, WidePass};
 use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Region, Sizes, Step, shaders};
 use crate::{Error, Result};
@@ -37,13 +39,19 @@ pub(super) struct Build {
     /// Most primitives of all geometries.
     primitive_count: u32,
     rebraid: Option<Rebraid>,
+    /// What makes nodes of eight of the builder's tree, which lies in scratch memory then.
+    wide: Option<WidePass>,
     options: BuildOptions,
+    /// What a build of fewer primitives may need.
+    of_fewer: Option<Sizes>,
 }
 
 /// Where the parts of the scratch memory begin.
 struct Scratch {
     entries: u64,
     rebraid: u64,
+    /// The tree that nodes of eight are made of.
+    binary: u64,
     builder: u64,
 }
 
@@ -72,24 +80,53 @@ impl Build {
         let builder = Builder::new(context, &builder_options, entries)?;
         let refit = Refit::new(context, &refit::RefitOptions::from(&builder_options), entries)?;
         let rebraid = capacity.map(|capacity| Rebraid { capacity });
-        Ok(Build { builder, refit, given, counts, primitive_count, rebraid, options: builder_options })
+        let wide = quality::is_wide(flags, options, primitives, entries).then(|| {
+            let of =
+                WideOptions { form: Form::EightQuantised, primitives, geometry_count: builder_options.geometry_count };
+            WidePass::new(context, &of, entries)
+        });
+        let fewer = quality::fewer_of_another_form(flags, entries).filter(|_| primitives != Primitives::Instances);
+        let of_fewer = |count: u32| {
+            let given = given.clone();
+            Build::new(context, options, flags, given, counts, count.into()).map(|build| build.sizes_at_most())
+        };
+        let of_fewer = fewer.map(of_fewer).transpose()?;
+        Ok(Build { builder, refit, given, counts, primitive_count, rebraid, wide, options: builder_options, of_fewer })
     }
 
     /// Bytes of structure and scratch memory that it needs.
     pub fn sizes(&self) -> Sizes {
-        let sizes = self.builder.sizes();
-        Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
+        self.sizes_with(self.builder.sizes())
     }
 
     /// Bytes of structure and scratch memory that suffice for it and for the same with fewer primitives.
     pub fn sizes_at_most(&self) -> Sizes {
-        let sizes = self.builder.sizes_at_most();
-        Sizes { scratch: sizes.scratch + self.scratch(0).builder, ..sizes }
+        let sizes = self.sizes_with(self.builder.sizes_at_most());
+        self.of_fewer.map_or(sizes, |fewer| Sizes {
+            structure: sizes.structure.max(fewer.structure),
+            scratch: sizes.scratch.max(fewer.scratch),
+            ..sizes
+        })
+    }
+
+    fn sizes_with(&self, builder: Sizes) -> Sizes {
+        let before = self.scratch(0).builder;
+        match self.wide.map(|wide| wide.sizes()) {
+            Some(wide) => {
+                Sizes { structure: wide.structure, scratch: before + builder.scratch.max(wide.scratch), ..builder }
+            }
+            None => Sizes { scratch: before + builder.scratch, ..builder },
+        }
     }
 
     /// What the host's builder takes, and the codes.
     pub fn host_options(&self) -> (BuildOptions, Codes) {
         (BuildOptions { method: self.builder.method(), ..self.options }, self.builder.codes())
+    }
+
+    /// Whether the structure has nodes of eight.
+    pub fn is_wide(&self) -> bool {
+        self.wide.is_some()
     }
 
     /// What it is over.
@@ -104,12 +141,21 @@ impl Build {
 
     /// The builder's part, with scratch memory at `scratch`.
     pub fn job(&self, structure: Region, scratch: Region) -> BuildJob<'_> {
+        let structure = if self.wide.is_some() { scratch.behind(self.scratch(0).binary) } else { structure };
         BuildJob {
             builder: &self.builder,
             input: self.input(scratch.address),
             structure,
             scratch: scratch.behind(self.scratch(0).builder),
         }
+    }
+
+    /// What must run behind the builder's part, with a barrier before.
+    pub fn epilogue(&self, structure: Region, scratch: Region) -> Result<Vec<Step>> {
+        let Some(wide) = &self.wide else { return Ok(Vec::new()) };
+        let parts = self.scratch(0);
+        let source = scratch.behind(parts.binary).address;
+        wide.steps(source, [0, 0], structure, scratch.behind(parts.builder))
     }
 
     /// The part of an update in place, with scratch memory at `scratch`.
@@ -192,7 +238,9 @@ impl Build {
             }
         };
         let rebraid = begin + records.next_multiple_of(SCRATCH_ALIGNMENT);
-        Scratch { entries: begin, rebraid, builder: rebraid + self.rebraid.map_or(0, |r| r.scratch_bytes()) }
+        let binary = rebraid + self.rebraid.map_or(0, |r| r.scratch_bytes());
+        let binary_bytes = if self.wide.is_some() { self.builder.sizes().structure } else { 0 };
+        Scratch { entries: begin, rebraid, binary, builder: binary + binary_bytes.next_multiple_of(SCRATCH_ALIGNMENT) }
     }
 }
 

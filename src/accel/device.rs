@@ -324,7 +324,14 @@ impl<'a> Device<'a> {
             recorder.chains(&prologues)?;
             recorder.barrier();
         }
-        recorder.chains(&chains)
+        recorder.chains(&chains)?;
+        let epilogues = builds_anew.iter().map(|p| p.build.epilogue(p.structure, p.scratch));
+        let epilogues: Vec<Vec<Step>> = epilogues.collect::<Result<_>>()?;
+        if epilogues.iter().any(|steps| !steps.is_empty()) {
+            recorder.barrier();
+            recorder.chains(&epilogues)?;
+        }
+        Ok(())
     }
 }
 

@@ -83,6 +83,12 @@ pub struct AccelOptions {
     /// The same of top levels; `None` takes those by number, too, but with [`CodeBounds::Robust`](crate::bvh::codes::CodeBounds::Robust):
     /// an instance far from the others costs them nothing.
     pub top_codes: Option<Codes>,
+    /// Whether bottom levels get quantised nodes of eight children ([`crate::bvh::wide`]), where they are not LBVHs and no update is
+    /// allowed. They take less memory; a device's top level may hold them beside others. Queries meet them, and a shader that defines
+    /// `HEDGEROW_WITHOUT_QUANTISED` (`glsl/trace/query_walk.glsl`) leaves them out; of the tracers, those of
+    /// [`crate::trace::wide`] do. On lavapipe rays take 1.6 times as long by them, as invocations at nodes of two, of which top levels
+    /// are, wait for those at nodes of eight: no GPU was measured.
+    pub wide: bool,
     /// Whether calls are checked against what was created and built, as Vulkan's validation would: memory that is too
     /// small or overlaps, misaligned data, updates without the flag or of changed counts. They return an error before anything
     /// is recorded. Structures must then be created, built and destroyed through this device and its clones. For debugging:
@@ -93,7 +99,7 @@ pub struct AccelOptions {
 impl AccelOptions {
     /// Four times as many entries as instances: where scenes of all kinds whose boxes are loose gain, and memory is spared. No checks.
     pub const DEFAULT: AccelOptions =
-        AccelOptions { rebraid_budget: 4.0, bottom_codes: None, top_codes: None, checked: false };
+        AccelOptions { rebraid_budget: 4.0, bottom_codes: None, top_codes: None, wide: false, checked: false };
     /// The same with checks.
     pub const CHECKED: AccelOptions = AccelOptions { checked: true, ..AccelOptions::DEFAULT };
 }

@@ -29,6 +29,9 @@ const KNOWN: Flags = Flags::from_raw(
 /// Primitives up to which a build without a preference is an LBVH: one workgroup makes it in one dispatch.
 const FEW: u32 = 2048;
 
+/// Records of wide structures, at most: above as many bits of an instance's record lie slots of a node.
+const MOST_WIDE: u32 = (1 << 27) - 1;
+
 /// Half a pass of reinsertion: that and H-PLOC take as long as a driver's fast trace on Mesa's lavapipe.
 const HALF_A_PASS: ReinsertionOptions =
     ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds / 2, ..ReinsertionOptions::FAST };
@@ -69,9 +72,24 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
     }
 }
 
+/// Whether a structure gets quantised nodes of eight: they cannot be refitted.
+pub(super) fn is_wide(flags: Flags, options: &AccelOptions, primitives: Primitives, count: u32) -> bool {
+    let is_bottom = primitives != Primitives::Instances;
+    is_bottom && options.wide && !flags.contains(Flags::ALLOW_UPDATE) && count <= MOST_WIDE && !is_quick(flags, count)
+}
+
+/// Whether a bottom level is an LBVH.
+fn is_quick(flags: Flags, count: u32) -> bool {
+    flags.contains(Flags::PREFER_FAST_BUILD) || (!flags.contains(Flags::PREFER_FAST_TRACE) && count <= FEW)
+}
+
+/// Fewer primitives, of which another form may need more memory than `count` in that of `count`.
+pub(super) fn fewer_of_another_form(flags: Flags, count: u32) -> Option<u32> {
+    (count > FEW && is_quick(flags, FEW) != is_quick(flags, count)).then_some(FEW)
+}
+
 fn bottom_method(flags: Flags, count: u32) -> Method {
-    let is_quick = flags.contains(Flags::PREFER_FAST_BUILD) || (!flags.contains(Flags::PREFER_FAST_TRACE) && count <= FEW);
-    if is_quick { Method::Lbvh } else { Method::Hploc(Window::DEFAULT) }
+    if is_quick(flags, count) { Method::Lbvh } else { Method::Hploc(Window::DEFAULT) }
 }
 
 fn bottom_optimise(flags: Flags) -> Option<ReinsertionOptions> {

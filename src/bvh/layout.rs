@@ -14,6 +14,8 @@
 //! names is unused: the `count` of its left child is [`UNUSED`], and nothing else of it means anything. The slots from
 //! `active` − 1 on are unused.
 
+use super::wide::Form;
+use super::wide::quantised::QuantisedNode;
 use crate::geometry::Aabb;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
@@ -228,11 +230,11 @@ pub struct InstanceRecord {
     /// Position in the input.
     pub instance: u32,
     /// Where to begin in the bottom-level structure: in the lower 27 bits a [`Child`]'s index, above them its count, or
-    /// [`InstanceRecord::UP_TO_LAST`].
+    /// [`InstanceRecord::UP_TO_LAST`]. Of quantised nodes a node's index, and above it the first five slots that are entered of it.
     pub start: u32,
     /// [`Header::node_slots`] of that structure; in the upper 5 bits what else rays need of it: `FORM_` constants.
     pub slots: u32,
-    /// Records of that structure that may be looked at.
+    /// Records of that structure that may be looked at. Of quantised nodes, above 27 bits, the other three slots.
     pub records: u32,
 }
 
@@ -247,20 +249,34 @@ impl InstanceRecord {
     pub const FORM_ALL_OPAQUE: u32 = 4 << InstanceRecord::INDEX_BITS;
     /// Some are.
     pub const FORM_ANY_OPAQUE: u32 = 8 << InstanceRecord::INDEX_BITS;
+    /// Its nodes are [`QuantisedNode`]s.
+    pub const FORM_QUANTISED: u32 = 16 << InstanceRecord::INDEX_BITS;
+    /// All slots of a quantised node.
+    pub const ALL_SLOTS: u32 = 0xFF;
 
     const INDEX_BITS: u32 = 27;
+    const INDEX_MASK: u32 = (1 << InstanceRecord::INDEX_BITS) - 1;
 
-    /// The record with what it knows of its structure: where it begins there, and what rays need of the header.
+    /// The record with what it knows of its structure: where it begins there, and what rays need of the header. Of quantised nodes
+    /// it begins with slots of a node, which are `child.count` then, a bit each.
     #[must_use]
     pub fn over(self, child: &Child, header: &Header) -> InstanceRecord {
         let is_long = child.count >= InstanceRecord::UP_TO_LAST;
+        let is_quantised = is_quantised(header.kind);
+        let has_boxes = [BoxRecord::KIND, BOXES_8Q].contains(&header.kind);
         let forms = [
-            (header.kind == BoxRecord::KIND, InstanceRecord::FORM_BOXES),
+            (has_boxes, InstanceRecord::FORM_BOXES),
+            (is_quantised, InstanceRecord::FORM_QUANTISED),
             (header.child_order != 0, InstanceRecord::FORM_LEFT_FIRST),
             (header.geometry_flags & GEOMETRY_OPAQUE != 0, InstanceRecord::FORM_ALL_OPAQUE),
             (header.geometry_flags >> 8 & GEOMETRY_OPAQUE != 0, InstanceRecord::FORM_ANY_OPAQUE),
         ];
         let form = forms.iter().map(|&(is_so, form)| if is_so { form } else { 0 }).sum::<u32>();
+        if is_quantised {
+            let [below, above] = [child.count & 31, child.count >> 5].map(|slots| slots << InstanceRecord::INDEX_BITS);
+            let (start, records) = (child.index | below, header.primitive_count | above);
+            return InstanceRecord { start, slots: header.node_slots | form, records, ..self };
+        }
         InstanceRecord {
             start: child.index | child.count.min(InstanceRecord::UP_TO_LAST) << InstanceRecord::INDEX_BITS,
             slots: header.node_slots | form,
@@ -269,9 +285,12 @@ impl InstanceRecord {
         }
     }
 
-    /// Where it begins in its structure: a [`Child`]'s index and count.
+    /// Where it begins in its structure: a [`Child`]'s index and count; of quantised nodes a node, and which of its slots.
     pub fn begin(&self) -> [u32; 2] {
-        let (index, count) = (self.start & ((1 << InstanceRecord::INDEX_BITS) - 1), self.start >> InstanceRecord::INDEX_BITS);
+        let (index, count) = (self.start & InstanceRecord::INDEX_MASK, self.start >> InstanceRecord::INDEX_BITS);
+        if self.slots & InstanceRecord::FORM_QUANTISED != 0 {
+            return [index, count | self.records >> InstanceRecord::INDEX_BITS << 5];
+        }
         [index, if count == InstanceRecord::UP_TO_LAST { self.records - index } else { count }]
     }
 }
@@ -387,7 +406,11 @@ pub const fn offsets(record_bytes: u64, primitive_count: u32, geometry_count: u3
 
 /// The sizes of a structure of this many node slots, records of `record_bytes` bytes, and geometries.
 pub const fn offsets_with(record_bytes: u64, node_slots: u32, primitive_count: u32, geometry_count: u32) -> BvhOffsets {
-    let records_offset = NODES_OFFSET + node_slots as u64 * size_of::<Node>() as u64;
+    offsets_behind(node_slots as u64 * size_of::<Node>() as u64, record_bytes, primitive_count, geometry_count)
+}
+
+const fn offsets_behind(nodes: u64, record_bytes: u64, primitive_count: u32, geometry_count: u32) -> BvhOffsets {
+    let records_offset = NODES_OFFSET + nodes;
     let geometries_offset = records_offset + primitive_count as u64 * record_bytes;
     let entries = if geometry_count > 1 { geometry_count as u64 } else { 0 };
     let bytes = geometries_offset + entries * size_of::<GeometryEntry>() as u64;
@@ -397,11 +420,24 @@ pub const fn offsets_with(record_bytes: u64, node_slots: u32, primitive_count: u
 /// Bytes of a record of this [`Record::KIND`]; `None` for an unknown kind.
 pub const fn record_bytes(kind: u32) -> Option<u64> {
     match kind {
-        Triangle::KIND => Some(size_of::<Triangle>() as u64),
-        BoxRecord::KIND => Some(size_of::<BoxRecord>() as u64),
+        Triangle::KIND | TRIANGLES_8Q => Some(size_of::<Triangle>() as u64),
+        BoxRecord::KIND | BOXES_8Q => Some(size_of::<BoxRecord>() as u64),
         InstanceRecord::KIND => Some(size_of::<InstanceRecord>() as u64),
         _ => None,
     }
+}
+
+const TRIANGLES_8Q: u32 = Form::EightQuantised.kind(Triangle::KIND);
+const BOXES_8Q: u32 = Form::EightQuantised.kind(BoxRecord::KIND);
+
+/// Whether the nodes of a bottom-level structure of this kind are [`QuantisedNode`]s.
+pub const fn is_quantised(kind: u32) -> bool {
+    kind == TRIANGLES_8Q || kind == BOXES_8Q
+}
+
+/// Bytes of a node of a structure of this kind.
+const fn node_bytes(kind: u32) -> u64 {
+    if is_quantised(kind) { size_of::<QuantisedNode>() as u64 } else { size_of::<Node>() as u64 }
 }
 
 /// Node slots that `primitive_count` records need at most.
@@ -476,6 +512,7 @@ impl<R: Record> Bvh2<R> {
 impl Header {
     /// Where the parts of the structure lie, if its records have `record_bytes` bytes.
     pub const fn offsets(&self, record_bytes: u64) -> BvhOffsets {
-        offsets_with(record_bytes, self.node_slots, self.primitive_count, self.geometry_count)
+        let nodes = self.node_slots as u64 * node_bytes(self.kind);
+        offsets_behind(nodes, record_bytes, self.primitive_count, self.geometry_count)
     }
 }

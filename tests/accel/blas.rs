@@ -1,16 +1,15 @@
 //! Bottom-level structures by Vulkan's structs: the same cases through ours and the driver's.
 
-use crate::common::backends::{Backend, Built, Ours, backends, vk_format, vk_geometry};
+use crate::common::backends::{Backend, Built, Ours, Traces, backends, vk_format, vk_geometry};
 use crate::common::device;
 use crate::common::geometries::{MOVED, Owned};
 use crate::common::shapes::{Corners, ray, soup};
-use hedgerow::accel;
+use hedgerow::accel::{self, Request};
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
-use hedgerow::bvh::builder::{BuildOptions, Builder};
 use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::geometry::{GeometryFlags, IndexFormat, VertexFormat};
-use hedgerow::bvh::layout::Bvh2;
+use hedgerow::bvh::layout::{self, Bvh2, Header};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin;
 use hedgerow::trace::twin::tracer::closest_hit_by_brute_force;
@@ -18,6 +17,7 @@ use hedgerow::trace::{Hit, Ray};
 use hedgerow_lab::random::SplitMix64;
 
 type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
+type Flags = vk::BuildAccelerationStructureFlagsKHR;
 type Range = vk::AccelerationStructureBuildRangeInfoKHR;
 
 fn bottom_level<'a>(geometries: &'a [vk::AccelerationStructureGeometryKHR<'a>]) -> BuildInfo<'a> {
@@ -189,6 +189,42 @@ fn offsets_of_a_range_begin_in_the_middle_of_the_buffers() {
     }
 }
 
+/// Nodes of eight: hits are those of brute force, whichever way the walk goes; of many triangles in one place, which are a leaf that is too long
+/// for its byte, too.
+#[test]
+fn structures_for_fast_rays_are_hit_where_they_are() {
+    let mut in_one_place = soup(40, 0.9, 5);
+    in_one_place.extend(vec![in_one_place[7]; 700]);
+    let flags = [Flags::PREFER_FAST_TRACE, Flags::PREFER_FAST_TRACE | accel::ANY_HIT_ORDER, Flags::LOW_MEMORY];
+    let backend = Ours::on(device());
+    for (what, corners) in [("one", soup(1, 0.9, 3)), ("soup", soup(3000, 0.1, 7)), ("in one place", in_one_place)] {
+        for flags in flags {
+            let owned = Owned::of(&corners, VertexFormat::FLOAT3, IndexFormat::U32, 0);
+            let (geometry, _memory) = owned.upload(0, 0);
+            let geometries = [vk_geometry(&geometry, &owned)];
+            let built = Built::new(&backend, &bottom_level(&geometries).flags(flags), &[range_of(&owned)], 0);
+            let header: Header = built.memory.read_at(0, 1)[0];
+            let is_wide = flags.contains(Flags::PREFER_FAST_TRACE) || corners.len() > 2048;
+            assert_eq!(layout::is_quantised(header.kind), is_wide, "{what}, {flags:?}");
+            let tree = on_the_host(std::slice::from_ref(&owned));
+            let rays = rays_to(&tree, 1000);
+            let probes: Vec<ProbeRay> = rays.iter().map(|ray| ProbeRay::new(ray.origin, ray.direction)).collect();
+            for (ray, report) in rays.iter().zip(backend.probe(built.structure, &probes)) {
+                let hit = closest_hit_by_brute_force(&tree, ray);
+                let met = report.committed;
+                assert_eq!(met.kind == 1, hit.is_some(), "{what}, {flags:?}, {ray:?}");
+                if hit.is_some() {
+                    assert_eq!(
+                        (met.t, met.primitive, met.barycentrics),
+                        (hit.t, hit.primitive, [hit.u, hit.v]),
+                        "{what}, {flags:?}, {ray:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 /// Five geometries, empty ones among them.
 fn several() -> Vec<Owned> {
     let part = |i: u64, count, vertex_format, index_format, transform| Owned {
@@ -329,6 +365,7 @@ fn the_sizes_of_a_maximum_suffice_for_every_smaller_count() {
     let owned = Owned::of(&soup(1, 0.5, 9), VertexFormat::FLOAT3, IndexFormat::U32, 0);
     let (geometry, _memory) = owned.upload(0, 0);
     let geometries = [vk_geometry(&geometry, &owned)];
+    let all = [Flags::empty(), Flags::PREFER_FAST_BUILD, Flags::PREFER_FAST_TRACE, Flags::ALLOW_UPDATE];
     let mut counts: Vec<u32> = (0..25)
         .flat_map(|bit| [-300, -1, 0, 1, 255, 256, 257].map(|by| (1i64 << bit) + by))
         .collect::<Vec<_>>()
@@ -336,15 +373,17 @@ fn the_sizes_of_a_maximum_suffice_for_every_smaller_count() {
         .filter_map(|count| u32::try_from(count).ok())
         .collect();
     counts.sort_unstable();
-    let mut most = [0; 2];
-    for count in counts {
-        let sizes = ours.build_sizes(&bottom_level(&geometries), &[count]);
-        let builder = Builder::new(device(), &BuildOptions::DEFAULT, count).expect("few enough").sizes();
-        most = [most[0].max(builder.structure), most[1].max(builder.scratch)];
-        assert!(
-            sizes.acceleration_structure_size >= most[0] && sizes.build_scratch_size >= most[1],
-            "{count}: {sizes:?}, {most:?}"
-        );
+    for flags in all {
+        let mut most = [0; 2];
+        for &count in &counts {
+            let sizes = ours.build_sizes(&bottom_level(&geometries).flags(flags), &[count]);
+            let needed = Request::triangles(&[(geometry, count)]).with_flags(flags).sizes(&ours.0).expect("few enough");
+            most = [most[0].max(needed.structure), most[1].max(needed.scratch)];
+            assert!(
+                sizes.acceleration_structure_size >= most[0] && sizes.build_scratch_size >= most[1],
+                "{count}, {flags:?}: {sizes:?}, {most:?}"
+            );
+        }
     }
 }
 

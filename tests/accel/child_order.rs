@@ -16,7 +16,10 @@ use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::layout::{Bvh2, Header, Triangle};
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::bvh::twin::{self, lbvh::{self, Finish}};
+use hedgerow::bvh::twin::{
+    self,
+    lbvh::{self, Finish},
+};
 use hedgerow::gpu::Recorder;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Query, Ray};
@@ -100,7 +103,7 @@ fn both_levels_are_those_of_the_host() {
         let expected = levels::top_level(&read.instances, |a| read.below(a), flags, &AccelOptions::DEFAULT);
         assert_eq!(expected.header.child_order, 1);
         assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}: the top level");
-        assert!(read.triangles.values().all(|tree| tree.header.child_order == 1), "{flags:?}: below");
+        assert!(read.triangles.values().all(|tree| tree.header().child_order == 1), "{flags:?}: below");
     }
     let corners = soup(700, 0.2, 12);
     let part = Part::Triangles(vec![(corners.clone(), GeometryFlags::OPAQUE)]);

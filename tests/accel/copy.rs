@@ -16,6 +16,7 @@ use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, 
 use hedgerow::bvh::layout::{BoxRecord, Bvh2, Child, Header, InstanceRecord, Record, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
+use hedgerow::bvh::wide::layout::Wide8q;
 use hedgerow::geometry::Aabb;
 use hedgerow::gpu::Recorder;
 use hedgerow::gpu::Region;
@@ -40,6 +41,12 @@ impl Case {
         let compacted = tree.compacted();
         compacted.validate().unwrap_or_else(|e| panic!("{name}, compacted: {e}"));
         Case { name, bytes: tree.to_bytes(), compacted: compacted.to_bytes() }
+    }
+
+    /// Its nodes of eight, which have no holes.
+    fn wide<R: Record>(name: impl std::fmt::Display, tree: &Bvh2<R>) -> Case {
+        let bytes = Wide8q::of(tree).to_bytes();
+        Case { name: format!("{name}, in nodes of eight"), compacted: bytes.clone(), bytes }
     }
 
     fn header(&self) -> Header {
@@ -99,11 +106,15 @@ fn cases() -> Vec<Case> {
         for count in [0, 1, 2, 3, 7, 100, 5000] {
             for (holes, geometries) in [(false, 1), (true, 1), (false, 3), (true, 3)] {
                 let name = format!("{count} triangles, holes: {holes}, {geometries} geometries, {collapse:?}");
-                cases.push(Case::new(name, &triangles(count, holes, geometries, collapse)));
+                let tree = triangles(count, holes, geometries, collapse);
+                cases.push(Case::wide(&name, &tree));
+                cases.push(Case::new(name, &tree));
             }
         }
         for count in [0, 1, 2, 7, 1000] {
-            cases.push(Case::new(format!("{count} boxes, {collapse:?}"), &boxes(count, collapse)));
+            let (name, tree) = (format!("{count} boxes, {collapse:?}"), boxes(count, collapse));
+            cases.push(Case::wide(&name, &tree));
+            cases.push(Case::new(name, &tree));
         }
     }
     for count in [0, 1, 2, 9, 500] {
@@ -295,6 +306,8 @@ fn what_is_copied_is_hit_as_before() {
         let counts: Vec<u32> = owned.iter().map(|o| o.primitive_count).collect();
         let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
             .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
+            // Nodes of two, which have holes.
+            .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_BUILD)
             .geometries(&geometries);
         let built = Built::place(&backend, &info, &counts, 0);
         let (_scratch, scratch) = built.scratch(&backend, &info, &counts);

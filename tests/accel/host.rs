@@ -7,6 +7,7 @@ use crate::common::shapes::{boxes, soup};
 use crate::common::world::Part;
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
+use hedgerow::bvh::layout::{self, Header};
 
 type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
 type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
@@ -27,12 +28,15 @@ fn on_the_host(ours: &Ours, geometries: &[Geometry], ranges: &[Range], flags: Fl
     assert_eq!(sizes.build_scratch_size, 0);
     let mut bytes = vec![0; sizes.acceleration_structure_size as usize];
     unsafe { ours.0.build_acceleration_structures(&[info], &[ranges], &mut [&mut bytes]) }.expect("it builds");
+    let header: Header = bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()]);
+    let record_bytes = layout::record_bytes(header.kind).expect("a structure");
+    bytes.truncate(header.offsets(record_bytes).bytes as usize);
     bytes
 }
 
 fn on_the_device(ours: &Ours, geometries: &[Geometry], ranges: &[Range], flags: Flags) -> Vec<u8> {
     let built = Built::new(ours, &info(geometries, flags), ranges, 0);
-    built.memory.read::<u8>(built.bytes as usize)
+    built.bytes_in_use()
 }
 
 #[test]

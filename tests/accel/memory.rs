@@ -98,7 +98,7 @@ fn scratch_memory_may_begin_at_every_multiple_of_its_alignment() {
         let geometries = [vk_geometry(&geometry, &owned)];
         let (info, range) = (bottom_level(&geometries), Range::default().primitive_count(count as u32));
         let expected = Built::new(&ours, &info, &[range], 0);
-        let expected = expected.memory.read::<u8>(expected.bytes as usize);
+        let expected = expected.bytes_in_use();
         let bytes = ours.build_sizes(&info, &[count as u32]).build_scratch_size;
         let place = Built::place(&ours, &info, &[count as u32], 0);
         for (shift, filling) in [(1, 0u8), (3, 0xff), (5, 0x5a), (15, 0x80)] {

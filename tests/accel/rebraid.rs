@@ -2,19 +2,20 @@
 
 use crate::common::backends::{Backend, Ours};
 use crate::common::device;
-use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
+use crate::common::mixture::{Bottom, ReadBack, diagonal, mixture, part, scaled};
 use crate::common::probe::{IGNORE, ProbeRay, flags};
 use crate::common::shapes::{Corners, icosphere, placed, soup};
 use crate::common::world::World;
 use hedgerow::accel::{self, AccelOptions, Instance, REBRAID, twin};
 use hedgerow::ash::vk;
 use hedgerow::bvh::layout::{self, Bvh2, Child, Record, Triangle, status};
+use hedgerow::bvh::wide::layout::WideNode;
 use hedgerow_lab::random::SplitMix64;
 use std::collections::BTreeMap;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 
 fn with_budget(rebraid_budget: f32) -> Ours {
-    Ours::with_options(device(), AccelOptions { rebraid_budget, ..AccelOptions::DEFAULT })
+    Ours::with_options(device(), AccelOptions { rebraid_budget, wide: true, ..AccelOptions::DEFAULT })
 }
 
 /// Where the entries of each instance begin.
@@ -36,14 +37,31 @@ fn reached_by(read: &ReadBack, instance: u32, starts: &[[u32; 2]]) -> Vec<u32> {
     }
 }
 
-fn reached<R: Record>(structure: &Bvh2<R>, starts: &[[u32; 2]]) -> Vec<u32> {
-    let mut counts = vec![0; structure.header.active as usize];
+fn reached<R: Record>(structure: &Bottom<R>, starts: &[[u32; 2]]) -> Vec<u32> {
+    let mut counts = vec![0; structure.header().active as usize];
+    let mut count_all =
+        |[index, count]: [u32; 2]| counts[index as usize..][..count as usize].iter_mut().for_each(|n| *n += 1);
     let mut waiting = starts.to_vec();
     while let Some([index, count]) = waiting.pop() {
-        match count {
-            0 => waiting
-                .extend(structure.nodes[index as usize].children.map(|Child { index, count, .. }| [index, count])),
-            _ => counts[index as usize..][..count as usize].iter_mut().for_each(|n| *n += 1),
+        match structure {
+            Bottom::OfTwo(_) if count > 0 => count_all([index, count]),
+            Bottom::OfTwo(tree) => {
+                waiting.extend(tree.nodes[index as usize].children.map(|Child { index, count, .. }| [index, count]))
+            }
+            Bottom::OfEight(tree) => {
+                let node = &tree.nodes[index as usize];
+                if let Some((first, count)) = node.long_leaf() {
+                    count_all([first, count]);
+                }
+                // Of a node where an entry begins `count` says which slots it enters.
+                for (slot, child) in node.children().into_iter().enumerate() {
+                    match child.filter(|_| count >> slot & 1 != 0) {
+                        Some(leaf) if leaf.is_leaf() => count_all([leaf.index, leaf.count]),
+                        Some(node) => waiting.push([node.index, layout::InstanceRecord::ALL_SLOTS]),
+                        None => {}
+                    }
+                }
+            }
         }
     }
     counts
@@ -119,7 +137,7 @@ fn entries_keep_to_the_budget_and_reach_every_primitive_once() {
         }
         // Not one that can be seen is lost: what is not there has no inverse, or nothing to show.
         for (i, instance) in read.instances.iter().enumerate().filter(|(i, _)| !entries.contains_key(&(*i as u32))) {
-            let below = |b: &Bvh2<Triangle>| b.header.active == 0;
+            let below = |b: &Bottom<Triangle>| b.header().active == 0;
             let shows_nothing = instance.structure == 0 || read.triangles.get(&instance.structure).is_some_and(below);
             let m = instance.transform.map(|row| row.map(f64::from));
             let minor = |r: usize, s: usize, c: usize, d: usize| m[r][c] * m[s][d] - m[r][d] * m[s][c];

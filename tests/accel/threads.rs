@@ -102,7 +102,7 @@ fn builds_that_many_threads_record_are_those_of_one() {
         })
         .expect("they build");
     for (i, (got, expected)) in placed.iter().zip(&expected).enumerate() {
-        let [got, expected] = [got, expected].map(|built| built.memory.read::<u8>(expected.bytes as usize));
+        let [got, expected] = [got, expected].map(Built::bytes_in_use);
         assert!(got == expected, "build {i} of {} triangles", meshes[i].primitive_count);
     }
     for (pool, _) in recorded {

@@ -29,15 +29,17 @@ Entry entry_of(uvec2 given_at, uint i) {
     if (!is_finite_matrix(given.to_world) || !inverse_of(given.to_world, inverse)) return entry;
     Structure structure = Structure(given.structure);
     Header header = structure.header;
-    if (header.magic != MAGIC || header.kind != KIND_TRIANGLES && header.kind != KIND_BOXES) return entry;
+    bool is_below = header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || is_quantised(header.kind);
+    if (header.magic != MAGIC || !is_below) return entry;
     entry.left_out = INACTIVE;
     if (header.active_count == 0u || (header.status & STATUS_UNUSABLE) != 0u) return entry;
-    Box b = world_box(given.to_world, structure, header.root);
+    uint slots = min(header.node_slots, INDEX_MASK) | form_of(header);
+    Child whole = whole_part(header);
+    Box b = world_box(given.to_world, structure, slots, whole);
     // Too far away to be a number.
     entry.left_out = STATUS_BAD_INSTANCE;
     if (!is_finite(b.lo) || !is_finite(b.hi)) return entry;
-    uint slots = min(header.node_slots, INDEX_MASK) | form_of(header);
-    return entry_over(b, i, header.root, slots, header.primitive_count, given_at);
+    return entry_over(b, i, whole, slots, header.primitive_count, given_at);
 }
 
 void main() {

@@ -8,6 +8,10 @@ void main() {
         write_wrong_version(target);
         return;
     }
+    if (is_quantised(header.kind)) {
+        copy_bytes(uvec2(source), uvec2(target), structure_bytes(header));
+        return;
+    }
     if (invocation_number() == 0) {
         target.header = compacted(header);
         if (compacted(header).inner_nodes == 0) mark_unused(target, 0);

@@ -4,7 +4,7 @@
 
 void main() {
     Header from = source.header;
-    if (!is_structure(from)) return;
+    if (!is_binary(from)) return;
     Header to = compacted(from);
     uvec2 bytes = address_of(uvec2(0), to.primitive_count, record_bytes(to.kind));
     copy_bytes(records_at(uvec2(source), from.node_slots), records_at(uvec2(target), to.node_slots), bytes);

@@ -79,7 +79,7 @@ layout(push_constant, scalar) uniform WideCollapseArguments {
 };
 
 bool can_be_collapsed(Header header) {
-    return is_structure(header) && compacted(header).active_count != 0;
+    return is_binary(header) && compacted(header).active_count != 0;
 }
 
 bool is_inner(Child child) {

@@ -18,7 +18,7 @@ void write_empty_node() {
 
 void write_header(bool there_is) {
     Header header = source.header;
-    if (!is_structure(header)) header = header_of_wrong_version();
+    if (!is_binary(header)) header = header_of_wrong_version();
     header = compacted(header);
     uint nodes = there_is ? 1 + first_children.word[source_slots] : 0;
     header.kind = wide_kind(header.kind, WIDTH, QUANTISED);

@@ -4,7 +4,7 @@
 
 void main() {
     Header from = source.header;
-    if (!is_structure(from)) return;
+    if (!is_binary(from)) return;
     Header to = Structure(target).header;
     uint bytes_each = record_bytes(from.kind);
     uvec2 records = records_at(uvec2(source), from.node_slots);

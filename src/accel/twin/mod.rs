@@ -7,6 +7,8 @@ use super::{AccelOptions, Instance, quality};
 use crate::bvh::builder::{Method, Primitives};
 use crate::bvh::codes::Codes;
 use crate::bvh::layout::{self, Bvh2, Child, Header, Node, Record, status};
+use crate::bvh::wide::layout::{Wide8q, WideNode};
+use crate::bvh::wide::quantised::QuantisedNode;
 use crate::bvh::{self, twin::lbvh};
 use crate::geometry::Aabb;
 use ash::vk;
@@ -15,12 +17,24 @@ use ash::vk;
 #[derive(Debug, Clone, Copy)]
 pub struct Below<'a> {
     header: &'a Header,
-    nodes: &'a [Node],
+    nodes: Nodes<'a>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Nodes<'a> {
+    OfTwo(&'a [Node]),
+    Quantised(&'a [QuantisedNode]),
 }
 
 impl<'a, R: Record> From<&'a Bvh2<R>> for Below<'a> {
     fn from(structure: &'a Bvh2<R>) -> Below<'a> {
-        Below { header: &structure.header, nodes: &structure.nodes }
+        Below { header: &structure.header, nodes: Nodes::OfTwo(&structure.nodes) }
+    }
+}
+
+impl<'a, R: Record> From<&'a Wide8q<R>> for Below<'a> {
+    fn from(structure: &'a Wide8q<R>) -> Below<'a> {
+        Below { header: &structure.header, nodes: Nodes::Quantised(&structure.nodes) }
     }
 }
 
@@ -31,7 +45,7 @@ pub struct Entry {
     pub bounds: Result<Aabb, u32>,
     /// Position of the instance in the input.
     pub instance: u32,
-    /// Where it begins in the instance's structure.
+    /// Where it begins in the instance's structure: a part (`glsl/accel/parts.glsl`).
     pub start: Child,
 }
 
@@ -79,7 +93,7 @@ fn entry_of<'a>(number: u32, instance: &Instance, below: &impl Fn(u64) -> Option
     if below.header.active == 0 || below.header.status & status::UNUSABLE != 0 {
         return without(0);
     }
-    let entry = below.entry_over(number, m, below.header.root);
+    let entry = below.entry_over(number, m, below.whole());
     match entry.bounds {
         Ok(b) if b.lo.iter().chain(&b.hi).all(|x| x.is_finite()) => entry,
         _ => without(status::BAD_INSTANCE),
@@ -87,12 +101,24 @@ fn entry_of<'a>(number: u32, instance: &Instance, below: &impl Fn(u64) -> Option
 }
 
 impl Below<'_> {
-    /// The children of an inner node.
-    fn opened(&self, child: &Child) -> Option<[Child; 2]> {
-        if child.is_leaf() { None } else { self.nodes.get(child.index as usize).map(|node| node.children) }
+    /// All that a structure holds.
+    fn whole(&self) -> Child {
+        match self.nodes {
+            Nodes::OfTwo(_) => self.header.root,
+            Nodes::Quantised(_) => Child { count: layout::InstanceRecord::ALL_SLOTS, ..self.header.root },
+        }
     }
 
-    /// A child's children, or of a leaf itself, some levels down.
+    /// The two parts of a part; `None` if it cannot be opened.
+    fn opened(&self, part: &Child) -> Option<[Child; 2]> {
+        match self.nodes {
+            Nodes::OfTwo(_) if part.is_leaf() => None,
+            Nodes::OfTwo(nodes) => nodes.get(part.index as usize).map(|node| node.children),
+            Nodes::Quantised(nodes) => parts_of(nodes.get(part.index as usize)?, part),
+        }
+    }
+
+    /// A part's parts, or of one that cannot be opened itself, some levels down.
     fn down(&self, child: Child, levels: u32) -> Vec<Child> {
         match self.opened(&child) {
             Some(children) if levels > 0 => children.into_iter().flat_map(|c| self.down(c, levels - 1)).collect(),
@@ -111,6 +137,42 @@ impl Below<'_> {
         let bounds = self.fine_box(m, child, if keeps_boxes { 0 } else { 3 });
         Entry { bounds: Ok(bounds), instance, start: child }
     }
+}
+
+/// The two parts of some slots of a quantised node: cut along the axis where that leaves least area, as the bits of a slot's number are
+/// the octant that it lies in.
+fn parts_of(node: &QuantisedNode, part: &Child) -> Option<[Child; 2]> {
+    const BEYOND: [u32; 3] = [0xAA, 0xCC, 0xF0];
+    if node.long_leaf().is_some() {
+        return None;
+    }
+    let in_use = (0..8).filter(|&slot| node.node_mask() >> slot & 1 != 0 || node.count(slot) != 0);
+    let slots = part.count & in_use.map(|slot| 1 << slot).sum::<u32>();
+    let bounds = |slots: u32| {
+        let used = (0..8).filter(|slot| slots >> slot & 1 != 0);
+        used.fold(Aabb::EMPTY, |b, slot| b.union(&node.bounds(slot)))
+    };
+    let mut best: Option<(u32, f32)> = None;
+    for beyond in BEYOND.map(|axis| slots & axis) {
+        if beyond == 0 || beyond == slots {
+            continue;
+        }
+        let area = bounds(slots & !beyond).half_area() + bounds(beyond).half_area();
+        // Of equal ones the first.
+        if best.is_none_or(|(_, least)| area < least) {
+            best = Some((beyond, area));
+        }
+    }
+    let (beyond, _) = best?;
+    Some([slots & !beyond, beyond].map(|slots| {
+        let Aabb { lo, hi } = bounds(slots);
+        // One slot that holds a node is that node, whole.
+        if slots.count_ones() == 1 && slots & node.node_mask() != 0 {
+            let index = node.index(slots.trailing_zeros() as usize);
+            return Child { lo, index, hi, count: layout::InstanceRecord::ALL_SLOTS };
+        }
+        Child { lo, index: part.index, hi, count: slots }
+    }))
 }
 
 /// The record of an entry; all zero for one that is left out.

@@ -7,7 +7,7 @@ use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::node_slots;
 use crate::gpu::arguments;
 use crate::gpu::plan::Plan;
-use crate::gpu::{Context, Grid, Kernel, Recorder, Region, Sizes, fill, scan, shaders};
+use crate::gpu::{Context, Grid, Kernel, Recorder, Region, Sizes, Step, fill, scan, shaders};
 use std::ops::Range;
 
 /// What is collapsed into what.
@@ -173,6 +173,18 @@ impl WidePass {
         let checked = |counts: Option<Region>, what| counts.map_or(Ok(0), |c| c.checked(what, counts_bytes, 4));
         let visits = checked(counts.opened_by, "counts of rays by which wide nodes are opened")?;
         let hits = checked(counts.ordered_by, "counts of rays by which children of wide nodes are put in order")?;
+        recorder.chains(&[self.steps(source, [visits, hits], target, scratch)?])
+    }
+
+    /// What is recorded, a step behind the other. Addresses of counts are 0 where there are none.
+    pub(crate) fn steps(
+        &self,
+        source: u64,
+        [visits, hits]: [u64; 2],
+        target: Region,
+        scratch: Region,
+    ) -> Result<Vec<Step>> {
+        const PHASE: &str = "wide";
         let kernel = |shader| self.kernel(shader, [visits, hits].map(|counts| u32::from(counts != 0)));
         let sizes = self.sizes();
         let target = target.checked("memory for a wide tree", sizes.structure, sizes.alignment)?;
@@ -195,9 +207,13 @@ impl WidePass {
             level: 0,
             level_end: 0,
         };
-        recorder.phase("wide");
-        fill::record(recorder, arguments.first_children, ((parts.sums - parts.first_children) / 4) as u32, 0)?;
-        recorder.dispatch(&kernel(&shaders::BVH_WIDE_RESET), &arguments, 1)?;
+        let step =
+            |shader, arguments: &arguments::WideCollapse, groups| Step::new(PHASE, kernel(shader), arguments, groups);
+        let cleared = ((parts.sums - parts.first_children) / 4) as u32;
+        let mut steps = vec![
+            fill::step(PHASE, arguments.first_children, cleared, 0),
+            step(&shaders::BVH_WIDE_RESET, &arguments, 1),
+        ];
         let few = |level, level_end| {
             (&shaders::BVH_WIDE_OPEN_FEW, arguments::WideCollapse { level, level_end, ..arguments }, 1)
         };
@@ -206,20 +222,16 @@ impl WidePass {
         let by_many = self.levels_by_many();
         let first = Some(few(0, by_many.start)).filter(|_| by_many.start > 0);
         let last = few(by_many.end, form.levels());
-        for (shader, arguments, groups) in first.into_iter().chain(by_many.map(many)).chain([last]) {
-            recorder.barrier();
-            recorder.dispatch(&kernel(shader), &arguments, groups)?;
-        }
+        let levels = first.into_iter().chain(by_many.map(many)).chain([last]);
+        steps.extend(levels.map(|(shader, arguments, groups)| step(shader, &arguments, groups)));
         let sums = scratch + parts.sums;
         let scanned = [arguments.first_children, arguments.first_records];
         for words in scanned.into_iter().take(if form.is_quantised() { 2 } else { 1 }) {
-            recorder.barrier();
-            self.scan.record(recorder, &scan::ScanBuffers { values: words, results: words, sums })?;
+            steps.extend(self.scan.steps(PHASE, &scan::ScanBuffers { values: words, results: words, sums }));
         }
-        recorder.barrier();
-        recorder.dispatch(&kernel(&shaders::BVH_WIDE_NODES), &arguments, groups)?;
-        recorder.barrier();
-        recorder.dispatch(&kernel(&shaders::BVH_WIDE_RECORDS), &arguments, self.grid.groups_for(self.count))
+        steps.push(step(&shaders::BVH_WIDE_NODES, &arguments, groups));
+        steps.push(step(&shaders::BVH_WIDE_RECORDS, &arguments, self.grid.groups_for(self.count)));
+        Ok(steps)
     }
 }
 

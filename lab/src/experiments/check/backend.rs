@@ -7,6 +7,7 @@ pub use crate::subjects::structures::BuildInfo;
 use crate::subjects::structures::{BuildSizes, Range, Structure, Structures};
 use ash::vk;
 use hedgerow::accel::{self, SCRATCH_ALIGNMENT};
+use hedgerow::bvh::layout::{self, Header};
 use hedgerow::gpu::Recorder;
 
 /// How many primitives of each geometry.
@@ -61,9 +62,9 @@ pub trait Backend {
 pub struct Ours(pub accel::Device<'static>, Probe, Structures<'static>);
 
 impl Ours {
-    /// With the defaults.
+    /// With the defaults, but for nodes of eight where there can be: beside nodes of two, so that queries meet both.
     pub fn on(device: &'static Device) -> Ours {
-        Ours::with_options(device, accel::AccelOptions::DEFAULT)
+        Ours::with_options(device, accel::AccelOptions { wide: true, ..accel::AccelOptions::DEFAULT })
     }
 
     /// With these options.
@@ -121,6 +122,18 @@ impl Built {
             .size(bytes)
             .ty(info.ty);
         Built { structure: backend.create(&create), memory, bytes: offset + bytes }
+    }
+
+    /// The bytes of one of ours that are in use: a structure of nodes of eight rarely needs all that it was given.
+    ///
+    /// # Panics
+    /// It is no structure of ours.
+    pub fn bytes_in_use(&self) -> Vec<u8> {
+        let mut bytes: Vec<u8> = self.memory.read(self.bytes as usize);
+        let header: Header = bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()]);
+        let record_bytes = layout::record_bytes(header.kind).expect("a structure of ours");
+        bytes.truncate(header.offsets(record_bytes).bytes as usize);
+        bytes
     }
 
     /// Scratch memory for it, and its address.

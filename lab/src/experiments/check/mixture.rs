@@ -7,7 +7,8 @@ use super::world::{BuiltWorld, Part, World};
 use crate::random::SplitMix64;
 use ash::vk;
 use hedgerow::accel::{Instance, REBRAID, twin};
-use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Triangle};
+use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Header, Record, Triangle};
+use hedgerow::bvh::wide::layout::Wide8q;
 use std::collections::BTreeMap;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
@@ -70,9 +71,39 @@ pub struct ReadBack {
     /// The instances, with the addresses of their structures.
     pub instances: Vec<Instance>,
     /// Structures of triangles by their addresses.
-    pub triangles: BTreeMap<u64, Bvh2<Triangle>>,
+    pub triangles: BTreeMap<u64, Bottom<Triangle>>,
     /// Structures of boxes by theirs.
-    pub boxes: BTreeMap<u64, Bvh2<BoxRecord>>,
+    pub boxes: BTreeMap<u64, Bottom<BoxRecord>>,
+}
+
+/// A bottom-level structure.
+pub enum Bottom<R: Record> {
+    OfTwo(Bvh2<R>),
+    OfEight(Wide8q<R>),
+}
+
+impl<R: Record> Bottom<R> {
+    fn read(bytes: &[u8]) -> Bottom<R> {
+        let header: Header = bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()]);
+        match layout::is_quantised(header.kind) {
+            true => Bottom::OfEight(Wide8q::from_bytes(bytes).expect("a structure of nodes of eight")),
+            false => Bottom::OfTwo(Bvh2::from_bytes(bytes).expect("a structure of nodes of two")),
+        }
+    }
+
+    pub fn header(&self) -> &Header {
+        match self {
+            Bottom::OfTwo(tree) => &tree.header,
+            Bottom::OfEight(tree) => &tree.header,
+        }
+    }
+
+    fn below(&self) -> twin::Below<'_> {
+        match self {
+            Bottom::OfTwo(tree) => tree.into(),
+            Bottom::OfEight(tree) => tree.into(),
+        }
+    }
 }
 
 impl ReadBack {
@@ -87,8 +118,8 @@ impl ReadBack {
         for (part, built) in world.parts.iter().zip(parts) {
             let (address, bytes) = (backend.address(built.structure), bytes(built));
             match part {
-                Part::Triangles(_) => drop(triangles.insert(address, Bvh2::from_bytes(&bytes).expect("triangles"))),
-                Part::Boxes(_) => drop(boxes.insert(address, Bvh2::from_bytes(&bytes).expect("boxes"))),
+                Part::Triangles(_) => drop(triangles.insert(address, Bottom::read(&bytes))),
+                Part::Boxes(_) => drop(boxes.insert(address, Bottom::read(&bytes))),
             }
         }
         let top = Bvh2::from_bytes(&bytes(top)).expect("a top level");
@@ -97,7 +128,7 @@ impl ReadBack {
 
     /// What an instance points to.
     pub fn below(&self, address: u64) -> Option<twin::Below<'_>> {
-        let triangles = self.triangles.get(&address).map(twin::Below::from);
-        triangles.or_else(|| self.boxes.get(&address).map(twin::Below::from))
+        let triangles = self.triangles.get(&address).map(Bottom::below);
+        triangles.or_else(|| self.boxes.get(&address).map(Bottom::below))
     }
 }

@@ -26,7 +26,10 @@ pub enum Part {
 pub struct World {
     pub parts: Vec<Part>,
     pub instances: Vec<Instance>,
+    /// Of the top level.
     pub flags: vk::BuildAccelerationStructureFlagsKHR,
+    /// Of the first part, the second, and so on in turn: ours are then of nodes of two and of eight.
+    pub part_flags: [vk::BuildAccelerationStructureFlagsKHR; 2],
     /// Whether the instances are given by pointers.
     pub by_pointers: bool,
 }
@@ -130,9 +133,11 @@ fn meetings_of<P>(geometries: &[(Vec<P>, GeometryFlags)], met: impl Fn(&P) -> Op
 }
 
 impl World {
-    /// Instances of parts, with no build flags.
+    /// Instances of parts, every second of which is built for fast rays; otherwise with no build flags.
     pub fn new(parts: Vec<Part>, instances: Vec<Instance>) -> World {
-        World { parts, instances, flags: vk::BuildAccelerationStructureFlagsKHR::empty(), by_pointers: false }
+        let flags = vk::BuildAccelerationStructureFlagsKHR::empty();
+        let part_flags = [flags, vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE];
+        World { parts, instances, flags, part_flags, by_pointers: false }
     }
 
     /// The instances as they are given to a back end whose parts are these.
@@ -146,8 +151,9 @@ impl World {
 
     /// Builds everything. Of the flags, which are the top level's, [`ANY_HIT_ORDER`] holds for the parts, too.
     pub fn build(&self, backend: &dyn Backend) -> BuiltWorld {
-        let (parts, memory): (_, Vec<_>) =
-            self.parts.iter().map(|part| part.build_with(backend, self.flags & ANY_HIT_ORDER)).unzip();
+        let flags = self.part_flags.map(|flags| flags | self.flags & ANY_HIT_ORDER);
+        let each = self.parts.iter().zip(flags.into_iter().cycle());
+        let (parts, memory): (_, Vec<_>) = each.map(|(part, flags)| part.build_with(backend, flags)).unzip();
         self.build_over(backend, parts, memory.into_iter().flatten().collect())
     }
 

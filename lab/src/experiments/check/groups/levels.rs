@@ -218,7 +218,7 @@ pub fn rebraid(cases: &mut Cases<'_>) {
         for flags in [REBRAID, Flags::empty()] {
             let world = World { flags, ..mixture(count, count as u64) };
             cases.case(format!("{count} instances, budget {budget}, {flags:?}"), |device| {
-                let options = AccelOptions { rebraid_budget: budget, ..AccelOptions::DEFAULT };
+                let options = AccelOptions { rebraid_budget: budget, wide: true, ..AccelOptions::DEFAULT };
                 let read = ReadBack::new(&Ours::with_options(device, options), &world);
                 let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &options);
                 same("header", &read.top.header, &expected.header)?;
