@@ -1,0 +1,55 @@
+//! Buffers of wgpu's that shaders reach by their addresses, too: made with Vulkan and imported.
+
+use crate::Result;
+use hedgerow::ash::vk;
+use hedgerow::gpu::{Context, Region};
+use wgpu::hal::{api::Vulkan, vulkan};
+
+/// A buffer as wgpu and as hedgerow see it.
+pub struct Shared {
+    pub buffer: wgpu::Buffer,
+    pub region: Region,
+}
+
+impl Shared {
+    /// Memory of the device that wgpu writes by copies and reads in shaders. wgpu frees it with the buffer's last use.
+    pub fn new(device: &wgpu::Device, context: &Context, size: u64) -> Result<Shared> {
+        let raw = context.ash_device();
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        // SAFETY: the device lives; wgpu owns buffer and memory from `from_raw_managed` on, and nobody else frees them.
+        unsafe {
+            let buffer = raw.create_buffer(&vk::BufferCreateInfo::default().size(size).usage(usage), None)?;
+            let needs = raw.get_buffer_memory_requirements(buffer);
+            let mut by_address = vk::MemoryAllocateFlagsInfo::default().flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
+            let info = vk::MemoryAllocateInfo::default()
+                .allocation_size(needs.size)
+                // Vulkan lists the device's own memory first; any type that the buffer may lie in is right.
+                .memory_type_index(needs.memory_type_bits.trailing_zeros())
+                .push_next(&mut by_address);
+            let memory = raw.allocate_memory(&info, None)?;
+            raw.bind_buffer_memory(buffer, memory, 0)?;
+            let address = raw.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(buffer));
+            let desc = wgpu::BufferDescriptor {
+                label: None,
+                size,
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            };
+            let imported = vulkan::Buffer::from_raw_managed(buffer, memory, 0, size);
+            let buffer = device.create_buffer_from_hal::<Vulkan>(imported, &desc);
+            Ok(Shared { buffer, region: Region { address, bytes: size } })
+        }
+    }
+
+    /// That shaders only read it next.
+    pub fn read(&self) -> wgpu::BufferTransition<&wgpu::Buffer> {
+        wgpu::BufferTransition { buffer: &self.buffer, state: wgpu::BufferUses::STORAGE_READ_ONLY }
+    }
+
+    /// That shaders write it next.
+    pub fn written(&self) -> wgpu::BufferTransition<&wgpu::Buffer> {
+        wgpu::BufferTransition { buffer: &self.buffer, state: wgpu::BufferUses::STORAGE_READ_WRITE }
+    }
+}
