@@ -5,7 +5,7 @@ use hedgerow::{accel, ash::vk, gpu};
 use wgpu::hal::{api::Vulkan, vulkan};
 
 /// Once: a device with what wgpu and hedgerow need, which is wgpu's from now on. Drop the context before it.
-pub unsafe fn open(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue, gpu::Context)> {
+pub unsafe fn open(adapter: &wgpu::Adapter) -> Result<((wgpu::Device, wgpu::Queue), gpu::Context)> {
     let desc = wgpu::DeviceDescriptor::default();
     let (wanted, limits, hints) = (desc.required_features, &desc.required_limits, &desc.memory_hints);
     let hal = unsafe { adapter.as_hal::<Vulkan>() }.ok_or("wgpu is not on Vulkan here")?;
@@ -18,9 +18,9 @@ pub unsafe fn open(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue
     let mut features = hal.physical_device_features(&names, wanted);
     let info = unsafe { needs.features.merge_into(features.add_to_device_create(info)) };
     let raw = unsafe { instance.create_device(physical, &info, None) }?;
-    let context = unsafe { gpu::Context::new(&gpu::ContextDesc::new(instance, physical, &raw, needs.optional)) }?;
-    let hal = unsafe { hal.device_from_raw(raw, None, &names, wanted, limits, hints, 0, 0) }?;
-    Ok(unsafe { adapter.create_device_from_hal(hal, &desc) }.map(|(device, queue)| (device, queue, context))?)
+    let open = unsafe { hal.device_from_raw(raw.clone(), None, &names, wanted, limits, hints, 0, 0) }?;
+    let device = unsafe { adapter.create_device_from_hal(open, &desc) }?;
+    Ok((device, unsafe { gpu::Context::new(&gpu::ContextDesc::new(instance, physical, &raw, needs.optional)) }?))
 }
 
 /// Each frame: a build behind wgpu's uploads, and rays. wgpu knows the `uses` and places the barriers before and behind.

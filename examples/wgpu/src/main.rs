@@ -61,7 +61,7 @@ fn draw(mesh: &Mesh) -> Result<image::RgbImage> {
     let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
     println!("on {}", adapter.get_info().name);
     // SAFETY: `Scene` lets go of the context before the device.
-    let (device, queue, context) = unsafe { engine::open(&adapter) }?;
+    let ((device, queue), context) = unsafe { engine::open(&adapter) }?;
     let scene = Scene::new(device, queue, context, mesh)?;
     let turned: Vec<_> = mesh.positions.iter().map(|&[x, y, z]| [x, -z, y]).collect();
     scene.frame(&turned)?;
