@@ -91,7 +91,7 @@ struct Scene {
 
 impl Scene {
     fn new(device: wgpu::Device, queue: wgpu::Queue, context: Context, mesh: &Mesh) -> Result<Scene> {
-        let shared = |size: u64| Shared::new(&device, &context, size);
+        let shared = |size: u64| Shared::new(&device, size);
         let positions = shared(size_of_val(&mesh.positions[..]) as u64)?;
         let triangles = shared(size_of_val(&mesh.triangles[..]) as u64)?;
         let picture = shared(u64::from(SIZE[0] * SIZE[1]) * 16)?;
