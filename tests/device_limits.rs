@@ -92,7 +92,12 @@ fn rays_hit_the_same_by_loads_of_64_bits_and_without_them() {
     for _ in 0..5000 {
         let (from, to) = (random.around(8.0), random.around(3.0));
         let origin = std::array::from_fn(|k| centre[k] + from[k]);
-        rays.push(Ray { origin, t_min: 0.0, direction: std::array::from_fn(|k| to[k] - from[k]), t_max: f32::INFINITY });
+        rays.push(Ray {
+            origin,
+            t_min: 0.0,
+            direction: std::array::from_fn(|k| to[k] - from[k]),
+            t_max: f32::INFINITY,
+        });
     }
     let cpu = DeviceOptions { tuning: TuningChoice::Cpu, ..OPTIONS };
     let with = open(cpu.clone());

@@ -70,7 +70,8 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
 }
 
 fn bottom_method(flags: Flags, count: u32) -> Method {
-    let is_quick = flags.contains(Flags::PREFER_FAST_BUILD) || (!flags.contains(Flags::PREFER_FAST_TRACE) && count <= FEW);
+    let is_quick =
+        flags.contains(Flags::PREFER_FAST_BUILD) || (!flags.contains(Flags::PREFER_FAST_TRACE) && count <= FEW);
     if is_quick { Method::Lbvh } else { Method::Hploc(Window::DEFAULT) }
 }
 

@@ -271,7 +271,8 @@ impl InstanceRecord {
 
     /// Where it begins in its structure: a [`Child`]'s index and count.
     pub fn begin(&self) -> [u32; 2] {
-        let (index, count) = (self.start & ((1 << InstanceRecord::INDEX_BITS) - 1), self.start >> InstanceRecord::INDEX_BITS);
+        let (index, count) =
+            (self.start & ((1 << InstanceRecord::INDEX_BITS) - 1), self.start >> InstanceRecord::INDEX_BITS);
         [index, if count == InstanceRecord::UP_TO_LAST { self.records - index } else { count }]
     }
 }

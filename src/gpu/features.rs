@@ -60,7 +60,8 @@ impl Features {
     /// `computeFullSubgroups`, or take [`super::Requirements::only`] what you want. Where [`Optional::int64`] is asked for, a
     /// `VkPhysicalDeviceFeatures2` is among them: `pEnabledFeatures` must then be null. [`Features::merge_into`] does all of this.
     pub fn push_into<'a>(&'a mut self, info: vk::DeviceCreateInfo<'a>) -> vk::DeviceCreateInfo<'a> {
-        let (subgroups, reconvergence, int64) = (self.wants_subgroups(), self.wants_reconvergence(), self.wants_int64());
+        let (subgroups, reconvergence, int64) =
+            (self.wants_subgroups(), self.wants_reconvergence(), self.wants_int64());
         let mut info = info.push_next(&mut self.vulkan_1_2);
         if subgroups {
             info = info.push_next(&mut self.subgroups);
@@ -81,7 +82,8 @@ impl Features {
     /// Behind `info` are Vulkan's structures that may be written to, as `push_next` chains them, and nothing else reads or writes
     /// them meanwhile. Its `pEnabledFeatures` may be read; what comes back has them in the chain, if [`Optional::int64`] is asked for.
     pub unsafe fn merge_into<'a>(&'a mut self, mut info: vk::DeviceCreateInfo<'a>) -> vk::DeviceCreateInfo<'a> {
-        let (subgroups, reconvergence, int64) = (self.wants_subgroups(), self.wants_reconvergence(), self.wants_int64());
+        let (subgroups, reconvergence, int64) =
+            (self.wants_subgroups(), self.wants_reconvergence(), self.wants_int64());
         // SAFETY: the caller's promise, here and below; each reference ends before the next begins.
         match unsafe { chained::<vk::PhysicalDeviceVulkan12Features<'_>>(&info) } {
             Some(there) => {
@@ -241,14 +243,17 @@ mod tests {
         let mut features = Features::with(wanted);
         // SAFETY: nothing is chained; the given features live.
         let info = unsafe { features.merge_into(vk::DeviceCreateInfo::default().enabled_features(&clip)) };
-        assert!(info.p_enabled_features.is_null() && types(&info).contains(&vk::StructureType::PHYSICAL_DEVICE_FEATURES_2));
+        assert!(
+            info.p_enabled_features.is_null() && types(&info).contains(&vk::StructureType::PHYSICAL_DEVICE_FEATURES_2)
+        );
         let merged = features.vulkan_1_0.features;
         assert_eq!([merged.shader_clip_distance, merged.shader_int64], [vk::TRUE; 2]);
 
         let mut there = vk::PhysicalDeviceFeatures2::default().features(clip);
         let mut features = Features::with(wanted);
         // SAFETY: `push_next` has chained what is there.
-        unsafe { features.merge_into(vk::DeviceCreateInfo::default().push_next(&mut there)) };
+        let info = unsafe { features.merge_into(vk::DeviceCreateInfo::default().push_next(&mut there)) };
+        assert_eq!(types(&info).iter().filter(|&&t| t == vk::StructureType::PHYSICAL_DEVICE_FEATURES_2).count(), 1);
         assert_eq!([there.features.shader_clip_distance, there.features.shader_int64], [vk::TRUE; 2]);
     }
 }

@@ -16,7 +16,10 @@ use hedgerow::bvh::codes::Codes;
 use hedgerow::bvh::layout::{Bvh2, Header, Triangle};
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::bvh::sah::Collapse;
-use hedgerow::bvh::twin::{self, lbvh::{self, Finish}};
+use hedgerow::bvh::twin::{
+    self,
+    lbvh::{self, Finish},
+};
 use hedgerow::gpu::Recorder;
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::{Query, Ray};

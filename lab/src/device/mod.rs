@@ -93,7 +93,8 @@ impl Device {
         let picked = pick(&found, options.wanted.as_deref())?;
         let (physical, found) = (handles[picked], found[picked].clone());
         let needs = requirements(&instance.raw, physical)?;
-        let wanted = Optional { maximal_reconvergence: options.maximal_reconvergence, int64: true, ..Optional::DEFAULT };
+        let wanted =
+            Optional { maximal_reconvergence: options.maximal_reconvergence, int64: true, ..Optional::DEFAULT };
         let optional = instance.without_what_layers_do_not_know(options.restrict.optional(wanted));
         let mut needs = needs.only(optional);
 
