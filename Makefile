@@ -9,6 +9,7 @@
 #   make test-gpu      the suite with work cut as for a GPU, and a check of builders and tracers with subgroups of 4 and 16
 #   make test-lanes    the suite by either tuning on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
 #   make test-drivers  every pass on a second driver, SwiftShader, by the tunings of CPUs and of GPUs; a quick check on Mesa 26
+#   make test-wgpu     an engine on wgpu: builds it, lets it draw a frame, and compares that with what `hedgerow render` draws
 #   make check         formatting, lints and docs, warnings denied
 #   make package       the crate that engines depend on, with compiled shaders; builds it with and without the compiler
 #   make portable      a folder OUT that runs on any machine with a Vulkan driver: scripts/portable.sh
@@ -32,6 +33,8 @@ BIN := $(RELEASE)/hedgerow
 CACHE := $(or $(HEDGEROW_CACHE),$(HOME)/.cache/hedgerow)
 MESA := $(CACHE)/mesa26
 SWIFTSHADER := $(CACHE)/swiftshader
+# Where `make test-wgpu` puts its pictures.
+WGPU := $(or $(CARGO_TARGET_DIR),target)/wgpu
 # The ICD file of the second driver; another one may be named.
 SECOND_DRIVER := $(or $(HEDGEROW_SECOND_DRIVER),$(SWIFTSHADER)/swiftshader.json)
 comma := ,
@@ -54,7 +57,7 @@ SUITE := $(RUN) --features $(FEATURES)
 WIDTH_GROUPS := scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,child-order,ray-counts,kd-build,kd-merge,trace,trace-kd
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
-.PHONY: bench bench-all bench-peers stability test test-gpu test-lanes check package portable install-c setup test-drivers
+.PHONY: bench bench-all bench-peers stability test test-gpu test-lanes test-wgpu check package portable install-c setup test-drivers
 
 bench: setup
 	$(CARGO) build --release -p hedgerow-lab --features $(FEATURES)
@@ -97,6 +100,17 @@ test-lanes: setup
 	$(CARGO) test --release --features $(FEATURES) --no-run
 	for tuning in cpu gpu; do for lanes in LP_NATIVE_VECTOR_WIDTH=128 LP_NATIVE_VECTOR_WIDTH=512 LP_NUM_THREADS=1; do \
 		env HEDGEROW_TUNING=$$tuning $$lanes $(SUITE) || exit 1; done; done
+
+# Not a part of `make test`: wgpu is a hundred crates. Where the validation layers are installed, what they say is wrong, too.
+test-wgpu: setup
+	$(CARGO) build --release -p hedgerow-lab --features $(FEATURES)
+	$(CARGO) build --release -p hedgerow-on-wgpu
+	mkdir -p $(WGPU)
+	$(WITHIN) $(BIN) render knot -b lbvh --view normals --size 640x480 -o $(WGPU)/render.png
+	VK_INSTANCE_LAYERS=VK_LAYER_KHRONOS_validation $(WITHIN) $(RELEASE)/hedgerow-on-wgpu scenes/knot.ply $(WGPU)/wgpu.png \
+		$(WGPU)/render.png > $(WGPU)/output 2>&1; status=$$?; cat $(WGPU)/output; \
+		! grep -q VUID $(WGPU)/output && exit $$status
+	$(CARGO) clippy --release -p hedgerow-on-wgpu -- -D warnings
 
 # One process: SwiftShader compiles every pipeline anew in each.
 test-drivers: setup

@@ -13,7 +13,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 use hedgerow::accel::{self, Instance};
 use hedgerow::ash::{self, vk};
-use hedgerow::gpu::{Context, ContextDesc, Optional, Requirements, TuningChoice, requirements};
+use hedgerow::gpu::{Context, ContextDesc, Optional, Requirements, requirements};
 use std::error::Error;
 use std::path::Path;
 
@@ -174,15 +174,7 @@ impl Engine {
     }
 
     fn render(&mut self, model: &Model) -> Result<Vec<u8>> {
-        let desc = ContextDesc {
-            instance: &self.instance,
-            physical_device: self.physical,
-            device: &self.device,
-            pipeline_cache: vk::PipelineCache::null(),
-            debug_utils: None,
-            optional: self.optional,
-            tuning: TuningChoice::Auto,
-        };
+        let desc = ContextDesc::new(&self.instance, self.physical, &self.device, self.optional);
         // SAFETY: the device was made from these with what `requirements` returned, and outlives the context.
         let context = unsafe { Context::new(&desc) }?;
 

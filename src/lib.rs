@@ -56,4 +56,5 @@ pub use error::{Error, Result};
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 #[doc = include_str!("../docs/linking.md")]
+#[doc = include_str!("../docs/engines.md")]
 struct Pages;

@@ -4,6 +4,7 @@ mod common;
 mod device_limits;
 mod drivers;
 mod engine;
+mod engines;
 mod flux_rounds;
 mod formats;
 mod house;

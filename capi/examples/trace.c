@@ -1,13 +1,14 @@
 /*
  * A small program in C that links hedgerow: it makes a device by what the library requires, builds a structure of three
- * triangles in its own memory and command buffer, traces rays through it, and compares the hits with known ones.
+ * triangles in its own memory and command buffer, traces rays through it, and compares the hits with known ones. What it
+ * writes for hedgerow stands in engine.h.
  *
  *   make install-c PREFIX=DIR
  *   cc -std=c99 -IDIR/include capi/examples/trace.c -LDIR/lib -lhedgerow_capi -lvulkan -Wl,-rpath,DIR/lib -o trace
  *
  * It prints the hits, and returns 1 if one of them is another than it should be.
  */
-#include "hedgerow.h"
+#include "engine.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -41,7 +42,7 @@ static const HedgerowHit expected[RAYS] = {
 
 static void check(VkResult result, const char *call) {
     if (result != VK_SUCCESS) {
-        const char *why = strncmp(call, "hedgerow_", 9) == 0 ? hedgerow_last_error_message() : "";
+        const char *why = strncmp(call, "vk", 2) == 0 ? "" : hedgerow_last_error_message();
         fprintf(stderr, "%s returned %d %s\n", call, (int)result, why);
         exit(2);
     }
@@ -52,9 +53,9 @@ typedef struct Engine {
     VkInstance instance;
     VkPhysicalDevice physical_device;
     VkDevice device;
-    HedgerowOptional optional;
     uint32_t queue_family;
     VkQueue queue;
+    HedgerowContext *context;
 } Engine;
 
 /* Memory that the host maps and shaders reach by its address. */
@@ -65,25 +66,8 @@ typedef struct Buffer {
     void *mapped;
 } Buffer;
 
-/* The first device that the library can be used on; tells what it must be created with. */
-static HedgerowRequirements *pick_device(Engine *engine) {
-    VkPhysicalDevice devices[16];
-    uint32_t count = 16;
-    VkResult listed = vkEnumeratePhysicalDevices(engine->instance, &count, devices);
-    if (listed != VK_INCOMPLETE) CHECK(listed);
-    for (uint32_t i = 0; i < count; i++) {
-        HedgerowRequirements *needs;
-        engine->physical_device = devices[i];
-        if (hedgerow_create_requirements(vkGetInstanceProcAddr, engine->instance, devices[i], &needs) == VK_SUCCESS)
-            return needs;
-        fprintf(stderr, "%s\n", hedgerow_last_error_message());
-    }
-    fprintf(stderr, "no device can be used\n");
-    exit(2);
-}
-
 static Engine create_engine(void) {
-    Engine engine;
+    Engine engine, *e = &engine;
     VkApplicationInfo application = {.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO, .apiVersion = VK_API_VERSION_1_2};
     VkInstanceCreateInfo instance_info = {
         .sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO,
@@ -91,28 +75,21 @@ static Engine create_engine(void) {
     };
     CHECK(vkCreateInstance(&instance_info, NULL, &engine.instance));
 
-    HedgerowRequirements *needs = pick_device(&engine);
-    engine.queue_family = needs->queueFamilyIndex;
-    const float priority = 1;
-    VkDeviceQueueCreateInfo queue_info = {
-        .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
-        .queueFamilyIndex = engine.queue_family,
-        .queueCount = 1,
-        .pQueuePriorities = &priority,
-    };
-    VkDeviceCreateInfo device_info = {
-        .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-        .pNext = needs->features,
-        .queueCreateInfoCount = 1,
-        .pQueueCreateInfos = &queue_info,
-        .enabledExtensionCount = needs->enabledExtensionCount,
-        .ppEnabledExtensionNames = needs->enabledExtensionNames,
-    };
-    CHECK(vkCreateDevice(engine.physical_device, &device_info, NULL, &engine.device));
-    engine.optional = needs->optional;
-    hedgerow_destroy_requirements(needs);
-    vkGetDeviceQueue(engine.device, engine.queue_family, 0, &engine.queue);
-    return engine;
+    /* The first device that the library can be used on. */
+    VkPhysicalDevice devices[16];
+    uint32_t count = 16;
+    VkResult listed = vkEnumeratePhysicalDevices(engine.instance, &count, devices);
+    if (listed != VK_INCOMPLETE) CHECK(listed);
+    for (uint32_t i = 0; i < count; i++) {
+        e->physical_device = devices[i];
+        if (open_device(e->instance, devices[i], &e->device, &e->queue_family, &e->context) == VK_SUCCESS) {
+            vkGetDeviceQueue(e->device, e->queue_family, 0, &e->queue);
+            return engine;
+        }
+        fprintf(stderr, "%s\n", hedgerow_last_error_message());
+    }
+    fprintf(stderr, "no device can be used\n");
+    exit(2);
 }
 
 static uint32_t host_memory_type(const Engine *engine, uint32_t allowed) {
@@ -163,18 +140,20 @@ static void destroy_buffer(const Engine *engine, Buffer buffer) {
     vkFreeMemory(engine->device, buffer.memory, NULL);
 }
 
-/* Makes what shaders wrote visible to `stage`. */
-static void barrier(VkCommandBuffer commands, VkPipelineStageFlags stage, VkAccessFlags access) {
+/* Makes what shaders wrote visible to the host. */
+static void barrier_to_host(VkCommandBuffer commands) {
     VkMemoryBarrier memory = {
         .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER,
         .srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT,
-        .dstAccessMask = access,
+        .dstAccessMask = VK_ACCESS_HOST_READ_BIT,
     };
-    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, stage, 0, 1, &memory, 0, NULL, 0, NULL);
+    const VkPipelineStageFlags shader = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, host = VK_PIPELINE_STAGE_HOST_BIT;
+    vkCmdPipelineBarrier(commands, shader, host, 0, 1, &memory, 0, NULL, 0, NULL);
 }
 
 /* Builds a structure and traces the rays through it, all in one command buffer. */
-static void trace(const Engine *engine, HedgerowContext *context, HedgerowHit *hits) {
+static void trace(const Engine *engine, HedgerowHit *hits) {
+    HedgerowContext *context = engine->context;
     Buffer position_buffer = create_buffer(engine, sizeof positions, positions);
     Buffer triangle_buffer = create_buffer(engine, sizeof triangles, triangles);
     Buffer ray_buffer = create_buffer(engine, sizeof rays, rays);
@@ -219,8 +198,6 @@ static void trace(const Engine *engine, HedgerowContext *context, HedgerowHit *h
     };
     CHECK(hedgerow_create_acceleration_structure(context, &create_info, NULL, &build.dstAccelerationStructure));
     build.scratchData.deviceAddress = scratch_buffer.address;
-    VkAccelerationStructureBuildRangeInfoKHR range = {.primitiveCount = TRIANGLES};
-    const VkAccelerationStructureBuildRangeInfoKHR *ranges = &range;
     VkAccelerationStructureDeviceAddressInfoKHR address_info = {
         .sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_DEVICE_ADDRESS_INFO_KHR,
         .accelerationStructure = build.dstAccelerationStructure,
@@ -251,10 +228,8 @@ static void trace(const Engine *engine, HedgerowContext *context, HedgerowHit *h
     /* 2. The library records into the engine's command buffer; the engine synchronises, submits and waits. */
     VkCommandBufferBeginInfo begin_info = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
     CHECK(vkBeginCommandBuffer(commands, &begin_info));
-    CHECK(hedgerow_cmd_build_acceleration_structures(context, commands, 1, &build, &ranges));
-    barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_ACCESS_SHADER_READ_BIT);
-    CHECK(hedgerow_cmd_trace_rays(context, commands, &trace_info));
-    barrier(commands, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
+    CHECK(record_frame(context, commands, TRIANGLES, &build, &trace_info));
+    barrier_to_host(commands);
     CHECK(vkEndCommandBuffer(commands));
     VkSubmitInfo submit_info = {
         .sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
@@ -278,18 +253,8 @@ static bool same(HedgerowHit a, HedgerowHit b) {
 
 int main(void) {
     Engine engine = create_engine();
-    HedgerowContextCreateInfo context_info = {
-        .pfnGetInstanceProcAddr = vkGetInstanceProcAddr,
-        .instance = engine.instance,
-        .physicalDevice = engine.physical_device,
-        .device = engine.device,
-        .optional = engine.optional,
-    };
-    HedgerowContext *context;
-    CHECK(hedgerow_create_context(&context_info, &context));
-
     HedgerowHit hits[RAYS];
-    trace(&engine, context, hits);
+    trace(&engine, hits);
     int different = 0;
     for (int i = 0; i < RAYS; i++) {
         const HedgerowHit hit = hits[i];
@@ -302,7 +267,7 @@ int main(void) {
         different += !right;
     }
 
-    hedgerow_destroy_context(context);
+    hedgerow_destroy_context(engine.context);
     vkDestroyDevice(engine.device, NULL);
     vkDestroyInstance(engine.instance, NULL);
     return different != 0;

@@ -27,6 +27,20 @@ pub struct ContextDesc<'a> {
     pub tuning: TuningChoice,
 }
 
+impl<'a> ContextDesc<'a> {
+    /// A description without a pipeline cache and labels, and with work cut for the device's kind. Other fields can be set:
+    /// `ContextDesc { pipeline_cache, ..ContextDesc::new(…) }`.
+    pub fn new(
+        instance: &'a ash::Instance,
+        physical_device: vk::PhysicalDevice,
+        device: &'a ash::Device,
+        optional: Optional,
+    ) -> ContextDesc<'a> {
+        let (pipeline_cache, tuning) = (vk::PipelineCache::null(), TuningChoice::Auto);
+        ContextDesc { instance, physical_device, device, pipeline_cache, debug_utils: None, optional, tuning }
+    }
+}
+
 /// Properties of the device that builders choose sizes by.
 #[derive(Debug, Clone)]
 pub struct Limits {

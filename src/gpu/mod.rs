@@ -7,6 +7,7 @@
 
 pub(crate) mod arguments;
 mod context;
+mod features;
 #[doc(hidden)]
 pub mod fill;
 mod grid;
@@ -31,10 +32,11 @@ pub mod twin;
 mod workarounds;
 
 pub use context::{Context, ContextDesc, Kernel, Limits};
+pub use features::Features;
 pub use grid::Grid;
 pub use recorder::{Phase, Recorder, Step, Timestamps};
 pub use region::Region;
-pub use requirements::{Features, Optional, Requirements, requirements};
+pub use requirements::{Optional, Requirements, requirements};
 pub use sizes::Sizes;
 pub(crate) use tuning::MOST_LANES;
 pub use tuning::{BuildTuning, KdTuning, RefitTuning, TraceTuning, Tuning, TuningChoice};

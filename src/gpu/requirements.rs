@@ -1,5 +1,6 @@
 //! Everything the library requires of a device, in one place (DESIGN: rule 9).
 
+use super::Features;
 use crate::{Error, Result};
 use ash::vk;
 use std::ffi::CStr;
@@ -125,55 +126,6 @@ impl SubgroupSizes {
             of_a_workgroup: sizes.max_compute_workgroup_subgroups,
             can_be_required: sizes.required_subgroup_size_stages.contains(vk::ShaderStageFlags::COMPUTE),
         }
-    }
-}
-
-/// The features to enable when the device is created; `push_into` chains them behind a `vk::DeviceCreateInfo`.
-///
-/// The required ones are core in Vulkan 1.2: no extension, no 64-bit integers, no float atomics.
-#[derive(Debug, Clone, Copy)]
-pub struct Features {
-    vulkan_1_0: vk::PhysicalDeviceFeatures2<'static>,
-    vulkan_1_2: vk::PhysicalDeviceVulkan12Features<'static>,
-    subgroups: vk::PhysicalDeviceSubgroupSizeControlFeatures<'static>,
-    reconvergence: vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR<'static>,
-}
-
-impl Features {
-    fn with(optional: Optional) -> Features {
-        let int64 = vk::PhysicalDeviceFeatures::default().shader_int64(optional.int64);
-        Features {
-            vulkan_1_0: vk::PhysicalDeviceFeatures2::default().features(int64),
-            vulkan_1_2: vk::PhysicalDeviceVulkan12Features::default()
-                .buffer_device_address(true)
-                .vulkan_memory_model(true)
-                .vulkan_memory_model_device_scope(true)
-                .scalar_block_layout(true),
-            subgroups: vk::PhysicalDeviceSubgroupSizeControlFeatures::default()
-                .subgroup_size_control(optional.subgroup_size_control)
-                .compute_full_subgroups(optional.subgroup_size_control),
-            reconvergence: vk::PhysicalDeviceShaderMaximalReconvergenceFeaturesKHR::default()
-                .shader_maximal_reconvergence(optional.maximal_reconvergence),
-        }
-    }
-
-    /// Chains the features behind `info`. Vulkan allows each structure once in a chain: if yours holds a
-    /// `VkPhysicalDeviceVulkan12Features`, set `bufferDeviceAddress`, `vulkanMemoryModel`, `vulkanMemoryModelDeviceScope` and
-    /// `scalarBlockLayout` there instead; if it holds a `VkPhysicalDeviceVulkan13Features`, `subgroupSizeControl` and
-    /// `computeFullSubgroups`, or take [`Requirements::only`] what you want. Where [`Optional::int64`] is asked for, a
-    /// `VkPhysicalDeviceFeatures2` is among them: `pEnabledFeatures` must then be null.
-    pub fn push_into<'a>(&'a mut self, info: vk::DeviceCreateInfo<'a>) -> vk::DeviceCreateInfo<'a> {
-        let mut info = info.push_next(&mut self.vulkan_1_2);
-        if self.subgroups.subgroup_size_control != vk::FALSE {
-            info = info.push_next(&mut self.subgroups);
-        }
-        if self.reconvergence.shader_maximal_reconvergence != vk::FALSE {
-            info = info.push_next(&mut self.reconvergence);
-        }
-        if self.vulkan_1_0.features.shader_int64 != vk::FALSE {
-            info = info.push_next(&mut self.vulkan_1_0);
-        }
-        info
     }
 }
 
