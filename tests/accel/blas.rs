@@ -1,8 +1,9 @@
 //! Bottom-level structures by Vulkan's structs: the same cases through ours and the driver's.
 
-use crate::common::backends::{Backend, Built, Ours, Traces, backends, vk_format, vk_geometry};
+use crate::common::backends::{Backend, Built, Ours, backends, vk_format, vk_geometry};
 use crate::common::device;
 use crate::common::geometries::{MOVED, Owned};
+use crate::common::probe::ProbeRay;
 use crate::common::shapes::{Corners, ray, soup};
 use hedgerow::accel::{self, Request};
 use hedgerow::ash::vk;
