@@ -11,9 +11,9 @@
 use super::builder::{BuildRoom, KdEstimate, KdOptions, KdShape, STATE_BYTES, TILE, stack_bytes};
 use super::layout;
 use crate::bvh::geometry::Input;
+use crate::gpu::Step;
 use crate::gpu::arguments;
 use crate::gpu::shaders::{self, Shader};
-use crate::gpu::Step;
 
 /// As `glsl/kdtree/across/` has them.
 const ACROSS_BYTES: u64 = 1024;
@@ -47,7 +47,8 @@ pub(super) fn room(options: &KdOptions, count: u32, shape: &KdShape) -> BuildRoo
         (wanted + more).min(most) as u32
     };
     let workers = shape.subtree_groups;
-    let nodes = each(estimate.level_nodes + estimate.subtree_nodes, 256 + u64::from(options.more.nodes), layout::MAX_NODES);
+    let nodes =
+        each(estimate.level_nodes + estimate.subtree_nodes, 256 + u64::from(options.more.nodes), layout::MAX_NODES);
     let references = (estimate.cut_references + estimate.subtree_references).max(1.0);
     let references = each(references, 512 + u64::from(options.more.references), layout::MAX_REFERENCES);
     // Workers keep some of it, those that have work.

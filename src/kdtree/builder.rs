@@ -288,8 +288,15 @@ pub const MAX_COUNT: u32 = 1 << 27;
 
 impl BuildRoom {
     pub fn of(options: &KdOptions, count: u32, chunk: u32) -> BuildRoom {
-        let KdEstimate { level_references, level_nodes, subtree_nodes, cut_references, subtree_references, subtrees, .. } =
-            options.estimate.unwrap_or(KdEstimate::for_exact(options.exact));
+        let KdEstimate {
+            level_references,
+            level_nodes,
+            subtree_nodes,
+            cut_references,
+            subtree_references,
+            subtrees,
+            ..
+        } = options.estimate.unwrap_or(KdEstimate::for_exact(options.exact));
         // A little more where a scene is small, and what the layout can name at most.
         let each = |of_each: f32, at_least: u32, most: u64| {
             let wanted = (f64::from(of_each.max(0.0)) * f64::from(count)).ceil() as u64 + u64::from(at_least);
@@ -531,7 +538,8 @@ impl KdBuilder {
         if self.schedule == KdSchedule::AcrossLevels {
             let bytes = if scratch.is_unbounded() { sizes.scratch } else { scratch.bytes };
             let room = across::grown(&self.options, &self.room, bytes);
-            let arguments = arguments::KdBuild { reference_capacity: room, ..self.arguments(input, structure, scratch_at)? };
+            let arguments =
+                arguments::KdBuild { reference_capacity: room, ..self.arguments(input, structure, scratch_at)? };
             return recorder.chains(&[across::steps(&self.shape, &self.options, input, &arguments)]);
         }
         recorder.chains(&[self.steps(input, structure, scratch_at)?])

@@ -321,7 +321,8 @@ fn whatever_is_short_by_little_gives_a_valid_tree() {
     for mesh in [sphere, corpus::random("random 9000", 9000, [-0.5; 3], [1.0; 3])] {
         let expected = on_host(&mesh, &KdOptions::DEFAULT);
         // Across levels there are other things.
-        let schedule = (KdOptions::DEFAULT.schedule_on(device()) == KdSchedule::AcrossLevels).then_some(KdSchedule::Chain);
+        let schedule =
+            (KdOptions::DEFAULT.schedule_on(device()) == KdSchedule::AcrossLevels).then_some(KdSchedule::Chain);
         let with = KdOptions { schedule, ..KdOptions::DEFAULT };
         let enough = built(&mesh, &KdOptions { estimate: Some(PLENTY), ..with }).1.estimate(mesh.2.len() as u32);
         let fields: [fn(&mut KdEstimate) -> &mut f32; 6] = [
@@ -357,8 +358,7 @@ fn many_builds(builds: u32, schedule: KdSchedule) {
     let indices = device.upload("indices", triangles).expect("memory");
     let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), 400);
     let builder = |workgroups| {
-        let options =
-            KdOptions { schedule: Some(schedule), workgroups: Some(workgroups), ..KdOptions::DEFAULT };
+        let options = KdOptions { schedule: Some(schedule), workgroups: Some(workgroups), ..KdOptions::DEFAULT };
         KdBuilder::new(device, &options, 400).expect("options that can be used")
     };
     let most = builder(1024).sizes();

@@ -23,7 +23,7 @@ BUFFER KdAcross {
     uint retrievals;
     uint skipped;
     uint scanned[LEVELS];   // tiles of drafts
-    uvec4 before[LEVELS + 1u];   // references of leaves, nodes and references of subtrees of the levels before; first the drafts, with the level's own
+    uvec4 before[LEVELS + 1u];   // drafts, with those of the level; references of leaves, subtrees' nodes and references before it
 };
 
 const uint ACROSS_BYTES = 1024;
@@ -53,7 +53,7 @@ void fall_short(uint of) {
 }
 
 // What the worker has to give; empty ones have no size.
-const uint PIECES = 32;
+const uint PIECES = 16;
 shared uint piece_begin[PIECES];
 shared uint piece_size[PIECES];
 // Where it puts what stays, and how much of that is left.
