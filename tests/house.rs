@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Passes whose plain form has another name, and why.
-const WITHOUT_TWIN: [(&str, &str); 7] = [
+const WITHOUT_TWIN: [(&str, &str); 8] = [
     ("accel/build", "writes down what the host gives it"),
     ("accel/copy", "copies bytes"),
     ("accel/instances", "the twin of whole top levels begins with it: src/accel/twin/mod.rs"),
@@ -14,6 +14,7 @@ const WITHOUT_TWIN: [(&str, &str); 7] = [
     ("bvh/encode", "bvh::twin::lbvh begins with it"),
     ("bvh/lbvh_workgroup", "gives the bytes of bvh::twin::lbvh"),
     ("gpu/fill", "writes one word everywhere"),
+    ("kdtree/across", "gives the bytes of kdtree::twin::builder"),
 ];
 
 /// What twins share, and is the plain form of no pass of its own.

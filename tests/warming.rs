@@ -32,6 +32,7 @@ fn first_builds_make_no_pipelines() {
         "hploc:width=4",
         "kd-gpu:schedule=chain",
         "kd-gpu:schedule=persistent",
+        "kd-gpu:schedule=across-levels",
     ];
     let (_, positions, triangles) = corpus::random("", 3000, [-0.5; 3], [1.0; 3]);
     let mesh = Mesh { positions, triangles };

@@ -117,6 +117,9 @@ struct KdReport {
     uint subtree_references;
     uint subtrees;
     uint ended;                     // at this level and one for want of room: what was needed below is not known
+    uint arena;                     // references that the arena had room for and that were in use, of a build across levels
+    uint retrievals;                // tasks and chunks that workers took out of a pool
+    uint skipped;                   // steps of a task that its worker went on with
 };
 
 BUFFER KdState {

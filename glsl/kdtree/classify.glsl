@@ -19,9 +19,9 @@ uint waiting_place(uint k) {
     return reference_capacity - 1u - k;
 }
 
-// The parts of what straddles the plane: an invocation a side. Side by side, so that each sees what the other has found. Adds to what
-// the invocation has found on either side.
-void clip_straddling(KdReferences references, uint count, uint first_place, bool fits, Box cell, uint axis, float plane, inout uvec2 found) {
+// The parts of what straddles the plane: an invocation a side. Side by side, so that each sees what the other has found. Those on the
+// right wait at `last_place` and before it. Adds to what the invocation has found on either side.
+void clip_straddling(KdReferences references, uint count, uint last_place, bool fits, Box cell, uint axis, float plane, inout uvec2 found) {
     float reach = build_state().reach;
     Words all_sides = Words(build_state().sides);
     Box halves[2];
@@ -44,7 +44,7 @@ void clip_straddling(KdReferences references, uint count, uint first_place, bool
         barrier();
         if (is_item) {
             bool other_is_there = part_is_there[gl_LocalInvocationIndex ^ 1u] == 1u;
-            uint waits = waiting_place(first_place + (item >> 1));
+            uint waits = last_place - (item >> 1);
             bool takes = is_there || !other_is_there;
             if (side == 0u) {
                 bool right = other_is_there || !is_there;
@@ -63,17 +63,16 @@ void clip_straddling(KdReferences references, uint count, uint first_place, bool
     }
 }
 
-// The sides of a block of references by the plane of their task.
-void classify_block(KdReferences references, uint begin, uint end, KdTask t, uint of_level, inout uvec2 found) {
-    KdState state = build_state();
-    Words all_sides = Words(state.sides);
-    uint axis = t.split & 3u, straddlers = 0;
+// The sides of a block of references by a plane, but for those that straddle it: how many do, and are listed.
+uint list_straddling(KdReferences references, uint begin, uint end, uint axis, float plane, bool planar_left, inout uvec2 found) {
+    Words all_sides = Words(build_state().sides);
+    uint straddlers = 0;
     for (uint base = begin; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
         bvec2 is_there = bvec2(false);
         if (i < end) {
             Box b = Box(references.reference[i].lo, references.reference[i].hi);
-            is_there = sides_of(b, axis, t.plane, (t.split & SPLIT_LEFT_PLANAR) != 0u);
+            is_there = sides_of(b, axis, plane, planar_left);
         }
         uint total;
         uint at = straddlers + sum_before(all(is_there) ? 1u : 0u, total);
@@ -86,13 +85,21 @@ void classify_block(KdReferences references, uint begin, uint end, KdTask t, uin
         straddlers += total;
     }
     barrier();
+    return straddlers;
+}
+
+// The sides of a block of references by the plane of their task.
+void classify_block(KdReferences references, uint begin, uint end, KdTask t, uint of_level, inout uvec2 found) {
+    KdState state = build_state();
+    uint axis = t.split & 3u;
+    uint straddlers = list_straddling(references, begin, end, axis, t.plane, (t.split & SPLIT_LEFT_PLANAR) != 0u, found);
     if (straddlers == 0u) return;
     uint first_place = 0;
     if (gl_LocalInvocationIndex == 0u) first_place = atomicAdd(state.straddling[of_level], straddlers);
     first_place = agree(first_place);
     bool fits = first_place + straddlers <= reference_capacity - state.level_references[of_level];
     if (!fits && gl_LocalInvocationIndex == 0u) atomicOr(state.is_short, 1u);
-    clip_straddling(references, straddlers, first_place, fits, Box(t.lo, t.hi), axis, t.plane, found);
+    clip_straddling(references, straddlers, waiting_place(first_place), fits, Box(t.lo, t.hi), axis, t.plane, found);
 }
 
 void kd_classify_chunk(uint chunk, uint of_level) {

@@ -20,23 +20,9 @@ uint leaf_at(Sums before, KdTask t, uint of_level) {
     return has_ended(of_level) ? first + before.split_references + t.cut : first + t.leaf;
 }
 
-void kd_distribute_chunk(uint chunk, uint of_level) {
-    KdReferences from = references_of(of_level), to = references_of(of_level + 1u);
-    uint number = task_of_chunk(of_level, chunk);
-    KdTask t = tasks_of(of_level).task[number];
-    uint begin = t.begin + (chunk - t.first_chunk) * CHUNK, end = min(begin + CHUNK, t.begin + t.count);
-    Fate fate = fate_of(t, has_ended(of_level));
-    if (!fate.is_split) {
-        Words leaf = leaf_references();
-        uint first = leaf_at(task_tiles().tile[number / TILE], t, of_level);
-        for (uint i = begin + gl_LocalInvocationIndex; i < end; i += gl_WorkGroupSize.x) {
-            leaf.word[first + (i - t.begin)] = from.reference[i].record;
-        }
-        return;
-    }
+// References that were classified go to those of the children, from `at` on.
+void distribute_references(KdReferences from, KdReferences to, uint begin, uint end, uvec2 at) {
     Words sides = Words(build_state().sides);
-    uint first = fate.before.x + fate.before.y;
-    uvec2 at = uvec2(first, first + fate.sides.x) + sides_before(chunk) - fate.before;
     for (uint base = begin; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
         uint side = i < end ? sides.word[i] : 0u;
@@ -57,6 +43,25 @@ void kd_distribute_chunk(uint chunk, uint of_level) {
         }
         at += total;
     }
+}
+
+void kd_distribute_chunk(uint chunk, uint of_level) {
+    KdReferences from = references_of(of_level), to = references_of(of_level + 1u);
+    uint number = task_of_chunk(of_level, chunk);
+    KdTask t = tasks_of(of_level).task[number];
+    uint begin = t.begin + (chunk - t.first_chunk) * CHUNK, end = min(begin + CHUNK, t.begin + t.count);
+    Fate fate = fate_of(t, has_ended(of_level));
+    if (!fate.is_split) {
+        Words leaf = leaf_references();
+        uint first = leaf_at(task_tiles().tile[number / TILE], t, of_level);
+        for (uint i = begin + gl_LocalInvocationIndex; i < end; i += gl_WorkGroupSize.x) {
+            leaf.word[first + (i - t.begin)] = from.reference[i].record;
+        }
+        return;
+    }
+    uint first = fate.before.x + fate.before.y;
+    uvec2 at = uvec2(first, first + fate.sides.x) + sides_before(chunk) - fate.before;
+    distribute_references(from, to, begin, end, at);
 }
 
 // Leaves of few references, an invocation each.

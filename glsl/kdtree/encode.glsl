@@ -20,47 +20,9 @@ uint counter_capacity() {
     return reference_capacity / CHUNK + 1u;
 }
 
-// The state, and where things lie in the scratch memory behind it: src/kdtree/builder.rs adds up the same.
-void kd_reset() {
-    if (gl_LocalInvocationIndex != 0u) return;
+// What is counted from nothing on; by one invocation.
+void clear_state() {
     KdState state = build_state();
-    PoolState pool = PoolState(state_address);
-    pool_reset(pool, PHASES);
-    pool.tasks[PHASE_COUNT] = tile_count();
-    pool.tasks[PHASE_PLAN] = 1u;
-    pool.tasks[PHASE_RECORDS] = tile_count();
-    pool.tasks[PHASE_ROOT] = 1u;
-    pool.tasks[PHASE_ORDER] = 1u;
-    uvec2 at = address_of(state_address, 1u, STATE_BYTES);
-    state.references[0] = at;
-    at = address_of(at, reference_capacity, 28u);
-    state.references[1] = at;
-    at = address_of(at, reference_capacity, 28u);
-    state.tasks[0] = at;
-    at = address_of(at, task_capacity, TASK_BYTES);
-    state.tasks[1] = at;
-    at = address_of(at, task_capacity, TASK_BYTES);
-    state.subtrees = at;
-    at = address_of(at, subtree_capacity, SUBTREE_BYTES);
-    state.chunks = at;
-    at = address_of(at, chunk_capacity + 1u, 8u);
-    state.sides = at;
-    at = address_of(at, reference_capacity, 4u);
-    state.counters = at;
-    at = address_of(at, counter_capacity(), 4u * counter_words());
-    state.arrivals = at;
-    at = address_of(at, tiles_of(chunk_capacity), 4u);
-    state.chunk_tiles = at;
-    at = address_of(at, tiles_of(chunk_capacity) + 1u, 8u);
-    state.task_tiles = at;
-    at = address_of(at, tiles_of(task_capacity) + 1u, SUMS_BYTES);
-    state.subtree_tiles = at;
-    at = address_of(at, tiles_of(subtree_capacity), 8u);
-    state.nodes = at;
-    at = address_of(at, subtree_node_room(), 8u);
-    state.leaf_references = at;
-    at = address_of(at, reference_room, 4u);
-    state.stacks = at;
     state.octaves[0] = 0u;
     state.octaves[1] = 0u;
     state.triangles_with_octave = 0u;
@@ -107,6 +69,50 @@ void kd_reset() {
     state.first_record = 0u;
 }
 
+// The state, and where things lie in the scratch memory behind it: src/kdtree/builder.rs adds up the same.
+void kd_reset() {
+    if (gl_LocalInvocationIndex != 0u) return;
+    KdState state = build_state();
+    PoolState pool = PoolState(state_address);
+    pool_reset(pool, PHASES);
+    pool.tasks[PHASE_COUNT] = tile_count();
+    pool.tasks[PHASE_PLAN] = 1u;
+    pool.tasks[PHASE_RECORDS] = tile_count();
+    pool.tasks[PHASE_ROOT] = 1u;
+    pool.tasks[PHASE_ORDER] = 1u;
+    uvec2 at = address_of(state_address, 1u, STATE_BYTES);
+    state.references[0] = at;
+    at = address_of(at, reference_capacity, 28u);
+    state.references[1] = at;
+    at = address_of(at, reference_capacity, 28u);
+    state.tasks[0] = at;
+    at = address_of(at, task_capacity, TASK_BYTES);
+    state.tasks[1] = at;
+    at = address_of(at, task_capacity, TASK_BYTES);
+    state.subtrees = at;
+    at = address_of(at, subtree_capacity, SUBTREE_BYTES);
+    state.chunks = at;
+    at = address_of(at, chunk_capacity + 1u, 8u);
+    state.sides = at;
+    at = address_of(at, reference_capacity, 4u);
+    state.counters = at;
+    at = address_of(at, counter_capacity(), 4u * counter_words());
+    state.arrivals = at;
+    at = address_of(at, tiles_of(chunk_capacity), 4u);
+    state.chunk_tiles = at;
+    at = address_of(at, tiles_of(chunk_capacity) + 1u, 8u);
+    state.task_tiles = at;
+    at = address_of(at, tiles_of(task_capacity) + 1u, SUMS_BYTES);
+    state.subtree_tiles = at;
+    at = address_of(at, tiles_of(subtree_capacity), 8u);
+    state.nodes = at;
+    at = address_of(at, subtree_node_room(), 8u);
+    state.leaf_references = at;
+    at = address_of(at, reference_room, 4u);
+    state.stacks = at;
+    clear_state();
+}
+
 // Which primitives there are, and how long their sides are; clears a part of the counters, and of the arrivals behind them.
 void kd_count(uint tile) {
     KdState state = build_state();
@@ -144,7 +150,9 @@ void kd_count(uint tile) {
         atomicAdd(state.triangles_with_octave, all_with_octave);
     }
     Words all_counters = Words(state.counters);
-    uint words = counter_capacity() * counter_words() + tiles_of(chunk_capacity), share = (words + tile_count() - 1u) / tile_count();
+    // A build across levels has none.
+    uint words = state.counters == uvec2(0) ? 0u : counter_capacity() * counter_words() + tiles_of(chunk_capacity);
+    uint share = (words + tile_count() - 1u) / tile_count();
     uint end = min(words, (tile + 1u) * share);
     for (uint i = tile * share + gl_LocalInvocationIndex; i < end; i += gl_WorkGroupSize.x) all_counters.word[i] = 0u;
     barrier();
@@ -204,7 +212,8 @@ void kd_records(uint tile) {
     }
 }
 
-void kd_root() {
+// The cell around all triangles.
+Box root_cell() {
     KdState state = build_state();
     Box cell = Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
     uint count = state.active_count;
@@ -217,6 +226,14 @@ void kd_root() {
         state.cell_hi = cell.hi;
         state.area_scale = count > 0u ? area_scale_of(cell) : 1.0;
         state.empty_leaves = count > 0u ? 0u : 1u;
+    }
+    return cell;
+}
+
+void kd_root() {
+    Box cell = root_cell();
+    uint count = build_state().active_count;
+    if (gl_LocalInvocationIndex == 0u) {
         Sums sums = no_sums();
         add_task(sums, count, 0u);
         publish_level(0u, sums, count);

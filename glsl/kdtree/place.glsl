@@ -32,11 +32,9 @@ bool order_subtrees(uint tile, out uvec2 used) {
     return true;
 }
 
-void kd_order_subtrees(uint tile) {
+// The header of a structure that has so many nodes and references; by one invocation.
+void write_header(uvec2 used) {
     KdState state = build_state();
-    KdStructure structure = KdStructure(structure_address);
-    uvec2 used;
-    if (!order_subtrees(tile, used) || gl_LocalInvocationIndex != 0u) return;
     KdHeader header;
     header.magic = MAGIC;
     header.kind = KIND_KD_TREE;
@@ -63,9 +61,20 @@ void kd_order_subtrees(uint tile) {
     header.replaced_nodes = 0u;
     header.replaced_references = 0u;
     for (uint k = 0; k < 5; ++k) header.reserved[k] = 0u;
-    structure.header = header;
+    KdStructure(structure_address).header = header;
+}
+
+void kd_order_subtrees(uint tile) {
+    KdState state = build_state();
+    uvec2 used;
+    if (!order_subtrees(tile, used) || gl_LocalInvocationIndex != 0u) return;
+    write_header(used);
+    // What the pool has drawn, if there is one; a chain has as many.
+    PoolState pool = PoolState(state_address);
+    uint tickets = 0;
+    for (uint phase = 0; phase < PHASES; ++phase) tickets += pool.tasks[phase];
     state.report = KdReport(state.status, state.most_references, state.most_nodes, state.subtree_nodes, state.most_cut,
-                            state.subtree_references, state.most_subtrees, state.ended);
+                            state.subtree_references, state.most_subtrees, state.ended, 0u, tickets, 0u);
 }
 
 // Where a node of a subtree goes, what it names goes too: a subtree's nodes count from 1, its references from 0.

@@ -223,65 +223,20 @@ void load_references(uint set, KdReferences from, uint begin, uint count) {
     barrier();
 }
 
-// Writes the subtree beside others that wait. Without room, its root becomes a leaf.
-void write_subtree(uint s, KdTask t, KdReferences level_references, KdStack stack, uvec3 tallies, uint nodes, uint references, uint depth) {
-    KdState state = build_state();
-    KdSubtrees subtrees = all_subtrees();
-    if (gl_LocalInvocationIndex == 0u) {
-        uint nodes_at = atomicAdd(state.subtree_nodes, nodes);
-        uint references_at = atomicAdd(state.subtree_references, references);
-        bool fits = nodes_at + nodes <= subtree_node_room() && references_at + references <= subtree_room();
-        KdNode root = stack.nodes.node[0];
-        if (!fits) {
-            nodes_at = NONE;
-            nodes = 0u;
-            references = t.count;
-            references_at = subtree_room() + atomicAdd(state.root_leaf_references, t.count);
-            root = kd_leaf(0u, t.count);
-            tallies = uvec3(0u, 1u, 0u);
-            depth = t.depth;
-            atomicOr(state.status, STATUS_OUT_OF_ROOM);
-        }
-        subtrees.subtree[s].root = root;
-        subtrees.subtree[s].nodes_at = nodes_at;
-        subtrees.subtree[s].nodes = nodes;
-        subtrees.subtree[s].references_at = references_at;
-        subtrees.subtree[s].references = references;
-        atomicAdd(state.subtree_inner, tallies.x);
-        atomicAdd(state.subtree_leaves, tallies.y);
-        atomicAdd(state.subtree_empty, tallies.z);
-        atomicMax(state.depth, depth);
-    }
-    next_step();
-    uint nodes_at = subtrees.subtree[s].nodes_at, references_at = subtrees.subtree[s].references_at;
-    Words to_references = Words(state.leaf_references);
-    if (nodes_at == NONE) {
-        for (uint i = gl_LocalInvocationIndex; i < t.count; i += gl_WorkGroupSize.x) {
-            to_references.word[references_at + i] = level_references.reference[t.begin + i].record;
-        }
-        return;
-    }
-    KdNodes to_nodes = KdNodes(state.nodes);
-    for (uint i = gl_LocalInvocationIndex; i < nodes; i += gl_WorkGroupSize.x) {
-        to_nodes.node[nodes_at + i] = stack.nodes.node[1u + i];
-    }
-    for (uint i = gl_LocalInvocationIndex; i < references; i += gl_WorkGroupSize.x) {
-        to_references.word[references_at + i] = stack.leaves.word[i];
-    }
-    barrier();
-}
+// A subtree in the memory of the workgroup that has built it.
+struct KdBuilt {
+    uint nodes;         // below its root
+    uint references;    // of its leaves
+    uvec3 tallies;      // inner nodes, leaves, empty leaves
+    uint deepest;
+};
 
-void kd_small(uint s, uint of_level) {
-    KdState state = build_state();
-    // Behind the last one of a loop, no lane active, lavapipe of Mesa 26 still loads what is the same for all lanes.
-    KdTask t = tasks_of(of_level).task[min(all_subtrees().subtree[s].task, task_capacity - 1u)];
-    KdStack stack = stack_of(group_number());
-    float area_scale = state.area_scale;
-    uint set = 0, count = t.count, depth = t.depth, slot = 0, waiting = 0, nodes = 0, references = 0, deepest = t.depth;
-    // Inner nodes, leaves, empty leaves.
+// Builds the subtree of a cell of `count` references, from `begin` on, into `stack`.
+KdBuilt build_small(KdReferences from, uint begin, uint count, Box cell, uint depth, KdStack stack) {
+    float area_scale = build_state().area_scale;
+    uint set = 0, slot = 0, waiting = 0, nodes = 0, references = 0, deepest = depth;
     uvec3 tallies = uvec3(0);
-    Box cell = Box(t.lo, t.hi);
-    load_references(set, references_of(of_level), t.begin, t.count);
+    load_references(set, from, begin, count);
     // Each turn makes a node.
     for (uint turn = 0; turn <= MOST_NODES; ++turn) {
         deepest = max(deepest, depth);
@@ -336,6 +291,65 @@ void kd_small(uint s, uint of_level) {
         }
     }
     next_step();
-    write_subtree(s, t, references_of(of_level), stack, tallies, nodes, references, deepest);
+    return KdBuilt(nodes, references, tallies, deepest);
+}
+
+// Writes the subtree beside others that wait. Without room, its root becomes a leaf.
+void write_subtree(uint s, KdTask t, KdReferences level_references, KdStack stack, KdBuilt built) {
+    KdState state = build_state();
+    uint nodes = built.nodes, references = built.references, depth = built.deepest;
+    uvec3 tallies = built.tallies;
+    KdSubtrees subtrees = all_subtrees();
+    if (gl_LocalInvocationIndex == 0u) {
+        uint nodes_at = atomicAdd(state.subtree_nodes, nodes);
+        uint references_at = atomicAdd(state.subtree_references, references);
+        bool fits = nodes_at + nodes <= subtree_node_room() && references_at + references <= subtree_room();
+        KdNode root = stack.nodes.node[0];
+        if (!fits) {
+            nodes_at = NONE;
+            nodes = 0u;
+            references = t.count;
+            references_at = subtree_room() + atomicAdd(state.root_leaf_references, t.count);
+            root = kd_leaf(0u, t.count);
+            tallies = uvec3(0u, 1u, 0u);
+            depth = t.depth;
+            atomicOr(state.status, STATUS_OUT_OF_ROOM);
+        }
+        subtrees.subtree[s].root = root;
+        subtrees.subtree[s].nodes_at = nodes_at;
+        subtrees.subtree[s].nodes = nodes;
+        subtrees.subtree[s].references_at = references_at;
+        subtrees.subtree[s].references = references;
+        atomicAdd(state.subtree_inner, tallies.x);
+        atomicAdd(state.subtree_leaves, tallies.y);
+        atomicAdd(state.subtree_empty, tallies.z);
+        atomicMax(state.depth, depth);
+    }
+    next_step();
+    uint nodes_at = subtrees.subtree[s].nodes_at, references_at = subtrees.subtree[s].references_at;
+    Words to_references = Words(state.leaf_references);
+    if (nodes_at == NONE) {
+        for (uint i = gl_LocalInvocationIndex; i < t.count; i += gl_WorkGroupSize.x) {
+            to_references.word[references_at + i] = level_references.reference[t.begin + i].record;
+        }
+        return;
+    }
+    KdNodes to_nodes = KdNodes(state.nodes);
+    for (uint i = gl_LocalInvocationIndex; i < nodes; i += gl_WorkGroupSize.x) {
+        to_nodes.node[nodes_at + i] = stack.nodes.node[1u + i];
+    }
+    for (uint i = gl_LocalInvocationIndex; i < references; i += gl_WorkGroupSize.x) {
+        to_references.word[references_at + i] = stack.leaves.word[i];
+    }
+    barrier();
+}
+
+void kd_small(uint s, uint of_level) {
+    // Behind the last one of a loop, no lane active, lavapipe of Mesa 26 still loads what is the same for all lanes.
+    KdTask t = tasks_of(of_level).task[min(all_subtrees().subtree[s].task, task_capacity - 1u)];
+    KdStack stack = stack_of(group_number());
+    KdReferences from = references_of(of_level);
+    KdBuilt built = build_small(from, t.begin, t.count, Box(t.lo, t.hi), t.depth, stack);
+    write_subtree(s, t, from, stack, built);
 }
 #endif

@@ -20,6 +20,11 @@ impl Region {
         Region { address, bytes: u64::MAX - address }
     }
 
+    /// Whether only the address is known.
+    pub(crate) const fn is_unbounded(&self) -> bool {
+        self.bytes == u64::MAX - self.address
+    }
+
     /// The rest after the first `bytes`.
     pub(crate) const fn behind(self, bytes: u64) -> Region {
         Region { address: self.address + bytes, bytes: self.bytes.saturating_sub(bytes) }

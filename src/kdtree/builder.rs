@@ -13,6 +13,7 @@
 //! device or by integers ([`crate::gpu::KdTuning::exact_reciprocals`]). Where a device flushes subnormal numbers, inputs must
 //! not lead to any.
 
+use super::across;
 use super::layout::{self, KdHeader, KdNode};
 use super::merge::MERGE_AT;
 use super::termination::{Costs, depth_limit, leaf_size};
@@ -33,10 +34,9 @@ pub struct KdOptions {
     pub exact: u32,
     /// The costs by which the best plane is chosen.
     pub costs: Costs,
-    /// How the phases are recorded: a chain of dispatches or one persistent dispatch; `None` takes what measured faster
-    /// ([`KdOptions::schedule_on`]).
+    /// How the phases are recorded; `None` takes what measured faster ([`KdOptions::schedule_on`]).
     pub schedule: Option<KdSchedule>,
-    /// Workgroups of the persistent dispatch, 1 or more; `None` takes what keeps the device busy.
+    /// Workgroups of a persistent dispatch, 1 or more; `None` takes what keeps the device busy.
     pub workgroups: Option<u32>,
     /// What the memory goes by; `None` takes [`KdEstimate::for_exact`].
     pub estimate: Option<KdEstimate>,
@@ -53,13 +53,21 @@ pub struct KdOptions {
 pub enum KdSchedule {
     /// One dispatch per phase of each level, with barriers between. Works on every device.
     Chain,
-    /// One persistent dispatch that draws tasks from a pool. The device must keep running workgroups that it has started.
+    /// One persistent dispatch that draws tasks from a pool, level by level. The device must keep running workgroups that it has
+    /// started.
     Persistent,
+    /// A pool in which tasks of all levels run at once, and memory that is taken while the tree is built: [`super::across`]. The
+    /// device must keep running workgroups that it has started. A merge runs as by [`KdSchedule::Persistent`].
+    AcrossLevels,
 }
 
 impl std::fmt::Display for KdSchedule {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(if *self == KdSchedule::Chain { "chain" } else { "persistent" })
+        f.write_str(match self {
+            KdSchedule::Chain => "chain",
+            KdSchedule::Persistent => "persistent",
+            KdSchedule::AcrossLevels => "across-levels",
+        })
     }
 }
 
@@ -140,6 +148,9 @@ pub struct KdEstimate {
     pub subtree_references: f32,
     /// Subtrees.
     pub subtrees: f32,
+    /// Of a build by [`KdSchedule::AcrossLevels`], what tasks, nodes and subtrees take of its arena at a time: in references, of 32
+    /// bytes each. The others have none.
+    pub arena: f32,
 }
 
 impl KdEstimate {
@@ -152,8 +163,12 @@ impl KdEstimate {
             cut_references: 3.0,
             subtree_references: 6.0,
             subtrees: 8.0 / exact as f32,
+            arena: KdEstimate::ARENA,
         }
     }
+
+    /// [`KdEstimate::arena`] of a scene of which nothing is known.
+    const ARENA: f32 = 6.0;
 }
 
 /// What a build needed, in the scratch memory at [`KdBuilder::report_range`] when it has run.
@@ -176,7 +191,18 @@ pub struct KdReport {
     pub subtrees: u32,
     /// One more than the level that was split no further for want of room, or 0. What the levels below it would have needed is not
     /// known: a build by [`KdReport::estimate`] comes farther, and reports it.
+    ///
+    /// Of a build by [`KdSchedule::AcrossLevels`] 1 for want of room: then the counts above are what there was room for, of what was
+    /// short, and half of that of other things. It has no `level_references`; its `cut_references` are those of leaves outside of
+    /// subtrees.
     pub ended: u32,
+    /// References of the arena that a build by [`KdSchedule::AcrossLevels`] has used. The number depends on which worker was first.
+    pub arena: u32,
+    /// Times that a workgroup took a task, or chunks of one, out of a pool: N_R in the tables of Papay 2025. A chain has as many
+    /// tasks, and no pool.
+    pub retrievals: u32,
+    /// Steps of tasks that a workgroup went on with by itself instead: N_SR there. 0 by levels.
+    pub skipped_retrievals: u32,
 }
 
 impl KdReport {
@@ -192,6 +218,7 @@ impl KdReport {
             cut_references: each(self.cut_references),
             subtree_references: each(self.subtree_references),
             subtrees: each(self.subtrees),
+            arena: if self.arena == 0 { KdEstimate::ARENA } else { each(self.arena) * across::MARGIN },
         }
     }
 }
@@ -211,11 +238,11 @@ pub struct KdBuilder {
 pub(super) struct KdShape {
     pub workgroup: u32,
     /// Invocations of a workgroup that has a subtree, or little else than one subgroup can do.
-    narrow: u32,
+    pub narrow: u32,
     items: u32,
     pub groups: u32,
     /// Workgroups that build subtrees.
-    subtree_groups: u32,
+    pub subtree_groups: u32,
     exact_reciprocals: bool,
 }
 
@@ -239,11 +266,18 @@ pub(super) struct BuildRoom {
 }
 
 /// As `glsl/kdtree/` has them.
-const STATE_BYTES: u64 = 3584;
+pub(super) const STATE_BYTES: u64 = 3584;
 const _: () = assert!(KD_STATE_BYTES <= MERGE_AT && MERGE_AT + KD_MERGE_BYTES <= STATE_BYTES);
 const REPORT_AT: u64 = size_of::<task_pool::State>() as u64;
 const REFERENCE_BYTES: u64 = 28;
 const TASK_BYTES: u64 = 60;
+/// What a workgroup has for a subtree of up to `exact` references.
+pub(super) const fn stack_bytes(exact: u64) -> u64 {
+    36 * MAX_DEPTH
+        + REFERENCE_BYTES * exact * MAX_DEPTH
+        + size_of::<KdNode>() as u64 * (MOST_NODES + 2)
+        + 4 * (MOST_NODES / 2 + 2) * exact
+}
 pub(super) const TILE: u32 = 256;
 const SUMS_BYTES: u64 = 36;
 const SUBTREE_BYTES: u64 = 40;
@@ -254,8 +288,15 @@ pub const MAX_COUNT: u32 = 1 << 27;
 
 impl BuildRoom {
     pub fn of(options: &KdOptions, count: u32, chunk: u32) -> BuildRoom {
-        let KdEstimate { level_references, level_nodes, subtree_nodes, cut_references, subtree_references, subtrees } =
-            options.estimate.unwrap_or(KdEstimate::for_exact(options.exact));
+        let KdEstimate {
+            level_references,
+            level_nodes,
+            subtree_nodes,
+            cut_references,
+            subtree_references,
+            subtrees,
+            ..
+        } = options.estimate.unwrap_or(KdEstimate::for_exact(options.exact));
         // A little more where a scene is small, and what the layout can name at most.
         let each = |of_each: f32, at_least: u32, most: u64| {
             let wanted = (f64::from(of_each.max(0.0)) * f64::from(count)).ceil() as u64 + u64::from(at_least);
@@ -293,6 +334,10 @@ impl KdShape {
             let groups = options.workgroups.unwrap_or(most(tuning.groups));
             return KdShape { workgroup: narrow, groups, subtree_groups: groups, ..KdShape::with(narrow, tuning) };
         }
+        let subtree_groups = match schedule {
+            KdSchedule::AcrossLevels => options.workgroups.unwrap_or(subtree_groups),
+            _ => subtree_groups,
+        };
         KdShape { narrow, groups: most(tuning.groups), subtree_groups, ..KdShape::with(tuning.group.max(2), tuning) }
     }
 
@@ -309,7 +354,7 @@ impl KdShape {
 
     fn is_narrow(shader: &Shader) -> bool {
         let narrow = [&shaders::KDTREE_BUILDER_SUBTREES, &shaders::KDTREE_BUILDER_PLACE, &shaders::KDTREE_MERGE_GATHER];
-        narrow.contains(&shader)
+        narrow.contains(&shader) || across::SHADERS.contains(&shader)
     }
 
     /// Workgroups of `shader` where others of the phase have `groups`: as many invocations, as far as each workgroup has memory for
@@ -334,12 +379,8 @@ impl KdShape {
     pub fn scratch(&self, options: &KdOptions, room: &BuildRoom) -> u64 {
         let BuildRoom { level_references, tasks, chunks, subtrees, level_nodes, nodes, references, .. } = *room;
         let of = |count: u32, bytes: u64| u64::from(count) * bytes;
-        let exact = u64::from(options.exact);
         let counters = of(level_references / self.chunk() + 1, 4 * (6 * u64::from(options.bins) + 1));
-        let stack = 36 * MAX_DEPTH
-            + REFERENCE_BYTES * exact * MAX_DEPTH
-            + size_of::<KdNode>() as u64 * (MOST_NODES + 2)
-            + 4 * (MOST_NODES / 2 + 2) * exact;
+        let stack = stack_bytes(options.exact.into());
         let tiles = |count: u32| count.div_ceil(TILE);
         let scratch = STATE_BYTES
             + of(level_references, 2 * REFERENCE_BYTES + 4)
@@ -432,7 +473,10 @@ impl KdBuilder {
         }
         let schedule = options.schedule_on(context);
         let shape = KdShape::of(context, options, primitive_count, schedule);
-        let room = BuildRoom::of(options, primitive_count, shape.chunk());
+        let room = match schedule {
+            KdSchedule::AcrossLevels => across::room(options, primitive_count, &shape),
+            _ => BuildRoom::of(options, primitive_count, shape.chunk()),
+        };
         Ok(KdBuilder { options: *options, schedule, count: primitive_count, shape, room })
     }
 
@@ -446,9 +490,13 @@ impl KdBuilder {
         self.count
     }
 
-    /// Bytes of the structure and of the scratch memory: exactly what [`KdBuilder::record`] uses.
+    /// Bytes of the structure and of the scratch memory: exactly what [`KdBuilder::record`] uses. A build by
+    /// [`KdSchedule::AcrossLevels`] that is given more scratch memory has so much more for what it takes as it goes.
     pub fn sizes(&self) -> Sizes {
-        let scratch = self.shape.scratch(&self.options, &self.room);
+        let scratch = match self.schedule {
+            KdSchedule::AcrossLevels => across::scratch(&self.options, &self.room),
+            _ => self.shape.scratch(&self.options, &self.room),
+        };
         Sizes { structure: self.header().offsets().bytes, scratch, alignment: 16 }
     }
 
@@ -477,7 +525,8 @@ impl KdBuilder {
     ///
     /// Before, the caller makes the input visible to compute shaders. After, it places a barrier from compute shader writes to
     /// whatever reads the structure or the report, or writes the scratch memory. Labels: `encode`; `subtrees`, `bin`,
-    /// `classify`, `scan` and `distribute` of each level; `place`. Or `build` where the schedule is persistent.
+    /// `classify`, `scan` and `distribute` of each level; `place`. Or `build` where the schedule is persistent; or `encode`, `pool`
+    /// and `place` across levels, where `pool` is the thesis' T_TP.
     ///
     /// # Errors
     /// The memory is too small; the input has another number of triangles or geometries than the builder; a pipeline could not
@@ -485,8 +534,15 @@ impl KdBuilder {
     pub fn record(&self, recorder: &mut Recorder<'_>, input: &Input, structure: Region, scratch: Region) -> Result<()> {
         let sizes = self.sizes();
         let structure = structure.checked("memory for a kd-tree", sizes.structure, sizes.alignment)?;
-        let scratch = scratch.checked("scratch memory for a kd-tree", sizes.scratch, sizes.alignment)?;
-        recorder.chains(&[self.steps(input, structure, scratch)?])
+        let scratch_at = scratch.checked("scratch memory for a kd-tree", sizes.scratch, sizes.alignment)?;
+        if self.schedule == KdSchedule::AcrossLevels {
+            let bytes = if scratch.is_unbounded() { sizes.scratch } else { scratch.bytes };
+            let room = across::grown(&self.options, &self.room, bytes);
+            let arguments =
+                arguments::KdBuild { reference_capacity: room, ..self.arguments(input, structure, scratch_at)? };
+            return recorder.chains(&[across::steps(&self.shape, &self.options, input, &arguments)]);
+        }
+        recorder.chains(&[self.steps(input, structure, scratch_at)?])
     }
 
     fn arguments(&self, input: &Input, structure: u64, scratch: u64) -> Result<arguments::KdBuild> {

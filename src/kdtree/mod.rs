@@ -11,6 +11,7 @@
 //! [`merge`] merges the triangles of objects that move into the tree of what stands still, and takes them out again.
 //! [`crate::trace::twin::kd`] finds the hits of rays in it.
 
+pub mod across;
 pub mod builder;
 pub mod layout;
 pub mod merge;

@@ -19,6 +19,8 @@ use hedgerow::trace::twin::kd as kd_host;
 use hedgerow_lab::device::Buffer;
 
 const SCHEDULES: [KdSchedule; 2] = [KdSchedule::Chain, KdSchedule::Persistent];
+/// Of builds; a merge has no other.
+const BUILDS: [KdSchedule; 3] = [KdSchedule::Chain, KdSchedule::Persistent, KdSchedule::AcrossLevels];
 
 fn with(schedule: KdSchedule) -> KdOptions {
     KdOptions { schedule: Some(schedule), estimate: Some(PLENTY), ..KdOptions::DEFAULT }
@@ -58,7 +60,7 @@ pub fn builds_and_hits_are_those_of_the_host() {
     for mesh in meshes() {
         let expected = on_host(&mesh);
         let (input, _memory) = uploaded(&mesh);
-        for schedule in SCHEDULES {
+        for schedule in BUILDS {
             let structure = built(&input, schedule);
             assert_same(&structure, structure.bytes(), &expected, &format!("{} {schedule}", mesh.0));
         }

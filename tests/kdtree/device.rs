@@ -1,4 +1,5 @@
-//! kd-trees built on the device equal those of the host, by the chain and by any number of persistent workgroups.
+//! kd-trees built on the device equal those of the host, by the chain and by any number of persistent workgroups, level by level and
+//! across levels.
 
 use crate::common::corpus::{self, Mesh};
 use crate::common::device;
@@ -12,6 +13,9 @@ use hedgerow::gpu::Region;
 use hedgerow::kdtree::builder::{KdBuilder, KdEstimate, KdOptions, KdReport, KdSchedule};
 use hedgerow::kdtree::layout::{KdHeader, KdTree};
 use hedgerow::kdtree::twin;
+
+/// The schedules with a pool.
+const POOLS: [KdSchedule; 2] = [KdSchedule::Persistent, KdSchedule::AcrossLevels];
 
 fn on_host((name, positions, triangles): &Mesh, options: &KdOptions) -> KdTree {
     twin::builder::build(positions, triangles, options).unwrap_or_else(|error| panic!("{name}: {error}"))
@@ -28,9 +32,15 @@ fn built((_, positions, triangles): &Mesh, options: &KdOptions) -> (KdTree, KdRe
 }
 
 fn built_of(input: &Input, options: &KdOptions) -> (KdTree, KdReport) {
+    built_with(input, options, 0)
+}
+
+/// Given so many bytes of scratch memory more than the builder asks for.
+fn built_with(input: &Input, options: &KdOptions, more_scratch: u64) -> (KdTree, KdReport) {
     let device = device();
     let builder = KdBuilder::new(device, options, input.primitive_count).expect("options that can be used");
-    let sizes = builder.sizes();
+    let mut sizes = builder.sizes();
+    sizes.scratch += more_scratch;
     // Whatever was there before changes nothing.
     let garbage = |bytes: u64| vec![0xA5u8; bytes as usize];
     let buffer = |name: &str, bytes: u64| device.buffer(name, bytes).expect("memory");
@@ -83,7 +93,7 @@ fn the_chain_gives_the_bytes_of_the_host() {
     }
 }
 
-/// As one geometry and as several, by both schedules.
+/// As one geometry and as several, by every schedule.
 #[track_caller]
 fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
     // Each triangle is as large as all of them.
@@ -94,6 +104,7 @@ fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
         cut_references: 200.0,
         subtree_references: 400.0,
         subtrees: 200.0,
+        arena: 800.0,
     };
     let with = KdOptions { estimate: Some(estimate), ..KdOptions::DEFAULT };
     let corners = geometries.iter().flat_map(|g| g.view().corners().collect::<Vec<_>>());
@@ -114,7 +125,7 @@ fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
     let geometry_count = records.len() as u32;
     let several = Source::Several { records: buffer.address(), count: geometry_count };
     for source in [several].into_iter().chain((records.len() == 1).then(|| Source::One(records[0]))) {
-        for schedule in [KdSchedule::Chain, KdSchedule::Persistent] {
+        for schedule in [KdSchedule::Chain, KdSchedule::Persistent, KdSchedule::AcrossLevels] {
             let options = KdOptions { schedule: Some(schedule), geometry_count, ..with };
             let (got, report) = built_of(&Input { source, primitive_count: first }, &options);
             assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
@@ -147,12 +158,77 @@ fn every_format_and_several_geometries_give_the_bytes_of_the_host() {
 fn any_number_of_persistent_workgroups_gives_the_bytes_of_the_host() {
     for mesh in meshes() {
         let expected = on_host(&mesh, &KdOptions::DEFAULT);
-        for workgroups in [1, 2, 7, 64, 1024] {
-            let (schedule, workgroups) = (Some(KdSchedule::Persistent), Some(workgroups));
-            let options = KdOptions { schedule, workgroups, estimate: Some(PLENTY), ..KdOptions::DEFAULT };
-            assert_same(&built(&mesh, &options).0, &expected, &format!("{}, {workgroups:?} workgroups", mesh.0));
+        for (schedule, workgroups) in POOLS.into_iter().flat_map(|pool| [1, 2, 7, 64, 1024].map(|of| (pool, of))) {
+            let options = KdOptions {
+                schedule: Some(schedule),
+                workgroups: Some(workgroups),
+                estimate: Some(PLENTY),
+                ..KdOptions::DEFAULT
+            };
+            let what = format!("{}, {schedule}, {workgroups} workgroups", mesh.0);
+            let (got, report) = built(&mesh, &options);
+            assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{what}: {report:?}");
+            assert_same(&got, &expected, &what);
         }
     }
+}
+
+#[test]
+fn across_levels_bins_and_exact_splits_give_the_bytes_of_the_host() {
+    for mesh in meshes() {
+        for (bins, exact) in [(7, 4), (32, 64), (256, 5)] {
+            let schedule = Some(KdSchedule::AcrossLevels);
+            let options = KdOptions { bins, exact, schedule, estimate: Some(PLENTY), ..KdOptions::DEFAULT };
+            let what = format!("{} bins {bins} exact {exact}", mesh.0);
+            let (got, report) = built(&mesh, &options);
+            assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{what}: {report:?}");
+            assert_same(&got, &on_host(&mesh, &options), &what);
+        }
+    }
+}
+
+/// What is counted of the pool: every chunk of a task that workers share is taken out of it, or is the last of a phase that whoever
+/// ended the phase before went on with.
+#[test]
+fn across_levels_the_report_counts_retrievals_and_those_that_were_skipped() {
+    let mesh = corpus::random("random 9000", 9000, [-0.5; 3], [1.0; 3]);
+    let options = KdOptions { schedule: Some(KdSchedule::AcrossLevels), ..KdOptions::DEFAULT };
+    let (tree, report) = built(&mesh, &options);
+    let by_one = built(&mesh, &KdOptions { workgroups: Some(1), ..options }).1;
+    for report in [&report, &by_one] {
+        // Each cell above subtrees takes three steps, and each subtree one; cells that are shared take more.
+        let steps = report.retrievals + report.skipped_retrievals;
+        assert!(steps >= 2 * report.level_nodes - report.subtrees, "{report:?}");
+        assert!(report.retrievals > 0 && report.skipped_retrievals > report.retrievals, "{report:?}");
+        assert_eq!(report.level_nodes + report.subtree_nodes, tree.header.node_count, "{report:?}");
+        assert_eq!(report.cut_references + report.subtree_references, tree.header.reference_count, "{report:?}");
+        assert!(report.arena > 9000, "{report:?}");
+    }
+    // Nobody waits for a worker that is alone.
+    let again = built(&mesh, &KdOptions { workgroups: Some(1), ..options }).1;
+    assert_eq!(by_one, again, "one worker does the same each time");
+}
+
+/// An arena grows into what the caller gave, beyond what the builder has asked for.
+#[test]
+fn across_levels_a_build_takes_what_it_needs_of_the_memory_that_it_is_given() {
+    let mesh = corpus::random("random 3000", 3000, [-0.5; 3], [1.0; 3]);
+    let (_, positions, triangles) = &mesh;
+    let vertices = device().upload("positions", positions).expect("memory");
+    let indices = device().upload("indices", triangles).expect("memory");
+    let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), 3000);
+    let schedule = Some(KdSchedule::AcrossLevels);
+    let plenty = KdOptions { schedule, estimate: Some(PLENTY), ..KdOptions::DEFAULT };
+    let needed = built_of(&input, &plenty).1.arena;
+    let little = KdOptions { estimate: Some(KdEstimate { arena: 1.0, ..PLENTY }), ..plenty };
+    let (cut, report) = built_of(&input, &little);
+    assert_ne!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
+    assert!(report.arena < needed, "{report:?}");
+    cut.validate().expect("a valid tree");
+    assert!(cut.header.reference_count < on_host(&mesh, &plenty).header.reference_count, "some cells are leaves");
+    let (got, report) = built_with(&input, &little, 64 * u64::from(needed));
+    assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
+    assert_same(&got, &on_host(&mesh, &plenty), "with more memory");
 }
 
 /// Whatever there is too little of, the tree is valid, the status says so, and the report says what would have sufficed.
@@ -169,8 +245,16 @@ fn what_is_out_of_room_is_a_leaf_and_the_report_says_what_would_suffice() {
         KdEstimate { subtree_references: 1.0, ..plenty },
         KdEstimate { subtrees: 0.0, ..plenty },
     ];
-    for estimate in short {
-        let mut options = KdOptions { estimate: Some(estimate), ..KdOptions::DEFAULT };
+    let of_levels = short.map(|estimate| (None, estimate));
+    let across = [
+        KdEstimate { arena: 1.0, ..plenty },
+        KdEstimate { level_nodes: 0.0, subtree_nodes: 0.1, ..plenty },
+        KdEstimate { cut_references: 0.0, subtree_references: 0.0, ..plenty },
+        KdEstimate { arena: 0.0, level_nodes: 0.0, subtree_nodes: 0.0, ..plenty },
+    ];
+    let across = across.map(|estimate| (Some(KdSchedule::AcrossLevels), estimate));
+    for (schedule, estimate) in of_levels.into_iter().chain(across) {
+        let mut options = KdOptions { schedule, estimate: Some(estimate), ..KdOptions::DEFAULT };
         let (mut builds, mut should_suffice) = (0, false);
         loop {
             let (got, report) = built(&mesh, &options);
@@ -191,14 +275,56 @@ fn what_is_out_of_room_is_a_leaf_and_the_report_says_what_would_suffice() {
     }
 }
 
+/// The same across levels. Whether a tree is whole depends on the memory of the structure alone, not on who was first.
+#[test]
+fn across_levels_whatever_is_short_by_little_gives_a_valid_tree() {
+    let sphere = corpus::soup("sphere", placed(&icosphere(4), 1.0, [0.1, 0.2, 0.3]));
+    let schedule = Some(KdSchedule::AcrossLevels);
+    for mesh in [sphere, corpus::random("random 9000", 9000, [-0.5; 3], [1.0; 3])] {
+        let plenty = KdOptions { schedule, estimate: Some(PLENTY), ..KdOptions::DEFAULT };
+        let expected = on_host(&mesh, &plenty);
+        let header = &expected.header;
+        let each = |count: u32| count as f32 / header.primitive_count as f32;
+        let enough = built(&mesh, &plenty).1.estimate(header.primitive_count);
+        // Of nodes and references, builders add a few.
+        let of_nodes = |factor: f32| (each(header.node_count) * factor, header.node_count as f32 * factor + 256.0);
+        for factor in [0.98, 0.95, 0.9, 0.8, 0.5, 0.2] {
+            let (nodes, node_room) = of_nodes(factor);
+            let references = each(header.reference_count) * factor;
+            let reference_room = header.reference_count as f32 * factor + 512.0;
+            let cases = [
+                (KdEstimate { level_nodes: nodes, subtree_nodes: 0.0, ..enough }, node_room < header.node_count as f32),
+                (
+                    KdEstimate { cut_references: references, subtree_references: 0.0, ..enough },
+                    reference_room < header.reference_count as f32,
+                ),
+                (KdEstimate { arena: enough.arena * factor, ..enough }, false),
+            ];
+            for (estimate, is_short) in cases {
+                let what = format!("{} {estimate:?}", mesh.0);
+                let (got, report) = built(&mesh, &KdOptions { estimate: Some(estimate), ..plenty });
+                got.validate().unwrap_or_else(|error| panic!("{what}: {error}"));
+                assert_eq!(got.header.status, report.status, "{what}");
+                if report.status & status::OUT_OF_ROOM == 0 {
+                    assert!(!is_short, "{what}: {report:?}");
+                    assert_same(&got, &expected, &what);
+                }
+            }
+        }
+    }
+}
+
 /// A little less of one thing, or much less: other trees, none of them wrong.
 #[test]
 fn whatever_is_short_by_little_gives_a_valid_tree() {
     let sphere = corpus::soup("sphere", placed(&icosphere(4), 1.0, [0.1, 0.2, 0.3]));
     for mesh in [sphere, corpus::random("random 9000", 9000, [-0.5; 3], [1.0; 3])] {
         let expected = on_host(&mesh, &KdOptions::DEFAULT);
-        let enough =
-            built(&mesh, &KdOptions { estimate: Some(PLENTY), ..KdOptions::DEFAULT }).1.estimate(mesh.2.len() as u32);
+        // Across levels there are other things.
+        let schedule =
+            (KdOptions::DEFAULT.schedule_on(device()) == KdSchedule::AcrossLevels).then_some(KdSchedule::Chain);
+        let with = KdOptions { schedule, ..KdOptions::DEFAULT };
+        let enough = built(&mesh, &KdOptions { estimate: Some(PLENTY), ..with }).1.estimate(mesh.2.len() as u32);
         let fields: [fn(&mut KdEstimate) -> &mut f32; 6] = [
             |e| &mut e.level_references,
             |e| &mut e.level_nodes,
@@ -212,7 +338,7 @@ fn whatever_is_short_by_little_gives_a_valid_tree() {
                 let mut estimate = enough;
                 *field(&mut estimate) *= factor;
                 let what = format!("{} {estimate:?}", mesh.0);
-                let (got, report) = built(&mesh, &KdOptions { estimate: Some(estimate), ..KdOptions::DEFAULT });
+                let (got, report) = built(&mesh, &KdOptions { estimate: Some(estimate), ..with });
                 got.validate().unwrap_or_else(|error| panic!("{what}: {error}"));
                 if report.status & status::OUT_OF_ROOM == 0 {
                     assert_same(&got, &expected, &what);
@@ -223,7 +349,7 @@ fn whatever_is_short_by_little_gives_a_valid_tree() {
 }
 
 /// Builds one after the other in the same memory, by all numbers of workgroups up to 1,024.
-fn many_builds(builds: u32) {
+fn many_builds(builds: u32, schedule: KdSchedule) {
     let device = device();
     let mesh = corpus::random("random 400", 400, [-0.5; 3], [1.0; 3]);
     let expected = on_host(&mesh, &KdOptions::DEFAULT);
@@ -232,8 +358,7 @@ fn many_builds(builds: u32) {
     let indices = device.upload("indices", triangles).expect("memory");
     let input = Input::mesh(vertices.address(), positions.len() as u32, indices.address(), 400);
     let builder = |workgroups| {
-        let options =
-            KdOptions { schedule: Some(KdSchedule::Persistent), workgroups: Some(workgroups), ..KdOptions::DEFAULT };
+        let options = KdOptions { schedule: Some(schedule), workgroups: Some(workgroups), ..KdOptions::DEFAULT };
         KdBuilder::new(device, &options, 400).expect("options that can be used")
     };
     let most = builder(1024).sizes();
@@ -246,19 +371,27 @@ fn many_builds(builds: u32) {
             .expect("a build");
         let bytes = structure.read::<u8>(builder.sizes().structure as usize);
         let got = KdTree::from_bytes(&bytes).expect("a kd-tree");
-        assert_same(&got, &expected, &format!("build {build}"));
+        assert_same(&got, &expected, &format!("{schedule}, build {build}"));
     }
 }
 
 #[test]
 fn builds_in_a_row_give_the_same_bytes() {
-    many_builds(300);
+    for pool in POOLS {
+        many_builds(300, pool);
+    }
 }
 
 #[test]
 #[ignore = "ten thousand builds take more than a minute; the same with 300 is not ignored"]
 fn ten_thousand_builds_in_a_row_give_the_same_bytes() {
-    many_builds(10_000);
+    many_builds(10_000, KdSchedule::Persistent);
+}
+
+#[test]
+#[ignore = "ten thousand builds take more than a minute; the same with 300 is not ignored"]
+fn ten_thousand_builds_across_levels_give_the_same_bytes() {
+    many_builds(10_000, KdSchedule::AcrossLevels);
 }
 
 #[test]

@@ -69,6 +69,15 @@ pub struct BuildRecord {
     /// Greatest CPU time of a run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cpu_max_ms: Option<f64>,
+    /// Of builds by a task pool, median milliseconds in it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pool_ms: Option<f64>,
+    /// Times that a worker took a task, or chunks of one, out of the pool: the median.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub retrievals: Option<u64>,
+    /// Steps of tasks that a worker went on with by itself: the median.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skipped_retrievals: Option<u64>,
 }
 
 impl From<&BuildRecord> for Spread {

@@ -2,7 +2,7 @@
 
 use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::kd_device::KdDevice;
-use super::{BuildRun, KD_TREE, Subject};
+use super::{BuildRun, InPool, KD_TREE, Subject};
 use crate::device::Device;
 use crate::measure::record;
 use crate::scene::Mesh;
@@ -105,7 +105,16 @@ impl<'a> KdGpu<'a> {
                 None => phases.push(phase),
             }
         }
-        Ok(BuildRun::of(phases))
+        // By levels, the pool has all of it.
+        let in_pool =
+            phases.iter().find(|phase| ["pool", "build"].contains(&phase.name)).map(|phase| phase.milliseconds);
+        let report = self.place.report();
+        let pool = in_pool.map(|milliseconds| InPool {
+            milliseconds,
+            retrievals: report.retrievals,
+            skipped: report.skipped_retrievals,
+        });
+        Ok(BuildRun { pool, ..BuildRun::of(phases) })
     }
 }
 

@@ -46,6 +46,19 @@ pub struct BuildRun {
     pub phases: Vec<gpu::Phase>,
     /// What it took beside time, where it ran on the CPU.
     pub on_cpu: Option<OnCpu>,
+    /// What its task pool did, where it has one.
+    pub pool: Option<InPool>,
+}
+
+/// What a task pool did in a build.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InPool {
+    /// Milliseconds in the pool.
+    pub milliseconds: f64,
+    /// Times that a worker took something out of it.
+    pub retrievals: u32,
+    /// Steps that a worker went on with by itself.
+    pub skipped: u32,
 }
 
 /// What a build on the CPU took beside wall-clock time.
@@ -60,12 +73,13 @@ pub struct OnCpu {
 impl BuildRun {
     /// One whose phases are not known.
     pub fn whole(milliseconds: f64) -> BuildRun {
-        BuildRun { milliseconds, phases: Vec::new(), on_cpu: None }
+        BuildRun { milliseconds, phases: Vec::new(), on_cpu: None, pool: None }
     }
 
     /// One of these phases.
     pub fn of(phases: Vec<gpu::Phase>) -> BuildRun {
-        BuildRun { milliseconds: phases.iter().map(|phase| phase.milliseconds).sum(), phases, on_cpu: None }
+        let milliseconds = phases.iter().map(|phase| phase.milliseconds).sum();
+        BuildRun { milliseconds, phases, on_cpu: None, pool: None }
     }
 }
 

@@ -46,6 +46,7 @@ impl MergeEstimate {
             cut_references: 32.0,
             subtree_references: 48.0,
             subtrees: 4.0,
+            arena: 0.0,
         },
     };
     /// The same for objects with trees.
@@ -103,6 +104,7 @@ impl MergeReport {
                 cut_references: each(self.cut_references),
                 subtree_references: each(self.subtree_references),
                 subtrees: each(self.subtrees),
+                arena: 0.0,
             },
         }
     }

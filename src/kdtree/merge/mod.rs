@@ -147,7 +147,11 @@ impl Merger {
                 )));
             }
         }
-        let schedule = options.build.schedule_on(context);
+        // Marked leaves have few references each: all that a pool across levels could do is build them, which the other does.
+        let schedule = match options.build.schedule_on(context) {
+            KdSchedule::AcrossLevels => KdSchedule::Persistent,
+            schedule => schedule,
+        };
         let shape = KdShape::of(context, &options.build, most.triangles.saturating_mul(4), schedule);
         let plan = MergePlan::of(&options.estimate, most.triangles);
         let chunk = shape.chunk();

@@ -13,7 +13,7 @@ use crate::measure::statistics::{Spread, in_turn, mean_work};
 use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::Scene;
 use crate::subjects::builders::Spec;
-use crate::subjects::{BuildRun, Subject};
+use crate::subjects::{BuildRun, InPool, Subject};
 use crate::{Error, Result};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::Bvh2;
@@ -267,6 +267,10 @@ fn build_of(timer: &str, runs: &[BuildRun]) -> BuildRecord {
     };
     let on_cpu: Vec<f64> = runs.iter().filter_map(|run| Some(run.on_cpu?.milliseconds)).collect();
     let cpu = Spread::of(&on_cpu);
+    let of_pool = |figure: fn(&InPool) -> f64| {
+        Spread::of(&runs.iter().filter_map(|run| Some(figure(run.pool.as_ref()?))).collect::<Vec<_>>())
+            .map(|s| s.median)
+    };
     BuildRecord {
         runs: spread.runs,
         median_ms: spread.median,
@@ -278,6 +282,9 @@ fn build_of(timer: &str, runs: &[BuildRun]) -> BuildRecord {
         cpu_median_ms: cpu.map(|cpu| cpu.median),
         cpu_min_ms: cpu.map(|cpu| cpu.min),
         cpu_max_ms: cpu.map(|cpu| cpu.max),
+        pool_ms: of_pool(|pool| pool.milliseconds),
+        retrievals: of_pool(|pool| pool.retrievals.into()).map(|n| n as u64),
+        skipped_retrievals: of_pool(|pool| pool.skipped.into()).map(|n| n as u64),
     }
 }
 
@@ -488,6 +495,7 @@ mod tests {
     #[test]
     fn medians_of_builds_are_taken_phase_by_phase() {
         let run = |a, b| BuildRun {
+            pool: Some(InPool { milliseconds: b, retrievals: 2 * a as u32, skipped: 7 }),
             on_cpu: Some(OnCpu { threads: 2, milliseconds: 2.0 * b }),
             ..BuildRun::of(vec![
                 hedgerow::gpu::Phase { name: "sort", milliseconds: a },
@@ -500,5 +508,6 @@ mod tests {
         assert_eq!(medians, [("sort", 2.0), ("hierarchy", 5.0)]);
         assert_eq!((build.threads, build.cpu_median_ms), (Some(2), Some(10.0)));
         assert_eq!((build.cpu_min_ms, build.cpu_max_ms), (Some(8.0), Some(18.0)));
+        assert_eq!((build.pool_ms, build.retrievals, build.skipped_retrievals), (Some(5.0), Some(4), Some(7)));
     }
 }

@@ -19,6 +19,7 @@ pub const PLENTY: KdEstimate = KdEstimate {
     cut_references: 20.0,
     subtree_references: 20.0,
     subtrees: 20.0,
+    arena: 60.0,
 };
 
 /// Room for objects that lie in the densest part of a kd-tree.
@@ -33,6 +34,7 @@ pub const PLENTY_TO_MERGE: MergeEstimate = MergeEstimate {
         cut_references: 400.0,
         subtree_references: 400.0,
         subtrees: 60.0,
+        arena: 0.0,
     },
 };
 

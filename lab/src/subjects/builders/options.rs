@@ -40,7 +40,7 @@ pub(super) const ORDER: BuilderOption = option("order", "distance or octant (of 
 pub(super) const OPEN: BuilderOption =
     option("open", "area, or rays (of width=4, 8 or 8q): wide nodes are opened where most rays of the scene go in");
 pub(super) const SCHEDULE: BuilderOption = option("schedule", "chain, persistent or workgroup");
-pub(super) const KD_SCHEDULE: BuilderOption = option("schedule", "chain or persistent");
+pub(super) const KD_SCHEDULE: BuilderOption = option("schedule", "chain, persistent or across-levels");
 pub(super) const SPLIT: BuilderOption = option(
     "split",
     "a number from 0 to 1: splits of large triangles at most, as a part of all; with /N behind: of each at most N",
@@ -231,7 +231,8 @@ impl Spec {
         let workgroups = self.parsed(&WORKGROUPS)?;
         let bins = self.parsed(&BINS)?.unwrap_or(default.bins);
         let exact = self.parsed(&EXACT)?.unwrap_or(default.exact);
-        let schedules = [("chain", KdSchedule::Chain), ("persistent", KdSchedule::Persistent)];
+        let known = [KdSchedule::Chain, KdSchedule::Persistent, KdSchedule::AcrossLevels];
+        let schedules = [("chain", known[0]), ("persistent", known[1]), ("across-levels", known[2])];
         let schedule = self.choice(&KD_SCHEDULE, &schedules)?;
         let options = KdOptions { bins, exact, costs, schedule, workgroups, ..default };
         options.check()?;

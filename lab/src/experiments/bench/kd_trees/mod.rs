@@ -4,7 +4,9 @@
 pub mod published;
 
 use crate::measure::record::{Record, TraceRecord};
+use crate::report::chart::Chart;
 use crate::report::columns;
+use crate::report::document;
 use crate::report::elements::number;
 use crate::report::names::{short, slug};
 use crate::report::numbers::{count, grouped, one_decimal, three_digits, two_decimals};
@@ -37,7 +39,7 @@ fn ratio(a: Option<u64>, b: Option<u64>) -> Option<f64> {
     a.zip(b.filter(|&b| b > 0)).map(|(a, b)| a as f64 / b as f64)
 }
 
-const TREE: [Figure<Record>; 9] = [
+const TREE: [Figure<Record>; 12] = [
     Figure::new(["nodes", "", "nodes"], count, |r| Some((r.quality.inner? + r.quality.leaves?) as f64)),
     Figure::new(["inner / leaves", "", "inner_to_leaf"], two_decimals, |r| ratio(r.quality.inner, r.quality.leaves)),
     Figure::new(["full / empty", "", "nonempty_to_empty_leaf"], two_decimals, |r| {
@@ -48,6 +50,11 @@ const TREE: [Figure<Record>; 9] = [
     Figure::new(["depth", "mean", "avg_depth"], one_decimal, |r| r.quality.depth_avg),
     Figure::new(["cost", "", "cost"], two_decimals, |r| r.quality.sah),
     Figure::new(["build", "ms", "build_dynamic_ms"], three_digits, |r| Some(r.build.median_ms)),
+    Figure::new(["task pool", "ms", "pool_ms"], three_digits, |r| r.build.pool_ms),
+    Figure::new(["retrievals", "thousands", "retrievals_k"], three_digits, |r| Some(r.build.retrievals? as f64 * 1e-3)),
+    Figure::new(["skipped", "thousands", "skipped_k"], three_digits, |r| {
+        Some(r.build.skipped_retrievals? as f64 * 1e-3)
+    }),
     Figure::new(["memory", "MB", "memory_mb"], three_digits, |r| Some(r.memory.structure_bytes? as f64 * 1e-6)),
 ];
 
@@ -102,12 +109,14 @@ pub fn text(records: &[&Record], published: &Published) -> Option<String> {
 }
 
 /// Both tables for the page.
-pub(crate) fn section(records: &[&Record], published: &Published) -> Markup {
+pub(crate) fn section(records: &[&Record], schedules: Option<&Chart>, published: &Published) -> Markup {
     let ours = of(records);
     html! {
         p {
             "In the tables of Papay 2025, " i { "Efficient ray tracing algorithms exploiting kd-trees on a GPU" } ", appendix D. Nodes count "
-            "leaves that hold nothing, full leaves are the others, and their size is the number of triangles in one."
+            "leaves that hold nothing, full leaves are the others, and their size is the number of triangles in one. The task pool is the "
+            "part of the build that it takes (T_TP); retrievals are tasks and chunks that workers took out of it (N_R), skipped ones steps "
+            "that a worker went on with by itself (N_SR)."
         }
         @if let Some(file) = &published.file {
             p.note { "Below each table, in grey, are the published figures of " code { (file) } ": context, never a result." }
@@ -119,6 +128,10 @@ pub(crate) fn section(records: &[&Record], published: &Published) -> Markup {
             }
         }
         (trees(&ours, &published.rows))
+        @if let Some(chart) = schedules {
+            h3 { "Schedules" }
+            (document::charts(std::slice::from_ref(chart)))
+        }
         @if ours.iter().any(|record| !record.trace.is_empty()) {
             h3 { "Tests and steps" }
             (rays(&ours, &published.rows))

@@ -115,6 +115,10 @@ mod tests {
         assert_eq!((sibenik.scene.as_str(), sibenik.triangles), ("Sibenik", Some(75_284)));
         assert_eq!((sibenik.config.as_str(), sibenik.figure("cost")), ("CPU exact", Some(170.45)));
         assert!(rows.iter().all(|row| row.figure("steps_per_ray").is_some()), "trees and their rays are one row");
+        let with_pool: Vec<&Row> = rows.iter().filter(|row| row.figure("pool_ms").is_some()).collect();
+        assert_eq!(with_pool.len(), 10);
+        let of_pool = ["pool_ms", "retrievals_k", "skipped_k"].map(|figure| with_pool[0].figure(figure));
+        assert_eq!(of_pool, [Some(29.99), Some(206.0), Some(785.0)]);
     }
 
     #[test]

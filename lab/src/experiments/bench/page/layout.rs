@@ -23,13 +23,13 @@ pub(super) fn document<'r>(
     report: &'r Report,
     legend: &Legend,
     scenes: &[SceneCharts<'_>],
-    growth: Option<&Chart>,
+    [schedules, growth]: [Option<&Chart>; 2],
 ) -> Document<'r> {
     let records = report.records();
     let mut sections = vec![Section::new("summary", "Summary", summary(report, &records, legend))];
     sections.extend(scenes.iter().map(|(scene, charts)| scene_section(report, scene, charts, legend)));
     if !kd_trees::of(&records).is_empty() {
-        sections.push(Section::new("kd-trees", "kd-trees", kd_trees::section(&records, &report.published)));
+        sections.push(Section::new("kd-trees", "kd-trees", kd_trees::section(&records, schedules, &report.published)));
     }
     if !report.choices.is_empty() {
         let content = choosing::section(&report.choices, &records);

@@ -120,9 +120,14 @@ impl Report {
             scenes.push((scene, charts.into_iter().flatten().collect()));
         }
         let growth = charts::growth::growth(&records, &legend)?;
+        let schedules = charts::schedules::schedules(&records, &legend)?;
 
-        let charts = scenes.iter().flat_map(|(_, charts)| charts).chain(&growth);
-        layout::document(self, &legend, &scenes, growth.as_ref()).write(folder, &beside::INDEX, charts)?;
+        let charts = scenes.iter().flat_map(|(_, charts)| charts).chain(&schedules).chain(&growth);
+        layout::document(self, &legend, &scenes, [schedules.as_ref(), growth.as_ref()]).write(
+            folder,
+            &beside::INDEX,
+            charts,
+        )?;
         write_pages(folder)
     }
 }

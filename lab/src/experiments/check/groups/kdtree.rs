@@ -22,8 +22,14 @@ fn meshes(cases: &Cases<'_>) -> Vec<Mesh> {
 
 pub fn build(cases: &mut Cases<'_>) {
     let schedules: &[(KdSchedule, Option<u32>)] = match cases.quick {
-        true => &[(KdSchedule::Chain, None), (KdSchedule::Persistent, None)],
-        false => &[(KdSchedule::Chain, None), (KdSchedule::Persistent, Some(1)), (KdSchedule::Persistent, Some(64))],
+        true => &[(KdSchedule::Chain, None), (KdSchedule::Persistent, None), (KdSchedule::AcrossLevels, None)],
+        false => &[
+            (KdSchedule::Chain, None),
+            (KdSchedule::Persistent, Some(1)),
+            (KdSchedule::Persistent, Some(64)),
+            (KdSchedule::AcrossLevels, Some(1)),
+            (KdSchedule::AcrossLevels, Some(64)),
+        ],
     };
     let cuts: &[(u32, u32)] = if cases.quick { &[(32, 32)] } else { &[(128, 32), (7, 4)] };
     for mesh in meshes(cases) {

@@ -3,4 +3,5 @@
 pub mod growth;
 pub mod phases;
 pub mod scatter;
+pub mod schedules;
 pub mod total_time;
