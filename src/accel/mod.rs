@@ -24,8 +24,8 @@
 //! | preference | bottom levels | top levels | build | rays |
 //! | --- | --- | --- | --- | --- |
 //! | `PREFER_FAST_BUILD` | an LBVH by codes of 8 bits less | the same | 1.0 | 1.0 |
-//! | none | H-PLOC, of over 2,048 primitives: of those measured, the least time for a build and ten rays a triangle | an LBVH and a pass of [reinsertion](crate::bvh::reinsertion) | 2.2 | 1.09 |
-//! | `PREFER_FAST_TRACE` | H-PLOC and half a pass of reinsertion | the same as without, and opens instances ([`REBRAID`]) | 7 | 1.15 |
+//! | none | H-PLOC, of over 2,048 primitives: of those measured in nodes of two, the least time for a build and ten rays a triangle | an LBVH and a pass of [reinsertion](crate::bvh::reinsertion) | 2.2 | 1.09 |
+//! | `PREFER_FAST_TRACE` | H-PLOC and half a pass of reinsertion (a whole one: 12 and 1.18) | the same as without, and opens instances ([`REBRAID`]) | 2.2 to 12 | 1.09 to 1.18 |
 //!
 //! What other flags change:
 //!
@@ -84,10 +84,10 @@ pub struct AccelOptions {
     /// an instance far from the others costs them nothing.
     pub top_codes: Option<Codes>,
     /// Whether bottom levels get quantised nodes of eight children ([`crate::bvh::wide`]), where they are not LBVHs and no update is
-    /// allowed. They take less memory; a device's top level may hold them beside others. Queries meet them, and a shader that defines
-    /// `HEDGEROW_WITHOUT_QUANTISED` (`glsl/trace/query_walk.glsl`) leaves them out; of the tracers, those of
-    /// [`crate::trace::wide`] do. On lavapipe rays take 1.6 times as long by them, as invocations at nodes of two, of which top levels
-    /// are, wait for those at nodes of eight: no GPU was measured.
+    /// allowed. They take less memory, and one top level may hold them beside others. Shaders must define `HEDGEROW_QUANTISED` before
+    /// they include `trace/query.glsl`, or their rays pass what is made of such nodes; of the tracers, those of [`crate::trace::wide`]
+    /// meet them. On lavapipe rays take 1.5 times as long by them, as invocations at nodes of two, of which top levels are, wait for those
+    /// at nodes of eight; no GPU was measured.
     pub wide: bool,
     /// Whether calls are checked against what was created and built, as Vulkan's validation would: memory that is too
     /// small or overlaps, misaligned data, updates without the flag or of changed counts. They return an error before anything

@@ -5,4 +5,5 @@
 // needs   one barrier before and after; a fixed workgroup of 64; any subgroup size
 #version 460
 #define WITH_HEDGEROW
+#define HEDGEROW_QUANTISED
 #include "measure/probe.glsl"
