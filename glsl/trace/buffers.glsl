@@ -25,7 +25,8 @@ layout(push_constant, scalar) uniform TraceArguments {
     uint c_i;
 };
 
-bool can_be_traced(Structure structure) {
-    return structure.header.active_count != 0u && (structure.header.status & STATUS_UNUSABLE) == 0u;
+// Whether it is of the kind whose nodes a kernel walks, and there is something in it.
+bool can_be_traced(Structure structure, uint kind) {
+    return structure.header.kind == kind && structure.header.active_count != 0u && (structure.header.status & STATUS_UNUSABLE) == 0u;
 }
 #endif

@@ -110,8 +110,8 @@ const LEVEL_BYTES: u32 = 8;
 /// Structure, rays and memory of a trace, all aligned to 16 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TraceBuffers {
-    /// Address of a `Bvh2`, or of another structure if the tracer takes it. One whose status says that it is too deep or
-    /// unfinished is traced as if it were empty.
+    /// Address of a `Bvh2`, or of another structure if the tracer takes it. One of another kind than the tracer's is traced as if it
+    /// were empty, and so is one whose status says that it is too deep or unfinished.
     pub structure: u64,
     /// [`Ray`] × `count`.
     pub rays: Region,

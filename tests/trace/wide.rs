@@ -11,8 +11,8 @@ use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::wide::Form;
 use hedgerow::bvh::wide::layout::Wide;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
-use hedgerow::gpu::Region;
-use hedgerow::trace::tracer::{Loads, TraceBuffers, TraceShape};
+use hedgerow::gpu::{Recorder, Region};
+use hedgerow::trace::tracer::{self, Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
 use hedgerow::trace::wide::{Order, WideTracer};
@@ -233,6 +233,41 @@ fn of_a_thousand_coincident_triangles_the_first_is_hit() {
     let rays = hard_rays(&corners, 100, 1.0, [0.0; 3], 4);
     for collapse in [Collapse::SAH, Collapse::OFF] {
         assert_all_forms(&tree_with(&corners, collapse), &rays);
+    }
+}
+
+/// A structure of a kind that a kernel does not walk is empty to it: its bytes mean something else.
+#[test]
+fn structures_of_another_kind_are_met_by_no_ray() {
+    let corners = soup(500, 0.2, 3);
+    let tree = tree_of(&corners);
+    let rays = hard_rays(&corners, 500, 1.0, [0.0; 3], 4);
+    assert!(rays.iter().any(|ray| host::trace(&tree, ray, Query::ClosestHit).0.is_some()));
+    let [of_two, of_four, as_bytes] =
+        [tree.to_bytes(), Wide::<[Child; 4]>::of(&tree).to_bytes(), Wide::<QuantisedNode>::of(&tree).to_bytes()];
+    let limits = &device().limits;
+    let mut shapes = vec![TraceShape::of(device()), TraceShape::subgroups(limits)];
+    if limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES {
+        shapes.push(TraceShape::lanes(limits));
+    }
+    let met = |hits: Vec<Hit>| hits.iter().filter(|hit| hit.is_some()).count();
+    for bytes in [&of_four, &as_bytes] {
+        for shape in &shapes {
+            let record =
+                |r: &mut Recorder<'_>, buffers: &TraceBuffers| tracer::record(r, shape, Query::ClosestHit, buffers);
+            let (hits, _) = crate::common::traced(device(), bytes, &rays, false, record).expect("it traces");
+            assert_eq!(met(hits), 0, "{shape:?}");
+        }
+    }
+    for (form, others) in [(Form::Four, [&of_two, &as_bytes]), (Form::EightQuantised, [&of_two, &of_four])] {
+        for tracer in tracers(form) {
+            for bytes in others {
+                let record =
+                    |r: &mut Recorder<'_>, buffers: &TraceBuffers| tracer.record(r, Query::ClosestHit, buffers);
+                let (hits, _) = crate::common::traced(device(), bytes, &rays, false, record).expect("it traces");
+                assert_eq!(met(hits), 0, "{tracer:?}");
+            }
+        }
     }
 }
 

@@ -29,7 +29,7 @@ void step_to(Node node, inout Walk walk) {
 void main() {
     Triangles triangles = triangles_of(structure);
     Child root = structure.header.root;
-    bool usable = can_be_traced(structure);
+    bool usable = can_be_traced(structure, KIND_TRIANGLES);
     uint group_rays = gl_WorkGroupSize.x * rays_each;
     uint next = first + gl_WorkGroupID.x * group_rays + gl_LocalInvocationIndex;
     uint end = min(count, first + (gl_WorkGroupID.x + 1) * group_rays);

@@ -12,7 +12,7 @@ layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 void main() {
     Triangles triangles = triangles_of(structure);
     Child root = structure.header.root;
-    bool usable = can_be_traced(structure);
+    bool usable = can_be_traced(structure, KIND_TRIANGLES);
     uint group_rays = gl_WorkGroupSize.x * rays_each;
     uint next = start + gl_WorkGroupID.x * group_rays + gl_LocalInvocationIndex;
     uint end = min(count, start + (gl_WorkGroupID.x + 1) * group_rays);

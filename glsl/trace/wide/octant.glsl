@@ -18,7 +18,7 @@ void main() {
     Triangles triangles = Triangles(wide_records_at(uvec2(structure), structure.header.node_slots, QUANTISED_NODE_BYTES));
     QuantisedNodes nodes = QuantisedNodes(wide_nodes_at(uvec2(structure)));
     Child root = structure.header.root;
-    bool usable = can_be_traced(structure);
+    bool usable = can_be_traced(structure, KIND_TRIANGLES_8Q);
     uint group_rays = gl_WorkGroupSize.x * rays_each;
     uint next = first + gl_WorkGroupID.x * group_rays + gl_LocalInvocationIndex;
     uint end = min(count, first + (gl_WorkGroupID.x + 1) * group_rays);
