@@ -65,7 +65,7 @@ impl Build {
         counts: Counts,
         primitive_count: u64,
     ) -> Result<Build> {
-        quality::check(flags)?;
+        quality::check(flags, options)?;
         let primitive_count = u32::try_from(primitive_count).unwrap_or(u32::MAX);
         let primitives = given.primitives();
         let capacity = match primitives {

@@ -37,8 +37,15 @@ const HALF_A_PASS: ReinsertionOptions =
     ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds / 2, ..ReinsertionOptions::FAST };
 
 /// # Errors
-/// Unknown flags, or two that exclude each other.
-pub(super) fn check(flags: Flags) -> Result<()> {
+/// Unknown flags, or two that exclude each other; codes that there are not.
+pub(super) fn check(flags: Flags, options: &AccelOptions) -> Result<()> {
+    for (field, codes) in [("bottom_codes", options.bottom_codes), ("top_codes", options.top_codes)] {
+        if let Some(codes) = codes.filter(|codes| codes.with_bounds(codes.bounds) != Some(*codes)) {
+            return Err(Error::Argument(format!(
+                "{field} are {codes:?}, which there are not; take what Codes::with_bits and Codes::with_bounds give"
+            )));
+        }
+    }
     if !KNOWN.contains(flags) {
         return Err(Error::Argument(format!("flags are {flags:?}; take some of {KNOWN:?}")));
     }

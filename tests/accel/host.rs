@@ -5,7 +5,9 @@ use crate::common::device;
 use crate::common::geometries::{MOVED, Owned};
 use crate::common::shapes::{boxes, soup};
 use crate::common::world::Part;
+use hedgerow::accel::{self, AccelOptions, Request};
 use hedgerow::ash::vk;
+use hedgerow::bvh::codes::{Code, CodeBounds, Codes};
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::{self, Header};
 
@@ -58,6 +60,41 @@ fn triangles_of_every_kind_have_the_devices_bytes() {
             let expected = on_the_device(&ours, &on_device, &ranges, flags);
             assert!(on_the_host(&ours, &host, &ranges, flags) == expected, "{} geometries, {flags:?}", parts.len());
         }
+    }
+}
+
+#[test]
+fn codes_that_are_asked_for_are_those_of_both() {
+    let owned = Owned::of(&soup(900, 0.2, 4), VertexFormat::FLOAT3, IndexFormat::U32, 0);
+    let (uploaded, _memory) = owned.upload(0, 0);
+    let on_device = [crate::common::backends::vk_geometry(&uploaded, &owned)];
+    let (host, ranges) = ([at_host_addresses(&owned)], [Range::default().primitive_count(owned.primitive_count)]);
+    let mut all = Vec::new();
+    for codes in [Code::Mc30.full(), Code::Mip9.full(), Code::Emc64VarNoSize.full().with_bits(33)] {
+        let options = AccelOptions { bottom_codes: Some(codes), ..AccelOptions::DEFAULT };
+        let ours = Ours::with_options(device(), options);
+        for flags in [Flags::PREFER_FAST_BUILD, Flags::PREFER_FAST_TRACE] {
+            let expected = on_the_device(&ours, &on_device, &ranges, flags);
+            let header: Header = bytemuck::pod_read_unaligned(&expected[..size_of::<Header>()]);
+            assert_eq!(header.code_bits, codes.bits, "{codes:?}, {flags:?}");
+            assert!(on_the_host(&ours, &host, &ranges, flags) == expected, "{codes:?}, {flags:?}");
+            all.push(expected);
+        }
+    }
+    assert!(all[0] != all[2] && all[2] != all[4], "the codes make no difference");
+}
+
+#[test]
+fn codes_that_there_are_not_are_refused_by_the_fields_name() {
+    let none = Codes { code: Code::Mip6, bounds: CodeBounds::Robust, bits: 64 };
+    let too_many = Codes { bits: 65, ..Code::Emc64Var.full() };
+    for (field, options) in [
+        ("bottom_codes", AccelOptions { bottom_codes: Some(none), ..AccelOptions::DEFAULT }),
+        ("top_codes", AccelOptions { top_codes: Some(too_many), ..AccelOptions::DEFAULT }),
+    ] {
+        let structures = accel::Device::with_options(device(), options);
+        let refused = Request::instances(16, 3).sizes(&structures).expect_err("no such codes");
+        assert!(refused.to_string().starts_with(field), "{refused}");
     }
 }
 

@@ -8,6 +8,7 @@ use crate::common::shapes::{Corners, icosphere, placed, soup};
 use crate::common::world::World;
 use hedgerow::accel::{self, AccelOptions, Instance, REBRAID, twin};
 use hedgerow::ash::vk;
+use hedgerow::bvh::codes::{Binning, Code, CodeBounds};
 use hedgerow::bvh::layout::{self, Bvh2, Child, Record, Triangle, status};
 use hedgerow::bvh::wide::layout::WideNode;
 use hedgerow_lab::random::SplitMix64;
@@ -116,6 +117,25 @@ fn what_the_flags_ask_for_is_what_the_host_builds() {
         let opens = flags.intersects(REBRAID | Flags::PREFER_FAST_TRACE) && !flags.contains(Flags::ALLOW_UPDATE);
         assert_eq!(read.top.header.primitive_count > 400, opens, "{flags:?}");
         assert_eq!(entries_of(&read).values().any(|starts| starts.len() > 1), opens, "{flags:?}");
+    }
+}
+
+#[test]
+fn top_levels_by_any_codes_are_those_of_the_host() {
+    let world = mixture(300, 8);
+    let robust = Code::Mc63.full().with_bounds(CodeBounds::Robust).expect("no grid");
+    for codes in [
+        Code::Mc30.full(),
+        Code::Emc64Sort.full().with_bits(40),
+        Code::Mip6.full(),
+        Code::Bin(Binning::Q4_A4).full(),
+        robust,
+    ] {
+        let options = AccelOptions { top_codes: Some(codes), wide: true, ..AccelOptions::DEFAULT };
+        let read = ReadBack::new(&Ours::with_options(device(), options), &world);
+        let expected = twin::top_level(&read.instances, |a| read.below(a), world.flags, &options);
+        assert_eq!(read.top.header.code_bits, codes.bits, "{codes:?}");
+        assert!(read.top.to_bytes() == expected.to_bytes(), "{codes:?}");
     }
 }
 
