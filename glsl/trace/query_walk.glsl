@@ -13,7 +13,6 @@
 // query in nodes of two takes 1.04 times as long where the shader could meet the others, too.
 #ifndef HEDGEROW_TRACE_QUERY_WALK
 #define HEDGEROW_TRACE_QUERY_WALK
-#extension GL_EXT_control_flow_attributes : require
 #include "bvh/layout.glsl"
 #define HEDGEROW_LEVELS (2 * MAX_DEPTH * HEDGEROW_QUERIES)
 #include "trace/geometry.glsl"
@@ -368,64 +367,7 @@ void hedgerow_put_off(inout HedgerowRayQuery query, uint index, uint count, floa
     query.level++;
 }
 
-// The children of a quantised node that the ray enters are at hand: leaves first, then nodes from near to far.
-void hedgerow_visit_quantised(inout HedgerowRayQuery query) {
-#ifdef HEDGEROW_COUNTS_WORK
-    query.work.z += 1u;
-#endif
-    QuantisedNode node = hedgerow_quantised_node_at(query.structure, query.index);
-    query.left = HEDGEROW_NOTHING;
-    if (node.exponents_and_nodes == LONG_LEAF) {
-        query.index = node.first_record;
-        if (node.first_child != 0u) query.left = node.first_child;
-        return;
-    }
-    float enters[8];
-    enter_quantised(query.prepared, node, query.best, enters);
-    uint entered = 0u;
-    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
-        if (enters[slot] < HEDGEROW_INFINITY) entered |= 1u << slot;
-    }
-    entered &= query.begin_slots;
-    query.begin_slots = ALL_SLOTS;
-    uint nodes = node.exponents_and_nodes >> 24;
-    uint visits = in_octant(entered & nodes, query.octant);
-    uint others = in_octant(visits & visits - 1u, query.octant);
-    float nearest = HEDGEROW_INFINITY;
-    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
-        if ((others >> slot & 1u) != 0u) nearest = min(nearest, enters[slot]);
-    }
-    query.first_child = node.first_child;
-    query.group = leading_half(nearest) | nodes << 8 | visits;
-    query.first_record = node.first_record;
-    query.counts = node.counts;
-    query.leaves = in_octant(entered & ~nodes, query.octant);
-}
-
-// The next leaf or node of those at hand; whether there was any.
-bool hedgerow_take_of_group(inout HedgerowRayQuery query) {
-    if (query.leaves != 0u) {
-        uint slot = uint(findLSB(query.leaves)) ^ query.octant;
-        query.leaves &= query.leaves - 1u;
-        uint count = byte_of_slot(query.counts, slot);
-        query.index = query.first_record + sum_below(query.counts, slot);
-        // A slot without a child may be among them.
-        query.left = count != 0u ? count : HEDGEROW_NOTHING;
-        return true;
-    }
-    uint visits = query.group & 0xFFu;
-    if (visits == 0u) return false;
-    uint slot = uint(findLSB(visits)) ^ query.octant;
-    uint left = visits & visits - 1u;
-    query.index = query.first_child + rank_of_node(query.group >> 8 & 0xFFu, slot);
-    query.left = 0u;
-    if (left != 0u && query.level - query.bottom < MAX_DEPTH) {
-        hedgerow_put_entry(query.level, uvec2(query.first_child, query.group ^ visits ^ left));
-        query.level++;
-    }
-    query.group = 0u;
-    return true;
-}
+#include "trace/query_quantised.glsl"
 
 void hedgerow_visit(inout HedgerowRayQuery query) {
     if (query.index >= query.slots) {
