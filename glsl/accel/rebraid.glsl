@@ -1,5 +1,5 @@
 // Re-braiding (Benthin, Woop, Wald 2017): before a top level is built, entries whose boxes are loose are opened, each replaced
-// by the two children of the node that it begins at, while the budget lasts. src/accel/rebraid.rs records the rounds, and
+// by the two parts of what it begins at (accel/parts.glsl), while the budget lasts. src/accel/rebraid.rs records the rounds, and
 // src/accel/twin/mod.rs is the twin.
 //
 //   weigh   reads entries, the structures below     writes gains of entries that have none yet; histogram[round]

@@ -76,11 +76,12 @@ struct Instance {
     uint index_and_mask;      // custom index, mask << 24
     uint offset_and_flags;    // offset in the shader binding table, flags << 24
     uint instance;
-    uint start;               // where to begin in the structure: a Child's index, its count or UP_TO_LAST above; or a quantised node
+    // Where to begin in the structure: a Child's index, its count or UP_TO_LAST above. Of quantised nodes a node's index, and above it
+    // and above `records` which of its slots.
+    uint start;
     uint slots;               // nodes of the structure, its FORM above
     uint records;             // of the structure that may be looked at
 };
-// Of quantised nodes, the bits above `start` and those above `records` are the slots of the node that the instance begins with.
 
 struct GeometryEntry {
     uint first;

@@ -214,7 +214,6 @@ fn transformed_box(m: &[[f32; 4]; 3], child: &Child) -> Aabb {
     b
 }
 
-/// The inverse of an affine matrix, by its adjugate; `None` if it is not finite (`instances.glsl`).
 /// How far the elements of an instance's inverse may be from those found here, where the device does not divide as the host does:
 /// in parts of an element; of the fourth column, in half the parts of the sum of the products that it is made of. Vulkan lets a
 /// quotient be 2.5 units in the last place away; what it is multiplied with is rounded twice.
@@ -231,6 +230,7 @@ pub fn is_near_inverse(got: &[[f32; 4]; 3], expected: &[[f32; 4]; 3], m: &[[f32;
     })
 }
 
+/// The inverse of an affine matrix, by its adjugate; `None` if it is not finite (`instances.glsl`).
 fn inverse_of(m: &[[f32; 4]; 3]) -> Option<[[f32; 4]; 3]> {
     let is_finite = |m: &[[f32; 4]; 3]| m.iter().flatten().all(|x| x.is_finite());
     if !is_finite(m) {
