@@ -6,8 +6,10 @@ use crate::requirements::{HedgerowOptional, optional_of};
 use crate::status::{status, value_or};
 use crate::vulkan::*;
 use hedgerow::ash::vk;
+use hedgerow::bvh::codes::Codes;
 use hedgerow::gpu::{Context, ContextDesc, TuningChoice};
-use hedgerow::{Result, accel};
+use hedgerow::{Error, Result, accel};
+use std::ffi::{CStr, c_char};
 
 /// What hedgerow_create_context takes.
 #[repr(C)]
@@ -29,6 +31,29 @@ pub struct HedgerowContextCreateInfo {
     pub checked: VkBool32,
     /// What the device was created with of `HedgerowRequirements::optional`; 0 is always right.
     pub optional: HedgerowOptional,
+    /// Entries of a top level that opens instances, as a multiple of its instances; at 1 none is opened, and 0 stands for 4.
+    pub rebraid_budget: f32,
+    /// Whether structures that allow no update get nodes of eight children: less memory, for a few large structures. Shaders must
+    /// define `HEDGEROW_QUANTISED` before they include `trace/query.glsl`; hedgerow_cmd_trace_rays takes them as empty.
+    pub wide: VkBool32,
+    /// The name of the codes that bottom levels are sorted by, as `hedgerow bench` takes it: "emc64var", "mc63/40", "bin4a4+robust";
+    /// null for those that flags and numbers choose.
+    pub p_bottom_codes: *const c_char,
+    /// The same of top levels.
+    pub p_top_codes: *const c_char,
+}
+
+/// The codes of a name; none of null.
+///
+/// # Safety
+/// `name` is null or a string that ends with a zero.
+unsafe fn codes(name: *const c_char, parameter: &str) -> Result<Option<Codes>> {
+    if name.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: the caller's promise.
+    let name = unsafe { CStr::from_ptr(name) }.to_string_lossy();
+    name.parse().map(Some).map_err(|error| Error::Argument(format!("{parameter}: {error}")))
 }
 
 /// The library's state on one device: pipelines, made when first recorded. Threads may share it.
@@ -86,7 +111,14 @@ pub unsafe extern "C" fn hedgerow_create_context(
         let context = Box::new(context);
         // The box is neither moved out of nor dropped before the structures that refer to what it holds.
         let shared: &'static Context = &*std::ptr::from_ref(&*context);
-        let options = accel::AccelOptions { checked: info.checked != vk::FALSE, ..accel::AccelOptions::DEFAULT };
+        let defaults = accel::AccelOptions::DEFAULT;
+        let options = accel::AccelOptions {
+            rebraid_budget: if info.rebraid_budget == 0.0 { defaults.rebraid_budget } else { info.rebraid_budget },
+            bottom_codes: codes(info.p_bottom_codes, "pBottomCodes")?,
+            top_codes: codes(info.p_top_codes, "pTopCodes")?,
+            wide: info.wide != vk::FALSE,
+            checked: info.checked != vk::FALSE,
+        };
         let structures = accel::Device::with_options(shared, options);
         place.write(Box::into_raw(Box::new(HedgerowContext { structures, context })));
         Ok(())

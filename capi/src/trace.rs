@@ -108,7 +108,7 @@ pub struct HedgerowTraceInfo {
     pub query: HedgerowQuery,
 }
 
-/// Records the tracing of rays.
+/// Records the tracing of rays through a bottom level in nodes of two; one of nodes of eight is taken as empty.
 ///
 /// It reads and writes in compute shaders: place a barrier from what wrote structure and rays before, and one to what reads
 /// the hits after, with `VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT`, `VK_ACCESS_SHADER_READ_BIT` and `VK_ACCESS_SHADER_WRITE_BIT`

@@ -50,6 +50,10 @@ impl Engine {
                 debug_labels: vk::FALSE,
                 checked: vk::TRUE,
                 optional,
+                rebraid_budget: 0.0,
+                wide: vk::FALSE,
+                p_bottom_codes: null(),
+                p_top_codes: null(),
             };
             Engine { info, device, instance, _entry: entry }
         }
@@ -89,6 +93,67 @@ fn labels_want_their_extension() {
         last_error(),
         "debugLabels is VK_TRUE and the instance has no VK_EXT_debug_utils; enable it, or set VK_FALSE"
     );
+}
+
+/// Bytes of a structure over `count` instances or triangles by a context with these options.
+fn structure_bytes(info: &HedgerowContextCreateInfo, ty: vk::AccelerationStructureTypeKHR, count: u32) -> u64 {
+    let geometry = match ty {
+        vk::AccelerationStructureTypeKHR::TOP_LEVEL => vk::AccelerationStructureGeometryKHR::default()
+            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+            .geometry(vk::AccelerationStructureGeometryDataKHR { instances: Default::default() }),
+        _ => {
+            let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+                .vertex_format(vk::Format::R32G32B32_SFLOAT)
+                .vertex_stride(12)
+                .max_vertex(3 * count)
+                .index_type(vk::IndexType::NONE_KHR);
+            vk::AccelerationStructureGeometryKHR::default()
+                .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+                .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
+        }
+    };
+    let build = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(ty)
+        .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)
+        .geometries(std::slice::from_ref(&geometry));
+    let mut context = null_mut();
+    let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+    let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
+    // SAFETY: the device has what the library requires and lives; the pointers are those of live values.
+    unsafe {
+        assert_eq!(hedgerow_create_context(info, &mut context), vk::Result::SUCCESS, "{}", last_error());
+        let result = hedgerow_get_acceleration_structure_build_sizes(context, place, &build, &count, &mut sizes);
+        assert_eq!(result, vk::Result::SUCCESS, "{}", last_error());
+        hedgerow_destroy_context(context);
+    }
+    sizes.acceleration_structure_size
+}
+
+#[test]
+fn options_are_those_of_the_library() {
+    let engine = Engine::new(&[]);
+    let (top, bottom) = (vk::AccelerationStructureTypeKHR::TOP_LEVEL, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL);
+    let with = |rebraid_budget, wide| HedgerowContextCreateInfo { rebraid_budget, wide, ..engine.info };
+    // Nodes of two take 64 bytes, records of instances 128.
+    for (budget, entries) in [(0.0, 4000), (1.0, 1000), (2.5, 2500)] {
+        let bytes = structure_bytes(&with(budget, vk::FALSE), top, 1000);
+        assert_eq!(bytes, 128 + 64 * (entries - 1) + 128 * entries, "budget {budget}");
+    }
+    // Nodes of eight 80, four for each seven leaves at most; records of triangles 40.
+    assert_eq!(structure_bytes(&with(0.0, vk::FALSE), bottom, 7002), 128 + 64 * 7001 + 40 * 7002);
+    assert_eq!(structure_bytes(&with(0.0, vk::TRUE), bottom, 7002), 128 + 80 * 4001 + 40 * 7002);
+
+    let mut context = null_mut();
+    let names = [c"bin4a4~64+concise", c"robust"].map(CStr::as_ptr);
+    let mut info = HedgerowContextCreateInfo { p_bottom_codes: names[0], ..engine.info };
+    // SAFETY: as above; names live.
+    unsafe {
+        assert_eq!(hedgerow_create_context(&info, &mut context), vk::Result::SUCCESS, "{}", last_error());
+        hedgerow_destroy_context(context);
+        info.p_top_codes = names[1];
+        assert_eq!(hedgerow_create_context(&info, &mut context), vk::Result::ERROR_VALIDATION_FAILED_EXT);
+    }
+    assert!(last_error().starts_with("pTopCodes: "), "{}", last_error());
 }
 
 #[test]

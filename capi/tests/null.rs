@@ -55,6 +55,10 @@ fn contexts_name_what_is_null() {
         debug_labels: vk::FALSE,
         checked: vk::TRUE,
         optional: 0,
+        rebraid_budget: 0.0,
+        wide: vk::FALSE,
+        p_bottom_codes: null(),
+        p_top_codes: null(),
     };
     // SAFETY: null is refused before anything is called.
     unsafe {

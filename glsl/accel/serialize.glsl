@@ -41,6 +41,6 @@ uvec2 serialized_at(uint handles) {
 }
 
 Instances instances_of(Header header) {
-    return Instances(records_at(uvec2(structure), header.node_slots));
+    return Instances(records_of_kind(uvec2(structure), header.kind, header.node_slots));
 }
 #endif

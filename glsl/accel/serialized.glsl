@@ -7,7 +7,7 @@
 const uint HEAD_PAIRS = 7;
 
 uint handle_count(Header header) {
-    return header.kind == KIND_INSTANCES ? header.primitive_count : 0;
+    return has_instances(header.kind) ? header.primitive_count : 0;
 }
 
 uvec2 serialized_bytes(Header header) {

@@ -16,6 +16,7 @@ const uint KIND_INSTANCES = 0x00220004u;
 // The same in nodes of eight children as bytes (bvh/wide.glsl).
 const uint KIND_TRIANGLES_8Q = 0x01080004u;
 const uint KIND_BOXES_8Q = 0x01180004u;
+const uint KIND_INSTANCES_8Q = 0x01280004u;
 const uint MAX_DEPTH = 96;
 // The count of a child that no tree has: its slot is unused.
 const uint UNUSED = 0xFFFFFFFFu;
@@ -135,15 +136,20 @@ uvec2 records_at(uvec2 structure, uint node_slots) {
 }
 
 bool is_quantised(uint kind) {
-    return kind == KIND_TRIANGLES_8Q || kind == KIND_BOXES_8Q;
+    return kind == KIND_TRIANGLES_8Q || kind == KIND_BOXES_8Q || kind == KIND_INSTANCES_8Q;
 }
 
 bool has_boxes(uint kind) {
     return kind == KIND_BOXES || kind == KIND_BOXES_8Q;
 }
 
+// Whether it is a top level.
+bool has_instances(uint kind) {
+    return kind == KIND_INSTANCES || kind == KIND_INSTANCES_8Q;
+}
+
 uint record_bytes(uint kind) {
-    return kind == KIND_INSTANCES ? 128u : has_boxes(kind) ? 28u : 40u;
+    return has_instances(kind) ? 128u : has_boxes(kind) ? 28u : 40u;
 }
 
 // What rays need of a structure's header, beside how many nodes it has.
@@ -154,6 +160,11 @@ uint form_of(Header header) {
     if ((header.geometry_flags & GEOMETRY_OPAQUE) != 0u) form |= FORM_ALL_OPAQUE;
     if ((header.geometry_flags >> 8 & GEOMETRY_OPAQUE) != 0u) form |= FORM_ANY_OPAQUE;
     return form;
+}
+
+// Where the records of a structure of any kind begin.
+uvec2 records_of_kind(uvec2 structure, uint kind, uint node_slots) {
+    return address_of(address_of(structure, 1u, 128u), node_slots, is_quantised(kind) ? 80u : 64u);
 }
 
 // Where an instance begins: a Child's index and count; of quantised nodes a node, and which of its slots.
@@ -181,8 +192,7 @@ uint geometry_index_of(GeometryTable table, uint count, uint primitive) {
 // Where the table of geometries lies, if there are several: behind the records. An address, for a reference made of another
 // reference makes SwiftShader crash.
 uvec2 geometry_table_address(uvec2 structure, uint kind, uint node_slots, uint primitive_count) {
-    uvec2 records = address_of(address_of(structure, 1u, 128u), node_slots, is_quantised(kind) ? 80u : 64u);
-    return address_of(records, primitive_count, record_bytes(kind));
+    return address_of(records_of_kind(structure, kind, node_slots), primitive_count, record_bytes(kind));
 }
 
 GeometryTable geometry_table_at(uvec2 structure, uint kind, uint node_slots, uint primitive_count) {

@@ -15,6 +15,7 @@
 #define triangles_of hedgerow_triangles_of
 #define address_of hedgerow_address_of
 #define records_at hedgerow_records_at
+#define records_of_kind hedgerow_records_of_kind
 #define record_bytes hedgerow_record_bytes
 #define geometry_table_at hedgerow_geometry_table_at
 #define geometry_table_address hedgerow_geometry_table_address
@@ -54,8 +55,10 @@
 #define leading_half hedgerow_leading_half
 #define is_quantised hedgerow_is_quantised_kind
 #define has_boxes hedgerow_has_boxes_kind
+#define has_instances hedgerow_has_instances_kind
 #define KIND_TRIANGLES_8Q HEDGEROW_KIND_TRIANGLES_8Q
 #define KIND_BOXES_8Q HEDGEROW_KIND_BOXES_8Q
+#define KIND_INSTANCES_8Q HEDGEROW_KIND_INSTANCES_8Q
 #define FORM_QUANTISED HEDGEROW_FORM_QUANTISED
 #define ALL_SLOTS HEDGEROW_ALL_SLOTS
 #define STATUS_NON_FINITE HEDGEROW_STATUS_NON_FINITE

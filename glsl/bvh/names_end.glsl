@@ -14,6 +14,7 @@
 #undef triangles_of
 #undef address_of
 #undef records_at
+#undef records_of_kind
 #undef record_bytes
 #undef geometry_table_at
 #undef geometry_table_address
@@ -53,8 +54,10 @@
 #undef leading_half
 #undef is_quantised
 #undef has_boxes
+#undef has_instances
 #undef KIND_TRIANGLES_8Q
 #undef KIND_BOXES_8Q
+#undef KIND_INSTANCES_8Q
 #undef FORM_QUANTISED
 #undef ALL_SLOTS
 #undef STATUS_NON_FINITE

@@ -8,6 +8,14 @@
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer HedgerowNodes { Node node[]; };
 
+// What a quantised node says of its children beside their boxes.
+struct HedgerowNames {
+    uint nodes;
+    uint first_child;
+    uint first_record;
+    uvec2 counts;
+};
+
 // Of a node in a structure, behind the header's 128 bytes.
 uvec2 hedgerow_node_address(uvec2 structure, uint index) {
     return address_of(structure, 2u + index, 64u);
@@ -22,6 +30,12 @@ Node hedgerow_node_at(uvec2 structure, uint index) {
 
 QuantisedNode hedgerow_quantised_node_at(uvec2 structure, uint index) {
     return hedgerow_long_quantised_node(address_of(wide_nodes_at(structure), index, QUANTISED_NODE_BYTES));
+}
+
+HedgerowNames hedgerow_names_at(uvec2 structure, uint index) {
+    HedgerowLongs at = HedgerowLongs(address_of(wide_nodes_at(structure), index, QUANTISED_NODE_BYTES));
+    uvec2 first = hedgerow_pair_of(at, 2u);
+    return HedgerowNames(hedgerow_pair_of(at, 1u).y >> 24, first.x, first.y, hedgerow_pair_of(at, 3u));
 }
 
 Triangle hedgerow_triangle_at(uvec2 triangles, uint index) {
@@ -44,6 +58,11 @@ Node hedgerow_node_at(uvec2 structure, uint index) {
 
 QuantisedNode hedgerow_quantised_node_at(uvec2 structure, uint index) {
     return QuantisedNodes(address_of(wide_nodes_at(structure), index, QUANTISED_NODE_BYTES)).node[0];
+}
+
+HedgerowNames hedgerow_names_at(uvec2 structure, uint index) {
+    QuantisedNodes at = QuantisedNodes(address_of(wide_nodes_at(structure), index, QUANTISED_NODE_BYTES));
+    return HedgerowNames(at.node[0].exponents_and_nodes >> 24, at.node[0].first_child, at.node[0].first_record, at.node[0].counts);
 }
 
 Triangle hedgerow_triangle_at(uvec2 triangles, uint index) {

@@ -7,7 +7,8 @@
 // The children of a quantised node that the ray enters are at hand: leaves first, then nodes from near to far.
 void hedgerow_visit_quantised(inout HedgerowRayQuery query) {
 #ifdef HEDGEROW_COUNTS_WORK
-    query.work.z += 1u;
+    if (query.has_instances) query.work.x += 1u;
+    else query.work.z += 1u;
 #endif
     QuantisedNode node = hedgerow_quantised_node_at(query.structure, query.index);
     query.left = HEDGEROW_NOTHING;
@@ -24,18 +25,37 @@ void hedgerow_visit_quantised(inout HedgerowRayQuery query) {
     }
     entered &= query.begin_slots;
     query.begin_slots = ALL_SLOTS;
-    uint nodes = node.exponents_and_nodes >> 24;
+    // In a top level leaves are among the nodes, from near to far, as an instance takes longer than a node. An entry of the stack has no
+    // room for where both begin: it names the node, which is asked again.
+    uint nodes = query.has_instances ? 0xFFu : node.exponents_and_nodes >> 24;
     uint visits = in_octant(entered & nodes, query.octant);
     uint others = in_octant(visits & visits - 1u, query.octant);
     float nearest = HEDGEROW_INFINITY;
     [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
         if ((others >> slot & 1u) != 0u) nearest = min(nearest, enters[slot]);
     }
-    query.first_child = node.first_child;
+    query.first_child = query.has_instances ? query.index : node.first_child;
     query.group = leading_half(nearest) | nodes << 8 | visits;
     query.first_record = node.first_record;
     query.counts = node.counts;
     query.leaves = in_octant(entered & ~nodes, query.octant);
+}
+
+// In the first word of an entry of the stack: what waits are records of a top level.
+const uint HEDGEROW_RECORDS_WAIT = 1u << 31;
+
+// The rest of the leaf at hand waits.
+void hedgerow_put_off_rest(inout HedgerowRayQuery query) {
+    hedgerow_put_entry(query.level, uvec2(query.index | HEDGEROW_RECORDS_WAIT, query.left));
+    query.level++;
+}
+
+// Whether an entry of the stack is such a rest, which is at hand then.
+bool hedgerow_takes_rest(inout HedgerowRayQuery query, uvec2 waiting) {
+    if (!query.has_instances || (waiting.x & HEDGEROW_RECORDS_WAIT) == 0u) return false;
+    query.index = waiting.x & ~HEDGEROW_RECORDS_WAIT;
+    query.left = waiting.y;
+    return true;
 }
 
 // The next leaf or node of those at hand; whether there was any.
@@ -53,8 +73,16 @@ bool hedgerow_take_of_group(inout HedgerowRayQuery query) {
     if (visits == 0u) return false;
     uint slot = uint(findLSB(visits)) ^ query.octant;
     uint left = visits & visits - 1u;
-    query.index = query.first_child + rank_of_node(query.group >> 8 & 0xFFu, slot);
-    query.left = 0u;
+    if (query.has_instances) {
+        HedgerowNames names = hedgerow_names_at(query.structure, query.first_child);
+        uint count = byte_of_slot(names.counts, slot);
+        bool is_node = (names.nodes >> slot & 1u) != 0u;
+        query.index = is_node ? names.first_child + rank_of_node(names.nodes, slot) : names.first_record + sum_below(names.counts, slot);
+        query.left = is_node ? 0u : count != 0u ? count : HEDGEROW_NOTHING;
+    } else {
+        query.index = query.first_child + rank_of_node(query.group >> 8 & 0xFFu, slot);
+        query.left = 0u;
+    }
     if (left != 0u && query.level - query.bottom < MAX_DEPTH) {
         hedgerow_put_entry(query.level, uvec2(query.first_child, query.group ^ visits ^ left));
         query.level++;

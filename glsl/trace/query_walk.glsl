@@ -8,8 +8,8 @@
 // children are in order (bvh/child_order.glsl) it takes the left child first, wherever that is. What a query asks for is mostly known
 // when its shader is compiled, and then nothing is left of the other way.
 //
-// Structures are of nodes of two. A shader that defines HEDGEROW_QUANTISED also meets bottom levels of nodes of eight (bvh/wide.glsl), as
-// trace/walk_quantised.glsl does, beside those of two; in others rays pass what is made of them. What nobody uses costs: on lavapipe a
+// Structures are of nodes of two. A shader that defines HEDGEROW_QUANTISED also meets those of nodes of eight (bvh/wide.glsl), as
+// trace/walk_quantised.glsl does, in either level beside those of two; in others rays pass what is made of them. What nobody uses costs: on lavapipe a
 // query in nodes of two takes 1.04 times as long where the shader could meet the others, too.
 #ifndef HEDGEROW_TRACE_QUERY_WALK
 #define HEDGEROW_TRACE_QUERY_WALK
@@ -117,7 +117,8 @@ struct HedgerowRayQuery {
     uint instance_flags;
     // Of quantised nodes: those of the one at hand that are nodes and that the ray has yet to enter, as an entry of the stack has them
     // (first of its nodes; where the ray enters the nearest in a half, which slots are nodes, which are left); its leaves, likewise; the
-    // bits of the axes in which the ray goes down; the slots that the ray may enter of the node where it begins.
+    // bits of the axes in which the ray goes down; the slots that the ray may enter of the node where it begins. In a top level
+    // `first_child` is the node itself, and its leaves are among its nodes.
     uint first_child;
     uint group;
     uint first_record;
@@ -210,10 +211,10 @@ void hedgerow_drop_group(inout HedgerowRayQuery query) {
     query.leaves = 0u;
 }
 
-// At a quantised node, of which the ray may enter these slots.
-void hedgerow_begin_quantised(inout HedgerowRayQuery query, uint slots) {
+// At a quantised node of a structure in whose space the ray goes in this direction; it may enter these slots.
+void hedgerow_begin_quantised(inout HedgerowRayQuery query, vec3 direction, uint slots) {
     query.begin_slots = slots;
-    uvec3 down = floatBitsToUint(query.prepared.inverse) >> 31;
+    uvec3 down = floatBitsToUint(direction) >> 31;
     query.octant = hedgerow_goes_left_first(query) ? 0u : down.x | down.y << 1 | down.z << 2;
 }
 
@@ -271,7 +272,7 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     uvec2 root = uvec2(0u, HEDGEROW_NOTHING);
     if (any(notEqual(structure, uvec2(0)))) {
         Header header = Structure(structure).header;
-        query.top_has_instances = header.kind == KIND_INSTANCES;
+        query.top_has_instances = has_instances(header.kind);
         query.top_slots = header.node_slots;
         query.top_records = header.primitive_count;
         query.top_form = form_of(header);
@@ -286,7 +287,7 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     if (hedgerow_prepare_for(query.has_instances, ray, query.prepared) && goes && !skips) {
         query.index = root.x;
         query.left = root.y;
-        if (hedgerow_is_quantised(query)) hedgerow_begin_quantised(query, ALL_SLOTS);
+        if (hedgerow_is_quantised(query)) hedgerow_begin_quantised(query, ray.direction, ALL_SLOTS);
 #ifdef HEDGEROW_LINK_COUNTS
         if (!query.has_instances) query.at.counts = HEDGEROW_LINK_COUNTS(structure);
 #endif
@@ -317,17 +318,21 @@ HedgerowMeeting hedgerow_met(HedgerowRayQuery query, bool committed) {
     return met;
 }
 
-// The instance of a meeting: of a bottom-level structure that is queried itself, one without a transform.
-Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
-    if (query.top_has_instances) return Instances(records_at(query.top, query.top_slots)).instance[met.instance];
-    const vec4 identity[3] = vec4[3](vec4(1, 0, 0, 0), vec4(0, 1, 0, 0), vec4(0, 0, 1, 0));
-    return Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, query.top_slots | query.top_form, query.top_records);
-}
-
-// The records of a bottom-level structure.
+// The records of a structure.
 uvec2 hedgerow_records_in(uvec2 structure, uint slots, uint form) {
     if ((form & FORM_QUANTISED) != 0u) return wide_records_at(structure, slots, QUANTISED_NODE_BYTES);
     return records_at(structure, slots);
+}
+
+uvec2 hedgerow_records_of_top(HedgerowRayQuery query) {
+    return hedgerow_records_in(query.top, query.top_slots, query.top_form);
+}
+
+// The instance of a meeting: of a bottom-level structure that is queried itself, one without a transform.
+Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
+    if (query.top_has_instances) return Instances(hedgerow_records_of_top(query)).instance[met.instance];
+    const vec4 identity[3] = vec4[3](vec4(1, 0, 0, 0), vec4(0, 1, 0, 0), vec4(0, 0, 1, 0));
+    return Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, query.top_slots | query.top_form, query.top_records);
 }
 
 uvec2 hedgerow_records_of(Instance instance) {
@@ -418,7 +423,7 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     uint at = query.index;
     hedgerow_step(query);
     if (at >= query.records) return;
-    Instance instance = hedgerow_instance_at(records_at(query.top, query.top_slots), at);
+    Instance instance = hedgerow_instance_at(hedgerow_records_of_top(query), at);
     uint flags = instance.offset_and_flags >> 24;
     if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
     HEDGEROW_COUNT(y);
@@ -432,7 +437,8 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     if (!hedgerow_prepare(ray, prepared)) return;
     // The rest of the leaf waits.
     if (query.left != HEDGEROW_NOTHING && query.level - query.floor < MAX_DEPTH) {
-        hedgerow_put_off(query, query.index, query.left, -HEDGEROW_INFINITY);
+        if (hedgerow_is_quantised(query)) hedgerow_put_off_rest(query);
+        else hedgerow_put_off(query, query.index, query.left, -HEDGEROW_INFINITY);
     }
     query.prepared = prepared;
     query.is_prepared = true;
@@ -455,13 +461,14 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     query.left = begin.y;
     if (hedgerow_is_quantised(query)) {
         query.left = 0u;
-        hedgerow_begin_quantised(query, begin.y);
+        hedgerow_begin_quantised(query, ray.direction, begin.y);
     }
 }
 
 // Back to the top level.
 void hedgerow_leave_instance(inout HedgerowRayQuery query) {
     hedgerow_take_top(query);
+    if (hedgerow_is_quantised(query)) hedgerow_begin_quantised(query, query.ray.direction, ALL_SLOTS);
     query.is_prepared = false;
     query.bottom = query.floor;
     query.rounds = query.top_rounds;
@@ -541,6 +548,7 @@ bool hedgerow_go_on(inout HedgerowRayQuery query) {
     query.level--;
     if (is_quantised_at_hand) {
         uvec2 waiting = hedgerow_entry(query.level);
+        if (hedgerow_takes_rest(query, waiting)) return true;
         query.first_child = waiting.x;
         // Equally far is not too far: an equally near hit that comes before may be there.
         query.group = uintBitsToFloat(waiting.y & 0xFFFF0000u) <= query.best ? waiting.y : 0u;

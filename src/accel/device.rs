@@ -301,7 +301,8 @@ impl<'a> Device<'a> {
         self.record_placed(&mut Recorder::warming(self.context), &builds)
     }
 
-    pub(super) fn options(&self) -> &AccelOptions {
+    /// The options that it was made with.
+    pub fn options(&self) -> &AccelOptions {
         &self.options
     }
 

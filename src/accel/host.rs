@@ -2,12 +2,10 @@
 
 use super::build::{self, Build, Counts};
 use super::geometry::BuildGeometries;
-use super::{AccelOptions, Device};
+use super::{AccelOptions, Device, Tree};
 use crate::bvh::geometry::{Geometry, IndexFormat};
-use crate::bvh::layout::{Bvh2, Record};
 use crate::bvh::twin::geometry::{Corners, HostGeometry};
 use crate::bvh::twin::{self, lbvh};
-use crate::bvh::wide::layout::Wide8q;
 use crate::geometry::Aabb;
 use crate::gpu::Context;
 use crate::{Error, Result};
@@ -81,7 +79,7 @@ unsafe fn built(
             }
             let lbvh = |finish| lbvh::build_corners(corners.into_iter(), codes, finish);
             let tree = twin::build(&options, codes, lbvh).with_geometries(&flags_of(geometries), options.build_flags);
-            Ok(bytes_of(&tree, build.is_wide()))
+            Ok(Tree::of(tree, build.is_wide()).to_bytes())
         }
         BuildGeometries::Boxes(geometries) => {
             let mut boxes = Vec::new();
@@ -91,17 +89,13 @@ unsafe fn built(
             }
             let lbvh = |finish| lbvh::build_aabbs(&boxes, codes, finish);
             let tree = twin::build(&options, codes, lbvh).with_geometries(&flags_of(geometries), options.build_flags);
-            Ok(bytes_of(&tree, build.is_wide()))
+            Ok(Tree::of(tree, build.is_wide()).to_bytes())
         }
         BuildGeometries::Instances { .. } => Err(Error::Argument(
             "type is TOP_LEVEL; this call does not have the structures that instances name: take accel::twin::top_level"
                 .into(),
         )),
     }
-}
-
-fn bytes_of<R: Record>(tree: &Bvh2<R>, is_wide: bool) -> Vec<u8> {
-    if is_wide { Wide8q::of(tree).to_bytes() } else { tree.to_bytes() }
 }
 
 /// Triangles at host addresses.

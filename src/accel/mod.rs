@@ -25,7 +25,7 @@
 //! | --- | --- | --- | --- | --- |
 //! | `PREFER_FAST_BUILD` | an LBVH by codes of 8 bits less | the same | 1.0 | 1.0 |
 //! | none | H-PLOC, of over 2,048 primitives: of those measured in nodes of two, the least time for a build and ten rays a triangle | an LBVH and a pass of [reinsertion](crate::bvh::reinsertion) | 2.2 | 1.09 |
-//! | `PREFER_FAST_TRACE` | H-PLOC and half a pass of reinsertion (a whole one: 12 and 1.18) | the same as without, and opens instances ([`REBRAID`]) | 2.2 to 12 | 1.09 to 1.18 |
+//! | `PREFER_FAST_TRACE` | H-PLOC and three quarters of a pass of reinsertion (a whole one: 12 and 1.18), up to 2,048 primitives two passes | the same as without, and opens instances ([`REBRAID`]) | 2.2 to 12 | 1.09 to 1.18 |
 //!
 //! What other flags change:
 //!
@@ -50,6 +50,7 @@ mod quality;
 mod rebraid;
 mod request;
 pub mod serialize;
+mod tree;
 pub mod twin;
 
 pub use build::SCRATCH_ALIGNMENT;
@@ -57,6 +58,7 @@ pub use device::{Device, STRUCTURE_ALIGNMENT};
 pub use instances::Instance;
 pub use properties::Property;
 pub use request::{Placement, Request};
+pub use tree::Tree;
 
 use crate::bvh::codes::Codes;
 use ash::vk;
@@ -83,11 +85,11 @@ pub struct AccelOptions {
     /// The same of top levels; `None` takes those by number, too, but with [`CodeBounds::Robust`](crate::bvh::codes::CodeBounds::Robust):
     /// an instance far from the others costs them nothing.
     pub top_codes: Option<Codes>,
-    /// Whether bottom levels get quantised nodes of eight children ([`crate::bvh::wide`]), where they are not LBVHs and no update is
-    /// allowed. They take less memory, and one top level may hold them beside others. Shaders must define `HEDGEROW_QUANTISED` before
-    /// they include `trace/query.glsl`, or their rays pass what is made of such nodes; of the tracers, those of [`crate::trace::wide`]
-    /// meet them. On lavapipe rays take 1.5 times as long by them, as invocations at nodes of two, of which top levels are, wait for those
-    /// at nodes of eight; no GPU was measured.
+    /// Whether structures get quantised nodes of eight children ([`crate::bvh::wide`]), where no update is allowed: top levels but for
+    /// those of `PREFER_FAST_BUILD`, bottom levels that are not LBVHs. They take less memory, and stand beside others in either level.
+    /// Shaders must define `HEDGEROW_QUANTISED` before they include `trace/query.glsl`, or their rays pass what is made of such nodes; of
+    /// the tracers, those of [`crate::trace::wide`] meet bottom levels. For a few large structures: on lavapipe queries of one scene in
+    /// one instance gain, those of many small instances lose (docs/notes/rays.md); no GPU was measured.
     pub wide: bool,
     /// Whether calls are checked against what was created and built, as Vulkan's validation would: memory that is too
     /// small or overlaps, misaligned data, updates without the flag or of changed counts. They return an error before anything

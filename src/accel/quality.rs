@@ -26,15 +26,17 @@ const KNOWN: Flags = Flags::from_raw(
         | ANY_HIT_ORDER.as_raw(),
 );
 
-/// Primitives up to which a build without a preference is an LBVH: one workgroup makes it in one dispatch.
+/// Primitives up to which a build without a preference is an LBVH: one workgroup makes it in one dispatch. Up to as many a fast trace
+/// gets two passes of reinsertion, which take less time than a driver's fast trace: opened instances want the nodes near the root good.
 const FEW: u32 = 2048;
 
 /// Records of wide structures, at most: above as many bits of an instance's record lie slots of a node.
 const MOST_WIDE: u32 = (1 << 27) - 1;
 
-/// Half a pass of reinsertion: that and H-PLOC take as long as a driver's fast trace on Mesa's lavapipe.
-const HALF_A_PASS: ReinsertionOptions =
-    ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds / 2, ..ReinsertionOptions::FAST };
+/// Three quarters of a pass of reinsertion: with H-PLOC that takes less time than a driver's fast trace on Mesa's lavapipe on every scene
+/// measured (bunny, sponza, classroom, san_francisco, dragon, salle_de_bain), where a pass takes up to 1.2 times as long.
+const MOST_OF_A_PASS: ReinsertionOptions =
+    ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds * 3 / 4, ..ReinsertionOptions::FAST };
 
 /// # Errors
 /// Unknown flags, or two that exclude each other; codes that there are not.
@@ -68,7 +70,7 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
     let is_top = primitives == Primitives::Instances;
     BuildOptions {
         method: if is_top { Method::Lbvh } else { bottom_method(flags, count) },
-        optimise: if is_top { top_optimise(flags) } else { bottom_optimise(flags) },
+        optimise: if is_top { top_optimise(flags) } else { bottom_optimise(flags, count) },
         codes: Some(codes(flags, options, is_top, count)),
         // An instance costs more than a node whatever its box: one a leaf.
         collapse: if is_top { Collapse::OFF } else { collapse(flags) },
@@ -81,8 +83,11 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
 
 /// Whether a structure gets quantised nodes of eight: they cannot be refitted.
 pub(super) fn is_wide(flags: Flags, options: &AccelOptions, primitives: Primitives, count: u32) -> bool {
-    let is_bottom = primitives != Primitives::Instances;
-    is_bottom && options.wide && !flags.contains(Flags::ALLOW_UPDATE) && count <= MOST_WIDE && !is_quick(flags, count)
+    let is_quick = match primitives {
+        Primitives::Instances => flags.contains(Flags::PREFER_FAST_BUILD),
+        _ => is_quick(flags, count),
+    };
+    options.wide && !flags.contains(Flags::ALLOW_UPDATE) && count <= MOST_WIDE && !is_quick
 }
 
 /// Whether a bottom level is an LBVH.
@@ -99,8 +104,9 @@ fn bottom_method(flags: Flags, count: u32) -> Method {
     if is_quick(flags, count) { Method::Lbvh } else { Method::Hploc(Window::DEFAULT) }
 }
 
-fn bottom_optimise(flags: Flags) -> Option<ReinsertionOptions> {
-    flags.contains(Flags::PREFER_FAST_TRACE).then_some(HALF_A_PASS)
+fn bottom_optimise(flags: Flags, count: u32) -> Option<ReinsertionOptions> {
+    let rounds = if count <= FEW { ReinsertionOptions::MEDIUM } else { MOST_OF_A_PASS };
+    flags.contains(Flags::PREFER_FAST_TRACE).then_some(rounds)
 }
 
 /// A top level has few entries and all rays go through it: a pass of reinsertion brings back more than it takes. H-PLOC before that would

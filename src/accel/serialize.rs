@@ -12,7 +12,7 @@
 
 use super::Device;
 use super::given::not_null;
-use crate::bvh::layout::{self, Header, InstanceRecord, Record};
+use crate::bvh::layout::{self, Header, InstanceRecord};
 use crate::gpu::arguments;
 use crate::gpu::{Grid, Recorder, shaders};
 use crate::{Error, Result};
@@ -59,7 +59,7 @@ pub struct Head {
 impl Head {
     /// Of a structure with this header.
     pub(super) fn of(header: &Header, sizes: &layout::BvhOffsets) -> Head {
-        let handle_count = if header.kind == InstanceRecord::KIND { header.primitive_count.into() } else { 0 };
+        let handle_count = if layout::has_instances(header.kind) { header.primitive_count.into() } else { 0 };
         Head {
             version: VERSION,
             serialized_bytes: size_of::<Head>() as u64 + 8 * handle_count + sizes.bytes,

@@ -422,17 +422,23 @@ pub const fn record_bytes(kind: u32) -> Option<u64> {
     match kind {
         Triangle::KIND | TRIANGLES_8Q => Some(size_of::<Triangle>() as u64),
         BoxRecord::KIND | BOXES_8Q => Some(size_of::<BoxRecord>() as u64),
-        InstanceRecord::KIND => Some(size_of::<InstanceRecord>() as u64),
+        InstanceRecord::KIND | INSTANCES_8Q => Some(size_of::<InstanceRecord>() as u64),
         _ => None,
     }
 }
 
 const TRIANGLES_8Q: u32 = Form::EightQuantised.kind(Triangle::KIND);
 const BOXES_8Q: u32 = Form::EightQuantised.kind(BoxRecord::KIND);
+const INSTANCES_8Q: u32 = Form::EightQuantised.kind(InstanceRecord::KIND);
 
-/// Whether the nodes of a bottom-level structure of this kind are [`QuantisedNode`]s.
+/// Whether the nodes of a structure of this kind are [`QuantisedNode`]s.
 pub const fn is_quantised(kind: u32) -> bool {
-    kind == TRIANGLES_8Q || kind == BOXES_8Q
+    kind == TRIANGLES_8Q || kind == BOXES_8Q || kind == INSTANCES_8Q
+}
+
+/// Whether a structure of this kind is a top level.
+pub const fn has_instances(kind: u32) -> bool {
+    kind == InstanceRecord::KIND || kind == INSTANCES_8Q
 }
 
 /// Bytes of a node of a structure of this kind.

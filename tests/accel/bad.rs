@@ -10,10 +10,10 @@ use crate::common::matrices::{moved, rotation, scaled};
 use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, ProbeReport};
 use crate::common::shapes::{Corners, boxes, soup};
 use crate::common::world::{BuiltWorld, Part, World, bottom_level, instances_at, top_level};
-use hedgerow::accel::Instance;
+use hedgerow::accel::{Instance, Tree};
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
-use hedgerow::bvh::layout::{Bvh2, Child, Header, InstanceRecord as Placed, NODES_OFFSET, Triangle, status};
+use hedgerow::bvh::layout::{self, Bvh2, Child, Header, InstanceRecord as Placed, NODES_OFFSET, Triangle, status};
 use hedgerow_lab::random::SplitMix64;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
@@ -170,10 +170,12 @@ fn instances_that_cannot_be_are_left_out_and_told_of() {
             let instances = device().upload("instances", &between).expect("memory");
             let range = Range::default().primitive_count(3);
             let top = top_level(&ours, &instances_at(instances.address(), false), range, world.flags);
-            let tree = Bvh2::<Placed>::from_bytes(&top.memory.read::<u8>(top.bytes as usize)).expect("a structure");
-            tree.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
+            let tree = Tree::<Placed>::from_bytes(&top.memory.read::<u8>(top.bytes as usize)).expect("a structure");
+            if let Tree::OfTwo(tree) = &tree {
+                tree.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
+            }
             assert_eq!(
-                (tree.header.active, tree.header.status),
+                (tree.header().active, tree.header().status),
                 (2, status::BAD_INSTANCE),
                 "{name}, {:?}",
                 bad.transform
@@ -192,7 +194,8 @@ fn overwritten(bytes: &[u8], how: usize, random: &mut SplitMix64) -> Vec<u8> {
     let header: Header = bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()]);
     let mut noise = |from: usize, to: usize, bytes: &mut [u8]| bytes[from..to].fill_with(|| random.bits() as u8);
     let mut out = bytes.to_vec();
-    let (nodes, records) = (NODES_OFFSET as usize, NODES_OFFSET as usize + 64 * header.node_slots as usize);
+    let node_bytes = if layout::is_quantised(header.kind) { 80 } else { 64 };
+    let (nodes, records) = (NODES_OFFSET as usize, NODES_OFFSET as usize + node_bytes * header.node_slots as usize);
     match how {
         // Nothing is left of it.
         0 => out.fill(0),
@@ -207,6 +210,20 @@ fn overwritten(bytes: &[u8], how: usize, random: &mut SplitMix64) -> Vec<u8> {
         6 => noise(nodes, records, &mut out),
         7 => noise(16, 48, &mut out),
         // Nodes of another structure: boxes that hold everything, children in circles.
+        _ if layout::is_quantised(header.kind) => {
+            for (slot, node) in out[nodes..records].chunks_exact_mut(80).enumerate() {
+                let others = [slot as u32, 0, (slot as u32 + 7) % header.node_slots, header.node_slots];
+                let [first_child, first_record] = [0, 1].map(|side| others[(how + side) % 4]);
+                let (which, count) = ([0xFF, 0, 0x5A, 1][how / 4 % 4], 0x0101_0101 * [0, 1, 40, 255][(how + slot) % 4]);
+                // Cells of an eighth: 255 of them hold −9 to 9.
+                let exponents = 0x7C_7C7C | which << 24;
+                let origin = (-9f32).to_bits();
+                let head = [origin, origin, origin, exponents, first_child, first_record, count, count];
+                let words = head.into_iter().chain([0; 6]).chain([u32::MAX; 6]);
+                let bytes: Vec<u8> = words.flat_map(u32::to_le_bytes).collect();
+                node.copy_from_slice(&bytes);
+            }
+        }
         _ => {
             for (slot, node) in out[nodes..records].chunks_exact_mut(64).enumerate() {
                 for (side, child) in node.chunks_exact_mut(32).enumerate() {

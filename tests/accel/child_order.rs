@@ -100,8 +100,8 @@ fn queries_hit_where_they_did_before() {
 fn both_levels_are_those_of_the_host() {
     for flags in [ANY_HIT_ORDER, ANY_HIT_ORDER | REBRAID] {
         let read = ReadBack::new(&Ours::on(device()), &World { flags, ..world(5) });
-        let expected = levels::top_level(&read.instances, |a| read.below(a), flags, &AccelOptions::DEFAULT);
-        assert_eq!(expected.header.child_order, 1);
+        let expected = levels::top_level(&read.instances, |a| read.below(a), flags, &Ours::OPTIONS);
+        assert_eq!(expected.header().child_order, 1);
         assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}: the top level");
         assert!(read.triangles.values().all(|tree| tree.header().child_order == 1), "{flags:?}: below");
     }
@@ -182,7 +182,7 @@ fn queries_take_the_left_child_first() {
     // As `Levels` builds parts: PREFER_FAST_TRACE.
     let options = BuildOptions {
         method: Method::Hploc(Window::DEFAULT),
-        optimise: Some(ReinsertionOptions { rounds: 32, ..ReinsertionOptions::FAST }),
+        optimise: Some(ReinsertionOptions::MEDIUM),
         child_order: IN_ORDER.child_order,
         ..BuildOptions::DEFAULT
     };

@@ -7,13 +7,13 @@ use crate::common::probe::{CONFIRM_ODD, ProbeRay, ProbeReport};
 use crate::common::shapes::{Corners, hard_rays, ray, soup, tree_with};
 use crate::common::world::{Part, World};
 use hedgerow::accel::serialize::Head;
-use hedgerow::accel::{self, Property};
+use hedgerow::accel::{self, Property, Tree};
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::builder::{BuildOptions, Builder};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, Input, Primitives, Source, VertexFormat};
-use hedgerow::bvh::layout::{BoxRecord, Bvh2, Child, Header, InstanceRecord, Record, status};
+use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Child, Header, InstanceRecord, Record, status};
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
 use hedgerow::bvh::wide::layout::Wide8q;
@@ -118,7 +118,9 @@ fn cases() -> Vec<Case> {
         }
     }
     for count in [0, 1, 2, 9, 500] {
-        cases.push(Case::new(format!("{count} instances"), &instances(count)));
+        let (name, tree) = (format!("{count} instances"), instances(count));
+        cases.push(Case::wide(&name, &tree));
+        cases.push(Case::new(name, &tree));
     }
     // None of the triangles is left.
     let nowhere: Corners = vec![[[f32::INFINITY; 3]; 3]; 9];
@@ -376,7 +378,7 @@ fn serialising_and_back_gives_the_same_bytes() {
 
             let head: Head = bytemuck::pod_read_unaligned(&expected[..size_of::<Head>()]);
             let header = header_of(bytes);
-            let handles = u64::from(if header.kind == InstanceRecord::KIND { header.primitive_count } else { 0 });
+            let handles = u64::from(if layout::has_instances(header.kind) { header.primitive_count } else { 0 });
             assert_eq!(property(&source, Property::BottomLevelPointers), handles, "{}", case.name);
             let sizes = (head.serialized_bytes, head.structure_bytes, head.handle_count);
             assert_eq!(sizes, (56 + 8 * handles + bytes.len() as u64, bytes.len() as u64, handles));
@@ -395,19 +397,37 @@ fn serialising_and_back_gives_the_same_bytes() {
 #[test]
 fn handles_that_were_rewritten_come_back_in_the_instances() {
     let tree = instances(500);
-    let bytes = tree.to_bytes();
-    let mut memory = hedgerow::accel::twin::serialize::write(&bytes).expect("a structure");
-    let handles: Vec<u64> = bytemuck::pod_collect_to_vec(&memory[56..56 + 8 * 500]);
-    assert!(handles.iter().zip(&tree.records).all(|(&handle, record)| handle == record.structure));
-    assert!(handles.contains(&0) && handles.iter().any(|&handle| handle > u64::from(u32::MAX)));
-    let mut expected = tree.clone();
-    for (i, record) in expected.records.iter_mut().enumerate() {
+    let mut wide = Wide8q::of(&tree);
+    // A tree of nodes of two has records of what is left out; nodes of eight have none.
+    assert!(tree.records.len() == 500 && wide.records.len() == 375);
+    let mut of_two = tree.clone();
+    handles_come_back(&tree.to_bytes(), &tree.records, |records| {
+        of_two.records = records;
+        of_two.to_bytes()
+    });
+    assert!(tree.records.iter().any(|record| record.structure == 0));
+    let before = wide.clone();
+    handles_come_back(&before.to_bytes(), &before.records, |records| {
+        wide.records = records;
+        wide.to_bytes()
+    });
+}
+
+/// The handles of a structure are those of its records; others come back in the structure that has `with` them.
+fn handles_come_back(bytes: &[u8], records: &[InstanceRecord], with: impl FnOnce(Vec<InstanceRecord>) -> Vec<u8>) {
+    let mut memory = hedgerow::accel::twin::serialize::write(bytes).expect("a structure");
+    let handles: Vec<u64> = bytemuck::pod_collect_to_vec(&memory[56..56 + 8 * records.len()]);
+    assert!(handles.iter().zip(records).all(|(&handle, record)| handle == record.structure));
+    assert!(handles.iter().any(|&handle| handle > u64::from(u32::MAX)));
+    let mut rewritten = records.to_vec();
+    for (i, record) in rewritten.iter_mut().enumerate() {
         record.structure = 0xfedc_ba98_0000_0000 + 256 * i as u64;
         memory[56 + 8 * i..][..8].copy_from_slice(&record.structure.to_le_bytes());
     }
+    let expected = with(rewritten);
     let got = deserialized(&Guarded::of(&memory), bytes.len());
-    assert!(got.read() == expected.to_bytes());
-    assert!(hedgerow::accel::twin::serialize::read(&memory).expect("its own") == expected.to_bytes());
+    assert!(got.read() == expected);
+    assert!(hedgerow::accel::twin::serialize::read(&memory).expect("its own") == expected);
 }
 
 /// Triangles of two geometries and boxes, each seen twenty times.
@@ -448,7 +468,9 @@ fn probe_rays() -> Vec<ProbeRay> {
 fn a_world_that_was_read_back_answers_queries_as_before() {
     let backend = Ours::on(device());
     let rays = probe_rays();
-    for flags in [vk::BuildAccelerationStructureFlagsKHR::empty(), accel::REBRAID] {
+    // The last one's top level is of nodes of two.
+    let by_two = accel::REBRAID | vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_BUILD;
+    for flags in [vk::BuildAccelerationStructureFlagsKHR::empty(), accel::REBRAID, by_two] {
         let built = World { flags, ..world() }.build(&backend);
         let before: Vec<ProbeReport> = backend.probe(built.top.structure, &rays);
         assert!(
@@ -459,9 +481,9 @@ fn a_world_that_was_read_back_answers_queries_as_before() {
         let top = bytes_of(&built.top);
         let compacted = Guarded::new(size_after(&built.top, Property::CompactedSize));
         copy_of(built.top.structure, compacted.handle(), Mode::COMPACT);
-        assert!(
-            compacted.read() == Bvh2::<InstanceRecord>::from_bytes(&top).expect("a top level").compacted().to_bytes()
-        );
+        let expected = Tree::<InstanceRecord>::from_bytes(&top).expect("a top level").compacted();
+        assert_eq!(matches!(expected, Tree::OfTwo(_)), flags == by_two);
+        assert!(compacted.read() == expected.to_bytes());
         assert_eq!(backend.probe(compacted.handle(), &rays), before, "compacted, {flags:?}");
 
         let mut kept = hedgerow::accel::twin::serialize::write(&compacted.read()).expect("a structure");

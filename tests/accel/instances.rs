@@ -7,9 +7,14 @@ use crate::common::matrices::{Matrix, moved, rotation, scaled};
 use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, flags};
 use crate::common::shapes::{Corners, boxes, icosphere, soup};
 use crate::common::world::{Part, World, instances_at, top_level, transformed};
-use hedgerow::accel::Instance;
+use hedgerow::accel::{Instance, Tree};
 use hedgerow::ash::vk;
-use hedgerow::bvh::layout::{Bvh2, InstanceRecord as Placed};
+use hedgerow::ash::vk::Handle;
+use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::layout::{Child, InstanceRecord as Placed};
+use hedgerow::bvh::sah::Collapse;
+use hedgerow::bvh::twin::lbvh;
+use hedgerow::bvh::wide::layout::{Wide8q, WideNode};
 use hedgerow::geometry::Aabb;
 use hedgerow_lab::random::SplitMix64;
 use vk::GeometryFlagsKHR as GeometryFlags;
@@ -32,6 +37,77 @@ fn rays_at(matrix: &Matrix, count: usize, seed: u64) -> Vec<ProbeRay> {
         ProbeRay { flags, decision, ..ProbeRay::new(bring(origin, 1.0), bring(way, 0.0)) }
     };
     (0..count).map(ray).collect()
+}
+
+/// A world's top level, read back.
+fn top_of(world: &World, backend: &Ours) -> Tree<Placed> {
+    let built = world.build(backend);
+    Tree::from_bytes(&built.top.memory.read::<u8>(built.top.bytes as usize)).expect("a structure")
+}
+
+/// The leaves of a tree that is none itself, with boxes as rays meet them.
+fn leaves_of(tree: &Tree<Placed>) -> Vec<Child> {
+    match tree {
+        Tree::OfTwo(tree) => {
+            tree.validate().expect("a valid tree");
+            let used = tree.nodes.iter().filter(|node| node.is_used());
+            used.flat_map(|node| node.children).filter(Child::is_leaf).collect()
+        }
+        Tree::OfEight(tree) => {
+            tree.nodes.iter().flat_map(WideNode::children).flatten().filter(Child::is_leaf).collect()
+        }
+    }
+}
+
+#[test]
+fn leaves_of_many_instances_show_each_of_them() {
+    let mut random = SplitMix64::new(17);
+    let parts = vec![triangles(soup(60, 0.4, 5)), Part::Boxes(vec![(boxes(9, 0.3, 6), GeometryFlags::empty())])];
+    let placed = |i: u64| Instance::new(1 + i % 2, moved(scaled(rotation(i), [0.4; 3]), random.around(2.0)));
+    let instances: Vec<Instance> = (0..700).map(placed).collect();
+    let world =
+        World { flags: vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_BUILD, ..World::new(parts, instances) };
+    let backend = Ours::on(device());
+    let built = world.build(&backend);
+    let bytes = built.top.memory.read::<u8>(built.top.bytes as usize);
+    let tree = Tree::<Placed>::from_bytes(&bytes).expect("a structure");
+    let mut boxes = vec![Err(0); tree.records().len()];
+    for leaf in leaves_of(&tree) {
+        assert_eq!(leaf.count, 1);
+        boxes[leaf.index as usize] = Ok(leaf.bounds());
+    }
+    let rays: Vec<ProbeRay> = (0..1500)
+        .map(|i| {
+            let (origin, target) = (random.around(3.0), random.around(2.0));
+            let ray = ProbeRay::new(origin, std::array::from_fn(|k| target[k] - origin[k]));
+            let (flags, decision) = [(flags::SKIP_BOXES, CONFIRM), (flags::NO_OPAQUE, IGNORE)][i % 2];
+            ProbeRay { flags, decision, ..ray }
+        })
+        .collect();
+    let expected = backend.probe(built.top.structure, &rays);
+    assert!(expected.iter().filter(|report| report.committed.kind != 0).count() > 500, "too few hits for a test");
+    // One a leaf, some a leaf, and all in one leaf, which is a node of its own where nodes are of eight.
+    for (c_i, in_leaf) in [(1e9, 1..=1), (1.0, 2..=255), (0.0, 700..=700)] {
+        let collapse = Collapse { c_i, ..Collapse::SAH };
+        let record = |i: u32| tree.records()[i as usize];
+        let of_two = lbvh::build_boxes(&boxes, record, Code::Mc30.full(), collapse);
+        let of_eight = Wide8q::of(&of_two);
+        let children = of_two.nodes.iter().filter(|node| node.is_used()).flat_map(|node| node.children);
+        let largest = children.chain([of_two.header.root]).filter(Child::is_leaf).map(|leaf| leaf.count).max();
+        assert!(largest.is_some_and(|most| in_leaf.contains(&most)), "{largest:?} a leaf, not {in_leaf:?}");
+        for (what, bytes) in [("two", of_two.to_bytes()), ("eight", of_eight.to_bytes())] {
+            let memory = device().upload("top level", &bytes).expect("memory");
+            let got = backend.probe(vk::AccelerationStructureKHR::from_raw(memory.address()), &rays);
+            for (i, (got, expected)) in got.iter().zip(&expected).enumerate() {
+                let what = format!("nodes of {what}, up to {largest:?} a leaf, ray {i}");
+                assert_eq!(got.committed, expected.committed, "{what}");
+                // Where nothing is a hit, nothing is left out for being behind one.
+                if rays[i].decision == IGNORE {
+                    assert_eq!(got.candidate_count, expected.candidate_count, "{what}");
+                }
+            }
+        }
+    }
 }
 
 #[test]
@@ -235,14 +311,22 @@ fn the_box_of_an_instance_holds_all_of_it_and_little_more() {
             Instance::new(1 + random.bits() % 4, moved(matrix, random.around(away)))
         })
         .collect();
-    let world = World::new(meshes.iter().cloned().map(triangles).collect(), instances);
-    let built = world.build(&Ours::on(device()));
-    let tree = Bvh2::<Placed>::from_bytes(&built.top.memory.read::<u8>(built.top.bytes as usize)).expect("a structure");
-    tree.validate().expect("a valid tree");
-    assert_eq!((tree.header.status, tree.header.active), (0, 2000));
+    let parts: Vec<Part> = meshes.iter().cloned().map(triangles).collect();
+    for flags in [vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_BUILD, Default::default()] {
+        let world = World { flags, ..World::new(parts.clone(), instances.clone()) };
+        boxes_hold(&world, &meshes);
+    }
+}
+
+/// Boxes of the top level's leaves hold every corner of the meshes in them, in nodes of two and of eight.
+fn boxes_hold(world: &World, meshes: &[Corners]) {
+    let tree = top_of(world, &Ours::on(device()));
+    // Bytes of a node's own grid are coarser.
+    let is_exact = matches!(tree, Tree::OfTwo(_));
+    assert_eq!((tree.header().status, tree.header().active), (0, 2000));
     let mut checked = 0;
-    for leaf in tree.nodes.iter().filter(|node| node.is_used()).flat_map(|node| node.children).filter(|c| c.is_leaf()) {
-        for placed in &tree.records[leaf.index as usize..][..leaf.count as usize] {
+    for leaf in leaves_of(&tree) {
+        for placed in &tree.records()[leaf.index as usize..][..leaf.count as usize] {
             checked += 1;
             let instance = &world.instances[placed.instance as usize];
             let corners = &meshes[instance.structure as usize - 1];
@@ -259,7 +343,8 @@ fn the_box_of_an_instance_holds_all_of_it_and_little_more() {
                 let most = (0..3).map(|k| ends(k)[0].max(ends(k)[1])).sum::<f64>() + matrix[row][3];
                 let terms: f64 = (0..3).map(|k| ends(k)[0].abs().max(ends(k)[1].abs())).sum();
                 let slack = 1e-6 * (terms + matrix[row][3].abs());
-                assert!(least - slack <= lo && hi <= most + slack, "{instance:?}: {lo}..{hi}, not {least}..{most}");
+                let is_tight = least - slack <= lo && hi <= most + slack;
+                assert!(is_tight || !is_exact, "{instance:?}: {lo}..{hi}, not {least}..{most}");
             }
         }
     }

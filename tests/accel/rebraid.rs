@@ -2,27 +2,27 @@
 
 use crate::common::backends::{Backend, Ours};
 use crate::common::device;
-use crate::common::mixture::{Bottom, ReadBack, diagonal, mixture, part, scaled};
+use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
 use crate::common::probe::{IGNORE, ProbeRay, flags};
 use crate::common::shapes::{Corners, icosphere, placed, soup};
 use crate::common::world::World;
-use hedgerow::accel::{self, AccelOptions, Instance, REBRAID, twin};
+use hedgerow::accel::{self, AccelOptions, Instance, REBRAID, Tree, twin};
 use hedgerow::ash::vk;
 use hedgerow::bvh::codes::{Binning, Code, CodeBounds};
-use hedgerow::bvh::layout::{self, Bvh2, Child, Record, Triangle, status};
+use hedgerow::bvh::layout::{self, Child, Record, Triangle, status};
 use hedgerow::bvh::wide::layout::WideNode;
 use hedgerow_lab::random::SplitMix64;
 use std::collections::BTreeMap;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 
 fn with_budget(rebraid_budget: f32) -> Ours {
-    Ours::with_options(device(), AccelOptions { rebraid_budget, wide: true, ..AccelOptions::DEFAULT })
+    Ours::with_options(device(), AccelOptions { rebraid_budget, ..Ours::OPTIONS })
 }
 
 /// Where the entries of each instance begin.
 fn entries_of(read: &ReadBack) -> BTreeMap<u32, Vec<[u32; 2]>> {
     let mut all = BTreeMap::<u32, Vec<[u32; 2]>>::new();
-    for record in read.top.records.iter().filter(|record| record.structure != 0) {
+    for record in read.top.records().iter().filter(|record| record.structure != 0) {
         all.entry(record.instance).or_default().push(record.begin());
     }
     all
@@ -38,18 +38,18 @@ fn reached_by(read: &ReadBack, instance: u32, starts: &[[u32; 2]]) -> Vec<u32> {
     }
 }
 
-fn reached<R: Record>(structure: &Bottom<R>, starts: &[[u32; 2]]) -> Vec<u32> {
+fn reached<R: Record>(structure: &Tree<R>, starts: &[[u32; 2]]) -> Vec<u32> {
     let mut counts = vec![0; structure.header().active as usize];
     let mut count_all =
         |[index, count]: [u32; 2]| counts[index as usize..][..count as usize].iter_mut().for_each(|n| *n += 1);
     let mut waiting = starts.to_vec();
     while let Some([index, count]) = waiting.pop() {
         match structure {
-            Bottom::OfTwo(_) if count > 0 => count_all([index, count]),
-            Bottom::OfTwo(tree) => {
+            Tree::OfTwo(_) if count > 0 => count_all([index, count]),
+            Tree::OfTwo(tree) => {
                 waiting.extend(tree.nodes[index as usize].children.map(|Child { index, count, .. }| [index, count]))
             }
-            Bottom::OfEight(tree) => {
+            Tree::OfEight(tree) => {
                 let node = &tree.nodes[index as usize];
                 if let Some((first, count)) = node.long_leaf() {
                     count_all([first, count]);
@@ -87,12 +87,12 @@ fn a_top_level_has_the_bytes_of_the_hosts() {
         for by_pointers in [false, true] {
             let world = World { by_pointers, ..mixture(count, count as u64) };
             let read = ReadBack::new(&backend, &world);
-            let options = AccelOptions { rebraid_budget: budget, ..AccelOptions::DEFAULT };
+            let options = AccelOptions { rebraid_budget: budget, ..Ours::OPTIONS };
             let expected = twin::top_level(&read.instances, |a| read.below(a), world.flags, &options);
             let what = format!("{count} instances, budget {budget}");
-            assert_eq!(read.top.header, expected.header, "{what}");
-            let differ = read.top.records.iter().zip(&expected.records).position(|(a, b)| a != b);
-            assert_eq!(differ.map(|i| (read.top.records[i], expected.records[i])), None, "{what}");
+            assert_eq!(read.top.header(), expected.header(), "{what}");
+            let differ = read.top.records().iter().zip(expected.records()).position(|(a, b)| a != b);
+            assert_eq!(differ.map(|i| (read.top.records()[i], expected.records()[i])), None, "{what}");
             assert!(read.top.to_bytes() == expected.to_bytes(), "{what}: the nodes differ");
         }
     }
@@ -101,7 +101,6 @@ fn a_top_level_has_the_bytes_of_the_hosts() {
 #[test]
 fn what_the_flags_ask_for_is_what_the_host_builds() {
     let world = mixture(400, 3);
-    let backend = Ours::on(device());
     let all = [
         Flags::empty(),
         REBRAID | Flags::PREFER_FAST_BUILD,
@@ -110,12 +109,15 @@ fn what_the_flags_ask_for_is_what_the_host_builds() {
         REBRAID | Flags::ALLOW_UPDATE,
         Flags::PREFER_FAST_TRACE | Flags::ALLOW_UPDATE,
     ];
-    for flags in all {
-        let read = ReadBack::new(&backend, &World { flags, ..world.clone() });
-        let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &AccelOptions::DEFAULT);
+    for (flags, wide) in all.into_iter().flat_map(|flags| [(flags, false), (flags, true)]) {
+        let options = AccelOptions { wide, ..AccelOptions::DEFAULT };
+        let read = ReadBack::new(&Ours::with_options(device(), options), &World { flags, ..world.clone() });
+        let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &options);
         assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}");
+        let is_wide = wide && !flags.intersects(Flags::ALLOW_UPDATE | Flags::PREFER_FAST_BUILD);
+        assert_eq!(matches!(read.top, Tree::OfEight(_)), is_wide, "{flags:?}");
         let opens = flags.intersects(REBRAID | Flags::PREFER_FAST_TRACE) && !flags.contains(Flags::ALLOW_UPDATE);
-        assert_eq!(read.top.header.primitive_count > 400, opens, "{flags:?}");
+        assert_eq!(read.top.header().primitive_count > 400, opens, "{flags:?}");
         assert_eq!(entries_of(&read).values().any(|starts| starts.len() > 1), opens, "{flags:?}");
     }
 }
@@ -131,10 +133,10 @@ fn top_levels_by_any_codes_are_those_of_the_host() {
         Code::Bin(Binning::Q4_A4).full(),
         robust,
     ] {
-        let options = AccelOptions { top_codes: Some(codes), wide: true, ..AccelOptions::DEFAULT };
+        let options = AccelOptions { top_codes: Some(codes), ..Ours::OPTIONS };
         let read = ReadBack::new(&Ours::with_options(device(), options), &world);
         let expected = twin::top_level(&read.instances, |a| read.below(a), world.flags, &options);
-        assert_eq!(read.top.header.code_bits, codes.bits, "{codes:?}");
+        assert_eq!(read.top.header().code_bits, codes.bits, "{codes:?}");
         assert!(read.top.to_bytes() == expected.to_bytes(), "{codes:?}");
     }
 }
@@ -144,10 +146,10 @@ fn entries_keep_to_the_budget_and_reach_every_primitive_once() {
     for (count, budget) in [(1, 2.0), (50, 1.3), (400, 2.0), (400, 16.0), (1500, 2.5)] {
         let read = ReadBack::new(&with_budget(budget), &mixture(count, 77));
         let most = (f64::from(budget) * count as f64).ceil() as u32;
-        assert_eq!(read.top.header.primitive_count, most);
-        assert!(read.top.header.active <= most, "{count} {budget}");
+        assert_eq!(read.top.header().primitive_count, read.top.header().active);
+        assert!(read.top.header().active <= most, "{count} {budget}");
         let entries = entries_of(&read);
-        assert_eq!(entries.values().map(Vec::len).sum::<usize>(), read.top.header.active as usize);
+        assert_eq!(entries.values().map(Vec::len).sum::<usize>(), read.top.header().active as usize);
         for (&instance, starts) in &entries {
             let counts = reached_by(&read, instance, starts);
             assert!(
@@ -157,7 +159,7 @@ fn entries_keep_to_the_budget_and_reach_every_primitive_once() {
         }
         // Not one that can be seen is lost: what is not there has no inverse, or nothing to show.
         for (i, instance) in read.instances.iter().enumerate().filter(|(i, _)| !entries.contains_key(&(*i as u32))) {
-            let below = |b: &Bottom<Triangle>| b.header().active == 0;
+            let below = |b: &Tree<Triangle>| b.header().active == 0;
             let shows_nothing = instance.structure == 0 || read.triangles.get(&instance.structure).is_some_and(below);
             let m = instance.transform.map(|row| row.map(f64::from));
             let minor = |r: usize, s: usize, c: usize, d: usize| m[r][c] * m[s][d] - m[r][d] * m[s][c];
@@ -165,7 +167,7 @@ fn entries_keep_to_the_budget_and_reach_every_primitive_once() {
             let is_bad = determinant == 0.0 || instance.transform.iter().flatten().any(|x| !x.is_finite());
             assert!(shows_nothing || is_bad, "{i} {instance:?}");
         }
-        assert_eq!(read.top.header.status & !status::BAD_INSTANCE, 0);
+        assert_eq!(read.top.header().status & !status::BAD_INSTANCE, 0);
     }
 }
 
@@ -216,7 +218,10 @@ fn candidates_are_those_of_whole_instances() {
         })
         .collect();
     let whole = World::new(parts, instances);
+    // The top level is of nodes of eight; and of nodes of two, over the same.
+    let by_two = World { flags: Flags::PREFER_FAST_BUILD, ..whole.clone() };
     let opened = World { flags: REBRAID, ..whole.clone() };
+    let opened_by_two = World { flags: REBRAID | Flags::PREFER_FAST_BUILD, ..whole.clone() };
     let rays: Vec<ProbeRay> = (0..2000)
         .map(|i| {
             let origin = random.around(2.0);
@@ -229,20 +234,22 @@ fn candidates_are_those_of_whole_instances() {
     let backend = with_budget(6.0);
     let read = ReadBack::new(&backend, &opened);
     assert!(entries_of(&read).values().any(|starts| starts.len() > 4), "nothing is opened: no test");
-    let [expected, got] = [&whole, &opened].map(|world| {
+    let [expected, all @ ..] = [&by_two, &whole, &opened, &opened_by_two].map(|world| {
         let built = world.build(&backend);
         backend.probe(built.top.structure, &rays)
     });
-    let mut met = 0;
-    for (i, (expected, got)) in expected.iter().zip(&got).enumerate() {
-        // An any-hit shader runs once for each: neither twice nor less for what is opened.
-        assert_eq!(got.candidate_count, expected.candidate_count, "ray {i}");
-        if got.candidate_count <= 8 {
-            assert_eq!(got.sorted_candidates(), expected.sorted_candidates(), "ray {i}");
+    for (what, got) in ["whole", "opened", "opened, nodes of two"].into_iter().zip(&all) {
+        let mut met = 0;
+        for (i, (expected, got)) in expected.iter().zip(got).enumerate() {
+            // An any-hit shader runs once for each: neither twice nor less for what is opened.
+            assert_eq!(got.candidate_count, expected.candidate_count, "{what}, ray {i}");
+            if got.candidate_count <= 8 {
+                assert_eq!(got.sorted_candidates(), expected.sorted_candidates(), "{what}, ray {i}");
+            }
+            met += got.candidate_count;
         }
-        met += got.candidate_count;
+        assert!(met > 1000, "{what}: {met} candidates are no test");
     }
-    assert!(met > 1000, "{met} candidates are no test");
 }
 
 #[test]
@@ -251,7 +258,12 @@ fn the_same_input_gives_the_same_bytes_every_time() {
         let world = mixture(count, 9);
         let backend = with_budget(3.0);
         let built = world.build(&backend);
-        let bytes = built.top.memory.read::<u8>(built.top.bytes as usize);
+        // What lies behind the structure is nobody's.
+        let in_use = |built: &crate::common::backends::Built| {
+            let bytes = built.memory.read::<u8>(built.bytes as usize);
+            Tree::<layout::InstanceRecord>::from_bytes(&bytes).expect("a top level").to_bytes()
+        };
+        let bytes = in_use(&built.top);
         for _ in 0..5 {
             let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
                 .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
@@ -259,7 +271,7 @@ fn the_same_input_gives_the_same_bytes_every_time() {
                 .geometries(std::slice::from_ref(&built.geometry));
             let range = vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count as u32);
             let again = crate::common::backends::Built::new(&backend, &info, &[range], 0);
-            assert!(again.memory.read::<u8>(again.bytes as usize) == bytes, "{count}");
+            assert!(in_use(&again) == bytes, "{count}");
         }
     }
 }
@@ -292,10 +304,10 @@ fn fewer_instances_than_were_planned_for_are_opened_too() {
             )
         })
         .expect("it builds");
-    let tree: Bvh2<layout::InstanceRecord> =
-        Bvh2::from_bytes(&top.memory.read::<u8>(top.bytes as usize)).expect("a top level");
+    let tree: Tree<layout::InstanceRecord> =
+        Tree::from_bytes(&top.memory.read::<u8>(top.bytes as usize)).expect("a top level");
     let mut counts = BTreeMap::<u32, u32>::new();
-    tree.records.iter().filter(|r| r.structure != 0).for_each(|r| *counts.entry(r.instance).or_default() += 1);
-    assert_eq!(counts.values().sum::<u32>(), tree.header.active);
+    tree.records().iter().filter(|r| r.structure != 0).for_each(|r| *counts.entry(r.instance).or_default() += 1);
+    assert_eq!(counts.values().sum::<u32>(), tree.header().active);
     assert!(counts.keys().all(|&i| i < 120) && counts.values().any(|&n| n > 1), "{counts:?}");
 }

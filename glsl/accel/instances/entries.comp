@@ -29,8 +29,8 @@ Entry entry_of(uvec2 given_at, uint i) {
     if (!is_finite_matrix(given.to_world) || !inverse_of(given.to_world, inverse)) return entry;
     Structure structure = Structure(given.structure);
     Header header = structure.header;
-    bool is_below = header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || is_quantised(header.kind);
-    if (header.magic != MAGIC || !is_below) return entry;
+    bool is_known = header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || is_quantised(header.kind);
+    if (header.magic != MAGIC || !is_known || has_instances(header.kind)) return entry;
     entry.left_out = INACTIVE;
     if (header.active_count == 0u || (header.status & STATUS_UNUSABLE) != 0u) return entry;
     uint slots = min(header.node_slots, INDEX_MASK) | form_of(header);

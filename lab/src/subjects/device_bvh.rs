@@ -174,7 +174,7 @@ fn record_trace(
     buffers: &TraceBuffers,
 ) -> hedgerow::Result<()> {
     match wide_tree {
-        None if binary.by_query => queries::record(recorder, query, buffers),
+        None if binary.by_query => queries::record(recorder, query, buffers, false),
         None => record_binary(recorder, binary.is_ordered, query, buffers),
         Some(tree) => tree.record_trace(recorder, query, buffers),
     }

@@ -47,6 +47,12 @@ impl<'a> Levels<'a> {
         Ok(Levels { structures, _parts: parts, top, timestamps })
     }
 
+    /// The same, built and traced further on by the calls of other structures of the same maker.
+    #[must_use]
+    pub fn traced_as(self, structures: Structures<'a>) -> Levels<'a> {
+        Levels { structures, ..self }
+    }
+
     /// Writes other transforms, for [`Levels::update`] or a build.
     pub fn place(&self, transforms: impl Iterator<Item = [[f32; 4]; 3]>) {
         let mut all: Vec<Instance> = self.top.input().read(self.top.count as usize);

@@ -163,7 +163,7 @@ impl<'a> Structures<'a> {
         query: Query,
     ) -> hedgerow::Result<()> {
         match self.maker {
-            Functions::Ours(_) => queries::record(recorder, query, buffers),
+            Functions::Ours(ref ours) => queries::record(recorder, query, buffers, ours.options().wide),
             Functions::Driver(_) => {
                 let any_hit = query == Query::AnyHit;
                 let &TraceBuffers { structure, rays, hits, count, .. } = buffers;

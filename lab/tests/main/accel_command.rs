@@ -93,6 +93,27 @@ fn one_experiment_is_measured_alone() {
 }
 
 #[test]
+fn nodes_of_eight_are_measured_and_a_mesh_is_one_instance() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let done = tiny(folder.path(), &["gen:forest:9", "gen:icosphere:3", "--experiments", "rebraid", "--wide"]);
+    assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+    let entries = page::read(folder.path()).expect("records");
+    let points: Vec<_> =
+        entries.iter().filter_map(|e| if let AccelEntry::Rebraid(p) = e { Some(p) } else { None }).collect();
+    let [forest, sphere] = points[..] else { panic!("{entries:?}") };
+    assert_eq!((forest.instances, sphere.instances, sphere.parts), (9, 1, 1));
+    for point in [forest, sphere] {
+        assert!(point.rays.iter().all(|rays| rays.different == 0) && point.rays[0].hits > 0, "{point:?}");
+        // Nine instances fit into two nodes of eight; nodes of two are eight.
+        assert!(point.rays.iter().all(|rays| rays.off_work.top_nodes <= 2.0), "{point:?}");
+    }
+    assert!(
+        sphere.rays.iter().all(|rays| rays.off_work == rays.on_work && rays.off_work.instances <= 1.0),
+        "{sphere:?}"
+    );
+}
+
+#[test]
 fn wrong_arguments_are_told_apart_from_failed_work() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (wrong, says) in [
@@ -105,7 +126,6 @@ fn wrong_arguments_are_told_apart_from_failed_work() {
         (&["--structures", "0"], "--structures"),
         (&["--size", "640"], "write WxH"),
         (&["gen:forest:x"], "not the arguments of this generator"),
-        (&["gen:icosphere:2"], "neither instances nor an animation; take an .inst or .anim file"),
     ] {
         let output = folder.path().to_str().expect("text");
         let done = hedgerow(&[&["accel", "-o", output], wrong].concat());

@@ -3,7 +3,7 @@
 pub mod rebraid;
 pub mod serialize;
 
-use super::{AccelOptions, Instance, quality};
+use super::{AccelOptions, Instance, Tree, quality};
 use crate::bvh::builder::{Method, Primitives};
 use crate::bvh::codes::Codes;
 use crate::bvh::layout::{self, Bvh2, Child, Header, Node, Record, status};
@@ -32,6 +32,15 @@ impl<'a, R: Record> From<&'a Bvh2<R>> for Below<'a> {
     }
 }
 
+impl<'a, R: Record> From<&'a Tree<R>> for Below<'a> {
+    fn from(structure: &'a Tree<R>) -> Below<'a> {
+        match structure {
+            Tree::OfTwo(tree) => tree.into(),
+            Tree::OfEight(tree) => tree.into(),
+        }
+    }
+}
+
 impl<'a, R: Record> From<&'a Wide8q<R>> for Below<'a> {
     fn from(structure: &'a Wide8q<R>) -> Below<'a> {
         Below { header: &structure.header, nodes: Nodes::Quantised(&structure.nodes) }
@@ -56,7 +65,7 @@ pub fn top_level<'a>(
     below: impl Fn(u64) -> Option<Below<'a>>,
     flags: vk::BuildAccelerationStructureFlagsKHR,
     options: &AccelOptions,
-) -> Bvh2<layout::InstanceRecord> {
+) -> Tree<layout::InstanceRecord> {
     let mut entries = entries(instances, &below);
     if let Some(capacity) = quality::opened_to(flags, options, entries.len() as u32) {
         rebraid::rebraid(&mut entries, instances, &below, capacity);
@@ -64,6 +73,7 @@ pub fn top_level<'a>(
         entries.resize(capacity as usize, none);
     }
     let boxes: Vec<_> = entries.iter().map(|entry| entry.bounds).collect();
+    let is_wide = quality::is_wide(flags, options, Primitives::Instances, boxes.len() as u32);
     let mut options = quality::build_options(flags, options, Primitives::Instances, boxes.len() as u32);
     // As the builder does.
     if boxes.len() < 2 {
@@ -73,7 +83,7 @@ pub fn top_level<'a>(
     let record = |entry: u32| record_of(&entries[entry as usize], instances, &below);
     let mut tree = bvh::twin::build(&options, codes, |finish| lbvh::build_boxes(&boxes, record, codes, finish));
     tree.header.build_flags = options.build_flags;
-    tree
+    Tree::of(tree, is_wide)
 }
 
 /// One entry for each instance (`entries.comp`).

@@ -1,5 +1,6 @@
 //! `hedgerow accel`: batches, top levels, re-braiding, orders of children and updates; records as they are measured, and a page.
 
+use crate::Result;
 use crate::cli::options::{Kinds, Size};
 use crate::cli::{Bar, Common, work};
 use crate::device::Device;
@@ -9,7 +10,7 @@ use crate::experiments::accel::{AccelSetup, Experiment, any_hit, batch, rebraid,
 use crate::measure::{Failure, Setting, Sink};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
-use crate::{Error, Result};
+use hedgerow::accel::AccelOptions;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
@@ -22,8 +23,8 @@ const UPDATED: [&str; 1] = ["gen:twist:20000:12"];
 /// and a page
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Scenes of instances to re-braid and animations to update: files, bare names or generators [default: generated ones of
-    /// both kinds]
+    /// Scenes to re-braid, any but one of instances as one instance, and animations to update: files, bare names or generators
+    /// [default: generated ones of both kinds]
     #[arg(value_name = "SCENE")]
     scenes: Vec<String>,
     /// What is measured, separated by commas: batch, tlas, rebraid, any-hit (always with shadow and ao rays), update
@@ -49,6 +50,9 @@ pub struct Arguments {
     /// Instances of the largest top level
     #[arg(long, value_name = "N", default_value = "100000")]
     instances: NonZeroU32,
+    /// Ours in nodes of eight, where no update is allowed: less memory, and other times
+    #[arg(long)]
+    wide: bool,
     /// Frames of each animation, spread evenly over all of them
     #[arg(long, value_name = "N", default_value = "12")]
     frames: NonZeroU32,
@@ -67,6 +71,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let say = |what: &str| bar.say(what);
     let stage = AccelSetup {
         device: &device,
+        options: AccelOptions { wide: arguments.wide, ..AccelOptions::DEFAULT },
         runs: arguments.runs.get(),
         kinds: &arguments.rays.0,
         rays: arguments.size.rays(common.seed),
@@ -125,8 +130,7 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<(Vec<Instanc
         } else if let Some(animation) = scene::load_moving(spec, &options)? {
             animations.push(animation);
         } else {
-            let what = "neither instances nor an animation; take an .inst or .anim file, or a generator of such";
-            return Err(Error::Argument(format!("{spec}: {what}")).into());
+            instances.push(scene::load_instances(spec, &options)?);
         }
     }
     if instances.is_empty()
@@ -148,6 +152,7 @@ fn setting(common: &Common, arguments: &Arguments, device: &Device) -> Result<Se
     let options = [
         ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),
         ("Image", format!("{}, seed {}", arguments.size, common.seed)),
+        ("Nodes of ours", if arguments.wide { "of eight, where there can be" } else { "of two" }.into()),
     ];
     Setting::of(Some(device), &options, notes)
 }

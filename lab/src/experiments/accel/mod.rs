@@ -23,7 +23,7 @@ use crate::subjects::levels::Levels;
 use crate::subjects::structures::Structures;
 use crate::{Error, Result};
 use ash::vk;
-use hedgerow::accel;
+use hedgerow::accel::AccelOptions;
 use hedgerow::trace::Query;
 
 /// Runs that do not count, before those that do.
@@ -57,6 +57,8 @@ named!(Experiment, "experiment":
 pub struct AccelSetup<'a> {
     /// Where they run.
     pub device: &'a Device,
+    /// Of our structures.
+    pub options: AccelOptions,
     /// Counted runs of everything, in turn, after one that warms up.
     pub runs: u32,
     /// Kinds of rays.
@@ -69,7 +71,7 @@ pub struct AccelSetup<'a> {
 
 impl<'a> AccelSetup<'a> {
     fn ours(&self) -> Structures<'a> {
-        Structures::ours(self.device, accel::AccelOptions::DEFAULT)
+        Structures::ours(self.device, self.options)
     }
 
     /// Ours, and the driver's where it has any.

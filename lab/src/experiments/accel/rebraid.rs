@@ -30,7 +30,7 @@ const DRIVER: usize = 2;
 pub fn measure(stage: &AccelSetup<'_>, instances: &Instances, point: &mut Sink<'_, AccelEntry>) -> Result<()> {
     let say = |what: &str| (stage.say)(&format!("re-braiding {}: {what}", instances.name));
     say("building");
-    let unopened = AccelOptions { rebraid_budget: 1.0, ..AccelOptions::DEFAULT };
+    let unopened = AccelOptions { rebraid_budget: 1.0, ..stage.options };
     let ours = [Structures::ours(stage.device, unopened), stage.ours()];
     let all = ours.into_iter().chain(Structures::drivers(stage.device));
     let levels = all.map(|maker| Levels::new(maker, instances, Flags::PREFER_FAST_TRACE));

@@ -62,9 +62,12 @@ pub trait Backend {
 pub struct Ours(pub accel::Device<'static>, Probe, Structures<'static>);
 
 impl Ours {
-    /// With the defaults, but for nodes of eight where there can be: beside nodes of two, so that queries meet both.
+    /// The defaults, but for nodes of eight where there can be: beside nodes of two, so that queries meet both.
+    pub const OPTIONS: accel::AccelOptions = accel::AccelOptions { wide: true, ..accel::AccelOptions::DEFAULT };
+
+    /// With [`Ours::OPTIONS`].
     pub fn on(device: &'static Device) -> Ours {
-        Ours::with_options(device, accel::AccelOptions { wide: true, ..accel::AccelOptions::DEFAULT })
+        Ours::with_options(device, Ours::OPTIONS)
     }
 
     /// With these options.

@@ -6,9 +6,8 @@ use super::shapes::{Corners, boxes_by, icosphere, soup};
 use super::world::{BuiltWorld, Part, World};
 use crate::random::SplitMix64;
 use ash::vk;
-use hedgerow::accel::{Instance, REBRAID, twin};
-use hedgerow::bvh::layout::{self, BoxRecord, Bvh2, Header, Record, Triangle};
-use hedgerow::bvh::wide::layout::Wide8q;
+use hedgerow::accel::{Instance, REBRAID, Tree, twin};
+use hedgerow::bvh::layout::{BoxRecord, InstanceRecord, Triangle};
 use std::collections::BTreeMap;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
@@ -67,43 +66,13 @@ pub fn mixture(count: usize, seed: u64) -> World {
 /// The structures of a world, read back, and the instances as they were given.
 pub struct ReadBack {
     /// The top level.
-    pub top: Bvh2<layout::InstanceRecord>,
+    pub top: Tree<InstanceRecord>,
     /// The instances, with the addresses of their structures.
     pub instances: Vec<Instance>,
     /// Structures of triangles by their addresses.
-    pub triangles: BTreeMap<u64, Bottom<Triangle>>,
+    pub triangles: BTreeMap<u64, Tree<Triangle>>,
     /// Structures of boxes by theirs.
-    pub boxes: BTreeMap<u64, Bottom<BoxRecord>>,
-}
-
-/// A bottom-level structure.
-pub enum Bottom<R: Record> {
-    OfTwo(Bvh2<R>),
-    OfEight(Wide8q<R>),
-}
-
-impl<R: Record> Bottom<R> {
-    fn read(bytes: &[u8]) -> Bottom<R> {
-        let header: Header = bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()]);
-        match layout::is_quantised(header.kind) {
-            true => Bottom::OfEight(Wide8q::from_bytes(bytes).expect("a structure of nodes of eight")),
-            false => Bottom::OfTwo(Bvh2::from_bytes(bytes).expect("a structure of nodes of two")),
-        }
-    }
-
-    pub fn header(&self) -> &Header {
-        match self {
-            Bottom::OfTwo(tree) => &tree.header,
-            Bottom::OfEight(tree) => &tree.header,
-        }
-    }
-
-    fn below(&self) -> twin::Below<'_> {
-        match self {
-            Bottom::OfTwo(tree) => tree.into(),
-            Bottom::OfEight(tree) => tree.into(),
-        }
-    }
+    pub boxes: BTreeMap<u64, Tree<BoxRecord>>,
 }
 
 impl ReadBack {
@@ -118,17 +87,19 @@ impl ReadBack {
         for (part, built) in world.parts.iter().zip(parts) {
             let (address, bytes) = (backend.address(built.structure), bytes(built));
             match part {
-                Part::Triangles(_) => drop(triangles.insert(address, Bottom::read(&bytes))),
-                Part::Boxes(_) => drop(boxes.insert(address, Bottom::read(&bytes))),
+                Part::Triangles(_) => {
+                    drop(triangles.insert(address, Tree::from_bytes(&bytes).expect("a structure of triangles")));
+                }
+                Part::Boxes(_) => drop(boxes.insert(address, Tree::from_bytes(&bytes).expect("a structure of boxes"))),
             }
         }
-        let top = Bvh2::from_bytes(&bytes(top)).expect("a top level");
+        let top = Tree::from_bytes(&bytes(top)).expect("a top level");
         ReadBack { top, instances: world.placed(backend, parts), triangles, boxes }
     }
 
     /// What an instance points to.
     pub fn below(&self, address: u64) -> Option<twin::Below<'_>> {
-        let triangles = self.triangles.get(&address).map(Bottom::below);
-        triangles.or_else(|| self.boxes.get(&address).map(Bottom::below))
+        let triangles = self.triangles.get(&address).map(twin::Below::from);
+        triangles.or_else(|| self.boxes.get(&address).map(twin::Below::from))
     }
 }

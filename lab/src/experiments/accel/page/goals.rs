@@ -10,6 +10,9 @@ const BATCH: f64 = 10.0;
 /// Of the speed of rays through plain top levels, that through re-braided ones: where boxes overlap, and where they do not.
 const REBRAID: f64 = 1.2;
 const REBRAID_APART: f64 = 0.97;
+/// Of the speed of the driver's ray queries, in the mean of scenes and kinds of rays, and for the slowest of them.
+const OVER_DRIVER: f64 = 1.4;
+const SLOWEST_OVER_DRIVER: f64 = 0.95;
 
 /// Something to be reached.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +63,37 @@ pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
             goals.push(Goal { what: format!("{}, re-braided ({how}): all kinds of rays", point.scene), ratio, least });
         }
     }
+    if let Some(ratio) = over_driver(&measured.rebraids) {
+        let what = "all kinds of rays through both levels, against the driver's ray queries".into();
+        goals.push(Goal { what, ratio, least: OVER_DRIVER });
+        let slowest = Spread { median: ratio.min, max: ratio.min, ..ratio };
+        goals.push(Goal { what: "the slowest of them".into(), ratio: slowest, least: SLOWEST_OVER_DRIVER });
+    }
+    for point in &measured.rebraids {
+        if let Some(driver) = &point.driver {
+            let ([ours, theirs], what) = ([point.on.build_ms, driver.build_ms], &point.scene);
+            let ratio = Spread {
+                median: theirs.median / ours.median,
+                min: theirs.min / ours.max,
+                max: theirs.max / ours.min,
+                runs: ours.runs,
+            };
+            goals.push(Goal {
+                what: format!("{what}: the top level's build, against the driver's"),
+                ratio,
+                least: 1.0,
+            });
+        }
+    }
     goals
+}
+
+/// How many times as fast rays are as the driver's: the geometric mean over scenes and kinds of rays, the least and the greatest.
+fn over_driver(points: &[RebraidPoint]) -> Option<Spread> {
+    let rays = points.iter().flat_map(|point| &point.rays);
+    let ratios: Vec<f64> = rays.filter_map(|r| Some(r.driver_ms?.median / r.on_ms.median)).collect();
+    let median = geometric_mean(ratios.iter().copied())?;
+    Some(Spread { median, ..Spread::of(&ratios)? })
 }
 
 /// Whether re-braiding has something to gain: the box of an instance overlaps another's, in the mean.
