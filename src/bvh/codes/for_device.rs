@@ -45,5 +45,6 @@ impl Codes {
             | self.bits << 8
             | count_bits << 15
             | stretch.ilog2() << 19
+            | u32::from(self.code == Code::Emc64VarExtents) << 23
     }
 }
