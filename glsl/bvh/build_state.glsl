@@ -128,7 +128,7 @@ uint write_reference(uvec2 records, uint position, Geometry g, uint reference, o
 
 CodeKind kind_of_codes() {
     return CodeKind(code_kind & 3u, code_kind >> 8 & 0x7Fu, 3u * (code_kind >> 6 & 3u), code_kind >> 2 & 3u,
-                    (code_kind >> 4 & 3u) + (CODE_PREFIX == PREFIX_CELLS ? 1u : 0u), code_kind >> 15 & 0xFu, 1u << (code_kind >> 19 & 0xFu), code_kind >> 23 & 1u);
+                    (code_kind >> 4 & 3u) + (CODE_PREFIX == PREFIX_CELLS ? 1u : 0u), code_kind >> 15 & 0xFu, 1u << (code_kind >> 19 & 0xFu));
 }
 
 Box bounds_of_boxes(BuildState state) {

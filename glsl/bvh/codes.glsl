@@ -14,7 +14,10 @@
 #include "bvh/codes/axes.glsl"
 
 // What comes before the bits of the recipe: `Prefix` in src/bvh/codes/plan.rs. Kernels without have none of its code.
-layout(constant_id = 6) const uint CODE_PREFIX = 0;
+layout(constant_id = 6) const uint CODE_PREFIX_WORD = 0;
+const uint CODE_PREFIX = CODE_PREFIX_WORD & 3u;
+// Whether bits of the size are of extents, not of the diagonal: kernels by diagonals have no code for that either.
+const bool BY_EXTENTS = (CODE_PREFIX_WORD & 4u) != 0;
 const uint PREFIX_NONE = 0;
 const uint PREFIX_SECTIONS = 1;
 const uint PREFIX_CELLS = 2;
@@ -48,7 +51,6 @@ struct CodeKind {
     uint depth;        // mipping: layers of 8:1; binning: half the depth of the splits
     uint count_bits;   // binning: bits of a count
     uint stretch;      // binning: 1 / the weight of the stretch factor
-    uint by_extents;   // 1: bits of the size are of extents, not of the diagonal
 };
 
 // Stretch 0 is one axis alone, 1 two in turn, 2 three in turn; per axis, how many bits it has in a stretch, and at which bit of
@@ -209,8 +211,10 @@ CodePlan plan_codes(CodeKind kind, Box bounds, Box scene) {
     precise vec3 e = bounds.hi * plan.size_prescale - bounds.lo * plan.size_prescale;
     precise float diagonal2 = e.x * e.x + e.y * e.y + e.z * e.z;
     plan.size_reciprocal = reciprocal_or_zero(diagonal2);
-    precise vec3 least = BEYOND * e;
-    plan.size_least = mix(ivec3(0), floatBitsToInt(least), greaterThanEqual(floatBitsToInt(least), ivec3(MIN_NORMAL)));
+    if (BY_EXTENTS) {
+        precise vec3 least = BEYOND * e;
+        plan.size_least = mix(ivec3(0), floatBitsToInt(least), greaterThanEqual(floatBitsToInt(least), ivec3(MIN_NORMAL)));
+    }
     plan.area_scale = area_scale_of(scene);
     ivec3 extents = extents_of(bounds);
     if (HAS_GRID) {
@@ -299,14 +303,6 @@ uint size_by_extents(CodeKind kind, CodePlan plan, Box b) {
     return 0xFFFFu >> min((max(bits, 1) - 1) / kind.size_group, 16u);
 }
 
-// The bits of a size, the first of 16 on top. Loops of at most one round: a driver on a CPU goes through every branch.
-uint size_word(CodeKind kind, CodePlan plan, Box b) {
-    uint size = 0;
-    for (uint round = kind.size_group != 0 && kind.by_extents == 0 ? 0 : 1; round < 1; ++round) size = size_of(plan, b);
-    for (uint round = kind.by_extents != 0 ? 0 : 1; round < 1; ++round) size = size_by_extents(kind, plan, b);
-    return size;
-}
-
 // One bit of the size behind each group of coordinate bits.
 uvec2 with_size(CodeKind kind, uvec2 coordinates, uint size) {
     uint left = coordinate_bits(kind);
@@ -375,7 +371,8 @@ CodeParts plain_parts(CodeKind kind, CodePlan plan, Box b) {
     CodeParts parts;
     for (uint axis = 0; axis < 3; ++axis) parts.coordinates[axis] = fraction_of(at[axis], plan.axes[axis]);
     parts.stretches = plan.stretches;
-    parts.size = size_word(kind, plan, b);
+    parts.size = 0;
+    if (kind.size_group != 0) parts.size = BY_EXTENTS ? size_by_extents(kind, plan, b) : size_of(plan, b);
     parts.prefix = 0;
     parts.prefix_bits = 0;
     parts.section = 0;

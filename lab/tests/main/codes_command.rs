@@ -62,6 +62,7 @@ fn the_sweep_has_every_weight_of_the_thesis_beside_the_same_base() {
         for rays in &point.rays {
             assert!(rays.count > 0 && rays.ms.median > 0.0 && rays.base_ms.median > 0.0, "{rays:?}");
             assert_eq!((rays.change_percent.runs, rays.ms.runs), (3, 3));
+            assert!(rays.relative_work.is_some_and(|work| work > 0.5 && work < 2.0), "{rays:?}");
             assert!(rays.change_percent.min > -100.0, "no speed is below none: {rays:?}");
         }
         assert_eq!(point.rays[0].count, 96);
@@ -70,7 +71,9 @@ fn the_sweep_has_every_weight_of_the_thesis_beside_the_same_base() {
         assert!(printed.contains(text), "{text}: {printed}");
     }
     assert!(printed.trim_end().ends_with("codes.html"), "{printed}");
-    for text in ["id=\"sweep-sah\"", "Speed of shadow rays", "Control (Riemersma 2024)", "1/2048"] {
+    for text in
+        ["SAH cost over λ", "Work of primary rays", "Speed of shadow rays", "Control (Riemersma 2024)", "1/2048"]
+    {
         assert!(page.contains(text), "{text}");
     }
     assert!(!page.contains("id=\"added-time\""), "it was not measured");

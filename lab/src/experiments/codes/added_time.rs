@@ -2,15 +2,12 @@
 //! base's, in turn.
 
 use super::points::{AddedTime, CodesEntry};
-use super::{BASE, CodesSetup, WARM_UPS, percent};
+use super::{BASE, CodesSetup, WARM_UPS, least_of_a_run, percent};
 use crate::Result;
 use crate::measure::{Failure, Sink, Spread, in_turn, ratios};
 use crate::scene::Scene;
 use crate::subjects::Subject;
 use hedgerow::bvh::codes::{Binning, Code, CodeBounds, Codes};
-
-/// Builds of a run, of which the least counts: what disturbs a build makes it longer.
-pub const BUILDS_OF_A_RUN: u32 = 3;
 
 /// Every code that there is but the base: those without a grid, by all bounds of [`Code::Emc64Var`], and the rows of table 7.
 pub fn all_codes() -> Vec<Codes> {
@@ -36,7 +33,9 @@ pub fn measure(stage: &CodesSetup<'_>, scene: &Scene, codes: &[Codes], point: &m
         let measured = spec.make_for(stage.device, scene).and_then(|mut subject| {
             // Two at a time: the structures of all would not fit into memory together.
             let mut subjects: [&mut dyn Subject; 2] = [base.as_mut(), subject.as_mut()];
-            let times = in_turn(&mut subjects, WARM_UPS, stage.runs, |subject| least_of_a_run(*subject));
+            let times = in_turn(&mut subjects, WARM_UPS, stage.runs, |subject| {
+                least_of_a_run(|| Ok(subject.build()?.milliseconds))
+            });
             let times: Vec<Vec<f64>> = times.into_iter().collect::<Result<_>>()?;
             let added: Vec<f64> = ratios(&times[1], &times[0]).into_iter().map(percent).collect();
             Ok(AddedTime {
@@ -56,11 +55,6 @@ pub fn measure(stage: &CodesSetup<'_>, scene: &Scene, codes: &[Codes], point: &m
         })?;
     }
     Ok(())
-}
-
-/// Milliseconds of the shortest build of a run.
-fn least_of_a_run(subject: &mut dyn Subject) -> Result<f64> {
-    (0..BUILDS_OF_A_RUN).try_fold(f64::INFINITY, |least, _| Ok(least.min(subject.build()?.milliseconds)))
 }
 
 #[cfg(test)]

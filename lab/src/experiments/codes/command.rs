@@ -53,7 +53,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let mut points = Points::create(&arguments.output)?;
     let options = [
         ("Runs", format!("{} after a warm-up, in turn with {base}", arguments.runs)),
-        ("Builds of a run", format!("{}, the least counts", added_time::BUILDS_OF_A_RUN)),
+        ("Of a run", format!("{} builds or traces, the least counts", super::OF_A_RUN)),
         ("Image", format!("{}, seed {}", arguments.size, common.seed)),
     ];
     points.append(CodesEntry::Setting(Setting::of(device.as_ref(), &options, Vec::new())?))?;

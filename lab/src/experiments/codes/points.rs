@@ -50,6 +50,8 @@ pub struct SweptRays {
     pub ms: Spread,
     /// Speed over that through the base's tree, in percent, run by run: above 0 the other is faster.
     pub change_percent: Spread,
+    /// 3 · steps + 2 · tests a ray over the same through the base's tree, which has no noise; `None` where the tracer counts neither.
+    pub relative_work: Option<f64>,
 }
 
 /// What a code adds to the time of a build.

@@ -2,9 +2,9 @@
 //! 11): each beside the tree of the base, in turn.
 
 use super::points::{CodesEntry, Swept, SweptRays};
-use super::{BASE, COSTS, CodesSetup, WARM_UPS, percent};
+use super::{BASE, COSTS, CodesSetup, WARM_UPS, least_of_a_run, percent};
 use crate::measure::agreement::wrong_where_different;
-use crate::measure::{Failure, Sink, Spread, in_turn, ratios};
+use crate::measure::{Failure, Sink, Spread, in_turn, mean_work, ratios};
 use crate::rays::kinds::{self, RayKind};
 use crate::scene::Scene;
 use crate::subjects::Subject;
@@ -14,8 +14,8 @@ use hedgerow::bvh::codes::{Binning, Code, Codes};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::{lbvh, quality};
-use hedgerow::trace::Ray;
 use hedgerow::trace::twin::tracer as host;
+use hedgerow::trace::{Query, Ray};
 use rayon::prelude::*;
 
 /// Rays that differ between two trees of which brute force looks at, at most.
@@ -106,7 +106,7 @@ fn beside(
     for subject in &mut subjects {
         subject.set_rays(rays)?;
     }
-    let times = in_turn(&mut subjects, WARM_UPS, stage.runs, |subject| subject.trace(query));
+    let times = in_turn(&mut subjects, WARM_UPS, stage.runs, |subject| least_of_a_run(|| subject.trace(query)));
     let times: Vec<Vec<f64>> = times.into_iter().collect::<Result<_>>()?;
     let (expected, found) = (base.subject.hits()?, other.subject.hits()?);
     let wrong = wrong_where_different(truth, rays, query, (&found, &expected), DIFFERENCES);
@@ -115,6 +115,8 @@ fn beside(
             "{wrong} {kind} rays differ from the base's and are wrong by brute force"
         )));
     }
+    let expected = work_of(base.subject.as_mut(), query)?;
+    let relative_work = work_of(other.subject.as_mut(), query)?.zip(expected).map(|(work, base)| work / base);
     // Speed over the base's is time of the base over time.
     let changes: Vec<f64> = ratios(&times[0], &times[1]).into_iter().map(percent).collect();
     Ok(SweptRays {
@@ -123,7 +125,16 @@ fn beside(
         base_ms: Spread::of_some(&times[0])?,
         ms: Spread::of_some(&times[1])?,
         change_percent: Spread::of_some(&changes)?,
+        relative_work: relative_work.filter(|ratio| ratio.is_finite()),
     })
+}
+
+/// What a ray costs in the mean by its steps and tests, where the tracer counts them.
+fn work_of(subject: &mut dyn Subject, query: Query) -> Result<Option<f64>> {
+    let [c_t, c_i] = COSTS;
+    let of =
+        |work: Vec<_>| Some(c_t * mean_work(&work, |work| work.steps)? + c_i * mean_work(&work, |work| work.tests)?);
+    Ok(subject.work(query)?.and_then(of))
 }
 
 #[cfg(test)]

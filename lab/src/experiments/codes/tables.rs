@@ -61,6 +61,11 @@ impl<'p> Sweeps<'p> {
         self.at(scene, stretch)?.relative_sah.map(super::percent)
     }
 
+    /// Work of rays over that through the base's tree, in percent more.
+    pub fn work_percent(&self, scene: &str, stretch: u32, kind: &str) -> Option<f64> {
+        self.rays(scene, stretch, kind)?.relative_work.map(super::percent)
+    }
+
     /// The mean over the scenes of a figure at a weight.
     pub fn mean(&self, stretch: u32, figure: impl Fn(&str, u32) -> Option<f64>) -> Option<f64> {
         mean_percent(self.scenes().into_iter().filter_map(|scene| figure(scene, stretch)))
@@ -127,6 +132,9 @@ fn sweep_text(sweeps: &Sweeps<'_>) -> String {
     };
     rows("SAH", &|scene, stretch| sweeps.sah_percent(scene, stretch));
     for kind in sweeps.kinds() {
+        rows(&format!("{kind} work"), &|scene, stretch| sweeps.work_percent(scene, stretch, kind));
+    }
+    for kind in sweeps.kinds() {
         rows(kind, &|scene, stretch| Some(sweeps.rays(scene, stretch, kind)?.change_percent.median));
     }
     for kind in sweeps.kinds() {
@@ -136,7 +144,7 @@ fn sweep_text(sweeps: &Sweeps<'_>) -> String {
         }
     }
     format!(
-        "Binning over λ: SAH cost and speed of rays over the base's, in percent; in brackets games of Riemersma 2024, tables 8 to 11\n\
+        "Binning over λ: SAH cost, work of rays (3 · steps + 2 · tests) and speed over the base's, in percent; in brackets games of Riemersma 2024, tables 8 to 11\n\
          {table}"
     )
 }
@@ -207,6 +215,7 @@ mod tests {
                     base_ms: Spread::once(1.0),
                     ms: Spread::once(1.0),
                     change_percent: Spread::once(7.5),
+                    relative_work: Some(0.875),
                 }],
             })
         };
@@ -216,7 +225,11 @@ mod tests {
         assert_eq!((sweeps.sah_percent("s", 2), sweeps.sah_percent("s", 4)), (Some(25.0), None));
         let text = text(&entries);
         assert!(
-            text.contains("+25.0") && text.contains("+7.5") && text.contains("1/2") && text.contains("(Control)"),
+            text.contains("+25.0")
+                && text.contains("-12.5")
+                && text.contains("+7.5")
+                && text.contains("1/2")
+                && text.contains("(Control)"),
             "{text}"
         );
         assert!(!text.contains("codes add"), "nothing of it was measured: {text}");

@@ -26,12 +26,15 @@ pub(super) fn part(sweeps: &Sweeps<'_>) -> Result<Option<Part>> {
     let body = html! {
         p {
             "Trees by binning, of each weight λ that the tables of the thesis have, beside those of " code { (base) } ". Changes in percent: of "
-            "speed, more is faster; of SAH cost, less is cheaper."
+            "speed, more is faster; of SAH cost and work, less is cheaper."
         }
         (document::charts(&charts))
         h3 { "SAH cost" }
-        (costs(sweeps))
+        (figures(sweeps, "SAH cost over λ", |scene, stretch| sweeps.sah_percent(scene, stretch)))
         @for kind in sweeps.kinds() {
+            h3 { "Work of " (kind) " rays" }
+            @let label = format!("Work of {kind} rays over λ");
+            (figures(sweeps, &label, |scene, stretch| sweeps.work_percent(scene, stretch, kind)))
             h3 { "Speed of " (kind) " rays" }
             (speeds(sweeps, kind))
         }
@@ -69,9 +72,9 @@ fn chart(sweeps: &Sweeps<'_>, kind: &str) -> Result<Option<Chart>> {
     )
 }
 
-fn costs(sweeps: &Sweeps<'_>) -> Markup {
-    let of = |scene: &str, stretch| sweeps.sah_percent(scene, stretch);
-    let mut table = Table::new("SAH cost over λ", sweeps.scenes()).id("sweep-sah").name("scene", |scene| *scene);
+/// A table of figures without noise, in percent.
+fn figures(sweeps: &Sweeps<'_>, label: &str, of: impl Fn(&str, u32) -> Option<f64> + Copy) -> Markup {
+    let mut table = Table::new(label, sweeps.scenes()).name("scene", |scene| *scene);
     for stretch in sweeps.stretches() {
         table = table.number(&lambda(stretch), "%", move |scene| of(scene, stretch), signed);
     }
