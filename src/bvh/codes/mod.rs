@@ -44,7 +44,7 @@ pub enum Code {
     /// The same with every fourth bit one of the size.
     Emc64VarSize4,
     /// As [`Code::Emc64VarSize4`], but a bit of the size says whether the primitive is too long for its cell along some axis: what
-    /// Riemersma 2024, chapter 6, names as future work.
+    /// Riemersma 2024, section 5, names as future work.
     Emc64VarExtents,
     /// As [`Code::Emc64Var`], without the size.
     Emc64VarNoSize,

@@ -1,7 +1,7 @@
 //! What the bits between those of the coordinates say of a primitive's size, as a word of 16 bits, the first of them on top.
 //!
-//! The *diagonal* of its box over that of the scene as a fraction (Vinkler, Bittner, Havran 2017, section 3.2). Or its *extents*:
-//! what Riemersma 2024, chapter 6, leaves to the future, "the distance a primitive extends into a direction (and might leave its
+//! The *diagonal* of its box over that of the scene as a fraction (Vinkler, Bittner, Havran 2017). Or its *extents*:
+//! what Riemersma 2024, section 5, leaves to the future, "the distance a primitive extends into a direction (and might leave its
 //! cell) instead of a fixed one-dimensional value". A bit is set if along some axis the box is at least [`BEYOND`] times as long
 //! as the cell is that the coordinate bits before it name. Once set, all later ones are, so that the word is a number: how far
 //! down the tree the primitive goes before it is too large for its cell.

@@ -19,7 +19,7 @@ use crate::subjects::builders::Spec;
 use crate::{Error, Result};
 use hedgerow::bvh::codes::{Code, Codes};
 
-/// What all codes are held against: extended Morton codes of 64 bits, without the size (section 3.5 of the thesis).
+/// What all codes are held against: extended Morton codes of 64 bits, without the size (chapter 4 of the thesis).
 pub const BASE: Codes = Code::Emc64VarNoSize.full();
 /// Runs that do not count, before those that do.
 const WARM_UPS: u32 = 1;
