@@ -10,7 +10,7 @@ shift 2
 [ $# -gt 0 ] || set -- $(cd "$(dirname "$0")/../scenes" && ls | grep -E '\.(obj|ply|glb|gltf|tri|anim|inst)(\.zst)?$' | sed 's/\..*//' | sort -u)
 
 specs=(lbvh hlbvh ploc:radius=25 hploc kd-gpu lbvh-host ploc-host sweep kd-exact kd-binned)
-for codes in mc30 mc63 emc64sort emc64var emc64var-nosize mip9 bin4a4 emc64var+concise emc64var+robust mc63/40; do
+for codes in mc30 mc63 emc64sort emc64var emc64var-size4 emc64var-extents emc64var-nosize mip9 bin4a4 bin4a4~2048 emc64var+concise emc64var+robust mc63/40; do
   specs+=("lbvh:codes=$codes")
 done
 for builder in lbvh hlbvh ploc hploc; do

@@ -14,7 +14,10 @@
 #include "bvh/codes/axes.glsl"
 
 // What comes before the bits of the recipe: `Prefix` in src/bvh/codes/plan.rs. Kernels without have none of its code.
-layout(constant_id = 6) const uint CODE_PREFIX = 0;
+layout(constant_id = 6) const uint CODE_PREFIX_WORD = 0;
+const uint CODE_PREFIX = CODE_PREFIX_WORD & 3u;
+// Whether bits of the size are of extents, not of the diagonal: kernels by diagonals have no code for that either.
+const bool BY_EXTENTS = (CODE_PREFIX_WORD & 4u) != 0;
 const uint PREFIX_NONE = 0;
 const uint PREFIX_SECTIONS = 1;
 const uint PREFIX_CELLS = 2;
@@ -24,6 +27,11 @@ const bool HAS_GRID = CODE_PREFIX >= PREFIX_CELLS;
 const uint ORDER_REGULAR = 0;
 const uint ORDER_SORTED = 1;
 const uint ORDER_VARIABLE = 2;
+
+// From how many times its cell's length on a primitive is large: src/bvh/codes/size.rs.
+const float BEYOND = 1.5;
+// The bits of the least float that is not denormal.
+const int MIN_NORMAL = 1 << 23;
 
 // Bits of the grid of binning.
 const uint BINNING_BITS = 7;
@@ -75,6 +83,7 @@ struct CodePlan {
     Axis axes[3];
     float size_prescale;
     float size_reciprocal;
+    ivec3 size_least;  // along each axis the length from which on a primitive is too large for all of the bounds, as a float's bits; 0: flat
     float area_scale;
     Stretches stretches;
     CodeSections sections;
@@ -202,6 +211,10 @@ CodePlan plan_codes(CodeKind kind, Box bounds, Box scene) {
     precise vec3 e = bounds.hi * plan.size_prescale - bounds.lo * plan.size_prescale;
     precise float diagonal2 = e.x * e.x + e.y * e.y + e.z * e.z;
     plan.size_reciprocal = reciprocal_or_zero(diagonal2);
+    if (BY_EXTENTS) {
+        precise vec3 least = BEYOND * e;
+        plan.size_least = mix(ivec3(0), floatBitsToInt(least), greaterThanEqual(floatBitsToInt(least), ivec3(MIN_NORMAL)));
+    }
     plan.area_scale = area_scale_of(scene);
     ivec3 extents = extents_of(bounds);
     if (HAS_GRID) {
@@ -262,6 +275,32 @@ uint size_of(CodePlan plan, Box b) {
     if (squared >= 1.0) return 65535u;
     precise float fixed_point = squared * 4294967296.0;
     return integer_root(uint(fixed_point));
+}
+
+// How many coordinate bits there are up to the one that halves an axis for the `halvings`th time; many where none does.
+uint bits_until(Stretches s, uint axis, uint halvings, uint total) {
+    uint until = halvings == 0 ? 0 : 0x7FFFFFFFu;
+    uint before = 0;
+    for (uint stretch = 0; stretch < 3; ++stretch) {
+        uint to = before + s.bits[stretch][axis];
+        if (halvings > before && halvings <= to) until = total - s.low[stretch][axis] - (to - halvings) * (stretch + 1);
+        before = to;
+    }
+    return until;
+}
+
+// The bits of a size by extents: ones from the first on before which some axis' cell is too short. src/bvh/codes/size.rs explains it.
+uint size_by_extents(CodeKind kind, CodePlan plan, Box b) {
+    precise vec3 e = b.hi * plan.size_prescale - b.lo * plan.size_prescale;
+    ivec3 length = floatBitsToInt(e);
+    uint bits = 0x7FFFFFFFu;
+    for (uint axis = 0; axis < 3; ++axis) {
+        if (length[axis] < MIN_NORMAL || plan.size_least[axis] == 0) continue;
+        uint halvings = uint(max(plan.size_least[axis] - length[axis] + 0x7FFFFF >> 23, 0));
+        bits = min(bits, bits_until(plan.stretches, axis, halvings, coordinate_bits(kind)));
+    }
+    // The bit of the size that stands behind the group in which that one is.
+    return 0xFFFFu >> min((max(bits, 1) - 1) / kind.size_group, 16u);
 }
 
 // One bit of the size behind each group of coordinate bits.
@@ -332,7 +371,8 @@ CodeParts plain_parts(CodeKind kind, CodePlan plan, Box b) {
     CodeParts parts;
     for (uint axis = 0; axis < 3; ++axis) parts.coordinates[axis] = fraction_of(at[axis], plan.axes[axis]);
     parts.stretches = plan.stretches;
-    parts.size = kind.size_group != 0 ? size_of(plan, b) : 0;
+    parts.size = 0;
+    if (kind.size_group != 0) parts.size = BY_EXTENTS ? size_by_extents(kind, plan, b) : size_of(plan, b);
     parts.prefix = 0;
     parts.prefix_bits = 0;
     parts.section = 0;

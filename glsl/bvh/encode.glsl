@@ -203,6 +203,7 @@ void write_recipe(BuildState state, Box boxes, Box bounds) {
     CodePlan plan = plan_codes(kind_of_codes(), bounds, boxes);
     state.plan.size_prescale = plan.size_prescale;
     state.plan.size_reciprocal = plan.size_reciprocal;
+    if (BY_EXTENTS) state.plan.size_least = plan.size_least;
     state.plan.area_scale = plan.area_scale;
     state.plan.stretches = plan.stretches;
     if (HAS_GRID) state.plan.grid = plan.grid;

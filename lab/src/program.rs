@@ -7,6 +7,7 @@ use crate::experiments::animate::command as animate;
 use crate::experiments::bench::command as bench;
 use crate::experiments::check::command as check;
 use crate::experiments::choose::command as choose;
+use crate::experiments::codes::command as codes;
 use crate::experiments::compare::command as compare;
 use crate::experiments::cpu_builders::command as cpu_builders;
 use crate::experiments::fly::command as fly;
@@ -35,6 +36,7 @@ enum Command {
     Bench(bench::Arguments),
     CpuBuilders(cpu_builders::Arguments),
     Predict(predict::Arguments),
+    Codes(codes::Arguments),
     Accel(accel::Arguments),
     Animate(animate::Arguments),
     Fly(fly::Arguments),
@@ -83,6 +85,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Bench(arguments) => bench::run(common, arguments),
         Command::CpuBuilders(arguments) => cpu_builders::run(common, arguments),
         Command::Predict(arguments) => predict::run(common, arguments),
+        Command::Codes(arguments) => codes::run(common, arguments),
         Command::Accel(arguments) => accel::run(common, arguments),
         Command::Animate(arguments) => animate::run(common, arguments),
         Command::Fly(arguments) => fly::run(common, arguments),

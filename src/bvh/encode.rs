@@ -111,7 +111,7 @@ impl Encode {
     pub fn reading_kernel_with(&self, shader: &'static shaders::Shader, input: &Input, more: &[u32]) -> Kernel {
         let constants = self.constants();
         let references = if self.split.is_some() { HAS_REFERENCES } else { 0 };
-        let source = [input.source_constant(self.primitives) | references, self.codes.prefix_number()];
+        let source = [input.source_constant(self.primitives) | references, self.codes.prefix_constant()];
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source, more].concat())
     }
 
@@ -130,7 +130,7 @@ impl Encode {
     /// The kernel of a `reset` shader.
     pub fn reset_kernel(&self, shader: &'static shaders::Shader) -> Kernel {
         let constants = self.constants();
-        Kernel::new(shader, self.shape.workgroup, &[&constants[..], &[0, self.codes.prefix_number()]].concat())
+        Kernel::new(shader, self.shape.workgroup, &[&constants[..], &[0, self.codes.prefix_constant()]].concat())
     }
 
     /// The same with the items that the bounds are found by.

@@ -1,11 +1,11 @@
-//! Codes with a prefix: the device's are the host's bit for bit, over scenes that are far, huge, flat and empty in places.
+//! Codes with a prefix or with sizes: the device's are the host's bit for bit, over scenes that are far, huge, flat and empty in places.
 
 use crate::common::corpus;
 use crate::common::twins::{assert_same, on_device, on_host};
 use hedgerow::bvh::builder::{BuildOptions, Schedule};
 use hedgerow::bvh::codes::Codes;
 
-const CODES: [&str; 16] = [
+const CODES: [&str; 25] = [
     "emc64var+robust",
     "emc64var+robust/24",
     "emc64var+robust/5",
@@ -22,6 +22,15 @@ const CODES: [&str; 16] = [
     "bin6a9~256",
     "bin6a1~2/6",
     "bin6a5+centroid",
+    "bin4a4~512",
+    "bin2a9~1024/30",
+    "bin6a4~2048+concise",
+    "emc64var-size4",
+    "emc64var-size4+robust/32",
+    "emc64var-extents",
+    "emc64var-extents/32",
+    "emc64var-extents+concise/13",
+    "emc64var-extents+robust",
 ];
 
 /// Small triangles in a lattice of these cells, which may be far apart, and larger ones with these corners.
@@ -62,7 +71,7 @@ fn meshes() -> Vec<corpus::Mesh> {
 }
 
 #[test]
-fn every_prefix_gives_the_bytes_of_the_host() {
+fn every_prefix_and_size_gives_the_bytes_of_the_host() {
     for mesh in meshes().into_iter().chain(corpus::meshes()) {
         for codes in CODES {
             let codes: Codes = codes.parse().unwrap();

@@ -5,6 +5,7 @@ pub mod animate;
 pub mod bench;
 pub mod check;
 pub mod choose;
+pub mod codes;
 pub mod compare;
 pub mod cpu_builders;
 pub mod fly;
@@ -28,6 +29,9 @@ pub fn write_pages(folder: &Path) -> Result<()> {
     }
     if beside::PREDICT.is_in(folder) {
         predict::page::write(folder)?;
+    }
+    if beside::CODES.is_in(folder) {
+        codes::page::write(folder)?;
     }
     if beside::ACCEL.is_in(folder) {
         accel::page::write(folder)?;

@@ -39,8 +39,12 @@ pub const CPU_BUILDERS: Page =
 /// `hedgerow predict`.
 pub const PREDICT: Page = Page { records: "predict.jsonl", file: "predict.html", name: "What predicts tracing" };
 
+/// `hedgerow codes`.
+pub const CODES: Page = Page { records: "codes.jsonl", file: "codes.html", name: "Codes" };
+
 /// All of them.
-pub const ALL: [Page; 10] = [INDEX, CPU_BUILDERS, PREDICT, ACCEL, ANIMATE, FLY, GROWTH, LARGE, DEGENERATE, GREEDY];
+pub const ALL: [Page; 11] =
+    [INDEX, CPU_BUILDERS, PREDICT, CODES, ACCEL, ANIMATE, FLY, GROWTH, LARGE, DEGENERATE, GREEDY];
 
 impl Page {
     /// What files of it begin with.

@@ -3,7 +3,7 @@
 use std::process::Command;
 
 /// Each command with its options that are relied on.
-const COMMANDS: [(&str, &[&str]); 17] = [
+const COMMANDS: [(&str, &[&str]); 18] = [
     ("devices", &["--json"]),
     ("build", &["--builder", "--json", "--output", "--runs", "--costs", "--epo"]),
     ("trace", &["--builder", "--rays", "--size", "--json", "--rays-file", "--hits-file", "--any-hit"]),
@@ -12,6 +12,7 @@ const COMMANDS: [(&str, &[&str]); 17] = [
     ("bench", &["--builder", "--rays", "--runs", "--output", "--shard"]),
     ("cpu-builders", &["--builder", "--size", "--runs", "--quick", "--json", "--output"]),
     ("predict", &["--builder", "--rays", "--size", "--runs", "--no-device", "--output"]),
+    ("codes", &["--builder", "--experiments", "--codes", "--rays", "--size", "--runs", "--output"]),
     ("stability", &[]),
     ("compare", &[]),
     ("check", &["--quick", "--json"]),

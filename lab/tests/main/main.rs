@@ -10,6 +10,7 @@ mod animate;
 mod bench;
 mod check;
 mod choose;
+mod codes_command;
 mod contract;
 mod cpu_builders;
 mod cpu_peers;

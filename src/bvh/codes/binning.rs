@@ -31,13 +31,18 @@ pub struct Binning {
 impl Binning {
     /// 1/λ by default.
     pub const STRETCH: u32 = 8;
+    /// 1/λ at most: as far as the thesis' tables 8 to 11 go.
+    pub const STRETCH_MAX: u32 = 2048;
     /// Splits of depth 4, counts of 4 bits: the thesis' balance of time and quality.
     pub const Q4_A4: Binning = Binning { depth: 4, count_bits: 4, stretch: 8 };
 
-    /// Splits of depth 2, 4 or 6, counts of 0 to 9 bits, and the stretch factor weighted by λ = 1/`stretch`, a power of two to 256;
-    /// `None` for anything else.
+    /// Splits of depth 2, 4 or 6, counts of 0 to 9 bits, and the stretch factor weighted by λ = 1/`stretch`, a power of two to
+    /// [`Binning::STRETCH_MAX`]; `None` for anything else.
     pub const fn new(depth: u32, count_bits: u32, stretch: u32) -> Option<Binning> {
-        let is_known = matches!(depth, 2 | 4 | 6) && count_bits <= 9 && stretch.is_power_of_two() && stretch <= 256;
+        let is_known = matches!(depth, 2 | 4 | 6)
+            && count_bits <= 9
+            && stretch.is_power_of_two()
+            && stretch <= Binning::STRETCH_MAX;
         if is_known {
             Some(Binning { depth: depth as u8, count_bits: count_bits as u8, stretch: stretch as u16 })
         } else {

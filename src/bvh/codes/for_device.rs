@@ -10,8 +10,13 @@ const PART_WORDS: u64 = 26;
 const SAMPLED_WORDS: u64 = 9;
 
 impl Codes {
-    /// `PREFIX_…` in codes.glsl: kernels are specialised by it, so that codes without a prefix do not pay for the others.
-    pub(crate) fn prefix_number(&self) -> u32 {
+    /// `CODE_PREFIX_WORD` in codes.glsl, which kernels are specialised by, so that codes do not pay for what others have.
+    pub(crate) fn prefix_constant(&self) -> u32 {
+        self.prefix_number() | u32::from(self.code == Code::Emc64VarExtents) << 2
+    }
+
+    /// `PREFIX_…` in codes.glsl.
+    fn prefix_number(&self) -> u32 {
         match (self.code, self.bounds) {
             (Code::Bin(_), _) => 3,
             (code, _) if code.grid_bits() > 0 => 2,

@@ -4,7 +4,7 @@
 //! section 3.7, and Riemersma 2024, section 2.4.3.
 //!
 //! Every code is the same recipe with other ingredients: a *sequence* of axes, from the top bit down, of which each takes the
-//! next bit of that axis' coordinate; and, at regular intervals, one bit of the primitive's size (`recipe.rs`). What far
+//! next bit of that axis' coordinate (`recipe.rs`); and, at regular intervals, one bit of the primitive's size (`size.rs`). What far
 //! primitives would cost, others save by a *prefix* that says in which part of the scene a primitive lies, followed by the code
 //! within that part: occupied cells (`mipping.rs`), splits of a counted grid (`binning.rs`), or sections around robust bounds
 //! (`sections.rs`). [`CodePlan`] is all of it for a given scene; `glsl/bvh/codes.glsl` cooks by the same one and gives the same
@@ -21,6 +21,7 @@ mod name;
 mod plan;
 mod recipe;
 mod sections;
+mod size;
 mod tables;
 
 pub use binning::Binning;
@@ -40,6 +41,11 @@ pub enum Code {
     Emc64Sort,
     /// Each bit halves the axis that is longest then; every seventh bit is one of the size.
     Emc64Var,
+    /// The same with every fourth bit one of the size.
+    Emc64VarSize4,
+    /// As [`Code::Emc64VarSize4`], but a bit of the size says whether the primitive is too long for its cell along some axis: what
+    /// Riemersma 2024, section 5, names as future work.
+    Emc64VarExtents,
     /// As [`Code::Emc64Var`], without the size.
     Emc64VarNoSize,
     /// Mipping (Riemersma 2024, 3.2.2): of the first 6 bits of [`Code::Emc64VarNoSize`], those that tell occupied cells apart, and
@@ -77,11 +83,13 @@ enum Order {
 
 impl Code {
     /// All codes; of binning the split depth and the counts that the thesis finds balanced.
-    pub const ALL: [Code; 9] = [
+    pub const ALL: [Code; 11] = [
         Code::Mc30,
         Code::Mc63,
         Code::Emc64Sort,
         Code::Emc64Var,
+        Code::Emc64VarSize4,
+        Code::Emc64VarExtents,
         Code::Emc64VarNoSize,
         Code::Mip6,
         Code::Mip9,
@@ -106,7 +114,7 @@ impl Code {
     /// Coordinate bits between two bits of the size; 0 for codes without.
     pub(crate) const fn size_group(self) -> u32 {
         match self {
-            Code::Emc64Sort => 3,
+            Code::Emc64Sort | Code::Emc64VarSize4 | Code::Emc64VarExtents => 3,
             Code::Emc64Var => 6,
             _ => 0,
         }

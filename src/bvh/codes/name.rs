@@ -6,11 +6,13 @@ use std::fmt;
 use std::str::FromStr;
 
 /// The codes that are only a name.
-const NAMES: [(Code, &str); 8] = [
+const NAMES: [(Code, &str); 10] = [
     (Code::Mc30, "mc30"),
     (Code::Mc63, "mc63"),
     (Code::Emc64Sort, "emc64sort"),
     (Code::Emc64Var, "emc64var"),
+    (Code::Emc64VarSize4, "emc64var-size4"),
+    (Code::Emc64VarExtents, "emc64var-extents"),
     (Code::Emc64VarNoSize, "emc64var-nosize"),
     (Code::Mip6, "mip6"),
     (Code::Mip9, "mip9"),
@@ -18,8 +20,8 @@ const NAMES: [(Code, &str); 8] = [
 ];
 
 /// The codes, for people.
-const KNOWN: &str = "mc30, mc63, emc64sort, emc64var, emc64var-nosize, mip6, mip9, mip12 or binQaA (Q 2, 4 or 6, A 0 to 9; \
-                         ~N behind for a stretch factor's weight of 1/N, N a power of two to 256)";
+const KNOWN: &str = "mc30, mc63, emc64sort, emc64var, emc64var-size4, emc64var-extents, emc64var-nosize, mip6, mip9, mip12 or \
+                         binQaA (Q 2, 4 or 6, A 0 to 9; ~N behind for a stretch factor's weight of 1/N, N a power of two to 2048)";
 
 impl fmt::Display for Code {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -113,11 +115,14 @@ mod tests {
             "bin2a0",
             "bin4a4",
             "bin6a9~256",
+            "bin4a4~2048+concise",
             "bin4a3~1+centroid/32",
             "mc63+concise",
             "emc64var+robust",
             "mc30+robust/12",
             "emc64var+concise/32",
+            "emc64var-size4/32",
+            "emc64var-extents+robust/40",
         ] {
             assert_eq!(text.parse::<Codes>().expect(text).to_string(), text);
         }
@@ -136,6 +141,8 @@ mod tests {
             ("bin4a10", "A 0 to 9"),
             ("bin4", "binQaA"),
             ("bin4a3~3", "a power of two"),
+            ("bin4a3~4096", "to 2048"),
+            ("bin4a3~0", "to 2048"),
             ("mc30+tight", "+concise"),
             ("mip9+robust", "+centroid"),
             ("mc30/31", "1 to 30"),

@@ -5,6 +5,7 @@ use super::binning::Splits;
 use super::mipping::Occupancy;
 use super::recipe::{Extents, Recipe};
 use super::sections::Sections;
+use super::size::Size;
 use super::{Code, CodeBounds, Codes};
 use crate::geometry::Aabb;
 
@@ -25,49 +26,6 @@ pub(super) enum Prefix {
     Sections(Sections),
     Cells(Occupancy),
     Splits(Splits),
-}
-
-/// How sizes become fractions.
-#[derive(Debug, Clone, Copy)]
-struct Size {
-    /// The power of two for lengths along any axis.
-    prescale: f32,
-    /// 1 / diagonal².
-    reciprocal: f32,
-}
-
-/// The power of two that brings `magnitude` into [1/4, 1/2): exact to multiply by, and a difference of two such stays below 1.
-fn prescale_of(magnitude: f32) -> f32 {
-    let exponent = (magnitude.to_bits() >> 23) as i32 & 0xFF;
-    // Denormals and zero take the largest scale; 2^(127 − e − 2) as a float, kept normal.
-    f32::from_bits(((127 + 127 - 2 - exponent).clamp(1, 254) as u32) << 23)
-}
-
-/// 1 / x for x > 0; 0 for anything else, so that a flat axis gives coordinate 0.
-fn reciprocal_or_zero(x: f32) -> f32 {
-    if x >= f32::MIN_POSITIVE { 1.0 / x } else { 0.0 }
-}
-
-impl Size {
-    fn new(bounds: &Aabb) -> Size {
-        let magnitude: [f32; 3] = std::array::from_fn(|i| bounds.lo[i].abs().max(bounds.hi[i].abs()));
-        let prescale = prescale_of(magnitude.into_iter().fold(0.0, f32::max));
-        let extent: [f32; 3] = std::array::from_fn(|i| bounds.hi[i] * prescale - bounds.lo[i] * prescale);
-        let diagonal2 = extent[0] * extent[0] + extent[1] * extent[1] + extent[2] * extent[2];
-        Size { prescale, reciprocal: reciprocal_or_zero(diagonal2) }
-    }
-
-    /// Diagonal of the box over that of the scene, as a 16-bit fraction.
-    #[inline]
-    fn of(&self, primitive: &Aabb) -> u32 {
-        let extent: [f32; 3] =
-            std::array::from_fn(|i| primitive.hi[i] * self.prescale - primitive.lo[i] * self.prescale);
-        let squared = (extent[0] * extent[0] + extent[1] * extent[1] + extent[2] * extent[2]) * self.reciprocal;
-        // The square root is taken of the fraction as an integer: the same on every device.
-        let fixed = if squared >= 1.0 { u32::MAX } else { (squared * 4_294_967_296.0) as u32 };
-        // Of 32 bits the root in double precision, cut off, is the integer's.
-        f64::from(fixed).sqrt() as u32
-    }
 }
 
 impl CodePlan {
@@ -114,13 +72,13 @@ impl CodePlan {
 
     /// The recipe within these bounds, without a prefix.
     fn within(codes: Codes, bounds: &Aabb) -> CodePlan {
-        CodePlan {
-            codes,
-            axes: std::array::from_fn(|i| Axis::new(bounds.lo[i], bounds.hi[i])),
-            recipe: Extents::of(bounds).recipe(codes.code.order(), codes.coordinate_bits()),
-            size: Size::new(bounds),
-            prefix: Prefix::None,
-        }
+        let recipe = Extents::of(bounds).recipe(codes.code.order(), codes.coordinate_bits());
+        let size = match codes.code {
+            Code::Emc64VarExtents => Size::by_extents(bounds, &recipe, codes.code.size_group()),
+            _ => Size::by_diagonal(bounds),
+        };
+        let axes = std::array::from_fn(|i| Axis::new(bounds.lo[i], bounds.hi[i]));
+        CodePlan { codes, axes, recipe, size, prefix: Prefix::None }
     }
 
     fn fractions(&self, at: [f32; 3]) -> [u64; 3] {
@@ -137,7 +95,7 @@ impl CodePlan {
         self.encode_with(primitive, |coordinates, size| self.recipe.encode(coordinates, size, group, bits))
     }
 
-    /// The size of a primitive as a 16-bit fraction, where the code has bits of it.
+    /// The size of a primitive as a word of 16 bits, where the code has bits of it.
     #[inline]
     pub(super) fn size_of(&self, primitive: &Aabb) -> u32 {
         if self.codes.code.size_group() == 0 { 0 } else { self.size.of(primitive) }

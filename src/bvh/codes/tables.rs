@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn tables_give_the_codes_of_the_plan() {
-        let binnings = [Binning::new(2, 0, 1), Binning::new(6, 9, 256)].map(|b| Code::Bin(b.expect("known")));
+        let binnings = [Binning::new(2, 0, 1), Binning::new(6, 9, 2048)].map(|b| Code::Bin(b.expect("known")));
         for boxes in scenes() {
             let boxes: Vec<Result<Aabb, u32>> = boxes.into_iter().map(Ok).collect();
             for code in Code::ALL.into_iter().chain(binnings) {

@@ -83,7 +83,7 @@ pub fn in_child_order(cases: &mut Cases<'_>) {
 }
 
 /// Codes with bounds and bits: every one of each.
-const CODES: [&str; 12] = [
+const CODES: [&str; 14] = [
     "mc30",
     "mc63/17",
     "mc63+concise",
@@ -92,6 +92,8 @@ const CODES: [&str; 12] = [
     "emc64var",
     "emc64var/32",
     "emc64var+robust/32",
+    "emc64var-size4",
+    "emc64var-extents/32",
     "emc64var-nosize/17",
     "mip6/32",
     "mip12+concise",
