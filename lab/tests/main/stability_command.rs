@@ -69,21 +69,9 @@ fn growth_leaves_a_point_for_every_builder_manner_and_step() {
 #[test]
 fn growth_of_top_levels_leaves_a_point_for_every_builder_manner_and_step() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let arguments = [
-        ["stability", "growth", "gen:city:30", "--level", "top", "--steps", "20,45", "--runs", "1", "--size", "12x8"],
-        [
-            "--rays",
-            "primary,ao",
-            "--codes",
-            "default,emc64var/24",
-            "--prefer",
-            "fast-build",
-            "--far",
-            "1,9",
-            "--rebraid",
-            "on,off",
-        ],
-    ];
+    let small = ["--steps", "20,45", "--runs", "1", "--size", "12x8", "--rays", "primary,ao", "--far", "1,9"];
+    let builders = ["--codes", "default,emc64var/24", "--prefer", "fast-build", "--rebraid", "on,off"];
+    let arguments = [&["stability", "growth", "gen:city:30", "--level", "top"][..], &small, &builders];
     let done = hedgerow(&arguments.concat(), folder.path());
     assert_eq!(done.status.code(), Some(0), "{}", err(&done));
     let said = String::from_utf8_lossy(&done.stdout).into_owned();
