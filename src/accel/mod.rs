@@ -80,8 +80,9 @@ pub struct AccelOptions {
     pub rebraid_budget: f32,
     /// The codes that bottom levels are sorted by; `None` takes [`Codes::for_count`]. Flags do not change those that are given.
     pub bottom_codes: Option<Codes>,
-    /// The same of top levels; `None` takes those by number, too, but with [`CodeBounds::Robust`](crate::bvh::codes::CodeBounds::Robust):
-    /// an instance far from the others costs them nothing.
+    /// The same of top levels; `None` takes those by number, too, but with [`CodeBounds::Robust`](crate::bvh::codes::CodeBounds::Robust),
+    /// as an instance far from the others would put them all into one cell, and with as many bits as the device finds that the
+    /// instances' spread needs ([`BuildOptions::bits_up_to`](crate::bvh::builder::BuildOptions::bits_up_to)).
     pub top_codes: Option<Codes>,
     /// Whether bottom levels get quantised nodes of eight children ([`crate::bvh::wide`]), where they are not LBVHs and no update is
     /// allowed. They take less memory, and one top level may hold them beside others. Shaders must define `HEDGEROW_QUANTISED` before

@@ -5,7 +5,7 @@ use hedgerow_lab::experiments::stability::far::Side;
 use hedgerow_lab::experiments::stability::large::LargePlacement;
 use hedgerow_lab::experiments::stability::page;
 use hedgerow_lab::experiments::stability::points::{Degenerate, Greedy, GreedyKind, Growth, Large};
-use hedgerow_lab::experiments::stability::top::points::{Preference, TopGrowth};
+use hedgerow_lab::experiments::stability::top::points::{GOALS, Preference, TopGrowth};
 use hedgerow_lab::report::lines;
 use hedgerow_lab::scene;
 use std::path::Path;
@@ -101,6 +101,23 @@ fn growth_of_top_levels_leaves_a_point_for_every_builder_manner_and_step() {
     assert!(page.contains("<section id=\"scene-gen-city-30\">") && page.contains("fast-build, re-braided, default"));
     let run = page::read_run::<TopGrowth>(folder.path()).expect("read").expect("written");
     assert!(run.setting.device.is_some() && run.failures.is_empty(), "{run:?}");
+}
+
+/// Issue 20's goal, without the noise of times: what is far costs what stays at most a twentieth.
+#[test]
+fn what_is_far_from_a_top_level_costs_what_stays_little_at_any_distance() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for scene in ["gen:city:150", "gen:forest:150"] {
+        let arguments =
+            ["stability", "growth", scene, "--level", "top", "--steps", "9,33,60", "--runs", "1", "--no-rays"];
+        let done = hedgerow(&arguments, folder.path());
+        assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+        let points: Vec<TopGrowth> = lines::entries(folder.path()).expect("records");
+        assert_eq!(points.len(), 2 * 2 * 6 * 4, "preferences, re-braiding, what is far, e");
+        for point in &points {
+            assert!(point.relative_cost.is_some_and(|cost| cost <= GOALS[0]), "{point:?}");
+        }
+    }
 }
 
 #[test]

@@ -21,11 +21,13 @@ mod name;
 mod plan;
 mod recipe;
 mod sections;
+mod spread;
 mod tables;
 
 pub use binning::Binning;
 pub use bounds::CodeBounds;
 pub use plan::CodePlan;
+pub(crate) use sections::{fences_around, is_apart};
 #[doc(hidden)]
 pub use tables::CodeTables;
 
