@@ -23,6 +23,7 @@ mod accel {
     mod copy;
     mod empty;
     mod facing;
+    mod far;
     mod host;
     mod indirect;
     mod instances;

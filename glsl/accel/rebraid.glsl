@@ -2,11 +2,13 @@
 // by the two parts of what it begins at (accel/parts.glsl), while the budget lasts. src/accel/rebraid.rs records the rounds, and
 // src/accel/twin/mod.rs is the twin.
 //
-//   weigh   reads entries, the structures below     writes gains of entries that have none yet; histogram[round]
+//   fences  reads entries; one workgroup            writes the sample, near
+//   weigh   reads entries, near, the structures below     writes gains of entries that have none yet; histogram[round]
 //   select  reads gains, histogram[round]           writes sums[chunk]: entries that the round opens
 //   open    reads all of them                       writes entries, gains, count[round + 1]
 //
 // What a round may spend is its share of what is left, so that the loosest entries are opened deeper than others are at all.
+// What lies beyond the fences of most entries (bvh/codes/quartiles.glsl) is opened last, as few rays come there, however large it is.
 // Entries are opened in the order of their gain, by 512 classes of it, within a class in that of their index: nothing depends
 // on who comes first.
 //
@@ -15,24 +17,32 @@
 #define HEDGEROW_ACCEL_REBRAID
 #include "accel/world_box.glsl"
 
+const bool HAS_SECTIONS = true;
+#include "bvh/codes/quartiles.glsl"
+
 const uint CLASSES = 512;
 const uint ROUNDS = 4;
 const uint CHUNKS_AT_MOST = 256;
 // Of a gain: not weighed yet; weighed, and nothing is gained. All begins as zeros.
 const float UNKNOWN = 0.0;
 const float NO_GAIN = -1.0;
+// Of what is far, at most: 2^-126.
+const float FAR_GAIN = 1.1754943508222875e-38;
 
 BUFFER RebraidState {
     uint count[ROUNDS + 1];   // the first is not read
     uint histogram[ROUNDS * CLASSES];
     // What is opened for sure, and what is in the class of which some are.
     uint sums[2 * CHUNKS_AT_MOST];
+    // Within the fences.
+    Box near;
 };
 
 layout(push_constant, scalar) uniform RebraidArguments {
     Entries entries;
     Floats gains;
     RebraidState state;
+    Sample table;
     uint capacity;
     uint first_round;   // of the dispatch
     uint chunks;
@@ -41,6 +51,12 @@ layout(push_constant, scalar) uniform RebraidArguments {
 
 // A number of each invocation, or two.
 shared uint of_lane[2 * gl_WorkGroupSize.x];
+
+// What one phase has written to memory, the next of a workgroup reads.
+void next_phase() {
+    controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
+                   gl_SemanticsAcquireRelease | gl_SemanticsMakeAvailable | gl_SemanticsMakeVisible);
+}
 
 uint entries_before(uint round) {
     return round == 0u ? instance_count : state.count[round];
@@ -107,6 +123,25 @@ uvec2 kinds_in(uvec2 range, Selection s) {
     return sum;
 }
 
+bool is_apart(Box a, Box b) {
+    return any(lessThan(ordered(a.hi), ordered(b.lo))) || any(greaterThan(ordered(a.lo), ordered(b.hi)));
+}
+
+void rebraid_fences() {
+    if (gl_LocalInvocationIndex == 0) begin_sample();
+    next_phase();
+    uint taken = min(instance_count, SECTION_SAMPLE);
+    for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
+        Entry entry = entries.entry[sampled_at(i, taken, instance_count)];
+        take_sample(table, i, entry.left_out == 0u, Box(entry.lo, entry.hi));
+    }
+    next_phase();
+    const Box EVERYWHERE = Box(vec3(-LARGEST_FLOAT), vec3(LARGEST_FLOAT));
+    Box near = EVERYWHERE;
+    if (sampled_count != 0) near = fences_of(EVERYWHERE, find_quartiles(table, taken));
+    if (gl_LocalInvocationIndex == 0) state.near = near;
+}
+
 // The area that rays need not enter any more for each entry more, if the entry is opened once, or its children too: from the
 // eight boxes below it, transformed.
 float gain_of(Entry entry) {
@@ -140,7 +175,8 @@ float gain_of(Entry entry) {
     precise float once = area - halves;
     precise float twice = (area - quarters) / added;
     float gain = max(once, twice);
-    return gain > 0.0 && is_finite(vec3(area)) ? gain : NO_GAIN;
+    if (!(gain > 0.0) || !is_finite(vec3(area))) return NO_GAIN;
+    return is_apart(Box(entry.lo, entry.hi), state.near) ? min(gain, FAR_GAIN) : gain;
 }
 
 // The entry over one child of the node that another begins at.

@@ -15,6 +15,7 @@ layout(constant_id = 1) const uint ITEMS_WORD = 1;
 const uint ITEMS = ITEMS_WORD & 0xFFFFu;
 
 const uint NONE = 0xFFFFFFFFu;
+const bool HAS_SECTIONS = CODE_PREFIX == PREFIX_SECTIONS;
 
 // Where in the scratch memory each part begins, in units of 16 bytes: src/bvh/scratch.rs plans it and says when each is in use.
 // The state is the first.
@@ -54,6 +55,9 @@ BUFFER BuildState {
     uint is_forced[2];
     uint looks;                           // clusters that rounds have looked at
     BuildParts saved_parts;               // for a kernel that does everything
+    // The last two: src/bvh/encode.rs tells other passes where they are.
+    Box where_most_is;                    // of codes with sections: the core, or everything where nothing is far
+    uint passes_left_out;                 // of the sort, whose bits no code has
 };
 
 // What a build is given; each kernel takes what it reads. `vertices` to `transform` with `vertex_stride` to `formats` are a
@@ -126,8 +130,29 @@ uint write_reference(uvec2 records, uint position, Geometry g, uint reference, o
     return r.left_out;
 }
 
+// Bits of codes, as they are given.
+uint given_code_bits() {
+    return code_kind >> 8 & 0x7Fu;
+}
+
+// The most bits that are taken where the primitives' spread tells how many: src/bvh/codes/spread.rs. 0 where it does not.
+uint most_bits_by_spread() {
+    if (!HAS_SECTIONS || (code_kind >> 23 & 1u) == 0u) return 0u;
+    return min(given_code_bits() + 16u, KEY_WORDS == 1u ? 32u : 64u);
+}
+
+// Bits of codes; where the spread tells how many, from the plan on.
+uint code_bits() {
+    return most_bits_by_spread() != 0u ? build_state().plan.bits : given_code_bits();
+}
+
+// The sort's first passes that are left out: those that codes have no bits for.
+uint passes_left_out() {
+    return most_bits_by_spread() != 0u ? build_state().passes_left_out : 0u;
+}
+
 CodeKind kind_of_codes() {
-    return CodeKind(code_kind & 3u, code_kind >> 8 & 0x7Fu, 3u * (code_kind >> 6 & 3u), code_kind >> 2 & 3u,
+    return CodeKind(code_kind & 3u, code_bits(), 3u * (code_kind >> 6 & 3u), code_kind >> 2 & 3u,
                     (code_kind >> 4 & 3u) + (CODE_PREFIX == PREFIX_CELLS ? 1u : 0u), code_kind >> 15 & 0xFu, 1u << (code_kind >> 19 & 0xFu));
 }
 

@@ -36,6 +36,9 @@ const int MIN_NORMAL = 1 << 23;
 // Bits of the grid of binning.
 const uint BINNING_BITS = 7;
 
+// For what is huge and what is far.
+const uint SECTION_BITS = 2;
+
 // What codes are normalised by: CodeBounds in src/bvh/codes/bounds.rs.
 const uint BOUNDS_FULL = 0;
 const uint BOUNDS_CONCISE = 1;
@@ -88,6 +91,8 @@ struct CodePlan {
     Stretches stretches;
     CodeSections sections;
     CodeGrid grid;
+    ivec3 typical;     // half of the extents that primitives would have if they were spread evenly (bvh/codes/sections.glsl)
+    uint bits;         // of codes whose bits are chosen by spread
 };
 
 // ---- exact arithmetic ----
@@ -149,14 +154,23 @@ Box code_bounds(Box boxes, Box centroids, uint bounds) {
     return Box(lo, hi);
 }
 
-// The exponent by which areas are scaled: src/bvh/sah.rs, area_scale.
-float area_scale_of(Box scene) {
-    precise vec3 half_extent = 0.5 * scene.hi - 0.5 * scene.lo;
-    float magnitude = max(max(half_extent.x, max(half_extent.y, half_extent.z)), 0.0);
+// Half of the longest edge.
+float half_extent_of(Box b) {
+    precise vec3 half_extent = 0.5 * b.hi - 0.5 * b.lo;
+    return max(max(half_extent.x, max(half_extent.y, half_extent.z)), 0.0);
+}
+
+// By what lengths are scaled before areas are taken, where most of the scene is in a part of it: src/bvh/sah.rs, area_scale_for.
+float area_scale_for(Box scene, Box part) {
     vec3 corner = max(abs(scene.lo), abs(scene.hi));
     float farthest = max(corner.x, max(corner.y, corner.z));
-    ivec2 exponent = ivec2(floatBitsToUint(vec2(magnitude, farthest)) >> 23 & 0xFFu);
-    return uintBitsToFloat(uint(min(clamp(127 + 127 - exponent.x, 1, 254), 3 * 127 - 1 - exponent.y)) << 23);
+    ivec3 exponent = ivec3(floatBitsToUint(vec3(half_extent_of(scene), half_extent_of(part), farthest)) >> 23 & 0xFFu);
+    int scale = min(254 - exponent.y, 254 - exponent.x + 40);
+    return uintBitsToFloat(uint(min(clamp(scale, 1, 254), 3 * 127 - 1 - exponent.z)) << 23);
+}
+
+float area_scale_of(Box scene) {
+    return area_scale_for(scene, scene);
 }
 
 // x before y before z where equal.
@@ -183,6 +197,31 @@ uvec3 sorted_axes(ivec3 extents) {
     return uvec3(first, second, 3 - first - second);
 }
 
+// As many bits, in eights, as make the same number of cells smaller than typical extents as the codes' own would if the primitives filled
+// the bounds: src/bvh/codes/spread.rs.
+uint bits_by_spread(CodeKind kind, ivec3 extents, ivec3 typical, CodeSections sections, uint most) {
+    uint needed = coordinate_bits(kind), lost = 0, taken = 0, counted = 0;
+    CodeKind longest = kind;
+    longest.bits = most;
+    uint total = coordinate_bits(longest);
+    ivec3 cells = extents;
+    if (sections.head != 0) {
+        lost = SECTION_BITS;
+        // What is of the core has half of the coordinates there.
+        for (uint axis = 0; axis < 3; ++axis) cells[axis] += (sections.beyond >> axis & 1) != 0 ? 1 << 23 : 0;
+    }
+    uvec3 sorted = kind.order == ORDER_SORTED ? sorted_axes(extents) : uvec3(0, 1, 2);
+    for (; taken < total && counted < needed; ++taken) {
+        uint axis = kind.order == ORDER_VARIABLE ? longest_axis(extents) : sorted[taken % 3];
+        extents[axis] -= 1 << 23;
+        cells[axis] -= 1 << 23;
+        counted += cells[axis] < typical[axis] ? 1 : 0;
+    }
+    CodeKind found = kind;
+    while (found.bits < most && coordinate_bits(found) < taken + lost) found.bits += 8;
+    return min(found.bits, most);
+}
+
 // The stretches of `total` coordinate bits.
 Stretches find_stretches(uint order, ivec3 extents, uint total) {
     Stretches found;
@@ -203,8 +242,8 @@ Stretches find_stretches(uint order, ivec3 extents, uint total) {
     return found;
 }
 
-// All but the axes and the sections.
-CodePlan plan_codes(CodeKind kind, Box bounds, Box scene) {
+// All but the axes, the sections and the scale of areas.
+CodePlan plan_codes(CodeKind kind, Box bounds) {
     CodePlan plan;
     vec3 magnitude = max(abs(bounds.lo), abs(bounds.hi));
     plan.size_prescale = prescale_of(max(magnitude.x, max(magnitude.y, magnitude.z)));
@@ -215,7 +254,6 @@ CodePlan plan_codes(CodeKind kind, Box bounds, Box scene) {
         precise vec3 least = BEYOND * e;
         plan.size_least = mix(ivec3(0), floatBitsToInt(least), greaterThanEqual(floatBitsToInt(least), ivec3(MIN_NORMAL)));
     }
-    plan.area_scale = area_scale_of(scene);
     ivec3 extents = extents_of(bounds);
     if (HAS_GRID) {
         plan.grid.bits = uvec3(0);

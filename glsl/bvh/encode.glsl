@@ -179,7 +179,7 @@ void write_header(BuildState state, uint geometry_count, uint geometry_flags) {
     structure.header.root = empty_root();
     structure.header.active_count = state.active_count;
     structure.header.node_slots = max(primitive_count, 2) - 1;
-    structure.header.code_bits = kind_of_codes().bits;
+    structure.header.code_bits = given_code_bits();
     structure.header.inner_nodes = max(state.active_count, 1) - 1;
     structure.header.geometry_count = geometry_count;
     structure.header.geometry_flags = geometry_flags;
@@ -200,15 +200,30 @@ void write_recipe(BuildState state, Box boxes, Box bounds) {
         state.plan.axes[axis] = axis_of(bounds.lo[axis], bounds.hi[axis]);
     }
     if (gl_LocalInvocationIndex != 0) return;
-    CodePlan plan = plan_codes(kind_of_codes(), bounds, boxes);
+    CodeKind kind = kind_of_codes();
+    Structure structure = Structure(structure_address);
+    uint most = most_bits_by_spread();
+    // Without a sample the typical extents are not known.
+    if (most != 0 && sampled_count != 0) {
+        kind.bits = bits_by_spread(kind, extents_of(bounds), state.plan.typical, state.plan.sections, most);
+        state.plan.bits = kind.bits;
+        state.passes_left_out = passes - min((kind.bits + DIGIT_BITS - 1) / DIGIT_BITS, passes);
+        structure.header.code_bits = kind.bits;
+    }
+    CodePlan plan = plan_codes(kind, bounds);
+    bool has_core = HAS_SECTIONS && state.plan.sections.head != 0;
+    plan.area_scale = area_scale_for(boxes, has_core ? bounds : boxes);
+    if (HAS_SECTIONS) {
+        state.where_most_is = Box(vec3(-LARGEST_FLOAT), vec3(LARGEST_FLOAT));
+        if (has_core) state.where_most_is = bounds;
+    }
     state.plan.size_prescale = plan.size_prescale;
     state.plan.size_reciprocal = plan.size_reciprocal;
     if (BY_EXTENTS) state.plan.size_least = plan.size_least;
     state.plan.area_scale = plan.area_scale;
     state.plan.stretches = plan.stretches;
     if (HAS_GRID) state.plan.grid = plan.grid;
-    if (HAS_SECTIONS && state.plan.sections.head != 0) state.plan.sections.head = head_of(plan.stretches);
-    Structure structure = Structure(structure_address);
+    if (has_core) state.plan.sections.head = head_of(plan.stretches);
     structure.header.area_scale = plan.area_scale;
     structure.header.built_area = scaled_half_area(boxes, plan.area_scale);
 }
@@ -267,7 +282,7 @@ void encode(uint task) {
     Geometry input_geometries = geometries();
     CodeKind kind = kind_of_codes();
     CodePlan plan = state.plan;
-    Words codes = Words(part(parts.keys[0]));
+    Words codes = Words(part(parts.keys[passes_left_out() & 1u]));
     Words ends = Words(part(parts.ends));
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
@@ -292,10 +307,11 @@ void encode(uint task) {
 
 // ---- sort ----
 
+// Of a pass that is not left out.
 Radix radix_of_pass(uint pass) {
-    uint from = pass & 1;
+    uint from = pass & 1, done = pass - passes_left_out();
     return Radix(Words(part(parts.keys[from])), Words(part(parts.values[from])), Words(part(parts.keys[1 - from])),
-                 Words(part(parts.values[1 - from])), Words(part(parts.table)), primitive_count, pass * DIGIT_BITS, columns_of_sort(), column_keys, pass == 0);
+                 Words(part(parts.values[1 - from])), Words(part(parts.table)), primitive_count, done * DIGIT_BITS, columns_of_sort(), column_keys, done == 0);
 }
 
 // ---- from the task pool ----
@@ -313,7 +329,9 @@ void encode_from_pool(uint phase, uint task) {
     } else if (phase == PHASE_ENCODE) {
         encode(task);
     } else {
-        Radix r = radix_of_pass((phase - PHASES_BEFORE_SORT) / PHASES_OF_A_PASS);
+        uint pass = (phase - PHASES_BEFORE_SORT) / PHASES_OF_A_PASS;
+        if (pass < passes_left_out()) return;
+        Radix r = radix_of_pass(pass);
         uint step = (phase - PHASES_BEFORE_SORT) % PHASES_OF_A_PASS;
         if (step == 0) radix_count(r, task);
         else if (step == 1) radix_scan(r, task);

@@ -72,7 +72,7 @@ void main() {
     // A strip for each lane, or tiles.
     column_keys = PRIVATE_COUNTERS ? max((primitive_count + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x, 1u)
                                    : TILE_KEYS;
-    passes = primitive_count < 2u ? 0u : (kind_of_codes().bits + DIGIT_BITS - 1u) / DIGIT_BITS;
+    passes = primitive_count < 2u ? 0u : (max(given_code_bits(), most_bits_by_spread()) + DIGIT_BITS - 1u) / DIGIT_BITS;
     plan_parts(given.state_bytes);
 
     uint tile = gl_WorkGroupSize.x * ITEMS;
@@ -94,7 +94,7 @@ void main() {
     }
     for (uint task = 0; task < tiles; ++task) encode(task);
     next_phase();
-    for (uint pass = 0; pass < passes; ++pass) {
+    for (uint pass = passes_left_out(); pass < passes; ++pass) {
         Radix r = radix_of_pass(pass);
         for (uint task = 0; task * COLUMNS_A_TASK < columns_of_sort(); ++task) radix_count(r, task);
         next_phase();

@@ -35,6 +35,8 @@
 
 // Whether rays say where nodes cost least, beside areas.
 layout(constant_id = 3) const bool BY_RAYS = false;
+// Whether a node's area is that of what it shares with a part of the scene.
+layout(constant_id = 4) const bool CLIPS = false;
 
 const uint NONE = 0xFFFFFFFFu;
 // Nodes that a path may have on either side.
@@ -48,6 +50,7 @@ struct Move {
 };
 
 BUFFER Moves { Move move[]; };
+BUFFER Part { Box box; };
 
 layout(push_constant, scalar) uniform ReinsertionArguments {
     Structure structure;
@@ -59,6 +62,7 @@ layout(push_constant, scalar) uniform ReinsertionArguments {
     Floats costs;       // of the boxes at links
     Words totals;       // TOTALS_…
     Words sums;         // SUMS_…
+    Part part;          // what areas are clipped to, if they are
     uint offset;
     uint stride;
     uint link_count;
@@ -108,9 +112,19 @@ float ratio() {
     return BY_RAYS ? uintBitsToFloat(totals.word[TOTALS_RATIO]) : 0.0;
 }
 
+// Of a search, what areas are clipped to.
+Box clip;
+
+// The area of a box, as far as it counts.
+float area_of(Box b, float scale) {
+    if (!CLIPS) return scaled_half_area(b, scale);
+    Box inside = Box(max(b.lo, clip.lo), min(b.hi, clip.hi));
+    return any(lessThan(inside.hi, inside.lo)) ? 0.0 : scaled_half_area(inside, scale);
+}
+
 // Of a node with this box.
 float cost_of(Box b, float scale, float of_rays) {
-    float area = scaled_half_area(b, scale);
+    float area = area_of(b, scale);
     if (!BY_RAYS) return area;
     precise float cost = area + of_rays * flux_of(grid, b);
     return cost;
@@ -118,7 +132,7 @@ float cost_of(Box b, float scale, float of_rays) {
 
 // Of a node with the box of this child at a link.
 float cost_at(uint link, Child child, float scale) {
-    return BY_RAYS ? costs.value[link] : scaled_half_area(box_of(child), scale);
+    return BY_RAYS ? costs.value[link] : area_of(box_of(child), scale);
 }
 
 // The node above another.

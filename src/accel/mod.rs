@@ -82,8 +82,9 @@ pub struct AccelOptions {
     pub rebraid_budget: f32,
     /// The codes that bottom levels are sorted by; `None` takes [`Codes::for_count`]. Flags do not change those that are given.
     pub bottom_codes: Option<Codes>,
-    /// The same of top levels; `None` takes those by number, too, but with [`CodeBounds::Robust`](crate::bvh::codes::CodeBounds::Robust):
-    /// an instance far from the others costs them nothing.
+    /// The same of top levels; `None` takes those by number, too, but with [`CodeBounds::Robust`](crate::bvh::codes::CodeBounds::Robust),
+    /// as an instance far from the others would put them all into one cell, and with as many bits as the device finds that the
+    /// instances' spread needs ([`BuildOptions::bits_up_to`](crate::bvh::builder::BuildOptions::bits_up_to)).
     pub top_codes: Option<Codes>,
     /// Whether structures get quantised nodes of eight children ([`crate::bvh::wide`]), where no update is allowed: top levels but for
     /// those of `PREFER_FAST_BUILD`, bottom levels that are not LBVHs. They take less memory, and stand beside others in either level.

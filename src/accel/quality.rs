@@ -72,6 +72,7 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
         method: if is_top { Method::Lbvh } else { bottom_method(flags, count) },
         optimise: if is_top { top_optimise(flags) } else { bottom_optimise(flags, count) },
         codes: Some(codes(flags, options, is_top, count)),
+        bits_up_to: (is_top && options.top_codes.is_none()).then(|| top_bits(flags)),
         // An instance costs more than a node whatever its box: one a leaf.
         collapse: if is_top { Collapse::OFF } else { collapse(flags) },
         child_order: flags.contains(ANY_HIT_ORDER).then_some(ChildOrder::MoreHitsForItsCost),
@@ -125,6 +126,11 @@ fn codes(flags: Flags, options: &AccelOptions, is_top: bool, count: u32) -> Code
     let bits = if flags.contains(Flags::PREFER_FAST_BUILD) { codes.bits.saturating_sub(8).max(8) } else { codes.bits };
     let bounds = if is_top { CodeBounds::Robust } else { CodeBounds::Full };
     Codes { bounds, ..codes }.with_bits(if flags.contains(Flags::LOW_MEMORY) { bits.min(32) } else { bits })
+}
+
+/// The most bits of a top level's codes, where the device chooses.
+fn top_bits(flags: Flags) -> u32 {
+    if flags.contains(Flags::LOW_MEMORY) { 32 } else { 64 }
 }
 
 /// How subtrees are collapsed: where memory counts, tests are taken to be cheaper than they are, so that leaves are larger and

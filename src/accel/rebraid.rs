@@ -4,7 +4,8 @@
 //! them can be told to be nearer. Opened, it stands in the tree as the two children of its structure's root, or their
 //! children…, each with a tighter box in the world. That is bought with entries, so the budget goes to where an entry more
 //! saves most area: the parent's, less its children's. (The paper opens by the largest area while a tree is built top-down;
-//! bottom-up builders need the entries before.) `glsl/accel/rebraid.glsl` has the rounds, [`twin`](super::twin) is the twin.
+//! bottom-up builders need the entries before.) What lies beyond the fences of most entries ([`crate::bvh::codes::CodeBounds::Robust`])
+//! is opened last: however large it is, few rays come there. `glsl/accel/rebraid.glsl` has the rounds, [`twin`](super::twin) is the twin.
 //!
 //! How many times as fast rays are traced, on lavapipe of Mesa 26 with two cores that others used too (load 10): the geometric
 //! mean of primary, ambient occlusion, diffuse and random rays, each the ratio of the medians of alternating runs; and what a
@@ -33,6 +34,10 @@ const CLASSES: u32 = 512;
 /// `CHUNKS_AT_MOST` there.
 const CHUNKS: u32 = 256;
 const STATE_WORDS: u32 = REBRAID_STATE_BYTES as u32 / 4;
+/// Bytes of the sample that tells what is far: 256 of `Sampled` in glsl/bvh/codes/quartiles.glsl.
+const SAMPLE_BYTES: u64 = 256 * 36;
+/// Of what is far, the gain at most: `FAR_GAIN` in rebraid.glsl.
+pub(super) const FAR_GAIN: f32 = f32::MIN_POSITIVE;
 /// Instances up to which one workgroup does all rounds: a chain of dispatches costs more than their work.
 const SMALL: u32 = 1024;
 
@@ -49,9 +54,9 @@ pub(super) struct Rebraid {
 }
 
 impl Rebraid {
-    /// Bytes of scratch memory: the gains of the entries, and the state.
+    /// Bytes of scratch memory: the gains of the entries, the state, and the sample.
     pub fn scratch_bytes(&self) -> u64 {
-        (4 * (u64::from(self.capacity) + u64::from(STATE_WORDS))).next_multiple_of(16)
+        (4 * (u64::from(self.capacity) + u64::from(STATE_WORDS)) + SAMPLE_BYTES).next_multiple_of(16)
     }
 
     /// The steps behind the one that writes the entries, of which `count` are of instances.
@@ -62,6 +67,7 @@ impl Rebraid {
             entries,
             gains: scratch,
             state: scratch + 4 * u64::from(self.capacity),
+            table: scratch + 4 * (u64::from(self.capacity) + u64::from(STATE_WORDS)),
             capacity: self.capacity,
             first_round,
             chunks,
@@ -71,7 +77,11 @@ impl Rebraid {
             let all = Kernel::new(&shaders::ACCEL_REBRAID_WORKGROUP, context.tuning.build.rebraid_group, &[]);
             return vec![Step::new("re-braid", all, &arguments(0, 1), 1)];
         }
-        let mut steps = vec![fill::step("re-braid", scratch, self.capacity + STATE_WORDS, 0)];
+        let fences = Kernel::new(&shaders::ACCEL_REBRAID_FENCES, context.tuning.build.rebraid_group, &[]);
+        let mut steps = vec![
+            fill::step("re-braid", scratch, self.capacity + STATE_WORDS, 0),
+            Step::new("re-braid", fences, &arguments(0, 1), 1),
+        ];
         for round in 0..ROUNDS {
             for shader in [&shaders::ACCEL_REBRAID_WEIGH, &shaders::ACCEL_REBRAID_SELECT, &shaders::ACCEL_REBRAID_OPEN]
             {

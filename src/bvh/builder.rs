@@ -4,7 +4,7 @@
 //! is in `encode.rs`; each [`Method`] has a file of its own, and a twin in [`super::twin`] with the same bytes.
 
 use super::child_order::{ChildOrder, ChildOrderPass};
-use super::codes::{Code, Codes};
+use super::codes::{Code, CodeBounds, Codes};
 use super::encode::Encode;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 pub use super::hlbvh::Treelets;
@@ -30,6 +30,10 @@ pub struct BuildOptions {
     pub method: Method,
     /// The codes; `None` lets [`Codes::for_count`] choose them from the number of primitives.
     pub codes: Option<Codes>,
+    /// Lets the device take as many bits of codes as the primitives' spread needs, from those of the codes on ([`Codes::by_spread`]), up to
+    /// 32 or 64. A build is recorded, and has memory, for the most; passes of the sort that are not needed return at once. `None` takes
+    /// the codes' bits. For robust codes alone.
+    pub bits_up_to: Option<u32>,
     /// Splitting of large triangles into several references, before everything else; `None` splits none.
     pub split: Option<split::SplitOptions>,
     /// Rounds of reinsertion after the method: they take time and give a better tree.
@@ -53,6 +57,7 @@ impl BuildOptions {
     pub const DEFAULT: BuildOptions = BuildOptions {
         method: Method::Lbvh,
         codes: None,
+        bits_up_to: None,
         split: None,
         optimise: None,
         collapse: Collapse::SAH,
@@ -229,8 +234,20 @@ impl Builder {
         let behind = options.child_order.filter(|_| !orders_on_the_way);
         let child_order = behind.map(|order| ChildOrderPass::new(context, order, options.collapse, count));
         let items = if alone { tuning.alone_run } else { run_of(tuning, method, count, shape.workgroup) };
+        let codes = options.codes.unwrap_or_else(|| Codes::for_count(count));
+        if let Some(most) = options.bits_up_to
+            && (![32, 64].contains(&most)
+                || !(codes.bits..=codes.code.bits()).contains(&most)
+                || codes.bounds != CodeBounds::Robust)
+        {
+            return Err(Error::Argument(format!(
+                "bits_up_to is {most} with codes {codes}; take 32 or 64, no fewer than the codes have and no more than there are, and \
+                 codes by robust bounds, or None"
+            )));
+        }
         let encode = Encode {
-            codes: options.codes.unwrap_or_else(|| Codes::for_count(count)),
+            codes,
+            bits_up_to: options.bits_up_to,
             collapse: options.collapse,
             child_order: options.child_order.filter(|_| orders_on_the_way),
             shape: if alone { shape.with_digit_bits(tuning.small_digit_bits) } else { shape },
@@ -418,7 +435,10 @@ impl Builder {
         let hierarchy = self.hierarchy().steps(encode, input, &single);
         let mut steps = [encode.steps(input, arguments), hierarchy].concat();
         if let Some(reinsertion) = optimise {
-            steps.extend(reinsertion.steps(arguments.structure, arguments.part(scratch.reinsertion)));
+            // Rays of a top level are where most instances are: a tree by the areas of what is far would cost them.
+            let clips = encode.primitives == Primitives::Instances && encode.codes.bounds == CodeBounds::Robust;
+            let part = if clips { arguments.where_most_is() } else { 0 };
+            steps.extend(reinsertion.steps(arguments.structure, arguments.part(scratch.reinsertion), part));
         }
         if self.weighs() {
             steps.extend(collapse::weigh_steps(encode, arguments));

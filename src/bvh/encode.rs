@@ -9,6 +9,7 @@ use super::sah::Collapse;
 use super::scratch::BuildPhase;
 use super::split::Split;
 use crate::Result;
+use crate::geometry::Aabb;
 use crate::gpu::arguments;
 use crate::gpu::plan::Plan;
 use crate::gpu::radix_sort::{self, SortShape};
@@ -18,6 +19,8 @@ use crate::gpu::{Kernel, Step, shaders};
 #[derive(Debug, Clone)]
 pub(super) struct Encode {
     pub codes: Codes,
+    /// The most bits of codes, where the device takes as many as the primitives' spread needs.
+    pub bits_up_to: Option<u32>,
     pub collapse: Collapse,
     /// The order that children get in the hierarchy.
     pub child_order: Option<ChildOrder>,
@@ -49,6 +52,16 @@ impl arguments::Build {
         arguments::Build { collapses: 0, ..*self }
     }
 
+    /// The address of the number of the sort's passes that are left out: the state's last word.
+    fn passes_left_out(&self) -> u64 {
+        self.scratch + arguments::BUILD_STATE_BYTES - 4
+    }
+
+    /// The address of the box that most primitives are in, where codes have sections: before that.
+    pub fn where_most_is(&self) -> u64 {
+        self.passes_left_out() - size_of::<Aabb>() as u64
+    }
+
     /// The address of a part of the scratch memory.
     pub fn part(&self, at: u32) -> u64 {
         self.scratch + Plan::<BuildPhase>::UNIT * u64::from(at)
@@ -59,8 +72,18 @@ impl arguments::Build {
 const HAS_REFERENCES: u32 = 8;
 
 impl Encode {
+    /// Bits that there is room and time for.
+    fn most_bits(&self) -> u32 {
+        self.bits_up_to.map_or(self.codes.bits, |most| self.codes.most_by_spread(most))
+    }
+
     pub fn key_words(&self) -> u32 {
-        if self.codes.bits > 32 { 2 } else { 1 }
+        if self.most_bits() > 32 { 2 } else { 1 }
+    }
+
+    /// What kernels are told of the codes.
+    pub fn code_kind(&self) -> u32 {
+        self.codes.kind_word() | if self.bits_up_to.is_some() { Codes::BY_SPREAD } else { 0 }
     }
 
     /// Words of the sort's table, in which the codes' prefixes lie before the sort. One workgroup on a CPU gives each of its
@@ -75,7 +98,7 @@ impl Encode {
     }
 
     pub fn passes(&self) -> u32 {
-        if self.count < 2 { 0 } else { self.shape.passes(self.codes.bits) }
+        if self.count < 2 { 0 } else { self.shape.passes(self.most_bits()) }
     }
 
     /// Workgroups of the phases that go over all primitives.
@@ -166,7 +189,7 @@ impl Encode {
             vertex_count: geometry.vertex_count,
             formats,
             primitive_count: self.count,
-            code_kind: self.codes.kind_word(),
+            code_kind: self.code_kind(),
             collapses: self.collapse.enabled.into(),
             build_flags: self.build_flags,
             c_t: self.collapse.c_t,
@@ -182,7 +205,7 @@ impl Encode {
     /// codes with a grid `cells`.
     pub fn steps(&self, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
         let reading = |phase, shader, groups| Step::new(phase, self.reading_kernel(shader, input), arguments, groups);
-        let sort = radix_sort::Sort { count: self.count, bits: self.codes.bits, identity: true };
+        let sort = radix_sort::Sort { count: self.count, bits: self.most_bits(), identity: true };
         let parts = arguments.parts;
         let buffers = radix_sort::SortBuffers {
             keys: parts.keys.map(|at| arguments.part(at)),
@@ -200,7 +223,8 @@ impl Encode {
             steps.push(reading("cells", &shaders::BVH_ENCODE_PREFIXES, 1));
         }
         steps.push(reading("encode", &shaders::BVH_ENCODE_CODES, self.tiles()));
-        steps.extend(radix_sort::steps(&self.shape, &buffers, &sort));
+        let left_out = self.bits_up_to.map_or(0, |_| arguments.passes_left_out());
+        steps.extend(radix_sort::steps_but(&self.shape, &buffers, &sort, left_out));
         steps
     }
 }

@@ -30,7 +30,7 @@ pub(super) fn steps(small: &[SmallBuild<'_>]) -> Result<Vec<Step>> {
         let (geometry, formats) = encode.checked(input)?;
         let kernel = encode.lbvh_kernel(&shaders::BVH_LBVH_WORKGROUP, input);
         let costs = [encode.collapse.c_t.to_bits(), encode.collapse.c_i.to_bits()];
-        let flags = encode.codes.kind_word() | u32::from(encode.collapse.enabled) << 25 | encode.build_flags << 26;
+        let flags = encode.code_kind() | u32::from(encode.collapse.enabled) << 25 | encode.build_flags << 26;
         let kind = (kernel, flags, costs);
         let builds = kinds.entry(kind.clone()).or_default();
         if builds.is_empty() {

@@ -219,8 +219,8 @@ impl Reinsertion {
         if *cost == Cost::Area { self.scratch_bytes() } else { self.scratch_bytes_by_rays() }
     }
 
-    fn kernel(&self, shader: &'static shaders::Shader, by_rays: bool) -> Kernel {
-        Kernel::new(shader, self.grid.workgroup, &[self.grid.rounds, self.shared, by_rays.into()])
+    fn kernel(&self, shader: &'static shaders::Shader, by_rays: bool, clips: bool) -> Kernel {
+        Kernel::new(shader, self.grid.workgroup, &[self.grid.rounds, self.shared, by_rays.into(), clips.into()])
     }
 
     /// Records all rounds on `structure`, in place, with scratch memory of [`Reinsertion::scratch_bytes`]; both aligned
@@ -231,7 +231,7 @@ impl Reinsertion {
     pub fn record(&self, recorder: &mut Recorder<'_>, structure: Region, scratch: Region) -> Result<()> {
         let structure = structure.checked("the BVH to optimise", NODES_OFFSET, 16)?;
         let scratch = scratch.checked("scratch memory of an optimisation", self.scratch_bytes(), 16)?;
-        recorder.chains(&[self.steps(structure, scratch)])
+        recorder.chains(&[self.steps(structure, scratch, 0)])
     }
 
     /// Records all rounds on a finished tree, in place, with scratch memory of [`Reinsertion::scratch_bytes`], or of
@@ -295,15 +295,17 @@ impl Reinsertion {
         probed_offsets(self.rounds, self.stride)
     }
 
-    /// What [`Reinsertion::record`] records, with addresses that were checked.
-    pub(super) fn steps(&self, structure: u64, scratch: u64) -> Vec<Step> {
+    /// What [`Reinsertion::record`] records, with addresses that were checked. Areas are those of boxes clipped to the one at the address
+    /// `part` (0: they are not clipped).
+    pub(super) fn steps(&self, structure: u64, scratch: u64, part: u64) -> Vec<Step> {
         let run = self.run(structure, scratch, &Cost::Area).expect("areas have nothing to check");
+        let run = Run { part, ..run };
         run.begin().into_iter().chain((0..self.rounds).flat_map(|round| run.round(round))).collect()
     }
 
     fn run(&self, structure: u64, scratch: u64, cost: &Cost) -> Result<Run> {
         let (grid, by_rays) = cost.checked()?;
-        Ok(Run { of: *self, phase: "optimise", structure, scratch, grid, by_rays, sums: 0 })
+        Ok(Run { of: *self, phase: "optimise", structure, scratch, grid, by_rays, sums: 0, part: 0 })
     }
 }
 
@@ -321,11 +323,12 @@ struct Run {
     grid: u64,
     by_rays: f32,
     sums: u64,
+    part: u64,
 }
 
 impl Run {
     fn arguments(&self, offset: u32) -> arguments::Reinsertion {
-        let Run { of, structure, scratch, grid, by_rays, sums, .. } = *self;
+        let Run { of, structure, scratch, grid, by_rays, sums, part, .. } = *self;
         let words = 4 * u64::from(of.slots);
         let behind = scratch + of.scratch_bytes();
         arguments::Reinsertion {
@@ -338,6 +341,7 @@ impl Run {
             costs: behind + TOTALS_BYTES,
             totals: behind,
             sums,
+            part,
             offset,
             stride: of.stride,
             link_count: of.link_count(),
@@ -346,7 +350,7 @@ impl Run {
     }
 
     fn step(&self, shader: &'static shaders::Shader, offset: u32, items: u32) -> Step {
-        let kernel = self.of.kernel(shader, self.grid != 0);
+        let kernel = self.of.kernel(shader, self.grid != 0, self.part != 0);
         Step::new(self.phase, kernel, &self.arguments(offset), self.of.grid.groups_for(items))
     }
 

@@ -33,12 +33,18 @@ impl Collapse {
 /// The power of two by which lengths are scaled before areas are taken, so that scenes of 1e30 have finite areas and those of
 /// 1e-30 have areas at all. Costs are compared only with each other: a common power of two changes nothing else.
 pub fn area_scale(scene: &Aabb) -> f32 {
+    area_scale_for(scene, scene)
+}
+
+/// The same where most of the scene is in a part of it, which is to have areas at all: its longest edge is 1 to 4 then, or that of the
+/// whole is 2^40 to 2^42. The areas of 2^27 nodes of that length have a sum far below the largest float.
+pub fn area_scale_for(scene: &Aabb, part: &Aabb) -> f32 {
     let exponent = |x: f32| (x.to_bits() >> 23) as i32 & 0xFF;
-    let magnitude = (0..3).map(|i| 0.5 * scene.hi[i] - 0.5 * scene.lo[i]).fold(0.0, f32::max);
+    let magnitude = |b: &Aabb| exponent((0..3).map(|i| 0.5 * b.hi[i] - 0.5 * b.lo[i]).fold(0.0, f32::max));
     let farthest = scene.lo.iter().chain(&scene.hi).fold(0.0, |m: f32, x| m.max(x.abs()));
+    let scale = (254 - magnitude(part)).min(254 - magnitude(scene) + 40);
     // A scene of no extent that is far from the origin stays among the floats: its areas are 0, not NaN.
-    let scale = (127 + 127 - exponent(magnitude)).clamp(1, 254).min(3 * 127 - 1 - exponent(farthest));
-    f32::from_bits((scale as u32) << 23)
+    f32::from_bits((scale.clamp(1, 254).min(3 * 127 - 1 - exponent(farthest)) as u32) << 23)
 }
 
 /// Edges shorter than this count as none, the scene's longest being 1 to 4. Areas are 2^-100 at least then, and differences of
@@ -70,6 +76,19 @@ mod tests {
             assert!(areas.iter().all(|b| !(a - b).is_subnormal()), "{a}");
         }
         assert!(areas.contains(&0.0) && areas.iter().any(|&a| a > 0.0 && a < 1e-29));
+    }
+
+    #[test]
+    fn a_part_has_areas_where_the_whole_is_huge_and_the_whole_stays_finite() {
+        let part = Aabb { lo: [1.0; 3], hi: [2.0; 3] };
+        for e in [10, 40, 60, 120] {
+            let scene = Aabb { lo: [0.0; 3], hi: [2f32.powi(e); 3] };
+            let scale = area_scale_for(&scene, &part);
+            let (own, whole) = (part.scaled_half_area(scale), scene.scaled_half_area(scale));
+            assert!(whole <= 48.0 * 2f32.powi(80) && own <= 48.0, "2^{e}: {own} {whole}");
+            assert!(own >= 2f32.powi(-2 * (e - 40).max(0)).min(3.0) || e > 90, "2^{e}: {own}");
+        }
+        assert_eq!(area_scale_for(&part, &part), area_scale(&part));
     }
 
     #[test]

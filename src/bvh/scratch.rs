@@ -173,6 +173,7 @@ mod tests {
     fn encode(count: u32, bits: u32, workgroup: u32) -> Encode {
         Encode {
             codes: Code::Emc64Var.full().with_bits(bits),
+            bits_up_to: None,
             collapse: Collapse::SAH,
             child_order: None,
             shape: SortShape::strips_of(workgroup),

@@ -186,12 +186,24 @@ pub(crate) const STEPS_OF_A_PASS: usize = 3;
 /// # Panics
 /// The count is over [`MAX_COUNT`], or the bits over 64.
 pub(crate) fn steps(shape: &SortShape, buffers: &SortBuffers, sort: &Sort) -> Vec<Step> {
+    steps_but(shape, buffers, sort, 0)
+}
+
+/// The same where the device knows how many of the passes, the first, are left out, as keys have no such bits: the number lies at this
+/// address (0: none are). The keys to sort are where the first pass that is done looks for them, so the results are where they are
+/// without any left out. An indirect dispatch would take a buffer, and the caller's memory is known by addresses: workgroups of a pass
+/// that is left out return at once.
+///
+/// # Panics
+/// As [`steps`].
+pub(crate) fn steps_but(shape: &SortShape, buffers: &SortBuffers, sort: &Sort, left_out: u64) -> Vec<Step> {
     let Sort { count, bits, identity } = *sort;
     assert!(count <= MAX_COUNT && bits <= 64, "{count} keys of {bits} bits");
     if count < 2 {
         return Vec::new();
     }
-    let constants = shape.constants(0, if bits > 32 { 2 } else { 1 });
+    let [first, digits, tiles, words] = shape.constants(0, if bits > 32 { 2 } else { 1 });
+    let constants = [first, digits, tiles, words, u32::from(left_out != 0)];
     let pass = |pass: u32| -> [Step; STEPS_OF_A_PASS] {
         let (from, to) = (pass as usize % 2, (pass as usize + 1) % 2);
         let arguments = arguments::RadixSort {
@@ -200,11 +212,12 @@ pub(crate) fn steps(shape: &SortShape, buffers: &SortBuffers, sort: &Sort) -> Ve
             keys_out: buffers.keys[to],
             values_out: buffers.values[to],
             table: buffers.table,
+            left_out,
             count,
-            shift: pass * shape.digit_bits,
+            pass,
             columns: shape.columns(count),
             column_keys: shape.column_keys(count),
-            identity: u32::from(identity && pass == 0),
+            identity: u32::from(identity),
         };
         [
             (&shaders::GPU_RADIX_SORT_COUNT, shape.column_tasks(count)),

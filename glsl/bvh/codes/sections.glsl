@@ -5,47 +5,21 @@
 #ifndef HEDGEROW_BVH_CODE_SECTIONS
 #define HEDGEROW_BVH_CODE_SECTIONS
 #include "bvh/build_state.glsl"
+#include "bvh/codes/quartiles.glsl"
 
 const uint SECTION_CORE = 0;
 const uint SECTION_FAR = 1;
 const uint SECTION_HUGE = 2;
-// Primitives that are looked at.
-const uint SECTION_SAMPLE = 256;
-const uint SECTION_QUANTILE = 16;
-
-// The sample lies in the sort's table: per primitive its centroid and its box, as `ordered` floats.
-struct Sampled {
-    uvec3 middle;
-    uvec3 lo;
-    uvec3 hi;
-};
-BUFFER Sample { Sampled primitive[]; };
-
-const bool HAS_SECTIONS = CODE_PREFIX == PREFIX_SECTIONS;
-shared uint sampled_count;
-shared uint sampled_below[HAS_SECTIONS ? 18 : 1];   // of three rounds in turn: keys below three low candidates, three high ones
 shared uint section_octaves[HAS_SECTIONS ? 9 : 1];  // of each axis: of the core's extent, from the core to the high and to the low bound
 shared uint sampled_core[HAS_SECTIONS ? 6 : 1];     // low corner, high corner
 
-bool is_inside(uvec3 lo, uvec3 hi, Box fences) {
-    return all(greaterThanEqual(lo, ordered(fences.lo))) && all(lessThanEqual(hi, ordered(fences.hi)));
-}
-
-// `eighth` moved by `by` both ways, but not beyond the limits: of eighths, so that nothing overflows.
-Box widened(Box eighth, vec3 by, Box limits) {
-    precise vec3 lo = eighth.lo - by;
-    precise vec3 hi = eighth.hi + by;
-    return Box(mix(limits.lo, lo * 8.0, greaterThan(lo, limits.lo * 0.125)),
-               mix(limits.hi, hi * 8.0, lessThan(hi, limits.hi * 0.125)));
-}
-
-Box fences_of(Box bounds, uvec3 low_quantile, uvec3 high_quantile) {
-    precise vec3 low = from_ordered(low_quantile) * 0.125;
-    precise vec3 high = from_ordered(high_quantile) * 0.125;
-    precise vec3 widths = high - low;
-    precise float least = 0.25 * max(max(widths.x, widths.y), max(widths.z, 0.0));
-    precise vec3 by = 1.5 * max(widths, vec3(least));
-    return widened(Box(low, high), by, bounds);
+// Half of the extents that primitives would have whose centroids lie evenly between bounds, and have these quartiles, as integers like
+// those of extents_of.
+ivec3 typical_extents(Box quartiles) {
+    precise vec3 low = quartiles.lo * 0.125;
+    precise vec3 high = quartiles.hi * 0.125;
+    precise vec3 eighths = high - low;
+    return mix(ivec3(-0x40000000), floatBitsToInt(eighths) + (3 << 23), greaterThan(eighths, vec3(0)));
 }
 
 // What the sample found inside of the fences, and an eighth more to each side, for the sample misses the outermost.
@@ -92,58 +66,28 @@ void find_sections() {
     Geometry input_geometries = geometries();
     uint taken = min(primitive_count, SECTION_SAMPLE);
     if (gl_LocalInvocationIndex == 0) {
-        sampled_count = 0;
+        begin_sample();
         for (uint i = 0; i < 6; ++i) sampled_core[i] = i < 3 ? NONE : 0;
-        for (uint i = 0; i < 18; ++i) sampled_below[i] = 0;
     }
     next_phase();
     for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
-        // i · primitive_count / taken, which may have more than 32 bits on the way.
-        uint primitive = i * (primitive_count / taken) + i * (primitive_count % taken) / taken;
         Box b;
-        bool is_active = load_reference(input_geometries, primitive, b) == 0;
-        table.primitive[i].middle = is_active ? ordered(centroid_of(b)) : uvec3(NONE);
-        table.primitive[i].lo = ordered(b.lo);
-        table.primitive[i].hi = ordered(b.hi);
-        if (is_active) atomicAdd(sampled_count, 1);
+        bool is_active = load_reference(input_geometries, sampled_at(i, taken, primitive_count), b) == 0;
+        take_sample(table, i, is_active, b);
     }
     next_phase();
     uint count = sampled_count;
-    if (gl_LocalInvocationIndex == 0) state.plan.sections.head = 0;
+    if (gl_LocalInvocationIndex == 0) {
+        state.plan.sections.head = 0;
+        state.plan.bits = given_code_bits();
+        state.passes_left_out = passes - min((given_code_bits() + DIGIT_BITS - 1) / DIGIT_BITS, passes);
+    }
     if (count == 0) return;
 
-    // The keys of both ranks along each axis, bit by bit: the largest that no more keys than the rank are below.
-    uint rank = count / SECTION_QUANTILE;
-    uvec3 low = uvec3(0), high = uvec3(0);
-    for (uint round = 0; round < 32; ++round) {
-        uint at = round % 3 * 6, next = (round + 1) % 3 * 6;
-        uvec3 try_low = low | 0x80000000u >> round, try_high = high | 0x80000000u >> round;
-        uvec3 below_low = uvec3(0), below_high = uvec3(0);
-        for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
-            uvec3 key = table.primitive[i].middle;
-            below_low += uvec3(lessThan(key, try_low));
-            below_high += uvec3(lessThan(key, try_high));
-        }
-        below_low = subgroupAdd(below_low);
-        below_high = subgroupAdd(below_high);
-        if (subgroupElect()) {
-            for (uint axis = 0; axis < 3; ++axis) {
-                atomicAdd(sampled_below[at + axis], below_low[axis]);
-                atomicAdd(sampled_below[at + 3 + axis], below_high[axis]);
-            }
-        }
-        // What was read in the round before the last is free.
-        if (gl_LocalInvocationIndex == 0) {
-            for (uint i = 0; i < 6; ++i) sampled_below[next + i] = 0;
-        }
-        barrier();
-        for (uint axis = 0; axis < 3; ++axis) {
-            if (sampled_below[at + axis] <= rank) low[axis] = try_low[axis];
-            if (sampled_below[at + 3 + axis] <= count - 1 - rank) high[axis] = try_high[axis];
-        }
-    }
+    Box quartiles = find_quartiles(table, taken);
     Box bounds = bounds_of_boxes(state);
-    Box fences = fences_of(bounds, low, high);
+    if (gl_LocalInvocationIndex == 0) state.plan.typical = typical_extents(quartiles);
+    Box fences = fences_of(bounds, quartiles);
     if (is_inside(ordered(bounds.lo), ordered(bounds.hi), fences)) return;
     uvec3 lo = uvec3(NONE), hi = uvec3(0);   // of the core
     for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {

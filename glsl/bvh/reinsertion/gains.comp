@@ -9,8 +9,8 @@ void main() {
         count++;
         Move m = moves.move[i];
         if (m.to == NONE) continue;
-        // Below 2^24; what is behind the point fits 32 bits exactly.
-        float gain = uintBitsToFloat(m.gain);
+        // Counted up to below 2^24; what is behind the point fits 32 bits exactly.
+        float gain = min(uintBitsToFloat(m.gain), 16777215.0);
         uint whole = uint(gain);
         precise float parts = (gain - float(whole)) * 4294967296.0;
         add_to(sum, uint(parts));

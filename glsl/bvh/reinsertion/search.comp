@@ -62,8 +62,8 @@ Below below(uint at, Child child, float saved, float merged, Search s) {
 
 // What a box by rays costs at least, around what moves and a child of this cost: to ask the grid takes many times as long.
 float least_cost(Search s, Box merged, Child child, float cost) {
-    precise float by_rays = cost - scaled_half_area(box_of(child), s.scale);
-    precise float least = scaled_half_area(merged, s.scale) + max(by_rays, s.moving_by_rays);
+    precise float by_rays = cost - area_of(box_of(child), s.scale);
+    precise float least = area_of(merged, s.scale) + max(by_rays, s.moving_by_rays);
     return least;
 }
 
@@ -133,7 +133,7 @@ Move search(uint link) {
     s.scale = structure.header.area_scale;
     s.of_rays = ratio();
     s.moving_cost = cost_at(link, child_at(link), s.scale);
-    precise float moving_by_rays = s.moving_cost - scaled_half_area(s.moving, s.scale);
+    precise float moving_by_rays = s.moving_cost - area_of(s.moving, s.scale);
     s.moving_by_rays = moving_by_rays;
     s.best_to = NONE;
     s.best_pivot = NONE;
@@ -148,7 +148,7 @@ Move search(uint link) {
         Node node = structure.nodes[s.pivot];
         Child other = (at & 1u) == 0u ? node.right : node.left;
         Box pivot_box = around(box_of(node.left), box_of(node.right));
-        float pivot_cost = BY_RAYS ? known_cost(s.pivot, root) : scaled_half_area(pivot_box, s.scale);
+        float pivot_cost = BY_RAYS ? known_cost(s.pivot, root) : area_of(pivot_box, s.scale);
         if (level == 0u) saved = pivot_cost;
         s.least = max(LEAST_SHARE * pivot_cost, LEAST_GAIN);
         // A move beside the own sibling would tie a cycle. It is never looked at: the box around both is the parent's.
@@ -171,6 +171,7 @@ Move search(uint link) {
 }
 
 void main() {
+    if (CLIPS) clip = part.box;
     for (uint k = 0, i = grid_item(0); i < tried(); i = grid_item(++k)) {
         Move m = search(link_of(i));
         moves.move[i] = m;

@@ -1,21 +1,8 @@
 #version 460
 // Radix sort, the step `count` of one digit, a task a workgroup: see gpu/radix_sort.glsl for its contract.
-#include "gpu/radix_sort.glsl"
-
-layout(push_constant, scalar) uniform RadixSortArguments {
-    Words keys;
-    Words values;
-    Words keys_out;
-    Words values_out;
-    Words table;
-    uint count;
-    uint shift;
-    uint columns;
-    uint column_keys;
-    uint identity;
-};
+#include "gpu/radix_sort/pass.glsl"
 
 void main() {
-    Radix r = Radix(keys, values, keys_out, values_out, table, count, shift, columns, column_keys, identity != 0);
-    radix_count(r, group_number());
+    Radix r;
+    if (is_done(r)) radix_count(r, group_number());
 }

@@ -4,7 +4,7 @@ use super::Bar;
 use crate::device::{Device, DeviceOptions, DriverTracing};
 use crate::rays::kinds::{RayKind, RayOptions};
 use crate::report::names::distinct;
-use crate::scene::{self, Camera, DynamicScene, Flight, Scene};
+use crate::scene::{self, Camera, DynamicScene, Flight, Instances, Scene};
 use crate::subjects::builders::{self, Spec};
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use hedgerow::gpu::TuningChoice;
@@ -109,6 +109,16 @@ impl Common {
     /// The scene cannot be found, read or used.
     pub fn load(&self, spec: &str) -> crate::Result<Scene> {
         let mut scene = self.loaded(spec, scene::load)?;
+        self.aim(&mut scene.camera);
+        Ok(scene)
+    }
+
+    /// The same of a scene of instances, whose parts stay apart.
+    ///
+    /// # Errors
+    /// The scene cannot be found, read or used.
+    pub fn load_instances(&self, spec: &str) -> crate::Result<Instances> {
+        let mut scene = self.loaded(spec, scene::load_instances)?;
         self.aim(&mut scene.camera);
         Ok(scene)
     }

@@ -20,6 +20,9 @@ pub const INDEX: Page = Page { records: "index.html", file: "index.html", name: 
 pub const ACCEL: Page = Page { records: "accel.jsonl", file: "accel.html", name: "Batches, top levels, updates" };
 /// `hedgerow stability growth`.
 pub const GROWTH: Page = Page { records: "growth.jsonl", file: "growth.html", name: "Growing bounds" };
+/// `hedgerow stability growth --level top`.
+pub const GROWTH_TOP: Page =
+    Page { records: "growth-top.jsonl", file: "growth-top.html", name: "Growing bounds of top levels" };
 /// `hedgerow stability large`.
 pub const LARGE: Page = Page { records: "large.jsonl", file: "large.html", name: "Large triangles" };
 /// `hedgerow stability degenerate`.
@@ -43,8 +46,8 @@ pub const PREDICT: Page = Page { records: "predict.jsonl", file: "predict.html",
 pub const CODES: Page = Page { records: "codes.jsonl", file: "codes.html", name: "Codes" };
 
 /// All of them.
-pub const ALL: [Page; 11] =
-    [INDEX, CPU_BUILDERS, PREDICT, CODES, ACCEL, ANIMATE, FLY, GROWTH, LARGE, DEGENERATE, GREEDY];
+pub const ALL: [Page; 12] =
+    [INDEX, CPU_BUILDERS, PREDICT, CODES, ACCEL, ANIMATE, FLY, GROWTH, GROWTH_TOP, LARGE, DEGENERATE, GREEDY];
 
 impl Page {
     /// What files of it begin with.

@@ -101,6 +101,11 @@ impl<'a> Level<'a> {
         (self.owner.maker() == Implementation::Ours).then(|| self.memory.read::<Header>(1)[0])
     }
 
+    /// The memory of the structure, as it is.
+    pub(super) fn structure_bytes(&self) -> Vec<u8> {
+        self.memory.read(self.sizes.acceleration_structure_size as usize)
+    }
+
     /// Bytes of the structure, and of the scratch memory of a build.
     pub fn bytes(&self) -> [u64; 2] {
         [self.sizes.acceleration_structure_size, self.sizes.build_scratch_size]

@@ -8,6 +8,7 @@ use crate::Result;
 use crate::scene::Instances;
 use ash::vk;
 use hedgerow::accel::{ANY_HIT_ORDER, Instance};
+use hedgerow::bvh::layout::{Bvh2, InstanceRecord};
 use hedgerow::gpu::Timestamps;
 use hedgerow::trace;
 
@@ -86,6 +87,14 @@ impl<'a> Levels<'a> {
     /// Entries of the top level, where it is one of ours: its instances, those that were opened as their parts.
     pub fn entries(&self) -> Option<u32> {
         self.top.header().map(|header| header.active)
+    }
+
+    /// The top level's tree, where it is one of ours in nodes of two.
+    ///
+    /// # Errors
+    /// The structure is another.
+    pub fn top_tree(&self) -> Result<Bvh2<InstanceRecord>> {
+        Ok(Bvh2::from_bytes(&self.top.structure_bytes())?)
     }
 
     /// Traces rays that lie in device memory; milliseconds by the device's timestamps.

@@ -5,6 +5,7 @@ use hedgerow_lab::experiments::stability::far::Side;
 use hedgerow_lab::experiments::stability::large::LargePlacement;
 use hedgerow_lab::experiments::stability::page;
 use hedgerow_lab::experiments::stability::points::{Degenerate, Greedy, GreedyKind, Growth, Large};
+use hedgerow_lab::experiments::stability::top::points::{GOALS, Preference, TopGrowth};
 use hedgerow_lab::report::lines;
 use hedgerow_lab::scene;
 use std::path::Path;
@@ -63,6 +64,60 @@ fn growth_leaves_a_point_for_every_builder_manner_and_step() {
     let run = page::read_run::<Growth>(folder.path()).expect("read").expect("written");
     assert!(run.setting.command.starts_with("hedgerow stability growth") && run.setting.device.is_some(), "{run:?}");
     assert_eq!((run.failures, run.setting.notes), (vec![], vec![]));
+}
+
+#[test]
+fn growth_of_top_levels_leaves_a_point_for_every_builder_manner_and_step() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let small = ["--steps", "20,45", "--runs", "1", "--size", "12x8", "--rays", "primary,ao", "--far", "1,9"];
+    let builders = ["--codes", "default,emc64var/24", "--prefer", "fast-build", "--rebraid", "on,off"];
+    let arguments = [&["stability", "growth", "gen:city:30", "--level", "top"][..], &small, &builders];
+    let done = hedgerow(&arguments.concat(), folder.path());
+    assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(
+        said.contains("fast-build, re-braided, default") && said.contains("9 far in three axes, side drawn"),
+        "{said}"
+    );
+    assert!(said.trim().ends_with("growth-top.html"), "{said}");
+    let points: Vec<TopGrowth> = lines::entries(folder.path()).expect("records");
+    // Codes and re-braiding; axes; one far on either side, nine on drawn ones; e.
+    assert_eq!(points.len(), 4 * 2 * 3 * 3);
+    for point in &points {
+        assert_eq!((point.scene.as_str(), point.builder.prefer), ("gen:city:30", Preference::FastBuild));
+        let kinds: Vec<&str> = point.relative_mrays.keys().map(String::as_str).collect();
+        assert_eq!(kinds, ["ao", "primary"]);
+        assert!(point.relative_mrays.values().all(|speed| speed.median > 0.0) && point.relative_frame > Some(0.0));
+        let opened = point.entries > point.instances + point.by.far;
+        assert!(point.builder.rebraid || !opened, "{point:?}");
+        assert!(point.e > 0 || point.relative_cost == Some(1.0), "{point:?}");
+        assert!(point.builder.codes.is_none_or(|codes| point.code_bits == codes.bits), "{point:?}");
+        // With the default codes what is far costs little; 24 bits of which 20 go to the distance are too few.
+        let cost = point.relative_cost.expect("a city has area");
+        let far_enough = point.by.axes == 3 && point.e > 0 && !point.builder.rebraid;
+        assert!(!far_enough || (cost > 1.2) == point.builder.codes.is_some(), "{point:?}");
+    }
+    let page = read(folder.path(), "growth-top.html");
+    assert!(page.contains("<section id=\"scene-gen-city-30\">") && page.contains("fast-build, re-braided, default"));
+    let run = page::read_run::<TopGrowth>(folder.path()).expect("read").expect("written");
+    assert!(run.setting.device.is_some() && run.failures.is_empty(), "{run:?}");
+}
+
+/// Issue 20's goal, without the noise of times: what is far costs what stays at most a twentieth.
+#[test]
+fn what_is_far_from_a_top_level_costs_what_stays_little_at_any_distance() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for scene in ["gen:city:150", "gen:forest:150"] {
+        let arguments =
+            ["stability", "growth", scene, "--level", "top", "--steps", "9,33,60", "--runs", "1", "--no-rays"];
+        let done = hedgerow(&arguments, folder.path());
+        assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+        let points: Vec<TopGrowth> = lines::entries(folder.path()).expect("records");
+        assert_eq!(points.len(), 2 * 2 * 6 * 4, "preferences, re-braiding, what is far, e");
+        for point in &points {
+            assert!(point.relative_cost.is_some_and(|cost| cost <= GOALS[0]), "{point:?}");
+        }
+    }
 }
 
 #[test]
@@ -154,6 +209,10 @@ fn wrong_arguments_are_told_apart_from_failed_work() {
         (&["growth", "--axes", "2"], "use 1 or 3"),
         (&["greedy", "--most", "65"], "65 is not in 3..=64"),
         (&["growth", "--sides", "left"], "use + or -"),
+        (&["growth", "--level", "middle"], "unknown level \"middle\"; use one of bottom, top"),
+        (&["growth", "--level", "top", "-b", "lbvh"], "take --prefer and --codes"),
+        (&["growth", "--far", "2"], "--far is for top levels"),
+        (&["growth", "--level", "top", "--codes", "emc65"], "or default"),
         (&["growth", "--steps", "60/0"], "LAST/STEP"),
         (&["growth", "--rays", "light"], "unknown kind of ray \"light\""),
         (&["large", "--placements", "roof"], "wall, walls, outward"),

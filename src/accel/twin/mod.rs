@@ -5,7 +5,7 @@ pub mod serialize;
 
 use super::{AccelOptions, Instance, Tree, quality};
 use crate::bvh::builder::{Method, Primitives};
-use crate::bvh::codes::Codes;
+use crate::bvh::codes::{CodePlan, Codes};
 use crate::bvh::layout::{self, Bvh2, Child, Header, Node, Record, status};
 use crate::bvh::wide::layout::{Wide8q, WideNode};
 use crate::bvh::wide::quantised::QuantisedNode;
@@ -80,8 +80,11 @@ pub fn top_level<'a>(
         options.method = Method::Lbvh;
     }
     let codes = options.codes.unwrap_or_else(|| Codes::for_count(boxes.len() as u32));
+    let codes = options.bits_up_to.map_or(codes, |most| codes.by_spread(&boxes, most));
     let record = |entry: u32| record_of(&entries[entry as usize], instances, &below);
-    let mut tree = bvh::twin::build(&options, codes, |finish| lbvh::build_boxes(&boxes, record, codes, finish));
+    let plan = CodePlan::new(codes, &boxes);
+    let lbvh = |finish| lbvh::build_boxes(&boxes, record, codes, finish);
+    let mut tree = bvh::twin::build_within(&options, codes, plan.core(), lbvh);
     tree.header.build_flags = options.build_flags;
     Tree::of(tree, is_wide)
 }

@@ -36,6 +36,9 @@ impl Codes {
         }
     }
 
+    /// In the word of [`Codes::kind_word`], that the device takes as many bits as the primitives' spread needs.
+    pub(crate) const BY_SPREAD: u32 = 1 << 23;
+
     /// What `kind_of_codes` in build_state.glsl takes apart.
     pub(crate) fn kind_word(&self) -> u32 {
         let (depth, count_bits, stretch) = match self.code {

@@ -22,11 +22,13 @@ mod plan;
 mod recipe;
 mod sections;
 mod size;
+mod spread;
 mod tables;
 
 pub use binning::Binning;
 pub use bounds::CodeBounds;
 pub use plan::CodePlan;
+pub(crate) use sections::{fences_around, is_apart};
 #[doc(hidden)]
 pub use tables::CodeTables;
 

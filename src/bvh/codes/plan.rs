@@ -15,6 +15,7 @@ pub struct CodePlan {
     pub(super) codes: Codes,
     pub(super) axes: [Axis; 3],
     pub(super) recipe: Recipe,
+    extents: Extents,
     size: Size,
     pub(super) prefix: Prefix,
 }
@@ -72,13 +73,14 @@ impl CodePlan {
 
     /// The recipe within these bounds, without a prefix.
     fn within(codes: Codes, bounds: &Aabb) -> CodePlan {
-        let recipe = Extents::of(bounds).recipe(codes.code.order(), codes.coordinate_bits());
+        let extents = Extents::of(bounds);
+        let recipe = extents.recipe(codes.code.order(), codes.coordinate_bits());
         let size = match codes.code {
             Code::Emc64VarExtents => Size::by_extents(bounds, &recipe, codes.code.size_group()),
             _ => Size::by_diagonal(bounds),
         };
         let axes = std::array::from_fn(|i| Axis::new(bounds.lo[i], bounds.hi[i]));
-        CodePlan { codes, axes, recipe, size, prefix: Prefix::None }
+        CodePlan { codes, axes, recipe, extents, size, prefix: Prefix::None }
     }
 
     fn fractions(&self, at: [f32; 3]) -> [u64; 3] {
@@ -93,6 +95,32 @@ impl CodePlan {
     pub fn encode(&self, primitive: &Aabb) -> u64 {
         let (bits, group) = (self.codes.bits, self.codes.code.size_group());
         self.encode_with(primitive, |coordinates, size| self.recipe.encode(coordinates, size, group, bits))
+    }
+
+    /// Where most of the primitives are, if something is far or huge.
+    pub fn core(&self) -> Option<&Aabb> {
+        match &self.prefix {
+            Prefix::Sections(sections) => Some(&sections.core),
+            _ => None,
+        }
+    }
+
+    /// Of its coordinate bits those up to the one by which `needed` have counted: that have made cells smaller than these extents.
+    pub(super) fn coordinate_bits_for(&self, typical: Extents, needed: u32) -> u32 {
+        let Extents(mut cells) = self.extents;
+        if let Prefix::Sections(sections) = &self.prefix {
+            // What is of the core has half of the coordinates there.
+            (0..3).filter(|&axis| sections.has_tail(axis)).for_each(|axis| cells[axis] += 1 << 23);
+        }
+        let mut counted = 0;
+        for (taken, &axis) in self.recipe.sequence.iter().enumerate() {
+            if counted == needed {
+                return taken as u32;
+            }
+            cells[axis] = cells[axis].wrapping_sub(1 << 23);
+            counted += u32::from(cells[axis] < typical.0[axis]);
+        }
+        self.recipe.sequence.len() as u32
     }
 
     /// The size of a primitive as a word of 16 bits, where the code has bits of it.

@@ -2,8 +2,9 @@
 //! 2024, section 5, leaves to the future: a heuristic that filters primitives into sections while they are encoded, with the split
 //! between the sections at the start of the code.
 //!
-//! *Tukey's fences* of a sample of the centroids tell what is far: what lies beyond the quantiles by more than one and a half times
-//! the distance between them (here the 1/16 quantiles). Where nothing does, codes are those of the full bounds. Otherwise there are
+//! *Tukey's outer fences* of a sample of the centroids tell what is far (Tukey 1977, "Exploratory Data Analysis", section 2C): what lies
+//! beyond the quartiles by more than three times the distance between them, so that up to a quarter of all primitives may be far to one
+//! side, and as many to the other. Where nothing does, codes are those of the full bounds. Otherwise there are
 //! three sections: the *core*, all boxes inside the fences, encoded within its own bounds; what is *far*; and what is not inside
 //! the fences but touches the core, *huge*.
 //!
@@ -14,14 +15,19 @@
 //! they are.
 
 use super::axis::{from_ordered, octaves, ordered};
+use super::recipe::Extents;
 use crate::geometry::Aabb;
 
 /// Bits for what is huge, what is far, and one of each axis between them.
 pub(super) const PREFIX_BITS: u32 = 5;
+/// The bits for what is huge and what is far.
+pub(super) const SECTION_BITS: u32 = 2;
 /// Primitives that are looked at.
 const SAMPLE: u64 = 256;
-/// One in this many sampled centroids lies below the low quantile, and one above the high one.
-const QUANTILE: usize = 16;
+/// One in this many sampled centroids lies below the low quartile, and one above the high one.
+const QUARTILE: usize = 4;
+/// Distances between the quartiles from there to the outer fences.
+const TO_FENCES: f32 = 3.0;
 
 /// The sections of a scene that has something far or huge.
 #[derive(Debug, Clone)]
@@ -81,29 +87,68 @@ fn widened(base: [f32; 2], by: f32, limits: [f32; 2]) -> [f32; 2] {
     ]
 }
 
+/// The primitives that are looked at.
+fn sample_of<E>(boxes: &[Result<Aabb, E>]) -> Vec<&Aabb> {
+    let count = boxes.len() as u64;
+    let taken = count.min(SAMPLE);
+    (0..taken).filter_map(|i| boxes[(i * count / taken) as usize].as_ref().ok()).collect()
+}
+
+/// Along each axis an eighth of the quartiles of the sample's centroids; of a sample that there is.
+fn quartiles_of(sample: &[&Aabb]) -> [[f32; 2]; 3] {
+    std::array::from_fn(|axis| {
+        let mut keys: Vec<u32> = sample.iter().map(|b| ordered(b.centroid()[axis])).collect();
+        keys.sort_unstable();
+        let rank = keys.len() / QUARTILE;
+        [keys[rank], keys[keys.len() - 1 - rank]].map(|key| from_ordered(key) * 0.125)
+    })
+}
+
+/// Half of the extents that primitives would have whose centroids lie evenly between bounds, and have the quartiles of the sample's;
+/// `None` without a sample.
+pub(super) fn typical_extents<E>(boxes: &[Result<Aabb, E>]) -> Option<Extents> {
+    let sample = sample_of(boxes);
+    (!sample.is_empty()).then(|| {
+        let eighths = quartiles_of(&sample).map(|[low, high]| high - low);
+        // Half of twice the distance between the quartiles.
+        let Extents(keys) = Extents::new(eighths);
+        Extents(std::array::from_fn(|axis| if eighths[axis] > 0.0 { keys[axis] + (3 << 23) } else { keys[axis] }))
+    })
+}
+
+/// Tukey's outer fences, but not beyond these bounds.
+fn fences_of(quartiles: [[f32; 2]; 3], bounds: &Aabb) -> Aabb {
+    let widths = quartiles.map(|[low, high]| high - low);
+    // What is thin is not therefore outlying: no axis is taken to be thinner than a quarter of the widest.
+    let least = 0.25 * widths.into_iter().fold(0.0, f32::max);
+    let mut fences = *bounds;
+    for axis in 0..3 {
+        let by = TO_FENCES * widths[axis].max(least);
+        [fences.lo[axis], fences.hi[axis]] = widened(quartiles[axis], by, [bounds.lo[axis], bounds.hi[axis]]);
+    }
+    fences
+}
+
+/// Tukey's outer fences of a sample of these boxes' centroids; `None` without a sample.
+pub(crate) fn fences_around<E>(boxes: &[Result<Aabb, E>]) -> Option<Aabb> {
+    let sample = sample_of(boxes);
+    let everywhere = Aabb { lo: [f32::MIN; 3], hi: [f32::MAX; 3] };
+    (!sample.is_empty()).then(|| fences_of(quartiles_of(&sample), &everywhere))
+}
+
+/// Whether two boxes share no point.
+pub(crate) fn is_apart(a: &Aabb, b: &Aabb) -> bool {
+    (0..3).any(|i| below(a.hi[i], b.lo[i]) || below(b.hi[i], a.lo[i]))
+}
+
 impl Sections {
     /// The sections of primitives with these boxes, whose bounds are `bounds`; `None` where nothing is beyond the fences.
     pub fn of<E>(boxes: &[Result<Aabb, E>], bounds: &Aabb) -> Option<Sections> {
-        let count = boxes.len() as u64;
-        let taken = count.min(SAMPLE);
-        let sample: Vec<&Aabb> = (0..taken).filter_map(|i| boxes[(i * count / taken) as usize].as_ref().ok()).collect();
+        let sample = sample_of(boxes);
         if sample.is_empty() {
             return None;
         }
-        let quantiles: [[f32; 2]; 3] = std::array::from_fn(|axis| {
-            let mut keys: Vec<u32> = sample.iter().map(|b| ordered(b.centroid()[axis])).collect();
-            keys.sort_unstable();
-            let rank = keys.len() / QUANTILE;
-            [keys[rank], keys[keys.len() - 1 - rank]].map(|key| from_ordered(key) * 0.125)
-        });
-        let widths = quantiles.map(|[low, high]| high - low);
-        // What is thin is not therefore outlying: no axis is taken to be thinner than a quarter of the widest.
-        let least = 0.25 * widths.into_iter().fold(0.0, f32::max);
-        let mut fences = *bounds;
-        for axis in 0..3 {
-            let by = 1.5 * widths[axis].max(least);
-            [fences.lo[axis], fences.hi[axis]] = widened(quantiles[axis], by, [bounds.lo[axis], bounds.hi[axis]]);
-        }
+        let fences = fences_of(quartiles_of(&sample), bounds);
         if is_inside(bounds, &fences) {
             return None;
         }
@@ -131,6 +176,11 @@ impl Sections {
             is_beyond.then(|| Tail { reference, shift: 30 + farthest.max(1).leading_zeros() })
         });
         Some(Sections { fences, core, head: 0, tails })
+    }
+
+    /// Whether something is beyond the core along an axis: coordinates of the core have one bit less then.
+    pub fn has_tail(&self, axis: usize) -> bool {
+        self.tails[axis].is_some()
     }
 
     /// The same with its far bit behind the first bit of each axis in this sequence.

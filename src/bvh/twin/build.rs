@@ -6,10 +6,21 @@ use crate::bvh::builder::{BuildOptions, Method};
 use crate::bvh::codes::Codes;
 use crate::bvh::layout::{Bvh2, Record};
 use crate::bvh::sah::Collapse;
+use crate::geometry::Aabb;
 
 /// The tree that a builder with these options makes by `codes`, where `lbvh` gives LBVHs over its primitives, or their parts. The codes
 /// of the options are not looked at.
 pub fn build<R: Record>(options: &BuildOptions, codes: Codes, lbvh: impl FnOnce(Finish) -> Bvh2<R>) -> Bvh2<R> {
+    build_within(options, codes, None, lbvh)
+}
+
+/// The same of instances, of which most are in the box `core`, if some are not ([`CodePlan::core`](crate::bvh::codes::CodePlan::core)).
+pub fn build_within<R: Record>(
+    options: &BuildOptions,
+    codes: Codes,
+    core: Option<&Aabb>,
+    lbvh: impl FnOnce(Finish) -> Bvh2<R>,
+) -> Bvh2<R> {
     let (collapse, child_order) = (options.collapse, options.child_order);
     if options.method == Method::Lbvh && options.optimise.is_none() {
         // Its own collapsing leaves other bytes in slots that fall out.
@@ -24,7 +35,13 @@ pub fn build<R: Record>(options: &BuildOptions, codes: Codes, lbvh: impl FnOnce(
     };
     let tree = match &options.optimise {
         None => tree.collapsed(&collapse),
-        Some(optimise) => tree.reinserted(optimise).collapsed(&collapse),
+        Some(optimise) => {
+            let optimised = match core {
+                None => tree.reinserted(optimise),
+                Some(core) => tree.reinserted_within(optimise, core),
+            };
+            optimised.collapsed(&collapse)
+        }
     };
     match child_order {
         None => tree,

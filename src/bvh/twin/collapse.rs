@@ -23,7 +23,9 @@ impl<R: Record> Bvh2<R> {
             return tree;
         }
         let bounds = self.header.root.bounds();
-        let scale = area_scale(&bounds);
+        // A tree that was made of another has its scale, whose codes may have known a part that most of it is in.
+        let known = self.header.area_scale;
+        let scale = if known > 0.0 { known } else { area_scale(&bounds) };
         let weights = Weights { tree: self, collapse, scale, of_slot: self.weights(collapse, scale) };
         let root = weights.of(&self.header.root);
         let mut order = Vec::with_capacity(self.header.active as usize);

@@ -92,7 +92,7 @@ pub fn build_boxes<R: Record>(
     order.sort_unstable();
 
     let Finish { collapse, child_order } = finish.into();
-    let area_scale = crate::bvh::sah::area_scale(&bounds);
+    let area_scale = crate::bvh::sah::area_scale_for(&bounds, plan.core().unwrap_or(&bounds));
     let ordering = child_order.map(|order| Ordering { order, costs: collapse, scale: area_scale });
     let records: Vec<R> = order.iter().map(|&(_, primitive)| record(primitive)).collect();
     let mut tree = Tree {

@@ -18,4 +18,4 @@ pub mod reinsertion;
 pub mod split;
 pub mod wide;
 
-pub use build::build;
+pub use build::{build, build_within};

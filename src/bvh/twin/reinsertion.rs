@@ -41,6 +41,17 @@ impl<R: Record> Bvh2<R> {
         self.after_rounds(options, 0, |bounds| bounds.scaled_half_area(scale), false)
     }
 
+    /// The same by the areas of boxes clipped to a part of the scene.
+    pub fn reinserted_within(&self, options: &ReinsertionOptions, part: &Aabb) -> Bvh2<R> {
+        let scale = self.header.area_scale;
+        let area = |bounds: &Aabb| {
+            let lo: [f32; 3] = std::array::from_fn(|i| bounds.lo[i].max(part.lo[i]));
+            let hi: [f32; 3] = std::array::from_fn(|i| bounds.hi[i].min(part.hi[i]));
+            if (0..3).any(|i| hi[i] < lo[i]) { 0.0 } else { Aabb { lo, hi }.scaled_half_area(scale) }
+        };
+        self.after_rounds(options, 0, area, false)
+    }
+
     /// The finished tree after the rounds of `options`, from `first_round` on: the bytes of
     /// [`record_rounds`](crate::bvh::reinsertion::Reinsertion::record_rounds).
     ///
@@ -79,8 +90,9 @@ impl<R: Record> Bvh2<R> {
             .flat_map(|offset| (offset..2 * slots).step_by(stride as usize))
         {
             probed.tried += 1;
-            // Exact: a float below 2²⁴ has 32 bits behind the point at most that count.
-            probed.gains += work.search(link).map_or(0, |m| (f64::from(m.gain) * 4_294_967_296.0) as u64);
+            // Exact: a float below 2²⁴ has 32 bits behind the point at most that count. What is more counts as that.
+            probed.gains +=
+                work.search(link).map_or(0, |m| (f64::from(m.gain.min(16_777_215.0)) * 4_294_967_296.0) as u64);
         }
         Ok(probed)
     }
@@ -122,7 +134,7 @@ impl<R: Record> Bvh2<R> {
         let boxes = boxes.map(|node| node.children[0].bounds().union(&node.children[1].bounds()));
         let (mut area, mut rays) = (0u64, 0u64);
         for bounds in boxes {
-            area += (bounds.scaled_half_area(self.header.area_scale) * PARTS_OF_AREA) as u64;
+            area += (bounds.scaled_half_area(self.header.area_scale).min(MOST_AREA) * PARTS_OF_AREA) as u64;
             rays += (grid.rays(&bounds) * PARTS_OF_RAYS) as u64;
         }
         if area == 0 || rays == 0 || weight == 0.0 {
@@ -148,6 +160,8 @@ impl<R: Record> Bvh2<R> {
 
 /// In which area and rays of all nodes are added up.
 const PARTS_OF_AREA: f32 = (1u64 << 24) as f32;
+/// What is larger counts as this: of what is far from where most is.
+const MOST_AREA: f32 = 255.0;
 const PARTS_OF_RAYS: f32 = 256.0;
 
 /// The first 24 bits of a sum, in its unit.

@@ -7,12 +7,17 @@ use super::large::{HugeTriangles, LargePlacement};
 use super::page::{self, Paged};
 use super::points::{Run, Stretched};
 use super::relative::{self, Stretch};
+use super::top::{
+    self,
+    command::{Shared, TopArguments},
+};
 use crate::cli::options::{Kinds, Size, Steps};
 use crate::cli::work::{device_for_those, page_written};
 use crate::cli::{Bar, Common};
 use crate::device::Device;
 use crate::experiments::stability;
 use crate::measure::{Failure, Setting};
+use crate::named::named;
 use crate::rays::kinds::RayKind;
 use crate::report::lines::Points;
 use crate::scene::{self, Scene};
@@ -33,7 +38,8 @@ pub struct Arguments {
 
 #[derive(Debug, clap::Subcommand)]
 enum Experiment {
-    /// One far triangle makes the bounds of a scene 2^e times as long: growth.jsonl and growth.html
+    /// One far triangle makes the bounds of a scene 2^e times as long: growth.jsonl and growth.html; or far instances those of a top level:
+    /// growth-top.jsonl and growth-top.html
     Growth(Growth),
     /// Huge triangles at the edge of a scene, by the bounds that codes are normalised by: large.jsonl and large.html
     Large(Large),
@@ -70,9 +76,14 @@ struct Relative {
 struct Growth {
     #[command(flatten)]
     relative: Relative,
-    /// Builders with their options, separated by commas, or all
-    #[arg(short, long, value_name = "BUILDER[,BUILDER…]", default_value = stability::GROWTH_BUILDERS)]
-    builder: String,
+    /// What grows: bottom, a structure over triangles, or top, one over instances
+    #[arg(long, value_name = "LEVEL", default_value = "bottom")]
+    level: GrownLevel,
+    /// Of bottom levels: builders with their options, separated by commas, or all [default: LBVHs by all kinds of codes, H-PLOC, PLOC]
+    #[arg(short, long, value_name = "BUILDER[,BUILDER…]")]
+    builder: Option<String>,
+    #[command(flatten)]
+    top: TopArguments,
     /// The e that are measured beside 0: a list of numbers, or LAST/STEP for every STEP up to LAST
     #[arg(long, value_name = "E,E…|LAST/STEP", default_value = "60/2")]
     steps: Steps,
@@ -83,6 +94,17 @@ struct Growth {
     #[arg(long, value_name = "+|-", value_delimiter = ',', default_value = "+,-", value_parser = side, allow_hyphen_values = true)]
     sides: Vec<Side>,
 }
+
+/// Which level of structures grows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum GrownLevel {
+    /// One over triangles.
+    Bottom,
+    /// One over instances.
+    Top,
+}
+
+named!(GrownLevel, "level": Bottom = "bottom", Top = "top");
 
 #[derive(Debug, clap::Args)]
 struct Large {
@@ -137,6 +159,13 @@ struct Greedy {
     output: PathBuf,
 }
 
+impl Relative {
+    /// The kinds of rays; none where costs alone are asked for.
+    fn kinds(&self) -> &[RayKind] {
+        if self.no_rays { &[] } else { &self.rays.0 }
+    }
+}
+
 fn axes(text: &str) -> Result<u32, String> {
     let axes = text.parse().ok().filter(|axes| [1, 3].contains(axes));
     axes.ok_or_else(|| format!("{text:?} is not a number of axes; use 1 or 3"))
@@ -148,11 +177,7 @@ fn side(text: &str) -> Result<Side, String> {
 
 pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
     match &arguments.experiment {
-        Experiment::Growth(Growth { relative, builder, steps, axes, sides }) => {
-            let both = |&axes: &u32| sides.iter().map(move |&side| FarTriangle { axes, side });
-            let stretches: Vec<FarTriangle> = axes.iter().flat_map(both).collect();
-            run_relative(common, relative, builder, (&stretches, &steps.0))
-        }
+        Experiment::Growth(growth) => run_growth(common, growth),
         Experiment::Large(Large { relative, builder, steps, placements, counts }) => {
             let each = |&placement| counts.iter().map(move |count| HugeTriangles { placement, count: count.get() });
             let stretches: Vec<HugeTriangles> = placements.iter().flat_map(each).collect();
@@ -161,6 +186,38 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         Experiment::Degenerate(degenerate) => run_degenerate(common, degenerate),
         Experiment::Greedy(greedy) => run_greedy(common, greedy),
     }
+}
+
+fn run_growth(common: &Common, growth: &Growth) -> anyhow::Result<()> {
+    let Growth { relative, level, builder, top, steps, axes, sides } = growth;
+    if *level == GrownLevel::Top {
+        if builder.is_some() {
+            return Err(refused("-b chooses builders of bottom levels; with --level top take --prefer and --codes"));
+        }
+        let shared = Shared {
+            scenes: &relative.scenes,
+            kinds: relative.kinds(),
+            rays: relative.size.rays(common.seed),
+            runs: relative.runs.get(),
+            axes,
+            sides,
+            steps: &steps.0,
+            output: &relative.output,
+        };
+        return top::command::run(common, top, &shared);
+    }
+    if let Some(given) = top.first_given() {
+        return Err(refused(&format!("{given} is for top levels; add --level top, or leave it out")));
+    }
+    let both = |&axes: &u32| sides.iter().map(move |&side| FarTriangle { axes, side });
+    let stretches: Vec<FarTriangle> = axes.iter().flat_map(both).collect();
+    let builder = builder.as_deref().unwrap_or(stability::GROWTH_BUILDERS);
+    run_relative(common, relative, builder, (&stretches, &steps.0))
+}
+
+/// Options that do not go together.
+fn refused(what: &str) -> anyhow::Error {
+    crate::Error::Argument(what.into()).into()
 }
 
 /// The scenes of these names, or those that are taken where none is named.
@@ -202,7 +259,7 @@ where
     let (device, specs) = opened(common, builders)?;
     // Before any work: a folder that cannot be written would lose all of it.
     let mut points = Points::<Stretched<S>>::create(&arguments.output)?;
-    let kinds: &[RayKind] = if arguments.no_rays { &[] } else { &arguments.rays.0 };
+    let kinds = arguments.kinds();
     let options = [
         ("Runs", format!("{} after a warm-up, in turn with e = 0", arguments.runs)),
         ("Image", format!("{}, seed {}", arguments.size, common.seed)),

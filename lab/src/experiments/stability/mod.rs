@@ -1,6 +1,6 @@
 //! What `hedgerow stability` measures: where methods give way.
 //!
-//! [`far`]: the bounds grow by a far triangle; [`large`]: huge triangles at the scene's edge; [`degenerate`]: scenes that
+//! [`far`]: the bounds grow by a far triangle; [`top`]: those of a top level by far instances; [`large`]: huge triangles at the scene's edge; [`degenerate`]: scenes that
 //! hurt; [`greedy`]: what greedy trees cost over the cheapest ones. The first two compare a builder with itself ([`relative`]) by the cost of what stays ([`clipped`]) and the speed of its
 //! rays; [`mod@drop`] says where a tenth is lost. Each gives [`points`] as it goes.
 
@@ -14,6 +14,7 @@ pub mod large;
 pub mod page;
 pub mod points;
 pub mod relative;
+pub mod top;
 
 /// What `growth` measures where `-b` does not say: the codes, and builders that sort by them, in trees with one triangle a leaf,
 /// so that nothing but the order of the triangles and what is made of it counts.

@@ -13,6 +13,9 @@ use std::collections::BTreeMap;
 pub enum Experiment {
     /// The bounds grow by a far triangle.
     Growth,
+    /// The bounds of a top level grow by far instances.
+    #[serde(rename = "growth-top")]
+    GrowthTop,
     /// Huge triangles at the scene's edge.
     Large,
     /// Scenes that hurt.

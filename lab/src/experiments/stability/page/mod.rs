@@ -10,8 +10,10 @@ mod growth;
 mod large;
 mod losses;
 mod stretched;
+pub(super) mod top;
 
 use super::points::{Degenerate, Greedy, Growth, Large, Run};
+use super::top::points::TopGrowth;
 use crate::Result;
 use crate::experiments::write_pages;
 use crate::report::beside::Page;
@@ -71,6 +73,7 @@ pub fn read_run<P: Paged>(folder: &Path) -> Result<Option<Run>> {
 /// The points cannot be read; a file cannot be written.
 pub fn write_all(folder: &Path) -> Result<()> {
     write::<Growth>(folder)?;
+    write::<TopGrowth>(folder)?;
     write::<Large>(folder)?;
     write::<Degenerate>(folder)?;
     write::<Greedy>(folder)

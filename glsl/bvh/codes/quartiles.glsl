@@ -1,0 +1,104 @@
+// Quartiles of a sample of centroids, and Tukey's outer fences around them: src/bvh/codes/sections.rs explains them and is the twin.
+//
+//   begin_sample     one invocation                                  writes shared memory
+//   take_sample      of one number of the sample                     writes the sample, shared memory
+//   find_quartiles   the workgroup together; of a sample that there is   reads the sample, writes shared memory
+//
+// needs  HAS_SECTIONS of the includer, without which there are none; a barrier for buffers and shared memory between each two; any
+//        subgroup size
+#ifndef HEDGEROW_BVH_CODE_QUARTILES
+#define HEDGEROW_BVH_CODE_QUARTILES
+#include "bvh/geometry.glsl"
+
+// Primitives that are looked at.
+const uint SECTION_SAMPLE = 256;
+const uint SECTION_QUARTILE = 4;
+// Distances between the quartiles from there to the outer fences.
+const float TO_FENCES = 3.0;
+const float LARGEST_FLOAT = 3.4028234663852886e38;
+// The place of one that is left out, behind all others.
+const uint NOWHERE = 0xFFFFFFFFu;
+
+// Per primitive its centroid and its box, as `ordered` floats.
+struct Sampled {
+    uvec3 middle;
+    uvec3 lo;
+    uvec3 hi;
+};
+BUFFER Sample { Sampled primitive[]; };
+
+shared uint sampled_count;
+shared uint sampled_below[HAS_SECTIONS ? 18 : 1];   // of three rounds in turn: keys below three low candidates, three high ones
+
+void begin_sample() {
+    sampled_count = 0;
+    for (uint i = 0; i < 18; ++i) sampled_below[i] = 0;
+}
+
+// The i-th of so many taken of all: i · count / taken, which may have more than 32 bits on the way.
+uint sampled_at(uint i, uint taken, uint count) {
+    return i * (count / taken) + i * (count % taken) / taken;
+}
+
+void take_sample(Sample table, uint i, bool is_active, Box b) {
+    table.primitive[i].middle = is_active ? ordered(centroid_of(b)) : uvec3(NOWHERE);
+    table.primitive[i].lo = ordered(b.lo);
+    table.primitive[i].hi = ordered(b.hi);
+    if (is_active) atomicAdd(sampled_count, 1);
+}
+
+Box find_quartiles(Sample table, uint taken) {
+    // The keys of both ranks along each axis, bit by bit: the largest that no more keys than the rank are below.
+    uint count = sampled_count, rank = count / SECTION_QUARTILE;
+    uvec3 low = uvec3(0), high = uvec3(0);
+    for (uint round = 0; round < 32; ++round) {
+        uint at = round % 3 * 6, next = (round + 1) % 3 * 6;
+        uvec3 try_low = low | 0x80000000u >> round, try_high = high | 0x80000000u >> round;
+        uvec3 below_low = uvec3(0), below_high = uvec3(0);
+        for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
+            uvec3 key = table.primitive[i].middle;
+            below_low += uvec3(lessThan(key, try_low));
+            below_high += uvec3(lessThan(key, try_high));
+        }
+        below_low = subgroupAdd(below_low);
+        below_high = subgroupAdd(below_high);
+        if (subgroupElect()) {
+            for (uint axis = 0; axis < 3; ++axis) {
+                atomicAdd(sampled_below[at + axis], below_low[axis]);
+                atomicAdd(sampled_below[at + 3 + axis], below_high[axis]);
+            }
+        }
+        // What was read in the round before the last is free.
+        if (gl_LocalInvocationIndex == 0) {
+            for (uint i = 0; i < 6; ++i) sampled_below[next + i] = 0;
+        }
+        barrier();
+        for (uint axis = 0; axis < 3; ++axis) {
+            if (sampled_below[at + axis] <= rank) low[axis] = try_low[axis];
+            if (sampled_below[at + 3 + axis] <= count - 1 - rank) high[axis] = try_high[axis];
+        }
+    }
+    return Box(from_ordered(low), from_ordered(high));
+}
+
+bool is_inside(uvec3 lo, uvec3 hi, Box fences) {
+    return all(greaterThanEqual(lo, ordered(fences.lo))) && all(lessThanEqual(hi, ordered(fences.hi)));
+}
+
+// `eighth` moved by `by` both ways, but not beyond the limits: of eighths, so that nothing overflows.
+Box widened(Box eighth, vec3 by, Box limits) {
+    precise vec3 lo = eighth.lo - by;
+    precise vec3 hi = eighth.hi + by;
+    return Box(mix(limits.lo, lo * 8.0, greaterThan(lo, limits.lo * 0.125)),
+               mix(limits.hi, hi * 8.0, lessThan(hi, limits.hi * 0.125)));
+}
+
+Box fences_of(Box bounds, Box quartiles) {
+    precise vec3 low = quartiles.lo * 0.125;
+    precise vec3 high = quartiles.hi * 0.125;
+    precise vec3 widths = high - low;
+    precise float least = 0.25 * max(max(widths.x, widths.y), max(widths.z, 0.0));
+    precise vec3 by = TO_FENCES * max(widths, vec3(least));
+    return widened(Box(low, high), by, bounds);
+}
+#endif

@@ -1,0 +1,124 @@
+//! Top levels with instances far away: the bytes of the host's, bits of codes by the spread, and what is near is opened first.
+
+use crate::common::backends::Ours;
+use crate::common::device;
+use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
+use crate::common::shapes::icosphere;
+use crate::common::world::World;
+use hedgerow::accel::{AccelOptions, Instance, REBRAID, twin};
+use hedgerow::ash::vk;
+use hedgerow::bvh::builder::{BuildOptions, Builder};
+use hedgerow::bvh::codes::Code;
+use vk::BuildAccelerationStructureFlagsKHR as Flags;
+
+/// Where things are far: at 2^`e`, in one axis or three, to either side in turn.
+fn far(count: usize, e: i32, axes: usize) -> Vec<Instance> {
+    let place = |i: usize| {
+        let at = if i.is_multiple_of(2) { 2f32.powi(e) } else { -(2f32.powi(e)) };
+        let to = std::array::from_fn(|axis| if axis < axes { at } else { 0.5 * i as f32 / count as f32 });
+        Instance::new(1, scaled(1e-6 * at.abs(), to))
+    };
+    (0..count).map(place).collect()
+}
+
+/// A grid of rows along diagonals, which are loose, and what is far.
+fn grid(side: u32, far: &[Instance], flags: Flags) -> World {
+    let at = |i: u32| [i % side, i / side % side, i / side / side].map(|k| k as f32);
+    let near = (0..side * side * side).map(|i| Instance::new(1, scaled(0.4, at(i))));
+    World {
+        flags,
+        ..World::new(vec![part(diagonal(50)), part(icosphere(1))], near.chain(far.iter().copied()).collect())
+    }
+}
+
+#[test]
+fn top_levels_with_something_far_have_the_bytes_of_the_hosts() {
+    let all_flags = [
+        Flags::PREFER_FAST_BUILD,
+        Flags::PREFER_FAST_BUILD | REBRAID,
+        Flags::empty(),
+        Flags::PREFER_FAST_TRACE,
+        Flags::PREFER_FAST_TRACE | Flags::LOW_MEMORY,
+    ];
+    let ours = Ours::on(device());
+    // By one workgroup and by chains; few far, and so many that they count as the scene.
+    for (side, count) in [(4, 1), (4, 40), (4, 80), (7, 30), (13, 1), (13, 100)] {
+        for (axes, e) in [(1, 60), (3, 9), (3, 60)] {
+            for flags in all_flags {
+                let read = ReadBack::new(&ours, &grid(side, &far(count, e, axes), flags));
+                let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &Ours::OPTIONS);
+                let what = format!("{side}³ and {count} at 2^{e} in {axes}, {flags:?}");
+                assert_eq!(read.top.header(), expected.header(), "{what}");
+                assert!(read.top.to_bytes() == expected.to_bytes(), "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn bits_are_as_many_as_the_spread_needs() {
+    let ours = Ours::on(device());
+    let bits = |side, far: &[Instance], flags| {
+        let read = ReadBack::new(&ours, &grid(side, far, flags));
+        read.top.header().code_bits
+    };
+    for side in [4, 13] {
+        for flags in [Flags::PREFER_FAST_BUILD, Flags::empty()] {
+            let alone = bits(side, &[], flags);
+            let one = bits(side, &far(1, 30, 3), flags);
+            assert!(one > alone, "{side} {flags:?}: {one} bits with something far, {alone} without");
+            assert_eq!(bits(side, &far(1, 60, 3), flags), one, "{side} {flags:?}: however far it is");
+        }
+    }
+    // One word of a code is what low memory has.
+    let low = bits(4, &far(1, 60, 3), Flags::LOW_MEMORY);
+    assert!(low <= 32, "{low} bits");
+    // What the spread is not asked for keeps its bits.
+    let given = AccelOptions { top_codes: Some(Code::Emc64Var.full().with_bits(24)), ..AccelOptions::DEFAULT };
+    let read = ReadBack::new(&Ours::with_options(device(), given), &grid(4, &far(1, 60, 3), Flags::empty()));
+    assert_eq!(read.top.header().code_bits, 24);
+}
+
+#[test]
+fn what_is_near_is_opened_before_what_is_far_however_large() {
+    let ours = Ours::on(device());
+    for side in [5, 11] {
+        let near = side * side * side;
+        let opened = |far: &[Instance]| {
+            let read = ReadBack::new(&ours, &grid(side, far, Flags::PREFER_FAST_TRACE));
+            let of_near =
+                |record: &&hedgerow::bvh::layout::InstanceRecord| record.structure != 0 && record.instance < near;
+            read.top.records().iter().filter(of_near).count() as u32
+        };
+        // The budget grows with each far instance by four entries, of which it takes one.
+        let (alone, with_far) = (opened(&[]), opened(&far(20, 60, 3)));
+        assert!(alone > 2 * near, "{alone} entries of {near} instances");
+        assert!(with_far >= alone, "{with_far} entries of {near} instances with something far, {alone} without");
+    }
+}
+
+#[test]
+fn mixtures_of_all_transforms_with_something_far_have_the_bytes_of_the_hosts() {
+    let ours = Ours::on(device());
+    for count in [2, 40, 700, 2600] {
+        let mut world = mixture(count, 5);
+        world.instances.extend(far(7, 33, 3));
+        let read = ReadBack::new(&ours, &world);
+        let expected = twin::top_level(&read.instances, |a| read.below(a), world.flags, &Ours::OPTIONS);
+        assert_eq!(read.top.header(), expected.header(), "{count}");
+        assert!(read.top.to_bytes() == expected.to_bytes(), "{count}");
+    }
+}
+
+#[test]
+fn bits_that_no_codes_have_are_refused_by_the_fields_name() {
+    let robust = "emc64var+robust/40".parse().expect("codes");
+    let plain = Code::Emc64Var.full().with_bits(24);
+    for (codes, most) in [(robust, 32), (robust, 48), (plain, 64), ("mc30+robust".parse().expect("codes"), 32)] {
+        let options = BuildOptions { codes: Some(codes), bits_up_to: Some(most), ..BuildOptions::DEFAULT };
+        let refused = Builder::new(device(), &options, 100).expect_err("no such bits");
+        assert!(refused.to_string().contains("bits_up_to is"), "{refused}");
+    }
+    let options = BuildOptions { codes: Some(robust), bits_up_to: Some(64), ..BuildOptions::DEFAULT };
+    assert!(Builder::new(device(), &options, 100).is_ok());
+}
