@@ -24,8 +24,8 @@
 //! | preference | bottom levels | top levels | build | rays |
 //! | --- | --- | --- | --- | --- |
 //! | `PREFER_FAST_BUILD` | an LBVH by codes of 8 bits less | the same | 1.0 | 1.0 |
-//! | none | H-PLOC, of over 2,048 primitives: of those measured in nodes of two, the least time for a build and ten rays a triangle | an LBVH and a pass of [reinsertion](crate::bvh::reinsertion) | 2.2 | 1.09 |
-//! | `PREFER_FAST_TRACE` | H-PLOC and three quarters of a pass of reinsertion (a whole one: 12 and 1.18), up to 2,048 primitives two passes | the same as without, and opens instances ([`REBRAID`]) | 2.2 to 12 | 1.09 to 1.18 |
+//! | none | H-PLOC, of over 2,048 primitives: of those measured in nodes of two, the least time for a build and ten rays a triangle | an LBVH and three quarters of a pass of [reinsertion](crate::bvh::reinsertion) | 2.2 | 1.09 |
+//! | `PREFER_FAST_TRACE` | H-PLOC and as much of reinsertion (a whole pass: 12 and 1.18), up to 2,048 primitives two passes | the same as without, and opens instances ([`REBRAID`]) | 2.2 to 12 | 1.09 to 1.18 |
 //!
 //! What other flags change:
 //!
