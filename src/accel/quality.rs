@@ -27,14 +27,15 @@ const KNOWN: Flags = Flags::from_raw(
 );
 
 /// Primitives up to which a build without a preference is an LBVH: one workgroup makes it in one dispatch. Up to as many a fast trace
-/// gets two passes of reinsertion, which take less time than a driver's fast trace: opened instances want the nodes near the root good.
+/// gets two passes of reinsertion, as opened instances want the nodes near the root good: they take 0.3 to 1.3 of the time of a driver's
+/// fast trace (docs/notes/rays.md).
 const FEW: u32 = 2048;
 
 /// Records of wide structures, at most: above as many bits of an instance's record lie slots of a node.
 const MOST_WIDE: u32 = (1 << 27) - 1;
 
-/// Three quarters of a pass of reinsertion: with H-PLOC that takes less time than a driver's fast trace on Mesa's lavapipe on every scene
-/// measured (bunny, sponza, classroom, san_francisco, dragon, salle_de_bain), where a pass takes up to 1.2 times as long.
+/// Three quarters of a pass of reinsertion. A whole one and H-PLOC take 0.6 to 1.2 of the time of a driver's fast trace on Mesa's lavapipe, so
+/// that this takes less on every scene (docs/notes/rays.md).
 const MOST_OF_A_PASS: ReinsertionOptions =
     ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds * 3 / 4, ..ReinsertionOptions::FAST };
 
