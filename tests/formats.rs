@@ -66,6 +66,7 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         built_area,
         split_from,
         child_order,
+        pairs,
         reserved
     });
     // `active` is a reserved word of GLSL.

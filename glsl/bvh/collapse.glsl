@@ -254,18 +254,35 @@ void collapse_place(uint task) {
 
 // ---- records ----
 
+uvec2 records_of_tree() {
+    return records_at(structure_address, max(primitive_count, 2u) - 1u);
+}
+
 void collapse_records(uint task) {
     Words walk = walk_order(), sorted = sorted_values();
-    uvec2 records = records_at(structure_address, max(primitive_count, 2u) - 1u);
     Geometry input_geometries = geometries();
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
         uint position = first + k * gl_WorkGroupSize.x;
         Box b;
         Corners c;
-        if (position < primitive_count) {
-            write_reference(records, position, input_geometries, sorted.word[walk.word[position]], b, c);
-        }
+        if (position >= primitive_count) continue;
+        uint reference = sorted.word[walk.word[position]];
+        if (HAS_NUMBERS) Words(records_of_tree()).word[position] = reference;
+        else write_reference(records_of_tree(), position, input_geometries, reference, b, c);
+    }
+}
+
+// Of a tree that HAS_NUMBERS: the records, to `scratch_address`.
+void collapse_numbered(uint task) {
+    Words numbers = Words(records_of_tree());
+    Geometry input_geometries = geometries();
+    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint position = first + k * gl_WorkGroupSize.x;
+        Box b;
+        Corners c;
+        if (position < primitive_count) write_record(scratch_address, position, input_geometries, numbers.word[position], b, c);
     }
 }
 #endif

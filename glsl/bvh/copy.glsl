@@ -22,13 +22,8 @@ bool is_structure(Header header) {
 }
 
 // Bytes of a structure, as two words: an address behind address 0.
-uvec2 structure_bytes(uint kind, uint node_slots, uint primitive_count, uint geometry_count) {
-    uvec2 table = geometry_table_address(uvec2(0), kind, node_slots, primitive_count);
-    return address_of(table, geometry_count > 1 ? geometry_count : 0, 8);
-}
-
 uvec2 structure_bytes(Header header) {
-    return structure_bytes(header.kind, header.node_slots, header.primitive_count, header.geometry_count);
+    return address_of(geometry_table_of(uvec2(0), header), header.geometry_count > 1 ? header.geometry_count : 0, 8);
 }
 
 // Copies a number of bytes (two words; a multiple of 4) between addresses that are multiples of 8. Pieces are found by address, as
@@ -49,9 +44,9 @@ void copy_bytes(uvec2 from, uvec2 to, uvec2 bytes) {
 
 // The header of a structure of nothing that stands for what this version cannot read.
 Header header_of_wrong_version() {
-    uint reserved[7];
-    for (uint i = 0; i < 7; ++i) reserved[i] = 0;
-    return Header(MAGIC, KIND_TRIANGLES, STATUS_WRONG_VERSION, 0, empty_root(), 0, 1, 0, 0, 1, 0, 0, 0.0, 0.0, 0.0, 0.0, 0, 0, reserved);
+    uint reserved[6];
+    for (uint i = 0; i < 6; ++i) reserved[i] = 0;
+    return Header(MAGIC, KIND_TRIANGLES, STATUS_WRONG_VERSION, 0, empty_root(), 0, 1, 0, 0, 1, 0, 0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0, reserved);
 }
 
 // One invocation of the dispatch writes it.
@@ -69,6 +64,7 @@ Header compacted(Header header) {
         header.inner_nodes = 0;
     }
     header.primitive_count = header.active_count;
+    header.pairs = min(header.pairs, header.active_count);
     header.node_slots = max(header.inner_nodes, 1);
     // A root that is a node is the first.
     if (header.root.count == 0) header.root.index = 0;

@@ -190,7 +190,8 @@ void write_header(BuildState state, uint geometry_count, uint geometry_flags) {
     structure.header.built_area = 0.0;
     structure.header.split_from = HAS_REFERENCES ? SplitState(part(parts.split)).primitive_count : 0;
     structure.header.child_order = 0;
-    for (uint i = 0; i < 7; ++i) structure.header.reserved[i] = 0;
+    structure.header.pairs = 0;
+    for (uint i = 0; i < 6; ++i) structure.header.reserved[i] = 0;
     if (primitive_count < 2) mark_unused(structure, 0);
 }
 
@@ -232,7 +233,8 @@ void write_recipe(BuildState state, Box boxes, Box bounds) {
 void make_plan() {
     BuildState state = build_state();
     uint geometry_count = count_geometries(geometries()), slots = max(primitive_count, 2) - 1;
-    GeometryTable table = geometry_table_at(structure_address, kind_of_records(), slots, primitive_count);
+    uint bytes_each = HAS_NUMBERS ? 4u : record_bytes(kind_of_records());
+    GeometryTable table = GeometryTable(address_of(records_at(structure_address, slots), primitive_count, bytes_each));
     uint geometry_flags = write_geometries_together(geometries(), geometry_count, table);
     if (gl_LocalInvocationIndex == 0) write_header(state, geometry_count, geometry_flags);
     if (HAS_SECTIONS) {

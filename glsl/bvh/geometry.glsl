@@ -17,6 +17,8 @@ layout(constant_id = 5) const uint SOURCE_WORD = 0;
 const uint SOURCE = SOURCE_WORD & 7u;
 // Whether leaves hold references (bvh/references.glsl) to the primitives.
 const bool HAS_REFERENCES = (SOURCE_WORD & 8u) != 0u;
+// Whether the structure has the primitives' numbers in place of their records, which are written when the tree is done.
+const bool HAS_NUMBERS = (SOURCE_WORD & 16u) != 0u;
 
 // A primitive is left out without a status bit: the caller wants it so.
 const uint INACTIVE = 1u << 31;

@@ -10,13 +10,13 @@
 
 const uint MAGIC = 0x72676468u;
 // What the leaves hold.
-const uint KIND_TRIANGLES = 0x00020004u;
-const uint KIND_BOXES = 0x00120004u;
-const uint KIND_INSTANCES = 0x00220004u;
+const uint KIND_TRIANGLES = 0x00020005u;
+const uint KIND_BOXES = 0x00120005u;
+const uint KIND_INSTANCES = 0x00220005u;
 // The same in nodes of eight children as bytes (bvh/wide.glsl).
-const uint KIND_TRIANGLES_8Q = 0x01080004u;
-const uint KIND_BOXES_8Q = 0x01180004u;
-const uint KIND_INSTANCES_8Q = 0x01280004u;
+const uint KIND_TRIANGLES_8Q = 0x01080005u;
+const uint KIND_BOXES_8Q = 0x01180005u;
+const uint KIND_INSTANCES_8Q = 0x01280005u;
 const uint MAX_DEPTH = 96;
 // The count of a child that no tree has: its slot is unused.
 const uint UNUSED = 0xFFFFFFFFu;
@@ -108,7 +108,8 @@ struct Header {
     float built_area;
     uint split_from;
     uint child_order;         // 1: left children are those that rays look into first that end at any hit
-    uint reserved[7];
+    uint pairs;               // of quantised trees of triangles: records that hold two
+    uint reserved[6];
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer Structure {
@@ -191,11 +192,13 @@ uint geometry_index_of(GeometryTable table, uint count, uint primitive) {
 
 // Where the table of geometries lies, if there are several: behind the records. An address, for a reference made of another
 // reference makes SwiftShader crash.
-uvec2 geometry_table_address(uvec2 structure, uint kind, uint node_slots, uint primitive_count) {
-    return address_of(records_of_kind(structure, kind, node_slots), primitive_count, record_bytes(kind));
+uvec2 geometry_table_address(uvec2 structure, uint kind, uint node_slots, uint primitive_count, uint pairs) {
+    // A pair takes 16 bytes more than one triangle.
+    uint singly = primitive_count - min(pairs, primitive_count);
+    return address_of(address_of(records_of_kind(structure, kind, node_slots), singly, record_bytes(kind)), pairs, 16u);
 }
 
-GeometryTable geometry_table_at(uvec2 structure, uint kind, uint node_slots, uint primitive_count) {
-    return GeometryTable(geometry_table_address(structure, kind, node_slots, primitive_count));
+uvec2 geometry_table_of(uvec2 structure, Header header) {
+    return geometry_table_address(structure, header.kind, header.node_slots, header.primitive_count, header.pairs);
 }
 #endif

@@ -5,6 +5,7 @@
 #ifndef HEDGEROW_TRACE_LONG_LOADS
 #define HEDGEROW_TRACE_LONG_LOADS
 #include "bvh/wide.glsl"
+#include "bvh/wide/pairs.glsl"
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer HedgerowLongs { uint64_t element[]; };
@@ -30,6 +31,11 @@ Triangle hedgerow_long_triangle(uvec2 address) {
     uvec4 a = hedgerow_quad_of(at, 0u), b = hedgerow_quad_of(at, 2u);
     uvec2 c = hedgerow_pair_of(at, 4u);
     return Triangle(uintBitsToFloat(a.xyz), uintBitsToFloat(uvec3(a.w, b.xy)), uintBitsToFloat(uvec3(b.zw, c.x)), c.y);
+}
+
+SecondOfPair hedgerow_long_second_of_pair(uvec2 address) {
+    uvec4 a = hedgerow_quad_of(HedgerowLongs(address), 0u);
+    return SecondOfPair(uintBitsToFloat(a.xyz), a.w);
 }
 
 QuantisedNode hedgerow_long_quantised_node(uvec2 address) {

@@ -149,7 +149,7 @@ mat4x3 hedgerowRayQueryGetIntersectionWorldToObject(HedgerowRayQuery query, bool
 // The corners of the triangle, in the object's space.
 void hedgerowRayQueryGetIntersectionTriangleVertexPositions(HedgerowRayQuery query, bool committed, out vec3 positions[3]) {
     HedgerowMeeting met = hedgerow_met(query, committed);
-    HedgerowTriangle triangle = Triangles(hedgerow_records_of(hedgerow_instance_of(query, met))).triangle[met.record];
+    HedgerowTriangle triangle = hedgerow_triangle_of(hedgerow_instance_of(query, met), met);
     positions = vec3[3](triangle.v0, triangle.v1, triangle.v2);
 }
 

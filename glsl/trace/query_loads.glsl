@@ -5,6 +5,7 @@
 #ifndef HEDGEROW_TRACE_QUERY_LOADS
 #define HEDGEROW_TRACE_QUERY_LOADS
 #include "bvh/wide.glsl"
+#include "bvh/wide/pairs.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer HedgerowNodes { Node node[]; };
 
@@ -42,6 +43,14 @@ Triangle hedgerow_triangle_at(uvec2 triangles, uint index) {
     return hedgerow_long_triangle(address_of(triangles, index, 40u));
 }
 
+Triangle hedgerow_triangle_at_unit(uvec2 records, uint unit) {
+    return hedgerow_long_triangle(record_at_unit(records, unit));
+}
+
+SecondOfPair hedgerow_second_of_pair_at(uvec2 records, uint unit) {
+    return hedgerow_long_second_of_pair(second_at_unit(records, unit));
+}
+
 // Without `to_world`, which no ray needs on its way.
 Instance hedgerow_instance_at(uvec2 instances, uint index) {
     HedgerowLongs at = HedgerowLongs(address_of(instances, index, 128u));
@@ -69,8 +78,26 @@ Triangle hedgerow_triangle_at(uvec2 triangles, uint index) {
     return Triangles(triangles).triangle[index];
 }
 
+Triangle hedgerow_triangle_at_unit(uvec2 records, uint unit) {
+    return Triangles(record_at_unit(records, unit)).triangle[0];
+}
+
+SecondOfPair hedgerow_second_of_pair_at(uvec2 records, uint unit) {
+    return SecondsOfPairs(second_at_unit(records, unit)).second[0];
+}
+
 Instance hedgerow_instance_at(uvec2 instances, uint index) {
     return Instances(instances).instance[index];
 }
 #endif
+
+// In what names a record of quantised triangles beside its unit: its second triangle.
+const uint HEDGEROW_SECOND = 1u << 31;
+
+Triangle hedgerow_triangle_of_record(uvec2 records, uint record) {
+    uint unit = record & ~HEDGEROW_SECOND;
+    Triangle first = hedgerow_triangle_at_unit(records, unit);
+    if (record == unit) return first_of_pair(first);
+    return second_of_pair(first, hedgerow_second_of_pair_at(records, unit));
+}
 #endif

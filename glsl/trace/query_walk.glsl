@@ -89,7 +89,7 @@ struct HedgerowMeeting {
     float t;
     float u;
     float v;
-    uint record;              // in the bottom-level structure
+    uint record;              // in the bottom-level structure; of quantised triangles see trace/query_pairs.glsl
     uint instance;            // record in the top level; without meaning where a bottom-level structure is queried
     bool is_front;
     bool is_opaque;
@@ -308,7 +308,7 @@ HedgerowGeometry hedgerow_geometry_of(uvec2 structure, uint slots, uint primitiv
     Header header = Structure(structure).header;
     if (header.magic != MAGIC || header.node_slots != slots) return HedgerowGeometry(0u, 0u, 0u);
     if (header.geometry_count <= 1u) return HedgerowGeometry(0u, 0u, header.geometry_flags);
-    GeometryTable table = geometry_table_at(structure, header.kind, header.node_slots, header.primitive_count);
+    GeometryTable table = GeometryTable(geometry_table_of(structure, header));
     return hedgerow_geometry_in(table, header.geometry_count, primitive);
 }
 
@@ -339,10 +339,18 @@ uvec2 hedgerow_records_of(Instance instance) {
     return hedgerow_records_in(instance.structure, instance.slots & INDEX_MASK, instance.slots);
 }
 
-uint hedgerow_primitive_of(Instance instance, HedgerowMeeting met) {
+// The triangle that a meeting was with.
+Triangle hedgerow_triangle_of(Instance instance, HedgerowMeeting met) {
     uvec2 records = hedgerow_records_of(instance);
-    return met.type == HEDGEROW_MET_BOX ? BoxRecords(records).box[met.record].primitive
-                                        : Triangles(records).triangle[met.record].primitive;
+#ifdef HEDGEROW_QUANTISED
+    if ((instance.slots & FORM_QUANTISED) != 0u) return hedgerow_triangle_of_record(records, met.record);
+#endif
+    return Triangles(records).triangle[met.record];
+}
+
+uint hedgerow_primitive_of(Instance instance, HedgerowMeeting met) {
+    if (met.type == HEDGEROW_MET_BOX) return BoxRecords(hedgerow_records_of(instance)).box[met.record].primitive;
+    return hedgerow_triangle_of(instance, met).primitive;
 }
 
 // Whether the candidate comes before the committed hit at the same t: by instance, then primitive.
@@ -495,9 +503,8 @@ bool hedgerow_is_culled(HedgerowRayQuery query, bool is_opaque) {
     return (query.flags & (is_opaque ? hedgerowRayFlagsCullOpaque : hedgerowRayFlagsCullNoOpaque)) != 0u;
 }
 
-// The next triangle of the leaf; true if it is a candidate that the shader must decide on.
-bool hedgerow_test_triangle(inout HedgerowRayQuery query, uint at) {
-    Triangle triangle = hedgerow_triangle_at(hedgerow_records_in(query.structure, query.slots, query.form), at);
+// The triangle of the record `at`; true if it is a candidate that the shader must decide on.
+bool hedgerow_meet_triangle(inout HedgerowRayQuery query, Triangle triangle, uint at) {
     vec3 met;
     bool is_front;
     if (!hedgerow_meet_facing(query.prepared, triangle.v0, triangle.v1, triangle.v2, met, is_front)) return false;
@@ -528,12 +535,22 @@ bool hedgerow_test_box(inout HedgerowRayQuery query, uint at) {
     return true;
 }
 
+#ifdef HEDGEROW_QUANTISED
+#include "trace/query_pairs.glsl"
+#endif
+
+// The next record of the leaf; true if what was met is a candidate that the shader must decide on.
 bool hedgerow_test(inout HedgerowRayQuery query) {
+#ifdef HEDGEROW_QUANTISED
+    if ((query.form & (FORM_QUANTISED | FORM_BOXES)) == FORM_QUANTISED) return hedgerow_test_pair(query);
+#endif
     uint at = query.index;
     hedgerow_step(query);
     HEDGEROW_COUNT(w);
     if (at >= query.records) return false;
-    return (query.form & FORM_BOXES) != 0u ? hedgerow_test_box(query, at) : hedgerow_test_triangle(query, at);
+    if ((query.form & FORM_BOXES) != 0u) return hedgerow_test_box(query, at);
+    Triangle triangle = hedgerow_triangle_at(hedgerow_records_in(query.structure, query.slots, query.form), at);
+    return hedgerow_meet_triangle(query, triangle, at);
 }
 
 // Takes what waits; false at the end of the walk.

@@ -83,14 +83,20 @@ void visit_left_first(Node node, inout Walk walk) {
     count_leaf(walk);
 }
 
-void test(Triangle triangle, bool any_hit, inout Walk walk) {
+// Tests a triangle; a ray that has ended has nothing at hand.
+void meet(Triangle triangle, bool any_hit, inout Walk walk) {
     walk.work.y++;
-    walk.index++;
-    walk.left = walk.left == 1u ? NOTHING : walk.left - 1u;
     if (hit_nearer(walk.ray, triangle, any_hit, walk.best, walk.hit) && any_hit) {
         walk.left = NOTHING;
         walk.level = 0;
     }
+}
+
+// The next triangle of the leaf.
+void test(Triangle triangle, bool any_hit, inout Walk walk) {
+    walk.index++;
+    walk.left = walk.left == 1u ? NOTHING : walk.left - 1u;
+    meet(triangle, any_hit, walk);
 }
 
 // Takes what waits; whether there was any. Equally far is not too far: an equally near hit with a lower index may be there.

@@ -7,6 +7,7 @@
 #ifndef HEDGEROW_TRACE_WALK_QUANTISED
 #define HEDGEROW_TRACE_WALK_QUANTISED
 #extension GL_EXT_control_flow_attributes : require
+#include "bvh/wide/pairs.glsl"
 #include "trace/buffers.glsl"
 #include "trace/nearest.glsl"
 #include "trace/quantised_boxes.glsl"
@@ -27,7 +28,7 @@ struct QuantisedWalk {
     uint first_record;
     uvec2 counts;
     uint leaves;
-    // The next triangle, and how many are left of its leaf.
+    // The next record, and how many units are left of its leaf.
     uint record;
     uint left;
     // How many groups wait.
@@ -118,16 +119,24 @@ void next_leaf(inout QuantisedWalk walk) {
     if (walk.left != 0u) walk.work.z++;
 }
 
-void test(Triangle triangle, bool any_hit, inout QuantisedWalk walk) {
+void meet(Triangle triangle, bool any_hit, inout QuantisedWalk walk) {
     walk.work.y++;
-    walk.record++;
-    walk.left--;
     if (hit_nearer(walk.ray, triangle, any_hit, walk.best, walk.hit) && any_hit) {
         walk.left = 0;
         walk.leaves = 0;
         walk.visits = 0;
         walk.level = 0;
     }
+}
+
+// The next record of the leaf: one triangle, or two. `second` is what lies behind the first of two.
+void test_record(Triangle first, SecondOfPair second, bool any_hit, inout QuantisedWalk walk) {
+    uint units = units_of_record(first);
+    walk.record += units;
+    walk.left -= min(walk.left, units);
+    meet(first_of_pair(first), any_hit, walk);
+    bool has_ended = any_hit && walk.hit.primitive != HEDGEROW_NONE;
+    if (has_second(first) && !has_ended) meet(second_of_pair(first, second), any_hit, walk);
 }
 
 // Takes a group that waits, if there is nothing at hand; whether there was any. Equally far is not too far: an equally near hit

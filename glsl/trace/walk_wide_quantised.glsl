@@ -31,6 +31,16 @@ void visit_wide(QuantisedNode node, inout Walk walk) {
     go_to_first(walk);
 }
 
+// The next record of the leaf: one triangle, or two. `second` is what lies behind the first of two.
+void test_record(Triangle first, SecondOfPair second, bool any_hit, inout Walk walk) {
+    uint units = units_of_record(first);
+    walk.index += units;
+    walk.left = walk.left <= units ? NOTHING : walk.left - units;
+    meet(first_of_pair(first), any_hit, walk);
+    bool has_ended = any_hit && walk.hit.primitive != HEDGEROW_NONE;
+    if (has_second(first) && !has_ended) meet(second_of_pair(first, second), any_hit, walk);
+}
+
 // Index and count of the child in a slot.
 uvec2 quantised_child_in_slot(QuantisedNodes nodes, uint node, uint slot) {
     uint of_nodes = nodes.node[node].exponents_and_nodes >> 24;

@@ -7,9 +7,10 @@ use super::{AccelOptions, quality};
 use crate::bvh::builder::{BuildJob, BuildOptions, Builder};
 use crate::bvh::codes::Codes;
 use crate::bvh::geometry::{Geometry, GeometryFlags, Input, Primitives, Source};
+use crate::bvh::layout::NODES_OFFSET;
 use crate::bvh::refit::{self, Refit};
 use crate::bvh::wide::Form;
-use crate::bvh::wide::device::{WideOptions, WidePass};
+use crate::bvh::wide::device::{WideMemory, WideOptions, WidePass};
 use crate::gpu::arguments;
 use crate::gpu::{Context, Kernel, Region, Sizes, Step, shaders};
 use crate::{Error, Result};
@@ -19,6 +20,10 @@ type Flags = vk::BuildAccelerationStructureFlagsKHR;
 
 /// What scratch addresses must be multiples of: `minAccelerationStructureScratchOffsetAlignment`.
 pub const SCRATCH_ALIGNMENT: u64 = 16;
+
+/// From how many triangles on a structure of wide nodes is made in its own memory: 162 bytes a triangle in all, where 270 and the tables
+/// of a sort are for a few.
+const NUMBERED_FROM: u32 = 4096;
 
 /// Where the numbers of primitives come from.
 #[derive(Debug, Clone, Copy)]
@@ -41,6 +46,8 @@ pub(super) struct Build {
     rebraid: Option<Rebraid>,
     /// What makes nodes of eight of the builder's tree, which lies in scratch memory then.
     wide: Option<WidePass>,
+    /// Whether that tree has the primitives' numbers in place of their records, and the structure's memory serves while it is made.
+    numbered: bool,
     options: BuildOptions,
     /// What a build of fewer primitives may need.
     of_fewer: Option<Sizes>,
@@ -85,13 +92,19 @@ impl Build {
                 WideOptions { form: Form::EightQuantised, primitives, geometry_count: builder_options.geometry_count };
             WidePass::new(context, &of, entries)
         });
+        let in_pieces = wide.filter(|_| primitives == Primitives::Triangles && entries >= NUMBERED_FROM);
+        let numbered = in_pieces.and_then(|_| builder.numbered());
+        let (builder, numbered) = numbered.map_or((builder, false), |builder| (builder, true));
         let fewer = quality::fewer_of_another_form(flags, entries).filter(|_| primitives != Primitives::Instances);
+        // Which itself may need more than one of another form.
+        let fewer = if numbered { Some(NUMBERED_FROM - 1) } else { fewer };
         let of_fewer = |count: u32| {
             let given = given.clone();
             Build::new(context, options, flags, given, counts, count.into()).map(|build| build.sizes_at_most())
         };
         let of_fewer = fewer.map(of_fewer).transpose()?;
-        Ok(Build { builder, refit, given, counts, primitive_count, rebraid, wide, options: builder_options, of_fewer })
+        let options = builder_options;
+        Ok(Build { builder, refit, given, counts, primitive_count, rebraid, wide, numbered, options, of_fewer })
     }
 
     /// Bytes of structure and scratch memory that it needs.
@@ -112,6 +125,13 @@ impl Build {
     fn sizes_with(&self, builder: Sizes) -> Sizes {
         let before = self.scratch(0).builder;
         match self.wide.map(|wide| wide.sizes()) {
+            Some(of_wide) if self.numbered => {
+                let wide = self.wide.expect("there is one");
+                // The structure's memory has room for what the builder needs, and behind the nodes for what the wide pass does.
+                let structure = of_wide.structure.max(builder.scratch);
+                let structure = structure.max(wide.behind_all_nodes() + wide.passing_bytes());
+                Sizes { structure, scratch: before + wide.lasting_bytes(), ..builder }
+            }
             Some(wide) => {
                 Sizes { structure: wide.structure, scratch: before + builder.scratch.max(wide.scratch), ..builder }
             }
@@ -141,13 +161,14 @@ impl Build {
 
     /// The builder's part, with scratch memory at `scratch`.
     pub fn job(&self, structure: Region, scratch: Region) -> BuildJob<'_> {
-        let structure = if self.wide.is_some() { scratch.behind(self.scratch(0).binary) } else { structure };
-        BuildJob {
-            builder: &self.builder,
-            input: self.input(scratch.address),
-            structure,
-            scratch: scratch.behind(self.scratch(0).builder),
-        }
+        let parts = self.scratch(0);
+        let (binary, room) = (scratch.behind(parts.binary), scratch.behind(parts.builder));
+        let (structure, room) = match self.wide {
+            Some(_) if self.numbered => (binary, structure),
+            Some(_) => (binary, room),
+            None => (structure, room),
+        };
+        BuildJob { builder: &self.builder, input: self.input(scratch.address), structure, scratch: room }
     }
 
     /// What must run behind the builder's part, with a barrier before.
@@ -155,7 +176,21 @@ impl Build {
         let Some(wide) = &self.wide else { return Ok(Vec::new()) };
         let parts = self.scratch(0);
         let source = scratch.behind(parts.binary).address;
-        wide.steps(source, [0, 0], structure, scratch.behind(parts.builder))
+        if !self.numbered {
+            return wide.steps(source, [0, 0], structure, scratch.behind(parts.builder));
+        }
+        // Nodes are made with the records where they will be themselves, and records with those where the binary nodes were.
+        let records = [structure.address, source + NODES_OFFSET];
+        let memory = WideMemory {
+            target: structure.address,
+            passing: structure.address + wide.behind_all_nodes(),
+            lasting: scratch.behind(parts.builder).address,
+            records,
+        };
+        let input = self.input(scratch.address);
+        let written = |at: u64| self.builder.numbered_step(&input, source, at).map(|step| vec![step]);
+        let [nodes, moved] = wide.steps_in(source, [0, 0], &memory)?;
+        Ok([written(records[0])?, nodes, written(records[1])?, moved].concat())
     }
 
     /// The part of an update in place, with scratch memory at `scratch`.

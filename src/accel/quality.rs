@@ -10,6 +10,7 @@ use crate::bvh::child_order::ChildOrder;
 use crate::bvh::codes::{CodeBounds, Codes};
 use crate::bvh::reinsertion::ReinsertionOptions;
 use crate::bvh::sah::Collapse;
+use crate::bvh::wide::pairs::TRIANGLES_AT_MOST;
 use crate::{Error, Result};
 use ash::vk;
 
@@ -31,8 +32,9 @@ const KNOWN: Flags = Flags::from_raw(
 /// fast trace (docs/notes/rays.md).
 const FEW: u32 = 2048;
 
-/// Records of wide structures, at most: above as many bits of an instance's record lie slots of a node.
-const MOST_WIDE: u32 = (1 << 27) - 1;
+/// Records of wide structures, at most: what tracers can name of triangles, and fewer than the bits of an instance's record, above which
+/// slots of a node lie.
+const MOST_WIDE: u32 = TRIANGLES_AT_MOST;
 
 /// Three quarters of a pass of reinsertion. A whole one and H-PLOC take 0.6 to 1.2 of the time of a driver's fast trace on Mesa's lavapipe, so
 /// that this takes less on every scene (docs/notes/rays.md).

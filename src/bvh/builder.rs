@@ -263,6 +263,7 @@ impl Builder {
             geometry_count: options.geometry_count,
             build_flags: options.build_flags,
             alone,
+            numbered: false,
         };
         Ok(Builder { method, schedule, optimise, workers: tuning.workers, merging, encode, child_order })
     }
@@ -311,8 +312,23 @@ impl Builder {
 
     /// Where the parts of the structure lie.
     pub fn layout(&self) -> layout::BvhOffsets {
-        let Encode { primitives, count, geometry_count, .. } = self.encode;
-        layout::offsets(primitives.record_bytes(), count, geometry_count)
+        let Encode { primitives, count, geometry_count, numbered, .. } = self.encode;
+        layout::offsets(if numbered { 4 } else { primitives.record_bytes() }, count, geometry_count)
+    }
+
+    /// The builder of structures that have the primitives' numbers in place of their records, 4 bytes each, for whoever makes another
+    /// structure of it: [`Builder::numbered_step`] writes the records when they are needed. `None` where the tree's making reads them.
+    pub(crate) fn numbered(&self) -> Option<Builder> {
+        let is_chain = self.schedule == Schedule::Chain && self.encode.split.is_none();
+        let encode = Encode { numbered: true, ..self.encode.clone() };
+        (is_chain && self.places() && self.child_order.is_none()).then(|| Builder { encode, ..self.clone() })
+    }
+
+    /// Writes the records of such a structure, in the primitive order, to the address `records`.
+    pub(crate) fn numbered_step(&self, input: &Input, structure: u64, records: u64) -> Result<Step> {
+        let parts = self.scratch(self.encode.table_words()).parts;
+        let arguments = self.encode.arguments(input, structure, 0, parts)?;
+        Ok(collapse::numbered_step(&self.encode, input, &arguments, records))
     }
 
     /// Bytes that suffice for builds of this many primitives and of any fewer by builders of the same options.

@@ -18,6 +18,12 @@ pub(super) fn place_steps(encode: &Encode, input: &Input, arguments: &arguments:
     kernels.map(|kernel| Step::new("collapse", kernel, arguments, encode.tiles())).into()
 }
 
+/// Writes the records of a tree that has the numbers of its primitives in their place to the address `records`. Label: `collapse`.
+pub(super) fn numbered_step(encode: &Encode, input: &Input, arguments: &arguments::Build, records: u64) -> Step {
+    let kernel = encode.reading_kernel(&shaders::BVH_COLLAPSE_NUMBERED, input);
+    Step::new("collapse", kernel, &arguments::Build { scratch: records, ..*arguments }, encode.tiles())
+}
+
 /// The dispatches that find the weights of any tree. Label: `collapse`.
 pub(super) fn weigh_steps(encode: &Encode, arguments: &arguments::Build) -> Vec<Step> {
     [&shaders::BVH_COLLAPSE_PARENTS, &shaders::BVH_COLLAPSE_WEIGH]

@@ -44,6 +44,8 @@ pub(super) struct Encode {
     pub build_flags: u32,
     /// Whether one workgroup does everything.
     pub alone: bool,
+    /// Whether the structure has the primitives' numbers in place of their records.
+    pub numbered: bool,
 }
 
 impl arguments::Build {
@@ -70,6 +72,8 @@ impl arguments::Build {
 
 /// In `SOURCE_WORD` of geometry.glsl: leaves hold references.
 const HAS_REFERENCES: u32 = 8;
+/// There: the structure has numbers in place of records.
+const HAS_NUMBERS: u32 = 16;
 
 impl Encode {
     /// Bits that there is room and time for.
@@ -134,7 +138,8 @@ impl Encode {
     pub fn reading_kernel_with(&self, shader: &'static shaders::Shader, input: &Input, more: &[u32]) -> Kernel {
         let constants = self.constants();
         let references = if self.split.is_some() { HAS_REFERENCES } else { 0 };
-        let source = [input.source_constant(self.primitives) | references, self.codes.prefix_constant()];
+        let numbers = if self.numbered { HAS_NUMBERS } else { 0 };
+        let source = [input.source_constant(self.primitives) | references | numbers, self.codes.prefix_constant()];
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source, more].concat())
     }
 

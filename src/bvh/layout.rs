@@ -15,6 +15,7 @@
 //! `active` − 1 on are unused.
 
 use super::wide::Form;
+use super::wide::pairs::SAVED_BY_PAIR;
 use super::wide::quantised::QuantisedNode;
 use crate::geometry::Aabb;
 use crate::{Error, Result};
@@ -162,7 +163,7 @@ pub struct Triangle {
 }
 
 impl Record for Triangle {
-    const KIND: u32 = 0x0002_0004;
+    const KIND: u32 = 0x0002_0005;
 
     fn primitive(&self) -> u32 {
         self.primitive
@@ -196,7 +197,7 @@ pub struct BoxRecord {
 }
 
 impl Record for BoxRecord {
-    const KIND: u32 = 0x0012_0004;
+    const KIND: u32 = 0x0012_0005;
 
     fn primitive(&self) -> u32 {
         self.primitive
@@ -296,7 +297,7 @@ impl InstanceRecord {
 }
 
 impl Record for InstanceRecord {
-    const KIND: u32 = 0x0022_0004;
+    const KIND: u32 = 0x0022_0005;
 
     fn primitive(&self) -> u32 {
         self.instance
@@ -368,8 +369,10 @@ pub struct Header {
     /// at any hit. 0: they are as the build left them. Copies and updates keep it,
     /// and wide trees made of the structure have it.
     pub child_order: u32,
+    /// Of a quantised tree of triangles: records that hold two ([`super::wide::pairs`]). Otherwise 0.
+    pub pairs: u32,
     /// Zero.
-    pub reserved: [u32; 7],
+    pub reserved: [u32; 6],
 }
 
 impl Header {
@@ -406,12 +409,14 @@ pub const fn offsets(record_bytes: u64, primitive_count: u32, geometry_count: u3
 
 /// The sizes of a structure of this many node slots, records of `record_bytes` bytes, and geometries.
 pub const fn offsets_with(record_bytes: u64, node_slots: u32, primitive_count: u32, geometry_count: u32) -> BvhOffsets {
-    offsets_behind(node_slots as u64 * size_of::<Node>() as u64, record_bytes, primitive_count, geometry_count)
+    let nodes = node_slots as u64 * size_of::<Node>() as u64;
+    offsets_behind(nodes, primitive_count as u64 * record_bytes, geometry_count)
 }
 
-const fn offsets_behind(nodes: u64, record_bytes: u64, primitive_count: u32, geometry_count: u32) -> BvhOffsets {
+/// With nodes and records of so many bytes.
+const fn offsets_behind(nodes: u64, records: u64, geometry_count: u32) -> BvhOffsets {
     let records_offset = NODES_OFFSET + nodes;
-    let geometries_offset = records_offset + primitive_count as u64 * record_bytes;
+    let geometries_offset = records_offset + records;
     let entries = if geometry_count > 1 { geometry_count as u64 } else { 0 };
     let bytes = geometries_offset + entries * size_of::<GeometryEntry>() as u64;
     BvhOffsets { records_offset, geometries_offset, bytes }
@@ -519,6 +524,8 @@ impl Header {
     /// Where the parts of the structure lie, if its records have `record_bytes` bytes.
     pub const fn offsets(&self, record_bytes: u64) -> BvhOffsets {
         let nodes = self.node_slots as u64 * node_bytes(self.kind);
-        offsets_behind(nodes, record_bytes, self.primitive_count, self.geometry_count)
+        let records = self.primitive_count as u64 * record_bytes;
+        let records = records.saturating_sub(self.pairs as u64 * SAVED_BY_PAIR);
+        offsets_behind(nodes, records, self.geometry_count)
     }
 }

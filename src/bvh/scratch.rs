@@ -188,6 +188,7 @@ mod tests {
             geometry_count: 1,
             build_flags: 0,
             alone: false,
+            numbered: false,
         }
     }
 

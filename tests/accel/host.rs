@@ -1,15 +1,17 @@
 //! Builds on the host have the bytes of the device's.
 
-use crate::common::backends::{Built, Ours, vk_format, vk_index_type};
+use crate::common::backends::{Backend, Built, Ours, vk_format, vk_geometry, vk_index_type};
 use crate::common::device;
 use crate::common::geometries::{MOVED, Owned};
-use crate::common::shapes::{boxes, soup};
+use crate::common::shapes::{Corners, boxes, soup};
 use crate::common::world::Part;
-use hedgerow::accel::{self, AccelOptions, Request};
+use hedgerow::accel::{self, ANY_HIT_ORDER, AccelOptions, Request};
 use hedgerow::ash::vk;
 use hedgerow::bvh::codes::{Code, CodeBounds, Codes};
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
-use hedgerow::bvh::layout::{self, Header};
+use hedgerow::bvh::layout::{self, Header, Triangle};
+use hedgerow::bvh::wide::layout::Wide8q;
+use hedgerow::gpu::Recorder;
 
 type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
 type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
@@ -54,11 +56,90 @@ fn triangles_of_every_kind_have_the_devices_bytes() {
             let ranges: Vec<Range> =
                 parts.iter().map(|p| Range::default().primitive_count(p.primitive_count)).collect();
             let uploaded: Vec<_> = parts.iter().map(|p| p.upload(0, 0)).collect();
-            let on_device: Vec<Geometry> =
-                uploaded.iter().zip(parts).map(|((g, _), p)| crate::common::backends::vk_geometry(g, p)).collect();
+            let on_device: Vec<Geometry> = uploaded.iter().zip(parts).map(|((g, _), p)| vk_geometry(g, p)).collect();
             let host: Vec<Geometry> = parts.iter().map(at_host_addresses).collect();
             let expected = on_the_device(&ours, &on_device, &ranges, flags);
             assert!(on_the_host(&ours, &host, &ranges, flags) == expected, "{} geometries, {flags:?}", parts.len());
+        }
+    }
+}
+
+/// So many quads in two triangles each, with all vertices shared.
+fn quads(count: usize) -> Corners {
+    let side = (count as f32).sqrt().ceil() as usize;
+    let at = |x: usize, y: usize| [x as f32, (x * 7 % 5 + y * 3 % 4) as f32 * 0.2, y as f32];
+    let quad = |i: usize| {
+        let (x, y) = (i % side, i / side);
+        let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+        [[a, b, c], if i % 3 == 0 { [d, c, b] } else { [b, d, c] }]
+    };
+    (0..count).flat_map(quad).collect()
+}
+
+/// From a few thousand triangles on, nodes of eight are made in the structure's own memory: nothing behind it or behind the scratch memory
+/// is written, and whatever was there before.
+#[test]
+fn wide_structures_of_many_triangles_have_the_hosts_bytes_and_keep_to_their_memory() {
+    const GUARD: usize = 256;
+    let ours = Ours::on(device());
+    let parts = [
+        Owned::of(&quads(3000), VertexFormat::FLOAT3, IndexFormat::U32, 0),
+        Owned { transform: Some(MOVED), ..Owned::of(&soup(900, 0.3, 2), VertexFormat::HALF3, IndexFormat::NONE, 2) },
+        Owned::of(&vec![[[0.5; 3], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]]; 200], VertexFormat::FLOAT3, IndexFormat::U32, 4),
+    ];
+    for flags in [Flags::empty(), Flags::PREFER_FAST_TRACE, Flags::LOW_MEMORY, ANY_HIT_ORDER] {
+        for parts in [&parts[..], &parts[..1]] {
+            let ranges: Vec<Range> =
+                parts.iter().map(|p| Range::default().primitive_count(p.primitive_count)).collect();
+            let uploaded: Vec<_> = parts.iter().map(|p| p.upload(0, 0)).collect();
+            let geometries: Vec<Geometry> = uploaded.iter().zip(parts).map(|((g, _), p)| vk_geometry(g, p)).collect();
+            let host: Vec<Geometry> = parts.iter().map(at_host_addresses).collect();
+            let counts: Vec<u32> = ranges.iter().map(|range| range.primitive_count).collect();
+            let sizes = ours.build_sizes(&info(&geometries, flags), &counts);
+            let guarded = |bytes: u64| {
+                let buffer = device().buffer("guarded", bytes + GUARD as u64).expect("memory");
+                buffer.write(&vec![0xA5u8; buffer.bytes() as usize]);
+                buffer
+            };
+            let (structure, scratch) = (guarded(sizes.acceleration_structure_size), guarded(sizes.build_scratch_size));
+            let create = vk::AccelerationStructureCreateInfoKHR::default()
+                .buffer(structure.raw())
+                .size(sizes.acceleration_structure_size)
+                .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL);
+            let build = info(&geometries, flags)
+                .dst_acceleration_structure(ours.create(&create))
+                .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.address() });
+            let record = |recorder: &mut Recorder<'_>| {
+                ours.build(recorder, &[build], &[&ranges]);
+                Ok(())
+            };
+            device().run(None, record).expect("it builds");
+            let expected = on_the_host(&ours, &host, &ranges, flags);
+            let tree = Wide8q::<Triangle>::from_bytes(&expected).expect("nodes of eight");
+            tree.validate().expect("valid");
+            assert!(tree.header.pairs > 2000, "{} pairs", tree.header.pairs);
+            assert!(structure.read::<u8>(expected.len()) == expected, "{} geometries, {flags:?}", parts.len());
+            for (buffer, bytes) in
+                [(&structure, sizes.acceleration_structure_size), (&scratch, sizes.build_scratch_size)]
+            {
+                assert_eq!(buffer.read_at::<u8>(bytes, GUARD), [0xA5; GUARD], "{} geometries, {flags:?}", parts.len());
+            }
+        }
+    }
+}
+
+/// A triangle's share of a structure as it is asked for and of the scratch memory of its build.
+#[test]
+fn wide_structures_and_their_builds_take_less_than_180_bytes_a_triangle() {
+    let ours = Ours::on(device());
+    let geometry = Owned::of(&soup(1, 0.5, 9), VertexFormat::FLOAT3, IndexFormat::U32, 0);
+    let (geometry, _memory) = geometry.upload(0, 0);
+    for flags in [Flags::empty(), Flags::PREFER_FAST_TRACE, Flags::ALLOW_COMPACTION | Flags::LOW_MEMORY] {
+        for count in [20_000, 100_000, 1_000_003, 20_000_000] {
+            let request = Request::triangles(&[(geometry, count)]).with_flags(flags);
+            let sizes = request.sizes(&ours.0).expect("few enough");
+            let each = (sizes.structure + sizes.scratch) as f64 / f64::from(count);
+            assert!(each <= 180.0, "{count} triangles, {flags:?}: {each} bytes each");
         }
     }
 }
@@ -67,7 +148,7 @@ fn triangles_of_every_kind_have_the_devices_bytes() {
 fn codes_that_are_asked_for_are_those_of_both() {
     let owned = Owned::of(&soup(900, 0.2, 4), VertexFormat::FLOAT3, IndexFormat::U32, 0);
     let (uploaded, _memory) = owned.upload(0, 0);
-    let on_device = [crate::common::backends::vk_geometry(&uploaded, &owned)];
+    let on_device = [vk_geometry(&uploaded, &owned)];
     let (host, ranges) = ([at_host_addresses(&owned)], [Range::default().primitive_count(owned.primitive_count)]);
     let mut all = Vec::new();
     for codes in [Code::Mc30.full(), Code::Mip9.full(), Code::Emc64VarNoSize.full().with_bits(33)] {

@@ -40,8 +40,13 @@ fn reached_by(read: &ReadBack, instance: u32, starts: &[[u32; 2]]) -> Vec<u32> {
 
 fn reached<R: Record>(structure: &Tree<R>, starts: &[[u32; 2]]) -> Vec<u32> {
     let mut counts = vec![0; structure.header().active as usize];
-    let mut count_all =
-        |[index, count]: [u32; 2]| counts[index as usize..][..count as usize].iter_mut().for_each(|n| *n += 1);
+    let mut count_all = |[index, count]: [u32; 2]| {
+        let records = match structure {
+            Tree::OfTwo(_) => index as usize..(index + count) as usize,
+            Tree::OfEight(tree) => tree.places.records(index, count),
+        };
+        counts[records].iter_mut().for_each(|n| *n += 1);
+    };
     let mut waiting = starts.to_vec();
     while let Some([index, count]) = waiting.pop() {
         match structure {

@@ -96,7 +96,7 @@ fn met_in(tree: &Bvh2, child: &Child, met: &mut Vec<u32>) {
 /// The same below a wide node, by slots.
 fn met_in_wide<N: WideNode>(tree: &Wide<N>, node: u32, met: &mut Vec<u32>) {
     let leaf = |first: u32, count: u32, met: &mut Vec<u32>| {
-        met.extend(tree.records[first as usize..][..count as usize].iter().map(|record| record.primitive));
+        met.extend(tree.leaf(first, count).iter().map(|record| record.primitive));
     };
     let node = &tree.nodes[node as usize];
     if let Some((first, count)) = node.long_leaf() {
@@ -265,8 +265,11 @@ fn leaves_of_any_length_stay_leaves() {
     }
 
     fn leaves<N: WideNode>(tree: &Wide<N>) -> Vec<u32> {
-        let long = |node: &N| node.long_leaf().map(|(_, count)| count);
-        let short = |node: &N| node.children().into_iter().flatten().filter(Child::is_leaf).map(|c| c.count).collect();
+        let records = |first, count| tree.leaf(first, count).len() as u32;
+        let long = |node: &N| node.long_leaf().map(|(first, count)| records(first, count));
+        let short = |node: &N| {
+            node.children().into_iter().flatten().filter(Child::is_leaf).map(|c| records(c.index, c.count)).collect()
+        };
         tree.nodes.iter().flat_map(|node| long(node).map_or_else(|| short(node), |count| vec![count])).collect()
     }
 }

@@ -9,8 +9,8 @@ void main() {
     uvec2 bytes = address_of(uvec2(0), to.primitive_count, record_bytes(to.kind));
     copy_bytes(records_at(uvec2(source), from.node_slots), records_at(uvec2(target), to.node_slots), bytes);
     // The table begins behind records of 28 or 40 bytes: at a multiple of 4.
-    Words given = Words(geometry_table_address(uvec2(source), from.kind, from.node_slots, from.primitive_count));
-    Words table = Words(geometry_table_address(uvec2(target), to.kind, to.node_slots, to.primitive_count));
+    Words given = Words(geometry_table_of(uvec2(source), from));
+    Words table = Words(geometry_table_of(uvec2(target), to));
     uint words = to.geometry_count > 1 ? 2 * to.geometry_count : 0;
     for (uint k = 0, i = grid_item(0); i < words; i = grid_item(++k)) table.word[i] = given.word[i];
 }

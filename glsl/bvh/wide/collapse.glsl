@@ -3,9 +3,10 @@
 //   reset            reads the source                            writes levels, opened[0]
 //   open, open_few   read the source, opened of a level          write slots, opened of the next level, levels, first_children,
 //                                                                 first_records
+//   pair             reads the source, opened, slots             writes partners, first_records: of quantised trees of triangles
 //   (scans)          first_children, first_records: exclusive sums over the source's slots
-//   nodes            reads the source and all that               writes the target's header and nodes, order
-//   records          reads the source, order                     writes the target's records and table of geometries
+//   nodes            reads the source and all that               writes the target's header and nodes, places
+//   records          reads the source, places, partners          writes the target's records and table of geometries
 //
 // Which binary nodes wide ones begin with is found from the root down, a level of wide nodes after the other. The list of a
 // level is in whatever order the atomics gave; nothing of it reaches the target: a node's index is one and the number of nodes
@@ -19,6 +20,8 @@
 // Anything that is not a structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
 // its own status.
 //
+// Records of quantised nodes lie in units: of triangles 8 bytes each (bvh/wide/pairs.glsl), otherwise a record each.
+//
 // needs  first_children and first_records zeroed; one barrier before, between each two, and after; any number of workgroups, but
 //        one for reset and open_few; any subgroup size; no overlap of source, target and scratch
 #ifndef HEDGEROW_BVH_WIDE_COLLAPSE
@@ -27,6 +30,7 @@
 #include "bvh/counts.glsl"
 #include "bvh/sah.glsl"
 #include "bvh/wide.glsl"
+#include "bvh/wide/pairs.glsl"
 #extension GL_EXT_control_flow_attributes : require
 
 layout(constant_id = 2) const uint WIDTH = 4;
@@ -43,6 +47,12 @@ const uint LEVELS_BY_AREA = 24;
 const float PRIOR_RAYS = 8.0;
 const float PRIOR_WORK = 24.0;
 const uint LEVELS_AT_MOST = 64;
+// Leaves of more triangles are nodes of their own: a byte holds the units of others, if none are pairs.
+const uint LEAF_MAX_TRIANGLES = LEAF_MAX / UNITS_OF_ONE;
+// In place of a partner: alone, or the second of a pair. Otherwise how many records behind it the second lies, and above 4 bits
+// which of the four vertices are its own, two bits each.
+const uint ALONE = 0;
+const uint IS_SECOND = 0xFFFFFFFFu;
 // In place of what names a child, which is where it lies among all children of the source: twice its node's slot, and one for
 // the right one.
 const uint NO_CHILD = 0xFFFFFFFFu;
@@ -71,7 +81,9 @@ layout(push_constant, scalar) uniform WideCollapseArguments {
     Words slots;             // what names the children of each of opened, WIDTH words
     Words first_children;    // of each of the source's slots, and one more: the sum
     Words first_records;
-    Words order;             // of quantised nodes: the source's record of each of the target
+    Words places;            // of quantised nodes: in which of the target's units each of the source's records lies
+    Words partners;          // of each of the source's records, if it is a triangle: see pair.comp
+    uvec2 given_records;     // the source's, which has the numbers of its primitives in their place; 0: they are there
     uint source_slots;
     uint capacity;           // of opened
     uint level;
@@ -82,13 +94,48 @@ bool can_be_collapsed(Header header) {
     return is_binary(header) && compacted(header).active_count != 0;
 }
 
+bool has_numbers() {
+    return any(notEqual(given_records, uvec2(0)));
+}
+
+uvec2 source_records() {
+    return has_numbers() ? given_records : records_at(uvec2(source), source.header.node_slots);
+}
+
+uvec2 source_table() {
+    if (!has_numbers()) return geometry_table_of(uvec2(source), source.header);
+    return address_of(records_at(uvec2(source), source.header.node_slots), source.header.primitive_count, 4u);
+}
+
 bool is_inner(Child child) {
     return child.count == 0;
 }
 
+// Whether two triangles may be one record.
+bool is_paired() {
+    return QUANTISED && source.header.kind == KIND_TRIANGLES;
+}
+
+// Whether a leaf is a node of its own.
+bool is_long(uint count) {
+    return QUANTISED && count > (is_paired() ? LEAF_MAX_TRIANGLES : LEAF_MAX);
+}
+
 // Whether a child of a wide node is a node.
 bool is_wide_node(Child child) {
-    return child.count == 0 || QUANTISED && child.count > LEAF_MAX;
+    return child.count == 0 || is_long(child.count);
+}
+
+uint units_by_partner(uint partner) {
+    return partner == IS_SECOND ? 0 : partner == ALONE ? UNITS_OF_ONE : UNITS_OF_TWO;
+}
+
+// Units that the leaf's records take.
+uint units_of_leaf(Child leaf) {
+    if (!is_paired()) return leaf.count;
+    uint units = 0, end = min(leaf.index + leaf.count, source.header.primitive_count);
+    for (uint r = leaf.index; r < end; ++r) units += units_by_partner(partners.word[r]);
+    return units;
 }
 
 Child child_named(uint name) {

@@ -26,6 +26,7 @@ void write_header(bool there_is) {
     header.root.count = 0;
     header.node_slots = max(nodes, 1);
     header.inner_nodes = nodes;
+    header.pairs = there_is && is_paired() ? (UNITS_OF_ONE * header.active_count - first_records.word[source_slots]) / (2 * UNITS_OF_ONE - UNITS_OF_TWO) : 0;
     Structure(target).header = header;
     if (nodes == 0) write_empty_node();
 }
@@ -43,6 +44,16 @@ void write_node(uint at, uint index, uint next_node) {
     }
 }
 
+// The records of a leaf from a unit on; how many units they take.
+uint place_leaf(Child leaf, uint first) {
+    uint unit = first, end = min(leaf.index + leaf.count, source.header.primitive_count);
+    for (uint r = leaf.index; r < end; ++r) {
+        places.word[r] = unit;
+        unit += is_paired() ? units_by_partner(partners.word[r]) : 1;
+    }
+    return unit - first;
+}
+
 void write_quantised_node(uint at, uint index, uint next_node, uint next_record) {
     vec3 lo = uintBitsToFloat(uvec3(0x7F800000u)), hi = uintBitsToFloat(uvec3(0xFF800000u));
     bool has_node = false, has_leaf = false;
@@ -57,7 +68,7 @@ void write_quantised_node(uint at, uint index, uint next_node, uint next_record)
         bool is_node = is_wide_node(child);
         has_node = has_node || is_node;
         has_leaf = has_leaf || !is_node;
-        if (is_node) next_record += child.count;
+        if (is_node && !is_inner(child)) next_record += units_of_leaf(child);
     }
     QuantisedNode node = quantised_node_around(lo, hi, has_node ? next_node : 0, has_leaf ? next_record : 0);
     for (uint s = 0; s < 8; ++s) {
@@ -68,15 +79,15 @@ void write_quantised_node(uint at, uint index, uint next_node, uint next_record)
         }
         Child child = child_named(name);
         bool is_node = is_wide_node(child);
-        put_into_slot(node, s, true, child.lo, child.hi, is_node, child.count);
+        uint units = 0;
         if (!is_inner(child)) {
             uint first = is_node ? first_of_long : next_record;
-            if (is_node) QuantisedNodes(address_of_node(next_node)).node[0] = long_leaf_node(first, child.count);
-            uint count = min(child.count, source.header.active_count);
-            for (uint r = 0; r < count; ++r) order.word[first + r] = child.index + r;
-            if (is_node) first_of_long += child.count;
-            else next_record += child.count;
+            units = place_leaf(child, first);
+            if (is_node) QuantisedNodes(address_of_node(next_node)).node[0] = long_leaf_node(first, units);
+            if (is_node) first_of_long += units;
+            else next_record += units;
         }
+        put_into_slot(node, s, true, child.lo, child.hi, is_node, units);
         if (is_node) next_node++;
     }
     QuantisedNodes(address_of_node(index)).node[0] = node;

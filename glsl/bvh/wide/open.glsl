@@ -160,10 +160,10 @@ void open(uint i, uvec2 of, uint level) {
             bool is_leaf = child.z != 0;
             if (is_leaf) records += child.z;
             if (!is_leaf) inner++;
-            if (!is_leaf || QUANTISED && child.z > LEAF_MAX) nodes++;
+            if (!is_leaf || is_long(child.z)) nodes++;
         }
         first_children.word[slot] = nodes;
-        if (QUANTISED) first_records.word[slot] = records;
+        if (QUANTISED && !is_paired()) first_records.word[slot] = records;
     }
 
     uint next = of.x + of.y + place_in_next_level(level, inner);
@@ -173,7 +173,7 @@ void open(uint i, uvec2 of, uint level) {
             uvec3 child = child_at(in_slot[s]);
             if (child.x == NO_CHILD) continue;
             if (child.z == 0 && next < capacity) opened.node[next++] = Opened(child.y, slot << 3 | rank);
-            if (child.z == 0 || QUANTISED && child.z > LEAF_MAX) rank++;
+            if (child.z == 0 || is_long(child.z)) rank++;
         }
     }
 }

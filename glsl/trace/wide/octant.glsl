@@ -15,7 +15,7 @@ layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 #include "trace/walk_quantised.glsl"
 
 void main() {
-    Triangles triangles = Triangles(wide_records_at(uvec2(structure), structure.header.node_slots, QUANTISED_NODE_BYTES));
+    uvec2 records = wide_records_at(uvec2(structure), structure.header.node_slots, QUANTISED_NODE_BYTES);
     QuantisedNodes nodes = QuantisedNodes(wide_nodes_at(uvec2(structure)));
     Child root = structure.header.root;
     bool usable = can_be_traced(structure, KIND_TRIANGLES_8Q);
@@ -36,7 +36,12 @@ void main() {
         }
         if (at_node(walk)) visit(quantised_node_at(nodes, next_node(walk)), walk);
         next_leaf(walk);
-        if (at_triangle(walk)) test(triangle_at(triangles, walk.record), ANY_HIT, walk);
+        if (at_triangle(walk)) {
+            Triangle triangle = triangle_at_unit(records, walk.record);
+            SecondOfPair second;
+            if (has_second(triangle)) second = second_of_pair_at(records, walk.record);
+            test_record(triangle, second, ANY_HIT, walk);
+        }
         going = go_on(walk);
         if (!going) {
             hits.hit[i] = walk.hit;

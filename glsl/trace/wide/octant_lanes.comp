@@ -26,8 +26,31 @@ QuantisedNode quantised_node_of_each_lane(QuantisedNodes nodes, EachLane index) 
     return mine;
 }
 
+Triangle record_of_each_lane(uvec2 records, EachLane unit) {
+    Triangle mine;
+#define LOAD_RECORD(lane)                                                                     \
+    if (lane < lane_count) {                                                                  \
+        Triangle theirs = Triangles(record_at_unit(records, unit.value[lane])).triangle[0];   \
+        if (gl_SubgroupInvocationID == lane) mine = theirs;                                   \
+    }
+    FOR_EACH_LANE(LOAD_RECORD)
+    return mine;
+}
+
+// What lies in a unit of each lane as behind the first of two triangles.
+SecondOfPair second_of_each_lane(uvec2 records, EachLane unit) {
+    SecondOfPair mine;
+#define LOAD_SECOND(lane)                                                                              \
+    if (lane < lane_count) {                                                                           \
+        SecondOfPair theirs = SecondsOfPairs(record_at_unit(records, unit.value[lane])).second[0];     \
+        if (gl_SubgroupInvocationID == lane) mine = theirs;                                            \
+    }
+    FOR_EACH_LANE(LOAD_SECOND)
+    return mine;
+}
+
 void main() {
-    Triangles triangles = Triangles(wide_records_at(uvec2(structure), structure.header.node_slots, QUANTISED_NODE_BYTES));
+    uvec2 records = wide_records_at(uvec2(structure), structure.header.node_slots, QUANTISED_NODE_BYTES);
     QuantisedNodes nodes = QuantisedNodes(wide_nodes_at(uvec2(structure)));
     Child root = structure.header.root;
     bool usable = can_be_traced(structure, KIND_TRIANGLES_8Q);
@@ -67,8 +90,12 @@ void main() {
         if (visits) visit(node, walk);
         next_leaf(walk);
         bool tests = at_triangle(walk);
-        Triangle triangle = triangle_of_each_lane(triangles, each_lane(tests ? walk.record : 0u));
-        if (tests) test(triangle, ANY_HIT, walk);
+        EachLane unit = each_lane(tests ? walk.record : 0u);
+        Triangle triangle = record_of_each_lane(records, unit);
+        // Where there is no second, the beginning of the first.
+        bool is_pair = tests && has_second(triangle);
+        SecondOfPair second = second_of_each_lane(records, each_lane(is_pair ? walk.record + UNITS_OF_ONE : 0u));
+        if (tests) test_record(triangle, second, ANY_HIT, walk);
         if (going) {
             going = go_on(walk);
             if (!going) {

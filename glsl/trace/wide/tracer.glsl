@@ -18,11 +18,22 @@ layout(constant_id = 6) const bool LEFT_FIRST = false;
 #define NODES QuantisedNodes
 #define NODE_AT quantised_node_at
 #define CHILD_IN_SLOT quantised_child_in_slot
+
+void test_next(uvec2 records, inout Walk walk) {
+    Triangle triangle = triangle_at_unit(records, walk.index);
+    SecondOfPair second;
+    if (has_second(triangle)) second = second_of_pair_at(records, walk.index);
+    test_record(triangle, second, ANY_HIT, walk);
+}
 #else
 #include "trace/walk_wide.glsl"
 #define NODES WideNodes
 #define NODE_AT wide_node_at
 #define CHILD_IN_SLOT wide_child_in_slot
+
+void test_next(uvec2 records, inout Walk walk) {
+    test(triangle_at(Triangles(records), walk.index), ANY_HIT, walk);
+}
 #endif
 
 // LEFT_FIRST: takes the next child of the node at hand, or of one that waits; whether there was any.
@@ -44,7 +55,7 @@ bool go_on_left_first(NODES nodes, inout Walk walk) {
 }
 
 void main() {
-    Triangles triangles = Triangles(wide_records_at(uvec2(structure), structure.header.node_slots, wide_node_bytes(WIDTH, QUANTISED != 0)));
+    uvec2 records = wide_records_at(uvec2(structure), structure.header.node_slots, wide_node_bytes(WIDTH, QUANTISED != 0));
     NODES nodes = NODES(wide_nodes_at(uvec2(structure)));
     Child root = structure.header.root;
     bool usable = can_be_traced(structure, wide_kind(KIND_TRIANGLES, WIDTH, QUANTISED != 0));
@@ -65,7 +76,7 @@ void main() {
             going = true;
         }
         if (at_node(walk)) visit_wide(NODE_AT(nodes, walk.index), walk);
-        if (at_triangle(walk)) test(triangle_at(triangles, walk.index), ANY_HIT, walk);
+        if (at_triangle(walk)) test_next(records, walk);
         if (walk.left == NOTHING) {
             going = LEFT_FIRST ? go_on_left_first(nodes, walk) : go_on(walk);
             if (!going) {

@@ -143,6 +143,25 @@ impl<'a> Structures<'a> {
         Ok(())
     }
 
+    /// Bytes of a compacted copy of a structure of ours.
+    ///
+    /// # Errors
+    /// It is the driver's; too little memory; the device failed.
+    pub(crate) fn compacted_bytes(&self, structure: Structure) -> Result<u64> {
+        let Functions::Ours(ours) = &self.maker else {
+            return Err(Error::Argument("the driver's structures are not asked for properties".into()));
+        };
+        let result = self.device.buffer("property", size_of::<u64>() as u64)?;
+        self.device.run(None, |recorder| {
+            let (commands, property) = (recorder.commands(), accel::Property::CompactedSize);
+            // SAFETY: the structure and the buffer are live until the submit has finished.
+            unsafe {
+                ours.cmd_write_acceleration_structures_properties(commands, &[structure], property, result.address())
+            }
+        })?;
+        Ok(result.read::<u64>(1)[0])
+    }
+
     /// Traces rays that lie in device memory through a top level; milliseconds by the device's timestamps.
     pub(crate) fn trace(
         &self,

@@ -93,6 +93,24 @@ fn one_experiment_is_measured_alone() {
 }
 
 #[test]
+fn memory_is_measured_in_both_forms_of_nodes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let done = tiny(folder.path(), &["gen:icosphere:5", "--experiments", "memory"]);
+    assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+    let entries = page::read(folder.path()).expect("records");
+    let points: Vec<_> =
+        entries.iter().filter_map(|e| if let AccelEntry::Memory(p) = e { Some(p) } else { None }).collect();
+    let ours: Vec<_> = points.iter().filter(|point| point.maker == Implementation::Ours).collect();
+    let of_eight: Vec<_> = ours.iter().filter(|point| point.of_eight).collect();
+    assert_eq!((ours.len(), of_eight.len(), ours[0].triangles), (5, 3, 20_480));
+    // Nearly all triangles of a closed mesh find a partner: 56 bytes for two, and the nodes.
+    assert!(of_eight.iter().all(|p| p.compacted().is_some_and(|bytes| (28.0..40.0).contains(&bytes))), "{points:?}");
+    assert!(of_eight.iter().all(|point| point.with_scratch() <= 180.0), "{points:?}");
+    let page = std::fs::read_to_string(folder.path().join("accel.html")).expect("written");
+    assert!(page.contains("<section id=\"memory\">") && page.contains("1 have at most 40 bytes a triangle compacted"));
+}
+
+#[test]
 fn nodes_of_eight_are_measured_and_a_mesh_is_one_instance() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let done = tiny(folder.path(), &["gen:forest:9", "gen:icosphere:3", "--experiments", "rebraid", "--wide"]);

@@ -2,10 +2,12 @@
 
 use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{Bvh2, Child, Record};
-use crate::bvh::wide::layout::{Slots, Wide, WideNode};
+use crate::bvh::wide::layout::{Slots, Wide, WideNode, is_paired, leaf_max};
+use crate::bvh::wide::pairs::{self, Part, Places};
 use crate::bvh::wide::{LEVELS_BY_AREA, PRIOR_RAYS, PRIOR_WORK};
 use crate::geometry::Aabb;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// What rays did in a tree, two counts for each node slot; empty where nothing was counted. The same as
 /// [`WideCounts`](crate::bvh::wide::device::WideCounts).
@@ -46,32 +48,39 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         (header.node_slots, header.inner_nodes) = (1, 0);
         let geometries = tree.geometries.clone();
         if header.active == 0 {
-            return Wide { header, nodes: vec![N::empty()], records: Vec::new(), geometries };
+            let places = if is_paired::<N, R>() { Places::Units(Vec::new()) } else { Places::InOrder };
+            return Wide { header, nodes: vec![N::empty()], records: Vec::new(), places, geometries };
         }
         let opened = open_all::<N, R>(tree, counts);
+        let written = Written::<R>::of(&tree.records[..header.active as usize], is_paired::<N, R>());
+        let written = opened.iter().fold(written, |written, node| written.with_leaves(&node.children));
         // The nodes that a node names lie behind those that others name whose binary nodes are in lower slots; records likewise.
-        let first_children = running_sums(1, opened.iter().map(|o| (o.slot, o.node_children::<N>().count() as u32)));
-        let first_records = running_sums(0, opened.iter().map(|o| (o.slot, o.leaf_records())));
-        let mut nodes = vec![N::empty(); opened.iter().map(|o| o.node_children::<N>().count()).sum::<usize>() + 1];
-        let mut records = tree.records[..header.active as usize].to_vec();
+        let first_children = running_sums(1, opened.iter().map(|o| (o.slot, o.node_children::<N, R>().count() as u32)));
+        let first_records = running_sums(0, opened.iter().map(|o| (o.slot, written.units_in(&o.children))));
+        let mut nodes = vec![N::empty(); opened.iter().map(|o| o.node_children::<N, R>().count()).sum::<usize>() + 1];
+        // Where each record of the binary tree comes to lie.
+        let mut units: Vec<u32> = (0..header.active).collect();
         for node in &opened {
             let mut children = node.children;
             if N::FORM.is_quantised() {
                 // The short leaves of a node side by side; long ones, which are nodes of their own, before them.
                 let mut next_record = first_records[&node.slot];
                 for long in [true, false] {
-                    let leaves =
-                        children.iter_mut().flatten().filter(|c| c.is_leaf() && (c.count > N::LEAF_MAX) == long);
+                    let leaves = children.iter_mut().flatten().filter(|c| c.is_leaf() && is_node::<N, R>(c) == long);
                     for leaf in leaves {
-                        let (from, to, count) = (leaf.index as usize, next_record as usize, leaf.count as usize);
-                        records[to..to + count].copy_from_slice(&tree.records[from..from + count]);
-                        leaf.index = next_record;
-                        next_record += leaf.count;
+                        written.place(leaf, next_record, &mut units);
+                        next_record += written.units(leaf);
                     }
                 }
             }
-            let node_children = children.iter_mut().flatten().filter(|child| is_node::<N>(child));
-            for (child, index) in node_children.zip(first_children[&node.slot]..) {
+            // From here on leaves count units.
+            let is_node: [bool; 8] = std::array::from_fn(|s| children[s].as_ref().is_some_and(is_node::<N, R>));
+            for leaf in children.iter_mut().flatten().filter(|child| child.is_leaf()) {
+                let at = leaf.index as usize;
+                (leaf.index, leaf.count) = (units[at], written.units(leaf));
+            }
+            let node_children = children.iter_mut().zip(is_node).filter(|(_, is_node)| *is_node);
+            for (child, index) in node_children.flat_map(|(child, _)| child).zip(first_children[&node.slot]..) {
                 if child.is_leaf() {
                     nodes[index as usize] = N::of_long_leaf(child.index, child.count);
                 }
@@ -81,25 +90,86 @@ impl<N: WideNode, R: Record> Wide<N, R> {
             nodes[index as usize] = N::of(&children);
         }
         (header.node_slots, header.inner_nodes) = (nodes.len() as u32, nodes.len() as u32);
-        Wide { header, nodes, records, geometries }
+        let (records, places) = written.in_order_of(&units);
+        header.pairs = places.pairs();
+        Wide { header, nodes, records, places, geometries }
     }
 }
 
 impl Opened {
     /// The children that are nodes.
-    fn node_children<N: WideNode>(&self) -> impl Iterator<Item = &Child> {
-        self.children.iter().flatten().filter(|child| is_node::<N>(child))
-    }
-
-    /// Records of the children that are leaves.
-    fn leaf_records(&self) -> u32 {
-        self.children.iter().flatten().map(|child| child.count).sum()
+    fn node_children<N: WideNode, R: Record>(&self) -> impl Iterator<Item = &Child> {
+        self.children.iter().flatten().filter(|child| is_node::<N, R>(child))
     }
 }
 
 /// Whether a child of a wide node is a node: an inner one, or a leaf that is too long.
-fn is_node<N: WideNode>(child: &Child) -> bool {
-    !child.is_leaf() || child.count > N::LEAF_MAX
+fn is_node<N: WideNode, R: Record>(child: &Child) -> bool {
+    !child.is_leaf() || child.count > leaf_max::<N, R>()
+}
+
+/// How the records of the binary tree are written.
+struct Written<'a, R: Record> {
+    records: &'a [R],
+    /// Empty where none may be pairs.
+    parts: Vec<Part>,
+}
+
+impl<'a, R: Record> Written<'a, R> {
+    fn of(records: &'a [R], is_paired: bool) -> Written<'a, R> {
+        Written { records, parts: if is_paired { vec![Part::One; records.len()] } else { Vec::new() } }
+    }
+
+    fn range(leaf: &Child) -> Range<usize> {
+        leaf.index as usize..(leaf.index + leaf.count) as usize
+    }
+
+    /// Knowing these leaves.
+    fn with_leaves(mut self, children: &Slots) -> Self {
+        let is_paired = !self.parts.is_empty();
+        for leaf in children.iter().flatten().filter(|child| child.is_leaf() && is_paired) {
+            let range = Written::<R>::range(leaf);
+            self.parts[range.clone()].copy_from_slice(&pairs::parts_of(bytemuck::cast_slice(&self.records[range])));
+        }
+        self
+    }
+
+    /// What a leaf of the binary tree takes: units where some may be pairs, otherwise records.
+    fn units(&self, leaf: &Child) -> u32 {
+        if self.parts.is_empty() { leaf.count } else { pairs::units_of(&self.parts[Written::<R>::range(leaf)]) }
+    }
+
+    /// What all leaves among the children take.
+    fn units_in(&self, children: &Slots) -> u32 {
+        children.iter().flatten().filter(|child| child.is_leaf()).map(|leaf| self.units(leaf)).sum()
+    }
+
+    /// Lays the records of a leaf from unit `next` on.
+    fn place(&self, leaf: &Child, mut next: u32, units: &mut [u32]) {
+        for at in Written::<R>::range(leaf) {
+            match self.parts.get(at) {
+                None => (units[at], next) = (next, next + 1),
+                Some(Part::Second) => {}
+                Some(part) => {
+                    units[at] = next;
+                    if let Part::First(behind, _) = part {
+                        units[at + behind] = next;
+                    }
+                    next += pairs::units_of(&[*part]);
+                }
+            }
+        }
+    }
+
+    /// The records as they lie, and where.
+    fn in_order_of(&self, units: &[u32]) -> (Vec<R>, Places) {
+        let mut order: Vec<usize> = (0..units.len()).collect();
+        // The first of a pair is before the second in the binary tree, too.
+        order.sort_by_key(|&at| units[at]);
+        let places = order.iter().map(|&at| units[at]).collect();
+        let places = if self.parts.is_empty() { Places::InOrder } else { Places::Units(places) };
+        (order.iter().map(|&at| self.records[at]).collect(), places)
+    }
 }
 
 /// For each slot, `from` and the sum of those of lower slots.
@@ -128,7 +198,7 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> 
             }
             let slot = if root.is_leaf() { 0 } else { root.index };
             let node = Opened { slot, children: slots, place };
-            let inner = node.node_children::<N>().zip(0..).filter(|(child, _)| !child.is_leaf());
+            let inner = node.node_children::<N, R>().zip(0..).filter(|(child, _)| !child.is_leaf());
             next_level.extend(inner.map(|(&child, rank)| (child, Some((slot, rank)))));
             opened.push(node);
         }

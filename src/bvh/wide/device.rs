@@ -1,13 +1,13 @@
 //! Collapsing a `Bvh2` into a wide tree on the device (glsl/bvh/wide/collapse.glsl); [`crate::bvh::twin::wide`] is the twin.
 
-use super::Form;
-use crate::Result;
+use super::{Form, pairs};
 use crate::bvh::counts::LinkCount;
 use crate::bvh::geometry::Primitives;
-use crate::bvh::layout::node_slots;
+use crate::bvh::layout::{NODES_OFFSET, node_slots};
 use crate::gpu::arguments;
 use crate::gpu::plan::Plan;
 use crate::gpu::{Context, Grid, Kernel, Recorder, Region, Sizes, Step, fill, scan, shaders};
+use crate::{Error, Result};
 use std::ops::Range;
 
 /// What is collapsed into what.
@@ -53,11 +53,27 @@ const LEVELS: u32 = 16;
 /// Words of `Levels` in wide_collapse.glsl.
 const LEVEL_WORDS: u64 = 64 + 65 + 1;
 
+/// Memory of a collapsing, by address: of the bytes of [`WidePass::sizes`], or in pieces.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WideMemory {
+    /// For the wide tree.
+    pub target: u64,
+    /// [`WidePass::passing_bytes`], until the nodes are there.
+    pub passing: u64,
+    /// [`WidePass::lasting_bytes`].
+    pub lasting: u64,
+    /// Where the records of the source are while nodes are made, and while records are: of one that has the numbers of its primitives in
+    /// their place, otherwise 0.
+    pub records: [u64; 2],
+}
+
 /// What collapsing does, as far as memory is used in one and free in the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum WidePhase {
     /// Nodes are opened, level by level.
     Open,
+    /// Triangles find those that they share a record with.
+    Pair,
     /// What they have becomes where it goes.
     Scan,
     Nodes,
@@ -66,14 +82,19 @@ enum WidePhase {
 
 /// The plan of the scratch memory, and where its parts begin, in bytes.
 struct Scratch {
-    plan: Plan<WidePhase>,
+    /// What is in use until the nodes are there, and what is until the records are.
+    passing: Plan<WidePhase>,
+    lasting: Plan<WidePhase>,
     levels: u64,
     opened: u64,
     slots: u64,
-    /// How many children each slot has before its own; of quantised nodes also how many records, otherwise 0.
+    /// How many children each slot has before its own; of quantised nodes also how many units of records, otherwise 0.
     first_children: u64,
     first_records: u64,
-    order: u64,
+    /// Of quantised nodes.
+    places: u64,
+    /// Of quantised trees of triangles.
+    partners: u64,
     sums: u64,
 }
 
@@ -99,12 +120,15 @@ impl WidePass {
         let WideOptions { form, primitives, geometry_count } = self.options;
         let nodes = form.nodes_at_most(self.count);
         let structure = form.bytes(primitives.record_bytes(), nodes, self.count, geometry_count);
-        Sizes { structure, scratch: self.scratch().plan.bytes(), alignment: 16 }
+        Sizes { structure, scratch: self.passing_bytes() + self.lasting_bytes(), alignment: 16 }
     }
 
     fn scratch(&self) -> Scratch {
-        let mut plan = Plan::new();
-        let mut take = |name, words: u64, life| Plan::<WidePhase>::UNIT * u64::from(plan.take(name, 4 * words, life));
+        let (mut passing, mut lasting) = (Plan::new(), Plan::new());
+        let take_of = |plan: &mut Plan<WidePhase>, name, words: u64, life| {
+            Plan::<WidePhase>::UNIT * u64::from(plan.take(name, 4 * words, life))
+        };
+        let mut take = |name, words: u64, life| take_of(&mut passing, name, words, life);
         let form = self.options.form;
         let (nodes, width) = (u64::from(form.nodes_at_most(self.count)), u64::from(form.width()));
         let slots = u64::from(node_slots(self.count)) + 1;
@@ -118,9 +142,34 @@ impl WidePass {
             if is_quantised { take("first records", slots, WidePhase::Open..=WidePhase::Nodes) } else { 0 };
         let sums = take("sums of tiles", self.scan.sums_words().into(), WidePhase::Scan..=WidePhase::Scan);
         let records = u64::from(self.count);
-        let order =
-            if is_quantised { take("order of records", records, WidePhase::Nodes..=WidePhase::Records) } else { 0 };
-        Scratch { plan, levels, opened, slots: children, first_children, first_records, order, sums }
+        let mut take = |name, words: u64, life| take_of(&mut lasting, name, words, life);
+        let places =
+            if is_quantised { take("places of records", records, WidePhase::Nodes..=WidePhase::Records) } else { 0 };
+        let partners =
+            if self.is_paired() { take("partners", records, WidePhase::Pair..=WidePhase::Records) } else { 0 };
+        let slots = children;
+        Scratch { passing, lasting, levels, opened, slots, first_children, first_records, places, partners, sums }
+    }
+
+    /// Bytes of scratch memory that are in use until the nodes are there.
+    pub(crate) fn passing_bytes(&self) -> u64 {
+        self.scratch().passing.bytes()
+    }
+
+    /// Bytes of scratch memory that are in use to the end.
+    pub(crate) fn lasting_bytes(&self) -> u64 {
+        self.scratch().lasting.bytes()
+    }
+
+    /// Where records lie in a wide structure of as many nodes as there can be: behind it a tree has nothing but records.
+    pub(crate) fn behind_all_nodes(&self) -> u64 {
+        let form = self.options.form;
+        (NODES_OFFSET + u64::from(form.nodes_at_most(self.count)) * form.node_bytes()).next_multiple_of(16)
+    }
+
+    /// Whether two records may be one.
+    fn is_paired(&self) -> bool {
+        self.options.form.is_quantised() && self.options.primitives == Primitives::Triangles
     }
 
     fn kernel(&self, shader: &'static shaders::Shader, [by_visits, by_hits]: [u32; 2]) -> Kernel {
@@ -152,7 +201,7 @@ impl WidePass {
     /// write) before and behind.
     ///
     /// # Errors
-    /// The memory is too small; a pipeline could not be made.
+    /// The memory is too small; more triangles than quantised nodes can hold; a pipeline could not be made.
     pub fn record(&self, recorder: &mut Recorder<'_>, source: u64, target: Region, scratch: Region) -> Result<()> {
         self.record_by_counts(recorder, source, &WideCounts::default(), target, scratch)
     }
@@ -184,24 +233,45 @@ impl WidePass {
         target: Region,
         scratch: Region,
     ) -> Result<Vec<Step>> {
-        const PHASE: &str = "wide";
-        let kernel = |shader| self.kernel(shader, [visits, hits].map(|counts| u32::from(counts != 0)));
         let sizes = self.sizes();
         let target = target.checked("memory for a wide tree", sizes.structure, sizes.alignment)?;
         let scratch = scratch.checked("scratch memory for a wide tree", sizes.scratch, sizes.alignment)?;
+        let memory = WideMemory { target, passing: scratch + self.lasting_bytes(), lasting: scratch, records: [0; 2] };
+        Ok(self.steps_in(source, [visits, hits], &memory)?.concat())
+    }
+
+    /// The same in memory that may be in pieces: the steps up to the nodes, and those that write the records.
+    pub(crate) fn steps_in(
+        &self,
+        source: u64,
+        [visits, hits]: [u64; 2],
+        memory: &WideMemory,
+    ) -> Result<[Vec<Step>; 2]> {
+        const PHASE: &str = "wide";
+        let kernel = |shader| self.kernel(shader, [visits, hits].map(|counts| u32::from(counts != 0)));
+        if self.is_paired() && self.count > pairs::TRIANGLES_AT_MOST {
+            return Err(Error::Argument(format!(
+                "{} triangles in quantised nodes: they hold at most {}; split the mesh or take another form",
+                self.count,
+                pairs::TRIANGLES_AT_MOST
+            )));
+        }
         let form = self.options.form;
         let parts = self.scratch();
+        let WideMemory { target, passing, lasting, records } = *memory;
         let arguments = arguments::WideCollapse {
             source,
             target,
-            levels: scratch + parts.levels,
-            opened: scratch + parts.opened,
+            levels: passing + parts.levels,
+            opened: passing + parts.opened,
             counts: visits,
             hits,
-            slots: scratch + parts.slots,
-            first_children: scratch + parts.first_children,
-            first_records: scratch + parts.first_records,
-            order: scratch + parts.order,
+            slots: passing + parts.slots,
+            first_children: passing + parts.first_children,
+            first_records: passing + parts.first_records,
+            places: lasting + parts.places,
+            partners: lasting + parts.partners,
+            given_records: records[0],
             source_slots: node_slots(self.count),
             capacity: form.nodes_at_most(self.count),
             level: 0,
@@ -224,14 +294,18 @@ impl WidePass {
         let last = few(by_many.end, form.levels());
         let levels = first.into_iter().chain(by_many.map(many)).chain([last]);
         steps.extend(levels.map(|(shader, arguments, groups)| step(shader, &arguments, groups)));
-        let sums = scratch + parts.sums;
+        if self.is_paired() {
+            steps.push(step(&shaders::BVH_WIDE_PAIR, &arguments, groups));
+        }
+        let sums = passing + parts.sums;
         let scanned = [arguments.first_children, arguments.first_records];
         for words in scanned.into_iter().take(if form.is_quantised() { 2 } else { 1 }) {
             steps.extend(self.scan.steps(PHASE, &scan::ScanBuffers { values: words, results: words, sums }));
         }
         steps.push(step(&shaders::BVH_WIDE_NODES, &arguments, groups));
-        steps.push(step(&shaders::BVH_WIDE_RECORDS, &arguments, self.grid.groups_for(self.count)));
-        Ok(steps)
+        let arguments = arguments::WideCollapse { given_records: records[1], ..arguments };
+        let write = step(&shaders::BVH_WIDE_RECORDS, &arguments, self.grid.groups_for(self.count));
+        Ok([steps, vec![write]])
     }
 }
 

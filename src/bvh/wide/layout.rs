@@ -6,7 +6,7 @@
 //! | --- | --- | --- |
 //! | [`Header`] | 128 | 0 |
 //! | nodes × `node_slots` | [`Form::node_bytes`] each | [`NODES_OFFSET`] |
-//! | [`Record`] × `primitive_count` | 40, 28 or 128 each | behind the nodes |
+//! | [`Record`] × `primitive_count` | 40, 28 or 128 each; of quantised trees two triangles may be one record of 56 ([`super::pairs`]) | behind the nodes |
 //! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | behind the records |
 //!
 //! The header is that of a `Bvh2` with another `kind`: [`Form::kind`]. The root is node 0, always, even if the whole tree is a
@@ -17,6 +17,7 @@
 //! the order of the binary tree. [`super::quantised`] describes quantised ones.
 
 use super::Form;
+use super::pairs::{self, Places, SAVED_BY_PAIR};
 use crate::bvh::layout::{self, Child, GeometryEntry, Header, NODES_OFFSET, Record, Triangle, header_of};
 use crate::{Error, Result};
 use bytemuck::Pod;
@@ -29,7 +30,7 @@ pub trait WideNode: Pod + PartialEq + std::fmt::Debug + Send + Sync {
     /// How it is written.
     const FORM: Form;
 
-    /// Leaves of more records than this are nodes of their own.
+    /// Leaves of more records than this are nodes of their own; of more than [`leaf_max`] where two may be one record.
     const LEAF_MAX: u32;
 
     /// The node of these children, whose indices are final. There is at least one; those that are nodes (or long leaves) lie
@@ -88,10 +89,22 @@ pub struct Wide<N: WideNode, R: Record = Triangle> {
     pub header: Header,
     /// The nodes, the root first.
     pub nodes: Vec<N>,
-    /// What the leaves hold.
+    /// What the leaves hold, in the order of memory.
     pub records: Vec<R>,
+    /// Where they lie: what the first record and the count of a leaf mean.
+    pub places: Places,
     /// The table of geometries; empty where there is one.
     pub geometries: Vec<GeometryEntry>,
+}
+
+/// Whether two records that share an edge may be one.
+pub(crate) fn is_paired<N: WideNode, R: Record>() -> bool {
+    N::FORM.is_quantised() && R::KIND == Triangle::KIND
+}
+
+/// Leaves of more records than this are nodes of their own.
+pub(crate) fn leaf_max<N: WideNode, R: Record>() -> u32 {
+    if is_paired::<N, R>() { pairs::LEAF_MAX } else { N::LEAF_MAX }
 }
 
 impl Form {
@@ -104,7 +117,8 @@ impl Form {
 
     /// Bytes of the structure that begins with `header`: what of the memory that was given to a build is in use.
     pub const fn bytes_in_use(self, header: &Header, record_bytes: u64) -> u64 {
-        self.bytes(record_bytes, header.node_slots, header.primitive_count, header.geometry_count)
+        let without_pairs = self.bytes(record_bytes, header.node_slots, header.primitive_count, header.geometry_count);
+        without_pairs.saturating_sub(header.pairs as u64 * SAVED_BY_PAIR)
     }
 }
 
@@ -125,20 +139,35 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         }
         let head = NODES_OFFSET as usize;
         let records = head + header.node_slots as usize * size_of::<N>();
-        let geometries = records + header.primitive_count as usize * size_of::<R>();
+        let entries = if header.geometry_count > 1 { header.geometry_count as usize } else { 0 };
+        let geometries = needs as usize - entries * size_of::<GeometryEntry>();
+        let Some(records_there) = bytes.get(records..geometries) else {
+            let (pairs, count) = (header.pairs, header.primitive_count);
+            return Err(Error::InvalidStructure(format!("{pairs} pairs of {count} records: more than there are")));
+        };
+        let (records_there, places) = pairs::from_bytes(records_there, is_paired::<N, R>());
         Ok(Wide {
             header,
             nodes: bytemuck::pod_collect_to_vec(&bytes[head..records]),
-            records: bytemuck::pod_collect_to_vec(&bytes[records..geometries]),
+            records: records_there,
+            places,
             geometries: bytemuck::pod_collect_to_vec(&bytes[geometries..needs as usize]),
         })
+    }
+
+    /// What a leaf holds, by its first record and its count.
+    ///
+    /// # Panics
+    /// The tree has no such records.
+    pub fn leaf(&self, first: u32, count: u32) -> &[R] {
+        &self.records[self.places.records(first, count)]
     }
 
     /// The structure's bytes, as the device has them.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = bytemuck::bytes_of(&self.header).to_vec();
         bytes.extend_from_slice(bytemuck::cast_slice(&self.nodes));
-        bytes.extend_from_slice(bytemuck::cast_slice(&self.records));
+        bytes.extend_from_slice(&pairs::to_bytes(&self.records, &self.places));
         bytes.extend_from_slice(bytemuck::cast_slice(&self.geometries));
         bytes
     }

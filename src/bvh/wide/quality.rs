@@ -35,13 +35,13 @@ pub fn on_host<N: WideNode, R: Record>(tree: &Wide<N, R>, c_t: f64, c_i: f64) ->
         let node = &tree.nodes[index as usize];
         quality.inner += 1;
         inner_area += node_area;
-        if let Some((_, count)) = node.long_leaf() {
-            leaf(&mut quality, node_area, count, depth);
+        if let Some((first, count)) = node.long_leaf() {
+            leaf(&mut quality, node_area, tree.leaf(first, count).len() as u32, depth);
         }
         for child in node.children().iter().flatten() {
             let area = area(&child.bounds());
             if child.is_leaf() {
-                leaf(&mut quality, area, child.count, depth + 1);
+                leaf(&mut quality, area, tree.leaf(child.index, child.count).len() as u32, depth + 1);
             } else {
                 stack.push((child.index, area, depth + 1));
             }

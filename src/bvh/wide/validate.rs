@@ -1,6 +1,6 @@
 //! Walks a wide tree on the host and says what is wrong and where.
 
-use super::layout::{Wide, WideNode};
+use super::layout::{Wide, WideNode, leaf_max};
 use crate::bvh::cover::SplitParts;
 use crate::bvh::layout::{InstanceRecord, Record};
 use crate::bvh::twin::split::around_parts;
@@ -71,6 +71,10 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         if header.kind != Self::KIND {
             return invalid(format!("kind {:#x}, not {:#x}", header.kind, Self::KIND));
         }
+        let pairs = self.places.pairs();
+        if header.pairs != pairs {
+            return invalid(format!("{} pairs of records, and {pairs} are there", header.pairs));
+        }
         self.validate_primitives()
     }
 
@@ -103,8 +107,9 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         }
         let node = &self.nodes[index as usize];
         if let Some((first, count)) = node.long_leaf() {
-            if count <= N::LEAF_MAX {
-                return invalid(format!("node {index} is a long leaf of {count} records"));
+            let records = self.places.records(first, count).len();
+            if records <= leaf_max::<N, R>() as usize {
+                return invalid(format!("node {index} is a long leaf of {records} records"));
             }
             return self.validate_leaf(index, (first, count), bounds, (in_leaf, parts));
         }
@@ -153,7 +158,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         bounds: &Aabb,
         (in_leaf, parts): (&mut [bool], &mut SplitParts),
     ) -> Result<Option<Aabb>> {
-        let range = first as usize..first as usize + count as usize;
+        let range = self.places.records(first, count);
         if range.end > in_leaf.len() {
             return invalid(format!("node {named_by}: a leaf of {range:?}, there are {} records", in_leaf.len()));
         }
@@ -241,12 +246,13 @@ mod tests {
     #[test]
     fn every_broken_rule_of_quantised_nodes_is_found_and_named() {
         type Break = fn(&mut Wide8q);
-        let breaks: [(&str, Break); 5] = [
+        let breaks: [(&str, Break); 6] = [
             ("around its content", |t| t.nodes[1].hi = [[0; 2]; 3]),
             ("around its content", |t| t.nodes[0].exponents_and_nodes -= 1),
             ("two parents", |t| t.nodes[0].first_child = 0),
-            ("there are 60 records", |t| t.nodes[2].first_record = 60),
+            ("there are 60 records", |t| t.nodes[2].first_record = 300),
             ("is there twice", |t| t.records[3] = t.records[4]),
+            ("pairs of records, and 0", |t| t.header.pairs = 1),
         ];
         for (says, break_it) in breaks {
             let mut tree = Wide8q::of(&tree());

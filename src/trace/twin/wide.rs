@@ -99,7 +99,7 @@ impl<N: TracedNode> Walk<'_, N> {
     /// Tests the records of a leaf; whether the search is over.
     fn leaf(&mut self, ray: &PreparedRay, first: u32, count: u32) -> bool {
         self.work.leaves += 1;
-        for triangle in &self.tree.records[first as usize..(first + count) as usize] {
+        for triangle in self.tree.leaf(first, count) {
             self.work.tests += 1;
             self.nearest.consider(ray, triangle);
             if self.query == Query::AnyHit && self.nearest.hit.is_some() {

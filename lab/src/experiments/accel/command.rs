@@ -6,7 +6,7 @@ use crate::cli::{Bar, Common, work};
 use crate::device::Device;
 use crate::experiments::accel::page::{self, Points};
 use crate::experiments::accel::points::AccelEntry;
-use crate::experiments::accel::{AccelSetup, Experiment, any_hit, batch, rebraid, top_level, update};
+use crate::experiments::accel::{AccelSetup, Experiment, any_hit, batch, memory, rebraid, top_level, update};
 use crate::measure::{Failure, Setting, Sink};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
@@ -27,7 +27,8 @@ pub struct Arguments {
     /// [default: generated ones of both kinds]
     #[arg(value_name = "SCENE")]
     scenes: Vec<String>,
-    /// What is measured, separated by commas: batch, tlas, rebraid, any-hit (always with shadow and ao rays), update
+    /// What is measured, separated by commas: batch, tlas, rebraid, any-hit (always with shadow and ao rays), update, memory (of each
+    /// scene as one bottom level)
     #[arg(
         long,
         value_name = "EXPERIMENT[,…]",
@@ -103,6 +104,11 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
                     measured(&format!("{name} {}", scene.name), &|point| any_hit::measure(&stage, scene, point))?;
                 }
             }
+            Experiment::Memory => {
+                for scene in &instances {
+                    measured(&format!("{name} {}", scene.name), &|point| memory::measure(&stage, scene, point))?;
+                }
+            }
             Experiment::Update => {
                 for scene in &animations {
                     let frames = arguments.frames.get();
@@ -134,7 +140,10 @@ fn scenes(common: &Common, arguments: &Arguments) -> anyhow::Result<(Vec<Instanc
         }
     }
     if instances.is_empty()
-        && arguments.experiments.iter().any(|e| [Experiment::Rebraid, Experiment::AnyHit].contains(e))
+        && arguments
+            .experiments
+            .iter()
+            .any(|e| [Experiment::Rebraid, Experiment::AnyHit, Experiment::Memory].contains(e))
     {
         instances = REBRAIDED.iter().map(|spec| scene::load_instances(spec, &options)).collect::<Result<_>>()?;
     }

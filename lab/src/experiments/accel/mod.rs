@@ -3,11 +3,12 @@
 //!
 //! [`batch`]: many small structures at once; [`top_level`]: how top levels grow with their instances; [`rebraid`]: rays through
 //! top levels that are re-braided or not; [`any_hit`]: rays that end at any hit through children in order or not; [`update`]:
-//! refitting against building again over an animation. Each gives [`points`] as it goes.
+//! refitting against building again over an animation; [`memory`]: bytes a triangle. Each gives [`points`] as it goes.
 
 pub mod any_hit;
 pub mod batch;
 pub(crate) mod command;
+pub mod memory;
 pub mod page;
 pub mod points;
 pub mod rebraid;
@@ -42,6 +43,8 @@ pub enum Experiment {
     AnyHit,
     /// [`update`].
     Update,
+    /// [`memory`].
+    Memory,
 }
 
 named!(Experiment, "experiment":
@@ -50,6 +53,7 @@ named!(Experiment, "experiment":
     Rebraid = "rebraid",
     AnyHit = "any-hit",
     Update = "update",
+    Memory = "memory",
 );
 
 /// What all experiments have in common.

@@ -21,6 +21,8 @@ pub enum AccelEntry {
     AnyHit(AnyHitPoint),
     /// A frame of an animation.
     Update(Update),
+    /// A bottom level over a scene.
+    Memory(MemoryPoint),
     /// An experiment that could not be measured, or not to its end.
     Failure(Failure),
 }
@@ -126,6 +128,46 @@ pub struct TopLevelPoint {
     pub scratch_bytes: u64,
     /// What its leaves hold: instances, those that were opened as their parts; `None` if the implementation does not report it.
     pub entries: Option<u32>,
+}
+
+/// A bottom level over a scene, built so that it can be compacted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MemoryPoint {
+    /// Scene name.
+    pub scene: String,
+    /// Triangles.
+    pub triangles: u64,
+    /// Whose.
+    pub maker: Implementation,
+    /// Whether its nodes are quantised and have eight children.
+    pub of_eight: bool,
+    /// Preferences that it was built by.
+    pub flags: String,
+    /// Building it, by the device's timestamps.
+    pub build_ms: Spread,
+    /// The structure, as it is asked for.
+    pub structure_bytes: u64,
+    /// What a build needs beside it.
+    pub scratch_bytes: u64,
+    /// A compacted copy.
+    pub compacted_bytes: Option<u64>,
+}
+
+impl MemoryPoint {
+    /// So many bytes, for each triangle.
+    pub fn each(&self, bytes: u64) -> f64 {
+        bytes as f64 / self.triangles.max(1) as f64
+    }
+
+    /// Structure and scratch memory, bytes a triangle.
+    pub fn with_scratch(&self) -> f64 {
+        self.each(self.structure_bytes + self.scratch_bytes)
+    }
+
+    /// The compacted copy, bytes a triangle.
+    pub fn compacted(&self) -> Option<f64> {
+        self.compacted_bytes.map(|bytes| self.each(bytes))
+    }
 }
 
 /// A scene of instances whose structures of both levels have their children in order, or not.

@@ -7,13 +7,14 @@ mod any_hit;
 mod batch;
 mod flagged;
 mod goals;
+mod memory;
 mod rebraid;
 mod top_level;
 mod update;
 
 use crate::Result;
 use crate::experiments::accel::points::{
-    AccelEntry, AnyHitPoint, Batch, Implementation, RebraidPoint, TopLevel, Update,
+    AccelEntry, AnyHitPoint, Batch, Implementation, MemoryPoint, RebraidPoint, TopLevel, Update,
 };
 use crate::measure::{Failure, Setting, Spread};
 use crate::report::numbers::three_digits;
@@ -47,6 +48,7 @@ struct Measured {
     rebraids: Vec<RebraidPoint>,
     any_hits: Vec<AnyHitPoint>,
     updates: Vec<Update>,
+    memories: Vec<MemoryPoint>,
     failures: Vec<Failure>,
 }
 
@@ -65,6 +67,7 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
             AccelEntry::Rebraid(point) => measured.rebraids.push(point),
             AccelEntry::AnyHit(point) => measured.any_hits.push(point),
             AccelEntry::Update(point) => measured.updates.push(point),
+            AccelEntry::Memory(point) => measured.memories.push(point),
             AccelEntry::Failure(failure) => measured.failures.push(failure),
         }
     }
@@ -75,6 +78,7 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
         rebraid::part(&measured.rebraids)?,
         any_hit::part(&measured.any_hits)?,
         update::part(&measured.updates)?,
+        memory::part(&measured.memories)?,
     ];
     let (parts, charts): (Vec<Section>, Vec<Vec<Chart>>) = parts.into_iter().flatten().unzip();
     let mut sections = vec![Section::new("summary", "Summary", summary(setting, &goals::goals(&measured)))];
