@@ -23,7 +23,7 @@ pub const SCRATCH_ALIGNMENT: u64 = 16;
 
 /// From how many triangles on a structure of wide nodes is made in its own memory: 162 bytes a triangle in all, where 270 and the tables
 /// of a sort are for a few.
-const NUMBERED_FROM: u32 = 4096;
+const NUMBERED_FROM: u32 = 1024;
 
 /// Where the numbers of primitives come from.
 #[derive(Debug, Clone, Copy)]

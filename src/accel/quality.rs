@@ -36,8 +36,13 @@ const FEW: u32 = 2048;
 /// slots of a node lie.
 const MOST_WIDE: u32 = TRIANGLES_AT_MOST;
 
-/// Three quarters of a pass of reinsertion. A whole one and H-PLOC take 0.6 to 1.2 of the time of a driver's fast trace on Mesa's lavapipe, so
-/// that this takes less on every scene (docs/notes/rays.md).
+/// Primitives up to which a fast trace gets most of a pass of reinsertion, as a driver's build of few takes long; of more it gets half of
+/// one. H-PLOC and three quarters take 0.7 to 1.4 of a driver's time over more than 60 thousand triangles on Mesa's lavapipe, and half of
+/// one 0.7 to 1.0 (docs/notes/rays.md).
+const SOME: u32 = 1 << 15;
+
+const HALF_A_PASS: ReinsertionOptions =
+    ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds / 2, ..ReinsertionOptions::FAST };
 const MOST_OF_A_PASS: ReinsertionOptions =
     ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds * 3 / 4, ..ReinsertionOptions::FAST };
 
@@ -109,7 +114,11 @@ fn bottom_method(flags: Flags, count: u32) -> Method {
 }
 
 fn bottom_optimise(flags: Flags, count: u32) -> Option<ReinsertionOptions> {
-    let rounds = if count <= FEW { ReinsertionOptions::MEDIUM } else { MOST_OF_A_PASS };
+    let rounds = match count {
+        0..=FEW => ReinsertionOptions::MEDIUM,
+        ..=SOME => MOST_OF_A_PASS,
+        _ => HALF_A_PASS,
+    };
     flags.contains(Flags::PREFER_FAST_TRACE).then_some(rounds)
 }
 

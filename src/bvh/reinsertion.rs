@@ -8,7 +8,7 @@
 //! A round has three steps, each done for all links at once that the round tries:
 //!
 //! 1. *search*: of the subtree at each link, the move that shortens the sum of the nodes' areas most: up through all pivots, and
-//!    down on their other side as long as there may be more to gain than was found;
+//!    down on their other side as long as there may be more to gain than was found, into at most 32 nodes;
 //! 2. *match*: a move is made if no other across a node of its path (from the parent up to the pivot, and from there down to
 //!    the new place) gains more, or as much with a smaller link;
 //! 3. *move*: of each such path, the links, boxes and parents.
@@ -150,6 +150,8 @@ const STRIDE: u32 = 64;
 const LEAST_LINKS: u32 = 128;
 /// Subtrees that a search may put off; what does not find room is not looked at.
 pub(super) const STACK: usize = 32;
+/// Nodes that a search looks into, at most.
+pub(super) const VISITS: u32 = 32;
 /// Nodes that a path may have on either side.
 pub(super) const PATH: usize = 256;
 /// A gain counts if it is more than this share of the pivot's area: less may be rounding.

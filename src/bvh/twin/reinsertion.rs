@@ -4,7 +4,7 @@ use crate::Result;
 use crate::bvh::flux::{FluxGrid, quotient};
 use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Record, status};
 use crate::bvh::reinsertion::{
-    LEAST_GAIN, LEAST_SHARE, PATH, Probed, ReinsertionOptions, STACK, probed_offsets, weight_of,
+    LEAST_GAIN, LEAST_SHARE, PATH, Probed, ReinsertionOptions, STACK, VISITS, probed_offsets, weight_of,
 };
 use crate::geometry::Aabb;
 
@@ -251,6 +251,7 @@ impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
         }
         let moving = self.child(link).bounds();
         let mut best = Move { link, to: NONE, pivot: NONE, gain: 0.0 };
+        let mut visits = 0;
         // What all nodes cost less, without a new one; so far, the parent's cost.
         let mut saved = self.cost(&self.bounds_by(parent));
         // What is left below the pivot on the side that the subtree leaves.
@@ -259,7 +260,7 @@ impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
         for _ in 0..PATH {
             let pivot = at / 2;
             let pivot_cost = self.cost(&self.bounds_by(pivot));
-            self.search_below(at ^ 1, pivot, saved, pivot_cost, &moving, &mut best);
+            self.search_below(at ^ 1, (pivot, pivot_cost), saved, &moving, (&mut best, &mut visits));
             if pivot == root {
                 break;
             }
@@ -274,7 +275,14 @@ impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
     }
 
     /// Looks at the subtree at link `at`, on the other side of the pivot.
-    fn search_below(&self, at: u32, pivot: u32, saved: f32, pivot_cost: f32, moving: &Aabb, best: &mut Move) {
+    fn search_below(
+        &self,
+        at: u32,
+        (pivot, pivot_cost): (u32, f32),
+        saved: f32,
+        moving: &Aabb,
+        (best, visits): (&mut Move, &mut u32),
+    ) {
         let moving_cost = self.cost(moving);
         let scale = self.tree.header.area_scale;
         let (link, by_rays) = (best.link, |bounds: &Aabb, cost: f32| cost - bounds.scaled_half_area(scale));
@@ -309,9 +317,13 @@ impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
         let first = if at == link ^ 1 { below(&self.child(at), saved, pivot_cost) } else { look(at, saved, best) };
         let mut stack = vec![first];
         while let Some(next) = stack.pop() {
+            if *visits == VISITS {
+                break;
+            }
             if !may_gain(next, best) {
                 continue;
             }
+            *visits += 1;
             let (slot, saved) = next;
             let [left, right] = [0, 1].map(|side| look(2 * slot + side, saved, best));
             let [near, far] = if right.1 > left.1 { [right, left] } else { [left, right] };
