@@ -6,7 +6,7 @@
 #   make bench-peers   the same on Mesa 26, whose ray queries are a peer, beside CPU crates
 #   make stability     where methods give way: report/growth.html, large.html, degenerate.html, greedy.html
 #   make test          the test suite, under a bound in time: a shader that hangs would hang with it
-#   make test-gpu      the suite with work cut as for a GPU, and a check of builders and tracers with subgroups of 4 and 16
+#   make test-gpu      what work cut as for a GPU changes of the suite, and a check of builders and tracers with subgroups of 4 and 16
 #   make test-lanes    the suite by either tuning on lavapipe with subgroups of 4 and 16, and with one workgroup at a time
 #   make test-drivers  every pass on a second driver, SwiftShader, by the tunings of CPUs and of GPUs; a quick check on Mesa 26
 #   make test-wgpu     an engine on wgpu: builds it, lets it draw a frame, and compares that with what `hedgerow render` draws
@@ -53,6 +53,8 @@ WITHIN := $(if $(shell command -v timeout),timeout --kill-after 10 $(TEST_BOUND)
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 RUN := $(WITHIN) $(CARGO) $(if $(NEXTEST),nextest run,test) --release
 SUITE := $(RUN) --features $(FEATURES)
+# What the tuning changes: tests of the library on the device. (Warming tests both tunings by itself; the others named are of the host.)
+TUNED := $(if $(NEXTEST),-E 'package(hedgerow) & !test(/^(warming|bvh::heuristics|bvh::host|kdtree::host|kdtree::merge)::/)')
 # What depends on how many lanes a subgroup has: groups of `hedgerow check`.
 WIDTH_GROUPS := scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,child-order,ray-counts,kd-build,kd-merge,trace,trace-kd
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
@@ -92,7 +94,7 @@ test: setup
 # What `make test` has on a CPU is the tuning of CPUs; every branch for GPUs runs here. lavapipe alone reads the width.
 test-gpu: setup
 	$(CARGO) test --release --features $(FEATURES) --no-run
-	HEDGEROW_TUNING=gpu $(SUITE)
+	HEDGEROW_TUNING=gpu $(SUITE) $(TUNED)
 	for width in 128 512; do LP_NATIVE_VECTOR_WIDTH=$$width $(BIN) check --quick --tuning gpu --groups $(WIDTH_GROUPS) || exit 1; done
 
 # lavapipe alone reads these variables; subgroups of 8 and two workgroups at a time are what `make test` has on most machines.

@@ -50,7 +50,7 @@ pub(super) struct Build {
     numbered: bool,
     options: BuildOptions,
     /// What a build of fewer primitives may need.
-    of_fewer: Option<Sizes>,
+    of_fewer: Vec<Sizes>,
 }
 
 /// Where the parts of the scratch memory begin.
@@ -95,14 +95,14 @@ impl Build {
         let in_pieces = wide.filter(|_| primitives == Primitives::Triangles && entries >= NUMBERED_FROM);
         let numbered = in_pieces.and_then(|_| builder.numbered());
         let (builder, numbered) = numbered.map_or((builder, false), |builder| (builder, true));
-        let fewer = quality::fewer_of_another_form(flags, entries).filter(|_| primitives != Primitives::Instances);
-        // Which itself may need more than one of another form.
-        let fewer = if numbered { Some(NUMBERED_FROM - 1) } else { fewer };
+        let of_another_form =
+            quality::fewer_of_another_form(flags, entries).filter(|_| primitives != Primitives::Instances);
+        let in_other_memory = numbered.then_some(NUMBERED_FROM - 1);
         let of_fewer = |count: u32| {
             let given = given.clone();
             Build::new(context, options, flags, given, counts, count.into()).map(|build| build.sizes_at_most())
         };
-        let of_fewer = fewer.map(of_fewer).transpose()?;
+        let of_fewer = of_another_form.into_iter().chain(in_other_memory).map(of_fewer).collect::<Result<_>>()?;
         let options = builder_options;
         Ok(Build { builder, refit, given, counts, primitive_count, rebraid, wide, numbered, options, of_fewer })
     }
@@ -115,7 +115,7 @@ impl Build {
     /// Bytes of structure and scratch memory that suffice for it and for the same with fewer primitives.
     pub fn sizes_at_most(&self) -> Sizes {
         let sizes = self.sizes_with(self.builder.sizes_at_most());
-        self.of_fewer.map_or(sizes, |fewer| Sizes {
+        self.of_fewer.iter().fold(sizes, |sizes, fewer| Sizes {
             structure: sizes.structure.max(fewer.structure),
             scratch: sizes.scratch.max(fewer.scratch),
             ..sizes

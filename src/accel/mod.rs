@@ -25,7 +25,7 @@
 //! | --- | --- | --- | --- | --- |
 //! | `PREFER_FAST_BUILD` | an LBVH by codes of 8 bits less | the same | 1.0 | 1.0 |
 //! | none | H-PLOC, of over 2,048 primitives: of those measured in nodes of two, the least time for a build and ten rays a triangle | an LBVH and three quarters of a pass of [reinsertion](crate::bvh::reinsertion) | 2.2 | 1.09 |
-//! | `PREFER_FAST_TRACE` | H-PLOC and as much of reinsertion (a whole pass: 12 and 1.18), up to 2,048 primitives two passes | the same as without, and opens instances ([`REBRAID`]) | 2.2 to 12 | 1.09 to 1.18 |
+//! | `PREFER_FAST_TRACE` | H-PLOC and half a pass of reinsertion (a whole one: 12 and 1.18); three quarters up to 32,768 primitives, two passes up to 2,048 | the same as without, and opens instances ([`REBRAID`]) | 2.2 to 12 | 1.09 to 1.18 |
 //!
 //! What other flags change:
 //!
@@ -87,7 +87,8 @@ pub struct AccelOptions {
     /// instances' spread needs ([`BuildOptions::bits_up_to`](crate::bvh::builder::BuildOptions::bits_up_to)).
     pub top_codes: Option<Codes>,
     /// Whether structures get quantised nodes of eight children ([`crate::bvh::wide`]), where no update is allowed: top levels but for
-    /// those of `PREFER_FAST_BUILD`, bottom levels that are not LBVHs. They take less memory, and stand beside others in either level.
+    /// those of `PREFER_FAST_BUILD`, bottom levels that are not LBVHs. They take less memory, 32 to 38 bytes a triangle compacted where nodes
+    /// of two take 50 to 62 (docs/notes/memory.md), and stand beside others in either level.
     /// Shaders must define `HEDGEROW_QUANTISED` before they include `trace/query.glsl`, or their rays pass what is made of such nodes; of
     /// the tracers, those of [`crate::trace::wide`] meet bottom levels. For a few large structures: on lavapipe queries of one scene in
     /// one instance gain, those of many small instances lose (docs/notes/rays.md); no GPU was measured.

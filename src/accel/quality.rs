@@ -37,8 +37,8 @@ const FEW: u32 = 2048;
 const MOST_WIDE: u32 = TRIANGLES_AT_MOST;
 
 /// Primitives up to which a fast trace gets most of a pass of reinsertion, as a driver's build of few takes long; of more it gets half of
-/// one. H-PLOC and three quarters take 0.7 to 1.4 of a driver's time over more than 60 thousand triangles on Mesa's lavapipe, and half of
-/// one 0.7 to 1.0 (docs/notes/rays.md).
+/// one. On Mesa's lavapipe H-PLOC and three quarters took 0.7 to 1.4 of a driver's time over more than 60 thousand triangles, and with half
+/// of one they take 0.5 to 1.04 (docs/notes/memory.md).
 const SOME: u32 = 1 << 15;
 
 const HALF_A_PASS: ReinsertionOptions =
@@ -114,10 +114,12 @@ fn bottom_method(flags: Flags, count: u32) -> Method {
 }
 
 fn bottom_optimise(flags: Flags, count: u32) -> Option<ReinsertionOptions> {
-    let rounds = match count {
-        0..=FEW => ReinsertionOptions::MEDIUM,
-        ..=SOME => MOST_OF_A_PASS,
-        _ => HALF_A_PASS,
+    let rounds = if count <= FEW {
+        ReinsertionOptions::MEDIUM
+    } else if count <= SOME {
+        MOST_OF_A_PASS
+    } else {
+        HALF_A_PASS
     };
     flags.contains(Flags::PREFER_FAST_TRACE).then_some(rounds)
 }

@@ -15,7 +15,7 @@ pub use super::method::Method;
 pub use super::method::PersistentShaders;
 use super::reinsertion::{self, Reinsertion};
 use super::sah::Collapse;
-use super::scratch::Scratch;
+use super::scratch::{CLUSTER_BYTES, Scratch};
 use super::split::{self, Split};
 use super::{collapse, hploc, layout};
 use crate::gpu::arguments;
@@ -264,6 +264,9 @@ impl Builder {
             build_flags: options.build_flags,
             alone,
             numbered: false,
+            // H-PLOC writes records when it has no clusters any more.
+            clusters_in_records: matches!(method, Method::Hploc(_))
+                && options.primitives.record_bytes() >= CLUSTER_BYTES,
         };
         Ok(Builder { method, schedule, optimise, workers: tuning.workers, merging, encode, child_order })
     }
@@ -320,7 +323,7 @@ impl Builder {
     /// structure of it: [`Builder::numbered_step`] writes the records when they are needed. `None` where the tree's making reads them.
     pub(crate) fn numbered(&self) -> Option<Builder> {
         let is_chain = self.schedule == Schedule::Chain && self.encode.split.is_none();
-        let encode = Encode { numbered: true, ..self.encode.clone() };
+        let encode = Encode { numbered: true, clusters_in_records: false, ..self.encode.clone() };
         (is_chain && self.places() && self.child_order.is_none()).then(|| Builder { encode, ..self.clone() })
     }
 

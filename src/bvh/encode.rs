@@ -46,6 +46,8 @@ pub(super) struct Encode {
     pub alone: bool,
     /// Whether the structure has the primitives' numbers in place of their records.
     pub numbered: bool,
+    /// Whether the clusters of a method lie where the records will.
+    pub clusters_in_records: bool,
 }
 
 impl arguments::Build {
@@ -74,6 +76,8 @@ impl arguments::Build {
 const HAS_REFERENCES: u32 = 8;
 /// There: the structure has numbers in place of records.
 const HAS_NUMBERS: u32 = 16;
+/// There: clusters lie where records will.
+const CLUSTERS_IN_RECORDS: u32 = 32;
 
 impl Encode {
     /// Bits that there is room and time for.
@@ -139,7 +143,9 @@ impl Encode {
         let constants = self.constants();
         let references = if self.split.is_some() { HAS_REFERENCES } else { 0 };
         let numbers = if self.numbered { HAS_NUMBERS } else { 0 };
-        let source = [input.source_constant(self.primitives) | references | numbers, self.codes.prefix_constant()];
+        let clusters = if self.clusters_in_records { CLUSTERS_IN_RECORDS } else { 0 };
+        let source = input.source_constant(self.primitives) | references | numbers | clusters;
+        let source = [source, self.codes.prefix_constant()];
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source, more].concat())
     }
 

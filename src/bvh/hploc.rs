@@ -95,12 +95,14 @@ impl Hierarchy for &Merging {
         [encode.reset_kernel(&shaders::BVH_HPLOC_RESET), all]
     }
 
-    fn plan(&self, _encode: &Encode, scratch: &mut Scratch) {
+    fn plan(&self, encode: &Encode, scratch: &mut Scratch) {
         scratch.take_weights(BuildPhase::Hierarchy);
         scratch.take_codes(BuildPhase::Hierarchy);
         scratch.take_ends(BuildPhase::Hierarchy);
         scratch.take_sort();
-        scratch.take_clusters(BuildPhase::Hierarchy, BuildPhase::Hierarchy);
+        if !encode.clusters_in_records {
+            scratch.take_clusters(BuildPhase::Hierarchy, BuildPhase::Hierarchy);
+        }
         scratch.parts.lists[0] = scratch.take_words("list of clusters", BuildPhase::Hierarchy, BuildPhase::Hierarchy);
     }
 }

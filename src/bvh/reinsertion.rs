@@ -206,10 +206,10 @@ impl Reinsertion {
         2 * self.slots
     }
 
-    /// Bytes of scratch memory.
+    /// Bytes of scratch memory: no fewer than for a smaller structure, whose rounds may try more links.
     pub fn scratch_bytes(&self) -> u64 {
-        let moves = u64::from(self.link_count().div_ceil(self.stride));
-        12 * u64::from(self.slots) + MOVE_BYTES * moves
+        let moves = self.link_count().div_ceil(self.stride).max(self.link_count().min(2 * LEAST_LINKS));
+        12 * u64::from(self.slots) + MOVE_BYTES * u64::from(moves)
     }
 
     /// Bytes of scratch memory by rays: 8 for each node slot more.

@@ -31,7 +31,7 @@ pub(super) enum BuildPhase {
 }
 
 /// Bytes of a cluster: `Cluster` in clusters.glsl.
-const CLUSTER_BYTES: u64 = 40;
+pub(super) const CLUSTER_BYTES: u64 = 40;
 /// Bytes of a task: `Task` in hlbvh.glsl.
 const TASK_BYTES: u64 = 12;
 /// Bytes of the weights of a primitive: `Weights` in weights.glsl.
@@ -189,6 +189,7 @@ mod tests {
             build_flags: 0,
             alone: false,
             numbered: false,
+            clusters_in_records: false,
         }
     }
 

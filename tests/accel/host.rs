@@ -71,7 +71,7 @@ fn quads(count: usize) -> Corners {
     let quad = |i: usize| {
         let (x, y) = (i % side, i / side);
         let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
-        [[a, b, c], if i % 3 == 0 { [d, c, b] } else { [b, d, c] }]
+        [[a, b, c], if i.is_multiple_of(3) { [d, c, b] } else { [b, d, c] }]
     };
     (0..count).flat_map(quad).collect()
 }

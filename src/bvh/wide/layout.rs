@@ -30,7 +30,7 @@ pub trait WideNode: Pod + PartialEq + std::fmt::Debug + Send + Sync {
     /// How it is written.
     const FORM: Form;
 
-    /// Leaves of more records than this are nodes of their own; of more than [`leaf_max`] where two may be one record.
+    /// Leaves of more records than this are nodes of their own. Where two records may be one, leaves of more than 51 are.
     const LEAF_MAX: u32;
 
     /// The node of these children, whose indices are final. There is at least one; those that are nodes (or long leaves) lie
@@ -102,7 +102,7 @@ pub(crate) fn is_paired<N: WideNode, R: Record>() -> bool {
     N::FORM.is_quantised() && R::KIND == Triangle::KIND
 }
 
-/// Leaves of more records than this are nodes of their own.
+/// The most records of a leaf that is no node of its own.
 pub(crate) fn leaf_max<N: WideNode, R: Record>() -> u32 {
     if is_paired::<N, R>() { pairs::LEAF_MAX } else { N::LEAF_MAX }
 }
