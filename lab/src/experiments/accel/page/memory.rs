@@ -23,15 +23,15 @@ pub(super) fn part(points: &[MemoryPoint]) -> Result<Option<Part>> {
         .text("nodes", |point| if point.of_eight { "of eight" } else { "of two" })
         .text("preference", |point| &point.flags)
         .spread("build", "ms", |point| Some(point.build_ms), three_digits)
-        .number("structure", "bytes a triangle", |point| Some(point.each(point.structure_bytes)), three_digits)
-        .number("scratch", "bytes a triangle", |point| Some(point.each(point.scratch_bytes)), three_digits)
-        .number("both", "bytes a triangle", |point| Some(point.with_scratch()), three_digits)
-        .number("compacted", "bytes a triangle", |point| point.compacted(), three_digits)
+        .number("structure", "bytes each", |point| Some(point.each(point.structure_bytes)), three_digits)
+        .number("scratch", "bytes each", |point| Some(point.each(point.scratch_bytes)), three_digits)
+        .number("both", "bytes each", |point| Some(point.with_scratch()), three_digits)
+        .number("compacted", "bytes each", |point| point.compacted(), three_digits)
         .html();
     let body = html! {
         p {
             "One bottom level over all of a scene, with ALLOW_COMPACTION: what vkGetAccelerationStructureBuildSizesKHR asks for, and what a "
-            "compacted copy takes; header and table of geometries included. In nodes of eight, two triangles that share an edge are one record."
+            "compacted copy takes, for each triangle; header and table of geometries included. In nodes of eight, two triangles that share an edge are one record."
         }
         p { (reading(points)) }
         (table)
