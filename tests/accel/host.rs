@@ -1,17 +1,21 @@
 //! Builds on the host have the bytes of the device's.
 
+use crate::common::agree::assert_agrees;
 use crate::common::backends::{Backend, Built, Ours, vk_format, vk_geometry, vk_index_type};
 use crate::common::device;
 use crate::common::geometries::{MOVED, Owned};
+use crate::common::matrices::{rotation, scaled};
+use crate::common::probe::{CONFIRM, CONFIRM_ODD, IGNORE, ProbeRay, TERMINATE, flags};
 use crate::common::shapes::{Corners, boxes, soup};
-use crate::common::world::Part;
-use hedgerow::accel::{self, ANY_HIT_ORDER, AccelOptions, Request};
+use crate::common::world::{Part, World};
+use hedgerow::accel::{self, ANY_HIT_ORDER, AccelOptions, Instance, Request};
 use hedgerow::ash::vk;
 use hedgerow::bvh::codes::{Code, CodeBounds, Codes};
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::{self, Header, Triangle};
 use hedgerow::bvh::wide::layout::Wide8q;
 use hedgerow::gpu::Recorder;
+use hedgerow_lab::random::SplitMix64;
 
 type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
 type Geometry = vk::AccelerationStructureGeometryKHR<'static>;
@@ -125,6 +129,42 @@ fn wide_structures_of_many_triangles_have_the_hosts_bytes_and_keep_to_their_memo
                 assert_eq!(buffer.read_at::<u8>(bytes, GUARD), [0xA5; GUARD], "{} geometries, {flags:?}", parts.len());
             }
         }
+    }
+}
+
+/// Both triangles of a record are met as brute force meets them, as hits and as candidates, whatever the shader says of the first: sheets of
+/// quads over each other, some opaque and some not.
+#[test]
+fn triangles_that_share_a_record_are_met_each() {
+    let sheets = |height: f32, count: usize| -> Corners {
+        let lift = |[x, y, z]: [f32; 3]| [0.1 * x - 0.5, 0.1 * y + height, 0.1 * z - 0.5];
+        quads(count).into_iter().map(|corners| corners.map(lift)).collect()
+    };
+    let part = Part::Triangles(vec![
+        (sheets(-0.4, 100), vk::GeometryFlagsKHR::empty()),
+        (sheets(0.0, 100), vk::GeometryFlagsKHR::OPAQUE),
+        (sheets(0.4, 81), vk::GeometryFlagsKHR::NO_DUPLICATE_ANY_HIT_INVOCATION),
+    ]);
+    let ours = Ours::on(device());
+    let (geometries, ranges, _memory) = part.geometries(device());
+    let header: Header = bytemuck::pod_read_unaligned(
+        &on_the_device(&ours, &geometries, &ranges, Flags::PREFER_FAST_TRACE)[..size_of::<Header>()],
+    );
+    assert!(header.pairs > 100, "{} pairs of {}", header.pairs, header.active);
+    let transforms = [Instance::IDENTITY, scaled(rotation(3), [1.5, 0.5, 1.0])];
+    let instances = transforms.map(|transform| Instance::new(1, transform)).to_vec();
+    let mut random = SplitMix64::new(31);
+    let all = [flags::NONE, flags::OPAQUE, flags::NO_OPAQUE, flags::FIRST_HIT, flags::CULL_BACK, flags::CULL_OPAQUE];
+    let ray = |i: usize| {
+        let ray = ProbeRay::to(random.around(2.0), random.around(0.5));
+        let decision = [IGNORE, CONFIRM, CONFIRM_ODD, TERMINATE][i % 4];
+        ProbeRay { flags: all[i / 4 % all.len()], decision, ..ray }
+    };
+    let rays: Vec<ProbeRay> = (0..1200).map(ray).collect();
+    for flags in [Flags::PREFER_FAST_TRACE, Flags::PREFER_FAST_TRACE | ANY_HIT_ORDER] {
+        let world = World { flags, ..World::new(vec![part.clone()], instances.clone()) };
+        let hits = assert_agrees(&ours, &format!("{flags:?}"), &world, &rays);
+        assert!(hits > 400, "{hits} hits are no test");
     }
 }
 
