@@ -96,6 +96,11 @@ uvec2 part(uint at) {
     return address_of(scratch_address, at, 16u);
 }
 
+// Where the records of the tree will lie.
+uvec2 records_of_tree() {
+    return records_at(structure_address, max(primitive_count, 2u) - 1u);
+}
+
 // The sort's results.
 Words sorted_keys() {
     return Words(part(parts.keys[passes & 1u]));

@@ -17,7 +17,7 @@ struct Cluster {
 BUFFER Clusters { Cluster cluster[]; };
 
 Clusters all_clusters() {
-    if (CLUSTERS_IN_RECORDS) return Clusters(records_at(structure_address, max(primitive_count, 2u) - 1u));
+    if (CLUSTERS_IN_RECORDS) return Clusters(records_of_tree());
     return Clusters(part(parts.clusters));
 }
 

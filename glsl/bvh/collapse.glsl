@@ -6,9 +6,10 @@
 //   weigh    reads nodes, parents             writes weights: counts, left_counts; costs; the header's costs
 //   above    reads weights                    writes the places of large nodes; of these what place writes of the others
 //   place    reads weights, places            writes the walk's order, the nodes' children, slots that fall out, the root
-//   records  reads the walk's order           writes records
+//   records  reads the walk's order           writes records, or the primitives' numbers in their place
+//   numbered reads those numbers              writes records, to anywhere
 //
-// A builder that writes the weights itself needs the last three alone.
+// A builder that writes the weights itself needs none of the first two.
 //
 // Where a record goes is the sum of the counts of all left siblings on the way up. That way is long, and the larger part of it is
 // that of many others too: so nodes above more than LARGE primitives go it first.
@@ -253,10 +254,6 @@ void collapse_place(uint task) {
 }
 
 // ---- records ----
-
-uvec2 records_of_tree() {
-    return records_at(structure_address, max(primitive_count, 2u) - 1u);
-}
 
 void collapse_records(uint task) {
     Words walk = walk_order(), sorted = sorted_values();

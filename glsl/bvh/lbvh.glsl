@@ -92,7 +92,7 @@ void climb(inout Run run, float area_scale, Subtree s, inout uint unused) {
 }
 
 void lbvh_hierarchy(uint task) {
-    uvec2 records = records_at(structure_address, max(primitive_count, 2) - 1);
+    uvec2 records = records_of_tree();
     Geometry input_geometries = geometries();
     float area_scale = build_state().plan.area_scale;
     Words order = sorted_values();

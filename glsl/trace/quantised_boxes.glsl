@@ -1,4 +1,4 @@
-// Where a ray enters the boxes of a quantised node: the twin of src/trace/wide_host.rs, bit for bit. The proof of src/trace/slab.rs
+// Where a ray enters the boxes of a quantised node: the twin of src/trace/twin/wide.rs, bit for bit. The proof of src/trace/slab.rs
 // is for any box around the triangle, and those that come out of the bytes are (src/bvh/wide/quantised.rs); they are widened by
 // what the node's whole grid needs, once for all eight.
 #ifndef HEDGEROW_TRACE_QUANTISED_BOXES

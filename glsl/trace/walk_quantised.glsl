@@ -1,4 +1,4 @@
-// One ray on its way through a tree of quantised nodes, step by step: the twin of src/trace/wide_host.rs, visit for visit.
+// One ray on its way through a tree of quantised nodes, step by step: the twin of src/trace/twin/wide.rs, visit for visit.
 //
 // As Ylitie, Karras and Laine (2017, section 4) do: the children of a node that are nodes and that the ray enters are a group,
 // met from near to far by counting slots in the order of the ray's octant; what is left of a group waits as one entry. The

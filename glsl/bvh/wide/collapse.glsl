@@ -1,4 +1,4 @@
-// Collapses a Bvh2 into a wide tree: src/bvh/wide/device.rs records the steps, src/bvh/wide/host.rs is the twin.
+// Collapses a Bvh2 into a wide tree: src/bvh/wide/device.rs records the steps, src/bvh/twin/wide.rs is the twin.
 //
 //   reset            reads the source                            writes levels, opened[0]
 //   open, open_few   read the source, opened of a level          write slots, opened of the next level, levels, first_children,
