@@ -15,6 +15,7 @@ mod shader_features;
 mod warming;
 
 mod accel {
+    mod arguments;
     mod bad;
     mod blas;
     mod boxes;

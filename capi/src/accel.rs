@@ -5,6 +5,7 @@ use crate::pointers::{handle, place, reference, reference_mut, slice, slices};
 use crate::status::{status, value_or};
 use crate::vulkan::*;
 use hedgerow::accel;
+use hedgerow::gpu::ArgumentMemory;
 
 /// What scratch addresses must be multiples of.
 pub const HEDGEROW_SCRATCH_ALIGNMENT: u32 = 16;
@@ -121,6 +122,54 @@ pub unsafe extern "C" fn hedgerow_cmd_build_acceleration_structures(
         let ranges = slices(pp_build_range_infos, infos, "ppBuildRangeInfos")?;
         let commands = handle(command_buffer, "commandBuffer")?;
         structures_of(context)?.cmd_build_acceleration_structures(commands, infos, &ranges)
+    })
+}
+
+/// Memory for the arguments of builds: a part of a buffer with the usage `VK_BUFFER_USAGE_TRANSFER_DST_BIT`,
+/// `VK_BUFFER_USAGE_STORAGE_BUFFER_BIT` and `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT`. It is a call's own while it runs, as scratch
+/// memory is.
+#[repr(C)]
+pub struct HedgerowArgumentMemory {
+    /// The buffer.
+    pub buffer: VkBuffer,
+    /// Where in the buffer it begins; the address there is a multiple of 16.
+    pub offset: VkDeviceSize,
+    /// Its length in bytes.
+    pub size: VkDeviceSize,
+}
+
+/// Bytes that suffice for the arguments of one call of so many builds with so many geometries in all.
+#[unsafe(no_mangle)]
+pub extern "C" fn hedgerow_get_argument_size(info_count: u32, geometry_count: u32) -> VkDeviceSize {
+    accel::Device::argument_bytes(info_count.into(), geometry_count.into())
+}
+
+/// hedgerow_cmd_build_acceleration_structures with the arguments in memory: thousands of small builds are one dispatch for all of a
+/// kind in place of one for two.
+///
+/// # Safety
+/// As Vulkan's; the memory is as HedgerowArgumentMemory says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hedgerow_cmd_build_acceleration_structures_by_table(
+    context: *const HedgerowContext,
+    command_buffer: VkCommandBuffer,
+    info_count: u32,
+    p_infos: *const VkAccelerationStructureBuildGeometryInfoKHR<'_>,
+    pp_build_range_infos: *const *const VkAccelerationStructureBuildRangeInfoKHR,
+    p_argument_memory: *const HedgerowArgumentMemory,
+) -> VkResult {
+    // SAFETY: the caller's promises.
+    status(|| unsafe {
+        let infos = slice(p_infos, info_count, "pInfos")?;
+        let ranges = slices(pp_build_range_infos, infos, "ppBuildRangeInfos")?;
+        let commands = handle(command_buffer, "commandBuffer")?;
+        let memory = reference(p_argument_memory, "pArgumentMemory")?;
+        let memory = ArgumentMemory {
+            buffer: handle(memory.buffer, "pArgumentMemory->buffer")?,
+            offset: memory.offset,
+            bytes: memory.size,
+        };
+        structures_of(context)?.with_arguments_in(memory).cmd_build_acceleration_structures(commands, infos, &ranges)
     })
 }
 

@@ -11,12 +11,13 @@ pub use hedgerow::ash::vk::{
     AccelerationStructureDeviceAddressInfoKHR as VkAccelerationStructureDeviceAddressInfoKHR,
     AccelerationStructureKHR as VkAccelerationStructureKHR,
     AccelerationStructureVersionInfoKHR as VkAccelerationStructureVersionInfoKHR,
-    AllocationCallbacks as VkAllocationCallbacks, Bool32 as VkBool32, CommandBuffer as VkCommandBuffer,
-    CopyAccelerationStructureInfoKHR as VkCopyAccelerationStructureInfoKHR,
+    AllocationCallbacks as VkAllocationCallbacks, Bool32 as VkBool32, Buffer as VkBuffer,
+    CommandBuffer as VkCommandBuffer, CopyAccelerationStructureInfoKHR as VkCopyAccelerationStructureInfoKHR,
     CopyAccelerationStructureToMemoryInfoKHR as VkCopyAccelerationStructureToMemoryInfoKHR,
     CopyMemoryToAccelerationStructureInfoKHR as VkCopyMemoryToAccelerationStructureInfoKHR, Device as VkDevice,
-    DeviceAddress as VkDeviceAddress, Instance as VkInstance, PhysicalDevice as VkPhysicalDevice,
-    PipelineCache as VkPipelineCache, QueueFlags as VkQueueFlags, Result as VkResult,
+    DeviceAddress as VkDeviceAddress, DeviceSize as VkDeviceSize, Instance as VkInstance,
+    PhysicalDevice as VkPhysicalDevice, PipelineCache as VkPipelineCache, QueueFlags as VkQueueFlags,
+    Result as VkResult,
 };
 
 /// Null in C where it is `None` here.

@@ -108,6 +108,10 @@ fn structures_name_what_is_null() {
             "ppBuildRangeInfos[0] is null; 2 elements were announced",
         );
         assert_refused(build(null(), vk::CommandBuffer::null(), 0, null(), null()), "commandBuffer is null");
+        let by_table = hedgerow_cmd_build_acceleration_structures_by_table;
+        assert_refused(by_table(null(), commands, 0, null(), null(), null()), "pArgumentMemory is null");
+        let nowhere = HedgerowArgumentMemory { buffer: vk::Buffer::null(), offset: 0, size: 1 << 10 };
+        assert_refused(by_table(null(), commands, 0, null(), null(), &nowhere), "pArgumentMemory->buffer is null");
         assert_refused(build(null(), commands, 0, null(), null()), "context is null");
     }
 }

@@ -1,7 +1,7 @@
-// Builds of few triangles, each by one workgroup that does all phases: two builds a dispatch. See bvh/lbvh.glsl for the
-// phases' contracts.
+// Builds of few triangles, each by one workgroup that does all phases: two builds a dispatch, or as many as a table in memory has.
+// See bvh/lbvh.glsl for the phases' contracts.
 //
-// reads   the triangles
+// reads   the triangles; the table, where there is one
 // writes  the structures; scratch memory of each build
 // needs   nothing of other workgroups; subgroups of any size; workgroups of whole subgroups
 #version 460
@@ -26,8 +26,20 @@ layout(push_constant, scalar) uniform BuildAloneArguments {
     float step_cost;
     float test_cost;
     uint codes_and_flags;   // codes, collapses << 25, build flags << 26: push constants are full
-    uint state_bytes;
+    uint state_bytes;       // and IN_TABLE
 } given;
+
+// In `state_bytes`: all builds lie in a table, whose address is in the place of the first one's vertices.
+const uint IN_TABLE = 1u << 31;
+
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Table {
+    Small builds[];
+};
+
+Small build_of(uint number) {
+    if ((given.state_bytes & IN_TABLE) != 0u) return Table(given.builds[0].vertices).builds[number];
+    return given.builds[number];
+}
 
 // The next part of the scratch memory.
 uint take(inout uint at, uint bytes) {
@@ -54,7 +66,7 @@ void plan_parts(uint state_bytes) {
 }
 
 void main() {
-    Small build = given.builds[group_number()];
+    Small build = build_of(group_number());
     vertices = build.vertices;
     indices = build.indices;
     transform = build.transform;
@@ -73,7 +85,7 @@ void main() {
     column_keys = PRIVATE_COUNTERS ? max((primitive_count + gl_WorkGroupSize.x - 1u) / gl_WorkGroupSize.x, 1u)
                                    : TILE_KEYS;
     passes = primitive_count < 2u ? 0u : (max(given_code_bits(), most_bits_by_spread()) + DIGIT_BITS - 1u) / DIGIT_BITS;
-    plan_parts(given.state_bytes);
+    plan_parts(given.state_bytes & ~IN_TABLE);
 
     uint tile = gl_WorkGroupSize.x * ITEMS;
     uint tiles = (primitive_count + tile - 1u) / tile;

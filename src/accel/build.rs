@@ -12,7 +12,7 @@ use crate::bvh::refit::{self, Refit};
 use crate::bvh::wide::Form;
 use crate::bvh::wide::device::{WideMemory, WideOptions, WidePass};
 use crate::gpu::arguments;
-use crate::gpu::{Context, Kernel, Region, Sizes, Step, shaders};
+use crate::gpu::{ArgumentTable, Context, Kernel, Region, Sizes, Step, shaders};
 use crate::{Error, Result};
 use ash::vk;
 
@@ -49,6 +49,8 @@ pub(super) struct Build {
     /// Whether that tree has the primitives' numbers in place of their records, and the structure's memory serves while it is made.
     numbered: bool,
     options: BuildOptions,
+    /// Where the geometries' records lie, if not in scratch memory.
+    records: Option<u64>,
     /// What a build of fewer primitives may need.
     of_fewer: Vec<Sizes>,
 }
@@ -104,7 +106,19 @@ impl Build {
         };
         let of_fewer = of_another_form.into_iter().chain(in_other_memory).map(of_fewer).collect::<Result<_>>()?;
         let options = builder_options;
-        Ok(Build { builder, refit, given, counts, primitive_count, rebraid, wide, numbered, options, of_fewer })
+        Ok(Build {
+            builder,
+            refit,
+            given,
+            counts,
+            primitive_count,
+            rebraid,
+            wide,
+            numbered,
+            options,
+            records: None,
+            of_fewer,
+        })
     }
 
     /// Bytes of structure and scratch memory that it needs.
@@ -142,6 +156,28 @@ impl Build {
     /// What the host's builder takes, and the codes.
     pub fn host_options(&self) -> (BuildOptions, Codes) {
         (BuildOptions { method: self.builder.method(), ..self.options }, self.builder.codes())
+    }
+
+    /// Puts the geometries' records into the table, where they would be written by dispatches.
+    pub fn put_records(&mut self, table: &mut ArgumentTable) -> Result<()> {
+        if let Some(records) = self.written_records() {
+            self.records = Some(table.put(&records)?);
+        }
+        Ok(())
+    }
+
+    /// The records that must lie in memory.
+    fn written_records(&self) -> Option<Vec<Geometry>> {
+        let (BuildGeometries::Triangles(geometries) | BuildGeometries::Boxes(geometries)) = &self.given else {
+            return None;
+        };
+        let end = Geometry { flags: GeometryFlags::END, ..Geometry::mesh(0, 0, 0) };
+        match self.counts {
+            Counts::OnHost if geometries.len() < 2 => None,
+            Counts::OnHost => Some(geometries.clone()),
+            Counts::OnDevice { .. } if geometries.is_empty() => None,
+            Counts::OnDevice { .. } => Some(geometries.iter().copied().chain([end]).collect()),
+        }
     }
 
     /// Whether the structure has nodes of eight.
@@ -205,16 +241,15 @@ impl Build {
 
     fn input(&self, scratch: u64) -> Input {
         let parts = self.scratch(scratch);
+        let records = self.records.unwrap_or(scratch);
         let source = match &self.given {
             BuildGeometries::Instances { .. } => Source::Entries(parts.entries),
             BuildGeometries::Triangles(geometries) | BuildGeometries::Boxes(geometries) => {
                 match (&geometries[..], self.counts) {
                     ([], _) => Source::One(Geometry::mesh(0, 0, 0)),
                     (&[geometry], Counts::OnHost) => Source::One(geometry),
-                    (_, Counts::OnHost) => Source::Several { records: scratch, count: geometries.len() as u32 },
-                    (_, Counts::OnDevice { .. }) => {
-                        Source::Several { records: scratch, count: geometries.len() as u32 + 1 }
-                    }
+                    (_, Counts::OnHost) => Source::Several { records, count: geometries.len() as u32 },
+                    (_, Counts::OnDevice { .. }) => Source::Several { records, count: geometries.len() as u32 + 1 },
                 }
             }
         };
@@ -239,28 +274,25 @@ impl Build {
                 }
                 vec![steps]
             }
-            BuildGeometries::Triangles(geometries) | BuildGeometries::Boxes(geometries) => match self.counts {
-                Counts::OnHost if geometries.len() < 2 => Vec::new(),
-                Counts::OnHost => record_steps(geometries, scratch).into_iter().map(|step| vec![step]).collect(),
-                Counts::OnDevice { .. } if geometries.is_empty() => Vec::new(),
-                Counts::OnDevice { address, stride } => {
-                    let end = Geometry { flags: GeometryFlags::END, ..Geometry::mesh(0, 0, 0) };
-                    let all: Vec<Geometry> = geometries.iter().copied().chain([end]).collect();
-                    let arguments = arguments::Ranges {
-                        records: scratch,
-                        ranges: address,
-                        stride,
-                        count: geometries.len() as u32,
-                        boxes: u32::from(self.given.primitives() == Primitives::Boxes),
-                    };
-                    // The records of one chain touch no memory of each other's: the barriers between them are not needed, and
-                    // geometries whose ranges lie in device memory are few.
-                    let mut steps = record_steps(&all, scratch);
-                    let kernel = Kernel::new(&shaders::ACCEL_BUILD_RANGES, context.tuning.small_group, &[]);
-                    steps.push(Step::new("geometries", kernel, &arguments, 1));
-                    vec![steps]
-                }
-            },
+            BuildGeometries::Triangles(_) | BuildGeometries::Boxes(_) => {
+                let Some(all) = self.written_records() else { return Vec::new() };
+                let mut steps = if self.records.is_some() { Vec::new() } else { record_steps(&all, scratch) };
+                let Counts::OnDevice { address, stride } = self.counts else {
+                    return steps.into_iter().map(|step| vec![step]).collect();
+                };
+                let arguments = arguments::Ranges {
+                    records: self.records.unwrap_or(scratch),
+                    ranges: address,
+                    stride,
+                    count: all.len() as u32 - 1,
+                    boxes: u32::from(self.given.primitives() == Primitives::Boxes),
+                };
+                // The records of one chain touch no memory of each other's: the barriers between them are not needed, and
+                // geometries whose ranges lie in device memory are few.
+                let kernel = Kernel::new(&shaders::ACCEL_BUILD_RANGES, context.tuning.small_group, &[]);
+                steps.push(Step::new("geometries", kernel, &arguments, 1));
+                vec![steps]
+            }
         }
     }
 

@@ -6,8 +6,10 @@ use super::copy::clone_step;
 use super::given::not_null;
 use super::{AccelOptions, Placement, Request, geometry};
 use crate::bvh::builder::{BuildJob, Builder};
+use crate::bvh::geometry::Geometry;
 use crate::bvh::refit::Refit;
-use crate::gpu::{Context, Recorder, Region, Sizes, Step};
+use crate::gpu::arguments;
+use crate::gpu::{ArgumentMemory, ArgumentTable, Context, Recorder, Region, Sizes, Step};
 use crate::{Error, Result};
 use ash::vk;
 use ash::vk::Handle;
@@ -26,6 +28,8 @@ type Flags = vk::BuildAccelerationStructureFlagsKHR;
 pub struct Device<'a> {
     pub(super) context: &'a Context,
     options: AccelOptions,
+    /// Where arguments lie that are too many for push constants.
+    arguments: Option<ArgumentMemory>,
     /// Where [`Options::checked`] asks for it; shared with clones.
     pub(super) checks: Option<Arc<Checks>>,
 }
@@ -38,7 +42,24 @@ impl<'a> Device<'a> {
 
     /// The same with options.
     pub fn with_options(context: &'a Context, options: AccelOptions) -> Device<'a> {
-        Device { context, options, checks: options.checked.then(Default::default) }
+        Device { context, options, arguments: None, checks: options.checked.then(Default::default) }
+    }
+
+    /// The same structures, whose builds read their arguments from `memory`: a call for thousands of small builds records one dispatch
+    /// for all of a kind in place of one for two, and the records of geometries are written at once in place of two at a time. Each call
+    /// needs [`Device::argument_bytes`] there, and has the memory for itself while it runs, like scratch memory.
+    ///
+    /// # Safety
+    /// As [`ArgumentMemory`] says, whenever this device or a clone records builds.
+    pub unsafe fn with_arguments_in(&self, memory: ArgumentMemory) -> Device<'a> {
+        Device { arguments: Some(memory), ..self.clone() }
+    }
+
+    /// Bytes that suffice for the arguments of one call of so many builds with so many geometries in all.
+    pub const fn argument_bytes(builds: u64, geometries: u64) -> u64 {
+        // Of each build the records of its geometries, one more, what fills up to the alignment, and its arguments.
+        (size_of::<Geometry>() as u64) * (geometries + builds)
+            + (size_of::<arguments::Small>() as u64 + 2 * ArgumentTable::ALIGNMENT) * builds
     }
 
     /// `vkGetAccelerationStructureBuildSizesKHR`: bytes that a build of at most `max_primitive_counts` primitives a geometry
@@ -157,7 +178,7 @@ impl<'a> Device<'a> {
         // SAFETY: the caller's promise.
         unsafe {
             self.check(infos, ranges, &builds)?;
-            self.record_placed(&mut Recorder::new(self.context, commands), &builds)
+            self.record_placed(&mut Recorder::new(self.context, commands), &mut builds)
         }
     }
 
@@ -204,7 +225,7 @@ impl<'a> Device<'a> {
         // SAFETY: the caller's promise.
         unsafe {
             self.check(infos, ranges, &builds)?;
-            self.record_placed(&mut Recorder::new(self.context, commands), &builds)
+            self.record_placed(&mut Recorder::new(self.context, commands), &mut builds)
         }
     }
 
@@ -276,10 +297,10 @@ impl<'a> Device<'a> {
             scratch.checked("scratch memory for an acceleration structure", sizes.scratch, SCRATCH_ALIGNMENT)?;
             Ok(PlacedBuild { build, source: None, structure, scratch })
         });
-        let builds = placed.collect::<Result<Vec<_>>>()?;
+        let mut builds = placed.collect::<Result<Vec<_>>>()?;
         // SAFETY: the caller's promise.
         let mut recorder = unsafe { Recorder::new(self.context, commands) };
-        self.record_placed(&mut recorder, &builds)
+        self.record_placed(&mut recorder, &mut builds)
     }
 
     /// Makes the pipelines of these builds now, and of their updates if the flags allow updates. Recording the same later, for
@@ -297,8 +318,8 @@ impl<'a> Device<'a> {
         const ANOTHER: u64 = 16;
         let can_be_updated = |request: &&Request| request.flags.contains(Flags::ALLOW_UPDATE);
         let updates = requests.iter().filter(can_be_updated).map(|request| placed(request, Some(ANOTHER)));
-        let builds = anew.chain(updates).collect::<Result<Vec<_>>>()?;
-        self.record_placed(&mut Recorder::warming(self.context), &builds)
+        let mut builds = anew.chain(updates).collect::<Result<Vec<_>>>()?;
+        self.record_placed(&mut Recorder::warming(self.context), &mut builds)
     }
 
     /// The options that it was made with.
@@ -306,12 +327,19 @@ impl<'a> Device<'a> {
         &self.options
     }
 
-    fn record_placed(&self, recorder: &mut Recorder<'_>, builds: &[PlacedBuild]) -> Result<()> {
+    fn record_placed(&self, recorder: &mut Recorder<'_>, builds: &mut [PlacedBuild]) -> Result<()> {
+        let memory = self.arguments.filter(|_| recorder.commands() != vk::CommandBuffer::null());
+        // SAFETY: the promise of `with_arguments_in`.
+        let table = memory.map(|memory| unsafe { ArgumentTable::new(self.context, memory) });
+        let mut table = table.transpose()?;
+        if let Some(table) = &mut table {
+            builds.iter_mut().try_for_each(|placed| placed.build.put_records(table))?;
+        }
         let (updates, builds_anew): (Vec<&PlacedBuild>, Vec<&PlacedBuild>) =
             builds.iter().partition(|p| p.source.is_some());
         let jobs: Vec<BuildJob<'_>> = builds_anew.iter().map(|p| p.build.job(p.structure, p.scratch)).collect();
         let updates_in_place: Vec<_> = updates.iter().map(|p| p.build.update(p.structure, p.scratch)).collect();
-        let mut chains = Builder::chains(&jobs)?;
+        let mut chains = Builder::chains(&jobs, table.as_mut())?;
         chains.extend(Refit::chains(&updates_in_place)?);
         let mut prologues: Vec<Vec<Step>> =
             builds.iter().flat_map(|p| p.build.prologue(self.context, p.scratch.address)).collect();
@@ -320,6 +348,9 @@ impl<'a> Device<'a> {
             p.source.map(|source| (source, p.structure.address)).filter(|(source, target)| source != target)
         };
         let copies = updates.iter().filter_map(from_another);
+        if let Some(table) = &table {
+            recorder.write_table(table);
+        }
         prologues.extend(copies.map(|(source, target)| vec![clone_step(self.context, source, target)]));
         if !prologues.is_empty() {
             recorder.chains(&prologues)?;

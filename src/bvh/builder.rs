@@ -20,7 +20,7 @@ use super::split::{self, Split};
 use super::{collapse, hploc, layout};
 use crate::gpu::arguments;
 use crate::gpu::radix_sort::{self, SortShape};
-use crate::gpu::{BuildTuning, Context, Recorder, Region, Sizes, Step};
+use crate::gpu::{ArgumentTable, BuildTuning, Context, Recorder, Region, Sizes, Step};
 use crate::{Error, Result};
 
 /// What to build, beside the primitives.
@@ -398,16 +398,17 @@ impl Builder {
     /// # Errors
     /// As [`Builder::record`], pipelines aside.
     pub fn steps(&self, input: &Input, structure: Region, scratch: Region) -> Result<Vec<Step>> {
-        let mut chains = Builder::chains(&[BuildJob { builder: self, input: *input, structure, scratch }])?;
+        let mut chains = Builder::chains(&[BuildJob { builder: self, input: *input, structure, scratch }], None)?;
         Ok(chains.pop().unwrap_or_default())
     }
 
-    /// The chains of many builds, for [`Recorder::chains`]: one per build, except that two builds by one workgroup each share a
-    /// dispatch.
+    /// The chains of many builds, for [`Recorder::chains`]: one per build, except that builds by one workgroup each share a dispatch,
+    /// two by two, or those of a kind all together by a table of their arguments, which is then written with
+    /// [`Recorder::write_table`].
     ///
     /// # Errors
-    /// As [`Builder::record`], pipelines aside.
-    pub fn chains(jobs: &[BuildJob<'_>]) -> Result<Vec<Vec<Step>>> {
+    /// As [`Builder::record`], pipelines aside; the table is too small.
+    pub fn chains(jobs: &[BuildJob<'_>], table: Option<&mut ArgumentTable>) -> Result<Vec<Vec<Step>>> {
         let (small, large): (Vec<&BuildJob<'_>>, Vec<&BuildJob<'_>>) =
             jobs.iter().partition(|job| job.builder.schedule == Schedule::Workgroup);
         let chains = large.iter().map(|job| job.builder.chain_of(job));
@@ -417,7 +418,7 @@ impl Builder {
             Ok(SmallBuild { encode: &job.builder.encode, input: &job.input, memory })
         });
         let small: Vec<SmallBuild<'_>> = small.collect::<Result<_>>()?;
-        chains.extend(lbvh_workgroup::steps(&small)?.into_iter().map(|step| vec![step]));
+        chains.extend(lbvh_workgroup::steps(&small, table)?.into_iter().map(|step| vec![step]));
         Ok(chains)
     }
 

@@ -25,6 +25,7 @@ pub mod scan;
 pub mod shaders;
 mod sizes;
 mod specialise;
+mod table;
 #[doc(hidden)]
 pub mod task_pool;
 mod tuning;
@@ -38,6 +39,7 @@ pub use recorder::{Phase, Recorder, Step, Timestamps};
 pub use region::Region;
 pub use requirements::{Optional, Requirements, requirements};
 pub use sizes::Sizes;
+pub use table::{ArgumentMemory, ArgumentTable};
 pub(crate) use tuning::MOST_LANES;
 pub use tuning::{BuildTuning, KdTuning, RefitTuning, TraceTuning, Tuning, TuningChoice};
 pub use workarounds::Workarounds;

@@ -1,7 +1,7 @@
 //! Recording: phases, dispatches and barriers into the caller's command buffer, with labels and timestamps.
 
 use super::shaders::Block;
-use super::{Context, Kernel};
+use super::{ArgumentTable, Context, Kernel};
 use crate::{Error, Result};
 use ash::vk;
 use std::ffi::CString;
@@ -282,6 +282,25 @@ impl<'a> Recorder<'a> {
             device.cmd_push_constants(self.commands, layout, vk::ShaderStageFlags::COMPUTE, 0, arguments);
         }
         Ok(Some(device))
+    }
+
+    /// Writes a table of arguments, which dispatches after it read. Dispatches before it have read what lay there.
+    pub fn write_table(&mut self, table: &ArgumentTable) {
+        let Some(device) = self.device() else { return };
+        let (shaders, transfer) = (vk::PipelineStageFlags::COMPUTE_SHADER, vk::PipelineStageFlags::TRANSFER);
+        let none = vk::DependencyFlags::empty();
+        let written = vk::MemoryBarrier::default()
+            .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+            .dst_access_mask(vk::AccessFlags::SHADER_READ | vk::AccessFlags::SHADER_WRITE);
+        let (buffer, writes) = table.writes();
+        // SAFETY: `new`'s promise; the table's is that the buffer has its bytes.
+        unsafe {
+            device.cmd_pipeline_barrier(self.commands, shaders, transfer, none, &[], &[], &[]);
+            for (at, bytes) in writes {
+                device.cmd_update_buffer(self.commands, buffer, at, bytes);
+            }
+            device.cmd_pipeline_barrier(self.commands, transfer, shaders, none, &[written], &[], &[]);
+        }
     }
 
     /// Makes what dispatches before have written visible to dispatches after.

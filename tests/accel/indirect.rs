@@ -12,6 +12,7 @@ use hedgerow::accel::{Instance, REBRAID};
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::{Bvh2, Triangle};
+use hedgerow::gpu::ArgumentMemory;
 use hedgerow_lab::random::SplitMix64;
 use vk::GeometryFlagsKHR as GeometryFlags;
 
@@ -179,6 +180,12 @@ fn several_geometries_keep_their_indices_when_some_have_fewer_primitives_than_pl
 #[test]
 fn instances_boxes_and_triangles_are_built_by_one_call() {
     let ours = Ours::on(device());
+    // The geometries' records in memory for arguments.
+    let mut in_memory = Ours::on(device());
+    let arguments = device().buffer("arguments", 1 << 12).expect("memory");
+    let memory = ArgumentMemory { buffer: arguments.raw(), offset: 0, bytes: arguments.bytes() };
+    // SAFETY: buffers of the tests' device have the usage.
+    in_memory.0 = unsafe { ours.0.with_arguments_in(memory) };
     let parts = vec![
         Part::Triangles(vec![(soup(90, 0.3, 5), GeometryFlags::OPAQUE), (soup(60, 0.3, 6), GeometryFlags::empty())]),
         Part::Boxes(vec![(boxes(40, 0.2, 7), GeometryFlags::empty()), (boxes(9, 0.3, 8), GeometryFlags::OPAQUE)]),
@@ -215,7 +222,9 @@ fn instances_boxes_and_triangles_are_built_by_one_call() {
                 });
             }
         }
-        let hits = assert_as_told(&format!("{count} from {skipped} on"), &ours, &builds, &rays(1.0));
-        assert!(count < 17 || hits > 200, "{count} from {skipped} on: {hits} hits are no test");
+        for ours in [&ours, &in_memory] {
+            let hits = assert_as_told(&format!("{count} from {skipped} on"), ours, &builds, &rays(1.0));
+            assert!(count < 17 || hits > 200, "{count} from {skipped} on: {hits} hits are no test");
+        }
     }
 }

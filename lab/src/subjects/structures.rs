@@ -49,6 +49,14 @@ impl<'a> Structures<'a> {
         Structures { device, maker: Functions::Ours(ours) }
     }
 
+    /// The same, with arguments of builds in a part of `memory`, if they are ours.
+    pub(crate) fn with_arguments_in(&self, memory: &Buffer<'_>) -> Option<Structures<'a>> {
+        let Functions::Ours(ours) = &self.maker else { return None };
+        let part = hedgerow::gpu::ArgumentMemory { buffer: memory.raw(), offset: 0, bytes: memory.bytes() };
+        // SAFETY: buffers of `Device` have the usage; who keeps the structures keeps the memory.
+        Some(Structures::of(self.device, unsafe { ours.with_arguments_in(part) }))
+    }
+
     /// Those of the driver, where it has any and the device was opened with them.
     pub fn drivers(device: &'a Device) -> Option<Structures<'a>> {
         device.driver_tracing()?;

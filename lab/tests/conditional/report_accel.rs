@@ -32,6 +32,7 @@ fn setting() -> AccelEntry {
 fn batches() -> impl Iterator<Item = AccelEntry> {
     let ways = [
         (Some(Implementation::Ours), Submission::OneCall, 1.0),
+        (Some(Implementation::Ours), Submission::OneTable, 0.9),
         (Some(Implementation::Ours), Submission::OneSubmit, 12.0),
         (Some(Implementation::Ours), Submission::SubmitEach, 14.0),
         (Some(Implementation::Driver), Submission::OneCall, 0.8),

@@ -56,7 +56,13 @@ fn a_run_leaves_records_of_every_experiment_and_a_page_of_them() {
             _ => {}
         }
     }
-    let ways = [Submission::OneCall, Submission::OneSubmit, Submission::SubmitEach, Submission::EmptySubmits];
+    let ways = [
+        Submission::OneCall,
+        Submission::OneTable,
+        Submission::OneSubmit,
+        Submission::SubmitEach,
+        Submission::EmptySubmits,
+    ];
     assert_eq!(batches, [2, 32].map(|count| ways.map(|way| (count, way))).concat());
     assert_eq!((top_levels, frames, rebraids, any_hits), (vec![100, 200], vec![0, 2, 4], 1, 1));
 

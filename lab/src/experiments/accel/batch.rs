@@ -1,4 +1,4 @@
-//! Many small structures: in one call, in a call each within one submit, and in a submit each.
+//! Many small structures: in one call, with arguments in push constants or in memory, in a call each within one submit, and in a submit each.
 
 use super::points::{self, AccelEntry, Submission};
 use super::{AccelSetup, WARM_UPS};
@@ -8,6 +8,7 @@ use crate::measure::{Sink, Spread, in_turn, ratios};
 use crate::scene::{self, LoadOptions};
 use crate::subjects::structures::{BuildInfo, Geometry, Range, Structures, triangles_of};
 use ash::vk;
+use hedgerow::accel;
 use std::time::Instant;
 
 /// Structures of 12 to 478 triangles, out of one pair of buffers.
@@ -52,9 +53,11 @@ impl<'a> Workload<'a> {
 /// Room for all structures of a [`Workload`], and the builds that fill it.
 pub struct Batch<'w, 'a> {
     structures: Structures<'a>,
+    /// The same with arguments in memory, where there is that.
+    by_table: Option<Structures<'a>>,
     infos: Vec<BuildInfo<'w>>,
     ranges: Vec<&'w [Range]>,
-    _memory: [Buffer<'a>; 2],
+    _memory: [Buffer<'a>; 3],
 }
 
 impl<'w, 'a> Batch<'w, 'a> {
@@ -81,8 +84,11 @@ impl<'w, 'a> Batch<'w, 'a> {
         let memory = structures.device.buffer("structures", end[0])?;
         let scratch = structures.device.buffer("scratch", end[1] + 256)?;
         let scratch_begin = scratch.address().next_multiple_of(256);
-        let mut batch =
-            Batch { structures, infos: Vec::with_capacity(ranges.len()), ranges, _memory: [memory, scratch] };
+        let bytes = accel::Device::argument_bytes(ranges.len() as u64, ranges.len() as u64);
+        let arguments = structures.device.buffer("arguments", bytes)?;
+        let by_table = structures.with_arguments_in(&arguments);
+        let infos = Vec::with_capacity(ranges.len());
+        let mut batch = Batch { structures, by_table, infos, ranges, _memory: [memory, scratch, arguments] };
         for (i, (begin, bytes)) in places.into_iter().enumerate() {
             let create = vk::AccelerationStructureCreateInfoKHR::default()
                 .buffer(batch._memory[0].raw())
@@ -107,6 +113,10 @@ impl<'w, 'a> Batch<'w, 'a> {
         let start = Instant::now();
         match way {
             Submission::OneCall => device.run(None, |recorder| self.structures.build(recorder, infos, ranges))?,
+            Submission::OneTable => {
+                let structures = self.by_table.as_ref().unwrap_or(&self.structures);
+                device.run(None, |recorder| structures.build(recorder, infos, ranges))?
+            }
             Submission::OneSubmit => device.run(None, |recorder| {
                 each().try_for_each(|(infos, ranges)| self.structures.build(recorder, infos, ranges))
             })?,
@@ -138,8 +148,10 @@ pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut Sink<'_, AccelEntr
         makers.iter().map(|maker| Batch::new(maker.clone(), &workload)).collect::<Result<_>>()?;
     for count in counts(most) {
         (stage.say)(&format!("batch of {count}"));
-        let ways = |batch| [Submission::OneCall, Submission::OneSubmit, Submission::SubmitEach].map(|way| (batch, way));
-        let mut subjects: Vec<(&Batch<'_, '_>, Submission)> = batches.iter().flat_map(ways).collect();
+        let ways = [Submission::OneCall, Submission::OneTable, Submission::OneSubmit, Submission::SubmitEach];
+        let all = batches.iter().flat_map(|batch| ways.map(|way| (batch, way)));
+        let can = |&(batch, way): &(&Batch<'_, '_>, _)| way != Submission::OneTable || batch.by_table.is_some();
+        let mut subjects: Vec<(&Batch<'_, '_>, Submission)> = all.filter(can).collect();
         subjects.push((&batches[0], Submission::EmptySubmits));
         let samples = in_turn(&mut subjects, WARM_UPS, stage.runs, |(batch, way)| batch.build(*way, count as usize));
         let samples: Vec<Vec<f64>> = samples.into_iter().collect::<Result<_>>()?;

@@ -45,6 +45,8 @@ named!(Implementation, "maker": Ours = "hedgerow", Driver = "driver");
 pub enum Submission {
     /// All in one call.
     OneCall,
+    /// The same with the arguments in memory: ours only.
+    OneTable,
     /// A call each with a barrier behind it, all in one command buffer.
     OneSubmit,
     /// A call each, submitted and waited for by itself.
@@ -55,6 +57,7 @@ pub enum Submission {
 
 named!(Submission, "submission":
     OneCall = "one call",
+    OneTable = "one call, arguments in memory",
     OneSubmit = "a call each, one submit",
     SubmitEach = "a call and submit each",
     EmptySubmits = "as many empty submits",

@@ -10,8 +10,9 @@ use maud::{Markup, html};
 
 /// Builders and their ways, in the order of charts and tables, with its colour: ours begin with the first and the driver's with
 /// the second, as on the whole page.
-const SUBJECTS: [Subject; 7] = [
+const SUBJECTS: [Subject; 8] = [
     (Some(Implementation::Ours), Submission::OneCall, SERIES[0]),
+    (Some(Implementation::Ours), Submission::OneTable, SERIES[4]),
     (Some(Implementation::Ours), Submission::OneSubmit, SERIES[2]),
     (Some(Implementation::Ours), Submission::SubmitEach, SERIES[6]),
     (Some(Implementation::Driver), Submission::OneCall, SERIES[1]),
@@ -86,7 +87,7 @@ pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
     let body = html! {
         p {
             "Engines build hundreds of small structures a frame. Here " (grouped(most.into())) " of them, "
-            (grouped(triangles)) " triangles together, are built in one call; in a call each with a barrier behind it, in one "
+            (grouped(triangles)) " triangles together, are built in one call, ours also with the arguments in memory in place of push constants; in a call each with a barrier behind it, in one "
             "command buffer; and in a call each that is submitted and waited for. By the wall's clock, recording included."
         }
         p { (reading(points, most)) }
@@ -117,6 +118,9 @@ fn reading(points: &[Batch], most: u32) -> String {
     let of = |maker, way| find(points, most, Some(maker), way);
     let Some(ours) = of(Implementation::Ours, Submission::OneCall) else { return String::new() };
     let mut text = format!("One call takes {}", duration(ours.wall_ms.median));
+    if let Some(table) = of(Implementation::Ours, Submission::OneTable) {
+        text += &format!(", with the arguments in memory {} of that", three_digits(table.over_our_call.median));
+    }
     let singly = [Submission::OneSubmit, Submission::SubmitEach].map(|way| of(Implementation::Ours, way));
     if let [Some(one_submit), Some(submit_each)] = singly {
         let [in_one, each] = [one_submit, submit_each].map(|point| three_digits(point.over_our_call.median));

@@ -1,0 +1,80 @@
+//! Arguments of many dispatches in one table: memory of the caller's in place of push constants.
+
+use super::Context;
+use crate::{Error, Result};
+use ash::vk;
+use bytemuck::Pod;
+
+/// Where a table of arguments may lie: a part of a buffer with `TRANSFER_DST`, `STORAGE_BUFFER` and `SHADER_DEVICE_ADDRESS` usage.
+///
+/// It is like scratch memory: written and read while the command buffer runs, and nobody else's meanwhile. The arguments themselves are
+/// in the command buffer (`vkCmdUpdateBuffer`), which may be submitted again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ArgumentMemory {
+    /// The buffer.
+    pub buffer: vk::Buffer,
+    /// Where in the buffer it begins. The address there is a multiple of 16.
+    pub offset: u64,
+    /// Length in bytes.
+    pub bytes: u64,
+}
+
+/// Arguments that dispatches read from memory, gathered while these are planned. [`Recorder::write_table`](super::Recorder::write_table)
+/// writes them before.
+#[derive(Debug)]
+pub struct ArgumentTable {
+    memory: ArgumentMemory,
+    address: u64,
+    bytes: Vec<u8>,
+}
+
+impl ArgumentTable {
+    /// Parts of a table begin at multiples of this.
+    pub(crate) const ALIGNMENT: u64 = 16;
+
+    /// An empty table in this memory.
+    ///
+    /// # Errors
+    /// The memory begins at an address that is not a multiple of 16.
+    ///
+    /// # Safety
+    /// The buffer is live, of the context's device, and has the usage and as many bytes as [`ArgumentMemory`] says.
+    pub unsafe fn new(context: &Context, memory: ArgumentMemory) -> Result<ArgumentTable> {
+        let info = vk::BufferDeviceAddressInfo::default().buffer(memory.buffer);
+        // SAFETY: the caller's promise.
+        let address = unsafe { context.ash_device().get_buffer_device_address(&info) } + memory.offset;
+        if !address.is_multiple_of(Self::ALIGNMENT) {
+            return Err(Error::Argument(format!(
+                "memory for arguments at {address:#x}; its address is a multiple of {}",
+                Self::ALIGNMENT
+            )));
+        }
+        Ok(ArgumentTable { memory, address, bytes: Vec::new() })
+    }
+
+    /// Puts `records` behind what is there. Returns the address where they will lie.
+    ///
+    /// # Errors
+    /// The memory is too small.
+    pub(crate) fn put<T: Pod>(&mut self, records: &[T]) -> Result<u64> {
+        let at = self.bytes.len();
+        self.bytes.extend_from_slice(bytemuck::cast_slice(records));
+        self.bytes.resize(self.bytes.len().next_multiple_of(Self::ALIGNMENT as usize), 0);
+        let needs = self.bytes.len() as u64;
+        if needs > self.memory.bytes {
+            return Err(Error::Argument(format!(
+                "memory for arguments of {} bytes, at least {needs} are needed; give more",
+                self.memory.bytes
+            )));
+        }
+        Ok(self.address + at as u64)
+    }
+
+    /// The buffer, and for each write where it begins and what it writes.
+    pub(super) fn writes(&self) -> (vk::Buffer, impl Iterator<Item = (u64, &[u8])>) {
+        /// The most that `vkCmdUpdateBuffer` takes.
+        const AT_ONCE: usize = 65_536;
+        let begin = move |i: usize| self.memory.offset + (i * AT_ONCE) as u64;
+        (self.memory.buffer, self.bytes.chunks(AT_ONCE).enumerate().map(move |(i, bytes)| (begin(i), bytes)))
+    }
+}
