@@ -11,6 +11,7 @@ use hedgerow_lab::random::SplitMix64;
 use hedgerow_lab::scene::{Instances, LoadOptions, load_instances};
 use hedgerow_lab::subjects::device_rays::RayBuffers;
 use hedgerow_lab::subjects::levels::Levels;
+use hedgerow_lab::subjects::queries::Queries;
 use hedgerow_lab::subjects::structures::Structures;
 
 type Flags = vk::BuildAccelerationStructureFlagsKHR;
@@ -80,7 +81,7 @@ fn hits(device: &Device, options: AccelOptions, shader: AccelOptions, scene: &In
     levels.build().expect("it builds");
     let mut levels = levels.traced_as(Structures::ours(device, shader));
     let buffers = RayBuffers::new(device, rays).expect("memory");
-    levels.trace(&buffers, Query::ClosestHit).expect("it traces");
+    levels.trace(&buffers, Query::ClosestHit, Queries::OneEach).expect("it traces");
     buffers.read_hits()
 }
 

@@ -245,7 +245,7 @@ fn what_is_out_of_room_is_a_leaf_and_the_report_says_what_would_suffice() {
         KdEstimate { subtree_references: 1.0, ..plenty },
         KdEstimate { subtrees: 0.0, ..plenty },
     ];
-    let of_levels = short.map(|estimate| (None, estimate));
+    let of_levels = short.map(|estimate| (Some(KdSchedule::Persistent), estimate));
     let across = [
         KdEstimate { arena: 1.0, ..plenty },
         KdEstimate { level_nodes: 0.0, subtree_nodes: 0.1, ..plenty },
@@ -322,7 +322,7 @@ fn whatever_is_short_by_little_gives_a_valid_tree() {
         let expected = on_host(&mesh, &KdOptions::DEFAULT);
         // Across levels there are other things.
         let schedule =
-            (KdOptions::DEFAULT.schedule_on(device()) == KdSchedule::AcrossLevels).then_some(KdSchedule::Chain);
+            (KdOptions::DEFAULT.schedule_on(device()) == KdSchedule::AcrossLevels).then_some(KdSchedule::Persistent);
         let with = KdOptions { schedule, ..KdOptions::DEFAULT };
         let enough = built(&mesh, &KdOptions { estimate: Some(PLENTY), ..with }).1.estimate(mesh.2.len() as u32);
         let fields: [fn(&mut KdEstimate) -> &mut f32; 6] = [

@@ -1,6 +1,7 @@
 // Everything that a ray query reports, for each ray: of the driver's queries or, with WITH_HEDGEROW, of ours.
 //
-// A ray says how its candidates are decided on; the first eight are written down as they come.
+// A ray says how its candidates are decided on; the first eight are written down as they come. With IN_TURN, which ours can, an
+// invocation has five rays.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_scalar_block_layout : require
@@ -61,38 +62,40 @@ layout(buffer_reference, scalar) readonly buffer Rays { ProbeRay ray[]; };
 layout(buffer_reference, scalar) writeonly buffer Reports { Report report[]; };
 layout(push_constant, scalar) uniform ProbeArguments { uvec2 structure; Rays rays; Reports reports; uint count; };
 
-void main() {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= count) return;
-    ProbeRay ray = rays.ray[i];
-    Report r;
+rayQueryEXT query;
+ProbeRay ray;
+Report r;
+
+void begin(uint i) {
+    ray = rays.ray[i];
     for (uint k = 0; k < CANDIDATES; ++k) r.candidates[k] = uvec4(0);
     r.candidate_count = 0;
     r.opaque_boxes = 0;
-
-    rayQueryEXT query;
     rayQueryInitializeEXT(query, accelerationStructureEXT(structure), ray.flags, ray.mask, ray.origin, ray.t_min, ray.direction, ray.t_max);
-    for (uint round = 0; round < 10000 && rayQueryProceedEXT(query); ++round) {
-        uint type = rayQueryGetIntersectionTypeEXT(query, false);
-        uint primitive = rayQueryGetIntersectionPrimitiveIndexEXT(query, false);
-        if (r.candidate_count < CANDIDATES) {
-            r.candidates[r.candidate_count] = uvec4(type, rayQueryGetIntersectionInstanceIdEXT(query, false),
-                                                    rayQueryGetIntersectionGeometryIndexEXT(query, false), primitive);
-        }
-        r.candidate_count += 1;
-        bool confirms = ray.decision == CONFIRM || ray.decision == CONFIRM_ODD && (primitive & 1) != 0;
-        if (type == gl_RayQueryCandidateIntersectionTriangleEXT) {
-            if (confirms) rayQueryConfirmIntersectionEXT(query);
-        } else {
-            if (rayQueryGetIntersectionCandidateAABBOpaqueEXT(query)) r.opaque_boxes += 1;
-            // The extension asks that t is no farther than what is committed.
-            bool is_nearer = rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionNoneEXT
-                                 || ray.generated_t < rayQueryGetIntersectionTEXT(query, true);
-            if (confirms && is_nearer) rayQueryGenerateIntersectionEXT(query, ray.generated_t);
-        }
-        if (ray.decision == TERMINATE) rayQueryTerminateEXT(query);
-    }
+}
 
+void decide() {
+    uint type = rayQueryGetIntersectionTypeEXT(query, false);
+    uint primitive = rayQueryGetIntersectionPrimitiveIndexEXT(query, false);
+    if (r.candidate_count < CANDIDATES) {
+        r.candidates[r.candidate_count] = uvec4(type, rayQueryGetIntersectionInstanceIdEXT(query, false),
+                                                rayQueryGetIntersectionGeometryIndexEXT(query, false), primitive);
+    }
+    r.candidate_count += 1;
+    bool confirms = ray.decision == CONFIRM || ray.decision == CONFIRM_ODD && (primitive & 1) != 0;
+    if (type == gl_RayQueryCandidateIntersectionTriangleEXT) {
+        if (confirms) rayQueryConfirmIntersectionEXT(query);
+    } else {
+        if (rayQueryGetIntersectionCandidateAABBOpaqueEXT(query)) r.opaque_boxes += 1;
+        // The extension asks that t is no farther than what is committed.
+        bool is_nearer = rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionNoneEXT
+                             || ray.generated_t < rayQueryGetIntersectionTEXT(query, true);
+        if (confirms && is_nearer) rayQueryGenerateIntersectionEXT(query, ray.generated_t);
+    }
+    if (ray.decision == TERMINATE) rayQueryTerminateEXT(query);
+}
+
+void report(uint i) {
     r.t_min = rayQueryGetRayTMinEXT(query);
     r.flags = rayQueryGetRayFlagsEXT(query);
     r.origin = rayQueryGetWorldRayOriginEXT(query);
@@ -117,3 +120,33 @@ void main() {
     r.committed = m;
     reports.report[i] = r;
 }
+
+#ifdef IN_TURN
+#include "trace/query_turns.glsl"
+const uint RAYS_EACH = 5;
+
+void main() {
+    uint begins = gl_WorkGroupID.x * gl_WorkGroupSize.x * RAYS_EACH;
+    uint next = begins + gl_LocalInvocationIndex;
+    uint end = min(count, begins + gl_WorkGroupSize.x * RAYS_EACH);
+    uint i = next;
+    HedgerowTurns turns = hedgerowTurns();
+    while (hedgerowTakeTurn(turns, next < end)) {
+        if (turns.takes) {
+            i = next;
+            next += gl_WorkGroupSize.x;
+            begin(i);
+        }
+        while (hedgerowRayQueryProceedInTurn(query, turns)) decide();
+        if (hedgerowRayQueryEndsInTurn(query, turns)) report(i);
+    }
+}
+#else
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= count) return;
+    begin(i);
+    for (uint round = 0; round < 10000 && rayQueryProceedEXT(query); ++round) decide();
+    report(i);
+}
+#endif

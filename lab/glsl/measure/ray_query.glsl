@@ -1,22 +1,27 @@
-// Traces rays by queries: the same source for the driver's (measure/ray_query.comp) and ours (measure/query.comp).
+// Traces rays by queries: the same source for the driver's (measure/ray_query.comp) and ours (measure/query.comp); and, with IN_TURN,
+// ours with many rays for each invocation.
 //
 // reads   rays[first..count], the structure
 // writes  hits[first..count]; works[first..count] where work is counted
 // needs   a barrier (build -> read) before and one after; any subgroup size
 #include "measure/rays.glsl"
 
-void main() {
-    uint i = first + gl_GlobalInvocationID.x;
-    if (i >= count) return;
+// Every triangle is opaque, so that nothing is left to decide between candidates.
+const uint FLAGS = gl_RayFlagsOpaqueEXT | (ANY_HIT ? gl_RayFlagsTerminateOnFirstHitEXT : 0u);
+
+#ifdef HEDGEROW_TRACE_QUERY
+#define QUERY inout rayQueryEXT query
+#else
+#define QUERY rayQueryEXT query
+#endif
+
+void begin(QUERY, uint i) {
     GivenRay ray = rays.ray[i];
-
-    rayQueryEXT query;
-    const uint flags = gl_RayFlagsOpaqueEXT | (ANY_HIT ? gl_RayFlagsTerminateOnFirstHitEXT : 0u);
-    rayQueryInitializeEXT(query, accelerationStructureEXT(structure), flags, 0xFF, ray.origin, ray.t_min, ray.direction,
+    rayQueryInitializeEXT(query, accelerationStructureEXT(structure), FLAGS, 0xFF, ray.origin, ray.t_min, ray.direction,
                           ray.t_max);
-    // Every triangle is opaque, so that nothing is left to decide between candidates.
-    while (rayQueryProceedEXT(query)) {}
+}
 
+void report(QUERY, uint i) {
     Hit hit = no_hit();
     if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionTriangleEXT) {
         vec2 uv = rayQueryGetIntersectionBarycentricsEXT(query, true);
@@ -32,3 +37,35 @@ void main() {
 #endif
     hits.hit[i] = hit;
 }
+
+#ifdef IN_TURN
+#include "trace/query_turns.glsl"
+layout(constant_id = 3) const uint RAYS_EACH = 1;
+
+void main() {
+    uint group_rays = gl_WorkGroupSize.x * RAYS_EACH;
+    uint next = first + gl_WorkGroupID.x * group_rays + gl_LocalInvocationIndex;
+    uint end = min(count, first + (gl_WorkGroupID.x + 1u) * group_rays);
+    uint i = next;
+    rayQueryEXT query;
+    HedgerowTurns turns = hedgerowTurns();
+    while (hedgerowTakeTurn(turns, next < end)) {
+        if (turns.takes) {
+            i = next;
+            next += gl_WorkGroupSize.x;
+            begin(query, i);
+        }
+        while (hedgerowRayQueryProceedInTurn(query, turns)) {}
+        if (hedgerowRayQueryEndsInTurn(query, turns)) report(query, i);
+    }
+}
+#else
+void main() {
+    uint i = first + gl_GlobalInvocationID.x;
+    if (i >= count) return;
+    rayQueryEXT query;
+    begin(query, i);
+    while (rayQueryProceedEXT(query)) {}
+    report(query, i);
+}
+#endif

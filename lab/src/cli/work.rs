@@ -56,7 +56,8 @@ fn check_driver(device: &Device, builders: &[Spec]) -> anyhow::Result<()> {
             found.driver
         );
     }
-    let persistent = builders.iter().find(|spec| spec.option("schedule") == Some("persistent"));
+    let is_pool = |spec: &&Spec| matches!(spec.option("schedule"), Some("persistent" | "across-levels"));
+    let persistent = builders.iter().find(is_pool);
     if let (false, Some(spec)) = (findings.task_pool, persistent) {
         bail!("{spec}: on {} workgroups that wait for each other do not finish; take schedule=chain", found.name);
     }

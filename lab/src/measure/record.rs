@@ -193,11 +193,16 @@ impl Record {
         self.triangles as f64 / (self.build.median_ms * 1e3)
     }
 
+    /// Seconds that all rays of all kinds take. `None` without tracing.
+    pub fn rays_s(&self) -> Option<f64> {
+        let time: f64 = self.trace.iter().map(|t| t.count as f64 / (t.mrays_s * 1e6)).sum();
+        (!self.trace.is_empty() && time.is_finite()).then_some(time)
+    }
+
     /// Millions of rays traced a second over all kinds together: all rays over the time of all. `None` without tracing.
     pub fn mrays_s(&self) -> Option<f64> {
         let rays: f64 = self.trace.iter().map(|t| t.count as f64).sum();
-        let time: f64 = self.trace.iter().map(|t| t.count as f64 / t.mrays_s).sum();
-        (rays > 0.0 && time.is_finite()).then(|| rays / time)
+        self.rays_s().filter(|_| rays > 0.0).map(|time| rays * 1e-6 / time)
     }
 
     /// Tracing of one kind of ray, where it was measured.

@@ -3,7 +3,7 @@
 use super::any_hit::{AnyHit, ChildrenBy, TaughtOrder};
 use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::device_rays::DeviceRays;
-use super::queries::{self, QueryWork};
+use super::queries::{self, Queries, QueryWork};
 use super::taught_rounds::TaughtRounds;
 use super::wide::{WidePlan, WideTree};
 use super::{BuildRun, Subject, joined_choices};
@@ -30,7 +30,7 @@ pub enum Walk {
     /// By the tracer of binary trees.
     Tracer,
     /// By queries in a shader.
-    Query,
+    Query(Queries),
     /// Through a wide tree that is made of the binary one.
     Wide(WidePlan),
 }
@@ -38,7 +38,7 @@ pub enum Walk {
 /// How rays go through a binary tree.
 #[derive(Debug, Clone, Copy)]
 struct BinaryWalk {
-    by_query: bool,
+    by_query: Option<Queries>,
     /// Whether the children have an order.
     is_ordered: bool,
 }
@@ -119,7 +119,11 @@ impl<'a> DeviceBvh<'a> {
         let memory = BuildMemory::new(device, sizes)?;
         let wide = match walk {
             Walk::Wide(plan) => Some(WideTree::new(device, plan, bvh.record_count())?),
-            Walk::Tracer | Walk::Query => None,
+            Walk::Tracer | Walk::Query(_) => None,
+        };
+        let by_query = match walk {
+            Walk::Query(queries) => Some(*queries),
+            Walk::Tracer | Walk::Wide(_) => None,
         };
         let mut warming = Recorder::warming(device);
         record_build(&mut warming, &bvh, (&taught, wide.as_ref()), &mesh.input, &memory)?;
@@ -128,7 +132,7 @@ impl<'a> DeviceBvh<'a> {
             builder: builder.to_owned(),
             choice: joined_choices([choice_of(options, &bvh), any_hit.choice.clone()]),
             wide,
-            binary: BinaryWalk { by_query: matches!(walk, Walk::Query), is_ordered: any_hit.order.is_some() },
+            binary: BinaryWalk { by_query, is_ordered: any_hit.order.is_some() },
             taught,
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,
@@ -173,10 +177,10 @@ fn record_trace(
     query: Query,
     buffers: &TraceBuffers,
 ) -> hedgerow::Result<()> {
-    match wide_tree {
-        None if binary.by_query => queries::record(recorder, query, buffers, false),
-        None => record_binary(recorder, binary.is_ordered, query, buffers),
-        Some(tree) => tree.record_trace(recorder, query, buffers),
+    match (wide_tree, binary.by_query) {
+        (None, Some(queries)) => queries::record(recorder, query, buffers, false, queries),
+        (None, None) => record_binary(recorder, binary.is_ordered, query, buffers),
+        (Some(tree), _) => tree.record_trace(recorder, query, buffers),
     }
 }
 
@@ -286,7 +290,7 @@ impl Subject for DeviceBvh<'_> {
         let (wide, binary) = (self.wide.as_ref(), self.binary);
         let record =
             |recorder: &mut Recorder<'_>, buffers: &TraceBuffers| record_trace(recorder, wide, binary, query, buffers);
-        if !binary.by_query {
+        if binary.by_query.is_none() {
             return self.rays.work(self.traced(), record);
         }
         let of_ray = |[_, _, steps, tests]: QueryWork| Work { steps, tests, leaves: 0 };

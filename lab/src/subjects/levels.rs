@@ -3,6 +3,7 @@
 
 use super::device_rays::RayBuffers;
 use super::level::Level;
+use super::queries::Queries;
 use super::structures::Structures;
 use crate::Result;
 use crate::scene::Instances;
@@ -101,8 +102,8 @@ impl<'a> Levels<'a> {
     ///
     /// # Errors
     /// The kernel cannot be made or run.
-    pub fn trace(&mut self, rays: &RayBuffers<'_>, query: trace::Query) -> Result<f64> {
-        self.structures.trace(&mut self.timestamps, self.top.structure(), rays, query)
+    pub fn trace(&mut self, rays: &RayBuffers<'_>, query: trace::Query, queries: Queries) -> Result<f64> {
+        self.structures.trace(&mut self.timestamps, self.top.structure(), rays, query, queries)
     }
 
     /// What each of the rays meets on its way, of our structures: nodes of the top level, instances, nodes below, triangles.

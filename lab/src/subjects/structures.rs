@@ -1,7 +1,7 @@
 //! Acceleration structures by the calls of `VK_KHR_acceleration_structure`: ours or the driver's, and nothing else differs.
 
 use super::device_rays::{RayBuffers, timed_run};
-use super::queries::{self, QueryWork};
+use super::queries::{self, Queries, QueryWork};
 use crate::device::{Buffer, Device, DriverRays, DriverTracing};
 use crate::experiments::accel::points;
 use crate::scene::Mesh;
@@ -177,20 +177,23 @@ impl<'a> Structures<'a> {
         top: Structure,
         buffers: &RayBuffers<'_>,
         query: Query,
+        queries: Queries,
     ) -> Result<f64> {
         let buffers = buffers.buffers(self.address(top), None);
-        timed_run(self.device, timestamps, "trace", |recorder| self.record_trace(recorder, &buffers, query))
+        timed_run(self.device, timestamps, "trace", |recorder| self.record_trace(recorder, &buffers, query, queries))
     }
 
-    /// Records the tracing of rays through a top level; their work, where there is room for it, is counted for ours alone.
+    /// Records the tracing of rays through a top level; their work, where there is room for it, is counted for ours alone, and
+    /// theirs are one each in any case.
     pub(crate) fn record_trace(
         &self,
         recorder: &mut Recorder<'_>,
         buffers: &TraceBuffers,
         query: Query,
+        queries: Queries,
     ) -> hedgerow::Result<()> {
         match self.maker {
-            Functions::Ours(ref ours) => queries::record(recorder, query, buffers, ours.options().wide),
+            Functions::Ours(ref ours) => queries::record(recorder, query, buffers, ours.options().wide, queries),
             Functions::Driver(_) => {
                 let any_hit = query == Query::AnyHit;
                 let &TraceBuffers { structure, rays, hits, count, .. } = buffers;
@@ -207,7 +210,7 @@ impl<'a> Structures<'a> {
         }
         let works = self.device.buffer("work", 16 * u64::from(buffers.count))?;
         let traced = buffers.buffers(self.address(top), Some(works.region()));
-        self.device.run(None, |recorder| self.record_trace(recorder, &traced, query))?;
+        self.device.run(None, |recorder| self.record_trace(recorder, &traced, query, Queries::OneEach))?;
         Ok(works.read(buffers.count as usize))
     }
 }

@@ -16,6 +16,7 @@ use hedgerow_lab::subjects::builders::Spec;
 use hedgerow_lab::subjects::device_rays::RayBuffers;
 use hedgerow_lab::subjects::levels::Levels;
 use hedgerow_lab::subjects::peers::driver::{Driver, DriverPreference};
+use hedgerow_lab::subjects::queries::Queries;
 use hedgerow_lab::subjects::structures::Structures;
 use std::sync::OnceLock;
 
@@ -228,7 +229,7 @@ fn two_levels_are_traced_by_a_pipeline_as_by_queries() {
         let mut levels = Levels::new(structures, &city, flags).expect("memory");
         levels.build().expect("it builds");
         let buffers = RayBuffers::new(device, &rays).expect("memory");
-        levels.trace(&buffers, Query::ClosestHit).expect("it traces");
+        levels.trace(&buffers, Query::ClosestHit, Queries::OneEach).expect("it traces");
         buffers.read_hits()
     });
     let met = hits[0].iter().filter(|hit| hit.is_some()).count();

@@ -78,6 +78,7 @@ fn rebraid(scene: &str, overlaps: f64, gain: f64) -> AccelEntry {
         different: 0,
         off_ms: spread(10.0 * gain),
         on_ms: spread(10.0),
+        in_turn_ms: spread(8.0),
         driver_ms: Some(spread(12.0)),
         gain: spread(gain),
         off_work: work(30.0),

@@ -21,6 +21,7 @@ use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Instances, Scene, SceneInstance};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::levels::Levels;
+use crate::subjects::queries::Queries;
 use crate::subjects::structures::Structures;
 use crate::{Error, Result};
 use ash::vk;
@@ -99,7 +100,7 @@ impl<'a> AccelSetup<'a> {
         for &kind in self.kinds {
             let rays = kinds::generate(kind, scene, &self.rays, &mut |rays| {
                 let buffers = RayBuffers::new(self.device, rays)?;
-                levels.trace(&buffers, Query::ClosestHit)?;
+                levels.trace(&buffers, Query::ClosestHit, Queries::OneEach)?;
                 Ok(buffers.read_hits())
             })?;
             if !rays.is_empty() {

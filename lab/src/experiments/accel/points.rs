@@ -201,12 +201,14 @@ pub struct FlaggedRays {
     pub count: u64,
     /// How many hit.
     pub hits: u64,
-    /// Of how many the two of ours say different hits; there should be none.
+    /// Of how many those of ours say different hits; there should be none.
     pub different: u64,
     /// Without the flag, by the device's timestamps.
     pub off_ms: Spread,
     /// With it.
     pub on_ms: Spread,
+    /// With it, many rays for each invocation in turn (`glsl/trace/query_turns.glsl`).
+    pub in_turn_ms: Spread,
     /// Through the driver's.
     pub driver_ms: Option<Spread>,
     /// Time without over time with it, run by run: above 1, rays are faster with the flag.

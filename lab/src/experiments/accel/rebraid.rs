@@ -10,6 +10,7 @@ use crate::rays::kinds::RayKind;
 use crate::scene::{Instances, Scene, SceneInstance};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::levels::Levels;
+use crate::subjects::queries::Queries;
 use crate::subjects::structures::Structures;
 use ash::vk;
 use hedgerow::accel::AccelOptions;
@@ -85,22 +86,28 @@ fn traced(
     rays: &RayBuffers<'_>,
 ) -> Result<FlaggedRays> {
     let query = kind.query();
-    let times = in_turn(levels, WARM_UPS, stage.runs, |levels| levels.trace(rays, query));
-    let times: Vec<Vec<f64>> = times.into_iter().collect::<Result<_>>()?;
+    // One ray for each invocation through all of them, and many through the second.
+    let mut ways: Vec<(usize, Queries)> = (0..levels.len()).map(|of| (of, Queries::OneEach)).collect();
+    ways.push((ON, Queries::InTurn));
+    let times = in_turn(&mut ways, WARM_UPS, stage.runs, |&mut (of, way)| levels[of].trace(rays, query, way));
+    let mut times: Vec<Vec<f64>> = times.into_iter().collect::<Result<_>>()?;
+    let in_turn_ms = Spread::of_some(&times.pop().unwrap_or_default())?;
     let mut found = Vec::new();
-    let mut work = Vec::new();
-    for levels in &mut levels[..=ON] {
-        levels.trace(rays, query)?;
+    for (of, way) in [(OFF, Queries::OneEach), (ON, Queries::OneEach), (ON, Queries::InTurn)] {
+        levels[of].trace(rays, query, way)?;
         found.push(rays.read_hits());
-        work.push(MeanWork::mean(&levels.work(rays, query)?));
     }
+    let work: Vec<MeanWork> =
+        levels[..=ON].iter_mut().map(|levels| Ok(MeanWork::mean(&levels.work(rays, query)?))).collect::<Result<_>>()?;
+    let is_same = |i: usize| found[1..].iter().all(|hits| agree(query, &found[OFF][i], &hits[i]));
     Ok(FlaggedRays {
         rays: kind.name().into(),
         count: rays.count.into(),
         hits: found[OFF].iter().filter(|hit| hit.is_some()).count() as u64,
-        different: found[OFF].iter().zip(&found[ON]).filter(|(a, b)| !agree(query, a, b)).count() as u64,
+        different: (0..found[OFF].len()).filter(|&i| !is_same(i)).count() as u64,
         off_ms: Spread::of_some(&times[OFF])?,
         on_ms: Spread::of_some(&times[ON])?,
+        in_turn_ms,
         driver_ms: times.get(DRIVER).and_then(|times| Spread::of(times)),
         gain: Spread::of_some(&ratios(&times[OFF], &times[ON]))?,
         off_work: work[OFF],

@@ -8,6 +8,7 @@ use crate::rays::kinds::RayKind;
 use crate::scene::{Animation, Mesh, Scene};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::level::Level;
+use crate::subjects::queries::Queries;
 use crate::subjects::structures::Structures;
 use ash::vk;
 use hedgerow::accel::Instance;
@@ -64,7 +65,7 @@ impl<'a> Pair<'a> {
     /// Traces rays through both; milliseconds through the one built again, and through the updated one.
     fn trace(&mut self, rays: &RayBuffers<'_>, query: Query) -> Result<(f64, Option<f64>)> {
         let Pair { structures, timestamps, updated, built, updates } = self;
-        let mut trace = |top: &Level<'_>| structures.trace(timestamps, top.structure(), rays, query);
+        let mut trace = |top: &Level<'_>| structures.trace(timestamps, top.structure(), rays, query, Queries::OneEach);
         let updated = updates.then(|| trace(&updated.top)).transpose()?;
         Ok((trace(&built.top)?, updated))
     }

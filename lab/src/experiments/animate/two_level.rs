@@ -5,6 +5,7 @@ use crate::measure::MemoryRecord;
 use crate::scene::{Frame, Group, Mesh};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::level::Level;
+use crate::subjects::queries::Queries;
 use crate::subjects::structures::{BuildInfo, Range, Structures};
 use crate::subjects::{BuildRun, Subject};
 use crate::{Error, Result};
@@ -134,7 +135,7 @@ impl Subject for TwoLevel<'_> {
 
     fn trace(&mut self, query: Query) -> Result<f64> {
         let Some(rays) = &self.rays else { return Ok(0.0) };
-        self.structures.trace(&mut self.timestamps, self.top.structure(), rays, query)
+        self.structures.trace(&mut self.timestamps, self.top.structure(), rays, query, Queries::OneEach)
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {

@@ -119,6 +119,11 @@ impl Probe {
         Probe::of(device, shaders::MEASURE_PROBE.spirv)
     }
 
+    /// The same with several rays for each invocation, in turn.
+    pub fn in_turn(device: &'static Device) -> Probe {
+        Probe::of(device, shaders::MEASURE_PROBE_TURNS.spirv)
+    }
+
     /// Of a shader with workgroups of 64 and at most 40 bytes of push constants.
     ///
     /// # Panics

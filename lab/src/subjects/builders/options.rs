@@ -6,6 +6,7 @@ use super::table::{BUILDERS, BuilderEntry};
 use super::{BuilderOption, Spec};
 use crate::subjects::any_hit::AnyHitSpec;
 use crate::subjects::auto;
+use crate::subjects::queries::Queries;
 use crate::subjects::retraced::TreeTracer;
 use crate::{Error, Result};
 use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
@@ -77,8 +78,10 @@ pub(super) const ANY_HIT: BuilderOption = option(
      prim-sato, opaque, rays (learned from rays of the scene), auto: the one with the least work for those rays, or built: as a heuristic \
      on the host has them, which is what srdh does unless told otherwise",
 );
-pub(super) const WALK: BuilderOption =
-    option("walk", "tracer, or query: rays go through a tree with nodes of two by queries, as in an engine's shader");
+pub(super) const WALK: BuilderOption = option(
+    "walk",
+    "tracer; query: rays go through a tree with nodes of two by queries, as in an engine's shader; or turns: likewise, many rays for each invocation",
+);
 pub(super) const TRACE_TREE: BuilderOption = option(
     "trace",
     "host or device: where our tracer takes rays through the tree; unless given, its own does on the host",
@@ -125,8 +128,9 @@ impl Spec {
             let what = "builders on the device have no order of children of their own; take any-hit=opaque";
             return Err(Error::Argument(format!("builder {self}: {what}")));
         }
-        let by_query = self.choice(&WALK, &[("tracer", false), ("query", true)])?.unwrap_or(false);
-        if form.is_some() && by_query {
+        let walks = [("tracer", None), ("query", Some(Queries::OneEach)), ("turns", Some(Queries::InTurn))];
+        let by_query = self.choice(&WALK, &walks)?.flatten();
+        if form.is_some() && by_query.is_some() {
             let what = "queries are for nodes of two; take width=2, or walk=tracer";
             return Err(Error::Argument(format!("builder {self}: {what}")));
         }

@@ -14,6 +14,7 @@ use crate::subjects::peers::driver::DriverPreference;
 use crate::subjects::peers::embree;
 #[cfg(feature = "peer-obvhs")]
 use crate::subjects::peers::obvhs;
+use crate::subjects::queries::Queries;
 use crate::subjects::wide::WidePlan;
 use hedgerow::bvh::builder::BuildOptions;
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
@@ -80,8 +81,8 @@ pub(crate) struct DevicePlan {
     pub(super) options: BuildOptions,
     /// Of the wide tree, where there shall be one.
     pub(super) form: Option<Form>,
-    /// Whether rays go through the binary tree by queries.
-    pub(super) by_query: bool,
+    /// How rays go through the binary tree by queries, if they do.
+    pub(super) by_query: Option<Queries>,
     /// The order in which that is traced, where it was given.
     pub(super) order: Option<Order>,
     /// How long reinsertion may take, where it was given a time.
@@ -101,8 +102,7 @@ impl DevicePlan {
         taught: &TaughtTree,
     ) -> Result<DeviceBvh<'a>> {
         let walk = match self.form {
-            None if self.by_query => Walk::Query,
-            None => Walk::Tracer,
+            None => self.by_query.map_or(Walk::Tracer, Walk::Query),
             Some(form) => {
                 let is_ordered = taught.any_hit.order.is_some();
                 let left_first = is_ordered.then(|| WideTracer::in_order(device, form, Order::LeftFirst));

@@ -10,6 +10,7 @@ use crate::scene::Mesh;
 use crate::subjects::build_memory::memory_record;
 use crate::subjects::device_rays::DeviceRays;
 use crate::subjects::level::Level;
+use crate::subjects::queries::Queries;
 use crate::subjects::structures::Structures;
 use crate::subjects::{BuildRun, Subject};
 use crate::{Error, Result};
@@ -116,7 +117,7 @@ impl Subject for Driver<'_> {
 
     fn trace(&mut self, query: Query) -> Result<f64> {
         let (structures, top) = (&self.structures, self.structures.address(self.top.structure()));
-        self.rays.trace(top, |recorder, buffers| structures.record_trace(recorder, buffers, query))
+        self.rays.trace(top, |recorder, buffers| structures.record_trace(recorder, buffers, query, Queries::OneEach))
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {

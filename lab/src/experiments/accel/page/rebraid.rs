@@ -30,7 +30,8 @@ pub(super) fn part(points: &[RebraidPoint]) -> Result<Option<Part>> {
             summary { "Rays and their work" }
             p {
                 "Nodes of the top level, instances entered, nodes below and triangles tested, in the mean over the rays: first "
-                "through the plain top level, then through the re-braided one."
+                "through the plain top level, then through the re-braided one. In turn: many rays for each invocation, through the "
+                "re-braided one, as " code { "trace/query_turns.glsl" } " takes them; the driver's queries cannot."
             }
             (tracing(points))
         }
@@ -104,6 +105,7 @@ fn tracing(points: &[RebraidPoint]) -> Markup {
         .spread("gain", "×", |(_, rays)| Some(rays.gain), three_digits)
         .number("without", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.off_ms.median), three_digits)
         .number("with", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.on_ms.median), three_digits)
+        .number("in turn", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.in_turn_ms.median), three_digits)
         .number("driver", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.driver_ms?.median), three_digits)
         .figure("top nodes", "", move |(_, rays)| both(rays, |work| work.top_nodes))
         .figure("instances", "", move |(_, rays)| both(rays, |work| work.instances))

@@ -39,7 +39,7 @@ fn ratio(a: Option<u64>, b: Option<u64>) -> Option<f64> {
     a.zip(b.filter(|&b| b > 0)).map(|(a, b)| a as f64 / b as f64)
 }
 
-const TREE: [Figure<Record>; 12] = [
+const TREE: [Figure<Record>; 13] = [
     Figure::new(["nodes", "", "nodes"], count, |r| Some((r.quality.inner? + r.quality.leaves?) as f64)),
     Figure::new(["inner / leaves", "", "inner_to_leaf"], two_decimals, |r| ratio(r.quality.inner, r.quality.leaves)),
     Figure::new(["full / empty", "", "nonempty_to_empty_leaf"], two_decimals, |r| {
@@ -55,6 +55,7 @@ const TREE: [Figure<Record>; 12] = [
     Figure::new(["skipped", "thousands", "skipped_k"], three_digits, |r| {
         Some(r.build.skipped_retrievals? as f64 * 1e-3)
     }),
+    Figure::new(["build and rays", "s", "frame_s"], three_digits, |r| Some(r.build.median_ms * 1e-3 + r.rays_s()?)),
     Figure::new(["memory", "MB", "memory_mb"], three_digits, |r| Some(r.memory.structure_bytes? as f64 * 1e-6)),
 ];
 
@@ -116,7 +117,7 @@ pub(crate) fn section(records: &[&Record], schedules: Option<&Chart>, published:
             "In the tables of Papay 2025, " i { "Efficient ray tracing algorithms exploiting kd-trees on a GPU" } ", appendix D. Nodes count "
             "leaves that hold nothing, full leaves are the others, and their size is the number of triangles in one. The task pool is the "
             "part of the build that it takes (T_TP); retrievals are tasks and chunks that workers took out of it (N_R), skipped ones steps "
-            "that a worker went on with by itself (N_SR)."
+            "that a worker went on with by itself (N_SR). Build and rays is a build and all its rays, one kind after the other (T_F)."
         }
         @if let Some(file) = &published.file {
             p.note { "Below each table, in grey, are the published figures of " code { (file) } ": context, never a result." }

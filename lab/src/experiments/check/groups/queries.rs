@@ -2,10 +2,10 @@
 
 use crate::device::Device;
 use crate::experiments::check::agree::assert_agrees;
-use crate::experiments::check::backend::Ours;
+use crate::experiments::check::backend::{Backend, Ours};
 use crate::experiments::check::cases::{Cases, Found, same};
 use crate::experiments::check::matrices::{Matrix, moved, rotation, scaled};
-use crate::experiments::check::probe::{CONFIRM, CONFIRM_ODD, IGNORE, ProbeRay, TERMINATE, flags};
+use crate::experiments::check::probe::{CONFIRM, CONFIRM_ODD, IGNORE, Probe, ProbeRay, TERMINATE, flags};
 use crate::experiments::check::shapes::{Corners, boxes as random_boxes, icosphere, soup};
 use crate::experiments::check::world::{Part, World, inverse, transformed};
 use crate::random::SplitMix64;
@@ -115,8 +115,23 @@ pub fn flags_and_decisions(cases: &mut Cases<'_>) {
         }
         let what = format!("world {seed}, by pointers: {by_pointers}, re-braided: {rebraids}");
         cases.case(what.clone(), |device| agrees(device, &what, &world, &all, 20));
+        cases.case(format!("{what}, rays in turn"), |device| in_turn(device, &world, &all));
     }
     masks(cases);
+}
+
+/// What queries report does not depend on how many rays an invocation has, whichever goes on while others have ended.
+fn in_turn(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found {
+    let ours = Ours::on(device);
+    let built = world.build(&ours);
+    let expected = ours.probe(built.top.structure, rays);
+    let found = Probe::in_turn(device).ask(ours.address(built.top.structure), rays);
+    for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        ensure!(found == expected, "ray {i}, {:?}: {found:?} in turn, {expected:?} by itself", rays[i]);
+    }
+    let waited = expected.iter().filter(|report| report.candidate_count > 1).count();
+    ensure!(waited > 20, "{waited} rays had candidates to decide on");
+    Ok(())
 }
 
 /// A ray sees the instances whose mask shares a bit with its own, whatever lies beside the mask.

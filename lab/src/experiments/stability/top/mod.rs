@@ -16,6 +16,7 @@ use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Instances, Mesh, Scene, SceneInstance};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::levels::Levels;
+use crate::subjects::queries::Queries;
 use crate::subjects::structures::Structures;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::sah::Collapse;
@@ -193,7 +194,9 @@ fn measure_one(
         let mut relative_mrays = BTreeMap::new();
         for traced in &part.rays {
             let query = traced.kind.query();
-            let times = in_turn(&mut levels, WARM_UPS, stage.runs, |levels| levels.trace(&traced.buffers, query));
+            let times = in_turn(&mut levels, WARM_UPS, stage.runs, |levels| {
+                levels.trace(&traced.buffers, query, Queries::OneEach)
+            });
             let times: Vec<Vec<f64>> = times.into_iter().collect::<Result<_>>()?;
             frame += Spread::of_some(&times[1])?.median;
             base_frame += Spread::of_some(&times[0])?.median;

@@ -1,0 +1,8 @@
+// The same as measure/query.comp, with many rays for each invocation, in turn (trace/query_turns.glsl).
+#version 460
+layout(local_size_x_id = 0) in;
+layout(constant_id = 2) const uint SHARED_LEVELS = 0;
+#define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
+#define IN_TURN
+#include "trace/ray_query_names.glsl"
+#include "measure/ray_query.glsl"
