@@ -54,55 +54,58 @@ void main() {
             }
         }
         has_task = false;
+        bool is_shared = slot != NONE, is_leaf = t.phase == TO_END, is_built = false;
         if (t.phase == TO_BUILD) {
-            build_subtree(t);
-            continue;
-        }
-        bool is_shared = slot != NONE;
-        uint begin = t.begin, end = t.begin + t.count;
-        uvec2 sides = uvec2(0);
-        if (is_shared) {
-            begin += chunk * CHUNK;
-            end = min(begin + CHUNK, end);
-        }
-        if (t.phase == TO_BIN) {
-            bin_references(t, begin, end, is_shared);
-        } else if (t.phase == TO_CLASSIFY) {
-            sides = classify_references(t, begin, end, slot);
-            if (is_shared && gl_LocalInvocationIndex == 0u) sides_of_chunks(t).side[chunk] = sides;
-        } else {
-            uvec2 before = uvec2(0);
-            if (is_shared) before = sides_of_chunks(t).side[chunk];
-            distribute_references(arena(), arena(), begin, end, uvec2(t.spare, t.right_at) + before);
-        }
-        next_step();
-        if (is_shared && !chunk_pool_finish(pool, slot)) continue;
-
-        // The phase is over: what comes next. (The thesis' post-processing.)
-        uint phase = t.phase, chunks = chunks_of(t.count);
-        bool is_leaf = false;
-        if (phase == TO_BIN) {
-            is_leaf = !choose_plane(t, is_shared);
-        } else if (phase == TO_CLASSIFY) {
+            is_built = build_subtree(t);
+            is_leaf = !is_built;
+        } else if (!is_leaf) {
+            uint begin = t.begin, end = t.begin + t.count;
+            uvec2 sides = uvec2(0);
             if (is_shared) {
-                sides = scan_pairs(sides_of_chunks(t), 0u, chunks);
-                t.waiting = slot_tasks().task[slot].waiting;
+                begin += chunk * CHUNK;
+                end = min(begin + CHUNK, end);
             }
-            is_leaf = !place_children(t, sides);
+            if (t.phase == TO_BIN) {
+                bin_references(t, begin, end, is_shared);
+            } else if (t.phase == TO_CLASSIFY) {
+                sides = classify_references(t, begin, end, slot);
+                if (is_shared && gl_LocalInvocationIndex == 0u) sides_of_chunks(t).side[chunk] = sides;
+            } else {
+                uvec2 before = uvec2(0);
+                if (is_shared) before = sides_of_chunks(t).side[chunk];
+                distribute_references(arena(), arena(), begin, end, uvec2(t.spare, t.right_at) + before);
+            }
+            next_step();
+            if (is_shared && !chunk_pool_finish(pool, slot)) continue;
+
+            // The phase is over: what comes next. (The thesis' post-processing.)
+            uint phase = t.phase, chunks = chunks_of(t.count);
+            if (phase == TO_BIN) {
+                is_leaf = !choose_plane(t, is_shared);
+            } else if (phase == TO_CLASSIFY) {
+                if (is_shared) {
+                    sides = scan_pairs(sides_of_chunks(t), 0u, chunks);
+                    t.waiting = slot_tasks().task[slot].waiting;
+                }
+                is_leaf = !place_children(t, sides);
+            }
+            has_task = phase != TO_DISTRIBUTE && !is_leaf;
+            next_step();
+            if (has_task && is_shared) {
+                // The last chunk of the next phase is the worker's own.
+                chunk = chunks - 1u;
+                if (gl_LocalInvocationIndex == 0u) slot_tasks().task[slot] = t;
+                chunk_pool_publish(pool, slot, chunks, 1u);
+            }
+            if (has_task) continue;
         }
-        bool goes_on = phase != TO_DISTRIBUTE && !is_leaf;
-        next_step();
-        if (goes_on && is_shared) {
-            // The last chunk of the next phase is the worker's own.
-            chunk = chunks - 1u;
-            if (gl_LocalInvocationIndex == 0u) slot_tasks().task[slot] = t;
-            chunk_pool_publish(pool, slot, chunks, 1u);
-        }
-        has_task = goes_on;
-        if (goes_on) continue;
-        if (is_shared) give_piece(t.counters, t.counters_room);
         if (is_leaf) make_leaf(t);
-        else begin_children(t);
+        else if (!is_built) begin_children(t);
+        [[dont_unroll]] for (uint k = 0; k < 3u; ++k) {
+            uvec2 piece = k == 0u ? done_with[0] : k == 1u ? done_with[1] : uvec2(t.counters, is_shared ? t.counters_room : 0u);
+            give_piece(piece.x, piece.y);
+        }
+        done_with = uvec2[2](uvec2(0), uvec2(0));
         if (is_shared) leave_slot(slot);
     }
     add_up(retrievals, skipped);

@@ -8,6 +8,7 @@
 #ifndef HEDGEROW_KDTREE_ACROSS_MEMORY
 #define HEDGEROW_KDTREE_ACROSS_MEMORY
 #include "kdtree/builder.glsl"
+#extension GL_EXT_control_flow_attributes : require
 
 // Behind a KdState.
 BUFFER KdAcross {
@@ -133,12 +134,13 @@ uint take_piece(uint size) {
 
 // A piece of at least `size`, and `more` where there is that; NONE where there is not even the least.
 uint take_piece_or_less(inout uint size, uint more) {
-    uint begin = take_piece(size + more);
-    if (begin != NONE) {
-        size += more;
-        return begin;
+    uint begin = NONE, taken = size;
+    // One copy of what takes it, with its barriers.
+    [[dont_unroll]] for (uint attempt = 0; attempt < 2u && begin == NONE; ++attempt) {
+        taken = attempt == 0u ? size + more : size;
+        begin = take_piece(taken);
     }
-    begin = take_piece(size);
+    size = taken;
     if (begin == NONE && gl_LocalInvocationIndex == 0u) fall_short(SHORT_OF_ARENA);
     return begin;
 }

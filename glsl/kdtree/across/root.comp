@@ -42,14 +42,8 @@ void main() {
     is_alive = true;
     if (gl_LocalInvocationIndex == 0u) chunk_pool().alive = 0u;
     begin_task(t);
-    if (own_count == 0u) {
-        // A leaf, or shared.
-        if (gl_LocalInvocationIndex == 0u) {
-            KdState state = build_state();
-            state.leaves += own_tallies.y;
-        }
-        return;
-    }
+    // Shared.
+    if (own_count == 0u) return;
     uint slot = chunk_pool_slot(chunk_pool());
     next_step();
     if (gl_LocalInvocationIndex == 0u) slot_tasks().task[slot] = own_tasks().task[0];

@@ -12,6 +12,7 @@ const uint TO_BIN = 0;
 const uint TO_CLASSIFY = 1;
 const uint TO_DISTRIBUTE = 2;
 const uint TO_BUILD = 3;
+const uint TO_END = 4;       // it is a leaf
 
 // Chunks of a task that one worker does by itself: its references are in its caches, and nothing of it goes through memory.
 const uint ALONE = 2;
@@ -56,6 +57,9 @@ uvec3 own_tallies = uvec3(0);
 uvec3 own_subtree_tallies = uvec3(0);
 uvec3 own_subtrees = uvec3(0);   // how many, their nodes, their references
 uint own_depth = 0;
+// Pieces that the task at hand needs no more: where they begin, and their size. They are given back at one place, as drivers take long
+// to compile each copy of what does it.
+uvec2 done_with[2] = uvec2[2](uvec2(0), uvec2(0));
 
 ChunkPool chunk_pool() {
     return ChunkPool(across_state().pool);
@@ -145,11 +149,11 @@ void make_leaf(KdCellTask t) {
         drafts().draft[t.draft] = KdDraft(DRAFT_LEAF, t.begin, t.count, KdNode(0u, 0u), 0u, 0u);
     }
     own_tallies.y += 1u;
-    give_piece(t.begin + t.count, t.room - t.count);
-    give_piece(t.spare, t.spare_room);
+    done_with = uvec2[2](uvec2(t.begin + t.count, t.room - t.count), uvec2(t.spare, t.spare_room));
 }
 
-void build_subtree(KdCellTask t) {
+// False if there is no room for it.
+bool build_subtree(KdCellTask t) {
     KdStack stack = stack_of(group_number());
     KdBuilt built = build_small(arena(), t.begin, t.count, Box(t.lo, t.hi), t.depth, stack);
     uint at = NONE;
@@ -158,10 +162,7 @@ void build_subtree(KdCellTask t) {
         at = take_to_keep(pieces_of_words(2u * built.nodes + built.references));
         if (at == NONE) give_room(built.nodes, built.references - t.count);
     }
-    if (at == NONE) {
-        make_leaf(t);
-        return;
-    }
+    if (at == NONE) return false;
     KdNodes nodes = KdNodes(arena_at(at));
     Words references = Words(address_of(arena_at(at), built.nodes, 8u));
     for (uint i = gl_LocalInvocationIndex; i < built.nodes; i += gl_WorkGroupSize.x) nodes.node[i] = stack.nodes.node[1u + i];
@@ -175,9 +176,9 @@ void build_subtree(KdCellTask t) {
     own_subtree_tallies += built.tallies;
     own_subtrees += uvec3(1u, built.nodes, built.references);
     own_depth = max(own_depth, built.deepest);
-    give_piece(t.begin, t.room);
-    give_piece(t.spare, t.spare_room);
+    done_with = uvec2[2](uvec2(t.begin, t.room), uvec2(t.spare, t.spare_room));
     next_step();
+    return true;
 }
 
 // ---- phases ----
@@ -287,12 +288,8 @@ bool place_children(inout KdCellTask t, uvec2 sides) {
 // A child goes where it is built; it is a leaf where the rule has it so.
 void begin_task(KdCellTask t) {
     own_depth = max(own_depth, t.depth);
-    if (ends_by_rule(t.count, t.depth)) {
-        make_leaf(t);
-        return;
-    }
-    t.phase = t.count > EXACT ? TO_BIN : TO_BUILD;
-    if (chunks_of(t.count) > ALONE && share_task(t)) return;
+    t.phase = ends_by_rule(t.count, t.depth) ? TO_END : t.count > EXACT ? TO_BIN : TO_BUILD;
+    if (t.phase == TO_BIN && chunks_of(t.count) > ALONE && share_task(t)) return;
     push_task(t);
 }
 

@@ -207,8 +207,9 @@ pub struct FlaggedRays {
     pub off_ms: Spread,
     /// With it.
     pub on_ms: Spread,
-    /// With it, many rays for each invocation in turn (`glsl/trace/query_turns.glsl`).
-    pub in_turn_ms: Spread,
+    /// With it, many rays for each invocation in turn (`glsl/trace/query_turns.glsl`); records of before have none.
+    #[serde(default)]
+    pub in_turn_ms: Option<Spread>,
     /// Through the driver's.
     pub driver_ms: Option<Spread>,
     /// Time without over time with it, run by run: above 1, rays are faster with the flag.

@@ -91,7 +91,7 @@ fn traced(
     ways.push((ON, Queries::InTurn));
     let times = in_turn(&mut ways, WARM_UPS, stage.runs, |&mut (of, way)| levels[of].trace(rays, query, way));
     let mut times: Vec<Vec<f64>> = times.into_iter().collect::<Result<_>>()?;
-    let in_turn_ms = Spread::of_some(&times.pop().unwrap_or_default())?;
+    let in_turn_ms = times.pop().and_then(|times| Spread::of(&times));
     let mut found = Vec::new();
     for (of, way) in [(OFF, Queries::OneEach), (ON, Queries::OneEach), (ON, Queries::InTurn)] {
         levels[of].trace(rays, query, way)?;

@@ -80,7 +80,7 @@ pub(super) const ANY_HIT: BuilderOption = option(
 );
 pub(super) const WALK: BuilderOption = option(
     "walk",
-    "tracer; query: rays go through a tree with nodes of two by queries, as in an engine's shader; or turns: likewise, many rays for each invocation",
+    "tracer, query or turns: rays go through a tree with nodes of two by queries, as in an engine's shader, one for each invocation or many in turn",
 );
 pub(super) const TRACE_TREE: BuilderOption = option(
     "trace",

@@ -63,8 +63,10 @@ pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
             goals.push(Goal { what: format!("{}, re-braided ({how}): all kinds of rays", point.scene), ratio, least });
         }
     }
-    let ways: [(&str, fn(&FlaggedRays) -> Spread); 2] =
-        [("one for each invocation", |rays| rays.on_ms), ("many for each invocation, in turn", |rays| rays.in_turn_ms)];
+    let ways: [(&str, fn(&FlaggedRays) -> Option<Spread>); 2] = [
+        ("one for each invocation", |rays| Some(rays.on_ms)),
+        ("many for each invocation, in turn", |rays| rays.in_turn_ms),
+    ];
     for (way, ours) in ways {
         if let Some(ratio) = over_driver(&measured.rebraids, ours) {
             let what = format!("all kinds of rays through both levels, {way}, against the driver's ray queries");
@@ -93,9 +95,9 @@ pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
 }
 
 /// How many times as fast rays are as the driver's: the geometric mean over scenes and kinds of rays, the least and the greatest.
-fn over_driver(points: &[RebraidPoint], ours: fn(&FlaggedRays) -> Spread) -> Option<Spread> {
+fn over_driver(points: &[RebraidPoint], ours: fn(&FlaggedRays) -> Option<Spread>) -> Option<Spread> {
     let rays = points.iter().flat_map(|point| &point.rays);
-    let ratios: Vec<f64> = rays.filter_map(|r| Some(r.driver_ms?.median / ours(r).median)).collect();
+    let ratios: Vec<f64> = rays.filter_map(|r| Some(r.driver_ms?.median / ours(r)?.median)).collect();
     let median = geometric_mean(ratios.iter().copied())?;
     Some(Spread { median, ..Spread::of(&ratios)? })
 }

@@ -105,7 +105,7 @@ fn tracing(points: &[RebraidPoint]) -> Markup {
         .spread("gain", "×", |(_, rays)| Some(rays.gain), three_digits)
         .number("without", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.off_ms.median), three_digits)
         .number("with", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.on_ms.median), three_digits)
-        .number("in turn", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.in_turn_ms.median), three_digits)
+        .number("in turn", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.in_turn_ms?.median), three_digits)
         .number("driver", "Mrays/s", move |(_, rays)| mrays_s(rays, rays.driver_ms?.median), three_digits)
         .figure("top nodes", "", move |(_, rays)| both(rays, |work| work.top_nodes))
         .figure("instances", "", move |(_, rays)| both(rays, |work| work.instances))
