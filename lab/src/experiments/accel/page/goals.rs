@@ -14,6 +14,15 @@ const REBRAID_APART: f64 = 0.97;
 const OVER_DRIVER: f64 = 1.4;
 const SLOWEST_OVER_DRIVER: f64 = 0.95;
 
+/// Milliseconds of ours.
+type Ours = fn(&FlaggedRays) -> Option<Spread>;
+
+/// How a shader takes the rays, beside the driver's queries.
+const WAYS: [(&str, Ours); 2] = [
+    ("one for each invocation", |rays| Some(rays.on_ms)),
+    ("many for each invocation, in turn", |rays| rays.in_turn_ms),
+];
+
 /// Something to be reached.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Goal {
@@ -63,11 +72,7 @@ pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
             goals.push(Goal { what: format!("{}, re-braided ({how}): all kinds of rays", point.scene), ratio, least });
         }
     }
-    let ways: [(&str, fn(&FlaggedRays) -> Option<Spread>); 2] = [
-        ("one for each invocation", |rays| Some(rays.on_ms)),
-        ("many for each invocation, in turn", |rays| rays.in_turn_ms),
-    ];
-    for (way, ours) in ways {
+    for (way, ours) in WAYS {
         if let Some(ratio) = over_driver(&measured.rebraids, ours) {
             let what = format!("all kinds of rays through both levels, {way}, against the driver's ray queries");
             goals.push(Goal { what, ratio, least: OVER_DRIVER });
@@ -95,7 +100,7 @@ pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
 }
 
 /// How many times as fast rays are as the driver's: the geometric mean over scenes and kinds of rays, the least and the greatest.
-fn over_driver(points: &[RebraidPoint], ours: fn(&FlaggedRays) -> Option<Spread>) -> Option<Spread> {
+fn over_driver(points: &[RebraidPoint], ours: Ours) -> Option<Spread> {
     let rays = points.iter().flat_map(|point| &point.rays);
     let ratios: Vec<f64> = rays.filter_map(|r| Some(r.driver_ms?.median / ours(r)?.median)).collect();
     let median = geometric_mean(ratios.iter().copied())?;
