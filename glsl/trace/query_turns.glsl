@@ -18,8 +18,8 @@
 // Rays that go the same way stay together: the next ones are taken when all have ended. Where more than half of the rounds were spent
 // waiting for the longest ray, each invocation takes its next one as soon as it can instead, from then on.
 //
-// On lavapipe the rays of `hedgerow accel` are 1.10 to 1.18 times as fast as with one for each invocation (docs/notes/rays.md): those
-// that go anywhere 1.2 to 1.8 times, those that go the same way 0.9 to 1.0.
+// On lavapipe the rays of `hedgerow accel` are 1.14 times as fast as with one for each invocation (docs/notes/rays.md): those that
+// go anywhere 1.3 to 1.8 times, those that go the same way 0.94 to 1.04.
 //
 // needs   votes and arithmetic of subgroups in compute shaders; all invocations of a subgroup come to hedgerowTakeTurn together
 #ifndef HEDGEROW_TRACE_QUERY_TURNS

@@ -87,7 +87,8 @@ pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
     let body = html! {
         p {
             "Engines build hundreds of small structures a frame. Here " (grouped(most.into())) " of them, "
-            (grouped(triangles)) " triangles together, are built in one call, ours also with the arguments in memory in place of push constants; in a call each with a barrier behind it, in one "
+            (grouped(triangles)) " triangles together, are built in one call, ours also with the arguments in memory in place of push "
+            "constants; in a call each with a barrier behind it, in one "
             "command buffer; and in a call each that is submitted and waited for. By the wall's clock, recording included."
         }
         p { (reading(points, most)) }
