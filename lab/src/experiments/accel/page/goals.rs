@@ -18,10 +18,8 @@ const SLOWEST_OVER_DRIVER: f64 = 0.95;
 type Ours = fn(&FlaggedRays) -> Option<Spread>;
 
 /// How a shader takes the rays, beside the driver's queries.
-const WAYS: [(&str, Ours); 2] = [
-    ("one for each invocation", |rays| Some(rays.on_ms)),
-    ("many for each invocation, in turn", |rays| rays.in_turn_ms),
-];
+const WAYS: [(&str, Ours); 2] =
+    [("one for each invocation", |rays| Some(rays.on_ms)), ("many, in turn", |rays| rays.in_turn_ms)];
 
 /// Something to be reached.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,7 +72,7 @@ pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
     }
     for (way, ours) in WAYS {
         if let Some(ratio) = over_driver(&measured.rebraids, ours) {
-            let what = format!("all kinds of rays through both levels, {way}, against the driver's ray queries");
+            let what = format!("rays through both levels, {way}, against the driver's queries");
             goals.push(Goal { what, ratio, least: OVER_DRIVER });
             let slowest = Spread { median: ratio.min, max: ratio.min, ..ratio };
             goals.push(Goal { what: "the slowest of them".into(), ratio: slowest, least: SLOWEST_OVER_DRIVER });
