@@ -7,7 +7,7 @@
 // The children of a quantised node that the ray enters are at hand: leaves first, then nodes from near to far.
 void hedgerow_visit_quantised(inout HedgerowRayQuery query) {
 #ifdef HEDGEROW_COUNTS_WORK
-    if (query.has_instances) query.work.x += 1u;
+    if (hedgerow_is_in_top(query)) query.work.x += 1u;
     else query.work.z += 1u;
 #endif
     QuantisedNode node = hedgerow_quantised_node_at(query.structure, query.index);
@@ -27,14 +27,14 @@ void hedgerow_visit_quantised(inout HedgerowRayQuery query) {
     query.begin_slots = ALL_SLOTS;
     // In a top level leaves are among the nodes, from near to far, as an instance takes longer than a node. An entry of the stack has no
     // room for where both begin: it names the node, which is asked again.
-    uint nodes = query.has_instances ? 0xFFu : node.exponents_and_nodes >> 24;
+    uint nodes = hedgerow_is_in_top(query) ? 0xFFu : node.exponents_and_nodes >> 24;
     uint visits = in_octant(entered & nodes, query.octant);
     uint others = in_octant(visits & visits - 1u, query.octant);
     float nearest = HEDGEROW_INFINITY;
     [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
         if ((others >> slot & 1u) != 0u) nearest = min(nearest, enters[slot]);
     }
-    query.first_child = query.has_instances ? query.index : node.first_child;
+    query.first_child = hedgerow_is_in_top(query) ? query.index : node.first_child;
     query.group = leading_half(nearest) | nodes << 8 | visits;
     query.first_record = node.first_record;
     query.counts = node.counts;
@@ -52,7 +52,7 @@ void hedgerow_put_off_rest(inout HedgerowRayQuery query) {
 
 // Whether an entry of the stack is such a rest, which is at hand then.
 bool hedgerow_takes_rest(inout HedgerowRayQuery query, uvec2 waiting) {
-    if (!query.has_instances || (waiting.x & HEDGEROW_RECORDS_WAIT) == 0u) return false;
+    if (!hedgerow_is_in_top(query) || (waiting.x & HEDGEROW_RECORDS_WAIT) == 0u) return false;
     query.index = waiting.x & ~HEDGEROW_RECORDS_WAIT;
     query.left = waiting.y;
     return true;
@@ -73,7 +73,7 @@ bool hedgerow_take_of_group(inout HedgerowRayQuery query) {
     if (visits == 0u) return false;
     uint slot = uint(findLSB(visits)) ^ query.octant;
     uint left = visits & visits - 1u;
-    if (query.has_instances) {
+    if (hedgerow_is_in_top(query)) {
         HedgerowNames names = hedgerow_names_at(query.structure, query.first_child);
         uint count = byte_of_slot(names.counts, slot);
         bool is_node = (names.nodes >> slot & 1u) != 0u;
@@ -83,7 +83,7 @@ bool hedgerow_take_of_group(inout HedgerowRayQuery query) {
         query.index = query.first_child + rank_of_node(query.group >> 8 & 0xFFu, slot);
         query.left = 0u;
     }
-    if (left != 0u && query.level - query.bottom < MAX_DEPTH) {
+    if (left != 0u && query.level - hedgerow_bottom(query) < MAX_DEPTH) {
         hedgerow_put_entry(query.level, uvec2(query.first_child, query.group ^ visits ^ left));
         query.level++;
     }

@@ -11,23 +11,35 @@
 //             i = next++;
 //             hedgerowRayQueryInitialize(query, …);
 //         }
-//         while (hedgerowRayQueryProceedInTurn(query, turns)) { … }  // candidates that the shader decides on
+//         if (hedgerowRayQueryProceedInTurn(query, turns, flags)) { … }     // a candidate that the shader decides on
 //         if (hedgerowRayQueryEndsInTurn(query, turns)) hits[i] = …;
 //     }
 //
 // Rays that go the same way stay together: the next ones are taken when all have ended. Where more than half of the rounds were spent
 // waiting for the longest ray, each invocation takes its next one as soon as it can instead, from then on.
 //
-// On lavapipe the rays of `hedgerow accel` are 1.14 times as fast as with one for each invocation (docs/notes/rays.md): those that
-// go anywhere 1.3 to 1.8 times, those that go the same way 0.94 to 1.04.
+// A shader whose workgroups are one subgroup each, of at most 16 invocations, may define HEDGEROW_LANES, how many they are, before it
+// includes this file: a constant or specialisation constant. Its lanes then load nodes and triangles one after the other
+// (trace/lanes.glsl): what CPUs' drivers are faster with that load what is uniform once. Structures are of nodes of two then.
 //
-// needs   votes and arithmetic of subgroups in compute shaders; all invocations of a subgroup come to hedgerowTakeTurn together
+// On lavapipe the rays of `hedgerow accel` are 1.25 times as fast lane by lane as with one for each invocation (docs/notes/rays.md): those
+// that go anywhere 1.6 to 2.1 times, those that go the same way 0.91 to 1.13. With each lane's own loads it is 1.13 times.
+//
+// needs   votes and arithmetic of subgroups in compute shaders, with HEDGEROW_LANES ballots in place of them; all invocations of a
+//         subgroup come to hedgerowTakeTurn and hedgerowRayQueryProceedInTurn together
 #ifndef HEDGEROW_TRACE_QUERY_TURNS
 #define HEDGEROW_TRACE_QUERY_TURNS
+#include "trace/query.glsl"
+#ifdef HEDGEROW_LANES
+#include "trace/query_lanes.glsl"
+#else
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_vote : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "trace/query.glsl"
+#define hedgerow_any_lane subgroupAny
+#define hedgerow_sum_of_lanes subgroupAdd
+#define hedgerow_max_of_lanes subgroupMax
+#endif
 
 // Rounds of a query until its subgroup is asked again who has ended. On lavapipe 8 are as good as 16; of 1 and 32, rays have 0.88 and
 // 0.93 of the speed.
@@ -36,42 +48,60 @@ const uint HEDGEROW_ROUNDS_A_TURN = 8u;
 struct HedgerowTurns {
     bool takes;      // in this turn: the next ray
     bool goes;       // a ray is on its way
+    bool ends;       // in this turn
     bool together;
-    uint left;       // rounds of this turn
     uint spent;      // rounds since all took a ray
+    uvec2 readable;  // memory that a lane may load from which needs nothing
 };
 
 HedgerowTurns hedgerowTurns() {
-    return HedgerowTurns(false, false, true, 0u, 0u);
+    return HedgerowTurns(false, false, false, true, 0u, uvec2(0u));
 }
 
 // Whether anything is left to do in the subgroup, where this invocation has rays left or not.
 bool hedgerowTakeTurn(inout HedgerowTurns turns, bool has_rays) {
-    bool none_goes = !subgroupAny(turns.goes);
+    bool none_goes = !hedgerow_any_lane(turns.goes);
     if (none_goes) {
-        if (!subgroupAny(has_rays)) return false;
-        uint lanes = subgroupAdd(1u);
-        turns.together = turns.together && 2u * subgroupAdd(turns.spent) >= lanes * subgroupMax(turns.spent);
+        if (!hedgerow_any_lane(has_rays)) return false;
+        uint lanes = hedgerow_sum_of_lanes(1u);
+        turns.together =
+            turns.together && 2u * hedgerow_sum_of_lanes(turns.spent) >= lanes * hedgerow_max_of_lanes(turns.spent);
         turns.spent = 0u;
     }
     turns.takes = !turns.goes && has_rays && (none_goes || !turns.together);
     turns.goes = turns.goes || turns.takes;
-    turns.left = turns.together ? 0xffffffffu : HEDGEROW_ROUNDS_A_TURN;
     return true;
 }
 
-// True while a candidate waits to be decided on. When it is false the query has ended, or goes on in the next turn.
-bool hedgerowRayQueryProceedInTurn(inout HedgerowRayQuery query, inout HedgerowTurns turns) {
+// True if a candidate waits to be decided on. If not, the query has ended or goes on in the next turn. Its flags are asked for again, as a
+// compiler does not see that they are constant where they come from another turn.
+bool hedgerowRayQueryProceedInTurn(inout HedgerowRayQuery query, inout HedgerowTurns turns, uint flags) {
+    query.flags = flags;
+    turns.ends = false;
+#ifdef HEDGEROW_LANES
+    if (all(equal(turns.readable, uvec2(0u)))) {
+        turns.readable = hedgerow_address_of_any_lane(turns.goes ? query.top : uvec2(0u));
+        // No ray has a structure.
+        if (all(equal(turns.readable, uvec2(0u)))) {
+            turns.ends = turns.goes;
+            return false;
+        }
+    }
+    if (turns.goes) turns.spent++;
+    return hedgerow_round_of_lanes(query, turns.goes, turns.readable, turns.ends);
+#else
     if (!turns.goes) return false;
-    uint before = turns.left;
-    bool waits = hedgerow_proceed_for(query, turns.left, true);
-    turns.spent += before - turns.left;
+    uint most = turns.together ? 0xffffffffu : HEDGEROW_ROUNDS_A_TURN;
+    uint left = most;
+    bool waits = hedgerow_proceed_for(query, left, true, turns.ends);
+    turns.spent += most - left;
     return waits;
+#endif
 }
 
-// Whether the query has ended in this turn: its hit is what it is. One that ends with the last of its rounds does so in the next.
+// Whether the query has ended in this turn: its hit is what it is.
 bool hedgerowRayQueryEndsInTurn(HedgerowRayQuery query, inout HedgerowTurns turns) {
-    bool ends = turns.goes && turns.left != 0u;
+    bool ends = turns.goes && turns.ends;
     if (ends) turns.goes = false;
     return ends;
 }

@@ -8,9 +8,15 @@
 // children are in order (bvh/child_order.glsl) it takes the left child first, wherever that is. What a query asks for is mostly known
 // when its shader is compiled, and then nothing is left of the other way.
 //
+// There is no loop in the loop, which would cost a copy of what changes in it: what was taken and is too far costs a round. On lavapipe a
+// query of one level in turn is 1.06 times as fast so, and one of two levels by itself 1.01 times.
+//
 // Structures are of nodes of two. A shader that defines HEDGEROW_QUANTISED also meets those of nodes of eight (bvh/wide.glsl), as
 // trace/walk_quantised.glsl does, in either level beside those of two; in others rays pass what is made of them. What nobody uses costs: on lavapipe a
 // query in nodes of two takes 1.04 times as long where the shader could meet the others, too.
+//
+// A shader may define HEDGEROW_ONE_LEVEL, a constant or specialisation constant: where it is true, bottom-level structures are queried
+// themselves, and nothing is left of the steps of a top level, which rays pass. On lavapipe rays are 1.1 to 1.2 times as fast so.
 #ifndef HEDGEROW_TRACE_QUERY_WALK
 #define HEDGEROW_TRACE_QUERY_WALK
 #include "bvh/layout.glsl"
@@ -45,6 +51,10 @@ const uint HEDGEROW_INSTANCE_FORCE_NO_OPAQUE = 8u;
 const uint HEDGEROW_MET_NOTHING = 0u;
 const uint HEDGEROW_MET_TRIANGLE = 1u;
 const uint HEDGEROW_MET_BOX = 2u;
+
+#ifndef HEDGEROW_ONE_LEVEL
+#define HEDGEROW_ONE_LEVEL false
+#endif
 
 // In place of a leaf's count: nothing at hand, take what waits.
 const uint HEDGEROW_NOTHING = 0xffffffffu;
@@ -148,6 +158,24 @@ struct HedgerowRayQuery {
 #endif
 };
 
+// Whether the structure that is queried is a top level; whether it is at hand; whether one below it is.
+bool hedgerow_has_top(HedgerowRayQuery query) {
+    return !HEDGEROW_ONE_LEVEL && query.top_has_instances;
+}
+
+bool hedgerow_is_in_top(HedgerowRayQuery query) {
+    return !HEDGEROW_ONE_LEVEL && query.has_instances;
+}
+
+bool hedgerow_is_below(HedgerowRayQuery query) {
+    return !HEDGEROW_ONE_LEVEL && query.is_below;
+}
+
+// Where the entries of the structure at hand begin in the stack.
+uint hedgerow_bottom(HedgerowRayQuery query) {
+    return HEDGEROW_ONE_LEVEL ? query.floor : query.bottom;
+}
+
 vec3 hedgerow_transformed(vec4 rows[3], vec4 p) {
     precise vec3 q = vec3(rows[0].x * p.x + rows[0].y * p.y + rows[0].z * p.z + rows[0].w * p.w,
                           rows[1].x * p.x + rows[1].y * p.y + rows[1].z * p.z + rows[1].w * p.w,
@@ -160,13 +188,14 @@ bool hedgerow_can_be_traced(Header header) {
 #ifdef HEDGEROW_QUANTISED
     known = known || is_quantised(header.kind);
 #endif
+    known = known && !(HEDGEROW_ONE_LEVEL && has_instances(header.kind));
     return header.magic == MAGIC && known && header.active_count != 0u && (header.status & STATUS_UNUSABLE) == 0u;
 }
 
-// More rounds than the walk of a structure takes: each node and each record is seen once and may wait once. One that was
-// overwritten may be a circle.
+// More rounds than the walk of a structure takes: each node is seen once, may wait once, and may have eight slots in which nothing comes;
+// each record is seen once and may wait once. A structure that was overwritten may be a circle.
 uint hedgerow_rounds(uint slots, uint records) {
-    return 2u * (min(slots, HEDGEROW_MOST) + min(records, HEDGEROW_MOST)) + 4u;
+    return 10u * min(slots, HEDGEROW_MOST) + 2u * min(records, HEDGEROW_MOST) + 4u;
 }
 
 // Of what a bottom-level structure holds.
@@ -282,14 +311,14 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
         goes = hedgerow_can_be_traced(header) && cull_mask != 0u;
     }
     hedgerow_take_top(query);
-    bool skips = !query.has_instances && hedgerow_skips(flags, query.form);
+    bool skips = !hedgerow_is_in_top(query) && hedgerow_skips(flags, query.form);
     query.is_prepared = true;
-    if (hedgerow_prepare_for(query.has_instances, ray, query.prepared) && goes && !skips) {
+    if (hedgerow_prepare_for(hedgerow_is_in_top(query), ray, query.prepared) && goes && !skips) {
         query.index = root.x;
         query.left = root.y;
         if (hedgerow_is_quantised(query)) hedgerow_begin_quantised(query, ray.direction, ALL_SLOTS);
 #ifdef HEDGEROW_LINK_COUNTS
-        if (!query.has_instances) query.at.counts = HEDGEROW_LINK_COUNTS(structure);
+        if (!hedgerow_is_in_top(query)) query.at.counts = HEDGEROW_LINK_COUNTS(structure);
 #endif
     }
 }
@@ -330,7 +359,7 @@ uvec2 hedgerow_records_of_top(HedgerowRayQuery query) {
 
 // The instance of a meeting: of a bottom-level structure that is queried itself, one without a transform.
 Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
-    if (query.top_has_instances) return Instances(hedgerow_records_of_top(query)).instance[met.instance];
+    if (hedgerow_has_top(query)) return Instances(hedgerow_records_of_top(query)).instance[met.instance];
     const vec4 identity[3] = vec4[3](vec4(1, 0, 0, 0), vec4(0, 1, 0, 0), vec4(0, 0, 1, 0));
     return Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, query.top_slots | query.top_form, query.top_records);
 }
@@ -382,30 +411,18 @@ void hedgerow_put_off(inout HedgerowRayQuery query, uint index, uint count, floa
 
 #include "trace/query_quantised.glsl"
 
-void hedgerow_visit(inout HedgerowRayQuery query) {
-    if (query.index >= query.slots) {
-        query.left = HEDGEROW_NOTHING;
-        return;
-    }
-    if (!query.is_prepared) {
-        hedgerow_prepare_for(query.has_instances, query.ray, query.prepared);
-        query.is_prepared = true;
-    }
-    if (hedgerow_is_quantised(query)) {
-        hedgerow_visit_quantised(query);
-        return;
-    }
+// At a node of two, which was loaded.
+void hedgerow_visit_node(inout HedgerowRayQuery query, Node node) {
 #ifdef HEDGEROW_COUNTS_WORK
-    if (query.has_instances) query.work.x += 1u;
+    if (hedgerow_is_in_top(query)) query.work.x += 1u;
     else query.work.z += 1u;
 #endif
-    Node node = hedgerow_node_at(query.structure, query.index);
     Child a = node.left, b = node.right;
     bool enters_a, enters_b;
     float enter_a = hedgerow_enter(query.prepared, a.lo, a.hi, query.best, enters_a);
     float enter_b = hedgerow_enter(query.prepared, b.lo, b.hi, query.best, enters_b);
     bool b_first = enters_b && (!enters_a || (enter_b < enter_a && !hedgerow_goes_left_first(query)));
-    bool has_room = query.level - query.bottom < MAX_DEPTH;
+    bool has_room = query.level - hedgerow_bottom(query) < MAX_DEPTH;
     if (enters_a && enters_b && has_room) {
 #ifdef HEDGEROW_LINK_COUNTS
         hedgerow_waiting_links[query.level] = 2u * query.index + (b_first ? 0u : 1u);
@@ -418,6 +435,25 @@ void hedgerow_visit(inout HedgerowRayQuery query) {
 #endif
     query.index = b_first ? b.index : a.index;
     query.left = enters_a || enters_b ? b_first ? b.count : a.count : HEDGEROW_NOTHING;
+}
+
+// Whether a node is at hand, and there: a stale structure may name nodes that there are not. The ray is ready for it then.
+bool hedgerow_comes_to_node(inout HedgerowRayQuery query) {
+    if (query.left != 0u) return false;
+    if (query.index >= query.slots) {
+        query.left = HEDGEROW_NOTHING;
+        return false;
+    }
+    if (!HEDGEROW_ONE_LEVEL && !query.is_prepared) {
+        hedgerow_prepare_for(hedgerow_is_in_top(query), query.ray, query.prepared);
+        query.is_prepared = true;
+    }
+    return true;
+}
+
+void hedgerow_visit(inout HedgerowRayQuery query) {
+    if (hedgerow_is_quantised(query)) hedgerow_visit_quantised(query);
+    else hedgerow_visit_node(query, hedgerow_node_at(query.structure, query.index));
 }
 
 // To the next record of the leaf, if it and they are there: a stale structure may name records that there are not.
@@ -488,17 +524,16 @@ void hedgerow_leave_instance(inout HedgerowRayQuery query) {
 
 #include "trace/query_primitives.glsl"
 
-// Takes what waits; false at the end of the walk.
+// Takes what waits; false at the end of the walk. Behind an instance it takes what waits above it. What was taken may be nothing: too far.
 bool hedgerow_go_on(inout HedgerowRayQuery query) {
-    bool is_quantised_at_hand = hedgerow_is_quantised(query);
-    if (is_quantised_at_hand && hedgerow_take_of_group(query)) return true;
-    if (query.level == query.bottom) {
-        if (!query.is_below) return false;
+    if (hedgerow_is_quantised(query) && hedgerow_take_of_group(query)) return true;
+    if (query.level == hedgerow_bottom(query)) {
+        if (!hedgerow_is_below(query)) return false;
         hedgerow_leave_instance(query);
-        return true;
+        if (query.level == query.floor) return false;
     }
     query.level--;
-    if (is_quantised_at_hand) {
+    if (hedgerow_is_quantised(query)) {
         uvec2 waiting = hedgerow_entry(query.level);
         if (hedgerow_takes_rest(query, waiting)) return true;
         query.first_child = waiting.x;
@@ -528,26 +563,29 @@ bool hedgerow_has_record(HedgerowRayQuery query) {
 }
 
 // To the end, or for at most so many rounds, each a step of each kind that there is to take; what is left of them. True if a candidate
-// waits. (A mark of the end in the query would cost all queries 1.07 of their time on lavapipe; what is left of the rounds tells it.)
-bool hedgerow_proceed_for(inout HedgerowRayQuery query, inout uint most, const bool is_bounded) {
+// waits; `ends` where there is none and nothing is left to do. (As a member of the query it would cost all queries 1.07 of their time on
+// lavapipe.)
+bool hedgerow_proceed_for(inout HedgerowRayQuery query, inout uint most, const bool is_bounded, out bool ends) {
+    ends = false;
     while (query.rounds != 0u && (!is_bounded || most != 0u)) {
         query.rounds--;
         if (is_bounded) most--;
-        while (query.left == HEDGEROW_NOTHING) {
-            if (!hedgerow_go_on(query)) {
-                hedgerow_count_hit(query);
-                return false;
-            }
+        if (query.left == HEDGEROW_NOTHING && !hedgerow_go_on(query)) {
+            hedgerow_count_hit(query);
+            ends = true;
+            return false;
         }
-        if (hedgerow_has_record(query) && query.has_instances) hedgerow_enter_instance(query);
-        if (query.left == 0u) hedgerow_visit(query);
-        if (hedgerow_has_record(query) && !query.has_instances && hedgerow_test(query)) return true;
+        if (hedgerow_has_record(query) && hedgerow_is_in_top(query)) hedgerow_enter_instance(query);
+        if (hedgerow_comes_to_node(query)) hedgerow_visit(query);
+        if (hedgerow_has_record(query) && !hedgerow_is_in_top(query) && hedgerow_test(query)) return true;
     }
+    ends = query.rounds == 0u;
     return false;
 }
 
 bool hedgerow_proceed(inout HedgerowRayQuery query) {
     uint most = 0u;
-    return hedgerow_proceed_for(query, most, false);
+    bool ends;
+    return hedgerow_proceed_for(query, most, false, ends);
 }
 #endif

@@ -8,7 +8,7 @@
 #include "trace/long_loads.glsl"
 #endif
 
-// 4 is taken by trace/lanes.glsl.
+// 4 is LANES of the kernels that load lane by lane.
 layout(constant_id = 5) const bool IN_VECTORS = false;
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly restrict buffer Quads { uvec4 quad[]; };

@@ -16,9 +16,30 @@ layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
 // Of rays that end at any hit.
 layout(constant_id = 6) const bool LEFT_FIRST = false;
+// Lanes of the workgroup: gl_WorkGroupSize.x by a constant of its own.
+layout(constant_id = 4) const uint LANES = 16;
+#define HEDGEROW_LANES LANES
 
 #include "trace/lanes.glsl"
 #include "trace/walk.glsl"
+
+Node node_of_each_lane(HedgerowEachLane index) {
+    Node mine = HEDGEROW_NO_NODE;
+#define LOAD_NODE(lane)              \
+    if (lane < hedgerow_lanes)       \
+        mine = hedgerow_own_node(gl_SubgroupInvocationID == lane, structure.nodes[index.value[lane]], mine);
+    HEDGEROW_FOR_EACH_LANE(LOAD_NODE)
+    return mine;
+}
+
+Triangle triangle_of_each_lane(Triangles triangles, HedgerowEachLane index) {
+    Triangle mine = HEDGEROW_NO_TRIANGLE;
+#define LOAD_TRIANGLE(lane)          \
+    if (lane < hedgerow_lanes)       \
+        mine = hedgerow_own_triangle(gl_SubgroupInvocationID == lane, triangles.triangle[index.value[lane]], mine);
+    HEDGEROW_FOR_EACH_LANE(LOAD_TRIANGLE)
+    return mine;
+}
 
 void step_to(Node node, inout Walk walk) {
     if (LEFT_FIRST) visit_left_first(node, walk);
@@ -41,10 +62,10 @@ void main() {
     // Since all lanes took a ray: turns of the loop, and those in which this lane had a ray.
     uint turns = 0, turns_going = 0;
     while (true) {
-        bool none_goes = !any_lane(going);
+        bool none_goes = !hedgerow_any_lane(going);
         if (none_goes) {
-            if (!any_lane(next < end)) break;
-            together = together && 2u * sum_of_lanes(turns_going) >= gl_WorkGroupSize.x * turns;
+            if (!hedgerow_any_lane(next < end)) break;
+            together = together && 2u * hedgerow_sum_of_lanes(turns_going) >= gl_WorkGroupSize.x * turns;
             turns = 0;
             turns_going = 0;
         }
@@ -58,11 +79,11 @@ void main() {
         if (going) turns_going++;
         // A lane that needs no node loads that of any lane that does: the root is one, or no lane is at a node.
         for (uint visits = 0; visits < 2; visits++) {
-            EachLane nodes = each_lane(at_node(walk) ? walk.index : root.index);
-            if (at_node(walk)) step_to(node_of_each_lane(structure, nodes), walk);
+            HedgerowEachLane nodes = hedgerow_each_lane(at_node(walk) ? walk.index : root.index);
+            if (at_node(walk)) step_to(node_of_each_lane(nodes), walk);
         }
         // There is a first triangle, or no lane is at one.
-        EachLane tests = each_lane(at_triangle(walk) ? walk.index : 0u);
+        HedgerowEachLane tests = hedgerow_each_lane(at_triangle(walk) ? walk.index : 0u);
         if (at_triangle(walk)) test(triangle_of_each_lane(triangles, tests), ANY_HIT, walk);
         if (going && walk.left == NOTHING) {
             going = LEFT_FIRST ? go_on_left_first(walk) : go_on(walk);

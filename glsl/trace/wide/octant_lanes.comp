@@ -12,40 +12,57 @@ layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
 #define HEDGEROW_LEVELS 49
 
+// Lanes of the workgroup: gl_WorkGroupSize.x by a constant of its own.
+layout(constant_id = 4) const uint LANES = 16;
+#define HEDGEROW_LANES LANES
+
 #include "trace/lanes.glsl"
 #include "trace/walk_quantised.glsl"
 
-QuantisedNode quantised_node_of_each_lane(QuantisedNodes nodes, EachLane index) {
-    QuantisedNode mine;
-#define LOAD_QUANTISED(lane)                                 \
-    if (lane < lane_count) {                                 \
-        QuantisedNode theirs = nodes.node[index.value[lane]]; \
-        if (gl_SubgroupInvocationID == lane) mine = theirs;  \
+QuantisedNode own_quantised(bool own, QuantisedNode theirs, QuantisedNode mine) {
+    QuantisedNode kept = QuantisedNode(own ? theirs.origin : mine.origin,
+                                       own ? theirs.exponents_and_nodes : mine.exponents_and_nodes,
+                                       own ? theirs.first_child : mine.first_child,
+                                       own ? theirs.first_record : mine.first_record,
+                                       own ? theirs.counts : mine.counts, mine.lo, mine.hi);
+    [[unroll]] for (uint axis = 0; axis < 3; ++axis) {
+        kept.lo[axis] = own ? theirs.lo[axis] : mine.lo[axis];
+        kept.hi[axis] = own ? theirs.hi[axis] : mine.hi[axis];
     }
-    FOR_EACH_LANE(LOAD_QUANTISED)
+    return kept;
+}
+
+QuantisedNode quantised_node_of_each_lane(QuantisedNodes nodes, HedgerowEachLane index) {
+    const uvec2 none[3] = uvec2[3](uvec2(0u), uvec2(0u), uvec2(0u));
+    QuantisedNode mine = QuantisedNode(uvec3(0u), 0u, 0u, 0u, uvec2(0u), none, none);
+#define LOAD_QUANTISED(lane)         \
+    if (lane < hedgerow_lanes)       \
+        mine = own_quantised(gl_SubgroupInvocationID == lane, nodes.node[index.value[lane]], mine);
+    HEDGEROW_FOR_EACH_LANE(LOAD_QUANTISED)
     return mine;
 }
 
-Triangle record_of_each_lane(uvec2 records, EachLane unit) {
-    Triangle mine;
-#define LOAD_RECORD(lane)                                                                     \
-    if (lane < lane_count) {                                                                  \
-        Triangle theirs = Triangles(record_at_unit(records, unit.value[lane])).triangle[0];   \
-        if (gl_SubgroupInvocationID == lane) mine = theirs;                                   \
+Triangle record_of_each_lane(uvec2 records, HedgerowEachLane unit) {
+    Triangle mine = HEDGEROW_NO_TRIANGLE;
+#define LOAD_RECORD(lane)                                                                              \
+    if (lane < hedgerow_lanes) {                                                                       \
+        Triangle theirs = Triangles(record_at_unit(records, unit.value[lane])).triangle[0];            \
+        mine = hedgerow_own_triangle(gl_SubgroupInvocationID == lane, theirs, mine);                   \
     }
-    FOR_EACH_LANE(LOAD_RECORD)
+    HEDGEROW_FOR_EACH_LANE(LOAD_RECORD)
     return mine;
 }
 
 // What lies in a unit of each lane as behind the first of two triangles.
-SecondOfPair second_of_each_lane(uvec2 records, EachLane unit) {
-    SecondOfPair mine;
-#define LOAD_SECOND(lane)                                                                              \
-    if (lane < lane_count) {                                                                           \
-        SecondOfPair theirs = SecondsOfPairs(record_at_unit(records, unit.value[lane])).second[0];     \
-        if (gl_SubgroupInvocationID == lane) mine = theirs;                                            \
+SecondOfPair second_of_each_lane(uvec2 records, HedgerowEachLane unit) {
+    SecondOfPair mine = SecondOfPair(vec3(0.0), 0u);
+#define LOAD_SECOND(lane)                                                                                      \
+    if (lane < hedgerow_lanes) {                                                                               \
+        SecondOfPair theirs = SecondsOfPairs(record_at_unit(records, unit.value[lane])).second[0];             \
+        bool own = gl_SubgroupInvocationID == lane;                                                            \
+        mine = SecondOfPair(own ? theirs.vertex : mine.vertex, own ? theirs.primitive : mine.primitive);       \
     }
-    FOR_EACH_LANE(LOAD_SECOND)
+    HEDGEROW_FOR_EACH_LANE(LOAD_SECOND)
     return mine;
 }
 
@@ -68,10 +85,10 @@ void main() {
     // Since all lanes took a ray: turns of the loop, and those in which this lane had a ray.
     uint turns = 0, turns_going = 0;
     while (true) {
-        bool none_goes = !any_lane(going);
+        bool none_goes = !hedgerow_any_lane(going);
         if (none_goes) {
-            if (!any_lane(next < end)) break;
-            together = together && 2u * sum_of_lanes(turns_going) >= gl_WorkGroupSize.x * turns;
+            if (!hedgerow_any_lane(next < end)) break;
+            together = together && 2u * hedgerow_sum_of_lanes(turns_going) >= gl_WorkGroupSize.x * turns;
             turns = 0;
             turns_going = 0;
         }
@@ -86,15 +103,15 @@ void main() {
         // A lane that needs no node loads the root; one that needs no triangle the first, if any lane is at one.
         bool visits = at_node(walk);
         uint index = visits ? next_node(walk) : 0u;
-        QuantisedNode node = quantised_node_of_each_lane(nodes, each_lane(index));
+        QuantisedNode node = quantised_node_of_each_lane(nodes, hedgerow_each_lane(index));
         if (visits) visit(node, walk);
         next_leaf(walk);
         bool tests = at_triangle(walk);
-        EachLane unit = each_lane(tests ? walk.record : 0u);
+        HedgerowEachLane unit = hedgerow_each_lane(tests ? walk.record : 0u);
         Triangle triangle = record_of_each_lane(records, unit);
         // Where there is no second, the beginning of the first.
         bool is_pair = tests && has_second(triangle);
-        SecondOfPair second = second_of_each_lane(records, each_lane(is_pair ? walk.record + UNITS_OF_ONE : 0u));
+        SecondOfPair second = second_of_each_lane(records, hedgerow_each_lane(is_pair ? walk.record + UNITS_OF_ONE : 0u));
         if (tests) test_record(triangle, second, ANY_HIT, walk);
         if (going) {
             going = go_on(walk);

@@ -1,7 +1,7 @@
 // Everything that a ray query reports, for each ray: of the driver's queries or, with WITH_HEDGEROW, of ours.
 //
 // A ray says how its candidates are decided on; the first eight are written down as they come. With IN_TURN, which ours can, an
-// invocation has five rays.
+// invocation has five rays; with HEDGEROW_LANES, which has to be a workgroup's invocations, these are loaded for lane by lane.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_scalar_block_layout : require
@@ -11,7 +11,11 @@
 #extension GL_EXT_ray_query : require
 #endif
 
+#ifdef HEDGEROW_LANES
+layout(local_size_x_id = 0) in;
+#else
 layout(local_size_x = 64) in;
+#endif
 
 const uint IGNORE = 0;
 const uint CONFIRM = 1;
@@ -137,7 +141,7 @@ void main() {
             next += gl_WorkGroupSize.x;
             begin(i);
         }
-        while (hedgerowRayQueryProceedInTurn(query, turns)) decide();
+        if (hedgerowRayQueryProceedInTurn(query, turns, ray.flags)) decide();
         if (hedgerowRayQueryEndsInTurn(query, turns)) report(i);
     }
 }

@@ -3,6 +3,8 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 2) const uint SHARED_LEVELS = 0;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
+layout(constant_id = 5) const bool ONE_LEVEL = false;
+#define HEDGEROW_ONE_LEVEL ONE_LEVEL
 #define IN_TURN
 #include "trace/ray_query_names.glsl"
 #include "measure/ray_query.glsl"

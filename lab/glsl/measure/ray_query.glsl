@@ -55,7 +55,7 @@ void main() {
             next += gl_WorkGroupSize.x;
             begin(query, i);
         }
-        while (hedgerowRayQueryProceedInTurn(query, turns)) {}
+        hedgerowRayQueryProceedInTurn(query, turns, FLAGS);
         if (hedgerowRayQueryEndsInTurn(query, turns)) report(query, i);
     }
 }

@@ -3,7 +3,7 @@
 use super::any_hit::{AnyHit, ChildrenBy, TaughtOrder};
 use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::device_rays::DeviceRays;
-use super::queries::{self, Queries, QueryWork};
+use super::queries::{self, Queried, Queries, QueryWork};
 use super::taught_rounds::TaughtRounds;
 use super::wide::{WidePlan, WideTree};
 use super::{BuildRun, Subject, joined_choices};
@@ -178,7 +178,7 @@ fn record_trace(
     buffers: &TraceBuffers,
 ) -> hedgerow::Result<()> {
     match (wide_tree, binary.by_query) {
-        (None, Some(queries)) => queries::record(recorder, query, buffers, false, queries),
+        (None, Some(queries)) => queries::record(recorder, query, buffers, Queried::OneLevel, queries),
         (None, None) => record_binary(recorder, binary.is_ordered, query, buffers),
         (Some(tree), _) => tree.record_trace(recorder, query, buffers),
     }

@@ -15,12 +15,23 @@ pub type QueryWork = [u32; 4];
 pub enum Queries {
     /// One each.
     OneEach,
-    /// Many each, in turn (`glsl/trace/query_turns.glsl`).
+    /// Many each, in turn (`glsl/trace/query_turns.glsl`), with loads lane by lane where tracers have them.
     InTurn,
 }
 
-/// Records the tracing of rays through a structure of ours, which may have nodes of eight where `wide` says so
-/// ([`hedgerow::accel::AccelOptions::wide`]); their [`QueryWork`] is counted, by one each, where there is room for it.
+/// What queries are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Queried {
+    /// A top level and what is below it.
+    TwoLevels {
+        /// They may have nodes of eight ([`hedgerow::accel::AccelOptions::wide`]).
+        wide: bool,
+    },
+    /// A bottom level of nodes of two, and no top level (`HEDGEROW_ONE_LEVEL`).
+    OneLevel,
+}
+
+/// Records the tracing of rays through a structure of ours; their [`QueryWork`] is counted, by one each, where there is room for it.
 ///
 /// # Errors
 /// The kernel cannot be made.
@@ -28,7 +39,7 @@ pub(crate) fn record(
     recorder: &mut Recorder<'_>,
     query: Query,
     buffers: &TraceBuffers,
-    wide: bool,
+    queried: Queried,
     queries: Queries,
 ) -> hedgerow::Result<()> {
     let &TraceBuffers { structure, rays, hits, work, count } = buffers;
@@ -39,7 +50,10 @@ pub(crate) fn record(
     let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
     let in_turn = queries == Queries::InTurn && work.is_none();
     let rays_each = if in_turn { rays_in_turn(recorder.context(), count) } else { 1 };
-    let shader = match (in_turn, wide, tuning.in_longs) {
+    let is_wide = queried == Queried::TwoLevels { wide: true };
+    let one_level = u32::from(queried == Queried::OneLevel);
+    let shader = match (in_turn, is_wide, tuning.in_longs) {
+        (true, false, _) if tuning.lane_by_lane => &shaders::MEASURE_QUERY_TURNS_LANES,
         (false, false, false) => &shaders::MEASURE_QUERY,
         (false, false, true) => &shaders::MEASURE_QUERY_INT64,
         (false, true, false) => &shaders::MEASURE_QUERY_QUANTISED,
@@ -50,8 +64,7 @@ pub(crate) fn record(
         (true, true, true) => &shaders::MEASURE_QUERY_QUANTISED_TURNS_INT64,
     };
     let kernel = match work {
-        None if in_turn => Kernel::new(shader, tuning.group, &[any_hit, levels, rays_each]),
-        None => Kernel::new(shader, tuning.group, &[any_hit, levels]),
+        None => Kernel::new(shader, tuning.group, &[any_hit, levels, rays_each, tuning.group, one_level]),
         Some(_) => Kernel::new(&shaders::MEASURE_QUERY_WORK, limits.subgroup_size, &[any_hit, 0]),
     };
     let arguments = arguments::TraceQueries { structure, rays, hits, works, first: 0, count };

@@ -1,7 +1,7 @@
 //! Acceleration structures by the calls of `VK_KHR_acceleration_structure`: ours or the driver's, and nothing else differs.
 
 use super::device_rays::{RayBuffers, timed_run};
-use super::queries::{self, Queries, QueryWork};
+use super::queries::{self, Queried, Queries, QueryWork};
 use crate::device::{Buffer, Device, DriverRays, DriverTracing};
 use crate::experiments::accel::points;
 use crate::scene::Mesh;
@@ -193,7 +193,10 @@ impl<'a> Structures<'a> {
         queries: Queries,
     ) -> hedgerow::Result<()> {
         match self.maker {
-            Functions::Ours(ref ours) => queries::record(recorder, query, buffers, ours.options().wide, queries),
+            Functions::Ours(ref ours) => {
+                let queried = Queried::TwoLevels { wide: ours.options().wide };
+                queries::record(recorder, query, buffers, queried, queries)
+            }
             Functions::Driver(_) => {
                 let any_hit = query == Query::AnyHit;
                 let &TraceBuffers { structure, rays, hits, count, .. } = buffers;

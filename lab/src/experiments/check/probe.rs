@@ -5,6 +5,7 @@ use crate::device::Device;
 use crate::shaders;
 use ash::vk;
 use hedgerow::gpu::Recorder;
+use hedgerow::trace::tracer::Loads;
 
 /// A ray with its flags, and how its candidates are decided on.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -106,6 +107,7 @@ impl ProbeReport {
 /// A pipeline of its own, and its layout: neither of them ours.
 pub struct Probe {
     device: &'static Device,
+    group: u32,
     layout: vk::PipelineLayout,
     pipeline: vk::Pipeline,
 }
@@ -124,11 +126,23 @@ impl Probe {
         Probe::of(device, shaders::MEASURE_PROBE_TURNS.spirv)
     }
 
+    /// The same with loads lane by lane, where a subgroup is one that can.
+    pub fn in_lanes(device: &'static Device) -> Option<Probe> {
+        let limits = &device.limits;
+        let can = limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES;
+        can.then(|| Probe::with(device, shaders::MEASURE_PROBE_TURNS_LANES.spirv, limits.subgroup_size))
+    }
+
     /// Of a shader with workgroups of 64 and at most 40 bytes of push constants.
     ///
     /// # Panics
     /// The device does not take it.
     pub fn of(device: &'static Device, spirv: &[u8]) -> Probe {
+        Probe::with(device, spirv, 64)
+    }
+
+    /// Of workgroups of `group`, which the shader may take as constants 0 and 4.
+    fn with(device: &'static Device, spirv: &[u8], group: u32) -> Probe {
         let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).expect("SPIR-V");
         let raw = device.ash_device();
         let range =
@@ -140,15 +154,19 @@ impl Probe {
                 .expect("a layout");
             let module =
                 raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None).expect("a module");
+            let entry = |id| vk::SpecializationMapEntry { constant_id: id, offset: 0, size: size_of::<u32>() };
+            let (entries, data) = ([entry(0), entry(4)], group.to_ne_bytes());
+            let constants = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
             let stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)
                 .module(module)
+                .specialization_info(&constants)
                 .name(c"main");
             let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
             let pipeline =
                 raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None).expect("a pipeline")[0];
             raw.destroy_shader_module(module, None);
-            Probe { device, layout, pipeline }
+            Probe { device, group, layout, pipeline }
         }
     }
 
@@ -177,7 +195,7 @@ impl Probe {
             unsafe {
                 raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, self.pipeline);
                 raw.cmd_push_constants(commands, self.layout, vk::ShaderStageFlags::COMPUTE, 0, push);
-                raw.cmd_dispatch(commands, count.div_ceil(64), 1, 1);
+                raw.cmd_dispatch(commands, count.div_ceil(self.group), 1, 1);
             }
             Ok(())
         };

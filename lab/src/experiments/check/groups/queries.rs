@@ -12,7 +12,7 @@ use crate::random::SplitMix64;
 use anyhow::ensure;
 use ash::vk;
 use glam::Vec3;
-use hedgerow::accel::{Instance, REBRAID};
+use hedgerow::accel::{AccelOptions, Instance, REBRAID};
 use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
 
 /// The world's reports are right, and enough rays hit for that to say something.
@@ -120,12 +120,19 @@ pub fn flags_and_decisions(cases: &mut Cases<'_>) {
     masks(cases);
 }
 
-/// What queries report does not depend on how many rays an invocation has, whichever goes on while others have ended.
+/// What queries report does not depend on how many rays an invocation has, whichever goes on while others have ended, nor on how it loads.
 fn in_turn(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found {
-    let ours = Ours::on(device);
-    let built = world.build(&ours);
+    reports_the_same(&Ours::on(device), &Probe::in_turn(device), world, rays)?;
+    // Loads lane by lane are for nodes of two.
+    let Some(in_lanes) = Probe::in_lanes(device) else { return Ok(()) };
+    reports_the_same(&Ours::with_options(device, AccelOptions::DEFAULT), &in_lanes, world, rays)
+}
+
+/// As queries of one ray each report.
+fn reports_the_same(ours: &Ours, probe: &Probe, world: &World, rays: &[ProbeRay]) -> Found {
+    let built = world.build(ours);
     let expected = ours.probe(built.top.structure, rays);
-    let found = Probe::in_turn(device).ask(ours.address(built.top.structure), rays);
+    let found = probe.ask(ours.address(built.top.structure), rays);
     for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
         ensure!(found == expected, "ray {i}, {:?}: {found:?} in turn, {expected:?} by itself", rays[i]);
     }
