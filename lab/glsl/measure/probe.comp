@@ -6,4 +6,6 @@
 #version 460
 #define WITH_HEDGEROW
 #define HEDGEROW_QUANTISED
+layout(constant_id = 5) const bool ONE_LEVEL = false;
+#define HEDGEROW_ONE_LEVEL ONE_LEVEL
 #include "measure/probe.glsl"

@@ -51,6 +51,38 @@ fn a_run_leaves_records_a_table_charts_pictures_and_a_page() {
 }
 
 #[test]
+fn rays_by_queries_hit_what_the_tracer_hits() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let output = text(folder.path());
+    let builders = "lbvh,lbvh:walk=query,lbvh:walk=turns";
+    let rays = "primary,ao,diffuse1,random";
+    let done = hedgerow(&[
+        "bench",
+        "gen:clutter:40:1",
+        "-b",
+        builders,
+        "--rays",
+        rays,
+        "--size",
+        "48x32",
+        "--runs",
+        "1",
+        "--no-pictures",
+        "-o",
+        output,
+    ]);
+    assert_eq!(status(&done), Some(0), "{}", err(&done));
+    let records = records(folder.path());
+    let [tracer, by_query, in_turn] = &records[..] else { panic!("{records:?}") };
+    assert_eq!(tracer.trace.len(), 4, "{tracer:?}");
+    for other in [by_query, in_turn] {
+        let checksums = |record: &Record| record.trace.iter().map(|t| (t.hits, t.checksum.clone())).collect::<Vec<_>>();
+        assert_eq!(checksums(other), checksums(tracer), "{}", other.builder);
+        assert!(tracer.trace.iter().all(|trace| trace.hits > 0), "{tracer:?}");
+    }
+}
+
+#[test]
 fn kd_trees_are_told_in_the_tables_of_the_thesis_beside_its_own_figures() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = folder.path().to_str().expect("text");

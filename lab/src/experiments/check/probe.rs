@@ -113,12 +113,19 @@ pub struct Probe {
 }
 
 impl Probe {
+    /// Invocations of a workgroup, where it is not one subgroup.
+    const GROUP: u32 = 64;
     /// Bytes of push constants that any of its shaders takes.
     const PUSH_BYTES: u32 = 40;
 
     /// For our structures.
     pub fn ours(device: &'static Device) -> Probe {
         Probe::of(device, shaders::MEASURE_PROBE.spirv)
+    }
+
+    /// The same for bottom levels alone (`HEDGEROW_ONE_LEVEL`).
+    pub fn of_one_level(device: &'static Device) -> Probe {
+        Probe::with(device, shaders::MEASURE_PROBE.spirv, Probe::GROUP, true)
     }
 
     /// The same with several rays for each invocation, in turn.
@@ -130,7 +137,7 @@ impl Probe {
     pub fn in_lanes(device: &'static Device) -> Option<Probe> {
         let limits = &device.limits;
         let can = limits.subgroup_is_exact && limits.subgroup_size <= Loads::MAX_LANES;
-        can.then(|| Probe::with(device, shaders::MEASURE_PROBE_TURNS_LANES.spirv, limits.subgroup_size))
+        can.then(|| Probe::with(device, shaders::MEASURE_PROBE_TURNS_LANES.spirv, limits.subgroup_size, false))
     }
 
     /// Of a shader with workgroups of 64 and at most 40 bytes of push constants.
@@ -138,11 +145,11 @@ impl Probe {
     /// # Panics
     /// The device does not take it.
     pub fn of(device: &'static Device, spirv: &[u8]) -> Probe {
-        Probe::with(device, spirv, 64)
+        Probe::with(device, spirv, Probe::GROUP, false)
     }
 
-    /// Of workgroups of `group`, which the shader may take as constants 0 and 4.
-    fn with(device: &'static Device, spirv: &[u8], group: u32) -> Probe {
+    /// Of workgroups of `group`, which the shader may take as constants 0 and 4; and whether of one level, as constant 5.
+    fn with(device: &'static Device, spirv: &[u8], group: u32, one_level: bool) -> Probe {
         let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).expect("SPIR-V");
         let raw = device.ash_device();
         let range =
@@ -154,9 +161,10 @@ impl Probe {
                 .expect("a layout");
             let module =
                 raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None).expect("a module");
-            let entry = |id| vk::SpecializationMapEntry { constant_id: id, offset: 0, size: size_of::<u32>() };
-            let (entries, data) = ([entry(0), entry(4)], group.to_ne_bytes());
-            let constants = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
+            let data = [group, u32::from(one_level)];
+            let entry = |(id, offset)| vk::SpecializationMapEntry { constant_id: id, offset, size: size_of::<u32>() };
+            let entries = [(0, 0), (4, 0), (5, 4)].map(entry);
+            let constants = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::bytes_of(&data));
             let stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)
                 .module(module)

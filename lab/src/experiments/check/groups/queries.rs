@@ -116,6 +116,7 @@ pub fn flags_and_decisions(cases: &mut Cases<'_>) {
         let what = format!("world {seed}, by pointers: {by_pointers}, re-braided: {rebraids}");
         cases.case(what.clone(), |device| agrees(device, &what, &world, &all, 20));
         cases.case(format!("{what}, rays in turn"), |device| in_turn(device, &world, &all));
+        cases.case(format!("{what}, one level"), |device| one_level(device, &world, &all));
     }
     masks(cases);
 }
@@ -126,6 +127,28 @@ fn in_turn(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found {
     // Loads lane by lane are for nodes of two.
     let Some(in_lanes) = Probe::in_lanes(device) else { return Ok(()) };
     reports_the_same(&Ours::with_options(device, AccelOptions::DEFAULT), &in_lanes, world, rays)
+}
+
+/// A shader for bottom levels alone reports of each part what another one does, and nothing of a top level.
+fn one_level(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found {
+    let (ours, probe) = (Ours::on(device), Probe::of_one_level(device));
+    let built = world.build(&ours);
+    let mut hits = 0;
+    for part in &built.parts {
+        let expected = ours.probe(part.structure, rays);
+        let found = probe.ask(ours.address(part.structure), rays);
+        for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            ensure!(found == expected, "ray {i}, {:?}: {found:?} of one level, {expected:?} of either", rays[i]);
+        }
+        hits += expected.iter().filter(|report| report.committed.kind != 0).count();
+    }
+    ensure!(hits > 20, "{hits} rays hit a part");
+    let of_top = probe.ask(ours.address(built.top.structure), rays);
+    ensure!(
+        of_top.iter().all(|report| report.committed.kind == 0 && report.candidate_count == 0),
+        "a top level was hit"
+    );
+    Ok(())
 }
 
 /// As queries of one ray each report.
