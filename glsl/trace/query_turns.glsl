@@ -23,7 +23,7 @@
 // (trace/lanes.glsl): what CPUs' drivers are faster with that load what is uniform once. Structures are of nodes of two then.
 //
 // On lavapipe the rays of `hedgerow accel` are 1.25 times as fast lane by lane as with one for each invocation (docs/notes/rays.md): those
-// that go anywhere 1.6 to 2.1 times, those that go the same way 0.91 to 1.13. With each lane's own loads it is 1.13 times.
+// that go anywhere 1.6 to 2.1 times, those that go the same way 0.91 to 1.13. With each lane's own loads it was 1.13 times.
 //
 // needs   votes and arithmetic of subgroups in compute shaders, with HEDGEROW_LANES ballots in place of them; all invocations of a
 //         subgroup come to hedgerowTakeTurn and hedgerowRayQueryProceedInTurn together
