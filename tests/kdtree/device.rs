@@ -265,7 +265,8 @@ fn what_is_out_of_room_is_a_leaf_and_the_report_says_what_would_suffice() {
                 assert_same(&got, &expected, &format!("{estimate:?}"));
                 break;
             }
-            assert!(got.header.reference_count < expected.header.reference_count, "{estimate:?}");
+            // Not fewer references: a cell that is cut off may have as many as its leaves would.
+            assert!(got.header.node_count < expected.header.node_count, "{estimate:?}: {:?}", got.header);
             assert!(!should_suffice && builds < 8, "{estimate:?}: {report:?}");
             // Of levels that were cut off nothing is known.
             should_suffice = report.ended == 0;
