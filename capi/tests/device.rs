@@ -9,6 +9,7 @@ use std::ptr::{null, null_mut};
 struct Engine {
     info: HedgerowContextCreateInfo,
     device: ash::Device,
+    queue_family: u32,
     instance: ash::Instance,
     _entry: ash::Entry,
 }
@@ -40,6 +41,7 @@ impl Engine {
             device_info.pp_enabled_extension_names = (*needs).enabled_extension_names;
             let device = instance.create_device(physical_device, &device_info, None).expect("a device");
             let optional = (*needs).optional;
+            let queue_family = (*needs).queue_family_index;
             hedgerow_destroy_requirements(needs);
             let info = HedgerowContextCreateInfo {
                 pfn_get_instance_proc_addr,
@@ -55,7 +57,7 @@ impl Engine {
                 p_bottom_codes: null(),
                 p_top_codes: null(),
             };
-            Engine { info, device, instance, _entry: entry }
+            Engine { info, device, queue_family, instance, _entry: entry }
         }
     }
 }
@@ -183,5 +185,85 @@ fn refusals_name_the_field() {
         let more = HedgerowContextCreateInfo { optional: 0x80, ..engine.info };
         assert_eq!(hedgerow_create_context(&more, &mut context), vk::Result::ERROR_VALIDATION_FAILED_EXT);
         assert_eq!(last_error(), "optional is 0x80; it must be of the bits HEDGEROW_OPTIONAL_*");
+    }
+}
+
+/// A buffer with an address, filled by whoever records into it.
+fn buffer(engine: &Engine, bytes: u64) -> (vk::Buffer, vk::DeviceMemory) {
+    let Engine { info, device, instance, .. } = engine;
+    let usage = vk::BufferUsageFlags::TRANSFER_DST
+        | vk::BufferUsageFlags::STORAGE_BUFFER
+        | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+    // SAFETY: the device lives; the buffer is bound before it is used.
+    unsafe {
+        let buffer =
+            device.create_buffer(&vk::BufferCreateInfo::default().size(bytes).usage(usage), None).expect("a buffer");
+        let needs = device.get_buffer_memory_requirements(buffer);
+        let has_address = vk::MemoryAllocateFlags::DEVICE_ADDRESS;
+        let mut flags = vk::MemoryAllocateFlagsInfo::default().flags(has_address);
+        let all = instance.get_physical_device_memory_properties(info.physical_device).memory_type_count;
+        let ty = (0..all).find(|ty| needs.memory_type_bits & 1 << ty != 0).expect("a type of memory");
+        let allocate =
+            vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(ty).push_next(&mut flags);
+        let memory = device.allocate_memory(&allocate, None).expect("memory");
+        device.bind_buffer_memory(buffer, memory, 0).expect("bound");
+        (buffer, memory)
+    }
+}
+
+#[test]
+fn arguments_lie_in_the_part_of_the_buffer_that_is_named() {
+    let engine = Engine::new(&[]);
+    let device = &engine.device;
+    let mut context = null_mut();
+    // SAFETY: the device has what the library requires and lives; what is recorded is never submitted, so that its addresses need not be.
+    unsafe {
+        // Not checked: the structure and the scratch memory are addresses alone.
+        let unchecked = HedgerowContextCreateInfo { checked: vk::FALSE, ..engine.info };
+        assert_eq!(hedgerow_create_context(&unchecked, &mut context), vk::Result::SUCCESS, "{}", last_error());
+        let (table, memory) = buffer(&engine, 4096);
+        let pool_info = vk::CommandPoolCreateInfo::default().queue_family_index(engine.queue_family);
+        let pool = device.create_command_pool(&pool_info, None).expect("a command pool");
+        let commands = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+        let commands = device.allocate_command_buffers(&commands).expect("a command buffer")[0];
+        device.begin_command_buffer(commands, &vk::CommandBufferBeginInfo::default()).expect("begun");
+
+        let address = |device_address| vk::DeviceOrHostAddressConstKHR { device_address };
+        let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+            .vertex_format(vk::Format::R32G32B32_SFLOAT)
+            .vertex_data(address(0x10000))
+            .vertex_stride(12)
+            .max_vertex(2)
+            .index_type(vk::IndexType::NONE_KHR);
+        let geometry = [vk::AccelerationStructureGeometryKHR::default()
+            .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+            .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })];
+        // Four of a kind are one dispatch, whose arguments are in memory; of two they would be push constants.
+        let builds = [0x20000, 0x40000, 0x60000, 0x80000].map(|at| {
+            vk::AccelerationStructureBuildGeometryInfoKHR::default()
+                .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
+                .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
+                .dst_acceleration_structure(vk::Handle::from_raw(at))
+                .scratch_data(vk::DeviceOrHostAddressKHR { device_address: at + 0x10000 })
+                .geometries(&geometry)
+        });
+        let range = vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(1);
+        let ranges = [&raw const range; 4];
+        let record = |offset, size| {
+            let memory = HedgerowArgumentMemory { buffer: table, offset, size };
+            let (builds, ranges) = (builds.as_ptr(), ranges.as_ptr());
+            hedgerow_cmd_build_acceleration_structures_by_table(context, commands, 4, builds, ranges, &memory)
+        };
+        let needs = hedgerow_get_argument_size(4, 4);
+        assert_eq!(record(16, needs), vk::Result::SUCCESS, "{}", last_error());
+        assert_eq!(record(4, needs), vk::Result::ERROR_VALIDATION_FAILED_EXT);
+        assert!(last_error().ends_with("its address is a multiple of 16"), "{}", last_error());
+        assert_eq!(record(16, 8), vk::Result::ERROR_VALIDATION_FAILED_EXT);
+        assert!(last_error().starts_with("memory for arguments of 8 bytes, at least"), "{}", last_error());
+
+        device.destroy_command_pool(pool, None);
+        device.destroy_buffer(table, None);
+        device.free_memory(memory, None);
+        hedgerow_destroy_context(context);
     }
 }

@@ -19,13 +19,13 @@
 //! device knows of it is a [`Property`], written to an address instead of a query pool.
 //!
 //! Three kinds of builds, by flag. Build and rays are beside those of `PREFER_FAST_BUILD`: geometric means of eight scenes and seven
-//! kinds of rays, on Mesa 26's lavapipe.
+//! kinds of rays, on Mesa 26's lavapipe (`hedgerow bench -b lbvh:codes=emc64var/24,hploc,hploc:optimise=0.5`).
 //!
 //! | preference | bottom levels | top levels | build | rays |
 //! | --- | --- | --- | --- | --- |
 //! | `PREFER_FAST_BUILD` | an LBVH by codes of 8 bits less | the same | 1.0 | 1.0 |
-//! | none | H-PLOC, of over 2,048 primitives: of those measured in nodes of two, the least time for a build and ten rays a triangle | an LBVH and three quarters of a pass of [reinsertion](crate::bvh::reinsertion) | 2.2 | 1.09 |
-//! | `PREFER_FAST_TRACE` | H-PLOC and half a pass of reinsertion (a whole one: 12 and 1.18); three quarters up to 32,768 primitives, two passes up to 2,048 | the same as without, and opens instances ([`REBRAID`]) | 2.2 to 12 | 1.09 to 1.18 |
+//! | none | H-PLOC, of over 2,048 primitives: of those measured in nodes of two, the least time for a build and ten rays a triangle | an LBVH and three quarters of a pass of [reinsertion](crate::bvh::reinsertion) | 2.4 | 1.17 |
+//! | `PREFER_FAST_TRACE` | H-PLOC and half a pass of reinsertion (a whole one: 16 and 1.27); three quarters up to 32,768 primitives, two passes up to 2,048 | the same as without, and opens instances ([`REBRAID`]) | 10 | 1.23 |
 //!
 //! What other flags change:
 //!

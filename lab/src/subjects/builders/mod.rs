@@ -337,6 +337,7 @@ pub fn help() -> String {
 mod tests {
     use super::*;
     use crate::subjects::host::HostPlan;
+    use hedgerow::bvh::reinsertion::ReinsertionOptions;
     use hedgerow::bvh::sah::Collapse;
     use hedgerow::trace::kd::Traversal;
 
@@ -377,6 +378,15 @@ mod tests {
         assert_eq!(spec.codes().expect("checked").map(|c| c.to_string()).as_deref(), Some("mc63+concise"));
         assert_eq!(spec.collapse().expect("checked"), Collapse::OFF);
         assert_eq!("lbvh-host".parse::<Spec>().expect("known").collapse().expect("checked"), Collapse::SAH);
+    }
+
+    #[test]
+    fn passes_of_reinsertion_may_be_parts() {
+        let rounds =
+            |text: &str| text.parse::<Spec>().expect("known").reinsertion().expect("checked").map(|o| o.rounds);
+        assert_eq!(rounds("hploc:optimise=0.5"), Some(ReinsertionOptions::FAST.rounds / 2));
+        assert_eq!(rounds("hploc:optimise=3"), Some(ReinsertionOptions::of_passes(3).rounds));
+        assert_eq!(rounds("hploc:optimise=1e30"), Some(u32::MAX));
     }
 
     #[test]
@@ -426,7 +436,7 @@ mod tests {
             let says = format!("split={wrong} is unknown; use a number from 0 to 1");
             assert!(error_of(&format!("hploc:split={wrong}")).contains(&says), "{wrong}");
         }
-        for wrong in ["ms", "-1ms", "infms", "20s"] {
+        for wrong in ["ms", "-1ms", "infms", "20s", "-0.5", "nan", "inf"] {
             assert!(error_of(&format!("lbvh:optimise={wrong}")).contains("a time for it as in 20ms"), "{wrong}");
         }
         assert!(error_of("lbvh-host:optimise=20ms").contains("on the host rounds are not timed"));

@@ -48,7 +48,7 @@ pub(super) const SPLIT: BuilderOption = option(
 );
 pub(super) const OPTIMISE: BuilderOption = option(
     "optimise",
-    "off, fast, medium, high, a number of passes of reinsertion, or on the device a time for it as in 20ms",
+    "off, fast, medium, high, a number of passes of reinsertion such as 0.5, or on the device a time for it as in 20ms",
 );
 pub(super) const BY: BuilderOption = option(
     "by",
@@ -305,7 +305,10 @@ impl Spec {
                 return Err(Error::Argument(format!("builder {self}: {what}; use {} here", OPTIMISE.values)));
             }
             Some(_) if self.time_to_optimise()?.is_some() => Some(ReinsertionOptions::FAST),
-            Some(_) => self.parsed(&OPTIMISE)?.map(ReinsertionOptions::of_passes),
+            Some(_) => self.within(&OPTIMISE, 0.0..=f64::MAX)?.map(|passes: f64| {
+                let rounds = passes * f64::from(ReinsertionOptions::FAST.rounds);
+                ReinsertionOptions { rounds: rounds.round() as u32, ..ReinsertionOptions::FAST }
+            }),
         })
     }
 
