@@ -188,7 +188,7 @@ fn refusals_name_the_field() {
     }
 }
 
-/// A buffer with an address, filled by whoever records into it.
+/// A buffer with an address, that commands may write.
 fn buffer(engine: &Engine, bytes: u64) -> (vk::Buffer, vk::DeviceMemory) {
     let Engine { info, device, instance, .. } = engine;
     let usage = vk::BufferUsageFlags::TRANSFER_DST
@@ -216,7 +216,7 @@ fn arguments_lie_in_the_part_of_the_buffer_that_is_named() {
     let engine = Engine::new(&[]);
     let device = &engine.device;
     let mut context = null_mut();
-    // SAFETY: the device has what the library requires and lives; what is recorded is never submitted, so that its addresses need not be.
+    // SAFETY: the device has what the library requires and lives; nothing recorded is submitted, so its addresses need no memory.
     unsafe {
         // Not checked: the structure and the scratch memory are addresses alone.
         let unchecked = HedgerowContextCreateInfo { checked: vk::FALSE, ..engine.info };

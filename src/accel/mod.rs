@@ -18,8 +18,9 @@
 //! A structure is copied, compacted, kept in a file and brought back by the calls of the extension ([`serialize`]); what the
 //! device knows of it is a [`Property`], written to an address instead of a query pool.
 //!
-//! Three kinds of builds, by flag. Build and rays are beside those of `PREFER_FAST_BUILD`: geometric means of eight scenes and seven
-//! kinds of rays, on Mesa 26's lavapipe (`hedgerow bench -b lbvh:codes=emc64var/24,hploc,hploc:optimise=0.5`).
+//! Three kinds of builds, by flag. Build time and speed of rays are beside those of `PREFER_FAST_BUILD`: geometric means of the first
+//! eight scenes of `docs/results.md` and seven kinds of rays through the tracer, on Mesa 26's lavapipe (`hedgerow bench -b
+//! lbvh:codes=emc64var/24,hploc,hploc:optimise=0.5,hploc:optimise=fast`).
 //!
 //! | preference | bottom levels | top levels | build | rays |
 //! | --- | --- | --- | --- | --- |
