@@ -136,9 +136,8 @@ void rebraid_fences() {
         take_sample(table, i, entry.left_out == 0u, Box(entry.lo, entry.hi));
     }
     next_phase();
-    const Box EVERYWHERE = Box(vec3(-LARGEST_FLOAT), vec3(LARGEST_FLOAT));
     Box near = EVERYWHERE;
-    if (sampled_count != 0) near = fences_of(EVERYWHERE, find_quartiles(table, taken));
+    if (sampled_count != 0) near = fences_of(find_quartiles(table, taken));
     if (gl_LocalInvocationIndex == 0) state.near = near;
 }
 

@@ -50,6 +50,8 @@ BUFFER BuildState {
     uint centroids_hi[3];
     uint active_count;
     uint status;
+    uint core_lo[3];                      // of codes with sections: the boxes inside the fences
+    uint core_hi[3];
     CodePlan plan;
     uint cluster_counts[2];               // of PLOC: of even and odd rounds; of HLBVH the first: treelets
     uint is_forced[2];

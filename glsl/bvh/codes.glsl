@@ -199,23 +199,16 @@ uvec3 sorted_axes(ivec3 extents) {
 
 // As many bits, in eights, as make the same number of cells smaller than typical extents as the codes' own would if the primitives filled
 // the bounds: src/bvh/codes/spread.rs.
-uint bits_by_spread(CodeKind kind, ivec3 extents, ivec3 typical, CodeSections sections, uint most) {
-    uint needed = coordinate_bits(kind), lost = 0, taken = 0, counted = 0;
+uint bits_by_spread(CodeKind kind, ivec3 extents, ivec3 typical, bool has_core, uint most) {
+    uint needed = coordinate_bits(kind), lost = has_core ? SECTION_BITS : 0, taken = 0, counted = 0;
     CodeKind longest = kind;
     longest.bits = most;
     uint total = coordinate_bits(longest);
-    ivec3 cells = extents;
-    if (sections.head != 0) {
-        lost = SECTION_BITS;
-        // What is of the core has half of the coordinates there.
-        for (uint axis = 0; axis < 3; ++axis) cells[axis] += (sections.beyond >> axis & 1) != 0 ? 1 << 23 : 0;
-    }
     uvec3 sorted = kind.order == ORDER_SORTED ? sorted_axes(extents) : uvec3(0, 1, 2);
     for (; taken < total && counted < needed; ++taken) {
         uint axis = kind.order == ORDER_VARIABLE ? longest_axis(extents) : sorted[taken % 3];
         extents[axis] -= 1 << 23;
-        cells[axis] -= 1 << 23;
-        counted += cells[axis] < typical[axis] ? 1 : 0;
+        counted += extents[axis] < typical[axis] ? 1 : 0;
     }
     CodeKind found = kind;
     while (found.bits < most && coordinate_bits(found) < taken + lost) found.bits += 8;

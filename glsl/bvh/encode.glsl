@@ -3,7 +3,8 @@
 // kernel. src/bvh/encode.rs records them; a hierarchy follows.
 //
 //   reset      writes state: empty bounds, the pool
-//   bounds     reads the primitives                    writes state: bounds, active_count, status
+//   (fences    reads the primitives                    writes state: the fences, of codes that have sections; in a chain with reset)
+//   bounds     reads the primitives, fences            writes state: bounds, core, active_count, status
 //   plan       reads state: bounds                     writes state: plan; the structure's header and table of geometries
 //   (cells     reads the primitives, plan              writes table: the cells of a grid, in codes that have one
 //   prefixes   reads table                             writes table: what the cells say)
@@ -22,12 +23,13 @@
 #include "bvh/codes/binning.glsl"
 
 // The order of the phases in the pool; the radix sort's three steps a pass and those of the hierarchy follow.
-const uint PHASE_BOUNDS = 0;
-const uint PHASE_PLAN = 1;
-const uint PHASE_CELLS = HAS_GRID ? 2 : NONE;
-const uint PHASE_SPLITS = HAS_GRID ? 3 : NONE;
-const uint PHASE_ENCODE = HAS_GRID ? 4 : 2;
-const uint PHASES_BEFORE_SORT = HAS_GRID ? 5 : 3;
+const uint PHASE_FENCES = HAS_SECTIONS ? 0 : NONE;
+const uint PHASE_BOUNDS = HAS_SECTIONS ? 1 : 0;
+const uint PHASE_PLAN = PHASE_BOUNDS + 1;
+const uint PHASE_CELLS = HAS_GRID ? PHASE_PLAN + 1 : NONE;
+const uint PHASE_SPLITS = HAS_GRID ? PHASE_PLAN + 2 : NONE;
+const uint PHASE_ENCODE = HAS_GRID ? PHASE_PLAN + 3 : PHASE_PLAN + 1;
+const uint PHASES_BEFORE_SORT = PHASE_ENCODE + 1;
 const uint PHASES_OF_A_PASS = 3;
 
 // Phases of the pool before the first of the hierarchy.
@@ -58,7 +60,7 @@ void reset_build(uint phases_behind) {
         if (word == POOL_WORD_PHASES) value = phases;
         if (word >= POOL_WORD_TASKS && phase < phases) {
             uint step = (phase - PHASES_BEFORE_SORT) % PHASES_OF_A_PASS;
-            if (phase == PHASE_PLAN || phase == PHASE_SPLITS) value = 1;
+            if (phase == PHASE_FENCES || phase == PHASE_PLAN || phase == PHASE_SPLITS) value = 1;
             else if (phase < PHASES_BEFORE_SORT || phase >= sorted) value = tiles;
             else value = step == 1 ? scan_tasks : column_tasks;
         }
@@ -69,6 +71,8 @@ void reset_build(uint phases_behind) {
         state.boxes_hi[axis] = 0;
         state.centroids_lo[axis] = NONE;
         state.centroids_hi[axis] = 0;
+        state.core_lo[axis] = NONE;
+        state.core_hi[axis] = 0;
     }
     if (HAS_GRID) {
         Words cells = Words(part(parts.table));
@@ -83,13 +87,14 @@ void reset_build(uint phases_behind) {
 
 // ---- bounds ----
 
-// The words of BuildState from boxes_lo to status, of a workgroup: on a GPU hundreds of thousands of subgroups would wait for each
-// other at one line of memory.
-const uint BOUNDS_WORDS = 14;
+// The words of BuildState from boxes_lo to status, or to core_hi in codes that have sections, of a workgroup: on a GPU hundreds of
+// thousands of subgroups would wait for each other at one line of memory.
+const uint CORE_WORD = 14;
+const uint BOUNDS_WORDS = HAS_SECTIONS ? CORE_WORD + 6 : CORE_WORD;
 shared uint group_bounds[PRIVATE_COUNTERS ? 1u : BOUNDS_WORDS];
 
 bool is_low_corner(uint word) {
-    return word < 12 && word % 6 < 3;
+    return word < 12 ? word % 6 < 3 : word >= CORE_WORD && word < CORE_WORD + 3;
 }
 
 void begin_group_bounds() {
@@ -105,7 +110,7 @@ void end_group_bounds(Words to) {
     for (uint i = gl_LocalInvocationIndex; i < BOUNDS_WORDS; i += gl_WorkGroupSize.x) {
         uint found = group_bounds[i];
         if (is_low_corner(i)) atomicMin(to.word[i], found);
-        else if (i < 12) atomicMax(to.word[i], found);
+        else if (i < 12 || i >= CORE_WORD) atomicMax(to.word[i], found);
         else if (i == 12) atomicAdd(to.word[i], found);
         else if (found != 0) atomicOr(to.word[i], found);
     }
@@ -115,6 +120,9 @@ void end_group_bounds(Words to) {
 void find_bounds(uint task) {
     Geometry input_geometries = geometries();
     uvec3 lo = uvec3(NONE), hi = uvec3(0), centroid_lo = uvec3(NONE), centroid_hi = uvec3(0);
+    uvec3 core_lo = uvec3(NONE), core_hi = uvec3(0);
+    Box fences;
+    if (HAS_SECTIONS) fences = build_state().plan.sections.fences;
     uint active_count = 0, status = 0;
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
@@ -124,11 +132,15 @@ void find_bounds(uint task) {
             uint why_not = load_reference(input_geometries, primitive, b);
             status |= why_not;
             if (why_not == 0) {
-                uvec3 middle = ordered(centroid_of(b));
-                lo = min(lo, ordered(b.lo));
-                hi = max(hi, ordered(b.hi));
+                uvec3 middle = ordered(centroid_of(b)), box_lo = ordered(b.lo), box_hi = ordered(b.hi);
+                lo = min(lo, box_lo);
+                hi = max(hi, box_hi);
                 centroid_lo = min(centroid_lo, middle);
                 centroid_hi = max(centroid_hi, middle);
+                if (HAS_SECTIONS && is_inside(box_lo, box_hi, fences)) {
+                    core_lo = min(core_lo, box_lo);
+                    core_hi = max(core_hi, box_hi);
+                }
                 active_count += 1;
             }
         }
@@ -137,6 +149,10 @@ void find_bounds(uint task) {
     hi = subgroupMax(hi);
     centroid_lo = subgroupMin(centroid_lo);
     centroid_hi = subgroupMax(centroid_hi);
+    if (HAS_SECTIONS) {
+        core_lo = subgroupMin(core_lo);
+        core_hi = subgroupMax(core_hi);
+    }
     active_count = subgroupAdd(active_count);
     status = subgroupOr(status & ~INACTIVE);
     // Integers: the order in which the atomics arrive changes nothing.
@@ -149,11 +165,19 @@ void find_bounds(uint task) {
                 atomicMax(to.word[3 + axis], hi[axis]);
                 atomicMin(to.word[6 + axis], centroid_lo[axis]);
                 atomicMax(to.word[9 + axis], centroid_hi[axis]);
+                if (HAS_SECTIONS) {
+                    atomicMin(to.word[CORE_WORD + axis], core_lo[axis]);
+                    atomicMax(to.word[CORE_WORD + 3 + axis], core_hi[axis]);
+                }
             } else {
                 atomicMin(group_bounds[axis], lo[axis]);
                 atomicMax(group_bounds[3 + axis], hi[axis]);
                 atomicMin(group_bounds[6 + axis], centroid_lo[axis]);
                 atomicMax(group_bounds[9 + axis], centroid_hi[axis]);
+                if (HAS_SECTIONS) {
+                    atomicMin(group_bounds[CORE_WORD + axis], core_lo[axis]);
+                    atomicMax(group_bounds[CORE_WORD + 3 + axis], core_hi[axis]);
+                }
             }
         }
         if (PRIVATE_COUNTERS) {
@@ -202,20 +226,19 @@ void write_recipe(BuildState state, Box boxes, Box bounds) {
     }
     if (gl_LocalInvocationIndex != 0) return;
     CodeKind kind = kind_of_codes();
+    bool has_core = HAS_SECTIONS && state.plan.sections.head != 0;
     Structure structure = Structure(structure_address);
     uint most = most_bits_by_spread();
-    // Without a sample the typical extents are not known.
-    if (most != 0 && sampled_count != 0) {
-        kind.bits = bits_by_spread(kind, extents_of(bounds), state.plan.typical, state.plan.sections, most);
+    if (most != 0) {
+        kind.bits = bits_by_spread(kind, extents_of(bounds), state.plan.typical, has_core, most);
         state.plan.bits = kind.bits;
         state.passes_left_out = passes - min((kind.bits + DIGIT_BITS - 1) / DIGIT_BITS, passes);
         structure.header.code_bits = kind.bits;
     }
     CodePlan plan = plan_codes(kind, bounds);
-    bool has_core = HAS_SECTIONS && state.plan.sections.head != 0;
     plan.area_scale = area_scale_for(boxes, has_core ? bounds : boxes);
     if (HAS_SECTIONS) {
-        state.where_most_is = Box(vec3(-LARGEST_FLOAT), vec3(LARGEST_FLOAT));
+        state.where_most_is = EVERYWHERE;
         if (has_core) state.where_most_is = bounds;
     }
     state.plan.size_prescale = plan.size_prescale;
@@ -320,7 +343,9 @@ Radix radix_of_pass(uint pass) {
 
 // A task of one of the phases before the hierarchy.
 void encode_from_pool(uint phase, uint task) {
-    if (phase == PHASE_BOUNDS) {
+    if (HAS_SECTIONS && phase == PHASE_FENCES) {
+        find_fences();
+    } else if (phase == PHASE_BOUNDS) {
         find_bounds(task);
     } else if (phase == PHASE_PLAN) {
         make_plan();

@@ -90,6 +90,7 @@ void main() {
     uint tile = gl_WorkGroupSize.x * ITEMS;
     uint tiles = (primitive_count + tile - 1u) / tile;
     reset_build(0);
+    if (HAS_SECTIONS) find_fences();
     next_phase();
     for (uint task = 0; task < tiles; ++task) find_bounds(task);
     next_phase();

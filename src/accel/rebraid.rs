@@ -34,8 +34,8 @@ const CLASSES: u32 = 512;
 /// `CHUNKS_AT_MOST` there.
 const CHUNKS: u32 = 256;
 const STATE_WORDS: u32 = REBRAID_STATE_BYTES as u32 / 4;
-/// Bytes of the sample that tells what is far: 256 of `Sampled` in glsl/bvh/codes/quartiles.glsl.
-const SAMPLE_BYTES: u64 = 256 * 36;
+/// Bytes of the sample that tells what is far: the `Sample` of glsl/bvh/codes/quartiles.glsl.
+const SAMPLE_BYTES: u64 = 256 * 12;
 /// Of what is far, the gain at most: `FAR_GAIN` in rebraid.glsl.
 pub(super) const FAR_GAIN: f32 = f32::MIN_POSITIVE;
 /// Instances up to which one workgroup does all rounds: a chain of dispatches costs more than their work.

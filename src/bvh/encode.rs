@@ -3,7 +3,7 @@
 //! `glsl/bvh/encode.glsl` is the device's side.
 
 use super::child_order::ChildOrder;
-use super::codes::Codes;
+use super::codes::{CodeBounds, Codes};
 use super::geometry::{Geometry, Input, Planned, Primitives};
 use super::sah::Collapse;
 use super::scratch::BuildPhase;
@@ -224,8 +224,13 @@ impl Encode {
             table: arguments.part(parts.table),
         };
         let bounds = self.for_bounds();
+        // Where codes have sections it looks at a sample of the primitives.
+        let reset = match self.codes.bounds {
+            CodeBounds::Robust => self.reading_kernel(&shaders::BVH_ENCODE_RESET, input),
+            _ => self.reset_kernel(&shaders::BVH_ENCODE_RESET),
+        };
         let mut steps = vec![
-            Step::new("bounds", self.reset_kernel(&shaders::BVH_ENCODE_RESET), arguments, 1),
+            Step::new("bounds", reset, arguments, 1),
             Step::new("bounds", bounds.reading_kernel(&shaders::BVH_ENCODE_BOUNDS, input), arguments, bounds.tiles()),
             reading("encode", &shaders::BVH_ENCODE_PLAN, 1),
         ];

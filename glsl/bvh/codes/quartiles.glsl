@@ -1,4 +1,4 @@
-// Quartiles of a sample of centroids, and Tukey's outer fences around them: src/bvh/codes/sections.rs explains them and is the twin.
+// Quartiles of a sample of centroids, and fences around them: src/bvh/codes/sections.rs explains them and is the twin.
 //
 //   begin_sample     one invocation                                  writes shared memory
 //   take_sample      of one number of the sample                     writes the sample, shared memory
@@ -13,19 +13,15 @@
 // Primitives that are looked at.
 const uint SECTION_SAMPLE = 256;
 const uint SECTION_QUARTILE = 4;
-// Distances between the quartiles from there to the outer fences.
-const float TO_FENCES = 3.0;
+// Distances between the quartiles from there to the fences.
+const float TO_FENCES = 2.0;
 const float LARGEST_FLOAT = 3.4028234663852886e38;
+const Box EVERYWHERE = Box(vec3(-LARGEST_FLOAT), vec3(LARGEST_FLOAT));
 // The place of one that is left out, behind all others.
 const uint NOWHERE = 0xFFFFFFFFu;
 
-// Per primitive its centroid and its box, as `ordered` floats.
-struct Sampled {
-    uvec3 middle;
-    uvec3 lo;
-    uvec3 hi;
-};
-BUFFER Sample { Sampled primitive[]; };
+// The centroids, as `ordered` floats.
+BUFFER Sample { uvec3 middle[]; };
 
 shared uint sampled_count;
 shared uint sampled_below[HAS_SECTIONS ? 18 : 1];   // of three rounds in turn: keys below three low candidates, three high ones
@@ -41,9 +37,7 @@ uint sampled_at(uint i, uint taken, uint count) {
 }
 
 void take_sample(Sample table, uint i, bool is_active, Box b) {
-    table.primitive[i].middle = is_active ? ordered(centroid_of(b)) : uvec3(NOWHERE);
-    table.primitive[i].lo = ordered(b.lo);
-    table.primitive[i].hi = ordered(b.hi);
+    table.middle[i] = is_active ? ordered(centroid_of(b)) : uvec3(NOWHERE);
     if (is_active) atomicAdd(sampled_count, 1);
 }
 
@@ -56,7 +50,7 @@ Box find_quartiles(Sample table, uint taken) {
         uvec3 try_low = low | 0x80000000u >> round, try_high = high | 0x80000000u >> round;
         uvec3 below_low = uvec3(0), below_high = uvec3(0);
         for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
-            uvec3 key = table.primitive[i].middle;
+            uvec3 key = table.middle[i];
             below_low += uvec3(lessThan(key, try_low));
             below_high += uvec3(lessThan(key, try_high));
         }
@@ -85,20 +79,16 @@ bool is_inside(uvec3 lo, uvec3 hi, Box fences) {
     return all(greaterThanEqual(lo, ordered(fences.lo))) && all(lessThanEqual(hi, ordered(fences.hi)));
 }
 
-// `eighth` moved by `by` both ways, but not beyond the limits: of eighths, so that nothing overflows.
-Box widened(Box eighth, vec3 by, Box limits) {
-    precise vec3 lo = eighth.lo - by;
-    precise vec3 hi = eighth.hi + by;
-    return Box(mix(limits.lo, lo * 8.0, greaterThan(lo, limits.lo * 0.125)),
-               mix(limits.hi, hi * 8.0, lessThan(hi, limits.hi * 0.125)));
-}
-
-Box fences_of(Box bounds, Box quartiles) {
+// From the quartiles by so much beyond them, as far as floats go: of eighths, so that nothing overflows.
+Box fences_of(Box quartiles) {
     precise vec3 low = quartiles.lo * 0.125;
     precise vec3 high = quartiles.hi * 0.125;
     precise vec3 widths = high - low;
     precise float least = 0.25 * max(max(widths.x, widths.y), max(widths.z, 0.0));
     precise vec3 by = TO_FENCES * max(widths, vec3(least));
-    return widened(Box(low, high), by, bounds);
+    precise vec3 lo = low - by;
+    precise vec3 hi = high + by;
+    return Box(mix(EVERYWHERE.lo, lo * 8.0, greaterThan(lo, EVERYWHERE.lo * 0.125)),
+               mix(EVERYWHERE.hi, hi * 8.0, lessThan(hi, EVERYWHERE.hi * 0.125)));
 }
 #endif

@@ -1,6 +1,7 @@
 // Robust bounds with sections for what is far and what is huge: src/bvh/codes/sections.rs explains them and is the twin.
 //
-//   find_sections   reads the primitives, state: bounds; the workgroup together   writes state: plan.sections
+//   find_fences     reads the primitives; the workgroup together                  writes state: plan.sections.fences, plan.typical
+//   find_sections   reads state: fences, bounds, core; the workgroup together     writes state: plan.sections
 //   section_parts   of one primitive
 #ifndef HEDGEROW_BVH_CODE_SECTIONS
 #define HEDGEROW_BVH_CODE_SECTIONS
@@ -11,7 +12,6 @@ const uint SECTION_CORE = 0;
 const uint SECTION_FAR = 1;
 const uint SECTION_HUGE = 2;
 shared uint section_octaves[HAS_SECTIONS ? 9 : 1];  // of each axis: of the core's extent, from the core to the high and to the low bound
-shared uint sampled_core[HAS_SECTIONS ? 6 : 1];     // low corner, high corner
 
 // Half of the extents that primitives would have whose centroids lie evenly between bounds, and have these quartiles, as integers like
 // those of extents_of.
@@ -22,20 +22,19 @@ ivec3 typical_extents(Box quartiles) {
     return mix(ivec3(-0x40000000), floatBitsToInt(eighths) + (3 << 23), greaterThan(eighths, vec3(0)));
 }
 
-// What the sample found inside of the fences, and an eighth more to each side, for the sample misses the outermost.
-Box core_of(Box fences) {
-    uvec3 lo = uvec3(sampled_core[0], sampled_core[1], sampled_core[2]);
-    uvec3 hi = uvec3(sampled_core[3], sampled_core[4], sampled_core[5]);
-    Box sampled = fences;
-    if (lo.x <= hi.x) sampled = Box(from_ordered(lo), from_ordered(hi));
-    precise vec3 low_eighth = sampled.lo * 0.125;
-    precise vec3 high_eighth = sampled.hi * 0.125;
-    precise vec3 by = (high_eighth - low_eighth) * 0.125;
-    return widened(Box(low_eighth, high_eighth), by, fences);
+// The box of what is inside the fences; where nothing is, as far as the bounds reach.
+Box core_of(BuildState state, Box bounds, Box fences) {
+    uvec3 lo = uvec3(state.core_lo[0], state.core_lo[1], state.core_lo[2]);
+    uvec3 hi = uvec3(state.core_hi[0], state.core_hi[1], state.core_hi[2]);
+    if (lo.x > hi.x) {
+        lo = max(ordered(fences.lo), ordered(bounds.lo));
+        hi = min(ordered(fences.hi), ordered(bounds.hi));
+    }
+    return Box(from_ordered(lo), from_ordered(hi));
 }
 
 // A lane a distance, so that there is one copy of what computes it: drivers that go through every branch take long over three.
-void write_sections(BuildState state, Box bounds, Box fences, Box core) {
+void write_sections(BuildState state, Box bounds, Box core) {
     for (uint i = gl_LocalInvocationIndex; i < 9; i += gl_WorkGroupSize.x) {
         uint axis = i % 3, which = i / 3;
         vec3 from = which == 0 ? core.hi : which == 1 ? bounds.hi : bounds.lo;
@@ -53,22 +52,18 @@ void write_sections(BuildState state, Box bounds, Box fences, Box core) {
     if (gl_LocalInvocationIndex == 0) {
         bvec3 is_below = lessThan(ordered(bounds.lo), ordered(core.lo)), is_above = lessThan(ordered(core.hi), ordered(bounds.hi));
         uvec3 beyond = uvec3(is_below) | uvec3(is_above);
-        state.plan.sections.fences = fences;
         state.plan.sections.core = core;
         state.plan.sections.head = 1;   // more is known with the recipe
         state.plan.sections.beyond = beyond.x | beyond.y << 1 | beyond.z << 2;
     }
 }
 
-void find_sections() {
+void find_fences() {
     BuildState state = build_state();
     Sample table = Sample(part(parts.table));
     Geometry input_geometries = geometries();
     uint taken = min(primitive_count, SECTION_SAMPLE);
-    if (gl_LocalInvocationIndex == 0) {
-        begin_sample();
-        for (uint i = 0; i < 6; ++i) sampled_core[i] = i < 3 ? NONE : 0;
-    }
+    if (gl_LocalInvocationIndex == 0) begin_sample();
     next_phase();
     for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
         Box b;
@@ -76,33 +71,30 @@ void find_sections() {
         take_sample(table, i, is_active, b);
     }
     next_phase();
-    uint count = sampled_count;
+    // Without a sample nothing is far, and codes have the bits that they are given.
+    Box fences = EVERYWHERE;
+    ivec3 typical = ivec3(0x7F800000);
+    if (sampled_count != 0) {
+        Box quartiles = find_quartiles(table, taken);
+        fences = fences_of(quartiles);
+        typical = typical_extents(quartiles);
+    }
+    if (gl_LocalInvocationIndex == 0) {
+        state.plan.sections.fences = fences;
+        state.plan.typical = typical;
+    }
+}
+
+void find_sections() {
+    BuildState state = build_state();
     if (gl_LocalInvocationIndex == 0) {
         state.plan.sections.head = 0;
         state.plan.bits = given_code_bits();
         state.passes_left_out = passes - min((given_code_bits() + DIGIT_BITS - 1) / DIGIT_BITS, passes);
     }
-    if (count == 0) return;
-
-    Box quartiles = find_quartiles(table, taken);
-    Box bounds = bounds_of_boxes(state);
-    if (gl_LocalInvocationIndex == 0) state.plan.typical = typical_extents(quartiles);
-    Box fences = fences_of(bounds, quartiles);
+    Box bounds = bounds_of_boxes(state), fences = state.plan.sections.fences;
     if (is_inside(ordered(bounds.lo), ordered(bounds.hi), fences)) return;
-    uvec3 lo = uvec3(NONE), hi = uvec3(0);   // of the core
-    for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
-        Sampled sampled = table.primitive[i];
-        if (sampled.middle.x != NONE && is_inside(sampled.lo, sampled.hi, fences)) {
-            lo = min(lo, sampled.lo);
-            hi = max(hi, sampled.hi);
-        }
-    }
-    for (uint axis = 0; axis < 3; ++axis) {
-        atomicMin(sampled_core[axis], lo[axis]);
-        atomicMax(sampled_core[3 + axis], hi[axis]);
-    }
-    next_phase();
-    write_sections(state, bounds, fences, core_of(fences));
+    write_sections(state, bounds, core_of(state, bounds, fences));
 }
 
 // How many coordinate bits come before the one of what is far: the first of each axis.

@@ -6,8 +6,8 @@ use super::{Code, CodeBounds, Codes};
 const CELL_WORDS: u64 = 128;
 /// Words of `CodePart` in code_binning.glsl, of which there are at most 64.
 const PART_WORDS: u64 = 26;
-/// Words of `Sampled` in code_sections.glsl, of which there are 256.
-const SAMPLED_WORDS: u64 = 9;
+/// Of `Sample` in codes/quartiles.glsl: 256 centroids.
+const SAMPLE_WORDS: u64 = 256 * 3;
 
 impl Codes {
     /// `CODE_PREFIX_WORD` in codes.glsl, which kernels are specialised by, so that codes do not pay for what others have.
@@ -29,7 +29,7 @@ impl Codes {
     pub(crate) fn prefix_words(&self) -> u64 {
         match self.prefix_number() {
             0 => 0,
-            1 => 256 * SAMPLED_WORDS,
+            1 => SAMPLE_WORDS,
             // The layers above the cells have a seventh of them.
             2 => CELL_WORDS + CELL_WORDS / 4,
             _ => CELL_WORDS + 64 * PART_WORDS,

@@ -108,10 +108,6 @@ impl CodePlan {
     /// Of its coordinate bits those up to the one by which `needed` have counted: that have made cells smaller than these extents.
     pub(super) fn coordinate_bits_for(&self, typical: Extents, needed: u32) -> u32 {
         let Extents(mut cells) = self.extents;
-        if let Prefix::Sections(sections) = &self.prefix {
-            // What is of the core has half of the coordinates there.
-            (0..3).filter(|&axis| sections.has_tail(axis)).for_each(|axis| cells[axis] += 1 << 23);
-        }
         let mut counted = 0;
         for (taken, &axis) in self.recipe.sequence.iter().enumerate() {
             if counted == needed {

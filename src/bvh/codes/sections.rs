@@ -2,11 +2,13 @@
 //! 2024, section 5, leaves to the future: a heuristic that filters primitives into sections while they are encoded, with the split
 //! between the sections at the start of the code.
 //!
-//! *Tukey's outer fences* of a sample of the centroids tell what is far (Tukey 1977, "Exploratory Data Analysis", section 2C): what lies
-//! beyond the quartiles by more than three times the distance between them, so that up to a quarter of all primitives may be far to one
-//! side, and as many to the other. Where nothing does, codes are those of the full bounds. Otherwise there are
-//! three sections: the *core*, all boxes inside the fences, encoded within its own bounds; what is *far*; and what is not inside
-//! the fences but touches the core, *huge*.
+//! *Fences* around a sample of the centroids, as Tukey draws them (1977, "Exploratory Data Analysis", section 2C), tell what is far: what
+//! lies beyond the quartiles by more than twice the distance between them, so that up to a quarter of all primitives may be far to one
+//! side, and as many to the other. (Tukey's inner fences are at 1.5 and his outer ones at 3 distances. At two, primitives that are spread
+//! evenly have them at 7/4 of their extent, so that what doubles their bounds is far.) Where nothing lies beyond, codes are those of the
+//! full bounds. Otherwise there are three sections: the *core*, all boxes inside the fences, encoded within its own bounds; what is *far*;
+//! and what is not inside the fences but touches the core, *huge*. So the codes of the core are the same as without the others, but for
+//! their last two bits.
 //!
 //! A code begins with a bit for what is huge, which otherwise would lie over every node above it. The bit that sets apart what
 //! is far stands behind the first bit of each axis: only one octant of the core has the far primitives of one side in its node,
@@ -26,15 +28,15 @@ pub(super) const SECTION_BITS: u32 = 2;
 const SAMPLE: u64 = 256;
 /// One in this many sampled centroids lies below the low quartile, and one above the high one.
 const QUARTILE: usize = 4;
-/// Distances between the quartiles from there to the outer fences.
-const TO_FENCES: f32 = 3.0;
+/// Distances between the quartiles from there to the fences.
+const TO_FENCES: f32 = 2.0;
 
 /// The sections of a scene that has something far or huge.
 #[derive(Debug, Clone)]
 pub(super) struct Sections {
     /// What is inside is of the core.
     fences: Aabb,
-    /// The bounds of the core, from the sample.
+    /// The bounds of the core.
     pub core: Aabb,
     /// Coordinate bits before the one of what is far.
     head: u32,
@@ -78,15 +80,6 @@ fn is_inside(b: &Aabb, fences: &Aabb) -> bool {
     (0..3).all(|i| !below(b.lo[i], fences.lo[i]) && !below(fences.hi[i], b.hi[i]))
 }
 
-/// `base` moved by `by` both ways, but not beyond `limits`; both are given as eighths, so that nothing overflows.
-fn widened(base: [f32; 2], by: f32, limits: [f32; 2]) -> [f32; 2] {
-    let [lo, hi] = [base[0] - by, base[1] + by];
-    [
-        if lo > limits[0] * 0.125 { lo * 8.0 } else { limits[0] },
-        if hi < limits[1] * 0.125 { hi * 8.0 } else { limits[1] },
-    ]
-}
-
 /// The primitives that are looked at.
 fn sample_of<E>(boxes: &[Result<Aabb, E>]) -> Vec<&Aabb> {
     let count = boxes.len() as u64;
@@ -116,24 +109,29 @@ pub(super) fn typical_extents<E>(boxes: &[Result<Aabb, E>]) -> Option<Extents> {
     })
 }
 
-/// Tukey's outer fences, but not beyond these bounds.
-fn fences_of(quartiles: [[f32; 2]; 3], bounds: &Aabb) -> Aabb {
+/// Fences around a sample of these boxes' centroids; `None` without a sample.
+pub(crate) fn fences_around<E>(boxes: &[Result<Aabb, E>]) -> Option<Aabb> {
+    let sample = sample_of(boxes);
+    if sample.is_empty() {
+        return None;
+    }
+    let quartiles = quartiles_of(&sample);
     let widths = quartiles.map(|[low, high]| high - low);
     // What is thin is not therefore outlying: no axis is taken to be thinner than a quarter of the widest.
     let least = 0.25 * widths.into_iter().fold(0.0, f32::max);
-    let mut fences = *bounds;
+    let mut fences = Aabb { lo: [f32::MIN; 3], hi: [f32::MAX; 3] };
     for axis in 0..3 {
         let by = TO_FENCES * widths[axis].max(least);
-        [fences.lo[axis], fences.hi[axis]] = widened(quartiles[axis], by, [bounds.lo[axis], bounds.hi[axis]]);
+        // As far as floats go.
+        let [lo, hi] = [quartiles[axis][0] - by, quartiles[axis][1] + by];
+        if lo > f32::MIN * 0.125 {
+            fences.lo[axis] = lo * 8.0;
+        }
+        if hi < f32::MAX * 0.125 {
+            fences.hi[axis] = hi * 8.0;
+        }
     }
-    fences
-}
-
-/// Tukey's outer fences of a sample of these boxes' centroids; `None` without a sample.
-pub(crate) fn fences_around<E>(boxes: &[Result<Aabb, E>]) -> Option<Aabb> {
-    let sample = sample_of(boxes);
-    let everywhere = Aabb { lo: [f32::MIN; 3], hi: [f32::MAX; 3] };
-    (!sample.is_empty()).then(|| fences_of(quartiles_of(&sample), &everywhere))
+    Some(fences)
 }
 
 /// Whether two boxes share no point.
@@ -144,30 +142,23 @@ pub(crate) fn is_apart(a: &Aabb, b: &Aabb) -> bool {
 impl Sections {
     /// The sections of primitives with these boxes, whose bounds are `bounds`; `None` where nothing is beyond the fences.
     pub fn of<E>(boxes: &[Result<Aabb, E>], bounds: &Aabb) -> Option<Sections> {
-        let sample = sample_of(boxes);
-        if sample.is_empty() {
-            return None;
-        }
-        let fences = fences_of(quartiles_of(&sample), bounds);
+        let fences = fences_around(boxes)?;
         if is_inside(bounds, &fences) {
             return None;
         }
-
-        let inside = sample.iter().filter(|b| is_inside(b, &fences));
-        let core = inside.fold([[u32::MAX; 3], [0; 3]], |[lo, hi], b| {
+        let inside = boxes.iter().flatten().filter(|b| is_inside(b, &fences));
+        let [mut lo, mut hi] = inside.fold([[u32::MAX; 3], [0; 3]], |[lo, hi], b| {
             [
                 std::array::from_fn(|axis| lo[axis].min(ordered(b.lo[axis]))),
                 std::array::from_fn(|axis| hi[axis].max(ordered(b.hi[axis]))),
             ]
         });
-        let sampled = if core[0][0] > core[1][0] { fences } else { from_ordered_box(core[0], core[1]) };
-        let mut core = sampled;
-        for axis in 0..3 {
-            // The sample misses the outermost: an eighth more to each side.
-            let eighths = [sampled.lo[axis] * 0.125, sampled.hi[axis] * 0.125];
-            let by = (eighths[1] - eighths[0]) * 0.125;
-            [core.lo[axis], core.hi[axis]] = widened(eighths, by, [fences.lo[axis], fences.hi[axis]]);
+        if lo[0] > hi[0] {
+            // Nothing is inside: as far as the bounds reach.
+            lo = std::array::from_fn(|axis| ordered(fences.lo[axis]).max(ordered(bounds.lo[axis])));
+            hi = std::array::from_fn(|axis| ordered(fences.hi[axis]).min(ordered(bounds.hi[axis])));
         }
+        let core = from_ordered_box(lo, hi);
         let tails = std::array::from_fn(|axis| {
             let (lo, hi) = (core.lo[axis], core.hi[axis]);
             let is_beyond = below(bounds.lo[axis], lo) || below(hi, bounds.hi[axis]);
@@ -176,11 +167,6 @@ impl Sections {
             is_beyond.then(|| Tail { reference, shift: 30 + farthest.max(1).leading_zeros() })
         });
         Some(Sections { fences, core, head: 0, tails })
-    }
-
-    /// Whether something is beyond the core along an axis: coordinates of the core have one bit less then.
-    pub fn has_tail(&self, axis: usize) -> bool {
-        self.tails[axis].is_some()
     }
 
     /// The same with its far bit behind the first bit of each axis in this sequence.
@@ -268,6 +254,21 @@ mod tests {
         assert!(near.iter().collect::<std::collections::HashSet<_>>().len() == 1000, "every cell has its own code");
         for distance in [1.0e6, 1.0e18, 1.0e37, 3.0e38] {
             assert_eq!(codes(distance), near, "{distance:e}");
+        }
+    }
+
+    #[test]
+    fn what_is_far_leaves_the_order_of_the_core_as_it_is() {
+        let mut boxes = grid();
+        let alone = plan(&boxes);
+        boxes.sort_by_key(|b| alone.encode(b));
+        for distance in [1.9, 100.0, 1.0e30] {
+            for side in [1.0, -1.0] {
+                let lo = [side * distance, 0.5, 0.5];
+                let plan = plan(&[&boxes[..], &[Aabb { lo, hi: lo }]].concat());
+                let codes: Vec<u64> = boxes.iter().map(|b| plan.encode(b)).collect();
+                assert!(codes.windows(2).all(|w| w[0] < w[1]), "{distance:e} to side {side}");
+            }
         }
     }
 
