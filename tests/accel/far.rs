@@ -55,6 +55,28 @@ fn top_levels_with_something_far_have_the_bytes_of_the_hosts() {
     }
 }
 
+/// Of 512 instances the sample takes every other: here all of those are left out, so that nothing tells what is far.
+#[test]
+fn where_the_sample_is_left_out_nothing_is_far_and_bits_are_those_by_number() {
+    let ours = Ours::on(device());
+    let World { instances, .. } = grid(8, &[], Flags::empty());
+    let instances = instances.into_iter().enumerate().map(|(i, near)| match i {
+        _ if i % 2 == 0 => Instance::new(1, scaled(f32::NAN, [0.0; 3])),
+        1 => far(1, 30, 3)[0],
+        _ => near,
+    });
+    let instances: Vec<Instance> = instances.collect();
+    for flags in [Flags::PREFER_FAST_BUILD, Flags::empty()] {
+        let by_number = ReadBack::new(&ours, &grid(8, &[], flags)).top.header().code_bits;
+        let world = World { flags, ..World::new(vec![part(diagonal(50)), part(icosphere(1))], instances.clone()) };
+        let read = ReadBack::new(&ours, &world);
+        let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &Ours::OPTIONS);
+        let header = *read.top.header();
+        assert_eq!(header.code_bits, by_number, "{flags:?}");
+        assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}: {header:?}, {:?}", expected.header());
+    }
+}
+
 #[test]
 fn bits_are_as_many_as_the_spread_needs() {
     let ours = Ours::on(device());
