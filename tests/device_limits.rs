@@ -1,7 +1,7 @@
 //! A device that has less than it could: without what is optional, with inexact subgroups, with small limits, without timestamps.
 
 use crate::common::{OPTIONS, open};
-use hedgerow::accel::AccelOptions;
+use hedgerow::accel::{AccelOptions, Wide};
 use hedgerow::ash::vk;
 use hedgerow::gpu::scan::{Scan, ScanBuffers};
 use hedgerow::gpu::{Timestamps, TuningChoice};
@@ -11,7 +11,7 @@ use hedgerow_lab::random::SplitMix64;
 use hedgerow_lab::scene::{Instances, LoadOptions, load_instances};
 use hedgerow_lab::subjects::device_rays::RayBuffers;
 use hedgerow_lab::subjects::levels::Levels;
-use hedgerow_lab::subjects::queries::Queries;
+use hedgerow_lab::subjects::queries::{Forms, Queries};
 use hedgerow_lab::subjects::structures::Structures;
 
 type Flags = vk::BuildAccelerationStructureFlagsKHR;
@@ -74,12 +74,12 @@ fn results_are_the_same_with_and_without_what_is_optional() {
     }
 }
 
-/// What rays hit in a scene of instances by `options`, by queries of a shader for structures by others.
-fn hits(device: &Device, options: AccelOptions, shader: AccelOptions, scene: &Instances, rays: &[Ray]) -> Vec<Hit> {
-    let structures = Structures::ours(device, options);
+/// What rays hit in a scene of instances, by queries of a shader for such nodes.
+fn hits(device: &Device, wide: Wide, forms: Forms, scene: &Instances, rays: &[Ray]) -> Vec<Hit> {
+    let structures = Structures::ours(device, AccelOptions { wide, ..AccelOptions::DEFAULT });
     let mut levels = Levels::new(structures, scene, Flags::PREFER_FAST_TRACE).expect("memory");
     levels.build().expect("it builds");
-    let mut levels = levels.traced_as(Structures::ours(device, shader));
+    let mut levels = levels.traced_as(forms);
     let buffers = RayBuffers::new(device, rays).expect("memory");
     levels.trace(&buffers, Query::ClosestHit, Queries::OneEach).expect("it traces");
     buffers.read_hits()
@@ -105,15 +105,18 @@ fn rays_hit_the_same_by_loads_of_64_bits_and_without_them() {
     let with = open(cpu.clone());
     let without = open(DeviceOptions { restrict: "inexact".parse().expect("a restriction"), ..cpu });
     assert_eq!((with.limits.int64, without.limits.int64), (with.tuning.trace.in_longs, false));
-    let (two, eight) = (AccelOptions::DEFAULT, AccelOptions { wide: true, ..AccelOptions::DEFAULT });
-    let expected = hits(&without, two, two, &scene, &rays);
+    let (never, always) = (Wide::Never, Wide::Always);
+    let expected = hits(&without, never, Forms::OF_TWO, &scene, &rays);
     assert!(expected.iter().filter(|hit| hit.is_some()).count() > 500);
     for device in [&with, &without] {
-        for (options, shader) in [(two, two), (two, eight), (eight, eight)] {
-            assert!(hits(device, options, shader, &scene, &rays) == expected, "{options:?} {shader:?}");
+        let met = [Forms::OF_TWO, Forms::ALL].map(|forms| (never, forms));
+        for (wide, forms) in met.into_iter().chain([Forms::OF_EIGHT, Forms::ALL].map(|forms| (always, forms))) {
+            assert!(hits(device, wide, forms, &scene, &rays) == expected, "{wide:?} {forms:?}");
         }
-        // Nodes of eight, which the shader leaves out: no ray meets them, and none ends badly.
-        assert!(hits(device, eight, two, &scene, &rays).iter().all(|hit| !hit.is_some()));
+        // Nodes that the shader leaves out: no ray meets them, and none ends badly.
+        for (wide, forms) in [(always, Forms::OF_TWO), (never, Forms::OF_EIGHT)] {
+            assert!(hits(device, wide, forms, &scene, &rays).iter().all(|hit| !hit.is_some()), "{wide:?} {forms:?}");
+        }
     }
 }
 

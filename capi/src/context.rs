@@ -5,6 +5,7 @@ use crate::pointers::{handle, place, reference};
 use crate::requirements::{HedgerowOptional, optional_of};
 use crate::status::{status, value_or};
 use crate::vulkan::*;
+use hedgerow::accel::Wide;
 use hedgerow::ash::vk;
 use hedgerow::bvh::codes::Codes;
 use hedgerow::gpu::{Context, ContextDesc, TuningChoice};
@@ -33,14 +34,34 @@ pub struct HedgerowContextCreateInfo {
     pub optional: HedgerowOptional,
     /// Entries of a top level that opens instances, as a multiple of its instances; at 1 none is opened, and 0 stands for 4.
     pub rebraid_budget: f32,
-    /// Whether structures that allow no update get nodes of eight children: less memory, for a few large structures. Shaders must
-    /// define `HEDGEROW_QUANTISED` before they include `trace/query.glsl`; hedgerow_cmd_trace_rays takes them as empty.
-    pub wide: VkBool32,
+    /// Which structures get nodes of eight children. Shaders that meet none may leave them out by `HEDGEROW_FORMS`
+    /// (`trace/query_walk.glsl`).
+    pub wide: HedgerowWide,
     /// The name of the codes that bottom levels are sorted by, as `hedgerow bench` takes it: "emc64var", "mc63/40", "bin4a4+robust";
     /// null for those that flags and numbers choose.
     pub p_bottom_codes: *const c_char,
     /// The same of top levels.
     pub p_top_codes: *const c_char,
+}
+
+/// Which structures that allow no update get quantised nodes of eight children, and none of two: one of HEDGEROW_WIDE_*.
+pub type HedgerowWide = u32;
+/// Bottom levels of 4,096 primitives and more that are not built in haste: they take less memory, and rays are faster.
+pub const HEDGEROW_WIDE_LARGE: HedgerowWide = 0;
+/// None.
+pub const HEDGEROW_WIDE_NEVER: HedgerowWide = 1;
+/// All, but for top levels of `PREFER_FAST_BUILD` and bottom levels that are built in haste.
+pub const HEDGEROW_WIDE_ALWAYS: HedgerowWide = 2;
+
+const _: () = assert!(Wide::LARGE == 4096);
+
+fn wide_of(wide: HedgerowWide) -> Result<Wide> {
+    match wide {
+        HEDGEROW_WIDE_LARGE => Ok(Wide::Large),
+        HEDGEROW_WIDE_NEVER => Ok(Wide::Never),
+        HEDGEROW_WIDE_ALWAYS => Ok(Wide::Always),
+        _ => Err(Error::Argument(format!("wide is {wide}; it must be one of HEDGEROW_WIDE_*"))),
+    }
 }
 
 /// The codes of a name; none of null.
@@ -116,7 +137,7 @@ pub unsafe extern "C" fn hedgerow_create_context(
             rebraid_budget: if info.rebraid_budget == 0.0 { defaults.rebraid_budget } else { info.rebraid_budget },
             bottom_codes: codes(info.p_bottom_codes, "pBottomCodes")?,
             top_codes: codes(info.p_top_codes, "pTopCodes")?,
-            wide: info.wide != vk::FALSE,
+            wide: wide_of(info.wide)?,
             checked: info.checked != vk::FALSE,
         };
         let structures = accel::Device::with_options(shared, options);

@@ -5,8 +5,8 @@ use crate::pointers::{handle, reference};
 use crate::status::status;
 use crate::vulkan::{VkCommandBuffer, VkDeviceAddress, VkResult};
 use hedgerow::gpu::{Recorder, Region};
-use hedgerow::trace::tracer::{self, TraceBuffers, TraceShape};
-use hedgerow::trace::{Hit, MAX_RAYS, Query, Ray, Work};
+use hedgerow::trace::tracer::TraceBuffers;
+use hedgerow::trace::{Hit, MAX_RAYS, Query, Ray, Work, bottom_level};
 use hedgerow::{Error, Result};
 use std::mem::offset_of;
 
@@ -108,7 +108,7 @@ pub struct HedgerowTraceInfo {
     pub query: HedgerowQuery,
 }
 
-/// Records the tracing of rays through a bottom level in nodes of two; one of nodes of eight is taken as empty.
+/// Records the tracing of rays through a bottom level of triangles.
 ///
 /// It reads and writes in compute shaders: place a barrier from what wrote structure and rays before, and one to what reads
 /// the hits after, with `VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT`, `VK_ACCESS_SHADER_READ_BIT` and `VK_ACCESS_SHADER_WRITE_BIT`
@@ -146,6 +146,6 @@ pub unsafe extern "C" fn hedgerow_cmd_trace_rays(
         };
         // SAFETY: the caller's promises.
         let mut recorder = unsafe { Recorder::new(context, commands) };
-        tracer::record(&mut recorder, &TraceShape::of(context), query, &buffers)
+        bottom_level::record(&mut recorder, query, &buffers)
     })
 }

@@ -53,7 +53,7 @@ impl Engine {
                 checked: vk::TRUE,
                 optional,
                 rebraid_budget: 0.0,
-                wide: vk::FALSE,
+                wide: HEDGEROW_WIDE_LARGE,
                 p_bottom_codes: null(),
                 p_top_codes: null(),
             };
@@ -138,12 +138,15 @@ fn options_are_those_of_the_library() {
     let with = |rebraid_budget, wide| HedgerowContextCreateInfo { rebraid_budget, wide, ..engine.info };
     // Nodes of two take 64 bytes, records of instances 128.
     for (budget, entries) in [(0.0, 4000), (1.0, 1000), (2.5, 2500)] {
-        let bytes = structure_bytes(&with(budget, vk::FALSE), top, 1000);
+        let bytes = structure_bytes(&with(budget, HEDGEROW_WIDE_LARGE), top, 1000);
         assert_eq!(bytes, 128 + 64 * (entries - 1) + 128 * entries, "budget {budget}");
     }
     // Nodes of eight 80, four for each seven leaves at most; records of triangles 40.
-    assert_eq!(structure_bytes(&with(0.0, vk::FALSE), bottom, 7002), 128 + 64 * 7001 + 40 * 7002);
-    assert_eq!(structure_bytes(&with(0.0, vk::TRUE), bottom, 7002), 128 + 80 * 4001 + 40 * 7002);
+    let (of_two, of_eight) = (128 + 64 * 7001 + 40 * 7002, 128 + 80 * 4001 + 40 * 7002);
+    assert_eq!(structure_bytes(&with(0.0, HEDGEROW_WIDE_NEVER), bottom, 7002), of_two);
+    for wide in [HEDGEROW_WIDE_LARGE, HEDGEROW_WIDE_ALWAYS] {
+        assert_eq!(structure_bytes(&with(0.0, wide), bottom, 7002), of_eight, "{wide}");
+    }
 
     let mut context = null_mut();
     let names = [c"bin4a4~64+concise", c"robust"].map(CStr::as_ptr);
@@ -185,6 +188,10 @@ fn refusals_name_the_field() {
         let more = HedgerowContextCreateInfo { optional: 0x80, ..engine.info };
         assert_eq!(hedgerow_create_context(&more, &mut context), vk::Result::ERROR_VALIDATION_FAILED_EXT);
         assert_eq!(last_error(), "optional is 0x80; it must be of the bits HEDGEROW_OPTIONAL_*");
+
+        let wider = HedgerowContextCreateInfo { wide: 3, ..engine.info };
+        assert_eq!(hedgerow_create_context(&wider, &mut context), vk::Result::ERROR_VALIDATION_FAILED_EXT);
+        assert_eq!(last_error(), "wide is 3; it must be one of HEDGEROW_WIDE_*");
     }
 }
 

@@ -4,8 +4,8 @@
 // trace/tracer/lanes.comp. What is rarer, instances and boxes, each lane loads for itself.
 #ifndef HEDGEROW_TRACE_QUERY_LANES
 #define HEDGEROW_TRACE_QUERY_LANES
-#ifdef HEDGEROW_QUANTISED
-#error "HEDGEROW_LANES is for structures of nodes of two: leave one of HEDGEROW_LANES and HEDGEROW_QUANTISED out"
+#ifdef HEDGEROW_ALL_FORMS
+#error "HEDGEROW_LANES is for structures of nodes of two: define HEDGEROW_FORMS as HEDGEROW_NODES_OF_TWO before trace/query.glsl"
 #endif
 // Until the end of this file.
 #include "bvh/names.glsl"

@@ -30,8 +30,8 @@ bool hedgerow_meet_triangle(inout HedgerowRayQuery query, Triangle triangle, uin
     if ((query.flags & culled) != 0u && (query.instance_flags & HEDGEROW_INSTANCE_CULL_DISABLE) == 0u) return false;
     bool is_opaque = hedgerow_is_opaque(query, triangle.primitive);
     if (hedgerow_is_culled(query, is_opaque)) return false;
-    query.candidate =
-        HedgerowMeeting(HEDGEROW_MET_TRIANGLE, met.x, met.y, met.z, at, query.instance, is_front, is_opaque);
+    query.candidate = HedgerowMeeting(HEDGEROW_MET_TRIANGLE, met.x, met.y, met.z, at, triangle.primitive, query.instance, is_front,
+                                      is_opaque);
     if (met.x == query.best && !hedgerow_comes_before(query)) return false;
     if (is_opaque) hedgerow_commit(query);
     return !is_opaque;
@@ -47,19 +47,15 @@ bool hedgerow_test_box(inout HedgerowRayQuery query, uint at) {
     if (!entered) return false;
     bool is_opaque = hedgerow_is_opaque(query, box.primitive);
     if (hedgerow_is_culled(query, is_opaque)) return false;
-    query.candidate = HedgerowMeeting(HEDGEROW_MET_BOX, query.best, 0.0, 0.0, at, query.instance, false, is_opaque);
+    query.candidate = HedgerowMeeting(HEDGEROW_MET_BOX, query.best, 0.0, 0.0, at, box.primitive, query.instance, false, is_opaque);
     return true;
 }
 
-#ifdef HEDGEROW_QUANTISED
 #include "trace/query_pairs.glsl"
-#endif
 
 // The next record of the leaf; true if what was met is a candidate that the shader must decide on.
 bool hedgerow_test(inout HedgerowRayQuery query) {
-#ifdef HEDGEROW_QUANTISED
-    if ((query.form & (FORM_QUANTISED | FORM_BOXES)) == FORM_QUANTISED) return hedgerow_test_pair(query);
-#endif
+    if (hedgerow_is_quantised(query) && (query.form & FORM_BOXES) == 0u) return hedgerow_test_pair(query);
     uint at = query.index;
     hedgerow_step(query);
     HEDGEROW_COUNT(w);

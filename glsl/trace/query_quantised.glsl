@@ -1,5 +1,6 @@
 // The steps of a query at quantised nodes: a part of trace/query_walk.glsl, which declares the query. As trace/walk_quantised.glsl, with the
-// state of a query.
+// state of a query: what waits is taken and its first node visited in one round, and the first leaf of a node is tested in the round of the
+// node. With rounds of their own for them rays were no faster than in nodes of two (docs/notes/rays.md).
 #ifndef HEDGEROW_TRACE_QUERY_QUANTISED
 #define HEDGEROW_TRACE_QUERY_QUANTISED
 #extension GL_EXT_control_flow_attributes : require
@@ -50,27 +51,37 @@ void hedgerow_put_off_rest(inout HedgerowRayQuery query) {
     query.level++;
 }
 
-// Whether an entry of the stack is such a rest, which is at hand then.
-bool hedgerow_takes_rest(inout HedgerowRayQuery query, uvec2 waiting) {
-    if (!hedgerow_is_in_top(query) || (waiting.x & HEDGEROW_RECORDS_WAIT) == 0u) return false;
-    query.index = waiting.x & ~HEDGEROW_RECORDS_WAIT;
-    query.left = waiting.y;
-    return true;
+// An entry of the stack, such a rest or what is left of a group, is at hand, if it is one: what is too far is nothing.
+void hedgerow_take_entry(inout HedgerowRayQuery query, uvec2 waiting, bool waits) {
+    bool is_rest = waits && hedgerow_is_in_top(query) && (waiting.x & HEDGEROW_RECORDS_WAIT) != 0u;
+    query.index = is_rest ? waiting.x & ~HEDGEROW_RECORDS_WAIT : query.index;
+    query.left = is_rest ? waiting.y : HEDGEROW_NOTHING;
+    query.first_child = waiting.x;
+    // Equally far is not too far: an equally near hit that comes before may be there.
+    bool is_near = uintBitsToFloat(waiting.y & 0xFFFF0000u) <= query.best;
+    query.group = waits && !is_rest && is_near ? waiting.y : 0u;
 }
 
-// The next leaf or node of those at hand; whether there was any.
-bool hedgerow_take_of_group(inout HedgerowRayQuery query) {
-    if (query.leaves != 0u) {
+bool hedgerow_has_group(HedgerowRayQuery query) {
+    return (query.group & 0xFFu | query.leaves) != 0u;
+}
+
+// The next of the leaves at hand, if nothing else is.
+void hedgerow_take_leaf(inout HedgerowRayQuery query) {
+    if (query.left == HEDGEROW_NOTHING && query.leaves != 0u) {
         uint slot = uint(findLSB(query.leaves)) ^ query.octant;
         query.leaves &= query.leaves - 1u;
         uint count = byte_of_slot(query.counts, slot);
         query.index = query.first_record + sum_below(query.counts, slot);
         // A slot without a child may be among them.
         query.left = count != 0u ? count : HEDGEROW_NOTHING;
-        return true;
     }
+}
+
+// The next node of those at hand, if nothing else is.
+void hedgerow_take_of_group(inout HedgerowRayQuery query) {
     uint visits = query.group & 0xFFu;
-    if (visits == 0u) return false;
+    if (query.left != HEDGEROW_NOTHING || query.leaves != 0u || visits == 0u) return;
     uint slot = uint(findLSB(visits)) ^ query.octant;
     uint left = visits & visits - 1u;
     if (hedgerow_is_in_top(query)) {
@@ -88,6 +99,5 @@ bool hedgerow_take_of_group(inout HedgerowRayQuery query) {
         query.level++;
     }
     query.group = 0u;
-    return true;
 }
 #endif

@@ -10,11 +10,12 @@
 //
 // There is no loop in the loop, which would cost a copy of what changes in it: what was taken and is too far costs a round. On lavapipe a
 // query of one level in turn is 1.06 times as fast so, and one of two levels by itself 1.01 times. Nor is there a return in the middle of the
-// loop, or of taking what waits, behind which each write would be masked: queries through two levels are 1.09 times as fast without.
+// loop, or of taking what waits, behind which each write would be masked: queries through two levels are 1.09 times as fast without (in turn 1.04).
 //
-// Structures are of nodes of two. A shader that defines HEDGEROW_QUANTISED also meets those of nodes of eight (bvh/wide.glsl), as
-// trace/walk_quantised.glsl does, in either level beside those of two; in others rays pass what is made of them. What nobody uses costs: on lavapipe a
-// query in nodes of two takes 1.04 times as long where the shader could meet the others, too.
+// Structures are of nodes of two or of nodes of eight (bvh/wide.glsl), which are walked as trace/walk_quantised.glsl does, in either level
+// beside each other. A shader may define HEDGEROW_FORMS, a constant or specialisation constant: which of them there are,
+// HEDGEROW_NODES_OF_TWO or HEDGEROW_NODES_OF_EIGHT. Rays pass what is made of others. What nobody uses costs: on lavapipe a query in nodes
+// of two takes 1.04 times as long where the shader could meet those of eight, too.
 //
 // A shader may define HEDGEROW_ONE_LEVEL, a constant or specialisation constant: where it is true, bottom-level structures are queried
 // themselves, and nothing is left of the steps of a top level, which rays pass. On lavapipe rays are 1.1 to 1.2 times as fast so.
@@ -55,6 +56,13 @@ const uint HEDGEROW_MET_BOX = 2u;
 
 #ifndef HEDGEROW_ONE_LEVEL
 #define HEDGEROW_ONE_LEVEL false
+#endif
+
+const uint HEDGEROW_NODES_OF_TWO = 1u;
+const uint HEDGEROW_NODES_OF_EIGHT = 2u;
+#ifndef HEDGEROW_FORMS
+#define HEDGEROW_ALL_FORMS
+#define HEDGEROW_FORMS (HEDGEROW_NODES_OF_TWO | HEDGEROW_NODES_OF_EIGHT)
 #endif
 
 // In place of a leaf's count: nothing at hand, take what waits.
@@ -101,6 +109,7 @@ struct HedgerowMeeting {
     float u;
     float v;
     uint record;              // in the bottom-level structure; of quantised triangles see trace/query_pairs.glsl
+    uint primitive;           // of all geometries of the structure
     uint instance;            // record in the top level; without meaning where a bottom-level structure is queried
     bool is_front;
     bool is_opaque;
@@ -184,12 +193,14 @@ vec3 hedgerow_transformed(vec4 rows[3], vec4 p) {
     return q;
 }
 
+// Whether there are structures of this form.
+bool hedgerow_meets(uint form) {
+    return (HEDGEROW_FORMS & ((form & FORM_QUANTISED) != 0u ? HEDGEROW_NODES_OF_EIGHT : HEDGEROW_NODES_OF_TWO)) != 0u;
+}
+
 bool hedgerow_can_be_traced(Header header) {
-    bool known = header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || header.kind == KIND_INSTANCES;
-#ifdef HEDGEROW_QUANTISED
-    known = known || is_quantised(header.kind);
-#endif
-    known = known && !(HEDGEROW_ONE_LEVEL && has_instances(header.kind));
+    bool known = header.kind == KIND_TRIANGLES || header.kind == KIND_BOXES || header.kind == KIND_INSTANCES || is_quantised(header.kind);
+    known = known && hedgerow_meets(form_of(header)) && !(HEDGEROW_ONE_LEVEL && has_instances(header.kind));
     return header.magic == MAGIC && known && header.active_count != 0u && (header.status & STATUS_UNUSABLE) == 0u;
 }
 
@@ -228,11 +239,8 @@ bool hedgerow_goes_left_first(HedgerowRayQuery query) {
 }
 
 bool hedgerow_is_quantised(HedgerowRayQuery query) {
-#ifdef HEDGEROW_QUANTISED
-    return (query.form & FORM_QUANTISED) != 0u;
-#else
-    return false;
-#endif
+    if (HEDGEROW_FORMS == HEDGEROW_NODES_OF_TWO) return false;
+    return HEDGEROW_FORMS == HEDGEROW_NODES_OF_EIGHT || (query.form & FORM_QUANTISED) != 0u;
 }
 
 // Of quantised nodes nothing is at hand.
@@ -267,7 +275,7 @@ void hedgerow_take_top(inout HedgerowRayQuery query) {
 }
 
 void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint flags, uint cull_mask, HedgerowRay ray) {
-    const HedgerowMeeting nothing = HedgerowMeeting(HEDGEROW_MET_NOTHING, ray.t_max, 0.0, 0.0, 0u, 0u, false, false);
+    const HedgerowMeeting nothing = HedgerowMeeting(HEDGEROW_MET_NOTHING, ray.t_max, 0.0, 0.0, 0u, 0u, 0u, false, false);
     query.ray = ray;
     query.flags = flags;
     query.cull_mask = cull_mask;
@@ -336,8 +344,9 @@ void hedgerow_count_hit(inout HedgerowRayQuery query) {
 // first: its header may name any place.
 HedgerowGeometry hedgerow_geometry_of(uvec2 structure, uint slots, uint primitive) {
     Header header = Structure(structure).header;
-    if (header.magic != MAGIC || header.node_slots != slots) return HedgerowGeometry(0u, 0u, 0u);
+    // First, as it is most often all that has to be loaded.
     if (header.geometry_count <= 1u) return HedgerowGeometry(0u, 0u, header.geometry_flags);
+    if (header.magic != MAGIC || header.node_slots != slots) return HedgerowGeometry(0u, 0u, 0u);
     GeometryTable table = GeometryTable(geometry_table_of(structure, header));
     return hedgerow_geometry_in(table, header.geometry_count, primitive);
 }
@@ -372,23 +381,19 @@ uvec2 hedgerow_records_of(Instance instance) {
 // The triangle that a meeting was with.
 Triangle hedgerow_triangle_of(Instance instance, HedgerowMeeting met) {
     uvec2 records = hedgerow_records_of(instance);
-#ifdef HEDGEROW_QUANTISED
     if ((instance.slots & FORM_QUANTISED) != 0u) return hedgerow_triangle_of_record(records, met.record);
-#endif
     return Triangles(records).triangle[met.record];
 }
 
-uint hedgerow_primitive_of(Instance instance, HedgerowMeeting met) {
-    if (met.type == HEDGEROW_MET_BOX) return BoxRecords(hedgerow_records_of(instance)).box[met.record].primitive;
-    return hedgerow_triangle_of(instance, met).primitive;
-}
-
-// Whether the candidate comes before the committed hit at the same t: by instance, then primitive.
+// Whether the candidate comes before the committed hit at the same t: by instance, then primitive. Several records may be of one instance.
 bool hedgerow_comes_before(HedgerowRayQuery query) {
-    if (query.committed.type == HEDGEROW_MET_NOTHING) return false;
-    Instance a = hedgerow_instance_of(query, query.candidate), b = hedgerow_instance_of(query, query.committed);
-    if (a.instance != b.instance) return a.instance < b.instance;
-    return hedgerow_primitive_of(a, query.candidate) < hedgerow_primitive_of(b, query.committed);
+    HedgerowMeeting a = query.candidate, b = query.committed;
+    if (b.type == HEDGEROW_MET_NOTHING) return false;
+    if (hedgerow_has_top(query) && a.instance != b.instance) {
+        uint of_a = hedgerow_instance_of(query, a).instance, of_b = hedgerow_instance_of(query, b).instance;
+        if (of_a != of_b) return of_a < of_b;
+    }
+    return a.primitive < b.primitive;
 }
 
 void hedgerow_commit(inout HedgerowRayQuery query) {
@@ -472,10 +477,7 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     uint flags = instance.offset_and_flags >> 24;
     if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
     HEDGEROW_COUNT(y);
-    if (hedgerow_skips(query.flags, instance.slots)) return;
-#ifndef HEDGEROW_QUANTISED
-    if ((instance.slots & FORM_QUANTISED) != 0u) return;
-#endif
+    if (hedgerow_skips(query.flags, instance.slots) || !hedgerow_meets(instance.slots)) return;
     HedgerowRay ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
                                   hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
     HedgerowPreparedRay prepared;
@@ -527,19 +529,19 @@ void hedgerow_leave_instance(inout HedgerowRayQuery query) {
 
 // Takes what waits; false at the end of the walk. Behind an instance it takes what waits above it. What was taken may be nothing: too far.
 bool hedgerow_go_on(inout HedgerowRayQuery query) {
-    if (hedgerow_is_quantised(query) && hedgerow_take_of_group(query)) return true;
+    if (hedgerow_is_quantised(query) && hedgerow_has_group(query)) {
+        hedgerow_take_leaf(query);
+        hedgerow_take_of_group(query);
+        return true;
+    }
     if (query.level == hedgerow_bottom(query) && hedgerow_is_below(query)) hedgerow_leave_instance(query);
     bool waits = query.level != hedgerow_bottom(query);
-    if (hedgerow_is_quantised(query) && !waits) return false;
     // Where nothing waits an entry is read that means nothing.
     query.level -= waits ? 1u : 0u;
     if (hedgerow_is_quantised(query)) {
-        uvec2 waiting = hedgerow_entry(query.level);
-        if (hedgerow_takes_rest(query, waiting)) return true;
-        query.first_child = waiting.x;
-        // Equally far is not too far: an equally near hit that comes before may be there.
-        query.group = uintBitsToFloat(waiting.y & 0xFFFF0000u) <= query.best ? waiting.y : 0u;
-        return true;
+        hedgerow_take_entry(query, hedgerow_entry(query.level), waits);
+        hedgerow_take_of_group(query);
+        return waits;
     }
     if (hedgerow_ends_at_first_hit(query)) {
         uvec2 waiting = hedgerow_taken_anyway(query.level);
@@ -574,6 +576,7 @@ bool hedgerow_proceed_for(inout HedgerowRayQuery query, inout uint most, const b
         if (query.left == HEDGEROW_NOTHING) ends = !hedgerow_go_on(query);
         if (hedgerow_has_record(query) && hedgerow_is_in_top(query)) hedgerow_enter_instance(query);
         if (hedgerow_comes_to_node(query)) hedgerow_visit(query);
+        if (hedgerow_is_quantised(query)) hedgerow_take_leaf(query);
         if (hedgerow_has_record(query) && !hedgerow_is_in_top(query)) waits = hedgerow_test(query);
     }
     if (ends) hedgerow_count_hit(query);

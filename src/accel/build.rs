@@ -97,14 +97,14 @@ impl Build {
         let in_pieces = wide.filter(|_| primitives == Primitives::Triangles && entries >= NUMBERED_FROM);
         let numbered = in_pieces.and_then(|_| builder.numbered());
         let (builder, numbered) = numbered.map_or((builder, false), |builder| (builder, true));
-        let of_another_form =
-            quality::fewer_of_another_form(flags, entries).filter(|_| primitives != Primitives::Instances);
+        let of_another_form = quality::fewer_of_another_form(flags, options, primitives, entries)
+            .filter(|_| primitives != Primitives::Instances);
         let in_other_memory = numbered.then_some(NUMBERED_FROM - 1);
         let of_fewer = |count: u32| {
             let given = given.clone();
             Build::new(context, options, flags, given, counts, count.into()).map(|build| build.sizes_at_most())
         };
-        let of_fewer = of_another_form.into_iter().chain(in_other_memory).map(of_fewer).collect::<Result<_>>()?;
+        let of_fewer = of_another_form.chain(in_other_memory).map(of_fewer).collect::<Result<_>>()?;
         let options = builder_options;
         Ok(Build {
             builder,

@@ -88,6 +88,24 @@ impl<'a> Device<'a> {
         Ok(())
     }
 
+    /// Whether a build over so many primitives a geometry makes nodes of eight children ([`AccelOptions::wide`]). What shaders meet none of
+    /// they may leave out (`HEDGEROW_FORMS` in `glsl/trace/query_walk.glsl`).
+    ///
+    /// # Errors
+    /// As of [`Device::get_acceleration_structure_build_sizes`].
+    ///
+    /// # Safety
+    /// The pointers of `info` are valid.
+    pub unsafe fn makes_nodes_of_eight(
+        &self,
+        info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+        primitive_counts: &[u32],
+    ) -> Result<bool> {
+        // SAFETY: the caller's promise.
+        let (given, count) = unsafe { build::at_most(info, primitive_counts) }?;
+        Ok(Build::new(self.context, &self.options, info.flags, given, Counts::OnHost, count)?.is_wide())
+    }
+
     /// `vkCreateAccelerationStructureKHR`: a handle for the place that `info` names. Nothing is allocated.
     ///
     /// # Errors

@@ -19,14 +19,15 @@
 //! device knows of it is a [`Property`], written to an address instead of a query pool.
 //!
 //! Three kinds of builds, by flag. Build time and speed of rays are beside those of `PREFER_FAST_BUILD`: geometric means of the first
-//! eight scenes of `docs/results.md` and seven kinds of rays through the tracer, on Mesa 26's lavapipe (`hedgerow bench -b
-//! lbvh:codes=emc64var/24,hploc,hploc:optimise=0.5,hploc:optimise=fast`).
+//! eight scenes of `docs/results.md` and seven kinds of rays through the tracers, on Mesa 26's lavapipe (`hedgerow bench -b
+//! lbvh:codes=emc64var/24,hploc:width=8q,hploc:width=8q:optimise=0.5,hploc:width=8q:optimise=0.33`, 26 November 2026). Those of the second
+//! and third are [nodes of eight](Wide), of 4,096 primitives and more.
 //!
 //! | preference | bottom levels | top levels | build | rays |
 //! | --- | --- | --- | --- | --- |
 //! | `PREFER_FAST_BUILD` | an LBVH by codes of 8 bits less | the same | 1.0 | 1.0 |
-//! | none | H-PLOC, of over 2,048 primitives: of those measured in nodes of two, the least time for a build and ten rays a triangle | an LBVH and three quarters of a pass of [reinsertion](crate::bvh::reinsertion) | 2.4 | 1.17 |
-//! | `PREFER_FAST_TRACE` | H-PLOC and half a pass of reinsertion (a whole one: 16 and 1.27); three quarters up to 32,768 primitives, two passes up to 2,048 | the same as without, and opens instances ([`REBRAID`]) | 10 | 1.23 |
+//! | none | H-PLOC, of over 2,048 primitives: of those measured the least time for a build and ten rays a triangle, 0.70 of an LBVH's (0.91 in nodes of two, 0.83 and 0.89 with a third and half of a pass of reinsertion) | an LBVH and three quarters of a pass of [reinsertion](crate::bvh::reinsertion) | 4.4 (2.4 in nodes of two) | 1.66 (1.15) |
+//! | `PREFER_FAST_TRACE` | H-PLOC and half a pass of reinsertion, a third from 262,145 primitives on, three quarters up to 32,768, two passes up to 2,048 | the same as without, and opens instances ([`REBRAID`]) | 11 | 1.73 |
 //!
 //! What other flags change:
 //!
@@ -75,6 +76,27 @@ pub const REBRAID: vk::BuildAccelerationStructureFlagsKHR = vk::BuildAcceleratio
 pub const ANY_HIT_ORDER: vk::BuildAccelerationStructureFlagsKHR =
     vk::BuildAccelerationStructureFlagsKHR::from_raw(1 << 29);
 
+/// Which structures get quantised nodes of eight children ([`crate::bvh::wide`]) in place of nodes of two: of those that allow no update,
+/// bottom levels that are not LBVHs, and top levels but for those of `PREFER_FAST_BUILD`. They stand beside others in either level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Wide {
+    /// None: shaders may leave them out by `HEDGEROW_FORMS` (`glsl/trace/query_walk.glsl`), and [`crate::trace::tracer`] traces all bottom
+    /// levels.
+    Never,
+    /// Bottom levels of [`Wide::LARGE`] primitives and more. They take 32 to 38 bytes a triangle compacted where nodes of two take 50 to 62
+    /// (docs/notes/memory.md), and rays are faster. Instances of fewer primitives are met in two or three nodes: there nodes of two are
+    /// faster, as they are in the top level (docs/notes/rays.md).
+    #[default]
+    Large,
+    /// All.
+    Always,
+}
+
+impl Wide {
+    /// Primitives from which on [`Wide::Large`] takes bottom levels.
+    pub const LARGE: u32 = 4096;
+}
+
 /// Choices of a [`Device`] that Vulkan's structs have no field for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AccelOptions {
@@ -87,13 +109,8 @@ pub struct AccelOptions {
     /// as an instance far from the others would put them all into one cell, and with as many bits as the device finds that the
     /// instances' spread needs ([`BuildOptions::bits_up_to`](crate::bvh::builder::BuildOptions::bits_up_to)).
     pub top_codes: Option<Codes>,
-    /// Whether structures get quantised nodes of eight children ([`crate::bvh::wide`]), where no update is allowed: top levels but for
-    /// those of `PREFER_FAST_BUILD`, bottom levels that are not LBVHs. They take less memory, 32 to 38 bytes a triangle compacted where nodes
-    /// of two take 50 to 62 (docs/notes/memory.md), and stand beside others in either level.
-    /// Shaders must define `HEDGEROW_QUANTISED` before they include `trace/query.glsl`, or their rays pass what is made of such nodes; of
-    /// the tracers, those of [`crate::trace::wide`] meet bottom levels. For a few large structures: on lavapipe queries of one scene in
-    /// one instance gain, those of many small instances lose (docs/notes/rays.md); no GPU was measured.
-    pub wide: bool,
+    /// Which structures get nodes of eight children.
+    pub wide: Wide,
     /// Whether calls are checked against what was created and built, as Vulkan's validation would: memory that is too
     /// small or overlaps, misaligned data, updates without the flag or of changed counts. They return an error before anything
     /// is recorded. Structures must then be created, built and destroyed through this device and its clones. For debugging:
@@ -104,7 +121,7 @@ pub struct AccelOptions {
 impl AccelOptions {
     /// Four times as many entries as instances: where scenes of all kinds whose boxes are loose gain, and memory is spared. No checks.
     pub const DEFAULT: AccelOptions =
-        AccelOptions { rebraid_budget: 4.0, bottom_codes: None, top_codes: None, wide: false, checked: false };
+        AccelOptions { rebraid_budget: 4.0, bottom_codes: None, top_codes: None, wide: Wide::Large, checked: false };
     /// The same with checks.
     pub const CHECKED: AccelOptions = AccelOptions { checked: true, ..AccelOptions::DEFAULT };
 }

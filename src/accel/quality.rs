@@ -4,7 +4,7 @@
 //! neighbours by surface area and moves subtrees to where they cost less, for about as long as a driver's build takes; its top levels
 //! open instances. Without either, a build pays for what ten rays a triangle bring back.
 
-use super::{ANY_HIT_ORDER, AccelOptions, REBRAID};
+use super::{ANY_HIT_ORDER, AccelOptions, REBRAID, Wide};
 use crate::bvh::builder::{BuildOptions, Method, Primitives, Window};
 use crate::bvh::child_order::ChildOrder;
 use crate::bvh::codes::{CodeBounds, Codes};
@@ -36,15 +36,16 @@ const FEW: u32 = 2048;
 /// slots of a node lie.
 const MOST_WIDE: u32 = TRIANGLES_AT_MOST;
 
-/// Primitives up to which a fast trace gets most of a pass of reinsertion, as a driver's build of few takes long; of more it gets half of
-/// one. On Mesa's lavapipe H-PLOC and three quarters took 0.7 to 1.4 of a driver's time over more than 60 thousand triangles, and with half
-/// of one they take 0.5 to 1.04 (docs/notes/memory.md).
+/// Primitives up to which a fast trace gets most of a pass of reinsertion, as a driver's build of few takes long, and up to which half of
+/// one; of more it gets a third: what leaves a build as long as a driver's on Mesa's lavapipe (docs/notes/memory.md).
 const SOME: u32 = 1 << 15;
+const MANY: u32 = 1 << 18;
 
-const HALF_A_PASS: ReinsertionOptions =
-    ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds / 2, ..ReinsertionOptions::FAST };
-const MOST_OF_A_PASS: ReinsertionOptions =
-    ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds * 3 / 4, ..ReinsertionOptions::FAST };
+const fn part_of_a_pass(part: u32, of: u32) -> ReinsertionOptions {
+    ReinsertionOptions { rounds: ReinsertionOptions::FAST.rounds * part / of, ..ReinsertionOptions::FAST }
+}
+
+const MOST_OF_A_PASS: ReinsertionOptions = part_of_a_pass(3, 4);
 
 /// # Errors
 /// Unknown flags, or two that exclude each other; codes that there are not.
@@ -65,10 +66,11 @@ pub(super) fn check(flags: Flags, options: &AccelOptions) -> Result<()> {
     Ok(())
 }
 
-/// Entries of a top level over so many instances; `None` if none of them is opened, as an opened instance cannot be refitted.
+/// Entries of a top level over so many instances; `None` if none of them is opened, as an opened instance cannot be refitted, and one alone
+/// overlaps no other.
 pub(super) fn opened_to(flags: Flags, options: &AccelOptions, instance_count: u32) -> Option<u32> {
     let asked = flags.intersects(REBRAID | Flags::PREFER_FAST_TRACE) && !flags.contains(Flags::ALLOW_UPDATE);
-    let opens = asked && options.rebraid_budget > 1.0;
+    let opens = asked && options.rebraid_budget > 1.0 && instance_count > 1;
     // What is too much is refused by the builder.
     opens.then(|| (f64::from(instance_count) * f64::from(options.rebraid_budget)).ceil() as u32)
 }
@@ -78,7 +80,8 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
     let is_top = primitives == Primitives::Instances;
     BuildOptions {
         method: if is_top { Method::Lbvh } else { bottom_method(flags, count) },
-        optimise: if is_top { top_optimise(flags) } else { bottom_optimise(flags, count) },
+        // Of two leaves there is nothing to move.
+        optimise: if is_top { top_optimise(flags) } else { bottom_optimise(flags, count) }.filter(|_| count > 2),
         codes: Some(codes(flags, options, is_top, count)),
         bits_up_to: (is_top && options.top_codes.is_none()).then(|| top_bits(flags)),
         // An instance costs more than a node whatever its box: one a leaf.
@@ -92,11 +95,14 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
 
 /// Whether a structure gets quantised nodes of eight: they cannot be refitted.
 pub(super) fn is_wide(flags: Flags, options: &AccelOptions, primitives: Primitives, count: u32) -> bool {
-    let is_quick = match primitives {
-        Primitives::Instances => flags.contains(Flags::PREFER_FAST_BUILD),
-        _ => is_quick(flags, count),
+    let is_top = primitives == Primitives::Instances;
+    let is_quick = if is_top { flags.contains(Flags::PREFER_FAST_BUILD) } else { is_quick(flags, count) };
+    let is_asked = match options.wide {
+        Wide::Never => false,
+        Wide::Large => !is_top && count >= Wide::LARGE,
+        Wide::Always => true,
     };
-    options.wide && !flags.contains(Flags::ALLOW_UPDATE) && count <= MOST_WIDE && !is_quick
+    is_asked && !flags.contains(Flags::ALLOW_UPDATE) && count <= MOST_WIDE && !is_quick
 }
 
 /// Whether a bottom level is an LBVH.
@@ -104,9 +110,16 @@ fn is_quick(flags: Flags, count: u32) -> bool {
     flags.contains(Flags::PREFER_FAST_BUILD) || (!flags.contains(Flags::PREFER_FAST_TRACE) && count <= FEW)
 }
 
-/// Fewer primitives, of which another form may need more memory than `count` in that of `count`.
-pub(super) fn fewer_of_another_form(flags: Flags, count: u32) -> Option<u32> {
-    (count > FEW && is_quick(flags, FEW) != is_quick(flags, count)).then_some(FEW)
+/// Fewer primitives of a bottom level, of which another method or form may need more memory than `count` in that of `count`.
+pub(super) fn fewer_of_another_form(
+    flags: Flags,
+    options: &AccelOptions,
+    primitives: Primitives,
+    count: u32,
+) -> impl Iterator<Item = u32> {
+    let options = *options;
+    let made = move |count| (is_quick(flags, count), is_wide(flags, &options, primitives, count));
+    [FEW, Wide::LARGE - 1].into_iter().filter(move |&fewer| fewer < count && made(fewer) != made(count))
 }
 
 fn bottom_method(flags: Flags, count: u32) -> Method {
@@ -114,12 +127,11 @@ fn bottom_method(flags: Flags, count: u32) -> Method {
 }
 
 fn bottom_optimise(flags: Flags, count: u32) -> Option<ReinsertionOptions> {
-    let rounds = if count <= FEW {
-        ReinsertionOptions::MEDIUM
-    } else if count <= SOME {
-        MOST_OF_A_PASS
-    } else {
-        HALF_A_PASS
+    let rounds = match count {
+        count if count <= FEW => ReinsertionOptions::MEDIUM,
+        count if count <= SOME => MOST_OF_A_PASS,
+        count if count <= MANY => part_of_a_pass(1, 2),
+        _ => part_of_a_pass(1, 3),
     };
     flags.contains(Flags::PREFER_FAST_TRACE).then_some(rounds)
 }

@@ -6,10 +6,11 @@
 //!
 //! - [`ray`] prepares a ray: shear, reciprocals, error bounds;
 //! - [`determinant`], [`triangle`], [`slab`] are the arithmetic, each the twin of a file in `glsl/trace/`;
-//! - [`tracer`] traverses on the device, [`wide`] in wide trees, [`kd`] in kd-trees;
+//! - [`tracer`] traverses on the device, [`wide`] in wide trees, [`bottom_level`] in either, [`kd`] in kd-trees;
 //! - [`counts`] says where rays go in a tree, [`flux`] where in space; [`trial`] takes the better of two trees;
 //! - [`twin`] does the same on the host.
 
+pub mod bottom_level;
 pub mod counts;
 pub mod determinant;
 pub mod flux;

@@ -111,7 +111,8 @@ const LEVEL_BYTES: u32 = 8;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TraceBuffers {
     /// Address of a `Bvh2`, or of another structure if the tracer takes it. One of another kind than the tracer's is traced as if it
-    /// were empty, and so is one whose status says that it is too deep or unfinished.
+    /// were empty, and so is one whose status says that it is too deep or unfinished. [`super::bottom_level`] takes whatever bottom levels
+    /// of [`crate::accel`] are.
     pub structure: u64,
     /// [`Ray`] × `count`.
     pub rays: Region,
@@ -155,6 +156,19 @@ pub(super) fn kernel_left_first(shader: &'static shaders::Shader, shape: &TraceS
     let [any_hit, count_work, shared_levels, lanes, in_vectors] = constants(shape, Query::AnyHit, count_work);
     let left_first = 1;
     Kernel::new(shader, shape.workgroup, &[any_hit, count_work, shared_levels, lanes, in_vectors, left_first])
+}
+
+/// The kernel of an octant's shader that leaves hits as they are where the structure is not of its kind.
+pub(super) fn kernel_where_it_is(
+    shader: &'static shaders::Shader,
+    shape: &TraceShape,
+    query: Query,
+    count_work: bool,
+) -> Kernel {
+    let [any_hit, count_work, shared_levels, lanes, in_vectors] = constants(shape, query, count_work);
+    let (left_first, leaves_others) = (0, 1);
+    let constants = [any_hit, count_work, shared_levels, lanes, in_vectors, left_first, leaves_others];
+    Kernel::new(shader, shape.workgroup, &constants)
 }
 
 /// Records the tracing of all rays: one dispatch, or several if the device cannot take all workgroups in one.

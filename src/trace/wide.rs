@@ -3,7 +3,8 @@
 use super::Query;
 use super::tracer::{self, Loads, TraceBuffers, TraceShape};
 use crate::bvh::wide::Form;
-use crate::gpu::{Context, Kernel, Limits, Recorder, shaders};
+use crate::gpu::shaders::{self, Shader};
+use crate::gpu::{Context, Kernel, Limits, Recorder};
 use crate::{Error, Result};
 
 /// The order in which a ray visits the children of a node.
@@ -87,7 +88,18 @@ impl WideTracer {
     /// No kernel visits such nodes in that order, or loads them in that way; the nearest hit is not found by
     /// [`Order::LeftFirst`].
     fn kernel(&self, query: Query, count_work: bool) -> Result<Kernel> {
-        let shader = match (self.form, self.order, self.shape.loads) {
+        let shader = self.shader()?;
+        match (self.order, query) {
+            (Order::LeftFirst, Query::AnyHit) => Ok(tracer::kernel_left_first(shader, &self.shape, count_work)),
+            (Order::LeftFirst, Query::ClosestHit) => Err(Error::Argument(
+                "Order::LeftFirst is for rays that end at any hit; take Order::Distance for the closest".into(),
+            )),
+            _ => Ok(tracer::kernel_of(shader, &self.shape, query, count_work)),
+        }
+    }
+
+    fn shader(&self) -> Result<&'static Shader> {
+        Ok(match (self.form, self.order, self.shape.loads) {
             (Form::EightQuantised, Order::Octant, Loads::LaneByLane) => &shaders::TRACE_WIDE_OCTANT_LANES,
             (form, order, Loads::LaneByLane) => return Err(self.no_kernel(form, order)),
             (Form::EightQuantised, Order::Octant, Loads::InLongs) => &shaders::TRACE_WIDE_OCTANT_INT64,
@@ -99,14 +111,7 @@ impl WideTracer {
             (Form::Eight, ..) => &shaders::TRACE_WIDE_EIGHT,
             (Form::EightQuantised, _, Loads::InLongs) => &shaders::TRACE_WIDE_EIGHT_QUANTISED_INT64,
             (Form::EightQuantised, ..) => &shaders::TRACE_WIDE_EIGHT_QUANTISED,
-        };
-        match (self.order, query) {
-            (Order::LeftFirst, Query::AnyHit) => Ok(tracer::kernel_left_first(shader, &self.shape, count_work)),
-            (Order::LeftFirst, Query::ClosestHit) => Err(Error::Argument(
-                "Order::LeftFirst is for rays that end at any hit; take Order::Distance for the closest".into(),
-            )),
-            _ => Ok(tracer::kernel_of(shader, &self.shape, query, count_work)),
-        }
+        })
     }
 
     fn no_kernel(&self, form: Form, order: Order) -> Error {
@@ -126,6 +131,16 @@ impl WideTracer {
     /// [`Order::LeftFirst`].
     pub fn record(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &TraceBuffers) -> Result<()> {
         let kernel = self.kernel(query, buffers.work.is_some())?;
+        tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
+    }
+    /// The same by [`Order::Octant`], where the structure is of this form; otherwise hits and work stay what they are.
+    pub(super) fn record_where_it_is(
+        &self,
+        recorder: &mut Recorder<'_>,
+        query: Query,
+        buffers: &TraceBuffers,
+    ) -> Result<()> {
+        let kernel = tracer::kernel_where_it_is(self.shader()?, &self.shape, query, buffers.work.is_some());
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
     }
 }

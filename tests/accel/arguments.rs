@@ -3,7 +3,7 @@
 use crate::common::device;
 use crate::common::geometries::Owned;
 use crate::common::shapes::soup;
-use hedgerow::accel::{self, AccelOptions, Placement, Request};
+use hedgerow::accel::{self, AccelOptions, Placement, Request, Wide};
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{Geometry, IndexFormat, VertexFormat};
 use hedgerow::gpu::ArgumentMemory;
@@ -64,7 +64,7 @@ fn built(structures: &accel::Device<'_>, requests: &[Request]) -> hedgerow::Resu
 #[test]
 fn builds_with_arguments_in_memory_have_the_bytes_of_those_without() {
     let (requests, _geometries) = requests();
-    let pushed = accel::Device::with_options(device(), AccelOptions { wide: true, ..AccelOptions::DEFAULT });
+    let pushed = accel::Device::with_options(device(), AccelOptions { wide: Wide::Always, ..AccelOptions::DEFAULT });
     let bytes = accel::Device::argument_bytes(requests.len() as u64, 3 * requests.len() as u64);
     let arguments = device().upload("arguments", &vec![0xa5u8; 48 + bytes as usize]).expect("memory");
     let memory = ArgumentMemory { buffer: arguments.raw(), offset: 32, bytes };

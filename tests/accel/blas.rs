@@ -5,7 +5,7 @@ use crate::common::device;
 use crate::common::geometries::{MOVED, Owned};
 use crate::common::probe::ProbeRay;
 use crate::common::shapes::{Corners, ray, soup};
-use hedgerow::accel::{self, Request};
+use hedgerow::accel::{self, AccelOptions, Request, Wide};
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::codes::Codes;
@@ -362,7 +362,6 @@ fn fewer_primitives_than_were_planned_for_fit() {
 /// More triangles have a smaller table to sort with at some counts: what is asked for must suffice for fewer, too.
 #[test]
 fn the_sizes_of_a_maximum_suffice_for_every_smaller_count() {
-    let ours = Ours::on(device());
     let owned = Owned::of(&soup(1, 0.5, 9), VertexFormat::FLOAT3, IndexFormat::U32, 0);
     let (geometry, _memory) = owned.upload(0, 0);
     let geometries = [vk_geometry(&geometry, &owned)];
@@ -374,7 +373,9 @@ fn the_sizes_of_a_maximum_suffice_for_every_smaller_count() {
         .filter_map(|count| u32::try_from(count).ok())
         .collect();
     counts.sort_unstable();
-    for flags in all {
+    let all = all.into_iter().flat_map(|flags| [Wide::Never, Wide::Large, Wide::Always].map(|wide| (flags, wide)));
+    for (flags, wide) in all {
+        let ours = Ours::with_options(device(), AccelOptions { wide, ..AccelOptions::DEFAULT });
         let mut most = [0; 2];
         for &count in &counts {
             let sizes = ours.build_sizes(&bottom_level(&geometries).flags(flags), &[count]);
@@ -382,9 +383,46 @@ fn the_sizes_of_a_maximum_suffice_for_every_smaller_count() {
             most = [most[0].max(needed.structure), most[1].max(needed.scratch)];
             assert!(
                 sizes.acceleration_structure_size >= most[0] && sizes.build_scratch_size >= most[1],
-                "{count}, {flags:?}: {sizes:?}, {most:?}"
+                "{count}, {flags:?}, {wide:?}: {sizes:?}, {most:?}"
             );
         }
+    }
+}
+
+/// Of as many primitives as the documentation says, where they are not built in haste and allow no update.
+#[test]
+fn large_bottom_levels_are_of_nodes_of_eight() {
+    let ours = Ours::with_options(device(), AccelOptions::DEFAULT);
+    let owned = Owned::of(&soup(4096, 0.05, 21), VertexFormat::FLOAT3, IndexFormat::U32, 0);
+    let (geometry, _memory) = owned.upload(0, 0);
+    let geometries = [vk_geometry(&geometry, &owned)];
+    let (trace, none) = (Flags::PREFER_FAST_TRACE, Flags::empty());
+    for (flags, count, is_wide) in [
+        (trace, 4096, true),
+        (trace, 4095, false),
+        (none, 4096, true),
+        (none, 4095, false),
+        (Flags::PREFER_FAST_BUILD, 4096, false),
+        (trace | Flags::ALLOW_UPDATE, 4096, false),
+    ] {
+        let info = bottom_level(&geometries).flags(flags);
+        // SAFETY: the geometries live.
+        let says = unsafe { ours.0.makes_nodes_of_eight(&info, &[count]) }.expect("it can be built");
+        assert_eq!(says, is_wide, "{count}, {flags:?}");
+        // In memory for the most.
+        let built = Built::place(&ours, &info, &[4096], 0);
+        let (_scratch, scratch) = built.scratch(&ours, &info, &[4096]);
+        let info = info
+            .dst_acceleration_structure(built.structure)
+            .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch });
+        let range = Range::default().primitive_count(count);
+        let done = device().run(None, |recorder| {
+            ours.build(recorder, &[info], &[&[range]]);
+            Ok(())
+        });
+        done.expect("it builds");
+        let header: Header = built.memory.read_at(0, 1)[0];
+        assert_eq!((layout::is_quantised(header.kind), header.primitive_count), (is_wide, count), "{flags:?}");
     }
 }
 

@@ -6,7 +6,7 @@ use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
 use crate::common::probe::{IGNORE, ProbeRay, flags};
 use crate::common::shapes::{Corners, icosphere, placed, soup};
 use crate::common::world::World;
-use hedgerow::accel::{self, AccelOptions, Instance, REBRAID, Tree, twin};
+use hedgerow::accel::{self, AccelOptions, Instance, REBRAID, Tree, Wide, twin};
 use hedgerow::ash::vk;
 use hedgerow::bvh::codes::{Binning, Code, CodeBounds};
 use hedgerow::bvh::layout::{self, Child, Record, Triangle, status};
@@ -114,12 +114,14 @@ fn what_the_flags_ask_for_is_what_the_host_builds() {
         REBRAID | Flags::ALLOW_UPDATE,
         Flags::PREFER_FAST_TRACE | Flags::ALLOW_UPDATE,
     ];
-    for (flags, wide) in all.into_iter().flat_map(|flags| [(flags, false), (flags, true)]) {
+    for (flags, wide) in
+        all.into_iter().flat_map(|flags| [(flags, Wide::Never), (flags, Wide::Large), (flags, Wide::Always)])
+    {
         let options = AccelOptions { wide, ..AccelOptions::DEFAULT };
         let read = ReadBack::new(&Ours::with_options(device(), options), &World { flags, ..world.clone() });
         let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &options);
         assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}");
-        let is_wide = wide && !flags.intersects(Flags::ALLOW_UPDATE | Flags::PREFER_FAST_BUILD);
+        let is_wide = wide == Wide::Always && !flags.intersects(Flags::ALLOW_UPDATE | Flags::PREFER_FAST_BUILD);
         assert_eq!(matches!(read.top, Tree::OfEight(_)), is_wide, "{flags:?}");
         let opens = flags.intersects(REBRAID | Flags::PREFER_FAST_TRACE) && !flags.contains(Flags::ALLOW_UPDATE);
         assert_eq!(read.top.header().primitive_count > 400, opens, "{flags:?}");

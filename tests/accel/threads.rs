@@ -31,8 +31,10 @@ fn builds_that_many_threads_record_are_those_of_one() {
         tuning: crate::common::tuning(),
     };
     let context = unsafe { Context::new(&desc) }.expect("a context");
-    let builder =
-        accel::Device::with_options(&context, accel::AccelOptions { wide: true, ..accel::AccelOptions::DEFAULT });
+    let builder = accel::Device::with_options(
+        &context,
+        accel::AccelOptions { wide: accel::Wide::Always, ..accel::AccelOptions::DEFAULT },
+    );
     let ours = Ours::on(device());
     let flags =
         [BuildFlags::empty(), BuildFlags::PREFER_FAST_BUILD, BuildFlags::PREFER_FAST_TRACE, BuildFlags::LOW_MEMORY];

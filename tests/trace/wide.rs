@@ -16,7 +16,7 @@ use hedgerow::trace::tracer::{self, Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::twin::tracer as host;
 use hedgerow::trace::twin::wide::{self as wide_host, TracedNode};
 use hedgerow::trace::wide::{Order, WideTracer};
-use hedgerow::trace::{Hit, Query, Ray, Work};
+use hedgerow::trace::{Hit, Query, Ray, Work, bottom_level};
 
 /// An order with every way to cut the work: that for CPUs, that for GPUs, no shared memory at all, and a stack half here and half there.
 fn tracers_in_order(form: Form, order: Order) -> Vec<WideTracer> {
@@ -139,6 +139,31 @@ fn hits_are_those_of_brute_force_at_any_scale() {
         for collapse in [Collapse::SAH, Collapse::OFF] {
             assert_all_forms(&tree_with(&corners, collapse), &rays);
         }
+    }
+}
+
+/// One call for trees of either form: the hits and the work of the tracer of each.
+#[test]
+fn a_bottom_level_is_traced_whichever_its_nodes_are() {
+    let corners = soup(300, 0.3, 5);
+    let tree = tree_of(&corners);
+    let wide = Wide::<QuantisedNode>::of(&tree);
+    let rays = hard_rays(&corners, 777, 1.0, [0.0; 3], 3);
+    for query in [Query::ClosestHit, Query::AnyHit] {
+        let by_both = |bytes: &[u8], count| {
+            crate::common::traced(device(), bytes, &rays, count, |r, buffers| bottom_level::record(r, query, buffers))
+                .expect("the device traces")
+        };
+        let of_two: (Vec<Hit>, Vec<Work>) = rays.iter().map(|ray| host::trace(&tree, ray, query)).unzip();
+        let of_eight = rays.iter().map(|ray| wide_host::trace(&wide, ray, query, Order::Octant)).unzip();
+        assert!(by_both(&tree.to_bytes(), true) == of_two, "{query:?}");
+        assert!(by_both(&wide.to_bytes(), true) == of_eight, "{query:?}");
+        assert!(of_two.0.iter().any(Hit::is_some) && of_two.1 != of_eight.1, "the forms are told apart by their work");
+        assert!(by_both(&wide.to_bytes(), false).0 == of_eight.0, "{query:?}, uncounted");
+        // Neither form: empty.
+        let mut other = tree.to_bytes();
+        other[4..8].fill(0xff);
+        assert!(by_both(&other, false).0.iter().all(|hit| !hit.is_some()), "{query:?}");
     }
 }
 

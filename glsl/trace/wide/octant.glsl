@@ -8,6 +8,8 @@ layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const bool ANY_HIT = false;
 layout(constant_id = 2) const bool COUNT_WORK = false;
 layout(constant_id = 3) const uint SHARED_LEVELS = 0;
+// Where the structure is of another kind, hits stay what they are.
+layout(constant_id = 7) const bool LEAVES_OTHERS = false;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
 #define HEDGEROW_LEVELS 49
 
@@ -15,6 +17,7 @@ layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 #include "trace/walk_quantised.glsl"
 
 void main() {
+    if (LEAVES_OTHERS && structure.header.kind != KIND_TRIANGLES_8Q) return;
     uvec2 records = wide_records_at(uvec2(structure), structure.header.node_slots, QUANTISED_NODE_BYTES);
     QuantisedNodes nodes = QuantisedNodes(wide_nodes_at(uvec2(structure)));
     Child root = structure.header.root;

@@ -5,7 +5,8 @@
 // needs   one barrier before and after; a fixed workgroup of 64; any subgroup size
 #version 460
 #define WITH_HEDGEROW
-#define HEDGEROW_QUANTISED
 layout(constant_id = 5) const bool ONE_LEVEL = false;
 #define HEDGEROW_ONE_LEVEL ONE_LEVEL
+layout(constant_id = 6) const uint FORMS = 3;
+#define HEDGEROW_FORMS FORMS
 #include "measure/probe.glsl"

@@ -1,6 +1,5 @@
 // The same as measure/probe.comp, with five rays for each invocation, in turn (trace/query_turns.glsl): the tests.
 #version 460
 #define WITH_HEDGEROW
-#define HEDGEROW_QUANTISED
 #define IN_TURN
 #include "measure/probe.glsl"

@@ -11,5 +11,6 @@ uvec2 counts_of(uvec2 bottom_level) {
 }
 
 #define HEDGEROW_LINK_COUNTS counts_of
+#define HEDGEROW_FORMS HEDGEROW_NODES_OF_TWO
 #include "trace/ray_query_names.glsl"
 #include "measure/ray_query.glsl"

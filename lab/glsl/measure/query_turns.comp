@@ -5,6 +5,8 @@ layout(constant_id = 2) const uint SHARED_LEVELS = 0;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
 layout(constant_id = 5) const bool ONE_LEVEL = false;
 #define HEDGEROW_ONE_LEVEL ONE_LEVEL
+layout(constant_id = 6) const uint FORMS = 3;
+#define HEDGEROW_FORMS FORMS
 #define IN_TURN
 #include "trace/ray_query_names.glsl"
 #include "measure/ray_query.glsl"

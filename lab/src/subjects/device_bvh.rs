@@ -3,7 +3,7 @@
 use super::any_hit::{AnyHit, ChildrenBy, TaughtOrder};
 use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::device_rays::DeviceRays;
-use super::queries::{self, Queried, Queries, QueryWork};
+use super::queries::{self, Forms, Queried, Queries, QueryWork};
 use super::taught_rounds::TaughtRounds;
 use super::wide::{WidePlan, WideTree};
 use super::{BuildRun, Subject, joined_choices};
@@ -25,22 +25,34 @@ use hedgerow::trace::{Hit, Query, Ray, Work};
 const PHASES: u32 = 18;
 
 /// How rays go through a tree that is built on the device.
-#[derive(Debug, Clone)]
-pub enum Walk {
-    /// By the tracer of binary trees.
-    Tracer,
-    /// By queries in a shader.
-    Query(Queries),
+#[derive(Debug, Clone, Default)]
+pub struct Walk {
+    /// By queries in a shader, not by a tracer.
+    pub by_query: Option<Queries>,
     /// Through a wide tree that is made of the binary one.
-    Wide(WidePlan),
+    pub wide: Option<WidePlan>,
 }
 
-/// How rays go through a binary tree.
-#[derive(Debug, Clone, Copy)]
-struct BinaryWalk {
+/// What rays go through: the wide tree, where there is one, or the `Bvh2`.
+struct TracedTree<'a> {
+    wide: Option<WideTree<'a>>,
     by_query: Option<Queries>,
     /// Whether the children have an order.
     is_ordered: bool,
+}
+
+impl TracedTree<'_> {
+    /// Records the tracing of rays.
+    fn record(&self, recorder: &mut Recorder<'_>, query: Query, buffers: &TraceBuffers) -> hedgerow::Result<()> {
+        match (self.by_query, &self.wide) {
+            (Some(queries), wide) => {
+                let queried = Queried { one_level: true, forms: Forms::default().with(wide.is_some()) };
+                queries::record(recorder, query, buffers, queried, queries)
+            }
+            (None, Some(tree)) => tree.record_trace(recorder, query, buffers),
+            (None, None) => record_binary(recorder, self.is_ordered, query, buffers),
+        }
+    }
 }
 
 /// What rays teach a finished tree, behind a build.
@@ -77,8 +89,7 @@ pub struct DeviceBvh<'a> {
     bvh: Builder,
     mesh: DeviceMesh<'a>,
     memory: BuildMemory<'a>,
-    wide: Option<WideTree<'a>>,
-    binary: BinaryWalk,
+    traced: TracedTree<'a>,
     taught: Behind<'a>,
     timestamps: Timestamps,
     rays: DeviceRays<'a>,
@@ -117,22 +128,14 @@ impl<'a> DeviceBvh<'a> {
         check_memory(device, builder, count, mesh_bytes as u64 + sizes.structure + sizes.scratch)?;
         let mesh = DeviceMesh::new(device, &mesh.positions, &mesh.triangles)?;
         let memory = BuildMemory::new(device, sizes)?;
-        let wide = match walk {
-            Walk::Wide(plan) => Some(WideTree::new(device, plan, bvh.record_count())?),
-            Walk::Tracer | Walk::Query(_) => None,
-        };
-        let by_query = match walk {
-            Walk::Query(queries) => Some(*queries),
-            Walk::Tracer | Walk::Wide(_) => None,
-        };
+        let wide = walk.wide.as_ref().map(|plan| WideTree::new(device, plan, bvh.record_count())).transpose()?;
         let mut warming = Recorder::warming(device);
         record_build(&mut warming, &bvh, (&taught, wide.as_ref()), &mesh.input, &memory)?;
         Ok(DeviceBvh {
             device,
             builder: builder.to_owned(),
             choice: joined_choices([choice_of(options, &bvh), any_hit.choice.clone()]),
-            wide,
-            binary: BinaryWalk { by_query, is_ordered: any_hit.order.is_some() },
+            traced: TracedTree { wide, by_query: walk.by_query, is_ordered: any_hit.order.is_some() },
             taught,
             timestamps: Timestamps::new(device, PHASES)?,
             bvh,
@@ -143,8 +146,8 @@ impl<'a> DeviceBvh<'a> {
     }
 
     /// Address of what is traced.
-    fn traced(&self) -> u64 {
-        self.wide.as_ref().map_or(self.memory.structure.address(), WideTree::address)
+    fn traced_address(&self) -> u64 {
+        self.traced.wide.as_ref().map_or(self.memory.structure.address(), WideTree::address)
     }
 }
 
@@ -167,21 +170,6 @@ fn record_build(
     }
     let counts = taught.order.as_ref().map(TaughtOrder::counts);
     wide.map_or(Ok(()), |tree| tree.record(recorder, structure.region(), counts))
-}
-
-/// Records the tracing of the wide tree, where there is one, or of the `Bvh2`; the children of either may be in order.
-fn record_trace(
-    recorder: &mut Recorder<'_>,
-    wide_tree: Option<&WideTree<'_>>,
-    binary: BinaryWalk,
-    query: Query,
-    buffers: &TraceBuffers,
-) -> hedgerow::Result<()> {
-    match (wide_tree, binary.by_query) {
-        (None, Some(queries)) => queries::record(recorder, query, buffers, Queried::OneLevel, queries),
-        (None, None) => record_binary(recorder, binary.is_ordered, query, buffers),
-        (Some(tree), _) => tree.record_trace(recorder, query, buffers),
-    }
 }
 
 /// Records the tracing of a `Bvh2`.
@@ -211,7 +199,7 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn kind(&self) -> &'static str {
-        self.wide.as_ref().map_or("bvh2", |tree| tree.tracer.form.name())
+        self.traced.wide.as_ref().map_or("bvh2", |tree| tree.tracer.form.name())
     }
 
     fn device(&self) -> Option<&Device> {
@@ -228,18 +216,18 @@ impl Subject for DeviceBvh<'_> {
 
     fn build(&mut self) -> Result<BuildRun> {
         self.device.run(Some(&mut self.timestamps), |recorder| {
-            let behind = (&self.taught, self.wide.as_ref());
+            let behind = (&self.taught, self.traced.wide.as_ref());
             record_build(recorder, &self.bvh, behind, &self.mesh.input, &self.memory)
         })?;
         Ok(BuildRun::of(self.timestamps.phases()?))
     }
 
     fn memory(&self) -> record::MemoryRecord {
-        self.wide.as_ref().map_or_else(|| self.memory.record(), |tree| tree.memory(&self.memory.sizes))
+        self.traced.wide.as_ref().map_or_else(|| self.memory.record(), |tree| tree.memory(&self.memory.sizes))
     }
 
     fn quality(&mut self, c_t: f64, c_i: f64) -> Result<record::QualityRecord> {
-        if let Some(tree) = &self.wide {
+        if let Some(tree) = &self.traced.wide {
             return tree.quality(c_t, c_i);
         }
         let measure = quality::QualityPass::new(self.device, self.bvh.record_count());
@@ -264,12 +252,12 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn bytes(&mut self) -> Result<Option<Vec<u8>>> {
-        Ok(Some(self.wide.as_ref().map_or_else(|| self.memory.bytes(), WideTree::bytes)))
+        Ok(Some(self.traced.wide.as_ref().map_or_else(|| self.memory.bytes(), WideTree::bytes)))
     }
 
     fn validate(&mut self) -> Result<()> {
         self.tree()?.map_or(Ok(()), |tree| tree.validate())?;
-        self.wide.as_ref().map_or(Ok(()), WideTree::validate)
+        self.traced.wide.as_ref().map_or(Ok(()), WideTree::validate)
     }
 
     fn set_rays(&mut self, rays: &[Ray]) -> Result<()> {
@@ -277,8 +265,8 @@ impl Subject for DeviceBvh<'_> {
     }
 
     fn trace(&mut self, query: Query) -> Result<f64> {
-        let (structure, wide, binary) = (self.traced(), self.wide.as_ref(), self.binary);
-        self.rays.trace(structure, |recorder, buffers| record_trace(recorder, wide, binary, query, buffers))
+        let (structure, traced) = (self.traced_address(), &self.traced);
+        self.rays.trace(structure, |recorder, buffers| traced.record(recorder, query, buffers))
     }
 
     fn hits(&mut self) -> Result<Vec<Hit>> {
@@ -287,14 +275,13 @@ impl Subject for DeviceBvh<'_> {
 
     /// Queries do not count their leaves.
     fn work(&mut self, query: Query) -> Result<Option<Vec<Work>>> {
-        let (wide, binary) = (self.wide.as_ref(), self.binary);
-        let record =
-            |recorder: &mut Recorder<'_>, buffers: &TraceBuffers| record_trace(recorder, wide, binary, query, buffers);
-        if binary.by_query.is_none() {
-            return self.rays.work(self.traced(), record);
+        let (structure, traced) = (self.traced_address(), &self.traced);
+        let record = |recorder: &mut Recorder<'_>, buffers: &TraceBuffers| traced.record(recorder, query, buffers);
+        if traced.by_query.is_none() {
+            return self.rays.work(structure, record);
         }
         let of_ray = |[_, _, steps, tests]: QueryWork| Work { steps, tests, leaves: 0 };
-        let work: Option<Vec<QueryWork>> = self.rays.work(self.traced(), record)?;
+        let work: Option<Vec<QueryWork>> = self.rays.work(structure, record)?;
         Ok(work.map(|all| all.into_iter().map(of_ray).collect()))
     }
 }

@@ -3,7 +3,7 @@
 
 use super::device_rays::RayBuffers;
 use super::level::Level;
-use super::queries::Queries;
+use super::queries::{Forms, Queries};
 use super::structures::Structures;
 use crate::Result;
 use crate::scene::Instances;
@@ -49,10 +49,10 @@ impl<'a> Levels<'a> {
         Ok(Levels { structures, _parts: parts, top, timestamps })
     }
 
-    /// The same, built and traced further on by the calls of other structures of the same maker.
+    /// The same, traced by a shader for structures of these nodes, whatever they have.
     #[must_use]
-    pub fn traced_as(self, structures: Structures<'a>) -> Levels<'a> {
-        Levels { structures, ..self }
+    pub fn traced_as(self, forms: Forms) -> Levels<'a> {
+        Levels { structures: self.structures.traced_as(forms), ..self }
     }
 
     /// Writes other transforms, for [`Levels::update`] or a build.

@@ -15,20 +15,36 @@ pub type QueryWork = [u32; 4];
 pub enum Queries {
     /// One each.
     OneEach,
-    /// Many each, in turn (`glsl/trace/query_turns.glsl`), with loads lane by lane where tracers have them.
+    /// Many each, in turn (`glsl/trace/query_turns.glsl`); in nodes of two with loads lane by lane, where tracers have them.
     InTurn,
+}
+
+/// The nodes that structures have, as `HEDGEROW_FORMS` (`glsl/trace/query_walk.glsl`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Forms(u32);
+
+impl Forms {
+    /// Nodes of two alone.
+    pub const OF_TWO: Forms = Forms(1);
+    /// Nodes of eight alone.
+    pub const OF_EIGHT: Forms = Forms(2);
+    /// Both.
+    pub const ALL: Forms = Forms(3);
+
+    /// And those of another structure.
+    pub(crate) fn with(self, of_eight: bool) -> Forms {
+        let others = if of_eight { Forms::OF_EIGHT } else { Forms::OF_TWO };
+        Forms(self.0 | others.0)
+    }
 }
 
 /// What queries are of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Queried {
-    /// A top level and what is below it.
-    TwoLevels {
-        /// They may have nodes of eight ([`hedgerow::accel::AccelOptions::wide`]).
-        wide: bool,
-    },
-    /// A bottom level of nodes of two, and no top level (`HEDGEROW_ONE_LEVEL`).
-    OneLevel,
+pub(crate) struct Queried {
+    /// A bottom level, and no top level (`HEDGEROW_ONE_LEVEL`).
+    pub(crate) one_level: bool,
+    /// What nodes there are.
+    pub(crate) forms: Forms,
 }
 
 /// Records the tracing of rays through a structure of ours; their [`QueryWork`] is counted, by one each, where there is room for it.
@@ -50,21 +66,17 @@ pub(crate) fn record(
     let levels = if tuning.shared_levels >= MAX_DEPTH { 2 * MAX_DEPTH } else { 0 };
     let in_turn = queries == Queries::InTurn && work.is_none();
     let rays_each = if in_turn { rays_in_turn(recorder.context(), count) } else { 1 };
-    let is_wide = queried == Queried::TwoLevels { wide: true };
-    let one_level = u32::from(queried == Queried::OneLevel);
-    let shader = match (in_turn, is_wide, tuning.in_longs) {
-        (true, false, _) if tuning.lane_by_lane => &shaders::MEASURE_QUERY_TURNS_LANES,
-        (false, false, false) => &shaders::MEASURE_QUERY,
-        (false, false, true) => &shaders::MEASURE_QUERY_INT64,
-        (false, true, false) => &shaders::MEASURE_QUERY_QUANTISED,
-        (false, true, true) => &shaders::MEASURE_QUERY_QUANTISED_INT64,
+    let (one_level, Forms(forms)) = (u32::from(queried.one_level), queried.forms);
+    let lane_by_lane = tuning.lane_by_lane && queried.forms == Forms::OF_TWO;
+    let shader = match (in_turn, lane_by_lane, tuning.in_longs) {
+        (false, _, false) => &shaders::MEASURE_QUERY,
+        (false, _, true) => &shaders::MEASURE_QUERY_INT64,
+        (true, true, _) => &shaders::MEASURE_QUERY_TURNS_LANES,
         (true, false, false) => &shaders::MEASURE_QUERY_TURNS,
         (true, false, true) => &shaders::MEASURE_QUERY_TURNS_INT64,
-        (true, true, false) => &shaders::MEASURE_QUERY_QUANTISED_TURNS,
-        (true, true, true) => &shaders::MEASURE_QUERY_QUANTISED_TURNS_INT64,
     };
     let kernel = match work {
-        None => Kernel::new(shader, tuning.group, &[any_hit, levels, rays_each, tuning.group, one_level]),
+        None => Kernel::new(shader, tuning.group, &[any_hit, levels, rays_each, tuning.group, one_level, forms]),
         Some(_) => Kernel::new(&shaders::MEASURE_QUERY_WORK, limits.subgroup_size, &[any_hit, 0]),
     };
     let arguments = arguments::TraceQueries { structure, rays, hits, works, first: 0, count };

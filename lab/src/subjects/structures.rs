@@ -1,7 +1,7 @@
 //! Acceleration structures by the calls of `VK_KHR_acceleration_structure`: ours or the driver's, and nothing else differs.
 
 use super::device_rays::{RayBuffers, timed_run};
-use super::queries::{self, Queried, Queries, QueryWork};
+use super::queries::{self, Forms, Queried, Queries, QueryWork};
 use crate::device::{Buffer, Device, DriverRays, DriverTracing};
 use crate::experiments::accel::points;
 use crate::scene::Mesh;
@@ -12,6 +12,8 @@ use hedgerow::accel;
 use hedgerow::gpu::{Recorder, Timestamps};
 use hedgerow::trace::Query;
 use hedgerow::trace::tracer::TraceBuffers;
+use std::cell::Cell;
+use std::rc::Rc;
 
 /// What a build call takes.
 pub type BuildInfo<'a> = vk::AccelerationStructureBuildGeometryInfoKHR<'a>;
@@ -36,6 +38,8 @@ enum Functions<'a> {
 pub struct Structures<'a> {
     pub(crate) device: &'a Device,
     maker: Functions<'a>,
+    /// Nodes of those that were asked for, if they are ours.
+    forms: Rc<Cell<Forms>>,
 }
 
 impl<'a> Structures<'a> {
@@ -46,7 +50,7 @@ impl<'a> Structures<'a> {
 
     /// Ours, by the calls of `ours`.
     pub fn of(device: &'a Device, ours: accel::Device<'a>) -> Structures<'a> {
-        Structures { device, maker: Functions::Ours(ours) }
+        Structures { device, maker: Functions::Ours(ours), forms: Rc::default() }
     }
 
     /// The same, with arguments of builds in a part of `memory`, if they are ours.
@@ -54,14 +58,20 @@ impl<'a> Structures<'a> {
         let Functions::Ours(ours) = &self.maker else { return None };
         let part = hedgerow::gpu::ArgumentMemory { buffer: memory.raw(), offset: 0, bytes: memory.bytes() };
         // SAFETY: buffers of `Device` have the usage; who keeps the structures keeps the memory.
-        Some(Structures::of(self.device, unsafe { ours.with_arguments_in(part) }))
+        let ours = unsafe { ours.with_arguments_in(part) };
+        Some(Structures { maker: Functions::Ours(ours), ..self.clone() })
+    }
+
+    /// The same, traced by a shader for structures of these nodes.
+    pub(crate) fn traced_as(&self, forms: Forms) -> Structures<'a> {
+        Structures { forms: Rc::new(Cell::new(forms)), ..self.clone() }
     }
 
     /// Those of the driver, where it has any and the device was opened with them.
     pub fn drivers(device: &'a Device) -> Option<Structures<'a>> {
         device.driver_tracing()?;
         let functions = functions::Device::new(device.ash_instance(), device.ash_device());
-        Some(Structures { device, maker: Functions::Driver(functions) })
+        Some(Structures { device, maker: Functions::Driver(functions), forms: Rc::default() })
     }
 
     /// Whose they are.
@@ -78,9 +88,10 @@ impl<'a> Structures<'a> {
         let place = vk::AccelerationStructureBuildTypeKHR::DEVICE;
         match &self.maker {
             // SAFETY: the pointers of `info` are those of live slices.
-            Functions::Ours(ours) => {
-                unsafe { ours.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes) }?
-            }
+            Functions::Ours(ours) => unsafe {
+                ours.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes)?;
+                self.forms.set(self.forms.get().with(ours.makes_nodes_of_eight(info, counts)?));
+            },
             // SAFETY: as above.
             Functions::Driver(driver) => unsafe {
                 driver.get_acceleration_structure_build_sizes(place, info, counts, &mut sizes)
@@ -193,8 +204,8 @@ impl<'a> Structures<'a> {
         queries: Queries,
     ) -> hedgerow::Result<()> {
         match self.maker {
-            Functions::Ours(ref ours) => {
-                let queried = Queried::TwoLevels { wide: ours.options().wide };
+            Functions::Ours(_) => {
+                let queried = Queried { one_level: false, forms: self.forms.get() };
                 queries::record(recorder, query, buffers, queried, queries)
             }
             Functions::Driver(_) => {

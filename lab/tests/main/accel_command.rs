@@ -119,7 +119,8 @@ fn memory_is_measured_in_both_forms_of_nodes() {
 #[test]
 fn nodes_of_eight_are_measured_and_a_mesh_is_one_instance() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let done = tiny(folder.path(), &["gen:forest:9", "gen:icosphere:3", "--experiments", "rebraid", "--wide"]);
+    let done =
+        tiny(folder.path(), &["gen:forest:9", "gen:icosphere:3", "--experiments", "rebraid", "--wide", "always"]);
     assert_eq!(done.status.code(), Some(0), "{}", err(&done));
     let entries = page::read(folder.path()).expect("records");
     let points: Vec<_> =

@@ -54,7 +54,7 @@ fn a_run_leaves_records_a_table_charts_pictures_and_a_page() {
 fn rays_by_queries_hit_what_the_tracer_hits() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = text(folder.path());
-    let builders = "lbvh,lbvh:walk=query,lbvh:walk=turns";
+    let builders = "lbvh,lbvh:walk=query,lbvh:walk=turns,lbvh:width=8q:walk=query,lbvh:width=8q:walk=turns";
     let rays = "primary,ao,diffuse1,random";
     let done = hedgerow(&[
         "bench",
@@ -73,9 +73,10 @@ fn rays_by_queries_hit_what_the_tracer_hits() {
     ]);
     assert_eq!(status(&done), Some(0), "{}", err(&done));
     let records = records(folder.path());
-    let [tracer, by_query, in_turn] = &records[..] else { panic!("{records:?}") };
+    let [tracer, by_queries @ ..] = &records[..] else { panic!("{records:?}") };
+    assert_eq!(by_queries.len(), 4);
     assert_eq!(tracer.trace.len(), 4, "{tracer:?}");
-    for other in [by_query, in_turn] {
+    for other in by_queries {
         let checksums = |record: &Record| record.trace.iter().map(|t| (t.hits, t.checksum.clone())).collect::<Vec<_>>();
         assert_eq!(checksums(other), checksums(tracer), "{}", other.builder);
         assert!(tracer.trace.iter().all(|trace| trace.hits > 0), "{tracer:?}");

@@ -10,7 +10,7 @@ use crate::experiments::accel::{AccelSetup, Experiment, any_hit, batch, memory, 
 use crate::measure::{Failure, Setting, Sink};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
-use hedgerow::accel::AccelOptions;
+use hedgerow::accel::{AccelOptions, Wide};
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
@@ -51,9 +51,9 @@ pub struct Arguments {
     /// Instances of the largest top level
     #[arg(long, value_name = "N", default_value = "100000")]
     instances: NonZeroU32,
-    /// Ours in nodes of eight, where no update is allowed: less memory, and other times
-    #[arg(long)]
-    wide: bool,
+    /// Which of ours are in nodes of eight, where no update is allowed: less memory, and other times
+    #[arg(long, value_name = "WHICH", default_value = "large")]
+    wide: WhichWide,
     /// Frames of each animation, spread evenly over all of them
     #[arg(long, value_name = "N", default_value = "12")]
     frames: NonZeroU32,
@@ -61,6 +61,39 @@ pub struct Arguments {
     /// other
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+}
+
+/// [`Wide`] on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum WhichWide {
+    /// None.
+    Never,
+    /// Bottom levels of many primitives.
+    Large,
+    /// All.
+    Always,
+}
+
+impl From<WhichWide> for Wide {
+    fn from(which: WhichWide) -> Wide {
+        match which {
+            WhichWide::Never => Wide::Never,
+            WhichWide::Large => Wide::Large,
+            WhichWide::Always => Wide::Always,
+        }
+    }
+}
+
+impl WhichWide {
+    fn says(self) -> String {
+        match self {
+            WhichWide::Never => "none of ours".into(),
+            WhichWide::Large => {
+                format!("bottom levels of ours of {} primitives and more, where there can be", Wide::LARGE)
+            }
+            WhichWide::Always => "all of ours, where there can be".into(),
+        }
+    }
 }
 
 pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> {
@@ -72,7 +105,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     let say = |what: &str| bar.say(what);
     let stage = AccelSetup {
         device: &device,
-        options: AccelOptions { wide: arguments.wide, ..AccelOptions::DEFAULT },
+        options: AccelOptions { wide: arguments.wide.into(), ..AccelOptions::DEFAULT },
         runs: arguments.runs.get(),
         kinds: &arguments.rays.0,
         rays: arguments.size.rays(common.seed),
@@ -161,7 +194,7 @@ fn setting(common: &Common, arguments: &Arguments, device: &Device) -> Result<Se
     let options = [
         ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),
         ("Image", format!("{}, seed {}", arguments.size, common.seed)),
-        ("Nodes of ours", if arguments.wide { "of eight, where there can be" } else { "of two" }.into()),
+        ("Nodes of eight", arguments.wide.says()),
     ];
     Setting::of(Some(device), &options, notes)
 }

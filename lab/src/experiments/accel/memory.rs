@@ -8,18 +8,18 @@ use crate::scene::{Instances, Mesh};
 use crate::subjects::level::Level;
 use crate::subjects::structures::Structures;
 use ash::vk;
-use hedgerow::accel::AccelOptions;
+use hedgerow::accel::{AccelOptions, Wide};
 use hedgerow::gpu::Timestamps;
 
 type Flags = vk::BuildAccelerationStructureFlagsKHR;
 
 /// What is built beside each other: in nodes of eight or not, and by which flags. All can be compacted.
-const BUILT: [(bool, Flags); 5] = [
-    (false, Flags::PREFER_FAST_BUILD),
-    (false, Flags::PREFER_FAST_TRACE),
-    (true, Flags::empty()),
-    (true, Flags::PREFER_FAST_TRACE),
-    (true, Flags::from_raw(Flags::PREFER_FAST_TRACE.as_raw() | Flags::LOW_MEMORY.as_raw())),
+const BUILT: [(Wide, Flags); 5] = [
+    (Wide::Never, Flags::PREFER_FAST_BUILD),
+    (Wide::Never, Flags::PREFER_FAST_TRACE),
+    (Wide::Always, Flags::empty()),
+    (Wide::Always, Flags::PREFER_FAST_TRACE),
+    (Wide::Always, Flags::from_raw(Flags::PREFER_FAST_TRACE.as_raw() | Flags::LOW_MEMORY.as_raw())),
 ];
 
 /// A structure of a maker's.
@@ -52,10 +52,10 @@ pub fn measure(stage: &AccelSetup<'_>, scene: &Instances, point: &mut Sink<'_, A
     (stage.say)(&format!("memory of {}", scene.name));
     let mesh = joined(&scene.parts);
     let ours = BUILT.into_iter().map(|(wide, flags)| {
-        (Structures::ours(stage.device, AccelOptions { wide, ..AccelOptions::DEFAULT }), wide, flags)
+        (Structures::ours(stage.device, AccelOptions { wide, ..AccelOptions::DEFAULT }), wide == Wide::Always, flags)
     });
     let drivers = Structures::drivers(stage.device).map(|driver| (driver, false, Flags::PREFER_FAST_TRACE));
-    let built = ours.chain(drivers).map(|(maker, wide, flags)| Built::new(maker, wide, flags, &mesh));
+    let built = ours.chain(drivers).map(|(maker, of_eight, flags)| Built::new(maker, of_eight, flags, &mesh));
     let mut built: Vec<Built<'_>> = built.collect::<Result<_>>()?;
     let times = in_turn(&mut built, WARM_UPS, stage.runs, Built::build);
     for (built, times) in built.iter().zip(times) {

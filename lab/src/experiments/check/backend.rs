@@ -63,7 +63,8 @@ pub struct Ours(pub accel::Device<'static>, Probe, Structures<'static>);
 
 impl Ours {
     /// The defaults, but for nodes of eight where there can be: beside nodes of two, so that queries meet both.
-    pub const OPTIONS: accel::AccelOptions = accel::AccelOptions { wide: true, ..accel::AccelOptions::DEFAULT };
+    pub const OPTIONS: accel::AccelOptions =
+        accel::AccelOptions { wide: accel::Wide::Always, ..accel::AccelOptions::DEFAULT };
 
     /// With [`Ours::OPTIONS`].
     pub fn on(device: &'static Device) -> Ours {

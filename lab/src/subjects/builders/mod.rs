@@ -472,7 +472,7 @@ mod tests {
         assert!(error_of("lbvh:width=8:open=visits").contains("open=visits is unknown; use area, or rays"));
         assert!(error_of("kd-exact:any-hit=sato").contains("no option \"any-hit\""));
         assert!(error_of("lbvh:walk=there").contains("walk=there is unknown; use tracer, query or turns"));
-        assert!(error_of("lbvh:width=4:walk=query").contains("queries are for nodes of two; take width=2"));
+        assert!(error_of("lbvh:width=4:walk=query").contains("take width=2 or 8q, or walk=tracer"));
         assert!(error_of("sweep:heuristic=best").contains("heuristic=best is unknown; use sah, interior"));
         assert!(error_of("bonsai:heuristic=rdh").contains("bonsai has no option \"heuristic\""));
         assert!(error_of("lbvh:heuristic=rdh").contains("builders with heuristic= are sweep, binned, sbvh"));

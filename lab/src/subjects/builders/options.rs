@@ -80,7 +80,8 @@ pub(super) const ANY_HIT: BuilderOption = option(
 );
 pub(super) const WALK: BuilderOption = option(
     "walk",
-    "tracer, query or turns: rays go through a tree with nodes of two by queries, as in an engine's shader, one for each invocation or many in turn",
+    "tracer, query or turns: rays go through a tree with nodes of two, or quantised ones of eight, by queries, as in an engine's shader, one for \
+     each invocation or many in turn",
 );
 pub(super) const TRACE_TREE: BuilderOption = option(
     "trace",
@@ -130,8 +131,8 @@ impl Spec {
         }
         let walks = [("tracer", None), ("query", Some(Queries::OneEach)), ("turns", Some(Queries::InTurn))];
         let by_query = self.choice(&WALK, &walks)?.flatten();
-        if form.is_some() && by_query.is_some() {
-            let what = "queries are for nodes of two; take width=2, or walk=tracer";
+        if by_query.is_some() && !matches!(form, None | Some(Form::EightQuantised)) {
+            let what = "queries are for nodes of two and quantised ones of eight; take width=2 or 8q, or walk=tracer";
             return Err(Error::Argument(format!("builder {self}: {what}")));
         }
         Ok(BuilderPlan::Device(DevicePlan { options, form, by_query, order, time_to_optimise }))

@@ -81,7 +81,7 @@ pub(crate) struct DevicePlan {
     pub(super) options: BuildOptions,
     /// Of the wide tree, where there shall be one.
     pub(super) form: Option<Form>,
-    /// How rays go through the binary tree by queries, if they do.
+    /// How rays go through the tree by queries, if they do.
     pub(super) by_query: Option<Queries>,
     /// The order in which that is traced, where it was given.
     pub(super) order: Option<Order>,
@@ -101,20 +101,18 @@ impl DevicePlan {
         mesh: &Mesh,
         taught: &TaughtTree,
     ) -> Result<DeviceBvh<'a>> {
-        let walk = match self.form {
-            None => self.by_query.map_or(Walk::Tracer, Walk::Query),
-            Some(form) => {
-                let is_ordered = taught.any_hit.order.is_some();
-                let left_first = is_ordered.then(|| WideTracer::in_order(device, form, Order::LeftFirst));
-                let tracer = match self.order {
-                    // Where children have an order, their slots say nothing of octants.
-                    None if is_ordered => WideTracer::in_order(device, form, Order::Distance),
-                    None => WideTracer::of(device, form),
-                    Some(order) => WideTracer::in_order(device, form, order),
-                };
-                Walk::Wide(WidePlan { tracer, left_first, opened_by: taught.opened_by.clone() })
-            }
-        };
+        let wide = self.form.map(|form| {
+            let is_ordered = taught.any_hit.order.is_some();
+            let left_first = is_ordered.then(|| WideTracer::in_order(device, form, Order::LeftFirst));
+            let tracer = match self.order {
+                // Where children have an order, their slots say nothing of octants.
+                None if is_ordered => WideTracer::in_order(device, form, Order::Distance),
+                None => WideTracer::of(device, form),
+                Some(order) => WideTracer::in_order(device, form, order),
+            };
+            WidePlan { tracer, left_first, opened_by: taught.opened_by.clone() }
+        });
+        let walk = Walk { by_query: self.by_query, wide };
         let mut options = self.options;
         if let Some(time) = self.time_to_optimise {
             let pass = pass_of_reinsertion(device, mesh, &options)?;
@@ -135,7 +133,7 @@ fn pass_of_reinsertion(device: &Device, mesh: &Mesh, options: &BuildOptions) -> 
         "",
         mesh,
         options,
-        Teaching { walk: &Walk::Tracer, any_hit: &AnyHit::NEAR, rounds: None },
+        Teaching { walk: &Walk::default(), any_hit: &AnyHit::NEAR, rounds: None },
     )?;
     subject.build()?;
     let run = subject.build()?;

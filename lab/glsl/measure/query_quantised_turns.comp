@@ -1,9 +1,0 @@
-// The same as measure/query_quantised.comp, with many rays for each invocation, in turn (trace/query_turns.glsl).
-#version 460
-layout(local_size_x_id = 0) in;
-layout(constant_id = 2) const uint SHARED_LEVELS = 0;
-#define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
-#define HEDGEROW_QUANTISED
-#define IN_TURN
-#include "trace/ray_query_names.glsl"
-#include "measure/ray_query.glsl"
