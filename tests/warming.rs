@@ -1,7 +1,7 @@
 //! Whoever has warmed a context waits for no pipeline: a first build or update makes none.
 
 use crate::common::{OPTIONS, corpus, open};
-use hedgerow::accel::{self, ANY_HIT_ORDER, Instance, Placement, REBRAID, Request};
+use hedgerow::accel::{self, ANY_HIT_ORDER, AccelOptions, Instance, Placement, REBRAID, Request, Wide};
 use hedgerow::ash::vk;
 use hedgerow::ash::vk::Handle;
 use hedgerow::bvh::geometry::Geometry;
@@ -54,11 +54,13 @@ fn first_builds_make_no_pipelines() {
 #[test]
 fn first_builds_and_updates_make_no_pipelines() {
     let (_, positions, triangles) = corpus::random("", 3000, [-0.5; 3], [1.0; 3]);
-    for flags in
-        [Flags::empty(), Flags::PREFER_FAST_BUILD | Flags::ALLOW_UPDATE, Flags::LOW_MEMORY, REBRAID, ANY_HIT_ORDER]
-    {
+    let of_two =
+        [Flags::empty(), Flags::PREFER_FAST_BUILD | Flags::ALLOW_UPDATE, Flags::LOW_MEMORY, REBRAID, ANY_HIT_ORDER];
+    let of_eight = [Flags::empty(), Flags::PREFER_FAST_TRACE, Flags::PREFER_FAST_TRACE | ANY_HIT_ORDER];
+    let of_two = of_two.map(|flags| (flags, Wide::Never)).into_iter();
+    for (flags, wide) in of_two.chain(of_eight.map(|flags| (flags, Wide::Always))) {
         let device = cold(TuningChoice::Auto);
-        let ours = accel::Device::new(&device);
+        let ours = accel::Device::with_options(&device, AccelOptions { wide, ..AccelOptions::DEFAULT });
         let requests = |vertices: u64, indices: u64, instances: u64| {
             let mesh = |first: u64, count| (Geometry::mesh(vertices, 9000, indices + 12 * first), count);
             let all = [

@@ -30,8 +30,13 @@ bool hedgerow_meet_triangle(inout HedgerowRayQuery query, Triangle triangle, uin
     if ((query.flags & culled) != 0u && (query.instance_flags & HEDGEROW_INSTANCE_CULL_DISABLE) == 0u) return false;
     bool is_opaque = hedgerow_is_opaque(query, triangle.primitive);
     if (hedgerow_is_culled(query, is_opaque)) return false;
-    query.candidate = HedgerowMeeting(HEDGEROW_MET_TRIANGLE, met.x, met.y, met.z, at, triangle.primitive, query.instance, is_front,
-                                      is_opaque);
+#ifdef HEDGEROW_LANES
+    uint primitive = 0u;
+#else
+    uint primitive = triangle.primitive;
+#endif
+    query.candidate =
+        HedgerowMeeting(HEDGEROW_MET_TRIANGLE, met.x, met.y, met.z, at, primitive, query.instance, is_front, is_opaque);
     if (met.x == query.best && !hedgerow_comes_before(query)) return false;
     if (is_opaque) hedgerow_commit(query);
     return !is_opaque;

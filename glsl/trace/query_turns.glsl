@@ -19,7 +19,7 @@
 // waiting for the longest ray, each invocation takes its next one as soon as it can instead, from then on.
 //
 // A shader whose workgroups are one subgroup each, of at most 16 invocations, may define HEDGEROW_LANES, how many they are, before it
-// includes this file: a constant or specialisation constant. Its lanes then load nodes and triangles one after the other
+// includes trace/query.glsl: a constant or specialisation constant. Its lanes then load nodes and triangles one after the other
 // (trace/lanes.glsl): what CPUs' drivers are faster with that load what is uniform once. Structures are of nodes of two then, and it says so
 // by HEDGEROW_FORMS (trace/query_walk.glsl).
 //

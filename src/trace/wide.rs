@@ -133,6 +133,7 @@ impl WideTracer {
         let kernel = self.kernel(query, buffers.work.is_some())?;
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
     }
+
     /// The same by [`Order::Octant`], where the structure is of this form; otherwise hits and work stay what they are.
     pub(super) fn record_where_it_is(
         &self,
@@ -140,6 +141,7 @@ impl WideTracer {
         query: Query,
         buffers: &TraceBuffers,
     ) -> Result<()> {
+        debug_assert_eq!(self.order, Order::Octant, "no other shader leaves other forms");
         let kernel = tracer::kernel_where_it_is(self.shader()?, &self.shape, query, buffers.work.is_some());
         tracer::record_kernel(recorder, &kernel, &self.shape, buffers)
     }

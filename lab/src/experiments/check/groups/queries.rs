@@ -12,7 +12,7 @@ use crate::random::SplitMix64;
 use anyhow::ensure;
 use ash::vk;
 use glam::Vec3;
-use hedgerow::accel::{AccelOptions, Instance, REBRAID};
+use hedgerow::accel::{AccelOptions, Instance, REBRAID, Wide};
 use vk::{GeometryFlagsKHR as GeometryFlags, GeometryInstanceFlagsKHR as Flags};
 
 /// The world's reports are right, and enough rays hit for that to say something.
@@ -126,7 +126,8 @@ fn in_turn(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found {
     reports_the_same(&Ours::on(device), &Probe::in_turn(device), world, rays)?;
     // Loads lane by lane are for nodes of two.
     let Some(in_lanes) = Probe::in_lanes(device) else { return Ok(()) };
-    reports_the_same(&Ours::with_options(device, AccelOptions::DEFAULT), &in_lanes, world, rays)
+    let of_two = AccelOptions { wide: Wide::Never, ..AccelOptions::DEFAULT };
+    reports_the_same(&Ours::with_options(device, of_two), &in_lanes, world, rays)
 }
 
 /// A shader for bottom levels alone reports of each part what another one does, and nothing of a top level.
