@@ -7,6 +7,4 @@
 #define WITH_HEDGEROW
 layout(constant_id = 5) const bool ONE_LEVEL = false;
 #define HEDGEROW_ONE_LEVEL ONE_LEVEL
-layout(constant_id = 6) const uint FORMS = 3;
-#define HEDGEROW_FORMS FORMS
 #include "measure/probe.glsl"
