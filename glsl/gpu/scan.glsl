@@ -18,6 +18,10 @@ layout(push_constant, scalar) uniform ScanArguments {
     uint rounds;   // words of an invocation in a tile
 };
 
+// Words that lie side by side which an invocation takes at once: one where a subgroup's loads shall lie side by side, several where a scan
+// over lanes costs more than loads that do not.
+layout(constant_id = 1) const uint EACH = 1;
+
 // A workgroup may have as many subgroups as invocations.
 shared uint scan_partial[gl_WorkGroupSize.x];
 
@@ -38,11 +42,18 @@ uint scan_workgroup(uint value, out uint total) {
 
 // Exclusive scan of words[first..end], starting from `sum`; returns the sum behind the last.
 uint scan_range(Words from, Words to, uint first, uint end, uint sum) {
-    for (uint base = first; base < end; base += gl_WorkGroupSize.x) {
-        uint i = base + gl_LocalInvocationIndex;
+    for (uint base = first; base < end; base += gl_WorkGroupSize.x * EACH) {
+        uint own = min(base + gl_LocalInvocationIndex * EACH, end);
+        uint own_end = min(own + EACH, end);
+        uint own_sum = 0;
+        for (uint i = own; i < own_end; ++i) own_sum += from.word[i];
         uint total;
-        uint before = scan_workgroup(i < end ? from.word[i] : 0, total);
-        if (i < end) to.word[i] = sum + before;
+        uint before = sum + scan_workgroup(own_sum, total);
+        for (uint i = own; i < own_end; ++i) {
+            uint word = from.word[i];
+            to.word[i] = before;
+            before += word;
+        }
         sum += total;
     }
     return sum;

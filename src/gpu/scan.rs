@@ -14,6 +14,7 @@ pub struct Scan {
     count: u32,
     workgroup: u32,
     rounds: u32,
+    each: u32,
 }
 
 /// Device addresses of one scan, 4-byte aligned.
@@ -38,7 +39,7 @@ impl Scan {
         let workgroup = context.tuning.group;
         // At most 2^14 tiles, so that one workgroup scans their sums in little time.
         let rounds = (count >> 14).div_ceil(workgroup).next_power_of_two().max(context.tuning.scan_rounds);
-        Scan { count, workgroup, rounds }
+        Scan { count, workgroup, rounds, each: context.tuning.scan_each.min(rounds) }
     }
 
     fn tiles(&self) -> u32 {
@@ -76,7 +77,7 @@ impl Scan {
     }
 
     fn dispatches(&self) -> [(Kernel, u32); 3] {
-        let kernel = |shader| Kernel::new(shader, self.workgroup, &[]);
+        let kernel = |shader| Kernel::new(shader, self.workgroup, &[self.each]);
         [
             (kernel(&shaders::GPU_SCAN_SUM), self.tiles()),
             (kernel(&shaders::GPU_SCAN_SUMS), 1),

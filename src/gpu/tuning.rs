@@ -57,6 +57,8 @@ pub struct Tuning {
     pub reduce_rounds: u32,
     /// Items that an invocation of `scan` takes, at least.
     pub scan_rounds: u32,
+    /// Of these how many lie side by side and are taken at once.
+    pub scan_each: u32,
     /// Items that an invocation takes which measures a tree (`quality`, `epo`).
     pub measure_rounds: u32,
     /// Whether an invocation's few values that are asked for by a number are chosen among by comparisons, which keeps them in
@@ -183,6 +185,7 @@ impl Tuning {
             grid: Grid { workgroup: group, groups: limits.workgroup_count.min(64), rounds: 64 },
             reduce_rounds: 64,
             scan_rounds: 32,
+            scan_each: 16,
             measure_rounds: 64,
             in_registers: false,
             wide_alone: 256,
@@ -241,6 +244,7 @@ impl Tuning {
             grid: Grid { workgroup: group, groups: limits.workgroup_count.min(2048), rounds: 4 },
             reduce_rounds: 8,
             scan_rounds: 8,
+            scan_each: 1,
             measure_rounds: 4,
             in_registers: true,
             wide_alone: 1024,
