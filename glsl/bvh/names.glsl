@@ -47,6 +47,7 @@
 #define wide_records_at hedgerow_wide_records_at
 #define distances_to hedgerow_distances_to
 #define enter_box hedgerow_enter_box
+#define enter_of_nearest hedgerow_enter_of_nearest
 #define enter_quantised hedgerow_enter_quantised
 #define byte_of_slot hedgerow_byte_of_slot
 #define sum_below hedgerow_sum_below
@@ -67,6 +68,7 @@
 #define second_of_pair hedgerow_second_of_pair
 #define in_octant hedgerow_in_octant
 #define leading_half hedgerow_leading_half
+#define next_of_group hedgerow_next_of_group
 #define is_quantised hedgerow_is_quantised_kind
 #define has_boxes hedgerow_has_boxes_kind
 #define has_instances hedgerow_has_instances_kind

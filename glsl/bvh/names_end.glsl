@@ -46,6 +46,7 @@
 #undef wide_records_at
 #undef distances_to
 #undef enter_box
+#undef enter_of_nearest
 #undef enter_quantised
 #undef byte_of_slot
 #undef sum_below
@@ -66,6 +67,7 @@
 #undef second_of_pair
 #undef in_octant
 #undef leading_half
+#undef next_of_group
 #undef is_quantised
 #undef has_boxes
 #undef has_instances

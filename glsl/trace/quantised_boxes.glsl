@@ -3,7 +3,9 @@
 // what the node's whole grid needs, once for all eight.
 #ifndef HEDGEROW_TRACE_QUANTISED_BOXES
 #define HEDGEROW_TRACE_QUANTISED_BOXES
+#extension GL_EXT_control_flow_attributes : require
 #include "bvh/wide.glsl"
+#include "trace/quantised_slots.glsl"
 #include "trace/slab.glsl"
 
 // Distances to the planes through a corner of the slot's box, `base` being what byte 0 stands for.
@@ -46,5 +48,28 @@ void enter_quantised(HedgerowPreparedRay ray, QuantisedNode node, float t_best, 
     ENTER_SLOT(0); ENTER_SLOT(1); ENTER_SLOT(2); ENTER_SLOT(3);
     ENTER_SLOT(4); ENTER_SLOT(5); ENTER_SLOT(6); ENTER_SLOT(7);
 #undef ENTER_SLOT
+}
+
+// The leading half of where the nearest of these slots is entered.
+uint enter_of_nearest(uint slots, float enters[8]) {
+    float nearest = HEDGEROW_INFINITY;
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+        if ((slots >> slot & 1u) != 0u) nearest = min(nearest, enters[slot]);
+    }
+    return leading_half(nearest);
+}
+
+// The place of the slot that is entered first, and the leading half of where the nearest of the others is. Of those that are entered within
+// eight floats of each other the one that comes first in the octant, for its place is in the last bits of what is compared.
+uvec2 next_of_group(uint slots, uint octant, float enters[8]) {
+    const int NONE = 0x7FFFFFFF;
+    int first = NONE, second = NONE;
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+        int key = floatBitsToInt(enters[slot]) & ~7 | int(slot ^ octant);
+        key = (slots >> slot & 1u) != 0u ? key : NONE;
+        second = min(second, max(first, key));
+        first = min(first, key);
+    }
+    return uvec2(uint(first) & 7u, leading_half(intBitsToFloat(second)));
 }
 #endif

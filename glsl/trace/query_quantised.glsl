@@ -31,12 +31,8 @@ void hedgerow_visit_quantised(inout HedgerowRayQuery query) {
     uint nodes = hedgerow_is_in_top(query) ? 0xFFu : node.exponents_and_nodes >> 24;
     uint visits = in_octant(entered & nodes, query.octant);
     uint others = in_octant(visits & visits - 1u, query.octant);
-    float nearest = HEDGEROW_INFINITY;
-    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
-        if ((others >> slot & 1u) != 0u) nearest = min(nearest, enters[slot]);
-    }
     query.first_child = hedgerow_is_in_top(query) ? query.index : node.first_child;
-    query.group = leading_half(nearest) | nodes << 8 | visits;
+    query.group = enter_of_nearest(others, enters) | nodes << 8 | visits;
     query.first_record = node.first_record;
     query.counts = node.counts;
     query.leaves = in_octant(entered & ~nodes, query.octant);

@@ -2,8 +2,9 @@
 //
 // As Ylitie, Karras and Laine (2017, section 4) do: the children of a node that are nodes and that the ray enters are a group,
 // met from near to far by counting slots in the order of the ray's octant; what is left of a group waits as one entry. The
-// leaves that the ray enters come first. Unlike there, an entry holds where the ray enters the nearest of the nodes that
-// wait, in the leading half of a float; a group that is farther than the best hit by then is left out.
+// leaves that the ray enters come first. Unlike there, the node that it enters first is met first, unless any hit ends the ray, and an entry
+// holds where the ray enters the nearest of the nodes that wait, in the leading half of a float; a group that is farther than the best hit by
+// then is left out.
 #ifndef HEDGEROW_TRACE_WALK_QUANTISED
 #define HEDGEROW_TRACE_WALK_QUANTISED
 #extension GL_EXT_control_flow_attributes : require
@@ -22,7 +23,9 @@ struct QuantisedWalk {
     uint first_child;
     uint nodes;
     uint visits;
-    // Where the ray enters the nearest of the group but the first: the leading half of a float, not above it.
+    // The place of the next of them.
+    uint next;
+    // Where the ray enters the nearest of the group but the next: the leading half of a float, not above it.
     uint enter;
     // The leaves at hand, likewise.
     uint first_record;
@@ -48,6 +51,7 @@ void begin(HedgerowRay ray, Child root, bool usable, out QuantisedWalk walk) {
     walk.first_child = 0;
     walk.nodes = 1;
     walk.visits = goes ? in_octant(1, walk.octant) : 0;
+    walk.next = walk.octant;
     walk.enter = 0;
     walk.first_record = 0;
     walk.counts = uvec2(0);
@@ -70,8 +74,8 @@ bool at_triangle(QuantisedWalk walk) {
 
 // The next node of the group; what is left of it waits.
 uint next_node(inout QuantisedWalk walk) {
-    uint slot = uint(findLSB(walk.visits)) ^ walk.octant;
-    walk.visits &= walk.visits - 1u;
+    uint slot = walk.next ^ walk.octant;
+    walk.visits &= ~(1u << walk.next);
     if (walk.visits != 0u) {
         hedgerow_put_entry(walk.level, uvec2(walk.first_child, walk.enter | walk.nodes << 8 | walk.visits));
         walk.level++;
@@ -79,7 +83,7 @@ uint next_node(inout QuantisedWalk walk) {
     return walk.first_child + rank_of_node(walk.nodes, slot);
 }
 
-void visit(QuantisedNode node, inout QuantisedWalk walk) {
+void visit(QuantisedNode node, bool any_hit, inout QuantisedWalk walk) {
     walk.work.x++;
     walk.visits = 0;
     if (node.exponents_and_nodes == LONG_LEAF) {
@@ -96,13 +100,17 @@ void visit(QuantisedNode node, inout QuantisedWalk walk) {
     }
     walk.first_child = node.first_child;
     walk.nodes = node.exponents_and_nodes >> 24;
-    walk.visits = in_octant(entered & walk.nodes, walk.octant);
-    uint others = in_octant(walk.visits & walk.visits - 1u, walk.octant);
-    float nearest = HEDGEROW_INFINITY;
-    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
-        if ((others >> slot & 1u) != 0u) nearest = min(nearest, enters[slot]);
+    uint nodes = entered & walk.nodes;
+    walk.visits = in_octant(nodes, walk.octant);
+    if (any_hit) {
+        // No hit brings the end of the ray nearer, so no group is too far.
+        walk.next = uint(findLSB(walk.visits));
+        walk.enter = leading_half(-HEDGEROW_INFINITY);
+    } else {
+        uvec2 next = next_of_group(nodes, walk.octant, enters);
+        walk.next = next.x;
+        walk.enter = next.y;
     }
-    walk.enter = leading_half(nearest);
     walk.first_record = node.first_record;
     walk.counts = node.counts;
     // A slot without a child may be among them: a leaf of nothing.
@@ -147,6 +155,7 @@ bool go_on(inout QuantisedWalk walk) {
     walk.level--;
     uvec2 entry = hedgerow_entry(walk.level);
     walk.first_child = entry.x;
+    walk.next = uint(findLSB(entry.y & 0xFFu));
     walk.enter = entry.y & 0xFFFF0000u;
     walk.nodes = entry.y >> 8 & 0xFFu;
     walk.visits = uintBitsToFloat(walk.enter) <= walk.best ? entry.y & 0xFFu : 0;

@@ -37,7 +37,7 @@ void main() {
             begin(rays.ray[i], root, usable, walk);
             going = true;
         }
-        if (at_node(walk)) visit(quantised_node_at(nodes, next_node(walk)), walk);
+        if (at_node(walk)) visit(quantised_node_at(nodes, next_node(walk)), ANY_HIT, walk);
         next_leaf(walk);
         if (at_triangle(walk)) {
             Triangle triangle = triangle_at_unit(records, walk.record);

@@ -107,7 +107,7 @@ void main() {
         bool visits = at_node(walk);
         uint index = visits ? next_node(walk) : 0u;
         QuantisedNode node = quantised_node_of_each_lane(nodes, hedgerow_each_lane(index));
-        if (visits) visit(node, walk);
+        if (visits) visit(node, ANY_HIT, walk);
         next_leaf(walk);
         bool tests = at_triangle(walk);
         HedgerowEachLane unit = hedgerow_each_lane(tests ? walk.record : 0u);
