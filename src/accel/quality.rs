@@ -37,7 +37,7 @@ const FEW: u32 = 2048;
 const MOST_WIDE: u32 = TRIANGLES_AT_MOST;
 
 /// Primitives up to which a fast trace gets most of a pass of reinsertion, as a driver's build of few takes long, and up to which half of
-/// one; of more it gets a third: what leaves a build as long as a driver's on Mesa's lavapipe (docs/notes/memory.md).
+/// one; of more it gets a quarter: what leaves a build as long as a driver's on Mesa's lavapipe (docs/notes/memory.md).
 const SOME: u32 = 1 << 15;
 const MANY: u32 = 1 << 18;
 
@@ -85,7 +85,7 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
         codes: Some(codes(flags, options, is_top, count)),
         bits_up_to: (is_top && options.top_codes.is_none()).then(|| top_bits(flags)),
         // An instance costs more than a node whatever its box: one a leaf.
-        collapse: if is_top { Collapse::OFF } else { collapse(flags) },
+        collapse: if is_top { Collapse::OFF } else { collapse(flags, is_wide(flags, options, primitives, count)) },
         child_order: flags.contains(ANY_HIT_ORDER).then_some(ChildOrder::MoreHitsForItsCost),
         primitives,
         build_flags: flags.as_raw() & 0x1f,
@@ -131,7 +131,7 @@ fn bottom_optimise(flags: Flags, count: u32) -> Option<ReinsertionOptions> {
         count if count <= FEW => ReinsertionOptions::MEDIUM,
         count if count <= SOME => MOST_OF_A_PASS,
         count if count <= MANY => part_of_a_pass(1, 2),
-        _ => part_of_a_pass(1, 3),
+        _ => part_of_a_pass(1, 4),
     };
     flags.contains(Flags::PREFER_FAST_TRACE).then_some(rounds)
 }
@@ -159,12 +159,13 @@ fn top_bits(flags: Flags) -> u32 {
     if flags.contains(Flags::LOW_MEMORY) { 32 } else { 64 }
 }
 
-/// How subtrees are collapsed: where memory counts, tests are taken to be cheaper than they are, so that leaves are larger and
-/// nodes fewer. Compacted structures then have 56 to 59 bytes a triangle instead of 64 to 70 on eleven scenes of twelve.
-fn collapse(flags: Flags) -> Collapse {
-    if flags.intersects(Flags::ALLOW_COMPACTION | Flags::LOW_MEMORY) {
-        Collapse { c_i: 1.25, ..Collapse::SAH }
-    } else {
-        Collapse::SAH
+/// How subtrees are collapsed: where memory counts, tests are taken to be cheaper than they are, or in nodes of eight steps to be dearer, so
+/// that leaves are larger and nodes fewer. In nodes of two compacted structures then have 56 to 59 bytes a triangle instead of 64 to 70 on eleven
+/// scenes of twelve.
+fn collapse(flags: Flags, is_wide: bool) -> Collapse {
+    match (flags.intersects(Flags::ALLOW_COMPACTION | Flags::LOW_MEMORY), is_wide) {
+        (true, true) | (false, false) => Collapse::SAH,
+        (true, false) => Collapse { c_i: 1.25, ..Collapse::SAH },
+        (false, true) => Collapse::WIDE,
     }
 }

@@ -39,7 +39,7 @@ pub(super) const RAYS: BuilderOption = option("rays", "rays that are traced betw
 pub(super) const WIDTH: BuilderOption = option("width", "2, 4, 8 or 8q (quantised)");
 pub(super) const ORDER: BuilderOption = option("order", "distance or octant (of width=8q)");
 pub(super) const OPEN: BuilderOption =
-    option("open", "area, or rays (of width=4, 8 or 8q): wide nodes are opened where most rays of the scene go in");
+    option("open", "area, or rays (of width=4, 8 or 8q): what wide nodes cost least by");
 pub(super) const SCHEDULE: BuilderOption = option("schedule", "chain, persistent or workgroup");
 pub(super) const KD_SCHEDULE: BuilderOption = option("schedule", "chain, persistent or across-levels");
 pub(super) const SPLIT: BuilderOption = option(
@@ -105,9 +105,11 @@ impl Spec {
         method.check()?;
         let schedule = self.schedule()?;
         let (codes, split) = (self.codes()?, self.split()?);
-        let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
-        let options = BuildOptions { method, codes, split, optimise, collapse, schedule, ..BuildOptions::DEFAULT };
         let (form, order) = self.form_and_order()?;
+        let is_of_eight = matches!(form, Some(Form::Eight | Form::EightQuantised));
+        let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
+        let collapse = if is_of_eight && collapse.enabled { Collapse::WIDE } else { collapse };
+        let options = BuildOptions { method, codes, split, optimise, collapse, schedule, ..BuildOptions::DEFAULT };
         let time_to_optimise = self.time_to_optimise()?;
         let is_opened_by_rays = self.is_opened_by_rays()?;
         if form.is_none() && is_opened_by_rays {
