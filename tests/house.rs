@@ -17,10 +17,11 @@ const WITHOUT_TWIN: [(&str, &str); 8] = [
     ("kdtree/across", "gives the bytes of kdtree::twin::builder"),
 ];
 
-/// What twins share, and is the plain form of no pass of its own.
-const SHARED_BY_TWINS: [&str; 9] = [
+/// What twins share, or a part of one, and is the plain form of no pass of its own.
+const SHARED_BY_TWINS: [&str; 10] = [
     "bvh/build",
     "bvh/clusters",
+    "bvh/costs",
     "bvh/geometry",
     "bvh/over",
     "kdtree/assemble",

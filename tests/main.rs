@@ -52,6 +52,7 @@ mod bvh {
     mod reinsertion;
     mod split;
     mod wide;
+    mod wide_costs;
 }
 
 mod gpu {

@@ -141,8 +141,8 @@ fn options_are_those_of_the_library() {
         let bytes = structure_bytes(&with(budget, HEDGEROW_WIDE_LARGE), top, 1000);
         assert_eq!(bytes, 128 + 64 * (entries - 1) + 128 * entries, "budget {budget}");
     }
-    // Nodes of eight 80, four for each seven leaves at most; records of triangles 40.
-    let (of_two, of_eight) = (128 + 64 * 7001 + 40 * 7002, 128 + 80 * 4001 + 40 * 7002);
+    // Nodes of eight 80, two for each three leaves at most; records of triangles 40.
+    let (of_two, of_eight) = (128 + 64 * 7001 + 40 * 7002, 128 + 80 * 4667 + 40 * 7002);
     assert_eq!(structure_bytes(&with(0.0, HEDGEROW_WIDE_NEVER), bottom, 7002), of_two);
     for wide in [HEDGEROW_WIDE_LARGE, HEDGEROW_WIDE_ALWAYS] {
         assert_eq!(structure_bytes(&with(0.0, wide), bottom, 7002), of_eight, "{wide}");

@@ -73,7 +73,7 @@ fn assert_as_on_the_host<N: WideNode>(name: &str, tree: &Bvh2) {
 }
 
 /// Also of the tree with its children in order.
-fn assert_all_forms(name: &str, tree: &Bvh2) {
+pub fn assert_all_forms(name: &str, tree: &Bvh2) {
     assert_as_on_the_host::<[Child; 4]>(name, tree);
     assert_as_on_the_host::<[Child; 8]>(name, tree);
     assert_as_on_the_host::<QuantisedNode>(name, tree);
@@ -232,7 +232,7 @@ fn wide_trees_of_bad_scenes_have_the_bytes_of_the_host() {
 }
 
 /// Triangles far apart in piles of so many equal ones: leaves of these lengths.
-fn piles(lengths: &[usize]) -> Bvh2 {
+pub fn piles(lengths: &[usize]) -> Bvh2 {
     let mut positions = Vec::new();
     for (i, &length) in lengths.iter().enumerate() {
         let at = [i as f32 * 3.0, (i * i % 7) as f32 * 5.0, (i % 3) as f32];

@@ -1,7 +1,8 @@
 // Collapses a Bvh2 into a wide tree: src/bvh/wide/device.rs records the steps, src/bvh/twin/wide.rs is the twin.
 //
+//   (choices)        bvh/wide/costs.glsl: which binary nodes a wide one takes in
 //   reset            reads the source                            writes levels, opened[0]
-//   open, open_few   read the source, opened of a level          write slots, opened of the next level, levels, first_children,
+//   open, open_few   read the source, choices, opened of a level write slots, opened of the next level, levels, first_children,
 //                                                                 first_records
 //   pair             reads the source, opened, slots             writes partners, first_records: of quantised trees of triangles
 //   (scans)          first_children, first_records: exclusive sums over the source's slots
@@ -37,14 +38,11 @@ layout(constant_id = 2) const uint WIDTH = 4;
 layout(constant_id = 3) const bool QUANTISED = false;
 // Whether what is known of a node's children is chosen by comparisons, so that it stays in registers, or by index.
 layout(constant_id = 4) const bool IN_REGISTERS = false;
-// Whether the child that most rays went into is opened, rather than the largest.
-layout(constant_id = 6) const bool BY_VISITS = false;
 // Whether children in order are those first that end more rays for their work.
-layout(constant_id = 7) const bool BY_HITS = false;
+layout(constant_id = 6) const bool BY_HITS = false;
 
 // src/bvh/wide/mod.rs
-const uint LEVELS_BY_AREA = 24;
-const float PRIOR_RAYS = 8.0;
+const uint LEVELS_BY_COST = 24;
 const float PRIOR_WORK = 24.0;
 const uint LEVELS_AT_MOST = 64;
 // Leaves of more triangles are nodes of their own: a byte holds the units of others, if none are pairs.
@@ -76,8 +74,8 @@ layout(push_constant, scalar) uniform WideCollapseArguments {
     uvec2 target;
     Levels levels;
     OpenedNodes opened;
-    LinkCounts counts;       // of the source's links, by visits
-    LinkCounts hits;         // of the same, by hits
+    Words choices;           // of each of the source's slots
+    LinkCounts hits;         // of the source's links, by hits
     Words slots;             // what names the children of each of opened, WIDTH words
     Words first_children;    // of each of the source's slots, and one more: the sum
     Words first_records;

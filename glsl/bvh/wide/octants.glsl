@@ -21,15 +21,19 @@ vec3 middle_of_child(uint i) {
 // The slots of the `count` children of open_middle, `centre` being that of their node: `in_slot` gives the child in each, 8 for none.
 void octant_slots(uint count, vec3 centre, out uint in_slot[8]) {
     uint left = (1u << count) - 1u;
+    float distances[8];
+    for (uint i = 0; i < (IN_REGISTERS ? 8 : count); ++i) {
+        precise vec3 from = abs(open_middle[i] - centre);
+        precise float far = from.x + from.y + from.z;
+        distances[i] = far;
+    }
     [[unroll]] for (uint s = 0; s < 8; ++s) in_slot[s] = 8;
     for (uint round = 0; round < count; ++round) {
         uint farthest = 8;
         float distance = -1.0;
         for (uint i = 0; i < (IN_REGISTERS ? 8 : count); ++i) {
-            precise vec3 from = abs(open_middle[i] - centre);
-            precise float far = from.x + from.y + from.z;
-            if ((left >> i & 1u) != 0u && far > distance) {
-                distance = far;
+            if ((left >> i & 1u) != 0u && distances[i] > distance) {
+                distance = distances[i];
                 farthest = i;
             }
         }

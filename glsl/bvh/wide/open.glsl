@@ -1,32 +1,23 @@
 // The step `open` of bvh/wide/collapse.glsl: finds the children of a wide node, and lists those that are nodes.
 #ifndef HEDGEROW_BVH_WIDE_OPEN
 #define HEDGEROW_BVH_WIDE_OPEN
+#include "bvh/wide/choice.glsl"
 #include "bvh/wide/octants.glsl"
 
 // What is known of the children so far, beside open_middle.
 uint open_name[8];
 uint open_index[8];
 uint open_count[8];
-uint open_depth[8];
-// What speaks for opening it; less than 0 for a leaf.
-float open_weight[8];
+// How many places it takes. Children of several are opened.
+uint open_places[8];
 // Which child comes first, second and so on where the source's left-first walk meets them: four bits each.
 uint open_order;
 
-// What speaks for opening a child that is an inner node.
-float weight_by_visits(uint name, Child child, float scale) {
-    Child root = source.header.root;
-    precise float visits = float(counts.count[name].entered) * scaled_half_area(Box(root.lo, root.hi), scale);
-    precise float weight = visits + PRIOR_RAYS * scaled_half_area(Box(child.lo, child.hi), scale);
-    return weight;
-}
-
-// The same as `weight` in src/bvh/twin/wide.rs.
-void put_child(uint at, uint name, uint depth, uint level, float scale) {
+// A child that is given so many places, of which it takes what makes it cheaper.
+void put_child(uint at, uint name, uint places, uint level) {
     Child child = child_named(name);
-    float weight = level < LEVELS_BY_AREA ? scaled_half_area(Box(child.lo, child.hi), scale) : float(64 - depth);
-    if (BY_VISITS && level < LEVELS_BY_AREA && is_inner(child)) weight = weight_by_visits(name, child, scale);
-    weight = is_inner(child) ? weight : -1.0;
+    if (!is_inner(child)) places = 1;
+    else if (level < LEVELS_BY_COST && places > 1) places = places_by(choices.word[child.index], places);
     vec3 middle = QUANTISED ? quarter_middle(child.lo, child.hi) : vec3(0);
     if (IN_REGISTERS) {
         for (uint i = 0; i < 8; ++i) {
@@ -34,18 +25,23 @@ void put_child(uint at, uint name, uint depth, uint level, float scale) {
             open_name[i] = is_here ? name : open_name[i];
             open_index[i] = is_here ? child.index : open_index[i];
             open_count[i] = is_here ? child.count : open_count[i];
-            open_depth[i] = is_here ? depth : open_depth[i];
-            open_weight[i] = is_here ? weight : open_weight[i];
+            open_places[i] = is_here ? places : open_places[i];
             if (QUANTISED) open_middle[i] = is_here ? middle : open_middle[i];
         }
     } else {
         open_name[at] = name;
         open_index[at] = child.index;
         open_count[at] = child.count;
-        open_depth[at] = depth;
-        open_weight[at] = weight;
+        open_places[at] = places;
         if (QUANTISED) open_middle[at] = middle;
     }
+}
+
+// The children of binary node `slot` share so many places: the left one goes to `left`, the right one to `right`.
+void put_children(uint left, uint right, uint slot, uint places, uint level) {
+    uint of_left = level < LEVELS_BY_COST ? places_of_left_by(choices.word[slot], places) : places / 2;
+    put_child(left, 2 * slot, of_left, level);
+    put_child(right, 2 * slot + 1, places - of_left, level);
 }
 
 // Where child `opened` was, its two children come: itself, which is the left one now, and `right` right behind it.
@@ -66,32 +62,45 @@ bool ends_more_rays(uint first_name, uint second_name) {
     return of_first > of_second;
 }
 
+// What names a child, its index and its count; NO_CHILD for the eighth and others behind.
+uvec3 child_at(uint i) {
+    uvec3 child = uvec3(NO_CHILD, 0, 0);
+    if (IN_REGISTERS) {
+        for (uint k = 0; k < 8; ++k) child = k == i ? uvec3(open_name[k], open_index[k], open_count[k]) : child;
+    } else if (i < 8) {
+        child = uvec3(open_name[i], open_index[i], open_count[i]);
+    }
+    return child;
+}
+
+// The first of the children that is opened, and how many places its own two share. What fits as a whole is taken in, even where sums of
+// costs were too large to tell. 8: there is none.
+uvec2 next_to_open(uint count, uint level) {
+    for (uint i = 0; i < (IN_REGISTERS ? 8 : count); ++i) {
+        if (i < count && open_places[i] > 1) return uvec2(i, open_places[i]);
+    }
+    if (level >= LEVELS_BY_COST) return uvec2(8, 0);
+    for (uint i = 0; i < (IN_REGISTERS ? 8 : count); ++i) {
+        bool fits = i < count && open_count[i] == 0 && children_by(choices.word[open_index[i]]) <= WIDTH - count + 1;
+        if (fits) return uvec2(i, WIDTH);
+    }
+    return uvec2(8, 0);
+}
+
 // The children of the wide node that begins with the binary node `slot`: how many.
 uint open_children(uint slot, uint level, Child root) {
     open_order = 0x10u;
     if (!is_inner(root)) {
-        put_child(0, WHOLE_TREE, 0, level, 0.0);
+        put_child(0, WHOLE_TREE, 1, level);
         return 1;
     }
-    float scale = source.header.area_scale;
-    put_child(0, 2 * slot, 1, level, scale);
-    put_child(1, 2 * slot + 1, 1, level, scale);
+    put_children(0, 1, slot, WIDTH, level);
     uint count = 2;
     while (count < WIDTH) {
-        uint largest = 8, opens = 0, depth = 0;
-        float weight = -1.0;
-        for (uint i = 0; i < (IN_REGISTERS ? 8 : count); ++i) {
-            if (i < count && open_weight[i] > weight) {
-                weight = open_weight[i];
-                opens = open_index[i];
-                depth = open_depth[i] + 1;
-                largest = i;
-            }
-        }
-        if (largest == 8) break;
-        put_child(largest, 2 * opens, depth, level, scale);
-        put_child(count, 2 * opens + 1, depth, level, scale);
-        put_right_behind(largest, count);
+        uvec2 next = next_to_open(count, level);
+        if (next.x == 8) break;
+        put_children(next.x, count, child_at(next.x).y, next.y, level);
+        put_right_behind(next.x, count);
         count++;
     }
     return count;
@@ -103,17 +112,6 @@ vec3 middle_of_node(uint slot) {
     if (!is_inner(root)) return quarter_middle(root.lo, root.hi);
     Child left = child_named(2 * slot), right = child_named(2 * slot + 1);
     return quarter_middle(min(left.lo, right.lo), max(left.hi, right.hi));
-}
-
-// What names a child, its index and its count; NO_CHILD for the eighth and others behind.
-uvec3 child_at(uint i) {
-    uvec3 child = uvec3(NO_CHILD, 0, 0);
-    if (IN_REGISTERS) {
-        for (uint k = 0; k < 8; ++k) child = k == i ? uvec3(open_name[k], open_index[k], open_count[k]) : child;
-    } else if (i < 8) {
-        child = uvec3(open_name[i], open_index[i], open_count[i]);
-    }
-    return child;
 }
 
 // Children that end more rays for their work first; equal ones stay as they are.

@@ -32,20 +32,27 @@ uint order_of(Triangle first, Triangle second) {
 uint pair_leaf(Child leaf) {
     Triangles triangles = Triangles(source_records());
     uint units = 0, end = min(leaf.index + leaf.count, source.header.primitive_count);
-    for (uint r = leaf.index; r < end; ++r) partners.word[r] = ALONE;
-    for (uint r = leaf.index; r < end; ++r) {
-        if (partners.word[r] == IS_SECOND) continue;
+    // Bit 0: this record is the second of a pair; bits above it: those behind it.
+    uint seconds = 0;
+    for (uint r = leaf.index; r < end; ++r, seconds >>= 1) {
+        if ((seconds & 1u) != 0u) continue;
+        uint partner = ALONE, window_end = min(r + WINDOW + 1, end);
         units += UNITS_OF_ONE;
-        Triangle first = triangles.triangle[r];
-        for (uint behind = 1; behind <= WINDOW && r + behind < end; ++behind) {
-            if (partners.word[r + behind] == IS_SECOND) continue;
-            uint order = order_of(first, triangles.triangle[r + behind]);
-            if (order == 0) continue;
-            partners.word[r] = behind | order << 4;
-            partners.word[r + behind] = IS_SECOND;
-            units += UNITS_OF_TWO - UNITS_OF_ONE;
-            break;
+        // The last one has nothing behind it, and is not looked at.
+        if (r + 1 < window_end) {
+            Triangle first = triangles.triangle[r];
+            for (uint other = r + 1; other < window_end; ++other) {
+                if ((seconds >> other - r & 1u) != 0u) continue;
+                uint order = order_of(first, triangles.triangle[other]);
+                if (order == 0) continue;
+                partner = other - r | order << 4;
+                partners.word[other] = IS_SECOND;
+                seconds |= 1u << other - r;
+                units += UNITS_OF_TWO - UNITS_OF_ONE;
+                break;
+            }
         }
+        partners.word[r] = partner;
     }
     return units;
 }

@@ -1,10 +1,13 @@
 //! Collapsing a `Bvh2` into a wide tree, plainly: what [`crate::bvh::wide::device`] must equal, byte for byte.
 
+mod costs;
+
+use self::costs::{Choice, choices_of};
 use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{Bvh2, Child, Record};
 use crate::bvh::wide::layout::{Slots, Wide, WideNode, is_paired, leaf_max};
 use crate::bvh::wide::pairs::{self, Part, Places};
-use crate::bvh::wide::{LEVELS_BY_AREA, PRIOR_RAYS, PRIOR_WORK};
+use crate::bvh::wide::{LEVELS_BY_COST, PRIOR_WORK};
 use crate::geometry::Aabb;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -13,7 +16,7 @@ use std::ops::Range;
 /// [`WideCounts`](crate::bvh::wide::device::WideCounts).
 #[derive(Debug, Clone, Copy, Default)]
 pub struct LinkCounts<'a> {
-    /// The child that most rays went into is opened, rather than the largest.
+    /// Nodes are made to cost least by the rays that went into them, rather than by surface area.
     pub opened_by: &'a [LinkCount],
     /// Children in order are those first that end more rays for their work.
     pub ordered_by: &'a [LinkCount],
@@ -184,12 +187,14 @@ fn running_sums(from: u32, values: impl Iterator<Item = (u32, u32)>) -> BTreeMap
 
 /// All wide nodes to be, level by level.
 fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> Vec<Opened> {
+    let width = N::FORM.width();
+    let choices = choices_of(tree, width, counts.opened_by);
     let mut opened: Vec<Opened> = Vec::new();
     let mut this_level = vec![(tree.header.root, None)];
     for level in 0.. {
         let mut next_level = Vec::new();
         for (root, place) in this_level {
-            let children = open(tree, &root, N::FORM.width() as usize, level, counts);
+            let children = open(tree, &choices, &root, width, level, counts.ordered_by);
             let mut slots = [None; 8];
             if N::FORM.is_quantised() && tree.header.child_order == 0 {
                 slots = octant_slots(&children);
@@ -210,50 +215,58 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> 
     unreachable!("a tree has an end")
 }
 
-/// The children of a wide node: those of the binary node, the largest one opened again and again, or, where there are counts, the one
-/// that most rays went into; far down ([`LEVELS_BY_AREA`]) the highest one. Of equal ones the first. A tree that is a leaf is its
-/// own child. Children come as they were opened; where the tree's have an order, as the walk that takes left ones first meets them, or by hits.
-fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32, counts: &LinkCounts<'_>) -> Vec<Child> {
+/// A child of a wide node: its link, and how many places it takes among the children. One of several is opened.
+#[derive(Debug, Clone, Copy)]
+struct Taken {
+    child: Child,
+    link: u32,
+    places: u32,
+}
+
+/// The children of a wide node: those of the binary node, of which those are opened that are given several places ([`choices_of`]); far
+/// down ([`LEVELS_BY_COST`]) the places are halved. A tree that is a leaf is its own child. Children come as they were opened; where the
+/// tree's have an order, as the walk that takes left ones first meets them, or by hits.
+fn open<R: Record>(
+    tree: &Bvh2<R>,
+    choices: &[Choice],
+    root: &Child,
+    width: u32,
+    level: u32,
+    ordered_by: &[LinkCount],
+) -> Vec<Child> {
     if root.is_leaf() {
         return vec![*root];
     }
-    let scale = tree.header.area_scale;
-    let whole_area = tree.header.root.bounds().scaled_half_area(scale);
-    let weight = |link: u32, child: &Child, depth: u32| {
-        let area = child.bounds().scaled_half_area(scale);
-        match counts.opened_by.get(link as usize) {
-            _ if child.is_leaf() => -1.0,
-            _ if level >= LEVELS_BY_AREA => (64 - depth) as f32,
-            Some(count) => count.entered as f32 * whole_area + PRIOR_RAYS * area,
-            None => area,
-        }
+    let by_cost = level < LEVELS_BY_COST;
+    let choice = |child: &Child| choices[child.index as usize];
+    // The two children of one that has so many places.
+    let below = |child: &Child, places: u32| -> [Taken; 2] {
+        let left = if by_cost { choice(child).left_of(places) } else { places / 2 };
+        [(0, left), (1, places - left)].map(|(side, places)| {
+            let link = 2 * child.index + side;
+            let child = tree.nodes[child.index as usize].children[side as usize];
+            let takes = if child.is_leaf() || !by_cost { places } else { choice(&child).places_of(places) };
+            Taken { child, link, places: takes }
+        })
     };
-    // A child, what speaks for opening it, how many levels it is below the root, and its link.
-    let below = |child: &Child, depth: u32| {
-        let links = [2 * child.index, 2 * child.index + 1].into_iter();
-        let children = links.zip(tree.nodes[child.index as usize].children);
-        children.map(|(link, c)| (c, weight(link, &c, depth), depth, link)).collect::<Vec<_>>()
-    };
-    let mut children = below(root, 1);
+    let mut children = below(root, width).to_vec();
     // Which of them comes first, second and so on in the walk that takes left children first.
     let mut order = vec![0, 1];
-    while children.len() < width {
-        let mut largest: Option<usize> = None;
-        for (i, (_, weight, ..)) in children.iter().enumerate() {
-            if *weight > largest.map_or(-1.0, |at| children[at].1) {
-                largest = Some(i);
-            }
-        }
-        let Some(at) = largest else { break };
-        let (child, _, depth, _) = children[at];
-        let [left, right] = below(&child, depth + 1).try_into().expect("two children");
+    while children.len() < width as usize {
+        let room = width - children.len() as u32;
+        let of_several = children.iter().position(|taken| !taken.child.is_leaf() && taken.places > 1);
+        // What fits as a whole is taken in, even where sums of costs were too large to tell.
+        let fits = |taken: &Taken| by_cost && !taken.child.is_leaf() && choice(&taken.child).children() <= room + 1;
+        let next = of_several.map(|at| (at, children[at].places));
+        let Some((at, places)) = next.or_else(|| Some((children.iter().position(fits)?, width))) else { break };
+        let [left, right] = below(&children[at].child, places);
         children[at] = left;
         let place = order.iter().position(|&child| child == at).expect("all of them are there");
         order.insert(place + 1, children.len());
         children.push(right);
     }
-    if !counts.ordered_by.is_empty() {
-        let ends_more = |a: usize, b: usize| ends_more_rays([a, b].map(|i| counts.ordered_by[children[i].3 as usize]));
+    if !ordered_by.is_empty() {
+        let ends_more = |a: usize, b: usize| ends_more_rays([a, b].map(|i| ordered_by[children[i].link as usize]));
         // Insertion, as the device does, so that equal ones stay as they are.
         for mut at in 1..order.len() {
             while at > 0 && ends_more(order[at], order[at - 1]) {
@@ -263,7 +276,7 @@ fn open<R: Record>(tree: &Bvh2<R>, root: &Child, width: usize, level: u32, count
         }
     }
     let in_order = |place: usize| if tree.header.child_order != 0 { order[place] } else { place };
-    (0..children.len()).map(|place| children[in_order(place)].0).collect()
+    (0..children.len()).map(|place| children[in_order(place)].child).collect()
 }
 
 /// Whether the rays that went into the first of two children ended there for less work than those in the second.

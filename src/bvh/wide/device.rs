@@ -25,7 +25,7 @@ pub struct WideOptions {
 /// aligned to 4 bytes); none of them unless told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct WideCounts {
-    /// The child that most rays went into is opened, rather than the largest.
+    /// Nodes are made to cost least by the rays that went into them, rather than by surface area.
     pub opened_by: Option<Region>,
     /// Of a source whose children have an order, those of a wide node come first that end more rays for their work: by rays that were
     /// counted exhaustively ([`crate::trace::counts::CountedWalk::Exhaustive`]). Without it they come as the walk of the source meets
@@ -50,6 +50,8 @@ const FIRST_LEVELS: u32 = 3;
 /// Levels, at most, that are above those that one workgroup opens at the end.
 const LEVELS: u32 = 16;
 
+const PHASE: &str = "wide";
+
 /// Words of `Levels` in wide_collapse.glsl.
 const LEVEL_WORDS: u64 = 64 + 65 + 1;
 
@@ -70,6 +72,8 @@ pub(crate) struct WideMemory {
 /// What collapsing does, as far as memory is used in one and free in the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum WidePhase {
+    /// What subtrees cost is found, from the leaves up.
+    Costs,
     /// Nodes are opened, level by level.
     Open,
     /// Triangles find those that they share a record with.
@@ -85,6 +89,11 @@ struct Scratch {
     /// What is in use until the nodes are there, and what is until the records are.
     passing: Plan<WidePhase>,
     lasting: Plan<WidePhase>,
+    /// Of each of the source's slots what was chosen, its link, a node that climbs begin at, and its costs.
+    choices: u64,
+    links: u64,
+    starts: u64,
+    costs: u64,
     levels: u64,
     opened: u64,
     slots: u64,
@@ -132,6 +141,11 @@ impl WidePass {
         let form = self.options.form;
         let (nodes, width) = (u64::from(form.nodes_at_most(self.count)), u64::from(form.width()));
         let slots = u64::from(node_slots(self.count)) + 1;
+        let of_slots = u64::from(node_slots(self.count));
+        let choices = take("choices", of_slots, WidePhase::Costs..=WidePhase::Open);
+        let mut of_costs = |name, words| take(name, words * of_slots, WidePhase::Costs..=WidePhase::Costs);
+        let [links, starts] = ["links", "starts of climbs"].map(|name| of_costs(name, 1));
+        let costs = of_costs("costs in so many places", width - 1);
         let levels = take("levels", LEVEL_WORDS, WidePhase::Open..=WidePhase::Nodes);
         let opened = take("opened nodes", 2 * nodes, WidePhase::Open..=WidePhase::Nodes);
         let children = take("what names their children", width * nodes, WidePhase::Open..=WidePhase::Nodes);
@@ -148,7 +162,22 @@ impl WidePass {
         let partners =
             if self.is_paired() { take("partners", records, WidePhase::Pair..=WidePhase::Records) } else { 0 };
         let slots = children;
-        Scratch { passing, lasting, levels, opened, slots, first_children, first_records, places, partners, sums }
+        Scratch {
+            passing,
+            lasting,
+            choices,
+            links,
+            starts,
+            costs,
+            levels,
+            opened,
+            slots,
+            first_children,
+            first_records,
+            places,
+            partners,
+            sums,
+        }
     }
 
     /// Bytes of scratch memory that are in use until the nodes are there.
@@ -172,14 +201,33 @@ impl WidePass {
         self.options.form.is_quantised() && self.options.primitives == Primitives::Triangles
     }
 
-    fn kernel(&self, shader: &'static shaders::Shader, [by_visits, by_hits]: [u32; 2]) -> Kernel {
+    fn kernel(&self, shader: &'static shaders::Shader, by_hits: bool) -> Kernel {
         let workgroup = if one_workgroup(shader) { self.few } else { self.grid.workgroup };
         let WideOptions { form, .. } = self.options;
         let [quantised, in_registers] = [form.is_quantised(), self.in_registers].map(u32::from);
         // What `SOURCE_WORD` of glsl/bvh/geometry.glsl is without a value.
         let source_word = 0;
-        let constants = [self.grid.rounds, form.width(), quantised, in_registers, source_word, by_visits, by_hits];
+        let constants = [self.grid.rounds, form.width(), quantised, in_registers, source_word, by_hits.into()];
         Kernel::new(shader, workgroup, &constants)
+    }
+
+    /// What nodes cost, by surface area or by visits, and what is chosen by it.
+    fn costs_steps(&self, source: u64, visits: u64, passing: u64) -> [Step; 2] {
+        let parts = self.scratch();
+        let arguments = arguments::WideCosts {
+            source,
+            links: passing + parts.links,
+            starts: passing + parts.starts,
+            costs: passing + parts.costs,
+            choices: passing + parts.choices,
+            counts: visits,
+            slots: node_slots(self.count),
+        };
+        let constants = [self.grid.rounds, self.options.form.width(), u32::from(visits != 0)];
+        [&shaders::BVH_WIDE_LINKS, &shaders::BVH_WIDE_COSTS].map(|shader| {
+            let kernel = Kernel::new(shader, self.grid.workgroup, &constants);
+            Step::new(PHASE, kernel, &arguments, self.grid.groups_for(arguments.slots))
+        })
     }
 
     /// The levels that are opened by many workgroups, a dispatch each. Those before and behind are done by one workgroup, which
@@ -247,8 +295,7 @@ impl WidePass {
         [visits, hits]: [u64; 2],
         memory: &WideMemory,
     ) -> Result<[Vec<Step>; 2]> {
-        const PHASE: &str = "wide";
-        let kernel = |shader| self.kernel(shader, [visits, hits].map(|counts| u32::from(counts != 0)));
+        let kernel = |shader| self.kernel(shader, hits != 0);
         if self.is_paired() && self.count > pairs::TRIANGLES_AT_MOST {
             return Err(Error::Argument(format!(
                 "{} triangles in quantised nodes: they hold at most {}; split the mesh or take another form",
@@ -264,7 +311,7 @@ impl WidePass {
             target,
             levels: passing + parts.levels,
             opened: passing + parts.opened,
-            counts: visits,
+            choices: passing + parts.choices,
             hits,
             slots: passing + parts.slots,
             first_children: passing + parts.first_children,
@@ -280,10 +327,11 @@ impl WidePass {
         let step =
             |shader, arguments: &arguments::WideCollapse, groups| Step::new(PHASE, kernel(shader), arguments, groups);
         let cleared = ((parts.sums - parts.first_children) / 4) as u32;
-        let mut steps = vec![
+        let mut steps = self.costs_steps(source, visits, passing).to_vec();
+        steps.extend([
             fill::step(PHASE, arguments.first_children, cleared, 0),
             step(&shaders::BVH_WIDE_RESET, &arguments, 1),
-        ];
+        ]);
         let few = |level, level_end| {
             (&shaders::BVH_WIDE_OPEN_FEW, arguments::WideCollapse { level, level_end, ..arguments }, 1)
         };

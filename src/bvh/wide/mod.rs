@@ -1,9 +1,11 @@
-//! Wide trees: nodes of up to four or eight children, made of any `Bvh2` by surface area.
+//! Wide trees: nodes of up to four or eight children, made of any `Bvh2` so that they cost least.
 //!
-//! A wide node takes the place of a few binary ones: it begins with the two children of one, and the child of the largest
-//! surface area is replaced by its own two as long as there is room (Wald, Benthin, Boulos 2008, section 3.1). A ray takes
-//! fewer steps then, and what a step loads lies together. Where rays were counted, the child that most of them went into may be
-//! replaced instead (Gu, He, Blelloch 2015, "Ray Specialized Contraction on Bounding Volume Hierarchies").
+//! A wide node takes the place of a few binary ones: it begins with the two children of one, and some of them are replaced by
+//! their own two as long as there is room. A ray takes fewer steps then, and what a step loads lies together. Which ones is chosen from the
+//! leaves up, so that the surface areas of all wide nodes have the least sum (Ylitie, Karras, Laine 2017, section 3.1), or, where rays were
+//! counted, so that fewest of them go into wide nodes (as Gu, He, Blelloch 2015, "Ray Specialized Contraction on Bounding Volume
+//! Hierarchies", contract by counts). Always replacing the child with the largest area (Wald, Benthin, Boulos 2008, section 3.1) makes half
+//! as many nodes again, as it leaves small ones below.
 //!
 //! Where the children of the source have an order ([`super::child_order`]), those of a wide node lie in their slots as rays shall look
 //! into them that end at any hit, and the header says so, too.
@@ -38,10 +40,10 @@ pub(crate) const PRIOR_RAYS: f32 = 8.0;
 /// [`PRIOR_RAYS`], each of which takes a step of 3 and ends nowhere.
 pub(crate) const PRIOR_WORK: f32 = 24.0;
 
-/// Levels of wide nodes that are opened by surface area or by visits. Nodes further down are opened level by level, so that a node takes in
+/// Levels of wide nodes that are made to cost least. Nodes further down are opened level by level, so that a node takes in
 /// two binary levels of four children and three of eight, however the tree is shaped: what a ray puts off is bounded by that.
 /// Trees of scenes end long before.
-pub const LEVELS_BY_AREA: u32 = 24;
+pub const LEVELS_BY_COST: u32 = 24;
 
 impl Form {
     /// All there are.
@@ -74,24 +76,31 @@ impl Form {
         record_kind & 0xFFF0_FFFF | self.width() << 16 | (self.is_quantised() as u32) << 24
     }
 
-    /// Levels of nodes, at most, of a binary tree of at most [`super::layout::MAX_DEPTH`] levels: [`LEVELS_BY_AREA`], and
+    /// Levels of nodes, at most, of a binary tree of at most [`super::layout::MAX_DEPTH`] levels: [`LEVELS_BY_COST`], and
     /// those that hold the rest; one more where long leaves are nodes.
     pub const fn levels(self) -> u32 {
-        let rest = super::layout::MAX_DEPTH - LEVELS_BY_AREA;
+        let rest = super::layout::MAX_DEPTH - LEVELS_BY_COST;
         match self {
-            Form::Four => LEVELS_BY_AREA + rest.div_ceil(2),
-            Form::Eight => LEVELS_BY_AREA + rest.div_ceil(3),
-            Form::EightQuantised => LEVELS_BY_AREA + rest.div_ceil(3) + 1,
+            Form::Four => LEVELS_BY_COST + rest.div_ceil(2),
+            Form::Eight => LEVELS_BY_COST + rest.div_ceil(3),
+            Form::EightQuantised => LEVELS_BY_COST + rest.div_ceil(3) + 1,
         }
     }
 
     /// Nodes that a tree of `primitive_count` primitives has at most, 1 at least.
     ///
-    /// A node with room left has leaves alone for children, two at least. Nodes are the most where all others are full and each
-    /// of those that they can hold below them has two leaves: of `f` full ones, (w − 1)·f + 1.
+    /// Where costs choose, a node and one of its children that is a node have w + 2 children together at least, or the child would have
+    /// been taken in. So nodes of two children stand below one of w, of which each has w at most: w + 1 nodes for 2w − 1 more leaves, 3/5 of
+    /// the leaves where w is 8, and 5/7 where it is 4. Below [`LEVELS_BY_COST`] they are at most 4/7 and 2/3: a node with a node below it
+    /// has three or two others beside that one. Where one meets the other, a node by costs may have a child with two leaves whatever its
+    /// own number of children is. Two thirds and three quarters are enough for all of it.
     pub const fn nodes_at_most(self, primitive_count: u32) -> u32 {
-        let leaves = if primitive_count < 2 { 2 } else { primitive_count };
-        self.width() * (leaves - 2) / (2 * (self.width() - 1)) + 1
+        let leaves = if primitive_count < 2 { 2 } else { primitive_count as u64 };
+        let nodes = match self {
+            Form::Four => (3 * leaves - 2) / 4,
+            Form::Eight | Form::EightQuantised => (2 * leaves - 1) / 3,
+        };
+        nodes as u32
     }
 
     /// What records call it.

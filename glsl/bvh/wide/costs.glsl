@@ -1,0 +1,159 @@
+// Which binary nodes a wide node takes in, so that all wide nodes together cost least: src/bvh/twin/wide/costs.rs is the twin and has
+// the rules, src/bvh/wide/device.rs records the step.
+//
+//   links  reads the source                     writes links, starts; choices: how many of a node's children are nodes
+//   costs  reads the source, links, starts      writes choices; scratch: costs
+//
+// A climb begins at each node over two leaves; of two inner children the second that is done goes on with their parent.
+//
+// needs  a barrier before, between both and behind; both with as many workgroups of the same size; any subgroup size
+#ifndef HEDGEROW_BVH_WIDE_COSTS
+#define HEDGEROW_BVH_WIDE_COSTS
+#include "gpu/pass.glsl"
+#include "bvh/copy.glsl"
+#include "bvh/counts.glsl"
+#include "bvh/sah.glsl"
+#include "bvh/wide.glsl"
+#include "bvh/wide/choice.glsl"
+#extension GL_EXT_control_flow_attributes : require
+
+layout(constant_id = 2) const uint WIDTH = 4;
+// Whether nodes cost what rays were counted in them, rather than their area.
+layout(constant_id = 3) const bool BY_VISITS = false;
+
+// src/bvh/wide/mod.rs
+const float PRIOR_RAYS = 8.0;
+
+const uint NO_LINK = 0xFFFFFFFFu;
+
+layout(push_constant, scalar) uniform WideCostsArguments {
+    Structure source;
+    Words links;          // of each node slot, what names it: its place among all children, twice the parent's slot and one for the right one
+    Words starts;         // of each invocation, one at each of its slots: nodes over two leaves, and NO_LINK behind the last
+    Floats costs;         // WIDTH - 1 for each node slot: in 1, 2 and more places
+    Words choices;        // of each node slot
+    LinkCounts counts;    // of the source's links, by visits
+    uint slots;           // at most
+};
+
+// How many slots there are to look at.
+uint slots_in_use() {
+    Header header = source.header;
+    bool usable = is_binary(header) && compacted(header).active_count != 0u;
+    return usable && header.root.count == 0u && header.node_slots <= slots ? header.node_slots : 0u;
+}
+
+bool is_inner(Child child, uint node_slots) {
+    return child.count == 0u && child.index < node_slots;
+}
+
+// Of a subtree, in up to 7 places; a leaf costs nothing.
+struct Costs {
+    float of[8];
+};
+
+Costs costs_of(Child child, uint node_slots) {
+    Costs known;
+    bool inner = is_inner(child, node_slots);
+    uint at = (WIDTH - 1u) * (inner ? child.index : 0u);
+    known.of[0] = 0.0;
+    [[unroll]] for (uint i = 1; i < 8; ++i) known.of[i] = inner && i < WIDTH ? costs.value[at + i - 1u] : 0.0;
+    return known;
+}
+
+// How many places a child takes of those that it is given.
+uint places_taken(Child child, uint places, uint node_slots) {
+    return is_inner(child, node_slots) ? places_by(choices.word[child.index], places) : 1u;
+}
+
+// What a wide node costs that begins with the binary node of these children.
+float own_cost(Child left, Child right, uint link) {
+    float scale = source.header.area_scale;
+    float area = scaled_half_area(Box(min(left.lo, right.lo), max(left.hi, right.hi)), scale);
+    if (!BY_VISITS || link == NO_LINK) return area;
+    Child root = source.header.root;
+    precise float visits = float(counts.count[link].entered) * scaled_half_area(Box(root.lo, root.hi), scale);
+    precise float weight = visits + PRIOR_RAYS * area;
+    return weight;
+}
+
+// Where that is less: the cost with k places for the left child.
+void better(float cost, uint k, inout float best, inout uint least) {
+    least = cost < best ? k : least;
+    best = min(cost, best);
+}
+
+// What is known of the children of a node becomes what is of the node.
+void choose(uint slot, uint link, uint node_slots) {
+    Child left = source.nodes[slot].left, right = source.nodes[slot].right;
+    Costs of_left = costs_of(left, node_slots), of_right = costs_of(right, node_slots);
+    // Of equal ones the least for the left child. In more places than there are nothing is asked for. Written out, as shaderc does not unroll
+    // a loop in a loop, and arrays that are indexed by loops lie in memory.
+#define ONE_FOR_THE_LEFT(places)                                        \
+    float best##places = of_left.of[1] + of_right.of[places - 1];       \
+    uint least##places = 1u
+#define OR_SO_MANY(places, k) better(of_left.of[k] + of_right.of[places - k], k, best##places, least##places)
+    ONE_FOR_THE_LEFT(2);
+    ONE_FOR_THE_LEFT(3); OR_SO_MANY(3, 2);
+    ONE_FOR_THE_LEFT(4); OR_SO_MANY(4, 2); OR_SO_MANY(4, 3);
+    ONE_FOR_THE_LEFT(5); OR_SO_MANY(5, 2); OR_SO_MANY(5, 3); OR_SO_MANY(5, 4);
+    ONE_FOR_THE_LEFT(6); OR_SO_MANY(6, 2); OR_SO_MANY(6, 3); OR_SO_MANY(6, 4); OR_SO_MANY(6, 5);
+    ONE_FOR_THE_LEFT(7); OR_SO_MANY(7, 2); OR_SO_MANY(7, 3); OR_SO_MANY(7, 4); OR_SO_MANY(7, 5); OR_SO_MANY(7, 6);
+    ONE_FOR_THE_LEFT(8); OR_SO_MANY(8, 2); OR_SO_MANY(8, 3); OR_SO_MANY(8, 4); OR_SO_MANY(8, 5); OR_SO_MANY(8, 6); OR_SO_MANY(8, 7);
+#undef ONE_FOR_THE_LEFT
+#undef OR_SO_MANY
+    float opened[8] = float[8](0.0, 0.0, best2, best3, best4, best5, best6, best7);
+    uint choice = least2 | least3 << 3 | least4 << 6 | least5 << 9 | least6 << 12 | least7 << 15 | least8 << 18;
+    float before = WIDTH == 4u ? best4 : best8;
+    uint left_gets = WIDTH == 4u ? least4 : least8;
+    before += own_cost(left, right, link);
+    uint at = (WIDTH - 1u) * slot;
+    costs.value[at] = before;
+    [[unroll]] for (uint i = 2; i < 8; ++i) {
+        choice |= (i < WIDTH && opened[i] < before ? 1u : 0u) << CHOICE_CHEAPER + i - 2u;
+        before = min(opened[i], before);
+        if (i < WIDTH) costs.value[at + i - 1u] = before;
+    }
+    uint both = places_taken(left, left_gets, node_slots) + places_taken(right, WIDTH - left_gets, node_slots);
+    choices.word[slot] = choice | both - 2u << CHOICE_CHILDREN;
+}
+
+// What is known of all slots of an invocation before climbs begin.
+void find_links(uint node_slots) {
+    uint found = 0u;
+    for (uint k = 0, slot = grid_item(0); slot < node_slots; slot = grid_item(++k)) {
+        Child left = source.nodes[slot].left, right = source.nodes[slot].right;
+        if (slot == source.header.root.index) links.word[slot] = NO_LINK;
+        if (left.count == UNUSED) continue;
+        bool of_left = is_inner(left, node_slots), of_right = is_inner(right, node_slots);
+        if (of_left) links.word[left.index] = 2u * slot;
+        if (of_right) links.word[right.index] = 2u * slot + 1u;
+        choices.word[slot] = uint(of_left) + uint(of_right);
+        if (!of_left && !of_right) starts.word[grid_item(found++)] = slot;
+    }
+    uint end = grid_item(found);
+    if (end < node_slots) starts.word[end] = NO_LINK;
+}
+
+// The `k`th node of this invocation's over two leaves, or NO_LINK.
+uint start_of(uint k, uint node_slots) {
+    uint at = grid_item(k);
+    return at < node_slots ? starts.word[at] : NO_LINK;
+}
+
+// All climbs that are this invocation's. As soon as one has ended the next one begins: lanes do not wait for each other at the root.
+void climb(uint node_slots) {
+    uint k = 0u;
+    uint slot = start_of(k++, node_slots);
+    while (slot < node_slots) {
+        uint link = links.word[slot];
+        choose(slot, link, node_slots);
+        release_to_device();
+        slot = link >> 1;
+        // Another inner child that is not done yet goes on.
+        bool goes_on = slot < node_slots && atomicAdd(choices.word[slot], 0xFFFFFFFFu) == 1u;
+        acquire_from_device();
+        if (!goes_on) slot = start_of(k++, node_slots);
+    }
+}
+#endif
