@@ -4,8 +4,8 @@
 //! their own two as long as there is room. A ray takes fewer steps then, and what a step loads lies together. Which ones is chosen from the
 //! leaves up, so that the surface areas of all wide nodes have the least sum (Ylitie, Karras, Laine 2017, section 3.1), or, where rays were
 //! counted, so that fewest of them go into wide nodes (as Gu, He, Blelloch 2015, "Ray Specialized Contraction on Bounding Volume
-//! Hierarchies", contract by counts). Always replacing the child with the largest area (Wald, Benthin, Boulos 2008, section 3.1) makes half
-//! as many nodes again, as it leaves small ones below.
+//! Hierarchies", contract by counts). Always replacing the child with the largest area (Wald, Benthin, Boulos 2008, section 3.1) makes
+//! 1.35 to 1.6 times as many nodes (docs/notes/rays.md), as it leaves small ones below.
 //!
 //! Where the children of the source have an order ([`super::child_order`]), those of a wide node lie in their slots as rays shall look
 //! into them that end at any hit, and the header says so, too.
