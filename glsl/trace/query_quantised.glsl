@@ -1,6 +1,7 @@
 // The steps of a query at quantised nodes: a part of trace/query_walk.glsl, which declares the query. As trace/walk_quantised.glsl, with the
-// state of a query, and by octant alone, as it is no slower so: what waits is taken and its first node visited in one round, and the first leaf of a node is tested in the round of the
-// node. With rounds of their own for them rays were no faster than in nodes of two (docs/notes/rays.md).
+// state of a query, and by octant alone, as it is no slower so: what waits is taken and its first node visited in one round, and the first
+// leaf of a node is tested in the round of the node. With rounds of their own for them rays were no faster than in nodes of two
+// (docs/notes/rays.md).
 #ifndef HEDGEROW_TRACE_QUERY_QUANTISED
 #define HEDGEROW_TRACE_QUERY_QUANTISED
 #extension GL_EXT_control_flow_attributes : require
