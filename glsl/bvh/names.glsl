@@ -47,7 +47,6 @@
 #define wide_records_at hedgerow_wide_records_at
 #define distances_to hedgerow_distances_to
 #define enter_box hedgerow_enter_box
-#define enter_of_nearest hedgerow_enter_of_nearest
 #define enter_quantised hedgerow_enter_quantised
 #define byte_of_slot hedgerow_byte_of_slot
 #define sum_below hedgerow_sum_below

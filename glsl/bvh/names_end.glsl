@@ -46,7 +46,6 @@
 #undef wide_records_at
 #undef distances_to
 #undef enter_box
-#undef enter_of_nearest
 #undef enter_quantised
 #undef byte_of_slot
 #undef sum_below

@@ -50,18 +50,10 @@ void enter_quantised(HedgerowPreparedRay ray, QuantisedNode node, float t_best, 
 #undef ENTER_SLOT
 }
 
-// The leading half of where the nearest of these slots is entered.
-uint enter_of_nearest(uint slots, float enters[8]) {
-    float nearest = HEDGEROW_INFINITY;
-    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
-        if ((slots >> slot & 1u) != 0u) nearest = min(nearest, enters[slot]);
-    }
-    return leading_half(nearest);
-}
-
 // The place of the slot that is entered first, and the leading half of where the nearest of the others is. Of those that are entered within
-// eight floats of each other the one that comes first in the octant, for its place is in the last bits of what is compared.
-uvec2 next_of_group(uint slots, uint octant, float enters[8]) {
+// eight floats of each other the one that comes first in the octant, for its place is in the last bits of what is compared. Of a ray that
+// ends at any hit the place that comes first in the octant, and no distance: no hit brings the end of the ray nearer, so no group is too far.
+uvec2 next_of_group(uint slots, uint octant, float enters[8], bool any_hit) {
     const int NONE = 0x7FFFFFFF;
     int first = NONE, second = NONE;
     [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
@@ -70,6 +62,8 @@ uvec2 next_of_group(uint slots, uint octant, float enters[8]) {
         second = min(second, max(first, key));
         first = min(first, key);
     }
-    return uvec2(uint(first) & 7u, leading_half(intBitsToFloat(second)));
+    uvec2 next = uvec2(uint(first) & 7u, leading_half(intBitsToFloat(second)));
+    if (any_hit) next = uvec2(uint(findLSB(in_octant(slots, octant))), leading_half(-HEDGEROW_INFINITY));
+    return next;
 }
 #endif

@@ -1,7 +1,6 @@
 // The steps of a query at quantised nodes: a part of trace/query_walk.glsl, which declares the query. As trace/walk_quantised.glsl, with the
-// state of a query, and by octant alone, as it is no slower so: what waits is taken and its first node visited in one round, and the first
-// leaf of a node is tested in the round of the node. With rounds of their own for them rays were no faster than in nodes of two
-// (docs/notes/rays.md).
+// state of a query, but what waits is taken and its first node visited in one round, and the first leaf of a node is tested in the round of the
+// node. With rounds of their own for them rays were no faster than in nodes of two (docs/notes/rays.md).
 #ifndef HEDGEROW_TRACE_QUERY_QUANTISED
 #define HEDGEROW_TRACE_QUERY_QUANTISED
 #extension GL_EXT_control_flow_attributes : require
@@ -31,9 +30,10 @@ void hedgerow_visit_quantised(inout HedgerowRayQuery query) {
     // room for where both begin: it names the node, which is asked again.
     uint nodes = hedgerow_is_in_top(query) ? 0xFFu : node.exponents_and_nodes >> 24;
     uint visits = in_octant(entered & nodes, query.octant);
-    uint others = in_octant(visits & visits - 1u, query.octant);
     query.first_child = hedgerow_is_in_top(query) ? query.index : node.first_child;
-    query.group = enter_of_nearest(others, enters) | nodes << 8 | visits;
+    uvec2 next = next_of_group(entered & nodes, query.octant, enters, hedgerow_ends_at_first_hit(query));
+    query.next = next.x;
+    query.group = next.y | nodes << 8 | visits;
     query.first_record = node.first_record;
     query.counts = node.counts;
     query.leaves = in_octant(entered & ~nodes, query.octant);
@@ -57,6 +57,7 @@ void hedgerow_take_entry(inout HedgerowRayQuery query, uvec2 waiting, bool waits
     // Equally far is not too far: an equally near hit that comes before may be there.
     bool is_near = uintBitsToFloat(waiting.y & 0xFFFF0000u) <= query.best;
     query.group = waits && !is_rest && is_near ? waiting.y : 0u;
+    query.next = uint(findLSB(waiting.y & 0xFFu));
 }
 
 bool hedgerow_has_group(HedgerowRayQuery query) {
@@ -79,8 +80,8 @@ void hedgerow_take_leaf(inout HedgerowRayQuery query) {
 void hedgerow_take_of_group(inout HedgerowRayQuery query) {
     uint visits = query.group & 0xFFu;
     if (query.left != HEDGEROW_NOTHING || query.leaves != 0u || visits == 0u) return;
-    uint slot = uint(findLSB(visits)) ^ query.octant;
-    uint left = visits & visits - 1u;
+    uint slot = query.next ^ query.octant;
+    uint left = visits & ~(1u << query.next);
     if (hedgerow_is_in_top(query)) {
         HedgerowNames names = hedgerow_names_at(query.structure, query.first_child);
         uint count = byte_of_slot(names.counts, slot);

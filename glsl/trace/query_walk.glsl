@@ -136,11 +136,12 @@ struct HedgerowRayQuery {
     uint instance;            // record in the top level
     uint instance_flags;
     // Of quantised nodes: those of the one at hand that are nodes and that the ray has yet to enter, as an entry of the stack has them
-    // (first of its nodes; where the ray enters the nearest in a half, which slots are nodes, which are left); its leaves, likewise; the
-    // bits of the axes in which the ray goes down; the slots that the ray may enter of the node where it begins. In a top level
-    // `first_child` is the node itself, and its leaves are among its nodes.
+    // (first of its nodes; where the ray enters the nearest but the next in a half, which slots are nodes, which places are left), and the
+    // place of the next; its leaves, likewise; the bits of the axes in which the ray goes down; the slots that the ray may enter of the node
+    // where it begins. In a top level `first_child` is the node itself, and its leaves are among its nodes.
     uint first_child;
     uint group;
+    uint next;
     uint first_record;
     uvec2 counts;
     uint leaves;
@@ -302,6 +303,7 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.rounds = 0u;
     query.top_rounds = 0u;
     query.first_child = 0u;
+    query.next = 0u;
     query.first_record = 0u;
     query.counts = uvec2(0u);
     query.octant = 0u;

@@ -102,15 +102,9 @@ void visit(QuantisedNode node, bool any_hit, inout QuantisedWalk walk) {
     walk.nodes = node.exponents_and_nodes >> 24;
     uint nodes = entered & walk.nodes;
     walk.visits = in_octant(nodes, walk.octant);
-    if (any_hit) {
-        // No hit brings the end of the ray nearer, so no group is too far.
-        walk.next = uint(findLSB(walk.visits));
-        walk.enter = leading_half(-HEDGEROW_INFINITY);
-    } else {
-        uvec2 next = next_of_group(nodes, walk.octant, enters);
-        walk.next = next.x;
-        walk.enter = next.y;
-    }
+    uvec2 next = next_of_group(nodes, walk.octant, enters, any_hit);
+    walk.next = next.x;
+    walk.enter = next.y;
     walk.first_record = node.first_record;
     walk.counts = node.counts;
     // A slot without a child may be among them: a leaf of nothing.
