@@ -1,14 +1,14 @@
 // The parts of a structure below a top level, as a binary tree: what instances are opened to, and what their boxes are made of. The twin
 // is `Below` in src/accel/twin/mod.rs.
 //
-// A part is a Child. Of quantised nodes it is some of a node's slots, and `count` says which, a bit each: a node is cut in two along the
-// axis where that leaves least area, as the bits of a slot's number are the octant that it lies in. A part of one slot that holds a node is
-// that node, whole.
+// A part is a Child. Of quantised nodes it is some of a node's slots, and `count` says which, a bit each. A part of one slot that holds a node
+// is that node, whole.
 #ifndef HEDGEROW_ACCEL_PARTS
 #define HEDGEROW_ACCEL_PARTS
 #include "bvh/instances.glsl"
 #include "bvh/wide.glsl"
 #include "trace/quantised_slots.glsl"
+#extension GL_EXT_control_flow_attributes : require
 
 Box empty_box() {
     return Box(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
@@ -42,12 +42,18 @@ Box box_in_slot(QuantisedNode node, uint slot) {
     return Box(least, greatest);
 }
 
-Box box_in_slots(QuantisedNode node, uint slots) {
-    Box b = empty_box();
-    for (uint slot = 0; slot < 8; ++slot) {
-        if ((slots >> slot & 1u) != 0u) b = united(b, box_in_slot(node, slot));
+// Of all slots of a quantised node: in those that hold nothing, or that are not asked for, empty ones.
+struct SlotBoxes {
+    Box of[8];
+};
+
+SlotBoxes boxes_in_slots(QuantisedNode node, uint slots) {
+    SlotBoxes boxes;
+    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+        boxes.of[slot] = empty_box();
+        if ((slots >> slot & 1u) != 0u) boxes.of[slot] = box_in_slot(node, slot);
     }
-    return b;
+    return boxes;
 }
 
 // Which slots of a quantised node hold anything.
@@ -59,8 +65,7 @@ uint slots_in_use(QuantisedNode node) {
     return used;
 }
 
-Child part_of_node(QuantisedNode node, uint index, uint slots) {
-    Box b = box_in_slots(node, slots);
+Child part_of_node(QuantisedNode node, Box b, uint index, uint slots) {
     uint nodes = node.exponents_and_nodes >> 24;
     if (bitCount(slots) == 1 && (slots & nodes) != 0u) {
         return Child(b.lo, node.first_child + rank_of_node(nodes, uint(findLSB(slots))), b.hi, ALL_SLOTS);
@@ -68,9 +73,71 @@ Child part_of_node(QuantisedNode node, uint index, uint slots) {
     return Child(b.lo, index, b.hi, slots);
 }
 
-// The slots whose numbers have a bit of an axis.
-uint slots_beyond(uint axis) {
-    return axis == 0u ? 0xAAu : axis == 1u ? 0xCCu : 0xF0u;
+// How large a box is that is turned no one knows how: the surface area of a box around it grows with the square of its edges' sum. By its
+// own area a long box cut into two long ones would be as small as one cut in halves.
+float size_of(Box b) {
+    precise vec3 e = b.hi - b.lo;
+    precise float edges = e.x + e.y + e.z;
+    precise float size = edges * edges;
+    return size;
+}
+
+// Some of the slots cut in two, the other part's slots and the boxes of both.
+struct Cut {
+    Box one;
+    Box other;
+    uint others;
+};
+
+// As Guttman (1984, section 3.5.2) splits a node of an R-tree: the two slots begin that together in one box would waste most, and each of the
+// others goes to the part that grows less by it.
+Cut cut_slots(QuantisedNode node, uint slots) {
+    SlotBoxes boxes = boxes_in_slots(node, slots);
+    float sizes[8];
+    // No loops: where shaderc unrolls one, the copies of what is `precise` are not.
+#define SIZE(i) sizes[i] = size_of(boxes.of[i])
+    SIZE(0); SIZE(1); SIZE(2); SIZE(3); SIZE(4); SIZE(5); SIZE(6); SIZE(7);
+#undef SIZE
+    float most = uintBitsToFloat(0xFF800000u);
+    // The lowest two where sizes are too large for floats.
+    uvec2 first = uvec2(findLSB(slots), findLSB(slots & slots - 1u));
+#define LOOK(i, j)                                                                              \
+    {                                                                                           \
+        precise float waste = size_of(united(boxes.of[i], boxes.of[j])) - sizes[i] - sizes[j];  \
+        bool wastes_more = (slots >> i & slots >> j & 1u) != 0u && waste > most;                \
+        most = wastes_more ? waste : most;                                                      \
+        first = wastes_more ? uvec2(i, j) : first;                                              \
+    }
+    LOOK(0, 1) LOOK(0, 2) LOOK(0, 3) LOOK(0, 4) LOOK(0, 5) LOOK(0, 6) LOOK(0, 7)
+    LOOK(1, 2) LOOK(1, 3) LOOK(1, 4) LOOK(1, 5) LOOK(1, 6) LOOK(1, 7)
+    LOOK(2, 3) LOOK(2, 4) LOOK(2, 5) LOOK(2, 6) LOOK(2, 7)
+    LOOK(3, 4) LOOK(3, 5) LOOK(3, 6) LOOK(3, 7)
+    LOOK(4, 5) LOOK(4, 6) LOOK(4, 7)
+    LOOK(5, 6) LOOK(5, 7)
+    LOOK(6, 7)
+#undef LOOK
+    Cut cut = Cut(boxes.of[0], boxes.of[0], 1u << first.y);
+    [[unroll]] for (uint i = 1; i < 8; ++i) {
+        if (first.x == i) cut.one = boxes.of[i];
+        if (first.y == i) cut.other = boxes.of[i];
+    }
+    vec2 size = vec2(size_of(cut.one), size_of(cut.other));
+#define JOIN(i)                                                                                 \
+    {                                                                                           \
+        Box one = united(cut.one, boxes.of[i]), other = united(cut.other, boxes.of[i]);         \
+        vec2 joined = vec2(size_of(one), size_of(other));                                       \
+        precise vec2 sum = joined + size.yx;                                                    \
+        bool joins = (slots >> i & 1u) != 0u && i != first.x && i != first.y;                   \
+        bool joins_other = joins && sum.y < sum.x;                                              \
+        bool joins_one = joins && !joins_other;                                                 \
+        if (joins_one) cut.one = one;                                                           \
+        if (joins_other) cut.other = other;                                                     \
+        size = vec2(joins_one ? joined.x : size.x, joins_other ? joined.y : size.y);            \
+        cut.others |= joins_other ? 1u << i : 0u;                                               \
+    }
+    JOIN(0) JOIN(1) JOIN(2) JOIN(3) JOIN(4) JOIN(5) JOIN(6) JOIN(7)
+#undef JOIN
+    return cut;
 }
 
 bool open_quantised(Structure structure, Child part, out Child parts[2]) {
@@ -80,19 +147,9 @@ bool open_quantised(Structure structure, Child part, out Child parts[2]) {
     if (node.exponents_and_nodes == LONG_LEAF) return false;
     uint slots = part.count & slots_in_use(node);
     if (bitCount(slots) < 2) return false;
-    uint best = 0u;
-    float least = 0.0;
-    for (uint axis = 0; axis < 3; ++axis) {
-        uint beyond = slots & slots_beyond(axis);
-        if (beyond == 0u || beyond == slots) continue;
-        precise float area = half_area(box_in_slots(node, slots & ~beyond)) + half_area(box_in_slots(node, beyond));
-        if (best == 0u || area < least) {
-            best = beyond;
-            least = area;
-        }
-    }
-    parts[0] = part_of_node(node, part.index, slots & ~best);
-    parts[1] = part_of_node(node, part.index, best);
+    Cut cut = cut_slots(node, slots);
+    parts[0] = part_of_node(node, cut.one, part.index, slots & ~cut.others);
+    parts[1] = part_of_node(node, cut.other, part.index, cut.others);
     return true;
 }
 

@@ -152,33 +152,15 @@ impl Below<'_> {
     }
 }
 
-/// The two parts of some slots of a quantised node: cut along the axis where that leaves least area, as the bits of a slot's number are
-/// the octant that it lies in.
+/// The two parts of some slots of a quantised node.
 fn parts_of(node: &QuantisedNode, part: &Child) -> Option<[Child; 2]> {
-    const BEYOND: [u32; 3] = [0xAA, 0xCC, 0xF0];
     if node.long_leaf().is_some() {
         return None;
     }
-    let in_use = (0..8).filter(|&slot| node.node_mask() >> slot & 1 != 0 || node.count(slot) != 0);
-    let slots = part.count & in_use.map(|slot| 1 << slot).sum::<u32>();
-    let bounds = |slots: u32| {
-        let used = (0..8).filter(|slot| slots >> slot & 1 != 0);
-        used.fold(Aabb::EMPTY, |b, slot| b.union(&node.bounds(slot)))
-    };
-    let mut best: Option<(u32, f32)> = None;
-    for beyond in BEYOND.map(|axis| slots & axis) {
-        if beyond == 0 || beyond == slots {
-            continue;
-        }
-        let area = bounds(slots & !beyond).half_area() + bounds(beyond).half_area();
-        // Of equal ones the first.
-        if best.is_none_or(|(_, least)| area < least) {
-            best = Some((beyond, area));
-        }
-    }
-    let (beyond, _) = best?;
-    Some([slots & !beyond, beyond].map(|slots| {
-        let Aabb { lo, hi } = bounds(slots);
+    let is_in_use = |&slot: &usize| node.node_mask() >> slot & 1 != 0 || node.count(slot) != 0;
+    let slots: Vec<usize> = (0..8).filter(|slot| part.count >> slot & 1 != 0).filter(is_in_use).collect();
+    let cut = cut_slots(node, &slots)?;
+    Some(cut.map(|(Aabb { lo, hi }, slots)| {
         // One slot that holds a node is that node, whole.
         if slots.count_ones() == 1 && slots & node.node_mask() != 0 {
             let index = node.index(slots.trailing_zeros() as usize);
@@ -186,6 +168,44 @@ fn parts_of(node: &QuantisedNode, part: &Child) -> Option<[Child; 2]> {
         }
         Child { lo, index: part.index, hi, count: slots }
     }))
+}
+
+/// Slots of a quantised node cut in two, each part with its box and a bit for each of its slots; `None` if there are fewer than two.
+///
+/// As Guttman (1984, section 3.5.2) splits a node of an R-tree: the two slots begin that together in one box would waste most, and each
+/// of the others goes to the part that grows less by it.
+fn cut_slots(node: &QuantisedNode, slots: &[usize]) -> Option<[(Aabb, u32); 2]> {
+    let pairs = slots.iter().enumerate().flat_map(|(k, &i)| slots[k + 1..].iter().map(move |&j| [i, j]));
+    let waste = |[i, j]: [usize; 2]| {
+        let [a, b] = [i, j].map(|slot| node.bounds(slot));
+        size_of(&a.union(&b)) - size_of(&a) - size_of(&b)
+    };
+    let mut first = [*slots.first()?, *slots.get(1)?];
+    let mut most = f32::NEG_INFINITY;
+    for pair in pairs {
+        let waste = waste(pair);
+        if waste > most {
+            (first, most) = (pair, waste);
+        }
+    }
+    let [mut one, mut other] = first.map(|slot| (node.bounds(slot), 1 << slot));
+    for &slot in slots.iter().filter(|slot| !first.contains(slot)) {
+        let [with_one, with_other] = [one.0, other.0].map(|b| b.union(&node.bounds(slot)));
+        if size_of(&with_other) + size_of(&one.0) < size_of(&with_one) + size_of(&other.0) {
+            other = (with_other, other.1 | 1 << slot);
+        } else {
+            one = (with_one, one.1 | 1 << slot);
+        }
+    }
+    Some([one, other])
+}
+
+/// How large a box is that is turned no one knows how: the surface area of a box around it grows with the square of its edges' sum. By
+/// its own area a long box cut into two long ones would be as small as one cut in halves.
+fn size_of(b: &Aabb) -> f32 {
+    let [x, y, z] = b.extent();
+    let edges = x + y + z;
+    edges * edges
 }
 
 /// The record of an entry; all zero for one that is left out.
