@@ -160,7 +160,7 @@ float gain_of(Entry entry) {
         Box part = empty_box();
         precise float pieces = 0.0;
         for (uint quarter = 0; quarter < 2; ++quarter) {
-            Box piece = box_of_pair(given.to_world, structure, slots, grandchildren[quarter]);
+            Box piece = box_of_children(given.to_world, structure, slots, grandchildren[quarter]);
             pieces += half_area(piece);
             part = united(part, piece);
         }

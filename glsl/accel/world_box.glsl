@@ -29,17 +29,35 @@ bool keeps_boxes(vec4 m[3]) {
     return keeps;
 }
 
-// The box in the world around the boxes of a child's two children.
-Box box_of_pair(vec4 m[3], Structure structure, uint slots, Child child) {
+// The box in the world around what is in the slots of a part.
+Box box_of_slots(vec4 m[3], Structure structure, uint slots, Child part) {
+    Box whole = transformed_box(m, part.lo, part.hi);
+    if (part.index >= (slots & INDEX_MASK)) return whole;
+    QuantisedNode node = QuantisedNodes(wide_nodes_at(uvec2(structure))).node[part.index];
+    uint in_use = part.count & slots_in_use(node);
+    if (node.exponents_and_nodes == LONG_LEAF || in_use == 0u) return whole;
+    Box b = empty_box();
+    for (uint slot = 0; slot < 8; ++slot) {
+        if ((in_use >> slot & 1u) == 0u) continue;
+        Box in_slot = box_in_slot(node, slot);
+        b = united(b, transformed_box(m, in_slot.lo, in_slot.hi));
+    }
+    return b;
+}
+
+// The box in the world around the boxes of a child's two children, or of its slots.
+Box box_of_children(vec4 m[3], Structure structure, uint slots, Child child) {
+    if ((slots & FORM_QUANTISED) != 0u) return box_of_slots(m, structure, slots, child);
     Child pair[2];
     open_child(structure, slots, child, pair);
     return united(transformed_box(m, pair[0].lo, pair[0].hi), transformed_box(m, pair[1].lo, pair[1].hi));
 }
 
 // The box in the world of what is below `child` of a structure: where its own would be loose, around the boxes of the eight
-// that are three levels below.
+// that are three levels below, or of its slots.
 Box world_box(vec4 m[3], Structure structure, uint slots, Child child) {
     if (keeps_boxes(m)) return transformed_box(m, child.lo, child.hi);
+    if ((slots & FORM_QUANTISED) != 0u) return box_of_slots(m, structure, slots, child);
     Box b = empty_box();
     Child children[2];
     open_child(structure, slots, child, children);
@@ -47,7 +65,7 @@ Box world_box(vec4 m[3], Structure structure, uint slots, Child child) {
         Child grandchildren[2];
         open_child(structure, slots, children[side], grandchildren);
         for (uint quarter = 0; quarter < 2; ++quarter) {
-            b = united(b, box_of_pair(m, structure, slots, grandchildren[quarter]));
+            b = united(b, box_of_children(m, structure, slots, grandchildren[quarter]));
         }
     }
     return b;

@@ -88,7 +88,8 @@ pub enum Wide {
     /// faster, as they are in the top level (docs/notes/rays.md).
     #[default]
     Large,
-    /// All.
+    /// All. Where instances overlap rays are faster so than by [`Wide::Large`] (docs/notes/rays.md). A top level with something far
+    /// beyond the others is slower: a node over both has cells as coarse as that is far.
     Always,
 }
 

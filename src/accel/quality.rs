@@ -46,6 +46,7 @@ const fn part_of_a_pass(part: u32, of: u32) -> ReinsertionOptions {
 }
 
 const MOST_OF_A_PASS: ReinsertionOptions = part_of_a_pass(3, 4);
+const QUARTER_OF_A_PASS: ReinsertionOptions = part_of_a_pass(1, 4);
 
 /// # Errors
 /// Unknown flags, or two that exclude each other; codes that there are not.
@@ -78,14 +79,16 @@ pub(super) fn opened_to(flags: Flags, options: &AccelOptions, instance_count: u3
 /// What the builder is asked for over so many primitives, or entries of a top level.
 pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Primitives, count: u32) -> BuildOptions {
     let is_top = primitives == Primitives::Instances;
+    let is_wide = is_wide(flags, options, primitives, count);
     BuildOptions {
         method: if is_top { Method::Lbvh } else { bottom_method(flags, count) },
         // Of two leaves there is nothing to move.
-        optimise: if is_top { top_optimise(flags) } else { bottom_optimise(flags, count) }.filter(|_| count > 2),
+        optimise: if is_top { top_optimise(flags, is_wide) } else { bottom_optimise(flags, count) }
+            .filter(|_| count > 2),
         codes: Some(codes(flags, options, is_top, count)),
         bits_up_to: (is_top && options.top_codes.is_none()).then(|| top_bits(flags)),
         // An instance costs more than a node whatever its box: one a leaf.
-        collapse: if is_top { Collapse::OFF } else { collapse(flags, is_wide(flags, options, primitives, count)) },
+        collapse: if is_top { Collapse::OFF } else { collapse(flags, is_wide) },
         child_order: flags.contains(ANY_HIT_ORDER).then_some(ChildOrder::MoreHitsForItsCost),
         primitives,
         build_flags: flags.as_raw() & 0x1f,
@@ -131,15 +134,17 @@ fn bottom_optimise(flags: Flags, count: u32) -> Option<ReinsertionOptions> {
         count if count <= FEW => ReinsertionOptions::MEDIUM,
         count if count <= SOME => MOST_OF_A_PASS,
         count if count <= MANY => part_of_a_pass(1, 2),
-        _ => part_of_a_pass(1, 4),
+        _ => QUARTER_OF_A_PASS,
     };
     flags.contains(Flags::PREFER_FAST_TRACE).then_some(rounds)
 }
 
 /// A top level has few entries and all rays go through it: most of a pass of reinsertion brings back more than it takes; with a whole one
-/// some take longer than a driver's. H-PLOC before that would not gain more, and a tree of opened instances less.
-fn top_optimise(flags: Flags) -> Option<ReinsertionOptions> {
-    (!flags.contains(Flags::PREFER_FAST_BUILD)).then_some(MOST_OF_A_PASS)
+/// some take longer than a driver's. Of what becomes nodes of eight a quarter brings back as much. H-PLOC before that would not gain more,
+/// and a tree of opened instances less.
+fn top_optimise(flags: Flags, is_wide: bool) -> Option<ReinsertionOptions> {
+    let rounds = if is_wide { QUARTER_OF_A_PASS } else { MOST_OF_A_PASS };
+    (!flags.contains(Flags::PREFER_FAST_BUILD)).then_some(rounds)
 }
 
 /// A fast build sorts by 8 bits less; low memory keeps codes in one word, which saves 8 bytes of scratch a primitive. What lies far from

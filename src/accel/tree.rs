@@ -46,6 +46,17 @@ impl<R: Record> Tree<R> {
         }
     }
 
+    /// Checks all rules of its form.
+    ///
+    /// # Errors
+    /// [`Error::InvalidStructure`](crate::Error::InvalidStructure): the rule that is broken.
+    pub fn validate(&self) -> Result<()> {
+        match self {
+            Tree::OfTwo(tree) => tree.validate(),
+            Tree::OfEight(tree) => tree.validate(),
+        }
+    }
+
     /// Its head.
     pub fn header(&self) -> &Header {
         match self {

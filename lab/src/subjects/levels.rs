@@ -8,8 +8,8 @@ use super::structures::Structures;
 use crate::Result;
 use crate::scene::Instances;
 use ash::vk;
-use hedgerow::accel::{ANY_HIT_ORDER, Instance};
-use hedgerow::bvh::layout::{Bvh2, InstanceRecord};
+use hedgerow::accel::{ANY_HIT_ORDER, Instance, Tree};
+use hedgerow::bvh::layout::InstanceRecord;
 use hedgerow::gpu::Timestamps;
 use hedgerow::trace;
 
@@ -90,12 +90,12 @@ impl<'a> Levels<'a> {
         self.top.header().map(|header| header.active)
     }
 
-    /// The top level's tree, where it is one of ours in nodes of two.
+    /// The top level's tree, where it is one of ours.
     ///
     /// # Errors
     /// The structure is another.
-    pub fn top_tree(&self) -> Result<Bvh2<InstanceRecord>> {
-        Ok(Bvh2::from_bytes(&self.top.structure_bytes())?)
+    pub fn top_tree(&self) -> Result<Tree<InstanceRecord>> {
+        Ok(Tree::from_bytes(&self.top.structure_bytes())?)
     }
 
     /// Traces rays that lie in device memory; milliseconds by the device's timestamps.

@@ -103,6 +103,28 @@ fn growth_of_top_levels_leaves_a_point_for_every_builder_manner_and_step() {
     assert!(run.setting.device.is_some() && run.failures.is_empty(), "{run:?}");
 }
 
+/// Costs are over the tree's own at e = 0, by steps at nodes of eight.
+#[test]
+fn top_levels_in_nodes_of_eight_grow_too() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let small = ["--steps", "20", "--no-rays", "--runs", "1", "--far", "1", "--axes", "1", "--sides", "+"];
+    let builders = ["--prefer", "fast-trace", "--rebraid", "on", "--of-eight", "on,off"];
+    let done = hedgerow(
+        &[&["stability", "growth", "gen:city:30", "--level", "top"][..], &small, &builders].concat(),
+        folder.path(),
+    );
+    assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+    let points: Vec<TopGrowth> = lines::entries(folder.path()).expect("records");
+    let of_eight: Vec<bool> = points.iter().map(|point| point.builder.of_eight).collect();
+    assert_eq!(of_eight, [true, true, false, false]);
+    for point in &points {
+        assert!(point.e > 0 || point.relative_cost == Some(1.0), "{point:?}");
+        // What is far takes nothing off what is near.
+        assert!(point.relative_cost > Some(0.9), "{point:?}");
+    }
+    assert!(read(folder.path(), "growth-top.html").contains("re-braided, in nodes of eight, default"));
+}
+
 /// A goal without the noise of times: what is far costs what stays at most a twentieth.
 #[test]
 fn what_is_far_from_a_top_level_costs_what_stays_little_at_any_distance() {

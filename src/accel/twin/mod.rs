@@ -131,12 +131,33 @@ impl Below<'_> {
         }
     }
 
-    /// A part's parts, or of one that cannot be opened itself, some levels down.
+    /// A part's parts, or of one that cannot be opened itself, some levels down; the last level of slots is each by itself.
     fn down(&self, child: Child, levels: u32) -> Vec<Child> {
+        let last = match self.nodes {
+            Nodes::OfTwo(_) => 0,
+            Nodes::Quantised(_) => levels.min(1),
+        };
         match self.opened(&child) {
-            Some(children) if levels > 0 => children.into_iter().flat_map(|c| self.down(c, levels - 1)).collect(),
+            Some(children) if levels > last => children.into_iter().flat_map(|c| self.down(c, levels - 1)).collect(),
+            _ if last == 1 => self.by_slots(child),
             _ => vec![child],
         }
+    }
+
+    /// What is in the slots of a part, each by itself; of one that cannot be cut into slots itself.
+    fn by_slots(&self, part: Child) -> Vec<Child> {
+        let Nodes::Quantised(nodes) = self.nodes else { return vec![part] };
+        let node = nodes.get(part.index as usize).filter(|node| node.long_leaf().is_none());
+        let Some(node) = node else { return vec![part] };
+        let slots = slots_in_use(node, &part);
+        if slots.is_empty() {
+            return vec![part];
+        }
+        let child = |slot| {
+            let Aabb { lo, hi } = node.bounds(slot);
+            Child { lo, hi, ..part }
+        };
+        slots.into_iter().map(child).collect()
     }
 
     /// The box in the world around the boxes some levels below a child.
@@ -147,7 +168,12 @@ impl Below<'_> {
     fn entry_over(&self, instance: u32, m: &[[f32; 4]; 3], child: Child) -> Entry {
         // Where no axis turns away from the world's, a box's image is a box.
         let keeps_boxes = m.iter().all(|row| row[..3].iter().filter(|&&x| x != 0.0).count() <= 1);
-        let bounds = self.fine_box(m, child, if keeps_boxes { 0 } else { 3 });
+        let levels = match self.nodes {
+            _ if keeps_boxes => 0,
+            Nodes::OfTwo(_) => 3,
+            Nodes::Quantised(_) => 1,
+        };
+        let bounds = self.fine_box(m, child, levels);
         Entry { bounds: Ok(bounds), instance, start: child }
     }
 }
@@ -157,9 +183,7 @@ fn parts_of(node: &QuantisedNode, part: &Child) -> Option<[Child; 2]> {
     if node.long_leaf().is_some() {
         return None;
     }
-    let is_in_use = |&slot: &usize| node.node_mask() >> slot & 1 != 0 || node.count(slot) != 0;
-    let slots: Vec<usize> = (0..8).filter(|slot| part.count >> slot & 1 != 0).filter(is_in_use).collect();
-    let cut = cut_slots(node, &slots)?;
+    let cut = cut_slots(node, &slots_in_use(node, part))?;
     Some(cut.map(|(Aabb { lo, hi }, slots)| {
         // One slot that holds a node is that node, whole.
         if slots.count_ones() == 1 && slots & node.node_mask() != 0 {
@@ -168,6 +192,12 @@ fn parts_of(node: &QuantisedNode, part: &Child) -> Option<[Child; 2]> {
         }
         Child { lo, index: part.index, hi, count: slots }
     }))
+}
+
+/// The slots of a part in which there is anything.
+fn slots_in_use(node: &QuantisedNode, part: &Child) -> Vec<usize> {
+    let is_in_use = |&slot: &usize| node.node_mask() >> slot & 1 != 0 || node.count(slot) != 0;
+    (0..8).filter(|slot| part.count >> slot & 1 != 0).filter(is_in_use).collect()
 }
 
 /// Slots of a quantised node cut in two, each part with its box and a bit for each of its slots; `None` if there are fewer than two.
@@ -290,6 +320,43 @@ fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A node of leaves of one record in these boxes.
+    fn node_of(boxes: &[[[f32; 3]; 2]]) -> QuantisedNode {
+        let slot = |i: usize| boxes.get(i).map(|&[lo, hi]| Child { lo, index: i as u32, hi, count: 1 });
+        QuantisedNode::of(&std::array::from_fn(slot))
+    }
+
+    fn slots_of_cut(boxes: &[[[f32; 3]; 2]]) -> [u32; 2] {
+        let node = node_of(boxes);
+        let whole = Child { lo: [0.0; 3], index: 0, hi: [0.0; 3], count: layout::InstanceRecord::ALL_SLOTS };
+        cut_slots(&node, &slots_in_use(&node, &whole)).expect("more than one").map(|(_, slots)| slots)
+    }
+
+    #[test]
+    fn a_node_is_cut_between_what_lies_apart() {
+        let box_at = |x: f32| [[x, 0.0, 0.0], [x + 1.0, 1.0, 1.0]];
+        // Left and right in turn.
+        let turns: Vec<_> = (0..8).map(|i| box_at(if i % 2 == 0 { i as f32 } else { 100.0 + i as f32 })).collect();
+        assert_eq!(slots_of_cut(&turns), [0b0101_0101, 0b1010_1010]);
+        assert_eq!(slots_of_cut(&[box_at(0.0), box_at(9.0)]), [0b01, 0b10]);
+    }
+
+    /// Its own area would leave a long box in any place: all of its pieces are as long together.
+    #[test]
+    fn a_long_node_is_cut_across() {
+        let pieces: Vec<_> = (0..8).map(|i| [[i as f32, 0.0, 0.0], [i as f32 + 1.0, 0.01, 0.01]]).collect();
+        let [one, other] = slots_of_cut(&pieces);
+        assert_eq!((one | other, one & other), (0xff, 0));
+        assert!([one, other].iter().all(|slots| slots.count_ones() >= 2), "{one:#b} {other:#b}");
+        assert!(one.trailing_ones() == one.count_ones(), "{one:#b} is not one end");
+    }
+
+    #[test]
+    fn one_slot_is_not_cut() {
+        let node = node_of(&[[[0.0; 3], [1.0; 3]]]);
+        assert!(cut_slots(&node, &[0]).is_none());
+    }
 
     #[test]
     fn inverses_by_quotients_that_vulkan_allows_are_near() {

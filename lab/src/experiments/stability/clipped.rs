@@ -3,24 +3,43 @@
 //! What rays of that part meet. Nodes over the whole of a scene that has grown count as one of the part's size, not as
 //! everything there is, and so a tree is compared with one over the part alone.
 
-use hedgerow::bvh::layout::{Bvh2, Record};
+use hedgerow::bvh::layout::{Bvh2, Child, Header, Record};
+use hedgerow::bvh::wide::layout::{Wide8q, WideNode};
 use hedgerow::geometry::Aabb;
 
 /// (c_T · Σ SA(inner) + c_I · Σ SA(leaf)·n_leaf) / SA(`part`), of boxes clipped to `part`; `None` where that has no area.
 pub fn cost<R: Record>(tree: &Bvh2<R>, part: &Aabb, c_t: f64, c_i: f64) -> Option<f64> {
+    cost_below(&tree.header, |inner| tree.nodes[inner.index as usize].children.to_vec(), part, [c_t, c_i])
+}
+
+/// The same of a tree in nodes of eight, of a step at one of them, by the boxes that rays see.
+pub fn cost_of_eight<R: Record>(tree: &Wide8q<R>, part: &Aabb, c_t: f64, c_i: f64) -> Option<f64> {
+    let below = |inner: &Child| {
+        let node = &tree.nodes[inner.index as usize];
+        match node.long_leaf() {
+            Some((index, count)) => vec![Child { index, count, ..*inner }],
+            None => node.children().into_iter().flatten().collect(),
+        }
+    };
+    cost_below(&tree.header, below, part, [c_t, c_i])
+}
+
+/// The same of any tree, with what is below an inner child.
+fn cost_below(header: &Header, children: impl Fn(&Child) -> Vec<Child>, part: &Aabb, costs: [f64; 2]) -> Option<f64> {
+    let [c_t, c_i] = costs;
     let whole = clipped_half_area(part, part);
     if whole.is_nan() || whole <= 0.0 {
         return None;
     }
     let mut cost = 0.0;
-    let mut below = if tree.header.active == 0 { vec![] } else { vec![tree.header.root] };
+    let mut below = if header.active == 0 { vec![] } else { vec![header.root] };
     while let Some(child) = below.pop() {
         let area = clipped_half_area(&child.bounds(), part);
         if child.is_leaf() {
             cost += c_i * area * f64::from(child.count);
         } else {
             cost += c_t * area;
-            below.extend(tree.nodes[child.index as usize].children);
+            below.extend(children(&child));
         }
     }
     Some(cost / whole)

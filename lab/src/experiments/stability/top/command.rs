@@ -36,6 +36,9 @@ pub struct TopArguments {
     /// Of top levels: re-braiding, on, off or both [default: on,off]
     #[arg(long, value_name = "on|off", value_delimiter = ',')]
     rebraid: Vec<OnOff>,
+    /// Of top levels: nodes of eight where there can be, in both levels, on, off or both [default: off]
+    #[arg(long, value_name = "on|off", value_delimiter = ',')]
+    of_eight: Vec<OnOff>,
     /// Of top levels: how many instances are far; several have sides that are drawn [default: 1,100]
     #[arg(long, value_name = "N[,N…]", value_delimiter = ',')]
     far: Vec<NonZeroU32>,
@@ -63,21 +66,28 @@ impl TopArguments {
             (!self.prefer.is_empty(), "--prefer"),
             (!self.codes.is_empty(), "--codes"),
             (!self.rebraid.is_empty(), "--rebraid"),
+            (!self.of_eight.is_empty(), "--of-eight"),
             (!self.far.is_empty(), "--far"),
         ];
         given.into_iter().find_map(|(is_given, name)| is_given.then_some(name))
     }
 
     fn builders(&self) -> Vec<TopBuilder> {
-        let or_default = |given: Vec<bool>, default: &[bool]| if given.is_empty() { default.to_vec() } else { given };
-        let rebraid = or_default(self.rebraid.iter().map(|on| *on == OnOff::On).collect(), &[true, false]);
+        let or_default = |given: &[OnOff], default: &[bool]| match given {
+            [] => default.to_vec(),
+            given => given.iter().map(|on| *on == OnOff::On).collect(),
+        };
+        let rebraid = or_default(&self.rebraid, &[true, false]);
+        let of_eight = or_default(&self.of_eight, &[false]);
         let prefer = if self.prefer.is_empty() { &PREFERENCES[..] } else { &self.prefer };
         let default = [NamedCodes(None)];
         let codes = if self.codes.is_empty() { &default[..] } else { &self.codes };
         let mut builders = Vec::new();
         for &prefer in prefer {
             for &rebraid in &rebraid {
-                builders.extend(codes.iter().map(|codes| TopBuilder { prefer, rebraid, codes: codes.0 }));
+                for &of_eight in &of_eight {
+                    builders.extend(codes.iter().map(|codes| TopBuilder { prefer, rebraid, of_eight, codes: codes.0 }));
+                }
             }
         }
         builders

@@ -18,6 +18,7 @@ use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::levels::Levels;
 use crate::subjects::queries::Queries;
 use crate::subjects::structures::Structures;
+use hedgerow::accel::Tree;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::sah::Collapse;
 use hedgerow::bvh::twin::lbvh;
@@ -187,7 +188,10 @@ fn measure_one(
         if let Err(error) = tree.validate() {
             failed(Failure::named(format!("{of}, e = {e}"), error));
         }
-        let cost = clipped::cost(&tree, &part.bounds, COSTS.0, COSTS.1);
+        let cost = match &tree {
+            Tree::OfTwo(tree) => clipped::cost(tree, &part.bounds, COSTS.0, COSTS.1),
+            Tree::OfEight(tree) => clipped::cost_of_eight(tree, &part.bounds, COSTS.0, COSTS.1),
+        };
         base_cost = base_cost.or(cost);
         let [mut frame, mut base_frame] =
             [Spread::of_some(&builds[1])?, Spread::of_some(&builds[0])?].map(|s| s.median);
@@ -218,8 +222,8 @@ fn measure_one(
             builder,
             by,
             e: *e,
-            code_bits: tree.header.code_bits,
-            entries: tree.header.active,
+            code_bits: tree.header().code_bits,
+            entries: tree.header().active,
             relative_cost: cost.zip(base_cost).map(|(cost, base)| cost / base).filter(|cost| cost.is_finite()),
             build_ms: Spread::of_some(&builds[1])?,
             relative_build: Spread::of_some(&ratios(&builds[1], &builds[0]))?,

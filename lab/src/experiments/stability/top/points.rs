@@ -5,7 +5,7 @@ use crate::measure::Spread;
 use crate::named::named;
 use crate::{Error, Result};
 use ash::vk;
-use hedgerow::accel::{AccelOptions, REBRAID};
+use hedgerow::accel::{AccelOptions, REBRAID, Wide};
 use hedgerow::bvh::codes::Codes;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -66,6 +66,9 @@ pub struct TopBuilder {
     pub prefer: Preference,
     /// Whether instances may be opened.
     pub rebraid: bool,
+    /// Whether structures have nodes of eight where there can be; those of fast builds have none.
+    #[serde(default)]
+    pub of_eight: bool,
     /// The codes of the top level; `None`: what accel chooses.
     #[serde(with = "codes_by_name")]
     pub codes: Option<Codes>,
@@ -89,7 +92,8 @@ impl TopBuilder {
     pub fn options(&self) -> AccelOptions {
         let default = AccelOptions::DEFAULT;
         let rebraid_budget = if self.rebraid { default.rebraid_budget } else { 1.0 };
-        AccelOptions { rebraid_budget, top_codes: self.codes, ..default }
+        let wide = if self.of_eight { Wide::Always } else { default.wide };
+        AccelOptions { rebraid_budget, top_codes: self.codes, wide, ..default }
     }
 
     /// What its codes are called.
@@ -101,7 +105,8 @@ impl TopBuilder {
 impl fmt::Display for TopBuilder {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let opened = if self.rebraid { ", re-braided" } else { "" };
-        write!(f, "{}{opened}, {}", self.prefer, self.codes_name())
+        let of_eight = if self.of_eight { ", in nodes of eight" } else { "" };
+        write!(f, "{}{opened}{of_eight}, {}", self.prefer, self.codes_name())
     }
 }
 
