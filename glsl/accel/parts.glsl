@@ -49,10 +49,12 @@ struct SlotBoxes {
 
 SlotBoxes boxes_in_slots(QuantisedNode node, uint slots) {
     SlotBoxes boxes;
-    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
-        boxes.of[slot] = empty_box();
-        if ((slots >> slot & 1u) != 0u) boxes.of[slot] = box_in_slot(node, slot);
-    }
+    // No loop: where shaderc unrolls one, the copies of what is `precise` are not.
+#define BOX(slot)                                                                  \
+    boxes.of[slot] = empty_box();                                                  \
+    if ((slots >> slot & 1u) != 0u) boxes.of[slot] = box_in_slot(node, slot)
+    BOX(0); BOX(1); BOX(2); BOX(3); BOX(4); BOX(5); BOX(6); BOX(7);
+#undef BOX
     return boxes;
 }
 
@@ -94,7 +96,6 @@ struct Cut {
 Cut cut_slots(QuantisedNode node, uint slots) {
     SlotBoxes boxes = boxes_in_slots(node, slots);
     float sizes[8];
-    // No loops: where shaderc unrolls one, the copies of what is `precise` are not.
 #define SIZE(i) sizes[i] = size_of(boxes.of[i])
     SIZE(0); SIZE(1); SIZE(2); SIZE(3); SIZE(4); SIZE(5); SIZE(6); SIZE(7);
 #undef SIZE

@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_point_is_a_line_that_names_its_codes() {
-        let line = r#"{"experiment":"growth-top","scene":"gen:city:9","instances":9,"prefer":"fast-trace","rebraid":true,"codes":"default","far":100,"axes":3,"sides":"drawn","e":42,"code_bits":32,"entries":40,"relative_cost":1.01,"build_ms":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_build":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_mrays":{},"frame_ms":null,"relative_frame":null}"#;
+        let line = r#"{"experiment":"growth-top","scene":"gen:city:9","instances":9,"prefer":"fast-trace","rebraid":true,"of_eight":false,"codes":"default","far":100,"axes":3,"sides":"drawn","e":42,"code_bits":32,"entries":40,"relative_cost":1.01,"build_ms":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_build":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_mrays":{},"frame_ms":null,"relative_frame":null}"#;
         let point: TopGrowth = serde_json::from_str(line).expect("a point");
         assert_eq!((point.builder.codes, point.by.sides, point.speed()), (None, FarSides::Drawn, None));
         assert_eq!(serde_json::to_string(&point).expect("JSON"), line);
