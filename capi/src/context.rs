@@ -46,18 +46,17 @@ pub struct HedgerowContextCreateInfo {
 
 /// Which structures that allow no update get quantised nodes of eight children, and none of two: one of HEDGEROW_WIDE_*.
 pub type HedgerowWide = u32;
-/// Bottom levels of 4,096 primitives and more that are not built in haste: they take less memory, and rays are faster.
-pub const HEDGEROW_WIDE_LARGE: HedgerowWide = 0;
+/// All of `PREFER_FAST_TRACE`, and bottom levels of 4,096 primitives and more without a preference: they take less memory, and rays are
+/// faster.
+pub const HEDGEROW_WIDE_BY_FLAGS: HedgerowWide = 0;
 /// None.
 pub const HEDGEROW_WIDE_NEVER: HedgerowWide = 1;
 /// All, but for top levels of `PREFER_FAST_BUILD` and bottom levels that are built in haste.
 pub const HEDGEROW_WIDE_ALWAYS: HedgerowWide = 2;
 
-const _: () = assert!(Wide::LARGE == 4096);
-
 fn wide_of(wide: HedgerowWide) -> Result<Wide> {
     match wide {
-        HEDGEROW_WIDE_LARGE => Ok(Wide::Large),
+        HEDGEROW_WIDE_BY_FLAGS => Ok(Wide::ByFlags),
         HEDGEROW_WIDE_NEVER => Ok(Wide::Never),
         HEDGEROW_WIDE_ALWAYS => Ok(Wide::Always),
         _ => Err(Error::Argument(format!("wide is {wide}; it must be one of HEDGEROW_WIDE_*"))),

@@ -56,7 +56,7 @@ fn contexts_name_what_is_null() {
         checked: vk::TRUE,
         optional: 0,
         rebraid_budget: 0.0,
-        wide: HEDGEROW_WIDE_LARGE,
+        wide: HEDGEROW_WIDE_BY_FLAGS,
         p_bottom_codes: null(),
         p_top_codes: null(),
     };

@@ -163,6 +163,11 @@ CodeKind kind_of_codes() {
                     (code_kind >> 4 & 3u) + (CODE_PREFIX == PREFIX_CELLS ? 1u : 0u), code_kind >> 15 & 0xFu, 1u << (code_kind >> 19 & 0xFu));
 }
 
+// Of codes with sections: whether what is far stands right below the root (CodeBounds::Apart in src/bvh/codes/bounds.rs).
+bool far_is_apart() {
+    return (code_kind >> 24 & 1u) != 0u;
+}
+
 Box bounds_of_boxes(BuildState state) {
     return Box(from_ordered(uvec3(state.boxes_lo[0], state.boxes_lo[1], state.boxes_lo[2])),
                from_ordered(uvec3(state.boxes_hi[0], state.boxes_hi[1], state.boxes_hi[2])));

@@ -67,7 +67,7 @@ struct Stretches {
 struct CodeSections {
     Box fences;
     Box core;
-    uint head;         // coordinate bits before the one of what is far; 0: the scene has one section
+    uint head;         // coordinate bits before the one of what is far, or HEAD_APART; 0: the scene has one section
     uint beyond;       // the axes along which there is something, a bit each
     uvec3 reference;
     uvec3 shift;

@@ -247,7 +247,7 @@ void write_recipe(BuildState state, Box boxes, Box bounds) {
     state.plan.area_scale = plan.area_scale;
     state.plan.stretches = plan.stretches;
     if (HAS_GRID) state.plan.grid = plan.grid;
-    if (has_core) state.plan.sections.head = head_of(plan.stretches);
+    if (has_core) state.plan.sections.head = far_is_apart() ? HEAD_APART : head_of(plan.stretches);
     structure.header.area_scale = plan.area_scale;
     structure.header.built_area = scaled_half_area(boxes, plan.area_scale);
 }

@@ -35,8 +35,12 @@
 
 // Whether rays say where nodes cost least, beside areas.
 layout(constant_id = 3) const bool BY_RAYS = false;
-// Whether a node's area is that of what it shares with a part of the scene.
-layout(constant_id = 4) const bool CLIPS = false;
+// Whether a node's area is that of what it shares with a part of the scene. Or, of one that is in it and reaches beyond, the part's: all rays
+// there enter it, as quantised boxes in it are coarse.
+layout(constant_id = 4) const uint AREAS = 0;
+const uint AREAS_WHOLE = 0;
+const uint AREAS_CLIPPED = 1;
+const uint AREAS_COARSE = 2;
 
 const uint NONE = 0xFFFFFFFFu;
 // Nodes that a path may have on either side.
@@ -62,7 +66,7 @@ layout(push_constant, scalar) uniform ReinsertionArguments {
     Floats costs;       // of the boxes at links
     Words totals;       // TOTALS_…
     Words sums;         // SUMS_…
-    Part part;          // what areas are clipped to, if they are
+    Part part;          // of the scene, where areas are not whole
     uint offset;
     uint stride;
     uint link_count;
@@ -112,12 +116,18 @@ float ratio() {
     return BY_RAYS ? uintBitsToFloat(totals.word[TOTALS_RATIO]) : 0.0;
 }
 
-// Of a search, what areas are clipped to.
+// Of a search, the part of the scene.
 Box clip;
 
 // The area of a box, as far as it counts.
 float area_of(Box b, float scale) {
-    if (!CLIPS) return scaled_half_area(b, scale);
+    if (AREAS == AREAS_WHOLE) return scaled_half_area(b, scale);
+    if (AREAS == AREAS_COARSE) {
+        bool is_within = all(greaterThanEqual(b.lo, clip.lo)) && all(lessThanEqual(b.hi, clip.hi));
+        bool is_apart = any(greaterThan(b.lo, clip.hi)) || any(lessThan(b.hi, clip.lo));
+        Box counted = Box(is_within ? b.lo : clip.lo, is_within ? b.hi : clip.hi);
+        return is_apart ? 0.0 : scaled_half_area(counted, scale);
+    }
     Box inside = Box(max(b.lo, clip.lo), min(b.hi, clip.hi));
     return any(lessThan(inside.hi, inside.lo)) ? 0.0 : scaled_half_area(inside, scale);
 }

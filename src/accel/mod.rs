@@ -83,19 +83,13 @@ pub enum Wide {
     /// None: shaders may leave them out by `HEDGEROW_FORMS` (`glsl/trace/query_walk.glsl`), and [`crate::trace::tracer`] traces all bottom
     /// levels.
     Never,
-    /// Bottom levels of [`Wide::LARGE`] primitives and more. They take 32 to 38 bytes a triangle compacted where nodes of two take 50 to 62
-    /// (docs/notes/memory.md), and rays are faster. Instances of fewer primitives are met in two or three nodes: there nodes of two are
-    /// faster, as they are in the top level (docs/notes/rays.md).
+    /// All of `PREFER_FAST_TRACE`, and bottom levels of 4,096 primitives and more without a preference. They take 35 to 40 bytes a triangle
+    /// compacted where nodes of two take 50 to 62 (docs/notes/memory.md), and rays are faster. Rays that meet both forms are slower than
+    /// those that meet one: so a top level without a preference has nodes of two, as the small structures below it have (docs/notes/rays.md).
     #[default]
-    Large,
-    /// All. Where instances overlap rays are faster so than by [`Wide::Large`] (docs/notes/rays.md). A top level with something far
-    /// beyond the others is slower: a node over both has cells as coarse as that is far.
+    ByFlags,
+    /// All.
     Always,
-}
-
-impl Wide {
-    /// Primitives from which on [`Wide::Large`] takes bottom levels.
-    pub const LARGE: u32 = 4096;
 }
 
 /// Choices of a [`Device`] that Vulkan's structs have no field for.
@@ -122,7 +116,7 @@ pub struct AccelOptions {
 impl AccelOptions {
     /// Four times as many entries as instances: where scenes of all kinds whose boxes are loose gain, and memory is spared. No checks.
     pub const DEFAULT: AccelOptions =
-        AccelOptions { rebraid_budget: 4.0, bottom_codes: None, top_codes: None, wide: Wide::Large, checked: false };
+        AccelOptions { rebraid_budget: 4.0, bottom_codes: None, top_codes: None, wide: Wide::ByFlags, checked: false };
     /// The same with checks.
     pub const CHECKED: AccelOptions = AccelOptions { checked: true, ..AccelOptions::DEFAULT };
 }

@@ -32,6 +32,10 @@ const KNOWN: Flags = Flags::from_raw(
 /// fast trace (docs/notes/rays.md).
 const FEW: u32 = 2048;
 
+/// Primitives from which on a bottom level without a preference has nodes of eight: of fewer, ten rays a triangle do not bring back what
+/// they take.
+const LARGE: u32 = 4096;
+
 /// Records of wide structures, at most: what tracers can name of triangles, and fewer than the bits of an instance's record, above which
 /// slots of a node lie.
 const MOST_WIDE: u32 = TRIANGLES_AT_MOST;
@@ -85,7 +89,7 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
         // Of two leaves there is nothing to move.
         optimise: if is_top { top_optimise(flags, is_wide) } else { bottom_optimise(flags, count) }
             .filter(|_| count > 2),
-        codes: Some(codes(flags, options, is_top, count)),
+        codes: Some(codes(flags, options, (is_top, is_wide), count)),
         bits_up_to: (is_top && options.top_codes.is_none()).then(|| top_bits(flags)),
         // An instance costs more than a node whatever its box: one a leaf.
         collapse: if is_top { Collapse::OFF } else { collapse(flags, is_wide) },
@@ -102,7 +106,7 @@ pub(super) fn is_wide(flags: Flags, options: &AccelOptions, primitives: Primitiv
     let is_quick = if is_top { flags.contains(Flags::PREFER_FAST_BUILD) } else { is_quick(flags, count) };
     let is_asked = match options.wide {
         Wide::Never => false,
-        Wide::Large => !is_top && count >= Wide::LARGE,
+        Wide::ByFlags => flags.contains(Flags::PREFER_FAST_TRACE) || (!is_top && count >= LARGE),
         Wide::Always => true,
     };
     is_asked && !flags.contains(Flags::ALLOW_UPDATE) && count <= MOST_WIDE && !is_quick
@@ -122,7 +126,7 @@ pub(super) fn fewer_of_another_form(
 ) -> impl Iterator<Item = u32> {
     let options = *options;
     let made = move |count| (is_quick(flags, count), is_wide(flags, &options, primitives, count));
-    [FEW, Wide::LARGE - 1].into_iter().filter(move |&fewer| fewer < count && made(fewer) != made(count))
+    [FEW, LARGE - 1].into_iter().filter(move |&fewer| fewer < count && made(fewer) != made(count))
 }
 
 fn bottom_method(flags: Flags, count: u32) -> Method {
@@ -148,14 +152,18 @@ fn top_optimise(flags: Flags, is_wide: bool) -> Option<ReinsertionOptions> {
 }
 
 /// A fast build sorts by 8 bits less; low memory keeps codes in one word, which saves 8 bytes of scratch a primitive. What lies far from
-/// the others would put them all into one cell of a top level: its bounds are robust.
-fn codes(flags: Flags, options: &AccelOptions, is_top: bool, count: u32) -> Codes {
+/// the others would put them all into one cell of a top level: its bounds are robust, and where it becomes nodes of eight, that is apart.
+fn codes(flags: Flags, options: &AccelOptions, (is_top, is_wide): (bool, bool), count: u32) -> Codes {
     if let Some(codes) = if is_top { options.top_codes } else { options.bottom_codes } {
         return codes;
     }
     let codes = Codes::for_count(count);
     let bits = if flags.contains(Flags::PREFER_FAST_BUILD) { codes.bits.saturating_sub(8).max(8) } else { codes.bits };
-    let bounds = if is_top { CodeBounds::Robust } else { CodeBounds::Full };
+    let bounds = match (is_top, is_wide) {
+        (false, _) => CodeBounds::Full,
+        (true, false) => CodeBounds::Robust,
+        (true, true) => CodeBounds::Apart,
+    };
     Codes { bounds, ..codes }.with_bits(if flags.contains(Flags::LOW_MEMORY) { bits.min(32) } else { bits })
 }
 

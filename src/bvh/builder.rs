@@ -4,7 +4,7 @@
 //! is in `encode.rs`; each [`Method`] has a file of its own, and a twin in [`super::twin`] with the same bytes.
 
 use super::child_order::{ChildOrder, ChildOrderPass};
-use super::codes::{Code, CodeBounds, Codes};
+use super::codes::{Code, Codes};
 use super::encode::Encode;
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 pub use super::hlbvh::Treelets;
@@ -13,7 +13,7 @@ use super::lbvh_workgroup::{self, SmallBuild};
 use super::method::Hierarchy;
 pub use super::method::Method;
 pub use super::method::PersistentShaders;
-use super::reinsertion::{self, Reinsertion};
+use super::reinsertion::{self, Areas, Reinsertion};
 use super::sah::Collapse;
 use super::scratch::{CLUSTER_BYTES, Scratch};
 use super::split::{self, Split};
@@ -238,11 +238,11 @@ impl Builder {
         if let Some(most) = options.bits_up_to
             && (![32, 64].contains(&most)
                 || !(codes.bits..=codes.code.bits()).contains(&most)
-                || codes.bounds != CodeBounds::Robust)
+                || !codes.bounds.has_sections())
         {
             return Err(Error::Argument(format!(
                 "bits_up_to is {most} with codes {codes}; take 32 or 64, no fewer than the codes have and no more than there are, and \
-                 codes by robust bounds, or None"
+                 codes by robust bounds, or such with what is far apart, or None"
             )));
         }
         let encode = Encode {
@@ -455,10 +455,12 @@ impl Builder {
         let hierarchy = self.hierarchy().steps(encode, input, &single);
         let mut steps = [encode.steps(input, arguments), hierarchy].concat();
         if let Some(reinsertion) = optimise {
-            // Rays of a top level are where most instances are: a tree by the areas of what is far would cost them.
-            let clips = encode.primitives == Primitives::Instances && encode.codes.bounds == CodeBounds::Robust;
-            let part = if clips { arguments.where_most_is() } else { 0 };
-            steps.extend(reinsertion.steps(arguments.structure, arguments.part(scratch.reinsertion), part));
+            let areas = match encode.primitives {
+                Primitives::Instances => Areas::of_instances(encode.codes.bounds),
+                _ => Areas::Whole,
+            };
+            let part = if areas == Areas::Whole { 0 } else { arguments.where_most_is() };
+            steps.extend(reinsertion.steps(arguments.structure, arguments.part(scratch.reinsertion), (areas, part)));
         }
         if self.weighs() {
             steps.extend(collapse::weigh_steps(encode, arguments));

@@ -3,7 +3,7 @@
 //! `glsl/bvh/encode.glsl` is the device's side.
 
 use super::child_order::ChildOrder;
-use super::codes::{CodeBounds, Codes};
+use super::codes::Codes;
 use super::geometry::{Geometry, Input, Planned, Primitives};
 use super::sah::Collapse;
 use super::scratch::BuildPhase;
@@ -226,7 +226,7 @@ impl Encode {
         let bounds = self.for_bounds();
         // Where codes have sections it looks at a sample of the primitives.
         let reset = match self.codes.bounds {
-            CodeBounds::Robust => self.reading_kernel(&shaders::BVH_ENCODE_RESET, input),
+            bounds if bounds.has_sections() => self.reading_kernel(&shaders::BVH_ENCODE_RESET, input),
             _ => self.reset_kernel(&shaders::BVH_ENCODE_RESET),
         };
         let mut steps = vec![

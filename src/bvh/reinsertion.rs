@@ -27,6 +27,7 @@
 //! walk. In a tree that is finished, leaves move as they are. The twins are [`Bvh2::reinserted`](super::layout::Bvh2::reinserted) and
 //! [`Bvh2::reinserted_by`](super::layout::Bvh2::reinserted_by): the same bytes.
 
+use super::codes::CodeBounds;
 use super::flux::GRID_BYTES;
 use super::layout::{NODES_OFFSET, node_slots};
 use crate::gpu::arguments;
@@ -221,8 +222,8 @@ impl Reinsertion {
         if *cost == Cost::Area { self.scratch_bytes() } else { self.scratch_bytes_by_rays() }
     }
 
-    fn kernel(&self, shader: &'static shaders::Shader, by_rays: bool, clips: bool) -> Kernel {
-        Kernel::new(shader, self.grid.workgroup, &[self.grid.rounds, self.shared, by_rays.into(), clips.into()])
+    fn kernel(&self, shader: &'static shaders::Shader, by_rays: bool, areas: Areas) -> Kernel {
+        Kernel::new(shader, self.grid.workgroup, &[self.grid.rounds, self.shared, by_rays.into(), areas as u32])
     }
 
     /// Records all rounds on `structure`, in place, with scratch memory of [`Reinsertion::scratch_bytes`]; both aligned
@@ -233,7 +234,7 @@ impl Reinsertion {
     pub fn record(&self, recorder: &mut Recorder<'_>, structure: Region, scratch: Region) -> Result<()> {
         let structure = structure.checked("the BVH to optimise", NODES_OFFSET, 16)?;
         let scratch = scratch.checked("scratch memory of an optimisation", self.scratch_bytes(), 16)?;
-        recorder.chains(&[self.steps(structure, scratch, 0)])
+        recorder.chains(&[self.steps(structure, scratch, (Areas::Whole, 0))])
     }
 
     /// Records all rounds on a finished tree, in place, with scratch memory of [`Reinsertion::scratch_bytes`], or of
@@ -297,17 +298,48 @@ impl Reinsertion {
         probed_offsets(self.rounds, self.stride)
     }
 
-    /// What [`Reinsertion::record`] records, with addresses that were checked. Areas are those of boxes clipped to the one at the address
-    /// `part` (0: they are not clipped).
-    pub(super) fn steps(&self, structure: u64, scratch: u64, part: u64) -> Vec<Step> {
+    /// What [`Reinsertion::record`] records, with addresses that were checked, by these areas with the box of the part at an address.
+    pub(super) fn steps(&self, structure: u64, scratch: u64, (areas, part): (Areas, u64)) -> Vec<Step> {
         let run = self.run(structure, scratch, &Cost::Area).expect("areas have nothing to check");
-        let run = Run { part, ..run };
+        let run = Run { areas, part, ..run };
         run.begin().into_iter().chain((0..self.rounds).flat_map(|round| run.round(round))).collect()
     }
 
     fn run(&self, structure: u64, scratch: u64, cost: &Cost) -> Result<Run> {
         let (grid, by_rays) = cost.checked()?;
-        Ok(Run { of: *self, phase: "optimise", structure, scratch, grid, by_rays, sums: 0, part: 0 })
+        Ok(Run {
+            of: *self,
+            phase: "optimise",
+            structure,
+            scratch,
+            grid,
+            by_rays,
+            sums: 0,
+            areas: Areas::Whole,
+            part: 0,
+        })
+    }
+}
+
+/// What the area of a node is, where most rays are in a part of the scene: `AREAS` in glsl/bvh/reinsertion.glsl.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Areas {
+    /// Its own.
+    Whole,
+    /// That of what it shares with the part.
+    Clipped,
+    /// Its own within the part, none outside; of a node that is in both, the part's: boxes in it are coarse when it is quantised.
+    Coarse,
+}
+
+impl Areas {
+    /// Of a top level by these codes: rays are where most instances are, and a tree by the areas of what is far would cost them.
+    pub(super) fn of_instances(bounds: CodeBounds) -> Areas {
+        match bounds {
+            CodeBounds::Robust => Areas::Clipped,
+            CodeBounds::Apart => Areas::Coarse,
+            CodeBounds::Full | CodeBounds::Concise | CodeBounds::Centroid => Areas::Whole,
+        }
     }
 }
 
@@ -325,6 +357,7 @@ struct Run {
     grid: u64,
     by_rays: f32,
     sums: u64,
+    areas: Areas,
     part: u64,
 }
 
@@ -352,7 +385,7 @@ impl Run {
     }
 
     fn step(&self, shader: &'static shaders::Shader, offset: u32, items: u32) -> Step {
-        let kernel = self.of.kernel(shader, self.grid != 0, self.part != 0);
+        let kernel = self.of.kernel(shader, self.grid != 0, self.areas);
         Step::new(self.phase, kernel, &self.arguments(offset), self.of.grid.groups_for(items))
     }
 

@@ -115,14 +115,19 @@ fn what_the_flags_ask_for_is_what_the_host_builds() {
         Flags::PREFER_FAST_TRACE | Flags::ALLOW_UPDATE,
     ];
     for (flags, wide) in
-        all.into_iter().flat_map(|flags| [(flags, Wide::Never), (flags, Wide::Large), (flags, Wide::Always)])
+        all.into_iter().flat_map(|flags| [(flags, Wide::Never), (flags, Wide::ByFlags), (flags, Wide::Always)])
     {
         let options = AccelOptions { wide, ..AccelOptions::DEFAULT };
         let read = ReadBack::new(&Ours::with_options(device(), options), &World { flags, ..world.clone() });
         let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &options);
         assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}");
         assert_eq!(read.top.validate().map_err(|error| error.to_string()), Ok(()), "{flags:?}, {wide:?}");
-        let is_wide = wide == Wide::Always && !flags.intersects(Flags::ALLOW_UPDATE | Flags::PREFER_FAST_BUILD);
+        let is_asked = match wide {
+            Wide::Never => false,
+            Wide::ByFlags => flags.contains(Flags::PREFER_FAST_TRACE),
+            Wide::Always => true,
+        };
+        let is_wide = is_asked && !flags.intersects(Flags::ALLOW_UPDATE | Flags::PREFER_FAST_BUILD);
         assert_eq!(matches!(read.top, Tree::OfEight(_)), is_wide, "{flags:?}");
         let opens = flags.intersects(REBRAID | Flags::PREFER_FAST_TRACE) && !flags.contains(Flags::ALLOW_UPDATE);
         assert_eq!(read.top.header().primitive_count > 400, opens, "{flags:?}");

@@ -5,13 +5,17 @@ use crate::common::twins::{assert_same, on_device, on_host};
 use hedgerow::bvh::builder::{BuildOptions, Schedule};
 use hedgerow::bvh::codes::Codes;
 
-const CODES: [&str; 25] = [
+const CODES: [&str; 29] = [
     "emc64var+robust",
     "emc64var+robust/24",
     "emc64var+robust/5",
     "emc64sort+robust/32",
     "mc63+robust",
     "mc30+robust/9",
+    "emc64var+apart",
+    "emc64var+apart/5",
+    "mc30+apart/9",
+    "emc64sort+apart/32",
     "mip6/6",
     "mip9+concise",
     "mip12",

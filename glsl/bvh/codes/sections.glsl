@@ -97,6 +97,9 @@ void find_sections() {
     write_sections(state, bounds, core_of(state, bounds, fences));
 }
 
+// In place of how many coordinate bits come before the one of what is far: none, as that stands apart.
+const uint HEAD_APART = 64;
+
 // How many coordinate bits come before the one of what is far: the first of each axis.
 uint head_of(Stretches s) {
     uint alone = s.bits[0].x + s.bits[0].y + s.bits[0].z;
@@ -144,8 +147,9 @@ CodeParts section_parts(CodeKind kind, CodePlan plan, Box b) {
 // The bits of the section put into a code.
 uvec2 with_section(CodeKind kind, CodePlan plan, CodeParts parts, uvec2 code) {
     for (uint round = plan.sections.head == 0 ? 1 : 0; round < 1; ++round) {
-        uint behind = kind.bits - plan.sections.head;
-        uvec2 head = shift_right(code, behind);
+        uint of_head = plan.sections.head % HEAD_APART;
+        uint behind = kind.bits - of_head;
+        uvec2 head = of_head == 0 ? uvec2(0) : shift_right(code, behind);
         uvec2 rest = shift_right(bits_of(code, 64 - behind, behind), 2);
         uvec2 huge = uvec2(parts.section == SECTION_HUGE ? 1 : 0, 0);
         uvec2 beyond = uvec2(parts.section == SECTION_CORE ? 0 : 1, 0);

@@ -177,7 +177,7 @@ Move search(uint link) {
 }
 
 void main() {
-    if (CLIPS) clip = part.box;
+    if (AREAS != AREAS_WHOLE) clip = part.box;
     for (uint k = 0, i = grid_item(0); i < tried(); i = grid_item(++k)) {
         Move m = search(link_of(i));
         moves.move[i] = m;

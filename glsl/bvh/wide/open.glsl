@@ -8,15 +8,27 @@
 uint open_name[8];
 uint open_index[8];
 uint open_count[8];
-// How many places it takes. Children of several are opened.
+// How many places it takes. Children of several are opened; 0: of one that must not be.
 uint open_places[8];
 // Which child comes first, second and so on where the source's left-first walk meets them: four bits each.
 uint open_order;
+
+// Whether boxes in a child would be blown up, were they in cells of a quantised node as large as the whole tree.
+bool is_lost_in(Child child, Child whole) {
+    if (!QUANTISED) return false;
+    precise vec3 extent = child.hi - child.lo;
+    precise vec3 grown = extent + (whole.hi - whole.lo) * (1.0 / 128.0);
+    precise float area = extent.x * extent.y + extent.y * extent.z + extent.z * extent.x;
+    precise float grown_area = grown.x * grown.y + grown.y * grown.z + grown.z * grown.x;
+    precise float most = LOST * area;
+    return grown_area > most;
+}
 
 // A child that is given so many places, of which it takes what makes it cheaper.
 void put_child(uint at, uint name, uint places, uint level) {
     Child child = child_named(name);
     if (!is_inner(child)) places = 1;
+    else if (level == 0 && is_lost_in(child, source.header.root)) places = 0;
     else if (level < LEVELS_BY_COST && places > 1) places = places_by(choices.word[child.index], places);
     vec3 middle = QUANTISED ? quarter_middle(child.lo, child.hi) : vec3(0);
     if (IN_REGISTERS) {
@@ -81,7 +93,7 @@ uvec2 next_to_open(uint count, uint level) {
     }
     if (level >= LEVELS_BY_COST) return uvec2(8, 0);
     for (uint i = 0; i < (IN_REGISTERS ? 8 : count); ++i) {
-        bool fits = i < count && open_count[i] == 0 && children_by(choices.word[open_index[i]]) <= WIDTH - count + 1;
+        bool fits = i < count && open_count[i] == 0 && open_places[i] != 0 && children_by(choices.word[open_index[i]]) <= WIDTH - count + 1;
         if (fits) return uvec2(i, WIDTH);
     }
     return uvec2(8, 0);

@@ -15,13 +15,17 @@ pub enum CodeBounds {
     /// Where there are far or huge primitives, bounds that leave them out, and sections of their own for them. Otherwise the bounds
     /// of all boxes.
     Robust,
+    /// The same, but what is far stands apart from all others, right below the root, where robust bounds put it into a corner of the core. For
+    /// trees that become quantised nodes, whose cells are as coarse as a node is large.
+    Apart,
 }
 
 impl CodeBounds {
     /// All bounds.
-    pub const ALL: [CodeBounds; 4] = [CodeBounds::Full, CodeBounds::Concise, CodeBounds::Centroid, CodeBounds::Robust];
+    pub const ALL: [CodeBounds; 5] =
+        [CodeBounds::Full, CodeBounds::Concise, CodeBounds::Centroid, CodeBounds::Robust, CodeBounds::Apart];
     /// What stands behind the name of a code, for people.
-    pub const NAMES: &str = "+concise, +centroid and +robust";
+    pub const NAMES: &str = "+concise, +centroid, +robust and +apart";
 
     pub(super) const fn name(self) -> &'static str {
         match self {
@@ -29,13 +33,19 @@ impl CodeBounds {
             CodeBounds::Concise => "concise",
             CodeBounds::Centroid => "centroid",
             CodeBounds::Robust => "robust",
+            CodeBounds::Apart => "apart",
         }
     }
 
-    /// These bounds of primitives with such bounds of boxes and centroids; [`CodeBounds::Robust`] begins with the boxes'.
+    /// Whether there are sections for what is far and what is huge.
+    pub(crate) const fn has_sections(self) -> bool {
+        matches!(self, CodeBounds::Robust | CodeBounds::Apart)
+    }
+
+    /// These bounds of primitives with such bounds of boxes and centroids; those with sections begin with the boxes'.
     pub fn of(self, boxes: &Aabb, centroids: &Aabb) -> Aabb {
         match self {
-            CodeBounds::Full | CodeBounds::Robust => *boxes,
+            CodeBounds::Full | CodeBounds::Robust | CodeBounds::Apart => *boxes,
             CodeBounds::Centroid => *centroids,
             CodeBounds::Concise => {
                 let difference: [f32; 3] = std::array::from_fn(|i| {

@@ -20,7 +20,7 @@ impl Codes {
         match (self.code, self.bounds) {
             (Code::Bin(_), _) => 3,
             (code, _) if code.grid_bits() > 0 => 2,
-            (_, CodeBounds::Robust) => 1,
+            (_, bounds) if bounds.has_sections() => 1,
             _ => 0,
         }
     }
@@ -41,13 +41,15 @@ impl Codes {
 
     /// What `kind_of_codes` in build_state.glsl takes apart.
     pub(crate) fn kind_word(&self) -> u32 {
+        let apart = self.bounds == CodeBounds::Apart;
         let (depth, count_bits, stretch) = match self.code {
             Code::Bin(binning) => (binning.depth() / 2, binning.count_bits(), binning.stretch()),
             // Two bits: layers but one.
             code => ((code.grid_bits() / 3).saturating_sub(1), 0, 1),
         };
         self.code.order() as u32
-            | (self.bounds as u32) << 2
+            | (if apart { CodeBounds::Robust } else { self.bounds } as u32) << 2
+            | u32::from(apart) << 24
             | depth << 4
             | (self.code.size_group() / 3) << 6
             | self.bits << 8

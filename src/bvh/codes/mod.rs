@@ -148,16 +148,16 @@ impl Codes {
     }
 
     /// The same normalised by other bounds; `None` where the code has no such bounds: those with a grid cannot have
-    /// [`CodeBounds::Robust`].
+    /// [`CodeBounds::Robust`] or [`CodeBounds::Apart`].
     pub fn with_bounds(self, bounds: CodeBounds) -> Option<Codes> {
-        (bounds != CodeBounds::Robust || !self.has_grid()).then(|| Codes { bounds, ..self }.with_bits(self.bits))
+        (!bounds.has_sections() || !self.has_grid()).then(|| Codes { bounds, ..self }.with_bits(self.bits))
     }
 
     /// The bits of the longest prefix, at least 1.
     pub fn least_bits(&self) -> u32 {
         match (self.code, self.bounds) {
             (Code::Bin(binning), _) => binning.depth(),
-            (_, CodeBounds::Robust) => sections::PREFIX_BITS,
+            (_, bounds) if bounds.has_sections() => sections::PREFIX_BITS,
             (code, _) => code.grid_bits().max(1),
         }
     }

@@ -38,11 +38,14 @@ impl CodePlan {
         if boxes.iter().flatten().next().is_none() {
             return CodePlan::within(codes, &Aabb { lo: [0.0; 3], hi: [0.0; 3] });
         }
-        if codes.bounds == CodeBounds::Robust
+        if codes.bounds.has_sections()
             && let Some(sections) = Sections::of(boxes, &bounds)
         {
             let plan = CodePlan::within(codes, &sections.core);
-            let sections = sections.with_head(&plan.recipe.sequence);
+            let sections = match codes.bounds {
+                CodeBounds::Apart => sections,
+                _ => sections.with_head(&plan.recipe.sequence),
+            };
             return CodePlan { prefix: Prefix::Sections(sections), ..plan };
         }
         let bounds = codes.bounds.of(&bounds, &centroids);
@@ -63,7 +66,7 @@ impl CodePlan {
     #[doc(hidden)]
     pub fn of_bounds(codes: Codes, boxes: &Aabb, centroids: impl FnOnce() -> Aabb) -> Option<CodePlan> {
         let bounds = match codes.bounds {
-            CodeBounds::Robust => return None,
+            CodeBounds::Robust | CodeBounds::Apart => return None,
             _ if codes.has_grid() => return None,
             CodeBounds::Full => *boxes,
             CodeBounds::Centroid | CodeBounds::Concise => codes.bounds.of(boxes, &centroids()),

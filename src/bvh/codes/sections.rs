@@ -12,7 +12,8 @@
 //!
 //! A code begins with a bit for what is huge, which otherwise would lie over every node above it. The bit that sets apart what
 //! is far stands behind the first bit of each axis: only one octant of the core has the far primitives of one side in its node,
-//! and those of different sides meet in no node of their own. Coordinates of what is far or huge are linear in the core and the
+//! and those of different sides meet in no node of their own. Or it is the second bit of all ([`CodeBounds::Apart`](super::CodeBounds::Apart)):
+//! then no node but the root holds what is far and what is near, but each ray visits a node more. Coordinates of what is far or huge are linear in the core and the
 //! logarithm of the distance beyond it, so that a hundred far primitives at different distances are told apart, however far
 //! they are.
 
@@ -38,7 +39,7 @@ pub(super) struct Sections {
     fences: Aabb,
     /// The bounds of the core.
     pub core: Aabb,
-    /// Coordinate bits before the one of what is far.
+    /// Coordinate bits before the one of what is far: none where that stands apart.
     head: u32,
     tails: [Option<Tail>; 3],
 }
@@ -204,7 +205,8 @@ impl Sections {
     /// The bits of the section put into a code of `bits` bits.
     pub fn insert(&self, section: Section, code: u64, bits: u32) -> u64 {
         let behind = bits - self.head;
-        let (head, rest) = (code >> behind, (code & ((1 << behind) - 1)) >> 2);
+        let head = code.checked_shr(behind).unwrap_or(0);
+        let rest = (code & (u64::MAX >> (64 - behind))) >> 2;
         let huge = u64::from(section == Section::Huge);
         let beyond = u64::from(section != Section::Core);
         huge << (bits - 1) | head << (behind - 1) | beyond << (behind - 2) | rest
@@ -269,6 +271,24 @@ mod tests {
                 let codes: Vec<u64> = boxes.iter().map(|b| plan.encode(b)).collect();
                 assert!(codes.windows(2).all(|w| w[0] < w[1]), "{distance:e} to side {side}");
             }
+        }
+    }
+
+    /// And in their order, but behind all of the core.
+    #[test]
+    fn far_primitives_stand_apart_where_they_are_asked_to() {
+        let apart = Code::Emc64Var.full().with_bounds(CodeBounds::Apart).expect("it has no grid");
+        for bits in [64, 33, 32, 5] {
+            let mut boxes = grid();
+            for distance in [-1.0e30, -50.0, 50.0, 1.0e30] {
+                boxes.push(Aabb { lo: [distance; 3], hi: [distance; 3] });
+            }
+            let all: Vec<Result<Aabb, u32>> = boxes.iter().map(|&b| Ok(b)).collect();
+            let plan = CodePlan::new(apart.with_bits(bits), &all);
+            let codes: Vec<u64> = boxes.iter().map(|b| plan.encode(b) >> (bits - 2)).collect();
+            // Not huge, and far or not.
+            assert!(codes[..1000].iter().all(|&head| head == 0b00), "{bits}");
+            assert!(codes[1000..].iter().all(|&head| head == 0b01), "{bits}");
         }
     }
 

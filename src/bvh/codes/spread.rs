@@ -14,9 +14,9 @@
 //! Quartiles are those of the sample that tells what is far. Bits come in eights, a pass of the sort each. `bits_by_spread` in
 //! `glsl/bvh/codes.glsl` is the device's side.
 
+use super::Codes;
 use super::plan::CodePlan;
 use super::sections::{SECTION_BITS, typical_extents};
-use super::{CodeBounds, Codes};
 use crate::geometry::Aabb;
 
 /// Bits come in so many at a time.
@@ -31,9 +31,9 @@ impl Codes {
     }
 
     /// These codes with as many bits, at least their own and at most `most`, as tell primitives with these boxes apart as well as
-    /// their own would if the primitives filled the bounds. Only robust codes know their primitives' spread.
+    /// their own would if the primitives filled the bounds. Only codes with sections know their primitives' spread.
     pub fn by_spread<E: Copy>(self, boxes: &[Result<Aabb, E>], most: u32) -> Codes {
-        if self.bounds != CodeBounds::Robust {
+        if !self.bounds.has_sections() {
             return self;
         }
         let Some(typical) = typical_extents(boxes) else { return self };
@@ -50,7 +50,7 @@ impl Codes {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Code;
+    use super::super::{Code, CodeBounds};
     use super::*;
 
     fn robust(bits: u32) -> Codes {

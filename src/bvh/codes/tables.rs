@@ -162,7 +162,7 @@ mod tests {
             for code in Code::ALL {
                 for bounds in CodeBounds::ALL {
                     let Some(codes) = code.full().with_bounds(bounds) else { continue };
-                    let needs_boxes = codes.has_grid() || bounds == CodeBounds::Robust;
+                    let needs_boxes = codes.has_grid() || bounds.has_sections();
                     let Some(plan) = CodePlan::of_bounds(codes, &all, || centroids) else {
                         assert!(needs_boxes);
                         continue;

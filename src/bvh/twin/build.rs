@@ -5,6 +5,7 @@ use super::{hlbvh, hploc, ploc};
 use crate::bvh::builder::{BuildOptions, Method};
 use crate::bvh::codes::Codes;
 use crate::bvh::layout::{Bvh2, Record};
+use crate::bvh::reinsertion::Areas;
 use crate::bvh::sah::Collapse;
 use crate::geometry::Aabb;
 
@@ -38,7 +39,7 @@ pub fn build_within<R: Record>(
         Some(optimise) => {
             let optimised = match core {
                 None => tree.reinserted(optimise),
-                Some(core) => tree.reinserted_within(optimise, core),
+                Some(core) => tree.reinserted_within(optimise, Areas::of_instances(codes.bounds), core),
             };
             optimised.collapsed(&collapse)
         }

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::bvh::flux::{FluxGrid, quotient};
 use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Record, status};
 use crate::bvh::reinsertion::{
-    LEAST_GAIN, LEAST_SHARE, PATH, Probed, ReinsertionOptions, STACK, VISITS, probed_offsets, weight_of,
+    Areas, LEAST_GAIN, LEAST_SHARE, PATH, Probed, ReinsertionOptions, STACK, VISITS, probed_offsets, weight_of,
 };
 use crate::geometry::Aabb;
 
@@ -41,13 +41,20 @@ impl<R: Record> Bvh2<R> {
         self.after_rounds(options, 0, |bounds| bounds.scaled_half_area(scale), false)
     }
 
-    /// The same by the areas of boxes clipped to a part of the scene.
-    pub fn reinserted_within(&self, options: &ReinsertionOptions, part: &Aabb) -> Bvh2<R> {
+    /// The same by these areas, with a part of the scene.
+    pub(super) fn reinserted_within(&self, options: &ReinsertionOptions, areas: Areas, part: &Aabb) -> Bvh2<R> {
         let scale = self.header.area_scale;
-        let area = |bounds: &Aabb| {
+        let clipped = |bounds: &Aabb| {
             let lo: [f32; 3] = std::array::from_fn(|i| bounds.lo[i].max(part.lo[i]));
             let hi: [f32; 3] = std::array::from_fn(|i| bounds.hi[i].min(part.hi[i]));
             if (0..3).any(|i| hi[i] < lo[i]) { 0.0 } else { Aabb { lo, hi }.scaled_half_area(scale) }
+        };
+        let area = |bounds: &Aabb| match areas {
+            Areas::Whole => bounds.scaled_half_area(scale),
+            Areas::Clipped => clipped(bounds),
+            Areas::Coarse if part.contains(bounds) => bounds.scaled_half_area(scale),
+            Areas::Coarse if (0..3).any(|i| bounds.lo[i] > part.hi[i] || bounds.hi[i] < part.lo[i]) => 0.0,
+            Areas::Coarse => part.scaled_half_area(scale),
         };
         self.after_rounds(options, 0, area, false)
     }

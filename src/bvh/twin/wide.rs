@@ -7,7 +7,7 @@ use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{Bvh2, Child, Record};
 use crate::bvh::wide::layout::{Slots, Wide, WideNode, is_paired, leaf_max};
 use crate::bvh::wide::pairs::{self, Part, Places};
-use crate::bvh::wide::{LEVELS_BY_COST, PRIOR_WORK};
+use crate::bvh::wide::{LEVELS_BY_COST, LOST, PRIOR_WORK};
 use crate::geometry::Aabb;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -194,7 +194,8 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> 
     for level in 0.. {
         let mut next_level = Vec::new();
         for (root, place) in this_level {
-            let children = open(tree, &choices, &root, width, level, counts.ordered_by);
+            let is_lost = |child: &Child| level == 0 && N::FORM.is_quantised() && is_lost_in(child, &root);
+            let children = open(tree, &choices, (&root, level), is_lost, width, counts.ordered_by);
             let mut slots = [None; 8];
             if N::FORM.is_quantised() && tree.header.child_order == 0 {
                 slots = octant_slots(&children);
@@ -215,7 +216,16 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> 
     unreachable!("a tree has an end")
 }
 
-/// A child of a wide node: its link, and how many places it takes among the children. One of several is opened.
+/// Whether boxes in a child would be blown up, were they in cells of a quantised node as large as the whole tree: then the root does not
+/// take in what is below it.
+fn is_lost_in(child: &Child, whole: &Child) -> bool {
+    let half_area = |[x, y, z]: [f32; 3]| x * y + y * z + z * x;
+    let (extent, of_whole) = (child.bounds().extent(), whole.bounds().extent());
+    let grown = std::array::from_fn(|i| extent[i] + of_whole[i] * (1.0 / 128.0));
+    half_area(grown) > LOST * half_area(extent)
+}
+
+/// A child of a wide node: its link, and how many places it takes among the children. One of several is opened; 0: one that must not be.
 #[derive(Debug, Clone, Copy)]
 struct Taken {
     child: Child,
@@ -229,9 +239,9 @@ struct Taken {
 fn open<R: Record>(
     tree: &Bvh2<R>,
     choices: &[Choice],
-    root: &Child,
+    (root, level): (&Child, u32),
+    is_lost: impl Fn(&Child) -> bool,
     width: u32,
-    level: u32,
     ordered_by: &[LinkCount],
 ) -> Vec<Child> {
     if root.is_leaf() {
@@ -245,7 +255,12 @@ fn open<R: Record>(
         [(0, left), (1, places - left)].map(|(side, places)| {
             let link = 2 * child.index + side;
             let child = tree.nodes[child.index as usize].children[side as usize];
-            let takes = if child.is_leaf() || !by_cost { places } else { choice(&child).places_of(places) };
+            let takes = match () {
+                () if child.is_leaf() => places,
+                () if is_lost(&child) => 0,
+                () if !by_cost => places,
+                () => choice(&child).places_of(places),
+            };
             Taken { child, link, places: takes }
         })
     };
@@ -256,7 +271,8 @@ fn open<R: Record>(
         let room = width - children.len() as u32;
         let of_several = children.iter().position(|taken| !taken.child.is_leaf() && taken.places > 1);
         // What fits as a whole is taken in, even where sums of costs were too large to tell.
-        let fits = |taken: &Taken| by_cost && !taken.child.is_leaf() && choice(&taken.child).children() <= room + 1;
+        let may = |taken: &Taken| by_cost && !taken.child.is_leaf() && taken.places > 0;
+        let fits = |taken: &Taken| may(taken) && choice(&taken.child).children() <= room + 1;
         let next = of_several.map(|at| (at, children[at].places));
         let Some((at, places)) = next.or_else(|| Some((children.iter().position(fits)?, width))) else { break };
         let [left, right] = below(&children[at].child, places);

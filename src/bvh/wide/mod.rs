@@ -40,6 +40,10 @@ pub(crate) const PRIOR_RAYS: f32 = 8.0;
 /// [`PRIOR_RAYS`], each of which takes a step of 3 and ends nowhere.
 pub(crate) const PRIOR_WORK: f32 = 24.0;
 
+/// How many times as large a child of the root may be, were it in cells of a node as large as the whole tree, if what is below it is to be
+/// among the root's children.
+pub(crate) const LOST: f32 = 1.5;
+
 /// Levels of wide nodes that are made to cost least. Nodes further down are opened level by level, so that a node takes in
 /// two binary levels of four children and three of eight, however the tree is shaped: what a ray puts off is bounded by that.
 /// Trees of scenes end long before.
@@ -98,7 +102,9 @@ impl Form {
         let leaves = if primitive_count < 2 { 2 } else { primitive_count as u64 };
         let nodes = match self {
             Form::Four => (3 * leaves - 2) / 4,
-            Form::Eight | Form::EightQuantised => (2 * leaves - 1) / 3,
+            Form::Eight => (2 * leaves - 1) / 3,
+            // One more, where the root does not take in what is small.
+            Form::EightQuantised => (2 * leaves + 1) / 3,
         };
         nodes as u32
     }

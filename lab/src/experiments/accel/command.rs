@@ -52,7 +52,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "100000")]
     instances: NonZeroU32,
     /// Which of ours are in nodes of eight, where no update is allowed: less memory, and other times
-    #[arg(long, value_name = "WHICH", default_value = "large")]
+    #[arg(long, value_name = "WHICH", default_value = "flags")]
     wide: WhichWide,
     /// Frames of each animation, spread evenly over all of them
     #[arg(long, value_name = "N", default_value = "12")]
@@ -68,8 +68,8 @@ pub struct Arguments {
 enum WhichWide {
     /// None.
     Never,
-    /// Bottom levels of many primitives.
-    Large,
+    /// Those of a fast trace, and bottom levels of many primitives.
+    Flags,
     /// All.
     Always,
 }
@@ -78,7 +78,7 @@ impl From<WhichWide> for Wide {
     fn from(which: WhichWide) -> Wide {
         match which {
             WhichWide::Never => Wide::Never,
-            WhichWide::Large => Wide::Large,
+            WhichWide::Flags => Wide::ByFlags,
             WhichWide::Always => Wide::Always,
         }
     }
@@ -88,9 +88,7 @@ impl WhichWide {
     fn says(self) -> String {
         match self {
             WhichWide::Never => "none of ours".into(),
-            WhichWide::Large => {
-                format!("bottom levels of ours of {} primitives and more, where there can be", Wide::LARGE)
-            }
+            WhichWide::Flags => "those of ours that flags give them".into(),
             WhichWide::Always => "all of ours, where there can be".into(),
         }
     }

@@ -32,7 +32,7 @@ pub(super) const fn option(key: &'static str, values: &'static str) -> BuilderOp
 pub(super) const CODES: BuilderOption = option(
     "codes",
     "mc30, mc63, emc64sort, emc64var, emc64var-size4, emc64var-extents, emc64var-nosize, mip6, mip9, mip12 or binQaA (Q 2, 4 or \
-             6, A 0 to 9; ~N behind: the stretch factor weighs 1/N, N to 2048), with +concise, +centroid, +robust or /BITS behind",
+             6, A 0 to 9; ~N behind: the stretch factor weighs 1/N, N to 2048), with +concise, +centroid, +robust, +apart or /BITS behind",
 );
 pub(super) const COLLAPSE: BuilderOption = option("collapse", "sah or off");
 pub(super) const RAYS: BuilderOption = option("rays", "rays that are traced between two builds, 1e7 unless given");

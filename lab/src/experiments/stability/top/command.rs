@@ -36,7 +36,7 @@ pub struct TopArguments {
     /// Of top levels: re-braiding, on, off or both [default: on,off]
     #[arg(long, value_name = "on|off", value_delimiter = ',')]
     rebraid: Vec<OnOff>,
-    /// Of top levels: nodes of eight where there can be, in both levels, on, off or both [default: off]
+    /// Of top levels: nodes of eight where there can be, in both levels, on, off or both [default: on]
     #[arg(long, value_name = "on|off", value_delimiter = ',')]
     of_eight: Vec<OnOff>,
     /// Of top levels: how many instances are far; several have sides that are drawn [default: 1,100]
@@ -78,7 +78,7 @@ impl TopArguments {
             given => given.iter().map(|on| *on == OnOff::On).collect(),
         };
         let rebraid = or_default(&self.rebraid, &[true, false]);
-        let of_eight = or_default(&self.of_eight, &[false]);
+        let of_eight = or_default(&self.of_eight, &[true]);
         let prefer = if self.prefer.is_empty() { &PREFERENCES[..] } else { &self.prefer };
         let default = [NamedCodes(None)];
         let codes = if self.codes.is_empty() { &default[..] } else { &self.codes };

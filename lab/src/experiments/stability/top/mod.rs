@@ -30,7 +30,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Costs of a traversal step and of an instance: what a triangle costs in the experiment over bottom levels.
-const COSTS: (f64, f64) = (3.0, 2.0);
+pub const COSTS: (f64, f64) = (3.0, 2.0);
 /// Runs that do not count, before those that do.
 const WARM_UPS: u32 = 1;
 
@@ -224,6 +224,7 @@ fn measure_one(
             e: *e,
             code_bits: tree.header().code_bits,
             entries: tree.header().active,
+            cost: cost.filter(|cost| cost.is_finite()),
             relative_cost: cost.zip(base_cost).map(|(cost, base)| cost / base).filter(|cost| cost.is_finite()),
             build_ms: Spread::of_some(&builds[1])?,
             relative_build: Spread::of_some(&ratios(&builds[1], &builds[0]))?,

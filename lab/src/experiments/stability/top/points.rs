@@ -66,7 +66,7 @@ pub struct TopBuilder {
     pub prefer: Preference,
     /// Whether instances may be opened.
     pub rebraid: bool,
-    /// Whether structures have nodes of eight where there can be; those of fast builds have none.
+    /// Whether structures have nodes of eight where there can be, or of two; those of fast builds have none of eight.
     #[serde(default)]
     pub of_eight: bool,
     /// The codes of the top level; `None`: what accel chooses.
@@ -92,8 +92,13 @@ impl TopBuilder {
     pub fn options(&self) -> AccelOptions {
         let default = AccelOptions::DEFAULT;
         let rebraid_budget = if self.rebraid { default.rebraid_budget } else { 1.0 };
-        let wide = if self.of_eight { Wide::Always } else { default.wide };
+        let wide = if self.of_eight { Wide::Always } else { Wide::Never };
         AccelOptions { rebraid_budget, top_codes: self.codes, wide, ..default }
+    }
+
+    /// Whether its top levels are of nodes of eight.
+    pub fn has_nodes_of_eight(&self) -> bool {
+        self.of_eight && self.prefer != Preference::FastBuild
     }
 
     /// What its codes are called.
@@ -105,7 +110,7 @@ impl TopBuilder {
 impl fmt::Display for TopBuilder {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let opened = if self.rebraid { ", re-braided" } else { "" };
-        let of_eight = if self.of_eight { ", in nodes of eight" } else { "" };
+        let of_eight = if self.has_nodes_of_eight() { ", in nodes of eight" } else { "" };
         write!(f, "{}{opened}{of_eight}, {}", self.prefer, self.codes_name())
     }
 }
@@ -159,7 +164,10 @@ pub struct TopGrowth {
     pub code_bits: u32,
     /// Entries of the tree: instances, those that were opened as their parts.
     pub entries: u32,
-    /// SAH cost of the tree clipped to what stays, over that at e = 0.
+    /// SAH cost of the tree clipped to what stays: a step 3, whatever a node's width, an instance 2.
+    #[serde(default)]
+    pub cost: Option<f64>,
+    /// That over the one at e = 0.
     pub relative_cost: Option<f64>,
     /// Milliseconds of a build.
     pub build_ms: Spread,
@@ -189,7 +197,7 @@ mod tests {
 
     #[test]
     fn a_point_is_a_line_that_names_its_codes() {
-        let line = r#"{"experiment":"growth-top","scene":"gen:city:9","instances":9,"prefer":"fast-trace","rebraid":true,"of_eight":false,"codes":"default","far":100,"axes":3,"sides":"drawn","e":42,"code_bits":32,"entries":40,"relative_cost":1.01,"build_ms":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_build":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_mrays":{},"frame_ms":null,"relative_frame":null}"#;
+        let line = r#"{"experiment":"growth-top","scene":"gen:city:9","instances":9,"prefer":"fast-trace","rebraid":true,"of_eight":false,"codes":"default","far":100,"axes":3,"sides":"drawn","e":42,"code_bits":32,"entries":40,"cost":20.5,"relative_cost":1.01,"build_ms":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_build":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_mrays":{},"frame_ms":null,"relative_frame":null}"#;
         let point: TopGrowth = serde_json::from_str(line).expect("a point");
         assert_eq!((point.builder.codes, point.by.sides, point.speed()), (None, FarSides::Drawn, None));
         assert_eq!(serde_json::to_string(&point).expect("JSON"), line);
