@@ -8,7 +8,7 @@ use crate::common::mixture::ReadBack;
 use crate::common::probe::{CONFIRM, CONFIRM_ODD, IGNORE, ProbeRay, ProbeReport, flags};
 use crate::common::shapes::{Corners, boxes, hard_rays, soup};
 use crate::common::world::{Part, World};
-use hedgerow::accel::{ANY_HIT_ORDER, AccelOptions, Instance, REBRAID, twin as levels};
+use hedgerow::accel::{ANY_HIT_ORDER, AccelOptions, Instance, REBRAID, Wide, twin as levels};
 use hedgerow::ash::vk;
 use hedgerow::bvh::builder::{BuildOptions, Method, Window};
 use hedgerow::bvh::child_order::ChildOrder;
@@ -171,7 +171,7 @@ fn queries_take_the_left_child_first() {
         lights: Vec::new(),
     };
     let [plain, ordered] = [BuildFlags::empty(), ANY_HIT_ORDER].map(|flags| {
-        let structures = Structures::ours(device(), AccelOptions::DEFAULT);
+        let structures = Structures::ours(device(), AccelOptions { wide: Wide::Never, ..AccelOptions::DEFAULT });
         let mut levels = Levels::new(structures, &scene, flags).expect("built");
         levels.build().expect("built");
         let buffers = RayBuffers::new(device(), &rays).expect("memory");
@@ -179,7 +179,7 @@ fn queries_take_the_left_child_first() {
         work.iter().map(|work| [work[2], work[3]]).collect::<Vec<_>>()
     });
     assert_ne!(plain, ordered);
-    // As `Levels` builds parts: PREFER_FAST_TRACE.
+    // As `Levels` builds parts in nodes of two: PREFER_FAST_TRACE.
     let options = BuildOptions {
         method: Method::Hploc(Window::DEFAULT),
         optimise: Some(ReinsertionOptions::MEDIUM),
