@@ -75,8 +75,8 @@ Child part_of_node(QuantisedNode node, Box b, uint index, uint slots) {
     return Child(b.lo, index, b.hi, slots);
 }
 
-// How large a box is that is turned no one knows how: the surface area of a box around it grows with the square of its edges' sum. By its
-// own area a long box cut into two long ones would be as small as one cut in halves.
+// How large a box is in the world, whichever way its instance turns it: about the square of the sum of its edges. By its own area two long
+// halves of a long box would be as good as two short ones.
 float size_of(Box b) {
     precise vec3 e = b.hi - b.lo;
     precise float edges = e.x + e.y + e.z;

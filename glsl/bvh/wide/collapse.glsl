@@ -45,7 +45,7 @@ layout(constant_id = 6) const bool BY_HITS = false;
 const uint LEVELS_BY_COST = 24;
 const float PRIOR_WORK = 24.0;
 const uint LEVELS_AT_MOST = 64;
-// How many times as large a child of the root may be in cells as large as the root's.
+// src/bvh/wide/mod.rs: by how much the box of a child of the root may grow in the root's cells.
 const float LOST = 1.5;
 // Leaves of more triangles are nodes of their own: a byte holds the units of others, if none are pairs.
 const uint LEAF_MAX_TRIANGLES = LEAF_MAX / UNITS_OF_ONE;

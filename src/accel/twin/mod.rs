@@ -230,8 +230,8 @@ fn cut_slots(node: &QuantisedNode, slots: &[usize]) -> Option<[(Aabb, u32); 2]> 
     Some([one, other])
 }
 
-/// How large a box is that is turned no one knows how: the surface area of a box around it grows with the square of its edges' sum. By
-/// its own area a long box cut into two long ones would be as small as one cut in halves.
+/// How large a box is in the world, whichever way its instance turns it: about the square of the sum of its edges. By its own area two long
+/// halves of a long box would be as good as two short ones.
 fn size_of(b: &Aabb) -> f32 {
     let [x, y, z] = b.extent();
     let edges = x + y + z;

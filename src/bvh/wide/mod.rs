@@ -40,8 +40,8 @@ pub(crate) const PRIOR_RAYS: f32 = 8.0;
 /// [`PRIOR_RAYS`], each of which takes a step of 3 and ends nowhere.
 pub(crate) const PRIOR_WORK: f32 = 24.0;
 
-/// How many times as large a child of the root may be, were it in cells of a node as large as the whole tree, if what is below it is to be
-/// among the root's children.
+/// A child of the root whose box would grow by more than this, in cells as large as the whole tree asks for, stays a node of its own: what
+/// is below it is not taken into the root.
 pub(crate) const LOST: f32 = 1.5;
 
 /// Levels of wide nodes that are made to cost least. Nodes further down are opened level by level, so that a node takes in
@@ -103,7 +103,7 @@ impl Form {
         let nodes = match self {
             Form::Four => (3 * leaves - 2) / 4,
             Form::Eight => (2 * leaves - 1) / 3,
-            // One more, where the root does not take in what is small.
+            // The root may leave a small child closed that it has room for: one node more.
             Form::EightQuantised => (2 * leaves + 1) / 3,
         };
         nodes as u32
