@@ -52,12 +52,6 @@ layout(push_constant, scalar) uniform RebraidArguments {
 // A number of each invocation, or two.
 shared uint of_lane[2 * gl_WorkGroupSize.x];
 
-// What one phase has written to memory, the next of a workgroup reads.
-void next_phase() {
-    controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
-                   gl_SemanticsAcquireRelease | gl_SemanticsMakeAvailable | gl_SemanticsMakeVisible);
-}
-
 uint entries_before(uint round) {
     return round == 0u ? instance_count : state.count[round];
 }

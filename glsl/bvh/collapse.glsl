@@ -8,6 +8,7 @@
 //   place    reads weights, places            writes the walk's order, the nodes' children, slots that fall out, the root
 //   records  reads the walk's order           writes records, or the primitives' numbers in their place
 //   numbered reads those numbers              writes records, to anywhere
+//   alone    all but the last, by one workgroup, for a small tree
 //
 // A builder that writes the weights itself needs none of the first two.
 //

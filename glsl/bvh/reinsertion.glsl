@@ -8,6 +8,8 @@
 //   settle   reads parents, moves, firsts       writes moves: only those that are made are left
 //   move     reads moves                        writes nodes, parents; the header: children have no order any more
 //
+//   alone    all of that in all rounds, by one workgroup, for a small tree
+//
 // The first once, the others in each round, for every link of which offset + k · stride is one.
 //
 // By rays (BY_RAYS) a box costs its area and, times a ratio, the rays that meet it on a grid (bvh/flux.glsl). There are two steps behind
@@ -67,8 +69,9 @@ layout(push_constant, scalar) uniform ReinsertionArguments {
     Words totals;       // TOTALS_…
     Words sums;         // SUMS_…
     Part part;          // of the scene, where areas are not whole
-    uint offset;
+    uint offset;        // of the first round
     uint stride;
+    uint rounds;        // that one workgroup does
     uint link_count;
     float by_rays;      // what rays weigh in the whole tree's cost, its area being 1
 };
@@ -84,8 +87,15 @@ const uint SUMS_GAINS = 0;
 const uint SUMS_TRIED = 2;
 const uint SUMS_ROOT_AREA = 3;
 
+// Of the round, the link that is tried first.
+uint first_link;
+
+void begin_round(uint first) {
+    first_link = first;
+}
+
 uint link_of(uint k) {
-    return offset + k * stride;
+    return first_link + k * stride;
 }
 
 // A compacted tree has fewer slots than were planned for; behind them lie records.
@@ -95,7 +105,7 @@ bool is_used(uint slot) {
 
 // How many links the round tries.
 uint tried() {
-    return offset < link_count ? (link_count - offset + stride - 1) / stride : 0;
+    return first_link < link_count ? (link_count - first_link + stride - 1) / stride : 0;
 }
 
 Child child_at(uint link) {

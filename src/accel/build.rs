@@ -97,8 +97,7 @@ impl Build {
         let in_pieces = wide.filter(|_| primitives == Primitives::Triangles && entries >= NUMBERED_FROM);
         let numbered = in_pieces.and_then(|_| builder.numbered());
         let (builder, numbered) = numbered.map_or((builder, false), |builder| (builder, true));
-        let of_another_form = quality::fewer_of_another_form(flags, options, primitives, entries)
-            .filter(|_| primitives != Primitives::Instances);
+        let of_another_form = quality::fewer_of_another_form(flags, options, primitives, primitive_count);
         let in_other_memory = numbered.then_some(NUMBERED_FROM - 1);
         let of_fewer = |count: u32| {
             let given = given.clone();

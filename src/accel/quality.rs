@@ -28,13 +28,16 @@ const KNOWN: Flags = Flags::from_raw(
 );
 
 /// Primitives up to which a build without a preference is an LBVH: one workgroup makes it in one dispatch. Up to as many a fast trace
-/// gets two passes of reinsertion, as opened instances want the nodes near the root good: they take 0.3 to 1.3 of the time of a driver's
+/// gets two passes of reinsertion, as opened instances want the nodes near the root good: they take 0.1 to 0.4 of the time of a driver's
 /// fast trace (docs/notes/rays.md).
 const FEW: u32 = 2048;
 
 /// Primitives from which on a bottom level without a preference has nodes of eight: of fewer, ten rays a triangle do not bring back what
 /// they take.
 const LARGE: u32 = 4096;
+
+/// Entries of a top level that one node of eight holds: nothing comes of moving subtrees.
+const ONE_NODE: u32 = 8;
 
 /// Records of wide structures, at most: what tracers can name of triangles, and fewer than the bits of an instance's record, above which
 /// slots of a node lie.
@@ -86,9 +89,9 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
     let is_wide = is_wide(flags, options, primitives, count);
     BuildOptions {
         method: if is_top { Method::Lbvh } else { bottom_method(flags, count) },
-        // Of two leaves there is nothing to move.
+        // Of two leaves there is nothing to move, and of those that are in one node of eight nothing comes of it.
         optimise: if is_top { top_optimise(flags, is_wide) } else { bottom_optimise(flags, count) }
-            .filter(|_| count > 2),
+            .filter(|_| count > if is_top && is_wide { ONE_NODE } else { 2 }),
         codes: Some(codes(flags, options, (is_top, is_wide), count)),
         bits_up_to: (is_top && options.top_codes.is_none()).then(|| top_bits(flags)),
         // An instance costs more than a node whatever its box: one a leaf.
@@ -117,7 +120,7 @@ fn is_quick(flags: Flags, count: u32) -> bool {
     flags.contains(Flags::PREFER_FAST_BUILD) || (!flags.contains(Flags::PREFER_FAST_TRACE) && count <= FEW)
 }
 
-/// Fewer primitives of a bottom level, of which another method or form may need more memory than `count` in that of `count`.
+/// Fewer primitives, of which another method or form may need more memory than `count` in that of `count`.
 pub(super) fn fewer_of_another_form(
     flags: Flags,
     options: &AccelOptions,
@@ -125,8 +128,19 @@ pub(super) fn fewer_of_another_form(
     count: u32,
 ) -> impl Iterator<Item = u32> {
     let options = *options;
-    let made = move |count| (is_quick(flags, count), is_wide(flags, &options, primitives, count));
-    [FEW, LARGE - 1].into_iter().filter(move |&fewer| fewer < count && made(fewer) != made(count))
+    let made = move |count| match primitives {
+        Primitives::Instances => {
+            let entries = opened_to(flags, &options, count).unwrap_or(count);
+            (entries <= ONE_NODE, is_wide(flags, &options, primitives, entries))
+        }
+        _ => (is_quick(flags, count), is_wide(flags, &options, primitives, count)),
+    };
+    let fewer = match primitives {
+        // The most instances whose entries are in one node.
+        Primitives::Instances => (1..ONE_NODE + 1).rev().find(|&fewer| made(fewer).0).into_iter().collect(),
+        _ => vec![FEW, LARGE - 1],
+    };
+    fewer.into_iter().filter(move |&fewer| fewer < count && made(fewer) != made(count))
 }
 
 fn bottom_method(flags: Flags, count: u32) -> Method {

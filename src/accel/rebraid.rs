@@ -74,10 +74,10 @@ impl Rebraid {
             instance_count: count,
         };
         if count <= SMALL {
-            let all = Kernel::new(&shaders::ACCEL_REBRAID_WORKGROUP, context.tuning.build.rebraid_group, &[]);
+            let all = Kernel::new(&shaders::ACCEL_REBRAID_WORKGROUP, context.tuning.build.alone_group, &[]);
             return vec![Step::new("re-braid", all, &arguments(0, 1), 1)];
         }
-        let fences = Kernel::new(&shaders::ACCEL_REBRAID_FENCES, context.tuning.build.rebraid_group, &[]);
+        let fences = Kernel::new(&shaders::ACCEL_REBRAID_FENCES, context.tuning.build.alone_group, &[]);
         let mut steps = vec![
             fill::step("re-braid", scratch, self.capacity + STATE_WORDS, 0),
             Step::new("re-braid", fences, &arguments(0, 1), 1),

@@ -81,7 +81,7 @@ impl BuildOptions {
         match schedule {
             Schedule::Chain => true,
             Schedule::Persistent(_) => self.optimise.is_none(),
-            Schedule::Workgroup => self.optimise.is_none() && self.split.is_none() && self.method == Method::Lbvh,
+            Schedule::Workgroup => self.split.is_none() && self.method == Method::Lbvh,
         }
     }
 }
@@ -89,13 +89,14 @@ impl BuildOptions {
 /// How the phases of a build are recorded. The result is the same bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Schedule {
-    /// One dispatch per phase, with barriers between. Works on every device.
+    /// One dispatch per phase, with barriers between. Works on every device. Where it is not asked for but chosen, one workgroup optimises
+    /// and finishes a small tree.
     Chain,
     /// One persistent dispatch that draws tasks from a pool: [`Schedule::PERSISTENT`]. The device must keep running workgroups
     /// that it has started.
     Persistent(&'static PersistentShaders),
     /// One workgroup builds everything in one dispatch: for few primitives, at most [`Builder::WORKGROUP_MAX`]. Only
-    /// [`Method::Lbvh`] has it.
+    /// [`Method::Lbvh`] has it. What optimises its tree comes behind it.
     Workgroup,
 }
 
@@ -202,7 +203,8 @@ impl Builder {
         let count = primitive_count + budget;
         options.method.check()?;
         let tuning = &context.tuning.build;
-        let by_one = primitive_count <= tuning.small && options.takes(Schedule::Workgroup);
+        let small = if options.optimise.is_some() { tuning.small_optimised } else { tuning.small };
+        let by_one = primitive_count <= small && options.takes(Schedule::Workgroup);
         let of_count = if by_one { Schedule::Workgroup } else { Schedule::Chain };
         let schedule = options.schedule.unwrap_or(of_count);
         if !options.takes(schedule) {
@@ -229,7 +231,10 @@ impl Builder {
         } else {
             SortShape::of(context).with_short_tiles()
         };
+        // A caller who asks for the chain gets it to the end.
+        let finishes_alone = options.schedule != Some(Schedule::Chain) && count <= tuning.small_optimised;
         let optimise = options.optimise.map(|options| Reinsertion::new(context, &options, count));
+        let optimise = optimise.map(|pass| if finishes_alone { pass.alone(context) } else { pass });
         let orders_on_the_way = method == Method::Lbvh && optimise.is_none();
         let behind = options.child_order.filter(|_| !orders_on_the_way);
         let child_order = behind.map(|order| ChildOrderPass::new(context, order, options.collapse, count));
@@ -410,7 +415,7 @@ impl Builder {
     /// As [`Builder::record`], pipelines aside; the table is too small.
     pub fn chains(jobs: &[BuildJob<'_>], table: Option<&mut ArgumentTable>) -> Result<Vec<Vec<Step>>> {
         let (small, large): (Vec<&BuildJob<'_>>, Vec<&BuildJob<'_>>) =
-            jobs.iter().partition(|job| job.builder.schedule == Schedule::Workgroup);
+            jobs.iter().partition(|job| job.builder.is_one_dispatch());
         let chains = large.iter().map(|job| job.builder.chain_of(job));
         let mut chains: Vec<Vec<Step>> = chains.collect::<Result<_>>()?;
         let small = small.iter().map(|job| {
@@ -420,6 +425,11 @@ impl Builder {
         let small: Vec<SmallBuild<'_>> = small.collect::<Result<_>>()?;
         chains.extend(lbvh_workgroup::steps(&small, table)?.into_iter().map(|step| vec![step]));
         Ok(chains)
+    }
+
+    /// Whether one workgroup does everything in one dispatch.
+    fn is_one_dispatch(&self) -> bool {
+        self.schedule == Schedule::Workgroup && self.optimise.is_none()
     }
 
     /// What the method adds to a build.
@@ -439,8 +449,17 @@ impl Builder {
                 let shader = shaders.of(self.method);
                 self.hierarchy().persistent_steps(encode, input, arguments, shader, workers)
             }
-            // Builds by one workgroup have no chain of their own.
-            Schedule::Chain | Schedule::Workgroup => self.chain(input, arguments, scratch),
+            Schedule::Chain => {
+                let single = self.single(arguments);
+                let hierarchy = self.hierarchy().steps(encode, input, &single);
+                let tree = [encode.steps(input, arguments), hierarchy].concat();
+                [tree, self.finish(input, arguments, scratch)].concat()
+            }
+            Schedule::Workgroup => {
+                let encode = &Encode { collapse: Collapse { enabled: false, ..encode.collapse }, ..encode.clone() };
+                let tree = lbvh_workgroup::steps(&[SmallBuild { encode, input, memory: [structure, room] }], None)?;
+                [tree, self.finish(input, arguments, scratch)].concat()
+            }
         });
         if let Some(pass) = self.child_order {
             steps.extend(pass.steps(job.structure, job.scratch)?);
@@ -448,12 +467,15 @@ impl Builder {
         Ok(steps)
     }
 
-    fn chain(&self, input: &Input, arguments: &arguments::Build, scratch: &Scratch) -> Vec<Step> {
+    /// What is weighed later has leaves of one primitive until then.
+    fn single(&self, arguments: &arguments::Build) -> arguments::Build {
+        if self.weighs() { arguments.without_collapse() } else { *arguments }
+    }
+
+    /// What comes behind the tree.
+    fn finish(&self, input: &Input, arguments: &arguments::Build, scratch: &Scratch) -> Vec<Step> {
         let Builder { encode, optimise, .. } = self;
-        // What is weighed later has leaves of one primitive until then.
-        let single = if self.weighs() { arguments.without_collapse() } else { *arguments };
-        let hierarchy = self.hierarchy().steps(encode, input, &single);
-        let mut steps = [encode.steps(input, arguments), hierarchy].concat();
+        let mut steps = Vec::new();
         if let Some(reinsertion) = optimise {
             let areas = match encode.primitives {
                 Primitives::Instances => Areas::of_instances(encode.codes.bounds),
@@ -461,6 +483,10 @@ impl Builder {
             };
             let part = if areas == Areas::Whole { 0 } else { arguments.where_most_is() };
             steps.extend(reinsertion.steps(arguments.structure, arguments.part(scratch.reinsertion), (areas, part)));
+            if reinsertion.is_alone() {
+                steps.push(collapse::alone_step(encode, input, arguments));
+                return steps;
+            }
         }
         if self.weighs() {
             steps.extend(collapse::weigh_steps(encode, arguments));

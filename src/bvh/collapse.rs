@@ -18,6 +18,11 @@ pub(super) fn place_steps(encode: &Encode, input: &Input, arguments: &arguments:
     kernels.map(|kernel| Step::new("collapse", kernel, arguments, encode.tiles())).into()
 }
 
+/// The one dispatch that does what [`weigh_steps`] and [`place_steps`] do, for a tree of few primitives. Label: `collapse`.
+pub(super) fn alone_step(encode: &Encode, input: &Input, arguments: &arguments::Build) -> Step {
+    Step::new("collapse", encode.reading_kernel(&shaders::BVH_COLLAPSE_ALONE, input), arguments, 1)
+}
+
 /// Writes the records of a tree that has the numbers of its primitives in their place to the address `records`. Label: `collapse`.
 pub(super) fn numbered_step(encode: &Encode, input: &Input, arguments: &arguments::Build, records: u64) -> Step {
     let kernel = encode.reading_kernel(&shaders::BVH_COLLAPSE_NUMBERED, input);

@@ -176,6 +176,8 @@ pub struct Reinsertion {
     first_round: u32,
     grid: Grid,
     shared: u32,
+    /// The invocations of the one workgroup that does all rounds of a build, if there is one.
+    alone_group: Option<u32>,
 }
 
 impl Reinsertion {
@@ -190,12 +192,24 @@ impl Reinsertion {
         let shared = tuning.build.reinsertion_shared.min(context.limits.shared_memory / bytes).min(STACK as u32);
         let slots = node_slots(primitive_count);
         let (stride, rounds) = (options.stride_for(slots), options.rounds_for(slots));
-        Reinsertion { slots, stride, rounds, first_round: 0, grid, shared }
+        Reinsertion { slots, stride, rounds, first_round: 0, grid, shared, alone_group: None }
     }
 
     /// The same from another round on: where a pass goes over many frames, the number of rounds that there were.
     pub fn from_round(self, first_round: u32) -> Reinsertion {
         Reinsertion { first_round: first_round % self.stride, ..self }
+    }
+
+    /// The same in one dispatch of a workgroup, as part of a build.
+    pub(super) fn alone(self, context: &Context) -> Reinsertion {
+        let group = context.tuning.build.alone_group;
+        let shared = self.shared.min(context.limits.shared_memory / (ENTRY_BYTES * group));
+        Reinsertion { alone_group: Some(group), shared, ..self }
+    }
+
+    /// Whether one workgroup does all rounds of a build.
+    pub(super) fn is_alone(&self) -> bool {
+        self.alone_group.is_some()
     }
 
     /// How many rounds are recorded: those of the options, and fewer where there are few links.
@@ -302,6 +316,11 @@ impl Reinsertion {
     pub(super) fn steps(&self, structure: u64, scratch: u64, (areas, part): (Areas, u64)) -> Vec<Step> {
         let run = self.run(structure, scratch, &Cost::Area).expect("areas have nothing to check");
         let run = Run { areas, part, ..run };
+        if let Some(workgroup) = self.alone_group {
+            let of_group = Reinsertion { grid: Grid { workgroup, ..self.grid }, ..*self };
+            let kernel = of_group.kernel(&shaders::BVH_REINSERTION_ALONE, false, areas);
+            return vec![Step::new(run.phase, kernel, &run.arguments(self.first_round), 1)];
+        }
         run.begin().into_iter().chain((0..self.rounds).flat_map(|round| run.round(round))).collect()
     }
 
@@ -379,6 +398,7 @@ impl Run {
             part,
             offset,
             stride: of.stride,
+            rounds: of.rounds,
             link_count: of.link_count(),
             by_rays,
         }

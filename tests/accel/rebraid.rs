@@ -6,7 +6,7 @@ use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
 use crate::common::probe::{IGNORE, ProbeRay, flags};
 use crate::common::shapes::{Corners, icosphere, placed, soup};
 use crate::common::world::World;
-use hedgerow::accel::{self, AccelOptions, Instance, REBRAID, Tree, Wide, twin};
+use hedgerow::accel::{self, AccelOptions, Instance, REBRAID, Request, Tree, Wide, twin};
 use hedgerow::ash::vk;
 use hedgerow::bvh::codes::{Binning, Code, CodeBounds};
 use hedgerow::bvh::layout::{self, Child, Record, Triangle, status};
@@ -323,4 +323,36 @@ fn fewer_instances_than_were_planned_for_are_opened_too() {
     tree.records().iter().filter(|r| r.structure != 0).for_each(|r| *counts.entry(r.instance).or_default() += 1);
     assert_eq!(counts.values().sum::<u32>(), tree.header().active);
     assert!(counts.keys().all(|&i| i < 120) && counts.values().any(|&n| n > 1), "{counts:?}");
+}
+
+/// Few entries are one node, and what one workgroup makes needs other memory than a chain: what is asked for must suffice for fewer, too.
+#[test]
+fn the_sizes_of_a_maximum_of_instances_suffice_for_every_smaller_count() {
+    let instances = vk::AccelerationStructureGeometryInstancesDataKHR::default()
+        .data(vk::DeviceOrHostAddressConstKHR { device_address: 16 });
+    let geometry = vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { instances });
+    let info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(vk::AccelerationStructureTypeKHR::TOP_LEVEL)
+        .geometries(std::slice::from_ref(&geometry));
+    let counts = (0..70).chain((7..20).flat_map(|bit| [-1, 0, 1, 300].map(|by| ((1i64 << bit) + by) as u32)));
+    let mut counts: Vec<u32> = counts.collect();
+    counts.sort_unstable();
+    for flags in [Flags::empty(), Flags::PREFER_FAST_BUILD, Flags::PREFER_FAST_TRACE, REBRAID, Flags::ALLOW_UPDATE] {
+        for wide in [Wide::Never, Wide::ByFlags, Wide::Always] {
+            let ours = Ours::with_options(device(), AccelOptions { wide, ..AccelOptions::DEFAULT });
+            let mut most = [0; 2];
+            for &count in &counts {
+                let sizes = ours.build_sizes(&info.flags(flags), &[count]);
+                let needed =
+                    Request::instances(16, count).with_flags(flags).sizes(&ours.0).expect("as many as there may be");
+                most = [most[0].max(needed.structure), most[1].max(needed.scratch)];
+                assert!(
+                    sizes.acceleration_structure_size >= most[0] && sizes.build_scratch_size >= most[1],
+                    "{count}, {flags:?}, {wide:?}: {sizes:?}, {most:?}"
+                );
+            }
+        }
+    }
 }

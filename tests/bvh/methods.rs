@@ -1,11 +1,12 @@
 //! The device's trees equal the host's, byte for byte, for every method, code and schedule, over inputs that hurt.
 
-use crate::common::corpus;
 use crate::common::twins::{assert_same, on_device, on_host};
-use hedgerow::bvh::builder::{BuildOptions, Method, Schedule, Treelets, Window};
+use crate::common::{corpus, device};
+use hedgerow::bvh::builder::{BuildOptions, Builder, Geometry, Input, Method, Schedule, Source, Treelets, Window};
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::reinsertion;
 use hedgerow::bvh::sah::Collapse;
+use hedgerow::gpu::Region;
 
 /// The trees of `methods`, one for each of some codes, by the chain; of the first also by the pool, whose kernels take long to
 /// compile.
@@ -50,9 +51,27 @@ fn optimised_trees_are_those_of_the_host() {
             let expected = on_host(&mesh, &options);
             let what = format!("{} {method:?}", mesh.0);
             expected.validate().unwrap_or_else(|e| panic!("{what}: {e}"));
-            assert_same(&on_device(&mesh, &options), &expected, &what);
+            // Without a schedule one workgroup optimises what is small.
+            for schedule in [None, Some(Schedule::Chain)] {
+                let got = on_device(&mesh, &BuildOptions { schedule, ..options });
+                assert_same(&got, &expected, &format!("{what} {schedule:?}"));
+            }
         }
     }
+}
+
+/// A dispatch for the tree, one for all rounds, one for leaves and records; of the chain each phase and each round has its own.
+#[test]
+fn small_optimised_trees_take_three_dispatches() {
+    let input = Input { source: Source::One(Geometry::mesh(16, 16, 3)), primitive_count: 200 };
+    let steps = |schedule| {
+        let optimise = Some(reinsertion::ReinsertionOptions::MEDIUM);
+        let options = BuildOptions { optimise, schedule, ..BuildOptions::DEFAULT };
+        let builder = Builder::new(device(), &options, input.primitive_count).expect("options that fit");
+        builder.steps(&input, Region::unbounded(16), Region::unbounded(16)).expect("memory without an end").len()
+    };
+    assert_eq!(steps(None), 3);
+    assert!(steps(Some(Schedule::Chain)) > 30, "{}", steps(Some(Schedule::Chain)));
 }
 
 #[test]

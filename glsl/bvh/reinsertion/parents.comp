@@ -1,12 +1,7 @@
 #version 460
 // Of each slot, the link that names it: see bvh/reinsertion.glsl for the contract.
-#include "bvh/reinsertion.glsl"
+#include "bvh/reinsertion/parents.glsl"
 
 void main() {
-    for (uint k = 0, slot = grid_item(0); slot < link_count / 2u; slot = grid_item(++k)) {
-        if (!is_used(slot)) continue;
-        Child left = structure.nodes[slot].left, right = structure.nodes[slot].right;
-        if (left.count == 0u) parents.word[left.index] = 2u * slot;
-        if (right.count == 0u) parents.word[right.index] = 2u * slot + 1u;
-    }
+    find_parents();
 }

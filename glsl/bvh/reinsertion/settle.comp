@@ -1,15 +1,8 @@
 #version 460
 // Leaves the moves that are first on all nodes of their path: see bvh/reinsertion.glsl for the contract.
-#include "bvh/reinsertion.glsl"
+#include "bvh/reinsertion/settle.glsl"
 
 void main() {
-    for (uint k = 0, i = grid_item(0); i < tried(); i = grid_item(++k)) {
-        Move m = moves.move[i];
-        if (m.to == NONE) continue;
-        bool is_first = true;
-        for (Path path = path_of(link_of(i), m); path.slot != NONE && is_first; advance(path)) {
-            is_first = firsts.word[path.slot] == ~link_of(i);
-        }
-        if (!is_first) moves.move[i].to = NONE;
-    }
+    begin_round(offset);
+    settle_moves();
 }

@@ -1,6 +1,7 @@
 // Collapses a Bvh2 into a wide tree: src/bvh/wide/device.rs records the steps, src/bvh/twin/wide.rs is the twin.
 //
 //   (choices)        bvh/wide/costs.glsl: which binary nodes a wide one takes in
+//   (cleared)        first_children, first_records
 //   reset            reads the source                            writes levels, opened[0]
 //   open, open_few   read the source, choices, opened of a level write slots, opened of the next level, levels, first_children,
 //                                                                 first_records
@@ -8,6 +9,7 @@
 //   (scans)          first_children, first_records: exclusive sums over the source's slots
 //   nodes            reads the source and all that               writes the target's header and nodes, places
 //   records          reads the source, places, partners          writes the target's records and table of geometries
+//   alone            all of that, by one workgroup, for a small tree
 //
 // Which binary nodes wide ones begin with is found from the root down, a level of wide nodes after the other. The list of a
 // level is in whatever order the atomics gave; nothing of it reaches the target: a node's index is one and the number of nodes
@@ -23,8 +25,8 @@
 //
 // Records of quantised nodes lie in units: of triangles 8 bytes each (bvh/wide/pairs.glsl), otherwise a record each.
 //
-// needs  first_children and first_records zeroed; one barrier before, between each two, and after; any number of workgroups, but
-//        one for reset and open_few; any subgroup size; no overlap of source, target and scratch
+// needs  one barrier before, between each two, and after; any number of workgroups, but one for reset, open_few and alone; any subgroup
+//        size; no overlap of source, target and scratch
 #ifndef HEDGEROW_BVH_WIDE_COLLAPSE
 #define HEDGEROW_BVH_WIDE_COLLAPSE
 #include "bvh/copy.glsl"
@@ -76,15 +78,18 @@ layout(push_constant, scalar) uniform WideCollapseArguments {
     uvec2 target;
     Levels levels;
     OpenedNodes opened;
+    Words links;             // see bvh/wide/costs.glsl
+    Floats costs;
     Words choices;           // of each of the source's slots
-    LinkCounts hits;         // of the source's links, by hits
+    LinkCounts visits;       // of the source's links, by visits
+    LinkCounts hits;         // and by hits
     Words slots;             // what names the children of each of opened, WIDTH words
     Words first_children;    // of each of the source's slots, and one more: the sum
     Words first_records;
     Words places;            // of quantised nodes: in which of the target's units each of the source's records lies
     Words partners;          // of each of the source's records, if it is a triangle: see pair.comp
     uvec2 given_records;     // the source's, which has the numbers of its primitives in their place; 0: they are there
-    uint source_slots;
+    uint source_slots;       // at most
     uint capacity;           // of opened
     uint level;
     uint level_end;

@@ -1,46 +1,38 @@
 // Which binary nodes a wide node takes in, so that all wide nodes together cost least: src/bvh/twin/wide/costs.rs is the twin and has
 // the rules, src/bvh/wide/device.rs records the step.
 //
-//   links  reads the source                     writes links, starts; choices: how many of a node's children are nodes
-//   costs  reads the source, links, starts      writes choices; scratch: costs
+//   links  reads the source            writes links; choices: how many of a node's children are nodes
+//   costs  reads the source, links     writes choices; scratch: costs
 //
 // A climb begins at each node over two leaves; of two inner children the second that is done goes on with their parent.
 //
 // needs  a barrier before, between both and behind; both with as many workgroups of the same size; any subgroup size
 #ifndef HEDGEROW_BVH_WIDE_COSTS
 #define HEDGEROW_BVH_WIDE_COSTS
-#include "gpu/pass.glsl"
-#include "bvh/copy.glsl"
-#include "bvh/counts.glsl"
-#include "bvh/sah.glsl"
-#include "bvh/wide.glsl"
 #include "bvh/wide/choice.glsl"
-#extension GL_EXT_control_flow_attributes : require
+#include "bvh/wide/collapse.glsl"
 
-layout(constant_id = 2) const uint WIDTH = 4;
 // Whether nodes cost what rays were counted in them, rather than their area.
-layout(constant_id = 3) const bool BY_VISITS = false;
+layout(constant_id = 7) const bool BY_VISITS = false;
 
 // src/bvh/wide/mod.rs
 const float PRIOR_RAYS = 8.0;
 
 const uint NO_LINK = 0xFFFFFFFFu;
 
-layout(push_constant, scalar) uniform WideCostsArguments {
-    Structure source;
-    Words links;          // of each node slot, what names it: its place among all children, twice the parent's slot and one for the right one
-    Words starts;         // of each invocation, one at each of its slots: nodes over two leaves, and NO_LINK behind the last
-    Floats costs;         // WIDTH - 1 for each node slot: in 1, 2 and more places
-    Words choices;        // of each node slot
-    LinkCounts counts;    // of the source's links, by visits
-    uint slots;           // at most
-};
+// links.word    of each of source_slots, what names the node: its place among all children, twice the parent's slot and one for the right
+//               one; behind them of each invocation, one at each of its slots, nodes over two leaves, and NO_LINK behind the last
+// costs.value   WIDTH - 1 of each of source_slots: in 1, 2 and more places
+
+uint start_at(uint i) {
+    return source_slots + i;
+}
 
 // How many slots there are to look at.
 uint slots_in_use() {
     Header header = source.header;
     bool usable = is_binary(header) && compacted(header).active_count != 0u;
-    return usable && header.root.count == 0u && header.node_slots <= slots ? header.node_slots : 0u;
+    return usable && header.root.count == 0u && header.node_slots <= source_slots ? header.node_slots : 0u;
 }
 
 bool is_inner(Child child, uint node_slots) {
@@ -72,8 +64,8 @@ float own_cost(Child left, Child right, uint link) {
     float area = scaled_half_area(Box(min(left.lo, right.lo), max(left.hi, right.hi)), scale);
     if (!BY_VISITS || link == NO_LINK) return area;
     Child root = source.header.root;
-    precise float visits = float(counts.count[link].entered) * scaled_half_area(Box(root.lo, root.hi), scale);
-    precise float weight = visits + PRIOR_RAYS * area;
+    precise float entered = float(visits.count[link].entered) * scaled_half_area(Box(root.lo, root.hi), scale);
+    precise float weight = entered + PRIOR_RAYS * area;
     return weight;
 }
 
@@ -129,16 +121,16 @@ void find_links(uint node_slots) {
         if (of_left) links.word[left.index] = 2u * slot;
         if (of_right) links.word[right.index] = 2u * slot + 1u;
         choices.word[slot] = uint(of_left) + uint(of_right);
-        if (!of_left && !of_right) starts.word[grid_item(found++)] = slot;
+        if (!of_left && !of_right) links.word[start_at(grid_item(found++))] = slot;
     }
     uint end = grid_item(found);
-    if (end < node_slots) starts.word[end] = NO_LINK;
+    if (end < node_slots) links.word[start_at(end)] = NO_LINK;
 }
 
 // The `k`th node of this invocation's over two leaves, or NO_LINK.
 uint start_of(uint k, uint node_slots) {
     uint at = grid_item(k);
-    return at < node_slots ? starts.word[at] : NO_LINK;
+    return at < node_slots ? links.word[start_at(at)] : NO_LINK;
 }
 
 // All climbs that are this invocation's. As soon as one has ended the next one begins: lanes do not wait for each other at the root.

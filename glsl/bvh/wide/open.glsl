@@ -1,4 +1,4 @@
-// The step `open` of bvh/wide/collapse.glsl: finds the children of a wide node, and lists those that are nodes.
+// The steps `reset`, `open` and `open_few` of bvh/wide/collapse.glsl: find the children of a wide node, and list those that are nodes.
 #ifndef HEDGEROW_BVH_WIDE_OPEN
 #define HEDGEROW_BVH_WIDE_OPEN
 #include "bvh/wide/choice.glsl"
@@ -185,6 +185,32 @@ void open(uint i, uvec2 of, uint level) {
             if (child.z == 0 && next < capacity) opened.node[next++] = Opened(child.y, slot << 3 | rank);
             if (child.z == 0 || is_long(child.z)) rank++;
         }
+    }
+}
+
+// One workgroup: the root as the only node of the first level.
+void reset() {
+    Header header = source.header;
+    bool there_is = can_be_collapsed(header);
+    for (uint l = gl_LocalInvocationIndex; l < LEVELS_AT_MOST; l += gl_WorkGroupSize.x) {
+        levels.count[l] = l == 0 && there_is ? 1 : 0;
+    }
+    if (gl_LocalInvocationIndex == 0) {
+        levels.first[0] = 0;
+        levels.end = 0;
+    }
+    // A tree that is a leaf has no slot: the first one then stands for it.
+    if (gl_LocalInvocationIndex == 0) opened.node[0] = Opened(is_inner(header.root) ? header.root.index : 0, 0);
+}
+
+// One workgroup: the nodes of several levels, as far as there are any.
+void open_levels(uint first, uint end) {
+    for (uint l = first; l < end; ++l) {
+        uvec2 of = opened_of(l);
+        if (of.y == 0) break;
+        for (uint i = gl_LocalInvocationIndex; i - gl_LocalInvocationIndex < of.y; i += gl_WorkGroupSize.x) open(i, of, l);
+        if (gl_LocalInvocationIndex == 0) note_end(l, of.x + of.y);
+        next_phase();
     }
 }
 #endif

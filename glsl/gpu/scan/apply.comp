@@ -6,5 +6,5 @@ void main() {
     uint tile = group_number();
     uint tile_words = gl_WorkGroupSize.x * rounds;
     uint first = tile * tile_words;
-    scan_range(values, results, first, min(count, first + tile_words), sums.word[tile]);
+    scan_range(values, results, first, min(count, first + tile_words), sums.word[tile], EACH);
 }

@@ -5,6 +5,6 @@
 void main() {
     uint tile_words = gl_WorkGroupSize.x * rounds;
     uint tiles = count / tile_words + (count % tile_words != 0 ? 1 : 0);
-    uint total = scan_range(sums, sums, 0, tiles, 0);
+    uint total = scan_range(sums, sums, 0, tiles, 0, EACH);
     if (gl_LocalInvocationIndex == 0) sums.word[tiles] = total;
 }

@@ -89,10 +89,9 @@ struct Scratch {
     /// What is in use until the nodes are there, and what is until the records are.
     passing: Plan<WidePhase>,
     lasting: Plan<WidePhase>,
-    /// Of each of the source's slots what was chosen, its link, a node that climbs begin at, and its costs.
+    /// Of each of the source's slots what was chosen, its link with a node that climbs begin at, and its costs.
     choices: u64,
     links: u64,
-    starts: u64,
     costs: u64,
     levels: u64,
     opened: u64,
@@ -144,7 +143,7 @@ impl WidePass {
         let of_slots = u64::from(node_slots(self.count));
         let choices = take("choices", of_slots, WidePhase::Costs..=WidePhase::Open);
         let mut of_costs = |name, words| take(name, words * of_slots, WidePhase::Costs..=WidePhase::Costs);
-        let [links, starts] = ["links", "starts of climbs"].map(|name| of_costs(name, 1));
+        let links = of_costs("links, and starts of climbs", 2);
         let costs = of_costs("costs in so many places", width - 1);
         let levels = take("levels", LEVEL_WORDS, WidePhase::Open..=WidePhase::Nodes);
         let opened = take("opened nodes", 2 * nodes, WidePhase::Open..=WidePhase::Nodes);
@@ -167,7 +166,6 @@ impl WidePass {
             lasting,
             choices,
             links,
-            starts,
             costs,
             levels,
             opened,
@@ -201,40 +199,27 @@ impl WidePass {
         self.options.form.is_quantised() && self.options.primitives == Primitives::Triangles
     }
 
-    fn kernel(&self, shader: &'static shaders::Shader, by_hits: bool) -> Kernel {
+    fn kernel(&self, shader: &'static shaders::Shader, [by_visits, by_hits]: [bool; 2]) -> Kernel {
         let workgroup = if one_workgroup(shader) { self.few } else { self.grid.workgroup };
         let WideOptions { form, .. } = self.options;
         let [quantised, in_registers] = [form.is_quantised(), self.in_registers].map(u32::from);
         // What `SOURCE_WORD` of glsl/bvh/geometry.glsl is without a value.
         let source_word = 0;
-        let constants = [self.grid.rounds, form.width(), quantised, in_registers, source_word, by_hits.into()];
+        let by = [by_hits, by_visits].map(u32::from);
+        let constants = [self.grid.rounds, form.width(), quantised, in_registers, source_word, by[0], by[1]];
         Kernel::new(shader, workgroup, &constants)
     }
 
-    /// What nodes cost, by surface area or by visits, and what is chosen by it.
-    fn costs_steps(&self, source: u64, visits: u64, passing: u64) -> [Step; 2] {
-        let parts = self.scratch();
-        let arguments = arguments::WideCosts {
-            source,
-            links: passing + parts.links,
-            starts: passing + parts.starts,
-            costs: passing + parts.costs,
-            choices: passing + parts.choices,
-            counts: visits,
-            slots: node_slots(self.count),
-        };
-        let constants = [self.grid.rounds, self.options.form.width(), u32::from(visits != 0)];
-        [&shaders::BVH_WIDE_LINKS, &shaders::BVH_WIDE_COSTS].map(|shader| {
-            let kernel = Kernel::new(shader, self.grid.workgroup, &constants);
-            Step::new(PHASE, kernel, &arguments, self.grid.groups_for(arguments.slots))
-        })
+    /// Whether one workgroup does everything.
+    fn is_alone(&self) -> bool {
+        self.options.form.nodes_at_most(self.count) <= self.alone
     }
 
     /// The levels that are opened by many workgroups, a dispatch each. Those before and behind are done by one workgroup, which
     /// ends where the tree does; trees of scenes have ended by then. No dispatches for a tree that is small at all.
     fn levels_by_many(&self) -> Range<u32> {
         let nodes = self.options.form.nodes_at_most(self.count);
-        if nodes <= self.alone {
+        if self.is_alone() {
             return 0..0;
         }
         // A full tree has as many levels as the logarithm; trees of scenes have less than twice that.
@@ -295,7 +280,6 @@ impl WidePass {
         [visits, hits]: [u64; 2],
         memory: &WideMemory,
     ) -> Result<[Vec<Step>; 2]> {
-        let kernel = |shader| self.kernel(shader, hits != 0);
         if self.is_paired() && self.count > pairs::TRIANGLES_AT_MOST {
             return Err(Error::Argument(format!(
                 "{} triangles in quantised nodes: they hold at most {}; split the mesh or take another form",
@@ -311,7 +295,10 @@ impl WidePass {
             target,
             levels: passing + parts.levels,
             opened: passing + parts.opened,
+            links: passing + parts.links,
+            costs: passing + parts.costs,
             choices: passing + parts.choices,
+            visits,
             hits,
             slots: passing + parts.slots,
             first_children: passing + parts.first_children,
@@ -324,14 +311,20 @@ impl WidePass {
             level: 0,
             level_end: 0,
         };
-        let step =
-            |shader, arguments: &arguments::WideCollapse, groups| Step::new(PHASE, kernel(shader), arguments, groups);
+        let step = |shader, arguments: &arguments::WideCollapse, groups| {
+            Step::new(PHASE, self.kernel(shader, [visits != 0, hits != 0]), arguments, groups)
+        };
+        if self.is_alone() && records == [0; 2] {
+            return Ok([vec![step(&shaders::BVH_WIDE_ALONE, &arguments, 1)], Vec::new()]);
+        }
         let cleared = ((parts.sums - parts.first_children) / 4) as u32;
-        let mut steps = self.costs_steps(source, visits, passing).to_vec();
-        steps.extend([
+        let of_slots = self.grid.groups_for(arguments.source_slots);
+        let mut steps = vec![
+            step(&shaders::BVH_WIDE_LINKS, &arguments, of_slots),
+            step(&shaders::BVH_WIDE_COSTS, &arguments, of_slots),
             fill::step(PHASE, arguments.first_children, cleared, 0),
             step(&shaders::BVH_WIDE_RESET, &arguments, 1),
-        ]);
+        ];
         let few = |level, level_end| {
             (&shaders::BVH_WIDE_OPEN_FEW, arguments::WideCollapse { level, level_end, ..arguments }, 1)
         };
@@ -359,5 +352,5 @@ impl WidePass {
 
 /// Whether a step is dispatched as one workgroup.
 fn one_workgroup(shader: &'static shaders::Shader) -> bool {
-    [&shaders::BVH_WIDE_RESET, &shaders::BVH_WIDE_OPEN_FEW].contains(&shader)
+    [&shaders::BVH_WIDE_RESET, &shaders::BVH_WIDE_OPEN_FEW, &shaders::BVH_WIDE_ALONE].contains(&shader)
 }
