@@ -5,10 +5,14 @@ use crate::common::device;
 use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
 use crate::common::shapes::icosphere;
 use crate::common::world::World;
-use hedgerow::accel::{AccelOptions, Instance, REBRAID, twin};
+use hedgerow::accel::{AccelOptions, Instance, REBRAID, Tree, twin};
 use hedgerow::ash::vk;
 use hedgerow::bvh::builder::{BuildOptions, Builder};
 use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::layout::Child;
+use hedgerow::bvh::wide::Form;
+use hedgerow::bvh::wide::layout::WideNode;
+use std::collections::BTreeSet;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 
 /// Where things are far: at 2^`e`, in one axis or three, to either side in turn.
@@ -116,6 +120,50 @@ fn what_is_near_is_opened_before_what_is_far_however_large() {
         let (alone, with_far) = (opened(&[]), opened(&far(20, 60, 3)));
         assert!(alone > 2 * near, "{alone} entries of {near} instances");
         assert!(with_far >= alone, "{with_far} entries of {near} instances with something far, {alone} without");
+    }
+}
+
+/// The instances below each child of the root.
+fn below_the_root(read: &ReadBack) -> Vec<BTreeSet<u32>> {
+    let Tree::OfEight(tree) = &read.top else { panic!("a fast trace has nodes of eight") };
+    let below = |child: Child| {
+        let (mut instances, mut waiting) = (BTreeSet::new(), vec![child]);
+        while let Some(child) = waiting.pop() {
+            let (of_leaf, node) = match child.is_leaf() {
+                true => (Some((child.index, child.count)), None),
+                false => (tree.nodes[child.index as usize].long_leaf(), Some(&tree.nodes[child.index as usize])),
+            };
+            if let Some((first, count)) = of_leaf {
+                let records = &tree.records[tree.places.records(first, count)];
+                instances.extend(records.iter().map(|record| record.instance));
+            }
+            waiting.extend(node.into_iter().flat_map(|node| node.children()).flatten());
+        }
+        instances
+    };
+    tree.nodes[0].children().into_iter().flatten().map(below).collect()
+}
+
+/// In cells as large as the way to what is far, all that is near would be one box: it has a node of its own, which costs one node more.
+#[test]
+fn all_that_is_near_is_one_child_of_the_root() {
+    let ours = Ours::on(device());
+    for (side, count, axes, e) in [(2, 1, 1, 14), (4, 1, 3, 60), (4, 20, 1, 60), (7, 30, 3, 14)] {
+        let near = side * side * side;
+        let has_near = |instances: &&BTreeSet<u32>| instances.iter().any(|&instance| instance < near);
+        let root = |far: &[Instance]| {
+            let read = ReadBack::new(&ours, &grid(side, far, Flags::PREFER_FAST_TRACE));
+            let header = read.top.header();
+            assert!(header.inner_nodes <= Form::EightQuantised.nodes_at_most(header.active), "{header:?}");
+            below_the_root(&read)
+        };
+        let what = format!("{side}³ and {count} at 2^{e} in {axes}");
+        let with_far = root(&far(count, e, axes));
+        let of_near: Vec<_> = with_far.iter().filter(has_near).collect();
+        assert_eq!(of_near.len(), 1, "{what}: {with_far:?}");
+        assert!(of_near[0].iter().copied().eq(0..near), "{what}: {of_near:?}");
+        let alone = root(&[]);
+        assert!(alone.iter().filter(has_near).count() > 1, "{what}: {alone:?}");
     }
 }
 
