@@ -164,7 +164,7 @@ pub(super) const LEAST_GAIN: f32 = 1.0 / 1_152_921_504_606_846_976.0;
 const MOVE_BYTES: u64 = 12;
 /// Of two sums and a ratio by rays; a multiple of 16.
 const TOTALS_BYTES: u64 = 32;
-/// Bytes of an entry of a search's stack, `Below` in reinsertion_search.comp.
+/// Bytes of an entry of a search's stack, `Below` in glsl/bvh/reinsertion/search.glsl.
 const ENTRY_BYTES: u32 = 8;
 
 /// Rounds of reinsertion, for one device and a number of primitives.
