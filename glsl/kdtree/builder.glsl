@@ -303,12 +303,6 @@ uint task_of_chunk(uint of_level, uint chunk) {
 shared uint partial[gl_WorkGroupSize.x < 64u ? 64u : gl_WorkGroupSize.x];
 shared uint agreed;
 
-// What one step of a workgroup has written to memory, the next reads.
-void next_step() {
-    controlBarrier(gl_ScopeWorkgroup, gl_ScopeWorkgroup, gl_StorageSemanticsBuffer | gl_StorageSemanticsShared,
-                   gl_SemanticsAcquireRelease | gl_SemanticsMakeAvailable | gl_SemanticsMakeVisible);
-}
-
 // The sum of what lanes before have, and of all.
 uint sum_before(uint value, out uint total) {
     uint before = subgroupExclusiveAdd(value);

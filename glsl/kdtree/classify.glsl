@@ -113,7 +113,7 @@ void kd_classify_chunk(uint chunk, uint of_level) {
         Box cell = Box(t.lo, t.hi);
         fill_bins(references, cell, begin, end);
         settle(tasks, i, cell, t.count, best_of_bins(cell, state.area_scale, t.count));
-        next_step();
+        next_phase();
         t.split = tasks.task[i].split;
         t.plane = tasks.task[i].plane;
     }

@@ -238,7 +238,7 @@ void kd_root() {
         add_task(sums, count, 0u);
         publish_level(0u, sums, count);
     }
-    next_step();
+    next_phase();
     // One task, of the first invocation.
     KdTask root = new_task(cell, 0u, gl_LocalInvocationIndex == 0u ? count : 0u, 0u), none = new_task(cell, 0u, 0u, 0u);
     Sums sums = no_sums();

@@ -55,7 +55,7 @@ bool kd_sum_chunk(uint chunk, uint of_level) {
     if (!is_last_of(arrived, tiles_of(chunks))) return false;
     uvec2 all = scan_pairs(tiles, 0u, tiles_of(chunks));
     if (gl_LocalInvocationIndex == 0u) tiles.side[tiles_of(chunks)] = all;
-    next_step();
+    next_phase();
     return true;
 }
 
@@ -195,7 +195,7 @@ Sums scan_tiles(uint tiles) {
     KdSums sums = task_tiles();
     Words words = Words(uvec2(sums));
     for (uint word = 0; word < WORDS; ++word) scan_words(words, word, WORDS, tiles);
-    next_step();
+    next_phase();
     return sums.tile[tiles];
 }
 
@@ -265,7 +265,7 @@ void kd_end_level(uint of_level) {
 void kd_scan(uint of_level) {
     uint tiles = tiles_of(build_state().task_count[of_level]);
     for (uint tile = 0; tile < tiles; ++tile) kd_sum_tile(tile, of_level);
-    next_step();
+    next_phase();
     kd_end_level(of_level);
 }
 

@@ -209,7 +209,7 @@ uvec2 part(uint set, uint count, KdReferences right, uint right_at) {
         counts += total;
         base += gl_WorkGroupSize.x;
     } while (base < count);
-    next_step();
+    next_phase();
     return counts;
 }
 
@@ -281,7 +281,7 @@ KdBuilt build_small(KdReferences from, uint begin, uint count, Box cell, uint de
             tallies.y += 1u;
             if (waiting == 0u) break;
             waiting--;
-            next_step();
+            next_phase();
             KdWaiting next = stack.waiting.waiting[waiting];
             load_references(set, stack.references, waiting * EXACT, next.count);
             count = next.count;
@@ -290,7 +290,7 @@ KdBuilt build_small(KdReferences from, uint begin, uint count, Box cell, uint de
             slot = next.slot;
         }
     }
-    next_step();
+    next_phase();
     return KdBuilt(nodes, references, tallies, deepest);
 }
 
@@ -325,7 +325,7 @@ void write_subtree(uint s, KdTask t, KdReferences level_references, KdStack stac
         atomicAdd(state.subtree_empty, tallies.z);
         atomicMax(state.depth, depth);
     }
-    next_step();
+    next_phase();
     uint nodes_at = subtrees.subtree[s].nodes_at, references_at = subtrees.subtree[s].references_at;
     Words to_references = Words(state.leaf_references);
     if (nodes_at == NONE) {

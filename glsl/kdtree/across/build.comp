@@ -75,7 +75,7 @@ void main() {
                 if (is_shared) before = sides_of_chunks(t).side[chunk];
                 distribute_references(arena(), arena(), begin, end, uvec2(t.spare, t.right_at) + before);
             }
-            next_step();
+            next_phase();
             if (is_shared && !chunk_pool_finish(pool, slot)) continue;
 
             // The phase is over: what comes next. (The thesis' post-processing.)
@@ -90,7 +90,7 @@ void main() {
                 is_leaf = !place_children(t, sides);
             }
             has_task = phase != TO_DISTRIBUTE && !is_leaf;
-            next_step();
+            next_phase();
             if (has_task && is_shared) {
                 // The last chunk of the next phase is the worker's own.
                 chunk = chunks - 1u;

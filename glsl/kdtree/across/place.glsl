@@ -110,7 +110,7 @@ void kd_sum_drafts(uint tile, uint of_level) {
             order.word[0] = build_state().active_count;
             across.before[0] = uvec4(min(across.node_count, 1u), 0u, 0u, 0u);
         }
-        next_step();
+        next_phase();
     }
     uvec2 level = drafts_of_level(of_level);
     uint first = level.x, count = level.y, end = min(tile * TILE + TILE, count);

@@ -17,7 +17,7 @@ void main() {
         across.reference_count = count;
     }
     clear_pieces();
-    next_step();
+    next_phase();
     KdCellTask t;
     t.lo = cell.lo;
     t.hi = cell.hi;
@@ -45,7 +45,7 @@ void main() {
     // Shared.
     if (own_count == 0u) return;
     uint slot = chunk_pool_slot(chunk_pool());
-    next_step();
+    next_phase();
     if (gl_LocalInvocationIndex == 0u) slot_tasks().task[slot] = own_tasks().task[0];
     count_alive(1u);
     chunk_pool_publish(chunk_pool(), slot, 1u, 0u);

@@ -82,7 +82,7 @@ void push_task(KdCellTask t) {
 
 KdCellTask pop_task() {
     own_count -= 1u;
-    next_step();
+    next_phase();
     KdCellTask t = own_tasks().task[(own_first + own_count) % OWN_TASKS];
     barrier();
     return t;
@@ -109,7 +109,7 @@ void offer_task() {
     if (agree(idle) == 0u) return;
     uint slot = chunk_pool_slot(chunk_pool());
     if (slot == NONE) return;
-    next_step();
+    next_phase();
     if (gl_LocalInvocationIndex == 0u) slot_tasks().task[slot] = own_tasks().task[own_first % OWN_TASKS];
     own_first = (own_first + 1u) % OWN_TASKS;
     own_count -= 1u;
@@ -177,7 +177,7 @@ bool build_subtree(KdCellTask t) {
     own_subtrees += uvec3(1u, built.nodes, built.references);
     own_depth = max(own_depth, built.deepest);
     done_with = uvec2[2](uvec2(t.begin, t.room), uvec2(t.spare, t.spare_room));
-    next_step();
+    next_phase();
     return true;
 }
 
