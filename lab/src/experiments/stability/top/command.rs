@@ -180,13 +180,13 @@ pub(in crate::experiments::stability) fn run(
 
 /// The worst of all e, over e = 0, and the e that has it.
 fn table(points: &[TopGrowth]) -> String {
-    let header = ["scene", "top level", "far", "bits", "cost", "speed", "build", "frame"];
+    let header = ["scene", "top level", "far", "bits", "cost", "visits", "speed", "build", "frame"];
     let mut table = tables::table(&header, 3);
     for row in rows(points) {
         let worst = |worst: page::top::Worst| {
             worst.map_or_else(|| "-".to_owned(), |(value, e)| format!("{} at {e}", three_digits(value)))
         };
-        let figures = [row.cost(), row.speed(), row.build(), row.frame()].map(worst);
+        let figures = [row.cost(), row.visits(), row.speed(), row.build(), row.frame()].map(worst);
         let what = [row.scene.to_owned(), row.builder.to_string(), row.by.to_string(), row.code_bits().to_string()];
         table.add_row(what.into_iter().chain(figures));
     }
