@@ -7,11 +7,18 @@
 // zero, and costs would be compared otherwise.
 const float SHORTEST = 8.881784197001252e-16;   // 2^-50
 
-float scaled_half_area(Box b, float scale) {
+vec3 scaled_edges(Box b, float scale) {
     precise vec3 e = b.hi * scale - b.lo * scale;
-    e = mix(vec3(0.0), e, greaterThanEqual(abs(e), vec3(SHORTEST)));
+    return mix(vec3(0.0), e, greaterThanEqual(abs(e), vec3(SHORTEST)));
+}
+
+float half_area_of_edges(vec3 e) {
     precise float area = e.x * e.y + e.y * e.z + e.z * e.x;
     return area;
+}
+
+float scaled_half_area(Box b, float scale) {
+    return half_area_of_edges(scaled_edges(b, scale));
 }
 
 // Of `count` primitives with this area, a test of one costing c_i.

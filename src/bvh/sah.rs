@@ -55,15 +55,23 @@ pub fn area_scale_for(scene: &Aabb, part: &Aabb) -> f32 {
 pub(crate) const SHORTEST: f32 = 1.0 / (1u64 << 50) as f32;
 
 impl Aabb {
-    /// [`Aabb::half_area`] of the box scaled by `scale`, in the order of operations that the device uses. Edges of less than 2^-50
-    /// count as none.
-    pub fn scaled_half_area(&self, scale: f32) -> f32 {
-        let [x, y, z]: [f32; 3] = std::array::from_fn(|i| {
+    /// The edges of the box scaled by `scale`, in the order of operations that the device uses. Those of less than 2^-50 count as none.
+    pub(crate) fn scaled_edges(&self, scale: f32) -> [f32; 3] {
+        std::array::from_fn(|i| {
             let edge = self.hi[i] * scale - self.lo[i] * scale;
             if edge.abs() >= SHORTEST { edge } else { 0.0 }
-        });
-        x * y + y * z + z * x
+        })
     }
+
+    /// [`Aabb::half_area`] of the box scaled by `scale`. Edges of less than 2^-50 count as none.
+    pub fn scaled_half_area(&self, scale: f32) -> f32 {
+        half_area_of_edges(self.scaled_edges(scale))
+    }
+}
+
+/// Half of the area of a box with these edges, in the order of operations that the device uses.
+pub(crate) fn half_area_of_edges([x, y, z]: [f32; 3]) -> f32 {
+    x * y + y * z + z * x
 }
 
 #[cfg(test)]

@@ -47,8 +47,6 @@ layout(constant_id = 6) const bool BY_HITS = false;
 const uint LEVELS_BY_COST = 24;
 const float PRIOR_WORK = 24.0;
 const uint LEVELS_AT_MOST = 64;
-// src/bvh/wide/mod.rs: by how much the box of a child of the root may grow in the root's cells.
-const float LOST = 1.5;
 // Leaves of more triangles are nodes of their own: a byte holds the units of others, if none are pairs.
 const uint LEAF_MAX_TRIANGLES = LEAF_MAX / UNITS_OF_ONE;
 // In place of a partner: alone, or the second of a pair. Otherwise how many records behind it the second lies, and above 4 bits

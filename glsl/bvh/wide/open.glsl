@@ -13,22 +13,32 @@ uint open_places[8];
 // Which child comes first, second and so on where the source's left-first walk meets them: four bits each.
 uint open_order;
 
-// Whether boxes in a child would be blown up, were they in cells of a quantised node as large as the whole tree.
-bool is_lost_in(Child child, Child whole) {
+// Edges of a child's box, of an area that counts.
+vec3 edges_of(Child child) {
+    return scaled_edges(Box(child.lo, child.hi), source.header.area_scale);
+}
+
+// Half of the area of a box in a quantised root: it may be a cell longer.
+float area_in_root(Child child) {
+    precise vec3 edges = edges_of(child) + edges_of(source.header.root) * (1.0 / 128.0);
+    return half_area_of_edges(edges);
+}
+
+// Whether a visit of an inner child of a quantised root costs less than to have its children in the root, whose cells may be much larger
+// than they are.
+bool is_closed(Child child) {
     if (!QUANTISED) return false;
-    precise vec3 extent = child.hi - child.lo;
-    precise vec3 grown = extent + (whole.hi - whole.lo) * (1.0 / 128.0);
-    precise float area = extent.x * extent.y + extent.y * extent.z + extent.z * extent.x;
-    precise float grown_area = grown.x * grown.y + grown.y * grown.z + grown.z * grown.x;
-    precise float most = LOST * area;
-    return grown_area > most;
+    Child left = child_named(2 * child.index), right = child_named(2 * child.index + 1);
+    precise float opened = area_in_root(left) + area_in_root(right);
+    precise float closed = area_in_root(child) + (half_area_of_edges(edges_of(left)) + half_area_of_edges(edges_of(right)));
+    return opened > closed;
 }
 
 // A child that is given so many places, of which it takes what makes it cheaper.
 void put_child(uint at, uint name, uint places, uint level) {
     Child child = child_named(name);
     if (!is_inner(child)) places = 1;
-    else if (level == 0 && is_lost_in(child, source.header.root)) places = 0;
+    else if (level == 0 && is_closed(child)) places = 0;
     else if (level < LEVELS_BY_COST && places > 1) places = places_by(choices.word[child.index], places);
     vec3 middle = QUANTISED ? quarter_middle(child.lo, child.hi) : vec3(0);
     if (IN_REGISTERS) {

@@ -5,9 +5,10 @@ mod costs;
 use self::costs::{Choice, choices_of};
 use crate::bvh::counts::LinkCount;
 use crate::bvh::layout::{Bvh2, Child, Record};
+use crate::bvh::sah::half_area_of_edges;
 use crate::bvh::wide::layout::{Slots, Wide, WideNode, is_paired, leaf_max};
 use crate::bvh::wide::pairs::{self, Part, Places};
-use crate::bvh::wide::{LEVELS_BY_COST, LOST, PRIOR_WORK};
+use crate::bvh::wide::{LEVELS_BY_COST, PRIOR_WORK};
 use crate::geometry::Aabb;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -194,8 +195,8 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> 
     for level in 0.. {
         let mut next_level = Vec::new();
         for (root, place) in this_level {
-            let is_lost = |child: &Child| level == 0 && N::FORM.is_quantised() && is_lost_in(child, &root);
-            let children = open(tree, &choices, (&root, level), is_lost, width, counts.ordered_by);
+            let is_closed = |child: &Child| level == 0 && N::FORM.is_quantised() && is_closed(tree, child);
+            let children = open(tree, &choices, (&root, level), is_closed, width, counts.ordered_by);
             let mut slots = [None; 8];
             if N::FORM.is_quantised() && tree.header.child_order == 0 {
                 slots = octant_slots(&children);
@@ -216,13 +217,18 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> 
     unreachable!("a tree has an end")
 }
 
-/// Whether boxes in a child would be blown up, were they in cells of a quantised node as large as the whole tree: then the root does not
-/// take in what is below it.
-fn is_lost_in(child: &Child, whole: &Child) -> bool {
-    let half_area = |[x, y, z]: [f32; 3]| x * y + y * z + z * x;
-    let (extent, of_whole) = (child.bounds().extent(), whole.bounds().extent());
-    let grown = std::array::from_fn(|i| extent[i] + of_whole[i] * (1.0 / 128.0));
-    half_area(grown) > LOST * half_area(extent)
+/// Whether a visit of an inner child of a quantised root costs less than to have its children in the root, whose cells may be much larger
+/// than they are: boxes in the root may be a cell longer.
+fn is_closed<R: Record>(tree: &Bvh2<R>, child: &Child) -> bool {
+    let edges = |child: &Child| child.bounds().scaled_edges(tree.header.area_scale);
+    let area = |child: &Child| half_area_of_edges(edges(child));
+    let whole = edges(&tree.header.root);
+    let area_in_root = |child: &Child| {
+        let edges = edges(child);
+        half_area_of_edges(std::array::from_fn(|i| edges[i] + whole[i] * (1.0 / 128.0)))
+    };
+    let [left, right] = &tree.nodes[child.index as usize].children;
+    area_in_root(left) + area_in_root(right) > area_in_root(child) + (area(left) + area(right))
 }
 
 /// A child of a wide node: its link, and how many places it takes among the children. One of several is opened; 0: one that must not be.
@@ -240,7 +246,7 @@ fn open<R: Record>(
     tree: &Bvh2<R>,
     choices: &[Choice],
     (root, level): (&Child, u32),
-    is_lost: impl Fn(&Child) -> bool,
+    is_closed: impl Fn(&Child) -> bool,
     width: u32,
     ordered_by: &[LinkCount],
 ) -> Vec<Child> {
@@ -257,7 +263,7 @@ fn open<R: Record>(
             let child = tree.nodes[child.index as usize].children[side as usize];
             let takes = match () {
                 () if child.is_leaf() => places,
-                () if is_lost(&child) => 0,
+                () if is_closed(&child) => 0,
                 () if !by_cost => places,
                 () => choice(&child).places_of(places),
             };

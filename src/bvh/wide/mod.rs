@@ -40,10 +40,6 @@ pub(crate) const PRIOR_RAYS: f32 = 8.0;
 /// [`PRIOR_RAYS`], each of which takes a step of 3 and ends nowhere.
 pub(crate) const PRIOR_WORK: f32 = 24.0;
 
-/// A child of the root whose box would grow by more than this, in cells as large as the whole tree asks for, stays a node of its own: what
-/// is below it is not taken into the root.
-pub(crate) const LOST: f32 = 1.5;
-
 /// Levels of wide nodes that are made to cost least. Nodes further down are opened level by level, so that a node takes in
 /// two binary levels of four children and three of eight, however the tree is shaped: what a ray puts off is bounded by that.
 /// Trees of scenes end long before.
