@@ -2,7 +2,8 @@
 //
 // The stack is one: the entries of the bottom-level structure at hand lie above those of the top level. Each round takes a step
 // of each kind that there is to take (what waits, an instance, a node, a primitive): invocations that wait for each other's steps
-// are fewer than with a loop for each kind.
+// are fewer than with a loop for each kind. The steps are in trace/query_quantised.glsl, query_instances.glsl and query_primitives.glsl, and
+// what was met is in query_meetings.glsl; nodes of two and the loop are here.
 //
 // A query that ends at its first hit keeps no distances, as nothing is nearer than the end of its ray until then; in a structure whose
 // children are in order (bvh/child_order.glsl) it takes the left child first, wherever that is. What a query asks for is mostly known
@@ -342,80 +343,7 @@ void hedgerow_count_hit(inout HedgerowRayQuery query) {
 #endif
 }
 
-// The geometry of a primitive of a structure with so many nodes, as whoever asks knows it. Where something else lies there by now, the
-// first: its header may name any place.
-HedgerowGeometry hedgerow_geometry_of(uvec2 structure, uint slots, uint primitive) {
-    Header header = Structure(structure).header;
-    // First, as it is most often all that has to be loaded.
-    if (header.geometry_count <= 1u) return HedgerowGeometry(0u, 0u, header.geometry_flags);
-    if (header.magic != MAGIC || header.node_slots != slots) return HedgerowGeometry(0u, 0u, 0u);
-    GeometryTable table = GeometryTable(geometry_table_of(structure, header));
-    return hedgerow_geometry_in(table, header.geometry_count, primitive);
-}
-
-HedgerowMeeting hedgerow_met(HedgerowRayQuery query, bool committed) {
-    HedgerowMeeting met = query.candidate;
-    if (committed) met = query.committed;
-    return met;
-}
-
-// The records of a structure.
-uvec2 hedgerow_records_in(uvec2 structure, uint slots, uint form) {
-    if ((form & FORM_QUANTISED) != 0u) return wide_records_at(structure, slots, QUANTISED_NODE_BYTES);
-    return records_at(structure, slots);
-}
-
-uvec2 hedgerow_records_of_top(HedgerowRayQuery query) {
-    return hedgerow_records_in(query.top, query.top_slots, query.top_form);
-}
-
-// The instance of a meeting: of a bottom-level structure that is queried itself, one without a transform.
-Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
-    if (hedgerow_has_top(query)) return Instances(hedgerow_records_of_top(query)).instance[met.instance];
-    const vec4 identity[3] = vec4[3](vec4(1, 0, 0, 0), vec4(0, 1, 0, 0), vec4(0, 0, 1, 0));
-    return Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, query.top_slots | query.top_form, query.top_records);
-}
-
-uvec2 hedgerow_records_of(Instance instance) {
-    return hedgerow_records_in(instance.structure, instance.slots & INDEX_MASK, instance.slots);
-}
-
-// The triangle that a meeting was with.
-Triangle hedgerow_triangle_of(Instance instance, HedgerowMeeting met) {
-    uvec2 records = hedgerow_records_of(instance);
-    if ((instance.slots & FORM_QUANTISED) != 0u) return hedgerow_triangle_of_record(records, met.record);
-    return Triangles(records).triangle[met.record];
-}
-
-// The primitive of a meeting. Where triangles are loaded lane by lane (trace/query_lanes.glsl) it is loaded again: kept from the triangle that
-// was tested, Mesa 26's lavapipe loads it at address 0 for lanes that are at none.
-uint hedgerow_primitive_of(Instance instance, HedgerowMeeting met) {
-#ifdef HEDGEROW_LANES
-    if (met.type != HEDGEROW_MET_BOX) return hedgerow_triangle_of(instance, met).primitive;
-#endif
-    return met.primitive;
-}
-
-// Whether the candidate comes before the committed hit at the same t: by instance, then primitive. Several records may be of one instance.
-bool hedgerow_comes_before(HedgerowRayQuery query) {
-    HedgerowMeeting a = query.candidate, b = query.committed;
-    if (b.type == HEDGEROW_MET_NOTHING) return false;
-    Instance of_a = hedgerow_instance_of(query, a), of_b = hedgerow_instance_of(query, b);
-    if (of_a.instance != of_b.instance) return of_a.instance < of_b.instance;
-    return hedgerow_primitive_of(of_a, a) < hedgerow_primitive_of(of_b, b);
-}
-
-void hedgerow_commit(inout HedgerowRayQuery query) {
-    query.committed = query.candidate;
-    query.best = query.candidate.t;
-#ifdef HEDGEROW_LINK_COUNTS
-    query.hit_at = query.at;
-#endif
-    if (hedgerow_ends_at_first_hit(query)) {
-        hedgerow_count_hit(query);
-        hedgerow_end(query);
-    }
-}
+#include "trace/query_meetings.glsl"
 
 // What the ray enters at this distance waits.
 void hedgerow_put_off(inout HedgerowRayQuery query, uint index, uint count, float enter) {
@@ -477,63 +405,7 @@ void hedgerow_step(inout HedgerowRayQuery query) {
     query.left = query.left == 1u || query.index >= query.records ? HEDGEROW_NOTHING : query.left - 1u;
 }
 
-// From the top level into an instance.
-void hedgerow_enter_instance(inout HedgerowRayQuery query) {
-    uint at = query.index;
-    hedgerow_step(query);
-    if (at >= query.records) return;
-    Instance instance = hedgerow_instance_at(hedgerow_records_of_top(query), at);
-    uint flags = instance.offset_and_flags >> 24;
-    if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
-    HEDGEROW_COUNT(y);
-    if (hedgerow_skips(query.flags, instance.slots) || !hedgerow_meets(instance.slots)) return;
-    HedgerowRay ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
-                                  hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
-    HedgerowPreparedRay prepared;
-    if (!hedgerow_prepare(ray, prepared)) return;
-    // The rest of the leaf waits.
-    if (query.left != HEDGEROW_NOTHING && query.level - query.floor < MAX_DEPTH) {
-        if (hedgerow_is_quantised(query)) hedgerow_put_off_rest(query);
-        else hedgerow_put_off(query, query.index, query.left, -HEDGEROW_INFINITY);
-    }
-    query.prepared = prepared;
-    query.is_prepared = true;
-    query.structure = instance.structure;
-    query.has_instances = false;
-    query.slots = instance.slots & INDEX_MASK;
-    query.form = instance.slots & ~INDEX_MASK;
-    query.records = hedgerow_is_quantised(query) ? instance.records & INDEX_MASK : instance.records;
-    query.top_rounds = query.rounds;
-    query.rounds = hedgerow_rounds(query.slots, query.records);
-    query.is_below = true;
-    query.instance = at;
-    query.instance_flags = flags;
-    query.bottom = query.level;
-#ifdef HEDGEROW_LINK_COUNTS
-    query.at = HedgerowLink(HEDGEROW_LINK_COUNTS(instance.structure), HEDGEROW_NO_LINK);
-#endif
-    uvec2 begin = begin_at(instance.start, instance.slots, instance.records);
-    query.index = begin.x;
-    query.left = begin.y;
-    if (hedgerow_is_quantised(query)) {
-        query.left = 0u;
-        hedgerow_begin_quantised(query, ray.direction, begin.y);
-    }
-}
-
-// Back to the top level.
-void hedgerow_leave_instance(inout HedgerowRayQuery query) {
-    hedgerow_take_top(query);
-    if (hedgerow_is_quantised(query)) hedgerow_begin_quantised(query, query.ray.direction, ALL_SLOTS);
-    query.is_prepared = false;
-    query.bottom = query.floor;
-    query.rounds = query.top_rounds;
-    query.is_below = false;
-#ifdef HEDGEROW_LINK_COUNTS
-    query.at = HedgerowLink(uvec2(0u), HEDGEROW_NO_LINK);
-#endif
-}
-
+#include "trace/query_instances.glsl"
 #include "trace/query_primitives.glsl"
 
 // Takes what waits; false at the end of the walk. Behind an instance it takes what waits above it. What was taken may be nothing: too far.
