@@ -8,6 +8,9 @@
 #[path = "build/arguments.rs"]
 mod arguments;
 #[cfg(feature = "compile-shaders")]
+#[path = "build/by_table.rs"]
+mod by_table;
+#[cfg(feature = "compile-shaders")]
 #[path = "build/compile.rs"]
 mod compile;
 #[cfg(feature = "compile-shaders")]
@@ -34,7 +37,10 @@ fn main() {
 #[cfg(not(feature = "compile-shaders"))]
 fn main() {
     println!("cargo:rerun-if-changed=spirv");
-    table::write(|_, file| copy(file));
+    table::write(|_, file| {
+        copy(file);
+        table::file_by_table(file).iter().for_each(|file| copy(file));
+    });
     copy("arguments.rs");
 }
 

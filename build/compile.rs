@@ -1,12 +1,13 @@
 //! GLSL to SPIR-V, by shaderc: optimised, with `#include`, and with shared memory that is handed over at barriers.
 
-use crate::push_constants;
-use crate::table::out_dir;
+use crate::table::{file_by_table, out_dir};
+use crate::{by_table, push_constants};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What else SPIR-V follows from than its sources.
 const THIS: &str = concat!(
+    include_str!("by_table.rs"),
     include_str!("compile.rs"),
     include_str!("push_constants.rs"),
     include_str!("reflection.rs"),
@@ -21,7 +22,7 @@ pub struct Compiler<'a> {
 
 impl Compiler<'_> {
     /// Compiles `source` into OUT_DIR, if any of its text has changed. Beside the optimised shader lie what it takes of its push
-    /// constants, and in the folder `named` one with its names.
+    /// constants, of one that one workgroup runs the same by a table, and in the folder `named` one with its names.
     pub fn make(&self, source: &Path, file: &str) {
         let out = out_dir();
         let named = out.join("named");
@@ -44,6 +45,9 @@ impl Compiler<'_> {
             if is_pass { push_constants::only_what_is_read(file, &whole) } else { (whole, Vec::new()) };
         let takes: String = takes.iter().map(|(offset, bytes)| format!("{offset} {bytes}\n")).collect();
         fs::write(out.join(format!("{file}.takes")), takes).expect("OUT_DIR can be written");
+        if let Some(file) = file_by_table(file) {
+            fs::write(out.join(&file), by_table::by_table(&file, &spirv)).expect("OUT_DIR can be written");
+        }
         fs::write(&path, spirv).expect("OUT_DIR can be written");
         fs::write(stamp, made_of).expect("OUT_DIR can be written");
     }

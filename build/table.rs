@@ -18,6 +18,11 @@ pub fn file_of(name: &str) -> String {
     format!("{}.spv", name.replace('/', "."))
 }
 
+/// The file of the same shader with its arguments in a table, of one that one workgroup runs: those are named `alone`.
+pub fn file_by_table(file: &str) -> Option<String> {
+    file.strip_suffix(".alone.spv").map(|family| format!("{family}.alone_by_table.spv"))
+}
+
 /// The name of a shader's static.
 pub fn constant_of(name: &str) -> String {
     name.replace('/', "_").to_uppercase()
@@ -40,10 +45,12 @@ pub fn write(make: impl Fn(&Path, &str) + Sync) -> Vec<String> {
     let mut names = Vec::new();
     for (source, name) in &shaders {
         let (constant, file, spirv) = (constant_of(name), source.display(), out_dir().join(file_of(name)));
+        let by_table = file_by_table(&file_of(name)).map(|file| format!("include_bytes!({:?})", out_dir().join(file)));
+        let by_table = by_table.map_or("None".to_owned(), |bytes| format!("Some({bytes})"));
         writeln!(
             table,
-            "/// `{file}`\npub static {constant}: Shader =\n    Shader {{ name: {name:?}, spirv: include_bytes!({spirv:?}), takes: \
-             takes::{constant} }};"
+            "/// `{file}`\npub static {constant}: Shader =\n    Shader {{ name: {name:?}, spirv: include_bytes!({spirv:?}), by_table: \
+             {by_table}, takes: takes::{constant} }};"
         )
         .expect("writing to a string");
         names.push(constant);
@@ -63,7 +70,8 @@ fn name_of(source: &Path) -> String {
 
 /// Removes the SPIR-V that a former build left and this one does not have.
 fn forget_others(shaders: &[(PathBuf, String)]) {
-    let files: Vec<String> = shaders.iter().map(|(_, name)| file_of(name)).collect();
+    let own = shaders.iter().map(|(_, name)| file_of(name));
+    let files: Vec<String> = own.flat_map(|file| [file_by_table(&file), Some(file)]).flatten().collect();
     for folder in [out_dir(), out_dir().join("named")] {
         let Ok(entries) = fs::read_dir(folder) else { continue };
         let paths = entries.map(|entry| entry.expect("OUT_DIR can be listed").path());

@@ -3,6 +3,8 @@
 
 #[path = "../build/arguments.rs"]
 mod arguments;
+#[path = "../build/by_table.rs"]
+mod by_table;
 #[path = "../build/compile.rs"]
 mod compile;
 #[path = "../build/push_constants.rs"]

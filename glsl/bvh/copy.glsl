@@ -30,7 +30,7 @@ uvec2 structure_bytes(Header header) {
 // indices into memory are signed and end at 2^31.
 void copy_bytes(uvec2 from, uvec2 to, uvec2 bytes) {
     uint pairs = bytes.x >> 3 | bytes.y << 29;
-    for (uint first = group_number() * grid_piece(); first < pairs; first += gl_NumWorkGroups.x * grid_piece()) {
+    for (uint first = group_number() * grid_piece(); first < pairs; first += group_count() * grid_piece()) {
         Pairs source = Pairs(address_of(from, first, 8));
         Pairs target = Pairs(address_of(to, first, 8));
         for (uint i = gl_LocalInvocationIndex; i < min(grid_piece(), pairs - first); i += gl_WorkGroupSize.x) {

@@ -16,7 +16,7 @@ uint grid_piece() {
 
 // The k-th item of this invocation.
 uint grid_item(uint k) {
-    uint piece = k / GRID_ROUNDS * gl_NumWorkGroups.x + group_number();
+    uint piece = k / GRID_ROUNDS * group_count() + group_number();
     return piece * grid_piece() + k % GRID_ROUNDS * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
 }
 #endif

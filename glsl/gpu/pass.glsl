@@ -16,9 +16,26 @@ layout(local_size_x_id = 0) in;
 // A dispatch of more workgroups than a device takes along x has rows of as many as it takes: src/gpu/recorder.rs.
 layout(constant_id = 30) const uint GROUPS_OF_A_ROW = 65535;
 
+// A shader that one workgroup runs defines HEDGEROW_ONE_WORKGROUP: it may be one of many that do the same with arguments of their own
+// (build/by_table.rs).
+#ifdef HEDGEROW_ONE_WORKGROUP
+uint group_number() {
+    return 0u;
+}
+
+uint group_count() {
+    return 1u;
+}
+#else
 uint group_number() {
     return gl_WorkGroupID.y * GROUPS_OF_A_ROW + gl_WorkGroupID.x;
 }
+
+// Of a dispatch of one row.
+uint group_count() {
+    return gl_NumWorkGroups.x;
+}
+#endif
 
 uint invocation_number() {
     return group_number() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;

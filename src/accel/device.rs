@@ -46,7 +46,7 @@ impl<'a> Device<'a> {
     }
 
     /// The same structures, whose builds read their arguments from `memory`: a call for thousands of small builds records one dispatch
-    /// for all of a kind in place of one for two, and the records of geometries are written at once in place of two at a time. Each call
+    /// for all steps of a kind in place of one each or one for two, and the records of geometries are written at once in place of two at a time. Each call
     /// needs [`Device::argument_bytes`] there, and has the memory for itself while it runs, like scratch memory.
     ///
     /// # Safety
@@ -57,9 +57,12 @@ impl<'a> Device<'a> {
 
     /// Bytes that suffice for the arguments of one call of so many builds with so many geometries in all.
     pub const fn argument_bytes(builds: u64, geometries: u64) -> u64 {
+        /// What one workgroup does of a build: its optimising, its finishing and its wide nodes.
+        const SHARED: u64 = 3;
         // Of each build the records of its geometries, one more, what fills up to the alignment, and its arguments.
         (size_of::<Geometry>() as u64) * (geometries + builds)
             + (size_of::<arguments::Small>() as u64 + 2 * ArgumentTable::ALIGNMENT) * builds
+            + SHARED * ArgumentTable::ROW_BYTES * builds
     }
 
     /// `vkGetAccelerationStructureBuildSizesKHR`: bytes that a build of at most `max_primitive_counts` primitives a geometry
@@ -359,6 +362,13 @@ impl<'a> Device<'a> {
         let updates_in_place: Vec<_> = updates.iter().map(|p| p.build.update(p.structure, p.scratch)).collect();
         let mut chains = Builder::chains(&jobs, table.as_mut())?;
         chains.extend(Refit::chains(&updates_in_place)?);
+        let epilogues = builds_anew.iter().map(|p| p.build.epilogue(p.structure, p.scratch));
+        let mut epilogues: Vec<Vec<Step>> = epilogues.collect::<Result<_>>()?;
+        if let Some(table) = &mut table {
+            table.share_dispatches(&mut epilogues)?;
+        } else if self.arguments.is_some() {
+            recorder.warm_by_table(chains.iter().chain(&epilogues).flatten())?;
+        }
         let mut prologues: Vec<Vec<Step>> =
             builds.iter().flat_map(|p| p.build.prologue(self.context, p.scratch.address)).collect();
         // An update from another structure is one in place, of its copy.
@@ -375,8 +385,6 @@ impl<'a> Device<'a> {
             recorder.barrier();
         }
         recorder.chains(&chains)?;
-        let epilogues = builds_anew.iter().map(|p| p.build.epilogue(p.structure, p.scratch));
-        let epilogues: Vec<Vec<Step>> = epilogues.collect::<Result<_>>()?;
         if epilogues.iter().any(|steps| !steps.is_empty()) {
             recorder.barrier();
             recorder.chains(&epilogues)?;

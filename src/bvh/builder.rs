@@ -403,33 +403,50 @@ impl Builder {
     /// # Errors
     /// As [`Builder::record`], pipelines aside.
     pub fn steps(&self, input: &Input, structure: Region, scratch: Region) -> Result<Vec<Step>> {
-        let mut chains = Builder::chains(&[BuildJob { builder: self, input: *input, structure, scratch }], None)?;
-        Ok(chains.pop().unwrap_or_default())
+        let job = BuildJob { builder: self, input: *input, structure, scratch };
+        let tree = match self.small_build(&job)? {
+            Some(small) => lbvh_workgroup::steps(&[small], None)?,
+            None => self.tree_of(&job)?,
+        };
+        Ok([tree, self.behind_tree(&job)?].concat())
     }
 
-    /// The chains of many builds, for [`Recorder::chains`]: one per build, except that builds by one workgroup each share a dispatch,
-    /// two by two, or those of a kind all together by a table of their arguments, which is then written with
+    /// The chains of many builds, for [`Recorder::chains`]: one per build, except that what one workgroup does shares dispatches: the trees of
+    /// small builds two by two, or by a table of their arguments all steps of a kind. The table is then written with
     /// [`Recorder::write_table`].
     ///
     /// # Errors
     /// As [`Builder::record`], pipelines aside; the table is too small.
-    pub fn chains(jobs: &[BuildJob<'_>], table: Option<&mut ArgumentTable>) -> Result<Vec<Vec<Step>>> {
-        let (small, large): (Vec<&BuildJob<'_>>, Vec<&BuildJob<'_>>) =
-            jobs.iter().partition(|job| job.builder.is_one_dispatch());
-        let chains = large.iter().map(|job| job.builder.chain_of(job));
-        let mut chains: Vec<Vec<Step>> = chains.collect::<Result<_>>()?;
-        let small = small.iter().map(|job| {
-            let memory = job.addresses()?;
-            Ok(SmallBuild { encode: &job.builder.encode, input: &job.input, memory })
-        });
-        let small: Vec<SmallBuild<'_>> = small.collect::<Result<_>>()?;
-        chains.extend(lbvh_workgroup::steps(&small, table)?.into_iter().map(|step| vec![step]));
+    pub fn chains(jobs: &[BuildJob<'_>], mut table: Option<&mut ArgumentTable>) -> Result<Vec<Vec<Step>>> {
+        let (mut chains, mut small) = (Vec::new(), Vec::new());
+        for job in jobs {
+            let behind = job.builder.behind_tree(job)?;
+            match job.builder.small_build(job)? {
+                Some(build) => {
+                    small.push(build);
+                    // Its tree is in a dispatch with others.
+                    if let Some(first) = behind.first() {
+                        chains.push([vec![first.clone().without_groups()], behind].concat());
+                    }
+                }
+                None => chains.push([job.builder.tree_of(job)?, behind].concat()),
+            }
+        }
+        chains.extend(lbvh_workgroup::steps(&small, table.as_deref_mut())?.into_iter().map(|step| vec![step]));
+        if let Some(table) = table {
+            table.share_dispatches(&mut chains)?;
+        }
         Ok(chains)
     }
 
-    /// Whether one workgroup does everything in one dispatch.
-    fn is_one_dispatch(&self) -> bool {
-        self.schedule == Schedule::Workgroup && self.optimise.is_none()
+    /// Of a build whose tree one workgroup makes.
+    fn small_build<'a>(&'a self, job: &'a BuildJob<'_>) -> Result<Option<SmallBuild<'a>>> {
+        if self.schedule != Schedule::Workgroup {
+            return Ok(None);
+        }
+        let memory = job.addresses()?;
+        let single = self.optimise.is_some();
+        Ok(Some(SmallBuild { encode: &self.encode, single, input: &job.input, memory }))
     }
 
     /// What the method adds to a build.
@@ -437,30 +454,42 @@ impl Builder {
         self.method.hierarchy(&self.merging)
     }
 
-    fn chain_of(&self, job: &BuildJob<'_>) -> Result<Vec<Step>> {
-        let Builder { schedule, encode, workers, .. } = self;
-        let (input, workers) = (&job.input, *workers);
+    /// The steps of a tree that is not made by one workgroup.
+    fn tree_of(&self, job: &BuildJob<'_>) -> Result<Vec<Step>> {
+        let Builder { encode, .. } = self;
+        let input = &job.input;
         let scratch = &self.scratch(encode.table_words());
         let [structure, room] = job.addresses()?;
         let arguments = &encode.arguments(input, structure, room, scratch.parts)?;
-        let mut steps = encode.split.map_or(Vec::new(), |split| split.steps(encode, input, arguments, scratch));
-        steps.extend(match schedule {
+        let split = encode.split.map_or(Vec::new(), |split| split.steps(encode, input, arguments, scratch));
+        let tree = match self.schedule {
             Schedule::Persistent(shaders) => {
                 let shader = shaders.of(self.method);
-                self.hierarchy().persistent_steps(encode, input, arguments, shader, workers)
+                self.hierarchy().persistent_steps(encode, input, arguments, shader, self.workers)
             }
-            Schedule::Chain => {
-                let single = self.single(arguments);
-                let hierarchy = self.hierarchy().steps(encode, input, &single);
-                let tree = [encode.steps(input, arguments), hierarchy].concat();
-                [tree, self.finish(input, arguments, scratch)].concat()
+            Schedule::Chain | Schedule::Workgroup => {
+                let hierarchy = self.hierarchy().steps(encode, input, &self.single(arguments));
+                [encode.steps(input, arguments), hierarchy].concat()
             }
-            Schedule::Workgroup => {
-                let encode = &Encode { collapse: Collapse { enabled: false, ..encode.collapse }, ..encode.clone() };
-                let tree = lbvh_workgroup::steps(&[SmallBuild { encode, input, memory: [structure, room] }], None)?;
-                [tree, self.finish(input, arguments, scratch)].concat()
-            }
-        });
+        };
+        Ok([split, tree].concat())
+    }
+
+    /// The steps behind those of the tree.
+    fn behind_tree(&self, job: &BuildJob<'_>) -> Result<Vec<Step>> {
+        let finishes = match self.schedule {
+            Schedule::Persistent(_) => false,
+            Schedule::Chain => true,
+            // What is not optimised is finished in the same dispatch.
+            Schedule::Workgroup => self.optimise.is_some(),
+        };
+        let mut steps = Vec::new();
+        if finishes {
+            let scratch = &self.scratch(self.encode.table_words());
+            let [structure, room] = job.addresses()?;
+            let arguments = &self.encode.arguments(&job.input, structure, room, scratch.parts)?;
+            steps.extend(self.finish(&job.input, arguments, scratch));
+        }
         if let Some(pass) = self.child_order {
             steps.extend(pass.steps(job.structure, job.scratch)?);
         }

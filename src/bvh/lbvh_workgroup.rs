@@ -18,6 +18,8 @@ const IN_TABLE: u32 = 1 << 31;
 /// A build that one workgroup does.
 pub(super) struct SmallBuild<'a> {
     pub encode: &'a Encode,
+    /// Leaves of one primitive each, whatever `encode` says: subtrees are weighed later.
+    pub single: bool,
     pub input: &'a Input,
     /// Addresses of structure and scratch memory.
     pub memory: [u64; 2],
@@ -28,11 +30,11 @@ pub(super) fn steps(small: &[SmallBuild<'_>], mut table: Option<&mut ArgumentTab
     // What fills the push constants together must be of one kind.
     let mut kinds: HashMap<(Kernel, u32, [u32; 2]), Vec<arguments::Small>> = HashMap::new();
     let mut order = Vec::new();
-    for &SmallBuild { encode, input, memory: [structure, scratch] } in small {
+    for &SmallBuild { encode, single, input, memory: [structure, scratch] } in small {
         let (geometry, formats) = encode.checked(input)?;
         let kernel = encode.lbvh_kernel(&shaders::BVH_LBVH_WORKGROUP, input);
         let costs = [encode.collapse.c_t.to_bits(), encode.collapse.c_i.to_bits()];
-        let flags = encode.code_kind() | u32::from(encode.collapse.enabled) << 25 | encode.build_flags << 26;
+        let flags = encode.code_kind() | u32::from(encode.collapse.enabled && !single) << 25 | encode.build_flags << 26;
         let kind = (kernel, flags, costs);
         let builds = kinds.entry(kind.clone()).or_default();
         if builds.is_empty() {

@@ -123,6 +123,8 @@ pub struct Kernel {
     constants: Vec<u32>,
     /// For what is left of a dispatch behind its full rows.
     behind_rows: bool,
+    /// Many of it, with their arguments in a table.
+    by_table: bool,
 }
 
 /// The specialisation constant that every pass has: workgroups of a row, in glsl/gpu/pass.glsl.
@@ -133,7 +135,7 @@ impl Kernel {
     pub fn new(shader: &'static Shader, workgroup: u32, constants: &[u32]) -> Kernel {
         let mut all = vec![workgroup];
         all.extend_from_slice(constants);
-        Kernel { shader, constants: all, behind_rows: false }
+        Kernel { shader, constants: all, behind_rows: false, by_table: false }
     }
 
     /// The same for a dispatch whose workgroups begin behind rows of others.
@@ -141,12 +143,22 @@ impl Kernel {
         Kernel { behind_rows: true, ..self.clone() }
     }
 
+    /// Many of it, each by a workgroup, with their arguments in a table; `None` where the shader is not made for one workgroup.
+    pub(super) fn by_table(&self) -> Option<Kernel> {
+        self.shader.by_table.map(|_| Kernel { by_table: true, ..self.clone() })
+    }
+
+    /// Little-endian words as bytes.
+    fn spirv(&self) -> &'static [u8] {
+        self.shader.by_table.filter(|_| self.by_table).unwrap_or(self.shader.spirv)
+    }
+
     /// Whether the shader numbers the workgroups of several rows through.
     pub(super) fn takes_rows(&self) -> bool {
         /// `OpDecorate` of four words with the decoration `SpecId`.
         const DECORATE: u32 = 4 << 16 | 71;
         const SPEC_ID: u32 = 1;
-        let words = bytemuck::pod_collect_to_vec::<u8, u32>(self.shader.spirv);
+        let words = bytemuck::pod_collect_to_vec::<u8, u32>(self.spirv());
         words.windows(4).any(|w| w[0] == DECORATE && w[2] == SPEC_ID && w[3] == GROUPS_OF_A_ROW)
     }
 
@@ -287,7 +299,7 @@ impl Context {
 
     fn create_pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
         let mut words =
-            ash::util::read_spv(&mut std::io::Cursor::new(kernel.shader.spirv)).expect("build.rs wrote whole words");
+            ash::util::read_spv(&mut std::io::Cursor::new(kernel.spirv())).expect("build.rs wrote whole words");
         let constants = [&kernel.constants[..], &[self.limits.workgroup_count]].concat();
         let ids = (0..kernel.constants.len() as u32).chain([GROUPS_OF_A_ROW]);
         if self.workarounds.folded_constants {

@@ -117,10 +117,10 @@ impl Drop for Timestamps {
 /// A dispatch that is ready to be recorded: what a build does between two barriers.
 #[derive(Debug, Clone)]
 pub struct Step {
-    phase: &'static str,
-    kernel: Kernel,
-    arguments: Vec<u8>,
-    groups: u32,
+    pub(super) phase: &'static str,
+    pub(super) kernel: Kernel,
+    pub(super) arguments: Vec<u8>,
+    pub(super) groups: u32,
 }
 
 impl Step {
@@ -128,6 +128,11 @@ impl Step {
     pub fn new<B: Block>(phase: &'static str, kernel: Kernel, arguments: &B, groups: u32) -> Step {
         let arguments = kernel.takes().of(arguments);
         Step { phase, kernel, arguments, groups }
+    }
+
+    /// Nothing, while other chains have a step: what it would do is in one of theirs.
+    pub(crate) fn without_groups(self) -> Step {
+        Step { groups: 0, ..self }
     }
 }
 
@@ -243,6 +248,14 @@ impl<'a> Recorder<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Makes the pipelines that [`ArgumentTable::share_dispatches`] has in place of those of these steps.
+    ///
+    /// # Errors
+    /// A pipeline could not be made.
+    pub(crate) fn warm_by_table<'s>(&self, steps: impl Iterator<Item = &'s Step>) -> Result<()> {
+        steps.filter_map(|step| step.kernel.by_table()).try_for_each(|kernel| self.context.pipeline(&kernel).map(drop))
     }
 
     /// More workgroups than the device takes along x are rows of as many as it takes, and behind them what is left:

@@ -11,6 +11,9 @@ pub struct Shader {
     pub name: &'static str,
     /// SPIR-V, little-endian words as bytes.
     pub spirv: &'static [u8],
+    /// The same of one that one workgroup runs, for many of them: its push constants are the address of a table, and workgroup i takes row i
+    /// (build/by_table.rs).
+    pub by_table: Option<&'static [u8]>,
     /// What it takes of the block of push constants that its source declares.
     pub takes: Takes,
 }

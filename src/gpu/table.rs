@@ -1,6 +1,6 @@
 //! Arguments of many dispatches in one table: memory of the caller's in place of push constants.
 
-use super::Context;
+use super::{Context, Kernel, Step};
 use crate::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -26,11 +26,16 @@ pub struct ArgumentTable {
     memory: ArgumentMemory,
     address: u64,
     bytes: Vec<u8>,
+    /// Workgroups that a dispatch may have along x.
+    groups_at_most: u32,
 }
 
 impl ArgumentTable {
     /// Parts of a table begin at multiples of this.
     pub(crate) const ALIGNMENT: u64 = 16;
+
+    /// Bytes of the arguments of a step in a table, at most: what push constants hold.
+    pub(crate) const ROW_BYTES: u64 = super::requirements::PUSH_CONSTANT_BYTES as u64;
 
     /// An empty table in this memory.
     ///
@@ -49,7 +54,7 @@ impl ArgumentTable {
                 Self::ALIGNMENT
             )));
         }
-        Ok(ArgumentTable { memory, address, bytes: Vec::new() })
+        Ok(ArgumentTable { memory, address, bytes: Vec::new(), groups_at_most: context.limits.workgroup_count })
     }
 
     /// Puts `records` behind what is there. Returns the address where they will lie.
@@ -57,9 +62,50 @@ impl ArgumentTable {
     /// # Errors
     /// The memory is too small.
     pub(crate) fn put<T: Pod>(&mut self, records: &[T]) -> Result<u64> {
+        self.put_rows(&[bytemuck::cast_slice(records)])
+    }
+
+    /// Has what steps of these chains do by one workgroup, side by side and by one kernel, be one dispatch, where the kernel can take its
+    /// arguments from a table: a row each.
+    ///
+    /// # Errors
+    /// The memory is too small.
+    pub(crate) fn share_dispatches(&mut self, chains: &mut [Vec<Step>]) -> Result<()> {
+        let longest = chains.iter().map(Vec::len).max().unwrap_or(0);
+        for at in 0..longest {
+            let mut same: Vec<(Kernel, Vec<usize>)> = Vec::new();
+            for (chain, steps) in chains.iter().enumerate() {
+                let of_one_group = steps.get(at).filter(|step| step.groups == 1);
+                let Some(kernel) = of_one_group.and_then(|step| step.kernel.by_table()) else { continue };
+                match same.iter_mut().find(|(known, _)| *known == kernel) {
+                    Some((_, of)) => of.push(chain),
+                    None => same.push((kernel, vec![chain])),
+                }
+            }
+            for (kernel, of) in same {
+                for shared in of.chunks(self.groups_at_most as usize).filter(|shared| shared.len() > 1) {
+                    let rows: Vec<&[u8]> = shared.iter().map(|&chain| &chains[chain][at].arguments[..]).collect();
+                    let arguments = self.put_rows(&rows)?.to_le_bytes().to_vec();
+                    // The first does it for all.
+                    shared.iter().for_each(|&chain| chains[chain][at].groups = 0);
+                    let first = &mut chains[shared[0]][at];
+                    *first = Step { kernel: kernel.clone(), arguments, groups: shared.len() as u32, ..first.clone() };
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts these rows behind what is there, each from a multiple of [`ArgumentTable::ALIGNMENT`] on. Returns the address of the first.
+    ///
+    /// # Errors
+    /// The memory is too small.
+    fn put_rows(&mut self, rows: &[&[u8]]) -> Result<u64> {
         let at = self.bytes.len();
-        self.bytes.extend_from_slice(bytemuck::cast_slice(records));
-        self.bytes.resize(self.bytes.len().next_multiple_of(Self::ALIGNMENT as usize), 0);
+        for row in rows {
+            self.bytes.extend_from_slice(row);
+            self.bytes.resize(self.bytes.len().next_multiple_of(Self::ALIGNMENT as usize), 0);
+        }
         let needs = self.bytes.len() as u64;
         if needs > self.memory.bytes {
             return Err(Error::Argument(format!(

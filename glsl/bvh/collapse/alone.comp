@@ -2,6 +2,7 @@
 // All steps for a small tree, by one workgroup: see bvh/collapse.glsl for the contract.
 //
 // A chain of dispatches costs a small tree more than its work.
+#define HEDGEROW_ONE_WORKGROUP
 #include "bvh/collapse.glsl"
 
 void main() {

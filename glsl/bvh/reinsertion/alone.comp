@@ -2,6 +2,7 @@
 // All rounds on a small tree, by one workgroup: see bvh/reinsertion.glsl for the contract.
 //
 // A chain of dispatches costs a small tree more than its work.
+#define HEDGEROW_ONE_WORKGROUP
 #include "bvh/reinsertion/match.glsl"
 #include "bvh/reinsertion/move.glsl"
 #include "bvh/reinsertion/parents.glsl"

@@ -2,6 +2,7 @@
 // All steps for a small tree, by one workgroup: see bvh/wide/collapse.glsl for the contract.
 //
 // A chain of dispatches costs a small tree more than its work.
+#define HEDGEROW_ONE_WORKGROUP
 #include "bvh/wide/costs.glsl"
 #include "bvh/wide/nodes.glsl"
 #include "bvh/wide/open.glsl"

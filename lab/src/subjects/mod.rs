@@ -16,6 +16,7 @@ pub mod kd_host;
 pub mod level;
 pub mod levels;
 pub mod peers;
+pub mod preference;
 pub mod queries;
 pub mod retraced;
 pub mod structures;

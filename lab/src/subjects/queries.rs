@@ -6,9 +6,38 @@ use hedgerow::bvh::layout::MAX_DEPTH;
 use hedgerow::gpu::{Context, Kernel, Recorder};
 use hedgerow::trace::Query;
 use hedgerow::trace::tracer::TraceBuffers;
+use serde::{Deserialize, Serialize};
 
 /// What a query has met on its way: nodes of the top level, instances, nodes below, triangles.
 pub type QueryWork = [u32; 4];
+
+/// What a ray meets on its way, in the mean.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MeanWork {
+    /// Nodes of the top level.
+    pub top_nodes: f64,
+    /// Instances that it enters.
+    pub instances: f64,
+    /// Nodes below.
+    pub nodes_below: f64,
+    /// Triangles tested.
+    pub tests: f64,
+}
+
+impl MeanWork {
+    /// The mean over rays.
+    pub fn mean(works: &[QueryWork]) -> MeanWork {
+        let sum = |k: usize| works.iter().map(|work| f64::from(work[k])).sum::<f64>();
+        let [top_nodes, instances, nodes_below, tests] =
+            std::array::from_fn(|k| if works.is_empty() { 0.0 } else { sum(k) / works.len() as f64 });
+        MeanWork { top_nodes, instances, nodes_below, tests }
+    }
+
+    /// All of it together.
+    pub fn all(&self) -> f64 {
+        self.top_nodes + self.instances + self.nodes_below + self.tests
+    }
+}
 
 /// How invocations take rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,4 +118,16 @@ fn rays_in_turn(context: &Context, count: u32) -> u32 {
     let tuning = &context.tuning.trace;
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get() as u32);
     (count / (tuning.group * 8 * cores)).clamp(1, tuning.rays_each)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_is_the_mean_over_rays() {
+        let mean = MeanWork::mean(&[[1, 2, 3, 4], [3, 2, 1, 0]]);
+        assert_eq!(mean, MeanWork { top_nodes: 2.0, instances: 2.0, nodes_below: 2.0, tests: 2.0 });
+        assert_eq!(MeanWork::mean(&[]).tests, 0.0);
+    }
 }

@@ -4,11 +4,13 @@ use crate::browser::Browser;
 use crate::conditional::needs;
 use hedgerow_lab::experiments::accel::page::{self, Points};
 use hedgerow_lab::experiments::accel::points::{
-    AccelEntry, AnyHitPoint, Batch, FlaggedRays, Implementation, MeanWork, RebraidPoint, Submission, TopLevel,
-    TopLevelPoint, Update, UpdatedRays,
+    AccelEntry, AnyHitPoint, Batch, FlaggedRays, Implementation, RebraidPoint, Submission, TopLevel, TopLevelPoint,
+    Update, UpdatedRays,
 };
 use hedgerow_lab::measure::setting::Failure;
 use hedgerow_lab::measure::statistics::Spread;
+use hedgerow_lab::subjects::preference::Preference;
+use hedgerow_lab::subjects::queries::MeanWork;
 use std::path::Path;
 
 crate::conditional::tests! {
@@ -44,7 +46,16 @@ fn batches() -> impl Iterator<Item = AccelEntry> {
         ways.map(|(maker, way, times)| {
             let wall_ms = spread(50.0 * times * f64::from(structures) / 4096.0);
             let triangles = 245 * u64::from(structures);
-            AccelEntry::Batch(Batch { structures, triangles, maker, way, wall_ms, over_our_call: spread(times) })
+            let over_our_call = spread(times);
+            AccelEntry::Batch(Batch {
+                structures,
+                triangles,
+                prefer: Preference::FastBuild,
+                maker,
+                way,
+                wall_ms,
+                over_our_call,
+            })
         })
     })
 }

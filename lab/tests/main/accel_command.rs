@@ -71,7 +71,7 @@ fn a_run_leaves_records_of_every_experiment_and_a_page_of_them() {
         assert!(page.contains(&format!("<section id=\"{id}\">")), "{id}");
     }
     let of_forest = ["accel-rebraid-gen-forest-9", "accel-any-hit-gen-forest-9"];
-    for chart in ["accel-batch", "accel-tlas", "accel-update-gen-twist-400-5"].into_iter().chain(of_forest) {
+    for chart in ["accel-batch-fast-build", "accel-tlas", "accel-update-gen-twist-400-5"].into_iter().chain(of_forest) {
         for ending in ["svg", "png"] {
             assert!(folder.path().join(format!("charts/{chart}.{ending}")).is_file(), "{chart}.{ending}");
         }

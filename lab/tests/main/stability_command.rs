@@ -6,9 +6,10 @@ use hedgerow_lab::experiments::stability::large::LargePlacement;
 use hedgerow_lab::experiments::stability::page;
 use hedgerow_lab::experiments::stability::points::{Degenerate, Greedy, GreedyKind, Growth, Large};
 use hedgerow_lab::experiments::stability::top::COSTS;
-use hedgerow_lab::experiments::stability::top::points::{GOALS, Preference, TopGrowth};
+use hedgerow_lab::experiments::stability::top::points::{GOALS, TopGrowth};
 use hedgerow_lab::report::lines;
 use hedgerow_lab::scene;
+use hedgerow_lab::subjects::preference::Preference;
 use std::path::Path;
 use std::process::Output;
 

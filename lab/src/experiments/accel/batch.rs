@@ -6,6 +6,7 @@ use crate::Result;
 use crate::device::{Buffer, Device};
 use crate::measure::{Sink, Spread, in_turn, ratios};
 use crate::scene::{self, LoadOptions};
+use crate::subjects::preference::Preference;
 use crate::subjects::structures::{BuildInfo, Geometry, Range, Structures, triangles_of};
 use ash::vk;
 use hedgerow::accel;
@@ -65,12 +66,12 @@ impl<'w, 'a> Batch<'w, 'a> {
     ///
     /// # Errors
     /// Too little memory.
-    pub fn new(structures: Structures<'a>, workload: &'w Workload<'_>) -> Result<Batch<'w, 'a>> {
+    pub fn new(structures: Structures<'a>, workload: &'w Workload<'_>, prefer: Preference) -> Result<Batch<'w, 'a>> {
         let ranges: Vec<&[Range]> = workload.ranges.iter().map(std::slice::from_ref).collect();
         let plain = |i: usize| {
             BuildInfo::default()
                 .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
-                .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_BUILD)
+                .flags(prefer.flags())
                 .geometries(&workload.geometries[i..=i])
         };
         let mut end = [0u64; 2];
@@ -137,17 +138,17 @@ impl Drop for Batch<'_, '_> {
     }
 }
 
-/// Measures every way, ours and the driver's in turn, with up to `most` structures.
+/// Measures every way, ours and the driver's in turn, with up to `most` structures that prefer this.
 ///
 /// # Errors
 /// Too little memory; the device failed.
-pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut Sink<'_, AccelEntry>) -> Result<()> {
+pub fn measure(stage: &AccelSetup<'_>, most: u32, prefer: Preference, point: &mut Sink<'_, AccelEntry>) -> Result<()> {
     let workload = Workload::new(stage.device, most)?;
     let makers = stage.makers();
     let batches: Vec<Batch<'_, '_>> =
-        makers.iter().map(|maker| Batch::new(maker.clone(), &workload)).collect::<Result<_>>()?;
+        makers.iter().map(|maker| Batch::new(maker.clone(), &workload, prefer)).collect::<Result<_>>()?;
     for count in counts(most) {
-        (stage.say)(&format!("batch of {count}"));
+        (stage.say)(&format!("batch of {count}, {prefer}"));
         let ways = [Submission::OneCall, Submission::OneTable, Submission::OneSubmit, Submission::SubmitEach];
         let all = batches.iter().flat_map(|batch| ways.map(|way| (batch, way)));
         let can = |&(batch, way): &(&Batch<'_, '_>, _)| way != Submission::OneTable || batch.by_table.is_some();
@@ -159,6 +160,7 @@ pub fn measure(stage: &AccelSetup<'_>, most: u32, point: &mut Sink<'_, AccelEntr
             point(AccelEntry::Batch(points::Batch {
                 structures: count,
                 triangles: workload.triangles(count as usize),
+                prefer,
                 maker: (*way != Submission::EmptySubmits).then(|| batch.structures.maker()),
                 way: *way,
                 wall_ms: Spread::of_some(times)?,

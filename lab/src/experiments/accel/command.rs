@@ -10,6 +10,7 @@ use crate::experiments::accel::{AccelSetup, Experiment, any_hit, batch, memory, 
 use crate::measure::{Failure, Setting, Sink};
 use crate::scene::{self, Animation, Instances, LoadOptions};
 use crate::subjects::peers::driver;
+use crate::subjects::preference::Preference;
 use hedgerow::accel::{AccelOptions, Wide};
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -48,6 +49,9 @@ pub struct Arguments {
     /// Structures of the largest batch
     #[arg(long, value_name = "N", default_value = "4096")]
     structures: NonZeroU32,
+    /// What the builds of a batch prefer, separated by commas: fast-build, fast-trace, none
+    #[arg(long, value_name = "PREFERENCE[,…]", value_delimiter = ',', default_value = "fast-build")]
+    prefer: Vec<Preference>,
     /// Instances of the largest top level
     #[arg(long, value_name = "N", default_value = "100000")]
     instances: NonZeroU32,
@@ -121,7 +125,12 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     for experiment in Experiment::ALL.into_iter().filter(|e| arguments.experiments.contains(e)) {
         let name = experiment.name();
         match experiment {
-            Experiment::Batch => measured(name, &|point| batch::measure(&stage, arguments.structures.get(), point))?,
+            Experiment::Batch => {
+                for &prefer in &arguments.prefer {
+                    let most = arguments.structures.get();
+                    measured(&format!("{name} {prefer}"), &|point| batch::measure(&stage, most, prefer, point))?;
+                }
+            }
             Experiment::TopLevel => {
                 measured(name, &|point| top_level::measure(&stage, arguments.instances.get(), point))?;
             }

@@ -2,6 +2,8 @@
 
 use crate::measure::{Failure, Setting, Spread};
 use crate::named::named;
+use crate::subjects::preference::Preference;
+use crate::subjects::queries::MeanWork;
 use serde::{Deserialize, Serialize};
 
 /// What a line says, by its `experiment`.
@@ -70,6 +72,9 @@ pub struct Batch {
     pub structures: u32,
     /// Triangles of all together.
     pub triangles: u64,
+    /// What the builds prefer; a fast build in records of before 27 November 2026.
+    #[serde(default = "fast_build")]
+    pub prefer: Preference,
     /// Whose; nobody's are [`Submission::EmptySubmits`].
     pub maker: Option<Implementation>,
     /// How they are built.
@@ -78,6 +83,10 @@ pub struct Batch {
     pub wall_ms: Spread,
     /// Its time over that of ours in one call, run by run.
     pub over_our_call: Spread,
+}
+
+fn fast_build() -> Preference {
+    Preference::FastBuild
 }
 
 /// A top level.
@@ -220,29 +229,6 @@ pub struct FlaggedRays {
     pub on_work: MeanWork,
 }
 
-/// What a ray meets on its way, in the mean.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct MeanWork {
-    /// Nodes of the top level.
-    pub top_nodes: f64,
-    /// Instances that it enters.
-    pub instances: f64,
-    /// Nodes below.
-    pub nodes_below: f64,
-    /// Triangles tested.
-    pub tests: f64,
-}
-
-impl MeanWork {
-    /// The mean over rays.
-    pub fn mean(works: &[[u32; 4]]) -> MeanWork {
-        let sum = |k: usize| works.iter().map(|work| f64::from(work[k])).sum::<f64>();
-        let [top_nodes, instances, nodes_below, tests] =
-            std::array::from_fn(|k| if works.is_empty() { 0.0 } else { sum(k) / works.len() as f64 });
-        MeanWork { top_nodes, instances, nodes_below, tests }
-    }
-}
-
 /// A frame of an animation, with the structure of the first frame updated, and built again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Update {
@@ -361,12 +347,5 @@ mod tests {
         unmeasured.rays[0].slowdown = None;
         assert_eq!((unmeasured.pays_from(), unmeasured.slowdown()), (None, None));
         assert_eq!(frame(4.0, 1.0, [2.0, 3.0]).slowdown(), Some(1.5));
-    }
-
-    #[test]
-    fn work_is_the_mean_over_rays() {
-        let mean = MeanWork::mean(&[[1, 2, 3, 4], [3, 2, 1, 0]]);
-        assert_eq!(mean, MeanWork { top_nodes: 2.0, instances: 2.0, nodes_below: 2.0, tests: 2.0 });
-        assert_eq!(MeanWork::mean(&[]).tests, 0.0);
     }
 }

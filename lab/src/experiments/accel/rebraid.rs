@@ -1,7 +1,7 @@
 //! Structures as `PREFER_FAST_TRACE` alone makes them, beside the driver's by the same flag; and the same with no instance opened: what
 //! re-braiding takes to build, and what rays of every kind gain.
 
-use super::points::{self, AccelEntry, FlaggedRays, MeanWork, TopLevelPoint};
+use super::points::{self, AccelEntry, FlaggedRays, TopLevelPoint};
 use super::{AccelSetup, WARM_UPS};
 use crate::Result;
 use crate::measure::agreement::agree;
@@ -10,6 +10,7 @@ use crate::rays::kinds::RayKind;
 use crate::scene::{Instances, Scene, SceneInstance};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::levels::Levels;
+use crate::subjects::queries::MeanWork;
 use crate::subjects::queries::Queries;
 use crate::subjects::structures::Structures;
 use ash::vk;

@@ -3,10 +3,11 @@
 use super::Part;
 use super::flagged::{both, gains, mrays_s};
 use crate::Result;
-use crate::experiments::accel::points::{AnyHitPoint, FlaggedRays, MeanWork};
+use crate::experiments::accel::points::{AnyHitPoint, FlaggedRays};
 use crate::report::bars::Bars;
 use crate::report::numbers::{count, grouped, short_count, three_digits, tick, whole};
 use crate::report::{Caption, Chart, Section, Table, bars, document, slug};
+use crate::subjects::queries::MeanWork;
 use maud::{Markup, html};
 
 pub(super) fn part(points: &[AnyHitPoint]) -> Result<Option<Part>> {

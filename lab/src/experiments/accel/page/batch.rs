@@ -5,7 +5,8 @@ use crate::Result;
 use crate::experiments::accel::points::{Batch, Implementation, Submission};
 use crate::report::bars::{Bar, Bars};
 use crate::report::numbers::{count, duration, duration_tick, grouped, short_count, three_digits, tick};
-use crate::report::{Axis, Caption, Chart, Curve, SERIES, Section, Table, Tone, bars, curves, document};
+use crate::report::{Axis, Caption, Chart, Curve, SERIES, Section, Table, Tone, bars, curves, distinct, document};
+use crate::subjects::preference::Preference;
 use maud::{Markup, html};
 
 /// Builders and their ways, in the order of charts and tables, with its colour: ours begin with the first and the driver's with
@@ -23,22 +24,44 @@ const SUBJECTS: [Subject; 8] = [
 
 type Subject = (Option<Implementation>, Submission, Tone);
 
+/// The batches of each preference.
+pub(super) fn by_preference(points: &[Batch]) -> Vec<Vec<&Batch>> {
+    let all = distinct(points.iter().map(|point| point.prefer));
+    all.into_iter().map(|prefer| points.iter().filter(|point| point.prefer == prefer).collect()).collect()
+}
+
 /// The point of this many structures.
-pub(super) fn find(
-    points: &[Batch],
+pub(super) fn find<'p>(
+    points: &[&'p Batch],
     structures: u32,
     maker: Option<Implementation>,
     way: Submission,
-) -> Option<&Batch> {
-    points.iter().find(|point| point.structures == structures && point.maker == maker && point.way == way)
+) -> Option<&'p Batch> {
+    points.iter().copied().find(|point| point.structures == structures && point.maker == maker && point.way == way)
 }
 
 fn name(maker: Option<Implementation>, way: Submission) -> String {
     maker.map_or_else(|| way.name().to_owned(), |maker| format!("{}, {}", maker.name(), way.name()))
 }
 
-pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
-    let Some(most) = points.iter().map(|point| point.structures).max() else { return Ok(None) };
+/// What builds prefer.
+pub(super) fn in_words(prefer: Preference) -> &'static str {
+    match prefer {
+        Preference::FastTrace => "for fast traces",
+        Preference::FastBuild => "for fast builds",
+        Preference::None => "without a preference",
+    }
+}
+
+/// A section for each preference.
+pub(super) fn parts(points: &[Batch]) -> Result<Vec<Part>> {
+    by_preference(points).iter().map(|own| part(own)).collect()
+}
+
+/// That of some points, all of one preference.
+fn part(points: &[&Batch]) -> Result<Part> {
+    let prefer = points[0].prefer;
+    let most = points.iter().map(|point| point.structures).max().unwrap_or(0);
     let triangles = points.iter().find(|point| point.structures == most).map_or(0, |point| point.triangles);
     let bar = |&(maker, way, tone): &Subject| {
         let point = find(points, most, maker, way)?;
@@ -49,11 +72,11 @@ pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
         Some(Bar { label: name(maker, way), figure, spread: point.wall_ms, tone })
     };
     let all_bars: Vec<Bar> = SUBJECTS.iter().filter_map(bar).collect();
-    let in_words: Vec<String> = all_bars.iter().map(|bar| format!("{}: {}", bar.label, bar.figure)).collect();
+    let told: Vec<String> = all_bars.iter().map(|bar| format!("{}: {}", bar.label, bar.figure)).collect();
     let caption = Caption {
-        name: "accel-batch".into(),
-        title: format!("{} structures of 12 to 478 triangles", grouped(most.into())),
-        alt: in_words.join("; "),
+        name: format!("accel-batch-{prefer}"),
+        title: format!("{} structures of 12 to 478 triangles, {}", grouped(most.into()), in_words(prefer)),
+        alt: told.join("; "),
         reading:
             "Shorter is better; the line through a bar goes from the fastest to the slowest run. In brackets: how many \
                   times as long as one call of ours, in the median of the runs."
@@ -70,8 +93,8 @@ pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
     };
     let all: Vec<Curve> = SUBJECTS.iter().map(curve).filter(|curve| !curve.points.is_empty()).collect();
     let caption = Caption {
-        name: "accel-batch-growth".into(),
-        title: "Time over the number of structures".into(),
+        name: format!("accel-batch-{prefer}-growth"),
+        title: format!("Time over the number of structures, {}", in_words(prefer)),
         alt: all.iter().map(|curve| curve.name.clone()).collect::<Vec<_>>().join("; "),
         reading:
             "Both axes are logarithmic. Where lines lie together, it makes no difference how the builds are asked for."
@@ -87,7 +110,7 @@ pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
     let body = html! {
         p {
             "Engines build hundreds of small structures a frame. Here " (grouped(most.into())) " of them, "
-            (grouped(triangles)) " triangles together, are built in one call, ours also with the arguments in memory in place of push "
+            (grouped(triangles)) " triangles together, " (in_words(prefer)) ", are built in one call, ours also with the arguments in memory in place of push "
             "constants; in a call each with a barrier behind it, in one "
             "command buffer; and in a call each that is submitted and waited for. By the wall's clock, recording included."
         }
@@ -98,10 +121,10 @@ pub(super) fn part(points: &[Batch]) -> Result<Option<Part>> {
             (every_batch(points))
         }
     };
-    Ok(Some((Section::new("batches", "Batches", body), charts)))
+    Ok((Section::new(format!("batches-{prefer}"), format!("Batches, {}", in_words(prefer)), body), charts))
 }
 
-fn every_batch(points: &[Batch]) -> Markup {
+fn every_batch(points: &[&Batch]) -> Markup {
     let each = |point: &Batch| 1e3 * point.wall_ms.median / f64::from(point.structures);
     Table::new("Batches", points)
         .number("structures", "", |point| Some(point.structures.into()), count)
@@ -115,7 +138,7 @@ fn every_batch(points: &[Batch]) -> Markup {
 }
 
 /// One call of ours against the others, in a sentence.
-fn reading(points: &[Batch], most: u32) -> String {
+fn reading(points: &[&Batch], most: u32) -> String {
     let of = |maker, way| find(points, most, Some(maker), way);
     let Some(ours) = of(Implementation::Ours, Submission::OneCall) else { return String::new() };
     let mut text = format!("One call takes {}", duration(ours.wall_ms.median));

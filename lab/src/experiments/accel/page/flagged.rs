@@ -1,9 +1,10 @@
 //! What sections say of rays through structures with a flag and without it.
 
-use crate::experiments::accel::points::{FlaggedRays, MeanWork};
+use crate::experiments::accel::points::FlaggedRays;
 use crate::report::SERIES;
 use crate::report::bars::Bar;
 use crate::report::numbers::three_digits;
+use crate::subjects::queries::MeanWork;
 use maud::{Markup, html};
 
 /// The gain of each kind of ray: as bars, and in words.

@@ -1,7 +1,7 @@
 //! What was to be reached, and whether it is.
 
 use super::Measured;
-use super::batch::find;
+use super::batch::{by_preference, find, in_words};
 use crate::experiments::accel::points::{FlaggedRays, Implementation, RebraidPoint, Submission};
 use crate::measure::{Spread, geometric_mean};
 
@@ -53,15 +53,17 @@ impl Goal {
 /// All of which there are figures.
 pub(super) fn goals(measured: &Measured) -> Vec<Goal> {
     let mut goals = Vec::new();
-    let most = measured.batches.iter().map(|point| point.structures).max().unwrap_or(0);
-    for (maker, way, against, least) in [
-        (Implementation::Ours, Submission::OneSubmit, Submission::OneSubmit.name(), BATCH),
-        (Implementation::Ours, Submission::SubmitEach, Submission::SubmitEach.name(), BATCH),
-        (Implementation::Driver, Submission::OneCall, "one call of the driver's", 1.0),
-    ] {
-        if let Some(point) = find(&measured.batches, most, Some(maker), way) {
-            let what = format!("{most} structures in one call, against {against}");
-            goals.push(Goal { what, ratio: point.over_our_call, least });
+    for batches in by_preference(&measured.batches) {
+        let most = batches.iter().map(|point| point.structures).max().unwrap_or(0);
+        for (maker, way, against, least) in [
+            (Implementation::Ours, Submission::OneSubmit, Submission::OneSubmit.name(), BATCH),
+            (Implementation::Ours, Submission::SubmitEach, Submission::SubmitEach.name(), BATCH),
+            (Implementation::Driver, Submission::OneCall, "one call of the driver's", 1.0),
+        ] {
+            if let Some(point) = find(&batches, most, Some(maker), way) {
+                let what = format!("{most} structures {} in one call, against {against}", in_words(point.prefer));
+                goals.push(Goal { what, ratio: point.over_our_call, least });
+            }
         }
     }
     for point in &measured.rebraids {

@@ -73,14 +73,14 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     }
     let setting = measured.setting.as_ref();
     let parts = [
-        batch::part(&measured.batches)?,
         top_level::part(&measured.top_levels)?,
         rebraid::part(&measured.rebraids)?,
         any_hit::part(&measured.any_hits)?,
         update::part(&measured.updates)?,
         memory::part(&measured.memories)?,
     ];
-    let (parts, charts): (Vec<Section>, Vec<Vec<Chart>>) = parts.into_iter().flatten().unzip();
+    let parts = batch::parts(&measured.batches)?.into_iter().chain(parts.into_iter().flatten());
+    let (parts, charts): (Vec<Section>, Vec<Vec<Chart>>) = parts.unzip();
     let mut sections = vec![Section::new("summary", "Summary", summary(setting, &goals::goals(&measured)))];
     sections.extend(parts);
     sections.push(Section::method(Some(beside::ACCEL.records), terms()));

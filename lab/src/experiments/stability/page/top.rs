@@ -47,9 +47,9 @@ impl TopRow<'_> {
         self.worst(|point| point.relative_cost, |a, b| a > b)
     }
 
-    /// The most relative visits, of the geometric mean over kinds of rays.
-    pub fn visits(&self) -> Worst {
-        self.worst(TopGrowth::relative_visits, |a, b| a > b)
+    /// The most relative work, of the geometric mean over kinds of rays.
+    pub fn work(&self) -> Worst {
+        self.worst(TopGrowth::relative_work, |a, b| a > b)
     }
 
     /// The least relative speed, of the geometric mean over kinds of rays.
@@ -100,7 +100,7 @@ fn table(points: &[TopGrowth]) -> Markup {
         .text("side", |row| row.by.sides)
         .number("code", "bits", |row| Some(row.code_bits().into()), count)
         .figure("cost", "×", move |row| cell(row.cost(), |value| value <= cost))
-        .figure("visits", "×", |row| cell(row.visits(), |_| true))
+        .figure("work", "×", |row| cell(row.work(), |_| true))
         .figure("speed", "×", move |row| cell(row.speed(), |value| value >= speed))
         .figure("build", "×", move |row| cell(row.build(), |value| value <= build))
         .figure("frame", "×", |row| cell(row.frame(), |_| true))
@@ -195,8 +195,8 @@ impl Paged for TopGrowth {
                 "(3 · Σ area of inner nodes + 2 · Σ area of entries) / area of what stays, every box of the top level clipped to that; over the same at "
                 "e = 0. An opened instance has several entries."
             }
-            dt { "Visits" }
-            dd { "Nodes of both levels, instances and triangles that a ray visits in the mean, over those at e = 0; geometric mean over the kinds of rays." }
+            dt { "Work" }
+            dd { "Nodes of both levels, instances and triangles that a ray meets in the mean, over those at e = 0; geometric mean over the kinds of rays." }
             dt { "Speed" }
             dd {
                 "Rays of the scene without what is far, by queries of a shader, through both top levels in turn after a warm-up that does not "

@@ -1,6 +1,6 @@
 //! `hedgerow stability growth --level top`: its options, its table in the terminal, and its run.
 
-use super::points::{FarInstances, FarSides, Preference, TopBuilder, TopGrowth, codes_of};
+use super::points::{FarInstances, FarSides, TopBuilder, TopGrowth, codes_of};
 use crate::cli::work::page_written;
 use crate::cli::{Bar, Common, tables};
 use crate::experiments::stability::far::Side;
@@ -12,6 +12,7 @@ use crate::rays::kinds::{RayKind, RayOptions};
 use crate::report::lines::Points;
 use crate::report::numbers::three_digits;
 use crate::scene::Instances;
+use crate::subjects::preference::Preference;
 use hedgerow::bvh::codes::Codes;
 use std::io::Write;
 use std::num::NonZeroU32;
@@ -180,13 +181,13 @@ pub(in crate::experiments::stability) fn run(
 
 /// The worst of all e, over e = 0, and the e that has it.
 fn table(points: &[TopGrowth]) -> String {
-    let header = ["scene", "top level", "far", "bits", "cost", "visits", "speed", "build", "frame"];
+    let header = ["scene", "top level", "far", "bits", "cost", "work", "speed", "build", "frame"];
     let mut table = tables::table(&header, 3);
     for row in rows(points) {
         let worst = |worst: page::top::Worst| {
             worst.map_or_else(|| "-".to_owned(), |(value, e)| format!("{} at {e}", three_digits(value)))
         };
-        let figures = [row.cost(), row.visits(), row.speed(), row.build(), row.frame()].map(worst);
+        let figures = [row.cost(), row.work(), row.speed(), row.build(), row.frame()].map(worst);
         let what = [row.scene.to_owned(), row.builder.to_string(), row.by.to_string(), row.code_bits().to_string()];
         table.add_row(what.into_iter().chain(figures));
     }

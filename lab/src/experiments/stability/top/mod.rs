@@ -16,7 +16,7 @@ use crate::rays::kinds::{self, RayKind, RayOptions};
 use crate::scene::{Instances, Mesh, Scene, SceneInstance};
 use crate::subjects::device_rays::RayBuffers;
 use crate::subjects::levels::Levels;
-use crate::subjects::queries::Queries;
+use crate::subjects::queries::{MeanWork, Queries};
 use crate::subjects::structures::Structures;
 use hedgerow::accel::Tree;
 use hedgerow::bvh::codes::Code;
@@ -25,7 +25,7 @@ use hedgerow::bvh::twin::lbvh;
 use hedgerow::geometry::Aabb;
 use hedgerow::trace::twin::tracer;
 use hedgerow::trace::{Hit, Query, Ray};
-use points::{FarInstances, FarSides, TopBuilder, TopGrowth, Visits};
+use points::{FarInstances, FarSides, TopBuilder, TopGrowth};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -196,8 +196,8 @@ fn measure_one(
         let [mut frame, mut base_frame] =
             [Spread::of_some(&builds[1])?, Spread::of_some(&builds[0])?].map(|s| s.median);
         let mut relative_mrays = BTreeMap::new();
-        let mut visits = BTreeMap::new();
-        let mut relative_visits = BTreeMap::new();
+        let mut work = BTreeMap::new();
+        let mut relative_work = BTreeMap::new();
         for traced in &part.rays {
             let query = traced.kind.query();
             let times = in_turn(&mut levels, WARM_UPS, stage.runs, |levels| {
@@ -207,10 +207,10 @@ fn measure_one(
             frame += Spread::of_some(&times[1])?.median;
             base_frame += Spread::of_some(&times[0])?.median;
             relative_mrays.insert(traced.kind.name().to_owned(), Spread::of_some(&ratios(&times[0], &times[1]))?);
-            let [before, now] = &mut levels;
-            let (before, now) = (Visits::of(before, traced)?, Visits::of(now, traced)?);
-            relative_visits.insert(traced.kind.name().to_owned(), now.all() / before.all());
-            visits.insert(traced.kind.name().to_owned(), now);
+            let works = levels.iter_mut().map(|levels| Ok(MeanWork::mean(&levels.work(&traced.buffers, query)?)));
+            let works: Vec<MeanWork> = works.collect::<Result<_>>()?;
+            work.insert(traced.kind.name().to_owned(), works[1]);
+            relative_work.insert(traced.kind.name().to_owned(), works[1].all() / works[0].all());
             // The other was traced last: its hits are there.
             let wrong = traced.wrong(query);
             if wrong > 0 {
@@ -235,22 +235,13 @@ fn measure_one(
             build_ms: Spread::of_some(&builds[1])?,
             relative_build: Spread::of_some(&ratios(&builds[1], &builds[0]))?,
             relative_mrays,
-            visits,
-            relative_visits,
+            work,
+            relative_work,
             frame_ms: has_rays.then_some(frame),
             relative_frame: has_rays.then_some(frame / base_frame),
         })?;
     }
     Ok(())
-}
-
-impl Visits {
-    /// Those of the rays through these structures.
-    fn of(levels: &mut Levels<'_>, traced: &TracedKind<'_>) -> Result<Visits> {
-        let work = levels.work(&traced.buffers, traced.kind.query())?;
-        let mean = |i: usize| work.iter().map(|work| f64::from(work[i])).sum::<f64>() / work.len() as f64;
-        Ok(Visits { top_nodes: mean(0), instances: mean(1), nodes_below: mean(2), triangles: mean(3) })
-    }
 }
 
 impl TracedKind<'_> {

@@ -3,6 +3,8 @@
 use crate::experiments::stability::points::Experiment;
 use crate::measure::{Spread, geometric_mean};
 use crate::named::named;
+use crate::subjects::preference::Preference;
+use crate::subjects::queries::MeanWork;
 use crate::{Error, Result};
 use ash::vk;
 use hedgerow::accel::{AccelOptions, REBRAID, Wide};
@@ -10,20 +12,6 @@ use hedgerow::bvh::codes::Codes;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
-
-/// What a build prefers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Preference {
-    /// `PREFER_FAST_TRACE`.
-    FastTrace,
-    /// `PREFER_FAST_BUILD`.
-    FastBuild,
-    /// Neither.
-    None,
-}
-
-named!(Preference, "preference": FastTrace = "fast-trace", FastBuild = "fast-build", None = "none");
 
 /// Where the far instances are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,11 +68,7 @@ const DEFAULT: &str = "default";
 impl TopBuilder {
     /// The flags of its builds.
     pub fn flags(&self) -> vk::BuildAccelerationStructureFlagsKHR {
-        let prefer = match self.prefer {
-            Preference::FastTrace => vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE,
-            Preference::FastBuild => vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_BUILD,
-            Preference::None => vk::BuildAccelerationStructureFlagsKHR::empty(),
-        };
+        let prefer = self.prefer.flags();
         if self.rebraid { prefer | REBRAID } else { prefer }
     }
 
@@ -175,36 +159,16 @@ pub struct TopGrowth {
     pub relative_build: Spread,
     /// For each kind of ray, speed over that at e = 0, run by run in turn.
     pub relative_mrays: BTreeMap<String, Spread>,
-    /// For each kind of ray, what one of them visits in the mean; nothing in records of before 27 November 2026.
+    /// For each kind of ray, what one of them meets; nothing in records of before 27 November 2026.
     #[serde(default)]
-    pub visits: BTreeMap<String, Visits>,
+    pub work: BTreeMap<String, MeanWork>,
     /// All of that over the same at e = 0: what the tree makes of the speed, free of noise.
     #[serde(default)]
-    pub relative_visits: BTreeMap<String, f64>,
+    pub relative_work: BTreeMap<String, f64>,
     /// Milliseconds of a build and one trace of every kind of ray.
     pub frame_ms: Option<f64>,
     /// Those over a frame at e = 0.
     pub relative_frame: Option<f64>,
-}
-
-/// What a query visits, in the mean of all rays of a kind.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Visits {
-    /// Nodes of the top level.
-    pub top_nodes: f64,
-    /// Instances that it enters.
-    pub instances: f64,
-    /// Nodes below.
-    pub nodes_below: f64,
-    /// Triangles.
-    pub triangles: f64,
-}
-
-impl Visits {
-    /// Their sum.
-    pub fn all(&self) -> f64 {
-        self.top_nodes + self.instances + self.nodes_below + self.triangles
-    }
 }
 
 /// Issue 20's goals: cost at most, speed at least, build time at most, over those of e = 0.
@@ -216,9 +180,9 @@ impl TopGrowth {
         geometric_mean(self.relative_mrays.values().map(|spread| spread.median))
     }
 
-    /// The geometric mean of the relative visits; `None` without rays.
-    pub fn relative_visits(&self) -> Option<f64> {
-        geometric_mean(self.relative_visits.values().copied())
+    /// The geometric mean of the relative work; `None` without rays.
+    pub fn relative_work(&self) -> Option<f64> {
+        geometric_mean(self.relative_work.values().copied())
     }
 }
 
@@ -228,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_point_is_a_line_that_names_its_codes() {
-        let line = r#"{"experiment":"growth-top","scene":"gen:city:9","instances":9,"prefer":"fast-trace","rebraid":true,"of_eight":false,"codes":"default","far":100,"axes":3,"sides":"drawn","e":42,"code_bits":32,"entries":40,"cost":20.5,"relative_cost":1.01,"build_ms":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_build":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_mrays":{},"visits":{},"relative_visits":{},"frame_ms":null,"relative_frame":null}"#;
+        let line = r#"{"experiment":"growth-top","scene":"gen:city:9","instances":9,"prefer":"fast-trace","rebraid":true,"of_eight":false,"codes":"default","far":100,"axes":3,"sides":"drawn","e":42,"code_bits":32,"entries":40,"cost":20.5,"relative_cost":1.01,"build_ms":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_build":{"median":1.0,"min":1.0,"max":1.0,"runs":1},"relative_mrays":{},"work":{},"relative_work":{},"frame_ms":null,"relative_frame":null}"#;
         let point: TopGrowth = serde_json::from_str(line).expect("a point");
         assert_eq!((point.builder.codes, point.by.sides, point.speed()), (None, FarSides::Drawn, None));
         assert_eq!(serde_json::to_string(&point).expect("JSON"), line);
