@@ -21,6 +21,7 @@ use hedgerow_lab::experiments::accel::batch::{Batch, Workload};
 use hedgerow_lab::experiments::accel::points::Submission;
 use hedgerow_lab::rays::kinds::{self, RayKind, RayOptions};
 use hedgerow_lab::scene::{self, LoadOptions, Scene};
+use hedgerow_lab::subjects::preference::Preference;
 use hedgerow_lab::subjects::structures::Structures;
 
 const SIZE: [u32; 2] = [256, 192];
@@ -194,7 +195,7 @@ fn batch(c: &mut Criterion) {
     let mut group = c.benchmark_group("batch");
     group.sample_size(10).throughput(Throughput::Elements(COUNT.into()));
     for (whose, structures) in makers {
-        let batch = Batch::new(structures, &workload).expect("memory");
+        let batch = Batch::new(structures, &workload, Preference::FastBuild).expect("memory");
         for way in [Submission::OneCall, Submission::OneSubmit, Submission::SubmitEach] {
             let name = format!("{}{whose}", way.name());
             group.bench_function(name, |b| b.iter(|| batch.build(way, workload.count()).expect("it builds")));

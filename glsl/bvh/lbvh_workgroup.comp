@@ -7,6 +7,7 @@
 #version 460
 #define HEDGEROW_BUILD_BY_ONE_WORKGROUP
 #include "bvh/lbvh.glsl"
+#include "bvh/encode/alone.glsl"
 
 // The twin of `Small` in src/bvh/lbvh_workgroup.rs.
 struct Small {
@@ -87,34 +88,8 @@ void main() {
     passes = primitive_count < 2u ? 0u : (max(given_code_bits(), most_bits_by_spread()) + DIGIT_BITS - 1u) / DIGIT_BITS;
     plan_parts(given.state_bytes & ~IN_TABLE);
 
+    encode_alone();
     uint tile = gl_WorkGroupSize.x * ITEMS;
     uint tiles = (primitive_count + tile - 1u) / tile;
-    reset_build(0);
-    if (HAS_SECTIONS) find_fences();
-    next_phase();
-    for (uint task = 0; task < tiles; ++task) find_bounds(task);
-    next_phase();
-    make_plan();
-    next_phase();
-    if (HAS_GRID) {
-        for (uint task = 0; task < tiles; ++task) {
-            count_cells(task);
-            barrier();   // the task's use of shared memory is over
-        }
-        next_phase();
-        find_prefixes();
-        next_phase();
-    }
-    for (uint task = 0; task < tiles; ++task) encode(task);
-    next_phase();
-    for (uint pass = passes_left_out(); pass < passes; ++pass) {
-        Radix r = radix_of_pass(pass);
-        for (uint task = 0; task * COLUMNS_A_TASK < columns_of_sort(); ++task) radix_count(r, task);
-        next_phase();
-        for (uint task = 0; task * DIGITS_A_TASK < DIGITS; ++task) radix_scan(r, task);
-        next_phase();
-        for (uint task = 0; task * COLUMNS_A_TASK < columns_of_sort(); ++task) radix_scatter(r, task);
-        next_phase();
-    }
     for (uint task = 0; task < tiles; ++task) lbvh_hierarchy(task);
 }

@@ -22,8 +22,8 @@ type Flags = vk::BuildAccelerationStructureFlagsKHR;
 pub const SCRATCH_ALIGNMENT: u64 = 16;
 
 /// From how many triangles on a structure of wide nodes is made in its own memory: 162 bytes a triangle in all, where 270 and the tables
-/// of a sort are for a few.
-const NUMBERED_FROM: u32 = 1024;
+/// of a sort are for a few, which one workgroup builds.
+const NUMBERED_FROM: u32 = 1025;
 
 /// Where the numbers of primitives come from.
 #[derive(Debug, Clone, Copy)]
@@ -98,7 +98,9 @@ impl Build {
         let numbered = in_pieces.and_then(|_| builder.numbered());
         let (builder, numbered) = numbered.map_or((builder, false), |builder| (builder, true));
         let of_another_form = quality::fewer_of_another_form(flags, options, primitives, primitive_count);
-        let in_other_memory = numbered.then_some(NUMBERED_FROM - 1);
+        // What one workgroup builds may need more than a little more that a chain of dispatches does.
+        let of_one_workgroup = primitives != Primitives::Instances && entries >= NUMBERED_FROM;
+        let in_other_memory = of_one_workgroup.then_some(NUMBERED_FROM - 1);
         let of_fewer = |count: u32| {
             let given = given.clone();
             Build::new(context, options, flags, given, counts, count.into()).map(|build| build.sizes_at_most())

@@ -57,8 +57,9 @@ impl<'a> Device<'a> {
 
     /// Bytes that suffice for the arguments of one call of so many builds with so many geometries in all.
     pub const fn argument_bytes(builds: u64, geometries: u64) -> u64 {
-        /// What one workgroup does of a build: its optimising, its finishing and its wide nodes.
-        const SHARED: u64 = 3;
+        /// What one workgroup does of a build, in a dispatch each: the order of its primitives, its hierarchy, its optimising, its finishing and
+        /// its wide nodes.
+        const SHARED: u64 = 5;
         // Of each build the records of its geometries, one more, what fills up to the alignment, and its arguments.
         (size_of::<Geometry>() as u64) * (geometries + builds)
             + (size_of::<arguments::Small>() as u64 + 2 * ArgumentTable::ALIGNMENT) * builds

@@ -81,7 +81,10 @@ impl BuildOptions {
         match schedule {
             Schedule::Chain => true,
             Schedule::Persistent(_) => self.optimise.is_none(),
-            Schedule::Workgroup => self.split.is_none() && self.method == Method::Lbvh,
+            Schedule::Workgroup => {
+                let is_hploc = matches!(self.method, Method::Hploc(_)) && self.optimise.is_some();
+                self.split.is_none() && (self.method == Method::Lbvh || is_hploc)
+            }
         }
     }
 }
@@ -96,7 +99,8 @@ pub enum Schedule {
     /// that it has started.
     Persistent(&'static PersistentShaders),
     /// One workgroup builds everything in one dispatch: for few primitives, at most [`Builder::WORKGROUP_MAX`]. Only
-    /// [`Method::Lbvh`] has it. What optimises its tree comes behind it.
+    /// [`Method::Lbvh`] has it; what optimises its tree comes behind it. [`Method::Hploc`] has it where its tree is optimised, in a dispatch for
+    /// the order of the primitives and one for the hierarchy.
     Workgroup,
 }
 
@@ -203,7 +207,11 @@ impl Builder {
         let count = primitive_count + budget;
         options.method.check()?;
         let tuning = &context.tuning.build;
-        let small = if options.optimise.is_some() { tuning.small_optimised } else { tuning.small };
+        let small = match options.method {
+            _ if options.optimise.is_none() => tuning.small,
+            Method::Hploc(_) => tuning.small_hploc,
+            _ => tuning.small_optimised,
+        };
         let by_one = primitive_count <= small && options.takes(Schedule::Workgroup);
         let of_count = if by_one { Schedule::Workgroup } else { Schedule::Chain };
         let schedule = options.schedule.unwrap_or(of_count);
@@ -439,9 +447,9 @@ impl Builder {
         Ok(chains)
     }
 
-    /// Of a build whose tree one workgroup makes.
+    /// Of a build whose tree one workgroup makes in one dispatch.
     fn small_build<'a>(&'a self, job: &'a BuildJob<'_>) -> Result<Option<SmallBuild<'a>>> {
-        if self.schedule != Schedule::Workgroup {
+        if self.schedule != Schedule::Workgroup || self.method != Method::Lbvh {
             return Ok(None);
         }
         let memory = job.addresses()?;
@@ -454,7 +462,7 @@ impl Builder {
         self.method.hierarchy(&self.merging)
     }
 
-    /// The steps of a tree that is not made by one workgroup.
+    /// The steps of a tree that is not made by one workgroup in one dispatch.
     fn tree_of(&self, job: &BuildJob<'_>) -> Result<Vec<Step>> {
         let Builder { encode, .. } = self;
         let input = &job.input;
@@ -467,7 +475,11 @@ impl Builder {
                 let shader = shaders.of(self.method);
                 self.hierarchy().persistent_steps(encode, input, arguments, shader, self.workers)
             }
-            Schedule::Chain | Schedule::Workgroup => {
+            Schedule::Workgroup => vec![
+                encode.alone_step(input, arguments),
+                self.merging.alone_step(encode, input, &self.single(arguments)),
+            ],
+            Schedule::Chain => {
                 let hierarchy = self.hierarchy().steps(encode, input, &self.single(arguments));
                 [encode.steps(input, arguments), hierarchy].concat()
             }

@@ -212,6 +212,16 @@ impl Encode {
         })
     }
 
+    /// The one dispatch that does what [`Encode::steps`] does, of a build by one workgroup. Label: `encode`.
+    pub fn alone_step(&self, input: &Input, arguments: &arguments::Build) -> Step {
+        let column_keys = match self.shape.private_counters {
+            true => self.count.div_ceil(self.shape.workgroup).max(1),
+            false => arguments.column_keys,
+        };
+        let arguments = arguments::Build { column_keys, ..*arguments };
+        Step::new("encode", self.reading_kernel(&shaders::BVH_ENCODE_ALONE, input), &arguments, 1)
+    }
+
     /// The dispatches up to the sort; what follows needs a barrier before. Labels: `bounds`, `encode`, `sort`, and for
     /// codes with a grid `cells`.
     pub fn steps(&self, input: &Input, arguments: &arguments::Build) -> Vec<Step> {

@@ -82,6 +82,15 @@ impl Merging {
     }
 }
 
+impl Merging {
+    /// The one dispatch that does what its steps do, by one workgroup. Label: `hierarchy`.
+    pub fn alone_step(&self, encode: &Encode, input: &Input, arguments: &arguments::Build) -> Step {
+        let workgroup = encode.shape.workgroup.min(self.group);
+        let kernel = self.kernel(encode, &shaders::BVH_HPLOC_HIERARCHY_ALONE, input, workgroup);
+        Step::new("hierarchy", kernel, arguments, 1)
+    }
+}
+
 impl Hierarchy for &Merging {
     fn steps(&self, encode: &Encode, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
         let workgroup = encode.shape.workgroup.min(self.group);

@@ -101,6 +101,8 @@ pub struct BuildTuning {
     pub small: u32,
     /// Primitives up to which one workgroup does all rounds of a build's reinsertion, and finishes the tree, in a dispatch each.
     pub small_optimised: u32,
+    /// Primitives up to which one workgroup finds their order and makes an H-PLOC over it that is optimised then, in a dispatch each.
+    pub small_hploc: u32,
     /// Bits of a digit of its sort: with 8, a pass spends more on its table than on a few hundred keys.
     pub small_digit_bits: u32,
     /// Whether an invocation of H-PLOC merges small windows by itself, in registers, or a team of invocations does.
@@ -206,6 +208,8 @@ impl Tuning {
                 small: 2048,
                 // Fast traces of 300 to 2,000 triangles take 0.25 to 0.7 of the time so, top levels of 50 to 400 instances 0.25 to 0.85.
                 small_optimised: 2048,
+                // Of 600 to 1,000 triangles a fast trace takes 0.8 to 0.95 of the time so, of 1,500 and 2,000 on two cores 1.24.
+                small_hploc: 1024,
                 small_digit_bits: 4,
                 merges_alone: true,
                 reinsertion_rounds: 64,
@@ -266,6 +270,7 @@ impl Tuning {
                 small: 2048,
                 // Rounds of as many try 128 links each, whatever their number: no work for a second workgroup.
                 small_optimised: 2048,
+                small_hploc: 1024,
                 small_digit_bits: 4,
                 // As in the paper: of the invocations that climb, ever fewer have a window, and merging one alone takes 28
                 // distances a round and some hundred registers.

@@ -43,15 +43,19 @@ fn hlbvh_gives_the_bytes_of_the_host() {
 fn optimised_trees_are_those_of_the_host() {
     let optimise = reinsertion::ReinsertionOptions { rounds: 6, stride: 2 };
     for mesh in corpus::meshes() {
-        for method in
-            [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)]
-        {
+        for method in [
+            Method::Lbvh,
+            Method::Hlbvh(Treelets::DEFAULT),
+            Method::Ploc { radius: 8 },
+            Method::Hploc(Window::DEFAULT),
+            Method::Hploc(Window { size: 64, radius: 16 }),
+        ] {
             let codes = Some(Code::Emc64Var.full());
             let options = BuildOptions { method, codes, optimise: Some(optimise), ..BuildOptions::DEFAULT };
             let expected = on_host(&mesh, &options);
             let what = format!("{} {method:?}", mesh.0);
             expected.validate().unwrap_or_else(|e| panic!("{what}: {e}"));
-            // Without a schedule one workgroup optimises what is small.
+            // Without a schedule one workgroup optimises what is small, and makes its tree if that is an LBVH or by H-PLOC.
             for schedule in [None, Some(Schedule::Chain)] {
                 let got = on_device(&mesh, &BuildOptions { schedule, ..options });
                 assert_same(&got, &expected, &format!("{what} {schedule:?}"));
@@ -60,18 +64,23 @@ fn optimised_trees_are_those_of_the_host() {
     }
 }
 
-/// A dispatch for the tree, one for all rounds, one for leaves and records; of the chain each phase and each round has its own.
+/// A dispatch for the tree, or of H-PLOC one for the order and one for the hierarchy, one for all rounds, one for leaves and records; of the chain
+/// each phase and each round has its own.
 #[test]
-fn small_optimised_trees_take_three_dispatches() {
+fn small_optimised_trees_take_a_few_dispatches() {
     let input = Input { source: Source::One(Geometry::mesh(16, 16, 3)), primitive_count: 200 };
-    let steps = |schedule| {
+    let steps = |method, schedule| {
         let optimise = Some(reinsertion::ReinsertionOptions::MEDIUM);
-        let options = BuildOptions { optimise, schedule, ..BuildOptions::DEFAULT };
+        let options = BuildOptions { method, optimise, schedule, ..BuildOptions::DEFAULT };
         let builder = Builder::new(device(), &options, input.primitive_count).expect("options that fit");
         builder.steps(&input, Region::unbounded(16), Region::unbounded(16)).expect("memory without an end").len()
     };
-    assert_eq!(steps(None), 3);
-    assert!(steps(Some(Schedule::Chain)) > 30, "{}", steps(Some(Schedule::Chain)));
+    let hploc = Method::Hploc(Window::DEFAULT);
+    assert_eq!([steps(Method::Lbvh, None), steps(hploc, None)], [3, 4]);
+    for method in [Method::Lbvh, hploc] {
+        let chain = steps(method, Some(Schedule::Chain));
+        assert!(chain > 30, "{method:?}: {chain}");
+    }
 }
 
 #[test]

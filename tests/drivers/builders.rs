@@ -42,7 +42,10 @@ pub fn splits_and_optimised_trees_too() {
     let optimise = Some(reinsertion::ReinsertionOptions { rounds: 3, stride: 2 });
     let split = Some(split::SplitOptions::DEFAULT);
     let codes = Some(Code::Emc64Var.full());
-    assert_as_on_the_host(&BuildOptions { codes, optimise, ..BuildOptions::DEFAULT }, &[Schedule::Chain]);
+    for method in [Method::Lbvh, Method::Hploc(Window::DEFAULT)] {
+        let options = BuildOptions { method, codes, optimise, ..BuildOptions::DEFAULT };
+        assert_as_on_the_host(&options, &[Schedule::Chain, Schedule::Workgroup]);
+    }
     assert_as_on_the_host(
         &BuildOptions { codes, split, ..BuildOptions::DEFAULT },
         &[Schedule::Chain, Schedule::PERSISTENT],
