@@ -432,9 +432,9 @@ impl Builder {
             match job.builder.small_build(job)? {
                 Some(build) => {
                     small.push(build);
-                    // Its tree is in a dispatch with others.
+                    // Its tree is in a dispatch with others, and what comes behind waits for that.
                     if let Some(first) = behind.first() {
-                        chains.push([vec![first.clone().without_groups()], behind].concat());
+                        chains.push([vec![first.clone().idle(lbvh_workgroup::PHASE)], behind].concat());
                     }
                 }
                 None => chains.push([job.builder.tree_of(job)?, behind].concat()),

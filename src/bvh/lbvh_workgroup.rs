@@ -10,6 +10,8 @@ use crate::gpu::arguments::{self, BUILD_STATE_BYTES};
 use crate::gpu::{ArgumentTable, Kernel, Step, shaders};
 use std::collections::HashMap;
 
+/// The label of the dispatches.
+pub(super) const PHASE: &str = "build";
 /// Builds that fit into the push constants.
 const AT_ONCE: usize = 2;
 /// With the bytes of a build's state: the arguments lie in a table. The twin of that in glsl/bvh/lbvh_workgroup.comp.
@@ -63,7 +65,7 @@ pub(super) fn steps(small: &[SmallBuild<'_>], mut table: Option<&mut ArgumentTab
                 codes_and_flags: *codes_and_flags,
                 state_bytes: BUILD_STATE_BYTES as u32 | table,
             };
-            Step::new("build", kernel.clone(), &arguments, count as u32)
+            Step::new(PHASE, kernel.clone(), &arguments, count as u32)
         };
         let builds = &kinds[&kind];
         match &mut table {

@@ -130,9 +130,9 @@ impl Step {
         Step { phase, kernel, arguments, groups }
     }
 
-    /// Nothing, while other chains have a step: what it would do is in one of theirs.
-    pub(crate) fn without_groups(self) -> Step {
-        Step { groups: 0, ..self }
+    /// In its place nothing, while other chains are in the phase `phase`.
+    pub(crate) fn idle(self, phase: &'static str) -> Step {
+        Step { phase, groups: 0, ..self }
     }
 }
 
