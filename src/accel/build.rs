@@ -98,9 +98,11 @@ impl Build {
         let numbered = in_pieces.and_then(|_| builder.numbered());
         let (builder, numbered) = numbered.map_or((builder, false), |builder| (builder, true));
         let of_another_form = quality::fewer_of_another_form(flags, options, primitives, primitive_count);
-        // What one workgroup builds may need more than a little more that a chain of dispatches does.
-        let of_one_workgroup = primitives != Primitives::Instances && entries >= NUMBERED_FROM;
-        let in_other_memory = of_one_workgroup.then_some(NUMBERED_FROM - 1);
+        // A chain of dispatches sorts by another table than one workgroup does, which builds what is optimised, and that are three or more.
+        let other_tables = flags.contains(Flags::PREFER_FAST_TRACE) && primitives != Primitives::Instances;
+        let in_other_memory = [(2, other_tables), (NUMBERED_FROM - 1, other_tables || numbered)];
+        let in_other_memory = in_other_memory.into_iter().filter(|&(fewer, is_so)| is_so && fewer < entries);
+        let in_other_memory = in_other_memory.map(|(fewer, _)| fewer);
         let of_fewer = |count: u32| {
             let given = given.clone();
             Build::new(context, options, flags, given, counts, count.into()).map(|build| build.sizes_at_most())

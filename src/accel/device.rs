@@ -367,7 +367,7 @@ impl<'a> Device<'a> {
         let mut epilogues: Vec<Vec<Step>> = epilogues.collect::<Result<_>>()?;
         if let Some(table) = &mut table {
             table.share_dispatches(&mut epilogues)?;
-        } else if self.arguments.is_some() {
+        } else if self.arguments.is_some() && !self.context.workarounds.no_shared_dispatches {
             recorder.warm_by_table(chains.iter().chain(&epilogues).flatten())?;
         }
         let mut prologues: Vec<Vec<Step>> =

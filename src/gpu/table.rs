@@ -26,7 +26,7 @@ pub struct ArgumentTable {
     memory: ArgumentMemory,
     address: u64,
     bytes: Vec<u8>,
-    /// Workgroups that a dispatch may have along x.
+    /// Workgroups that a shared dispatch may have along x; 0 where there is none.
     groups_at_most: u32,
 }
 
@@ -54,7 +54,9 @@ impl ArgumentTable {
                 Self::ALIGNMENT
             )));
         }
-        Ok(ArgumentTable { memory, address, bytes: Vec::new(), groups_at_most: context.limits.workgroup_count })
+        let shares = !context.workarounds.no_shared_dispatches;
+        let groups_at_most = if shares { context.limits.workgroup_count } else { 0 };
+        Ok(ArgumentTable { memory, address, bytes: Vec::new(), groups_at_most })
     }
 
     /// Puts `records` behind what is there. Returns the address where they will lie.
@@ -71,7 +73,7 @@ impl ArgumentTable {
     /// # Errors
     /// The memory is too small.
     pub(crate) fn share_dispatches(&mut self, chains: &mut [Vec<Step>]) -> Result<()> {
-        let longest = chains.iter().map(Vec::len).max().unwrap_or(0);
+        let longest = chains.iter().map(Vec::len).max().filter(|_| self.groups_at_most > 0).unwrap_or(0);
         for at in 0..longest {
             let mut same: Vec<(Kernel, Vec<usize>)> = Vec::new();
             for (chain, steps) in chains.iter().enumerate() {

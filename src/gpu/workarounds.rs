@@ -31,6 +31,10 @@ pub struct Workarounds {
     /// time: `encode_plan`, the tracers lane by lane and every persistent kernel did not compile in minutes. Shown by:
     /// tests/drivers, which bounds the time of each pipeline.
     pub folded_constants: bool,
+    /// What one workgroup does of a small build keeps a dispatch of its own where the arguments of many could lie in a table
+    /// ([`ArgumentTable`](super::ArgumentTable)). SwiftShader writes elsewhere then, and crashes; what it makes of such shaders is not known. Shown
+    /// by: tests/accel/arguments.rs.
+    pub no_shared_dispatches: bool,
 }
 
 impl Workarounds {
@@ -41,6 +45,7 @@ impl Workarounds {
         driver_crashes_on_inactive_instances: false,
         driver_loses_boxes: false,
         folded_constants: false,
+        no_shared_dispatches: false,
     };
 
     /// What the driver of a device needs.
@@ -51,7 +56,12 @@ impl Workarounds {
     #[doc(hidden)]
     pub fn of_driver(driver: vk::DriverId, version: u32) -> Workarounds {
         if driver != vk::DriverId::MESA_LLVMPIPE {
-            return Workarounds { folded_constants: driver == vk::DriverId::GOOGLE_SWIFTSHADER, ..Workarounds::NONE };
+            let is_swiftshader = driver == vk::DriverId::GOOGLE_SWIFTSHADER;
+            return Workarounds {
+                folded_constants: is_swiftshader,
+                no_shared_dispatches: is_swiftshader,
+                ..Workarounds::NONE
+            };
         }
         let is_old = vk::api_version_major(version) < 26;
         Workarounds {
@@ -72,7 +82,7 @@ mod tests {
     fn faults_follow_from_driver_and_version() {
         let of = |driver, major| Workarounds::of_driver(driver, vk::make_api_version(0, major, 0, 7));
         assert_eq!(of(vk::DriverId::NVIDIA_PROPRIETARY, 25), Workarounds::NONE);
-        let swiftshader = Workarounds { folded_constants: true, ..Workarounds::NONE };
+        let swiftshader = Workarounds { folded_constants: true, no_shared_dispatches: true, ..Workarounds::NONE };
         assert_eq!(of(vk::DriverId::GOOGLE_SWIFTSHADER, 5), swiftshader);
         let (old, new) = (of(vk::DriverId::MESA_LLVMPIPE, 25), of(vk::DriverId::MESA_LLVMPIPE, 26));
         assert!(old.driver_halves_in_order && old.driver_misreads_geometry);

@@ -67,7 +67,7 @@ fn a_run_leaves_records_of_every_experiment_and_a_page_of_them() {
     assert_eq!((top_levels, frames, rebraids, any_hits), (vec![100, 200], vec![0, 2, 4], 1, 1));
 
     let page = std::fs::read_to_string(page).expect("written");
-    for id in ["batches", "tlas", "rebraid", "any-hit", "updates", "method"] {
+    for id in ["batches-fast-build", "tlas", "rebraid", "any-hit", "updates", "method"] {
         assert!(page.contains(&format!("<section id=\"{id}\">")), "{id}");
     }
     let of_forest = ["accel-rebraid-gen-forest-9", "accel-any-hit-gen-forest-9"];
