@@ -98,7 +98,8 @@ impl Build {
         let numbered = in_pieces.and_then(|_| builder.numbered());
         let (builder, numbered) = numbered.map_or((builder, false), |builder| (builder, true));
         let of_another_form = quality::fewer_of_another_form(flags, options, primitives, primitive_count);
-        // A chain of dispatches sorts by another table than one workgroup does, which builds what is optimised, and that are three or more.
+        // One workgroup sorts by a smaller table than a chain of dispatches. A fast trace of three or more primitives, up to a number, is
+        // its work; one of two is a chain's, as nothing is optimised.
         let other_tables = flags.contains(Flags::PREFER_FAST_TRACE) && primitives != Primitives::Instances;
         let in_other_memory = [(2, other_tables), (NUMBERED_FROM - 1, other_tables || numbered)];
         let in_other_memory = in_other_memory.into_iter().filter(|&(fewer, is_so)| is_so && fewer < entries);

@@ -46,8 +46,9 @@ impl<'a> Device<'a> {
     }
 
     /// The same structures, whose builds read their arguments from `memory`: a call for thousands of small builds records one dispatch
-    /// for all steps of a kind in place of one each or one for two, and the records of geometries are written at once in place of two at a time. Each call
-    /// needs [`Device::argument_bytes`] there, and has the memory for itself while it runs, like scratch memory.
+    /// for all steps of a kind in place of one each or one for two, and the records of geometries are written at once in place of two at a
+    /// time. Each call needs [`Device::argument_bytes`] there, and has the memory for itself while it runs, like scratch memory. On SwiftShader
+    /// only the trees of LBVHs share dispatches.
     ///
     /// # Safety
     /// As [`ArgumentMemory`] says, whenever this device or a clone records builds.

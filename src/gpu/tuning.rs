@@ -208,7 +208,7 @@ impl Tuning {
                 small: 2048,
                 // Fast traces of 300 to 2,000 triangles take 0.25 to 0.7 of the time so, top levels of 50 to 400 instances 0.25 to 0.85.
                 small_optimised: 2048,
-                // Of 600 to 1,000 triangles a fast trace takes 0.8 to 0.95 of the time so, of 1,500 and 2,000 on two cores 1.24.
+                // Of 600 to 1,000 triangles a fast trace takes 0.77 to 1.06 of the time so, of 1,500 and 2,000 on two cores 1.24.
                 small_hploc: 1024,
                 small_digit_bits: 4,
                 merges_alone: true,
