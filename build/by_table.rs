@@ -117,56 +117,110 @@ fn declare_group(module: &mut Module) -> u32 {
     id
 }
 
-/// Has a function read its arguments from the row of its workgroup.
+/// What a pointer into the push constants led to.
+enum Argument {
+    /// What was loaded at the start.
+    Loaded(u32),
+    /// A member of an array, by a number that is not known at the start: the pointer into the row, and what its loads are aligned to.
+    Indexed(Instruction, [Operand; 2]),
+}
+
+/// Has the entry point load the row of its workgroup before all else; what used its arguments uses what was loaded. (Where they are loaded
+/// in the middle of a shader instead, where invocations have parted, SwiftShader writes elsewhere, and crashes.)
 fn read_rows(module: &mut Module, function: usize, given: &Given<'_>) {
     let is_use = |i: &Instruction| i.operands.contains(&Operand::IdRef(given.variable));
-    let blocks = &module.functions[function].blocks;
-    let uses: Vec<Instruction> = blocks.iter().flat_map(|b| &b.instructions).filter(|i| is_use(i)).cloned().collect();
+    let instructions = module.functions[function].blocks.iter().flat_map(|block| &block.instructions);
+    let uses: Vec<Instruction> = instructions.filter(|i| is_use(i)).cloned().collect();
     if uses.is_empty() {
         return;
     }
+    let is_entry =
+        module.functions[function].def_id().is_some_and(|id| module.entry_points[0].operands[1] == Operand::IdRef(id));
+    assert!(is_entry, "{} reads its arguments in a function: tell build/by_table.rs how", given.name);
+    let mut begin = Vec::new();
+    let row = find_row(module, given, &mut begin);
+    // What is loaded of a row, by where it lies in it; and what is at the end of each pointer that led into the push constants.
+    let mut loaded: BTreeMap<Vec<u32>, u32> = BTreeMap::new();
+    let mut arguments: BTreeMap<u32, Argument> = BTreeMap::new();
+    for chain in uses {
+        let is_chain = matches!(chain.class.opcode, Op::AccessChain | Op::InBoundsAccessChain);
+        assert!(is_chain, "{} reads its arguments by {:?}: tell build/by_table.rs how", given.name, chain.class.opcode);
+        let path: Vec<u32> = chain.operands[1..].iter().map(Operand::unwrap_id_ref).collect();
+        let is_constant = |id: &u32| module.types_global_values.iter().any(|i| i.result_id == Some(*id));
+        let is_known = path.iter().all(is_constant);
+        let id = chain.result_id.expect("chains have an id");
+        let (mut into_row, ty, aligned) = chain_into(module, &row, chain);
+        let argument = if is_known {
+            Argument::Loaded(*loaded.entry(path).or_insert_with(|| {
+                let [at, value] = std::array::from_fn(|_| new_id(module));
+                into_row.result_id = Some(at);
+                let operands = [Operand::IdRef(at)].into_iter().chain(aligned).collect();
+                begin.extend([into_row, Instruction::new(Op::Load, Some(ty), Some(value), operands)]);
+                value
+            }))
+        } else {
+            Argument::Indexed(into_row, aligned)
+        };
+        arguments.insert(id, argument);
+    }
+    let blocks = &mut module.functions[function].blocks;
+    for block in blocks.iter_mut() {
+        use_arguments(&mut block.instructions, &arguments, given.name);
+    }
+    // Variables come first.
+    let instructions = &mut blocks[0].instructions;
+    let behind = instructions.iter().position(|i| i.class.opcode != Op::Variable).expect("blocks have an end");
+    instructions.splice(behind..behind, begin);
+}
+
+/// The operands of a pointer into the row of the workgroup, before those of a pointer into the block. `begin` loads them.
+fn find_row(module: &mut Module, given: &Given<'_>, begin: &mut Vec<Instruction>) -> [Operand; 3] {
     let word = declare(module, Op::TypeInt, None, [32, 0].map(Operand::LiteralBit32).to_vec());
     let zero = declare(module, Op::Constant, Some(word), vec![Operand::LiteralBit32(0)]);
     let [to_address, to_word] = [(StorageClass::PushConstant, given.table), (StorageClass::Input, word)]
         .map(|(class, to)| pointer(module, class, to));
     let [at_address, address, at_number, number] = std::array::from_fn(|_| new_id(module));
     let first_of = |of: u32| vec![Operand::IdRef(of), Operand::IdRef(zero)];
-    let begin = [
+    begin.extend([
         Instruction::new(Op::AccessChain, Some(to_address), Some(at_address), first_of(given.variable)),
         Instruction::new(Op::Load, Some(given.table), Some(address), vec![Operand::IdRef(at_address)]),
         Instruction::new(Op::AccessChain, Some(to_word), Some(at_number), first_of(given.group)),
         Instruction::new(Op::Load, Some(word), Some(number), vec![Operand::IdRef(at_number)]),
-    ];
-    // What is read where: pointers into the row, and what their loads are aligned to.
-    let mut chains: BTreeMap<u32, (Instruction, u32)> = BTreeMap::new();
-    for mut chain in uses {
-        let is_chain = matches!(chain.class.opcode, Op::AccessChain | Op::InBoundsAccessChain);
-        assert!(is_chain, "{} reads its arguments by {:?}: tell build/by_table.rs how", given.name, chain.class.opcode);
-        let to = declared(module, chain.result_type.expect("chains have a type")).operands[1].unwrap_id_ref();
-        let is_address = declared(module, to).class.opcode == Op::TypePointer;
-        chain.result_type = Some(pointer(module, StorageClass::PhysicalStorageBuffer, to));
-        chain.operands.splice(..1, [address, zero, number].map(Operand::IdRef));
-        chains.insert(chain.result_id.expect("chains have an id"), (chain, if is_address { 8 } else { 4 }));
-    }
-    let blocks = &mut module.functions[function].blocks;
-    for instruction in blocks.iter_mut().flat_map(|block| &mut block.instructions) {
-        if let Some((chain, _)) = instruction.result_id.and_then(|id| chains.get(&id)) {
+    ]);
+    [address, zero, number].map(Operand::IdRef)
+}
+
+/// A pointer into the push constants as one into the row; the type of what it leads to, and what loads of it are aligned to.
+fn chain_into(module: &mut Module, row: &[Operand; 3], mut chain: Instruction) -> (Instruction, u32, [Operand; 2]) {
+    let ty = declared(module, chain.result_type.expect("chains have a type")).operands[1].unwrap_id_ref();
+    let is_address = declared(module, ty).class.opcode == Op::TypePointer;
+    chain.result_type = Some(pointer(module, StorageClass::PhysicalStorageBuffer, ty));
+    chain.operands.splice(..1, row.clone());
+    let bytes = Operand::LiteralBit32(if is_address { 8 } else { 4 });
+    (chain, ty, [Operand::MemoryAccess(MemoryAccess::ALIGNED), bytes])
+}
+
+/// Puts arguments in the place of what was loaded of the push constants.
+fn use_arguments(instructions: &mut Vec<Instruction>, arguments: &BTreeMap<u32, Argument>, name: &str) {
+    let argument_of = |id: Option<u32>| id.and_then(|id| arguments.get(&id));
+    instructions.retain(|i| !matches!(argument_of(i.result_id), Some(Argument::Loaded(_))));
+    for instruction in instructions {
+        if let Some(Argument::Indexed(chain, _)) = argument_of(instruction.result_id) {
             *instruction = chain.clone();
         }
-        let reads = instruction.operands.iter().find_map(|operand| match operand {
-            Operand::IdRef(id) => chains.get(id),
-            _ => None,
-        });
-        if let Some((_, alignment)) = reads {
-            let op = instruction.class.opcode;
-            assert!(op == Op::Load, "{} reads its arguments by {op:?}: tell build/by_table.rs how", given.name);
-            let aligned = [Operand::MemoryAccess(MemoryAccess::ALIGNED), Operand::LiteralBit32(*alignment)];
-            instruction.operands.truncate(1);
-            instruction.operands.extend(aligned);
+        let used = instruction.operands.iter().find_map(|operand| argument_of(operand.id_ref_any()));
+        let Some(argument) = used else { continue };
+        let op = instruction.class.opcode;
+        assert!(op == Op::Load, "{name} reads its arguments by {op:?}: tell build/by_table.rs how");
+        match argument {
+            Argument::Loaded(value) => {
+                let copied = vec![Operand::IdRef(*value)];
+                *instruction = Instruction::new(Op::CopyObject, instruction.result_type, instruction.result_id, copied);
+            }
+            Argument::Indexed(_, aligned) => {
+                instruction.operands.truncate(1);
+                instruction.operands.extend(aligned.clone());
+            }
         }
     }
-    // Variables come first.
-    let instructions = &mut blocks[0].instructions;
-    let behind = instructions.iter().position(|i| i.class.opcode != Op::Variable).expect("blocks have an end");
-    instructions.splice(behind..behind, begin);
 }

@@ -47,8 +47,7 @@ impl<'a> Device<'a> {
 
     /// The same structures, whose builds read their arguments from `memory`: a call for thousands of small builds records one dispatch
     /// for all steps of a kind in place of one each or one for two, and the records of geometries are written at once in place of two at a
-    /// time. Each call needs [`Device::argument_bytes`] there, and has the memory for itself while it runs, like scratch memory. On SwiftShader
-    /// only the trees of LBVHs share dispatches.
+    /// time. Each call needs [`Device::argument_bytes`] there, and has the memory for itself while it runs, like scratch memory.
     ///
     /// # Safety
     /// As [`ArgumentMemory`] says, whenever this device or a clone records builds.
@@ -368,7 +367,7 @@ impl<'a> Device<'a> {
         let mut epilogues: Vec<Vec<Step>> = epilogues.collect::<Result<_>>()?;
         if let Some(table) = &mut table {
             table.share_dispatches(&mut epilogues)?;
-        } else if self.arguments.is_some() && !self.context.workarounds.no_shared_dispatches {
+        } else if self.arguments.is_some() {
             recorder.warm_by_table(chains.iter().chain(&epilogues).flatten())?;
         }
         let mut prologues: Vec<Vec<Step>> =

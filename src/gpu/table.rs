@@ -26,7 +26,7 @@ pub struct ArgumentTable {
     memory: ArgumentMemory,
     address: u64,
     bytes: Vec<u8>,
-    /// Workgroups that a shared dispatch may have along x; 0 where there is none.
+    /// Workgroups that a shared dispatch may have along x.
     groups_at_most: u32,
 }
 
@@ -54,9 +54,7 @@ impl ArgumentTable {
                 Self::ALIGNMENT
             )));
         }
-        let shares = !context.workarounds.no_shared_dispatches;
-        let groups_at_most = if shares { context.limits.workgroup_count } else { 0 };
-        Ok(ArgumentTable { memory, address, bytes: Vec::new(), groups_at_most })
+        Ok(ArgumentTable { memory, address, bytes: Vec::new(), groups_at_most: context.limits.workgroup_count })
     }
 
     /// Puts `records` behind what is there. Returns the address where they will lie.
@@ -73,7 +71,7 @@ impl ArgumentTable {
     /// # Errors
     /// The memory is too small.
     pub(crate) fn share_dispatches(&mut self, chains: &mut [Vec<Step>]) -> Result<()> {
-        let longest = chains.iter().map(Vec::len).max().filter(|_| self.groups_at_most > 0).unwrap_or(0);
+        let longest = chains.iter().map(Vec::len).max().unwrap_or(0);
         for at in 0..longest {
             let mut same: Vec<(Kernel, Vec<usize>)> = Vec::new();
             for (chain, steps) in chains.iter().enumerate() {
@@ -124,5 +122,55 @@ impl ArgumentTable {
         const AT_ONCE: usize = 65_536;
         let begin = move |i: usize| self.memory.offset + (i * AT_ONCE) as u64;
         (self.memory.buffer, self.bytes.chunks(AT_ONCE).enumerate().map(move |(i, bytes)| (begin(i), bytes)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::shaders;
+
+    /// What one workgroup does of a build, or what several do; arguments of so many bytes, each this number.
+    fn step(shader: &'static shaders::Shader, number: u8, groups: u32) -> Step {
+        Step { phase: "", kernel: Kernel::new(shader, 64, &[]), arguments: vec![number; 20], groups }
+    }
+
+    fn table(bytes: u64, groups_at_most: u32) -> ArgumentTable {
+        let memory = ArgumentMemory { buffer: vk::Buffer::null(), offset: 0, bytes };
+        ArgumentTable { memory, address: 0x1000, bytes: Vec::new(), groups_at_most }
+    }
+
+    #[test]
+    fn steps_of_one_workgroup_and_kernel_are_one_dispatch_with_a_row_each() {
+        let alone = &shaders::BVH_COLLAPSE_ALONE;
+        let mut chains: Vec<Vec<Step>> = (1..=5).map(|i| vec![step(alone, i, 1), step(alone, 10 + i, 2)]).collect();
+        // Not of the same kernel, and by itself; and of a shader that has no form for it.
+        chains.push(vec![step(&shaders::BVH_WIDE_ALONE, 6, 1)]);
+        chains.push(vec![step(&shaders::BVH_COLLAPSE_ABOVE, 7, 1)]);
+        let before = chains.clone();
+        let mut table = table(1 << 10, 2);
+        table.share_dispatches(&mut chains).expect("room");
+        let groups: Vec<Vec<u32>> = chains.iter().map(|steps| steps.iter().map(|step| step.groups).collect()).collect();
+        assert_eq!(groups, [vec![2, 2], vec![0, 2], vec![2, 2], vec![0, 2], vec![1, 2], vec![1], vec![1]]);
+        // The rows of two dispatches, aligned.
+        let row = |number: u8| [vec![number; 20], vec![0; 12]].concat();
+        assert_eq!(table.bytes, [row(1), row(2), row(3), row(4)].concat());
+        for (chain, address) in [(0, 0x1000u64), (2, 0x1040)] {
+            assert_eq!(Some(&chains[chain][0].kernel), before[chain][0].kernel.by_table().as_ref());
+            assert_eq!(chains[chain][0].arguments, address.to_le_bytes());
+        }
+        for chain in [4, 5, 6] {
+            assert_eq!(
+                (&chains[chain][0].kernel, &chains[chain][0].arguments),
+                (&before[chain][0].kernel, &before[chain][0].arguments)
+            );
+        }
+    }
+
+    #[test]
+    fn rows_that_do_not_fit_are_refused() {
+        let mut chains: Vec<Vec<Step>> = (1..=3).map(|i| vec![step(&shaders::BVH_COLLAPSE_ALONE, i, 1)]).collect();
+        let error = table(95, 8).share_dispatches(&mut chains).expect_err("96 bytes are needed").to_string();
+        assert!(error.contains("memory for arguments of 95 bytes, at least 96 are needed"), "{error}");
     }
 }

@@ -1,10 +1,11 @@
 //! What a driver's faults need, each from the driver's id and version, with the test that shows it.
 //!
 //! A fault that costs nothing to live with has no flag: the code does what suits every driver, and a comment there says why.
-//! These are three. lavapipe of Mesa 26 loads what is at one address for all lanes even where no lane is active (`bvh::encode`,
+//! These are four. lavapipe of Mesa 26 loads what is at one address for all lanes even where no lane is active (`bvh::encode`,
 //! `glsl/bvh/clusters.glsl`, `glsl/bvh/ploc.glsl`, `glsl/kdtree/small.glsl` keep such addresses in range); Mesa takes each
 //! access to shared memory that makes itself visible for a fence (`build/shared_memory.rs`); lavapipe before Mesa 25 ends long
-//! loops early, which [`super::probe`] finds out by running one.
+//! loops early, which [`super::probe`] finds out by running one; SwiftShader takes other arguments out of a table than lie there where they
+//! are loaded in the middle of a shader (`build/by_table.rs` has them loaded at the start; tests/accel/arguments.rs).
 
 use super::Limits;
 use ash::vk;
@@ -31,10 +32,6 @@ pub struct Workarounds {
     /// time: `encode_plan`, the tracers lane by lane and every persistent kernel did not compile in minutes. Shown by:
     /// tests/drivers, which bounds the time of each pipeline.
     pub folded_constants: bool,
-    /// What one workgroup does of a small build keeps a dispatch of its own where the arguments of many could lie in a table
-    /// ([`ArgumentTable`](super::ArgumentTable)). SwiftShader writes elsewhere then, and crashes; what it makes of such shaders is not known. Shown
-    /// by: tests/accel/arguments.rs.
-    pub no_shared_dispatches: bool,
 }
 
 impl Workarounds {
@@ -45,7 +42,6 @@ impl Workarounds {
         driver_crashes_on_inactive_instances: false,
         driver_loses_boxes: false,
         folded_constants: false,
-        no_shared_dispatches: false,
     };
 
     /// What the driver of a device needs.
@@ -57,11 +53,7 @@ impl Workarounds {
     pub fn of_driver(driver: vk::DriverId, version: u32) -> Workarounds {
         if driver != vk::DriverId::MESA_LLVMPIPE {
             let is_swiftshader = driver == vk::DriverId::GOOGLE_SWIFTSHADER;
-            return Workarounds {
-                folded_constants: is_swiftshader,
-                no_shared_dispatches: is_swiftshader,
-                ..Workarounds::NONE
-            };
+            return Workarounds { folded_constants: is_swiftshader, ..Workarounds::NONE };
         }
         let is_old = vk::api_version_major(version) < 26;
         Workarounds {
@@ -82,7 +74,7 @@ mod tests {
     fn faults_follow_from_driver_and_version() {
         let of = |driver, major| Workarounds::of_driver(driver, vk::make_api_version(0, major, 0, 7));
         assert_eq!(of(vk::DriverId::NVIDIA_PROPRIETARY, 25), Workarounds::NONE);
-        let swiftshader = Workarounds { folded_constants: true, no_shared_dispatches: true, ..Workarounds::NONE };
+        let swiftshader = Workarounds { folded_constants: true, ..Workarounds::NONE };
         assert_eq!(of(vk::DriverId::GOOGLE_SWIFTSHADER, 5), swiftshader);
         let (old, new) = (of(vk::DriverId::MESA_LLVMPIPE, 25), of(vk::DriverId::MESA_LLVMPIPE, 26));
         assert!(old.driver_halves_in_order && old.driver_misreads_geometry);
