@@ -11,8 +11,8 @@ struct HedgerowScaled {
 // The value divided by 2^exponent; below 2^-60 of that it is zero.
 float hedgerow_relative_to(HedgerowScaled value, int exponent) {
     int shift = exponent - value.exponent;
-    if (value.mantissa == 0 || shift > 60) return 0.0;
-    return float(value.mantissa) * uintBitsToFloat(uint(127 - shift) << 23);
+    bool is_zero = value.mantissa == 0 || shift > 60;
+    return is_zero ? 0.0 : float(value.mantissa) * uintBitsToFloat(uint(127 - shift) << 23);
 }
 
 // ±magnitude · 2^exponent; the magnitude as (low, high).
@@ -38,9 +38,10 @@ HedgerowProduct hedgerow_product(float a, float b) {
 }
 
 uvec2 hedgerow_shifted_right(uvec2 x, uint count) {
-    if (count == 0u) return x;
-    if (count >= 32u) return uvec2(x.y >> (count - 32u), 0);
-    return uvec2(x.x >> count | x.y << (32u - count), x.y >> count);
+    uvec2 shifted = uvec2(x.x >> count | x.y << (32u - count), x.y >> count);
+    if (count == 0u) shifted = x;
+    if (count >= 32u) shifted = uvec2(x.y >> (count - 32u), 0);
+    return shifted;
 }
 
 const uint HEDGEROW_ROOM = 14u;
@@ -75,10 +76,11 @@ HedgerowScaled hedgerow_difference_of_products(float a, float b, float c, float 
         magnitude.x = usubBorrow(high.x, low.x, carry);
         magnitude.y = high.y - low.y - carry;
     }
-    if (magnitude == uvec2(0)) return HedgerowScaled(0, 0);
+    bool is_zero = magnitude == uvec2(0);
     int highest = magnitude.y != 0u ? 32 + findMSB(magnitude.y) : findMSB(magnitude.x);
     int cut = highest - 23;
     uint mantissa = cut >= 0 ? hedgerow_shifted_right(magnitude, uint(cut)).x : magnitude.x << uint(-cut);
-    return HedgerowScaled(negative ? -int(mantissa) : int(mantissa), large.exponent - int(HEDGEROW_ROOM) + cut);
+    return HedgerowScaled(is_zero ? 0 : negative ? -int(mantissa) : int(mantissa),
+                          is_zero ? 0 : large.exponent - int(HEDGEROW_ROOM) + cut);
 }
 #endif

@@ -7,12 +7,12 @@
 // Whether the triangle is hit, and nearer than the best; of equally near ones the lower index wins.
 bool hit_nearer(HedgerowPreparedRay ray, Triangle triangle, bool any_hit, inout float best, inout HedgerowHit hit) {
     vec3 met;
-    if (!hedgerow_meet(ray, triangle.v0, triangle.v1, triangle.v2, met)) return false;
-    bool nearer = ray.t_min < met.x && met.x < ray.t_max &&
+    bool nearer = hedgerow_meet(ray, triangle.v0, triangle.v1, triangle.v2, met) && ray.t_min < met.x && met.x < ray.t_max &&
                   (met.x < best || met.x == best && triangle.primitive < hit.primitive);
-    if (!nearer) return false;
-    best = met.x;
-    hit = HedgerowHit(any_hit ? 0.0 : met.x, triangle.primitive, met.y, met.z);
-    return true;
+    if (nearer) {
+        best = met.x;
+        hit = HedgerowHit(any_hit ? 0.0 : met.x, triangle.primitive, met.y, met.z);
+    }
+    return nearer;
 }
 #endif

@@ -2,20 +2,23 @@
 #ifndef HEDGEROW_TRACE_QUERY_INSTANCES
 #define HEDGEROW_TRACE_QUERY_INSTANCES
 
-// From the top level into an instance.
-void hedgerow_enter_instance(inout HedgerowRayQuery query) {
-    uint at = query.index;
-    hedgerow_step(query);
-    if (at >= query.records) return;
-    Instance instance = hedgerow_instance_at(hedgerow_records_of_top(query), at);
-    uint flags = instance.offset_and_flags >> 24;
-    if ((instance.index_and_mask >> 24 & query.cull_mask) == 0u || all(equal(instance.structure, uvec2(0)))) return;
-    HEDGEROW_COUNT(y);
-    if (hedgerow_skips(query.flags, instance.slots) || !hedgerow_meets(instance.slots)) return;
-    HedgerowRay ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
-                                  hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
-    HedgerowPreparedRay prepared;
-    if (!hedgerow_prepare(ray, prepared)) return;
+// Whether the ray meets anything of an instance, and in its space: there it is made ready for the tests.
+bool hedgerow_meets_instance(inout HedgerowRayQuery query, Instance instance, out HedgerowRay ray, out HedgerowPreparedRay prepared) {
+    bool is_seen = (instance.index_and_mask >> 24 & query.cull_mask) != 0u && any(notEqual(instance.structure, uvec2(0)));
+    if (is_seen) {
+        HEDGEROW_COUNT(y);
+    }
+    bool meets = is_seen && !hedgerow_skips(query.flags, instance.slots) && hedgerow_meets(instance.slots);
+    if (meets) {
+        ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
+                          hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
+        meets = hedgerow_prepare(ray, prepared);
+    }
+    return meets;
+}
+
+// The structure of an instance is at hand, with the ray in its space.
+void hedgerow_begin_instance(inout HedgerowRayQuery query, Instance instance, uint at, HedgerowRay ray, HedgerowPreparedRay prepared) {
     // The rest of the leaf waits.
     if (query.left != HEDGEROW_NOTHING && query.level - query.floor < MAX_DEPTH) {
         if (hedgerow_is_quantised(query)) hedgerow_put_off_rest(query);
@@ -32,7 +35,7 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     query.rounds = hedgerow_rounds(query.slots, query.records);
     query.is_below = true;
     query.instance = at;
-    query.instance_flags = flags;
+    query.instance_flags = instance.offset_and_flags >> 24;
     query.bottom = query.level;
 #ifdef HEDGEROW_LINK_COUNTS
     query.at = HedgerowLink(HEDGEROW_LINK_COUNTS(instance.structure), HEDGEROW_NO_LINK);
@@ -43,6 +46,19 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
     if (hedgerow_is_quantised(query)) {
         query.left = 0u;
         hedgerow_begin_quantised(query, ray.direction, begin.y);
+    }
+}
+
+// From the top level into the next instance, if the ray meets it.
+void hedgerow_enter_instance(inout HedgerowRayQuery query) {
+    uint at = query.index;
+    hedgerow_step(query);
+    if (at < query.records) {
+        Instance instance = hedgerow_instance_at(hedgerow_records_of_top(query), at);
+        HedgerowRay ray;
+        HedgerowPreparedRay prepared;
+        bool meets = hedgerow_meets_instance(query, instance, ray, prepared);
+        if (meets) hedgerow_begin_instance(query, instance, at, ray, prepared);
     }
 }
 

@@ -5,34 +5,53 @@
 #ifndef HEDGEROW_TRACE_QUERY_PAIRS
 #define HEDGEROW_TRACE_QUERY_PAIRS
 
-// One or both triangles of the next record; true if one is a candidate that the shader must decide on. After that of the first, the
-// second is next.
-bool hedgerow_test_pair(inout HedgerowRayQuery query) {
-    uint at = query.index, unit = at & ~HEDGEROW_SECOND;
-    uvec2 records = hedgerow_records_in(query.structure, query.slots, query.form);
+uint hedgerow_unit_of(HedgerowRayQuery query) {
+    return query.index & ~HEDGEROW_SECOND;
+}
+
+// Whether the next record is there: a stale structure may name records that there are not.
+bool hedgerow_comes_to_record(inout HedgerowRayQuery query) {
+    if (hedgerow_unit_of(query) + UNITS_OF_ONE <= UNITS_OF_ONE * query.records) return true;
+    query.left = HEDGEROW_NOTHING;
+    return false;
+}
+
+// Whether the next record, whose first triangle this is, has a second one, and that is there.
+bool hedgerow_is_pair(HedgerowRayQuery query, Triangle first) {
+    return has_second(first) && hedgerow_unit_of(query) + UNITS_OF_TWO <= UNITS_OF_ONE * query.records;
+}
+
+// One or both triangles of the next record, as they lie in memory; true if one is a candidate that the shader must decide on. After that of
+// the first, the second is next.
+bool hedgerow_meet_pair(inout HedgerowRayQuery query, Triangle first, SecondOfPair second, bool is_pair) {
+    uint at = query.index, unit = hedgerow_unit_of(query), left = query.left, units = units_of_record(first);
     HEDGEROW_COUNT(w);
-    // A stale structure may name records that there are not.
-    if (unit + UNITS_OF_ONE > UNITS_OF_ONE * query.records) {
-        query.left = HEDGEROW_NOTHING;
-        return false;
-    }
-    Triangle first = hedgerow_triangle_at_unit(records, unit);
-    uint units = units_of_record(first);
-    bool is_pair = has_second(first) && unit + units <= UNITS_OF_ONE * query.records;
-    uint left = query.left;
     query.index = unit + units;
     query.left = left <= units ? HEDGEROW_NOTHING : left - units;
+    bool waits = false, goes_on = true;
     if (at == unit) {
-        bool is_candidate = hedgerow_meet_triangle(query, first_of_pair(first), at);
-        if (is_candidate && is_pair) {
+        waits = hedgerow_meet_triangle(query, first_of_pair(first), at);
+        if (waits && is_pair) {
             query.index = unit | HEDGEROW_SECOND;
             query.left = left;
         }
         bool has_ended = hedgerow_ends_at_first_hit(query) && query.committed.type != HEDGEROW_MET_NOTHING;
-        if (is_candidate || !is_pair || has_ended) return is_candidate;
-        HEDGEROW_COUNT(w);
+        goes_on = !waits && is_pair && !has_ended;
     }
-    Triangle second = second_of_pair(first, hedgerow_second_of_pair_at(records, unit));
-    return hedgerow_meet_triangle(query, second, unit | HEDGEROW_SECOND);
+    if (goes_on) {
+        if (at == unit) HEDGEROW_COUNT(w);
+        waits = hedgerow_meet_triangle(query, second_of_pair(first, second), unit | HEDGEROW_SECOND);
+    }
+    return waits;
+}
+
+bool hedgerow_test_pair(inout HedgerowRayQuery query) {
+    if (!hedgerow_comes_to_record(query)) return false;
+    uvec2 records = hedgerow_records_in(query.structure, query.slots, query.form);
+    Triangle first = hedgerow_triangle_at_unit(records, hedgerow_unit_of(query));
+    SecondOfPair second;
+    bool is_pair = hedgerow_is_pair(query, first);
+    if (is_pair) second = hedgerow_second_of_pair_at(records, hedgerow_unit_of(query));
+    return hedgerow_meet_pair(query, first, second, is_pair);
 }
 #endif

@@ -23,50 +23,74 @@ bool hedgerow_is_culled(HedgerowRayQuery query, bool is_opaque) {
 bool hedgerow_meet_triangle(inout HedgerowRayQuery query, Triangle triangle, uint at) {
     vec3 met;
     bool is_front;
-    if (!hedgerow_meet_facing(query.prepared, triangle.v0, triangle.v1, triangle.v2, met, is_front)) return false;
-    if (!(query.ray.t_min < met.x && met.x < query.ray.t_max && met.x <= query.best)) return false;
-    is_front = is_front != ((query.instance_flags & HEDGEROW_INSTANCE_FLIP_FACING) != 0u);
-    uint culled = is_front ? hedgerowRayFlagsCullFrontFacingTriangles : hedgerowRayFlagsCullBackFacingTriangles;
-    if ((query.flags & culled) != 0u && (query.instance_flags & HEDGEROW_INSTANCE_CULL_DISABLE) == 0u) return false;
-    bool is_opaque = hedgerow_is_opaque(query, triangle.primitive);
-    if (hedgerow_is_culled(query, is_opaque)) return false;
+    bool is_met = hedgerow_meet_facing(query.prepared, triangle.v0, triangle.v1, triangle.v2, met, is_front);
+    is_met = is_met && query.ray.t_min < met.x && met.x < query.ray.t_max && met.x <= query.best;
+    bool waits = false;
+    if (is_met) {
+        is_front = is_front != ((query.instance_flags & HEDGEROW_INSTANCE_FLIP_FACING) != 0u);
+        uint facing = is_front ? hedgerowRayFlagsCullFrontFacingTriangles : hedgerowRayFlagsCullBackFacingTriangles;
+        bool culls = (query.flags & facing) != 0u && (query.instance_flags & HEDGEROW_INSTANCE_CULL_DISABLE) == 0u;
+        bool is_opaque = hedgerow_is_opaque(query, triangle.primitive);
+        if (!culls && !hedgerow_is_culled(query, is_opaque)) {
 #ifdef HEDGEROW_LANES
-    uint primitive = 0u;
+            uint primitive = 0u;
 #else
-    uint primitive = triangle.primitive;
+            uint primitive = triangle.primitive;
 #endif
-    query.candidate =
-        HedgerowMeeting(HEDGEROW_MET_TRIANGLE, met.x, met.y, met.z, at, primitive, query.instance, is_front, is_opaque);
-    if (met.x == query.best && !hedgerow_comes_before(query)) return false;
-    if (is_opaque) hedgerow_commit(query);
-    return !is_opaque;
+            query.candidate =
+                HedgerowMeeting(HEDGEROW_MET_TRIANGLE, met.x, met.y, met.z, at, primitive, query.instance, is_front, is_opaque);
+            bool is_nearest = met.x != query.best || hedgerow_comes_before(query);
+            if (is_nearest && is_opaque) hedgerow_commit(query);
+            waits = is_nearest && !is_opaque;
+        }
+    }
+    return waits;
 }
 
-// The same for a box: always a candidate, as only the shader knows what is in it.
-bool hedgerow_test_box(inout HedgerowRayQuery query, uint at) {
-    BoxRecord box = BoxRecords(hedgerow_records_in(query.structure, query.slots, query.form)).box[at];
-    // Inside out where an update has left it out.
-    if (box.lo.x > box.hi.x) return false;
-    bool entered;
-    hedgerow_enter(query.prepared, box.lo, box.hi, query.best, entered);
-    if (!entered) return false;
-    bool is_opaque = hedgerow_is_opaque(query, box.primitive);
-    if (hedgerow_is_culled(query, is_opaque)) return false;
-    query.candidate = HedgerowMeeting(HEDGEROW_MET_BOX, query.best, 0.0, 0.0, at, box.primitive, query.instance, false, is_opaque);
-    return true;
+// The next record, a box; true if it is met: always a candidate, as only the shader knows what is in it.
+bool hedgerow_test_box(inout HedgerowRayQuery query) {
+    uint at = query.index;
+    hedgerow_step(query);
+    HEDGEROW_COUNT(w);
+    bool waits = false;
+    if (at < query.records) {
+        BoxRecord box = BoxRecords(hedgerow_records_in(query.structure, query.slots, query.form)).box[at];
+        bool entered;
+        hedgerow_enter(query.prepared, box.lo, box.hi, query.best, entered);
+        // Inside out where an update has left it out.
+        if (entered && box.lo.x <= box.hi.x) {
+            bool is_opaque = hedgerow_is_opaque(query, box.primitive);
+            waits = !hedgerow_is_culled(query, is_opaque);
+            if (waits) {
+                query.candidate =
+                    HedgerowMeeting(HEDGEROW_MET_BOX, query.best, 0.0, 0.0, at, box.primitive, query.instance, false, is_opaque);
+            }
+        }
+    }
+    return waits;
+}
+
+// The next record, a triangle of a structure of nodes of two.
+bool hedgerow_test_triangle(inout HedgerowRayQuery query) {
+    uint at = query.index;
+    hedgerow_step(query);
+    HEDGEROW_COUNT(w);
+    bool waits = false;
+    if (at < query.records) {
+        Triangle triangle = hedgerow_triangle_at(hedgerow_records_in(query.structure, query.slots, query.form), at);
+        waits = hedgerow_meet_triangle(query, triangle, at);
+    }
+    return waits;
 }
 
 #include "trace/query_pairs.glsl"
 
 // The next record of the leaf; true if what was met is a candidate that the shader must decide on.
 bool hedgerow_test(inout HedgerowRayQuery query) {
-    if (hedgerow_is_quantised(query) && (query.form & FORM_BOXES) == 0u) return hedgerow_test_pair(query);
-    uint at = query.index;
-    hedgerow_step(query);
-    HEDGEROW_COUNT(w);
-    if (at >= query.records) return false;
-    if ((query.form & FORM_BOXES) != 0u) return hedgerow_test_box(query, at);
-    Triangle triangle = hedgerow_triangle_at(hedgerow_records_in(query.structure, query.slots, query.form), at);
-    return hedgerow_meet_triangle(query, triangle, at);
+    bool waits = false;
+    if ((query.form & FORM_BOXES) != 0u) waits = hedgerow_test_box(query);
+    else if (hedgerow_is_quantised(query)) waits = hedgerow_test_pair(query);
+    else waits = hedgerow_test_triangle(query);
+    return waits;
 }
 #endif

@@ -6,37 +6,36 @@
 #extension GL_EXT_control_flow_attributes : require
 
 // The children of a quantised node that the ray enters are at hand: leaves first, then nodes from near to far.
-void hedgerow_visit_quantised(inout HedgerowRayQuery query) {
+void hedgerow_visit_quantised(inout HedgerowRayQuery query, QuantisedNode node) {
 #ifdef HEDGEROW_COUNTS_WORK
     if (hedgerow_is_in_top(query)) query.work.x += 1u;
     else query.work.z += 1u;
 #endif
-    QuantisedNode node = hedgerow_quantised_node_at(query.structure, query.index);
     query.left = HEDGEROW_NOTHING;
     if (node.exponents_and_nodes == LONG_LEAF) {
         query.index = node.first_record;
         if (node.first_child != 0u) query.left = node.first_child;
-        return;
+    } else {
+        float enters[8];
+        enter_quantised(query.prepared, node, query.best, enters);
+        uint entered = 0u;
+        [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+            if (enters[slot] < HEDGEROW_INFINITY) entered |= 1u << slot;
+        }
+        entered &= query.begin_slots;
+        query.begin_slots = ALL_SLOTS;
+        // In a top level leaves are among the nodes, from near to far, as an instance takes longer than a node. An entry of the stack has no
+        // room for where both begin: it names the node, which is asked again.
+        uint nodes = hedgerow_is_in_top(query) ? 0xFFu : node.exponents_and_nodes >> 24;
+        uint visits = in_octant(entered & nodes, query.octant);
+        query.first_child = hedgerow_is_in_top(query) ? query.index : node.first_child;
+        uvec2 next = next_of_group(entered & nodes, query.octant, enters, hedgerow_ends_at_first_hit(query));
+        query.next = next.x;
+        query.group = next.y | nodes << 8 | visits;
+        query.first_record = node.first_record;
+        query.counts = node.counts;
+        query.leaves = in_octant(entered & ~nodes, query.octant);
     }
-    float enters[8];
-    enter_quantised(query.prepared, node, query.best, enters);
-    uint entered = 0u;
-    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
-        if (enters[slot] < HEDGEROW_INFINITY) entered |= 1u << slot;
-    }
-    entered &= query.begin_slots;
-    query.begin_slots = ALL_SLOTS;
-    // In a top level leaves are among the nodes, from near to far, as an instance takes longer than a node. An entry of the stack has no
-    // room for where both begin: it names the node, which is asked again.
-    uint nodes = hedgerow_is_in_top(query) ? 0xFFu : node.exponents_and_nodes >> 24;
-    uint visits = in_octant(entered & nodes, query.octant);
-    query.first_child = hedgerow_is_in_top(query) ? query.index : node.first_child;
-    uvec2 next = next_of_group(entered & nodes, query.octant, enters, hedgerow_ends_at_first_hit(query));
-    query.next = next.x;
-    query.group = next.y | nodes << 8 | visits;
-    query.first_record = node.first_record;
-    query.counts = node.counts;
-    query.leaves = in_octant(entered & ~nodes, query.octant);
 }
 
 // In the first word of an entry of the stack: what waits are records of a top level.
@@ -79,23 +78,24 @@ void hedgerow_take_leaf(inout HedgerowRayQuery query) {
 // The next node of those at hand, if nothing else is.
 void hedgerow_take_of_group(inout HedgerowRayQuery query) {
     uint visits = query.group & 0xFFu;
-    if (query.left != HEDGEROW_NOTHING || query.leaves != 0u || visits == 0u) return;
-    uint slot = query.next ^ query.octant;
-    uint left = visits & ~(1u << query.next);
-    if (hedgerow_is_in_top(query)) {
-        HedgerowNames names = hedgerow_names_at(query.structure, query.first_child);
-        uint count = byte_of_slot(names.counts, slot);
-        bool is_node = (names.nodes >> slot & 1u) != 0u;
-        query.index = is_node ? names.first_child + rank_of_node(names.nodes, slot) : names.first_record + sum_below(names.counts, slot);
-        query.left = is_node ? 0u : count != 0u ? count : HEDGEROW_NOTHING;
-    } else {
-        query.index = query.first_child + rank_of_node(query.group >> 8 & 0xFFu, slot);
-        query.left = 0u;
+    if (query.left == HEDGEROW_NOTHING && query.leaves == 0u && visits != 0u) {
+        uint slot = query.next ^ query.octant;
+        uint left = visits & ~(1u << query.next);
+        if (hedgerow_is_in_top(query)) {
+            HedgerowNames names = hedgerow_names_at(query.structure, query.first_child);
+            uint count = byte_of_slot(names.counts, slot);
+            bool is_node = (names.nodes >> slot & 1u) != 0u;
+            query.index = is_node ? names.first_child + rank_of_node(names.nodes, slot) : names.first_record + sum_below(names.counts, slot);
+            query.left = is_node ? 0u : count != 0u ? count : HEDGEROW_NOTHING;
+        } else {
+            query.index = query.first_child + rank_of_node(query.group >> 8 & 0xFFu, slot);
+            query.left = 0u;
+        }
+        if (left != 0u && query.level - hedgerow_bottom(query) < MAX_DEPTH) {
+            hedgerow_put_entry(query.level, uvec2(query.first_child, query.group ^ visits ^ left));
+            query.level++;
+        }
+        query.group = 0u;
     }
-    if (left != 0u && query.level - hedgerow_bottom(query) < MAX_DEPTH) {
-        hedgerow_put_entry(query.level, uvec2(query.first_child, query.group ^ visits ^ left));
-        query.level++;
-    }
-    query.group = 0u;
 }
 #endif

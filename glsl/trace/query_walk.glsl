@@ -11,7 +11,8 @@
 //
 // There is no loop in the loop, which would cost a copy of what changes in it: what was taken and is too far costs a round. On lavapipe a
 // query of one level in turn is 1.06 times as fast so, and one of two levels by itself 1.01 times. Nor is there a return in the middle of the
-// loop, or of taking what waits, behind which each write would be masked: queries through two levels are 1.09 times as fast without (in turn 1.04).
+// loop or of a step, which shader compilers make a loop of one round of, whose writes are masked: queries through two levels are 1.09 times as
+// fast without in the loop, and again without in the steps (docs/notes/rays.md).
 //
 // Structures are of nodes of two or of nodes of eight (bvh/wide.glsl), which are walked as trace/walk_quantised.glsl does, in either level
 // beside each other. A shader may define HEDGEROW_FORMS, a constant or specialisation constant: which of them there are,
@@ -382,20 +383,17 @@ void hedgerow_visit_node(inout HedgerowRayQuery query, Node node) {
 
 // Whether a node is at hand, and there: a stale structure may name nodes that there are not. The ray is ready for it then.
 bool hedgerow_comes_to_node(inout HedgerowRayQuery query) {
-    if (query.left != 0u) return false;
-    if (query.index >= query.slots) {
-        query.left = HEDGEROW_NOTHING;
-        return false;
-    }
-    if (!HEDGEROW_ONE_LEVEL && !query.is_prepared) {
+    bool is_there = query.left == 0u && query.index < query.slots;
+    if (query.left == 0u && !is_there) query.left = HEDGEROW_NOTHING;
+    if (!HEDGEROW_ONE_LEVEL && is_there && !query.is_prepared) {
         hedgerow_prepare_for(hedgerow_is_in_top(query), query.ray, query.prepared);
         query.is_prepared = true;
     }
-    return true;
+    return is_there;
 }
 
 void hedgerow_visit(inout HedgerowRayQuery query) {
-    if (hedgerow_is_quantised(query)) hedgerow_visit_quantised(query);
+    if (hedgerow_is_quantised(query)) hedgerow_visit_quantised(query, hedgerow_quantised_node_at(query.structure, query.index));
     else hedgerow_visit_node(query, hedgerow_node_at(query.structure, query.index));
 }
 
@@ -408,22 +406,8 @@ void hedgerow_step(inout HedgerowRayQuery query) {
 #include "trace/query_instances.glsl"
 #include "trace/query_primitives.glsl"
 
-// Takes what waits; false at the end of the walk. Behind an instance it takes what waits above it. What was taken may be nothing: too far.
-bool hedgerow_go_on(inout HedgerowRayQuery query) {
-    if (hedgerow_is_quantised(query) && hedgerow_has_group(query)) {
-        hedgerow_take_leaf(query);
-        hedgerow_take_of_group(query);
-        return true;
-    }
-    if (query.level == hedgerow_bottom(query) && hedgerow_is_below(query)) hedgerow_leave_instance(query);
-    bool waits = query.level != hedgerow_bottom(query);
-    // Where nothing waits an entry is read that means nothing.
-    query.level -= waits ? 1u : 0u;
-    if (hedgerow_is_quantised(query)) {
-        hedgerow_take_entry(query, hedgerow_entry(query.level), waits);
-        hedgerow_take_of_group(query);
-        return waits;
-    }
+// What waits in a structure of nodes of two is at hand, if it is near enough.
+void hedgerow_take_waiting(inout HedgerowRayQuery query, bool waits) {
     if (hedgerow_ends_at_first_hit(query)) {
         uvec2 waiting = hedgerow_taken_anyway(query.level);
         query.index = waiting.x;
@@ -438,6 +422,24 @@ bool hedgerow_go_on(inout HedgerowRayQuery query) {
     query.at.link = hedgerow_waiting_links[query.level];
     if (query.left != HEDGEROW_NOTHING) hedgerow_count(query.at, HEDGEROW_ENTERED);
 #endif
+}
+
+// Takes what waits; false at the end of the walk. Behind an instance it takes what waits above it. What was taken may be nothing: too far.
+bool hedgerow_go_on(inout HedgerowRayQuery query) {
+    bool is_at_group = hedgerow_is_quantised(query) && hedgerow_has_group(query);
+    bool waits = is_at_group;
+    if (!is_at_group) {
+        if (query.level == hedgerow_bottom(query) && hedgerow_is_below(query)) hedgerow_leave_instance(query);
+        waits = query.level != hedgerow_bottom(query);
+        // Where nothing waits an entry is read that means nothing.
+        query.level -= waits ? 1u : 0u;
+        if (hedgerow_is_quantised(query)) hedgerow_take_entry(query, hedgerow_entry(query.level), waits);
+        else hedgerow_take_waiting(query, waits);
+    }
+    if (hedgerow_is_quantised(query)) {
+        hedgerow_take_leaf(query);
+        hedgerow_take_of_group(query);
+    }
     return waits;
 }
 

@@ -11,17 +11,20 @@ vec3 hedgerow_sheared(HedgerowPreparedRay ray, vec3 vertex) {
 }
 
 // The edge functions with exact signs and 24 right bits, divided by a common power of two.
-bool hedgerow_exactly(vec3 a, vec3 b, vec3 c, out vec3 edges) {
-    if (!(hedgerow_finite(vec3(a.xy, b.x)) && hedgerow_finite(vec3(b.y, c.xy)))) return false;
-    HedgerowScaled u = hedgerow_difference_of_products(c.x, b.y, c.y, b.x);
-    HedgerowScaled v = hedgerow_difference_of_products(a.x, c.y, a.y, c.x);
-    HedgerowScaled w = hedgerow_difference_of_products(b.x, a.y, b.y, a.x);
-    ivec3 signs = sign(ivec3(u.mantissa, v.mantissa, w.mantissa));
-    if (any(equal(signs, ivec3(1))) == any(equal(signs, ivec3(-1)))) return false;
-    const int LEAST = -1000;
-    int exponent = max(max(signs.x != 0 ? u.exponent : LEAST, signs.y != 0 ? v.exponent : LEAST), signs.z != 0 ? w.exponent : LEAST);
-    edges = vec3(hedgerow_relative_to(u, exponent), hedgerow_relative_to(v, exponent), hedgerow_relative_to(w, exponent));
-    return true;
+bool hedgerow_exactly(vec3 a, vec3 b, vec3 c, inout vec3 edges) {
+    bool meets = false;
+    if (hedgerow_finite(vec3(a.xy, b.x)) && hedgerow_finite(vec3(b.y, c.xy))) {
+        HedgerowScaled u = hedgerow_difference_of_products(c.x, b.y, c.y, b.x);
+        HedgerowScaled v = hedgerow_difference_of_products(a.x, c.y, a.y, c.x);
+        HedgerowScaled w = hedgerow_difference_of_products(b.x, a.y, b.y, a.x);
+        ivec3 signs = sign(ivec3(u.mantissa, v.mantissa, w.mantissa));
+        meets = any(equal(signs, ivec3(1))) != any(equal(signs, ivec3(-1)));
+        const int LEAST = -1000;
+        int exponent =
+            max(max(signs.x != 0 ? u.exponent : LEAST, signs.y != 0 ? v.exponent : LEAST), signs.z != 0 ? w.exponent : LEAST);
+        edges = vec3(hedgerow_relative_to(u, exponent), hedgerow_relative_to(v, exponent), hedgerow_relative_to(w, exponent));
+    }
+    return meets;
 }
 
 // x · y as the rounded product and, in `rest`, what it is off by; from the leading halves of the factors and their rests.
@@ -67,12 +70,14 @@ bool hedgerow_carefully(vec3 a, vec3 b, vec3 c, float m, float reach, out vec3 e
     precise float cube = m * m * m;
     precise float certainty = CERTAIN * (m * m);
     bool certain = nearest > certainty && nearest > HEDGEROW_TRUSTED;
-    if (certain && least < 0.0 && greatest > 0.0) return false;
+    bool passes = certain && least < 0.0 && greatest > 0.0;
     precise float sum = edges.x + edges.y + edges.z;
     precise float error = SMALLER * (HEDGEROW_PART_OF_CUBE * cube);
     precise float allowed = reach * abs(sum);
-    if (certain && cube < HEDGEROW_LARGEST_CUBE && error <= allowed) return true;
-    return hedgerow_exactly(a, b, c, edges);
+    bool suffices = certain && cube < HEDGEROW_LARGEST_CUBE && error <= allowed;
+    bool meets = !passes;
+    if (meets && !suffices) meets = hedgerow_exactly(a, b, c, edges);
+    return meets;
 }
 
 // Where the ray's line meets the triangle: t and the weights of the second and third vertex; and whether it meets the front,
@@ -84,30 +89,31 @@ bool hedgerow_meet_facing(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, ou
     precise vec3 edges = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
     float least = min(min(edges.x, edges.y), edges.z);
     float greatest = max(max(edges.x, edges.y), edges.z);
-    if (least < -HEDGEROW_TRUSTED && greatest > HEDGEROW_TRUSTED) return false;
-
-    vec2 m = max(max(abs(a.xy), abs(b.xy)), abs(c.xy));
-    float largest = max(m.x, m.y);
-    precise float cube = largest * largest * largest;
-    precise float sum = edges.x + edges.y + edges.z;
-    // Along some axis, the farthest vertex is at least this far from the origin.
-    precise float reach = max(max(abs(a.z), abs(b.z)), max(abs(c.z), 0.5 * largest));
-    precise float error = HEDGEROW_PART_OF_CUBE * cube;
-    precise float allowed = reach * abs(sum);
-    bool trusted = least > HEDGEROW_TRUSTED || greatest < -HEDGEROW_TRUSTED;
-    bool accurate = cube < HEDGEROW_LARGEST_CUBE && error <= allowed;
-    if (!(trusted && accurate)) {
-        vec3 careful;
-        if (!hedgerow_carefully(a, b, c, largest, reach, careful)) return false;
-        edges = careful;
+    bool meets = !(least < -HEDGEROW_TRUSTED && greatest > HEDGEROW_TRUSTED);
+    if (meets) {
+        vec2 m = max(max(abs(a.xy), abs(b.xy)), abs(c.xy));
+        float largest = max(m.x, m.y);
+        precise float cube = largest * largest * largest;
+        precise float sum = edges.x + edges.y + edges.z;
+        // Along some axis, the farthest vertex is at least this far from the origin.
+        precise float reach = max(max(abs(a.z), abs(b.z)), max(abs(c.z), 0.5 * largest));
+        precise float error = HEDGEROW_PART_OF_CUBE * cube;
+        precise float allowed = reach * abs(sum);
+        bool trusted = least > HEDGEROW_TRUSTED || greatest < -HEDGEROW_TRUSTED;
+        bool accurate = cube < HEDGEROW_LARGEST_CUBE && error <= allowed;
+        if (!(trusted && accurate)) {
+            vec3 careful = edges;
+            meets = hedgerow_carefully(a, b, c, largest, reach, careful);
+            edges = careful;
+        }
+        precise float scale = 1.0 / (edges.x + edges.y + edges.z);
+        precise vec3 weights = edges * scale;
+        precise float t = (weights.x * a.z + weights.y * b.z + weights.z * c.z) * ray.shear.z;
+        meeting = vec3(t, weights.yz);
+        // The permutation keeps the sense of rotation, and the shear turns it where the ray goes down its major axis.
+        is_front = (scale > 0.0) != (ray.shear.z < 0.0);
     }
-    precise float scale = 1.0 / (edges.x + edges.y + edges.z);
-    precise vec3 weights = edges * scale;
-    precise float t = (weights.x * a.z + weights.y * b.z + weights.z * c.z) * ray.shear.z;
-    meeting = vec3(t, weights.yz);
-    // The permutation keeps the sense of rotation, and the shear turns it where the ray goes down its major axis.
-    is_front = (scale > 0.0) != (ray.shear.z < 0.0);
-    return true;
+    return meets;
 }
 
 bool hedgerow_meet(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, out vec3 meeting) {

@@ -90,35 +90,36 @@ void visit(QuantisedNode node, bool any_hit, inout QuantisedWalk walk) {
         walk.record = node.first_record;
         walk.left = node.first_child;
         walk.work.z++;
-        return;
+    } else {
+        float enters[8];
+        enter_quantised(walk.ray, node, walk.best, enters);
+        uint entered = 0;
+        [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
+            if (enters[slot] < HEDGEROW_INFINITY) entered |= 1u << slot;
+        }
+        walk.first_child = node.first_child;
+        walk.nodes = node.exponents_and_nodes >> 24;
+        uint nodes = entered & walk.nodes;
+        walk.visits = in_octant(nodes, walk.octant);
+        uvec2 next = next_of_group(nodes, walk.octant, enters, any_hit);
+        walk.next = next.x;
+        walk.enter = next.y;
+        walk.first_record = node.first_record;
+        walk.counts = node.counts;
+        // A slot without a child may be among them: a leaf of nothing.
+        walk.leaves = in_octant(entered & ~walk.nodes, walk.octant);
     }
-    float enters[8];
-    enter_quantised(walk.ray, node, walk.best, enters);
-    uint entered = 0;
-    [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
-        if (enters[slot] < HEDGEROW_INFINITY) entered |= 1u << slot;
-    }
-    walk.first_child = node.first_child;
-    walk.nodes = node.exponents_and_nodes >> 24;
-    uint nodes = entered & walk.nodes;
-    walk.visits = in_octant(nodes, walk.octant);
-    uvec2 next = next_of_group(nodes, walk.octant, enters, any_hit);
-    walk.next = next.x;
-    walk.enter = next.y;
-    walk.first_record = node.first_record;
-    walk.counts = node.counts;
-    // A slot without a child may be among them: a leaf of nothing.
-    walk.leaves = in_octant(entered & ~walk.nodes, walk.octant);
 }
 
 // The next leaf, if the last one is done.
 void next_leaf(inout QuantisedWalk walk) {
-    if (walk.left != 0u || walk.leaves == 0u) return;
-    uint slot = uint(findLSB(walk.leaves)) ^ walk.octant;
-    walk.leaves &= walk.leaves - 1u;
-    walk.record = walk.first_record + sum_below(walk.counts, slot);
-    walk.left = byte_of_slot(walk.counts, slot);
-    if (walk.left != 0u) walk.work.z++;
+    if (walk.left == 0u && walk.leaves != 0u) {
+        uint slot = uint(findLSB(walk.leaves)) ^ walk.octant;
+        walk.leaves &= walk.leaves - 1u;
+        walk.record = walk.first_record + sum_below(walk.counts, slot);
+        walk.left = byte_of_slot(walk.counts, slot);
+        if (walk.left != 0u) walk.work.z++;
+    }
 }
 
 void meet(Triangle triangle, bool any_hit, inout QuantisedWalk walk) {
@@ -144,15 +145,17 @@ void test_record(Triangle first, SecondOfPair second, bool any_hit, inout Quanti
 // Takes a group that waits, if there is nothing at hand; whether there was any. Equally far is not too far: an equally near hit
 // with a lower index may be there.
 bool go_on(inout QuantisedWalk walk) {
-    if (walk.left != 0u || walk.leaves != 0u || walk.visits != 0u) return true;
-    if (walk.level == 0u) return false;
-    walk.level--;
-    uvec2 entry = hedgerow_entry(walk.level);
-    walk.first_child = entry.x;
-    walk.next = uint(findLSB(entry.y & 0xFFu));
-    walk.enter = entry.y & 0xFFFF0000u;
-    walk.nodes = entry.y >> 8 & 0xFFu;
-    walk.visits = uintBitsToFloat(walk.enter) <= walk.best ? entry.y & 0xFFu : 0;
-    return true;
+    bool goes = walk.left != 0u || walk.leaves != 0u || walk.visits != 0u;
+    if (!goes && walk.level != 0u) {
+        walk.level--;
+        uvec2 entry = hedgerow_entry(walk.level);
+        walk.first_child = entry.x;
+        walk.next = uint(findLSB(entry.y & 0xFFu));
+        walk.enter = entry.y & 0xFFFF0000u;
+        walk.nodes = entry.y >> 8 & 0xFFu;
+        walk.visits = uintBitsToFloat(walk.enter) <= walk.best ? entry.y & 0xFFu : 0;
+        goes = true;
+    }
+    return goes;
 }
 #endif

@@ -98,15 +98,17 @@ uvec3 child_at(uint i) {
 // The first of the children that is opened, and how many places its own two share. What fits as a whole is taken in, even where sums of
 // costs were too large to tell. 8: there is none.
 uvec2 next_to_open(uint count, uint level) {
+    uvec2 next = uvec2(8, 0);
     for (uint i = 0; i < (IN_REGISTERS ? 8 : count); ++i) {
-        if (i < count && open_places[i] > 1) return uvec2(i, open_places[i]);
+        if (next.x == 8 && i < count && open_places[i] > 1) next = uvec2(i, open_places[i]);
     }
-    if (level >= LEVELS_BY_COST) return uvec2(8, 0);
-    for (uint i = 0; i < (IN_REGISTERS ? 8 : count); ++i) {
-        bool fits = i < count && open_count[i] == 0 && open_places[i] != 0 && children_by(choices.word[open_index[i]]) <= WIDTH - count + 1;
-        if (fits) return uvec2(i, WIDTH);
+    if (next.x == 8 && level < LEVELS_BY_COST) {
+        for (uint i = 0; i < (IN_REGISTERS ? 8 : count); ++i) {
+            bool may_fit = next.x == 8 && i < count && open_count[i] == 0 && open_places[i] != 0;
+            if (may_fit && children_by(choices.word[open_index[i]]) <= WIDTH - count + 1) next = uvec2(i, WIDTH);
+        }
     }
-    return uvec2(8, 0);
+    return next;
 }
 
 // The children of the wide node that begins with the binary node `slot`: how many.

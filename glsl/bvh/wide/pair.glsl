@@ -13,19 +13,17 @@ uvec3 bits_of(vec3 vertex) {
 // Which vertex of a triangle this is, or 3.
 uint found_in(Triangle first, vec3 vertex) {
     uvec3 bits = bits_of(vertex);
-    if (bits == bits_of(first.v0)) return 0;
-    if (bits == bits_of(first.v1)) return 1;
-    return bits == bits_of(first.v2) ? 2 : 3;
+    return bits == bits_of(first.v0) ? 0 : bits == bits_of(first.v1) ? 1 : bits == bits_of(first.v2) ? 2 : 3;
 }
 
 // Which of four vertices the second triangle has, two bits each; 0 if the two share no edge.
 uint order_of(Triangle first, Triangle second) {
     uvec3 found = uvec3(found_in(first, second.v0), found_in(first, second.v1), found_in(first, second.v2));
     // Of several that may be the new one the first, as two triangles may be the same.
-    if (found.y != 3 && found.z != 3) return 3u | found.y << 2 | found.z << 4;
-    if (found.x == 3) return 0;
-    if (found.z != 3) return found.x | 3u << 2 | found.z << 4;
-    return found.y == 3 ? 0 : found.x | found.y << 2 | 3u << 4;
+    bool has_x = found.x != 3, has_y = found.y != 3, has_z = found.z != 3;
+    uint order = has_y && has_z ? found.y << 2 | found.z << 4 | 3u : found.x | 3u << 2 | found.z << 4;
+    if (has_x && !has_z) order = found.x | found.y << 2 | 3u << 4;
+    return uint(has_x) + uint(has_y) + uint(has_z) < 2u ? 0 : order;
 }
 
 // The pairs of a leaf: how many units it takes.

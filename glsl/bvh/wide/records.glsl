@@ -6,17 +6,18 @@
 // A triangle to its unit, and with it the second of its pair.
 void write_triangle(Triangles given, uvec2 records, uint i) {
     uint partner = partners.word[i];
-    if (partner == IS_SECOND) return;
-    Triangle first = given.triangle[i];
-    uint unit = places.word[i];
-    if (partner != ALONE) {
-        uint order = partner >> 4;
-        Triangle second = given.triangle[i + (partner & 15u)];
-        vec3 vertex = (order & 3u) == 3u ? second.v0 : (order >> 2 & 3u) == 3u ? second.v1 : second.v2;
-        first.primitive |= HAS_SECOND | order << 28;
-        SecondsOfPairs(second_at_unit(records, unit)).second[0] = SecondOfPair(vertex, second.primitive | order >> 4 << PRIMITIVE_BITS);
+    if (partner != IS_SECOND) {
+        Triangle first = given.triangle[i];
+        uint unit = places.word[i];
+        if (partner != ALONE) {
+            uint order = partner >> 4;
+            Triangle second = given.triangle[i + (partner & 15u)];
+            vec3 vertex = (order & 3u) == 3u ? second.v0 : (order >> 2 & 3u) == 3u ? second.v1 : second.v2;
+            first.primitive |= HAS_SECOND | order << 28;
+            SecondsOfPairs(second_at_unit(records, unit)).second[0] = SecondOfPair(vertex, second.primitive | order >> 4 << PRIMITIVE_BITS);
+        }
+        Triangles(record_at_unit(records, unit)).triangle[0] = first;
     }
-    Triangles(record_at_unit(records, unit)).triangle[0] = first;
 }
 
 void write_records() {
