@@ -37,6 +37,8 @@ SWIFTSHADER := $(CACHE)/swiftshader
 WGPU := $(or $(CARGO_TARGET_DIR),target)/wgpu
 # The ICD file of the second driver; another one may be named.
 SECOND_DRIVER := $(or $(HEDGEROW_SECOND_DRIVER),$(SWIFTSHADER)/swiftshader.json)
+ON_SECOND = VK_DRIVER_FILES=$(SECOND_DRIVER) VK_ICD_FILENAMES=$(SECOND_DRIVER) $(WITHIN) \
+	$(CARGO) test --release --features $(FEATURES) --test main --
 comma := ,
 EMBREE_BUILDERS := ,embree-low,embree-medium,embree-high,embree-medium-tree,embree-high-tree
 # The CPU peers that can be built here: Embree where it is installed (scripts/setup.sh --peers). The same features
@@ -114,12 +116,12 @@ test-wgpu: setup
 		! grep -q VUID $(WGPU)/output && exit $$status
 	$(CARGO) clippy --release -p hedgerow-on-wgpu -- -D warnings
 
-# One process: SwiftShader compiles every pipeline anew in each.
+# One process for all passes: SwiftShader compiles every pipeline anew in each. Small builds that share dispatches have a run of their own.
 test-drivers: setup
 	$(if $(HEDGEROW_SECOND_DRIVER),,scripts/second-driver.sh $(SWIFTSHADER))
 	$(CARGO) test --release --features $(FEATURES) --test main --no-run
-	VK_DRIVER_FILES=$(SECOND_DRIVER) VK_ICD_FILENAMES=$(SECOND_DRIVER) $(WITHIN) \
-		$(CARGO) test --release --features $(FEATURES) --test main -- drivers:: --ignored --nocapture
+	$(ON_SECOND) drivers:: --ignored --nocapture
+	$(ON_SECOND) accel::arguments
 	scripts/peer-lavapipe.sh $(MESA)
 	scripts/with-lavapipe.sh $(MESA) $(BIN) check --quick
 

@@ -20,9 +20,8 @@
 //
 // A shader whose workgroups are one subgroup each, of at most 16 invocations, may define HEDGEROW_LANES, how many they are, before it
 // includes trace/query.glsl: a constant or specialisation constant. Its lanes then load nodes and triangles one after the other
-// (trace/lanes.glsl): what CPUs' drivers are faster with that load what is uniform once. It says by HEDGEROW_FORMS (trace/query_walk.glsl)
-// what nodes there are, or those of either form are loaded for all lanes. Through two levels of nodes of eight each lane's own loads are
-// faster.
+// (trace/lanes.glsl): what CPUs' drivers are faster with that load what is uniform once. Structures are of nodes of two then, and it says so
+// by HEDGEROW_FORMS (trace/query_walk.glsl).
 //
 // On lavapipe the rays of `hedgerow accel` are 1.25 times as fast lane by lane as with one for each invocation (docs/notes/rays.md): those
 // that go anywhere 1.6 to 2.1 times, those that go the same way 0.91 to 1.13. With each lane's own loads it was 1.13 times.

@@ -21,11 +21,25 @@ layout(constant_id = 4) const uint LANES = 16;
 #include "trace/lanes.glsl"
 #include "trace/walk_quantised.glsl"
 
+QuantisedNode own_quantised(bool own, QuantisedNode theirs, QuantisedNode mine) {
+    QuantisedNode kept = QuantisedNode(own ? theirs.origin : mine.origin,
+                                       own ? theirs.exponents_and_nodes : mine.exponents_and_nodes,
+                                       own ? theirs.first_child : mine.first_child,
+                                       own ? theirs.first_record : mine.first_record,
+                                       own ? theirs.counts : mine.counts, mine.lo, mine.hi);
+    [[unroll]] for (uint axis = 0; axis < 3; ++axis) {
+        kept.lo[axis] = own ? theirs.lo[axis] : mine.lo[axis];
+        kept.hi[axis] = own ? theirs.hi[axis] : mine.hi[axis];
+    }
+    return kept;
+}
+
 QuantisedNode quantised_node_of_each_lane(QuantisedNodes nodes, HedgerowEachLane index) {
-    QuantisedNode mine = HEDGEROW_NO_QUANTISED_NODE;
+    const uvec2 none[3] = uvec2[3](uvec2(0u), uvec2(0u), uvec2(0u));
+    QuantisedNode mine = QuantisedNode(uvec3(0u), 0u, 0u, 0u, uvec2(0u), none, none);
 #define LOAD_QUANTISED(lane)         \
     if (lane < hedgerow_lanes)       \
-        mine = hedgerow_own_quantised_node(gl_SubgroupInvocationID == lane, nodes.node[index.value[lane]], mine);
+        mine = own_quantised(gl_SubgroupInvocationID == lane, nodes.node[index.value[lane]], mine);
     HEDGEROW_FOR_EACH_LANE(LOAD_QUANTISED)
     return mine;
 }
@@ -43,11 +57,12 @@ Triangle record_of_each_lane(uvec2 records, HedgerowEachLane unit) {
 
 // What lies in a unit of each lane as behind the first of two triangles.
 SecondOfPair second_of_each_lane(uvec2 records, HedgerowEachLane unit) {
-    SecondOfPair mine = HEDGEROW_NO_SECOND;
-#define LOAD_SECOND(lane)                                                                              \
-    if (lane < hedgerow_lanes) {                                                                       \
-        SecondOfPair theirs = SecondsOfPairs(record_at_unit(records, unit.value[lane])).second[0];     \
-        mine = hedgerow_own_second(gl_SubgroupInvocationID == lane, theirs, mine);                     \
+    SecondOfPair mine = SecondOfPair(vec3(0.0), 0u);
+#define LOAD_SECOND(lane)                                                                                      \
+    if (lane < hedgerow_lanes) {                                                                               \
+        SecondOfPair theirs = SecondsOfPairs(record_at_unit(records, unit.value[lane])).second[0];             \
+        bool own = gl_SubgroupInvocationID == lane;                                                            \
+        mine = SecondOfPair(own ? theirs.vertex : mine.vertex, own ? theirs.primitive : mine.primitive);       \
     }
     HEDGEROW_FOR_EACH_LANE(LOAD_SECOND)
     return mine;
