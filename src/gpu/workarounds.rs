@@ -4,8 +4,8 @@
 //! These are four. lavapipe of Mesa 26 loads what is at one address for all lanes even where no lane is active (`bvh::encode`,
 //! `glsl/bvh/clusters.glsl`, `glsl/bvh/ploc.glsl`, `glsl/kdtree/small.glsl` keep such addresses in range); Mesa takes each
 //! access to shared memory that makes itself visible for a fence (`build/shared_memory.rs`); lavapipe before Mesa 25 ends long
-//! loops early, which [`super::probe`] finds out by running one; SwiftShader takes other arguments out of a table than lie there where they
-//! are loaded in the middle of a shader (`build/by_table.rs` has them loaded at the start; tests/accel/arguments.rs).
+//! loops early, which [`super::probe`] finds out by running one; SwiftShader writes elsewhere, and crashes,
+//! where a shader loads its arguments from a table in its middle (`build/by_table.rs` has them loaded at the start; tests/accel/arguments.rs).
 
 use super::Limits;
 use ash::vk;
