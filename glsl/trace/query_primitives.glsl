@@ -47,13 +47,19 @@ bool hedgerow_meet_triangle(inout HedgerowRayQuery query, Triangle triangle, uin
     return waits;
 }
 
-// The next record, a box; true if it is met: always a candidate, as only the shader knows what is in it.
-bool hedgerow_test_box(inout HedgerowRayQuery query) {
-    uint at = query.index;
+// Takes the next record; whether it is there.
+bool hedgerow_takes_record(inout HedgerowRayQuery query, out uint at) {
+    at = query.index;
     hedgerow_step(query);
     HEDGEROW_COUNT(w);
+    return at < query.records;
+}
+
+// The next record, a box; true if it is met: always a candidate, as only the shader knows what is in it.
+bool hedgerow_test_box(inout HedgerowRayQuery query) {
+    uint at;
     bool waits = false;
-    if (at < query.records) {
+    if (hedgerow_takes_record(query, at)) {
         BoxRecord box = BoxRecords(hedgerow_records_in(query.structure, query.slots, query.form)).box[at];
         bool entered;
         hedgerow_enter(query.prepared, box.lo, box.hi, query.best, entered);
@@ -72,11 +78,9 @@ bool hedgerow_test_box(inout HedgerowRayQuery query) {
 
 // The next record, a triangle of a structure of nodes of two.
 bool hedgerow_test_triangle(inout HedgerowRayQuery query) {
-    uint at = query.index;
-    hedgerow_step(query);
-    HEDGEROW_COUNT(w);
+    uint at;
     bool waits = false;
-    if (at < query.records) {
+    if (hedgerow_takes_record(query, at)) {
         Triangle triangle = hedgerow_triangle_at(hedgerow_records_in(query.structure, query.slots, query.form), at);
         waits = hedgerow_meet_triangle(query, triangle, at);
     }
