@@ -14,6 +14,9 @@
 #ifndef HEDGEROW_TRACE_LANES
 #define HEDGEROW_TRACE_LANES
 #include "bvh/layout.glsl"
+#include "bvh/wide.glsl"
+#include "bvh/wide/pairs.glsl"
+#extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 
@@ -70,8 +73,29 @@ Triangle hedgerow_own_triangle(bool own, Triangle theirs, Triangle mine) {
                     own ? theirs.primitive : mine.primitive);
 }
 
+QuantisedNode hedgerow_own_quantised_node(bool own, QuantisedNode theirs, QuantisedNode mine) {
+    QuantisedNode kept = QuantisedNode(own ? theirs.origin : mine.origin,
+                                       own ? theirs.exponents_and_nodes : mine.exponents_and_nodes,
+                                       own ? theirs.first_child : mine.first_child,
+                                       own ? theirs.first_record : mine.first_record,
+                                       own ? theirs.counts : mine.counts, mine.lo, mine.hi);
+    [[unroll]] for (uint axis = 0; axis < 3; ++axis) {
+        kept.lo[axis] = own ? theirs.lo[axis] : mine.lo[axis];
+        kept.hi[axis] = own ? theirs.hi[axis] : mine.hi[axis];
+    }
+    return kept;
+}
+
+SecondOfPair hedgerow_own_second(bool own, SecondOfPair theirs, SecondOfPair mine) {
+    return SecondOfPair(own ? theirs.vertex : mine.vertex, own ? theirs.primitive : mine.primitive);
+}
+
 // What a lane has before anything was loaded for it.
 const Child HEDGEROW_NO_CHILD = Child(vec3(0.0), 0u, vec3(0.0), 0u);
 const Node HEDGEROW_NO_NODE = Node(HEDGEROW_NO_CHILD, HEDGEROW_NO_CHILD);
 const Triangle HEDGEROW_NO_TRIANGLE = Triangle(vec3(0.0), vec3(0.0), vec3(0.0), 0u);
+const SecondOfPair HEDGEROW_NO_SECOND = SecondOfPair(vec3(0.0), 0u);
+const uvec2 HEDGEROW_NO_BYTES[3] = uvec2[3](uvec2(0u), uvec2(0u), uvec2(0u));
+const QuantisedNode HEDGEROW_NO_QUANTISED_NODE =
+    QuantisedNode(uvec3(0u), 0u, 0u, 0u, uvec2(0u), HEDGEROW_NO_BYTES, HEDGEROW_NO_BYTES);
 #endif

@@ -101,14 +101,14 @@ uint hedgerowRayQueryGetIntersectionInstanceShaderBindingTableRecordOffset(Hedge
 uint hedgerowRayQueryGetIntersectionGeometryIndex(HedgerowRayQuery query, bool committed) {
     HedgerowMeeting met = hedgerow_met(query, committed);
     Instance instance = hedgerow_instance_of(query, met);
-    return hedgerow_geometry_of(instance.structure, instance.slots & INDEX_MASK, hedgerow_primitive_of(instance, met)).index;
+    return hedgerow_geometry_of(instance.structure, instance.slots & INDEX_MASK, met.primitive).index;
 }
 
 // The primitive's position in its geometry.
 uint hedgerowRayQueryGetIntersectionPrimitiveIndex(HedgerowRayQuery query, bool committed) {
     HedgerowMeeting met = hedgerow_met(query, committed);
     Instance instance = hedgerow_instance_of(query, met);
-    uint primitive = hedgerow_primitive_of(instance, met);
+    uint primitive = met.primitive;
     return primitive - hedgerow_geometry_of(instance.structure, instance.slots & INDEX_MASK, primitive).first;
 }
 

@@ -1,25 +1,12 @@
 // A round of a query whose nodes and triangles are loaded lane by lane (trace/lanes.glsl): a part of trace/query_turns.glsl.
 //
-// All lanes of the workgroup come here together, those without a ray as well. Two nodes are looked at in a round, as in
-// trace/tracer/lanes.comp. What is rarer, instances and boxes, each lane loads for itself.
+// All lanes of the workgroup come here together, those without a ray as well. Two nodes of two are looked at in a round, as in
+// trace/tracer/lanes.comp, or one of eight. What is rarer, instances and boxes, each lane loads for itself.
 #ifndef HEDGEROW_TRACE_QUERY_LANES
 #define HEDGEROW_TRACE_QUERY_LANES
-#ifdef HEDGEROW_ALL_FORMS
-#error "HEDGEROW_LANES is for structures of nodes of two: define HEDGEROW_FORMS as HEDGEROW_NODES_OF_TWO before trace/query.glsl"
-#endif
 // Until the end of this file.
 #include "bvh/names.glsl"
 #include "trace/lanes.glsl"
-
-// An address that any lane has, or 0.
-uvec2 hedgerow_address_of_any_lane(uvec2 address) {
-    HedgerowEachLane low = hedgerow_each_lane(address.x), high = hedgerow_each_lane(address.y);
-    uvec2 any = uvec2(0u);
-    for (uint lane = 0; lane < 16; lane++) {
-        if ((low.value[lane] | high.value[lane]) != 0u) any = uvec2(low.value[lane], high.value[lane]);
-    }
-    return any;
-}
 
 Node hedgerow_node_of_each_lane(uvec2 address) {
     HedgerowEachLane low = hedgerow_each_lane(address.x), high = hedgerow_each_lane(address.y);
@@ -45,29 +32,84 @@ Triangle hedgerow_triangle_of_each_lane(uvec2 address) {
     return mine;
 }
 
-// As a round of hedgerow_proceed, of the lanes whose ray goes. `readable` is the address of 64 bytes or more, for lanes that need nothing.
+QuantisedNode hedgerow_quantised_node_of_each_lane(uvec2 address) {
+    HedgerowEachLane low = hedgerow_each_lane(address.x), high = hedgerow_each_lane(address.y);
+    QuantisedNode mine = HEDGEROW_NO_QUANTISED_NODE;
+#define HEDGEROW_LOAD_QUANTISED_NODE(lane)                                                               \
+    if (lane < hedgerow_lanes) {                                                                         \
+        QuantisedNode theirs = QuantisedNodes(uvec2(low.value[lane], high.value[lane])).node[0];         \
+        mine = hedgerow_own_quantised_node(gl_SubgroupInvocationID == lane, theirs, mine);               \
+    }
+    HEDGEROW_FOR_EACH_LANE(HEDGEROW_LOAD_QUANTISED_NODE)
+    return mine;
+}
+
+SecondOfPair hedgerow_second_of_each_lane(uvec2 address) {
+    HedgerowEachLane low = hedgerow_each_lane(address.x), high = hedgerow_each_lane(address.y);
+    SecondOfPair mine = HEDGEROW_NO_SECOND;
+#define HEDGEROW_LOAD_SECOND(lane)                                                                    \
+    if (lane < hedgerow_lanes) {                                                                      \
+        SecondOfPair theirs = SecondsOfPairs(uvec2(low.value[lane], high.value[lane])).second[0];     \
+        mine = hedgerow_own_second(gl_SubgroupInvocationID == lane, theirs, mine);                    \
+    }
+    HEDGEROW_FOR_EACH_LANE(HEDGEROW_LOAD_SECOND)
+    return mine;
+}
+
+// The node at hand, of the lanes whose ray goes. `readable` is the address of 80 bytes or more, for lanes that need nothing.
+void hedgerow_visit_in_lanes(inout HedgerowRayQuery query, bool goes, uvec2 readable) {
+    bool visits = goes && hedgerow_comes_to_node(query);
+    if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_TWO) != 0u) {
+        bool is_own = visits && !hedgerow_is_quantised(query);
+        uvec2 address = is_own ? hedgerow_node_address(query.structure, query.index) : readable;
+        Node node = hedgerow_node_of_each_lane(address);
+        if (is_own) hedgerow_visit_node(query, node);
+    }
+    if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_EIGHT) != 0u) {
+        bool is_own = visits && hedgerow_is_quantised(query);
+        uvec2 address = is_own ? address_of(wide_nodes_at(query.structure), query.index, QUANTISED_NODE_BYTES) : readable;
+        QuantisedNode node = hedgerow_quantised_node_of_each_lane(address);
+        if (is_own) hedgerow_visit_quantised(query, node);
+    }
+}
+
+// The next record of a leaf, of the lanes that are at one; true if what was met is a candidate. Of quantised triangles a record may be two.
+bool hedgerow_test_in_lanes(inout HedgerowRayQuery query, bool tests, uvec2 readable) {
+    bool waits = false;
+    uvec2 records = hedgerow_records_in(query.structure, query.slots, query.form);
+    bool has_boxes = (query.form & FORM_BOXES) != 0u;
+    if (tests && has_boxes) waits = hedgerow_test_box(query);
+    bool tests_triangle = tests && !has_boxes;
+    if (HEDGEROW_FORMS != HEDGEROW_NODES_OF_EIGHT) {
+        uint at = query.index;
+        bool is_own = tests_triangle && !hedgerow_is_quantised(query);
+        bool is_there = is_own && at < query.records;
+        Triangle triangle = hedgerow_triangle_of_each_lane(is_there ? address_of(records, at, 40u) : readable);
+        if (is_own) {
+            hedgerow_step(query);
+            HEDGEROW_COUNT(w);
+        }
+        if (is_there) waits = hedgerow_meet_triangle(query, triangle, at);
+    }
+    if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_EIGHT) != 0u) {
+        bool is_own = tests_triangle && hedgerow_is_quantised(query) && hedgerow_comes_to_record(query);
+        uint unit = hedgerow_unit_of(query);
+        Triangle first = hedgerow_triangle_of_each_lane(is_own ? record_at_unit(records, unit) : readable);
+        bool is_pair = is_own && hedgerow_is_pair(query, first);
+        SecondOfPair second = hedgerow_second_of_each_lane(is_pair ? second_at_unit(records, unit) : readable);
+        if (is_own) waits = hedgerow_meet_pair(query, first, second, is_pair);
+    }
+    return waits;
+}
+
+// As a round of hedgerow_proceed, of the lanes whose ray goes.
 bool hedgerow_round_of_lanes(inout HedgerowRayQuery query, bool goes, uvec2 readable, out bool ends) {
     if (goes && hedgerow_has_record(query) && hedgerow_is_in_top(query)) hedgerow_enter_instance(query);
-    for (uint visit = 0; visit < 2; visit++) {
-        bool visits = goes && hedgerow_comes_to_node(query);
-        uvec2 address = visits ? hedgerow_node_address(query.structure, query.index) : readable;
-        Node node = hedgerow_node_of_each_lane(address);
-        if (visits) hedgerow_visit_node(query, node);
-    }
-    bool waits = false;
+    hedgerow_visit_in_lanes(query, goes, readable);
+    if (HEDGEROW_FORMS == HEDGEROW_NODES_OF_TWO) hedgerow_visit_in_lanes(query, goes, readable);
+    if (goes && hedgerow_is_quantised(query)) hedgerow_take_leaf(query);
     bool tests = goes && hedgerow_has_record(query) && !hedgerow_is_in_top(query);
-    uint at = query.index;
-    bool is_there = tests && at < query.records;
-    bool tests_triangle = is_there && (query.form & FORM_BOXES) == 0u;
-    uvec2 records = hedgerow_records_in(query.structure, query.slots, query.form);
-    Triangle triangle = hedgerow_triangle_of_each_lane(tests_triangle ? address_of(records, at, 40u) : readable);
-    if (tests && (query.form & FORM_BOXES) == 0u) {
-        hedgerow_step(query);
-        HEDGEROW_COUNT(w);
-        if (is_there) waits = hedgerow_meet_triangle(query, triangle, at);
-    } else if (tests) {
-        waits = hedgerow_test_box(query);
-    }
+    bool waits = hedgerow_test_in_lanes(query, tests, readable);
     ends = false;
     if (goes) {
         ends = query.rounds == 0u;

@@ -48,22 +48,13 @@ Triangle hedgerow_triangle_of(Instance instance, HedgerowMeeting met) {
     return Triangles(records).triangle[met.record];
 }
 
-// The primitive of a meeting. Where triangles are loaded lane by lane (trace/query_lanes.glsl) it is loaded again: kept from the triangle that
-// was tested, Mesa 26's lavapipe loads it at address 0 for lanes that are at none.
-uint hedgerow_primitive_of(Instance instance, HedgerowMeeting met) {
-#ifdef HEDGEROW_LANES
-    if (met.type != HEDGEROW_MET_BOX) return hedgerow_triangle_of(instance, met).primitive;
-#endif
-    return met.primitive;
-}
-
 // Whether the candidate comes before the committed hit at the same t: by instance, then primitive. Several records may be of one instance.
 bool hedgerow_comes_before(HedgerowRayQuery query) {
     HedgerowMeeting a = query.candidate, b = query.committed;
     if (b.type == HEDGEROW_MET_NOTHING) return false;
     Instance of_a = hedgerow_instance_of(query, a), of_b = hedgerow_instance_of(query, b);
     if (of_a.instance != of_b.instance) return of_a.instance < of_b.instance;
-    return hedgerow_primitive_of(of_a, a) < hedgerow_primitive_of(of_b, b);
+    return a.primitive < b.primitive;
 }
 
 void hedgerow_commit(inout HedgerowRayQuery query) {

@@ -32,13 +32,8 @@ bool hedgerow_meet_triangle(inout HedgerowRayQuery query, Triangle triangle, uin
         bool culls = (query.flags & facing) != 0u && (query.instance_flags & HEDGEROW_INSTANCE_CULL_DISABLE) == 0u;
         bool is_opaque = hedgerow_is_opaque(query, triangle.primitive);
         if (!culls && !hedgerow_is_culled(query, is_opaque)) {
-#ifdef HEDGEROW_LANES
-            uint primitive = 0u;
-#else
-            uint primitive = triangle.primitive;
-#endif
-            query.candidate =
-                HedgerowMeeting(HEDGEROW_MET_TRIANGLE, met.x, met.y, met.z, at, primitive, query.instance, is_front, is_opaque);
+            query.candidate = HedgerowMeeting(HEDGEROW_MET_TRIANGLE, met.x, met.y, met.z, at, triangle.primitive, query.instance,
+                                              is_front, is_opaque);
             bool is_nearest = met.x != query.best || hedgerow_comes_before(query);
             if (is_nearest && is_opaque) hedgerow_commit(query);
             waits = is_nearest && !is_opaque;

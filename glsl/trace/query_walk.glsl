@@ -111,7 +111,7 @@ struct HedgerowMeeting {
     float u;
     float v;
     uint record;              // in the bottom-level structure; of quantised triangles see trace/query_pairs.glsl
-    uint primitive;           // of all geometries of the structure; see hedgerow_primitive_of
+    uint primitive;           // of all geometries of the structure
     uint instance;            // record in the top level; without meaning where a bottom-level structure is queried
     bool is_front;
     bool is_opaque;

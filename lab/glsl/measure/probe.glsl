@@ -134,7 +134,7 @@ void main() {
     uint next = begins + gl_LocalInvocationIndex;
     uint end = min(count, begins + gl_WorkGroupSize.x * RAYS_EACH);
     uint i = next;
-    HedgerowTurns turns = hedgerowTurns();
+    HedgerowTurns turns = hedgerowTurns(accelerationStructureEXT(structure));
     while (hedgerowTakeTurn(turns, next < end)) {
         if (turns.takes) {
             i = next;

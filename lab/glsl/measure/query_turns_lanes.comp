@@ -8,7 +8,8 @@ layout(constant_id = 4) const uint LANES = 16;
 #define HEDGEROW_LANES LANES
 layout(constant_id = 5) const bool ONE_LEVEL = false;
 #define HEDGEROW_ONE_LEVEL ONE_LEVEL
-#define HEDGEROW_FORMS HEDGEROW_NODES_OF_TWO
+layout(constant_id = 6) const uint FORMS = 3;
+#define HEDGEROW_FORMS FORMS
 #define IN_TURN
 #include "trace/ray_query_names.glsl"
 #include "measure/ray_query.glsl"

@@ -48,7 +48,7 @@ void main() {
     uint end = min(count, first + (gl_WorkGroupID.x + 1u) * group_rays);
     uint i = next;
     rayQueryEXT query;
-    HedgerowTurns turns = hedgerowTurns();
+    HedgerowTurns turns = hedgerowTurns(accelerationStructureEXT(structure));
     while (hedgerowTakeTurn(turns, next < end)) {
         if (turns.takes) {
             i = next;

@@ -124,10 +124,11 @@ pub fn flags_and_decisions(cases: &mut Cases<'_>) {
 /// What queries report does not depend on how many rays an invocation has, whichever goes on while others have ended, nor on how it loads.
 fn in_turn(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found {
     reports_the_same(&Ours::on(device), &Probe::in_turn(device), world, rays)?;
-    // Loads lane by lane are for nodes of two.
     let Some(in_lanes) = Probe::in_lanes(device) else { return Ok(()) };
-    let of_two = AccelOptions { wide: Wide::Never, ..AccelOptions::DEFAULT };
-    reports_the_same(&Ours::with_options(device, of_two), &in_lanes, world, rays)
+    [Wide::Never, Wide::ByFlags, Wide::Always].into_iter().try_for_each(|wide| {
+        let options = AccelOptions { wide, ..AccelOptions::DEFAULT };
+        reports_the_same(&Ours::with_options(device, options), &in_lanes, world, rays)
+    })
 }
 
 /// A shader for bottom levels alone reports of each part what another one does, and nothing of a top level.
