@@ -31,17 +31,20 @@ Node node_at(Structure structure, uint index) {
 #endif
 }
 
+// That begins at an element of 8 bytes.
+Triangle triangle_of_pairs(Pairs pairs, uint at) {
+    vec2 a = uintBitsToFloat(pairs.pair[at]), b = uintBitsToFloat(pairs.pair[at + 1u]), c = uintBitsToFloat(pairs.pair[at + 2u]);
+    vec2 d = uintBitsToFloat(pairs.pair[at + 3u]);
+    uvec2 e = pairs.pair[at + 4u];
+    return Triangle(vec3(a, b.x), vec3(b.y, c), vec3(d, uintBitsToFloat(e.x)), e.y);
+}
+
 Triangle triangle_at(Triangles triangles, uint index) {
 #ifdef HEDGEROW_INT64
     return hedgerow_long_triangle(address_of(uvec2(triangles), index, 40u));
 #else
     if (!IN_VECTORS) return triangles.triangle[index];
-    Pairs triangle = Pairs(uvec2(triangles));
-    uint at = 5u * index;
-    vec2 a = uintBitsToFloat(triangle.pair[at]), b = uintBitsToFloat(triangle.pair[at + 1u]);
-    vec2 c = uintBitsToFloat(triangle.pair[at + 2u]), d = uintBitsToFloat(triangle.pair[at + 3u]);
-    uvec2 e = triangle.pair[at + 4u];
-    return Triangle(vec3(a, b.x), vec3(b.y, c), vec3(d, uintBitsToFloat(e.x)), e.y);
+    return triangle_of_pairs(Pairs(uvec2(triangles)), 5u * index);
 #endif
 }
 #endif

@@ -1,8 +1,5 @@
-// Traces rays, each by one invocation, on CPUs: the loop of tracer_single.comp, with loads lane by lane (trace/lanes.glsl).
-//
-// All lanes stay in the loop until all rays of the workgroup are done: every lane can be asked what it needs. Rays that go the
-// same way stay together: the next ones are taken when all lanes are done. Where more than half of the lanes' turns were spent waiting
-// for the longest ray, each lane takes its next ray as soon as it can instead.
+// Traces rays, each by one invocation, on CPUs: the loop of trace/lanes_loop.glsl, with loads lane by lane, and the steps of
+// trace/tracer/single.comp.
 //
 // reads   structure, rays[first..count]
 // writes  hits[first..count]; with COUNT_WORK also works[first..count]
@@ -20,7 +17,7 @@ layout(constant_id = 6) const bool LEFT_FIRST = false;
 layout(constant_id = 4) const uint LANES = 16;
 #define HEDGEROW_LANES LANES
 
-#include "trace/lanes.glsl"
+#include "trace/lanes_loop.glsl"
 #include "trace/walk.glsl"
 
 Node node_of_each_lane(HedgerowEachLane index) {
@@ -50,33 +47,14 @@ void main() {
     Triangles triangles = triangles_of(structure);
     Child root = structure.header.root;
     bool usable = can_be_traced(structure, KIND_TRIANGLES);
-    uint group_rays = gl_WorkGroupSize.x * rays_each;
-    uint next = first + gl_WorkGroupID.x * group_rays + gl_LocalInvocationIndex;
-    uint end = min(count, first + (gl_WorkGroupID.x + 1) * group_rays);
-
     Walk walk;
     walk.left = NOTHING;
-    bool going = false;
-    uint i;
-    bool together = true;
-    // Since all lanes took a ray: turns of the loop, and those in which this lane had a ray.
-    uint turns = 0, turns_going = 0;
-    while (true) {
-        bool none_goes = !hedgerow_any_lane(going);
-        if (none_goes) {
-            if (!hedgerow_any_lane(next < end)) break;
-            together = together && 2u * hedgerow_sum_of_lanes(turns_going) >= gl_WorkGroupSize.x * turns;
-            turns = 0;
-            turns_going = 0;
+    LaneRays lane = lane_rays();
+    while (take_turn(lane)) {
+        if (lane.any_takes) {
+            HedgerowRay ray = ray_of_each_lane(lane);
+            if (lane.takes) begin(ray, root, usable, walk);
         }
-        turns++;
-        if (!going && next < end && (none_goes || !together)) {
-            i = next;
-            next += gl_WorkGroupSize.x;
-            begin(rays.ray[i], root, usable, walk);
-            going = true;
-        }
-        if (going) turns_going++;
         // A lane that needs no node loads that of any lane that does: the root is one, or no lane is at a node.
         for (uint visits = 0; visits < 2; visits++) {
             HedgerowEachLane nodes = hedgerow_each_lane(at_node(walk) ? walk.index : root.index);
@@ -85,11 +63,11 @@ void main() {
         // There is a first triangle, or no lane is at one.
         HedgerowEachLane tests = hedgerow_each_lane(at_triangle(walk) ? walk.index : 0u);
         if (at_triangle(walk)) test(triangle_of_each_lane(triangles, tests), ANY_HIT, walk);
-        if (going && walk.left == NOTHING) {
-            going = LEFT_FIRST ? go_on_left_first(walk) : go_on(walk);
-            if (!going) {
-                hits.hit[i] = walk.hit;
-                if (COUNT_WORK) works.work[i] = walk.work;
+        if (lane.going && walk.left == NOTHING) {
+            lane.going = LEFT_FIRST ? go_on_left_first(walk) : go_on(walk);
+            if (!lane.going) {
+                hits.hit[lane.at] = walk.hit;
+                if (COUNT_WORK) works.work[lane.at] = walk.work;
             }
         }
     }

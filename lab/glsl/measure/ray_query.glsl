@@ -15,8 +15,7 @@ const uint FLAGS = gl_RayFlagsOpaqueEXT | (ANY_HIT ? gl_RayFlagsTerminateOnFirst
 #define QUERY rayQueryEXT query
 #endif
 
-void begin(QUERY, uint i) {
-    GivenRay ray = rays.ray[i];
+void begin(QUERY, GivenRay ray) {
     rayQueryInitializeEXT(query, accelerationStructureEXT(structure), FLAGS, 0xFF, ray.origin, ray.t_min, ray.direction,
                           ray.t_max);
 }
@@ -42,6 +41,27 @@ void report(QUERY, uint i) {
 #include "trace/query_turns.glsl"
 layout(constant_id = 3) const uint RAYS_EACH = 1;
 
+// The next ray of an invocation that takes one: lane by lane where tracers load so (trace/lanes_loop.glsl).
+GivenRay ray_of_turn(uint next, HedgerowTurns turns) {
+    GivenRay mine = GivenRay(vec3(0.0), 0.0, vec3(0.0), 0.0);
+#ifdef HEDGEROW_LANES
+    if (hedgerow_any_lane(turns.takes)) {
+        HedgerowEachLane index = hedgerow_each_lane(turns.takes ? next : first);
+#define LOAD_RAY(lane)                                                                                        \
+        if (lane < hedgerow_lanes) {                                                                          \
+            GivenRay theirs = rays.ray[index.value[lane]];                                                    \
+            bool own = gl_SubgroupInvocationID == lane;                                                       \
+            mine = GivenRay(own ? theirs.origin : mine.origin, own ? theirs.t_min : mine.t_min,               \
+                            own ? theirs.direction : mine.direction, own ? theirs.t_max : mine.t_max);        \
+        }
+        HEDGEROW_FOR_EACH_LANE(LOAD_RAY)
+    }
+#else
+    if (turns.takes) mine = rays.ray[next];
+#endif
+    return mine;
+}
+
 void main() {
     uint group_rays = gl_WorkGroupSize.x * RAYS_EACH;
     uint next = first + gl_WorkGroupID.x * group_rays + gl_LocalInvocationIndex;
@@ -50,10 +70,11 @@ void main() {
     rayQueryEXT query;
     HedgerowTurns turns = hedgerowTurns(accelerationStructureEXT(structure));
     while (hedgerowTakeTurn(turns, next < end)) {
+        GivenRay ray = ray_of_turn(next, turns);
         if (turns.takes) {
             i = next;
             next += gl_WorkGroupSize.x;
-            begin(query, i);
+            begin(query, ray);
         }
         hedgerowRayQueryProceedInTurn(query, turns, FLAGS);
         if (hedgerowRayQueryEndsInTurn(query, turns)) report(query, i);
@@ -64,7 +85,7 @@ void main() {
     uint i = first + gl_GlobalInvocationID.x;
     if (i >= count) return;
     rayQueryEXT query;
-    begin(query, i);
+    begin(query, rays.ray[i]);
     while (rayQueryProceedEXT(query)) {}
     report(query, i);
 }
