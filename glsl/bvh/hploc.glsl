@@ -12,7 +12,7 @@
 // needs one barrier before, behind bvh/encode.glsl's phases; subgroups of any size
 #ifndef HEDGEROW_BVH_HPLOC
 #define HEDGEROW_BVH_HPLOC
-#include "bvh/hploc/alone.glsl"
+#include "bvh/hploc/by_one.glsl"
 #include "bvh/hploc/teams.glsl"
 #include "bvh/radix_tree.glsl"
 
@@ -100,7 +100,7 @@ void hploc_hierarchy(uint task) {
         clusters.cluster[position] = cluster_of_primitive(input_geometries, position, area_scale);
         list.word[position] = position;
     }
-    if (!ALONE) reset_teams();
+    if (!BY_ONE) reset_teams();
     uint position = run;
     uint waiting = 0;
     bool leaves_done = false, climbs = false;
@@ -136,8 +136,8 @@ void hploc_hierarchy(uint task) {
         }
         uint left = 0u;
         bool any_works = !done;
-        if (!ALONE) any_works = merge_in_teams(structure, w, clusters, request, merges, done, area_scale, left);
-        else if (merges) left = merge_alone(structure, w, clusters, request, area_scale);
+        if (!BY_ONE) any_works = merge_in_teams(structure, w, clusters, request, merges, done, area_scale, left);
+        else if (merges) left = merge_by_one(structure, w, clusters, request, area_scale);
         if (!any_works) break;
         if (merges) s.clusters = left;
         if (merges && request.is_whole) climbs = false;

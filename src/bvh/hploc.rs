@@ -33,15 +33,15 @@ impl Window {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Merging {
     window: Window,
-    /// Each invocation merges its own windows (`hploc_alone.glsl`), or teams of them do (`hploc_teams.glsl`).
-    alone: bool,
+    /// Each invocation merges its own windows (`glsl/bvh/hploc/by_one.glsl`), or teams of them do (`teams.glsl`).
+    by_one: bool,
     /// Invocations of a workgroup of the hierarchy's dispatch, at most: on GPUs few, for the workgroup's barriers divide the steps.
     group: u32,
     /// Bytes of shared memory for the windows of teams.
     shared_memory: u32,
 }
 
-/// Places of the window that an invocation merges by itself: `SLOTS` in hploc_alone.glsl.
+/// Places of the window that an invocation merges by itself: `SLOTS` in `glsl/bvh/hploc/by_one.glsl`.
 const SLOTS: u32 = 8;
 /// Shared memory for each place of a team's window.
 const PLACE_BYTES: u32 = 44;
@@ -52,7 +52,7 @@ impl Merging {
         let sees_all = window.size <= SLOTS && window.radius + 1 >= window.size;
         Merging {
             window,
-            alone: tuning.build.merges_alone && sees_all,
+            by_one: tuning.build.merges_by_one && sees_all,
             group: tuning.small_group,
             // The sort's counters take most of the rest, where one kernel does everything.
             shared_memory: context.limits.shared_memory / 4,
@@ -61,8 +61,8 @@ impl Merging {
 
     /// Of a device whose invocations merge their own windows.
     #[cfg(test)]
-    pub fn alone() -> Merging {
-        Merging { window: Window::DEFAULT, alone: true, group: 8, shared_memory: 0 }
+    pub fn by_one() -> Merging {
+        Merging { window: Window::DEFAULT, by_one: true, group: 8, shared_memory: 0 }
     }
 
     /// Invocations of a team, in workgroups of so many: one for each place, where there is room for as many teams as that makes.
@@ -76,8 +76,8 @@ impl Merging {
     }
 
     fn kernel(&self, encode: &Encode, shader: &'static Shader, input: &Input, workgroup: u32) -> Kernel {
-        let Merging { window, alone, .. } = *self;
-        let constants = [window.size, window.radius, u32::from(alone), self.team(workgroup)];
+        let Merging { window, by_one, .. } = *self;
+        let constants = [window.size, window.radius, u32::from(by_one), self.team(workgroup)];
         encode.reading_kernel_with(shader, input, &constants).in_workgroups_of(workgroup)
     }
 }

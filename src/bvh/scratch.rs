@@ -203,7 +203,7 @@ mod tests {
             for method in METHODS {
                 for reinsertion in [None, Some(15 * u64::from(count))] {
                     let encode = encode(count, bits, 8);
-                    let merging = Merging::alone();
+                    let merging = Merging::by_one();
                     let scratch = Scratch::of(&encode, &*method.hierarchy(&merging), reinsertion, encode.table_words());
                     scratch.plan.assert_nothing_in_use_is_shared();
                     let (bytes, least) = (scratch.bytes(), scratch.plan.most_in_use());
@@ -219,7 +219,7 @@ mod tests {
         for method in METHODS {
             for reinsertion in [0, 15] {
                 let bytes = |count: u32| {
-                    let (encode, merging) = (encode(count, 32, 8), Merging::alone());
+                    let (encode, merging) = (encode(count, 32, 8), Merging::by_one());
                     let reinsertion = (reinsertion > 0).then_some(reinsertion * u64::from(count));
                     let most = encode.shape.most_table_words(count).max(encode.table_words());
                     Scratch::of(&encode, &*method.hierarchy(&merging), reinsertion, most).bytes()

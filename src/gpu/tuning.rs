@@ -106,7 +106,7 @@ pub struct BuildTuning {
     /// Bits of a digit of its sort: with 8, a pass spends more on its table than on a few hundred keys.
     pub small_digit_bits: u32,
     /// Whether an invocation of H-PLOC merges small windows by itself, in registers, or a team of invocations does.
-    pub merges_alone: bool,
+    pub merges_by_one: bool,
     /// Items that an invocation of reinsertion's passes takes.
     pub reinsertion_rounds: u32,
     /// Entries of a reinsertion's stack in shared memory; the others are private.
@@ -211,7 +211,7 @@ impl Tuning {
                 // Of 600 to 1,000 triangles a fast trace takes 0.77 to 1.06 of the time so, of 1,500 and 2,000 on two cores 1.24.
                 small_hploc: 1024,
                 small_digit_bits: 4,
-                merges_alone: true,
+                merges_by_one: true,
                 reinsertion_rounds: 64,
                 reinsertion_shared: 0,
                 alone_group: group,
@@ -274,7 +274,7 @@ impl Tuning {
                 small_digit_bits: 4,
                 // As in the paper: of the invocations that climb, ever fewer have a window, and merging one alone takes 28
                 // distances a round and some hundred registers.
-                merges_alone: false,
+                merges_by_one: false,
                 // A search is long: it is an invocation's only one, as far as there are invocations.
                 reinsertion_rounds: 1,
                 // 8 KiB a workgroup: few searches put off more.

@@ -4,7 +4,7 @@ use crate::common::corpus::{self, Mesh};
 use crate::common::shapes::{Corners, hard_rays, soup};
 use hedgerow::bvh::layout::Bvh2;
 use hedgerow::trace::twin::tracer::{all_hits, closest_hit, closest_hit_by_brute_force, trace, trace_left_first};
-use hedgerow::trace::{Query, Ray, Work};
+use hedgerow::trace::{Hit, Query, Ray, Work};
 use hedgerow_host::bvh::heuristic::{
     InteriorForm, Occlusion, Pinhole, Preferred, PreferredRays, RayDistribution, RaySegment, ShadowRays,
 };
@@ -70,12 +70,18 @@ fn heuristics<'a>(mesh: &Mesh, sample: &'a Sample, seen: &'a [bool]) -> Vec<Heur
     ]
 }
 
+/// Rays that are hard for a mesh, and what each of them hits.
+fn hard_rays_and_hits(mesh: &Mesh) -> Vec<(Ray, Hit)> {
+    let tree = build(&mesh.1, &mesh.2, &HostBvhOptions::of(HostMethod::Sweep)).expect("sound options").tree;
+    let rays = hard_rays(&corners_of(mesh), 20, 1.0, [0.0; 3], 7);
+    rays.into_iter().map(|ray| (ray, closest_hit_by_brute_force(&tree, &ray))).collect()
+}
+
 #[track_caller]
-fn assert_traced_rightly(tree: &Bvh2, rays: &[Ray], what: &str) {
+fn assert_traced_rightly(tree: &Bvh2, rays: &[(Ray, Hit)], what: &str) {
     tree.validate().unwrap_or_else(|error| panic!("{what}: {error}"));
-    for ray in rays {
-        let expected = closest_hit_by_brute_force(tree, ray);
-        assert_eq!(trace(tree, ray, Query::ClosestHit).0, expected, "{what}, {ray:?}");
+    for (ray, expected) in rays {
+        assert_eq!(trace(tree, ray, Query::ClosestHit).0, *expected, "{what}, {ray:?}");
         assert_eq!(trace_left_first(tree, ray).0.is_some(), expected.is_some(), "{what}, {ray:?}");
     }
 }
@@ -83,9 +89,9 @@ fn assert_traced_rightly(tree: &Bvh2, rays: &[Ray], what: &str) {
 #[test]
 fn trees_by_any_heuristic_are_valid_over_every_scene_that_hurts_and_have_the_hits_of_brute_force() {
     for (at, mesh) in corpus::meshes().into_iter().enumerate() {
-        let rays = hard_rays(&corners_of(&mesh), 20, 1.0, [0.0; 3], 7);
+        let rays = hard_rays_and_hits(&mesh);
         let plain = build(&mesh.1, &mesh.2, &HostBvhOptions::of(HostMethod::Sweep)).expect("sound options").tree;
-        let sample = Sample::of(rays.clone(), &plain);
+        let sample = Sample::of(rays.iter().map(|&(ray, _)| ray).collect(), &plain);
         let seen: Vec<bool> = (0..mesh.2.len()).map(|i| i % 3 == 0).collect();
         for (of, heuristic) in heuristics(&mesh, &sample, &seen).into_iter().enumerate() {
             let methods = [
@@ -166,7 +172,7 @@ fn a_tree_for_shadow_rays_is_less_work_for_others_like_them() {
 fn split_and_rebuilt_trees_are_valid_over_every_scene_that_hurts_and_have_the_hits_of_brute_force() {
     let tops = [2, 16].map(|subtrees| HostOptimise::Top(TopOptions { subtrees }));
     for mesh in corpus::meshes() {
-        let rays = hard_rays(&corners_of(&mesh), 20, 1.0, [0.0; 3], 7);
+        let rays = hard_rays_and_hits(&mesh);
         for method in [HostMethod::Sbvh(SbvhOptions { alpha: 0.0, ..SbvhOptions::PAPER }), HostMethod::Sweep] {
             for optimise in [HostOptimise::Off, tops[0], tops[1]] {
                 let options = HostBvhOptions { optimise, ..HostBvhOptions::of(method) };

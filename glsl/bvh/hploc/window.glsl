@@ -7,7 +7,7 @@ layout(constant_id = 7) const uint WINDOW = 32;
 layout(constant_id = 8) const uint RADIUS = 8;
 const uint HALF_WINDOW = WINDOW / 2;
 // Whether each invocation merges its own windows, which are of 8 clusters at most and look at all of them; or teams do.
-layout(constant_id = 9) const bool ALONE = false;
+layout(constant_id = 9) const bool BY_ONE = false;
 
 // The clusters of two siblings: their records are named by the list from `left` and from `right` on.
 struct Request {

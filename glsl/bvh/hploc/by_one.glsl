@@ -1,11 +1,11 @@
 // A small window of H-PLOC, merged by one invocation: its clusters lie in registers, and each looks at all others.
-#ifndef HEDGEROW_BVH_HPLOC_ALONE
-#define HEDGEROW_BVH_HPLOC_ALONE
+#ifndef HEDGEROW_BVH_HPLOC_BY_ONE
+#define HEDGEROW_BVH_HPLOC_BY_ONE
 #extension GL_EXT_control_flow_attributes : require
 #include "bvh/hploc/window.glsl"
 
 // Loops over slots are unrolled, for arrays that are indexed by variables would lie in memory.
-const uint SLOTS = 8;   // the WINDOW of ALONE, at most
+const uint SLOTS = 8;   // the WINDOW of BY_ONE, at most
 
 Cluster slot_cluster[SLOTS];
 bool slot_is_there[SLOTS];
@@ -79,7 +79,7 @@ void merge_slots(Structure structure, Weights w, uint first, float area_scale) {
 }
 
 // Merges what is asked for until at most half a window is left, or one of all; how many are left.
-uint merge_alone(Structure structure, Weights w, Clusters clusters, Request request, float area_scale) {
+uint merge_by_one(Structure structure, Weights w, Clusters clusters, Request request, float area_scale) {
     uint count = request.left_count + request.right_count;
     uint most = most_left(request);
     Words list = cluster_list();
