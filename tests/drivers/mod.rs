@@ -4,7 +4,7 @@
 //! One process and one test: SwiftShader compiles every pipeline anew in each process, when it is made. So the time that
 //! [`Context::pipelines`](hedgerow::gpu::Context::pipelines) tells of is the compiler's, and it is bounded here: by the wall clock.
 //! Whatever else runs can only add to it, and the other thread does (one of 3.1 s took 0.2 s alone): what seems to take too long is
-//! made once more, alone.
+//! made again, alone, up to three times.
 
 mod builders;
 mod kd_trees;
@@ -19,6 +19,8 @@ use std::time::{Duration, Instant};
 
 /// What a pipeline may take, and one whose kernel does everything.
 const BOUNDS: [Duration; 2] = [Duration::from_secs(3), Duration::from_secs(8)];
+/// How often one that took longer is made alone.
+const TRIES: u32 = 3;
 
 #[test]
 #[ignore = "takes minutes, as SwiftShader compiles all pipelines in each process: make test-drivers runs it there"]
@@ -34,13 +36,19 @@ fn every_pass_gives_the_bytes_of_the_host_by_each_tuning() {
     }
 }
 
-/// On a device of its own, which has no pipelines yet.
+/// On devices of their own, which have no pipelines yet, until it is soon made: other programs may have the cores, too.
 fn assert_soon_made_alone(tuning: TuningChoice, kernel: &Kernel) {
+    let bound = bound(kernel);
+    let is_soon_made = (0..TRIES).any(|_| time_alone(tuning, kernel) <= bound);
+    assert!(is_soon_made, "{} takes more than {bound:?}, each of {TRIES} times", kernel.name());
+}
+
+fn time_alone(tuning: TuningChoice, kernel: &Kernel) -> Duration {
     let device = open(DeviceOptions { tuning, ..crate::common::OPTIONS });
     device.warm(std::slice::from_ref(kernel)).expect("the kernel compiles");
     let (_, time) = device.pipelines().into_iter().find(|(made, _)| made == kernel).expect("the pipeline");
     println!("{tuning}: {:6.2} s  {}, alone", time.as_secs_f32(), kernel.name());
-    assert!(time <= bound(kernel), "{} takes {time:?}, more than {:?}", kernel.name(), bound(kernel));
+    time
 }
 
 /// Every part; the kernels that took longer than they may.
