@@ -77,6 +77,7 @@ fn devices_stay_apart_and_what_is_measured_twice_is_told_once() {
     let line = text.lines().next().expect("a record");
     let mut record: Record = serde_json::from_str(line).expect("a record");
     (record.device, record.driver, record.subgroup) = ("Some GPU".into(), "its driver 1.2".into(), 32);
+    record.valid = Some(false);
     let other = folder.path().join("other");
     std::fs::create_dir(&other).expect("a folder");
     std::fs::write(other.join("results.jsonl"), serde_json::to_string(&record).expect("JSON") + "\n").expect("a file");
@@ -100,6 +101,9 @@ fn devices_stay_apart_and_what_is_measured_twice_is_told_once() {
     let measured = results::read(&one).expect("records").iter().filter(|r| r.builder == record.builder).count();
     assert_eq!(rows, measured + 1, "{page}");
     assert!(page.contains("## Some GPU\n\nits driver 1.2, commit ") && page.contains("| primary"), "{page}");
+    // The one that was wrong, and what that means.
+    assert_eq!(page.matches('†').count(), 2, "{page}");
+    assert!(page.contains(&format!("| `{}` †", record.builder)), "{page}");
 }
 
 #[test]

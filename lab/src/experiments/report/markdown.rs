@@ -16,6 +16,8 @@ use std::path::{Path, PathBuf};
 const COLUMNS: [&str; 6] = ["scene", "triangles", "builder", "build, ms", "SAH cost", "EPO"];
 /// The first column of numbers behind the builder.
 const FIRST_NUMBER: usize = 3;
+/// Marks a builder whose structure or hits were wrong.
+const WRONG: char = '†';
 
 /// Writes the records of `folders` to `path`, a table for each device and commit.
 ///
@@ -48,6 +50,10 @@ fn page(records: &[Record]) -> String {
             table(&records)
         )
         .expect("writing to a string");
+        if records.iter().any(|record| is_wrong(record)) {
+            writeln!(page, "\n{WRONG} Not a valid structure, or hits that are wrong by brute force.")
+                .expect("writing to a string");
+        }
     }
     page
 }
@@ -61,7 +67,7 @@ fn table(records: &[&Record]) -> Table {
         let before = [
             record.scene.clone(),
             record.triangles.to_string(),
-            format!("`{}`", record.builder),
+            format!("`{}`{}", record.builder, if is_wrong(record) { format!(" {WRONG}") } else { String::new() }),
             three_digits(record.build.median_ms),
             figure(record.quality.sah),
             figure(record.quality.epo),
@@ -69,6 +75,10 @@ fn table(records: &[&Record]) -> Table {
         table.add_row(before.into_iter().chain(rays));
     }
     table
+}
+
+fn is_wrong(record: &Record) -> bool {
+    record.valid == Some(false)
 }
 
 fn figure(value: Option<f64>) -> String {
