@@ -16,6 +16,7 @@
 #include "bvh/layout.glsl"
 #include "bvh/wide.glsl"
 #include "bvh/wide/pairs.glsl"
+#include "trace/ray.glsl"
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
@@ -90,7 +91,13 @@ SecondOfPair hedgerow_own_second(bool own, SecondOfPair theirs, SecondOfPair min
     return SecondOfPair(own ? theirs.vertex : mine.vertex, own ? theirs.primitive : mine.primitive);
 }
 
+HedgerowRay hedgerow_own_ray(bool own, HedgerowRay theirs, HedgerowRay mine) {
+    return HedgerowRay(own ? theirs.origin : mine.origin, own ? theirs.t_min : mine.t_min, own ? theirs.direction : mine.direction,
+                       own ? theirs.t_max : mine.t_max);
+}
+
 // What a lane has before anything was loaded for it.
+const HedgerowRay HEDGEROW_NO_RAY = HedgerowRay(vec3(0.0), 0.0, vec3(0.0), 0.0);
 const Child HEDGEROW_NO_CHILD = Child(vec3(0.0), 0u, vec3(0.0), 0u);
 const Node HEDGEROW_NO_NODE = Node(HEDGEROW_NO_CHILD, HEDGEROW_NO_CHILD);
 const Triangle HEDGEROW_NO_TRIANGLE = Triangle(vec3(0.0), vec3(0.0), vec3(0.0), 0u);

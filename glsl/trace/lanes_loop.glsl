@@ -53,18 +53,13 @@ bool take_turn(inout LaneRays lane) {
     return lanes != 0u;
 }
 
-HedgerowRay own_ray(bool own, HedgerowRay theirs, HedgerowRay mine) {
-    return HedgerowRay(own ? theirs.origin : mine.origin, own ? theirs.t_min : mine.t_min, own ? theirs.direction : mine.direction,
-                       own ? theirs.t_max : mine.t_max);
-}
-
 // The rays of the lanes that take one.
 HedgerowRay ray_of_each_lane(LaneRays of) {
     HedgerowEachLane index = hedgerow_each_lane(of.takes ? of.at : first);
-    HedgerowRay mine = HedgerowRay(vec3(0.0), 0.0, vec3(0.0), 0.0);
+    HedgerowRay mine = HEDGEROW_NO_RAY;
 #define LOAD_RAY(lane)               \
     if (lane < hedgerow_lanes)       \
-        mine = own_ray(gl_SubgroupInvocationID == lane, rays.ray[index.value[lane]], mine);
+        mine = hedgerow_own_ray(gl_SubgroupInvocationID == lane, rays.ray[index.value[lane]], mine);
     HEDGEROW_FOR_EACH_LANE(LOAD_RAY)
     return mine;
 }

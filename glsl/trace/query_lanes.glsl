@@ -80,7 +80,7 @@ bool hedgerow_test_in_lanes(inout HedgerowRayQuery query, bool tests, uvec2 read
     bool has_boxes = (query.form & FORM_BOXES) != 0u;
     if (tests && has_boxes) waits = hedgerow_test_box(query);
     bool tests_triangle = tests && !has_boxes;
-    if (HEDGEROW_FORMS != HEDGEROW_NODES_OF_EIGHT) {
+    if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_TWO) != 0u) {
         uint at = query.index;
         bool is_own = tests_triangle && !hedgerow_is_quantised(query);
         bool is_there = is_own && at < query.records;

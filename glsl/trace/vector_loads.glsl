@@ -1,6 +1,7 @@
-// Nodes and triangles as tracers load them: member by member, in vectors, or with HEDGEROW_INT64 in elements of 64 bits. A GPU takes a node of 64 bytes by four loads of 128 bits,
-// and a triangle by five of 64, where members one by one are sixteen and ten; and memory that nothing writes while rays are traced may lie in
-// its read-only cache. Where lanes gather (CPUs), a vector is as many gathers as it has words, and an element of 64 bits is one.
+// Nodes and triangles as tracers load them: member by member, in vectors, or with HEDGEROW_INT64 in elements of 64 bits. A GPU takes a node
+// of 64 bytes by four loads of 128 bits, and a triangle by five of 64, where members one by one are sixteen and ten; and memory that nothing
+// writes while rays are traced may lie in its read-only cache. Where lanes gather (CPUs), a vector is as many gathers as it has words, and
+// an element of 64 bits is one.
 #ifndef HEDGEROW_TRACE_VECTOR_LOADS
 #define HEDGEROW_TRACE_VECTOR_LOADS
 #include "bvh/layout.glsl"

@@ -70,11 +70,15 @@ fn heuristics<'a>(mesh: &Mesh, sample: &'a Sample, seen: &'a [bool]) -> Vec<Heur
     ]
 }
 
-/// Rays that are hard for a mesh, and what each of them hits.
-fn hard_rays_and_hits(mesh: &Mesh) -> Vec<(Ray, Hit)> {
-    let tree = build(&mesh.1, &mesh.2, &HostBvhOptions::of(HostMethod::Sweep)).expect("sound options").tree;
+/// A tree by area.
+fn plain(mesh: &Mesh) -> Bvh2 {
+    build(&mesh.1, &mesh.2, &HostBvhOptions::of(HostMethod::Sweep)).expect("sound options").tree
+}
+
+/// Rays that are hard for a mesh, and what each of them hits of all that is in its plain tree.
+fn hard_rays_and_hits(mesh: &Mesh, plain: &Bvh2) -> Vec<(Ray, Hit)> {
     let rays = hard_rays(&corners_of(mesh), 20, 1.0, [0.0; 3], 7);
-    rays.into_iter().map(|ray| (ray, closest_hit_by_brute_force(&tree, &ray))).collect()
+    rays.into_iter().map(|ray| (ray, closest_hit_by_brute_force(plain, &ray))).collect()
 }
 
 #[track_caller]
@@ -89,8 +93,8 @@ fn assert_traced_rightly(tree: &Bvh2, rays: &[(Ray, Hit)], what: &str) {
 #[test]
 fn trees_by_any_heuristic_are_valid_over_every_scene_that_hurts_and_have_the_hits_of_brute_force() {
     for (at, mesh) in corpus::meshes().into_iter().enumerate() {
-        let rays = hard_rays_and_hits(&mesh);
-        let plain = build(&mesh.1, &mesh.2, &HostBvhOptions::of(HostMethod::Sweep)).expect("sound options").tree;
+        let plain = plain(&mesh);
+        let rays = hard_rays_and_hits(&mesh, &plain);
         let sample = Sample::of(rays.iter().map(|&(ray, _)| ray).collect(), &plain);
         let seen: Vec<bool> = (0..mesh.2.len()).map(|i| i % 3 == 0).collect();
         for (of, heuristic) in heuristics(&mesh, &sample, &seen).into_iter().enumerate() {
@@ -172,7 +176,7 @@ fn a_tree_for_shadow_rays_is_less_work_for_others_like_them() {
 fn split_and_rebuilt_trees_are_valid_over_every_scene_that_hurts_and_have_the_hits_of_brute_force() {
     let tops = [2, 16].map(|subtrees| HostOptimise::Top(TopOptions { subtrees }));
     for mesh in corpus::meshes() {
-        let rays = hard_rays_and_hits(&mesh);
+        let rays = hard_rays_and_hits(&mesh, &plain(&mesh));
         for method in [HostMethod::Sbvh(SbvhOptions { alpha: 0.0, ..SbvhOptions::PAPER }), HostMethod::Sweep] {
             for optimise in [HostOptimise::Off, tops[0], tops[1]] {
                 let options = HostBvhOptions { optimise, ..HostBvhOptions::of(method) };

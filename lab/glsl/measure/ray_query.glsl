@@ -43,20 +43,17 @@ layout(constant_id = 3) const uint RAYS_EACH = 1;
 
 // The next ray of an invocation that takes one: lane by lane where tracers load so (trace/lanes_loop.glsl).
 GivenRay ray_of_turn(uint next, HedgerowTurns turns) {
-    GivenRay mine = GivenRay(vec3(0.0), 0.0, vec3(0.0), 0.0);
 #ifdef HEDGEROW_LANES
+    GivenRay mine = HEDGEROW_NO_RAY;
     if (hedgerow_any_lane(turns.takes)) {
         HedgerowEachLane index = hedgerow_each_lane(turns.takes ? next : first);
-#define LOAD_RAY(lane)                                                                                        \
-        if (lane < hedgerow_lanes) {                                                                          \
-            GivenRay theirs = rays.ray[index.value[lane]];                                                    \
-            bool own = gl_SubgroupInvocationID == lane;                                                       \
-            mine = GivenRay(own ? theirs.origin : mine.origin, own ? theirs.t_min : mine.t_min,               \
-                            own ? theirs.direction : mine.direction, own ? theirs.t_max : mine.t_max);        \
-        }
+#define LOAD_RAY(lane)                   \
+        if (lane < hedgerow_lanes)       \
+            mine = hedgerow_own_ray(gl_SubgroupInvocationID == lane, rays.ray[index.value[lane]], mine);
         HEDGEROW_FOR_EACH_LANE(LOAD_RAY)
     }
 #else
+    GivenRay mine;
     if (turns.takes) mine = rays.ray[next];
 #endif
     return mine;

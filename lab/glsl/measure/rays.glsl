@@ -5,12 +5,17 @@
 #extension GL_EXT_buffer_reference : require
 layout(constant_id = 1) const bool ANY_HIT = false;
 
+// Beside our queries it is their ray.
+#ifdef HEDGEROW_TRACE_RAY
+#define GivenRay HedgerowRay
+#else
 struct GivenRay {
     vec3 origin;
     float t_min;
     vec3 direction;
     float t_max;
 };
+#endif
 
 struct Hit {
     float t;
