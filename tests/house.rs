@@ -18,12 +18,13 @@ const WITHOUT_TWIN: [(&str, &str); 8] = [
 ];
 
 /// What twins share, or a part of one, and is the plain form of no pass of its own.
-const SHARED_BY_TWINS: [&str; 10] = [
+const SHARED_BY_TWINS: [&str; 11] = [
     "bvh/build",
     "bvh/clusters",
     "bvh/costs",
     "bvh/geometry",
     "bvh/over",
+    "bvh/pairs",
     "kdtree/assemble",
     "kdtree/binned",
     "kdtree/clip",

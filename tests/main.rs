@@ -48,6 +48,7 @@ mod bvh {
     mod lbvh;
     mod limits;
     mod methods;
+    mod pairs;
     mod refit;
     mod reinsertion;
     mod split;

@@ -40,6 +40,7 @@ struct BuildParts {
     uint walk;
     uint split;                // a SplitState
     uint references;
+    uint pairs;                // of triangles that are one leaf: PAIR_BLOCK a word
 };
 
 BUFFER BuildState {
@@ -57,9 +58,10 @@ BUFFER BuildState {
     uint is_forced[2];
     uint looks;                           // clusters that rounds have looked at
     BuildParts saved_parts;               // for a kernel that does everything
-    // The last two: src/bvh/encode.rs tells other passes where they are.
+    // The last three: src/bvh/encode.rs tells other passes where they are.
     Box where_most_is;                    // of codes with sections: the core, or everything where nothing is far
     uint passes_left_out;                 // of the sort, whose bits no code has
+    uint pair_count;                      // keys that the sort has not: second triangles of pairs
 };
 
 // What a build is given; each kernel takes what it reads. `vertices` to `transform` with `vertex_stride` to `formats` are a
@@ -98,9 +100,20 @@ uvec2 part(uint at) {
     return address_of(scratch_address, at, 16u);
 }
 
+// Slots of nodes that so many leaves need at most.
+uint slots_of(uint leaves) {
+    return max(leaves, 2u) - 1u;
+}
+
+// Slots in front of the records. Pairs have no slots but those that they need, which the plan knows; numbers in place of records lie behind
+// as many as there could be, as records will lie where the nodes are.
+uint slots_before_records(uint slots) {
+    return HAS_PAIRS && !HAS_NUMBERS ? slots : slots_of(primitive_count);
+}
+
 // Where the records of the tree will lie.
 uvec2 records_of_tree() {
-    return records_at(structure_address, max(primitive_count, 2u) - 1u);
+    return records_at(structure_address, slots_before_records(HAS_PAIRS ? Structure(structure_address).header.node_slots : 0u));
 }
 
 // The sort's results.
@@ -116,8 +129,69 @@ Geometry geometries() {
     return Geometry(vertices, indices, transform, vertex_stride, vertex_count, formats, 0);
 }
 
+// Of pairs (bvh/pairs.glsl): triangles among which they are found, side by side in the input, and bits for each. They say how many places
+// behind a triangle the other one of its pair lies; 0: it is alone; SECOND_OF_PAIR: it lies before.
+const uint PAIR_BLOCK = 8;
+const uint PAIR_BITS = 4;
+const uint SECOND_OF_PAIR = 15;
+
+Words blocks_of_pairs() {
+    return Words(part(parts.pairs));
+}
+
+uint pair_of(uint primitive) {
+    if (!HAS_PAIRS) return 0u;
+    return blocks_of_pairs().word[primitive / PAIR_BLOCK] >> PAIR_BITS * (primitive % PAIR_BLOCK) & SECOND_OF_PAIR;
+}
+
+uint pairs_in_all() {
+    return HAS_PAIRS ? build_state().pair_count : 0u;
+}
+
+// Triangles that a leaf of one primitive holds.
+uint triangles_of_pair(uint apart) {
+    return apart == 0u ? 1u : 2u;
+}
+
+// The quotient of a product that may have more than 32 bits: of numbers below 2^27, `b` at most `divisor`.
+uint scaled(uint a, uint b, uint divisor) {
+    uint quotient = uint(float(a) * (float(b) / float(divisor)));
+    // The estimate is off by a few at most, and so the rest is below 2^31 whatever the product is.
+    int rest = int(a * b - quotient * divisor);
+    for (uint i = 0; i < 64u && rest < 0; ++i) {
+        quotient--;
+        rest += int(divisor);
+    }
+    for (uint i = 0; i < 64u && rest >= int(divisor); ++i) {
+        quotient++;
+        rest -= int(divisor);
+    }
+    return quotient;
+}
+
+// A task for a workgroup of a dispatch over as many tiles as primitives may need, where pairs are fewer: how many, only the device knows.
+// A CPU gives each core as many workgroups side by side, so those without a task (NONE) lie everywhere among the others.
+uint spread_task(uint group) {
+    if (!HAS_PAIRS) return group;
+    uint tile = gl_WorkGroupSize.x * ITEMS;
+    uint groups = (primitive_count + tile - 1u) / tile, tasks = (primitive_count - pairs_in_all() + tile - 1u) / tile;
+    uint task = scaled(group, tasks, groups);
+    return scaled(group + 1u, tasks, groups) > task ? task : NONE;
+}
+
 // The box of what a leaf holds; returns 0, or why it is left out: a status bit or INACTIVE.
 uint load_reference(Geometry g, uint reference, out Box b) {
+    if (HAS_PAIRS) {
+        uint apart = pair_of(reference);
+        if (apart == SECOND_OF_PAIR) return INACTIVE;
+        uint why_not = load_box(g, reference, b);
+        if (apart != 0u) {
+            Box second;
+            load_box(g, reference + apart, second);
+            b = Box(min(b.lo, second.lo), max(b.hi, second.hi));
+        }
+        return why_not;
+    }
     if (!HAS_REFERENCES) return load_box(g, reference, b);
     Reference r = References(part(parts.references)).reference[reference];
     b = Box(r.lo, r.hi);

@@ -24,13 +24,15 @@ Clusters all_clusters() {
 // The cluster of the primitive at a sorted position.
 Cluster cluster_of_primitive(Geometry input_geometries, uint position, float area_scale) {
     Box b;
-    load_reference(input_geometries, sorted_values().word[position], b);
-    return Cluster(b.lo, position | IS_PRIMITIVE, b.hi, 1u, leaf_cost(c_i, scaled_half_area(b, area_scale), 1u), position);
+    uint reference = sorted_values().word[position];
+    load_reference(input_geometries, reference, b);
+    uint count = triangles_of_pair(pair_of(reference));
+    return Cluster(b.lo, position | IS_PRIMITIVE, b.hi, count, leaf_cost(c_i, scaled_half_area(b, area_scale), count), position);
 }
 
 Child child_of(Cluster c) {
     bool is_primitive = (c.reference & IS_PRIMITIVE) != 0u;
-    return Child(c.lo, c.reference & ~IS_PRIMITIVE, c.hi, is_primitive ? 1u : 0u);
+    return Child(c.lo, c.reference & ~IS_PRIMITIVE, c.hi, is_primitive ? c.count : 0u);
 }
 
 // A place in a list of clusters, or in the memory of all of them, that there is. Mesa 26's lavapipe loads what is at the same

@@ -57,8 +57,8 @@ void collapse_parents(uint task) {
 // Count and cost of a child whose subtree is weighed.
 void weight_of(Weights w, Child child, out uint count, out float cost) {
     bool is_primitive = child.count != 0u;
-    count = is_primitive ? 1u : w.counts.word[child.index] & ~IS_LEAF;
-    cost = is_primitive ? leaf_cost(c_i, scaled_half_area(Box(child.lo, child.hi), build_state().plan.area_scale), 1u)
+    count = is_primitive ? child.count : w.counts.word[child.index] & ~IS_LEAF;
+    cost = is_primitive ? leaf_cost(c_i, scaled_half_area(Box(child.lo, child.hi), build_state().plan.area_scale), child.count)
                         : costs().value[child.index];
 }
 
@@ -79,7 +79,7 @@ void collapse_weigh(uint task) {
         uint link = w.parents.word[parent_at(position | IS_PRIMITIVE)];
         if (link == NO_PARENT) {
             Child root = structure.header.root;
-            write_costs(structure, leaf_cost(c_i, scaled_half_area(Box(root.lo, root.hi), state.plan.area_scale), 1u));
+            write_costs(structure, leaf_cost(c_i, scaled_half_area(Box(root.lo, root.hi), state.plan.area_scale), root.count));
         }
         // As many levels as there are nodes, at most.
         for (uint level = 0; level < node_count() && link != NO_PARENT; ++level) {
@@ -142,6 +142,15 @@ void name_leaf(uint link, uint first, uint count) {
     child.word[COUNT_WORD] = count;
 }
 
+// A node that falls out: its boxes stay as they are, which nobody looks at.
+void mark_fallen(uint slot) {
+    for (uint side = 0u; side < 2u; ++side) {
+        Words child = child_words(2u * slot + side);
+        child.word[INDEX_WORD] = UNUSED;
+        child.word[COUNT_WORD] = UNUSED;
+    }
+}
+
 // Of the nodes that an invocation has placed: how many fell out, and whether a leaf was made for the depth alone.
 struct Placed {
     uint unused;
@@ -156,7 +165,7 @@ void place_node(Structure structure, uint slot, uint count, uint link, Place pla
         name_leaf(link, place.first, count & ~IS_LEAF);
     }
     if (place.inside || is_leaf || place.depth == MAX_DEPTH) {
-        mark_unused(structure, slot);
+        mark_fallen(slot);
         placed.unused++;
     }
 }
@@ -234,14 +243,16 @@ void place_primitive(Structure structure, Weights w, uint position, inout Placed
     own_place.first = place.first - own_left;
     own_place.depth = place.depth - own_steps;
     place = limited_by_depth(place);
-    walk_order().word[place.first] = position;
-    if (!place.inside) name_leaf(first_link, place.first, 1u);
+    uint primitive = sorted_values().word[position], apart = pair_of(primitive);
+    walk_order().word[place.first] = primitive;
+    if (apart != 0u) walk_order().word[place.first + 1u] = primitive + apart;
+    if (!place.inside) name_leaf(first_link, place.first, triangles_of_pair(apart));
     if (own != NONE) place_node(structure, own, own_count, own_link, limited_by_depth(own_place), placed);
 }
 
 void collapse_place(uint task) {
     Structure structure = Structure(structure_address);
-    uint active_count = build_state().active_count;
+    uint active_count = build_state().active_count, pair_count = pairs_in_all();
     Weights w = weights();
     Placed placed = Placed(0u, false);
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
@@ -249,7 +260,7 @@ void collapse_place(uint task) {
         uint i = first + k * gl_WorkGroupSize.x;
         if (i < active_count) place_primitive(structure, w, i, placed);
         // Those that are left out stay behind the others.
-        else if (i < primitive_count) walk_order().word[i] = i;
+        else if (i < primitive_count - pair_count) walk_order().word[i + pair_count] = sorted_values().word[i];
     }
     write_placed(structure, placed);
 }
@@ -257,7 +268,7 @@ void collapse_place(uint task) {
 // ---- records ----
 
 void collapse_records(uint task) {
-    Words walk = walk_order(), sorted = sorted_values();
+    Words walk = walk_order();
     Geometry input_geometries = geometries();
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
@@ -265,7 +276,7 @@ void collapse_records(uint task) {
         Box b;
         Corners c;
         if (position >= primitive_count) continue;
-        uint reference = sorted.word[walk.word[position]];
+        uint reference = walk.word[position];
         if (HAS_NUMBERS) Words(records_of_tree()).word[position] = reference;
         else write_reference(records_of_tree(), position, input_geometries, reference, b, c);
     }

@@ -17,7 +17,9 @@
 #define HEDGEROW_BVH_ENCODE
 #include "bvh/build_state.glsl"
 #include "bvh/empty.glsl"
+#include "bvh/pairs.glsl"
 #include "bvh/sah.glsl"
+#include "bvh/tiles.glsl"
 #include "bvh/codes/sections.glsl"
 #include "bvh/codes/mipping.glsl"
 #include "bvh/codes/binning.glsl"
@@ -80,6 +82,8 @@ void reset_build(uint phases_behind) {
     }
     if (i == 0) {
         state.active_count = 0;
+        state.passes_left_out = 0;
+        state.pair_count = 0;
         state.status = 0;
         if (phases_behind != 0) state.saved_parts = parts;
     }
@@ -117,34 +121,72 @@ void end_group_bounds(Words to) {
     barrier();   // the words may be used again by the next task
 }
 
+// Of what leaves hold: `ordered` corners of the box around it, around its centroids, and around what is inside the fences.
+struct Found {
+    uvec3 lo;
+    uvec3 hi;
+    uvec3 centroid_lo;
+    uvec3 centroid_hi;
+    uvec3 core_lo;
+    uvec3 core_hi;
+    uint active_count;
+};
+
+void find_box(inout Found found, Box b, Box fences) {
+    uvec3 middle = ordered(centroid_of(b)), lo = ordered(b.lo), hi = ordered(b.hi);
+    found.lo = min(found.lo, lo);
+    found.hi = max(found.hi, hi);
+    found.centroid_lo = min(found.centroid_lo, middle);
+    found.centroid_hi = max(found.centroid_hi, middle);
+    if (HAS_SECTIONS && is_inside(lo, hi, fences)) {
+        found.core_lo = min(found.core_lo, lo);
+        found.core_hi = max(found.core_hi, hi);
+    }
+    found.active_count += 1;
+}
+
+// A tile of blocks, in which pairs are found on the way. Why triangles are left out.
+uint find_pairs(uint task, inout Found found, Box fences) {
+    Geometry input_geometries = geometries();
+    uint status = 0, pairs = 0;
+    for (uint i = gl_LocalInvocationIndex; i < blocks_of_tile(); i += gl_WorkGroupSize.x) {
+        uint block = task * blocks_of_tile() + i;
+        if (block * PAIR_BLOCK >= primitive_count) break;
+        status |= load_block(input_geometries, block);
+        blocks_of_pairs().word[block] = pair_block();
+        pairs += bitCount(block_seconds);
+        [[unroll]] for (uint k = 0; k < PAIR_BLOCK; ++k) {
+            if ((block_firsts & 1u << k) != 0u) find_box(found, block_box[k], fences);
+        }
+    }
+    write_tile_sum(task, pairs);
+    return status;
+}
+
 void find_bounds(uint task) {
     Geometry input_geometries = geometries();
-    uvec3 lo = uvec3(NONE), hi = uvec3(0), centroid_lo = uvec3(NONE), centroid_hi = uvec3(0);
-    uvec3 core_lo = uvec3(NONE), core_hi = uvec3(0);
+    uvec3 most = uvec3(NONE), least = uvec3(0);
+    Found found = Found(most, least, most, least, most, least, 0);
     Box fences;
     if (HAS_SECTIONS) fences = build_state().plan.sections.fences;
-    uint active_count = 0, status = 0;
-    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
-    for (uint k = 0; k < ITEMS; ++k) {
-        uint primitive = first + k * gl_WorkGroupSize.x;
-        if (primitive < primitive_count) {
-            Box b;
-            uint why_not = load_reference(input_geometries, primitive, b);
-            status |= why_not;
-            if (why_not == 0) {
-                uvec3 middle = ordered(centroid_of(b)), box_lo = ordered(b.lo), box_hi = ordered(b.hi);
-                lo = min(lo, box_lo);
-                hi = max(hi, box_hi);
-                centroid_lo = min(centroid_lo, middle);
-                centroid_hi = max(centroid_hi, middle);
-                if (HAS_SECTIONS && is_inside(box_lo, box_hi, fences)) {
-                    core_lo = min(core_lo, box_lo);
-                    core_hi = max(core_hi, box_hi);
-                }
-                active_count += 1;
+    uint status = 0;
+    if (HAS_PAIRS) {
+        status = find_pairs(task, found, fences);
+    } else {
+        uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+        for (uint k = 0; k < ITEMS; ++k) {
+            uint primitive = first + k * gl_WorkGroupSize.x;
+            if (primitive < primitive_count) {
+                Box b;
+                uint why_not = load_reference(input_geometries, primitive, b);
+                status |= why_not;
+                if (why_not == 0) find_box(found, b, fences);
             }
         }
     }
+    uvec3 lo = found.lo, hi = found.hi, centroid_lo = found.centroid_lo, centroid_hi = found.centroid_hi;
+    uvec3 core_lo = found.core_lo, core_hi = found.core_hi;
+    uint active_count = found.active_count;
     lo = subgroupMin(lo);
     hi = subgroupMax(hi);
     centroid_lo = subgroupMin(centroid_lo);
@@ -194,15 +236,15 @@ void find_bounds(uint task) {
 // ---- plan ----
 
 // By one invocation, but for what the recipe says.
-void write_header(BuildState state, uint geometry_count, uint geometry_flags) {
+void write_header(BuildState state, uint slots, uint geometry_count, uint geometry_flags) {
     Structure structure = Structure(structure_address);
     structure.header.magic = MAGIC;
     structure.header.kind = kind_of_records();
     structure.header.status = state.status;
     structure.header.primitive_count = primitive_count;
     structure.header.root = empty_root();
-    structure.header.active_count = state.active_count;
-    structure.header.node_slots = max(primitive_count, 2) - 1;
+    structure.header.active_count = state.active_count + pairs_in_all();
+    structure.header.node_slots = slots;
     structure.header.code_bits = given_code_bits();
     structure.header.inner_nodes = max(state.active_count, 1) - 1;
     structure.header.geometry_count = geometry_count;
@@ -216,7 +258,7 @@ void write_header(BuildState state, uint geometry_count, uint geometry_flags) {
     structure.header.child_order = 0;
     structure.header.pairs = 0;
     for (uint i = 0; i < 6; ++i) structure.header.reserved[i] = 0;
-    if (primitive_count < 2) mark_unused(structure, 0);
+    if ((HAS_PAIRS ? state.active_count : primitive_count) < 2) mark_unused(structure, 0);
 }
 
 // Of bounds that hold something: an axis a lane, the others by one.
@@ -255,11 +297,16 @@ void write_recipe(BuildState state, Box boxes, Box bounds) {
 // By the workgroup together.
 void make_plan() {
     BuildState state = build_state();
-    uint geometry_count = count_geometries(geometries()), slots = max(primitive_count, 2) - 1;
+    if (HAS_PAIRS) {
+        uint pairs = scan_tiles(tiles_of(primitive_count));
+        if (gl_LocalInvocationIndex == 0) state.pair_count = pairs;
+        next_phase();
+    }
+    uint geometry_count = count_geometries(geometries()), slots = slots_of(HAS_PAIRS ? state.active_count : primitive_count);
     uint bytes_each = HAS_NUMBERS ? 4u : record_bytes(kind_of_records());
-    GeometryTable table = GeometryTable(address_of(records_at(structure_address, slots), primitive_count, bytes_each));
+    GeometryTable table = GeometryTable(address_of(records_at(structure_address, slots_before_records(slots)), primitive_count, bytes_each));
     uint geometry_flags = write_geometries_together(geometries(), geometry_count, table);
-    if (gl_LocalInvocationIndex == 0) write_header(state, geometry_count, geometry_flags);
+    if (gl_LocalInvocationIndex == 0) write_header(state, slots, geometry_count, geometry_flags);
     if (HAS_SECTIONS) {
         find_sections();
         next_phase();
@@ -302,31 +349,64 @@ uvec2 code_of(CodeKind kind, CodePlan plan, Box b) {
     return code;
 }
 
+// What is encoded, and where to.
+struct Encoder {
+    Geometry input_geometries;
+    CodeKind kind;
+    CodePlan plan;
+    uint active_count;
+    Words keys;
+    Words values;
+};
+
+// What goes to the place `at` of those that are sorted.
+void encode_reference(Encoder to, uint primitive, uint at) {
+    Box b;
+    bool is_active = load_reference(to.input_geometries, primitive, b) == 0;
+    uvec2 code = is_active ? code_of(to.kind, to.plan, b) : inactive_code(to.kind);
+    if (KEY_WORDS == 1) {
+        to.keys.word[at] = code.x;
+    } else {
+        to.keys.word[2 * at] = code.x;
+        to.keys.word[2 * at + 1] = code.y;
+    }
+    if (HAS_PAIRS || passes == 0) to.values.word[at] = primitive;
+    Words(part(parts.ends)).word[at] = NONE;
+    // Slots from active_count - 1 on have no node.
+    if (!HAS_PAIRS && at >= max(to.active_count, 1)) mark_unused(Structure(structure_address), at - 1);
+}
+
+// A tile of blocks: pairs and what is alone, side by side.
+void encode_pairs(uint task, Encoder to) {
+    uint before = sums_of_tiles().word[task];
+    for (uint first = 0; first < blocks_of_tile(); first += gl_WorkGroupSize.x) {
+        uint i = first + gl_LocalInvocationIndex, begin = (task * blocks_of_tile() + i) * PAIR_BLOCK;
+        uint end = i < blocks_of_tile() ? min(begin + PAIR_BLOCK, primitive_count) : 0u;
+        uint seconds = begin < end ? seconds_of_block(blocks_of_pairs().word[begin / PAIR_BLOCK]) : 0u;
+        uint total;
+        uint at = begin - (before + sum_before(bitCount(seconds), total));
+        before += total;
+        uint left = begin < end ? (1u << end - begin) - 1u & ~seconds : 0u;
+        for (uint k = 0; k < PAIR_BLOCK && left != 0u; ++k) {
+            encode_reference(to, begin + findLSB(left), at++);
+            left &= left - 1u;
+        }
+    }
+}
+
 void encode(uint task) {
     BuildState state = build_state();
-    Geometry input_geometries = geometries();
-    CodeKind kind = kind_of_codes();
-    CodePlan plan = state.plan;
-    Words codes = Words(part(parts.keys[passes_left_out() & 1u]));
-    Words ends = Words(part(parts.ends));
+    uint from = passes_left_out() & 1u;
+    Encoder to = Encoder(geometries(), kind_of_codes(), state.plan, state.active_count, Words(part(parts.keys[from])),
+                         Words(part(parts.values[from])));
+    if (HAS_PAIRS) {
+        encode_pairs(task, to);
+        return;
+    }
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
         uint primitive = first + k * gl_WorkGroupSize.x;
-        if (primitive < primitive_count) {
-            Box b;
-            bool is_active = load_reference(input_geometries, primitive, b) == 0;
-            uvec2 code = is_active ? code_of(kind, plan, b) : inactive_code(kind);
-            if (KEY_WORDS == 1) {
-                codes.word[primitive] = code.x;
-            } else {
-                codes.word[2 * primitive] = code.x;
-                codes.word[2 * primitive + 1] = code.y;
-            }
-            ends.word[primitive] = NONE;
-            // Slots from active_count - 1 on have no node.
-            if (primitive >= max(state.active_count, 1)) mark_unused(Structure(structure_address), primitive - 1);
-            if (passes == 0) Words(part(parts.values[0])).word[primitive] = primitive;
-        }
+        if (primitive < primitive_count) encode_reference(to, primitive, primitive);
     }
 }
 
@@ -334,9 +414,11 @@ void encode(uint task) {
 
 // Of a pass that is not left out.
 Radix radix_of_pass(uint pass) {
-    uint from = pass & 1, done = pass - passes_left_out();
+    uint from = pass & 1, done = pass - passes_left_out(), count = primitive_count - pairs_in_all();
     return Radix(Words(part(parts.keys[from])), Words(part(parts.values[from])), Words(part(parts.keys[1 - from])),
-                 Words(part(parts.values[1 - from])), Words(part(parts.table)), primitive_count, done * DIGIT_BITS, columns_of_sort(), column_keys, done == 0);
+                 Words(part(parts.values[1 - from])), Words(part(parts.table)), count, done * DIGIT_BITS, columns_of_sort(),
+                 keys_of_column(count, columns_of_sort(), column_keys),
+                 !HAS_PAIRS && done == 0);
 }
 
 // ---- from the task pool ----

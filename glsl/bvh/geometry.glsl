@@ -19,6 +19,8 @@ const uint SOURCE = SOURCE_WORD & 7u;
 const bool HAS_REFERENCES = (SOURCE_WORD & 8u) != 0u;
 // Whether the structure has the primitives' numbers in place of their records, which are written when the tree is done.
 const bool HAS_NUMBERS = (SOURCE_WORD & 16u) != 0u;
+// Whether two triangles that share an edge may be one leaf from the start: bvh/pairs.glsl.
+const bool HAS_PAIRS = (SOURCE_WORD & 64u) != 0u;
 // Whether clusters (bvh/clusters.glsl) lie where records will.
 const bool CLUSTERS_IN_RECORDS = (SOURCE_WORD & 32u) != 0u;
 

@@ -5,7 +5,8 @@
 // needs one barrier between each two; subgroups of any size; workgroups of whole subgroups or less than one
 #ifndef HEDGEROW_BVH_TILES
 #define HEDGEROW_BVH_TILES
-#include "bvh/encode.glsl"
+#include "bvh/build_state.glsl"
+#extension GL_EXT_control_flow_attributes : require
 
 // A workgroup may have as many subgroups as invocations.
 shared uint partial[gl_WorkGroupSize.x];

@@ -40,6 +40,11 @@ struct Radix {
     bool identity;      // values are 0, 1, 2 …: not read
 };
 
+// Strips of fewer keys than there is room for are shorter, so that all have as much to do.
+uint keys_of_column(uint count, uint columns, uint most) {
+    return PRIVATE_COUNTERS ? min((count + columns - 1u) / columns, most) : most;
+}
+
 uvec2 radix_key(Words keys, uint i) {
     return KEY_WORDS == 1 ? uvec2(keys.word[i], 0) : uvec2(keys.word[2 * i], keys.word[2 * i + 1]);
 }

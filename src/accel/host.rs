@@ -5,7 +5,7 @@ use super::geometry::BuildGeometries;
 use super::{AccelOptions, Device, Tree};
 use crate::bvh::geometry::{Geometry, IndexFormat};
 use crate::bvh::twin::geometry::{Corners, HostGeometry};
-use crate::bvh::twin::{self, lbvh};
+use crate::bvh::twin::{self, lbvh, pairs};
 use crate::geometry::Aabb;
 use crate::gpu::Context;
 use crate::{Error, Result};
@@ -77,7 +77,10 @@ unsafe fn built(
                 // SAFETY: the caller's promise.
                 corners.extend(unsafe { triangles(geometry, range.primitive_count) }.corners());
             }
-            let lbvh = |finish| lbvh::build_corners(corners.into_iter(), codes, finish);
+            let lbvh = |finish| match options.pairs {
+                true => pairs::build_corners(corners.into_iter(), codes, finish),
+                false => lbvh::build_corners(corners.into_iter(), codes, finish).into(),
+            };
             let tree = twin::build(&options, codes, lbvh).with_geometries(&flags_of(geometries), options.build_flags);
             Ok(Tree::of(tree, build.is_wide()).to_bytes())
         }

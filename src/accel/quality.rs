@@ -87,7 +87,7 @@ pub(super) fn opened_to(flags: Flags, options: &AccelOptions, instance_count: u3
 pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Primitives, count: u32) -> BuildOptions {
     let is_top = primitives == Primitives::Instances;
     let is_wide = is_wide(flags, options, primitives, count);
-    BuildOptions {
+    let unpaired = BuildOptions {
         method: if is_top { Method::Lbvh } else { bottom_method(flags, count) },
         // Of two leaves there is nothing to move, and of those that are in one node of eight nothing comes of it.
         optimise: if is_top { top_optimise(flags, is_wide) } else { bottom_optimise(flags, count) }
@@ -100,7 +100,8 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
         primitives,
         build_flags: flags.as_raw() & 0x1f,
         ..BuildOptions::DEFAULT
-    }
+    };
+    BuildOptions { pairs: unpaired.can_pair(), ..unpaired }
 }
 
 /// Whether a structure gets quantised nodes of eight: they cannot be refitted.

@@ -5,7 +5,7 @@
 
 use super::child_order::{ChildOrder, ChildOrderPass};
 use super::codes::{Code, Codes};
-use super::encode::Encode;
+use super::encode::{Encode, PAIR_BLOCK};
 pub use super::geometry::{Geometry, Input, Primitives, Source};
 pub use super::hlbvh::Treelets;
 pub use super::hploc::Window;
@@ -36,6 +36,10 @@ pub struct BuildOptions {
     pub bits_up_to: Option<u32>,
     /// Splitting of large triangles into several references, before everything else; `None` splits none.
     pub split: Option<split::SplitOptions>,
+    /// Whether two triangles that lie near each other in the input and share an edge may be one leaf from the start: fewer leaves to sort and
+    /// to merge, for a tree that costs rays as much (docs/notes/rays.md). Of [`Method::Ploc`] and [`Method::Hploc`] over triangles:
+    /// [`BuildOptions::can_pair`].
+    pub pairs: bool,
     /// Rounds of reinsertion after the method: they take time and give a better tree.
     pub optimise: Option<reinsertion::ReinsertionOptions>,
     /// Whether a subtree becomes a leaf if that is cheaper.
@@ -59,6 +63,7 @@ impl BuildOptions {
         codes: None,
         bits_up_to: None,
         split: None,
+        pairs: false,
         optimise: None,
         collapse: Collapse::SAH,
         child_order: None,
@@ -76,6 +81,14 @@ impl Default for BuildOptions {
 }
 
 impl BuildOptions {
+    /// Whether [`BuildOptions::pairs`] can be set beside the other options: triangles that are not split, a method that merges clusters, and
+    /// codes that look at no sample of the triangles.
+    pub fn can_pair(&self) -> bool {
+        let merges = matches!(self.method, Method::Ploc { .. } | Method::Hploc(_));
+        let samples = self.codes.is_some_and(|codes| codes.bounds.has_sections());
+        merges && !samples && self.split.is_none() && self.primitives == Primitives::Triangles
+    }
+
     /// Whether there are kernels for the schedule.
     fn takes(&self, schedule: Schedule) -> bool {
         match schedule {
@@ -199,6 +212,15 @@ impl Builder {
                 )));
             }
         }
+        if options.pairs && !options.can_pair() {
+            let codes = options.codes.map_or(String::new(), |codes| format!(" by codes {codes}"));
+            let split = if options.split.is_some() { ", split" } else { "" };
+            return Err(Error::Argument(format!(
+                "pairs of {:?}{split}, by {:?}{codes}: only triangles that are not split are paired, by PLOC or H-PLOC and codes without \
+                 robust bounds or such with what is far apart; build without pairs",
+                options.primitives, options.method
+            )));
+        }
         let budget = options.split.map_or(0, |split| split.budget(primitive_count));
         let budget = budget.min(radix_sort::MAX_COUNT - primitive_count);
         let split = options.split.filter(|_| budget > 0);
@@ -247,6 +269,13 @@ impl Builder {
         let behind = options.child_order.filter(|_| !orders_on_the_way);
         let child_order = behind.map(|order| ChildOrderPass::new(context, order, options.collapse, count));
         let items = if alone { tuning.alone_run } else { run_of(tuning, method, count, shape.workgroup) };
+        // One primitive is no pair.
+        let pairs = options.pairs && count >= 2;
+        let whole_blocks = |items: u32| {
+            let has_parts = pairs && !(items * shape.workgroup).is_multiple_of(PAIR_BLOCK);
+            if has_parts { items.next_multiple_of(PAIR_BLOCK) } else { items }
+        };
+        let items = whole_blocks(items);
         let codes = options.codes.unwrap_or_else(|| Codes::for_count(count));
         if let Some(most) = options.bits_up_to
             && (![32, 64].contains(&most)
@@ -265,7 +294,7 @@ impl Builder {
             child_order: options.child_order.filter(|_| orders_on_the_way),
             shape: if alone { shape.with_digit_bits(tuning.small_digit_bits) } else { shape },
             items,
-            bounds_items: tuning.bounds_run.max(items),
+            bounds_items: whole_blocks(tuning.bounds_run.max(items)),
             // Persistent kernels are large as they are: lavapipe's compiler takes a third longer for it.
             meets_in_group: tuning.meets_in_group && !matches!(schedule, Schedule::Persistent(_)),
             sharers: tuning.workers,
@@ -276,6 +305,7 @@ impl Builder {
             geometry_count: options.geometry_count,
             build_flags: options.build_flags,
             alone,
+            pairs,
             numbered: false,
             // H-PLOC writes records when it has no clusters any more.
             clusters_in_records: matches!(method, Method::Hploc(_))
@@ -354,11 +384,12 @@ impl Builder {
     }
 
     /// Bytes that a phase must move if it reads each of its inputs once and writes each of its outputs once: what its time is
-    /// held against. `None` for a phase that there is not, and for all of a build of split triangles.
+    /// held against. `None` for a phase that there is not, and for all of a build of split triangles or
+    /// pairs.
     #[doc(hidden)]
     pub fn traffic(&self, phase: &str, input: &Input) -> Option<u64> {
         let Source::One(geometry) = input.source else { return None };
-        if self.encode.split.is_some() {
+        if self.encode.split.is_some() || self.encode.pairs {
             return None;
         }
         let count = u64::from(self.count());

@@ -44,6 +44,8 @@ pub(super) struct Encode {
     pub build_flags: u32,
     /// Whether one workgroup does everything.
     pub alone: bool,
+    /// Whether two triangles that share an edge may be one leaf from the start (glsl/bvh/pairs.glsl). A tile has whole blocks of them.
+    pub pairs: bool,
     /// Whether the structure has the primitives' numbers in place of their records.
     pub numbered: bool,
     /// Whether the clusters of a method lie where the records will.
@@ -56,14 +58,14 @@ impl arguments::Build {
         arguments::Build { collapses: 0, ..*self }
     }
 
-    /// The address of the number of the sort's passes that are left out: the state's last word.
-    fn passes_left_out(&self) -> u64 {
-        self.scratch + arguments::BUILD_STATE_BYTES - 4
+    /// The address of what is left out of the sort, passes and keys: the state's last two words.
+    fn left_out(&self) -> u64 {
+        self.scratch + arguments::BUILD_STATE_BYTES - 8
     }
 
     /// The address of the box that most primitives are in, where codes have sections: before that.
     pub fn where_most_is(&self) -> u64 {
-        self.passes_left_out() - size_of::<Aabb>() as u64
+        self.left_out() - size_of::<Aabb>() as u64
     }
 
     /// The address of a part of the scratch memory.
@@ -76,8 +78,12 @@ impl arguments::Build {
 const HAS_REFERENCES: u32 = 8;
 /// There: the structure has numbers in place of records.
 const HAS_NUMBERS: u32 = 16;
+/// There: two triangles may be one leaf from the start.
+const HAS_PAIRS: u32 = 64;
 /// There: clusters lie where records will.
 const CLUSTERS_IN_RECORDS: u32 = 32;
+/// In glsl/bvh/build_state.glsl: triangles among which pairs are found.
+pub(super) const PAIR_BLOCK: u32 = 8;
 
 impl Encode {
     /// Bits that there is room and time for.
@@ -129,8 +135,13 @@ impl Encode {
         self.shape.constants(self.items | u32::from(self.meets_in_group) << 16, self.key_words())
     }
 
+    fn pairs_constant(&self) -> u32 {
+        if self.pairs { HAS_PAIRS } else { 0 }
+    }
+
+    /// A kernel that reads no primitives.
     pub fn kernel(&self, shader: &'static shaders::Shader) -> Kernel {
-        Kernel::new(shader, self.shape.workgroup, &self.constants())
+        Kernel::new(shader, self.shape.workgroup, &[&self.constants()[..], &[self.pairs_constant()]].concat())
     }
 
     /// A kernel that reads primitives.
@@ -144,7 +155,7 @@ impl Encode {
         let references = if self.split.is_some() { HAS_REFERENCES } else { 0 };
         let numbers = if self.numbered { HAS_NUMBERS } else { 0 };
         let clusters = if self.clusters_in_records { CLUSTERS_IN_RECORDS } else { 0 };
-        let source = input.source_constant(self.primitives) | references | numbers | clusters;
+        let source = input.source_constant(self.primitives) | references | numbers | clusters | self.pairs_constant();
         let source = [source, self.codes.prefix_constant()];
         Kernel::new(shader, self.shape.workgroup, &[&constants[..], &source, more].concat())
     }
@@ -225,8 +236,9 @@ impl Encode {
     /// The dispatches up to the sort; what follows needs a barrier before. Labels: `bounds`, `encode`, `sort`, and for
     /// codes with a grid `cells`.
     pub fn steps(&self, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
-        let reading = |phase, shader, groups| Step::new(phase, self.reading_kernel(shader, input), arguments, groups);
-        let sort = radix_sort::Sort { count: self.count, bits: self.most_bits(), identity: true };
+        let reading =
+            |of: &Encode, phase, shader, groups| Step::new(phase, of.reading_kernel(shader, input), arguments, groups);
+        let sort = radix_sort::Sort { count: self.count, bits: self.most_bits(), identity: !self.pairs };
         let parts = arguments.parts;
         let buffers = radix_sort::SortBuffers {
             keys: parts.keys.map(|at| arguments.part(at)),
@@ -234,6 +246,8 @@ impl Encode {
             table: arguments.part(parts.table),
         };
         let bounds = self.for_bounds();
+        // Blocks of pairs are counted by the tiles that they are found in.
+        let tiled = if self.pairs { &bounds } else { self };
         // Where codes have sections it looks at a sample of the primitives.
         let reset = match self.codes.bounds {
             bounds if bounds.has_sections() => self.reading_kernel(&shaders::BVH_ENCODE_RESET, input),
@@ -241,15 +255,15 @@ impl Encode {
         };
         let mut steps = vec![
             Step::new("bounds", reset, arguments, 1),
-            Step::new("bounds", bounds.reading_kernel(&shaders::BVH_ENCODE_BOUNDS, input), arguments, bounds.tiles()),
-            reading("encode", &shaders::BVH_ENCODE_PLAN, 1),
+            reading(&bounds, "bounds", &shaders::BVH_ENCODE_BOUNDS, bounds.tiles()),
+            reading(tiled, "encode", &shaders::BVH_ENCODE_PLAN, 1),
         ];
         if self.codes.has_grid() {
-            steps.push(reading("cells", &shaders::BVH_ENCODE_CELLS, self.tiles()));
-            steps.push(reading("cells", &shaders::BVH_ENCODE_PREFIXES, 1));
+            steps.push(reading(self, "cells", &shaders::BVH_ENCODE_CELLS, self.tiles()));
+            steps.push(reading(self, "cells", &shaders::BVH_ENCODE_PREFIXES, 1));
         }
-        steps.push(reading("encode", &shaders::BVH_ENCODE_CODES, self.tiles()));
-        let left_out = self.bits_up_to.map_or(0, |_| arguments.passes_left_out());
+        steps.push(reading(tiled, "encode", &shaders::BVH_ENCODE_CODES, tiled.tiles()));
+        let left_out = if self.bits_up_to.is_some() || self.pairs { arguments.left_out() } else { 0 };
         steps.extend(radix_sort::steps_but(&self.shape, &buffers, &sort, left_out));
         steps
     }

@@ -80,7 +80,7 @@ impl Hierarchy for &Treelets {
         scratch.parts.orders = ["clusters of even levels", "clusters of odd levels"]
             .map(|name| scratch.take_words(name, BuildPhase::Gather, BuildPhase::Top));
         scratch.take_tasks();
-        scratch.take_sums(encode.shape.workgroup, BuildPhase::Gather);
+        scratch.take_sums(encode.shape.workgroup, BuildPhase::Gather, BuildPhase::Gather);
         scratch.take_ends(BuildPhase::Gather);
     }
 }

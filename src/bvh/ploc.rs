@@ -105,6 +105,6 @@ impl Hierarchy for Ploc {
         scratch.parts.lists = ["clusters of even rounds", "clusters of odd rounds"]
             .map(|name| scratch.take_words(name, BuildPhase::Hierarchy, BuildPhase::Hierarchy));
         scratch.parts.nearest = scratch.take_words("nearest clusters", BuildPhase::Hierarchy, BuildPhase::Hierarchy);
-        scratch.take_sums(encode.shape.workgroup, BuildPhase::Hierarchy);
+        scratch.take_sums(encode.shape.workgroup, BuildPhase::Hierarchy, BuildPhase::Hierarchy);
     }
 }

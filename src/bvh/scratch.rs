@@ -1,7 +1,7 @@
 //! The scratch memory of a build: what lies in it, and from which phase to which.
 
 use super::child_order::ChildOrder;
-use super::encode::Encode;
+use super::encode::{Encode, PAIR_BLOCK};
 use super::method::Hierarchy;
 use super::split::SplitReference;
 use crate::gpu::arguments::{self, BUILD_STATE_BYTES, BuildParts};
@@ -76,6 +76,9 @@ impl Scratch {
         scratch.take_split(encode);
         scratch.parts.values[scratch.sorted] =
             scratch.plan.take("sorted values", 4 * count, BuildPhase::Encode..=BuildPhase::Records);
+        if encode.pairs {
+            scratch.take_pairs(encode.shape.workgroup);
+        }
         method.plan(encode, &mut scratch);
         if let Some(bytes) = reinsertion {
             scratch.reinsertion = scratch.plan.take("reinsertion", bytes, BuildPhase::Optimise..=BuildPhase::Optimise);
@@ -112,6 +115,13 @@ impl Scratch {
         self.parts.split = plan.take("splitting", arguments::SPLIT_STATE_BYTES, BuildPhase::Split..=BuildPhase::Encode);
         self.split_counts = plan.take("splits", 4 * u64::from(split.primitives), BuildPhase::Split..=BuildPhase::Split);
         self.split_sums = plan.take("splits of tiles", split.sums_bytes(), BuildPhase::Split..=BuildPhase::Split);
+    }
+
+    /// Which triangles are pairs, and how many of each tile; methods may have their own sums there later.
+    fn take_pairs(&mut self, workgroup: u32) {
+        let blocks = 4 * self.count.div_ceil(u64::from(PAIR_BLOCK));
+        self.parts.pairs = self.plan.take("pairs", blocks, BuildPhase::Encode..=BuildPhase::Records);
+        self.take_sums(workgroup, BuildPhase::Encode, BuildPhase::Hierarchy);
     }
 
     /// What the tree is finished by, from the phase on that writes it.
@@ -155,9 +165,12 @@ impl Scratch {
         self.parts.tasks = self.plan.take("tasks", TASK_BYTES * self.count, BuildPhase::Top..=BuildPhase::Top);
     }
 
-    /// A sum for each tile, of which the smallest has `workgroup` items.
-    pub fn take_sums(&mut self, workgroup: u32, phase: BuildPhase) {
-        self.parts.sums = self.plan.take("sums of tiles", 4 * self.count.div_ceil(workgroup.into()), phase..=phase);
+    /// A sum for each tile, of which the smallest has `workgroup` items; where they are there, those.
+    pub fn take_sums(&mut self, workgroup: u32, from: BuildPhase, to: BuildPhase) {
+        if self.parts.sums != 0 {
+            return;
+        }
+        self.parts.sums = self.plan.take("sums of tiles", 4 * self.count.div_ceil(workgroup.into()), from..=to);
     }
 }
 
@@ -188,21 +201,29 @@ mod tests {
             geometry_count: 1,
             build_flags: 0,
             alone: false,
+            pairs: false,
             numbered: false,
             clusters_in_records: false,
         }
     }
 
-    const METHODS: [Method; 4] =
-        [Method::Lbvh, Method::Hlbvh(Treelets::DEFAULT), Method::Ploc { radius: 16 }, Method::Hploc(Window::DEFAULT)];
+    /// With whether triangles are paired.
+    const METHODS: [(Method, bool); 6] = [
+        (Method::Lbvh, false),
+        (Method::Hlbvh(Treelets::DEFAULT), false),
+        (Method::Ploc { radius: 16 }, false),
+        (Method::Ploc { radius: 16 }, true),
+        (Method::Hploc(Window::DEFAULT), false),
+        (Method::Hploc(Window::DEFAULT), true),
+    ];
 
     /// As the tables of a sort grow in steps, and the parts of methods do not.
     #[test]
     fn parts_in_use_share_nothing_and_nothing_is_wasted_where_scenes_are_large() {
         for (count, bits) in [(0, 32), (1, 32), (2, 64), (1000, 32), (1 << 20, 32), (1 << 20, 64), (1 << 27, 64)] {
-            for method in METHODS {
+            for (method, pairs) in METHODS {
                 for reinsertion in [None, Some(15 * u64::from(count))] {
-                    let encode = encode(count, bits, 8);
+                    let encode = Encode { pairs, ..encode(count, bits, 8) };
                     let merging = Merging::by_one();
                     let scratch = Scratch::of(&encode, &*method.hierarchy(&merging), reinsertion, encode.table_words());
                     scratch.plan.assert_nothing_in_use_is_shared();
@@ -216,10 +237,11 @@ mod tests {
     /// What accel's sizes for the most primitives promise to builds of fewer.
     #[test]
     fn fewer_primitives_never_need_more() {
-        for method in METHODS {
+        for (method, pairs) in METHODS {
             for reinsertion in [0, 15] {
                 let bytes = |count: u32| {
-                    let (encode, merging) = (encode(count, 32, 8), Merging::by_one());
+                    let encode = Encode { pairs, ..encode(count, 32, 8) };
+                    let merging = Merging::by_one();
                     let reinsertion = (reinsertion > 0).then_some(reinsertion * u64::from(count));
                     let most = encode.shape.most_table_words(count).max(encode.table_words());
                     Scratch::of(&encode, &*method.hierarchy(&merging), reinsertion, most).bytes()

@@ -189,9 +189,9 @@ pub(crate) fn steps(shape: &SortShape, buffers: &SortBuffers, sort: &Sort) -> Ve
     steps_but(shape, buffers, sort, 0)
 }
 
-/// The same where the device knows how many of the passes, the first, are left out, as keys have no such bits: the number lies at this
-/// address (0: none are). The keys to sort are where the first pass that is done looks for them, so the results are where they are
-/// without any left out. An indirect dispatch would take a buffer, and the caller's memory is known by addresses: workgroups of a pass
+/// The same where the device knows how many of the passes, the first, are left out, as keys have no such bits, and how many of the keys, the
+/// last, as there are fewer: the two numbers lie at this address (0: nothing is left out). The keys to sort are where the first pass that
+/// is done looks for them, so the results are where they are without any left out. An indirect dispatch would take a buffer, and the caller's memory is known by addresses: workgroups of a pass
 /// that is left out return at once.
 ///
 /// # Panics

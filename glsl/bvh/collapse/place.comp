@@ -3,5 +3,6 @@
 #include "bvh/collapse.glsl"
 
 void main() {
-    collapse_place(group_number());
+    uint task = spread_task(group_number());
+    if (task != NONE) collapse_place(task);
 }

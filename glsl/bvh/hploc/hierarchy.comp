@@ -3,5 +3,6 @@
 #include "bvh/hploc.glsl"
 
 void main() {
-    hploc_hierarchy(group_number());
+    uint task = spread_task(group_number());
+    if (task != NONE) hploc_hierarchy(task);
 }

@@ -107,7 +107,7 @@ uvec2 source_records() {
 
 uvec2 source_table() {
     if (!has_numbers()) return geometry_table_of(uvec2(source), source.header);
-    return address_of(records_at(uvec2(source), source.header.node_slots), source.header.primitive_count, 4u);
+    return address_of(records_at(uvec2(source), source_slots), source.header.primitive_count, 4u);
 }
 
 bool is_inner(Child child) {

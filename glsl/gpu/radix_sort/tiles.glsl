@@ -145,8 +145,8 @@ void radix_places_of_tile(Radix r, uint column) {
 void radix_scatter_tile(Radix r, uint column) {
     for (uint i = gl_LocalInvocationIndex; i < TILE_COUNTERS; i += gl_WorkGroupSize.x) tile_words[i] = 0;
     barrier();
-    // A subgroup owns rows of consecutive keys.
-    uint first = column * TILE_KEYS, left = r.count - first;
+    // A subgroup owns rows of consecutive keys. Where keys are left out, there may be none in the tile.
+    uint first = column * TILE_KEYS, left = max(r.count, first) - first;
     uint own = gl_SubgroupID * TILE_ROWS * TILE_LANES + gl_SubgroupInvocationID;
     uvec2 keys[TILE_ROWS];
     uint places[TILE_ROWS];

@@ -1,6 +1,6 @@
 //! Collapsing, plainly: costs bottom-up, then a walk that makes leaves and puts their records side by side.
 
-use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Node, Record, status};
+use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Node, Record, UNUSED, status};
 use crate::bvh::sah::{Collapse, area_scale};
 
 /// What a subtree costs and holds.
@@ -93,8 +93,12 @@ impl<R: Record> Weights<'_, R> {
                     let records = child.index as usize..(child.index + child.count) as usize;
                     order.extend_from_slice(&self.tree.records[records]);
                 } else {
-                    let [left, right] = self.tree.nodes[child.index as usize].children;
+                    let children = self.tree.nodes[child.index as usize].children;
+                    let [left, right] = children;
                     below.extend([right, left]);
+                    // The boxes of what falls out stay as they are.
+                    let children = children.map(|child| Child { index: UNUSED, count: UNUSED, ..child });
+                    tree.nodes[child.index as usize] = Node { children };
                 }
             }
             return Child { index: first, count, ..child };

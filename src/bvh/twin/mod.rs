@@ -11,6 +11,7 @@ pub mod hlbvh;
 pub mod hploc;
 pub mod lbvh;
 mod over;
+pub mod pairs;
 pub mod ploc;
 pub mod quality;
 pub mod refit;

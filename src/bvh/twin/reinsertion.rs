@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::bvh::flux::{FluxGrid, quotient};
-use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Record, status};
+use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Record, node_slots, status};
 use crate::bvh::reinsertion::{
     Areas, LEAST_GAIN, LEAST_SHARE, PATH, Probed, ReinsertionOptions, STACK, VISITS, probed_offsets, weight_of,
 };
@@ -89,12 +89,12 @@ impl<R: Record> Bvh2<R> {
             cost: self.cost_by(cost)?,
             by_rays: *cost != CostOnHost::Area,
         };
-        let slots = self.nodes.len() as u32;
-        let stride = options.stride_for(slots);
+        let slots = node_slots(self.header.primitive_count);
+        let (stride, links) = (options.stride_for(slots), 2 * self.nodes.len() as u32);
         let root_area = self.header.root.bounds().scaled_half_area(self.header.area_scale);
         let mut probed = Probed { root_area, ..Probed::default() };
         for link in probed_offsets(options.rounds_for(slots), stride)
-            .flat_map(|offset| (offset..2 * slots).step_by(stride as usize))
+            .flat_map(|offset| (offset..links).step_by(stride as usize))
         {
             probed.tried += 1;
             // Exact: a float below 2²⁴ has 32 bits behind the point at most that count. What is more counts as that.
@@ -112,7 +112,7 @@ impl<R: Record> Bvh2<R> {
         by_rays: bool,
     ) -> Bvh2<R> {
         let mut work = LinkedTree { parents: parents_of(self), tree: self.clone(), cost, by_rays };
-        let slots = self.nodes.len() as u32;
+        let slots = node_slots(self.header.primitive_count);
         let (rounds, stride) = (options.rounds_for(slots), options.stride_for(slots));
         for round in 0..rounds {
             work.round(first_round % stride + round, stride);

@@ -35,6 +35,31 @@ pub fn random(name: &str, count: usize, lo: [f32; 3], extent: [f32; 3]) -> Mesh 
     soup(name, triangles)
 }
 
+/// A bumpy sheet of so many quads along either side, whose triangles share edges with those before and behind them; of some their order is
+/// another, some are there twice, and some are left out.
+pub fn sheet(side: u32) -> Mesh {
+    let mut next = unit_floats(u64::from(side) + 3);
+    let vertex = |i: u32, j: u32| i * (side + 1) + j;
+    let mut positions: Vec<[f32; 3]> = (0..(side + 1) * (side + 1))
+        .map(|v| [(v / (side + 1)) as f32, 0.3 * next(), (v % (side + 1)) as f32])
+        .collect();
+    let quads = (0..side)
+        .flat_map(|i| (0..side).map(move |j| [vertex(i, j), vertex(i + 1, j), vertex(i, j + 1), vertex(i + 1, j + 1)]));
+    let mut triangles: Vec<[u32; 3]> = quads.flat_map(|[a, b, c, d]| [[a, b, c], [c, b, d]]).collect();
+    let count = triangles.len();
+    for at in (0..count).step_by(7) {
+        triangles.swap(at, (at + (10.0 * next()) as usize).min(count - 1));
+    }
+    for at in (1..count).step_by(11) {
+        triangles[at] = triangles[at - 1];
+    }
+    positions.push([f32::NAN; 3]);
+    for at in (0..count).step_by(29) {
+        triangles[at][at % 3] = positions.len() as u32 - 1 + (at % 2) as u32;
+    }
+    (format!("sheet {side}"), positions, triangles)
+}
+
 /// All of them, small enough for every builder and option.
 pub fn meshes() -> Vec<Mesh> {
     let sizes = [3, 7, 8, 9, 127, 128, 129, 1023, 1025, 3000];

@@ -46,6 +46,10 @@ pub(super) const SPLIT: BuilderOption = option(
     "split",
     "a number from 0 to 1: splits of large triangles at most, as a part of all; with /N behind: of each at most N",
 );
+pub(super) const PAIRS: BuilderOption = option(
+    "pairs",
+    "off or on: whether two triangles that share an edge may be one leaf from the start; on unless given, of hploc where leaves are collapsed",
+);
 pub(super) const OPTIMISE: BuilderOption = option(
     "optimise",
     "off, fast, medium, high, a number of passes of reinsertion such as 0.5, or on the device a time for it as in 20ms",
@@ -99,7 +103,7 @@ impl Spec {
         self.choice(&SCHEDULE, &all)
     }
 
-    /// Options `codes`, `split`, `optimise`, `by`, `collapse`, `schedule`, `width`, `order`, `any-hit` and `walk` of a builder
+    /// Options `codes`, `split`, `pairs`, `optimise`, `by`, `collapse`, `schedule`, `width`, `order`, `any-hit` and `walk` of a builder
     /// on the device.
     pub(super) fn on_device(&self, method: Method) -> Result<BuilderPlan> {
         method.check()?;
@@ -109,7 +113,10 @@ impl Spec {
         let is_of_eight = matches!(form, Some(Form::Eight | Form::EightQuantised));
         let (optimise, collapse) = (self.reinsertion()?, self.collapse()?);
         let collapse = if is_of_eight && collapse.enabled { Collapse::WIDE } else { collapse };
-        let options = BuildOptions { method, codes, split, optimise, collapse, schedule, ..BuildOptions::DEFAULT };
+        let unpaired = BuildOptions { method, codes, split, optimise, collapse, schedule, ..BuildOptions::DEFAULT };
+        let pairs_unless_told = matches!(method, Method::Hploc(_)) && collapse.enabled && unpaired.can_pair();
+        let pairs = self.choice(&PAIRS, &[("off", false), ("on", true)])?.unwrap_or(pairs_unless_told);
+        let options = BuildOptions { pairs, ..unpaired };
         let time_to_optimise = self.time_to_optimise()?;
         let is_opened_by_rays = self.is_opened_by_rays()?;
         if form.is_none() && is_opened_by_rays {

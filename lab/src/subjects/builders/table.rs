@@ -6,7 +6,7 @@ use super::host_options::{
     TERMINATION_FLAT, THREADS, WEIGHT,
 };
 use super::options::{
-    ANY_HIT, BINS, BITS, BY, CODES, COLLAPSE, EXACT, KD_SCHEDULE, KI, KT, OPEN, OPTIMISE, ORDER, RADIUS, RAYS,
+    ANY_HIT, BINS, BITS, BY, CODES, COLLAPSE, EXACT, KD_SCHEDULE, KI, KT, OPEN, OPTIMISE, ORDER, PAIRS, RADIUS, RAYS,
     SCHEDULE, SPLIT, TRACE, TRACE_TREE, TRAVERSAL, TREELET, WALK, WIDTH, WINDOW, WORKGROUPS,
 };
 use super::{BuilderPlan, Spec};
@@ -124,20 +124,22 @@ pub static BUILDERS: &[BuilderEntry] = &[
         "hierarchical LBVH on the device: small subtrees of the LBVH under a top split by the surface area heuristic",
         Spec::hlbvh,
     )
-    .taking(&[BITS, TREELET, CODES, SPLIT, OPTIMISE, BY, COLLAPSE, SCHEDULE, WIDTH, ORDER, OPEN, ANY_HIT, WALK]),
+    .taking(&[BITS, TREELET, CODES, SPLIT, PAIRS, OPTIMISE, BY, COLLAPSE, SCHEDULE, WIDTH, ORDER, OPEN, ANY_HIT, WALK]),
     on_device(
         &"ploc",
         "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
         Spec::ploc,
     )
-    .taking(&[RADIUS, CODES, SPLIT, OPTIMISE, BY, COLLAPSE, SCHEDULE, WIDTH, ORDER, OPEN, ANY_HIT, WALK])
+    .taking(&[RADIUS, CODES, SPLIT, PAIRS, OPTIMISE, BY, COLLAPSE, SCHEDULE, WIDTH, ORDER, OPEN, ANY_HIT, WALK])
     .in_variants(&["ploc", "ploc:radius=25"]),
     on_device(
         &"hploc",
         "hierarchical PLOC on the device: neighbours merged in windows of the order of codes",
         Spec::hploc,
     )
-    .taking(&[WINDOW, RADIUS, CODES, SPLIT, OPTIMISE, BY, COLLAPSE, SCHEDULE, WIDTH, ORDER, OPEN, ANY_HIT, WALK]),
+    .taking(&[
+        WINDOW, RADIUS, CODES, SPLIT, PAIRS, OPTIMISE, BY, COLLAPSE, SCHEDULE, WIDTH, ORDER, OPEN, ANY_HIT, WALK,
+    ]),
     on_device(
         &"auto",
         "the device's builder that takes least for a build and its rays, by its measured costs",

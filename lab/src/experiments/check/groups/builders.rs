@@ -139,6 +139,20 @@ pub fn hploc(cases: &mut Cases<'_>) {
     methods(cases, [Window::DEFAULT, odd, Window { size: 32, radius: 8 }, large].map(Method::Hploc));
 }
 
+/// Pairs of triangles, by each method that merges them and each schedule, finished and optimised.
+pub fn pairs(cases: &mut Cases<'_>) {
+    let optimise = Some(reinsertion::ReinsertionOptions { rounds: 6, stride: 2 });
+    let sides = if cases.quick { &[2, 25][..] } else { &[1, 2, 5, 25, 80] };
+    for mesh in sides.iter().map(|&side| corpus::sheet(side)).chain(meshes(cases)) {
+        let pairs = BuildOptions { pairs: true, ..by_codes(Code::Emc64Var.full()) };
+        let hploc = BuildOptions { method: Method::Hploc(Window::DEFAULT), ..pairs };
+        as_on_host(cases, &mesh, &hploc, if cases.quick { CHAIN } else { CHAIN_AND_POOL });
+        as_on_host(cases, &mesh, &BuildOptions { optimise, ..hploc }, &[Schedule::Chain, Schedule::Workgroup]);
+        let codes = Some(Code::Mc63.full().with_bits(17));
+        as_on_host(cases, &mesh, &BuildOptions { method: Method::Ploc { radius: 8 }, codes, ..pairs }, CHAIN);
+    }
+}
+
 pub fn split(cases: &mut Cases<'_>) {
     let mut next = corpus::unit_floats(5);
     let across = (0..130).map(|_| std::array::from_fn(|_| std::array::from_fn(|_| next()))).collect();

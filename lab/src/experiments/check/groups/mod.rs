@@ -29,6 +29,7 @@ pub const GROUPS: &[Group] = &[
     group("hlbvh", "HLBVH against its twin", builders::hlbvh),
     group("ploc", "PLOC against its twin", builders::ploc),
     group("hploc", "H-PLOC in small and large windows against its twin", builders::hploc),
+    group("pairs", "trees over pairs of triangles against their twin", builders::pairs),
     group("split", "split triangles against their twin", builders::split),
     group("optimise", "reinsertion against its twin", builders::optimise),
     group("wide", "collapsing to 4 and 8 children, quantised or not, against its twin", derived::wide),
