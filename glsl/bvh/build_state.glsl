@@ -153,24 +153,24 @@ uint triangles_of_pair(uint apart) {
     return apart == 0u ? 1u : 2u;
 }
 
-// The quotient of a product that may have more than 32 bits: of numbers below 2^27, `b` at most `divisor`.
+// a · b / divisor, rounded down, though the product may have more than 32 bits: of numbers up to 2^24, `b` at most `divisor`.
 uint scaled(uint a, uint b, uint divisor) {
     uint quotient = uint(float(a) * (float(b) / float(divisor)));
-    // The estimate is off by a few at most, and so the rest is below 2^31 whatever the product is.
+    // The estimate is off by a few, so the rest is what 32 bits of it say.
     int rest = int(a * b - quotient * divisor);
-    for (uint i = 0; i < 64u && rest < 0; ++i) {
+    for (uint i = 0; i < 8u && rest < 0; ++i) {
         quotient--;
         rest += int(divisor);
     }
-    for (uint i = 0; i < 64u && rest >= int(divisor); ++i) {
+    for (uint i = 0; i < 8u && rest >= int(divisor); ++i) {
         quotient++;
         rest -= int(divisor);
     }
     return quotient;
 }
 
-// A task for a workgroup of a dispatch over as many tiles as primitives may need, where pairs are fewer: how many, only the device knows.
-// A CPU gives each core as many workgroups side by side, so those without a task (NONE) lie everywhere among the others.
+// A task for a workgroup of a dispatch over as many tiles as there may be, of which pairs leave fewer: how many, only the device knows. A CPU
+// gives each core as many workgroups side by side, so those without a task (NONE) lie everywhere among the others.
 uint spread_task(uint group) {
     if (!HAS_PAIRS) return group;
     uint tile = gl_WorkGroupSize.x * ITEMS;

@@ -12,6 +12,10 @@
 //                                                      values[0] where nothing is sorted
 //   (sort      reads keys[0]                           writes keys[result], values[result]: gpu/radix_sort.glsl)
 //
+// Where triangles are paired (bvh/pairs.glsl), bounds writes which are, and sums: pairs of each tile; plan makes of them those of all tiles
+// before, and writes pair_count; encode reads both, writes keys[0] and values[0] of pairs and of what is alone without a gap, and only
+// those are sorted. Its tiles are those of bounds.
+//
 // needs one barrier between each two, and before the first; subgroups of any size; workgroups of whole subgroups
 #ifndef HEDGEROW_BVH_ENCODE
 #define HEDGEROW_BVH_ENCODE
@@ -145,7 +149,7 @@ void find_box(inout Found found, Box b, Box fences) {
     found.active_count += 1;
 }
 
-// A tile of blocks, in which pairs are found on the way. Why triangles are left out.
+// The same of a tile of blocks, in which pairs are found on the way; returns why triangles are left out.
 uint find_pairs(uint task, inout Found found, Box fences) {
     Geometry input_geometries = geometries();
     uint status = 0, pairs = 0;

@@ -29,7 +29,7 @@ const KNOWN: Flags = Flags::from_raw(
 
 /// Primitives up to which a build without a preference is an LBVH: one workgroup makes it in one dispatch. Up to as many a fast trace
 /// gets two passes of reinsertion, as opened instances want the nodes near the root good: they take 0.1 to 0.4 of the time of a driver's
-/// fast trace (docs/notes/rays.md).
+/// fast trace (docs/notes/rays.md). Pairs of so few triangles save nothing.
 const FEW: u32 = 2048;
 
 /// Primitives from which on a bottom level without a preference has nodes of eight: of fewer, ten rays a triangle do not bring back what
@@ -101,7 +101,7 @@ pub(super) fn build_options(flags: Flags, options: &AccelOptions, primitives: Pr
         build_flags: flags.as_raw() & 0x1f,
         ..BuildOptions::DEFAULT
     };
-    BuildOptions { pairs: unpaired.can_pair(), ..unpaired }
+    BuildOptions { pairs: count > FEW && unpaired.can_pair(), ..unpaired }
 }
 
 /// Whether a structure gets quantised nodes of eight: they cannot be refitted.
