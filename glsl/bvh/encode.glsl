@@ -149,6 +149,11 @@ void find_box(inout Found found, Box b, Box fences) {
     found.active_count += 1;
 }
 
+// Of a block: what the leaf with triangle k holds, if it is the first of one.
+void find_first(uint k, inout Found found, Box fences) {
+    if ((block_firsts & 1u << k) != 0u) find_box(found, block_box[k], fences);
+}
+
 // The same of a tile of blocks, in which pairs are found on the way; returns why triangles are left out.
 uint find_pairs(uint task, inout Found found, Box fences) {
     Geometry input_geometries = geometries();
@@ -159,9 +164,9 @@ uint find_pairs(uint task, inout Found found, Box fences) {
         status |= load_block(input_geometries, block);
         blocks_of_pairs().word[block] = pair_block();
         pairs += bitCount(block_seconds);
-        [[unroll]] for (uint k = 0; k < PAIR_BLOCK; ++k) {
-            if ((block_firsts & 1u << k) != 0u) find_box(found, block_box[k], fences);
-        }
+        // No loop: see `pair_block`.
+        find_first(0, found, fences); find_first(1, found, fences); find_first(2, found, fences); find_first(3, found, fences);
+        find_first(4, found, fences); find_first(5, found, fences); find_first(6, found, fences); find_first(7, found, fences);
     }
     write_tile_sum(task, pairs);
     return status;

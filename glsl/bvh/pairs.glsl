@@ -1,11 +1,11 @@
 // Pairs: of eight triangles that lie side by side in the input, two that share an edge are one leaf from the start, if the box around both
-// is small enough. A tree over pairs has fewer leaves to sort and to merge, down to half of them, and later nothing
-// is known of it: in the finished tree both are triangles of one leaf. src/bvh/twin/pairs.rs is the twin.
+// is small enough. A tree over pairs has fewer leaves to sort and to merge, down to half of them. In the finished tree both are triangles of
+// one leaf, and nothing else tells that they were a pair. src/bvh/twin/pairs.rs has the rule and is the twin.
 //
-//   load_block   reads the triangles        what is known of a block is in variables then
-//   pair_block   outputs the block's word: see PAIR_BITS
+//   load_block   reads the triangles of a block         writes the variables below
+//   pair_block   reads and changes the variables        outputs the block's word: see PAIR_BITS
 //
-// bvh/encode.glsl finds them on the way to the bounds. One triangle is a leaf that the second of a pair has no part in.
+// bvh/encode.glsl finds pairs on the way to the bounds.
 #ifndef HEDGEROW_BVH_PAIRS
 #define HEDGEROW_BVH_PAIRS
 #extension GL_EXT_control_flow_attributes : require
@@ -41,7 +41,7 @@ uint seconds_of_block(uint word) {
     return seconds;
 }
 
-// Vertices of the same bits have the same name. Others have it by chance: two triangles may share their box as well as an edge.
+// Vertices of the same bits have the same name. Others have it by chance, and rarely: then a pair shares no edge, which is no fault.
 uint name_of(vec3 vertex) {
     uvec3 bits = floatBitsToUint(vertex);
     uint name = (bits.x ^ bits.x >> 15) * 0x9E3779B1u + bits.y;

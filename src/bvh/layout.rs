@@ -343,7 +343,8 @@ pub struct Header {
     pub root: Child,
     /// Records in the tree: of the input's primitives those that are finite and whose indices are in range, or their parts.
     pub active: u32,
-    /// Node slots there are: `primitive_count` − 1, at least 1; of a compacted structure `inner_nodes`, at least 1.
+    /// Node slots there are, at least 1: `primitive_count` − 1; where triangles were paired, as many as pairs and what is alone need; of a
+    /// compacted structure `inner_nodes`.
     pub node_slots: u32,
     /// Code bits that the builder sorted by.
     pub code_bits: u32,

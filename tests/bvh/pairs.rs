@@ -3,6 +3,7 @@
 use crate::common::twins::{assert_same, on_device, on_host};
 use crate::common::{corpus, device};
 use hedgerow::bvh::builder::{BuildOptions, Builder, Method, Primitives, Schedule, Treelets, Window};
+use hedgerow::bvh::child_order::ChildOrder;
 use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::{Bvh2, Triangle};
 use hedgerow::bvh::reinsertion::ReinsertionOptions;
@@ -59,6 +60,7 @@ fn optimised_trees_over_pairs_are_those_of_the_host() {
     let optimise = Some(ReinsertionOptions { rounds: 6, stride: 2 });
     let options = BuildOptions { optimise, ..PAIRS };
     equals_the_host(&options, &[None, Some(Schedule::Chain), Some(Schedule::Workgroup)]);
+    equals_the_host(&BuildOptions { child_order: Some(ChildOrder::MoreHitsForItsCost), ..options }, &[None]);
 }
 
 /// What the leaves of an uncollapsed tree hold.

@@ -183,6 +183,24 @@ fn any_number_of_moved_triangles_is_refitted_as_on_the_host() {
     }
 }
 
+/// They have fewer slots of nodes than triangles need, and a pair stays one.
+#[test]
+fn trees_over_pairs_are_refitted_as_on_the_host() {
+    for side in [1, 5, 60] {
+        let (_, positions, triangles) = corpus::sheet(side);
+        let (method, codes) =
+            (builder::Method::Hploc(builder::Window::DEFAULT), Codes::for_count(triangles.len() as u32));
+        let options =
+            builder::BuildOptions { method, codes: Some(codes), pairs: true, ..builder::BuildOptions::DEFAULT };
+        let mesh = Mesh::new(positions, triangles);
+        let tree = twin::build(&options, codes, |finish| twin::pairs::build_corners(mesh.corners(), codes, finish));
+        assert!(side == 1 || tree.header.node_slots + 1 < mesh.count(), "nothing is paired");
+        for (what, moved) in [("bent", mesh.moved(bent(1.0))), ("scattered", mesh.moved(scattered(3)))] {
+            assert_as_on_the_host(&format!("{what} sheet {side}"), &tree, &moved);
+        }
+    }
+}
+
 #[test]
 fn unchanged_triangles_leave_every_byte_as_it_was() {
     for (name, positions, triangles) in corpus::meshes() {
