@@ -1,11 +1,11 @@
-// Finishing a tree whose leaves are single primitives at their sorted positions: subtrees become leaves where that is cheaper
-// (the weights say so) or where they are as deep as tracers can walk, records go to the order of a walk, left child first.
+// Finishing a tree whose leaves are single primitives, or pairs (bvh/pairs.glsl), at their sorted positions: subtrees become leaves where that
+// is cheaper (the weights say so) or where they are as deep as tracers can walk, records go to the order of a walk, left child first.
 // src/bvh/collapse.rs records the steps; src/bvh/twin/collapse.rs is the twin.
 //
 //   parents  reads nodes                      writes weights: parents; arrivals (zero)
 //   weigh    reads nodes, parents             writes weights: counts, left_counts; costs; the header's costs
 //   above    reads weights                    writes the places of large nodes; of these what place writes of the others
-//   place    reads weights, places            writes the walk's order, the nodes' children, slots that fall out, the root
+//   place    reads weights, places, values    writes the walk's order, the nodes' children, slots that fall out, the root
 //   records  reads the walk's order           writes records, or the primitives' numbers in their place
 //   numbered reads those numbers              writes records, to anywhere
 //   alone    all but the last, by one workgroup, for a small tree
@@ -120,7 +120,7 @@ Words large_depths() {
     return Words(part(parts.large_depths));
 }
 
-// The sorted positions in the order of the walk.
+// What the records will be of, by number, in the order of the walk.
 Words walk_order() {
     return Words(part(parts.walk));
 }

@@ -154,7 +154,7 @@ void find_first(uint k, inout Found found, Box fences) {
     if ((block_firsts & 1u << k) != 0u) find_box(found, block_box[k], fences);
 }
 
-// The same of a tile of blocks, in which pairs are found on the way; returns why triangles are left out.
+// All leaves of a tile of blocks, in which pairs are found on the way; returns why triangles are left out.
 uint find_pairs(uint task, inout Found found, Box fences) {
     Geometry input_geometries = geometries();
     uint status = 0, pairs = 0;

@@ -1,4 +1,4 @@
-//! Trees over pairs of triangles: the device's equal the host's, pairs are what they are said to be, and cost rays no more.
+//! Trees over pairs of triangles: the device's equal the host's, and pairs are what they are said to be.
 
 use crate::common::twins::{assert_same, on_device, on_host};
 use crate::common::{corpus, device};
@@ -71,7 +71,7 @@ fn leaves(tree: &Bvh2) -> Vec<&[Triangle]> {
 }
 
 #[test]
-fn a_leaf_has_a_triangle_or_two_of_one_block_that_share_an_edge_in_no_larger_a_box() {
+fn a_leaf_has_a_triangle_or_two_of_one_block_that_share_an_edge_in_a_small_box() {
     let mut paired = 0;
     for side in [9, 40] {
         let mesh = corpus::sheet(side);
@@ -104,7 +104,7 @@ fn a_leaf_has_a_triangle_or_two_of_one_block_that_share_an_edge_in_no_larger_a_b
     assert!(paired > 1000, "{paired} pairs of 3362 triangles");
 }
 
-/// Two quads of which the triangles come one after the other, a strip, and triangles whose common box would be too large.
+/// Quads whose triangles come one after the other or in turn, in one block or two, and triangles whose common box would be too large.
 #[test]
 fn the_best_of_a_block_are_pairs() {
     let quad = |x: f32| {

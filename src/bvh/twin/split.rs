@@ -33,18 +33,7 @@ const SPLITS_BITS: u32 = 10;
 /// [`Reference::left_out`] where no status says why.
 const INACTIVE: u32 = 1 << 31;
 
-/// The LBVH of the references of `triangles` over `positions`: what [`lbvh::build`] is without splitting.
-pub fn build(
-    positions: &[[f32; 3]],
-    triangles: &[[u32; 3]],
-    options: &SplitOptions,
-    codes: Codes,
-    finish: impl Into<Finish>,
-) -> Bvh2 {
-    build_corners(lbvh::corners(positions, triangles), options, codes, finish)
-}
-
-/// The same of triangles that [`HostGeometry::corners`](super::geometry::HostGeometry::corners) read.
+/// The LBVH of the references of triangles: what [`lbvh::build_corners`] is without splitting.
 pub fn build_corners(
     corners: impl Iterator<Item = Corners>,
     options: &SplitOptions,

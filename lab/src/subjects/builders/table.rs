@@ -124,7 +124,7 @@ pub static BUILDERS: &[BuilderEntry] = &[
         "hierarchical LBVH on the device: small subtrees of the LBVH under a top split by the surface area heuristic",
         Spec::hlbvh,
     )
-    .taking(&[BITS, TREELET, CODES, SPLIT, PAIRS, OPTIMISE, BY, COLLAPSE, SCHEDULE, WIDTH, ORDER, OPEN, ANY_HIT, WALK]),
+    .taking(&[BITS, TREELET, CODES, SPLIT, OPTIMISE, BY, COLLAPSE, SCHEDULE, WIDTH, ORDER, OPEN, ANY_HIT, WALK]),
     on_device(
         &"ploc",
         "parallel locally-ordered clustering on the device: nearest neighbours in the order of codes merged in rounds",
