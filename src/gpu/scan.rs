@@ -6,7 +6,7 @@ use super::{Context, Kernel, Recorder, Step, shaders};
 use crate::Result;
 
 /// The most words that are scanned at once.
-pub const MAX_COUNT: u32 = 1 << 27;
+pub const MAX_COUNT: u32 = 1 << 28;
 
 /// How a scan of words is cut for a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

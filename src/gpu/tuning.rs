@@ -61,9 +61,6 @@ pub struct Tuning {
     pub scan_each: u32,
     /// Items that an invocation takes which measures a tree (`quality`, `epo`).
     pub measure_rounds: u32,
-    /// Whether an invocation's few values that are asked for by a number are chosen among by comparisons, which keeps them in
-    /// registers: a GPU has arrays with an index in memory.
-    pub in_registers: bool,
     /// Wide nodes up to which one workgroup collapses a tree in one dispatch: a chain of dispatches costs more.
     pub wide_alone: u32,
     /// The radix sort's cut.
@@ -191,7 +188,6 @@ impl Tuning {
             scan_rounds: 32,
             scan_each: 16,
             measure_rounds: 64,
-            in_registers: false,
             wide_alone: 1366,
             sort: SortShape::strips(limits),
             build: BuildTuning {
@@ -254,7 +250,6 @@ impl Tuning {
             scan_rounds: 8,
             scan_each: 1,
             measure_rounds: 4,
-            in_registers: true,
             wide_alone: 1024,
             // Tiles count on the subgroups that they were cut for.
             sort: if limits.subgroup_is_exact { SortShape::tiles(limits) } else { SortShape::many_strips(limits) },

@@ -2,11 +2,11 @@
 //
 //   (choices)        bvh/wide/costs.glsl: which binary nodes a wide one takes in
 //   (cleared)        first_children, first_records
-//   reset            reads the source                            writes levels, opened[0]
-//   open, open_few   read the source, choices, opened of a level write slots, opened of the next level, levels, first_children,
-//                                                                 first_records
+//   open_few         reads the source, choices, opened of a level writes slots, opened of the next level, levels, first_children,
+//                                                                 first_records; of the first level also that
+//   open             the same of one level
 //   pair             reads the source, opened, slots             writes partners, first_records: of quantised trees of triangles
-//   (scans)          first_children, first_records: exclusive sums over the source's slots
+//   (scan)           first_children, first_records behind it: exclusive sums over the source's slots, and on
 //   nodes            reads the source and all that               writes the target's header and nodes, places
 //   records          reads the source, places, partners          writes the target's records and table of geometries
 //   alone            all of that, by one workgroup, for a small tree
@@ -16,16 +16,15 @@
 // that are named by nodes of lower slots, and its rank among the nodes of its parent; the sums make them. So nodes that one
 // names lie side by side, as do, of quantised nodes, the records of its leaves.
 //
-// Where the source's children have an order (bvh/child_order.glsl), those of a wide node lie in their slots as the walk that takes left
-// children first meets them, or by hits, and the target's header says so, too. Otherwise nodes of floats have them as they were opened, and quantised
-// ones by octants.
+// The children of a wide node lie in their slots as a walk meets them that takes left ones first. Those of quantised nodes lie by octants,
+// unless the source's have an order (bvh/child_order.glsl): then the target's header says so, too, and rays that were counted may choose it.
 //
 // Anything that is not a structure becomes an empty one with the status WRONG_VERSION; one that cannot be traced becomes an empty one with
 // its own status.
 //
 // Records of quantised nodes lie in units: of triangles 8 bytes each (bvh/wide/pairs.glsl), otherwise a record each.
 //
-// needs  one barrier before, between each two, and after; any number of workgroups, but one for reset, open_few and alone; any subgroup
+// needs  one barrier before, between each two, and after; any number of workgroups, but one for open_few and alone; any subgroup
 //        size; no overlap of source, target and scratch
 #ifndef HEDGEROW_BVH_WIDE_COLLAPSE
 #define HEDGEROW_BVH_WIDE_COLLAPSE
@@ -38,10 +37,8 @@
 
 layout(constant_id = 2) const uint WIDTH = 4;
 layout(constant_id = 3) const bool QUANTISED = false;
-// Whether what is known of a node's children is chosen by comparisons, so that it stays in registers, or by index.
-layout(constant_id = 4) const bool IN_REGISTERS = false;
 // Whether children in order are those first that end more rays for their work.
-layout(constant_id = 6) const bool BY_HITS = false;
+layout(constant_id = 4) const bool BY_HITS = false;
 
 // src/bvh/wide/mod.rs
 const uint LEVELS_BY_COST = 24;
@@ -144,6 +141,14 @@ uint units_of_leaf(Child leaf) {
 Child child_named(uint name) {
     if (name == WHOLE_TREE) return source.header.root;
     return Children(address_of(wide_nodes_at(uvec2(source)), name, 32)).child[0];
+}
+
+// The box of the binary node that a wide one begins with, which is that of the wide one. Of a tree that is a leaf it is the leaf's.
+Box box_of_node(uint slot) {
+    Child root = source.header.root;
+    if (!is_inner(root)) return Box(root.lo, root.hi);
+    Child left = child_named(2 * slot), right = child_named(2 * slot + 1);
+    return Box(min(left.lo, right.lo), max(left.hi, right.hi));
 }
 
 // Which of opened are of a level: the first, and how many.

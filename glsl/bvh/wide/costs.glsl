@@ -13,7 +13,7 @@
 #include "bvh/wide/collapse.glsl"
 
 // Whether nodes cost what rays were counted in them, rather than their area.
-layout(constant_id = 7) const bool BY_VISITS = false;
+layout(constant_id = 6) const bool BY_VISITS = false;
 
 // src/bvh/wide/mod.rs
 const float PRIOR_RAYS = 8.0;

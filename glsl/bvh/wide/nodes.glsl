@@ -8,6 +8,11 @@ uvec2 address_of_node(uint index) {
     return address_of(wide_nodes_at(target), index, wide_node_bytes(WIDTH, QUANTISED));
 }
 
+// The units of records that nodes of lower slots have. They are summed up as one with the children: those before are what the first begins with.
+uint records_before(uint slot) {
+    return first_records.word[slot] - first_records.word[0];
+}
+
 void write_empty_node() {
     if (QUANTISED) {
         QuantisedNodes(address_of_node(0)).node[0] = empty_quantised_node();
@@ -27,7 +32,7 @@ void write_header(bool there_is) {
     header.root.count = 0;
     header.node_slots = max(nodes, 1);
     header.inner_nodes = nodes;
-    header.pairs = there_is && is_paired() ? (UNITS_OF_ONE * header.active_count - first_records.word[source_slots]) / (2 * UNITS_OF_ONE - UNITS_OF_TWO) : 0;
+    header.pairs = there_is && is_paired() ? (UNITS_OF_ONE * header.active_count - records_before(source_slots)) / (2 * UNITS_OF_ONE - UNITS_OF_TWO) : 0;
     Structure(target).header = header;
     if (nodes == 0) write_empty_node();
 }
@@ -55,43 +60,46 @@ uint place_leaf(Child leaf, uint first) {
     return unit - first;
 }
 
-void write_quantised_node(uint at, uint index, uint next_node, uint next_record) {
-    vec3 lo = uintBitsToFloat(uvec3(0x7F800000u)), hi = uintBitsToFloat(uvec3(0xFF800000u));
-    bool has_node = false, has_leaf = false;
+void write_quantised_node(uint at, uint index, uint slot, uint next_node, uint next_record) {
     // The records of short leaves lie side by side; those of long ones, which are nodes of their own, before them.
     uint first_of_long = next_record;
+    bool has_node = false, has_leaf = false;
     for (uint s = 0; s < 8; ++s) {
         uint name = slots.word[at * WIDTH + s];
-        if (name == NO_CHILD) continue;
-        Child child = child_named(name);
-        lo = min(lo, child.lo);
-        hi = max(hi, child.hi);
-        bool is_node = is_wide_node(child);
-        has_node = has_node || is_node;
-        has_leaf = has_leaf || !is_node;
-        if (is_node && !is_inner(child)) next_record += units_of_leaf(child);
-    }
-    QuantisedNode node = quantised_node_around(lo, hi, has_node ? next_node : 0, has_leaf ? next_record : 0);
-    for (uint s = 0; s < 8; ++s) {
-        uint name = slots.word[at * WIDTH + s];
-        if (name == NO_CHILD) {
-            put_into_slot(node, s, false, lo, hi, false, 0);
-            continue;
+        if (name != NO_CHILD) {
+            Child child = child_named(name);
+            bool is_node = is_wide_node(child);
+            has_node = has_node || is_node;
+            has_leaf = has_leaf || !is_node;
+            if (is_node && !is_inner(child)) next_record += units_of_leaf(child);
         }
-        Child child = child_named(name);
-        bool is_node = is_wide_node(child);
+    }
+    Box b = box_of_node(slot);
+    uvec3 exponents = cell_exponents(b.lo, b.hi);
+    uint first_child = has_node ? next_node : 0, first_record = has_leaf ? next_record : 0;
+    SlotBytes bytes = NO_SLOT_BYTES;
+    for (uint s = 0; s < 8; ++s) {
+        uint name = slots.word[at * WIDTH + s];
+        uvec3 below = uvec3(255), above = uvec3(0);
+        bool is_node = false;
         uint units = 0;
-        if (!is_inner(child)) {
-            uint first = is_node ? first_of_long : next_record;
-            units = place_leaf(child, first);
-            if (is_node) QuantisedNodes(address_of_node(next_node)).node[0] = long_leaf_node(first, units);
-            if (is_node) first_of_long += units;
-            else next_record += units;
+        if (name != NO_CHILD) {
+            Child child = child_named(name);
+            is_node = is_wide_node(child);
+            if (!is_inner(child)) {
+                uint first = is_node ? first_of_long : next_record;
+                units = place_leaf(child, first);
+                if (is_node) QuantisedNodes(address_of_node(next_node)).node[0] = long_leaf_node(first, units);
+                if (is_node) first_of_long += units;
+                else next_record += units;
+            }
+            if (is_node) next_node++;
+            below = bytes_below(child.lo, b.lo, exponents);
+            above = bytes_above(child.hi, b.lo, exponents);
         }
-        put_into_slot(node, s, true, child.lo, child.hi, is_node, units);
-        if (is_node) next_node++;
+        put_into_next_slot(bytes, below, above, is_node, units);
     }
-    QuantisedNodes(address_of_node(index)).node[0] = node;
+    QuantisedNodes(address_of_node(index)).node[0] = quantised_node_of(bytes, b.lo, exponents, first_child, first_record);
 }
 
 void write_nodes() {
@@ -102,7 +110,7 @@ void write_nodes() {
         Opened o = opened.node[at];
         uint index = at == 0 ? 0 : 1 + first_children.word[o.place >> 3] + (o.place & 7u);
         uint next_node = 1 + first_children.word[o.slot];
-        if (QUANTISED) write_quantised_node(at, index, next_node, first_records.word[o.slot]);
+        if (QUANTISED) write_quantised_node(at, index, o.slot, next_node, records_before(o.slot));
         else write_node(at, index, next_node);
     }
 }

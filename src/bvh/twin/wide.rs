@@ -231,17 +231,9 @@ fn is_closed<R: Record>(tree: &Bvh2<R>, child: &Child) -> bool {
     area_in_root(left) + area_in_root(right) > area_in_root(child) + (area(left) + area(right))
 }
 
-/// A child of a wide node: its link, and how many places it takes among the children. One of several is opened; 0: one that must not be.
-#[derive(Debug, Clone, Copy)]
-struct Taken {
-    child: Child,
-    link: u32,
-    places: u32,
-}
-
 /// The children of a wide node: those of the binary node, of which those are opened that are given several places ([`choices_of`]); far
-/// down ([`LEVELS_BY_COST`]) the places are halved. A tree that is a leaf is its own child. Children come as they were opened; where the
-/// tree's have an order, as the walk that takes left ones first meets them, or by hits.
+/// down ([`LEVELS_BY_COST`]) the places are halved. A tree that is a leaf is its own child. Children come as a walk meets them that takes
+/// left ones first, or, where the tree's have an order, by hits.
 fn open<R: Record>(
     tree: &Bvh2<R>,
     choices: &[Choice],
@@ -255,50 +247,40 @@ fn open<R: Record>(
     }
     let by_cost = level < LEVELS_BY_COST;
     let choice = |child: &Child| choices[child.index as usize];
-    // The two children of one that has so many places.
-    let below = |child: &Child, places: u32| -> [Taken; 2] {
+    // The links of a node's two children, with the places of theirs; the left one is taken next.
+    let below = |child: &Child, places: u32| {
         let left = if by_cost { choice(child).left_of(places) } else { places / 2 };
-        [(0, left), (1, places - left)].map(|(side, places)| {
-            let link = 2 * child.index + side;
-            let child = tree.nodes[child.index as usize].children[side as usize];
-            let takes = match () {
-                () if child.is_leaf() => places,
-                () if is_closed(&child) => 0,
-                () if !by_cost => places,
-                () => choice(&child).places_of(places),
-            };
-            Taken { child, link, places: takes }
-        })
+        [(2 * child.index + 1, places - left), (2 * child.index, left)]
     };
-    let mut children = below(root, width).to_vec();
-    // Which of them comes first, second and so on in the walk that takes left children first.
-    let mut order = vec![0, 1];
-    while children.len() < width as usize {
-        let room = width - children.len() as u32;
-        let of_several = children.iter().position(|taken| !taken.child.is_leaf() && taken.places > 1);
-        // What fits as a whole is taken in, even where sums of costs were too large to tell.
-        let may = |taken: &Taken| by_cost && !taken.child.is_leaf() && taken.places > 0;
-        let fits = |taken: &Taken| may(taken) && choice(&taken.child).children() <= room + 1;
-        let next = of_several.map(|at| (at, children[at].places));
-        let Some((at, places)) = next.or_else(|| Some((children.iter().position(fits)?, width))) else { break };
-        let [left, right] = below(&children[at].child, places);
-        children[at] = left;
-        let place = order.iter().position(|&child| child == at).expect("all of them are there");
-        order.insert(place + 1, children.len());
-        children.push(right);
+    let mut waiting = below(root, width).to_vec();
+    let mut room = if by_cost { width - choice(root).children() } else { 0 };
+    let mut children = Vec::new();
+    while let Some((link, mut places)) = waiting.pop() {
+        let child = tree.nodes[(link >> 1) as usize].children[(link & 1) as usize];
+        if by_cost && !child.is_leaf() {
+            places = choice(&child).places_of(places);
+            // What fits as a whole is taken in, even where sums of costs were too large to tell.
+            let more = choice(&child).children() - 1;
+            if places == 1 && more <= room {
+                (places, room) = (width, room - more);
+            }
+        }
+        if child.is_leaf() || places == 1 || is_closed(&child) {
+            children.push((link, child));
+        } else {
+            waiting.extend(below(&child, places));
+        }
     }
-    if !ordered_by.is_empty() {
-        let ends_more = |a: usize, b: usize| ends_more_rays([a, b].map(|i| ordered_by[children[i].link as usize]));
+    if tree.header.child_order != 0 && !ordered_by.is_empty() {
         // Insertion, as the device does, so that equal ones stay as they are.
-        for mut at in 1..order.len() {
-            while at > 0 && ends_more(order[at], order[at - 1]) {
-                order.swap(at, at - 1);
+        for mut at in 1..children.len() {
+            while at > 0 && ends_more_rays([at, at - 1].map(|at| ordered_by[children[at].0 as usize])) {
+                children.swap(at, at - 1);
                 at -= 1;
             }
         }
     }
-    let in_order = |place: usize| if tree.header.child_order != 0 { order[place] } else { place };
-    (0..children.len()).map(|place| children[in_order(place)].child).collect()
+    children.into_iter().map(|(_, child)| child).collect()
 }
 
 /// Whether the rays that went into the first of two children ended there for less work than those in the second.

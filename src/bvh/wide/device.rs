@@ -38,10 +38,11 @@ pub struct WideCounts {
 pub struct WidePass {
     options: WideOptions,
     count: u32,
+    /// Of steps that take slots or records, and of those that take wide nodes.
     grid: Grid,
+    node_grid: Grid,
     few: u32,
     alone: u32,
-    in_registers: bool,
     scan: scan::Scan,
 }
 
@@ -52,7 +53,11 @@ const LEVELS: u32 = 16;
 
 const PHASE: &str = "wide";
 
-/// Words of `Levels` in wide_collapse.glsl.
+/// Wide nodes of an invocation in a piece, whatever the device: they are few, and each is much work. On two cores opening and writing them
+/// took twice as long in pieces of 64.
+const NODE_ROUNDS: u32 = 4;
+
+/// Words of `Levels` in wide/collapse.glsl.
 const LEVEL_WORDS: u64 = 64 + 65 + 1;
 
 /// Memory of a collapsing, by address: of the bytes of [`WidePass::sizes`], or in pieces.
@@ -96,7 +101,8 @@ struct Scratch {
     levels: u64,
     opened: u64,
     slots: u64,
-    /// How many children each slot has before its own; of quantised nodes also how many units of records, otherwise 0.
+    /// How many children each slot has before its own; of quantised nodes also how many units of records, otherwise 0. Side by side: they
+    /// are summed up as one.
     first_children: u64,
     first_records: u64,
     /// Of quantised nodes.
@@ -110,14 +116,14 @@ impl WidePass {
     /// For a source built of `primitive_count` primitives, or of fewer.
     pub fn new(context: &Context, options: &WideOptions, primitive_count: u32) -> WidePass {
         let tuning = &context.tuning;
-        let scan = scan::Scan::new(context, node_slots(primitive_count) + 1);
+        let scan = scan::Scan::new(context, sums_of(options.form) * (node_slots(primitive_count) + 1));
         WidePass {
             options: *options,
             count: primitive_count,
             grid: Grid::of(context),
+            node_grid: Grid { rounds: NODE_ROUNDS, ..Grid::of(context) },
             few: tuning.group,
             alone: tuning.wide_alone,
-            in_registers: tuning.in_registers,
             scan,
         }
     }
@@ -148,11 +154,10 @@ impl WidePass {
         let levels = take("levels", LEVEL_WORDS, WidePhase::Open..=WidePhase::Nodes);
         let opened = take("opened nodes", 2 * nodes, WidePhase::Open..=WidePhase::Nodes);
         let children = take("what names their children", width * nodes, WidePhase::Open..=WidePhase::Nodes);
-        // Side by side: they are cleared at once.
-        let first_children = take("first children", slots, WidePhase::Open..=WidePhase::Nodes);
         let is_quantised = form.is_quantised();
-        let first_records =
-            if is_quantised { take("first records", slots, WidePhase::Open..=WidePhase::Nodes) } else { 0 };
+        let of_sums = u64::from(sums_of(form)) * slots;
+        let first_children = take("first children, and first records", of_sums, WidePhase::Open..=WidePhase::Nodes);
+        let first_records = if is_quantised { first_children + 4 * slots } else { 0 };
         let sums = take("sums of tiles", self.scan.sums_words().into(), WidePhase::Scan..=WidePhase::Scan);
         let records = u64::from(self.count);
         let mut take = |name, words: u64, life| take_of(&mut lasting, name, words, life);
@@ -200,13 +205,14 @@ impl WidePass {
     }
 
     fn kernel(&self, shader: &'static shaders::Shader, [by_visits, by_hits]: [bool; 2]) -> Kernel {
-        let workgroup = if one_workgroup(shader) { self.few } else { self.grid.workgroup };
+        let grid = if takes_nodes(shader) { self.node_grid } else { self.grid };
+        let workgroup = if one_workgroup(shader) { self.few } else { grid.workgroup };
         let WideOptions { form, .. } = self.options;
-        let [quantised, in_registers] = [form.is_quantised(), self.in_registers].map(u32::from);
+        let quantised = u32::from(form.is_quantised());
         // What `SOURCE_WORD` of glsl/bvh/geometry.glsl is without a value.
         let source_word = 0;
-        let by = [by_hits, by_visits].map(u32::from);
-        let constants = [self.grid.rounds, form.width(), quantised, in_registers, source_word, by[0], by[1]];
+        let [by_hits, by_visits] = [by_hits, by_visits].map(u32::from);
+        let constants = [grid.rounds, form.width(), quantised, by_hits, source_word, by_visits];
         Kernel::new(shader, workgroup, &constants)
     }
 
@@ -317,18 +323,17 @@ impl WidePass {
         if self.is_alone() && records == [0; 2] {
             return Ok([vec![step(&shaders::BVH_WIDE_ALONE, &arguments, 1)], Vec::new()]);
         }
-        let cleared = ((parts.sums - parts.first_children) / 4) as u32;
+        let summed = sums_of(form) * (arguments.source_slots + 1);
         let of_slots = self.grid.groups_for(arguments.source_slots);
         let mut steps = vec![
             step(&shaders::BVH_WIDE_LINKS, &arguments, of_slots),
             step(&shaders::BVH_WIDE_COSTS, &arguments, of_slots),
-            fill::step(PHASE, arguments.first_children, cleared, 0),
-            step(&shaders::BVH_WIDE_RESET, &arguments, 1),
+            fill::step(PHASE, arguments.first_children, summed, 0),
         ];
         let few = |level, level_end| {
             (&shaders::BVH_WIDE_OPEN_FEW, arguments::WideCollapse { level, level_end, ..arguments }, 1)
         };
-        let groups = self.grid.groups_for(arguments.capacity);
+        let groups = self.node_grid.groups_for(arguments.capacity);
         let many = |level| (&shaders::BVH_WIDE_OPEN, arguments::WideCollapse { level, ..arguments }, groups);
         let by_many = self.levels_by_many();
         let first = Some(few(0, by_many.start)).filter(|_| by_many.start > 0);
@@ -339,10 +344,8 @@ impl WidePass {
             steps.push(step(&shaders::BVH_WIDE_PAIR, &arguments, groups));
         }
         let sums = passing + parts.sums;
-        let scanned = [arguments.first_children, arguments.first_records];
-        for words in scanned.into_iter().take(if form.is_quantised() { 2 } else { 1 }) {
-            steps.extend(self.scan.steps(PHASE, &scan::ScanBuffers { values: words, results: words, sums }));
-        }
+        let [values, results] = [arguments.first_children; 2];
+        steps.extend(self.scan.steps(PHASE, &scan::ScanBuffers { values, results, sums }));
         steps.push(step(&shaders::BVH_WIDE_NODES, &arguments, groups));
         let arguments = arguments::WideCollapse { given_records: records[1], ..arguments };
         let write = step(&shaders::BVH_WIDE_RECORDS, &arguments, self.grid.groups_for(self.count));
@@ -352,5 +355,15 @@ impl WidePass {
 
 /// Whether a step is dispatched as one workgroup.
 fn one_workgroup(shader: &'static shaders::Shader) -> bool {
-    [&shaders::BVH_WIDE_RESET, &shaders::BVH_WIDE_OPEN_FEW, &shaders::BVH_WIDE_ALONE].contains(&shader)
+    [&shaders::BVH_WIDE_OPEN_FEW, &shaders::BVH_WIDE_ALONE].contains(&shader)
+}
+
+/// How many words of each of the source's slots are summed up: the nodes that it names, and of quantised nodes the units of its records.
+const fn sums_of(form: Form) -> u32 {
+    1 + form.is_quantised() as u32
+}
+
+/// Whether a step takes wide nodes.
+fn takes_nodes(shader: &'static shaders::Shader) -> bool {
+    [&shaders::BVH_WIDE_OPEN, &shaders::BVH_WIDE_PAIR, &shaders::BVH_WIDE_NODES].contains(&shader)
 }
