@@ -130,10 +130,15 @@ uint units_by_partner(uint partner) {
     return partner == IS_SECOND ? 0 : partner == ALONE ? UNITS_OF_ONE : UNITS_OF_TWO;
 }
 
+// Behind the last record of a leaf.
+uint end_of_leaf(Child leaf) {
+    return min(leaf.index + leaf.count, source.header.primitive_count);
+}
+
 // Units that the leaf's records take.
 uint units_of_leaf(Child leaf) {
     if (!is_paired()) return leaf.count;
-    uint units = 0, end = min(leaf.index + leaf.count, source.header.primitive_count);
+    uint units = 0, end = end_of_leaf(leaf);
     for (uint r = leaf.index; r < end; ++r) units += units_by_partner(partners.word[r]);
     return units;
 }

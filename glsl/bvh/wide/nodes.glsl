@@ -52,7 +52,7 @@ void write_node(uint at, uint index, uint next_node) {
 
 // The records of a leaf from a unit on; how many units they take.
 uint place_leaf(Child leaf, uint first) {
-    uint unit = first, end = min(leaf.index + leaf.count, source.header.primitive_count);
+    uint unit = first, end = end_of_leaf(leaf);
     for (uint r = leaf.index; r < end; ++r) {
         places.word[r] = unit;
         unit += is_paired() ? units_by_partner(partners.word[r]) : 1;

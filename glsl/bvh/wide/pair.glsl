@@ -26,31 +26,64 @@ uint order_of(Triangle first, Triangle second) {
     return uint(has_x) + uint(has_y) + uint(has_z) < 2u ? 0 : order;
 }
 
-// The pairs of a leaf: how many units it takes.
-uint pair_leaf(Child leaf) {
+// Which slots of a wide node hold leaves.
+uint leaves_of(uint at) {
+    uint leaves = 0;
+    for (uint s = 0; s < WIDTH; ++s) {
+        uint name = slots.word[at * WIDTH + s];
+        if (name != NO_CHILD && !is_inner(child_named(name))) leaves |= 1u << s;
+    }
+    return leaves;
+}
+
+uint take_lowest(inout uint mask) {
+    uint lowest = uint(findLSB(mask));
+    mask &= mask - 1u;
+    return lowest;
+}
+
+// Looks through the leaves of a wide node: how many units they take. One loop over all of them, in which a turn looks at one triangle beside
+// another: in a loop for each leaf all lanes would wait for the longest.
+uint pair_leaves(uint at) {
     Triangles triangles = Triangles(source_records());
-    uint units = 0, end = min(leaf.index + leaf.count, source.header.primitive_count);
+    uint units = 0, leaves = leaves_of(at), record = 0, end = 0, other = 0, window_end = 0;
     // Bit 0: this record is the second of a pair; bits above it: those behind it.
     uint seconds = 0;
-    for (uint r = leaf.index; r < end; ++r, seconds >>= 1) {
-        if ((seconds & 1u) != 0u) continue;
-        uint partner = ALONE, window_end = min(r + WINDOW + 1, end);
-        units += UNITS_OF_ONE;
-        // The last one has nothing behind it, and is not looked at.
-        if (r + 1 < window_end) {
-            Triangle first = triangles.triangle[r];
-            for (uint other = r + 1; other < window_end; ++other) {
-                if ((seconds >> other - r & 1u) != 0u) continue;
-                uint order = order_of(first, triangles.triangle[other]);
-                if (order == 0) continue;
-                partner = other - r | order << 4;
-                partners.word[other] = IS_SECOND;
-                seconds |= 1u << other - r;
-                units += UNITS_OF_TWO - UNITS_OF_ONE;
-                break;
-            }
+    Triangle first;
+    while (record < end || leaves != 0u) {
+        if (record >= end) {
+            Child leaf = child_named(slots.word[at * WIDTH + take_lowest(leaves)]);
+            record = leaf.index;
+            end = end_of_leaf(leaf);
+            seconds = 0;
+            other = record;
         }
-        partners.word[r] = partner;
+        if (record < end && other <= record) {
+            units += UNITS_OF_ONE;
+            other = record + 1;
+            window_end = min(record + WINDOW + 1, end);
+            // The last one has nothing behind it, and is not looked at.
+            if (other < window_end) first = triangles.triangle[record];
+        }
+        uint partner = ALONE;
+        if (other < window_end) {
+            uint order = (seconds >> other - record & 1u) == 0u ? order_of(first, triangles.triangle[other]) : 0u;
+            if (order != 0u) {
+                partner = other - record | order << 4;
+                partners.word[other] = IS_SECOND;
+                seconds |= 1u << other - record;
+                units += UNITS_OF_TWO - UNITS_OF_ONE;
+            }
+            other++;
+        }
+        if (record < end && (partner != ALONE || other >= window_end)) {
+            partners.word[record] = partner;
+            // On to the next that is not a second.
+            uint next = uint(findLSB(~(seconds >> 1))) + 1u;
+            record += next;
+            seconds >>= next;
+            other = record;
+        }
     }
     return units;
 }
@@ -58,15 +91,6 @@ uint pair_leaf(Child leaf) {
 void find_pairs() {
     if (!is_paired() || !can_be_collapsed(source.header)) return;
     uint count = levels.end;
-    for (uint k = 0, at = grid_item(0); at < count; at = grid_item(++k)) {
-        uint units = 0;
-        for (uint s = 0; s < WIDTH; ++s) {
-            uint name = slots.word[at * WIDTH + s];
-            if (name == NO_CHILD) continue;
-            Child child = child_named(name);
-            if (!is_inner(child)) units += pair_leaf(child);
-        }
-        first_records.word[opened.node[at].slot] = units;
-    }
+    for (uint k = 0, at = grid_item(0); at < count; at = grid_item(++k)) first_records.word[opened.node[at].slot] = pair_leaves(at);
 }
 #endif
