@@ -39,15 +39,15 @@ pub(super) fn document<'r>(
     sections.extend(growth.map(|chart| Section::new("growth", "How build time grows", chart)));
     sections.push(Section::new("results", "All figures", results(&records, legend)));
     sections.push(Section::method(None, terms(report)));
+    let several = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+    let [of_builders, of_scenes] = [several(legend.builders.len(), "builder"), several(scenes.len(), "scene")];
     Document {
-        tab: format!("{} scenes, {} builders", scenes.len(), legend.builders.len()),
+        tab: format!("{of_scenes}, {of_builders}"),
         kicker: "hedgerow benchmark",
         title: "Build speed against tree quality".into(),
         lead: format!(
-            "{} builders of acceleration structures on {} scenes, built and traced in turn in one process; trees of ours \
-             validated on the host, a sample of every kind of ray checked against brute force.",
-            legend.builders.len(),
-            scenes.len()
+            "{of_builders} of acceleration structures on {of_scenes}, built and traced in turn in one process; trees of ours \
+             validated on the host, a sample of every kind of ray checked against brute force."
         ),
         setting: Some(&report.setting),
         failures: failures(report),
