@@ -226,7 +226,7 @@ fn the_page_holds_together_in_a_browser() {
       verdicts: all("#goals tbody td:last-child").map((cell) => cell.textContent),
     };"##;
     let found = browser.look(&folder.path().join("accel.html"), look);
-    let sections = ["failures", "summary", "batches", "tlas", "rebraid", "any-hit", "updates", "method"];
+    let sections = ["failures", "summary", "batches-fast-build", "tlas", "rebraid", "any-hit", "updates", "method"];
     assert_eq!(found["sections"], serde_json::json!(sections));
     assert_eq!(found["charts"], 2 + 1 + 2 + 1 + 2);
     assert_eq!(found["goals"], 11);
