@@ -78,6 +78,7 @@ uint open_children(uint slot, uint level) {
     waiting_next = uvec4(0u);
     waiting_behind = uvec4(0u);
     wait_for_children(slot, choice, WIDTH, by_cost);
+    // `room`: places that the choices leave free.
     uint count = 0, room = by_cost ? WIDTH - children_by(choice) : 0;
     // Of n children 2 n - 2 links are taken.
     for (uint turn = 0; turn < 14 && waiting_next.x != 0u; ++turn) {

@@ -253,6 +253,7 @@ fn open<R: Record>(
         [(2 * child.index + 1, places - left), (2 * child.index, left)]
     };
     let mut waiting = below(root, width).to_vec();
+    // Places that the choices leave free.
     let mut room = if by_cost { width - choice(root).children() } else { 0 };
     let mut children = Vec::new();
     while let Some((link, mut places)) = waiting.pop() {
