@@ -56,7 +56,7 @@ chmod 755 "$out/run.sh" "$out/hedgerow"
 for file in scenes/*; do
     case $file in
         *.py) ;;
-        *) cp "$file" "$out/scenes/" ;;
+        *) cp -r "$file" "$out/scenes/" ;;
     esac
 done
 
