@@ -12,8 +12,8 @@
 //                                                      values[0] where nothing is sorted
 //   (sort      reads keys[0]                           writes keys[result], values[result]: gpu/radix_sort.glsl)
 //
-// Where triangles are paired (bvh/pairs.glsl), bounds writes which are, and sums: pairs of each tile; plan makes of them those of all tiles
-// before, and writes pair_count; encode reads both, writes keys[0] and values[0] of pairs and of what is alone without a gap, and only
+// Where triangles are paired (bvh/pairs.glsl), bounds writes which are, pair_count, and sums: pairs of each tile; plan makes of these those
+// of all tiles before; encode reads both, writes keys[0] and values[0] of pairs and of what is alone without a gap, and only
 // those are sorted. Its tiles are those of bounds.
 //
 // needs one barrier between each two, and before the first; subgroups of any size; workgroups of whole subgroups
@@ -154,13 +154,27 @@ void find_first(uint k, inout Found found, Box fences) {
     if ((block_firsts & 1u << k) != 0u) find_box(found, block_box[k], fences);
 }
 
+shared uint pairs_of_tile;
+
+// Of pairs that an invocation has found: those of a tile and of all. Without subgroups, unlike `write_tile_sum`: by that, and all tiles' sums
+// by `scan_tiles`, an NVIDIA H200 (driver 580.159.04) came to -8 pairs for 3 and for 389 (docs/notes/gpu.md).
+void tell_pairs(uint task, uint pairs) {
+    if (gl_LocalInvocationIndex == 0) pairs_of_tile = 0;
+    barrier();
+    if (pairs != 0) atomicAdd(pairs_of_tile, pairs);
+    barrier();
+    if (gl_LocalInvocationIndex == 0) {
+        sums_of_tiles().word[task] = pairs_of_tile;
+        atomicAdd(build_state().pair_count, pairs_of_tile);
+    }
+}
+
 // All leaves of a tile of blocks, in which pairs are found on the way; returns why triangles are left out.
 uint find_pairs(uint task, inout Found found, Box fences) {
     Geometry input_geometries = geometries();
     uint status = 0, pairs = 0;
-    for (uint i = gl_LocalInvocationIndex; i < blocks_of_tile(); i += gl_WorkGroupSize.x) {
-        uint block = task * blocks_of_tile() + i;
-        if (block * PAIR_BLOCK >= primitive_count) break;
+    uint begin = task * blocks_of_tile(), end = min(begin + blocks_of_tile(), (primitive_count + PAIR_BLOCK - 1) / PAIR_BLOCK);
+    for (uint block = begin + gl_LocalInvocationIndex; block < end; block += gl_WorkGroupSize.x) {
         status |= load_block(input_geometries, block);
         blocks_of_pairs().word[block] = pair_block();
         pairs += bitCount(block_seconds);
@@ -168,7 +182,7 @@ uint find_pairs(uint task, inout Found found, Box fences) {
         find_first(0, found, fences); find_first(1, found, fences); find_first(2, found, fences); find_first(3, found, fences);
         find_first(4, found, fences); find_first(5, found, fences); find_first(6, found, fences); find_first(7, found, fences);
     }
-    write_tile_sum(task, pairs);
+    tell_pairs(task, pairs);
     return status;
 }
 
@@ -306,11 +320,7 @@ void write_recipe(BuildState state, Box boxes, Box bounds) {
 // By the workgroup together.
 void make_plan() {
     BuildState state = build_state();
-    if (HAS_PAIRS) {
-        uint pairs = scan_tiles(tiles_of(primitive_count));
-        if (gl_LocalInvocationIndex == 0) state.pair_count = pairs;
-        next_phase();
-    }
+    if (HAS_PAIRS) scan_tiles(tiles_of(primitive_count));
     uint geometry_count = count_geometries(geometries()), slots = slots_of(HAS_PAIRS ? state.active_count : primitive_count);
     uint bytes_each = HAS_NUMBERS ? 4u : record_bytes(kind_of_records());
     GeometryTable table = GeometryTable(address_of(records_at(structure_address, slots_before_records(slots)), primitive_count, bytes_each));

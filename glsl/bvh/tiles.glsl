@@ -25,7 +25,7 @@ uint tiles_of(uint count) {
 
 void write_tile_sum(uint task, uint value) {
     uint own = subgroupAdd(value);
-    if (subgroupElect()) partial[gl_SubgroupID] = own;
+    if (gl_SubgroupInvocationID == 0u) partial[gl_SubgroupID] = own;
     barrier();
     if (gl_LocalInvocationIndex == 0u) {
         uint sum = 0;
@@ -39,7 +39,7 @@ void write_tile_sum(uint task, uint value) {
 uint sum_before(uint value, out uint total) {
     uint before = subgroupExclusiveAdd(value), own_total = subgroupAdd(value);
     barrier();
-    if (subgroupElect()) partial[gl_SubgroupID] = own_total;
+    if (gl_SubgroupInvocationID == 0u) partial[gl_SubgroupID] = own_total;
     barrier();
     total = 0;
     for (uint s = 0; s < gl_NumSubgroups; ++s) {
