@@ -34,7 +34,7 @@ pub struct Arguments {
     /// Seconds that a group may take
     #[arg(long, value_name = "SECONDS", default_value = LIMIT)]
     limit: NonZeroU32,
-    /// Groups at a time [default: one; one a core on a device that is a CPU, where a kernel is compiled by one core]
+    /// Groups at a time [default: one a core on a device that is a CPU, of others one for four cores, which compile their kernels]
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
     /// Run one group in this process: what the command starts for each
@@ -60,7 +60,8 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
     // A device that cannot be opened is not the fault of a group: the command itself says what is there.
     let is_cpu = common.open_device(false)?.found().kind == vk::PhysicalDeviceType::CPU;
     let cores = thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    let jobs = arguments.jobs.unwrap_or(if is_cpu { cores } else { NonZeroUsize::MIN });
+    let of_gpus = NonZeroUsize::new(cores.get() / 4).unwrap_or(NonZeroUsize::MIN);
+    let jobs = arguments.jobs.unwrap_or(if is_cpu { cores } else { of_gpus });
     let commands = chosen.iter().map(|group| Ok((group.name, child(common, arguments, group)?)));
     let commands = commands.collect::<anyhow::Result<Vec<_>>>()?;
     let limit = Duration::from_secs(arguments.limit.get().into());
