@@ -14,14 +14,14 @@ mod by_table;
 #[path = "build/compile.rs"]
 mod compile;
 #[cfg(feature = "compile-shaders")]
+#[path = "build/memory_model.rs"]
+mod memory_model;
+#[cfg(feature = "compile-shaders")]
 #[path = "build/push_constants.rs"]
 mod push_constants;
 #[cfg(feature = "compile-shaders")]
 #[path = "build/reflection.rs"]
 mod reflection;
-#[cfg(feature = "compile-shaders")]
-#[path = "build/shared_memory.rs"]
-mod shared_memory;
 #[path = "build/table.rs"]
 mod table;
 

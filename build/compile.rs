@@ -1,4 +1,4 @@
-//! GLSL to SPIR-V, by shaderc: optimised, with `#include`, and with shared memory that is handed over at barriers.
+//! GLSL to SPIR-V, by shaderc: optimised, with `#include`, and with accesses to memory as `memory_model` says.
 
 use crate::table::{file_by_table, out_dir};
 use crate::{by_table, push_constants};
@@ -11,7 +11,7 @@ const THIS: &str = concat!(
     include_str!("compile.rs"),
     include_str!("push_constants.rs"),
     include_str!("reflection.rs"),
-    include_str!("shared_memory.rs")
+    include_str!("memory_model.rs")
 );
 
 /// Compiles shaders whose includes are named from one of `roots`, so that a line such as `#include "gpu/pass.glsl"` means the same
@@ -109,7 +109,7 @@ impl Compiler<'_> {
             _ => shaderc::ShaderKind::Compute,
         };
         match compiler.compile_into_spirv(&text, kind, &file, "main", Some(&options)) {
-            Ok(binary) => crate::shared_memory::handed_over_at_barriers(binary.as_binary_u8()),
+            Ok(binary) => crate::memory_model::applied(binary.as_binary_u8()),
             Err(error) => {
                 // shaderc already writes `glsl/room/pass.comp:LINE: error: …`, which editors follow as they follow rustc.
                 eprintln!("{error}");

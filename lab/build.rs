@@ -7,12 +7,12 @@ mod arguments;
 mod by_table;
 #[path = "../build/compile.rs"]
 mod compile;
+#[path = "../build/memory_model.rs"]
+mod memory_model;
 #[path = "../build/push_constants.rs"]
 mod push_constants;
 #[path = "../build/reflection.rs"]
 mod reflection;
-#[path = "../build/shared_memory.rs"]
-mod shared_memory;
 #[path = "../build/table.rs"]
 mod table;
 

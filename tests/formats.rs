@@ -12,7 +12,7 @@ use hedgerow::kdtree::layout as kdtree;
 use hedgerow::trace::kd::TreeEntry;
 use hedgerow::trace::{Hit, Ray};
 use rspirv::dr::{Instruction, Module, Operand};
-use rspirv::spirv::{Decoration, MemorySemantics, Op, StorageClass};
+use rspirv::spirv::{Decoration, MemoryAccess, MemorySemantics, Op, StorageClass};
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 use std::path::Path;
@@ -251,41 +251,70 @@ fn what_is_precise_in_a_source_is_so_in_its_shader() {
     assert!(precise_shaders > 0, "some shaders are precise throughout");
 }
 
-/// What `build/shared_memory.rs` has made of them.
+/// What points to memory of a class, by id.
+fn pointers_to(module: &Module, class: StorageClass) -> BTreeSet<u32> {
+    let points_there =
+        |i: &&Instruction| i.class.opcode == Op::TypePointer && i.operands.contains(&Operand::StorageClass(class));
+    let types: BTreeSet<_> = module.types_global_values.iter().filter(points_there).map(|i| i.result_id).collect();
+    module.all_inst_iter().filter(|i| types.contains(&i.result_type)).filter_map(|i| i.result_id).collect()
+}
+
+/// The loads and stores through `pointers`, each with what follows the pointer.
+fn accesses_of<'m>(module: &'m Module, pointers: &'m BTreeSet<u32>) -> impl Iterator<Item = &'m [Operand]> {
+    module.all_inst_iter().filter_map(|i| match (i.class.opcode, &i.operands[..]) {
+        (Op::Load | Op::Store, [Operand::IdRef(pointer), rest @ ..]) if pointers.contains(pointer) => Some(rest),
+        _ => None,
+    })
+}
+
+/// The semantics of all barriers.
+fn barriers_of(module: &Module) -> impl Iterator<Item = MemorySemantics> {
+    let semantics = |id: u32| {
+        let constant = module.types_global_values.iter().find(|i| i.result_id == Some(id)).expect("a constant");
+        MemorySemantics::from_bits_retain(constant.operands[0].unwrap_literal_bit32())
+    };
+    module.all_inst_iter().filter_map(move |i| match (i.class.opcode, i.operands.last()) {
+        (Op::ControlBarrier | Op::MemoryBarrier, Some(&Operand::IdMemorySemantics(id))) => Some(semantics(id)),
+        _ => None,
+    })
+}
+
+/// What `build/memory_model.rs` has made of them.
 #[test]
 fn shared_memory_is_handed_over_at_barriers_alone() {
     let (mut accesses, mut barriers) = (0, 0);
     for shader in shaders::ALL {
         let module = rspirv::dr::load_bytes(shader.spirv).expect("SPIR-V of shaderc");
-        let is_shared = |i: &&Instruction| i.operands.contains(&Operand::StorageClass(StorageClass::Workgroup));
-        let types: BTreeSet<_> = module.types_global_values.iter().filter(is_shared).map(|i| i.result_id).collect();
-        let pointers: BTreeSet<_> =
-            module.all_inst_iter().filter(|i| types.contains(&i.result_type)).filter_map(|i| i.result_id).collect();
-        let semantics = |id: u32| {
-            let constant = module.types_global_values.iter().find(|i| i.result_id == Some(id)).expect("a constant");
-            MemorySemantics::from_bits_retain(constant.operands[0].unwrap_literal_bit32())
-        };
-        for i in module.all_inst_iter() {
-            match (i.class.opcode, &i.operands[..]) {
-                (Op::Load | Op::Store, [Operand::IdRef(pointer), rest @ ..]) if pointers.contains(pointer) => {
-                    accesses += 1;
-                    assert!(
-                        !rest.iter().any(|operand| matches!(operand, Operand::IdScope(_))),
-                        "{}: {i:?}",
-                        shader.name
-                    );
-                }
-                (Op::ControlBarrier | Op::MemoryBarrier, [.., Operand::IdMemorySemantics(id)]) => {
-                    let has = |of: MemorySemantics| semantics(*id).contains(of);
-                    if has(MemorySemantics::WORKGROUP_MEMORY) {
-                        barriers += 1;
-                        let both = MemorySemantics::MAKE_AVAILABLE | MemorySemantics::MAKE_VISIBLE;
-                        assert!(has(MemorySemantics::ACQUIRE_RELEASE | both), "{}: {i:?}", shader.name);
-                    }
-                }
-                _ => {}
-            }
+        for rest in accesses_of(&module, &pointers_to(&module, StorageClass::Workgroup)) {
+            accesses += 1;
+            assert!(!rest.iter().any(|operand| matches!(operand, Operand::IdScope(_))), "{}: {rest:?}", shader.name);
+        }
+        for semantics in barriers_of(&module).filter(|s| s.contains(MemorySemantics::WORKGROUP_MEMORY)) {
+            barriers += 1;
+            let both = MemorySemantics::MAKE_AVAILABLE | MemorySemantics::MAKE_VISIBLE;
+            assert!(semantics.contains(MemorySemantics::ACQUIRE_RELEASE | both), "{}: {semantics:?}", shader.name);
         }
     }
     assert!(accesses > 0 && barriers > 0, "{accesses} accesses, {barriers} barriers");
+}
+
+/// Barriers order non-private accesses alone: where one orders buffers, every access to them is.
+#[test]
+fn what_barriers_order_in_buffers_is_not_private() {
+    let (mut accesses, mut ordering) = (0, 0);
+    for shader in shaders::ALL {
+        let module = rspirv::dr::load_bytes(shader.spirv).expect("SPIR-V of shaderc");
+        if !barriers_of(&module).any(|semantics| semantics.contains(MemorySemantics::UNIFORM_MEMORY)) {
+            continue;
+        }
+        ordering += 1;
+        for rest in accesses_of(&module, &pointers_to(&module, StorageClass::PhysicalStorageBuffer)) {
+            accesses += 1;
+            let is_shared = rest.iter().any(|operand| {
+                matches!(operand, Operand::MemoryAccess(access) if access.contains(MemoryAccess::NON_PRIVATE_POINTER))
+            });
+            assert!(is_shared, "{}: {rest:?}", shader.name);
+        }
+    }
+    assert!(accesses > 0 && ordering > 0, "{accesses} accesses in {ordering} shaders");
 }
