@@ -166,7 +166,8 @@ float gain_of(Entry entry) {
     }
     float area = half_area(whole);
     precise float once = area - halves;
-    precise float twice = (area - quarters) / added;
+    // By a constant: division may be inexact.
+    precise float twice = (area - quarters) * (added == 3.0 ? 1.0 / 3.0 : added == 2.0 ? 0.5 : 1.0);
     float gain = max(once, twice);
     if (!(gain > 0.0) || !is_finite(vec3(area))) return NO_GAIN;
     return is_apart(Box(entry.lo, entry.hi), state.near) ? min(gain, FAR_GAIN) : gain;

@@ -3,6 +3,8 @@
 // the host's side.
 #ifndef HEDGEROW_BVH_INSTANCES
 #define HEDGEROW_BVH_INSTANCES
+#include "gpu/division.glsl"
+#include "gpu/reciprocal.glsl"
 #include "bvh/geometry.glsl"
 
 struct GivenInstance {
@@ -70,7 +72,7 @@ bool inverse_of(vec4 m[3], out vec4 inverse[3]) {
     vec3 a = m[0].xyz * scale, b = m[1].xyz * scale, c = m[2].xyz * scale;
     vec3 columns[3] = vec3[3](cross_product(b, c), cross_product(c, a), cross_product(a, b));
     precise float determinant = a.x * columns[0].x + a.y * columns[0].y + a.z * columns[0].z;
-    precise float reciprocal = scale / determinant;
+    precise float reciprocal = scale * hedgerow_reciprocal(determinant);
     vec3 moved = vec3(m[0].w, m[1].w, m[2].w);
     bool finite = is_finite(moved);
     for (uint row = 0; row < 3; ++row) {

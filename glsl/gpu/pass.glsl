@@ -10,6 +10,7 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_ballot : require
 #pragma use_vulkan_memory_model
+#include "gpu/division.glsl"
 
 layout(local_size_x_id = 0) in;
 
@@ -41,7 +42,8 @@ uint invocation_number() {
     return group_number() * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
 }
 
-// `nonprivate`: what one workgroup writes another may read within the same dispatch, ordered by the barriers below.
+// `nonprivate`: what one workgroup writes another may read within the same dispatch, ordered by the barriers below. glslang drops the word
+// here, and build/memory_model.rs puts it back.
 #define BUFFER layout(buffer_reference, scalar, buffer_reference_align = 4) nonprivate buffer
 BUFFER Words { uint word[]; };
 BUFFER Floats { float value[]; };

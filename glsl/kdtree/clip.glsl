@@ -3,10 +3,8 @@
 #ifndef HEDGEROW_KDTREE_CLIP
 #define HEDGEROW_KDTREE_CLIP
 #include "kdtree/builder.glsl"
+#include "gpu/reciprocal.glsl"
 #include "bvh/codes.glsl"
-
-// Whether the device's own reciprocals are correctly rounded, as those of CPUs are. Vulkan lets them err by 2.5 ulp.
-layout(constant_id = 4) const bool EXACT_RECIPROCALS = false;
 
 const float OF_SIDE = 3.814697265625e-6;                  // 2^-18
 const float OF_COORDINATE = 4.76837158203125e-7;          // 2^-21
@@ -74,19 +72,12 @@ Box cell_around(Corners c, float reach) {
     return finite_part(widened(bounds_of(c, reach), rounding_of(whole, longest_side(whole))));
 }
 
-// 1 / x with the bits of the host, of an edge that is neither too short nor too long.
-float reciprocal_of(float x) {
-    if (!EXACT_RECIPROCALS) return reciprocal_or_zero(x);
-    precise float reciprocal = 1.0 / x;
-    return reciprocal;
-}
-
 // Where the edge from a to b, which goes up along the axis, crosses the plane, within the box around it; `outer` where it is too
 // short or too long to tell.
 vec3 crossing_of(vec3 a, vec3 b, uint axis, float plane, vec3 outer) {
     precise vec3 d = b - a;
     if (d[axis] < shortest_edge() || d[axis] > longest_edge() || !is_finite(d)) return outer;
-    precise float t = (plane - a[axis]) * reciprocal_of(d[axis]);
+    precise float t = (plane - a[axis]) * hedgerow_reciprocal(d[axis]);
     if (t < least_normal()) t = 0.0;
     precise vec3 point = a + t * d;
     point = min(max(point, min(a, b)), max(a, b));

@@ -1,6 +1,7 @@
 // What every ray kernel takes: rays, where hits and work go, and the structure.
 #ifndef HEDGEROW_TRACE_BUFFERS
 #define HEDGEROW_TRACE_BUFFERS
+#include "gpu/division.glsl"
 #include "bvh/layout.glsl"
 #include "trace/ray.glsl"
 

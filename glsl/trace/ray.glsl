@@ -1,6 +1,7 @@
 // A ray made ready for the tests, computed once: the twin of src/trace/ray.rs, which says why.
 #ifndef HEDGEROW_TRACE_RAY
 #define HEDGEROW_TRACE_RAY
+#include "gpu/reciprocal.glsl"
 
 #define HEDGEROW_INFINITY uintBitsToFloat(0x7f800000u)
 const uint HEDGEROW_NONE = 0xffffffffu;
@@ -46,7 +47,7 @@ bool hedgerow_prepare(HedgerowRay ray, out HedgerowPreparedRay prepared) {
     uint major = size.z >= size.x && size.z >= size.y ? 2u : size.y >= size.x ? 1u : 0u;
     vec3 direction = hedgerow_permuted(ray.direction, major);
     float greatest = abs(direction.z);
-    precise float scale = 1.0 / direction.z;
+    float scale = hedgerow_reciprocal(direction.z);
     float flattest = uintBitsToFloat((127u - 26u) << 23) * greatest;
     vec3 coordinates = abs(ray.origin);
     precise float margin = uintBitsToFloat((127u - 22u) << 23) * max(max(coordinates.x, coordinates.y), coordinates.z) +
@@ -60,7 +61,8 @@ bool hedgerow_prepare(HedgerowRay ray, out HedgerowPreparedRay prepared) {
     prepared.major = major;
     precise vec2 shear = direction.xy * scale;
     prepared.shear = vec3(shear, scale);
-    prepared.inverse = 1.0 / mix(ray.direction, steep, lessThan(size, vec3(flattest)));
+    vec3 inclined = mix(ray.direction, steep, lessThan(size, vec3(flattest)));
+    prepared.inverse = vec3(hedgerow_reciprocal(inclined.x), hedgerow_reciprocal(inclined.y), hedgerow_reciprocal(inclined.z));
     prepared.slack = uintBitsToFloat((127u - 17u) << 23);
     prepared.margin = margin;
     return hedgerow_finite(ray.origin) && hedgerow_finite(ray.direction) &&

@@ -106,7 +106,8 @@ bool hedgerow_meet_facing(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, ou
             meets = hedgerow_carefully(a, b, c, largest, reach, careful);
             edges = careful;
         }
-        precise float scale = 1.0 / (edges.x + edges.y + edges.z);
+        precise float all = edges.x + edges.y + edges.z;
+        float scale = hedgerow_reciprocal(all);
         precise vec3 weights = edges * scale;
         precise float t = (weights.x * a.z + weights.y * b.z + weights.z * c.z) * ray.shear.z;
         meeting = vec3(t, weights.yz);

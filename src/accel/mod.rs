@@ -10,10 +10,9 @@
 //! want the stage `ACCELERATION_STRUCTURE_BUILD` in a barrier, these want `COMPUTE_SHADER` with `SHADER_READ` and
 //! `SHADER_WRITE`.
 //!
-//! A structure's bytes are the same on every device, with one exception: an instance's record holds the inverse of its matrix,
-//! which takes one division. Vulkan lets a device's quotient be 2.5 units in the last place away from the correctly rounded one.
-//! lavapipe and SwiftShader round correctly, and there the bytes are those of
-//! [`twin::top_level`]; elsewhere its numbers are within [`twin::INVERSE_BOUND`] of them, and everything else is the same.
+//! A structure's bytes are the same on every device, and those of the host ([`twin::top_level`], [`crate::bvh::twin`]). So are the hits
+//! of rays: where a device's division is inexact, reciprocals are rounded by integers (`glsl/gpu/reciprocal.glsl`). A shader that runs on
+//! CPUs alone saves that by `#define HEDGEROW_DIVISION_IS_EXACT true` before `trace/query.glsl`.
 //!
 //! A structure is copied, compacted, kept in a file and brought back by the calls of the extension ([`serialize`]); what the
 //! device knows of it is a [`Property`], written to an address instead of a query pool.

@@ -1,12 +1,14 @@
 //! The library on a device that somebody made: limits and pipelines, nothing else.
 
+use super::execution_modes::ExecutionModes;
 use super::requirements::{self, Optional, SubgroupSizes};
 use super::shaders::{Shader, Takes};
-use super::{Tuning, TuningChoice, Workarounds, reconvergence, specialise};
+use super::{Tuning, TuningChoice, Workarounds, specialise};
 use crate::{Error, Result};
 use ash::vk;
-use std::collections::HashMap;
-use std::sync::Mutex;
+use std::collections::{HashMap, HashSet};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 /// What [`Context::new`] takes.
@@ -127,8 +129,10 @@ pub struct Kernel {
     by_table: bool,
 }
 
-/// The specialisation constant that every pass has: workgroups of a row, in glsl/gpu/pass.glsl.
+/// The specialisation constants that every pass has: workgroups of a row (glsl/gpu/pass.glsl), and whether the device divides exactly
+/// (glsl/gpu/division.glsl).
 const GROUPS_OF_A_ROW: u32 = 30;
+const DIVISION_IS_EXACT: u32 = 29;
 
 impl Kernel {
     /// `shader` with a workgroup of `workgroup` invocations and the specialisation constants 1, 2, … as given.
@@ -186,7 +190,7 @@ impl Kernel {
 
 /// The library's state on one device: pipelines, made when first recorded.
 ///
-/// Safe to share between threads that record; recording the first use of a kernel takes a lock.
+/// Safe to share between threads that record. Pipelines that a recording needs and that are not there yet are made first, side by side.
 pub struct Context {
     device: ash::Device,
     debug_utils: Option<ash::ext::debug_utils::Device>,
@@ -197,6 +201,7 @@ pub struct Context {
     /// What its driver's faults require.
     pub workarounds: Workarounds,
     optional: Optional,
+    execution_modes: ExecutionModes,
     /// Subgroups of a workgroup, at most, where the size is required.
     subgroups_of_a_workgroup: u32,
     layout: vk::PipelineLayout,
@@ -234,12 +239,17 @@ impl Context {
             .map_err(Error::vulkan("vkCreatePipelineLayout"))?;
         let mut limits = Limits::of(desc.instance, desc.physical_device, desc.optional);
         limit(&mut limits);
+        let tuning = Tuning::of(desc.tuning, &limits);
+        let floats = tuning.strict_floats.then(|| ExecutionModes::of_floats(desc.instance, desc.physical_device));
+        let execution_modes =
+            ExecutionModes { maximal_reconvergence: desc.optional.maximal_reconvergence, ..floats.unwrap_or_default() };
         Ok(Context {
             device: desc.device.clone(),
             debug_utils: desc.debug_utils.cloned(),
-            tuning: Tuning::of(desc.tuning, &limits),
+            tuning,
             workarounds: Workarounds::of(&limits),
             optional: desc.optional,
+            execution_modes,
             subgroups_of_a_workgroup: SubgroupSizes::of(desc.instance, desc.physical_device).of_a_workgroup,
             limits,
             layout,
@@ -261,30 +271,58 @@ impl Context {
         self.debug_utils.as_ref()
     }
 
-    /// Makes the pipelines of `kernels` now instead of when they are first recorded. For those of whole passes there is
-    /// [`Recorder::warming`](super::Recorder::warming).
+    /// Makes the pipelines of `kernels` now instead of when they are first recorded, side by side: a driver takes up to seconds for
+    /// one, on one core. For those of whole passes there is [`Recorder::warming`](super::Recorder::warming).
     ///
     /// # Errors
     /// A pipeline could not be made.
     pub fn warm(&self, kernels: &[Kernel]) -> Result<()> {
-        kernels.iter().try_for_each(|kernel| self.pipeline(kernel).map(drop))
+        self.make(kernels.iter())
+    }
+
+    /// Makes the pipelines of those kernels that have none, by as many threads as there are cores.
+    pub(super) fn make<'k>(&self, kernels: impl Iterator<Item = &'k Kernel>) -> Result<()> {
+        let missing: Vec<&Kernel> = {
+            let pipelines = self.made();
+            kernels.filter(|kernel| !pipelines.contains_key(kernel)).collect::<HashSet<_>>().into_iter().collect()
+        };
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let next = AtomicUsize::new(0);
+        let work = || {
+            while let Some(kernel) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+                self.pipeline(kernel)?;
+            }
+            Ok(())
+        };
+        std::thread::scope(|scope| {
+            let others: Vec<_> = (1..cores.min(missing.len())).map(|_| scope.spawn(work)).collect();
+            let own = work();
+            others.into_iter().fold(own, |made, other| made.and(other.join().expect("no pipeline panics")))
+        })
     }
 
     /// All pipelines made so far, and how long each took. Most drivers compile at that point; lavapipe compiles at the first
     /// dispatch.
     pub fn pipelines(&self) -> Vec<(Kernel, Duration)> {
-        let pipelines = self.pipelines.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        pipelines.iter().map(|(kernel, &(_, time))| (kernel.clone(), time)).collect()
+        self.made().iter().map(|(kernel, &(_, time))| (kernel.clone(), time)).collect()
     }
 
+    fn made(&self) -> MutexGuard<'_, HashMap<Kernel, (vk::Pipeline, Duration)>> {
+        self.pipelines.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    /// Made if it is not there yet, while other threads make others.
     pub(super) fn pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
-        let mut pipelines = self.pipelines.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        if let Some(&(pipeline, _)) = pipelines.get(kernel) {
+        if let Some(&(pipeline, _)) = self.made().get(kernel) {
             return Ok(pipeline);
         }
         let begin = Instant::now();
-        let pipeline = self.create_pipeline(kernel)?;
-        pipelines.insert(kernel.clone(), (pipeline, begin.elapsed()));
+        let made = self.create_pipeline(kernel)?;
+        let (pipeline, _) = *self.made().entry(kernel.clone()).or_insert((made, begin.elapsed()));
+        if pipeline != made {
+            // SAFETY: ours, and used by nobody: another thread was faster.
+            unsafe { self.device.destroy_pipeline(made, None) };
+        }
         Ok(pipeline)
     }
 
@@ -300,14 +338,13 @@ impl Context {
     fn create_pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
         let mut words =
             ash::util::read_spv(&mut std::io::Cursor::new(kernel.spirv())).expect("build.rs wrote whole words");
-        let constants = [&kernel.constants[..], &[self.limits.workgroup_count]].concat();
-        let ids = (0..kernel.constants.len() as u32).chain([GROUPS_OF_A_ROW]);
+        let of_the_device = [self.limits.workgroup_count, self.tuning.exact_division.into()];
+        let constants = [&kernel.constants[..], &of_the_device].concat();
+        let ids = (0..kernel.constants.len() as u32).chain([GROUPS_OF_A_ROW, DIVISION_IS_EXACT]);
         if self.workarounds.folded_constants {
             words = specialise::folded(&words, &ids.clone().zip(constants.iter().copied()).collect());
         }
-        if self.optional.maximal_reconvergence {
-            words = reconvergence::maximal(&words);
-        }
+        words = self.execution_modes.added_to(&words);
         let module_info = vk::ShaderModuleCreateInfo::default().code(&words);
         let entries: Vec<_> = (0..)
             .zip(ids)

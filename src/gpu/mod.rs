@@ -7,13 +7,13 @@
 
 pub(crate) mod arguments;
 mod context;
+mod execution_modes;
 mod features;
 #[doc(hidden)]
 pub mod fill;
 mod grid;
 pub(crate) mod plan;
 pub mod radix_sort;
-mod reconvergence;
 mod recorder;
 #[doc(hidden)]
 pub mod reduce;

@@ -234,6 +234,7 @@ impl<'a> Recorder<'a> {
     /// # Errors
     /// A kernel's pipeline could not be made.
     pub fn chains(&mut self, chains: &[Vec<Step>]) -> Result<()> {
+        self.context.make(chains.iter().flatten().filter(|step| step.groups > 0).map(|step| &step.kernel))?;
         let longest = chains.iter().max_by_key(|chain| chain.len()).map_or(&[][..], Vec::as_slice);
         for (at, named) in longest.iter().enumerate() {
             if at > 0 {
@@ -255,7 +256,7 @@ impl<'a> Recorder<'a> {
     /// # Errors
     /// A pipeline could not be made.
     pub(crate) fn warm_by_table<'s>(&self, steps: impl Iterator<Item = &'s Step>) -> Result<()> {
-        steps.filter_map(|step| step.kernel.by_table()).try_for_each(|kernel| self.context.pipeline(&kernel).map(drop))
+        self.context.warm(&steps.filter_map(|step| step.kernel.by_table()).collect::<Vec<_>>())
     }
 
     /// More workgroups than the device takes along x are rows of as many as it takes, and behind them what is left:

@@ -59,6 +59,11 @@ pub struct Tuning {
     pub scan_rounds: u32,
     /// Of these how many lie side by side and are taken at once.
     pub scan_each: u32,
+    /// Whether the device's reciprocals are taken as correctly rounded, as those of CPUs are, or made so.
+    pub exact_division: bool,
+    /// Whether shaders ask for floats as the host has them (`gpu::execution_modes`). CPUs compute so anyway, and rays take 1.15 of the time
+    /// on lavapipe if they are asked.
+    pub strict_floats: bool,
     /// Items that an invocation takes which measures a tree (`quality`, `epo`).
     pub measure_rounds: u32,
     /// Wide nodes up to which one workgroup collapses a tree in one dispatch: a chain of dispatches costs more.
@@ -137,8 +142,6 @@ pub struct KdTuning {
     pub chunk: u32,
     /// Whether the task pool is the default, or a chain of dispatches.
     pub persistent: bool,
-    /// Whether the device's reciprocals are taken as correctly rounded, or made so.
-    pub exact_reciprocals: bool,
 }
 
 /// How tracers are cut.
@@ -178,6 +181,7 @@ impl Tuning {
     /// many items, for a workgroup costs its start. Figures are of lavapipe.
     pub fn cpu(limits: &Limits) -> Tuning {
         let group = limits.subgroup_size;
+        let is_cpu = limits.kind == vk::PhysicalDeviceType::CPU;
         // Mesa 26 makes one plain load of what is at the same address for all lanes.
         let lane_by_lane = limits.loads_uniform_values_once() && group <= MOST_LANES && limits.subgroup_is_exact;
         Tuning {
@@ -187,6 +191,8 @@ impl Tuning {
             reduce_rounds: 64,
             scan_rounds: 32,
             scan_each: 16,
+            exact_division: is_cpu,
+            strict_floats: !is_cpu,
             measure_rounds: 64,
             wide_alone: 1366,
             sort: SortShape::strips(limits),
@@ -221,7 +227,6 @@ impl Tuning {
                 subtree_groups: limits.workgroup_count.min(64),
                 chunk: 256,
                 persistent: true,
-                exact_reciprocals: true,
             },
             trace: TraceTuning {
                 group,
@@ -249,6 +254,8 @@ impl Tuning {
             reduce_rounds: 8,
             scan_rounds: 8,
             scan_each: 1,
+            exact_division: false,
+            strict_floats: true,
             measure_rounds: 4,
             wide_alone: 1024,
             // Tiles count on the subgroups that they were cut for.
@@ -285,7 +292,6 @@ impl Tuning {
                 subtree_groups: limits.workgroup_count.min(4096),
                 chunk: 4096,
                 persistent: false,
-                exact_reciprocals: false,
             },
             trace: TraceTuning {
                 group: at_most(limits.subgroup_size.max(64)),

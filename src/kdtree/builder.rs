@@ -9,9 +9,8 @@
 //! workgroup to their leaves. [`super::twin::builder`] is the twin,
 //! `glsl/kdtree/builder.glsl` the device's side.
 //!
-//! Trees have the bytes of the twin on every device: the only reciprocals that they depend on are correctly rounded, by the
-//! device or by integers ([`crate::gpu::KdTuning::exact_reciprocals`]). Where a device flushes subnormal numbers, inputs must
-//! not lead to any.
+//! Trees have the bytes of the twin on every device: the reciprocals that they depend on are correctly rounded, by the device or
+//! by integers ([`crate::gpu::Tuning::exact_division`]). Where a device flushes subnormal numbers, inputs must not lead to any.
 
 use super::across;
 use super::layout::{self, KdHeader, KdNode};
@@ -243,7 +242,6 @@ pub(super) struct KdShape {
     pub groups: u32,
     /// Workgroups that build subtrees.
     pub subtree_groups: u32,
-    exact_reciprocals: bool,
 }
 
 /// How much there is room for.
@@ -348,7 +346,6 @@ impl KdShape {
             items: (tuning.chunk / tuning.group).max(1),
             groups: 1,
             subtree_groups: 1,
-            exact_reciprocals: tuning.exact_reciprocals,
         }
     }
 
@@ -370,7 +367,8 @@ impl KdShape {
 
     pub fn kernel(&self, shader: &'static Shader, options: &KdOptions, input: &Input) -> Kernel {
         let source = input.source_constant(Primitives::Triangles);
-        let constants = [self.items, options.bins, options.exact, self.exact_reciprocals.into(), source];
+        // The fourth is of other kernels that read primitives.
+        let constants = [self.items, options.bins, options.exact, 0, source];
         let workgroup = if KdShape::is_narrow(shader) { self.narrow } else { self.workgroup };
         Kernel::new(shader, workgroup, &constants)
     }

@@ -17,8 +17,8 @@
 //! 1971; no fused operation, which devices round as they like), so that the errors above shrink by 2²⁰. Large thin triangles
 //! need it at every hit, and integers take ten times its time.
 //!
-//! Every operation is written so that the device can do the same: no contraction, no reordering. Bits differ only where a
-//! device's division is not correctly rounded (Vulkan allows 2.5 units in the last place).
+//! Every operation is written so that the device can do the same: no contraction, no reordering, and reciprocals that are correctly
+//! rounded whatever the device makes of a division (`glsl/gpu/reciprocal.glsl`).
 
 use super::determinant::{Scaled, difference_of_products};
 use super::ray::PreparedRay;

@@ -12,6 +12,7 @@ layout(constant_id = 3) const uint SHARED_LEVELS = 0;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
 // Of rays that end at any hit.
 layout(constant_id = 6) const bool LEFT_FIRST = false;
+#include "gpu/division.glsl"
 
 #if QUANTISED
 #include "trace/walk_wide_quantised.glsl"

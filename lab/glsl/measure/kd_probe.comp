@@ -7,6 +7,7 @@
 #extension GL_EXT_scalar_block_layout : require
 #define HEDGEROW_KD_CAPACITY 3
 #define HEDGEROW_KD_PUSH_DOWN true
+#include "gpu/division.glsl"
 #include "trace/query.glsl"
 #include "trace/kd_tree.glsl"
 

@@ -7,4 +7,5 @@
 #define WITH_HEDGEROW
 layout(constant_id = 5) const bool ONE_LEVEL = false;
 #define HEDGEROW_ONE_LEVEL ONE_LEVEL
+#include "gpu/division.glsl"
 #include "measure/probe.glsl"

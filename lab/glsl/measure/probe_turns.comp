@@ -2,4 +2,5 @@
 #version 460
 #define WITH_HEDGEROW
 #define IN_TURN
+#include "gpu/division.glsl"
 #include "measure/probe.glsl"

@@ -5,4 +5,5 @@ layout(constant_id = 4) const uint LANES = 16;
 #define HEDGEROW_LANES LANES
 #define WITH_HEDGEROW
 #define IN_TURN
+#include "gpu/division.glsl"
 #include "measure/probe.glsl"

@@ -12,5 +12,6 @@ uvec2 counts_of(uvec2 bottom_level) {
 
 #define HEDGEROW_LINK_COUNTS counts_of
 #define HEDGEROW_FORMS HEDGEROW_NODES_OF_TWO
+#include "gpu/division.glsl"
 #include "trace/ray_query_names.glsl"
 #include "measure/ray_query.glsl"

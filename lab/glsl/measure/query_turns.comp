@@ -8,5 +8,6 @@ layout(constant_id = 5) const bool ONE_LEVEL = false;
 layout(constant_id = 6) const uint FORMS = 3;
 #define HEDGEROW_FORMS FORMS
 #define IN_TURN
+#include "gpu/division.glsl"
 #include "trace/ray_query_names.glsl"
 #include "measure/ray_query.glsl"

@@ -4,5 +4,6 @@ layout(local_size_x_id = 0) in;
 layout(constant_id = 2) const uint SHARED_LEVELS = 0;
 #define HEDGEROW_SHARED_LEVELS SHARED_LEVELS
 #define HEDGEROW_COUNTS_WORK
+#include "gpu/division.glsl"
 #include "trace/ray_query_names.glsl"
 #include "measure/ray_query.glsl"

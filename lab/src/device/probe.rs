@@ -1,5 +1,5 @@
 //! What a driver is asked because no property says it: that started workgroups go on, and that long loops end where they should
-//! (Mesa 22.3's lavapipe ends them after 65,535 rounds and says nothing). And how far a driver may divide inexactly.
+//! (Mesa 22.3's lavapipe ends them after 65,535 rounds and says nothing).
 
 use super::Device;
 use crate::Result;
@@ -48,13 +48,4 @@ pub fn probe(device: &Device) -> Result<Findings> {
     const LOOP: u32 = 100_000;
     let (state, visits, counted) = tree(device, PHASES, 16, LOOP)?;
     Ok(Findings { long_loops: counted == LOOP, task_pool: state.status == 0 && visits == tree_on_host(PHASES) })
-}
-
-/// By how many units in the last place a quotient may be off, rounded up: Vulkan, "Precision of Individual Operations".
-const QUOTIENT_ULPS: f32 = 3.0;
-
-/// Whether `got` is `expected`, or as near as `divisions` inexact divisions one after the other leave it.
-pub fn is_near(got: f32, expected: f32, divisions: u32) -> bool {
-    let bound = divisions as f32 * QUOTIENT_ULPS * f32::EPSILON * expected.abs();
-    got.to_bits() == expected.to_bits() || bound.is_finite() && (got - expected).abs() <= bound
 }

@@ -15,7 +15,7 @@ mod contract;
 mod cpu_builders;
 mod cpu_peers;
 mod fly;
-mod gpu_division;
+mod gpu_reciprocal;
 mod gpu_task_pool;
 mod host_records;
 mod measure_copy;

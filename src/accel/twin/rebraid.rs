@@ -48,18 +48,18 @@ impl Below<'_> {
         let whole = self.fine_box(m, entry.start, 3).half_area();
         let halves = children.map(|child| self.fine_box(m, child, 2).half_area());
         let mut quarters = 0.0;
-        let mut added = 1.0;
+        let mut added = 1;
         for (child, half) in children.iter().zip(halves) {
             quarters += match self.opened(child) {
                 Some([a, b]) => {
-                    added += 1.0;
+                    added += 1;
                     self.fine_box(m, a, 1).half_area() + self.fine_box(m, b, 1).half_area()
                 }
                 None => half,
             };
         }
         let once = whole - (halves[0] + halves[1]);
-        let twice = (whole - quarters) / added;
+        let twice = (whole - quarters) * [1.0, 0.5, 1.0 / 3.0][added - 1];
         let gain = once.max(twice);
         (whole.is_finite() && gain > 0.0).then_some(gain)
     }
