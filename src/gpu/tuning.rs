@@ -241,7 +241,8 @@ impl Tuning {
         }
     }
 
-    /// Many short invocations in workgroups of several subgroups. No GPU has been measured: values are from the literature.
+    /// Many short invocations in workgroups of several subgroups. Values are from the literature: one GPU has run
+    /// them, and none has been tuned for (docs/notes/gpu.md).
     pub fn gpu(limits: &Limits) -> Tuning {
         let at_most = |invocations: u32| limits.workgroup_invocations.min(invocations);
         let group = at_most(256);
