@@ -84,6 +84,9 @@ for builder in lbvh hploc hploc:width=8q hlbvh ploc; do
     name=million-$(echo "$builder" | tr ':=' '--')
     step "$name" 10 40 "$hedgerow" build gen:soup:1000000:1 -b "$builder" --runs 5 --epo off --json "$out/$name.jsonl"
 done
+# Where the time of builds goes, dispatch by dispatch.
+step kernels 10 40 "$hedgerow" build "$here/scenes/knot.ply" -b lbvh,hploc,hploc:width=8q:optimise=0.5 --runs 9 --epo off --by-kernel \
+    --json "$out/kernels.jsonl"
 old=$IFS
 IFS='
 '

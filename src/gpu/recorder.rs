@@ -26,6 +26,8 @@ pub struct Timestamps {
     period: f32,
     valid_bits: u32,
     names: Vec<&'static str>,
+    /// Whether each dispatch of a pass is a phase, by the name of its shader.
+    by_kernel: bool,
     /// What the whole took by the host's clock.
     waited: Option<Duration>,
 }
@@ -56,8 +58,15 @@ impl Timestamps {
             period: context.limits.timestamp_period,
             valid_bits,
             names: Vec::new(),
+            by_kernel: false,
             waited: None,
         })
+    }
+
+    /// The same with a phase for each dispatch of a pass, named after its shader: there must be room for as many.
+    pub fn by_kernel(mut self) -> Timestamps {
+        self.by_kernel = true;
+        self
     }
 
     /// The phases of the last recording, read back; none without timestamps. Call after the command buffer has finished.
@@ -236,13 +245,15 @@ impl<'a> Recorder<'a> {
     pub fn chains(&mut self, chains: &[Vec<Step>]) -> Result<()> {
         self.context.make(chains.iter().flatten().filter(|step| step.groups > 0).map(|step| &step.kernel))?;
         let longest = chains.iter().max_by_key(|chain| chain.len()).map_or(&[][..], Vec::as_slice);
+        let by_kernel = self.timestamps.as_ref().is_some_and(|timestamps| timestamps.by_kernel);
+        let name = |step: &Step| if by_kernel { step.kernel.name() } else { step.phase };
         for (at, named) in longest.iter().enumerate() {
             if at > 0 {
                 self.barrier();
             }
             // Shorter chains may be ahead: the longest names the phase.
-            if at == 0 || longest[at - 1].phase != named.phase {
-                self.phase(named.phase);
+            if at == 0 || name(&longest[at - 1]) != name(named) {
+                self.phase(name(named));
             }
             for step in chains.iter().filter_map(|chain| chain.get(at)) {
                 self.dispatch_bytes(&step.kernel, &step.arguments, step.groups)?;

@@ -31,6 +31,9 @@ pub struct Arguments {
     /// Measure the end-point overlap: on, off, or cheap (given up after 5 s a tree)
     #[arg(long, value_name = "on|off|cheap", default_value = "cheap")]
     epo: Epo,
+    /// Show how long each kernel of the device took in place of the phases; a timestamp for each dispatch takes time, too
+    #[arg(long)]
+    by_kernel: bool,
     /// Write the structure's bytes to a file (with one builder)
     #[arg(short, long, value_name = "TREE")]
     output: Option<PathBuf>,
@@ -53,6 +56,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         c_t: arguments.costs.step,
         c_i: arguments.costs.test,
         epo: arguments.epo,
+        by_kernel: arguments.by_kernel,
     };
     let (outcomes, all_right) = work::measured(common, &scene, device.as_ref(), &plan);
     if let Some(path) = &arguments.output {

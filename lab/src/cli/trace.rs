@@ -73,6 +73,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         c_t: 3.0,
         c_i: 2.0,
         epo: Epo::Off,
+        by_kernel: false,
     };
     let (outcomes, all_right) = work::measured(common, &scene, device.as_ref(), &plan);
     arguments.json.write_each(outcomes.iter().map(|outcome| &outcome.record))?;

@@ -6,7 +6,7 @@ use super::device_rays::DeviceRays;
 use super::queries::{self, Forms, Queried, Queries, QueryWork};
 use super::taught_rounds::TaughtRounds;
 use super::wide::{WidePlan, WideTree};
-use super::{BuildRun, Subject, joined_choices};
+use super::{BuildRun, PHASES_BY_KERNEL, Subject, joined_choices};
 use crate::Result;
 use crate::device::Device;
 use crate::measure::overlap::{self, Epo};
@@ -204,6 +204,11 @@ impl Subject for DeviceBvh<'_> {
 
     fn device(&self) -> Option<&Device> {
         Some(self.device)
+    }
+
+    fn time_kernels(&mut self) -> Result<()> {
+        self.timestamps = Timestamps::new(self.device, PHASES_BY_KERNEL)?.by_kernel();
+        Ok(())
     }
 
     fn choice(&self) -> Option<String> {

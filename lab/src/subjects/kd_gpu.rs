@@ -2,7 +2,7 @@
 
 use super::build_memory::{BuildMemory, DeviceMesh, check_memory};
 use super::kd_device::KdDevice;
-use super::{BuildRun, InPool, KD_TREE, Subject};
+use super::{BuildRun, InPool, KD_TREE, PHASES_BY_KERNEL, Subject};
 use crate::device::Device;
 use crate::measure::record;
 use crate::scene::Mesh;
@@ -97,24 +97,17 @@ impl<'a> KdGpu<'a> {
 
     fn build_once(&mut self) -> Result<BuildRun> {
         self.device.run(Some(&mut self.timestamps), |recorder| self.place.record(recorder, &self.mesh.input))?;
-        // Those of the same name, of all levels, are one.
-        let mut phases: Vec<Phase> = Vec::new();
-        for phase in self.timestamps.phases()? {
-            match phases.iter_mut().find(|p| p.name == phase.name) {
-                Some(same) => same.milliseconds += phase.milliseconds,
-                None => phases.push(phase),
-            }
-        }
+        let run = BuildRun::of(self.timestamps.phases()?);
         // By levels, the pool has all of it.
-        let in_pool =
-            phases.iter().find(|phase| ["pool", "build"].contains(&phase.name)).map(|phase| phase.milliseconds);
+        let is_pool = |phase: &&Phase| ["pool", "build"].contains(&phase.name);
+        let in_pool = run.phases.iter().find(is_pool).map(|phase| phase.milliseconds);
         let report = self.place.report();
         let pool = in_pool.map(|milliseconds| InPool {
             milliseconds,
             retrievals: report.retrievals,
             skipped: report.skipped_retrievals,
         });
-        Ok(BuildRun { pool, ..BuildRun::of(phases) })
+        Ok(BuildRun { pool, ..run })
     }
 }
 
@@ -129,6 +122,11 @@ impl Subject for KdGpu<'_> {
 
     fn device(&self) -> Option<&Device> {
         Some(self.device)
+    }
+
+    fn time_kernels(&mut self) -> Result<()> {
+        self.timestamps = Timestamps::new(self.device, PHASES_BY_KERNEL)?.by_kernel();
+        Ok(())
     }
 
     fn choice(&self) -> Option<String> {

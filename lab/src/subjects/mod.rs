@@ -77,9 +77,16 @@ impl BuildRun {
         BuildRun { milliseconds, phases: Vec::new(), on_cpu: None, pool: None }
     }
 
-    /// One of these phases.
-    pub fn of(phases: Vec<gpu::Phase>) -> BuildRun {
-        let milliseconds = phases.iter().map(|phase| phase.milliseconds).sum();
+    /// One of these phases, of which those of the same name are one.
+    pub fn of(all: Vec<gpu::Phase>) -> BuildRun {
+        let milliseconds = all.iter().map(|phase| phase.milliseconds).sum();
+        let mut phases: Vec<gpu::Phase> = Vec::new();
+        for phase in all {
+            match phases.iter_mut().find(|p| p.name == phase.name) {
+                Some(same) => same.milliseconds += phase.milliseconds,
+                None => phases.push(phase),
+            }
+        }
         BuildRun { milliseconds, phases, on_cpu: None, pool: None }
     }
 }
@@ -98,6 +105,9 @@ pub struct Outcome {
     /// Bits of [`hedgerow::bvh::layout::status`].
     pub status: u32,
 }
+
+/// Dispatches of a build, at most, where each is a phase.
+const PHASES_BY_KERNEL: u32 = 8192;
 
 /// A builder on a scene, which may move. Whatever is uploaded once is uploaded when the subject is made, not under the clock.
 ///
@@ -118,6 +128,13 @@ pub trait Subject {
     /// Whether rays are traced on the device.
     fn traces_on_device(&self) -> bool {
         self.device().is_some() || self.timer() == "device"
+    }
+    /// From now on phases of builds are the device's kernels, where it has several.
+    ///
+    /// # Errors
+    /// Too little memory.
+    fn time_kernels(&mut self) -> Result<()> {
+        Ok(())
     }
     /// Brings what moves to where it stands in a frame, for the next build; not under the clock. What does not move stays.
     ///

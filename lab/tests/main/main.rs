@@ -8,6 +8,7 @@ mod files;
 mod accel_command;
 mod animate;
 mod bench;
+mod build_command;
 mod check;
 mod choose;
 mod codes_command;

@@ -106,6 +106,7 @@ pub(crate) fn run(common: &Common, arguments: &Arguments) -> anyhow::Result<()> 
         c_t: arguments.costs.step,
         c_i: arguments.costs.test,
         epo: arguments.epo,
+        by_kernel: false,
     };
     let options = [
         ("Runs", format!("{} after a warm-up, in turn", arguments.runs)),

@@ -51,6 +51,8 @@ pub struct BenchPlan {
     pub c_i: f64,
     /// Whether the end-point overlap is measured.
     pub epo: Epo,
+    /// Whether phases of builds are the device's kernels.
+    pub by_kernel: bool,
 }
 
 /// What one builder gave on one scene.
@@ -120,7 +122,13 @@ pub fn measure(
 ) -> (Vec<Outcome>, Vec<Failure<OnScene>>) {
     let (mut entrants, mut failures) = (Vec::new(), Vec::new());
     for spec in &plan.builders {
-        match spec.make_for(device, scene) {
+        let made = spec.make_for(device, scene).and_then(|mut subject| {
+            if plan.by_kernel {
+                subject.time_kernels()?;
+            }
+            Ok(subject)
+        });
+        match made {
             Ok(subject) => entrants.push(Entrant { subject, is_traced: true }),
             Err(error) => failures.push(OnScene::failure(&scene.name, Some(spec), error)),
         }
@@ -435,6 +443,7 @@ mod tests {
             c_t: 3.0,
             c_i: 2.0,
             epo: Epo::On,
+            by_kernel: false,
         }
     }
 

@@ -180,6 +180,7 @@ fn plan(common: &Common, arguments: &Arguments, builders: &[Spec]) -> BenchPlan 
         c_t: COSTS[0],
         c_i: COSTS[1],
         epo: arguments.epo.unwrap_or(if quick { Epo::Off } else { Epo::WhereCheap }),
+        by_kernel: false,
     }
 }
 
