@@ -6,9 +6,10 @@
 //!
 //! *Shared memory* is handed over at barriers, not at every access. glslang has each access to a `shared` variable make its value available
 //! or visible to the workgroup, as if it were `workgroupcoherent`, and leaves that out of its barriers. Mesa takes such an access for a
-//! fence: on lavapipe an `mfence` each, which was 40% of the time of a kd-tree's build (bunny: 413 ms with, 241 ms without). Nothing here reads what another invocation has written without a barrier between (or an atomic, which needs none), so
-//! the barriers do it: an access stays non-private, and a barrier that releases or acquires shared memory makes it
-//! available or visible as well (Vulkan memory model, "Availability and Visibility").
+//! fence: on lavapipe an `mfence` each, which was 40% of the time of a kd-tree's build (bunny: 413 ms with, 241 ms without). Nothing here
+//! reads what another invocation has written without a barrier between (or an atomic, which needs none), so the barriers do it: an access
+//! stays non-private, and a barrier that releases or acquires shared memory makes it available or visible as well (Vulkan memory model,
+//! "Availability and Visibility").
 
 use rspirv::binary::Assemble;
 use rspirv::dr::{Instruction, Module, Operand, load_bytes};

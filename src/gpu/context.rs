@@ -280,7 +280,7 @@ impl Context {
         self.make(kernels.iter())
     }
 
-    /// Makes the pipelines of those kernels that have none, by as many threads as there are cores.
+    /// Makes the pipelines that are missing, by a thread for each core.
     pub(super) fn make<'k>(&self, kernels: impl Iterator<Item = &'k Kernel>) -> Result<()> {
         let missing: Vec<&Kernel> = {
             let pipelines = self.made();

@@ -123,6 +123,9 @@ impl Drop for Timestamps {
     }
 }
 
+/// Chains whose kernels are looked at before any is recorded.
+const FEW_CHAINS: usize = 8;
+
 /// A dispatch that is ready to be recorded: what a build does between two barriers.
 #[derive(Debug, Clone)]
 pub struct Step {
@@ -243,7 +246,9 @@ impl<'a> Recorder<'a> {
     /// # Errors
     /// A kernel's pipeline could not be made.
     pub fn chains(&mut self, chains: &[Vec<Step>]) -> Result<()> {
-        self.context.make(chains.iter().flatten().filter(|step| step.groups > 0).map(|step| &step.kernel))?;
+        // Many chains have the kernels of a few; what the others have more is made when it is met.
+        let few = chains.iter().take(FEW_CHAINS).flatten();
+        self.context.make(few.filter(|step| step.groups > 0).map(|step| &step.kernel))?;
         let longest = chains.iter().max_by_key(|chain| chain.len()).map_or(&[][..], Vec::as_slice);
         let by_kernel = self.timestamps.as_ref().is_some_and(|timestamps| timestamps.by_kernel);
         let name = |step: &Step| if by_kernel { step.kernel.name() } else { step.phase };
