@@ -23,7 +23,8 @@ bool is_structure(Header header) {
 
 // Bytes of a structure, as two words: an address behind address 0.
 uvec2 structure_bytes(Header header) {
-    return address_of(geometry_table_of(uvec2(0), header), header.geometry_count > 1 ? header.geometry_count : 0, 8);
+    uvec2 bytes = address_of(geometry_table_of(uvec2(0), header), header.geometry_count > 1 ? header.geometry_count : 0, 8);
+    return address_of(bytes, header.near_node != 0 ? FAR_SIDES : 0, FAR_BOX_BYTES);
 }
 
 // Copies a number of bytes (two words; a multiple of 4) between addresses that are multiples of 8. Pieces are found by address, as
@@ -44,9 +45,8 @@ void copy_bytes(uvec2 from, uvec2 to, uvec2 bytes) {
 
 // The header of a structure of nothing that stands for what this version cannot read.
 Header header_of_wrong_version() {
-    uint reserved[6];
-    for (uint i = 0; i < 6; ++i) reserved[i] = 0;
-    return Header(MAGIC, KIND_TRIANGLES, STATUS_WRONG_VERSION, 0, empty_root(), 0, 1, 0, 0, 1, 0, 0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0, reserved);
+    const uint reserved[4] = uint[4](0, 0, 0, 0);
+    return Header(MAGIC, KIND_TRIANGLES, STATUS_WRONG_VERSION, 0, empty_root(), 0, 1, 0, 0, 1, 0, 0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0, 0, 0, reserved);
 }
 
 // One invocation of the dispatch writes it.

@@ -280,7 +280,9 @@ void write_header(BuildState state, uint slots, uint geometry_count, uint geomet
     structure.header.split_from = HAS_REFERENCES ? SplitState(part(parts.split)).primitive_count : 0;
     structure.header.child_order = 0;
     structure.header.pairs = 0;
-    for (uint i = 0; i < 6; ++i) structure.header.reserved[i] = 0;
+    structure.header.near_node = 0;
+    structure.header.far_sides = 0;
+    for (uint i = 0; i < 4; ++i) structure.header.reserved[i] = 0;
     if ((HAS_PAIRS ? state.active_count : primitive_count) < 2) mark_unused(structure, 0);
 }
 

@@ -10,13 +10,13 @@
 
 const uint MAGIC = 0x72676468u;
 // What the leaves hold.
-const uint KIND_TRIANGLES = 0x00020005u;
-const uint KIND_BOXES = 0x00120005u;
-const uint KIND_INSTANCES = 0x00220005u;
+const uint KIND_TRIANGLES = 0x00020006u;
+const uint KIND_BOXES = 0x00120006u;
+const uint KIND_INSTANCES = 0x00220006u;
 // The same in nodes of eight children as bytes (bvh/wide.glsl).
-const uint KIND_TRIANGLES_8Q = 0x01080005u;
-const uint KIND_BOXES_8Q = 0x01180005u;
-const uint KIND_INSTANCES_8Q = 0x01280005u;
+const uint KIND_TRIANGLES_8Q = 0x01080006u;
+const uint KIND_BOXES_8Q = 0x01180006u;
+const uint KIND_INSTANCES_8Q = 0x01280006u;
 const uint MAX_DEPTH = 96;
 // The count of a child that no tree has: its slot is unused.
 const uint UNUSED = 0xFFFFFFFFu;
@@ -109,8 +109,19 @@ struct Header {
     uint split_from;
     uint child_order;         // 1: left children are those that rays look into first that end at any hit
     uint pairs;               // of quantised trees of triangles: records that hold two
-    uint reserved[6];
+    uint near_node;           // of a quantised top level with something far: the node over what is not; otherwise 0
+    uint far_sides;           // on which sides of that node something is: bits 2 * axis, and 1 more on the positive side
+    uint reserved[4];
 };
+
+// What is far on one side: boxes of all sides lie behind the records, if there is anything far.
+struct FarBox {
+    vec3 lo;
+    vec3 hi;
+};
+
+const uint FAR_SIDES = 6;
+const uint FAR_BOX_BYTES = 24;
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer Structure {
     Header header;
@@ -121,6 +132,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer T
 layout(buffer_reference, scalar, buffer_reference_align = 4) nonprivate buffer BoxRecords { BoxRecord box[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Instances { Instance instance[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) nonprivate buffer GeometryTable { GeometryEntry entry[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) nonprivate buffer FarBoxes { FarBox box[]; };
 
 // base + index * stride: no 64-bit integers, which a device need not have.
 uvec2 address_of(uvec2 base, uint index, uint stride) {
@@ -200,5 +212,10 @@ uvec2 geometry_table_address(uvec2 structure, uint kind, uint node_slots, uint p
 
 uvec2 geometry_table_of(uvec2 structure, Header header) {
     return geometry_table_address(structure, header.kind, header.node_slots, header.primitive_count, header.pairs);
+}
+
+// Where the boxes of what is far lie: a top level has one geometry, and so no table.
+uvec2 far_boxes_of(uvec2 structure, Header header) {
+    return geometry_table_of(structure, header);
 }
 #endif

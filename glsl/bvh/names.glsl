@@ -12,6 +12,11 @@
 #define BoxRecords HedgerowBoxRecords
 #define Instances HedgerowInstances
 #define GeometryTable HedgerowGeometryTable
+#define FarBoxes HedgerowFarBoxes
+#define FarBox HedgerowFarBox
+#define FAR_SIDES HEDGEROW_FAR_SIDES
+#define FAR_BOX_BYTES HEDGEROW_FAR_BOX_BYTES
+#define far_boxes_of hedgerow_far_boxes_of
 #define triangles_of hedgerow_triangles_of
 #define address_of hedgerow_address_of
 #define records_at hedgerow_records_at

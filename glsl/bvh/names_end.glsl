@@ -11,6 +11,11 @@
 #undef BoxRecords
 #undef Instances
 #undef GeometryTable
+#undef FarBoxes
+#undef FarBox
+#undef FAR_SIDES
+#undef FAR_BOX_BYTES
+#undef far_boxes_of
 #undef triangles_of
 #undef address_of
 #undef records_at

@@ -3,7 +3,7 @@
 #define HEDGEROW_KDTREE_LAYOUT
 #include "bvh/layout.glsl"
 
-const uint KIND_KD_TREE = 0x00320005u;
+const uint KIND_KD_TREE = 0x00320006u;
 const uint KD_MAX_DEPTH = 41;
 const uint KD_MAX_NODES = 1u << 28;
 const uint KD_MAX_REFERENCES = 1u << 30;

@@ -14,6 +14,8 @@
 // loop or of a step, which shader compilers make a loop of one round of, whose writes are masked: queries through two levels are 1.09 times as
 // fast without in the loop, and again without in the steps (docs/notes/rays.md).
 //
+// Rays that meet nothing far of a top level begin at the node over what is near (src/bvh/wide/far.rs).
+//
 // Structures are of nodes of two or of nodes of eight (bvh/wide.glsl), which are walked as trace/walk_quantised.glsl does, in either level
 // beside each other. A shader may define HEDGEROW_FORMS, a constant or specialisation constant: which of them there are,
 // HEDGEROW_NODES_OF_TWO or HEDGEROW_NODES_OF_EIGHT. Rays pass what is made of others. What nobody uses costs: on lavapipe a query in nodes
@@ -268,6 +270,16 @@ void hedgerow_end(inout HedgerowRayQuery query) {
     query.is_below = false;
 }
 
+// Whether the ray meets anything that is far, of boxes on these sides.
+bool hedgerow_meets_far(HedgerowRayQuery query, FarBoxes far, uint sides) {
+    bool meets = false;
+    for (uint left = sides & (1u << FAR_SIDES) - 1u; left != 0u && !meets; left &= left - 1u) {
+        FarBox b = far.box[findLSB(left)];
+        hedgerow_enter(query.prepared, b.lo, b.hi, query.best, meets);
+    }
+    return meets;
+}
+
 // The structure that is queried is at hand.
 void hedgerow_take_top(inout HedgerowRayQuery query) {
     query.structure = query.top;
@@ -311,7 +323,8 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     query.octant = 0u;
     query.begin_slots = ALL_SLOTS;
     bool goes = false;
-    uvec2 root = uvec2(0u, HEDGEROW_NOTHING);
+    uvec2 root = uvec2(0u, HEDGEROW_NOTHING), far = uvec2(0u);
+    uint near = 0u, far_sides = 0u;
     if (any(notEqual(structure, uvec2(0)))) {
         Header header = Structure(structure).header;
         query.top_has_instances = has_instances(header.kind);
@@ -320,6 +333,9 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
         query.top_form = form_of(header);
         query.rounds = hedgerow_rounds(header.node_slots, header.primitive_count);
         root = uvec2(header.root.index, header.root.count);
+        near = header.near_node;
+        far_sides = header.far_sides;
+        far = far_boxes_of(structure, header);
         // As in Vulkan, a mask without bits lets the ray meet nothing.
         goes = hedgerow_can_be_traced(header) && cull_mask != 0u;
     }
@@ -329,7 +345,11 @@ void hedgerow_begin(out HedgerowRayQuery query, uint slot, uvec2 structure, uint
     if (hedgerow_prepare_for(hedgerow_is_in_top(query), ray, query.prepared) && goes && !skips) {
         query.index = root.x;
         query.left = root.y;
-        if (hedgerow_is_quantised(query)) hedgerow_begin_quantised(query, ray.direction, ALL_SLOTS);
+        if (hedgerow_is_quantised(query)) {
+            hedgerow_begin_quantised(query, ray.direction, ALL_SLOTS);
+            bool may_begin_near = hedgerow_is_in_top(query) && near != 0u;
+            if (may_begin_near && !hedgerow_meets_far(query, FarBoxes(far), far_sides)) query.index = near;
+        }
 #ifdef HEDGEROW_LINK_COUNTS
         if (!hedgerow_is_in_top(query)) query.at.counts = HEDGEROW_LINK_COUNTS(structure);
 #endif

@@ -15,6 +15,7 @@
 //! `active` − 1 on are unused.
 
 use super::wide::Form;
+use super::wide::far;
 use super::wide::pairs::SAVED_BY_PAIR;
 use super::wide::quantised::QuantisedNode;
 use crate::geometry::Aabb;
@@ -163,7 +164,7 @@ pub struct Triangle {
 }
 
 impl Record for Triangle {
-    const KIND: u32 = 0x0002_0005;
+    const KIND: u32 = 0x0002_0006;
 
     fn primitive(&self) -> u32 {
         self.primitive
@@ -197,7 +198,7 @@ pub struct BoxRecord {
 }
 
 impl Record for BoxRecord {
-    const KIND: u32 = 0x0012_0005;
+    const KIND: u32 = 0x0012_0006;
 
     fn primitive(&self) -> u32 {
         self.primitive
@@ -297,7 +298,7 @@ impl InstanceRecord {
 }
 
 impl Record for InstanceRecord {
-    const KIND: u32 = 0x0022_0005;
+    const KIND: u32 = 0x0022_0006;
 
     fn primitive(&self) -> u32 {
         self.instance
@@ -372,8 +373,13 @@ pub struct Header {
     pub child_order: u32,
     /// Of a quantised tree of triangles: records that hold two ([`super::wide::pairs`]). Otherwise 0.
     pub pairs: u32,
+    /// Of a quantised top level that has something far ([`super::wide::far`]): the node over what is not, where rays begin that meet nothing
+    /// far. Otherwise 0.
+    pub near_node: u32,
+    /// On which sides of that node something is: a bit each.
+    pub far_sides: u32,
     /// Zero.
-    pub reserved: [u32; 6],
+    pub reserved: [u32; 4],
 }
 
 impl Header {
@@ -527,6 +533,7 @@ impl Header {
         let nodes = self.node_slots as u64 * node_bytes(self.kind);
         let records = self.primitive_count as u64 * record_bytes;
         let records = records.saturating_sub(self.pairs as u64 * SAVED_BY_PAIR);
-        offsets_behind(nodes, records, self.geometry_count)
+        let offsets = offsets_behind(nodes, records, self.geometry_count);
+        BvhOffsets { bytes: offsets.bytes + far::bytes(self), ..offsets }
     }
 }

@@ -1,8 +1,10 @@
 //! Top levels with instances far away: the bytes of the host's, bits of codes by the spread, and what is near is opened first.
 
+use crate::common::agree::assert_agrees;
 use crate::common::backends::Ours;
 use crate::common::device;
 use crate::common::mixture::{ReadBack, diagonal, mixture, part, scaled};
+use crate::common::probe::{CONFIRM, ProbeRay, flags};
 use crate::common::shapes::icosphere;
 use crate::common::world::World;
 use hedgerow::accel::{AccelOptions, Instance, REBRAID, Tree, twin};
@@ -12,6 +14,7 @@ use hedgerow::bvh::codes::Code;
 use hedgerow::bvh::layout::Child;
 use hedgerow::bvh::wide::Form;
 use hedgerow::bvh::wide::layout::WideNode;
+use hedgerow_lab::random::SplitMix64;
 use std::collections::BTreeSet;
 use vk::BuildAccelerationStructureFlagsKHR as Flags;
 
@@ -164,6 +167,66 @@ fn all_that_is_near_is_one_child_of_the_root() {
         assert!(of_near[0].iter().copied().eq(0..near), "{what}: {of_near:?}");
         let alone = root(&[]);
         assert!(alone.iter().filter(has_near).count() > 1, "{what}: {alone:?}");
+    }
+}
+
+/// The sides of what is far, as a header has them: 2 · axis, and 1 more for the positive one.
+#[test]
+fn the_header_names_the_node_over_what_is_near_and_the_sides_of_what_is_far() {
+    let ours = Ours::on(device());
+    let header_of = |world: &World| {
+        let read = ReadBack::new(&ours, world);
+        read.top.validate().expect("valid");
+        let header = *read.top.header();
+        let Tree::OfEight(tree) = &read.top else { panic!("a fast trace has nodes of eight") };
+        let of_root = tree.nodes[0].children().into_iter().flatten().zip(below_the_root(&read));
+        let near =
+            of_root.filter(|(child, _)| !child.is_leaf() && child.index == header.near_node).map(|(_, below)| below);
+        (header.far_sides, near.last().filter(|_| header.near_node != 0))
+    };
+    let with = |far: &[Instance]| grid(4, far, Flags::PREFER_FAST_TRACE);
+    assert_eq!(header_of(&with(&[])), (0, None));
+    let all_near = Some((0..64).collect());
+    for (count, axes, e, sides) in [(1, 1, 14, 0b10), (1, 3, 60, 0b10), (20, 1, 60, 0b11), (8, 3, 9, 0b11)] {
+        assert_eq!(header_of(&with(&far(count, e, axes))), (sides, all_near.clone()), "{count} at 2^{e} in {axes}");
+    }
+    // Along y and z, and what is large but reaches into none of the others.
+    let beside =
+        [[3.0, 4000.0, 1.0], [0.0, -4000.0, 2.0], [1.0, 2.0, -9000.0]].map(|to| Instance::new(1, scaled(2.0, to)));
+    assert_eq!(header_of(&with(&beside)), (0b01_1100, all_near));
+    // What is far, and one triangle that reaches through everything: a ray may meet that anywhere.
+    let mut world = with(&far(1, 14, 1));
+    world.parts.push(part(vec![[[-1.0; 3], [1.0; 3], [1.0, -1.0, 0.0]]]));
+    world.instances.push(Instance::new(3, scaled(1000.0, [0.0; 3])));
+    assert_eq!(header_of(&world), (0, None));
+}
+
+/// From what is near to what is near, to what is far and past it, up to limits before and behind.
+#[test]
+fn rays_meet_what_is_near_and_what_is_far_as_by_brute_force() {
+    let ours = Ours::on(device());
+    let mut random = SplitMix64::new(5);
+    for axes in [1, 3] {
+        let far = far(6, 7, axes)
+            .iter()
+            .map(|far| Instance::new(2, scaled(6.0, far.transform.map(|row| row[3]))))
+            .collect::<Vec<_>>();
+        let world = grid(4, &far, Flags::PREFER_FAST_TRACE);
+        assert_ne!(ReadBack::new(&ours, &world).top.header().near_node, 0);
+        let ray = |i: usize| {
+            let origin: [f32; 3] = std::array::from_fn(|_| 1.5 + 2.5 * random.signed());
+            let target = match i % 3 {
+                0 => std::array::from_fn(|_| 1.5 + 2.0 * random.signed()),
+                _ => far[i / 3 % far.len()].transform.map(|row| row[3] + 5.0 * random.signed()),
+            };
+            let direction: [f32; 3] = std::array::from_fn(|k| target[k] - origin[k]);
+            let t_max = [f32::INFINITY, 0.5, 1.5][i / 9 % 3];
+            let which = [flags::OPAQUE, flags::OPAQUE | flags::FIRST_HIT][i / 2 % 2];
+            ProbeRay { flags: which, decision: CONFIRM, t_max, ..ProbeRay::new(origin, direction) }
+        };
+        let rays: Vec<ProbeRay> = (0..600).map(ray).collect();
+        let hits = assert_agrees(&ours, &format!("far in {axes} axes"), &world, &rays);
+        assert!(hits > 150, "{hits} hits are no test");
     }
 }
 

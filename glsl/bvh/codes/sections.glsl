@@ -108,11 +108,21 @@ uint head_of(Stretches s) {
     return alone + paired > 2 ? 2 : 3;
 }
 
+// Whether it has an edge that is longer than the longest of the core.
+bool is_longer_than_core(CodeSections s, Box b) {
+    uint longest = max(max(s.reference.x, s.reference.y), s.reference.z);
+    uint edge = 0;
+    for (uint axis = 0; axis < 3; ++axis) edge = max(edge, octaves(b.hi[axis], b.lo[axis]));
+    return edge > longest;
+}
+
 uint section_of(CodeSections s, Box b) {
     uvec3 lo = ordered(b.lo), hi = ordered(b.hi);
     if (is_inside(lo, hi, s.fences)) return SECTION_CORE;
     bool touches = all(lessThanEqual(lo, ordered(s.core.hi))) && all(greaterThanEqual(hi, ordered(s.core.lo)));
-    return touches ? SECTION_HUGE : SECTION_FAR;
+    uint section = touches ? SECTION_HUGE : SECTION_FAR;
+    for (uint round = touches ? 0 : 1; round < 1; ++round) section = is_longer_than_core(s, b) ? SECTION_HUGE : SECTION_CORE;
+    return section;
 }
 
 // The coordinate of what is not of the core, from that within the core: the lower and the upper quarter are for what is beyond.

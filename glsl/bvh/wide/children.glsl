@@ -4,6 +4,7 @@
 #define HEDGEROW_BVH_WIDE_CHILDREN
 #include "bvh/wide/choice.glsl"
 #include "bvh/wide/collapse.glsl"
+#include "bvh/wide/far.glsl"
 
 // The children so far, in the order of a walk that takes left ones first. Indexed by constants alone: they stay in registers.
 uint open_name[8];
@@ -38,6 +39,13 @@ void put_child(uint at, uint name, Child child) {
     }
 }
 
+// What names a child: by comparisons, so that all of them stay in registers.
+uint name_of_child(uint child) {
+    uint name = NO_CHILD;
+    [[unroll]] for (uint i = 0; i < 8; ++i) name = i == child ? open_name[i] : name;
+    return name;
+}
+
 // Edges of a child's box, of an area that counts.
 vec3 edges_of(Child child) {
     return scaled_edges(Box(child.lo, child.hi), source.header.area_scale);
@@ -66,6 +74,40 @@ void wait_for_children(uint slot, uint choice, uint places, bool by_cost) {
     wait(2 * slot, of_left);
 }
 
+void wait_for_nothing() {
+    waiting_next = uvec4(0u);
+    waiting_behind = uvec4(0u);
+}
+
+// Puts down what the root holds where its first child is near and all others are far from that: how many, or 0 where they are not.
+uint put_near_and_far() {
+    uint first = name_of_near();
+    if (first == NO_CHILD) return 0;
+    Child near = child_named(first);
+    put_child(0, first, near);
+    uint count = 1, waiting = 1;
+    bool all_are_far = true;
+    wait_for_nothing();
+    wait(first + 1, 1);
+    for (uint turn = 0; turn < 14 && waiting_next.x != 0u && all_are_far; ++turn) {
+        uint name = take_next() & WAITING_NAME;
+        Child other = child_named(name);
+        waiting--;
+        if (side_of(near, other) != ON_NO_SIDE) {
+            put_child(count, name, other);
+            count++;
+        } else if (is_inner(other) && count + waiting + 2 <= WIDTH) {
+            // What lies on both sides reaches over what is near: its parts may be far.
+            wait(2 * other.index + 1, 1);
+            wait(2 * other.index, 1);
+            waiting += 2;
+        } else {
+            all_are_far = false;
+        }
+    }
+    return all_are_far ? count : 0;
+}
+
 // The children of the wide node that begins with the binary node `slot`: how many.
 uint open_children(uint slot, uint level) {
     Child root = source.header.root;
@@ -75,11 +117,12 @@ uint open_children(uint slot, uint level) {
     }
     bool by_cost = level < LEVELS_BY_COST;
     uint choice = by_cost ? choices.word[slot] : 0;
-    waiting_next = uvec4(0u);
-    waiting_behind = uvec4(0u);
-    wait_for_children(slot, choice, WIDTH, by_cost);
-    // `room`: places that the choices leave free.
-    uint count = 0, room = by_cost ? WIDTH - children_by(choice) : 0;
+    uint apart = level == 0 ? put_near_and_far() : 0;
+    wait_for_nothing();
+    if (apart == 0) wait_for_children(slot, choice, WIDTH, by_cost);
+    for (uint other = apart; other-- > 1;) wait(name_of_child(other), 1);
+    // What is near stays closed. `room`: places that the choices leave free.
+    uint count = min(apart, 1), room = apart != 0 ? WIDTH - apart : by_cost ? WIDTH - children_by(choice) : 0;
     // Of n children 2 n - 2 links are taken.
     for (uint turn = 0; turn < 14 && waiting_next.x != 0u; ++turn) {
         uint next = take_next(), name = next & WAITING_NAME, places = next >> WAITING_BITS;

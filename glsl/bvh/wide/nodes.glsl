@@ -2,6 +2,7 @@
 #ifndef HEDGEROW_BVH_WIDE_NODES
 #define HEDGEROW_BVH_WIDE_NODES
 #include "bvh/wide/collapse.glsl"
+#include "bvh/wide/far.glsl"
 #include "bvh/wide/quantised.glsl"
 
 uvec2 address_of_node(uint index) {
@@ -112,6 +113,7 @@ void write_nodes() {
         uint next_node = 1 + first_children.word[o.slot];
         if (QUANTISED) write_quantised_node(at, index, o.slot, next_node, records_before(o.slot));
         else write_node(at, index, next_node);
+        if (at == 0) tell_far(next_node);
     }
 }
 #endif

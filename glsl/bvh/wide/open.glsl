@@ -16,13 +16,6 @@ bool ends_more_rays(uint first_name, uint second_name) {
     return of_first > of_second;
 }
 
-// What names a child: by comparisons, so that all of them stay in registers.
-uint name_of_child(uint child) {
-    uint name = NO_CHILD;
-    [[unroll]] for (uint i = 0; i < 8; ++i) name = i == child ? open_name[i] : name;
-    return name;
-}
-
 // The slots of so many children, four bits each, those first that end more rays for their work. Equal ones stay as they are.
 uint slots_by_hits(uint count) {
     uint order = IN_ORDER;

@@ -6,9 +6,9 @@
 //! lies beyond the quartiles by more than twice the distance between them, so that up to a quarter of all primitives may be far to one
 //! side, and as many to the other. (Tukey's inner fences are at 1.5 and his outer ones at 3 distances. At two, primitives that are spread
 //! evenly have them at 7/4 of their extent, so that what doubles their bounds is far.) Where nothing lies beyond, codes are those of the
-//! full bounds. Otherwise there are three sections: the *core*, all boxes inside the fences, encoded within its own bounds; what is *far*;
-//! and what is not inside the fences but touches the core, *huge*. So the codes of the core are the same as without the others, but for
-//! their last two bits.
+//! full bounds. Otherwise there are three sections: the *core*, all boxes inside the fences, encoded within their own bounds, and those that
+//! touch these and are no longer than they are; what is *far*; and what touches the core and is longer, *huge*. So the codes of the core are
+//! the same as without the others, but for their last two bits.
 //!
 //! A code begins with a bit for what is huge, which otherwise would lie over every node above it. The bit that sets apart what
 //! is far stands behind the first bit of each axis: only one octant of the core has the far primitives of one side in its node,
@@ -37,8 +37,10 @@ const TO_FENCES: f32 = 2.0;
 pub(super) struct Sections {
     /// What is inside is of the core.
     fences: Aabb,
-    /// The bounds of the core.
+    /// The bounds of what is inside: the core's, but for what touches them.
     pub core: Aabb,
+    /// [`octaves`] of their longest edge.
+    longest: u32,
     /// Coordinate bits before the one of what is far: none where that stands apart.
     head: u32,
     tails: [Option<Tail>; 3],
@@ -167,7 +169,8 @@ impl Sections {
             let farthest = octaves(bounds.hi[axis], lo).max(octaves(bounds.lo[axis], hi)).saturating_sub(reference);
             is_beyond.then(|| Tail { reference, shift: 30 + farthest.max(1).leading_zeros() })
         });
-        Some(Sections { fences, core, head: 0, tails })
+        let longest = (0..3).map(|i| octaves(core.hi[i], core.lo[i])).max()?;
+        Some(Sections { fences, core, longest, head: 0, tails })
     }
 
     /// The same with its far bit behind the first bit of each axis in this sequence.
@@ -178,10 +181,13 @@ impl Sections {
 
     pub fn section_of(&self, primitive: &Aabb) -> Section {
         let touches = |i: usize| !below(self.core.hi[i], primitive.lo[i]) && !below(primitive.hi[i], self.core.lo[i]);
+        // A tree whose crown reaches over the fences is no dome over everything.
+        let is_longer = |i: usize| octaves(primitive.hi[i], primitive.lo[i]) > self.longest;
         match is_inside(primitive, &self.fences) {
             true => Section::Core,
-            false if (0..3).all(touches) => Section::Huge,
-            false => Section::Far,
+            false if !(0..3).all(touches) => Section::Far,
+            false if (0..3).any(is_longer) => Section::Huge,
+            false => Section::Core,
         }
     }
 
@@ -289,6 +295,25 @@ mod tests {
             // Not huge, and far or not.
             assert!(codes[..1000].iter().all(|&head| head == 0b00), "{bits}");
             assert!(codes[1000..].iter().all(|&head| head == 0b01), "{bits}");
+        }
+    }
+
+    /// The grid reaches from 0 to 0.95 and the fences to 1.7; of the core is what lies before them, too.
+    #[test]
+    fn what_touches_the_core_and_reaches_over_the_fences_is_huge_if_it_is_longer_than_the_core() {
+        let at_the_fence = Aabb { lo: [1.5, 0.5, 0.5], hi: [1.69, 0.6, 0.6] };
+        for (edge, head) in [(0.1, 0b00), (1.6, 0b00), (1.75, 0b11), (3.0, 0b11), (1.0e30, 0b11)] {
+            for along in 0..3 {
+                let mut over = Aabb { lo: [1.65, 0.5, 0.5], hi: [1.75, 0.6, 0.6] };
+                over.hi[along] = over.lo[along] + edge;
+                over.hi[0] = over.hi[0].max(1.75);
+                let apart = Code::Emc64Var.full().with_bounds(CodeBounds::Apart).expect("it has no grid");
+                let far = Aabb { lo: [50.0; 3], hi: [50.1; 3] };
+                let all = [&grid()[..], &[at_the_fence, far, over]].concat();
+                let plan = CodePlan::new(apart, &all.iter().map(|&b| Ok::<_, u32>(b)).collect::<Vec<_>>());
+                assert_eq!(plan.encode(&far) >> 62, 0b01);
+                assert_eq!(plan.encode(&over) >> 62, head, "{edge} along {along}");
+            }
         }
     }
 

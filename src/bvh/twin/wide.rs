@@ -1,6 +1,7 @@
 //! Collapsing a `Bvh2` into a wide tree, plainly: what [`crate::bvh::wide::device`] must equal, byte for byte.
 
 mod costs;
+mod far;
 
 use self::costs::{Choice, choices_of};
 use crate::bvh::counts::LinkCount;
@@ -53,7 +54,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         let geometries = tree.geometries.clone();
         if header.active == 0 {
             let places = if is_paired::<N, R>() { Places::Units(Vec::new()) } else { Places::InOrder };
-            return Wide { header, nodes: vec![N::empty()], records: Vec::new(), places, geometries };
+            return Wide { header, nodes: vec![N::empty()], records: Vec::new(), places, geometries, far: Vec::new() };
         }
         let opened = open_all::<N, R>(tree, counts);
         let written = Written::<R>::of(&tree.records[..header.active as usize], is_paired::<N, R>());
@@ -64,6 +65,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         let mut nodes = vec![N::empty(); opened.iter().map(|o| o.node_children::<N, R>().count()).sum::<usize>() + 1];
         // Where each record of the binary tree comes to lie.
         let mut units: Vec<u32> = (0..header.active).collect();
+        let mut far = Vec::new();
         for node in &opened {
             let mut children = node.children;
             if N::FORM.is_quantised() {
@@ -90,13 +92,16 @@ impl<N: WideNode, R: Record> Wide<N, R> {
                 }
                 (child.index, child.count) = (index, 0);
             }
+            if node.place.is_none() {
+                far = far::tell_far::<N, R>(tree, &node.children, &children, &mut header);
+            }
             let index = node.place.map_or(0, |(parent, rank)| first_children[&parent] + rank);
             nodes[index as usize] = N::of(&children);
         }
         (header.node_slots, header.inner_nodes) = (nodes.len() as u32, nodes.len() as u32);
         let (records, places) = written.in_order_of(&units);
         header.pairs = places.pairs();
-        Wide { header, nodes, records, places, geometries }
+        Wide { header, nodes, records, places, geometries, far }
     }
 }
 
@@ -196,7 +201,8 @@ fn open_all<N: WideNode, R: Record>(tree: &Bvh2<R>, counts: &LinkCounts<'_>) -> 
         let mut next_level = Vec::new();
         for (root, place) in this_level {
             let is_closed = |child: &Child| level == 0 && N::FORM.is_quantised() && is_closed(tree, child);
-            let children = open(tree, &choices, (&root, level), is_closed, width, counts.ordered_by);
+            let apart = if level == 0 { far::root_links::<N, R>(tree) } else { None };
+            let children = open(tree, &choices, (&root, level, apart), is_closed, width, counts.ordered_by);
             let mut slots = [None; 8];
             if N::FORM.is_quantised() && tree.header.child_order == 0 {
                 slots = octant_slots(&children);
@@ -232,12 +238,13 @@ fn is_closed<R: Record>(tree: &Bvh2<R>, child: &Child) -> bool {
 }
 
 /// The children of a wide node: those of the binary node, of which those are opened that are given several places ([`choices_of`]); far
-/// down ([`LEVELS_BY_COST`]) the places are halved. A tree that is a leaf is its own child. Children come as a walk meets them that takes
-/// left ones first, or, where the tree's have an order, by hits.
+/// down ([`LEVELS_BY_COST`]) the places are halved. A tree that is a leaf is its own child. Of links that stand `apart` the first, which is near,
+/// stays closed, and the others begin with a place each. Children come as a walk meets them that takes left ones first, or, where the tree's
+/// have an order, by hits.
 fn open<R: Record>(
     tree: &Bvh2<R>,
     choices: &[Choice],
-    (root, level): (&Child, u32),
+    (root, level, apart): (&Child, u32, Option<Vec<u32>>),
     is_closed: impl Fn(&Child) -> bool,
     width: u32,
     ordered_by: &[LinkCount],
@@ -252,12 +259,18 @@ fn open<R: Record>(
         let left = if by_cost { choice(child).left_of(places) } else { places / 2 };
         [(2 * child.index + 1, places - left), (2 * child.index, left)]
     };
+    let child_at = |link: u32| tree.nodes[(link >> 1) as usize].children[(link & 1) as usize];
     let mut waiting = below(root, width).to_vec();
     // Places that the choices leave free.
     let mut room = if by_cost { width - choice(root).children() } else { 0 };
     let mut children = Vec::new();
+    if let Some(links) = apart {
+        room = width - links.len() as u32;
+        waiting = links[1..].iter().rev().map(|&link| (link, 1)).collect();
+        children.push((links[0], child_at(links[0])));
+    }
     while let Some((link, mut places)) = waiting.pop() {
-        let child = tree.nodes[(link >> 1) as usize].children[(link & 1) as usize];
+        let child = child_at(link);
         if by_cost && !child.is_leaf() {
             places = choice(&child).places_of(places);
             // What fits as a whole is taken in, even where sums of costs were too large to tell.

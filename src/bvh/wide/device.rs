@@ -1,6 +1,6 @@
 //! Collapsing a `Bvh2` into a wide tree on the device (glsl/bvh/wide/collapse.glsl); [`crate::bvh::twin::wide`] is the twin.
 
-use super::{Form, pairs};
+use super::{Form, far, pairs};
 use crate::bvh::counts::LinkCount;
 use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::{NODES_OFFSET, node_slots};
@@ -133,7 +133,8 @@ impl WidePass {
     pub fn sizes(&self) -> Sizes {
         let WideOptions { form, primitives, geometry_count } = self.options;
         let nodes = form.nodes_at_most(self.count);
-        let structure = form.bytes(primitives.record_bytes(), nodes, self.count, geometry_count);
+        let far = if form.is_quantised() && primitives == Primitives::Instances { far::BYTES } else { 0 };
+        let structure = form.bytes(primitives.record_bytes(), nodes, self.count, geometry_count) + far;
         Sizes { structure, scratch: self.passing_bytes() + self.lasting_bytes(), alignment: 16 }
     }
 

@@ -8,6 +8,7 @@
 //! | nodes × `node_slots` | [`Form::node_bytes`] each | [`NODES_OFFSET`] |
 //! | [`Record`] × `primitive_count` | 40, 28 or 128 each; of quantised trees two triangles may be one record of 56 ([`super::pairs`]) | behind the nodes |
 //! | [`GeometryEntry`] × `geometry_count`, where that is over 1 | 8 each | behind the records |
+//! | [`Aabb`] × 6, of a quantised top level that has something far ([`super::far`]) | 24 each | behind the records |
 //!
 //! The header is that of a `Bvh2` with another `kind`: [`Form::kind`]. The root is node 0, always, even if the whole tree is a
 //! leaf: then it has one child. `node_slots` are the nodes that there are, at least one, `primitive_count` the records in leaves.
@@ -16,9 +17,10 @@
 //! Nodes of floats hold [`Child`]ren as those of a `Bvh2` do, the first ones used, the others [`Child::UNUSED`]; records lie in
 //! the order of the binary tree. [`super::quantised`] describes quantised ones.
 
-use super::Form;
 use super::pairs::{self, Places, SAVED_BY_PAIR};
+use super::{Form, far};
 use crate::bvh::layout::{self, Child, GeometryEntry, Header, NODES_OFFSET, Record, Triangle, header_of};
+use crate::geometry::Aabb;
 use crate::{Error, Result};
 use bytemuck::Pod;
 
@@ -95,6 +97,8 @@ pub struct Wide<N: WideNode, R: Record = Triangle> {
     pub places: Places,
     /// The table of geometries; empty where there is one.
     pub geometries: Vec<GeometryEntry>,
+    /// The boxes of what is far, by sides; empty where nothing is.
+    pub far: Vec<Aabb>,
 }
 
 /// Whether two records that share an edge may be one.
@@ -118,7 +122,7 @@ impl Form {
     /// Bytes of the structure that begins with `header`: what of the memory that was given to a build is in use.
     pub const fn bytes_in_use(self, header: &Header, record_bytes: u64) -> u64 {
         let without_pairs = self.bytes(record_bytes, header.node_slots, header.primitive_count, header.geometry_count);
-        without_pairs.saturating_sub(header.pairs as u64 * SAVED_BY_PAIR)
+        without_pairs.saturating_sub(header.pairs as u64 * SAVED_BY_PAIR) + far::bytes(header)
     }
 }
 
@@ -140,7 +144,8 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         let head = NODES_OFFSET as usize;
         let records = head + header.node_slots as usize * size_of::<N>();
         let entries = if header.geometry_count > 1 { header.geometry_count as usize } else { 0 };
-        let geometries = needs as usize - entries * size_of::<GeometryEntry>();
+        let far = (needs - far::bytes(&header)) as usize;
+        let geometries = far - entries * size_of::<GeometryEntry>();
         let Some(records_there) = bytes.get(records..geometries) else {
             let (pairs, count) = (header.pairs, header.primitive_count);
             return Err(Error::InvalidStructure(format!("{pairs} pairs of {count} records: more than there are")));
@@ -151,7 +156,8 @@ impl<N: WideNode, R: Record> Wide<N, R> {
             nodes: bytemuck::pod_collect_to_vec(&bytes[head..records]),
             records: records_there,
             places,
-            geometries: bytemuck::pod_collect_to_vec(&bytes[geometries..needs as usize]),
+            geometries: bytemuck::pod_collect_to_vec(&bytes[geometries..far]),
+            far: bytemuck::pod_collect_to_vec(&bytes[far..needs as usize]),
         })
     }
 
@@ -169,6 +175,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         bytes.extend_from_slice(bytemuck::cast_slice(&self.nodes));
         bytes.extend_from_slice(&pairs::to_bytes(&self.records, &self.places));
         bytes.extend_from_slice(bytemuck::cast_slice(&self.geometries));
+        bytes.extend_from_slice(bytemuck::cast_slice(&self.far));
         bytes
     }
 }

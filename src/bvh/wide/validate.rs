@@ -1,8 +1,9 @@
 //! Walks a wide tree on the host and says what is wrong and where.
 
+use super::far;
 use super::layout::{Wide, WideNode, leaf_max};
 use crate::bvh::cover::SplitParts;
-use crate::bvh::layout::{InstanceRecord, Record};
+use crate::bvh::layout::{Header, InstanceRecord, Record};
 use crate::bvh::twin::split::around_parts;
 use crate::bvh::validate::validate_split_primitives;
 use crate::geometry::Aabb;
@@ -37,6 +38,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
         if let Some(node) = visited.iter().position(|&visited| !visited) {
             return invalid(format!("node {node} is named by none"));
         }
+        self.validate_far()?;
         match in_leaf.iter().position(|&named| !named) {
             Some(record) => invalid(format!("record {record} is in no leaf")),
             None => parts.check(&self.records),
@@ -76,6 +78,26 @@ impl<N: WideNode, R: Record> Wide<N, R> {
             return invalid(format!("{} pairs of records, and {pairs} are there", header.pairs));
         }
         self.validate_primitives()
+    }
+
+    /// Where something is far, the root names the node over what is not, and the sides that the header names, and no others, have a box.
+    fn validate_far(&self) -> Result<()> {
+        let Header { near_node, far_sides, .. } = self.header;
+        let there = if near_node == 0 { 0 } else { far::SIDES };
+        let sides: u32 = (0..).zip(&self.far).filter(|(_, b)| **b != Aabb::EMPTY).map(|(side, _)| 1 << side).sum();
+        if self.far.len() != there || sides != far_sides || (sides == 0) != (near_node == 0) {
+            let boxes = self.far.len();
+            return invalid(format!(
+                "node {near_node} is near, sides {far_sides:#b} far, and {boxes} boxes on {sides:#b}"
+            ));
+        }
+        let of_root = self.nodes[0].children();
+        let is_named = of_root.iter().flatten().any(|child| !child.is_leaf() && child.index == near_node);
+        match self.far.iter().find(|b| **b != Aabb::EMPTY && !self.header.root.bounds().contains(b)) {
+            _ if near_node != 0 && !is_named => invalid(format!("the near node {near_node} is no child of the root")),
+            Some(b) => invalid(format!("what is far has box {b:?}, outside of the root's")),
+            None => Ok(()),
+        }
     }
 
     /// The primitive order names every primitive once; of a top level, an instance may have several entries.

@@ -12,7 +12,8 @@ pub fn cost<R: Record>(tree: &Bvh2<R>, part: &Aabb, c_t: f64, c_i: f64) -> Optio
     cost_below(&tree.header, |inner| tree.nodes[inner.index as usize].children.to_vec(), part, [c_t, c_i])
 }
 
-/// The same of a tree in nodes of eight, of a step at one of them, by the boxes that rays see.
+/// The same of a tree in nodes of eight, of a step at one of them, by the boxes that rays see. Where something is far, rays begin at the node
+/// over what is near, wherever they go, and those that meet something far at the root ([`hedgerow::bvh::wide::far`]).
 pub fn cost_of_eight<R: Record>(tree: &Wide8q<R>, part: &Aabb, c_t: f64, c_i: f64) -> Option<f64> {
     let below = |inner: &Child| {
         let node = &tree.nodes[inner.index as usize];
@@ -21,7 +22,15 @@ pub fn cost_of_eight<R: Record>(tree: &Wide8q<R>, part: &Aabb, c_t: f64, c_i: f6
             None => node.children().into_iter().flatten().collect(),
         }
     };
-    cost_below(&tree.header, below, part, [c_t, c_i])
+    let cost = cost_below(&tree.header, below, part, [c_t, c_i])?;
+    let near = tree.nodes[0].children().into_iter().flatten().find(|child| child.index == tree.header.near_node);
+    let near = near.filter(|_| tree.header.near_node != 0);
+    Some(near.map_or(cost, |near| {
+        let whole = clipped_half_area(part, part);
+        let part_of = |b: &Aabb| clipped_half_area(b, part) / whole;
+        let far = tree.far.iter().map(part_of).sum::<f64>().min(1.0);
+        cost + c_t * (far - part_of(&tree.header.root.bounds()) + 1.0 - part_of(&near.bounds()))
+    }))
 }
 
 /// The same of any tree, with what is below an inner child.

@@ -193,7 +193,8 @@ impl Paged for TopGrowth {
             dt { "Cost" }
             dd {
                 "(3 · Σ area of inner nodes + 2 · Σ area of entries) / area of what stays, every box of the top level clipped to that; over the same at "
-                "e = 0. An opened instance has several entries."
+                "e = 0. An opened instance has several entries. Where rays begin at the node over what is near unless they meet something far, each "
+                "takes a step there, and one at the root as many as meet what is far: Σ area of its boxes."
             }
             dt { "Work" }
             dd { "Nodes of both levels, instances and triangles that a ray meets in the mean, over those at e = 0; geometric mean over the kinds of rays." }
