@@ -1,7 +1,8 @@
 // What a query loads: nodes, triangles and records of instances, each invocation its own.
 //
 // A shader that defines HEDGEROW_INT64 before it includes trace/query.glsl loads elements of 64 bits: see trace/long_loads.glsl. The same
-// rays then hit the same.
+// rays then hit the same. Quantised nodes it loads so where HEDGEROW_LONG_NODES, a constant or specialisation constant, is true, and otherwise
+// member by member: on lavapipe that gains on a CPU which gathers words fast, and loses on others (src/gpu/tuning.rs).
 #ifndef HEDGEROW_TRACE_QUERY_LOADS
 #define HEDGEROW_TRACE_QUERY_LOADS
 #include "bvh/wide.glsl"
@@ -17,11 +18,6 @@ struct HedgerowNames {
     uvec2 counts;
 };
 
-// Member by member in any case: by elements of 64 bits rays through two levels have 0.9 of the speed (docs/notes/rays.md).
-QuantisedNode hedgerow_quantised_node_at(uvec2 structure, uint index) {
-    return QuantisedNodes(address_of(wide_nodes_at(structure), index, QUANTISED_NODE_BYTES)).node[0];
-}
-
 // Of a node in a structure, behind the header's 128 bytes.
 uvec2 hedgerow_node_address(uvec2 structure, uint index) {
     return address_of(structure, 2u + index, 64u);
@@ -32,6 +28,18 @@ uvec2 hedgerow_node_address(uvec2 structure, uint index) {
 
 Node hedgerow_node_at(uvec2 structure, uint index) {
     return hedgerow_long_node(hedgerow_node_address(structure, index));
+}
+
+#ifndef HEDGEROW_LONG_NODES
+#define HEDGEROW_LONG_NODES false
+#endif
+
+QuantisedNode hedgerow_quantised_node_at(uvec2 structure, uint index) {
+    uvec2 at = address_of(wide_nodes_at(structure), index, QUANTISED_NODE_BYTES);
+    QuantisedNode node;
+    if (HEDGEROW_LONG_NODES) node = hedgerow_long_quantised_node(at);
+    else node = QuantisedNodes(at).node[0];
+    return node;
 }
 
 HedgerowNames hedgerow_names_at(uvec2 structure, uint index) {
@@ -64,6 +72,10 @@ Instance hedgerow_instance_at(uvec2 instances, uint index) {
 #else
 Node hedgerow_node_at(uvec2 structure, uint index) {
     return HedgerowNodes(hedgerow_node_address(structure, index)).node[0];
+}
+
+QuantisedNode hedgerow_quantised_node_at(uvec2 structure, uint index) {
+    return QuantisedNodes(address_of(wide_nodes_at(structure), index, QUANTISED_NODE_BYTES)).node[0];
 }
 
 HedgerowNames hedgerow_names_at(uvec2 structure, uint index) {

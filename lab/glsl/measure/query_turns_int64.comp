@@ -7,7 +7,9 @@ layout(constant_id = 5) const bool ONE_LEVEL = false;
 #define HEDGEROW_ONE_LEVEL ONE_LEVEL
 layout(constant_id = 6) const uint FORMS = 3;
 #define HEDGEROW_FORMS FORMS
+layout(constant_id = 7) const bool LONG_NODES = false;
 #define HEDGEROW_INT64
+#define HEDGEROW_LONG_NODES LONG_NODES
 #define IN_TURN
 #include "gpu/division.glsl"
 #include "trace/ray_query_names.glsl"

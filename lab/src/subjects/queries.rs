@@ -106,7 +106,11 @@ pub(crate) fn record(
         (true, false, true) => &shaders::MEASURE_QUERY_TURNS_INT64,
     };
     let kernel = match work {
-        None => Kernel::new(shader, tuning.group, &[any_hit, levels, rays_each, tuning.group, one_level, forms]),
+        None => {
+            let long_nodes = u32::from(tuning.nodes_in_longs);
+            let constants = [any_hit, levels, rays_each, tuning.group, one_level, forms, long_nodes];
+            Kernel::new(shader, tuning.group, &constants)
+        }
         Some(_) => Kernel::new(&shaders::MEASURE_QUERY_WORK, limits.subgroup_size, &[any_hit, 0]),
     };
     let arguments = arguments::TraceQueries { structure, rays, hits, works, first: 0, count };
