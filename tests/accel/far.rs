@@ -207,10 +207,12 @@ fn rays_meet_what_is_near_and_what_is_far_as_by_brute_force() {
     let ours = Ours::on(device());
     let mut random = SplitMix64::new(5);
     for axes in [1, 3] {
-        let far = far(6, 7, axes)
-            .iter()
-            .map(|far| Instance::new(2, scaled(6.0, far.transform.map(|row| row[3]))))
-            .collect::<Vec<_>>();
+        // Beside each other, so that a ray tells which it meets.
+        let beside = |(i, far): (usize, &Instance)| {
+            let [x, y, z] = far.transform.map(|row| row[3]);
+            Instance::new(2, scaled(6.0, [x, y + 20.0 * i as f32, z]))
+        };
+        let far: Vec<Instance> = far(6, 7, axes).iter().enumerate().map(beside).collect();
         let world = grid(4, &far, Flags::PREFER_FAST_TRACE);
         assert_ne!(ReadBack::new(&ours, &world).top.header().near_node, 0);
         let ray = |i: usize| {

@@ -42,7 +42,6 @@ layout(constant_id = 4) const bool BY_HITS = false;
 
 // src/bvh/wide/mod.rs
 const uint LEVELS_BY_COST = 24;
-const float FAR_BY = 0.5;
 const float PRIOR_WORK = 24.0;
 const uint LEVELS_AT_MOST = 64;
 // Leaves of more triangles are nodes of their own: a byte holds the units of others, if none are pairs.

@@ -4,9 +4,12 @@
 #define HEDGEROW_BVH_WIDE_FAR
 #include "bvh/wide/collapse.glsl"
 
+// src/bvh/wide/far.rs
+const float FAR_BY = 0.5;
+
 const uint ON_NO_SIDE = FAR_SIDES;
 
-// The side of what is near to which another child lies by more than half of its longest edge, the first one.
+// The side of what is near to which another child lies by more than FAR_BY of its longest edges, the first one.
 uint side_of(Child near, Child other) {
     float scale = source.header.area_scale;
     vec3 edges = scaled_edges(Box(near.lo, near.hi), scale);

@@ -106,6 +106,29 @@ mod tests {
     }
 
     #[test]
+    fn rays_that_begin_near_are_spared_the_root_but_for_those_that_meet_what_is_far() {
+        // A grid of thirty boxes over the part, and one far away.
+        let part = Aabb { lo: [0.0; 3], hi: [6.0, 5.0, 1.0] };
+        let near = (0..30).map(|i| [(i % 6) as f32, (i / 6) as f32, 0.0]).map(|lo| [lo, lo.map(|x| x + 1.0)]);
+        let far = [[1e6, 0.0, 0.0], [1e6 + 1.0, 1.0, 1.0]];
+        let mut wide = Wide8q::of(&tree(&near.chain([far]).collect::<Vec<_>>()));
+        let from_the_root = cost_of_eight(&wide, &part, 3.0, 2.0).expect("an area");
+        let inner: Vec<Child> =
+            wide.nodes[0].children().into_iter().flatten().filter(|child| !child.is_leaf()).collect();
+        assert_eq!(inner.len(), 1, "what is near has a node of its own");
+        wide.header.near_node = inner[0].index;
+        wide.far = vec![Aabb::EMPTY; 6];
+        wide.far[1] = Aabb { lo: far[0], hi: far[1] };
+        let cost = cost_of_eight(&wide, &part, 3.0, 2.0).expect("an area");
+        assert!((from_the_root - 3.0 - cost).abs() < 1e-9, "{from_the_root} {cost}");
+        // What is far reaches into the part.
+        wide.far[1] = Aabb { lo: [0.0, 0.0, 0.5], hi: [2.0, 5.0, 1.0] };
+        let met = (2.0 * 5.0 + 5.0 * 0.5 + 0.5 * 2.0) / (6.0 * 5.0 + 5.0 * 1.0 + 1.0 * 6.0);
+        let cost = cost_of_eight(&wide, &part, 3.0, 2.0).expect("an area");
+        assert!((from_the_root - 3.0 + 3.0 * met - cost).abs() < 1e-9, "{from_the_root} {cost}");
+    }
+
+    #[test]
     fn a_part_without_area_has_no_cost_and_an_empty_tree_none_to_speak_of() {
         let point = Aabb { lo: [1.0; 3], hi: [1.0; 3] };
         assert_eq!(cost(&tree(&[[[0.0; 3], [1.0; 3]]]), &point, 3.0, 2.0), None);
