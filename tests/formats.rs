@@ -7,6 +7,7 @@ use hedgerow::bvh::geometry::Geometry;
 use hedgerow::bvh::layout::{BoxRecord, Child, GeometryEntry, Header, InstanceRecord, Node, Triangle};
 use hedgerow::bvh::split::SplitReference;
 use hedgerow::bvh::wide::quantised::QuantisedNode;
+use hedgerow::geometry::Aabb;
 use hedgerow::gpu::shaders;
 use hedgerow::kdtree::layout as kdtree;
 use hedgerow::trace::kd::TreeEntry;
@@ -67,6 +68,8 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         split_from,
         child_order,
         pairs,
+        near_node,
+        far_sides,
         reserved
     });
     // `active` is a reserved word of GLSL.
@@ -109,6 +112,7 @@ fn structs() -> BTreeMap<&'static str, Layout> {
         ("Reference", layout_of!(SplitReference { lo, primitive, hi, left_out })),
         ("BoxRecord", layout_of!(BoxRecord { lo, hi, primitive })),
         ("GeometryEntry", layout_of!(GeometryEntry { first, flags })),
+        ("FarBox", layout_of!(Aabb { lo, hi })),
         (
             "Instance",
             layout_of!(InstanceRecord {

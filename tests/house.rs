@@ -18,10 +18,11 @@ const WITHOUT_TWIN: [(&str, &str); 8] = [
 ];
 
 /// What twins share, or a part of one, and is the plain form of no pass of its own.
-const SHARED_BY_TWINS: [&str; 11] = [
+const SHARED_BY_TWINS: [&str; 12] = [
     "bvh/build",
     "bvh/clusters",
     "bvh/costs",
+    "bvh/far",
     "bvh/geometry",
     "bvh/over",
     "bvh/pairs",
