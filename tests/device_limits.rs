@@ -103,12 +103,16 @@ fn rays_hit_the_same_by_loads_of_64_bits_and_without_them() {
     }
     let cpu = DeviceOptions { tuning: TuningChoice::Cpu, ..OPTIONS };
     let with = open(cpu.clone());
+    let other = open(DeviceOptions { restrict: "gathers".parse().expect("a restriction"), ..cpu.clone() });
     let without = open(DeviceOptions { restrict: "inexact".parse().expect("a restriction"), ..cpu });
     assert_eq!((with.limits.int64, without.limits.int64), (with.tuning.trace.in_longs, false));
+    // Nodes of eight are loaded so by one of the two, and member by member by the other.
+    let [nodes, others] = [&with, &other].map(|device| device.tuning.trace.nodes_in_longs);
+    assert_eq!(nodes ^ others, with.limits.int64);
     let (never, always) = (Wide::Never, Wide::Always);
     let expected = hits(&without, never, Forms::OF_TWO, &scene, &rays);
     assert!(expected.iter().filter(|hit| hit.is_some()).count() > 500);
-    for device in [&with, &without] {
+    for device in [&with, &other, &without] {
         let met = [Forms::OF_TWO, Forms::ALL].map(|forms| (never, forms));
         for (wide, forms) in met.into_iter().chain([Forms::OF_EIGHT, Forms::ALL].map(|forms| (always, forms))) {
             assert!(hits(device, wide, forms, &scene, &rays) == expected, "{wide:?} {forms:?}");

@@ -159,7 +159,8 @@ pub struct TraceTuning {
     pub in_vectors: bool,
     /// Whether each lane loads them in elements of 64 bits, where it loads for itself and not in vectors.
     pub in_longs: bool,
-    /// Whether queries load quantised nodes so, too (`HEDGEROW_LONG_NODES`).
+    /// Whether queries load quantised nodes so, too (`HEDGEROW_LONG_NODES`): on a CPU that gathers words fast they have 0.92 of the speed then
+    /// (an Intel Xeon with AVX-512), and on others 1.15 times (an AMD EPYC without it; lavapipe of Mesa 26, docs/notes/rays.md).
     pub nodes_in_longs: bool,
     /// Whether rays meet the children of quantised nodes by octants, or by distance.
     pub by_octant: bool,
@@ -238,7 +239,7 @@ impl Tuning {
                 in_vectors: false,
                 // Lanes gather: half of the gathers.
                 in_longs: limits.int64,
-                nodes_in_longs: limits.int64 && !gathers_words_fast(),
+                nodes_in_longs: limits.int64 && !limits.gathers_words_fast,
                 by_octant: lane_by_lane,
             },
         }
@@ -308,22 +309,6 @@ impl Tuning {
                 by_octant: true,
             },
         }
-    }
-}
-
-/// Whether the host's CPU, which a CPU's driver runs on, gathers words in one fast instruction, as Intel's do. Queries through quantised nodes in
-/// elements of 64 bits have 0.92 of the speed there (a Xeon with AVX-512), and 1.11 to 1.18 times the speed on an AMD EPYC without
-/// AVX-512, where each lane of a gather is a branch and a load (lavapipe of Mesa 26; docs/notes/rays.md).
-fn gathers_words_fast() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    {
-        // The vendor's name, in the order of the registers.
-        let name = std::arch::x86_64::__cpuid(0);
-        [name.ebx, name.edx, name.ecx].map(u32::to_le_bytes).concat() == b"GenuineIntel"
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    {
-        false
     }
 }
 

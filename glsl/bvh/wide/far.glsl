@@ -32,42 +32,32 @@ uint name_of_near() {
     return is_inner(child_named(name)) ? name : NO_CHILD;
 }
 
-FarBox far_box(Child near, uint first, uint side) {
-    FarBox b = FarBox(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
-    for (uint s = 0; s < 8; ++s) {
-        uint name = slots.word[s];
-        if (name == NO_CHILD || name == first) continue;
-        Child other = child_named(name);
-        if (side_of(near, other) == side) b = FarBox(min(b.lo, other.lo), max(b.hi, other.hi));
-    }
-    return b;
-}
-
-// Tells in the header, which is written, what is far of the root's children; the nodes among them begin with `next_node`.
+// Tells in the header, which is written, what is far of the root's children, and writes the boxes of it; the nodes among them begin with
+// `next_node`. Where not all is far but the near one, what was written lies behind what is in use.
 void tell_far(uint next_node) {
     uint first = name_of_near();
     if (first == NO_CHILD) return;
     Child near = child_named(first);
-    uint near_node = 0, others = 0;
-    bool all_are_far = true;
+    FarBoxes boxes = FarBoxes(far_boxes_of(target, Structure(target).header));
+    FarBox nothing = FarBox(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
+    for (uint side = 0; side < FAR_SIDES; ++side) boxes.box[side] = nothing;
+    uint near_node = 0, sides = 0;
     for (uint s = 0; s < 8; ++s) {
         uint name = slots.word[s];
         if (name == NO_CHILD) continue;
         Child child = child_named(name);
-        if (name == first) near_node = next_node;
-        else all_are_far = all_are_far && side_of(near, child) != ON_NO_SIDE;
-        others += name == first ? 0 : 1;
+        if (name == first) {
+            near_node = next_node;
+        } else {
+            uint side = side_of(near, child);
+            if (side == ON_NO_SIDE) return;
+            FarBox b = boxes.box[side];
+            boxes.box[side] = FarBox(min(b.lo, child.lo), max(b.hi, child.hi));
+            sides |= 1u << side;
+        }
         next_node += is_wide_node(child) ? 1 : 0;
     }
-    if (near_node == 0 || others == 0 || !all_are_far) return;
-    Header header = Structure(target).header;
-    FarBoxes boxes = FarBoxes(far_boxes_of(target, header));
-    uint sides = 0;
-    for (uint side = 0; side < FAR_SIDES; ++side) {
-        FarBox b = far_box(near, first, side);
-        boxes.box[side] = b;
-        sides |= b.lo.x <= b.hi.x ? 1u << side : 0u;
-    }
+    if (near_node == 0 || sides == 0) return;
     Structure(target).header.near_node = near_node;
     Structure(target).header.far_sides = sides;
 }

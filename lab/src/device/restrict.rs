@@ -19,6 +19,8 @@ pub struct Restrict {
     pub workgroup_count: Option<u32>,
     /// Valid bits of a timestamp, at most; 0 for a queue family without timestamps.
     pub timestamp_bits: Option<u32>,
+    /// Gathers are taken to be fast where they are slow, and slow where they are fast.
+    pub other_gathers: bool,
     /// Buffers are filled and read through staging memory, as on a GPU with memory of its own.
     pub staged: bool,
 }
@@ -32,6 +34,7 @@ impl Restrict {
         workgroup_invocations: None,
         workgroup_count: None,
         timestamp_bits: None,
+        other_gathers: false,
         staged: false,
     };
 
@@ -47,6 +50,7 @@ impl Restrict {
         at_most(&mut limits.workgroup_invocations, self.workgroup_invocations);
         at_most(&mut limits.workgroup_count, self.workgroup_count);
         at_most(&mut limits.timestamp_bits, self.timestamp_bits);
+        limits.gathers_words_fast ^= self.other_gathers;
         let size = self.subgroup_size.unwrap_or(limits.subgroup_size);
         if self.inexact || size != limits.subgroup_size {
             limits.subgroup_is_exact = false;
@@ -60,7 +64,7 @@ impl Restrict {
 impl FromStr for Restrict {
     type Err = String;
 
-    /// Reads a list such as `subgroup=32,inexact,shared=16384,invocations=128,groups=65535,timestamps=0,staged`.
+    /// Reads a list such as `subgroup=32,inexact,shared=16384,invocations=128,groups=65535,timestamps=0,gathers,staged`.
     fn from_str(text: &str) -> Result<Restrict, String> {
         let mut restrict = Restrict::default();
         for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
@@ -76,10 +80,11 @@ impl FromStr for Restrict {
                 "groups" => restrict.workgroup_count = number()?,
                 "timestamps" => restrict.timestamp_bits = number()?,
                 "inexact" if value.is_empty() => restrict.inexact = true,
+                "gathers" if value.is_empty() => restrict.other_gathers = true,
                 "staged" if value.is_empty() => restrict.staged = true,
                 _ => {
                     return Err(format!(
-                        "{part:?} restricts nothing; take subgroup=, shared=, invocations=, groups=, timestamps=, inexact or staged"
+                        "{part:?} restricts nothing; take subgroup=, shared=, invocations=, groups=, timestamps=, inexact, gathers or staged"
                     ));
                 }
             }

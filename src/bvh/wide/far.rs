@@ -1,9 +1,9 @@
 //! What is far from the rest of a top level: boxes by which rays tell that they meet none of it (glsl/bvh/wide/far.glsl).
 //!
-//! The root of a quantised top level that has something far holds that, and one node over everything else, the *near* one: in its cells, as
-//! coarse as it is large, nothing near could be told from the rest. A ray of what is near would visit it for nothing. So the near node is named by the
-//! header ([`Header::near_node`]), and a ray that meets none of the boxes of what is far, as floats behind the records, begins there. All
-//! others begin at the root, as rays of those do that know nothing of this.
+//! Where something is far, the root of a quantised top level holds that, and one node over everything else, the *near* one. (The root's cells
+//! are as coarse as it is large: smaller boxes of what is near would all be the same there.) A ray among what is near would visit the root for
+//! nothing. So the header names the near node ([`Header::near_node`]), and boxes of what is far lie behind the records, as floats. A ray that
+//! meets none of them begins at the near node, and all others at the root.
 //!
 //! Boxes are those of the root's other children by sides of the near one, six in all: one around all that lie farther out than half of its
 //! longest edge to that side. Sides on which nothing is have no bit in [`Header::far_sides`], and a box that holds nothing.
@@ -38,14 +38,17 @@ pub(crate) fn side_of(near: &Aabb, other: &Aabb, area_scale: f32) -> Option<usiz
     })
 }
 
+/// The sides that have a box, a bit each.
+pub(crate) fn sides_of(boxes: &[Aabb]) -> u32 {
+    (0..).zip(boxes).filter(|(_, b)| **b != Aabb::EMPTY).map(|(side, _)| 1 << side).sum()
+}
+
 /// What is far of a root's other children, by sides of the near one; empty where one of them is not, or there are none.
 pub(crate) fn boxes_of<'a>(near: &Child, others: impl Iterator<Item = &'a Child>, area_scale: f32) -> Vec<Aabb> {
     let mut boxes = vec![Aabb::EMPTY; SIDES];
-    let mut any = false;
     for other in others {
         let Some(side) = side_of(&near.bounds(), &other.bounds(), area_scale) else { return Vec::new() };
         boxes[side] = boxes[side].union(&other.bounds());
-        any = true;
     }
-    if any { boxes } else { Vec::new() }
+    if sides_of(&boxes) == 0 { Vec::new() } else { boxes }
 }

@@ -84,7 +84,7 @@ impl<N: WideNode, R: Record> Wide<N, R> {
     fn validate_far(&self) -> Result<()> {
         let Header { near_node, far_sides, .. } = self.header;
         let there = if near_node == 0 { 0 } else { far::SIDES };
-        let sides: u32 = (0..).zip(&self.far).filter(|(_, b)| **b != Aabb::EMPTY).map(|(side, _)| 1 << side).sum();
+        let sides = far::sides_of(&self.far);
         if self.far.len() != there || sides != far_sides || (sides == 0) != (near_node == 0) {
             let boxes = self.far.len();
             return invalid(format!(
@@ -221,6 +221,7 @@ mod tests {
     use crate::bvh::sah::Collapse;
     use crate::bvh::twin::lbvh;
     use crate::bvh::wide::layout::{Wide4, Wide8q};
+    use crate::geometry::Aabb;
 
     fn tree() -> crate::bvh::layout::Bvh2 {
         let positions: Vec<[f32; 3]> =
@@ -283,6 +284,39 @@ mod tests {
         ];
         for (says, break_it) in breaks {
             let mut tree = Wide8q::of(&tree());
+            break_it(&mut tree);
+            let error = tree.validate().expect_err(says).to_string();
+            assert!(error.contains(says), "{says}: {error}");
+        }
+    }
+
+    /// As if all on the positive side of the x axis were far from the first node below the root.
+    fn with_something_far() -> Wide8q {
+        let mut tree = Wide8q::of(&tree());
+        (tree.header.near_node, tree.header.far_sides) = (tree.nodes[0].first_child, 0b10);
+        tree.far = vec![Aabb::EMPTY; 6];
+        tree.far[1] = tree.header.root.bounds();
+        tree
+    }
+
+    #[test]
+    fn every_broken_rule_of_what_is_far_is_found_and_named() {
+        with_something_far().validate().expect("valid");
+        type Break = fn(&mut Wide8q);
+        let breaks: [(&str, Break); 7] = [
+            ("is near, sides 0b10 far, and 0 boxes", |t| t.far.clear()),
+            ("is near, sides 0b11 far, and 6 boxes on 0b10", |t| t.header.far_sides = 0b11),
+            ("is near, sides 0b10 far, and 6 boxes on 0b0", |t| t.far[1] = Aabb::EMPTY),
+            ("node 0 is near", |t| t.header.near_node = 0),
+            ("is no child of the root", |t| t.header.near_node = 0xFFFF),
+            ("outside of the root's", |t| t.far[1].hi[2] += 1.0),
+            ("node 1 is near, sides 0b0 far, and 6 boxes on 0b0", |t| {
+                t.header.far_sides = 0;
+                t.far[1] = Aabb::EMPTY;
+            }),
+        ];
+        for (says, break_it) in breaks {
+            let mut tree = with_something_far();
             break_it(&mut tree);
             let error = tree.validate().expect_err(says).to_string();
             assert!(error.contains(says), "{says}: {error}");

@@ -1,7 +1,7 @@
 //! What is far from the rest of a top level ([`crate::bvh::wide::far`]): the root's children then, and what the header says of them.
 
 use crate::bvh::layout::{Bvh2, Child, Header, InstanceRecord, Record};
-use crate::bvh::wide::far::{boxes_of, side_of};
+use crate::bvh::wide::far::{boxes_of, side_of, sides_of};
 use crate::bvh::wide::layout::{Slots, WideNode};
 use crate::geometry::Aabb;
 
@@ -47,7 +47,7 @@ pub(super) fn tell_far<N: WideNode, R: Record>(
     let boxes = boxes_of(near, others, tree.header.area_scale);
     if !boxes.is_empty() {
         header.near_node = written[slot].map_or(0, |child| child.index);
-        header.far_sides = (0..).zip(&boxes).filter(|(_, b)| **b != Aabb::EMPTY).map(|(side, _)| 1 << side).sum();
+        header.far_sides = sides_of(&boxes);
     }
     boxes
 }
