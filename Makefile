@@ -50,13 +50,12 @@ PEER_BUILDERS ?= lbvh,lbvh:collapse=off,driver-fast-build,driver-fast-trace,obvh
 QUICK := --runs 3 --structures 1024 --instances 10000 --size 80x60 --frames 7
 QUICK_SCENES := scenes/hall.glb scenes/pine_hill.inst gen:city:280
 # Seconds for the whole suite; compiling does not count, but for that of shaders by a driver that has none in its cache.
-TEST_BOUND ?= 2400
+TEST_BOUND ?= 3000
 WITHIN := $(if $(shell command -v timeout),timeout --kill-after 10 $(TEST_BOUND))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
-RUN := $(WITHIN) $(CARGO) $(if $(NEXTEST),nextest run,test) --release
-SUITE := $(RUN) --features $(FEATURES)
+SUITE := $(WITHIN) $(if $(NEXTEST),scripts/suite.sh $(FEATURES),$(CARGO) test --release --features $(FEATURES))
 # What the tuning changes: tests of the library on the device. (Warming tests both tunings by itself; the others named are of the host.)
-TUNED := $(if $(NEXTEST),-E 'package(hedgerow) & !test(/^(warming|bvh::heuristics|bvh::host|kdtree::host|kdtree::merge)::/)')
+TUNED := $(if $(NEXTEST),'package(hedgerow) & !test(/^(warming|bvh::heuristics|bvh::host|kdtree::host|kdtree::merge)::/)')
 # What depends on how many lanes a subgroup has: groups of `hedgerow check`.
 WIDTH_GROUPS := scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,child-order,ray-counts,kd-build,kd-merge,trace,trace-kd
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)

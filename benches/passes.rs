@@ -16,7 +16,7 @@ use hedgerow::bvh::layout::{Header, Triangle};
 use hedgerow::trace::tracer::{self, Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::Result;
-use hedgerow_lab::device::{Buffer, Device, DeviceOptions, DriverTracing};
+use hedgerow_lab::device::{Buffer, Device, DeviceOptions, DriverTracing, Validation};
 use hedgerow_lab::experiments::accel::batch::{Batch, Workload};
 use hedgerow_lab::experiments::accel::points::Submission;
 use hedgerow_lab::rays::kinds::{self, RayKind, RayOptions};
@@ -28,7 +28,8 @@ const SIZE: [u32; 2] = [256, 192];
 
 fn device() -> Device {
     let wanted = std::env::var("HEDGEROW_DEVICE").ok();
-    Device::new(&DeviceOptions { wanted, validation: false, ..DeviceOptions::default() }).expect("a device that fits")
+    Device::new(&DeviceOptions { wanted, validation: Validation::Off, ..DeviceOptions::default() })
+        .expect("a device that fits")
 }
 
 fn scene() -> Scene {
@@ -184,7 +185,7 @@ fn batch(c: &mut Criterion) {
     let wanted = std::env::var("HEDGEROW_DEVICE").ok();
     let options = DeviceOptions {
         wanted,
-        validation: false,
+        validation: Validation::Off,
         driver_tracing: Some(DriverTracing::Query),
         ..DeviceOptions::default()
     };

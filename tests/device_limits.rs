@@ -4,9 +4,9 @@ use crate::common::{OPTIONS, open};
 use hedgerow::accel::{AccelOptions, Wide};
 use hedgerow::ash::vk;
 use hedgerow::gpu::scan::{Scan, ScanBuffers};
-use hedgerow::gpu::{Timestamps, TuningChoice};
+use hedgerow::gpu::{Recorder, Timestamps, TuningChoice};
 use hedgerow::trace::{Hit, Query, Ray};
-use hedgerow_lab::device::{Device, DeviceOptions};
+use hedgerow_lab::device::{Device, DeviceOptions, Validation};
 use hedgerow_lab::random::SplitMix64;
 use hedgerow_lab::scene::{Instances, LoadOptions, load_instances};
 use hedgerow_lab::subjects::device_rays::RayBuffers;
@@ -22,7 +22,7 @@ fn restricted(text: &str) -> Device {
 
 /// A device with all that is optional, without the validation layers, which refuse extensions that are younger than they are.
 fn with_everything() -> Device {
-    let options = DeviceOptions { validation: false, maximal_reconvergence: true, ..OPTIONS };
+    let options = DeviceOptions { validation: Validation::Off, maximal_reconvergence: true, ..OPTIONS };
     Device::new(&options).expect("a device")
 }
 
@@ -134,6 +134,21 @@ fn without_timestamps_a_submit_is_one_phase_by_the_hosts_clock() {
     assert_eq!(phases.iter().map(|phase| phase.name).collect::<Vec<_>>(), ["submit"]);
     assert!(phases[0].milliseconds > 0.0);
     assert_eq!(device.timer(), "wall");
+}
+
+#[test]
+fn phases_that_there_is_no_room_for_are_one() {
+    let device = crate::common::device();
+    let mut timestamps = Timestamps::new(device, 2).expect("a query pool");
+    for (recorded, told) in [(1, vec!["a"]), (2, vec!["a", "b"]), (4, vec!["a", Timestamps::REST])] {
+        let record = |recorder: &mut Recorder| {
+            ["a", "b", "c", "d"][..recorded].iter().for_each(|name| recorder.phase(name));
+            Ok(())
+        };
+        device.run(Some(&mut timestamps), record).expect("it runs");
+        let phases = timestamps.phases().expect("phases");
+        assert_eq!(phases.iter().map(|phase| phase.name).collect::<Vec<_>>(), told);
+    }
 }
 
 /// As on a GPU with memory of its own.

@@ -74,12 +74,12 @@ KdPlane best_of_bins(Box cell, float area_scale, uint count) {
         uint first = 2u * BINS * axis, left = 0, right = count;
         for (uint base = 0; base + 1u < BINS; base += gl_WorkGroupSize.x) {
             uint bin = base + gl_LocalInvocationIndex;
-            uint begin = bin < BINS ? counters[first + bin] : 0u, end = bin < BINS ? counters[first + BINS + bin] : 0u;
-            uint begun, ended;
-            uint own_left = left + sum_before(begin, begun) + begin;
-            uint own_right = right - sum_before(end, ended) - end;
-            left += begun;
-            right -= ended;
+            uvec2 faces = uvec2(0), all_faces;
+            if (bin < BINS) faces = uvec2(counters[first + bin], counters[first + BINS + bin]);
+            uvec2 passed = faces + sum_before(faces, all_faces);
+            uint own_left = left + passed.x, own_right = right - passed.y;
+            left += all_faces.x;
+            right -= all_faces.y;
             if (bin + 1u < BINS) {
                 float at = plane_at(planes, bin + 1u);
                 bool planar_left;

@@ -299,44 +299,75 @@ uint task_of_chunk(uint of_level, uint chunk) {
 
 // ---- workgroups ----
 
-// Of each subgroup; a subgroup may be smaller than the device says. Never a short array: Mesa would unroll the loops over it.
-shared uint partial[gl_WorkGroupSize.x < 64u ? 64u : gl_WorkGroupSize.x];
-shared uint agreed;
+// Of each subgroup, up to four things at a time: each barrier is a place where a workgroup waits and where drivers compile more. A
+// subgroup may be smaller than the device says. Never a short array: Mesa would unroll the loops over it.
+shared uvec4 partial[gl_WorkGroupSize.x < 64u ? 64u : gl_WorkGroupSize.x];
+shared uvec2 agreed;
+
+// What each subgroup has of something, for all to read.
+void exchange(uvec4 own) {
+    barrier();
+    if (subgroupElect()) partial[gl_SubgroupID] = own;
+    barrier();
+}
+
+// Sums within subgroups become those of the workgroup.
+void add_subgroups(inout uvec4 before, inout uvec4 total) {
+    if (gl_NumSubgroups == 1u) return;
+    exchange(total);
+    total = uvec4(0);
+    for (uint s = 0; s < gl_NumSubgroups; ++s) {
+        if (s < gl_SubgroupID) before += partial[s];
+        total += partial[s];
+    }
+}
 
 // The sum of what lanes before have, and of all.
 uint sum_before(uint value, out uint total) {
-    uint before = subgroupExclusiveAdd(value);
+    uvec4 before = uvec4(subgroupExclusiveAdd(value), uvec3(0)), all = uvec4(subgroupAdd(value), uvec3(0));
+    add_subgroups(before, all);
+    total = all.x;
+    return before.x;
+}
+
+uvec2 sum_before(uvec2 value, out uvec2 total) {
+    uvec4 before = uvec4(subgroupExclusiveAdd(value), uvec2(0)), all = uvec4(subgroupAdd(value), uvec2(0));
+    add_subgroups(before, all);
+    total = all.xy;
+    return before.xy;
+}
+
+uvec4 sum_before(uvec4 value, out uvec4 total) {
+    uvec4 before = subgroupExclusiveAdd(value);
     total = subgroupAdd(value);
-    if (gl_NumSubgroups > 1u) {
-        barrier();
-        if (subgroupElect()) partial[gl_SubgroupID] = total;
-        barrier();
-        total = 0;
-        for (uint s = 0; s < gl_NumSubgroups; ++s) {
-            if (s < gl_SubgroupID) before += partial[s];
-            total += partial[s];
-        }
-    }
+    add_subgroups(before, total);
     return before;
 }
 
-uint least_of_all(uint value) {
-    uint least = subgroupMin(value);
+// Of each of three numbers the least.
+uvec3 least_of_all(uvec3 value) {
+    uvec3 least = subgroupMin(value);
     if (gl_NumSubgroups > 1u) {
-        barrier();
-        if (subgroupElect()) partial[gl_SubgroupID] = least;
-        barrier();
-        for (uint s = 0; s < gl_NumSubgroups; ++s) least = min(least, partial[s]);
+        exchange(uvec4(least, 0u));
+        for (uint s = 0; s < gl_NumSubgroups; ++s) least = min(least, partial[s].xyz);
     }
     return least;
 }
 
-// The value of the first invocation, for all.
-uint agree(uint value) {
+uint least_of_all(uint value) {
+    return least_of_all(uvec3(value)).x;
+}
+
+// The values of the first invocation, for all.
+uvec2 agree(uvec2 value) {
     barrier();
     if (gl_LocalInvocationIndex == 0u) agreed = value;
     barrier();
     return agreed;
+}
+
+uint agree(uint value) {
+    return agree(uvec2(value, 0u)).x;
 }
 
 // Makes what the workgroup has written available, before its first invocation counts it as arrived.

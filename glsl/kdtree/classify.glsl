@@ -122,11 +122,7 @@ void kd_classify_chunk(uint chunk, uint of_level) {
         for (uint block = begin; block < end; block += BLOCK) {
             classify_block(references, block, min(block + BLOCK, end), t, of_level, found);
         }
-        uint total;
-        sum_before(found.x, total);
-        sides.x = total;
-        sum_before(found.y, total);
-        sides.y = total;
+        sum_before(found, sides);
     }
     if (gl_LocalInvocationIndex == 0u) chunk_sides().side[chunk] = sides;
     barrier();

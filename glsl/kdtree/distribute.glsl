@@ -26,19 +26,17 @@ void distribute_references(KdReferences from, KdReferences to, uint begin, uint 
     for (uint base = begin; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
         uint side = i < end ? sides.word[i] : 0u;
-        uvec2 total;
-        uint left = at.x + sum_before(side & IS_LEFT, total.x);
-        uint right = at.y + sum_before(side >> 1 & 1u, total.y);
+        uvec2 total, to_side = at + sum_before(uvec2(side & IS_LEFT, side >> 1 & 1u), total);
         if (side != 0u) {
             KdReference own = from.reference[i];
-            if ((side & IS_LEFT) != 0u) to.reference[left] = own;
+            if ((side & IS_LEFT) != 0u) to.reference[to_side.x] = own;
             if ((side & IS_RIGHT) != 0u) {
                 uint waits = side >> 2;
                 if (waits != 0u) {
                     own.lo = from.reference[waits - 1u].lo;
                     own.hi = from.reference[waits - 1u].hi;
                 }
-                to.reference[right] = own;
+                to.reference[to_side.y] = own;
             }
         }
         at += total;

@@ -133,10 +133,9 @@ void kd_count(uint tile) {
             longest = max(longest, bits);
         }
     }
-    uint all_found, all_octaves, all_with_octave;
-    sum_before(found, all_found);
-    sum_before(octaves, all_octaves);
-    sum_before(with_octave, all_with_octave);
+    uvec4 all;
+    sum_before(uvec4(found, octaves, with_octave, 0u), all);
+    uint all_found = all.x, all_octaves = all.y, all_with_octave = all.z;
     longest = subgroupMax(longest);
     status = subgroupOr(status);
     if (subgroupElect()) {

@@ -66,13 +66,20 @@ bool is_better(KdPlane a, KdPlane b) {
 // Of the best planes of all lanes the best.
 KdPlane best_of_all(KdPlane own) {
     KdPlane best;
-    best.cost = least_of_all(own.cost);
+    best.cost = subgroupMin(own.cost);
     bool is_candidate = own.cost == best.cost;
-    best.axis = least_of_all(is_candidate ? own.axis : NONE);
+    best.axis = subgroupMin(is_candidate ? own.axis : NONE);
     is_candidate = is_candidate && own.axis == best.axis;
-    best.place = least_of_all(is_candidate ? own.place : NONE);
+    best.place = subgroupMin(is_candidate ? own.place : NONE);
     // Where planes are one, so are their sides.
-    best.planar_left = least_of_all(is_candidate && own.place == best.place ? (own.planar_left ? 1u : 0u) : NONE) == 1u;
+    best.planar_left = subgroupMin(is_candidate && own.place == best.place ? (own.planar_left ? 1u : 0u) : NONE) == 1u;
+    if (gl_NumSubgroups > 1u) {
+        exchange(uvec4(best.cost, best.axis, best.place, best.planar_left ? 1u : 0u));
+        for (uint s = 0; s < gl_NumSubgroups; ++s) {
+            KdPlane other = KdPlane(partial[s].x, partial[s].y, partial[s].z, partial[s].w == 1u);
+            if (is_better(other, best)) best = other;
+        }
+    }
     return best;
 }
 #endif

@@ -13,12 +13,12 @@ bool order_subtrees(uint tile, out uvec2 used) {
     uvec2 sum = uvec2(0);
     for (uint base = tile * TILE; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
-        uint nodes = i < end ? subtrees.subtree[i].nodes : 0u, references = i < end ? subtrees.subtree[i].references : 0u;
-        uvec2 total;
-        uint node_at = sum.x + sum_before(nodes, total.x), reference_at = sum.y + sum_before(references, total.y);
+        uvec2 own = uvec2(0), total;
+        if (i < end) own = uvec2(subtrees.subtree[i].nodes, subtrees.subtree[i].references);
+        uvec2 before = sum + sum_before(own, total);
         if (i < end) {
-            subtrees.subtree[i].first_node = node_at;
-            subtrees.subtree[i].first_reference = reference_at;
+            subtrees.subtree[i].first_node = before.x;
+            subtrees.subtree[i].first_reference = before.y;
         }
         sum += total;
     }

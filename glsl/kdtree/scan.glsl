@@ -13,7 +13,7 @@ uvec2 scan_pairs(KdSides pairs, uint begin, uint end) {
     for (uint base = begin; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
         uvec2 own = i < end ? pairs.side[i] : uvec2(0), total;
-        uvec2 before = uvec2(sum_before(own.x, total.x), sum_before(own.y, total.y));
+        uvec2 before = sum_before(own, total);
         if (i < end) pairs.side[i] = sum + before;
         sum += total;
     }
@@ -117,9 +117,16 @@ void add_task(inout Sums sums, uint count, uint depth) {
     sums.subtree_references += is_subtree(count, depth) ? count : 0u;
 }
 
-// Adds what all invocations have of one thing; returns what those before have, behind what there was.
+// Adds what all invocations have of something; returns what those before have, behind what there was.
 uint add_all(inout uint sum, uint own) {
     uint total, before = sum + sum_before(own, total);
+    sum += total;
+    return before;
+}
+
+// The same of two things.
+uvec2 add_all(inout uvec2 sum, uvec2 own) {
+    uvec2 total, before = sum + sum_before(own, total);
     sum += total;
     return before;
 }
@@ -135,15 +142,15 @@ uvec3 unpacked(uint word) {
 
 // Adds what the invocations of a workgroup have of tasks, of up to 512, and of the leaves and splits that they are of.
 void add_all_tasks(inout Sums sums, Sums own) {
-    uint kinds = 0, fates = 0;
-    add_all(kinds, packed(own.tasks, own.subtrees, own.counters));
-    add_all(fates, packed(own.leaves, own.inner, 0u));
-    add_all(sums.chunks, own.chunks);
-    add_all(sums.subtree_references, own.subtree_references);
-    uvec3 of_kind = unpacked(kinds), of_fate = unpacked(fates);
+    uint kinds = packed(own.tasks, own.subtrees, own.counters), fates = packed(own.leaves, own.inner, 0u);
+    uvec4 all;
+    sum_before(uvec4(kinds, fates, own.chunks, own.subtree_references), all);
+    uvec3 of_kind = unpacked(all.x), of_fate = unpacked(all.y);
     sums.tasks += of_kind.x;
     sums.subtrees += of_kind.y;
     sums.counters += of_kind.z;
+    sums.chunks += all.z;
+    sums.subtree_references += all.w;
     sums.leaves += of_fate.x;
     sums.inner += of_fate.y;
 }
@@ -152,7 +159,9 @@ void add_all_tasks(inout Sums sums, Sums own) {
 void kd_sum_tile(uint tile, uint of_level) {
     KdTasks tasks = tasks_of(of_level);
     Sums own = no_sums(), sums = no_sums();
-    uint end = min(tile * TILE + TILE, build_state().task_count[of_level]), cut = 0;
+    uint end = min(tile * TILE + TILE, build_state().task_count[of_level]);
+    // References of leaves, and of all that is cut.
+    uvec2 all = uvec2(0);
     for (uint base = tile * TILE; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
         KdTask t = tasks.task[min(i, end - 1u)];
@@ -164,15 +173,15 @@ void kd_sum_tile(uint tile, uint of_level) {
             add_task(own, fate.sides.y, t.depth + 1u);
         }
         own.leaves += is_leaf ? 1u : 0u;
-        uint leaf = add_all(sums.leaf_references, is_leaf ? t.count : 0u);
-        uint all_cut = add_all(cut, is_leaf || is_split ? t.count : 0u);
+        uvec2 before = add_all(all, uvec2(is_leaf ? t.count : 0u, is_leaf || is_split ? t.count : 0u));
         if (is_leaf || is_split) {
-            tasks.task[i].leaf = leaf;
-            tasks.task[i].cut = all_cut;
+            tasks.task[i].leaf = before.x;
+            tasks.task[i].cut = before.y;
         }
     }
     add_all_tasks(sums, own);
-    sums.split_references = cut - sums.leaf_references;
+    sums.leaf_references = all.x;
+    sums.split_references = all.y - all.x;
     if (gl_LocalInvocationIndex == 0u) task_tiles().tile[tile] = sums;
 }
 
@@ -289,14 +298,15 @@ uint write_tasks(uint of_level, KdTask left, KdTask right, inout Sums sums) {
     Sums own = no_sums();
     add_task(own, left.count, left.depth);
     add_task(own, right.count, right.depth);
-    uint kinds = 0;
-    uvec3 before = unpacked(add_all(kinds, packed(own.tasks, own.subtrees, own.counters)));
+    // What is packed, and chunks.
+    uvec2 all, all_before = sum_before(uvec2(packed(own.tasks, own.subtrees, own.counters), own.chunks), all);
+    uvec3 before = unpacked(all_before.x), of_all = unpacked(all.x);
     uint first = sums.tasks + before.x, at = first;
-    uint small = sums.subtrees + before.y, counter = sums.counters + before.z;
-    uint chunk = add_all(sums.chunks, own.chunks);
-    sums.tasks += unpacked(kinds).x;
-    sums.subtrees += unpacked(kinds).y;
-    sums.counters += unpacked(kinds).z;
+    uint small = sums.subtrees + before.y, counter = sums.counters + before.z, chunk = sums.chunks + all_before.y;
+    sums.tasks += of_all.x;
+    sums.subtrees += of_all.y;
+    sums.counters += of_all.z;
+    sums.chunks += all.y;
     uint first_node = state.first_node[min(of_level, LEVELS - 1u)];
     small += state.first_subtree[min(of_level, LEVELS - 1u)];
     uint deepest = subgroupMax(max(left.count > 0u ? left.depth : 0u, right.count > 0u ? right.depth : 0u));

@@ -195,7 +195,7 @@ uvec2 part(uint set, uint count, KdReferences right, uint right_at) {
         uint i = base + gl_LocalInvocationIndex;
         uint side = i < count ? small_side[i] : 0u;
         uvec2 total;
-        uvec2 at = counts + uvec2(sum_before(side & 1u, total.x), sum_before(side >> 1 & 1u, total.y));
+        uvec2 at = counts + sum_before(uvec2(side & 1u, side >> 1 & 1u), total);
         if (side != 0u) {
             uint record = small_record[set * EXACT + i], k = side >> 2;
             Box own = box_of(set, i), own_left = own, own_right = own;

@@ -33,7 +33,10 @@ pub struct Timestamps {
 }
 
 impl Timestamps {
-    /// Room for `phases` phases, in command buffers of the queue family that [`super::requirements`] chooses.
+    /// The last phase where there was no room for one more: all that was recorded from it on.
+    pub const REST: &'static str = "rest";
+
+    /// Room for `phases` phases; of more, the last one is all that is left, named [`Timestamps::REST`]. In command buffers of the queue family that [`super::requirements`] chooses.
     ///
     /// # Errors
     /// The query pool could not be made.
@@ -63,7 +66,7 @@ impl Timestamps {
         })
     }
 
-    /// The same with a phase for each dispatch of a pass, named after its shader: there must be room for as many.
+    /// The same with a phase for each dispatch of a pass, named after its shader.
     pub fn by_kernel(mut self) -> Timestamps {
         self.by_kernel = true;
         self
@@ -225,10 +228,13 @@ impl<'a> Recorder<'a> {
             }
         }
         self.in_phase = true;
-        let at = self.timestamps.as_ref().map_or(0, |t| t.names.len() as u32);
-        self.stamp(at);
-        if let Some(timestamps) = &mut self.timestamps {
+        let Some(timestamps) = &mut self.timestamps else { return };
+        let at = timestamps.names.len() as u32;
+        if at + 1 < timestamps.capacity {
             timestamps.names.push(name);
+            self.stamp(at);
+        } else if let Some(last) = timestamps.names.last_mut() {
+            *last = Timestamps::REST;
         }
     }
 
@@ -358,7 +364,6 @@ impl<'a> Recorder<'a> {
         if let Some(device) = self.device()
             && let Some(timestamps) = self.timestamps.as_ref().filter(|timestamps| timestamps.valid_bits > 0)
         {
-            assert!(at < timestamps.capacity, "more phases than the Timestamps have room for");
             // SAFETY: `new`'s promise; the query was reset by `timed` and is written once.
             unsafe {
                 device.cmd_write_timestamp(self.commands, vk::PipelineStageFlags::BOTTOM_OF_PIPE, timestamps.pool, at);

@@ -10,7 +10,7 @@ pub use hedgerow_lab::experiments::check::traced::traced;
 pub use hedgerow_lab::experiments::check::{agree, corpus, matrices, mixture, shapes, world};
 
 use hedgerow::gpu::TuningChoice;
-use hedgerow_lab::device::{Device, DeviceOptions, DriverTracing, Restrict};
+use hedgerow_lab::device::{Device, DeviceOptions, DriverTracing, Restrict, Validation};
 use std::cell::Cell;
 use std::sync::OnceLock;
 
@@ -49,10 +49,10 @@ pub fn device() -> &'static Device {
     })
 }
 
-/// The device of tests: with everything on.
+/// The device of tests: with everything on, but for what validation layers say of shaders: `warming` asks that of every kernel.
 pub const OPTIONS: DeviceOptions = DeviceOptions {
     wanted: None,
-    validation: true,
+    validation: Validation::Calls,
     driver_tracing: Some(DriverTracing::Query),
     tuning: TuningChoice::Auto,
     maximal_reconvergence: false,
@@ -64,7 +64,7 @@ pub fn open(options: DeviceOptions) -> Device {
     Device::new(&options)
         .or_else(|error| {
             eprintln!("without validation layers: {error}");
-            Device::new(&DeviceOptions { validation: false, ..options })
+            Device::new(&DeviceOptions { validation: Validation::Off, ..options })
         })
         .expect("a Vulkan device that has what hedgerow needs")
 }

@@ -81,7 +81,8 @@ void give_piece(uint begin, uint size) {
         if (piece_size[i] > 0u && piece_begin[i] == begin + size) own_behind = i;
         own_smallest = min(own_smallest, piece_key(i));
     }
-    uint before = least_of_all(own_before), behind = least_of_all(own_behind), to = least_of_all(own_smallest) & PIECES - 1u;
+    uvec3 least = least_of_all(uvec3(own_before, own_behind, own_smallest));
+    uint before = least.x, behind = least.y, to = least.z & PIECES - 1u;
     barrier();
     if (gl_LocalInvocationIndex == 0u) {
         if (before != NONE) {

@@ -45,12 +45,7 @@ uvec4 scan_draft_tiles(uint tiles) {
     uvec4 sum = uvec4(0);
     for (uint base = 0; base < tiles; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
-        uvec4 own = i < tiles ? all.sums[i] : uvec4(0), total, before;
-        for (uint k = 0; k < 4; ++k) {
-            uint of_all;
-            before[k] = sum_before(own[k], of_all);
-            total[k] = of_all;
-        }
+        uvec4 own = i < tiles ? all.sums[i] : uvec4(0), total, before = sum_before(own, total);
         if (i < tiles) all.sums[i] = sum + before;
         sum += total;
     }
@@ -118,13 +113,7 @@ void kd_sum_drafts(uint tile, uint of_level) {
     for (uint base = tile * TILE; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
         uint at = order.word[first + min(i, end - 1u)];
-        uvec4 own = i < end ? sums_of(drafts().draft[at]) : uvec4(0), total, before;
-        for (uint k = 0; k < 4; ++k) {
-            uint of_all;
-            before[k] = sum_before(own[k], of_all);
-            total[k] = of_all;
-        }
-        before += sum;
+        uvec4 own = i < end ? sums_of(drafts().draft[at]) : uvec4(0), total, before = sum + sum_before(own, total);
         if (i < end) {
             bool is_subtree = own.z + own.w > 0u;
             drafts().draft[at].nodes_before = is_subtree ? before.z : before.x;

@@ -42,12 +42,14 @@ shared uint pool_found_chunk;
 // many are in use, and at the front when few are. Whether there was a chunk.
 bool chunk_pool_search(ChunkPool pool, uint worker, uint workers, out uint slot, out uint chunk) {
     const uint LANES = gl_WorkGroupSize.x;
-    uint own_in_use = 0, own_used = 0;
+    // How many slots are in use, and how many have been.
+    uvec2 own = uvec2(0);
     if (gl_LocalInvocationIndex == 0u) {
-        own_in_use = atomicLoad(pool.in_use, gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsRelaxed);
-        own_used = atomicLoad(pool.used, gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsRelaxed);
+        own.x = atomicLoad(pool.in_use, gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsRelaxed);
+        own.y = atomicLoad(pool.used, gl_ScopeDevice, gl_StorageSemanticsBuffer, gl_SemanticsRelaxed);
     }
-    uint in_use = agree(own_in_use), end = (agree(own_used) + LANES - 1u) / LANES * LANES;
+    uvec2 slots = agree(own);
+    uint in_use = slots.x, end = (slots.y + LANES - 1u) / LANES * LANES;
     slot = 0u;
     chunk = 0u;
     if (end == 0u) return false;

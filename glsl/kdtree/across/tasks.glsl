@@ -200,8 +200,7 @@ uvec2 boxes_beside(KdCellTask t) {
     for (uint bin = gl_LocalInvocationIndex; bin < bins; bin += gl_WorkGroupSize.x) {
         own += uvec2(counters[first + bin], counters[first + BINS + bin]);
     }
-    sum_before(own.x, all.x);
-    sum_before(own.y, all.y);
+    sum_before(own, all);
     return uvec2(all.x, t.count - all.y);
 }
 
@@ -251,8 +250,7 @@ uvec2 classify_references(inout KdCellTask t, uint begin, uint end, uint slot) {
         }
         clip_straddling(arena(), straddlers, t.last_wait - first, true, Box(t.lo, t.hi), t.axis, t.plane, found);
     }
-    sum_before(found.x, all.x);
-    sum_before(found.y, all.y);
+    sum_before(found, all);
     return all;
 }
 

@@ -51,7 +51,9 @@ void describe_tile(uint tile, uint marked) {
     KdMarkedLeaves leaves = marked_leaves();
     KdStructure structure = KdStructure(structure_address);
     Sums sums = no_sums(), own = no_sums();
-    uint pairs = pair_count(), end = min(tile * TILE + TILE, marked), empty = 0;
+    uint pairs = pair_count(), end = min(tile * TILE + TILE, marked);
+    // References of leaves, and leaves that are empty.
+    uvec2 all = uvec2(0);
     for (uint base = tile * TILE; base < end; base += gl_WorkGroupSize.x) {
         uint i = base + gl_LocalInvocationIndex;
         bool is_there = i < end;
@@ -69,8 +71,9 @@ void describe_tile(uint tile, uint marked) {
         leaf.count = leaf.own + next - leaf.first;
         leaf.home = is_empty ? leaf.id - 1u >> 1 : leaf.node;
         leaf.copies = 1u;
-        leaf.begin = add_all(sums.split_references, is_there ? leaf.count : 0u);
-        leaf.pair = 2u * add_all(empty, is_there && is_empty ? 1u : 0u);
+        uvec2 before = add_all(all, is_there ? uvec2(leaf.count, is_empty ? 1u : 0u) : uvec2(0));
+        leaf.begin = before.x;
+        leaf.pair = 2u * before.y;
         if (is_there) {
             own.leaf_references += leaf.own;
             add_task(own, leaf.count, pair.depth);
@@ -87,7 +90,8 @@ void describe_tile(uint tile, uint marked) {
     }
     add_all_tasks(sums, own);
     add_all(sums.leaf_references, own.leaf_references);
-    sums.leaves = empty;
+    sums.split_references = all.x;
+    sums.leaves = all.y;
     if (gl_LocalInvocationIndex == 0u) task_tiles().tile[tile] = sums;
 }
 

@@ -1,7 +1,7 @@
 //! Options that every command takes, and the values they are made of.
 
 use super::Bar;
-use crate::device::{Device, DeviceOptions, DriverTracing};
+use crate::device::{Device, DeviceOptions, DriverTracing, Validation};
 use crate::rays::kinds::{RayKind, RayOptions};
 use crate::report::names::distinct;
 use crate::scene::{self, Camera, DynamicScene, Flight, Instances, Scene};
@@ -91,7 +91,7 @@ impl Common {
     pub fn open_device(&self, driver: bool) -> crate::Result<Device> {
         Device::new(&DeviceOptions {
             wanted: self.device().map(str::to_owned),
-            validation: self.validation,
+            validation: if self.validation { Validation::All } else { Validation::Off },
             driver_tracing: driver.then_some(DriverTracing::Query),
             tuning: self.tuning,
             ..DeviceOptions::default()

@@ -1,7 +1,7 @@
 //! The machine's Vulkan devices: the loader, an instance with the messages of its validation layers, and which device to take.
 
 use super::memory::largest_local_heap;
-use super::{DriverTracing, locked, properties};
+use super::{DriverTracing, Validation, locked, properties};
 use crate::{Error, Result};
 use ash::vk::{self, DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as MessageType};
 use hedgerow::gpu::{Optional, Workarounds, requirements};
@@ -50,7 +50,7 @@ const DRIVER_VARIABLES: [&str; 3] = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_
 /// # Errors
 /// No Vulkan loader, no device, or `wanted` is not there.
 pub fn list(wanted: Option<&str>) -> Result<Vec<Found>> {
-    let instance = VulkanInstance::new(false)?;
+    let instance = VulkanInstance::new(Validation::Off)?;
     let mut found: Vec<_> = instance.devices()?.into_iter().map(|(_, found)| found).collect();
     let picked = pick(&found, wanted)?;
     found[picked].picked = true;
@@ -110,7 +110,8 @@ pub(super) struct VulkanInstance {
 }
 
 impl VulkanInstance {
-    pub fn new(validation: bool) -> Result<VulkanInstance> {
+    pub fn new(validation: Validation) -> Result<VulkanInstance> {
+        let (of_shaders, validation) = (validation == Validation::All, validation != Validation::Off);
         // SAFETY: loading the system's Vulkan loader runs its initialisers, as every Vulkan program does.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| Error::NoVulkan(e.to_string()))?;
         // SAFETY: the loader is loaded.
@@ -134,7 +135,11 @@ impl VulkanInstance {
         let layer_names: Vec<_> = validation.then_some(VALIDATION_LAYER.as_ptr()).into_iter().collect();
         let application = vk::ApplicationInfo::default().application_name(c"hedgerow").api_version(vk::API_VERSION_1_3);
         let synchronisation = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+        let shaders = [vk::ValidationFeatureDisableEXT::SHADERS];
         let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&synchronisation);
+        if !of_shaders {
+            features = features.disabled_validation_features(&shaders);
+        }
         let mut info = vk::InstanceCreateInfo::default()
             .flags(flags)
             .application_info(&application)

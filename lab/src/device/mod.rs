@@ -30,13 +30,26 @@ use std::ops::Deref;
 use std::sync::{Mutex, MutexGuard, OnceLock};
 use std::time::{Duration, Instant};
 
+/// What the Khronos validation layers look at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Validation {
+    /// Nothing: the layers stay off.
+    #[default]
+    Off,
+    /// Calls and synchronisation. Shaders are not looked at: each pipeline would be, anew in every process, which takes as long as a
+    /// driver takes to make it.
+    Calls,
+    /// Shaders, too.
+    All,
+}
+
 /// What [`Device::new`] takes.
 #[derive(Debug, Clone, Default)]
 pub struct DeviceOptions {
     /// Name (a part of it, any case) or index of the device; otherwise the first discrete, integrated or CPU device.
     pub wanted: Option<String>,
-    /// Switch the Khronos validation layers on, synchronisation validation included; any message is an error.
-    pub validation: bool,
+    /// What the Khronos validation layers look at; any message is an error.
+    pub validation: Validation,
     /// Enable the driver's own acceleration structures where it has them, to be traced like this: [`DriverTracing::Query`] falls
     /// back on pipelines, [`DriverTracing::Pipeline`] is meant.
     pub driver_tracing: Option<DriverTracing>,
@@ -69,6 +82,8 @@ pub struct Device {
     ray_pipelines: [OnceLock<RayPipeline>; 2],
     /// Whether the host maps all memory, or stages what it writes and reads.
     maps_memory: bool,
+    /// Whether what is recorded runs.
+    submits: bool,
     /// Buffers that the host maps, of [`memory::STAGING`]; each is made when first used.
     staging: Mutex<[Option<Memory>; 2]>,
     instance: VulkanInstance,
@@ -150,6 +165,7 @@ impl Device {
             driver_tracing,
             ray_pipelines: Default::default(),
             maps_memory: !options.restrict.staged && memory::is_mapped(&instance.raw, physical),
+            submits: !options.restrict.unsubmitted,
             staging: Mutex::default(),
             instance,
         })
@@ -297,6 +313,9 @@ impl Device {
     }
 
     unsafe fn submitted(&self, commands: vk::CommandBuffer) -> Result<Duration> {
+        if !self.submits {
+            return Ok(Duration::ZERO);
+        }
         let queue = locked(&self.queue);
         // SAFETY: as in `submit`; the queue is locked.
         unsafe {

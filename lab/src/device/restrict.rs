@@ -23,6 +23,9 @@ pub struct Restrict {
     pub other_gathers: bool,
     /// Buffers are filled and read through staging memory, as on a GPU with memory of its own.
     pub staged: bool,
+    /// Command buffers are recorded and not submitted: what memory holds means nothing. For tests of what recording makes, as a driver
+    /// may compile a pipeline when it first runs, and take minutes for all. Has no word in a list.
+    pub unsubmitted: bool,
 }
 
 impl Restrict {
@@ -36,6 +39,7 @@ impl Restrict {
         timestamp_bits: None,
         other_gathers: false,
         staged: false,
+        unsubmitted: false,
     };
 
     /// What is left of what may be enabled.

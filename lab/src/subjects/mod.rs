@@ -106,7 +106,7 @@ pub struct Outcome {
     pub status: u32,
 }
 
-/// Dispatches of a build, at most, where each is a phase.
+/// Dispatches of a build that are phases of their own where each is one; what is behind them is one more.
 const PHASES_BY_KERNEL: u32 = 8192;
 
 /// A builder on a scene, which may move. Whatever is uploaded once is uploaded when the subject is made, not under the clock.

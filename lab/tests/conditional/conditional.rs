@@ -83,28 +83,37 @@ pub fn browser() -> Option<PathBuf> {
     variable("HEDGEROW_CHROMIUM").or_else(found)
 }
 
-/// A test: its name, what it needs, and what it does.
-pub type Test = (&'static str, Needs, fn());
+/// A test: its name, what tells what it needs, and what it does.
+pub type Test = (&'static str, fn() -> Needs, fn());
 
 /// Runs the tests of all files as the arguments ask, in the manner of the standard harness.
+///
+/// What a test needs is asked only where the test may run: to ask may take opening a device, and nextest runs this program once a test.
 pub fn run(files: Vec<(&'static str, Vec<Test>)>) -> ExitCode {
+    let arguments = Arguments::from_args();
+    // A filter may be a part of a name, or a name behind its reason.
+    let may_run =
+        |name: &str| arguments.filter.as_ref().is_none_or(|filter| filter.contains(name) || name.contains(&**filter));
     let trial = |file: &str, (name, needs, run): Test| {
+        let name = format!("{file}::{name}");
+        let needs = if may_run(&name) { needs() } else { None };
         let ignored = needs.is_some();
-        let trial = Trial::test(format!("{file}::{name}"), move || {
+        let trial = Trial::test(name, move || {
             run();
             Ok(())
         });
         trial.with_ignored_flag(ignored).with_kind(needs.unwrap_or_default())
     };
     let trials = files.into_iter().flat_map(|(file, tests)| tests.into_iter().map(move |test| trial(file, test)));
-    libtest_mimic::run(&Arguments::from_args(), trials.collect()).exit_code()
+    let trials = trials.collect();
+    libtest_mimic::run(&arguments, trials).exit_code()
 }
 
 /// The tests of a file, each with what it needs.
 macro_rules! tests {
     ($($name:ident: $needs:expr),* $(,)?) => {
         pub fn tests() -> Vec<crate::conditional::Test> {
-            vec![$((stringify!($name), $needs, $name as fn())),*]
+            vec![$((stringify!($name), || $needs, $name as fn())),*]
         }
     };
 }

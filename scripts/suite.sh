@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# The test suite by cargo-nextest, a process a test: scripts/suite.sh FEATURES [FILTER]. The Makefile calls it, under a bound.
+#
+# Without a cache lavapipe compiles for longer than tests run; what it has compiled, later processes find. Tests of one module need
+# the same shaders, and side by side would compile them twice. So a core takes a part of the suite at a time, whose tests run one
+# after another. What a part has printed is shown when it ends; which parts failed, at the end.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+features=$1 filter=${2:-all()}
+
+# The longest first; the last one is all that is in no other.
+parts=(bvh accel conditional trace kdtree others)
+filter_of() {
+  case $1 in
+    conditional) echo 'binary_id(hedgerow-lab::conditional)' ;;
+    others) echo 'not (binary_id(hedgerow-lab::conditional) | binary_id(hedgerow::main) & test(/^(bvh|accel|trace|kdtree)::/))' ;;
+    *) echo "binary_id(hedgerow::main) & test(/^$1::/)" ;;
+  esac
+}
+
+cores=$(nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
+at_once=$((cores < ${#parts[@]} ? cores : ${#parts[@]}))
+output=$(mktemp -d)
+trap 'rm -rf "$output"' EXIT
+# The bound ran out: what ran then has printed nothing yet.
+trap 'tail -n 20 "$output"/* >&2; exit 124' TERM
+
+run_part() {
+  local status=0 levels=(--final-status-level skip)
+  # Tests of other parts count as skipped; which cannot run here, and why, is listed with the conditional ones.
+  [ "$1" = conditional ] || levels=(--final-status-level slow)
+  scripts/cargo.sh nextest run --release --features "$features" --no-tests pass -j $((cores / at_once)) "${levels[@]}" \
+    -E "($(filter_of "$1")) & ($filter)" >"$output/$1" 2>&1 || status=$?
+  [ $status = 0 ] || touch "$output/$1.failed"
+  printf '== tests: %s\n' "$1"
+  cat "$output/$1"
+}
+
+for part in "${parts[@]}"; do
+  while [ "$(jobs -rp | wc -l)" -ge "$at_once" ]; do sleep 1; done
+  run_part "$part" &
+done
+wait
+status=0
+for part in "${parts[@]}"; do
+  [ -e "$output/$part.failed" ] || continue
+  status=1
+  printf '== failed: %s\n' "$part"
+  grep -E '^ +(FAIL|TIMEOUT|SIG[A-Z]+|ABORT|TERMINATING) |Summary|^error' "$output/$part" | sort -u || true
+done >&2
+exit $status
