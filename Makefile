@@ -55,7 +55,8 @@ WITHIN := $(if $(shell command -v timeout),timeout --kill-after 10 $(TEST_BOUND)
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 SUITE := $(WITHIN) $(if $(NEXTEST),scripts/suite.sh $(FEATURES),$(CARGO) test --release --features $(FEATURES))
 # What the tuning changes: tests of the library on the device. (Warming tests both tunings by itself; the others named are of the host.)
-TUNED := $(if $(NEXTEST),'package(hedgerow) & !test(/^(warming|bvh::heuristics|bvh::host|kdtree::host|kdtree::merge)::/)')
+TUNED_TESTS ?= package(hedgerow) & !test(/^(warming|bvh::heuristics|bvh::host|kdtree::host|kdtree::merge)::/)
+TUNED := $(if $(NEXTEST),'$(TUNED_TESTS)')
 # What depends on how many lanes a subgroup has: groups of `hedgerow check`.
 WIDTH_GROUPS := scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,child-order,ray-counts,kd-build,kd-merge,trace,trace-kd
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
