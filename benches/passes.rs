@@ -16,7 +16,7 @@ use hedgerow::bvh::layout::{Header, Triangle};
 use hedgerow::trace::tracer::{self, Loads, TraceBuffers, TraceShape};
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::Result;
-use hedgerow_lab::device::{Buffer, Device, DeviceOptions, DriverTracing, Validation};
+use hedgerow_lab::device::{Buffer, Device, DeviceOptions, DriverTracing};
 use hedgerow_lab::experiments::accel::batch::{Batch, Workload};
 use hedgerow_lab::experiments::accel::points::Submission;
 use hedgerow_lab::rays::kinds::{self, RayKind, RayOptions};
@@ -28,8 +28,7 @@ const SIZE: [u32; 2] = [256, 192];
 
 fn device() -> Device {
     let wanted = std::env::var("HEDGEROW_DEVICE").ok();
-    Device::new(&DeviceOptions { wanted, validation: Validation::Off, ..DeviceOptions::default() })
-        .expect("a device that fits")
+    Device::new(&DeviceOptions { wanted, ..DeviceOptions::default() }).expect("a device that fits")
 }
 
 fn scene() -> Scene {
@@ -183,12 +182,7 @@ fn compaction(c: &mut Criterion) {
 fn batch(c: &mut Criterion) {
     const COUNT: u32 = 4096;
     let wanted = std::env::var("HEDGEROW_DEVICE").ok();
-    let options = DeviceOptions {
-        wanted,
-        validation: Validation::Off,
-        driver_tracing: Some(DriverTracing::Query),
-        ..DeviceOptions::default()
-    };
+    let options = DeviceOptions { wanted, driver_tracing: Some(DriverTracing::Query), ..DeviceOptions::default() };
     let device = Device::new(&options).expect("a device that fits");
     let workload = Workload::new(&device, COUNT).expect("memory");
     let mut makers = vec![("", Structures::ours(&device, accel::AccelOptions::DEFAULT))];

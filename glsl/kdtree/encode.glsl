@@ -133,9 +133,9 @@ void kd_count(uint tile) {
             longest = max(longest, bits);
         }
     }
+    // Triangles, their octaves, and triangles with one.
     uvec4 all;
     sum_before(uvec4(found, octaves, with_octave, 0u), all);
-    uint all_found = all.x, all_octaves = all.y, all_with_octave = all.z;
     longest = subgroupMax(longest);
     status = subgroupOr(status);
     if (subgroupElect()) {
@@ -143,10 +143,10 @@ void kd_count(uint tile) {
         if (status != 0u) atomicOr(state.status, status);
     }
     if (gl_LocalInvocationIndex == 0u) {
-        chunk_sides().side[first_tile + tile] = uvec2(all_found, 0u);
-        uint before = atomicAdd(state.octaves[0], all_octaves);
-        if (before + all_octaves < before) atomicAdd(state.octaves[1], 1u);
-        atomicAdd(state.triangles_with_octave, all_with_octave);
+        chunk_sides().side[first_tile + tile] = uvec2(all.x, 0u);
+        uint before = atomicAdd(state.octaves[0], all.y);
+        if (before + all.y < before) atomicAdd(state.octaves[1], 1u);
+        atomicAdd(state.triangles_with_octave, all.z);
     }
     Words all_counters = Words(state.counters);
     // A build across levels has none.

@@ -36,7 +36,8 @@ impl Timestamps {
     /// The last phase where there was no room for one more: all that was recorded from it on.
     pub const REST: &'static str = "rest";
 
-    /// Room for `phases` phases; of more, the last one is all that is left, named [`Timestamps::REST`]. In command buffers of the queue family that [`super::requirements`] chooses.
+    /// Room for `phases` phases, in command buffers of the queue family that [`super::requirements`] chooses. Of more, the last one is
+    /// all that is left, named [`Timestamps::REST`].
     ///
     /// # Errors
     /// The query pool could not be made.

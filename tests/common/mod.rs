@@ -49,7 +49,8 @@ pub fn device() -> &'static Device {
     })
 }
 
-/// The device of tests: with everything on, but for what validation layers say of shaders: `warming` asks that of every kernel.
+/// The device of tests: with everything on, but that the validation layers leave shaders out. A quick check of all passes asks them
+/// (lab/tests/main/check.rs).
 pub const OPTIONS: DeviceOptions = DeviceOptions {
     wanted: None,
     validation: Validation::Calls,

@@ -105,8 +105,7 @@ pub fn run(files: Vec<(&'static str, Vec<Test>)>) -> ExitCode {
         trial.with_ignored_flag(ignored).with_kind(needs.unwrap_or_default())
     };
     let trials = files.into_iter().flat_map(|(file, tests)| tests.into_iter().map(move |test| trial(file, test)));
-    let trials = trials.collect();
-    libtest_mimic::run(&arguments, trials).exit_code()
+    libtest_mimic::run(&arguments, trials.collect()).exit_code()
 }
 
 /// The tests of a file, each with what it needs.

@@ -1,6 +1,7 @@
 //! `hedgerow check`: what is right passes, and whatever happens to a group is reported while the rest goes on.
 
 use crate::program::{err, out, program};
+use hedgerow_lab::device::{Device, DeviceOptions, Validation};
 use hedgerow_lab::experiments::check::{CheckRecord, GROUPS};
 use std::process::{Command, Output};
 
@@ -12,7 +13,10 @@ fn check(arguments: &[&str], faults: &str) -> Output {
 fn a_quick_check_passes_and_its_record_says_on_what() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("check.json");
-    let done = check(&["--quick", "--json", file.to_str().expect("text")], "");
+    // Where the validation layers are installed, they look at the shaders of every pass here: other tests leave them out.
+    let layers = Device::new(&DeviceOptions { validation: Validation::All, ..DeviceOptions::default() });
+    let arguments = ["--quick", "--json", file.to_str().expect("text"), "--validation"];
+    let done = check(if layers.is_ok() { &arguments } else { &arguments[..3] }, "");
     let text = out(&done);
     assert_eq!(done.status.code(), Some(0), "{text}{}", err(&done));
     assert_eq!(text.lines().last(), Some(&*format!("{} passed, 0 failed", GROUPS.len())), "{text}");
