@@ -8,12 +8,12 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 features=$1 filter=${2:-all()}
 
-# The longest first; the last one is all that is in no other.
-parts=(bvh accel conditional trace kdtree others)
+# The longest first. The last has the quick check, which runs every pass: most are compiled by then.
+parts=(bvh accel conditional kdtree trace others lab)
 filter_of() {
   case $1 in
-    conditional) echo 'binary_id(hedgerow-lab::conditional)' ;;
-    others) echo 'not (binary_id(hedgerow-lab::conditional) | binary_id(hedgerow::main) & test(/^(bvh|accel|trace|kdtree)::/))' ;;
+    lab | conditional) echo "binary_id(hedgerow-lab::$1)" ;;
+    others) echo 'not (binary_id(/^hedgerow-lab::/) | binary_id(hedgerow::main) & test(/^(bvh|accel|trace|kdtree)::/))' ;;
     *) echo "binary_id(hedgerow::main) & test(/^$1::/)" ;;
   esac
 }

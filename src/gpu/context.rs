@@ -353,22 +353,12 @@ impl Context {
     }
 
     fn create_pipeline(&self, kernel: &Kernel) -> Result<vk::Pipeline> {
-        let mut words =
-            ash::util::read_spv(&mut std::io::Cursor::new(kernel.spirv())).expect("build.rs wrote whole words");
-        let of_the_device = [self.limits.workgroup_count, self.tuning.exact_division.into()];
-        let constants = [&kernel.constants[..], &of_the_device].concat();
-        let ids = (0..kernel.constants.len() as u32).chain([GROUPS_OF_A_ROW, DIVISION_IS_EXACT]);
-        if self.workarounds.folded_constants {
-            words = specialise::folded(&words, &ids.clone().zip(constants.iter().copied()).collect());
-        }
-        words = self.execution_modes.added_to(&words);
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(kernel.spirv())).expect("build.rs wrote whole words");
+        let of_the_device =
+            [(GROUPS_OF_A_ROW, self.limits.workgroup_count), (DIVISION_IS_EXACT, self.tuning.exact_division.into())];
+        let constants = (0..).zip(kernel.constants.iter().copied()).chain(of_the_device).collect();
+        let words = self.execution_modes.added_to(&specialise::specialised(&words, &constants));
         let module_info = vk::ShaderModuleCreateInfo::default().code(&words);
-        let entries: Vec<_> = (0..)
-            .zip(ids)
-            .map(|(i, id)| vk::SpecializationMapEntry { constant_id: id, offset: 4 * i, size: 4 })
-            .collect();
-        let specialisation =
-            vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&constants));
         let mut subgroups = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
             .required_subgroup_size(self.limits.subgroup_size);
         // SAFETY: the device is live; the module is destroyed after the pipeline that used it was made.
@@ -378,8 +368,7 @@ impl Context {
             let mut stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)
                 .module(module)
-                .name(c"main")
-                .specialization_info(&specialisation);
+                .name(c"main");
             if self.can_require_subgroups(kernel.workgroup()) {
                 stage =
                     stage.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS).push_next(&mut subgroups);

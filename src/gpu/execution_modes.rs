@@ -6,9 +6,9 @@
 //! - *Floats* (`SPV_KHR_float_controls`, part of Vulkan 1.2): subnormal numbers are kept; so are infinities, NaN and the sign of zero;
 //!   results are rounded to the nearest. The host does so, and Vulkan lets a device do otherwise.
 
+use super::spirv::{HEADER_WORDS, Instructions};
 use ash::vk;
 
-const HEADER_WORDS: usize = 5;
 const OP_EXTENSION: u32 = 10;
 const OP_ENTRY_POINT: u32 = 15;
 const OP_EXECUTION_MODE: u32 = 16;
@@ -96,20 +96,6 @@ fn extension() -> Vec<u32> {
     });
     let name: Vec<u32> = name.collect();
     [vec![(name.len() as u32 + 1) << 16 | OP_EXTENSION], name].concat()
-}
-
-/// The instructions of a module behind its header, each with its first word.
-struct Instructions<'a>(&'a [u32]);
-
-impl<'a> Iterator for Instructions<'a> {
-    type Item = &'a [u32];
-
-    fn next(&mut self) -> Option<&'a [u32]> {
-        let length = (self.0.first()? >> 16) as usize;
-        let (instruction, rest) = self.0.split_at_checked(length.max(1))?;
-        self.0 = rest;
-        Some(instruction)
-    }
 }
 
 #[cfg(all(test, feature = "compile-shaders"))]

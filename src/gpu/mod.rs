@@ -25,6 +25,7 @@ pub mod scan;
 pub mod shaders;
 mod sizes;
 mod specialise;
+mod spirv;
 mod table;
 #[doc(hidden)]
 pub mod task_pool;

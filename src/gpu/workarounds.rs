@@ -26,12 +26,6 @@ pub struct Workarounds {
     /// Active boxes beside inactive ones are lost in the driver's own structures. Every lavapipe so far (25.0.7, 26.1.6).
     /// Shown by: tests/accel/boxes.rs.
     pub driver_loses_boxes: bool,
-    /// Specialisation constants are folded into a module before the driver sees it (`gpu::specialise`). SwiftShader sets their
-    /// values, but takes out no code behind them; and for each loop it looks for paths through what is left, breadth first,
-    /// taking a block once for each path to it (`Spirv::Function::ExistsPath`), so that each of n `if`s in sequence doubles the
-    /// time: `encode_plan`, the tracers lane by lane and every persistent kernel did not compile in minutes. Shown by:
-    /// tests/drivers, which bounds the time of each pipeline.
-    pub folded_constants: bool,
 }
 
 impl Workarounds {
@@ -41,7 +35,6 @@ impl Workarounds {
         driver_misreads_geometry: false,
         driver_crashes_on_inactive_instances: false,
         driver_loses_boxes: false,
-        folded_constants: false,
     };
 
     /// What the driver of a device needs.
@@ -52,8 +45,7 @@ impl Workarounds {
     #[doc(hidden)]
     pub fn of_driver(driver: vk::DriverId, version: u32) -> Workarounds {
         if driver != vk::DriverId::MESA_LLVMPIPE {
-            let is_swiftshader = driver == vk::DriverId::GOOGLE_SWIFTSHADER;
-            return Workarounds { folded_constants: is_swiftshader, ..Workarounds::NONE };
+            return Workarounds::NONE;
         }
         let is_old = vk::api_version_major(version) < 26;
         Workarounds {
@@ -61,7 +53,6 @@ impl Workarounds {
             driver_misreads_geometry: is_old,
             driver_crashes_on_inactive_instances: !is_old,
             driver_loses_boxes: true,
-            ..Workarounds::NONE
         }
     }
 }
@@ -74,8 +65,7 @@ mod tests {
     fn faults_follow_from_driver_and_version() {
         let of = |driver, major| Workarounds::of_driver(driver, vk::make_api_version(0, major, 0, 7));
         assert_eq!(of(vk::DriverId::NVIDIA_PROPRIETARY, 25), Workarounds::NONE);
-        let swiftshader = Workarounds { folded_constants: true, ..Workarounds::NONE };
-        assert_eq!(of(vk::DriverId::GOOGLE_SWIFTSHADER, 5), swiftshader);
+        assert_eq!(of(vk::DriverId::GOOGLE_SWIFTSHADER, 5), Workarounds::NONE);
         let (old, new) = (of(vk::DriverId::MESA_LLVMPIPE, 25), of(vk::DriverId::MESA_LLVMPIPE, 26));
         assert!(old.driver_halves_in_order && old.driver_misreads_geometry);
         assert!(!old.driver_crashes_on_inactive_instances && new.driver_crashes_on_inactive_instances);

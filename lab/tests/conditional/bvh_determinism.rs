@@ -70,7 +70,7 @@ fn subgroups_of_4_8_and_16_give_the_same_bytes() {
         assert!(out.status.success(), "{width}: {}", String::from_utf8_lossy(&out.stderr));
         out.stdout
     };
-    for builder in ["lbvh", "lbvh:width=4", "lbvh:width=8q", "lbvh:codes=emc64var:schedule=persistent"] {
+    for builder in ["lbvh:width=8q", "lbvh:codes=emc64var:schedule=persistent"] {
         let mut trees = Vec::new();
         for (width, subgroup) in [("128", 4), ("256", 8), ("512", 16)] {
             assert_eq!(size_of(&run(width, &["devices", "--json"])), subgroup);

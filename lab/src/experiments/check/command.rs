@@ -15,13 +15,13 @@ use std::sync::{Mutex, PoisonError, mpsc};
 use std::thread;
 use std::time::Duration;
 
-/// Seconds that a group may take: several times what the longest takes on a slow device that has to compile every shader.
+/// Seconds that a case may take: several times what the longest takes on a slow device that has to compile its shaders.
 const LIMIT: &str = "240";
 
 /// Check every builder, tracer and call on this device against host twins and brute force
 ///
-/// Run it first on a new device. Each group runs in a process of its own under a time limit: a crash, a hang or a lost device is a
-/// failed group, and the rest goes on. The last line is `N passed, M failed`; the exit status is 1 if any failed.
+/// Run it first on a new device. Each group runs in a process of its own, its cases under a time limit: a crash, a hang or a lost device
+/// is a failed group, and the rest goes on. The last line is `N passed, M failed`; the exit status is 1 if any failed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = after_help())]
 pub struct Arguments {
@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Run these groups only, separated by commas
     #[arg(long, value_name = "GROUP,…", value_delimiter = ',')]
     groups: Vec<String>,
-    /// Seconds that a group may take
+    /// Seconds that a case may take
     #[arg(long, value_name = "SECONDS", default_value = LIMIT)]
     limit: NonZeroU32,
     /// Groups at a time [default: one a core on a device that is a CPU, of others one for four cores, which compile their kernels]

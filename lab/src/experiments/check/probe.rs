@@ -133,13 +133,13 @@ impl Probe {
         Probe::of(device, shaders::MEASURE_PROBE_TURNS.spirv)
     }
 
-    /// The same with loads lane by lane, where a subgroup is one that can, and the driver folds constants that a pipeline gives: one that
-    /// does not would follow the paths of sixteen lanes one by one (SwiftShader: no end after 230 s).
+    /// The same with loads lane by lane, where a subgroup is one that can, and the driver takes out what the pipeline's constants leave out:
+    /// SwiftShader does not, and follows the paths of sixteen lanes one by one (no end after 230 s).
     pub fn in_lanes(device: &'static Device) -> Option<Probe> {
         let limits = &device.limits;
         let can = limits.subgroup_is_exact
             && limits.subgroup_size <= Loads::MAX_LANES
-            && !device.workarounds.folded_constants;
+            && limits.driver != vk::DriverId::GOOGLE_SWIFTSHADER;
         can.then(|| Probe::with(device, shaders::MEASURE_PROBE_TURNS_LANES.spirv, limits.subgroup_size, false))
     }
 

@@ -1,4 +1,4 @@
-//! A group in a process of its own, under a time limit: whatever happens to it, the rest goes on.
+//! A group in a process of its own, whose cases have a time limit: whatever happens to it, the rest goes on.
 
 use super::Ground;
 use super::cases::{Difference, Message};
@@ -60,7 +60,8 @@ fn loader_arguments() -> Vec<OsString> {
     Vec::new()
 }
 
-/// Runs a group in the process that `command` starts, at most as long as `limit`. Gives what it ran on, too, if it said so.
+/// Runs a group in the process that `command` starts, each of its cases at most as long as `limit`. Gives what it ran on, too, if it said
+/// so.
 pub fn run(group: &str, mut command: Command, limit: Duration) -> (Outcome, Option<Ground>) {
     let begin = Instant::now();
     let mut outcome = Outcome { group: group.to_owned(), ..Outcome::default() };
@@ -91,7 +92,8 @@ pub fn run(group: &str, mut command: Command, limit: Duration) -> (Outcome, Opti
 
     let (mut ground, mut last_case, mut is_done) = (None, None, false);
     let in_time = loop {
-        match messages.recv_timeout(limit.saturating_sub(begin.elapsed())) {
+        // The process says where each case begins, so a wait is as long as a case.
+        match messages.recv_timeout(limit) {
             Ok(Message::Ground(found)) => ground = Some(found),
             Ok(Message::Case(name)) => {
                 outcome.cases += 1;

@@ -1,11 +1,8 @@
-//! Specialisation constants, folded into a module's words: for drivers that set their values and fold nothing
-//! ([`Workarounds::folded_constants`](super::Workarounds)).
-//!
-//! What is left are plain constants. A branch on one is for the driver's optimiser to take out.
+//! Specialisation constants, folded into a module's words, and values that follow from constants.
 
+use crate::gpu::spirv::{BOUND, HEADER_WORDS, Instructions, opcode, push};
 use std::collections::HashMap;
 
-const HEADER_WORDS: usize = 5;
 const SPEC_ID: u32 = 1;
 
 /// Opcodes of SPIR-V that declare constants, or name one.
@@ -23,40 +20,66 @@ mod op {
     pub const TYPE_INT: u32 = 21;
     pub const DECORATE: u32 = 71;
     pub const COMPOSITE_EXTRACT: u32 = 81;
+    pub const COPY_OBJECT: u32 = 83;
+    pub const LOGICAL_OR: u32 = 166;
+    pub const LOGICAL_AND: u32 = 167;
+    pub const SELECT: u32 = 169;
+    pub const BITWISE_AND: u32 = 199;
 }
 
-/// The module whose specialisation constants have the values that `constants` names by number. `spirv` is a valid module.
-pub(super) fn folded(spirv: &[u32], constants: &HashMap<u32, u32>) -> Vec<u32> {
-    let mut folder = Folder::of(constants);
-    let mut words = spirv[..HEADER_WORDS].to_vec();
-    let mut rest = &spirv[HEADER_WORDS..];
-    while let Some(&first) = rest.first() {
-        let (instruction, behind) = rest.split_at((first >> 16).max(1) as usize);
-        folder.fold(instruction, &mut words);
-        rest = behind;
-    }
-    words
-}
-
-/// What is known of ids, from the declarations so far: those of constants come before they are used.
-struct Folder<'a> {
-    constants: &'a HashMap<u32, u32>,
+/// What is known of ids.
+pub(super) struct Constants<'a> {
+    /// The values that are given, by number.
+    given: &'a HashMap<u32, u32>,
     /// The number of a specialisation constant.
     numbers: HashMap<u32, u32>,
     /// The types of which values are words: 32-bit integers, and booleans as 0 and 1.
     is_bool: HashMap<u32, bool>,
-    values: HashMap<u32, u32>,
+    values: Vec<Option<u32>>,
     composites: HashMap<u32, Vec<u32>>,
 }
 
-impl<'a> Folder<'a> {
-    fn of(constants: &'a HashMap<u32, u32>) -> Folder<'a> {
-        let (numbers, is_bool, values, composites) = Default::default();
-        Folder { constants, numbers, is_bool, values, composites }
+impl<'a> Constants<'a> {
+    /// Those of a module, of which nothing is known yet.
+    pub fn of(given: &'a HashMap<u32, u32>, spirv: &[u32]) -> Constants<'a> {
+        let (numbers, is_bool, composites) = Default::default();
+        Constants { given, numbers, is_bool, values: vec![None; spirv[BOUND] as usize], composites }
+    }
+
+    /// The module with plain constants alone. Those are declared before they are used, so that all are known then.
+    pub fn folded(&mut self, spirv: &[u32]) -> Vec<u32> {
+        let mut words = spirv[..HEADER_WORDS].to_vec();
+        for instruction in Instructions(&spirv[HEADER_WORDS..]) {
+            self.fold(instruction, &mut words);
+        }
+        words
+    }
+
+    /// The word that an id is known to be.
+    pub fn value(&self, id: u32) -> Option<u32> {
+        self.values.get(id as usize).copied().flatten()
+    }
+
+    /// Takes a value for known, if its type is one of words. Whether that is new.
+    pub fn learn(&mut self, ty: u32, id: u32, value: u32) -> bool {
+        let is_new = self.value(id).is_none() && self.is_bool.contains_key(&ty);
+        if is_new {
+            self.values[id as usize] = Some(value);
+        }
+        is_new
+    }
+
+    /// Learns what an instruction in a function gives, if that follows from constants. Whether it is new.
+    pub fn evaluate(&mut self, instruction: &[u32]) -> bool {
+        let &[_, ty, id, ref operands @ ..] = instruction else { return false };
+        if !self.is_bool.contains_key(&ty) || self.value(id).is_some() {
+            return false;
+        }
+        self.evaluated(opcode(instruction), operands).is_some_and(|value| self.learn(ty, id, value))
     }
 
     fn fold(&mut self, instruction: &[u32], words: &mut Vec<u32>) {
-        let opcode = instruction[0] & 0xffff;
+        let opcode = opcode(instruction);
         match (opcode, &instruction[1..]) {
             (op::DECORATE, &[id, SPEC_ID, number]) => {
                 self.numbers.insert(id, number);
@@ -69,10 +92,10 @@ impl<'a> Folder<'a> {
                 self.is_bool.insert(ty, false);
             }
             (op::CONSTANT_TRUE | op::CONSTANT_FALSE, &[_, id]) => {
-                self.values.insert(id, u32::from(opcode == op::CONSTANT_TRUE));
+                self.values[id as usize] = Some(u32::from(opcode == op::CONSTANT_TRUE));
             }
-            (op::CONSTANT, &[ty, id, value]) if self.is_bool.contains_key(&ty) => {
-                self.values.insert(id, value);
+            (op::CONSTANT, &[ty, id, value]) => {
+                self.learn(ty, id, value);
             }
             (op::SPEC_CONSTANT_TRUE | op::SPEC_CONSTANT_FALSE, &[ty, id]) => {
                 let default = u32::from(opcode == op::SPEC_CONSTANT_TRUE);
@@ -83,9 +106,7 @@ impl<'a> Folder<'a> {
             }
             (op::CONSTANT_COMPOSITE | op::SPEC_CONSTANT_COMPOSITE, [_, id, members @ ..]) => {
                 self.composites.insert(*id, members.to_vec());
-                words.push(instruction[0] & !0xffff | op::CONSTANT_COMPOSITE);
-                words.extend_from_slice(&instruction[1..]);
-                return;
+                return push(words, op::CONSTANT_COMPOSITE, instruction[1..].iter().copied());
             }
             (op::SPEC_CONSTANT_OP, &[ty, id, operation, ref operands @ ..]) => {
                 if let Some(value) = self.is_bool.get(&ty).and_then(|_| self.evaluated(operation, operands)) {
@@ -98,30 +119,41 @@ impl<'a> Folder<'a> {
     }
 
     fn given(&self, id: u32, default: u32) -> u32 {
-        self.numbers.get(&id).and_then(|number| self.constants.get(number)).copied().unwrap_or(default)
+        self.numbers.get(&id).and_then(|number| self.given.get(number)).copied().unwrap_or(default)
     }
 
     /// Declares a plain constant.
     fn declare(&mut self, ty: u32, id: u32, value: u32, words: &mut Vec<u32>) {
         if self.is_bool.get(&ty) == Some(&true) {
-            words.extend([3 << 16 | if value == 0 { op::CONSTANT_FALSE } else { op::CONSTANT_TRUE }, ty, id]);
+            push(words, if value == 0 { op::CONSTANT_FALSE } else { op::CONSTANT_TRUE }, [ty, id]);
         } else {
-            words.extend([4 << 16 | op::CONSTANT, ty, id, value]);
+            push(words, op::CONSTANT, [ty, id, value]);
         }
-        if self.is_bool.contains_key(&ty) {
-            self.values.insert(id, value);
-        }
+        self.learn(ty, id, value);
     }
 
     /// The value of an operation on constants; `None` for what no shader here does.
     fn evaluated(&self, operation: u32, operands: &[u32]) -> Option<u32> {
-        if let (op::COMPOSITE_EXTRACT, &[composite, member]) = (operation, operands) {
-            return self.values.get(self.composites.get(&composite)?.get(member as usize)?).copied();
+        let value = |id: u32| self.value(id);
+        match (operation, operands) {
+            (op::COMPOSITE_EXTRACT, &[composite, member]) => {
+                return value(*self.composites.get(&composite)?.get(member as usize)?);
+            }
+            (op::COPY_OBJECT, &[id]) => return value(id),
+            (op::SELECT, &[condition, yes, no]) => return value(if value(condition)? != 0 { yes } else { no }),
+            // One side is enough.
+            (op::LOGICAL_AND | op::BITWISE_AND, &[a, b]) if value(a) == Some(0) || value(b) == Some(0) => {
+                return Some(0);
+            }
+            (op::LOGICAL_OR, &[a, b]) if value(a) == Some(1) || value(b) == Some(1) => return Some(1),
+            _ => {}
         }
-        let values: Option<Vec<u32>> = operands.iter().map(|id| self.values.get(id).copied()).collect();
+        let (a, b) = match *operands {
+            [a] => (value(a)?, 0),
+            [a, b] => (value(a)?, value(b)?),
+            _ => return None,
+        };
         let signed = |value: u32| value as i32;
-        let values = values?;
-        let [a, b, c] = std::array::from_fn(|i| values.get(i).copied().unwrap_or(0));
         Some(match operation {
             126 => a.wrapping_neg(),
             128 => a.wrapping_add(b),
@@ -135,7 +167,6 @@ impl<'a> Folder<'a> {
             166 | 197 => a | b,
             167 | 199 => a & b,
             168 => u32::from(a == 0),
-            169 => [c, b][usize::from(a != 0)],
             172 => u32::from(a > b),
             173 => u32::from(signed(a) > signed(b)),
             174 => u32::from(a >= b),
@@ -154,40 +185,18 @@ impl<'a> Folder<'a> {
     }
 }
 
-#[cfg(all(test, feature = "compile-shaders"))]
+#[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::shaders;
-    use rspirv::dr::load_words;
-    use rspirv::spirv::Op;
-
-    #[test]
-    fn no_shader_keeps_a_specialisation_constant() {
-        for shader in shaders::ALL {
-            let words = ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv)).expect("whole words");
-            let module = load_words(folded(&words, &HashMap::from([(0, 8)]))).expect("SPIR-V");
-            let left = module.types_global_values.iter().filter(|i| {
-                matches!(
-                    i.class.opcode,
-                    Op::SpecConstant
-                        | Op::SpecConstantTrue
-                        | Op::SpecConstantFalse
-                        | Op::SpecConstantComposite
-                        | Op::SpecConstantOp
-                )
-            });
-            let left: Vec<_> = left.map(|i| i.operands.clone()).collect();
-            assert!(left.is_empty(), "{}: {left:?}", shader.name);
-        }
-    }
 
     #[test]
     fn constants_take_the_values_that_are_given_and_operations_on_them_are_done() {
         let instruction =
             |opcode: u32, operands: &[u32]| [&[(operands.len() as u32 + 1) << 16 | opcode], operands].concat();
         let [uint, boolean, three, given, default, sum, is_less] = [1, 2, 3, 4, 5, 6, 7];
+        let header = vec![0, 0, 0, 8, 0];
         let before = [
-            vec![0; HEADER_WORDS],
+            header.clone(),
             instruction(op::DECORATE, &[given, SPEC_ID, 0]),
             instruction(op::DECORATE, &[default, SPEC_ID, 1]),
             instruction(op::TYPE_INT, &[uint, 32, 0]),
@@ -199,7 +208,7 @@ mod tests {
             instruction(op::SPEC_CONSTANT_OP, &[boolean, is_less, 176, sum, three]),
         ];
         let after = [
-            vec![0; HEADER_WORDS],
+            header,
             instruction(op::TYPE_INT, &[uint, 32, 0]),
             instruction(op::TYPE_BOOL, &[boolean]),
             instruction(op::CONSTANT, &[uint, three, 3]),
@@ -208,6 +217,9 @@ mod tests {
             instruction(op::CONSTANT, &[uint, sum, 23]),
             instruction(op::CONSTANT_FALSE, &[boolean, is_less]),
         ];
-        assert_eq!(folded(&before.concat(), &HashMap::from([(0, 20)])), after.concat());
+        let (given, before) = (HashMap::from([(0, 20)]), before.concat());
+        let mut constants = Constants::of(&given, &before);
+        assert_eq!(constants.folded(&before), after.concat());
+        assert_eq!([sum, is_less].map(|id| constants.value(id)), [Some(23), Some(0)]);
     }
 }
