@@ -1,11 +1,13 @@
 //! What a driver's faults need, each from the driver's id and version, with the test that shows it.
 //!
 //! A fault that costs nothing to live with has no flag: the code does what suits every driver, and a comment there says why.
-//! These are four. lavapipe of Mesa 26 loads what is at one address for all lanes even where no lane is active (`bvh::encode`,
+//! These are five. lavapipe of Mesa 26 loads what is at one address for all lanes even where no lane is active (`bvh::encode`,
 //! `glsl/bvh/clusters.glsl`, `glsl/bvh/ploc.glsl`, `glsl/kdtree/small.glsl` keep such addresses in range); Mesa takes each
 //! access to shared memory that makes itself visible for a fence (`build/memory_model.rs`); lavapipe before Mesa 25 ends long
 //! loops early, which [`super::probe`] finds out by running one; SwiftShader writes elsewhere, and crashes,
-//! where a shader loads its arguments from a table in its middle (`build/by_table.rs` has them loaded at the start; tests/accel/arguments.rs).
+//! where a shader loads its arguments from a table in its middle (`build/by_table.rs` has them loaded at the start; tests/accel/arguments.rs);
+//! and it optimises by SPIR-V Tools, whose constant propagation (`CCPPass`) never gives a value to a `min` of two constants that it does
+//! not fold, and takes what meets that at a phi for the other side (`glsl/bvh/wide/children.glsl`; tests/drivers).
 
 use super::Limits;
 use ash::vk;

@@ -121,8 +121,8 @@ uint open_children(uint slot, uint level) {
     wait_for_nothing();
     if (apart == 0) wait_for_children(slot, choice, WIDTH, by_cost);
     for (uint other = apart; other-- > 1;) wait(name_of_child(other), 1);
-    // What is near stays closed. `room`: places that the choices leave free.
-    uint count = min(apart, 1), room = apart != 0 ? WIDTH - apart : by_cost ? WIDTH - children_by(choice) : 0;
+    // What is near stays closed. `room`: places that the choices leave free. No min() of what may be constant (src/gpu/workarounds.rs).
+    uint count = apart == 0 ? 0 : 1, room = apart != 0 ? WIDTH - apart : by_cost ? WIDTH - children_by(choice) : 0;
     // Of n children 2 n - 2 links are taken.
     for (uint turn = 0; turn < 14 && waiting_next.x != 0u; ++turn) {
         uint next = take_next(), name = next & WAITING_NAME, places = next >> WAITING_BITS;
