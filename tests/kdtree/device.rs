@@ -196,10 +196,12 @@ fn across_levels_the_report_counts_retrievals_and_those_that_were_skipped() {
     let (tree, report) = built(&mesh, &options);
     let by_one = built(&mesh, &KdOptions { workgroups: Some(1), ..options }).1;
     for report in [&report, &by_one] {
-        // Each cell above subtrees takes three steps, and each subtree one; cells that are shared take more.
+        // Each cell above subtrees takes three steps, and each subtree one; cells that are shared take more: how many, the chunks of
+        // the device decide. Who ends the first or the second step of a cell that is divided goes on with the next.
         let steps = report.retrievals + report.skipped_retrievals;
         assert!(steps >= 2 * report.level_nodes - report.subtrees, "{report:?}");
-        assert!(report.retrievals > 0 && report.skipped_retrievals > report.retrievals, "{report:?}");
+        let divided = (report.level_nodes - 1) / 2;
+        assert!(report.retrievals > 0 && report.skipped_retrievals >= 2 * divided, "{report:?}");
         assert_eq!(report.level_nodes + report.subtree_nodes, tree.header.node_count, "{report:?}");
         assert_eq!(report.cut_references + report.subtree_references, tree.header.reference_count, "{report:?}");
         assert!(report.arena > 9000, "{report:?}");
