@@ -183,8 +183,8 @@ uvec2 records_of_kind(uvec2 structure, uint kind, uint node_slots) {
 // Where an instance begins: a Child's index and count; of quantised nodes a node, and which of its slots.
 uvec2 begin_at(uint start, uint slots, uint records) {
     uint index = start & INDEX_MASK, above = start >> INDEX_BITS;
-    if ((slots & FORM_QUANTISED) != 0u) return uvec2(index, above | records >> INDEX_BITS << 32u - INDEX_BITS);
-    return uvec2(index, above == UP_TO_LAST ? records - index : above);
+    uint of_eight = above | records >> INDEX_BITS << 32u - INDEX_BITS, of_two = above == UP_TO_LAST ? records - index : above;
+    return uvec2(index, (slots & FORM_QUANTISED) != 0u ? of_eight : of_two);
 }
 
 Triangles triangles_of(Structure structure) {

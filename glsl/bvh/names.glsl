@@ -56,6 +56,9 @@
 #define byte_of_slot hedgerow_byte_of_slot
 #define sum_below hedgerow_sum_below
 #define rank_of_node hedgerow_rank_of_node
+#define Units HedgerowUnits
+#define triangle_in_units hedgerow_triangle_in_units
+#define second_in_units hedgerow_second_in_units
 #define SecondsOfPairs HedgerowSecondsOfPairs
 #define SecondOfPair HedgerowSecondOfPair
 #define UNITS_OF_ONE HEDGEROW_UNITS_OF_ONE

@@ -55,6 +55,9 @@
 #undef byte_of_slot
 #undef sum_below
 #undef rank_of_node
+#undef Units
+#undef triangle_in_units
+#undef second_in_units
 #undef SecondsOfPairs
 #undef SecondOfPair
 #undef UNITS_OF_ONE

@@ -41,6 +41,7 @@ HedgerowEachLane hedgerow_each_lane(uint value) {
     return each;
 }
 
+// In place of a vote, too, which is a loop over the lanes on lavapipe.
 uint hedgerow_sum_of_lanes(uint value) {
     HedgerowEachLane each = hedgerow_each_lane(value);
     uint sum = 0;
@@ -53,11 +54,6 @@ uint hedgerow_max_of_lanes(uint value) {
     uint most = 0;
     for (uint lane = 0; lane < 16; lane++) most = max(most, each.value[lane]);
     return most;
-}
-
-// Whether any lane says so. A vote is a loop over the lanes on lavapipe.
-bool hedgerow_any_lane(bool says) {
-    return hedgerow_sum_of_lanes(uint(says)) != 0u;
 }
 
 Child hedgerow_own_child(bool own, Child theirs, Child mine) {

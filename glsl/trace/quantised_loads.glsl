@@ -22,7 +22,7 @@ Triangle triangle_at_unit(uvec2 records, uint unit) {
 #ifdef HEDGEROW_INT64
     return hedgerow_long_triangle(record_at_unit(records, unit));
 #else
-    return IN_VECTORS ? triangle_of_pairs(Pairs(records), unit) : Triangles(record_at_unit(records, unit)).triangle[0];
+    return IN_VECTORS ? triangle_in_units(Units(records), unit) : Triangles(record_at_unit(records, unit)).triangle[0];
 #endif
 }
 
@@ -32,11 +32,5 @@ SecondOfPair second_of_pair_at(uvec2 records, uint unit) {
 #else
     return SecondsOfPairs(second_at_unit(records, unit)).second[0];
 #endif
-}
-
-// Of a record's second triangle what begins at an element of 8 bytes.
-SecondOfPair second_of_pairs(Pairs pairs, uint at) {
-    uvec2 a = pairs.pair[at], b = pairs.pair[at + 1u];
-    return SecondOfPair(uintBitsToFloat(uvec3(a, b.x)), b.y);
 }
 #endif

@@ -8,83 +8,123 @@
 #include "bvh/names.glsl"
 #include "trace/lanes.glsl"
 
-Node hedgerow_node_of_each_lane(uvec2 address) {
-    HedgerowEachLane low = hedgerow_each_lane(address.x), high = hedgerow_each_lane(address.y);
+// Where each lane loads from: an element of an array. Of one level the array is the same for all lanes, and known to be; through two it is
+// each lane's own.
+struct HedgerowEachPlace {
+    HedgerowEachLane low;
+    HedgerowEachLane high;
+    HedgerowEachLane index;
+};
+
+HedgerowEachPlace hedgerow_each_place(uvec2 array, uint index) {
+    HedgerowEachPlace each;
+    if (!HEDGEROW_ONE_LEVEL) {
+        each.low = hedgerow_each_lane(array.x);
+        each.high = hedgerow_each_lane(array.y);
+    }
+    each.index = hedgerow_each_lane(index);
+    return each;
+}
+
+#define HEDGEROW_ARRAY_OF(lane) (HEDGEROW_ONE_LEVEL ? array : uvec2(each.low.value[lane], each.high.value[lane]))
+
+Node hedgerow_node_of_each_lane(uvec2 array, uint index) {
+    HedgerowEachPlace each = hedgerow_each_place(array, index);
     Node mine = HEDGEROW_NO_NODE;
-#define HEDGEROW_LOAD_NODE(lane)                                                         \
-    if (lane < hedgerow_lanes) {                                                         \
-        Node theirs = HedgerowNodes(uvec2(low.value[lane], high.value[lane])).node[0];   \
-        mine = hedgerow_own_node(gl_SubgroupInvocationID == lane, theirs, mine);         \
+#define HEDGEROW_LOAD_NODE(lane)                                                              \
+    if (lane < hedgerow_lanes) {                                                              \
+        Node theirs = HedgerowNodes(HEDGEROW_ARRAY_OF(lane)).node[each.index.value[lane]];    \
+        mine = hedgerow_own_node(gl_SubgroupInvocationID == lane, theirs, mine);              \
     }
     HEDGEROW_FOR_EACH_LANE(HEDGEROW_LOAD_NODE)
     return mine;
 }
 
-Triangle hedgerow_triangle_of_each_lane(uvec2 address) {
-    HedgerowEachLane low = hedgerow_each_lane(address.x), high = hedgerow_each_lane(address.y);
+Triangle hedgerow_triangle_of_each_lane(uvec2 array, uint index) {
+    HedgerowEachPlace each = hedgerow_each_place(array, index);
     Triangle mine = HEDGEROW_NO_TRIANGLE;
-#define HEDGEROW_LOAD_TRIANGLE(lane)                                                         \
-    if (lane < hedgerow_lanes) {                                                             \
-        Triangle theirs = Triangles(uvec2(low.value[lane], high.value[lane])).triangle[0];   \
-        mine = hedgerow_own_triangle(gl_SubgroupInvocationID == lane, theirs, mine);         \
+#define HEDGEROW_LOAD_TRIANGLE(lane)                                                                  \
+    if (lane < hedgerow_lanes) {                                                                      \
+        Triangle theirs = Triangles(HEDGEROW_ARRAY_OF(lane)).triangle[each.index.value[lane]];        \
+        mine = hedgerow_own_triangle(gl_SubgroupInvocationID == lane, theirs, mine);                  \
     }
     HEDGEROW_FOR_EACH_LANE(HEDGEROW_LOAD_TRIANGLE)
     return mine;
 }
 
-QuantisedNode hedgerow_quantised_node_of_each_lane(uvec2 address) {
-    HedgerowEachLane low = hedgerow_each_lane(address.x), high = hedgerow_each_lane(address.y);
+QuantisedNode hedgerow_quantised_node_of_each_lane(uvec2 array, uint index) {
+    HedgerowEachPlace each = hedgerow_each_place(array, index);
     QuantisedNode mine = HEDGEROW_NO_QUANTISED_NODE;
-#define HEDGEROW_LOAD_QUANTISED_NODE(lane)                                                               \
-    if (lane < hedgerow_lanes) {                                                                         \
-        QuantisedNode theirs = QuantisedNodes(uvec2(low.value[lane], high.value[lane])).node[0];         \
-        mine = hedgerow_own_quantised_node(gl_SubgroupInvocationID == lane, theirs, mine);               \
+#define HEDGEROW_LOAD_QUANTISED_NODE(lane)                                                                    \
+    if (lane < hedgerow_lanes) {                                                                              \
+        QuantisedNode theirs = QuantisedNodes(HEDGEROW_ARRAY_OF(lane)).node[each.index.value[lane]];          \
+        mine = hedgerow_own_quantised_node(gl_SubgroupInvocationID == lane, theirs, mine);                    \
     }
     HEDGEROW_FOR_EACH_LANE(HEDGEROW_LOAD_QUANTISED_NODE)
     return mine;
 }
 
-SecondOfPair hedgerow_second_of_each_lane(uvec2 address) {
-    HedgerowEachLane low = hedgerow_each_lane(address.x), high = hedgerow_each_lane(address.y);
+Triangle hedgerow_first_of_each_lane(uvec2 array, uint unit) {
+    HedgerowEachPlace each = hedgerow_each_place(array, unit);
+    Triangle mine = HEDGEROW_NO_TRIANGLE;
+#define HEDGEROW_LOAD_FIRST(lane)                                                                             \
+    if (lane < hedgerow_lanes) {                                                                              \
+        Triangle theirs = triangle_in_units(Units(HEDGEROW_ARRAY_OF(lane)), each.index.value[lane]);          \
+        mine = hedgerow_own_triangle(gl_SubgroupInvocationID == lane, theirs, mine);                          \
+    }
+    HEDGEROW_FOR_EACH_LANE(HEDGEROW_LOAD_FIRST)
+    return mine;
+}
+
+SecondOfPair hedgerow_second_of_each_lane(uvec2 array, uint unit) {
+    HedgerowEachPlace each = hedgerow_each_place(array, unit);
     SecondOfPair mine = HEDGEROW_NO_SECOND;
-#define HEDGEROW_LOAD_SECOND(lane)                                                                    \
-    if (lane < hedgerow_lanes) {                                                                      \
-        SecondOfPair theirs = SecondsOfPairs(uvec2(low.value[lane], high.value[lane])).second[0];     \
-        mine = hedgerow_own_second(gl_SubgroupInvocationID == lane, theirs, mine);                    \
+#define HEDGEROW_LOAD_SECOND(lane)                                                                            \
+    if (lane < hedgerow_lanes) {                                                                              \
+        SecondOfPair theirs = second_in_units(Units(HEDGEROW_ARRAY_OF(lane)), each.index.value[lane]);        \
+        mine = hedgerow_own_second(gl_SubgroupInvocationID == lane, theirs, mine);                            \
     }
     HEDGEROW_FOR_EACH_LANE(HEDGEROW_LOAD_SECOND)
     return mine;
 }
 
-// The node at hand, of the lanes whose ray goes. `readable` is the address of 80 bytes or more, for lanes that need nothing.
-void hedgerow_visit_in_lanes(inout HedgerowRayQuery query, bool goes, uvec2 readable) {
+// The node at hand, of the lanes whose ray goes. `told` is the structure that hedgerowTurns was told of: what lanes load that need nothing
+// lies at the beginning of it or, of one level, of its nodes and records.
+void hedgerow_visit_in_lanes(inout HedgerowRayQuery query, bool goes, uvec2 told) {
     bool visits = goes && hedgerow_comes_to_node(query);
     if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_TWO) != 0u) {
         bool is_own = visits && !hedgerow_is_quantised(query);
-        uvec2 address = is_own ? hedgerow_node_address(query.structure, query.index) : readable;
-        Node node = hedgerow_node_of_each_lane(address);
+        // Behind the header, which is as long as two nodes.
+        Node node = hedgerow_node_of_each_lane(is_own ? query.structure : told, is_own ? 2u + query.index : 0u);
         if (is_own) hedgerow_visit_node(query, node);
     }
     if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_EIGHT) != 0u) {
         bool is_own = visits && hedgerow_is_quantised(query);
-        uvec2 address = is_own ? address_of(wide_nodes_at(query.structure), query.index, QUANTISED_NODE_BYTES) : readable;
-        QuantisedNode node = hedgerow_quantised_node_of_each_lane(address);
+        uvec2 nodes = HEDGEROW_ONE_LEVEL ? wide_nodes_at(told) : is_own ? wide_nodes_at(query.structure) : told;
+        QuantisedNode node = hedgerow_quantised_node_of_each_lane(nodes, is_own ? query.index : 0u);
         if (is_own) hedgerow_visit_quantised(query, node);
     }
 }
 
+// The triangles of the structure that hedgerowTurns was told of, which has one level; if it has boxes, its nodes.
+uvec2 hedgerow_triangles_of_told(uvec2 told) {
+    Header header = Structure(told).header;
+    return records_of_kind(told, header.kind, has_boxes(header.kind) ? 0u : header.node_slots);
+}
+
 // The next record of a leaf, of the lanes that are at one; true if what was met is a candidate. Of quantised triangles a record may be two.
-bool hedgerow_test_in_lanes(inout HedgerowRayQuery query, bool tests, uvec2 readable) {
+bool hedgerow_test_in_lanes(inout HedgerowRayQuery query, bool tests, uvec2 told) {
     bool waits = false;
-    uvec2 records = hedgerow_records_in(query.structure, query.slots, query.form);
-    bool has_boxes = (query.form & FORM_BOXES) != 0u;
-    if (tests && has_boxes) waits = hedgerow_test_box(query);
-    bool tests_triangle = tests && !has_boxes;
+    bool at_box = (query.form & FORM_BOXES) != 0u;
+    if (tests && at_box) waits = hedgerow_test_box(query);
+    bool tests_triangle = tests && !at_box;
     if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_TWO) != 0u) {
         uint at = query.index;
         bool is_own = tests_triangle && !hedgerow_is_quantised(query);
         bool is_there = is_own && at < query.records;
-        Triangle triangle = hedgerow_triangle_of_each_lane(is_there ? address_of(records, at, 40u) : readable);
+        uvec2 triangles = HEDGEROW_ONE_LEVEL ? hedgerow_triangles_of_told(told)
+                                             : is_there ? records_at(query.structure, query.slots) : told;
+        Triangle triangle = hedgerow_triangle_of_each_lane(triangles, is_there ? at : 0u);
         if (is_own) {
             hedgerow_step(query);
             HEDGEROW_COUNT(w);
@@ -94,22 +134,24 @@ bool hedgerow_test_in_lanes(inout HedgerowRayQuery query, bool tests, uvec2 read
     if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_EIGHT) != 0u) {
         bool is_own = tests_triangle && hedgerow_is_quantised(query) && hedgerow_comes_to_record(query);
         uint unit = hedgerow_unit_of(query);
-        Triangle first = hedgerow_triangle_of_each_lane(is_own ? record_at_unit(records, unit) : readable);
+        uvec2 records = HEDGEROW_ONE_LEVEL ? hedgerow_triangles_of_told(told)
+                                           : is_own ? wide_records_at(query.structure, query.slots, QUANTISED_NODE_BYTES) : told;
+        Triangle first = hedgerow_first_of_each_lane(records, is_own ? unit : 0u);
         bool is_pair = is_own && hedgerow_is_pair(query, first);
-        SecondOfPair second = hedgerow_second_of_each_lane(is_pair ? second_at_unit(records, unit) : readable);
+        SecondOfPair second = hedgerow_second_of_each_lane(records, is_pair ? unit + UNITS_OF_ONE : 0u);
         if (is_own) waits = hedgerow_meet_pair(query, first, second, is_pair);
     }
     return waits;
 }
 
 // As a round of hedgerow_proceed, of the lanes whose ray goes.
-bool hedgerow_round_of_lanes(inout HedgerowRayQuery query, bool goes, uvec2 readable, out bool ends) {
+bool hedgerow_round_of_lanes(inout HedgerowRayQuery query, bool goes, uvec2 told, out bool ends) {
     if (goes && hedgerow_has_record(query) && hedgerow_is_in_top(query)) hedgerow_enter_instance(query);
-    hedgerow_visit_in_lanes(query, goes, readable);
-    if (HEDGEROW_FORMS == HEDGEROW_NODES_OF_TWO) hedgerow_visit_in_lanes(query, goes, readable);
+    hedgerow_visit_in_lanes(query, goes, told);
+    if (HEDGEROW_FORMS == HEDGEROW_NODES_OF_TWO) hedgerow_visit_in_lanes(query, goes, told);
     if (goes && hedgerow_is_quantised(query)) hedgerow_take_leaf(query);
     bool tests = goes && hedgerow_has_record(query) && !hedgerow_is_in_top(query);
-    bool waits = hedgerow_test_in_lanes(query, tests, readable);
+    bool waits = hedgerow_test_in_lanes(query, tests, told);
     ends = false;
     if (goes) {
         ends = query.rounds == 0u;

@@ -7,11 +7,15 @@
 // first: its header may name any place.
 HedgerowGeometry hedgerow_geometry_of(uvec2 structure, uint slots, uint primitive) {
     Header header = Structure(structure).header;
+    HedgerowGeometry geometry = HedgerowGeometry(0u, 0u, header.geometry_flags);
     // First, as it is most often all that has to be loaded.
-    if (header.geometry_count <= 1u) return HedgerowGeometry(0u, 0u, header.geometry_flags);
-    if (header.magic != MAGIC || header.node_slots != slots) return HedgerowGeometry(0u, 0u, 0u);
-    GeometryTable table = GeometryTable(geometry_table_of(structure, header));
-    return hedgerow_geometry_in(table, header.geometry_count, primitive);
+    if (header.geometry_count > 1u) {
+        geometry.flags = 0u;
+        if (header.magic == MAGIC && header.node_slots == slots) {
+            geometry = hedgerow_geometry_in(GeometryTable(geometry_table_of(structure, header)), header.geometry_count, primitive);
+        }
+    }
+    return geometry;
 }
 
 HedgerowMeeting hedgerow_met(HedgerowRayQuery query, bool committed) {
@@ -22,8 +26,10 @@ HedgerowMeeting hedgerow_met(HedgerowRayQuery query, bool committed) {
 
 // The records of a structure.
 uvec2 hedgerow_records_in(uvec2 structure, uint slots, uint form) {
-    if ((form & FORM_QUANTISED) != 0u) return wide_records_at(structure, slots, QUANTISED_NODE_BYTES);
-    return records_at(structure, slots);
+    uvec2 records;
+    if ((form & FORM_QUANTISED) != 0u) records = wide_records_at(structure, slots, QUANTISED_NODE_BYTES);
+    else records = records_at(structure, slots);
+    return records;
 }
 
 uvec2 hedgerow_records_of_top(HedgerowRayQuery query) {
@@ -32,9 +38,10 @@ uvec2 hedgerow_records_of_top(HedgerowRayQuery query) {
 
 // The instance of a meeting: of a bottom-level structure that is queried itself, one without a transform.
 Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
-    if (hedgerow_has_top(query)) return Instances(hedgerow_records_of_top(query)).instance[met.instance];
     const vec4 identity[3] = vec4[3](vec4(1, 0, 0, 0), vec4(0, 1, 0, 0), vec4(0, 0, 1, 0));
-    return Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, query.top_slots | query.top_form, query.top_records);
+    Instance instance = Instance(identity, identity, query.top, 0u, 0u, 0u, 0u, query.top_slots | query.top_form, query.top_records);
+    if (hedgerow_has_top(query)) instance = Instances(hedgerow_records_of_top(query)).instance[met.instance];
+    return instance;
 }
 
 uvec2 hedgerow_records_of(Instance instance) {
@@ -51,10 +58,12 @@ Triangle hedgerow_triangle_of(Instance instance, HedgerowMeeting met) {
 // Whether the candidate comes before the committed hit at the same t: by instance, then primitive. Several records may be of one instance.
 bool hedgerow_comes_before(HedgerowRayQuery query) {
     HedgerowMeeting a = query.candidate, b = query.committed;
-    if (b.type == HEDGEROW_MET_NOTHING) return false;
-    Instance of_a = hedgerow_instance_of(query, a), of_b = hedgerow_instance_of(query, b);
-    if (of_a.instance != of_b.instance) return of_a.instance < of_b.instance;
-    return a.primitive < b.primitive;
+    bool before = false;
+    if (b.type != HEDGEROW_MET_NOTHING) {
+        uint of_a = hedgerow_instance_of(query, a).instance, of_b = hedgerow_instance_of(query, b).instance;
+        before = of_a < of_b || (of_a == of_b && a.primitive < b.primitive);
+    }
+    return before;
 }
 
 void hedgerow_commit(inout HedgerowRayQuery query) {

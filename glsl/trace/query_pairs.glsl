@@ -11,9 +11,9 @@ uint hedgerow_unit_of(HedgerowRayQuery query) {
 
 // Whether the next record is there: a stale structure may name records that there are not.
 bool hedgerow_comes_to_record(inout HedgerowRayQuery query) {
-    if (hedgerow_unit_of(query) + UNITS_OF_ONE <= UNITS_OF_ONE * query.records) return true;
-    query.left = HEDGEROW_NOTHING;
-    return false;
+    bool is_there = hedgerow_unit_of(query) + UNITS_OF_ONE <= UNITS_OF_ONE * query.records;
+    if (!is_there) query.left = HEDGEROW_NOTHING;
+    return is_there;
 }
 
 // Whether the next record, whose first triangle this is, has a second one, and that is there.
@@ -46,12 +46,15 @@ bool hedgerow_meet_pair(inout HedgerowRayQuery query, Triangle first, SecondOfPa
 }
 
 bool hedgerow_test_pair(inout HedgerowRayQuery query) {
-    if (!hedgerow_comes_to_record(query)) return false;
-    uvec2 records = hedgerow_records_in(query.structure, query.slots, query.form);
-    Triangle first = hedgerow_triangle_at_unit(records, hedgerow_unit_of(query));
-    SecondOfPair second;
-    bool is_pair = hedgerow_is_pair(query, first);
-    if (is_pair) second = hedgerow_second_of_pair_at(records, hedgerow_unit_of(query));
-    return hedgerow_meet_pair(query, first, second, is_pair);
+    bool waits = false;
+    if (hedgerow_comes_to_record(query)) {
+        uvec2 records = wide_records_at(query.structure, query.slots, QUANTISED_NODE_BYTES);
+        Triangle first = hedgerow_triangle_at_unit(records, hedgerow_unit_of(query));
+        SecondOfPair second;
+        bool is_pair = hedgerow_is_pair(query, first);
+        if (is_pair) second = hedgerow_second_of_pair_at(records, hedgerow_unit_of(query));
+        waits = hedgerow_meet_pair(query, first, second, is_pair);
+    }
+    return waits;
 }
 #endif

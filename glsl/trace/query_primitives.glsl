@@ -76,7 +76,7 @@ bool hedgerow_test_triangle(inout HedgerowRayQuery query) {
     uint at;
     bool waits = false;
     if (hedgerow_takes_record(query, at)) {
-        Triangle triangle = hedgerow_triangle_at(hedgerow_records_in(query.structure, query.slots, query.form), at);
+        Triangle triangle = hedgerow_triangle_at(records_at(query.structure, query.slots), at);
         waits = hedgerow_meet_triangle(query, triangle, at);
     }
     return waits;

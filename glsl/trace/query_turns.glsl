@@ -23,7 +23,7 @@
 // (trace/lanes.glsl): what CPUs' drivers are faster with that load what is uniform once. It says by HEDGEROW_FORMS (trace/query_walk.glsl)
 // what nodes there are, or those of either form are loaded for all lanes. Through two levels of nodes of eight each lane's own loads are
 // faster. What a lane loads that needs nothing is the beginning of the structure that hedgerowTurns was told of. Rays may go into others,
-// but if that is null they meet nothing.
+// but if that is null, or with HEDGEROW_ONE_LEVEL, those meet nothing.
 //
 // On lavapipe the rays of `hedgerow accel` are 1.25 times as fast lane by lane as with one for each invocation (docs/notes/rays.md): those
 // that go anywhere 1.6 to 2.1 times, those that go the same way 0.91 to 1.13. With each lane's own loads it was 1.13 times.
@@ -39,7 +39,6 @@
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_vote : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#define hedgerow_any_lane subgroupAny
 #define hedgerow_sum_of_lanes subgroupAdd
 #define hedgerow_max_of_lanes subgroupMax
 #endif
@@ -50,31 +49,45 @@ const uint HEDGEROW_ROUNDS_A_TURN = 8u;
 
 struct HedgerowTurns {
     bool takes;      // in this turn: the next ray
+    bool any_takes;  // of the subgroup
     bool goes;       // a ray is on its way
     bool ends;       // in this turn
     bool together;
     uint spent;      // rounds since all took a ray
-    uvec2 readable;  // memory that a lane may load from which needs nothing
+    uvec2 told;      // the structure that lanes load from that need nothing
 };
 
 // Before the first turn. The structure has to be the same for all invocations of a subgroup, with HEDGEROW_LANES of the workgroup.
 HedgerowTurns hedgerowTurns(HedgerowStructure structure) {
-    return HedgerowTurns(false, false, false, true, 0u, uvec2(structure));
+    uvec2 told = uvec2(structure);
+    // Of one level what lanes load lies among its nodes and triangles.
+    if (HEDGEROW_ONE_LEVEL && any(notEqual(told, uvec2(0u)))) told = hedgerow_can_be_traced(structure.header) ? told : uvec2(0u);
+    return HedgerowTurns(false, false, false, false, true, 0u, told);
 }
 
 // Whether anything is left to do in the subgroup, where this invocation has rays left or not.
+//
+// There is no return in the middle here either, nor in the next function. With one lavapipe keeps even constants, the numbers of lanes, in
+// variables that it writes by a mask, and then compares lanes and selects words where it would insert them: rays that are loaded lane by
+// lane have 0.8 of the speed (docs/notes/rays.md).
 bool hedgerowTakeTurn(inout HedgerowTurns turns, bool has_rays) {
-    bool none_goes = !hedgerow_any_lane(turns.goes);
+    bool waits = !turns.goes && has_rays;
+#ifdef HEDGEROW_LANES
+    uint lanes = hedgerow_sum_of_lanes(uint(turns.goes) | uint(waits) << 16);
+    bool none_goes = (lanes & 0xFFFFu) == 0u, any_waits = lanes >> 16 != 0u;
+#else
+    bool none_goes = !subgroupAny(turns.goes), any_waits = subgroupAny(waits);
+#endif
     if (none_goes) {
-        if (!hedgerow_any_lane(has_rays)) return false;
-        uint lanes = hedgerow_sum_of_lanes(1u);
-        turns.together =
-            turns.together && 2u * hedgerow_sum_of_lanes(turns.spent) >= lanes * hedgerow_max_of_lanes(turns.spent);
+        uint all = hedgerow_sum_of_lanes(1u);
+        turns.together = turns.together && 2u * hedgerow_sum_of_lanes(turns.spent) >= all * hedgerow_max_of_lanes(turns.spent);
         turns.spent = 0u;
     }
-    turns.takes = !turns.goes && has_rays && (none_goes || !turns.together);
+    bool take = none_goes || !turns.together;
+    turns.any_takes = take && any_waits;
+    turns.takes = take && waits;
     turns.goes = turns.goes || turns.takes;
-    return true;
+    return !none_goes || any_waits;
 }
 
 // True if a candidate waits to be decided on. If not, the query has ended or goes on in the next turn. Its flags are asked for again, as a
@@ -82,22 +95,24 @@ bool hedgerowTakeTurn(inout HedgerowTurns turns, bool has_rays) {
 bool hedgerowRayQueryProceedInTurn(inout HedgerowRayQuery query, inout HedgerowTurns turns, uint flags) {
     query.flags = flags;
     turns.ends = false;
+    bool waits = false;
 #ifdef HEDGEROW_LANES
     // Not found on the way: a driver may load what is the same for all lanes where none of them is active, from what it then finds there.
-    if (all(equal(turns.readable, uvec2(0u)))) {
-        turns.ends = turns.goes;
-        return false;
-    }
-    if (turns.goes) turns.spent++;
-    return hedgerow_round_of_lanes(query, turns.goes, turns.readable, turns.ends);
+    bool is_told = any(notEqual(turns.told, uvec2(0u)));
+    // Of one level the nodes and records of that structure are loaded by their indices.
+    bool goes = turns.goes && (!HEDGEROW_ONE_LEVEL || all(equal(query.top, turns.told)));
+    if (is_told) waits = hedgerow_round_of_lanes(query, goes, turns.told, turns.ends);
+    turns.ends = turns.ends || (turns.goes && !(goes && is_told));
+    turns.spent += turns.goes ? 1u : 0u;
 #else
-    if (!turns.goes) return false;
-    uint most = turns.together ? 0xffffffffu : HEDGEROW_ROUNDS_A_TURN;
-    uint left = most;
-    bool waits = hedgerow_proceed_for(query, left, true, turns.ends);
-    turns.spent += most - left;
-    return waits;
+    if (turns.goes) {
+        uint most = turns.together ? 0xffffffffu : HEDGEROW_ROUNDS_A_TURN;
+        uint left = most;
+        waits = hedgerow_proceed_for(query, left, true, turns.ends);
+        turns.spent += most - left;
+    }
 #endif
+    return waits;
 }
 
 // Whether the query has ended in this turn: its hit is what it is.

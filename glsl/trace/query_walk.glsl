@@ -244,8 +244,8 @@ bool hedgerow_goes_left_first(HedgerowRayQuery query) {
 }
 
 bool hedgerow_is_quantised(HedgerowRayQuery query) {
-    if (HEDGEROW_FORMS == HEDGEROW_NODES_OF_TWO) return false;
-    return HEDGEROW_FORMS == HEDGEROW_NODES_OF_EIGHT || (query.form & FORM_QUANTISED) != 0u;
+    bool is_quantised = HEDGEROW_FORMS == HEDGEROW_NODES_OF_EIGHT || (query.form & FORM_QUANTISED) != 0u;
+    return HEDGEROW_FORMS != HEDGEROW_NODES_OF_TWO && is_quantised;
 }
 
 // Of quantised nodes nothing is at hand.
@@ -445,6 +445,7 @@ void hedgerow_take_waiting(inout HedgerowRayQuery query, bool waits) {
 }
 
 // Takes what waits; false at the end of the walk. Behind an instance it takes what waits above it. What was taken may be nothing: too far.
+// Leaves of a quantised node that are at hand it leaves to the round.
 bool hedgerow_go_on(inout HedgerowRayQuery query) {
     bool is_at_group = hedgerow_is_quantised(query) && hedgerow_has_group(query);
     bool waits = is_at_group;
@@ -456,10 +457,7 @@ bool hedgerow_go_on(inout HedgerowRayQuery query) {
         if (hedgerow_is_quantised(query)) hedgerow_take_entry(query, hedgerow_entry(query.level), waits);
         else hedgerow_take_waiting(query, waits);
     }
-    if (hedgerow_is_quantised(query)) {
-        hedgerow_take_leaf(query);
-        hedgerow_take_of_group(query);
-    }
+    if (hedgerow_is_quantised(query)) hedgerow_take_of_group(query);
     return waits;
 }
 

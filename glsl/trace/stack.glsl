@@ -32,8 +32,8 @@ uvec2 hedgerow_packed(HedgerowWaiting waiting) {
 HedgerowWaiting hedgerow_unpacked(uvec2 entry) {
     uint count = entry.x >> HEDGEROW_WAITING_BITS;
     uint index = entry.x & (1u << HEDGEROW_WAITING_BITS) - 1u;
-    if (count == HEDGEROW_LONG_LEAF) return HedgerowWaiting(index, entry.y, -HEDGEROW_INFINITY);
-    return HedgerowWaiting(index, count, uintBitsToFloat(entry.y));
+    bool is_long = count == HEDGEROW_LONG_LEAF;
+    return HedgerowWaiting(index, is_long ? entry.y : count, is_long ? -HEDGEROW_INFINITY : uintBitsToFloat(entry.y));
 }
 
 #ifdef HEDGEROW_SHARED_LEVELS

@@ -5,6 +5,7 @@
 #ifndef HEDGEROW_TRACE_VECTOR_LOADS
 #define HEDGEROW_TRACE_VECTOR_LOADS
 #include "bvh/layout.glsl"
+#include "bvh/wide/pairs.glsl"
 #ifdef HEDGEROW_INT64
 #include "trace/long_loads.glsl"
 #endif
@@ -13,7 +14,6 @@
 layout(constant_id = 5) const bool IN_VECTORS = false;
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly restrict buffer Quads { uvec4 quad[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly restrict buffer Pairs { uvec2 pair[]; };
 
 Child child_of_quads(uvec4 lo, uvec4 hi) {
     return Child(uintBitsToFloat(lo.xyz), lo.w, uintBitsToFloat(hi.xyz), hi.w);
@@ -32,20 +32,12 @@ Node node_at(Structure structure, uint index) {
 #endif
 }
 
-// That begins at an element of 8 bytes.
-Triangle triangle_of_pairs(Pairs pairs, uint at) {
-    vec2 a = uintBitsToFloat(pairs.pair[at]), b = uintBitsToFloat(pairs.pair[at + 1u]), c = uintBitsToFloat(pairs.pair[at + 2u]);
-    vec2 d = uintBitsToFloat(pairs.pair[at + 3u]);
-    uvec2 e = pairs.pair[at + 4u];
-    return Triangle(vec3(a, b.x), vec3(b.y, c), vec3(d, uintBitsToFloat(e.x)), e.y);
-}
-
 Triangle triangle_at(Triangles triangles, uint index) {
 #ifdef HEDGEROW_INT64
     return hedgerow_long_triangle(address_of(uvec2(triangles), index, 40u));
 #else
     if (!IN_VECTORS) return triangles.triangle[index];
-    return triangle_of_pairs(Pairs(uvec2(triangles)), 5u * index);
+    return triangle_in_units(Units(uvec2(triangles)), UNITS_OF_ONE * index);
 #endif
 }
 #endif

@@ -31,30 +31,28 @@ QuantisedNode quantised_node_of_each_lane(QuantisedNodes nodes, HedgerowEachLane
     return mine;
 }
 
-// Records are elements of 8 bytes, by the unit where they begin: a driver adds an index that is the same for all lanes to an address of 64
-// bits by one plain instruction, where adding by halves (record_at_unit) takes eight.
-Triangle record_of_each_lane(Pairs records, HedgerowEachLane unit) {
+Triangle record_of_each_lane(Units records, HedgerowEachLane unit) {
     Triangle mine = HEDGEROW_NO_TRIANGLE;
 #define LOAD_RECORD(lane)            \
     if (lane < hedgerow_lanes)       \
-        mine = hedgerow_own_triangle(gl_SubgroupInvocationID == lane, triangle_of_pairs(records, unit.value[lane]), mine);
+        mine = hedgerow_own_triangle(gl_SubgroupInvocationID == lane, triangle_in_units(records, unit.value[lane]), mine);
     HEDGEROW_FOR_EACH_LANE(LOAD_RECORD)
     return mine;
 }
 
 // What lies in a unit of each lane as behind the first of two triangles.
-SecondOfPair second_of_each_lane(Pairs records, HedgerowEachLane unit) {
+SecondOfPair second_of_each_lane(Units records, HedgerowEachLane unit) {
     SecondOfPair mine = HEDGEROW_NO_SECOND;
 #define LOAD_SECOND(lane)            \
     if (lane < hedgerow_lanes)       \
-        mine = hedgerow_own_second(gl_SubgroupInvocationID == lane, second_of_pairs(records, unit.value[lane]), mine);
+        mine = hedgerow_own_second(gl_SubgroupInvocationID == lane, second_in_units(records, unit.value[lane]), mine);
     HEDGEROW_FOR_EACH_LANE(LOAD_SECOND)
     return mine;
 }
 
 void main() {
     if (LEAVES_OTHERS && structure.header.kind != KIND_TRIANGLES_8Q) return;
-    Pairs records = Pairs(wide_records_at(uvec2(structure), structure.header.node_slots, QUANTISED_NODE_BYTES));
+    Units records = Units(wide_records_at(uvec2(structure), structure.header.node_slots, QUANTISED_NODE_BYTES));
     QuantisedNodes nodes = QuantisedNodes(wide_nodes_at(uvec2(structure)));
     Child root = structure.header.root;
     bool usable = can_be_traced(structure, KIND_TRIANGLES_8Q);

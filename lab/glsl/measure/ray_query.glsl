@@ -45,7 +45,7 @@ layout(constant_id = 3) const uint RAYS_EACH = 1;
 GivenRay ray_of_turn(uint next, HedgerowTurns turns) {
 #ifdef HEDGEROW_LANES
     GivenRay mine = HEDGEROW_NO_RAY;
-    if (hedgerow_any_lane(turns.takes)) {
+    if (turns.any_takes) {
         HedgerowEachLane index = hedgerow_each_lane(turns.takes ? next : first);
 #define LOAD_RAY(lane)                   \
         if (lane < hedgerow_lanes)       \
