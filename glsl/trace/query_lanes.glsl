@@ -95,7 +95,8 @@ void hedgerow_visit_in_lanes(inout HedgerowRayQuery query, bool goes, uvec2 told
     if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_TWO) != 0u) {
         bool is_own = visits && !hedgerow_is_quantised(query);
         // Behind the header, which is as long as two nodes.
-        Node node = hedgerow_node_of_each_lane(is_own ? query.structure : told, is_own ? 2u + query.index : 0u);
+        uvec2 nodes = HEDGEROW_ONE_LEVEL || !is_own ? told : query.structure;
+        Node node = hedgerow_node_of_each_lane(nodes, is_own ? 2u + query.index : 0u);
         if (is_own) hedgerow_visit_node(query, node);
     }
     if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_EIGHT) != 0u) {
