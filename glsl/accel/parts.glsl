@@ -154,18 +154,24 @@ bool open_quantised(Structure structure, Child part, out Child parts[2]) {
     return true;
 }
 
-// The two parts of a part; of what cannot be opened twice itself, and false. `slots` are those of an Entry.
-bool open_child(Structure structure, uint slots, Child child, out Child children[2]) {
-    bool is_there = child.index < (slots & INDEX_MASK);
+// The children of a node of two; of what cannot be opened twice itself, and false. `slots` are those of an Entry.
+bool open_node_of_two(Structure structure, uint slots, Child child, out Child children[2]) {
+    bool opens = child.count == 0u && child.index < (slots & INDEX_MASK);
     children[0] = child;
     children[1] = child;
-    if ((slots & FORM_QUANTISED) != 0u) return is_there && open_quantised(structure, child, children);
-    bool opens = child.count == 0u && is_there;
     if (opens) {
         Node node = structure.nodes[child.index];
         children[0] = node.left;
         children[1] = node.right;
     }
     return opens;
+}
+
+// The two parts of a part, of either form.
+bool open_child(Structure structure, uint slots, Child child, out Child children[2]) {
+    if ((slots & FORM_QUANTISED) == 0u) return open_node_of_two(structure, slots, child, children);
+    children[0] = child;
+    children[1] = child;
+    return child.index < (slots & INDEX_MASK) && open_quantised(structure, child, children);
 }
 #endif

@@ -187,10 +187,11 @@ void open(uint i, uint behind) {
     Child parts[2];
     // What has a gain can be opened.
     open_child(structure, entry.slots, Child(entry.lo, begin.x, entry.hi, begin.y), parts);
-    entries.entry[i] = entry_below(entry, given.to_world, structure, parts[0]);
-    entries.entry[behind] = entry_below(entry, given.to_world, structure, parts[1]);
-    gains.value[i] = UNKNOWN;
-    gains.value[behind] = UNKNOWN;
+    for (uint side = 0; side < 2; ++side) {
+        uint to = side == 0u ? i : behind;
+        entries.entry[to] = entry_below(entry, given.to_world, structure, parts[side]);
+        gains.value[to] = UNKNOWN;
+    }
 }
 
 void rebraid_weigh(uint round, uint chunk) {

@@ -45,12 +45,17 @@ Box box_of_slots(vec4 m[3], Structure structure, uint slots, Child part) {
     return b;
 }
 
-// The box in the world around the boxes of a child's two children, or of its slots.
+// The box in the world around the boxes of a child's two children, of nodes of two.
+Box box_of_two(vec4 m[3], Structure structure, uint slots, Child child) {
+    Child pair[2];
+    open_node_of_two(structure, slots, child, pair);
+    return united(transformed_box(m, pair[0].lo, pair[0].hi), transformed_box(m, pair[1].lo, pair[1].hi));
+}
+
+// The same of nodes of either form: those of eight have slots.
 Box box_of_children(vec4 m[3], Structure structure, uint slots, Child child) {
     if ((slots & FORM_QUANTISED) != 0u) return box_of_slots(m, structure, slots, child);
-    Child pair[2];
-    open_child(structure, slots, child, pair);
-    return united(transformed_box(m, pair[0].lo, pair[0].hi), transformed_box(m, pair[1].lo, pair[1].hi));
+    return box_of_two(m, structure, slots, child);
 }
 
 // The box in the world of what is below `child` of a structure: where its own would be loose, around the boxes of the eight
@@ -58,14 +63,15 @@ Box box_of_children(vec4 m[3], Structure structure, uint slots, Child child) {
 Box world_box(vec4 m[3], Structure structure, uint slots, Child child) {
     if (keeps_boxes(m)) return transformed_box(m, child.lo, child.hi);
     if ((slots & FORM_QUANTISED) != 0u) return box_of_slots(m, structure, slots, child);
+    // open_child() would put the cutting of slots, which is long, into every kernel that only needs boxes.
     Box b = empty_box();
     Child children[2];
-    open_child(structure, slots, child, children);
+    open_node_of_two(structure, slots, child, children);
     for (uint side = 0; side < 2; ++side) {
         Child grandchildren[2];
-        open_child(structure, slots, children[side], grandchildren);
+        open_node_of_two(structure, slots, children[side], grandchildren);
         for (uint quarter = 0; quarter < 2; ++quarter) {
-            b = united(b, box_of_children(m, structure, slots, grandchildren[quarter]));
+            b = united(b, box_of_two(m, structure, slots, grandchildren[quarter]));
         }
     }
     return b;
