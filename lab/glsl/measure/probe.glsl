@@ -1,7 +1,8 @@
 // Everything that a ray query reports, for each ray: of the driver's queries or, with WITH_HEDGEROW, of ours.
 //
 // A ray says how its candidates are decided on; the first eight are written down as they come. With IN_TURN, which ours can, an
-// invocation has five rays; with HEDGEROW_LANES, which has to be a workgroup's invocations, these are loaded for lane by lane.
+// invocation has five rays, and `told` is the structure that its turns are told of; with HEDGEROW_LANES, which has to be a workgroup's
+// invocations, these are loaded for lane by lane.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_scalar_block_layout : require
@@ -64,7 +65,7 @@ struct Report {
 
 layout(buffer_reference, scalar) readonly buffer Rays { ProbeRay ray[]; };
 layout(buffer_reference, scalar) writeonly buffer Reports { Report report[]; };
-layout(push_constant, scalar) uniform ProbeArguments { uvec2 structure; Rays rays; Reports reports; uint count; };
+layout(push_constant, scalar) uniform ProbeArguments { uvec2 structure; uvec2 told; Rays rays; Reports reports; uint count; };
 
 rayQueryEXT query;
 ProbeRay ray;
@@ -134,7 +135,7 @@ void main() {
     uint next = begins + gl_LocalInvocationIndex;
     uint end = min(count, begins + gl_WorkGroupSize.x * RAYS_EACH);
     uint i = next;
-    HedgerowTurns turns = hedgerowTurns(accelerationStructureEXT(structure));
+    HedgerowTurns turns = hedgerowTurns(accelerationStructureEXT(told));
     while (hedgerowTakeTurn(turns, next < end)) {
         if (turns.takes) {
             i = next;

@@ -3,6 +3,8 @@
 // gl_WorkGroupSize.x by a constant of its own.
 layout(constant_id = 4) const uint LANES = 16;
 #define HEDGEROW_LANES LANES
+layout(constant_id = 5) const bool ONE_LEVEL = false;
+#define HEDGEROW_ONE_LEVEL ONE_LEVEL
 #define WITH_HEDGEROW
 #define IN_TURN
 #include "gpu/division.glsl"

@@ -5,6 +5,7 @@ use crate::device::Device;
 use crate::shaders;
 use ash::vk;
 use hedgerow::gpu::Recorder;
+use hedgerow::gpu::shaders::{Block, Shader};
 use hedgerow::trace::tracer::Loads;
 
 /// A ray with its flags, and how its candidates are decided on.
@@ -107,6 +108,7 @@ impl ProbeReport {
 /// A pipeline of its own, and its layout: neither of them ours.
 pub struct Probe {
     device: &'static Device,
+    shader: &'static Shader,
     group: u32,
     layout: vk::PipelineLayout,
     pipeline: vk::Pipeline,
@@ -120,40 +122,40 @@ impl Probe {
 
     /// For our structures.
     pub fn ours(device: &'static Device) -> Probe {
-        Probe::of(device, shaders::MEASURE_PROBE.spirv)
+        Probe::of(device, &shaders::MEASURE_PROBE)
     }
 
     /// The same for bottom levels alone (`HEDGEROW_ONE_LEVEL`).
     pub fn of_one_level(device: &'static Device) -> Probe {
-        Probe::with(device, shaders::MEASURE_PROBE.spirv, Probe::GROUP, true)
+        Probe::with(device, &shaders::MEASURE_PROBE, Probe::GROUP, true)
     }
 
     /// The same with several rays for each invocation, in turn.
     pub fn in_turn(device: &'static Device) -> Probe {
-        Probe::of(device, shaders::MEASURE_PROBE_TURNS.spirv)
+        Probe::of(device, &shaders::MEASURE_PROBE_TURNS)
     }
 
     /// The same with loads lane by lane, where a subgroup is one that can, and the driver takes out what the pipeline's constants leave out:
-    /// SwiftShader does not, and follows the paths of sixteen lanes one by one (no end after 230 s).
-    pub fn in_lanes(device: &'static Device) -> Option<Probe> {
+    /// SwiftShader does not, and follows the paths of sixteen lanes one by one (no end after 230 s). For bottom levels alone, or for both.
+    pub fn in_lanes(device: &'static Device, one_level: bool) -> Option<Probe> {
         let limits = &device.limits;
         let can = limits.subgroup_is_exact
             && limits.subgroup_size <= Loads::MAX_LANES
             && limits.driver != vk::DriverId::GOOGLE_SWIFTSHADER;
-        can.then(|| Probe::with(device, shaders::MEASURE_PROBE_TURNS_LANES.spirv, limits.subgroup_size, false))
+        can.then(|| Probe::with(device, &shaders::MEASURE_PROBE_TURNS_LANES, limits.subgroup_size, one_level))
     }
 
     /// Of a shader with workgroups of 64 and at most 40 bytes of push constants.
     ///
     /// # Panics
     /// The device does not take it.
-    pub fn of(device: &'static Device, spirv: &[u8]) -> Probe {
-        Probe::with(device, spirv, Probe::GROUP, false)
+    pub fn of(device: &'static Device, shader: &'static Shader) -> Probe {
+        Probe::with(device, shader, Probe::GROUP, false)
     }
 
     /// Of workgroups of `group`, which the shader may take as constants 0 and 4; and whether of one level, as constant 5.
-    fn with(device: &'static Device, spirv: &[u8], group: u32, one_level: bool) -> Probe {
-        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).expect("SPIR-V");
+    fn with(device: &'static Device, shader: &'static Shader, group: u32, one_level: bool) -> Probe {
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv)).expect("SPIR-V");
         let raw = device.ash_device();
         let range =
             [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(Self::PUSH_BYTES)];
@@ -177,7 +179,7 @@ impl Probe {
             let pipeline =
                 raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None).expect("a pipeline")[0];
             raw.destroy_shader_module(module, None);
-            Probe { device, group, layout, pipeline }
+            Probe { device, shader, group, layout, pipeline }
         }
     }
 
@@ -186,26 +188,35 @@ impl Probe {
     /// # Panics
     /// The device failed.
     pub fn ask(&self, structure: u64, rays: &[ProbeRay]) -> Vec<ProbeReport> {
+        self.ask_told(structure, structure, rays)
+    }
+
+    /// The same where turns are told of another structure than the one that rays go into.
+    ///
+    /// # Panics
+    /// The device failed.
+    pub fn ask_told(&self, structure: u64, told: u64, rays: &[ProbeRay]) -> Vec<ProbeReport> {
         let ray_buffer = self.device.upload("rays", rays).expect("memory");
         let reports =
             self.device.buffer("reports", size_of::<ProbeReport>() as u64 * rays.len() as u64).expect("memory");
         let count = rays.len() as u32;
-        let push = arguments::Probe { structure, rays: ray_buffer.address(), reports: reports.address(), count };
-        self.dispatch(bytemuck::bytes_of(&push), count);
+        let push = arguments::Probe { structure, told, rays: ray_buffer.address(), reports: reports.address(), count };
+        self.dispatch(&push, count);
         reports.read(rays.len())
     }
 
     /// One invocation for each of `count` rays.
     ///
     /// # Panics
-    /// The device failed.
-    pub fn dispatch(&self, push: &[u8], count: u32) {
+    /// The device failed, or the shader takes other arguments.
+    pub fn dispatch<B: Block>(&self, push: &B, count: u32) {
+        let push = self.shader.takes.of(push);
         let record = |recorder: &mut Recorder<'_>| {
             let (raw, commands) = (self.device.ash_device(), recorder.commands());
             // SAFETY: the command buffer is being recorded, and the pipeline outlives the submit, which waits.
             unsafe {
                 raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, self.pipeline);
-                raw.cmd_push_constants(commands, self.layout, vk::ShaderStageFlags::COMPUTE, 0, push);
+                raw.cmd_push_constants(commands, self.layout, vk::ShaderStageFlags::COMPUTE, 0, &push);
                 raw.cmd_dispatch(commands, count.div_ceil(self.group), 1, 1);
             }
             Ok(())

@@ -5,7 +5,7 @@ use crate::experiments::check::agree::assert_agrees;
 use crate::experiments::check::backend::{Backend, Ours};
 use crate::experiments::check::cases::{Cases, Found, same};
 use crate::experiments::check::matrices::{Matrix, moved, rotation, scaled};
-use crate::experiments::check::probe::{CONFIRM, CONFIRM_ODD, IGNORE, Probe, ProbeRay, TERMINATE, flags};
+use crate::experiments::check::probe::{CONFIRM, CONFIRM_ODD, IGNORE, Probe, ProbeRay, ProbeReport, TERMINATE, flags};
 use crate::experiments::check::shapes::{Corners, boxes as random_boxes, icosphere, soup};
 use crate::experiments::check::world::{Part, World, inverse, transformed};
 use crate::random::SplitMix64;
@@ -123,46 +123,72 @@ pub fn flags_and_decisions(cases: &mut Cases<'_>) {
 
 /// What queries report does not depend on how many rays an invocation has, whichever goes on while others have ended, nor on how it loads.
 fn in_turn(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found {
-    reports_the_same(&Ours::on(device), &Probe::in_turn(device), world, rays)?;
-    let Some(in_lanes) = Probe::in_lanes(device) else { return Ok(()) };
+    reports_the_same(&Ours::on(device), &Probe::in_turn(device), world, rays, false)?;
+    let Some(in_lanes) = Probe::in_lanes(device, false) else { return Ok(()) };
     [Wide::Never, Wide::ByFlags, Wide::Always].into_iter().try_for_each(|wide| {
         let options = AccelOptions { wide, ..AccelOptions::DEFAULT };
-        reports_the_same(&Ours::with_options(device, options), &in_lanes, world, rays)
+        reports_the_same(&Ours::with_options(device, options), &in_lanes, world, rays, true)
     })
+}
+
+/// As queries of one ray each report. Lanes that need nothing load from what turns are told of: another structure than their rays go into
+/// will do, and of none nothing is met.
+fn reports_the_same(ours: &Ours, probe: &Probe, world: &World, rays: &[ProbeRay], in_lanes: bool) -> Found {
+    let built = world.build(ours);
+    let top = ours.address(built.top.structure);
+    let expected = ours.probe(built.top.structure, rays);
+    same_reports("in turn", &probe.ask(top, rays), &expected, rays)?;
+    let part = ours.address(built.parts[0].structure);
+    same_reports("in turn, told of a part", &probe.ask_told(top, part, rays), &expected, rays)?;
+    if in_lanes {
+        meets_nothing(&probe.ask_told(top, 0, rays), "a top level, lanes told of none,")?;
+    }
+    let waited = expected.iter().filter(|report| report.candidate_count > 0).count();
+    ensure!(waited > 20, "{waited} rays had candidates to decide on");
+    Ok(())
 }
 
 /// A shader for bottom levels alone reports of each part what another one does, and nothing of a top level.
 fn one_level(device: &'static Device, world: &World, rays: &[ProbeRay]) -> Found {
-    let (ours, probe) = (Ours::on(device), Probe::of_one_level(device));
-    let built = world.build(&ours);
-    let mut hits = 0;
-    for part in &built.parts {
-        let expected = ours.probe(part.structure, rays);
-        let found = probe.ask(ours.address(part.structure), rays);
-        for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
-            ensure!(found == expected, "ray {i}, {:?}: {found:?} of one level, {expected:?} of either", rays[i]);
+    let probe = Probe::of_one_level(device);
+    let in_lanes = Probe::in_lanes(device, true);
+    for wide in [Wide::Never, Wide::Always] {
+        let ours = Ours::with_options(device, AccelOptions { wide, ..AccelOptions::DEFAULT });
+        let built = world.build(&ours);
+        let top = ours.address(built.top.structure);
+        let parts: Vec<u64> = built.parts.iter().map(|part| ours.address(part.structure)).collect();
+        let mut hits = 0;
+        for (i, part) in built.parts.iter().enumerate() {
+            let expected = ours.probe(part.structure, rays);
+            same_reports("of one level", &probe.ask(parts[i], rays), &expected, rays)?;
+            hits += expected.iter().filter(|report| report.committed.kind != 0).count();
+            let Some(in_lanes) = &in_lanes else { continue };
+            same_reports("of one level, lane by lane", &in_lanes.ask(parts[i], rays), &expected, rays)?;
+            for told in [parts[(i + 1) % parts.len()], top, 0] {
+                meets_nothing(
+                    &in_lanes.ask_told(parts[i], told, rays),
+                    "a part, lanes told of another structure or none,",
+                )?;
+            }
         }
-        hits += expected.iter().filter(|report| report.committed.kind != 0).count();
+        ensure!(hits > 20, "{hits} rays hit a part");
+        for probe in [&probe].into_iter().chain(&in_lanes) {
+            meets_nothing(&probe.ask(top, rays), "a top level")?;
+        }
     }
-    ensure!(hits > 20, "{hits} rays hit a part");
-    let of_top = probe.ask(ours.address(built.top.structure), rays);
-    ensure!(
-        of_top.iter().all(|report| report.committed.kind == 0 && report.candidate_count == 0),
-        "a top level was hit"
-    );
     Ok(())
 }
 
-/// As queries of one ray each report.
-fn reports_the_same(ours: &Ours, probe: &Probe, world: &World, rays: &[ProbeRay]) -> Found {
-    let built = world.build(ours);
-    let expected = ours.probe(built.top.structure, rays);
-    let found = probe.ask(ours.address(built.top.structure), rays);
-    for (i, (found, expected)) in found.iter().zip(&expected).enumerate() {
-        ensure!(found == expected, "ray {i}, {:?}: {found:?} in turn, {expected:?} by itself", rays[i]);
+fn same_reports(how: &str, found: &[ProbeReport], expected: &[ProbeReport], rays: &[ProbeRay]) -> Found {
+    for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
+        ensure!(found == expected, "ray {i}, {:?}: {found:?} {how}, {expected:?} by itself", rays[i]);
     }
-    let waited = expected.iter().filter(|report| report.candidate_count > 0).count();
-    ensure!(waited > 20, "{waited} rays had candidates to decide on");
+    Ok(())
+}
+
+fn meets_nothing(reports: &[ProbeReport], what: &str) -> Found {
+    let met = reports.iter().filter(|report| report.committed.kind != 0 || report.candidate_count != 0).count();
+    ensure!(met == 0, "{what} was met by {met} rays");
     Ok(())
 }
 
