@@ -1,12 +1,17 @@
 //! A device that has less than it could: without what is optional, with inexact subgroups, with small limits, without timestamps.
 
-use crate::common::{OPTIONS, open};
+use crate::common::twins::{assert_same, on_host};
+use crate::common::{OPTIONS, corpus, open};
 use hedgerow::accel::{AccelOptions, Wide};
 use hedgerow::ash::vk;
+use hedgerow::bvh::builder::{BuildOptions, Method, Window};
+use hedgerow::bvh::codes::Code;
+use hedgerow::bvh::reinsertion::ReinsertionOptions;
 use hedgerow::gpu::scan::{Scan, ScanBuffers};
 use hedgerow::gpu::{Recorder, Timestamps, TuningChoice};
 use hedgerow::trace::{Hit, Query, Ray};
 use hedgerow_lab::device::{Device, DeviceOptions, Validation};
+use hedgerow_lab::experiments::check::twins;
 use hedgerow_lab::random::SplitMix64;
 use hedgerow_lab::scene::{Instances, LoadOptions, load_instances};
 use hedgerow_lab::subjects::device_rays::RayBuffers;
@@ -120,6 +125,29 @@ fn rays_hit_the_same_by_loads_of_64_bits_and_without_them() {
         // Nodes that the shader leaves out: no ray meets them, and none ends badly.
         for (wide, forms) in [(always, Forms::OF_TWO), (never, Forms::OF_EIGHT)] {
             assert!(hits(device, wide, forms, &scene, &rays).iter().all(|hit| !hit.is_some()), "{wide:?} {forms:?}");
+        }
+    }
+}
+
+/// Small trees by one workgroup and larger ones by many, optimised. Wide nodes and top levels are built for the rays above.
+#[test]
+fn trees_have_the_same_bytes_in_elements_of_64_bits_and_without_them() {
+    let cpu = DeviceOptions { tuning: TuningChoice::Cpu, ..OPTIONS };
+    let devices = ["", "gathers", "inexact"]
+        .map(|restrict| open(DeviceOptions { restrict: restrict.parse().expect("a restriction"), ..cpu.clone() }));
+    let [with, other, without] = devices.each_ref().map(|device| device.tuning.build.in_longs);
+    let is_cpu = devices[0].limits.kind == vk::PhysicalDeviceType::CPU;
+    assert_eq!((with ^ other, without), (is_cpu && devices[0].limits.int64, false));
+    for count in [300, 5000] {
+        let mesh = corpus::random("random", count, [-0.5; 3], [1.0; 3]);
+        for method in [Method::Lbvh, Method::Ploc { radius: 8 }, Method::Hploc(Window::DEFAULT)] {
+            let (codes, optimise) = (Some(Code::Emc64Var.full()), Some(ReinsertionOptions { rounds: 2, stride: 1 }));
+            let options = BuildOptions { method, codes, optimise, ..BuildOptions::DEFAULT };
+            let expected = on_host(&mesh, &options);
+            for device in &devices {
+                let what = format!("{count} {method:?}, in longs: {}", device.tuning.build.in_longs);
+                assert_same(&twins::on_device(device, &mesh, &options), &expected, &what);
+            }
         }
     }
 }

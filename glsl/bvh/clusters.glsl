@@ -14,7 +14,7 @@ struct Cluster {
     uint first;      // sorted position of its first primitive
 };
 
-BUFFER Clusters { Cluster cluster[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Clusters { Cluster cluster[]; };
 
 Clusters all_clusters() {
     if (CLUSTERS_IN_RECORDS) return Clusters(records_of_tree());

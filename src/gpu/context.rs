@@ -3,7 +3,7 @@
 use super::execution_modes::ExecutionModes;
 use super::requirements::{self, Optional, SubgroupSizes};
 use super::shaders::{Shader, Takes};
-use super::{Tuning, TuningChoice, Workarounds, specialise};
+use super::{Tuning, TuningChoice, Workarounds, longs, specialise};
 use crate::{Error, Result};
 use ash::vk;
 use std::collections::{HashMap, HashSet};
@@ -183,6 +183,12 @@ impl Kernel {
         words.windows(4).any(|w| w[0] == DECORATE && w[2] == SPEC_ID && w[3] == GROUPS_OF_A_ROW)
     }
 
+    /// Whether it belongs to builds of BVHs and what is done to them. Tracers choose how they load, and kd-trees take 1.08 of the time in
+    /// elements of 64 bits.
+    fn builds_bvhs(&self) -> bool {
+        ["bvh/", "accel/"].iter().any(|room| self.shader.name.starts_with(room))
+    }
+
     /// The same in workgroups of `workgroup` invocations.
     pub(crate) fn in_workgroups_of(mut self, workgroup: u32) -> Kernel {
         self.constants[0] = workgroup;
@@ -357,7 +363,11 @@ impl Context {
         let of_the_device =
             [(GROUPS_OF_A_ROW, self.limits.workgroup_count), (DIVISION_IS_EXACT, self.tuning.exact_division.into())];
         let constants = (0..).zip(kernel.constants.iter().copied()).chain(of_the_device).collect();
-        let words = self.execution_modes.added_to(&specialise::specialised(&words, &constants));
+        let mut words = specialise::specialised(&words, &constants);
+        if self.tuning.build.in_longs && kernel.builds_bvhs() {
+            words = longs::in_longs(&words);
+        }
+        let words = self.execution_modes.added_to(&words);
         let module_info = vk::ShaderModuleCreateInfo::default().code(&words);
         let mut subgroups = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
             .required_subgroup_size(self.limits.subgroup_size);

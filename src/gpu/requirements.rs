@@ -14,7 +14,8 @@ pub struct Optional {
     /// `VK_KHR_shader_maximal_reconvergence` with its feature `shaderMaximalReconvergence`: lanes meet again where the source
     /// says. No kernel relies on it, so it is enabled only where [`Requirements::only`] asks for it.
     pub maximal_reconvergence: bool,
-    /// The feature `shaderInt64`: on CPUs, tracers and queries load elements of 64 bits, 1.02 to 1.2 times as fast. It lies in
+    /// The feature `shaderInt64`: on CPUs, tracers and queries load elements of 64 bits, 1.02 to 1.2 times as fast, and builds take 0.7 to 0.9 of
+    /// the time on some ([`super::BuildTuning::in_longs`]). It lies in
     /// `VkPhysicalDeviceFeatures`, which an engine fills in itself, so that it is enabled only where [`Requirements::only`] asks for it;
     /// whoever enables it there says so in [`super::ContextDesc::optional`].
     pub int64: bool,

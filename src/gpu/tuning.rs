@@ -109,6 +109,9 @@ pub struct BuildTuning {
     pub small_digit_bits: u32,
     /// Whether an invocation of H-PLOC merges small windows by itself, in registers, or a team of invocations does.
     pub merges_by_one: bool,
+    /// Whether nodes, records and clusters are loaded and stored in elements of 64 bits (`gpu::longs`). On an AMD EPYC without AVX-512 builds of BVHs
+    /// take 0.7 to 0.92 of the time so (lavapipe of Mesa 26, docs/notes/rays.md). CPUs that gather words fast were not measured.
+    pub in_longs: bool,
     /// Items that an invocation of reinsertion's passes takes.
     pub reinsertion_rounds: u32,
     /// Entries of a reinsertion's stack in shared memory; the others are private.
@@ -217,6 +220,7 @@ impl Tuning {
                 small_hploc: 1024,
                 small_digit_bits: 4,
                 merges_by_one: true,
+                in_longs: is_cpu && limits.int64 && !limits.gathers_words_fast,
                 reinsertion_rounds: 64,
                 reinsertion_shared: 0,
                 alone_group: group,
@@ -282,6 +286,7 @@ impl Tuning {
                 // As in the paper: of the invocations that climb, ever fewer have a window, and merging one alone takes 28
                 // distances a round and some hundred registers.
                 merges_by_one: false,
+                in_longs: false,
                 // A search is long: it is an invocation's only one, as far as there are invocations.
                 reinsertion_rounds: 1,
                 // 8 KiB a workgroup: few searches put off more.

@@ -28,7 +28,7 @@ pub(super) fn specialised(spirv: &[u32], constants: &HashMap<u32, u32>) -> Vec<u
 }
 
 #[cfg(all(test, feature = "compile-shaders"))]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::gpu::shaders;
     use crate::gpu::spirv::{BOUND, HEADER_WORDS, push};
@@ -36,12 +36,12 @@ mod tests {
     use rspirv::spirv::Op;
     use std::collections::HashSet;
 
-    fn words_of(spirv: &[u8]) -> Vec<u32> {
+    pub(in crate::gpu) fn words_of(spirv: &[u8]) -> Vec<u32> {
         ash::util::read_spv(&mut std::io::Cursor::new(spirv)).expect("whole words")
     }
 
     /// Constants of all numbers that shaders have: each of one value, and of values that differ.
-    fn choices() -> Vec<HashMap<u32, u32>> {
+    pub(in crate::gpu) fn choices() -> Vec<HashMap<u32, u32>> {
         let all = |value: fn(u32) -> u32| (0..31).map(|number| (number, value(number))).collect();
         vec![HashMap::new(), all(|_| 1), all(|_| 2), all(|number| 8 >> (number % 4)), all(|number| 16 + number % 3)]
     }
@@ -51,7 +51,7 @@ mod tests {
     }
 
     /// That what is named is there, what a phi lists are the blocks before, and each loop has one way back.
-    fn assert_whole(module: &Module, what: &str) {
+    pub(in crate::gpu) fn assert_whole(module: &Module, what: &str) {
         let defined: HashSet<u32> = module.all_inst_iter().filter_map(|i| i.result_id).collect();
         for instruction in module.all_inst_iter() {
             let types = instruction.result_type.into_iter();
