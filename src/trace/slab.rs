@@ -38,12 +38,17 @@ pub fn slack_of(ray: &PreparedRay, farthest: f32) -> f32 {
 
 /// Where the ray enters the box, or `None` if it does not between `t_min` and `t_best`.
 pub fn enter(ray: &PreparedRay, b: &Aabb, t_best: f32) -> Option<f32> {
-    let before: [f32; 3] = std::array::from_fn(|i| ray.origin[i] - b.lo[i]);
-    let behind: [f32; 3] = std::array::from_fn(|i| b.hi[i] - ray.origin[i]);
-    let slack = slack_of(ray, before.iter().chain(&behind).copied().fold(f32::NEG_INFINITY, f32::max));
-    let lo: [f32; 3] = std::array::from_fn(|i| (before[i] + slack) * -ray.inverse[i]);
-    let hi: [f32; 3] = std::array::from_fn(|i| (behind[i] + slack) * ray.inverse[i]);
-    let near = (0..3).fold(ray.t_min, |t, i| t.max(lo[i].min(hi[i])));
-    let far = (0..3).fold(t_best, |t, i| t.min(lo[i].max(hi[i])));
+    let mut farthest = f32::NEG_INFINITY;
+    for i in 0..3 {
+        farthest = farthest.max(ray.origin[i] - b.lo[i]).max(b.hi[i] - ray.origin[i]);
+    }
+    let slack = slack_of(ray, farthest);
+    let (mut near, mut far) = (ray.t_min, t_best);
+    for i in 0..3 {
+        let lo = (ray.origin[i] - b.lo[i] + slack) * -ray.inverse[i];
+        let hi = (b.hi[i] - ray.origin[i] + slack) * ray.inverse[i];
+        near = near.max(lo.min(hi));
+        far = far.min(lo.max(hi));
+    }
     (near <= far).then_some(near)
 }

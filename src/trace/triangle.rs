@@ -44,8 +44,10 @@ pub struct Meeting {
 const PART_OF_CUBE: f32 = 0.5625;
 
 /// Where the ray's line meets the triangle, at any t; edges and corners belong to it, triangles seen edge-on do not count.
+#[inline]
 pub fn meet(ray: &PreparedRay, triangle: &Triangle) -> Option<Meeting> {
-    let [a, b, c] = [triangle.v0, triangle.v1, triangle.v2].map(|vertex| sheared(ray, vertex));
+    // Not by `map`, whose closures stay calls.
+    let (a, b, c) = (sheared(ray, triangle.v0), sheared(ray, triangle.v1), sheared(ray, triangle.v2));
     let u = c.x * b.y - c.y * b.x;
     let v = a.x * c.y - a.y * c.x;
     let w = b.x * a.y - b.y * a.x;
@@ -75,8 +77,10 @@ struct Sheared {
     z: f32,
 }
 
+#[inline]
 fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> Sheared {
-    let [x, y, z] = [(ray.major + 1) % 3, (ray.major + 2) % 3, ray.major].map(|i| vertex[i] - ray.origin[i]);
+    let from_origin = |axis: usize| vertex[axis] - ray.origin[axis];
+    let (x, y, z) = (from_origin((ray.major + 1) % 3), from_origin((ray.major + 2) % 3), from_origin(ray.major));
     Sheared { x: x - ray.shear[0] * z, y: y - ray.shear[1] * z, z }
 }
 
