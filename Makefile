@@ -1,7 +1,7 @@
 # `make bench` and `make test` are all that a machine with Rust needs; scripts/setup.sh installs the rest.
 #
 #   make bench         builders of every kind on a hall, a hill and a city: report/index.html, and structures as engines use
-#                      them: report/accel.html; three to four minutes on two cores, once the driver has compiled the shaders
+#                      them: report/accel.html; three minutes on two cores, once the driver has compiled the shaders
 #   make bench-all     every scene of the folder SCENES (or HEDGEROW_SCENES)
 #   make bench-peers   the same on Mesa 26, whose ray queries are a peer, beside CPU crates
 #   make stability     where methods give way: report/growth.html, large.html, degenerate.html, greedy.html

@@ -361,7 +361,7 @@ mod tests {
     use rspirv::spirv::{Op, StorageClass};
     use std::collections::BTreeSet;
 
-    fn of_type<'a>(module: &'a Module, id: u32) -> &'a Instruction {
+    fn of_type(module: &Module, id: u32) -> &Instruction {
         let is_it = |i: &&Instruction| i.result_id == Some(id);
         module.types_global_values.iter().find(is_it).expect("a type")
     }
