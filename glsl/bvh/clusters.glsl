@@ -14,6 +14,7 @@ struct Cluster {
     uint first;      // sorted position of its first primitive
 };
 
+// They lie at multiples of 8, so that src/gpu/longs.rs may take two words at a time.
 layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Clusters { Cluster cluster[]; };
 
 Clusters all_clusters() {

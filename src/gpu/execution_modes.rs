@@ -6,13 +6,9 @@
 //! - *Floats* (`SPV_KHR_float_controls`, part of Vulkan 1.2): subnormal numbers are kept; so are infinities, NaN and the sign of zero;
 //!   results are rounded to the nearest. The host does so, and Vulkan lets a device do otherwise.
 
-use super::spirv::{HEADER_WORDS, Instructions};
+use super::spirv::{HEADER_WORDS, Instructions, op};
 use ash::vk;
 
-const OP_EXTENSION: u32 = 10;
-const OP_ENTRY_POINT: u32 = 15;
-const OP_EXECUTION_MODE: u32 = 16;
-const OP_CAPABILITY: u32 = 17;
 const MAXIMALLY_RECONVERGES: u32 = 6023;
 const EXTENSION: &[u8] = b"SPV_KHR_maximal_reconvergence\0";
 const FLOAT_BITS: u32 = 32;
@@ -68,19 +64,19 @@ impl ExecutionModes {
         for instruction in Instructions(&spirv[HEADER_WORDS..]) {
             let opcode = instruction[0] & 0xffff;
             // Capabilities are the first section of a module, extensions the second.
-            if !is_extended && opcode != OP_CAPABILITY {
-                self.floats().for_each(|float| words.extend([2 << 16 | OP_CAPABILITY, float.capability]));
+            if !is_extended && opcode != op::CAPABILITY {
+                self.floats().for_each(|float| words.extend([2 << 16 | op::CAPABILITY, float.capability]));
                 words.extend(if self.maximal_reconvergence { extension() } else { Vec::new() });
                 is_extended = true;
             }
             words.extend_from_slice(instruction);
             // Entry points and execution modes are sections next to each other, and there is one entry point.
-            if opcode == OP_ENTRY_POINT {
+            if opcode == op::ENTRY_POINT {
                 let entry = instruction[2];
                 if self.maximal_reconvergence {
-                    words.extend([3 << 16 | OP_EXECUTION_MODE, entry, MAXIMALLY_RECONVERGES]);
+                    words.extend([3 << 16 | op::EXECUTION_MODE, entry, MAXIMALLY_RECONVERGES]);
                 }
-                let mode = |float: FloatMode| [4 << 16 | OP_EXECUTION_MODE, entry, float.mode, FLOAT_BITS];
+                let mode = |float: FloatMode| [4 << 16 | op::EXECUTION_MODE, entry, float.mode, FLOAT_BITS];
                 self.floats().for_each(|float| words.extend(mode(float)));
             }
         }
@@ -95,7 +91,7 @@ fn extension() -> Vec<u32> {
         u32::from_le_bytes(bytes)
     });
     let name: Vec<u32> = name.collect();
-    [vec![(name.len() as u32 + 1) << 16 | OP_EXTENSION], name].concat()
+    [vec![(name.len() as u32 + 1) << 16 | op::EXTENSION], name].concat()
 }
 
 #[cfg(all(test, feature = "compile-shaders"))]

@@ -7,32 +7,8 @@
 //! What is rewritten are loads and stores of whole structs, vectors and arrays in buffers that are words without gaps, at addresses that are
 //! multiples of 8: nodes, records, clusters. Two words go at once; nothing else changes.
 
-use super::spirv::{BOUND, HEADER_WORDS, Instructions, opcode, push};
+use super::spirv::{BOUND, HEADER_WORDS, Instructions, op, opcode, push};
 use std::collections::{BTreeMap, HashMap};
-
-mod op {
-    pub const CAPABILITY: u32 = 17;
-    pub const FIRST_TYPE: u32 = 19;
-    pub const LAST_TYPE: u32 = 39;
-    pub const TYPE_INT: u32 = 21;
-    pub const TYPE_FLOAT: u32 = 22;
-    pub const TYPE_VECTOR: u32 = 23;
-    pub const TYPE_ARRAY: u32 = 28;
-    pub const TYPE_RUNTIME_ARRAY: u32 = 29;
-    pub const TYPE_STRUCT: u32 = 30;
-    pub const TYPE_POINTER: u32 = 32;
-    pub const CONSTANT: u32 = 43;
-    pub const FUNCTION: u32 = 54;
-    pub const LOAD: u32 = 61;
-    pub const STORE: u32 = 62;
-    pub const ACCESS_CHAIN: u32 = 65;
-    pub const IN_BOUNDS_ACCESS_CHAIN: u32 = 66;
-    pub const DECORATE: u32 = 71;
-    pub const MEMBER_DECORATE: u32 = 72;
-    pub const COMPOSITE_CONSTRUCT: u32 = 80;
-    pub const COMPOSITE_EXTRACT: u32 = 81;
-    pub const BITCAST: u32 = 124;
-}
 
 const CAPABILITY_INT64: u32 = 11;
 /// The storage class of buffers: they are known by their addresses.
@@ -54,7 +30,7 @@ pub(super) fn in_longs(spirv: &[u32]) -> Vec<u32> {
     let Some(most_words) = accesses.map(|access| access.words).max() else { return spirv.to_vec() };
     let mut module = Rewriter::new(spirv, &declared, most_words);
     Instructions(&spirv[HEADER_WORDS..]).for_each(|instruction| module.rewrite(instruction));
-    module.words[BOUND] = module.bound;
+    module.words[BOUND] = module.added.bound;
     module.words
 }
 
@@ -165,13 +141,49 @@ impl Declarations {
     }
 }
 
+/// What a module gets in addition.
+struct Additions {
+    bound: u32,
+    decorations: Vec<u32>,
+    /// Types and constants.
+    declarations: Vec<u32>,
+}
+
+impl Additions {
+    fn id(&mut self) -> u32 {
+        self.bound += 1;
+        self.bound - 1
+    }
+
+    fn declare(&mut self, opcode: u32, operands: &[u32]) -> u32 {
+        let id = self.id();
+        push(&mut self.declarations, opcode, [id].into_iter().chain(operands.iter().copied()));
+        id
+    }
+
+    fn constant(&mut self, ty: u32, value: u32) -> u32 {
+        let id = self.id();
+        push(&mut self.declarations, op::CONSTANT, [ty, id, value]);
+        id
+    }
+
+    /// Pointers to an element of a buffer, and to the buffer.
+    fn buffer_of(&mut self, element: u32, bytes: u32) -> (u32, u32) {
+        let array = self.declare(op::TYPE_RUNTIME_ARRAY, &[element]);
+        let buffer = self.declare(op::TYPE_STRUCT, &[array]);
+        push(&mut self.decorations, op::DECORATE, [array, ARRAY_STRIDE, bytes]);
+        push(&mut self.decorations, op::DECORATE, [buffer, BLOCK]);
+        push(&mut self.decorations, op::MEMBER_DECORATE, [buffer, 0, OFFSET, 0]);
+        let mut pointer = |to| self.declare(op::TYPE_POINTER, &[PHYSICAL_STORAGE_BUFFER, to]);
+        (pointer(element), pointer(buffer))
+    }
+}
+
 /// What is written so far, and the types and constants that it needs.
 struct Rewriter<'a> {
     declared: &'a Declarations,
+    added: Additions,
     words: Vec<u32>,
-    bound: u32,
-    decorations: Vec<u32>,
-    declarations: Vec<u32>,
     uint: u32,
     /// Two words, and 64 bits.
     pair: u32,
@@ -191,71 +203,26 @@ impl<'a> Rewriter<'a> {
         if !declared.has_int64 {
             push(&mut words, op::CAPABILITY, [CAPABILITY_INT64]);
         }
-        let mut module = Rewriter {
-            declared,
-            words,
-            bound: spirv[BOUND],
-            decorations: Vec::new(),
-            declarations: Vec::new(),
-            uint: 0,
-            pair: 0,
-            long: 0,
-            to_uint: 0,
-            to_long: 0,
-            to_uints: 0,
-            to_longs: 0,
-            indices: Vec::new(),
+        let mut added = Additions { bound: spirv[BOUND], decorations: Vec::new(), declarations: Vec::new() };
+        // Scalars and vectors may not be declared twice.
+        let mut unsigned = |width| {
+            let is_it = |ty: &Type| matches!(ty, Type::Scalar { bits, is_uint: true } if *bits == width);
+            declared.find(is_it).unwrap_or_else(|| added.declare(op::TYPE_INT, &[width, 0]))
         };
-        let unsigned = |width| declared.find(|ty| matches!(ty, Type::Scalar { bits, is_uint: true } if *bits == width));
-        module.uint = module.declared_or(unsigned(32), op::TYPE_INT, &[32, 0]);
-        module.long = module.declared_or(unsigned(64), op::TYPE_INT, &[64, 0]);
-        let uint = module.uint;
-        let pair = declared.find(|ty| matches!(ty, Type::Vector { of, count: 2 } if *of == uint));
-        module.pair = module.declared_or(pair, op::TYPE_VECTOR, &[uint, 2]);
-        (module.to_uint, module.to_uints) = module.buffer_of(uint, WORD_BYTES);
-        (module.to_long, module.to_longs) = module.buffer_of(module.long, LONG_BYTES);
-        module.indices = (0..most_words).map(|index| module.constant(index)).collect();
-        module
-    }
-
-    fn id(&mut self) -> u32 {
-        self.bound += 1;
-        self.bound - 1
-    }
-
-    fn declare(&mut self, opcode: u32, operands: &[u32]) -> u32 {
-        let id = self.id();
-        push(&mut self.declarations, opcode, [id].into_iter().chain(operands.iter().copied()));
-        id
-    }
-
-    /// A type that may not be declared twice.
-    fn declared_or(&mut self, found: Option<u32>, opcode: u32, operands: &[u32]) -> u32 {
-        found.unwrap_or_else(|| self.declare(opcode, operands))
-    }
-
-    fn constant(&mut self, value: u32) -> u32 {
-        let id = self.id();
-        push(&mut self.declarations, op::CONSTANT, [self.uint, id, value]);
-        id
-    }
-
-    /// Pointers to an element of a buffer, and to the buffer.
-    fn buffer_of(&mut self, element: u32, bytes: u32) -> (u32, u32) {
-        let array = self.declare(op::TYPE_RUNTIME_ARRAY, &[element]);
-        let buffer = self.declare(op::TYPE_STRUCT, &[array]);
-        push(&mut self.decorations, op::DECORATE, [array, ARRAY_STRIDE, bytes]);
-        push(&mut self.decorations, op::DECORATE, [buffer, BLOCK]);
-        push(&mut self.decorations, op::MEMBER_DECORATE, [buffer, 0, OFFSET, 0]);
-        let mut pointer = |to| self.declare(op::TYPE_POINTER, &[PHYSICAL_STORAGE_BUFFER, to]);
-        (pointer(element), pointer(buffer))
+        let (uint, long) = (unsigned(32), unsigned(64));
+        let is_pair = |ty: &Type| matches!(ty, Type::Vector { of, count: 2 } if *of == uint);
+        let pair = declared.find(is_pair).unwrap_or_else(|| added.declare(op::TYPE_VECTOR, &[uint, 2]));
+        let (to_uint, to_uints) = added.buffer_of(uint, WORD_BYTES);
+        let (to_long, to_longs) = added.buffer_of(long, LONG_BYTES);
+        let indices = (0..most_words).map(|index| added.constant(uint, index)).collect();
+        Rewriter { declared, added, words, uint, pair, long, to_uint, to_long, to_uints, to_longs, indices }
     }
 
     fn rewrite(&mut self, instruction: &[u32]) {
         // A module has decorations before its types, and those and constants before its functions.
         match opcode(instruction) {
-            op::FIRST_TYPE..=op::LAST_TYPE => self.words.append(&mut self.decorations),
-            op::FUNCTION => self.words.append(&mut self.declarations),
+            op::TYPE_VOID..=op::TYPE_FORWARD_POINTER => self.words.append(&mut self.added.decorations),
+            op::FUNCTION => self.words.append(&mut self.added.declarations),
             _ => {}
         }
         match (self.declared.access(instruction), &instruction[1..]) {
@@ -269,7 +236,7 @@ impl<'a> Rewriter<'a> {
 
     /// Writes an instruction that gives a value of a type.
     fn give(&mut self, opcode: u32, ty: u32, operands: &[u32]) -> u32 {
-        let id = self.id();
+        let id = self.added.id();
         push(&mut self.words, opcode, [ty, id].into_iter().chain(operands.iter().copied()));
         id
     }
@@ -434,7 +401,7 @@ mod tests {
             (op::MEMBER_DECORATE, &[node, 1, OFFSET, 12]),
             (op::MEMBER_DECORATE, &[node, 2, OFFSET, 16]),
             (op::MEMBER_DECORATE, &[buffer, 0, OFFSET, 0]),
-            (19, &[void]),
+            (op::TYPE_VOID, &[void]),
             (33, &[function, void]),
             (op::TYPE_INT, &[uint, 32, 0]),
             (op::TYPE_FLOAT, &[float, 32]),
@@ -446,11 +413,11 @@ mod tests {
             (op::CONSTANT, &[uint, zero, 0]),
             (59, &[to_buffer, at, class]),
             (op::FUNCTION, &[void, main, 0, function]),
-            (248, &[20]),
+            (op::LABEL, &[20]),
             (op::ACCESS_CHAIN, &[to_node, 21, at, zero]),
             (op::LOAD, &[node, 22, 21, ALIGNED, alignment]),
             (253, &[]),
-            (56, &[]),
+            (op::FUNCTION_END, &[]),
         ];
         instructions.iter().for_each(|(opcode, operands)| push(&mut words, *opcode, operands.iter().copied()));
         let module = load_words(in_longs(&words)).expect("SPIR-V");

@@ -5,22 +5,8 @@
 //! is never gone round keeps a block that would go back.
 
 use super::constants::Constants;
-use crate::gpu::spirv::{BOUND, HEADER_WORDS, Instructions, opcode, push};
+use crate::gpu::spirv::{BOUND, HEADER_WORDS, Instructions, op, opcode, push};
 use std::collections::{HashMap, HashSet};
-
-mod op {
-    pub const UNDEF: u32 = 1;
-    pub const FUNCTION: u32 = 54;
-    pub const FUNCTION_END: u32 = 56;
-    pub const PHI: u32 = 245;
-    pub const LOOP_MERGE: u32 = 246;
-    pub const SELECTION_MERGE: u32 = 247;
-    pub const LABEL: u32 = 248;
-    pub const BRANCH: u32 = 249;
-    pub const BRANCH_CONDITIONAL: u32 = 250;
-    pub const SWITCH: u32 = 251;
-    pub const UNREACHABLE: u32 = 255;
-}
 
 /// The module without what no branch reaches; with its constants folded. As it is where that would take a loop's way back.
 pub(super) fn without_unreached(spirv: &[u32], constants: &mut Constants<'_>) -> Vec<u32> {

@@ -1,31 +1,9 @@
 //! Specialisation constants, folded into a module's words, and values that follow from constants.
 
-use crate::gpu::spirv::{BOUND, HEADER_WORDS, Instructions, opcode, push};
+use crate::gpu::spirv::{BOUND, HEADER_WORDS, Instructions, op, opcode, push};
 use std::collections::HashMap;
 
 const SPEC_ID: u32 = 1;
-
-/// Opcodes of SPIR-V that declare constants, or name one.
-mod op {
-    pub const CONSTANT_TRUE: u32 = 41;
-    pub const CONSTANT_FALSE: u32 = 42;
-    pub const CONSTANT: u32 = 43;
-    pub const CONSTANT_COMPOSITE: u32 = 44;
-    pub const SPEC_CONSTANT_TRUE: u32 = 48;
-    pub const SPEC_CONSTANT_FALSE: u32 = 49;
-    pub const SPEC_CONSTANT: u32 = 50;
-    pub const SPEC_CONSTANT_COMPOSITE: u32 = 51;
-    pub const SPEC_CONSTANT_OP: u32 = 52;
-    pub const TYPE_BOOL: u32 = 20;
-    pub const TYPE_INT: u32 = 21;
-    pub const DECORATE: u32 = 71;
-    pub const COMPOSITE_EXTRACT: u32 = 81;
-    pub const COPY_OBJECT: u32 = 83;
-    pub const LOGICAL_OR: u32 = 166;
-    pub const LOGICAL_AND: u32 = 167;
-    pub const SELECT: u32 = 169;
-    pub const BITWISE_AND: u32 = 199;
-}
 
 /// What is known of ids.
 pub(super) struct Constants<'a> {

@@ -2,19 +2,7 @@
 //!
 //! Which words of an instruction are ids is not looked up: each word that could be one counts as a use, and so something stays now and then.
 
-use crate::gpu::spirv::{BOUND, HEADER_WORDS, Instructions, opcode, push};
-
-mod op {
-    pub const UNDEF: u32 = 1;
-    pub const NAME: u32 = 5;
-    pub const MEMBER_NAME: u32 = 6;
-    pub const EXT_INST: u32 = 12;
-    pub const ENTRY_POINT: u32 = 15;
-    pub const TYPE_FORWARD_POINTER: u32 = 39;
-    pub const LOAD: u32 = 61;
-    pub const DECORATE: u32 = 71;
-    pub const MEMBER_DECORATE: u32 = 72;
-}
+use crate::gpu::spirv::{BOUND, HEADER_WORDS, Instructions, op, opcode, push};
 
 const BUILT_IN: u32 = 11;
 const WORKGROUP_SIZE: u32 = 25;
