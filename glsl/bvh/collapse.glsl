@@ -3,7 +3,7 @@
 // src/bvh/collapse.rs records the steps; src/bvh/twin/collapse.rs is the twin.
 //
 //   parents  reads nodes                      writes weights: parents; arrivals (zero)
-//   weigh    reads nodes, parents             writes weights: counts, left_counts; costs; the header's costs
+//   weigh    reads nodes, parents             writes weights: counts; costs; the header's costs
 //   above    reads weights                    writes the places of large nodes; of these what place writes of the others
 //   place    reads weights, places, values    writes the walk's order, the nodes' children, slots that fall out, the root
 //   records  reads the walk's order           writes records, or the primitives' numbers in their place
@@ -57,7 +57,7 @@ void collapse_parents(uint task) {
 // Count and cost of a child whose subtree is weighed.
 void weight_of(Weights w, Child child, out uint count, out float cost) {
     bool is_primitive = child.count != 0u;
-    count = is_primitive ? child.count : w.counts.word[child.index] & ~IS_LEAF;
+    count = is_primitive ? child.count : w.counts.node[child.index].all & ~IS_LEAF;
     cost = is_primitive ? leaf_cost(c_i, scaled_half_area(Box(child.lo, child.hi), build_state().plan.area_scale), child.count)
                         : costs().value[child.index];
 }
@@ -187,20 +187,21 @@ void collapse_above(uint task) {
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
     for (uint k = 0; k < ITEMS; ++k) {
         uint slot = first + k * gl_WorkGroupSize.x;
-        if (slot >= node_count() || !is_large(w.counts.word[slot])) continue;
+        if (slot >= node_count() || !is_large(w.counts.node[slot].all)) continue;
         Place place = Place(0u, 0u, false);
         uint link = w.parents.word[slot];
         for (uint level = 0; level < node_count() && link != NO_PARENT; ++level) {
             uint above = link >> 1;
-            if ((link & 1u) != 0u) place.first += w.left_counts.word[above];
-            if ((w.counts.word[above] & IS_LEAF) != 0u) place.inside = true;
+            NodeCounts counts = w.counts.node[above];
+            if ((link & 1u) != 0u) place.first += counts.left;
+            if ((counts.all & IS_LEAF) != 0u) place.inside = true;
             place.depth++;
             link = w.parents.word[above];
         }
         place = limited_by_depth(place);
         large_firsts().word[slot] = place.first;
         large_depths().word[slot] = place.depth << 1 | (place.inside ? 1u : 0u);
-        place_node(structure, slot, w.counts.word[slot], w.parents.word[slot], place, placed);
+        place_node(structure, slot, w.counts.node[slot].all, w.parents.word[slot], place, placed);
     }
     write_placed(structure, placed);
 }
@@ -215,14 +216,14 @@ void place_primitive(Structure structure, Weights w, uint position, inout Placed
     uint link = first_link;
     for (uint level = 0; level < node_count() && link != NO_PARENT; ++level) {
         uint slot = link >> 1;
-        uint count = w.counts.word[slot];
-        bool is_right = (link & 1u) != 0u, is_leaf = (count & IS_LEAF) != 0u;
-        uint left = is_right ? w.left_counts.word[slot] : 0u;
+        NodeCounts counts = w.counts.node[slot];
+        bool is_right = (link & 1u) != 0u, is_leaf = (counts.all & IS_LEAF) != 0u;
+        uint left = is_right ? counts.left : 0u;
         place.first += left;
         place.depth++;
         place.inside = place.inside || is_leaf;
         if (own != NONE) own_place.inside = own_place.inside || is_leaf;
-        if (is_large(count)) {
+        if (is_large(counts.all)) {
             uint depth = large_depths().word[slot];
             bool inside = (depth & 1u) != 0u;
             place.first += large_firsts().word[slot];
@@ -234,7 +235,7 @@ void place_primitive(Structure structure, Weights w, uint position, inout Placed
         link = w.parents.word[slot];
         if (own == NONE && is_right) {
             own = slot;
-            own_count = count;
+            own_count = counts.all;
             own_link = link;
             own_left = left;
             own_steps = place.depth;

@@ -84,7 +84,7 @@ uint task_count(uint level) {
 
 // Primitives below a child.
 uint count_of(Weights w, Child child) {
-    return child.count != 0u ? 1u : w.counts.word[child.index] & ~IS_LEAF;
+    return child.count != 0u ? 1u : w.counts.node[child.index].all & ~IS_LEAF;
 }
 
 float top_cost(uint slot, uint side) {
@@ -109,7 +109,7 @@ void hlbvh_weigh(uint task) {
             uint slot = link >> 1;
             Floats(part(parts.top_costs[link & 1u])).value[slot] = cost;
             release_to_device();
-            if (atomicAdd(w.counts.word[slot], 1u) == 0u) break;
+            if (atomicAdd(w.counts.node[slot].all, 1u) == 0u) break;
             acquire_from_device();
             Child left = structure.nodes[slot].left, right = structure.nodes[slot].right;
             vec2 costs = vec2(top_cost(slot, 0u), top_cost(slot, 1u));

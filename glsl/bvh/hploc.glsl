@@ -45,23 +45,54 @@ bool is_whole(Range s, uint active_count) {
     return s.first == 0u && s.last + 1u == active_count;
 }
 
+// What is left of a run of positions.
+struct Rest {
+    uint position;       // the next leaf
+    uint end;
+    uint run;            // the first position; NONE where siblings out of the run are met as any others
+    uint waiting;        // left children in the slots of the run
+    bool leaves_done;
+};
+
+// What an invocation climbs from next: a leaf of its run, or then what waits there, last first. Outputs whether there is anything.
+bool begin_next(Words codes, uint active_count, inout Rest rest, out Range s) {
+    if (rest.position < rest.end) {
+        s.first = rest.position;
+        s.last = rest.position++;
+        s.clusters = 1u;
+    } else if (rest.waiting > 0u) {
+        s.last = (rest.leaves_done ? run_firsts[run_slot(rest.waiting)] : rest.end) - 1u;
+        rest.waiting--;
+        s.first = run_firsts[run_slot(rest.waiting)];
+        s.clusters = run_clusters[run_slot(rest.waiting)];
+        rest.leaves_done = true;
+        rest.run = NONE;
+    } else {
+        s = Range(0u, 0u, 0u, uvec3(0u), uvec3(0u));
+        return false;
+    }
+    s.before = difference_before(codes, s.first);
+    s.behind = difference_behind(codes, s.last, active_count);
+    return true;
+}
+
 // One step up from a subtree: whether its sibling is there. If so, `s` becomes their parent, and the clusters of both are output.
-bool step_up(Words codes, uint active_count, uint run, inout uint waiting, inout Range s, out Request request) {
+bool step_up(Words codes, uint active_count, inout Rest rest, inout Range s, out Request request) {
     request = NO_REQUEST;
     Words ends = Words(part(parts.ends));
     bool is_left = is_less(s.behind, s.before);
     uint parent = is_left ? s.last : s.first - 1u;
     uint end, clusters;
-    if (is_left && s.first >= run) {
-        run_firsts[run_slot(waiting)] = s.first;
-        run_clusters[run_slot(waiting)] = s.clusters;
-        waiting++;
+    if (is_left && s.first >= rest.run) {
+        run_firsts[run_slot(rest.waiting)] = s.first;
+        run_clusters[run_slot(rest.waiting)] = s.clusters;
+        rest.waiting++;
         return false;
     }
-    if (!is_left && waiting > 0u) {
-        waiting--;
-        end = run_firsts[run_slot(waiting)];
-        clusters = run_clusters[run_slot(waiting)];
+    if (!is_left && rest.waiting > 0u) {
+        rest.waiting--;
+        end = run_firsts[run_slot(rest.waiting)];
+        clusters = run_clusters[run_slot(rest.waiting)];
     } else {
         release_to_device();
         uint word = atomicExchange(ends.word[parent], packed_end(is_left ? s.first : s.last, s.clusters));
@@ -101,37 +132,25 @@ void hploc_hierarchy(uint task) {
         list.word[position] = position;
     }
     if (!BY_ONE) reset_teams();
-    uint position = run;
-    uint waiting = 0;
-    bool leaves_done = false, climbs = false;
-    uint own_run = run;
+    Rest rest = Rest(run, end, run, 0u, false);
+    bool climbs = false;
     Range s;
     // Each invocation goes as far as it can without a merge; then come the merges of all.
     for (uint turn = 0; turn < (ITEMS + 1u) * (LEVELS + 1u); ++turn) {
         Request request = NO_REQUEST;
         bool merges = false, done = false;
         for (uint steps = 0; steps < (ITEMS + 1u) * (LEVELS + 1u) && !merges && !done; ++steps) {
-            if (climbs) {
-                climbs = step_up(codes, active_count, own_run, waiting, s, request);
+            // What begins takes its first step at once: lanes that climb wait for those that begin.
+            if (!climbs) {
+                climbs = begin_next(codes, active_count, rest, s);
+                done = !climbs;
+                merges = climbs && is_whole(s, active_count);
+                if (merges) request = Request(s.first, s.clusters, s.first, 0u, true);
+            }
+            if (climbs && !merges) {
+                climbs = step_up(codes, active_count, rest, s, request);
                 // Where they lie side by side and are few, nothing needs to be done.
                 merges = climbs && (s.clusters > HALF_WINDOW || request.left + request.left_count != request.right || request.is_whole);
-            } else if (position < end) {
-                s = Range(position, position, 1u, difference_before(codes, position), difference_behind(codes, position, active_count));
-                request = Request(position, 1u, position, 0u, is_whole(s, active_count));
-                climbs = true;
-                merges = request.is_whole;
-                position++;
-            } else if (waiting > 0u) {
-                own_run = NONE;
-                uint last = (leaves_done ? run_firsts[run_slot(waiting)] : end) - 1u;
-                leaves_done = true;
-                waiting--;
-                uint first = run_firsts[run_slot(waiting)];
-                s = Range(first, last, run_clusters[run_slot(waiting)], difference_before(codes, first),
-                          difference_behind(codes, last, active_count));
-                climbs = true;
-            } else {
-                done = true;
             }
         }
         uint left = 0u;

@@ -12,15 +12,22 @@ const uint IS_PRIMITIVE = 1u << 31;
 const uint IS_LEAF = 1u << 31;
 const uint NO_PARENT = 0xFFFFFFFFu;
 
+struct NodeCounts {
+    uint all;             // IS_LEAF in the top bit
+    uint left;
+};
+
+// They lie at multiples of 8, so that src/gpu/longs.rs may take both at a time.
+layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer CountsOfNodes { NodeCounts node[]; };
+
 struct Weights {
     Words parents;        // of the slots, then of the positions: slot * 2, + 1 for a right child; NO_PARENT
-    Words counts;         // IS_LEAF in the top bit
-    Words left_counts;
+    CountsOfNodes counts;
 };
 
 Weights weights() {
     uvec2 begin = part(parts.weights);
-    return Weights(Words(begin), Words(address_of(begin, primitive_count, 8u)), Words(address_of(begin, primitive_count, 12u)));
+    return Weights(Words(begin), CountsOfNodes(address_of(begin, primitive_count, 8u)));
 }
 
 uint parent_at(uint reference) {
@@ -47,8 +54,7 @@ float weigh_node(Weights w, uint slot, uvec2 children_counts, vec2 children_cost
     float as_leaf = leaf_cost(c_i, area, count);
     float as_inner = inner_cost(c_t, area, children_costs.x, children_costs.y);
     bool is_leaf = collapses != 0u && as_leaf < as_inner;
-    w.counts.word[slot] = count | (is_leaf ? IS_LEAF : 0u);
-    w.left_counts.word[slot] = children_counts.x;
+    w.counts.node[slot] = NodeCounts(count | (is_leaf ? IS_LEAF : 0u), children_counts.x);
     return is_leaf ? as_leaf : as_inner;
 }
 #endif

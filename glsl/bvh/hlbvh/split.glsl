@@ -147,7 +147,7 @@ uint split(Task t, uint level, out uint middle) {
     middle = chosen_middle;
     uint slot = clusters.cluster[safe_place(middle)].first - 1u;
     if (gl_LocalInvocationIndex == 0u) {
-        w.counts.word[slot] = 0u;
+        w.counts.node[slot].all = 0u;
         w.parents.word[slot] = t.link;
         Child children[2];
         for (uint side = 0; side < 2u; ++side) {

@@ -30,8 +30,7 @@ void climb(inout Run run, Weights w, float area_scale, Subtree s) {
     for (uint level = 0; level < run.active_count; ++level) {
         bool is_left = is_left_child(s);
         if (is_treelet(run, is_left, s)) {
-            w.counts.word[s.last] = reference_of(s.child);
-            w.left_counts.word[s.last] = floatBitsToUint(s.cost);
+            w.counts.node[s.last] = NodeCounts(reference_of(s.child), floatBitsToUint(s.cost));
             break;
         }
         uint parent = parent_of(s, is_left);
@@ -110,11 +109,11 @@ void hlbvh_scan() {
 
 // The cluster of the treelet that ends at a position.
 Cluster cluster_of_treelet(Structure structure, Weights w, Geometry input_geometries, uint last, float area_scale) {
-    uint reference = w.counts.word[last];
+    uint reference = w.counts.node[last].all;
     if ((reference & IS_PRIMITIVE) != 0u) return cluster_of_primitive(input_geometries, last, area_scale);
     Child left = structure.nodes[reference].left, right = structure.nodes[reference].right;
-    uint count = w.counts.word[reference] & ~IS_LEAF;
-    float cost = uintBitsToFloat(w.left_counts.word[last]);
+    uint count = w.counts.node[reference].all & ~IS_LEAF;
+    float cost = uintBitsToFloat(w.counts.node[last].left);
     return Cluster(min(left.lo, right.lo), reference, max(left.hi, right.hi), count, cost, last + 1u - count);
 }
 
