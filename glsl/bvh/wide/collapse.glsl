@@ -67,6 +67,8 @@ BUFFER Levels {
     uint end;                         // of all levels that have a node
 };
 BUFFER OpenedNodes { Opened node[]; };
+// Multiples of 8, so that src/gpu/longs.rs may take two words at a time.
+layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer FourPlaces { uvec4 of[]; };
 
 layout(push_constant, scalar) uniform WideCollapseArguments {
     Structure source;
@@ -74,7 +76,7 @@ layout(push_constant, scalar) uniform WideCollapseArguments {
     Levels levels;
     OpenedNodes opened;
     Words links;             // see bvh/wide/costs.glsl
-    Floats costs;
+    FourPlaces costs;
     Words choices;           // of each of the source's slots
     LinkCounts visits;       // of the source's links, by visits
     LinkCounts hits;         // and by hits
