@@ -19,17 +19,26 @@
 // Levels of a radix tree: a code bit or a position bit each.
 const uint LEVELS = 64 + 27;
 
-// Left children that wait for a sibling out of the same run of positions (bvh/run.glsl), and their clusters.
-shared uint run_firsts[ITEMS * gl_WorkGroupSize.x];
-shared uint run_clusters[ITEMS * gl_WorkGroupSize.x];
+// Left children that wait for a sibling out of the same run of positions (bvh/run.glsl): their packed ends.
+shared uint run_ends[ITEMS * gl_WorkGroupSize.x];
 
 uint run_slot(uint level) {
     return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
 }
 
-// The end of a subtree and how many clusters it has, in a word: positions have 27 bits.
+const uint POSITION_BITS = 27;
+
+// The end of a subtree that is not its sibling's, and how many clusters it has, in a word.
 uint packed_end(uint end, uint clusters) {
-    return end | (clusters - 1u) << 27;
+    return end | (clusters - 1u) << POSITION_BITS;
+}
+
+uint position_of(uint packed) {
+    return packed & (1u << POSITION_BITS) - 1u;
+}
+
+uint clusters_of(uint packed) {
+    return (packed >> POSITION_BITS) + 1u;
 }
 
 // A subtree over the positions first..=last, and how the codes differ before and behind it.
@@ -61,10 +70,10 @@ bool begin_next(Words codes, uint active_count, inout Rest rest, out Range s) {
         s.last = rest.position++;
         s.clusters = 1u;
     } else if (rest.waiting > 0u) {
-        s.last = (rest.leaves_done ? run_firsts[run_slot(rest.waiting)] : rest.end) - 1u;
-        rest.waiting--;
-        s.first = run_firsts[run_slot(rest.waiting)];
-        s.clusters = run_clusters[run_slot(rest.waiting)];
+        s.last = (rest.leaves_done ? position_of(run_ends[run_slot(rest.waiting)]) : rest.end) - 1u;
+        uint waits = run_ends[run_slot(--rest.waiting)];
+        s.first = position_of(waits);
+        s.clusters = clusters_of(waits);
         rest.leaves_done = true;
         rest.run = NONE;
     } else {
@@ -77,42 +86,39 @@ bool begin_next(Words codes, uint active_count, inout Rest rest, out Range s) {
 }
 
 // One step up from a subtree: whether its sibling is there. If so, `s` becomes their parent, and the clusters of both are output.
-bool step_up(Words codes, uint active_count, inout Rest rest, inout Range s, out Request request) {
-    request = NO_REQUEST;
+// No return in the middle, behind which each write would be masked, and one place that loads codes.
+bool step_up(Words codes, uint active_count, inout Rest rest, inout Range s, inout Request request) {
     Words ends = Words(part(parts.ends));
     bool is_left = is_less(s.behind, s.before);
-    uint parent = is_left ? s.last : s.first - 1u;
-    uint end, clusters;
+    uint own = packed_end(is_left ? s.first : s.last, s.clusters);
+    uint met = NONE;
     if (is_left && s.first >= rest.run) {
-        run_firsts[run_slot(rest.waiting)] = s.first;
-        run_clusters[run_slot(rest.waiting)] = s.clusters;
-        rest.waiting++;
-        return false;
-    }
-    if (!is_left && rest.waiting > 0u) {
-        rest.waiting--;
-        end = run_firsts[run_slot(rest.waiting)];
-        clusters = run_clusters[run_slot(rest.waiting)];
+        run_ends[run_slot(rest.waiting++)] = own;
+    } else if (!is_left && rest.waiting > 0u) {
+        met = run_ends[run_slot(--rest.waiting)];
     } else {
         release_to_device();
-        uint word = atomicExchange(ends.word[parent], packed_end(is_left ? s.first : s.last, s.clusters));
-        if (word == NONE) return false;
+        met = atomicExchange(ends.word[is_left ? s.last : s.first - 1u], own);
         acquire_from_device();
-        end = word & (1u << 27) - 1u;
-        clusters = (word >> 27) + 1u;
     }
-    if (is_left) {
-        request = Request(s.first, s.clusters, s.last + 1u, clusters, false);
-        s.last = end;
-        s.behind = difference_behind(codes, s.last, active_count);
-    } else {
-        request = Request(end, clusters, s.first, s.clusters, false);
-        s.first = end;
-        s.before = difference_before(codes, s.first);
+    bool is_there = met != NONE;
+    if (is_there) {
+        uint end = position_of(met), clusters = clusters_of(met);
+        request.left = is_left ? s.first : end;
+        request.left_count = is_left ? s.clusters : clusters;
+        request.right = is_left ? s.last + 1u : s.first;
+        request.right_count = is_left ? clusters : s.clusters;
+        s.first = request.left;
+        s.last = is_left ? end : s.last;
+        s.clusters += clusters;
+        request.is_whole = is_whole(s, active_count);
+        bool has_neighbour = is_left ? s.last + 1u < active_count : s.first > 0u;
+        uvec3 difference = uvec3(NONE);
+        if (has_neighbour) difference = difference_at(codes, is_left ? s.last : s.first - 1u);
+        s.before = is_left ? s.before : difference;
+        s.behind = is_left ? difference : s.behind;
     }
-    s.clusters += clusters;
-    request.is_whole = is_whole(s, active_count);
-    return true;
+    return is_there;
 }
 
 void hploc_hierarchy(uint task) {
