@@ -22,7 +22,7 @@ const uint NO_LINK = 0xFFFFFFFFu;
 
 // links.word    of each of source_slots, what names the node: its place among all children, twice the parent's slot and one for the right
 //               one; behind them of each invocation, one at each of its slots, nodes over two leaves, and NO_LINK behind the last
-// costs.of      WIDTH words of each of source_slots, when its subtree is done: what was chosen, and its costs in 1, 2 and more places
+// costs.value   WIDTH - 1 of each of source_slots: in 1, 2 and more places
 
 uint start_at(uint i) {
     return source_slots + i;
@@ -39,32 +39,28 @@ bool is_inner(Child child, uint node_slots) {
     return child.count == 0u && child.index < node_slots;
 }
 
-// Of a subtree: what was chosen, and what it costs in up to 7 places; a leaf costs nothing.
-struct Known {
-    bool is_inner;
-    uint choice;
+// Of a subtree, in up to 7 places; a leaf costs nothing.
+struct Costs {
     float of[8];
 };
 
-const uint QUADS = WIDTH / 4;
-
-Known known_of(Child child, uint node_slots) {
+Costs costs_of(Child child, uint node_slots) {
+    Costs known;
     bool inner = is_inner(child, node_slots);
-    uvec4 few = uvec4(0u), more = uvec4(0u);
-    if (inner) few = costs.of[QUADS * child.index];
-    if (inner && WIDTH == 8u) more = costs.of[QUADS * child.index + 1u];
-    vec3 in_few = uintBitsToFloat(few.yzw);
-    vec4 in_more = uintBitsToFloat(more);
-    return Known(inner, few.x, float[8](0.0, in_few.x, in_few.y, in_few.z, in_more.x, in_more.y, in_more.z, in_more.w));
+    uint at = (WIDTH - 1u) * (inner ? child.index : 0u);
+    known.of[0] = 0.0;
+    [[unroll]] for (uint i = 1; i < 8; ++i) known.of[i] = inner && i < WIDTH ? costs.value[at + i - 1u] : 0.0;
+    return known;
 }
 
 // How many places a child takes of those that it is given.
-uint places_taken(Known known, uint places) {
-    return known.is_inner ? places_by(known.choice, places) : 1u;
+uint places_taken(Child child, uint places, uint node_slots) {
+    return is_inner(child, node_slots) ? places_by(choices.word[child.index], places) : 1u;
 }
 
 // What a wide node costs that begins with the binary node of these children.
-float own_cost(Child left, Child right, uint link, float scale) {
+float own_cost(Child left, Child right, uint link) {
+    float scale = source.header.area_scale;
     float area = scaled_half_area(Box(min(left.lo, right.lo), max(left.hi, right.hi)), scale);
     if (!BY_VISITS || link == NO_LINK) return area;
     Child root = source.header.root;
@@ -80,9 +76,9 @@ void better(float cost, uint k, inout float best, inout uint least) {
 }
 
 // What is known of the children of a node becomes what is of the node.
-void choose(uint slot, uint link, uint node_slots, float scale) {
+void choose(uint slot, uint link, uint node_slots) {
     Child left = source.nodes[slot].left, right = source.nodes[slot].right;
-    Known of_left = known_of(left, node_slots), of_right = known_of(right, node_slots);
+    Costs of_left = costs_of(left, node_slots), of_right = costs_of(right, node_slots);
     // Of equal ones the least for the left child. In more places than there are nothing is asked for. Written out, as shaderc does not unroll
     // a loop in a loop, and arrays that are indexed by loops lie in memory.
 #define ONE_FOR_THE_LEFT(places)                                        \
@@ -102,18 +98,16 @@ void choose(uint slot, uint link, uint node_slots, float scale) {
     uint choice = least2 | least3 << 3 | least4 << 6 | least5 << 9 | least6 << 12 | least7 << 15 | least8 << 18;
     float before = WIDTH == 4u ? best4 : best8;
     uint left_gets = WIDTH == 4u ? least4 : least8;
-    before += own_cost(left, right, link, scale);
-    float known[8] = float[8](0.0, before, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    before += own_cost(left, right, link);
+    uint at = (WIDTH - 1u) * slot;
+    costs.value[at] = before;
     [[unroll]] for (uint i = 2; i < 8; ++i) {
         choice |= (i < WIDTH && opened[i] < before ? 1u : 0u) << CHOICE_CHEAPER + i - 2u;
         before = min(opened[i], before);
-        known[i] = before;
+        if (i < WIDTH) costs.value[at + i - 1u] = before;
     }
-    uint both = places_taken(of_left, left_gets) + places_taken(of_right, WIDTH - left_gets);
-    choice |= both - 2u << CHOICE_CHILDREN;
-    choices.word[slot] = choice;
-    costs.of[QUADS * slot] = uvec4(choice, floatBitsToUint(vec3(known[1], known[2], known[3])));
-    if (WIDTH == 8u) costs.of[QUADS * slot + 1u] = floatBitsToUint(vec4(known[4], known[5], known[6], known[7]));
+    uint both = places_taken(left, left_gets, node_slots) + places_taken(right, WIDTH - left_gets, node_slots);
+    choices.word[slot] = choice | both - 2u << CHOICE_CHILDREN;
 }
 
 // What is known of all slots of an invocation before climbs begin.
@@ -141,12 +135,11 @@ uint start_of(uint k, uint node_slots) {
 
 // All climbs that are this invocation's. As soon as one has ended the next one begins: lanes do not wait for each other at the root.
 void climb(uint node_slots) {
-    float scale = source.header.area_scale;
     uint k = 0u;
     uint slot = start_of(k++, node_slots);
     while (slot < node_slots) {
         uint link = links.word[slot];
-        choose(slot, link, node_slots, scale);
+        choose(slot, link, node_slots);
         release_to_device();
         slot = link >> 1;
         // Another inner child that is not done yet goes on.

@@ -151,7 +151,7 @@ impl WidePass {
         let choices = take("choices", of_slots, WidePhase::Costs..=WidePhase::Open);
         let mut of_costs = |name, words| take(name, words * of_slots, WidePhase::Costs..=WidePhase::Costs);
         let links = of_costs("links, and starts of climbs", 2);
-        let costs = of_costs("what was chosen again, and costs in so many places", width);
+        let costs = of_costs("costs in so many places", width - 1);
         let levels = take("levels", LEVEL_WORDS, WidePhase::Open..=WidePhase::Nodes);
         let opened = take("opened nodes", 2 * nodes, WidePhase::Open..=WidePhase::Nodes);
         let children = take("what names their children", width * nodes, WidePhase::Open..=WidePhase::Nodes);
