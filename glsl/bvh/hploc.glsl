@@ -28,7 +28,7 @@ uint run_slot(uint level) {
 
 const uint POSITION_BITS = 27;
 
-// The end of a subtree that is not its sibling's, and how many clusters it has, in a word.
+// The end of a subtree that is away from its sibling, and how many clusters it has, in a word.
 uint packed_end(uint end, uint clusters) {
     return end | (clusters - 1u) << POSITION_BITS;
 }
@@ -58,9 +58,8 @@ bool is_whole(Range s, uint active_count) {
 struct Rest {
     uint position;       // the next leaf
     uint end;
-    uint run;            // the first position; NONE where siblings out of the run are met as any others
+    uint run;            // its first position; NONE once all leaves are done: siblings out of the run are met as any others then
     uint waiting;        // left children in the slots of the run
-    bool leaves_done;
 };
 
 // What an invocation climbs from next: a leaf of its run, or then what waits there, last first. Outputs whether there is anything.
@@ -70,11 +69,10 @@ bool begin_next(Words codes, uint active_count, inout Rest rest, out Range s) {
         s.last = rest.position++;
         s.clusters = 1u;
     } else if (rest.waiting > 0u) {
-        s.last = (rest.leaves_done ? position_of(run_ends[run_slot(rest.waiting)]) : rest.end) - 1u;
+        s.last = (rest.run == NONE ? position_of(run_ends[run_slot(rest.waiting)]) : rest.end) - 1u;
         uint waits = run_ends[run_slot(--rest.waiting)];
         s.first = position_of(waits);
         s.clusters = clusters_of(waits);
-        rest.leaves_done = true;
         rest.run = NONE;
     } else {
         s = Range(0u, 0u, 0u, uvec3(0u), uvec3(0u));
@@ -138,7 +136,7 @@ void hploc_hierarchy(uint task) {
         list.word[position] = position;
     }
     if (!BY_ONE) reset_teams();
-    Rest rest = Rest(run, end, run, 0u, false);
+    Rest rest = Rest(run, end, run, 0u);
     bool climbs = false;
     Range s;
     // Each invocation goes as far as it can without a merge; then come the merges of all.

@@ -12,6 +12,7 @@ const uint IS_PRIMITIVE = 1u << 31;
 const uint IS_LEAF = 1u << 31;
 const uint NO_PARENT = 0xFFFFFFFFu;
 
+// Primitives below a node, and below its left child.
 struct NodeCounts {
     uint all;             // IS_LEAF in the top bit
     uint left;

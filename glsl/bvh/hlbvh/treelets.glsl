@@ -30,6 +30,7 @@ void climb(inout Run run, Weights w, float area_scale, Subtree s) {
     for (uint level = 0; level < run.active_count; ++level) {
         bool is_left = is_left_child(s);
         if (is_treelet(run, is_left, s)) {
+            // Until the node of this slot is there, its counts hold what the treelet is to hlbvh_gather().
             w.counts.node[s.last] = NodeCounts(reference_of(s.child), floatBitsToUint(s.cost));
             break;
         }
