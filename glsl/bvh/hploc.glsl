@@ -19,16 +19,36 @@
 // Levels of a radix tree: a code bit or a position bit each.
 const uint LEVELS = 64 + 27;
 
-// Left children that wait for a sibling out of the same run of positions (bvh/run.glsl): their packed ends.
-shared uint run_ends[ITEMS * gl_WorkGroupSize.x];
+// Left children that wait for a sibling out of the same run of positions (bvh/run.glsl), as words of a `Waiting`. Until a leaf begins,
+// its word has the bit of the split behind it.
+shared uint run_words[ITEMS * gl_WorkGroupSize.x];
 
 uint run_slot(uint level) {
     return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
 }
 
 const uint POSITION_BITS = 27;
+const uint CLUSTER_BITS = 5;
 
-// The end of a subtree that is away from its sibling, and how many clusters it has, in a word.
+// Where a subtree in a run begins, how many clusters it has, and the bit of the split before it.
+struct Waiting {
+    uint first;
+    uint clusters;
+    uint before;
+};
+
+// Positions are counted from the run's first one.
+uint packed_waiting(Waiting w, uint base) {
+    return (w.first - base << CLUSTER_BITS | w.clusters - 1u) << SPLIT_BITS | w.before;
+}
+
+Waiting waiting_of(uint word, uint base) {
+    uint before = word & (1u << SPLIT_BITS) - 1u;
+    uint clusters = (word >> SPLIT_BITS & (1u << CLUSTER_BITS) - 1u) + 1u;
+    return Waiting(base + (word >> SPLIT_BITS + CLUSTER_BITS), clusters, before);
+}
+
+// Between invocations: the end of a subtree that is away from its sibling, and how many clusters it has, in a word.
 uint packed_end(uint end, uint clusters) {
     return end | (clusters - 1u) << POSITION_BITS;
 }
@@ -41,13 +61,13 @@ uint clusters_of(uint packed) {
     return (packed >> POSITION_BITS) + 1u;
 }
 
-// A subtree over the positions first..=last, and how the codes differ before and behind it.
+// A subtree over the positions first..=last, and the bits of the splits before and behind it.
 struct Range {
     uint first;
     uint last;
     uint clusters;
-    uvec3 before;
-    uvec3 behind;
+    uint before;
+    uint behind;
 };
 
 bool is_whole(Range s, uint active_count) {
@@ -56,52 +76,60 @@ bool is_whole(Range s, uint active_count) {
 
 // What is left of a run of positions.
 struct Rest {
+    uint base;           // its first position
     uint position;       // the next leaf
     uint end;
+    uint behind;         // the split before the next leaf
     uint run;            // its first position; NONE once all leaves are done: siblings out of the run are met as any others then
     uint waiting;        // left children in the slots of the run
 };
 
 // What an invocation climbs from next: a leaf of its run, or then what waits there, last first. Outputs whether there is anything.
-bool begin_next(Words codes, uint active_count, inout Rest rest, out Range s) {
+bool begin_next(inout Rest rest, out Range s) {
+    s = Range(0u, 0u, 0u, 0u, 0u);
     if (rest.position < rest.end) {
-        s.first = rest.position;
-        s.last = rest.position++;
-        s.clusters = 1u;
-    } else if (rest.waiting > 0u) {
-        s.last = (rest.run == NONE ? position_of(run_ends[run_slot(rest.waiting)]) : rest.end) - 1u;
-        uint waits = run_ends[run_slot(--rest.waiting)];
-        s.first = position_of(waits);
-        s.clusters = clusters_of(waits);
-        rest.run = NONE;
-    } else {
-        s = Range(0u, 0u, 0u, uvec3(0u), uvec3(0u));
-        return false;
+        s = Range(rest.position, rest.position, 1u, rest.behind, run_words[run_slot(rest.position - rest.base)]);
+        rest.position++;
+        rest.behind = s.behind;
+        return true;
     }
-    s.before = difference_before(codes, s.first);
-    s.behind = difference_behind(codes, s.last, active_count);
+    if (rest.waiting == 0u) return false;
+    // What was taken last began where this ends.
+    Waiting behind = Waiting(rest.end, 1u, rest.behind);
+    if (rest.run == NONE) behind = waiting_of(run_words[run_slot(rest.waiting)], rest.base);
+    Waiting w = waiting_of(run_words[run_slot(--rest.waiting)], rest.base);
+    s = Range(w.first, behind.first - 1u, w.clusters, w.before, behind.before);
+    rest.run = NONE;
     return true;
 }
 
 // One step up from a subtree: whether its sibling is there. If so, `s` becomes their parent, and the clusters of both are output.
-// No return in the middle, behind which each write would be masked, and one place that loads codes.
+// No return in the middle, behind which each write would be masked, and one place that loads codes: siblings in a run know the splits.
 bool step_up(Words codes, uint active_count, inout Rest rest, inout Range s, inout Request request) {
     Words ends = Words(part(parts.ends));
-    bool is_left = is_less(s.behind, s.before);
-    uint own = packed_end(is_left ? s.first : s.last, s.clusters);
-    uint met = NONE;
+    bool is_left = s.behind < s.before;
+    uint end = NONE, clusters = 0u, split = NO_SPLIT;
     if (is_left && s.first >= rest.run) {
-        run_ends[run_slot(rest.waiting++)] = own;
+        run_words[run_slot(rest.waiting++)] = packed_waiting(Waiting(s.first, s.clusters, s.before), rest.base);
     } else if (!is_left && rest.waiting > 0u) {
-        met = run_ends[run_slot(--rest.waiting)];
+        Waiting w = waiting_of(run_words[run_slot(--rest.waiting)], rest.base);
+        end = w.first;
+        clusters = w.clusters;
+        split = w.before;
     } else {
         release_to_device();
-        met = atomicExchange(ends.word[is_left ? s.last : s.first - 1u], own);
+        uint met = atomicExchange(ends.word[is_left ? s.last : s.first - 1u], packed_end(is_left ? s.first : s.last, s.clusters));
         acquire_from_device();
+        if (met != NONE) {
+            end = position_of(met);
+            clusters = clusters_of(met);
+            bool has_neighbour = is_left ? end + 1u < active_count : end > 0u;
+            uint before = is_left ? end : end - 1u;
+            if (has_neighbour) split = bit_between(codes, before, before + 1u);
+        }
     }
-    bool is_there = met != NONE;
+    bool is_there = end != NONE;
     if (is_there) {
-        uint end = position_of(met), clusters = clusters_of(met);
         request.left = is_left ? s.first : end;
         request.left_count = is_left ? s.clusters : clusters;
         request.right = is_left ? s.last + 1u : s.first;
@@ -110,13 +138,33 @@ bool step_up(Words codes, uint active_count, inout Rest rest, inout Range s, ino
         s.last = is_left ? end : s.last;
         s.clusters += clusters;
         request.is_whole = is_whole(s, active_count);
-        bool has_neighbour = is_left ? s.last + 1u < active_count : s.first > 0u;
-        uvec3 difference = uvec3(NONE);
-        if (has_neighbour) difference = difference_at(codes, is_left ? s.last : s.first - 1u);
-        s.before = is_left ? s.before : difference;
-        s.behind = is_left ? difference : s.behind;
+        s.before = is_left ? s.before : split;
+        s.behind = is_left ? split : s.behind;
     }
     return is_there;
+}
+
+// Each primitive of a run as a cluster of its own, and the split behind it. Outputs the split before the run.
+uint begin_run(Words codes, uint active_count, uint run, uint end) {
+    Clusters clusters = all_clusters();
+    Words list = cluster_list();
+    Geometry input_geometries = geometries();
+    float area_scale = build_state().plan.area_scale;
+    if (run >= end) return NO_SPLIT;
+    uint before = split_before(codes, run);
+    uvec2 code = code_at(codes, run);
+    for (uint position = run; position < end; ++position) {
+        clusters.cluster[position] = cluster_of_primitive(input_geometries, position, area_scale);
+        list.word[position] = position;
+        uint split = NO_SPLIT;
+        if (position + 1u < active_count) {
+            uvec2 next = code_at(codes, position + 1u);
+            split = highest_bit(code, next, position, position + 1u);
+            code = next;
+        }
+        run_words[run_slot(position - run)] = split;
+    }
+    return before;
 }
 
 void hploc_hierarchy(uint task) {
@@ -124,19 +172,14 @@ void hploc_hierarchy(uint task) {
     Structure structure = Structure(structure_address);
     Weights w = weights();
     Clusters clusters = all_clusters();
-    Words list = cluster_list();
-    Geometry input_geometries = geometries();
     Words codes = sorted_keys();
     uint active_count = state.active_count;
     float area_scale = state.plan.area_scale;
     uint run = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
     uint end = min(run + ITEMS, active_count);
-    for (uint position = run; position < end; ++position) {
-        clusters.cluster[position] = cluster_of_primitive(input_geometries, position, area_scale);
-        list.word[position] = position;
-    }
+    uint before = begin_run(codes, active_count, run, end);
     if (!BY_ONE) reset_teams();
-    Rest rest = Rest(run, end, run, 0u);
+    Rest rest = Rest(run, run, end, before, run, 0u);
     bool climbs = false;
     Range s;
     // Each invocation goes as far as it can without a merge; then come the merges of all.
@@ -146,7 +189,7 @@ void hploc_hierarchy(uint task) {
         for (uint steps = 0; steps < (ITEMS + 1u) * (LEVELS + 1u) && !merges && !done; ++steps) {
             // What begins takes its first step at once: lanes that climb wait for those that begin.
             if (!climbs) {
-                climbs = begin_next(codes, active_count, rest, s);
+                climbs = begin_next(rest, s);
                 done = !climbs;
                 merges = climbs && is_whole(s, active_count);
                 if (merges) request = Request(s.first, s.clusters, s.first, 0u, true);

@@ -51,7 +51,6 @@ float area_of_primitive(Corners c, float box_area, float area_scale) {
 // From a subtree up, as far as siblings are there.
 void climb(inout Run run, float area_scale, Subtree s, inout uint unused) {
     Structure structure = run.structure;
-    find_neighbours(run, s);
     // A level a differing bit: codes have 64 at most, positions 27.
     for (uint level = 0; level <= MAX_DEPTH; ++level) {
         if (s.first == 0 && s.last + 1 == run.active_count) {
@@ -112,8 +111,7 @@ void lbvh_hierarchy(uint task) {
                 Corners c;
                 write_reference(records, position, input_geometries, order.word[position], b, c);
                 climbs = position < run.active_count;
-                s.first = position;
-                s.last = position;
+                if (climbs) begin_leaf(run, s);
                 s.child = Child(b.lo, position, b.hi, 1);
                 float area = scaled_half_area(b, area_scale);
                 s.cost = leaf_cost(c_i, area, 1);
@@ -123,7 +121,7 @@ void lbvh_hierarchy(uint task) {
                 }
                 position++;
             } else if (run.waiting > 0) {
-                s = take_waiting(run, min(end, run.active_count));
+                s = take_waiting(run);
             } else if (!MEETS_IN_GROUP || turn == 0 || !take_left_over(run, split, s)) {
                 break;
             }

@@ -4,34 +4,37 @@
 #define HEDGEROW_BVH_RADIX_TREE
 #include "gpu/radix_sort.glsl"
 
-// How the codes at two positions differ, as a number that is larger where a higher bit differs: the code's bits, then those of the
-// position, which distinguish equal codes.
-uvec3 difference_of(Words codes, uint i, uint j) {
-    if (KEY_WORDS == 1) return uvec3(i ^ j, codes.word[i] ^ codes.word[j], 0);
-    return uvec3(i ^ j, codes.word[2 * i] ^ codes.word[2 * j], codes.word[2 * i + 1] ^ codes.word[2 * j + 1]);
+// Two codes in sorted order, and the positions that they have, first differ in a bit, counted from the lowest of a position: the code's
+// bits are above the 32 of the position, which distinguish equal codes. Of a subtree's two neighbouring splits no bit is the same.
+const uint POSITION_WORD_BITS = 32;
+// In place of the bit at either end of all positions, where there is no split: above every bit.
+const uint NO_SPLIT = 127;
+const uint SPLIT_BITS = 7;
+
+uvec2 code_at(Words codes, uint i) {
+    if (KEY_WORDS == 1) return uvec2(codes.word[i], 0u);
+    return uvec2(codes.word[2 * i], codes.word[2 * i + 1]);
 }
 
-uvec3 difference_at(Words codes, uint i) {
-    return difference_of(codes, i, i + 1);
+uint highest_bit(uvec2 code, uvec2 other, uint i, uint j) {
+    uvec2 difference = code ^ other;
+    uint word = i ^ j, below = 0u;
+    if (difference.x != 0u) word = difference.x, below = POSITION_WORD_BITS;
+    if (KEY_WORDS == 2 && difference.y != 0u) word = difference.y, below = 2u * POSITION_WORD_BITS;
+    return below + uint(findMSB(word));
 }
 
-// The highest bit of a difference, counted from the lowest of the position.
-int highest_bit(uvec3 difference) {
-    if (KEY_WORDS == 2 && difference.z != 0u) return 64 + findMSB(difference.z);
-    return difference.y != 0u ? 32 + findMSB(difference.y) : findMSB(difference.x);
+// Of the codes at two positions.
+uint bit_between(Words codes, uint i, uint j) {
+    return highest_bit(code_at(codes, i), code_at(codes, j), i, j);
 }
 
-// Of the neighbouring splits of a subtree; at the ends of all positions there is none.
-uvec3 difference_before(Words codes, uint first) {
-    return first > 0 ? difference_at(codes, first - 1) : uvec3(0xFFFFFFFFu);
+// Of the split behind position i, or before position i.
+uint split_behind(Words codes, uint i, uint active_count) {
+    return i + 1u < active_count ? bit_between(codes, i, i + 1u) : NO_SPLIT;
 }
 
-uvec3 difference_behind(Words codes, uint last, uint active_count) {
-    return last + 1 < active_count ? difference_at(codes, last) : uvec3(0xFFFFFFFFu);
-}
-
-bool is_less(uvec3 a, uvec3 b) {
-    if (KEY_WORDS == 2 && a.z != b.z) return a.z < b.z;
-    return a.y != b.y ? a.y < b.y : a.x < b.x;
+uint split_before(Words codes, uint i) {
+    return i > 0u ? bit_between(codes, i - 1u, i) : NO_SPLIT;
 }
 #endif

@@ -13,12 +13,12 @@
 #include "bvh/radix_tree.glsl"
 #include "bvh/child_weights.glsl"
 
-// A finished subtree over the positions first..=last, and how the codes differ before and behind it.
+// A finished subtree over the positions first..=last, and the bits of the splits before and behind it.
 struct Subtree {
     uint first;
     uint last;
-    uvec3 before;
-    uvec3 behind;
+    uint before;
+    uint behind;
     Child child;
     float cost;
     Weight weight;
@@ -67,13 +67,16 @@ struct Run {
     uint active_count;
     uint first;
     uint waiting;
+    uint end;           // behind what has begun last
+    uint behind;        // the split there
+    uvec2 code;         // of the position there
     uint group_first;   // the task's first position
     bool in_group;      // meets those of the workgroup
 };
 
-// Left children that wait for a sibling out of the same run of positions: where each begins. They lie side by side and end
-// with the run so far, so that the last of them is the sibling of whichever right child comes next.
-shared uint run_firsts[ITEMS * gl_WorkGroupSize.x];
+// Left children that wait for a sibling out of the same run of positions: where each begins (`packed_begin`). They lie side by side and
+// end with the run so far, so that the last of them is the sibling of whichever right child comes next.
+shared uint run_begins[ITEMS * gl_WorkGroupSize.x];
 
 // For each split from the one before the task's positions to the one behind them, the far end of the child that came first, with
 // its side; or that both came.
@@ -84,6 +87,23 @@ shared uint group_ends[GROUP_SPLITS];
 
 uint run_slot(uint level) {
     return level * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+}
+
+uint run_base(Run run) {
+    return run.group_first + gl_LocalInvocationIndex * ITEMS;
+}
+
+// Where in the run a subtree begins, and the bit of the split before it.
+uint packed_begin(Run run, uint first, uint before) {
+    return first - run_base(run) << SPLIT_BITS | before;
+}
+
+uint position_of(Run run, uint begin) {
+    return run_base(run) + (begin >> SPLIT_BITS);
+}
+
+uint split_of(uint begin) {
+    return begin & (1u << SPLIT_BITS) - 1u;
 }
 
 Run run_of(uint task) {
@@ -97,9 +117,16 @@ Run run_of(uint task) {
     run.left_weights = ChildWeights(address_of(uvec2(run.left_costs), primitive_count, 4u));
     run.right_weights = ChildWeights(address_of(uvec2(run.right_costs), primitive_count, 4u));
     run.active_count = build_state().active_count;
-    run.first = (task * gl_WorkGroupSize.x + gl_LocalInvocationIndex) * ITEMS;
-    run.waiting = 0u;
     run.group_first = task * gl_WorkGroupSize.x * ITEMS;
+    run.first = run_base(run);
+    run.waiting = 0u;
+    run.end = run.first;
+    run.behind = NO_SPLIT;
+    run.code = uvec2(0u);
+    if (run.first < run.active_count) {
+        run.behind = split_before(run.codes, run.first);
+        run.code = code_at(run.codes, run.first);
+    }
     run.in_group = false;
     return run;
 }
@@ -150,35 +177,49 @@ bool take_left_over(Run run, inout uint split, out Subtree s) {
         s.child = run.children.child[child_number(parent, is_left)];
         s.cost = costs_of(run, is_left).value[parent];
         load_weight(run, is_left, parent, s.weight, s.area);
+        s.before = split_before(run.codes, s.first);
+        s.behind = split_behind(run.codes, s.last, run.active_count);
         split += gl_WorkGroupSize.x;
         return true;
     }
     return false;
 }
 
-// The last of those that wait, once the leaves up to `end` are done: its sibling begins behind the run.
-Subtree take_waiting(inout Run run, uint end) {
+// The positions of the next leaf of the run. What is behind one leaf is before the next: each code is loaded once.
+void begin_leaf(inout Run run, inout Subtree s) {
+    s.first = run.end;
+    s.last = run.end++;
+    s.before = run.behind;
+    s.behind = NO_SPLIT;
+    if (run.end < run.active_count) {
+        uvec2 next = code_at(run.codes, run.end);
+        s.behind = highest_bit(run.code, next, s.last, run.end);
+        run.code = next;
+    }
+    run.behind = s.behind;
+}
+
+// The last of those that wait, once the leaves are done: its sibling begins behind the run.
+Subtree take_waiting(inout Run run) {
     Subtree s;
     // What was taken last began where this ends.
-    s.last = (run.first == NONE ? run_firsts[run_slot(run.waiting)] : end) - 1u;
-    run.first = NONE;
-    run.waiting--;
-    s.first = run_firsts[run_slot(run.waiting)];
+    uint behind = run.first == NONE ? run_begins[run_slot(run.waiting)] : packed_begin(run, run.end, run.behind);
+    uint begin = run_begins[run_slot(--run.waiting)];
+    s.first = position_of(run, begin);
+    s.last = position_of(run, behind) - 1u;
+    s.before = split_of(begin);
+    s.behind = split_of(behind);
     s.child = run.structure.nodes[s.last].left;
     s.cost = run.left_costs.value[s.last];
     load_weight(run, true, s.last, s.weight, s.area);
+    run.first = NONE;
     return s;
-}
-
-void find_neighbours(Run run, inout Subtree s) {
-    s.before = difference_before(run.codes, s.first);
-    s.behind = difference_behind(run.codes, s.last, run.active_count);
 }
 
 // The node that splits between positions i and i + 1 has slot i, so the parent follows from which of the two neighbouring splits
 // differs in a lower bit.
 bool is_left_child(Subtree s) {
-    return is_less(s.behind, s.before);
+    return s.behind < s.before;
 }
 
 uint parent_of(Subtree s, bool is_left) {
@@ -217,26 +258,26 @@ bool step_up(inout Run run, bool is_left, uint parent, inout Subtree s, out Sibl
         costs_of(run, is_left).value[parent] = s.cost;
         if (HAS_WEIGHTS) weights_of(run, is_left).of[parent] = ChildWeight(s.weight, s.area);
     }
-    uint end = NONE;
+    uint end = NONE, split = NO_SPLIT;
     if (is_left && s.first >= run.first) {
-        run_firsts[run_slot(run.waiting)] = s.first;
-        run.waiting++;
+        run_begins[run_slot(run.waiting++)] = packed_begin(run, s.first, s.before);
     } else if (in_run) {
-        run.waiting--;
-        end = run_firsts[run_slot(run.waiting)];
+        uint begin = run_begins[run_slot(--run.waiting)];
+        end = position_of(run, begin);
+        split = split_of(begin);
     } else {
         uint own_end = is_left ? s.first : s.last;
         if (MEETS_IN_GROUP && run.in_group) end = meet_in_group(run, parent, is_left, own_end);
         else end = meet_in_device(run, parent, own_end);
+        bool has_neighbour = end != NONE && (is_left ? end + 1u < run.active_count : end > 0u);
+        uint at = is_left ? end : end - 1u;
+        if (has_neighbour) split = bit_between(run.codes, at, at + 1u);
     }
     if (end != NONE) {
-        if (is_left) {
-            s.last = end;
-            s.behind = difference_behind(run.codes, s.last, run.active_count);
-        } else {
-            s.first = end;
-            s.before = difference_before(run.codes, s.first);
-        }
+        s.last = is_left ? end : s.last;
+        s.first = is_left ? s.first : end;
+        s.before = is_left ? s.before : split;
+        s.behind = is_left ? split : s.behind;
         sibling.child = run.children.child[child_number(parent, !is_left)];
         sibling.cost = costs_of(run, !is_left).value[parent];
         load_weight(run, !is_left, parent, sibling.weight, sibling.area);

@@ -14,18 +14,16 @@ const uint RULE = 0;
 // primitives. Its positions begin (or end) where the subtree's do, and share all bits of the code above the one that it splits at.
 bool is_treelet(Run run, bool is_left, Subtree s) {
     if (s.first == 0u && s.last + 1u == run.active_count) return true;
-    int split = highest_bit(is_left ? s.behind : s.before);
-    // Behind the bits of the position.
-    if (split >= 32 + int(kind_of_codes().bits - treelet_bits())) return true;
+    uint split = is_left ? s.behind : s.before;
+    if (split >= POSITION_WORD_BITS + kind_of_codes().bits - treelet_bits()) return true;
     uint most = min(TREELET_PRIMITIVES, run.active_count);
     uint from = is_left ? s.first : max(s.last, most) - most;
     uint to = from + most;
     if (to >= run.active_count || (!is_left && to != s.last)) return false;
-    return highest_bit(difference_of(run.codes, from, to)) <= split;
+    return bit_between(run.codes, from, to) <= split;
 }
 
 void climb(inout Run run, Weights w, float area_scale, Subtree s) {
-    find_neighbours(run, s);
     // As many levels as there are primitives, at most.
     for (uint level = 0; level < run.active_count; ++level) {
         bool is_left = is_left_child(s);
@@ -63,13 +61,12 @@ void hlbvh_treelets(uint task) {
             Subtree s;
             if (position < end) {
                 Cluster c = cluster_of_primitive(input_geometries, position, area_scale);
-                s.first = position;
-                s.last = position;
+                begin_leaf(run, s);
                 s.child = child_of(c);
                 s.cost = c.cost;
                 position++;
             } else if (run.waiting > 0u) {
-                s = take_waiting(run, end);
+                s = take_waiting(run);
             } else if (!MEETS_IN_GROUP || turn == 0u || !take_left_over(run, split, s)) {
                 break;
             }

@@ -11,9 +11,14 @@ uint places_of_left_by(uint choice, uint places) {
     return choice >> 3u * places - 6u & 7u;
 }
 
-// How many of up to so many places the subtree takes: more would not make it cheaper.
+// How many of up to so many places a subtree takes that is cheaper, by a bit for each from 2 places on, in more: others would not make it
+// cheaper. A leaf, which has no such bit, takes one.
+uint places_within(uint cheaper, uint places) {
+    return uint(findMSB(cheaper & (1u << places - 1u) - 1u) + 2);
+}
+
 uint places_by(uint choice, uint places) {
-    return uint(findMSB(choice >> CHOICE_CHEAPER & (1u << places - 1u) - 1u) + 2);
+    return places_within(choice >> CHOICE_CHEAPER, places);
 }
 
 // How many children it has as a wide node.

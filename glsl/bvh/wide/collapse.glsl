@@ -67,14 +67,16 @@ BUFFER Levels {
     uint end;                         // of all levels that have a node
 };
 BUFFER OpenedNodes { Opened node[]; };
+// Multiples of 8, so that src/gpu/longs.rs may take two words at a time.
+layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Quads { uvec4 of[]; };
 
 layout(push_constant, scalar) uniform WideCollapseArguments {
     Structure source;
     uvec2 target;
     Levels levels;
     OpenedNodes opened;
-    Words links;             // see bvh/wide/costs.glsl
-    Floats costs;
+    Words starts;            // see bvh/wide/costs.glsl
+    Quads costs;
     Words choices;           // of each of the source's slots
     LinkCounts visits;       // of the source's links, by visits
     LinkCounts hits;         // and by hits

@@ -94,9 +94,9 @@ struct Scratch {
     /// What is in use until the nodes are there, and what is until the records are.
     passing: Plan<WidePhase>,
     lasting: Plan<WidePhase>,
-    /// Of each of the source's slots what was chosen, its link with a node that climbs begin at, and its costs.
+    /// Of each of the source's slots what was chosen, a node that climbs begin at, and what names it with its costs.
     choices: u64,
-    links: u64,
+    starts: u64,
     costs: u64,
     levels: u64,
     opened: u64,
@@ -150,8 +150,8 @@ impl WidePass {
         let of_slots = u64::from(node_slots(self.count));
         let choices = take("choices", of_slots, WidePhase::Costs..=WidePhase::Open);
         let mut of_costs = |name, words| take(name, words * of_slots, WidePhase::Costs..=WidePhase::Costs);
-        let links = of_costs("links, and starts of climbs", 2);
-        let costs = of_costs("costs in so many places", width - 1);
+        let starts = of_costs("starts of climbs", 1);
+        let costs = of_costs("what names nodes, and costs in so many places", width);
         let levels = take("levels", LEVEL_WORDS, WidePhase::Open..=WidePhase::Nodes);
         let opened = take("opened nodes", 2 * nodes, WidePhase::Open..=WidePhase::Nodes);
         let children = take("what names their children", width * nodes, WidePhase::Open..=WidePhase::Nodes);
@@ -171,7 +171,7 @@ impl WidePass {
             passing,
             lasting,
             choices,
-            links,
+            starts,
             costs,
             levels,
             opened,
@@ -302,7 +302,7 @@ impl WidePass {
             target,
             levels: passing + parts.levels,
             opened: passing + parts.opened,
-            links: passing + parts.links,
+            starts: passing + parts.starts,
             costs: passing + parts.costs,
             choices: passing + parts.choices,
             visits,
