@@ -14,6 +14,9 @@ mod by_table;
 #[path = "build/compile.rs"]
 mod compile;
 #[cfg(feature = "compile-shaders")]
+#[path = "build/kept.rs"]
+mod kept;
+#[cfg(feature = "compile-shaders")]
 #[path = "build/memory_model.rs"]
 mod memory_model;
 #[cfg(feature = "compile-shaders")]

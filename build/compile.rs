@@ -1,7 +1,7 @@
 //! GLSL to SPIR-V, by shaderc: optimised, with `#include`, and with accesses to memory as `memory_model` says.
 
 use crate::table::{file_by_table, out_dir};
-use crate::{by_table, push_constants};
+use crate::{by_table, kept, push_constants};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -36,6 +36,15 @@ impl Compiler<'_> {
         }
         // What fails half-way is made again.
         let _ = fs::remove_file(&stamp);
+        let takes_file = format!("{file}.takes");
+        let files: Vec<String> = [file.to_owned(), format!("named/{file}"), takes_file.clone()]
+            .into_iter()
+            .chain(file_by_table(file))
+            .collect();
+        if kept::take(file, &made_of, &files, &out) {
+            fs::write(stamp, made_of).expect("OUT_DIR can be written");
+            return;
+        }
         fs::write(named.join(file), self.compile(source, shaderc::OptimizationLevel::Zero))
             .expect("OUT_DIR can be written");
         let whole = self.compile(source, shaderc::OptimizationLevel::Performance);
@@ -44,11 +53,12 @@ impl Compiler<'_> {
         let (spirv, takes) =
             if is_pass { push_constants::only_what_is_read(file, &whole) } else { (whole, Vec::new()) };
         let takes: String = takes.iter().map(|(offset, bytes)| format!("{offset} {bytes}\n")).collect();
-        fs::write(out.join(format!("{file}.takes")), takes).expect("OUT_DIR can be written");
+        fs::write(out.join(takes_file), takes).expect("OUT_DIR can be written");
         if let Some(file) = file_by_table(file) {
             fs::write(out.join(&file), by_table::by_table(&file, &spirv)).expect("OUT_DIR can be written");
         }
         fs::write(&path, spirv).expect("OUT_DIR can be written");
+        kept::keep(file, &made_of, &files, &out);
         fs::write(stamp, made_of).expect("OUT_DIR can be written");
     }
 

@@ -7,6 +7,8 @@ mod arguments;
 mod by_table;
 #[path = "../build/compile.rs"]
 mod compile;
+#[path = "../build/kept.rs"]
+mod kept;
 #[path = "../build/memory_model.rs"]
 mod memory_model;
 #[path = "../build/push_constants.rs"]

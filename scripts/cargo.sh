@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# cargo, with shaderc's library kept between clones: scripts/cargo.sh ARGUMENTS…
+# cargo, with shaderc's library and what it compiled kept between clones: scripts/cargo.sh ARGUMENTS…
 #
 # shaderc is built from its sources (minutes), for the systems' own are often broken or absent. The library that comes
 # out is kept in ${HEDGEROW_CACHE:-~/.cache/hedgerow}, one for each version of shaderc-sys and host, and found there next
-# time. An empty folder makes shaderc-sys build from source, so that a system's copy is never taken unasked; whoever
-# wants another sets SHADERC_LIB_DIR.
+# time, and beside it the SPIR-V that it made (build/kept.rs). An empty folder makes shaderc-sys build from source, so that
+# a system's copy is never taken unasked; whoever wants another sets SHADERC_LIB_DIR.
 set -euo pipefail
 [ -z "${SHADERC_LIB_DIR:-}" ] || exec cargo "$@"
 
@@ -13,7 +13,7 @@ target=${CARGO_TARGET_DIR:-$root/target}
 version=$(awk '/^name = "shaderc-sys"$/ { found = 1 } found && /^version/ { gsub(/"/, "", $3); print $3; exit }' "$root/Cargo.lock")
 host=$(rustc -vV | awk '/^host:/ { print $2 }')
 SHADERC_LIB_DIR=${HEDGEROW_CACHE:-$HOME/.cache/hedgerow}/shaderc-$version-$host
-export SHADERC_LIB_DIR
+export SHADERC_LIB_DIR HEDGEROW_SPIRV=$SHADERC_LIB_DIR/spirv
 library=libshaderc_combined.a
 if ! mkdir -p "$SHADERC_LIB_DIR" 2>/dev/null; then
   echo "cargo.sh: $SHADERC_LIB_DIR cannot be made, shaderc is not kept; set HEDGEROW_CACHE to a folder you may write" >&2

@@ -136,13 +136,12 @@ fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
 
 #[test]
 fn every_format_and_several_geometries_give_the_bytes_of_the_host() {
-    for vertex_format in VertexFormat::ALL {
-        for index_format in [IndexFormat::NONE, IndexFormat::U8, IndexFormat::U32] {
-            for (padding, transform) in [(0, None), (4, Some(MOVED))] {
-                let geometry = Owned::random(vertex_format, index_format, padding, 60, 7);
-                assert_geometries_as_on_the_host(&[Owned { transform, ..geometry }]);
-            }
-        }
+    // Every one of both; that of each with each is read alike, bvh::geometry looks at: it is the same code.
+    let index_formats = [IndexFormat::NONE, IndexFormat::U8, IndexFormat::U32, IndexFormat::U16];
+    for (i, vertex_format) in VertexFormat::ALL.into_iter().enumerate() {
+        let (padding, transform) = if i % 2 == 0 { (0, None) } else { (4, Some(MOVED)) };
+        let geometry = Owned::random(vertex_format, index_formats[i % 4], padding, 60, 7);
+        assert_geometries_as_on_the_host(&[Owned { transform, ..geometry }]);
     }
     let geometry = |i: usize, count| {
         let (vertices, indices) = (VertexFormat::ALL[i % 6], IndexFormat::ALL[i % 4]);
