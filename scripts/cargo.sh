@@ -17,7 +17,7 @@ export SHADERC_LIB_DIR HEDGEROW_SPIRV=$SHADERC_LIB_DIR/spirv
 library=libshaderc_combined.a
 if ! mkdir -p "$SHADERC_LIB_DIR" 2>/dev/null; then
   echo "cargo.sh: $SHADERC_LIB_DIR cannot be made, shaderc is not kept; set HEDGEROW_CACHE to a folder you may write" >&2
-  exec env -u SHADERC_LIB_DIR cargo "$@"
+  exec env -u SHADERC_LIB_DIR -u HEDGEROW_SPIRV cargo "$@"
 fi
 
 built() { ls -t "$target"/*/build/shaderc-sys-*/out/lib/$library 2>/dev/null | head -n 1; }

@@ -5,7 +5,8 @@
 #include "gpu/radix_sort.glsl"
 
 // Two codes in sorted order, and the positions that they have, first differ in a bit, counted from the lowest of a position: the code's
-// bits are above the 32 of the position, which distinguish equal codes. Of a subtree's two neighbouring splits no bit is the same.
+// bits are above the 32 of the position, which distinguish equal codes. The splits before and behind a subtree never have the same
+// bit.
 const uint POSITION_WORD_BITS = 32;
 // In place of the bit at either end of all positions, where there is no split: above every bit.
 const uint NO_SPLIT = 127;

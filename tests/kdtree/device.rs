@@ -136,7 +136,7 @@ fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
 
 #[test]
 fn every_format_and_several_geometries_give_the_bytes_of_the_host() {
-    // Every one of both; that of each with each is read alike, bvh::geometry looks at: it is the same code.
+    // Each format once. The same code reads them for BVHs, and bvh::geometry tests each vertex format with each index format.
     let index_formats = [IndexFormat::NONE, IndexFormat::U8, IndexFormat::U32, IndexFormat::U16];
     for (i, vertex_format) in VertexFormat::ALL.into_iter().enumerate() {
         let (padding, transform) = if i % 2 == 0 { (0, None) } else { (4, Some(MOVED)) };

@@ -11,8 +11,8 @@ uint places_of_left_by(uint choice, uint places) {
     return choice >> 3u * places - 6u & 7u;
 }
 
-// How many of up to so many places a subtree takes that is cheaper, by a bit for each from 2 places on, in more: others would not make it
-// cheaper. A leaf, which has no such bit, takes one.
+// How many places a subtree takes of those that it is given. `cheaper` has a bit for each number of places from 2 on: whether the subtree
+// costs less in them than in one less. A leaf has none of these bits, and takes one place.
 uint places_within(uint cheaper, uint places) {
     return uint(findMSB(cheaper & (1u << places - 1u) - 1u) + 2);
 }

@@ -94,7 +94,7 @@ struct Scratch {
     /// What is in use until the nodes are there, and what is until the records are.
     passing: Plan<WidePhase>,
     lasting: Plan<WidePhase>,
-    /// Of each of the source's slots what was chosen, a node that climbs begin at, and what names it with its costs.
+    /// Of each of the source's slots: what was chosen; a node that a climb begins at; what names the node, and its costs.
     choices: u64,
     starts: u64,
     costs: u64,
