@@ -156,13 +156,7 @@ uint begin_run(Words codes, uint active_count, uint run, uint end) {
     for (uint position = run; position < end; ++position) {
         clusters.cluster[position] = cluster_of_primitive(input_geometries, position, area_scale);
         list.word[position] = position;
-        uint split = NO_SPLIT;
-        if (position + 1u < active_count) {
-            uvec2 next = code_at(codes, position + 1u);
-            split = highest_bit(code, next, position, position + 1u);
-            code = next;
-        }
-        run_words[run_slot(position - run)] = split;
+        run_words[run_slot(position - run)] = split_to_next(codes, position, active_count, code);
     }
     return before;
 }

@@ -13,10 +13,10 @@
 layout(constant_id = 7) const uint RULE = 0;
 #include "bvh/run.glsl"
 
-// Marks the slots below a leaf over the positions first..=last; how many had a node of the tree.
-uint free_slots(Structure structure, uint first, uint last) {
+// Marks the slots first..end; how many had a node of the tree.
+uint free_slots(Structure structure, uint first, uint end) {
     uint freed = 0;
-    for (uint slot = first; slot < last; ++slot) {
+    for (uint slot = first; slot < end; ++slot) {
         if (structure.nodes[slot].left.count != UNUSED) {
             structure.nodes[slot].left.count = UNUSED;
             freed += 1;
@@ -25,21 +25,66 @@ uint free_slots(Structure structure, uint first, uint last) {
     return freed;
 }
 
-// The weight of the node over a subtree and its sibling, with this half area, and whether its children swap places.
-Weight weight_of_node(bool is_left, float area, Subtree own, Sibling sibling, float area_scale, out bool swaps) {
-    float own_area = scaled_half_area(Box(own.child.lo, own.child.hi), area_scale);
-    float other_area = scaled_half_area(Box(sibling.child.lo, sibling.child.hi), area_scale);
-    Weights2 w = is_left ? Weights2(own.weight, sibling.weight) : Weights2(sibling.weight, own.weight);
-    vec2 areas = is_left ? vec2(own_area, other_area) : vec2(other_area, own_area);
-    return weight_in_order(w, w, areas, area, c_t, swaps);
+// Writes a subtree's child where it belongs; returns whether it is the root.
+bool place(Run run, Subtree s, Weighed own) {
+    bool is_root = s.first == 0u && s.last + 1u == run.active_count;
+    if (is_root) {
+        run.structure.header.root = own.child;
+        run.structure.header.cost = own.cost;
+        run.structure.header.built_cost = own.cost;
+        if (RULE != AS_BUILT && own.child.count == 0u) run.structure.header.child_order = 1u;
+    } else {
+        bool is_left = is_left_child(s);
+        write_child(run, parent_of(s, is_left), is_left, own);
+    }
+    return is_root;
 }
 
-// Children are where they shall stay: one that is not written yet, or both of those that swap. No other invocation looks at the node any
-// more.
-void place_children(Run run, uint slot, bool is_left, bool is_written, bool swaps, Child own, Child sibling) {
-    bool is_first = is_left != swaps;
-    if (swaps || !is_written) run.children.child[child_number(slot, is_first)] = own;
-    if (swaps) run.children.child[child_number(slot, !is_first)] = sibling;
+// The weight of the node at `slot` of this half area, and its children in their order.
+Weight order_children(Run run, uint slot, Weighed left, Weighed right, float area) {
+    vec2 areas = vec2(scaled_half_area(Box(left.child.lo, left.child.hi), run.area_scale),
+                      scaled_half_area(Box(right.child.lo, right.child.hi), run.area_scale));
+    Weights2 weights = Weights2(left.weight.weight, right.weight.weight);
+    bool swaps;
+    Weight weight = weight_in_order(weights, weights, areas, area, c_t, swaps);
+    if (swaps) {
+        run.children.child[child_number(slot, true)] = right.child;
+        run.children.child[child_number(slot, false)] = left.child;
+    }
+    return weight;
+}
+
+// Makes the node of a subtree, or a leaf if that is cheaper, of its two children at `slot`, and places it.
+bool join(inout Run run, uint slot, Subtree s) {
+    Weighed left = child_at(run, slot, true), right = child_at(run, slot, false);
+    uint count = s.last - s.first + 1u;
+    Box b = Box(min(left.child.lo, right.child.lo), max(left.child.hi, right.child.hi));
+    float area = scaled_half_area(b, run.area_scale);
+    float as_leaf = leaf_cost(c_i, area, count);
+    float as_inner = inner_cost(c_t, area, left.cost, right.cost);
+    bool is_leaf = collapses != 0u && as_leaf < as_inner;
+    Weighed own;
+    own.child = Child(b.lo, is_leaf ? s.first : slot, b.hi, is_leaf ? count : 0u);
+    own.cost = is_leaf ? as_leaf : as_inner;
+    own.weight = ChildWeight(Weight(0.0, 0.0), 0.0);
+    if (HAS_AREAS) {
+        precise float area_of_both = left.weight.area + right.weight.area;
+        own.weight.area = area_of_both;
+    }
+    if (RULE != AS_BUILT) {
+        if (is_leaf) own.weight.weight = weight_of_leaf(own.weight.area, area, count, c_i);
+        else own.weight.weight = order_children(run, slot, left, right, area);
+    }
+    // Below children that are leaves all is marked.
+    uint first_node = left.child.count == 0u ? s.first : slot;
+    uint end_of_nodes = right.child.count == 0u ? s.last : slot + 1u;
+    if (is_leaf) run.freed += free_slots(run.structure, first_node, end_of_nodes);
+    return place(run, s, own);
+}
+
+// Only the root has no parent.
+bool ends_at(Run run, Subtree s) {
+    return false;
 }
 
 // The area by which a ray meets a primitive with this half area of its box; of a triangle that was split what the box has room for.
@@ -48,88 +93,41 @@ float area_of_primitive(Corners c, float box_area, float area_scale) {
     return min(area_of_triangle(c.v0, c.v1, c.v2, area_scale), box_area);
 }
 
-// From a subtree up, as far as siblings are there.
-void climb(inout Run run, float area_scale, Subtree s, inout uint unused) {
-    Structure structure = run.structure;
-    // A level a differing bit: codes have 64 at most, positions 27.
-    for (uint level = 0; level <= MAX_DEPTH; ++level) {
-        if (s.first == 0 && s.last + 1 == run.active_count) {
-            structure.header.root = s.child;
-            structure.header.cost = s.cost;
-            structure.header.built_cost = s.cost;
-            if (RULE != AS_BUILT && s.child.count == 0u) structure.header.child_order = 1u;
-            break;
-        }
-        bool is_left = is_left_child(s);
-        uint parent = parent_of(s, is_left);
-        bool is_written = RULE == AS_BUILT || !meets_in_run(run, is_left);
-        Subtree own = s;
-        Sibling sibling;
-        if (!step_up(run, is_left, parent, s, sibling)) break;
-        uint count = s.last - s.first + 1;
-        float area = scaled_half_area(Box(s.child.lo, s.child.hi), area_scale);
-        float as_leaf = leaf_cost(c_i, area, count);
-        s.cost = inner_cost(c_t, area, s.cost, sibling.cost);
-        bool as_leaf_is_cheaper = collapses != 0 && as_leaf < s.cost;
-        s.child.index = as_leaf_is_cheaper ? s.first : parent;
-        s.child.count = as_leaf_is_cheaper ? count : 0;
-        if (HAS_AREAS) {
-            precise float area_of_both = own.area + sibling.area;
-            s.area = area_of_both;
-        }
-        if (RULE != AS_BUILT) {
-            bool swaps = false;
-            if (as_leaf_is_cheaper) s.weight = weight_of_leaf(s.area, area, count, c_i);
-            else s.weight = weight_of_node(is_left, area, own, sibling, area_scale, swaps);
-            place_children(run, parent, is_left, is_written, swaps, own.child, sibling.child);
-        }
-        if (as_leaf_is_cheaper) {
-            s.cost = as_leaf;
-            unused += free_slots(structure, s.first, s.last);
+// The records of a run, and its leaves. Those behind all active primitives are in no leaf.
+void write_leaves(Run run) {
+    uvec2 records = records_of_tree();
+    Geometry input_geometries = geometries();
+    Words order = sorted_values();
+    uvec2 code = code_of_first(run);
+    uint before = run.before;
+    uint end = min(run.begin + ITEMS, primitive_count);
+    for (uint position = run.begin; position < end; ++position) {
+        Box b;
+        Corners c;
+        write_reference(records, position, input_geometries, order.word[position], b, c);
+        if (position < run.end) {
+            float area = scaled_half_area(b, run.area_scale);
+            Weighed own;
+            own.child = Child(b.lo, position, b.hi, 1u);
+            own.cost = leaf_cost(c_i, area, 1u);
+            own.weight = ChildWeight(Weight(0.0, 0.0), 0.0);
+            if (RULE != AS_BUILT) {
+                own.weight.area = area_of_primitive(c, area, run.area_scale);
+                own.weight.weight = weight_of_leaf(own.weight.area, area, 1u, c_i);
+            }
+            uint behind = split_to_next(run.codes, position, run.active_count, code);
+            keep_leaf(run, position, behind, place(run, Subtree(position, position, before, behind), own));
+            before = behind;
         }
     }
 }
 
 void lbvh_hierarchy(uint task) {
-    uvec2 records = records_of_tree();
-    Geometry input_geometries = geometries();
-    float area_scale = build_state().plan.area_scale;
-    Words order = sorted_values();
     Run run = run_of(task);
-    uint position = run.first;
-    uint end = min(position + ITEMS, primitive_count);
-    uint unused = 0;
-    for (uint turn = 0; turn < TURNS; ++turn) {
-        begin_turn(run, turn);
-        uint split = gl_LocalInvocationIndex;
-        // First the leaves of the run; then what waits, last first; in the second turn what is left over.
-        while (true) {
-            Subtree s;
-            bool climbs = true;
-            if (position < end) {
-                Box b;
-                Corners c;
-                write_reference(records, position, input_geometries, order.word[position], b, c);
-                climbs = position < run.active_count;
-                if (climbs) begin_leaf(run, s);
-                s.child = Child(b.lo, position, b.hi, 1);
-                float area = scaled_half_area(b, area_scale);
-                s.cost = leaf_cost(c_i, area, 1);
-                if (RULE != AS_BUILT && climbs) {
-                    s.area = area_of_primitive(c, area, area_scale);
-                    s.weight = weight_of_leaf(s.area, area, 1u, c_i);
-                }
-                position++;
-            } else if (run.waiting > 0) {
-                s = take_waiting(run);
-            } else if (!MEETS_IN_GROUP || turn == 0 || !take_left_over(run, split, s)) {
-                break;
-            }
-            if (climbs) climb(run, area_scale, s, unused);
-        }
-        end_turn();
-    }
-    unused = subgroupAdd(unused);
-    if (unused > 0 && subgroupElect()) atomicAdd(run.structure.header.inner_nodes, -unused);
+    write_leaves(run);
+    join_in_run(run);
+    join_beyond_run(run);
+    uint freed = subgroupAdd(run.freed);
+    if (freed > 0u && subgroupElect()) atomicAdd(run.structure.header.inner_nodes, -freed);
 }
 #endif

@@ -38,4 +38,15 @@ uint split_behind(Words codes, uint i, uint active_count) {
 uint split_before(Words codes, uint i) {
     return i > 0u ? bit_between(codes, i - 1u, i) : NO_SPLIT;
 }
+
+// Of the split behind position i, whose code is given and becomes that of the next.
+uint split_to_next(Words codes, uint i, uint active_count, inout uvec2 code) {
+    uint split = NO_SPLIT;
+    if (i + 1u < active_count) {
+        uvec2 next = code_at(codes, i + 1u);
+        split = highest_bit(code, next, i, i + 1u);
+        code = next;
+    }
+    return split;
+}
 #endif

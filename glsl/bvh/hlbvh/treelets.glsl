@@ -10,70 +10,90 @@
 const uint RULE = 0;
 #include "bvh/run.glsl"
 
-// Whether a subtree has no parent, or one that is not a treelet: one that splits at a bit that treelets share, or has too many
-// primitives. Its positions begin (or end) where the subtree's do, and share all bits of the code above the one that it splits at.
-bool is_treelet(Run run, bool is_left, Subtree s) {
-    if (s.first == 0u && s.last + 1u == run.active_count) return true;
-    uint split = is_left ? s.behind : s.before;
-    if (split >= POSITION_WORD_BITS + kind_of_codes().bits - treelet_bits()) return true;
+// Whether a subtree is not all there is and splits off its sibling at a bit that treelets do not share.
+bool parent_shares_bits(Run run, Subtree s) {
+    return min(s.before, s.behind) < POSITION_WORD_BITS + kind_of_codes().bits - treelet_bits();
+}
+
+// Whether the parent has too many primitives. Its positions begin (or end) where the subtree's do, and share all bits of the code above
+// the one that it splits at.
+bool parent_is_too_large(Run run, Subtree s) {
+    bool is_left = is_left_child(s);
     uint most = min(TREELET_PRIMITIVES, run.active_count);
     uint from = is_left ? s.first : max(s.last, most) - most;
     uint to = from + most;
     if (to >= run.active_count || (!is_left && to != s.last)) return false;
-    return bit_between(run.codes, from, to) <= split;
+    return bit_between(run.codes, from, to) <= (is_left ? s.behind : s.before);
 }
 
-void climb(inout Run run, Weights w, float area_scale, Subtree s) {
-    // As many levels as there are primitives, at most.
-    for (uint level = 0; level < run.active_count; ++level) {
+// Until the node of this slot is there, its counts hold what the treelet that ends there is to hlbvh_gather().
+void write_treelet(uint last, Weighed own) {
+    weights().counts.node[last] = NodeCounts(reference_of(own.child), floatBitsToUint(own.cost));
+}
+
+// Writes what is known of a subtree where it belongs; returns whether it is a treelet.
+bool place(Run run, Subtree s, Weighed own) {
+    bool is_treelet = !parent_shares_bits(run, s);
+    if (is_treelet) {
+        write_treelet(s.last, own);
+    } else {
         bool is_left = is_left_child(s);
-        if (is_treelet(run, is_left, s)) {
-            // Until the node of this slot is there, its counts hold what the treelet is to hlbvh_gather().
-            w.counts.node[s.last] = NodeCounts(reference_of(s.child), floatBitsToUint(s.cost));
-            break;
-        }
         uint parent = parent_of(s, is_left);
-        w.parents.word[parent_at(reference_of(s.child))] = 2u * parent + (is_left ? 0u : 1u);
-        Sibling sibling;
-        if (!step_up(run, is_left, parent, s, sibling)) break;
-        // No treelet ends there, which siblings that met within the run have not said yet.
-        run.ends.word[parent] = s.first;
-        s.child.index = parent;
-        s.child.count = 0u;
-        float area = scaled_half_area(Box(s.child.lo, s.child.hi), area_scale);
-        vec2 costs = is_left ? vec2(s.cost, sibling.cost) : vec2(sibling.cost, s.cost);
-        s.cost = weigh_node(w, parent, uvec2(parent + 1u - s.first, s.last - parent), costs, area);
+        weights().parents.word[parent_at(reference_of(own.child))] = 2u * parent + (is_left ? 0u : 1u);
+        write_child(run, parent, is_left, own);
+    }
+    return is_treelet;
+}
+
+// Makes the node of a subtree of its two children at `slot`, and places it; if it has too many primitives, both are treelets.
+bool join(inout Run run, uint slot, Subtree s) {
+    Weighed left = child_at(run, slot, true), right = child_at(run, slot, false);
+    bool is_too_large = s.last - s.first >= TREELET_PRIMITIVES;
+    bool has_ended = true;
+    if (is_too_large) {
+        write_treelet(slot, left);
+        write_treelet(s.last, right);
+    } else {
+        // No treelet ends there.
+        run.ends.word[slot] = s.first;
+        Weighed own;
+        own.child = Child(min(left.child.lo, right.child.lo), slot, max(left.child.hi, right.child.hi), 0u);
+        float area = scaled_half_area(Box(own.child.lo, own.child.hi), run.area_scale);
+        own.cost = weigh_node(weights(), slot, uvec2(slot + 1u - s.first, s.last - slot), vec2(left.cost, right.cost), area);
+        own.weight = ChildWeight(Weight(0.0, 0.0), 0.0);
+        has_ended = place(run, s, own);
+    }
+    return has_ended;
+}
+
+// Of subtrees whose siblings are in the run, `join` finds out.
+bool ends_at(Run run, Subtree s) {
+    bool is_treelet = parent_is_too_large(run, s);
+    if (is_treelet) {
+        bool is_left = is_left_child(s);
+        write_treelet(s.last, child_at(run, parent_of(s, is_left), is_left));
+    }
+    return is_treelet;
+}
+
+void write_leaves(Run run) {
+    Geometry input_geometries = geometries();
+    uvec2 code = code_of_first(run);
+    uint before = run.before;
+    for (uint position = run.begin; position < run.end; ++position) {
+        Cluster c = cluster_of_primitive(input_geometries, position, run.area_scale);
+        Weighed own = Weighed(child_of(c), c.cost, ChildWeight(Weight(0.0, 0.0), 0.0));
+        uint behind = split_to_next(run.codes, position, run.active_count, code);
+        keep_leaf(run, position, behind, place(run, Subtree(position, position, before, behind), own));
+        before = behind;
     }
 }
 
 void hlbvh_treelets(uint task) {
-    Weights w = weights();
-    Geometry input_geometries = geometries();
-    float area_scale = build_state().plan.area_scale;
     Run run = run_of(task);
-    uint position = run.first;
-    uint end = min(position + ITEMS, run.active_count);
-    for (uint turn = 0; turn < TURNS; ++turn) {
-        begin_turn(run, turn);
-        uint split = gl_LocalInvocationIndex;
-        // First the leaves of the run; then what waits, last first; in the second turn what is left over.
-        for (uint taken = 0; taken < 2u * ITEMS; ++taken) {
-            Subtree s;
-            if (position < end) {
-                Cluster c = cluster_of_primitive(input_geometries, position, area_scale);
-                begin_leaf(run, s);
-                s.child = child_of(c);
-                s.cost = c.cost;
-                position++;
-            } else if (run.waiting > 0u) {
-                s = take_waiting(run);
-            } else if (!MEETS_IN_GROUP || turn == 0u || !take_left_over(run, split, s)) {
-                break;
-            }
-            climb(run, w, area_scale, s);
-        }
-        end_turn();
-    }
+    write_leaves(run);
+    join_in_run(run);
+    join_beyond_run(run);
 }
 
 // ---- count, scan, gather ----
