@@ -58,7 +58,7 @@ SUITE := $(WITHIN) $(if $(NEXTEST),scripts/suite.sh $(FEATURES),$(CARGO) test --
 TUNED_TESTS ?= package(hedgerow) & !test(/^(warming|bvh::heuristics|bvh::host|kdtree::host|kdtree::merge)::/)
 TUNED := $(if $(NEXTEST),'$(TUNED_TESTS)')
 # What depends on how many lanes a subgroup has: groups of `hedgerow check`.
-WIDTH_GROUPS := scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,child-order,ray-counts,kd-build,kd-merge,trace,trace-kd
+WIDTH_GROUPS ?= scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,child-order,ray-counts,kd-build,kd-merge,trace,trace-kd
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
 .PHONY: bench bench-all bench-peers stability test test-gpu test-lanes test-wgpu check package portable install-c setup test-drivers
