@@ -169,7 +169,7 @@ bool put_off(inout Run run, Subtree s, bool has_ended) {
     if (!joins) {
         uint word = s.first - run.begin << SPLIT_BITS | s.before;
         run_words[run_slot(run.waiting++)] = word | (has_ended ? HAS_ENDED : 0u);
-        // What waits before it are left siblings of what is around it, if the climb has ended; if not, there is nothing.
+        // Before a right one nothing waits for a sibling of the run. What waits before one that has ended will have none: `ends_at` says so.
         if (has_ended || !is_left) run.left_over = run.waiting;
     }
     return !joins;
