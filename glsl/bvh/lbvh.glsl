@@ -66,7 +66,7 @@ bool join(inout Run run, uint slot, Subtree s) {
     Weighed own;
     own.child = Child(b.lo, is_leaf ? s.first : slot, b.hi, is_leaf ? count : 0u);
     own.cost = is_leaf ? as_leaf : as_inner;
-    own.weight = ChildWeight(Weight(0.0, 0.0), 0.0);
+    own.weight = NO_WEIGHT;
     if (HAS_AREAS) {
         precise float area_of_both = left.weight.area + right.weight.area;
         own.weight.area = area_of_both;
@@ -110,14 +110,12 @@ void write_leaves(Run run) {
             Weighed own;
             own.child = Child(b.lo, position, b.hi, 1u);
             own.cost = leaf_cost(c_i, area, 1u);
-            own.weight = ChildWeight(Weight(0.0, 0.0), 0.0);
+            own.weight = NO_WEIGHT;
             if (RULE != AS_BUILT) {
                 own.weight.area = area_of_primitive(c, area, run.area_scale);
                 own.weight.weight = weight_of_leaf(own.weight.area, area, 1u, c_i);
             }
-            uint behind = split_to_next(run.codes, position, run.active_count, code);
-            keep_leaf(run, position, behind, place(run, Subtree(position, position, before, behind), own));
-            before = behind;
+            place_leaf(run, position, own, before, code);
         }
     }
 }

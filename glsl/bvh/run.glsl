@@ -8,7 +8,7 @@
 // the first, invocations meet in shared memory, as far as the workgroup's positions go, with fences for the workgroup alone. In the
 // second those subtrees go on whose siblings reach beyond it, a few for each level: they meet those of other workgroups.
 //
-// Includers define what is made of two siblings, and where a climb ends: `join` and `ends_at`.
+// Includers define what is made of two siblings, and where a climb ends: `place`, `join` and `ends_at`.
 #ifndef HEDGEROW_BVH_RUN
 #define HEDGEROW_BVH_RUN
 #include "bvh/build_state.glsl"
@@ -28,6 +28,8 @@ struct ChildWeight {
     Weight weight;
     float area;    // of its primitives
 };
+
+const ChildWeight NO_WEIGHT = ChildWeight(Weight(0.0, 0.0), 0.0);
 
 BUFFER ChildWeights { ChildWeight of[]; };
 
@@ -97,6 +99,8 @@ uint parent_of(Subtree s, bool is_left) {
     return is_left ? s.last : s.first - 1u;
 }
 
+// Writes what is known of a subtree where it belongs. Returns whether its climb ends there.
+bool place(Run run, Subtree s, Weighed own);
 // Makes the node at `slot` of its children, and writes it where it belongs. Returns whether the climb ends with it.
 bool join(inout Run run, uint slot, Subtree s);
 // Whether a subtree whose sibling is not in the run has none; then what is to be known of it is written.
@@ -143,7 +147,7 @@ Weighed child_at(Run run, uint slot, bool is_left) {
     Weighed w;
     w.child = run.children.child[child_number(slot, is_left)];
     w.cost = costs_of(run, is_left).value[slot];
-    w.weight = ChildWeight(Weight(0.0, 0.0), 0.0);
+    w.weight = NO_WEIGHT;
     if (HAS_WEIGHTS) w.weight = weights_of(run, is_left).of[slot];
     return w;
 }
@@ -158,8 +162,12 @@ uvec2 code_of_first(Run run) {
     return run.begin < run.end ? code_at(run.codes, run.begin) : uvec2(0u);
 }
 
-void keep_leaf(Run run, uint position, uint behind, bool has_ended) {
+// Places a leaf. The split before it and its code are given, and become those of the next.
+void place_leaf(Run run, uint position, Weighed own, inout uint before, inout uvec2 code) {
+    uint behind = split_to_next(run.codes, position, run.active_count, code);
+    bool has_ended = place(run, Subtree(position, position, before, behind), own);
     run_words[run_slot(position - run.begin)] = behind | (has_ended ? HAS_ENDED : 0u);
+    before = behind;
 }
 
 // Puts a subtree behind those that wait, unless its sibling is the last of them. Returns whether it did.

@@ -60,7 +60,7 @@ bool join(inout Run run, uint slot, Subtree s) {
         own.child = Child(min(left.child.lo, right.child.lo), slot, max(left.child.hi, right.child.hi), 0u);
         float area = scaled_half_area(Box(own.child.lo, own.child.hi), run.area_scale);
         own.cost = weigh_node(weights(), slot, uvec2(slot + 1u - s.first, s.last - slot), vec2(left.cost, right.cost), area);
-        own.weight = ChildWeight(Weight(0.0, 0.0), 0.0);
+        own.weight = NO_WEIGHT;
         has_ended = place(run, s, own);
     }
     return has_ended;
@@ -82,10 +82,8 @@ void write_leaves(Run run) {
     uint before = run.before;
     for (uint position = run.begin; position < run.end; ++position) {
         Cluster c = cluster_of_primitive(input_geometries, position, run.area_scale);
-        Weighed own = Weighed(child_of(c), c.cost, ChildWeight(Weight(0.0, 0.0), 0.0));
-        uint behind = split_to_next(run.codes, position, run.active_count, code);
-        keep_leaf(run, position, behind, place(run, Subtree(position, position, before, behind), own));
-        before = behind;
+        Weighed own = Weighed(child_of(c), c.cost, NO_WEIGHT);
+        place_leaf(run, position, own, before, code);
     }
 }
 
