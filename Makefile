@@ -129,7 +129,7 @@ test-drivers: setup
 check: setup
 	cargo fmt --all --check
 	$(CARGO) clippy --release --all-targets --features $(FEATURES) -- -D warnings
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --features $(FEATURES)
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --lib --examples --features $(FEATURES)
 
 package: setup
 	scripts/package.sh

@@ -1,7 +1,7 @@
 //! What rays win that teach reinsertion, on the device: work of the next frame's rays, over that after as many rounds by area.
 //!
-//! reinsertion_by_rays SCENE,… SHARE,… [ROUNDS [PASSES]]: an H-PLOC after so many passes by area, finished; on copies of it so many rounds
-//! by area and by each share of rays. Or reinsertion_by_rays ANIMATION,… probe EVERY PASSES.
+//! `reinsertion_by_rays SCENE,… SHARE,… [ROUNDS [PASSES]]`: an H-PLOC after so many passes by area, finished; on copies of it so many rounds
+//! by area and by each share of rays. Or `reinsertion_by_rays ANIMATION,… probe EVERY PASSES`.
 
 mod frames;
 mod probe;
