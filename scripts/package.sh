@@ -29,13 +29,14 @@ if [ "$bytes" -gt "$MOST_BYTES" ]; then
 fi
 
 unpacked=$target/package/unpacked
-rm -rf "$unpacked" "$target/package/without" "$target/package/with"
+rm -rf "$unpacked" "$target/package/built"
 mkdir -p "$unpacked"
 tar -xzf "$package" -C "$unpacked" --strip-components 1
-build() { (cd "$unpacked" && "$cargo" build --release --offline --target-dir "$@"); }
+# Without the compiler first: what it alone depends on is not there yet.
+build() { (cd "$unpacked" && "$cargo" build --release --offline --target-dir "$target/package/built" "$@"); }
 SECONDS=0
-build "$target/package/without"
+build
 printf 'package: built without the compiler in %s s\n' "$SECONDS"
 SECONDS=0
-build "$target/package/with" --features compile-shaders
+build --features compile-shaders
 printf 'package: built with the compiler in %s s\n' "$SECONDS"
