@@ -17,9 +17,18 @@ struct Cluster {
 // They lie at multiples of 8, so that src/gpu/longs.rs may take two words at a time.
 layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Clusters { Cluster cluster[]; };
 
+// In units of 8 bytes.
+const uint NODE_EIGHTHS = 8;
+const uint LEAF_BOX_EIGHTHS = 3;
+
+// In place of records they lie behind all boxes of leaves, of which there are more than nodes where many triangles are left out. A single
+// cluster may lie anywhere.
 Clusters all_clusters() {
-    if (CLUSTERS_IN_RECORDS) return Clusters(records_of_tree());
-    return Clusters(part(parts.clusters));
+    if (!CLUSTERS_IN_RECORDS) return Clusters(part(parts.clusters));
+    if (!HAS_PAIRS) return Clusters(records_of_tree());
+    uint slots = Structure(structure_address).header.node_slots;
+    uint begin = build_state().active_count < 2u ? 0u : max(NODE_EIGHTHS * slots, LEAF_BOX_EIGHTHS * primitive_count);
+    return Clusters(address_of(uvec2(leaf_boxes()), begin, 8u));
 }
 
 // The cluster of the primitive at a sorted position.

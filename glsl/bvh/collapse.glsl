@@ -257,6 +257,7 @@ void collapse_place(uint task) {
     Weights w = weights();
     Placed placed = Placed(0u, false);
     uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+    if (HAS_PAIRS && first == 0u && active_count < 2u) mark_unused(structure, 0u);
     for (uint k = 0; k < ITEMS; ++k) {
         uint i = first + k * gl_WorkGroupSize.x;
         if (i < active_count) place_primitive(structure, w, i, placed);

@@ -12,7 +12,7 @@
 //                                                      values[0] where nothing is sorted
 //   (sort      reads keys[0]                           writes keys[result], values[result]: gpu/radix_sort.glsl)
 //
-// Where triangles are paired (bvh/pairs.glsl), bounds writes which are, pair_count, and sums: pairs of each tile; plan makes of these those
+// Where triangles are paired (bvh/pairs.glsl), bounds writes which are, the boxes of leaves, pair_count, and sums: pairs of each tile; plan makes of these those
 // of all tiles before; encode reads both, writes keys[0] and values[0] of pairs and of what is alone without a gap, and only
 // those are sorted. Its tiles are those of bounds.
 //
@@ -149,9 +149,13 @@ void find_box(inout Found found, Box b, Box fences) {
     found.active_count += 1;
 }
 
-// Of a block: what the leaf with triangle k holds, if it is the first of one.
-void find_first(uint k, inout Found found, Box fences) {
-    if ((block_firsts & 1u << k) != 0u) find_box(found, block_box[k], fences);
+// Of a block that begins with this triangle: what the leaf with the one k behind it holds, if it is the first of one. Its box is kept.
+void find_first(uint k, uint begin, inout Found found, Box fences) {
+    bool is_first = (block_firsts & 1u << k) != 0u;
+    if (is_first) find_box(found, block_box[k], fences);
+    Box kept = block_box[k];
+    if (!is_first) kept.lo.x = uintBitsToFloat(0x7F800000u);
+    if (begin + k < primitive_count) leaf_boxes().box[begin + k] = kept;
 }
 
 shared uint pairs_of_tile;
@@ -179,8 +183,10 @@ uint find_pairs(uint task, inout Found found, Box fences) {
         blocks_of_pairs().word[block] = pair_block();
         pairs += bitCount(block_seconds);
         // No loop: see `pair_block`.
-        find_first(0, found, fences); find_first(1, found, fences); find_first(2, found, fences); find_first(3, found, fences);
-        find_first(4, found, fences); find_first(5, found, fences); find_first(6, found, fences); find_first(7, found, fences);
+        uint first = block * PAIR_BLOCK;
+        find_first(0, first, found, fences); find_first(1, first, found, fences); find_first(2, first, found, fences);
+        find_first(3, first, found, fences); find_first(4, first, found, fences); find_first(5, first, found, fences);
+        find_first(6, first, found, fences); find_first(7, first, found, fences);
     }
     tell_pairs(task, pairs);
     return status;
@@ -283,7 +289,8 @@ void write_header(BuildState state, uint slots, uint geometry_count, uint geomet
     structure.header.near_node = 0;
     structure.header.far_sides = 0;
     for (uint i = 0; i < 4; ++i) structure.header.reserved[i] = 0;
-    if ((HAS_PAIRS ? state.active_count : primitive_count) < 2) mark_unused(structure, 0);
+    // With pairs, boxes lie there now: bvh/collapse.glsl marks it.
+    if (!HAS_PAIRS && primitive_count < 2) mark_unused(structure, 0);
 }
 
 // Of bounds that hold something: an axis a lane, the others by one.

@@ -1,7 +1,8 @@
 // H-PLOC (Benthin et al. 2024): PLOC within each node of the radix tree, bottom-up in one pass. src/bvh/hploc.rs records it;
 // src/bvh/twin/hploc.rs is the twin.
 //
-//   hierarchy  reads the primitives, keys and values   writes nodes, root, costs, weights; scratch: clusters
+//   begin      reads the primitives and values         writes scratch: clusters
+//   hierarchy  reads clusters and keys                 writes nodes, root, costs, weights; scratch: clusters
 //   (collapse: bvh/collapse.glsl)
 //
 // Each invocation climbs the radix tree from a run of positions; of two siblings the second to arrive goes on. What it meets
@@ -84,13 +85,32 @@ struct Rest {
     uint waiting;        // left children in the slots of the run
 };
 
-// What an invocation climbs from next: a leaf of its run, or then what waits there, last first. Outputs whether there is anything.
+// The next leaves of a run that are a subtree by themselves: as many as need no merging, so that no step is taken for each.
+Range take_leaves(inout Rest rest) {
+    uint first = rest.position, inside = 0u;
+    uint behind = run_words[run_slot(first - rest.base)];
+    Range s = Range(first, first, 1u, rest.behind, behind);
+    bool goes_on = true;
+    for (uint k = 1; k < HALF_WINDOW && k < ITEMS; ++k) {
+        inside = max(inside, behind);
+        goes_on = goes_on && first + k < rest.end && inside < s.before;
+        if (goes_on) behind = run_words[run_slot(first + k - rest.base)];
+        if (goes_on && inside < behind) {
+            s.last = first + k;
+            s.behind = behind;
+        }
+    }
+    s.clusters = s.last - first + 1u;
+    rest.position = s.last + 1u;
+    rest.behind = s.behind;
+    return s;
+}
+
+// What an invocation climbs from next: leaves of its run, or then what waits there, last first. Outputs whether there is anything.
 bool begin_next(inout Rest rest, out Range s) {
     s = Range(0u, 0u, 0u, 0u, 0u);
     if (rest.position < rest.end) {
-        s = Range(rest.position, rest.position, 1u, rest.behind, run_words[run_slot(rest.position - rest.base)]);
-        rest.position++;
-        rest.behind = s.behind;
+        s = take_leaves(rest);
         return true;
     }
     if (rest.waiting == 0u) return false;
@@ -144,18 +164,29 @@ bool step_up(Words codes, uint active_count, inout Rest rest, inout Range s, ino
     return is_there;
 }
 
-// Each primitive of a run as a cluster of its own, and the split behind it. Outputs the split before the run.
-uint begin_run(Words codes, uint active_count, uint run, uint end) {
+// Each primitive as a cluster of its own.
+void hploc_begin(uint task) {
     Clusters clusters = all_clusters();
     Words list = cluster_list();
     Geometry input_geometries = geometries();
     float area_scale = build_state().plan.area_scale;
+    uint active_count = build_state().active_count;
+    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint position = first + k * gl_WorkGroupSize.x;
+        if (position < active_count) {
+            clusters.cluster[position] = cluster_of_primitive(input_geometries, position, area_scale);
+            list.word[position] = position;
+        }
+    }
+}
+
+// The splits behind all positions of a run. Outputs the split before it.
+uint begin_run(Words codes, uint active_count, uint run, uint end) {
     if (run >= end) return NO_SPLIT;
     uint before = split_before(codes, run);
     uvec2 code = code_at(codes, run);
     for (uint position = run; position < end; ++position) {
-        clusters.cluster[position] = cluster_of_primitive(input_geometries, position, area_scale);
-        list.word[position] = position;
         run_words[run_slot(position - run)] = split_to_next(codes, position, active_count, code);
     }
     return before;

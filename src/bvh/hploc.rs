@@ -94,9 +94,10 @@ impl Merging {
 impl Hierarchy for &Merging {
     fn steps(&self, encode: &Encode, input: &Input, arguments: &arguments::Build) -> Vec<Step> {
         let workgroup = encode.shape.workgroup.min(self.group);
-        let kernel = self.kernel(encode, &shaders::BVH_HPLOC_HIERARCHY, input, workgroup);
         let groups = encode.count.div_ceil(workgroup * encode.items);
-        vec![Step::new("hierarchy", kernel, arguments, groups)]
+        let begin = encode.reading_kernel(&shaders::BVH_HPLOC_BEGIN, input).in_workgroups_of(workgroup);
+        let hierarchy = self.kernel(encode, &shaders::BVH_HPLOC_HIERARCHY, input, workgroup);
+        [begin, hierarchy].map(|kernel| Step::new("hierarchy", kernel, arguments, groups)).into()
     }
 
     fn persistent(&self, encode: &Encode, input: &Input, shader: &'static Shader) -> [Kernel; 2] {

@@ -16,9 +16,10 @@ void main() {
         pool_take(pool, cursor);
         if (!cursor.working) break;
         if (cursor.phase < sorted) encode_from_pool(cursor.phase, cursor.task);
-        else if (cursor.phase == sorted) hploc_hierarchy(cursor.task);
-        else if (cursor.phase == sorted + 1u) collapse_above(cursor.task);
-        else if (cursor.phase == sorted + 2u) collapse_place(cursor.task);
+        else if (cursor.phase == sorted) hploc_begin(cursor.task);
+        else if (cursor.phase == sorted + 1u) hploc_hierarchy(cursor.task);
+        else if (cursor.phase == sorted + 2u) collapse_above(cursor.task);
+        else if (cursor.phase == sorted + 3u) collapse_place(cursor.task);
         else collapse_records(cursor.task);
         pool_finish(pool);
     }

@@ -6,6 +6,6 @@
 #include "bvh/encode.glsl"
 
 void main() {
-    // Hierarchy, and three of the collapse.
-    reset_build(4);
+    // Two of the hierarchy, and three of the collapse.
+    reset_build(5);
 }

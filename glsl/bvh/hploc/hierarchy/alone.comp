@@ -6,6 +6,8 @@
 void main() {
     uint tile = gl_WorkGroupSize.x * ITEMS;
     uint tiles = (primitive_count + tile - 1u) / tile;
+    for (uint task = 0; task < tiles; ++task) hploc_begin(task);
+    next_phase();
     for (uint task = 0; task < tiles; ++task) {
         hploc_hierarchy(task);
         next_phase();
