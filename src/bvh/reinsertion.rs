@@ -187,7 +187,8 @@ impl Reinsertion {
         // As many invocations as the grid has, in workgroups small enough for their stacks.
         let groups = tuning.grid.groups * (tuning.grid.workgroup / tuning.small_group).max(1);
         let groups = groups.min(context.limits.workgroup_count);
-        let grid = Grid { workgroup: tuning.small_group, groups, rounds: tuning.build.reinsertion_rounds };
+        let rounds = tuning.build.reinsertion_rounds;
+        let grid = Grid { workgroup: tuning.small_group, groups, rounds, ..tuning.grid };
         let bytes = ENTRY_BYTES * tuning.small_group;
         let shared = tuning.build.reinsertion_shared.min(context.limits.shared_memory / bytes).min(STACK as u32);
         let slots = node_slots(primitive_count);
@@ -237,7 +238,7 @@ impl Reinsertion {
     }
 
     fn kernel(&self, shader: &'static shaders::Shader, by_rays: bool, areas: Areas) -> Kernel {
-        Kernel::new(shader, self.grid.workgroup, &[self.grid.rounds, self.shared, by_rays.into(), areas as u32])
+        Kernel::new(shader, self.grid.workgroup, &[self.grid.word(), self.shared, by_rays.into(), areas as u32])
     }
 
     /// Records all rounds on `structure`, in place, with scratch memory of [`Reinsertion::scratch_bytes`]; both aligned

@@ -13,7 +13,13 @@ pub struct Grid {
     pub groups: u32,
     /// Items of an invocation in a piece.
     pub rounds: u32,
+    /// Whether the first pieces go to workgroups that lie far apart, for a driver that gives each core as many workgroups side by side: the
+    /// first core would have all that there is, where it is little. For that a dispatch has a power of two of them.
+    pub spread: bool,
 }
+
+/// `SPREAD_BIT` in `glsl/gpu/grid.glsl`.
+const SPREAD_BIT: u32 = 16;
 
 impl Grid {
     /// For a device. On a CPU few workgroups, as each costs its start even if there is nothing to do, and long pieces, as each is
@@ -24,11 +30,17 @@ impl Grid {
 
     /// Workgroups for `most` items at most: on a GPU, starting workgroups that find nothing costs more than small work does.
     pub fn groups_for(&self, most: u32) -> u32 {
-        most.div_ceil(self.workgroup.saturating_mul(self.rounds)).clamp(1, self.groups)
+        let groups = most.div_ceil(self.workgroup.saturating_mul(self.rounds)).clamp(1, self.groups);
+        if self.spread { 1 << groups.ilog2() } else { groups }
+    }
+
+    /// The constant 1 of kernels that take their items from the grid.
+    pub fn word(&self) -> u32 {
+        self.rounds | u32::from(self.spread) << SPREAD_BIT
     }
 
     /// The kernel of a shader that takes its items from the grid.
     pub fn kernel(&self, shader: &'static Shader) -> Kernel {
-        Kernel::new(shader, self.workgroup, &[self.rounds])
+        Kernel::new(shader, self.workgroup, &[self.word()])
     }
 }

@@ -193,7 +193,7 @@ impl Tuning {
         Tuning {
             group,
             small_group: group,
-            grid: Grid { workgroup: group, groups: limits.workgroup_count.min(64), rounds: 64 },
+            grid: Grid { workgroup: group, groups: limits.workgroup_count.min(64), rounds: 64, spread: true },
             reduce_rounds: 64,
             scan_rounds: 32,
             scan_each: 16,
@@ -259,7 +259,7 @@ impl Tuning {
             group,
             small_group,
             // Half a million invocations: a large GPU holds a quarter of a million at a time.
-            grid: Grid { workgroup: group, groups: limits.workgroup_count.min(2048), rounds: 4 },
+            grid: Grid { workgroup: group, groups: limits.workgroup_count.min(2048), rounds: 4, spread: false },
             reduce_rounds: 8,
             scan_rounds: 8,
             scan_each: 1,

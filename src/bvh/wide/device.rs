@@ -213,7 +213,7 @@ impl WidePass {
         // What `SOURCE_WORD` of glsl/bvh/geometry.glsl is without a value.
         let source_word = 0;
         let [by_hits, by_visits] = [by_hits, by_visits].map(u32::from);
-        let constants = [grid.rounds, form.width(), quantised, by_hits, source_word, by_visits];
+        let constants = [grid.word(), form.width(), quantised, by_hits, source_word, by_visits];
         Kernel::new(shader, workgroup, &constants)
     }
 
