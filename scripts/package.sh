@@ -32,7 +32,7 @@ unpacked=$target/package/unpacked
 rm -rf "$unpacked" "$target/package/built"
 mkdir -p "$unpacked"
 tar -xzf "$package" -C "$unpacked" --strip-components 1
-# Without the compiler first: what it alone depends on is not there yet.
+# Without the compiler first, while nothing that the compiler needs is there.
 build() { (cd "$unpacked" && "$cargo" build --release --offline --target-dir "$target/package/built" "$@"); }
 SECONDS=0
 build

@@ -43,9 +43,6 @@ struct BuildParts {
     uint pairs;                // of triangles that are one leaf: PAIR_BLOCK a word
 };
 
-// They lie at multiples of 8, so that src/gpu/longs.rs may take two words at a time.
-layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer LeafBoxes { Box box[]; };
-
 BUFFER BuildState {
     uint pool[POOL_WORDS];                // a PoolState
     uint boxes_lo[3];                     // `ordered` floats
@@ -182,21 +179,29 @@ uint spread_task(uint group) {
     return scaled(group + 1u, tasks, groups) > task ? task : NONE;
 }
 
-// Boxes of what leaves hold, by the first triangle, where triangles are paired: kept from the bounds to the first clusters, where nodes will
-// lie. Of triangles that are in no leaf, or in that of another, they begin at infinity.
+// Boxes of what leaves hold, by the first triangle, where triangles are paired. The bounds keep them where nodes will lie; the codes and the
+// first clusters load them. They lie at multiples of 8, so that src/gpu/longs.rs may take two words at a time.
+layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer LeafBoxes { Box box[]; };
+
 LeafBoxes leaf_boxes() {
     return LeafBoxes(records_at(structure_address, 0u));
 }
 
-bool is_box_of_leaf(Box b) {
-    return b.lo.x != uintBitsToFloat(0x7F800000u);
+// Where the box of a triangle begins that is in no leaf, or in that of another.
+float nowhere() {
+    return uintBitsToFloat(0x7F800000u);
+}
+
+void keep_box(uint triangle, Box b, bool is_of_leaf) {
+    if (!is_of_leaf) b.lo.x = nowhere();
+    leaf_boxes().box[triangle] = b;
 }
 
 // The box of what a leaf holds; returns 0, or why it is left out: a status bit or INACTIVE.
 uint load_reference(Geometry g, uint reference, out Box b) {
     if (HAS_PAIRS) {
         b = leaf_boxes().box[reference];
-        return is_box_of_leaf(b) ? 0u : INACTIVE;
+        return b.lo.x != nowhere() ? 0u : INACTIVE;
     }
     if (!HAS_REFERENCES) return load_box(g, reference, b);
     Reference r = References(part(parts.references)).reference[reference];

@@ -21,8 +21,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer C
 const uint NODE_EIGHTHS = 8;
 const uint LEAF_BOX_EIGHTHS = 3;
 
-// In place of records they lie behind all boxes of leaves, of which there are more than nodes where many triangles are left out. A single
-// cluster may lie anywhere.
+// In place of records they lie behind all boxes of leaves, which reach beyond the nodes where many triangles are left out. A single cluster
+// may lie on them, for nobody else reads a box any more; with one of two triangles there is no room behind.
 Clusters all_clusters() {
     if (!CLUSTERS_IN_RECORDS) return Clusters(part(parts.clusters));
     if (!HAS_PAIRS) return Clusters(records_of_tree());

@@ -12,9 +12,9 @@
 //                                                      values[0] where nothing is sorted
 //   (sort      reads keys[0]                           writes keys[result], values[result]: gpu/radix_sort.glsl)
 //
-// Where triangles are paired (bvh/pairs.glsl), bounds writes which are, the boxes of leaves, pair_count, and sums: pairs of each tile; plan makes of these those
-// of all tiles before; encode reads both, writes keys[0] and values[0] of pairs and of what is alone without a gap, and only
-// those are sorted. Its tiles are those of bounds.
+// Where triangles are paired (bvh/pairs.glsl), bounds writes which are, the boxes of leaves, pair_count, and sums: pairs of each tile; plan
+// makes of these those of all tiles before; encode reads all that, writes keys[0] and values[0] of pairs and of what is alone without a
+// gap, and only those are sorted. Its tiles are those of bounds.
 //
 // needs one barrier between each two, and before the first; subgroups of any size; workgroups of whole subgroups
 #ifndef HEDGEROW_BVH_ENCODE
@@ -153,9 +153,7 @@ void find_box(inout Found found, Box b, Box fences) {
 void find_first(uint k, uint begin, inout Found found, Box fences) {
     bool is_first = (block_firsts & 1u << k) != 0u;
     if (is_first) find_box(found, block_box[k], fences);
-    Box kept = block_box[k];
-    if (!is_first) kept.lo.x = uintBitsToFloat(0x7F800000u);
-    if (begin + k < primitive_count) leaf_boxes().box[begin + k] = kept;
+    if (begin + k < primitive_count) keep_box(begin + k, block_box[k], is_first);
 }
 
 shared uint pairs_of_tile;

@@ -44,3 +44,20 @@ impl Grid {
         Kernel::new(shader, self.workgroup, &[self.word()])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dispatch_has_as_many_workgroups_as_pieces_or_where_they_are_spread_the_power_of_two_below() {
+        let grid = Grid { workgroup: 8, groups: 48, rounds: 4, spread: false };
+        let spread = Grid { spread: true, ..grid };
+        for (most, pieces, power) in
+            [(0, 1, 1), (32, 1, 1), (33, 2, 2), (200, 7, 4), (1024, 32, 32), (u32::MAX, 48, 32)]
+        {
+            assert_eq!((grid.groups_for(most), spread.groups_for(most)), (pieces, power), "{most} items");
+        }
+        assert_eq!((grid.word(), spread.word()), (4, 4 | 1 << 16));
+    }
+}

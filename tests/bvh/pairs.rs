@@ -21,7 +21,18 @@ const PAIRS: BuildOptions = BuildOptions {
 };
 
 fn meshes() -> Vec<corpus::Mesh> {
-    [1, 2, 3, 9, 40].map(corpus::sheet).into_iter().chain(corpus::meshes()).collect()
+    let left_out = [0, 1, 2, 400].map(|kept| all_but_the_last_are_left_out(40, kept));
+    [1, 2, 3, 9, 40].map(corpus::sheet).into_iter().chain(left_out).chain(corpus::meshes()).collect()
+}
+
+/// Boxes of leaves are kept for all triangles, and reach beyond nodes where few of them have one.
+fn all_but_the_last_are_left_out(side: u32, kept: usize) -> corpus::Mesh {
+    let (name, mut positions, mut triangles) = corpus::sheet(side);
+    let nowhere = positions.len() as u32;
+    positions.push([f32::NAN; 3]);
+    let left_out = triangles.len() - kept;
+    triangles[..left_out].iter_mut().for_each(|triangle| triangle[2] = nowhere);
+    (format!("{name}, the last {kept}"), positions, triangles)
 }
 
 fn equals_the_host(options: &BuildOptions, schedules: &[Option<Schedule>]) {
