@@ -16,6 +16,7 @@
 #   make install-c     hedgerow.h and the libraries for C into PREFIX (/usr/local)
 #
 #   SETUP=true         go on without scripts/setup.sh       OUT=DIR        where reports go
+#   PROFILE=ci         what `make check` and the tests are compiled by in CI, in two thirds of the time
 #   BENCH="…"          further arguments of `hedgerow bench`, such as -b lbvh,ploc or --runs 3
 #   ACCEL="…"          the same of `hedgerow accel`, such as gen:city:1000 or --experiments batch,tlas
 #   STABILITY="…"      the same of `hedgerow stability growth` and `large`, such as sponza or --no-rays
@@ -28,17 +29,21 @@ ACCEL ?=
 STABILITY ?=
 PREFIX ?= /usr/local
 CARGO := scripts/cargo.sh
-RELEASE := $(or $(CARGO_TARGET_DIR),target)/release
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+RELEASE := $(TARGET)/release
 BIN := $(RELEASE)/hedgerow
+# What tests and lints are compiled by; `ci` compiles sooner (.cargo/config.toml).
+PROFILE ?= release
+TESTED := $(TARGET)/$(PROFILE)/hedgerow
 CACHE := $(or $(HEDGEROW_CACHE),$(HOME)/.cache/hedgerow)
 MESA := $(CACHE)/mesa26
 SWIFTSHADER := $(CACHE)/swiftshader
 # Where `make test-wgpu` puts its pictures.
-WGPU := $(or $(CARGO_TARGET_DIR),target)/wgpu
+WGPU := $(TARGET)/wgpu
 # The ICD file of the second driver; another one may be named.
 SECOND_DRIVER := $(or $(HEDGEROW_SECOND_DRIVER),$(SWIFTSHADER)/swiftshader.json)
 ON_SECOND = VK_DRIVER_FILES=$(SECOND_DRIVER) VK_ICD_FILENAMES=$(SECOND_DRIVER) $(WITHIN) \
-	$(CARGO) test --release --features $(FEATURES) --test main --
+	$(CARGO) test --profile $(PROFILE) --features $(FEATURES) --test main --
 comma := ,
 EMBREE_BUILDERS := ,embree-low,embree-medium,embree-high,embree-medium-tree,embree-high-tree
 # The CPU peers that can be built here: Embree where it is installed (scripts/setup.sh --peers). The same features
@@ -53,7 +58,7 @@ QUICK_SCENES := scenes/hall.glb scenes/pine_hill.inst gen:city:280
 TEST_BOUND ?= 3000
 WITHIN := $(if $(shell command -v timeout),timeout --kill-after 10 $(TEST_BOUND))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
-SUITE := $(WITHIN) $(if $(NEXTEST),scripts/suite.sh $(FEATURES),$(CARGO) test --release --features $(FEATURES))
+SUITE := $(WITHIN) $(if $(NEXTEST),scripts/suite.sh $(PROFILE) $(FEATURES),$(CARGO) test --profile $(PROFILE) --features $(FEATURES))
 # What the tuning changes: tests of the library on the device. (Warming tests both tunings by itself; the others named are of the host.)
 TUNED_TESTS ?= package(hedgerow) & !test(/^(warming|bvh::heuristics|bvh::host|kdtree::host|kdtree::merge)::/)
 TUNED := $(if $(NEXTEST),'$(TUNED_TESTS)')
@@ -89,20 +94,20 @@ stability: setup
 	$(BIN) stability greedy -o $(OUT)
 
 test: setup
-	$(CARGO) test --release --features $(FEATURES) --no-run
+	$(CARGO) test --profile $(PROFILE) --features $(FEATURES) --no-run
 	$(SUITE)
-	$(if $(NEXTEST),$(WITHIN) $(CARGO) test --release --features $(FEATURES) --doc)
+	$(if $(NEXTEST),$(WITHIN) $(CARGO) test --profile $(PROFILE) --features $(FEATURES) --doc)
 
 # What `make test` has on a CPU is its tuning, and subgroups of 8 on most machines. Every branch for GPUs runs here, and other
 # subgroups: lavapipe alone reads the width.
 test-gpu: setup
-	$(CARGO) test --release --features $(FEATURES) --no-run
+	$(CARGO) test --profile $(PROFILE) --features $(FEATURES) --no-run
 	HEDGEROW_TUNING=gpu LP_NATIVE_VECTOR_WIDTH=128 $(SUITE) $(TUNED)
-	LP_NATIVE_VECTOR_WIDTH=512 $(BIN) check --quick --tuning gpu --groups $(WIDTH_GROUPS)
+	LP_NATIVE_VECTOR_WIDTH=512 $(TESTED) check --quick --tuning gpu --groups $(WIDTH_GROUPS)
 
 # lavapipe alone reads these variables.
 test-lanes: setup
-	$(CARGO) test --release --features $(FEATURES) --no-run
+	$(CARGO) test --profile $(PROFILE) --features $(FEATURES) --no-run
 	for tuning in cpu gpu; do for lanes in LP_NATIVE_VECTOR_WIDTH=128 LP_NATIVE_VECTOR_WIDTH=256 LP_NATIVE_VECTOR_WIDTH=512 LP_NUM_THREADS=1; do \
 		env HEDGEROW_TUNING=$$tuning $$lanes $(SUITE) || exit 1; done; done
 
@@ -120,19 +125,19 @@ test-wgpu: setup
 # One process for all passes: SwiftShader compiles every pipeline anew in each. Small builds that share dispatches have a run of their own.
 test-drivers: setup
 	$(if $(HEDGEROW_SECOND_DRIVER),,scripts/second-driver.sh $(SWIFTSHADER))
-	$(CARGO) test --release --features $(FEATURES) --test main --no-run
+	$(CARGO) test --profile $(PROFILE) --features $(FEATURES) --test main --no-run
 	$(ON_SECOND) drivers:: --ignored --nocapture
 	$(ON_SECOND) accel::arguments
 	scripts/peer-lavapipe.sh $(MESA)
-	scripts/with-lavapipe.sh $(MESA) $(BIN) check --quick
+	scripts/with-lavapipe.sh $(MESA) $(TESTED) check --quick
 
 check: setup
 	cargo fmt --all --check
-	$(CARGO) clippy --release --all-targets --features $(FEATURES) -- -D warnings
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --lib --examples --features $(FEATURES)
+	$(CARGO) clippy --profile $(PROFILE) --all-targets --features $(FEATURES) -- -D warnings
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --profile $(PROFILE) --no-deps --lib --examples --features $(FEATURES)
 
 package: setup
-	scripts/package.sh
+	scripts/package.sh $(PROFILE)
 
 portable: setup
 	@test "$(OUT)" != report || { echo "make portable: OUT=DIR names the folder to make" >&2; exit 2; }

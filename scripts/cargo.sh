@@ -23,7 +23,7 @@ fi
 built() { ls -t "$target"/*/build/shaderc-sys-*/out/lib/$library 2>/dev/null | head -n 1; }
 if [ ! -e "$SHADERC_LIB_DIR/$library" ] && [ -z "$(built)" ] && [ -d "$target" ]; then
   # A target folder that outlived the cache still points to the library there.
-  cargo clean --quiet --release -p shaderc-sys 2>/dev/null || true
+  for profile in release ci; do cargo clean --quiet --profile "$profile" -p shaderc-sys 2>/dev/null || true; done
 fi
 status=0
 cargo "$@" || status=$?

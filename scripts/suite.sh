@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# The test suite by cargo-nextest, a process a test: scripts/suite.sh FEATURES [FILTER]. The Makefile calls it, under a bound.
+# The test suite by cargo-nextest, a process a test: scripts/suite.sh PROFILE FEATURES [FILTER]. The Makefile calls it, under a bound.
 #
 # Without a cache lavapipe compiles for longer than tests run; what it has compiled, later processes find. Tests of one module need
 # the same shaders, and side by side would compile them twice. So a core takes a part of the suite at a time, whose tests run one
 # after another. What a part has printed is shown when it ends; which parts failed, at the end.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-features=$1 filter=${2:-all()}
+profile=$1 features=$2 filter=${3:-all()}
 
 # The longest first. The last has the quick check, which runs every pass: most are compiled by then.
 parts=(bvh accel conditional kdtree trace others lab)
@@ -29,7 +29,7 @@ run_part() {
   local status=0 levels=(--final-status-level skip)
   # Tests of other parts count as skipped; which cannot run here, and why, is listed with the conditional ones.
   [ "$1" = conditional ] || levels=(--final-status-level slow)
-  scripts/cargo.sh nextest run --release --features "$features" --no-tests pass -j $((cores / at_once)) "${levels[@]}" \
+  scripts/cargo.sh nextest run --cargo-profile "$profile" --features "$features" --no-tests pass -j $((cores / at_once)) "${levels[@]}" \
     -E "($(filter_of "$1")) & ($filter)" >"$output/$1" 2>&1 || status=$?
   [ $status = 0 ] || touch "$output/$1.failed"
   printf '== tests: %s\n' "$1"

@@ -83,17 +83,13 @@ fn top_down(by: &impl SplitCost, items: Vec<Item>, scale: f32, rule: LeafRule<'_
 }
 
 /// The tree over references to `items`.
-fn split_tree<C, B>(
+fn split_tree(
     items: Vec<Item>,
-    scene: &sbvh::Scene<'_, C, B>,
+    scene: &sbvh::Scene<'_>,
     rule: LeafRule<'_>,
     options: &SbvhOptions,
     by: &Prepared<'_>,
-) -> sbvh::SplitTree
-where
-    C: Fn(u32) -> Option<[[f32; 3]; 3]> + Sync,
-    B: Fn(u32) -> Bounds + Sync,
-{
+) -> sbvh::SplitTree {
     match by {
         Prepared::Area => sbvh::build(&Area, items, scene, rule, options),
         Prepared::Rays(measure) => sbvh::build(&ByRays(&**measure), items, scene, rule, options),
@@ -139,7 +135,8 @@ fn build_on_thread<R: Record>(
     let (mut tree, numbered) = match method {
         HostMethod::Sbvh(of_sbvh) => {
             let corners = |primitive| record(primitive).corners();
-            let scene = sbvh::Scene { corners, bounds, around: &input.bounds, scale: input.item_scale };
+            let scene =
+                sbvh::Scene { corners: &corners, bounds: &bounds, around: &input.bounds, scale: input.item_scale };
             let sbvh::SplitTree { tree, references, is_split } =
                 split_tree(items, &scene, leaf_rule(options, &by), of_sbvh, &by);
             input.refer(references.len(), is_split);

@@ -272,13 +272,10 @@ impl Device {
     /// Submits what `record` records and waits for it. What it wrote may then be read by the host and by later submits. Returns how
     /// long that took.
     fn submit(&self, record: impl FnOnce(vk::CommandBuffer) -> Result<()>) -> Result<Duration> {
-        // SAFETY: the pool, buffer and fence are made, used and destroyed here.
+        // SAFETY: the pool is used by this call alone, and freed once what it recorded is done.
         unsafe {
-            let pool = self
-                .raw
-                .create_command_pool(&vk::CommandPoolCreateInfo::default().queue_family_index(self.queue_family), None)
-                .map_err(Error::vulkan("vkCreateCommandPool"))?;
-            let result = self.recorded(pool, record).and_then(|commands| self.submitted(commands));
+            let (pool, commands) = self.begun()?;
+            let result = record(commands).and_then(|()| self.submitted(commands));
             if !matches!(result, Err(Error::Timeout { .. })) {
                 self.raw.destroy_command_pool(pool, None);
             }
@@ -286,33 +283,38 @@ impl Device {
         }
     }
 
-    /// A command buffer of `pool`, ready to be submitted.
-    unsafe fn recorded(
-        &self,
-        pool: vk::CommandPool,
-        record: impl FnOnce(vk::CommandBuffer) -> Result<()>,
-    ) -> Result<vk::CommandBuffer> {
-        // SAFETY: as in `submit`.
+    /// A pool, and a command buffer of it that is recorded.
+    unsafe fn begun(&self) -> Result<(vk::CommandPool, vk::CommandBuffer)> {
+        // SAFETY: the device is live; the pool is destroyed on failure, or by `submit`.
         unsafe {
-            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
-            let commands =
-                self.raw.allocate_command_buffers(&info).map_err(Error::vulkan("vkAllocateCommandBuffers"))?[0];
-            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-            self.raw.begin_command_buffer(commands, &begin).map_err(Error::vulkan("vkBeginCommandBuffer"))?;
-            record(commands)?;
-            let visible = vk::AccessFlags::HOST_READ | vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE;
-            let barrier =
-                vk::MemoryBarrier::default().src_access_mask(vk::AccessFlags::MEMORY_WRITE).dst_access_mask(visible);
-            let before = vk::PipelineStageFlags::ALL_COMMANDS;
-            let after = vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::ALL_COMMANDS;
-            let no_flags = vk::DependencyFlags::empty();
-            self.raw.cmd_pipeline_barrier(commands, before, after, no_flags, &[barrier], &[], &[]);
-            self.raw.end_command_buffer(commands).map_err(Error::vulkan("vkEndCommandBuffer"))?;
-            Ok(commands)
+            let of_family = vk::CommandPoolCreateInfo::default().queue_family_index(self.queue_family);
+            let pool = self.raw.create_command_pool(&of_family, None).map_err(Error::vulkan("vkCreateCommandPool"))?;
+            let begin = || -> Result<vk::CommandBuffer> {
+                let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+                let commands =
+                    self.raw.allocate_command_buffers(&info).map_err(Error::vulkan("vkAllocateCommandBuffers"))?[0];
+                let once = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+                self.raw.begin_command_buffer(commands, &once).map_err(Error::vulkan("vkBeginCommandBuffer"))?;
+                Ok(commands)
+            };
+            let commands = begin().inspect_err(|_| self.raw.destroy_command_pool(pool, None))?;
+            Ok((pool, commands))
         }
     }
 
+    /// Ends what is recorded, submits it and waits.
     unsafe fn submitted(&self, commands: vk::CommandBuffer) -> Result<Duration> {
+        let visible = vk::AccessFlags::HOST_READ | vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE;
+        let barrier =
+            vk::MemoryBarrier::default().src_access_mask(vk::AccessFlags::MEMORY_WRITE).dst_access_mask(visible);
+        let before = vk::PipelineStageFlags::ALL_COMMANDS;
+        let after = vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::ALL_COMMANDS;
+        let no_flags = vk::DependencyFlags::empty();
+        // SAFETY: as in `submit`.
+        unsafe {
+            self.raw.cmd_pipeline_barrier(commands, before, after, no_flags, &[barrier], &[], &[]);
+            self.raw.end_command_buffer(commands).map_err(Error::vulkan("vkEndCommandBuffer"))?;
+        }
         if !self.submits {
             return Ok(Duration::ZERO);
         }

@@ -75,12 +75,15 @@ const SHORTEST_CUT: f32 = 1.0 / (1u64 << 60) as f32;
 const WHOLE: u32 = 1;
 const PART: u32 = 2;
 
-/// What a tree is built over besides its items.
-pub(super) struct Scene<'a, C, B> {
+type Corners = [[f32; 3]; 3];
+
+/// What a tree is built over besides its items. Its functions are called through pointers: this method is compiled for every
+/// heuristic, and would be for every kind of record besides.
+pub(super) struct Scene<'a> {
     /// The corners of a primitive that is a triangle.
-    pub corners: C,
+    pub corners: &'a (dyn Fn(u32) -> Option<Corners> + Sync),
     /// The box of a primitive.
-    pub bounds: B,
+    pub bounds: &'a (dyn Fn(u32) -> Bounds + Sync),
     /// The box around all primitives.
     pub around: &'a Aabb,
     /// What the lengths of the items were scaled by.
@@ -98,26 +101,19 @@ pub(super) struct SplitTree {
 }
 
 /// Whether any triangle of a tree over `items` may be split.
-pub(super) fn can_split<C, B>(items: &[Item], scene: &Scene<'_, C, B>, options: &SbvhOptions) -> bool
-where
-    C: Fn(u32) -> Option<[[f32; 3]; 3]>,
-{
+pub(super) fn can_split(items: &[Item], scene: &Scene<'_>, options: &SbvhOptions) -> bool {
     let is_triangle = |item: &Item| (scene.corners)(item.primitive()).is_some();
     options.alpha < 1.0 && is_in_reach(scene.around) && items.first().is_some_and(is_triangle)
 }
 
 /// The tree over `items`.
-pub(super) fn build<C, B>(
+pub(super) fn build(
     by: &impl SplitCost,
     items: Vec<Item>,
-    scene: &Scene<'_, C, B>,
+    scene: &Scene<'_>,
     rule: LeafRule<'_>,
     options: &SbvhOptions,
-) -> SplitTree
-where
-    C: Fn(u32) -> Option<[[f32; 3]; 3]> + Sync,
-    B: Fn(u32) -> Bounds + Sync,
-{
+) -> SplitTree {
     let room = ((f64::from(options.budget) - 1.0) * items.len() as f64) as usize;
     let corners = |primitive: u32| {
         let corners = (scene.corners)(primitive).expect("only triangles are split");
@@ -125,7 +121,7 @@ where
     };
     let area = super::bounds::around(&items).half_area();
     let least_overlap = can_split(&items, scene, options).then_some(options.alpha * area);
-    let build = Build { corners, rule, bins: options.bins as usize, least_overlap };
+    let build = Build { corners: &corners, rule, bins: options.bins as usize, least_overlap };
     let mut out = Written::default();
     if !items.is_empty() {
         let mut root = Subtree::default();
@@ -146,11 +142,7 @@ fn is_in_reach(scene: &Aabb) -> bool {
     longest >= power_of_two(-40) && farthest <= power_of_two(120)
 }
 
-impl<C, B> Scene<'_, C, B>
-where
-    C: Fn(u32) -> Option<[[f32; 3]; 3]>,
-    B: Fn(u32) -> Bounds,
-{
+impl Scene<'_> {
     /// A reference with its box in the lengths of the input, larger by the slack of parts if it is one.
     fn finished(&self, reference: &Item) -> Item {
         let primitive = reference.primitive();
@@ -229,9 +221,9 @@ struct Part<'a> {
 }
 
 /// What nodes are split by.
-struct Build<'a, C> {
+struct Build<'a> {
     /// Of a primitive, in the lengths of the items.
-    corners: C,
+    corners: &'a (dyn Fn(u32) -> Corners + Sync),
     rule: LeafRule<'a>,
     bins: usize,
     /// Sides of an object split with less area in common are not looked at any further; none if nothing may be split.
@@ -239,13 +231,13 @@ struct Build<'a, C> {
 }
 
 /// The search for the split of a node.
-struct Search<'a, S: SplitCost, C> {
+struct Search<'a, S: SplitCost> {
     by: &'a S,
     here: &'a S::Here,
-    build: &'a Build<'a, C>,
+    build: &'a Build<'a>,
 }
 
-impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Candidates for Build<'_, C> {
+impl Candidates for Build<'_> {
     type Part<'a> = Part<'a>;
     /// The references on both sides.
     type Split = [Vec<Item>; 2];
@@ -294,7 +286,7 @@ impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Candidates for Build<'_, C> {
     }
 }
 
-impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
+impl<S: SplitCost> Search<'_, S> {
     /// The references on both sides of the best split; `None` if the node is a leaf.
     fn divided(&self, references: &[Item], depth: u32, room: usize) -> Option<[Vec<Item>; 2]> {
         let node = Unsplit::of(references);

@@ -67,7 +67,7 @@ impl ObjectSplit {
     }
 }
 
-impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
+impl<S: SplitCost> Search<'_, S> {
     /// The plane between bins that costs least, of equal ones the first along the first axis.
     pub(super) fn object_split(&self, references: &[Item], node: &Unsplit) -> ObjectSplit {
         let bins = self.build.bins;

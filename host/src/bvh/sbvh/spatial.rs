@@ -98,7 +98,7 @@ impl Slabs {
     }
 }
 
-impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
+impl<S: SplitCost> Search<'_, S> {
     /// The plane between bins of space that costs least and adds no more references than there is room for.
     pub(super) fn spatial_split(&self, references: &[Item], node: &Bounds, room: usize) -> Option<SpatialSplit> {
         let of_axis = |axis| self.spatial_split_by(references, &Slabs::new(node, axis, self.build.bins)?, room);
@@ -151,7 +151,7 @@ impl<S: SplitCost, C: Fn(u32) -> [[f32; 3]; 3] + Sync> Search<'_, S, C> {
     }
 }
 
-impl<C: Fn(u32) -> [[f32; 3]; 3] + Sync> Build<'_, C> {
+impl Build<'_> {
     /// The references of the parts below and above a plane.
     fn parts(&self, reference: &Item, axis: usize, at: f32) -> [Option<Item>; 2] {
         let primitive = reference.primitive();
@@ -291,7 +291,7 @@ mod tests {
     fn what_crosses_is_left_whole_where_that_is_cheaper_and_allowed() {
         let corners = [[0.4, 0.0, 0.0], [0.51, 0.0, 0.1], [0.51, 0.1, 0.0]];
         let rule = LeafRule { costs: &Collapse::SAH, single: true };
-        let build = Build { corners: |_| corners, rule, bins: 2, least_overlap: Some(0.0) };
+        let build = Build { corners: &|_| corners, rule, bins: 2, least_overlap: Some(0.0) };
         let item = |lo: [f32; 3], hi: [f32; 3], primitive: u32| {
             Item::new(Bounds { lo: Vec3A::from_array(lo), hi: Vec3A::from_array(hi) }, primitive, 1)
         };
