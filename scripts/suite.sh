@@ -8,8 +8,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 profile=$1 features=$2 filter=${3:-all()}
 
-# The longest first. The last has the quick check, which runs every pass: most are compiled by then.
-parts=(bvh accel conditional kdtree trace others lab)
+# The longest first, but for that with the quick check, which runs every pass (lab): most are compiled by then. A short one last,
+# so that no core waits long for the others.
+parts=(bvh accel kdtree trace others lab conditional)
 filter_of() {
   case $1 in
     lab | conditional) echo "binary_id(hedgerow-lab::$1)" ;;
