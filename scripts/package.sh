@@ -35,6 +35,7 @@ rm -rf "$unpacked" "$target/package/built"
 mkdir -p "$unpacked"
 tar -xzf "$package" -C "$unpacked" --strip-components 1
 # Without the compiler first, while nothing that the compiler needs is there.
+export CARGO_PROFILE_DEV_DEBUG=false
 build() { (cd "$unpacked" && "$cargo" build --offline --target-dir "$target/package/built" "$@"); }
 SECONDS=0
 build
