@@ -16,7 +16,7 @@
 #   make install-c     hedgerow.h and the libraries for C into PREFIX (/usr/local)
 #
 #   SETUP=true         go on without scripts/setup.sh       OUT=DIR        where reports go
-#   PROFILE=ci         what `make check` and the tests are compiled by in CI, in two thirds of the time
+#   PROFILE=ci         what CI compiles `make check` and the tests by: sooner, as not all is optimised
 #   BENCH="…"          further arguments of `hedgerow bench`, such as -b lbvh,ploc or --runs 3
 #   ACCEL="…"          the same of `hedgerow accel`, such as gen:city:1000 or --experiments batch,tlas
 #   STABILITY="…"      the same of `hedgerow stability growth` and `large`, such as sponza or --no-rays
@@ -64,6 +64,8 @@ TUNED_TESTS ?= package(hedgerow) & !test(/^(warming|bvh::heuristics|bvh::host|kd
 TUNED := $(if $(NEXTEST),'$(TUNED_TESTS)')
 # What depends on how many lanes a subgroup has: groups of `hedgerow check`.
 WIDTH_GROUPS ?= scan,sort,pool,lbvh,codes,hlbvh,ploc,hploc,split,optimise,wide,refit,child-order,ray-counts,kd-build,kd-merge,trace,trace-kd
+# Groups that are checked once more with LLVM's optimisations, where GALLIVM_PERF leaves them out (.ci/run).
+OPTIMISED_GROUPS ?=
 SHARED := $(if $(filter Darwin,$(shell uname -s)),dylib,so)
 
 .PHONY: bench bench-all bench-peers stability test test-gpu test-lanes test-wgpu check package portable install-c setup test-drivers
@@ -130,6 +132,7 @@ test-drivers: setup
 	$(ON_SECOND) accel::arguments
 	scripts/peer-lavapipe.sh $(MESA)
 	scripts/with-lavapipe.sh $(MESA) $(TESTED) check --quick
+	$(if $(OPTIMISED_GROUPS),GALLIVM_PERF= scripts/with-lavapipe.sh $(MESA) $(TESTED) check --quick --groups $(OPTIMISED_GROUPS))
 
 check: setup
 	cargo fmt --all --check

@@ -283,7 +283,7 @@ impl Device {
         }
     }
 
-    /// A pool, and a command buffer of it that is recorded.
+    /// A pool, and a command buffer of it that records.
     unsafe fn begun(&self) -> Result<(vk::CommandPool, vk::CommandBuffer)> {
         // SAFETY: the device is live; the pool is destroyed on failure, or by `submit`.
         unsafe {

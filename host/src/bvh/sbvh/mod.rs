@@ -75,13 +75,11 @@ const SHORTEST_CUT: f32 = 1.0 / (1u64 << 60) as f32;
 const WHOLE: u32 = 1;
 const PART: u32 = 2;
 
-type Corners = [[f32; 3]; 3];
-
 /// What a tree is built over besides its items. Its functions are called through pointers: this method is compiled for every
 /// heuristic, and would be for every kind of record besides.
 pub(super) struct Scene<'a> {
     /// The corners of a primitive that is a triangle.
-    pub corners: &'a (dyn Fn(u32) -> Option<Corners> + Sync),
+    pub corners: &'a (dyn Fn(u32) -> Option<[[f32; 3]; 3]> + Sync),
     /// The box of a primitive.
     pub bounds: &'a (dyn Fn(u32) -> Bounds + Sync),
     /// The box around all primitives.
@@ -223,7 +221,7 @@ struct Part<'a> {
 /// What nodes are split by.
 struct Build<'a> {
     /// Of a primitive, in the lengths of the items.
-    corners: &'a (dyn Fn(u32) -> Corners + Sync),
+    corners: &'a (dyn Fn(u32) -> [[f32; 3]; 3] + Sync),
     rule: LeafRule<'a>,
     bins: usize,
     /// Sides of an object split with less area in common are not looked at any further; none if nothing may be split.
