@@ -9,7 +9,10 @@ folder=$1 version=$2
 root=$(cd "$(dirname "$0")/.." && pwd)
 host=$(rustc -vV | awk '/^host:/ { print $2 }')
 manifest=$(cargo metadata --format-version 1 --filter-platform "$host" --manifest-path "$root/Cargo.toml" |
-  grep -o '"manifest_path":"[^"]*/shaderc-sys-'"$version"'/Cargo.toml"' | head -n 1 | cut -d '"' -f 4)
+  grep -o '"manifest_path":"[^"]*/shaderc-sys-'"$version"'/Cargo.toml"' | head -n 1 | cut -d '"' -f 4) || {
+  echo "shaderc.sh: cargo could not fetch shaderc-sys $version, which has shaderc's sources" >&2
+  exit 1
+}
 sources=$(dirname "$manifest")/build
 build=$(mktemp -d)
 trap 'rm -rf "$build"' EXIT
