@@ -34,8 +34,9 @@ unpacked=$target/package/unpacked
 rm -rf "$unpacked" "$target/package/built"
 mkdir -p "$unpacked"
 tar -xzf "$package" -C "$unpacked" --strip-components 1
-# Without the compiler first, while nothing that the compiler needs is there.
+# Nobody debugs these builds.
 export CARGO_PROFILE_DEV_DEBUG=false
+# Without the compiler first, while nothing that the compiler needs is there.
 build() { (cd "$unpacked" && "$cargo" build --offline --target-dir "$target/package/built" "$@"); }
 SECONDS=0
 build
