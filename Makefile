@@ -42,8 +42,7 @@ SWIFTSHADER := $(CACHE)/swiftshader
 WGPU := $(TARGET)/wgpu
 # The ICD file of the second driver; another one may be named.
 SECOND_DRIVER := $(or $(HEDGEROW_SECOND_DRIVER),$(SWIFTSHADER)/swiftshader.json)
-ON_SECOND = VK_DRIVER_FILES=$(SECOND_DRIVER) VK_ICD_FILENAMES=$(SECOND_DRIVER) $(WITHIN) \
-	$(CARGO) test --profile $(PROFILE) --features $(FEATURES) --test main --
+ON_SECOND = VK_DRIVER_FILES=$(SECOND_DRIVER) VK_ICD_FILENAMES=$(SECOND_DRIVER) $(WITHIN) $(CARGO)
 comma := ,
 EMBREE_BUILDERS := ,embree-low,embree-medium,embree-high,embree-medium-tree,embree-high-tree
 # The CPU peers that can be built here: Embree where it is installed (scripts/setup.sh --peers). The same features
@@ -124,12 +123,15 @@ test-wgpu: setup
 		! grep -q VUID $(WGPU)/output && exit $$status
 	$(CARGO) clippy --release -p hedgerow-on-wgpu -- -D warnings
 
-# One process for all passes: SwiftShader compiles every pipeline anew in each. Small builds that share dispatches have a run of their own.
+# A process for each tuning: SwiftShader compiles every pipeline anew in each, one at a time. Small builds that share dispatches have a
+# run of their own.
 test-drivers: setup
 	$(if $(HEDGEROW_SECOND_DRIVER),,scripts/second-driver.sh $(SWIFTSHADER))
 	$(CARGO) test --profile $(PROFILE) --features $(FEATURES) --test main --no-run
-	$(ON_SECOND) drivers:: --ignored --nocapture
-	$(ON_SECOND) accel::arguments
+	$(ON_SECOND) $(if $(NEXTEST),nextest run --cargo-profile $(PROFILE) --features $(FEATURES) --test main --run-ignored only \
+		--success-output immediate --final-status-level slow -E 'test(/^drivers::/)',test --profile $(PROFILE) \
+		--features $(FEATURES) --test main -- drivers:: --ignored --nocapture)
+	$(ON_SECOND) test --profile $(PROFILE) --features $(FEATURES) --test main -- accel::arguments
 	scripts/peer-lavapipe.sh $(MESA)
 	scripts/with-lavapipe.sh $(MESA) $(TESTED) check --quick
 	$(if $(OPTIMISED_GROUPS),GALLIVM_PERF= scripts/with-lavapipe.sh $(MESA) $(TESTED) check --quick --groups $(OPTIMISED_GROUPS))

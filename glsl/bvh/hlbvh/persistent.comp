@@ -12,8 +12,7 @@ void hlbvh_from_pool(uint phase, uint task) {
     else if (phase == PHASE_COUNT) hlbvh_count(task);
     else if (phase == PHASE_SCAN) hlbvh_scan();
     else if (phase == PHASE_GATHER) hlbvh_gather(task);
-    else if (phase < PHASE_FINISH) hlbvh_split(task, phase - PHASE_SPLIT);
-    else if (phase == PHASE_FINISH) hlbvh_finish(task, LEVELS);
+    else if (phase <= PHASE_FINISH) hlbvh_split(task, phase - PHASE_SPLIT, phase == PHASE_FINISH);
     else if (phase == PHASE_WEIGH) hlbvh_weigh(task);
     else if (phase == PHASE_ABOVE) collapse_above(task);
     else if (phase == PHASE_PLACE) collapse_place(task);

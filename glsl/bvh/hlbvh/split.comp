@@ -4,5 +4,5 @@
 
 void main() {
     uint tasks = task_count(level);
-    for (uint i = group_number(); i < tasks; i += gl_NumWorkGroups.x) hlbvh_split(i, level);
+    for (uint i = group_number(); i < tasks; i += gl_NumWorkGroups.x) hlbvh_split(i, level, false);
 }

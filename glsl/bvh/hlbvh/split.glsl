@@ -22,7 +22,7 @@ shared uint chosen_bin;
 shared uint chosen_middle;
 shared vec3 chosen_lo[2];
 shared vec3 chosen_hi[2];
-// Of `finish`.
+// Of a task and all below it.
 shared uint stack_begins[STACK];
 shared uint stack_ends[STACK];
 shared uint stack_links[STACK];
@@ -177,21 +177,6 @@ Task task_at(uint level, uint i) {
     return all_tasks().task[safe_place(first_task(level) + i)];
 }
 
-// A task of a level: its sides of two clusters or more are tasks of the next, in any order, on which nothing depends.
-void hlbvh_split(uint i, uint level) {
-    Task t = task_at(level, i);
-    uint middle;
-    uint slot = split(t, level, middle);
-    if (gl_LocalInvocationIndex != 0u) return;
-    Tasks tasks = all_tasks();
-    uint left = middle - t.begin > 1u ? 1u : 0u, right = t.end - middle > 1u ? 1u : 0u;
-    if (left + right == 0u) return;
-    PoolState pool = PoolState(scratch_address);
-    uint at = first_task(level + 1u) + atomicAdd(pool.tasks[pool_phase(PHASE_SPLIT + level + 1u)], left + right);
-    if (left == 1u) tasks.task[at] = Task(t.begin, middle, 2u * slot);
-    if (right == 1u) tasks.task[at + left] = Task(middle, t.end, 2u * slot + 1u);
-}
-
 void push(inout uint level, Task t, uint of_level) {
     if (gl_LocalInvocationIndex == 0u) {
         stack_begins[level] = t.begin;
@@ -202,18 +187,36 @@ void push(inout uint level, Task t, uint of_level) {
     level++;
 }
 
-// A task that no level is recorded for, and all below it.
-void hlbvh_finish(uint i, uint level) {
+// Sides of two clusters or more are tasks of a level, in any order, on which nothing depends.
+void hand_on(Task left, Task right, uint level) {
+    if (gl_LocalInvocationIndex != 0u) return;
+    Tasks tasks = all_tasks();
+    uint lefts = left.end - left.begin > 1u ? 1u : 0u, rights = right.end - right.begin > 1u ? 1u : 0u;
+    if (lefts + rights == 0u) return;
+    PoolState pool = PoolState(scratch_address);
+    uint at = first_task(level) + atomicAdd(pool.tasks[pool_phase(PHASE_SPLIT + level)], lefts + rights);
+    if (lefts == 1u) tasks.task[at] = left;
+    if (rights == 1u) tasks.task[at + lefts] = right;
+}
+
+// A task of a level, or with all below it where no further level is recorded.
+//
+// One loop for both: a kernel that has either would have all of `split` twice.
+void hlbvh_split(uint i, uint level, bool all_below) {
     Task t = task_at(level, i);
-    uint nodes = t.end - t.begin - 1u;
+    uint nodes = all_below ? t.end - t.begin - 1u : 1u;
     uint waiting = 0;
     for (uint node = 0; node < nodes; ++node) {
         uint middle;
         uint slot = split(t, level, middle);
         Task left = Task(t.begin, middle, 2u * slot), right = Task(middle, t.end, 2u * slot + 1u);
+        level++;
+        if (!all_below) {
+            hand_on(left, right, level);
+            break;
+        }
         bool left_is_small = middle - t.begin <= t.end - middle;
         Task small = left_is_small ? left : right, large = left_is_small ? right : left;
-        level++;
         if (small.end - small.begin > 1u) push(waiting, large, level);
         t = small.end - small.begin > 1u ? small : large;
         if (t.end - t.begin == 1u && waiting > 0u) {
