@@ -1,9 +1,12 @@
 #!/usr/bin/env bash
-# The test suite by cargo-nextest, a process a test: scripts/suite.sh PROFILE FEATURES [FILTER]. The Makefile calls it, under a bound.
+# The test suite, as cargo-nextest lists it: scripts/suite.sh PROFILE FEATURES [FILTER]. The Makefile calls it, under a bound.
 #
 # Without a cache lavapipe compiles for longer than tests run; what it has compiled, later processes find. Tests of one module need
 # the same shaders, and side by side would compile them twice. So a core takes a part of the suite at a time, whose tests run one
 # after another. What a part has printed is shown when it ends; which parts failed, at the end.
+#
+# nextest runs a process a test. But a process makes its pipelines anew, compiled before or not, which took a sixth of the time of
+# those parts that build and trace by most of them. Of these a process runs a module: what hangs or crashes ends its module.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 profile=$1 features=$2 filter=${3:-all()}
@@ -26,12 +29,40 @@ trap 'rm -rf "$output"' EXIT
 # The bound ran out: what ran then has printed nothing yet.
 trap 'tail -n 20 "$output"/* >&2; exit 124' TERM
 
+# Seconds for a module: the longest takes 250 on two slow cores, with no shader compiled before.
+module_bound=1200
+within=()
+[ -z "$(command -v timeout)" ] || within=(timeout --kill-after 10 "$module_bound")
+
+# Tests of hedgerow::main, a process a module.
+run_modules() {
+  local tests bin module names status=0 own
+  tests=$(scripts/cargo.sh nextest list --verbose --message-format oneline --cargo-profile "$profile" --features "$features" \
+    -E "($(filter_of "$1")) & ($filter)") || return
+  tests=$(printf '%s\n' "$tests" | grep '^hedgerow::main ' | grep -v '(skipped)$' || true)
+  [ -n "$tests" ] || return 0
+  bin=$(printf '%s\n' "$tests" | sed -n '1s/.*\[bin: \([^]]*\)\].*/\1/p')
+  tests=$(printf '%s\n' "$tests" | awk '{ print $2 }')
+  for module in $(printf '%s\n' "$tests" | sed 's/::[^:]*$//' | sort -u); do
+    names=($(printf '%s\n' "$tests" | grep -E "^${module}::[^:]*$"))
+    SECONDS=0 own=0
+    ${within[@]+"${within[@]}"} "$bin" --exact "${names[@]}" --test-threads 1 || own=$?
+    # What hangs or crashes is the last test that is named.
+    [ $own = 0 ] || { status=1; printf '\nFAIL %s, exit status %s\n' "$module" $own; }
+    printf '%s: %s s\n' "$module" $SECONDS
+  done
+  return $status
+}
+
 run_part() {
   local status=0 levels=(--final-status-level skip)
   # Tests of other parts count as skipped; which cannot run here, and why, is listed with the conditional ones.
   [ "$1" = conditional ] || levels=(--final-status-level slow)
-  scripts/cargo.sh nextest run --cargo-profile "$profile" --features "$features" --no-tests pass -j $((cores / at_once)) "${levels[@]}" \
-    -E "($(filter_of "$1")) & ($filter)" >"$output/$1" 2>&1 || status=$?
+  case $1 in
+    bvh | accel | kdtree | trace) run_modules "$1" >"$output/$1" 2>&1 || status=$? ;;
+    *) scripts/cargo.sh nextest run --cargo-profile "$profile" --features "$features" --no-tests pass -j $((cores / at_once)) \
+      "${levels[@]}" -E "($(filter_of "$1")) & ($filter)" >"$output/$1" 2>&1 || status=$? ;;
+  esac
   [ $status = 0 ] || touch "$output/$1.failed"
   printf '== tests: %s\n' "$1"
   cat "$output/$1"
@@ -47,6 +78,6 @@ for part in "${parts[@]}"; do
   [ -e "$output/$part.failed" ] || continue
   status=1
   printf '== failed: %s\n' "$part"
-  grep -E '^ +(FAIL|TIMEOUT|SIG[A-Z]+|ABORT|TERMINATING) |Summary|^error' "$output/$part" | sort -u || true
+  grep -E '^ *(FAIL|TIMEOUT|SIG[A-Z]+|ABORT|TERMINATING) |^test .* FAILED$|Summary|^error' "$output/$part" | sort -u || true
 done >&2
 exit $status
