@@ -67,6 +67,8 @@ pub struct Limits {
     pub int64: bool,
     /// Whether lanes gather words in one fast instruction, of a CPU's driver: as far as the CPU's vendor tells. GPUs are not asked.
     pub gathers_words_fast: bool,
+    /// Cores of this machine, if it is the device: a CPU's driver computes on them.
+    pub cores: Option<u32>,
     /// The most invocations of a workgroup.
     pub workgroup_invocations: u32,
     /// The most bytes of shared memory of a workgroup.
@@ -93,6 +95,9 @@ impl Limits {
         let sizes = SubgroupSizes::of(instance, physical_device);
         let subgroup_size = subgroup.subgroup_size;
         let family = requirements::queue_family(&families);
+        let is_cpu = properties.device_type == vk::PhysicalDeviceType::CPU;
+        let cores =
+            std::thread::available_parallelism().map_or(1, |cores| u32::try_from(cores.get()).unwrap_or(u32::MAX));
         Limits {
             name: properties.device_name_as_c_str().unwrap_or(c"?").to_string_lossy().into_owned(),
             kind: properties.device_type,
@@ -103,7 +108,8 @@ impl Limits {
             subgroup_max: sizes.most.min(128).max(subgroup_size),
             subgroup_is_exact: optional.subgroup_size_control || sizes.least == sizes.most,
             int64: optional.int64,
-            gathers_words_fast: properties.device_type == vk::PhysicalDeviceType::CPU && host_gathers_words_fast(),
+            gathers_words_fast: is_cpu && host_gathers_words_fast(),
+            cores: is_cpu.then_some(cores),
             workgroup_invocations: properties.limits.max_compute_work_group_invocations,
             shared_memory: properties.limits.max_compute_shared_memory_size,
             workgroup_count: properties.limits.max_compute_work_group_count[0],

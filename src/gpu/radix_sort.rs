@@ -19,7 +19,12 @@ pub struct SortShape {
     subgroups: u32,
     /// Keys of a lane in a tile.
     rows: u32,
+    /// Strips at most, until they would be over 4,096 keys; at least half as many. 0 of tiles.
+    strips: u32,
 }
+
+/// Strips of a sort on any machine: those of one with many cores.
+const MOST_STRIPS: u32 = 256;
 
 /// Digits whose counts of a tile are scanned together: `SCANNED_TOGETHER` in radix_sort.glsl.
 const SCANNED_TOGETHER: u32 = 8;
@@ -31,21 +36,26 @@ impl SortShape {
     }
 
     /// A strip of keys for each invocation, which counts alone: for CPUs, where an invocation is a lane of a loop.
+    ///
+    /// Long strips make the table small, short ones keep all cores busy: one to two workgroups of strips for each core, as far as the
+    /// device tells of its cores.
     pub fn strips(limits: &Limits) -> SortShape {
         /// A lane's counters take 1 KiB of shared memory.
         const MOST: u32 = 8;
-        SortShape::strips_of(limits.subgroup_size.min(MOST))
+        let shape = SortShape::strips_of(limits.subgroup_size.min(MOST));
+        let enough = limits.cores.map_or(MOST_STRIPS, |cores| cores.min(MOST_STRIPS).next_power_of_two() * 2 * MOST);
+        SortShape { strips: enough.min(MOST_STRIPS), ..shape }
     }
 
     /// The same with workgroups of this many invocations.
     pub(crate) fn strips_of(workgroup: u32) -> SortShape {
-        SortShape { workgroup, digit_bits: 8, private_counters: true, subgroups: 0, rows: 0 }
+        SortShape { workgroup, digit_bits: 8, private_counters: true, subgroups: 0, rows: 0, strips: MOST_STRIPS }
     }
 
     /// The same for GPUs whose subgroups may be smaller than they report: small digits, so that a workgroup has many strips.
     pub fn many_strips(limits: &Limits) -> SortShape {
         let workgroup = limits.workgroup_invocations.min(64);
-        SortShape { workgroup, digit_bits: 4, private_counters: true, subgroups: 0, rows: 0 }
+        SortShape { digit_bits: 4, ..SortShape::strips_of(workgroup) }
     }
 
     /// A tile of keys for each workgroup, ranked by ballots: for GPUs whose subgroups have the size that they report.
@@ -63,6 +73,7 @@ impl SortShape {
             private_counters: false,
             subgroups,
             rows,
+            strips: 0,
         }
     }
 
@@ -90,11 +101,9 @@ impl SortShape {
     }
 
     /// Keys of a column of the table, for `count` keys in all.
-    ///
-    /// Long strips make the table small, short ones keep all cores busy: 128 to 256 strips, until they would be over 4,096 keys.
     pub(crate) fn column_keys(&self, count: u32) -> u32 {
         if self.private_counters {
-            (count / 256).next_power_of_two().clamp(256, 4096)
+            (count / self.strips).next_power_of_two().clamp(256, 4096)
         } else {
             self.workgroup * self.rows
         }
@@ -111,8 +120,9 @@ impl SortShape {
 
     /// Words that the table of no count up to `count` exceeds: longer strips make it smaller for more keys.
     pub(crate) fn most_table_words(&self, count: u32) -> u64 {
-        // Strips hold at least 256 keys and, up to 4,096, at least a 256th of all, rounded down.
-        let columns = if self.private_counters { count.div_ceil(256).min(257) } else { 0 };
+        // Strips hold at least 256 keys and, up to 4,096, at least a 256th of all, rounded down; where
+        // cores are few, more.
+        let columns = if self.private_counters { count.div_ceil(256).min(MOST_STRIPS + 1) } else { 0 };
         u64::from(self.digits()) * (u64::from(columns.max(self.columns(count))) + 1)
     }
 

@@ -35,10 +35,12 @@ fn sorted_on_device(shape: &SortShape, keys: &[u64], values: &[u32], bits: u32) 
     (keys, values[result].read(count as usize))
 }
 
-/// All cuts: strips of CPUs, tiles of GPUs, those of a small GPU, and strips where nobody knows how large subgroups are.
+/// All cuts: strips of CPUs with few and many cores, tiles of GPUs, those of a small GPU, and strips where nobody knows how large subgroups are.
 fn shapes() -> Vec<SortShape> {
     let limits = &device().limits;
-    let strips = [SortShape::strips(limits), SortShape::many_strips(limits)];
+    let few_cores = Limits { cores: Some(1), ..limits.clone() };
+    let many_cores = Limits { cores: None, ..limits.clone() };
+    let strips = [SortShape::strips(&few_cores), SortShape::strips(&many_cores), SortShape::many_strips(limits)];
     if !limits.subgroup_is_exact {
         return strips.into();
     }
