@@ -130,7 +130,7 @@ test-drivers: setup
 	$(CARGO) test --profile $(PROFILE) --features $(FEATURES) --test main --no-run
 	$(ON_SECOND) $(if $(NEXTEST),nextest run --cargo-profile $(PROFILE) --features $(FEATURES) --test main --run-ignored only \
 		--success-output immediate --final-status-level slow -E 'test(/^drivers::/)',test --profile $(PROFILE) \
-		--features $(FEATURES) --test main -- drivers:: --ignored --nocapture)
+		--features $(FEATURES) --test main -- drivers:: --ignored --nocapture --test-threads 1)
 	$(ON_SECOND) test --profile $(PROFILE) --features $(FEATURES) --test main -- accel::arguments
 	scripts/peer-lavapipe.sh $(MESA)
 	scripts/with-lavapipe.sh $(MESA) $(TESTED) check --quick

@@ -37,8 +37,8 @@ impl SortShape {
 
     /// A strip of keys for each invocation, which counts alone: for CPUs, where an invocation is a lane of a loop.
     ///
-    /// Long strips make the table small, short ones keep all cores busy: one to two workgroups of strips for each core, as far as the
-    /// device tells of its cores.
+    /// Long strips make the table small, short ones keep all cores busy: each core has at least one workgroup of eight strips, and at
+    /// most two, as far as cores are known and strips have at most 4,096 keys.
     pub fn strips(limits: &Limits) -> SortShape {
         /// A lane's counters take 1 KiB of shared memory.
         const MOST: u32 = 8;
@@ -120,8 +120,7 @@ impl SortShape {
 
     /// Words that the table of no count up to `count` exceeds: longer strips make it smaller for more keys.
     pub(crate) fn most_table_words(&self, count: u32) -> u64 {
-        // Strips hold at least 256 keys and, up to 4,096, at least a 256th of all, rounded down; where
-        // cores are few, more.
+        // Strips hold at least 256 keys and, up to 4,096, at least a 256th of all, rounded down; where cores are few, more.
         let columns = if self.private_counters { count.div_ceil(256).min(MOST_STRIPS + 1) } else { 0 };
         u64::from(self.digits()) * (u64::from(columns.max(self.columns(count))) + 1)
     }
