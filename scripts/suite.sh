@@ -5,8 +5,8 @@
 # the same shaders, and side by side would compile them twice. So a core takes a part of the suite at a time, whose tests run one
 # after another. What a part has printed is shown when it ends; which parts failed, at the end.
 #
-# nextest runs a process a test. But a process makes its pipelines anew, compiled before or not, which took a sixth of the time of
-# those parts that build and trace by most of them. Of these a process runs a module: what hangs or crashes ends its module.
+# nextest runs a process a test. But each process makes its pipelines anew, compiled before or not: in parts that use most of them this
+# took a tenth to a sixth of the time. Of these parts a process runs a module. What hangs or crashes ends its module.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 profile=$1 features=$2 filter=${3:-all()}
@@ -29,7 +29,7 @@ trap 'rm -rf "$output"' EXIT
 # The bound ran out: what ran then has printed nothing yet.
 trap 'tail -n 20 "$output"/* >&2; exit 124' TERM
 
-# Seconds for a module: the longest takes 250 on two slow cores, with no shader compiled before.
+# Seconds for a module: the longest takes 300 on two slow cores, with no shader compiled before.
 module_bound=1200
 within=()
 [ -z "$(command -v timeout)" ] || within=(timeout --kill-after 10 "$module_bound")

@@ -35,7 +35,8 @@ fn sorted_on_device(shape: &SortShape, keys: &[u64], values: &[u32], bits: u32) 
     (keys, values[result].read(count as usize))
 }
 
-/// All cuts: strips of CPUs with few and many cores, tiles of GPUs, those of a small GPU, and strips where nobody knows how large subgroups are.
+/// All cuts: strips of CPUs with few and many cores, tiles of GPUs, those of a small GPU, and strips where nobody knows how large
+/// subgroups are.
 fn shapes() -> Vec<SortShape> {
     let limits = &device().limits;
     let few_cores = Limits { cores: Some(1), ..limits.clone() };

@@ -93,11 +93,9 @@ fn the_chain_gives_the_bytes_of_the_host() {
     }
 }
 
-const SCHEDULES: [KdSchedule; 3] = [KdSchedule::Chain, KdSchedule::Persistent, KdSchedule::AcrossLevels];
-
-/// As several geometries, and if there is one as one.
+/// As one geometry and as several, by every schedule.
 #[track_caller]
-fn assert_geometries_as_on_the_host(geometries: &[Owned], schedules: &[KdSchedule]) {
+fn assert_geometries_as_on_the_host(geometries: &[Owned]) {
     // Each triangle is as large as all of them.
     let estimate = KdEstimate {
         level_references: 200.0,
@@ -127,7 +125,7 @@ fn assert_geometries_as_on_the_host(geometries: &[Owned], schedules: &[KdSchedul
     let geometry_count = records.len() as u32;
     let several = Source::Several { records: buffer.address(), count: geometry_count };
     for source in [several].into_iter().chain((records.len() == 1).then(|| Source::One(records[0]))) {
-        for &schedule in schedules {
+        for schedule in [KdSchedule::Chain, KdSchedule::Persistent, KdSchedule::AcrossLevels] {
             let options = KdOptions { schedule: Some(schedule), geometry_count, ..with };
             let (got, report) = built_of(&Input { source, primitive_count: first }, &options);
             assert_eq!(report.status & status::OUT_OF_ROOM, 0, "{report:?}");
@@ -138,25 +136,21 @@ fn assert_geometries_as_on_the_host(geometries: &[Owned], schedules: &[KdSchedul
 
 #[test]
 fn every_format_and_several_geometries_give_the_bytes_of_the_host() {
-    // Each format once, and by every schedule the first: a kernel is compiled anew for each. The same code reads them for BVHs, and
-    // bvh::geometry tests each vertex format with each index format.
+    // Each format once. The same code reads them for BVHs, and bvh::geometry tests each vertex format with each index format.
     let index_formats = [IndexFormat::NONE, IndexFormat::U8, IndexFormat::U32, IndexFormat::U16];
     for (i, vertex_format) in VertexFormat::ALL.into_iter().enumerate() {
         let (padding, transform) = if i % 2 == 0 { (0, None) } else { (4, Some(MOVED)) };
         let geometry = Owned::random(vertex_format, index_formats[i % 4], padding, 60, 7);
-        let schedules = if i == 0 { &SCHEDULES[..] } else { &SCHEDULES[..1] };
-        assert_geometries_as_on_the_host(&[Owned { transform, ..geometry }], schedules);
+        assert_geometries_as_on_the_host(&[Owned { transform, ..geometry }]);
     }
     let geometry = |i: usize, count| {
         let (vertices, indices) = (VertexFormat::ALL[i % 6], IndexFormat::ALL[i % 4]);
         Owned::random(vertices, indices, 0, count, i as u64)
     };
-    assert_geometries_as_on_the_host(&[geometry(0, 1), geometry(1, 1)], &SCHEDULES);
-    assert_geometries_as_on_the_host(&[geometry(2, 0), geometry(3, 0)], &SCHEDULES);
-    let some = [2, 3, 4, 5, 6, 7].map(|i| geometry(i, [0, 70, 0, 0, 9, 0][i - 2]));
-    assert_geometries_as_on_the_host(&some, &SCHEDULES);
-    let many: Vec<Owned> = (0..50).map(|i| geometry(i, (i as u32 * 7) % 13)).collect();
-    assert_geometries_as_on_the_host(&many, &SCHEDULES);
+    assert_geometries_as_on_the_host(&[geometry(0, 1), geometry(1, 1)]);
+    assert_geometries_as_on_the_host(&[geometry(2, 0), geometry(3, 0)]);
+    assert_geometries_as_on_the_host(&[2, 3, 4, 5, 6, 7].map(|i| geometry(i, [0, 70, 0, 0, 9, 0][i - 2])));
+    assert_geometries_as_on_the_host(&(0..50).map(|i| geometry(i, (i as u32 * 7) % 13)).collect::<Vec<_>>());
 }
 
 #[test]

@@ -201,7 +201,7 @@ void hand_on(Task left, Task right, uint level) {
 
 // A task of a level, or with all below it where no further level is recorded.
 //
-// One loop for both: a kernel that has either would have all of `split` twice.
+// One loop for both: a kernel that does both would have all of `split` twice.
 void hlbvh_split(uint i, uint level, bool all_below) {
     Task t = task_at(level, i);
     uint nodes = all_below ? t.end - t.begin - 1u : 1u;
