@@ -5,7 +5,7 @@ use super::arguments;
 use super::{Context, Kernel, Recorder, Step, shaders};
 use crate::Result;
 
-/// The most words that are scanned at once: two of each node slot of the largest tree.
+/// The most words that are scanned at once: twice the primitives that a tree may have.
 pub const MAX_COUNT: u32 = 1 << 28;
 
 /// How a scan of words is cut for a device.

@@ -10,27 +10,17 @@
 #include "bvh/wide/records.glsl"
 #include "gpu/scan_range.glsl"
 
-// First children, and of quantised nodes first records behind them.
-uint summed_words() {
-    return (QUANTISED ? 2 : 1) * (source_slots + 1);
-}
-
-void clear_sums() {
-    for (uint i = gl_LocalInvocationIndex; i < summed_words(); i += gl_WorkGroupSize.x) first_children.word[i] = 0;
-}
-
 void main() {
     find_links(slots_in_use());
+    clear_blocks();
     next_phase();
     climb(slots_in_use());
     next_phase();
     // Links and costs are not read any more: what follows may lie in their memory.
-    clear_sums();
-    next_phase();
     open_levels(0, LEVELS_AT_MOST);
     find_pairs();
     next_phase();
-    scan_range(first_children, first_children, 0, summed_words(), 0, 1);
+    scan_range(blocks, blocks, block_count(), block_words(), 0, 1);
     next_phase();
     write_nodes();
     next_phase();

@@ -11,16 +11,13 @@ uint open_name[8];
 uint open_index[8];
 uint open_count[8];
 
-// Links that the walk has before it, the next one first, with how many places each may take above WAITING_NAME; 0 behind the last.
+// Links that the walk has before it, the next one first, with how many places each may take above NAME; 0 behind the last.
 uvec4 waiting_next;
 uvec4 waiting_behind;
 
-const uint WAITING_BITS = 28;   // of a name: twice a slot, of which there are 2^27 at most
-const uint WAITING_NAME = (1u << WAITING_BITS) - 1u;
-
 void wait(uint name, uint places) {
     waiting_behind = uvec4(waiting_next.w, waiting_behind.xyz);
-    waiting_next = uvec4(name | places << WAITING_BITS, waiting_next.xyz);
+    waiting_next = uvec4(name | places << NAME_BITS, waiting_next.xyz);
 }
 
 uint take_next() {
@@ -90,7 +87,7 @@ uint put_near_and_far() {
     wait_for_nothing();
     wait(first + 1, 1);
     for (uint turn = 0; turn < 14 && waiting_next.x != 0u && all_are_far; ++turn) {
-        uint name = take_next() & WAITING_NAME;
+        uint name = take_next() & NAME;
         Child other = child_named(name);
         waiting--;
         if (side_of(near, other) != ON_NO_SIDE) {
@@ -125,7 +122,7 @@ uint open_children(uint slot, uint level) {
     uint count = apart == 0 ? 0 : 1, room = apart != 0 ? WIDTH - apart : by_cost ? WIDTH - children_by(choice) : 0;
     // Of n children 2 n - 2 links are taken.
     for (uint turn = 0; turn < 14 && waiting_next.x != 0u; ++turn) {
-        uint next = take_next(), name = next & WAITING_NAME, places = next >> WAITING_BITS;
+        uint next = take_next(), name = next & NAME, places = next >> NAME_BITS;
         Child child = child_named(name);
         bool inner = is_inner(child);
         if (inner && by_cost) {

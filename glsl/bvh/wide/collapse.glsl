@@ -1,20 +1,19 @@
 // Collapses a Bvh2 into a wide tree: src/bvh/wide/device.rs records the steps, src/bvh/twin/wide.rs is the twin.
 //
-//   (choices)        bvh/wide/costs.glsl: which binary nodes a wide one takes in
-//   (cleared)        first_children, first_records
-//   open_few         reads the source, choices, opened of a level writes slots, opened of the next level, levels, first_children,
-//                                                                 first_records; of the first level also that
+//   (choices)        bvh/wide/costs.glsl: which binary nodes a wide one takes in; blocks (zero)
+//   open_few         reads the source, choices, opened of a level writes slots, opened of the next level, levels, choices: how many nodes
+//                                                                 each names, units, blocks; of the first level also that
 //   open             the same of one level
-//   pair             reads the source, opened, slots             writes partners, first_records: of quantised trees of triangles
-//   (scan)           first_children, first_records behind it: exclusive sums over the source's slots, and on
+//   pair             reads the source, opened, slots             writes partners, units, blocks: of quantised trees of triangles
+//   (scan)           the sums of blocks: exclusive ones over all blocks before
 //   nodes            reads the source and all that               writes the target's header and nodes, places
 //   records          reads the source, places, partners          writes the target's records and table of geometries
 //   alone            all of that, by one workgroup, for a small tree
 //
 // Which binary nodes wide ones begin with is found from the root down, a level of wide nodes after the other. The list of a
 // level is in whatever order the atomics gave; nothing of it reaches the target: a node's index is one and the number of nodes
-// that are named by nodes of lower slots, and its rank among the nodes of its parent; the sums make them. So nodes that one
-// names lie side by side, as do, of quantised nodes, the records of its leaves.
+// that are named by nodes of lower slots, and its rank among the nodes of its parent; the sums make them, over blocks of slots, of which few
+// are of wide nodes. So nodes that one names lie side by side, as do, of quantised nodes, the records of its leaves.
 //
 // The children of a wide node lie in their slots as a walk meets them that takes left ones first. Those of quantised nodes lie by octants,
 // unless the source's have an order (bvh/child_order.glsl): then the target's header says so, too, and rays that were counted may choose it.
@@ -50,10 +49,15 @@ const uint LEAF_MAX_TRIANGLES = LEAF_MAX / UNITS_OF_ONE;
 // which of the four vertices are its own, two bits each.
 const uint ALONE = 0;
 const uint IS_SECOND = 0xFFFFFFFFu;
-// In place of what names a child, which is where it lies among all children of the source: twice its node's slot, and one for
-// the right one.
+// What names a child, which is where it lies among all children of the source: twice its node's slot, of which there are fewer than 2^27, and
+// one for the right one. A slot of a wide node has above it what the child is, so that it need not be loaded to tell.
+const uint NAME_BITS = 28;
+const uint NAME = (1u << NAME_BITS) - 1u;
+const uint SHORT_LEAF = 1u << NAME_BITS;
+const uint LONG_LEAF_NODE = 2u << NAME_BITS;
+// In place of a name: the root of a tree that is a leaf; in place of all of it: nothing.
+const uint WHOLE_TREE = NAME;
 const uint NO_CHILD = 0xFFFFFFFFu;
-const uint WHOLE_TREE = 0xFFFFFFFEu;
 
 // A wide node to be: the slot of the binary node that it begins with; that of its parent << 3 | which of its nodes it is.
 struct Opened {
@@ -67,6 +71,10 @@ BUFFER Levels {
     uint end;                         // of all levels that have a node
 };
 BUFFER OpenedNodes { Opened node[]; };
+// Of the source's slots, in blocks of SLOTS_OF_BLOCK: which ones wide nodes begin with, a bit each, of every block; then how many nodes those
+// name, and of quantised nodes how many units of records they have, of every block and one more.
+const uint SLOTS_OF_BLOCK = 16;   // src/bvh/wide/device.rs
+
 // Multiples of 8, so that src/gpu/longs.rs may take two words at a time.
 layout(buffer_reference, scalar, buffer_reference_align = 8) nonprivate buffer Quads { uvec4 of[]; };
 
@@ -77,12 +85,12 @@ layout(push_constant, scalar) uniform WideCollapseArguments {
     OpenedNodes opened;
     Words starts;            // see bvh/wide/costs.glsl
     Quads costs;
-    Words choices;           // of each of the source's slots
+    Words choices;           // of each of the source's slots: what was chosen, and since it is opened, how many nodes it names
     LinkCounts visits;       // of the source's links, by visits
     LinkCounts hits;         // and by hits
-    Words slots;             // what names the children of each of opened, WIDTH words
-    Words first_children;    // of each of the source's slots, and one more: the sum
-    Words first_records;
+    Quads slots;             // what each of opened has in its slots, WIDTH words
+    Words blocks;
+    Words units;             // of quantised nodes: of each of the source's slots that is opened, units of its records
     Words places;            // of quantised nodes: in which of the target's units each of the source's records lies
     Words partners;          // of each of the source's records, if it is a triangle: see pair.comp
     uvec2 given_records;     // the source's, which has the numbers of its primitives in their place; 0: they are there
@@ -123,9 +131,39 @@ bool is_long(uint count) {
     return QUANTISED && count > (is_paired() ? LEAF_MAX_TRIANGLES : LEAF_MAX);
 }
 
-// Whether a child of a wide node is a node.
-bool is_wide_node(Child child) {
-    return child.count == 0 || is_long(child.count);
+// What is in the slots of a wide node that are not looked at yet, the next one first.
+struct NextSlots {
+    uvec4 next;
+    uvec4 behind;
+};
+
+NextSlots slots_of(uint at) {
+    uint quads = WIDTH / 4u;
+    return NextSlots(slots.of[at * quads], WIDTH == 8u ? slots.of[at * quads + 1u] : uvec4(NO_CHILD));
+}
+
+uint take_slot(inout NextSlots all) {
+    uint slot = all.next.x;
+    all.next = uvec4(all.next.yzw, all.behind.x);
+    all.behind = uvec4(all.behind.yzw, NO_CHILD);
+    return slot;
+}
+
+uint word_of_slot(uint at, uint s) {
+    return Words(uvec2(slots)).word[at * WIDTH + s];
+}
+
+bool is_leaf_in(uint slot) {
+    return slot > NAME && slot != NO_CHILD;
+}
+
+bool is_long_leaf_in(uint slot) {
+    return slot >= LONG_LEAF_NODE && slot != NO_CHILD;
+}
+
+// Whether it holds a node of the wide tree: an inner child, or a leaf that is too long.
+bool is_node_in(uint slot) {
+    return slot <= NAME || is_long_leaf_in(slot);
 }
 
 uint units_by_partner(uint partner) {
@@ -150,12 +188,47 @@ Child child_named(uint name) {
     return Children(address_of(wide_nodes_at(uvec2(source)), name, 32)).child[0];
 }
 
+Child child_in(uint slot) {
+    return child_named(slot & NAME);
+}
+
 // The box of the binary node that a wide one begins with, which is that of the wide one. Of a tree that is a leaf it is the leaf's.
 Box box_of_node(uint slot) {
     Child root = source.header.root;
     if (!is_inner(root)) return Box(root.lo, root.hi);
     Child left = child_named(2 * slot), right = child_named(2 * slot + 1);
     return Box(min(left.lo, right.lo), max(left.hi, right.hi));
+}
+
+uint block_count() {
+    return (source_slots + SLOTS_OF_BLOCK - 1u) / SLOTS_OF_BLOCK;
+}
+
+uint block_of(uint slot) {
+    return slot / SLOTS_OF_BLOCK;
+}
+
+uint bit_in_block(uint slot) {
+    return 1u << slot % SLOTS_OF_BLOCK;
+}
+
+// Where the nodes that wide nodes of a block name are summed up, and the units of their records.
+uint nodes_of_block(uint block) {
+    return block_count() + block;
+}
+
+uint units_of_block(uint block) {
+    return 2u * block_count() + 1u + block;
+}
+
+uint block_words() {
+    return (QUANTISED ? 3u : 2u) * block_count() + (QUANTISED ? 2u : 1u);
+}
+
+// Notes how many units of records the wide node has that begins with a slot.
+void note_units(uint slot, uint count) {
+    units.word[slot] = count;
+    atomicAdd(blocks.word[units_of_block(block_of(slot))], count);
 }
 
 // Which of opened are of a level: the first, and how many.

@@ -42,11 +42,12 @@ void tell_far(uint next_node) {
     FarBox nothing = FarBox(uintBitsToFloat(uvec3(0x7F800000u)), uintBitsToFloat(uvec3(0xFF800000u)));
     for (uint side = 0; side < FAR_SIDES; ++side) boxes.box[side] = nothing;
     uint near_node = 0, sides = 0;
+    NextSlots of_root = slots_of(0);
     for (uint s = 0; s < 8; ++s) {
-        uint name = slots.word[s];
-        if (name == NO_CHILD) continue;
-        Child child = child_named(name);
-        if (name == first) {
+        uint in_slot = take_slot(of_root);
+        if (in_slot == NO_CHILD) continue;
+        Child child = child_in(in_slot);
+        if (in_slot == first) {
             near_node = next_node;
         } else {
             uint side = side_of(near, child);
@@ -55,7 +56,7 @@ void tell_far(uint next_node) {
             boxes.box[side] = FarBox(min(b.lo, child.lo), max(b.hi, child.hi));
             sides |= 1u << side;
         }
-        next_node += is_wide_node(child) ? 1 : 0;
+        next_node += is_node_in(in_slot) ? 1 : 0;
     }
     if (near_node == 0 || sides == 0) return;
     Structure(target).header.near_node = near_node;

@@ -4,4 +4,5 @@
 
 void main() {
     find_links(slots_in_use());
+    clear_blocks();
 }

@@ -57,23 +57,23 @@ void open(uint i, uvec2 of, uint level) {
         slot = opened.node[at].slot;
         count = open_children(slot, level);
         slots_by_child = slots_of_children(count, slot);
-        uint records = 0, taken = 0;
+        uint records = 0, quads = WIDTH / 4u;
+        for (uint q = 0; q < quads; ++q) slots.of[at * quads + q] = uvec4(NO_CHILD);
         [[unroll]] for (uint c = 0; c < 8; ++c) {
             if (c < count) {
                 uint in_slot = slots_by_child >> 4 * c & 15u;
-                bool is_leaf = open_count[c] != 0;
-                slots.word[at * WIDTH + in_slot] = open_name[c];
-                taken |= 1u << in_slot;
-                node_mask |= (!is_leaf || is_long(open_count[c]) ? 1u : 0u) << in_slot;
+                bool is_leaf = open_count[c] != 0, is_long_leaf = is_long(open_count[c]);
+                uint leaf = is_long_leaf ? LONG_LEAF_NODE : is_leaf ? SHORT_LEAF : 0;
+                Words(uvec2(slots)).word[at * WIDTH + in_slot] = open_name[c] | leaf;
+                node_mask |= (!is_leaf || is_long_leaf ? 1u : 0u) << in_slot;
                 records += open_count[c];
                 inner += is_leaf ? 0 : 1;
             }
         }
-        for (uint s = 0; s < WIDTH; ++s) {
-            if ((taken >> s & 1u) == 0u) slots.word[at * WIDTH + s] = NO_CHILD;
-        }
-        first_children.word[slot] = bitCount(node_mask);
-        if (QUANTISED && !is_paired()) first_records.word[slot] = records;
+        choices.word[slot] = bitCount(node_mask);
+        atomicOr(blocks.word[block_of(slot)], bit_in_block(slot));
+        atomicAdd(blocks.word[nodes_of_block(block_of(slot))], bitCount(node_mask));
+        if (QUANTISED && !is_paired()) note_units(slot, records);
     }
 
     uint next = of.x + of.y + place_in_next_level(level, inner);

@@ -29,10 +29,8 @@ uint order_of(Triangle first, Triangle second) {
 // Which slots of a wide node hold leaves.
 uint leaves_of(uint at) {
     uint leaves = 0;
-    for (uint s = 0; s < WIDTH; ++s) {
-        uint name = slots.word[at * WIDTH + s];
-        if (name != NO_CHILD && !is_inner(child_named(name))) leaves |= 1u << s;
-    }
+    NextSlots all = slots_of(at);
+    for (uint s = 0; s < WIDTH; ++s) leaves |= (is_leaf_in(take_slot(all)) ? 1u : 0u) << s;
     return leaves;
 }
 
@@ -52,7 +50,7 @@ uint pair_leaves(uint at) {
     Triangle first;
     while (record < end || leaves != 0u) {
         if (record >= end) {
-            Child leaf = child_named(slots.word[at * WIDTH + take_lowest(leaves)]);
+            Child leaf = child_in(word_of_slot(at, take_lowest(leaves)));
             record = leaf.index;
             end = end_of_leaf(leaf);
             seconds = 0;
@@ -91,6 +89,6 @@ uint pair_leaves(uint at) {
 void find_pairs() {
     if (!is_paired() || !can_be_collapsed(source.header)) return;
     uint count = levels.end;
-    for (uint k = 0, at = grid_item(0); at < count; at = grid_item(++k)) first_records.word[opened.node[at].slot] = pair_leaves(at);
+    for (uint k = 0, at = grid_item(0); at < count; at = grid_item(++k)) note_units(opened.node[at].slot, pair_leaves(at));
 }
 #endif

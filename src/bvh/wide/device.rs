@@ -6,7 +6,7 @@ use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::{NODES_OFFSET, node_slots};
 use crate::gpu::arguments;
 use crate::gpu::plan::Plan;
-use crate::gpu::{Context, Grid, Kernel, Recorder, Region, Sizes, Step, fill, scan, shaders};
+use crate::gpu::{Context, Grid, Kernel, Recorder, Region, Sizes, Step, scan, shaders};
 use crate::{Error, Result};
 use std::ops::Range;
 
@@ -57,6 +57,10 @@ const PHASE: &str = "wide";
 /// took twice as long in pieces of 64.
 const NODE_ROUNDS: u32 = 4;
 
+/// Slots of the source in a block, of which there are sums (wide/collapse.glsl). One node in some ten begins a wide one: a scan of all slots
+/// took 4% of the whole build.
+const SLOTS_OF_BLOCK: u32 = 16;
+
 /// Words of `Levels` in wide/collapse.glsl.
 const LEVEL_WORDS: u64 = 64 + 65 + 1;
 
@@ -101,11 +105,10 @@ struct Scratch {
     levels: u64,
     opened: u64,
     slots: u64,
-    /// How many children each slot has before its own; of quantised nodes also how many units of records, otherwise 0. Side by side: they
-    /// are summed up as one.
-    first_children: u64,
-    first_records: u64,
+    /// Of blocks of slots; what is summed up begins behind the first word of each.
+    blocks: u64,
     /// Of quantised nodes.
+    units: u64,
     places: u64,
     /// Of quantised trees of triangles.
     partners: u64,
@@ -116,7 +119,7 @@ impl WidePass {
     /// For a source built of `primitive_count` primitives, or of fewer.
     pub fn new(context: &Context, options: &WideOptions, primitive_count: u32) -> WidePass {
         let tuning = &context.tuning;
-        let scan = scan::Scan::new(context, sums_of(options.form) * (node_slots(primitive_count) + 1));
+        let scan = scan::Scan::new(context, sums_of(options.form) * (blocks_of(node_slots(primitive_count)) + 1));
         WidePass {
             options: *options,
             count: primitive_count,
@@ -146,9 +149,11 @@ impl WidePass {
         let mut take = |name, words: u64, life| take_of(&mut passing, name, words, life);
         let form = self.options.form;
         let (nodes, width) = (u64::from(form.nodes_at_most(self.count)), u64::from(form.width()));
-        let slots = u64::from(node_slots(self.count)) + 1;
         let of_slots = u64::from(node_slots(self.count));
-        let choices = take("choices", of_slots, WidePhase::Costs..=WidePhase::Open);
+        let choices = take("choices, and how many nodes each names", of_slots, WidePhase::Costs..=WidePhase::Nodes);
+        let block_count = u64::from(blocks_of(node_slots(self.count)));
+        let of_blocks = block_count + u64::from(sums_of(form)) * (block_count + 1);
+        let blocks = take("blocks of slots", of_blocks, WidePhase::Costs..=WidePhase::Nodes);
         let mut of_costs = |name, words| take(name, words * of_slots, WidePhase::Costs..=WidePhase::Costs);
         let starts = of_costs("starts of climbs", 1);
         let costs = of_costs("what names nodes, and costs in so many places", width);
@@ -156,9 +161,7 @@ impl WidePass {
         let opened = take("opened nodes", 2 * nodes, WidePhase::Open..=WidePhase::Nodes);
         let children = take("what names their children", width * nodes, WidePhase::Open..=WidePhase::Nodes);
         let is_quantised = form.is_quantised();
-        let of_sums = u64::from(sums_of(form)) * slots;
-        let first_children = take("first children, and first records", of_sums, WidePhase::Open..=WidePhase::Nodes);
-        let first_records = if is_quantised { first_children + 4 * slots } else { 0 };
+        let units = if is_quantised { take("units", of_slots, WidePhase::Open..=WidePhase::Nodes) } else { 0 };
         let sums = take("sums of tiles", self.scan.sums_words().into(), WidePhase::Scan..=WidePhase::Scan);
         let records = u64::from(self.count);
         let mut take = |name, words: u64, life| take_of(&mut lasting, name, words, life);
@@ -176,8 +179,8 @@ impl WidePass {
             levels,
             opened,
             slots,
-            first_children,
-            first_records,
+            blocks,
+            units,
             places,
             partners,
             sums,
@@ -308,8 +311,8 @@ impl WidePass {
             visits,
             hits,
             slots: passing + parts.slots,
-            first_children: passing + parts.first_children,
-            first_records: passing + parts.first_records,
+            blocks: passing + parts.blocks,
+            units: passing + parts.units,
             places: lasting + parts.places,
             partners: lasting + parts.partners,
             given_records: records[0],
@@ -324,12 +327,10 @@ impl WidePass {
         if self.is_alone() && records == [0; 2] {
             return Ok([vec![step(&shaders::BVH_WIDE_ALONE, &arguments, 1)], Vec::new()]);
         }
-        let summed = sums_of(form) * (arguments.source_slots + 1);
         let of_slots = self.grid.groups_for(arguments.source_slots);
         let mut steps = vec![
             step(&shaders::BVH_WIDE_LINKS, &arguments, of_slots),
             step(&shaders::BVH_WIDE_COSTS, &arguments, of_slots),
-            fill::step(PHASE, arguments.first_children, summed, 0),
         ];
         let few = |level, level_end| {
             (&shaders::BVH_WIDE_OPEN_FEW, arguments::WideCollapse { level, level_end, ..arguments }, 1)
@@ -345,7 +346,8 @@ impl WidePass {
             steps.push(step(&shaders::BVH_WIDE_PAIR, &arguments, groups));
         }
         let sums = passing + parts.sums;
-        let [values, results] = [arguments.first_children; 2];
+        // Behind which slots are opened.
+        let [values, results] = [arguments.blocks + 4 * u64::from(blocks_of(arguments.source_slots)); 2];
         steps.extend(self.scan.steps(PHASE, &scan::ScanBuffers { values, results, sums }));
         steps.push(step(&shaders::BVH_WIDE_NODES, &arguments, groups));
         let arguments = arguments::WideCollapse { given_records: records[1], ..arguments };
@@ -359,7 +361,12 @@ fn one_workgroup(shader: &'static shaders::Shader) -> bool {
     [&shaders::BVH_WIDE_OPEN_FEW, &shaders::BVH_WIDE_ALONE].contains(&shader)
 }
 
-/// How many words of each of the source's slots are summed up: the nodes that it names, and of quantised nodes the units of its records.
+/// Blocks of so many slots.
+const fn blocks_of(slots: u32) -> u32 {
+    slots.div_ceil(SLOTS_OF_BLOCK)
+}
+
+/// How many words of each block are summed up: the nodes that are named in it, and of quantised nodes the units of their records.
 const fn sums_of(form: Form) -> u32 {
     1 + form.is_quantised() as u32
 }
