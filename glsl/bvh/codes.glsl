@@ -12,6 +12,7 @@
 #include "gpu/pass.glsl"
 #include "bvh/geometry.glsl"
 #include "bvh/codes/axes.glsl"
+#include "gpu/whole.glsl"
 
 // What comes before the bits of the recipe: `Prefix` in src/bvh/codes/plan.rs. Kernels without have none of its code.
 layout(constant_id = 6) const uint CODE_PREFIX_WORD = 0;
@@ -131,7 +132,7 @@ float reciprocal_or_zero(float x) {
 
 // The largest integer whose square is at most x.
 uint integer_root(uint x) {
-    uint root = min(uint(sqrt(float(x))), 65535u);
+    uint root = min(whole(sqrt(float(x))), 65535u);
     // The device's root errs by a few ulp: at most one step either way, two to be safe.
     for (int i = 0; i < 2; ++i) {
         if (root * root > x) root -= 1;
@@ -305,7 +306,7 @@ uint size_of(CodePlan plan, Box b) {
     precise float squared = (e.x * e.x + e.y * e.y + e.z * e.z) * plan.size_reciprocal;
     if (squared >= 1.0) return 65535u;
     precise float fixed_point = squared * 4294967296.0;
-    return integer_root(uint(fixed_point));
+    return integer_root(long_whole(fixed_point));
 }
 
 // How many coordinate bits there are up to the one that halves an axis for the `halvings`th time; many where none does.

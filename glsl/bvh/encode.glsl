@@ -413,9 +413,12 @@ void encode_pairs(uint task, Encoder to) {
         uint at = begin - (before + sum_before(bitCount(seconds), total));
         before += total;
         uint left = begin < end ? (1u << end - begin) - 1u & ~seconds : 0u;
+        // `begin` goes on with the loop: as it was, LLVM found the invocation's number in each turn anew, by eight divisions.
         for (uint k = 0; k < PAIR_BLOCK && left != 0u; ++k) {
-            encode_reference(to, begin + findLSB(left), at++);
-            left &= left - 1u;
+            uint next = findLSB(left);
+            begin += next;
+            encode_reference(to, begin, at++);
+            left = left >> next & ~1u;
         }
     }
 }

@@ -3,6 +3,7 @@
 // how many on its right.
 #ifndef HEDGEROW_KDTREE_BIN
 #define HEDGEROW_KDTREE_BIN
+#include "gpu/whole.glsl"
 #include "kdtree/heuristic.glsl"
 
 // Of each axis, bins in which boxes begin, then those in which they end.
@@ -29,7 +30,7 @@ float plane_at(BinPlanes planes, uint number) {
 
 // A bin to begin with; which one has no say in the result.
 uint bin_near(BinPlanes planes, float x) {
-    return min(uint(clamp((x - planes.lo) * planes.bins_per_length, 0.0, float(BINS))), BINS - 1u);
+    return min(whole(clamp((x - planes.lo) * planes.bins_per_length, 0.0, float(BINS))), BINS - 1u);
 }
 
 // How many planes are not beyond x.

@@ -59,7 +59,7 @@ bool find_plane(SplitGrid grid, Box b, out SplitPlane plane) {
         precise float from_lo = (b.lo[axis] - grid.lo[axis]) * grid.cells_per_length[axis];
         precise float to_hi = (b.hi[axis] - grid.lo[axis]) * grid.cells_per_length[axis];
         precise float side = b.hi[axis] - b.lo[axis];
-        uint from = uint(clamp(from_lo, 0.0, CELLS - 1.0)), to = uint(clamp(to_hi, 0.0, CELLS - 1.0));
+        uint from = whole(clamp(from_lo, 0.0, CELLS - 1.0)), to = whole(clamp(to_hi, 0.0, CELLS - 1.0));
         // Rounding may put a side of the box a cell too far, no more.
         for (uint attempt = 0; attempt < 4 && from < to; ++attempt) {
             uint bit = uint(findMSB(from ^ to));

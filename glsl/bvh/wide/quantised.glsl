@@ -2,6 +2,7 @@
 #ifndef HEDGEROW_BVH_WIDE_QUANTISED
 #define HEDGEROW_BVH_WIDE_QUANTISED
 #include "bvh/wide.glsl"
+#include "gpu/whole.glsl"
 
 vec3 cells_of(uvec3 exponents) {
     return uintBitsToFloat(exponents << 23);
@@ -24,14 +25,14 @@ vec3 cells_from(vec3 origin, vec3 x, uvec3 exponents) {
 uvec3 bytes_below(vec3 x, vec3 origin, uvec3 exponents) {
     vec3 bytes = clamp(floor(cells_from(origin, x, exponents)), 0.0, 255.0);
     precise vec3 corner = origin + bytes * cells_of(exponents);
-    return uvec3(bytes) - uvec3(greaterThan(corner, x)) * uvec3(greaterThan(bytes, vec3(0.0)));
+    return whole(bytes) - uvec3(greaterThan(corner, x)) * uvec3(greaterThan(bytes, vec3(0.0)));
 }
 
 // The least bytes whose corner is not below x.
 uvec3 bytes_above(vec3 x, vec3 origin, uvec3 exponents) {
     vec3 bytes = clamp(ceil(cells_from(origin, x, exponents)), 0.0, 255.0);
     precise vec3 corner = origin + bytes * cells_of(exponents);
-    return uvec3(bytes) + uvec3(lessThan(corner, x)) * uvec3(lessThan(bytes, vec3(255.0)));
+    return whole(bytes) + uvec3(lessThan(corner, x)) * uvec3(lessThan(bytes, vec3(255.0)));
 }
 
 QuantisedNode empty_quantised_node() {
