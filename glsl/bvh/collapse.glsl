@@ -179,15 +179,30 @@ void write_placed(Structure structure, Placed placed) {
     }
 }
 
-// Large nodes go up to the root.
+// The large nodes of a task, side by side in any order: few are, and lanes without one would wait for those with one.
+shared uint large_count;
+shared uint large_slots[ITEMS * gl_WorkGroupSize.x];
+
+void list_large(uint task, Weights w) {
+    barrier();   // behind the task before
+    if (gl_LocalInvocationIndex == 0u) large_count = 0u;
+    barrier();
+    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
+    for (uint k = 0; k < ITEMS; ++k) {
+        uint slot = first + k * gl_WorkGroupSize.x;
+        if (slot < node_count() && is_large(w.counts.node[slot].all)) large_slots[atomicAdd(large_count, 1u)] = slot;
+    }
+    barrier();
+}
+
+// Large nodes go up to the root. All invocations of a workgroup come here together.
 void collapse_above(uint task) {
     Structure structure = Structure(structure_address);
     Weights w = weights();
     Placed placed = Placed(0u, false);
-    uint first = task * gl_WorkGroupSize.x * ITEMS + gl_LocalInvocationIndex;
-    for (uint k = 0; k < ITEMS; ++k) {
-        uint slot = first + k * gl_WorkGroupSize.x;
-        if (slot >= node_count() || !is_large(w.counts.node[slot].all)) continue;
+    list_large(task, w);
+    for (uint i = gl_LocalInvocationIndex; i < large_count; i += gl_WorkGroupSize.x) {
+        uint slot = large_slots[i];
         Place place = Place(0u, 0u, false);
         uint link = w.parents.word[slot];
         for (uint level = 0; level < node_count() && link != NO_PARENT; ++level) {

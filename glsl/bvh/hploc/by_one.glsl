@@ -57,11 +57,12 @@ uint first_slots_of_pairs() {
     return pairs;
 }
 
-// Merges the pair whose first slot is `first`.
+// Merges the pair whose first slot is `first`, which is not the last one, as the second is not the first one. A slot keeps the first position
+// of its cluster, which is the merged one's: nine words are chosen and put back, not ten.
 void merge_slots(Structure structure, Weights w, uint first, float area_scale) {
     Cluster left = slot_cluster[0];
     uint second = first ^ slot_apart[0];
-    [[unroll]] for (uint i = 1; i < SLOTS; ++i) {
+    [[unroll]] for (uint i = 1; i < SLOTS - 1u; ++i) {
         if (first == i) {
             left = slot_cluster[i];
             second = first ^ slot_apart[i];
@@ -73,7 +74,9 @@ void merge_slots(Structure structure, Weights w, uint first, float area_scale) {
     }
     Cluster merged = merge_clusters(structure, w, left, right, area_scale);
     [[unroll]] for (uint i = 0; i < SLOTS; ++i) {
-        if (first == i) slot_cluster[i] = merged;
+        uint position = slot_cluster[i].first;
+        if (first == i && i < SLOTS - 1u) slot_cluster[i] = merged;
+        slot_cluster[i].first = position;
         if (second == i) slot_is_there[i] = false;
     }
 }
