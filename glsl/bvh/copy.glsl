@@ -56,9 +56,14 @@ void write_wrong_version(Structure structure) {
     mark_unused(structure, 0);
 }
 
+// Whether there is anything in it, and it can be traced.
+bool holds_something(Header header) {
+    return header.active_count != 0 && (header.status & STATUS_UNUSABLE) == 0u;
+}
+
 // The header of the compacted structure.
 Header compacted(Header header) {
-    if (header.active_count == 0 || (header.status & STATUS_UNUSABLE) != 0u) {
+    if (!holds_something(header)) {
         header.root = empty_root();
         header.active_count = 0;
         header.inner_nodes = 0;

@@ -20,7 +20,8 @@ const uint LONG_LEAF = 0x00FFFFFFu;
 // Leaves of more records are such nodes.
 const uint LEAF_MAX = 255;
 
-// Nodes of floats: as many children as the tree is wide.
+// Nodes of floats: as many children as the tree is wide. A header is as long as so many.
+const uint HEADER_CHILDREN = 4;
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer Children { Child child[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) nonprivate buffer QuantisedNodes { QuantisedNode node[]; };
 

@@ -27,6 +27,10 @@ uint first_piece() {
 
 // The k-th item of this invocation.
 uint grid_item(uint k) {
+#ifdef HEDGEROW_ONE_WORKGROUP
+    // What is below comes to that, and is long for a kernel that does everything.
+    return k * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+#endif
     uint piece = k / GRID_ROUNDS * group_count() + first_piece();
     return piece * grid_piece() + k % GRID_ROUNDS * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
 }

@@ -101,7 +101,7 @@ layout(push_constant, scalar) uniform WideCollapseArguments {
 };
 
 bool can_be_collapsed(Header header) {
-    return is_binary(header) && compacted(header).active_count != 0;
+    return is_binary(header) && holds_something(header);
 }
 
 bool has_numbers() {
@@ -185,7 +185,7 @@ uint units_of_leaf(Child leaf) {
 
 Child child_named(uint name) {
     if (name == WHOLE_TREE) return source.header.root;
-    return Children(address_of(wide_nodes_at(uvec2(source)), name, 32)).child[0];
+    return Children(uvec2(source)).child[HEADER_CHILDREN + name];
 }
 
 Child child_in(uint slot) {

@@ -29,8 +29,7 @@ const uint QUADS = WIDTH / 4;
 // How many slots there are to look at.
 uint slots_in_use() {
     Header header = source.header;
-    bool usable = is_binary(header) && compacted(header).active_count != 0u;
-    return usable && header.root.count == 0u && header.node_slots <= source_slots ? header.node_slots : 0u;
+    return can_be_collapsed(header) && header.root.count == 0u && header.node_slots <= source_slots ? header.node_slots : 0u;
 }
 
 bool is_inner(Child child, uint node_slots) {

@@ -5,10 +5,6 @@
 #include "bvh/wide/far.glsl"
 #include "bvh/wide/quantised.glsl"
 
-uvec2 address_of_node(uint index) {
-    return address_of(wide_nodes_at(target), index, wide_node_bytes(WIDTH, QUANTISED));
-}
-
 // The nodes that wide nodes of lower blocks name.
 uint nodes_before_block(uint block) {
     return blocks.word[nodes_of_block(block)];
@@ -36,13 +32,21 @@ uvec2 all_before(uint slot) {
     return before;
 }
 
+void write_quantised(uint index, QuantisedNode node) {
+    QuantisedNodes(wide_nodes_at(target)).node[index] = node;
+}
+
+void write_child(uint index, uint s, Child child) {
+    Children(target).child[HEADER_CHILDREN + WIDTH * index + s] = child;
+}
+
 void write_empty_node() {
     if (QUANTISED) {
-        QuantisedNodes(address_of_node(0)).node[0] = empty_quantised_node();
+        write_quantised(0, empty_quantised_node());
         return;
     }
     Child unused = Child(uintBitsToFloat(uvec3(0x7F800000u)), UNUSED, uintBitsToFloat(uvec3(0xFF800000u)), UNUSED);
-    for (uint s = 0; s < WIDTH; ++s) Children(address_of_node(0)).child[s] = unused;
+    for (uint s = 0; s < WIDTH; ++s) write_child(0, s, unused);
 }
 
 void write_header(bool there_is) {
@@ -61,7 +65,6 @@ void write_header(bool there_is) {
 }
 
 void write_node(uint at, uint index, uint next_node) {
-    Children node = Children(address_of_node(index));
     NextSlots all = slots_of(at);
     for (uint s = 0; s < WIDTH; ++s) {
         uint in_slot = take_slot(all);
@@ -70,7 +73,7 @@ void write_node(uint at, uint index, uint next_node) {
             child = child_in(in_slot);
             if (is_inner(child)) child.index = next_node++;
         }
-        node.child[s] = child;
+        write_child(index, s, child);
     }
 }
 
@@ -109,7 +112,7 @@ void write_quantised_node(uint at, uint index, uint slot, uint next_node, uint n
             if (is_leaf_in(in_slot)) {
                 uint first = is_node ? first_of_long : next_record;
                 units = place_leaf(child, first);
-                if (is_node) QuantisedNodes(address_of_node(next_node)).node[0] = long_leaf_node(first, units);
+                if (is_node) write_quantised(next_node, long_leaf_node(first, units));
                 if (is_node) first_of_long += units;
                 else next_record += units;
             }
@@ -119,7 +122,7 @@ void write_quantised_node(uint at, uint index, uint slot, uint next_node, uint n
         }
         put_into_next_slot(bytes, below, above, is_node, units);
     }
-    QuantisedNodes(address_of_node(index)).node[0] = quantised_node_of(bytes, b.lo, exponents, first_child, first_record);
+    write_quantised(index, quantised_node_of(bytes, b.lo, exponents, first_child, first_record));
 }
 
 void write_nodes() {
