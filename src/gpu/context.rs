@@ -3,7 +3,7 @@
 use super::execution_modes::ExecutionModes;
 use super::requirements::{self, Optional, SubgroupSizes};
 use super::shaders::{Shader, Takes};
-use super::{Tuning, TuningChoice, Workarounds, longs, specialise};
+use super::{Tuning, TuningChoice, Workarounds, lanes, longs, specialise};
 use crate::{Error, Result};
 use ash::vk;
 use std::collections::{HashMap, HashSet};
@@ -195,6 +195,12 @@ impl Kernel {
         ["bvh/", "accel/"].iter().any(|room| self.shader.name.starts_with(room))
     }
 
+    /// Whether invocations are numbered by their subgroup where a workgroup is one: those of such builds, and what all passes share. Tracers and
+    /// builds of kd-trees gain nothing by it.
+    fn is_numbered_by_subgroup(&self) -> bool {
+        self.builds_bvhs() || self.shader.name.starts_with("gpu/")
+    }
+
     /// The same in workgroups of `workgroup` invocations.
     pub(crate) fn in_workgroups_of(mut self, workgroup: u32) -> Kernel {
         self.constants[0] = workgroup;
@@ -372,6 +378,10 @@ impl Context {
         let mut words = specialise::specialised(&words, &constants);
         if self.tuning.build.in_longs && kernel.builds_bvhs() {
             words = longs::in_longs(&words);
+        }
+        let is_one_subgroup = kernel.workgroup() == self.limits.subgroup_size;
+        if is_one_subgroup && self.can_require_subgroups(kernel.workgroup()) && kernel.is_numbered_by_subgroup() {
+            words = lanes::numbered_by_subgroup(&words);
         }
         let words = self.execution_modes.added_to(&words);
         let module_info = vk::ShaderModuleCreateInfo::default().code(&words);

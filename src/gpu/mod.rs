@@ -12,6 +12,7 @@ mod features;
 #[doc(hidden)]
 pub mod fill;
 mod grid;
+mod lanes;
 mod longs;
 pub(crate) mod plan;
 pub mod radix_sort;
