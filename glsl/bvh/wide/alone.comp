@@ -10,13 +10,18 @@
 #include "bvh/wide/records.glsl"
 #include "gpu/scan_range.glsl"
 
+void clear_blocks() {
+    for (uint i = gl_LocalInvocationIndex; i < block_words(); i += gl_WorkGroupSize.x) blocks.word[i] = 0u;
+}
+
 void main() {
     find_links(slots_in_use());
-    clear_blocks();
     next_phase();
     climb(slots_in_use());
     next_phase();
     // Links and costs are not read any more: what follows may lie in their memory.
+    clear_blocks();
+    next_phase();
     open_levels(0, LEVELS_AT_MOST);
     find_pairs();
     next_phase();

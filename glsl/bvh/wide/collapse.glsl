@@ -1,6 +1,7 @@
 // Collapses a Bvh2 into a wide tree: src/bvh/wide/device.rs records the steps, src/bvh/twin/wide.rs is the twin.
 //
-//   (choices)        bvh/wide/costs.glsl: which binary nodes a wide one takes in; blocks (zero)
+//   (choices)        bvh/wide/costs.glsl: which binary nodes a wide one takes in
+//   (cleared)        blocks
 //   open_few         reads the source, choices, opened of a level writes slots, opened of the next level, levels, choices: how many nodes
 //                                                                 each names, units, blocks; of the first level also that
 //   open             the same of one level

@@ -1,8 +1,7 @@
 // Which binary nodes a wide node takes in, so that all wide nodes together cost least: src/bvh/twin/wide/costs.rs is the twin and has
 // the rules, src/bvh/wide/device.rs records the step.
 //
-//   links  reads the source                   writes starts, costs: what names a node; choices: how many of a node's children are nodes;
-//                                             blocks (zero)
+//   links  reads the source                   writes starts, costs: what names a node; choices: how many of a node's children are nodes
 //   costs  reads the source, starts, costs    writes choices, costs
 //
 // A climb begins at each node over two leaves; of two inner children the second that is done goes on with their parent.
@@ -136,10 +135,6 @@ void find_links(uint node_slots) {
     }
     uint end = grid_item(found);
     if (end < node_slots) starts.word[end] = NO_LINK;
-}
-
-void clear_blocks() {
-    for (uint k = 0, i = grid_item(0); i < block_words(); i = grid_item(++k)) blocks.word[i] = 0u;
 }
 
 // The `k`th node of this invocation's over two leaves, or NO_LINK.

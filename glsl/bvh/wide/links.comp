@@ -4,5 +4,4 @@
 
 void main() {
     find_links(slots_in_use());
-    clear_blocks();
 }

@@ -6,7 +6,7 @@ use crate::bvh::geometry::Primitives;
 use crate::bvh::layout::{NODES_OFFSET, node_slots};
 use crate::gpu::arguments;
 use crate::gpu::plan::Plan;
-use crate::gpu::{Context, Grid, Kernel, Recorder, Region, Sizes, Step, scan, shaders};
+use crate::gpu::{Context, Grid, Kernel, Recorder, Region, Sizes, Step, fill, scan, shaders};
 use crate::{Error, Result};
 use std::ops::Range;
 
@@ -151,9 +151,6 @@ impl WidePass {
         let (nodes, width) = (u64::from(form.nodes_at_most(self.count)), u64::from(form.width()));
         let of_slots = u64::from(node_slots(self.count));
         let choices = take("choices, and how many nodes each names", of_slots, WidePhase::Costs..=WidePhase::Nodes);
-        let block_count = u64::from(blocks_of(node_slots(self.count)));
-        let of_blocks = block_count + u64::from(sums_of(form)) * (block_count + 1);
-        let blocks = take("blocks of slots", of_blocks, WidePhase::Costs..=WidePhase::Nodes);
         let mut of_costs = |name, words| take(name, words * of_slots, WidePhase::Costs..=WidePhase::Costs);
         let starts = of_costs("starts of climbs", 1);
         let costs = of_costs("what names nodes, and costs in so many places", width);
@@ -161,6 +158,7 @@ impl WidePass {
         let opened = take("opened nodes", 2 * nodes, WidePhase::Open..=WidePhase::Nodes);
         let children = take("what names their children", width * nodes, WidePhase::Open..=WidePhase::Nodes);
         let is_quantised = form.is_quantised();
+        let blocks = take("blocks of slots", self.block_words(), WidePhase::Open..=WidePhase::Nodes);
         let units = if is_quantised { take("units", of_slots, WidePhase::Open..=WidePhase::Nodes) } else { 0 };
         let sums = take("sums of tiles", self.scan.sums_words().into(), WidePhase::Scan..=WidePhase::Scan);
         let records = u64::from(self.count);
@@ -185,6 +183,12 @@ impl WidePass {
             partners,
             sums,
         }
+    }
+
+    /// Of each block which slots are opened, then what is summed up, of every block and one more.
+    fn block_words(&self) -> u64 {
+        let block_count = u64::from(blocks_of(node_slots(self.count)));
+        block_count + u64::from(sums_of(self.options.form)) * (block_count + 1)
     }
 
     /// Bytes of scratch memory that are in use until the nodes are there.
@@ -331,6 +335,7 @@ impl WidePass {
         let mut steps = vec![
             step(&shaders::BVH_WIDE_LINKS, &arguments, of_slots),
             step(&shaders::BVH_WIDE_COSTS, &arguments, of_slots),
+            fill::step(PHASE, arguments.blocks, self.block_words() as u32, 0),
         ];
         let few = |level, level_end| {
             (&shaders::BVH_WIDE_OPEN_FEW, arguments::WideCollapse { level, level_end, ..arguments }, 1)
