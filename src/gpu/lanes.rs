@@ -1,7 +1,7 @@
 //! Workgroups that are one subgroup: there an invocation's number in the workgroup may be that in the subgroup.
 //!
 //! A driver of a CPU knows the latter, its lanes being constants. lavapipe finds the former by eight divisions, and LLVM finds it anew behind
-//! each barrier and in loops: a quarter of the samples of kernels that build small trees by one workgroup (docs/notes/rays.md). Sources know
+//! each barrier and in loops: a fifth of the samples of kernels that build small trees by one workgroup (docs/notes/rays.md). Sources know
 //! nothing of it, for most devices have several subgroups in a workgroup: a module is rewritten when its pipeline is made.
 
 use super::spirv::{HEADER_WORDS, Instructions, op, opcode, push};
