@@ -90,7 +90,7 @@ layout(push_constant, scalar) uniform WideCollapseArguments {
     LinkCounts visits;       // of the source's links, by visits
     LinkCounts hits;         // and by hits
     Quads slots;             // what each of opened has in its slots, WIDTH words
-    Words blocks;
+    Words blocks;            // see SLOTS_OF_BLOCK
     Words units;             // of quantised nodes: of each of the source's slots that is opened, units of its records
     Words places;            // of quantised nodes: in which of the target's units each of the source's records lies
     Words partners;          // of each of the source's records, if it is a triangle: see pair.comp

@@ -58,7 +58,7 @@ const PHASE: &str = "wide";
 const NODE_ROUNDS: u32 = 4;
 
 /// Slots of the source in a block, of which there are sums (wide/collapse.glsl). One node in some ten begins a wide one: a scan of all slots
-/// took 4% of the whole build.
+/// took 3 to 4% of a build.
 const SLOTS_OF_BLOCK: u32 = 16;
 
 /// Words of `Levels` in wide/collapse.glsl.
