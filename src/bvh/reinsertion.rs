@@ -7,8 +7,8 @@
 //!
 //! A round has three steps, each done for all links at once that the round tries:
 //!
-//! 1. *search*: of the subtree at each link, the move that shortens the sum of the nodes' areas most: up through all pivots, and
-//!    down on their other side as long as there may be more to gain than was found, into at most 32 nodes;
+//! 1. *search*: of the subtree at each link, the move that shortens the sum of the nodes' areas most: up through ten pivots (all of
+//!    them, in the paper), and down on their other side as long as there may be more to gain than was found, into at most 32 nodes;
 //! 2. *match*: a move is made if no other across a node of its path (from the parent up to the pivot, and from there down to
 //!    the new place) gains more, or as much with a smaller link;
 //! 3. *move*: of each such path, the links, boxes and parents.
@@ -151,14 +151,18 @@ const STRIDE: u32 = 64;
 const LEAST_LINKS: u32 = 128;
 /// Subtrees that a search may put off; what does not find room is not looked at.
 pub(super) const STACK: usize = 32;
-/// Nodes that a search looks into, at most.
+/// Pivots of a search, at most.
+pub(super) const LEVELS: usize = 10;
+/// Nodes that a search looks into below them, at most.
 pub(super) const VISITS: u32 = 32;
-/// Nodes that a path may have on either side.
-pub(super) const PATH: usize = 256;
 /// A gain counts if it is more than this share of the pivot's area: less may be rounding.
 pub(super) const LEAST_SHARE: f32 = 1.0 / 1_048_576.0;
 /// And more than this, the scene's longest edge being about 1: less may be made of numbers that devices take for zero.
 pub(super) const LEAST_GAIN: f32 = 1.0 / 1_152_921_504_606_846_976.0;
+/// And as this at most: a round's gains take 30 bits of a word.
+pub(super) const MOST_GAIN: f32 = f32::from_bits(LEAST_GAIN.to_bits() + (1 << 30) - 1);
+/// Rounds until what moves gain and which are first are zeros again: as many as the rest of the word tells apart.
+const ROUNDS_A_FILL: u32 = 4;
 
 /// Bytes of `Move` in reinsertion.glsl.
 const MOVE_BYTES: u64 = 12;
@@ -242,7 +246,7 @@ impl Reinsertion {
     }
 
     /// Records all rounds on `structure`, in place, with scratch memory of [`Reinsertion::scratch_bytes`]; both aligned
-    /// to 16 bytes. Five dispatches a round with barriers between; the caller places one before and one behind. Label: `optimise`.
+    /// to 16 bytes. Four dispatches a round, and one more in every fourth, with barriers between; the caller places one before and one behind. Label: `optimise`.
     ///
     /// # Errors
     /// The memory is too small; a pipeline could not be made.
@@ -260,7 +264,7 @@ impl Reinsertion {
     /// A tree that becomes deeper than tracers can walk has the status [`TOO_DEEP`](super::layout::status::TOO_DEEP) and is traced as if it
     /// were empty. So rounds go to a copy, which [`crate::trace::trial`] may refuse.
     ///
-    /// Five dispatches a round with barriers between; the caller places one before and one behind. Label: `optimise`.
+    /// Four dispatches a round, and one more in every fourth, with barriers between; the caller places one before and one behind. Label: `optimise`.
     ///
     /// # Errors
     /// The memory is too small; the share is out of range; a pipeline could not be made.
@@ -399,6 +403,7 @@ impl Run {
             part,
             offset,
             stride: of.stride,
+            since_fill: 0,
             rounds: of.rounds,
             link_count: of.link_count(),
             by_rays,
@@ -406,8 +411,12 @@ impl Run {
     }
 
     fn step(&self, shader: &'static shaders::Shader, offset: u32, items: u32) -> Step {
+        self.step_with(shader, &self.arguments(offset), items)
+    }
+
+    fn step_with(&self, shader: &'static shaders::Shader, arguments: &arguments::Reinsertion, items: u32) -> Step {
         let kernel = self.of.kernel(shader, self.grid != 0, self.areas);
-        Step::new(self.phase, kernel, &self.arguments(offset), self.of.grid.groups_for(items))
+        Step::new(self.phase, kernel, arguments, self.of.grid.groups_for(items))
     }
 
     /// How many links a round tries.
@@ -430,9 +439,10 @@ impl Run {
 
     fn round(&self, round: u32) -> impl Iterator<Item = Step> {
         let offset = (self.of.first_round + round) % self.of.stride;
-        let gains = self.arguments(0).gains;
-        let unlock = fill::step(self.phase, gains, 2 * self.of.slots, 0);
-        [unlock].into_iter().chain(STEPS.map(|shader| self.step(shader, offset, self.tried())))
+        let since_fill = round % ROUNDS_A_FILL;
+        let arguments = arguments::Reinsertion { since_fill, ..self.arguments(offset) };
+        let fills = (since_fill == 0).then(|| fill::step(self.phase, arguments.gains, 2 * self.of.slots, 0));
+        fills.into_iter().chain(STEPS.map(|shader| self.step_with(shader, &arguments, self.tried())))
     }
 }
 

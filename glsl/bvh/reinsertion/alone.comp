@@ -19,8 +19,8 @@ void clear_gains() {
 void main() {
     find_parents();
     for (uint round = 0; round < rounds; ++round) {
-        begin_round((offset + round) % stride);
-        clear_gains();
+        begin_round((offset + round) % stride, round % ROUNDS_A_FILL);
+        if (round % ROUNDS_A_FILL == 0u) clear_gains();
         next_phase();
         search_moves();
         next_phase();

@@ -3,7 +3,7 @@
 #include "bvh/reinsertion.glsl"
 
 void main() {
-    begin_round(offset);
+    begin_round(offset, since_fill);
     Sum64 sum = Sum64(0u, 0u);
     uint count = 0;
     for (uint k = 0, i = grid_item(0); i < tried(); i = grid_item(++k)) {

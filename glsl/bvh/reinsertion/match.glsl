@@ -8,7 +8,7 @@ void match_moves() {
         Move m = moves.move[i];
         if (m.to == NONE) continue;
         for (Path path = path_of(link_of(i), m); path.slot != NONE; advance(path)) {
-            if (gains.word[path.slot] == m.gain) atomicMax(firsts.word[path.slot], ~link_of(i));
+            if (gains.word[path.slot] == rank_of_gain(m.gain)) atomicMax(firsts.word[path.slot], rank_of_link(link_of(i)));
         }
     }
 }

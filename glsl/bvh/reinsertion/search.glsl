@@ -5,35 +5,44 @@
 
 // Subtrees that are put off; what does not find room is not looked at.
 const uint STACK = 32;
-// Nodes that a search looks into, at most. Few look into more, and those find little there: over six scenes trees cost the same within
-// 0.1% (with 64 to five digits). Where some subtrees are far larger than others, rounds would take eight times as long without it.
-const uint VISITS = 32;
 // Of those, the first that lie in shared memory: a GPU has an invocation's own arrays far away.
 layout(constant_id = 2) const uint SHARED_ENTRIES = 0;
-// A gain counts if it is more than this share of the pivot's cost (less may be rounding) and more than this (less may be made of
-// numbers that devices take for zero).
+// A gain counts if it is more than this share of the pivot's cost: less may be rounding.
 const float LEAST_SHARE = 1.0 / 1048576.0;
-const float LEAST_GAIN = 1.0 / 1152921504606846976.0;
 
+// A search on its way: up from the parent, and at each node of that, the pivot, down on the other side.
 struct Search {
     Box moving;
     float moving_cost;
-    float scale;
     float moving_by_rays;   // the part of its cost that is not its area
-    float of_rays;
+    uint sibling;           // the link beside the one where it hangs
+    uint at;                // the link on the way up that was come by
+    uint level;             // nodes of the way up that were looked at
     uint pivot;
-    float least;     // what a gain must exceed at this pivot
+    float least;            // what a gain must exceed at this pivot
+    float saved;            // what all nodes cost less, without a new one
+    Box left_behind;        // what is left below the pivot on the side that the subtree leaves
     uint visits;
+    uint height;            // subtrees that are put off
     uint best_to;
     uint best_pivot;
     float best_gain;
 };
+
+// Of all of them.
+float area_scale;
+float rays_weigh;
+uint root;
+uint node_slots;
 
 // A node that may be looked into, and what would be saved if the move went below it.
 struct Below {
     uint slot;
     float saved;
 };
+
+// Of a search. Each is a pivot, a visit below, or a subtree less that is put off; a visit puts off one.
+const uint TURNS = LEVELS + 2 * VISITS + 1;
 
 const uint SHARED_SIZE = SHARED_ENTRIES == 0 ? 1 : SHARED_ENTRIES * gl_WorkGroupSize.x;
 shared Below put_off_first[SHARED_SIZE];
@@ -61,129 +70,134 @@ bool may_gain(Search s, Below b) {
 
 // What would be saved below a child that a move has grown to this cost.
 Below below(uint at, Child child, float saved, float merged, Search s) {
-    precise float left = saved - (merged - cost_at(at, child, s.scale));
+    precise float left = saved - (merged - cost_at(at, child, area_scale));
     return Below(child.count == 0u ? child.index : NONE, left);
 }
 
 // What a box by rays costs at least, around what moves and a child of this cost: to ask the grid takes many times as long.
 float least_cost(Search s, Box merged, Child child, float cost) {
-    precise float by_rays = cost - area_of(box_of(child), s.scale);
-    precise float least = area_of(merged, s.scale) + max(by_rays, s.moving_by_rays);
+    precise float by_rays = cost - area_of(box_of(child), area_scale);
+    precise float least = area_of(merged, area_scale) + max(by_rays, s.moving_by_rays);
     return least;
 }
 
-// What a move to link `at`, where `child` hangs, would gain.
-Below look(inout Search s, uint at, Child child, float saved) {
+// What a move to link `at`, where `child` hangs, would gain, if that `counts`. Beside the own sibling a move would tie a cycle: the box around both
+// is the parent's, which costs what is saved, so it gains nothing.
+Below look(inout Search s, uint at, Child child, float saved, bool counts) {
     Box box = around(box_of(child), s.moving);
-    if (BY_RAYS) {
+    bool is_sibling = at == s.sibling;
+    if (BY_RAYS && !is_sibling) {
         float own = costs.value[at];
         float least = least_cost(s, box, child, own);
         precise float most = saved - least;
         precise float most_below = saved - (least - own) - s.moving_cost;
         if (most <= bar(s) && (child.count != 0u || most_below <= bar(s))) return Below(NONE, 0.0);
     }
-    float merged = cost_of(box, s.scale, s.of_rays);
+    float merged = is_sibling ? saved : cost_of(box, area_scale, rays_weigh);
     precise float gain = saved - merged;
-    if (gain > bar(s)) {
+    if (counts && gain > bar(s)) {
         s.best_to = at;
         s.best_pivot = s.pivot;
         s.best_gain = gain;
     }
-    return below(at, child, saved, merged, s);
-}
-
-// Into the subtree on the other side of the pivot.
-void search_below(inout Search s, Below next) {
-    uint height = 0;
-    for (uint turn = 0; turn < link_count && s.visits < VISITS; ++turn) {
-        if (may_gain(s, next)) {
-            s.visits++;
-            Node node = structure.nodes[next.slot];
-            Below left = look(s, 2u * next.slot, node.left, next.saved);
-            Below right = look(s, 2u * next.slot + 1u, node.right, next.saved);
-            bool swap = right.saved > left.saved;
-            Below far = left, near = right;
-            if (!swap) {
-                far = right;
-                near = left;
-            }
-            if (may_gain(s, far) && height < STACK) put(height++, far);
-            if (may_gain(s, near) && height < STACK) put(height++, near);
-        }
-        if (height == 0u) break;
-        next = take(--height);
-    }
-}
-
-// Whether the new place is no more than PATH nodes below the pivot.
-bool is_path_walkable(uint to, uint pivot) {
-    uint slot = to >> 1;
-    for (uint level = 0; level < PATH; ++level) {
-        if (slot == pivot) return true;
-        slot = above(slot);
-    }
-    return false;
+    Below next = below(at, child, saved, merged, s);
+    if (!counts) next.slot = NONE;
+    return next;
 }
 
 // Of a node, by rays.
-float known_cost(uint slot, uint root) {
+float known_cost(uint slot) {
     return slot == root ? uintBitsToFloat(totals.word[TOTALS_ROOT]) : costs.value[parents.word[slot]];
 }
 
-Move search(uint link) {
-    uint parent = link >> 1, root = structure.header.root.index;
-    Move none = Move(NONE, NONE, 0u);
-    if (!is_used(parent) || parent == root) return none;
-    Search s;
-    s.moving = box_of(child_at(link));
-    s.scale = structure.header.area_scale;
-    s.of_rays = ratio();
-    s.moving_cost = cost_at(link, child_at(link), s.scale);
-    precise float moving_by_rays = s.moving_cost - area_of(s.moving, s.scale);
-    s.moving_by_rays = moving_by_rays;
-    s.visits = 0;
-    s.best_to = NONE;
-    s.best_pivot = NONE;
-    s.best_gain = 0.0;
-    // What all nodes cost less, without a new one; so far, the parent's cost.
-    precise float saved = 0.0;
-    // What is left below the pivot on the side that the subtree leaves.
-    Box left_behind;
-    uint at = link;
-    for (uint level = 0; level < PATH; ++level) {
-        s.pivot = at >> 1;
-        Node node = structure.nodes[s.pivot];
-        Child other = (at & 1u) == 0u ? node.right : node.left;
-        Box pivot_box = around(box_of(node.left), box_of(node.right));
-        float pivot_cost = BY_RAYS ? known_cost(s.pivot, root) : area_of(pivot_box, s.scale);
-        if (level == 0u) saved = pivot_cost;
-        s.least = max(LEAST_SHARE * pivot_cost, LEAST_GAIN);
-        // A move beside the own sibling would tie a cycle. It is never looked at: the box around both is the parent's.
-        Below next;
-        if (level == 0u) next = below(at ^ 1u, other, saved, pivot_cost, s);
-        else next = look(s, at ^ 1u, other, saved);
-        search_below(s, next);
-        if (s.pivot == root) break;
-        if (level == 0u) {
-            left_behind = box_of(other);
-        } else {
-            left_behind = around(left_behind, box_of(other));
-            // What is inside of a box, and does not touch its faces, leaves it as it is.
-            if (!BY_RAYS || left_behind != pivot_box) saved = saved + (pivot_cost - cost_of(left_behind, s.scale, s.of_rays));
-        }
-        at = parents.word[s.pivot];
+// Of a subtree's best move, before anything was looked at.
+Search search_from(uint link) {
+    Box nothing = Box(vec3(0.0), vec3(0.0));
+    return Search(nothing, 0.0, 0.0, link ^ 1u, link, 0u, NONE, 0.0, 0.0, nothing, 0u, 0u, NONE, NONE, 0.0);
+}
+
+// To the node at `slot`: the next pivot, or `next` below the one at hand. What to look into then, if it may gain.
+Below visit(inout Search s, uint slot, Below next, bool goes_up) {
+    Node node = structure.nodes[slot];
+    bool is_left = (s.at & 1u) == 0u, begins = goes_up && s.level == 0u;
+    Child from = is_left ? node.left : node.right, other = is_left ? node.right : node.left;
+    Box pivot_box = around(box_of(node.left), box_of(node.right));
+    float pivot_cost = 0.0;
+    if (begins) {
+        s.moving = box_of(from);
+        s.moving_cost = cost_at(s.at, from, area_scale);
+        precise float by_rays = s.moving_cost - area_of(s.moving, area_scale);
+        s.moving_by_rays = by_rays;
     }
-    if (s.best_to == NONE || !is_path_walkable(s.best_to, s.best_pivot)) return none;
-    return Move(s.best_to, s.best_pivot, floatBitsToUint(s.best_gain));
+    if (goes_up) {
+        s.pivot = slot;
+        pivot_cost = BY_RAYS ? known_cost(slot) : area_of(pivot_box, area_scale);
+        if (begins) s.saved = pivot_cost;
+        s.least = max(LEAST_SHARE * pivot_cost, uintBitsToFloat(LEAST_GAIN));
+        next.saved = s.saved;
+    }
+    s.visits += goes_up ? 0u : 1u;
+    Below left = look(s, 2u * slot, node.left, next.saved, !goes_up || !is_left);
+    Below right = look(s, 2u * slot + 1u, node.right, next.saved, !goes_up || is_left);
+    bool swap = right.saved > left.saved;
+    Below far = left, near = right;
+    if (!swap) {
+        far = right;
+        near = left;
+    }
+    bool far_may_gain = may_gain(s, far), near_may_gain = may_gain(s, near);
+    if (far_may_gain && near_may_gain && s.height < STACK) put(s.height++, far);
+    if (!near_may_gain) near = far;
+    if (s.visits == VISITS) {
+        near.slot = NONE;
+        s.height = 0u;
+    }
+    if (goes_up) {
+        Box both = around(s.left_behind, box_of(other));
+        // What is inside of a box, and does not touch its faces, leaves it as it is.
+        if (!begins && (!BY_RAYS || both != pivot_box)) {
+            precise float saved = s.saved + (pivot_cost - cost_of(both, area_scale, rays_weigh));
+            s.saved = saved;
+        }
+        s.left_behind = both;
+        if (begins) s.left_behind = box_of(other);
+        s.level++;
+        bool is_unused = begins && node.left.count == UNUSED;
+        if (is_unused) {
+            s.level = LEVELS;
+            s.best_to = NONE;
+            near.slot = NONE;
+        }
+    }
+    return near;
+}
+
+// Up and down in one loop: invocations side by side go on while others look into more below their pivots.
+Move search(uint link) {
+    Search s = search_from(link);
+    Below next = Below(NONE, 0.0);
+    bool stays = link >> 1 == root || link >> 1 >= node_slots, ends = false;
+    for (uint turn = 0; turn < TURNS && !stays && !ends; ++turn) {
+        if (!may_gain(s, next) && s.height != 0u) next = take(--s.height);
+        bool goes_below = may_gain(s, next), goes_up = !goes_below && s.height == 0u;
+        ends = goes_up && (s.level == LEVELS || s.pivot == root);
+        if (goes_up && !ends && s.level != 0u) s.at = parents.word[s.pivot];
+        if ((goes_below || goes_up) && !ends) next = visit(s, goes_up ? s.at >> 1 : next.slot, next, goes_up);
+    }
+    return Move(s.best_to, s.best_pivot, min(floatBitsToUint(s.best_gain), MOST_GAIN));
 }
 
 void search_moves() {
     if (AREAS != AREAS_WHOLE) clip = part.box;
+    area_scale = structure.header.area_scale;
+    rays_weigh = ratio();
+    root = structure.header.root.index;
+    node_slots = structure.header.node_slots;
     for (uint k = 0, i = grid_item(0); i < tried(); i = grid_item(++k)) {
         Move m = search(link_of(i));
         moves.move[i] = m;
         if (m.to == NONE) continue;
-        for (Path path = path_of(link_of(i), m); path.slot != NONE; advance(path)) atomicMax(gains.word[path.slot], m.gain);
+        for (Path path = path_of(link_of(i), m); path.slot != NONE; advance(path)) atomicMax(gains.word[path.slot], rank_of_gain(m.gain));
     }
 }
 #endif

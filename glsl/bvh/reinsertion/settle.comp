@@ -3,6 +3,6 @@
 #include "bvh/reinsertion/settle.glsl"
 
 void main() {
-    begin_round(offset);
+    begin_round(offset, since_fill);
     settle_moves();
 }

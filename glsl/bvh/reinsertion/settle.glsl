@@ -9,7 +9,7 @@ void settle_moves() {
         if (m.to == NONE) continue;
         bool is_first = true;
         for (Path path = path_of(link_of(i), m); path.slot != NONE && is_first; advance(path)) {
-            is_first = firsts.word[path.slot] == ~link_of(i);
+            is_first = firsts.word[path.slot] == rank_of_link(link_of(i));
         }
         if (!is_first) moves.move[i].to = NONE;
     }

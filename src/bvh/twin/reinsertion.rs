@@ -4,7 +4,7 @@ use crate::Result;
 use crate::bvh::flux::{FluxGrid, quotient};
 use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Record, node_slots, status};
 use crate::bvh::reinsertion::{
-    Areas, LEAST_GAIN, LEAST_SHARE, PATH, Probed, ReinsertionOptions, STACK, VISITS, probed_offsets, weight_of,
+    Areas, LEAST_GAIN, LEAST_SHARE, LEVELS, MOST_GAIN, Probed, ReinsertionOptions, STACK, VISITS, probed_offsets, weight_of,
 };
 use crate::geometry::Aabb;
 
@@ -264,7 +264,7 @@ impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
         // What is left below the pivot on the side that the subtree leaves.
         let mut left_behind = Aabb::EMPTY;
         let mut at = link;
-        for _ in 0..PATH {
+        for _ in 0..LEVELS {
             let pivot = at / 2;
             let pivot_cost = self.cost(&self.bounds_by(pivot));
             self.search_below(at ^ 1, (pivot, pivot_cost), saved, &moving, (&mut best, &mut visits));
@@ -278,7 +278,8 @@ impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
             }
             at = self.parents[pivot as usize];
         }
-        (best.to != NONE && self.is_path_walkable(&best)).then_some(best)
+        best.gain = best.gain.min(MOST_GAIN);
+        (best.to != NONE).then_some(best)
     }
 
     /// Looks at the subtree at link `at`, on the other side of the pivot.
@@ -340,11 +341,6 @@ impl<R: Record, C: Fn(&Aabb) -> f32> LinkedTree<R, C> {
                 }
             }
         }
-    }
-
-    /// Whether the new place is no more than [`PATH`] nodes below the pivot.
-    fn is_path_walkable(&self, m: &Move) -> bool {
-        std::iter::successors(Some(m.to / 2), |&slot| Some(self.above(slot))).take(PATH).any(|slot| slot == m.pivot)
     }
 
     /// The nodes that a move changes: from the parent up to the pivot, and to the node above the parent in any case; and from the
@@ -430,6 +426,32 @@ mod tests {
         for link in 0..2 * tree.nodes.len() as u32 {
             asked.set(0);
             assert!(work.search(link).is_none(), "link {link} moves");
+        }
+    }
+
+    /// Triangles stand in a row in the order of their numbers, but for one. As another is so far that the row is in one cell, the tree halves it
+    /// by number: the node over both places of the one is as many levels up as the numbers have bits from the highest that differs. Where that
+    /// is too far, most of the way is better than none.
+    #[test]
+    fn a_search_goes_up_through_ten_pivots_and_no_more() {
+        for (levels, expected) in [(2, 2), (LEVELS, LEVELS), (LEVELS + 1, LEVELS)] {
+            let stray = 5usize;
+            let corner = |i: usize| {
+                let x = if i == 4096 { 1e7 } else if i == stray { (i ^ 1 << (levels - 1)) as f32 + 0.1 } else { i as f32 };
+                [[x, 0.0, 0.0], [x + 0.5, 0.0, 0.0], [x, 1.0, 0.0]]
+            };
+            let positions: Vec<[f32; 3]> = (0..4097).flat_map(corner).collect();
+            let triangles: Vec<[u32; 3]> = (0..4097).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            let tree = lbvh::build(&positions, &triangles, Code::Mc30.full(), Collapse::OFF);
+            let area = |bounds: &Aabb| bounds.scaled_half_area(tree.header.area_scale);
+            let work = LinkedTree { parents: parents_of(&tree), tree: tree.clone(), cost: area, by_rays: false };
+            let is_stray = |link: &u32| work.child(*link).is_leaf() && work.child(*link).index == stray as u32;
+            let link = (0..2 * tree.nodes.len() as u32).find(is_stray).expect("a leaf");
+            let pivots = work.search(link).map(|m| {
+                let way = std::iter::successors(Some(link / 2), |&slot| Some(work.above(slot)));
+                1 + way.take_while(|&slot| slot != m.pivot).count()
+            });
+            assert_eq!(pivots, Some(expected), "{levels} levels");
         }
     }
 
