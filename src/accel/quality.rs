@@ -43,8 +43,8 @@ const ONE_NODE: u32 = 8;
 /// slots of a node lie.
 const MOST_WIDE: u32 = TRIANGLES_AT_MOST;
 
-/// Primitives up to which a fast trace gets most of a pass of reinsertion, as a driver's build of few takes long, and up to which half of
-/// one; of more it gets a quarter: what leaves a build as long as a driver's on Mesa's lavapipe (docs/notes/memory.md).
+/// Primitives up to which a fast trace gets one and a half passes of reinsertion, as a driver's build of few takes long, and up to which one;
+/// of more it gets three quarters: what leaves a build no longer than a driver's on Mesa's lavapipe (docs/notes/memory.md).
 const SOME: u32 = 1 << 15;
 const MANY: u32 = 1 << 18;
 
@@ -151,9 +151,9 @@ fn bottom_method(flags: Flags, count: u32) -> Method {
 fn bottom_optimise(flags: Flags, count: u32) -> Option<ReinsertionOptions> {
     let rounds = match count {
         count if count <= FEW => ReinsertionOptions::MEDIUM,
-        count if count <= SOME => MOST_OF_A_PASS,
-        count if count <= MANY => part_of_a_pass(1, 2),
-        _ => QUARTER_OF_A_PASS,
+        count if count <= SOME => part_of_a_pass(3, 2),
+        count if count <= MANY => ReinsertionOptions::FAST,
+        _ => MOST_OF_A_PASS,
     };
     flags.contains(Flags::PREFER_FAST_TRACE).then_some(rounds)
 }
