@@ -33,7 +33,6 @@ struct Search {
 float area_scale;
 float rays_weigh;
 uint root;
-uint node_slots;
 
 // A node that may be looked into, and what would be saved if the move went below it.
 struct Below {
@@ -162,12 +161,6 @@ Below visit(inout Search s, uint slot, Below next, bool goes_up) {
         s.left_behind = both;
         if (begins) s.left_behind = box_of(other);
         s.level++;
-        bool is_unused = begins && node.left.count == UNUSED;
-        if (is_unused) {
-            s.level = LEVELS;
-            s.best_to = NONE;
-            near.slot = NONE;
-        }
     }
     return near;
 }
@@ -176,7 +169,7 @@ Below visit(inout Search s, uint slot, Below next, bool goes_up) {
 Move search(uint link) {
     Search s = search_from(link);
     Below next = Below(NONE, 0.0);
-    bool stays = link >> 1 == root || link >> 1 >= node_slots, ends = false;
+    bool stays = !is_used(link >> 1) || link >> 1 == root, ends = false;
     for (uint turn = 0; turn < TURNS && !stays && !ends; ++turn) {
         if (!may_gain(s, next) && s.height != 0u) next = take(--s.height);
         bool goes_below = may_gain(s, next), goes_up = !goes_below && s.height == 0u;
@@ -192,7 +185,6 @@ void search_moves() {
     area_scale = structure.header.area_scale;
     rays_weigh = ratio();
     root = structure.header.root.index;
-    node_slots = structure.header.node_slots;
     for (uint k = 0, i = grid_item(0); i < tried(); i = grid_item(++k)) {
         Move m = search(link_of(i));
         moves.move[i] = m;
