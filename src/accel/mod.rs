@@ -19,14 +19,14 @@
 //!
 //! Three kinds of builds, by flag. Build time and speed of rays are beside those of `PREFER_FAST_BUILD`: geometric means of the first
 //! eight scenes of `docs/results.md` and seven kinds of rays through the tracers, on Mesa 26's lavapipe (`hedgerow bench -b
-//! lbvh:codes=emc64var/24,hploc,hploc:width=8q,hploc:width=8q:optimise=0.5,hploc:width=8q:optimise=0.25`, 27 November 2026). Those of the third are
+//! lbvh:codes=emc64var/24,hploc,hploc:width=8q,hploc:width=8q:optimise=0.75,hploc:width=8q:optimise=fast`, 30 November 2026, an AMD EPYC without AVX-512). Those of the third are
 //! [nodes of eight](Wide), and those of the second in bottom levels of 4,096 primitives and more.
 //!
 //! | preference | bottom levels | top levels | build | rays |
 //! | --- | --- | --- | --- | --- |
 //! | `PREFER_FAST_BUILD` | an LBVH by codes of 8 bits less | the same | 1.0 | 1.0 |
-//! | none | H-PLOC, of over 2,048 primitives: of those measured the least time for a build and ten rays a triangle, 0.59 of an LBVH's (0.69 and 0.76 with a quarter and half of a pass of reinsertion, 0.87 in nodes of two) | an LBVH and three quarters of a pass of [reinsertion](crate::bvh::reinsertion) | 4.1 (2.0 in nodes of two) | 2.04 (1.19) |
-//! | `PREFER_FAST_TRACE` | H-PLOC and a pass of reinsertion, three quarters of one from 262,145 primitives on, one and a half up to 32,768, two up to 2,048 | the same as without, but for a quarter of a pass in nodes of eight, and opens instances ([`REBRAID`]) | 9.4 | 2.10 |
+//! | none | H-PLOC, of over 2,048 primitives: of those measured the least time for a build and ten rays a triangle, 0.61 of an LBVH's (0.68 and 0.69 with three quarters of a pass of reinsertion and a whole one, 0.87 in nodes of two) | an LBVH and three quarters of a pass of [reinsertion](crate::bvh::reinsertion) | 3.7 (2.3 in nodes of two) | 1.82 (1.19) |
+//! | `PREFER_FAST_TRACE` | H-PLOC and a pass of reinsertion, three quarters of one from 262,145 primitives on, one and a half up to 32,768, two up to 2,048 | the same as without, but for a quarter of a pass in nodes of eight, and opens instances ([`REBRAID`]) | 10.3 | 1.99 |
 //!
 //! H-PLOC begins with pairs of triangles that share an edge, in structures of over 2,048.
 //!
