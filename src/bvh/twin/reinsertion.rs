@@ -4,7 +4,8 @@ use crate::Result;
 use crate::bvh::flux::{FluxGrid, quotient};
 use crate::bvh::layout::{Bvh2, Child, MAX_DEPTH, Record, node_slots, status};
 use crate::bvh::reinsertion::{
-    Areas, LEAST_GAIN, LEAST_SHARE, LEVELS, MOST_GAIN, Probed, ReinsertionOptions, STACK, VISITS, probed_offsets, weight_of,
+    Areas, LEAST_GAIN, LEAST_SHARE, LEVELS, MOST_GAIN, Probed, ReinsertionOptions, STACK, VISITS, probed_offsets,
+    weight_of,
 };
 use crate::geometry::Aabb;
 
@@ -437,7 +438,11 @@ mod tests {
         for (levels, expected) in [(2, 2), (LEVELS, LEVELS), (LEVELS + 1, LEVELS)] {
             let stray = 5usize;
             let corner = |i: usize| {
-                let x = if i == 4096 { 1e7 } else if i == stray { (i ^ 1 << (levels - 1)) as f32 + 0.1 } else { i as f32 };
+                let x = match i {
+                    4096 => 1e7,
+                    _ if i == stray => (i ^ 1 << (levels - 1)) as f32 + 0.1,
+                    _ => i as f32,
+                };
                 [[x, 0.0, 0.0], [x + 0.5, 0.0, 0.0], [x, 1.0, 0.0]]
             };
             let positions: Vec<[f32; 3]> = (0..4097).flat_map(corner).collect();
