@@ -246,7 +246,8 @@ impl Reinsertion {
     }
 
     /// Records all rounds on `structure`, in place, with scratch memory of [`Reinsertion::scratch_bytes`]; both aligned
-    /// to 16 bytes. Four dispatches a round, and one more in every fourth, with barriers between; the caller places one before and one behind. Label: `optimise`.
+    /// to 16 bytes. Four dispatches a round, and one more in every fourth, with barriers between; the caller places one before and one
+    /// behind. Label: `optimise`.
     ///
     /// # Errors
     /// The memory is too small; a pipeline could not be made.
@@ -264,7 +265,8 @@ impl Reinsertion {
     /// A tree that becomes deeper than tracers can walk has the status [`TOO_DEEP`](super::layout::status::TOO_DEEP) and is traced as if it
     /// were empty. So rounds go to a copy, which [`crate::trace::trial`] may refuse.
     ///
-    /// Four dispatches a round, and one more in every fourth, with barriers between; the caller places one before and one behind. Label: `optimise`.
+    /// Four dispatches a round, and one more in every fourth, with barriers between; the caller places one before and one behind.
+    /// Label: `optimise`.
     ///
     /// # Errors
     /// The memory is too small; the share is out of range; a pipeline could not be made.

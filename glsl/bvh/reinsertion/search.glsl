@@ -16,7 +16,7 @@ struct Search {
     float moving_cost;
     float moving_by_rays;   // the part of its cost that is not its area
     uint sibling;           // the link beside the one where it hangs
-    uint at;                // the link on the way up that was come by
+    uint at;                // the link below the pivot on the way up
     uint level;             // nodes of the way up that were looked at
     uint pivot;
     float least;            // what a gain must exceed at this pivot
@@ -80,8 +80,8 @@ float least_cost(Search s, Box merged, Child child, float cost) {
     return least;
 }
 
-// What a move to link `at`, where `child` hangs, would gain, if that `counts`. Beside the own sibling a move would tie a cycle: the box around both
-// is the parent's, which costs what is saved, so it gains nothing.
+// What a move to link `at`, where `child` hangs, would gain, if that `counts`. Beside the own sibling a move would tie a cycle: the
+// box around both is the parent's, which costs what is saved, so it gains nothing.
 Below look(inout Search s, uint at, Child child, float saved, bool counts) {
     Box box = around(box_of(child), s.moving);
     bool is_sibling = at == s.sibling;
