@@ -99,17 +99,13 @@ uint hedgerowRayQueryGetIntersectionInstanceShaderBindingTableRecordOffset(Hedge
 }
 
 uint hedgerowRayQueryGetIntersectionGeometryIndex(HedgerowRayQuery query, bool committed) {
-    HedgerowMeeting met = hedgerow_met(query, committed);
-    Instance instance = hedgerow_instance_of(query, met);
-    return hedgerow_geometry_of(instance.structure, instance.slots & INDEX_MASK, met.primitive).index;
+    return hedgerow_geometry_met(query, hedgerow_met(query, committed)).x;
 }
 
 // The primitive's position in its geometry.
 uint hedgerowRayQueryGetIntersectionPrimitiveIndex(HedgerowRayQuery query, bool committed) {
     HedgerowMeeting met = hedgerow_met(query, committed);
-    Instance instance = hedgerow_instance_of(query, met);
-    uint primitive = met.primitive;
-    return primitive - hedgerow_geometry_of(instance.structure, instance.slots & INDEX_MASK, primitive).first;
+    return met.primitive - hedgerow_geometry_met(query, met).y;
 }
 
 // The weights of the second and the third vertex.

@@ -44,6 +44,17 @@ Instance hedgerow_instance_of(HedgerowRayQuery query, HedgerowMeeting met) {
     return instance;
 }
 
+// The index of a meeting's geometry, and its first primitive. Where a bottom-level structure of one geometry is queried itself, nothing is loaded.
+uvec2 hedgerow_geometry_met(HedgerowRayQuery query, HedgerowMeeting met) {
+    uvec2 index_and_first = uvec2(0u);
+    if (hedgerow_has_top(query) || query.top_geometries > 1u) {
+        Instance instance = hedgerow_instance_of(query, met);
+        HedgerowGeometry geometry = hedgerow_geometry_of(instance.structure, instance.slots & INDEX_MASK, met.primitive);
+        index_and_first = uvec2(geometry.index, geometry.first);
+    }
+    return index_and_first;
+}
+
 uvec2 hedgerow_records_of(Instance instance) {
     return hedgerow_records_in(instance.structure, instance.slots & INDEX_MASK, instance.slots);
 }
@@ -68,7 +79,6 @@ bool hedgerow_comes_before(HedgerowRayQuery query) {
 
 void hedgerow_commit(inout HedgerowRayQuery query) {
     query.committed = query.candidate;
-    query.best = query.candidate.t;
 #ifdef HEDGEROW_LINK_COUNTS
     query.hit_at = query.at;
 #endif

@@ -24,7 +24,7 @@ bool hedgerow_meet_triangle(inout HedgerowRayQuery query, Triangle triangle, uin
     vec3 met;
     bool is_front;
     bool is_met = hedgerow_meet_facing(query.prepared, triangle.v0, triangle.v1, triangle.v2, met, is_front);
-    is_met = is_met && query.ray.t_min < met.x && met.x < query.ray.t_max && met.x <= query.best;
+    is_met = is_met && query.ray.t_min < met.x && met.x < query.ray.t_max && met.x <= query.committed.t;
     bool waits = false;
     if (is_met) {
         is_front = is_front != ((query.instance_flags & HEDGEROW_INSTANCE_FLIP_FACING) != 0u);
@@ -34,7 +34,7 @@ bool hedgerow_meet_triangle(inout HedgerowRayQuery query, Triangle triangle, uin
         if (!culls && !hedgerow_is_culled(query, is_opaque)) {
             query.candidate = HedgerowMeeting(HEDGEROW_MET_TRIANGLE, met.x, met.y, met.z, at, triangle.primitive, query.instance,
                                               is_front, is_opaque);
-            bool is_nearest = met.x != query.best || hedgerow_comes_before(query);
+            bool is_nearest = met.x != query.committed.t || hedgerow_comes_before(query);
             if (is_nearest && is_opaque) hedgerow_commit(query);
             waits = is_nearest && !is_opaque;
         }
@@ -57,14 +57,14 @@ bool hedgerow_test_box(inout HedgerowRayQuery query) {
     if (hedgerow_takes_record(query, at)) {
         BoxRecord box = BoxRecords(hedgerow_records_in(query.structure, query.slots, query.form)).box[at];
         bool entered;
-        hedgerow_enter(query.prepared, box.lo, box.hi, query.best, entered);
+        hedgerow_enter(query.prepared, box.lo, box.hi, query.committed.t, entered);
         // Inside out where an update has left it out.
         if (entered && box.lo.x <= box.hi.x) {
             bool is_opaque = hedgerow_is_opaque(query, box.primitive);
             waits = !hedgerow_is_culled(query, is_opaque);
             if (waits) {
                 query.candidate =
-                    HedgerowMeeting(HEDGEROW_MET_BOX, query.best, 0.0, 0.0, at, box.primitive, query.instance, false, is_opaque);
+                    HedgerowMeeting(HEDGEROW_MET_BOX, query.committed.t, 0.0, 0.0, at, box.primitive, query.instance, false, is_opaque);
             }
         }
     }

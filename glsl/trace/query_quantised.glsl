@@ -17,7 +17,7 @@ void hedgerow_visit_quantised(inout HedgerowRayQuery query, QuantisedNode node) 
         if (node.first_child != 0u) query.left = node.first_child;
     } else {
         float enters[8];
-        enter_quantised(query.prepared, node, query.best, enters);
+        enter_quantised(query.prepared, node, query.committed.t, enters);
         uint entered = 0u;
         [[unroll]] for (uint slot = 0; slot < 8; ++slot) {
             if (enters[slot] < HEDGEROW_INFINITY) entered |= 1u << slot;
@@ -54,7 +54,7 @@ void hedgerow_take_entry(inout HedgerowRayQuery query, uvec2 waiting, bool waits
     query.left = is_rest ? waiting.y : HEDGEROW_NOTHING;
     query.first_child = waiting.x;
     // Equally far is not too far: an equally near hit that comes before may be there.
-    bool is_near = uintBitsToFloat(waiting.y & 0xFFFF0000u) <= query.best;
+    bool is_near = uintBitsToFloat(waiting.y & 0xFFFF0000u) <= query.committed.t;
     query.group = waits && !is_rest && is_near ? waiting.y : 0u;
     query.next = uint(findLSB(waiting.y & 0xFFu));
 }

@@ -94,6 +94,7 @@ bool hedgerowTakeTurn(inout HedgerowTurns turns, bool has_rays) {
 // compiler does not see that they are constant where they come from another turn.
 bool hedgerowRayQueryProceedInTurn(inout HedgerowRayQuery query, inout HedgerowTurns turns, uint flags) {
     query.flags = flags;
+    hedgerow_recall(query);
     turns.ends = false;
     bool waits = false;
 #ifdef HEDGEROW_LANES
