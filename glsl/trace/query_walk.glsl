@@ -365,7 +365,7 @@ void hedgerow_recall(inout HedgerowRayQuery query) {
         query.prepared.origin = query.ray.origin;
         query.prepared.t_min = query.ray.t_min;
         query.prepared.t_max = query.ray.t_max;
-        query.prepared.slack = uintBitsToFloat((127u - 17u) << 23);
+        query.prepared.slack = HEDGEROW_SLACK;
         query.instance = 0u;
         query.instance_flags = 0u;
         query.begin_slots = ALL_SLOTS;

@@ -5,6 +5,8 @@
 
 #define HEDGEROW_INFINITY uintBitsToFloat(0x7f800000u)
 const uint HEDGEROW_NONE = 0xffffffffu;
+// 2^-17: the slack of a ray that is made ready, in src/trace/ray.rs.
+#define HEDGEROW_SLACK uintBitsToFloat((127u - 17u) << 23)
 
 struct HedgerowRay {
     vec3 origin;
@@ -63,7 +65,7 @@ bool hedgerow_prepare(HedgerowRay ray, out HedgerowPreparedRay prepared) {
     prepared.shear = vec3(shear, scale);
     vec3 inclined = mix(ray.direction, steep, lessThan(size, vec3(flattest)));
     prepared.inverse = vec3(hedgerow_reciprocal(inclined.x), hedgerow_reciprocal(inclined.y), hedgerow_reciprocal(inclined.z));
-    prepared.slack = uintBitsToFloat((127u - 17u) << 23);
+    prepared.slack = HEDGEROW_SLACK;
     prepared.margin = margin;
     return hedgerow_finite(ray.origin) && hedgerow_finite(ray.direction) &&
            greatest >= uintBitsToFloat((127u - 100u) << 23) && greatest <= uintBitsToFloat((127u + 100u) << 23) &&
