@@ -131,7 +131,7 @@ void rebraid_fences() {
     }
     next_phase();
     Box near = EVERYWHERE;
-    if (sampled_count != 0) near = fences_of(find_quartiles(table, taken));
+    if (sampled_count != 0) near = fences_beyond(table, taken, find_quartiles(table, taken));
     if (gl_LocalInvocationIndex == 0) state.near = near;
 }
 

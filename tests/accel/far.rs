@@ -48,9 +48,9 @@ fn top_levels_with_something_far_have_the_bytes_of_the_hosts() {
         Flags::PREFER_FAST_TRACE | Flags::LOW_MEMORY,
     ];
     let ours = Ours::on(device());
-    // By one workgroup and by chains; few far, and so many that they count as the scene.
+    // By one workgroup and by chains; few far, and so many that they count as the scene; at 2³ behind a gap.
     for (side, count) in [(4, 1), (4, 40), (4, 80), (7, 30), (13, 1), (13, 100)] {
-        for (axes, e) in [(1, 60), (3, 9), (3, 60)] {
+        for (axes, e) in [(1, 3), (1, 60), (3, 3), (3, 9), (3, 60)] {
             for flags in all_flags {
                 let read = ReadBack::new(&ours, &grid(side, &far(count, e, axes), flags));
                 let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &Ours::OPTIONS);

@@ -71,6 +71,13 @@ fn meshes() -> Vec<corpus::Mesh> {
     }
     let hundred: Vec<_> = (1..=100).map(|i| far(1 + i)).collect();
     meshes.push(scene("a hundred far", plate(), &hundred));
+    // Behind a gap that is longer than the quartiles are apart, and not beyond the fences without it.
+    let beside = |axes: usize| {
+        let at = move |i: u32| if i.is_multiple_of(2) { 8.0 } else { -5.0 };
+        move |i: u32| [0, 1, 2].map(|axis| if axis < axes { at(i) } else { 0.5 })
+    };
+    meshes.push(scene("a third beside, in one axis", plate().chain((0..1000).map(beside(1))), &[]));
+    meshes.push(scene("a third beside, in three", plate().chain((0..1000).map(beside(3))), &[]));
     meshes
 }
 

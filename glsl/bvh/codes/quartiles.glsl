@@ -3,9 +3,10 @@
 //   begin_sample     one invocation                                  writes shared memory
 //   take_sample      of one number of the sample                     writes the sample, shared memory
 //   find_quartiles   the workgroup together; of a sample that there is   reads the sample, writes shared memory
+//   fences_beyond    right behind it, the workgroup together             reads the sample, writes shared memory
 //
-// needs  HAS_SECTIONS of the includer, without which there are none; a barrier for buffers and shared memory between each two; any
-//        subgroup size
+// needs  HAS_SECTIONS of the includer, without which there are none; a barrier for buffers and shared memory between each two, but for
+//        the last; any subgroup size
 #ifndef HEDGEROW_BVH_CODE_QUARTILES
 #define HEDGEROW_BVH_CODE_QUARTILES
 #include "bvh/geometry.glsl"
@@ -15,6 +16,10 @@ const uint SECTION_SAMPLE = 256;
 const uint SECTION_QUARTILE = 4;
 // Distances between the quartiles from there to the fences.
 const float TO_FENCES = 2.0;
+// Parts of the way there, and how many without a centroid are a gap.
+const uint STEPS = 32;
+const uint GAP = 16;
+const float SMALLEST_NORMAL = 1.1754943508222875e-38;
 const float LARGEST_FLOAT = 3.4028234663852886e38;
 const Box EVERYWHERE = Box(vec3(-LARGEST_FLOAT), vec3(LARGEST_FLOAT));
 // The place of one that is left out, behind all others.
@@ -79,15 +84,60 @@ bool is_inside(uvec3 lo, uvec3 hi, Box fences) {
     return all(greaterThanEqual(lo, ordered(fences.lo))) && all(lessThanEqual(hi, ordered(fences.hi)));
 }
 
-// From the quartiles by so much beyond them, as far as floats go: of eighths, so that nothing overflows.
-Box fences_of(Box quartiles) {
+// Of each axis the bit of the step that so far beyond a quartile lies in; none beyond the last.
+uvec3 step_at(vec3 distance, vec3 size) {
+    uvec3 at = uvec3(0);
+    for (uint more = STEPS / 2; more != 0; more >>= 1) {
+        precise vec3 begin = vec3(at + more) * size;
+        at += more * uvec3(lessThanEqual(begin, distance));
+    }
+    precise vec3 end = float(STEPS) * size;
+    uvec3 is_on_the_way = uvec3(greaterThanEqual(distance, vec3(0))) & uvec3(lessThan(distance, end));
+    return is_on_the_way << at;
+}
+
+// How many steps beyond a quartile the fence stands.
+uint steps_to_fence(uint taken, float size) {
+    uint gaps = ~taken;
+    for (uint i = 1; i < GAP; ++i) gaps &= gaps >> 1;
+    uint gap = min(uint(findLSB(gaps)), STEPS);
+    bool has_more = gap + GAP < STEPS && taken >> (gap + GAP) != 0;
+    return size >= SMALLEST_NORMAL && has_more ? gap + GAP / 2 : STEPS;
+}
+
+// So far beyond the quartiles, or in a gap before that, as far as floats go: by eighths, so that nothing overflows.
+Box fences_beyond(Sample table, uint taken, Box quartiles) {
     precise vec3 low = quartiles.lo * 0.125;
     precise vec3 high = quartiles.hi * 0.125;
     precise vec3 widths = high - low;
     precise float least = 0.25 * max(max(widths.x, widths.y), max(widths.z, 0.0));
-    precise vec3 by = TO_FENCES * max(widths, vec3(least));
-    precise vec3 lo = low - by;
-    precise vec3 hi = high + by;
+    precise vec3 size = max(widths, vec3(least)) * (TO_FENCES / float(STEPS));
+    uvec3 before = uvec3(0), behind = uvec3(0);
+    for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
+        uvec3 key = table.middle[i];
+        if (key.x == NOWHERE) continue;
+        precise vec3 at = from_ordered(key) * 0.125;
+        precise vec3 to_low = low - at;
+        precise vec3 from_high = at - high;
+        before |= step_at(to_low, size);
+        behind |= step_at(from_high, size);
+    }
+    before = subgroupOr(before);
+    behind = subgroupOr(behind);
+    // The counters that the last round of the quartiles has cleared.
+    const uint cleared = 32 % 3 * 6;
+    if (subgroupElect()) {
+        for (uint axis = 0; axis < 3; ++axis) {
+            atomicOr(sampled_below[cleared + axis], before[axis]);
+            atomicOr(sampled_below[cleared + 3 + axis], behind[axis]);
+        }
+    }
+    barrier();
+    precise vec3 lo, hi;
+    for (uint axis = 0; axis < 3; ++axis) {
+        lo[axis] = low[axis] - float(steps_to_fence(sampled_below[cleared + axis], size[axis])) * size[axis];
+        hi[axis] = high[axis] + float(steps_to_fence(sampled_below[cleared + 3 + axis], size[axis])) * size[axis];
+    }
     return Box(mix(EVERYWHERE.lo, lo * 8.0, greaterThan(lo, EVERYWHERE.lo * 0.125)),
                mix(EVERYWHERE.hi, hi * 8.0, lessThan(hi, EVERYWHERE.hi * 0.125)));
 }

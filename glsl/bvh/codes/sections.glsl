@@ -76,7 +76,7 @@ void find_fences() {
     ivec3 typical = ivec3(0x7F800000);
     if (sampled_count != 0) {
         Box quartiles = find_quartiles(table, taken);
-        fences = fences_of(quartiles);
+        fences = fences_beyond(table, taken, quartiles);
         typical = typical_extents(quartiles);
     }
     if (gl_LocalInvocationIndex == 0) {

@@ -5,7 +5,9 @@
 //! *Fences* around a sample of the centroids, as Tukey draws them (1977, "Exploratory Data Analysis", section 2C), tell what is far: what
 //! lies beyond the quartiles by more than twice the distance between them, so that up to a quarter of all primitives may be far to one
 //! side, and as many to the other. (Tukey's inner fences are at 1.5 and his outer ones at 3 distances. At two, primitives that are spread
-//! evenly have them at 7/4 of their extent, so that what doubles their bounds is far.) Where nothing lies beyond, codes are those of the
+//! evenly have them at 7/4 of their extent, so that what doubles their bounds is far.) Many that are far move the quartiles outwards. So a
+//! fence stands nearer where the sample has a *gap* before it, as long as the quartiles are apart, with something behind: in the middle of
+//! the first part of the gap that is so long. Where nothing lies beyond, codes are those of the
 //! full bounds. Otherwise there are three sections: the *core*, all boxes inside the fences, encoded within their own bounds, and those that
 //! touch these and are no longer than they are; what is *far*; and what touches the core and is longer, *huge*. So the codes of the core are
 //! the same as without the others, but for their last two bits.
@@ -31,6 +33,10 @@ const SAMPLE: u64 = 256;
 const QUARTILE: usize = 4;
 /// Distances between the quartiles from there to the fences.
 const TO_FENCES: f32 = 2.0;
+/// Parts of the way there, of which each has a centroid or none.
+const STEPS: u32 = 32;
+/// So many steps without a centroid are a gap: as long as the quartiles are apart.
+const GAP: u32 = 16;
 
 /// The sections of a scene that has something far or huge.
 #[derive(Debug, Clone)]
@@ -112,6 +118,34 @@ pub(super) fn typical_extents<E>(boxes: &[Result<Aabb, E>]) -> Option<Extents> {
     })
 }
 
+/// How many steps beyond a quartile the fence stands, of the distances from the quartile outwards to each centroid.
+fn steps_to_fence(step: f32, distances: impl Iterator<Item = f32>) -> u32 {
+    if step < f32::MIN_POSITIVE {
+        // Devices may take such numbers for zero.
+        return STEPS;
+    }
+    // A bit for each step that has a centroid.
+    let mut taken = 0_u32;
+    for distance in distances.filter(|&d| 0.0 <= d && d < STEPS as f32 * step) {
+        // The last step that begins before it, by products: a device's quotients may be inexact.
+        let mut at = 0;
+        for more in [16, 8, 4, 2, 1] {
+            if (at + more) as f32 * step <= distance {
+                at += more;
+            }
+        }
+        taken |= 1 << at;
+    }
+    // The steps with which a gap begins.
+    let mut gaps = !taken;
+    for _ in 1..GAP {
+        gaps &= gaps >> 1;
+    }
+    let gap = gaps.trailing_zeros();
+    let has_more = gap + GAP < STEPS && taken >> (gap + GAP) != 0;
+    if has_more { gap + GAP / 2 } else { STEPS }
+}
+
 /// Fences around a sample of these boxes' centroids; `None` without a sample.
 pub(crate) fn fences_around<E>(boxes: &[Result<Aabb, E>]) -> Option<Aabb> {
     let sample = sample_of(boxes);
@@ -124,9 +158,12 @@ pub(crate) fn fences_around<E>(boxes: &[Result<Aabb, E>]) -> Option<Aabb> {
     let least = 0.25 * widths.into_iter().fold(0.0, f32::max);
     let mut fences = Aabb { lo: [f32::MIN; 3], hi: [f32::MAX; 3] };
     for axis in 0..3 {
-        let by = TO_FENCES * widths[axis].max(least);
+        let step = widths[axis].max(least) * (TO_FENCES / STEPS as f32);
+        let [low, high] = quartiles[axis];
+        let eighths = || sample.iter().map(|b| b.centroid()[axis] * 0.125);
+        let lo = low - steps_to_fence(step, eighths().map(|at| low - at)) as f32 * step;
+        let hi = high + steps_to_fence(step, eighths().map(|at| at - high)) as f32 * step;
         // As far as floats go.
-        let [lo, hi] = [quartiles[axis][0] - by, quartiles[axis][1] + by];
         if lo > f32::MIN * 0.125 {
             fences.lo[axis] = lo * 8.0;
         }
@@ -278,6 +315,38 @@ mod tests {
                 assert!(codes.windows(2).all(|w| w[0] < w[1]), "{distance:e} to side {side}");
             }
         }
+    }
+
+    /// Without the gap the fences would be beyond what doubles the bounds: two fifths of all move the quartiles to the core's ends.
+    #[test]
+    fn many_next_to_the_core_are_as_far_as_those_far_away() {
+        for axes in [1, 3] {
+            let codes = |times: f32| {
+                let beside = (0..600).map(|i| {
+                    let to_low = i % 2 == 0;
+                    let along = if to_low { 1.0 - times } else { times };
+                    let lo = [0, 1, 2].map(|axis| if axis < axes { along } else { 0.5 });
+                    Aabb { lo, hi: lo }
+                });
+                let boxes: Vec<Aabb> = grid().into_iter().chain(beside).collect();
+                let plan = plan(&boxes);
+                boxes[..1000].iter().map(|b| plan.encode(b)).collect::<Vec<_>>()
+            };
+            assert_eq!(codes(2.0), codes(1.0e6), "{axes} axes");
+        }
+    }
+
+    #[test]
+    fn a_fence_stands_in_a_gap_that_is_long_enough_and_has_something_behind() {
+        let steps = |distances: &[f32]| steps_to_fence(0.25, distances.iter().map(|d| d * 0.25));
+        assert_eq!(steps(&[]), STEPS, "nothing beyond the quartile");
+        assert_eq!(steps(&[-40.0, 0.0]), STEPS, "nothing behind the gap");
+        assert_eq!(steps(&[0.0, 16.9]), STEPS, "a gap of fifteen steps");
+        assert_eq!(steps(&[0.0, 17.0]), 1 + GAP / 2);
+        assert_eq!(steps(&[0.0, 31.9]), 1 + GAP / 2, "in the middle of its first sixteen steps");
+        assert_eq!(steps(&[0.0, 32.0]), STEPS, "behind the fence as it is");
+        assert_eq!(steps(&[31.0, 14.5, 2.0]), 15 + GAP / 2, "the first that is long enough");
+        assert_eq!(steps_to_fence(1e-38, [0.0, 30e-38].into_iter()), STEPS, "where products may be zero");
     }
 
     /// And in their order, but behind all of the core.
