@@ -29,10 +29,12 @@ const uint NOWHERE = 0xFFFFFFFFu;
 BUFFER Sample { uvec3 middle[]; };
 
 shared uint sampled_count;
+shared uint sampled_end;   // behind the last one in the sample that is not left out
 shared uint sampled_below[HAS_SECTIONS ? 18 : 1];   // of three rounds in turn: keys below three low candidates, three high ones
 
 void begin_sample() {
     sampled_count = 0;
+    sampled_end = 0;
     for (uint i = 0; i < 18; ++i) sampled_below[i] = 0;
 }
 
@@ -43,7 +45,10 @@ uint sampled_at(uint i, uint taken, uint count) {
 
 void take_sample(Sample table, uint i, bool is_active, Box b) {
     table.middle[i] = is_active ? ordered(centroid_of(b)) : uvec3(NOWHERE);
-    if (is_active) atomicAdd(sampled_count, 1);
+    if (is_active) {
+        atomicAdd(sampled_count, 1);
+        atomicMax(sampled_end, i + 1);
+    }
 }
 
 Box find_quartiles(Sample table, uint taken) {

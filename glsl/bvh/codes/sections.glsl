@@ -62,15 +62,23 @@ void find_fences() {
     BuildState state = build_state();
     Sample table = Sample(part(parts.table));
     Geometry input_geometries = geometries();
-    uint taken = min(primitive_count, SECTION_SAMPLE);
-    if (gl_LocalInvocationIndex == 0) begin_sample();
-    next_phase();
-    for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
-        Box b;
-        bool is_active = load_reference(input_geometries, sampled_at(i, taken, primitive_count), b) == 0;
-        take_sample(table, i, is_active, b);
+    // Twice where those at the end are left out: re-braiding has as many entries as there may be, and uses the first.
+    uint count = primitive_count, taken = 0;
+    for (uint round = 0; round < 2; ++round) {
+        taken = min(count, SECTION_SAMPLE);
+        barrier();   // the counters of the first have been read
+        if (gl_LocalInvocationIndex == 0) begin_sample();
+        next_phase();
+        for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
+            Box b;
+            bool is_active = load_reference(input_geometries, sampled_at(i, taken, count), b) == 0;
+            take_sample(table, i, is_active, b);
+        }
+        next_phase();
+        uint end = taken == 0 ? 0 : sampled_at(sampled_end, taken, count);
+        if (end == count) break;
+        count = end;
     }
-    next_phase();
     // Without a sample nothing is far, and codes have the bits that they are given.
     Box fences = EVERYWHERE;
     ivec3 typical = ivec3(0x7F800000);

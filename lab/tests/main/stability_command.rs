@@ -5,7 +5,6 @@ use hedgerow_lab::experiments::stability::far::Side;
 use hedgerow_lab::experiments::stability::large::LargePlacement;
 use hedgerow_lab::experiments::stability::page;
 use hedgerow_lab::experiments::stability::points::{Degenerate, Greedy, GreedyKind, Growth, Large};
-use hedgerow_lab::experiments::stability::top::COSTS;
 use hedgerow_lab::experiments::stability::top::points::{GOALS, TopGrowth};
 use hedgerow_lab::report::lines;
 use hedgerow_lab::scene;
@@ -127,34 +126,25 @@ fn top_levels_in_nodes_of_eight_grow_too() {
     assert!(read(folder.path(), "growth-top.html").contains("re-braided, in nodes of eight, default"));
 }
 
-/// A goal without the noise of times: what is far costs what stays at most a twentieth; in nodes of eight a visit beside, as the root is over
-/// both, and no other node.
+/// A goal without the noise of times: what is far costs what stays at most a twentieth, where it is two fifths of all and lies next to the
+/// scene, too.
 #[test]
 fn what_is_far_from_a_top_level_costs_what_stays_little_at_any_distance() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for scene in ["gen:city:150", "gen:forest:150"] {
+    for scene in ["gen:city:150", "gen:forest:150", "gen:cells:150"] {
         let arguments =
             ["stability", "growth", scene, "--level", "top", "--steps", "1,2,33,60", "--runs", "1", "--no-rays"];
         let done = hedgerow(&[&arguments[..], &["--of-eight", "on,off"]].concat(), folder.path());
         assert_eq!(done.status.code(), Some(0), "{}", err(&done));
         let points: Vec<TopGrowth> = lines::entries(folder.path()).expect("records");
         assert_eq!(points.len(), 2 * 2 * 2 * 6 * 5, "preferences, re-braiding, nodes, what is far, e");
-        for steps in points.chunks(5) {
-            let base = steps[0].cost.expect("measured");
-            let a_visit = if steps[0].builder.has_nodes_of_eight() { COSTS.0 / base } else { 0.0 };
-            let goal = GOALS[0] + a_visit;
-            for point in steps {
-                // A hundred of 250 that lie next to the scene are its other part.
-                let is_scene = point.by.far == 100 && point.e == 1;
-                assert!(is_scene || point.relative_cost.is_some_and(|cost| cost <= goal), "{goal} {point:?}");
-            }
+        for point in &points {
+            assert!(point.relative_cost.is_some_and(|cost| cost <= GOALS[0]), "{point:?}");
         }
         // How far it is makes no difference: steps of a kind follow each other, 0, 1, 2, 33, 60.
         for steps in points.chunks(5) {
-            let [_, _, near, farther, far] = steps else { panic!("{steps:?}") };
-            assert_eq!((near.e, far.e, &near.builder, &near.by), (2, 60, &far.builder, &far.by));
-            // The root takes in what is less than some thirty times as small.
-            let near = if near.builder.has_nodes_of_eight() { farther } else { near };
+            let [_, near, _, _, far] = steps else { panic!("{steps:?}") };
+            assert_eq!((near.e, far.e, &near.builder, &near.by), (1, 60, &far.builder, &far.by));
             let [near, far] = [near, far].map(|point| point.relative_cost.expect("measured"));
             assert!((near - far).abs() < 0.005, "{steps:?}");
         }

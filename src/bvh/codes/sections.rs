@@ -89,11 +89,17 @@ fn is_inside(b: &Aabb, fences: &Aabb) -> bool {
     (0..3).all(|i| !below(b.lo[i], fences.lo[i]) && !below(fences.hi[i], b.hi[i]))
 }
 
-/// The primitives that are looked at.
+/// The primitives that are looked at, evenly over all but those at the end that are left out: re-braiding has as many entries as there may
+/// be, and uses the first.
 fn sample_of<E>(boxes: &[Result<Aabb, E>]) -> Vec<&Aabb> {
-    let count = boxes.len() as u64;
-    let taken = count.min(SAMPLE);
-    (0..taken).filter_map(|i| boxes[(i * count / taken) as usize].as_ref().ok()).collect()
+    let places = |count: u64| {
+        let taken = count.min(SAMPLE);
+        (0..taken).map(move |i| (i * count / taken) as usize)
+    };
+    let all = boxes.len() as u64;
+    let behind = places(all).rev().take_while(|&at| boxes[at].is_err()).last();
+    let count = behind.map_or(all, |at| at as u64);
+    places(count).filter_map(|at| boxes[at].as_ref().ok()).collect()
 }
 
 /// Along each axis an eighth of the quartiles of the sample's centroids; of a sample that there is.
@@ -315,6 +321,21 @@ mod tests {
                 assert!(codes.windows(2).all(|w| w[0] < w[1]), "{distance:e} to side {side}");
             }
         }
+    }
+
+    #[test]
+    fn a_sample_is_of_all_but_those_at_the_end_that_are_left_out() {
+        let spots = |count: usize, of: usize| {
+            let ok = |i: usize| if i < count { Ok(Aabb { lo: [i as f32; 3], hi: [i as f32; 3] }) } else { Err(()) };
+            let boxes: Vec<Result<Aabb, ()>> = (0..of).map(ok).collect();
+            sample_of(&boxes).iter().map(|b| b.lo[0] as usize).collect::<Vec<_>>()
+        };
+        assert_eq!(spots(200, 200), (0..200).collect::<Vec<_>>());
+        assert_eq!(spots(200, 512), (0..200).collect::<Vec<_>>());
+        assert_eq!(spots(512, 512), (0..512).step_by(2).collect::<Vec<_>>());
+        // Where they end is known to a step of the first look, of eight here.
+        assert_eq!(spots(509, 2048), (0..512).step_by(2).filter(|&i| i < 509).collect::<Vec<_>>());
+        assert_eq!(spots(0, 512), []);
     }
 
     /// Without the gap the fences would be beyond what doubles the bounds: two fifths of all move the quartiles to the core's ends.
