@@ -84,6 +84,25 @@ fn where_the_sample_is_left_out_nothing_is_far_and_bits_are_those_by_number() {
     }
 }
 
+/// Single triangles are not opened, so that half of the entries that there may be are empty. Every other instance of those that are far lies to
+/// the same side: by a sample of every other entry they would be more than a quarter of all, and count as the scene.
+#[test]
+fn entries_that_rebraiding_leaves_empty_tell_nothing_of_what_is_far() {
+    let ours = Ours::on(device());
+    let World { instances, .. } = grid(6, &[], Flags::empty());
+    let instances = [&instances[..156], &far(100, 30, 3)].concat();
+    let all = |flags| World { flags, ..World::new(vec![part(diagonal(1)), part(diagonal(1))], instances.clone()) };
+    let [opened, whole] = [REBRAID, Flags::empty()].map(|rebraid| {
+        let flags = Flags::PREFER_FAST_BUILD | rebraid;
+        let read = ReadBack::new(&ours, &all(flags));
+        let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &Ours::OPTIONS);
+        assert!(read.top.to_bytes() == expected.to_bytes(), "{flags:?}: {:?}", read.top.header());
+        *read.top.header()
+    });
+    assert_eq!((opened.active, whole.active), (256, 256));
+    assert_eq!(opened.code_bits, whole.code_bits);
+}
+
 #[test]
 fn bits_are_as_many_as_the_spread_needs() {
     let ours = Ours::on(device());
