@@ -16,10 +16,10 @@ struct LaneRays {
     uint at;             // the lane's ray
     uint next;
     uint end;
-    bool going;
+    uint going;          // 1 or 0, as `together`: trace/query_walk.glsl says why these are no bools
     bool takes;          // in this turn: the next ray
     bool any_takes;      // of all lanes
-    bool together;
+    uint together;
     // Since all lanes took a ray: turns of the loop, and those in which this lane had a ray.
     uint turns;
     uint turns_going;
@@ -29,27 +29,28 @@ LaneRays lane_rays() {
     uint group_rays = gl_WorkGroupSize.x * rays_each;
     uint next = first + gl_WorkGroupID.x * group_rays + gl_LocalInvocationIndex;
     uint end = min(count, first + (gl_WorkGroupID.x + 1u) * group_rays);
-    return LaneRays(next, next, end, false, false, false, true, 0u, 0u);
+    return LaneRays(next, next, end, 0u, false, false, 1u, 0u, 0u);
 }
 
 // Whether any lane has a ray, or takes one. One sum says how many have one, and how many could take the next.
 bool take_turn(inout LaneRays lane) {
-    bool waits = !lane.going && lane.next < lane.end;
-    uint lanes = hedgerow_sum_of_lanes(uint(lane.going) | uint(waits) << 16);
+    bool waits = lane.going == 0u && lane.next < lane.end;
+    uint lanes = hedgerow_sum_of_lanes(lane.going | (waits ? 1u << 16 : 0u));
     bool none_goes = (lanes & 0xFFFFu) == 0u;
     if (none_goes) {
-        lane.together = lane.together && 2u * hedgerow_sum_of_lanes(lane.turns_going) >= gl_WorkGroupSize.x * lane.turns;
+        bool stay = 2u * hedgerow_sum_of_lanes(lane.turns_going) >= gl_WorkGroupSize.x * lane.turns;
+        lane.together = stay ? lane.together : 0u;
         lane.turns = 0u;
         lane.turns_going = 0u;
     }
-    bool take = none_goes || !lane.together;
+    bool take = none_goes || lane.together == 0u;
     lane.any_takes = take && lanes >> 16 != 0u;
     lane.takes = take && waits;
     lane.at = lane.takes ? lane.next : lane.at;
     lane.next += lane.takes ? gl_WorkGroupSize.x : 0u;
-    lane.going = lane.going || lane.takes;
+    lane.going = lane.takes ? 1u : lane.going;
     lane.turns++;
-    lane.turns_going += lane.going ? 1u : 0u;
+    lane.turns_going += lane.going;
     return lanes != 0u;
 }
 

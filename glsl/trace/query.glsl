@@ -115,11 +115,11 @@ vec2 hedgerowRayQueryGetIntersectionBarycentrics(HedgerowRayQuery query, bool co
 }
 
 bool hedgerowRayQueryGetIntersectionFrontFace(HedgerowRayQuery query, bool committed) {
-    return hedgerow_met(query, committed).is_front;
+    return hedgerow_met(query, committed).is_front != 0u;
 }
 
 bool hedgerowRayQueryGetIntersectionCandidateAABBOpaque(HedgerowRayQuery query) {
-    return query.candidate.is_opaque;
+    return query.candidate.is_opaque != 0u;
 }
 
 vec3 hedgerowRayQueryGetIntersectionObjectRayDirection(HedgerowRayQuery query, bool committed) {

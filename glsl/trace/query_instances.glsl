@@ -8,13 +8,13 @@ bool hedgerow_meets_instance(inout HedgerowRayQuery query, Instance instance, ou
     if (is_seen) {
         HEDGEROW_COUNT(y);
     }
-    bool meets = is_seen && !hedgerow_skips(query.flags, instance.slots) && hedgerow_meets(instance.slots);
-    if (meets) {
+    uint meets = is_seen && !hedgerow_skips(query.flags, instance.slots) && hedgerow_meets(instance.slots) ? 1u : 0u;
+    if (meets != 0u) {
         ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
                           hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
-        meets = hedgerow_prepare(ray, prepared);
+        meets = hedgerow_prepare(ray, prepared) ? 1u : 0u;
     }
-    return meets;
+    return meets != 0u;
 }
 
 // The structure of an instance is at hand, with the ray in its space.
@@ -25,15 +25,14 @@ void hedgerow_begin_instance(inout HedgerowRayQuery query, Instance instance, ui
         else hedgerow_put_off(query, query.index, query.left, -HEDGEROW_INFINITY);
     }
     query.prepared = prepared;
-    query.is_prepared = true;
+    query.is_prepared = 1u;
     query.structure = instance.structure;
-    query.has_instances = false;
     query.slots = instance.slots & INDEX_MASK;
     query.form = instance.slots & ~INDEX_MASK;
     query.records = hedgerow_is_quantised(query) ? instance.records & INDEX_MASK : instance.records;
     query.top_rounds = query.rounds;
     query.rounds = hedgerow_rounds(query.slots, query.records);
-    query.is_below = true;
+    query.is_below = 1u;
     query.instance = at;
     query.instance_flags = instance.offset_and_flags >> 24;
     query.bottom = query.level;
@@ -66,10 +65,10 @@ void hedgerow_enter_instance(inout HedgerowRayQuery query) {
 void hedgerow_leave_instance(inout HedgerowRayQuery query) {
     hedgerow_take_top(query);
     if (hedgerow_is_quantised(query)) hedgerow_begin_quantised(query, query.ray.direction, ALL_SLOTS);
-    query.is_prepared = false;
+    query.is_prepared = 0u;
     query.bottom = query.floor;
     query.rounds = query.top_rounds;
-    query.is_below = false;
+    query.is_below = 0u;
 #ifdef HEDGEROW_LINK_COUNTS
     query.at = HedgerowLink(uvec2(0u), HEDGEROW_NO_LINK);
 #endif

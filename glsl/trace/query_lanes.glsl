@@ -113,9 +113,9 @@ uvec2 hedgerow_triangles_of_told(uvec2 told) {
     return records_of_kind(told, header.kind, has_boxes(header.kind) ? 0u : header.node_slots);
 }
 
-// The next record of a leaf, of the lanes that are at one; true if what was met is a candidate. Of quantised triangles a record may be two.
-bool hedgerow_test_in_lanes(inout HedgerowRayQuery query, bool tests, uvec2 told) {
-    bool waits = false;
+// The next record of a leaf, of the lanes that are at one; 1 if what was met is a candidate. Of quantised triangles a record may be two.
+uint hedgerow_test_in_lanes(inout HedgerowRayQuery query, bool tests, uvec2 told) {
+    uint waits = 0u;
     bool at_box = (query.form & FORM_BOXES) != 0u;
     if (tests && at_box) waits = hedgerow_test_box(query);
     bool tests_triangle = tests && !at_box;
@@ -145,22 +145,21 @@ bool hedgerow_test_in_lanes(inout HedgerowRayQuery query, bool tests, uvec2 told
     return waits;
 }
 
-// As a round of hedgerow_proceed, of the lanes whose ray goes.
-bool hedgerow_round_of_lanes(inout HedgerowRayQuery query, bool goes, uvec2 told, out bool ends) {
+// As a round of hedgerow_proceed, of the lanes whose ray goes; 1 if a candidate waits, and `ends` is 1 where nothing is left to do. The next node
+// of a group is taken at the beginning, where it is loaded, and not at the end, where that would be a branch in two others.
+uint hedgerow_round_of_lanes(inout HedgerowRayQuery query, bool goes, uvec2 told, out uint ends) {
+    if (goes && hedgerow_is_quantised(query)) hedgerow_take_of_group(query);
     if (goes && hedgerow_has_record(query) && hedgerow_is_in_top(query)) hedgerow_enter_instance(query);
     hedgerow_visit_in_lanes(query, goes, told);
     if (HEDGEROW_FORMS == HEDGEROW_NODES_OF_TWO) hedgerow_visit_in_lanes(query, goes, told);
     if (goes && hedgerow_is_quantised(query)) hedgerow_take_leaf(query);
     bool tests = goes && hedgerow_has_record(query) && !hedgerow_is_in_top(query);
-    bool waits = hedgerow_test_in_lanes(query, tests, told);
-    ends = false;
-    if (goes) {
-        ends = query.rounds == 0u;
-        query.rounds -= ends ? 0u : 1u;
-        // A candidate is decided on before anything else is.
-        if (!ends && !waits && query.left == HEDGEROW_NOTHING) ends = !hedgerow_go_on(query);
-        if (ends) hedgerow_count_hit(query);
-    }
+    uint waits = hedgerow_test_in_lanes(query, tests, told);
+    ends = goes && query.rounds == 0u ? 1u : 0u;
+    query.rounds -= goes ? 1u - ends : 0u;
+    // A candidate is decided on before anything else is.
+    if (goes && (ends | waits) == 0u && query.left == HEDGEROW_NOTHING) ends = hedgerow_go_back(query) ? 0u : 1u;
+    if (ends != 0u) hedgerow_count_hit(query);
     return waits;
 }
 

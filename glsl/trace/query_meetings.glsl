@@ -69,12 +69,14 @@ Triangle hedgerow_triangle_of(Instance instance, HedgerowMeeting met) {
 // Whether the candidate comes before the committed hit at the same t: by instance, then primitive. Several records may be of one instance.
 bool hedgerow_comes_before(HedgerowRayQuery query) {
     HedgerowMeeting a = query.candidate, b = query.committed;
-    bool before = false;
-    if (b.type != HEDGEROW_MET_NOTHING) {
-        uint of_a = hedgerow_instance_of(query, a).instance, of_b = hedgerow_instance_of(query, b).instance;
-        before = of_a < of_b || (of_a == of_b && a.primitive < b.primitive);
+    bool is_met = b.type != HEDGEROW_MET_NOTHING;
+    uint of_a = 0u, of_b = 0u;
+    if (hedgerow_has_top(query) && is_met && a.t == b.t) {
+        of_a = hedgerow_instance_of(query, a).instance;
+        of_b = hedgerow_instance_of(query, b).instance;
     }
-    return before;
+    bool comes_before = of_a < of_b || (of_a == of_b && a.primitive < b.primitive);
+    return is_met && comes_before;
 }
 
 void hedgerow_commit(inout HedgerowRayQuery query) {

@@ -21,32 +21,31 @@ bool hedgerow_is_pair(HedgerowRayQuery query, Triangle first) {
     return has_second(first) && hedgerow_unit_of(query) + UNITS_OF_TWO <= UNITS_OF_ONE * query.records;
 }
 
-// One or both triangles of the next record, as they lie in memory; true if one is a candidate that the shader must decide on. After that of
+// One or both triangles of the next record, as they lie in memory; 1 if one is a candidate that the shader must decide on. After that of
 // the first, the second is next.
-bool hedgerow_meet_pair(inout HedgerowRayQuery query, Triangle first, SecondOfPair second, bool is_pair) {
+uint hedgerow_meet_pair(inout HedgerowRayQuery query, Triangle first, SecondOfPair second, bool is_pair) {
     uint at = query.index, unit = hedgerow_unit_of(query), left = query.left, units = units_of_record(first);
     HEDGEROW_COUNT(w);
     query.index = unit + units;
     query.left = left <= units ? HEDGEROW_NOTHING : left - units;
-    bool waits = false, goes_on = true;
-    if (at == unit) {
-        waits = hedgerow_meet_triangle(query, first_of_pair(first), at);
-        if (waits && is_pair) {
-            query.index = unit | HEDGEROW_SECOND;
-            query.left = left;
-        }
-        bool has_ended = hedgerow_ends_at_first_hit(query) && query.committed.type != HEDGEROW_MET_NOTHING;
-        goes_on = !waits && is_pair && !has_ended;
+    uint waits = 0u;
+    // Nothing was decided on between the two where all are opaque.
+    bool is_first = (query.flags & hedgerowRayFlagsOpaque) != 0u || at == unit;
+    if (is_first) waits = hedgerow_meet_triangle(query, first_of_pair(first), at);
+    if (waits != 0u && is_pair) {
+        query.index = unit | HEDGEROW_SECOND;
+        query.left = left;
     }
-    if (goes_on) {
-        if (at == unit) HEDGEROW_COUNT(w);
+    bool has_ended = hedgerow_ends_at_first_hit(query) && query.committed.type != HEDGEROW_MET_NOTHING;
+    if (is_pair && waits == 0u && !has_ended) {
+        if (is_first) HEDGEROW_COUNT(w);
         waits = hedgerow_meet_triangle(query, second_of_pair(first, second), unit | HEDGEROW_SECOND);
     }
     return waits;
 }
 
-bool hedgerow_test_pair(inout HedgerowRayQuery query) {
-    bool waits = false;
+uint hedgerow_test_pair(inout HedgerowRayQuery query) {
+    uint waits = 0u;
     if (hedgerow_comes_to_record(query)) {
         uvec2 records = wide_records_at(query.structure, query.slots, QUANTISED_NODE_BYTES);
         Triangle first = hedgerow_triangle_at_unit(records, hedgerow_unit_of(query));

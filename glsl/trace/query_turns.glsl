@@ -50,9 +50,10 @@ const uint HEDGEROW_ROUNDS_A_TURN = 8u;
 struct HedgerowTurns {
     bool takes;      // in this turn: the next ray
     bool any_takes;  // of the subgroup
-    bool goes;       // a ray is on its way
-    bool ends;       // in this turn
-    bool together;
+    // Words, 1 or 0: trace/query_walk.glsl says why.
+    uint goes;       // a ray is on its way
+    uint ends;       // in this turn
+    uint together;
     uint spent;      // rounds since all took a ray
     uvec2 told;      // the structure that lanes load from that need nothing
 };
@@ -62,7 +63,7 @@ HedgerowTurns hedgerowTurns(HedgerowStructure structure) {
     uvec2 told = uvec2(structure);
     // Of one level what lanes load lies among its nodes and triangles.
     if (HEDGEROW_ONE_LEVEL && any(notEqual(told, uvec2(0u)))) told = hedgerow_can_be_traced(structure.header) ? told : uvec2(0u);
-    return HedgerowTurns(false, false, false, false, true, 0u, told);
+    return HedgerowTurns(false, false, 0u, 0u, 1u, 0u, told);
 }
 
 // Whether anything is left to do in the subgroup, where this invocation has rays left or not.
@@ -71,22 +72,23 @@ HedgerowTurns hedgerowTurns(HedgerowStructure structure) {
 // variables that it writes by a mask, and then compares lanes and selects words where it would insert them: rays that are loaded lane by
 // lane have 0.8 of the speed (docs/notes/rays.md).
 bool hedgerowTakeTurn(inout HedgerowTurns turns, bool has_rays) {
-    bool waits = !turns.goes && has_rays;
+    bool waits = turns.goes == 0u && has_rays;
 #ifdef HEDGEROW_LANES
-    uint lanes = hedgerow_sum_of_lanes(uint(turns.goes) | uint(waits) << 16);
+    uint lanes = hedgerow_sum_of_lanes(turns.goes | (waits ? 1u << 16 : 0u));
     bool none_goes = (lanes & 0xFFFFu) == 0u, any_waits = lanes >> 16 != 0u;
 #else
-    bool none_goes = !subgroupAny(turns.goes), any_waits = subgroupAny(waits);
+    bool none_goes = !subgroupAny(turns.goes != 0u), any_waits = subgroupAny(waits);
 #endif
     if (none_goes) {
         uint all = hedgerow_sum_of_lanes(1u);
-        turns.together = turns.together && 2u * hedgerow_sum_of_lanes(turns.spent) >= all * hedgerow_max_of_lanes(turns.spent);
+        bool stay = 2u * hedgerow_sum_of_lanes(turns.spent) >= all * hedgerow_max_of_lanes(turns.spent);
+        turns.together = stay ? turns.together : 0u;
         turns.spent = 0u;
     }
-    bool take = none_goes || !turns.together;
+    bool take = none_goes || turns.together == 0u;
     turns.any_takes = take && any_waits;
     turns.takes = take && waits;
-    turns.goes = turns.goes || turns.takes;
+    turns.goes = turns.takes ? 1u : turns.goes;
     return !none_goes || any_waits;
 }
 
@@ -95,31 +97,33 @@ bool hedgerowTakeTurn(inout HedgerowTurns turns, bool has_rays) {
 bool hedgerowRayQueryProceedInTurn(inout HedgerowRayQuery query, inout HedgerowTurns turns, uint flags) {
     query.flags = flags;
     hedgerow_recall(query);
-    turns.ends = false;
-    bool waits = false;
+    turns.ends = 0u;
+    uint waits = 0u;
 #ifdef HEDGEROW_LANES
     // Not found on the way: a driver may load what is the same for all lanes where none of them is active, from what it then finds there.
     bool is_told = any(notEqual(turns.told, uvec2(0u)));
     // Of one level the nodes and records of that structure are loaded by their indices.
-    bool goes = turns.goes && (!HEDGEROW_ONE_LEVEL || all(equal(query.top, turns.told)));
+    bool goes = turns.goes != 0u && (!HEDGEROW_ONE_LEVEL || all(equal(query.top, turns.told)));
     if (is_told) waits = hedgerow_round_of_lanes(query, goes, turns.told, turns.ends);
-    turns.ends = turns.ends || (turns.goes && !(goes && is_told));
-    turns.spent += turns.goes ? 1u : 0u;
+    turns.ends |= goes && is_told ? 0u : turns.goes;
+    turns.spent += turns.goes;
 #else
-    if (turns.goes) {
-        uint most = turns.together ? 0xffffffffu : HEDGEROW_ROUNDS_A_TURN;
+    if (turns.goes != 0u) {
+        uint most = turns.together != 0u ? 0xffffffffu : HEDGEROW_ROUNDS_A_TURN;
         uint left = most;
-        waits = hedgerow_proceed_for(query, left, true, turns.ends);
+        bool ends;
+        waits = hedgerow_proceed_for(query, left, true, ends) ? 1u : 0u;
+        turns.ends = ends ? 1u : 0u;
         turns.spent += most - left;
     }
 #endif
-    return waits;
+    return waits != 0u;
 }
 
 // Whether the query has ended in this turn: its hit is what it is.
 bool hedgerowRayQueryEndsInTurn(HedgerowRayQuery query, inout HedgerowTurns turns) {
-    bool ends = turns.goes && turns.ends;
-    if (ends) turns.goes = false;
-    return ends;
+    uint ends = turns.goes & turns.ends;
+    turns.goes ^= ends;
+    return ends != 0u;
 }
 #endif

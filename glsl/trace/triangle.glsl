@@ -89,8 +89,9 @@ bool hedgerow_meet_facing(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, ou
     precise vec3 edges = vec3(c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x);
     float least = min(min(edges.x, edges.y), edges.z);
     float greatest = max(max(edges.x, edges.y), edges.z);
-    bool meets = !(least < -HEDGEROW_TRUSTED && greatest > HEDGEROW_TRUSTED);
-    if (meets) {
+    // No bool: trace/query_walk.glsl says why.
+    uint meets = least < -HEDGEROW_TRUSTED && greatest > HEDGEROW_TRUSTED ? 0u : 1u;
+    if (meets != 0u) {
         vec2 m = max(max(abs(a.xy), abs(b.xy)), abs(c.xy));
         float largest = max(m.x, m.y);
         precise float cube = largest * largest * largest;
@@ -103,7 +104,7 @@ bool hedgerow_meet_facing(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, ou
         bool accurate = cube < HEDGEROW_LARGEST_CUBE && error <= allowed;
         if (!(trusted && accurate)) {
             vec3 careful = edges;
-            meets = hedgerow_carefully(a, b, c, largest, reach, careful);
+            meets = hedgerow_carefully(a, b, c, largest, reach, careful) ? 1u : 0u;
             edges = careful;
         }
         precise float all = edges.x + edges.y + edges.z;
@@ -114,7 +115,7 @@ bool hedgerow_meet_facing(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, ou
         // The permutation keeps the sense of rotation, and the shear turns it where the ray goes down its major axis.
         is_front = (scale > 0.0) != (ray.shear.z < 0.0);
     }
-    return meets;
+    return meets != 0u;
 }
 
 bool hedgerow_meet(HedgerowPreparedRay ray, vec3 v0, vec3 v1, vec3 v2, out vec3 meeting) {

@@ -101,23 +101,27 @@ void test(Triangle triangle, bool any_hit, inout Walk walk) {
 
 // Takes what waits; whether there was any. Equally far is not too far: an equally near hit with a lower index may be there.
 bool go_on(inout Walk walk) {
-    if (walk.level == 0u) return false;
-    walk.level--;
-    HedgerowWaiting waiting = hedgerow_taken(walk.level);
-    walk.index = waiting.index;
-    walk.left = waiting.enter <= walk.best ? waiting.count : NOTHING;
-    count_leaf(walk);
-    return true;
+    bool waits = walk.level != 0u;
+    if (waits) {
+        walk.level--;
+        HedgerowWaiting waiting = hedgerow_taken(walk.level);
+        walk.index = waiting.index;
+        walk.left = waiting.enter <= walk.best ? waiting.count : NOTHING;
+        count_leaf(walk);
+    }
+    return waits;
 }
 
 // The same where it was put there by `visit_left_first`.
 bool go_on_left_first(inout Walk walk) {
-    if (walk.level == 0u) return false;
-    walk.level--;
-    uvec2 waiting = hedgerow_taken_anyway(walk.level);
-    walk.index = waiting.x;
-    walk.left = waiting.y;
-    count_leaf(walk);
-    return true;
+    bool waits = walk.level != 0u;
+    if (waits) {
+        walk.level--;
+        uvec2 waiting = hedgerow_taken_anyway(walk.level);
+        walk.index = waiting.x;
+        walk.left = waiting.y;
+        count_leaf(walk);
+    }
+    return waits;
 }
 #endif

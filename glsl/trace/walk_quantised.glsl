@@ -145,8 +145,9 @@ void test_record(Triangle first, SecondOfPair second, bool any_hit, inout Quanti
 // Takes a group that waits, if there is nothing at hand; whether there was any. Equally far is not too far: an equally near hit
 // with a lower index may be there.
 bool go_on(inout QuantisedWalk walk) {
-    bool goes = walk.left != 0u || walk.leaves != 0u || walk.visits != 0u;
-    if (!goes && walk.level != 0u) {
+    bool is_at_hand = walk.left != 0u || walk.leaves != 0u || walk.visits != 0u;
+    bool waits = !is_at_hand && walk.level != 0u;
+    if (waits) {
         walk.level--;
         uvec2 entry = hedgerow_entry(walk.level);
         walk.first_child = entry.x;
@@ -154,8 +155,7 @@ bool go_on(inout QuantisedWalk walk) {
         walk.enter = entry.y & 0xFFFF0000u;
         walk.nodes = entry.y >> 8 & 0xFFu;
         walk.visits = uintBitsToFloat(walk.enter) <= walk.best ? entry.y & 0xFFu : 0;
-        goes = true;
     }
-    return goes;
+    return is_at_hand || waits;
 }
 #endif

@@ -63,9 +63,9 @@ void main() {
         // There is a first triangle, or no lane is at one.
         HedgerowEachLane tests = hedgerow_each_lane(at_triangle(walk) ? walk.index : 0u);
         if (at_triangle(walk)) test(triangle_of_each_lane(triangles, tests), ANY_HIT, walk);
-        if (lane.going && walk.left == NOTHING) {
-            lane.going = LEFT_FIRST ? go_on_left_first(walk) : go_on(walk);
-            if (!lane.going) {
+        if (lane.going != 0u && walk.left == NOTHING) {
+            lane.going = (LEFT_FIRST ? go_on_left_first(walk) : go_on(walk)) ? 1u : 0u;
+            if (lane.going == 0u) {
                 hits.hit[lane.at] = walk.hit;
                 if (COUNT_WORK) works.work[lane.at] = walk.work;
             }

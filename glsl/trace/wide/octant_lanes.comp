@@ -79,9 +79,9 @@ void main() {
         bool is_pair = tests && has_second(triangle);
         SecondOfPair second = second_of_each_lane(records, hedgerow_each_lane(is_pair ? walk.record + UNITS_OF_ONE : 0u));
         if (tests) test_record(triangle, second, ANY_HIT, walk);
-        if (lane.going) {
-            lane.going = go_on(walk);
-            if (!lane.going) {
+        if (lane.going != 0u) {
+            lane.going = go_on(walk) ? 1u : 0u;
+            if (lane.going == 0u) {
                 hits.hit[lane.at] = walk.hit;
                 if (COUNT_WORK) works.work[lane.at] = walk.work;
             }
