@@ -66,7 +66,7 @@ void find_fences() {
     uint count = primitive_count, taken = 0;
     for (uint round = 0; round < 2; ++round) {
         taken = min(count, SECTION_SAMPLE);
-        barrier();   // the counters of the first have been read
+        barrier();   // the counters of the first round have been read
         if (gl_LocalInvocationIndex == 0) begin_sample();
         next_phase();
         for (uint i = gl_LocalInvocationIndex; i < taken; i += gl_WorkGroupSize.x) {
