@@ -8,13 +8,11 @@ bool hedgerow_meets_instance(inout HedgerowRayQuery query, Instance instance, ou
     if (is_seen) {
         HEDGEROW_COUNT(y);
     }
-    uint meets = is_seen && !hedgerow_skips(query.flags, instance.slots) && hedgerow_meets(instance.slots) ? 1u : 0u;
-    if (meets != 0u) {
-        ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
-                          hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
-        meets = hedgerow_prepare(ray, prepared) ? 1u : 0u;
-    }
-    return meets != 0u;
+    bool meets = is_seen && !hedgerow_skips(query.flags, instance.slots) && hedgerow_meets(instance.slots);
+    ray = HedgerowRay(hedgerow_transformed(instance.to_object, vec4(query.ray.origin, 1.0)), query.ray.t_min,
+                      hedgerow_transformed(instance.to_object, vec4(query.ray.direction, 0.0)), query.ray.t_max);
+    bool goes = hedgerow_prepare(ray, prepared);
+    return meets && goes;
 }
 
 // The structure of an instance is at hand, with the ray in its space.

@@ -116,7 +116,7 @@ uvec2 hedgerow_triangles_of_told(uvec2 told) {
 // The next record of a leaf, of the lanes that are at one; 1 if what was met is a candidate. Of quantised triangles a record may be two.
 uint hedgerow_test_in_lanes(inout HedgerowRayQuery query, bool tests, uvec2 told) {
     uint waits = 0u;
-    bool at_box = (query.form & FORM_BOXES) != 0u;
+    bool at_box = hedgerow_is_at_boxes(query);
     if (tests && at_box) waits = hedgerow_test_box(query);
     bool tests_triangle = tests && !at_box;
     if ((HEDGEROW_FORMS & HEDGEROW_NODES_OF_TWO) != 0u) {

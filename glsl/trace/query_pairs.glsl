@@ -49,7 +49,7 @@ uint hedgerow_test_pair(inout HedgerowRayQuery query) {
     if (hedgerow_comes_to_record(query)) {
         uvec2 records = wide_records_at(query.structure, query.slots, QUANTISED_NODE_BYTES);
         Triangle first = hedgerow_triangle_at_unit(records, hedgerow_unit_of(query));
-        SecondOfPair second;
+        SecondOfPair second = SecondOfPair(vec3(0.0), 0u);
         bool is_pair = hedgerow_is_pair(query, first);
         if (is_pair) second = hedgerow_second_of_pair_at(records, hedgerow_unit_of(query));
         waits = hedgerow_meet_pair(query, first, second, is_pair);

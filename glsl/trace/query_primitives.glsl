@@ -85,7 +85,7 @@ uint hedgerow_test_triangle(inout HedgerowRayQuery query) {
 // The next record of the leaf; 1 if what was met is a candidate that the shader must decide on.
 uint hedgerow_test(inout HedgerowRayQuery query) {
     uint waits = 0u;
-    if ((query.form & FORM_BOXES) != 0u) waits = hedgerow_test_box(query);
+    if (hedgerow_is_at_boxes(query)) waits = hedgerow_test_box(query);
     else if (hedgerow_is_quantised(query)) waits = hedgerow_test_pair(query);
     else waits = hedgerow_test_triangle(query);
     return waits;

@@ -26,7 +26,8 @@
 // but if that is null, or with HEDGEROW_ONE_LEVEL, those meet nothing.
 //
 // On lavapipe the rays of `hedgerow accel` are 1.25 times as fast lane by lane as with one for each invocation (docs/notes/rays.md): those
-// that go anywhere 1.6 to 2.1 times, those that go the same way 0.91 to 1.13. With each lane's own loads it was 1.13 times.
+// that go anywhere 1.6 to 2.1 times, those that go the same way 0.91 to 1.13. With each lane's own loads it was 1.13 times. Where
+// HEDGEROW_ALL_BUILT (trace/query_walk.glsl) is true, no lane asks in each turn whether there is something to load.
 //
 // needs   votes and arithmetic of subgroups in compute shaders, with HEDGEROW_LANES ballots in place of them; all invocations of a
 //         subgroup come to hedgerowTakeTurn and hedgerowRayQueryProceedInTurn together
@@ -62,7 +63,7 @@ struct HedgerowTurns {
 HedgerowTurns hedgerowTurns(HedgerowStructure structure) {
     uvec2 told = uvec2(structure);
     // Of one level what lanes load lies among its nodes and triangles.
-    if (HEDGEROW_ONE_LEVEL && any(notEqual(told, uvec2(0u)))) told = hedgerow_can_be_traced(structure.header) ? told : uvec2(0u);
+    if (HEDGEROW_ONE_LEVEL && !HEDGEROW_ALL_BUILT && any(notEqual(told, uvec2(0u)))) told = hedgerow_can_be_traced(structure.header) ? told : uvec2(0u);
     return HedgerowTurns(false, false, 0u, 0u, 1u, 0u, told);
 }
 
@@ -96,12 +97,12 @@ bool hedgerowTakeTurn(inout HedgerowTurns turns, bool has_rays) {
 // compiler does not see that they are constant where they come from another turn.
 bool hedgerowRayQueryProceedInTurn(inout HedgerowRayQuery query, inout HedgerowTurns turns, uint flags) {
     query.flags = flags;
-    hedgerow_recall(query);
     turns.ends = 0u;
     uint waits = 0u;
 #ifdef HEDGEROW_LANES
+    hedgerow_recall(query);
     // Not found on the way: a driver may load what is the same for all lanes where none of them is active, from what it then finds there.
-    bool is_told = any(notEqual(turns.told, uvec2(0u)));
+    bool is_told = HEDGEROW_ALL_BUILT || any(notEqual(turns.told, uvec2(0u)));
     // Of one level the nodes and records of that structure are loaded by their indices.
     bool goes = turns.goes != 0u && (!HEDGEROW_ONE_LEVEL || all(equal(query.top, turns.told)));
     if (is_told) waits = hedgerow_round_of_lanes(query, goes, turns.told, turns.ends);

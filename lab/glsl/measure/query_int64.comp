@@ -7,6 +7,7 @@ layout(constant_id = 5) const bool ONE_LEVEL = false;
 #define HEDGEROW_ONE_LEVEL ONE_LEVEL
 layout(constant_id = 6) const uint FORMS = 3;
 #define HEDGEROW_FORMS FORMS
+#define HEDGEROW_ALL_BUILT true
 layout(constant_id = 7) const bool LONG_NODES = false;
 #define HEDGEROW_INT64
 #define HEDGEROW_LONG_NODES LONG_NODES

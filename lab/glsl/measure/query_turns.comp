@@ -7,6 +7,7 @@ layout(constant_id = 5) const bool ONE_LEVEL = false;
 #define HEDGEROW_ONE_LEVEL ONE_LEVEL
 layout(constant_id = 6) const uint FORMS = 3;
 #define HEDGEROW_FORMS FORMS
+#define HEDGEROW_ALL_BUILT true
 #define IN_TURN
 #include "gpu/division.glsl"
 #include "trace/ray_query_names.glsl"

@@ -6,14 +6,17 @@
 // needs   a barrier (build -> read) before and one after; any subgroup size
 #include "measure/rays.glsl"
 
-// Every triangle is opaque, so that nothing is left to decide between candidates.
-const uint FLAGS = gl_RayFlagsOpaqueEXT | (ANY_HIT ? gl_RayFlagsTerminateOnFirstHitEXT : 0u);
-
+// Ours are told that there are no boxes. The driver's are not: on lavapipe they are no faster so, and it is a feature of its own.
 #ifdef HEDGEROW_TRACE_QUERY
 #define QUERY inout rayQueryEXT query
+const uint PRIMITIVES = gl_RayFlagsSkipAABBEXT;
 #else
 #define QUERY rayQueryEXT query
+const uint PRIMITIVES = gl_RayFlagsNoneEXT;
 #endif
+
+// Every triangle is opaque, so that nothing is left to decide between candidates.
+const uint FLAGS = gl_RayFlagsOpaqueEXT | PRIMITIVES | (ANY_HIT ? gl_RayFlagsTerminateOnFirstHitEXT : 0u);
 
 void begin(QUERY, GivenRay ray) {
     rayQueryInitializeEXT(query, accelerationStructureEXT(structure), FLAGS, 0xFF, ray.origin, ray.t_min, ray.direction,
