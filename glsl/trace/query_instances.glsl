@@ -38,12 +38,8 @@ void hedgerow_begin_instance(inout HedgerowRayQuery query, Instance instance, ui
     query.at = HedgerowLink(HEDGEROW_LINK_COUNTS(instance.structure), HEDGEROW_NO_LINK);
 #endif
     uvec2 begin = begin_at(instance.start, instance.slots, instance.records);
-    query.index = begin.x;
-    query.left = begin.y;
-    if (hedgerow_is_quantised(query)) {
-        query.left = 0u;
-        hedgerow_begin_quantised(query, ray.direction, begin.y);
-    }
+    hedgerow_begin_at(query, begin.x, hedgerow_is_quantised(query) ? 0u : begin.y);
+    if (hedgerow_is_quantised(query)) hedgerow_begin_quantised(query, ray.direction, begin.y);
 }
 
 // From the top level into the next instance, if the ray meets it.

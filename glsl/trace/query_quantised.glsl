@@ -43,7 +43,7 @@ const uint HEDGEROW_RECORDS_WAIT = 1u << 31;
 
 // The rest of the leaf at hand waits.
 void hedgerow_put_off_rest(inout HedgerowRayQuery query) {
-    hedgerow_put_entry(query.level, uvec2(query.index | HEDGEROW_RECORDS_WAIT, query.left));
+    hedgerow_put_entry(hedgerow_place(query), uvec2(query.index | HEDGEROW_RECORDS_WAIT, query.left));
     query.level++;
 }
 
@@ -92,7 +92,7 @@ void hedgerow_take_of_group(inout HedgerowRayQuery query) {
             query.left = 0u;
         }
         if (left != 0u && query.level - hedgerow_bottom(query) < MAX_DEPTH) {
-            hedgerow_put_entry(query.level, uvec2(query.first_child, query.group ^ visits ^ left));
+            hedgerow_put_entry(hedgerow_place(query), uvec2(query.first_child, query.group ^ visits ^ left));
             query.level++;
         }
         query.group = 0u;

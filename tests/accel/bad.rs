@@ -7,7 +7,7 @@ use crate::common::backends::{Backend, Built, Ours, vk_geometry};
 use crate::common::device;
 use crate::common::geometries::Owned;
 use crate::common::matrices::{moved, rotation, scaled};
-use crate::common::probe::{CONFIRM, IGNORE, ProbeRay, ProbeReport};
+use crate::common::probe::{CONFIRM, IGNORE, Probe, ProbeRay, ProbeReport};
 use crate::common::shapes::{Corners, boxes, soup};
 use crate::common::world::{BuiltWorld, Part, World, bottom_level, instances_at, top_level};
 use hedgerow::accel::{Instance, Tree};
@@ -239,7 +239,7 @@ fn overwritten(bytes: &[u8], how: usize, random: &mut SplitMix64) -> Vec<u8> {
     out
 }
 
-const OVERWRITTEN: std::ops::Range<usize> = 0..16;
+const OVERWRITTEN: std::ops::Range<usize> = 0..20;
 /// The first of them leave no node: a top level built before knows where the structure begins, and there is nothing.
 const NOTHING_LEFT: usize = 2;
 /// The first of them leave no header: the structure itself cannot be traced, nor by a top level built over it.
@@ -310,5 +310,35 @@ fn queries_of_overwritten_top_levels_end() {
         let reports = ours.probe(built.top.structure, &rays);
         assert_finite(&format!("overwritten {how}"), &rays, &reports);
         assert!(how >= NO_HEADER || hits_of(&reports) == 0, "overwritten {how}: {} hits", hits_of(&reports));
+    }
+}
+
+/// One of them goes on whenever the other has a candidate, into a good structure or one that was overwritten: the other reports what it
+/// reports alone.
+#[test]
+fn two_queries_of_an_invocation_leave_each_other_alone() {
+    let ours = Ours::on(device());
+    let mut random = SplitMix64::new(13);
+    let rays = rays(128);
+    let part = Part::Triangles(vec![(soup(300, 0.6, 1), GeometryFlags::empty())]);
+    let world = World::new(vec![part.clone(), part], vec![Instance::new(1, rotation(1))]);
+    let built = world.build(&ours);
+    let (top, other) = (ours.address(built.top.structure), &built.parts[1]);
+    let alone = ours.probe(built.top.structure, &rays);
+    let waited = alone.iter().filter(|report| report.candidate_count > 1).count();
+    assert!(waited > 40, "{waited} rays had candidates to decide on");
+    let probe = Probe::beside_another(device());
+    let original = other.memory.read::<u8>(other.bytes as usize);
+    let mut met = 0;
+    for how in std::iter::once(None).chain(OVERWRITTEN.map(Some)) {
+        let bytes = how.map_or_else(|| original.clone(), |how| overwritten(&original, how, &mut random));
+        other.memory.write(&bytes);
+        let reports = probe.ask_told(top, ours.address(other.structure), &rays);
+        for (i, (report, expected)) in reports.iter().zip(&alone).enumerate() {
+            met += report.opaque_boxes;
+            let report = ProbeReport { opaque_boxes: expected.opaque_boxes, ..*report };
+            assert_eq!(report, *expected, "the other structure overwritten {how:?}, ray {i}");
+        }
+        assert!(how.is_some() || met > 0, "the other query meets nothing");
     }
 }

@@ -2,7 +2,8 @@
 //
 // A ray says how its candidates are decided on; the first eight are written down as they come. With IN_TURN, which ours can, an
 // invocation has five rays, and `told` is the structure that its turns are told of; with HEDGEROW_LANES, which has to be a workgroup's
-// invocations, these are loaded for lane by lane.
+// invocations, these are loaded for lane by lane. With WITH_ANOTHER, another query of each ray, into `told`, goes on whenever its first has a
+// candidate; how many hits it committed to is added to the opaque boxes.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_scalar_block_layout : require
@@ -68,6 +69,9 @@ layout(buffer_reference, scalar) writeonly buffer Reports { Report report[]; };
 layout(push_constant, scalar) uniform ProbeArguments { uvec2 structure; uvec2 told; Rays rays; Reports reports; uint count; };
 
 rayQueryEXT query;
+#ifdef WITH_ANOTHER
+rayQueryEXT another;
+#endif
 ProbeRay ray;
 Report r;
 
@@ -76,7 +80,12 @@ void begin(uint i) {
     for (uint k = 0; k < CANDIDATES; ++k) r.candidates[k] = uvec4(0);
     r.candidate_count = 0;
     r.opaque_boxes = 0;
+#ifdef WITH_ANOTHER
+    hedgerowRayQueryInitializeAt(query, 1u, HedgerowStructure(structure), ray.flags, ray.mask, ray.origin, ray.t_min, ray.direction, ray.t_max);
+    hedgerowRayQueryInitialize(another, HedgerowStructure(told), ray.flags, ray.mask, ray.origin, ray.t_min, ray.direction, ray.t_max);
+#else
     rayQueryInitializeEXT(query, accelerationStructureEXT(structure), ray.flags, ray.mask, ray.origin, ray.t_min, ray.direction, ray.t_max);
+#endif
 }
 
 void decide() {
@@ -151,7 +160,13 @@ void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
     begin(i);
-    for (uint round = 0; round < 10000 && rayQueryProceedEXT(query); ++round) decide();
+    for (uint round = 0; round < 10000 && rayQueryProceedEXT(query); ++round) {
+        decide();
+#ifdef WITH_ANOTHER
+        if (rayQueryProceedEXT(another)) rayQueryConfirmIntersectionEXT(another);
+        r.opaque_boxes += rayQueryGetIntersectionTypeEXT(another, true);
+#endif
+    }
     report(i);
 }
 #endif

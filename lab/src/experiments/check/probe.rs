@@ -130,6 +130,12 @@ impl Probe {
         Probe::with(device, &shaders::MEASURE_PROBE, Probe::GROUP, true)
     }
 
+    /// The same while another query of each ray goes on, into what turns would be told of: how many hits that committed to is added to
+    /// `opaque_boxes`.
+    pub fn beside_another(device: &'static Device) -> Probe {
+        Probe::of(device, &shaders::MEASURE_PROBE_TWO)
+    }
+
     /// The same with several rays for each invocation, in turn.
     pub fn in_turn(device: &'static Device) -> Probe {
         Probe::of(device, &shaders::MEASURE_PROBE_TURNS)
