@@ -63,7 +63,8 @@ struct HedgerowTurns {
 HedgerowTurns hedgerowTurns(HedgerowStructure structure) {
     uvec2 told = uvec2(structure);
     // Of one level what lanes load lies among its nodes and triangles.
-    if (HEDGEROW_ONE_LEVEL && !HEDGEROW_ALL_BUILT && any(notEqual(told, uvec2(0u)))) told = hedgerow_can_be_traced(structure.header) ? told : uvec2(0u);
+    bool asks = HEDGEROW_ONE_LEVEL && !HEDGEROW_ALL_BUILT && any(notEqual(told, uvec2(0u)));
+    if (asks) told = hedgerow_can_be_traced(structure.header) ? told : uvec2(0u);
     return HedgerowTurns(false, false, 0u, 0u, 1u, 0u, told);
 }
 

@@ -10,7 +10,7 @@ use crate::common::matrices::{moved, rotation, scaled};
 use crate::common::probe::{CONFIRM, IGNORE, Probe, ProbeRay, ProbeReport};
 use crate::common::shapes::{Corners, boxes, soup};
 use crate::common::world::{BuiltWorld, Part, World, bottom_level, instances_at, top_level};
-use hedgerow::accel::{Instance, Tree};
+use hedgerow::accel::{AccelOptions, Instance, Tree, Wide};
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::{self, Bvh2, Child, Header, InstanceRecord as Placed, NODES_OFFSET, Triangle, status};
@@ -317,12 +317,17 @@ fn queries_of_overwritten_top_levels_end() {
 /// reports alone.
 #[test]
 fn two_queries_of_an_invocation_leave_each_other_alone() {
-    let ours = Ours::on(device());
+    for wide in [Wide::Never, Wide::Always] {
+        leave_each_other_alone(&Ours::with_options(device(), AccelOptions { wide, ..AccelOptions::DEFAULT }));
+    }
+}
+
+fn leave_each_other_alone(ours: &Ours) {
     let mut random = SplitMix64::new(13);
     let rays = rays(128);
     let part = Part::Triangles(vec![(soup(300, 0.6, 1), GeometryFlags::empty())]);
     let world = World::new(vec![part.clone(), part], vec![Instance::new(1, rotation(1))]);
-    let built = world.build(&ours);
+    let built = world.build(ours);
     let (top, other) = (ours.address(built.top.structure), &built.parts[1]);
     let alone = ours.probe(built.top.structure, &rays);
     let waited = alone.iter().filter(|report| report.candidate_count > 1).count();
