@@ -3,7 +3,7 @@
 // A ray says how its candidates are decided on; the first eight are written down as they come. With IN_TURN, which ours can, an
 // invocation has five rays, and `told` is the structure that its turns are told of; with HEDGEROW_LANES, which has to be a workgroup's
 // invocations, these are loaded for lane by lane. With WITH_ANOTHER, another query of each ray, into `told`, goes on whenever its first has a
-// candidate; how many hits it committed to is added to the opaque boxes.
+// candidate; each time the kind of what it has committed to, 0 if nothing, is added to the opaque boxes.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_scalar_block_layout : require

@@ -130,8 +130,8 @@ impl Probe {
         Probe::with(device, &shaders::MEASURE_PROBE, Probe::GROUP, true)
     }
 
-    /// The same while another query of each ray goes on, into what turns would be told of: how many hits that committed to is added to
-    /// `opaque_boxes`.
+    /// The same while another query of each ray goes on, into what turns would be told of. Each time the kind of what that has
+    /// committed to, 0 if nothing, is added to `opaque_boxes`.
     pub fn beside_another(device: &'static Device) -> Probe {
         Probe::of(device, &shaders::MEASURE_PROBE_TWO)
     }
