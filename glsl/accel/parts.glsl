@@ -2,7 +2,7 @@
 // is `Below` in src/accel/twin/mod.rs.
 //
 // A part is a Child. Of quantised nodes it is some of a node's slots, and `count` says which, a bit each. A part of one slot that holds a node
-// is that node, whole.
+// is that node, whole. Parts of a node do without a box of their own, which few need (box_around()).
 #ifndef HEDGEROW_ACCEL_PARTS
 #define HEDGEROW_ACCEL_PARTS
 #include "bvh/instances.glsl"
@@ -58,21 +58,36 @@ SlotBoxes boxes_in_slots(QuantisedNode node, uint slots) {
     return boxes;
 }
 
-// Which slots of a quantised node hold anything.
-uint slots_in_use(QuantisedNode node) {
-    uint used = node.exponents_and_nodes >> 24;
-    for (uint slot = 0; slot < 8; ++slot) {
-        if (byte_of_slot(node.counts, slot) != 0u) used |= 1u << slot;
-    }
-    return used;
+// Which of four bytes are not 0, a bit each.
+uint bytes_in_use(uint bytes) {
+    uint tops = ((bytes & 0x7F7F7F7Fu) + 0x7F7F7F7Fu | bytes) & 0x80808080u;
+    // Bits 0, 8, 16, 24 to 28, 29, 30, 31.
+    return (tops >> 7) * 0x10204080u >> 28;
 }
 
-Child part_of_node(QuantisedNode node, Box b, uint index, uint slots) {
+// Which slots of a quantised node hold anything.
+uint slots_in_use(QuantisedNode node) {
+    return node.exponents_and_nodes >> 24 | bytes_in_use(node.counts.x) | bytes_in_use(node.counts.y) << 4;
+}
+
+// Some of the slots of the node at `index`.
+Child part_of_node(QuantisedNode node, uint index, uint slots) {
     uint nodes = node.exponents_and_nodes >> 24;
+    Child part = Child(vec3(0), index, vec3(0), slots);
     if (bitCount(slots) == 1 && (slots & nodes) != 0u) {
-        return Child(b.lo, node.first_child + rank_of_node(nodes, uint(findLSB(slots))), b.hi, ALL_SLOTS);
+        uint slot = uint(findLSB(slots));
+        Box b = box_in_slot(node, slot);
+        part = Child(b.lo, node.first_child + rank_of_node(nodes, slot), b.hi, ALL_SLOTS);
     }
-    return Child(b.lo, index, b.hi, slots);
+    return part;
+}
+
+// The box around a part of `node`.
+Box box_around(QuantisedNode node, Child part) {
+    if (part.count == ALL_SLOTS) return Box(part.lo, part.hi);
+    Box b = empty_box();
+    for (uint left = part.count; left != 0u; left &= left - 1u) b = united(b, box_in_slot(node, uint(findLSB(left))));
+    return b;
 }
 
 // How large a box is in the world, whichever way its instance turns it: about the square of the sum of its edges. By its own area two long
@@ -84,16 +99,9 @@ float size_of(Box b) {
     return size;
 }
 
-// Some of the slots cut in two, the other part's slots and the boxes of both.
-struct Cut {
-    Box one;
-    Box other;
-    uint others;
-};
-
-// As Guttman (1984, section 3.5.2) splits a node of an R-tree: the two slots begin that together in one box would waste most, and each of the
-// others goes to the part that grows less by it.
-Cut cut_slots(QuantisedNode node, uint slots) {
+// Two or more slots cut in two: those of the other part. As Guttman (1984, section 3.5.2) splits a node of an R-tree: the two slots begin
+// that together in one box would waste most, and each of the others goes to the part that grows less by it.
+uint cut_slots(QuantisedNode node, uint slots) {
     SlotBoxes boxes = boxes_in_slots(node, slots);
     float sizes[8];
 #define SIZE(i) sizes[i] = size_of(boxes.of[i])
@@ -117,44 +125,62 @@ Cut cut_slots(QuantisedNode node, uint slots) {
     LOOK(5, 6) LOOK(5, 7)
     LOOK(6, 7)
 #undef LOOK
-    Cut cut = Cut(boxes.of[0], boxes.of[0], 1u << first.y);
+    Box one = boxes.of[0], other = boxes.of[0];
     [[unroll]] for (uint i = 1; i < 8; ++i) {
-        if (first.x == i) cut.one = boxes.of[i];
-        if (first.y == i) cut.other = boxes.of[i];
+        if (first.x == i) one = boxes.of[i];
+        if (first.y == i) other = boxes.of[i];
     }
-    vec2 size = vec2(size_of(cut.one), size_of(cut.other));
+    uint others = 1u << first.y;
+    vec2 size = vec2(size_of(one), size_of(other));
 #define JOIN(i)                                                                                 \
     {                                                                                           \
-        Box one = united(cut.one, boxes.of[i]), other = united(cut.other, boxes.of[i]);         \
-        vec2 joined = vec2(size_of(one), size_of(other));                                       \
+        Box with_one = united(one, boxes.of[i]), with_other = united(other, boxes.of[i]);       \
+        vec2 joined = vec2(size_of(with_one), size_of(with_other));                             \
         precise vec2 sum = joined + size.yx;                                                    \
         bool joins = (slots >> i & 1u) != 0u && i != first.x && i != first.y;                   \
         bool joins_other = joins && sum.y < sum.x;                                              \
         bool joins_one = joins && !joins_other;                                                 \
-        if (joins_one) cut.one = one;                                                           \
-        if (joins_other) cut.other = other;                                                     \
+        if (joins_one) one = with_one;                                                          \
+        if (joins_other) other = with_other;                                                    \
         size = vec2(joins_one ? joined.x : size.x, joins_other ? joined.y : size.y);            \
-        cut.others |= joins_other ? 1u << i : 0u;                                               \
+        others |= joins_other ? 1u << i : 0u;                                                   \
     }
     JOIN(0) JOIN(1) JOIN(2) JOIN(3) JOIN(4) JOIN(5) JOIN(6) JOIN(7)
 #undef JOIN
-    return cut;
+    return others;
 }
 
-bool open_quantised(Structure structure, Child part, out Child parts[2]) {
-    QuantisedNode node = QuantisedNodes(wide_nodes_at(uvec2(structure))).node[part.index];
-    parts[0] = part;
-    parts[1] = part;
-    if (node.exponents_and_nodes == LONG_LEAF) return false;
-    uint slots = part.count & slots_in_use(node);
-    if (bitCount(slots) < 2) return false;
-    Cut cut = cut_slots(node, slots);
-    parts[0] = part_of_node(node, cut.one, part.index, slots & ~cut.others);
-    parts[1] = part_of_node(node, cut.other, part.index, cut.others);
-    return true;
+// The node that a part is of, where it is one of eight and there: `near`, if that has its index. Of others no function asks for it.
+// `slots` are those of an Entry.
+QuantisedNode node_of(Structure structure, uint slots, Child part, uint near_index, QuantisedNode near) {
+    QuantisedNode node = near;
+    if ((slots & FORM_QUANTISED) != 0u && part.index < (slots & INDEX_MASK) && part.index != near_index) {
+        node = QuantisedNodes(wide_nodes_at(uvec2(structure))).node[part.index];
+    }
+    return node;
 }
 
-// The children of a node of two; of what cannot be opened twice itself, and false. `slots` are those of an Entry.
+QuantisedNode node_of(Structure structure, uint slots, Child part) {
+    const uvec2 none[3] = uvec2[3](uvec2(0), uvec2(0), uvec2(0));
+    return node_of(structure, slots, part, 0xFFFFFFFFu, QuantisedNode(uvec3(0), 0u, 0u, 0u, uvec2(0), none, none));
+}
+
+// Of a part of `node` the slots that hold anything; none where it is no node of eight.
+uint slots_of_part(QuantisedNode node, uint slots, Child part) {
+    bool has_slots = (slots & FORM_QUANTISED) != 0u && part.index < (slots & INDEX_MASK) && node.exponents_and_nodes != LONG_LEAF;
+    return has_slots ? part.count & slots_in_use(node) : 0u;
+}
+
+// The slots of the second of a part's two parts; 0 if it has none, and of nodes of two.
+uint cut_of(QuantisedNode node, uint slots, Child part) {
+    uint in_use = slots_of_part(node, slots, part);
+    // Of two it is the higher one, of fewer none.
+    uint others = in_use & in_use - 1u;
+    if (bitCount(in_use) > 2) others = cut_slots(node, in_use);
+    return others;
+}
+
+// The children of a node of two; of what cannot be opened twice itself, and false.
 bool open_node_of_two(Structure structure, uint slots, Child child, out Child children[2]) {
     bool opens = child.count == 0u && child.index < (slots & INDEX_MASK);
     children[0] = child;
@@ -167,11 +193,14 @@ bool open_node_of_two(Structure structure, uint slots, Child child, out Child ch
     return opens;
 }
 
-// The two parts of a part, of either form.
-bool open_child(Structure structure, uint slots, Child child, out Child children[2]) {
-    if ((slots & FORM_QUANTISED) == 0u) return open_node_of_two(structure, slots, child, children);
-    children[0] = child;
-    children[1] = child;
-    return child.index < (slots & INDEX_MASK) && open_quantised(structure, child, children);
+// The two parts of a part of either form, which cut_of() cuts by `cut`; of what cannot be opened twice itself, and false.
+bool open_part(Structure structure, QuantisedNode node, uint slots, Child part, uint cut, out Child parts[2]) {
+    if ((slots & FORM_QUANTISED) == 0u) return open_node_of_two(structure, slots, part, parts);
+    parts[0] = part;
+    parts[1] = part;
+    if (cut == 0u) return false;
+    parts[0] = part_of_node(node, part.index, part.count & slots_in_use(node) & ~cut);
+    parts[1] = part_of_node(node, part.index, cut);
+    return true;
 }
 #endif

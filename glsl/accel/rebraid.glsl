@@ -2,17 +2,23 @@
 // by the two parts of what it begins at (accel/parts.glsl), while the budget lasts. src/accel/rebraid.rs records the rounds, and
 // src/accel/twin/mod.rs is the twin.
 //
-//   fences  reads entries; one workgroup            writes the sample, near
-//   weigh   reads entries, near, the structures below     writes gains of entries that have none yet; histogram[round]
-//   select  reads gains, histogram[round]           writes sums[chunk]: entries that the round opens
-//   open    reads all of them                       writes entries, gains, count[round + 1]
+//   fences  reads entries; one workgroup                        writes the sample, near
+//   weigh   reads entries, near, the structures below           writes gains and cuts of all entries, histogram[0]
+//   select  reads gains, histogram[round]                       writes sums[chunk]: entries that the round opens
+//   list    reads gains, histogram[round], sums                 writes count[round + 1]; in place of the gains of the entries
+//                                                               that come to be, the numbers of those that are opened
+//   open    reads that list, histogram[round], near, the        writes entries, their gains and cuts, histogram[round + 1]
+//           structures below
+//
+// Weighing and opening are long: from the list, no invocation waits for another that opens one. How an entry is cut, and how its two parts
+// are, is found when it is weighed, and kept.
 //
 // What a round may spend is its share of what is left, so that the loosest entries are opened deeper than others are at all.
 // What lies beyond the fences of most entries (bvh/codes/quartiles.glsl) is opened last, as few rays come there, however large it is.
 // Entries are opened in the order of their gain, by 512 classes of it, within a class in that of their index: nothing depends
 // on who comes first.
 //
-// needs  one barrier between each two; gains and the state zeroed before the first; any subgroup size; `chunks` workgroups
+// needs  one barrier between each two; the state zeroed before the first; any subgroup size; `chunks` workgroups
 #ifndef HEDGEROW_ACCEL_REBRAID
 #define HEDGEROW_ACCEL_REBRAID
 #include "accel/world_box.glsl"
@@ -23,9 +29,7 @@ const bool HAS_SECTIONS = true;
 const uint CLASSES = 512;
 const uint ROUNDS = 4;
 const uint CHUNKS_AT_MOST = 256;
-// Of a gain: not weighed yet; weighed, and nothing is gained. All begins as zeros.
-const float UNKNOWN = 0.0;
-const float NO_GAIN = -1.0;
+const uint NO_GAIN = 0;
 // Of what is far, at most: 2^-126.
 const float FAR_GAIN = 1.1754943508222875e-38;
 
@@ -40,11 +44,11 @@ BUFFER RebraidState {
 
 layout(push_constant, scalar) uniform RebraidArguments {
     Entries entries;
-    Floats gains;
+    Words gains;   // bits of floats; where something is gained, above 0
     RebraidState state;
     Sample table;
     uint capacity;
-    uint first_round;   // of the dispatch
+    uint this_round;   // of the dispatch
     uint chunks;
     uint instance_count;
 };
@@ -62,8 +66,8 @@ bool is_over(uint round) {
     return count >= capacity || round > 0u && count == entries_before(round - 1u);
 }
 
-uint class_of(float gain) {
-    return floatBitsToUint(gain) >> 22 & (CLASSES - 1u);
+uint class_of(uint gain) {
+    return gain >> 22 & (CLASSES - 1u);
 }
 
 // A range cut into as many parts as there are invocations (or workgroups), in order.
@@ -105,15 +109,15 @@ Selection selection_of(uint round) {
 }
 
 // x: opened for sure; y: in the class of which some are.
-uvec2 kind_of(float gain, Selection s) {
-    if (!(gain > 0.0)) return uvec2(0);
+uvec2 kind_of(uint gain, Selection s) {
+    if (gain == NO_GAIN) return uvec2(0);
     uint bucket = class_of(gain);
     return uvec2(bucket > s.partial ? 1u : 0u, bucket == s.partial ? 1u : 0u);
 }
 
 uvec2 kinds_in(uvec2 range, Selection s) {
     uvec2 sum = uvec2(0);
-    for (uint i = range.x; i < range.y; ++i) sum += kind_of(gains.value[i], s);
+    for (uint i = range.x; i < range.y; ++i) sum += kind_of(gains.word[i], s);
     return sum;
 }
 
@@ -135,26 +139,39 @@ void rebraid_fences() {
     if (gl_LocalInvocationIndex == 0) state.near = near;
 }
 
-// The area that rays need not enter any more for each entry more, if the entry is opened once, or its children too: from the
-// eight boxes below it, transformed.
-float gain_of(Entry entry) {
-    if (entry.left_out != 0u) return NO_GAIN;
-    GivenInstance given = instance_of(entry);
-    Structure structure = Structure(given.structure);
+// What an entry begins at, as a part without a box of its own.
+Child part_of_entry(Entry entry) {
+    uvec2 begin = begin_at(entry.start, entry.slots, entry.records);
+    return Child(entry.lo, begin.x, entry.hi, begin.y);
+}
+
+// `Entry::cuts`: how it is cut, and how its two parts are, a byte each (cut_of()).
+uint cut_in(uint cuts, uint at) {
+    return cuts >> 8u * at & 0xFFu;
+}
+
+// The area that rays need not enter any more for each entry more, if the entry over a part of `node` is opened once, or its children too:
+// from the eight boxes below it, transformed. Completes `entry.cuts`.
+uint gain_of(inout Entry entry, vec4 m[3], Structure structure, QuantisedNode node) {
     uint slots = entry.slots;
-    uvec2 begin = begin_at(entry.start, slots, entry.records);
+    Child opened = part_of_entry(entry);
+    if (entry.cuts == 0u) entry.cuts = cut_of(node, slots, opened);
     Child children[2];
-    if (!open_child(structure, slots, Child(entry.lo, begin.x, entry.hi, begin.y), children)) return NO_GAIN;
+    if (!open_part(structure, node, slots, opened, cut_in(entry.cuts, 0), children)) return NO_GAIN;
     Box whole = empty_box();
     precise float halves = 0.0, quarters = 0.0;
     float added = 1.0;
     for (uint side = 0; side < 2; ++side) {
+        QuantisedNode of_child = node_of(structure, slots, children[side], opened.index, node);
+        uint cut = cut_of(of_child, slots, children[side]);
+        entry.cuts |= cut << 8u * (side + 1u);
         Child grandchildren[2];
-        bool opens = open_child(structure, slots, children[side], grandchildren);
+        bool opens = open_part(structure, of_child, slots, children[side], cut, grandchildren);
         Box part = empty_box();
         precise float pieces = 0.0;
         for (uint quarter = 0; quarter < 2; ++quarter) {
-            Box piece = box_of_children(given.to_world, structure, slots, grandchildren[quarter]);
+            QuantisedNode below = node_of(structure, slots, grandchildren[quarter], children[side].index, of_child);
+            Box piece = box_of_children(m, structure, below, slots, grandchildren[quarter]);
             pieces += half_area(piece);
             part = united(part, piece);
         }
@@ -170,40 +187,52 @@ float gain_of(Entry entry) {
     precise float twice = (area - quarters) * (added == 3.0 ? 1.0 / 3.0 : added == 2.0 ? 0.5 : 1.0);
     float gain = max(once, twice);
     if (!(gain > 0.0) || !is_finite(vec3(area))) return NO_GAIN;
-    return is_apart(Box(entry.lo, entry.hi), state.near) ? min(gain, FAR_GAIN) : gain;
+    return floatBitsToUint(is_apart(Box(entry.lo, entry.hi), state.near) ? min(gain, FAR_GAIN) : gain);
 }
 
-// The entry over one child of the node that another begins at.
-Entry entry_below(Entry parent, vec4 m[3], Structure structure, Child child) {
-    Box b = world_box(m, structure, parent.slots, child);
-    return entry_over(b, parent.instance, child, parent.slots, parent.records, parent.given);
+void count_gain(uint gain, uint round) {
+    if (gain != NO_GAIN) atomicAdd(state.histogram[round * CLASSES + class_of(gain)], 1u);
 }
 
-void open(uint i, uint behind) {
-    Entry entry = entries.entry[i];
-    GivenInstance given = instance_of(entry);
+// Opens entry i: its second part gets the place `behind`. Both are weighed for the next round, if there is one.
+void open(uint i, uint behind, uint round) {
+    Entry parent = entries.entry[i];
+    GivenInstance given = instance_of(parent);
     Structure structure = Structure(given.structure);
-    uvec2 begin = begin_at(entry.start, entry.slots, entry.records);
+    Child opened = part_of_entry(parent);
+    QuantisedNode node = node_of(structure, parent.slots, opened);
     Child parts[2];
     // What has a gain can be opened.
-    open_child(structure, entry.slots, Child(entry.lo, begin.x, entry.hi, begin.y), parts);
+    open_part(structure, node, parent.slots, opened, cut_in(parent.cuts, 0), parts);
     for (uint side = 0; side < 2; ++side) {
         uint to = side == 0u ? i : behind;
-        entries.entry[to] = entry_below(entry, given.to_world, structure, parts[side]);
-        gains.value[to] = UNKNOWN;
+        QuantisedNode of_part = node_of(structure, parent.slots, parts[side], opened.index, node);
+        Box b = world_box(given.to_world, structure, of_part, parent.slots, parts[side]);
+        Entry entry = entry_over(b, parent.instance, parts[side], parent.slots, parent.records, parent.given);
+        entry.cuts = cut_in(parent.cuts, side + 1u);
+        if (round + 1u < ROUNDS) {
+            uint gain = gain_of(entry, given.to_world, structure, of_part);
+            gains.word[to] = gain;
+            count_gain(gain, round + 1u);
+        }
+        entries.entry[to] = entry;
     }
 }
 
-void rebraid_weigh(uint round, uint chunk) {
-    if (is_over(round)) return;
-    uvec2 range = range_of_chunk(round, chunk);
+void rebraid_weigh(uint chunk) {
+    uvec2 range = range_of_chunk(0u, chunk);
     for (uint i = range.x + gl_LocalInvocationIndex; i < range.y; i += gl_WorkGroupSize.x) {
-        float gain = gains.value[i];
-        if (gain == UNKNOWN) {
-            gain = gain_of(entries.entry[i]);
-            gains.value[i] = gain;
+        Entry entry = entries.entry[i];
+        uint gain = NO_GAIN;
+        if (entry.left_out == 0u) {
+            GivenInstance given = instance_of(entry);
+            Structure structure = Structure(given.structure);
+            QuantisedNode node = node_of(structure, entry.slots, part_of_entry(entry));
+            gain = gain_of(entry, given.to_world, structure, node);
+            entries.entry[i].cuts = entry.cuts;
         }
-        if (gain > 0.0) atomicAdd(state.histogram[round * CLASSES + class_of(gain)], 1u);
+        gains.word[i] = gain;
+        count_gain(gain, 0u);
     }
 }
 
@@ -221,14 +250,14 @@ void rebraid_select(uint round, uint chunk) {
     }
 }
 
-void rebraid_open(uint round, uint chunk) {
+void rebraid_list(uint round, uint chunk) {
     uint count = entries_before(round);
     if (is_over(round)) {
         if (chunk == 0u && gl_LocalInvocationIndex == 0u) state.count[round + 1u] = count;
         return;
     }
     Selection s = selection_of(round);
-    // Each invocation opens a run of entries, and finds its place behind those that are opened before it.
+    // Each invocation lists what is opened of a run of entries, behind what is of those before it.
     uvec2 range = part_of(range_of_chunk(round, chunk), gl_LocalInvocationIndex, gl_WorkGroupSize.x);
     uvec2 kinds = kinds_in(range, s);
     of_lane[2u * gl_LocalInvocationIndex] = kinds.x;
@@ -242,10 +271,28 @@ void rebraid_open(uint round, uint chunk) {
     barrier();
     for (uint lane = 0; lane < gl_LocalInvocationIndex; ++lane) before += uvec2(of_lane[2u * lane], of_lane[2u * lane + 1u]);
     for (uint i = range.x; i < range.y; ++i) {
-        uvec2 kind = kind_of(gains.value[i], s);
-        if (kind.x != 0u || kind.y != 0u && before.y < s.quota) open(i, count + before.x + min(before.y, s.quota));
+        uvec2 kind = kind_of(gains.word[i], s);
+        if (kind.x != 0u || kind.y != 0u && before.y < s.quota) gains.word[count + before.x + min(before.y, s.quota)] = i;
         before += kind;
     }
     if (chunk == 0u && gl_LocalInvocationIndex == 0u) state.count[round + 1u] = count + all.x + min(all.y, s.quota);
+}
+
+// Counts the gains that the round has left, of a part of the classes, for the next one.
+void count_what_is_left(uint round, uint chunk) {
+    Selection s = selection_of(round);
+    uvec2 range = part_of(uvec2(0u, CLASSES), chunk, chunks);
+    for (uint i = range.x + gl_LocalInvocationIndex; i < range.y; i += gl_WorkGroupSize.x) {
+        uint there = state.histogram[round * CLASSES + i];
+        uint left = i < s.partial ? there : i == s.partial ? there - min(there, s.quota) : 0u;
+        if (left != 0u) atomicAdd(state.histogram[(round + 1u) * CLASSES + i], left);
+    }
+}
+
+void rebraid_open(uint round, uint chunk) {
+    if (is_over(round)) return;
+    if (round + 1u < ROUNDS) count_what_is_left(round, chunk);
+    uvec2 range = part_of(uvec2(entries_before(round), entries_before(round + 1u)), chunk, chunks);
+    for (uint i = range.x + gl_LocalInvocationIndex; i < range.y; i += gl_WorkGroupSize.x) open(gains.word[i], i, round);
 }
 #endif

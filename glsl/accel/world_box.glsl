@@ -29,19 +29,15 @@ bool keeps_boxes(vec4 m[3]) {
     return keeps;
 }
 
-// The box in the world around what is in the slots of a part.
-Box box_of_slots(vec4 m[3], Structure structure, uint slots, Child part) {
-    Box whole = transformed_box(m, part.lo, part.hi);
-    if (part.index >= (slots & INDEX_MASK)) return whole;
-    QuantisedNode node = QuantisedNodes(wide_nodes_at(uvec2(structure))).node[part.index];
-    uint in_use = part.count & slots_in_use(node);
-    if (node.exponents_and_nodes == LONG_LEAF || in_use == 0u) return whole;
+// The box in the world around what is in the slots of a part of a node.
+Box box_of_slots(vec4 m[3], QuantisedNode node, uint slots, Child part) {
+    uint in_use = slots_of_part(node, slots, part);
     Box b = empty_box();
-    for (uint slot = 0; slot < 8; ++slot) {
-        if ((in_use >> slot & 1u) == 0u) continue;
-        Box in_slot = box_in_slot(node, slot);
+    for (uint left = in_use; left != 0u; left &= left - 1u) {
+        Box in_slot = box_in_slot(node, uint(findLSB(left)));
         b = united(b, transformed_box(m, in_slot.lo, in_slot.hi));
     }
+    if (in_use == 0u) b = transformed_box(m, part.lo, part.hi);
     return b;
 }
 
@@ -53,17 +49,20 @@ Box box_of_two(vec4 m[3], Structure structure, uint slots, Child child) {
 }
 
 // The same of nodes of either form: those of eight have slots.
-Box box_of_children(vec4 m[3], Structure structure, uint slots, Child child) {
-    if ((slots & FORM_QUANTISED) != 0u) return box_of_slots(m, structure, slots, child);
+Box box_of_children(vec4 m[3], Structure structure, QuantisedNode node, uint slots, Child child) {
+    if ((slots & FORM_QUANTISED) != 0u) return box_of_slots(m, node, slots, child);
     return box_of_two(m, structure, slots, child);
 }
 
 // The box in the world of what is below `child` of a structure: where its own would be loose, around the boxes of the eight
 // that are three levels below, or of its slots.
-Box world_box(vec4 m[3], Structure structure, uint slots, Child child) {
-    if (keeps_boxes(m)) return transformed_box(m, child.lo, child.hi);
-    if ((slots & FORM_QUANTISED) != 0u) return box_of_slots(m, structure, slots, child);
-    // open_child() would put the cutting of slots, which is long, into every kernel that only needs boxes.
+Box world_box(vec4 m[3], Structure structure, QuantisedNode node, uint slots, Child child) {
+    if (keeps_boxes(m)) {
+        Box own = Box(child.lo, child.hi);
+        if ((slots & FORM_QUANTISED) != 0u) own = box_around(node, child);
+        return transformed_box(m, own.lo, own.hi);
+    }
+    if ((slots & FORM_QUANTISED) != 0u) return box_of_slots(m, node, slots, child);
     Box b = empty_box();
     Child children[2];
     open_node_of_two(structure, slots, child, children);

@@ -22,6 +22,8 @@
 //! Where boxes fit (spheres, upright trees), nothing is opened and the tree is the same. The default is the budget at which all
 //! loose scenes gain: more gains for cables alone, and takes memory and time to build everywhere.
 //!
+//! How long it takes beside the rest of a build: docs/notes/rays.md, "Re-braiding, opened from a list".
+//!
 //! Tried, and not worth it: weighing volume beside area, for rays that begin in boxes (city ±5%, cables −1%); opening what is
 //! tight, too (slower); more than three rounds (no change within 1%, but what is very loose among many is opened deeper: four).
 use crate::gpu::arguments::{self, REBRAID_STATE_BYTES};
@@ -63,13 +65,13 @@ impl Rebraid {
     pub fn steps(&self, context: &Context, count: u32, entries: u64, scratch: u64) -> Vec<Step> {
         // Enough for all cores; a chunk is a workgroup's.
         let chunks = count.div_ceil(256).clamp(1, CHUNKS);
-        let arguments = |first_round, chunks| arguments::Rebraid {
+        let arguments = |this_round, chunks| arguments::Rebraid {
             entries,
             gains: scratch,
             state: scratch + 4 * u64::from(self.capacity),
             table: scratch + 4 * (u64::from(self.capacity) + u64::from(STATE_WORDS)),
             capacity: self.capacity,
-            first_round,
+            this_round,
             chunks,
             instance_count: count,
         };
@@ -78,16 +80,18 @@ impl Rebraid {
             return vec![Step::new("re-braid", all, &arguments(0, 1), 1)];
         }
         let fences = Kernel::new(&shaders::ACCEL_REBRAID_FENCES, context.tuning.build.alone_group, &[]);
+        let of_chunks = |shader, round| {
+            let kernel = Kernel::new(shader, context.tuning.small_group, &[]);
+            Step::new("re-braid", kernel, &arguments(round, chunks), chunks)
+        };
         let mut steps = vec![
-            fill::step("re-braid", scratch, self.capacity + STATE_WORDS, 0),
+            fill::step("re-braid", scratch + 4 * u64::from(self.capacity), STATE_WORDS, 0),
             Step::new("re-braid", fences, &arguments(0, 1), 1),
+            of_chunks(&shaders::ACCEL_REBRAID_WEIGH, 0),
         ];
+        let of_round = [&shaders::ACCEL_REBRAID_SELECT, &shaders::ACCEL_REBRAID_LIST, &shaders::ACCEL_REBRAID_OPEN];
         for round in 0..ROUNDS {
-            for shader in [&shaders::ACCEL_REBRAID_WEIGH, &shaders::ACCEL_REBRAID_SELECT, &shaders::ACCEL_REBRAID_OPEN]
-            {
-                let kernel = Kernel::new(shader, context.tuning.small_group, &[]);
-                steps.push(Step::new("re-braid", kernel, &arguments(round, chunks), chunks));
-            }
+            steps.extend(of_round.map(|shader| of_chunks(shader, round)));
         }
         steps
     }

@@ -200,7 +200,8 @@ impl Tuning {
             exact_division: is_cpu,
             strict_floats: !is_cpu,
             measure_rounds: 64,
-            wide_alone: 1366,
+            // Nodes of 4,096 primitives; of 8,192 it takes as long as the chain.
+            wide_alone: 2731,
             sort: SortShape::strips(limits),
             build: BuildTuning {
                 run: 32,
@@ -214,8 +215,9 @@ impl Tuning {
                 meets_in_group: false,
                 workers: limits.workgroup_count.min(64),
                 small: 2048,
-                // Fast traces of 300 to 2,000 triangles take 0.25 to 0.7 of the time so, top levels of 50 to 400 instances 0.25 to 0.85.
-                small_optimised: 2048,
+                // Fast traces of 300 to 2,000 triangles take 0.25 to 0.7 of the time so, of 2,500 to 8,000 0.5 to 0.75 on two cores; top levels of
+                // 50 to 400 instances 0.25 to 0.85, of 2,400 to 8,000 entries 0.4 to 0.65, of 16,000 still 0.75, where more cores may do without.
+                small_optimised: 8192,
                 // Of 600 to 1,000 triangles a fast trace takes 0.77 to 1.06 of the time so, of 1,500 and 2,000 on two cores 1.24.
                 small_hploc: 1024,
                 small_digit_bits: 4,

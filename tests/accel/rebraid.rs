@@ -75,7 +75,7 @@ fn reached<R: Record>(structure: &Tree<R>, starts: &[[u32; 2]]) -> Vec<u32> {
 
 #[test]
 fn a_top_level_has_the_bytes_of_the_hosts() {
-    // On both sides of the size up to which one workgroup does all rounds, and of that of the builder.
+    // On both sides of the sizes up to which one workgroup does all rounds, builds, and finishes the tree.
     for (count, budget) in [
         (0, 2.0),
         (1, 7.5),
@@ -85,7 +85,7 @@ fn a_top_level_has_the_bytes_of_the_hosts() {
         (700, 5.0),
         (1024, 2.0),
         (1025, 2.0),
-        (2500, 3.3),
+        (2500, 4.0),
         (2500, 1.0),
     ] {
         let backend = with_budget(budget);
@@ -105,7 +105,8 @@ fn a_top_level_has_the_bytes_of_the_hosts() {
 
 #[test]
 fn what_the_flags_ask_for_is_what_the_host_builds() {
-    let world = mixture(400, 3);
+    // Of the second as many that a fast trace is built by a chain of dispatches.
+    let [world, large] = [mixture(400, 3), mixture(2200, 5)];
     let all = [
         Flags::empty(),
         REBRAID | Flags::PREFER_FAST_BUILD,
@@ -133,6 +134,11 @@ fn what_the_flags_ask_for_is_what_the_host_builds() {
         assert_eq!(read.top.header().primitive_count > 400, opens, "{flags:?}");
         assert_eq!(entries_of(&read).values().any(|starts| starts.len() > 1), opens, "{flags:?}");
     }
+    let (flags, options) = (Flags::PREFER_FAST_TRACE, AccelOptions::DEFAULT);
+    let read = ReadBack::new(&Ours::with_options(device(), options), &World { flags, ..large });
+    let expected = twin::top_level(&read.instances, |a| read.below(a), flags, &options);
+    assert!(read.top.header().primitive_count > 8192, "{} entries", read.top.header().primitive_count);
+    assert!(read.top.to_bytes() == expected.to_bytes(), "of many");
 }
 
 #[test]

@@ -35,7 +35,7 @@ Entry entry_of(uvec2 given_at, uint i) {
     if (header.active_count == 0u || (header.status & STATUS_UNUSABLE) != 0u) return entry;
     uint slots = min(header.node_slots, INDEX_MASK) | form_of(header);
     Child whole = whole_part(header);
-    Box b = world_box(given.to_world, structure, slots, whole);
+    Box b = world_box(given.to_world, structure, node_of(structure, slots, whole), slots, whole);
     // Too far away to be a number.
     entry.left_out = STATUS_BAD_INSTANCE;
     if (!is_finite(b.lo) || !is_finite(b.hi)) return entry;

@@ -1,7 +1,7 @@
 #version 460
-// Opens what the round has selected: see accel/rebraid.glsl for the contract.
+// Opens what the round has listed, and weighs what comes to be: see accel/rebraid.glsl for the contract.
 #include "accel/rebraid.glsl"
 
 void main() {
-    rebraid_open(first_round, group_number());
+    rebraid_open(this_round, group_number());
 }

@@ -3,5 +3,5 @@
 #include "accel/rebraid.glsl"
 
 void main() {
-    rebraid_select(first_round, group_number());
+    rebraid_select(this_round, group_number());
 }

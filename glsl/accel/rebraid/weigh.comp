@@ -1,7 +1,7 @@
 #version 460
-// What opening entries would save: see accel/rebraid.glsl for the contract.
+// What opening the entries would save that there are at first: see accel/rebraid.glsl for the contract.
 #include "accel/rebraid.glsl"
 
 void main() {
-    rebraid_weigh(first_round, group_number());
+    rebraid_weigh(group_number());
 }

@@ -7,16 +7,17 @@
 #include "accel/rebraid.glsl"
 
 void main() {
-    for (uint i = gl_LocalInvocationIndex; i < capacity; i += gl_WorkGroupSize.x) gains.value[i] = UNKNOWN;
     for (uint i = gl_LocalInvocationIndex; i < ROUNDS * CLASSES; i += gl_WorkGroupSize.x) state.histogram[i] = 0u;
     rebraid_fences();
     next_phase();
-    for (uint round = 0; round < ROUNDS && !is_over(round); ++round) {
-        rebraid_weigh(round, 0u);
+    rebraid_weigh(0u);
+    next_phase();
+    for (uint i = 0; i < ROUNDS && !is_over(i); ++i) {
+        rebraid_select(i, 0u);
         next_phase();
-        rebraid_select(round, 0u);
+        rebraid_list(i, 0u);
         next_phase();
-        rebraid_open(round, 0u);
+        rebraid_open(i, 0u);
         next_phase();
     }
 }
