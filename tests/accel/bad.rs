@@ -10,7 +10,7 @@ use crate::common::matrices::{moved, rotation, scaled};
 use crate::common::probe::{CONFIRM, IGNORE, Probe, ProbeRay, ProbeReport};
 use crate::common::shapes::{Corners, boxes, soup};
 use crate::common::world::{BuiltWorld, Part, World, bottom_level, instances_at, top_level};
-use hedgerow::accel::{AccelOptions, Instance, Tree, Wide};
+use hedgerow::accel::{AccelOptions, Instance, REBRAID, Tree, Wide};
 use hedgerow::ash::vk;
 use hedgerow::bvh::geometry::{IndexFormat, VertexFormat};
 use hedgerow::bvh::layout::{self, Bvh2, Child, Header, InstanceRecord as Placed, NODES_OFFSET, Triangle, status};
@@ -249,10 +249,18 @@ fn hits_of(reports: &[ProbeReport]) -> usize {
     reports.iter().filter(|report| report.committed.kind != 0).count()
 }
 
+/// What makes structures of either form of node.
+fn either_form() -> [Ours; 2] {
+    [Wide::Never, Wide::Always].map(|wide| Ours::with_options(device(), AccelOptions { wide, ..AccelOptions::DEFAULT }))
+}
+
 /// Below a good top level: its instance is empty, or finite somehow; and the other instance is hit as before.
 #[test]
 fn queries_of_overwritten_bottom_levels_end() {
-    let ours = Ours::on(device());
+    either_form().iter().for_each(queries_of_bottom_levels_end);
+}
+
+fn queries_of_bottom_levels_end(ours: &Ours) {
     let mut random = SplitMix64::new(11);
     let rays = rays(128);
     for part in [
@@ -262,7 +270,7 @@ fn queries_of_overwritten_bottom_levels_end() {
         let other = Part::Triangles(vec![(soup(50, 0.4, 3), GeometryFlags::OPAQUE)]);
         let instances = vec![Instance::new(1, rotation(1)), Instance::new(2, rotation(2))];
         let world = World::new(vec![part, other], instances);
-        let built = world.build(&ours);
+        let built = world.build(ours);
         let stale = &built.parts[0];
         let original = stale.memory.read::<u8>(stale.bytes as usize);
         let mut without = world.clone();
@@ -277,14 +285,14 @@ fn queries_of_overwritten_bottom_levels_end() {
             let reports = ours.probe(stale.structure, &rays);
             assert_finite(&format!("itself, overwritten {how}"), &rays, &reports);
             assert!(how >= NO_HEADER || hits_of(&reports) == 0, "itself, overwritten {how}");
-            // A top level that is built over it ends, too, and may leave it out.
-            let again = top_level(&ours, &built.geometry, Range::default().primitive_count(2), world.flags);
-            let header = again.memory.read::<Header>(1)[0];
-            assert!(
-                how >= 4 || (header.active, header.status) == (1, status::BAD_INSTANCE),
-                "overwritten {how}: {header:?}"
-            );
-            assert_finite(&format!("built over {how}"), &rays, &ours.probe(again.structure, &rays));
+            // A top level that is built over it ends, too, and may leave it out or open it.
+            for flags in [world.flags, REBRAID] {
+                let again = top_level(ours, &built.geometry, Range::default().primitive_count(2), flags);
+                let header = again.memory.read::<Header>(1)[0];
+                let leaves_it_out = header.status == status::BAD_INSTANCE && (flags == REBRAID || header.active == 1);
+                assert!(how >= 4 || leaves_it_out, "overwritten {how}, {flags:?}: {header:?}");
+                assert_finite(&format!("built over {how}, {flags:?}"), &rays, &ours.probe(again.structure, &rays));
+            }
             stale.memory.write(&original);
         }
         assert_reports("as it was", &world, &rays, &ours.probe(built.top.structure, &rays));
@@ -294,12 +302,15 @@ fn queries_of_overwritten_bottom_levels_end() {
 /// The records, which hold addresses, stay: nothing can be said of a structure that sends a query to any place.
 #[test]
 fn queries_of_overwritten_top_levels_end() {
-    let ours = Ours::on(device());
+    either_form().iter().for_each(queries_of_top_levels_end);
+}
+
+fn queries_of_top_levels_end(ours: &Ours) {
     let mut random = SplitMix64::new(12);
     let part = Part::Triangles(vec![(soup(50, 0.4, 3), GeometryFlags::OPAQUE)]);
     let instances = (0..60).map(|i| Instance::new(1, moved(rotation(i), random.around(1.0)))).collect();
     let world = World::new(vec![part], instances);
-    let built = world.build(&ours);
+    let built = world.build(ours);
     let original = built.top.memory.read::<u8>(built.top.bytes as usize);
     let records = original.len() - 60 * size_of::<Placed>();
     let rays = rays(128);
@@ -317,9 +328,7 @@ fn queries_of_overwritten_top_levels_end() {
 /// reports alone.
 #[test]
 fn two_queries_of_an_invocation_leave_each_other_alone() {
-    for wide in [Wide::Never, Wide::Always] {
-        leave_each_other_alone(&Ours::with_options(device(), AccelOptions { wide, ..AccelOptions::DEFAULT }));
-    }
+    either_form().iter().for_each(leave_each_other_alone);
 }
 
 fn leave_each_other_alone(ours: &Ours) {
